@@ -100,6 +100,15 @@ double JointBlocks::coupling(size_t i, size_t j) const {
   return sum;
 }
 
+double JointBlocks::coupling(size_t i, const Row& other) const {
+  double sum = rows_[i].coupling(other);
+  if (const Third* third = third_of(i)) {
+    if (other.a == third->body) sum += third->angular.dot(other.turns_a);
+    if (other.b == third->body) sum += third->angular.dot(other.turns_b);
+  }
+  return sum;
+}
+
 double JointBlocks::velocity(size_t i, const SolverBodies& bodies) const {
   const Third* third = third_of(i);
   return rows_[i].velocity(bodies) +
@@ -299,7 +308,7 @@ void JointBlocks::factor(Block& block) {
   block.factored = true;
 }
 
-void JointBlocks::solve(const Block& block, std::vector<double>& x) const {
+void JointBlocks::solve_lower(const Block& block, double* x) const {
   const size_t n = block.free.size();
   for (size_t i = 0; i < n; ++i) {
     const double* of_i = &block.factor[i * n];
@@ -307,6 +316,11 @@ void JointBlocks::solve(const Block& block, std::vector<double>& x) const {
     for (size_t k = block.begin[i]; k < i; ++k) sum -= of_i[k] * x[k];
     x[i] = sum / of_i[i];
   }
+}
+
+void JointBlocks::solve(const Block& block, std::vector<double>& x) const {
+  const size_t n = block.free.size();
+  solve_lower(block, x.data());
   for (size_t i = n; i-- > 0;) {
     const double* of_i = &block.factor[i * n];
     x[i] /= of_i[i];
@@ -346,6 +360,49 @@ double JointBlocks::sweep(SolverBodies& bodies) {
     for (const size_t i : block.bounded) worst = std::max(worst, relax(i, bodies));
   }
   return worst;
+}
+
+size_t JointBlocks::mechanism(int body, const SolverBodies& bodies) {
+  const size_t i = static_cast<size_t>(body);
+  if (bodies[i].inverse_mass == Vec3::Zero()) return 0;
+  return rows_.empty() ? i : root(i);
+}
+
+void JointBlocks::tell_responses(const std::vector<Row*>& contacts,
+                                 std::vector<double>& responses) {
+  const size_t n = contacts.size();
+  responses.resize(n * n);
+  for (size_t i = 0; i < n; ++i) {
+    for (size_t j = 0; j <= i; ++j) responses[i * n + j] = contacts[i]->coupling(*contacts[j]);
+  }
+  for (size_t b = 0; b < block_count_; ++b) {
+    if (blocks_[b].factored) take_off_held(blocks_[b], contacts, responses);
+  }
+  for (size_t i = 0; i < n; ++i) {
+    for (size_t j = 0; j < i; ++j) responses[j * n + i] = responses[i * n + j];
+  }
+}
+
+// C^T K^-1 C, where K = L L^T is the rows' own response and C that to the contacts.
+void JointBlocks::take_off_held(const Block& block, const std::vector<Row*>& contacts,
+                                std::vector<double>& responses) {
+  const size_t n = contacts.size(), m = block.free.size();
+  held_.resize(n * m);
+  bool any = false;
+  for (size_t i = 0; i < n; ++i) {
+    double* of_i = &held_[i * m];
+    for (size_t k = 0; k < m; ++k) {
+      of_i[k] = coupling(block.free[k], *contacts[i]);
+      any |= of_i[k] != 0.0;
+    }
+  }
+  if (!any) return;
+  for (size_t i = 0; i < n; ++i) {
+    solve_lower(block, &held_[i * m]);
+    for (size_t j = 0; j <= i; ++j) {
+      for (size_t k = 0; k < m; ++k) responses[i * n + j] -= held_[i * m + k] * held_[j * m + k];
+    }
+  }
 }
 
 double JointBlocks::look_again(double substep_s) {

@@ -30,6 +30,13 @@ class JointBlocks {
   double look_again(double substep_s);
   void write_back() const;  // to the motors
 
+  // The mechanism of a body, as the number of its first body; 0: what nothing moves. Joints are
+  // prepared.
+  size_t mechanism(int body, const SolverBodies& bodies);
+  // Of contacts: what an impulse of each changes in the velocity of each while the rows that are
+  // solved directly hold, by rows of a square matrix. A sweep was made.
+  void tell_responses(const std::vector<Row*>& contacts, std::vector<double>& responses);
+
   // Which bodies are tied together, and by which rows.
   void tell_pairs(std::vector<std::pair<int, int>>& pairs) const;
   void tell_rows(Newton& newton);
@@ -59,6 +66,7 @@ class JointBlocks {
   };
   const Third* third_of(size_t row) const;
   double coupling(size_t i, size_t j) const;
+  double coupling(size_t i, const Row& other) const;
   double velocity(size_t i, const SolverBodies& bodies) const;
   double push_velocity(size_t i, const SolverBodies& bodies) const;
   void give(size_t i, SolverBodies& bodies, double more);
@@ -79,6 +87,9 @@ class JointBlocks {
   void find_envelope(Block& block);
   void factor(Block& block);
   void solve(const Block& block, std::vector<double>& x) const;
+  void solve_lower(const Block& block, double* x) const;
+  void take_off_held(const Block& block, const std::vector<Row*>& contacts,
+                     std::vector<double>& responses);
 
   std::vector<Row> rows_;
   std::vector<Third> thirds_;
@@ -89,6 +100,7 @@ class JointBlocks {
   std::vector<size_t> block_of_root_;
   std::vector<double> x_;              // scratch
   std::vector<size_t> first_of_body_;  // scratch: a block's first row at each body
+  std::vector<double> held_;           // scratch: of contacts
 };
 
 }  // namespace ruedo::physics

@@ -64,14 +64,18 @@ Quat principal_axes(const Eigen::Matrix3d& inertia, Vec3& moments) {
   return Quat(axes).normalized();
 }
 
-// The wheel of a wheels drive that this body is, or -1.
-int driven_wheel(const model::BodyLayout& layout, int index) {
-  const int instance = layout.bodies[static_cast<size_t>(index)].instance;
+const model::RobotPlacement* robot_of(const model::BodyLayout& layout, int instance) {
   const auto robot =
       std::lower_bound(layout.robots.begin(), layout.robots.end(), instance,
                        [](const model::RobotPlacement& a, int b) { return a.instance < b; });
-  if (robot == layout.robots.end() || robot->instance != instance || robot->body == index)
-    return -1;
+  return robot != layout.robots.end() && robot->instance == instance ? &*robot : nullptr;
+}
+
+// The wheel of a wheels drive that this body is, or -1.
+int driven_wheel(const model::BodyLayout& layout, int index) {
+  const model::RobotPlacement* robot =
+      robot_of(layout, layout.bodies[static_cast<size_t>(index)].instance);
+  if (!robot || robot->body == index) return -1;
   for (const int wheel : robot->wheels) {
     const model::WheelPlacement& placement = layout.wheels[static_cast<size_t>(wheel)];
     if (!placement.steers && layout.links[static_cast<size_t>(placement.link)].body == index)
@@ -84,6 +88,11 @@ double mass_on_each_wheel(const model::Model& model, const model::RobotPlacement
   double mass = 0.0;
   for (const auto& link : model.links) mass += link.inertial.mass;
   return mass / static_cast<double>(std::max<size_t>(robot.wheels.size(), 1));
+}
+
+void make_it_give(double share, const Vec3& gravity, ShapeSurface& surface) {
+  surface.stiffness = share * gravity.norm() / kTyreGives_m;
+  surface.damping = kTyreDamping * 2.0 * std::sqrt(surface.stiffness * share);
 }
 
 bool carries_kinematic_drive(const model::WorldModel& world, const model::BodyLayout& layout,
@@ -162,10 +171,23 @@ ShapeSurface RigidBodies::tyre_of(const model::WorldModel& world, const model::B
   }
   if (tyre.along_I == Vec3::Zero()) tyre.axle_I = Vec3::UnitY();
   if (tyre.stiffness > 0.0) return tyre;  // the file says how it gives
-  const double share = mass_on_each_wheel(model, robot);
-  tyre.stiffness = share * world.gravity.norm() / kTyreGives_m;
-  tyre.damping = kTyreDamping * 2.0 * std::sqrt(tyre.stiffness * share);
+  make_it_give(mass_on_each_wheel(model, robot), world.gravity, tyre);
   return tyre;
+}
+
+// What else a robot stands on, casters above all, gives way like its tyres: rigid, it would bear
+// all and leave the wheels nothing. Against what it runs into it is as hard as before.
+ShapeSurface RigidBodies::foot_of(const model::WorldModel& world, const model::BodyLayout& layout,
+                                  int instance, const ShapeSurface& surface) const {
+  const model::Model& model = *world.models[static_cast<size_t>(instance)].model;
+  const model::RobotPlacement* robot = robot_of(layout, instance);
+  using Kind = model::DriveDescription::Kind;
+  if (surface.stiffness > 0.0 || !robot || !model.drive || model.drive->kind != Kind::wheels)
+    return surface;
+  ShapeSurface foot = surface;
+  make_it_give(mass_on_each_wheel(model, *robot), world.gravity, foot);
+  if (foot.stiffness > 0.0) foot.borne_along = -world.gravity.normalized();
+  return foot;
 }
 
 void RigidBodies::make_body(const model::WorldModel& world, const model::BodyLayout& layout,
@@ -221,7 +243,8 @@ void RigidBodies::make_body(const model::WorldModel& world, const model::BodyLay
         body.info.collisions.push_back(static_cast<int>(c));
         body.info.surfaces.push_back(surface_of(collision.surface, X_IC.rotation));
         ShapeSurface& surface = body.info.surfaces.back();
-        if (wheel >= 0) surface = tyre_of(world, layout, wheel, surface);
+        surface = wheel >= 0 ? tyre_of(world, layout, wheel, surface)
+                             : foot_of(world, layout, placement.instance, surface);
         if (imposed && link_placement.wheel >= 0) surface.friction = surface.friction2 = 0.0;
       }
     }

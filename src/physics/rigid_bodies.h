@@ -62,6 +62,8 @@ class RigidBodies {
   void make_statics(const model::WorldModel& world, const model::BodyLayout& layout, size_t link);
   ShapeSurface tyre_of(const model::WorldModel& world, const model::BodyLayout& layout, int wheel,
                        const ShapeSurface& surface) const;
+  ShapeSurface foot_of(const model::WorldModel& world, const model::BodyLayout& layout,
+                       int instance, const ShapeSurface& surface) const;
   void make_body(const model::WorldModel& world, const model::BodyLayout& layout, int index);
   ShapeFactory shapes_;
 };

@@ -15,6 +15,10 @@ constexpr double kSlowestBounce_m_s = 1e-3;
 // So deep a contact is left in peace. Were it undone, too, what rests would be lifted a little,
 // fall a little, and rock.
 constexpr double kRestingDepth_m = 5e-5;
+// What bore a load bears it up to so small a gap, and nothing stands so much higher than the rest.
+// Surfaces yield by more.
+constexpr double kTouching_m = 1e-5;
+constexpr double kStanding_m_s = 1e-3;
 constexpr int kPushSweeps = 30;
 constexpr double kPushTolerance_m_s = 1e-5;
 // Sweeps that come first, and again after so many. One factorization may cost as much as so many
@@ -129,7 +133,11 @@ void Solver::set_normal(ContactRows& contact, const ContactSurface& surface, dou
   row.prepare(bodies_);
   row.lower = 0.0;
   row.upper = BT_LARGE_FLOAT;
-  row.target = gap > 0.0 ? -gap / substep_s : contact.soft ? -reduction * gap / substep_s : 0.0;
+  const bool bore = contact.point->m_appliedImpulse > 0.0 && gap <= kTouching_m && !contact.soft;
+  row.target = bore           ? 0.0
+               : gap > 0.0    ? -gap / substep_s
+               : contact.soft ? -reduction * gap / substep_s
+                              : 0.0;
   row.push_target = gap < -kRestingDepth_m && !contact.soft
                         ? -reduction * (gap + kRestingDepth_m) / substep_s
                         : 0.0;
@@ -227,6 +235,7 @@ void Solver::add_contacts(btPersistentManifold& manifold, double substep_s) {
   for (int i = 0; i < manifold.getNumContacts(); ++i) {
     btManifoldPoint& point = manifold.getContactPoint(i);
     add_contact(point, surfaces_.at(a, b, point), of_a, of_b, substep_s);
+    contacts_[contact_count_ - 1].manifold = &manifold;
   }
 }
 
@@ -297,11 +306,19 @@ void Solver::sweep_until_still() {
   const auto start_conjugates = [](Row& row) { row.before = row.impulse, row.heading = 0.0; };
   for_each_main_row(start_conjugates);
   double last_square = 0.0, before_newton = 0.0;
-  bool after_newton = false;
+  bool after_newton = false, shared = false;
   for (int i = 0; i < settings_.iterations; ++i) {
     const double worst = sweep(i);
     ++sweeps_;
-    if (worst <= settings_.tolerance_m_s || i + 1 == settings_.iterations) break;
+    if (i + 1 == settings_.iterations) break;
+    if (worst <= settings_.tolerance_m_s) {
+      if (shared || !share_loads()) break;
+      shared = true;
+      after_newton = false;
+      last_square = 0.0;
+      for_each_main_row(start_conjugates);
+      continue;
+    }
     if (after_newton && worst > before_newton) {
       for_each_main_row([this](Row& row) { row.give(bodies_, row.before - row.impulse); });
     }
@@ -316,6 +333,34 @@ void Solver::sweep_until_still() {
       go_on_along_conjugates(last_square, i);
     }
   }
+}
+
+// Returns whether any load changed.
+bool Solver::share_loads() {
+  if (contact_count_ < 3) return false;
+  shares_.begin();
+  for (size_t c = 0; c < contact_count_; ++c) {
+    ContactRows& contact = contacts_[c];
+    Row& row = contact.normal;
+    if (row.inverse == 0.0 || contact.soft || contact.gap > kTouching_m) continue;
+    if (row.impulse <= 0.0 && row.velocity(bodies_) > kStanding_m_s) continue;
+    Bearing bearing;
+    bearing.normal = &row;
+    bearing.manifold = contact.manifold;
+    bearing.shape = contact.point->m_index0;
+    bearing.other_shape = contact.point->m_index1;
+    bearing.place = from_bt(contact.point->getPositionWorldOnB());
+    bearing.on = blocks_.mechanism(row.a, bodies_);
+    bearing.against = blocks_.mechanism(row.b, bodies_);
+    if (bearing.on == bearing.against) continue;
+    bearing.direction = row.linear_a;
+    if (bearing.on < bearing.against) {
+      std::swap(bearing.on, bearing.against);
+      bearing.direction = row.linear_b;
+    }
+    shares_.add(bearing);
+  }
+  return shares_.spread(bodies_, blocks_, settings_.tolerance_m_s);
 }
 
 void Solver::go_on_along_conjugates(double& last_square, int sweep) {

@@ -2,7 +2,7 @@
 // are tied to each other.
 //
 // Projected Gauss-Seidel on impulses, started with those of the last substep, as in Bullet's own
-// sequential impulses (E. Catto, "Iterative dynamics with temporal coherence", 2005), with four
+// sequential impulses (E. Catto, "Iterative dynamics with temporal coherence", 2005), with five
 // differences that were measured to matter:
 // - Sweeps are accelerated by conjugate directions, and go on until no row changes a velocity by
 // more than a tolerance, up to
@@ -14,6 +14,8 @@
 //   the slip of greatest dissipation, whatever the heading.
 // - Penetration and joint errors are undone by velocities of their own, which are forgotten: they
 // add no energy.
+// - A load that more contacts bear than need to is shared as equal springs share it
+// (load_shares.h).
 #pragma once
 
 #include <array>
@@ -21,6 +23,7 @@
 
 #include "physics/bullet.h"
 #include "physics/joint_block.h"
+#include "physics/load_shares.h"
 #include "physics/newton.h"
 #include "physics/rows.h"
 
@@ -71,6 +74,7 @@ class Solver {
  private:
   struct ContactRows {
     btManifoldPoint* point = nullptr;
+    const btPersistentManifold* manifold = nullptr;
     Row normal, along, across, spin, roll[2];
     double friction = 0.0, friction2 = 0.0, spinning = 0.0, rolling = 0.0;
     double step = 0.0;     // of the projected gradient for both directions of friction
@@ -93,6 +97,7 @@ class Solver {
   double rub(ContactRows& contact);
   double sweep(int number);
   void sweep_until_still();
+  bool share_loads();
   void go_on_along_conjugates(double& last_square, int sweep);
   bool newton_pays();
   void solve_at_once();
@@ -115,6 +120,7 @@ class Solver {
   std::vector<ContactRows> contacts_;
   size_t contact_count_ = 0;
   JointBlocks blocks_;
+  LoadShares shares_;
   Newton newton_;
   bool newton_known_ = false, newton_pays_ = false;  // of this island
   std::vector<std::pair<int, int>> pairs_;           // of bodies that rows tie together

@@ -52,6 +52,12 @@ double in_series(double k1, double k2) {
   return k1 > 0.0 && k2 > 0.0 ? k1 * k2 / (k1 + k2) : std::max(k1, k2);
 }
 
+// force: direction of what the contact does to the shape.
+bool gives_way(const ShapeSurface& surface, const Vec3& force) {
+  constexpr double kFromBelow = 0.7;
+  return surface.borne_along == Vec3::Zero() || surface.borne_along.dot(force) > kFromBelow;
+}
+
 }  // namespace
 
 ShapeSurface surface_of(const model::Surface& surface, const Quat& R_IC) {
@@ -95,8 +101,10 @@ ContactSurface Surfaces::at(const btCollisionObject& a, const btCollisionObject&
   both.spinning = std::max(lever_a, lever_b);
   both.rolling = std::max(of_a.rolling_m, of_b.rolling_m);
   both.restitution = of_a.restitution * of_b.restitution;
-  both.stiffness = in_series(of_a.stiffness, of_b.stiffness);
-  both.damping = both.stiffness > 0.0 ? of_a.damping + of_b.damping : 0.0;
+  const bool a_gives = gives_way(of_a, normal), b_gives = gives_way(of_b, -normal);
+  both.stiffness = in_series(a_gives ? of_a.stiffness : 0.0, b_gives ? of_b.stiffness : 0.0);
+  if (both.stiffness > 0.0)
+    both.damping = (a_gives ? of_a.damping : 0.0) + (b_gives ? of_b.damping : 0.0);
   return both;
 }
 

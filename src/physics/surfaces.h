@@ -26,6 +26,8 @@ struct ShapeSurface {
   double rolling_m = 0.0;
   double restitution = 0.0;
   double stiffness = 0.0, damping = 0.0;  // 0: rigid
+  // World. Where it is given, the shape gives way only to what bears it along this direction.
+  Vec3 borne_along = Vec3::Zero();
 };
 
 // R_IC: the collision's axes in the body's frame.
