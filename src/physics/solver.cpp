@@ -24,6 +24,8 @@ constexpr double kPushTolerance_m_s = 1e-5;
 // Sweeps that come first, and again after so many. One factorization may cost as much as so many
 // sweeps.
 constexpr int kSweepsBeforeNewton = 1, kSweepsBetweenNewton = 40, kNewtonSteps = 15;
+// Where friction holds a load, it does not become still while a few contacts bear all.
+constexpr int kSweepsBeforeSharing = 10;
 constexpr int kSweepsOfMechanisms = 20;  // before Newton: their joints are solved at once anyway
 constexpr size_t kFewBodies = 2;         // what never moves, and another one: sweeps are faster
 constexpr double kSweepsForAFactor = 30.0, kProductsOfARow = 40.0, kSmall = 20'000.0;
@@ -311,13 +313,17 @@ void Solver::sweep_until_still() {
     const double worst = sweep(i);
     ++sweeps_;
     if (i + 1 == settings_.iterations) break;
-    if (worst <= settings_.tolerance_m_s) {
-      if (shared || !share_loads()) break;
-      shared = true;
-      after_newton = false;
-      last_square = 0.0;
-      for_each_main_row(start_conjugates);
-      continue;
+    const bool still = worst <= settings_.tolerance_m_s;
+    if (still && shared) break;
+    if (still || i == kSweepsBeforeSharing) {
+      shared = still;
+      if (share_loads()) {
+        after_newton = false;
+        last_square = 0.0;
+        for_each_main_row(start_conjugates);
+        continue;
+      }
+      if (still) break;
     }
     if (after_newton && worst > before_newton) {
       for_each_main_row([this](Row& row) { row.give(bodies_, row.before - row.impulse); });
