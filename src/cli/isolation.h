@@ -3,9 +3,8 @@
 
 namespace ruedo::cli {
 
-// Starts this program again, with its arguments, in a network namespace in which multicast goes
-// over the loopback device; there it returns true. False where the system has no namespaces for
-// this user. Call it before any thread is made.
+// Moves this program into a network namespace in which multicast goes over the loopback device.
+// False where the system has no namespaces for this user. Call it before any thread is made.
 bool isolate();
 
 }  // namespace ruedo::cli

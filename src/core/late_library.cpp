@@ -2,10 +2,21 @@
 // of the program, or of the shared library in its place.
 #include "core/late_library.h"
 
+#include <algorithm>
+#include <string_view>
+
 #include <dlfcn.h>
+#include <fcntl.h>
+#include <link.h>
+#include <spawn.h>
+#include <sys/auxv.h>
+#include <sys/wait.h>
+#include <unistd.h>
 
 namespace ruedo {
 namespace {
+
+constexpr LateLibrary kAll[] = {LateLibrary::codecs, LateLibrary::osmesa};
 
 const char* file_of(LateLibrary library) {
   switch (library) {
@@ -13,6 +24,78 @@ const char* file_of(LateLibrary library) {
     case LateLibrary::osmesa: return "libruedo_osmesa.so";
   }
   return "";
+}
+
+// The program's dynamic loader, as a program.
+std::string loader() {
+  std::string path;
+  dl_iterate_phdr(
+      [](dl_phdr_info* info, size_t, void* data) {
+        if (info->dlpi_addr != getauxval(AT_BASE)) return 0;
+        *static_cast<std::string*>(data) = info->dlpi_name;
+        return 1;
+      },
+      &path);
+  return path;
+}
+
+// Where dlopen finds it: in the folders that the program, or the shared library that this code is
+// part of, names.
+std::string path_of(const char* name) {
+  static const int here = 0;
+  Dl_info info;
+  link_map* self = nullptr;
+  Dl_serinfo size;
+  if (::dladdr1(&here, &info, reinterpret_cast<void**>(&self), RTLD_DL_LINKMAP) == 0 ||
+      ::dlinfo(self, RTLD_DI_SERINFOSIZE, &size) != 0)
+    return "";
+  std::vector<Dl_serinfo> room(size.dls_size / sizeof(Dl_serinfo) + 1);
+  Dl_serinfo* folders = room.data();
+  *folders = size;
+  if (::dlinfo(self, RTLD_DI_SERINFO, folders) != 0) return "";
+  for (unsigned i = 0; i < folders->dls_cnt; ++i) {
+    std::string path = std::string(folders->dls_serpath[i].dls_name) + "/" + name;
+    if (::access(path.c_str(), R_OK) == 0) return path;
+  }
+  return "";
+}
+
+// What the loader prints of a library's dependencies: a line "NAME => PATH (ADDRESS)" of each.
+std::string listing(const std::string& library) {
+  int ends[2];
+  if (::pipe2(ends, O_CLOEXEC) != 0) return "";
+  const std::string program = loader();
+  const char* words[] = {program.c_str(), "--list", library.c_str(), nullptr};
+  posix_spawn_file_actions_t actions;
+  posix_spawn_file_actions_init(&actions);
+  posix_spawn_file_actions_adddup2(&actions, ends[1], STDOUT_FILENO);
+  posix_spawn_file_actions_addopen(&actions, STDERR_FILENO, "/dev/null", O_WRONLY, 0);
+  pid_t child = -1;
+  const int fault =
+      ::posix_spawn(&child, program.c_str(), &actions, nullptr, const_cast<char**>(words), environ);
+  posix_spawn_file_actions_destroy(&actions);
+  ::close(ends[1]);
+  std::string text;
+  char part[4096];
+  for (ssize_t size = 0; fault == 0 && (size = ::read(ends[0], part, sizeof part)) > 0;)
+    text.append(part, static_cast<size_t>(size));
+  ::close(ends[0]);
+  int status = 1;
+  if (fault != 0 || ::waitpid(child, &status, 0) != child || status != 0) return "";
+  return text;
+}
+
+void add_files(std::string_view lines, std::vector<std::string>& files) {
+  constexpr std::string_view kArrow = " => ";
+  for (size_t begin = 0; begin < lines.size();) {
+    const size_t end = std::min(lines.find('\n', begin), lines.size());
+    const std::string_view line = lines.substr(begin, end - begin);
+    begin = end + 1;
+    const size_t arrow = line.find(kArrow), address = line.rfind(" (0x");
+    if (arrow == line.npos || address == line.npos || address < arrow) continue;
+    const size_t path = arrow + kArrow.size();
+    files.emplace_back(line.substr(path, address - path));
+  }
 }
 
 }  // namespace
@@ -28,8 +111,20 @@ void* late_symbol(LateLibrary library, const char* name, std::string& why) {
 }
 
 void load_late_libraries() {
-  for (const LateLibrary library : {LateLibrary::codecs, LateLibrary::osmesa})
-    ::dlopen(file_of(library), RTLD_NOW | RTLD_LOCAL);
+  for (const LateLibrary library : kAll) ::dlopen(file_of(library), RTLD_NOW | RTLD_LOCAL);
+}
+
+const std::vector<std::string>& files_of_late_libraries() {
+  static const std::vector<std::string> files = [] {
+    std::vector<std::string> found;
+    for (const LateLibrary library : kAll) {
+      if (::dlopen(file_of(library), RTLD_LAZY | RTLD_NOLOAD) != nullptr) continue;
+      const std::string path = path_of(file_of(library));
+      if (!path.empty()) add_files(listing(path), found);
+    }
+    return found;
+  }();
+  return files;
 }
 
 }  // namespace ruedo

@@ -4,6 +4,7 @@
 #pragma once
 
 #include <string>
+#include <vector>
 
 namespace ruedo {
 
@@ -18,8 +19,12 @@ Function* late_function(LateLibrary library, const char* name, std::string& why)
   return reinterpret_cast<Function*>(late_symbol(library, name, why));
 }
 
-// Loads all that there are: before files are out of reach, or before a caller asks which libraries
-// this process has.
+// Loads all that there are: before files are out of reach.
 void load_late_libraries();
+
+// The shared libraries that would come in with those that are not loaded yet, by path. The loader
+// lists them, once in a process: to load a hundred libraries for their names would take longer than
+// all else that a run begins with.
+const std::vector<std::string>& files_of_late_libraries();
 
 }  // namespace ruedo

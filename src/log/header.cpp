@@ -117,17 +117,22 @@ std::string own_version() {
 std::string libc_version() { return std::string("glibc ") + gnu_get_libc_version(); }
 
 std::vector<std::string> libraries_that_matter() {
-  load_late_libraries();  // whether or not a picture was drawn by now
-  std::set<std::string> names;
+  std::vector<std::string> files;
   dl_iterate_phdr(
       [](dl_phdr_info* info, size_t, void* data) {
-        std::error_code error;
-        const std::filesystem::path path = std::filesystem::canonical(info->dlpi_name, error);
-        const std::string name = path.filename().string();
-        if (!error && matters(name)) static_cast<std::set<std::string>*>(data)->insert(name);
+        static_cast<std::vector<std::string>*>(data)->emplace_back(info->dlpi_name);
         return 0;
       },
-      &names);
+      &files);
+  const std::vector<std::string>& late = files_of_late_libraries();
+  files.insert(files.end(), late.begin(), late.end());  // whether or not a picture was drawn by now
+  std::set<std::string> names;
+  for (const std::string& file : files) {
+    std::error_code error;
+    const std::filesystem::path path = std::filesystem::canonical(file, error);
+    const std::string name = path.filename().string();
+    if (!error && matters(name)) names.insert(name);
+  }
   return {names.begin(), names.end()};
 }
 

@@ -4,10 +4,11 @@ client; and they repeat.
 
 import math
 import re
+import time
 
 import pytest
 import ruedo as client
-from conftest import SOURCE, ruedo
+from conftest import PATIENCE, SOURCE, ruedo
 from ruedo import World
 from ruedo.lcmtypes import fault_t, odometry_t, planar_lidar_t, pose_t
 
@@ -276,3 +277,27 @@ def test_from_a_client_it_is_in_the_log_and_repeats(tmp_path):
     assert "repeated byte for byte" in ruedo("verify", "run.lcm", folder=tmp_path).stdout
     log = (tmp_path / "run.lcm").read_bytes()
     assert b"p3at/fault" in log
+
+
+def test_injected_in_a_run_it_acts_at_once_and_ends(tmp_path):
+    (tmp_path / "w.sdf").write_text(HALL)
+    log = tmp_path / "run.lcm"
+    with client.launch(
+        tmp_path / "w.sdf", noise=False, args=["--record", str(log)], disable=DISABLED
+    ) as sim:
+        robot = sim.robot("p3at")
+        scans = robot.lrf.reader()
+
+        def wait_for_scan(is_wanted):
+            until = time.monotonic() + PATIENCE
+            while not is_wanted(scans.next(PATIENCE).ranges):
+                assert time.monotonic() < until
+
+        wait_for_scan(lambda ranges: ranges.min() > 1.0)
+        robot.inject("blocked", "lrf", duration=1.0, value=0.1)
+        wait_for_scan(lambda ranges: ranges.max() == pytest.approx(0.1))
+        wait_for_scan(lambda ranges: ranges.min() > 1.0)
+        with pytest.raises(ValueError, match="value"):
+            robot.inject("lag", "lrf", value=math.nan)
+    assert "repeated byte for byte" in ruedo("verify", log, folder=tmp_path).stdout
+    assert b"p3at/fault" in log.read_bytes()

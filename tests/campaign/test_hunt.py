@@ -69,6 +69,14 @@ def test_trusts_a_frozen_scan_and_the_find_is_kept_as_a_test(example):
         file.name for file in kept.iterdir()
     }
     assert "repeated byte for byte" in ruedo("verify", kept / "run.lcm", folder=folder).stdout
+    (folder / "CMakeLists.txt").write_text(
+        "cmake_minimum_required(VERSION 3.20)\nproject(mine NONE)\nenable_testing()\n"
+        "add_subdirectory(kept/frozen)\n"
+    )
+    ctest = ["ctest", "--test-dir", "build", "--output-on-failure"]
+    subprocess.run(["cmake", "-S", ".", "-B", "build"], cwd=folder, check=True)
+    failed = subprocess.run(ctest, cwd=folder, capture_output=True, text=True, timeout=PATIENCE)
+    assert failed.returncode != 0 and "touched" in failed.stdout, failed.stdout
     command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", str(kept)]
     failed = subprocess.run(command, capture_output=True, text=True, timeout=PATIENCE)
     assert failed.returncode == 1 and "touched" in failed.stdout, failed.stdout + failed.stderr
@@ -93,6 +101,8 @@ def test_trusts_a_frozen_scan_and_the_find_is_kept_as_a_test(example):
     text = (kept / "regression.yaml").read_text()
     (kept / "regression.yaml").write_text(text.replace("- frozen", "- ''"))  # mended
     done = subprocess.run(command, capture_output=True, text=True, timeout=PATIENCE)
+    assert done.returncode == 0, done.stdout
+    done = subprocess.run(ctest, cwd=folder, capture_output=True, text=True, timeout=PATIENCE)
     assert done.returncode == 0, done.stdout
 
 

@@ -1,10 +1,15 @@
 """Campaigns as they are run, cut off and taken up again: the same table, whoever ran what when."""
 
+import fcntl
 import json
 import os
+import pty
+import re
 import signal
 import sqlite3
+import struct
 import subprocess
+import termios
 import time
 import xml.etree.ElementTree as ElementTree
 
@@ -120,8 +125,6 @@ def test_nothing_is_run_twice_and_a_changed_controller_is_run_anew(folder):
 
 
 def test_a_second_driver_is_refused(whole):
-    import fcntl
-
     folder, _ = whole
     with open(folder / "c.campaign/lock", "w") as file:
         fcntl.flock(file, fcntl.LOCK_EX)
@@ -211,6 +214,39 @@ def test_exports_and_the_sum_as_json(whole):
         2,
         {"failed": 2, "passed": 6},
     )
+
+
+def seen_on_a_terminal(*words, folder, code):
+    """Standard output, and what a terminal of 100 columns was sent on standard error."""
+    ours, theirs = pty.openpty()
+    fcntl.ioctl(theirs, termios.TIOCSWINSZ, struct.pack("HHHH", 24, 100, 0, 0))
+    environment = {**os.environ, "TERM": "xterm", "COLUMNS": "100"}
+    process = subprocess.Popen(
+        [RUEDO, *words], cwd=folder, stdout=subprocess.PIPE, stderr=theirs, env=environment
+    )
+    os.close(theirs)
+    seen = b""
+    try:
+        while part := os.read(ours, 65536):
+            seen += part
+    except OSError:  # its last writer is gone
+        pass
+    out = process.communicate(timeout=PATIENCE)[0].decode()
+    os.close(ours)
+    assert process.returncode == code
+    return out, re.sub(r"\x1b\[[0-9;?]*[A-Za-z]", "", seen.decode())
+
+
+def test_a_terminal_sees_rate_failures_and_the_time_that_is_left(folder):
+    command = ("campaign", "run", "c.yaml", "--workers", "1")
+    out, seen = seen_on_a_terminal(*command, folder=folder, code=1)
+    last = [line for line in re.split(r"[\r\n]+", seen) if line.strip()][-1]
+    assert re.match(r"walls .*8/8 +[\d.]+/s +2 failed +0:\d\d:\d\d left 0:00:00", last), seen
+    assert "walls: 8 of 8 cases: 2 failed, 6 passed" in out
+    quiet, nothing = seen_on_a_terminal(*command, "--quiet", folder=folder, code=1)
+    assert not nothing and quiet == out
+    text, nothing = seen_on_a_terminal(*command, "--json", folder=folder, code=1)
+    assert not nothing and json.loads(text)["failed"] == 2
 
 
 def test_the_report_needs_no_network(whole):

@@ -1,9 +1,13 @@
 // Logs: the format, the header, the commands that took effect, and a full disk.
+#include <algorithm>
+
 #include <gtest/gtest.h>
 #include <lcm/lcm-cpp.hpp>
 
+#include "core/late_library.h"
 #include "core/sha256.h"
 #include "full_disk.h"
+#include "log/header.h"
 #include "log/reader.h"
 #include "log/writer.h"
 #include "ruedo/applied_t.hpp"
@@ -86,6 +90,15 @@ TEST(Writer, ADiskThatIsFullAtAnyByteLeavesAWholeLog) {
     EXPECT_EQ(reader.fault(), "") << room;
     EXPECT_EQ(events, static_cast<int64_t>(room) / kEvent);
   }
+}
+
+TEST(Recording, NamesLibrariesThatAreNotLoadedYet) {
+  const std::vector<std::string> before = log::libraries_that_matter();
+  load_late_libraries();
+  EXPECT_EQ(before, log::libraries_that_matter());
+  EXPECT_TRUE(std::any_of(before.begin(), before.end(), [](const std::string& name) {
+    return name.starts_with("libopencv_imgcodecs.so");
+  }));
 }
 
 TEST(Recording, AFullDiskEndsTheRun) {

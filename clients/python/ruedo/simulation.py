@@ -11,7 +11,6 @@ import sys
 import threading
 import time
 import weakref
-import webbrowser
 from collections.abc import Callable, Sequence
 from types import TracebackType
 from typing import Any, Literal
@@ -244,6 +243,8 @@ class Simulation:
             from IPython.display import IFrame  # type: ignore[import-not-found, unused-ignore]
 
             return IFrame(self._view, width, height)
+        import webbrowser
+
         webbrowser.open(self._view)
         return self._view
 

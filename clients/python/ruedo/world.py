@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 import os
+from html import escape  # xml.sax brings in urllib and ssl, 20 ms at each start of a program
 from pathlib import Path
-from xml.sax.saxutils import escape, quoteattr
 
 
 class World:
@@ -117,7 +117,7 @@ class World:
             ]
         )
         return (
-            f'<sdf version="1.9">\n  <world name={quoteattr(self._name)}>\n'
+            f'<sdf version="1.9">\n  <world name="{escape(self._name)}">\n'
             f'    <physics name="step" type="bullet"><max_step_size>{self._step!r}</max_step_size></physics>\n    {lines}\n  </world>\n</sdf>\n'
         )
 
@@ -148,7 +148,7 @@ class World:
             )
             body = f"<link name='link'><inertial><mass>{kg!r}</mass><inertia>{moments}</inertia></inertial>"
         self._models.append(
-            f"<model name={quoteattr(self._unused(name))}><pose>{pose}</pose>{body}"
+            f'<model name="{escape(self._unused(name))}"><pose>{pose}</pose>{body}'
             f"<collision name='collision'>{geometry}</collision><visual name='visual'>{geometry}</visual></link></model>"
         )
         return self

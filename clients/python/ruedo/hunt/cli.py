@@ -24,7 +24,7 @@ def add_hunt(commands: Any) -> None:
         "--shrink", type=int, default=100, metavar="N", help="most cases to shrink (default 100)"
     )
     one.add_argument("--seed", type=int, default=1, metavar="N")
-    one.add_argument("--by", choices=("optuna", "hypothesis"), default="optuna")
+    one.add_argument("--by", choices=("optuna", "hypothesis", "random"), default="optuna")
     one.add_argument("--workers", type=int, metavar="N")
     one.add_argument("--out", metavar="FOLDER", help="of the made worlds")
     one.add_argument(

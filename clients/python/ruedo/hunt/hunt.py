@@ -15,7 +15,7 @@ from ..campaign.local import Worker, cores, run_local
 from ..campaign.plan import Case
 from ..campaign.worlds import keep_text
 from .regression import keep
-from .search import SEARCHES
+from .search import SEARCHES, breaks
 from .shrink import shrink
 from .space import Choices, Space
 
@@ -28,7 +28,7 @@ _REACH_M = 3.0  # clearances below it steer
 class Found:
     """A case that breaks the controller, as small as it became.
 
-    cases: that were run until it was found; shrinking took `shrink_cases` more.
+    cases: how many it took, the one that was found included; shrinking took `shrink_cases` more.
     """
 
     choices: Choices
@@ -80,17 +80,20 @@ class Hunt:
         """The first case that fails, shrunk; None: none was found. The same seed finds the same,
         with any number of workers.
 
-        by: "optuna" (TPE, after the corners) or "hypothesis" (its own draws, steered by target()).
+        by: "optuna" (TPE, after the corners), "hypothesis" (its own draws, steered by target()), or
+        "random" (uniform draws).
         """
-        count = invalid = 0
+        count = invalid = found_after = 0
         first_invalid = ""
         with _Crew(str(self.folder), workers or cores()) as crew:
 
             def evaluate(several: list[Choices]) -> list[tuple[Outcome, float]]:
-                nonlocal count, invalid, first_invalid
+                nonlocal count, invalid, found_after, first_invalid
                 outcomes = crew.run([self._case_or_why_not(one) for one in several])
                 for outcome in outcomes:
                     count += 1
+                    if breaks(outcome):
+                        found_after = found_after or count
                     if outcome["status"] == "invalid":
                         invalid += 1
                         first_invalid = first_invalid or outcome["reason"]
@@ -106,14 +109,14 @@ class Hunt:
                     )
                 return None
             choices, outcome = hit
-            found_after = count
+            searched = count
             choices, outcome = shrink(self.space, choices, outcome, evaluate, shrink_cases)
             return Found(
                 self.space.used(choices),
                 outcome,
                 self.case(choices),
                 found_after,
-                count - found_after,
+                count - searched,
                 self.content_of(choices),
                 self.folder,
             )

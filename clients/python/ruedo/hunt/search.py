@@ -1,4 +1,6 @@
-"""Who proposes cases: Optuna, after the corners of the space; or Hypothesis, by its own draws."""
+"""Who proposes cases: Optuna, after the corners of the space; Hypothesis, by its own draws; or
+chance, to compare with.
+"""
 
 from __future__ import annotations
 
@@ -12,6 +14,11 @@ from .space import Choices, Space
 Evaluate = Callable[[list[Choices]], list[tuple[dict[str, Any], float]]]
 Hit = tuple[Choices, dict[str, Any]]
 _BATCH = 8  # proposals at a time: fixed, so that more workers change nothing
+
+
+def breaks(outcome: dict[str, Any]) -> bool:
+    """A case that cannot be run breaks nobody."""
+    return outcome["status"] not in ("passed", "invalid")
 
 
 def corners(space: Space, seed: int) -> list[Choices]:
@@ -64,11 +71,9 @@ def by_optuna(space: Space, evaluate: Evaluate, cases: int, seed: int) -> Hit | 
         ]
         results = evaluate(proposals)
         for trial, choices, (outcome, score) in zip(trials, proposals, results):
-            if outcome["status"] not in ("passed", "invalid"):
+            if breaks(outcome):
                 return choices, outcome
-            study.tell(
-                trial, score if outcome["status"] == "passed" else 1.0
-            )  # a world that cannot be made breaks nobody
+            study.tell(trial, score if outcome["status"] == "passed" else 1.0)
         left -= len(trials)
     return None
 
@@ -101,17 +106,16 @@ def by_hypothesis(space: Space, evaluate: Evaluate, cases: int, seed: int) -> Hi
     hits: dict[str, Hit] = {}
     left = cases
 
-    def breaks(choices: Choices) -> bool:
+    def fails(choices: Choices) -> bool:
         nonlocal left
         if left <= 0:
             return False
         left -= 1
         ((outcome, score),) = evaluate([choices])
         hypothesis.target(-score)
-        broken = outcome["status"] not in ("passed", "invalid")
-        if broken:
+        if breaks(outcome):
             hits[repr(choices)] = (choices, outcome)
-        return broken
+        return breaks(outcome)
 
     settings = hypothesis.settings(
         max_examples=cases,
@@ -124,7 +128,7 @@ def by_hypothesis(space: Space, evaluate: Evaluate, cases: int, seed: int) -> Hi
     try:
         smallest = hypothesis.find(
             st.fixed_dictionaries({one.name: strategy(one) for one in space.dimensions}),
-            breaks,
+            fails,
             settings=settings,
             random=random.Random(seed),
         )
@@ -133,7 +137,22 @@ def by_hypothesis(space: Space, evaluate: Evaluate, cases: int, seed: int) -> Hi
     return hits[repr(smallest)]
 
 
+def by_random(space: Space, evaluate: Evaluate, cases: int, seed: int) -> Hit | None:
+    """Uniform draws, the baseline of the others."""
+    draw = random.Random(seed)
+    for begin in range(0, cases, _BATCH):
+        proposals = [
+            {one.name: one.at(draw.random()) for one in space.dimensions}
+            for _ in range(min(_BATCH, cases - begin))
+        ]
+        for choices, (outcome, _) in zip(proposals, evaluate(proposals)):
+            if breaks(outcome):
+                return choices, outcome
+    return None
+
+
 SEARCHES: dict[str, Callable[[Space, Evaluate, int, int], Hit | None]] = {
     "optuna": by_optuna,
     "hypothesis": by_hypothesis,
+    "random": by_random,
 }
