@@ -116,7 +116,8 @@ class CycloneNode : public Ros2Node {
     node_.stop();
     const ros2::Node::Counts counts = node_.counts();
     if (counts.faulty > 0)
-      spdlog::warn("ROS 2: {} messages that came were faulty, and ignored", counts.faulty);
+      spdlog::warn("ROS 2: {} messages that came were faulty, too large or too many, and ignored",
+                   counts.faulty);
     if (const uint64_t lost = counts.dropped + queue_.missed(); lost > 0)
       spdlog::warn("ROS 2: {} messages were dropped: it did not follow the run", lost);
   }

@@ -4,10 +4,12 @@
 #include <algorithm>
 #include <atomic>
 #include <charconv>
+#include <chrono>
 #include <cstdlib>
 #include <cstring>
 #include <map>
 #include <set>
+#include <string_view>
 #include <thread>
 #include <utility>
 #include <vector>
@@ -19,6 +21,7 @@
 #include <spdlog/spdlog.h>
 #include <sys/socket.h>
 
+#include "dds/early_requests.h"
 #include "dds/identity.h"
 #include "dds/raw_type.h"
 #include "ros2/interfaces.h"
@@ -33,6 +36,7 @@ using ros2::Role;
 
 constexpr uint32_t kLastDomain = 232;  // ports of higher ones do not exist
 constexpr int kMostTaken = 64;         // samples at once
+constexpr auto kLook = DDS_MSECS(2);   // after requests that came early
 
 struct QosDeleter {
   void operator()(dds_qos_t* qos) const { dds_delete_qos(qos); }
@@ -158,6 +162,19 @@ std::string configuration(const CycloneOptions& options) {
          "<Tracing><Verbosity>none</Verbosity></Tracing></Domain></CycloneDDS>";
 }
 
+// Cyclone's own warnings, of which strangers can cause any number: once a second at most. Samples
+// that were refused are counted elsewhere.
+void tell(void*, const dds_log_data_t* data) {
+  constexpr int64_t kPeriod_ns = 1'000'000'000;
+  static std::atomic<int64_t> next_ns{0};
+  const std::string_view text(data->message, data->size);
+  if (text.find("deserialization") != text.npos) return;
+  const int64_t now = std::chrono::steady_clock::now().time_since_epoch().count();
+  int64_t next = next_ns;
+  if (now < next || !next_ns.compare_exchange_strong(next, now + kPeriod_ns)) return;
+  spdlog::warn("ROS 2: Cyclone DDS: {}", text.substr(0, text.find_last_not_of('\n') + 1));
+}
+
 class CycloneWriter : public ros2::Writer {
  public:
   CycloneWriter(dds_entity_t participant, const Endpoint& endpoint) {
@@ -189,6 +206,7 @@ class CycloneWriter : public ros2::Writer {
                : 0;
   }
   Gid gid() const override { return gid_of(writer_); }
+  dds_entity_t entity() const { return writer_; }
 
  private:
   dds_entity_t topic_ = 0, writer_ = 0;
@@ -212,8 +230,11 @@ class CycloneReader : public ros2::Reader {
             "reader of " + name);
     checked(dds_waitset_attach(waitset_, reader_, reinterpret_cast<dds_attach_t>(this)),
             "reader of " + name);
+    if (const auto* replies = static_cast<const CycloneWriter*>(endpoint.replies))
+      early_ = std::make_unique<EarlyRequests>(reader_, replies->entity());
   }
   ~CycloneReader() override {
+    early_.reset();
     dds_waitset_detach(waitset_, reader_);
     dds_delete(reader_);
     dds_delete(topic_);
@@ -227,24 +248,43 @@ class CycloneReader : public ros2::Reader {
                : 0;
   }
 
-  // The transport's thread.
-  void take() {
+  // What is left to do here; the transport's thread. One batch at a time, so that who sends without
+  // end leaves others their turn.
+  enum class Left { nothing, early, more };
+  Left take() {
     uint32_t status = 0;
     dds_take_status(reader_, &status,
                     DDS_DATA_AVAILABLE_STATUS | DDS_REQUESTED_INCOMPATIBLE_QOS_STATUS);
     if (status & DDS_REQUESTED_INCOMPATIBLE_QOS_STATUS) tell_incompatible();
+    answer_early();
     ddsi_serdata* samples[kMostTaken];
     dds_sample_info_t infos[kMostTaken];
-    for (int count = kMostTaken; count == kMostTaken;) {
-      count = dds_takecdr(reader_, samples, kMostTaken, infos, DDS_ANY_STATE);
-      for (int i = 0; i < count; ++i) {
-        if (infos[i].valid_data) handler_(as_sample(samples[i]));
-        ddsi_serdata_unref(samples[i]);
-      }
+    const int count = dds_takecdr(reader_, samples, kMostTaken, infos, DDS_ANY_STATE);
+    for (int i = 0; i < count; ++i) {
+      const dds_instance_handle_t writer = infos[i].publication_handle;
+      if (infos[i].valid_data &&
+          !(early_ && early_->keep(samples[i], writer, EarlyRequests::Clock::now())))
+        hand_over(samples[i], writer);
+      ddsi_serdata_unref(samples[i]);
     }
+    if (count == kMostTaken) return Left::more;
+    return early_ && !early_->empty() ? Left::early : Left::nothing;
   }
 
  private:
+  void hand_over(const ddsi_serdata* data, dds_instance_handle_t writer) {
+    ros2::Sample sample = as_sample(data);
+    sample.sender = writer;
+    handler_(sample);
+  }
+  void answer_early() {
+    while (early_) {
+      const EarlyRequests::Ready ready = early_->next(EarlyRequests::Clock::now());
+      if (!ready.request) return;
+      hand_over(ready.request, ready.writer);
+      ddsi_serdata_unref(ready.request);
+    }
+  }
   void tell_incompatible() {
     if (std::exchange(told_, true)) return;
     spdlog::warn(
@@ -256,12 +296,14 @@ class CycloneReader : public ros2::Reader {
   dds_entity_t waitset_, topic_ = 0, reader_ = 0;
   std::string name_;
   ros2::Transport::Handler handler_;
+  std::unique_ptr<EarlyRequests> early_;  // of requests
   bool told_ = false;
 };
 
 class CycloneTransport : public ros2::Transport {
  public:
   explicit CycloneTransport(const CycloneOptions& options) : options_(options) {
+    dds_set_log_sink(tell, nullptr);
     domain_ =
         checked(dds_create_domain(options.domain, (configuration(options) + options.more).c_str()),
                 fmt::format("domain {}", options.domain));
@@ -311,11 +353,20 @@ class CycloneTransport : public ros2::Transport {
 
  private:
   void receive() {
+    using Left = CycloneReader::Left;
     dds_attach_t woken[kMostTaken];
+    std::set<CycloneReader*> readers;  // that have something left to do
+    dds_duration_t patience = DDS_INFINITY;
     while (!stopping_) {
-      const dds_return_t count = dds_waitset_wait(waitset_, woken, kMostTaken, DDS_INFINITY);
-      for (dds_return_t i = 0; i < std::min(count, kMostTaken) && !stopping_; ++i) {
-        if (woken[i] != 0) reinterpret_cast<CycloneReader*>(woken[i])->take();
+      const dds_return_t count = dds_waitset_wait(waitset_, woken, kMostTaken, patience);
+      for (dds_return_t i = 0; i < std::min(count, kMostTaken); ++i) {
+        if (woken[i] != 0) readers.insert(reinterpret_cast<CycloneReader*>(woken[i]));
+      }
+      patience = DDS_INFINITY;
+      for (auto reader = readers.begin(); reader != readers.end() && !stopping_;) {
+        const Left left = (*reader)->take();
+        if (left != Left::nothing) patience = left == Left::more ? 0 : std::min(patience, kLook);
+        reader = left == Left::nothing ? readers.erase(reader) : std::next(reader);
       }
     }
   }

@@ -7,6 +7,9 @@
 #include <atomic>
 #include <cstring>
 #include <functional>
+#include <map>
+#include <memory>
+#include <mutex>
 #include <string_view>
 #include <vector>
 
@@ -19,9 +22,41 @@ namespace {
 
 std::atomic<uint64_t> refused{0};
 
-struct RawType : ddsi_sertype {};
+// The room that samples of a topic take until they are dealt with: a share for each writer, so that
+// one that sends without end displaces nothing of others.
+class Room {
+ public:
+  // False: there is none.
+  bool take(const ros2::Gid& writer, size_t size) {
+    const std::lock_guard lock(mutex_);
+    const auto [own, fresh] = samples_of_.try_emplace(writer, 0);
+    const bool fits = own->second < kMostOfWriter && bytes_ + size <= kMostWaiting;
+    if (fits) ++own->second, bytes_ += size;
+    if (own->second == 0) samples_of_.erase(own);
+    return fits;
+  }
+  void give_back(const ros2::Gid& writer, size_t size) {
+    const std::lock_guard lock(mutex_);
+    bytes_ -= size;
+    if (const auto own = samples_of_.find(writer); --own->second == 0) samples_of_.erase(own);
+  }
+
+ private:
+  std::mutex mutex_;
+  size_t bytes_ = 0;
+  std::map<ros2::Gid, size_t> samples_of_;
+};
+
+struct RawType : ddsi_sertype {
+  std::shared_ptr<Room> room = std::make_shared<Room>();  // samples may live longer than their type
+};
 
 struct RawSample : ddsi_serdata {
+  ~RawSample() {
+    if (room) room->give_back(writer, size);
+  }
+  std::shared_ptr<Room> room;  // null: it takes none
+  ros2::Gid writer{};
   std::vector<uint8_t> bytes;  // with CDR's header, filled up to a multiple of four
   size_t size = 0;             // without what fills up
   ros2::SampleIdentity identity;
@@ -54,10 +89,13 @@ bool is_too_large(ddsi_serdata_kind kind, size_t size) {
 }
 
 // From the datagram that the sample came in.
-void identify(RawSample& sample, const nn_rdata& first) {
+DataIdentity identity_of(const nn_rdata& first) {
   const unsigned char* packet = NN_RMSG_PAYLOAD(first.rmsg);
-  const DataIdentity found =
-      identity_in({packet, NN_RDATA_PAYLOAD_OFF(&first)}, NN_RDATA_SUBMSG_OFF(&first));
+  return identity_in({packet, NN_RDATA_PAYLOAD_OFF(&first)}, NN_RDATA_SUBMSG_OFF(&first));
+}
+
+void identify(RawSample& sample, const DataIdentity& found) {
+  sample.writer = found.sample.writer;
   sample.identity = found.sample;
   sample.is_related = found.related.has_value();
   sample.vendor = found.vendor;
@@ -68,8 +106,15 @@ void identify(RawSample& sample, const nn_rdata& first) {
 ddsi_serdata* from_fragments(const ddsi_sertype* type, ddsi_serdata_kind kind,
                              const nn_rdata* fragment, size_t size) {
   if (is_too_large(kind, size)) return nullptr;
+  const DataIdentity identity = identity_of(*fragment);
+  const std::shared_ptr<Room>& room = static_cast<const RawType*>(type)->room;
+  if (!room->take(identity.sample.writer, size)) {
+    ++refused;
+    return nullptr;
+  }
   RawSample* sample = new_sample(type, kind, size);
-  const nn_rdata* first = fragment;
+  identify(*sample, identity);
+  sample->room = room;
   uint32_t done = 0;
   for (; fragment; fragment = fragment->nextfrag) {
     if (fragment->maxp1 <= done || fragment->min > done || fragment->maxp1 > size) continue;
@@ -79,7 +124,6 @@ ddsi_serdata* from_fragments(const ddsi_sertype* type, ddsi_serdata_kind kind,
                 fragment->maxp1 - done);
     done = fragment->maxp1;
   }
-  identify(*sample, *first);
   return sample;
 }
 

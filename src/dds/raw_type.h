@@ -17,6 +17,9 @@ namespace ruedo::dds {
 
 // Samples that come in and are larger are dropped, and counted.
 inline constexpr size_t kMostReceived = size_t{1} << 20;
+// As are those for which there is no room beside those of their topic that wait to be dealt with.
+inline constexpr size_t kMostWaiting = size_t{16} << 20;  // bytes
+inline constexpr size_t kMostOfWriter = 100;              // samples
 
 // A topic with that name and that type's name, and the type for its samples, which lives as long.
 // Negative: Cyclone's error.

@@ -161,7 +161,7 @@ void Node::add_commands(const std::vector<world_info_t>& info) {
       if (!poses_.try_emplace(key(topic), topic).second) continue;
       readers_[key(topic)] = transport_->add_reader(
           endpoint(topic), [this, name = robot.name, topic](const Sample& sample) {
-            receive_pose(name, topic.name, sample.cdr);
+            receive_pose(name, topic.name, sample);
           });
     }
   }
@@ -196,11 +196,10 @@ void Node::receive(const Command& command, std::span<const uint8_t> cdr) {
 }
 
 // The robot is put where the message says: the map's frame is the world's.
-void Node::receive_pose(const std::string& robot, const std::string& topic,
-                        std::span<const uint8_t> cdr) {
+void Node::receive_pose(const std::string& robot, const std::string& topic, const Sample& sample) {
   ++received_;
   if (!injecting_) return;
-  CdrReader in(cdr);
+  CdrReader in(sample.cdr);
   in.skip<uint32_t>(2);
   const std::string frame = in.get_text();
   set_pose_request_t pose;
@@ -208,10 +207,10 @@ void Node::receive_pose(const std::string& robot, const std::string& topic,
   for (double& x : pose.position) x = in.get<double>();
   for (const size_t i : {1, 2, 3, 0}) pose.orientation[i] = in.get<double>();
   if (!in.good() || !(frame.empty() || frame == "map" || frame == "world"))
-    return count_faulty(topic, "pose in the frame map", cdr.size());
+    return count_faulty(topic, "pose in the frame map", sample.cdr.size());
   std::vector<uint8_t> body(static_cast<size_t>(pose.getEncodedSize()));
   pose.encode(body.data(), 0, static_cast<int>(body.size()));
-  requests_.ask(request_t::SET_POSE, std::move(body), [topic](const reply_t& reply) {
+  requests_.ask(sample.sender, request_t::SET_POSE, std::move(body), [topic](const reply_t& reply) {
     if (reply.code != reply_t::OK) spdlog::warn("ROS 2: {}: {}", topic, reply.text);
   });
 }

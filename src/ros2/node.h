@@ -48,11 +48,14 @@ class Node : public run::Sink {
   void announce(const std::shared_ptr<const run::Announcement>& announcement) override;
   void begin_step(const run::Step& step) override;
   void message(const run::Published& message) override;
+  void flush() override { requests_.repeat(Requests::Clock::now()); }
 
   struct Counts {
     uint64_t sent = 0, received = 0, dropped = 0, faulty = 0;
   };
-  Counts counts() const { return {sent_, received_, dropped_, faulty_ + services_->faulty()}; }
+  Counts counts() const {
+    return {sent_, received_, dropped_, faulty_ + services_->faulty() + transport_->refused()};
+  }
   // Before the run begins: whether anybody reads a sensor's topic, publishes on that one, and how
   // many of both there are.
   bool is_read() const;
@@ -70,7 +73,7 @@ class Node : public run::Sink {
   void tell_graph();  // ros_discovery_info
   void receive(const Command& command, std::span<const uint8_t> cdr);
   void receive_pose(const std::string& robot, const std::string& topic,
-                    std::span<const uint8_t> cdr);  // initialpose
+                    const Sample& sample);  // initialpose
   void count_faulty(const std::string& topic, const std::string& type, size_t size);
   void send(Writer& writer, std::span<const uint8_t> cdr);
   Endpoint endpoint(const Topic& topic, Role role = Role::topic) const;

@@ -1,8 +1,6 @@
 #include "ros2/service_server.h"
 
 #include <algorithm>
-#include <chrono>
-#include <thread>
 #include <utility>
 
 #include "ruedo/errors.h"
@@ -46,7 +44,8 @@ Call::Call(Writer& replies, const Sample& sample, ServiceMapping mapping)
       has_header_(mapping == ServiceMapping::cyclonedds ||
                   (mapping == ServiceMapping::automatic && !sample.is_related &&
                    sample.vendor == kCyclone)),
-      identity_(sample.identity) {
+      identity_(sample.identity),
+      sender_(sample.sender) {
   if (!has_header_) return;
   client_ = in.get<uint64_t>();
   sequence_ = in.get<int64_t>();
@@ -75,9 +74,9 @@ ServiceServer::ServiceServer(const ServiceContext& context, const std::string& n
   const std::string hash = type_hash(type, context.distro),
                     id = service_id(context.transport.gid(), topic_.name);
   replies_ = context.transport.add_writer(
-      {Role::reply, {topic_.name, type + "_Response", kCommandQos}, hash, id});
+      {Role::reply, {topic_.name, type + "_Response", kServiceQos}, hash, id});
   requests_ = context.transport.add_reader(
-      {Role::request, {topic_.name, type + "_Request", kCommandQos}, hash, id},
+      {Role::request, {topic_.name, type + "_Request", kServiceQos}, hash, id, replies_.get()},
       [this](const Sample& sample) { receive(sample); });
 }
 
@@ -87,24 +86,7 @@ void ServiceServer::receive(const Sample& sample) {
     ++faulty_;
     return;
   }
-  await_reader();
   handler_(call);
-}
-
-// A client's first request may be here before it is known who reads the replies, which would then
-// are lost: rmw_cyclonedds waits for that, too. Each client has a writer and a reader; one that
-// has no reader costs the wait once.
-void ServiceServer::await_reader() {
-  constexpr auto kLongest = std::chrono::milliseconds(500), kLook = std::chrono::milliseconds(1);
-  const auto missing = [&] {
-    const size_t clients = requests_->writers(), readers = replies_->readers();
-    return clients > readers ? clients - readers : 0;
-  };
-  deaf_ = std::min(deaf_, missing());
-  const auto deadline = std::chrono::steady_clock::now() + kLongest;
-  while (missing() > deaf_ && std::chrono::steady_clock::now() < deadline)
-    std::this_thread::sleep_for(kLook);
-  deaf_ = missing();
 }
 
 }  // namespace ruedo::ros2

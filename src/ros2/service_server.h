@@ -41,6 +41,7 @@ class Call {
 
   // Begins the answer.
   CdrWriter answer() const;
+  uint64_t client() const { return sender_; }
   void send(const CdrWriter& out);
 
  private:
@@ -53,6 +54,7 @@ class Call {
   Writer& replies_;
   bool has_header_;
   SampleIdentity identity_;
+  uint64_t sender_;
   uint64_t client_ = 0;
   int64_t sequence_ = 0;
 };
@@ -73,13 +75,11 @@ class ServiceServer {
 
  private:
   void receive(const Sample& sample);
-  void await_reader();
 
   Topic topic_;
   ServiceMapping mapping_;
   Handler handler_;
   std::atomic<uint64_t>& faulty_;
-  size_t deaf_ = 0;  // clients that write requests, and read no replies
   std::unique_ptr<Writer> replies_;
   std::unique_ptr<Reader> requests_;  // the last: it calls receive()
 };

@@ -193,7 +193,7 @@ void Services::update(const std::vector<world_info_t>& info) {
 }
 
 void Services::pass_on(const CallPointer& call, int32_t kind, std::vector<uint8_t> body) {
-  requests_.ask(kind, std::move(body), [call, kind](const reply_t& reply) {
+  requests_.ask(call->client(), kind, std::move(body), [call, kind](const reply_t& reply) {
     CdrWriter out = call->answer();
     put_result(out, kind, reply);
     call->send(out);
@@ -228,7 +228,7 @@ void Services::reset_simulation(const CallPointer& call) {
   if (scope == kTime) return pass_on(call, request_t::RESET, body(reset_request_t::TIME));
   if (scope == kState) return pass_on(call, request_t::RESET, body(reset_request_t::POSES));
   if (scope == (kTime | kState)) {
-    requests_.ask(request_t::RESET, body(reset_request_t::POSES),
+    requests_.ask(call->client(), request_t::RESET, body(reset_request_t::POSES),
                   [this, call, body](const reply_t& reply) {
                     if (reply.code == reply_t::OK)
                       return pass_on(call, request_t::RESET, body(reset_request_t::TIME));
@@ -252,31 +252,34 @@ void Services::step_simulation(const CallPointer& call) {
 }
 
 void Services::get_simulation_state(const CallPointer& call) {
-  requests_.ask(request_t::GET_STATE, name_body(""), [this, call](const reply_t& reply) {
-    state_reply_t state{};
-    const bool good =
-        reply.code == reply_t::OK &&
-        decode_checked(reply.body.data(), reply.body.size(), state) == DecodeFault::none;
-    CdrWriter out = call->answer();
-    out.put(good ? state_of(state.paused) : kPlaying);
-    put_result(out, request_t::GET_STATE, reply);
-    call->send(out);
-  });
+  requests_.ask(
+      call->client(), request_t::GET_STATE, name_body(""), [this, call](const reply_t& reply) {
+        state_reply_t state{};
+        const bool good =
+            reply.code == reply_t::OK &&
+            decode_checked(reply.body.data(), reply.body.size(), state) == DecodeFault::none;
+        CdrWriter out = call->answer();
+        out.put(good ? state_of(state.paused) : kPlaying);
+        put_result(out, request_t::GET_STATE, reply);
+        call->send(out);
+      });
 }
 
 void Services::set_simulation_state(const CallPointer& call) {
   const auto wanted = call->in.get<uint8_t>();
   if (!call->in.good()) return void(++faulty_);
-  requests_.ask(request_t::GET_STATE, name_body(""), [this, call, wanted](const reply_t& reply) {
-    state_reply_t state{};
-    if (reply.code == reply_t::OK &&
-        decode_checked(reply.body.data(), reply.body.size(), state) == DecodeFault::none) {
-      return change_state(call, state_of(state.paused), wanted);
-    }
-    CdrWriter out = call->answer();
-    put_result(out, request_t::GET_STATE, reply);
-    call->send(out);
-  });
+  requests_.ask(
+      call->client(), request_t::GET_STATE, name_body(""),
+      [this, call, wanted](const reply_t& reply) {
+        state_reply_t state{};
+        if (reply.code == reply_t::OK &&
+            decode_checked(reply.body.data(), reply.body.size(), state) == DecodeFault::none) {
+          return change_state(call, state_of(state.paused), wanted);
+        }
+        CdrWriter out = call->answer();
+        put_result(out, request_t::GET_STATE, reply);
+        call->send(out);
+      });
 }
 
 void Services::change_state(const CallPointer& call, uint8_t now, uint8_t wanted) {
@@ -296,7 +299,7 @@ void Services::change_state(const CallPointer& call, uint8_t now, uint8_t wanted
     return call->send(out);
   }
   if (wanted == kPaused) return pass_on(call, request_t::PAUSE, {});
-  requests_.ask(request_t::PAUSE, {}, [this, call](const reply_t& reply) {
+  requests_.ask(call->client(), request_t::PAUSE, {}, [this, call](const reply_t& reply) {
     if (reply.code != reply_t::OK) {
       CdrWriter out = call->answer();
       put_result(out, request_t::PAUSE, reply);
@@ -347,7 +350,7 @@ void Services::spawn_entity(const CallPointer& call) {
   body.on_ground = false;
   std::copy(std::begin(placed.position), std::end(placed.position), body.position);
   std::copy(std::begin(placed.orientation), std::end(placed.orientation), body.orientation);
-  requests_.ask(request_t::SPAWN, encoded(body), [call](const reply_t& reply) {
+  requests_.ask(call->client(), request_t::SPAWN, encoded(body), [call](const reply_t& reply) {
     state_reply_t state{};
     const bool named =
         reply.code == reply_t::OK &&
@@ -414,7 +417,8 @@ void Services::get_entity_state(const CallPointer& call) {
       put_no_state(out);
     call->send(out);
   };
-  if (!name.empty()) return requests_.ask(request_t::GET_STATE, name_body(name), answer);
+  if (!name.empty())
+    return requests_.ask(call->client(), request_t::GET_STATE, name_body(name), answer);
   reply_t nobody{};  // without a name the run tells of itself
   nobody.code = reply_t::UNKNOWN_NAME;
   nobody.text = "the name is empty";
@@ -440,12 +444,14 @@ void Services::set_entity_state(const CallPointer& call) {
       std::all_of(twist.linear, twist.linear + 3, [](double x) { return x == 0.0; }) &&
       std::all_of(twist.angular, twist.angular + 3, [](double x) { return x == 0.0; });
   if (rests) return pass_on(call, request_t::SET_POSE, encoded(pose));  // which brings it to rest
-  requests_.ask(request_t::SET_POSE, encoded(pose), [this, call, twist](const reply_t& reply) {
-    if (reply.code == reply_t::OK) return pass_on(call, request_t::SET_TWIST, encoded(twist));
-    CdrWriter out = call->answer();
-    put_result(out, request_t::SET_POSE, reply);
-    call->send(out);
-  });
+  requests_.ask(call->client(), request_t::SET_POSE, encoded(pose),
+                [this, call, twist](const reply_t& reply) {
+                  if (reply.code == reply_t::OK)
+                    return pass_on(call, request_t::SET_TWIST, encoded(twist));
+                  CdrWriter out = call->answer();
+                  put_result(out, request_t::SET_POSE, reply);
+                  call->send(out);
+                });
 }
 
 }  // namespace ruedo::ros2

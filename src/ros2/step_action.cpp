@@ -13,6 +13,7 @@ namespace {
 
 constexpr const char* kType = "simulation_interfaces/action/SimulateSteps";
 constexpr uint8_t kOk = 1, kFailed = 4;  // simulation_interfaces/msg/Result
+constexpr uint64_t kNode = 0;            // who asks for the steps of a goal: no client
 
 int64_t now_ns() {
   return std::chrono::duration_cast<std::chrono::nanoseconds>(
@@ -118,7 +119,7 @@ void StepAction::step() {
     if (goal->status == canceling) return end(*goal, canceled, kOk, "");
     if (goal->done == goal->steps) return end(*goal, succeeded, kOk, "");
   }
-  requests_.ask(request_t::STEP, engine::encoded(body),
+  requests_.ask(kNode, request_t::STEP, engine::encoded(body),
                 [this](const reply_t& reply) { stepped(reply); });
 }
 

@@ -19,6 +19,9 @@ inline constexpr Qos kStateQos{true, false, 10};
 inline constexpr Qos kTfQos{true, false, 100};
 inline constexpr Qos kLatchedQos{true, true, 1};
 inline constexpr Qos kCommandQos{true, false, 10};
+// Of all clients of a service together: what one of them sends, or is sent, must not displace what
+// another is. The transport bounds the bytes, and each client's share.
+inline constexpr Qos kServiceQos{true, false, 10'000};
 
 struct Topic {
   std::string name;  // "/p3at/scan"

@@ -27,6 +27,7 @@ struct Sample {
   SampleIdentity identity;          // where it is related: of the reader that waits for the reply
   bool is_related = false;          // it names that reader (DDS-RPC's related sample identity)
   std::array<uint8_t, 2> vendor{};  // of the DDS that sent it
+  uint64_t sender = 0;              // a number that the transport gives the writer
 };
 
 // Where a sample goes by, and what the transport's middleware calls it.
@@ -37,6 +38,9 @@ struct Endpoint {
   Topic topic;               // of a service: its name, and "pkg/srv/Name_Request" or "..._Response"
   std::string hash;          // RIHS01_..., "": none
   std::string service = {};  // what both ends of a service have in common; "": a topic
+  // Of requests, by what they are answered: a request whose client is not yet known to hear there
+  // is handed over a little later.
+  const class Writer* replies = nullptr;
 };
 
 class Writer {
@@ -75,7 +79,7 @@ class Transport {
 
   virtual Gid gid() const = 0;            // of this participant
   virtual std::string where() const = 0;  // "domain 0, this machine only"
-  virtual uint64_t refused() const = 0;   // samples too large to be looked at
+  virtual uint64_t refused() const = 0;   // samples, too large or too many
 };
 
 }  // namespace ruedo::ros2

@@ -1,5 +1,6 @@
 """What strangers send: counted, harmless, and said once a second at most."""
 
+import itertools
 import math
 import random
 from dataclasses import dataclass
@@ -12,7 +13,8 @@ from cyclonedds.core import Policy
 from cyclonedds.idl import IdlStruct, make_idl_struct
 from cyclonedds.idl.types import float64, sequence, uint8
 from ros_types import LaserScan, Odometry, Twist, Vector3
-from test_services import Client
+from simulation_types import SERVICES
+from test_services import Client, filters
 
 RIG = str(Path(__file__).resolve().parent / "sensors.sdf")
 
@@ -89,23 +91,46 @@ def noise(seed: int) -> bytes:
     return b"".join(random_.choice((w, w, b"\xff\xff\xff\xff", b"\0\0\0\0")) for w in words)
 
 
-def test_noise_on_every_topic_that_is_read_is_harmless():
+def test_noise_on_all_that_is_read_is_harmless():
     with Run("--no-noise", world=RIG) as run:
         peer = Peer(run.domain)
         read = inputs(peer)
         # Each kind of joint command, cmd_vel's absence aside; the pose; ten services; the action.
         assert len(read) == 4 + 1 + 10 + 3
-        # Services have noise of good requests among it, to take 2^60 steps, say: not here.
-        for topic, kind in sorted(each for each in read if each[0].startswith("rt/")):
+        for topic, kind in sorted(read):
             liar = peer.writer(topic, make_idl_struct("Noise", kind, {"data": sequence[uint8]}), "")
             wait_for(liar.get_matched_subscriptions, f"a reader of {topic}")
             for seed in range(40):
                 liar.write(liar.topic.data_type(noise(seed)))
+        # It comes after all of that, and reads its answers, as none of those did.
         client = Client(run.domain)
         assert client.call("get_simulation_state").result.result == 1
+        assert client.call("get_simulator_features").spawn_formats == ["sdf", "urdf"]
+        assert client.call("get_entities", filters()).entities
+        assert client.call("get_entity_state", "rig").result.result == 1
         output = run.end()
     assert run.process.returncode == 0
     assert "messages that came were faulty" in output
+
+
+@pytest.mark.parametrize("hears", [False, True], ids=["deaf", "hears"])
+def test_who_asks_much_keeps_nobody_waiting(hears):
+    with Run("--no-noise") as run:
+        hostile, honest = Client(run.domain), Client(run.domain)
+        question, answer = SERVICES["get_entity_state"]
+        greedy = hostile.peer.writer("/get_entity_stateRequest", question, prefix="rq")
+        wait_for(greedy.get_matched_subscriptions, "a reader")
+        if hears:
+            hostile.peer.reader("/get_entity_stateReply", answer, prefix="rr")
+        sequence = itertools.count(1)
+        for _ in range(20):
+            for _ in range(300):
+                greedy.write(question(hostile.mark + 1, next(sequence), "p3at"))
+            # Answered, and not by "try again".
+            assert honest.call("get_entity_state", "p3at").result.result == 1
+        assert honest.call("get_entities", filters("^p3at$")).entities == ["p3at"]
+        run.end()
+    assert run.process.returncode == 0
 
 
 def test_a_message_of_64_mb_is_not_looked_at():
