@@ -57,6 +57,16 @@ int64_t sequence_at(const uint8_t* bytes) {
   return static_cast<int64_t>(uint64_t{halves[0]} << 32 | halves[1]);
 }
 
+// Part of a GUID that Cyclone has turned to this machine's order, word by word, as it goes over the
+// wire.
+void copy_turned(std::span<const uint8_t> words, uint8_t* out) {
+  for (size_t i = 0; i < words.size(); i += 4) {
+    uint32_t word;
+    std::memcpy(&word, words.data() + i, sizeof word);
+    for (const int shift : {24, 16, 8, 0}) *out++ = static_cast<uint8_t>(word >> shift);
+  }
+}
+
 void put_related(std::vector<uint8_t>& out, uint16_t id, const uint8_t* identity) {
   out.insert(out.end(), {static_cast<uint8_t>(id), static_cast<uint8_t>(id >> 8), kIdentity, 0});
   out.insert(out.end(), identity, identity + kIdentity);
@@ -145,10 +155,8 @@ DataIdentity identity_in(std::span<const uint8_t> message, size_t submessage) {
   const uint8_t kind = message[submessage], flags = message[submessage + 1];
   if (kind != kData && kind != kDataFrag) return found;
   std::copy_n(message.begin() + 6, found.vendor.size(), found.vendor.begin());
-  std::copy_n(message.begin() + 8, kPrefix, found.sample.writer.begin());
-  std::copy_n(message.begin() + static_cast<std::ptrdiff_t>(numbers) + 4, 4,
-              found.sample.writer.begin() + kPrefix);
-  // Cyclone has turned these numbers to this machine's order already.
+  copy_turned(message.subspan(8, kPrefix), found.sample.writer.data());
+  copy_turned(message.subspan(numbers + 4, 4), found.sample.writer.data() + kPrefix);
   found.sample.sequence = sequence_at(message.data() + numbers + 8);
   if (!(flags & kHasInlineQos) || !(flags & kLittleEndian)) return found;
   size_t at = numbers + u16_at(message, numbers - 2);

@@ -23,8 +23,10 @@ struct DataIdentity {
   std::array<uint8_t, 2> vendor{};
 };
 
-// Of the DATA or DATA_FRAG submessage at that offset of an RTPS message, whose payload, which is
-// not needed, begins where the bytes end. Whatever is not there, or is no such thing, is left out.
+// Of the DATA or DATA_FRAG submessage at that offset of an RTPS message as Cyclone hands it over:
+// its GUIDs and sequence numbers are in this machine's order already, its inline QoS is not. The
+// payload is not needed, and begins where the bytes end. Whatever is not there, or is no such
+// thing, is left out.
 DataIdentity identity_in(std::span<const uint8_t> message, size_t submessage);
 
 // CDR bytes with what they answer; empty: too many for one datagram.
