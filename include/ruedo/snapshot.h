@@ -63,6 +63,7 @@ struct RobotState {
 struct Snapshot {
   int64_t step = 0;
   SimTime time = 0;
+  Vec3 wind = Vec3::Zero();              // m/s: in the step that led here
   std::vector<Pose> bodies;              // X_WB
   std::vector<Twist> body_twists;        // of B's origin
   std::vector<Vec3> body_accelerations;  // m/s^2, of B's origin, without gravity

@@ -1,8 +1,9 @@
-// <spherical_coordinates>, <atmosphere> and <magnetic_field>.
+// <spherical_coordinates>, <atmosphere>, <wind> and <magnetic_field>.
 #include "model/environment.h"
 
 #include <cmath>
 
+#include "model/plugins.h"
 #include "model/read_context.h"
 
 namespace ruedo::model {
@@ -65,7 +66,7 @@ void read_environment(const Element& world, Environment& environment, Findings& 
   part("atmosphere", "the air is the standard atmosphere",
        [&](const Element& air) { read_air(air, environment); });
   part("wind", "no wind blows", [&](const Element& wind) {
-    environment.wind =
+    environment.wind.velocity =
         wind.vector3("linear_velocity", Vec3::Zero(), Allowed::any(quantity::kSpeed));
   });
   const char* const field =
@@ -73,6 +74,12 @@ void read_environment(const Element& world, Environment& environment, Findings& 
   part(field, "the field is the usual one", [&](const Element& tesla) {
     environment.magnetic_field = tesla.as_vector3(Allowed::between(-100, 100));
   });
+  for (const Element* plugin : world.all("plugin")) {
+    const std::string kind = kind_of(*plugin).name;
+    if (kind == "WindEffects" || kind == "WindPlugin")
+      read_or_leave_out("world/plugin", "the wind pushes nothing", findings,
+                        [&] { read_wind_plugin(*plugin, environment.wind, findings); });
+  }
 }
 
 }  // namespace ruedo::model

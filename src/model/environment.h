@@ -9,4 +9,7 @@ namespace ruedo::model {
 // What is wrong in one of them is named, and that element is left out.
 void read_environment(const Element& world, Environment& environment, Findings& findings);
 
+// The plugins WindEffects and WindPlugin: the wind pushes, and changes.
+void read_wind_plugin(const Element& plugin, Wind& wind, Findings& findings);
+
 }  // namespace ruedo::model

@@ -28,7 +28,6 @@ constexpr const char* kChannels = "channels begin with the model's name";
 constexpr const char* kSecondAxis = "the second axis of a joint follows nothing";
 constexpr const char* kInWorld = "the poses of a state are those in the world";
 constexpr const char* kFrames = "frames have the names of the devices";
-constexpr const char* kCalm = "the wind pushes nothing";
 constexpr const char* kElastic = "<kp> and <kd> say how a contact yields";
 
 constexpr NoEffect kTable[] = {
@@ -57,6 +56,7 @@ constexpr NoEffect kTable[] = {
     {"script/auto_start", "true|1", "the actor walks from the start"},
     {"camera/triggered", "false|0", "pictures come at the camera's rate"},
     {"camera/trigger_topic", "", "pictures come at the camera's rate"},
+    {"lens/projection", "", "camera_info_t has no projection of its own"},
     {"camera/save", "", "pictures are not written to files; `ruedo export` does that"},
     {"metal/metalness", "0.5", kShine},
     {"metal/roughness", "0.5", kShine},
@@ -82,9 +82,6 @@ constexpr NoEffect kTable[] = {
      "the orientation is that in the world's axes"},
     {"orientation_reference_frame/custom_rpy", "0 0 0",
      "the orientation is that in the world's axes"},
-    {"include/enable_wind", "false|0", kCalm},
-    {"model/enable_wind", "false|0", kCalm},
-    {"link/enable_wind", "false|0", kCalm},
     {"sensor/frame_id", "", kFrames},
     {"sensor/gz_frame_id", "", kFrames},
     {"sensor/ignition_frame_id", "", kFrames},

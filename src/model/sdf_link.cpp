@@ -333,15 +333,16 @@ void collect_plugins(const Element& element, std::vector<const Element*>& plugin
 
 Link read_link(const Element& element, const PoseInLink& pose_in_link, const std::string& where,
                ReadContext& context, int index, std::vector<SensorDescription>& sensors) {
-  report_other_children(
-      element,
-      {"pose", "inertial", "collision", "visual", "sensor", "light", "gravity", "kinematic"},
-      {"self_collide", "enable_wind", "velocity_decay", "must_be_base_link", "plugin"}, where,
-      context.findings);
+  report_other_children(element,
+                        {"pose", "inertial", "collision", "visual", "sensor", "light", "gravity",
+                         "kinematic", "enable_wind"},
+                        {"self_collide", "velocity_decay", "must_be_base_link", "plugin"}, where,
+                        context.findings);
   Link link;
   link.name = required_name(element);
   link.source = element.source;
   link.gravity = element.boolean("gravity", true);
+  link.wind = element.boolean("enable_wind", false);
   link.kinematic = element.boolean("kinematic", false);
   if (const Element* decay = element.child("velocity_decay");
       decay && (decay->number("linear", 0.0, Allowed::any(quantity::kDamping)) != 0.0 ||

@@ -206,11 +206,12 @@ std::shared_ptr<const ScopedModel> SdfReader::ModelReader::read() {
 
 void SdfReader::ModelReader::read_attributes() {
   model_->name = required_name(element_);
-  report_other_children(element_,
-                        {"link", "joint", "frame", "model", "include", "pose", "static",
-                         "self_collide", "plugin", "ruedo:drive", "ruedo:joints", "ruedo:odometry",
-                         "ruedo:path", "ruedo:belt", "ruedo:door", "transmission", "ros2_control"},
-                        {"allow_auto_disable", "enable_wind"}, where_, findings_);
+  report_other_children(
+      element_,
+      {"link", "joint", "frame", "model", "include", "pose", "static", "self_collide", "plugin",
+       "ruedo:drive", "ruedo:joints", "ruedo:odometry", "ruedo:path", "ruedo:belt", "ruedo:door",
+       "transmission", "ros2_control", "enable_wind"},
+      {"allow_auto_disable"}, where_, findings_);
   model_->source = element_.source;
   model_->is_static = element_.boolean("static", false);
   model_->self_collide = element_.boolean("self_collide", false);
@@ -363,6 +364,7 @@ void SdfReader::ModelReader::append_link(const Element& child) {
                         index, model_->sensors);
   link.name = dotted(link.name);
   link.X_ML = X_ML;
+  if (!child.has("enable_wind")) link.wind = element_.boolean("enable_wind", false);
   model_->links.push_back(std::move(link));
 }
 

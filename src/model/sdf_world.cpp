@@ -76,17 +76,28 @@ void read_physics(const Element& world_element, WorldModel& world, Findings& fin
   world.gravity = world_element.vector3("gravity", world.gravity, gravity);
 }
 
+// In Gazebo, too, it takes a plugin; servers have been told to load it for every world.
+void name_wind_without_plugin(const Element& element, const WorldModel& world, Findings& findings) {
+  const Wind& wind = world.environment.wind;
+  if (wind.pushes || wind.velocity == Vec3::Zero()) return;
+  for (const ModelInstance& instance : world.models) {
+    for (const Link& link : instance.model->links) {
+      if (link.wind)
+        return findings.unsupported(element.child("wind")->source, "world " + world.name,
+                                    "<enable_wind> has no effect: the wind pushes only with the "
+                                    "plugin WindEffects in <world>");
+    }
+  }
+}
+
 // Of a world, what changes things in Gazebo and does not here, where it says more than the format's
 // own default.
-void name_what_has_no_effect(const Element& world, const Environment& environment,
-                             const std::string& where, Findings& findings) {
+void name_what_has_no_effect(const Element& world, const std::string& where, Findings& findings) {
   const auto name = [&](const char* path, const std::string& text) {
     if (const Element* element = world.child(path))
       findings.unsupported(element->source, where,
                            "<" + element->name + "> is not supported: " + text);
   };
-  if (environment.wind != Vec3::Zero())
-    name("wind", "only air speed sensors feel it, and nothing is pushed");
   name("population", "what it would place is left out");
   name("audio", "nothing sounds");
 }
@@ -298,7 +309,7 @@ void SdfReader::read_world(const Element& element, SdfVersion version, WorldMode
   if (const Element* scene = element.child("scene"))
     read_or_leave_out(in_world, "what is usual is taken", findings,
                       [&] { read_scene(*scene, world.sky, findings); });
-  name_what_has_no_effect(element, world.environment, in_world, findings);
+  name_what_has_no_effect(element, in_world, findings);
 
   std::set<std::string> named;
   load_own_plugins(element.all("plugin"));
@@ -431,6 +442,7 @@ void SdfReader::read_world(const Element& element, SdfVersion version, WorldMode
     check_channel_names(instance, each.element->source);
     world.models.push_back(std::move(instance));
   }
+  name_wind_without_plugin(element, world, findings);
   stand_actors(actors, world);
   for (const Element* fleet : element.all("ruedo:fleet")) read_fleet(*fleet, world, kMaxModels);
   for (const Element* crowd : element.all("ruedo:crowd")) add_crowd(*crowd, world, kMaxModels);

@@ -100,6 +100,7 @@ struct Link {
   Pose X_ML;
   Inertial inertial;
   bool gravity = true;
+  bool wind = false;  // feels it
   bool kinematic = false;
   std::vector<Collision> collisions;
   std::vector<Visual> visuals;
@@ -242,6 +243,20 @@ struct SolverDescription {
       0;  // of a step, for everything; 0: as many as steps of 5 ms take, of 1 ms where joints are
 };
 
+// <wind>, and what the plugin WindEffects makes of it: robot/wind.h.
+struct Wind {
+  struct Noise {
+    double mean = 0.0, stddev = 0.0;
+  };
+  Vec3 velocity = Vec3::Zero();  // m/s, in the world's axes
+  bool pushes = false;           // there is the plugin: links with <enable_wind> feel it
+  double gain = 1.0;             // 1/s: the force is gain mass (wind - velocity of the link)
+  double rise_s = 0.0, vertical_rise_s = 0.0;     // time constants
+  double swing = 0.0, swing_period_s = 1.0;       // of the speed: a part of it
+  double turn_rad = 0.0, turn_period_s = 1.0;     // of the direction
+  Noise speed_noise, turn_noise, vertical_noise;  // m/s, rad, m/s
+};
+
 // Where the world lies, and what surrounds it: <spherical_coordinates>, <atmosphere>, <wind> and
 // <magnetic_field>.
 struct Environment {
@@ -254,9 +269,9 @@ struct Environment {
   double temperature = 288.15;            // K, at sea level
   double temperature_gradient = -0.0065;  // K/m
   double pressure = 101325.0;             // Pa, at sea level
-  Vec3 wind = Vec3::Zero();               // m/s, in the world's axes
-  std::optional<Vec3> magnetic_field;     // T, in the world's axes; empty: the earth's dipole where
-                                          // the world is placed, else SDF's default
+  Wind wind;
+  std::optional<Vec3> magnetic_field;  // T, in the world's axes; empty: the earth's dipole where
+                                       // the world is placed, else SDF's default
 };
 
 struct WorldModel {

@@ -35,6 +35,8 @@ void PhysicsWorld::set_gravity(int body, const Vec3& gravity) {
   impl_->bullet(body).setGravity(to_bt(gravity));
 }
 
+void PhysicsWorld::set_wind(const Vec3& wind) { impl_->set_wind(wind); }
+
 double PhysicsWorld::mass(int body) const {
   const double inverse = impl_->bullet(body).getInvMass();
   return inverse > 0.0 ? 1.0 / inverse : 0.0;

@@ -60,6 +60,10 @@ class PhysicsWorld {
   // Acceleration by gravity of one body from now on, m/s^2, world.
   void set_gravity(int body, const Vec3& gravity);
 
+  // Of the coming steps, m/s, world. Links with <enable_wind> are pushed in their centre of mass
+  // with gain mass (wind - velocity), where the world's plugin says so (model::Wind).
+  void set_wind(const Vec3& wind);
+
   double mass(int body) const;              // kg
   Vec3 center_of_mass(int body) const;      // m, world
   Eigen::Matrix3d inertia(int body) const;  // kg m^2, about the centre of mass, world axes

@@ -371,7 +371,33 @@ void PhysicsWorld::Impl::move_on(btRigidBody& mover, double substep_s) {
   mover.setWorldTransform(next);
 }
 
+// What feels the wind does not fall asleep: it may freshen.
+void PhysicsWorld::Impl::set_wind(const Vec3& wind) {
+  wind_ = wind;
+  if (!world_.environment.wind.pushes || wind_ == Vec3::Zero()) return;
+  for (const RigidBody& rigid : rigid_.bodies) {
+    if (rigid.wind_mass > 0.0 && !rigid.info.moved && !rigid.info.gone)
+      rigid.bullet->activate(true);
+  }
+}
+
+// The approximation of Gazebo's WindEffects: proportional to the mass of what feels the wind, and
+// to how much faster it blows.
+void PhysicsWorld::Impl::blow(int pace) {
+  if (!world_.environment.wind.pushes) return;
+  const double gain = world_.environment.wind.gain;
+  for (size_t i = 0; i < motions_.size(); ++i) {
+    const RigidBody& rigid = rigid_.bodies[i];
+    if (rigid.wind_mass == 0.0 || rigid.info.moved || rigid.info.gone) continue;
+    if (!motions_[i].simulated || motions_[i].fine != (pace == kFine)) continue;
+    const btVector3 at = rigid.bullet->getWorldTransform().getBasis() * to_bt(rigid.wind_center);
+    const Vec3 missing = wind_ - from_bt(rigid.bullet->getVelocityInLocalPoint(at));
+    rigid.bullet->applyForce(to_bt(Vec3(gain * rigid.wind_mass * missing)), at);
+  }
+}
+
 void PhysicsWorld::Impl::before_substep(int pace, double substep_s) {
+  blow(pace);
   for (size_t i = 0; i < joints_.size(); ++i) {
     if (leaders_[i] < 0 || !at_pace(i, pace)) continue;
     const JointConstraint& leader = joints_[index(leaders_[i])];

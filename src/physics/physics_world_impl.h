@@ -71,6 +71,8 @@ class PhysicsWorld::Impl {
   }
   void sleep(int body);
 
+  void set_wind(const Vec3& wind);
+
   static size_t index(int body) { return static_cast<size_t>(body); }
 
   RigidBodies rigid_;
@@ -86,6 +88,7 @@ class PhysicsWorld::Impl {
 
  private:
   void add_joints();  // those that are new
+  void blow(int pace);
   void before_substep(int pace, double substep_s);
   void after_substep(int pace, double substep_s);
   void add_wheel(size_t wheel);
@@ -122,6 +125,7 @@ class PhysicsWorld::Impl {
   Broadphase broadphase_;
   Surfaces surfaces_;
   Dynamics dynamics_;
+  Vec3 wind_ = Vec3::Zero();
   std::vector<btRigidBody*> simulated_[2];                    // of each pace
   std::vector<size_t> parents_;                               // union-find over bodies
   std::vector<int> rolling_;                                  // bodies that are driven wheels

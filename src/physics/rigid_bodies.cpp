@@ -222,6 +222,12 @@ void RigidBodies::make_body(const model::WorldModel& world, const model::BodyLay
     const auto& link_placement = layout.links[static_cast<size_t>(link_index)];
     const model::Link& link = model.links[static_cast<size_t>(link_placement.link)];
     gravity |= link.gravity;
+    if (link.wind) {
+      const double more = link.inertial.mass;
+      const Vec3 at = X_IB * (link_placement.X_BL * link.inertial.X_LI.translation);
+      body.wind_mass += more;
+      body.wind_center += (at - body.wind_center) * (more / body.wind_mass);
+    }
     kinematic |= link.kinematic;
     for (size_t c = 0; c < link.collisions.size(); ++c) {
       const auto& collision = link.collisions[c];

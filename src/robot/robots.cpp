@@ -12,6 +12,7 @@
 #include "robot/robots.h"
 #include "robot/surroundings.h"
 #include "robot/wheels_drive.h"
+#include "robot/wind.h"
 
 namespace ruedo::robot {
 
@@ -61,6 +62,7 @@ class Robots::Impl {
   Crowd crowd_;
   Surroundings surroundings_;
   JointControl joints_;
+  Wind wind_;
 };
 
 Robots::Impl::Impl(const model::WorldModel& world, const model::BodyLayout& layout,
@@ -72,7 +74,8 @@ Robots::Impl::Impl(const model::WorldModel& world, const model::BodyLayout& layo
       driveless_(layout.robots.size()),
       crowd_(world, layout, physics, seed),
       surroundings_(world, layout, physics),
-      joints_(world, layout, physics) {
+      joints_(world, layout, physics),
+      wind_(world.environment.wind, seed) {
   number_robots();
   for (size_t i = 0; i < layout.robots.size(); ++i)
     drives_.push_back(make_drive(static_cast<int>(i)));
@@ -137,6 +140,7 @@ void Robots::Impl::step() {
   for (auto& drive : drives_)
     if (drive) drive->before_step(now());
   joints_.before_step();
+  physics_.set_wind(wind_.at(step_ + 1, world_.step_us));
   physics_.step();
   ++step_;
   for (auto& drive : drives_)
@@ -148,6 +152,7 @@ void Robots::Impl::read(Snapshot& snapshot) const {
   physics_.read(snapshot);
   snapshot.step = step_;
   snapshot.time = now();
+  snapshot.wind = wind_.at(step_, world_.step_us);
   snapshot.robots.resize(drives_.size());
   snapshot.motion_ends.clear();
   snapshot.wheel_angles.assign(layout_.wheels.size(),

@@ -1,7 +1,7 @@
 // A Pitot tube: the differential pressure rho v |v| / 2 of the air that comes along the device's x
 // axis at v, and the temperature of the air, on ROBOT/AIRSPEED. Density and temperature are those
 // of the standard atmosphere at its height (air.h). The air moves with the
-// world's <wind>, the same everywhere.
+// world's wind (robot/wind.h), the same everywhere.
 #include <cmath>
 
 #include "ruedo/air_speed_t.hpp"
@@ -33,7 +33,7 @@ class AirSpeed : public Sensor {
     const Pose X_WS = mount_.pose(input.snapshot);
     const Air air = air_at(environment_, environment_.elevation + X_WS.translation.z());
     const Vec3 ahead = X_WS.rotation * Vec3::UnitX();
-    const double v = (mount_.twist(input.snapshot).linear - environment_.wind).dot(ahead);
+    const double v = (mount_.twist(input.snapshot).linear - input.snapshot.wind).dot(ahead);
     air_speed_t message;
     message.utime = input.snapshot.time;
     message.differential_pressure =

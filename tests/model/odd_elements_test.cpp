@@ -87,11 +87,6 @@ TEST(OddElements, AMissingPrefixIsGuessed) {
 
 TEST(OddElements, WhatWasSilentIsNamed) {
   const auto named = [](const std::string& inside) { return texts(*world_of(inside)); };
-  EXPECT_THAT(named("<wind><linear_velocity>1 0 0</linear_velocity></wind>"),
-              ElementsAre(HasSubstr("<wind> is not supported: only air speed sensors feel it")));
-  EXPECT_THAT(named("<model name='m'><enable_wind>true</enable_wind><link "
-                    "name='l'><enable_wind>false</enable_wind></link></model>"),
-              ElementsAre("<enable_wind> is not supported: the wind pushes nothing"));
   EXPECT_THAT(
       named("<wind/><atmosphere type='adiabatic'/><magnetic_field>1e-5 0 0</magnetic_field>"),
       IsEmpty());  // written by Gazebo into every world

@@ -307,6 +307,8 @@ TEST(AirSpeed, CountsWhatComesAlongItsAxis) {
   bench.at({0, 0, 0});
   bench.now.body_twists[0].linear = {7, 20, 3};  // it looks along y
   EXPECT_NEAR(bench.sample().differential_pressure, 0.5 * 1.225 * 400, 1e-2);
+  bench.now.wind = {0, 30, 0};  // it comes from behind
+  EXPECT_NEAR(bench.sample().differential_pressure, -0.5 * 1.225 * 100, 1e-2);
 }
 
 TEST(Instruments, RefusedConfigurations) {

@@ -1,0 +1,31 @@
+// The wind: the same everywhere, and as the plugin WindEffects of Gazebo has it.
+//
+// Model: with t since the start of the run, and the file's velocity of the speed s (in the plane),
+// the direction d and the vertical speed z,
+//   speed     = s (1 - exp(-t / rise)) (1 + swing sin(2 pi t / swing_period)) + noise
+//   direction = d + turn sin(2 pi t / turn_period) + noise
+//   vertical  = z (1 - exp(-t / vertical_rise)) + noise,
+// where noise is N(mean, stddev), drawn anew in each step. Gazebo's filter adds up over its steps
+// what stands here in closed form. Without the plugin it is the file's velocity, and pushes
+// nothing.
+#pragma once
+
+#include "model/world_model.h"
+#include "ruedo/random.h"
+
+namespace ruedo::robot {
+
+class Wind {
+ public:
+  Wind(const model::Wind& description, uint64_t seed);
+
+  // m/s, world, at the end of that step; 0 is the start of the run.
+  Vec3 at(int64_t step, SimTime step_us) const;
+
+ private:
+  model::Wind wind_;
+  double speed_, direction_;
+  RandomSource random_;
+};
+
+}  // namespace ruedo::robot
