@@ -1,6 +1,8 @@
 // Pictures of labels, through a lens.
 #include "sensors/camera_view.h"
 
+#include <algorithm>
+
 #include "ruedo/math.h"
 
 namespace ruedo {
@@ -36,14 +38,12 @@ const Element& camera_of(const SensorSetup& setup) {
   return *camera;
 }
 
-void name_rest_of_camera(const SensorSetup& setup, std::vector<std::string> read) {
-  for (const char* name : {"pose", "horizontal_fov", "image", "clip", "lens", "save", "topic",
-                           "camera_info_topic", "optical_frame_id"})
-    read.push_back(name);
-  name_what_does_not_act(setup, &camera_of(setup), read);
-  if (const Element* save = camera_of(setup).child("save"); save && setup.findings)
-    setup.findings->unsupported(save->source, "sensor " + setup.device + "/camera/save",
-                                "<save> is not supported: ruedo export writes what was recorded");
+void name_rest_of_camera(const SensorSetup& setup, const std::vector<std::string>& read) {
+  for (const char* name :
+       {"noise", "distortion", "depth_camera", "box_type", "segmentation_type"}) {
+    if (std::find(read.begin(), read.end(), name) == read.end())
+      name_where_written(setup, camera_of(setup), {name});
+  }
 }
 
 CameraView::CameraView(const SensorSetup& setup, const std::vector<std::string>& own)
@@ -53,7 +53,7 @@ CameraView::CameraView(const SensorSetup& setup, const std::vector<std::string>&
       info_(camera_info(lens_)) {
   std::vector<std::string> read = own;
   read.push_back("distortion");
-  name_rest_of_camera(setup, std::move(read));
+  name_rest_of_camera(setup, read);
   if (lens_.distorts()) map_.emplace(lens_);
   view_ =
       map_ ? map_->ideal() : scene::View{{},       lens_.width, lens_.height, lens_.fx,   lens_.fy,

@@ -18,8 +18,9 @@ void describe_lens(const Lens& lens, device_info_t& info);
 // Finds the <camera> of a sensor; throws InputError where there is none.
 const Element& camera_of(const SensorSetup& setup);
 
-// Names what of <camera> has no effect, but for `read` and for names of topics and frames.
-void name_rest_of_camera(const SensorSetup& setup, std::vector<std::string> read);
+// Names what other cameras read of their <camera> and this one does not; `read`: what it does. What
+// no camera reads, or no <camera> has, was named when the file was read.
+void name_rest_of_camera(const SensorSetup& setup, const std::vector<std::string>& read);
 
 class CameraView {
  public:

@@ -55,4 +55,14 @@ void name_what_does_not_act(const SensorSetup& setup, const Element* element,
   }
 }
 
+void name_where_written(const SensorSetup& setup, const Element& element,
+                        const std::vector<std::string>& children) {
+  if (!setup.findings) return;
+  for (const std::string& name : children) {
+    if (const Element* child = element.child(name))
+      setup.findings->unsupported(child->source, "sensor " + setup.device + "/" + element.name,
+                                  "<" + name + "> is not supported and left out");
+  }
+}
+
 }  // namespace ruedo

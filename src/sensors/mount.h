@@ -69,4 +69,8 @@ class Noises {
 void name_what_does_not_act(const SensorSetup& setup, const Element* element,
                             const std::vector<std::string>& read);
 
+// Names these children of a <sensor>'s element as without effect.
+void name_where_written(const SensorSetup& setup, const Element& element,
+                        const std::vector<std::string>& children);
+
 }  // namespace ruedo

@@ -110,9 +110,8 @@ class WideAngleCamera : public Sensor {
     const Element& camera = camera_of(setup);
     setup.element.refuse_unknown({"ruedo:encoding", "ruedo:quality", "ruedo:phase"});
     name_rest_of_camera(setup, {"noise"});
-    name_what_does_not_act(
-        setup, camera.child("lens"),
-        {"type", "custom_function", "scale_to_hfov", "cutoff_angle", "env_texture_size"});
+    if (const Element* lens = camera.child("lens"))
+      name_where_written(setup, *lens, {"intrinsics"});
     read_picture(camera, setup);
     const Projection projection(camera, hfov_);
     make_map(projection, static_cast<int>(camera.integer("lens/env_texture_size", 256,

@@ -29,7 +29,15 @@ ADDED = {
             "reference=double:0",
         )
     ],
-    "camera": ["camera_info_topic=string:", "trigger_topic=string:", "optical_frame_id=string:"],
+    "camera": [
+        "camera_info_topic=string:",
+        "trigger_topic=string:",
+        "triggered=bool:false",
+        "optical_frame_id=string:",
+        "image/anti_aliasing=int:4",
+        *(f"lens/projection/{part}=double:0.0" for part in ("p_fx", "p_fy", "p_cx", "p_cy")),
+        *(f"lens/projection/{part}=double:0.0" for part in ("tx", "ty")),
+    ],
 }
 # 1.12 calls the parts of a <state> so; the older names stay.
 STATES = {"model": "model_state", "link": "link_state", "light": "light_state"}

@@ -246,8 +246,7 @@ TEST(LabelledCameras, WhatDoesNotActIsNamed) {
   for (const Case& c :
        {Case{"segmentation", "<noise><type>gaussian</type><stddev>1</stddev></noise>",
              "<noise> is not supported and left out"},
-        Case{"boundingbox", "<box_tipe>3d</box_tipe>", "did you mean <box_type>?"},
-        Case{"thermal", "<save enabled='true'/>", "<save> is not supported"},
+        Case{"boundingbox", "<depth_camera/>", "<depth_camera> is not supported and left out"},
         Case{"thermal",
              "<noise><type>gaussian</type><dynamic_bias_stddev>1</dynamic_bias_stddev>"
              "</noise>",
