@@ -477,9 +477,15 @@ DriveDescription read_drive(std::shared_ptr<const Element> element,
 namespace {
 
 // What nothing stands in for, each once.
-void name_plugin(const Element& plugin, const PluginKind& kind, const std::string& where,
-                 Findings& findings, std::set<std::string>& named) {
+void name_plugin(const Element& plugin, const PluginKind& kind, const Model& model,
+                 const std::string& where, Findings& findings, std::set<std::string>& named) {
   std::string text;
+  if (kind.does == PluginKind::Does::unknown && names_wheels(plugin, model))
+    return findings.repaired(
+        plugin.source, where,
+        "the plugin " + kind.name + " is not known; as it names wheels, it is read as a drive");
+  if (kind.name == "WindEffects" || kind.name == "WindPlugin")
+    text = "the plugin " + kind.name + " does nothing in a model: it belongs into <world>";
   if (kind.does == PluginKind::Does::dead)
     text = "the plugin " + kind.name + " does nothing here: " + kind.would;
   if (kind.does == PluginKind::Does::unknown) text = "plugins are not loaded: " + kind.name;
@@ -622,8 +628,8 @@ void read_drive_of(const Element& model_element, const std::string& where, ReadC
     const PluginKind kind = kind_of(*plugin);
     model.commanded |= kind.does == PluginKind::Does::joints ||
                        kind.does == PluginKind::Does::control || moves_joints(kind);
-    name_plugin(*plugin, kind, where, context.findings, named);
-    auto translated = drive_from_plugin(*plugin);
+    name_plugin(*plugin, kind, model, where, context.findings, named);
+    auto translated = drive_from_plugin(*plugin, model);
     if (!translated || model_element.has("ruedo:drive"))
       continue;  // Ruedo's own element is there instead of it
     if (model.drive) {

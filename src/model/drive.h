@@ -19,8 +19,12 @@ void read_drive_of(const Element& model_element, const std::string& where, ReadC
 DriveDescription read_drive(std::shared_ptr<const Element> drive,
                             std::shared_ptr<const Element> odometry, const Model& model);
 
-// A Gazebo drive plugin as <ruedo:drive>; null when the plugin is another one.
-std::unique_ptr<Element> drive_from_plugin(const Element& plugin);
+// A Gazebo drive plugin as <ruedo:drive>, or one that is not known and names wheels of the model as
+// these do; null when the plugin is another one.
+std::unique_ptr<Element> drive_from_plugin(const Element& plugin, const Model& model);
+
+// It has elements as drive plugins do, with joints of the model to the left and to the right.
+bool names_wheels(const Element& plugin, const Model& model);
 
 // As <ruedo:drive steering=""> has it: "differential", "mecanum", ...
 std::string name_of(DriveDescription::Steering steering);

@@ -57,11 +57,13 @@ const Joints kJoints[] = {
     {"ruedo:left_joint",
      {"left_joint", "leftJoint", "left_front", "leftFrontJoint", "left_rear", "leftRearJoint",
       "front_left_joint", "back_left_joint", "rear_left_joint", "rearLeftJoint", "frontLeftJoint",
-      "leftMiddleJoint", "frontLeftWheelJoint", "rearLeftWheelJoint"}},
+      "leftMiddleJoint", "frontLeftWheelJoint", "rearLeftWheelJoint", "left_wheel_joint",
+      "left_wheel_joint_name", "leftWheelJoint", "left_joint_name"}},
     {"ruedo:right_joint",
      {"right_joint", "rightJoint", "right_front", "rightFrontJoint", "right_rear", "rightRearJoint",
       "front_right_joint", "back_right_joint", "rear_right_joint", "rearRightJoint",
-      "frontRightJoint", "rightMiddleJoint", "frontRightWheelJoint", "rearRightWheelJoint"}},
+      "frontRightJoint", "rightMiddleJoint", "frontRightWheelJoint", "rearRightWheelJoint",
+      "right_wheel_joint", "right_wheel_joint_name", "rightWheelJoint", "right_joint_name"}},
     {"ruedo:steer_joint",
      {"left_steering_joint", "right_steering_joint", "steeringJoint", "steering_joint"}},
 };
@@ -83,6 +85,7 @@ constexpr Steered kSteering[] = {
     {"gazebo_ros_planar_move", "holonomic"},
     {"gazebo_ros_force_based_move", "holonomic"},
     {"hector_gazebo_ros_force_based_move", "holonomic"},
+    {"ridgeback_ros_force_based_move", "holonomic"},
 };
 
 void add(Element& drive, const char* name, const std::string& text, const Source& source) {
@@ -93,11 +96,27 @@ void add(Element& drive, const char* name, const std::string& text, const Source
   drive.children.push_back(std::move(child));
 }
 
+bool is_joint_of(const Element& named, const Model& model) {
+  return std::any_of(model.joints.begin(), model.joints.end(),
+                     [&](const Joint& joint) { return joint.name == dotted(named.text); });
+}
+
 }  // namespace
 
-std::unique_ptr<Element> drive_from_plugin(const Element& plugin) {
+bool names_wheels(const Element& plugin, const Model& model) {
+  const auto names = [&](const Joints& side) {
+    return std::any_of(side.theirs.begin(), side.theirs.end(), [&](const char* name) {
+      const Element* joint = plugin.child(name);
+      return joint && is_joint_of(*joint, model);
+    });
+  };
+  return names(kJoints[0]) && names(kJoints[1]);
+}
+
+std::unique_ptr<Element> drive_from_plugin(const Element& plugin, const Model& model) {
   const PluginKind kind = kind_of(plugin);
-  if (kind.does != PluginKind::Does::drive) return nullptr;
+  const bool alike = kind.does == PluginKind::Does::unknown && names_wheels(plugin, model);
+  if (kind.does != PluginKind::Does::drive && !alike) return nullptr;
   // One that only starts something moving, as obstacles are, takes no commands on the ground.
   if (kind.name == "VelocityControl" &&
       (plugin.has("initial_linear") || plugin.has("initial_angular")))
@@ -113,6 +132,11 @@ std::unique_ptr<Element> drive_from_plugin(const Element& plugin) {
       for (const Element* joint : plugin.all(name))
         add(*drive, each.ours, joint->text, joint->source);
     }
+  }
+  if (alike) {
+    const bool mecanum = kind.name.find("mecanum") != std::string::npos;
+    if (mecanum || drive->has("ruedo:steer_joint"))
+      drive->attributes.emplace_back("steering", mecanum ? "mecanum" : "ackermann");
   }
   for (const Parameter& each : kParameters) {
     const Element* given = plugin.child(each.theirs);

@@ -128,6 +128,15 @@ bool may_be_package(const fs::path& folder) {
          (!home || !starts_with(full_path(home) + "/", (folder.string() + "/").c_str()));
 }
 
+// Where the packages of a workspace lie beside the one that holds the file; "": it lies in none.
+std::string workspace_of(const std::string& file) {
+  for (fs::path folder = fs::path(file).parent_path(); folder.has_relative_path();
+       folder = folder.parent_path()) {
+    if (is_there(folder / "package.xml")) return folder.parent_path().string();
+  }
+  return "";
+}
+
 }  // namespace
 
 std::string shipped_worlds() {
@@ -223,8 +232,8 @@ bool ResourceFinder::allowed(const std::string& path, const std::string& from) c
 }
 
 // ROS packages may live in a folder of another name: one whose package.xml has the name counts too,
-// be it above the naming file, a folder that is searched, or in one. Above it the folder's own name
-// will do.
+// be it above the naming file, beside its package, a folder that is searched, or in one. Above it
+// the folder's own name will do.
 std::optional<std::string> ResourceFinder::in_package(const std::string& package,
                                                       const std::string& rest,
                                                       const std::string& from) const {
@@ -234,7 +243,10 @@ std::optional<std::string> ResourceFinder::in_package(const std::string& package
     if ((folder.filename() == package && may_be_package(folder)) || package_name(folder) == package)
       return full_path(folder / rest);
   }
-  for (const auto& root : roots_for(from)) {
+  std::vector<std::string> roots = roots_for(from);
+  if (const std::string beside = for_strangers_ ? "" : workspace_of(from); !beside.empty())
+    add_folder(roots, beside);
+  for (const auto& root : roots) {
     const auto [at, inserted] = packages_.try_emplace(root);
     if (inserted) {
       std::vector<fs::path> folders{root};

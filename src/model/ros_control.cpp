@@ -76,7 +76,8 @@ void collect_types(const Element& map, std::vector<Controller>& into) {
   for (const auto& child : map.children) {
     if (const Element* type = child->child("type");
         type && type->text.find("ontroller") != std::string::npos) {
-      into.push_back({child->name, type->text, {child.get()}, child->source});
+      const bool own = child->name == "ros__parameters";  // the type stands among the rest
+      into.push_back({own ? map.name : child->name, type->text, {child.get()}, child->source});
     }
     collect_types(*child, into);
   }
@@ -96,10 +97,13 @@ void collect_parameters(const Element& map, Controller& controller) {
   }
 }
 
-std::vector<Controller> controllers_in(const Element& file) {
+// One file may name the types, and another hold the parameters.
+std::vector<Controller> controllers_in(const std::vector<std::unique_ptr<Element>>& files) {
   std::vector<Controller> all;
-  collect_types(file, all);
-  for (Controller& each : all) collect_parameters(file, each);
+  for (const auto& file : files) collect_types(*file, all);
+  for (Controller& each : all) {
+    for (const auto& file : files) collect_parameters(*file, each);
+  }
   return all;
 }
 
@@ -459,11 +463,13 @@ ControllersDrive drive_from_controllers(const Element& model_element,
   if (!controlled) return {};
   const std::vector<std::string> beside = files_beside(model_element.source.file);
   const std::vector<std::string> named = named_files(plugins, beside, where, context);
-  const auto look_in = [&](const std::string& path, bool is_named) -> ControllersDrive {
-    const auto file = read_yaml(path, is_named, where, context);
-    if (!file) return {};
+  const auto look_in = [&](const std::vector<std::string>& paths, bool is_named) {
     ControllersDrive result;
-    for (const Controller& each : controllers_in(*file)) {
+    std::vector<std::unique_ptr<Element>> files;
+    for (const std::string& path : paths) {
+      if (auto file = read_yaml(path, is_named, where, context)) files.push_back(std::move(file));
+    }
+    for (const Controller& each : controllers_in(files)) {
       if (is_named && !known_type(each.type)) {
         context.findings.unsupported(each.source, where,
                                      "controllers of type '" + each.type + "' are not known; '" +
@@ -480,17 +486,17 @@ ControllersDrive drive_from_controllers(const Element& model_element,
       }
       if (!result.drive) continue;
       result.odometry = odometry_of(each);
-      result.controller = "'" + each.name + "' of " + fs::path(path).filename().string();
+      result.controller =
+          "'" + each.name + "' of " + fs::path(each.source.file).filename().string();
       result.named = is_named;
       name_what_has_no_effect(each, where, context.findings);
-      context.documents.note(path);
+      for (const std::string& path : paths) context.documents.note(path);
     }
     return result;
   };
-  for (const bool is_named : {true, false}) {
-    for (const std::string& path : is_named ? named : beside) {
-      if (ControllersDrive found = look_in(path, is_named); found.drive) return found;
-    }
+  if (ControllersDrive found = look_in(named, true); found.drive) return found;
+  for (const std::string& path : beside) {  // each may be another robot's
+    if (ControllersDrive found = look_in({path}, false); found.drive) return found;
   }
   return {};
 }

@@ -2,12 +2,18 @@
 #include <algorithm>
 #include <filesystem>
 
+#include "model/include_params.h"
 #include "model/no_effect.h"
 #include "model/sdf_reader.h"
 #include "model/urdf.h"
 #include "model/xacro.h"
 
 namespace ruedo::model {
+namespace {
+
+constexpr const char* kParams = "experimental:params";
+
+}  // namespace
 
 std::string relative_to(const Element& owner) {
   const Element* pose = owner.child("pose");
@@ -111,10 +117,13 @@ std::shared_ptr<const ScopedModel> SdfReader::read_overridden(const Element& mod
     std::erase_if(copy->children, [&](const auto& child) { return child->name == name; });
   };
   for (const auto& child : include.children) {
-    if (child->name == "static" || child->name.rfind("ruedo:", 0) == 0) remove(child->name);
+    if (child->name == "static" || child->name == "enable_wind" ||
+        child->name.rfind("ruedo:", 0) == 0)
+      remove(child->name);
   }
   for (const auto& child : include.children) {
-    if (child->name == "static" || child->name == "plugin" || child->name.rfind("ruedo:", 0) == 0) {
+    if (child->name == "static" || child->name == "enable_wind" || child->name == "plugin" ||
+        child->name.rfind("ruedo:", 0) == 0) {
       copy->children.push_back(child->clone());
     } else if (child->name == "sensor") {
       Element* link = copy->child("link");
@@ -122,6 +131,8 @@ std::shared_ptr<const ScopedModel> SdfReader::read_overridden(const Element& mod
       link->children.push_back(child->clone());
     }
   }
+  for (const Element* params : include.all(kParams))
+    apply_params(*params, *copy, "include", context_.findings);
   return read_model(*copy, version);
 }
 
@@ -129,8 +140,8 @@ namespace {
 
 // What of an <include> changes the model itself, not only where it stands.
 bool is_override(const Element& child) {
-  return child.name == "static" || child.name == "plugin" || child.name == "sensor" ||
-         child.name.rfind("ruedo:", 0) == 0;
+  return child.name == "static" || child.name == "enable_wind" || child.name == "plugin" ||
+         child.name == "sensor" || child.name == kParams || child.name.rfind("ruedo:", 0) == 0;
 }
 
 // False also for <static> alone with the value that the model has: nothing is to be read again.
@@ -186,16 +197,11 @@ std::shared_ptr<const ScopedModel> placed_by(const Element& include,
 
 std::optional<SdfReader::Included> SdfReader::include(const Element& element,
                                                       const std::string& where) {
-  report_other_children(
-      element,
-      {"uri", "name", "pose", "static", "placement_frame", "plugin", "sensor", "ruedo:drive",
-       "ruedo:joints", "ruedo:odometry", "ruedo:path", "ruedo:belt", "ruedo:door"},
-      {"allow_auto_disable", "enable_wind"}, where, context_.findings);
-  if (const Element* changes = element.child("experimental:params")) {
-    context_.findings.unsupported(
-        changes->source, where,
-        "<experimental:params> is not supported: the model is included as it is");
-  }
+  report_other_children(element,
+                        {"uri", "name", "pose", "static", "enable_wind", "placement_frame",
+                         "plugin", "sensor", kParams, "ruedo:drive", "ruedo:joints",
+                         "ruedo:odometry", "ruedo:path", "ruedo:belt", "ruedo:door"},
+                        {"allow_auto_disable"}, where, context_.findings);
   const Element* uri = element.child("uri");
   if (!uri || uri->text.empty()) element.fail("has no <uri>");
   const auto path = context_.resources.find_model(uri->text, element.source.file);

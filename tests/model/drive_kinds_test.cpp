@@ -13,6 +13,7 @@ namespace ruedo::model {
 namespace {
 
 using testing::ElementsAre;
+using testing::IsEmpty;
 using Steering = DriveDescription::Steering;
 
 std::string link(const std::string& name, const std::string& pose) {
@@ -187,6 +188,36 @@ TEST(DrivePlugins, OfEveryKindAreTranslated) {
                      "<back_left_joint>j_rl</back_left_joint><back_right_joint>j_rr</"
                      "back_right_joint></plugin>"),
             Steering::mecanum);
+}
+
+// A vendor's own library, with the elements that others have, drives; one without wheels of the
+// model does not.
+TEST(DrivePlugins, OneThatIsNotKnownDrivesByTheWheelsThatItNames) {
+  const auto robot = [](const std::string& file, const std::string& inside) {
+    return world_of("<model name='m'><link name='base'/>" + wheel("l", "0 0.2 0.1 0 0 0") +
+                    wheel("r", "0 -0.2 0.1 0 0 0") + "<plugin name='p' filename='" + file + "'>" +
+                    inside + "</plugin></model>");
+  };
+  const std::string kobuki =
+      "<left_wheel_joint_name>j_l</left_wheel_joint_name><right_wheel_joint_name>j_r"
+      "</right_wheel_joint_name><wheel_separation>0.5</wheel_separation>"
+      "<wheel_diameter>0.18</wheel_diameter>";
+  const auto known = robot("libgazebo_ros_kobuki.so", kobuki);
+  EXPECT_THAT(texts(*known), IsEmpty());
+  const auto vendors = robot("libacme_wheels.so", kobuki);
+  EXPECT_THAT(texts(*vendors), ElementsAre("the plugin libacme_wheels.so is not known; as it names "
+                                           "wheels, it is read as a drive"));
+  for (const auto& world : {known, vendors}) {
+    const auto& drive = world->models[0].model->drive;
+    ASSERT_TRUE(drive);
+    EXPECT_FALSE(drive->guessed);
+    EXPECT_EQ(drive->track, 0.5);
+    EXPECT_EQ(drive->wheel_radius, 0.09);
+  }
+  const auto other = robot("libacme_doors.so",
+                           "<left_joint>port</left_joint><right_joint>starboard</right_joint>");
+  EXPECT_FALSE(other->models[0].model->drive);
+  EXPECT_THAT(texts(*other), ElementsAre("plugins are not loaded: libacme_doors.so"));
 }
 
 // A name alone makes no drive, and each plugin has its class.

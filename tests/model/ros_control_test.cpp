@@ -185,6 +185,32 @@ TEST(RosControl, MecanumAndSteeringControllers) {
   EXPECT_NEAR(drive_of(*world).wheelbase, 0.5, 1e-12);
 }
 
+// As PAL's robots have it: one file names the types, another holds the rest; and the type may stand
+// among the parameters.
+TEST(RosControl, SeveralFilesAreReadAsOne) {
+  TemporaryFolder folder;
+  const std::string plugin =
+      "<gazebo><plugin name='c' filename='libgz_ros2_control-system.so'>"
+      "<parameters>base.yaml</parameters><parameters>manager.yaml</parameters></plugin></gazebo>";
+  const std::string base =
+      "base_controller:\n  ros__parameters:\n    left_wheel_names: [front_left, rear_left]\n"
+      "    right_wheel_names: [front_right, rear_right]\n    wheel_radius: 0.11\n"
+      "    wheel_separation: 0.7\n";
+  const std::string type = "type: diff_drive_controller/DiffDriveController\n";
+  folder.write("base.yaml", base);
+  folder.write("manager.yaml",
+               "controller_manager:\n  ros__parameters:\n    base_controller:\n      " + type);
+  const auto apart = load_world(folder.write("bot.urdf", four_wheels(plugin)));
+  folder.write("base.yaml", base + "    " + type);
+  folder.write("manager.yaml", "controller_manager:\n  ros__parameters:\n    update_rate: 100\n");
+  const auto among = load_world(folder.write("bot.urdf", four_wheels(plugin)));
+  for (const auto& world : {apart, among}) {
+    EXPECT_THAT(texts(*world), IsEmpty());
+    EXPECT_EQ(drive_of(*world).track, 0.7);
+    EXPECT_EQ(drive_of(*world).wheel_radius, 0.11);
+  }
+}
+
 // A controller of other joints is another robot's.
 TEST(RosControl, JointsThatAreNotThereAreAnotherRobots) {
   TemporaryFolder folder;

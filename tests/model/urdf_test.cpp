@@ -251,6 +251,24 @@ TEST(Urdf, PackagesGoByTheFolderThatTheFileIsIn) {
             std::vector<std::string>{});
 }
 
+// Packages of a workspace lie beside each other, in folders of any name; a world's <include> finds
+// robots there, and robots their meshes.
+TEST(Urdf, PackagesLieBesideEachOther) {
+  TemporaryFolder folder;
+  folder.write("src/one/package.xml", "<package><name>bot_gazebo</name></package>");
+  folder.write("src/two/package.xml", "<package><name>bot_description</name></package>");
+  folder.write("src/three/package.xml", "<package><name>bot_meshes</name></package>");
+  folder.write("src/three/meshes/a.obj", kTetrahedron);
+  folder.write("src/two/urdf/bot.urdf", robot_with_mesh("package://bot_meshes/meshes/a.obj"));
+  const auto world = load_world(folder.write(
+      "src/one/worlds/w.sdf",
+      "<sdf version='1.9'><world name='w'><include><uri>package://bot_description/urdf/bot.urdf"
+      "</uri></include></world></sdf>"));
+  EXPECT_EQ(texts(*world), std::vector<std::string>{});
+  ASSERT_EQ(world->models.size(), 1u);
+  EXPECT_EQ(world->models[0].model->links.at(0).visuals.size(), 1u);
+}
+
 // urdfdom leaves out what comes after a fault in a link; here only the faulty part is.
 TEST(Urdf, AFaultInALinkCostsThatPartAlone) {
   const std::string

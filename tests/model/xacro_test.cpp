@@ -72,7 +72,22 @@ TEST(Xacro, AnIncludeThatIsNotThereIsPassedOver) {
                             "<robot name='b' xmlns:xacro='x'><xacro:include filename='$(find "
                             "nowhere)/x.xacro'/><link name='l'/></robot>"));
   EXPECT_THAT(texts(*world),
-              ElementsAre("the include '$(find) nowhere/x.xacro' is not found; it is passed over"));
+              ElementsAre("the include '$(find nowhere)/x.xacro' is not found; it is passed over"));
+}
+
+// Nobody has a folder of the name that stands in for a package that is not there.
+TEST(Xacro, WhatLiesInAPackageThatIsNotThereIsNamedAsWritten) {
+  const Packages packages;
+  const auto world = load_world(packages.folder.write(
+      "bot/bot.xacro",
+      "<robot name='b' xmlns:xacro='x'><link name='l'><visual><geometry><mesh "
+      "filename='file://$(find nowhere)/m.stl'/></geometry></visual></link><gazebo><plugin "
+      "name='c' filename='libgz_ros2_control-system.so'><parameters>$(find nowhere)/c.yaml"
+      "</parameters></plugin></gazebo></robot>"));
+  EXPECT_THAT(texts(*world),
+              testing::UnorderedElementsAre(
+                  "the mesh 'package://nowhere/m.stl' is not found; the shape is left out",
+                  "the controllers' file 'package://nowhere/c.yaml' is not found"));
 }
 
 TEST(Xacro, WhatIsWrongIsSaidInOneLine) {

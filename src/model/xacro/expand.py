@@ -84,6 +84,13 @@ def note_lines(files):
     builder.start_element_handler = start_element_handler
 
 
+MISSING = "/package-not-found"  # the folder of a package that is not found
+
+
+def as_written(text):
+    return re.sub(MISSING + "/([^/ ']+)", r"$(find \1)", text)
+
+
 def main():
     parser = argparse.ArgumentParser()
     parser.add_argument("file")
@@ -106,7 +113,7 @@ def main():
     def get_package_share_directory(name):
         if name in known:
             return known[name]
-        return os.path.join("/package-not-found", name)
+        return os.path.join(MISSING, name)
 
     index, inner = (
         types.ModuleType("ament_index_python"),
@@ -139,9 +146,7 @@ def main():
         name = xacro.eval_text(elt.getAttribute("filename"), symbols)
         path = xacro.abs_filename_spec(name)
         if not re.search(r"[*?\[]", path) and not os.path.exists(path):
-            missing.append(
-                (xacro.filestack[-1] or file, name.replace("/package-not-found/", "$(find) "))
-            )
+            missing.append((xacro.filestack[-1] or file, as_written(name)))
             elt.setAttribute("optional", "true")
         return include(elt, macros, symbols, func)
 
@@ -156,12 +161,17 @@ def main():
         where = next(
             (os.path.abspath(each) for each in reversed(xacro.filestack or []) if each), file
         )
-        text = " ".join(str(error).split()) or type(error).__name__
+        text = as_written(" ".join(str(error).split())) or type(error).__name__
         lost = "; not found: " + ", ".join(sorted({name for _, name in missing})) if missing else ""
         print(f"{where}: {text}{lost}", file=sys.stderr)
         return 1
     with open(arguments.out, "w", encoding="utf-8") as out:
-        out.write(document.toxml())
+        # What is not found is named as other files have it.
+        out.write(
+            document.toxml()
+            .replace("file://" + MISSING, MISSING)
+            .replace(MISSING + "/", "package://")
+        )
     with open(arguments.out + ".files", "w", encoding="utf-8") as out:
         out.writelines(f"{each}\n" for each in dict.fromkeys(read))
     with open(arguments.out + ".missing", "w", encoding="utf-8") as out:
