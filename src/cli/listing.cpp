@@ -159,8 +159,12 @@ void print_devices(FILE* out, const std::vector<world_info_t>& info) {
       for (size_t i = 0; i < robot.wheels.size(); ++i)
         wheels += fmt::format("{}{} ({})", i > 0 ? ", " : "", robot.wheels[i],
                               robot.left[i] ? "left" : "right");
-      fmt::print(out, "  wheels: {}; radius {:g} m, track {:g} m\n", wheels, robot.wheel_radius,
-                 robot.track);
+      if (wheels.empty())  // tracks, or what moves without
+        fmt::print(out, "  no wheels{}\n",
+                   robot.track > 0.0 ? fmt::format("; track {:g} m", robot.track) : "");
+      else
+        fmt::print(out, "  wheels: {}; radius {:g} m, track {:g} m\n", wheels, robot.wheel_radius,
+                   robot.track);
       fmt::print(
           out,
           "  accelerates with {:g}, brakes with {:g} m/s^2, turns with {:g} rad/s^2; watchdog {}\n",

@@ -211,6 +211,11 @@ def test_info_as_json():
     assert lrf["width"] == 181 and abs(lrf["fov_horizontal"] - 3.14159265) < 1e-6
 
 
+def test_info_of_what_moves_without_wheels():
+    lines = ruedo("info", WORLDS / "robots" / "puck" / "model.sdf").stdout.splitlines()
+    assert "  no wheels" in lines
+
+
 def test_check_finds_all_with_lines(tmp_path):
     world = tmp_path / "bad.sdf"
     world.write_text(
