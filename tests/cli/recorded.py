@@ -72,8 +72,9 @@ class Server:
 
     def __init__(self, port, *arguments, world=ARENA):
         self.url = url(port)
+        options = QUICK if world == ARENA else ["--quiet"]  # the camera is the arena's
         self.process = subprocess.Popen(
-            [RUEDO, "run", world, *QUICK, "--lcm", self.url, *map(str, arguments)],
+            [RUEDO, "run", world, *options, "--lcm", self.url, *map(str, arguments)],
             stdout=subprocess.DEVNULL,
             stderr=subprocess.PIPE,
             text=True,

@@ -9,13 +9,16 @@ import struct
 import subprocess
 from pathlib import Path
 
+import lcm
 import pytest
+import ruedo
 from recorded import (
     ARENA,
     BOX,
     PATIENCE,
     QUICK,
     RUEDO,
+    SOURCE,
     Server,
     events,
     no_process_outlives_its_test,  # noqa: F401 (a fixture of every test here)
@@ -25,7 +28,9 @@ from recorded import (
     url,
     write,
 )
-from ruedo.lcmtypes import applied_t, log_header_t, planar_lidar_t, state_hash_t
+from ruedo.lcmtypes import applied_t, joint_command_t, log_header_t, planar_lidar_t, state_hash_t
+
+ARMS = str(SOURCE / "tests" / "golden" / "arms.sdf")
 
 
 @pytest.fixture(scope="module")
@@ -274,3 +279,59 @@ def test_a_lockstep_log_verifies(tmp_path):
     assert sum(channel == "ruedo/applied" for _, channel, _ in events(tmp_path / "a.lcm")) >= 40
     result = program("verify", tmp_path / "a.lcm")
     assert result.returncode == 0, result.stdout + result.stderr
+
+
+def test_gains_and_limits_by_message_are_repeated(tmp_path):
+    """In lockstep, and from a client's own time beside a run that goes on."""
+    modes = joint_command_t
+
+    def told(*entries):
+        message = joint_command_t()
+        message.n = len(entries)
+        names, kinds, values = zip(*entries, strict=True)
+        message.name, message.mode, message.value = list(names), bytes(kinds), list(values)
+        return message.encode()
+
+    orders = [
+        told(("pan", modes.POSITION, 1.0), ("fork", modes.POSITION, 0.4)),
+        told(("pan", modes.POSITION_GAIN, 2.5), ("fork", modes.RATE_GAIN, 900.0)),
+        told(("tilt", modes.VELOCITY_LIMIT, 1.5), ("tilt", modes.POSITION, 0.8)),
+        told(("fork", modes.EFFORT_LIMIT, 25.0), ("pan", modes.EFFORT_LIMIT, 0.3)),
+        told(("pan", modes.POSITION, -1.0), ("tilt", modes.EFFORT, 0.05)),
+    ]
+    lockstep, own_time = tmp_path / "lockstep.lcm", tmp_path / "own_time.lcm"
+    server = Server(7836, "--lockstep", "1", "--record", lockstep, world=ARMS)
+    with server.connect() as simulation:
+        for order in orders:
+            simulation.step(40, [ruedo.Command("lift/joint_command", order)])
+        simulation.quit()
+    assert server.end()[0] == 0
+    server = Server(7837, "--rate", "20", "--record", own_time, world=ARMS)
+    with server.connect() as simulation:
+        bus = lcm.LCM(simulation.url)
+        for order in [*orders, None, *orders]:
+            if order is None:
+                simulation.reset(seed=3)  # the file's gains again
+            else:
+                bus.publish("lift/joint_command", order)
+            simulation.sleep(0.4)
+        simulation.quit()
+    assert server.end()[0] == 0
+    for log, least in ((lockstep, len(orders)), (own_time, 2 * len(orders))):
+        applied = [
+            applied_t.decode(data) for _, channel, data in events(log) if channel == "ruedo/applied"
+        ]
+        assert sum(each.channel == "lift/joint_command" for each in applied) >= least
+        result = program("verify", log, "--threads", 2)
+        assert result.returncode == 0, result.stdout + result.stderr
+        assert "repeated byte for byte" in result.stdout
+    # With another gain it is another run.
+    found = events(lockstep)
+    for i, (utime, channel, data) in enumerate(found):
+        if channel == "ruedo/applied" and applied_t.decode(data).data == orders[1]:
+            applied = applied_t.decode(data)
+            applied.data = told(("pan", modes.POSITION_GAIN, 2.0), ("fork", modes.RATE_GAIN, 900.0))
+            found[i] = (utime, channel, applied.encode())
+    write(tmp_path / "other.lcm", found)
+    result = program("verify", tmp_path / "other.lcm")
+    assert result.returncode == 1, result.stdout + result.stderr
