@@ -232,11 +232,11 @@ export default async function controls(tools) {
   };
   check(
     "beside what lies over it, a click reaches the view",
-    await page.evaluate(() => {
+    (await page.evaluate(() => {
       window.ruedo.page.set({ reduced: true }); // one more chip, in a row of its own
       const { right, bottom } = document.getElementById("legend").getBoundingClientRect();
       return document.elementFromPoint(right - 2, bottom - 2)?.id;
-    }) === "canvas",
+    })) === "canvas",
     "something else is there",
   );
   const clicked = await put("a box", [-1.5, 1]);
