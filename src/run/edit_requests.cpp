@@ -61,17 +61,16 @@ Run::Outcome Run::change(const request_t& request, bool models,
   return outcome;
 }
 
-// Who edits a world that stands still sees what has become of it, though no state comes. To the bus
-// alone: a log is the same with and without viewers.
+// Who edits a world that stands still sees what has become of it, though no state comes. As a
+// service, which is in no log: a log is the same with and without viewers.
 void Run::show_change() {
   if (!options_.edited || repeating_ || !pacer_->paused() || !publisher_.latest()) return;
-  for (const engine::Channel& channel : channels_.list()) {
-    if (channel.name != "ruedo/world") continue;
+  const std::vector<engine::Channel>& channels = channels_.list();
+  for (size_t i = 0; i < channels.size(); ++i) {
+    if (channels[i].name != "ruedo/world") continue;
     for (const world_state_t& state :
-         engine::world_states(*world_, simulation_->layout(), epoch_, changed_)) {
-      const std::vector<uint8_t> bytes = engine::encoded(state);
-      bus_.publish(channel.bus_name, bytes.data(), bytes.size());
-    }
+         engine::world_states(*world_, simulation_->layout(), epoch_, changed_))
+      publisher_.service(static_cast<int>(i), state, state.part);
   }
 }
 

@@ -213,11 +213,8 @@ export default async function controls(tools) {
   await page.getByRole("tab", { name: "World" }).click();
   await page.keyboard.press("3");
   await still();
-  const put = async (thing, at) => {
-    await page.getByLabel("what to place").selectOption({ label: thing });
-    await page.locator("#canvas").focus();
-    await page.keyboard.press("b");
-    // Where those metres are on the screen, by the page's own camera.
+  // Clicks on the ground there, and returns where exactly, by the page's own camera.
+  const click = async (at) => {
     const [px, py, gx, gy] = await page.evaluate(([gx, gy]) => {
       const { stage } = window.ruedo,
         box = document.getElementById("canvas").getBoundingClientRect();
@@ -229,6 +226,12 @@ export default async function controls(tools) {
     }, at);
     await page.mouse.click(px, py);
     return [gx, gy];
+  };
+  const put = async (thing, at) => {
+    await page.getByLabel("what to place").selectOption({ label: thing });
+    await page.locator("#canvas").focus();
+    await page.keyboard.press("b");
+    return click(at);
   };
   check(
     "beside what lies over it, a click reaches the view",
@@ -262,6 +265,29 @@ export default async function controls(tools) {
       );
     },
     clicked,
+  );
+  // ---- going to where one clicks
+  await page.locator("#canvas").focus();
+  await page.keyboard.press("g");
+  await click([0.8, -1]);
+  await page.keyboard.down("Shift");
+  const last = await click([0, -1.2]);
+  await page.keyboard.up("Shift");
+  await page.keyboard.press("Escape");
+  check(
+    "two points lie ahead",
+    (await page.evaluate(() => window.ruedo.trip.points().length)) === 2,
+    "other points",
+  );
+  await until(
+    "the robot goes to where the clicks were",
+    ([x, y]) => {
+      const { stage, trip } = window.ruedo,
+        base = stage.description.bases.findIndex(({ robot }) => robot === "p3dx"),
+        at = stage.planar(base);
+      return trip.points().length === 0 && Math.hypot(at.x - x, at.y - y) < 0.06;
+    },
+    last,
   );
   await put("Pioneer 3-DX", [-1.5, -1]);
   await until("a robot was placed", () =>

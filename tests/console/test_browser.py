@@ -365,6 +365,7 @@ def test_everything_is_steered(steered):
         *(f"{layer} make a difference to the picture" for layer in LAYERS),
         "a box was placed",
         "the box stands where the click was",
+        "the robot goes to where the clicks were",
         "a robot was placed",
         "where there is no room, it says so",
         "the server has the rate that was chosen",
@@ -401,9 +402,12 @@ def test_what_was_steered_is_in_the_log(steered):
         {(0.9, 0), (0, 0.8)},
     )
     assert keys | stick | gamepad | {(0, 0)} <= shares
-    assert [
-        move_command_t.decode(each.data).value for each in applied if each.channel == "p3dx/move"
-    ] == pytest.approx([0.4])  # typing drove nothing
+    moves = [
+        move_command_t.decode(each.data) for each in applied if each.channel == "p3dx/move"
+    ]
+    assert moves[0].value == pytest.approx(0.4)  # typing drove nothing
+    turns = {move_command_t.ROTATE, move_command_t.ADVANCE}
+    assert {each.kind for each in moves[1:]} == turns  # by clicks
     requests = [each.kind for each in applied if each.channel == "ruedo/request"]
     assert requests.count(request_t.SPAWN) == 2 and requests[-1] == request_t.RESET
     assert (

@@ -11,11 +11,13 @@ import { Outline } from "./edit/outline";
 import { loadScene, type SceneFiles } from "./scene/description";
 import { Labels } from "./scene/labels";
 import { Measure } from "./scene/measure";
+import { Way } from "./scene/way";
 import { OverlaySet } from "./scene/overlay_set";
 import { Stage, type ViewMode } from "./scene/stage";
 import { Clock } from "./state/clock";
 import { Loading } from "./state/loading";
 import { makePage } from "./state/page";
+import { GoTo, type PlanarPose } from "./state/go_to";
 import { hashOf, placeOf, type Place } from "./state/place";
 import { Poses } from "./state/poses";
 import { wantedChannels } from "./state/wanted";
@@ -34,7 +36,7 @@ import { listenToKeys } from "./ui/keys";
 import { makeLegend } from "./ui/legend";
 import { Notice } from "./ui/notice";
 import { Panel } from "./ui/panel";
-import { RobotPages } from "./ui/robot";
+import { kReasons, RobotPages } from "./ui/robot";
 import { Timeline } from "./ui/timeline";
 import { encode } from "./wire/lcm";
 import { Link, type Hello, type Playback, type RunLink } from "./wire/link";
@@ -100,6 +102,16 @@ export class App {
   );
   readonly channels = new ChannelList(() => this.want());
   readonly measure = new Measure(this.page, this.stage, byId("canvas"));
+  private readonly way = new Way(this.stage);
+  readonly trip = new GoTo({
+    pose: () => this.planarPose(),
+    move: (command) => this.control.move(command),
+    failed: (reason) => toast(`It does not get there: ${kReasons[reason] ?? reason}.`, "error"),
+    changed: () => {
+      this.way.show(this.planarPose(), this.trip.points());
+      this.want();
+    },
+  });
   readonly labels = new Labels(byId("view"), this.page, this.stage);
   readonly frames = new FrameTree(this.page, this.stage);
   readonly inset = new Inset(byId("view"), this.page, () => this.want());
@@ -165,7 +177,12 @@ export class App {
       this.editPage.door,
       () => this.gizmo.seized,
       (point) => this.measure.click(point),
+      (point, further) => this.trip.go(point, further),
     );
+    this.pages.onMotion = (status) => this.trip.heard(status);
+    const going = () => page.set({ tool: page.now.tool === "go" ? "select" : "go" });
+    this.pages.goButton.addEventListener("click", going);
+    page.watch(["tool"], ({ tool }) => this.pages.goButton.classList.toggle("on", tool === "go"));
     this.editPage.extras.append(
       new Capture(this.stage, byId("canvas") as HTMLCanvasElement).element,
       h(
@@ -189,6 +206,7 @@ export class App {
       End: () => this.rewind?.live(),
       r: () => void control.reset(),
       x: () => control.stop(),
+      g: going,
       "1": () => this.setMode("orbit"),
       "2": () => this.setMode("follow"),
       "3": () => this.setMode("top"),
@@ -382,6 +400,7 @@ export class App {
   private forgetPast(anew: boolean): void {
     if (anew) this.editor.history.clear();
     if (anew) this.plots.clear();
+    if (anew) this.trip.forget();
     this.overlays.forget();
     this.pages.forget();
     this.poses.jump();
@@ -402,12 +421,28 @@ export class App {
     this.stage.follow(base);
     this.pages.beginAt(scene ? scene.bases[base]?.start : [0, 0, 0, 1, 0, 0, 0]);
     const key = `${world!.runId} ${robot.name}`;
-    if (key !== this.shown)
+    if (key !== this.shown) {
+      this.trip.forget();
       this.pages.show(
         robot,
         world!.devices.filter((device) => device.robot === robot.name),
       );
+    }
     this.shown = key;
+  }
+
+  // The chosen robot's.
+  private planarPose(): PlanarPose | null {
+    const { world, scene, robot } = this.page.now,
+      name = world?.robots[robot]?.name;
+    return this.stage.planar(scene?.bases.findIndex((base) => base.robot === name) ?? -1);
+  }
+  private motionChannels(): string[] {
+    const { world, robot } = this.page.now,
+      name = world?.robots[robot]?.name;
+    return (world?.channels ?? [])
+      .filter((channel) => channel.robot === name && channel.type === "motion_status_t")
+      .map((channel) => channel.name);
   }
 
   private want(): void {
@@ -417,6 +452,7 @@ export class App {
         ...this.channels.opened,
         ...this.plots.channels,
         ...(this.inset.channel ? [this.inset.channel] : []),
+        ...(this.trip.points().length > 0 ? this.motionChannels() : []),
       ]),
     );
     this.link.watchTraffic(panel && tab === "Channels");

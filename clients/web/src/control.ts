@@ -102,15 +102,18 @@ export class Control {
     return { robot: robot.name, vx, omega };
   }
 
-  move(command: Move): void {
+  // Returns the primitive's id; null, said in a note, where the robot takes none.
+  move(command: Move): bigint | null {
     const { world, robot: chosen } = this.page.now,
       robot = world?.robots[chosen];
     const channel = robot && inputOf(world!, robot.name, "move_command_t");
-    if (!channel) return toast("This robot takes no motion primitives.", "error");
-    this.link.command(
-      channel,
-      encode("move_command_t", { ...command, utime: 0n, id: ++this.motionId }),
-    );
+    if (!channel) {
+      toast("This robot takes no motion primitives.", "error");
+      return null;
+    }
+    const id = ++this.motionId;
+    this.link.command(channel, encode("move_command_t", { ...command, utime: 0n, id }));
+    return id;
   }
 
   // Where the chosen robot takes commands to its joints.

@@ -1,4 +1,4 @@
-// A click on the scene: chooses, selects, places a thing, or makes a door.
+// A click on the scene: chooses, selects, sends a robot, places a thing, or makes a door.
 import * as THREE from "three";
 import { matrixOf } from "../scene/matrix";
 import type { Stage } from "../scene/stage";
@@ -17,6 +17,7 @@ export function listenToClicks(
   door: Door,
   busy: () => boolean,
   measured: (point: THREE.Vector3) => void,
+  sent: (point: THREE.Vector3, further: boolean) => void,
 ): void {
   let down = { x: 0, y: 0 },
     taken = false;
@@ -37,6 +38,10 @@ export function listenToClicks(
     if (tool === "measure") {
       const point = picked.point ?? picked.ground;
       if (point) measured(point);
+      return;
+    }
+    if (tool === "go") {
+      if (picked.ground) sent(picked.ground, event.shiftKey);
       return;
     }
     if (tool === "door") return makeDoor(picked.model, picked.point, editor, door);

@@ -6,6 +6,7 @@ import { disposeOf, SceneBuilder, type Built, type Movers } from "./build";
 import type { Description, LightDescription, ModelDescription, SceneFiles } from "./description";
 import { matrixOf } from "./matrix";
 import { drawnBySoftware, Quality } from "./quality";
+import type { PlanarPose } from "../state/go_to";
 import type { Poses } from "../state/poses";
 
 export type ViewMode = "orbit" | "follow" | "top";
@@ -322,6 +323,14 @@ export class Stage {
     }
     into.premultiply(matrixOf(this.poses.now, 7 * base.body, kScratch));
     return true;
+  }
+
+  // Where it is on the floor, and its heading; null when that is not known.
+  planar(robot: number): PlanarPose | null {
+    const at = new THREE.Matrix4();
+    if (robot < 0 || !this.base(robot, at)) return null;
+    const [cosine, sine] = at.elements;
+    return { x: at.elements[12], y: at.elements[13], heading: Math.atan2(sine, cosine) };
   }
 
   // Where a model is.

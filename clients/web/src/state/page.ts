@@ -13,8 +13,8 @@ import type { World } from "./world";
 export const kTabs = ["Robot", "Plots", "Channels", "World"] as const;
 export type Tab = (typeof kTabs)[number];
 
-// What a click on the scene does: selects, places a thing, or draws.
-export type Tool = "select" | "wall" | "room" | "door" | "measure" | Thing;
+// What a click on the scene does: selects, sends the chosen robot there, places a thing, or draws.
+export type Tool = "select" | "go" | "wall" | "room" | "door" | "measure" | Thing;
 // What the handles of the selected model do.
 export type Handle = "translate" | "rotate" | "scale";
 

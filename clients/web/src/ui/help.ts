@@ -4,6 +4,7 @@ import { h } from "./dom";
 const kKeys: [string[], string][] = [
   [["W", "A", "S", "D"], "drive the chosen robot (arrow keys, a gamepad and the stick, too)"],
   [["X"], "stop it"],
+  [["G"], "send it to where you click; with Shift, further points"],
   [["Space"], "pause and go on"],
   [[".", ","], "one step, while paused; in a log or the past, a state on and back"],
   [[">", "<"], "next event, event before"],

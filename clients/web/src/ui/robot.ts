@@ -21,7 +21,7 @@ import { inWorld, type Heading } from "./odometry";
 import { PolarPlot, TimePlot } from "./plots";
 
 const kStates = ["idle", "running", "done", "ended", "refused"];
-const kReasons = [
+export const kReasons = [
   "",
   "replaced by a newer command",
   "blocked by contact",
@@ -155,12 +155,18 @@ export class RobotPages {
     { label: "distance, m", colour: "--rays" },
     { label: "heading, °", colour: "--sonar", scale: "w" },
   ]);
+  // Sends the robot to where one clicks.
+  readonly goButton = h(
+    "button",
+    { id: "go", title: "with Shift, further points; Esc leaves it" },
+    "Go to a click (G)",
+  );
   private start: Heading | null = null; // odom in the world; null: not known
   private truth: pose_t | null = null;
   private reckoned: odometry_t | null = null;
 
   constructor(
-    move: (command: Omit<move_command_t, "utime" | "id">) => void,
+    move: (command: Omit<move_command_t, "utime" | "id">) => unknown,
     stop: () => void,
     joint: { move(name: string, position: number): void; canMove(): boolean },
   ) {
@@ -231,6 +237,7 @@ export class RobotPages {
         h("label", { class: "row" }, "speed", speed),
         h("button", { id: "move", click: send }, "Go"),
         h("button", { click: stop, title: "stop (X)" }, "Stop"),
+        this.goButton,
       ),
       h("h2", {}, "Ranges"),
       this.polar.element,
@@ -318,7 +325,9 @@ export class RobotPages {
     this.fact("odometry error", `${away.toFixed(3)} m, ${degrees(turn)}`);
   }
 
+  onMotion: (m: motion_status_t) => void = () => undefined;
   motion(m: motion_status_t): void {
+    this.onMotion(m);
     const kind = kKinds[m.kind] ?? "",
       unit = m.kind === 1 ? "m" : "rad";
     const far =
