@@ -5,6 +5,7 @@
 #include <fmt/format.h>
 
 #include "cli/commands.h"
+#include "cli/extensions.h"
 #include "core/utf8.h"
 #include "log/diff.h"
 #include "ruedo/errors.h"
@@ -24,6 +25,7 @@ void write_file(const std::string& path, const std::string& text) {
 }
 
 int diff(const DiffArguments& arguments) {
+  read_given_types();
   std::vector<log::DiffRule> rules;
   for (const std::string& text : arguments.tolerances)
     rules.push_back(log::DiffRule::parse(text, false));
@@ -54,6 +56,7 @@ void add_diff(CLI::App& app, Action& chosen) {
   command->add_option("--junit", arguments->junit, "write JUnit XML")->type_name("FILE");
   command->add_option("--html", arguments->html, "write a page with plots of what differs")
       ->type_name("FILE");
+  add_types_argument(*command);
   command->callback([arguments, &chosen] { chosen = [arguments] { return diff(*arguments); }; });
 }
 

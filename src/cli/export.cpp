@@ -6,6 +6,7 @@
 #include <fmt/format.h>
 
 #include "cli/commands.h"
+#include "cli/extensions.h"
 #include "cli/foxglove.h"
 #include "cli/logged_run.h"
 #include "cli/rosbag.h"
@@ -94,6 +95,7 @@ void export_foxglove(const ExportArguments& arguments, const log::Index& index,
 int export_log(const ExportArguments& arguments) {
   if (arguments.out.empty() == arguments.bag.empty())
     throw InputError({}, "give OUT, or --ros2 FOLDER");
+  read_given_types();
   if (arguments.sandboxed)
     enter_sandbox(arguments.log, {arguments.out, without_slash(arguments.bag)});
   const log::Index index(arguments.log);
@@ -120,6 +122,7 @@ void add_export(CLI::App& app, Action& chosen) {
   command->add_option("--remap", arguments->remaps, "give a ROS topic another name: /TOPIC=/NAME")
       ->type_name("REMAP")
       ->allow_extra_args(false);
+  add_types_argument(*command);
   add_sandbox_argument(*command, arguments->sandboxed);
   command->callback(
       [arguments, &chosen] { chosen = [arguments] { return export_log(*arguments); }; });

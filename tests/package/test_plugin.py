@@ -8,6 +8,7 @@ import math
 import os
 import re
 import shutil
+import struct
 import subprocess
 import sys
 from pathlib import Path
@@ -259,14 +260,45 @@ def test_wrong_types_are_named(ruedo, tmp_path, text, words):
     assert said.count("\n") == 1 and words in said
 
 
-def test_the_engine_in_the_process_has_them(prefix, project):
+def test_diff_and_export_read_lcm_files(project, ruedo, log, tmp_path):
+    """A temperature with other last digits: by its field, where the type is known."""
+    from lcm import EventLog
+
+    events = list(EventLog(str(log), "r"))
+    other = EventLog(str(tmp_path / "other.lcm"), "w", overwrite=True)
+    changed = False
+    for event in events:
+        data = event.data
+        if event.channel == "rover/temp" and not changed:
+            data, changed = data[:-9] + struct.pack(">d", 30.5) + data[-1:], True  # the float64
+        other.write_event(event.timestamp, event.channel, data)
+    other.close()
+    assert changed
+    types = ["--types", project]
+    plain = ruedo("diff", log, tmp_path / "other.lcm", code=1)
+    named = ruedo("diff", log, tmp_path / "other.lcm", *types, code=1)
+    assert "temperature" not in plain and re.search(r"temperature.*30\.5", named), named
+    rule = ["--tolerance", "rover/temp:temperature=abs:0.6"]
+    ruedo("diff", log, tmp_path / "other.lcm", *types, *rule)
+    more = {"RUEDO_PLUGIN_PATH": str(project / "build")}
+    assert "are left out" in ruedo("export", log, tmp_path / "plain.mcap", more=more)
+    assert "left out" not in ruedo("export", log, tmp_path / "named.mcap", *types, more=more)
+    assert b"ruedo.thermometer_t" in (tmp_path / "named.mcap").read_bytes()
+
+
+@pytest.mark.parametrize("named_by", ["argument", "path"])
+def test_the_engine_in_the_process_has_them(prefix, project, named_by):
+    library = project / "build/libexample.so"
+    given = f", plugin=[{str(library)!r}]" if named_by == "argument" else ""
     program = (
         "import ruedo\n"
-        f"with ruedo.Engine({str(project / 'room.sdf')!r}, record=True) as engine:\n"
+        f"with ruedo.Engine({str(project / 'room.sdf')!r}, record=True{given}) as engine:\n"
         "    engine.step(None, 40)\n"
         "    print(sum(m[2] == 'rover/temp' for m in engine.messages()))\n"
     )
-    more = {"PYTHONPATH": f"{prefix}/lib/ruedo/python", "RUEDO_PLUGIN_PATH": f"{project}/build"}
+    more = {"PYTHONPATH": f"{prefix}/lib/ruedo/python"}
+    if named_by == "path":
+        more["RUEDO_PLUGIN_PATH"] = f"{project}/build"
     assert run(sys.executable, "-c", program, more=more) == "2\n"
 
 

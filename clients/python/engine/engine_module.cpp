@@ -15,6 +15,7 @@
 #include <nanobind/stl/tuple.h>
 #include <nanobind/stl/vector.h>
 
+#include "core/plugins.h"
 #include "core/version.h"
 #include "engine/engine.h"
 #include "log/header.h"
@@ -69,7 +70,9 @@ class PyEngine {
            uint64_t seed, bool noise, int threads, const std::vector<std::string>& spawns,
            const std::vector<std::string>& drives, const std::vector<std::string>& settings,
            const std::vector<std::string>& disabled, const std::vector<std::string>& faults,
-           const std::vector<std::string>& draws, bool record) {
+           const std::vector<std::string>& draws, const std::vector<std::string>& plugins,
+           bool record) {
+    for (const std::string& one : plugins) ruedo::load_plugin(one);
     ruedo::model::LoadOptions options;
     for (const std::string& one : spawns) options.spawns.push_back(ruedo::model::parse_spawn(one));
     for (const std::string& one : drives) options.drives.push_back(ruedo::model::parse_drive(one));
@@ -98,6 +101,8 @@ class PyEngine {
     for (const std::string& one : disabled) result_options_.push_back("--disable=" + one);
     for (const std::string& one : faults) result_options_.push_back("--fault=" + one);
     if (!noise) result_options_.push_back("--no-noise");
+    for (const ruedo::Plugin& each : ruedo::loaded_plugins())
+      result_options_.push_back("--plugin=" + each.name + "@" + each.sha256);
     if (record) {
       engine_->on_message([this](int copy, int64_t step, const ruedo::engine::Channel& channel,
                                  std::span<const uint8_t> bytes) {
@@ -269,13 +274,14 @@ NB_MODULE(_engine, module) {
       .def(nb::init<const std::string&, const std::optional<std::string>&, int, uint64_t, bool, int,
                     const std::vector<std::string>&, const std::vector<std::string>&,
                     const std::vector<std::string>&, const std::vector<std::string>&,
-                    const std::vector<std::string>&, const std::vector<std::string>&, bool>(),
+                    const std::vector<std::string>&, const std::vector<std::string>&,
+                    const std::vector<std::string>&, bool>(),
            nb::arg("world"), nb::kw_only(), nb::arg("text") = nb::none(), nb::arg("worlds") = 1,
            nb::arg("seed") = 1, nb::arg("noise") = true, nb::arg("threads") = 0,
            nb::arg("spawn") = nb::list(), nb::arg("drive") = nb::list(),
            nb::arg("set") = nb::list(), nb::arg("disable") = nb::list(),
            nb::arg("fault") = nb::list(), nb::arg("randomize") = nb::list(),
-           nb::arg("record") = false)
+           nb::arg("plugin") = nb::list(), nb::arg("record") = false)
       .def("close", &PyEngine::close)
       .def("step", &PyEngine::step, nb::arg("steps"), nb::arg("which") = nb::none())
       .def("drive", &PyEngine::drive)

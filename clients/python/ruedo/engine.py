@@ -13,6 +13,7 @@ the same steps. There is no network and no clock.
 from __future__ import annotations
 
 import operator
+import os
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
@@ -33,8 +34,9 @@ class Engine:
     ("p3at:guest@1,2,0.5"), drive ("rover=left_joint,right_joint"), set ({"p3at/LRF.update_rate":
     10}) and disable ("p3at/camera") and fault ("p3at/lrf:freeze@3") are those of ``ruedo run``.
     randomize: what is drawn anew for each seed, see :meth:`drawn`: {"p3at.x": "uniform(-2, 2)",
-    "p3at/lrf.lidar.noise.stddev": "log_uniform(0.003, 0.03)"}. record: keep the messages of the
-    last call, for :meth:`messages`.
+    "p3at/lrf.lidar.noise.stddev": "log_uniform(0.003, 0.03)"}. plugin: shared libraries with
+    sensors or drives of your own, which stay for the life of the process. record: keep the messages
+    of the last call, for :meth:`messages`.
 
     Raises ValueError for what is wrong in the file or an argument, with file, line, value and what
     is allowed; OSError for what the machine lacks. Not for several threads at once; ``step`` lets
@@ -56,9 +58,11 @@ class Engine:
         disable: Iterable[str] = (),
         fault: Iterable[str] = (),
         randomize: Mapping[str, str] | None = None,
+        plugin: Iterable[str | os.PathLike[str]] = (),
         record: bool = False,
     ) -> None:
         for name, value in (
+            ("plugin", plugin),
             ("spawn", spawn),
             ("drive", drive),
             ("disable", disable),
@@ -80,6 +84,7 @@ class Engine:
             disable=list(disable),
             fault=list(fault),
             randomize=[f"{target}={drawn}" for target, drawn in (randomize or {}).items()],
+            plugin=[os.fspath(one) for one in plugin],
             record=bool(record),
         )
         self._worlds = self._core.worlds()
