@@ -16,6 +16,7 @@
 #include "ruedo/boxes_2d_t.hpp"
 #include "ruedo/boxes_3d_t.hpp"
 #include "ruedo/camera_info_t.hpp"
+#include "ruedo/collisions_t.hpp"
 #include "ruedo/contact_t.hpp"
 #include "ruedo/decode.h"
 #include "ruedo/force_torque_t.hpp"
@@ -45,6 +46,7 @@ struct MovedLink {
 
 // Where a message comes from, for those who write it down.
 struct Source {
+  std::string robot;
   std::vector<std::string> wheels;       // names of their joints
   std::vector<MovedLink> turned, moved;  // by odometry_t and joint_state_t, in their order
   device_info_t device{};
@@ -362,12 +364,12 @@ void put_entity(CdrWriter& out, const std::string& name) {
   out.put(uint64_t{0}).put(name).put(kLink);
 }
 
-// A point of contact each; the force acts on the robot's body along the normal.
-void write_contacts(const contact_t& contact, const Source& from, CdrWriter& out) {
-  const std::string own = from.device.robot + "/" + from.device.name;
-  put_header(out, contact.utime, from.world);
-  out.put_length(contact.points.size());
-  for (const contact_point_t& point : contact.points) {
+// A point of contact each, of what `own` names; the force acts on it along the normal.
+void put_contacts(int64_t utime, const std::string& own, std::span<const contact_point_t> points,
+                  const Source& from, CdrWriter& out) {
+  put_header(out, utime, from.world);
+  out.put_length(points.size());
+  for (const contact_point_t& point : points) {
     put_entity(out, own);
     put_entity(out, point.body);
     out.put_length(1);
@@ -376,7 +378,7 @@ void write_contacts(const contact_t& contact, const Source& from, CdrWriter& out
     put_vector(out, point.normal);
     out.put_length(1).put(point.depth);
     out.put_length(1);
-    put_header(out, contact.utime, from.world);
+    put_header(out, utime, from.world);
     out.put(own).put(uint32_t{0}).put(point.body).put(uint32_t{0});
     for (const double sign : {1.0, -1.0}) {
       put_vector(out, sign * point.force * point.normal[0], sign * point.force * point.normal[1],
@@ -384,6 +386,15 @@ void write_contacts(const contact_t& contact, const Source& from, CdrWriter& out
       put_vector(out, 0, 0, 0);
     }
   }
+}
+
+void write_contacts(const contact_t& contact, const Source& from, CdrWriter& out) {
+  put_contacts(contact.utime, from.device.robot + "/" + from.device.name, contact.points, from,
+               out);
+}
+
+void write_collisions(const collisions_t& collisions, const Source& from, CdrWriter& out) {
+  put_contacts(collisions.utime, from.robot, collisions.points, from, out);
 }
 
 void write_bumper(const contact_t& contact, const Source&, CdrWriter& out) {
@@ -527,6 +538,8 @@ RUEDO_ROWS(camera_info_t,
            {"camera_info", "sensor_msgs/msg/CameraInfo", kSensorQos, write_camera_info})
 RUEDO_ROWS(contact_t, {"contacts", "ros_gz_interfaces/msg/Contacts", kSensorQos, write_contacts},
            {"bumper", "std_msgs/msg/Bool", kSensorQos, write_bumper})
+RUEDO_ROWS(collisions_t, {"collisions", "ros_gz_interfaces/msg/Contacts", kSensorQos,
+                          write_collisions, nullptr, nullptr, Scope::robot})
 
 #undef RUEDO_ROWS
 
@@ -563,6 +576,7 @@ struct Conversions::Plan {
 
   Source source(const channel_info_t& channel) const {
     Source from;
+    from.robot = channel.robot;
     const std::string name = channel.robot + "/" + channel.device;
     if (const auto robot = robots.find(channel.robot); robot != robots.end())
       from.wheels = robot->second->wheels;
@@ -653,10 +667,10 @@ void with_type(const std::string& type, const Visit& visit) {
                        (visit.template operator()<Messages>(), true)),
      ...);
   };
-  match.template
-  operator()<planar_lidar_t, lidar_t, sonar_t, odometry_t, joint_state_t, imu_t, pose_t, image_t,
-             camera_info_t, contact_t, navsat_t, magnetometer_t, altimeter_t, air_pressure_t,
-             air_speed_t, force_torque_t, logical_camera_t, boxes_2d_t, boxes_3d_t>();
+  match.template operator()<planar_lidar_t, lidar_t, sonar_t, odometry_t, joint_state_t, imu_t,
+                            pose_t, image_t, camera_info_t, contact_t, collisions_t, navsat_t,
+                            magnetometer_t, altimeter_t, air_pressure_t, air_speed_t,
+                            force_torque_t, logical_camera_t, boxes_2d_t, boxes_3d_t>();
 }
 
 }  // namespace

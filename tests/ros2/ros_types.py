@@ -16,6 +16,7 @@ from cyclonedds.idl.types import (
     sequence,
     uint8,
     uint32,
+    uint64,
 )
 
 
@@ -272,3 +273,48 @@ class MultiArrayLayout(IdlStruct, typename="std_msgs::msg::dds_::MultiArrayLayou
 class Float64MultiArray(IdlStruct, typename="std_msgs::msg::dds_::Float64MultiArray_"):
     layout: MultiArrayLayout
     data: sequence[float64]
+
+
+@dataclass
+class UInt32(IdlStruct, typename="std_msgs::msg::dds_::UInt32_"):
+    data: uint32
+
+
+@dataclass
+class Wrench(IdlStruct, typename="geometry_msgs::msg::dds_::Wrench_"):
+    force: Vector3
+    torque: Vector3
+
+
+@dataclass
+class Entity(IdlStruct, typename="ros_gz_interfaces::msg::dds_::Entity_"):
+    id: uint64
+    name: str
+    type: uint8
+
+
+@dataclass
+class JointWrench(IdlStruct, typename="ros_gz_interfaces::msg::dds_::JointWrench_"):
+    header: Header
+    body_1_name: String
+    body_1_id: UInt32
+    body_2_name: String
+    body_2_id: UInt32
+    body_1_wrench: Wrench
+    body_2_wrench: Wrench
+
+
+@dataclass
+class Contact(IdlStruct, typename="ros_gz_interfaces::msg::dds_::Contact_"):
+    collision1: Entity
+    collision2: Entity
+    positions: sequence[Vector3]
+    normals: sequence[Vector3]
+    depths: sequence[float64]
+    wrenches: sequence[JointWrench]
+
+
+@dataclass
+class Contacts(IdlStruct, typename="ros_gz_interfaces::msg::dds_::Contacts_"):
+    header: Header
+    contacts: sequence[Contact]

@@ -14,8 +14,9 @@ import pytest
 from mcap.reader import make_reader
 from mcap_ros2.decoder import DecoderFactory
 from rosbags.rosbag2 import Reader
-from rosbags.typesys import Stores, get_types_from_msg, get_typestore
+from rosbags.typesys import get_types_from_msg
 from ruedo import lcmtypes
+from stores import store_of
 
 SOURCE = Path(os.environ.get("RUEDO_SOURCE_DIR", Path(__file__).resolve().parents[2]))
 RUEDO = os.environ.get("RUEDO", str(SOURCE / "build/release/bin/ruedo"))
@@ -88,7 +89,7 @@ def us(stamp) -> int:
 
 def test_rosbags_reads_the_log_message_by_message(logged):
     bag, log = (
-        bag_messages(logged / "run", get_typestore(Stores.ROS2_JAZZY)),
+        bag_messages(logged / "run", store_of("jazzy")),
         log_messages(logged / "run.lcm"),
     )
     pairs = [
@@ -124,7 +125,7 @@ def test_rosbags_reads_the_log_message_by_message(logged):
 
 def test_ranges_are_those_that_were_measured_anew(logged):
     bag, log = (
-        bag_messages(logged / "run", get_typestore(Stores.ROS2_JAZZY)),
+        bag_messages(logged / "run", store_of("jazzy")),
         log_messages(logged / "run.lcm"),
     )
     for i in range(8):
@@ -134,7 +135,7 @@ def test_ranges_are_those_that_were_measured_anew(logged):
 
 
 def test_hashes_and_definitions_are_those_of_ros(logged):
-    store = get_typestore(Stores.ROS2_JAZZY)
+    store = store_of("jazzy")
     with Reader(logged / "run") as reader:
         for connection in reader.connections:
             assert connection.digest == store.hash_rihs01(connection.msgtype)
@@ -159,14 +160,14 @@ def test_mcap_ros2_support_reads_it(logged):
 
 def test_the_humble_of_a_bag_is_humbles(logged):
     ruedo("export", logged / "run.lcm", "--ros2", logged / "humble", "--distro", "humble")
-    store = get_typestore(Stores.ROS2_HUMBLE)
+    store = store_of("humble")
     assert len(bag_messages(logged / "humble", store)["/sonar_front/range_0"]) > 0
 
 
 @pytest.mark.parametrize("distro", ["humble", "iron", "jazzy", "kilted", "lyrical"])
 def test_hashes_are_those_of_each_release(logged, distro, tmp_path):
     ruedo("export", logged / "run.lcm", "--ros2", tmp_path / "bag", "--distro", distro)
-    store = get_typestore(getattr(Stores, f"ROS2_{distro.upper()}"))
+    store = store_of(distro)
     with open(tmp_path / "bag/bag_0.mcap", "rb") as file:
         summary = make_reader(file).get_summary()
     told = {
@@ -186,7 +187,7 @@ def test_topics_of_a_bag_are_remapped(logged):
         "--remap",
         "/scan=/front/scan",
     )
-    assert "/front/scan" in bag_messages(logged / "remapped", get_typestore(Stores.ROS2_JAZZY))
+    assert "/front/scan" in bag_messages(logged / "remapped", store_of("jazzy"))
     wrong = subprocess.run(
         [RUEDO, "export", logged / "run.lcm", "--ros2", logged / "none", "--remap", "/scam=/x"],
         capture_output=True,

@@ -11,6 +11,7 @@ from pathlib import Path
 import pytest
 from conftest import Peer, Run, bag_of, wait_for
 from ros_types import (
+    Contacts,
     Duration,
     Float64MultiArray,
     Header,
@@ -20,6 +21,8 @@ from ros_types import (
     MultiArrayDimension,
     MultiArrayLayout,
     Time,
+    Twist,
+    Vector3,
 )
 
 WORLD = str(Path(__file__).resolve().parent / "sensors.sdf")
@@ -93,6 +96,30 @@ def test_contacts_carry_the_weight(bag):
         c.collision1.name == "rig/bumper" and c.normals[0].z == pytest.approx(1.0) for c in contacts
     )
     assert bag["/bumper"][-1].data is True
+
+
+def test_what_a_robot_runs_into_is_told():
+    """The arena's parcel, a box of 0.45 m, stands 2 m ahead of the robot."""
+    with Run("--no-noise", "--rate", "4") as run:
+        peer = Peer(run.domain)
+        drive, told = peer.writer("/cmd_vel", Twist), peer.reader("/collisions", Contacts)
+
+        def touched():
+            drive.write(Twist(Vector3(x=0.5), Vector3()))
+            return [m for m in told.take(N=100) if hasattr(m, "__idl__") and m.contacts]
+
+        first = wait_for(touched, "a collision")[0]
+    assert first.header.frame_id == "world" and first.header.stamp.us > 0
+    for contact in first.contacts:
+        assert contact.collision1.name == "p3at"
+        assert contact.collision2.name.startswith("parcel")
+        assert 2.0 - 0.23 * math.sqrt(2.0) < contact.positions[0].x < 2.0
+        # Towards the robot, which comes from -x, and by no more than the box's turn of 0.2 rad
+        # beside it.
+        assert contact.normals[0].x < -math.cos(0.21)
+        wrench = contact.wrenches[0]
+        assert wrench.body_1_wrench.force.x == -wrench.body_2_wrench.force.x
+        assert wrench.body_2_name.data == contact.collision2.name
 
 
 def test_frames_of_devices_hang_on_the_robot(bag):

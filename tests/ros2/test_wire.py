@@ -30,7 +30,8 @@ from ros_types import (
     TwistStamped,
     Vector3,
 )
-from rosbags.typesys import Stores, get_types_from_msg, get_typestore
+from rosbags.typesys import get_types_from_msg
+from stores import store_of
 
 
 @pytest.fixture(scope="module")
@@ -158,7 +159,7 @@ ACTION = {
 
 @pytest.mark.parametrize("kind", [BuiltinTopicDcpsPublication, BuiltinTopicDcpsSubscription])
 def test_type_hashes_are_those_of_rosbags(standing, kind):
-    store = get_typestore(Stores.ROS2_JAZZY)
+    store = store_of("jazzy")
     for name, fields in ACTION.items():
         store.register(get_types_from_msg(fields, name))
     compared = 0
