@@ -1,11 +1,10 @@
-"""Runs every world, model and robot of a folder for a simulated minute and writes what came of it
-as a table.
+"""Runs every world, model and robot of a folder for some simulated seconds and writes what came of
+it as a table.
 
     tests/corpus/corpus_table.py build/release/bin/ruedo ../shared/corpus -o docs/corpus.md
     [--pictures FOLDER]
 
-The table says for each file whether it ran, how long that took, and everything that `ruedo check`
-named.
+The table says for each file whether it ran, and everything that `ruedo check` named.
 """
 
 import argparse
@@ -14,7 +13,6 @@ import json
 import re
 import subprocess
 import sys
-import time
 from pathlib import Path
 
 from sections import put
@@ -22,10 +20,8 @@ from sections import put
 KINDS = {".world", ".sdf", ".urdf", ".xacro"}
 TITLE = "Every file"
 HEAD = """Made by `tests/corpus/corpus_table.py RUEDO FOLDER -o docs/corpus.md` from public files: TurtleBot3's simulations, AWS RoboMaker's small warehouse,
-Gazebo's models, and MobileRobots' descriptions of their robots. They are not part of Ruedo. Every file is run for a simulated minute (`ruedo run FILE --rate
-max --duration 60`). "Took" is the wall time of that minute, loading included, on a server's two cores (the camera of TurtleBot3's
-waffles has 1920 x 1080 pixels at 30 Hz, drawn without a GPU); or "not within" the seconds after which it was given up;
-or the exit code, and the error beside it says why the file cannot run.
+Gazebo's models, Husky, linorobot2, neobotix, and MobileRobots' descriptions of their robots. They are not part of Ruedo. Every file is run for two simulated seconds
+(`ruedo run FILE --rate max --duration 2`): "Runs" says whether it did, or the exit code; the error beside it says why the file cannot run. A xacro file of macros alone holds no robot.
 """
 
 
@@ -83,7 +79,6 @@ def short(text, path):
 
 
 def run(ruedo, path, seconds, timeout):
-    start = time.monotonic()
     done = call(
         ruedo,
         "run",
@@ -97,11 +92,10 @@ def run(ruedo, path, seconds, timeout):
         "--quiet",
         timeout=timeout,
     )
-    took = time.monotonic() - start
     if done is None:
         return f"not within {timeout} s"
     if done.returncode == 0:
-        return f"{took:.1f} s"
+        return "yes"
     return f"exit code {done.returncode}"
 
 
@@ -111,16 +105,16 @@ def main():
     parser.add_argument("folder", type=Path)
     parser.add_argument("-o", "--out", type=Path)
     parser.add_argument("--pictures", type=Path, help="a folder for a picture of each file")
-    parser.add_argument("--seconds", type=float, default=60)
+    parser.add_argument("--seconds", type=float, default=2)
     parser.add_argument("--timeout", type=float, default=900)
     arguments = parser.parse_args()
-    lines = [HEAD, "| File | What | Took | Not supported, repaired, wrong |", "|---|---|---|---|"]
+    lines = [HEAD, "| File | What | Runs | Not supported, repaired, wrong |", "|---|---|---|---|"]
     for path in files(arguments.folder):
         name = path.relative_to(arguments.folder)
-        took = run(arguments.ruedo, path, arguments.seconds, arguments.timeout)
+        ran = run(arguments.ruedo, path, arguments.seconds, arguments.timeout)
         said = findings(arguments.ruedo, path)
         lines.append(
-            f"| {name} | {what(arguments.ruedo, path)} | {took} | {'<br>'.join(said) if said else 'nothing'} |"
+            f"| {name} | {what(arguments.ruedo, path)} | {ran} | {'<br>'.join(said) if said else 'nothing'} |"
         )
         print(lines[-1], file=sys.stderr, flush=True)
         if arguments.pictures:
