@@ -402,9 +402,7 @@ def test_what_was_steered_is_in_the_log(steered):
         {(0.9, 0), (0, 0.8)},
     )
     assert keys | stick | gamepad | {(0, 0)} <= shares
-    moves = [
-        move_command_t.decode(each.data) for each in applied if each.channel == "p3dx/move"
-    ]
+    moves = [move_command_t.decode(each.data) for each in applied if each.channel == "p3dx/move"]
     assert moves[0].value == pytest.approx(0.4)  # typing drove nothing
     turns = {move_command_t.ROTATE, move_command_t.ADVANCE}
     assert {each.kind for each in moves[1:]} == turns  # by clicks
