@@ -5,8 +5,10 @@ start it.
 from __future__ import annotations
 
 import os
+import sqlite3
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 import pytest
@@ -73,7 +75,22 @@ def ruedo(*words, folder, code=0, **options):
     return done
 
 
-def table(folder, *options):
-    """The results of c.yaml as CSV."""
-    ruedo("campaign", "export", "c.yaml", *options, "-o", "table.csv", folder=folder)
+def table(folder, *options, file="c.yaml"):
+    """The results of the campaign as CSV."""
+    ruedo("campaign", "export", file, *options, "-o", "table.csv", folder=folder)
     return (folder / "table.csv").read_text()
+
+
+def wait_for(condition):
+    until = time.monotonic() + PATIENCE
+    while not condition():
+        assert time.monotonic() < until
+        time.sleep(0.01)
+
+
+def results_in(folder):
+    try:
+        with sqlite3.connect(f"file:{folder}/results.sqlite?mode=ro", uri=True) as db:
+            return db.execute("SELECT count(*) FROM results").fetchone()[0]
+    except sqlite3.Error:
+        return 0

@@ -2,12 +2,25 @@
 with one of them killed.
 """
 
+import csv
 import os
+import re
+import subprocess
 import threading
 import time
 
 import pytest
-from conftest import CAMPAIGN, CONTROLLER, PATIENCE, WORLD, ruedo, table
+from conftest import (
+    CAMPAIGN,
+    CONTROLLER,
+    PATIENCE,
+    RUEDO,
+    WORLD,
+    results_in,
+    ruedo,
+    table,
+    wait_for,
+)
 
 os.environ["RAY_USAGE_STATS_ENABLED"] = "0"
 import ray
@@ -85,6 +98,37 @@ def test_three_nodes_of_which_one_is_killed_give_the_same_bytes(whole, cluster):
         assert time.monotonic() < until
         time.sleep(0.05)
     assert table(folder, "--out", "ray3") == expected
+
+
+def test_a_lost_head_node_is_one_line_and_loses_nothing(whole, cluster):
+    folder, expected = whole
+    out = folder / "headless"
+    slow = CONTROLLER.replace("def ahead", "import time\n\n\ndef ahead", 1).replace(
+        "    near", "    time.sleep(0.01)\n    near", 1
+    )
+    (folder / "slow.py").write_text(slow)
+    (folder / "slow.yaml").write_text(CAMPAIGN.replace("controller.py", "slow.py"))
+    command = [RUEDO, "campaign", "run", "slow.yaml", "--ray", cluster.address, "--out", str(out)]
+    driver = subprocess.Popen(command, cwd=folder, stderr=subprocess.PIPE, text=True)
+    wait_for(lambda: results_in(out) >= 1)
+    cluster.head_node.kill_all_processes(check_alive=False, allow_graceful=False)
+    _, said = driver.communicate(timeout=PATIENCE)
+    assert driver.returncode == 4
+    (line,) = said.splitlines()
+    assert re.match(
+        "ruedo: the Ray cluster was lost: its head node [0-9.:]+ does not answer; what was run is "
+        "kept, `ruedo campaign resume` does the rest",
+        line,
+    )
+    kept = results_in(out)
+    assert 1 <= kept < 8
+    ruedo("campaign", "resume", "slow.yaml", "--out", out, folder=folder, code=1)
+    resumed = table(folder, "--out", str(out), file="slow.yaml")
+    assert outcomes(resumed) == outcomes(expected)
+
+
+def outcomes(text):
+    return [(row["number"], row["reason"]) for row in csv.DictReader(text.splitlines())]
 
 
 def test_no_cluster_is_one_line(whole):

@@ -97,6 +97,8 @@ def test_trusts_a_frozen_scan_and_the_find_is_kept_as_a_test(example):
         re.search(r"it could be avoided up to [\d.]+ s", why)
         and "avoids it: without the fault freeze" in why
     )
+    ends = float(re.search(r"avoids it: the fault freeze ends at ([\d.]+) s", why).group(1))
+    assert 0.0 < ends < float(re.search(r"failed: ([\d.]+) s", why).group(1))
     assert (folder / "why.svg").read_text().startswith("<?xml")
     text = (kept / "regression.yaml").read_text()
     (kept / "regression.yaml").write_text(text.replace("- frozen", "- ''"))  # mended

@@ -6,15 +6,13 @@ import os
 import pty
 import re
 import signal
-import sqlite3
 import struct
 import subprocess
 import termios
-import time
 import xml.etree.ElementTree as ElementTree
 
 import pytest
-from conftest import CAMPAIGN, CONTROLLER, PATIENCE, RUEDO, ruedo, table
+from conftest import CAMPAIGN, CONTROLLER, PATIENCE, RUEDO, results_in, ruedo, table, wait_for
 from ruedo.campaign import Campaign
 from ruedo.campaign.compare import compare_with
 
@@ -72,21 +70,6 @@ def test_shards_joined_give_the_same_bytes(whole):
 
 
 SHARD_CODES = {1: 1, 2: 0, 3: 1}
-
-
-def wait_for(condition):
-    until = time.monotonic() + PATIENCE
-    while not condition():
-        assert time.monotonic() < until
-        time.sleep(0.01)
-
-
-def results_in(folder):
-    try:
-        with sqlite3.connect(f"file:{folder}/results.sqlite?mode=ro", uri=True) as db:
-            return db.execute("SELECT count(*) FROM results").fetchone()[0]
-    except sqlite3.Error:
-        return 0
 
 
 def children(pid):

@@ -22,7 +22,7 @@ from ..engine import Engine
 from ..launch import find_ruedo
 from .controller import DONE, View, make_controller
 from .functions import Function
-from .processes import die_with_parent, end_descendants, limit_memory
+from .processes import die_with_parent, end_descendants, ends_within, limit_memory
 
 _TAIL = 4000  # characters of a controller's output that are kept
 _ENGINES = 4  # that a worker keeps
@@ -205,9 +205,7 @@ class Runner:
                 preexec_fn=die_with_parent,
             )
             try:
-                code: int | None = process.wait(limits["wall"])
-            except subprocess.TimeoutExpired:
-                code = None
+                code = process.wait() if ends_within(process.pid, limits["wall"]) else None
             finally:
                 if process.poll() is None:
                     os.killpg(process.pid, signal.SIGKILL)

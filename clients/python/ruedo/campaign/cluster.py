@@ -5,8 +5,12 @@ lost.
 from __future__ import annotations
 
 import logging
+import os
 import socket
+import sys
+import time
 from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +21,8 @@ from .plan import DEFAULT_MEMORY_MB, Case
 
 _AHEAD = 4  # cases that wait at the cluster for each core
 _RETRIES = 5  # of a case whose node was lost
+_LOOK_S = 1.0  # between looks at the head node while no case ends
+_PATIENCE_S = 10.0  # that it may be away; Ray ends the whole program after 60
 _worker: tuple[str, Worker] | None = None  # of a process of Ray's: stays from case to case
 
 
@@ -30,25 +36,93 @@ def run_on_ray(
         import ray
     except ImportError:
         raise missing("Ray", "ray") from None
-    joined = not ray.is_initialized()
-    if joined:
-        _knock(address)
-        try:
-            ray.init(address=address, log_to_driver=False, logging_level=logging.ERROR)
-        except Exception as error:
-            raise CampaignError(
-                f"--ray {address}: no cluster answers: {str(error).splitlines()[0]}"
-            ) from None
-    try:
-        yield from _run(ray, cases, folder, pack(Path(folder), files), version)
-    except (ray.exceptions.RaySystemError, ray.exceptions.RayActorError, ConnectionError) as error:
-        raise CampaignError(
-            f"the Ray cluster was lost: {str(error).splitlines()[0]}; what was run is kept, `ruedo campaign resume` "
-            "does the rest"
-        ) from None
-    finally:
+    joined, lost = not ray.is_initialized(), ""
+    with _quiet():
         if joined:
-            ray.shutdown()
+            _join(ray, address)
+        try:
+            yield from _run(ray, cases, folder, pack(Path(folder), files), address, version)
+        except (
+            ray.exceptions.RaySystemError,
+            ray.exceptions.RayActorError,
+            ConnectionError,
+        ) as error:
+            lost = str(error).splitlines()[0]
+        finally:
+            if joined and not lost:
+                ray.shutdown()
+    if lost:
+        raise CampaignError(
+            f"the Ray cluster was lost: {lost}; what was run is kept, `ruedo campaign resume` does "
+            "the rest"
+        )
+
+
+def _join(ray: Any, address: str) -> None:
+    _knock(address)
+    try:
+        ray.init(address=address, log_to_driver=False, logging_level=logging.ERROR)
+    except Exception as error:
+        raise CampaignError(
+            f"--ray {address}: no cluster answers: {str(error).splitlines()[0]}"
+        ) from None
+
+
+@contextmanager
+def _quiet() -> Iterator[None]:
+    """Python alone writes to standard error: Ray's libraries fill pages when a node is lost, which
+    are in Ray's own logs, too.
+    """
+    before, kept, nowhere = sys.stderr, os.dup(2), os.open(os.devnull, os.O_WRONLY)
+    if before is sys.__stderr__ and before is not None:
+        before.flush()
+        sys.stderr = open(kept, "w", buffering=1, closefd=False)
+    os.dup2(nowhere, 2)
+    os.close(nowhere)
+    try:
+        yield
+    finally:
+        sys.stderr.flush()
+        sys.stderr = before
+        os.dup2(kept, 2)
+        os.close(kept)
+
+
+class _Head:
+    """Looks whether the cluster's head node is there, since Ray says so only after a minute, and
+    ends the program then.
+    """
+
+    def __init__(self, address: str) -> None:
+        host, _, port = address.removeprefix("ray://").rpartition(":")
+        self._place = (host, int(port))
+        self._looked = 0.0
+        self._known = self._answers()  # else it is where this machine cannot look
+
+    def is_there(self) -> bool:
+        """At most one True in _LOOK_S. Raises ConnectionError when it is away for too long."""
+        if time.monotonic() < self._looked + _LOOK_S:
+            return False
+        self.wait()
+        self._looked = time.monotonic()
+        return True
+
+    def wait(self) -> None:
+        """Until it answers; raises ConnectionError when it does not."""
+        until = time.monotonic() + _PATIENCE_S
+        while self._known and not self._answers():
+            if time.monotonic() > until:
+                raise ConnectionError(
+                    f"its head node {self._place[0]}:{self._place[1]} does not answer"
+                )
+            time.sleep(_LOOK_S / 10)
+
+    def _answers(self) -> bool:
+        try:
+            socket.create_connection(self._place, _PATIENCE_S).close()
+        except OSError:
+            return False
+        return True
 
 
 def _knock(address: str) -> None:
@@ -64,7 +138,9 @@ def _knock(address: str) -> None:
         ) from None
 
 
-def _run(ray: Any, cases: list[Case], folder: str, bundle: Bundle, version: str) -> Iterator[Done]:
+def _run(
+    ray: Any, cases: list[Case], folder: str, bundle: Bundle, address: str, version: str
+) -> Iterator[Done]:
     limits = {case.what["limits"]["memory_mb"] for case in cases}
     memory = 0 if limits <= {DEFAULT_MEMORY_MB} else max(limits) << 20
     largest = max(
@@ -79,12 +155,15 @@ def _run(ray: Any, cases: list[Case], folder: str, bundle: Bundle, version: str)
     remote = ray.remote(_remote).options(num_cpus=1, memory=memory, max_retries=_RETRIES)
     waiting = list(reversed(cases))
     running: dict[Any, Case] = {}
+    head = _Head(address if address.startswith("ray://") else ray.get_runtime_context().gcs_address)
+    cores = 1
     while waiting or running:
-        cores = int(ray.cluster_resources().get("CPU", 1))
+        if head.is_there():  # else this would wait for it; nodes come and go
+            cores = int(ray.cluster_resources().get("CPU", 1))
         while waiting and len(running) < _AHEAD * max(cores, 1):
             case = waiting.pop()
             running[remote.remote([packed], name, case, folder, version)] = case
-        ready, _ = ray.wait(list(running), num_returns=1)
+        ready, _ = ray.wait(list(running), num_returns=1, timeout=_LOOK_S)
         for one in ready:
             case = running.pop(one)
             try:
@@ -94,6 +173,7 @@ def _run(ray: Any, cases: list[Case], folder: str, bundle: Bundle, version: str)
                     str(error.cause if hasattr(error, "cause") else error).strip().splitlines()[-1]
                 ) from None
             except ray.exceptions.RayError as error:
+                head.wait()  # without it, it is not the case's fault
                 outcome, wall_s, there = (
                     failed(
                         "crashed", f"its node was lost {_RETRIES + 1} times: {type(error).__name__}"

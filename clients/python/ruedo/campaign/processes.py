@@ -5,6 +5,7 @@ from __future__ import annotations
 import ctypes
 import os
 import resource
+import select
 import signal
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
@@ -35,6 +36,15 @@ def end_descendants() -> None:
         for child in children:
             with suppress(ChildProcessError):
                 os.waitpid(child, 0)
+
+
+def ends_within(pid: int, seconds: float) -> bool:
+    """Waits for a child. Popen.wait() with a timeout looks in intervals of up to 50 ms."""
+    descriptor = os.pidfd_open(pid)
+    try:
+        return bool(select.select([descriptor], [], [], seconds)[0])
+    finally:
+        os.close(descriptor)
 
 
 def _children() -> list[int]:

@@ -210,7 +210,7 @@ def _distributions(results: Results) -> Iterable[str]:
 def _heat_map(results: Results) -> Iterable[str]:
     plots = []
     for world in dict.fromkeys(case.world for case in results.cases):
-        places = [_place_of_failure(row) for case, row in results.failed if case.world == world]
+        places = [place_of_failure(row) for case, row in results.failed if case.world == world]
         known = [one for one in places if one]
         if not known:
             continue
@@ -228,7 +228,7 @@ def _heat_map(results: Results) -> Iterable[str]:
         yield f"<h2>Where they failed</h2><div class='plots'>{''.join(plots)}</div>"
 
 
-def _place_of_failure(row: dict[str, Any]) -> tuple[float, float] | None:
+def place_of_failure(row: dict[str, Any]) -> tuple[float, float] | None:
     """Where the robot was when the first expectation did not hold; at the end, if that has no
     time.
     """
@@ -271,7 +271,7 @@ def _path(case: Case, row: dict[str, Any]) -> str:
         _, x, y = zip(*row["track"])
         axes.plot(x, y, color="#2c5f9e", linewidth=1.2)
         axes.plot(x[0], y[0], "o", color="#2c5f9e", markersize=4)
-        place = _place_of_failure(row)
+        place = place_of_failure(row)
         if place:
             axes.plot(*place, "x", color="#c23b22", markersize=7)
     for goal in case.what.get("expect", {}).get("goal", []):

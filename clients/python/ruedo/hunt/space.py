@@ -153,7 +153,7 @@ def _of_parameter(name: str, given: Any) -> Dimension:
     if not (math.isfinite(low) and math.isfinite(high)):
         raise SpecError(f"parameters.{name}: a hunt needs its ends")
     middle = math.sqrt(low * high) if kind == "log_uniform" else (low + high) / 2
-    simple = 0.0 if low <= 0.0 <= high else middle
+    simple = 0.0 if low <= 0.0 <= high else min(max(_rounded(middle), low), high)
     if kind == "integers":
         return Dimension(name, int(simple), low, high, whole=True)
     return Dimension(name, simple, low, high, log=kind == "log_uniform")

@@ -158,7 +158,7 @@ def why(path: str) -> Answer:
     answer = _as_it_was(recorded, case)
     if "touched" in answer.reason:
         answer.rescues = _rescues(recorded, answer.failed_s)
-    answer.changes = list(_changes(recorded, case))
+    answer.changes = list(_changes(recorded, case, answer.failed_s))
     return answer
 
 
@@ -204,6 +204,12 @@ def _as_it_was(recorded: Recorded, case: tuple[Any, Any] | None) -> Answer:
     return Answer(failures[0]["time_s"], f"{failures[0]['time_s']:.3f} s: {failures[0]['text']}")
 
 
+def _moments(failed_s: float) -> list[float]:
+    """Earlier and earlier."""
+    last = round(failed_s / _PERIOD_S) - 1
+    return [_PERIOD_S * i for i in range(last, max(0, last - _MOST), -1)]
+
+
 def _rescues(recorded: Recorded, failed_s: float) -> dict[str, list[tuple[float, bool]]]:
     """Earlier and earlier, until all manoeuvres save it at two moments in a row, or the run is at
     its beginning.
@@ -212,8 +218,7 @@ def _rescues(recorded: Recorded, failed_s: float) -> dict[str, list[tuple[float,
     commands = np.array([[pair] for pair in MANOEUVRES.values()])
     with recorded.engine(len(MANOEUVRES)) as engine:
         clean = 0
-        moments = [failed_s - _PERIOD_S * i for i in range(1, _MOST)]
-        for moment in [round(one / _PERIOD_S) * _PERIOD_S for one in moments if one > 0]:
+        for moment in _moments(failed_s):
             engine.reset(seed=[recorded.seed] * len(MANOEUVRES))
             recorded.replay(engine, round(moment / engine.dt))
             touched = np.zeros(len(MANOEUVRES), bool)
@@ -231,9 +236,12 @@ def _rescues(recorded: Recorded, failed_s: float) -> dict[str, list[tuple[float,
     return found
 
 
-def _changes(recorded: Recorded, case: tuple[Any, Any] | None) -> Iterator[tuple[str, bool, str]]:
-    """Each alone. Of a campaign's case the controller answers to the change; of another log the
-    commands stay as they were.
+def _changes(
+    recorded: Recorded, case: tuple[Any, Any] | None, failed_s: float
+) -> Iterator[tuple[str, bool, str]]:
+    """Each alone; of a fault also the latest moment at which its end is soon enough. Of a
+    campaign's case the controller answers to the change; of another log the commands stay as they
+    were.
     """
     if case is None:
         for fault in recorded.options["fault"]:
@@ -250,11 +258,23 @@ def _changes(recorded: Recorded, case: tuple[Any, Any] | None) -> Iterator[tuple
         outcome = runner.run({**one.what, **changed})
         return text, outcome.status == "passed", outcome.reason
 
-    for i, fault in enumerate(one.what["faults"]):
-        yield tried(
-            f"without the fault {fault['kind']}",
-            faults=one.what["faults"][:i] + one.what["faults"][i + 1 :],
-        )
+    faults = one.what["faults"]
+    for i, fault in enumerate(faults):
+        without = tried(f"without the fault {fault['kind']}", faults=faults[:i] + faults[i + 1 :])
+        yield without
+        begin = float(fault.get("at", 0.0))
+        for moment in _moments(failed_s) if without[1] and fault["kind"] != "kidnapped" else ():
+            if moment <= begin:
+                break
+            ended = {**fault, "duration": moment - begin}
+            found = tried(
+                f"the fault {fault['kind']} ends at {moment:g} s, from there on the controller "
+                "sees the truth",
+                faults=[*faults[:i], ended, *faults[i + 1 :]],
+            )
+            if found[1]:
+                yield found
+                break
     for seed in [number for number in range(1, _SEEDS + 2) if number != one.seed][:_SEEDS]:
         yield tried(f"seed {seed}", seed=seed)
     if one.what["noise"]:
