@@ -19,4 +19,6 @@ while answered < int(sys.argv[2]):
         speed = max(0.0, min(0.5, ahead - 0.6))
         cmd_vel.write(Twist(Vector3(x=speed), Vector3(z=0.5 if left > right else -0.5)))
         answered += 1
+        if answered == 1:
+            print("driving", flush=True)
     time.sleep(0.0005)
