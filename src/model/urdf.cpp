@@ -496,6 +496,8 @@ std::unique_ptr<Element> urdf_as_sdf(const Element& written, Findings& findings)
   const std::unique_ptr<Element> kept = written.clone();
   Element& robot = *kept;
   refuse_xacro(robot);
+  if (!robot.attribute("name") && !robot.child("link"))
+    robot.fail("has no name and no link; a file of xacro macros alone is for others to include");
   const std::string name = required_name(robot);
   for (const char* kind : {"link", "joint"}) {
     std::map<std::string, const Element*> seen;

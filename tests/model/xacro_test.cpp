@@ -107,6 +107,9 @@ TEST(Xacro, WhatIsWrongIsSaidInOneLine) {
   EXPECT_THAT(error_of(head + "<xacro:unknown/></robot>"),
               HasSubstr("unknown macro name: xacro:unknown"));
   EXPECT_THAT(error_of(head + "<link"), HasSubstr("not XML"));
+  EXPECT_THAT(error_of("<robot xmlns:xacro='x'><xacro:macro name='m' params=''><link name='l'/>"
+                       "</xacro:macro></robot>"),
+              HasSubstr("a file of xacro macros alone is for others to include"));
 }
 
 // What comes with a request is not run: only what is on the disk.
