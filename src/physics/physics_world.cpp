@@ -19,15 +19,15 @@ void PhysicsWorld::set_twist(int body, const Twist& twist) { impl_->set_twist(bo
 void PhysicsWorld::set_support(int body, Support support) { impl_->set_support(body, support); }
 
 void PhysicsWorld::guide(int body, const Twist& mean, const Pose& X_WB) {
-  Motion& motion = impl_->motions_[Impl::index(body)];
-  motion.kind = Motion::Kind::guided;
+  BodyMotion& motion = impl_->motions_[Impl::index(body)];
+  motion.kind = BodyMotion::Kind::guided;
   motion.mean = mean;
   motion.end = X_WB;
 }
 
 void PhysicsWorld::drive(int body, const Twist& twist) {
-  Motion& motion = impl_->motions_[Impl::index(body)];
-  motion.kind = Motion::Kind::driven;
+  BodyMotion& motion = impl_->motions_[Impl::index(body)];
+  motion.kind = BodyMotion::Kind::driven;
   motion.mean = twist;
 }
 

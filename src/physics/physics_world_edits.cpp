@@ -50,7 +50,7 @@ void PhysicsWorld::Impl::add(int instance) {
   }
   contacts_.resize(rigid_.bodies.size());
   for (int i = 0; i < static_cast<int>(rigid_.bodies.size()); ++i) {
-    if (is_of(rigid_.bodies[index(i)].info)) begin_again(i);
+    if (is_of(rigid_.bodies[index(i)].info)) reset_body(i);
   }
   add_joints(instance);
   for (size_t i = first; i < rigid_.bodies.size(); ++i) {
@@ -66,7 +66,7 @@ void PhysicsWorld::Impl::add(int instance) {
 }
 
 // As a new body where the layout has it.
-void PhysicsWorld::Impl::begin_again(int body) {
+void PhysicsWorld::Impl::reset_body(int body) {
   RigidBody& rigid = rigid_.bodies[index(body)];
   rigid.info.gone = rigid.info.on_plane = false;
   rigid.info.joined.clear();

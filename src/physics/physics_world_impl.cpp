@@ -239,7 +239,7 @@ void PhysicsWorld::Impl::update_box(int body) {
   const RigidBody& rigid = rigid_.bodies[index(body)];
   btBroadphaseProxy* proxy = rigid.bullet->getBroadphaseHandle();
   if (!proxy || rigid.info.links.empty()) return;
-  const Motion& motion = motions_[index(body)];
+  const BodyMotion& motion = motions_[index(body)];
   const double step_s = static_cast<double>(step_us_) * 1e-6;
   const auto half_of = [&rigid](const Pose& X) {
     return Vec3(X.rotation.toRotationMatrix().cwiseAbs() * rigid.box_half +
@@ -248,12 +248,13 @@ void PhysicsWorld::Impl::update_box(int body) {
   const Pose& from = poses_[index(body)];
   const Vec3 center = from * rigid.box_center, half = half_of(from);
   Vec3 low = center - half, high = center + half;
-  if (motion.kind == Motion::Kind::guided) {
+  if (motion.kind == BodyMotion::Kind::guided) {
     const Vec3 end_center = motion.end * rigid.box_center, end_half = half_of(motion.end);
     low = low.cwiseMin(end_center - end_half);
     high = high.cwiseMax(end_center + end_half);
   } else {
-    const Twist& twist = motion.kind == Motion::Kind::driven ? motion.mean : twists_[index(body)];
+    const Twist& twist =
+        motion.kind == BodyMotion::Kind::driven ? motion.mean : twists_[index(body)];
     const Vec3 way = twist.linear * step_s;
     low += way.cwiseMin(0.0);
     high += way.cwiseMax(0.0);
@@ -262,8 +263,8 @@ void PhysicsWorld::Impl::update_box(int body) {
 }
 
 void PhysicsWorld::Impl::start(int body) {
-  Motion& motion = motions_[index(body)];
-  if (motion.kind == Motion::Kind::free) {
+  BodyMotion& motion = motions_[index(body)];
+  if (motion.kind == BodyMotion::Kind::free) {
     if (motion.dirty) push_to_bullet(body);
     return;
   }
@@ -277,7 +278,7 @@ void PhysicsWorld::Impl::choose_simulated() {
   const int n = static_cast<int>(motions_.size());
   for (int i = 0; i < n; ++i) {
     if (rigid_.bodies[index(i)].info.gone) continue;
-    if (motions_[index(i)].kind != Motion::Kind::free) {
+    if (motions_[index(i)].kind != BodyMotion::Kind::free) {
       if (sleeping(i)) bullet(i).activate(true);
       bullet(i).setDeactivationTime(0.0);
       bullet(i).setActivationState(ACTIVE_TAG);
@@ -287,12 +288,12 @@ void PhysicsWorld::Impl::choose_simulated() {
     }
   }
   for (int i = 0; i < n; ++i) {
-    Motion& motion = motions_[index(i)];
+    BodyMotion& motion = motions_[index(i)];
     motion.simulated = false;
     if (rigid_.bodies[index(i)].info.gone) continue;
     const bool alone_now = alone(i);
     motion.simulated = motion.tied || !alone_now ||
-                       (motion.kind != Motion::Kind::guided && !sleeping(i) &&
+                       (motion.kind != BodyMotion::Kind::guided && !sleeping(i) &&
                         !rigid_.bodies[index(i)].info.moved);
     if (motion.simulated) start(i);
   }
@@ -328,7 +329,7 @@ void PhysicsWorld::Impl::choose_pace() {
         info_of(*static_cast<btCollisionObject*>(pairs[i].m_pProxy1->m_clientObject)).body;
     together(a, b);
   }
-  for (Motion& motion : motions_) motion.fine = false;
+  for (BodyMotion& motion : motions_) motion.fine = false;
   find_hurried();
   for (size_t i = 0; i < motions_.size(); ++i) {
     if (!motions_[i].simulated) continue;
@@ -345,7 +346,7 @@ void PhysicsWorld::Impl::find_hurried() {
   constexpr double kStill_m_s = 1e-3, kStill_rad_s = 1e-3;
   constexpr int kStillSteps = 20;
   for (size_t i = 0; i < motions_.size(); ++i) {
-    Motion& motion = motions_[i];
+    BodyMotion& motion = motions_[i];
     if (!motion.simulated || !motion.tied) continue;
     const bool still = twists_[i].linear.squaredNorm() < kStill_m_s * kStill_m_s &&
                        twists_[i].angular.squaredNorm() < kStill_rad_s * kStill_rad_s;
@@ -364,7 +365,7 @@ void PhysicsWorld::Impl::find_hurried() {
 }
 
 // A mover goes on along its way; Bullet leaves it where it is.
-void PhysicsWorld::Impl::move_on(btRigidBody& mover, double substep_s) {
+void PhysicsWorld::Impl::advance(btRigidBody& mover, double substep_s) {
   btTransform next;
   btTransformUtil::integrateTransform(mover.getWorldTransform(), mover.getLinearVelocity(),
                                       mover.getAngularVelocity(), substep_s, next);
@@ -444,7 +445,7 @@ void PhysicsWorld::Impl::step_at(int pace) {
     btRigidBody& mover = *rigid_.bodies[i].bullet;
     bodies.push_back(&mover);
     movers.emplace_back(&mover, mover.getWorldTransform());
-    moving |= motions_[i].kind != Motion::Kind::free;
+    moving |= motions_[i].kind != BodyMotion::Kind::free;
   }
   dynamics_.take(bodies);
   const double substep_s = static_cast<double>(step_us_) * 1e-6 / substeps_[pace];
@@ -459,7 +460,7 @@ void PhysicsWorld::Impl::step_at(int pace) {
     bound_speeds(bodies);
     after_substep(pace, substep_s);
     contacts_.add(dynamics_.manifolds(), 1, s + 1 == substeps_[pace]);
-    for (auto& [mover, start] : movers) move_on(*mover, substep_s);
+    for (auto& [mover, start] : movers) advance(*mover, substep_s);
   }
   for (auto& [mover, start] : movers)
     mover->setWorldTransform(start);  // the other pace begins there, too
@@ -473,15 +474,15 @@ void PhysicsWorld::Impl::step() {
   step_at(kFine);
   contacts_.finish();
   for (int i = 0; i < static_cast<int>(motions_.size()); ++i) {
-    Motion& motion = motions_[index(i)];
+    BodyMotion& motion = motions_[index(i)];
     const bool moved = rigid_.bodies[index(i)].info.moved;
     if (motion.simulated && !moved && (motion.awake || !sleeping(i))) pull_from_bullet(i);
-    if (motion.kind == Motion::Kind::guided && (moved || contacts_.touching(i).empty())) {
+    if (motion.kind == BodyMotion::Kind::guided && (moved || contacts_.touching(i).empty())) {
       poses_[index(i)] = motion.end;
       twists_[index(i)] = motion.mean;
       motion.dirty = true;
     }
-    motion.kind = Motion::Kind::free;
+    motion.kind = BodyMotion::Kind::free;
     motion.fresh = false;
   }
 }

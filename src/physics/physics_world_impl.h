@@ -24,7 +24,7 @@ class MayTouch final : public PairFilter {
 };
 
 // How a body goes through the coming step.
-struct Motion {
+struct BodyMotion {
   enum class Kind : uint8_t { free, driven, guided };
   Kind kind = Kind::free;
   bool dirty = false;      // our pose and twist are newer than Bullet's
@@ -78,7 +78,7 @@ class PhysicsWorld::Impl {
   RigidBodies rigid_;
   std::vector<Pose> poses_;
   std::vector<Twist> twists_, last_twists_;
-  std::vector<Motion> motions_;
+  std::vector<BodyMotion> motions_;
   ContactBook contacts_;
   std::vector<JointConstraint> joints_;  // as in the layout
   std::vector<int> leaders_;  // of each joint, into joints_: the one that it mimics; -1: none
@@ -95,7 +95,7 @@ class PhysicsWorld::Impl {
   JointConstraint make_joint(int instance, int joint);
   void add_joints(int instance);  // in the simulation, too
   void add_static(StaticObject& object);
-  void begin_again(int body);
+  void reset_body(int body);
   void refilter_all();
   int substeps_for(int64_t longest_us) const;
   void choose_pace();
@@ -103,7 +103,7 @@ class PhysicsWorld::Impl {
   bool at_pace(size_t joint, int pace) const;
   int body_of(size_t joint) const;  // that moves
   void step_at(int pace);
-  void move_on(btRigidBody& mover, double substep_s);
+  void advance(btRigidBody& mover, double substep_s);
   void tie(int body, int other);
   void push_to_bullet(int body);  // our pose and twist
   void pull_from_bullet(int body);

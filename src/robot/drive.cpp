@@ -36,7 +36,7 @@ Drive::Drive(const model::WorldModel& world, const model::BodyLayout& layout,
       X_BaseB_(X_BBase_.inverse()),
       wheels_(layout.robots[static_cast<size_t>(robot)].wheels),
       description_(description_of(world, layout, robot)),
-      motion_(description_, rims_of(layout, robot)),
+      planner_(description_, rims_of(layout, robot)),
       X_WBase_(base_pose().normalized()) {
   odom_heading_ = heading(X_WBase_.rotation);
 }
@@ -72,9 +72,9 @@ void Drive::resist(const Contact& contact) {
   Vec3 force = to_base * Vec3(contact.force * contact.normal);
   if (collides) force += to_base * contact.friction;
   const Vec3 p = to_base * Vec3(contact.position - X_WBase_.translation);
-  const Vec3 planned(motion_.v() - motion_.omega() * p.y(),
-                     motion_.side() + motion_.omega() * p.x(), 0.0);
-  motion_.resist(contact.link_b, std::max(collides ? 1e-9 : 0.0, -force.dot(planned)) * step_s_);
+  const Vec3 planned(planner_.v() - planner_.omega() * p.y(),
+                     planner_.side() + planner_.omega() * p.x(), 0.0);
+  planner_.resist(contact.link_b, std::max(collides ? 1e-9 : 0.0, -force.dot(planned)) * step_s_);
 }
 
 void Drive::reset_odometry() {
@@ -91,7 +91,7 @@ void Drive::placed(SimTime now) {
   velocity_.setZero();
   acceleration_.setZero();
   wheel_v_ = wheel_omega_ = 0.0;
-  motion_.stand_still(now);
+  planner_.stand_still(now);
   wake();
   begin_at_rest();
 }
@@ -109,7 +109,7 @@ void Drive::read(Snapshot& snapshot) const {
   state.wheel_v = wheel_v_;
   state.wheel_omega = wheel_omega_;
   state.odometry_resets = resets_;
-  read_motion(motion_.log(), robot_, snapshot);
+  read_motion(planner_.log(), robot_, snapshot);
 }
 
 }  // namespace ruedo::robot

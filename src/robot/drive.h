@@ -6,7 +6,7 @@
 
 #include "model/body_layout.h"
 #include "physics/physics_world.h"
-#include "robot/motion.h"
+#include "robot/motion_planner.h"
 #include "robot/wheel_kinematics.h"
 #include "ruedo/snapshot.h"
 
@@ -35,7 +35,7 @@ class Drive {
   // A command came: what sleeps must wake.
   virtual void wake() = 0;
 
-  Motion& motion() { return motion_; }
+  MotionPlanner& planner() { return planner_; }
   // The robot's state in the snapshot, and what of its motion came to an end.
   void read(Snapshot& snapshot) const;
   // As the robot's primitives measure it: the true one, or what its odometry makes of its wheels.
@@ -70,7 +70,7 @@ class Drive {
   const Pose X_BBase_, X_BaseB_;
   const std::vector<int> wheels_;
   const model::DriveDescription& description_;
-  Motion motion_;
+  MotionPlanner planner_;
   Pose X_WBase_;
   Twist twist_;                       // of base_link in base_link
   Vec3 velocity_ = Vec3::Zero();      // of base_link in the world

@@ -259,7 +259,7 @@ void KinematicDrive::before_step(SimTime now) {
     if (physics_.sleeping(body_)) return;
     wake();
   }
-  way_ = planned_ = motion_.step(now, step_us_);
+  way_ = planned_ = planner_.step(now, step_us_);
   if (model_) way_ = follow_model(now);
   if (description_.on_odometry) {  // the wheels turn as the robot believes it must; what comes of
                                    // it depends on what they are
@@ -358,7 +358,7 @@ void KinematicDrive::after_step(SimTime now) {
   if (asleep_) {
     velocity_.setZero();
     acceleration_.setZero();
-    motion_.show_step();
+    planner_.show_step();
     return;
   }
   if (on_plane_) {
@@ -369,25 +369,25 @@ void KinematicDrive::after_step(SimTime now) {
   const PlaneMotion wheels = of_wheels();
   wheel_v_ = wheels.v;
   wheel_omega_ = wheels.omega;
-  motion_.show_step();
+  planner_.show_step();
 }
 
 // What the wheels, at the rates of the plan, make of speed and turn rate.
 PlaneMotion KinematicDrive::of_wheels() const {
   if (model_) return {made_.ahead, made_.turn};
-  if (!description_.on_odometry) return {motion_.v(), motion_.omega()};
+  if (!description_.on_odometry) return {planner_.v(), planner_.omega()};
   return WheelKinematics::real(description_)
-      .motion(WheelKinematics::believed(description_).wheels({motion_.v(), motion_.omega()}));
+      .motion(WheelKinematics::believed(description_).wheels({planner_.v(), planner_.omega()}));
 }
 
 // On odometry the wheels do as planned, and the robot believes them.
 void KinematicDrive::finish(SimTime now, double way, double angle, bool touched) {
-  if (description_.on_odometry && motion_.has_primitive())
-    return motion_.finish(now, planned_.way, planned_.angle, false);
+  if (description_.on_odometry && planner_.has_primitive())
+    return planner_.finish(now, planned_.way, planned_.angle, false);
   if (touched)
     for (const Contact& contact : physics_.contacts(body_)) resist(contact);
-  motion_.finish(now, way, angle, touched, lag_);
-  if (touched || !motion_.has_primitive())
+  planner_.finish(now, way, angle, touched, lag_);
+  if (touched || !planner_.has_primitive())
     lag_ = {0.0, 0.0, lag_.moving};  // a velocity is not made up for
 }
 
@@ -457,7 +457,7 @@ void KinematicDrive::after_on_contacts(SimTime now) {
 }
 
 void KinematicDrive::fall_asleep_when_still(bool still) {
-  if (!still || !motion_.resting() || !is_still()) {
+  if (!still || !planner_.resting() || !is_still()) {
     still_us_ = 0;
     return;
   }
@@ -470,7 +470,7 @@ void KinematicDrive::fall_asleep_when_still(bool still) {
 }
 
 void KinematicDrive::read_wheels(Snapshot& snapshot) const {
-  wheel_angles_.read(snapshot, {wheel_v_, side(), wheel_omega_}, motion_.curvature());
+  wheel_angles_.read(snapshot, {wheel_v_, side(), wheel_omega_}, planner_.curvature());
 }
 
 }  // namespace ruedo::robot

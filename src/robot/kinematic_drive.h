@@ -39,7 +39,7 @@ class KinematicDrive final : public Drive {
   const std::string& robot_name() const;
   void make_model();
   Displacement follow_model(SimTime now);
-  double side() const { return model_ ? made_.left : motion_.side(); }
+  double side() const { return model_ ? made_.left : planner_.side(); }
   bool is_still() const;
   void stand_on_near_plane();
   void choose_support();

@@ -98,7 +98,7 @@ void Robots::Impl::apply(const Command& command) {
   if (command.robot < 0 || static_cast<size_t>(command.robot) >= drives_.size()) return;
   Drive* drive = drives_[static_cast<size_t>(command.robot)].get();
   const auto refuse = [&](int64_t id, int8_t kind, int8_t reason) {
-    if (drive) return drive->motion().refuse(id, kind, reason);
+    if (drive) return drive->planner().refuse(id, kind, reason);
     MotionState refused;
     refused.id = id;
     refused.kind = kind;
@@ -125,11 +125,11 @@ void Robots::Impl::apply(const Command& command) {
   if (std::holds_alternative<ResetOdometry>(command.what)) return drive->reset_odometry();
   drive->wake();
   if (const auto* velocity = std::get_if<VelocityCommand>(&command.what))
-    drive->motion().command(*velocity, now());
+    drive->planner().command(*velocity, now());
   if (const auto* wheels = std::get_if<WheelCommand>(&command.what))
-    drive->motion().command(*wheels, now());
+    drive->planner().command(*wheels, now());
   if (const auto* move = std::get_if<MoveCommand>(&command.what)) {
-    drive->motion().command(*move, now(), drive->heading_in_odom());
+    drive->planner().command(*move, now(), drive->heading_in_odom());
   }
 }
 
@@ -329,7 +329,7 @@ void Robots::Impl::start_again(int instance) {
 SimTime Robots::Impl::set_time_to_zero() {
   const SimTime was = now();
   for (auto& drive : drives_)
-    if (drive) drive->motion().shift_time(was);
+    if (drive) drive->planner().shift_time(was);
   for (auto& mover : movers_) mover->shift_time(was);
   crowd_.shift_time(was);
   surroundings_.shift_time(was);

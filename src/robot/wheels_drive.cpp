@@ -108,7 +108,7 @@ void WheelsDrive::before_step(SimTime now) {
     if (physics_.sleeping(body_)) return;
     wake();
   }
-  way_ = motion_.step(now, step_us_);
+  way_ = planner_.step(now, step_us_);
   way_missing_ += way_.way;
   angle_missing_ += way_.angle;
   turn_wheels(way_);
@@ -117,17 +117,17 @@ void WheelsDrive::before_step(SimTime now) {
 // rad/s, from what the gyro says; wheel commands go past it.
 double WheelsDrive::yaw_correction() {
   const double gain = description_.yaw_gain;
-  if (gain <= 0.0 || motion_.by_wheels()) return 0.0;
+  if (gain <= 0.0 || planner_.by_wheels()) return 0.0;
   const double error = std::clamp(angle_missing_, -kLargestYawError_rad, kLargestYawError_rad);
   yaw_integral_ += 0.25 * gain * gain * error * step_s_;  // critically damped
-  const double most = 3.0 * std::abs(motion_.omega()) + 0.1;
+  const double most = 3.0 * std::abs(planner_.omega()) + 0.1;
   yaw_integral_ = std::clamp(yaw_integral_, -most, most);
   return gain * error + yaw_integral_;
 }
 
 void WheelsDrive::turn_wheels(const Displacement& way) {
   const Vec3 twist(way.way / step_s_, way.side / step_s_, way.angle / step_s_ + yaw_correction());
-  const double curvature = motion_.curvature();
+  const double curvature = planner_.curvature();
   const SideRates sides = base_ ? SideRates{} : believed_.wheels({twist.x(), twist.z()});
   for (size_t i = 0; i < wheels_.size(); ++i) {
     if (places_[i].steers) {
@@ -213,7 +213,7 @@ void WheelsDrive::after_step(SimTime now) {
   if (asleep_) {
     velocity_.setZero();
     acceleration_.setZero();
-    motion_.show_step();
+    planner_.show_step();
     return;
   }
   const Pose X_WBase = base_pose().normalized();
@@ -234,16 +234,16 @@ void WheelsDrive::after_step(SimTime now) {
   angle_missing_ -= made.omega;
   const bool touched = touches_something();
   // A primitive ends by what the robot believes; whether a velocity leads anywhere, the room says.
-  const bool believes = motion_.has_primitive();
-  motion_.finish(now, believes ? made.v : ahead, believes ? made.omega : turned, touched, lag());
-  if (touched && motion_.has_primitive())
+  const bool believes = planner_.has_primitive();
+  planner_.finish(now, believes ? made.v : ahead, believes ? made.omega : turned, touched, lag());
+  if (touched && planner_.has_primitive())
     way_missing_ = angle_missing_ = 0.0;  // it was replanned from where the robot believes to be
-  if (!motion_.has_primitive()) {         // a velocity is not made up for later
+  if (!planner_.has_primitive()) {        // a velocity is not made up for later
     way_missing_ = 0.0;
     angle_missing_ = std::clamp(angle_missing_, -kLargestYawError_rad, kLargestYawError_rad);
   }
   fall_asleep_when_still();
-  motion_.show_step();
+  planner_.show_step();
 }
 
 Lag WheelsDrive::lag() const {
@@ -283,7 +283,7 @@ void WheelsDrive::read_wheel_rates() {
 }
 
 void WheelsDrive::fall_asleep_when_still() {
-  const bool still = motion_.resting() && twist_.linear.norm() < kStill_m_s &&
+  const bool still = planner_.resting() && twist_.linear.norm() < kStill_m_s &&
                      twist_.angular.norm() < kStill_rad_s && std::abs(wheel_v_) < kStill_m_s;
   still_us_ = still ? still_us_ + step_us_ : 0;
   if (still_us_ < kFallAsleep_us) return;

@@ -25,11 +25,11 @@ struct Lag {
   bool moving = false;            // faster than a robot that has come to rest
 };
 
-class Motion {
+class MotionPlanner {
  public:
   // rims: of its rolling wheels, in their order (model::WheelPlacement::rim); needed where they can
   // roll sideways.
-  explicit Motion(const model::DriveDescription& drive, const std::vector<Vec3>& rims = {});
+  explicit MotionPlanner(const model::DriveDescription& drive, const std::vector<Vec3>& rims = {});
 
   // Commands, at sim time now. Bad values are refused, and nothing changes but the log.
   void command(const VelocityCommand& command, SimTime now);
@@ -89,7 +89,7 @@ class Motion {
   void keep_wheel_rates(double& v, double& side, double& omega) const;
   Displacement way_of(double begin, double end) const;
   void brake(SimTime now);
-  void move_on(SimTime to);
+  void take_speeds(SimTime to);
   void set_plan(const Profile& v, const Profile& omega, SimTime now, double side = 0.0);
   void plan_primitive(SimTime now);
   void replace_running();

@@ -1,6 +1,6 @@
 // Commands to plans. The plan's clock is whole microseconds; what happens inside a step (the
 // watchdog's end) splits it.
-#include "robot/motion.h"
+#include "robot/motion_planner.h"
 
 #include <algorithm>
 #include <cmath>
@@ -47,7 +47,7 @@ bool all_finite(std::initializer_list<double> values) {
 
 }  // namespace
 
-Motion::Motion(const model::DriveDescription& drive, const std::vector<Vec3>& rims)
+MotionPlanner::MotionPlanner(const model::DriveDescription& drive, const std::vector<Vec3>& rims)
     : deadline_(kNever),
       drive_(drive),
       kinematics_(drive.on_odometry ? WheelKinematics::believed(drive)
@@ -66,16 +66,16 @@ Motion::Motion(const model::DriveDescription& drive, const std::vector<Vec3>& ri
 
 using Steering = model::DriveDescription::Steering;
 
-bool Motion::is_steered() const {
+bool MotionPlanner::is_steered() const {
   return drive_.steering == Steering::ackermann || drive_.steering == Steering::tricycle;
 }
 
-bool Motion::moves_sideways() const {
+bool MotionPlanner::moves_sideways() const {
   return drive_.steering == Steering::mecanum || drive_.steering == Steering::omni ||
          drive_.steering == Steering::holonomic;
 }
 
-void Motion::show(int64_t id, int8_t kind, int8_t state, int8_t reason, int blocked_by) {
+void MotionPlanner::show(int64_t id, int8_t kind, int8_t state, int8_t reason, int blocked_by) {
   MotionState shown;
   shown.id = id;
   shown.kind = kind;
@@ -86,7 +86,7 @@ void Motion::show(int64_t id, int8_t kind, int8_t state, int8_t reason, int bloc
   publish_progress();
 }
 
-void Motion::refuse(int64_t id, int8_t kind, int8_t reason) {
+void MotionPlanner::refuse(int64_t id, int8_t kind, int8_t reason) {
   MotionState refused;
   refused.id = id;
   refused.kind = kind;
@@ -95,7 +95,7 @@ void Motion::refuse(int64_t id, int8_t kind, int8_t reason) {
   log_.mention(refused);
 }
 
-void Motion::replace_running() {
+void MotionPlanner::replace_running() {
   if (primitive_.axis == Axis::none) return;
   MotionState ended = log_.current();
   ended.state = Status::STATE_ENDED;
@@ -104,7 +104,7 @@ void Motion::replace_running() {
   primitive_ = {};
 }
 
-void Motion::command(const VelocityCommand& command, SimTime now) {
+void MotionPlanner::command(const VelocityCommand& command, SimTime now) {
   if (!all_finite({command.vx, command.vy, command.omega}))
     return refuse(0, Status::KIND_VELOCITY, Status::REASON_NOT_FINITE);
   if (command.vy != 0.0 && !moves_sideways())
@@ -112,7 +112,7 @@ void Motion::command(const VelocityCommand& command, SimTime now) {
   hold(command.vx, command.vy, command.omega, now, Status::KIND_VELOCITY);
 }
 
-void Motion::command(const WheelCommand& command, SimTime now) {
+void MotionPlanner::command(const WheelCommand& command, SimTime now) {
   const size_t left = drive_.left_joints.size(), right = drive_.right_joints.size(),
                n = command.rates.size();
   if (!rims_.empty() && n == rims_.size()) return hold_wheels(command, now);
@@ -136,7 +136,7 @@ void Motion::command(const WheelCommand& command, SimTime now) {
 }
 
 // Of mecanum and omni wheels: the twist that fits the rates best, in the sense of least squares.
-void Motion::hold_wheels(const WheelCommand& command, SimTime now) {
+void MotionPlanner::hold_wheels(const WheelCommand& command, SimTime now) {
   Eigen::Matrix3d normal = Eigen::Matrix3d::Zero();
   Vec3 sum = Vec3::Zero();
   for (size_t i = 0; i < rims_.size(); ++i) {
@@ -151,7 +151,7 @@ void Motion::hold_wheels(const WheelCommand& command, SimTime now) {
 }
 
 // All together may be too fast for a wheel: the direction is kept.
-void Motion::keep_wheel_rates(double& v, double& side, double& omega) const {
+void MotionPlanner::keep_wheel_rates(double& v, double& side, double& omega) const {
   if (!std::isfinite(drive_.max_wheel_rate) || is_steered()) return;
   double fastest = std::abs(v) + 0.5 * drive_.track * std::abs(omega);
   if (!rims_.empty()) {
@@ -167,7 +167,7 @@ void Motion::keep_wheel_rates(double& v, double& side, double& omega) const {
 }
 
 // Standing still it can only turn its wheels.
-void Motion::steer_for(double v, double omega) {
+void MotionPlanner::steer_for(double v, double omega) {
   const double most = drive_.max_steering_angle;
   if (v != 0.0)
     target_steering_ = std::clamp(math::atan(drive_.wheelbase * omega / v), -most, most);
@@ -175,7 +175,7 @@ void Motion::steer_for(double v, double omega) {
     target_steering_ = std::copysign(most, omega * drive_.wheelbase);
 }
 
-void Motion::hold(double v, double side, double omega, SimTime now, int8_t kind) {
+void MotionPlanner::hold(double v, double side, double omega, SimTime now, int8_t kind) {
   v = std::clamp(v, -way_limits_.speed, way_limits_.speed);
   side = std::clamp(side, -side_limits_.speed, side_limits_.speed);
   omega = std::clamp(omega, -angle_limits_.speed, angle_limits_.speed);
@@ -199,7 +199,8 @@ void Motion::hold(double v, double side, double omega, SimTime now, int8_t kind)
            Profile::to_velocity(omega_, omega, angle_limits_), now, side);
 }
 
-Limits Motion::stricter(const Limits& own, const MoveCommand& command, double fallback_speed) {
+Limits MotionPlanner::stricter(const Limits& own, const MoveCommand& command,
+                               double fallback_speed) {
   Limits limits = own;
   if (command.speed > 0.0) limits.speed = std::min(limits.speed, command.speed);
   if (command.speed == 0.0 && limits.speed >= kFastest_m_s) limits.speed = fallback_speed;
@@ -211,7 +212,7 @@ Limits Motion::stricter(const Limits& own, const MoveCommand& command, double fa
   return limits;
 }
 
-void Motion::command(const MoveCommand& command, SimTime now, double heading) {
+void MotionPlanner::command(const MoveCommand& command, SimTime now, double heading) {
   const auto refused = [&](int8_t reason) { refuse(command.id, command.kind, reason); };
   if (command.kind < Move::ADVANCE || command.kind > Move::STOP)
     return refused(Status::REASON_BAD_KIND);
@@ -284,18 +285,18 @@ void Motion::command(const MoveCommand& command, SimTime now, double heading) {
   begin_window(now);
 }
 
-void Motion::set_plan(const Profile& v, const Profile& omega, SimTime now, double side) {
+void MotionPlanner::set_plan(const Profile& v, const Profile& omega, SimTime now, double side) {
   start_ = now;
   plan_v_ = v;
   plan_omega_ = omega;
   if (moves_sideways()) plan_side_ = Profile::to_velocity(side_, side, side_limits_);
   if (is_steered())
     plan_steering_ = SteeringPlan::between(steering_, target_steering_, drive_.max_steering_rate);
-  move_on(now);
+  take_speeds(now);
 }
 
 // Takes the plan's velocities at that time; an unlimited acceleration is over at once.
-void Motion::move_on(SimTime to) {
+void MotionPlanner::take_speeds(SimTime to) {
   const double t = seconds(to);
   v_ = plan_v_.velocity(t);
   omega_ = plan_omega_.velocity(t);
@@ -314,7 +315,7 @@ void Motion::move_on(SimTime to) {
              primitive_.axis == Axis::none && !stopping;
 }
 
-void Motion::plan_primitive(SimTime now) {
+void MotionPlanner::plan_primitive(SimTime now) {
   Primitive& p = primitive_;
   const double rest = p.target - p.done;
   p.done_before_plan = p.done;
@@ -353,7 +354,7 @@ void Motion::plan_primitive(SimTime now) {
   set_plan(v, omega, now);
 }
 
-void Motion::brake(SimTime now) {
+void MotionPlanner::brake(SimTime now) {
   primitive_ = {};
   holding_ = false;
   deadline_ = kNever;
@@ -361,7 +362,7 @@ void Motion::brake(SimTime now) {
            Profile::to_velocity(omega_, 0.0, angle_limits_), now);
 }
 
-void Motion::stand_still(SimTime now) {
+void MotionPlanner::stand_still(SimTime now) {
   const MotionState state = log_.current();
   v_ = omega_ = side_ = target_v_ = target_omega_ = target_side_ = 0.0;
   target_steering_ = steering_;
@@ -369,22 +370,22 @@ void Motion::stand_still(SimTime now) {
   if (state.state != Status::STATE_RUNNING) return;
   show(state.id, state.kind, Status::STATE_ENDED, Status::REASON_REPLACED);
   log_.progress(state.done, state.remaining);
-  move_on(now);  // at rest for good
+  take_speeds(now);  // at rest for good
 }
 
-void Motion::shift_time(SimTime us) {
+void MotionPlanner::shift_time(SimTime us) {
   start_ -= us;
   window_start_ -= us;
   if (deadline_ != kNever) deadline_ -= us;
 }
 
-Displacement Motion::way_of(double begin, double end) const {
+Displacement MotionPlanner::way_of(double begin, double end) const {
   if (is_steered()) return integrate_steered(plan_v_, plan_steering_, drive_.wheelbase, begin, end);
   if (moves_sideways()) return integrate(plan_v_, plan_side_, plan_omega_, begin, end);
   return integrate(plan_v_, plan_omega_, begin, end);
 }
 
-Displacement Motion::step(SimTime now, int64_t step_us) {
+Displacement MotionPlanner::step(SimTime now, int64_t step_us) {
   if (resting_) return {};
   const SimTime end = now + step_us;
   if (steady_ && end < deadline_) {
@@ -396,7 +397,7 @@ Displacement Motion::step(SimTime now, int64_t step_us) {
   if (deadline_ < end) {  // the watchdog ends the command within this step
     const SimTime deadline = std::max(deadline_, now);
     way = way_of(seconds(now), seconds(deadline));
-    move_on(deadline);
+    take_speeds(deadline);
     const int8_t kind = log_.current().kind;
     const bool moving = target_v_ != 0.0 || target_omega_ != 0.0 || target_side_ != 0.0 ||
                         v_ != 0.0 || omega_ != 0.0 || side_ != 0.0;
@@ -410,18 +411,18 @@ Displacement Motion::step(SimTime now, int64_t step_us) {
   } else {
     way = way_of(seconds(now), seconds(end));
   }
-  move_on(end);
+  take_speeds(end);
   return way;
 }
 
-bool Motion::settled(SimTime now, const Lag& lag) const {
+bool MotionPlanner::settled(SimTime now, const Lag& lag) const {
   const bool near = std::abs(lag.way) < kSettled_m && std::abs(lag.angle) < kSettled_rad;
   return (near && !lag.moving) ||
          seconds(now) >
              std::max({plan_v_.end(), plan_omega_.end(), plan_side_.end()}) + kSettling_s;
 }
 
-void Motion::finish(SimTime now, double way, double angle, bool touched, const Lag& lag) {
+void MotionPlanner::finish(SimTime now, double way, double angle, bool touched, const Lag& lag) {
   if (resting_) return;
   Primitive& p = primitive_;
   if (p.axis == Axis::none) {
@@ -429,7 +430,7 @@ void Motion::finish(SimTime now, double way, double angle, bool touched, const L
         log_.current().kind == Move::STOP && log_.current().state == Status::STATE_RUNNING;
     if (stopping && steady_ && settled(now, lag)) {
       show(log_.current().id, Move::STOP, Status::STATE_DONE);
-      move_on(now);
+      take_speeds(now);
     }
     if (holding_) watch_held(now, way, angle, touched);
     return;
@@ -450,7 +451,7 @@ void Motion::finish(SimTime now, double way, double angle, bool touched, const L
     p = {};
     show(state.id, state.kind, Status::STATE_DONE);
     log_.progress(state.done, state.remaining);
-    move_on(now);
+    take_speeds(now);
     return;
   }
   watch_for_block(now, touched);
@@ -459,14 +460,14 @@ void Motion::finish(SimTime now, double way, double angle, bool touched, const L
     plan_primitive(now);  // what is left, from where it really is
 }
 
-void Motion::begin_window(SimTime now) {
+void MotionPlanner::begin_window(SimTime now) {
   window_start_ = now;
   window_done_ = window_turned_ = window_fastest_ = window_fastest_turn_ = 0.0;
   window_touched_ = false;
   window_work_.clear();
 }
 
-void Motion::resist(int link, double work) {
+void MotionPlanner::resist(int link, double work) {
   const auto known = std::find_if(window_work_.begin(), window_work_.end(),
                                   [link](const auto& each) { return each.first == link; });
   if (known == window_work_.end()) {
@@ -477,7 +478,7 @@ void Motion::resist(int link, double work) {
 }
 
 // What took the most work from the robot since the window began; of equal ones the lowest link.
-int Motion::strongest() const {
+int MotionPlanner::strongest() const {
   const auto weaker = [](const auto& a, const auto& b) {
     return a.second < b.second || (a.second == b.second && a.first > b.first);
   };
@@ -486,7 +487,7 @@ int Motion::strongest() const {
 }
 
 // A velocity holds on; its status says while it leads nowhere.
-void Motion::watch_held(SimTime now, double way, double angle, bool touched) {
+void MotionPlanner::watch_held(SimTime now, double way, double angle, bool touched) {
   window_touched_ |= touched;
   window_done_ += way;
   window_turned_ += angle;
@@ -509,7 +510,7 @@ void Motion::watch_held(SimTime now, double way, double angle, bool touched) {
   begin_window(now);
 }
 
-void Motion::watch_for_block(SimTime now, bool touched) {
+void MotionPlanner::watch_for_block(SimTime now, bool touched) {
   window_touched_ |= touched;
   const double planned = primitive_.axis == Axis::angle ? omega_ : v_;
   window_fastest_ = std::max(window_fastest_, std::abs(planned));
@@ -533,7 +534,7 @@ void Motion::watch_for_block(SimTime now, bool touched) {
   window_done_ = primitive_.done;
 }
 
-void Motion::publish_progress() {
+void MotionPlanner::publish_progress() {
   if (primitive_.axis == Axis::none) return;
   log_.progress(primitive_.done * primitive_.unit,
                 (primitive_.target - primitive_.done) * primitive_.unit);
