@@ -16,9 +16,9 @@ constexpr auto kRepeatTime = std::chrono::milliseconds(100);
 
 std::string kind_name(int32_t kind) {
   static const char* const names[] = {
-      "",      "JOIN",  "LEAVE",  "PAUSE",    "RESUME",    "STEP",          "RATE",
-      "RESET", "SPAWN", "REMOVE", "SET_POSE", "SET_TWIST", "GET_STATE",     "INFO",
-      "QUIT",  "GRANT", "RESEND", "SNAPSHOT", "RESTORE",   "RESET_ODOMETRY"};
+      "",      "JOIN",  "LEAVE",  "PAUSE",    "RESUME",    "STEP",           "RATE",
+      "RESET", "SPAWN", "REMOVE", "SET_POSE", "SET_TWIST", "GET_STATE",      "INFO",
+      "QUIT",  "GRANT", "RESEND", "SNAPSHOT", "RESTORE",   "RESET_ODOMETRY", "SAVE"};
   return kind > 0 && kind < static_cast<int32_t>(std::size(names)) ? names[kind]
                                                                    : std::to_string(kind);
 }

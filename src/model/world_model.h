@@ -204,6 +204,8 @@ struct DriveDescription {
 
 struct Model {
   std::string name;  // as the file says
+  // By the file, or because all its parts are, or an actor without a trajectory. A model that a
+  // joint holds to the world is not.
   bool is_static = false;
   bool self_collide = false;
   std::vector<Link> links;  // links[0] is the canonical link, or the first

@@ -36,7 +36,7 @@ class RequestTable {
   static const RequestKind* find(int32_t kind);
 };
 
-const RequestKind RequestTable::kKinds[] = {
+constexpr RequestKind RequestTable::kKinds[] = {
     // name, kind, needs, effect, waits, function
     {"JOIN", request_t::JOIN, RequestKind::nothing, RequestKind::steers, RequestKind::for_nothing,
      nullptr},
@@ -79,6 +79,16 @@ const RequestKind RequestTable::kKinds[] = {
     {"RESTORE", request_t::RESTORE, RequestKind::snapshots, RequestKind::steers,
      RequestKind::for_state, with<name_request_t, &Run::restore>},
 };
+
+// A kind is a bit of `features`, and has one line.
+static_assert([] {
+  uint64_t seen = 0;
+  for (const RequestKind& each : RequestTable::kKinds) {
+    if (each.kind <= 0 || each.kind >= 63 || (seen >> each.kind & 1) != 0) return false;
+    seen |= uint64_t{1} << each.kind;
+  }
+  return true;
+}());
 
 const RequestKind* RequestTable::find(int32_t kind) {
   const auto found = std::find_if(std::begin(kKinds), std::end(kKinds),

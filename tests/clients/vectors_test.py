@@ -4,6 +4,7 @@ nothing is lost but what the script loses."""
 
 import json
 import os
+import re
 import struct
 import subprocess
 import sys
@@ -265,3 +266,14 @@ def test_conversations(runner, name):
         seen = [f"{state}:p3at/odometry:{zlib.crc32(script.odometry(state))}" for state in states]
         expected.append(" ".join(["step", str(last), str(5000 * last), str(100 + last), *seen]))
     assert said == expected + ([one["ends"]] if "ends" in one else [])
+
+
+def test_cpp_names_each_kind_of_request():
+    """Python and Java read the names from the type; lcm-gen's C++ has none to read."""
+    proto = (HERE.parents[1] / "proto/request_t.lcm").read_text(encoding="utf-8")
+    kinds = {
+        int(number): name for name, number in re.findall(r"const int32_t (\w+)\s*=\s*(\d+)", proto)
+    }
+    source = (HERE.parents[1] / "clients/cpp/session.cpp").read_text(encoding="utf-8")
+    block = re.search(r"names\[\] = \{(.*?)\};", source, re.DOTALL).group(1)
+    assert re.findall(r'"(\w*)"', block) == ["", *(kinds[k] for k in range(1, len(kinds) + 1))]

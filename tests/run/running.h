@@ -139,6 +139,7 @@ inline std::string robot_sdf(const std::string& name, double x, double y,
          "<ruedo:watchdog>0</ruedo:watchdog></ruedo:drive></model>";
 }
 
+// A world of these models on a static model "ground".
 inline std::string world_sdf(const std::string& models) {
   return "<?xml version='1.0'?><sdf version='1.9' xmlns:ruedo='ruedo'><world name='test'><physics "
          "type='bullet'>"

@@ -1,20 +1,18 @@
 // The C library's names for our functions, for what is compiled into our programs and calls those:
-// Eigen, Bullet's headers. Hidden, so that they are neither taken from nor given to a shared
-// library; those have their names changed (cmake/RuedoMath.cmake).
+// Eigen, Bullet's headers. The program exports them, so that the shared libraries that it loads
+// compute by them, too, but for those whose copies call ours by name (cmake/RuedoMath.cmake).
 #define OURS(name)             \
   double ruedo_##name(double); \
-  [[gnu::visibility("hidden")]] double name(double x) noexcept { return ruedo_##name(x); }
-#define OURS_2(name)                                                       \
-  double ruedo_##name(double, double);                                     \
-  [[gnu::visibility("hidden")]] double name(double x, double y) noexcept { \
-    return ruedo_##name(x, y);                                             \
-  }
+  double name(double x) noexcept { return ruedo_##name(x); }
+#define OURS_2(name)                   \
+  double ruedo_##name(double, double); \
+  double name(double x, double y) noexcept { return ruedo_##name(x, y); }
 #define OURS_F(name)         \
   float ruedo_##name(float); \
-  [[gnu::visibility("hidden")]] float name(float x) noexcept { return ruedo_##name(x); }
+  float name(float x) noexcept { return ruedo_##name(x); }
 #define OURS_2F(name)               \
   float ruedo_##name(float, float); \
-  [[gnu::visibility("hidden")]] float name(float x, float y) noexcept { return ruedo_##name(x, y); }
+  float name(float x, float y) noexcept { return ruedo_##name(x, y); }
 
 extern "C" {
 // clang-format off

@@ -6,7 +6,11 @@ import ruedo.lcmtypes.reply_t;
 import ruedo.lcmtypes.request_t;
 
 import java.io.IOException;
+import java.lang.reflect.Field;
+import java.lang.reflect.Modifier;
 import java.security.SecureRandom;
+import java.util.HashMap;
+import java.util.Map;
 
 /**
  * A client's session with the server: requests are repeated until they are answered, and executed
@@ -14,28 +18,7 @@ import java.security.SecureRandom;
  */
 final class Session {
     private static final long REPEAT_MILLIS = 100;
-    private static final String[] KINDS = {
-        "",
-        "JOIN",
-        "LEAVE",
-        "PAUSE",
-        "RESUME",
-        "STEP",
-        "RATE",
-        "RESET",
-        "SPAWN",
-        "REMOVE",
-        "SET_POSE",
-        "SET_TWIST",
-        "GET_STATE",
-        "INFO",
-        "QUIT",
-        "GRANT",
-        "RESEND",
-        "SNAPSHOT",
-        "RESTORE",
-        "RESET_ODOMETRY"
-    };
+    private static final Map<Integer, String> KINDS = kinds();
 
     private final Simulation sim;
     private final String name;
@@ -61,7 +44,7 @@ final class Session {
                     "this server (Ruedo "
                             + info.head.version
                             + ") has no "
-                            + KINDS[kind]
+                            + name(kind)
                             + " request");
         }
         byte[] encoded = body == null ? new byte[0] : Bus.encode(body);
@@ -131,7 +114,7 @@ final class Session {
                     awaitedKind = 0;
                     throw new RuedoException.Timeout(
                             "no reply to "
-                                    + KINDS[kind]
+                                    + name(kind)
                                     + " on ruedo/reply within "
                                     + Deadline.text(timeout)
                                     + " s");
@@ -175,12 +158,26 @@ final class Session {
         sim.bus.publish("ruedo/request", request);
     }
 
+    private static String name(int kind) {
+        return KINDS.getOrDefault(kind, Integer.toString(kind));
+    }
+
+    private static Map<Integer, String> kinds() {
+        Map<Integer, String> names = new HashMap<>();
+        try {
+            for (Field field : request_t.class.getFields()) {
+                if (field.getType() == int.class && Modifier.isFinal(field.getModifiers()))
+                    names.put(field.getInt(null), field.getName());
+            }
+        } catch (IllegalAccessException error) {
+            throw new AssertionError(error); // they are public
+        }
+        return names;
+    }
+
     private static reply_t checked(reply_t reply) {
         if (reply.code == reply_t.OK) return reply;
-        String kind =
-                reply.kind > 0 && reply.kind < KINDS.length
-                        ? KINDS[reply.kind]
-                        : Integer.toString(reply.kind);
+        String kind = name(reply.kind);
         String text =
                 kind
                         + ": "
