@@ -30,7 +30,7 @@ class Harm(threading.Thread):
     def __init__(self, url: str, folder: Path):
         super().__init__()
         self.url, self.folder, self.end = url, folder, False
-        self.messages = self.models = self.files = 0
+        self.messages = self.models = self.files = self.rounds = 0
         self.accepted: list[str] = []
 
     def run(self) -> None:
@@ -46,6 +46,7 @@ class Harm(threading.Thread):
             self.check_files()
             said = flood.communicate(timeout=PATIENCE)[0]
             self.messages += sum(int(line.split()[0]) for line in said.splitlines())
+            self.rounds += 1
 
     def bring_models(self) -> None:
         try:
@@ -86,6 +87,8 @@ def a_day(log: Path, url: str, harm: Harm | None) -> list[int]:
                     commands.uniform(-0.5, 0.5), commands.uniform(-1, 1)
                 )
                 sim.step(round(1 / sim.step_size), [command], timeout=PATIENCE)
+                while second == SECONDS // 3 and harm and harm.is_alive() and harm.rounds == 0:
+                    sim.state()  # what is bad comes once, however busy the machine is
                 if second % max(1, SECONDS // 300) == 0:
                     sizes.append(resident_kb(server))
             sim.close()
@@ -115,7 +118,7 @@ def test_the_log_is_the_same_beside_a_flood(tmp_path: Path, free_port) -> None:
     harm = Harm(url, tmp_path)
     sizes = a_day(loud, url, harm)
     third = len(sizes) // 3
-    first, last = max(sizes[:third]), max(sizes[-third:])
+    first, last = max(sizes[: third + 1]), max(sizes[-third:])
     print(
         f"{SECONDS} s: {harm.messages} bad messages, {harm.models} bad models, {harm.files} bad files, "
         f"{len(harm.accepted)} accepted; {first} kB at first, {last} kB at the end"
