@@ -27,7 +27,11 @@ sensors over LCM, with clients for C++, Python and Java. The same seed and
 commands give the same bytes.")
 set(CPACK_PACKAGING_INSTALL_PREFIX /usr)
 set(CPACK_INSTALLED_DIRECTORIES ${debian} /)
-set(CPACK_DEBIAN_PACKAGE_CONTROL_EXTRA ${PROJECT_SOURCE_DIR}/packaging/debian/prerm)
+# libruedo_engine.so is for others to link; the libraries in lib/ruedo are our own.
+file(WRITE ${PROJECT_BINARY_DIR}/debian-control/shlibs
+  "libruedo_engine ${PROJECT_VERSION_MAJOR}.${PROJECT_VERSION_MINOR} ruedo (= ${PROJECT_VERSION})\n")
+set(CPACK_DEBIAN_PACKAGE_CONTROL_EXTRA ${PROJECT_SOURCE_DIR}/packaging/debian/prerm
+  ${PROJECT_SOURCE_DIR}/packaging/debian/triggers ${PROJECT_BINARY_DIR}/debian-control/shlibs)
 set(CPACK_STRIP_FILES ON)
 set(CPACK_DEBIAN_FILE_NAME DEB-DEFAULT)
 set(CPACK_DEBIAN_PACKAGE_SECTION science)
