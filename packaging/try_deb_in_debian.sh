@@ -56,7 +56,7 @@ python3 first.py
 zcat /usr/share/man/man1/ruedo-run.1.gz | grep -q "serve a world"
 source /usr/share/bash-completion/completions/ruedo
 COMP_WORDS=(ruedo ver) COMP_CWORD=1; _ruedo; test "${COMPREPLY[*]}" = verify
-COMP_WORDS=(ruedo run --rec) COMP_CWORD=2; _ruedo; test "${COMPREPLY[*]}" = --record'
+COMP_WORDS=(ruedo run --rec) COMP_CWORD=2; _ruedo; test "${COMPREPLY[*]}" = "--record --record-limit"'
 
 inside 'apt-get -q update >/dev/null; apt-get -q install --no-install-recommends -y g++ make cmake pkg-config default-jdk-headless' >"$folder/$suite.apt.log" 2>&1 ||
   { cat "$folder/$suite.apt.log"; exit 1; }

@@ -2,6 +2,9 @@
 #include "model/visual_plugins.h"
 
 #include <algorithm>
+#include <string>
+#include <string_view>
+#include <unordered_map>
 
 #include "model/plugins.h"
 #include "model/read_context.h"
@@ -39,27 +42,34 @@ Seen read(const Element& element, Seen seen, const std::string& where, Findings&
   return seen;
 }
 
+// Its children of that kind, by name as a link of the model has it; looked up only.
+std::unordered_map<std::string, const Element*> by_name(const Element& element,
+                                                        std::string_view kind) {
+  std::unordered_map<std::string, const Element*> found;
+  for (const Element* each : element.all(kind)) {
+    if (const std::string* name = each->attribute("name")) found[dotted(*name)] = each;
+  }
+  return found;
+}
+
 }  // namespace
 
 void read_labels_and_temperatures(const Element& model_element, const std::string& where,
                                   Findings& findings, Model& model) {
   const Seen of_model = read(model_element, {}, where, findings);
+  const auto links = by_name(model_element, "link");
   for (Link& link : model.links) {
-    Seen of_link = of_model;
-    const Element* written = nullptr;
-    for (const Element* each : model_element.all("link")) {
-      const std::string* name = each->attribute("name");
-      if (name && dotted(*name) == link.name) written = each;
-    }
+    const auto written = links.find(link.name);
     const std::string here = where + "/link " + link.name;
-    if (written) of_link = read(*written, of_model, here, findings);
+    const Seen of_link =
+        written == links.end() ? of_model : read(*written->second, of_model, here, findings);
+    const auto visuals = written == links.end() ? std::unordered_map<std::string, const Element*>()
+                                                : by_name(*written->second, "visual");
     for (Visual& visual : link.visuals) {
-      Seen seen = of_link;
-      for (const Element* each : written ? written->all("visual") : std::vector<const Element*>()) {
-        const std::string* name = each->attribute("name");
-        if (name && *name == visual.name)
-          seen = read(*each, of_link, here + "/visual " + visual.name, findings);
-      }
+      const auto shown = visuals.find(dotted(visual.name));
+      const Seen seen = shown == visuals.end() ? of_link
+                                               : read(*shown->second, of_link,
+                                                      here + "/visual " + visual.name, findings);
       if (visual.label == 0) visual.label = seen.label;
       if (visual.temperature == 0.0) visual.temperature = seen.temperature;
     }
