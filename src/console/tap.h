@@ -5,7 +5,6 @@
 // for nothing: when the ring is full, the console misses a message.
 #pragma once
 
-#include <array>
 #include <atomic>
 #include <memory>
 #include <mutex>
