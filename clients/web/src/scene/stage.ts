@@ -312,7 +312,7 @@ export class Stage {
   }
 
   // Where a robot's base_link is; false when that is not known.
-  base(robot: number, into: THREE.Matrix4): boolean {
+  base(robot: number, into: THREE.Matrix4, poses: ArrayLike<number> = this.poses.now): boolean {
     const base = this.description?.bases[robot];
     if (!base) return false;
     matrixOf(base.pose, 0, into);
@@ -321,14 +321,15 @@ export class Stage {
       matrixOf(base.start, 0, into);
       return true;
     }
-    into.premultiply(matrixOf(this.poses.now, 7 * base.body, kScratch));
+    into.premultiply(matrixOf(poses, 7 * base.body, kScratch));
     return true;
   }
 
-  // Where it is on the floor, and its heading; null when that is not known.
+  // Where the newest message has it on the floor, and its heading, of which what is drawn is a
+  // little behind; null when that is not known.
   planar(robot: number): PlanarPose | null {
     const at = new THREE.Matrix4();
-    if (robot < 0 || !this.base(robot, at)) return null;
+    if (robot < 0 || !this.base(robot, at, this.poses.to)) return null;
     const [cosine, sine] = at.elements;
     return { x: at.elements[12], y: at.elements[13], heading: Math.atan2(sine, cosine) };
   }

@@ -14,6 +14,7 @@ export class Way {
       size: 10,
       sizeAttenuation: false,
       depthTest: false,
+      transparent: true,
       toneMapped: false,
       fog: false,
     }),
@@ -23,6 +24,7 @@ export class Way {
     for (const object of [this.line, this.ends]) {
       object.visible = false;
       object.frustumCulled = false;
+      object.renderOrder = 1; // over what robots sense
       stage.scene.add(object);
     }
   }
@@ -32,8 +34,8 @@ export class Way {
     const at = ({ x, y }: Planar) => new THREE.Vector3(x, y, kAbove_m);
     this.line.visible = this.ends.visible = points.length > 0;
     if (points.length > 0) {
-      this.line.geometry.setFromPoints([...(from ? [from] : []), ...points].map(at));
-      this.ends.geometry.setFromPoints(points.map(at));
+      draw(this.line, [...(from ? [from] : []), ...points].map(at));
+      draw(this.ends, points.map(at));
     }
     this.stage.touch();
   }
@@ -43,6 +45,13 @@ const kColour = 0x35c2ad,
   kPaint = new THREE.LineBasicMaterial({
     color: kColour,
     depthTest: false,
+    transparent: true,
     toneMapped: false,
     fog: false,
   });
+
+// A geometry keeps the number of its first points.
+function draw(object: THREE.Line | THREE.Points, points: THREE.Vector3[]): void {
+  object.geometry.dispose();
+  object.geometry = new THREE.BufferGeometry().setFromPoints(points);
+}
