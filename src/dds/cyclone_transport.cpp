@@ -21,9 +21,10 @@
 #include <spdlog/spdlog.h>
 #include <sys/socket.h>
 
-#include "dds/early_requests.h"
 #include "dds/identity.h"
 #include "dds/raw_type.h"
+#include "dds/reply_ends.h"
+#include "ros2/fair_queue.h"
 #include "ros2/interfaces.h"
 #include "ruedo/errors.h"
 
@@ -36,7 +37,7 @@ using ros2::Role;
 
 constexpr uint32_t kLastDomain = 232;  // ports of higher ones do not exist
 constexpr int kMostTaken = 64;         // samples at once
-constexpr auto kLook = DDS_MSECS(2);   // after requests that came early
+constexpr auto kLook = DDS_MSECS(2);   // after requests that have to wait
 
 struct QosDeleter {
   void operator()(dds_qos_t* qos) const { dds_delete_qos(qos); }
@@ -231,10 +232,10 @@ class CycloneReader : public ros2::Reader {
     checked(dds_waitset_attach(waitset_, reader_, reinterpret_cast<dds_attach_t>(this)),
             "reader of " + name);
     if (const auto* replies = static_cast<const CycloneWriter*>(endpoint.replies))
-      early_ = std::make_unique<EarlyRequests>(reader_, replies->entity());
+      requests_ = std::make_unique<WaitingRequests>(reader_, replies->entity());
   }
   ~CycloneReader() override {
-    early_.reset();
+    requests_.reset();
     dds_waitset_detach(waitset_, reader_);
     dds_delete(reader_);
     dds_delete(topic_);
@@ -250,39 +251,53 @@ class CycloneReader : public ros2::Reader {
 
   // What is left to do here; the transport's thread. One batch at a time, so that who sends without
   // end leaves others their turn.
-  enum class Left { nothing, early, more };
+  enum class Left { nothing, waiting, more };
   Left take() {
     uint32_t status = 0;
     dds_take_status(reader_, &status,
                     DDS_DATA_AVAILABLE_STATUS | DDS_REQUESTED_INCOMPATIBLE_QOS_STATUS);
     if (status & DDS_REQUESTED_INCOMPATIBLE_QOS_STATUS) tell_incompatible();
-    answer_early();
     ddsi_serdata* samples[kMostTaken];
     dds_sample_info_t infos[kMostTaken];
     const int count = dds_takecdr(reader_, samples, kMostTaken, infos, DDS_ANY_STATE);
     for (int i = 0; i < count; ++i) {
+      SamplePointer sample(samples[i]);
+      if (!infos[i].valid_data) continue;
       const dds_instance_handle_t writer = infos[i].publication_handle;
-      if (infos[i].valid_data &&
-          !(early_ && early_->keep(samples[i], writer, EarlyRequests::Clock::now())))
-        hand_over(samples[i], writer);
-      ddsi_serdata_unref(samples[i]);
+      if (requests_)
+        requests_->queue.push(writer, std::move(sample));
+      else
+        hand_over(*sample, writer);
     }
+    if (requests_) answer();
     if (count == kMostTaken) return Left::more;
-    return early_ && !early_->empty() ? Left::early : Left::nothing;
+    return requests_ && !requests_->queue.empty() ? Left::waiting : Left::nothing;
   }
 
  private:
-  void hand_over(const ddsi_serdata* data, dds_instance_handle_t writer) {
-    ros2::Sample sample = as_sample(data);
+  struct Unref {
+    void operator()(ddsi_serdata* sample) const { ddsi_serdata_unref(sample); }
+  };
+  using SamplePointer = std::unique_ptr<ddsi_serdata, Unref>;
+  // While they wait they have their writer's share of the topic's room.
+  struct WaitingRequests {
+    WaitingRequests(dds_entity_t requests, dds_entity_t replies) : ends(requests, replies) {}
+    ReplyEnds ends;
+    ros2::FairQueue<SamplePointer> queue;
+  };
+
+  void hand_over(const ddsi_serdata& data, dds_instance_handle_t writer) {
+    ros2::Sample sample = as_sample(&data);
     sample.sender = writer;
     handler_(sample);
   }
-  void answer_early() {
-    while (early_) {
-      const EarlyRequests::Ready ready = early_->next(EarlyRequests::Clock::now());
-      if (!ready.request) return;
-      hand_over(ready.request, ready.writer);
-      ddsi_serdata_unref(ready.request);
+  void answer() {
+    for (int i = 0; i < kMostTaken; ++i) {
+      const auto now = ReplyEnds::Clock::now();
+      const auto request = requests_->queue.next(
+          now, [&](uint64_t writer) { return requests_->ends.may_answer(writer, now); });
+      if (!request) return;
+      hand_over(*request->second, request->first);
     }
   }
   void tell_incompatible() {
@@ -296,7 +311,7 @@ class CycloneReader : public ros2::Reader {
   dds_entity_t waitset_, topic_ = 0, reader_ = 0;
   std::string name_;
   ros2::Transport::Handler handler_;
-  std::unique_ptr<EarlyRequests> early_;  // of requests
+  std::unique_ptr<WaitingRequests> requests_;  // null: a topic
   bool told_ = false;
 };
 

@@ -210,16 +210,23 @@ void Node::receive_pose(const std::string& robot, const std::string& topic, cons
     return count_faulty(topic, "pose in the frame map", sample.cdr.size());
   std::vector<uint8_t> body(static_cast<size_t>(pose.getEncodedSize()));
   pose.encode(body.data(), 0, static_cast<int>(body.size()));
-  requests_.ask(sample.sender, request_t::SET_POSE, std::move(body), [topic](const reply_t& reply) {
-    if (reply.code != reply_t::OK) spdlog::warn("ROS 2: {}: {}", topic, reply.text);
-  });
+  requests_.ask(sample.sender, request_t::SET_POSE, std::move(body),
+                [this, topic](const reply_t& reply) {
+                  if (reply.code != reply_t::OK && may_warn())
+                    spdlog::warn("ROS 2: {}: {}", topic, reply.text);
+                });
+}
+
+bool Node::may_warn() {
+  const int64_t now = std::chrono::steady_clock::now().time_since_epoch().count();
+  int64_t last = last_warning_ns_;
+  if (now < last + 1'000'000'000 && last != 0) return false;
+  return last_warning_ns_.compare_exchange_strong(last, now);
 }
 
 void Node::count_faulty(const std::string& topic, const std::string& type, size_t size) {
   const uint64_t faulty = ++faulty_;
-  const int64_t now = std::chrono::steady_clock::now().time_since_epoch().count();
-  if (now < last_warning_ns_ + 1'000'000'000 && last_warning_ns_ != 0) return;
-  last_warning_ns_ = now;
+  if (!may_warn()) return;
   spdlog::warn(
       "ROS 2: {} got {} bytes that are no {} for this robot: ignored ({} such messages so far)",
       topic, size, type, faulty);

@@ -2,7 +2,11 @@
 
 import itertools
 import math
+import os
 import random
+import subprocess
+import sys
+import threading
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -131,6 +135,77 @@ def test_who_asks_much_keeps_nobody_waiting(hears):
         assert honest.call("get_entities", filters("^p3at$")).entities == ["p3at"]
         run.end()
     assert run.process.returncode == 0
+
+
+FLOOD = """
+import itertools, sys
+from conftest import wait_for
+from simulation_types import SERVICES
+from test_services import Client
+
+hostile = Client(int(sys.argv[1]))
+question, answer = SERVICES[sys.argv[2]]
+calls = hostile.peer.writer(f"/{sys.argv[2]}Request", question, prefix="rq")
+wait_for(calls.get_matched_subscriptions, "a reader")
+if sys.argv[3] == "hears":
+    hostile.peer.reader(f"/{sys.argv[2]}Reply", answer, prefix="rr")
+for i in itertools.count(1):
+    calls.write(question(hostile.mark + 1, i, *sys.argv[4:]))
+    if i % 1000 == 0:
+        print(i, flush=True)
+"""
+
+
+class Flood:
+    """Calls without end, in a process of its own; `sent` is how many so far."""
+
+    def __init__(self, domain: int, *arguments: str):
+        self.sent = 0
+        self.process = subprocess.Popen(
+            [sys.executable, "-c", FLOOD, str(domain), *arguments],
+            env={**os.environ, "PYTHONPATH": str(Path(__file__).resolve().parent)},
+            stdout=subprocess.PIPE,
+            text=True,
+        )
+        self.thread = threading.Thread(target=self.count)
+        self.thread.start()
+
+    def count(self):
+        for line in self.process.stdout:
+            self.sent = int(line)
+
+    def goes_on(self):
+        before = self.sent
+        wait_for(lambda: self.sent > before + 1000, "more calls")
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        self.process.kill()
+        self.process.wait()
+        self.thread.join()
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [("get_entity_state", "deaf", "p3at"), ("get_simulation_state", "hears")],
+    ids=["deaf", "hears"],
+)
+def test_a_flood_of_calls_keeps_nobody_waiting(arguments):
+    with Run("--no-noise") as run:
+        known = Client(run.domain)
+        assert known.call("get_entity_state", "p3at").result.result == 1
+        with Flood(run.domain, *arguments) as flood:
+            for client in (known, Client(run.domain)):
+                flood.goes_on()
+                for _ in range(5):
+                    assert client.call("get_entity_state", "p3at").result.result == 1
+                assert client.call("get_simulation_state").state == 1
+                flood.goes_on()
+        output = run.end()
+    assert run.process.returncode == 0
+    assert "too large or too many, and ignored" in output
 
 
 def test_a_message_of_64_mb_is_not_looked_at():

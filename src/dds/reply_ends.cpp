@@ -1,10 +1,8 @@
-#include "dds/early_requests.h"
+#include "dds/reply_ends.h"
 
 #include <algorithm>
 #include <memory>
 #include <vector>
-
-#include <dds/ddsi/ddsi_serdata.h>
 
 namespace ruedo::dds {
 namespace {
@@ -46,11 +44,7 @@ size_t count_of(const Participant& whose, dds_entity_t entity, List list, Data d
 
 }  // namespace
 
-EarlyRequests::~EarlyRequests() {
-  for (const Kept& kept : kept_) ddsi_serdata_unref(kept.what.request);
-}
-
-size_t EarlyRequests::missing(const Participant& whose) const {
+size_t ReplyEnds::missing(const Participant& whose) const {
   const size_t writers =
       count_of(whose, requests_, dds_get_matched_publications, dds_get_matched_publication_data);
   const size_t readers =
@@ -58,7 +52,7 @@ size_t EarlyRequests::missing(const Participant& whose) const {
   return writers > readers ? writers - readers : 0;
 }
 
-bool EarlyRequests::hears(dds_instance_handle_t writer) {
+bool ReplyEnds::hears(dds_instance_handle_t writer) {
   dds_subscription_matched_status_t clients{};
   dds_publication_matched_status_t replies{};
   dds_get_subscription_matched_status(requests_, &clients);
@@ -72,7 +66,7 @@ bool EarlyRequests::hears(dds_instance_handle_t writer) {
   return known->second;
 }
 
-bool EarlyRequests::look(dds_instance_handle_t writer) {
+bool ReplyEnds::look(dds_instance_handle_t writer) {
   const Endpoint end = writer_of(requests_, writer);
   if (!end) return true;  // it has gone
   const Participant whose = participant_of(end);
@@ -83,7 +77,7 @@ bool EarlyRequests::look(dds_instance_handle_t writer) {
   return true;
 }
 
-void EarlyRequests::give_up(dds_instance_handle_t writer) {
+void ReplyEnds::give_up(dds_instance_handle_t writer) {
   const Endpoint end = writer_of(requests_, writer);
   if (!end) return;
   if (deaf_.size() >= kMostDeaf) deaf_.clear();
@@ -92,27 +86,16 @@ void EarlyRequests::give_up(dds_instance_handle_t writer) {
   hears_.clear();
 }
 
-bool EarlyRequests::keep(ddsi_serdata* request, dds_instance_handle_t writer,
-                         Clock::time_point now) {
-  const auto own = static_cast<size_t>(std::count_if(
-      kept_.begin(), kept_.end(), [&](const Kept& kept) { return kept.what.writer == writer; }));
-  if (kept_.size() >= kMost || own >= kMostOfOne) return false;
-  if (own == 0 && hears(writer)) return false;  // behind one that is kept, all of its writer are
-  kept_.push_back({{ddsi_serdata_ref(request), writer}, now + kLongest});
-  return true;
-}
-
-EarlyRequests::Ready EarlyRequests::next(Clock::time_point now) {
-  for (auto each = kept_.begin(); each != kept_.end(); ++each) {
-    const Ready ready = each->what;
-    if (!hears(ready.writer)) {
-      if (now < each->until) continue;
-      give_up(ready.writer);
-    }
-    kept_.erase(each);
-    return ready;
+bool ReplyEnds::may_answer(dds_instance_handle_t writer, Clock::time_point now) {
+  if (hears(writer)) {
+    until_.erase(writer);
+    return true;
   }
-  return {};
+  const auto [until, fresh] = until_.try_emplace(writer, now + kLongest);
+  if (now < until->second) return false;
+  until_.erase(until);
+  give_up(writer);
+  return true;
 }
 
 }  // namespace ruedo::dds
