@@ -28,7 +28,7 @@ constexpr auto kLongestSleep = std::chrono::milliseconds(100);  // Ctrl-C is see
 volatile std::sig_atomic_t interrupted = 0;
 
 struct PlayArguments {
-  std::string log, speed = "1", lcm, view, html;
+  std::string log, speed = "1", lcm, view, html, other;
   double html_size = 20.0;
   bool viewed = false, sandboxed = false;
 };
@@ -53,14 +53,14 @@ int view(const PlayArguments& arguments, double speed) {
   if (!arguments.lcm.empty())
     throw InputError(
         {}, "--lcm goes not with --view: the page shows the log, and nothing is published");
-  const auto serving = view_log(arguments.log, arguments.view, speed);
+  const auto serving = view_log(arguments.log, arguments.view, speed, arguments.other);
   while (!interrupted) std::this_thread::sleep_for(kLongestSleep);
   return kGood;
 }
 
 int play(const PlayArguments& arguments) {
   load_given_plugins();
-  if (arguments.sandboxed) enter_sandbox(arguments.log, {arguments.html});
+  if (arguments.sandboxed) enter_sandbox(arguments.log, {arguments.html}, arguments.other);
   const double speed = parse_rate(arguments.speed);
   std::signal(SIGINT, [](int) { interrupted = 1; });
   std::signal(SIGTERM, [](int) { interrupted = 1; });
@@ -107,6 +107,10 @@ void add_play(CLI::App& app, Action& chosen) {
   command->add_option("--html", arguments->html, "write it as a page that needs no server instead")
       ->type_name("FILE")
       ->excludes(view);
+  CLI::Option* compare =
+      command->add_option("--compare", arguments->other,
+                          "show that log beside it in the web console: ghosts, differences");
+  compare->type_name("LOG")->excludes("--html");
   command
       ->add_option("--html-size", arguments->html_size,
                    "at most so large: messages are thinned to fit")
@@ -120,8 +124,8 @@ void add_play(CLI::App& app, Action& chosen) {
       ->type_name("URL");
   add_plugin_argument(*command);
   add_sandbox_argument(*command, arguments->sandboxed);
-  command->callback([arguments, view, &chosen] {
-    arguments->viewed = view->count() > 0;
+  command->callback([arguments, view, compare, &chosen] {
+    arguments->viewed = view->count() > 0 || compare->count() > 0;
     chosen = [arguments] { return play(*arguments); };
   });
 }

@@ -39,13 +39,19 @@ std::string own_folder() {
 
 }  // namespace
 
-void enter_sandbox(const std::string& file, const std::vector<std::string>& written) {
+void enter_sandbox(const std::string& file, const std::vector<std::string>& written,
+                   const std::string& other) {
   if (const std::string missing = missing_for_sandbox(); !missing.empty())
     throw EnvironmentError("--sandbox: " + missing);
   load_late_libraries();  // they may lie where files cannot be reached any more
   Sandbox sandbox;
   sandbox.readable = model::ResourceFinder::for_strangers(file).folders();
   sandbox.readable.push_back(fs::absolute(file).parent_path().string());
+  if (!other.empty()) {
+    for (std::string& folder : model::ResourceFinder::for_strangers(other).folders())
+      sandbox.readable.push_back(std::move(folder));
+    sandbox.readable.push_back(fs::absolute(other).parent_path().string());
+  }
   for (std::string& folder : plugin_folders()) sandbox.readable.push_back(std::move(folder));
   const fs::path python = model::xacro_python();
   if (python.has_parent_path())

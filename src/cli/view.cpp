@@ -71,10 +71,12 @@ std::shared_ptr<void> RunView::open(run::Run& run, const std::string& title,
   return serving;
 }
 
-std::shared_ptr<void> view_log(const std::string& log, const std::string& address, double speed) {
+std::shared_ptr<void> view_log(const std::string& log, const std::string& address, double speed,
+                               const std::string& other) {
   const console::Address where = console::parse_address(address);
   auto source = std::make_unique<console::LogSource>(
-      log, [&](const log_header_t& header) { return load_run(header, log); }, speed);
+      log, [&](const log_header_t& header) { return load_run(header, log); }, speed, other,
+      [&](const log_header_t& header) { return load_run(header, other); });
   const std::string fault = source->fault();
   auto serving = std::make_shared<console::Console>(where, std::move(source), "log",
                                                     std::filesystem::path(log).filename().string());
@@ -129,7 +131,9 @@ std::shared_ptr<void> RunView::open(run::Run&, const std::string&, const std::st
   return nullptr;
 }
 
-std::shared_ptr<void> view_log(const std::string&, const std::string&, double) { no_console(); }
+std::shared_ptr<void> view_log(const std::string&, const std::string&, double, const std::string&) {
+  no_console();
+}
 
 void write_page(const std::string&, const std::string&, double) { no_console(); }
 

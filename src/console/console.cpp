@@ -190,6 +190,7 @@ Console::Console(const Address& address, std::unique_ptr<Source> source, const s
   json.member("info", impl.stage.source->info_channel())
       .member("fault", printable(impl.stage.source->fault()))
       .member("save", printable(impl.stage.source->save_name()))
+      .member("compared", printable(impl.stage.source->compared()))
       .close('}')
       .close('}');
   impl.stage.greeting = json.text();

@@ -36,7 +36,8 @@ std::optional<double> number_at(std::span<const uint8_t> message, const std::str
 
 }  // namespace
 
-LogSource::LogSource(const std::string& path, const run::LoadRun& load, double speed)
+LogSource::LogSource(const std::string& path, const run::LoadRun& load, double speed,
+                     const std::string& other, const run::LoadRun& load_other)
     : index_(path),
       worlds_(index_, load),
       scan_(index_, worlds_.at(index_.begin_us()).world.get()),
@@ -53,12 +54,19 @@ LogSource::LogSource(const std::string& path, const run::LoadRun& load, double s
   }
   makes_info_ = info_channel_.empty();
   if (makes_info_) info_channel_ = "ruedo/info";
+  if (!other.empty())
+    comparison_ = std::make_unique<Comparison>(path, index_, worlds_, other, load_other);
 }
 
 std::string LogSource::fault() const {
   const std::string log =
       index_.fault().empty() ? "" : "The log is not whole: " + index_.fault() + ".";
-  return log + (log.empty() || worlds_.fault().empty() ? "" : " ") + worlds_.fault();
+  const std::string other = comparison_ ? comparison_->fault() : "";
+  std::string all;
+  for (const std::string& each : {log, worlds_.fault(), other}) {
+    if (!each.empty()) all += (all.empty() ? "" : " ") + each;
+  }
+  return all;
 }
 
 SimTime LogSource::now_us() const {
@@ -70,6 +78,7 @@ void LogSource::pump(Board& board, bool viewers) {
   if (board.channels().empty()) {
     for (size_t i = 0; i < index_.channels().size(); ++i) board.name(i, index_.channels()[i].name);
     if (makes_info_) board.name(index_.channels().size(), info_channel_);
+    if (comparison_) board.name(compared_channel(), Comparison::kStates);
   }
   if (viewers && !scanned_) scanned_ = scan_.advance(reader_, kScanned);
   const auto now = std::chrono::steady_clock::now();
@@ -102,6 +111,15 @@ void LogSource::show(Board& board) {
     told_ = scene_;
     for (const auto& part : scene_->info) board.put(channels.size(), part);
   }
+  if (comparison_) show_other(board);
+}
+
+void LogSource::show_other(Board& board) {
+  const size_t channel = compared_channel();
+  if (board.channels()[channel].watchers == 0)
+    comparison_->forget();
+  else
+    comparison_->show(board, channel, now_us());
 }
 
 // The newest of so many messages; of one that comes in parts, the parts before it, too.
@@ -125,6 +143,9 @@ bool LogSource::read(size_t channel, size_t entry) {
 
 // The first message and the last one are always among those that are read.
 Bytes LogSource::history(const std::string& name, const std::string& field) {
+  const std::string_view apart = Comparison::kApart;
+  if (comparison_ && name.starts_with(apart))
+    return comparison_->apart(name.substr(apart.size()), field);
   const auto& channels = index_.channels();
   const auto found = std::find_if(
       channels.begin(), channels.end(),

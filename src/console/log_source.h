@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "console/comparison.h"
 #include "console/source.h"
 #include "log/index.h"
 #include "run/log_worlds.h"
@@ -21,7 +22,9 @@ class LogSource : public Source {
   static constexpr uint32_t kMostMessage = 64u << 20;  // bytes; a larger one is not shown
 
   // Throws InputError for what is no log. speed: log time per real time.
-  LogSource(const std::string& path, const run::LoadRun& load, double speed);
+  // other: a log that is compared with it; "" for none. It is loaded by load_other.
+  LogSource(const std::string& path, const run::LoadRun& load, double speed,
+            const std::string& other = "", const run::LoadRun& load_other = {});
 
   void pump(Board& board, bool viewers) override;
   Count traffic(size_t channel) const override;
@@ -31,6 +34,8 @@ class LogSource : public Source {
   std::string info_channel() const override { return info_channel_; }
   Bytes history(const std::string& channel, const std::string& field) override;
   const Events* events() const override { return scanned_ ? &scan_.events() : nullptr; }
+  std::string compared() const override { return comparison_ ? comparison_->name() : ""; }
+  std::string comparison() const override { return comparison_ ? comparison_->report() : ""; }
   const Playback* playback() const override { return &playback_; }
   void play(bool on, double speed) override;
   void seek(Board& board, double time_s) override;
@@ -40,7 +45,10 @@ class LogSource : public Source {
   static constexpr size_t kNothing = static_cast<size_t>(-1);
 
   SimTime now_us() const;
+  // Behind those of the log, and the info that it may not have.
+  size_t compared_channel() const { return index_.channels().size() + (makes_info_ ? 1 : 0); }
   void show(Board& board);
+  void show_other(Board& board);
   void load(Board& board, size_t channel, size_t count);
   bool read(size_t channel, size_t entry);
 
@@ -56,6 +64,7 @@ class LogSource : public Source {
   const run::LogWorlds::Scene* told_ = nullptr;  // whose info is on the board
   std::vector<size_t>
       shown_;  // of each channel, how many messages there were when one was put on the board
+  std::unique_ptr<Comparison> comparison_;  // null: with none
   Playback playback_;
   std::chrono::steady_clock::time_point last_;
 };

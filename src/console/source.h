@@ -65,6 +65,11 @@ class Source {
   // What happened; null: not known yet.
   virtual const Events* events() const { return nullptr; }
 
+  // Of a log beside which another one is shown: its name, and what differs as JSON; "" for none,
+  // and while it is not known.
+  virtual std::string compared() const { return {}; }
+  virtual std::string comparison() const { return {}; }
+
   // Of logs.
   virtual const Playback* playback() const { return nullptr; }
   virtual void play(bool on, double speed) { static_cast<void>(on), static_cast<void>(speed); }

@@ -162,6 +162,11 @@ bool Viewer::next_text(std::string& text) {
     text = json.text();
     return true;
   }
+  if (!compared_) {
+    text = stage_.source->comparison();
+    compared_ = !text.empty();
+    if (compared_) return true;
+  }
   const auto& channels = stage_.board.channels();
   if (told_channels_ < channels.size()) {
     JsonWriter json;

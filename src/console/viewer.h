@@ -71,6 +71,7 @@ class Viewer : public Connection {
   uint64_t told_world_ = 0, told_playback_ = 0;
   size_t told_events_ = 0;                 // of the list's
   uint64_t told_generation_ = UINT64_MAX;  // whose list that is
+  bool compared_ = false;                  // was told what differs
   bool greeted_ = false, parted_ = false, traffic_ = false;
   std::string note_;  // to say next
   int unseen_ = 0;

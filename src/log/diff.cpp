@@ -223,13 +223,13 @@ bool Diff::same() const {
 }
 
 Diff diff_logs(const std::string& golden_path, const std::string& other_path,
-               const std::vector<DiffRule>& rules) {
+               const std::vector<DiffRule>& rules, const std::function<bool()>& goes_on) {
   Diff diff;
   Comparison comparison(diff, rules);
   Stamps golden(golden_path), other(other_path);
   std::vector<uint8_t> golden_header, other_header;
 
-  while (golden.more() || other.more()) {
+  while ((golden.more() || other.more()) && (!goes_on || goes_on())) {
     const bool take_golden = golden.more() && (!other.more() || golden.time() <= other.time());
     const bool take_other = other.more() && (!golden.more() || other.time() <= golden.time());
     auto golden_events = take_golden ? golden.take() : decltype(golden.take()){};

@@ -5,6 +5,7 @@
 // compared.
 #pragma once
 
+#include <functional>
 #include <map>
 #include <string>
 #include <string_view>
@@ -58,9 +59,10 @@ struct Diff {
   bool same() const;
 };
 
-// Throws InputError when one of them is not a log.
+// Throws InputError when one of them is not a log. goes_on: asked now and then; where it says no,
+// what was found so far is returned.
 Diff diff_logs(const std::string& golden, const std::string& other,
-               const std::vector<DiffRule>& rules);
+               const std::vector<DiffRule>& rules, const std::function<bool()>& goes_on = {});
 
 std::string diff_text(const Diff& diff);   // for a terminal
 std::string diff_junit(const Diff& diff);  // JUnit XML: one test case a channel

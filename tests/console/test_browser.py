@@ -4,6 +4,7 @@ recorded runs.
 
 import contextlib
 import json
+import math
 import re
 import shutil
 import socket
@@ -475,6 +476,62 @@ def test_what_was_placed_and_reset_is_in_the_log_too(steered, tmp_path):
     }
     with playing(log) as process:
         browse(process.url, tmp_path, "log", given)
+
+
+def test_two_runs_are_compared(tmp_path):
+    """The same world twice, at rest and driven: what differs first, where both robots are, and how
+    far apart, as LCM's own reader has it.
+    """
+    from ruedo.lcmtypes import pose_t, velocity_command_t
+
+    logs = [tmp_path / "driven.lcm", tmp_path / "rest.lcm"]
+    command = velocity_command_t()
+    command.vx, command.omega = 0.5, 0.4
+    for log in logs:
+        options = ("--record", log, "--duration", "4", "--disable", "p3at/camera")
+        with running(*options) as process:
+            driver = Socket(process.port)
+            while process.poll() is None:
+                if log == logs[0]:
+                    with contextlib.suppress(OSError):  # when it has just ended
+                        driver.command("p3at/velocity", command)
+                time.sleep(0.1)
+    stamped = [{}, {}]  # of both: {time: what is in it}
+    poses = [{}, {}]
+    for of, log in enumerate(logs):
+        for channel, time_us, data in events(log):
+            if channel != "ruedo/header":
+                stamped[of].setdefault(time_us, set()).add((channel, data))
+            if channel == "p3at/pose":
+                poses[of][time_us] = pose_t.decode(data).pos
+    first = min(
+        t for t in stamped[0].keys() | stamped[1].keys() if stamped[0].get(t) != stamped[1].get(t)
+    )
+    differing = stamped[0].get(first, set()) ^ stamped[1].get(first, set())
+    found = [list(states(log, 0)) for log in logs]
+    pairs = [(a, b) for a, b in zip(*found, strict=False) if a[0] == b[0]]
+    given = {
+        "first": first * 1e-6,
+        "channels": sorted({channel for channel, _ in differing}),
+        "time": pairs[-10][0][0],
+        "body": 0,
+        "pose": pairs[-10][0][2:4],
+        "other": pairs[-10][1][2:4],
+        "most": max(math.dist(poses[0][t], poses[1][t]) for t in poses[0].keys() & poses[1].keys()),
+    }
+    assert given["most"] > 0.3
+    with playing(logs[0], "--compare", logs[1]) as process:
+        seen = browse(process.url, tmp_path, "compare", given)
+    assert {"its ghost is where the other log has it", "compared"} <= set(seen)
+    # A log beside itself.
+    with playing(logs[1], "--compare", logs[1]) as process:
+        viewer = Socket(process.port)
+        told = {}
+        while "comparison" not in told:
+            opcode, data = viewer.receive()
+            told = json.loads(data) if opcode == 1 else told
+    assert told["comparison"]["same"] and "first" not in told["comparison"]
+    assert [robot["distance"] for robot in told["comparison"]["robots"]] == [0]
 
 
 def thousand_robots(path):

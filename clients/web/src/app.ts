@@ -9,6 +9,7 @@ import { Gizmo } from "./edit/gizmo";
 import { listenToEditing } from "./edit/keys";
 import { Outline } from "./edit/outline";
 import { loadScene, type SceneFiles } from "./scene/description";
+import { Ghosts } from "./scene/ghosts";
 import { Labels } from "./scene/labels";
 import { Measure } from "./scene/measure";
 import { Way } from "./scene/way";
@@ -25,6 +26,7 @@ import { inputOf, type World } from "./state/world";
 import { Bar } from "./ui/bar";
 import { Capture } from "./ui/capture";
 import { ChannelList } from "./ui/channels";
+import { Compared } from "./ui/compared";
 import { Drive } from "./ui/drive";
 import { h, recall, remember, say, toast } from "./ui/dom";
 import { EditPage } from "./ui/edit_page";
@@ -62,6 +64,7 @@ export class App {
     recall("detail") === "full",
   );
   readonly overlays = new OverlaySet(this.page, this.stage);
+  readonly ghosts = new Ghosts(this.page, this.stage);
   readonly clock = new Clock(this.page, (anew) => this.forgetPast(anew));
   readonly notice = new Notice(byId("notice"), this.page);
   readonly loading = new Loading<SceneFiles>({
@@ -121,12 +124,16 @@ export class App {
     (time_s) => this.seek(time_s),
     () => this.want(),
   );
+  readonly compared = new Compared(this.page, {
+    seek: (time_s) => this.seek(time_s),
+    plot: (channel, field) => this.plots.plot(channel, field, field === "distance"),
+  });
   readonly panel = new Panel(
     byId("panel"),
     this.page,
     {
       Robot: this.pages.statePage,
-      Plots: h("div", {}, this.pages.plotPage, this.plots.element),
+      Plots: h("div", {}, this.compared.element, this.pages.plotPage, this.plots.element),
       Channels: this.channels.element,
       World: this.editPage.element,
     },
@@ -252,6 +259,7 @@ export class App {
       playback: (playback) => this.onPlayback(playback),
       events: (first, events) =>
         page.set({ events: [...page.now.events.slice(0, first), ...events] }),
+      comparison: (comparison) => page.set({ comparison }),
       message: (channel, bytes) => this.router.onMessage(channel, bytes),
       traffic: (channels, messages, sizes) => this.channels.traffic(channels, messages, sizes),
       refused: (channel) =>
@@ -324,6 +332,7 @@ export class App {
     const { world: before, robot } = this.page.now,
       name = before?.robots[robot]?.name;
     this.stage.show(files);
+    this.ghosts.show(files);
     this.channels.show(world);
     const at = Math.max(
       world.robots.findIndex((r) => r.name === name),
@@ -404,6 +413,7 @@ export class App {
     this.overlays.forget();
     this.pages.forget();
     this.poses.jump();
+    this.ghosts.poses.jump();
   }
 
   // ---- what is shown
@@ -463,7 +473,10 @@ export class App {
     this.gizmo.follow();
     this.outline.follow();
     this.editPage.transform.show();
-    this.stage.frame(at, () => this.overlays.place());
+    this.stage.frame(at, () => {
+      const moved = this.ghosts.place(at);
+      return this.overlays.place() || moved;
+    });
     this.labels.follow();
     this.frames.follow(at);
     this.pages.draw();

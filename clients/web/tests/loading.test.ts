@@ -11,6 +11,7 @@ const kHello: Hello = {
   info: "ruedo/info",
   fault: "",
   save: "",
+  compared: "",
 };
 
 function info(robots: string[], more: Partial<world_info_t> = {}): world_info_t {

@@ -37,7 +37,15 @@ function worldOf(robots: string[]): World {
 function state(more: Partial<PageState> = {}): PageState {
   return {
     link: "open",
-    hello: { mode: "live", title: "", version: "", info: "ruedo/info", fault: "", save: "" },
+    hello: {
+      mode: "live",
+      title: "",
+      version: "",
+      info: "ruedo/info",
+      fault: "",
+      save: "",
+      compared: "",
+    },
     controlled: true,
     world: worldOf(["a"]),
     scene: null,
@@ -48,6 +56,7 @@ function state(more: Partial<PageState> = {}): PageState {
     playback: null,
     past: null,
     kept: { begin: 0, end: 0 },
+    comparison: null,
     events: [],
     eventKind: "",
     loop: false,
@@ -180,7 +189,15 @@ describe("wanted channels", () => {
 });
 
 it("what is said of the run", () => {
-  const log = { mode: "log", title: "", version: "", info: "", fault: "", save: "" } as const,
+  const log = {
+      mode: "log",
+      title: "",
+      version: "",
+      info: "",
+      fault: "",
+      save: "",
+      compared: "",
+    } as const,
     playback = { begin: 0, end: 1, now: 0, speed: 1, playing: true, jumps: 0 };
   expect(stateWords(state({ link: "lost" }))).toEqual(["no connection", false]);
   expect(stateWords(state({ link: "ended" }))).toEqual(["ended", false]);

@@ -31,7 +31,15 @@ describe("the time line", () => {
   it("is there for a log, and for a live run that has a past", () => {
     const playback = { begin: 1, end: 5, now: 2, speed: 1, playing: false, jumps: 0 },
       nothing = { playback: null, past: null, kept: { begin: 3, end: 3.1 } };
-    const live = { mode: "live", title: "", version: "", info: "", fault: "", save: "" } as const;
+    const live = {
+      mode: "live",
+      title: "",
+      version: "",
+      info: "",
+      fault: "",
+      save: "",
+      compared: "",
+    } as const;
     expect(shownOf({ ...nothing, hello: { ...live, mode: "log" }, playback })).toBe(playback);
     expect(shownOf({ ...nothing, hello: live })).toBeNull();
     expect(shownOf({ ...nothing, hello: live, kept: { begin: 3, end: 7 } })).toMatchObject({

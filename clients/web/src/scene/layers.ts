@@ -10,6 +10,7 @@ export const kLayers = [
   "clouds",
   "labels",
   "shapes",
+  "ghosts",
 ] as const;
 export type Layer = (typeof kLayers)[number];
 
@@ -24,6 +25,7 @@ export const kLayerColours: Record<Layer, string> = {
   clouds: "linear-gradient(90deg,#f33,#3f3,#33f)",
   labels: "var(--text)",
   shapes: "#8fd14f",
+  ghosts: "#b58cff",
 };
 
 // Those that are off until somebody wants them.

@@ -1,6 +1,7 @@
 // The page's state: what runs, what is shown of it, and how.
 import type { Hello, LinkState, Playback, RunEvent } from "../wire/link";
 import type { Past } from "../wire/rewind";
+import type { Comparison } from "./comparison";
 import type { Description } from "../scene/description";
 import { kLayers, kOffAtFirst, type Layer } from "../scene/layers";
 import type { ViewMode } from "../scene/stage";
@@ -31,6 +32,7 @@ export interface PageState {
   playback: Playback | null; // of a log
   past: Past | null; // of a live run: the earlier moment that is shown; null: the present
   kept: { begin: number; end: number }; // what can be shown of it
+  comparison: Comparison | null; // with the other log; null: none, or not known yet
   events: readonly RunEvent[]; // what happened, in the order of time
   eventKind: string; // which of them are shown; "" for all
   loop: boolean; // what plays begins anew when it has ended
@@ -52,8 +54,7 @@ export interface PageState {
 export type Page = Store<PageState>;
 
 export function makePage(): Page {
-  const layers =
-    recall("layers")?.split(",") ?? kLayers.filter((layer) => !kOffAtFirst.includes(layer));
+  const off = recall("layers-off")?.split(",") ?? kOffAtFirst;
   const tab = recall("page");
   return new Store<PageState>({
     link: "connecting",
@@ -68,11 +69,12 @@ export function makePage(): Page {
     playback: null,
     past: null,
     kept: { begin: 0, end: 0 },
+    comparison: null,
     events: [],
     eventKind: "",
     loop: false,
     marks: { begin: null, end: null },
-    layers: new Set(kLayers.filter((layer) => layers.includes(layer))),
+    layers: new Set(kLayers.filter((layer) => !off.includes(layer))),
     mode: "orbit",
     reduced: false,
     theme:

@@ -11,7 +11,7 @@ export class Poses {
   utime = 0; // us, of the newest state
   private from = new Float32Array(0);
   to = new Float32Array(0); // of the newest state
-  private known = new Uint8Array(0);
+  known = new Uint8Array(0);
   private arrived = 0;
   private interval = 33;
   private epoch = -1;

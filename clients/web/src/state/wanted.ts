@@ -1,5 +1,6 @@
 // Which channels the page needs: it asks for no others.
 import type { Layer } from "../scene/layers";
+import { kStates } from "./comparison";
 import { shownRobots, type PageState, type Tab } from "./page";
 
 const kOfPage = ["world_state_t", "tick_t", "reply_t"];
@@ -56,6 +57,7 @@ export function wantedChannels(
       wanted.add(name);
     }
   }
+  if (complete && hello.compared && layers.has("ghosts")) wanted.add(kStates);
   for (const name of opened) wanted.add(name);
   return wanted;
 }

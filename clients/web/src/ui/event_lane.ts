@@ -1,5 +1,6 @@
 // What happened, below the time line: a stroke for each event, jumps from one to the next, and the
 // part of the run that is looped.
+import { eventOf } from "../state/comparison";
 import type { Page, PageState } from "../state/page";
 import { eventAfter, eventBefore, shownOf } from "../state/time";
 import type { RunEvent } from "../wire/link";
@@ -17,6 +18,7 @@ const kColours: Record<string, string> = {
   refused: "#ff9d2e",
   fault: "#e53935",
   lost: "#8a8f98",
+  difference: "#b58cff",
 };
 const kThumb_px = 8; // of the slider, half of it: its ends stand so far from the line's
 const kNear_px = 6;
@@ -53,12 +55,14 @@ export class EventLane {
       else this.seek(this.timeAt(event.offsetX));
     });
     new ResizeObserver(() => this.draw()).observe(this.canvas);
-    page.watch(["events"], ({ events }) => this.list(events));
+    page.watch(["events", "comparison"], () => this.list(this.all));
     page.watch(["loop"], ({ loop }) => {
       this.loop.classList.toggle("on", loop);
       this.loop.setAttribute("aria-pressed", String(loop));
     });
-    page.watch(["events", "eventKind", "marks", "kept", "hello", "theme"], () => this.draw());
+    page.watch(["events", "comparison", "eventKind", "marks", "kept", "hello", "theme"], () =>
+      this.draw(),
+    );
     page.watch(["playback"], ({ playback }) => {
       if (playback?.begin !== this.drawn.begin || playback.end !== this.drawn.end) this.draw();
     });
@@ -85,14 +89,26 @@ export class EventLane {
     this.page.set({ marks: turned ? { begin: null, end: null, [which]: at } : next, loop: true });
   }
 
+  goToDifference(): void {
+    const difference = eventOf(this.page.now.comparison);
+    if (difference) this.goTo(difference);
+  }
+
   private goTo(event: RunEvent): void {
     say(this.text, wordsOf(event));
     this.seek(event.t);
   }
 
+  // The first difference to another log is one of them.
+  private get all(): readonly RunEvent[] {
+    const { events, comparison } = this.page.now,
+      difference = eventOf(comparison);
+    return difference ? [...events, difference] : events;
+  }
+
   private get events(): readonly RunEvent[] {
-    const { events, eventKind } = this.page.now;
-    return eventKind ? events.filter(({ kind }) => kind === eventKind) : events;
+    const { eventKind } = this.page.now;
+    return eventKind ? this.all.filter(({ kind }) => kind === eventKind) : this.all;
   }
 
   private list(events: readonly RunEvent[]): void {

@@ -1,6 +1,7 @@
 // Plots of any fields of any channels, in panes: over the whole of what is known of a run, with its
 // statistics, as a table, and with a cursor that is the time line's.
 import uPlot from "uplot";
+import { isCompared } from "../state/comparison";
 import { csvOf, fieldsOf, statisticsOf, valueAt } from "../state/fields";
 import type { Page } from "../state/page";
 import { decode, typeOf } from "../wire/lcm";
@@ -305,7 +306,9 @@ export class FieldPlots {
     try {
       const panes = JSON.parse(recall("plots") ?? "[]") as [string, string][][];
       panes.forEach((pane) =>
-        pane.forEach(([channel, path], i) => this.plot(channel, path, i === 0)),
+        pane
+          .filter(([channel]) => !isCompared(channel) || this.page.now.hello?.compared)
+          .forEach(([channel, path], i) => this.plot(channel, path, i === 0)),
       );
     } catch {
       remember("plots", "[]");

@@ -30,6 +30,9 @@ export function makeLegend(place: HTMLElement, page: Page): void {
     "reduced detail",
   );
   place.append(...chips.values(), sign);
+  page.watch(["hello"], ({ hello }) => {
+    chips.get("ghosts")!.hidden = !hello?.compared;
+  });
   page.watch(["reduced"], ({ reduced }) => {
     sign.hidden = !reduced;
   });
@@ -44,6 +47,6 @@ export function makeLegend(place: HTMLElement, page: Page): void {
 function toggle(page: Page, layer: Layer): void {
   const layers = new Set(page.now.layers);
   if (!layers.delete(layer)) layers.add(layer);
-  remember("layers", [...layers].join());
+  remember("layers-off", kLayers.filter((each) => !layers.has(each)).join());
   page.set({ layers });
 }

@@ -74,7 +74,7 @@ export class Timeline {
       h("span", { class: "row tight" }, back, ahead),
       h("div", { class: "line" }, this.slider, canvas),
       h("div", { class: "times" }, this.time, text),
-      h("span", { class: "row tight" }, before, after, kinds, loop),
+      h("span", { class: "row tight" }, before, after, kinds, loop, this.difference()),
       this.speed,
       this.live,
     );
@@ -91,6 +91,21 @@ export class Timeline {
       actions.seek(to);
       actions.play(true, shown!.speed);
     });
+  }
+
+  // Where another log is shown beside this one.
+  private difference(): HTMLElement {
+    const words = "the first difference",
+      button = h(
+        "button",
+        { id: "first-difference", title: words, click: () => this.lane.goToDifference() },
+        "≠",
+      );
+    button.setAttribute("aria-label", words);
+    this.page.watch(["comparison"], ({ comparison }) => {
+      button.hidden = !comparison?.first;
+    });
+    return button;
   }
 
   private toggle(): void {

@@ -2,9 +2,10 @@
 // by itself when the connection is lost.
 
 import { valueAt } from "../state/fields";
+import type { Comparison } from "../state/comparison";
 import { decode, typeOf } from "./lcm";
 
-// save: the file that SAVE writes; "" for none.
+// save: the file that SAVE writes; compared: the log beside this one; "" for none.
 export interface Hello {
   mode: "live" | "log";
   title: string;
@@ -12,6 +13,7 @@ export interface Hello {
   info: string;
   fault: string;
   save: string;
+  compared: string;
 }
 export interface Playback {
   begin: number;
@@ -37,6 +39,8 @@ export interface LinkHandler {
   playback(playback: Playback): void;
   // What happened, from the event of that number on; from 0 on: earlier ones hold no more.
   events(first: number, events: RunEvent[]): void;
+  // What differs from the other log.
+  comparison(comparison: Comparison): void;
   message(channel: string, bytes: Uint8Array): void;
   traffic(channels: string[], messages: Uint32Array, sizes: Uint32Array): void;
   refused(channel: string): void;
@@ -203,6 +207,7 @@ export class Link implements RunLink {
       first?: number;
       channels?: string[];
       events?: RunEvent[];
+      comparison?: Comparison;
       ended?: string;
       refused?: string;
     };
@@ -214,6 +219,7 @@ export class Link implements RunLink {
         this.channels[said.first! + i] = name;
       });
     if (said.events) this.handler.events(said.first!, said.events);
+    if (said.comparison) this.handler.comparison(said.comparison);
     if (said.refused !== undefined) this.handler.refused(said.refused);
     if (said.ended !== undefined) {
       this.over = true;

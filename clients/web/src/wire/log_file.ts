@@ -126,6 +126,7 @@ export class LogFile implements RunLink {
       info: this.head.info,
       fault: this.note,
       save: "",
+      compared: "",
     };
     this.last_ms = performance.now();
     setTimeout(() => {

@@ -85,6 +85,7 @@ export class Rewind implements RunLink {
       scene: () => handler.scene(),
       playback: (playback) => handler.playback(playback),
       events: (first, events) => handler.events(first, events),
+      comparison: (comparison) => handler.comparison(comparison),
       message: (channel, bytes) => this.onMessage(channel, bytes),
       traffic: (channels, messages, sizes) => handler.traffic(channels, messages, sizes),
       refused: (channel) => handler.refused(channel),

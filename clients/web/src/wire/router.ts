@@ -1,5 +1,6 @@
 // Messages to those who show them. Which type a channel has is told by ruedo/info.
 import type { device_info_t, Messages } from "../../generated/messages";
+import { isCompared } from "../state/comparison";
 import type { Loading } from "../state/loading";
 import { pointsOfDepth, pointsOfLidar } from "../scene/clouds";
 import { isDepth } from "../state/wanted";
@@ -7,6 +8,7 @@ import { channelOfType, type World } from "../state/world";
 import type { Clock } from "../state/clock";
 import type { Page } from "../state/page";
 import type { Poses } from "../state/poses";
+import type { Ghosts } from "../scene/ghosts";
 import type { OverlaySet } from "../scene/overlay_set";
 import type { Stage } from "../scene/stage";
 import type { ChannelList } from "../ui/channels";
@@ -42,6 +44,7 @@ export interface Views {
   clock: Clock;
   stage: Stage;
   overlays: OverlaySet;
+  ghosts: Ghosts;
   pages: RobotPages;
   channels: ChannelList;
   inset: Inset;
@@ -63,6 +66,7 @@ export class Router {
 
   onMessage(channel: string, bytes: Uint8Array): void {
     this.views.channels.message(channel, bytes);
+    if (isCompared(channel)) return this.ofOther(bytes);
     const route = this.routes.get(channel),
       type = route?.type ?? typeOf(bytes);
     if (!type) return;
@@ -71,6 +75,12 @@ export class Router {
     } catch (error) {
       console.warn(`${channel}: ${(error as Error).message}`);
     }
+  }
+
+  // Where the other run's bodies are.
+  private ofOther(bytes: Uint8Array): void {
+    if (typeOf(bytes) === "world_state_t" && this.views.loading.complete)
+      this.views.ghosts.poses.add(decode("world_state_t", bytes), performance.now());
   }
 
   private dispatch(

@@ -1,0 +1,87 @@
+// Another run beside the one that is shown: where its bodies are at each moment, how far apart
+// robots are, and what differs first.
+//
+// Both are compared in a thread of its own, for a long log takes a while; all else is the console
+// thread's.
+#pragma once
+
+#include <atomic>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "console/board.h"
+#include "log/index.h"
+#include "run/log_worlds.h"
+
+namespace ruedo::console {
+
+class Comparison {
+ public:
+  // What it adds to the channels of the log that is shown.
+  static constexpr const char* kStates = "compared/ruedo/world";  // the other run's world_state_t
+  static constexpr const char* kApart = "compared/";  // ROBOT: with fields "distance" and "angle"
+
+  // Throws InputError for what is no log. index, worlds: of the log that is shown; they must
+  // outlive it.
+  Comparison(const std::string& log, const log::Index& index, const run::LogWorlds& worlds,
+             const std::string& other, const run::LoadRun& load);
+  ~Comparison();
+  Comparison(const Comparison&) = delete;
+  Comparison& operator=(const Comparison&) = delete;
+
+  // The other run's file name.
+  const std::string& name() const { return name_; }
+  // "" or what of the other run cannot be shown.
+  std::string fault() const;
+
+  // Puts the other run's state of that moment on the board, where it is another one than before.
+  void show(Board& board, size_t channel, SimTime time_us);
+  void forget() { shown_ = kNothing; }  // what is on the board: it is put there again
+
+  // Of a robot: time in s and distance in m, or angle in rad, between its pose in the log and that
+  // in the other run; null where not both have such a robot.
+  Bytes apart(const std::string& robot, const std::string& field);
+
+  // {"comparison": ...}; "" while it is not known.
+  std::string report() const;
+
+ private:
+  static constexpr size_t kNothing = static_cast<size_t>(-1);
+  struct Sample {
+    double time_s, distance_m, angle_rad;
+  };
+  struct Robot {
+    std::string name;
+    size_t shown, other;  // channels of their pose_t
+  };
+
+  void find_robots();
+  std::vector<Sample> samples(const Robot& robot, size_t most) const;
+  void write_report();
+  const std::vector<int32_t>& matched(const run::LogWorlds::Scene& shown,
+                                      const run::LogWorlds::Scene& other);
+
+  std::string log_, path_, name_;
+  const log::Index& index_;
+  const run::LogWorlds& worlds_;
+  log::Index other_;
+  run::LogWorlds other_worlds_;
+  log::Reader reader_;
+  log::Event event_;
+  std::optional<size_t> states_;  // the other run's channel of world_state_t
+  size_t shown_ = kNothing;       // how many of them there were when one was put on the board
+  const run::LogWorlds::Scene *matched_shown_ = nullptr, *matched_other_ = nullptr;
+  std::vector<int32_t> matched_;  // of each body of the other run, its index in the log's; -1: none
+  std::vector<Robot> robots_;     // of both
+  std::vector<std::string> missing_, extra_;  // robots of the one, and of the other
+
+  std::atomic<bool> ending_{false};
+  mutable std::mutex mutex_;
+  std::string report_;  // guarded
+  std::thread thread_;  // last: it uses all of the above
+};
+
+}  // namespace ruedo::console
