@@ -11,6 +11,7 @@ from contextlib import contextmanager
 from typing import Any
 
 from .transport import Transport
+from .unix_transport import UnixTransport
 
 Handler = Callable[[bytes], None]
 log = logging.getLogger("ruedo")
@@ -66,8 +67,10 @@ class Bus:
 
     def __init__(self, transport: Transport):
         self._transport = transport
+        self.loses_nothing = isinstance(transport, UnixTransport)
         self._closed = threading.Event()
         self._handlers: dict[str, tuple[Subscription, ...]] = {}
+        self._collectors: dict[str, Callable[[tuple[str, bytes]], object]] = {}
         self._lock = threading.Lock()
         self._turn = threading.Lock()  # to receive
         self._lent_until = 0.0  # until then the thread leaves it to who has received last
@@ -82,9 +85,23 @@ class Bus:
         with self._lock:
             others = self._handlers.get(channel, ())
             self._handlers[channel] = (*others, subscription)
-            if not others:
+            if not others and channel not in self._collectors:
                 self._transport.subscribe(channel)
         return subscription
+
+    def collect(self, channel: str, collector: Callable[[tuple[str, bytes]], object]) -> None:
+        """Every message of the channel goes to a collector, too, with its channel: at most one, and
+        one that raises nothing. For who takes all there is."""
+        with self._lock:
+            others = channel in self._handlers or channel in self._collectors
+            self._collectors[channel] = collector
+            if not others:
+                self._transport.subscribe(channel)
+
+    def collect_no_more(self, channel: str) -> None:
+        with self._lock:
+            if self._collectors.pop(channel, None) and channel not in self._handlers:
+                self._transport.unsubscribe(channel)
 
     def publish(self, channel: str, data: bytes) -> None:
         if not self._closed.is_set():
@@ -104,11 +121,17 @@ class Bus:
                 self._handlers[channel] = others
             elif before:
                 del self._handlers[channel]
-                self._transport.unsubscribe(channel)
+                if channel not in self._collectors:
+                    self._transport.unsubscribe(channel)
 
-    def _dispatch(self, channel: str, data: bytes) -> None:
-        for subscription in self._handlers.get(channel, ()):
-            subscription._call(data)
+    def _dispatch(self, arrived: list[tuple[str, bytes]]) -> None:
+        for one in arrived:
+            channel, data = one
+            collector = self._collectors.get(channel)
+            if collector is not None:
+                collector(one)
+            for subscription in self._handlers.get(channel, ()):
+                subscription._call(data)
 
     @contextmanager
     def receiving(self) -> Iterator[Callable[[float], bool]]:

@@ -14,7 +14,6 @@ import zlib
 from collections import deque
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import partial
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
 import numpy as np
@@ -25,15 +24,15 @@ from .errors import LeaseLost, NoServer, RequestError, RuedoError, Timeout, Type
 from .stream import Stream
 
 if TYPE_CHECKING:
-    from .bus import Subscription
     from .simulation import Simulation
 
 T = TypeVar("T")
 
-_FIRST_REPEAT, _LAST_REPEAT = 0.005, 0.1  # s
+_FIRST_REPEAT, _LAST_REPEAT = 0.005, 0.1  # s; where nothing is lost, the last from the beginning
 _ACKNOWLEDGED_TOGETHER = 32  # steps
 _MOST_WANTED = 256  # messages asked for at once
 _MOST_EARLY = 512  # messages of one channel that wait for their ticks
+_MOST_FRESH = 16384  # messages of all channels since the last tick
 _MOST_AHEAD = 1024  # steps beyond what is here: no server is that far
 _LONGEST = 2**63 - 1
 
@@ -143,6 +142,13 @@ class _Step:
     def complete(self) -> bool:
         return not self.missing and len(self.parts) == self.nparts
 
+    def messages(self, number: int, names: list[str]) -> list[Message]:
+        entries = (entry for part in range(self.nparts) for entry in self.parts[part])
+        return [
+            Message(number, names[e.channel] if e.channel < len(names) else "", e.data)
+            for e in entries
+        ]
+
 
 class Stepper:
     """Called with the simulation's turn: one step() at a time."""
@@ -151,7 +157,7 @@ class Stepper:
         self._sim = sim
         self._part = False  # takes part
         self._info: Any = None  # whose channels are subscribed
-        self._sources: dict[int, tuple[str, Subscription]] = {}  # of each channel
+        self._indices: dict[str, int] = {}  # of the channels that are subscribed
         self._run_id = self._epoch = 0
         self._granted, self._have = 0, -1  # all of the states up to _have are here
         self._acknowledged = self._newest = -1
@@ -163,7 +169,13 @@ class Stepper:
         )  # the one under way: sequence, from, body
         self._taken = True
         self._resends = 0
-        self._steps: dict[int, _Step] = {}  # those not collected yet
+        # Mostly all comes once and in order: a step's messages, then its tick. Then they are a step
+        # as they are; only when something is lost, twice or late, each is put into its place.
+        self._fresh: deque[tuple[str, bytes]] = deque(maxlen=_MOST_FRESH)  # since the last tick
+        self._steps: dict[int, _Step] = {}  # those of which something is missing, and later ones
+        self._names: list[str] = []  # of the channels
+        # Utime, number, hash and messages of the steps up to _have that were not collected yet.
+        self._whole: list[tuple[int, int, int, list[Message] | _Step]] = []
         self._early: dict[
             int, deque[tuple[int, int, int, bytes]]
         ] = {}  # of each channel: crc, size, utime, message
@@ -238,6 +250,8 @@ class Stepper:
         self._granted, self._have, self._newest = stands.granted, stands.received, stands.step
         self._acknowledged = self._have
         self._steps.clear()
+        self._fresh.clear()
+        self._whole.clear()
         self._taken, self._fault, self._waits_for = True, None, ""
         self._part = True
 
@@ -251,16 +265,17 @@ class Stepper:
             for index, channel in enumerate(info.channel_list)
             if not channel.input and (channel.robot or channel.type == "world_state_t")
         }
-        for index, (name, source) in list(self._sources.items()):
+        for name, index in list(self._indices.items()):
             if wanted.get(index) != name:
-                source.close()
-                del self._sources[index]
+                self._sim._bus.collect_no_more(name)
+                del self._indices[name]
         for index, name in wanted.items():
             self._early.setdefault(index, deque(maxlen=_MOST_EARLY))
-            if index not in self._sources:
-                source = self._sim._bus.subscribe(name, partial(self._on_message, index))
-                self._sources[index] = (name, source)
+            if name not in self._indices:
+                self._sim._bus.collect(name, self._fresh.append)
+            self._indices[name] = index
         self._info = info
+        self._names = [channel.name for channel in info.channel_list]
 
     def _grant_body(self, until: int, commands: Sequence[Command]) -> bytes:
         body = lcmtypes.grant_request_t()
@@ -279,7 +294,8 @@ class Stepper:
         grant, or the request for what is missing, goes out again, sooner at first."""
         if self._taken and self._have >= until:
             return
-        repeat, deadline = _FIRST_REPEAT, time.monotonic() + timeout
+        first = _LAST_REPEAT if self._sim._bus.loses_nothing else _FIRST_REPEAT
+        repeat, deadline = first, time.monotonic() + timeout
         with self._sim._bus.receiving() as receive:
             while True:
                 had, quiet_at = self._have, time.monotonic() + repeat
@@ -293,6 +309,8 @@ class Stepper:
                     if self._taken and self._have >= until:
                         return
                     heard = receive(max(0.0, quiet_at - time.monotonic()))
+                    if self._steps:
+                        self._sort()
                 if self._fault:
                     fault, self._fault, self._part = self._fault, None, False
                     raise fault
@@ -305,7 +323,7 @@ class Stepper:
                 elif self._have - self._acknowledged >= _ACKNOWLEDGED_TOGETHER:
                     self._ask_for_lost(self._have)  # for nothing: it says what is here
                 self._ask_now = False
-                repeat = min(2.0 * repeat, _LAST_REPEAT) if silence else _FIRST_REPEAT
+                repeat = min(2.0 * repeat, _LAST_REPEAT) if silence else first
                 if self._have > had:
                     deadline = time.monotonic() + timeout
                 elif silence:
@@ -354,24 +372,27 @@ class Stepper:
         )
 
     def _collect(self) -> Observations:
-        messages = []
-        for number in sorted(n for n in self._steps if n <= self._have):
-            step = self._steps.pop(number)
-            self._last = (step.utime, number, step.state_hash)
-            for part in range(step.nparts):
-                messages += [
-                    Message(number, self._name(e.channel), e.data) for e in step.parts[part]
-                ]
+        messages: list[Message] = []
+        for utime, number, state_hash, of_step in self._whole:
+            self._last = (utime, number, state_hash)
+            if isinstance(of_step, _Step):
+                messages += of_step.messages(number, self._names)
+            else:
+                messages += of_step
+        self._whole = []
         return observed(self._last, messages)
-
-    def _name(self, channel: int) -> str:
-        known: list[Any] = self._info.channel_list
-        return known[channel].name if channel < len(known) else ""
 
     # Putting ticks and messages together, as they come: in any order, twice, or not at all.
 
-    def _on_message(self, channel: int, data: bytes) -> None:
-        if not self._part or len(data) < 16:
+    def _sort(self) -> None:
+        """What came since the last tick, into its places."""
+        while self._fresh:
+            name, data = self._fresh.popleft()
+            if (channel := self._indices.get(name)) is not None:
+                self._place(channel, data)
+
+    def _place(self, channel: int, data: bytes) -> None:
+        if len(data) < 16:
             return
         crc, size = zlib.crc32(data), len(data)
         for step in self._steps.values():  # a tick may come before its messages
@@ -398,6 +419,8 @@ class Stepper:
         return False
 
     def on_tick(self, data: bytes) -> None:
+        if not self._part:
+            self._fresh.clear()
         if not self._part or len(data) < _TICK.size:
             return
         fingerprint, utime, run_id, epoch, number, state_hash, part, nparts = _TICK.unpack_from(
@@ -416,6 +439,13 @@ class Stepper:
             at = self._applied(data, number)
             if not 0 < number - self._have <= _MOST_AHEAD:
                 return
+            if nparts == 1 and number == self._have + 1 and not self._steps:
+                messages = self._as_they_came(data, at, number)
+                if messages is not None:
+                    self._have = number
+                    self._whole.append((utime, number, state_hash, messages))
+                    return
+            self._sort()
             step = self._steps.get(number)
             if step is None:
                 step = self._steps[number] = _Step(utime, state_hash, nparts)
@@ -447,6 +477,23 @@ class Stepper:
             at += 8
         return at
 
+    def _as_they_came(self, data: bytes, at: int, number: int) -> list[Message] | None:
+        """The messages since the last tick, when they are what this one lists."""
+        fresh = self._fresh
+        (count,) = _INT.unpack_from(data, at)
+        at += 4
+        if count != len(fresh) or at + count * _ENTRY.size != len(data):
+            return None
+        if not count:
+            return []
+        messages, indices, crc32, new = [], self._indices, zlib.crc32, tuple.__new__
+        for (name, message), (channel, _, size, crc) in zip(fresh, _ENTRY.iter_unpack(data[at:])):
+            if indices.get(name) != channel or len(message) != size or crc32(message) != crc:
+                return None
+            messages.append(new(Message, (number, name, message)))
+        fresh.clear()
+        return messages
+
     def _manifest(self, data: bytes, at: int) -> tuple[list[_Entry], int]:
         (count,) = _INT.unpack_from(data, at)
         at += 4
@@ -476,6 +523,8 @@ class Stepper:
                     early = self._early[entry.channel]
                     while early and early[0][2] <= step.utime:
                         early.popleft()
+            self._whole.append((step.utime, self._have, step.state_hash, step))
+            del self._steps[self._have]
             step = self._steps.get(self._have + 1)
 
     def on_reply(self, reply: Any) -> None:

@@ -89,6 +89,7 @@ class Simulation:
         self._known: WorldInfo | None = None
         self._fault: RuedoError | None = None
         self._utime = 0
+        self._sleepers = 0  # who wait for sim time
         self._last_sign = time.monotonic()
         self._robots: dict[str, Robot] = {}
         self._session = Session(self, name)
@@ -181,9 +182,13 @@ class Simulation:
         self._check_open()
         until = self._utime + round(seconds * 1e6)
         with self._news:
-            while self._utime < until:
-                self._news.wait(0.5)
-                self._check_server()
+            self._sleepers += 1
+            try:
+                while self._utime < until:
+                    self._news.wait(0.5)
+                    self._check_server()
+            finally:
+                self._sleepers -= 1
 
     # Control. Every call raises NotSupported where the server has no such request, RequestError
     # when it refuses.
@@ -428,10 +433,12 @@ class Simulation:
         )
 
     def _note_time(self, utime: int) -> None:
-        with self._news:
-            self._utime = max(self._utime, utime)
-            self._last_sign = time.monotonic()
-            self._news.notify_all()
+        if utime > self._utime:
+            self._utime = utime
+        self._last_sign = time.monotonic()
+        if self._sleepers:  # else a lock for each tick, of which a step() may bring hundreds
+            with self._news:
+                self._news.notify_all()
 
     def _stream(
         self, channel: Any, make: Callable[[], Stream[Any]], form: Any = None

@@ -99,8 +99,8 @@ class LcmTransport:
         except OSError:  # TCP: the server is gone; those who wait find out by their timeouts
             time.sleep(min(seconds, 0.1))
         arrived, self._arrived = self._arrived, []
-        for channel, data in arrived:
-            receiver(channel, data)
+        if arrived:
+            receiver(arrived)
         return bool(arrived)
 
     def close(self) -> None:

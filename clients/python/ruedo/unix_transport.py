@@ -16,7 +16,7 @@ import threading
 import time
 from collections.abc import Callable
 
-Receiver = Callable[[str, bytes], None]  # channel, message
+Receiver = Callable[[list[tuple[str, bytes]]], None]  # channels and messages, as they came
 
 _HELLO = struct.pack(">II", 0x287617FB, 0x0100)
 _HEAD = struct.Struct(">II")  # kind, length of the channel's name
@@ -94,8 +94,8 @@ class UnixTransport:
                 connection.close()
                 self._socket = None
             return False
-        for channel, data in arrived:
-            receiver(channel, data)
+        if arrived:
+            receiver(arrived)
         return bool(arrived)
 
     def close(self) -> None:

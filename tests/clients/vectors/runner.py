@@ -126,7 +126,7 @@ class PipeTransport:
         if not select.select([self._in], [], [], seconds)[0]:
             return False
         name, size = struct.unpack(">ii", self._read(8))
-        receiver(self._read(name).decode(), self._read(size))
+        receiver([(self._read(name).decode(), self._read(size))])
         return True
 
     def _read(self, size):
