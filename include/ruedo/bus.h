@@ -40,6 +40,15 @@ class Bus {
   // Ends listening: once it returns, the handler is not called any more.
   virtual void stop() {}
 
+  // Whether somebody may hear what is published on that channel; true where a bus does not know its
+  // listeners. Any thread, as the next.
+  virtual bool is_heard(const std::string& channel) const {
+    static_cast<void>(channel);
+    return true;
+  }
+  // Grows whenever is_heard() may say something else than before.
+  virtual uint64_t audience() const { return 0; }
+
   // Messages that could not be sent so far.
   virtual uint64_t failed() const { return 0; }
 };

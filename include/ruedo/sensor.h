@@ -137,6 +137,8 @@ struct SensorKind {
   Rate default_rate;
   bool needs_rays = false;
   bool needs_visual_rays = false;
+  // Pictures: a sample depends on no other one, for those that nobody reads are not taken. A sensor
+  // whose samples do observes().
   bool needs_renderer = false;
   std::function<std::unique_ptr<Sensor>(const SensorSetup&)> make;
   // As ruedo/info names it; empty: the module's name.

@@ -90,6 +90,13 @@ void UnixServer::publish(const std::string& channel, const uint8_t* data, size_t
   if (!clients_.empty()) add(channel, {data, size});
 }
 
+bool UnixServer::is_heard(const std::string& channel) const {
+  const std::lock_guard lock(mutex_);
+  return std::any_of(clients_.begin(), clients_.end(), [&](const Client& client) {
+    return !client.gone && client.filter.passes(channel);
+  });
+}
+
 void UnixServer::flush() {
   const std::lock_guard lock(mutex_);
   send_frames();
@@ -283,8 +290,12 @@ void UnixServer::take(Client& client, const tcpq::Frame& frame) {
     case tcpq::Frame::Kind::subscribe:
       send_frames();  // what was published before is not for it
       client.filter.subscribe(frame.channel);
+      ++audience_;
       return;
-    case tcpq::Frame::Kind::unsubscribe: client.filter.unsubscribe(frame.channel); return;
+    case tcpq::Frame::Kind::unsubscribe:
+      client.filter.unsubscribe(frame.channel);
+      ++audience_;
+      return;
     case tcpq::Frame::Kind::publish: break;
   }
   const std::string channel(frame.channel);
@@ -305,6 +316,7 @@ void UnixServer::sweep() {
     }
     held_ -= client->behind();
     client = clients_.erase(client);
+    ++audience_;
   }
 }
 

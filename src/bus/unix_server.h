@@ -46,6 +46,8 @@ class UnixServer : public Bus {
   // connections.
   void stop() override;
   uint64_t failed() const override { return failed_; }
+  bool is_heard(const std::string& channel) const override;
+  uint64_t audience() const override { return audience_; }
 
   // Counts since the start.
   uint64_t connections() const { return connections_; }
@@ -89,9 +91,9 @@ class UnixServer : public Bus {
   uint64_t inode_ = 0;
   Handler handler_;
   std::atomic<bool> stop_{false};
-  std::atomic<uint64_t> failed_{0}, connections_{0}, refused_{0};
+  std::atomic<uint64_t> failed_{0}, connections_{0}, refused_{0}, audience_{0};
 
-  std::mutex mutex_;  // of all that follows; not held while the handler runs
+  mutable std::mutex mutex_;  // of all that follows; not held while the handler runs
   std::unordered_set<std::string> channels_;  // listened to
   std::vector<uint8_t> frames_;               // published since flush()
   std::vector<Frame> index_;

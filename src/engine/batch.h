@@ -26,6 +26,9 @@ struct AppliedCommand {
 
 struct SensorFault;
 
+// By channel: whether anybody reads its messages. A channel beyond its end is read.
+using ReadChannels = std::vector<bool>;
+
 // Written by the simulation thread, then by each module into its own output, then read by the
 // publisher.
 struct Batch {
@@ -38,6 +41,9 @@ struct Batch {
 
   // Of all devices, while any is faulty or was; null: none. Those of the batch's steps are in it.
   std::shared_ptr<const std::vector<SensorFault>> sensor_faults;
+
+  // Null: everything is read. Pictures of cameras of which nothing is read are not drawn.
+  std::shared_ptr<const ReadChannels> read;
 
   struct Output {
     bool woken = false;  // false: the rest is of an earlier round

@@ -85,9 +85,9 @@ struct Engine::Copy {
   std::shared_ptr<StaticScenes> statics;
   Channels channels;
   std::unique_ptr<World> world;
-  int64_t step = -1;    // of the state that there is
-  bool driven = false;  // velocities_ has rows of it that the inbox does not have yet
-  bool scenes_made = false;
+  int64_t step = -1;              // of the state that there is
+  bool driven = false;            // velocities_ has rows of it that the inbox does not have yet
+  std::vector<bool> scenes_made;  // of each module
   std::vector<std::vector<uint8_t>> newest;  // message of each channel; empty: none yet
   struct Place {
     const Outbox* outbox;
@@ -98,6 +98,7 @@ struct Engine::Copy {
   // met them.
   std::vector<std::vector<int>> met;
 
+  void make_scenes(const ReadChannels* read);
   void keep_newest(const Batch& batch);
 };
 
@@ -119,6 +120,7 @@ Engine::Engine(std::shared_ptr<const model::WorldModel> world, EngineOptions opt
   copies_[0] = make_copy(
       world_, options_.fleet.seed);  // the first says what is wrong, and builds what all share
   first_made_ = true;
+  read_ = std::make_shared<const ReadChannels>(copies_[0]->channels.list().size(), false);
   for_each(copies_.size(), [this](size_t i) {
     if (i > 0) copies_[i] = make_copy(world_, options_.fleet.seed + i);
   });
@@ -186,11 +188,8 @@ void Engine::compute(size_t index, int64_t steps) {
   Borrowed borrowed(*arena_, world);
   Batch& batch = *borrowed;
   take_velocities(index);
-  if (!copy.scenes_made) {
-    const SceneMakers makers = world.scene_makers();
-    for (auto& module : world.modules()) module->make_scenes(makers);
-    copy.scenes_made = true;
-  }
+  batch.read = handler_ ? nullptr : read_;
+  copy.make_scenes(batch.read.get());
   auto* const touching =
       reinterpret_cast<int32_t*>(touching_->values.data()) + index * driven_.size();
   std::fill_n(touching, driven_.size(), 0);
@@ -215,6 +214,17 @@ void Engine::compute(size_t index, int64_t steps) {
     if (handler_ || state_handler_) tell(index, batch);
   }
   for (auto& observer : observers_) update(*observer, index);
+}
+
+// A renderer when the first picture is read: most copies never need one.
+void Engine::Copy::make_scenes(const ReadChannels* read) {
+  const auto& modules = world->modules();
+  scenes_made.resize(modules.size(), false);
+  for (size_t m = 0; m < modules.size(); ++m) {
+    if (scenes_made[m] || !modules[m]->needs_scenes(read)) continue;
+    modules[m]->make_scenes(world->scene_makers());
+    scenes_made[m] = true;
+  }
 }
 
 void Engine::Copy::keep_newest(const Batch& batch) {
@@ -437,6 +447,7 @@ std::shared_ptr<const FieldArray> Engine::observe(const std::string& device,
     throw InputError({}, "the messages of '" + device + "' are of a type without a description");
   auto observer =
       std::make_unique<Observer>(Observer{device, field, FieldReader(*schema, field), channels});
+  read(channels);
   const std::vector<uint8_t>& sample = copies_[0]->newest[static_cast<size_t>(channels[0])];
   if (sample.empty())
     throw InputError({}, device + "." + field + " has no sample yet: step the engine first");
@@ -453,6 +464,27 @@ std::shared_ptr<const FieldArray> Engine::observe(const std::string& device,
   observers_.push_back(std::move(observer));
   for (size_t i = 0; i < copies_.size(); ++i) update(*observers_.back(), i);
   return observers_.back()->array;
+}
+
+// From now on they are read, and so are their newest messages, which may not have been made.
+void Engine::read(const std::vector<int>& channels) {
+  auto read = std::make_shared<ReadChannels>(*read_);
+  for (const int channel : channels) (*read)[static_cast<size_t>(channel)] = true;
+  const DefaultFloatingPoint floating_point;
+  for_each(copies_.size(), [&](size_t i) {
+    copies_[i]->make_scenes(read.get());
+    for (const int channel : channels) catch_up(*copies_[i], channel);
+  });
+  read_ = std::move(read);
+}
+
+void Engine::catch_up(Copy& copy, int channel) {
+  Outbox made;
+  for (auto& module : copy.world->modules()) module->catch_up(channel, made);
+  copy.newest.resize(copy.channels.list().size());
+  for (const Outbox::Entry& entry : made.entries())
+    copy.newest[static_cast<size_t>(entry.channel)].assign(made.data(entry),
+                                                           made.data(entry) + entry.size);
 }
 
 int64_t Engine::current_step(int world) const {

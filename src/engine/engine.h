@@ -2,7 +2,8 @@
 //
 // The same code as a server's run, and the same bytes: copy i with the seed s + i, given the same
 // commands at the same steps, makes the messages of `ruedo run --lockstep --seed s+i`. What never
-// moves is shared between the copies. Not thread safe: one thread at a time.
+// moves is shared between the copies. Pictures that nobody reads, neither by observe() nor by
+// on_message(), are not drawn. Not thread safe: one thread at a time.
 #pragma once
 
 #include <atomic>
@@ -92,7 +93,8 @@ class Engine {
 
   // The array of a field, kept up to date as long as the engine lives. device: the name of one
   // ("LRF"), or of its kind
-  // ("lrf") where each robot has at most one of them. Throws InputError.
+  // ("lrf") where each robot has at most one of them. Throws InputError, and EnvironmentError where
+  // pictures cannot be drawn here.
   std::shared_ptr<const FieldArray> observe(const std::string& device, const std::string& field);
 
   // Of each copy and driven robot (int32): how many of the states of the last step() it ran into
@@ -124,6 +126,8 @@ class Engine {
   void compute(size_t world, int64_t steps);
   void tell(size_t world, const Batch& batch);
   void update(Observer& observer, size_t world);
+  void read(const std::vector<int>& channels);
+  void catch_up(Copy& copy, int channel);
   void for_each(size_t count, const std::function<void(size_t)>& body);
   std::vector<int> channels_of(const std::string& device) const;
 
@@ -145,6 +149,7 @@ class Engine {
   std::vector<double> velocities_;    // of the last drive(): see Copy::driven
   std::shared_ptr<FieldArray> touching_ = std::make_shared<FieldArray>();
   std::vector<std::unique_ptr<Observer>> observers_;
+  std::shared_ptr<const ReadChannels> read_;  // by observers; the same of each copy
   MessageHandler handler_;
   StateHandler state_handler_;
   struct Arena;

@@ -171,6 +171,7 @@ class FleetMaker {
     const std::string& robot = instance(wanted.robot).name;
     const std::string where = robot + "/" + wanted.name;
     channel_refused_ = nullptr;
+    device_channels_.clear();
     try {
       if (model::read_or_leave_out(where, "the sensor is left out", findings_,
                                    [&] { module.devices.push_back(make_device(wanted)); }))
@@ -211,8 +212,9 @@ class FleetMaker {
                             int64_t fingerprint) {
       const std::string device = suffix.empty() ? wanted.name : wanted.name + "/" + suffix;
       try {
-        return channels_.add(
-            {robot + "/" + device, "", robot, wanted.name, type, fingerprint, rate, false});
+        device_channels_.push_back(channels_.add(
+            {robot + "/" + device, "", robot, wanted.name, type, fingerprint, rate, false}));
+        return device_channels_.back();
       } catch (const InputError&) {
         channel_refused_ = std::current_exception();
         throw;
@@ -226,6 +228,7 @@ class FleetMaker {
                   options_.first_step,
                   wanted.name};
     device.visual_rays |= device.sensor->wants_visual_rays();
+    device.channels = device_channels_;
     describe(wanted, rate, *device.sensor);
     return device;
   }
@@ -296,6 +299,7 @@ class FleetMaker {
   Channels& channels_;
   Findings& findings_;
   std::exception_ptr channel_refused_;  // why the device that is made cannot have a channel
+  std::vector<int> device_channels_;    // of the device that is made
   Fleet fleet_;
   std::set<std::string> disabled_;                      // "ROBOT/DEVICE"
   std::vector<std::vector<device_info_t>> devices_of_;  // each robot

@@ -161,6 +161,7 @@ void Module::sample_with_faults(const Batch& batch, const Snapshot& snapshot, si
   if (slot.observes) device.sensor->observe(snapshot, out);
   if (slot.step == snapshot.step) {
     device.sensor->sample(input_of(slot, snapshot), out);
+    slot.passed_sample = -1;
     slot.step = device.first_step + slot.clock.step_of(++slot.sample);
   }
   if (!faulty) return;
@@ -187,9 +188,51 @@ void Module::process_piece(const Batch& batch, Outbox& outbox, int piece, int be
       if (slot.step != snapshot.step) continue;
       if (left_off.load(std::memory_order_relaxed))
         return;  // a thousand pictures may be in the batch
-      sensor.sample(input_of(slot, snapshot), outbox);
+      if (is_read(setup_.devices[k], slot, batch.read.get())) {
+        sensor.sample(input_of(slot, snapshot), outbox);
+        slot.passed_sample = -1;
+      } else {
+        pass_over(slot, snapshot);
+      }
       slot.step = setup_.devices[k].first_step + slot.clock.step_of(++slot.sample);
     }
+  }
+}
+
+// Only of pictures, whose samples do not depend on those before (SensorKind::needs_renderer).
+bool Module::is_read(const Device& device, const Slot& slot, const ReadChannels* read) const {
+  if (!setup_.wants_renderer || !read || slot.observes) return true;
+  return std::any_of(device.channels.begin(), device.channels.end(), [&](int channel) {
+    return static_cast<size_t>(channel) >= read->size() || (*read)[static_cast<size_t>(channel)];
+  });
+}
+
+bool Module::needs_scenes(const ReadChannels* read) const {
+  if (!setup_.wants_renderer) return true;
+  for (size_t k = 0; k < slots_.size(); ++k) {
+    if (is_read(setup_.devices[k], slots_[k], read)) return true;
+  }
+  return false;
+}
+
+void Module::pass_over(Slot& slot, const Snapshot& snapshot) {
+  if (!slot.passed_over) slot.passed_over = std::make_unique<Snapshot>();
+  *slot.passed_over = snapshot;
+  slot.passed_sample = slot.sample;
+}
+
+void Module::catch_up(int channel, Outbox& out) {
+  for (size_t k = 0; k < slots_.size(); ++k) {
+    Slot& slot = slots_[k];
+    const std::vector<int>& channels = setup_.devices[k].channels;
+    if (slot.passed_sample < 0 ||
+        std::find(channels.begin(), channels.end(), channel) == channels.end())
+      continue;
+    SampleInput input = input_of(slot, *slot.passed_over);
+    input.sample = slot.passed_sample;
+    out.begin_step(slot.passed_over->step);
+    setup_.devices[k].sensor->sample(input, out);
+    slot.passed_sample = -1;
   }
 }
 

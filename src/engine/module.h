@@ -48,6 +48,7 @@ struct Device {
   int robot = -1;            // index into BodyLayout::robots; -1: the simulation's
   int64_t first_step = 0;    // its samples count from the time of this one
   std::string name = {};     // as its robot's faults name it
+  std::vector<int> channels = {};
 };
 
 struct ModuleSetup {
@@ -77,6 +78,9 @@ class Module {
   // Makes its scenes, in the thread that will process batches: a renderer's context belongs to it.
   // Throws what making them threw.
   void make_scenes(const SceneMakers& makers);
+  // Whether it needs them for batches of which only that is read: one that draws pictures does when
+  // any of them is.
+  bool needs_scenes(const ReadChannels* read) const;
   bool has_scenes() const {
     return setup_.wants_rays || setup_.wants_visual_rays || setup_.wants_renderer;
   }
@@ -91,6 +95,9 @@ class Module {
   // Lets its devices observe and sample the states of a batch, and writes their messages into
   // `output`. Batches come in order; left_off: once it is true samples are no longer wanted.
   void process(const Batch& batch, Batch::Output& output, const std::atomic<bool>& left_off);
+  // Lets the device of a channel take the last sample that it passed over because nobody read it,
+  // and no later one was due; nothing when there is none.
+  void catch_up(int channel, Outbox& out);
   // Whether a sample is due before that step.
   bool is_due(int64_t before_step) const { return to_sample_.next() < before_step; }
 
@@ -121,10 +128,14 @@ class Module {
     SampleClock clock;
     int64_t sample, step;
     bool observes, visual_rays;
-    std::shared_ptr<FaultFilter> faults = {};  // made when the device is first faulty
+    std::shared_ptr<FaultFilter> faults = {};    // made when the device is first faulty
+    std::unique_ptr<Snapshot> passed_over = {};  // what the last sample would have shown
+    int64_t passed_sample = -1;                  // its number; -1: it was taken
   };
 
   Slot slot_of(const Device& device) const;
+  bool is_read(const Device& device, const Slot& slot, const ReadChannels* read) const;
+  static void pass_over(Slot& slot, const Snapshot& snapshot);
   void count_due();
   void process_pieces(const Batch& batch, Batch::Output& output, int begin, int end,
                       const std::atomic<bool>& left_off);

@@ -155,6 +155,12 @@ bool Simulation::go() {
   return true;
 }
 
+void Simulation::read_only(ReadChannels read) {
+  auto changed = std::make_shared<const ReadChannels>(std::move(read));
+  const std::lock_guard lock(read_mutex_);
+  read_ = std::move(changed);
+}
+
 void Simulation::compute(Batch& batch, int64_t first_step, int count) {
   ++round_;
   batch.first_step = first_step;
@@ -162,6 +168,10 @@ void Simulation::compute(Batch& batch, int64_t first_step, int count) {
   batch.last = count == 0;
   batch.applied_count = 0;
   batch.end.clear();
+  {
+    const std::lock_guard lock(read_mutex_);
+    batch.read = read_;
+  }
   const auto begin = std::chrono::steady_clock::now();
   computing_.store(first_step, std::memory_order_relaxed);
   try {

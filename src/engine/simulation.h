@@ -9,6 +9,7 @@
 #include <atomic>
 #include <functional>
 #include <memory>
+#include <mutex>
 #include <stdexcept>
 #include <string>
 #include <thread>
@@ -47,6 +48,9 @@ class Simulation {
   // Starts the threads. Throws EnvironmentError when a module cannot be served here. The pace must
   // outlive it.
   void start(Pace& pace);
+
+  // From the next batch on, only these channels are read (Batch::read). Any thread.
+  void read_only(ReadChannels read);
 
   // Computes the next steps in the caller's thread, the publisher's, where they are few, may be
   // computed now, and the simulation thread waits for them: waking it, and waiting for it, takes
@@ -104,6 +108,8 @@ class Simulation {
   bool started_ = false;
   std::function<void(const std::string&)> before_batch_;
   Wakeup& finished_;
+  std::mutex read_mutex_;
+  std::shared_ptr<const ReadChannels> read_;  // null: everything
   std::atomic<bool> left_off_{false};
   std::atomic<int64_t> computing_{-1};  // the first step that is being computed; -1: none
   std::vector<std::unique_ptr<ModuleThread>> threads_;  // of the world's modules, in their order

@@ -40,6 +40,8 @@ class Ticks : public Sink {
         beat_(rate, step_us),
         add_applied_(std::move(add_applied)) {}
 
+  // It lists what there is.
+  bool wants(const std::string&) const override { return false; }
   void begin_step(const Step& step) override;
   void message(const Published& message) override;
   void end_step(const Step& step) override;

@@ -1,12 +1,14 @@
 // One loop over the sinks for each kind of message.
 #include "run/publisher.h"
 
+#include <algorithm>
 #include <utility>
 
 namespace ruedo::run {
 
 void Publisher::add(Sink& sink) {
   sinks_.push_back(&sink);
+  ++changes_;
   choose_audience();
   if (announcement_) sink.announce(announcement_);
 }
@@ -31,7 +33,24 @@ void Publisher::choose_audience() {
 void Publisher::announce(Announcement announcement) {
   announcement_ = std::make_shared<const Announcement>(std::move(announcement));
   sequences_.resize(announcement_->channels.list().size(), 0);
+  ++changes_;
   for (Sink* sink : sinks_) sink->announce(announcement_);
+}
+
+engine::ReadChannels Publisher::read() const {
+  engine::ReadChannels read;
+  for (const engine::Channel& channel : announcement_->channels.list()) {
+    read.push_back(std::any_of(sinks_.begin(), sinks_.end(), [&](const Sink* sink) {
+      return sink->hears().samples && sink->wants(channel.bus_name);
+    }));
+  }
+  return read;
+}
+
+uint64_t Publisher::audience() const {
+  uint64_t changes = changes_;
+  for (const Sink* sink : sinks_) changes += sink->audience();
+  return changes;
 }
 
 void Publisher::begin_epoch(int32_t epoch) {

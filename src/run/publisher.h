@@ -48,6 +48,11 @@ class Publisher {
 
   void flush();
 
+  // By channel: whether any sink wants its samples, be they muted now or not.
+  engine::ReadChannels read() const;
+  // Grows whenever read() may be another.
+  uint64_t audience() const;
+
   bool has_recorders() const { return !audience_.records.empty(); }
   const Announcement& announcement() const { return *announcement_; }
 
@@ -81,6 +86,7 @@ class Publisher {
   std::vector<Sink*> sinks_;
   Audience audience_;
   bool muted_ = false;
+  uint64_t changes_ = 0;  // of the sinks and channels
   std::shared_ptr<const Announcement> announcement_;
   std::vector<int64_t> sequences_;  // messages on each channel in this epoch
   int32_t epoch_ = 0;

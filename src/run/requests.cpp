@@ -126,6 +126,7 @@ Outcome Run::ask(const request_t& request, const Session& session) {
 }
 
 Outcome Run::execute(const request_t& request, const Session& session) {
+  tell_readers();  // a STEP is for those who have subscribed before it
   const RequestKind* kind = find_request_kind(request.kind);
   if (!kind || !kind->execute) {
     return Outcome::refuse(reply_t::NOT_SUPPORTED, "this server does not know requests of kind " +

@@ -131,6 +131,7 @@ void Run::run() {
   bus_sink_.listen([this](const std::string& channel, const uint8_t* data, size_t size) {
     receive(channel, data, size);
   });
+  tell_readers();
   simulation_->start(*pacer_);
   take_turns();
   next_status_ = Clock::now() + kStatusPeriod;
@@ -174,6 +175,7 @@ void Run::publish(const engine::Batch& batch) {
     publisher_.publish(*simulation_, batch, state);
     if (on_state_) on_state_(state);
   }
+  tell_readers();
   if (batch.count == 0) return;
   mode().published(publisher_.step());
   stall_watch_.moved(Clock::now());
@@ -197,6 +199,13 @@ void Run::record_applied(const engine::Batch& batch, int64_t step) {
     applied.data = command.bytes;
     publisher_.record(kAppliedChannel, applied);
   }
+}
+
+void Run::tell_readers() {
+  const uint64_t audience = publisher_.audience();
+  if (audience == audience_) return;
+  audience_ = audience;
+  simulation_->read_only(publisher_.read());
 }
 
 bool Run::compute_here() {

@@ -135,6 +135,7 @@ class Run {
   void publish_what_is_ready();
   void publish(const engine::Batch& batch);
   void record_applied(const engine::Batch& batch, int64_t step);
+  void tell_readers();         // what is read by now
   bool compute_here();         // a few steps that were granted; false: there are none
   void serve();                // requests, and models that are ready
   Clock::time_point attend();  // to what real time brings; returns when next
@@ -209,6 +210,7 @@ class Run {
   Bus& bus_;
   const int64_t run_id_;
   int32_t epoch_ = 0;
+  uint64_t audience_ = UINT64_MAX;  // of the publisher, when the simulation was told what is read
   engine::Channels channels_;
   engine::SimulationChannels own_;
   std::string request_channel_;  // as it is called on the bus; "": none

@@ -64,6 +64,7 @@ void Run::announce() {
   publisher_.announce({channels_, own_,
                        engine::make_world_info(head, *world_, simulation_->layout(),
                                                simulation_->devices(), channels_)});
+  tell_readers();
 }
 
 Mode::Stage Run::stage() {

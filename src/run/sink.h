@@ -63,6 +63,15 @@ class Sink {
   // The same for its whole life.
   virtual Hears hears() const { return {}; }
 
+  // Whether it wants the samples of that channel. Pictures that no sink wants are not drawn: then
+  // message() does not bring them. The publisher's thread, as the next.
+  virtual bool wants(const std::string& channel) const {
+    static_cast<void>(channel);
+    return true;
+  }
+  // Grows whenever wants() may say something else than before.
+  virtual uint64_t audience() const { return 0; }
+
   // Before anything else, and again whenever models have come or gone, or sim time begins again.
   virtual void announce(const std::shared_ptr<const Announcement>& announcement) {
     static_cast<void>(announcement);

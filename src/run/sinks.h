@@ -25,6 +25,8 @@ class BusSink : public Sink {
   void listen(Bus::Handler handler);
 
   Hears hears() const override { return {.samples = true, .services = true}; }
+  bool wants(const std::string& channel) const override { return bus_.is_heard(channel); }
+  uint64_t audience() const override { return bus_.audience(); }
   void announce(const std::shared_ptr<const Announcement>& announcement) override;
   void message(const Published& message) override {
     bus_.publish(message.channel, message.data, message.size);

@@ -16,18 +16,14 @@
 #include <opencv2/imgproc.hpp>
 
 #include "model/body_layout.h"
-#include "model/codecs.h"
 #include "scene/render_scene.h"
 #include "sensors/camera_lens.h"
 #include "sensors/camera_view.h"
+#include "sensors/jpeg.h"
 #include "sensors/pixel_noise.h"
 
 namespace ruedo {
 namespace {
-
-// A message that fits one datagram, with room for LCM's head.
-constexpr size_t kMaxMessage = 60000;
-constexpr int kMinQuality = 10, kQualityStep = 8;
 
 enum class Encoding { jpeg, rgb, grey };
 
@@ -109,8 +105,8 @@ class Camera : public Sensor {
     encoding_ = encoding == "jpeg"  ? Encoding::jpeg
                 : encoding == "rgb" ? Encoding::rgb
                                     : Encoding::grey;
-    quality_ = first_quality_ = static_cast<int>(
-        setup.element.integer("ruedo:quality", 85, Allowed::between(kMinQuality, 100)));
+    quality_ = static_cast<int>(
+        setup.element.integer("ruedo:quality", 85, Allowed::between(kLeastJpegQuality, 100)));
     const std::string format = camera.string("image/format", "R8G8B8");
     grey_ = encoding_ == Encoding::grey || format == "L8" || format == "L_INT8";
     const bool colour =
@@ -165,7 +161,7 @@ class Camera : public Sensor {
 
     image_.utime = input.snapshot.time;
     if (encoding_ == Encoding::jpeg) {
-      encode_jpeg(pixels);
+      write_jpeg(pixels);
     } else {
       image_.data.assign(bytes.begin(), bytes.end());
       image_.row_stride = static_cast<int32_t>(lens_.width * pixels.channels());
@@ -176,21 +172,13 @@ class Camera : public Sensor {
     out.publish(channel_, image_);
   }
 
-  // Lowers the quality until the picture fits a datagram, and comes back towards the wanted one
-  // picture by picture.
-  void encode_jpeg(const cv::Mat& pixels) {
+  void write_jpeg(const cv::Mat& pixels) {
     const cv::Mat* source = &pixels;
     if (!grey_) {
       cv::cvtColor(pixels, bgr_, cv::COLOR_RGB2BGR);  // OpenCV's order
       source = &bgr_;
     }
-    quality_ = std::min(quality_ + kQualityStep / 2, first_quality_);
-    for (;;) {
-      jpeg_parameters_ = {cv::IMWRITE_JPEG_QUALITY, quality_};
-      model::encode_picture(".jpg", *source, image_.data, jpeg_parameters_);
-      if (image_.data.size() <= kMaxMessage || quality_ <= kMinQuality) break;
-      quality_ = std::max(quality_ - kQualityStep, kMinQuality);
-    }
+    encode_jpeg(*source, quality_, image_.data);
     image_.row_stride = 0;
     image_.pixelformat = image_t::PIXEL_FORMAT_MJPEG;
   }
@@ -223,7 +211,7 @@ class Camera : public Sensor {
   Pose X_LC_;
   Encoding encoding_ = Encoding::jpeg;
   bool grey_ = false;
-  int quality_ = 85, first_quality_ = 85;
+  int quality_ = 85;
   std::optional<LensMap> map_;
   scene::View view_;
 
@@ -232,7 +220,6 @@ class Camera : public Sensor {
   cv::Mat bent_, bent_plane_, grey_picture_, bgr_;
   image_t image_, plane_;
   camera_info_t info_;
-  std::vector<int> jpeg_parameters_;
 };
 
 const RegisterSensor kRegister{

@@ -11,17 +11,16 @@
 
 #include <opencv2/imgproc.hpp>
 
-#include "model/codecs.h"
 #include "ruedo/image_t.hpp"
 #include "ruedo/math.h"
 #include "sensors/camera_view.h"
+#include "sensors/jpeg.h"
 #include "sensors/pixel_noise.h"
 
 namespace ruedo {
 namespace {
 
-constexpr size_t kMaxMessage = 60000;  // a message that fits one datagram, with LCM's head
-constexpr int kQuality = 85, kMinQuality = 10, kQualityStep = 8;
+constexpr int kQuality = 85;
 
 // Of <lens>: angle to radius, and back by bisection, since fun grows on the way to the cutoff.
 class Projection {
@@ -139,7 +138,7 @@ class WideAngleCamera : public Sensor {
       image_.row_stride = 3 * width_;
       image_.data.assign(bytes.begin(), bytes.end());
     } else {
-      encode_jpeg();
+      write_jpeg();
     }
     image_.size = static_cast<int32_t>(image_.data.size());
     out.publish(channel_, image_);
@@ -165,7 +164,7 @@ class WideAngleCamera : public Sensor {
     if (view_.far_m <= view_.near_m) camera.fail("the far clip has to be beyond the near one");
     raw_ = setup.element.choice("ruedo:encoding", "jpeg", {"jpeg", "rgb"}) == "rgb";
     quality_ = static_cast<int>(
-        setup.element.integer("ruedo:quality", kQuality, Allowed::between(kMinQuality, 100)));
+        setup.element.integer("ruedo:quality", kQuality, Allowed::between(kLeastJpegQuality, 100)));
     if (const Element* noise = camera.child("noise")) {
       const std::string* attribute = noise->attribute("type");
       const std::string type = attribute ? *attribute : noise->string("type", "none");
@@ -222,12 +221,9 @@ class WideAngleCamera : public Sensor {
             static_cast<float>(view_.cy - view_.fy * on.z() / on.x() + face * view_.height)};
   }
 
-  void encode_jpeg() {
+  void write_jpeg() {
     cv::cvtColor(bent_, bgr_, cv::COLOR_RGB2BGR);
-    for (int quality = quality_;; quality = std::max(quality - kQualityStep, kMinQuality)) {
-      model::encode_picture(".jpg", bgr_, image_.data, {cv::IMWRITE_JPEG_QUALITY, quality});
-      if (image_.data.size() <= kMaxMessage || quality <= kMinQuality) break;
-    }
+    encode_jpeg(bgr_, quality_, image_.data);
     image_.row_stride = 0;
     image_.pixelformat = image_t::PIXEL_FORMAT_MJPEG;
   }

@@ -301,3 +301,51 @@ def test_what_falls_feels_nothing_from_its_first_sample_on():
         for _ in range(20):
             assert felt == pytest.approx(np.zeros((1, 3, 3)), abs=1e-6)
             e.step(None, 2)
+
+
+CAMERA = """<sensor name='eye' type='camera'><update_rate>20</update_rate><camera><horizontal_fov>1.2</horizontal_fov>
+<image><width>32</width><height>24</height></image><clip><near>0.05</near><far>50</far></clip>
+<noise><type>gaussian</type><mean>0</mean><stddev>0.02</stddev></noise></camera>
+<ruedo:encoding>rgb</ruedo:encoding></sensor></link>"""
+
+
+def with_camera(**options):
+    return ruedo.Engine(
+        "w.sdf", text=world().replace("</sensor></link>", "</sensor>" + CAMERA), **options
+    )
+
+
+def test_a_picture_that_is_read_late_is_the_one_that_was_due():
+    """Noise too: it follows the number of the sample. 0.32 s are 64 steps: the newest picture is
+    that of 0.3 s, which no later one of the same call replaces."""
+    with with_camera(worlds=2) as early, with_camera(worlds=2) as late:
+        seen = early["eye.data"]
+        begun = seen.copy()
+        for e in (early, late):
+            e.step([0.3, 0.1], 64)
+        assert late["eye.data"].shape == (2, 1, 32 * 24 * 3)
+        assert (late["eye.utime"] == 300_000).all()
+        assert (late["eye.data"] == seen).all() and (seen != begun).any()
+        for e in (early, late):
+            e.step([0.3, 0.1], 20)
+            e.reset([1])
+            e.step([0.3, 0.1], 7)
+        assert (late["eye.data"] == seen).all()
+        assert (late["eye.utime"][:, 0] == [450_000, 0]).all()
+
+
+def test_pictures_are_drawn_for_those_who_read_them(monkeypatch):
+    """Without a renderer all goes well until a picture is read."""
+    monkeypatch.setenv("RUEDO_RENDERER", "none")
+    with with_camera(worlds=2) as e:
+        e.step([0.3, 0.1], 40)
+        e.reset()
+        assert (e["scan.ranges"] > 0).all()
+        with pytest.raises(OSError, match="RUEDO_RENDERER=none"):
+            e.observe("eye.data")
+        e.step(n=40)  # it goes on
+        monkeypatch.delenv("RUEDO_RENDERER")
+        assert (e["eye.utime"] == 200_000).all()
+    monkeypatch.setenv("RUEDO_RENDERER", "none")
+    with with_camera(record=True) as e, pytest.raises(OSError, match="RUEDO_RENDERER=none"):
+        e.step()  # messages() has all

@@ -216,6 +216,14 @@ TEST(Camera, JpegByDefaultInOneDatagram) {
   EXPECT_EQ(cv::imdecode(noisy.image().data, cv::IMREAD_COLOR).cols, 640);
 }
 
+TEST(Camera, QualityDoesNotFollowThePictureBefore) {
+  Shot shot(world_with(kWall, "<noise type='gaussian'><stddev>0.1</stddev></noise>"));
+  const std::vector<uint8_t> first = shot.image().data;
+  EXPECT_LT(first.size(), 60000u);
+  shot.take(0);
+  EXPECT_EQ(shot.image().data, first);
+}
+
 TEST(Camera, ColoursKeepTheirOrder) {
   const std::string red = box("red", "3.5 0 1 0 0 0", "1 40 40", "<diffuse>1 0.2 0 1</diffuse>");
   const image_t raw = Shot(world_with(red, "", kRaw)).image();
