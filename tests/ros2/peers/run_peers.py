@@ -3,7 +3,8 @@ own, and writes what came of it as the table in docs/ros2.md.
 
     run_peers.py RUEDO FOLDER   (scripts/test --peers; FOLDER: where the peers are built)
 
-Fast DDS by Debian's libfastrtps-dev, ros2-client by cargo. A peer that cannot be built here is a
+Fast DDS 2 by Debian 12's libfastrtps-dev, Fast DDS 3 in a Debian 13 that debootstrap makes below
+FOLDER (wants root and the network), ros2-client by cargo. A peer that cannot be built here is a
 row that says why. Ends with 1 when something of a peer that was built does not work.
 """
 
@@ -29,6 +30,7 @@ class Peer:
     version: str
     program: Path | None  # None: not built
     why: str = ""
+    root: Path | None = None  # the program is for the Debian there
 
 
 def output(*command: object) -> str:
@@ -59,6 +61,23 @@ def fast_dds(folder: Path) -> Peer:
     return Peer("Fast DDS, Debian's", version.split("+")[0], folder / "fastdds/fastdds_peer")
 
 
+def fast_dds_3(folder: Path) -> Peer:
+    root = folder / "trixie"
+    packages = "libfastdds-dev,g++,cmake,make"
+    try:
+        if not (root / "peer").exists():
+            made = ["debootstrap", "--variant=minbase", f"--include={packages}", "trixie", root]
+            output(*made)
+        shutil.copytree(HERE / "fastdds", root / "peer", dirs_exist_ok=True)
+        version = output("chroot", root, "dpkg-query", "-W", "-f", "${Version}", "libfastdds-dev")
+        output("chroot", root, "cmake", "-S", "/peer", "-B", "/peer/build")
+        output("chroot", root, "cmake", "--build", "/peer/build")
+    except (subprocess.SubprocessError, OSError) as error:
+        return Peer("Fast DDS, Debian's", "3", None, why(error))
+    program = root / "peer/build/fastdds_peer"
+    return Peer("Fast DDS, Debian's", version.split("+")[0], program, root=root)
+
+
 def ros2_client(folder: Path) -> Peer:
     manifest = HERE / "rust/Cargo.toml"
     version = manifest.read_text(encoding="utf-8").split('version = "=', 1)[1].split('"')[0]
@@ -77,12 +96,14 @@ def rows(ruedo: str, peer: Peer, domain: int) -> list[tuple[str, str, str]]:
     """(name, type, result) of what the peer tried with a run of its own."""
     script = (
         '"$1" run "$2" --no-noise --ros2 --lcm auto > "$3" 2>&1 & run=$!; '
-        'timeout "$5" "$4" "$ROS_DOMAIN_ID"; kill $run; wait $run'
+        'timeout "$5" ${6:+chroot "$6"} "$4" "$ROS_DOMAIN_ID"; kill $run; wait $run'
     )
     log = peer.program.with_suffix(".log")
     isolated = [sys.executable, SOURCE / "tests/clients/isolated.py", "bash", "-c", script, "peer"]
+    program = peer.program if not peer.root else Path("/", peer.program.relative_to(peer.root))
+    world, patience, root = SOURCE / "worlds/arena.sdf", str(PATIENCE_S), str(peer.root or "")
     found = subprocess.run(
-        [*isolated, ruedo, SOURCE / "worlds/arena.sdf", log, peer.program, str(PATIENCE_S)],
+        [*isolated, ruedo, world, log, program, patience, root],
         env={**os.environ, "ROS_DOMAIN_ID": str(domain)},
         stdout=subprocess.PIPE,
         text=True,
@@ -107,7 +128,7 @@ def main() -> None:
     ruedo, folder = sys.argv[1], Path(sys.argv[2])
     folder.mkdir(parents=True, exist_ok=True)
     peers = []
-    for domain, build in enumerate((fast_dds, ros2_client), start=41):
+    for domain, build in enumerate((fast_dds, fast_dds_3, ros2_client), start=41):
         peer = build(folder)
         tried = rows(ruedo, peer, domain) if peer.program else [("all", "", peer.why)]
         peers.append((peer, tried))

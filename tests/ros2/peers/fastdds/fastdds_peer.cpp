@@ -1,5 +1,5 @@
-// A peer of `ruedo run --ros2` over Fast DDS, which shares nothing with Ruedo: topics by CDR as
-// fastcdr reads and writes it, services as rmw_fastrtps maps them.
+// A peer of `ruedo run --ros2` over Fast DDS (2 of Debian 12, 3 of Debian 13), which shares nothing
+// with Ruedo: topics by CDR as fastcdr reads and writes it, services as rmw_fastrtps maps them.
 //
 // fastdds_peer DOMAIN prints a line for each thing that it tried: name, tab, type, tab, what came
 // of it.
@@ -14,7 +14,12 @@
 #include <vector>
 
 #include <fastcdr/Cdr.h>
+#if __has_include(<fastdds/rtps/common/WriteParams.hpp>)
+#include <fastdds/rtps/common/WriteParams.hpp>
+#define FAST_DDS_3
+#else
 #include <fastdds/rtps/common/WriteParams.h>
+#endif
 #include <fastdds/dds/domain/DomainParticipant.hpp>
 #include <fastdds/dds/domain/DomainParticipantFactory.hpp>
 #include <fastdds/dds/publisher/DataWriter.hpp>
@@ -28,10 +33,19 @@ namespace {
 
 using namespace eprosima::fastdds::dds;
 using eprosima::fastcdr::Cdr;
-using eprosima::fastrtps::rtps::InstanceHandle_t;
-using eprosima::fastrtps::rtps::SampleIdentity;
-using eprosima::fastrtps::rtps::SerializedPayload_t;
-using eprosima::fastrtps::rtps::WriteParams;
+#ifdef FAST_DDS_3
+namespace rtps = eprosima::fastdds::rtps;
+constexpr auto kOk = RETCODE_OK;
+constexpr auto kCdr = eprosima::fastcdr::DDS_CDR;
+#else
+namespace rtps = eprosima::fastrtps::rtps;
+const auto kOk = ReturnCode_t::RETCODE_OK;
+constexpr auto kCdr = Cdr::DDS_CDR;
+#endif
+using rtps::InstanceHandle_t;
+using rtps::SampleIdentity;
+using rtps::SerializedPayload_t;
+using rtps::WriteParams;
 using Bytes = std::vector<char>;
 using namespace std::chrono_literals;
 
@@ -40,30 +54,58 @@ constexpr auto kPatience = 60s;
 // Samples are CDR bytes, with their header.
 class BytesType : public TopicDataType {
  public:
+#ifdef FAST_DDS_3
+  explicit BytesType(const std::string& name) {
+    set_name(name);
+    max_serialized_type_size = kMost;
+  }
+  bool serialize(const void* data, SerializedPayload_t& payload, DataRepresentationId_t) override {
+    return put(data, payload);
+  }
+  bool deserialize(SerializedPayload_t& payload, void* data) override { return get(payload, data); }
+  uint32_t calculate_serialized_size(const void* data, DataRepresentationId_t) override {
+    return size(data);
+  }
+  void* create_data() override { return new Bytes; }
+  void delete_data(void* data) override { delete static_cast<Bytes*>(data); }
+  bool compute_key(SerializedPayload_t&, InstanceHandle_t&, bool) override { return false; }
+  bool compute_key(const void*, InstanceHandle_t&, bool) override { return false; }
+#else
   explicit BytesType(const std::string& name) {
     setName(name.c_str());
-    m_typeSize = 4 << 20;
+    m_typeSize = kMost;
     m_isGetKeyDefined = false;
     auto_fill_type_object(false);
     auto_fill_type_information(false);
   }
-  bool serialize(void* data, SerializedPayload_t* payload) override {
-    const auto& bytes = *static_cast<Bytes*>(data);
-    std::memcpy(payload->data, bytes.data(), bytes.size());
-    payload->length = static_cast<uint32_t>(bytes.size());
-    payload->encapsulation = CDR_LE;
-    return true;
-  }
+  bool serialize(void* data, SerializedPayload_t* payload) override { return put(data, *payload); }
   bool deserialize(SerializedPayload_t* payload, void* data) override {
-    static_cast<Bytes*>(data)->assign(payload->data, payload->data + payload->length);
-    return true;
+    return get(*payload, data);
   }
   std::function<uint32_t()> getSerializedSizeProvider(void* data) override {
-    return [data] { return static_cast<uint32_t>(static_cast<Bytes*>(data)->size()); };
+    return [data] { return size(data); };
   }
   void* createData() override { return new Bytes; }
   void deleteData(void* data) override { delete static_cast<Bytes*>(data); }
   bool getKey(void*, InstanceHandle_t*, bool) override { return false; }
+#endif
+
+ private:
+  static constexpr uint32_t kMost = 4 << 20;
+  static bool put(const void* data, SerializedPayload_t& payload) {
+    const auto& bytes = *static_cast<const Bytes*>(data);
+    std::memcpy(payload.data, bytes.data(), bytes.size());
+    payload.length = static_cast<uint32_t>(bytes.size());
+    payload.encapsulation = CDR_LE;
+    return true;
+  }
+  static bool get(const SerializedPayload_t& payload, void* data) {
+    static_cast<Bytes*>(data)->assign(payload.data, payload.data + payload.length);
+    return true;
+  }
+  static uint32_t size(const void* data) {
+    return static_cast<uint32_t>(static_cast<const Bytes*>(data)->size());
+  }
 };
 
 void report(const std::string& name, const std::string& type, const std::string& result) {
@@ -90,14 +132,19 @@ std::string dds_name(const std::string& type) {
 
 class Out {
  public:
-  Out() : cdr_(buffer_, Cdr::LITTLE_ENDIANNESS, Cdr::DDS_CDR) { cdr_.serialize_encapsulation(); }
+  Out() : cdr_(buffer_, Cdr::LITTLE_ENDIANNESS, kCdr) { cdr_.serialize_encapsulation(); }
   template <class T>
   Out& operator<<(const T& value) {
     cdr_ << value;
     return *this;
   }
   Bytes bytes() {
-    return {buffer_.getBuffer(), buffer_.getBuffer() + cdr_.getSerializedDataLength()};
+#ifdef FAST_DDS_3
+    const size_t size = cdr_.get_serialized_data_length();
+#else
+    const size_t size = cdr_.getSerializedDataLength();
+#endif
+    return {buffer_.getBuffer(), buffer_.getBuffer() + size};
   }
 
  private:
@@ -108,7 +155,7 @@ class Out {
 class In {
  public:
   explicit In(Bytes& bytes)
-      : buffer_(bytes.data(), bytes.size()), cdr_(buffer_, Cdr::LITTLE_ENDIANNESS, Cdr::DDS_CDR) {
+      : buffer_(bytes.data(), bytes.size()), cdr_(buffer_, Cdr::LITTLE_ENDIANNESS, kCdr) {
     cdr_.read_encapsulation();
   }
   template <class T>
@@ -136,16 +183,14 @@ class Peer {
     qos.reliability().kind = RELIABLE_RELIABILITY_QOS;
     qos.durability().kind = latched ? TRANSIENT_LOCAL_DURABILITY_QOS : VOLATILE_DURABILITY_QOS;
     qos.history().depth = 100;
-    qos.endpoint().history_memory_policy =
-        eprosima::fastrtps::rtps::PREALLOCATED_WITH_REALLOC_MEMORY_MODE;
+    qos.endpoint().history_memory_policy = rtps::PREALLOCATED_WITH_REALLOC_MEMORY_MODE;
     return subscriber_->create_datareader(this->topic(topic, type), qos);
   }
   DataWriter* writer(const std::string& topic, const std::string& type) {
     DataWriterQos qos;
     qos.reliability().kind = RELIABLE_RELIABILITY_QOS;
     qos.history().depth = 10;
-    qos.endpoint().history_memory_policy =
-        eprosima::fastrtps::rtps::PREALLOCATED_WITH_REALLOC_MEMORY_MODE;
+    qos.endpoint().history_memory_policy = rtps::PREALLOCATED_WITH_REALLOC_MEMORY_MODE;
     return publisher_->create_datawriter(this->topic(topic, type), qos);
   }
 
@@ -168,7 +213,7 @@ std::string first(DataReader* reader, const std::function<std::string(In&)>& loo
   const bool came = wait_for([&] {
     Bytes bytes;
     SampleInfo info;
-    while (told.empty() && reader->take_next_sample(&bytes, &info) == ReturnCode_t::RETCODE_OK) {
+    while (told.empty() && reader->take_next_sample(&bytes, &info) == kOk) {
       if (!info.valid_data) continue;
       try {
         In in(bytes);
@@ -245,7 +290,7 @@ void try_driving(Peer& peer) {
     commands->write(&bytes);
     std::this_thread::sleep_for(50ms);
     SampleInfo info;
-    while (odometry->take_next_sample(&taken, &info) == ReturnCode_t::RETCODE_OK) {
+    while (odometry->take_next_sample(&taken, &info) == kOk) {
       if (!info.valid_data) continue;
       In in(taken);
       header(in);
@@ -285,12 +330,16 @@ class Client {
   std::optional<Bytes> ask(Bytes& request) {
     WriteParams params;
     params.related_sample_identity().writer_guid() = replies_->guid();
+#ifdef FAST_DDS_3
+    if (requests_->write(&request, params) != kOk) return std::nullopt;
+#else
     if (!requests_->write(&request, params)) return std::nullopt;
+#endif
     Bytes reply;
     const bool came = wait_for(
         [&] {
           SampleInfo info;
-          while (replies_->take_next_sample(&reply, &info) == ReturnCode_t::RETCODE_OK) {
+          while (replies_->take_next_sample(&reply, &info) == kOk) {
             const SampleIdentity& related = info.related_sample_identity;
             if (info.valid_data && related.writer_guid() == replies_->guid() &&
                 related.sequence_number() == params.sample_identity().sequence_number())
