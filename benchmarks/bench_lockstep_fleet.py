@@ -1,5 +1,5 @@
 """Lockstep from Python with many robots of 24 beams: robot-decisions a second at 10 Hz, over each
-transport in turn.
+transport in turn. A decision reads the robot's scan, and commands a velocity.
 
 bench_lockstep_fleet.py [DECISIONS] [ROUNDS] [ROBOTS,...]
 
@@ -42,10 +42,13 @@ def world(count: int) -> str:
 def rate(file: Path, url: str | None, count: int, decisions: int) -> float:
     with ruedo.launch(file, args=["--lockstep", "1"], url=url) as sim:
         robots = [sim.robot(f"r{i}") for i in range(count)]
-        sim.step(20)
+        scanners = [one.lrf for one in robots]
+        seen = sim.step(20)
         begin = time.perf_counter()
         for _ in range(decisions):
-            sim.step(20, [one.velocity_command(0.2, 0.5) for one in robots])
+            if not all(seen.latest(one) for one in scanners):
+                raise ruedo.RuedoError("a robot has no scan")
+            seen = sim.step(20, [one.velocity_command(0.2, 0.5) for one in robots])
         return count * decisions / (time.perf_counter() - begin)
 
 

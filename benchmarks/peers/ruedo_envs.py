@@ -15,9 +15,10 @@ def engine_steps(given: argparse.Namespace):
     first = ruedo.Engine(given.world)
     name = first.robots[0]
     first.close()
+    # Each in a room of its own, of the 16 that there are, as the first one stands in its.
     spawn = [
-        f"p3at:more{i}@{-1.5 + 0.9 * (i % 4)},{-1.5 + 0.9 * (i // 4)}"
-        for i in range(given.robots - 1)
+        f"p3at:more{i - 1}@{4 + 6 * (i % 4)},{3 + 6 * (i // 4)},1.5708"
+        for i in range(1, given.robots)
     ]
     names = [name, *(f"more{i}" for i in range(given.robots - 1))]
     left_out = [device for device in DEVICES if not (given.camera and device == "camera")]

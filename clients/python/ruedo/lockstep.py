@@ -84,14 +84,22 @@ class Observations(State):
         """The samples of a device or stream, decoded, in order; none when none was due. Raises
         TypeMismatch.
         """
-        return [stream._sample_of(m.data) for m in self.messages if m.channel == stream.channel]
+        return [stream._sample_of(data) for data in self._on(stream.channel)]
 
     def latest(self, stream: Stream[T]) -> T | None:
         """The last of them."""
-        for message in reversed(self.messages):
-            if message.channel == stream.channel:
-                return stream._sample_of(message.data)
-        return None
+        on_channel = self._on(stream.channel)
+        return stream._sample_of(on_channel[-1]) if on_channel else None
+
+    def _on(self, channel: str) -> list[bytes]:
+        """Sorted once: a fleet asks for each of its robots."""
+        by_channel: dict[str, list[bytes]] | None = self.__dict__.get("_by_channel")
+        if by_channel is None:
+            by_channel = {}
+            for _, name, data in self.messages:
+                by_channel.setdefault(name, []).append(data)
+            self.__dict__["_by_channel"] = by_channel
+        return by_channel.get(channel, [])
 
 
 _NOTHING = np.zeros(3)
