@@ -14,10 +14,12 @@ namespace ruedo::physics {
 
 namespace {
 
-constexpr double kUnbounded = 1e17;  // Bullet's "infinity" is 1e18 or more
-constexpr double kRegular = 1e-10;   // part of the diagonal: loops of joints say the same twice
-constexpr size_t kMostRows = 8;      // of one of Bullet's constraints
-constexpr size_t kSkip = 12;         // numbers of a row's Jacobian
+constexpr double kUnbounded = 1e17;    // Bullet's "infinity" is 1e18 or more
+constexpr double kRegular = 1e-10;     // part of the diagonal: loops of joints say the same twice
+constexpr double kIndependent = 1e-6;  // of its response that no other row has
+constexpr size_t kMostRows = 8;        // of one of Bullet's constraints
+constexpr size_t kRowsOfAHinge = 5;
+constexpr size_t kSkip = 12;  // numbers of a row's Jacobian
 constexpr size_t kMostInBlock =
     256;  // rows that are solved directly; a longer mechanism's others are relaxed
 
@@ -30,6 +32,28 @@ bool says_more(const btTypedConstraint& constraint) {
          constraint.getConstraintType() == D6_SPRING_2_CONSTRAINT_TYPE ||
          constraint.getConstraintType() == FIXED_CONSTRAINT_TYPE;
 }
+
+// Where a hinge's frames are.
+struct HingeAt {
+  explicit HingeAt(btHingeConstraint& hinge) {
+    const btTransform &A = hinge.getRigidBodyA().getCenterOfMassTransform(),
+                      &B = hinge.getRigidBodyB().getCenterOfMassTransform();
+    const btTransform &in_a = hinge.getAFrame(), &in_b = hinge.getBFrame();
+    arm_a = from_bt(A.getBasis() * in_a.getOrigin());
+    arm_b = from_bt(B.getBasis() * in_b.getOrigin());
+    apart = from_bt(B.getOrigin() - A.getOrigin()) + arm_b - arm_a;
+    first = from_bt(A.getBasis() * in_a.getBasis().getColumn(0));
+    second = from_bt(A.getBasis() * in_a.getBasis().getColumn(1));
+    const Vec3 axis_b = from_bt(B.getBasis() * in_b.getBasis().getColumn(2));
+    askew = first.cross(second).cross(axis_b);
+  }
+  // What the five rows must undo, in m and rad.
+  double error(int row) const {
+    return row < 3 ? apart[row] : row == 3 ? askew.dot(first) : askew.dot(second);
+  }
+  Vec3 arm_a, arm_b, apart;   // from the centres of mass to the anchors, and from A's to B's
+  Vec3 first, second, askew;  // square to A's axis; turns A's axis into B's
+};
 
 bool is_stop(const Row& row) { return row.lower == 0.0 || row.upper == 0.0; }
 
@@ -143,21 +167,67 @@ double JointBlocks::relax(size_t i, SolverBodies& bodies) {
 
 void JointBlocks::add(btTypedConstraint& constraint, int a, int b, int reference,
                       const SolverBodies& bodies, double substep_s) {
-  Values values;
-  const int n = ask(constraint, 0.0, substep_s, values);
   auto* motors = static_cast<JointMotors*>(constraint.getUserConstraintPtr());
   Joint& joint = joints_.emplace_back();
   joint.constraint = &constraint;
   joint.first = rows_.size();
   joint.a = a;
   joint.b = b;
+  joint.hinge = add_hinge(constraint, joint, bodies);
+  if (!joint.hinge) add_asked(constraint, joint, bodies, substep_s);
+  if (motors && motors->first.on) add_motor(motors->first, joint, reference, bodies);
+  if (motors && motors->second.on) add_motor(motors->second, joint, reference, bodies);
+  joint.count = rows_.size() - joint.first;
+}
+
+Row& JointBlocks::add_row(const Joint& joint) {
+  Row& row = rows_.emplace_back();
+  row.a = joint.a;
+  row.b = joint.b;
+  return row;
+}
+
+// Anchor to anchor and axis to axis, as Bullet has it. Returns false for what Bullet is asked for:
+// other joints, and a hinge at a stop.
+bool JointBlocks::add_hinge(btTypedConstraint& constraint, Joint& joint,
+                            const SolverBodies& bodies) {
+  if (constraint.getConstraintType() != HINGE_CONSTRAINT_TYPE) return false;
+  auto& hinge = static_cast<btHingeConstraint&>(constraint);
+  if (hinge.hasLimit()) {
+    hinge.testLimit(hinge.getRigidBodyA().getCenterOfMassTransform(),
+                    hinge.getRigidBodyB().getCenterOfMassTransform());
+    if (hinge.getSolveLimit()) return false;
+  }
+  const HingeAt at(hinge);
+  for (int i = 0; i < 3; ++i) {
+    Row& row = add_row(joint);
+    row.linear_a = Vec3::Unit(i);
+    row.linear_b = -row.linear_a;
+    row.angular_a = at.arm_a.cross(row.linear_a);
+    row.angular_b = -at.arm_b.cross(row.linear_a);
+  }
+  for (const Vec3* square : {&at.first, &at.second}) {
+    Row& row = add_row(joint);
+    row.angular_a = *square;
+    row.angular_b = -*square;
+  }
+  for (size_t i = joint.first; i < rows_.size(); ++i) {
+    rows_[i].lower = -BT_LARGE_FLOAT;
+    rows_[i].upper = BT_LARGE_FLOAT;
+    rows_[i].prepare(bodies);
+  }
+  return true;
+}
+
+void JointBlocks::add_asked(btTypedConstraint& constraint, Joint& joint, const SolverBodies& bodies,
+                            double substep_s) {
+  Values values;
+  const int n = ask(constraint, 0.0, substep_s, values);
   joint.errors_only = !says_more(constraint);
   for (int i = 0; i < n; ++i) {
     const size_t at = static_cast<size_t>(i) * kSkip;
     joint.errors_only = joint.errors_only && values.error[at] == 0.0;
-    Row row;
-    row.a = a;
-    row.b = b;
+    Row& row = add_row(joint);
     row.linear_a = vector_at(&values.jacobian[at]);
     row.angular_a = vector_at(&values.jacobian[at + 3]);
     row.linear_b = vector_at(&values.jacobian[at + 6]);
@@ -167,11 +237,7 @@ void JointBlocks::add(btTypedConstraint& constraint, int a, int b, int reference
     row.lower = values.lower[at];
     row.upper = values.upper[at];
     row.prepare(bodies);
-    rows_.push_back(row);
   }
-  if (motors && motors->first.on) add_motor(motors->first, joint, reference, bodies);
-  if (motors && motors->second.on) add_motor(motors->second, joint, reference, bodies);
-  joint.count = rows_.size() - joint.first;
 }
 
 // Positive as the child, body b, moves against the parent.
@@ -286,23 +352,45 @@ void JointBlocks::find_envelope(Block& block) {
       block.begin[i] = std::min(block.begin[i], first);
     });
   }
+  block.end.resize(n);
+  std::iota(block.end.begin(), block.end.end(), size_t{0});
+  for (size_t i = 0; i < n; ++i) block.end[block.begin[i]] = i;
+  for (size_t j = 1; j < n; ++j) block.end[j] = std::max(block.end[j], block.end[j - 1]);
 }
 
-void JointBlocks::factor(Block& block) {
-  find_envelope(block);
+void JointBlocks::write_matrix(Block& block) {
   const size_t n = block.free.size();
   block.factor.resize(n * n);
-  for (size_t i = 0; i < n; ++i) {
-    const Row& row = rows_[block.free[i]];
-    double* of_i = &block.factor[i * n];
-    for (size_t j = block.begin[i]; j < i; ++j) of_i[j] = coupling(block.free[i], block.free[j]);
-    of_i[i] = row.response * (1.0 + kRegular) + row.softness;
-    for (size_t j = block.begin[i]; j <= i; ++j) {
-      const double* of_j = &block.factor[j * n];
-      double sum = of_i[j];
-      for (size_t k = std::max(block.begin[i], block.begin[j]); k < j; ++k)
-        sum -= of_i[k] * of_j[k];
-      of_i[j] = j < i ? sum / of_j[j] : std::sqrt(std::max(sum, 1e-300 + kRegular * row.response));
+  for (size_t j = 0; j < n; ++j) {
+    double* of_j = &block.factor[j * n];
+    const Row& row = rows_[block.free[j]];
+    of_j[j] = row.response * (1.0 + kRegular) + row.softness;
+    for (size_t i = j + 1; i <= block.end[j]; ++i)
+      of_j[i] = block.begin[i] > j ? 0.0
+                : thirds_.empty()  ? row.coupling(rows_[block.free[i]])
+                                   : coupling(block.free[i], block.free[j]);
+  }
+}
+
+// Each pivot is taken off the rows that it reaches, at once: no sum waits for another one.
+void JointBlocks::factor(Block& block) {
+  find_envelope(block);
+  write_matrix(block);
+  const size_t n = block.free.size();
+  block.inverse.resize(n);
+  block.exact = true;
+  for (size_t j = 0; j < n; ++j) {
+    double* of_j = &block.factor[j * n];
+    const double response = rows_[block.free[j]].response;
+    block.exact = block.exact && of_j[j] > kIndependent * response;
+    of_j[j] = std::max(of_j[j], 1e-300 + kRegular * response);
+    block.inverse[j] = 1.0 / of_j[j];
+    const size_t end = block.end[j];
+    for (size_t i = j + 1; i <= end; ++i) {
+      if (of_j[i] == 0.0) continue;
+      const double part = of_j[i] * block.inverse[j];
+      double* of_i = &block.factor[i * n];
+      for (size_t k = i; k <= end; ++k) of_i[k] -= part * of_j[k];
     }
   }
   block.factored = true;
@@ -310,22 +398,27 @@ void JointBlocks::factor(Block& block) {
 
 void JointBlocks::solve_lower(const Block& block, double* x) const {
   const size_t n = block.free.size();
-  for (size_t i = 0; i < n; ++i) {
-    const double* of_i = &block.factor[i * n];
-    double sum = x[i];
-    for (size_t k = block.begin[i]; k < i; ++k) sum -= of_i[k] * x[k];
-    x[i] = sum / of_i[i];
+  for (size_t j = 0; j < n; ++j) {
+    const double* of_j = &block.factor[j * n];
+    const double part = x[j] * block.inverse[j];
+    for (size_t i = j + 1; i <= block.end[j]; ++i) x[i] -= part * of_j[i];
   }
 }
 
 void JointBlocks::solve(const Block& block, std::vector<double>& x) const {
   const size_t n = block.free.size();
   solve_lower(block, x.data());
-  for (size_t i = n; i-- > 0;) {
-    const double* of_i = &block.factor[i * n];
-    x[i] /= of_i[i];
-    for (size_t k = block.begin[i]; k < i; ++k) x[k] -= of_i[k] * x[i];
+  for (size_t j = n; j-- > 0;) {
+    const double* of_j = &block.factor[j * n];
+    double sum = x[j];
+    for (size_t i = block.end[j]; i > j; --i) sum -= of_j[i] * x[i];  // the newest one comes last
+    x[j] = sum * block.inverse[j];
   }
+}
+
+bool JointBlocks::exact() const {
+  return std::all_of(blocks_.begin(), blocks_.begin() + static_cast<std::ptrdiff_t>(block_count_),
+                     [](const Block& block) { return block.exact && block.bounded.empty(); });
 }
 
 double JointBlocks::sweep(SolverBodies& bodies) {
@@ -383,7 +476,7 @@ void JointBlocks::tell_responses(const std::vector<Row*>& contacts,
   }
 }
 
-// C^T K^-1 C, where K = L L^T is the rows' own response and C that to the contacts.
+// C^T K^-1 C, where K = L D L^T is the rows' own response and C that to the contacts.
 void JointBlocks::take_off_held(const Block& block, const std::vector<Row*>& contacts,
                                 std::vector<double>& responses) {
   const size_t n = contacts.size(), m = block.free.size();
@@ -400,15 +493,25 @@ void JointBlocks::take_off_held(const Block& block, const std::vector<Row*>& con
   for (size_t i = 0; i < n; ++i) {
     solve_lower(block, &held_[i * m]);
     for (size_t j = 0; j <= i; ++j) {
-      for (size_t k = 0; k < m; ++k) responses[i * n + j] -= held_[i * m + k] * held_[j * m + k];
+      for (size_t k = 0; k < m; ++k)
+        responses[i * n + j] -= held_[i * m + k] * held_[j * m + k] * block.inverse[k];
     }
   }
 }
 
 double JointBlocks::look_again(double substep_s) {
   double largest = 0.0;
-  Values whole, none;
   for (Joint& joint : joints_) {
+    if (joint.hinge) {
+      const HingeAt at(static_cast<btHingeConstraint&>(*joint.constraint));
+      for (size_t i = 0; i < kRowsOfAHinge; ++i) {
+        double& target = rows_[joint.first + i].push_target;
+        target = at.error(static_cast<int>(i)) / substep_s;
+        largest = std::max(largest, std::abs(target));
+      }
+      continue;
+    }
+    Values whole, none;
     const int n = ask(*joint.constraint, 1.0, substep_s, whole);
     if (!joint.errors_only) ask(*joint.constraint, 0.0, substep_s, none);
     const size_t motors = joint.motors[1] ? 2 : joint.motors[0] ? 1 : 0;

@@ -19,6 +19,8 @@ class JointBlocks {
   // All are added: sorts the rows into blocks.
   void prepare(const SolverBodies& bodies);
   bool empty() const { return rows_.empty(); }
+  // A sweep has brought all rows to their targets; another one would find them there.
+  bool exact() const;
   bool has_gears() const { return !thirds_.empty(); }  // their rows have three bodies
 
   // Brings all rows to their targets, as far as their bounds allow. Returns how far off the worst
@@ -47,15 +49,19 @@ class JointBlocks {
     btTypedConstraint* constraint = nullptr;
     JointMotor* motors[2] = {};  // of the last rows, in that order
     bool errors_only = true;     // without reduction, no row has a target
+    bool hinge = false;          // not at a stop: its five rows are ours, not Bullet's
     int a = 0, b = 0;
     size_t block = 0;
   };
   struct Block {
     std::vector<size_t> free;     // rows that are solved directly: none of them is at a bound
     std::vector<size_t> bounded;  // rows at a bound, relaxed one by one
-    std::vector<double> factor;   // Cholesky, lower, by rows, of the free ones
-    std::vector<size_t> begin;    // of each of its rows: the first column that is not 0
+    // L D L^T of the free ones: D L^T, upper, by rows; 1 / D; of each row the first column that is
+    // not 0 below the diagonal, and the last one beyond it.
+    std::vector<double> factor, inverse;
+    std::vector<size_t> begin, end;
     bool factored = false;
+    bool exact = false;  // no row says what others say already: solving once is enough
   };
 
   // What a gearbox's row does to its reference.
@@ -79,15 +85,20 @@ class JointBlocks {
     if (const Third* third = third_of(i)) act(third->body);
   }
 
+  bool add_hinge(btTypedConstraint& constraint, Joint& joint, const SolverBodies& bodies);
+  void add_asked(btTypedConstraint& constraint, Joint& joint, const SolverBodies& bodies,
+                 double substep_s);
+  Row& add_row(const Joint& joint);
   struct Values;
   int ask(btTypedConstraint& constraint, double reduction, double substep_s, Values& values);
   void add_motor(JointMotor& motor, Joint& joint, int reference, const SolverBodies& bodies);
   void add_third(const JointMotor& motor, int reference, const SolverBodies& bodies);
   size_t root(size_t body);
   void find_envelope(Block& block);
+  void write_matrix(Block& block);
   void factor(Block& block);
   void solve(const Block& block, std::vector<double>& x) const;
-  void solve_lower(const Block& block, double* x) const;
+  void solve_lower(const Block& block, double* x) const;  // L
   void take_off_held(const Block& block, const std::vector<Row*>& contacts,
                      std::vector<double>& responses);
 

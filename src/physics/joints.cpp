@@ -223,6 +223,15 @@ void JointConstraint::set_effort(double effort) {
   if (news) wake();
 }
 
+bool JointConstraint::leads() const {
+  constexpr double kOfItsEffort = 0.99;  // more is its limit, and it may lag
+  if (!constraint_ || !constraint_->isEnabled() || type_ == model::JointType::fixed) return true;
+  if (mode_ != Mode::motor || follows_ || std::isfinite(gain_)) return false;
+  const JointMotor& motor = motors_->first;
+  return type_ != model::JointType::universal && type_ != model::JointType::screw &&
+         motor.impulse >= kOfItsEffort * motor.lower && motor.impulse <= kOfItsEffort * motor.upper;
+}
+
 void JointConstraint::wake() {
   if (!parent_.isStaticObject()) parent_.activate(true);
   if (!child_.isStaticObject()) child_.activate(true);

@@ -46,6 +46,9 @@ class JointConstraint {
     return mode_ == Mode::effort || limits_.spring_stiffness > 0.0 || std::abs(command_) > 1e-3;
   }
 
+  // It moves as it is told, or not at all: nothing that acts on its bodies changes how.
+  bool leads() const;
+
   // The bodies were put back to where they started: the position is 0, and no command holds.
   void start_again() {
     position_ = effort_ = command_ = 0.0;

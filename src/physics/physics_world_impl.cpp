@@ -330,6 +330,7 @@ void PhysicsWorld::Impl::choose_pace() {
     together(a, b);
   }
   for (BodyMotion& motion : motions_) motion.fine = false;
+  find_led();
   find_hurried();
   for (size_t i = 0; i < motions_.size(); ++i) {
     if (!motions_[i].simulated) continue;
@@ -337,6 +338,25 @@ void PhysicsWorld::Impl::choose_pace() {
     motions_[i].fine = motions_[root(i)].fine;
     motions_[i].awake = rigid_.bodies[i].bullet->isActive();
     simulated_[motions_[i].fine ? kFine : kCoarse].push_back(rigid_.bodies[i].bullet.get());
+  }
+}
+
+// A mechanism on the world whose motors lead every joint, and that touches nothing, goes as it is
+// told: shorter substeps would find it on the same way.
+void PhysicsWorld::Impl::find_led() {
+  for (BodyMotion& motion : motions_) motion.led = false;
+  for (size_t i = 0; i < motions_.size(); ++i) {
+    if (motions_[i].simulated && motions_[i].hung) motions_[root(i)].led = true;
+  }
+  for (size_t i = 0; i < motions_.size(); ++i) {
+    if (motions_[i].simulated && !alone(static_cast<int>(i))) motions_[root(i)].led = false;
+  }
+  for (size_t i = 0; i < joints_.size(); ++i) {
+    const auto stray = [this](int body) {
+      if (body >= 0 && motions_[index(body)].simulated) motions_[root(index(body))].led = false;
+    };
+    if (!joints_[i].leads()) stray(body_of(i));
+    if (leaders_[i] >= 0) stray(body_of(index(leaders_[i])));  // what follows goes along with it
   }
 }
 
@@ -351,13 +371,13 @@ void PhysicsWorld::Impl::find_hurried() {
     const bool still = twists_[i].linear.squaredNorm() < kStill_m_s * kStill_m_s &&
                        twists_[i].angular.squaredNorm() < kStill_rad_s * kStill_rad_s;
     motion.still = still ? std::min(motion.still + 1, kStillSteps) : 0;
-    if (motion.still < kStillSteps) motions_[root(i)].fine = true;
+    if (motion.still < kStillSteps && !motions_[root(i)].led) motions_[root(i)].fine = true;
   }
   for (size_t i = 0; i < joints_.size(); ++i) {
     const int body = body_of(i);
-    if (body >= 0 && motions_[index(body)].simulated &&
-        (joints_[i].may_start() || leaders_[i] >= 0))
-      motions_[root(index(body))].fine = true;
+    if (body < 0 || !motions_[index(body)].simulated) continue;
+    BodyMotion& first = motions_[root(index(body))];
+    if ((joints_[i].may_start() && !first.led) || leaders_[i] >= 0) first.fine = true;
   }
   for (const int body : rolling_) {
     if (motions_[index(body)].simulated) motions_[root(index(body))].fine = true;

@@ -33,6 +33,7 @@ struct BodyMotion {
   bool simulated = false;  // in this step
   bool fine = false;       // ... in the shorter substeps
   bool awake = false;      // when the step began
+  bool led = false;        // of a mechanism's first body: motors hold it to its way
   int still = 0;           // steps for which it hardly moved, where it is tied
   bool fresh = true;  // put there since the last step: nothing says how it accelerates but gravity
   Twist mean;
@@ -99,6 +100,7 @@ class PhysicsWorld::Impl {
   void refilter_all();
   int substeps_for(int64_t longest_us) const;
   void choose_pace();
+  void find_led();
   void find_hurried();
   bool at_pace(size_t joint, int pace) const;
   int body_of(size_t joint) const;  // that moves

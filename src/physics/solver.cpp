@@ -312,7 +312,7 @@ void Solver::sweep_until_still() {
   for (int i = 0; i < settings_.iterations; ++i) {
     const double worst = sweep(i);
     ++sweeps_;
-    if (i + 1 == settings_.iterations) break;
+    if (i + 1 == settings_.iterations || (contact_count_ == 0 && blocks_.exact())) break;
     const bool still = worst <= settings_.tolerance_m_s;
     if (still && shared) break;
     if (still || i == kSweepsBeforeSharing) {

@@ -7,7 +7,7 @@
 // - Sweeps are accelerated by conjugate directions, and go on until no row changes a velocity by
 // more than a tolerance, up to
 //   a limit: a lone robot takes a few, a stack or a large ratio of masses takes more.
-// - The joints of a mechanism are one block, solved directly (dense Cholesky) in each sweep: a
+// - The joints of a mechanism are one block, solved directly (Cholesky) in each sweep: a
 // chain of joints holds.
 // - Friction is Coulomb's cone, not a pyramid: an ellipse where a file gives two coefficients. Its
 // force points against

@@ -110,6 +110,33 @@ TEST(Articulated, AnArmHoldsItsLoadWithoutCreeping) {
   EXPECT_NEAR(w.physics.joint_effort(0), -10 * (2.5 + 6.6), 0.5);
 }
 
+// Its joints have turned by what they were told in all, and its tip is where that puts it: the
+// product of the joints' rotations.
+TEST(Articulated, AnArmGoesAsItsMotorsAreTold) {
+  for (const int64_t step_us : {5000, 10000}) {
+    World w(arm(), step_us);
+    const double step_s = static_cast<double>(step_us) * 1e-6;
+    double told[6] = {};
+    for (int k = 0; k * step_s < 1.5; ++k) {
+      for (int i = 0; i < 6; ++i) {
+        const double rate = 0.5 * std::sin(4.0 * k * step_s + i);
+        w.physics.drive_joint_velocity(i, rate, 500.0);
+        told[i] += rate * step_s;
+      }
+      w.physics.step();
+      for (int i = 0; i < 6; ++i)
+        ASSERT_NEAR(w.physics.joint_position(i), told[i], 2e-4) << i << " at " << step_us;
+    }
+    Pose tip{Quat::Identity(), {0, 0, 1}};
+    for (int i = 0; i < 6; ++i) {
+      const Vec3 axis = i % 2 == 0 ? Vec3::UnitY() : Vec3::UnitZ();
+      if (i > 0) tip = tip * Pose{Quat::Identity(), {0.2, 0, 0}};
+      tip = tip * Pose{Quat(Eigen::AngleAxisd(told[i], axis)), Vec3::Zero()};
+    }
+    EXPECT_LT((w.physics.pose(5).translation - tip.translation).norm(), 3e-4) << step_us;
+  }
+}
+
 // A spring of 40 N m/rad under 2 kg at 0.5 m: k x = m g r cos x, and the friction of the joint lets
 // it come to rest.
 TEST(Articulated, AJointsSpringHolds) {

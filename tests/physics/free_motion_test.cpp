@@ -27,6 +27,8 @@ TEST(FreeMotion, TheFirstStateKnowsWhatFalls) {
   w.physics.read(first);
   w.physics.step();
   w.physics.read(second);
+  EXPECT_TRUE(first.contacts.empty());  // nothing has borne anything yet
+  EXPECT_FALSE(second.contacts.empty());
   for (const Snapshot* state : {&first, &second}) {
     EXPECT_NEAR(state->body_accelerations[0].z(), -10.0, 1e-9);
     EXPECT_NEAR(state->body_accelerations[1].z(), 0.0, 1e-9);

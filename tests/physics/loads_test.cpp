@@ -71,6 +71,29 @@ TEST(Loads, OfATableAreThoseOfEqualSprings) {
   }
 }
 
+// Each of two bodies that no joint ties shares what it bears among its own contacts: a table on the
+// other one's top.
+TEST(Loads, OfATableOnATable) {
+  std::string feet;
+  for (size_t i = 0; i < kTable.size(); ++i) feet += foot(i, kTable[i].first, kTable[i].second);
+  const std::string top =
+      "<collision name='top'><pose>0 0 0.42 0 0 0</pose><geometry><box><size>1.2 1 "
+      "0.04</size></box>"
+      "</geometry></collision>";
+  World world(kPlane + "<model name='lower'><link name='l'>" + inertial(20, 0.1, 0.05, 0.4) + feet +
+              top +
+              "</link></model><model name='upper'><pose>0 0 0.44 0 0 0</pose><link name='l'>" +
+              inertial(20, 0.1, 0.05, 0.2) + feet + "</link></model>");
+  world.run(0.5);
+  const std::vector<double> wanted = on_springs(kTable, 200.0, 0.1, 0.05);
+  for (size_t i = 0; i < kTable.size(); ++i) {
+    const auto& [x, y] = kTable[i];
+    EXPECT_NEAR(load_at(world, "upper/l", x, y), wanted[i], 0.01 * wanted[i]) << i;
+    // Its own foot bears both tables, and the upper one's foot stands above it.
+    EXPECT_NEAR(load_at(world, "lower/l", x, y), 3 * wanted[i], 0.03 * wanted[i]) << i;
+  }
+}
+
 // Set down with one foot first, and once after a slide: what was before is forgotten.
 TEST(Loads, DoNotRememberHowItCameThere) {
   std::string feet;
