@@ -7,6 +7,7 @@
 #include <cfenv>
 #include <cmath>
 #include <cstring>
+#include <limits>
 #include <stdexcept>
 #include <utility>
 
@@ -297,6 +298,24 @@ std::vector<std::vector<std::string>> Engine::collisions(int world) const {
   return names;
 }
 
+namespace {
+
+// Of a device that has published nothing since its world began: NaN, of whole numbers 0.
+void put_nothing(Primitive type, std::byte* row, size_t size) {
+  const auto fill = [&](auto nothing) {
+    for (size_t at = 0; at < size; at += sizeof nothing)
+      std::memcpy(row + at, &nothing, sizeof nothing);
+  };
+  if (type == Primitive::float32)
+    fill(std::numeric_limits<float>::quiet_NaN());
+  else if (type == Primitive::float64)
+    fill(std::numeric_limits<double>::quiet_NaN());
+  else
+    fill(std::byte{0});
+}
+
+}  // namespace
+
 void Engine::update(Observer& observer, size_t world) {
   const size_t row_size = observer.count * observer.reader.value_size();
   for (size_t robot = 0; robot < observer.channels.size(); ++robot) {
@@ -304,7 +323,11 @@ void Engine::update(Observer& observer, size_t world) {
         copies_[world]->newest[static_cast<size_t>(observer.channels[robot])];
     std::byte* row =
         observer.array->values.data() + (world * observer.channels.size() + robot) * row_size;
-    if (message.empty() || observer.reader.read(message, row, observer.count)) continue;
+    if (message.empty()) {
+      put_nothing(observer.reader.type(), row, row_size);
+      continue;
+    }
+    if (observer.reader.read(message, row, observer.count)) continue;
     throw std::runtime_error("the number of values in " + observer.device + "." + observer.field +
                              " changes from message to message: an array cannot hold them");
   }
@@ -438,8 +461,14 @@ std::vector<int> Engine::channels_of(const std::string& device) const {
 
 std::shared_ptr<const FieldArray> Engine::observe(const std::string& device,
                                                   const std::string& field) {
+  const auto refuse_nothing = [&](const std::vector<int>& channels) {
+    if (copies_[0]->newest[static_cast<size_t>(channels[0])].empty())
+      throw InputError({}, device + "." + field + " has no sample yet: step the engine first");
+  };
   for (const auto& known : observers_) {
-    if (known->device == device && known->field == field) return known->array;
+    if (known->device != device || known->field != field) continue;
+    refuse_nothing(known->channels);  // since a reset
+    return known->array;
   }
   const std::vector<int> channels = channels_of(device);
   const Schema* schema = find_schema(copies_[0]->channels[channels[0]].fingerprint);
@@ -448,9 +477,8 @@ std::shared_ptr<const FieldArray> Engine::observe(const std::string& device,
   auto observer =
       std::make_unique<Observer>(Observer{device, field, FieldReader(*schema, field), channels});
   read(channels);
+  refuse_nothing(channels);
   const std::vector<uint8_t>& sample = copies_[0]->newest[static_cast<size_t>(channels[0])];
-  if (sample.empty())
-    throw InputError({}, device + "." + field + " has no sample yet: step the engine first");
   FieldArray& array = *observer->array;
   array.type = observer->reader.type();
   array.shape = {static_cast<int64_t>(copies_.size()), static_cast<int64_t>(channels.size())};

@@ -102,6 +102,45 @@ def test_each_bad_controller_is_one_failed_case(tmp_path):
     ] == pytest.approx(0.1333, abs=0.002)
 
 
+WAITS = '''
+def drive(view):
+    return (0.2, 0.0) if view["lrf.ranges"].min() > 0.1 else (0.0, 0.0)
+
+
+def looks(view):
+    assert ("lrf.ranges" in view) == (view.time >= 1.0)
+    return (0.2, 0.0) if "lrf.ranges" in view else (0.0, 0.0)
+
+
+def misspelt(view):
+    return view["lrf.range"]
+'''
+
+UNTIL_THE_FIRST_SCAN = '''
+worlds: [arena]
+controllers:
+  - {name: drive, python: "waits.py:drive"}
+  - {name: looks, python: "waits.py:looks"}
+  - {name: misspelt, python: "waits.py:misspelt"}
+parameters: {last: [1, 0]}
+faults: [{kind: dropout, robot: p3at, target: lrf, at: 0, duration: "{last}"}]
+disable: [p3at/camera]
+limits: {duration: 2}
+'''
+
+
+def test_a_controller_stands_until_what_it_reads_has_come(tmp_path):
+    (tmp_path / "waits.py").write_text(WAITS)
+    (tmp_path / "c.yaml").write_text(UNTIL_THE_FIRST_SCAN)
+    results = Campaign(tmp_path / "c.yaml").run(workers=1)
+    found = {(case.controller, case.parameters["last"]): row for case, row in results.done}
+    # For a second, after 0.3 m/s^2 from rest: 0.2 - 0.2^2 / (2 * 0.3) m. What never comes: no way.
+    for name, last, way in (("drive", 1, 0.1333), ("looks", 1, 0.1333), ("drive", 0, 0.0)):
+        assert found[name, last]["status"] == "passed", found[name, last]
+        assert found[name, last]["metrics"]["path_m"] == pytest.approx(way, abs=0.002)
+    assert found["misspelt", 1]["status"] == "crashed"
+
+
 PROGRAM = '''
 import json, os, subprocess, sys, time
 import ruedo

@@ -5,6 +5,7 @@ import json
 import os
 import pty
 import re
+import shutil
 import signal
 import struct
 import subprocess
@@ -12,7 +13,17 @@ import termios
 import xml.etree.ElementTree as ElementTree
 
 import pytest
-from conftest import CAMPAIGN, CONTROLLER, PATIENCE, RUEDO, results_in, ruedo, table, wait_for
+from conftest import (
+    CAMPAIGN,
+    CONTROLLER,
+    PATIENCE,
+    RUEDO,
+    SOURCE,
+    results_in,
+    ruedo,
+    table,
+    wait_for,
+)
 from ruedo.campaign import Campaign
 from ruedo.campaign.compare import compare_with
 
@@ -278,6 +289,37 @@ limits: {duration: 3}
     assert len(marks) == 30 and [bool(marks[f"student{i:02d}"]) for i in range(30)] == [
         i % 3 != 0 for i in range(30)
     ]
+
+
+def test_the_labs_of_a_class_are_marked_in_one_command(tmp_path):
+    """The labs' own answers pass; each of the others fails where it was made to."""
+    shutil.copytree(SOURCE / "clients/python/examples/labs", tmp_path / "labs")
+    folder = tmp_path / "labs/marking"
+    first = "import sys\nfrom pathlib import Path\n\nsys.path.append(str(Path(__file__).parents[1]))\nimport labs\n"
+    students = {
+        "runs_into_it": "class SonarAvoidance(labs.SonarAvoidance):\n    def program(self):\n        while True:\n            yield (0.4 if self.view.time < 20.0 else -0.4), 0.0\n",
+        "stands": "class WallFollowing(labs.WallFollowing):\n    def program(self):\n        while True:\n            yield 0.0, 0.0\n",
+        "guesses": "class ParticleFilter(labs.ParticleFilter):\n    def program(self):\n        self.estimate = self.true_pose() + 0.3\n        yield 0.0, 0.0\n",
+        "crashes": "class Square(labs.Square):\n    def program(self):\n        yield 1 / 0, 0.0\n",
+        "typo": "class UmbMark(labs.UmbMark):\n    def program(self)\n",
+    }
+    for name, text in students.items():
+        (folder / f"students/{name}.py").write_text(first + "\n\n" + text)
+    ruedo("campaign", "run", "labs.yaml", "--quiet", "--workers", "2", folder=folder, code=1)
+    frame = Campaign(folder / "labs.yaml").results().frame()
+    passed = frame[frame.passed].groupby("controller").size()
+    assert dict(passed) == {"solution": 6}
+    reasons = {(row.controller, row.lab): row.reason for row in frame.itertuples()}
+    assert len(reasons) == 6 * 6
+    for student, lab, text in (
+        ("runs_into_it", "SonarAvoidance", "touched"),
+        ("stands", "WallFollowing", "went 0.0 m, and 6 are asked for"),
+        ("guesses", "ParticleFilter", "believes to be 0.42 m from where it is"),
+        ("crashes", "Square", "ZeroDivisionError"),
+        ("typo", "UmbMark", "SyntaxError"),
+        ("stands", "Mapping", "has no Mapping"),
+    ):
+        assert text in reasons[student, lab], reasons[student, lab]
 
 
 def test_slurm(whole):

@@ -16,16 +16,16 @@ from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
-from harness import ARENA, BUILD, NODE, RUEDO
+from harness import ARENA, BUILD, NODE, RUEDO, SOURCE
 from mcap.reader import make_reader
 
 TOPICS = ["p3at/lrf", "p3at/odometry", "ruedo/world", "ruedo/frames", "ruedo/scene"]
 
 
 @contextmanager
-def serving(*arguments: str) -> Iterator[tuple[subprocess.Popen, str]]:
+def serving(*arguments: str, world: Path = ARENA) -> Iterator[tuple[subprocess.Popen, str]]:
     process = subprocess.Popen(
-        [RUEDO, "run", ARENA, "--foxglove", "127.0.0.1:0", *arguments],
+        [RUEDO, "run", world, "--foxglove", "127.0.0.1:0", *arguments],
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
@@ -121,6 +121,24 @@ def test_time_is_the_simulations(run: tuple[list[dict], dict]) -> None:
     times = [int(line["time"]) for line in run[0] if "time" in line]
     assert times == sorted(times) and len(times) > 50
     assert times[-1] < 60_000_000_000
+
+
+def test_a_fix_is_a_place_on_the_map() -> None:
+    """By hand: tests/ros2/instruments.sdf lies at 45 degrees north, 8 east, 110 m high."""
+    world = SOURCE / "tests/ros2/instruments.sdf"
+    with serving("--no-noise", world=world) as (_, url):
+        lines = seen(url, 6, "mast/gps")
+    channel = next(
+        line["channel"] for line in lines if line.get("channel", {}).get("topic") == "mast/gps"
+    )
+    assert channel["schemaName"] == "foxglove.LocationFix"
+    fixes = [json.loads(line["text"]) for line in lines if line.get("topic") == "mast/gps"]
+    assert fixes
+    for fix in fixes:
+        assert fix["latitude"] == pytest.approx(45, abs=1e-12)
+        assert fix["longitude"] == pytest.approx(8, abs=1e-12)
+        assert fix["altitude"] == pytest.approx(110, abs=1e-8)
+        assert fix["frame_id"] == "mast/gps" and fix["position_covariance_type"] == 0
 
 
 def open_socket(url: str, origin: str = "") -> tuple[socket.socket, bytes]:

@@ -68,6 +68,22 @@ def test_arrays_show_the_runs_without_a_copy():
     assert math.isinf(ranges[2, 1, 4])  # what was observed stays readable
 
 
+def test_what_has_not_come_since_a_reset_is_not_the_run_befores():
+    with engine(robots=2, worlds=2, fault=["r0/scan:dropout@0,for=1"]) as e:
+        with pytest.raises(ValueError, match=r"scan\.ranges has no sample yet"):
+            e.observe("scan.ranges")
+        e.step(None, 200)  # a second
+        ranges, times = e.observe("scan.ranges"), e.observe("scan.utime")
+        assert np.isfinite(ranges).all() and (times == 1_000_000).all()
+        e.reset()
+        with pytest.raises(ValueError, match=r"scan\.ranges has no sample yet"):
+            e.observe("scan.ranges")
+        assert np.isnan(ranges[:, 0]).all() and np.isfinite(ranges[:, 1]).all()
+        assert (times == 0).all()
+        e.step(None, 200)
+        assert np.isfinite(ranges).all() and e.observe("scan.ranges").shape == (2, 2, 5)
+
+
 def test_commands_are_broadcast_and_nan_is_none():
     with engine(robots=2, worlds=2) as e:
         x = e["pose.pos"][..., 0]

@@ -20,7 +20,7 @@ from typing import Any
 
 from ..engine import Engine
 from ..launch import find_ruedo
-from .controller import DONE, View, make_controller
+from .controller import DONE, NothingYet, View, make_controller
 from .functions import Function
 from .processes import die_with_parent, end_descendants, ends_within, limit_memory
 
@@ -148,7 +148,10 @@ class Runner:
         index = engine.robots.index(robot) if robot in engine.robots else -1
         commands = _no_commands(len(engine.robots))
         while engine.steps() < last:
-            answer = controller(view)
+            try:
+                answer = controller(view)
+            except NothingYet:
+                answer = None
             if isinstance(answer, str) and answer == DONE:
                 return
             commands[:] = float("nan")

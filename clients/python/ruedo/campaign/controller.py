@@ -15,12 +15,19 @@ DONE = "done"
 """What a controller answers to end its run."""
 
 
+class NothingYet(LookupError):
+    """A device that is asked for has published nothing so far. The robot stands meanwhile, as one
+    does whose program waits for its first message.
+    """
+
+
 class View:
     """What a controller in the engine sees of its robot at a decision.
 
-    view["lrf.ranges"]: the newest message's field, DEVICE.FIELD as in Engine.observe(). view.time:
-    s of sim time. view.parameters and view.seed: of the case. view.send(channel, message): a
-    command other than a velocity.
+    view["lrf.ranges"]: the newest message's field, DEVICE.FIELD as in Engine.observe(); NothingYet
+    where none has come, which a controller may leave to its caller. "lrf.ranges" in view tells
+    whether one has. view.time: s of sim time. view.parameters and view.seed: of the case.
+    view.send(channel, message): a command other than a velocity.
     """
 
     def __init__(self, engine: Engine, robot: str, parameters: dict[str, Any], seed: int) -> None:
@@ -37,7 +44,19 @@ class View:
 
     def __getitem__(self, name: str) -> NDArray[Any]:
         device = name.rpartition(".")[0].lower()
-        return np.asarray(self._engine.observe(name)[0, self._row.get(device, 0)])
+        try:
+            return np.asarray(self._engine.observe(name)[0, self._row.get(device, 0)])
+        except ValueError as error:
+            if "has no sample yet" in str(error):
+                raise NothingYet(f"{name}: nothing has come yet") from None
+            raise
+
+    def __contains__(self, name: str) -> bool:
+        try:
+            self[name]
+        except NothingYet:
+            return False
+        return True
 
     def send(self, channel: str, message: Any) -> None:
         """A message on one of the robot's channels: "move" or "p3at/move"."""

@@ -60,6 +60,10 @@ _VALUES = {
 }
 
 
+# Without what never comes at all no program does anything, and a hunt would find nothing else.
+_FIRST_MESSAGES_S = 1.0
+
+
 class Space:
     """content: of a checked campaign's file with its `hunt`."""
 
@@ -108,7 +112,8 @@ class Space:
         if not which:
             return []
         made = dict(self.faults[int(which)])
-        made.setdefault("at", _rounded(choices["fault_at"]))
+        earliest = _FIRST_MESSAGES_S if made["kind"] == "dropout" else 0.0
+        made.setdefault("at", _rounded(max(choices["fault_at"], earliest)))
         if choices["fault_for"] < self._duration and made["kind"] != "kidnapped":
             made.setdefault("duration", _rounded(choices["fault_for"]))
         if made["kind"] in _VALUES and "value" not in made:
