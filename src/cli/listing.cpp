@@ -148,6 +148,26 @@ void print_channels(FILE* out, const std::vector<world_info_t>& info) {
   print_rows(out, rows[""]);
 }
 
+namespace {
+
+// Infinity is no limit: what it is told, it does at once.
+std::string accelerations(const robot_info_t& robot) {
+  std::string limited, at_once;
+  const auto add = [&](const char* does, double limit, const char* unit) {
+    if (std::isfinite(limit))
+      limited += fmt::format("{}{} with {:g} {}", limited.empty() ? "" : ", ", does, limit, unit);
+    else
+      at_once += fmt::format("{}{}", at_once.empty() ? "" : " and ", does);
+  };
+  add("accelerates", robot.acceleration, "m/s^2");
+  add("brakes", robot.deceleration, "m/s^2");
+  add("turns", robot.turn_acceleration, "rad/s^2");
+  if (at_once.empty()) return limited;
+  return (limited.empty() ? "" : limited + "; ") + at_once + " at once: no limit is given";
+}
+
+}  // namespace
+
 void print_devices(FILE* out, const std::vector<world_info_t>& info) {
   const Style style = style_of(out);
   const Whole whole(info);
@@ -165,13 +185,10 @@ void print_devices(FILE* out, const std::vector<world_info_t>& info) {
       else
         fmt::print(out, "  wheels: {}; radius {:g} m, track {:g} m\n", wheels, robot.wheel_radius,
                    robot.track);
-      fmt::print(
-          out,
-          "  accelerates with {:g}, brakes with {:g} m/s^2, turns with {:g} rad/s^2; watchdog {}\n",
-          robot.acceleration, robot.deceleration, robot.turn_acceleration,
-          robot.watchdog_us > 0
-              ? fmt::format("{:g} s", static_cast<double>(robot.watchdog_us) * 1e-6)
-              : "off");
+      fmt::print(out, "  {}; watchdog {}\n", accelerations(robot),
+                 robot.watchdog_us > 0
+                     ? fmt::format("{:g} s", static_cast<double>(robot.watchdog_us) * 1e-6)
+                     : "off");
     }
     for (const device_info_t& device : whole.devices) {
       if (device.robot != robot.name) continue;

@@ -344,6 +344,16 @@ std::optional<std::string> ResourceFinder::find_anything(const std::string& writ
   return std::nullopt;
 }
 
+// The deepest folder that both are in.
+static std::string folder_of_both(const fs::path& one, const std::string& other) {
+  const fs::path two = fs::absolute(other).lexically_normal();
+  fs::path both;
+  for (auto a = one.begin(), b = two.begin(); a != one.end() && b != two.end() && *a == *b;
+       ++a, ++b)
+    both /= *a;
+  return both.string();
+}
+
 std::string ResourceFinder::why_not(const std::string& uri, const std::string& from) const {
   const std::string path = decoded(starts_with(uri, "file://") ? uri.substr(7) : uri);
   if (for_strangers_ || path.empty() || path.find('\0') != std::string::npos ||
@@ -356,7 +366,8 @@ std::string ResourceFinder::why_not(const std::string& uri, const std::string& f
     return "is a folder without model.config or model.sdf";
   if (!is_there(full) || allowed(full.string(), from)) return "is not found";
   return absolute ? "lies outside the folders that are searched (--allow-absolute lets it in)"
-                  : "leads out of the folders that are searched";
+                  : "leads out of the folders that are searched (RUEDO_PATH=" +
+                        folder_of_both(full, from) + " lets it in)";
 }
 
 std::optional<std::string> ResourceFinder::find_model(const std::string& uri,

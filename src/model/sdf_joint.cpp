@@ -116,6 +116,13 @@ void read_mimic(const Element& element, const std::vector<Joint>& joints, Joint&
   joint.leader = static_cast<int>(leader - joints.begin());
 }
 
+std::string beside_link(const std::string& joint) { return joint + " (joint)"; }
+
+std::string joint_frame(FrameGraph& frames, const std::string& joint) {
+  const std::string beside = beside_link(joint);
+  return frames.has(beside) ? beside : joint;
+}
+
 std::string joint_end(const Element& joint, const char* which) {
   return joint.string(which, "").empty() ? joint.string(std::string(which) + "/link_name", "")
                                          : joint.string(which, "");
@@ -227,7 +234,7 @@ Joint read_joint(const Element& element, SdfVersion version, FrameGraph& frames,
   joint.source = element.source;
   joint.type = read_type(element, where, context.findings);
   read_ends(element, frames, links, joint);
-  joint.X_MJ = frames.pose(required_name(element), element);
+  joint.X_MJ = frames.pose(joint_frame(frames, required_name(element)), element);
   read_axes(element, version, frames, where, context, joint);
   if (joint.type == JointType::gearbox) read_gear(element, frames, joint);
   return joint;

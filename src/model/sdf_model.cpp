@@ -167,6 +167,7 @@ class SdfReader::ModelReader {
   bool parts_missing_ = false;
   bool all_static_ = true;             // all that it consists of
   std::set<const Element*> left_out_;  // children
+  std::set<std::string> joint_names_;
   std::vector<Joint> anchors_;
 };
 
@@ -223,9 +224,12 @@ void SdfReader::ModelReader::read_attributes() {
 
 void SdfReader::ModelReader::read_parts() {
   std::vector<const Element*> in_order;  // frames last: of two of one name the frame goes
-  for (const bool is_frame : {false, true}) {
+  const auto rank = [](const Element& child) {
+    return child.name == "frame" ? 2 : child.name == "joint" ? 1 : 0;
+  };
+  for (const int each : {0, 1, 2}) {
     for (const auto& child : element_.children) {
-      if ((child->name == "frame") == is_frame) in_order.push_back(child.get());
+      if (rank(*child) == each) in_order.push_back(child.get());
     }
   }
   for (const Element* child : in_order) {
@@ -250,6 +254,12 @@ void SdfReader::ModelReader::read_part(const Element& child) {
     node = link_node(child);
   } else if (child.name == "joint") {
     node = attached_node(child, joint_end(child, "child"));
+    if (joint_names_.insert(node->name).second && frames_.has(node->name)) {
+      findings_.repaired(child.source, where_,
+                         "the joint '" + node->name +
+                             "' has the name of a link; as a frame the name is the link's");
+      node->name = beside_link(node->name);
+    }
   } else if (child.name == "frame") {
     const std::string* frame = child.attribute("attached_to");
     node = attached_node(child, frame ? *frame : "");
@@ -482,7 +492,7 @@ void SdfReader::ModelReader::read_joint_and_sensors(const Element& child) {
   if (parts_missing_ && lacks_an_end(child)) {
     findings_.error(child.source, here,
                     "it joins a link of a part that was not found; the joint is left out");
-    frames_.drop(name);
+    frames_.drop(joint_frame(frames_, name));
     return;
   }
   const bool read = read_or_leave_out(here, "the joint is left out", findings_, [&] {
@@ -490,7 +500,7 @@ void SdfReader::ModelReader::read_joint_and_sensors(const Element& child) {
         read_joint(child, version_, frames_, model_->links, here, reader_.context_));
   });
   if (!read) {
-    frames_.drop(name);
+    frames_.drop(joint_frame(frames_, name));
     return;
   }
   read_initial_position(child, here);

@@ -90,6 +90,10 @@ void make_sensor_names_unique(Model& model, const std::string& where, Findings& 
 // Checks that the names of an instance and of its devices are fit for channels.
 void check_channel_names(const ModelInstance& instance, const Source& source);
 
+// The frame of a joint: of its name, or one beside it where a link has the name.
+std::string joint_frame(FrameGraph& frames, const std::string& joint);
+std::string beside_link(const std::string& joint);
+
 // The name in a joint's <parent> or <child>, which old files write in <link_name>; "" when there is
 // none.
 std::string joint_end(const Element& joint, const char* which);

@@ -362,7 +362,9 @@ TEST(BadFiles, NothingIsReadOutsideTheSearchPath) {
       "<sdf version='1.9'><model name='secret'><link name='l'/></model></sdf>";
   const std::string secret = folder.write("secret/model.sdf", model);
   folder.write("a/b/near.sdf", model);
-  const std::string out = "leads out of the folders that are searched",
+  const std::string root = std::filesystem::path(secret).parent_path().parent_path().string();
+  const std::string out = "leads out of the folders that are searched (RUEDO_PATH=" + root +
+                          " lets it in)",
                     absolute =
                         "lies outside the folders that are searched (--allow-absolute lets it in)";
   const std::pair<std::string, std::string> cases[] = {{secret, absolute},

@@ -70,6 +70,27 @@ TEST(OddElements, AFrameNamedLikeSomethingElse) {
   EXPECT_EQ(link_of(*inner->models.at(0).model, "k").X_ML.translation.z(), 2.0);
 }
 
+// URDF lets a joint have the name of a link; both stay.
+TEST(OddElements, AJointMayHaveTheNameOfALink) {
+  const auto world = world_of(
+      "<model name='m'><joint name='a' type='revolute'><pose>0 0 1 0 0 0</pose><parent>base"
+      "</parent><child>a</child><axis><xyz>0 1 0</xyz></axis></joint><link name='base'/>"
+      "<link name='a'><pose>0 0 2 0 0 0</pose></link></model>");
+  EXPECT_THAT(texts(*world), ElementsAre("the joint 'a' has the name of a link; as a frame the "
+                                         "name is the link's"));
+  const Model& model = *world->models[0].model;
+  ASSERT_EQ(model.joints.size(), 1u);
+  EXPECT_EQ(model.joints[0].name, "a");
+  EXPECT_EQ(model.joints[0].X_MJ.translation.z(), 3.0);  // its pose is in its child
+  EXPECT_EQ(model.links[1].X_ML.translation.z(), 2.0);
+  const auto twice = world_of(
+      "<model name='m'><link name='a'/><link name='b'/><joint name='j' type='fixed'><parent>a"
+      "</parent><child>b</child></joint><joint name='j' type='fixed'><parent>a</parent><child>b"
+      "</child></joint></model>");
+  EXPECT_EQ(twice->models[0].model->joints.size(), 1u);
+  EXPECT_THAT(texts(*twice), ElementsAre(HasSubstr("the name 'j' is taken")));
+}
+
 TEST(OddElements, TwoRobotsOfOneName) {
   const std::string robot =
       "<model name='r'><link name='l'><sensor name='odometry' type='imu'/></link></model>";

@@ -38,6 +38,32 @@ TEST(Urdf, ARootNamedWorldIsTheWorld) {
   EXPECT_EQ(arm.joints[0].child, 0);
 }
 
+TEST(Urdf, APlaceThatCannotBeReadIsNamedAndTheRobotStays) {
+  TemporaryFolder folder;
+  const auto world = load_world(folder.write("bot.urdf", R"x(<robot name="bot">
+  <link name="a"/><link name="b"/><link name="c"/>
+  <joint name="one" type="fixed"><parent link="a"/><child link="b"/>
+    <origin xyz="0.07, 0, -0.69" rpy="0 0 0"/></joint>
+  <joint name="two" type="revolute"><parent link="b"/><child link="c"/>
+    <origin xyz="$(optenv BOT_XYZ 1 2 3)"/><axis xyz="0 up 0"/>
+    <limit lower="-1" upper="1" effort="1" velocity="1"/></joint></robot>)x"));
+  const Model& bot = *world->models.back().model;
+  ASSERT_EQ(bot.joints.size(), 2u);
+  EXPECT_EQ(bot.joints[0].X_MJ.translation, Vec3(0.07, 0, -0.69));
+  EXPECT_EQ(bot.joints[1].X_MJ.translation, Vec3(0.07, 0, -0.69));
+  EXPECT_EQ(bot.joints[1].axis.axis_in_J, Vec3::UnitX());
+  std::vector<std::string> said;
+  for (const Finding& each : world->findings)
+    said.push_back(std::to_string(each.source.line) + " " + each.element + " " + each.text);
+  EXPECT_EQ(said,
+            (std::vector<std::string>{
+                "4 joint one xyz=\"0.07, 0, -0.69\" of <origin> is not three numbers; its "
+                "commas are taken for blanks",
+                "6 joint two xyz=\"$(optenv BOT_XYZ 1 2 3)\" of <origin> is not three "
+                "numbers; 0 0 0 is taken",
+                "6 joint two xyz=\"0 up 0\" of <axis> is not three numbers; 1 0 0 is taken"}));
+}
+
 TEST(Urdf, OnlyTheRootMayBeTheWorld) {
   TemporaryFolder folder;
   const std::string file = folder.write("arm.urdf", R"(<robot name="arm"><link name="base"/>
