@@ -163,29 +163,46 @@ std::vector<log_file_t> hashed_files(const std::vector<std::string>& paths) {
   return files;
 }
 
-void find_files_again(log_header_t& header, const std::string& log) {
-  namespace fs = std::filesystem;
+namespace {
+
+namespace fs = std::filesystem;
+
+// A file of that content in those folders whose path ends as the given one's does; "" where there
+// is none.
+std::string found_again(const log_file_t& file, const std::vector<fs::path>& folders) {
   std::error_code error;
-  const fs::path beside = fs::absolute(log, error).parent_path();
-  for (log_file_t& file : header.files) {
-    if (fs::is_regular_file(file.path, error)) continue;  // changed or not: that is told
-    const fs::path was = fs::path(file.path).lexically_normal();
-    const auto found = [&]() -> std::string {
-      for (auto begin = was.begin(); begin != was.end(); ++begin) {
-        fs::path end;
-        for (auto part = begin; part != was.end(); ++part) end /= *part;
-        if (end.is_absolute()) continue;
-        for (const fs::path& folder : {beside, fs::path(model::shipped_worlds())}) {
-          const fs::path here = folder / end;
-          if (fs::is_regular_file(here, error) && sha256_of_file(here.string()) == file.sha256)
-            return here.string();
-        }
-      }
-      return "";
-    }();
-    if (found.empty()) continue;
+  const fs::path was = fs::path(file.path).lexically_normal();
+  for (auto begin = was.begin(); begin != was.end(); ++begin) {
+    fs::path end;
+    for (auto part = begin; part != was.end(); ++part) end /= *part;
+    if (end.is_absolute()) continue;
+    for (const fs::path& folder : folders) {
+      const fs::path here = folder / end;
+      if (fs::is_regular_file(here, error) && sha256_of_file(here.string()) == file.sha256)
+        return here.string();
+    }
+  }
+  return "";
+}
+
+}  // namespace
+
+void find_files_again(log_header_t& header, const std::string& log) {
+  std::error_code error;
+  const fs::path beside = fs::absolute(log, error).parent_path(), shipped = model::shipped_worlds();
+  const auto move = [&](log_file_t& file, const std::vector<fs::path>& folders) {
+    const std::string found = found_again(file, folders);
+    if (found.empty()) return;
     if (header.world_file == file.path) header.world_file = found;
     file.path = found;
+  };
+  for (log_file_t& file : header.files) {
+    if (!fs::is_regular_file(file.path, error)) move(file, {beside, shipped});
+  }
+  // What is there may be another installation's: ours is as good, and may be looked at.
+  const model::ResourceFinder finder(header.world_file, false);
+  for (log_file_t& file : header.files) {
+    if (!finder.reaches(file.path)) move(file, {shipped});
   }
 }
 

@@ -31,8 +31,9 @@ log_header_t make_log_header(const model::WorldModel& world, uint64_t seed,
 std::vector<log_file_t> hashed_files(const std::vector<std::string>& paths);
 
 // A log may have been made elsewhere: a file that is not where it was is looked for beside the log,
-// and among Ruedo's own worlds, by the end of its path and its SHA-256. The header then names that
-// one.
+// and among Ruedo's own worlds, by the end of its path and its SHA-256; one that is there, but
+// where nothing may be looked at, as another installation's, among the latter. The header then
+// names what was found.
 void find_files_again(log_header_t& header, const std::string& log);
 
 // Throws InputError when a file that the log was made from is gone or was changed: names the first.

@@ -4,6 +4,7 @@ damaged, cut off or no logs.
 
 import os
 import random
+import shutil
 import signal
 import struct
 import subprocess
@@ -139,6 +140,29 @@ def test_a_changed_file_is_named_first(tmp_path):
     world.unlink()
     result = program("verify", tmp_path / "a.lcm")
     assert result.returncode == 3 and str(world) in result.stderr
+
+
+def test_a_log_of_another_installation_that_is_still_there(tmp_path):
+    """Whose models lie in no folder of ours, but are ours."""
+    for folder in ("there/bin", "there/share/ruedo", "mine/worlds"):
+        (tmp_path / folder).mkdir(parents=True)
+    shutil.copy(RUEDO, tmp_path / "there/bin")
+    shutil.copytree(SOURCE / "worlds", tmp_path / "there/share/ruedo/worlds")
+    world = tmp_path / "mine/worlds/mine.sdf"
+    world.write_text(
+        "<sdf version='1.9'><world name='mine'>"
+        "<include><uri>model://ground_plane</uri></include><include><uri>model://p3at</uri></include>"
+        "</world></sdf>"
+    )
+    log = tmp_path / "log.lcm"
+    run = ["run", world, *QUICK, "--rate", "max", "--duration", "1", "--record", log]
+    subprocess.run([tmp_path / "there/bin/ruedo", *run, "--lcm", "memq://"], check=True)
+    header = next(
+        log_header_t.decode(data) for _, name, data in events(log) if name == "ruedo/header"
+    )
+    assert any(str(tmp_path / "there") in file.path for file in header.files)
+    done = program("verify", log)
+    assert done.returncode == 0 and "byte for byte" in done.stdout, done.stderr
 
 
 def test_another_machine_is_said_first_and_is_no_nondeterminism(tmp_path):

@@ -10,8 +10,10 @@ import struct
 import sys
 import time
 
+from ruedo import lcmtypes  # where the system has no GLib, LCM finds the one of Ruedo's wheel
+
+# isort: split
 import lcm
-from ruedo import lcmtypes
 
 
 def info(options):

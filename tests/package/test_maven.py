@@ -62,6 +62,20 @@ def test_the_artifact_is_whole(artifact):
     assert pom.find("m:dependencies", space) is None
 
 
+def test_the_compiler_has_nothing_to_say(artifact, tmp_path):
+    """Of the library, its examples and the programs of its tests."""
+    import lcm
+
+    other = Path(lcm.__file__).resolve().parents[1] / "share/java/lcm.jar"
+    folders = ("clients/java/examples", "tests/clients", "tests/console")
+    programs = [file for folder in folders for file in (SOURCE / folder).rglob("*.java")]
+    programs += [HERE / "Drive.java"]
+    javac = ("javac", "--release", "11", "-Xlint:all", "-Werror", "-encoding", "UTF-8")
+    for sources in ([*(SOURCE / "clients/java/src/ruedo").glob("*.java")], programs):
+        assert sources
+        run(*javac, "-d", tmp_path, "-cp", f"{artifact['jar']}:{other}", *sources)
+
+
 @pytest.fixture(scope="module")
 def repository(artifact, tmp_path_factory):
     """A local repository that has it: Maven's own plugins come from the user's, by links."""

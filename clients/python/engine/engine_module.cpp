@@ -22,6 +22,7 @@
 #include "model/load.h"
 #include "model/randomization.h"
 #include "ruedo/errors.h"
+#include "ruedo/math.h"
 #include "scene/gl_context.h"
 #include "watched_run.h"
 
@@ -270,6 +271,9 @@ NB_MODULE(_engine, module) {
   module.attr("build") = ruedo::log::own_version();
   nb::exception<ruedo::InputError>(module, "InputError", PyExc_ValueError);
   nb::exception<ruedo::EnvironmentError>(module, "EnvironmentError", PyExc_OSError);
+  // Python's own are the C library's, whose last bit differs from one system to the next.
+  module.def("sin", &ruedo::math::sin);
+  module.def("cos", &ruedo::math::cos);
   nb::class_<PyEngine>(module, "Engine")
       .def(nb::init<const std::string&, const std::optional<std::string>&, int, uint64_t, bool, int,
                     const std::vector<std::string>&, const std::vector<std::string>&,

@@ -89,8 +89,8 @@ def __getattr__(name: str) -> object:
         from .engine import Engine
     except ImportError as error:
         raise ImportError(
-            "ruedo.Engine is not in this installation of the client (it was installed without a build of Ruedo): "
-            f"use BUILD/python, or an installed Ruedo ({error})"
+            "ruedo.Engine is not in this installation of the client: it comes with Ruedo's wheel, for Python 3.11 "
+            f"and newer, and with a build of Ruedo, for the Python that built it ({error})"
         ) from error
     return Engine
 

@@ -214,7 +214,8 @@ public final class Probe {
         Collisions first = robot.collisions().latest(PATIENCE);
         say("free", first.points.size(), first.blockedBy.isEmpty() ? "-" : first.blockedBy);
         List<Object> met = Collections.synchronizedList(new ArrayList<>(List.of("met")));
-        try (Subscription open = robot.onCollision(sample -> met.add(sample.points.get(0).body))) {
+        Subscription open = robot.onCollision(sample -> met.add(sample.points.get(0).body));
+        try (open) {
             for (String what : List.of("once", "twice")) {
                 Motion motion = robot.advance(20.0);
                 attempt(what, () -> motion.await());
