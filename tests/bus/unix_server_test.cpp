@@ -6,6 +6,7 @@
 #include <fstream>
 #include <memory>
 #include <mutex>
+#include <thread>
 #include <vector>
 
 #include <gtest/gtest.h>
@@ -109,6 +110,27 @@ TEST(UnixServer, BothWaysInOrder) {
   EXPECT_EQ(served.heard.back(), "x");
   other.take_until(2);
   EXPECT_EQ(other.came.back(), (std::pair<std::string, std::string>{"b", "to the other"}));
+}
+
+TEST(UnixServer, KnowsWhatIsHeard) {
+  const Folder folder;
+  UnixServer bus(folder.url());
+  bus.listen({"in"}, [](const std::string&, const uint8_t*, size_t) {});
+  const auto wait_for_change = [&bus](uint64_t before) {
+    while (bus.audience() == before) std::this_thread::yield();
+    return bus.audience();
+  };
+  EXPECT_FALSE(bus.is_heard("a"));
+  uint64_t audience = bus.audience();
+  {
+    UnixConnection connection(folder.url().host);
+    connection.subscribe("a");
+    audience = wait_for_change(audience);
+    EXPECT_TRUE(bus.is_heard("a"));
+    EXPECT_FALSE(bus.is_heard("b"));
+  }
+  wait_for_change(audience);
+  EXPECT_FALSE(bus.is_heard("a"));
 }
 
 TEST(UnixServer, IsTheUsersOwn) {
