@@ -269,7 +269,7 @@ export default async function controls(tools) {
   // ---- going to where one clicks
   await page.locator("#canvas").focus();
   await page.keyboard.press("g");
-  await click([0.8, -1]);
+  const near = await click([0.8, -1]);
   await page.keyboard.down("Shift");
   const last = await click([0, -1.2]);
   await page.keyboard.up("Shift");
@@ -279,13 +279,47 @@ export default async function controls(tools) {
     (await page.evaluate(() => window.ruedo.trip.points().length)) === 2,
     "other points",
   );
+  // In one go, so that nothing else moves between both pictures.
+  const way = await page.evaluate(() => {
+    const { stage, way } = window.ruedo,
+      picture = () => {
+        stage.renderer.render(stage.scene, stage.camera);
+        return document.getElementById("canvas").toDataURL();
+      };
+    const visible = way.line.visible && way.ends.visible,
+      drawn = picture();
+    way.line.visible = way.ends.visible = false;
+    const without = picture();
+    way.line.visible = way.ends.visible = visible;
+    const points = ({ geometry }) => [...geometry.getAttribute("position").array];
+    return {
+      visible,
+      differs: drawn !== without,
+      ends: points(way.ends),
+      line: points(way.line),
+    };
+  });
+  const isAt = (at, [x, y]) => Math.hypot(way.ends[at] - x, way.ends[at + 1] - y) < 0.01;
+  check(
+    "the way there is drawn, from the robot through all clicks",
+    way.visible &&
+      way.differs &&
+      way.ends.length === 6 &&
+      way.line.length === 9 &&
+      way.line.slice(3).join() === way.ends.join() &&
+      isAt(0, near) &&
+      isAt(3, last),
+    JSON.stringify([way, near, last]),
+  );
   await until(
     "the robot goes to where the clicks were",
     ([x, y]) => {
-      const { stage, trip } = window.ruedo,
+      const { stage, trip, way } = window.ruedo,
         base = stage.description.bases.findIndex(({ robot }) => robot === "p3dx"),
         at = stage.planar(base);
-      return trip.points().length === 0 && Math.hypot(at.x - x, at.y - y) < 0.06;
+      return (
+        !way.line.visible && trip.points().length === 0 && Math.hypot(at.x - x, at.y - y) < 0.06
+      );
     },
     last,
   );

@@ -74,6 +74,11 @@ export default async function senses({ page, until, check, seen, ready, picture 
       /probe\/base_link -?0\.00\d m/.test(text)
     );
   });
+  await until("a link that moves is in it, as its joint has it", () =>
+    /probe\/arm -0\.\d{3} m, -?0\.00\d m, 0\.\d{3} m, pitch (2\d|3\d)\.\d°/.test(
+      document.getElementById("tf").textContent,
+    ),
+  );
   await picture("senses");
   const triangles = () => window.ruedo.stage.renderer.info.render.triangles;
   await until("(it is drawn)", (n) => window.ruedo.stage.frames > n, 3);

@@ -3,6 +3,7 @@ recorded runs.
 """
 
 import contextlib
+import itertools
 import json
 import math
 import re
@@ -262,6 +263,7 @@ def test_what_robots_sense_in_space_is_shown(tmp_path):
         "a slider moves a joint",
         "an IMU at rest shows gravity, and no turning",
         "frames are a tree",
+        "a link that moves is in it, as its joint has it",
         "shapes of physics take the place of looks",
         "and looks come back",
     } <= set(seen)
@@ -330,6 +332,38 @@ def test_the_page_loads_fast_fits_and_says_what_is_wrong(tmp_path):
     } <= set(said)
 
 
+def test_what_is_open_is_kept_for_each_world(tmp_path):
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        port = probe.getsockname()[1]
+    worlds = itertools.cycle([SOURCE / "worlds/arena.sdf", SOURCE / "tests/console/aside.sdf"])
+
+    def server():
+        return running(world=next(worlds), view=f"127.0.0.1:{port}")
+
+    said, context = [], server()
+    process = context.__enter__()
+    try:
+        with browser(process.url, tmp_path, "layout") as page:
+            for line in page.stdout:
+                said.append(line.rstrip())
+                if line.startswith("another world"):
+                    context.__exit__(None, None, None)
+                    context = server()
+                    process = context.__enter__()
+                    page.stdin.write("done\n")
+                    page.stdin.flush()
+            page.wait(60)
+    finally:
+        context.__exit__(None, None, None)
+    judged("layout", tmp_path, said, page.returncode)
+    assert {
+        "plots are of their world",
+        "what was open is open again",
+        "and in the other world what was open there",
+    } <= set(said)
+
+
 @pytest.fixture(scope="module")
 def steered(tmp_path_factory):
     """The log of a run in which everything was steered, and what was seen then: nothing where that
@@ -366,6 +400,7 @@ def test_everything_is_steered(steered):
         *(f"{layer} make a difference to the picture" for layer in LAYERS),
         "a box was placed",
         "the box stands where the click was",
+        "the way there is drawn, from the robot through all clicks",
         "the robot goes to where the clicks were",
         "a robot was placed",
         "where there is no room, it says so",

@@ -35,6 +35,7 @@ import { FrameTree } from "./ui/frames";
 import { fillHelp } from "./ui/help";
 import { Inset } from "./ui/inset";
 import { listenToKeys } from "./ui/keys";
+import { Layout } from "./ui/layout";
 import { makeLegend } from "./ui/legend";
 import { Notice } from "./ui/notice";
 import { Panel } from "./ui/panel";
@@ -168,6 +169,7 @@ export class App {
       this.rewind.onPast = (past, kept) => this.onPast(past, kept);
       this.rewind.onKept = (channel, bytes) => this.plots.message(channel, bytes);
     }
+    new Layout(page);
     makeLegend(byId("legend"), page);
     this.stage.onDetail = (reduced) => page.set({ reduced });
     if (!this.stage.renderer) byId("flat").hidden = false;
@@ -341,7 +343,6 @@ export class App {
     const first = this.page.now.world === null;
     this.page.set({ world, scene: files?.description ?? null, robot: at });
     if (!first) return;
-    if (this.plots.channels.length === 0) this.plots.restore();
     this.goTo(placeOf(location.hash));
   }
 
@@ -505,7 +506,6 @@ export class App {
 
   private togglePanel(): void {
     const panel = !this.page.now.panel;
-    remember("panel", panel ? "open" : "closed");
     this.page.set({ panel });
   }
 

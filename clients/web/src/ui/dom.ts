@@ -42,6 +42,13 @@ export const remember = (key: string, value: string) => {
     /* private mode */
   }
 };
+// Of a world, and for those that are new.
+export function rememberFor(world: string, key: string, value: string): void {
+  remember(key, value);
+  remember(`${key} of ${world}`, value);
+}
+export const recallFor = (world: string, key: string) =>
+  recall(`${key} of ${world}`) ?? recall(key);
 export const recall = (key: string) => {
   try {
     return localStorage.getItem(`ruedo.${key}`);

@@ -220,6 +220,7 @@ const labelOf = ({ channel, path }: { channel: string; path: string }) => `${cha
 export class FieldPlots {
   readonly element: HTMLElement;
   private readonly panes: Pane[] = [];
+  private of = ""; // the world whose panes they are
   private readonly list = h("div");
   private readonly channel = h("select", { "aria-label": "channel to plot", class: "wide" });
   private readonly field = h("select", { "aria-label": "field to plot", class: "wide" });
@@ -256,7 +257,13 @@ export class FieldPlots {
     );
     this.element.addEventListener("dragover", (event) => event.preventDefault());
     this.element.addEventListener("drop", (event) => this.drop(event));
-    page.watch(["world"], () => this.fillChannels());
+    page.watch(["world"], ({ world }) => {
+      if (world && world.name !== this.of) {
+        this.of = world.name;
+        this.restore();
+      }
+      this.fillChannels();
+    });
   }
 
   get channels(): string[] {
@@ -301,17 +308,18 @@ export class FieldPlots {
     for (const pane of this.panes) pane.restyle();
   }
 
-  // What was plotted when the page was left.
-  restore(): void {
+  // What was plotted when this world was left.
+  private restore(): void {
+    for (const { element } of this.panes.splice(0)) element.remove();
     try {
-      const panes = JSON.parse(recall("plots") ?? "[]") as [string, string][][];
+      const panes = JSON.parse(recall(`plots of ${this.of}`) ?? "[]") as [string, string][][];
       panes.forEach((pane) =>
         pane
           .filter(([channel]) => !isCompared(channel) || this.page.now.hello?.compared)
           .forEach(([channel, path], i) => this.plot(channel, path, i === 0)),
       );
     } catch {
-      remember("plots", "[]");
+      remember(`plots of ${this.of}`, "[]");
     }
   }
 
@@ -351,7 +359,7 @@ export class FieldPlots {
 
   private onChanged(): void {
     remember(
-      "plots",
+      `plots of ${this.of}`,
       JSON.stringify(
         this.panes.map(({ series }) => series.map(({ channel, path }) => [channel, path])),
       ),

@@ -1,10 +1,13 @@
-// The tree of frames of a robot: world, odom and base_link, and the frame of each device below it.
+// The tree of frames of a robot: world, odom and base_link, and below it the frame of each device
+// and of each link that moves against it.
 import type { Page } from "../state/page";
 import type { Stage } from "../scene/stage";
 import * as THREE from "three";
+import { matrixOf } from "../scene/matrix";
 import { h, say } from "./dom";
 
 const kNoFrame = new Set(["odometry", "pose", "motion", "collisions", "joints"]);
+const kMostLinks = 200;
 const kPeriod_ms = 200;
 
 const number = (value: number, unit: string) =>
@@ -31,6 +34,8 @@ export class FrameTree {
   private readonly position = new THREE.Vector3();
   private readonly rotation = new THREE.Quaternion();
   private readonly scale = new THREE.Vector3();
+  private readonly body = new THREE.Matrix4();
+  private links: { body: number; pose: HTMLElement }[] = [];
   private shown_ms = 0;
 
   constructor(
@@ -56,18 +61,26 @@ export class FrameTree {
           h("span", { class: "dim" }, poseWords(position, orientation)),
         ),
       );
+    const moving = (world!.bodies ?? [])
+      .filter(
+        ({ name, index }) =>
+          name.startsWith(`${robot.name}/`) && index >= 0 && index !== (base?.body ?? -1),
+      )
+      .slice(0, kMostLinks);
+    this.links = moving.map(({ index }) => ({ body: index, pose: h("span", { class: "dim" }) }));
+    const links = moving.map(({ name }, i) => item(name, this.links[i]!.pose));
     const start = base ? poseWords(base.start.slice(0, 3), base.start.slice(3)) : "";
     this.list.replaceChildren(
       item(
         "world",
         "",
         item(`${robot.name}/odom`, h("span", { class: "dim" }, start)),
-        item(`${robot.name}/base_link`, this.basePose, ...devices),
+        item(`${robot.name}/base_link`, this.basePose, ...devices, ...links),
       ),
     );
   }
 
-  // Once a frame: where base_link is now.
+  // Once a frame: where base_link is now, and links in it.
   follow(at_ms: number): void {
     if (!(this.element as HTMLDetailsElement).open || at_ms - this.shown_ms < kPeriod_ms) return;
     this.shown_ms = at_ms;
@@ -75,8 +88,19 @@ export class FrameTree {
       name = world?.robots[robot]?.name;
     if (!this.stage.base(scene?.bases.findIndex((base) => base.robot === name) ?? -1, this.matrix))
       return;
-    this.matrix.decompose(this.position, this.rotation, this.scale);
+    say(this.basePose, this.words(this.matrix));
+    this.matrix.invert();
+    const { poses } = this.stage;
+    for (const { body, pose } of this.links) {
+      if (!poses.known[body]) continue;
+      matrixOf(poses.now, 7 * body, this.body).premultiply(this.matrix);
+      say(pose, this.words(this.body));
+    }
+  }
+
+  private words(matrix: THREE.Matrix4): string {
+    matrix.decompose(this.position, this.rotation, this.scale);
     const { x, y, z, w } = this.rotation;
-    say(this.basePose, poseWords(this.position.toArray(), [w, x, y, z]));
+    return poseWords(this.position.toArray(), [w, x, y, z]);
   }
 }

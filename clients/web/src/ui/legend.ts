@@ -1,7 +1,7 @@
 // The chips that switch what is drawn over the scene.
 import { kLayerColours, kLayers, type Layer } from "../scene/layers";
 import type { Page } from "../state/page";
-import { h, remember } from "./dom";
+import { h } from "./dom";
 
 export function makeLegend(place: HTMLElement, page: Page): void {
   const chips = new Map(
@@ -47,6 +47,5 @@ export function makeLegend(place: HTMLElement, page: Page): void {
 function toggle(page: Page, layer: Layer): void {
   const layers = new Set(page.now.layers);
   if (!layers.delete(layer)) layers.add(layer);
-  remember("layers-off", kLayers.filter((each) => !layers.has(each)).join());
   page.set({ layers });
 }

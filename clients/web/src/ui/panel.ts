@@ -1,6 +1,6 @@
 // The panel beside the view: pages for the robot, its plots, the channels, and the world.
 import { kTabs, type Page, type Tab } from "../state/page";
-import { h, remember } from "./dom";
+import { h } from "./dom";
 
 const kSearched = 12; // more robots than these can be searched
 
@@ -74,7 +74,6 @@ export class Panel {
   }
 
   private open(tab: Tab): void {
-    remember("page", tab);
     this.page.set({ tab });
   }
 

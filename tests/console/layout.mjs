@@ -1,0 +1,47 @@
+// What is open is kept for each world by itself. Who started this has another world served on the
+// same address when it is told so.
+export default async function layout({ page, seen, told, until, expect, ready, picture }) {
+  expect(/WebSocket|ERR_CONNECTION|Failed to load|socket/);
+  const world = () => page.evaluate(() => window.ruedo.page.now.world.name);
+  const open = () => {
+    const { tab, layers } = window.ruedo.page.now;
+    return [tab, layers.has("sonar"), window.ruedo.plots.channels.join()].join(" ");
+  };
+  const isOpen = (what, words) =>
+    until(
+      what,
+      ([of, words]) => {
+        const { world, tab, layers } = window.ruedo.page.now;
+        const is = [tab, layers.has("sonar"), window.ruedo.plots.channels.join()].join(" ");
+        return world?.name === of && is === words;
+      },
+      words,
+    );
+  const change = async () => {
+    const before = await world();
+    seen("another world");
+    await told();
+    await until(
+      "(it is there)",
+      (name) => (window.ruedo.page.now.world?.name ?? name) !== name,
+      before,
+    );
+    return before;
+  };
+  await ready();
+  await page.getByRole("tab", { name: "Plots" }).click();
+  await page.evaluate(() => window.ruedo.plots.plot("p3at/odometry", "x", false));
+  await page.locator('[data-layer="sonar"]').click();
+  const first = await page.evaluate(open);
+  const one = await change();
+  const two = await world();
+  await isOpen("plots are of their world", [two, "Plots false "]);
+  await page.getByRole("tab", { name: "World" }).click();
+  await page.locator('[data-layer="sonar"]').click();
+  await page.reload();
+  await ready();
+  await isOpen("what was open is open again", [two, "World true "]);
+  await change();
+  await isOpen("and in the other world what was open there", [one, first]);
+  await picture("layout");
+}
