@@ -25,7 +25,7 @@ class Thermometer : public Sensor {
         heater_(setup.element.vector3("thermometer/heater", Vec3::Zero(),
                                       Allowed::any(quantity::kLength))),
         noise_(setup.noise ? Noise(setup.element.child("thermometer/noise")) : Noise()) {
-    const model::LinkPlacement& link = setup.layout.links[static_cast<size_t>(setup.link)];
+    const model::LinkPlacement& link = setup.layout.links[setup.link];
     body_ = link.body;
     X_BS_ = link.X_BL * setup.X_LS;
     RandomStream constants = random_.stream(kConstantDraws);
@@ -33,7 +33,7 @@ class Thermometer : public Sensor {
   }
 
   void sample(const SampleInput& input, Outbox& out) override {
-    const Pose X_WB = body_ < 0 ? Pose{} : input.snapshot.bodies[static_cast<size_t>(body_)];
+    const Pose X_WB = body_.valid() ? input.snapshot.bodies[body_] : Pose{};
     const Vec3 place = X_WB * X_BS_.translation, way = heater_ - place;
     const double distance = way.norm();
     const bool warmed =
@@ -49,12 +49,13 @@ class Thermometer : public Sensor {
 
  private:
   RandomSource random_;
-  int channel_, link_;
+  int channel_;
+  LinkIndex link_;
   double ambient_, power_;  // degrees Celsius; degrees Celsius m^2
   Vec3 heater_;             // m, world
   Noise noise_;
-  int body_ = -1;  // into BodyLayout::bodies; -1: does not move
-  Pose X_BS_;      // the device in its body
+  BodyIndex body_;  // none: does not move
+  Pose X_BS_;       // the device in its body
 };
 
 const RegisterSensor kRegister{

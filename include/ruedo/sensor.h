@@ -77,9 +77,9 @@ struct SensorSetup {
   const Element&
       element;  // its <sensor>, or <ruedo:odometry>, ...; an empty element when there is none
   std::string robot, device;  // names; the main channel is robot + "/" + device
-  int robot_index;            // into layout.robots and Snapshot::robots
-  int link;                   // into layout.links: the link that carries it
-  Pose X_LS;                  // the device's frame in that link
+  RobotIndex robot_index;
+  LinkIndex link;  // that carries it
+  Pose X_LS;       // the device's frame in that link
   RandomSource random;
   bool noise;          // false: --no-noise
   Rate rate;           // <update_rate>, or the module's default
@@ -146,6 +146,9 @@ struct SensorKind {
   // Attached kinds only: the rate that the robot's drive asks for; where it is null, or the robot
   // has no drive, default_rate holds.
   std::function<Rate(const model::DriveDescription&)> drive_rate = {};
+  // For --set: what a <sensor> of that type may have below it besides what the file has written, as
+  // paths: "lidar.range.max".
+  std::function<std::vector<std::string>(const std::string& type)> settings = {};
 
   const std::string& name() const { return kind.empty() ? module : kind; }
 };

@@ -9,6 +9,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "ruedo/index.h"
 #include "ruedo/pose.h"
 #include "ruedo/sim_time.h"
 
@@ -16,8 +17,8 @@ namespace ruedo {
 
 // Two shapes that touched during the step that led to this state.
 struct Contact {
-  int link_a = -1, link_b = -1;    // indices into BodyLayout::links
-  int body_a = -1, body_b = -1;    // indices into BodyLayout::bodies; -1: static
+  LinkIndex link_a, link_b;
+  BodyIndex body_a, body_b;        // none: static
   Vec3 position = Vec3::Zero();    // m, world
   Vec3 normal = Vec3::UnitZ();     // unit, world, from b towards a
   double force = 0.0;              // N along the normal, mean over the step
@@ -29,7 +30,7 @@ struct Contact {
 // A contact of a robot with what it runs into: with something that is no part of it, that does not
 // carry it and does not lie on it.
 struct Collision {
-  int robot = -1;    // index into BodyLayout::robots
+  RobotIndex robot;
   int contact = -1;  // index into Snapshot::contacts
   bool as_a = true;  // the robot's is link_a
 };
@@ -39,14 +40,14 @@ struct MotionState {
   int64_t id = 0;
   int8_t kind = 0, state = 0, reason = 0;
   double done = 0.0, remaining = 0.0;
-  int blocked_by = -1;  // while the reason is that it is blocked: index into BodyLayout::links
+  LinkIndex blocked_by = {};  // while the reason is that it is blocked
   int64_t changes = 0;  // counts the changes of id, kind, state and reason, and the MotionEnds
 };
 
 // What came to its end by a command in this step: a primitive that it replaced, or the command
 // itself, refused.
 struct MotionEnd {
-  int robot = -1;  // index into BodyLayout::robots
+  RobotIndex robot;
   MotionState state;
 };
 
@@ -63,16 +64,17 @@ struct RobotState {
 struct Snapshot {
   int64_t step = 0;
   SimTime time = 0;
-  Vec3 wind = Vec3::Zero();              // m/s: in the step that led here
-  std::vector<Pose> bodies;              // X_WB
-  std::vector<Twist> body_twists;        // of B's origin
-  std::vector<Vec3> body_accelerations;  // m/s^2, of B's origin, without gravity
-  std::vector<double> wheel_angles;      // rad since the start, positive ahead, not wrapped
-  std::vector<double> wheel_rates;       // rad/s
-  std::vector<double> joint_positions;   // rad or m
-  std::vector<double> joint_velocities;
-  std::vector<double> joint_efforts;
-  std::vector<RobotState> robots;
+  Vec3 wind = Vec3::Zero();                           // m/s: in the step that led here
+  IndexedVector<BodyIndex, Pose> bodies;              // X_WB
+  IndexedVector<BodyIndex, Twist> body_twists;        // of B's origin
+  IndexedVector<BodyIndex, Vec3> body_accelerations;  // m/s^2, of B's origin, without gravity
+  IndexedVector<WheelIndex, double>
+      wheel_angles;  // rad since the start, positive ahead, not wrapped
+  IndexedVector<WheelIndex, double> wheel_rates;      // rad/s
+  IndexedVector<JointIndex, double> joint_positions;  // rad or m
+  IndexedVector<JointIndex, double> joint_velocities;
+  IndexedVector<JointIndex, double> joint_efforts;
+  IndexedVector<RobotIndex, RobotState> robots;
   std::vector<MotionEnd> motion_ends;  // by robot, then in the order of the commands
   std::vector<Contact> contacts;       // in a fixed order
   std::vector<Collision> collisions;   // by robot, then in the order of the contacts

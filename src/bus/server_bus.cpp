@@ -7,6 +7,7 @@
 #include <sys/socket.h>
 
 #include "bus/lcm_bus.h"
+#include "bus/rival_watch.h"
 #include "bus/tcpq_server.h"
 #include "bus/unix_server.h"
 #include "ruedo/errors.h"
@@ -68,7 +69,9 @@ ServerBus on_free_tcp_port(const std::string& world) {
 
 }  // namespace
 
-ServerBus open_server_bus(const std::string& text, const std::string& world) {
+namespace {
+
+ServerBus unwatched_bus(const std::string& text, const std::string& world) {
   const char* environment = std::getenv("LCM_DEFAULT_URL");
   const bool asked = !text.empty() || (environment && *environment);
   const bool routed = has_route(parse_url(kDefaultUrl));
@@ -96,6 +99,16 @@ ServerBus open_server_bus(const std::string& text, const std::string& world) {
   } else {
     made.bus = std::make_unique<LcmBus>(made.url.str());
   }
+  return made;
+}
+
+}  // namespace
+
+ServerBus open_server_bus(const std::string& text, const std::string& world,
+                          std::function<void(const std::string&)> say) {
+  ServerBus made = unwatched_bus(text, world);
+  if (made.url.scheme != "memq")  // there nobody else can be
+    made.bus = std::make_unique<RivalWatch>(std::move(made.bus), std::move(say));
   return made;
 }
 

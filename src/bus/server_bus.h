@@ -2,6 +2,7 @@
 // tcpq server.
 #pragma once
 
+#include <functional>
 #include <memory>
 #include <string>
 
@@ -25,10 +26,12 @@ struct ServerBus {
 
 // `text` is an LCM URL; "auto": a free port of this machine; "auto-tcp": the same, and tcpq in any
 // case; "": $LCM_DEFAULT_URL, else LCM's default group, else, where that has no route,
-// tcpq://127.0.0.1:7700. `world` is what others are told of this server. Throws InputError for a
+// tcpq://127.0.0.1:7700. `world` is what others are told of this server; `say` gets a line about
+// each rival (rival_watch.h). Throws InputError for a
 // bad address and EnvironmentError, with the cure, when it cannot be served or another server has
 // it.
-ServerBus open_server_bus(const std::string& text, const std::string& world);
+ServerBus open_server_bus(const std::string& text, const std::string& world,
+                          std::function<void(const std::string&)> say);
 
 // What a shell needs to send clients there.
 std::string export_line(const LcmUrl& url);  // export LCM_DEFAULT_URL='...'

@@ -25,9 +25,8 @@ constexpr int kFewestScans = 200, kRounds = 15;
 model::Mesh triangles_of(const model::WorldModel& world, const model::BodyLayout& layout) {
   model::Mesh mesh;
   for (const model::LinkPlacement& placement : layout.links) {
-    const model::ModelInstance& instance = world.models[static_cast<size_t>(placement.instance)];
-    for (const model::Collision& collision :
-         instance.model->links[static_cast<size_t>(placement.link)].collisions) {
+    const model::ModelInstance& instance = world.models[placement.instance];
+    for (const model::Collision& collision : instance.model->links[placement.link].collisions) {
       if (collision.geometry.shape != model::Shape::box) continue;
       const auto first = static_cast<uint32_t>(mesh.positions.size());
       for (int corner = 0; corner < 8; ++corner) {

@@ -87,7 +87,7 @@ void ExperimentRig::look() {
 }
 
 void ExperimentRig::start(const robot::MoveCommand& command) {
-  robots_->apply({0, command});
+  robots_->apply({RobotIndex(0), command});
   give_up_ = now_.time + kMostTime;
   step();
 }

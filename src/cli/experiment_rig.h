@@ -28,7 +28,7 @@ class ExperimentRig {
   explicit ExperimentRig(const RigOptions& options);
 
   void velocity(double v, double omega) {
-    robots_->apply({0, robot::VelocityCommand{v, 0.0, omega}});
+    robots_->apply({RobotIndex(0), robot::VelocityCommand{v, 0.0, omega}});
   }
   void step();
   // Commands a primitive and steps until it has ended; calls each() after every step. Throws

@@ -208,7 +208,7 @@ void laser_experiment(Experiments& all) {
   for (int i = 0; i < scan.nranges; ++i) {
     // The angle of ray i as the world file has it: the message's are floats.
     const double angle = kRobotYaw - M_PI / 2 + M_PI * i / 180.0;
-    const double range = expected.range(angle), seen = scan.ranges[static_cast<size_t>(i)];
+    const double range = expected.range(angle), seen = scan.ranges[i];
     worst = std::max(worst, std::isinf(range) && std::isinf(seen) ? 0.0 : std::abs(range - seen));
     const double x = expected.x + seen * math::cos(angle), y = expected.y + seen * math::sin(angle);
     plot.line({{expected.x, expected.y}, {x, y}}, "#d62728", "", false, 0.7);

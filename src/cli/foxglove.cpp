@@ -182,9 +182,8 @@ std::string location_json(const navsat_t& navsat, const std::string& frame, uint
 // A part of a link as a list of triangles in the body's frame, or the world's.
 void write_part(JsonWriter& json, const scene::RenderContent& content,
                 const scene::RenderPart& part, bool many, const Pose& X_BL) {
-  const scene::Batch& batch =
-      content.batches[static_cast<size_t>(many ? part.small_batch : part.batch)];
-  const scene::RenderMesh& mesh = content.meshes[static_cast<size_t>(batch.mesh)];
+  const scene::Batch& batch = content.batches[many ? part.small_batch : part.batch];
+  const scene::RenderMesh& mesh = content.meshes[batch.mesh];
   const scene::Affine M = scene::compose(scene::to_affine(X_BL), part.M_LP);
   std::map<uint32_t, size_t> places;  // of vertices among the points
   std::vector<uint32_t> vertices;
@@ -265,10 +264,9 @@ void FoxgloveExport::send_frames(const run::LogWorlds::Scene& scene, uint64_t ti
   JsonWriter json;
   json.open('{').name("transforms").open('[');
   for (const model::RobotPlacement& robot : layout.robots) {
-    const model::ModelInstance& instance = scene.world->models[static_cast<size_t>(robot.instance)];
+    const model::ModelInstance& instance = scene.world->models[robot.instance];
     if (instance.removed) continue;
-    const model::BodyPlacement* body =
-        robot.body < 0 ? nullptr : &layout.bodies[static_cast<size_t>(robot.body)];
+    const model::BodyPlacement* body = robot.body < 0 ? nullptr : &layout.bodies[robot.body];
     write_frame(json, time_ns, body ? body->name : "world", instance.name, robot.X_BBase);
     write_frame(json, time_ns, "world", instance.name + "/odom",
                 body ? body->X_WB * robot.X_BBase : robot.X_BBase);
@@ -294,7 +292,7 @@ void FoxgloveExport::send_scene(const model::WorldModel& world, uint64_t time_ns
   const scene::RenderContent content(world, layout);
   std::vector<int> links_of_kind(content.link_kinds.size());
   for (const int kind : content.kind_of_link) {
-    if (kind >= 0) ++links_of_kind[static_cast<size_t>(kind)];
+    if (kind >= 0) ++links_of_kind[kind];
   }
   if (scene_sent_) {
     JsonWriter all;
@@ -323,9 +321,8 @@ void FoxgloveExport::send_scene(const model::WorldModel& world, uint64_t time_ns
       const auto kind = static_cast<size_t>(content.kind_of_link[link]);
       json.open('{');
       write_time(json, "timestamp", time_ns);
-      json.member("frame_id", placement.body < 0
-                                  ? std::string("world")
-                                  : layout.bodies[static_cast<size_t>(placement.body)].name);
+      json.member("frame_id",
+                  placement.body < 0 ? std::string("world") : layout.bodies[placement.body].name);
       json.member("id", instance.name + "/" + instance.model->links[k].name);
       write_time(json, "lifetime", 0);
       json.member("frame_locked", true).name("triangles").open('[');

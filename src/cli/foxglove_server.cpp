@@ -252,8 +252,7 @@ class Viewer : public console::Connection {
   void publish(std::string_view message) {
     if (message.size() < 4) return complain("a message without a channel");
     uint32_t id = 0;
-    for (int i = 3; i >= 0; --i)
-      id = id << 8 | static_cast<uint8_t>(message[static_cast<size_t>(i)]);
+    for (int i = 3; i >= 0; --i) id = id << 8 | static_cast<uint8_t>(message[i]);
     const auto known = published_.find(id);
     if (known == published_.end()) return complain(fmt::format("no channel {} was advertised", id));
     const std::vector<uint8_t> command = velocity_of(message.substr(4));

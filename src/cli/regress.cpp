@@ -9,7 +9,6 @@
 #include <fnmatch.h>
 #include <spdlog/spdlog.h>
 
-#include "bus/rival_watch.h"
 #include "bus/server_bus.h"
 #include "cli/client_process.h"
 #include "cli/commands.h"
@@ -68,9 +67,10 @@ run::RunOptions server_options(const RegressArguments& arguments) {
 std::string run(const RegressArguments& arguments,
                 const std::shared_ptr<const model::WorldModel>& world, bool isolated,
                 judge::Judge& judge) {
-  bus::ServerBus place = bus::open_server_bus(isolated ? "auto" : "auto-tcp", world->name);
-  bus::RivalWatch bus(std::move(place.bus), [](const std::string& line) { spdlog::warn(line); });
-  run::Run server(world, server_options(arguments), bus);
+  const bus::ServerBus place =
+      bus::open_server_bus(isolated ? "auto" : "auto-tcp", world->name,
+                           [](const std::string& line) { spdlog::warn(line); });
+  run::Run server(world, server_options(arguments), *place.bus);
   Progress progress("running " + world->name, parse_duration_us(arguments.duration));
   server.on_state([&](const Snapshot& snapshot) {
     judge.see(snapshot);

@@ -84,7 +84,7 @@ cv::Mat picture_of_camera(const RenderArguments& arguments, const model::WorldMo
   Outbox out;
   device->sensor->sample({initial_snapshot(layout), 0, nullptr, renderer.get()}, out);
   for (const Outbox::Entry& entry : out.entries()) {
-    if (device->channels[static_cast<size_t>(entry.channel)] != arguments.camera) continue;
+    if (device->channels[entry.channel] != arguments.camera) continue;
     image_t image;
     if (image.decode(out.data(entry), 0, static_cast<int>(entry.size)) < 0) break;
     if (image.pixelformat == image_t::PIXEL_FORMAT_MJPEG)

@@ -103,8 +103,7 @@ Snapshot initial_snapshot(const model::BodyLayout& layout) {
   s.robots.resize(layout.robots.size());
   for (size_t i = 0; i < layout.robots.size(); ++i) {
     const model::RobotPlacement& robot = layout.robots[i];
-    s.robots[i].X_WBase =
-        robot.body < 0 ? robot.X_BBase : s.bodies[static_cast<size_t>(robot.body)] * robot.X_BBase;
+    s.robots[i].X_WBase = robot.body < 0 ? robot.X_BBase : s.bodies[robot.body] * robot.X_BBase;
   }
   return s;
 }
@@ -113,7 +112,7 @@ std::vector<std::string> device_names(const model::WorldModel& world,
                                       const model::BodyLayout& layout) {
   std::vector<std::string> names;
   for (const model::RobotPlacement& robot : layout.robots) {
-    const model::ModelInstance& instance = world.models[static_cast<size_t>(robot.instance)];
+    const model::ModelInstance& instance = world.models[robot.instance];
     for (const model::SensorDescription& sensor : instance.model->sensors) {
       if (kind_of(sensor.type)) names.push_back(instance.name + "/" + sensor.name);
     }
@@ -125,20 +124,18 @@ std::unique_ptr<LoneDevice> make_lone_device(const model::WorldModel& world,
                                              const model::BodyLayout& layout,
                                              const std::string& name, bool noise) {
   static const Element kNothing;
-  for (size_t robot = 0; robot < layout.robots.size(); ++robot) {
-    const auto instance_index = static_cast<size_t>(layout.robots[robot].instance);
+  for (const RobotIndex robot : layout.robots.indices()) {
+    const InstanceIndex instance_index = layout.robots[robot].instance;
     const model::ModelInstance& instance = world.models[instance_index];
     for (const model::SensorDescription& sensor : instance.model->sensors) {
       const SensorKind* kind = kind_of(sensor.type);
       if (!kind || instance.name + "/" + sensor.name != name) continue;
       auto device = std::make_unique<LoneDevice>();
       device->kind = kind;
-      const int link = layout.first_link[instance_index] + sensor.link;
-      const model::LinkPlacement& placement = layout.links[static_cast<size_t>(link)];
-      const Pose X_WL =
-          placement.body < 0
-              ? placement.X_BL
-              : layout.bodies[static_cast<size_t>(placement.body)].X_WB * placement.X_BL;
+      const LinkIndex link = layout.link_of(instance_index, sensor.link);
+      const model::LinkPlacement& placement = layout.links[link];
+      const Pose X_WL = placement.body.valid() ? layout.bodies[placement.body].X_WB * placement.X_BL
+                                               : placement.X_BL;
       device->X_WS = X_WL * sensor.X_LS;
       const Element& element = sensor.element ? *sensor.element : kNothing;
       SensorSetup setup{world,
@@ -146,7 +143,7 @@ std::unique_ptr<LoneDevice> make_lone_device(const model::WorldModel& world,
                         element,
                         instance.name,
                         sensor.name,
-                        static_cast<int>(robot),
+                        robot,
                         link,
                         sensor.X_LS,
                         RandomSource(1, instance.name, sensor.name),
@@ -196,7 +193,7 @@ std::vector<scene::Line> device_rays(const model::WorldModel& world,
           out);
     }
     for (const Outbox::Entry& entry : out.entries()) {
-      const std::string& type = device->types[static_cast<size_t>(entry.channel)];
+      const std::string& type = device->types[entry.channel];
       planar_lidar_t scan;
       lidar_t layers;
       sonar_t sonar;

@@ -69,13 +69,10 @@ std::vector<std::string> joints_of(const model::WorldModel& world, const std::st
   const model::BodyLayout layout(world);
   std::vector<std::string> names;
   for (const model::RobotPlacement& placement : layout.robots) {
-    const model::ModelInstance& instance = world.models[static_cast<size_t>(placement.instance)];
+    const model::ModelInstance& instance = world.models[placement.instance];
     if (instance.name != robot || instance.removed) continue;
-    for (const int joint : placement.joints)
-      names.push_back(
-          instance.model
-              ->joints[static_cast<size_t>(layout.joints[static_cast<size_t>(joint)].joint)]
-              .name);
+    for (const JointIndex joint : placement.joints)
+      names.push_back(instance.model->joints[layout.joints[joint].joint].name);
   }
   return names;
 }

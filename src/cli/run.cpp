@@ -15,7 +15,6 @@
 #include <spdlog/spdlog.h>
 #include <unistd.h>
 
-#include "bus/rival_watch.h"
 #include "bus/server_bus.h"
 #include "cli/commands.h"
 #include "cli/extensions.h"
@@ -237,8 +236,9 @@ int run_world(const RunArguments& arguments) {
   }
   const std::shared_ptr<const model::WorldModel> world = load(arguments.world);
   for (std::string& plugin : plugin_options()) options.result_options.push_back(std::move(plugin));
-  bus::ServerBus place = bus::open_server_bus(arguments.lcm, world->name);
-  bus::RivalWatch bus(std::move(place.bus), [](const std::string& line) { spdlog::warn(line); });
+  const bus::ServerBus place = bus::open_server_bus(
+      arguments.lcm, world->name, [](const std::string& line) { spdlog::warn(line); });
+  Bus& bus = *place.bus;
   RunView viewed(arguments.viewed, arguments.view);
   viewed.follow(options);
   const Ros2Arguments ros2 = ros2_arguments(arguments, options);

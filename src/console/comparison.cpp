@@ -12,6 +12,7 @@
 #include "core/utf8.h"
 #include "log/diff.h"
 #include "ruedo/decode.h"
+#include "ruedo/math.h"
 #include "ruedo/pose.h"
 #include "ruedo/pose_t.hpp"
 #include "ruedo/schema.h"
@@ -68,7 +69,7 @@ Quat rotation_of(const pose_t& pose) {
 
 double angle_between(const Quat& a, const Quat& b) {
   const Quat turn = a.conjugate() * b;
-  const double angle = 2.0 * std::atan2(turn.vec().norm(), std::abs(turn.w()));
+  const double angle = 2.0 * math::atan2(turn.vec().norm(), std::abs(turn.w()));
   return angle < kAnyAngle_rad ? 0.0 : angle;
 }
 

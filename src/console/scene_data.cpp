@@ -105,7 +105,7 @@ void write_light(JsonWriter& json, const scene::RenderLight& light) {
 // fast: it stands fast. body: that carries the model; -1: none, and the pose is that in the world.
 void write_model(JsonWriter& json, const model::ModelInstance& instance,
                  const model::BodyLayout& layout, size_t index) {
-  const model::LinkPlacement& first = layout.links[static_cast<size_t>(layout.first_link[index])];
+  const model::LinkPlacement& first = layout.links[layout.first_link[index]];
   json.open('{')
       .member("name", instance.name)
       .member("first_link", layout.first_link[index])
@@ -195,7 +195,7 @@ SceneData::SceneData(const model::WorldModel& world, int version) {
           .member("small", part.small_batch)
           .member("shadow", part.casts_shadow);
       std::array<double, 12> rows{};  // of [M | t]
-      for (int i = 0; i < 12; ++i) rows[static_cast<size_t>(i)] = part.M_LP(i / 4, i % 4);
+      for (int i = 0; i < 12; ++i) rows[i] = part.M_LP(i / 4, i % 4);
       list(out.name("matrix"), rows.data(), 12);
       list(out.name("diffuse"), part.diffuse.data(), 4);
       list(out.name("specular"), part.specular.data(), 4);
@@ -214,8 +214,8 @@ SceneData::SceneData(const model::WorldModel& world, int version) {
   for (size_t r = 0; r < layout.robots.size(); ++r) {
     const model::RobotPlacement& robot = layout.robots[r];
     for (size_t w = 0; w < robot.wheels.size(); ++w) {
-      const model::WheelPlacement& wheel = layout.wheels[static_cast<size_t>(robot.wheels[w])];
-      if (layout.links[static_cast<size_t>(wheel.link)].wheel < 0) continue;
+      const model::WheelPlacement& wheel = layout.wheels[robot.wheels[w]];
+      if (layout.links[wheel.link].wheel < 0) continue;
       out.open('[').value(wheel.link).value(static_cast<int>(r)).value(static_cast<int>(w));
       for (int k = 0; k < 3; ++k) out.value(wheel.center_in_L[k]);
       for (int k = 0; k < 3; ++k) out.value(wheel.axis_in_L[k]);
@@ -226,12 +226,9 @@ SceneData::SceneData(const model::WorldModel& world, int version) {
   // z, qw, qx, qy, qz.
   out.close(']').name("bases").open('[');
   for (const model::RobotPlacement& robot : layout.robots) {
-    out.open('{')
-        .member("robot", world.models[static_cast<size_t>(robot.instance)].name)
-        .member("body", robot.body);
-    const Pose start = robot.body < 0
-                           ? robot.X_BBase
-                           : layout.bodies[static_cast<size_t>(robot.body)].X_WB * robot.X_BBase;
+    out.open('{').member("robot", world.models[robot.instance].name).member("body", robot.body);
+    const Pose start =
+        robot.body < 0 ? robot.X_BBase : layout.bodies[robot.body].X_WB * robot.X_BBase;
     list(out.name("pose"), numbers(robot.X_BBase).data(), 7);
     list(out.name("start"), numbers(start).data(), 7);
     out.close('}');
@@ -242,7 +239,7 @@ SceneData::SceneData(const model::WorldModel& world, int version) {
   Blob placements;
   for (size_t i = 0; i < layout.links.size(); ++i) {
     const model::LinkPlacement& link = layout.links[i];
-    const bool removed = world.models[static_cast<size_t>(link.instance)].removed;
+    const bool removed = world.models[link.instance].removed;
     placements.add(int32_t{removed ? -1 : content.kind_of_link[i]});
     placements.add(int32_t{link.body});
     for (const double value : numbers(link.X_BL)) placements.add(static_cast<float>(value));

@@ -14,7 +14,7 @@ void Tap::announce(const std::shared_ptr<const run::Announcement>& announcement)
 }
 
 void Tap::message(const run::Published& message) {
-  Traffic*& traffic = by_index_[static_cast<size_t>(message.index)];
+  Traffic*& traffic = by_index_[message.index];
   if (!traffic) traffic = find(message.channel);
   if (traffic) offer(*traffic, message.data, message.size);
 }

@@ -36,8 +36,7 @@ int Channels::add(Channel channel) {
   const int index = static_cast<int>(place - channels_.begin());
   if (const auto [other, added] = by_bus_name_.try_emplace(channel.bus_name, index); !added) {
     throw InputError({}, "two channels are called '" + channel.bus_name + "': '" +
-                             channels_[static_cast<size_t>(other->second)].name + "' and '" +
-                             channel.name + "'");
+                             channels_[other->second].name + "' and '" + channel.name + "'");
   }
   if (place == channels_.end()) {
     channels_.push_back(std::move(channel));

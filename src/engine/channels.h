@@ -43,7 +43,7 @@ class Channels {
   }
 
   const std::vector<Channel>& list() const { return channels_; }
-  const Channel& operator[](int index) const { return channels_[static_cast<size_t>(index)]; }
+  const Channel& operator[](int index) const { return channels_[index]; }
 
   // A robot is gone, or one device of it. The indices of all other channels stay.
   void remove(const std::string& robot, const std::string& device = "");

@@ -123,9 +123,9 @@ CommandInbox::CommandInbox(std::vector<Input> inputs, int robots)
 }
 
 void CommandInbox::listen(int index) {
-  const Input& input = inputs_[static_cast<size_t>(index)];
+  const Input& input = inputs_[index];
   if (input.kind == Input::Kind::reset_odometry) {
-    reset_input_[static_cast<size_t>(input.robot)] = index;
+    reset_input_[input.robot] = index;
   } else {
     by_channel_.insert_or_assign(input.channel, index);
   }
@@ -146,14 +146,14 @@ void CommandInbox::add(const std::vector<Input>& inputs, int robots) {
   }
 }
 
-void CommandInbox::remove(int robot) {
+void CommandInbox::remove(RobotIndex robot) {
   std::lock_guard lock(mutex_);
   for (Input& input : inputs_) {
     if (input.robot != robot) continue;
     by_channel_.erase(input.channel);
     input.channel.clear();
   }
-  slots_[static_cast<size_t>(robot)].size = 0;
+  slots_[robot].size = 0;
   std::erase(waiting_, robot);
   const auto is_of = [robot](const Entry& entry) { return entry.command.robot == robot; };
   const auto end = scheduled_.begin() + static_cast<std::ptrdiff_t>(scheduled_count_);
@@ -174,7 +174,7 @@ void CommandInbox::receive(const std::string& channel, const uint8_t* data, size
   const auto found = by_channel_.find(channel);
   if (found == by_channel_.end()) return;
   if (size > kMaxMessageSize) return refuse(channel, "more than 64 kB");
-  const Input& input = inputs_[static_cast<size_t>(found->second)];
+  const Input& input = inputs_[found->second];
   robot::Command command;
   command.robot = input.robot;
   const DecodeFault fault = decode_command(input.kind, data, size, command);
@@ -187,13 +187,13 @@ void CommandInbox::receive(const std::string& channel, const uint8_t* data, size
   keep(found->second, command, data, size);
 }
 
-void CommandInbox::reset_odometry(int robot, const std::vector<uint8_t>& body) {
+void CommandInbox::reset_odometry(RobotIndex robot, const std::vector<uint8_t>& body) {
   robot::Command command{robot, robot::ResetOdometry{}};
-  keep(reset_input_[static_cast<size_t>(robot)], command, body.data(), body.size());
+  keep(reset_input_[robot], command, body.data(), body.size());
 }
 
-CommandInbox::Entry& CommandInbox::next_entry(int robot) {
-  Slots& slots = slots_[static_cast<size_t>(robot)];
+CommandInbox::Entry& CommandInbox::next_entry(RobotIndex robot) {
+  Slots& slots = slots_[robot];
   if (slots.size == 0) waiting_.push_back(robot);
   if (slots.size == kKeptPerRobot) {
     slots.first = (slots.first + 1) % kKeptPerRobot;
@@ -221,13 +221,11 @@ CommandInbox::Scheduled CommandInbox::schedule(int64_t step, int input, const ui
   if (input < 0 || static_cast<size_t>(input) >= inputs_.size() || size > kMaxMessageSize)
     return Scheduled::faulty;
   robot::Command command;
-  command.robot = inputs_[static_cast<size_t>(input)].robot;
-  if (decode_command(inputs_[static_cast<size_t>(input)].kind, data, size, command) !=
-      DecodeFault::none)
+  command.robot = inputs_[input].robot;
+  if (decode_command(inputs_[input].kind, data, size, command) != DecodeFault::none)
     return Scheduled::faulty;
   model::Fault asked;
-  if (inputs_[static_cast<size_t>(input)].kind == Input::Kind::fault &&
-      !check_fault_message(data, size, asked).empty())
+  if (inputs_[input].kind == Input::Kind::fault && !check_fault_message(data, size, asked).empty())
     return Scheduled::faulty;
   std::lock_guard lock(mutex_);
   if (step < next_step_) return Scheduled::late;
@@ -273,8 +271,8 @@ void CommandInbox::apply(robot::Robots& robots, Faults& faults, int64_t step, Ba
       scheduled_bytes_ -= entry.bytes.size();
       std::swap(next_taken(count), entry);
     }
-    for (int robot : waiting_) {
-      Slots& slots = slots_[static_cast<size_t>(robot)];
+    for (const RobotIndex robot : waiting_) {
+      Slots& slots = slots_[robot];
       for (size_t i = 0; i < slots.size; ++i)
         std::swap(next_taken(count), slots.entries[(slots.first + i) % kKeptPerRobot]);
       slots.size = 0;
@@ -285,7 +283,7 @@ void CommandInbox::apply(robot::Robots& robots, Faults& faults, int64_t step, Ba
             taken_.begin() + static_cast<std::ptrdiff_t>(count),
             [](const Entry& a, const Entry& b) { return a.arrival < b.arrival; });
   for (size_t i = 0; i < count; ++i) {
-    if (inputs_[static_cast<size_t>(taken_[i].input)].kind == Input::Kind::fault) {
+    if (inputs_[taken_[i].input].kind == Input::Kind::fault) {
       model::Fault fault;
       if (check_fault_message(taken_[i].bytes.data(), taken_[i].bytes.size(), fault).empty())
         faults.begin(fault, taken_[i].command.robot, step);
@@ -294,7 +292,7 @@ void CommandInbox::apply(robot::Robots& robots, Faults& faults, int64_t step, Ba
     }
     if (static_cast<size_t>(batch.applied_count) == batch.applied.size())
       batch.applied.emplace_back();
-    AppliedCommand& applied = batch.applied[static_cast<size_t>(batch.applied_count++)];
+    AppliedCommand& applied = batch.applied[batch.applied_count++];
     applied.step = step;
     applied.input = taken_[i].input;
     std::swap(applied.bytes, taken_[i].bytes);

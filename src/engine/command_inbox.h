@@ -26,7 +26,7 @@ class Faults;
 struct Input {
   enum class Kind { velocity, wheels, move, joints, fault, reset_odometry };
   std::string channel;  // on the bus
-  int robot = -1;       // index into BodyLayout::robots
+  RobotIndex robot;
   Kind kind = Kind::velocity;
 };
 
@@ -47,7 +47,7 @@ class CommandInbox {
   void receive(const std::string& channel, const uint8_t* data, size_t size);
 
   // Asks for a reset of a robot's odometry, with the request's body for the log. Any thread.
-  void reset_odometry(int robot, const std::vector<uint8_t>& body);
+  void reset_odometry(RobotIndex robot, const std::vector<uint8_t>& body);
 
   // Keeps a command, as it would come over the bus, that acts on the state of exactly that step:
   // before the live ones of that step, in the order of scheduling. input: index into inputs().
@@ -70,7 +70,7 @@ class CommandInbox {
 
   // Robots that come and go; while nothing is received or applied. `inputs` are all of one robot.
   void add(const std::vector<Input>& inputs, int robots);
-  void remove(int robot);
+  void remove(RobotIndex robot);
   void begin_time_anew();  // steps count from 0: what was scheduled is dropped
 
   uint64_t refused() const { return refused_; }      // faulty messages
@@ -90,7 +90,7 @@ class CommandInbox {
   };
 
   void listen(int input);
-  Entry& next_entry(int robot);  // with the mutex held
+  Entry& next_entry(RobotIndex robot);  // with the mutex held
   void keep(int input, robot::Command& command, const uint8_t* data, size_t size);
   void refuse(const std::string& channel, const char* why);
   Entry& next_taken(size_t& count);
@@ -101,7 +101,7 @@ class CommandInbox {
   std::vector<int> reset_input_;                     // of each robot
   mutable std::mutex mutex_;
   std::vector<Slots> slots_;
-  std::vector<int> waiting_;  // robots with entries
+  std::vector<RobotIndex> waiting_;  // with entries
   uint64_t arrivals_ = 0;
   std::vector<Entry> scheduled_;  // the first scheduled_count_ are a heap, the next step on top
   size_t scheduled_count_ = 0, scheduled_bytes_ = 0;

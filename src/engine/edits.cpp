@@ -69,11 +69,11 @@ Outcome unknown(const std::string& name) {
 }
 
 // Why a model cannot be pushed; "": it can.
-std::string why_immovable(const Simulation& simulation, int instance) {
-  const model::Model& model = *simulation.world().models[static_cast<size_t>(instance)].model;
+std::string why_immovable(const Simulation& simulation, InstanceIndex instance) {
+  const model::Model& model = *simulation.world().models[instance].model;
   if (model.path) return "moves along its path";
   const model::BodyLayout& layout = simulation.layout();
-  const size_t first = static_cast<size_t>(layout.first_link[static_cast<size_t>(instance)]);
+  const size_t first = static_cast<size_t>(layout.first_link[instance]);
   bool moves = false, stands = false;
   for (size_t link = first; link < first + model.links.size(); ++link)
     (layout.links[link].body >= 0 ? moves : stands) = true;
@@ -82,12 +82,11 @@ std::string why_immovable(const Simulation& simulation, int instance) {
   return stands ? "is fixed to the world by a joint" : "";
 }
 
-Pose link_now(const Simulation& simulation, size_t instance, size_t link) {
+Pose link_now(const Simulation& simulation, InstanceIndex instance, ModelLinkIndex link) {
   const model::BodyLayout& layout = simulation.layout();
-  const model::LinkPlacement& placement =
-      layout.links[static_cast<size_t>(layout.first_link[instance]) + link];
-  return placement.body < 0 ? placement.X_BL
-                            : simulation.physics().pose(placement.body) * placement.X_BL;
+  const model::LinkPlacement& placement = layout.links[layout.link_of(instance, link)];
+  return placement.body.valid() ? simulation.physics().pose(placement.body) * placement.X_BL
+                                : placement.X_BL;
 }
 
 }  // namespace
@@ -141,13 +140,13 @@ Outcome spawn(const spawn_request_t& request, const model::LoadedModel& loaded, 
     return refused("the world has " + std::to_string(kMostModels) +
                    " models, those that were removed included; a reset makes room");
   }
-  if (!request.name.empty() && find_model(world, request.name) >= 0)
+  if (!request.name.empty() && find_model(world, request.name).valid())
     return refused("the name '" + request.name + "' is taken");
   name = request.name.empty() ? unused_name(world, loaded.name) : request.name;
   if (const std::string fault = fault_of_name(name); !fault.empty())
     return bad("the model's name '" + name + "' " + fault);
   const Pose X_WM = spawn_pose(world, *loaded.model, request);
-  const auto now = [&](size_t instance, size_t link) {
+  const auto now = [&](InstanceIndex instance, ModelLinkIndex link) {
     return link_now(simulation, instance, link);
   };
   if (const std::string other = model::overlapped(world, *loaded.model, X_WM, now);
@@ -169,8 +168,8 @@ Outcome spawn(const spawn_request_t& request, const model::LoadedModel& loaded, 
 }
 
 Outcome remove(const std::string& name, Simulation& simulation, Channels& channels) {
-  const int instance = find_model(simulation.world(), name);
-  if (instance < 0) return unknown(name);
+  const InstanceIndex instance = find_model(simulation.world(), name);
+  if (!instance.valid()) return unknown(name);
   simulation.remove_model(instance, channels);
   return {};
 }
@@ -180,9 +179,9 @@ Pose pose_of(const set_pose_request_t& request) {
 }
 
 bool stands_fast(const model::WorldModel& world, const std::string& name) {
-  const int instance = find_model(world, name);
-  if (instance < 0) return false;
-  const model::Model& model = *world.models[static_cast<size_t>(instance)].model;
+  const InstanceIndex instance = find_model(world, name);
+  if (!instance.valid()) return false;
+  const model::Model& model = *world.models[instance].model;
   return !model.path && (model.is_static ||
                          std::any_of(model.joints.begin(), model.joints.end(),
                                      [](const model::Joint& joint) { return joint.parent < 0; }));
@@ -193,11 +192,11 @@ Outcome set_pose(const set_pose_request_t& request, int64_t step, Simulation& si
   if (const std::string fault = fault_of_pose(request.position, request.orientation);
       !fault.empty())
     return bad(fault);
-  const int instance = find_model(simulation.world(), request.name);
-  if (instance < 0) return unknown(request.name);
+  const InstanceIndex instance = find_model(simulation.world(), request.name);
+  if (!instance.valid()) return unknown(request.name);
   const Pose X_WM = pose_of(request);
   if (stands_fast(simulation.world(), request.name)) {
-    const auto model = simulation.world().models[static_cast<size_t>(instance)].model;
+    const auto model = simulation.world().models[instance].model;
     Findings findings;
     simulation.remove_model(instance, channels);
     simulation.add_model(request.name, X_WM, model, step, channels, findings);
@@ -216,10 +215,10 @@ Outcome set_twist(const set_twist_request_t& request, Simulation& simulation) {
   if (const std::string fault = fault_of("angular", request.angular, kFastest_rad_s, "rad/s");
       !fault.empty())
     return bad(fault);
-  const int instance = find_model(simulation.world(), request.name);
-  if (instance < 0) return unknown(request.name);
+  const InstanceIndex instance = find_model(simulation.world(), request.name);
+  if (!instance.valid()) return unknown(request.name);
   std::string why = why_immovable(simulation, instance);
-  const model::Model& model = *simulation.world().models[static_cast<size_t>(instance)].model;
+  const model::Model& model = *simulation.world().models[instance].model;
   const bool kinematic = std::any_of(model.links.begin(), model.links.end(),
                                      [](const model::Link& link) { return link.kinematic; });
   if (why.empty() && model.drive) why = "has a drive: send it a velocity command";
@@ -231,10 +230,9 @@ Outcome set_twist(const set_twist_request_t& request, Simulation& simulation) {
 }
 
 void reset_poses(Simulation& simulation) {
-  const std::vector<model::ModelInstance>& models = simulation.world().models;
-  for (size_t i = 0; i < models.size(); ++i) {
-    if (!models[i].removed && !models[i].model->is_static)
-      simulation.robots().start_again(static_cast<int>(i));
+  const auto& models = simulation.world().models;
+  for (const InstanceIndex i : models.indices()) {
+    if (!models[i].removed && !models[i].model->is_static) simulation.robots().start_again(i);
   }
 }
 

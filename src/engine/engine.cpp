@@ -97,7 +97,7 @@ struct Engine::Copy {
   std::vector<Place> places;  // of the newest messages of a batch
   // Of each driven robot, the links that it ran into in the last step(), in the order in which it
   // met them.
-  std::vector<std::vector<int>> met;
+  std::vector<std::vector<LinkIndex>> met;
 
   void make_scenes(const ReadChannels* read);
   void keep_newest(const Batch& batch);
@@ -128,9 +128,8 @@ Engine::Engine(std::shared_ptr<const model::WorldModel> world, EngineOptions opt
   const std::vector<Input>& inputs = copies_[0]->world->inbox().inputs();
   for (size_t i = 0; i < inputs.size(); ++i) {
     if (inputs[i].kind != Input::Kind::velocity) continue;
-    const int instance =
-        copies_[0]->world->layout().robots[static_cast<size_t>(inputs[i].robot)].instance;
-    driven_.push_back(world_->models[static_cast<size_t>(instance)].name);
+    const InstanceIndex instance = copies_[0]->world->layout().robots[inputs[i].robot].instance;
+    driven_.push_back(world_->models[instance].name);
     velocity_inputs_.push_back(static_cast<int>(i));
     driven_robots_.push_back(inputs[i].robot);
   }
@@ -195,13 +194,13 @@ void Engine::compute(size_t index, int64_t steps) {
       reinterpret_cast<int32_t*>(touching_->values.data()) + index * driven_.size();
   std::fill_n(touching, driven_.size(), 0);
   copy.met.resize(driven_.size());
-  for (std::vector<int>& met : copy.met) met.clear();
+  for (std::vector<LinkIndex>& met : copy.met) met.clear();
   for (int64_t left = steps; left > 0; left -= batch.count) {
     batch.first_step = copy.step + 1;
     batch.count = static_cast<int>(std::min(left, kBatchSteps));
     batch.applied_count = 0;
     for (int i = 0; i < batch.count; ++i)
-      world.advance(batch.first_step + i, batch.snapshots[static_cast<size_t>(i)], batch);
+      world.advance(batch.first_step + i, batch.snapshots[i], batch);
     copy.step += batch.count;
     for (size_t m = 0; m < world.modules().size(); ++m) {
       Module& module = *world.modules()[m];
@@ -234,8 +233,7 @@ void Engine::Copy::keep_newest(const Batch& batch) {
   for (const Batch::Output& output : batch.outputs) {
     if (!output.woken) continue;
     for (const Outbox& outbox : output.pieces) {
-      for (const Outbox::Entry& entry : outbox.entries())
-        places[static_cast<size_t>(entry.channel)] = {&outbox, &entry};
+      for (const Outbox::Entry& entry : outbox.entries()) places[entry.channel] = {&outbox, &entry};
     }
   }
   for (size_t channel = 0; channel < places.size(); ++channel) {
@@ -250,8 +248,7 @@ void Engine::tell(size_t index, const Batch& batch) {
   const Copy& copy = *copies_[index];
   for (int64_t step = batch.first_step; step < batch.first_step + batch.count; ++step) {
     if (state_handler_)
-      state_handler_(static_cast<int>(index),
-                     batch.snapshots[static_cast<size_t>(step - batch.first_step)], batch);
+      state_handler_(static_cast<int>(index), batch.snapshots[step - batch.first_step], batch);
     if (!handler_) continue;
     for (const Batch::Output& output : batch.outputs) {
       if (!output.woken) continue;
@@ -268,16 +265,16 @@ void Engine::tell(size_t index, const Batch& batch) {
 
 void Engine::count_touching(Copy& copy, const Batch& batch, int32_t* counts) const {
   for (int i = 0; i < batch.count; ++i) {
-    const Snapshot& state = batch.snapshots[static_cast<size_t>(i)];
+    const Snapshot& state = batch.snapshots[i];
     if (state.collisions.empty()) continue;
     for (size_t robot = 0; robot < driven_robots_.size(); ++robot) {
       bool touched = false;
       for (const Collision& collision : state.collisions) {
         if (collision.robot != driven_robots_[robot]) continue;
         touched = true;
-        const Contact& contact = state.contacts[static_cast<size_t>(collision.contact)];
-        const int other = collision.as_a ? contact.link_b : contact.link_a;
-        std::vector<int>& met = copy.met[robot];
+        const Contact& contact = state.contacts[collision.contact];
+        const LinkIndex other = collision.as_a ? contact.link_b : contact.link_a;
+        std::vector<LinkIndex>& met = copy.met[robot];
         if (std::find(met.begin(), met.end(), other) == met.end()) met.push_back(other);
       }
       counts[robot] += touched;
@@ -288,9 +285,9 @@ void Engine::count_touching(Copy& copy, const Batch& batch, int32_t* counts) con
 std::vector<std::vector<std::string>> Engine::collisions(int world) const {
   const Copy& copy = *copies_.at(static_cast<size_t>(world));
   std::vector<std::vector<std::string>> names;
-  for (const std::vector<int>& links : copy.met) {
+  for (const std::vector<LinkIndex>& links : copy.met) {
     std::vector<std::string>& of_robot = names.emplace_back();
-    for (const int link : links)
+    for (const LinkIndex link : links)
       of_robot.push_back(model::body_name(copy.world->model(), copy.world->layout(), link));
     std::sort(of_robot.begin(), of_robot.end());
     of_robot.erase(std::unique(of_robot.begin(), of_robot.end()), of_robot.end());
@@ -319,8 +316,7 @@ void put_nothing(Primitive type, std::byte* row, size_t size) {
 void Engine::update(Observer& observer, size_t world) {
   const size_t row_size = observer.count * observer.reader.value_size();
   for (size_t robot = 0; robot < observer.channels.size(); ++robot) {
-    const std::vector<uint8_t>& message =
-        copies_[world]->newest[static_cast<size_t>(observer.channels[robot])];
+    const std::vector<uint8_t>& message = copies_[world]->newest[observer.channels[robot]];
     std::byte* row =
         observer.array->values.data() + (world * observer.channels.size() + robot) * row_size;
     if (message.empty()) {
@@ -404,7 +400,7 @@ void Engine::reset(std::span<const Reset> resets) {
     if (named.at(static_cast<size_t>(reset.world)))
       throw InputError({},
                        "world " + std::to_string(reset.world) + " is to be reset twice at once");
-    named[static_cast<size_t>(reset.world)] = true;
+    named[reset.world] = true;
   }
   for_each(resets.size(), [&](size_t i) { reset_one(resets[i]); });
 }
@@ -478,7 +474,7 @@ std::shared_ptr<const FieldArray> Engine::observe(const std::string& device,
       std::make_unique<Observer>(Observer{device, field, FieldReader(*schema, field), channels});
   read(channels);
   refuse_nothing(channels);
-  const std::vector<uint8_t>& sample = copies_[0]->newest[static_cast<size_t>(channels[0])];
+  const std::vector<uint8_t>& sample = copies_[0]->newest[channels[0]];
   FieldArray& array = *observer->array;
   array.type = observer->reader.type();
   array.shape = {static_cast<int64_t>(copies_.size()), static_cast<int64_t>(channels.size())};
@@ -497,7 +493,7 @@ std::shared_ptr<const FieldArray> Engine::observe(const std::string& device,
 // From now on they are read, and so are their newest messages, which may not have been made.
 void Engine::read(const std::vector<int>& channels) {
   auto read = std::make_shared<ReadChannels>(*read_);
-  for (const int channel : channels) (*read)[static_cast<size_t>(channel)] = true;
+  for (const int channel : channels) (*read)[channel] = true;
   const DefaultFloatingPoint floating_point;
   for_each(copies_.size(), [&](size_t i) {
     copies_[i]->make_scenes(read.get());
@@ -511,8 +507,7 @@ void Engine::catch_up(Copy& copy, int channel) {
   for (auto& module : copy.world->modules()) module->catch_up(channel, made);
   copy.newest.resize(copy.channels.list().size());
   for (const Outbox::Entry& entry : made.entries())
-    copy.newest[static_cast<size_t>(entry.channel)].assign(made.data(entry),
-                                                           made.data(entry) + entry.size);
+    copy.newest[entry.channel].assign(made.data(entry), made.data(entry) + entry.size);
 }
 
 int64_t Engine::current_step(int world) const {

@@ -145,8 +145,8 @@ class Engine {
   bool first_made_ = false;  // the first copy tells what is wrong with the world
   std::vector<std::string> driven_;
   std::vector<int> velocity_inputs_;  // of the driven robots
-  std::vector<int> driven_robots_;    // indices into BodyLayout::robots
-  std::vector<double> velocities_;    // of the last drive(): see Copy::driven
+  std::vector<RobotIndex> driven_robots_;
+  std::vector<double> velocities_;  // of the last drive(): see Copy::driven
   std::shared_ptr<FieldArray> touching_ = std::make_shared<FieldArray>();
   std::vector<std::unique_ptr<Observer>> observers_;
   std::shared_ptr<const ReadChannels> read_;  // by observers; the same of each copy

@@ -54,8 +54,7 @@ Faults::Faults(const model::WorldModel& world, const model::BodyLayout& layout,
                const std::vector<device_info_t>& devices, uint64_t seed)
     : world_(world), layout_(layout), devices_(devices), seed_(seed) {
   for (const model::Fault& fault : world.faults) {
-    for (size_t i = 0; i < layout.robots.size(); ++i) {
-      const int robot = static_cast<int>(i);
+    for (const RobotIndex robot : layout.robots.indices()) {
       if (name_of(robot) != fault.robot) continue;
       if (const std::string why = check(fault, robot); !why.empty())
         throw InputError(fault.source, "a fault of " + fault.robot + ": " + why);
@@ -65,16 +64,15 @@ Faults::Faults(const model::WorldModel& world, const model::BodyLayout& layout,
   }
 }
 
-const std::string& Faults::name_of(int robot) const {
-  return world_.models[static_cast<size_t>(layout_.robots[static_cast<size_t>(robot)].instance)]
-      .name;
+const std::string& Faults::name_of(RobotIndex robot) const {
+  return world_.models[layout_.robots[robot].instance].name;
 }
 
 int64_t Faults::steps(double seconds) const {
   return std::max<int64_t>(1, rounded(seconds * 1e6 / static_cast<double>(world_.step_us)));
 }
 
-const device_info_t* Faults::find_device(int robot, const std::string& name) const {
+const device_info_t* Faults::find_device(RobotIndex robot, const std::string& name) const {
   for (const bool by_kind : {false, true}) {
     for (const device_info_t& device : devices_) {
       if (device.robot == name_of(robot) && same_name(by_kind ? device.kind : device.name, name))
@@ -84,7 +82,7 @@ const device_info_t* Faults::find_device(int robot, const std::string& name) con
   return nullptr;
 }
 
-std::string Faults::check(const model::Fault& fault, int robot) const {
+std::string Faults::check(const model::Fault& fault, RobotIndex robot) const {
   if (std::string why = model::check_fault(fault); !why.empty()) return why;
   if (of_robots_.size() + (of_sensors_ ? of_sensors_->size() : 0) >= kMostFaults)
     return fmt::format("there are {} faults already", kMostFaults);
@@ -104,15 +102,13 @@ std::string Faults::check(const model::Fault& fault, int robot) const {
     }
     if (!applies_to(sensor_kind(fault.kind), device->kind))
       return fmt::format("{} is no fault of a {}", fault.kind, device->kind);
-  } else if (!world_
-                  .models[static_cast<size_t>(layout_.robots[static_cast<size_t>(robot)].instance)]
-                  .model->drive) {
+  } else if (!world_.models[layout_.robots[robot].instance].model->drive) {
     return fmt::format("{} is a fault of robots that drive", fault.kind);
   }
   return "";
 }
 
-void Faults::begin(const model::Fault& fault, int robot, int64_t step) {
+void Faults::begin(const model::Fault& fault, RobotIndex robot, int64_t step) {
   if (const std::string why = check(fault, robot); !why.empty()) {
     spdlog::warn("{}/fault was ignored: {}", name_of(robot), why);
     return;
@@ -120,7 +116,7 @@ void Faults::begin(const model::Fault& fault, int robot, int64_t step) {
   begin_at(fault, robot, step, true);
 }
 
-void Faults::begin_at(const model::Fault& fault, int robot, int64_t begin, bool message) {
+void Faults::begin_at(const model::Fault& fault, RobotIndex robot, int64_t begin, bool message) {
   const int64_t end = fault.duration_s > 0.0 ? begin + steps(fault.duration_s) : INT64_MAX;
   const model::FaultKind& kind = *model::find_fault_kind(fault.kind);
   if (kind.of == model::FaultKind::Of::device) {
@@ -140,7 +136,8 @@ void Faults::begin_at(const model::Fault& fault, int robot, int64_t begin, bool 
   }
 }
 
-void Faults::begin_of_device(const model::Fault& fault, int robot, int64_t begin, int64_t end) {
+void Faults::begin_of_device(const model::Fault& fault, RobotIndex robot, int64_t begin,
+                             int64_t end) {
   const device_info_t* device = find_device(robot, fault.target);
   if (!device) return;  // it is switched off
   SensorFault made;
@@ -168,7 +165,7 @@ void Faults::before_commands(int64_t step, robot::Robots& robots) {
   for (RobotFault& fault : of_robots_) {
     if (fault.kind != Kind::kidnapped || fault.done || step < fault.begin) continue;
     fault.done = true;
-    const int instance = layout_.robots[static_cast<size_t>(fault.robot)].instance;
+    const InstanceIndex instance = layout_.robots[fault.robot].instance;
     Pose X_WM = robots.model_pose(instance);
     X_WM.translation.x() = fault.asked.x;
     X_WM.translation.y() = fault.asked.y;
@@ -178,14 +175,13 @@ void Faults::before_commands(int64_t step, robot::Robots& robots) {
   }
 }
 
-bool Faults::is_lost(int robot, int64_t step) {
+bool Faults::is_lost(RobotIndex robot, int64_t step) {
   bool lost = false;
   for (const RobotFault& fault : of_robots_) {
     if (fault.kind != Kind::commands_lost || !fault.acts(robot, step)) continue;
     draws_.resize(layout_.robots.size());
-    lost |= RandomSource(seed_, name_of(robot), "commands_lost")
-                .stream(draws_[static_cast<size_t>(robot)]++)
-                .uniform() < fault.value;
+    lost |= RandomSource(seed_, name_of(robot), "commands_lost").stream(draws_[robot]++).uniform() <
+            fault.value;
   }
   return lost;
 }
@@ -210,7 +206,7 @@ void Faults::command(const robot::Command& command, int64_t step, robot::Robots&
   robots.apply(weakened(command, step));
 }
 
-double Faults::left_of(int robot, bool left, int64_t step) const {
+double Faults::left_of(RobotIndex robot, bool left, int64_t step) const {
   double rest = 1.0;
   for (const RobotFault& fault : of_robots_) {
     if (!fault.acts(robot, step) || !(left ? fault.left : fault.right)) continue;
@@ -227,9 +223,7 @@ robot::Command Faults::weakened(robot::Command command, int64_t step) const {
                right = left_of(command.robot, false, step), least = std::min(left, right);
   if (left == 1.0 && right == 1.0) return command;
   const model::DriveDescription& drive =
-      *world_
-           .models[static_cast<size_t>(layout_.robots[static_cast<size_t>(command.robot)].instance)]
-           .model->drive;
+      *world_.models[layout_.robots[command.robot].instance].model->drive;
   if (auto* velocity = std::get_if<robot::VelocityCommand>(&command.what)) {
     const double half = 0.5 * drive.track;
     velocity->vy *= least;
@@ -272,7 +266,7 @@ void Faults::show_wheels(Snapshot& snapshot) {
   }
 }
 
-void Faults::remove(int robot) {
+void Faults::remove(RobotIndex robot) {
   std::erase_if(of_robots_, [&](const RobotFault& fault) { return fault.robot == robot; });
   std::erase_if(late_, [&](const auto& one) { return one.second.robot == robot; });
   if (!of_sensors_) return;

@@ -35,9 +35,9 @@ class Faults {
          const std::vector<device_info_t>& devices, uint64_t seed);
 
   // What is wrong with a fault of that robot, or "".
-  std::string check(const model::Fault& fault, int robot) const;
+  std::string check(const model::Fault& fault, RobotIndex robot) const;
   // It acts on the state `step`: samples of later ones show it. One that is wrong changes nothing.
-  void begin(const model::Fault& fault, int robot, int64_t step);
+  void begin(const model::Fault& fault, RobotIndex robot, int64_t step);
 
   // Before the commands on the state `step`: what was late acts, who is kidnapped is put elsewhere.
   void before_commands(int64_t step, robot::Robots& robots);
@@ -48,7 +48,7 @@ class Faults {
   // For the modules; null while there was none.
   const std::shared_ptr<const std::vector<SensorFault>>& of_sensors() const { return of_sensors_; }
 
-  void remove(int robot);
+  void remove(RobotIndex robot);
   void begin_time_anew();  // steps count from 0: what went on is over
 
  private:
@@ -63,7 +63,7 @@ class Faults {
   };
   struct RobotFault {
     Kind kind;
-    int robot;
+    RobotIndex robot;
     bool left, right;    // which wheels
     int64_t begin, end;  // of steps
     int64_t delay_steps;
@@ -76,13 +76,14 @@ class Faults {
   };
 
   int64_t steps(double seconds) const;
-  void begin_at(const model::Fault& fault, int robot, int64_t begin, bool message);
-  void begin_of_device(const model::Fault& fault, int robot, int64_t begin, int64_t end);
-  const device_info_t* find_device(int robot, const std::string& name) const;
-  const std::string& name_of(int robot) const;
-  double left_of(int robot, bool left, int64_t step) const;  // of the commanded speed of a side
+  void begin_at(const model::Fault& fault, RobotIndex robot, int64_t begin, bool message);
+  void begin_of_device(const model::Fault& fault, RobotIndex robot, int64_t begin, int64_t end);
+  const device_info_t* find_device(RobotIndex robot, const std::string& name) const;
+  const std::string& name_of(RobotIndex robot) const;
+  double left_of(RobotIndex robot, bool left,
+                 int64_t step) const;  // of the commanded speed of a side
   robot::Command weakened(robot::Command command, int64_t step) const;
-  bool is_lost(int robot, int64_t step);
+  bool is_lost(RobotIndex robot, int64_t step);
 
   const model::WorldModel& world_;
   const model::BodyLayout& layout_;

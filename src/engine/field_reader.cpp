@@ -72,8 +72,7 @@ size_t FieldReader::value_size() const { return wire_size(type_); }
 int64_t FieldReader::length(const Field& field, const std::vector<int64_t>& counts) {
   int64_t length = 1;
   for (const Dimension& dimension : field.dimensions) {
-    length *= dimension.counted_by < 0 ? dimension.size
-                                       : counts[static_cast<size_t>(dimension.counted_by)];
+    length *= dimension.counted_by < 0 ? dimension.size : counts[dimension.counted_by];
   }
   return length;
 }
@@ -101,8 +100,7 @@ std::vector<int64_t> FieldReader::shape(std::span<const uint8_t> message) const 
   const std::vector<int64_t>& counts = counts_of_thread();
   std::vector<int64_t> shape;
   for (const Dimension& dimension : schema_->fields[target_].dimensions) {
-    shape.push_back(dimension.counted_by < 0 ? dimension.size
-                                             : counts[static_cast<size_t>(dimension.counted_by)]);
+    shape.push_back(dimension.counted_by < 0 ? dimension.size : counts[dimension.counted_by]);
   }
   return shape;
 }

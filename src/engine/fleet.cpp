@@ -28,10 +28,10 @@ const Element& no_element() {
 // One device that is to be made.
 struct Wanted {
   const SensorKind* kind;
-  int robot;
+  RobotIndex robot;
   std::string name;
   const Element* element;
-  int link;  // index into layout.links
+  LinkIndex link;
   Pose X_LS;
   std::optional<Rate> rate;  // empty: as its element says
 };
@@ -60,7 +60,7 @@ class FleetMaker {
     }
     name_unserved(kinds);
     add_inputs();
-    if (options_.only_robot < 0)
+    if (!options_.only_robot.valid())
       fleet_.modules.push_back(world_state_module(world_, layout_, options_.epoch, channels_));
     for (auto& devices : devices_of_) {
       for (device_info_t& device : devices) fleet_.devices.push_back(std::move(device));
@@ -70,26 +70,23 @@ class FleetMaker {
 
  private:
   // The robots whose devices are made.
-  std::pair<int, int> robots() const {
-    if (options_.only_robot >= 0) return {options_.only_robot, options_.only_robot + 1};
-    return {0, static_cast<int>(layout_.robots.size())};
+  std::vector<RobotIndex> robots() const {
+    if (options_.only_robot.valid()) return {options_.only_robot};
+    std::vector<RobotIndex> all;
+    for (const RobotIndex robot : layout_.robots.indices()) all.push_back(robot);
+    return all;
   }
 
-  const model::ModelInstance& instance(int robot) const {
-    return world_.models[static_cast<size_t>(layout_.robots[static_cast<size_t>(robot)].instance)];
+  const model::ModelInstance& instance(RobotIndex robot) const {
+    return world_.models[layout_.robots[robot].instance];
   }
 
-  int first_link(int robot) const {
-    return layout_
-        .first_link[static_cast<size_t>(layout_.robots[static_cast<size_t>(robot)].instance)];
-  }
-
-  bool disabled(int robot, const std::string& device) const {
+  bool disabled(RobotIndex robot, const std::string& device) const {
     return disabled_.contains(instance(robot).name + "/" + device);
   }
 
   // The devices of a kind on a robot, in the order of its file.
-  void collect(const SensorKind& kind, int robot, std::vector<Wanted>& wanted) const {
+  void collect(const SensorKind& kind, RobotIndex robot, std::vector<Wanted>& wanted) const {
     const model::Model& model = *instance(robot).model;
     if (kind.attach_to.empty()) {
       for (const model::SensorDescription& sensor : model.sensors) {
@@ -101,15 +98,14 @@ class FleetMaker {
                           robot,
                           sensor.name,
                           &element,
-                          first_link(robot) + sensor.link,
+                          layout_.link_of(layout_.robots[robot].instance, sensor.link),
                           sensor.X_LS,
                           {}});
       }
       return;
     }
-    const bool attached =
-        kind.attach_to == "robot" || (kind.attach_to == "drive" && model.drive) ||
-        (kind.attach_to == "joints" && !layout_.robots[static_cast<size_t>(robot)].joints.empty());
+    const bool attached = kind.attach_to == "robot" || (kind.attach_to == "drive" && model.drive) ||
+                          (kind.attach_to == "joints" && !layout_.robots[robot].joints.empty());
     if (!attached || disabled(robot, kind.device_name)) return;
     const Element* element = &no_element();
     Rate rate = kind.default_rate;
@@ -119,24 +115,23 @@ class FleetMaker {
         element = drive.odometry.get();
       if (kind.drive_rate) rate = kind.drive_rate(drive);
     }
-    const model::RobotPlacement& placement = layout_.robots[static_cast<size_t>(robot)];
-    int link = first_link(robot);  // it sits in base_link
-    if (placement.body >= 0)
-      link = layout_.bodies[static_cast<size_t>(placement.body)].links.front();
+    const model::RobotPlacement& placement = layout_.robots[robot];
+    const LinkIndex link = placement.body.valid()  // it sits in base_link
+                               ? layout_.bodies[placement.body].links.front()
+                               : layout_.first_link[placement.instance];
     wanted.push_back({&kind, robot, kind.device_name, element, link,
                       initial_pose(layout_, link).inverse() * X_WBase(robot), rate});
   }
 
-  Pose X_WBase(int robot) const {
-    const model::RobotPlacement& placement = layout_.robots[static_cast<size_t>(robot)];
-    return placement.body >= 0
-               ? layout_.bodies[static_cast<size_t>(placement.body)].X_WB * placement.X_BBase
-               : placement.X_BBase;
+  Pose X_WBase(RobotIndex robot) const {
+    const model::RobotPlacement& placement = layout_.robots[robot];
+    return placement.body.valid() ? layout_.bodies[placement.body].X_WB * placement.X_BBase
+                                  : placement.X_BBase;
   }
 
   void add_module(std::span<const SensorKind> kinds, int rank) {
     std::vector<Wanted> wanted;
-    for (int robot = robots().first; robot < robots().second; ++robot) {
+    for (const RobotIndex robot : robots()) {
       for (const SensorKind& kind : kinds) collect(kind, robot, wanted);
     }
     if (wanted.empty()) return;
@@ -153,7 +148,7 @@ class FleetMaker {
     // Pictures: each renderer has a thread of its own, with a stretch of the cameras. Which
     // renderer draws which camera changes no pixel.
     const size_t cores = std::max(1u, std::thread::hardware_concurrency());
-    const size_t threads = setup.wants_renderer && options_.only_robot < 0
+    const size_t threads = setup.wants_renderer && !options_.only_robot.valid()
                                ? std::min({wanted.size(), cores, size_t{8}})
                                : 1;
     for (size_t i = 0; i < threads; ++i) {
@@ -249,14 +244,13 @@ class FleetMaker {
     info.range_min = info.range_max = info.fov_horizontal = info.fov_vertical = 0.0;
     info.width = info.height = info.nelements = 0;
     sensor.describe(info);
-    devices_of_[static_cast<size_t>(wanted.robot)].push_back(std::move(info));
+    devices_of_[wanted.robot].push_back(std::move(info));
   }
 
   void name_unserved(const std::vector<SensorKind>& kinds) {
     std::set<const model::Model*> seen;
-    for (int i = robots().first; i < robots().second; ++i) {
-      const model::RobotPlacement& robot = layout_.robots[static_cast<size_t>(i)];
-      const model::Model* model = world_.models[static_cast<size_t>(robot.instance)].model.get();
+    for (const RobotIndex robot : robots()) {
+      const model::Model* model = instance(robot).model.get();
       if (!seen.insert(model).second) continue;
       for (const model::SensorDescription& sensor : model->sensors) {
         const bool served = std::any_of(kinds.begin(), kinds.end(), [&](const SensorKind& kind) {
@@ -272,20 +266,20 @@ class FleetMaker {
   }
 
   template <class Message>
-  void add_input(int robot, const std::string& suffix, Input::Kind kind) {
+  void add_input(RobotIndex robot, const std::string& suffix, Input::Kind kind) {
     const std::string& name = instance(robot).name;
     const int channel = channels_.add<Message>(name + "/" + suffix, name, "", Rate{}, true);
     fleet_.inputs.push_back({channels_[channel].bus_name, robot, kind});
   }
 
   void add_inputs() {
-    for (int robot = robots().first; robot < robots().second; ++robot) {
+    for (const RobotIndex robot : robots()) {
       if (instance(robot).model->drive) {
         add_input<velocity_command_t>(robot, "velocity", Input::Kind::velocity);
         add_input<wheel_command_t>(robot, "wheels", Input::Kind::wheels);
         add_input<move_command_t>(robot, "move", Input::Kind::move);
       }
-      if (!layout_.robots[static_cast<size_t>(robot)].joints.empty()) {
+      if (!layout_.robots[robot].joints.empty()) {
         add_input<joint_command_t>(robot, "joint_command", Input::Kind::joints);
       }
       add_input<fault_t>(robot, "fault", Input::Kind::fault);
@@ -301,17 +295,16 @@ class FleetMaker {
   std::exception_ptr channel_refused_;  // why the device that is made cannot have a channel
   std::vector<int> device_channels_;    // of the device that is made
   Fleet fleet_;
-  std::set<std::string> disabled_;                      // "ROBOT/DEVICE"
-  std::vector<std::vector<device_info_t>> devices_of_;  // each robot
+  std::set<std::string> disabled_;  // "ROBOT/DEVICE"
+  IndexedVector<RobotIndex, std::vector<device_info_t>> devices_of_;
 };
 
 }  // namespace
 
-Pose initial_pose(const model::BodyLayout& layout, int link) {
-  const model::LinkPlacement& placement = layout.links[static_cast<size_t>(link)];
-  return placement.body >= 0
-             ? layout.bodies[static_cast<size_t>(placement.body)].X_WB * placement.X_BL
-             : placement.X_BL;
+Pose initial_pose(const model::BodyLayout& layout, LinkIndex link) {
+  const model::LinkPlacement& placement = layout.links[link];
+  return placement.body.valid() ? layout.bodies[placement.body].X_WB * placement.X_BL
+                                : placement.X_BL;
 }
 
 Fleet make_fleet(const model::WorldModel& world, const model::BodyLayout& layout,

@@ -19,9 +19,9 @@ struct FleetOptions {
   bool noise = true;
   std::vector<std::string> disabled;  // "ROBOT/DEVICE"
   int epoch = 0;
-  bool keep_going = false;  // what would throw is an error finding, and the device left out
-  int only_robot = -1;      // index into BodyLayout::robots: one that joins a world that runs
-  int64_t first_step = 0;   // samples count from its time
+  bool keep_going = false;     // what would throw is an error finding, and the device left out
+  RobotIndex only_robot = {};  // one that joins a world that runs
+  int64_t first_step = 0;      // samples count from its time
 };
 
 struct Fleet {
@@ -39,6 +39,6 @@ Fleet make_fleet(const model::WorldModel& world, const model::BodyLayout& layout
                  const FleetOptions& options, Channels& channels, Findings& findings);
 
 // The pose of a link's frame L at the start, in the world.
-Pose initial_pose(const model::BodyLayout& layout, int link);
+Pose initial_pose(const model::BodyLayout& layout, LinkIndex link);
 
 }  // namespace ruedo::engine

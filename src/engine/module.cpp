@@ -70,7 +70,7 @@ void Module::add(ModuleSetup more) {
   count_due();
 }
 
-void Module::remove(int robot) {
+void Module::remove(RobotIndex robot) {
   for (size_t i = setup_.devices.size(); i-- > 0;) {
     if (setup_.devices[i].robot != robot) continue;
     setup_.devices.erase(setup_.devices.begin() + static_cast<std::ptrdiff_t>(i));
@@ -132,7 +132,7 @@ void Module::process(const Batch& batch, Batch::Output& output, const std::atomi
 void Module::process_pieces(const Batch& batch, Batch::Output& output, int begin, int end,
                             const std::atomic<bool>& left_off) {
   const auto process_one = [&](int piece) {
-    process_piece(batch, output.pieces[static_cast<size_t>(piece)], piece, begin, end, left_off);
+    process_piece(batch, output.pieces[piece], piece, begin, end, left_off);
   };
   if (pieces() == 1 || renderer_) {  // a renderer serves one thread
     for (int piece = 0; piece < pieces(); ++piece) process_one(piece);
@@ -203,7 +203,7 @@ void Module::process_piece(const Batch& batch, Outbox& outbox, int piece, int be
 bool Module::is_read(const Device& device, const Slot& slot, const ReadChannels* read) const {
   if (!setup_.wants_renderer || !read || slot.observes) return true;
   return std::any_of(device.channels.begin(), device.channels.end(), [&](int channel) {
-    return static_cast<size_t>(channel) >= read->size() || (*read)[static_cast<size_t>(channel)];
+    return static_cast<size_t>(channel) >= read->size() || (*read)[channel];
   });
 }
 

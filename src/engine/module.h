@@ -45,7 +45,7 @@ struct Device {
   Rate rate;
   int64_t phase_us = 0;
   bool visual_rays = false;  // its rays hit visuals, not collisions
-  int robot = -1;            // index into BodyLayout::robots; -1: the simulation's
+  RobotIndex robot = {};     // none: the simulation's
   int64_t first_step = 0;    // its samples count from the time of this one
   std::string name = {};     // as its robot's faults name it
   std::vector<int> channels = {};
@@ -103,19 +103,19 @@ class Module {
 
   // Changes between two batches, while it has none.
   void add(ModuleSetup more);  // its devices, in the order of robots
-  void remove(int robot);
+  void remove(RobotIndex robot);
   void replace_sensor(std::unique_ptr<Sensor> sensor);  // of the only device, whose samples go on
   void begin_time_anew(SimTime us);  // sim time was set back by so much, and steps count from 0
 
   // The device that began to work last, by its place; -1: none has. Any thread.
   int at_work() const { return at_work_.load(std::memory_order_relaxed); }
-  const Device& device(int place) const { return setup_.devices[static_cast<size_t>(place)]; }
+  const Device& device(int place) const { return setup_.devices[place]; }
   int devices() const { return static_cast<int>(setup_.devices.size()); }
 
   int rank() const { return setup_.rank; }
   bool wants_visual_rays() const { return setup_.wants_visual_rays; }
   // True when it serves a robot that comes after that one.
-  bool robots_after(int robot) const {
+  bool robots_after(RobotIndex robot) const {
     return !setup_.devices.empty() && setup_.devices.back().robot > robot;
   }
   const std::string& name() const { return setup_.name; }

@@ -116,8 +116,8 @@ bool applies_to(SensorFault::Kind fault, const std::string& device_kind) {
   return true;
 }
 
-void FaultFilter::pass(const Outbox& published, const std::vector<SensorFault>& faults, int robot,
-                       const std::string& device, int64_t step, Outbox& out) {
+void FaultFilter::pass(const Outbox& published, const std::vector<SensorFault>& faults,
+                       RobotIndex robot, const std::string& device, int64_t step, Outbox& out) {
   std::vector<Message> messages;
   for (const Outbox::Entry& entry : published.entries()) {
     const uint8_t* bytes = published.data(entry);

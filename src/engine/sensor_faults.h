@@ -17,7 +17,7 @@ struct SensorFault {
   enum class Kind { dropout, freeze, lag, bias, scale, blocked, clock_drift };
   int64_t id = 0;  // counts them: states of faults are kept by it
   Kind kind = Kind::dropout;
-  int robot = -1;  // index into BodyLayout::robots
+  RobotIndex robot;
   std::string device;
   int64_t begin = 0, end = INT64_MAX;  // samples of begin <= step < end
   int64_t lag_steps = 0;
@@ -37,7 +37,7 @@ class FaultFilter {
   explicit FaultFilter(int64_t step_us) : step_us_(step_us) {}
 
   // What becomes of what the device published at a step. Faults act in their order.
-  void pass(const Outbox& published, const std::vector<SensorFault>& faults, int robot,
+  void pass(const Outbox& published, const std::vector<SensorFault>& faults, RobotIndex robot,
             const std::string& device, int64_t step, Outbox& out);
 
  private:

@@ -86,10 +86,11 @@ void Simulation::fit_threads() {
   }
 }
 
-int Simulation::add_model(const std::string& name, const Pose& X_WM,
-                          std::shared_ptr<const model::Model> model, int64_t step,
-                          Channels& channels, Findings& findings) {
-  const int instance = world_.add_model(name, X_WM, std::move(model), step, channels, findings);
+InstanceIndex Simulation::add_model(const std::string& name, const Pose& X_WM,
+                                    std::shared_ptr<const model::Model> model, int64_t step,
+                                    Channels& channels, Findings& findings) {
+  const InstanceIndex instance =
+      world_.add_model(name, X_WM, std::move(model), step, channels, findings);
   fit_threads();
   if (!started_) return instance;
   try {
@@ -103,7 +104,7 @@ int Simulation::add_model(const std::string& name, const Pose& X_WM,
   return instance;
 }
 
-void Simulation::remove_model(int instance, Channels& channels) {
+void Simulation::remove_model(InstanceIndex instance, Channels& channels) {
   world_.remove_model(instance, channels);
   fit_threads();
   if (!started_) return;
@@ -181,7 +182,7 @@ void Simulation::compute(Batch& batch, int64_t first_step, int count) {
             0;  // the publisher still holds the last state, in a batch that is free already
       if (batch.count == 0) break;
       try {
-        world_.advance(first_step + i, batch.snapshots[static_cast<size_t>(i)], batch);
+        world_.advance(first_step + i, batch.snapshots[i], batch);
       } catch (const physics::StateError& error) {  // the steps before it are good
         batch.end = error.what();
         batch.count = i;
@@ -230,8 +231,8 @@ std::string Simulation::at_work() const {
     const Device& device = module.device(place);
     std::string name = device.name;
     if (device.robot >= 0) {
-      const int instance = layout().robots[static_cast<size_t>(device.robot)].instance;
-      name = world().models[static_cast<size_t>(instance)].name + "/" + name;
+      const InstanceIndex instance = layout().robots[device.robot].instance;
+      name = world().models[instance].name + "/" + name;
     }
     return "the module " + module.name() + " works for " + name;
   }

@@ -91,10 +91,10 @@ class Simulation {
 
   // As World's. Throws EnvironmentError, too, when a module cannot be served here; the world is
   // then as it was. Both throw SceneLost.
-  int add_model(const std::string& name, const Pose& X_WM,
-                std::shared_ptr<const model::Model> model, int64_t step, Channels& channels,
-                Findings& findings);
-  void remove_model(int instance, Channels& channels);
+  InstanceIndex add_model(const std::string& name, const Pose& X_WM,
+                          std::shared_ptr<const model::Model> model, int64_t step,
+                          Channels& channels, Findings& findings);
+  void remove_model(InstanceIndex instance, Channels& channels);
   SimTime begin_time_anew(int epoch) { return world_.begin_time_anew(epoch); }
 
  private:

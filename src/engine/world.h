@@ -66,16 +66,17 @@ class World {
 
   // Puts a model in, which is seen from the next state on; `step` is that state's number. Returns
   // its index in model().models. Throws InputError; the world is then as it was.
-  int add_model(const std::string& name, const Pose& X_WM,
-                std::shared_ptr<const model::Model> model, int64_t step, Channels& channels,
-                Findings& findings);
+  InstanceIndex add_model(const std::string& name, const Pose& X_WM,
+                          std::shared_ptr<const model::Model> model, int64_t step,
+                          Channels& channels, Findings& findings);
   // Takes one out. Its numbers stay free until the same model comes again.
-  void remove_model(int instance, Channels& channels);
+  void remove_model(InstanceIndex instance, Channels& channels);
   // The state that there is becomes state 0. Returns what the time was.
   SimTime begin_time_anew(int epoch);
 
  private:
-  int place(const std::string& name, const Pose& X_WM, std::shared_ptr<const model::Model> model);
+  InstanceIndex place(const std::string& name, const Pose& X_WM,
+                      std::shared_ptr<const model::Model> model);
   void show_beginning(Fleet& fleet, int64_t step) const;
   void join(Fleet fleet);
   void join(ModuleSetup setup);

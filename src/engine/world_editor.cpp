@@ -14,37 +14,39 @@ namespace ruedo::engine {
 
 WorldEditor::Placed WorldEditor::place(const std::string& name, const Pose& X_WM,
                                        std::shared_ptr<const model::Model> model) {
-  std::vector<model::ModelInstance>& models = world_.models;
+  IndexedVector<InstanceIndex, model::ModelInstance>& models = world_.models;
   const auto free =
       std::find_if(models.begin(), models.end(), [&](const model::ModelInstance& instance) {
         return instance.removed && instance.model == model;
       });
   if (free == models.end()) {
+    const InstanceIndex instance = models.next();
     models.push_back({name, X_WM, std::move(model)});
-    return {static_cast<int>(models.size()) - 1, false};
+    return {instance, false};
   }
   free->name = name;
   free->X_WM = X_WM;
   free->removed = false;
-  return {static_cast<int>(free - models.begin()), true};
+  return {InstanceIndex(free - models.begin()), true};
 }
 
-void WorldEditor::remove(int instance) {
-  model::ModelInstance& removed = world_.models[static_cast<size_t>(instance)];
+void WorldEditor::remove(InstanceIndex instance) {
+  model::ModelInstance& removed = world_.models[instance];
   removed.removed = true;
   removed.name.clear();
 }
 
-int find_model(const model::WorldModel& world, const std::string& name) {
+InstanceIndex find_model(const model::WorldModel& world, const std::string& name) {
   const auto found = std::find_if(world.models.begin(), world.models.end(),
                                   [&](const model::ModelInstance& instance) {
                                     return !instance.removed && instance.name == name;
                                   });
-  return found == world.models.end() ? -1 : static_cast<int>(found - world.models.begin());
+  return found == world.models.end() ? InstanceIndex()
+                                     : InstanceIndex(found - world.models.begin());
 }
 
 std::string unused_name(const model::WorldModel& world, const std::string& name) {
-  if (find_model(world, name) < 0) return name;
+  if (!find_model(world, name).valid()) return name;
   const std::string stem = name + "_";
   std::set<int> taken;
   for (const model::ModelInstance& instance : world.models) {

@@ -19,19 +19,19 @@ class WorldEditor {
   explicit WorldEditor(model::WorldModel& world) : world_(world) {}
 
   struct Placed {
-    int instance;  // index into the world's models
-    bool reused;   // in the place of one that has left
+    InstanceIndex instance;  // index into the world's models
+    bool reused;             // in the place of one that has left
   };
   Placed place(const std::string& name, const Pose& X_WM,
                std::shared_ptr<const model::Model> model);
-  void remove(int instance);
+  void remove(InstanceIndex instance);
 
  private:
   model::WorldModel& world_;
 };
 
 // Index of the model of that name; -1: there is none.
-int find_model(const model::WorldModel& world, const std::string& name);
+InstanceIndex find_model(const model::WorldModel& world, const std::string& name);
 
 // Where a SPAWN puts a model: as it says, or standing on the ground below.
 Pose spawn_pose(const model::WorldModel& world, const model::Model& model,

@@ -9,36 +9,36 @@
 namespace ruedo::engine {
 namespace {
 
-int robot_of(const model::BodyLayout& layout, int instance) {
-  for (size_t i = 0; i < layout.robots.size(); ++i) {
-    if (layout.robots[i].instance == instance) return static_cast<int>(i);
+RobotIndex robot_of(const model::BodyLayout& layout, InstanceIndex instance) {
+  for (const RobotIndex robot : layout.robots.indices()) {
+    if (layout.robots[robot].instance == instance) return robot;
   }
-  return -1;
+  return {};
 }
 
 constexpr unsigned kMostDrawers = 8;  // threads that draw
 
 }  // namespace
 
-int World::place(const std::string& name, const Pose& X_WM,
-                 std::shared_ptr<const model::Model> model) {
+InstanceIndex World::place(const std::string& name, const Pose& X_WM,
+                           std::shared_ptr<const model::Model> model) {
   const WorldEditor::Placed placed = WorldEditor(model_).place(name, X_WM, std::move(model));
   placed.reused ? layout_.place_again(model_, placed.instance) : layout_.append(model_);
   return placed.instance;
 }
 
-int World::add_model(const std::string& name, const Pose& X_WM,
-                     std::shared_ptr<const model::Model> model, int64_t step, Channels& channels,
-                     Findings& findings) {
+InstanceIndex World::add_model(const std::string& name, const Pose& X_WM,
+                               std::shared_ptr<const model::Model> model, int64_t step,
+                               Channels& channels, Findings& findings) {
   const model::BodyLayout layout_before = layout_;
-  const std::vector<model::ModelInstance> models_before = model_.models;
+  const auto models_before = model_.models;
   const Channels channels_before = channels;
   if (model->path) robot::check_path(*model->path);
-  const int instance = place(name, X_WM, std::move(model));
-  const int robot = robot_of(layout_, instance);
+  const InstanceIndex instance = place(name, X_WM, std::move(model));
+  const RobotIndex robot = robot_of(layout_, instance);
   Fleet fleet;
   try {
-    if (robot >= 0) {
+    if (robot.valid()) {
       FleetOptions options = options_;
       options.only_robot = robot;
       options.first_step = step;
@@ -52,7 +52,7 @@ int World::add_model(const std::string& name, const Pose& X_WM,
   }
   physics_->add(instance);
   robots_->add(instance);
-  if (robot >= 0) inbox_.add(fleet.inputs, static_cast<int>(layout_.robots.size()));
+  if (robot.valid()) inbox_.add(fleet.inputs, static_cast<int>(layout_.robots.size()));
   if (step > 0) show_beginning(fleet, step - 1);
   join(std::move(fleet));
   statics_ = std::make_shared<StaticScenes>();
@@ -74,9 +74,9 @@ void World::show_beginning(Fleet& fleet, int64_t step) const {
   }
 }
 
-void World::remove_model(int instance, Channels& channels) {
-  const std::string name = model_.models[static_cast<size_t>(instance)].name;
-  if (const int robot = robot_of(layout_, instance); robot >= 0) {
+void World::remove_model(InstanceIndex instance, Channels& channels) {
+  const std::string name = model_.models[instance].name;
+  if (const RobotIndex robot = robot_of(layout_, instance); robot.valid()) {
     for (auto& module : modules_) module->remove(robot);
     std::erase_if(devices_, [&](const device_info_t& device) { return device.robot == name; });
     inbox_.remove(robot);

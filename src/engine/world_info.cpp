@@ -46,7 +46,7 @@ class Parts {
 
 robot_info_t robot_info(const model::WorldModel& world, const model::BodyLayout& layout,
                         const model::RobotPlacement& placement) {
-  const model::ModelInstance& instance = world.models[static_cast<size_t>(placement.instance)];
+  const model::ModelInstance& instance = world.models[placement.instance];
   const model::Model& model = *instance.model;
   robot_info_t info;
   info.name = instance.name;
@@ -69,9 +69,9 @@ robot_info_t robot_info(const model::WorldModel& world, const model::BodyLayout&
     info.turn_acceleration = drive.turn_acceleration;
     info.watchdog_us = drive.watchdog_us;
   }
-  for (int wheel : placement.wheels) {
-    const model::WheelPlacement& description = layout.wheels[static_cast<size_t>(wheel)];
-    info.wheels.push_back(model.joints[static_cast<size_t>(description.joint)].name);
+  for (WheelIndex wheel : placement.wheels) {
+    const model::WheelPlacement& description = layout.wheels[wheel];
+    info.wheels.push_back(model.joints[description.joint].name);
     info.left.push_back(description.left);
   }
   info.nwheels = static_cast<int32_t>(info.wheels.size());
@@ -79,8 +79,7 @@ robot_info_t robot_info(const model::WorldModel& world, const model::BodyLayout&
 }
 
 const model::Link& link_of(const model::WorldModel& world, const model::LinkPlacement& placement) {
-  return world.models[static_cast<size_t>(placement.instance)]
-      .model->links[static_cast<size_t>(placement.link)];
+  return world.models[placement.instance].model->links[placement.link];
 }
 
 }  // namespace
@@ -90,9 +89,7 @@ std::vector<world_info_t> make_world_info(const world_info_t& head, const model:
                                           const std::vector<device_info_t>& devices,
                                           const Channels& channels) {
   Parts parts(head);
-  const auto removed = [&](int instance) {
-    return world.models[static_cast<size_t>(instance)].removed;
-  };
+  const auto removed = [&](InstanceIndex instance) { return world.models[instance].removed; };
   for (const model::RobotPlacement& robot : layout.robots) {
     if (removed(robot.instance)) continue;
     parts.add(&world_info_t::robots, &world_info_t::nrobots, robot_info(world, layout, robot));
@@ -116,21 +113,19 @@ std::vector<world_info_t> make_world_info(const world_info_t& head, const model:
   }
   for (const model::ListedBody& listed :
        layout.listed) {  // their places count: pictures label by them
-    const model::LinkPlacement& link = layout.links[static_cast<size_t>(listed.link)];
+    const model::LinkPlacement& link = layout.links[listed.link];
     body_info_t info{};
     info.index = -1;
     info.is_static = listed.body < 0;
     if (removed(link.instance)) {
       // no name
     } else if (listed.body < 0) {
-      info.name =
-          world.models[static_cast<size_t>(link.instance)].name + "/" + link_of(world, link).name;
+      info.name = world.models[link.instance].name + "/" + link_of(world, link).name;
     } else {
-      const model::BodyPlacement& body = layout.bodies[static_cast<size_t>(listed.body)];
+      const model::BodyPlacement& body = layout.bodies[listed.body];
       info.index = listed.body;
       info.name = body.name;
-      for (int each : body.links)
-        info.mass += link_of(world, layout.links[static_cast<size_t>(each)]).inertial.mass;
+      for (int each : body.links) info.mass += link_of(world, layout.links[each]).inertial.mass;
     }
     parts.add(&world_info_t::bodies, &world_info_t::nbodies, info);
   }

@@ -38,7 +38,7 @@ class WorldState : public Sensor {
     for (world_state_t& message : parts_) {
       message.utime = state.time;
       for (size_t i = 0; i < message.index.size(); ++i) {
-        const Pose& X_WB = state.bodies[static_cast<size_t>(message.index[i])];
+        const Pose& X_WB = state.bodies[message.index[i]];
         for (int k = 0; k < 3; ++k) message.position[i][k] = X_WB.translation[k];
         message.orientation[i] = {X_WB.rotation.w(), X_WB.rotation.x(), X_WB.rotation.y(),
                                   X_WB.rotation.z()};
@@ -83,8 +83,7 @@ namespace {
 std::vector<int32_t> bodies_of(const model::WorldModel& world, const model::BodyLayout& layout) {
   std::vector<int32_t> there;
   for (size_t i = 0; i < layout.bodies.size(); ++i) {
-    if (!world.models[static_cast<size_t>(layout.bodies[i].instance)].removed)
-      there.push_back(static_cast<int32_t>(i));
+    if (!world.models[layout.bodies[i].instance].removed) there.push_back(static_cast<int32_t>(i));
   }
   return there;
 }

@@ -47,24 +47,23 @@ Goal parse_goal(const std::string& text) {
 
 Judge::Judge(const model::WorldModel& world, Expectations expected)
     : world_(world), expected_(std::move(expected)), layout_(world) {
-  std::vector<std::string> names;
-  for (size_t i = 0; i < layout_.robots.size(); ++i) {
-    const std::string& name = world.models[static_cast<size_t>(layout_.robots[i].instance)].name;
+  IndexedVector<RobotIndex, std::string> names;
+  for (const RobotIndex i : layout_.robots.indices()) {
+    const std::string& name = world.models[layout_.robots[i].instance].name;
     names.push_back(name);
-    if (robot_ < 0 && (expected_.robot.empty() || expected_.robot == name))
-      robot_ = static_cast<int>(i);
+    if (!robot_.valid() && (expected_.robot.empty() || expected_.robot == name)) robot_ = i;
   }
-  if (robot_ < 0)
+  if (!robot_.valid())
     throw InputError(
         {}, fmt::format("--robot '{}': the world has {}", expected_.robot,
                         names.empty() ? "no robot" : fmt::format("{}", fmt::join(names, ", "))));
-  expected_.robot = names[static_cast<size_t>(robot_)];
-  const int instance = layout_.robots[static_cast<size_t>(robot_)].instance;
+  expected_.robot = names[robot_];
+  const InstanceIndex instance = layout_.robots[robot_].instance;
   own_.resize(layout_.links.size());
   wheel_.resize(layout_.links.size());
-  for (size_t i = 0; i < layout_.links.size(); ++i) own_[i] = layout_.links[i].instance == instance;
+  for (const LinkIndex i : layout_.links.indices()) own_[i] = layout_.links[i].instance == instance;
   for (const model::WheelPlacement& wheel : layout_.wheels)
-    wheel_[static_cast<size_t>(wheel.link)] = wheel.robot == robot_;
+    wheel_[wheel.link] = wheel.robot == robot_;
   reached_.resize(expected_.goals.size());
   expected_.clearance_reach =
       std::max(expected_.clearance_reach, expected_.clearance.value_or(0.0));
@@ -79,15 +78,15 @@ void Judge::fail(const std::string& what, SimTime time, const std::string& text)
   if (!known) failures_.push_back({what, time, text});
 }
 
-std::string Judge::name_of(int link) const {
-  const model::LinkPlacement& placement = layout_.links[static_cast<size_t>(link)];
-  const model::ModelInstance& instance = world_.models[static_cast<size_t>(placement.instance)];
-  return instance.name + "/" + instance.model->links[static_cast<size_t>(placement.link)].name;
+std::string Judge::name_of(LinkIndex link) const {
+  const model::LinkPlacement& placement = layout_.links[link];
+  const model::ModelInstance& instance = world_.models[placement.instance];
+  return instance.name + "/" + instance.model->links[placement.link].name;
 }
 
 void Judge::see(const Snapshot& snapshot) {
-  if (static_cast<size_t>(robot_) >= snapshot.robots.size()) return;
-  const Vec3 position = snapshot.robots[static_cast<size_t>(robot_)].X_WBase.translation;
+  if (!snapshot.robots.has(robot_)) return;
+  const Vec3 position = snapshot.robots[robot_].X_WBase.translation;
   if (seen_ >= 0) path_m_ += (position - position_).head<2>().norm();
   seen_ = snapshot.time;
   position_ = position;
@@ -120,13 +119,11 @@ void Judge::see_contacts(const Snapshot& snapshot) {
     if (contact.link_a < 0 || contact.link_b < 0 ||
         static_cast<size_t>(std::max(contact.link_a, contact.link_b)) >= own_.size())
       continue;
-    const bool a = own_[static_cast<size_t>(contact.link_a)],
-               b = own_[static_cast<size_t>(contact.link_b)];
+    const bool a = own_[contact.link_a], b = own_[contact.link_b];
     if (a == b) continue;
     // What carries it presses upwards on a wheel, or from below anywhere (castors).
     if (std::abs(contact.normal.z()) > 0.7 &&
-        contact.position.z() <
-            snapshot.robots[static_cast<size_t>(robot_)].X_WBase.translation.z() + 0.02)
+        contact.position.z() < snapshot.robots[robot_].X_WBase.translation.z() + 0.02)
       continue;
     if (first_contact_ < 0) first_contact_ = snapshot.time;
     if (!expected_.no_contact) return;

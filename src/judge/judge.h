@@ -77,13 +77,13 @@ class Judge {
   void see_contacts(const Snapshot& snapshot);
   void see_clearance(const Snapshot& snapshot);
   void compare_odometry();
-  std::string name_of(int link) const;
+  std::string name_of(LinkIndex link) const;
 
   const model::WorldModel& world_;
   Expectations expected_;
   model::BodyLayout layout_;
-  int robot_ = -1;                 // index into BodyLayout::robots
-  std::vector<bool> own_, wheel_;  // of each link
+  RobotIndex robot_;
+  IndexedVector<LinkIndex, bool> own_, wheel_;
   std::unique_ptr<JudgeHull> hull_;
   std::vector<bool> reached_;
   double last_goal_distance_m_ = std::numeric_limits<double>::infinity();

@@ -25,7 +25,8 @@ Vec3 direction_of(int i) {
 
 }  // namespace
 
-JudgeHull::JudgeHull(const model::WorldModel& world, const model::BodyLayout& layout, int robot)
+JudgeHull::JudgeHull(const model::WorldModel& world, const model::BodyLayout& layout,
+                     RobotIndex robot)
     : layout_(layout), robot_(robot) {
   find_hull(world);
   scene_ = scene::make_ray_scene(scene::make_static_ray_scene(world, layout));
@@ -34,16 +35,14 @@ JudgeHull::JudgeHull(const model::WorldModel& world, const model::BodyLayout& la
 // The robot alone, with base_link at the origin.
 void JudgeHull::find_hull(const model::WorldModel& world) {
   model::WorldModel alone;
-  alone.models.push_back(
-      world.models[static_cast<size_t>(layout_.robots[static_cast<size_t>(robot_)].instance)]);
+  alone.models.push_back(world.models[layout_.robots[robot_].instance]);
   const model::BodyLayout layout(alone);
   const model::RobotPlacement& placement = layout.robots.at(0);
   Snapshot still;
   for (const model::BodyPlacement& body : layout.bodies) still.bodies.push_back(body.X_WB);
   still.wheel_angles.resize(layout.wheels.size());
   const Pose X_BaseW =
-      (placement.body < 0 ? placement.X_BBase
-                          : still.bodies[static_cast<size_t>(placement.body)] * placement.X_BBase)
+      (placement.body < 0 ? placement.X_BBase : still.bodies[placement.body] * placement.X_BBase)
           .inverse();
   for (Pose& pose : still.bodies) pose = X_BaseW * pose;
   const auto scene = scene::make_ray_scene(scene::make_static_ray_scene(alone, layout));
@@ -69,15 +68,14 @@ void JudgeHull::find_hull(const model::WorldModel& world) {
 
 JudgeHull::Nearest JudgeHull::nearest(const Snapshot& snapshot, double reach) {
   scene_->update(snapshot);
-  const Pose& X_WBase = snapshot.robots[static_cast<size_t>(robot_)].X_WBase;
-  const int instance = layout_.robots[static_cast<size_t>(robot_)].instance;
+  const Pose& X_WBase = snapshot.robots[robot_].X_WBase;
+  const InstanceIndex instance = layout_.robots[robot_].instance;
   for (size_t i = 0; i < hull_.size(); ++i)
     rays_[i] = {X_WBase * hull_[i].origin, X_WBase.rotation * hull_[i].direction, reach};
   scene_->cast(rays_, hits_);
   Nearest nearest;
   for (const scene::Hit& hit : hits_) {
-    if (!hit.hit() || layout_.links[static_cast<size_t>(hit.link)].instance == instance ||
-        hit.range >= nearest.range)
+    if (!hit.hit() || layout_.links[hit.link].instance == instance || hit.range >= nearest.range)
       continue;
     nearest = {hit.range, hit.link};
   }

@@ -15,11 +15,11 @@ namespace ruedo::judge {
 
 class JudgeHull {
  public:
-  JudgeHull(const model::WorldModel& world, const model::BodyLayout& layout, int robot);
+  JudgeHull(const model::WorldModel& world, const model::BodyLayout& layout, RobotIndex robot);
 
   struct Nearest {
     double range = std::numeric_limits<double>::infinity();  // m
-    int link = -1;                                           // of what is nearest
+    LinkIndex link;                                          // of what is nearest
   };
   // The nearest thing within `reach` (m) of the hull.
   Nearest nearest(const Snapshot& snapshot, double reach);
@@ -28,7 +28,7 @@ class JudgeHull {
   void find_hull(const model::WorldModel& world);
 
   const model::BodyLayout& layout_;
-  int robot_;
+  RobotIndex robot_;
   std::vector<scene::Ray> hull_;  // in base_link: points on the hull, directions outwards
   std::unique_ptr<scene::RayScene> scene_;
   std::vector<scene::Ray> rays_;

@@ -14,14 +14,14 @@ bool BaseOdometry::is_for(const DriveDescription& drive) {
   return drive.steering != Steering::tracked || drive.left_joints.empty();
 }
 
-BaseOdometry::BaseOdometry(const BodyLayout& layout, int robot, const DriveDescription& drive,
-                           double track_error, double steering_error)
+BaseOdometry::BaseOdometry(const BodyLayout& layout, RobotIndex robot,
+                           const DriveDescription& drive, double track_error, double steering_error)
     : lever_(1.0 + track_error), steering_error_(steering_error) {
-  const RobotPlacement& placement = layout.robots[static_cast<size_t>(robot)];
+  const RobotPlacement& placement = layout.robots[robot];
   if (drive.steering == Steering::mecanum || drive.steering == Steering::omni) {
     normal_.setZero();
-    for (const int wheel : placement.wheels) {
-      Vec3 rim = layout.wheels[static_cast<size_t>(wheel)].rim;
+    for (const WheelIndex wheel : placement.wheels) {
+      Vec3 rim = layout.wheels[wheel].rim;
       rim.z() *= lever_;
       rims_.push_back(rim);
       normal_ += rim * rim.transpose();
@@ -29,14 +29,12 @@ BaseOdometry::BaseOdometry(const BodyLayout& layout, int robot, const DriveDescr
   } else if (drive.steering == Steering::ackermann || drive.steering == Steering::tricycle) {
     const Pose X_BaseB = placement.X_BBase.inverse();
     for (const int index : placement.wheels) {
-      const WheelPlacement& wheel = layout.wheels[static_cast<size_t>(index)];
-      const WheelPlacement& place =
-          wheel.on < 0 ? wheel : layout.wheels[static_cast<size_t>(wheel.on)];
-      const LinkPlacement& link = layout.links[static_cast<size_t>(place.link)];
+      const WheelPlacement& wheel = layout.wheels[index];
+      const WheelPlacement& place = wheel.on < 0 ? wheel : layout.wheels[wheel.on];
+      const LinkPlacement& link = layout.links[place.link];
       Pose X_BL = link.X_BL;  // in the body that carries base_link
       if (link.body != placement.body)
-        X_BL = layout.bodies[static_cast<size_t>(placement.body)].X_WB.inverse() *
-               layout.bodies[static_cast<size_t>(link.body)].X_WB * X_BL;
+        X_BL = layout.bodies[placement.body].X_WB.inverse() * layout.bodies[link.body].X_WB * X_BL;
       const Vec3 p = X_BaseB * (X_BL * place.center_in_L);
       const auto on = std::find(placement.wheels.begin(), placement.wheels.end(), wheel.on);
       wheels_.push_back({wheel.steers, wheel.on >= 0,

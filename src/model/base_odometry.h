@@ -14,7 +14,7 @@ class BaseOdometry {
   static bool is_for(const DriveDescription& drive);
 
   // track_error: of the lever between turning and the wheels' ways, relative. steering_error: rad.
-  BaseOdometry(const BodyLayout& layout, int robot, const DriveDescription& drive,
+  BaseOdometry(const BodyLayout& layout, RobotIndex robot, const DriveDescription& drive,
                double track_error, double steering_error);
 
   bool rolls_sideways() const { return !rims_.empty(); }

@@ -19,13 +19,13 @@ class Groups {
  public:
   explicit Groups(size_t n) : parent_(n) { std::iota(parent_.begin(), parent_.end(), 0); }
   int find(int i) const {
-    while (parent_[static_cast<size_t>(i)] != i) i = parent_[static_cast<size_t>(i)];
+    while (parent_[i] != i) i = parent_[i];
     return i;
   }
   void join(int a, int b) {
     a = find(a);
     b = find(b);
-    parent_[static_cast<size_t>(std::max(a, b))] = std::min(a, b);
+    parent_[std::max(a, b)] = std::min(a, b);
   }
 
  private:
@@ -41,8 +41,8 @@ bool unlimited(const Joint& joint) {
 }
 
 // The links below a joint, through all further joints.
-std::vector<int> subtree(const Model& model, int link) {
-  std::vector<int> links{link};
+std::vector<ModelLinkIndex> subtree(const Model& model, ModelLinkIndex link) {
+  std::vector<ModelLinkIndex> links{link};
   for (size_t i = 0; i < links.size(); ++i) {
     for (const Joint& joint : model.joints) {
       if (joint.parent == links[i] &&
@@ -53,10 +53,11 @@ std::vector<int> subtree(const Model& model, int link) {
   return links;
 }
 
-double lowest_point(const Model& model, const std::vector<int>& links, const Pose& X_BaseM) {
+double lowest_point(const Model& model, const std::vector<ModelLinkIndex>& links,
+                    const Pose& X_BaseM) {
   double lowest = std::numeric_limits<double>::infinity();
-  for (const int index : links) {
-    const Link& link = model.links[static_cast<size_t>(index)];
+  for (const ModelLinkIndex index : links) {
+    const Link& link = model.links[index];
     for (const Collision& c : link.collisions) {
       const Eigen::AlignedBox3d box = bounds(c.geometry);
       if (box.isEmpty()) continue;
@@ -70,9 +71,9 @@ double lowest_point(const Model& model, const std::vector<int>& links, const Pos
   return lowest;
 }
 
-bool is_drive_wheel(const Model& model, int joint) {
+bool is_drive_wheel(const Model& model, ModelJointIndex joint) {
   if (!model.drive) return false;
-  const auto in = [&](const std::vector<int>& list) {
+  const auto in = [&](const std::vector<ModelJointIndex>& list) {
     return std::find(list.begin(), list.end(), joint) != list.end();
   };
   return in(model.drive->left_joints) || in(model.drive->right_joints) ||
@@ -80,51 +81,52 @@ bool is_drive_wheel(const Model& model, int joint) {
 }
 
 // The link that a drive moves: what its wheels hang on, be it by way of what steers them.
-int carrier_of(const Model& model) {
+ModelLinkIndex carrier_of(const Model& model) {
   const DriveDescription& drive = *model.drive;
-  const std::vector<int>& first = !drive.steer_joints.empty()  ? drive.steer_joints
-                                  : !drive.left_joints.empty() ? drive.left_joints
-                                                               : drive.right_joints;
-  return first.empty() ? 0 : std::max(model.joints[static_cast<size_t>(first[0])].parent, 0);
+  const std::vector<ModelJointIndex>& first = !drive.steer_joints.empty()  ? drive.steer_joints
+                                              : !drive.left_joints.empty() ? drive.left_joints
+                                                                           : drive.right_joints;
+  const ModelLinkIndex carrier = first.empty() ? ModelLinkIndex() : model.joints[first[0]].parent;
+  return carrier.valid() ? carrier : ModelLinkIndex(0);
 }
 
 // What of a model moves as one, and which links turn with which of its joints: the same for all its
 // instances.
 struct Grouping {
   Groups links;
-  std::vector<bool> joined;     // of each joint: its links are one
-  std::vector<bool> is_static;  // of each group's representative
+  IndexedVector<ModelJointIndex, bool> joined;  // its links are one
+  std::vector<bool> is_static;                  // of each group's representative
 };
 
 Grouping group(const Model& model) {
-  Grouping result{Groups(model.links.size()), std::vector<bool>(model.joints.size(), false),
+  Grouping result{Groups(model.links.size()),
+                  {std::vector<bool>(model.joints.size(), false)},
                   std::vector<bool>(model.links.size(), false)};
   const bool kinematic = model.drive && model.drive->kind == DriveDescription::Kind::kinematic;
-  const auto join = [&](size_t j) {
+  const auto join = [&](ModelJointIndex j) {
     if (result.joined[j]) return;
     result.joined[j] = true;
     if (model.joints[j].parent >= 0)
       result.links.join(model.joints[j].parent, model.joints[j].child);
   };
-  for (size_t j = 0; j < model.joints.size(); ++j) {
-    const Joint& joint = model.joints[j];
-    if (joint.type == JointType::fixed || (kinematic && is_drive_wheel(model, static_cast<int>(j))))
+  for (const ModelJointIndex j : model.joints.indices()) {
+    if (model.joints[j].type == JointType::fixed || (kinematic && is_drive_wheel(model, j)))
       join(j);
   }
   if (kinematic) {
     const Pose X_BaseM = model.drive->X_MBase.inverse();
     for (const Joint& joint : model.joints) {
       if (joint.parent < 0 || !unlimited(joint)) continue;
-      const std::vector<int> below = subtree(model, joint.child);
+      const std::vector<ModelLinkIndex> below = subtree(model, joint.child);
       if (lowest_point(model, below, X_BaseM) > kGroundReach_m) continue;
-      for (size_t k = 0; k < model.joints.size(); ++k) {
+      for (const ModelJointIndex k : model.joints.indices()) {
         if (std::find(below.begin(), below.end(), model.joints[k].child) != below.end()) join(k);
       }
     }
   }
   for (const Joint& joint : model.joints) {
     if (joint.parent < 0 && joint.type == JointType::fixed)
-      result.is_static[static_cast<size_t>(result.links.find(joint.child))] = true;
+      result.is_static[result.links.find(joint.child)] = true;
   }
   return result;
 }
@@ -171,35 +173,36 @@ struct BodyLayout::Known {
 
 BodyLayout::BodyLayout(const WorldModel& world) {
   Known known;
-  for (size_t i = 0; i < world.models.size(); ++i) add(world, static_cast<int>(i), known);
-  list(0, 0);
+  for (const InstanceIndex i : world.models.indices()) add(world, i, known);
+  list(BodyIndex(0), LinkIndex(0));
 }
 
 void BodyLayout::append(const WorldModel& world) {
   Known known;
-  const size_t first_body = bodies.size(), first_link = links.size();
-  add(world, static_cast<int>(world.models.size()) - 1, known);
-  list(first_body, first_link);
+  const BodyIndex first_body = bodies.next();
+  const LinkIndex first_new_link = links.next();
+  add(world, InstanceIndex(world.models.size() - 1), known);
+  list(first_body, first_new_link);
 }
 
-void BodyLayout::list(size_t first_body, size_t first_link) {
-  for (size_t body = first_body; body < bodies.size(); ++body)
-    listed.push_back({static_cast<int>(body), bodies[body].links.front()});
-  for (size_t link = first_link; link < links.size(); ++link) {
-    if (links[link].body < 0) listed.push_back({-1, static_cast<int>(link)});
+void BodyLayout::list(BodyIndex first_body, LinkIndex first_link) {
+  for (BodyIndex body = first_body; bodies.has(body); ++body)
+    listed.push_back({body, bodies[body].links.front()});
+  for (LinkIndex link = first_link; links.has(link); ++link) {
+    if (!links[link].body.valid()) listed.push_back({{}, link});
   }
 }
 
-void BodyLayout::place_again(const WorldModel& world, int instance) {
-  const ModelInstance& placed = world.models[static_cast<size_t>(instance)];
+void BodyLayout::place_again(const WorldModel& world, InstanceIndex instance) {
+  const ModelInstance& placed = world.models[instance];
   const Model& model = *placed.model;
   for (LinkPlacement& link : links) {
     if (link.instance == instance && link.body < 0)
-      link.X_BL = placed.X_WM * model.links[static_cast<size_t>(link.link)].X_ML;
+      link.X_BL = placed.X_WM * model.links[link.link].X_ML;
   }
   for (BodyPlacement& body : bodies) {
     if (body.instance != instance) continue;
-    const Link& root = model.links[static_cast<size_t>(body.root_link)];
+    const Link& root = model.links[body.root_link];
     body.X_WB = placed.X_WM * root.X_ML;
     body.name = placed.name + "/" + root.name;
   }
@@ -209,66 +212,61 @@ void BodyLayout::place_again(const WorldModel& world, int instance) {
   }
 }
 
-void BodyLayout::add(const WorldModel& world, int i, Known& known) {
-  const ModelInstance& instance = world.models[static_cast<size_t>(i)];
+void BodyLayout::add(const WorldModel& world, InstanceIndex i, Known& known) {
+  const ModelInstance& instance = world.models[i];
   const Model& model = *instance.model;
-  const int first = static_cast<int>(links.size());
-  first_link.push_back(first);
+  first_link.push_back(links.next());
   const Grouping& grouping = known.of(model);
 
-  std::vector<int> body_of_group(model.links.size(), -1);
-  for (size_t l = 0; l < model.links.size(); ++l) {
-    const int root = grouping.links.find(static_cast<int>(l));
+  IndexedVector<ModelLinkIndex, BodyIndex> body_of_group(model.links.size());
+  for (const ModelLinkIndex l : model.links.indices()) {
+    const ModelLinkIndex root(grouping.links.find(l));
     const Pose& X_ML = model.links[l].X_ML;
     LinkPlacement link;
     link.instance = i;
-    link.link = static_cast<int>(l);
-    if (model.is_static || grouping.is_static[static_cast<size_t>(root)]) {
+    link.link = l;
+    if (model.is_static || grouping.is_static[root]) {
       link.X_BL = instance.X_WM * X_ML;
     } else {
-      const Pose& X_MB = model.links[static_cast<size_t>(root)].X_ML;
-      int& body = body_of_group[static_cast<size_t>(root)];
-      if (body < 0) {
-        body = static_cast<int>(bodies.size());
-        bodies.push_back({i,
-                          root,
-                          {},
-                          instance.X_WM * X_MB,
-                          instance.name + "/" + model.links[static_cast<size_t>(root)].name});
+      const Pose& X_MB = model.links[root].X_ML;
+      BodyIndex& body = body_of_group[root];
+      if (!body.valid()) {
+        body = bodies.next();
+        bodies.push_back(
+            {i, root, {}, instance.X_WM * X_MB, instance.name + "/" + model.links[root].name});
       }
       link.body = body;
-      link.X_BL = static_cast<int>(l) == root ? Pose{} : X_MB.inverse() * X_ML;
-      bodies[static_cast<size_t>(body)].links.push_back(first + static_cast<int>(l));
+      link.X_BL = l == root ? Pose{} : X_MB.inverse() * X_ML;
+      bodies[body].links.push_back(links.next());
     }
     links.push_back(link);
   }
 
-  const int robot = instance.is_robot() ? static_cast<int>(robots.size()) : -1;
+  const RobotIndex robot = instance.is_robot() ? robots.next() : RobotIndex();
   RobotPlacement placement;
   placement.instance = i;
-  if (robot >= 0) {
-    int carrier = 0;
+  if (robot.valid()) {
+    ModelLinkIndex carrier(0);
     Pose X_MBase;
     if (model.drive) {
       carrier = carrier_of(model);
       X_MBase = model.drive->X_MBase;
     }
-    const LinkPlacement& link = links[static_cast<size_t>(first + carrier)];
+    const LinkPlacement& link = links[link_of(i, carrier)];
     placement.body = link.body;
-    placement.X_BBase =
-        link.X_BL * model.links[static_cast<size_t>(carrier)].X_ML.inverse() * X_MBase;
+    placement.X_BBase = link.X_BL * model.links[carrier].X_ML.inverse() * X_MBase;
   }
   if (model.drive) {
     const bool kinematic = model.drive->kind == DriveDescription::Kind::kinematic;
     const Pose X_BaseM = model.drive->X_MBase.inverse();
     const Vec3 left_M = model.drive->X_MBase.rotation * Vec3::UnitY();
-    const auto add_wheel = [&](int j, bool left, bool steers) {
-      const Joint& joint = model.joints[static_cast<size_t>(j)];
-      const Pose X_LM = model.links[static_cast<size_t>(joint.child)].X_ML.inverse();
+    const auto add_wheel = [&](ModelJointIndex j, bool left, bool steers) {
+      const Joint& joint = model.joints[j];
+      const Pose X_LM = model.links[joint.child].X_ML.inverse();
       WheelPlacement wheel;
       wheel.robot = robot;
       wheel.joint = j;
-      wheel.link = first + joint.child;
+      wheel.link = link_of(i, joint.child);
       wheel.left = left;
       wheel.steers = steers;
       Vec3 axis_M = joint.X_MJ.rotation * joint.axis.axis_in_J;
@@ -280,47 +278,46 @@ void BodyLayout::add(const WorldModel& world, int i, Known& known) {
           rim_of(*model.drive, left, X_BaseM * joint.X_MJ.translation, X_BaseM.rotation * axis_M);
       wheel.axis_in_L = (X_LM.rotation * axis_M).normalized();
       wheel.center_in_L = X_LM * joint.X_MJ.translation;
-      const int index = static_cast<int>(wheels.size());
-      for (const int below : subtree(model, joint.child)) {
-        int& turned_by = links[static_cast<size_t>(first + below)].wheel;
-        if (kinematic && turned_by < 0) {
+      const WheelIndex index = wheels.next();
+      for (const ModelLinkIndex below : subtree(model, joint.child)) {
+        WheelIndex& turned_by = links[link_of(i, below)].wheel;
+        if (kinematic && !turned_by.valid()) {
           turned_by = index;
           continue;
         }
-        for (const int other : placement.wheels) {  // that hangs on this one
-          if (wheels[static_cast<size_t>(other)].link == first + below)
-            wheels[static_cast<size_t>(other)].on = index;
+        for (const WheelIndex other : placement.wheels) {  // that hangs on this one
+          if (wheels[other].link == link_of(i, below)) wheels[other].on = index;
         }
       }
       placement.wheels.push_back(index);
       wheels.push_back(wheel);
     };
-    for (const int j : model.drive->left_joints) add_wheel(j, true, false);
-    for (const int j : model.drive->right_joints) add_wheel(j, false, false);
-    for (const int j : model.drive->steer_joints) add_wheel(j, false, true);
+    for (const ModelJointIndex j : model.drive->left_joints) add_wheel(j, true, false);
+    for (const ModelJointIndex j : model.drive->right_joints) add_wheel(j, false, false);
+    for (const ModelJointIndex j : model.drive->steer_joints) add_wheel(j, false, true);
   }
   if (!model.is_static) {
-    for (size_t j = 0; j < model.joints.size(); ++j) {
+    for (const ModelJointIndex j : model.joints.indices()) {
       const Joint& joint = model.joints[j];
-      if (grouping.joined[j] || is_drive_wheel(model, static_cast<int>(j))) continue;
-      const auto body = [&](int link) {
-        return link < 0 ? -1 : links[static_cast<size_t>(first + link)].body;
+      if (grouping.joined[j] || is_drive_wheel(model, j)) continue;
+      const auto body = [&](ModelLinkIndex link) {
+        return link.valid() ? links[link_of(i, link)].body : BodyIndex();
       };
-      const int parent = body(joint.parent), child = body(joint.child);
+      const BodyIndex parent = body(joint.parent), child = body(joint.child);
       if (parent == child) continue;  // both static, or joined another way
-      placement.joints.push_back(static_cast<int>(joints.size()));
-      joints.push_back({i, static_cast<int>(j), parent, child});
+      placement.joints.push_back(joints.next());
+      joints.push_back({i, j, parent, child});
     }
   }
-  if (robot >= 0) robots.push_back(std::move(placement));
+  if (robot.valid()) robots.push_back(std::move(placement));
 }
 
-std::string body_name(const WorldModel& world, const BodyLayout& layout, int link) {
-  if (link < 0) return "";
-  const LinkPlacement& placement = layout.links[static_cast<size_t>(link)];
-  if (placement.body >= 0) return layout.bodies[static_cast<size_t>(placement.body)].name;
-  const ModelInstance& instance = world.models[static_cast<size_t>(placement.instance)];
-  return instance.name + "/" + instance.model->links[static_cast<size_t>(placement.link)].name;
+std::string body_name(const WorldModel& world, const BodyLayout& layout, LinkIndex link) {
+  if (!link.valid()) return "";
+  const LinkPlacement& placement = layout.links[link];
+  if (placement.body.valid()) return layout.bodies[placement.body].name;
+  const ModelInstance& instance = world.models[placement.instance];
+  return instance.name + "/" + instance.model->links[placement.link].name;
 }
 
 }  // namespace ruedo::model

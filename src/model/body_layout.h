@@ -14,64 +14,64 @@
 namespace ruedo::model {
 
 struct LinkPlacement {
-  int instance = -1;  // index into WorldModel::models
-  int link = -1;      // index into Model::links
-  int body = -1;      // index into BodyLayout::bodies; -1: static, X_BL is then X_WL
-  Pose X_BL;          // at wheel angle 0
-  int wheel = -1;     // index into BodyLayout::wheels when the link turns with that wheel
+  InstanceIndex instance;
+  ModelLinkIndex link;
+  BodyIndex body;    // none: static, X_BL is then X_WL
+  Pose X_BL;         // at wheel angle 0
+  WheelIndex wheel;  // that turns the link
 };
 
 struct WheelPlacement {
-  int robot = -1;  // index into BodyLayout::robots
-  int joint = -1;  // index into Model::joints
-  int link = -1;   // index into BodyLayout::links
+  RobotIndex robot;
+  ModelJointIndex joint;
+  LinkIndex link;
   bool left = false;
-  bool steers = false;       // its angle is that of steering, about the vertical
-  int on = -1;               // index into BodyLayout::wheels: the steering joint that it hangs on
-  Vec3 rim = Vec3::UnitX();  // its rim's speed is rim . (vx, vy, omega) of base_link; not for
-                             // wheels that are steered
+  bool steers = false;             // its angle is that of steering, about the vertical
+  WheelIndex on;                   // the steering joint that it hangs on
+  Vec3 rim = Vec3::UnitX();        // its rim's speed is rim . (vx, vy, omega) of base_link; not for
+                                   // wheels that are steered
   Vec3 axis_in_L = Vec3::UnitY();  // unit; a positive angle about it rolls the robot ahead
   Vec3 center_in_L =
       Vec3::Zero();  // a point on the axis: the joint, which need not be the link's origin
 };
 
 struct BodyPlacement {
-  int instance = -1;
-  int root_link = -1;      // index into Model::links; the body's frame is this link's frame
-  std::vector<int> links;  // indices into BodyLayout::links
-  Pose X_WB;               // at the start
-  std::string name;        // MODEL/LINK
+  InstanceIndex instance;
+  ModelLinkIndex root_link;  // the body's frame is this link's frame
+  std::vector<LinkIndex> links;
+  Pose X_WB;         // at the start
+  std::string name;  // MODEL/LINK
 };
 
 struct JointPlacement {  // joints that are neither fixed nor wheels of a drive
-  int instance = -1;
-  int joint = -1;        // index into Model::joints
-  int parent_body = -1;  // -1: the world
-  int child_body = -1;
+  InstanceIndex instance;
+  ModelJointIndex joint;
+  BodyIndex parent_body;  // none: the world
+  BodyIndex child_body;
 };
 
 struct RobotPlacement {
-  int instance = -1;
-  int body = -1;            // that carries base_link; -1 for a robot that does not move
-  Pose X_BBase;             // base_link in that body (X_WBase when body is -1)
-  std::vector<int> wheels;  // indices into BodyLayout::wheels: left ones first, then right, front
-                            // first, then those that steer
-  std::vector<int> joints;  // indices into BodyLayout::joints
+  InstanceIndex instance;
+  BodyIndex body;                  // that carries base_link; none for a robot that does not move
+  Pose X_BBase;                    // base_link in that body (X_WBase where there is none)
+  std::vector<WheelIndex> wheels;  // left ones first, then right, front first, then those that
+                                   // steer
+  std::vector<JointIndex> joints;
 };
 
 // What ruedo/info lists as a body, and pictures label with its place in that list + 1.
 struct ListedBody {
-  int body = -1;  // index into BodyLayout::bodies; -1: a static link
-  int link = -1;  // index into BodyLayout::links; of a body its first
+  BodyIndex body;  // none: a static link
+  LinkIndex link;  // of a body its first
 };
 
 struct BodyLayout {
-  std::vector<LinkPlacement> links;   // all links of all models, in world order
-  std::vector<int> first_link;        // of each instance
-  std::vector<BodyPlacement> bodies;  // movable ones, in world order
-  std::vector<WheelPlacement> wheels;
-  std::vector<JointPlacement> joints;
-  std::vector<RobotPlacement> robots;  // instances that are robots, in world order
+  IndexedVector<LinkIndex, LinkPlacement> links;       // all links of all models, in world order
+  IndexedVector<InstanceIndex, LinkIndex> first_link;  // of each instance
+  IndexedVector<BodyIndex, BodyPlacement> bodies;      // movable ones, in world order
+  IndexedVector<WheelIndex, WheelPlacement> wheels;
+  IndexedVector<JointIndex, JointPlacement> joints;
+  IndexedVector<RobotIndex, RobotPlacement> robots;  // instances that are robots, in world order
   std::vector<ListedBody>
       listed;  // movable bodies, then static links; of instances that were added the same
 
@@ -81,19 +81,22 @@ struct BodyLayout {
   void append(const WorldModel& world);
   // An instance that was removed stands somewhere else now, with another name: the same model, the
   // same numbers.
-  void place_again(const WorldModel& world, int instance);
+  void place_again(const WorldModel& world, InstanceIndex instance);
 
+  LinkIndex link_of(InstanceIndex instance, ModelLinkIndex link) const {
+    return LinkIndex(first_link[instance] + link);
+  }
   // X_BL of a link, with the wheel that turns it at its angle in wheel_angles (rad, as in
   // Snapshot).
-  Pose link_in_body(int link, const std::vector<double>& wheel_angles) const;
+  Pose link_in_body(LinkIndex link, const IndexedVector<WheelIndex, double>& wheel_angles) const;
 
  private:
   struct Known;  // what was worked out of models
-  void add(const WorldModel& world, int instance, Known& known);
-  void list(size_t first_body, size_t first_link);
+  void add(const WorldModel& world, InstanceIndex instance, Known& known);
+  void list(BodyIndex first_body, LinkIndex first_link);
 };
 
 // As ruedo/info names what a link belongs to: its body's MODEL/LINK, or its own where it is static.
-std::string body_name(const WorldModel& world, const BodyLayout& layout, int link);
+std::string body_name(const WorldModel& world, const BodyLayout& layout, LinkIndex link);
 
 }  // namespace ruedo::model

@@ -50,7 +50,7 @@ struct Simplex {
   int n = 0;
   void set(std::initializer_list<Vec3> points) {
     n = 0;
-    for (const Vec3& each : points) p[static_cast<size_t>(n++)] = each;
+    for (const Vec3& each : points) p[n++] = each;
   }
 };
 
@@ -88,7 +88,7 @@ bool reduce(Simplex& s, Vec3& direction) {
       direction = -normal;
     }
   };
-  const Vec3 a = s.p[static_cast<size_t>(s.n - 1)];
+  const Vec3 a = s.p[s.n - 1];
   if (s.n == 2) {
     line(a, s.p[0]);
   } else if (s.n == 3) {
@@ -129,7 +129,7 @@ bool overlap(const Convex& a, const Convex& b) {
     if (direction.squaredNorm() < 1e-18) return true;  // the origin is on the simplex
     const Vec3 point = support(direction.normalized());
     if (point.dot(direction) <= 0) return false;
-    simplex.p[static_cast<size_t>(simplex.n++)] = point;
+    simplex.p[simplex.n++] = point;
     if (reduce(simplex, direction)) return true;
   }
   return true;  // it hovers at the border

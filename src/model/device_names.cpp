@@ -59,7 +59,7 @@ void make_sensor_names_unique(Model& model, const std::string& where, Findings& 
     // "arm.laser" twice becomes "arm.wrist-laser": the link's name has the scope already.
     const size_t dot = sensor.name.rfind('.');
     const std::string own = dot == std::string::npos ? sensor.name : sensor.name.substr(dot + 1);
-    sensor.name = model.links[static_cast<size_t>(sensor.link)].name + "-" + own;
+    sensor.name = model.links[sensor.link].name + "-" + own;
   }
   std::map<std::string, const SensorDescription*> seen;
   for (SensorDescription& sensor : model.sensors) {

@@ -21,10 +21,10 @@ namespace {
 
 constexpr double kStandardGravity = 9.80665;  // m/s^2
 
-int joint_of(const Element& element, const Model& model) {
+ModelJointIndex joint_of(const Element& element, const Model& model) {
   const std::string name = dotted(element.text);
   std::vector<std::string> names;
-  for (size_t i = 0; i < model.joints.size(); ++i) {
+  for (const ModelJointIndex i : model.joints.indices()) {
     const Joint& joint = model.joints[i];
     // Gazebo's plugins also take "MODEL::JOINT".
     if (joint.name == name || model.name + "." + joint.name == name) {
@@ -32,7 +32,7 @@ int joint_of(const Element& element, const Model& model) {
         element.fail("the joint '" + name +
                      "' does not turn; a wheel's joint is revolute or continuous");
       }
-      return static_cast<int>(i);
+      return i;
     }
     names.push_back(joint.name);
   }
@@ -44,7 +44,7 @@ int joint_of(const Element& element, const Model& model) {
 // The radius of the wheel on a joint: of the round shapes of its link and of the links fixed to it,
 // across the axis; 0 when there is none.
 double radius_of(const Model& model, const Joint& joint) {
-  std::vector<int> links{joint.child};
+  std::vector<ModelLinkIndex> links{joint.child};
   for (size_t i = 0; i < links.size(); ++i) {
     for (const Joint& other : model.joints) {
       if (other.type == JointType::fixed && other.parent == links[i]) links.push_back(other.child);
@@ -52,8 +52,8 @@ double radius_of(const Model& model, const Joint& joint) {
   }
   double radius = 0;
   const Vec3 axis_M = joint.X_MJ.rotation * joint.axis.axis_in_J;
-  for (const int index : links) {
-    const Link& link = model.links[static_cast<size_t>(index)];
+  for (const ModelLinkIndex index : links) {
+    const Link& link = model.links[index];
     for (const Collision& c : link.collisions) {
       const Geometry& g = c.geometry;
       if (g.shape == Shape::cylinder || g.shape == Shape::sphere || g.shape == Shape::capsule) {
@@ -70,9 +70,9 @@ double radius_of(const Model& model, const Joint& joint) {
   return radius;
 }
 
-Vec3 middle(const Model& model, const std::vector<int>& joints) {
+Vec3 middle(const Model& model, const std::vector<ModelJointIndex>& joints) {
   Vec3 sum = Vec3::Zero();
-  for (const int joint : joints) sum += model.joints[static_cast<size_t>(joint)].X_MJ.translation;
+  for (const ModelJointIndex joint : joints) sum += model.joints[joint].X_MJ.translation;
   return sum / static_cast<double>(joints.size());
 }
 
@@ -93,11 +93,11 @@ Quat heading_of(const Vec3& left, const Vec3& right, DriveDescription& drive,
 }
 
 // Front first, whatever the order in the file.
-void sort_by_front(const Model& model, const Pose& X_MBase, std::vector<int>& joints) {
+void sort_by_front(const Model& model, const Pose& X_MBase, std::vector<ModelJointIndex>& joints) {
   const Pose X_BaseM = X_MBase.inverse();
-  std::stable_sort(joints.begin(), joints.end(), [&](int a, int b) {
-    return (X_BaseM * model.joints[static_cast<size_t>(a)].X_MJ.translation).x() >
-           (X_BaseM * model.joints[static_cast<size_t>(b)].X_MJ.translation).x() + 1e-9;
+  std::stable_sort(joints.begin(), joints.end(), [&](ModelJointIndex a, ModelJointIndex b) {
+    return (X_BaseM * model.joints[a].X_MJ.translation).x() >
+           (X_BaseM * model.joints[b].X_MJ.translation).x() + 1e-9;
   });
 }
 
@@ -126,28 +126,28 @@ Steering read_steering(const Element& e) {
   e.fail("steering '" + *written + "' is not allowed; allowed are " + allowed);
 }
 
-bool is_steered(const Model& model, const DriveDescription& drive, int joint) {
-  int link = model.joints[static_cast<size_t>(joint)].parent;
-  for (size_t steps = 0; link >= 0 && steps <= model.joints.size(); ++steps) {
-    for (const int steer : drive.steer_joints) {
-      if (model.joints[static_cast<size_t>(steer)].child == link) return true;
+bool is_steered(const Model& model, const DriveDescription& drive, ModelJointIndex joint) {
+  ModelLinkIndex link = model.joints[joint].parent;
+  for (size_t steps = 0; link.valid() && steps <= model.joints.size(); ++steps) {
+    for (const ModelJointIndex steer : drive.steer_joints) {
+      if (model.joints[steer].child == link) return true;
     }
     const auto above = std::find_if(model.joints.begin(), model.joints.end(),
                                     [&](const Joint& each) { return each.child == link; });
-    link = above == model.joints.end() ? -1 : above->parent;
+    link = above == model.joints.end() ? ModelLinkIndex() : above->parent;
   }
   return false;
 }
 
 void read_joints(const Element& e, const Model& model, DriveDescription& drive) {
-  const auto read = [&](const char* name, std::vector<int>& into) {
+  const auto read = [&](const char* name, std::vector<ModelJointIndex>& into) {
     for (const Element* joint : e.all(name)) into.push_back(joint_of(*joint, model));
   };
   read("ruedo:left_joint", drive.left_joints);
   read("ruedo:right_joint", drive.right_joints);
   read("ruedo:wheel_joint", drive.left_joints);
   read("ruedo:steer_joint", drive.steer_joints);
-  std::vector<int> all = drive.left_joints;
+  std::vector<ModelJointIndex> all = drive.left_joints;
   all.insert(all.end(), drive.right_joints.begin(), drive.right_joints.end());
   all.insert(all.end(), drive.steer_joints.begin(), drive.steer_joints.end());
   for (size_t i = 0; i < all.size(); ++i) {
@@ -155,7 +155,7 @@ void read_joints(const Element& e, const Model& model, DriveDescription& drive) 
         all.begin() + static_cast<ptrdiff_t>(i))
       continue;
     const bool sides = drive.steer_joints.empty() && !drive.right_joints.empty();
-    e.fail("the joint '" + model.joints[static_cast<size_t>(all[i])].name +
+    e.fail("the joint '" + model.joints[all[i]].name +
            (sides ? "' is left and right" : "' is named twice"));
   }
   const auto need = [&](bool there, const char* name) {
@@ -210,21 +210,23 @@ Vec3 below_model(const Model& model) {
 // base_link: on the ground, in the middle of the wheels that are not steered; and what follows from
 // it.
 void place_base(const Element& e, const Model& model, DriveDescription& drive) {
-  std::vector<int> wheels = drive.left_joints;
+  std::vector<ModelJointIndex> wheels = drive.left_joints;
   wheels.insert(wheels.end(), drive.right_joints.begin(), drive.right_joints.end());
   Quat heading = Quat::Identity();
   Vec3 at = wheels.empty() ? below_model(model)
                            : Vec3(middle(model, wheels) - Vec3(0, 0, drive.wheel_radius));
   double track = 0;
-  const auto fixed_of = [&](const std::vector<int>& side) {
-    std::vector<int> fixed;
+  const auto fixed_of = [&](const std::vector<ModelJointIndex>& side) {
+    std::vector<ModelJointIndex> fixed;
     std::copy_if(side.begin(), side.end(), std::back_inserter(fixed),
-                 [&](int joint) { return !is_steered(model, drive, joint); });
+                 [&](ModelJointIndex joint) { return !is_steered(model, drive, joint); });
     return fixed;
   };
   const bool steers = drive.steering == Steering::ackermann || drive.steering == Steering::tricycle;
-  const std::vector<int> lefts = steers ? fixed_of(drive.left_joints) : drive.left_joints,
-                         rights = steers ? fixed_of(drive.right_joints) : drive.right_joints;
+  const std::vector<ModelJointIndex> lefts =
+                                         steers ? fixed_of(drive.left_joints) : drive.left_joints,
+                                     rights =
+                                         steers ? fixed_of(drive.right_joints) : drive.right_joints;
   if (!lefts.empty() && !rights.empty() && drive.steering != Steering::omni) {
     const Vec3 left = middle(model, lefts), right = middle(model, rights);
     heading = heading_of(left, right, drive, e);
@@ -233,7 +235,7 @@ void place_base(const Element& e, const Model& model, DriveDescription& drive) {
   }
   const Allowed positive = Allowed::positive(quantity::kLength);
   if (steers) {
-    const std::vector<int> fixed = fixed_of(wheels);
+    const std::vector<ModelJointIndex> fixed = fixed_of(wheels);
     const Vec3 steered = middle(model, drive.steer_joints);
     if (fixed.empty()) {
       const double wheelbase = e.number("ruedo:wheelbase", 0, positive);
@@ -251,8 +253,8 @@ void place_base(const Element& e, const Model& model, DriveDescription& drive) {
           "the steered wheels are beside the fixed ones; they have to be ahead of them or behind");
     drive.wheelbase = std::copysign(e.number("ruedo:wheelbase", std::abs(ahead), positive), ahead);
     double limit = std::numeric_limits<double>::infinity();
-    for (const int joint : drive.steer_joints) {
-      const JointAxis& axis = model.joints[static_cast<size_t>(joint)].axis;
+    for (const ModelJointIndex joint : drive.steer_joints) {
+      const JointAxis& axis = model.joints[joint].axis;
       limit = std::min({limit, std::abs(axis.lower), std::abs(axis.upper)});
     }
     if (!(limit > 0)) limit = kUsualSteering_rad;
@@ -276,9 +278,8 @@ void place_base(const Element& e, const Model& model, DriveDescription& drive) {
     const Pose X_BaseM = drive.X_MBase.inverse();
     drive.left_joints.clear();
     drive.right_joints.clear();
-    for (const int joint : wheels) {
-      const bool left =
-          (X_BaseM * model.joints[static_cast<size_t>(joint)].X_MJ.translation).y() > 0;
+    for (const ModelJointIndex joint : wheels) {
+      const bool left = (X_BaseM * model.joints[joint].X_MJ.translation).y() > 0;
       (left ? drive.left_joints : drive.right_joints).push_back(joint);
     }
   }
@@ -286,8 +287,8 @@ void place_base(const Element& e, const Model& model, DriveDescription& drive) {
   sort_by_front(model, drive.X_MBase, drive.right_joints);
   if (drive.steering == Steering::mecanum) {
     const Pose X_BaseM = drive.X_MBase.inverse();
-    const auto x = [&](const std::vector<int>& side, size_t i) {
-      return (X_BaseM * model.joints[static_cast<size_t>(side[i])].X_MJ.translation).x();
+    const auto x = [&](const std::vector<ModelJointIndex>& side, size_t i) {
+      return (X_BaseM * model.joints[side[i]].X_MJ.translation).x();
     };
     const double apart = (x(drive.left_joints, 0) - x(drive.left_joints, 1) +
                           x(drive.right_joints, 0) - x(drive.right_joints, 1)) /
@@ -435,8 +436,8 @@ DriveDescription read_drive(std::shared_ptr<const Element> element,
     drive.wheel_radius =
         e.number("ruedo:wheel_radius", 0, Allowed::not_negative(quantity::kLength));
   } else {
-    const int first = drive.left_joints.empty() ? drive.right_joints[0] : drive.left_joints[0];
-    const double found_radius = radius_of(model, model.joints[static_cast<size_t>(first)]);
+    const auto& side = drive.left_joints.empty() ? drive.right_joints : drive.left_joints;
+    const double found_radius = radius_of(model, model.joints[side[0]]);
     if (!e.has("ruedo:wheel_radius") && found_radius <= 0)
       e.fail("has no <ruedo:wheel_radius>, and the wheel has no collision shape to take it from");
     drive.wheel_radius =
@@ -495,8 +496,7 @@ void name_plugin(const Element& plugin, const PluginKind& kind, const Model& mod
 // Whether a joint that moves carries the link of that name.
 bool is_carried(const Model& model, const std::string& link) {
   return std::any_of(model.joints.begin(), model.joints.end(), [&](const Joint& joint) {
-    return joint.type != JointType::fixed &&
-           model.links[static_cast<size_t>(joint.child)].name == link;
+    return joint.type != JointType::fixed && model.links[joint.child].name == link;
   });
 }
 

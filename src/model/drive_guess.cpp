@@ -35,30 +35,30 @@ bool unlimited(const Joint& joint) {
 Vec3 axis_in_model(const Joint& joint) { return joint.X_MJ.rotation * joint.axis.axis_in_J; }
 
 struct Wheel {
-  int joint = -1;
-  int steer = -1;  // the joint about the vertical that it hangs on
-  Vec3 axis, at;   // in the model
+  ModelJointIndex joint;
+  ModelJointIndex steer;  // the joint about the vertical that it hangs on
+  Vec3 axis, at;          // in the model
   double lowest = 0.0;
   std::string name;  // of joint and link, in small letters
 };
 
-// The joint about the vertical between the wheel and the base; -1: none.
-int steering_above(const Model& model, int joint) {
-  int link = model.joints[static_cast<size_t>(joint)].parent;
-  for (size_t steps = 0; link >= 0 && steps <= model.joints.size(); ++steps) {
+// The joint about the vertical between the wheel and the base, if there is one.
+ModelJointIndex steering_above(const Model& model, ModelJointIndex joint) {
+  ModelLinkIndex link = model.joints[joint].parent;
+  for (size_t steps = 0; link.valid() && steps <= model.joints.size(); ++steps) {
     const auto above = std::find_if(model.joints.begin(), model.joints.end(),
                                     [&](const Joint& each) { return each.child == link; });
-    if (above == model.joints.end()) return -1;
+    if (above == model.joints.end()) return {};
     const bool turns = above->type == JointType::revolute || above->type == JointType::continuous;
     if (turns && std::abs(axis_in_model(*above).z()) > 1.0 - kLevel)
-      return static_cast<int>(above - model.joints.begin());
+      return ModelJointIndex(above - model.joints.begin());
     link = above->parent;
   }
-  return -1;
+  return {};
 }
 
-bool is_round(const Model& model, int link) {
-  for (const Collision& c : model.links[static_cast<size_t>(link)].collisions) {
+bool is_round(const Model& model, ModelLinkIndex link) {
+  for (const Collision& c : model.links[link].collisions) {
     if (c.geometry.shape == Shape::cylinder || c.geometry.shape == Shape::sphere ||
         c.geometry.shape == Shape::mesh)
       return true;
@@ -68,14 +68,14 @@ bool is_round(const Model& model, int link) {
 
 std::vector<Wheel> wheels_of(const Model& model, bool by_name) {
   std::vector<Wheel> wheels;
-  for (size_t j = 0; j < model.joints.size(); ++j) {
+  for (const ModelJointIndex j : model.joints.indices()) {
     const Joint& joint = model.joints[j];
     if (!unlimited(joint) || joint.parent < 0) continue;
     Wheel wheel;
-    wheel.joint = static_cast<int>(j);
+    wheel.joint = j;
     wheel.axis = axis_in_model(joint);
     if (std::abs(wheel.axis.z()) > kLevel) continue;
-    wheel.name = lower(joint.name + " " + model.links[static_cast<size_t>(joint.child)].name);
+    wheel.name = lower(joint.name + " " + model.links[joint.child].name);
     if (has_any(wheel.name, {"caster", "castor", "idler", "swivel", "roller", "passive", "laser",
                              "lidar", "scan", "sonar", "camera", "rotor", "prop"}))
       continue;
@@ -83,9 +83,8 @@ std::vector<Wheel> wheels_of(const Model& model, bool by_name) {
                 : !is_round(model, joint.child))
       continue;
     wheel.steer = steering_above(model, wheel.joint);
-    if (wheel.steer >= 0 && unlimited(model.joints[static_cast<size_t>(wheel.steer)]) &&
-        has_any(lower(model.joints[static_cast<size_t>(wheel.steer)].name),
-                {"caster", "castor", "swivel"}))
+    if (wheel.steer.valid() && unlimited(model.joints[wheel.steer]) &&
+        has_any(lower(model.joints[wheel.steer].name), {"caster", "castor", "swivel"}))
       continue;
     wheel.at = joint.X_MJ.translation;
     wheel.lowest = lowest_point_below(model, wheel.joint);
@@ -107,9 +106,9 @@ void add(Element& drive, const char* name, const std::string& text) {
 
 }  // namespace
 
-double lowest_point_below(const Model& model, int joint) {
-  const Joint& top = model.joints[static_cast<size_t>(joint)];
-  std::vector<int> links{top.child};
+double lowest_point_below(const Model& model, ModelJointIndex joint) {
+  const Joint& top = model.joints[joint];
+  std::vector<ModelLinkIndex> links{top.child};
   for (size_t i = 0; i < links.size(); ++i) {
     for (const Joint& each : model.joints) {
       if (each.parent == links[i] &&
@@ -125,8 +124,8 @@ double lowest_point_below(const Model& model, int joint) {
       lowest = std::min(lowest,
                         (X * box.corner(static_cast<Eigen::AlignedBox3d::CornerType>(corner))).z());
   };
-  for (const int index : links) {
-    const Link& link = model.links[static_cast<size_t>(index)];
+  for (const ModelLinkIndex index : links) {
+    const Link& link = model.links[index];
     for (const Collision& each : link.collisions) reach(link.X_ML * each.X_LC, each.geometry);
   }
   return lowest;
@@ -138,13 +137,12 @@ GuessedDrive guess_drive(const Model& model, const std::vector<std::string>& con
   if (wheels.size() < 2) wheels = wheels_of(model, false);
   const auto is_controlled = [&](const Wheel& wheel) {
     return std::any_of(controlled.begin(), controlled.end(), [&](const std::string& name) {
-      return name == model.joints[static_cast<size_t>(wheel.joint)].name;
+      return name == model.joints[wheel.joint].name;
     });
   };
   if (std::count_if(wheels.begin(), wheels.end(), is_controlled) >= 2)
     std::erase_if(wheels, [&](const Wheel& wheel) { return !is_controlled(wheel); });
-  for (const Wheel& wheel : wheels)
-    result.wheels.push_back(model.joints[static_cast<size_t>(wheel.joint)].name);
+  for (const Wheel& wheel : wheels) result.wheels.push_back(model.joints[wheel.joint].name);
   if (wheels.size() < 2) return result;
 
   const auto parallel = [&](const Wheel& wheel) {
@@ -152,7 +150,7 @@ GuessedDrive guess_drive(const Model& model, const std::vector<std::string>& con
   };
   const bool all_parallel = std::all_of(wheels.begin(), wheels.end(), parallel);
   const auto steered = static_cast<size_t>(std::count_if(
-      wheels.begin(), wheels.end(), [](const Wheel& wheel) { return wheel.steer >= 0; }));
+      wheels.begin(), wheels.end(), [](const Wheel& wheel) { return wheel.steer.valid(); }));
   const bool rollers = std::any_of(wheels.begin(), wheels.end(), [](const Wheel& wheel) {
     return has_any(wheel.name, {"mecanum", "meca", "omni"});
   });
@@ -169,15 +167,15 @@ GuessedDrive guess_drive(const Model& model, const std::vector<std::string>& con
   if (ahead.x() < -1e-6 || (std::abs(ahead.x()) <= 1e-6 && ahead.y() < 0)) left = -left;
 
   std::string lefts, rights, steers, steering = "differential";
-  const auto name_of = [&](int joint) -> const std::string& {
-    return model.joints[static_cast<size_t>(joint)].name;
+  const auto name_of = [&](ModelJointIndex joint) -> const std::string& {
+    return model.joints[joint].name;
   };
   const auto list = [](std::string& names, const std::string& name) {
     names += (names.empty() ? "" : "+") + name;
   };
   const auto sides = [&](bool with_steered) {
     for (const Wheel& wheel : wheels) {
-      if (!with_steered && wheel.steer >= 0) continue;
+      if (!with_steered && wheel.steer.valid()) continue;
       const double aside = left.dot(wheel.at - middle);
       if (std::abs(aside) < kAside_m) continue;
       add(*drive, aside > 0 ? "ruedo:left_joint" : "ruedo:right_joint", name_of(wheel.joint));
@@ -194,9 +192,10 @@ GuessedDrive guess_drive(const Model& model, const std::vector<std::string>& con
     for (const Wheel& wheel : wheels) add(*drive, "ruedo:steer_joint", name_of(wheel.steer));
     sides(true);
   } else if (steered > 0) {
-    std::vector<int> joints;
+    std::vector<ModelJointIndex> joints;
     for (const Wheel& wheel : wheels) {
-      if (wheel.steer < 0 || std::find(joints.begin(), joints.end(), wheel.steer) != joints.end())
+      if (!wheel.steer.valid() ||
+          std::find(joints.begin(), joints.end(), wheel.steer) != joints.end())
         continue;
       joints.push_back(wheel.steer);
       add(*drive, "ruedo:steer_joint", name_of(wheel.steer));

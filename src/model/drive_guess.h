@@ -21,6 +21,6 @@ struct GuessedDrive {
 GuessedDrive guess_drive(const Model& model, const std::vector<std::string>& controlled);
 
 // Whether something of a joint's subtree reaches down to the height z in the model.
-double lowest_point_below(const Model& model, int joint);
+double lowest_point_below(const Model& model, ModelJointIndex joint);
 
 }  // namespace ruedo::model

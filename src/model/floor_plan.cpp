@@ -67,7 +67,7 @@ FloorPlan::FloorPlan(std::vector<Rect> walls, const Rect& within)
               y1 = block_of(r.high.y(), within.low.y(), blocks_y_);
     for (int y = block_of(r.low.y(), within.low.y(), blocks_y_); y <= y1; ++y) {
       for (int x = block_of(r.low.x(), within.low.x(), blocks_x_); x <= x1; ++x)
-        of_block_[static_cast<size_t>(y * blocks_x_ + x)].push_back(static_cast<int>(wall));
+        of_block_[y * blocks_x_ + x].push_back(static_cast<int>(wall));
     }
   }
 }
@@ -80,8 +80,7 @@ void FloorPlan::for_each_near(const Vec2& low, const Vec2& high, Visit visit) co
             y1 = block_of(high.y(), within_.low.y(), blocks_y_);
   for (int y = block_of(low.y(), within_.low.y(), blocks_y_); y <= y1; ++y) {
     for (int x = block_of(low.x(), within_.low.x(), blocks_x_); x <= x1; ++x) {
-      for (const int wall : of_block_[static_cast<size_t>(y * blocks_x_ + x)])
-        visit(walls_[static_cast<size_t>(wall)]);
+      for (const int wall : of_block_[y * blocks_x_ + x]) visit(walls_[wall]);
     }
   }
 }
@@ -152,14 +151,14 @@ Route FloorPlan::route_to(const Rect& goal, double radius, double clearance) con
     for (int c = column(goal.low.x()); c <= column(goal.high.x()); ++c) {
       const int cell = r * columns_ + c;
       const Vec2 m = middle(cell);
-      route.left[static_cast<size_t>(cell)] = static_cast<float>((m - goal.nearest(m)).norm());
-      open.emplace(route.left[static_cast<size_t>(cell)], cell);
+      route.left[cell] = static_cast<float>((m - goal.nearest(m)).norm());
+      open.emplace(route.left[cell], cell);
     }
   }
   while (!open.empty()) {
     const auto [left, cell] = open.top();
     open.pop();
-    if (left > route.left[static_cast<size_t>(cell)]) continue;
+    if (left > route.left[cell]) continue;
     for (int dy = -1; dy <= 1; ++dy) {
       for (int dx = -1; dx <= 1; ++dx) {
         const int c = cell % columns_ + dx, r = cell / columns_ + dy;
@@ -189,7 +188,7 @@ Vec2 FloorPlan::next(const Route& route, const Rect& goal, const Vec2& p, double
         const int c = cell % columns_ + dx, r = cell / columns_ + dy;
         if (c < 0 || r < 0 || c >= columns_ || r >= rows_) continue;
         const int to = r * columns_ + c;
-        if (route.left[static_cast<size_t>(to)] < route.left[static_cast<size_t>(best)]) best = to;
+        if (route.left[to] < route.left[best]) best = to;
       }
     }
     if (best == cell) break;

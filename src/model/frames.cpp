@@ -128,24 +128,25 @@ Pose FrameGraph::pose(const std::string& name, const Element& asker) {
   return found.inner ? outer * found.inner->X_MF : outer;
 }
 
-int FrameGraph::node_link(size_t index, int depth) {
+ModelLinkIndex FrameGraph::node_link(size_t index, int depth) {
   const Node& node = nodes_[index];
   if (depth > static_cast<int>(nodes_.size()))
     node.element->fail("'" + node.name + "' is attached to itself, through other frames");
   if (node.scope) return node.first_link;  // a model moves with its canonical link
-  if (node.link >= 0) return node.link;
+  if (node.link.valid()) return node.link;
   if (node.attached_to.empty() || node.attached_to == "__model__" || node.attached_to == "world")
-    return -1;
+    return {};
   const Found found = require(node.attached_to, *node.element);
-  return found.inner ? nodes_[found.node].first_link + found.inner->link
+  return found.inner ? ModelLinkIndex(nodes_[found.node].first_link + found.inner->link)
                      : node_link(found.node, depth + 1);
 }
 
-int FrameGraph::link(const std::string& name, const Element& asker) {
-  if (name.empty() || name == "__model__" || name == "world") return -1;
+ModelLinkIndex FrameGraph::link(const std::string& name, const Element& asker) {
+  if (name.empty() || name == "__model__" || name == "world") return {};
   const Found found = require(name, asker);
-  return found.inner ? nodes_[found.node].first_link + std::max(found.inner->link, 0)
-                     : node_link(found.node, 0);
+  return found.inner
+             ? ModelLinkIndex(nodes_[found.node].first_link + std::max<int>(found.inner->link, 0))
+             : node_link(found.node, 0);
 }
 
 }  // namespace ruedo::model

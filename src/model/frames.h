@@ -14,11 +14,11 @@
 
 namespace ruedo::model {
 
-// A frame of a model that was read: X_MF, and the link it moves with (-1: a static scope's or the
+// A frame of a model that was read: X_MF, and the link it moves with (none: a static scope's or the
 // world's).
 struct FrameInModel {
   Pose X_MF;
-  int link = -1;
+  ModelLinkIndex link;
 };
 
 // A model as its own file sees it, before it is placed.
@@ -41,10 +41,10 @@ class FrameGraph {
     Pose pose;
     std::string relative_to;  // "": the scope's own frame
     std::string attached_to;  // "": what `link` says, or the scope itself
-    int link = -1;
+    ModelLinkIndex link;
     std::shared_ptr<const ScopedModel> scope;  // a nested model: its frames are reached by "name::"
     std::string placement_frame;               // of that model: the frame that `pose` places
-    int first_link = 0;                        // of that model's links in this scope
+    ModelLinkIndex first_link{0};              // of that model's links in this scope
     bool merged = false;                       // its frames are reached by their own names
   };
 
@@ -54,7 +54,7 @@ class FrameGraph {
   // The pose of a frame in the scope, and the link it moves with. `asker` is blamed when there is
   // no such frame, or when frames go in a circle.
   Pose pose(const std::string& name, const Element& asker);
-  int link(const std::string& name, const Element& asker);
+  ModelLinkIndex link(const std::string& name, const Element& asker);
   bool has(const std::string& name);
   // Whether that frame comes from this element.
   bool is_from(const std::string& name, const Element& element) const;
@@ -71,7 +71,7 @@ class FrameGraph {
   bool find(const std::string& name, Found& found) const;
   Found require(const std::string& name, const Element& asker) const;
   Pose node_pose(size_t index);
-  int node_link(size_t index, int depth);
+  ModelLinkIndex node_link(size_t index, int depth);
 
   enum class State { unknown, asked, known };
   std::string scope_name_;

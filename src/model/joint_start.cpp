@@ -30,8 +30,8 @@ bool has_position(const Joint& joint) { return turns(joint) || joint.type == Joi
 
 double position_of(const Model& model, const Joint& joint, const Pose& X_MParent,
                    const Pose& X_MChild) {
-  const Pose& X_MC = model.links[static_cast<size_t>(joint.child)].X_ML;
-  const Pose X_MP = joint.parent < 0 ? Pose{} : model.links[static_cast<size_t>(joint.parent)].X_ML;
+  const Pose& X_MC = model.links[joint.child].X_ML;
+  const Pose X_MP = joint.parent < 0 ? Pose{} : model.links[joint.parent].X_ML;
   const Pose before = X_MP.inverse() * X_MC, after = X_MParent.inverse() * X_MChild;
   const Pose X_PJ = X_MP.inverse() * joint.X_MJ;
   const Pose moved = X_PJ.inverse() * after * before.inverse() * X_PJ;
@@ -44,28 +44,26 @@ double position_of(const Model& model, const Joint& joint, const Pose& X_MParent
 namespace {
 
 // Where each link goes, in the model, from where it was.
-std::vector<Pose> moves_of_links(const Model& model, const std::vector<double>& positions) {
-  const size_t n = model.links.size();
-  std::vector<int> carrier(n, -1);  // the joint that carries a link
-  for (size_t j = 0; j < model.joints.size(); ++j) {
+IndexedVector<ModelLinkIndex, Pose> moves_of_links(const Model& model,
+                                                   const JointPositions& positions) {
+  IndexedVector<ModelLinkIndex, ModelJointIndex> carrier(model.links.size());  // of each link
+  for (const ModelJointIndex j : model.joints.indices()) {
     if (model.joints[j].type != JointType::gearbox)  // which carries nothing
-      carrier[static_cast<size_t>(model.joints[j].child)] = static_cast<int>(j);
+      carrier[model.joints[j].child] = j;
   }
-  std::vector<Pose> moves(n);
-  std::vector<char> done(n, 0);
-  for (size_t i = 0; i < n; ++i) {
-    std::vector<size_t> way;  // towards the root, as far as it is not done yet
-    for (size_t at = i; !done[at] && carrier[at] >= 0;) {
-      done[at] = 1;  // a loop of joints ends here, too
+  IndexedVector<ModelLinkIndex, Pose> moves(model.links.size());
+  IndexedVector<ModelLinkIndex, bool> done(model.links.size());
+  for (const ModelLinkIndex link : model.links.indices()) {
+    std::vector<ModelLinkIndex> way;  // towards the root, as far as it is not done yet
+    for (ModelLinkIndex at = link; at.valid() && !done[at] && carrier[at].valid();
+         at = model.joints[carrier[at]].parent) {
+      done[at] = true;  // a loop of joints ends here, too
       way.push_back(at);
-      const int parent = model.joints[static_cast<size_t>(carrier[at])].parent;
-      if (parent < 0) break;
-      at = static_cast<size_t>(parent);
     }
     for (; !way.empty(); way.pop_back()) {
-      const size_t j = static_cast<size_t>(carrier[way.back()]);
+      const ModelJointIndex j = carrier[way.back()];
       const Joint& joint = model.joints[j];
-      const Pose X_parent = joint.parent < 0 ? Pose{} : moves[static_cast<size_t>(joint.parent)];
+      const Pose X_parent = joint.parent.valid() ? moves[joint.parent] : Pose{};
       moves[way.back()] =
           X_parent * joint.X_MJ * moved_by(joint, positions[j]) * joint.X_MJ.inverse();
     }
@@ -87,17 +85,17 @@ void count_from(double position, size_t j, Model& model) {
 
 }  // namespace
 
-void begin_at(const std::vector<double>& positions, const std::string& where, Model& model,
+void begin_at(const JointPositions& positions, const std::string& where, Model& model,
               Findings& findings) {
-  std::vector<double> all = positions;
+  JointPositions all = positions;
   all.resize(model.joints.size(), 0.0);
   if (std::all_of(all.begin(), all.end(), [](double each) { return each == 0.0; })) return;
-  const std::vector<Pose> moves = moves_of_links(model, all);
-  for (size_t i = 0; i < model.links.size(); ++i)
+  const IndexedVector<ModelLinkIndex, Pose> moves = moves_of_links(model, all);
+  for (const ModelLinkIndex i : model.links.indices())
     model.links[i].X_ML = moves[i] * model.links[i].X_ML;
-  for (size_t j = 0; j < all.size(); ++j) {
+  for (const ModelJointIndex j : model.joints.indices()) {
     Joint& joint = model.joints[j];
-    if (joint.parent >= 0) joint.X_MJ = moves[static_cast<size_t>(joint.parent)] * joint.X_MJ;
+    if (joint.parent.valid()) joint.X_MJ = moves[joint.parent] * joint.X_MJ;
     if (all[j] == 0.0) continue;
     count_from(all[j], j, model);
     findings.repaired(joint.source, where + "/joint " + joint.name,

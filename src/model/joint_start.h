@@ -16,10 +16,12 @@ bool has_position(const Joint& joint);
 double position_of(const Model& model, const Joint& joint, const Pose& X_MParent,
                    const Pose& X_MChild);
 
-// Moves what each joint carries to these positions (by joint; those at the end may be missing: 0).
+using JointPositions = IndexedVector<ModelJointIndex, double>;  // rad or m
+
+// Moves what each joint carries to these positions (those at the end may be missing: 0).
 // The joints' positions count from there: limits, springs and who follows are shifted, and each is
 // named.
-void begin_at(const std::vector<double>& positions, const std::string& where, Model& model,
+void begin_at(const JointPositions& positions, const std::string& where, Model& model,
               Findings& findings);
 
 }  // namespace ruedo::model

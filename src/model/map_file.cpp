@@ -195,9 +195,7 @@ void write_map(const OccupancyGrid& grid, const std::string& path) {
   for (int r = grid.height - 1; r >= 0; --r) {
     for (int c = 0; c < grid.width; ++c) {
       const Cell cell = grid.at(c, r);
-      row[static_cast<size_t>(c)] = static_cast<char>(cell == Cell::occupied ? 0
-                                                      : cell == Cell::free   ? 254
-                                                                             : 205);
+      row[c] = static_cast<char>(cell == Cell::occupied ? 0 : cell == Cell::free ? 254 : 205);
     }
     image.write(row.data(), static_cast<std::streamsize>(row.size()));
   }

@@ -111,8 +111,7 @@ class TriangleGrid {
     };
     const int y1 = cell(box.max().y(), 1), x1 = cell(box.max().x(), 0);
     for (int y = cell(box.min().y(), 1); y <= y1; ++y) {
-      for (int x = cell(box.min().x(), 0); x <= x1; ++x)
-        visit(cells_[static_cast<size_t>(y * side_ + x)]);
+      for (int x = cell(box.min().x(), 0); x <= x1; ++x) visit(cells_[y * side_ + x]);
     }
   }
 
@@ -129,7 +128,7 @@ struct Room::Index {
     const Geometry* geometry;
     Pose X_WG;
     Box box;
-    int instance;
+    int instance;  // index into instances
     bool is_static;
   };
 
@@ -160,7 +159,7 @@ struct Room::Index {
   template <class PoseOf>
   void add(const std::string& name, const std::shared_ptr<const Model>& model, PoseOf X_WL) {
     instances.emplace_back(name, model);
-    for (size_t l = 0; l < model->links.size(); ++l) {
+    for (const ModelLinkIndex l : model->links.indices()) {
       const Pose X = X_WL(l);
       for (const Collision& c : model->links[l].collisions) {
         const Pose X_WG = X * c.X_LC;
@@ -194,21 +193,20 @@ struct Room::Index {
           found.insert(found.end(), cell->second.begin(), cell->second.end());
       }
     }
-    std::erase_if(
-        found, [&](int solid) { return !solids[static_cast<size_t>(solid)].box.intersects(box); });
+    std::erase_if(found, [&](int solid) { return !solids[solid].box.intersects(box); });
     std::sort(found.begin(), found.end());
     found.erase(std::unique(found.begin(), found.end()), found.end());
     return found;
   }
 
   TriangleGrid& triangles_of(int solid) {
-    const Solid& s = solids[static_cast<size_t>(solid)];
+    const Solid& s = solids[solid];
     return triangles.try_emplace(solid, *s.geometry, s.X_WG).first->second;
   }
 
   // Whether a convex thing with that box shares space with a solid.
   bool meets(const Convex& thing, const Box& box, int solid) {
-    const Solid& s = solids[static_cast<size_t>(solid)];
+    const Solid& s = solids[solid];
     if (!s.box.intersects(box)) return false;
     if (s.geometry->shape != Shape::mesh) return overlap(thing, {s.geometry, s.X_WG, {}});
     return triangles_of(solid).any(box, [&](const std::array<Vec3, 3>& corners) {
@@ -238,14 +236,12 @@ struct Room::Index {
     if (parts.empty()) return "";
     // Walls meet in corners: what never moves may stand in what never moves.
     const auto counts = [&](int solid) {
-      const bool is_static = solids[static_cast<size_t>(solid)].is_static;
+      const bool is_static = solids[solid].is_static;
       return of_static ? is_static : !(is_static && model.is_static);
     };
-    const auto name = [&](int solid) {
-      return instances[static_cast<size_t>(solids[static_cast<size_t>(solid)].instance)].first;
-    };
+    const auto name = [&](int solid) { return instances[solids[solid].instance].first; };
     for (const int plane : planes) {
-      const Solid& s = solids[static_cast<size_t>(plane)];
+      const Solid& s = solids[plane];
       const Vec3 n = s.X_WG.rotation * s.geometry->normal;
       for (const Part& part : parts) {
         if (counts(plane) && n.dot(part.shape.support(-n) - s.X_WG.translation) < 0)
@@ -265,10 +261,10 @@ Room::Room() : index_(std::make_unique<Index>()) {}
 Room::~Room() = default;
 
 Room::Room(const WorldModel& world, const LinkPose& now) : Room() {
-  for (size_t i = 0; i < world.models.size(); ++i) {
+  for (const InstanceIndex i : world.models.indices()) {
     const ModelInstance& instance = world.models[i];
     if (instance.removed) continue;
-    index_->add(instance.name, instance.model, [&](size_t l) {
+    index_->add(instance.name, instance.model, [&](ModelLinkIndex l) {
       return now ? now(i, l) : instance.X_WM * instance.model->links[l].X_ML;
     });
   }
@@ -276,7 +272,7 @@ Room::Room(const WorldModel& world, const LinkPose& now) : Room() {
 
 void Room::add(const ModelInstance& instance) {
   index_->add(instance.name, instance.model,
-              [&](size_t l) { return instance.X_WM * instance.model->links[l].X_ML; });
+              [&](ModelLinkIndex l) { return instance.X_WM * instance.model->links[l].X_ML; });
 }
 
 namespace {
@@ -296,7 +292,7 @@ double walkable(const std::vector<double>& heights) {
 std::vector<double> Room::surfaces(double x, double y) const {
   std::vector<double> heights;
   for (const int plane : index_->planes) {
-    const Index::Solid& s = index_->solids[static_cast<size_t>(plane)];
+    const Index::Solid& s = index_->solids[plane];
     const Vec3 n = s.X_WG.rotation * s.geometry->normal;
     const Vec3& at = s.X_WG.translation;
     if (s.is_static && n.z() > 1e-6)
@@ -304,7 +300,7 @@ std::vector<double> Room::surfaces(double x, double y) const {
   }
   const Box line(Vec3(x, y, -kFar_m), Vec3(x, y, kFar_m));
   for (const int solid : index_->near(line)) {
-    const Index::Solid& s = index_->solids[static_cast<size_t>(solid)];
+    const Index::Solid& s = index_->solids[solid];
     if (!s.is_static) continue;
     if (s.geometry->shape == Shape::mesh) {
       index_->triangles_of(solid).any(line, [&](const std::array<Vec3, 3>& corners) {

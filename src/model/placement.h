@@ -12,7 +12,7 @@
 namespace ruedo::model {
 
 // The pose of a link of an instance now, by their indices; empty: where the world file puts it.
-using LinkPose = std::function<Pose(size_t instance, size_t link)>;
+using LinkPose = std::function<Pose(InstanceIndex instance, ModelLinkIndex link)>;
 
 // What stands where in a world. A question costs what is near the place, so that thousands of
 // models can be placed one after another. Not for several threads at once.

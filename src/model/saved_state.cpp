@@ -37,7 +37,7 @@ bool position_in(const Element& joint, double& position) {
 }
 
 // However far a wheel has turned, it begins at 0.
-bool is_of_drive(const Model& model, int joint) {
+bool is_of_drive(const Model& model, ModelJointIndex joint) {
   if (!model.drive) return false;
   const DriveDescription& drive = *model.drive;
   for (const auto* joints : {&drive.left_joints, &drive.right_joints, &drive.steer_joints}) {
@@ -135,18 +135,18 @@ void SavedState::put_back(const std::string& name, ModelInstance& instance,
   const SavedModel& saved = found->second;
   instance.X_WM = saved.X_WM;
   const Pose X_MW = saved.X_WM.inverse();
-  const auto pose_of = [&](int link) -> const Pose* {
-    if (link < 0) return nullptr;
-    const std::string& own = instance.model->links[static_cast<size_t>(link)].name;
+  const auto pose_of = [&](ModelLinkIndex link) -> const Pose* {
+    if (!link.valid()) return nullptr;
+    const std::string& own = instance.model->links[link].name;
     const auto at = std::find_if(saved.links.begin(), saved.links.end(),
                                  [&](const Link& each) { return each.name == own; });
     return at == saved.links.end() ? nullptr : &at->X_WL;
   };
   auto model = std::make_shared<Model>(*instance.model);
-  std::vector<double> starts(model->joints.size(), 0.0);
-  for (size_t j = 0; j < starts.size(); ++j) {
+  IndexedVector<ModelJointIndex, double> starts(model->joints.size(), 0.0);
+  for (const ModelJointIndex j : starts.indices()) {
     const Joint& joint = model->joints[j];
-    if (is_of_drive(*model, static_cast<int>(j)) || !has_position(joint)) continue;
+    if (is_of_drive(*model, j) || !has_position(joint)) continue;
     const Pose* child = pose_of(joint.child);
     const Pose* parent = pose_of(joint.parent);
     if (const auto at = saved.joints.find(joint.name); at != saved.joints.end())

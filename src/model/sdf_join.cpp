@@ -65,8 +65,7 @@ std::unique_ptr<Element> SdfReader::with_joined_models(const Element& world, Sdf
         joint->fail("joins '" + parent + "' and '" + child +
                     "'; in a <world> it joins links of its models, as MODEL::LINK");
       joints.emplace_back(joint, b);
-      const int to = std::min(group[static_cast<size_t>(a)], group[static_cast<size_t>(b)]),
-                from = std::max(group[static_cast<size_t>(a)], group[static_cast<size_t>(b)]);
+      const int to = std::min(group[a], group[b]), from = std::max(group[a], group[b]);
       std::replace(group.begin(), group.end(), from, to);
     });
   }
@@ -85,7 +84,7 @@ std::unique_ptr<Element> SdfReader::with_joined_models(const Element& world, Sdf
     }
     const size_t index = next++;
     const bool tied = std::any_of(joints.begin(), joints.end(), [&](const auto& each) {
-      return group[static_cast<size_t>(each.second)] == group[index];
+      return group[each.second] == group[index];
     });
     if (!tied)
       joined->children.push_back(child->clone());
@@ -118,7 +117,7 @@ std::unique_ptr<Element> SdfReader::join(
       names += (names.empty() ? "'" : ", '") + each->name + "'";
   }
   for (const auto& [joint, of] : joints) {
-    if (group[static_cast<size_t>(of)] != which) continue;
+    if (group[of] != which) continue;
     model->children.push_back(joint->clone());
     leave_scope(*model->children.back(), "parent", first.name);
     leave_scope(*model->children.back(), "child", first.name);

@@ -91,7 +91,8 @@ double read_advance(const Element& joint) {
 
 }  // namespace
 
-void read_mimic(const Element& element, const std::vector<Joint>& joints, Joint& joint) {
+void read_mimic(const Element& element, const IndexedVector<ModelJointIndex, Joint>& joints,
+                Joint& joint) {
   const Element* mimic = element.child("axis/mimic");
   if (!mimic || joint.type == JointType::fixed || joint.type == JointType::ball) return;
   const std::string* written = mimic->attribute("joint");
@@ -105,15 +106,15 @@ void read_mimic(const Element& element, const std::vector<Joint>& joints, Joint&
   if (leader == joints.end()) mimic->fail("joint '" + name + "' is none of the model's joints");
   if (leader->type == JointType::fixed || leader->type == JointType::ball)
     mimic->fail("joint '" + name + "' has no position to follow");
-  for (const Joint* each = &*leader;; each = &joints[static_cast<size_t>(each->leader)]) {
+  for (const Joint* each = &*leader;; each = &joints[each->leader]) {
     if (each == &joint)
       mimic->fail("joint '" + name + "' follows this one: a joint cannot follow itself");
-    if (each->leader < 0) break;
+    if (!each->leader.valid()) break;
   }
   joint.mimic_multiplier = mimic->number("multiplier", 1.0, Allowed::any(quantity::kFactor));
   joint.mimic_offset = mimic->number("offset", 0.0, Allowed::any(quantity::kAngle));
   joint.mimic_reference = mimic->number("reference", 0.0, Allowed::any(quantity::kAngle));
-  joint.leader = static_cast<int>(leader - joints.begin());
+  joint.leader = ModelJointIndex(leader - joints.begin());
 }
 
 std::string beside_link(const std::string& joint) { return joint + " (joint)"; }
@@ -168,19 +169,19 @@ const Element& named_end(const Element& element, const char* which) {
   return *found;
 }
 
-void read_ends(const Element& element, FrameGraph& frames, const std::vector<Link>& links,
-               Joint& joint) {
+void read_ends(const Element& element, FrameGraph& frames,
+               const IndexedVector<ModelLinkIndex, Link>& links, Joint& joint) {
   const Element &parent = named_end(element, "parent"), &child = named_end(element, "child");
   const std::string parent_name = joint_end(element, "parent"),
                     child_name = joint_end(element, "child");
   if (child_name == "world") child.fail("'world' is not allowed as the child of a joint");
-  joint.parent = parent_name == "world" ? -1 : frames.link(parent_name, parent);
+  joint.parent = parent_name == "world" ? ModelLinkIndex() : frames.link(parent_name, parent);
   joint.child = frames.link(child_name, child);
-  if (joint.child < 0) child.fail("'" + child_name + "' is not part of a link");
-  if (joint.parent < 0 && parent_name != "world")
+  if (!joint.child.valid()) child.fail("'" + child_name + "' is not part of a link");
+  if (!joint.parent.valid() && parent_name != "world")
     parent.fail("'" + parent_name + "' is not part of a link");
   if (joint.parent == joint.child)
-    element.fail("joins the link '" + links[static_cast<size_t>(joint.child)].name + "' to itself");
+    element.fail("joins the link '" + links[joint.child].name + "' to itself");
 }
 
 void read_axes(const Element& element, SdfVersion version, FrameGraph& frames,
@@ -219,7 +220,8 @@ void read_gear(const Element& element, FrameGraph& frames, Joint& joint) {
 }  // namespace
 
 Joint read_joint(const Element& element, SdfVersion version, FrameGraph& frames,
-                 const std::vector<Link>& links, const std::string& where, ReadContext& context) {
+                 const IndexedVector<ModelLinkIndex, Link>& links, const std::string& where,
+                 ReadContext& context) {
   report_other_children(element,
                         {"parent", "child", "pose", "axis", "axis2", "sensor", "thread_pitch",
                          "screw_thread_pitch", "gearbox_ratio", "gearbox_reference_body"},

@@ -308,7 +308,7 @@ Light read_light(const Element& element, const Pose& pose, const std::string& wh
   return light;
 }
 
-SensorDescription read_sensor(const Element& element, int link, const Pose& X_LS) {
+SensorDescription read_sensor(const Element& element, ModelLinkIndex link, const Pose& X_LS) {
   SensorDescription sensor;
   sensor.name = dotted(required_name(element));
   const std::string* type = element.attribute("type");
@@ -332,7 +332,8 @@ void collect_plugins(const Element& element, std::vector<const Element*>& plugin
 }
 
 Link read_link(const Element& element, const PoseInLink& pose_in_link, const std::string& where,
-               ReadContext& context, int index, std::vector<SensorDescription>& sensors) {
+               ReadContext& context, ModelLinkIndex index,
+               std::vector<SensorDescription>& sensors) {
   report_other_children(element,
                         {"pose", "inertial", "collision", "visual", "sensor", "light", "gravity",
                          "kinematic", "enable_wind"},

@@ -16,14 +16,14 @@ using PoseInLink = std::function<Pose(const Element&)>;
 
 // The link without its X_ML; its sensors are appended to `sensors` with the index `link`.
 Link read_link(const Element& element, const PoseInLink& pose_in_link, const std::string& where,
-               ReadContext& context, int link, std::vector<SensorDescription>& sensors);
+               ReadContext& context, ModelLinkIndex link, std::vector<SensorDescription>& sensors);
 
 // A light at `pose`.
 Light read_light(const Element& element, const Pose& pose, const std::string& where,
                  ReadContext& context);
 
 // A sensor; its name as written, with "::" as ".".
-SensorDescription read_sensor(const Element& element, int link, const Pose& X_LS);
+SensorDescription read_sensor(const Element& element, ModelLinkIndex link, const Pose& X_LS);
 
 // Files of another layout than SDF's sensors say what plugins they name.
 void collect_plugins(const Element& element, std::vector<const Element*>& plugins);

@@ -23,11 +23,10 @@ struct Nested {
 };
 
 // A joint that keeps what a static nested model brings from moving with the rest.
-Joint anchor(const std::string& name, int link, const Pose& X_MJ, const Source& source) {
+Joint anchor(const std::string& name, ModelLinkIndex link, const Pose& X_MJ, const Source& source) {
   Joint joint;
   joint.name = name + ".anchor";
   joint.type = JointType::fixed;
-  joint.parent = -1;
   joint.child = link;
   joint.X_MJ = X_MJ;
   joint.source = source;
@@ -38,8 +37,7 @@ Joint anchor(const std::string& name, int link, const Pose& X_MJ, const Source& 
 void append_nested(const Nested& nested, const Pose& X_MN, Model& into, Findings& findings) {
   const Model& from = *nested.scope->model;
   const std::string prefix = nested.merged ? "" : dotted(nested.name) + ".";
-  const int first_link = static_cast<int>(nested.first_link),
-            first_joint = static_cast<int>(into.joints.size());
+  const int first_link = static_cast<int>(nested.first_link), first_joint = into.joints.next();
   for (Link link : from.links) {
     link.name = prefix + link.name;
     link.X_ML = X_MN * link.X_ML;
@@ -48,16 +46,16 @@ void append_nested(const Nested& nested, const Pose& X_MN, Model& into, Findings
   for (Joint joint : from.joints) {
     joint.name = prefix + joint.name;
     joint.X_MJ = X_MN * joint.X_MJ;
-    if (joint.parent >= 0) joint.parent += first_link;
-    if (joint.gear_reference >= 0) joint.gear_reference += first_link;
+    if (joint.parent.valid()) joint.parent += first_link;
+    if (joint.gear_reference.valid()) joint.gear_reference += first_link;
     joint.child += first_link;
-    if (joint.leader >= 0) joint.leader += first_joint;
+    if (joint.leader.valid()) joint.leader += first_joint;
     into.joints.push_back(std::move(joint));
   }
   for (SensorDescription sensor : from.sensors) {
     sensor.name = prefix + sensor.name;
     sensor.link += first_link;
-    if (sensor.joint >= 0) sensor.joint += first_joint;
+    if (sensor.joint.valid()) sensor.joint += first_joint;
     into.sensors.push_back(std::move(sensor));
   }
   into.commanded |= from.commanded;
@@ -65,7 +63,7 @@ void append_nested(const Nested& nested, const Pose& X_MN, Model& into, Findings
     into.drive = from.drive;
     for (auto* joints :
          {&into.drive->left_joints, &into.drive->right_joints, &into.drive->steer_joints}) {
-      for (int& joint : *joints) joint += first_joint;
+      for (ModelJointIndex& joint : *joints) joint += first_joint;
     }
     into.drive->X_MBase = X_MN * into.drive->X_MBase;
   } else if (from.drive) {
@@ -77,17 +75,18 @@ void append_nested(const Nested& nested, const Pose& X_MN, Model& into, Findings
 }
 
 // Makes `canonical` link 0; every index follows.
-void bring_to_front(int canonical, ScopedModel& scope, Model& model) {
+void bring_to_front(ModelLinkIndex canonical, ScopedModel& scope, Model& model) {
   if (canonical <= 0) return;
   std::rotate(model.links.begin(), model.links.begin() + canonical,
               model.links.begin() + canonical + 1);
-  const auto moved = [&](int& link) {
+  const auto moved = [&](ModelLinkIndex& link) {
     if (link == canonical)
-      link = 0;
-    else if (link >= 0 && link < canonical)
+      link = ModelLinkIndex(0);
+    else if (link.valid() && link < canonical)
       ++link;
   };
-  for (Joint& joint : model.joints) moved(joint.parent), moved(joint.child);
+  for (Joint& joint : model.joints)
+    moved(joint.parent), moved(joint.child), moved(joint.gear_reference);
   for (SensorDescription& sensor : model.sensors) moved(sensor.link);
   for (auto& [name, frame] : scope.frames) moved(frame.link);
 }
@@ -95,9 +94,9 @@ void bring_to_front(int canonical, ScopedModel& scope, Model& model) {
 // A sensor of a joint sits on the joint's child.
 SensorDescription joint_sensor(const Element& element, const Joint& joint, const Pose& X_MS,
                                const Model& model) {
-  const Pose& X_ML = model.links[static_cast<size_t>(joint.child)].X_ML;
+  const Pose& X_ML = model.links[joint.child].X_ML;
   SensorDescription sensor = read_sensor(element, joint.child, X_ML.inverse() * X_MS);
-  sensor.joint = static_cast<int>(&joint - model.joints.data());
+  sensor.joint = ModelJointIndex(&joint - model.joints.data());
   return sensor;
 }
 
@@ -149,7 +148,7 @@ class SdfReader::ModelReader {
   void read_mimic_plugin(const Element& plugin);
   // Findings about the model as a whole.
   void export_frames();
-  int canonical_link();
+  ModelLinkIndex canonical_link();
   void read_path();
 
   SdfReader& reader_;
@@ -162,8 +161,8 @@ class SdfReader::ModelReader {
   std::shared_ptr<Model> model_ = std::make_shared<Model>();
   std::vector<Nested> nested_;
   size_t link_count_ = 0;
-  int first_own_link_ = -1;
-  std::vector<double> starts_;  // <initial_position> of each joint
+  ModelLinkIndex first_own_link_;
+  JointPositions starts_;  // <initial_position> of each joint
   bool parts_missing_ = false;
   bool all_static_ = true;             // all that it consists of
   std::set<const Element*> left_out_;  // children
@@ -288,8 +287,8 @@ FrameGraph::Node SdfReader::ModelReader::framed(const Element& child) const {
 FrameGraph::Node SdfReader::ModelReader::link_node(const Element& child) {
   FrameGraph::Node node = framed(child);
   if (frames_.has(node.name)) frames_.add(std::move(node));  // throws
-  node.link = static_cast<int>(link_count_++);
-  if (first_own_link_ < 0) first_own_link_ = node.link;
+  node.link = ModelLinkIndex(link_count_++);
+  if (!first_own_link_.valid()) first_own_link_ = node.link;
   return node;
 }
 
@@ -315,7 +314,7 @@ std::optional<FrameGraph::Node> SdfReader::ModelReader::nested_node(const Elemen
   node.relative_to = part->scope->relative_to;
   node.placement_frame = part->scope->placement_frame;
   node.scope = part->scope;
-  node.first_link = static_cast<int>(link_count_);
+  node.first_link = ModelLinkIndex(link_count_);
   node.merged = part->merged;
   part->name = node.name;
   part->first_link = link_count_;
@@ -369,7 +368,7 @@ void SdfReader::ModelReader::append_link(const Element& child) {
     const Pose pose = owner.pose("pose");
     return frame.empty() ? pose : X_ML.inverse() * (frames_.pose(frame, owner) * pose);
   };
-  const int index = static_cast<int>(model_->links.size());
+  const ModelLinkIndex index = model_->links.next();
   Link link = read_link(child, in_link, where_ + "/link " + required_name(child), reader_.context_,
                         index, model_->sensors);
   link.name = dotted(link.name);
@@ -386,7 +385,7 @@ void SdfReader::ModelReader::append_part(const Nested& part, const Element& chil
   }
   for (size_t i = part.first_link; i < part.first_link + part.scope->model->links.size(); ++i)
     anchors_.push_back(
-        anchor(model_->links[i].name, static_cast<int>(i), model_->links[i].X_ML, child.source));
+        anchor(model_->links[i].name, ModelLinkIndex(i), model_->links[i].X_ML, child.source));
 }
 
 // Every name's pose and link, for files that nest or place this model.
@@ -398,11 +397,11 @@ void SdfReader::ModelReader::export_frames() {
   }
 }
 
-int SdfReader::ModelReader::canonical_link() {
-  int canonical = std::max(first_own_link_, 0);
+ModelLinkIndex SdfReader::ModelReader::canonical_link() {
+  ModelLinkIndex canonical(std::max<int>(first_own_link_, 0));
   if (const std::string* name = element_.attribute("canonical_link"); name && !name->empty()) {
     read_or_leave_out(where_, "its first link is taken", findings_, [&] {
-      const int link = frames_.link(*name, element_);
+      const ModelLinkIndex link = frames_.link(*name, element_);
       if (link < 0) element_.fail("canonical_link '" + *name + "' is no link");
       canonical = link;
     });
@@ -430,7 +429,8 @@ void SdfReader::ModelReader::read_plugin_sensors() {
       if (!made.sensor) return;
       const Pose pose = made.sensor->pose("pose");
       if (made.joint.empty()) {
-        const int link = made.link.empty() ? 0 : frames_.link(made.link, *plugin);
+        const ModelLinkIndex link =
+            made.link.empty() ? ModelLinkIndex(0) : frames_.link(made.link, *plugin);
         if (link < 0) plugin->fail("'" + made.link + "' is no link");
         model_->sensors.push_back(read_sensor(*made.sensor, link, pose));
         return;
@@ -480,9 +480,9 @@ void SdfReader::ModelReader::read_mimic_plugin(const Element& plugin) {
   };
   const Joint& leader = named("joint");
   Joint& follower = named("mimicJoint");
-  if (&leader == &follower || leader.leader >= 0)
+  if (&leader == &follower || leader.leader.valid())
     plugin.fail("a joint cannot follow itself, or one that follows");
-  follower.leader = static_cast<int>(&leader - model_->joints.data());
+  follower.leader = ModelJointIndex(&leader - model_->joints.data());
   follower.mimic_multiplier = plugin.number("multiplier", 1.0, Allowed::any(quantity::kFactor));
   follower.mimic_offset = plugin.number("offset", 0.0, Allowed::any(quantity::kAngle));
 }
@@ -537,7 +537,7 @@ void SdfReader::ModelReader::read_initial_values(const Element& system) {
       for (const Element* param : state->all("param")) {
         const std::string* key = param->attribute("name");
         if (key && *key == "initial_value")
-          starts_[static_cast<size_t>(own - model_->joints.begin())] =
+          starts_[ModelJointIndex(own - model_->joints.begin())] =
               param->as_number(Allowed::any(quantity::kLength));
       }
     }

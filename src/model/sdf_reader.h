@@ -100,8 +100,10 @@ std::string joint_end(const Element& joint, const char* which);
 
 // <joint> to Joint; the frames are those of its model.
 Joint read_joint(const Element& element, SdfVersion version, FrameGraph& frames,
-                 const std::vector<Link>& links, const std::string& where, ReadContext& context);
+                 const IndexedVector<ModelLinkIndex, Link>& links, const std::string& where,
+                 ReadContext& context);
 // Its <mimic>, when all joints of the model are read.
-void read_mimic(const Element& element, const std::vector<Joint>& joints, Joint& joint);
+void read_mimic(const Element& element, const IndexedVector<ModelJointIndex, Joint>& joints,
+                Joint& joint);
 
 }  // namespace ruedo::model

@@ -7,15 +7,13 @@
 
 #include "model/drive.h"
 #include "model/sdf_reader.h"
+#include "ruedo/sensor.h"
 
 namespace ruedo::model {
 namespace {
 
 constexpr const char* kDriveDevices[] = {"velocity", "wheels", "odometry",
                                          "pose",     "motion", "move"};
-constexpr const char* kFixedDevices[] = {"velocity", "wheels",        "odometry",
-                                         "pose",     "motion",        "move",
-                                         "joints",   "joint_command", "collisions"};
 
 template <class List>
 bool contains(const List& list, const std::string& what) {
@@ -26,6 +24,15 @@ std::string listed(const std::vector<std::string>& names) {
   std::string text;
   for (const auto& name : names) text += (text.empty() ? "" : ", ") + name;
   return text.empty() ? "none" : text;
+}
+
+// What robots have without a <sensor>: what takes commands, and the devices that are attached to
+// them.
+bool is_fixed_device(const std::string& name) {
+  if (contains(kDriveDevices, name) || name == "joint_command") return true;
+  return std::any_of(sensor_kinds().begin(), sensor_kinds().end(), [&](const SensorKind& kind) {
+    return !kind.attach_to.empty() && kind.device_name == name;
+  });
 }
 
 std::vector<std::string> devices_of(const Model& model) {
@@ -59,39 +66,12 @@ class RobotsByName {
   std::map<std::string, ModelInstance*> robots_;
 };
 
-// Keys that a kind of sensor reads, so that what a file leaves out can be set, too.
+// Keys of a sensor, so that what a file leaves out can be set, too.
 std::vector<std::string> known_keys(const std::string& type) {
   std::vector<std::string> keys = {"update_rate", "always_on", "pose"};
-  const auto noise = [&](const std::string& at) {
-    for (const char* each : {"type", "mean", "stddev"}) keys.push_back(at + "." + each);
-  };
-  if (type == "ray" || type == "gpu_ray" || type == "lidar" || type == "gpu_lidar") {
-    const std::string top = type.find("ray") != std::string::npos ? "ray" : "lidar";
-    for (const char* plane : {"horizontal", "vertical"}) {
-      for (const char* each : {"samples", "resolution", "min_angle", "max_angle"})
-        keys.push_back(top + ".scan." + plane + "." + each);
-    }
-    for (const char* each : {"min", "max", "resolution"})
-      keys.push_back(top + ".range." + std::string(each));
-    noise(top + ".noise");
-    for (const char* each :
-         {"own_link", "hits", "intensities", "sweep_time", "bearing_noise", "phase"})
-      keys.push_back(std::string("ruedo:") + each);
-  } else if (type == "sonar") {
-    for (const char* each : {"min", "max", "radius", "geometry"})
-      keys.push_back(std::string("sonar.") + each);
-    for (const char* each : {"horizontal_aperture", "vertical_aperture", "rays", "reading",
-                             "firing", "order", "specular_angle", "cross_talk"}) {
-      keys.push_back(std::string("ruedo:sonar.ruedo:") + each);
-    }
-    noise("ruedo:sonar.noise");
-  } else if (type.find("camera") != std::string::npos) {
-    for (const char* each :
-         {"horizontal_fov", "image.width", "image.height", "image.format", "clip.near", "clip.far"})
-      keys.push_back(std::string("camera.") + each);
-    noise("camera.noise");
-    for (const char* each : {"encoding", "quality", "depth", "labels", "exposure", "vignetting"})
-      keys.push_back(std::string("ruedo:") + each);
+  for (const SensorKind& kind : sensor_kinds()) {
+    if (!kind.settings || !contains(kind.types, type)) continue;
+    for (std::string& key : kind.settings(type)) keys.push_back(std::move(key));
   }
   return keys;
 }
@@ -276,7 +256,7 @@ void apply_disabled(const std::vector<std::string>& disabled, WorldModel& world)
         less = std::move(model);
       }
       instance.model = less;
-    } else if (contains(kFixedDevices, device)) {
+    } else if (is_fixed_device(device)) {
       world.disabled.push_back(each);
     } else {
       const std::vector<std::string> devices = devices_of(*instance.model);

@@ -16,6 +16,7 @@
 #include "model/fault.h"
 #include "model/mesh.h"
 #include "ruedo/element.h"
+#include "ruedo/index.h"
 #include "ruedo/pose.h"
 
 namespace ruedo::model {
@@ -126,16 +127,16 @@ struct JointAxis {
 struct Joint {
   std::string name;
   JointType type = JointType::fixed;
-  int parent = -1;  // index into links; -1: the world
-  int child = 0;
+  ModelLinkIndex parent;  // none: the world
+  ModelLinkIndex child{0};
   Pose X_MJ;              // at the start
   JointAxis axis, axis2;  // axis2: universal and gearbox only
   double advance = 0.0;   // m/rad along the axis: screw only
-  // Gearbox only: against the reference (a link; -1: the world) the child turns -gear_ratio times
+  // Gearbox only: against the reference (a link; none: the world) the child turns -gear_ratio times
   // as far about axis2 as the parent does about axis.
   double gear_ratio = 1.0;
-  int gear_reference = -1;
-  int leader = -1;  // index into joints: the one that this one mimics
+  ModelLinkIndex gear_reference;
+  ModelJointIndex leader;  // the one that this one mimics
   double mimic_multiplier = 1.0, mimic_offset = 0.0,
          mimic_reference = 0.0;  // multiplier (leader - reference) + offset
   Source source;
@@ -145,10 +146,10 @@ struct Joint {
 struct SensorDescription {
   std::string name;  // the device's name: unique in its model, fit for a channel
   std::string type;  // SDF's type: "ray", "gpu_lidar", "lidar", "sonar", "camera", "custom", ...
-  int link = 0;
+  ModelLinkIndex link{0};
   Pose X_LS;
   std::shared_ptr<const Element> element;
-  int joint = -1;  // index into Model::joints: the one that carries it; link is then its child
+  ModelJointIndex joint;  // the one that carries it; link is then its child
 };
 
 // How a robot drives: read from <ruedo:drive>, or mapped from a Gazebo plugin. See
@@ -161,14 +162,14 @@ struct DriveDescription {
   Kind kind = Kind::kinematic;
   Steering steering = Steering::differential;
   bool guessed = false;  // no file says how the robot drives; its joints look like wheels
-  std::vector<int> left_joints,
-      right_joints;               // wheel joints, front first; holonomic and tracked may have none
-  std::vector<int> steer_joints;  // Ackermann, tricycle: turn about the vertical, with the wheels
-                                  // that hang on them
-  double wheel_radius = 0.0;      // m
-  double track = 0.0;             // m, between the left and right wheels
-  double wheelbase = 0.0;         // m: Ackermann, tricycle: from the fixed axle to the steered one;
-                                  // mecanum: between the axles
+  std::vector<ModelJointIndex> left_joints,
+      right_joints;  // wheel joints, front first; holonomic and tracked may have none
+  std::vector<ModelJointIndex> steer_joints;  // Ackermann, tricycle: turn about the vertical, with
+                                              // the wheels that hang on them
+  double wheel_radius = 0.0;                  // m
+  double track = 0.0;                         // m, between the left and right wheels
+  double wheelbase = 0.0;  // m: Ackermann, tricycle: from the fixed axle to the steered one;
+                           // mecanum: between the axles
   double max_steering_angle = 0.0;  // rad, of a wheel in the middle of the steered axle
   double max_steering_rate = std::numeric_limits<double>::infinity();  // rad/s, of that wheel
   Pose X_MBase;  // base_link: on the ground below the centre of rotation, x ahead
@@ -208,8 +209,8 @@ struct Model {
   // joint holds to the world is not.
   bool is_static = false;
   bool self_collide = false;
-  std::vector<Link> links;  // links[0] is the canonical link, or the first
-  std::vector<Joint> joints;
+  IndexedVector<ModelLinkIndex, Link> links;  // links[0] is the canonical link, or the first
+  IndexedVector<ModelJointIndex, Joint> joints;
   std::vector<SensorDescription> sensors;
   std::optional<DriveDescription> drive;
   bool commanded =
@@ -285,8 +286,8 @@ struct WorldModel {
   SolverDescription solver;
   Sky sky;
   std::vector<Light> lights;
-  std::vector<ModelInstance> models;    // in file order; --spawn's after them
-  std::vector<Finding> findings;        // what was unsupported or repaired
+  IndexedVector<InstanceIndex, ModelInstance> models;  // in file order; --spawn's after them
+  std::vector<Finding> findings;                       // what was unsupported or repaired
   std::vector<std::string> files_read;  // absolute paths, in the order of first reading
   std::vector<std::string>
       disabled;  // "ROBOT/odometry", ...: channels of a robot itself that are switched off

@@ -17,10 +17,11 @@ constexpr size_t kRoom = 64, kRoomPerBody = 8;
 
 // The entry of a child shape in one of ObjectInfo's lists; Bullet says no child for what is a
 // single shape.
-int entry_of(const ObjectInfo& info, const std::vector<int>& list, int child) {
-  if (info.body < 0 || child < 0 || static_cast<size_t>(child) >= list.size())
-    return list.empty() ? -1 : list.front();
-  return list[static_cast<size_t>(child)];
+template <typename Entry>
+Entry entry_of(const ObjectInfo& info, const std::vector<Entry>& list, int child) {
+  if (!info.body.valid() || child < 0 || static_cast<size_t>(child) >= list.size())
+    return list.empty() ? Entry(-1) : list.front();
+  return list[child];
 }
 
 bool earlier(const Contact& a, const Contact& b) {
@@ -44,7 +45,7 @@ Contact swapped(const Contact& contact) {
 }  // namespace
 
 void ContactBook::ByBody::clear() {
-  for (const Contact& contact : entries_) ranges_[static_cast<size_t>(contact.body_a)] = {0, 0};
+  for (const Contact& contact : entries_) ranges_[contact.body_a] = {0, 0};
   entries_.clear();
 }
 
@@ -55,7 +56,7 @@ void ContactBook::ByBody::fill(const std::vector<Contact>& contacts) {
   }
   std::sort(entries_.begin(), entries_.end(), earlier);
   for (size_t i = 0; i < entries_.size(); ++i) {
-    auto& range = ranges_[static_cast<size_t>(entries_[i].body_a)];
+    auto& range = ranges_[entries_[i].body_a];
     if (range.second++ == 0) range.first = i;
   }
 }

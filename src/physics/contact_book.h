@@ -28,8 +28,8 @@ class ContactBook {
   void finish();
 
   const std::vector<Contact>& all() const { return contacts_; }  // those that touched
-  std::span<const Contact> touching(int body) const { return touching_.of(body); }
-  std::span<const Contact> near(int body) const { return near_.of(body); }
+  std::span<const Contact> touching(BodyIndex body) const { return touching_.of(body); }
+  std::span<const Contact> near(BodyIndex body) const { return near_.of(body); }
 
  private:
   // Contacts grouped by body, that body always first in them.
@@ -40,14 +40,14 @@ class ContactBook {
     void reserve(size_t contacts) { entries_.reserve(contacts); }
     void clear();
     void fill(const std::vector<Contact>& contacts);
-    std::span<const Contact> of(int body) const {
-      const auto& range = ranges_[static_cast<size_t>(body)];
+    std::span<const Contact> of(BodyIndex body) const {
+      const auto& range = ranges_[body];
       return {entries_.data() + range.first, range.second};
     }
 
    private:
     std::vector<Contact> entries_;
-    std::vector<std::pair<size_t, size_t>> ranges_;  // first, count
+    IndexedVector<BodyIndex, std::pair<size_t, size_t>> ranges_;  // first, count
   };
 
   void make_room(size_t bodies);

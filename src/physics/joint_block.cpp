@@ -135,26 +135,23 @@ double JointBlocks::coupling(size_t i, const Row& other) const {
 
 double JointBlocks::velocity(size_t i, const SolverBodies& bodies) const {
   const Third* third = third_of(i);
-  return rows_[i].velocity(bodies) +
-         (third ? third->angular.dot(bodies[static_cast<size_t>(third->body)].w) : 0.0);
+  return rows_[i].velocity(bodies) + (third ? third->angular.dot(bodies[third->body].w) : 0.0);
 }
 
 double JointBlocks::push_velocity(size_t i, const SolverBodies& bodies) const {
   const Third* third = third_of(i);
   return rows_[i].push_velocity(bodies) +
-         (third ? third->angular.dot(bodies[static_cast<size_t>(third->body)].push_w) : 0.0);
+         (third ? third->angular.dot(bodies[third->body].push_w) : 0.0);
 }
 
 void JointBlocks::give(size_t i, SolverBodies& bodies, double more) {
   rows_[i].give(bodies, more);
-  if (const Third* third = third_of(i))
-    bodies[static_cast<size_t>(third->body)].w += third->turns * more;
+  if (const Third* third = third_of(i)) bodies[third->body].w += third->turns * more;
 }
 
 void JointBlocks::give_push(size_t i, SolverBodies& bodies, double more) {
   rows_[i].give_push(bodies, more);
-  if (const Third* third = third_of(i))
-    bodies[static_cast<size_t>(third->body)].push_w += third->turns * more;
+  if (const Third* third = third_of(i)) bodies[third->body].push_w += third->turns * more;
 }
 
 double JointBlocks::relax(size_t i, SolverBodies& bodies) {
@@ -247,7 +244,7 @@ void JointBlocks::add_motor(JointMotor& motor, Joint& joint, int reference,
   row.a = joint.a;
   row.b = joint.b;
   const auto arm = [&](int body) {
-    const btRigidBody* bullet = bodies[static_cast<size_t>(body)].bullet;
+    const btRigidBody* bullet = bodies[body].bullet;
     return bullet ? Vec3(motor.anchor - from_bt(bullet->getCenterOfMassPosition()))
                   : Vec3(Vec3::Zero());
   };
@@ -279,7 +276,7 @@ void JointBlocks::add_third(const JointMotor& motor, int reference, const Solver
   third.row = rows_.size() - 1;
   third.body = reference;
   third.angular = -motor.axis - motor.parent_axis;
-  third.turns = bodies[static_cast<size_t>(reference)].inverse_inertia * third.angular;
+  third.turns = bodies[reference].inverse_inertia * third.angular;
   thirds_.push_back(third);
   Row& row = rows_.back();
   row.response = coupling(third.row, third.row);
@@ -295,9 +292,7 @@ void JointBlocks::prepare(const SolverBodies& bodies) {
   if (rows_.empty()) return;
   parents_.resize(bodies.size());
   std::iota(parents_.begin(), parents_.end(), size_t{0});
-  const auto moves = [&](int body) {
-    return bodies[static_cast<size_t>(body)].inverse_mass != Vec3::Zero();
-  };
+  const auto moves = [&](int body) { return bodies[body].inverse_mass != Vec3::Zero(); };
   const auto unite = [&](int one, int other) {
     if (!moves(one) || !moves(other)) return;
     const size_t a = root(static_cast<size_t>(one)), b = root(static_cast<size_t>(other));
@@ -340,14 +335,14 @@ void JointBlocks::find_envelope(Block& block) {
     for_each_body(i, [&](int body) {
       if (first_of_body_.size() <= static_cast<size_t>(body))
         first_of_body_.resize(static_cast<size_t>(body) + 1);
-      first_of_body_[static_cast<size_t>(body)] = kNone;
+      first_of_body_[body] = kNone;
     });
   }
   for (size_t i = 0; i < n; ++i) {
     block.begin[i] = i;
     for_each_body(block.free[i], [&](int body) {
       if (body == 0) return;  // nothing moves it
-      size_t& first = first_of_body_[static_cast<size_t>(body)];
+      size_t& first = first_of_body_[body];
       if (first == kNone) first = i;
       block.begin[i] = std::min(block.begin[i], first);
     });

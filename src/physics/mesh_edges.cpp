@@ -87,8 +87,8 @@ void MeshEdges::find_neighbours() {
     while (end < sides.size() && edge(sides[end]) == edge(sides[first])) ++end;
     if (end - first != 2) continue;
     const Side &a = sides[first], &b = sides[first + 1];
-    neighbours_[static_cast<size_t>(a.triangle)][static_cast<size_t>(a.corner)] = b.triangle;
-    neighbours_[static_cast<size_t>(b.triangle)][static_cast<size_t>(b.corner)] = a.triangle;
+    neighbours_[a.triangle][a.corner] = b.triangle;
+    neighbours_[b.triangle][b.corner] = a.triangle;
   }
 }
 
@@ -112,7 +112,7 @@ void MeshEdges::find_rings() {
 
 bool MeshEdges::belongs_elsewhere(int triangle, const Vec3& point, const Vec3& normal) const {
   if (triangle < 0 || static_cast<size_t>(triangle) >= triangles_.size()) return false;
-  const auto& t = triangles_[static_cast<size_t>(triangle)];
+  const auto& t = triangles_[triangle];
   const auto leads_there = [&](const Vec3& direction) {
     return normal.dot(direction) > kLean * direction.norm();
   };
@@ -135,10 +135,10 @@ bool MeshEdges::belongs_elsewhere(int triangle, const Vec3& point, const Vec3& n
     }
     return false;
   }
-  const int other = neighbours_[static_cast<size_t>(triangle)][static_cast<size_t>(edge)];
+  const int other = neighbours_[triangle][edge];
   if (other == kNone) return false;
-  const uint32_t from = t[static_cast<size_t>(edge)], to = t[static_cast<size_t>(edge + 1) % 3];
-  const auto& n = triangles_[static_cast<size_t>(other)];
+  const uint32_t from = t[edge], to = t[static_cast<size_t>(edge + 1) % 3];
+  const auto& n = triangles_[other];
   const auto third =
       std::find_if(n.begin(), n.end(), [&](uint32_t v) { return v != from && v != to; });
   if (third == n.end()) return false;

@@ -82,8 +82,8 @@ double Newton::prepare(const SolverBodies& bodies, const std::vector<std::pair<i
 // From a body with few neighbours to its neighbours, to theirs; then the other way round.
 void Newton::put_in_order(const std::vector<std::pair<int, int>>& pairs) {
   const auto movable = [&](int body) {
-    return body > 0 && (bodies_[static_cast<size_t>(body)].root_mass != Vec3::Zero() ||
-                        !bodies_[static_cast<size_t>(body)].root_inertia.isZero(0.0));
+    return body > 0 &&
+           (bodies_[body].root_mass != Vec3::Zero() || !bodies_[body].root_inertia.isZero(0.0));
   };
   first_neighbour_.assign(bodies_.size() + 1, 0);
   for (const auto& [a, b] : pairs) {
@@ -102,13 +102,12 @@ void Newton::put_in_order(const std::vector<std::pair<int, int>>& pairs) {
     }
   }
   const auto fewer = [&](int a, int b) {
-    return std::pair(degree_[static_cast<size_t>(a)], a) <
-           std::pair(degree_[static_cast<size_t>(b)], b);
+    return std::pair(degree_[a], a) < std::pair(degree_[b], b);
   };
   std::sort(movable_.begin(), movable_.end(), fewer);
   order_.clear();
   const auto visit = [&](int body) {
-    int& place = bodies_[static_cast<size_t>(body)].place;
+    int& place = bodies_[body].place;
     if (place >= 0) return;
     place = 0;
     order_.push_back(body);
@@ -125,17 +124,16 @@ void Newton::put_in_order(const std::vector<std::pair<int, int>>& pairs) {
     }
   }
   std::reverse(order_.begin(), order_.end());
-  for (size_t i = 0; i < order_.size(); ++i)
-    bodies_[static_cast<size_t>(order_[i])].place = static_cast<int>(i);
+  for (size_t i = 0; i < order_.size(); ++i) bodies_[order_[i]].place = static_cast<int>(i);
 }
 
 void Newton::lay_out(const std::vector<std::pair<int, int>>& pairs) {
   first_.resize(order_.size());
   for (size_t i = 0; i < first_.size(); ++i) first_[i] = static_cast<int>(i);
   for (const auto& [a, b] : pairs) {
-    const int p = bodies_[static_cast<size_t>(a)].place, q = bodies_[static_cast<size_t>(b)].place;
+    const int p = bodies_[a].place, q = bodies_[b].place;
     if (p < 0 || q < 0) continue;
-    int& first = first_[static_cast<size_t>(std::max(p, q))];
+    int& first = first_[std::max(p, q)];
     first = std::min(first, std::min(p, q));
   }
   start_.resize(first_.size());
@@ -155,7 +153,7 @@ Newton::Entry& Newton::enter(Row& row, Kind kind, double scale, double response)
   entry.weight = 1.0 / (scale * scale * (row.softness + kYields * response));
   entry.begun = entry.held = row.impulse / scale;
   const auto scaled = [&](int body, const Vec3& linear, const Vec3& angular, int& place, Six& J) {
-    const Body& of = bodies_[static_cast<size_t>(body)];
+    const Body& of = bodies_[body];
     place = of.place;
     if (place < 0) return;
     J.head<3>() = scale * linear.cwiseProduct(of.root_mass);
@@ -218,8 +216,8 @@ double Newton::slope(const std::vector<Six>& y) {
   for (size_t i = 0; i < entries_.size(); ++i) {
     Entry& entry = entries_[i];
     double missing = entry.missing;
-    if (entry.a >= 0) missing -= entry.J_a.dot(y[static_cast<size_t>(entry.a)]);
-    if (entry.b >= 0) missing -= entry.J_b.dot(y[static_cast<size_t>(entry.b)]);
+    if (entry.a >= 0) missing -= entry.J_a.dot(y[entry.a]);
+    if (entry.b >= 0) missing -= entry.J_b.dot(y[entry.b]);
     missing -= entry.scale * entry.scale * entry.row->softness * (entry.held - entry.begun);
     const double wanted = entry.held + entry.weight * missing;
     if (entry.kind == Kind::along) {
@@ -234,8 +232,8 @@ double Newton::slope(const std::vector<Six>& y) {
     for (size_t k = entry.kind == Kind::across ? i - 1 : i; k <= i; ++k) {
       const Entry& each = entries_[k];
       const double more = each.pulls - each.begun;
-      if (each.a >= 0) gradient_[static_cast<size_t>(each.a)] -= more * each.J_a;
-      if (each.b >= 0) gradient_[static_cast<size_t>(each.b)] -= more * each.J_b;
+      if (each.a >= 0) gradient_[each.a] -= more * each.J_a;
+      if (each.b >= 0) gradient_[each.b] -= more * each.J_b;
     }
   }
   double sum = 0.0;
@@ -281,11 +279,11 @@ void Newton::assemble() {
 
 void Newton::factor() {
   for (int i = 0; i < static_cast<int>(first_.size()); ++i) {
-    const int first = first_[static_cast<size_t>(i)];
+    const int first = first_[i];
     Block& own = block(i, i);
     for (int j = first; j < i; ++j) {
       Block& of_j = block(i, j);
-      for (int k = std::max(first, first_[static_cast<size_t>(j)]); k < j; ++k)
+      for (int k = std::max(first, first_[j]); k < j; ++k)
         of_j.noalias() -= block(i, k) * block(j, k).transpose();
       block(j, j).triangularView<Eigen::Lower>().transpose().solveInPlace<Eigen::OnTheRight>(of_j);
       own.noalias() -= of_j * of_j.transpose();
@@ -297,16 +295,14 @@ void Newton::factor() {
 void Newton::substitute() {
   const int n = static_cast<int>(first_.size());
   for (int i = 0; i < n; ++i) {
-    Six& x = step_[static_cast<size_t>(i)];
-    for (int j = first_[static_cast<size_t>(i)]; j < i; ++j)
-      x.noalias() -= block(i, j) * step_[static_cast<size_t>(j)];
+    Six& x = step_[i];
+    for (int j = first_[i]; j < i; ++j) x.noalias() -= block(i, j) * step_[j];
     block(i, i).triangularView<Eigen::Lower>().solveInPlace(x);
   }
   for (int i = n; i-- > 0;) {
-    Six& x = step_[static_cast<size_t>(i)];
+    Six& x = step_[i];
     block(i, i).triangularView<Eigen::Lower>().transpose().solveInPlace(x);
-    for (int j = first_[static_cast<size_t>(i)]; j < i; ++j)
-      step_[static_cast<size_t>(j)].noalias() -= block(i, j).transpose() * x;
+    for (int j = first_[i]; j < i; ++j) step_[j].noalias() -= block(i, j).transpose() * x;
   }
 }
 
@@ -325,7 +321,7 @@ double Newton::take_multipliers() {
 double Newton::furthest(const std::vector<Six>& step) const {
   double most = 0.0;
   for (size_t i = 0; i < step.size(); ++i) {
-    const Body& body = bodies_[static_cast<size_t>(order_[i])];
+    const Body& body = bodies_[order_[i]];
     most = std::max(most, step[i].norm() * body.root_mass.maxCoeff());
   }
   return most;

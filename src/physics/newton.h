@@ -65,8 +65,7 @@ class Newton {
   void put_in_order(const std::vector<std::pair<int, int>>& pairs);
   void lay_out(const std::vector<std::pair<int, int>>& pairs);
   Block& block(int row, int column) {
-    return blocks_[start_[static_cast<size_t>(row)] +
-                   static_cast<size_t>(column - first_[static_cast<size_t>(row)])];
+    return blocks_[start_[row] + static_cast<size_t>(column - first_[row])];
   }
   Entry& enter(Row& row, Kind kind, double scale, double response);
   void set_bounds();

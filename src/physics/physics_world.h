@@ -45,67 +45,68 @@ class PhysicsWorld {
   void step();
 
   // Poses and twists are of the body's frame B, expressed in the world.
-  const Pose& pose(int body) const;
-  const Twist& twist(int body) const;
-  void set_pose(int body, const Pose& X_WB);
-  void set_twist(int body, const Twist& twist);
-  void set_support(int body, Support support);
+  const Pose& pose(BodyIndex body) const;
+  const Twist& twist(BodyIndex body) const;
+  void set_pose(BodyIndex body, const Pose& X_WB);
+  void set_twist(BodyIndex body, const Twist& twist);
+  void set_support(BodyIndex body, Support support);
 
   // For the coming step only: the body starts it with `mean`, and where it touches nothing it ends
   // at `X_WB` exactly. A body with nothing near costs no collision detection and no solver. A
   // kinematic body (a mover) ends there whatever it touches.
-  void guide(int body, const Twist& mean, const Pose& X_WB);
+  void guide(BodyIndex body, const Twist& mean, const Pose& X_WB);
   // For the coming step only: the body starts it with `twist`, and Bullet says where it ends.
-  void drive(int body, const Twist& twist);
+  void drive(BodyIndex body, const Twist& twist);
   // Acceleration by gravity of one body from now on, m/s^2, world.
-  void set_gravity(int body, const Vec3& gravity);
+  void set_gravity(BodyIndex body, const Vec3& gravity);
 
   // Of the coming steps, m/s, world. Links with <enable_wind> are pushed in their centre of mass
   // with gain mass (wind - velocity), where the world's plugin says so (model::Wind).
   void set_wind(const Vec3& wind);
 
-  double mass(int body) const;              // kg
-  Vec3 center_of_mass(int body) const;      // m, world
-  Eigen::Matrix3d inertia(int body) const;  // kg m^2, about the centre of mass, world axes
+  double mass(BodyIndex body) const;              // kg
+  Vec3 center_of_mass(BodyIndex body) const;      // m, world
+  Eigen::Matrix3d inertia(BodyIndex body) const;  // kg m^2, about the centre of mass, world axes
   // Changes the velocity at once, by an impulse in N s and N m s about the centre of mass, world.
-  void apply_impulse(int body, const Vec3& linear, const Vec3& angular);
+  void apply_impulse(BodyIndex body, const Vec3& linear, const Vec3& angular);
   // Contacts of that body in the last step; valid until the next. The body is always `a` here.
-  std::span<const Contact> contacts(int body) const;
+  std::span<const Contact> contacts(BodyIndex body) const;
   // The same and the places where it is about to touch, within 20 mm: these have no force and a
   // negative depth.
-  std::span<const Contact> nearby(int body) const;
+  std::span<const Contact> nearby(BodyIndex body) const;
   // True when no other thing is near that the body could touch.
-  bool alone(int body) const;
-  void wake(int body);
-  void sleep(int body);  // at once, with velocity 0; a contact or wake() ends it
-  bool sleeping(int body) const;
+  bool alone(BodyIndex body) const;
+  void wake(BodyIndex body);
+  void sleep(BodyIndex body);  // at once, with velocity 0; a contact or wake() ends it
+  bool sleeping(BodyIndex body) const;
 
   // Motors of joints that are not wheels of a drive; joint as in BodyLayout::joints.
-  double joint_position(int joint) const;  // rad or m, not wrapped; 0 at the start
-  double joint_velocity(int joint) const;  // rad/s or m/s
-  double joint_effort(int joint) const;    // N m or N: what its motor gave in the last step
-  void drive_joint_velocity(int joint, double rate, double max_effort);  // rad/s or m/s; N m or N
-  void apply_joint_effort(int joint, double effort);
+  double joint_position(JointIndex joint) const;  // rad or m, not wrapped; 0 at the start
+  double joint_velocity(JointIndex joint) const;  // rad/s or m/s
+  double joint_effort(JointIndex joint) const;    // N m or N: what its motor gave in the last step
+  void drive_joint_velocity(JointIndex joint, double rate,
+                            double max_effort);  // rad/s or m/s; N m or N
+  void apply_joint_effort(JointIndex joint, double effort);
   // Instead of what the file says, until the joint starts again.
-  void set_joint(int joint, JointSetting setting, double value);
+  void set_joint(JointIndex joint, JointSetting setting, double value);
 
   // Wheels that are bodies of their own (the wheels drive); wheel as in BodyLayout::wheels.
   // Positive rolls ahead.
-  double wheel_angle(int wheel) const;  // rad, not wrapped
-  double wheel_rate(int wheel) const;   // rad/s
-  void drive_wheel(int wheel, const WheelServo& servo);
+  double wheel_angle(WheelIndex wheel) const;  // rad, not wrapped
+  double wheel_rate(WheelIndex wheel) const;   // rad/s
+  void drive_wheel(WheelIndex wheel, const WheelServo& servo);
 
   // Between two steps. `instance` is new at the end of the world and the layout, or was removed and
   // placed again: its bodies are where the layout has them, at rest.
-  void add(int instance);
+  void add(InstanceIndex instance);
   // Takes an instance out: its bodies touch nothing and stay where they are. What rested on it
   // wakes.
-  void remove(int instance);
+  void remove(InstanceIndex instance);
   // Wakes a body and all that it could touch: before it is put elsewhere, and after.
-  void disturb(int body);
+  void disturb(BodyIndex body);
   // Its bodies were put back to where they started: a joint that is no wheel of a drive is at 0,
   // and no command holds.
-  void start_again(int joint);
+  void start_again(JointIndex joint);
 
   // Shapes that Bullet can only approximate.
   const std::vector<Finding>& findings() const;

@@ -6,7 +6,7 @@
 
 namespace ruedo::physics {
 
-void PhysicsWorld::Impl::disturb(int body) {
+void PhysicsWorld::Impl::disturb(BodyIndex body) {
   btRigidBody& itself = bullet(body);
   broadphase_.for_each_partner(itself.getBroadphaseHandle(),
                                [](btCollisionObject& partner) { partner.activate(true); });
@@ -23,42 +23,41 @@ void PhysicsWorld::Impl::add_static(StaticObject& object) {
                                btBroadphaseProxy::AllFilter ^ btBroadphaseProxy::StaticFilter);
 }
 
-void PhysicsWorld::Impl::add(int instance) {
+void PhysicsWorld::Impl::add(InstanceIndex instance) {
   const auto is_of = [instance](const ObjectInfo& info) { return info.instance == instance; };
   bool again = false, has_statics = false;
   for (const auto& object : rigid_.statics) again |= is_of(object->info);
   for (const RigidBody& rigid : rigid_.bodies) again |= is_of(rigid.info);
-  const size_t first = rigid_.bodies.size();
+  const BodyIndex first = rigid_.bodies.next();
   if (!again) rigid_.append(world_, layout_, instance);
 
   for (const auto& object : rigid_.statics) {
     if (!is_of(object->info)) continue;
     object->info.gone = false;
-    const auto& link = layout_.links[index(object->info.links.front())];
+    const auto& link = layout_.links[object->info.links.front()];
     const auto& collision =
-        world_.models[index(instance)].model->links[index(link.link)].collisions[index(
-            object->info.collisions.front())];
+        world_.models[instance].model->links[link.link].collisions[object->info.collisions.front()];
     object->bullet->setWorldTransform(to_bt((link.X_BL * collision.X_LC).normalized()));
     add_static(*object);
     has_statics = true;
   }
-  for (size_t i = first; i < rigid_.bodies.size(); ++i) {
+  for (BodyIndex i = first; rigid_.bodies.has(i); ++i) {
     motions_.emplace_back();
     poses_.push_back(layout_.bodies[i].X_WB.normalized());
     twists_.emplace_back();
     last_twists_.emplace_back();
   }
   contacts_.resize(rigid_.bodies.size());
-  for (int i = 0; i < static_cast<int>(rigid_.bodies.size()); ++i) {
-    if (is_of(rigid_.bodies[index(i)].info)) reset_body(i);
+  for (const BodyIndex i : rigid_.bodies.indices()) {
+    if (is_of(rigid_.bodies[i].info)) reset_body(i);
   }
   add_joints(instance);
-  for (size_t i = first; i < rigid_.bodies.size(); ++i) {
+  for (BodyIndex i = first; rigid_.bodies.has(i); ++i) {
     dynamics_.addRigidBody(rigid_.bodies[i].bullet.get(), btBroadphaseProxy::DefaultFilter,
                            btBroadphaseProxy::AllFilter);
   }
-  for (int i = 0; i < static_cast<int>(rigid_.bodies.size()); ++i) {
-    if (!is_of(rigid_.bodies[index(i)].info)) continue;
+  for (const BodyIndex i : rigid_.bodies.indices()) {
+    if (!is_of(rigid_.bodies[i].info)) continue;
     update_box(i);
     broadphase_.refilter(bullet(i).getBroadphaseHandle(), &dispatcher_);
   }
@@ -66,13 +65,13 @@ void PhysicsWorld::Impl::add(int instance) {
 }
 
 // As a new body where the layout has it.
-void PhysicsWorld::Impl::reset_body(int body) {
-  RigidBody& rigid = rigid_.bodies[index(body)];
+void PhysicsWorld::Impl::reset_body(BodyIndex body) {
+  RigidBody& rigid = rigid_.bodies[body];
   rigid.info.gone = rigid.info.on_plane = false;
   rigid.info.joined.clear();
-  motions_[index(body)] = {};
-  poses_[index(body)] = layout_.bodies[index(body)].X_WB.normalized();
-  twists_[index(body)] = last_twists_[index(body)] = {};
+  motions_[body] = {};
+  poses_[body] = layout_.bodies[body].X_WB.normalized();
+  twists_[body] = last_twists_[body] = {};
   rigid.bullet->setLinearFactor({1, 1, 1});
   rigid.bullet->setAngularFactor(btVector3(1, 1, 1));
   rigid.bullet->setGravity(to_bt(rigid.gravity));
@@ -81,32 +80,33 @@ void PhysicsWorld::Impl::reset_body(int body) {
   rigid.bullet->activate(true);
 }
 
-void PhysicsWorld::Impl::add_joints(int instance) {
-  const auto again = [&](JointConstraint& joint, int joint_of_model) {
+void PhysicsWorld::Impl::add_joints(InstanceIndex instance) {
+  const auto again = [&](JointConstraint& joint, ModelJointIndex joint_of_model) {
     std::destroy_at(&joint);
     std::construct_at(&joint, make_joint(instance, joint_of_model));
     if (joint.constraint()) dynamics_.addConstraint(joint.constraint(), true);
   };
-  for (size_t i = 0; i < joints_.size(); ++i) {
+  for (const JointIndex i : joints_.indices()) {
     if (layout_.joints[i].instance == instance) again(joints_[i], layout_.joints[i].joint);
   }
-  for (size_t i = 0; i < wheel_joint_.size(); ++i) {
+  for (const WheelIndex i : wheel_joint_.indices()) {
     const auto& wheel = layout_.wheels[i];
-    if (wheel_joint_[i] >= 0 && layout_.robots[index(wheel.robot)].instance == instance)
-      again(wheels_[index(wheel_joint_[i])], wheel.joint);
+    if (wheel_joint_[i] >= 0 && layout_.robots[wheel.robot].instance == instance)
+      again(wheels_[wheel_joint_[i]], wheel.joint);
   }
-  const size_t joints = joints_.size(), wheels = wheels_.size();
+  const JointIndex first_joint = joints_.next();
+  const size_t wheels = wheels_.size();
   add_joints();
-  for (size_t i = joints; i < joints_.size(); ++i)
+  for (JointIndex i = first_joint; joints_.has(i); ++i)
     if (joints_[i].constraint()) dynamics_.addConstraint(joints_[i].constraint(), true);
   for (size_t i = wheels; i < wheels_.size(); ++i)
     if (wheels_[i].constraint()) dynamics_.addConstraint(wheels_[i].constraint(), true);
 }
 
-void PhysicsWorld::Impl::remove(int instance) {
+void PhysicsWorld::Impl::remove(InstanceIndex instance) {
   const auto is_of = [instance](const ObjectInfo& info) { return info.instance == instance; };
-  for (int i = 0; i < static_cast<int>(rigid_.bodies.size()); ++i) {
-    RigidBody& rigid = rigid_.bodies[index(i)];
+  for (const BodyIndex i : rigid_.bodies.indices()) {
+    RigidBody& rigid = rigid_.bodies[i];
     bool neighbour = is_of(rigid.info);
     broadphase_.for_each_partner(
         rigid.bullet->getBroadphaseHandle(),
@@ -118,11 +118,11 @@ void PhysicsWorld::Impl::remove(int instance) {
       dynamics_.removeConstraint(joint.constraint());
     joint.disable();
   };
-  for (size_t i = 0; i < joints_.size(); ++i)
+  for (const JointIndex i : joints_.indices())
     if (layout_.joints[i].instance == instance) let_go(joints_[i]);
-  for (size_t i = 0; i < wheel_joint_.size(); ++i) {
-    if (wheel_joint_[i] >= 0 && layout_.robots[index(layout_.wheels[i].robot)].instance == instance)
-      let_go(wheels_[index(wheel_joint_[i])]);
+  for (const WheelIndex i : wheel_joint_.indices()) {
+    if (wheel_joint_[i] >= 0 && layout_.robots[layout_.wheels[i].robot].instance == instance)
+      let_go(wheels_[wheel_joint_[i]]);
   }
   bool has_statics = false;
   for (const auto& object : rigid_.statics) {
@@ -130,11 +130,11 @@ void PhysicsWorld::Impl::remove(int instance) {
     object->info.gone = true;
     has_statics = true;
   }
-  for (int i = 0; i < static_cast<int>(rigid_.bodies.size()); ++i) {
-    RigidBody& rigid = rigid_.bodies[index(i)];
+  for (const BodyIndex i : rigid_.bodies.indices()) {
+    RigidBody& rigid = rigid_.bodies[i];
     if (!is_of(rigid.info)) continue;
     rigid.info.gone = true;
-    twists_[index(i)] = last_twists_[index(i)] = {};
+    twists_[i] = last_twists_[i] = {};
     broadphase_.refilter(rigid.bullet->getBroadphaseHandle(), &dispatcher_);
   }
   if (!has_statics) return;

@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numeric>
+#include <span>
 
 #include "physics/collisions.h"
 #include "physics/state_check.h"
@@ -85,10 +86,10 @@ PhysicsWorld::Impl::Impl(const model::WorldModel& world, const model::BodyLayout
   twists_.resize(n);
   for (const auto& body : layout.bodies) poses_.push_back(body.X_WB.normalized());
   add_joints();
-  for (size_t i = 0; i < n; ++i) {
+  for (const BodyIndex i : rigid_.bodies.indices()) {
     dynamics_.addRigidBody(rigid_.bodies[i].bullet.get(), btBroadphaseProxy::DefaultFilter,
                            btBroadphaseProxy::AllFilter);
-    update_box(static_cast<int>(i));
+    update_box(i);
     if (broadphase_.getOverlappingPairCache()->getNumOverlappingPairs() > kMostPairs) {
       throw InputError({world.file, 0}, "more than " + std::to_string(kMostPairs) +
                                             " pairs of things touch each other at the start: '" +
@@ -109,8 +110,8 @@ int PhysicsWorld::Impl::substeps_for(int64_t longest_us) const {
 }
 
 PhysicsWorld::Impl::~Impl() {
-  for (auto* joints : {&joints_, &wheels_}) {
-    for (JointConstraint& joint : *joints) {
+  for (const std::span<JointConstraint> joints : {std::span(joints_), std::span(wheels_)}) {
+    for (JointConstraint& joint : joints) {
       if (joint.constraint() && joint.constraint()->isEnabled())
         dynamics_.removeConstraint(joint.constraint());
     }
@@ -125,127 +126,126 @@ PhysicsWorld::Impl::~Impl() {
   }
 }
 
-JointConstraint PhysicsWorld::Impl::make_joint(int instance, int joint_index) {
-  const auto& placed = world_.models[index(instance)];
-  const model::Joint& joint = placed.model->joints[index(joint_index)];
-  const auto body_of = [&](int link) {
-    return link < 0 ? -1 : layout_.links[index(layout_.first_link[index(instance)] + link)].body;
+JointConstraint PhysicsWorld::Impl::make_joint(InstanceIndex instance,
+                                               ModelJointIndex joint_index) {
+  const auto& placed = world_.models[instance];
+  const model::Joint& joint = placed.model->joints[joint_index];
+  const auto body_of = [&](ModelLinkIndex link) {
+    return link.valid() ? layout_.links[layout_.link_of(instance, link)].body : BodyIndex();
   };
-  const int parent = body_of(joint.parent), child = body_of(joint.child);
+  const BodyIndex parent = body_of(joint.parent), child = body_of(joint.child);
   const Pose X_WJ = placed.X_WM * joint.X_MJ;
-  const auto in_body = [&](int body) {
-    return body < 0
-               ? X_WJ
-               : rigid_.bodies[index(body)].X_BI.inverse() * poses_[index(body)].inverse() * X_WJ;
+  const auto in_body = [&](BodyIndex body) {
+    return body.valid() ? rigid_.bodies[body].X_BI.inverse() * poses_[body].inverse() * X_WJ : X_WJ;
   };
-  if (child >= 0) {
+  if (child.valid()) {
     tie(child, parent);
   } else {
     tie(parent, child);  // what the joint carries is fixed to the world
   }
-  const int reference = body_of(joint.gear_reference);
+  const BodyIndex reference = body_of(joint.gear_reference);
   const bool gears = joint.type == model::JointType::gearbox;
-  if (gears && reference >= 0) {
-    for (const int body : {parent, child})
-      if (body >= 0) tie(body, reference);
+  if (gears && reference.valid()) {
+    for (const BodyIndex body : {parent, child})
+      if (body.valid()) tie(body, reference);
   }
   return {joint,
-          parent < 0 ? ground_ : bullet(parent),
-          child < 0 ? ground_ : bullet(child),
+          parent.valid() ? bullet(parent) : ground_,
+          child.valid() ? bullet(child) : ground_,
           in_body(parent),
           in_body(child),
-          !gears          ? nullptr
-          : reference < 0 ? &ground_
-                          : &bullet(reference)};
+          !gears              ? nullptr
+          : reference.valid() ? &bullet(reference)
+                              : &ground_};
 }
 
 void PhysicsWorld::Impl::add_joints() {
-  for (size_t i = joints_.size(); i < layout_.joints.size(); ++i) {
+  for (JointIndex i = joints_.next(); layout_.joints.has(i); ++i) {
     joints_.push_back(make_joint(layout_.joints[i].instance, layout_.joints[i].joint));
   }
   const auto leader_of = [&](const auto& placed) {
-    const int leader =
-        world_.models[index(placed.instance)].model->joints[index(placed.joint)].leader;
+    const ModelJointIndex leader =
+        world_.models[placed.instance].model->joints[placed.joint].leader;
     const auto same = [&](const auto& each) {
       return each.instance == placed.instance && each.joint == leader;
     };
     const auto found = std::find_if(layout_.joints.begin(), layout_.joints.end(), same);
-    return leader < 0 || found == layout_.joints.end()
-               ? -1
-               : static_cast<int>(found - layout_.joints.begin());
+    return !leader.valid() || found == layout_.joints.end()
+               ? JointIndex()
+               : JointIndex(found - layout_.joints.begin());
   };
-  for (size_t i = leaders_.size(); i < layout_.joints.size(); ++i)
+  for (JointIndex i = leaders_.next(); layout_.joints.has(i); ++i)
     leaders_.push_back(leader_of(layout_.joints[i]));
-  for (size_t i = wheel_joint_.size(); i < layout_.wheels.size(); ++i) add_wheel(i);
+  for (WheelIndex i = wheel_joint_.next(); layout_.wheels.has(i); ++i) add_wheel(i);
 }
 
-void PhysicsWorld::Impl::add_wheel(size_t i) {
+void PhysicsWorld::Impl::add_wheel(WheelIndex i) {
   const auto& wheel = layout_.wheels[i];
-  const auto& robot = layout_.robots[index(wheel.robot)];
-  const auto& link = layout_.links[index(wheel.link)];
+  const auto& robot = layout_.robots[wheel.robot];
+  const auto& link = layout_.links[wheel.link];
   wheel_joint_.push_back(-1);
   wheel_sign_.push_back(1.0);
-  if (link.body < 0 || link.body == robot.body) return;
+  if (!link.body.valid() || link.body == robot.body) return;
   wheel_joint_[i] = static_cast<int>(wheels_.size());
   rolling_.push_back(link.body);
   wheels_.push_back(make_joint(robot.instance, wheel.joint));
-  const auto& model = *world_.models[index(robot.instance)].model;
-  const model::Joint& joint = model.joints[index(wheel.joint)];
+  const auto& model = *world_.models[robot.instance].model;
+  const model::Joint& joint = model.joints[wheel.joint];
   const Vec3 axis_in_M = joint.X_MJ.rotation * joint.axis.axis_in_J;
-  const Vec3 ahead_in_M = model.links[index(link.link)].X_ML.rotation * wheel.axis_in_L;
+  const Vec3 ahead_in_M = model.links[link.link].X_ML.rotation * wheel.axis_in_L;
   wheel_sign_[i] = axis_in_M.dot(ahead_in_M) < 0.0 ? -1.0 : 1.0;
 }
 
-void PhysicsWorld::Impl::tie(int body, int other) {
-  motions_[index(body)].tied = true;
-  if (other < 0) {
-    motions_[index(body)].hung = true;
+void PhysicsWorld::Impl::tie(BodyIndex body, BodyIndex other) {
+  motions_[body].tied = true;
+  if (!other.valid()) {
+    motions_[body].hung = true;
     return;
   }
-  motions_[index(other)].tied = true;
+  motions_[other].tied = true;
   tied_.emplace_back(body, other);
-  rigid_.bodies[index(body)].info.joined.push_back(other);
-  rigid_.bodies[index(other)].info.joined.push_back(body);
+  rigid_.bodies[body].info.joined.push_back(other);
+  rigid_.bodies[other].info.joined.push_back(body);
 }
 
-void PhysicsWorld::Impl::push_to_bullet(int body) {
-  RigidBody& rigid = rigid_.bodies[index(body)];
+void PhysicsWorld::Impl::push_to_bullet(BodyIndex body) {
+  RigidBody& rigid = rigid_.bodies[body];
   btRigidBody& bullet = *rigid.bullet;
-  const Pose& X_WB = poses_[index(body)];
+  const Pose& X_WB = poses_[body];
   const btTransform X_WI = to_bt((X_WB * rigid.X_BI).normalized());
   bullet.setWorldTransform(X_WI);
   bullet.setInterpolationWorldTransform(X_WI);
   bullet.updateInertiaTensor();
-  const Twist& twist = twists_[index(body)];
+  const Twist& twist = twists_[body];
   const Vec3 arm = X_WB.rotation * rigid.X_BI.translation;
   bullet.setLinearVelocity(to_bt(Vec3(twist.linear + twist.angular.cross(arm))));
   bullet.setAngularVelocity(to_bt(twist.angular));
-  motions_[index(body)].dirty = false;
+  motions_[body].dirty = false;
 }
 
-void PhysicsWorld::Impl::pull_from_bullet(int body) {
-  const RigidBody& rigid = rigid_.bodies[index(body)];
+void PhysicsWorld::Impl::pull_from_bullet(BodyIndex body) {
+  const RigidBody& rigid = rigid_.bodies[body];
   const Pose X_WB =
       (from_bt(rigid.bullet->getWorldTransform()) * rigid.X_BI.inverse()).normalized();
-  poses_[index(body)] = X_WB;
+  poses_[body] = X_WB;
   const Vec3 arm = X_WB.rotation * rigid.X_BI.translation;
-  Twist& twist = twists_[index(body)];
+  Twist& twist = twists_[body];
   twist.angular = from_bt(rigid.bullet->getAngularVelocity());
   twist.linear = from_bt(rigid.bullet->getLinearVelocity()) - twist.angular.cross(arm);
 }
 
 // The box that the body may be in during the step, with the reach of its contacts.
-void PhysicsWorld::Impl::update_box(int body) {
-  const RigidBody& rigid = rigid_.bodies[index(body)];
+void PhysicsWorld::Impl::update_box(BodyIndex body) {
+  const RigidBody& rigid = rigid_.bodies[body];
   btBroadphaseProxy* proxy = rigid.bullet->getBroadphaseHandle();
   if (!proxy || rigid.info.links.empty()) return;
-  const BodyMotion& motion = motions_[index(body)];
+  const BodyMotion& motion = motions_[body];
   const double step_s = static_cast<double>(step_us_) * 1e-6;
   const auto half_of = [&rigid](const Pose& X) {
     return Vec3(X.rotation.toRotationMatrix().cwiseAbs() * rigid.box_half +
                 Vec3::Constant(kContactReach_m));
   };
-  const Pose& from = poses_[index(body)];
+  const Pose& from = poses_[body];
   const Vec3 center = from * rigid.box_center, half = half_of(from);
   Vec3 low = center - half, high = center + half;
   if (motion.kind == BodyMotion::Kind::guided) {
@@ -253,8 +253,7 @@ void PhysicsWorld::Impl::update_box(int body) {
     low = low.cwiseMin(end_center - end_half);
     high = high.cwiseMax(end_center + end_half);
   } else {
-    const Twist& twist =
-        motion.kind == BodyMotion::Kind::driven ? motion.mean : twists_[index(body)];
+    const Twist& twist = motion.kind == BodyMotion::Kind::driven ? motion.mean : twists_[body];
     const Vec3 way = twist.linear * step_s;
     low += way.cwiseMin(0.0);
     high += way.cwiseMax(0.0);
@@ -262,45 +261,44 @@ void PhysicsWorld::Impl::update_box(int body) {
   broadphase_.setAabb(proxy, to_bt(low), to_bt(high), &dispatcher_);
 }
 
-void PhysicsWorld::Impl::start(int body) {
-  BodyMotion& motion = motions_[index(body)];
+void PhysicsWorld::Impl::start(BodyIndex body) {
+  BodyMotion& motion = motions_[body];
   if (motion.kind == BodyMotion::Kind::free) {
     if (motion.dirty) push_to_bullet(body);
     return;
   }
-  const Twist now = twists_[index(body)];
-  twists_[index(body)] = motion.mean;
+  const Twist now = twists_[body];
+  twists_[body] = motion.mean;
   push_to_bullet(body);
-  twists_[index(body)] = now;
+  twists_[body] = now;
 }
 
 void PhysicsWorld::Impl::choose_simulated() {
-  const int n = static_cast<int>(motions_.size());
-  for (int i = 0; i < n; ++i) {
-    if (rigid_.bodies[index(i)].info.gone) continue;
-    if (motions_[index(i)].kind != BodyMotion::Kind::free) {
+  for (const BodyIndex i : motions_.indices()) {
+    if (rigid_.bodies[i].info.gone) continue;
+    if (motions_[i].kind != BodyMotion::Kind::free) {
       if (sleeping(i)) bullet(i).activate(true);
       bullet(i).setDeactivationTime(0.0);
       bullet(i).setActivationState(ACTIVE_TAG);
       update_box(i);
-    } else if (!sleeping(i) && !rigid_.bodies[index(i)].info.moved) {
+    } else if (!sleeping(i) && !rigid_.bodies[i].info.moved) {
       update_box(i);
     }
   }
-  for (int i = 0; i < n; ++i) {
-    BodyMotion& motion = motions_[index(i)];
+  for (const BodyIndex i : motions_.indices()) {
+    BodyMotion& motion = motions_[i];
     motion.simulated = false;
-    if (rigid_.bodies[index(i)].info.gone) continue;
+    if (rigid_.bodies[i].info.gone) continue;
     const bool alone_now = alone(i);
-    motion.simulated = motion.tied || !alone_now ||
-                       (motion.kind != BodyMotion::Kind::guided && !sleeping(i) &&
-                        !rigid_.bodies[index(i)].info.moved);
+    motion.simulated =
+        motion.tied || !alone_now ||
+        (motion.kind != BodyMotion::Kind::guided && !sleeping(i) && !rigid_.bodies[i].info.moved);
     if (motion.simulated) start(i);
   }
   choose_pace();
 }
 
-size_t PhysicsWorld::Impl::root(size_t body) {
+BodyIndex PhysicsWorld::Impl::root(BodyIndex body) {
   while (parents_[body] != body) body = parents_[body] = parents_[parents_[body]];
   return body;
 }
@@ -310,29 +308,29 @@ size_t PhysicsWorld::Impl::root(size_t body) {
 void PhysicsWorld::Impl::choose_pace() {
   for (auto& bodies : simulated_) bodies.clear();
   parents_.resize(motions_.size());
-  std::iota(parents_.begin(), parents_.end(), size_t{0});
-  const auto movable = [&](int body) {
-    return body >= 0 && motions_[index(body)].simulated && !rigid_.bodies[index(body)].info.moved;
+  std::iota(parents_.begin(), parents_.end(), BodyIndex(0));
+  const auto movable = [&](BodyIndex body) {
+    return body.valid() && motions_[body].simulated && !rigid_.bodies[body].info.moved;
   };
-  const auto together = [&](int a, int b) {
+  const auto together = [&](BodyIndex a, BodyIndex b) {
     if (!movable(a) || !movable(b)) return;
-    const size_t of_a = root(index(a)), of_b = root(index(b));
+    const BodyIndex of_a = root(a), of_b = root(b);
     parents_[std::max(of_a, of_b)] = std::min(of_a, of_b);
   };
   for (const auto& [a, b] : tied_) together(a, b);
   const btBroadphasePairArray& pairs =
       broadphase_.getOverlappingPairCache()->getOverlappingPairArray();
   for (int i = 0; i < pairs.size(); ++i) {
-    const int a =
+    const BodyIndex a =
         info_of(*static_cast<btCollisionObject*>(pairs[i].m_pProxy0->m_clientObject)).body;
-    const int b =
+    const BodyIndex b =
         info_of(*static_cast<btCollisionObject*>(pairs[i].m_pProxy1->m_clientObject)).body;
     together(a, b);
   }
   for (BodyMotion& motion : motions_) motion.fine = false;
   find_led();
   find_hurried();
-  for (size_t i = 0; i < motions_.size(); ++i) {
+  for (const BodyIndex i : motions_.indices()) {
     if (!motions_[i].simulated) continue;
     if (rigid_.bodies[i].info.moved) continue;
     motions_[i].fine = motions_[root(i)].fine;
@@ -345,18 +343,18 @@ void PhysicsWorld::Impl::choose_pace() {
 // told: shorter substeps would find it on the same way.
 void PhysicsWorld::Impl::find_led() {
   for (BodyMotion& motion : motions_) motion.led = false;
-  for (size_t i = 0; i < motions_.size(); ++i) {
+  for (const BodyIndex i : motions_.indices()) {
     if (motions_[i].simulated && motions_[i].hung) motions_[root(i)].led = true;
   }
-  for (size_t i = 0; i < motions_.size(); ++i) {
-    if (motions_[i].simulated && !alone(static_cast<int>(i))) motions_[root(i)].led = false;
+  for (const BodyIndex i : motions_.indices()) {
+    if (motions_[i].simulated && !alone(i)) motions_[root(i)].led = false;
   }
-  for (size_t i = 0; i < joints_.size(); ++i) {
-    const auto stray = [this](int body) {
-      if (body >= 0 && motions_[index(body)].simulated) motions_[root(index(body))].led = false;
+  for (const JointIndex i : joints_.indices()) {
+    const auto stray = [this](BodyIndex body) {
+      if (body.valid() && motions_[body].simulated) motions_[root(body)].led = false;
     };
     if (!joints_[i].leads()) stray(body_of(i));
-    if (leaders_[i] >= 0) stray(body_of(index(leaders_[i])));  // what follows goes along with it
+    if (leaders_[i].valid()) stray(body_of(leaders_[i]));  // what follows goes along with it
   }
 }
 
@@ -365,7 +363,7 @@ void PhysicsWorld::Impl::find_led() {
 void PhysicsWorld::Impl::find_hurried() {
   constexpr double kStill_m_s = 1e-3, kStill_rad_s = 1e-3;
   constexpr int kStillSteps = 20;
-  for (size_t i = 0; i < motions_.size(); ++i) {
+  for (const BodyIndex i : motions_.indices()) {
     BodyMotion& motion = motions_[i];
     if (!motion.simulated || !motion.tied) continue;
     const bool still = twists_[i].linear.squaredNorm() < kStill_m_s * kStill_m_s &&
@@ -373,14 +371,14 @@ void PhysicsWorld::Impl::find_hurried() {
     motion.still = still ? std::min(motion.still + 1, kStillSteps) : 0;
     if (motion.still < kStillSteps && !motions_[root(i)].led) motions_[root(i)].fine = true;
   }
-  for (size_t i = 0; i < joints_.size(); ++i) {
-    const int body = body_of(i);
-    if (body < 0 || !motions_[index(body)].simulated) continue;
-    BodyMotion& first = motions_[root(index(body))];
-    if ((joints_[i].may_start() && !first.led) || leaders_[i] >= 0) first.fine = true;
+  for (const JointIndex i : joints_.indices()) {
+    const BodyIndex body = body_of(i);
+    if (!body.valid() || !motions_[body].simulated) continue;
+    BodyMotion& first = motions_[root(body)];
+    if ((joints_[i].may_start() && !first.led) || leaders_[i].valid()) first.fine = true;
   }
-  for (const int body : rolling_) {
-    if (motions_[index(body)].simulated) motions_[root(index(body))].fine = true;
+  for (const BodyIndex body : rolling_) {
+    if (motions_[body].simulated) motions_[root(body)].fine = true;
   }
 }
 
@@ -407,7 +405,7 @@ void PhysicsWorld::Impl::set_wind(const Vec3& wind) {
 void PhysicsWorld::Impl::blow(int pace) {
   if (!world_.environment.wind.pushes) return;
   const double gain = world_.environment.wind.gain;
-  for (size_t i = 0; i < motions_.size(); ++i) {
+  for (const BodyIndex i : motions_.indices()) {
     const RigidBody& rigid = rigid_.bodies[i];
     if (rigid.wind_mass == 0.0 || rigid.info.moved || rigid.info.gone) continue;
     if (!motions_[i].simulated || motions_[i].fine != (pace == kFine)) continue;
@@ -419,12 +417,12 @@ void PhysicsWorld::Impl::blow(int pace) {
 
 void PhysicsWorld::Impl::before_substep(int pace, double substep_s) {
   blow(pace);
-  for (size_t i = 0; i < joints_.size(); ++i) {
-    if (leaders_[i] < 0 || !at_pace(i, pace)) continue;
-    const JointConstraint& leader = joints_[index(leaders_[i])];
+  for (const JointIndex i : joints_.indices()) {
+    if (!leaders_[i].valid() || !at_pace(i, pace)) continue;
+    const JointConstraint& leader = joints_[leaders_[i]];
     joints_[i].follow(leader.position(), leader.velocity(), substep_s);
   }
-  for (size_t i = 0; i < joints_.size(); ++i) {
+  for (const JointIndex i : joints_.indices()) {
     if (at_pace(i, pace)) joints_[i].before_substep(substep_s);
   }
   if (pace == kFine) {
@@ -433,7 +431,7 @@ void PhysicsWorld::Impl::before_substep(int pace, double substep_s) {
 }
 
 void PhysicsWorld::Impl::after_substep(int pace, double substep_s) {
-  for (size_t i = 0; i < joints_.size(); ++i) {
+  for (const JointIndex i : joints_.indices()) {
     if (at_pace(i, pace)) joints_[i].after_substep(substep_s);
   }
   if (pace == kFine) {
@@ -442,16 +440,16 @@ void PhysicsWorld::Impl::after_substep(int pace, double substep_s) {
 }
 
 // One that takes no part goes on at the shorter substeps, as it was.
-bool PhysicsWorld::Impl::at_pace(size_t joint, int pace) const {
-  const int body = body_of(joint);
-  const bool coarse = body >= 0 && motions_[index(body)].simulated && !motions_[index(body)].fine;
+bool PhysicsWorld::Impl::at_pace(JointIndex joint, int pace) const {
+  const BodyIndex body = body_of(joint);
+  const bool coarse = body.valid() && motions_[body].simulated && !motions_[body].fine;
   return coarse == (pace == kCoarse);
 }
 
-int PhysicsWorld::Impl::body_of(size_t joint) const {
+BodyIndex PhysicsWorld::Impl::body_of(JointIndex joint) const {
   const auto& placed = layout_.joints[joint];
-  const int child = placed.child_body;
-  return child >= 0 && !rigid_.bodies[index(child)].info.moved ? child : placed.parent_body;
+  const BodyIndex child = placed.child_body;
+  return child.valid() && !rigid_.bodies[child].info.moved ? child : placed.parent_body;
 }
 
 void PhysicsWorld::Impl::step_at(int pace) {
@@ -460,7 +458,7 @@ void PhysicsWorld::Impl::step_at(int pace) {
   std::vector<std::pair<btRigidBody*, btTransform>>& movers = movers_;
   movers.clear();
   bool moving = false;
-  for (size_t i = 0; i < motions_.size(); ++i) {
+  for (const BodyIndex i : motions_.indices()) {
     if (!motions_[i].simulated || !rigid_.bodies[i].info.moved) continue;
     btRigidBody& mover = *rigid_.bodies[i].bullet;
     bodies.push_back(&mover);
@@ -493,13 +491,13 @@ void PhysicsWorld::Impl::step() {
   step_at(kCoarse);
   step_at(kFine);
   contacts_.finish();
-  for (int i = 0; i < static_cast<int>(motions_.size()); ++i) {
-    BodyMotion& motion = motions_[index(i)];
-    const bool moved = rigid_.bodies[index(i)].info.moved;
+  for (const BodyIndex i : motions_.indices()) {
+    BodyMotion& motion = motions_[i];
+    const bool moved = rigid_.bodies[i].info.moved;
     if (motion.simulated && !moved && (motion.awake || !sleeping(i))) pull_from_bullet(i);
     if (motion.kind == BodyMotion::Kind::guided && (moved || contacts_.touching(i).empty())) {
-      poses_[index(i)] = motion.end;
-      twists_[index(i)] = motion.mean;
+      poses_[i] = motion.end;
+      twists_[i] = motion.mean;
       motion.dirty = true;
     }
     motion.kind = BodyMotion::Kind::free;
@@ -508,15 +506,15 @@ void PhysicsWorld::Impl::step() {
 }
 
 // With all that joints tie to it: a mechanism that stands still in the air falls as one.
-bool PhysicsWorld::Impl::falling(int body) const {
-  const btVector3& gravity = rigid_.bodies[index(body)].bullet->getGravity();
-  std::vector<int> tied{body};
+bool PhysicsWorld::Impl::falling(BodyIndex body) const {
+  const btVector3& gravity = rigid_.bodies[body].bullet->getGravity();
+  std::vector<BodyIndex> tied{body};
   for (size_t i = 0; i < tied.size(); ++i) {
-    const RigidBody& rigid = rigid_.bodies[index(tied[i])];
-    if (motions_[index(tied[i])].hung || rigid.info.moved || rigid.info.gone ||
-        rigid.info.on_plane || rigid.bullet->getGravity() != gravity || !alone(tied[i]))
+    const RigidBody& rigid = rigid_.bodies[tied[i]];
+    if (motions_[tied[i]].hung || rigid.info.moved || rigid.info.gone || rigid.info.on_plane ||
+        rigid.bullet->getGravity() != gravity || !alone(tied[i]))
       return false;
-    for (const int other : rigid.info.joined) {
+    for (const BodyIndex other : rigid.info.joined) {
       if (std::find(tied.begin(), tied.end(), other) == tied.end()) tied.push_back(other);
     }
   }
@@ -535,7 +533,7 @@ void PhysicsWorld::Impl::bound_speeds(const std::vector<btRigidBody*>& bodies) {
     const btVector3 &linear = body->getLinearVelocity(), &angular = body->getAngularVelocity(),
                     &at = body->getWorldTransform().getOrigin();
     if (!std::isfinite(linear.length2() + angular.length2() + at.length2())) {
-      throw StateError("the state of the body '" + layout_.bodies[index(info_of(*body).body)].name +
+      throw StateError("the state of the body '" + layout_.bodies[info_of(*body).body].name +
                        "' is not finite: the run ends with the step before. Masses, inertias and "
                        "efforts that do not fit each other do this");
     }
@@ -544,8 +542,8 @@ void PhysicsWorld::Impl::bound_speeds(const std::vector<btRigidBody*>& bodies) {
   }
 }
 
-void PhysicsWorld::Impl::set_support(int body, Support support) {
-  RigidBody& rigid = rigid_.bodies[index(body)];
+void PhysicsWorld::Impl::set_support(BodyIndex body, Support support) {
+  RigidBody& rigid = rigid_.bodies[body];
   const bool plane = support == Support::plane;
   if (rigid.info.on_plane == plane) return;
   rigid.info.on_plane = plane;
@@ -554,18 +552,18 @@ void PhysicsWorld::Impl::set_support(int body, Support support) {
   broadphase_.refilter(rigid.bullet->getBroadphaseHandle(), &dispatcher_);
 }
 
-void PhysicsWorld::Impl::apply_impulse(int body, const Vec3& linear, const Vec3& angular) {
-  if (motions_[index(body)].dirty) push_to_bullet(body);
+void PhysicsWorld::Impl::apply_impulse(BodyIndex body, const Vec3& linear, const Vec3& angular) {
+  if (motions_[body].dirty) push_to_bullet(body);
   bullet(body).activate(true);
   bullet(body).applyCentralImpulse(to_bt(linear));
   bullet(body).applyTorqueImpulse(to_bt(angular));
-  const Pose pose = poses_[index(body)];
+  const Pose pose = poses_[body];
   pull_from_bullet(body);
-  poses_[index(body)] = pose;
+  poses_[body] = pose;
 }
 
-void PhysicsWorld::Impl::sleep(int body) {
-  twists_[index(body)] = Twist{};
+void PhysicsWorld::Impl::sleep(BodyIndex body) {
+  twists_[body] = Twist{};
   push_to_bullet(body);
   bullet(body).setActivationState(ISLAND_SLEEPING);
 }
@@ -575,15 +573,15 @@ void PhysicsWorld::Impl::read(Snapshot& snapshot) const {
   snapshot.bodies = poses_;
   snapshot.body_twists = twists_;
   snapshot.body_accelerations.resize(twists_.size());
-  for (size_t i = 0; i < twists_.size(); ++i) {
+  for (const BodyIndex i : twists_.indices()) {
     snapshot.body_accelerations[i] = (twists_[i].linear - last_twists_[i].linear) / step_s;
-    if (motions_[i].fresh && falling(static_cast<int>(i)))
+    if (motions_[i].fresh && falling(i))
       snapshot.body_accelerations[i] = from_bt(rigid_.bodies[i].bullet->getGravity());
   }
   snapshot.joint_positions.resize(joints_.size());
   snapshot.joint_velocities.resize(joints_.size());
   snapshot.joint_efforts.resize(joints_.size());
-  for (size_t i = 0; i < joints_.size(); ++i) {
+  for (const JointIndex i : joints_.indices()) {
     snapshot.joint_positions[i] = joints_[i].position();
     snapshot.joint_velocities[i] = joints_[i].velocity();
     snapshot.joint_efforts[i] = joints_[i].effort();

@@ -48,71 +48,69 @@ class PhysicsWorld::Impl {
   void step();
   void read(Snapshot& snapshot) const;
 
-  void set_pose(int body, const Pose& pose) {
-    poses_[index(body)] = pose;
-    motions_[index(body)].dirty = true;
+  void set_pose(BodyIndex body, const Pose& pose) {
+    poses_[body] = pose;
+    motions_[body].dirty = true;
     update_box(body);
   }
-  void set_twist(int body, const Twist& twist) {
-    twists_[index(body)] = twist;
-    motions_[index(body)].dirty = true;
+  void set_twist(BodyIndex body, const Twist& twist) {
+    twists_[body] = twist;
+    motions_[body].dirty = true;
   }
-  void set_support(int body, Support support);
-  void apply_impulse(int body, const Vec3& linear, const Vec3& angular);
-  void add(int instance);
-  void remove(int instance);
-  void disturb(int body);
-  btRigidBody& bullet(int body) { return *rigid_.bodies[index(body)].bullet; }
-  bool alone(int body) const {
-    return broadphase_.alone(rigid_.bodies[index(body)].bullet->getBroadphaseHandle());
+  void set_support(BodyIndex body, Support support);
+  void apply_impulse(BodyIndex body, const Vec3& linear, const Vec3& angular);
+  void add(InstanceIndex instance);
+  void remove(InstanceIndex instance);
+  void disturb(BodyIndex body);
+  btRigidBody& bullet(BodyIndex body) { return *rigid_.bodies[body].bullet; }
+  bool alone(BodyIndex body) const {
+    return broadphase_.alone(rigid_.bodies[body].bullet->getBroadphaseHandle());
   }
-  bool falling(int body) const;
-  bool sleeping(int body) const {
-    return rigid_.bodies[index(body)].bullet->getActivationState() == ISLAND_SLEEPING;
+  bool falling(BodyIndex body) const;
+  bool sleeping(BodyIndex body) const {
+    return rigid_.bodies[body].bullet->getActivationState() == ISLAND_SLEEPING;
   }
-  void sleep(int body);
+  void sleep(BodyIndex body);
 
   void set_wind(const Vec3& wind);
 
-  static size_t index(int body) { return static_cast<size_t>(body); }
-
   RigidBodies rigid_;
-  std::vector<Pose> poses_;
-  std::vector<Twist> twists_, last_twists_;
-  std::vector<BodyMotion> motions_;
+  IndexedVector<BodyIndex, Pose> poses_;
+  IndexedVector<BodyIndex, Twist> twists_, last_twists_;
+  IndexedVector<BodyIndex, BodyMotion> motions_;
   ContactBook contacts_;
-  std::vector<JointConstraint> joints_;  // as in the layout
-  std::vector<int> leaders_;  // of each joint, into joints_: the one that it mimics; -1: none
-  std::vector<JointConstraint> wheels_;  // those that are bodies of their own
-  std::vector<int> wheel_joint_;         // of each wheel, into wheels_; -1: none
-  std::vector<double> wheel_sign_;       // axis of the joint against that of the wheel
+  IndexedVector<JointIndex, JointConstraint> joints_;  // as in the layout
+  IndexedVector<JointIndex, JointIndex> leaders_;      // the one that it mimics, if it does
+  std::vector<JointConstraint> wheels_;                // those that are bodies of their own
+  IndexedVector<WheelIndex, int> wheel_joint_;         // into wheels_; -1: none
+  IndexedVector<WheelIndex, double> wheel_sign_;  // axis of the joint against that of the wheel
 
  private:
   void add_joints();  // those that are new
   void blow(int pace);
   void before_substep(int pace, double substep_s);
   void after_substep(int pace, double substep_s);
-  void add_wheel(size_t wheel);
-  JointConstraint make_joint(int instance, int joint);
-  void add_joints(int instance);  // in the simulation, too
+  void add_wheel(WheelIndex wheel);
+  JointConstraint make_joint(InstanceIndex instance, ModelJointIndex joint);
+  void add_joints(InstanceIndex instance);  // in the simulation, too
   void add_static(StaticObject& object);
-  void reset_body(int body);
+  void reset_body(BodyIndex body);
   void refilter_all();
   int substeps_for(int64_t longest_us) const;
   void choose_pace();
   void find_led();
   void find_hurried();
-  bool at_pace(size_t joint, int pace) const;
-  int body_of(size_t joint) const;  // that moves
+  bool at_pace(JointIndex joint, int pace) const;
+  BodyIndex body_of(JointIndex joint) const;  // that moves
   void step_at(int pace);
   void advance(btRigidBody& mover, double substep_s);
-  void tie(int body, int other);
-  void push_to_bullet(int body);  // our pose and twist
-  void pull_from_bullet(int body);
-  void start(int body);  // the velocity it begins the step with
-  void update_box(int body);
+  void tie(BodyIndex body, BodyIndex other);
+  void push_to_bullet(BodyIndex body);  // our pose and twist
+  void pull_from_bullet(BodyIndex body);
+  void start(BodyIndex body);  // the velocity it begins the step with
+  void update_box(BodyIndex body);
   void choose_simulated();
-  size_t root(size_t body);
+  BodyIndex root(BodyIndex body);
   void bound_speeds(const std::vector<btRigidBody*>&
                         bodies);  // after a substep; throws StateError for what is not finite
 
@@ -129,9 +127,9 @@ class PhysicsWorld::Impl {
   Dynamics dynamics_;
   Vec3 wind_ = Vec3::Zero();
   std::vector<btRigidBody*> simulated_[2];                    // of each pace
-  std::vector<size_t> parents_;                               // union-find over bodies
-  std::vector<int> rolling_;                                  // bodies that are driven wheels
-  std::vector<std::pair<int, int>> tied_;                     // bodies that a joint ties together
+  IndexedVector<BodyIndex, BodyIndex> parents_;               // union-find over bodies
+  std::vector<BodyIndex> rolling_;                            // that are driven wheels
+  std::vector<std::pair<BodyIndex, BodyIndex>> tied_;         // that a joint ties together
   std::vector<std::pair<btRigidBody*, btTransform>> movers_;  // and where they began the step
 };
 

@@ -29,17 +29,17 @@ struct MassProperties {
 MassProperties mass_of(const model::Model& model, const model::BodyLayout& layout,
                        const model::BodyPlacement& body) {
   MassProperties sum;
-  for (const int index : body.links) {
-    const auto& placement = layout.links[static_cast<size_t>(index)];
-    const auto& inertial = model.links[static_cast<size_t>(placement.link)].inertial;
+  for (const LinkIndex index : body.links) {
+    const auto& placement = layout.links[index];
+    const auto& inertial = model.links[placement.link].inertial;
     sum.mass += inertial.mass;
     sum.center += inertial.mass * (placement.X_BL * inertial.X_LI.translation);
   }
   sum.mass = std::max(sum.mass, kSmallestMass_kg);
   sum.center /= sum.mass;
-  for (const int index : body.links) {
-    const auto& placement = layout.links[static_cast<size_t>(index)];
-    const auto& inertial = model.links[static_cast<size_t>(placement.link)].inertial;
+  for (const LinkIndex index : body.links) {
+    const auto& placement = layout.links[index];
+    const auto& inertial = model.links[placement.link].inertial;
     const Pose X_BI = placement.X_BL * inertial.X_LI;
     const Eigen::Matrix3d R = X_BI.rotation.toRotationMatrix();
     const Vec3 d = X_BI.translation - sum.center;
@@ -64,24 +64,22 @@ Quat principal_axes(const Eigen::Matrix3d& inertia, Vec3& moments) {
   return Quat(axes).normalized();
 }
 
-const model::RobotPlacement* robot_of(const model::BodyLayout& layout, int instance) {
-  const auto robot =
-      std::lower_bound(layout.robots.begin(), layout.robots.end(), instance,
-                       [](const model::RobotPlacement& a, int b) { return a.instance < b; });
+const model::RobotPlacement* robot_of(const model::BodyLayout& layout, InstanceIndex instance) {
+  const auto robot = std::lower_bound(
+      layout.robots.begin(), layout.robots.end(), instance,
+      [](const model::RobotPlacement& a, InstanceIndex b) { return a.instance < b; });
   return robot != layout.robots.end() && robot->instance == instance ? &*robot : nullptr;
 }
 
-// The wheel of a wheels drive that this body is, or -1.
-int driven_wheel(const model::BodyLayout& layout, int index) {
-  const model::RobotPlacement* robot =
-      robot_of(layout, layout.bodies[static_cast<size_t>(index)].instance);
-  if (!robot || robot->body == index) return -1;
-  for (const int wheel : robot->wheels) {
-    const model::WheelPlacement& placement = layout.wheels[static_cast<size_t>(wheel)];
-    if (!placement.steers && layout.links[static_cast<size_t>(placement.link)].body == index)
-      return wheel;
+// The wheel of a wheels drive that this body is, if it is one.
+WheelIndex driven_wheel(const model::BodyLayout& layout, BodyIndex index) {
+  const model::RobotPlacement* robot = robot_of(layout, layout.bodies[index].instance);
+  if (!robot || robot->body == index) return {};
+  for (const WheelIndex wheel : robot->wheels) {
+    const model::WheelPlacement& placement = layout.wheels[wheel];
+    if (!placement.steers && layout.links[placement.link].body == index) return wheel;
   }
-  return -1;
+  return {};
 }
 
 double mass_on_each_wheel(const model::Model& model, const model::RobotPlacement& robot) {
@@ -96,10 +94,10 @@ void make_it_give(double share, const Vec3& gravity, ShapeSurface& surface) {
 }
 
 bool carries_kinematic_drive(const model::WorldModel& world, const model::BodyLayout& layout,
-                             int index) {
+                             BodyIndex index) {
   for (const auto& robot : layout.robots) {
     if (robot.body != index) continue;
-    const auto& drive = world.models[static_cast<size_t>(robot.instance)].model->drive;
+    const auto& drive = world.models[robot.instance].model->drive;
     return drive && drive->kind == model::DriveDescription::Kind::kinematic;
   }
   return false;
@@ -109,29 +107,29 @@ bool carries_kinematic_drive(const model::WorldModel& world, const model::BodyLa
 
 RigidBodies::RigidBodies(const model::WorldModel& world, const model::BodyLayout& layout)
     : findings(simplifications(world, layout)) {
-  for (size_t link = 0; link < layout.links.size(); ++link) make_statics(world, layout, link);
+  for (const LinkIndex link : layout.links.indices()) make_statics(world, layout, link);
   bodies.resize(layout.bodies.size());
-  for (size_t i = 0; i < bodies.size(); ++i) make_body(world, layout, static_cast<int>(i));
+  for (const BodyIndex i : bodies.indices()) make_body(world, layout, i);
 }
 
 void RigidBodies::append(const model::WorldModel& world, const model::BodyLayout& layout,
-                         int instance) {
-  const size_t first = bodies.size();
-  for (size_t link = 0; link < layout.links.size(); ++link) {
+                         InstanceIndex instance) {
+  const BodyIndex first = bodies.next();
+  for (const LinkIndex link : layout.links.indices()) {
     if (layout.links[link].instance == instance) make_statics(world, layout, link);
   }
   bodies.resize(layout.bodies.size());
-  for (size_t i = 0; i < first; ++i)
+  for (BodyIndex i(0); i < first; ++i)
     bodies[i].bullet->setUserPointer(&bodies[i].info);  // they may have moved
-  for (size_t i = first; i < bodies.size(); ++i) make_body(world, layout, static_cast<int>(i));
+  for (BodyIndex i = first; bodies.has(i); ++i) make_body(world, layout, i);
 }
 
 void RigidBodies::make_statics(const model::WorldModel& world, const model::BodyLayout& layout,
-                               size_t index) {
+                               LinkIndex index) {
   const auto& placement = layout.links[index];
-  if (placement.body >= 0) return;
-  const auto& model = *world.models[static_cast<size_t>(placement.instance)].model;
-  const auto& collisions = model.links[static_cast<size_t>(placement.link)].collisions;
+  if (placement.body.valid()) return;
+  const auto& model = *world.models[placement.instance].model;
+  const auto& collisions = model.links[placement.link].collisions;
   for (size_t c = 0; c < collisions.size(); ++c) {
     const auto& collision = collisions[c];
     btCollisionShape* shape = shapes_.fixed(collision.geometry);
@@ -146,7 +144,7 @@ void RigidBodies::make_statics(const model::WorldModel& world, const model::Body
         surface_of(collision.surface, Quat::Identity()));  // Bullet's frame is the collision's
     object->info.instance = placement.instance;
     object->info.plane = collision.geometry.shape == model::Shape::plane;
-    object->info.links.push_back(static_cast<int>(index));
+    object->info.links.push_back(index);
     object->info.collisions.push_back(static_cast<int>(c));
     bullet.setUserPointer(&object->info);
     statics.push_back(std::move(object));
@@ -155,16 +153,15 @@ void RigidBodies::make_statics(const model::WorldModel& world, const model::Body
 
 // A wheel of a wheels drive: y of its frame is its axle.
 ShapeSurface RigidBodies::tyre_of(const model::WorldModel& world, const model::BodyLayout& layout,
-                                  int wheel, const ShapeSurface& surface) const {
-  const auto& robot =
-      layout.robots[static_cast<size_t>(layout.wheels[static_cast<size_t>(wheel)].robot)];
-  const model::Model& model = *world.models[static_cast<size_t>(robot.instance)].model;
+                                  WheelIndex wheel, const ShapeSurface& surface) const {
+  const auto& robot = layout.robots[layout.wheels[wheel].robot];
+  const model::Model& model = *world.models[robot.instance].model;
   ShapeSurface tyre = surface;
   using Steering = model::DriveDescription::Steering;
   const bool rolls_sideways = model.drive && (model.drive->steering == Steering::mecanum ||
                                               model.drive->steering == Steering::omni);
   if (rolls_sideways) {  // it grips along the roller's axis only; the roller turns freely
-    const Vec3& rim = layout.wheels[static_cast<size_t>(wheel)].rim;
+    const Vec3& rim = layout.wheels[wheel].rim;
     tyre.along_I.setZero();
     tyre.friction2 = 0.0;
     if (model.drive->steering == Steering::mecanum) tyre.roller_rad = math::atan2(rim.y(), rim.x());
@@ -178,8 +175,8 @@ ShapeSurface RigidBodies::tyre_of(const model::WorldModel& world, const model::B
 // What else a robot stands on, casters above all, gives way like its tyres: rigid, it would bear
 // all and leave the wheels nothing. Against what it runs into it is as hard as before.
 ShapeSurface RigidBodies::foot_of(const model::WorldModel& world, const model::BodyLayout& layout,
-                                  int instance, const ShapeSurface& surface) const {
-  const model::Model& model = *world.models[static_cast<size_t>(instance)].model;
+                                  InstanceIndex instance, const ShapeSurface& surface) const {
+  const model::Model& model = *world.models[instance].model;
   const model::RobotPlacement* robot = robot_of(layout, instance);
   using Kind = model::DriveDescription::Kind;
   if (surface.stiffness > 0.0 || !robot || !model.drive || model.drive->kind != Kind::wheels)
@@ -191,19 +188,18 @@ ShapeSurface RigidBodies::foot_of(const model::WorldModel& world, const model::B
 }
 
 void RigidBodies::make_body(const model::WorldModel& world, const model::BodyLayout& layout,
-                            int index) {
-  const auto& placement = layout.bodies[static_cast<size_t>(index)];
-  const auto& instance = world.models[static_cast<size_t>(placement.instance)];
+                            BodyIndex index) {
+  const auto& placement = layout.bodies[index];
+  const auto& instance = world.models[placement.instance];
   const model::Model& model = *instance.model;
-  RigidBody& body = bodies[static_cast<size_t>(index)];
-  const int wheel = driven_wheel(layout, index);
+  RigidBody& body = bodies[index];
+  const WheelIndex wheel = driven_wheel(layout, index);
 
   const MassProperties mass = mass_of(model, layout, placement);
   Vec3 moments;
-  if (wheel >= 0) {  // y of I is the wheel's axis, which lateral friction refers to
-    const auto& of_wheel = layout.wheels[static_cast<size_t>(wheel)];
-    const Vec3 axis =
-        layout.links[static_cast<size_t>(of_wheel.link)].X_BL.rotation * of_wheel.axis_in_L;
+  if (wheel.valid()) {  // y of I is the wheel's axis, which lateral friction refers to
+    const auto& of_wheel = layout.wheels[wheel];
+    const Vec3 axis = layout.links[of_wheel.link].X_BL.rotation * of_wheel.axis_in_L;
     body.X_BI.rotation = Quat::FromTwoVectors(Vec3::UnitY(), axis);
     const Eigen::Matrix3d R = body.X_BI.rotation.toRotationMatrix();
     moments = (R.transpose() * mass.inertia * R).diagonal();
@@ -218,9 +214,9 @@ void RigidBodies::make_body(const model::WorldModel& world, const model::BodyLay
       carries_kinematic_drive(world, layout, index);  // its drive stands for its wheels' friction
   body.compound = std::make_unique<btCompoundShape>();
   std::vector<btCollisionShape*> shapes;
-  for (const int link_index : placement.links) {
-    const auto& link_placement = layout.links[static_cast<size_t>(link_index)];
-    const model::Link& link = model.links[static_cast<size_t>(link_placement.link)];
+  for (const LinkIndex link_index : placement.links) {
+    const auto& link_placement = layout.links[link_index];
+    const model::Link& link = model.links[link_placement.link];
     gravity |= link.gravity;
     if (link.wind) {
       const double more = link.inertial.mass;
@@ -232,7 +228,7 @@ void RigidBodies::make_body(const model::WorldModel& world, const model::BodyLay
     for (size_t c = 0; c < link.collisions.size(); ++c) {
       const auto& collision = link.collisions[c];
       shapes.clear();
-      if (wheel >= 0 && collision.geometry.shape == model::Shape::cylinder) {
+      if (wheel.valid() && collision.geometry.shape == model::Shape::cylinder) {
         shapes.push_back(shapes_.tyre(collision.geometry.size.x(), collision.geometry.size.y()));
       } else if (!shapes_.moving(collision.geometry, shapes)) {
         findings.push_back(
@@ -249,9 +245,9 @@ void RigidBodies::make_body(const model::WorldModel& world, const model::BodyLay
         body.info.collisions.push_back(static_cast<int>(c));
         body.info.surfaces.push_back(surface_of(collision.surface, X_IC.rotation));
         ShapeSurface& surface = body.info.surfaces.back();
-        surface = wheel >= 0 ? tyre_of(world, layout, wheel, surface)
-                             : foot_of(world, layout, placement.instance, surface);
-        if (imposed && link_placement.wheel >= 0) surface.friction = surface.friction2 = 0.0;
+        surface = wheel.valid() ? tyre_of(world, layout, wheel, surface)
+                                : foot_of(world, layout, placement.instance, surface);
+        if (imposed && link_placement.wheel.valid()) surface.friction = surface.friction2 = 0.0;
       }
     }
   }

@@ -14,17 +14,17 @@ namespace ruedo::physics {
 
 // What a collision object is to the rest of Ruedo; Bullet's user pointer leads to it.
 struct ObjectInfo {
-  int body = -1;  // -1: static
-  int instance = -1;
+  BodyIndex body;  // none: static
+  InstanceIndex instance;
   bool self_collide = false;  // of its model
   bool plane = false;
   bool on_plane = false;               // held up by a plane without a contact pair
   bool moved = false;                  // kinematic: moved from outside, never by contacts
   bool gone = false;                   // its model was removed: it is nowhere
-  std::vector<int> links;              // of each child shape; one entry for a single shape
+  std::vector<LinkIndex> links;        // of each child shape; one entry for a single shape
   std::vector<int> collisions;         // of each child shape, in its link
   std::vector<ShapeSurface> surfaces;  // of each child shape
-  std::vector<int> joined;             // bodies that a joint ties to this one
+  std::vector<BodyIndex> joined;       // that a joint ties to this one
 };
 
 inline const ObjectInfo& info_of(const btCollisionObject& object) {
@@ -54,19 +54,21 @@ class RigidBodies {
   RigidBodies(const model::WorldModel& world, const model::BodyLayout& layout);
 
   // Makes what the layout has of a new instance, at the end of the lists.
-  void append(const model::WorldModel& world, const model::BodyLayout& layout, int instance);
+  void append(const model::WorldModel& world, const model::BodyLayout& layout,
+              InstanceIndex instance);
 
-  std::vector<RigidBody> bodies;                       // as in the layout
+  IndexedVector<BodyIndex, RigidBody> bodies;          // as in the layout
   std::vector<std::unique_ptr<StaticObject>> statics;  // in world order
   std::vector<Finding> findings;
 
  private:
-  void make_statics(const model::WorldModel& world, const model::BodyLayout& layout, size_t link);
-  ShapeSurface tyre_of(const model::WorldModel& world, const model::BodyLayout& layout, int wheel,
-                       const ShapeSurface& surface) const;
+  void make_statics(const model::WorldModel& world, const model::BodyLayout& layout,
+                    LinkIndex link);
+  ShapeSurface tyre_of(const model::WorldModel& world, const model::BodyLayout& layout,
+                       WheelIndex wheel, const ShapeSurface& surface) const;
   ShapeSurface foot_of(const model::WorldModel& world, const model::BodyLayout& layout,
-                       int instance, const ShapeSurface& surface) const;
-  void make_body(const model::WorldModel& world, const model::BodyLayout& layout, int index);
+                       InstanceIndex instance, const ShapeSurface& surface) const;
+  void make_body(const model::WorldModel& world, const model::BodyLayout& layout, BodyIndex index);
   ShapeFactory shapes_;
 };
 

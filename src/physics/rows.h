@@ -53,8 +53,8 @@ struct Row {
 
   // To be called when bodies, Jacobian and softness are set.
   void prepare(const SolverBodies& bodies) {
-    const SolverBody& A = bodies[static_cast<size_t>(a)];
-    const SolverBody& B = bodies[static_cast<size_t>(b)];
+    const SolverBody& A = bodies[a];
+    const SolverBody& B = bodies[b];
     moves_a = A.inverse_mass.cwiseProduct(linear_a);
     turns_a = A.inverse_inertia * angular_a;
     moves_b = B.inverse_mass.cwiseProduct(linear_b);
@@ -73,20 +73,20 @@ struct Row {
     return sum;
   }
   double velocity(const SolverBodies& bodies) const {
-    const SolverBody& A = bodies[static_cast<size_t>(a)];
-    const SolverBody& B = bodies[static_cast<size_t>(b)];
+    const SolverBody& A = bodies[a];
+    const SolverBody& B = bodies[b];
     return linear_a.dot(A.v) + angular_a.dot(A.w) + linear_b.dot(B.v) + angular_b.dot(B.w);
   }
   double push_velocity(const SolverBodies& bodies) const {
-    const SolverBody& A = bodies[static_cast<size_t>(a)];
-    const SolverBody& B = bodies[static_cast<size_t>(b)];
+    const SolverBody& A = bodies[a];
+    const SolverBody& B = bodies[b];
     return linear_a.dot(A.push_v) + angular_a.dot(A.push_w) + linear_b.dot(B.push_v) +
            angular_b.dot(B.push_w);
   }
   // Adds to the impulse.
   void give(SolverBodies& bodies, double more) {
-    SolverBody& A = bodies[static_cast<size_t>(a)];
-    SolverBody& B = bodies[static_cast<size_t>(b)];
+    SolverBody& A = bodies[a];
+    SolverBody& B = bodies[b];
     impulse += more;
     A.v += moves_a * more;
     A.w += turns_a * more;
@@ -94,8 +94,8 @@ struct Row {
     B.w += turns_b * more;
   }
   void give_push(SolverBodies& bodies, double more) {
-    SolverBody& A = bodies[static_cast<size_t>(a)];
-    SolverBody& B = bodies[static_cast<size_t>(b)];
+    SolverBody& A = bodies[a];
+    SolverBody& B = bodies[b];
     push += more;
     A.push_v += moves_a * more;
     A.push_w += turns_a * more;

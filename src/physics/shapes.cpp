@@ -102,11 +102,11 @@ std::unique_ptr<btConvexHullShape> hull_of(const std::vector<btVector3>& points,
       for (int v = 1; v < corners; ++v) {
         if (direction.dot(computer.vertices[v]) > direction.dot(computer.vertices[best])) best = v;
       }
-      keep[static_cast<size_t>(best)] = true;
+      keep[best] = true;
     }
   }
   for (int v = 0; v < corners; ++v) {
-    if (keep[static_cast<size_t>(v)]) shape->addPoint(computer.vertices[v], false);
+    if (keep[v]) shape->addPoint(computer.vertices[v], false);
   }
   shape->setMargin(0.0);
   shape->recalcLocalAabb();
@@ -215,7 +215,7 @@ bool ShapeFactory::moving(const model::Geometry& geometry, std::vector<btCollisi
                       b = scaled(mesh.positions[triangle[1]], scale),
                       c = scaled(mesh.positions[triangle[2]], scale);
       mesh_volume += a.dot(b.cross(c)) / 6.0;
-      auto& of_part = points[static_cast<size_t>(part[triangle[0]])];
+      auto& of_part = points[part[triangle[0]]];
       of_part.insert(of_part.end(), {a, b, c});
     }
     for (const auto& of_part : points) {

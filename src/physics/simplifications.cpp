@@ -9,30 +9,27 @@ namespace ruedo::physics {
 
 namespace {
 
-const model::Model& model_of(const model::WorldModel& world, int instance) {
-  return *world.models[static_cast<size_t>(instance)].model;
+const model::Model& model_of(const model::WorldModel& world, InstanceIndex instance) {
+  return *world.models[instance].model;
 }
 
 void look_at_joints(const model::WorldModel& world, const model::BodyLayout& layout,
                     std::vector<Finding>& findings) {
   for (const auto& placement : layout.joints) {
-    const model::Joint& joint =
-        model_of(world, placement.instance).joints[static_cast<size_t>(placement.joint)];
+    const model::Joint& joint = model_of(world, placement.instance).joints[placement.joint];
     const bool led =
         std::any_of(layout.joints.begin(), layout.joints.end(), [&](const auto& other) {
           return other.instance == placement.instance && other.joint == joint.leader;
         });
     if (joint.leader >= 0 && !led) {
       findings.push_back({Finding::Kind::unsupported, joint.source,
-                          "model " + world.models[static_cast<size_t>(placement.instance)].name +
-                              "/joint " + joint.name,
+                          "model " + world.models[placement.instance].name + "/joint " + joint.name,
                           "<mimic> of a driven wheel is not supported; the joint moves freely"});
     }
     const bool ball = joint.type == model::JointType::ball;
     if (!ball && joint.type != model::JointType::universal) continue;
     findings.push_back({Finding::Kind::unsupported, joint.source,
-                        "model " + world.models[static_cast<size_t>(placement.instance)].name +
-                            "/joint " + joint.name,
+                        "model " + world.models[placement.instance].name + "/joint " + joint.name,
                         ball ? "a ball joint holds its links together; it takes no commands, and "
                                "its position is published as 0"
                              : "a universal joint takes commands for its first axis, and publishes "
@@ -44,8 +41,8 @@ void look_at_joints(const model::WorldModel& world, const model::BodyLayout& lay
 void look_at_friction(const model::WorldModel& world, const model::BodyLayout& layout,
                       std::vector<Finding>& findings) {
   for (const auto& placement : layout.links) {
-    const model::ModelInstance& instance = world.models[static_cast<size_t>(placement.instance)];
-    const model::Link& link = instance.model->links[static_cast<size_t>(placement.link)];
+    const model::ModelInstance& instance = world.models[placement.instance];
+    const model::Link& link = instance.model->links[placement.link];
     const bool rolls = placement.wheel >= 0;  // its axle is the direction
     for (const auto& collision : link.collisions) {
       const model::Surface& surface = collision.surface;

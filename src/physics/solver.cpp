@@ -103,7 +103,7 @@ Vec3 bounded(const Vec3& velocity) {
 int Solver::body_of(const btCollisionObject& object) {
   const int index = object.getCompanionId();
   return index > 0 && static_cast<size_t>(index) < bodies_.size() &&
-                 bodies_[static_cast<size_t>(index)].bullet == &object
+                 bodies_[index].bullet == &object
              ? index
              : 0;
 }
@@ -145,8 +145,8 @@ void Solver::set_normal(ContactRows& contact, const ContactSurface& surface, dou
                         : 0.0;
   if (surface.restitution <= 0.0) return;
   // The speed at the moment of touching, somewhere within the substep: forces act up to there only.
-  const SolverBody& A = bodies_[static_cast<size_t>(row.a)];
-  const SolverBody& B = bodies_[static_cast<size_t>(row.b)];
+  const SolverBody& A = bodies_[row.a];
+  const SolverBody& B = bodies_[row.b];
   const double before = -(row.linear_a.dot(A.v0) + row.angular_a.dot(A.w0) +
                           row.linear_b.dot(B.v0) + row.angular_b.dot(B.w0));
   const double acceleration = (-row.velocity(bodies_) - before) / substep_s;
@@ -179,7 +179,7 @@ void Solver::add_contact(btManifoldPoint& point, const ContactSurface& surface, 
   contact.gap = point.getDistance();
   const Vec3 normal = from_bt(point.m_normalWorldOnB);
   const auto arm = [&](int body, const btVector3& at) {
-    const btRigidBody* bullet = bodies_[static_cast<size_t>(body)].bullet;
+    const btRigidBody* bullet = bodies_[body].bullet;
     return bullet ? from_bt(at - bullet->getCenterOfMassPosition()) : Vec3(Vec3::Zero());
   };
   const Vec3 arm_a = arm(a, point.getPositionWorldOnA()),
@@ -532,7 +532,7 @@ void Solver::solve(const std::vector<btRigidBody*>& bodies,
   for (btRigidBody* body : bodies) add_body(*body, substep_s);
   const auto tie = [this](btRigidBody& body) {
     const int index = body_of(body);
-    if (index > 0) bodies_[static_cast<size_t>(index)].held = true;
+    if (index > 0) bodies_[index].held = true;
     return index;
   };
   for (btTypedConstraint* joint : joints) {
@@ -550,8 +550,7 @@ void Solver::solve(const std::vector<btRigidBody*>& bodies,
   for (size_t c = 0; c < contact_count_; ++c) {
     const ContactRows& contact = contacts_[c];
     if (contact.normal.impulse == 0.0 && contact.normal.push == 0.0) continue;
-    bodies_[static_cast<size_t>(contact.normal.a)].held =
-        bodies_[static_cast<size_t>(contact.normal.b)].held = true;
+    bodies_[contact.normal.a].held = bodies_[contact.normal.b].held = true;
   }
   advance(substep_s);
   close_joints(substep_s);

@@ -25,9 +25,8 @@ bool finite(const Twist& twist) { return std::isfinite(twist.linear.sum() + twis
 std::string joint_name(size_t joint, const model::WorldModel& world,
                        const model::BodyLayout& layout) {
   const auto& placed = layout.joints[joint];
-  const model::ModelInstance& instance = world.models[static_cast<size_t>(placed.instance)];
-  return "the joint '" + instance.name + "/" +
-         instance.model->joints[static_cast<size_t>(placed.joint)].name + "'";
+  const model::ModelInstance& instance = world.models[placed.instance];
+  return "the joint '" + instance.name + "/" + instance.model->joints[placed.joint].name + "'";
 }
 
 }  // namespace
@@ -51,9 +50,7 @@ void check_finite(const Snapshot& snapshot, const model::WorldModel& world,
     const bool good = finite(robot.X_WBase) && finite(robot.twist) &&
                       std::isfinite(robot.acceleration.sum() + robot.wheel_v + robot.wheel_omega +
                                     robot.motion.done + robot.motion.remaining);
-    if (!good)
-      fail(snapshot,
-           "the robot '" + world.models[static_cast<size_t>(layout.robots[i].instance)].name + "'");
+    if (!good) fail(snapshot, "the robot '" + world.models[layout.robots[i].instance].name + "'");
   }
   for (size_t i = 0; i < snapshot.wheel_angles.size(); ++i) {
     if (!std::isfinite(snapshot.wheel_angles[i] + snapshot.wheel_rates[i]))
@@ -62,10 +59,9 @@ void check_finite(const Snapshot& snapshot, const model::WorldModel& world,
   for (const Contact& contact : snapshot.contacts) {
     if (!std::isfinite(contact.position.sum() + contact.normal.sum() + contact.force +
                        contact.depth)) {
-      const int body = contact.body_a >= 0 ? contact.body_a : contact.body_b;
+      const BodyIndex body = contact.body_a >= 0 ? contact.body_a : contact.body_b;
       fail(snapshot,
-           "a contact of the body '" +
-               (body < 0 ? std::string() : layout.bodies[static_cast<size_t>(body)].name) + "'");
+           "a contact of the body '" + (body < 0 ? std::string() : layout.bodies[body].name) + "'");
     }
   }
 }

@@ -24,7 +24,7 @@ const ShapeSurface& surface_at(const ObjectInfo& info, int child) {
   if (info.surfaces.empty()) return kPlain;
   const bool known =
       info.body >= 0 && child >= 0 && static_cast<size_t>(child) < info.surfaces.size();
-  return known ? info.surfaces[static_cast<size_t>(child)] : info.surfaces.front();
+  return known ? info.surfaces[child] : info.surfaces.front();
 }
 
 // Where `friction` acts along, in the world; not projected yet.

@@ -146,7 +146,8 @@ struct Crowd::Group {
 };
 
 struct Crowd::Person {
-  int instance, body;
+  InstanceIndex instance;
+  BodyIndex body;
   Group* group;
   uint64_t number;  // in the group
   Vec2 start = Vec2::Zero();
@@ -165,7 +166,8 @@ struct Crowd::Person {
 };
 
 struct Crowd::Other {
-  int instance, body;
+  InstanceIndex instance;
+  BodyIndex body;
   bool is_robot;
   Eigen::AlignedBox3d box;  // of its shapes, in the body's frame
   // At this tick:
@@ -214,28 +216,26 @@ void Crowd::gather(const model::BodyLayout& layout) {
   if (std::none_of(world_.models.begin(), world_.models.end(),
                    [](const auto& instance) { return is_person(*instance.model); }))
     return;
-  for (size_t b = 0; b < layout.bodies.size(); ++b) {
-    const int instance = layout.bodies[b].instance, body = static_cast<int>(b);
-    is_person(*world_.models[static_cast<size_t>(instance)].model) ? add_person(layout, body)
-                                                                   : add_other(layout, body);
+  for (const BodyIndex body : layout.bodies.indices()) {
+    is_person(*world_.models[layout.bodies[body].instance].model) ? add_person(layout, body)
+                                                                  : add_other(layout, body);
   }
 }
 
-void Crowd::add(int instance, const model::BodyLayout& layout) {
+void Crowd::add(InstanceIndex instance, const model::BodyLayout& layout) {
   if (people_.empty()) return;
-  for (size_t b = 0; b < layout.bodies.size(); ++b) {
-    if (layout.bodies[b].instance == instance) add_other(layout, static_cast<int>(b));
+  for (const BodyIndex body : layout.bodies.indices()) {
+    if (layout.bodies[body].instance == instance) add_other(layout, body);
   }
 }
 
-void Crowd::add_other(const model::BodyLayout& layout, int body) {
-  const model::BodyPlacement& placed = layout.bodies[static_cast<size_t>(body)];
-  const model::ModelInstance& instance = world_.models[static_cast<size_t>(placed.instance)];
+void Crowd::add_other(const model::BodyLayout& layout, BodyIndex body) {
+  const model::BodyPlacement& placed = layout.bodies[body];
+  const model::ModelInstance& instance = world_.models[placed.instance];
   Other other{placed.instance, body, instance.is_robot(), {}};
-  for (const int l : placed.links) {
-    const model::LinkPlacement& link = layout.links[static_cast<size_t>(l)];
-    for (const model::Collision& collision :
-         instance.model->links[static_cast<size_t>(link.link)].collisions) {
+  for (const LinkIndex l : placed.links) {
+    const model::LinkPlacement& link = layout.links[l];
+    for (const model::Collision& collision : instance.model->links[link.link].collisions) {
       const Eigen::AlignedBox3d box = model::bounds(collision.geometry);
       if (box.isEmpty()) continue;
       for (int corner = 0; corner < 8; ++corner)
@@ -247,9 +247,9 @@ void Crowd::add_other(const model::BodyLayout& layout, int body) {
   if (!other.box.isEmpty()) others_.push_back(other);
 }
 
-void Crowd::add_person(const model::BodyLayout& layout, int body) {
-  const int index = layout.bodies[static_cast<size_t>(body)].instance;
-  const model::ModelInstance& instance = world_.models[static_cast<size_t>(index)];
+void Crowd::add_person(const model::BodyLayout& layout, BodyIndex body) {
+  const InstanceIndex index = layout.bodies[body].instance;
+  const model::ModelInstance& instance = world_.models[index];
   const auto known = std::find_if(groups_.begin(), groups_.end(), [&](const auto& group) {
     return group->element == instance.model->path.get();
   });
@@ -286,12 +286,12 @@ void Crowd::put(Person& person, const Vec2& at) {
   person.jumped = true;
 }
 
-void Crowd::remove(int instance) {
+void Crowd::remove(InstanceIndex instance) {
   for (Person& person : people_) person.gone |= person.instance == instance;
   std::erase_if(others_, [&](const Other& other) { return other.instance == instance; });
 }
 
-void Crowd::start_again(int instance, SimTime now) {
+void Crowd::start_again(InstanceIndex instance, SimTime now) {
   for (Person& person : people_) {
     if (person.instance != instance || person.gone) continue;
     begin(person);
@@ -384,7 +384,7 @@ void Crowd::sort_into_cells() {
     const Vec2 at = (people_[i].p - cells_from_) / kSeesPeople_m;
     const int c = std::min(rounded_down<int>(std::min(at.x(), 1e6)), columns_ - 1),
               r = std::min(rounded_down<int>(std::min(at.y(), 1e6)), rows_ - 1);
-    cells_[static_cast<size_t>(r * columns_ + c)].push_back(static_cast<int>(i));
+    cells_[r * columns_ + c].push_back(static_cast<int>(i));
   }
 }
 
@@ -412,8 +412,8 @@ Crowd::Vec2 Crowd::of_people(const Person& person, size_t index) const {
             r = std::min(rounded_down<int>(std::min(at.y(), 1e6)), rows_ - 1);
   for (int row = std::max(0, r - 1); row <= std::min(rows_ - 1, r + 1); ++row) {
     for (int column = std::max(0, c - 1); column <= std::min(columns_ - 1, c + 1); ++column) {
-      for (const int i : cells_[static_cast<size_t>(row * columns_ + column)]) {
-        const Person& other = people_[static_cast<size_t>(i)];
+      for (const int i : cells_[row * columns_ + column]) {
+        const Person& other = people_[i];
         if (static_cast<size_t>(i) == index || other.group->floor != person.group->floor) continue;
         const Vec2 d = person.p - other.p;
         const double distance = d.norm();
@@ -433,7 +433,7 @@ Crowd::Vec2 Crowd::of_others(const Person& person, const Vec2& ahead) const {
   const model::CrowdDescription& crowd = person.group->description;
   Vec2 sum = Vec2::Zero();
   for (size_t i = 0; i < others_.size();) {
-    const int instance = others_[i].instance;
+    const InstanceIndex instance = others_[i].instance;
     const Other* near = nullptr;  // of all bodies of a model
     double least = kSeesThings_m;
     Vec2 d = Vec2::Zero();

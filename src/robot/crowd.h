@@ -32,9 +32,9 @@ class Crowd {
   // Sends them to where they are one step later.
   void before_step(SimTime now);
 
-  void add(int instance, const model::BodyLayout& layout);  // what they see from now on
-  void remove(int instance);
-  void start_again(int instance, SimTime now);
+  void add(InstanceIndex instance, const model::BodyLayout& layout);  // what they see from now on
+  void remove(InstanceIndex instance);
+  void start_again(InstanceIndex instance, SimTime now);
   void shift_time(SimTime us) { thought_ -= us; }  // sim time was set back by so much
 
  private:
@@ -45,8 +45,8 @@ class Crowd {
   struct Push;   // of a tick
 
   void gather(const model::BodyLayout& layout);
-  void add_other(const model::BodyLayout& layout, int body);
-  void add_person(const model::BodyLayout& layout, int body);
+  void add_other(const model::BodyLayout& layout, BodyIndex body);
+  void add_person(const model::BodyLayout& layout, BodyIndex body);
   void begin(Person& person);
   void put(Person& person, const Vec2& at);
   void think();

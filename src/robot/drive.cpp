@@ -9,15 +9,15 @@ namespace ruedo::robot {
 namespace {
 
 const model::DriveDescription& description_of(const model::WorldModel& world,
-                                              const model::BodyLayout& layout, int robot) {
-  const int instance = layout.robots[static_cast<size_t>(robot)].instance;
-  return *world.models[static_cast<size_t>(instance)].model->drive;
+                                              const model::BodyLayout& layout, RobotIndex robot) {
+  const InstanceIndex instance = layout.robots[robot].instance;
+  return *world.models[instance].model->drive;
 }
 
-std::vector<Vec3> rims_of(const model::BodyLayout& layout, int robot) {
+std::vector<Vec3> rims_of(const model::BodyLayout& layout, RobotIndex robot) {
   std::vector<Vec3> rims;
-  for (const int wheel : layout.robots[static_cast<size_t>(robot)].wheels) {
-    const model::WheelPlacement& placement = layout.wheels[static_cast<size_t>(wheel)];
+  for (const WheelIndex wheel : layout.robots[robot].wheels) {
+    const model::WheelPlacement& placement = layout.wheels[wheel];
     if (!placement.steers) rims.push_back(placement.rim);
   }
   return rims;
@@ -26,15 +26,15 @@ std::vector<Vec3> rims_of(const model::BodyLayout& layout, int robot) {
 }  // namespace
 
 Drive::Drive(const model::WorldModel& world, const model::BodyLayout& layout,
-             physics::PhysicsWorld& physics, int robot)
+             physics::PhysicsWorld& physics, RobotIndex robot)
     : physics_(physics),
       robot_(robot),
-      body_(layout.robots[static_cast<size_t>(robot)].body),
+      body_(layout.robots[robot].body),
       step_us_(world.step_us),
       step_s_(static_cast<double>(world.step_us) * 1e-6),
-      X_BBase_(layout.robots[static_cast<size_t>(robot)].X_BBase),
+      X_BBase_(layout.robots[robot].X_BBase),
       X_BaseB_(X_BBase_.inverse()),
-      wheels_(layout.robots[static_cast<size_t>(robot)].wheels),
+      wheels_(layout.robots[robot].wheels),
       description_(description_of(world, layout, robot)),
       planner_(description_, rims_of(layout, robot)),
       X_WBase_(base_pose().normalized()) {
@@ -96,13 +96,13 @@ void Drive::placed(SimTime now) {
   begin_at_rest();
 }
 
-void read_motion(const MotionLog& log, int robot, Snapshot& snapshot) {
-  snapshot.robots[static_cast<size_t>(robot)].motion = log.shown();
+void read_motion(const MotionLog& log, RobotIndex robot, Snapshot& snapshot) {
+  snapshot.robots[robot].motion = log.shown();
   for (const MotionState& end : log.ends()) snapshot.motion_ends.push_back({robot, end});
 }
 
 void Drive::read(Snapshot& snapshot) const {
-  RobotState& state = snapshot.robots[static_cast<size_t>(robot_)];
+  RobotState& state = snapshot.robots[robot_];
   state.X_WBase = X_WBase_;
   state.twist = twist_;
   state.acceleration = acceleration_;

@@ -17,12 +17,12 @@ namespace ruedo::robot {
 inline constexpr double kSupportNormal = 0.5;
 
 // Writes what a robot's motion shows at this step.
-void read_motion(const MotionLog& log, int robot, Snapshot& snapshot);
+void read_motion(const MotionLog& log, RobotIndex robot, Snapshot& snapshot);
 
 class Drive {
  public:
   Drive(const model::WorldModel& world, const model::BodyLayout& layout,
-        physics::PhysicsWorld& physics, int robot);
+        physics::PhysicsWorld& physics, RobotIndex robot);
   virtual ~Drive() = default;
   Drive(const Drive&) = delete;
   Drive& operator=(const Drive&) = delete;
@@ -64,11 +64,12 @@ class Drive {
   void resist(const Contact& contact);
 
   physics::PhysicsWorld& physics_;
-  const int robot_, body_;
+  const RobotIndex robot_;
+  const BodyIndex body_;
   const int64_t step_us_;
   const double step_s_;
   const Pose X_BBase_, X_BaseB_;
-  const std::vector<int> wheels_;
+  const std::vector<WheelIndex> wheels_;
   const model::DriveDescription& description_;
   MotionPlanner planner_;
   Pose X_WBase_;

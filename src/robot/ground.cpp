@@ -13,10 +13,10 @@ std::vector<LevelPlane> level_planes(const model::WorldModel& world,
                                      const model::BodyLayout& layout) {
   std::vector<LevelPlane> planes;
   for (const auto& placement : layout.links) {
-    const auto& instance = world.models[static_cast<size_t>(placement.instance)];
+    const auto& instance = world.models[placement.instance];
     if (placement.body >= 0 || instance.removed) continue;
     const auto& model = *instance.model;
-    for (const auto& collision : model.links[static_cast<size_t>(placement.link)].collisions) {
+    for (const auto& collision : model.links[placement.link].collisions) {
       if (collision.geometry.shape != model::Shape::plane) continue;
       const Pose X_WC = placement.X_BL * collision.X_LC;
       const Vec3 normal = X_WC.rotation * collision.geometry.normal;
@@ -65,32 +65,30 @@ double lowest_point(const model::Geometry& geometry, const Pose& X_FC) {
 }
 
 double friction_of_wheels(const model::WorldModel& world, const model::BodyLayout& layout,
-                          int robot) {
-  const auto& placement = layout.robots[static_cast<size_t>(robot)];
-  const auto& model = *world.models[static_cast<size_t>(placement.instance)].model;
+                          RobotIndex robot) {
+  const auto& placement = layout.robots[robot];
+  const auto& model = *world.models[placement.instance].model;
   double least = std::numeric_limits<double>::infinity();
-  for (const int wheel : placement.wheels) {
-    const auto& link =
-        layout.links[static_cast<size_t>(layout.wheels[static_cast<size_t>(wheel)].link)];
-    for (const auto& collision : model.links[static_cast<size_t>(link.link)].collisions)
+  for (const WheelIndex wheel : placement.wheels) {
+    const auto& link = layout.links[layout.wheels[wheel].link];
+    for (const auto& collision : model.links[link.link].collisions)
       least = std::min(least, collision.surface.friction);
   }
   return std::isfinite(least) ? least : 1.0;
 }
 
 double lowest_of_wheels(const model::WorldModel& world, const model::BodyLayout& layout,
-                        int robot) {
-  const auto& placement = layout.robots[static_cast<size_t>(robot)];
-  const auto& model = *world.models[static_cast<size_t>(placement.instance)].model;
+                        RobotIndex robot) {
+  const auto& placement = layout.robots[robot];
+  const auto& model = *world.models[placement.instance].model;
   const Pose X_BaseB = placement.X_BBase.inverse();
-  const Pose X_BaseW = X_BaseB * layout.bodies[static_cast<size_t>(placement.body)].X_WB.inverse();
+  const Pose X_BaseW = X_BaseB * layout.bodies[placement.body].X_WB.inverse();
   double lowest = std::numeric_limits<double>::infinity();
-  for (const int wheel : placement.wheels) {
-    if (layout.wheels[static_cast<size_t>(wheel)].steers) continue;
-    const auto& link =
-        layout.links[static_cast<size_t>(layout.wheels[static_cast<size_t>(wheel)].link)];
-    const Pose X_BaseL = X_BaseW * layout.bodies[static_cast<size_t>(link.body)].X_WB * link.X_BL;
-    const auto& collisions = model.links[static_cast<size_t>(link.link)].collisions;
+  for (const WheelIndex wheel : placement.wheels) {
+    if (layout.wheels[wheel].steers) continue;
+    const auto& link = layout.links[layout.wheels[wheel].link];
+    const Pose X_BaseL = X_BaseW * layout.bodies[link.body].X_WB * link.X_BL;
+    const auto& collisions = model.links[link.link].collisions;
     for (const auto& collision : collisions) {
       lowest = std::min(lowest, lowest_point(collision.geometry, X_BaseL * collision.X_LC));
     }

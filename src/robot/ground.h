@@ -21,13 +21,14 @@ std::optional<LevelPlane> nearest_plane(const std::vector<LevelPlane>& planes, d
 
 // The least friction of the shapes of a robot's wheels; 1 where they have none.
 double friction_of_wheels(const model::WorldModel& world, const model::BodyLayout& layout,
-                          int robot);
+                          RobotIndex robot);
 
 // Height of the lowest point of a shape at X_FC, along z of F.
 double lowest_point(const model::Geometry& geometry, const Pose& X_FC);
 
 // Height of the lowest point of a robot's wheels, along z of base_link and from its origin. Of
 // wheels without collision shapes, the drive's wheel radius below the wheel's centre.
-double lowest_of_wheels(const model::WorldModel& world, const model::BodyLayout& layout, int robot);
+double lowest_of_wheels(const model::WorldModel& world, const model::BodyLayout& layout,
+                        RobotIndex robot);
 
 }  // namespace ruedo::robot

@@ -52,32 +52,33 @@ JointControl::JointControl(const model::WorldModel& world, const model::BodyLayo
   targets_.reserve(layout.joints.size());
 }
 
-const model::Joint& JointControl::description(int joint) const {
-  const auto& placed = layout_.joints[static_cast<size_t>(joint)];
-  return world_.models[static_cast<size_t>(placed.instance)]
-      .model->joints[static_cast<size_t>(placed.joint)];
+const model::Joint& JointControl::description(JointIndex joint) const {
+  const auto& placed = layout_.joints[joint];
+  return world_.models[placed.instance].model->joints[placed.joint];
 }
 
-int JointControl::find(int robot, const std::string& name) const {
-  const std::vector<int>& joints = layout_.robots[static_cast<size_t>(robot)].joints;
-  const auto found = std::find_if(joints.begin(), joints.end(),
-                                  [&](int joint) { return description(joint).name == name; });
-  return found == joints.end() ? -1 : *found;
+JointIndex JointControl::find(RobotIndex robot, const std::string& name) const {
+  const std::vector<JointIndex>& joints = layout_.robots[robot].joints;
+  const auto found = std::find_if(joints.begin(), joints.end(), [&](JointIndex joint) {
+    return description(joint).name == name;
+  });
+  return found == joints.end() ? JointIndex() : *found;
 }
 
-int8_t JointControl::check(int robot, const std::string& name, int8_t mode, double value) const {
+int8_t JointControl::check(RobotIndex robot, const std::string& name, int8_t mode,
+                           double value) const {
   if (!std::isfinite(value)) return motion_status_t::REASON_NOT_FINITE;
   const Limits* limits = limits_of(mode);
   if (!limits) return motion_status_t::REASON_BAD_KIND;
   if (value > limits->most || value < limits->least) return motion_status_t::REASON_BAD_VALUE;
-  const int joint = find(robot, name);
+  const JointIndex joint = find(robot, name);
   // One that mimics another, and a gearbox, take no commands.
-  const bool takes = joint >= 0 && description(joint).leader < 0 &&
+  const bool takes = joint.valid() && !description(joint).leader.valid() &&
                      description(joint).type != model::JointType::gearbox;
   return takes ? motion_status_t::REASON_NONE : motion_status_t::REASON_BAD_VALUE;
 }
 
-int8_t JointControl::apply(int robot, const JointCommand& command) {
+int8_t JointControl::apply(RobotIndex robot, const JointCommand& command) {
   const size_t n = command.names.size();
   if (command.modes.size() != n || command.values.size() != n)
     return motion_status_t::REASON_BAD_VALUE;
@@ -86,17 +87,17 @@ int8_t JointControl::apply(int robot, const JointCommand& command) {
       return reason;
   }
   for (size_t i = 0; i < n; ++i) {
-    const int joint = find(robot, command.names[i]);
+    const JointIndex joint = find(robot, command.names[i]);
     tell(joint, command.modes[i], command.values[i]);
-    const auto& placed = layout_.joints[static_cast<size_t>(joint)];
-    if (placed.parent_body >= 0) physics_.wake(placed.parent_body);
-    if (placed.child_body >= 0) physics_.wake(placed.child_body);
+    const auto& placed = layout_.joints[joint];
+    if (placed.parent_body.valid()) physics_.wake(placed.parent_body);
+    if (placed.child_body.valid()) physics_.wake(placed.child_body);
   }
   return motion_status_t::REASON_NONE;
 }
 
 // What passed check().
-void JointControl::tell(int joint, int8_t mode, double value) {
+void JointControl::tell(JointIndex joint, int8_t mode, double value) {
   using Mode = joint_command_t;
   const auto of_joint = [joint](const auto& each) { return each.joint == joint; };
   switch (mode) {
@@ -116,16 +117,16 @@ void JointControl::tell(int joint, int8_t mode, double value) {
   targets_.push_back({joint, limited ? std::clamp(value, axis.lower, axis.upper) : value});
 }
 
-double JointControl::gain_of(int joint) const {
+double JointControl::gain_of(JointIndex joint) const {
   const auto set = std::find_if(gains_.begin(), gains_.end(),
                                 [joint](const Gain& gain) { return gain.joint == joint; });
   const double gain = set == gains_.end() ? description(joint).axis.position_gain : set->value;
   return std::min(gain, largest_gain_);
 }
 
-void JointControl::forget(int instance) {
+void JointControl::forget(InstanceIndex instance) {
   const auto of_instance = [&](const auto& each) {
-    return layout_.joints[static_cast<size_t>(each.joint)].instance == instance;
+    return layout_.joints[each.joint].instance == instance;
   };
   std::erase_if(targets_, of_instance);
   std::erase_if(gains_, of_instance);

@@ -18,25 +18,25 @@ class JointControl {
 
   // Returns a reason of motion_status_t: 0 for accepted. A refused command changes no joint:
   // unknown names, unknown modes, numbers that are not finite or not allowed.
-  int8_t apply(int robot, const JointCommand& command);
+  int8_t apply(RobotIndex robot, const JointCommand& command);
   void before_step();
-  void forget(int instance);  // no command holds for its joints, nor a setting
+  void forget(InstanceIndex instance);  // no command holds for its joints, nor a setting
 
  private:
   struct Target {
-    int joint;  // index into BodyLayout::joints
+    JointIndex joint;
     double position;
   };
   struct Gain {
-    int joint;
+    JointIndex joint;
     double value;  // 1/s
   };
 
-  const model::Joint& description(int joint) const;
-  int find(int robot, const std::string& name) const;  // -1: it has none of that name
-  int8_t check(int robot, const std::string& name, int8_t mode, double value) const;
-  void tell(int joint, int8_t mode, double value);
-  double gain_of(int joint) const;
+  const model::Joint& description(JointIndex joint) const;
+  JointIndex find(RobotIndex robot, const std::string& name) const;  // none of that name: invalid
+  int8_t check(RobotIndex robot, const std::string& name, int8_t mode, double value) const;
+  void tell(JointIndex joint, int8_t mode, double value);
+  double gain_of(JointIndex joint) const;
 
   const model::WorldModel& world_;
   const model::BodyLayout& layout_;

@@ -28,13 +28,10 @@ constexpr double kStill_m_s = 2e-3, kStill_rad_s = 1e-2;  // of what Bullet move
 constexpr double kFirstTouch = 0.05;
 
 bool have_shapes(const model::WorldModel& world, const model::BodyLayout& layout,
-                 const std::vector<int>& wheels) {
-  return std::any_of(wheels.begin(), wheels.end(), [&](int wheel) {
-    const auto& link =
-        layout.links[static_cast<size_t>(layout.wheels[static_cast<size_t>(wheel)].link)];
-    return !world.models[static_cast<size_t>(link.instance)]
-                .model->links[static_cast<size_t>(link.link)]
-                .collisions.empty();
+                 const std::vector<WheelIndex>& wheels) {
+  return std::any_of(wheels.begin(), wheels.end(), [&](WheelIndex wheel) {
+    const auto& link = layout.links[layout.wheels[wheel].link];
+    return !world.models[link.instance].model->links[link.link].collisions.empty();
   });
 }
 
@@ -46,7 +43,7 @@ Quat about_z(double angle) {
 }  // namespace
 
 KinematicDrive::KinematicDrive(const model::WorldModel& world, const model::BodyLayout& layout,
-                               physics::PhysicsWorld& physics, int robot,
+                               physics::PhysicsWorld& physics, RobotIndex robot,
                                const std::vector<LevelPlane>& planes)
     : Drive(world, layout, physics, robot),
       wheel_angles_(layout, robot, description_),
@@ -67,8 +64,7 @@ KinematicDrive::KinematicDrive(const model::WorldModel& world, const model::Body
 }
 
 const std::string& KinematicDrive::robot_name() const {
-  return world_.models[static_cast<size_t>(layout_.robots[static_cast<size_t>(robot_)].instance)]
-      .name;
+  return world_.models[layout_.robots[robot_].instance].name;
 }
 
 void KinematicDrive::make_model() {
@@ -134,20 +130,16 @@ bool KinematicDrive::is_support(const Contact& contact, const Vec3& up) const {
 }
 
 bool KinematicDrive::on_wheel(const Contact& contact) const {
-  return !wheels_touch_ ||
-         (contact.link_a >= 0 && layout_.links[static_cast<size_t>(contact.link_a)].wheel >= 0);
+  return !wheels_touch_ || (contact.link_a >= 0 && layout_.links[contact.link_a].wheel >= 0);
 }
 
 double KinematicDrive::friction(const Contact& contact) const {
-  const auto of = [this](int link, int shape) {
+  const auto of = [this](LinkIndex link, int shape) {
     if (link < 0 || shape < 0) return 1.0;
-    const auto& placed = layout_.links[static_cast<size_t>(link)];
-    const auto& collisions = world_.models[static_cast<size_t>(placed.instance)]
-                                 .model->links[static_cast<size_t>(placed.link)]
-                                 .collisions;
-    return static_cast<size_t>(shape) < collisions.size()
-               ? collisions[static_cast<size_t>(shape)].surface.friction
-               : 1.0;
+    const auto& placed = layout_.links[link];
+    const auto& collisions = world_.models[placed.instance].model->links[placed.link].collisions;
+    return static_cast<size_t>(shape) < collisions.size() ? collisions[shape].surface.friction
+                                                          : 1.0;
   };
   return std::min(of(contact.link_a, contact.shape_a), of(contact.link_b, contact.shape_b));
 }

@@ -26,7 +26,8 @@ class KinematicDrive final : public Drive {
  public:
   // planes: heights of the world's level planes; must outlive the drive.
   KinematicDrive(const model::WorldModel& world, const model::BodyLayout& layout,
-                 physics::PhysicsWorld& physics, int robot, const std::vector<LevelPlane>& planes);
+                 physics::PhysicsWorld& physics, RobotIndex robot,
+                 const std::vector<LevelPlane>& planes);
 
   void before_step(SimTime now) override;
   void after_step(SimTime now) override;

@@ -75,7 +75,8 @@ bool MotionPlanner::moves_sideways() const {
          drive_.steering == Steering::holonomic;
 }
 
-void MotionPlanner::show(int64_t id, int8_t kind, int8_t state, int8_t reason, int blocked_by) {
+void MotionPlanner::show(int64_t id, int8_t kind, int8_t state, int8_t reason,
+                         LinkIndex blocked_by) {
   MotionState shown;
   shown.id = id;
   shown.kind = kind;
@@ -188,7 +189,7 @@ void MotionPlanner::hold(double v, double side, double omega, SimTime now, int8_
   const bool blocked =
       same && log_.current().kind == kind && log_.current().reason == Status::REASON_BLOCKED;
   show(0, kind, Status::STATE_RUNNING, blocked ? Status::REASON_BLOCKED : Status::REASON_NONE,
-       blocked ? log_.current().blocked_by : -1);
+       blocked ? log_.current().blocked_by : LinkIndex());
   if (same) return;  // a repeated command only feeds the watchdog
   begin_window(now);
   target_v_ = v;
@@ -467,7 +468,7 @@ void MotionPlanner::begin_window(SimTime now) {
   window_work_.clear();
 }
 
-void MotionPlanner::resist(int link, double work) {
+void MotionPlanner::resist(LinkIndex link, double work) {
   const auto known = std::find_if(window_work_.begin(), window_work_.end(),
                                   [link](const auto& each) { return each.first == link; });
   if (known == window_work_.end()) {
@@ -478,12 +479,12 @@ void MotionPlanner::resist(int link, double work) {
 }
 
 // What took the most work from the robot since the window began; of equal ones the lowest link.
-int MotionPlanner::strongest() const {
+LinkIndex MotionPlanner::strongest() const {
   const auto weaker = [](const auto& a, const auto& b) {
     return a.second < b.second || (a.second == b.second && a.first > b.first);
   };
   const auto most = std::max_element(window_work_.begin(), window_work_.end(), weaker);
-  return most == window_work_.end() ? -1 : most->first;
+  return most == window_work_.end() ? LinkIndex() : most->first;
 }
 
 // A velocity holds on; its status says while it leads nowhere.
@@ -506,7 +507,8 @@ void MotionPlanner::watch_held(SimTime now, double way, double angle, bool touch
   const bool blocked = wanted && window_touched_ && stuck;
   const int8_t reason = blocked ? Status::REASON_BLOCKED : Status::REASON_NONE;
   if (log_.current().state == Status::STATE_RUNNING)
-    show(0, log_.current().kind, Status::STATE_RUNNING, reason, blocked ? strongest() : -1);
+    show(0, log_.current().kind, Status::STATE_RUNNING, reason,
+         blocked ? strongest() : LinkIndex());
   begin_window(now);
 }
 

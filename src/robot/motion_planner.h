@@ -46,7 +46,7 @@ class MotionPlanner {
   Displacement step(SimTime now, int64_t step_us);
   // Before finish(): a link of another thing that the robot touched in this step, and the work (J)
   // that it took from what the robot is told to do.
-  void resist(int link, double work);
+  void resist(LinkIndex link, double work);
   // After step(): how it came out, with the way (m) and angle (rad) that base_link really made.
   // `touched`: by something that may have changed them. Ends primitives: when the plan is over and
   // the robot has settled, too.
@@ -93,8 +93,8 @@ class MotionPlanner {
   void set_plan(const Profile& v, const Profile& omega, SimTime now, double side = 0.0);
   void plan_primitive(SimTime now);
   void replace_running();
-  void show(int64_t id, int8_t kind, int8_t state, int8_t reason = 0, int blocked_by = -1);
-  int strongest() const;
+  void show(int64_t id, int8_t kind, int8_t state, int8_t reason = 0, LinkIndex blocked_by = {});
+  LinkIndex strongest() const;
   void publish_progress();
   void begin_window(SimTime now);
   void watch_for_block(SimTime now, bool touched);
@@ -124,7 +124,7 @@ class MotionPlanner {
   double window_done_ = 0.0, window_fastest_ = 0.0;
   double window_turned_ = 0.0, window_fastest_turn_ = 0.0;  // beside the way, of a velocity command
   bool window_touched_ = false;
-  std::vector<std::pair<int, double>> window_work_;  // by link that resisted, J
+  std::vector<std::pair<LinkIndex, double>> window_work_;  // by link that resisted, J
   MotionLog log_;
 };
 

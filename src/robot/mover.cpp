@@ -14,13 +14,13 @@ constexpr double kJump_m_s = 1000.0;  // nothing moves so fast
 }  // namespace
 
 Mover::Mover(const model::WorldModel& world, const model::BodyLayout& layout,
-             physics::PhysicsWorld& physics, int instance)
+             physics::PhysicsWorld& physics, InstanceIndex instance)
     : physics_(physics), instance_(instance), step_us_(world.step_us) {
-  const auto& placed = world.models[static_cast<size_t>(instance)];
+  const auto& placed = world.models[instance];
   path_ = read(*placed.model->path);
-  for (size_t i = 0; i < layout.bodies.size(); ++i) {
+  for (const BodyIndex i : layout.bodies.indices()) {
     if (layout.bodies[i].instance != instance) continue;
-    parts_.push_back({static_cast<int>(i), placed.X_WM.inverse() * layout.bodies[i].X_WB});
+    parts_.push_back({i, placed.X_WM.inverse() * layout.bodies[i].X_WB});
   }
   start_again(0);
 }

@@ -16,14 +16,14 @@ class Mover {
   }
   // Throws InputError for waypoints that are not numbers, or whose times do not grow.
   Mover(const model::WorldModel& world, const model::BodyLayout& layout,
-        physics::PhysicsWorld& physics, int instance);
+        physics::PhysicsWorld& physics, InstanceIndex instance);
 
   // The model's pose in the world at a time: linear between waypoints, rotations by slerp. Before
   // the first one it is there already; after the last one it stays, or begins again where the path
   // is a loop.
   Pose pose_at(SimTime time) const;
 
-  int instance() const { return instance_; }
+  InstanceIndex instance() const { return instance_; }
   // The path starts over at that sim time.
   void start_again(SimTime now);
   void shift_time(SimTime us) {
@@ -46,12 +46,12 @@ class Mover {
 
  private:
   struct Part {
-    int body;
+    BodyIndex body;
     Pose X_MB;
   };
 
   physics::PhysicsWorld& physics_;
-  int instance_;
+  InstanceIndex instance_;
   int64_t step_us_;
   SimTime offset_ = 0;  // time of the path less sim time
   Path path_;

@@ -11,23 +11,23 @@ namespace ruedo::robot {
 void Profile::add(double duration, double velocity, double acceleration) {
   if (!(duration > 0.0)) return;
   assert(count_ < kCapacity);
-  Segment& now = segments_[static_cast<size_t>(count_ - 1)];
+  Segment& now = segments_[count_ - 1];
   now.velocity = velocity;
   now.acceleration = acceleration;
   Segment next;
   next.time = now.time + duration;
   next.position = now.position + (velocity + 0.5 * acceleration * duration) * duration;
-  segments_[static_cast<size_t>(count_++)] = next;
+  segments_[count_++] = next;
 }
 
 void Profile::keep(double velocity) {
-  segments_[static_cast<size_t>(count_ - 1)].velocity = velocity;
-  segments_[static_cast<size_t>(count_ - 1)].acceleration = 0.0;
+  segments_[count_ - 1].velocity = velocity;
+  segments_[count_ - 1].acceleration = 0.0;
 }
 
 void Profile::keep_at(double velocity, double position) {
   keep(velocity);
-  segments_[static_cast<size_t>(count_ - 1)].position = position;
+  segments_[count_ - 1].position = position;
 }
 
 Profile Profile::to_velocity(double velocity, double target, const Limits& limits) {
@@ -87,15 +87,15 @@ Profile Profile::to_distance(double velocity, double distance, const Limits& lim
 }
 
 void Profile::append(const Profile& other, double at) {
-  Segment& last = segments_[static_cast<size_t>(count_ - 1)];
+  Segment& last = segments_[count_ - 1];
   const double position = last.position + last.velocity * (at - last.time);
   if (at <= last.time) --count_;
   for (int i = 0; i < other.count_; ++i) {
     assert(count_ < kCapacity);
-    Segment segment = other.segments_[static_cast<size_t>(i)];
+    Segment segment = other.segments_[i];
     segment.time += at;
     segment.position += position;
-    segments_[static_cast<size_t>(count_++)] = segment;
+    segments_[count_++] = segment;
   }
 }
 
@@ -111,14 +111,13 @@ Profile Profile::scaled(double factor) const {
 
 const Profile::Segment& Profile::at(double time) const {
   int i = count_ - 1;
-  while (i > 0 && time < segments_[static_cast<size_t>(i)].time) --i;
-  return segments_[static_cast<size_t>(i)];
+  while (i > 0 && time < segments_[i].time) --i;
+  return segments_[i];
 }
 
 double Profile::next_change(double time) const {
   for (int i = 1; i < count_; ++i) {
-    if (segments_[static_cast<size_t>(i)].time > time)
-      return segments_[static_cast<size_t>(i)].time;
+    if (segments_[i].time > time) return segments_[i].time;
   }
   return std::numeric_limits<double>::infinity();
 }

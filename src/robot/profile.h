@@ -46,8 +46,8 @@ class Profile {
   // Begin of the next segment after `time`; infinity in the last one.
   double next_change(double time) const;
   // Time from which on the velocity does not change any more.
-  double end() const { return segments_[static_cast<size_t>(count_ - 1)].time; }
-  double final_position() const { return segments_[static_cast<size_t>(count_ - 1)].position; }
+  double end() const { return segments_[count_ - 1].time; }
+  double final_position() const { return segments_[count_ - 1].position; }
 
  private:
   void add(double duration, double velocity, double acceleration);

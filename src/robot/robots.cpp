@@ -24,29 +24,29 @@ class Robots::Impl {
   void apply(const Command& command);
   void step();
   void read(Snapshot& snapshot) const;
-  void add(int instance);
-  void remove(int instance);
-  Pose model_pose(int instance) const;
-  void set_pose(int instance, const Pose& X_WM);
-  void set_twist(int instance, const Twist& twist);
-  void start_again(int instance);
+  void add(InstanceIndex instance);
+  void remove(InstanceIndex instance);
+  Pose model_pose(InstanceIndex instance) const;
+  void set_pose(InstanceIndex instance, const Pose& X_WM);
+  void set_twist(InstanceIndex instance, const Twist& twist);
+  void start_again(InstanceIndex instance);
   SimTime set_time_to_zero();
 
   int64_t step_ = 0;
 
  private:
-  std::unique_ptr<Drive> make_drive(int robot);
+  std::unique_ptr<Drive> make_drive(RobotIndex robot);
   void change_ground();
   template <class Visit>
-  void for_each_body(int instance, Visit visit) const {
-    for (size_t i = 0; i < layout_.bodies.size(); ++i) {
-      if (layout_.bodies[i].instance == instance) visit(static_cast<int>(i));
+  void for_each_body(InstanceIndex instance, Visit visit) const {
+    for (const BodyIndex i : layout_.bodies.indices()) {
+      if (layout_.bodies[i].instance == instance) visit(i);
     }
   }
-  int robot_of(int instance) const;  // -1: it is none
-  void put(int body, const Pose& X_WB);
-  void end_put(int instance);
-  void read_driveless(size_t robot, RobotState& state) const;
+  RobotIndex robot_of(InstanceIndex instance) const;  // invalid: it is none
+  void put(BodyIndex body, const Pose& X_WB);
+  void end_put(InstanceIndex instance);
+  void read_driveless(RobotIndex robot, RobotState& state) const;
   void read_collisions(Snapshot& snapshot) const;
   void number_robots();
   SimTime now() const { return step_ * world_.step_us; }
@@ -55,9 +55,9 @@ class Robots::Impl {
   const model::BodyLayout& layout_;
   physics::PhysicsWorld& physics_;
   std::vector<LevelPlane> planes_;
-  std::vector<std::unique_ptr<Drive>> drives_;  // of each robot; null: it has none, or cannot move
-  std::vector<MotionLog> driveless_;            // refusals of those
-  std::vector<int> robot_of_link_;              // -1: none's
+  IndexedVector<RobotIndex, std::unique_ptr<Drive>> drives_;  // null: it has none, or cannot move
+  IndexedVector<RobotIndex, MotionLog> driveless_;            // refusals of those
+  IndexedVector<LinkIndex, RobotIndex> robot_of_link_;
   std::vector<std::unique_ptr<Mover>> movers_;
   Crowd crowd_;
   Surroundings surroundings_;
@@ -77,26 +77,25 @@ Robots::Impl::Impl(const model::WorldModel& world, const model::BodyLayout& layo
       joints_(world, layout, physics),
       wind_(world.environment.wind, seed) {
   number_robots();
-  for (size_t i = 0; i < layout.robots.size(); ++i)
-    drives_.push_back(make_drive(static_cast<int>(i)));
-  for (size_t i = 0; i < world.models.size(); ++i) {
+  for (const RobotIndex robot : layout.robots.indices()) drives_.push_back(make_drive(robot));
+  for (const InstanceIndex i : world.models.indices()) {
     if (Mover::moves(*world.models[i].model))
-      movers_.push_back(std::make_unique<Mover>(world, layout, physics, static_cast<int>(i)));
+      movers_.push_back(std::make_unique<Mover>(world, layout, physics, i));
   }
 }
 
-std::unique_ptr<Drive> Robots::Impl::make_drive(int robot) {
-  const model::RobotPlacement& placement = layout_.robots[static_cast<size_t>(robot)];
-  const auto& drive = world_.models[static_cast<size_t>(placement.instance)].model->drive;
-  if (!drive || placement.body < 0) return nullptr;
+std::unique_ptr<Drive> Robots::Impl::make_drive(RobotIndex robot) {
+  const model::RobotPlacement& placement = layout_.robots[robot];
+  const auto& drive = world_.models[placement.instance].model->drive;
+  if (!drive || !placement.body.valid()) return nullptr;
   if (drive->kind == model::DriveDescription::Kind::wheels)
     return std::make_unique<WheelsDrive>(world_, layout_, physics_, robot);
   return std::make_unique<KinematicDrive>(world_, layout_, physics_, robot, planes_);
 }
 
 void Robots::Impl::apply(const Command& command) {
-  if (command.robot < 0 || static_cast<size_t>(command.robot) >= drives_.size()) return;
-  Drive* drive = drives_[static_cast<size_t>(command.robot)].get();
+  if (!drives_.has(command.robot)) return;
+  Drive* drive = drives_[command.robot].get();
   const auto refuse = [&](int64_t id, int8_t kind, int8_t reason) {
     if (drive) return drive->planner().refuse(id, kind, reason);
     MotionState refused;
@@ -104,7 +103,7 @@ void Robots::Impl::apply(const Command& command) {
     refused.kind = kind;
     refused.state = motion_status_t::STATE_REFUSED;
     refused.reason = reason;
-    driveless_[static_cast<size_t>(command.robot)].mention(refused);
+    driveless_[command.robot].mention(refused);
   };
   if (const auto* joint = std::get_if<JointCommand>(&command.what)) {
     if (const int8_t reason = joints_.apply(command.robot, *joint))
@@ -158,40 +157,39 @@ void Robots::Impl::read(Snapshot& snapshot) const {
   snapshot.wheel_angles.assign(layout_.wheels.size(),
                                0.0);  // of a robot that is gone, too: a snapshot is used again
   snapshot.wheel_rates.assign(layout_.wheels.size(), 0.0);
-  for (size_t i = 0; i < drives_.size(); ++i) {
+  for (const RobotIndex i : drives_.indices()) {
     if (drives_[i]) {
       drives_[i]->read(snapshot);
       drives_[i]->read_wheels(snapshot);
     } else {
       read_driveless(i, snapshot.robots[i]);
-      read_motion(driveless_[i], static_cast<int>(i), snapshot);
+      read_motion(driveless_[i], i, snapshot);
     }
   }
   read_collisions(snapshot);
 }
 
 void Robots::Impl::number_robots() {
-  std::vector<int> of_instance(world_.models.size(), -1);
-  for (size_t i = 0; i < layout_.robots.size(); ++i)
-    of_instance[static_cast<size_t>(layout_.robots[i].instance)] = static_cast<int>(i);
+  IndexedVector<InstanceIndex, RobotIndex> of_instance(world_.models.size());
+  for (const RobotIndex i : layout_.robots.indices()) of_instance[layout_.robots[i].instance] = i;
   robot_of_link_.clear();
   for (const model::LinkPlacement& link : layout_.links)
-    robot_of_link_.push_back(of_instance[static_cast<size_t>(link.instance)]);
+    robot_of_link_.push_back(of_instance[link.instance]);
 }
 
 void Robots::Impl::read_collisions(Snapshot& snapshot) const {
   snapshot.collisions.clear();
   snapshot.collisions.reserve(2 * snapshot.contacts.capacity());  // so that none is made in a run
-  const auto robot_of_link = [this](int link) {
-    return link < 0 ? -1 : robot_of_link_[static_cast<size_t>(link)];
+  const auto robot_of_link = [this](LinkIndex link) {
+    return link.valid() ? robot_of_link_[link] : RobotIndex();
   };
   for (size_t i = 0; i < snapshot.contacts.size(); ++i) {
     const Contact& contact = snapshot.contacts[i];
-    const int a = robot_of_link(contact.link_a), b = robot_of_link(contact.link_b);
+    const RobotIndex a = robot_of_link(contact.link_a), b = robot_of_link(contact.link_b);
     if (a == b) continue;  // no robot's, or a robot's own links
-    const auto add = [&](int robot, bool as_a) {
-      if (robot < 0) return;
-      const Vec3 up = snapshot.robots[static_cast<size_t>(robot)].X_WBase.rotation * Vec3::UnitZ();
+    const auto add = [&](RobotIndex robot, bool as_a) {
+      if (!robot.valid()) return;
+      const Vec3 up = snapshot.robots[robot].X_WBase.rotation * Vec3::UnitZ();
       if (std::abs(contact.normal.dot(up)) < kSupportNormal)
         snapshot.collisions.push_back({robot, static_cast<int>(i), as_a});
     };
@@ -205,11 +203,11 @@ void Robots::Impl::read_collisions(Snapshot& snapshot) const {
 }
 
 // A robot that only senses: base_link is where its body is.
-void Robots::Impl::read_driveless(size_t robot, RobotState& state) const {
+void Robots::Impl::read_driveless(RobotIndex robot, RobotState& state) const {
   const auto& placement = layout_.robots[robot];
   state = {};
   state.X_WBase = placement.X_BBase;
-  if (placement.body < 0) return;
+  if (!placement.body.valid()) return;
   state.X_WBase = physics_.pose(placement.body) * placement.X_BBase;
   const Twist& twist = physics_.twist(placement.body);
   const Quat to_base = state.X_WBase.rotation.conjugate();
@@ -219,11 +217,11 @@ void Robots::Impl::read_driveless(size_t robot, RobotState& state) const {
 
 // ---- Changes between two steps.
 
-int Robots::Impl::robot_of(int instance) const {
-  for (size_t i = 0; i < layout_.robots.size(); ++i) {
-    if (layout_.robots[i].instance == instance) return static_cast<int>(i);
+RobotIndex Robots::Impl::robot_of(InstanceIndex instance) const {
+  for (const RobotIndex robot : layout_.robots.indices()) {
+    if (layout_.robots[robot].instance == instance) return robot;
   }
-  return -1;
+  return {};
 }
 
 void Robots::Impl::change_ground() {
@@ -232,24 +230,24 @@ void Robots::Impl::change_ground() {
     if (drive) drive->ground_changed();
 }
 
-void Robots::Impl::add(int instance) {
+void Robots::Impl::add(InstanceIndex instance) {
   change_ground();
   number_robots();
   drives_.resize(layout_.robots.size());
   driveless_.resize(layout_.robots.size());
-  if (const int robot = robot_of(instance); robot >= 0) {
-    drives_[static_cast<size_t>(robot)] = make_drive(robot);
-    driveless_[static_cast<size_t>(robot)] = {};
+  if (const RobotIndex robot = robot_of(instance); robot.valid()) {
+    drives_[robot] = make_drive(robot);
+    driveless_[robot] = {};
   }
   crowd_.add(instance, layout_);
   surroundings_.add(instance);
-  if (!Mover::moves(*world_.models[static_cast<size_t>(instance)].model)) return;
+  if (!Mover::moves(*world_.models[instance].model)) return;
   movers_.push_back(std::make_unique<Mover>(world_, layout_, physics_, instance));
   movers_.back()->start_again(now());
 }
 
-void Robots::Impl::remove(int instance) {
-  if (const int robot = robot_of(instance); robot >= 0) drives_[static_cast<size_t>(robot)].reset();
+void Robots::Impl::remove(InstanceIndex instance) {
+  if (const RobotIndex robot = robot_of(instance); robot.valid()) drives_[robot].reset();
   std::erase_if(movers_, [instance](const auto& mover) { return mover->instance() == instance; });
   crowd_.remove(instance);
   surroundings_.remove(instance);
@@ -257,37 +255,34 @@ void Robots::Impl::remove(int instance) {
   change_ground();
 }
 
-Pose Robots::Impl::model_pose(int instance) const {
-  const auto& link =
-      layout_.links[static_cast<size_t>(layout_.first_link[static_cast<size_t>(instance)])];
-  const Pose X_WL = link.body < 0 ? link.X_BL : physics_.pose(link.body) * link.X_BL;
-  return X_WL * world_.models[static_cast<size_t>(instance)]
-                    .model->links[static_cast<size_t>(link.link)]
-                    .X_ML.inverse();
+Pose Robots::Impl::model_pose(InstanceIndex instance) const {
+  const auto& link = layout_.links[layout_.first_link[instance]];
+  const Pose X_WL = link.body.valid() ? physics_.pose(link.body) * link.X_BL : link.X_BL;
+  return X_WL * world_.models[instance].model->links[link.link].X_ML.inverse();
 }
 
-void Robots::Impl::put(int body, const Pose& X_WB) {
+void Robots::Impl::put(BodyIndex body, const Pose& X_WB) {
   physics_.disturb(body);  // what leaned on it
   physics_.set_twist(body, {});
   physics_.set_pose(body, X_WB.normalized());
 }
 
-void Robots::Impl::end_put(int instance) {
-  if (const int robot = robot_of(instance); robot >= 0) {
-    if (Drive* drive = drives_[static_cast<size_t>(robot)].get()) drive->placed(now());
+void Robots::Impl::end_put(InstanceIndex instance) {
+  if (const RobotIndex robot = robot_of(instance); robot.valid()) {
+    if (Drive* drive = drives_[robot].get()) drive->placed(now());
   }
-  for_each_body(instance, [&](int body) { physics_.disturb(body); });
+  for_each_body(instance, [&](BodyIndex body) { physics_.disturb(body); });
 }
 
-void Robots::Impl::set_pose(int instance, const Pose& X_WM) {
+void Robots::Impl::set_pose(InstanceIndex instance, const Pose& X_WM) {
   const Pose X_MW = model_pose(instance).inverse();
-  for_each_body(instance, [&](int body) { put(body, X_WM * X_MW * physics_.pose(body)); });
+  for_each_body(instance, [&](BodyIndex body) { put(body, X_WM * X_MW * physics_.pose(body)); });
   end_put(instance);
 }
 
-void Robots::Impl::set_twist(int instance, const Twist& twist) {
+void Robots::Impl::set_twist(InstanceIndex instance, const Twist& twist) {
   const Vec3 p_M = model_pose(instance).translation;
-  for_each_body(instance, [&](int body) {
+  for_each_body(instance, [&](BodyIndex body) {
     physics_.set_twist(
         body,
         {twist.linear + twist.angular.cross(physics_.pose(body).translation - p_M), twist.angular});
@@ -296,27 +291,23 @@ void Robots::Impl::set_twist(int instance, const Twist& twist) {
 }
 
 // A drive's wheels keep the angle that they have turned: encoders do not jump.
-void Robots::Impl::start_again(int instance) {
-  const int robot = robot_of(instance);
-  const int base = robot >= 0 && drives_[static_cast<size_t>(robot)]
-                       ? layout_.robots[static_cast<size_t>(robot)].body
-                       : -1;
-  const auto is_wheel = [&](int body) {
-    const auto& wheels = layout_.robots[static_cast<size_t>(robot)].wheels;
-    return body != base && std::any_of(wheels.begin(), wheels.end(), [&](int wheel) {
-             return layout_
-                        .links[static_cast<size_t>(layout_.wheels[static_cast<size_t>(wheel)].link)]
-                        .body == body;
+void Robots::Impl::start_again(InstanceIndex instance) {
+  const RobotIndex robot = robot_of(instance);
+  const BodyIndex base = robot.valid() && drives_[robot] ? layout_.robots[robot].body : BodyIndex();
+  const auto is_wheel = [&](BodyIndex body) {
+    const auto& wheels = layout_.robots[robot].wheels;
+    return body != base && std::any_of(wheels.begin(), wheels.end(), [&](WheelIndex wheel) {
+             return layout_.links[layout_.wheels[wheel].link].body == body;
            });
   };
-  const Pose X_BaseW = base >= 0 ? physics_.pose(base).inverse() : Pose{};
-  for_each_body(instance, [&](int body) {
-    const bool wheel = base >= 0 && is_wheel(body);
-    put(body, wheel ? layout_.bodies[static_cast<size_t>(base)].X_WB * X_BaseW * physics_.pose(body)
-                    : layout_.bodies[static_cast<size_t>(body)].X_WB);
+  const Pose X_BaseW = base.valid() ? physics_.pose(base).inverse() : Pose{};
+  for_each_body(instance, [&](BodyIndex body) {
+    const bool wheel = base.valid() && is_wheel(body);
+    put(body, wheel ? layout_.bodies[base].X_WB * X_BaseW * physics_.pose(body)
+                    : layout_.bodies[body].X_WB);
   });
-  for (size_t i = 0; i < layout_.joints.size(); ++i) {
-    if (layout_.joints[i].instance == instance) physics_.start_again(static_cast<int>(i));
+  for (const JointIndex i : layout_.joints.indices()) {
+    if (layout_.joints[i].instance == instance) physics_.start_again(i);
   }
   joints_.forget(instance);
   for (auto& mover : movers_)
@@ -345,12 +336,14 @@ void Robots::apply(const Command& command) { impl_->apply(command); }
 void Robots::step() { impl_->step(); }
 void Robots::read(Snapshot& snapshot) const { impl_->read(snapshot); }
 int64_t Robots::current_step() const { return impl_->step_; }
-void Robots::add(int instance) { impl_->add(instance); }
-void Robots::remove(int instance) { impl_->remove(instance); }
-Pose Robots::model_pose(int instance) const { return impl_->model_pose(instance); }
-void Robots::set_pose(int instance, const Pose& X_WM) { impl_->set_pose(instance, X_WM); }
-void Robots::set_twist(int instance, const Twist& twist) { impl_->set_twist(instance, twist); }
-void Robots::start_again(int instance) { impl_->start_again(instance); }
+void Robots::add(InstanceIndex instance) { impl_->add(instance); }
+void Robots::remove(InstanceIndex instance) { impl_->remove(instance); }
+Pose Robots::model_pose(InstanceIndex instance) const { return impl_->model_pose(instance); }
+void Robots::set_pose(InstanceIndex instance, const Pose& X_WM) { impl_->set_pose(instance, X_WM); }
+void Robots::set_twist(InstanceIndex instance, const Twist& twist) {
+  impl_->set_twist(instance, twist);
+}
+void Robots::start_again(InstanceIndex instance) { impl_->start_again(instance); }
 SimTime Robots::set_time_to_zero() { return impl_->set_time_to_zero(); }
 
 }  // namespace ruedo::robot

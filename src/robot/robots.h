@@ -35,7 +35,7 @@ struct ResetOdometry {};
 // A command that has a robot and passed the checks of size and fingerprint; its values are not
 // checked yet.
 struct Command {
-  int robot = -1;  // index into BodyLayout::robots
+  RobotIndex robot;
   std::variant<VelocityCommand, WheelCommand, MoveCommand, JointCommand, ResetOdometry> what;
 };
 
@@ -63,15 +63,16 @@ class Robots {
   int64_t current_step() const;
 
   // Changes between two steps; instance is an index into WorldModel::models.
-  void add(int instance);               // the physics has it; the layout, too
-  void remove(int instance);            // the physics has it no more
-  Pose model_pose(int instance) const;  // X_WM, of a model that can move
+  void add(InstanceIndex instance);               // the physics has it; the layout, too
+  void remove(InstanceIndex instance);            // the physics has it no more
+  Pose model_pose(InstanceIndex instance) const;  // X_WM, of a model that can move
   // Puts a model there, at rest: its joints stand as they stood, what it was asked to do ends, its
   // odometry stays.
-  void set_pose(int instance, const Pose& X_WM);
-  void set_twist(int instance, const Twist& twist);  // of the model's frame, expressed in the world
-  void start_again(int instance);  // back where it started, at rest; paths start over
-  SimTime set_time_to_zero();      // nothing moves; returns what the time was
+  void set_pose(InstanceIndex instance, const Pose& X_WM);
+  void set_twist(InstanceIndex instance,
+                 const Twist& twist);        // of the model's frame, expressed in the world
+  void start_again(InstanceIndex instance);  // back where it started, at rest; paths start over
+  SimTime set_time_to_zero();                // nothing moves; returns what the time was
 
  private:
   class Impl;

@@ -46,11 +46,11 @@ Surroundings::Surroundings(const model::WorldModel& world, const model::BodyLayo
       layout_(layout),
       physics_(physics),
       step_s_(1e-6 * static_cast<double>(world.step_us)) {
-  for (size_t i = 0; i < world.models.size(); ++i) add(static_cast<int>(i));
+  for (const InstanceIndex i : world.models.indices()) add(i);
 }
 
-void Surroundings::add(int instance) {
-  const model::ModelInstance& placed = world_.models[static_cast<size_t>(instance)];
+void Surroundings::add(InstanceIndex instance) {
+  const model::ModelInstance& placed = world_.models[instance];
   if (is(*placed.model, "ruedo:belt"))
     belts_.push_back({instance, parts_of(instance), placed.X_WM,
                       placed.X_WM.rotation * velocity_of(*placed.model->path)});
@@ -61,23 +61,22 @@ void Surroundings::add(int instance) {
   }
 }
 
-std::vector<Surroundings::Part> Surroundings::parts_of(int instance) const {
+std::vector<Surroundings::Part> Surroundings::parts_of(InstanceIndex instance) const {
   std::vector<Part> parts;
-  const Pose X_MW = world_.models[static_cast<size_t>(instance)].X_WM.inverse();
-  for (size_t b = 0; b < layout_.bodies.size(); ++b) {
-    if (layout_.bodies[b].instance == instance)
-      parts.push_back({static_cast<int>(b), X_MW * layout_.bodies[b].X_WB});
+  const Pose X_MW = world_.models[instance].X_WM.inverse();
+  for (const BodyIndex b : layout_.bodies.indices()) {
+    if (layout_.bodies[b].instance == instance) parts.push_back({b, X_MW * layout_.bodies[b].X_WB});
   }
   return parts;
 }
 
-void Surroundings::remove(int instance) {
+void Surroundings::remove(InstanceIndex instance) {
   const auto of_it = [instance](const auto& each) { return each.instance == instance; };
   std::erase_if(belts_, of_it);
   std::erase_if(doors_, of_it);
 }
 
-void Surroundings::start_again(int instance) {
+void Surroundings::start_again(InstanceIndex instance) {
   for (Door& door : doors_) {
     if (door.instance != instance) continue;
     door.open = 0.0;
@@ -97,12 +96,11 @@ Pose Surroundings::Door::pose() const {
 
 // A robot or a person, at its middle, seen from above.
 bool Surroundings::is_near(const Door& door) const {
-  for (size_t b = 0; b < layout_.bodies.size(); ++b) {
-    const model::ModelInstance& instance =
-        world_.models[static_cast<size_t>(layout_.bodies[b].instance)];
+  for (const BodyIndex b : layout_.bodies.indices()) {
+    const model::ModelInstance& instance = world_.models[layout_.bodies[b].instance];
     const bool walks = is(*instance.model, "ruedo:path") || is(*instance.model, "ruedo:crowd");
     if (instance.removed || !(walks || instance.is_robot())) continue;
-    const Vec3 way = physics_.pose(static_cast<int>(b)).translation - door.X_WM.translation;
+    const Vec3 way = physics_.pose(b).translation - door.X_WM.translation;
     if (way.head<2>().norm() < door.distance_m) return true;
   }
   return false;

@@ -20,26 +20,26 @@ class Surroundings {
 
   void before_step(SimTime now);
 
-  void add(int instance);
-  void remove(int instance);
-  void start_again(int instance);
+  void add(InstanceIndex instance);
+  void remove(InstanceIndex instance);
+  void start_again(InstanceIndex instance);
   void shift_time(SimTime us);  // sim time was set back by so much
 
  private:
   struct Part {
-    int body;
+    BodyIndex body;
     Pose X_MB;
   };
   // Stands where it is, with a surface that moves.
   struct Belt {
-    int instance;
+    InstanceIndex instance;
     std::vector<Part> parts;
     Pose X_WM;
     Vec3 velocity;  // m/s, in the world
   };
   // Moves from where the file has it by X_MOpen and back.
   struct Door {
-    int instance;
+    InstanceIndex instance;
     std::vector<Part> parts;
     Pose X_WM, X_MOpen;
     double opening_s, distance_m;
@@ -48,7 +48,7 @@ class Surroundings {
     SimTime wanted = -1;  // when a body was last near; -1: never
     Pose pose() const;
   };
-  std::vector<Part> parts_of(int instance) const;
+  std::vector<Part> parts_of(InstanceIndex instance) const;
   bool is_near(const Door& door) const;
   void guide(const std::vector<Part>& parts, const Pose& X_WM);
 

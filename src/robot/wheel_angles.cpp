@@ -7,17 +7,15 @@
 
 namespace ruedo::robot {
 
-WheelAngles::WheelAngles(const model::BodyLayout& layout, int robot,
+WheelAngles::WheelAngles(const model::BodyLayout& layout, RobotIndex robot,
                          const model::DriveDescription& drive)
     : radius_(drive.wheel_radius) {
-  const model::RobotPlacement& placement = layout.robots[static_cast<size_t>(robot)];
+  const model::RobotPlacement& placement = layout.robots[robot];
   const Pose X_BaseB = placement.X_BBase.inverse();
-  for (const int index : placement.wheels) {
-    const model::WheelPlacement& wheel = layout.wheels[static_cast<size_t>(index)];
-    const model::WheelPlacement& place =
-        wheel.on < 0 ? wheel : layout.wheels[static_cast<size_t>(wheel.on)];
-    const Vec3 p_Base =
-        X_BaseB * (layout.links[static_cast<size_t>(place.link)].X_BL * place.center_in_L);
+  for (const WheelIndex index : placement.wheels) {
+    const model::WheelPlacement& wheel = layout.wheels[index];
+    const model::WheelPlacement& place = wheel.on < 0 ? wheel : layout.wheels[wheel.on];
+    const Vec3 p_Base = X_BaseB * (layout.links[place.link].X_BL * place.center_in_L);
     wheels_.push_back({index, wheel.steers, wheel.on >= 0, wheel.rim, p_Base.x(), p_Base.y()});
   }
 }
@@ -48,8 +46,8 @@ void WheelAngles::read(Snapshot& snapshot, const Vec3& twist, double curvature) 
       angle = wheel.rim.dot(sums) / radius_;
       rate = wheel.rim.dot(twist) / radius_;
     }
-    snapshot.wheel_angles[static_cast<size_t>(wheel.index)] = angle;
-    snapshot.wheel_rates[static_cast<size_t>(wheel.index)] = rate;
+    snapshot.wheel_angles[wheel.index] = angle;
+    snapshot.wheel_rates[wheel.index] = rate;
   }
 }
 

@@ -12,7 +12,8 @@ namespace ruedo::robot {
 
 class WheelAngles {
  public:
-  WheelAngles(const model::BodyLayout& layout, int robot, const model::DriveDescription& drive);
+  WheelAngles(const model::BodyLayout& layout, RobotIndex robot,
+              const model::DriveDescription& drive);
 
   void advance(const Displacement& way);
   // twist: m/s ahead, m/s to the left, rad/s. curvature: 1/m, of the way that the steering sets.
@@ -20,7 +21,7 @@ class WheelAngles {
 
  private:
   struct Wheel {
-    int index;             // into Snapshot::wheel_angles
+    WheelIndex index;
     bool steers, steered;  // it is a steering joint; it rolls and hangs on one
     Vec3 rim;
     double x, y;          // m, in base_link: of a steered wheel the joint that steers it

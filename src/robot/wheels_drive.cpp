@@ -25,7 +25,7 @@ constexpr double kStill_m_s = 5e-3, kStill_rad_s = 2e-2;
 }  // namespace
 
 WheelsDrive::WheelsDrive(const model::WorldModel& world, const model::BodyLayout& layout,
-                         physics::PhysicsWorld& physics, int robot)
+                         physics::PhysicsWorld& physics, RobotIndex robot)
     : Drive(world, layout, physics, robot),
       servos_(wheels_.size()),
       max_torque_(description_.max_wheel_torque),
@@ -34,8 +34,8 @@ WheelsDrive::WheelsDrive(const model::WorldModel& world, const model::BodyLayout
   bodies_.push_back(body_);
   double mass = physics.mass(body_);
   for (size_t i = 0; i < wheels_.size(); ++i) {
-    const auto& wheel = layout.wheels[static_cast<size_t>(wheels_[i])];
-    const int body = layout.links[static_cast<size_t>(wheel.link)].body;
+    const auto& wheel = layout.wheels[wheels_[i]];
+    const BodyIndex body = layout.links[wheel.link].body;
     if (std::find(bodies_.begin(), bodies_.end(), body) != bodies_.end()) continue;
     bodies_.push_back(body);
     mass += physics.mass(body);
@@ -47,14 +47,12 @@ WheelsDrive::WheelsDrive(const model::WorldModel& world, const model::BodyLayout
 void WheelsDrive::place_wheels(const model::BodyLayout& layout) {
   if (model::BaseOdometry::is_for(description_))
     base_.emplace(layout, robot_, description_, description_.track_error, 0.0);
-  const Pose X_BaseW = (layout.bodies[static_cast<size_t>(body_)].X_WB * X_BBase_).inverse();
-  for (const int index : wheels_) {
-    const model::WheelPlacement& wheel = layout.wheels[static_cast<size_t>(index)];
-    const model::WheelPlacement& place =
-        wheel.on < 0 ? wheel : layout.wheels[static_cast<size_t>(wheel.on)];
-    const model::LinkPlacement& link = layout.links[static_cast<size_t>(place.link)];
-    const Vec3 p_Base = X_BaseW * (layout.bodies[static_cast<size_t>(link.body)].X_WB *
-                                   (link.X_BL * place.center_in_L));
+  const Pose X_BaseW = (layout.bodies[body_].X_WB * X_BBase_).inverse();
+  for (const WheelIndex index : wheels_) {
+    const model::WheelPlacement& wheel = layout.wheels[index];
+    const model::WheelPlacement& place = wheel.on < 0 ? wheel : layout.wheels[wheel.on];
+    const model::LinkPlacement& link = layout.links[place.link];
+    const Vec3 p_Base = X_BaseW * (layout.bodies[link.body].X_WB * (link.X_BL * place.center_in_L));
     places_.push_back({wheel.left, wheel.steers, wheel.on >= 0, wheel.rim, p_Base.x(), p_Base.y()});
   }
 }
@@ -100,7 +98,7 @@ void WheelsDrive::begin_at_rest() {
 void WheelsDrive::wake() {
   asleep_ = false;
   still_us_ = 0;
-  for (const int body : bodies_) physics_.wake(body);
+  for (const BodyIndex body : bodies_) physics_.wake(body);
 }
 
 void WheelsDrive::before_step(SimTime now) {
@@ -199,7 +197,7 @@ void WheelsDrive::drive_wheel(size_t wheel, double rate) {
 bool WheelsDrive::touches_something() {
   const Vec3 up = X_WBase_.rotation * Vec3::UnitZ();
   bool touched = false;
-  for (const int body : bodies_) {
+  for (const BodyIndex body : bodies_) {
     for (const Contact& contact : physics_.contacts(body)) {
       if (std::abs(contact.normal.dot(up)) >= kSupportNormal) continue;
       touched = true;
@@ -276,7 +274,7 @@ void WheelsDrive::read_wheel_rates() {
     return;
   }
   std::vector<double> rates;
-  for (const int wheel : wheels_) rates.push_back(physics_.wheel_rate(wheel));
+  for (const WheelIndex wheel : wheels_) rates.push_back(physics_.wheel_rate(wheel));
   const PlaneMotion motion = WheelKinematics::real(description_).motion(mean_of_sides(rates));
   wheel_v_ = motion.v;
   wheel_omega_ = motion.omega;
@@ -291,13 +289,13 @@ void WheelsDrive::fall_asleep_when_still() {
   twist_ = {};
   wheel_v_ = wheel_omega_ = 0.0;
   begin_at_rest();
-  for (const int body : bodies_) physics_.sleep(body);
+  for (const BodyIndex body : bodies_) physics_.sleep(body);
 }
 
 void WheelsDrive::read_wheels(Snapshot& snapshot) const {
-  for (const int wheel : wheels_) {
-    snapshot.wheel_angles[static_cast<size_t>(wheel)] = physics_.wheel_angle(wheel);
-    snapshot.wheel_rates[static_cast<size_t>(wheel)] = asleep_ ? 0.0 : physics_.wheel_rate(wheel);
+  for (const WheelIndex wheel : wheels_) {
+    snapshot.wheel_angles[wheel] = physics_.wheel_angle(wheel);
+    snapshot.wheel_rates[wheel] = asleep_ ? 0.0 : physics_.wheel_rate(wheel);
   }
 }
 

@@ -24,7 +24,7 @@ namespace ruedo::robot {
 class WheelsDrive final : public Drive {
  public:
   WheelsDrive(const model::WorldModel& world, const model::BodyLayout& layout,
-              physics::PhysicsWorld& physics, int robot);
+              physics::PhysicsWorld& physics, RobotIndex robot);
 
   void before_step(SimTime now) override;
   void after_step(SimTime now) override;
@@ -57,10 +57,10 @@ class WheelsDrive final : public Drive {
     Vec3 rim;
     double x, y;  // m, in base_link: of what steers it, where something does
   };
-  std::vector<Servo> servos_;  // as wheels_
-  std::vector<Place> places_;  // as wheels_
-  std::vector<int> bodies_;    // the robot's own: chassis and wheels
-  double max_torque_;          // N m, each wheel
+  std::vector<Servo> servos_;      // as wheels_
+  std::vector<Place> places_;      // as wheels_
+  std::vector<BodyIndex> bodies_;  // the robot's own: chassis and wheels
+  double max_torque_;              // N m, each wheel
   WheelKinematics believed_;
   std::optional<model::BaseOdometry> base_;         // of what is no differential drive
   std::vector<double> last_angles_;                 // of the encoders, as wheels_

@@ -711,19 +711,24 @@ Conversions::~Conversions() = default;
 template <class Message>
 void Conversions::add_route(const channel_info_t& channel, Plan& plan) {
   auto route = std::make_unique<TypedRoute<Message>>();
+  std::vector<size_t>& topics = topics_of_[channel.name];
+  const auto add = [&](const Row<Message>& row, const Source& from, const std::string& name) {
+    topics.push_back(add_topic({name, row.type, row.qos}));
+    route->add(row, from, topics.back());
+  };
   for (const Row<Message>& row : rows<Message>()) {
     Source from = plan.source(channel);
     if (row.applies && !row.applies(from)) continue;
     const std::string name = plan.topic(row, channel);
     if (row.scope != Scope::element) {
-      route->add(row, from, add_topic({name, row.type, row.qos}));
+      add(row, from, name);
       continue;
     }
     const std::string array = from.frame;
     for (int i = 0; i < from.device.nelements; ++i) {
       from.element = i;
       from.frame = array + "_" + std::to_string(i);
-      route->add(row, from, add_topic({name + "_" + std::to_string(i), row.type, row.qos}));
+      add(row, from, name + "_" + std::to_string(i));
     }
   }
   routes_[channel.name] = std::move(route);
@@ -781,6 +786,12 @@ void Conversions::add_links(const std::string& name, const RobotFrames& robot, N
   out.put(robot.description);
   standing_.push_back(
       {{names.topic(name, "robot_description"), "std_msgs/msg/String", kLatchedQos}, out.bytes()});
+}
+
+const std::vector<size_t>& Conversions::topics_of(const std::string& channel) const {
+  static const std::vector<size_t> none;
+  const auto found = topics_of_.find(channel);
+  return found == topics_of_.end() ? none : found->second;
 }
 
 bool Conversions::convert(const std::string& channel, std::span<const uint8_t> message,

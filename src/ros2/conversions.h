@@ -47,6 +47,9 @@ class Conversions {
 
   const std::vector<Topic>& topics() const { return topics_; }
 
+  // What becomes of a channel, as places in topics().
+  const std::vector<size_t>& topics_of(const std::string& channel) const;
+
   // Converts what is wanted of a message. False: it is not of its channel's type, or damaged.
   bool convert(const std::string& channel, std::span<const uint8_t> message, const Wanted& wanted,
                const Emit& emit);
@@ -72,6 +75,7 @@ class Conversions {
 
   std::vector<Topic> topics_;
   std::unordered_map<std::string, size_t> by_name_;                 // of topics
+  std::unordered_map<std::string, std::vector<size_t>> topics_of_;  // by channel; looked up only
   std::unordered_map<std::string, std::unique_ptr<Route>> routes_;  // by channel; looked up only
   struct Frame {
     std::string parent, child;

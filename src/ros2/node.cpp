@@ -7,12 +7,16 @@
 #include <spdlog/spdlog.h>
 
 #include "core/whole.h"
+#include "ruedo/camera_info_t.hpp"
+#include "ruedo/image_t.hpp"
 #include "ruedo/reply_t.hpp"
 #include "ruedo/request_t.hpp"
 #include "ruedo/set_pose_request_t.hpp"
 
 namespace ruedo::ros2 {
 namespace {
+
+constexpr auto kLook = std::chrono::milliseconds(20);  // at who reads pictures
 
 std::string key(const Topic& topic) { return topic.name + " " + topic.type; }
 
@@ -79,6 +83,44 @@ Endpoint Node::endpoint(const Topic& topic, Role role) const {
   return {role, topic, type_hash(topic.type, options_.conversion.distro)};
 }
 
+// Of pictures as it was at the last look; all else costs little.
+bool Node::wants(const std::string& channel) const {
+  const std::lock_guard lock(pictures_mutex_);
+  const auto picture = pictures_.find(channel);
+  return picture == pictures_.end() || picture->second;
+}
+
+void Node::flush() {
+  const Requests::Clock::time_point now = Requests::Clock::now();
+  requests_.repeat(now);
+  if (now < next_look_) return;
+  next_look_ = now + kLook;
+  look_for_readers();
+}
+
+void Node::look_for_readers() {
+  const std::lock_guard lock(pictures_mutex_);
+  for (auto& [channel, is_read] : pictures_) {
+    const std::vector<size_t>& topics = conversions_->topics_of(channel);
+    const bool now = std::any_of(topics.begin(), topics.end(),
+                                 [&](size_t topic) { return writer_of_topic_[topic]->is_read(); });
+    if (std::exchange(is_read, now) != now) ++audience_;
+  }
+}
+
+// Their first are drawn, until somebody has looked.
+void Node::add_pictures(const std::vector<world_info_t>& info) {
+  const std::lock_guard lock(pictures_mutex_);
+  pictures_.clear();
+  for (const world_info_t& part : info) {
+    for (const channel_info_t& channel : part.channels) {
+      if (channel.type == image_t::getTypeName() || channel.type == camera_info_t::getTypeName())
+        pictures_[channel.name] = true;
+    }
+  }
+  ++audience_;
+}
+
 void Node::announce(const std::shared_ptr<const run::Announcement>& announcement) {
   next_clock_us_ = 0;  // sim time may begin again
   if (!is_same(announcement->info, info_)) take_over(announcement->info);
@@ -126,6 +168,7 @@ void Node::take_over(const std::vector<world_info_t>& info) {
   conversions_ = std::move(conversions);
   writers_ = std::move(writers);
   writer_of_topic_ = std::move(of_topic);
+  add_pictures(info);
   add_commands(info);
   tell_standing();
   tell_graph();

@@ -9,6 +9,7 @@
 #include <functional>
 #include <map>
 #include <memory>
+#include <mutex>
 #include <span>
 #include <string>
 #include <vector>
@@ -45,10 +46,12 @@ class Node : public run::Sink {
   Hears hears() const override {
     return {.samples = true, .records = false, .services = true, .repeated = false};
   }
+  bool wants(const std::string& channel) const override;
+  uint64_t audience() const override { return audience_; }
   void announce(const std::shared_ptr<const run::Announcement>& announcement) override;
   void begin_step(const run::Step& step) override;
   void message(const run::Published& message) override;
-  void flush() override { requests_.repeat(Requests::Clock::now()); }
+  void flush() override;
 
   struct Counts {
     uint64_t sent = 0, received = 0, dropped = 0, faulty = 0;
@@ -68,6 +71,8 @@ class Node : public run::Sink {
 
  private:
   void take_over(const std::vector<world_info_t>& info);  // of robots that have come or gone
+  void add_pictures(const std::vector<world_info_t>& info);
+  void look_for_readers();  // of pictures
   void add_commands(const std::vector<world_info_t>& info);
   void tell_standing();
   void tell_graph();  // ros_discovery_info
@@ -99,6 +104,11 @@ class Node : public run::Sink {
   std::string reply_channel_;
   std::vector<world_info_t> info_;
   int64_t clock_period_us_, next_clock_us_ = 0;
+  Requests::Clock::time_point next_look_;
+
+  mutable std::mutex pictures_mutex_;
+  std::map<std::string, bool> pictures_;  // channels of pictures; whether anybody reads them
+  std::atomic<uint64_t> audience_{0};
 
   std::atomic<bool> injecting_{false};
   std::atomic<uint64_t> sent_{0}, received_{0}, dropped_{0}, faulty_{0};

@@ -28,19 +28,19 @@ class Tree {
  public:
   Tree(const model::WorldModel& world, const model::BodyLayout& layout,
        const model::RobotPlacement& robot)
-      : instance_(world.models[static_cast<size_t>(robot.instance)]),
+      : instance_(world.models[robot.instance]),
         model_(*instance_.model),
         layout_(layout),
         robot_(robot),
-        frame_of_link_(model_.links.size(), 0),
-        seen_(model_.links.size(), false),
-        moves_(model_.joints.size(), false) {
-    for (const int j : robot.joints) moves_[joint_of(j)] = true;
-    for (const int w : robot.wheels) moves_[wheel_joint(w)] = true;
+        frame_of_link_(model_.links.size()),
+        seen_(model_.links.size()),
+        moves_(model_.joints.size()) {
+    for (const JointIndex j : robot.joints) moves_[layout.joints[j].joint] = true;
+    for (const WheelIndex w : robot.wheels) moves_[layout.wheels[w].joint] = true;
     reserve_names();
     add_base();
-    for (size_t link = 0; link < model_.links.size(); ++link) {
-      if (!seen_[link] && is_carrier(link)) add(link, 0, -1, false);
+    for (const ModelLinkIndex link : model_.links.indices()) {
+      if (!seen_[link] && is_carrier(link)) add(link, 0, {}, false);
     }
     list_moved();
   }
@@ -51,23 +51,15 @@ class Tree {
   }
 
  private:
-  size_t joint_of(int placed) const {
-    return static_cast<size_t>(layout_.joints[static_cast<size_t>(placed)].joint);
-  }
-  size_t wheel_joint(int wheel) const {
-    return static_cast<size_t>(layout_.wheels[static_cast<size_t>(wheel)].joint);
-  }
-  const model::LinkPlacement& placement(size_t link) const {
-    const int first = layout_.first_link[static_cast<size_t>(robot_.instance)];
-    return layout_.links[static_cast<size_t>(first) + link];
+  const model::LinkPlacement& placement(ModelLinkIndex link) const {
+    return layout_.links[layout_.link_of(robot_.instance, link)];
   }
   // Moves as base_link does, though no joint ties it to that.
-  bool is_carrier(size_t link) const {
+  bool is_carrier(ModelLinkIndex link) const {
     if (placement(link).body != robot_.body) return false;
     return std::none_of(model_.joints.begin(), model_.joints.end(), [&](const Joint& joint) {
-      return joint.child == static_cast<int>(link) && joint.parent >= 0 &&
-             joint.type != JointType::gearbox &&
-             placement(static_cast<size_t>(joint.parent)).body == robot_.body;
+      return joint.child == link && joint.parent.valid() && joint.type != JointType::gearbox &&
+             placement(joint.parent).body == robot_.body;
     });
   }
 
@@ -92,21 +84,21 @@ class Tree {
   }
 
   // A link that is called base_link and lies there is that frame.
-  bool is_base(size_t link, const Pose& X_BF) const {
+  bool is_base(ModelLinkIndex link, const Pose& X_BF) const {
     constexpr double kNear = 1e-6;
-    return model_.links[link].name == "base_link" && result_.frames[0].link < 0 &&
+    return model_.links[link].name == "base_link" && !result_.frames[0].link.valid() &&
            X_BF.translation.norm() < kNear &&
            X_BF.rotation.angularDistance(Quat::Identity()) < kNear;
   }
 
-  void add(size_t link, size_t parent, int joint, bool backwards) {
+  void add(ModelLinkIndex link, size_t parent, ModelJointIndex joint, bool backwards) {
     seen_[link] = true;
     LinkFrame frame;
-    frame.link = static_cast<int>(link);
+    frame.link = link;
     frame.joint = joint;
     frame.parent = parent;
     frame.X_MF = model_.links[link].X_ML;
-    if (joint >= 0) move(frame, model_.joints[static_cast<size_t>(joint)], backwards);
+    if (joint.valid()) move(frame, model_.joints[joint], backwards);
     const Pose X_MBase = result_.frames[0].X_MF;
     frame.X_BF = X_MBase.inverse() * frame.X_MF;
     frame.X_PF = result_.frames[parent].X_MF.inverse() * frame.X_MF;
@@ -122,7 +114,7 @@ class Tree {
   }
 
   void move(LinkFrame& frame, const Joint& joint, bool backwards) const {
-    if (!moves_[static_cast<size_t>(frame.joint)]) return;
+    if (!moves_[frame.joint]) return;
     frame.motion = motion_of(joint.type);
     if (frame.motion == Motion::none) return;
     frame.X_MF = joint.X_MJ;
@@ -130,40 +122,40 @@ class Tree {
     frame.advance = joint.advance;
   }
 
-  void add_neighbours(size_t link) {
-    for (size_t j = 0; j < model_.joints.size(); ++j) {
+  void add_neighbours(ModelLinkIndex link) {
+    for (const ModelJointIndex j : model_.joints.indices()) {
       const Joint& joint = model_.joints[j];
-      if (joint.parent < 0 || joint.type == JointType::gearbox) continue;  // others carry its links
-      const auto parent = static_cast<size_t>(joint.parent),
-                 child = static_cast<size_t>(joint.child);
+      if (!joint.parent.valid() || joint.type == JointType::gearbox)
+        continue;  // others carry its links
+      const ModelLinkIndex parent = joint.parent, child = joint.child;
       if (parent == link && !seen_[child])
-        add(child, frame_of_link_[link], static_cast<int>(j), false);
+        add(child, frame_of_link_[link], j, false);
       else if (child == link && !seen_[parent])
-        add(parent, frame_of_link_[link], static_cast<int>(j), true);
+        add(parent, frame_of_link_[link], j, true);
     }
   }
 
-  size_t frame_of_joint(size_t joint) const {
-    const auto found = std::find_if(
-        result_.frames.begin(), result_.frames.end(),
-        [&](const LinkFrame& frame) { return frame.joint == static_cast<int>(joint); });
+  size_t frame_of_joint(ModelJointIndex joint) const {
+    const auto found = std::find_if(result_.frames.begin(), result_.frames.end(),
+                                    [&](const LinkFrame& frame) { return frame.joint == joint; });
     return found == result_.frames.end() || found->motion == Motion::none
                ? 0
                : static_cast<size_t>(found - result_.frames.begin());
   }
 
   void list_moved() {
-    for (const int w : robot_.wheels) {
-      const model::WheelPlacement& wheel = layout_.wheels[static_cast<size_t>(w)];
-      const Joint& joint = model_.joints[static_cast<size_t>(wheel.joint)];
-      const Pose X_LM = model_.links[static_cast<size_t>(joint.child)].X_ML.inverse();
+    for (const WheelIndex w : robot_.wheels) {
+      const model::WheelPlacement& wheel = layout_.wheels[w];
+      const Joint& joint = model_.joints[wheel.joint];
+      const Pose X_LM = model_.links[joint.child].X_ML.inverse();
       const Vec3 axis_in_L = X_LM.rotation * (joint.X_MJ.rotation * joint.axis.axis_in_J);
       result_.wheels.push_back(
-          {frame_of_joint(wheel_joint(w)), axis_in_L.dot(wheel.axis_in_L) < 0 ? -1.0 : 1.0});
+          {frame_of_joint(wheel.joint), axis_in_L.dot(wheel.axis_in_L) < 0 ? -1.0 : 1.0});
     }
-    for (const int j : robot_.joints) result_.joints.push_back({frame_of_joint(joint_of(j))});
+    for (const JointIndex j : robot_.joints)
+      result_.joints.push_back({frame_of_joint(layout_.joints[j].joint)});
     for (const model::SensorDescription& sensor : model_.sensors) {
-      const size_t frame = frame_of_link_[static_cast<size_t>(sensor.link)];
+      const size_t frame = frame_of_link_[sensor.link];
       for (size_t each = frame; each != 0; each = result_.frames[each].parent) {
         if (result_.frames[each].motion != Motion::none) result_.carriers[sensor.name] = frame;
       }
@@ -175,8 +167,9 @@ class Tree {
   const model::BodyLayout& layout_;
   const model::RobotPlacement& robot_;
   RobotFrames result_;
-  std::vector<size_t> frame_of_link_;
-  std::vector<bool> seen_, moves_;
+  IndexedVector<ModelLinkIndex, size_t> frame_of_link_;
+  IndexedVector<ModelLinkIndex, bool> seen_;
+  IndexedVector<ModelJointIndex, bool> moves_;
   std::set<std::string> names_;
 };
 
@@ -195,7 +188,7 @@ std::map<std::string, RobotFrames> robot_frames(const model::WorldModel& world) 
   const model::BodyLayout layout(world);
   std::map<std::string, RobotFrames> robots;
   for (const model::RobotPlacement& robot : layout.robots) {
-    const model::ModelInstance& instance = world.models[static_cast<size_t>(robot.instance)];
+    const model::ModelInstance& instance = world.models[robot.instance];
     if (!instance.removed) robots[instance.name] = Tree(world, layout, robot).result();
   }
   return robots;

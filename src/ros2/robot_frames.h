@@ -17,12 +17,12 @@ namespace ruedo::ros2 {
 struct LinkFrame {
   enum class Motion { none, turn, slide, screw };
 
-  std::string name;   // without the robot's prefix
-  size_t parent = 0;  // index into RobotFrames::frames; of base_link itself 0
-  int link = -1;      // index into Model::links; -1: base_link alone
-  int joint = -1;     // index into Model::joints; -1: tied to its parent by none
-  Pose X_PF;          // in its parent, the joint at 0
-  Pose X_BF, X_MF;    // in base_link and in the model at the start
+  std::string name;       // without the robot's prefix
+  size_t parent = 0;      // index into RobotFrames::frames; of base_link itself 0
+  ModelLinkIndex link;    // none: base_link alone
+  ModelJointIndex joint;  // none: tied to its parent by none
+  Pose X_PF;              // in its parent, the joint at 0
+  Pose X_BF, X_MF;        // in base_link and in the model at the start
   Motion motion = Motion::none;
   Vec3 axis = Vec3::UnitZ();  // in F
   double advance = 0.0;       // m/rad, of a screw

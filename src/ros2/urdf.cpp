@@ -108,8 +108,8 @@ std::string inertial(const model::Inertial& inertial, const Pose& X_FL) {
 
 std::string link_text(const LinkFrame& frame, const model::Model& model) {
   std::string text = "  <link name=\"" + model::escaped(frame.name) + "\">\n";
-  if (frame.link < 0) return "  <link name=\"" + model::escaped(frame.name) + "\"/>\n";
-  const model::Link& link = model.links[static_cast<size_t>(frame.link)];
+  if (!frame.link.valid()) return "  <link name=\"" + model::escaped(frame.name) + "\"/>\n";
+  const model::Link& link = model.links[frame.link];
   const Pose X_FL = frame.X_MF.inverse() * link.X_ML;
   text += inertial(link.inertial, X_FL);
   for (size_t i = 0; i < link.visuals.size(); ++i) {
@@ -143,7 +143,7 @@ std::string limits(const model::JointAxis& axis, bool bounds) {
 }
 
 std::string moving_joint(const LinkFrame& frame, const model::Model& model) {
-  const model::Joint& joint = model.joints[static_cast<size_t>(frame.joint)];
+  const model::Joint& joint = model.joints[frame.joint];
   const bool endless = std::isinf(joint.axis.lower) && std::isinf(joint.axis.upper);
   const char* type = frame.motion == Motion::slide   ? "prismatic"
                      : frame.motion == Motion::screw ? "floating"
@@ -156,8 +156,7 @@ std::string moving_joint(const LinkFrame& frame, const model::Model& model) {
           limits(joint.axis, frame.motion == Motion::slide || !endless);
   if (joint.leader >= 0) {
     text += fmt::format("<mimic joint=\"{}\" multiplier=\"{:.9g}\" offset=\"{:.9g}\"/>",
-                        model::escaped(model.joints[static_cast<size_t>(joint.leader)].name),
-                        joint.mimic_multiplier,
+                        model::escaped(model.joints[joint.leader].name), joint.mimic_multiplier,
                         joint.mimic_offset - joint.mimic_multiplier * joint.mimic_reference);
   }
   return text;
@@ -165,8 +164,8 @@ std::string moving_joint(const LinkFrame& frame, const model::Model& model) {
 
 std::string joint_text(const LinkFrame& frame, const RobotFrames& robot,
                        const model::Model& model) {
-  const std::string tied = frame.joint < 0 ? frame.name + "_to_base_link"
-                                           : model.joints[static_cast<size_t>(frame.joint)].name;
+  const std::string tied =
+      frame.joint.valid() ? model.joints[frame.joint].name : frame.name + "_to_base_link";
   std::string text = frame.motion == Motion::none
                          ? fmt::format("  <joint name=\"{}\" type=\"fixed\">\n    {}",
                                        model::escaped(tied), origin(frame.X_PF))

@@ -214,10 +214,9 @@ Run::Outcome Run::save(const request_t&) {
   const model::BodyLayout& layout = simulation_->layout();
   const EditedWorld::Saved saved = edited_->save(*world_, [&](size_t instance) {
     const model::ModelInstance& model = world_->models[instance];
-    const model::LinkPlacement& link =
-        layout.links[static_cast<size_t>(layout.first_link[instance])];
+    const model::LinkPlacement& link = layout.links[layout.first_link[instance]];
     if (link.body < 0) return link.X_BL * model.model->links[0].X_ML.inverse();
-    return publisher_.latest()->bodies[static_cast<size_t>(link.body)] * link.X_BL *
+    return publisher_.latest()->bodies[link.body] * link.X_BL *
            model.model->links[0].X_ML.inverse();
   });
   if (!saved.fault.empty()) return Outcome::refuse(reply_t::REFUSED, saved.fault);

@@ -36,7 +36,7 @@ void KeptMessages::forget(int64_t step) {
 
 std::span<const uint8_t> KeptMessages::find(int64_t step, int channel, int64_t sequence) const {
   if (steps_.empty() || step < steps_.front().step || step > steps_.back().step) return {};
-  const KeptStep& kept = steps_[static_cast<size_t>(step - steps_.front().step)];
+  const KeptStep& kept = steps_[step - steps_.front().step];
   for (const Entry& entry : kept.entries) {
     if (entry.channel == channel && entry.sequence == sequence)
       return {kept.bytes.data() + entry.offset, entry.size};

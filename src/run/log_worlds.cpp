@@ -44,8 +44,8 @@ std::shared_ptr<const WorldModel> edited(const applied_t& applied,
     case request_t::REMOVE: {
       name_request_t body;
       if (!read_body(applied, body)) return nullptr;
-      const int instance = engine::find_model(*before, body.name);
-      if (instance < 0) return nullptr;
+      const InstanceIndex instance = engine::find_model(*before, body.name);
+      if (!instance.valid()) return nullptr;
       auto world = std::make_shared<WorldModel>(*before);
       engine::WorldEditor(*world).remove(instance);
       return world;
@@ -55,8 +55,8 @@ std::shared_ptr<const WorldModel> edited(const applied_t& applied,
       if (!read_body(applied, body) || !engine::stands_fast(*before, body.name)) return nullptr;
       auto world = std::make_shared<WorldModel>(*before);
       engine::WorldEditor editor(*world);
-      const int instance = engine::find_model(*before, body.name);
-      const auto model = world->models[static_cast<size_t>(instance)].model;
+      const InstanceIndex instance = engine::find_model(*before, body.name);
+      const auto model = world->models[instance].model;
       editor.remove(instance);
       editor.place(body.name, engine::pose_of(body), model);
       return world;
@@ -92,10 +92,10 @@ std::vector<std::vector<uint8_t>> make_info(const log::Index& index, const Logge
     engine::Channels channels(run.remaps);
     std::vector<device_info_t> devices;
     Findings findings;
-    for (size_t r = 0; r < layout.robots.size(); ++r) {
-      if (world->models[static_cast<size_t>(layout.robots[r].instance)].removed) continue;
+    for (const RobotIndex r : layout.robots.indices()) {
+      if (world->models[layout.robots[r].instance].removed) continue;
       const engine::FleetOptions options{
-          .disabled = run.disabled, .keep_going = true, .only_robot = static_cast<int>(r)};
+          .disabled = run.disabled, .keep_going = true, .only_robot = r};
       engine::Fleet fleet = engine::make_fleet(*world, layout, options, channels, findings);
       devices.insert(devices.end(), fleet.devices.begin(), fleet.devices.end());
     }

@@ -34,7 +34,7 @@ class Mode {
     Gate* gate = nullptr;
     const engine::Channels* channels = nullptr;
     SimTime base_us = 0;  // the stamp of sim time 0
-    std::function<std::string(int robot)> robot_name;
+    std::function<std::string(RobotIndex robot)> robot_name;
   };
   // What the run has to do before it goes on.
   struct Turn {

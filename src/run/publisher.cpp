@@ -71,7 +71,7 @@ void Publisher::publish(engine::Simulation& simulation, const engine::Batch& bat
   const SimTime stamp_us = base_us_ + time_us_;
   for (Sink* sink : audience_.steps) sink->begin_step(step);
   simulation.messages(batch, step_, [&](int64_t, int index, const uint8_t* data, size_t size) {
-    int64_t& sequence = sequences_[static_cast<size_t>(index)];
+    int64_t& sequence = sequences_[index];
     const Published message{
         Kind::sample, time_us_, stamp_us, announcement_->channels[index].bus_name,
         index,        sequence, data,     size};

@@ -32,11 +32,14 @@ class QueuedSink : public Sink {
     std::chrono::milliseconds latency{0};  // that a message may wait for others to travel with
   };
 
-  // The sink must outlive it, and is called from the queue's thread alone, but for hears().
+  // The sink must outlive it, and is called from the queue's thread alone, but for hears(), wants()
+  // and audience().
   QueuedSink(Sink& sink, Options options);
   ~QueuedSink() override;  // hands on all there is, then ends the thread
 
   Hears hears() const override { return sink_.hears(); }
+  bool wants(const std::string& channel) const override { return sink_.wants(channel); }
+  uint64_t audience() const override { return sink_.audience(); }
   void announce(const std::shared_ptr<const Announcement>& announcement) override;
   void begin_step(const Step& step) override;
   void message(const Published& message) override;

@@ -220,17 +220,16 @@ Outcome Run::get_state(const request_t&, const name_request_t& body) {
   const model::BodyLayout& layout = simulation_->layout();
   for (size_t i = 0; i < layout.links.size(); ++i) {
     const model::LinkPlacement& placement = layout.links[i];
-    const model::ModelInstance& instance = world_->models[static_cast<size_t>(placement.instance)];
+    const model::ModelInstance& instance = world_->models[placement.instance];
     if (instance.removed) continue;
-    const model::Link& link = instance.model->links[static_cast<size_t>(placement.link)];
+    const model::Link& link = instance.model->links[placement.link];
     const bool whole_model = body.name == instance.name && placement.link == 0;
     if (!whole_model && body.name != instance.name + "/" + link.name) continue;
     Pose X_WL = placement.X_BL;
     Twist twist;
     if (placement.body >= 0) {
-      const Pose& X_WB = publisher_.latest()->bodies[static_cast<size_t>(placement.body)];
-      const Twist& body_twist =
-          publisher_.latest()->body_twists[static_cast<size_t>(placement.body)];
+      const Pose& X_WB = publisher_.latest()->bodies[placement.body];
+      const Twist& body_twist = publisher_.latest()->body_twists[placement.body];
       X_WL = X_WB * placement.X_BL;
       const Pose X_WF = whole_model ? X_WL * link.X_ML.inverse() : X_WL;
       twist.angular = body_twist.angular;
@@ -246,9 +245,9 @@ Outcome Run::get_state(const request_t&, const name_request_t& body) {
 
 Outcome Run::reset_odometry(const request_t& request, const name_request_t& body) {
   const model::BodyLayout& layout = simulation_->layout();
-  for (size_t i = 0; i < layout.robots.size(); ++i) {
-    if (world_->models[static_cast<size_t>(layout.robots[i].instance)].name != body.name) continue;
-    simulation_->inbox().reset_odometry(static_cast<int>(i), request.body);
+  for (const RobotIndex robot : layout.robots.indices()) {
+    if (world_->models[layout.robots[robot].instance].name != body.name) continue;
+    simulation_->inbox().reset_odometry(robot, request.body);
     return {};
   }
   return Outcome::refuse(reply_t::UNKNOWN_NAME, "there is no robot called '" + body.name + "'");

@@ -170,7 +170,7 @@ void Run::publish_what_is_ready() {
 
 void Run::publish(const engine::Batch& batch) {
   for (int i = 0; i < batch.count; ++i) {
-    const Snapshot& state = batch.snapshots[static_cast<size_t>(i)];
+    const Snapshot& state = batch.snapshots[i];
     record_applied(batch, state.step - 1);  // on the state before this one, whose messages are out
     publisher_.publish(*simulation_, batch, state);
     if (on_state_) on_state_(state);
@@ -184,9 +184,9 @@ void Run::publish(const engine::Batch& batch) {
 void Run::record_applied(const engine::Batch& batch, int64_t step) {
   if (!publisher_.has_recorders()) return;
   for (int i = 0; i < batch.applied_count; ++i) {
-    const engine::AppliedCommand& command = batch.applied[static_cast<size_t>(i)];
+    const engine::AppliedCommand& command = batch.applied[i];
     if (command.step != step) continue;
-    const engine::Input& input = simulation_->inbox().inputs()[static_cast<size_t>(command.input)];
+    const engine::Input& input = simulation_->inbox().inputs()[command.input];
     applied_t applied;
     applied.step = step;
     applied.utime = step * world_->step_us;
@@ -265,8 +265,7 @@ std::string Run::takes_no_messages() const {
 }
 
 void Run::tell_watchdog(size_t index) {
-  const model::ModelInstance& robot =
-      world_->models[static_cast<size_t>(simulation_->layout().robots[index].instance)];
+  const model::ModelInstance& robot = world_->models[simulation_->layout().robots[index].instance];
   spdlog::warn(
       "{} was stopped by its watchdog: no command came for {:g} s of sim time. A velocity or wheel "
       "command "

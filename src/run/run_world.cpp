@@ -68,11 +68,9 @@ void Run::announce() {
 }
 
 Mode::Stage Run::stage() {
-  return {&simulation_->inbox(), pacer_.get(), &channels_, publisher_.base_us(), [this](int robot) {
-            return world_
-                ->models[static_cast<size_t>(
-                    simulation_->layout().robots[static_cast<size_t>(robot)].instance)]
-                .name;
+  return {&simulation_->inbox(), pacer_.get(), &channels_, publisher_.base_us(),
+          [this](RobotIndex robot) {
+            return world_->models[simulation_->layout().robots[robot].instance].name;
           }};
 }
 

@@ -95,9 +95,7 @@ class RayMesh {
     }
     double t(const Shear& s) const { return s.sz * ((u * az + v * bz + w * cz) / (u + v + w)); }
   };
-  const Vec3& corner(int triangle, int i) const {
-    return positions_[triangles_[static_cast<size_t>(triangle)][static_cast<size_t>(i)]];
-  }
+  const Vec3& corner(int triangle, int i) const { return positions_[triangles_[triangle][i]]; }
   Seen seen(int triangle, const Vec3& o, const Shear& shear) const {
     return {corner(triangle, 0), corner(triangle, 1), corner(triangle, 2), o, shear};
   }

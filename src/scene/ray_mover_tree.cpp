@@ -28,7 +28,7 @@ void MoverTree::split(int* first, int* last) {
     return;
   }
   const auto center = [&](int mover) -> Vec3 {
-    const Box& box = boxes_[static_cast<size_t>(mover)];
+    const Box& box = boxes_[mover];
     return box.empty() ? Vec3::Zero() : Vec3(0.5 * box.lower + 0.5 * box.upper);
   };
   Box centers;
@@ -51,12 +51,12 @@ double MoverTree::fit() {
   for (size_t i = nodes_.size(); i-- > 0;) {
     Node& node = nodes_[i];
     if (node.second < 0) {
-      node.box = boxes_[static_cast<size_t>(node.mover)];
+      node.box = boxes_[node.mover];
       if (!node.box.empty()) node.box.grow(node.box.rounding());
       continue;
     }
     node.box = nodes_[i + 1].box;
-    node.box.add(nodes_[static_cast<size_t>(node.second)].box);
+    node.box.add(nodes_[node.second].box);
     if (node.box.empty()) continue;
     const Vec3 side = node.box.upper - node.box.lower;
     area += side.x() * side.y() + side.y() * side.z() + side.z() * side.x();

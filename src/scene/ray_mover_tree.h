@@ -72,7 +72,7 @@ void MoverTree::visit(unsigned lanes, const FrameRays& rays, const double* t, Vi
   stack[depth++] = 0;
   while (depth > 0) {
     const int index = stack[--depth];
-    const Node& node = nodes_[static_cast<size_t>(index)];
+    const Node& node = nodes_[index];
     if (!node.box.overlaps(beam)) continue;
     if (node.second < 0) {
       visit(static_cast<size_t>(node.mover), within, beam);

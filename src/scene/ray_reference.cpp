@@ -19,23 +19,23 @@ class ReferenceRayScene : public RayScene {
     for (size_t i = 0; i < bodies_.size(); ++i) bodies_[i] = IntoShape(snapshot.bodies[i]);
     for (size_t i = 0; i < turning_.size(); ++i) {
       const TurningShape& shape = statics_->table.turning[i];
-      turning_[i] = shape.at(snapshot.wheel_angles[static_cast<size_t>(shape.wheel)]);
+      turning_[i] = shape.at(snapshot.wheel_angles[shape.wheel]);
     }
   }
 
-  void cast(std::span<const Ray> rays, std::span<Hit> hits, int ignored_link) const override {
+  void cast(std::span<const Ray> rays, std::span<Hit> hits, LinkIndex ignored_link) const override {
     for (size_t i = 0; i < rays.size(); ++i) hits[i] = cast_one(rays[i], ignored_link);
   }
 
  private:
   IntoShape into_frame(const RayShape& shape) const {
-    return shape.body < 0 ? IntoShape() : bodies_[static_cast<size_t>(shape.body)];
+    return shape.body < 0 ? IntoShape() : bodies_[shape.body];
   }
   const IntoShape& into_shape(const RayShape& shape) const {
-    return shape.turning < 0 ? shape.into : turning_[static_cast<size_t>(shape.turning)];
+    return shape.turning < 0 ? shape.into : turning_[shape.turning];
   }
 
-  Hit cast_one(const Ray& ray, int ignored_link) const {
+  Hit cast_one(const Ray& ray, LinkIndex ignored_link) const {
     if (!usable(ray)) return {};
     const std::vector<RayShape>& shapes = statics_->table.shapes;
     RayBatch batch;
@@ -51,7 +51,7 @@ class ReferenceRayScene : public RayScene {
     }
     if (batch.shape[0] == RayBatch::kNothing) return {};
 
-    const RayShape& shape = shapes[static_cast<size_t>(batch.shape[0])];
+    const RayShape& shape = shapes[batch.shape[0]];
     Hit hit{batch.t[0], shape.link, shape.shape, -ray.direction};
     if (batch.feature[0] == kInside) return hit;
     const IntoShape frame = into_frame(shape), &into = into_shape(shape);

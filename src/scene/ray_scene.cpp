@@ -14,11 +14,11 @@ class EmbreeRayScene : public RayScene {
   explicit EmbreeRayScene(std::shared_ptr<const StaticRayScene> statics);
 
   void update(const Snapshot& snapshot) override;
-  void cast(std::span<const Ray> rays, std::span<Hit> hits, int ignored_link) const override;
+  void cast(std::span<const Ray> rays, std::span<Hit> hits, LinkIndex ignored_link) const override;
 
  private:
   struct Mover {
-    int body = -1;          // index into BodyLayout::bodies
+    BodyIndex body;
     Vec3 center_B, half_B;  // box around its shapes
     IntoShape into;         // world to body
     bool there = false;     // false: its pose is not finite
@@ -34,7 +34,7 @@ class EmbreeRayScene : public RayScene {
 
   std::shared_ptr<const StaticRayScene> statics_;
   std::vector<Mover> bounded_, unbounded_;
-  std::vector<int> mover_of_body_;  // index into bounded_, or ~index into unbounded_
+  IndexedVector<BodyIndex, int> mover_of_body_;  // index into bounded_, or ~index into unbounded_
   std::vector<IntoShape> turning_;  // as RayTable::turning, at the snapshot's wheel angles
   MoverTree tree_;
 };
@@ -44,17 +44,17 @@ EmbreeRayScene::EmbreeRayScene(std::shared_ptr<const StaticRayScene> statics)
   const RayTable& table = statics_->table;
   std::vector<Box> boxes;
   mover_of_body_.resize(table.bodies.size());
-  for (size_t body = 0; body < table.bodies.size(); ++body) {
+  for (const BodyIndex body : table.bodies.indices()) {
     Box box;
     bool fits = true;
     for (const int index : table.bodies[body]) {
-      const Box& of_shape = table.shapes[static_cast<size_t>(index)].box_F;
+      const Box& of_shape = table.shapes[index].box_F;
       fits = fits && fits_tree(of_shape);
       box.add(of_shape);
     }
     if (table.bodies[body].empty()) continue;
     Mover mover;
-    mover.body = static_cast<int>(body);
+    mover.body = body;
     mover.center_B = 0.5 * (box.lower + box.upper);
     mover.half_B = 0.5 * (box.upper - box.lower);
     mover_of_body_[body] =
@@ -73,7 +73,7 @@ EmbreeRayScene::EmbreeRayScene(std::shared_ptr<const StaticRayScene> statics)
 
 void EmbreeRayScene::update(const Snapshot& snapshot) {
   const auto place = [&](Mover& mover) {
-    const Pose& X_WB = snapshot.bodies[static_cast<size_t>(mover.body)];
+    const Pose& X_WB = snapshot.bodies[mover.body];
     mover.into = IntoShape(X_WB);
     mover.there = X_WB.translation.allFinite() && X_WB.rotation.coeffs().allFinite();
   };
@@ -82,15 +82,14 @@ void EmbreeRayScene::update(const Snapshot& snapshot) {
     Mover& mover = bounded_[i];
     place(mover);
     const Eigen::Matrix3d R_WB = mover.into.rotation.transpose();
-    const Vec3 center =
-        snapshot.bodies[static_cast<size_t>(mover.body)].translation + R_WB * mover.center_B;
+    const Vec3 center = snapshot.bodies[mover.body].translation + R_WB * mover.center_B;
     const Vec3 half = R_WB.cwiseAbs() * mover.half_B;
     const Box box{center - half, center + half};
     tree_.box(i) = mover.there ? box : Box{};
   }
   for (size_t i = 0; i < turning_.size(); ++i) {
     const TurningShape& shape = statics_->table.turning[i];
-    turning_[i] = shape.at(snapshot.wheel_angles[static_cast<size_t>(shape.wheel)]);
+    turning_[i] = shape.at(snapshot.wheel_angles[shape.wheel]);
   }
   tree_.refit();
 }
@@ -106,7 +105,7 @@ void EmbreeRayScene::into_body(const Mover& mover, unsigned lanes, const FrameRa
 
 void EmbreeRayScene::test_near(int index, unsigned lanes, const FrameRays& body,
                                RayBatch& batch) const {
-  const RayShape& shape = statics_->table.shapes[static_cast<size_t>(index)];
+  const RayShape& shape = statics_->table.shapes[index];
   unsigned near = lanes;
   if (shape.kind != model::Shape::plane) {
     near = 0;
@@ -115,8 +114,7 @@ void EmbreeRayScene::test_near(int index, unsigned lanes, const FrameRays& body,
       if (near_ball(shape, body.o[lane], body.d[lane])) near |= 1u << lane;
     }
   }
-  const IntoShape& into =
-      shape.turning < 0 ? shape.into : turning_[static_cast<size_t>(shape.turning)];
+  const IntoShape& into = shape.turning < 0 ? shape.into : turning_[shape.turning];
   if (near) test_shape(shape, index, into, near, body, batch);
 }
 
@@ -124,8 +122,7 @@ void EmbreeRayScene::test_unbounded(const Mover& mover, unsigned lanes, RayBatch
   if (!mover.there) return;
   FrameRays body;
   into_body(mover, lanes, batch.world, body);
-  for (const int index : statics_->table.bodies[static_cast<size_t>(mover.body)])
-    test_near(index, lanes, body, batch);
+  for (const int index : statics_->table.bodies[mover.body]) test_near(index, lanes, body, batch);
 }
 
 // Most packets that come near a mover start on it and pass over its wheels: the beam's box in the
@@ -138,8 +135,8 @@ void EmbreeRayScene::test_bounded(size_t bounded, unsigned lanes, const Box& bea
   const Box beam_B{center - half, center + half};
   FrameRays body;
   bool turned = false;
-  for (const int index : statics_->table.bodies[static_cast<size_t>(mover.body)]) {
-    const RayShape& shape = statics_->table.shapes[static_cast<size_t>(index)];
+  for (const int index : statics_->table.bodies[mover.body]) {
+    const RayShape& shape = statics_->table.shapes[index];
     if (shape.link == batch.ignored_link || !shape.box_F.overlaps(beam_B)) continue;
     if (!turned) {
       turned = true;
@@ -160,7 +157,8 @@ void EmbreeRayScene::cast_batch(unsigned lanes, TreeQuery& query) const {
               });
 }
 
-void EmbreeRayScene::cast(std::span<const Ray> rays, std::span<Hit> hits, int ignored_link) const {
+void EmbreeRayScene::cast(std::span<const Ray> rays, std::span<Hit> hits,
+                          LinkIndex ignored_link) const {
   TreeQuery query;
   RayBatch& batch = query.batch;
   batch.ignored_link = ignored_link;
@@ -188,7 +186,7 @@ void EmbreeRayScene::write(const RayBatch& batch, int lane, Hit& hit) const {
     hit = {};
     return;
   }
-  const RayShape& shape = statics_->table.shapes[static_cast<size_t>(batch.shape[lane])];
+  const RayShape& shape = statics_->table.shapes[batch.shape[lane]];
   hit.range = batch.t[lane];
   hit.link = shape.link;
   hit.shape = shape.shape;
@@ -204,14 +202,12 @@ void EmbreeRayScene::write(const RayBatch& batch, int lane, Hit& hit) const {
   }
   const IntoShape* body = nullptr;
   if (shape.body >= 0) {
-    const int mover = mover_of_body_[static_cast<size_t>(shape.body)];
-    body = mover >= 0 ? &bounded_[static_cast<size_t>(mover)].into
-                      : &unbounded_[static_cast<size_t>(~mover)].into;
+    const int mover = mover_of_body_[shape.body];
+    body = mover >= 0 ? &bounded_[mover].into : &unbounded_[~mover].into;
     o = body->point(o);
     d = body->vector(d);
   }
-  const IntoShape& into =
-      shape.turning < 0 ? shape.into : turning_[static_cast<size_t>(shape.turning)];
+  const IntoShape& into = shape.turning < 0 ? shape.into : turning_[shape.turning];
   o = into.point(o);
   d = into.vector(d);
   Vec3 normal = into.vector_back(shape_normal(shape, batch.feature[lane], o + hit.range * d));

@@ -24,7 +24,7 @@ struct Ray {
 struct Hit {
   double range = std::numeric_limits<double>::infinity();  // m; +inf: nothing; 0: the origin is
                                                            // inside a closed shape
-  int link = -1;  // index into BodyLayout::links; -1: nothing
+  LinkIndex link;                                          // none: nothing
   int shape =
       -1;  // index of the struck shape: collision of that link (or visual, as the scene is made)
   Vec3 normal = Vec3::Zero();  // unit, world, towards the ray's origin
@@ -50,12 +50,12 @@ class RayScene {
   virtual void update(const Snapshot& snapshot) = 0;
 
   // Casts rays[i] and writes hits[i]: the nearest hit, ties by the lowest link and shape.
-  // `ignored_link` (an index into BodyLayout::links, -1: none) is not seen: a sensor's own link.
+  // `ignored_link` is not seen: a sensor's own link.
   // Faster for many rays near each other.
   virtual void cast(std::span<const Ray> rays, std::span<Hit> hits,
-                    int ignored_link = -1) const = 0;
+                    LinkIndex ignored_link = {}) const = 0;
 
-  Hit cast(const Ray& ray, int ignored_link = -1) const {
+  Hit cast(const Ray& ray, LinkIndex ignored_link = {}) const {
     Hit hit;
     cast(std::span(&ray, 1), std::span(&hit, 1), ignored_link);
     return hit;

@@ -79,7 +79,7 @@ class StaticRayScene {
   static void test_primitive(const RTCIntersectFunctionNArguments* arguments);
   static void test_closed(const RTCIntersectFunctionNArguments* arguments);
   void cast_inside(unsigned lanes, TreeQuery& query) const;
-  const RayShape& shape(int index) const { return table.shapes[static_cast<size_t>(index)]; }
+  const RayShape& shape(int index) const { return table.shapes[index]; }
 
   std::vector<int> unbounded_, bounded_, closed_;  // indices into table.shapes
   RayTree tree_, closed_tree_;

@@ -51,10 +51,10 @@ RayTable::RayTable(const model::WorldModel& world, const model::BodyLayout& layo
     : bodies(layout.bodies.size()) {
   for (size_t i = 0; i < layout.links.size(); ++i) {
     const model::LinkPlacement& placement = layout.links[i];
-    const model::ModelInstance& instance = world.models[static_cast<size_t>(placement.instance)];
+    const model::ModelInstance& instance = world.models[placement.instance];
     if (instance.removed) continue;
-    const model::Link& link = instance.model->links[static_cast<size_t>(placement.link)];
-    const int link_index = static_cast<int>(i);
+    const model::Link& link = instance.model->links[placement.link];
+    const LinkIndex link_index(i);
     if (visuals) {
       for (size_t v = 0; v < link.visuals.size(); ++v)
         if (link.visuals[v].transparency < 1.0)
@@ -68,7 +68,7 @@ RayTable::RayTable(const model::WorldModel& world, const model::BodyLayout& layo
   }
 }
 
-void RayTable::add(const model::LinkPlacement& link, int link_index, int shape_index,
+void RayTable::add(const model::LinkPlacement& link, LinkIndex link_index, int shape_index,
                    const Pose& X_LShape, const model::Geometry& geometry,
                    const model::BodyLayout& layout, bool visuals, RTCDevice device) {
   RayShape shape;
@@ -129,8 +129,8 @@ void RayTable::add(const model::LinkPlacement& link, int link_index, int shape_i
   }
   if (link.wheel >= 0 && shape.kind != Shape::plane) {
     // Parts fixed to the wheel's own link turn about the same axis, seen from their frame.
-    const model::WheelPlacement& wheel = layout.wheels[static_cast<size_t>(link.wheel)];
-    const Pose X_LWheel = X_FL.inverse() * layout.links[static_cast<size_t>(wheel.link)].X_BL;
+    const model::WheelPlacement& wheel = layout.wheels[link.wheel];
+    const Pose X_LWheel = X_FL.inverse() * layout.links[wheel.link].X_BL;
     const Vec3 axis_in_L = (X_LWheel.rotation * wheel.axis_in_L).normalized(),
                center_in_L = X_LWheel * wheel.center_in_L;
     if (!round_about(shape, X_LS, center_in_L, axis_in_L)) {
@@ -151,7 +151,7 @@ void RayTable::add(const model::LinkPlacement& link, int link_index, int shape_i
   if (shape.body < 0)
     statics.push_back(index);
   else
-    bodies[static_cast<size_t>(shape.body)].push_back(index);
+    bodies[shape.body].push_back(index);
   shapes.push_back(std::move(shape));
 }
 

@@ -31,12 +31,13 @@ struct IntoShape {
 
 struct RayShape {
   model::Shape kind = model::Shape::box;
-  int link = -1, shape = -1;  // as in Hit
-  int body = -1;              // -1: static
-  int turning = -1;           // index into RayTable::turning: its place depends on a wheel's angle
-  IntoShape into;             // at wheel angle 0
-  Vec3 size = Vec3::Zero();   // box: half lengths; sphere, cylinder, capsule, cone: radius, half
-                              // length; ellipsoid: radii
+  LinkIndex link;            // as in Hit
+  int shape = -1;            // likewise
+  BodyIndex body;            // none: static
+  int turning = -1;          // index into RayTable::turning: its place depends on a wheel's angle
+  IntoShape into;            // at wheel angle 0
+  Vec3 size = Vec3::Zero();  // box: half lengths; sphere, cylinder, capsule, cone: radius, half
+                             // length; ellipsoid: radii
   Vec3 normal = Vec3::UnitZ();  // plane
   std::shared_ptr<const RayMesh> mesh;
   Box box_F;                     // around the shape at every wheel angle; empty for a plane
@@ -46,7 +47,7 @@ struct RayShape {
 
 // A shape that is not round about its wheel's axis.
 struct TurningShape {
-  int wheel = -1;   // index into BodyLayout::wheels
+  WheelIndex wheel;
   Pose X_FL, X_LS;  // at angle 0
   Vec3 axis_in_L = Vec3::UnitY();
   Vec3 center_in_L = Vec3::Zero();  // a point on the axis
@@ -58,9 +59,9 @@ struct TurningShape {
 };
 
 struct RayTable {
-  std::vector<RayShape> shapes;          // by (link, shape)
-  std::vector<std::vector<int>> bodies;  // indices into shapes, of each body
-  std::vector<int> statics;              // indices into shapes
+  std::vector<RayShape> shapes;                       // by (link, shape)
+  IndexedVector<BodyIndex, std::vector<int>> bodies;  // indices into shapes
+  std::vector<int> statics;                           // indices into shapes
   std::vector<TurningShape> turning;
 
   // Meshes of static links are given in the world's frame, without a tree. Those of movers are
@@ -69,9 +70,9 @@ struct RayTable {
            RTCDevice device);
 
  private:
-  void add(const model::LinkPlacement& link, int link_index, int shape_index, const Pose& X_LS,
-           const model::Geometry& geometry, const model::BodyLayout& layout, bool visuals,
-           RTCDevice device);
+  void add(const model::LinkPlacement& link, LinkIndex link_index, int shape_index,
+           const Pose& X_LS, const model::Geometry& geometry, const model::BodyLayout& layout,
+           bool visuals, RTCDevice device);
   std::map<std::tuple<const model::Mesh*, double, double, double>, std::shared_ptr<const RayMesh>>
       meshes_;
 };
@@ -84,7 +85,7 @@ struct RayBatch {
   double t[kLanes];   // nearest hit, or the maximum range
   int shape[kLanes];  // index into RayTable::shapes; kNothing: no hit yet
   int feature[kLanes];
-  int ignored_link = -1;
+  LinkIndex ignored_link;
 
   // The last origin that the static closed meshes were asked about, and the first that it is inside
   // of.

@@ -111,7 +111,7 @@ class Builder {
     const Affine M_LP =
         compose(to_affine(visual.X_LV * Pose{pair.rotation, Vec3::Zero()}),
                 (Affine() << Eigen::Matrix3d(pair.scale.asDiagonal()), Vec3::Zero()).finished());
-    const auto& pieces = content_.meshes[static_cast<size_t>(pair.mesh)].pieces;
+    const auto& pieces = content_.meshes[pair.mesh].pieces;
     for (size_t i = 0; i < pieces.size(); ++i) {
       const RenderMesh::Piece& piece = pieces[i];
       if (piece.index_count == 0) continue;
@@ -138,8 +138,7 @@ class Builder {
       if (g.shape == model::Shape::plane) part.casts_shadow = false;
       part.batch = batch(b);
       if (pair.small_mesh != pair.mesh) {
-        const RenderMesh::Piece& small =
-            content_.meshes[static_cast<size_t>(pair.small_mesh)].pieces[i];
+        const RenderMesh::Piece& small = content_.meshes[pair.small_mesh].pieces[i];
         b.mesh = pair.small_mesh;
         b.first_index = small.first_index;
         b.index_count = small.index_count;
@@ -153,7 +152,7 @@ class Builder {
 
   static model::Material own_material(const model::Geometry& g, int index) {
     if (g.mesh && index >= 0 && static_cast<size_t>(index) < g.mesh->materials.size()) {
-      return g.mesh->materials[static_cast<size_t>(index)];
+      return g.mesh->materials[index];
     }
     return {};
   }
@@ -198,35 +197,33 @@ Affine compose(const Affine& a, const Affine& b) {
   return m;
 }
 
-Pose link_pose(const model::BodyLayout& layout, const Snapshot& snapshot, size_t link) {
+Pose link_pose(const model::BodyLayout& layout, const Snapshot& snapshot, LinkIndex link) {
   const model::LinkPlacement& placement = layout.links[link];
-  if (placement.body < 0) return placement.X_BL;
-  return snapshot.bodies[static_cast<size_t>(placement.body)] *
-         layout.link_in_body(static_cast<int>(link), snapshot.wheel_angles);
+  if (!placement.body.valid()) return placement.X_BL;
+  return snapshot.bodies[placement.body] * layout.link_in_body(link, snapshot.wheel_angles);
 }
 
 RenderContent::RenderContent(const model::WorldModel& world, const model::BodyLayout& layout) {
   Builder builder(*this);
   std::map<const model::Link*, int> kinds;  // looked up only
-  std::vector<size_t> label_of_body(layout.bodies.size()), label_of_static(layout.links.size());
+  IndexedVector<BodyIndex, size_t> label_of_body(layout.bodies.size());
+  IndexedVector<LinkIndex, size_t> label_of_static(layout.links.size());
   for (size_t i = 0; i < layout.listed.size(); ++i) {
     const model::ListedBody& listed = layout.listed[i];
-    if (listed.body >= 0)
-      label_of_body[static_cast<size_t>(listed.body)] = i + 1;
+    if (listed.body.valid())
+      label_of_body[listed.body] = i + 1;
     else
-      label_of_static[static_cast<size_t>(listed.link)] = i + 1;
+      label_of_static[listed.link] = i + 1;
   }
   bool first = true;
-  for (size_t i = 0; i < layout.links.size(); ++i) {
+  for (const LinkIndex i : layout.links.indices()) {
     const model::LinkPlacement& placement = layout.links[i];
-    const auto instance = static_cast<size_t>(placement.instance);
-    if (world.models[instance].removed) {
+    if (world.models[placement.instance].removed) {
       kind_of_link.push_back(-1);
       label_of_link.push_back(0);
       continue;
     }
-    const model::Link& link =
-        world.models[instance].model->links[static_cast<size_t>(placement.link)];
+    const model::Link& link = world.models[placement.instance].model->links[placement.link];
     const auto [at, inserted] = kinds.try_emplace(&link, -1);
     if (inserted) {
       RenderLinkKind kind = builder.link_kind(link);
@@ -236,18 +233,17 @@ RenderContent::RenderContent(const model::WorldModel& world, const model::BodyLa
       }
     }
     kind_of_link.push_back(at->second);
-    for (const model::Light& light : link.lights) lights.push_back({light, static_cast<int>(i)});
+    for (const model::Light& light : link.lights) lights.push_back({light, i});
 
-    const size_t label = placement.body >= 0 ? label_of_body[static_cast<size_t>(placement.body)]
-                                             : label_of_static[i];
+    const size_t label =
+        placement.body.valid() ? label_of_body[placement.body] : label_of_static[i];
     label_of_link.push_back(static_cast<uint16_t>(std::min<size_t>(label, 65535)));
 
     if (at->second < 0) continue;
-    const Pose X_WL = placement.body < 0 ? placement.X_BL
-                                         : layout.bodies[static_cast<size_t>(placement.body)].X_WB *
-                                               placement.X_BL;
-    for (const RenderPart& part : link_kinds[static_cast<size_t>(at->second)].parts) {
-      if ((batches[static_cast<size_t>(part.batch)].flags & kGround) != 0) continue;
+    const Pose X_WL = placement.body.valid() ? layout.bodies[placement.body].X_WB * placement.X_BL
+                                             : placement.X_BL;
+    for (const RenderPart& part : link_kinds[at->second].parts) {
+      if ((batches[part.batch].flags & kGround) != 0) continue;
       for (int corner = 0; corner < 8; ++corner) {
         const Vec3 p((corner & 1) != 0 ? part.high.x() : part.low.x(),
                      (corner & 2) != 0 ? part.high.y() : part.low.y(),
@@ -260,7 +256,7 @@ RenderContent::RenderContent(const model::WorldModel& world, const model::BodyLa
       }
     }
   }
-  for (const model::Light& light : world.lights) lights.push_back({light, -1});
+  for (const model::Light& light : world.lights) lights.push_back({light, {}});
   if (lights.empty()) {
     // A world without a light gets a high afternoon sun, so that something can be seen.
     model::Light sun;
@@ -269,7 +265,7 @@ RenderContent::RenderContent(const model::WorldModel& world, const model::BodyLa
     sun.direction = Vec3(-0.5, 0.35, -0.9).normalized();
     sun.diffuse = {0.8f, 0.8f, 0.8f, 1.0f};
     sun.cast_shadows = true;
-    lights.push_back({sun, -1});
+    lights.push_back({sun, {}});
   }
 }
 

@@ -59,7 +59,7 @@ struct RenderLinkKind {
 // A light and what carries it.
 struct RenderLight {
   model::Light light;
-  int link = -1;  // index into BodyLayout::links; -1: the world
+  LinkIndex link;  // none: the world
 };
 
 struct RenderContent {
@@ -67,8 +67,8 @@ struct RenderContent {
   std::vector<std::shared_ptr<const model::Texture>> textures;
   std::vector<Batch> batches;
   std::vector<RenderLinkKind> link_kinds;
-  std::vector<int> kind_of_link;  // of each of BodyLayout::links; -1: nothing to draw
-  std::vector<uint16_t> label_of_link;
+  IndexedVector<LinkIndex, int> kind_of_link;  // -1: nothing to draw
+  IndexedVector<LinkIndex, uint16_t> label_of_link;
   std::vector<RenderLight> lights;
   Bounds bounds{Vec3::Constant(-3.0),
                 Vec3::Constant(3.0)};  // of all that is drawn at the start, but for the ground
@@ -77,6 +77,6 @@ struct RenderContent {
 };
 
 // Where a link is in a snapshot, its wheel's turning included.
-Pose link_pose(const model::BodyLayout& layout, const Snapshot& snapshot, size_t link);
+Pose link_pose(const model::BodyLayout& layout, const Snapshot& snapshot, LinkIndex link);
 
 }  // namespace ruedo::scene

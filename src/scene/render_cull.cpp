@@ -46,28 +46,27 @@ Culler::Culler(const model::BodyLayout& layout, const RenderContent& content)
       content_(content),
       rank_(content.batches.size()),
       M_WL_(layout.links.size()) {
-  for (size_t i = 0; i < layout.links.size(); ++i) {
-    const bool is_static = layout.links[i].body < 0;
+  for (const LinkIndex i : layout.links.indices()) {
+    const bool is_static = !layout.links[i].body.valid();
     if (is_static) M_WL_[i] = to_affine(layout.links[i].X_BL);
     if (content.kind_of_link[i] < 0) continue;
-    visible_links_.push_back(static_cast<uint32_t>(i));
-    (is_static ? static_links_ : moving_links_).push_back(static_cast<uint32_t>(i));
+    visible_links_.push_back(i);
+    (is_static ? static_links_ : moving_links_).push_back(i);
   }
   // Programs change least often, then textures; the ground last, as most of it is hidden by then.
   std::vector<int> order(content.batches.size());
   std::iota(order.begin(), order.end(), 0);
   const auto key = [&](int i) {
-    const Batch& b = content.batches[static_cast<size_t>(i)];
+    const Batch& b = content.batches[i];
     return std::make_tuple(b.flags & kGround, b.flags, b.texture, b.mesh, b.first_index);
   };
   std::sort(order.begin(), order.end(), [&](int a, int b) { return key(a) < key(b); });
-  for (size_t i = 0; i < order.size(); ++i)
-    rank_[static_cast<size_t>(order[i])] = static_cast<int>(i);
+  for (size_t i = 0; i < order.size(); ++i) rank_[order[i]] = static_cast<int>(i);
 }
 
 void Culler::update(const Snapshot& snapshot) {
-  for (size_t i = 0; i < layout_.links.size(); ++i) {
-    if (layout_.links[i].body >= 0) M_WL_[i] = to_affine(scene::link_pose(layout_, snapshot, i));
+  for (const LinkIndex i : layout_.links.indices()) {
+    if (layout_.links[i].body.valid()) M_WL_[i] = to_affine(scene::link_pose(layout_, snapshot, i));
   }
 }
 
@@ -95,9 +94,8 @@ void Culler::collect(const Region& region, const Vec3& origin, double pixels_per
                      bool orthographic, DrawList& list) {
   opaque_.clear();
   transparent_.clear();
-  for (const uint32_t link : visible_links_) {
-    const RenderLinkKind& kind =
-        content_.link_kinds[static_cast<size_t>(content_.kind_of_link[link])];
+  for (const LinkIndex link : visible_links_) {
+    const RenderLinkKind& kind = content_.link_kinds[content_.kind_of_link[link]];
     const Affine& M = M_WL_[link];
     if (!region.touches(M.leftCols<3>() * kind.centre_L + M.col(3), kind.radius)) continue;
     for (const RenderPart& part : kind.parts) {
@@ -110,8 +108,7 @@ void Culler::collect(const Region& region, const Vec3& origin, double pixels_per
       if (pixels < kInvisiblePixels) continue;
       const int batch = pixels < kSmallPixels ? part.small_batch : part.batch;
       (part.transparent ? transparent_ : opaque_)
-          .push_back({rank_[static_cast<size_t>(batch)], batch, static_cast<float>(distance), link,
-                      &part});
+          .push_back({rank_[batch], batch, static_cast<float>(distance), link, &part});
     }
   }
   std::sort(opaque_.begin(), opaque_.end(), [](const Item& a, const Item& b) {
@@ -132,9 +129,8 @@ void Culler::collect_casters(const Region& region, const Vec3& origin, Movers mo
                              DrawList& list) {
   opaque_.clear();
   list.spheres.clear();
-  for (const uint32_t link : movers == Movers::only_static ? static_links_ : moving_links_) {
-    const RenderLinkKind& kind =
-        content_.link_kinds[static_cast<size_t>(content_.kind_of_link[link])];
+  for (const LinkIndex link : movers == Movers::only_static ? static_links_ : moving_links_) {
+    const RenderLinkKind& kind = content_.link_kinds[content_.kind_of_link[link]];
     const Affine& M = M_WL_[link];
     const Vec3 link_centre = M.leftCols<3>() * kind.centre_L + M.col(3);
     if (!region.touches(link_centre, kind.radius)) continue;
@@ -144,7 +140,7 @@ void Culler::collect_casters(const Region& region, const Vec3& origin, Movers mo
           !region.touches(M.leftCols<3>() * part.centre_L + M.col(3), part.radius))
         continue;
       const int batch = part.radius < kCoarseShadowRadius ? part.small_batch : part.batch;
-      opaque_.push_back({rank_[static_cast<size_t>(batch)], batch, 0.0f, link, &part});
+      opaque_.push_back({rank_[batch], batch, 0.0f, link, &part});
     }
   }
   std::sort(opaque_.begin(), opaque_.end(), [](const Item& a, const Item& b) {

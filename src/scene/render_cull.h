@@ -58,7 +58,7 @@ class Culler {
   Culler(const model::BodyLayout& layout, const RenderContent& content);
 
   void update(const Snapshot& snapshot);
-  const Affine& link_pose(size_t link) const { return M_WL_[link]; }
+  const Affine& link_pose(LinkIndex link) const { return M_WL_[link]; }
 
   // Instances are relative to `origin`. pixels_per_radian: for leaving out what is smaller than a
   // pixel and for coarser round shapes; 0: everything in full.
@@ -71,7 +71,7 @@ class Culler {
   struct Item {
     int rank, batch;
     float distance;
-    uint32_t link;
+    LinkIndex link;
     const RenderPart* part;
   };
   void append(std::vector<Item>& items, const Vec3& origin, std::vector<Run>& runs,
@@ -80,8 +80,8 @@ class Culler {
   const model::BodyLayout& layout_;
   const RenderContent& content_;
   std::vector<int> rank_;  // of a batch: the drawing order
-  std::vector<Affine> M_WL_;
-  std::vector<uint32_t> visible_links_, moving_links_, static_links_;  // with something to draw
+  IndexedVector<LinkIndex, Affine> M_WL_;
+  std::vector<LinkIndex> visible_links_, moving_links_, static_links_;  // with something to draw
   std::vector<Item> opaque_, transparent_;
 };
 

@@ -139,10 +139,10 @@ void RenderDevice::upload(const RenderMesh& mesh) {
 }
 
 const RenderDevice::TextureState& RenderDevice::texture(int index) {
-  TextureState& state = textures_[static_cast<size_t>(index)];
+  TextureState& state = textures_[index];
   if (state.tried) return state;
   state.tried = true;
-  const TexturePixels pixels = decode_texture(*content_.textures[static_cast<size_t>(index)]);
+  const TexturePixels pixels = decode_texture(*content_.textures[index]);
   if (pixels.width == 0) return state;
   state.holes = pixels.holes;
   gl.GenTextures(1, &state.name);
@@ -286,7 +286,7 @@ void RenderDevice::set_shadow_state(int size) {
 }
 
 void RenderDevice::draw_run(Pass pass, const Run& run) {
-  const Batch& batch = content_.batches[static_cast<size_t>(run.batch)];
+  const Batch& batch = content_.batches[run.batch];
   uint32_t flags = batch.flags;
   bool cutout = false;
   if (batch.texture >= 0 && pass != Pass::shadow) {
@@ -309,7 +309,7 @@ void RenderDevice::draw_run(Pass pass, const Run& run) {
   // Rows go from the top, so that pictures need no turning: outside is clockwise in OpenGL's
   // window.
   gl.FrontFace((flags & kMirrored) != 0 ? GL_CCW : GL_CW);
-  gl.BindVertexArray(meshes_[static_cast<size_t>(batch.mesh)].vertex_array);
+  gl.BindVertexArray(meshes_[batch.mesh].vertex_array);
   const size_t at = run.first * sizeof(Instance);
   const auto attribute = [&](GLuint index, size_t member) {
     gl.VertexAttribPointer(index, 4, GL_FLOAT, GL_FALSE, sizeof(Instance), offset(at + member));

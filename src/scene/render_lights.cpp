@@ -70,7 +70,7 @@ void RenderLights::fill(const Culler& culler, const View& view, FrameBlock& fram
   }
   const auto pose_of = [&](const RenderLight& light) {
     const Affine M = to_affine(light.light.pose);
-    return light.link < 0 ? M : compose(culler.link_pose(static_cast<size_t>(light.link)), M);
+    return light.link.valid() ? compose(culler.link_pose(light.link), M) : M;
   };
   for (size_t i = 0; i < suns_.size(); ++i) {
     const Affine M = pose_of(*suns_[i]);

@@ -86,7 +86,7 @@ class BoxesCamera : public Sensor {
           kind_ == Kind::full ? projected(instance, input.snapshot) : seen.pixels;
       box_2d_t& box = boxes_.boxes.emplace_back();
       box.label = seen.label;
-      box.name = world_.models[static_cast<size_t>(instance)].name;
+      box.name = world_.models[instance].name;
       box.x = around.center().x();
       box.y = around.center().y();
       // A pixel is as wide as itself; projected edges lie where they lie.
@@ -109,7 +109,7 @@ class BoxesCamera : public Sensor {
                   [&](const Vec3& p_M) { around.extend(p_M); });
       box_3d_t& box = solids_.boxes.emplace_back();
       box.label = seen.label;
-      box.name = world_.models[static_cast<size_t>(instance)].name;
+      box.name = world_.models[instance].name;
       const Vec3 center = X_CM * Vec3(around.center());
       const Vec3 size = around.sizes();
       const Quat& q = X_CM.rotation;
@@ -124,11 +124,11 @@ class BoxesCamera : public Sensor {
 
   // Visits the corners of the boxes of a model's labelled visuals, in the frame F; X_FW.
   template <class Visit>
-  void each_corner(int instance, const Snapshot& now, const Pose& X_FW, const Visit& visit) const {
-    const model::Model& model = *world_.models[static_cast<size_t>(instance)].model;
-    const int first = layout_.first_link[static_cast<size_t>(instance)];
-    for (size_t i = 0; i < model.links.size(); ++i) {
-      const Pose X_FL = X_FW * link_pose(layout_, first + static_cast<int>(i), now);
+  void each_corner(InstanceIndex instance, const Snapshot& now, const Pose& X_FW,
+                   const Visit& visit) const {
+    const model::Model& model = *world_.models[instance].model;
+    for (const ModelLinkIndex i : model.links.indices()) {
+      const Pose X_FL = X_FW * link_pose(layout_, layout_.link_of(instance, i), now);
       for (const model::Visual& visual : model.links[i].visuals) {
         const Eigen::AlignedBox3d box = model::bounds(visual.geometry);
         if (visual.label == 0 || box.isEmpty()) continue;
@@ -139,7 +139,7 @@ class BoxesCamera : public Sensor {
     }
   }
 
-  Rectangle projected(int instance, const Snapshot& now) const {
+  Rectangle projected(InstanceIndex instance, const Snapshot& now) const {
     Rectangle around;
     each_corner(instance, now, view_.pose(now).inverse(), [&](Vec3 p) {
       p.x() = std::max(p.x(), view_.lens().near_m);
@@ -156,7 +156,7 @@ class BoxesCamera : public Sensor {
   int channel_;
   CameraView view_;
   SeenThings things_;
-  std::map<int, Seen> seen_;  // by instance: in the order of the world
+  std::map<InstanceIndex, Seen> seen_;  // by instance: in the order of the world
   boxes_2d_t boxes_;
   boxes_3d_t solids_;
 };
@@ -170,7 +170,8 @@ const RegisterSensor kRegister{
      .default_rate = {30, 1},
      .needs_renderer = true,
      .make = [](const SensorSetup& setup) { return std::make_unique<BoxesCamera>(setup); },
-     .kind = "boundingbox_camera"}};
+     .kind = "boundingbox_camera",
+     .settings = camera_settings}};
 
 }  // namespace
 }  // namespace ruedo

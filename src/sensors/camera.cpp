@@ -44,7 +44,7 @@ class Camera : public Sensor {
     const Element& camera = camera_of(setup);
     element.refuse_unknown({"ruedo:encoding", "ruedo:quality", "ruedo:depth", "ruedo:labels",
                             "ruedo:exposure", "ruedo:vignetting", "ruedo:phase"});
-    const model::LinkPlacement& link = setup.layout.links[static_cast<size_t>(setup.link)];
+    const model::LinkPlacement& link = setup.layout.links[setup.link];
     body_ = link.body;
     X_LC_ = setup.X_LS * camera.pose("pose");
     X_BC_ = link.X_BL * X_LC_;
@@ -93,9 +93,9 @@ class Camera : public Sensor {
 
  private:
   Pose X_WC(const Snapshot& now) const {
-    if (body_ < 0) return X_BC_;
-    const Pose& X_WB = now.bodies[static_cast<size_t>(body_)];
-    const bool on_wheel = layout_->links[static_cast<size_t>(link_)].wheel >= 0;
+    if (!body_.valid()) return X_BC_;
+    const Pose& X_WB = now.bodies[body_];
+    const bool on_wheel = layout_->links[link_].wheel.valid();
     return on_wheel ? X_WB * layout_->link_in_body(link_, now.wheel_angles) * X_LC_ : X_WB * X_BC_;
   }
 
@@ -204,10 +204,10 @@ class Camera : public Sensor {
   PixelNoise noise_;
   Vignette vignette_;
   int channel_, info_channel_, depth_channel_ = -1, labels_channel_ = -1;
-  int body_ = -1;  // into BodyLayout::bodies; -1: does not move
-  Pose X_BC_;      // X_WC when it does not move
+  BodyIndex body_;  // none: does not move
+  Pose X_BC_;       // X_WC when it does not move
   const model::BodyLayout* layout_ = nullptr;
-  int link_ = -1;  // into BodyLayout::links
+  LinkIndex link_;
   Pose X_LC_;
   Encoding encoding_ = Encoding::jpeg;
   bool grey_ = false;
@@ -222,6 +222,14 @@ class Camera : public Sensor {
   camera_info_t info_;
 };
 
+std::vector<std::string> settings_of(const std::string& type) {
+  std::vector<std::string> keys = camera_settings(type);
+  for (std::string& key : noise_settings("camera.noise")) keys.push_back(std::move(key));
+  for (const char* each : {"encoding", "quality", "depth", "labels", "exposure", "vignetting"})
+    keys.push_back(std::string("ruedo:") + each);
+  return keys;
+}
+
 const RegisterSensor kRegister{
     {.module = "camera",
      .order = 4,
@@ -230,7 +238,8 @@ const RegisterSensor kRegister{
      .device_name = "",
      .default_rate = {30, 1},
      .needs_renderer = true,
-     .make = [](const SensorSetup& setup) { return std::make_unique<Camera>(setup); }}};
+     .make = [](const SensorSetup& setup) { return std::make_unique<Camera>(setup); },
+     .settings = settings_of}};
 
 }  // namespace
 }  // namespace ruedo

@@ -46,6 +46,11 @@ void name_rest_of_camera(const SensorSetup& setup, const std::vector<std::string
   }
 }
 
+std::vector<std::string> camera_settings(const std::string&) {
+  return {"camera.horizontal_fov", "camera.image.width", "camera.image.height",
+          "camera.image.format",   "camera.clip.near",   "camera.clip.far"};
+}
+
 CameraView::CameraView(const SensorSetup& setup, const std::vector<std::string>& own)
     : lens_(camera_of(setup)),
       mount_(setup, camera_of(setup).pose("pose")),

@@ -22,6 +22,9 @@ const Element& camera_of(const SensorSetup& setup);
 // no camera reads, or no <camera> has, was named when the file was read.
 void name_rest_of_camera(const SensorSetup& setup, const std::vector<std::string>& read);
 
+// SensorKind::settings that every camera has.
+std::vector<std::string> camera_settings(const std::string& type);
+
 class CameraView {
  public:
   // own: children of <camera> that the sensor reads itself.

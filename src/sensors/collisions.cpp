@@ -27,7 +27,7 @@ class Collisions : public Sensor {
   bool observes() const override { return true; }
 
   void observe(const Snapshot& now, Outbox& out) override {
-    const int blocked_by = now.robots[static_cast<size_t>(robot_)].motion.blocked_by;
+    const LinkIndex blocked_by = now.robots[robot_].motion.blocked_by;
     if (now.collisions.empty() && blocked_by == blocked_by_) return;
     const bool news = gather(now) || blocked_by != blocked_by_;
     blocked_by_ = blocked_by;
@@ -45,11 +45,11 @@ class Collisions : public Sensor {
   static constexpr size_t kUsual = 8;
 
   struct Touched {
-    int link;  // the other's, index into BodyLayout::links
+    LinkIndex link;  // the other's
     int64_t step;
   };
   struct Point {
-    int link;
+    LinkIndex link;
     Contact contact;
     bool as_a;
   };
@@ -61,8 +61,8 @@ class Collisions : public Sensor {
                          [](const Collision& a, const Collision& b) { return a.robot < b.robot; });
     bool news = false;
     for (auto each = own.first; each != own.second; ++each) {
-      const Contact& contact = now.contacts[static_cast<size_t>(each->contact)];
-      const int link = each->as_a ? contact.link_b : contact.link_a;
+      const Contact& contact = now.contacts[each->contact];
+      const LinkIndex link = each->as_a ? contact.link_b : contact.link_a;
       auto known = std::find_if(touched_.begin(), touched_.end(),
                                 [link](const Touched& one) { return one.link == link; });
       if (known == touched_.end()) {
@@ -108,12 +108,12 @@ class Collisions : public Sensor {
 
   const model::WorldModel& world_;
   const model::BodyLayout& layout_;
-  int robot_;
+  RobotIndex robot_;
   int channel_;
-  int blocked_by_ = -1;
+  LinkIndex blocked_by_;
   std::vector<Touched> touched_;  // since the last message, in the order in which it came
   std::vector<Point> points_;     // of each, at the last step at which it was touched
-  std::vector<int> told_;         // links in the last message
+  std::vector<LinkIndex> told_;   // links in the last message
   int64_t shown_step_ = -1;
   collisions_t message_;
 };

@@ -26,11 +26,9 @@ class ContactSensor : public Sensor {
     setup.element.refuse_unknown({"ruedo:phase"});  // the server reads it
     const Element* contact = setup.element.child("contact");
     if (!contact) return;
-    const model::LinkPlacement& placement = layout_.links[static_cast<size_t>(link_)];
+    const model::LinkPlacement& placement = layout_.links[link_];
     const std::vector<model::Collision>& shapes =
-        world_.models[static_cast<size_t>(placement.instance)]
-            .model->links[static_cast<size_t>(placement.link)]
-            .collisions;
+        world_.models[placement.instance].model->links[placement.link].collisions;
     for (const Element* named : contact->all("collision")) {
       const std::string name = without_scope(named->text);
       const auto found =
@@ -91,7 +89,7 @@ class ContactSensor : public Sensor {
 
   const model::WorldModel& world_;
   const model::BodyLayout& layout_;
-  int link_;
+  LinkIndex link_;
   int channel_;
   std::vector<int> shapes_;  // indices into the link's collisions; empty: all
   bool pressed_ = false;

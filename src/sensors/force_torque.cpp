@@ -29,15 +29,17 @@ std::array<std::string, 6> noise_paths() {
 }
 
 // The links of a model that hang together when one joint is cut.
-std::vector<bool> side(const model::Model& model, int link, int cut) {
-  std::vector<bool> in(model.links.size(), false);
-  in[static_cast<size_t>(link)] = true;
+using Side = IndexedVector<ModelLinkIndex, bool>;
+
+Side side(const model::Model& model, ModelLinkIndex link, ModelJointIndex cut) {
+  Side in(model.links.size());
+  in[link] = true;
   for (bool grown = true; grown;) {
     grown = false;
-    for (size_t j = 0; j < model.joints.size(); ++j) {
+    for (const ModelJointIndex j : model.joints.indices()) {
       const Joint& joint = model.joints[j];
-      if (static_cast<int>(j) == cut || joint.parent < 0) continue;
-      const size_t a = static_cast<size_t>(joint.parent), b = static_cast<size_t>(joint.child);
+      if (j == cut || !joint.parent.valid()) continue;
+      const ModelLinkIndex a = joint.parent, b = joint.child;
       if (in[a] == in[b]) continue;
       in[a] = in[b] = grown = true;
     }
@@ -58,8 +60,8 @@ class ForceTorque : public Sensor {
     frame_ = setup.element.choice("force_torque/frame", "child", {"child", "parent", "sensor"});
     by_parent_ = setup.element.choice("force_torque/measure_direction", "child_to_parent",
                                       {"child_to_parent", "parent_to_child"}) == "parent_to_child";
-    instance_ = layout_.links[static_cast<size_t>(setup.link)].instance;
-    model_ = setup.world.models[static_cast<size_t>(instance_)].model.get();
+    instance_ = layout_.links[setup.link].instance;
+    model_ = setup.world.models[instance_].model.get();
     find_joint(setup);
     choose_side(setup);
   }
@@ -71,11 +73,11 @@ class ForceTorque : public Sensor {
     const double dt_s = 1e-6 * static_cast<double>(now.time - time_);
     omega_.resize(now.bodies.size(), Vec3::Zero());
     alpha_.resize(now.bodies.size(), Vec3::Zero());
-    for (const int body : bodies_) {
-      const size_t b = static_cast<size_t>(body);
-      const Vec3& omega = now.body_twists[b].angular;
-      alpha_[b] = first || dt_s <= 0.0 ? Vec3(Vec3::Zero()) : Vec3((omega - omega_[b]) / dt_s);
-      omega_[b] = omega;
+    for (const BodyIndex body : bodies_) {
+      const Vec3& omega = now.body_twists[body].angular;
+      alpha_[body] =
+          first || dt_s <= 0.0 ? Vec3(Vec3::Zero()) : Vec3((omega - omega_[body]) / dt_s);
+      omega_[body] = omega;
     }
     time_ = now.time;
   }
@@ -86,7 +88,7 @@ class ForceTorque : public Sensor {
     const Pose X_WC = link_pose(now, child_);
     const Vec3 p_WJ = X_WC * p_CJ_;
     Vec3 force = Vec3::Zero(), torque = Vec3::Zero();  // on the weighed side, world
-    for (const int link : weighed_) weigh(now, link, p_WJ, force, torque);
+    for (const LinkIndex link : weighed_) weigh(now, link, p_WJ, force, torque);
     for (const Contact& contact : now.contacts) take_contact(contact, p_WJ, force, torque);
     // So far what the other side puts on this one.
     if (weighs_child_ != by_parent_) force = -force, torque = -torque;
@@ -113,53 +115,48 @@ class ForceTorque : public Sensor {
     for (const model::SensorDescription& sensor : model_->sensors) {
       if (sensor.name == setup.device) joint_ = sensor.joint;
     }
-    if (joint_ < 0) {  // on a link: in the joint that carries the link
-      const int link = layout_.links[static_cast<size_t>(setup.link)].link;
-      for (size_t j = 0; j < model_->joints.size() && joint_ < 0; ++j) {
-        if (model_->joints[j].child == link) joint_ = static_cast<int>(j);
-      }
+    if (!joint_.valid()) {  // on a link: in the joint that carries the link
+      const ModelLinkIndex link = layout_.links[setup.link].link;
+      const auto carries = std::find_if(model_->joints.begin(), model_->joints.end(),
+                                        [&](const Joint& joint) { return joint.child == link; });
+      if (carries != model_->joints.end())
+        joint_ = ModelJointIndex(carries - model_->joints.begin());
     }
-    if (joint_ < 0)
+    if (!joint_.valid())
       setup.element.fail("a force-torque sensor stands in a <joint>, or on a joint's child");
   }
 
-  int layout_link(int link) const {
-    return layout_.first_link[static_cast<size_t>(instance_)] + link;
-  }
-
   // Held by what tells no force.
-  bool held(const std::vector<bool>& in, int cut) const {
-    for (size_t j = 0; j < model_->joints.size(); ++j) {
+  bool held(const Side& in, ModelJointIndex cut) const {
+    for (const ModelJointIndex j : model_->joints.indices()) {
       const Joint& joint = model_->joints[j];
-      if (static_cast<int>(j) != cut && joint.parent < 0 && in[static_cast<size_t>(joint.child)])
-        return true;
+      if (j != cut && !joint.parent.valid() && in[joint.child]) return true;
     }
     const bool driven = model_->drive && model_->drive->kind == DriveDescription::Kind::kinematic;
     const DriveDescription* drive = driven ? &*model_->drive : nullptr;
     const bool wheelless = drive && drive->left_joints.empty() && drive->right_joints.empty();
-    for (size_t i = 0; i < in.size(); ++i) {
-      const model::LinkPlacement& link =
-          layout_.links[static_cast<size_t>(layout_link(static_cast<int>(i)))];
+    for (const ModelLinkIndex i : in.indices()) {
+      const model::LinkPlacement& link = layout_.links[layout_.link_of(instance_, i)];
       if (!in[i]) continue;
       if (model_->is_static || model_->links[i].kinematic) return true;
-      if (driven && (link.wheel >= 0 || (wheelless && i == 0))) return true;
+      if (driven && (link.wheel.valid() || (wheelless && i == 0))) return true;
     }
     return false;
   }
 
   void choose_side(const SensorSetup& setup) {
-    const Joint& joint = model_->joints[static_cast<size_t>(joint_)];
-    child_ = layout_link(joint.child);
-    parent_ = joint.parent < 0 ? -1 : layout_link(joint.parent);
-    const Pose& X_MC = model_->links[static_cast<size_t>(joint.child)].X_ML;
+    const Joint& joint = model_->joints[joint_];
+    child_ = layout_.link_of(instance_, joint.child);
+    if (joint.parent.valid()) parent_ = layout_.link_of(instance_, joint.parent);
+    const Pose& X_MC = model_->links[joint.child].X_ML;
     p_CJ_ = (X_MC.inverse() * joint.X_MJ).translation;
     X_CS_ = setup.X_LS;
-    const std::vector<bool> with_child = side(*model_, joint.child, joint_);
-    const bool loop = joint.parent >= 0 && with_child[static_cast<size_t>(joint.parent)];
+    const Side with_child = side(*model_, joint.child, joint_);
+    const bool loop = joint.parent.valid() && with_child[joint.parent];
     if (!loop && !held(with_child, joint_)) {
       take_side(with_child, true);
-    } else if (!loop && joint.parent >= 0) {
-      const std::vector<bool> with_parent = side(*model_, joint.parent, joint_);
+    } else if (!loop && joint.parent.valid()) {
+      const Side with_parent = side(*model_, joint.parent, joint_);
       if (!held(with_parent, joint_)) take_side(with_parent, false);
     }
     if (weighed_.empty() && setup.findings) {
@@ -170,38 +167,38 @@ class ForceTorque : public Sensor {
     }
   }
 
-  void take_side(const std::vector<bool>& in, bool child) {
+  void take_side(const Side& in, bool child) {
     weighs_child_ = child;
-    for (size_t i = 0; i < in.size(); ++i) {
+    for (const ModelLinkIndex i : in.indices()) {
       if (!in[i]) continue;
-      weighed_.push_back(layout_link(static_cast<int>(i)));
-      const int body = layout_.links[static_cast<size_t>(weighed_.back())].body;
-      if (body >= 0 && std::find(bodies_.begin(), bodies_.end(), body) == bodies_.end())
+      weighed_.push_back(layout_.link_of(instance_, i));
+      const BodyIndex body = layout_.links[weighed_.back()].body;
+      if (body.valid() && std::find(bodies_.begin(), bodies_.end(), body) == bodies_.end())
         bodies_.push_back(body);
     }
   }
 
-  Pose link_pose(const Snapshot& now, int link) const {
-    const model::LinkPlacement& placement = layout_.links[static_cast<size_t>(link)];
-    if (placement.body < 0) return placement.X_BL;
-    return now.bodies[static_cast<size_t>(placement.body)] *
-           layout_.link_in_body(link, now.wheel_angles);
+  Pose link_pose(const Snapshot& now, LinkIndex link) const {
+    const model::LinkPlacement& placement = layout_.links[link];
+    if (!placement.body.valid()) return placement.X_BL;
+    return now.bodies[placement.body] * layout_.link_in_body(link, now.wheel_angles);
   }
 
   Quat axes(const Snapshot& now, const Pose& X_WC) const {
     if (frame_ == "sensor") return X_WC.rotation * X_CS_.rotation;
     if (frame_ == "child") return X_WC.rotation;
-    return parent_ < 0 ? Quat::Identity() : link_pose(now, parent_).rotation;
+    return parent_.valid() ? link_pose(now, parent_).rotation : Quat::Identity();
   }
 
   // Adds what moves a link as it moves, against gravity.
-  void weigh(const Snapshot& now, int link, const Vec3& p_WJ, Vec3& force, Vec3& torque) const {
-    const model::LinkPlacement& placement = layout_.links[static_cast<size_t>(link)];
-    const model::Link& described = model_->links[static_cast<size_t>(placement.link)];
+  void weigh(const Snapshot& now, LinkIndex link, const Vec3& p_WJ, Vec3& force,
+             Vec3& torque) const {
+    const model::LinkPlacement& placement = layout_.links[link];
+    const model::Link& described = model_->links[placement.link];
     const Pose X_WI = link_pose(now, link) * described.inertial.X_LI;
     Vec3 a = Vec3::Zero(), omega = Vec3::Zero(), alpha = Vec3::Zero();
-    if (placement.body >= 0) {  // else it is fixed to the world
-      const size_t body = static_cast<size_t>(placement.body);
+    if (placement.body.valid()) {  // else it is fixed to the world
+      const BodyIndex body = placement.body;
       const Vec3 arm = X_WI.translation - now.bodies[body].translation;
       omega = omega_[body];
       alpha = alpha_[body];
@@ -218,7 +215,7 @@ class ForceTorque : public Sensor {
   // Takes off what contacts put on the weighed links.
   void take_contact(const Contact& contact, const Vec3& p_WJ, Vec3& force, Vec3& torque) const {
     const Vec3 on_a = contact.force * contact.normal + contact.friction;
-    for (const int link : weighed_) {
+    for (const LinkIndex link : weighed_) {
       const double sign = (contact.link_a == link) - (contact.link_b == link);
       if (sign == 0.0) continue;
       force -= sign * on_a;
@@ -233,15 +230,15 @@ class ForceTorque : public Sensor {
   int channel_;
   std::string frame_;
   bool by_parent_ = false;
-  int instance_ = -1;
-  int joint_ = -1;                // into Model::joints
-  int child_ = -1, parent_ = -1;  // into BodyLayout::links; -1: the world
-  Vec3 p_CJ_ = Vec3::Zero();      // the joint's origin in the child
+  InstanceIndex instance_;
+  ModelJointIndex joint_;
+  LinkIndex child_, parent_;  // parent: none is the world
+  Vec3 p_CJ_ = Vec3::Zero();  // the joint's origin in the child
   Pose X_CS_;
   bool weighs_child_ = true;
-  std::vector<int> weighed_;         // into BodyLayout::links; empty: there is no value
-  std::vector<int> bodies_;          // theirs
-  std::vector<Vec3> omega_, alpha_;  // of bodies, world
+  std::vector<LinkIndex> weighed_;                // empty: there is no value
+  std::vector<BodyIndex> bodies_;                 // theirs
+  IndexedVector<BodyIndex, Vec3> omega_, alpha_;  // world
   SimTime time_ = 0;
 };
 

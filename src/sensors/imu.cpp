@@ -18,16 +18,16 @@ class Imu : public Sensor {
  public:
   explicit Imu(const SensorSetup& setup)
       : random_(setup.random), gravity_(setup.world.gravity), channel_(setup.channel<imu_t>()) {
-    const model::LinkPlacement& link = setup.layout.links[static_cast<size_t>(setup.link)];
+    const model::LinkPlacement& link = setup.layout.links[setup.link];
     body_ = link.body;
     X_LS_ = setup.X_LS;
     X_BS_ = link.X_BL * X_LS_;
-    if (body_ >= 0 && link.wheel >= 0) {
+    if (body_.valid() && link.wheel.valid()) {
       layout_ = &setup.layout;
       link_ = setup.link;
-      wheel_ = static_cast<size_t>(link.wheel);
+      wheel_ = link.wheel;
       const model::WheelPlacement& wheel = layout_->wheels[wheel_];
-      const Pose& X_BWheel = layout_->links[static_cast<size_t>(wheel.link)].X_BL;
+      const Pose& X_BWheel = layout_->links[wheel.link].X_BL;
       hub_B_ = X_BWheel * wheel.center_in_L;
       axis_B_ = X_BWheel.rotation * wheel.axis_in_L;
     }
@@ -36,10 +36,10 @@ class Imu : public Sensor {
   }
 
   // For alpha.
-  bool observes() const override { return body_ >= 0; }
+  bool observes() const override { return body_.valid(); }
 
   void observe(const Snapshot& now, Outbox&) override {
-    const Vec3& of_body = now.body_twists[static_cast<size_t>(body_)].angular;
+    const Vec3& of_body = now.body_twists[body_].angular;
     const Vec3 omega = of_body + of_wheel(now);
     if (time_ >= 0 && now.time > time_) {
       const double dt_s = 1e-6 * static_cast<double>(now.time - time_);
@@ -60,13 +60,12 @@ class Imu : public Sensor {
     const Snapshot& now = input.snapshot;
     Pose X_WS = X_BS_;
     Vec3 omega = Vec3::Zero(), acceleration = Vec3::Zero();  // of S, in the world's axes
-    if (body_ >= 0) {
-      const size_t body = static_cast<size_t>(body_);
-      const Pose& X_WB = now.bodies[body];
+    if (body_.valid()) {
+      const Pose& X_WB = now.bodies[body_];
       const Pose X_BS = layout_ ? layout_->link_in_body(link_, now.wheel_angles) * X_LS_ : X_BS_;
       X_WS = X_WB * X_BS;
-      acceleration = now.body_accelerations[body];
-      omega = now.body_twists[body].angular;
+      acceleration = now.body_accelerations[body_];
+      omega = now.body_twists[body_].angular;
       if (layout_) {
         const Vec3 hub = X_WB.rotation * hub_B_;
         acceleration += alpha_of_body_.cross(hub) + omega.cross(omega.cross(hub));
@@ -99,7 +98,7 @@ class Imu : public Sensor {
   // rad/s, world: what the wheel turns the device more than the body does.
   Vec3 of_wheel(const Snapshot& now) const {
     if (!layout_) return Vec3::Zero();
-    return now.bodies[static_cast<size_t>(body_)].rotation * (now.wheel_rates[wheel_] * axis_B_);
+    return now.bodies[body_].rotation * (now.wheel_rates[wheel_] * axis_B_);
   }
 
   void configure(const Element& imu, const SensorSetup& setup) {
@@ -138,11 +137,11 @@ class Imu : public Sensor {
   RandomSource random_;
   Vec3 gravity_;
   int channel_;
-  int body_ = -1;                              // into BodyLayout::bodies; -1: does not move
+  BodyIndex body_;                             // none: does not move
   Pose X_LS_, X_BS_;                           // X_BS_: X_WS when it does not move
   const model::BodyLayout* layout_ = nullptr;  // only when a wheel of that body turns the device
-  int link_ = -1;
-  size_t wheel_ = 0;
+  LinkIndex link_;
+  WheelIndex wheel_;
   Vec3 hub_B_ = Vec3::Zero(), axis_B_ = Vec3::Zero();  // p_BH; unit
   bool has_orientation_ = true;
   Noise gyroscope_[3], accelerometer_[3];

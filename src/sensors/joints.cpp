@@ -10,14 +10,11 @@ namespace {
 class Joints : public Sensor {
  public:
   explicit Joints(const SensorSetup& setup) : channel_(setup.channel<joint_state_t>()) {
-    const model::RobotPlacement& robot =
-        setup.layout.robots[static_cast<size_t>(setup.robot_index)];
-    const model::Model& model = *setup.world.models[static_cast<size_t>(robot.instance)].model;
+    const model::RobotPlacement& robot = setup.layout.robots[setup.robot_index];
+    const model::Model& model = *setup.world.models[robot.instance].model;
     joints_ = robot.joints;
-    for (const int joint : joints_) {
-      message_.joint_name.push_back(
-          model.joints[static_cast<size_t>(setup.layout.joints[static_cast<size_t>(joint)].joint)]
-              .name);
+    for (const JointIndex joint : joints_) {
+      message_.joint_name.push_back(model.joints[setup.layout.joints[joint].joint].name);
     }
     message_.num_joints = static_cast<int16_t>(joints_.size());
     message_.joint_position.resize(joints_.size());
@@ -28,7 +25,7 @@ class Joints : public Sensor {
   void sample(const SampleInput& input, Outbox& out) override {
     message_.utime = input.snapshot.time;
     for (size_t i = 0; i < joints_.size(); ++i) {
-      const size_t joint = static_cast<size_t>(joints_[i]);
+      const JointIndex joint = joints_[i];
       message_.joint_position[i] = static_cast<float>(input.snapshot.joint_positions[joint]);
       message_.joint_velocity[i] = static_cast<float>(input.snapshot.joint_velocities[joint]);
       message_.joint_effort[i] = static_cast<float>(input.snapshot.joint_efforts[joint]);
@@ -38,7 +35,7 @@ class Joints : public Sensor {
 
  private:
   int channel_;
-  std::vector<int> joints_;  // indices into BodyLayout::joints
+  std::vector<JointIndex> joints_;
   joint_state_t message_;
 };
 

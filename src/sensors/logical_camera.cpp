@@ -16,7 +16,7 @@ class LogicalCamera : public Sensor {
   explicit LogicalCamera(const SensorSetup& setup)
       : world_(setup.world),
         layout_(setup.layout),
-        own_(setup.layout.links[static_cast<size_t>(setup.link)].instance),
+        own_(setup.layout.links[setup.link].instance),
         mount_(setup),
         channel_(setup.channel<logical_camera_t>()) {
     setup.element.refuse_unknown({"ruedo:phase"});
@@ -39,10 +39,10 @@ class LogicalCamera : public Sensor {
     const Pose X_SW = mount_.pose(now).inverse();
     message_.utime = now.time;
     message_.objects.clear();
-    for (size_t i = 0; i < world_.models.size(); ++i) {
+    for (const InstanceIndex i : world_.models.indices()) {
       const model::ModelInstance& instance = world_.models[i];
-      if (instance.removed || static_cast<int>(i) == own_) continue;
-      const Pose X_SM = X_SW * model_pose(world_, layout_, static_cast<int>(i), now);
+      if (instance.removed || i == own_) continue;
+      const Pose X_SM = X_SW * model_pose(world_, layout_, i, now);
       if (!sees(X_SM.translation)) continue;
       logical_object_t& object = message_.objects.emplace_back();
       object.model = instance.name;
@@ -70,7 +70,7 @@ class LogicalCamera : public Sensor {
 
   const model::WorldModel& world_;
   const model::BodyLayout& layout_;
-  int own_;  // into WorldModel::models
+  InstanceIndex own_;
   Mount mount_;
   int channel_;
   double near_m_ = 0.0, far_m_ = 1.0, hfov_ = 1.0;

@@ -89,7 +89,7 @@ class Lrf : public Sensor {
                   " rays; allowed: " + std::to_string(kMaxRays) + " rays in all");
     }
     read_range(*laser);
-    ignored_link_ = e.boolean("ruedo:own_link", false) ? -1 : setup.link;
+    ignored_link_ = e.boolean("ruedo:own_link", false) ? LinkIndex() : setup.link;
     visuals_ = e.choice("ruedo:hits", "collisions", {"collisions", "visuals"}) == "visuals";
     intensities_ = e.boolean("ruedo:intensities", true);
     sweep_us_ = microseconds(e.number("ruedo:sweep_time", 0.0, Allowed::between(0.0, 60.0)));
@@ -332,7 +332,7 @@ class Lrf : public Sensor {
   double min_ = 0.0, max_ = 0.0, resolution_ = 0.0;  // m
   double bearing_noise_ = 0.0;                       // rad
   Noise noise_;
-  int ignored_link_ = -1;
+  LinkIndex ignored_link_;
   bool visuals_ = false, intensities_ = true;
   int64_t sweep_us_ = 0;
   int channel_ = -1;
@@ -345,6 +345,21 @@ class Lrf : public Sensor {
   lidar_t layered_{};
 };
 
+std::vector<std::string> settings_of(const std::string& type) {
+  const std::string top = type.find("ray") != std::string::npos ? "ray" : "lidar";
+  std::vector<std::string> keys = noise_settings(top + ".noise");
+  for (const char* plane : {"horizontal", "vertical"}) {
+    for (const char* each : {"samples", "resolution", "min_angle", "max_angle"})
+      keys.push_back(top + ".scan." + plane + "." + each);
+  }
+  for (const char* each : {"min", "max", "resolution"})
+    keys.push_back(top + ".range." + std::string(each));
+  for (const char* each :
+       {"own_link", "hits", "intensities", "sweep_time", "bearing_noise", "phase"})
+    keys.push_back(std::string("ruedo:") + each);
+  return keys;
+}
+
 const RegisterSensor kRegister{
     {.module = "lrf",
      .order = 3,
@@ -353,7 +368,8 @@ const RegisterSensor kRegister{
      .device_name = "",
      .default_rate = {10, 1},
      .needs_rays = true,
-     .make = [](const SensorSetup& setup) { return std::make_unique<Lrf>(setup); }}};
+     .make = [](const SensorSetup& setup) { return std::make_unique<Lrf>(setup); },
+     .settings = settings_of}};
 
 }  // namespace
 }  // namespace ruedo

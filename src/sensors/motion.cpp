@@ -18,7 +18,7 @@ class MotionStatus : public Sensor {
   bool observes() const override { return true; }
 
   void observe(const Snapshot& now, Outbox& out) override {
-    const MotionState& motion = now.robots[static_cast<size_t>(robot_)].motion;
+    const MotionState& motion = now.robots[robot_].motion;
     if (motion.changes == changes_) return;
     changes_ = motion.changes;
     const auto ends =
@@ -37,11 +37,11 @@ class MotionStatus : public Sensor {
  private:
   void show(const Snapshot& now, Outbox& out) {
     shown_step_ = now.step;
-    publish(now, now.robots[static_cast<size_t>(robot_)].motion, out);
+    publish(now, now.robots[robot_].motion, out);
   }
 
   void publish(const Snapshot& now, const MotionState& motion, Outbox& out) {
-    const RobotState& robot = now.robots[static_cast<size_t>(robot_)];
+    const RobotState& robot = now.robots[robot_];
     motion_status_t message;
     message.utime = now.time;
     message.id = motion.id;
@@ -55,7 +55,7 @@ class MotionStatus : public Sensor {
     out.publish(channel_, message);
   }
 
-  int robot_;
+  RobotIndex robot_;
   int channel_;
   int64_t changes_ = 0;
   int64_t shown_step_ = -1;

@@ -10,33 +10,32 @@ namespace ruedo {
 Mount::Mount(const SensorSetup& setup, const Pose& X_SD)
     : layout_(setup.layout),
       link_(setup.link),
-      body_(setup.layout.links[static_cast<size_t>(setup.link)].body),
+      body_(setup.layout.links[setup.link].body),
       X_LS_(setup.X_LS * X_SD) {}
 
 Pose Mount::start() const {
-  const Pose X_BS = layout_.links[static_cast<size_t>(link_)].X_BL * X_LS_;
-  return body_ < 0 ? X_BS : layout_.bodies[static_cast<size_t>(body_)].X_WB * X_BS;
+  const Pose X_BS = layout_.links[link_].X_BL * X_LS_;
+  return body_ < 0 ? X_BS : layout_.bodies[body_].X_WB * X_BS;
 }
 
 Pose Mount::pose(const Snapshot& now) const {
   if (body_ < 0) return start();
-  const model::LinkPlacement& link = layout_.links[static_cast<size_t>(link_)];
+  const model::LinkPlacement& link = layout_.links[link_];
   const Pose X_BL = link.wheel >= 0 ? layout_.link_in_body(link_, now.wheel_angles) : link.X_BL;
-  return now.bodies[static_cast<size_t>(body_)] * X_BL * X_LS_;
+  return now.bodies[body_] * X_BL * X_LS_;
 }
 
 Twist Mount::twist(const Snapshot& now) const {
   if (body_ < 0) return {};
-  const Pose& X_WB = now.bodies[static_cast<size_t>(body_)];
+  const Pose& X_WB = now.bodies[body_];
   const Vec3 p_WS = pose(now).translation;
-  Twist twist = now.body_twists[static_cast<size_t>(body_)];
+  Twist twist = now.body_twists[body_];
   twist.linear += twist.angular.cross(p_WS - X_WB.translation);
-  const model::LinkPlacement& link = layout_.links[static_cast<size_t>(link_)];
+  const model::LinkPlacement& link = layout_.links[link_];
   if (link.wheel >= 0) {
-    const model::WheelPlacement& wheel = layout_.wheels[static_cast<size_t>(link.wheel)];
+    const model::WheelPlacement& wheel = layout_.wheels[link.wheel];
     const Pose X_WWheel = X_WB * layout_.link_in_body(wheel.link, now.wheel_angles);
-    const Vec3 omega =
-        now.wheel_rates[static_cast<size_t>(link.wheel)] * (X_WWheel.rotation * wheel.axis_in_L);
+    const Vec3 omega = now.wheel_rates[link.wheel] * (X_WWheel.rotation * wheel.axis_in_L);
     twist.linear += omega.cross(p_WS - X_WWheel * wheel.center_in_L);
     twist.angular += omega;
   }

@@ -14,15 +14,15 @@ class Mount {
   // X_SD: of what is measured, in the device's frame.
   explicit Mount(const SensorSetup& setup, const Pose& X_SD = {});
 
-  int body() const { return body_; }       // into BodyLayout::bodies; -1: does not move
-  Pose start() const;                      // X_WS of the world's first state
-  Pose pose(const Snapshot& now) const;    // X_WS
-  Twist twist(const Snapshot& now) const;  // of S's origin, in the world's axes
+  BodyIndex body() const { return body_; }  // none: does not move
+  Pose start() const;                       // X_WS of the world's first state
+  Pose pose(const Snapshot& now) const;     // X_WS
+  Twist twist(const Snapshot& now) const;   // of S's origin, in the world's axes
 
  private:
   const model::BodyLayout& layout_;
-  int link_;
-  int body_;
+  LinkIndex link_;
+  BodyIndex body_;
   Pose X_LS_;
 };
 

@@ -44,6 +44,10 @@ Noise Noise::from_parameters(const Element& parameters, bool quantized) {
   return noise;
 }
 
+std::vector<std::string> noise_settings(const std::string& at) {
+  return {at + ".type", at + ".mean", at + ".stddev"};
+}
+
 void Noise::draw_bias(RandomStream& constants) {
   if (bias_stddev_ > 0.0) bias_ = bias_mean_ + bias_stddev_ * constants.gaussian();
 }

@@ -9,6 +9,8 @@
 #pragma once
 
 #include <cmath>
+#include <string>
+#include <vector>
 
 #include "ruedo/element.h"
 #include "ruedo/random.h"
@@ -18,6 +20,9 @@ namespace ruedo {
 // Number of the stream from which a device draws what holds for the whole run; samples have those
 // from 0 on.
 inline constexpr uint64_t kConstantDraws = ~uint64_t{0};
+
+// The settings of a <noise> there, for SensorKind::settings: "lidar.noise".
+std::vector<std::string> noise_settings(const std::string& at);
 
 class Noise {
  public:

@@ -80,14 +80,13 @@ class Odometry : public Sensor {
         random_(setup.random),
         robot_(setup.robot_index),
         channel_(setup.channel<odometry_t>()) {
-    const model::RobotPlacement& robot = setup.layout.robots[static_cast<size_t>(robot_)];
-    const model::DriveDescription& drive =
-        *setup.world.models[static_cast<size_t>(robot.instance)].model->drive;
+    const model::RobotPlacement& robot = setup.layout.robots[robot_];
+    const model::DriveDescription& drive = *setup.world.models[robot.instance].model->drive;
     if (!setup.noise) configuration_.slip_noise = 0.0;
     radius_ = drive.wheel_radius;
     track_ = drive.track * (1.0 + configuration_.track_error);
-    for (const int wheel : robot.wheels) {
-      const model::WheelPlacement& placement = setup.layout.wheels[static_cast<size_t>(wheel)];
+    for (const WheelIndex wheel : robot.wheels) {
+      const model::WheelPlacement& placement = setup.layout.wheels[wheel];
       const int side = placement.left ? 0 : 1;
       wheels_.push_back({wheel, side, placement.steers});
       if (!placement.steers) ++wheels_of_side_[side];
@@ -104,7 +103,7 @@ class Odometry : public Sensor {
   bool observes() const override { return true; }
 
   void observe(const Snapshot& now, Outbox&) override {
-    const RobotState& robot = now.robots[static_cast<size_t>(robot_)];
+    const RobotState& robot = now.robots[robot_];
     if (time_ < 0) {
       for (Wheel& wheel : wheels_) start(wheel, now);
       X_WBase_ = robot.X_WBase;
@@ -158,7 +157,7 @@ class Odometry : public Sensor {
 
  private:
   struct Wheel {
-    int index;                // into Snapshot::wheel_angles
+    WheelIndex index;
     int side;                 // 0 left, 1 right
     bool steers;              // its angle is that of steering
     double true_angle = 0.0;  // rad
@@ -176,8 +175,8 @@ class Odometry : public Sensor {
   }
 
   void start(Wheel& wheel, const Snapshot& now) const {
-    wheel.true_angle = now.wheel_angles[static_cast<size_t>(wheel.index)];
-    wheel.rate = now.wheel_rates[static_cast<size_t>(wheel.index)];
+    wheel.true_angle = now.wheel_angles[wheel.index];
+    wheel.rate = now.wheel_rates[wheel.index];
     if (configuration_.ticks_per_turn > 0) {
       wheel.counter = wrapped(count(wheel.true_angle));
       wheel.ticks = wheel.counter;
@@ -211,10 +210,10 @@ class Odometry : public Sensor {
   void turn_wheels(const Snapshot& now, double dt_s) {
     double way[2] = {0.0, 0.0};  // m, of each side, true
     for (Wheel& wheel : wheels_) {
-      const double angle = now.wheel_angles[static_cast<size_t>(wheel.index)];
+      const double angle = now.wheel_angles[wheel.index];
       wheel.turned = angle - wheel.true_angle;
       wheel.true_angle = angle;
-      wheel.rate = now.wheel_rates[static_cast<size_t>(wheel.index)];
+      wheel.rate = now.wheel_rates[wheel.index];
       if (!wheel.steers) way[wheel.side] += radius_ * wheel.turned / wheels_of_side_[wheel.side];
     }
     if (configuration_.slip_noise > 0.0 && (way[0] != 0.0 || way[1] != 0.0)) {
@@ -260,7 +259,7 @@ class Odometry : public Sensor {
   }
 
   void integrate_base(const Snapshot& now, double dt_s) {
-    const Pose& X_WBase = now.robots[static_cast<size_t>(robot_)].X_WBase;
+    const Pose& X_WBase = now.robots[robot_].X_WBase;
     Vec3 moved;
     if (base_->has_wheels()) {
       angles_.clear();
@@ -312,7 +311,7 @@ class Odometry : public Sensor {
 
   Configuration configuration_;
   RandomSource random_;
-  int robot_;
+  RobotIndex robot_;
   int channel_;
   double radius_ = 0.0, track_ = 0.0;  // m; the track is the one that the robot believes in
   std::vector<Wheel> wheels_;

@@ -13,7 +13,7 @@ class TruePose : public Sensor {
       : robot_(setup.robot_index), channel_(setup.channel<pose_t>()) {}
 
   void sample(const SampleInput& input, Outbox& out) override {
-    const RobotState& robot = input.snapshot.robots[static_cast<size_t>(robot_)];
+    const RobotState& robot = input.snapshot.robots[robot_];
     pose_t message;
     message.utime = input.snapshot.time;
     const Quat& q = robot.X_WBase.rotation;
@@ -29,7 +29,7 @@ class TruePose : public Sensor {
   }
 
  private:
-  int robot_;
+  RobotIndex robot_;
   int channel_;
 };
 

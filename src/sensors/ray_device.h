@@ -13,17 +13,17 @@ class RayMount {
  public:
   explicit RayMount(const SensorSetup& setup)
       : world_(&setup.world), layout_(&setup.layout), link_(setup.link) {
-    const model::LinkPlacement& link = setup.layout.links[static_cast<size_t>(setup.link)];
+    const model::LinkPlacement& link = setup.layout.links[setup.link];
     body_ = link.body;
     X_LS_ = setup.X_LS;
     X_BS_ = link.X_BL * setup.X_LS;
-    turns_ = link.wheel >= 0;
+    turns_ = link.wheel.valid();
   }
 
-  int link() const { return link_; }  // into BodyLayout::links
+  LinkIndex link() const { return link_; }
   Pose X_WS(const Snapshot& now) const {
-    if (body_ < 0) return X_BS_;
-    const Pose& X_WB = now.bodies[static_cast<size_t>(body_)];
+    if (!body_.valid()) return X_BS_;
+    const Pose& X_WB = now.bodies[body_];
     return turns_ ? X_WB * layout_->link_in_body(link_, now.wheel_angles) * X_LS_ : X_WB * X_BS_;
   }
 
@@ -31,18 +31,16 @@ class RayMount {
   const model::Surface& surface(const scene::Hit& hit, bool visuals = false) const {
     static const model::Surface kDefault;
     if (visuals) return kDefault;
-    const model::LinkPlacement& link = layout_->links[static_cast<size_t>(hit.link)];
-    const model::Model& model = *world_->models[static_cast<size_t>(link.instance)].model;
-    return model.links[static_cast<size_t>(link.link)]
-        .collisions[static_cast<size_t>(hit.shape)]
-        .surface;
+    const model::LinkPlacement& link = layout_->links[hit.link];
+    const model::Model& model = *world_->models[link.instance].model;
+    return model.links[link.link].collisions[hit.shape].surface;
   }
 
  private:
   const model::WorldModel* world_;
   const model::BodyLayout* layout_;
-  int link_ = -1;
-  int body_ = -1;       // into BodyLayout::bodies; -1: does not move, X_BS_ is then X_WS
+  LinkIndex link_;
+  BodyIndex body_;      // none: does not move, X_BS_ is then X_WS
   bool turns_ = false;  // with a wheel that is part of that body
   Pose X_LS_;
   Pose X_BS_;

@@ -8,14 +8,14 @@ namespace ruedo {
 
 SeenThings::Thing SeenThings::thing_of(const model::ListedBody& listed) {
   Thing thing;
-  const std::vector<int> alone{listed.link};
-  const std::vector<int>& links =
-      listed.body < 0 ? alone : layout_.bodies[static_cast<size_t>(listed.body)].links;
-  for (const int index : links) {
-    const model::LinkPlacement& placement = layout_.links[static_cast<size_t>(index)];
+  const std::vector<LinkIndex> alone{listed.link};
+  const std::vector<LinkIndex>& links =
+      listed.body.valid() ? layout_.bodies[listed.body].links : alone;
+  for (const LinkIndex index : links) {
+    const model::LinkPlacement& placement = layout_.links[index];
     thing.instance = placement.instance;
-    const model::Model& model = *world_.models[static_cast<size_t>(placement.instance)].model;
-    for (const model::Visual& visual : model.links[static_cast<size_t>(placement.link)].visuals) {
+    const model::Model& model = *world_.models[placement.instance].model;
+    for (const model::Visual& visual : model.links[placement.link].visuals) {
       if (thing.label == 0) thing.label = visual.label;
       if (thing.temperature == 0.0) thing.temperature = visual.temperature;
     }
@@ -26,11 +26,12 @@ SeenThings::Thing SeenThings::thing_of(const model::ListedBody& listed) {
 void SeenThings::update() {
   if (things_.size() == layout_.listed.size() + 1) return;
   things_.assign(1, Thing{});
-  std::map<int, std::vector<int>> of_label;  // instances of each label, in the order of the world
+  std::map<int, std::vector<InstanceIndex>>
+      of_label;  // instances of each label, in the order of the world
   for (const model::ListedBody& listed : layout_.listed) {
     Thing& thing = things_.emplace_back(thing_of(listed));
     if (thing.label == 0) continue;
-    std::vector<int>& known = of_label[thing.label];
+    std::vector<InstanceIndex>& known = of_label[thing.label];
     const auto at = std::find(known.begin(), known.end(), thing.instance);
     thing.number = static_cast<int>(at - known.begin()) + 1;
     if (at == known.end()) known.push_back(thing.instance);

@@ -18,8 +18,8 @@ class SeenThings {
   struct Thing {
     int label = 0;             // 0: none
     double temperature = 0.0;  // K; 0: that of the air
-    int instance = -1;         // into WorldModel::models
-    int number = 0;            // of its model among those of the label, from 1
+    InstanceIndex instance;
+    int number = 0;  // of its model among those of the label, from 1
   };
   // By the value of a pixel; 0 is nothing. Valid until the next call of update().
   const Thing& operator[](uint16_t pixel) const {

@@ -72,7 +72,8 @@ const RegisterSensor kRegister{
      .default_rate = {30, 1},
      .needs_renderer = true,
      .make = [](const SensorSetup& setup) { return std::make_unique<SegmentationCamera>(setup); },
-     .kind = "segmentation_camera"}};
+     .kind = "segmentation_camera",
+     .settings = camera_settings}};
 
 }  // namespace
 }  // namespace ruedo

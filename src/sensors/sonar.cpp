@@ -201,7 +201,7 @@ class Sonar : public Sensor {
       named[whole<size_t>(index)] = true;
     }
     for (int i = 0; i < n; ++i)
-      if (!named[static_cast<size_t>(i)])
+      if (!named[i])
         order->fail("transducer " + std::to_string(i) + " never fires; name every one of 0 to " +
                     std::to_string(n - 1));
   }
@@ -230,8 +230,7 @@ class Sonar : public Sensor {
       // comes first.
       const bool heard = stream.uniform() < cross_talk_;
       if (heard && last_fired_ >= 0 && last_fired_ != index)
-        range =
-            std::min(range, static_cast<double>(message_.range[static_cast<size_t>(last_fired_)]));
+        range = std::min(range, static_cast<double>(message_.range[last_fired_]));
     }
     last_fired_ = index;
     message_.range[i] = static_cast<float>(range);
@@ -321,6 +320,16 @@ class Sonar : public Sensor {
   sonar_t message_{};
 };
 
+std::vector<std::string> settings_of(const std::string&) {
+  std::vector<std::string> keys = noise_settings("ruedo:sonar.noise");
+  for (const char* each : {"min", "max", "radius", "geometry"})
+    keys.push_back(std::string("sonar.") + each);
+  for (const char* each : {"horizontal_aperture", "vertical_aperture", "rays", "reading", "firing",
+                           "order", "specular_angle", "cross_talk"})
+    keys.push_back(std::string("ruedo:sonar.ruedo:") + each);
+  return keys;
+}
+
 const RegisterSensor kRegister{
     {.module = "sonar",
      .order = 2,
@@ -329,7 +338,8 @@ const RegisterSensor kRegister{
      .device_name = "",
      .default_rate = {25, 1},
      .needs_rays = true,
-     .make = [](const SensorSetup& setup) { return std::make_unique<Sonar>(setup); }}};
+     .make = [](const SensorSetup& setup) { return std::make_unique<Sonar>(setup); },
+     .settings = settings_of}};
 
 }  // namespace
 }  // namespace ruedo

@@ -116,7 +116,8 @@ const RegisterSensor kRegister{
      .default_rate = {30, 1},
      .needs_renderer = true,
      .make = [](const SensorSetup& setup) { return std::make_unique<ThermalCamera>(setup); },
-     .kind = "thermal_camera"}};
+     .kind = "thermal_camera",
+     .settings = camera_settings}};
 
 }  // namespace
 }  // namespace ruedo

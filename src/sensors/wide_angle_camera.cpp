@@ -243,6 +243,12 @@ class WideAngleCamera : public Sensor {
   image_t image_;
 };
 
+std::vector<std::string> settings_of(const std::string& type) {
+  std::vector<std::string> keys = camera_settings(type);
+  for (const char* each : {"encoding", "quality"}) keys.push_back(std::string("ruedo:") + each);
+  return keys;
+}
+
 const RegisterSensor kRegister{
     {.module = "camera",
      .order = 4,
@@ -252,7 +258,8 @@ const RegisterSensor kRegister{
      .default_rate = {30, 1},
      .needs_renderer = true,
      .make = [](const SensorSetup& setup) { return std::make_unique<WideAngleCamera>(setup); },
-     .kind = "wide_angle_camera"}};
+     .kind = "wide_angle_camera",
+     .settings = settings_of}};
 
 }  // namespace
 }  // namespace ruedo

@@ -158,6 +158,8 @@ TEST(LcmBus, HearsItsChannelsOnly) {
   EXPECT_EQ(bus.failed(), 0u);
 }
 
+TEST(LcmBus, IsHeardByNobodyOnMemq) { EXPECT_FALSE(LcmBus("memq://").is_heard("p3at/camera")); }
+
 TEST(LcmBus, StopsAtOnce) {
   int count = 0;
   LcmBus bus("memq://");

@@ -172,8 +172,7 @@ TEST(UnixServer, NothingIsLostThatASlowClientTakesLater) {
   EXPECT_EQ(served.server.failed(), 0u);
   slow.take_until(500);
   ASSERT_EQ(slow.came.size(), 500u);
-  for (int i = 0; i < 500; ++i)
-    ASSERT_EQ(slow.came[static_cast<size_t>(i)].second, std::to_string(i) + block) << i;
+  for (int i = 0; i < 500; ++i) ASSERT_EQ(slow.came[i].second, std::to_string(i) + block) << i;
 }
 
 TEST(UnixServer, WhoTakesNothingHasABound) {

@@ -48,7 +48,7 @@ TEST(RandomStream, UniformIsUniform) {
     const double u = stream.uniform();
     ASSERT_GE(u, 0.0);
     ASSERT_LT(u, 1.0);
-    ++count[static_cast<size_t>(u * kCells)];
+    ++count[u * kCells];
   }
   double chi2 = 0.0;
   for (const int n : count) chi2 += std::pow(n - kDraws / kCells, 2) / (kDraws / kCells);
@@ -126,7 +126,7 @@ TEST(RandomStream, GaussianIsNormal) {
   std::sort(draws.begin(), draws.end());
   double distance = 0.0;
   for (int i = 0; i < kDraws; ++i) {
-    const double cdf = 0.5 * std::erfc(-draws[static_cast<size_t>(i)] / std::sqrt(2.0));
+    const double cdf = 0.5 * std::erfc(-draws[i] / std::sqrt(2.0));
     distance = std::max(
         {distance, std::abs(cdf - double(i) / kDraws), std::abs(cdf - double(i + 1) / kDraws)});
   }

@@ -72,7 +72,7 @@ TEST(DriveKinds, ACarTurnsAboutItsRearAxle) {
   const Model& model = *world->models[0].model;
   for (size_t l = 0; l < model.links.size(); ++l) {
     if (model.links[l].name != "fl" && model.links[l].name != "fr") continue;
-    const Vec3 axle = layout.link_in_body(static_cast<int>(l), angles).rotation * Vec3::UnitY();
+    const Vec3 axle = layout.link_in_body(LinkIndex(l), angles).rotation * Vec3::UnitY();
     EXPECT_LT((axle - Vec3(-1, 0, 0)).norm(), 1e-12) << model.links[l].name;
   }
 }
@@ -261,7 +261,7 @@ TEST(SensorPlugins, AnImuWithoutASensor) {
   const Model& model = *world->models[0].model;
   ASSERT_EQ(model.sensors.size(), 1u);
   EXPECT_EQ(model.sensors[0].name, "imu_controller");
-  EXPECT_EQ(model.links[static_cast<size_t>(model.sensors[0].link)].name, "b");
+  EXPECT_EQ(model.links[model.sensors[0].link].name, "b");
   EXPECT_EQ(model.sensors[0].element->number("update_rate", 0, Allowed::any(quantity::kRange)),
             50.0);
   EXPECT_EQ(model.sensors[0].element->number("imu/angular_velocity/y/noise/stddev", 0,

@@ -69,11 +69,14 @@ TEST(Poses, CanonicalLinkComesFirstAndIndicesFollow) {
   const auto world = world_of(
       "<model name='m' canonical_link='c'><link name='a'/><link name='b'/><link name='c'><sensor "
       "name='s' type='imu'/></link>"
-      "<joint name='j' type='ball'><parent>a</parent><child>c</child></joint></model>");
+      "<joint name='j' type='gearbox'><parent>b</parent><child>c</child>"
+      "<gearbox_reference_body>a</gearbox_reference_body>"
+      "<axis><xyz>0 0 1</xyz></axis><axis2><xyz>0 0 1</xyz></axis2></joint></model>");
   const Model& m = *world->models.at(0).model;
   EXPECT_EQ(m.links[0].name, "c");
-  EXPECT_EQ(m.links[static_cast<size_t>(m.joints[0].parent)].name, "a");
-  EXPECT_EQ(m.links[static_cast<size_t>(m.joints[0].child)].name, "c");
+  EXPECT_EQ(m.links[m.joints[0].parent].name, "b");
+  EXPECT_EQ(m.links[m.joints[0].child].name, "c");
+  EXPECT_EQ(m.links[m.joints[0].gear_reference].name, "a");
   EXPECT_EQ(m.sensors[0].link, 0);
 }
 
@@ -133,7 +136,7 @@ TEST(Includes, MergedModelsBringTheirSensors) {
   const SensorDescription& lrf = cart.sensors[0];
   EXPECT_EQ(lrf.name, "LRF");
   EXPECT_EQ(lrf.element->string("update_rate", ""), "7");
-  const Link& pole = cart.links[static_cast<size_t>(lrf.link)];
+  const Link& pole = cart.links[lrf.link];
   EXPECT_EQ(pole.name, "pole");
   const Pose X_MS = pole.X_ML * lrf.X_LS;
   EXPECT_LT((X_MS.translation - Vec3(1.2, 0, 0.6)).norm(), 1e-12);
@@ -325,7 +328,7 @@ TEST(Drive, SidesThatAreSwappedAreSwappedBack) {
       "<plugin filename='libgazebo_ros_diff_drive.so' "
       "name='d'><leftJoint>right_joint</leftJoint><rightJoint>left_joint</rightJoint></plugin>"));
   const Model& m = *world->models.at(0).model;
-  EXPECT_EQ(m.joints[static_cast<size_t>(m.drive->left_joints[0])].name, "left_joint");
+  EXPECT_EQ(m.joints[m.drive->left_joints[0]].name, "left_joint");
   EXPECT_NEAR(heading(m.drive->X_MBase.rotation), 0, 1e-12);
 }
 
@@ -415,11 +418,11 @@ TEST(Layout, KinematicRobotIsOneBody) {
   // A wheel's axle stays where it is however the wheel turns.
   const int left = layout.wheels[0].link;
   for (const double angle : {0.0, 1.0, 10.0}) {
-    const Pose X_BL = layout.link_in_body(left, {angle, 0});
+    const Pose X_BL = layout.link_in_body(LinkIndex(left), {angle, 0});
     EXPECT_LT((X_BL * Vec3(0.2, 0.25, 0) - Vec3(0.2, 0.25, -0.3)).norm(), 1e-12);
   }
   // A quarter turn ahead brings the foremost point to the bottom.
-  const Pose X_BL = layout.link_in_body(left, {M_PI / 2, 0});
+  const Pose X_BL = layout.link_in_body(LinkIndex(left), {M_PI / 2, 0});
   EXPECT_LT((X_BL * Vec3(0.3, 0.25, 0) - Vec3(0.2, 0.25, -0.4)).norm(), 1e-12);
 }
 
@@ -431,7 +434,7 @@ TEST(Layout, WheelsDriveHasABodyForEachWheel) {
   EXPECT_EQ(layout.bodies.size(), 3u);
   EXPECT_TRUE(layout.joints.empty());
   EXPECT_EQ(layout.wheels.size(), 2u);
-  EXPECT_EQ(layout.links[static_cast<size_t>(layout.wheels[0].link)].wheel, -1);
+  EXPECT_EQ(layout.links[layout.wheels[0].link].wheel, -1);
 }
 
 TEST(Layout, StaticPartOfAMovingModelStays) {
@@ -457,9 +460,8 @@ TEST(Layout, AJointOfTheOuterModelTiesLinksOfTwoNestedOnes) {
   const BodyLayout layout(*world);
   ASSERT_EQ(layout.bodies.size(), 2u);
   ASSERT_EQ(layout.joints.size(), 1u);
-  EXPECT_EQ(layout.bodies[static_cast<size_t>(layout.joints[0].parent_body)].name,
-            "crane/tower.top");
-  EXPECT_EQ(layout.bodies[static_cast<size_t>(layout.joints[0].child_body)].name, "crane/arm.beam");
+  EXPECT_EQ(layout.bodies[layout.joints[0].parent_body].name, "crane/tower.top");
+  EXPECT_EQ(layout.bodies[layout.joints[0].child_body].name, "crane/arm.beam");
   const Joint& joint = world->models[0].model->joints[0];
   EXPECT_NEAR((joint.X_MJ.translation - Vec3(1, 0, 2)).norm(), 0, 1e-12);  // at its child
 }

@@ -6,6 +6,7 @@
 #include "model/convex.h"
 #include "model/load.h"
 #include "model/placement.h"
+#include "ruedo/sensor.h"
 #include "temporary_folder.h"
 
 namespace ruedo::model {
@@ -21,6 +22,19 @@ const char* kRobot = R"(<sdf version='1.9'><model name='bot'>
 <joint name='jr' type='revolute'><parent>base</parent><child>r</child><axis><xyz>0 1 0</xyz></axis></joint>
 <ruedo:drive><ruedo:left_joint>jl</ruedo:left_joint><ruedo:right_joint>jr</ruedo:right_joint></ruedo:drive>
 </model></sdf>)";
+
+// What the lidar's kind says that a file may leave out.
+const RegisterSensor kLidar{{.module = "lidar",
+                             .order = 0,
+                             .types = {"lidar"},
+                             .attach_to = "",
+                             .device_name = "",
+                             .default_rate = {10, 1},
+                             .make = {},
+                             .settings = [](const std::string&) {
+                               return std::vector<std::string>{"lidar.scan.vertical.samples",
+                                                               "ruedo:sweep_time"};
+                             }}};
 
 // Ground at 0; a static ramp of 0.2 m at x 5 (a box), a wall of 2 m at x 10, a roof over all, a
 // light box at y 5.

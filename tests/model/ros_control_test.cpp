@@ -57,10 +57,11 @@ const DriveDescription& drive_of(const WorldModel& world) {
   return *drive;
 }
 
-std::vector<std::string> names(const WorldModel& world, const std::vector<int>& joints) {
+std::vector<std::string> names(const WorldModel& world,
+                               const std::vector<ModelJointIndex>& joints) {
   std::vector<std::string> list;
-  for (const int joint : joints)
-    list.push_back(world.models.back().model->joints[static_cast<size_t>(joint)].name);
+  for (const ModelJointIndex joint : joints)
+    list.push_back(world.models.back().model->joints[joint].name);
   return list;
 }
 

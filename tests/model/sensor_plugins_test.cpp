@@ -42,7 +42,7 @@ TEST(SensorPlugins, HectorsGps) {
   const SensorDescription& gps = only(*world);
   EXPECT_EQ(gps.type, "navsat");
   EXPECT_EQ(gps.name, "device");
-  EXPECT_EQ(world->models[0].model->links[static_cast<size_t>(gps.link)].name, "b");
+  EXPECT_EQ(world->models[0].model->links[gps.link].name, "b");
   const auto number = [&](const char* path) { return gps.element->number(path, -1, kAny); };
   EXPECT_EQ(number("update_rate"), 4);
   EXPECT_EQ(number("navsat/position_sensing/horizontal/noise/stddev"), 0.5);

@@ -33,8 +33,8 @@ TEST(WorldJoints, TieModelsTogether) {
   const Joint& hinge = model.joints.at(0);
   EXPECT_EQ(hinge.type, JointType::revolute);
   EXPECT_EQ(hinge.X_MJ.translation, Vec3(1, 0, 0));
-  EXPECT_EQ(model.links[static_cast<size_t>(hinge.parent)].name, "l");
-  EXPECT_EQ(model.links[static_cast<size_t>(hinge.child)].name, "gate.l");
+  EXPECT_EQ(model.links[hinge.parent].name, "l");
+  EXPECT_EQ(model.links[hinge.child].name, "gate.l");
   EXPECT_EQ(model.joints.at(1).name, "l.anchor");  // the post stands fast
 }
 

@@ -45,7 +45,7 @@ TEST(Articulated, APendulumHasItsPeriodAtAnyAmplitude) {
     double first_crossing = 0.0;
     for (int i = 1; i < 6000 && crossings < 3; ++i) {  // through the lowest point, each half period
       w.physics.step();
-      const double angle = w.physics.joint_position(0) - amplitude;
+      const double angle = w.physics.joint_position(JointIndex(0)) - amplitude;
       if (last < 0.0 && angle >= 0.0) {
         crossed = 0.005 * (i - angle / (angle - last));
         if (crossings++ == 0) first_crossing = crossed;
@@ -68,11 +68,12 @@ TEST(Articulated, ADoublePendulumKeepsItsEnergy) {
   const auto energy = [&] {
     double sum = 0.0;
     for (const int body : {0, 1}) {
-      const Vec3 centre = w.physics.center_of_mass(body);
-      const Twist& twist = w.physics.twist(body);
-      const Vec3 v = twist.linear + twist.angular.cross(centre - w.physics.pose(body).translation);
+      const Vec3 centre = w.physics.center_of_mass(BodyIndex(body));
+      const Twist& twist = w.physics.twist(BodyIndex(body));
+      const Vec3 v =
+          twist.linear + twist.angular.cross(centre - w.physics.pose(BodyIndex(body)).translation);
       sum += 0.5 * v.squaredNorm() +
-             0.5 * twist.angular.dot(w.physics.inertia(body) * twist.angular) +
+             0.5 * twist.angular.dot(w.physics.inertia(BodyIndex(body)) * twist.angular) +
              10 * (centre.z() - 2);
     }
     return sum;
@@ -98,16 +99,16 @@ std::string arm() {
 
 TEST(Articulated, AnArmHoldsItsLoadWithoutCreeping) {
   World w(arm(), 5000);
-  for (int i = 0; i < 6; ++i) w.physics.drive_joint_velocity(i, 0.0, 500.0);
+  for (int i = 0; i < 6; ++i) w.physics.drive_joint_velocity(JointIndex(i), 0.0, 500.0);
   w.run(1.0);
-  const double before = w.physics.joint_position(0);
+  const double before = w.physics.joint_position(JointIndex(0));
   w.run(10.0);
-  for (int i = 0; i < 6; ++i) EXPECT_NEAR(w.physics.joint_velocity(i), 0.0, 1e-4);
-  EXPECT_NEAR(w.physics.joint_position(0), before, 1e-3);  // 1e-4 rad/s
-  EXPECT_LT(std::abs(w.physics.joint_position(0)), 1e-3);
+  for (int i = 0; i < 6; ++i) EXPECT_NEAR(w.physics.joint_velocity(JointIndex(i)), 0.0, 1e-4);
+  EXPECT_NEAR(w.physics.joint_position(JointIndex(0)), before, 1e-3);  // 1e-4 rad/s
+  EXPECT_LT(std::abs(w.physics.joint_position(JointIndex(0))), 1e-3);
   // 5 links of 1 kg and the last of 6 kg: 10 (0.1 + 0.3 + 0.5 + 0.7 + 0.9 + 6 * 1.1) N m at the
   // shoulder.
-  EXPECT_NEAR(w.physics.joint_effort(0), -10 * (2.5 + 6.6), 0.5);
+  EXPECT_NEAR(w.physics.joint_effort(JointIndex(0)), -10 * (2.5 + 6.6), 0.5);
 }
 
 // Its joints have turned by what they were told in all, and its tip is where that puts it: the
@@ -120,12 +121,13 @@ TEST(Articulated, AnArmGoesAsItsMotorsAreTold) {
     for (int k = 0; k * step_s < 1.5; ++k) {
       for (int i = 0; i < 6; ++i) {
         const double rate = 0.5 * std::sin(4.0 * k * step_s + i);
-        w.physics.drive_joint_velocity(i, rate, 500.0);
+        w.physics.drive_joint_velocity(JointIndex(i), rate, 500.0);
         told[i] += rate * step_s;
       }
       w.physics.step();
       for (int i = 0; i < 6; ++i)
-        ASSERT_NEAR(w.physics.joint_position(i), told[i], 2e-4) << i << " at " << step_us;
+        ASSERT_NEAR(w.physics.joint_position(JointIndex(i)), told[i], 2e-4)
+            << i << " at " << step_us;
     }
     Pose tip{Quat::Identity(), {0, 0, 1}};
     for (int i = 0; i < 6; ++i) {
@@ -133,7 +135,7 @@ TEST(Articulated, AnArmGoesAsItsMotorsAreTold) {
       if (i > 0) tip = tip * Pose{Quat::Identity(), {0.2, 0, 0}};
       tip = tip * Pose{Quat(Eigen::AngleAxisd(told[i], axis)), Vec3::Zero()};
     }
-    EXPECT_LT((w.physics.pose(5).translation - tip.translation).norm(), 3e-4) << step_us;
+    EXPECT_LT((w.physics.pose(BodyIndex(5)).translation - tip.translation).norm(), 3e-4) << step_us;
   }
 }
 
@@ -150,7 +152,7 @@ TEST(Articulated, AJointsSpringHolds) {
   w.run(5.0);
   double x = 0.25;
   for (int i = 0; i < 50; ++i) x = 10 * std::cos(x) / 40;
-  EXPECT_NEAR(w.physics.joint_position(0), x, 1e-3);
+  EXPECT_NEAR(w.physics.joint_position(JointIndex(0)), x, 1e-3);
 }
 
 }  // namespace

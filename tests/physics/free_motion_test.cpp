@@ -9,11 +9,11 @@ namespace {
 TEST(FreeMotion, FlightIsTheParabolaAtAnyStep) {
   for (const int64_t step_us : {1000, 5000, 20'000}) {
     World w(thing("ball", "0 0 5 0 0 0", kBall, 1), step_us);
-    w.physics.set_twist(0, {{2, 0, 3}, Vec3::Zero()});
+    w.physics.set_twist(BodyIndex(0), {{2, 0, 3}, Vec3::Zero()});
     w.run(1.0);
     EXPECT_NEAR(w.position("ball/l").x(), 2.0, 1e-9);
     EXPECT_NEAR(w.position("ball/l").z(), 5.0 + 3.0 - 5.0, 1e-9);
-    EXPECT_NEAR(w.physics.twist(0).linear.z(), 3.0 - 10.0, 1e-9);
+    EXPECT_NEAR(w.physics.twist(BodyIndex(0)).linear.z(), 3.0 - 10.0, 1e-9);
   }
 }
 
@@ -60,7 +60,7 @@ TEST(FreeMotion, TheFirstStateKnowsWhichMechanismFalls) {
   for (const char* link : {"/a", "/b"}) {
     for (const Snapshot* state : {&first, &second}) {
       const auto z = [&](const std::string& model) {
-        return state->body_accelerations[static_cast<size_t>(w.body(model + link))].z();
+        return state->body_accelerations[w.body(model + link)].z();
       };
       EXPECT_NEAR(z("falling"), -10.0, 1e-6) << link;
       EXPECT_NEAR(z("standing"), 0.0, 1e-3) << link;
@@ -76,16 +76,19 @@ TEST(FreeMotion, RotationKeepsEnergyAndAngularMomentum) {
       "name='l'><gravity>0</gravity><inertial><mass>1</mass><inertia><ixx>0.01</ixx><iyy>0.02</"
       "iyy><izz>0.025</izz></inertia></inertial></link></model>",
       5000);
-  const auto momentum = [&] { return Vec3(w.physics.inertia(0) * w.physics.twist(0).angular); };
-  const auto energy = [&] { return 0.5 * w.physics.twist(0).angular.dot(momentum()); };
-  w.physics.set_twist(0, {Vec3::Zero(), {0.1, 5.0, 0.1}});
+  const auto momentum = [&] {
+    return Vec3(w.physics.inertia(BodyIndex(0)) * w.physics.twist(BodyIndex(0)).angular);
+  };
+  const auto energy = [&] { return 0.5 * w.physics.twist(BodyIndex(0)).angular.dot(momentum()); };
+  w.physics.set_twist(BodyIndex(0), {Vec3::Zero(), {0.1, 5.0, 0.1}});
   w.physics.step();
   const Vec3 L = momentum();
   const double E = energy();
   double most_turned = 0.0;
   for (int i = 0; i < 1200; ++i) {
     w.physics.step();
-    most_turned = std::max(most_turned, (w.physics.twist(0).angular - Vec3(0.1, 5.0, 0.1)).norm());
+    most_turned =
+        std::max(most_turned, (w.physics.twist(BodyIndex(0)).angular - Vec3(0.1, 5.0, 0.1)).norm());
   }
   EXPECT_GT(most_turned, 1.5);  // it did tumble
   EXPECT_LT((momentum() - L).norm(), 1e-6 * L.norm());

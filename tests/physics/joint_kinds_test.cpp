@@ -29,14 +29,15 @@ TEST(JointKinds, AMimicFollowsItsLeader) {
       5000);
   const int follower = 0, leader = 1;
   w.run(0.2);
-  EXPECT_NEAR(w.physics.joint_position(follower), 0.02, 1e-6);
-  w.physics.drive_joint_velocity(leader, 0.1, 1e3);
+  EXPECT_NEAR(w.physics.joint_position(JointIndex(follower)), 0.02, 1e-6);
+  w.physics.drive_joint_velocity(JointIndex(leader), 0.1, 1e3);
   for (int i = 0; i < 100; ++i) {
     w.physics.step();
-    EXPECT_NEAR(w.physics.joint_position(follower), 0.02 - w.physics.joint_position(leader), 1e-3);
+    EXPECT_NEAR(w.physics.joint_position(JointIndex(follower)),
+                0.02 - w.physics.joint_position(JointIndex(leader)), 1e-3);
   }
-  EXPECT_NEAR(w.physics.joint_position(leader), 0.05, 1e-3);
-  EXPECT_NEAR(w.physics.joint_velocity(follower), -0.1, 1e-4);
+  EXPECT_NEAR(w.physics.joint_position(JointIndex(leader)), 0.05, 1e-3);
+  EXPECT_NEAR(w.physics.joint_velocity(JointIndex(follower)), -0.1, 1e-4);
 }
 
 // A load of 1 kg on a vertical thread of 10 mm a turn: it goes down at 10 mm a turn when it is
@@ -51,13 +52,13 @@ TEST(JointKinds, AScrewAdvancesByItsPitch) {
   w.run(0.5);
   const double a = 10.0 / (1.0 + 0.01 / (p * p)), fallen = 0.5 * a * 0.25;
   EXPECT_NEAR(w.position("m/nut").z(), 1.0 - fallen, 0.01 * fallen);
-  EXPECT_NEAR(w.physics.joint_position(0), -fallen / p, 0.01 * fallen / p);
-  w.physics.drive_joint_velocity(0, 2.0, 1e3);
+  EXPECT_NEAR(w.physics.joint_position(JointIndex(0)), -fallen / p, 0.01 * fallen / p);
+  w.physics.drive_joint_velocity(JointIndex(0), 2.0, 1e3);
   const double before = w.position("m/nut").z();
   w.run(1.0);
   EXPECT_NEAR(w.position("m/nut").z() - before, 2.0 * p, 2e-3);
   // The effort is the load's: m g p.
-  EXPECT_NEAR(w.physics.joint_effort(0), 10.0 * p, 0.02 * 10.0 * p);
+  EXPECT_NEAR(w.physics.joint_effort(JointIndex(0)), 10.0 * p, 0.02 * 10.0 * p);
 }
 
 // A stop at two turns of a right-handed thread, in either of the ways to write it.
@@ -68,9 +69,9 @@ TEST(JointKinds, AScrewHasLimitsAndItsOldPitchIsLeftHanded) {
                     "<thread_pitch>-62.83185307</thread_pitch>") +
               "</model>",
           5000);
-  w.physics.drive_joint_velocity(0, 10.0, 20.0);
+  w.physics.drive_joint_velocity(JointIndex(0), 10.0, 20.0);
   w.run(3.0);
-  EXPECT_NEAR(w.physics.joint_position(0), 12.566, 0.02);
+  EXPECT_NEAR(w.physics.joint_position(JointIndex(0)), 12.566, 0.02);
   EXPECT_NEAR(w.position("m/nut").z(), 1.2, 1e-3);
 }
 
@@ -85,9 +86,9 @@ TEST(JointKinds, ARateGainYields) {
                 "<ruedo:rate_gain>500</ruedo:rate_gain>") +
           "</model>",
       5000);
-  w.physics.drive_joint_velocity(0, 0.0, 1e3);
+  w.physics.drive_joint_velocity(JointIndex(0), 0.0, 1e3);
   w.run(0.5);
-  EXPECT_NEAR(w.physics.joint_velocity(0), 5.0 / 500.0, 1e-4);
+  EXPECT_NEAR(w.physics.joint_velocity(JointIndex(0)), 5.0 / 500.0, 1e-4);
 }
 
 std::string gearbox(const std::string& reference, double ratio, const std::string& xyz2 = "0 0 1") {
@@ -112,16 +113,18 @@ TEST(JointKinds, AGearboxHoldsItsRatio) {
               joint("jp", "continuous", "world", "p", "0 0 1") +
               joint("jc", "continuous", "world", "c", "0 0 1") + gearbox("world", 3.0) + "</model>",
           5000);
-  w.physics.apply_joint_effort(0, 0.5);
+  w.physics.apply_joint_effort(JointIndex(0), 0.5);
   w.run(1.0);
   const double alpha = 0.5 / (0.01 + 9 * 0.01);  // 5 rad/s^2
-  EXPECT_NEAR(w.physics.joint_velocity(0), alpha, 1e-3 * alpha);
-  EXPECT_NEAR(w.physics.joint_velocity(1), -3.0 * alpha, 1e-3 * alpha);
-  EXPECT_NEAR(w.physics.joint_position(1), -3.0 * w.physics.joint_position(0), 1e-6);
-  EXPECT_NEAR(w.physics.joint_position(2), w.physics.joint_position(1), 1e-6);  // 7.5 rad
-  EXPECT_GT(w.physics.joint_position(0), 2.4);
+  EXPECT_NEAR(w.physics.joint_velocity(JointIndex(0)), alpha, 1e-3 * alpha);
+  EXPECT_NEAR(w.physics.joint_velocity(JointIndex(1)), -3.0 * alpha, 1e-3 * alpha);
+  EXPECT_NEAR(w.physics.joint_position(JointIndex(1)),
+              -3.0 * w.physics.joint_position(JointIndex(0)), 1e-6);
+  EXPECT_NEAR(w.physics.joint_position(JointIndex(2)), w.physics.joint_position(JointIndex(1)),
+              1e-6);  // 7.5 rad
+  EXPECT_GT(w.physics.joint_position(JointIndex(0)), 2.4);
   // The moment on the child: J times its acceleration.
-  EXPECT_NEAR(std::abs(w.physics.joint_effort(2)), 0.01 * 3.0 * alpha, 1e-3);
+  EXPECT_NEAR(std::abs(w.physics.joint_effort(JointIndex(2))), 0.01 * 3.0 * alpha, 1e-3);
 }
 
 // The axes may be square to each other, as of a bevel gear, and the ratio negative.
@@ -131,10 +134,11 @@ TEST(JointKinds, ABevelGear) {
               joint("jc", "continuous", "world", "c", "1 0 0") + gearbox("world", -0.5, "1 0 0") +
               "</model>",
           5000);
-  w.physics.drive_joint_velocity(0, 2.0, 1e3);
+  w.physics.drive_joint_velocity(JointIndex(0), 2.0, 1e3);
   w.run(5.0);
-  EXPECT_NEAR(w.physics.joint_position(0), 10.0, 0.02);
-  EXPECT_NEAR(w.physics.joint_position(1), 0.5 * w.physics.joint_position(0), 1e-6);
+  EXPECT_NEAR(w.physics.joint_position(JointIndex(0)), 10.0, 0.02);
+  EXPECT_NEAR(w.physics.joint_position(JointIndex(1)),
+              0.5 * w.physics.joint_position(JointIndex(0)), 1e-6);
 }
 
 // On a table that turns freely no moment comes from outside: with S the moment of inertia of all,
@@ -142,25 +146,27 @@ TEST(JointKinds, ABevelGear) {
 // (J + g^2 J - (J - g J)^2 / S) theta1'' = tau.
 TEST(JointKinds, AGearboxTurnsWhatCarriesIt) {
   World w(geared("continuous", "r"), 5000);
-  w.physics.apply_joint_effort(kParent, 0.5);
+  w.physics.apply_joint_effort(JointIndex(kParent), 0.5);
   w.run(1.0);
   const double J = 0.01, g = 3.0, S = 3 * J + 0.2 * 0.2 + 0.3 * 0.3, d = J - g * J;
   const double alpha = 0.5 / (J + g * g * J - d * d / S);
-  EXPECT_NEAR(w.physics.joint_velocity(kParent), alpha, 2e-3 * alpha);
-  EXPECT_NEAR(w.physics.joint_velocity(kTable), -d / S * alpha, 2e-3 * alpha);
-  EXPECT_NEAR(w.physics.joint_position(kChild), -g * w.physics.joint_position(kParent), 1e-6);
-  EXPECT_NEAR(w.physics.joint_position(kGear), w.physics.joint_position(kChild), 1e-6);
+  EXPECT_NEAR(w.physics.joint_velocity(JointIndex(kParent)), alpha, 2e-3 * alpha);
+  EXPECT_NEAR(w.physics.joint_velocity(JointIndex(kTable)), -d / S * alpha, 2e-3 * alpha);
+  EXPECT_NEAR(w.physics.joint_position(JointIndex(kChild)),
+              -g * w.physics.joint_position(JointIndex(kParent)), 1e-6);
+  EXPECT_NEAR(w.physics.joint_position(JointIndex(kGear)),
+              w.physics.joint_position(JointIndex(kChild)), 1e-6);
 }
 
 // Carried round on a table, gears that nothing turns against it stand still against it.
 TEST(JointKinds, AGearboxIsCarriedRound) {
   World w(geared("continuous", "r"), 5000);
-  w.physics.drive_joint_velocity(kTable, 3.0, 1e3);
-  w.physics.drive_joint_velocity(kParent, 0.0, 1e3);
+  w.physics.drive_joint_velocity(JointIndex(kTable), 3.0, 1e3);
+  w.physics.drive_joint_velocity(JointIndex(kParent), 0.0, 1e3);
   w.run(4.0);
-  EXPECT_NEAR(w.physics.joint_position(kTable), 12.0, 0.02);
-  EXPECT_NEAR(w.physics.joint_position(kParent), 0.0, 1e-6);
-  EXPECT_NEAR(w.physics.joint_position(kChild), 0.0, 1e-5);
+  EXPECT_NEAR(w.physics.joint_position(JointIndex(kTable)), 12.0, 0.02);
+  EXPECT_NEAR(w.physics.joint_position(JointIndex(kParent)), 0.0, 1e-6);
+  EXPECT_NEAR(w.physics.joint_position(JointIndex(kChild)), 0.0, 1e-5);
 }
 
 // A motor of 1e-5 kg m^2 holds an arm of m g r = 5 N m through 100 : 1, with a hundredth of its
@@ -179,10 +185,10 @@ TEST(JointKinds, AMotorHoldsAnArmThroughItsGearbox) {
                 "<gearbox_reference_body>world</gearbox_reference_body>") +
           "</model>",
       5000);
-  w.physics.drive_joint_velocity(0, 0.0, 1e3);
+  w.physics.drive_joint_velocity(JointIndex(0), 0.0, 1e3);
   w.run(10.0);
-  EXPECT_NEAR(w.physics.joint_position(1), 0.0, 1e-5);
-  EXPECT_NEAR(std::abs(w.physics.joint_effort(0)), 0.05, 1e-4);
+  EXPECT_NEAR(w.physics.joint_position(JointIndex(1)), 0.0, 1e-5);
+  EXPECT_NEAR(std::abs(w.physics.joint_effort(JointIndex(0))), 0.05, 1e-4);
 }
 
 TEST(JointKinds, AGearboxNeedsItsReference) {

@@ -26,14 +26,14 @@ TEST_P(EachShape, CarriesABallAtItsExactHeight) {
   World w(thing("s", "0 0 1 0 0 0", GetParam().geometry, 0) +
           thing("ball", "0 0 " + std::to_string(1.11 + GetParam().top) + " 0 0 0", kBall, 1));
   w.run(0.3);
-  EXPECT_NEAR(w.physics.pose(0).translation.z(), 1.1 + GetParam().top, 1e-3);
+  EXPECT_NEAR(w.physics.pose(BodyIndex(0)).translation.z(), 1.1 + GetParam().top, 1e-3);
 }
 
 TEST_P(EachShape, RestsOnThePlaneAtItsExactHeight) {
   World w(kPlane + thing("s", "0 0 " + std::to_string(GetParam().bottom + 0.01) + " 0 0 0",
                          GetParam().geometry, 1));
   w.run(0.5);
-  EXPECT_NEAR(w.physics.pose(0).translation.z(), GetParam().bottom, 1e-3);
+  EXPECT_NEAR(w.physics.pose(BodyIndex(0)).translation.z(), GetParam().bottom, 1e-3);
 }
 
 INSTANTIATE_TEST_SUITE_P(
@@ -48,8 +48,8 @@ INSTANTIATE_TEST_SUITE_P(
 TEST(Physics, ABallFallsFreely) {
   World w(thing("ball", "0 0 5 0 0 0", kBall, 1));
   w.run(0.5);
-  EXPECT_NEAR(w.physics.pose(0).translation.z(), 5.0 - 0.5 * 10 * 0.25, 0.01);
-  EXPECT_NEAR(w.physics.twist(0).linear.z(), -5.0, 0.01);
+  EXPECT_NEAR(w.physics.pose(BodyIndex(0)).translation.z(), 5.0 - 0.5 * 10 * 0.25, 0.01);
+  EXPECT_NEAR(w.physics.twist(BodyIndex(0)).linear.z(), -5.0, 0.01);
 }
 
 TEST(Physics, TheGroundCarriesTheWeight) {
@@ -57,7 +57,7 @@ TEST(Physics, TheGroundCarriesTheWeight) {
     World w(kPlane + thing("box", "0 0 0.1 0 0 0", kBox, 3), step_us);
     w.run(1.0);
     double force = 0.0;
-    for (const Contact& contact : w.physics.contacts(0)) {
+    for (const Contact& contact : w.physics.contacts(BodyIndex(0))) {
       EXPECT_NEAR(contact.normal.z(), 1.0, 1e-9);  // towards the box
       EXPECT_EQ(contact.body_b, -1);
       EXPECT_NEAR(contact.position.z(), 0.0, 1e-3);
@@ -73,9 +73,9 @@ TEST(Physics, FrictionIsTheLowerOfBoth) {
     World w(thing("floor", "0 0 -0.5 0 0 0", "<box><size>20 20 1</size></box>", 0, of_floor) +
             thing("box", "0 0 0.1 0 0 0", kBox, 1, of_box));
     w.run(0.2);
-    w.physics.set_twist(0, {{1, 0, 0}, Vec3::Zero()});  // Eigen leaves {} unset
+    w.physics.set_twist(BodyIndex(0), {{1, 0, 0}, Vec3::Zero()});  // Eigen leaves {} unset
     w.run(2.0);
-    EXPECT_NEAR(w.physics.pose(0).translation.x(), 0.25, 0.02);
+    EXPECT_NEAR(w.physics.pose(BodyIndex(0)).translation.x(), 0.25, 0.02);
   }
 }
 
@@ -83,14 +83,14 @@ TEST(Physics, ThingsAtRestSleepAndStay) {
   World w(kPlane + thing("a", "0 0 0.1 0 0 0", kBox, 1) + thing("b", "0 0 0.3 0 0 0", kBox, 1),
           5000);
   w.run(5.0);
-  EXPECT_TRUE(w.physics.sleeping(0));
-  const Vec3 rest = w.physics.pose(1).translation;
+  EXPECT_TRUE(w.physics.sleeping(BodyIndex(0)));
+  const Vec3 rest = w.physics.pose(BodyIndex(1)).translation;
   w.run(10.0);
-  EXPECT_EQ(w.physics.pose(1).translation, rest);
-  EXPECT_FALSE(w.physics.contacts(0).empty());  // and still touch
-  w.physics.apply_impulse(1, {0.5, 0, 0}, {0, 0, 0});
+  EXPECT_EQ(w.physics.pose(BodyIndex(1)).translation, rest);
+  EXPECT_FALSE(w.physics.contacts(BodyIndex(0)).empty());  // and still touch
+  w.physics.apply_impulse(BodyIndex(1), {0.5, 0, 0}, {0, 0, 0});
   w.run(0.1);
-  EXPECT_GT(w.physics.pose(1).translation.x(), rest.x() + 0.005);
+  EXPECT_GT(w.physics.pose(BodyIndex(1)).translation.x(), rest.x() + 0.005);
 }
 
 TEST(Physics, MassCentreAndInertiaOfJoinedLinks) {
@@ -104,16 +104,17 @@ TEST(Physics, MassCentreAndInertiaOfJoinedLinks) {
       "0</pose><mass>3</mass><inertia><ixx>0.3</ixx><iyy>0.3</iyy><izz>0.3</izz>"
       "</inertia></inertial></link><joint name='j' "
       "type='fixed'><parent>a</parent><child>b</child></joint></model>");
-  EXPECT_NEAR(w.physics.mass(0), 4.0, 1e-12);
-  EXPECT_NEAR(w.physics.center_of_mass(0).x(), 1.5, 1e-12);
-  EXPECT_NEAR(w.physics.inertia(0)(2, 2), 3.4, 1e-12);
-  EXPECT_NEAR(w.physics.inertia(0)(0, 0), 0.4, 1e-12);
+  EXPECT_NEAR(w.physics.mass(BodyIndex(0)), 4.0, 1e-12);
+  EXPECT_NEAR(w.physics.center_of_mass(BodyIndex(0)).x(), 1.5, 1e-12);
+  EXPECT_NEAR(w.physics.inertia(BodyIndex(0))(2, 2), 3.4, 1e-12);
+  EXPECT_NEAR(w.physics.inertia(BodyIndex(0))(0, 0), 0.4, 1e-12);
   // An impulse through the centre turns nothing; the frame's origin moves with it.
-  w.physics.apply_impulse(0, {0, 4, 0}, {0, 0, 0});
-  EXPECT_NEAR(w.physics.twist(0).linear.y(), 1.0, 1e-12);
-  w.physics.apply_impulse(0, {0, 0, 0}, {0, 0, 3.4});
-  EXPECT_NEAR(w.physics.twist(0).angular.z(), 1.0, 1e-12);
-  EXPECT_NEAR(w.physics.twist(0).linear.y(), 1.0 - 1.5, 1e-12);  // omega x (origin - centre)
+  w.physics.apply_impulse(BodyIndex(0), {0, 4, 0}, {0, 0, 0});
+  EXPECT_NEAR(w.physics.twist(BodyIndex(0)).linear.y(), 1.0, 1e-12);
+  w.physics.apply_impulse(BodyIndex(0), {0, 0, 0}, {0, 0, 3.4});
+  EXPECT_NEAR(w.physics.twist(BodyIndex(0)).angular.z(), 1.0, 1e-12);
+  EXPECT_NEAR(w.physics.twist(BodyIndex(0)).linear.y(), 1.0 - 1.5,
+              1e-12);  // omega x (origin - centre)
 }
 
 TEST(Physics, ARotatedInertiaKeepsItsAxes) {
@@ -124,7 +125,7 @@ TEST(Physics, ARotatedInertiaKeepsItsAxes) {
   const Pose X = Pose::from_xyz_rpy({0, 0, 0}, {0.3, 0.2, 0.9});
   const Eigen::Matrix3d R = X.rotation.toRotationMatrix();
   const Eigen::Matrix3d expected = R * Vec3(1, 2, 2.5).asDiagonal() * R.transpose();
-  EXPECT_LT((w.physics.inertia(0) - expected).norm(), 1e-9);
+  EXPECT_LT((w.physics.inertia(BodyIndex(0)) - expected).norm(), 1e-9);
 }
 
 std::string hinged(const std::string& axis, const std::string& type = "revolute",
@@ -142,10 +143,10 @@ std::string hinged(const std::string& axis, const std::string& type = "revolute"
 TEST(Joints, AMotorTurnsTheChildPositivelyAboutTheAxis) {
   World w(hinged("0 0 1"));
   ASSERT_EQ(w.layout.joints.size(), 1u);
-  w.physics.drive_joint_velocity(0, 2.0, 100.0);
+  w.physics.drive_joint_velocity(JointIndex(0), 2.0, 100.0);
   w.run(4.0);
-  EXPECT_NEAR(w.physics.joint_velocity(0), 2.0, 1e-3);
-  EXPECT_NEAR(w.physics.joint_position(0), 8.0, 0.02);  // not wrapped
+  EXPECT_NEAR(w.physics.joint_velocity(JointIndex(0)), 2.0, 1e-3);
+  EXPECT_NEAR(w.physics.joint_position(JointIndex(0)), 8.0, 0.02);  // not wrapped
   EXPECT_NEAR(heading(w.physics.pose(w.body("m/arm")).rotation), wrap_angle(8.0), 0.02);
 }
 
@@ -160,35 +161,36 @@ TEST(Joints, APendulumKeepsItsPeriod) {
       1000);
   const double period = 2 * M_PI * std::sqrt((0.1 + 2 * 0.25) / (2 * 10 * 0.5));
   w.run(period / 2);
-  EXPECT_NEAR(w.physics.joint_position(0), 0.2, 5e-3);  // from 0.1 rad on one side to the other
+  EXPECT_NEAR(w.physics.joint_position(JointIndex(0)), 0.2,
+              5e-3);  // from 0.1 rad on one side to the other
 }
 
 TEST(Joints, LimitsHold) {
   World w(hinged("0 0 1", "revolute", "<limit><lower>-0.5</lower><upper>0.7</upper></limit>"));
-  w.physics.drive_joint_velocity(0, 1.0, 20.0);
+  w.physics.drive_joint_velocity(JointIndex(0), 1.0, 20.0);
   w.run(3.0);
-  EXPECT_NEAR(w.physics.joint_position(0), 0.7, 0.02);
-  w.physics.drive_joint_velocity(0, -1.0, 20.0);
+  EXPECT_NEAR(w.physics.joint_position(JointIndex(0)), 0.7, 0.02);
+  w.physics.drive_joint_velocity(JointIndex(0), -1.0, 20.0);
   w.run(3.0);
-  EXPECT_NEAR(w.physics.joint_position(0), -0.5, 0.02);
+  EXPECT_NEAR(w.physics.joint_position(JointIndex(0)), -0.5, 0.02);
 }
 
 // A limit on one side only, and limits beyond a turn, hold as well.
 TEST(Joints, LimitsHoldOnOneSideAndBeyondATurn) {
   World one(hinged("0 0 1", "revolute", "<limit><lower>-0.5</lower></limit>"));
-  one.physics.drive_joint_velocity(0, -1.0, 20.0);
+  one.physics.drive_joint_velocity(JointIndex(0), -1.0, 20.0);
   one.run(2.0);
-  EXPECT_NEAR(one.physics.joint_position(0), -0.5, 0.02);
-  one.physics.drive_joint_velocity(0, 2.0, 20.0);
+  EXPECT_NEAR(one.physics.joint_position(JointIndex(0)), -0.5, 0.02);
+  one.physics.drive_joint_velocity(JointIndex(0), 2.0, 20.0);
   one.run(5.0);
-  EXPECT_GT(one.physics.joint_position(0), 7.0);  // more than a turn
+  EXPECT_GT(one.physics.joint_position(JointIndex(0)), 7.0);  // more than a turn
   World wide(hinged("0 0 1", "revolute", "<limit><lower>-4</lower><upper>8</upper></limit>"));
-  wide.physics.drive_joint_velocity(0, 2.0, 20.0);
+  wide.physics.drive_joint_velocity(JointIndex(0), 2.0, 20.0);
   wide.run(6.0);
-  EXPECT_NEAR(wide.physics.joint_position(0), 8.0, 0.02);
-  wide.physics.drive_joint_velocity(0, -2.0, 20.0);
+  EXPECT_NEAR(wide.physics.joint_position(JointIndex(0)), 8.0, 0.02);
+  wide.physics.drive_joint_velocity(JointIndex(0), -2.0, 20.0);
   wide.run(8.0);
-  EXPECT_NEAR(wide.physics.joint_position(0), -4.0, 0.02);
+  EXPECT_NEAR(wide.physics.joint_position(JointIndex(0)), -4.0, 0.02);
 }
 
 // What is held more simply than the file says is told, once and with its name.
@@ -215,34 +217,34 @@ TEST(Physics, SimplerJointsAndFrictionAreNamed) {
 TEST(Joints, EffortAccelerates) {
   // 0.6 N m on I + m r^2 = 0.6 kg m^2: 1 rad/s^2.
   World w(hinged("0 0 1"));
-  w.physics.apply_joint_effort(0, 0.6);
+  w.physics.apply_joint_effort(JointIndex(0), 0.6);
   w.run(1.0);
-  EXPECT_NEAR(w.physics.joint_velocity(0), 1.0, 0.01);
-  EXPECT_EQ(w.physics.joint_effort(0), 0.6);
+  EXPECT_NEAR(w.physics.joint_velocity(JointIndex(0)), 1.0, 0.01);
+  EXPECT_EQ(w.physics.joint_effort(JointIndex(0)), 0.6);
 }
 
 TEST(Joints, AMotorHoldsAgainstGravityAndSaysItsEffort) {
   World w(hinged("0 1 0"));  // the arm lies along x: 2 kg * 10 * 0.5 m = 10 N m, which y turns down
-  w.physics.drive_joint_velocity(0, 0.0, 100.0);
+  w.physics.drive_joint_velocity(JointIndex(0), 0.0, 100.0);
   w.run(0.5);
-  EXPECT_NEAR(w.physics.joint_position(0), 0.0, 0.01);
-  EXPECT_NEAR(w.physics.joint_effort(0), -10.0, 0.3);
+  EXPECT_NEAR(w.physics.joint_position(JointIndex(0)), 0.0, 0.01);
+  EXPECT_NEAR(w.physics.joint_effort(JointIndex(0)), -10.0, 0.3);
 }
 
 TEST(Joints, DampingSlowsDownAndNeverReverses) {
   // I = 0.6, damping 0.6: the rate falls by 1/e in 1 s.
   World w(hinged("0 0 1", "continuous", "<dynamics><damping>0.6</damping></dynamics>"));
-  w.physics.apply_joint_effort(0, 6.0);
+  w.physics.apply_joint_effort(JointIndex(0), 6.0);
   w.run(0.2);
-  const double rate = w.physics.joint_velocity(0);
-  w.physics.apply_joint_effort(0, 0.0);
+  const double rate = w.physics.joint_velocity(JointIndex(0));
+  w.physics.apply_joint_effort(JointIndex(0), 0.0);
   w.run(1.0);
-  EXPECT_NEAR(w.physics.joint_velocity(0) / rate, std::exp(-1.0), 0.02);
+  EXPECT_NEAR(w.physics.joint_velocity(JointIndex(0)) / rate, std::exp(-1.0), 0.02);
   World stiff(hinged("0 0 1", "continuous", "<dynamics><damping>1e6</damping></dynamics>"));
-  stiff.physics.apply_joint_effort(0, 1.0);
+  stiff.physics.apply_joint_effort(JointIndex(0), 1.0);
   stiff.run(1.0);
-  EXPECT_GE(stiff.physics.joint_velocity(0), -1e-9);
-  EXPECT_LT(stiff.physics.joint_velocity(0), 0.01);
+  EXPECT_GE(stiff.physics.joint_velocity(JointIndex(0)), -1e-9);
+  EXPECT_LT(stiff.physics.joint_velocity(JointIndex(0)), 0.01);
 }
 
 TEST(Joints, FrictionHoldsUpToItsEffortAndStopsEvenly) {
@@ -250,17 +252,17 @@ TEST(Joints, FrictionHoldsUpToItsEffortAndStopsEvenly) {
   // after 1.8 s.
   const std::string dry = "<dynamics><friction>0.6</friction></dynamics>";
   World w(hinged("0 0 1", "continuous", dry));
-  w.physics.apply_joint_effort(0, 0.5);
+  w.physics.apply_joint_effort(JointIndex(0), 0.5);
   w.run(1.0);
-  EXPECT_NEAR(w.physics.joint_position(0), 0.0, 1e-6);
-  w.physics.apply_joint_effort(0, 6.0);
+  EXPECT_NEAR(w.physics.joint_position(JointIndex(0)), 0.0, 1e-6);
+  w.physics.apply_joint_effort(JointIndex(0), 6.0);
   w.run(0.2);
-  EXPECT_NEAR(w.physics.joint_velocity(0), 1.8, 0.03);
-  w.physics.apply_joint_effort(0, 0.0);
+  EXPECT_NEAR(w.physics.joint_velocity(JointIndex(0)), 1.8, 0.03);
+  w.physics.apply_joint_effort(JointIndex(0), 0.0);
   w.run(1.0);
-  EXPECT_NEAR(w.physics.joint_velocity(0), 0.8, 0.03);
+  EXPECT_NEAR(w.physics.joint_velocity(JointIndex(0)), 0.8, 0.03);
   w.run(2.0);
-  EXPECT_NEAR(w.physics.joint_velocity(0), 0.0, 1e-6);
+  EXPECT_NEAR(w.physics.joint_velocity(JointIndex(0)), 0.0, 1e-6);
 }
 
 // An arm that hangs from a ball or a universal joint, 0.1 rad off in the plane of x and z, or in
@@ -280,13 +282,14 @@ TEST(Joints, ABallAndAUniversalJointSwingBothWays) {
   for (const char* const type : {"ball", "universal"}) {
     for (const bool along_x : {true, false}) {
       World w(pendulum(type, along_x ? "0 -0.1 0" : "0.1 0 0"), 1000);
-      const auto centre = [&] { return Vec3(w.physics.pose(0) * Vec3(0, 0, -0.5)); };
+      const auto centre = [&] { return Vec3(w.physics.pose(BodyIndex(0)) * Vec3(0, 0, -0.5)); };
       const Vec3 start = centre();
       EXPECT_NEAR(along_x ? start.x() : start.y(), 0.5 * std::sin(0.1), 1e-9);
       w.run(period / 2);
       EXPECT_NEAR(centre().x(), -start.x(), 2e-3) << type << along_x;
       EXPECT_NEAR(centre().y(), -start.y(), 2e-3) << type << along_x;
-      EXPECT_LT((w.physics.pose(0).translation - Vec3(0, 0, 1)).norm(), 1e-3) << type << along_x;
+      EXPECT_LT((w.physics.pose(BodyIndex(0)).translation - Vec3(0, 0, 1)).norm(), 1e-3)
+          << type << along_x;
     }
   }
 }
@@ -300,38 +303,38 @@ std::string cardan(const std::string& first = "", const std::string& second = ""
 
 TEST(Joints, AUniversalJointTakesCommandsForItsFirstAxis) {
   World w(cardan());
-  w.physics.drive_joint_velocity(0, 2.0, 100.0);
+  w.physics.drive_joint_velocity(JointIndex(0), 2.0, 100.0);
   w.run(4.0);
-  EXPECT_NEAR(w.physics.joint_velocity(0), 2.0, 5e-3);
-  EXPECT_NEAR(w.physics.joint_position(0), 8.0, 0.02);  // through more than a turn
+  EXPECT_NEAR(w.physics.joint_velocity(JointIndex(0)), 2.0, 5e-3);
+  EXPECT_NEAR(w.physics.joint_position(JointIndex(0)), 8.0, 0.02);  // through more than a turn
   EXPECT_NEAR(heading(w.physics.pose(w.body("m/arm")).rotation), wrap_angle(8.0), 0.02);
   EXPECT_NEAR((w.physics.pose(w.body("m/arm")) * Vec3(0.5, 0, 0)).z(), 1.0, 2e-3);
   World pushed(cardan());
-  pushed.physics.apply_joint_effort(0, 0.6);  // on 0.6 kg m^2
+  pushed.physics.apply_joint_effort(JointIndex(0), 0.6);  // on 0.6 kg m^2
   pushed.run(1.0);
-  EXPECT_NEAR(pushed.physics.joint_velocity(0), 1.0, 0.01);
+  EXPECT_NEAR(pushed.physics.joint_velocity(JointIndex(0)), 1.0, 0.01);
 }
 
 TEST(Joints, LimitsAndBrakesOfAUniversalJoint) {
   World w(cardan("<limit><lower>-0.5</lower><upper>0.7</upper></limit>"));
-  w.physics.drive_joint_velocity(0, 1.0, 20.0);
+  w.physics.drive_joint_velocity(JointIndex(0), 1.0, 20.0);
   w.run(3.0);
-  EXPECT_NEAR(w.physics.joint_position(0), 0.7, 0.02);
-  w.physics.drive_joint_velocity(0, -1.0, 20.0);
+  EXPECT_NEAR(w.physics.joint_position(JointIndex(0)), 0.7, 0.02);
+  w.physics.drive_joint_velocity(JointIndex(0), -1.0, 20.0);
   w.run(3.0);
-  EXPECT_NEAR(w.physics.joint_position(0), -0.5, 0.02);
+  EXPECT_NEAR(w.physics.joint_position(JointIndex(0)), -0.5, 0.02);
   World wide(cardan("<limit><lower>-4</lower><upper>8</upper></limit>"));
-  wide.physics.drive_joint_velocity(0, 2.0, 20.0);
+  wide.physics.drive_joint_velocity(JointIndex(0), 2.0, 20.0);
   wide.run(6.0);
-  EXPECT_NEAR(wide.physics.joint_position(0), 8.0, 0.02);
+  EXPECT_NEAR(wide.physics.joint_position(JointIndex(0)), 8.0, 0.02);
   // I = 0.6, damping 0.6, as for a hinge.
   World damped(cardan("<dynamics><damping>0.6</damping></dynamics>"));
-  damped.physics.apply_joint_effort(0, 6.0);
+  damped.physics.apply_joint_effort(JointIndex(0), 6.0);
   damped.run(0.2);
-  const double rate = damped.physics.joint_velocity(0);
-  damped.physics.apply_joint_effort(0, 0.0);
+  const double rate = damped.physics.joint_velocity(JointIndex(0));
+  damped.physics.apply_joint_effort(JointIndex(0), 0.0);
   damped.run(1.0);
-  EXPECT_NEAR(damped.physics.joint_velocity(0) / rate, std::exp(-1.0), 0.02);
+  EXPECT_NEAR(damped.physics.joint_velocity(JointIndex(0)) / rate, std::exp(-1.0), 0.02);
 }
 
 // The second axis is along y, and the arm's weight of 10 N m turns about it: to its limit, and not
@@ -352,14 +355,14 @@ TEST(Joints, TheSecondAxisOfAUniversalJointHasItsOwnLimits) {
 
 TEST(Joints, ASliderGoesAlongItsAxis) {
   World w(hinged("0 1 0", "prismatic", "<limit><lower>-0.2</lower><upper>0.6</upper></limit>"));
-  w.physics.drive_joint_velocity(0, 0.5, 100.0);
+  w.physics.drive_joint_velocity(JointIndex(0), 0.5, 100.0);
   w.run(0.8);
-  EXPECT_NEAR(w.physics.joint_position(0), 0.4, 0.01);
-  EXPECT_NEAR(w.physics.joint_velocity(0), 0.5, 0.01);
+  EXPECT_NEAR(w.physics.joint_position(JointIndex(0)), 0.4, 0.01);
+  EXPECT_NEAR(w.physics.joint_velocity(JointIndex(0)), 0.5, 0.01);
   EXPECT_NEAR(w.physics.pose(w.body("m/arm")).translation.y(), 0.4, 0.01);
   EXPECT_NEAR(w.physics.pose(w.body("m/arm")).translation.z(), 1.0, 0.01);
   w.run(1.0);
-  EXPECT_NEAR(w.physics.joint_position(0), 0.6, 0.01);
+  EXPECT_NEAR(w.physics.joint_position(JointIndex(0)), 0.6, 0.01);
 }
 
 TEST(Joints, LinksOfAModelCollideOnlyWhenItSaysSo) {
@@ -373,7 +376,8 @@ TEST(Joints, LinksOfAModelCollideOnlyWhenItSaysSo) {
             "</self_collide><link name='low'><pose>0 0 0.1 0 0 0</pose>" + box +
             "</link><link name='high'><pose>0 0 0.31 0 0 0</pose>" + box + "</link></model>");
     w.run(1.0);
-    return w.physics.pose(1).translation.z() - w.physics.pose(0).translation.z();
+    return w.physics.pose(BodyIndex(1)).translation.z() -
+           w.physics.pose(BodyIndex(0)).translation.z();
   };
   EXPECT_NEAR(gap(true), 0.2, 2e-3);
   EXPECT_NEAR(gap(false), 0.0, 2e-3);
@@ -386,15 +390,16 @@ TEST(Physics, AGuidedBodyEndsExactlyThereUnlessItTouches) {
   const int box = w.body("box/l");
   for (int i = 1; i <= 60; ++i) {
     const Pose end{Quat::Identity(), {0.01 * i, 0, 0.5}};
-    w.physics.guide(box, {{1, 0, 0}, Vec3::Zero()}, end);
+    w.physics.guide(BodyIndex(box), {{1, 0, 0}, Vec3::Zero()}, end);
     w.physics.step();
-    EXPECT_EQ(w.physics.pose(box).translation, end.translation);
+    EXPECT_EQ(w.physics.pose(BodyIndex(box)).translation, end.translation);
   }
   for (int i = 61; i <= 120; ++i) {
-    w.physics.guide(box, {{1, 0, 0}, Vec3::Zero()},
-                    {Quat::Identity(), {w.physics.pose(box).translation.x() + 0.01, 0, 0.5}});
+    w.physics.guide(
+        BodyIndex(box), {{1, 0, 0}, Vec3::Zero()},
+        {Quat::Identity(), {w.physics.pose(BodyIndex(box)).translation.x() + 0.01, 0, 0.5}});
     w.physics.step();
-    EXPECT_LT(w.physics.pose(box).translation.x(),
+    EXPECT_LT(w.physics.pose(BodyIndex(box)).translation.x(),
               0.801);  // the wall's face at 0.9, half a box before it
   }
 }
@@ -411,11 +416,11 @@ TEST(Physics, ARollingCylinderKeepsItsSpeed) {
               step_us);
       w.run(0.5);
       const int body = w.body("barrel/l");
-      w.physics.set_twist(body, {{0.3, 0, 0}, {0, 2, 0}});
+      w.physics.set_twist(BodyIndex(body), {{0.3, 0, 0}, {0, 2, 0}});
       w.run(10);
-      EXPECT_NEAR(w.physics.twist(body).linear.x(), 0.3, 1e-3) << step_us;
-      EXPECT_NEAR(w.physics.pose(body).translation.x(), 3.0, 1e-2) << step_us;
-      EXPECT_NEAR(w.physics.pose(body).translation.y(), 0.0, 1e-2) << step_us;
+      EXPECT_NEAR(w.physics.twist(BodyIndex(body)).linear.x(), 0.3, 1e-3) << step_us;
+      EXPECT_NEAR(w.physics.pose(BodyIndex(body)).translation.x(), 3.0, 1e-2) << step_us;
+      EXPECT_NEAR(w.physics.pose(BodyIndex(body)).translation.y(), 0.0, 1e-2) << step_us;
     }
   }
 }
@@ -440,8 +445,8 @@ TEST(Physics, AStaticMeshCarriesAtItsExactHeight) {
   World w(thing("m", "0 0 1 0 0 0", slab, 0) + thing("ball", "0.3 0.2 1.31 0 0 0", kBall, 1) +
           thing("box", "-0.3 0.2 1.31 0 0 0", kBox, 1));
   w.run(0.5);
-  EXPECT_NEAR(w.physics.pose(0).translation.z(), 1.3, 1e-3);
-  EXPECT_NEAR(w.physics.pose(1).translation.z(), 1.3, 1e-3);
+  EXPECT_NEAR(w.physics.pose(BodyIndex(0)).translation.z(), 1.3, 1e-3);
+  EXPECT_NEAR(w.physics.pose(BodyIndex(1)).translation.z(), 1.3, 1e-3);
 }
 
 TEST(Physics, ContactsNameTheShapesThatTouch) {

@@ -24,16 +24,15 @@ std::string stack(int boxes, double top = 1.0, const std::string& at = "0 0") {
 double drift(World& w, double seconds, const std::string& first = "s0/l") {
   std::vector<Vec3> start;
   for (size_t i = 0; i < w.layout.bodies.size(); ++i)
-    start.push_back(w.physics.pose(static_cast<int>(i)).translation);
+    start.push_back(w.physics.pose(BodyIndex(i)).translation);
   const int body = w.body(first);
   for (int i = 0; i < static_cast<int>(seconds * 1e6) / w.world->step_us; ++i) {
-    w.physics.wake(body);
+    w.physics.wake(BodyIndex(body));
     w.physics.step();
   }
   double furthest = 0.0;
   for (size_t i = 0; i < start.size(); ++i)
-    furthest =
-        std::max(furthest, (w.physics.pose(static_cast<int>(i)).translation - start[i]).norm());
+    furthest = std::max(furthest, (w.physics.pose(BodyIndex(i)).translation - start[i]).norm());
   return furthest;
 }
 

@@ -60,7 +60,7 @@ TEST(StateCheck, NamesWhatIsNotFinite) {
   EXPECT_THAT(error_with([](Snapshot& s) { s.joint_efforts[0] = kInfinity; }),
               HasSubstr("the joint 'm/j'"));
   EXPECT_THAT(error_with([](Snapshot& s) {
-                s.contacts.push_back({}), s.contacts.back().body_b = 1,
+                s.contacts.push_back({}), s.contacts.back().body_b = BodyIndex(1),
                                           s.contacts.back().force = kNaN;
               }),
               HasSubstr("a contact of the body 'm/b'"));
@@ -78,7 +78,8 @@ TEST(StateCheck, EffortsThatAreAllowedStayFinite) {
     PhysicsWorld physics(*world, layout);
     Snapshot snapshot;
     for (int step = 0; step < 500; ++step) {
-      physics.apply_joint_effort(0, step % 2 ? quantity::kEffort.most : -quantity::kEffort.most);
+      physics.apply_joint_effort(JointIndex(0),
+                                 step % 2 ? quantity::kEffort.most : -quantity::kEffort.most);
       ASSERT_NO_THROW(physics.step()) << mass << " " << moment << " " << step;
       physics.read(snapshot);
       ASSERT_NO_THROW(check_finite(snapshot, *world, layout))
@@ -93,7 +94,7 @@ TEST(StateCheck, StepsThrowForWhatIsNotFinite) {
   const auto world = hinged("1", "1");
   const model::BodyLayout layout(*world);
   PhysicsWorld physics(*world, layout);
-  physics.set_twist(1, {Vec3(0, 0, kNaN), Vec3::Zero()});
+  physics.set_twist(BodyIndex(1), {Vec3(0, 0, kNaN), Vec3::Zero()});
   EXPECT_THROW(physics.step(), StateError);
 }
 

@@ -145,7 +145,7 @@ TEST(Surfaces, ABounceHasTheFilesRestitution) {
       bool hit = false;
       for (int64_t t = 0; t < 1'300'000; t += step_us) {
         w.physics.step();
-        hit |= w.physics.twist(0).linear.z() > 0.0;
+        hit |= w.physics.twist(BodyIndex(0)).linear.z() > 0.0;
         if (hit) highest = std::max(highest, w.position("b/l").z() - 0.1);
       }
       EXPECT_NEAR(highest, e * e, 2e-3) << e << " at " << step_us;

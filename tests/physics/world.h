@@ -27,11 +27,11 @@ class World {
     const auto steps = static_cast<int64_t>(std::llround(seconds * 1e6)) / world->step_us;
     for (int64_t i = 0; i < steps; ++i) physics.step();
   }
-  int body(const std::string& name) const {
-    for (size_t i = 0; i < layout.bodies.size(); ++i) {
-      if (layout.bodies[i].name == name) return static_cast<int>(i);
+  BodyIndex body(const std::string& name) const {
+    for (const BodyIndex i : layout.bodies.indices()) {
+      if (layout.bodies[i].name == name) return i;
     }
-    return -1;
+    return {};
   }
   Vec3 position(const std::string& name) const { return physics.pose(body(name)).translation; }
   std::shared_ptr<const model::WorldModel> world;

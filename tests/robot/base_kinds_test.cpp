@@ -20,13 +20,12 @@ class Bases : public Sim {
  public:
   explicit Bases(const std::string& models, int64_t step_us = 5000) : Sim(models, step_us) {}
   void twist(double vx, double vy, double omega) {
-    robots.apply({0, VelocityCommand{vx, vy, omega}});
+    robots.apply({RobotIndex(0), VelocityCommand{vx, vy, omega}});
   }
   double yaw() const { return heading(robot().X_WBase.rotation); }
   double angle(const std::string& joint) const {
     for (size_t i = 0; i < layout.wheels.size(); ++i) {
-      if (world->models.back().model->joints[static_cast<size_t>(layout.wheels[i].joint)].name ==
-          joint)
+      if (world->models.back().model->joints[layout.wheels[i].joint].name == joint)
         return state.wheel_angles[i];
     }
     return NAN;
@@ -92,8 +91,9 @@ TEST(Mecanum, MovesSidewaysAndItsWheelsRoll) {
 TEST(Mecanum, TakesRatesOfItsWheels) {
   Bases sim(shipped("mecanum"));
   const double vx = 0.2, vy = -0.1, omega = 0.5, r = 0.08, arm = 0.35;
-  sim.robots.apply({0, WheelCommand{{(vx - vy - arm * omega) / r, (vx + vy - arm * omega) / r,
-                                     (vx + vy + arm * omega) / r, (vx - vy + arm * omega) / r}}});
+  sim.robots.apply(
+      {RobotIndex(0), WheelCommand{{(vx - vy - arm * omega) / r, (vx + vy - arm * omega) / r,
+                                    (vx + vy + arm * omega) / r, (vx - vy + arm * omega) / r}}});
   sim.run(0.5);
   EXPECT_NEAR(sim.robot().twist.linear.x(), vx, 1e-12);
   EXPECT_NEAR(sim.robot().twist.linear.y(), vy, 1e-12);

@@ -32,14 +32,13 @@ class OnWheels : public Sim {
   explicit OnWheels(const std::string& models) : Sim(models) {}
   void hold(double vx, double vy, double omega, double seconds) {
     for (double t = 0; t < seconds - 1e-9; t += 0.25) {
-      robots.apply({0, VelocityCommand{vx, vy, omega}});
+      robots.apply({RobotIndex(0), VelocityCommand{vx, vy, omega}});
       run(std::min(0.25, seconds - t));
     }
   }
   double steering_of(const std::string& joint) const {
     for (size_t i = 0; i < layout.wheels.size(); ++i) {
-      if (world->models.back().model->joints[static_cast<size_t>(layout.wheels[i].joint)].name ==
-          joint)
+      if (world->models.back().model->joints[layout.wheels[i].joint].name == joint)
         return state.wheel_angles[i];
     }
     return NAN;

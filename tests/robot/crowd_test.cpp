@@ -24,16 +24,14 @@ class People : public Sim {
  public:
   explicit People(const std::string& models, int64_t step_us = 10'000) : Sim(models, step_us) {
     for (size_t i = 0; i < layout.bodies.size(); ++i) {
-      const auto& model = *world->models[static_cast<size_t>(layout.bodies[i].instance)].model;
+      const auto& model = *world->models[layout.bodies[i].instance].model;
       if (model.path) people.push_back(static_cast<int>(i));
     }
   }
-  Vec3 at(size_t i) const { return state.bodies[static_cast<size_t>(people.at(i))].translation; }
-  Vec3 velocity_of(size_t i) const {
-    return state.body_twists[static_cast<size_t>(people.at(i))].linear;
-  }
+  Vec3 at(size_t i) const { return state.bodies[people.at(i)].translation; }
+  Vec3 velocity_of(size_t i) const { return state.body_twists[people.at(i)].linear; }
   bool is_of(size_t i, const std::string& crowd) const {
-    return layout.bodies[static_cast<size_t>(people.at(i))].name.starts_with(crowd + "_");
+    return layout.bodies[people.at(i)].name.starts_with(crowd + "_");
   }
   double nearest_pair() const {
     double least = 1e9;

@@ -26,7 +26,8 @@ std::vector<Pose> ram(const std::string& type, int steps) {
   std::vector<Pose> poses;
   for (int step = 0; step < steps; ++step) {
     if (step % 50 == 0) {
-      for (int i = 0; i < 30; ++i) sim.velocity(0.3 + 0.02 * i, (i + step / 50) % 3 - 1.0, i);
+      for (int i = 0; i < 30; ++i)
+        sim.velocity(0.3 + 0.02 * i, (i + step / 50) % 3 - 1.0, RobotIndex(i));
     }
     sim.step();
     poses.insert(poses.end(), sim.state.bodies.begin(), sim.state.bodies.end());

@@ -36,14 +36,11 @@ std::string gimbal() {
 
 struct Gimbal : ::testing::Test {
   void tell(const std::string& joint, int8_t mode, double value) {
-    sim.robots.apply({0, JointCommand{{joint}, {mode}, {value}}});
+    sim.robots.apply({RobotIndex(0), JointCommand{{joint}, {mode}, {value}}});
   }
   size_t index(const std::string& joint) const {
     for (size_t i = 0; i < sim.layout.joints.size(); ++i) {
-      if (sim.world->models[1]
-              .model->joints[static_cast<size_t>(sim.layout.joints[i].joint)]
-              .name == joint)
-        return i;
+      if (sim.world->models[1].model->joints[sim.layout.joints[i].joint].name == joint) return i;
     }
     throw std::logic_error("no joint " + joint);
   }
@@ -67,8 +64,7 @@ TEST_F(Gimbal, GoesToItsPositionsWhileItDrives) {
   EXPECT_NEAR(position("lift"), 0.25, 5e-3);
   EXPECT_NEAR(sim.yaw(), 0.8, 1e-9);  // the drive keeps to its closed form
   // Both turn about the vertical: the head looks where the sum points.
-  EXPECT_NEAR(heading(sim.state.bodies[static_cast<size_t>(sim.body("r/head"))].rotation), 1.6,
-              1e-2);
+  EXPECT_NEAR(heading(sim.state.bodies[sim.body("r/head")].rotation), 1.6, 1e-2);
 }
 
 TEST_F(Gimbal, APositionBeyondTheLimitIsTheLimit) {
@@ -160,7 +156,7 @@ TEST_F(Gimbal, ARateGainComesByMessage) {
 TEST_F(Gimbal, SettingsEndWhenItStartsAgain) {
   tell("tilt", joint_command_t::VELOCITY_LIMIT, 0.1);
   tell("pan", joint_command_t::POSITION_GAIN, 1e-3);
-  sim.robots.start_again(1);
+  sim.robots.start_again(InstanceIndex(1));
   tell("tilt", kVelocity, 2.0);
   tell("pan", kPosition, 1.0);
   sim.run(1.0);
@@ -179,9 +175,9 @@ TEST_F(Gimbal, SettingsThatAreNotAllowedAreRefused) {
         Case{joint_command_t::EFFORT_LIMIT, -1e-3}, Case{joint_command_t::VELOCITY_LIMIT, -1.0},
         Case{joint_command_t::VELOCITY_LIMIT, std::nan("")}, Case{7, 1.0}, Case{-1, 1.0}}) {
     // The first of the two is fine; with the other one neither counts.
-    sim.robots.apply({0, JointCommand{{"tilt", "tilt"},
-                                      {joint_command_t::VELOCITY_LIMIT, each.mode},
-                                      {0.1, each.value}}});
+    sim.robots.apply({RobotIndex(0), JointCommand{{"tilt", "tilt"},
+                                                  {joint_command_t::VELOCITY_LIMIT, each.mode},
+                                                  {0.1, each.value}}});
     sim.step();
     EXPECT_EQ(sim.state.motion_ends.size(), 1u) << int{each.mode} << " " << each.value;
   }

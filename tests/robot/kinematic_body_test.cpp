@@ -19,8 +19,7 @@ TEST(KinematicBody, CargoRidesOnItsDeck) {
   sim.run(0.5);
   const int cargo = sim.body("cargo/l");
   const auto on_deck = [&] {
-    return Vec3(sim.robot().X_WBase.inverse() *
-                sim.state.bodies[static_cast<size_t>(cargo)].translation);
+    return Vec3(sim.robot().X_WBase.inverse() * sim.state.bodies[cargo].translation);
   };
   const Vec3 start = on_deck();
   sim.velocity(0.6, 0.0);
@@ -63,7 +62,7 @@ TEST(KinematicBody, ASlopeCanBeTooSteep) {
 // On its back its wheels drive nothing, and friction stops it.
 TEST(KinematicBody, OnItsBackItIsABody) {
   Sim sim(plane_sdf() + robot_sdf("r", "0 0 0.24 3.14159265358979 0 0", kNoWatchdog));
-  sim.robots.set_twist(1, {{1.0, 0, 0}, Vec3::Zero()});
+  sim.robots.set_twist(InstanceIndex(1), {{1.0, 0, 0}, Vec3::Zero()});
   sim.velocity(0.5, 0.0);
   sim.run(3.0);
   const Vec3 rest = sim.position();

@@ -89,8 +89,8 @@ TEST(KinematicContact, PushesALightBoxNotAHeavyOne) {
 TEST(KinematicContact, AnotherRobotStopsIt) {
   Sim sim(plane_sdf() + robot_sdf("a", "0 0 0 0 0 0", kNoWatchdog) +
           robot_sdf("b", "1.5 0 0 0 0 3.14159265358979", kNoWatchdog));
-  sim.velocity(0.5, 0.0, 0);
-  sim.velocity(0.5, 0.0, 1);
+  sim.velocity(0.5, 0.0, RobotIndex(0));
+  sim.velocity(0.5, 0.0, RobotIndex(1));
   sim.run(4.0);
   EXPECT_NEAR(sim.position(1).x() - sim.position(0).x(), 2 * kFront_m, 5e-3);
   EXPECT_NEAR(sim.position(0).x(), 0.5, 0.03);  // alike, they hold each other in the middle
@@ -99,7 +99,7 @@ TEST(KinematicContact, AnotherRobotStopsIt) {
 TEST(KinematicContact, APrimitiveBlockedByAWallEnds) {
   Sim sim(plane_sdf() + robot_sdf("r", "0 0 0 0 0 0", limits(0.6, 1.0, 0.5, 0.5, 1.0)) +
           box_sdf("wall", "1.1 0 0.5 0 0 0", "0.2 4 1"));
-  sim.move(Move::ADVANCE, 3.0, 0, 0, 0, 0, 0, 9);
+  sim.move(Move::ADVANCE, 3.0, 0, 0, 0, 0, RobotIndex(0), 9);
   sim.run(6.0);
   EXPECT_EQ(sim.robot().motion.id, 9);
   EXPECT_EQ(sim.robot().motion.state, Status::STATE_ENDED);
@@ -173,7 +173,8 @@ TEST(KinematicContact, BackingOffAWallIsNotBlockedByIt) {
             box_sdf("wall", "1.1 0 0.5 0 0 0", "0.2 4 1"));
     sim.move(Move::ADVANCE, 3.0);
     while (sim.robot().motion.reason != Status::REASON_BLOCKED) sim.step();
-    primitive ? sim.move(Move::ADVANCE, -0.5, 0, 0, 0, 0, 0, 7) : sim.velocity(-0.2, 0.0);
+    primitive ? sim.move(Move::ADVANCE, -0.5, 0, 0, 0, 0, RobotIndex(0), 7)
+              : sim.velocity(-0.2, 0.0);
     for (int i = 0; i < 1200; ++i) {
       sim.step();
       EXPECT_NE(sim.robot().motion.reason, Status::REASON_BLOCKED);
@@ -220,7 +221,7 @@ TEST(KinematicContact, ARobotThatBelievesItsWheelsIsBlockedAllTheSame) {
 std::vector<std::string> collides_with(const Sim& sim, int robot = 0) {
   std::vector<std::string> names;
   for (const Collision& each : sim.state.collisions) {
-    const Contact& contact = sim.state.contacts[static_cast<size_t>(each.contact)];
+    const Contact& contact = sim.state.contacts[each.contact];
     if (each.robot != robot) continue;
     names.push_back(
         model::body_name(*sim.world, sim.layout, each.as_a ? contact.link_b : contact.link_a));
@@ -240,8 +241,8 @@ TEST(KinematicContact, CollisionsAreWithNeitherTheFloorNorTheCargo) {
     sim.run(1.0);
     EXPECT_TRUE(sim.state.collisions.empty()) << drive;
     EXPECT_FALSE(sim.state.contacts.empty()) << drive;  // the cargo's
-    sim.velocity(0.5, 0.0, 0);
-    sim.velocity(0.3, 0.0, 1);
+    sim.velocity(0.5, 0.0, RobotIndex(0));
+    sim.velocity(0.3, 0.0, RobotIndex(1));
     sim.run(3.0);
     EXPECT_EQ(collides_with(sim, 0), (std::vector<std::string>{"b/base"})) << drive;
     EXPECT_EQ(collides_with(sim, 1), (std::vector<std::string>{"a/base"})) << drive;

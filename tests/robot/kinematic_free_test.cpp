@@ -135,7 +135,7 @@ TEST(KinematicFree, HeadingIsInOdomAndTheShortestWay) {
   EXPECT_NEAR(wrap_angle(sim.yaw() - (3.0 - 3.0)), 0.0, 1e-9);
   EXPECT_NEAR(sim.robot().motion.done, 2 * M_PI - 3.5,
               1e-9);  // -3.0 - 0.5 = -3.5: the other way is shorter
-  sim.robots.apply({0, ResetOdometry{}});
+  sim.robots.apply({RobotIndex(0), ResetOdometry{}});
   sim.move(Move::HEADING, 0.25);
   sim.run(3.0);
   EXPECT_NEAR(sim.yaw(), 0.25, 1e-9);
@@ -165,7 +165,7 @@ TEST(KinematicFree, TakeOverWithinTheLimits) {
   run(0.8);
   sim.move(Move::ARC, 2.0, 0.3);
   run(0.7);
-  sim.robots.apply({0, WheelCommand{{12.0, -4.0}}});
+  sim.robots.apply({RobotIndex(0), WheelCommand{{12.0, -4.0}}});
   run(0.3);
   sim.move(Move::HEADING, -2.0);
   run(0.4);
@@ -207,7 +207,7 @@ TEST(KinematicFree, RepeatedCommandsFeedTheWatchdogAndChangeNothing) {
 TEST(KinematicFree, RestingRobotsSleepAndWakeForCommands) {
   Sim sim(free_robot());
   sim.run(1.0);
-  EXPECT_TRUE(sim.physics.sleeping(0));
+  EXPECT_TRUE(sim.physics.sleeping(BodyIndex(0)));
   sim.velocity(0.5, 0.0);
   sim.run(0.5);
   EXPECT_GT(sim.position().x(), 0.05);
@@ -221,27 +221,28 @@ struct Refused {
 TEST(Commands, RefusedOnesChangeNothingAndSayWhy) {
   const double nan = std::nan(""), inf = INFINITY;
   const Refused table[] = {
-      {{0, VelocityCommand{nan, 0, 0}}, Status::REASON_NOT_FINITE},
-      {{0, VelocityCommand{0, inf, 0}}, Status::REASON_NOT_FINITE},
-      {{0, VelocityCommand{0, 0, -inf}}, Status::REASON_NOT_FINITE},
-      {{0, VelocityCommand{0.5, 0.1, 0}}, Status::REASON_BAD_VALUE},
-      {{0, WheelCommand{{1, nan}}}, Status::REASON_NOT_FINITE},
-      {{0, WheelCommand{{}}}, Status::REASON_BAD_VALUE},
-      {{0, WheelCommand{{1}}}, Status::REASON_BAD_VALUE},
-      {{0, WheelCommand{{1, 2, 3}}}, Status::REASON_BAD_VALUE},
-      {{0, MoveCommand{7, 0, 1, 0, 0, 0, 0}}, Status::REASON_BAD_KIND},
-      {{0, MoveCommand{7, 6, 1, 0, 0, 0, 0}}, Status::REASON_BAD_KIND},
-      {{0, MoveCommand{7, -3, 1, 0, 0, 0, 0}}, Status::REASON_BAD_KIND},
-      {{0, MoveCommand{7, Move::ADVANCE, nan, 0, 0, 0, 0}}, Status::REASON_NOT_FINITE},
-      {{0, MoveCommand{7, Move::ADVANCE, 1, 0, 0, inf, 0}}, Status::REASON_NOT_FINITE},
-      {{0, MoveCommand{7, Move::ADVANCE, 1, 0, -0.5, 0, 0}}, Status::REASON_BAD_VALUE},
-      {{0, MoveCommand{7, Move::ADVANCE, 1e300, 0, 0, 0, 0}}, Status::REASON_BAD_VALUE},
-      {{0, MoveCommand{7, Move::ADVANCE, 1, 0, 1e-300, 0, 0}}, Status::REASON_BAD_VALUE},
-      {{0, MoveCommand{7, Move::ARC, 1, 0, 0, 0, 0}}, Status::REASON_BAD_VALUE},
-      {{0, MoveCommand{7, Move::ARC, 1, -2, 0, 0, 0}}, Status::REASON_BAD_VALUE},
-      {{0, MoveCommand{7, Move::ARC, 1e5, 1e5, 0, 0, 0}}, Status::REASON_BAD_VALUE},
-      {{0, JointCommand{{"arm"}, {1}, {0.5}}}, Status::REASON_BAD_VALUE},
-      {{0, JointCommand{{"arm"}, {1}, {}}}, Status::REASON_BAD_VALUE},
+      {{RobotIndex(0), VelocityCommand{nan, 0, 0}}, Status::REASON_NOT_FINITE},
+      {{RobotIndex(0), VelocityCommand{0, inf, 0}}, Status::REASON_NOT_FINITE},
+      {{RobotIndex(0), VelocityCommand{0, 0, -inf}}, Status::REASON_NOT_FINITE},
+      {{RobotIndex(0), VelocityCommand{0.5, 0.1, 0}}, Status::REASON_BAD_VALUE},
+      {{RobotIndex(0), WheelCommand{{1, nan}}}, Status::REASON_NOT_FINITE},
+      {{RobotIndex(0), WheelCommand{{}}}, Status::REASON_BAD_VALUE},
+      {{RobotIndex(0), WheelCommand{{1}}}, Status::REASON_BAD_VALUE},
+      {{RobotIndex(0), WheelCommand{{1, 2, 3}}}, Status::REASON_BAD_VALUE},
+      {{RobotIndex(0), MoveCommand{7, 0, 1, 0, 0, 0, 0}}, Status::REASON_BAD_KIND},
+      {{RobotIndex(0), MoveCommand{7, 6, 1, 0, 0, 0, 0}}, Status::REASON_BAD_KIND},
+      {{RobotIndex(0), MoveCommand{7, -3, 1, 0, 0, 0, 0}}, Status::REASON_BAD_KIND},
+      {{RobotIndex(0), MoveCommand{7, Move::ADVANCE, nan, 0, 0, 0, 0}}, Status::REASON_NOT_FINITE},
+      {{RobotIndex(0), MoveCommand{7, Move::ADVANCE, 1, 0, 0, inf, 0}}, Status::REASON_NOT_FINITE},
+      {{RobotIndex(0), MoveCommand{7, Move::ADVANCE, 1, 0, -0.5, 0, 0}}, Status::REASON_BAD_VALUE},
+      {{RobotIndex(0), MoveCommand{7, Move::ADVANCE, 1e300, 0, 0, 0, 0}}, Status::REASON_BAD_VALUE},
+      {{RobotIndex(0), MoveCommand{7, Move::ADVANCE, 1, 0, 1e-300, 0, 0}},
+       Status::REASON_BAD_VALUE},
+      {{RobotIndex(0), MoveCommand{7, Move::ARC, 1, 0, 0, 0, 0}}, Status::REASON_BAD_VALUE},
+      {{RobotIndex(0), MoveCommand{7, Move::ARC, 1, -2, 0, 0, 0}}, Status::REASON_BAD_VALUE},
+      {{RobotIndex(0), MoveCommand{7, Move::ARC, 1e5, 1e5, 0, 0, 0}}, Status::REASON_BAD_VALUE},
+      {{RobotIndex(0), JointCommand{{"arm"}, {1}, {0.5}}}, Status::REASON_BAD_VALUE},
+      {{RobotIndex(0), JointCommand{{"arm"}, {1}, {}}}, Status::REASON_BAD_VALUE},
   };
   for (const Refused& refused : table) {
     Sim sim(free_robot("<ruedo:watchdog>0</ruedo:watchdog>")),
@@ -271,10 +272,10 @@ TEST(Commands, UnknownRobotsAndThoseWithoutADriveAreNotHarmed) {
   Sim sim(plane_sdf() + robot_sdf("r", "0 0 0 0 0 0") +
           "<model name='mast'><static>true</static><link name='l'><sensor name='s' "
           "type='gpu_lidar'/></link></model>");
-  sim.robots.apply({-1, VelocityCommand{1, 0, 0}});
-  sim.robots.apply({99, VelocityCommand{1, 0, 0}});
+  sim.robots.apply({RobotIndex(), VelocityCommand{1, 0, 0}});
+  sim.robots.apply({RobotIndex(99), VelocityCommand{1, 0, 0}});
   ASSERT_EQ(sim.layout.robots.size(), 2u);
-  sim.velocity(1, 0, 1);
+  sim.velocity(1, 0, RobotIndex(1));
   sim.step();
   ASSERT_EQ(sim.state.motion_ends.size(), 1u);
   EXPECT_EQ(sim.state.motion_ends[0].robot, 1);
@@ -284,12 +285,12 @@ TEST(Commands, UnknownRobotsAndThoseWithoutADriveAreNotHarmed) {
 
 TEST(Commands, AReplacedPrimitiveAndItsSuccessorShowAtTheSameStep) {
   Sim sim(free_robot());
-  sim.move(Move::ADVANCE, 5.0, 0, 0, 0, 0, 0, 41);
+  sim.move(Move::ADVANCE, 5.0, 0, 0, 0, 0, RobotIndex(0), 41);
   sim.step();
   EXPECT_EQ(sim.robot().motion.id, 41);
   sim.run(1.0);
-  sim.move(Move::ARC, 1.0, 1.0, 0, 0, 0, 0, 42);  // replaced before it began
-  sim.move(Move::ROTATE, 1.0, 0, 0, 0, 0, 0, 43);
+  sim.move(Move::ARC, 1.0, 1.0, 0, 0, 0, RobotIndex(0), 42);  // replaced before it began
+  sim.move(Move::ROTATE, 1.0, 0, 0, 0, 0, RobotIndex(0), 43);
   const double done = sim.robot().motion.done;
   EXPECT_NEAR(done, 0.25 * 1.005 * 1.005, 1e-12);  // half of 0.5 m/s^2 times the time's square
   sim.step();
@@ -298,7 +299,7 @@ TEST(Commands, AReplacedPrimitiveAndItsSuccessorShowAtTheSameStep) {
   EXPECT_EQ(sim.robot().motion.changes, 4);  // 41 began; 41 and 42 ended, 43 began
   ASSERT_EQ(sim.state.motion_ends.size(), 2u);
   for (const int64_t i : {0, 1}) {
-    const MotionState& end = sim.state.motion_ends[static_cast<size_t>(i)].state;
+    const MotionState& end = sim.state.motion_ends[i].state;
     EXPECT_EQ(end.id, 41 + i);
     EXPECT_EQ(end.state, Status::STATE_ENDED);
     EXPECT_EQ(end.reason, Status::REASON_REPLACED);

@@ -134,7 +134,7 @@ TEST_P(OnWheels, PushesALightBox) {
   ASSERT_GE(box, 0);
   sim.velocity(0.3, 0.0);
   sim.run(4.0);
-  EXPECT_GT(sim.state.bodies[static_cast<size_t>(box)].translation.x(),
+  EXPECT_GT(sim.state.bodies[box].translation.x(),
             1.2);  // 1.2 m of way, the first 0.3 without it
   EXPECT_GT(sim.position().x(), 0.9);
   EXPECT_LT(sim.position().x(), 1.25);
@@ -184,18 +184,18 @@ TEST_P(OnWheels, AContactWakesIt) {
           robot_sdf("pusher", "0 0 0 0 0 0", "<ruedo:watchdog>0</ruedo:watchdog>"));
   sim.run(3.0);
   const int body = sim.layout.robots[0].body;
-  EXPECT_TRUE(sim.physics.sleeping(body));
+  EXPECT_TRUE(sim.physics.sleeping(BodyIndex(body)));
   const Vec3 rest = sim.position();
   sim.run(1.0);
   EXPECT_EQ(sim.position(), rest);
-  sim.velocity(0.5, 0.0, 1);
+  sim.velocity(0.5, 0.0, RobotIndex(1));
   sim.run(0.5);
-  EXPECT_TRUE(sim.physics.sleeping(body));  // the other is on its way
+  EXPECT_TRUE(sim.physics.sleeping(BodyIndex(body)));  // the other is on its way
   sim.run(2.5);
   EXPECT_GT(sim.position().x(), rest.x() + 0.01);  // as far as tyres let it go sideways
-  sim.velocity(-0.5, 0.0, 1);
+  sim.velocity(-0.5, 0.0, RobotIndex(1));
   sim.run(3.0);
-  EXPECT_TRUE(sim.physics.sleeping(body));  // left alone, it sleeps again
+  EXPECT_TRUE(sim.physics.sleeping(BodyIndex(body)));  // left alone, it sleeps again
 }
 
 // There by arc, line and turn, and back the same way: what is missing is slip.

@@ -126,14 +126,14 @@ class Sim {
   void run(double seconds) {
     step(static_cast<int64_t>(std::llround(seconds * 1e6)) / world->step_us);
   }
-  void velocity(double v, double omega, int robot = 0) {
+  void velocity(double v, double omega, RobotIndex robot = RobotIndex(0)) {
     robots.apply({robot, VelocityCommand{v, 0.0, omega}});
   }
   void move(int8_t kind, double value, double radius = 0, double speed = 0, double acceleration = 0,
-            double deceleration = 0, int robot = 0, int64_t id = 1) {
+            double deceleration = 0, RobotIndex robot = RobotIndex(0), int64_t id = 1) {
     robots.apply({robot, MoveCommand{id, kind, value, radius, speed, acceleration, deceleration}});
   }
-  const RobotState& robot(int index = 0) const { return state.robots[static_cast<size_t>(index)]; }
+  const RobotState& robot(int index = 0) const { return state.robots[index]; }
   Vec3 position(int index = 0) const { return robot(index).X_WBase.translation; }
   double yaw(int index = 0) const { return heading(robot(index).X_WBase.rotation); }
   int body(const std::string& name) const {

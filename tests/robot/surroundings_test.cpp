@@ -22,13 +22,13 @@ TEST(Belt, CarriesWhatLiesOnIt) {  // turned by 90 degrees: its x is the world's
           box_sdf("box", "0 -2 0.6 0 0 0", "0.2 0.2 0.2", 1.0, 0.8));
   sim.run(1.0);
   const int box = sim.body("box/l"), belt = sim.body("belt/l");
-  EXPECT_NEAR(sim.state.body_twists[static_cast<size_t>(box)].linear.y(), 0.4, 0.02);
-  const double from = sim.state.bodies[static_cast<size_t>(box)].translation.y();
+  EXPECT_NEAR(sim.state.body_twists[box].linear.y(), 0.4, 0.02);
+  const double from = sim.state.bodies[box].translation.y();
   sim.run(2.0);
-  const Vec3 at = sim.state.bodies[static_cast<size_t>(box)].translation;
+  const Vec3 at = sim.state.bodies[box].translation;
   EXPECT_NEAR(at.y() - from, 0.8, 0.02);
   EXPECT_NEAR(at.z(), 0.6, 0.005);
-  EXPECT_EQ(sim.state.bodies[static_cast<size_t>(belt)].translation, Vec3(0, 0, 0.25));
+  EXPECT_EQ(sim.state.bodies[belt].translation, Vec3(0, 0, 0.25));
 }
 
 TEST(Belt, CarriesARobot) {
@@ -46,9 +46,7 @@ TEST(Door, OpensForARobotAndClosesBehindIt) {
             "<ruedo:door><ruedo:open>0 1.1 0 0 0 0</ruedo:open><ruedo:time>1</ruedo:time>"
             "<ruedo:distance>1.5</ruedo:distance><ruedo:hold>0.5</ruedo:hold></ruedo:door>");
   Sim sim(plane_sdf() + door + robot_sdf("r", "0 0 0 0 0 0"));
-  const auto door_at = [&] {
-    return sim.state.bodies[static_cast<size_t>(sim.body("door/l"))].translation.y();
-  };
+  const auto door_at = [&] { return sim.state.bodies[sim.body("door/l")].translation.y(); };
   sim.run(2.0);
   EXPECT_EQ(door_at(), 0.0);
   sim.move(Move::ADVANCE, 4.0, 0, 0.5);
@@ -71,7 +69,7 @@ TEST(Door, TurnsAboutItsModelsOrigin) {  // the hinge
       "</model>";
   Sim sim(plane_sdf() + door + robot_sdf("r", "0 0 0 0 0 0"));
   sim.run(1.0);
-  const Pose X_WL = sim.state.bodies[static_cast<size_t>(sim.body("door/l"))];
+  const Pose X_WL = sim.state.bodies[sim.body("door/l")];
   EXPECT_NEAR(X_WL.translation.x(), 1 - 0.5 * std::sin(1.5), 1e-9);
   EXPECT_NEAR(X_WL.translation.y(), 0.5 - 0.5 * std::cos(1.5), 1e-9);
 }

@@ -88,7 +88,7 @@ TEST(Wheels, SkidSteeringTurnsAsCoulombHasIt) {
 // The wheels turn at the rates they are told.
 TEST(Wheels, WheelCommandsAreWheelRates) {
   Sim sim(plane_sdf() + wheeled("0 0 0 0 0 0", limits(5, 50, 50, 50, 50)));
-  sim.robots.apply({0, WheelCommand{{2.0, 3.0}}});
+  sim.robots.apply({RobotIndex(0), WheelCommand{{2.0, 3.0}}});
   sim.run(2.0);
   EXPECT_NEAR(sim.state.wheel_rates[0], 2.0, 5e-3);
   EXPECT_NEAR(sim.state.wheel_rates[3], 3.0, 5e-3);
@@ -194,7 +194,7 @@ TEST(Wheels, AWallStopsIt) {
 TEST(Wheels, AnotherRobotPushesIt) {
   Sim sim(plane_sdf() + wheeled("0.8 0 0 0 0 0") + robot_sdf("k", "0 0 0 0 0 0", kNoWatchdog));
   sim.run(1.0);
-  sim.velocity(0.5, 0.0, 1);
+  sim.velocity(0.5, 0.0, RobotIndex(1));
   sim.run(3.0);
   EXPECT_GT(sim.position(0).x(), 0.9);
 }

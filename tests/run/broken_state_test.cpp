@@ -25,7 +25,7 @@ TEST(BrokenState, EndsTheRunAndIsNotPublished) {
   const auto take = [&] {
     while (const engine::Batch* batch = simulation.take()) {
       for (int i = 0; i < batch->count; ++i) {
-        const Snapshot& snapshot = batch->snapshots[static_cast<size_t>(i)];
+        const Snapshot& snapshot = batch->snapshots[i];
         EXPECT_EQ(snapshot.step, ++last);
         for (const Pose& pose : snapshot.bodies) EXPECT_TRUE(pose.translation.allFinite());
       }
@@ -39,7 +39,7 @@ TEST(BrokenState, EndsTheRunAndIsNotPublished) {
   ASSERT_NE(thing, bodies.end());
   // No input does this, so the test reaches into the physics, which stands still.
   const_cast<physics::PhysicsWorld&>(simulation.physics())
-      .set_twist(static_cast<int>(thing - bodies.begin()), {Vec3(nan, 0, 0), Vec3::Zero()});
+      .set_twist(BodyIndex(thing - bodies.begin()), {Vec3(nan, 0, 0), Vec3::Zero()});
   pacer.set_limit(1000);
   for (take(); !simulation.over(); take()) wakeup.wait();
   EXPECT_EQ(last, 99);
@@ -75,7 +75,7 @@ TEST(BrokenState, NobodyGoesOnWithoutARenderer) {
   EXPECT_THROW(
       simulation.add_model("second", {Quat::Identity(), {6, 0, 0}}, guest, 10, channels, findings),
       engine::SceneLost);
-  EXPECT_THROW(simulation.remove_model(instance, channels), engine::SceneLost);
+  EXPECT_THROW(simulation.remove_model(InstanceIndex(instance), channels), engine::SceneLost);
   unsetenv("RUEDO_RENDERER");
 }
 

@@ -101,8 +101,8 @@ std::vector<std::map<int64_t, Told>> by_engine(Engine& engine, const std::vector
   std::vector<std::map<int64_t, Told>> told(static_cast<size_t>(engine.worlds()));
   engine.on_message(
       [&](int world, int64_t step, const engine::Channel& channel, std::span<const uint8_t> bytes) {
-        told[static_cast<size_t>(world)][step].emplace_back(
-            channel.bus_name, std::vector<uint8_t>(bytes.begin(), bytes.end()));
+        told[world][step].emplace_back(channel.bus_name,
+                                       std::vector<uint8_t>(bytes.begin(), bytes.end()));
       });
   size_t next = 0;
   for (int64_t step = 0; step < steps;) {
@@ -134,8 +134,8 @@ TEST_P(EngineEqualsServer, ByteForByte) {
   for (const int copy : {0, 2}) {
     auto expected = by_server(world, 7 + static_cast<uint64_t>(copy), commands, kSteps);
     expected.erase(0);  // which the engine computed before anybody listened
-    ASSERT_EQ(told[static_cast<size_t>(copy)].size(), expected.size());
-    EXPECT_TRUE(told[static_cast<size_t>(copy)] == expected) << "copy " << copy;
+    ASSERT_EQ(told[copy].size(), expected.size());
+    EXPECT_TRUE(told[copy] == expected) << "copy " << copy;
   }
   EXPECT_FALSE(told[0] == told[2]) << "other seeds have other noise";
 }

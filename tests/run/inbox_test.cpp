@@ -38,7 +38,7 @@ class InboxTest : public testing::Test {
     inbox_.apply(robots_, faults_, step, batch_);
     std::vector<double> speeds;
     for (int i = 0; i < batch_.applied_count; ++i) {
-      const engine::AppliedCommand& applied = batch_.applied[static_cast<size_t>(i)];
+      const engine::AppliedCommand& applied = batch_.applied[i];
       EXPECT_EQ(applied.step, step);
       velocity_command_t command;
       EXPECT_GT(command.decode(applied.bytes.data(), 0, static_cast<int>(applied.bytes.size())), 0);
@@ -53,7 +53,7 @@ class InboxTest : public testing::Test {
   robot::Robots robots_{*world_, layout_, physics_};
   std::vector<device_info_t> devices_;
   engine::Faults faults_{*world_, layout_, devices_, 1};
-  engine::CommandInbox inbox_{{{"r/velocity", 0, engine::Input::Kind::velocity}}, 1};
+  engine::CommandInbox inbox_{{{"r/velocity", RobotIndex(0), engine::Input::Kind::velocity}}, 1};
   engine::Batch batch_;
 };
 

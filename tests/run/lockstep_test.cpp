@@ -71,15 +71,15 @@ Result run(int clients, Faults faults, unsigned seed) {
         client.step(n);
         step += n;
       }
-      seen[static_cast<size_t>(i)] = client.seen();
+      seen[i] = client.seen();
     });
   }
   for (std::thread& thread : threads) thread.join();
   server.stop();
   running.join();
   for (int i = 1; i < clients; ++i) {
-    EXPECT_EQ(seen[static_cast<size_t>(i)].size(), seen[0].size());
-    for (const auto& [step, here] : seen[static_cast<size_t>(i)]) {
+    EXPECT_EQ(seen[i].size(), seen[0].size());
+    for (const auto& [step, here] : seen[i]) {
       EXPECT_EQ(here.state_hash, seen[0][step].state_hash) << "step " << step;
       EXPECT_TRUE(here.messages == seen[0][step].messages) << "step " << step;
     }

@@ -42,11 +42,11 @@ struct FakeWorld {
     channels.add(velocity);
   }
   Mode::Stage stage(SimTime base_us = 0) {
-    return {&inbox, &gate, &channels, base_us, [](int) { return std::string("r"); }};
+    return {&inbox, &gate, &channels, base_us, [](RobotIndex) { return std::string("r"); }};
   }
   FakeGate gate;
   engine::Channels channels;
-  engine::CommandInbox inbox{{{"r/velocity", 0, engine::Input::Kind::velocity}}, 1};
+  engine::CommandInbox inbox{{{"r/velocity", RobotIndex(0), engine::Input::Kind::velocity}}, 1};
 };
 
 std::vector<uint8_t> forward() {
@@ -112,7 +112,7 @@ class LockstepModeTest : public testing::Test {
     request_t request{};
     request.kind = request_t::GRANT;
     request.body = engine::encoded(body);
-    return lockstep_->grant(request, sessions_[static_cast<size_t>(client)]);
+    return lockstep_->grant(request, sessions_[client]);
   }
   void join_all() {
     for (size_t i = 0; i < sessions_.size(); ++i)

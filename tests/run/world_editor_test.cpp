@@ -31,7 +31,7 @@ TEST(WorldEditor, FindsTheFirstUnusedName) {
 
 TEST(WorldEditor, NamesOfTheRemovedAreFree) {
   model::WorldModel world = with({"cart", "cart_2"});
-  WorldEditor(world).remove(0);
+  WorldEditor(world).remove(InstanceIndex(0));
   EXPECT_EQ(find_model(world, "cart"), -1);
   EXPECT_EQ(find_model(world, "cart_2"), 1);
   EXPECT_EQ(unused_name(world, "cart"), "cart");
@@ -41,7 +41,7 @@ TEST(WorldEditor, PlacesAModelWhereOneOfItsKindWas) {
   model::WorldModel world = with({"a", "b", "c"});
   WorldEditor editor(world);
   const auto model = world.models[1].model;
-  editor.remove(1);
+  editor.remove(InstanceIndex(1));
   const WorldEditor::Placed other = editor.place("d", Pose{}, made());
   EXPECT_EQ(other.instance, 3);
   EXPECT_FALSE(other.reused);

@@ -87,8 +87,8 @@ TEST(RayScene, RandomWorldsEqualTheReference) {
     const std::vector<Ray> rays = random_rays(random, 600, size);
     std::vector<Hit> fast(rays.size()), slow(rays.size());
     for (int round = 0; round < 3; ++round) {
-      const int ignored =
-          round == 0 ? -1 : static_cast<int>(random.bits() % scenes.layout->links.size());
+      const LinkIndex ignored =
+          round == 0 ? LinkIndex() : LinkIndex(random.bits() % scenes.layout->links.size());
       scenes.fast->cast(rays, fast, ignored);
       scenes.slow->cast(rays, slow, ignored);
       for (size_t i = 0; i < rays.size(); ++i) {
@@ -143,7 +143,7 @@ TEST(RayScene, TiesGoToTheLowestLinkAndShape) {
       EXPECT_EQ(hit.range, 4.0);
       EXPECT_EQ(hit.link, 1);
       EXPECT_EQ(hit.shape, 1);
-      hit = scene->cast({Vec3::Zero(), Vec3::UnitX()}, 1);
+      hit = scene->cast({Vec3::Zero(), Vec3::UnitX()}, LinkIndex(1));
       EXPECT_EQ(hit.range, 4.0);
       EXPECT_EQ(hit.link, 2);
       EXPECT_EQ(scene->cast({{5, 0, 0}, Vec3::UnitX()}).link, 1);  // inside of all
@@ -212,9 +212,9 @@ TEST(RayScene, WheelsTurn) {
   Scenes scenes;
   scenes.world.add({}, geometry(Shape::box, {0.1, 0.1, 1.0}), false);
   scenes.layout = std::make_unique<model::BodyLayout>(scenes.world.model);
-  scenes.layout->links[0].wheel = 0;
+  scenes.layout->links[0].wheel = WheelIndex(0);
   model::WheelPlacement wheel;
-  wheel.link = 0;
+  wheel.link = LinkIndex(0);
   wheel.axis_in_L = Vec3::UnitY();
   scenes.layout->wheels.push_back(wheel);
   for (const Backend backend : {Backend::embree, Backend::reference}) {
@@ -249,15 +249,15 @@ TEST(RayScene, WheelsTurnAboutTheirAxisWhereverTheirLinksAre) {
   model->links.push_back(cap);
   model::Joint joint;
   joint.type = model::JointType::fixed;
-  joint.parent = 0;
-  joint.child = 1;
+  joint.parent = ModelLinkIndex(0);
+  joint.child = ModelLinkIndex(1);
   model->joints.push_back(joint);
   world.model.models[0].model = model;
   model::BodyLayout layout(world.model);
   ASSERT_EQ(layout.bodies.size(), 1u);
-  layout.links[0].wheel = layout.links[1].wheel = 0;
+  layout.links[0].wheel = layout.links[1].wheel = WheelIndex(0);
   model::WheelPlacement wheel;
-  wheel.link = 0;
+  wheel.link = LinkIndex(0);
   wheel.center_in_L = Vec3(1, 0, 0);
   layout.wheels.push_back(wheel);
   for (const Backend backend : {Backend::embree, Backend::reference}) {

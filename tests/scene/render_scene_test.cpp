@@ -152,14 +152,14 @@ TEST(RenderScene, WheelsTurnAboutTheirAxisWhereverTheirLinksAre) {
       Vec3(1, 0, 0.5);  // in the model: (3, 1, 1.5)
   model::Joint joint;
   joint.type = model::JointType::fixed;
-  joint.parent = 0;
-  joint.child = 1;
+  joint.parent = ModelLinkIndex(0);
+  joint.child = ModelLinkIndex(1);
   model->joints.push_back(joint);
   w.world.models[0].model = model;
   model::BodyLayout layout(w.world);
-  layout.links[0].wheel = layout.links[1].wheel = 0;
+  layout.links[0].wheel = layout.links[1].wheel = WheelIndex(0);
   model::WheelPlacement wheel;
-  wheel.link = 0;
+  wheel.link = LinkIndex(0);
   wheel.center_in_L = Vec3(3, 0, 1);
   layout.wheels.push_back(wheel);
   Snapshot snapshot = start(layout);

@@ -82,13 +82,12 @@ struct Shot {
   camera_info_t info() const { return Device::decode<camera_info_t>(out, channel("/info")).at(0); }
   // Bytes of channel c at (u, v) of a raw picture.
   static int value(const image_t& image, int u, int v, int c = 0) {
-    return image
-        .data[static_cast<size_t>(v * image.row_stride + u * (image.row_stride / image.width) + c)];
+    return image.data[v * image.row_stride + u * (image.row_stride / image.width) + c];
   }
   float depth(int u, int v) const {
     const image_t image = this->image("/depth");
     float metres;
-    std::memcpy(&metres, &image.data[static_cast<size_t>(v * image.row_stride + 4 * u)], 4);
+    std::memcpy(&metres, &image.data[v * image.row_stride + 4 * u], 4);
     return metres;
   }
 

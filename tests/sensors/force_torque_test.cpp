@@ -125,8 +125,8 @@ TEST(ForceTorque, AnArmThatBeginsToTurn) {
 TEST(ForceTorque, ContactsTakeTheirPart) {
   Bench bench(rig(""));
   Contact contact;
-  contact.link_a = 2;
-  contact.body_a = static_cast<int>(bench.body(2));
+  contact.link_a = LinkIndex(2);
+  contact.body_a = BodyIndex(bench.body(2));
   contact.position = {1, 0, 1};
   contact.normal = {0, 0, 1};
   contact.force = 4;

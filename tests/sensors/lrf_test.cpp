@@ -68,11 +68,11 @@ TEST(Lrf, WallAndPostAsComputedByHand) {
       cosine = std::sqrt(1 - 4 * off * off);
     }
     if (std::isinf(expected)) {
-      EXPECT_EQ(scan.ranges[static_cast<size_t>(i)], kInfinity) << i;
-      EXPECT_EQ(scan.intensities[static_cast<size_t>(i)], 0.0f);
+      EXPECT_EQ(scan.ranges[i], kInfinity) << i;
+      EXPECT_EQ(scan.intensities[i], 0.0f);
     } else {
-      EXPECT_NEAR(scan.ranges[static_cast<size_t>(i)], expected, 4e-7 * expected) << i;
-      EXPECT_NEAR(scan.intensities[static_cast<size_t>(i)], cosine, 1e-6) << i;
+      EXPECT_NEAR(scan.ranges[i], expected, 4e-7 * expected) << i;
+      EXPECT_NEAR(scan.intensities[i], cosine, 1e-6) << i;
     }
   }
 }
@@ -355,7 +355,7 @@ TEST(Lrf, ManyRaysEqualSingleRays) {
   for (int i = 0; i < 63; ++i) {
     const Vec3 d(std::cos(-3.1 + i * (6.2 / 62)), std::sin(-3.1 + i * (6.2 / 62)), 0);
     const scene::Hit hit = many.scene->cast({Vec3::Zero(), d, 8.0});
-    EXPECT_EQ(all.ranges[static_cast<size_t>(i)], static_cast<float>(hit.range)) << i;
+    EXPECT_EQ(all.ranges[i], static_cast<float>(hit.range)) << i;
   }
 }
 

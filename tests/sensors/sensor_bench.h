@@ -65,9 +65,7 @@ class SensorBench {
     s.robots.resize(layout.robots.size());
     for (size_t i = 0; i < layout.robots.size(); ++i) {
       const model::RobotPlacement& robot = layout.robots[i];
-      s.robots[i].X_WBase = robot.body < 0
-                                ? robot.X_BBase
-                                : s.bodies[static_cast<size_t>(robot.body)] * robot.X_BBase;
+      s.robots[i].X_WBase = robot.body < 0 ? robot.X_BBase : s.bodies[robot.body] * robot.X_BBase;
     }
     return s;
   }
@@ -75,8 +73,7 @@ class SensorBench {
   // The index of a robot in the layout, by its name in the world.
   int robot(const std::string& name) const {
     for (size_t i = 0; i < layout.robots.size(); ++i) {
-      if (world->models[static_cast<size_t>(layout.robots[i].instance)].name == name)
-        return static_cast<int>(i);
+      if (world->models[layout.robots[i].instance].name == name) return static_cast<int>(i);
     }
     throw std::logic_error("no robot " + name);
   }
@@ -84,11 +81,11 @@ class SensorBench {
   // Makes a device as the server would: a <sensor> of that name, or an attached one.
   Device make(const std::string& robot_name, const std::string& device, const Options& options) {
     Device made;
-    const int index = robot(robot_name);
-    const model::RobotPlacement& placement = layout.robots[static_cast<size_t>(index)];
-    const model::Model& model = *world->models[static_cast<size_t>(placement.instance)].model;
+    const RobotIndex index(robot(robot_name));
+    const model::RobotPlacement& placement = layout.robots[index];
+    const model::Model& model = *world->models[placement.instance].model;
     std::shared_ptr<const Element> element;
-    int link = layout.first_link[static_cast<size_t>(placement.instance)];
+    LinkIndex link = layout.first_link[placement.instance];
     Pose X_LS;
     for (const model::SensorDescription& sensor : model.sensors) {
       if (sensor.name != device) continue;
@@ -118,7 +115,7 @@ class SensorBench {
         element ? *element : kNothing,
         robot_name,
         device,
-        index,
+        RobotIndex(index),
         link,
         X_LS,
         RandomSource(options.seed, robot_key, device_key),

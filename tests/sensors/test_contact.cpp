@@ -35,13 +35,15 @@ std::string world(const std::string& contact) {
 
 // Links in world order: robot/body 0, robot/bumper 1, box/link 2, wall/bricks 3. Bodies: robot 0,
 // box 1.
-constexpr int kHull = 0, kBumper = 1, kBox = 2, kWall = 3;
+constexpr LinkIndex kHull(0), kBumper(1), kBox(2), kWall(3);
 
-Contact touch(int link_a, int link_b, int shape_a = 0, int shape_b = 0) {
+Contact touch(LinkIndex link_a, LinkIndex link_b, int shape_a = 0, int shape_b = 0) {
   Contact c;
   c.link_a = link_a;
   c.link_b = link_b;
-  const auto body = [](int link) { return link == kWall ? -1 : link == kBox ? 1 : 0; };
+  const auto body = [](LinkIndex link) {
+    return link == kWall ? BodyIndex() : BodyIndex(link == kBox ? 1 : 0);
+  };
   c.body_a = body(link_a);
   c.body_b = body(link_b);
   c.shape_a = shape_a;

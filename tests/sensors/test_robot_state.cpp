@@ -120,14 +120,15 @@ TEST(MotionStatus, TheSuccessorShowsAtTheStepOfItsCommand) {
   now.robots[0].motion = {
       .id = 43, .kind = 2, .state = motion_status_t::STATE_RUNNING, .changes = 2};
   now.motion_ends = {
-      {0,
+      {RobotIndex(0),
        {.id = 42,
         .kind = 1,
         .state = motion_status_t::STATE_ENDED,
         .reason = motion_status_t::REASON_REPLACED,
         .done = 0.5}},
-      {1, {.id = 99, .kind = 1, .state = motion_status_t::STATE_REFUSED}}};  // another robot's
-  test::step(device, now, out, 1);                                           // also due: told once
+      {RobotIndex(1),
+       {.id = 99, .kind = 1, .state = motion_status_t::STATE_REFUSED}}};  // another robot's
+  test::step(device, now, out, 1);                                        // also due: told once
   const auto messages = Device::decode<motion_status_t>(out);
   ASSERT_EQ(messages.size(), 2u);
   EXPECT_EQ(messages[0].id, 42);
@@ -149,10 +150,9 @@ const char* const kTwoRobots =
 class CollisionsOf : public ::testing::Test {
  protected:
   CollisionsOf() { test::step(device_, now_, out_, 0); }  // the initial state
-  int link(const std::string& name) const {
-    for (size_t i = 0; i < bench_.layout.links.size(); ++i) {
-      if (model::body_name(*bench_.world, bench_.layout, static_cast<int>(i)) == name)
-        return static_cast<int>(i);
+  LinkIndex link(const std::string& name) const {
+    for (const LinkIndex i : bench_.layout.links.indices()) {
+      if (model::body_name(*bench_.world, bench_.layout, i) == name) return i;
     }
     throw std::logic_error(name);
   }
@@ -170,7 +170,7 @@ class CollisionsOf : public ::testing::Test {
       contact.position = Vec3(1.0, 2.0, 3.0);
       contact.force = force;
       contact.depth = 0.25;
-      now_.collisions.push_back({0, static_cast<int>(now_.contacts.size()), true});
+      now_.collisions.push_back({RobotIndex(0), static_cast<int>(now_.contacts.size()), true});
       now_.contacts.push_back(contact);
     }
     test::step(device_, now_, out_, due ? 1 : -1);
@@ -227,7 +227,7 @@ TEST_F(CollisionsOf, ASecondBodyIsNewsTheFirstOneIsNot) {
 
 TEST_F(CollisionsOf, AnotherRobotsAreNotItsOwn) {
   step({"wall/l"});
-  now_.collisions[0].robot = 1;
+  now_.collisions[0].robot = RobotIndex(1);
   ++now_.step;
   test::step(device_, now_, out_, 1);
   EXPECT_EQ(messages().back().n, 0);
@@ -237,7 +237,7 @@ TEST_F(CollisionsOf, SeenFromTheOtherSideTheNormalStillPointsToTheRobot) {
   step({"two/base"});
   Device other = bench_.make("two", "collisions");
   Outbox out;
-  now_.collisions[0] = {1, 0, false};
+  now_.collisions[0] = {RobotIndex(1), 0, false};
   test::step(other, now_, out, 0);
   const collisions_t m = Device::decode<collisions_t>(out).at(0);
   ASSERT_EQ(m.n, 1);
@@ -249,7 +249,7 @@ TEST_F(CollisionsOf, WhatBlocksIsToldAtOnce) {
   now_.robots[0].motion.blocked_by = link("crate/l");
   step({});
   step({});
-  now_.robots[0].motion.blocked_by = -1;
+  now_.robots[0].motion.blocked_by = {};
   step({});
   const auto told = messages();
   ASSERT_EQ(told.size(), 3u);

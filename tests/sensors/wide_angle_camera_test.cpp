@@ -46,7 +46,7 @@ Eigen::Vector2d light(const std::string& sdf) {
   Eigen::Vector2d weighed(0, 0);
   for (int row = 0; row < image.height; ++row) {
     for (int column = 0; column < image.width; ++column) {
-      const double value = image.data[static_cast<size_t>(row * image.row_stride + 3 * column)];
+      const double value = image.data[row * image.row_stride + 3 * column];
       sum += value;
       weighed += value * Eigen::Vector2d(100 - column, 100 - row);
     }

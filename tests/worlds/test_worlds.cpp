@@ -65,8 +65,8 @@ TEST(P3at, HasTheSourcesNumbers) {
   for (const auto& [name, at] : axles) {
     const int link = link_of(p3at, name);
     ASSERT_GE(link, 0) << name;
-    EXPECT_LT((p3at.links[static_cast<size_t>(link)].X_ML.translation - at).norm(), 1e-12) << name;
-    EXPECT_EQ(p3at.links[static_cast<size_t>(link)].collisions.at(0).geometry.size.x(), 0.111);
+    EXPECT_LT((p3at.links[link].X_ML.translation - at).norm(), 1e-12) << name;
+    EXPECT_EQ(p3at.links[link].collisions.at(0).geometry.size.x(), 0.111);
   }
 
   std::set<std::string> devices;
@@ -88,8 +88,7 @@ TEST(P3at, ScanPlaneIsFree) {
   const Model& p3at = *instance(*world, "p3at").model;
   for (const auto& sensor : p3at.sensors) {
     if (sensor.name != "lrf") continue;
-    const double plane =
-        (p3at.links[static_cast<size_t>(sensor.link)].X_ML * sensor.X_LS).translation.z();
+    const double plane = (p3at.links[sensor.link].X_ML * sensor.X_LS).translation.z();
     for (size_t i = 0; i < p3at.links.size(); ++i) {
       if (static_cast<int>(i) == sensor.link) continue;
       for (const auto& collision : p3at.links[i].collisions) {
