@@ -35,7 +35,7 @@ def find_ruedo() -> str:
     if named:
         if not os.access(named, os.X_OK) or os.path.isdir(named):
             raise LaunchError(f"the environment's RUEDO is {named!r}, which is no program")
-        return named
+        return os.path.abspath(named)  # it may be started from another folder
     above = Path(__file__).resolve().parents
     for candidate in (folder / "bin/ruedo" for folder in above):
         if _is_program(candidate):
