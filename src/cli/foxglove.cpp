@@ -12,15 +12,8 @@
 #include "core/json.h"
 #include "core/utf8.h"
 #include "model/body_layout.h"
-#include "ruedo/camera_info_t.hpp"
 #include "ruedo/decode.h"
-#include "ruedo/image_t.hpp"
 #include "ruedo/math.h"
-#include "ruedo/navsat_t.hpp"
-#include "ruedo/odometry_t.hpp"
-#include "ruedo/planar_lidar_t.hpp"
-#include "ruedo/pose_t.hpp"
-#include "ruedo/world_state_t.hpp"
 #include "scene/render_content.h"
 
 namespace ruedo::cli {
@@ -335,92 +328,92 @@ void FoxgloveExport::send_scene(const model::WorldModel& world, uint64_t time_ns
   }
 }
 
-bool FoxgloveExport::convert(const std::string& channel, uint64_t time_ns,
-                             std::span<const uint8_t> message, bool& all) {
-  const auto read = [&](auto& into) {
-    return decode_checked(message.data(), message.size(), into) == DecodeFault::none;
-  };
+FoxgloveExport::Shown FoxgloveExport::show(const planar_lidar_t& scan, const Place& place) {
+  send(place.channel, foxglove::laser_scan(), place.time_ns,
+       scan_json(scan, device_frame(place.channel), place.time_ns));
+  return Shown::wholly;
+}
+
+FoxgloveExport::Shown FoxgloveExport::show(const image_t& image, const Place& place) {
+  const char* encoding = encoding_of(image.pixelformat);
+  if (!encoding && image.pixelformat != image_t::PIXEL_FORMAT_MJPEG) return Shown::no;
+  const std::string frame = device_frame(place.channel) + "/optical";
+  send(place.channel, encoding ? foxglove::raw_image() : foxglove::compressed_image(),
+       place.time_ns, image_json(image, encoding, frame, place.time_ns));
+  return Shown::wholly;
+}
+
+FoxgloveExport::Shown FoxgloveExport::show(const camera_info_t& camera, const Place& place) {
+  send(place.channel, foxglove::camera_calibration(), place.time_ns,
+       camera_json(camera, device_frame(place.channel) + "/optical", place.time_ns));
+  return Shown::wholly;
+}
+
+FoxgloveExport::Shown FoxgloveExport::show(const pose_t& pose, const Place& place) {
+  send(place.channel, foxglove::pose_in_frame(), place.time_ns,
+       pose_json(pose_of(pose.pos, pose.orientation), "world", place.time_ns));
+  return Shown::partly;
+}
+
+FoxgloveExport::Shown FoxgloveExport::show(const navsat_t& navsat, const Place& place) {
+  send(place.channel, foxglove::location_fix(), place.time_ns,
+       location_json(navsat, device_frame(place.channel), place.time_ns));
+  return Shown::partly;  // without the velocities
+}
+
+FoxgloveExport::Shown FoxgloveExport::show(const odometry_t& odometry, const Place& place) {
+  const std::string robot = place.channel.substr(0, place.channel.find('/'));
+  const Pose X{Quat(math::cos(odometry.theta / 2), 0, 0, math::sin(odometry.theta / 2)),
+               Vec3(odometry.x, odometry.y, 0)};
+  send(place.channel, foxglove::pose_in_frame(), place.time_ns,
+       pose_json(X, robot + "/odom", place.time_ns));
+  return Shown::partly;
+}
+
+FoxgloveExport::Shown FoxgloveExport::show(const world_state_t& state, const Place& place) {
+  JsonWriter json;
+  json.open('{').name("transforms").open('[');
+  for (size_t i = 0; i < state.index.size(); ++i) {
+    const auto known = bodies_.find(state.index[i]);
+    const std::string name =
+        known == bodies_.end() ? fmt::format("body_{}", state.index[i]) : known->second;
+    write_frame(json, place.time_ns, "world", name,
+                pose_of(state.position[i].data(), state.orientation[i].data()));
+  }
+  json.close(']').close('}');
+  send(place.channel, foxglove::frame_transforms(), place.time_ns, json.text());
+  return Shown::wholly;
+}
+
+FoxgloveExport::Shown FoxgloveExport::convert(const Place& place,
+                                              std::span<const uint8_t> message) {
   const int64_t fingerprint = fingerprint_of(message);
-  if (fingerprint == planar_lidar_t::getHash()) {
-    planar_lidar_t scan;
-    if (!read(scan)) return false;
-    send(channel, foxglove::laser_scan(), time_ns, scan_json(scan, device_frame(channel), time_ns));
-    return all = true;
-  }
-  if (fingerprint == image_t::getHash()) {
-    image_t image;
-    if (!read(image)) return false;
-    const char* encoding = encoding_of(image.pixelformat);
-    if (!encoding && image.pixelformat != image_t::PIXEL_FORMAT_MJPEG) return false;
-    const std::string frame = device_frame(channel) + "/optical";
-    send(channel, encoding ? foxglove::raw_image() : foxglove::compressed_image(), time_ns,
-         image_json(image, encoding, frame, time_ns));
-    return all = true;
-  }
-  if (fingerprint == camera_info_t::getHash()) {
-    camera_info_t camera;
-    if (!read(camera)) return false;
-    send(channel, foxglove::camera_calibration(), time_ns,
-         camera_json(camera, device_frame(channel) + "/optical", time_ns));
-    return all = true;
-  }
-  if (fingerprint == pose_t::getHash()) {
-    pose_t pose;
-    if (!read(pose)) return false;
-    send(channel, foxglove::pose_in_frame(), time_ns,
-         pose_json(pose_of(pose.pos, pose.orientation), "world", time_ns));
+  Shown shown = Shown::no;
+  const auto is = [&]<typename Type>(Type read) {
+    if (fingerprint != Type::getHash()) return false;
+    if (decode_checked(message.data(), message.size(), read) == DecodeFault::none)
+      shown = show(read, place);
     return true;
-  }
-  if (fingerprint == navsat_t::getHash()) {
-    navsat_t navsat;
-    if (!read(navsat)) return false;
-    send(channel, foxglove::location_fix(), time_ns,
-         location_json(navsat, device_frame(channel), time_ns));
-    return true;  // velocities are in the message itself alone
-  }
-  if (fingerprint == odometry_t::getHash()) {
-    odometry_t odometry;
-    if (!read(odometry)) return false;
-    const std::string robot = channel.substr(0, channel.find('/'));
-    const Pose X{Quat(math::cos(odometry.theta / 2), 0, 0, math::sin(odometry.theta / 2)),
-                 Vec3(odometry.x, odometry.y, 0)};
-    send(channel, foxglove::pose_in_frame(), time_ns, pose_json(X, robot + "/odom", time_ns));
-    return true;
-  }
-  if (fingerprint == world_state_t::getHash()) {
-    world_state_t state;
-    if (!read(state)) return false;
-    JsonWriter json;
-    json.open('{').name("transforms").open('[');
-    for (size_t i = 0; i < state.index.size(); ++i) {
-      const auto known = bodies_.find(state.index[i]);
-      const std::string name =
-          known == bodies_.end() ? fmt::format("body_{}", state.index[i]) : known->second;
-      write_frame(json, time_ns, "world", name,
-                  pose_of(state.position[i].data(), state.orientation[i].data()));
-    }
-    json.close(']').close('}');
-    send(channel, foxglove::frame_transforms(), time_ns, json.text());
-    return all = true;
-  }
-  return false;
+  };
+  static_cast<void>(is(planar_lidar_t()) || is(image_t()) || is(camera_info_t()) || is(pose_t()) ||
+                    is(navsat_t()) || is(odometry_t()) || is(world_state_t()));
+  return shown;
 }
 
 void FoxgloveExport::add(const std::string& name, uint64_t time_ns,
                          std::span<const uint8_t> message) {
   const std::string topic = printable(name);
   if (!out_.wants(topic)) return;
-  bool all = false;
-  const bool converted = convert(topic, time_ns, message, all);
-  if (converted && all) return;
+  const Shown shown = convert({topic, time_ns}, message);
+  if (shown == Shown::wholly) return;
   const Schema* schema = find_schema(fingerprint_of(message));
   const std::string json = schema ? json_message(*schema, message) : "";
   if (json.empty()) {
     ++left_out_;
     return;
   }
-  const std::string own =
-      converted ? topic + "/values" : topic;  // what Foxglove's type leaves out is there
+  // What Foxglove's type leaves out is there.
+  const std::string own = shown == Shown::partly ? topic + "/values" : topic;
   out_.add_message(channel(own, "ruedo." + schema->name, json_schema(*schema)), time_ns, json);
 }
 

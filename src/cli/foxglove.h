@@ -12,7 +12,14 @@
 #include "cli/foxglove_schemas.h"
 #include "cli/mcap_writer.h"
 #include "model/world_model.h"
+#include "ruedo/camera_info_t.hpp"
+#include "ruedo/image_t.hpp"
+#include "ruedo/navsat_t.hpp"
+#include "ruedo/odometry_t.hpp"
+#include "ruedo/planar_lidar_t.hpp"
+#include "ruedo/pose_t.hpp"
 #include "ruedo/world_info_t.hpp"
+#include "ruedo/world_state_t.hpp"
 #include "run/log_worlds.h"
 
 namespace ruedo::cli {
@@ -70,9 +77,20 @@ class FoxgloveExport {
   void send_frames(const run::LogWorlds::Scene& scene, uint64_t time_ns);
   void send_scene(const model::WorldModel& world, uint64_t time_ns);
   std::string device_frame(const std::string& channel) const;
-  // Whether Foxglove has a type for it; all: that type says all that the message does.
-  bool convert(const std::string& channel, uint64_t time_ns, std::span<const uint8_t> message,
-               bool& all);
+  struct Place {
+    const std::string& channel;
+    uint64_t time_ns;
+  };
+  // How much of a message Foxglove's own type says: partly is followed by our own values.
+  enum class Shown { no, partly, wholly };
+  Shown convert(const Place& place, std::span<const uint8_t> message);
+  Shown show(const planar_lidar_t& scan, const Place& place);
+  Shown show(const image_t& image, const Place& place);
+  Shown show(const camera_info_t& camera, const Place& place);
+  Shown show(const pose_t& pose, const Place& place);
+  Shown show(const navsat_t& navsat, const Place& place);
+  Shown show(const odometry_t& odometry, const Place& place);
+  Shown show(const world_state_t& state, const Place& place);
 
   FoxgloveOutput& out_;
   std::map<std::string, uint16_t> schemas_, channels_;

@@ -252,81 +252,98 @@ int regress(RegressArguments arguments) {
   return failures.empty() ? kGood : kCheckFailed;
 }
 
+void add_list(CLI::App& command, const char* name, std::vector<std::string>& to, const char* text,
+              const char* type) {
+  command.add_option(name, to, text)->type_name(type)->allow_extra_args(false);
+}
+
+void add_course(CLI::App& command, RegressArguments& a) {
+  command
+      .add_option("--client", a.client,
+                  "command line of the client, for a shell; LCM_DEFAULT_URL says where the run is")
+      ->type_name("COMMAND");
+  command.add_option("--seed", a.seed, "of all noise")->type_name("N")->capture_default_str();
+  command
+      .add_option("--duration", a.duration,
+                  "end after so many seconds of sim time, or when the client ends")
+      ->type_name("S")
+      ->required();
+  command.add_option("--rate", a.rate, "sim time per real time, or max")
+      ->type_name("R|max")
+      ->capture_default_str();
+  command.add_option("--record", a.record, "the log of the run")->type_name("FILE")->required();
+  command
+      .add_option("--lockstep", a.lockstep,
+                  "wait for so many clients, then go as far as all of them grant")
+      ->type_name("N")
+      ->check(CLI::Range(1, 64));
+  add_list(command, "--wait-for", a.wait_for,
+           "do not pass a step at which a message on that channel is due: CHANNEL@HZ", "WAIT");
+  add_list(command, "--remap", a.remaps, "give a channel another name: CHANNEL=NAME", "REMAP");
+  command.add_flag("--shared-network", a.shared_network,
+                   "no network of its own: for a client that needs other machines");
+}
+
+void add_expectations(CLI::App& command, RegressArguments& a) {
+  command
+      .add_option("--robot", a.expected.robot,
+                  "whom the expectations are about (default: the first of the world)")
+      ->type_name("NAME");
+  add_list(command, "--goal", a.goals,
+           "base_link gets within RADIUS of X, Y by a time: X,Y,RADIUS,BY (m, s)", "GOAL");
+  command.add_flag("--no-contact", a.expected.no_contact,
+                   "the robot touches nothing but the ground");
+  command.add_option("--clearance", a.clearance, "at least so far from everything (m)")
+      ->type_name("M")
+      ->check(CLI::Range(0.0, 100.0));
+  command
+      .add_option("--odometry-error", a.odometry_error,
+                  "odometry at most so far from the truth (m)")
+      ->type_name("M")
+      ->check(CLI::Range(0.0, 1e6));
+  command
+      .add_option("--clearance-reach", a.clearance_reach,
+                  "measure the smallest clearance below this (m), for --json")
+      ->type_name("M")
+      ->check(CLI::Range(0.0, 100.0));
+  command
+      .add_option("--script", a.script,
+                  "command line that judges too, by its exit code; RUEDO_LOG is the run's log")
+      ->type_name("COMMAND");
+}
+
+void add_golden(CLI::App& command, RegressArguments& a) {
+  command.add_option("--golden", a.golden, "log to compare with")->type_name("FILE");
+  add_list(command, "--keep", a.keep,
+           "channels that golden logs hold; shell patterns (default: */pose)", "PATTERN");
+  add_list(command, "--tolerance", a.tolerances, "as of ruedo diff", "RULE");
+  add_list(command, "--ignore", a.ignored, "as of ruedo diff", "PATTERN");
+  command.add_flag("--renew", a.renew,
+                   "write the golden log anew, when all else holds; or set RUEDO_RENEW=1");
+}
+
+void add_reports(CLI::App& command, RegressArguments& a) {
+  command
+      .add_option("--json", a.json,
+                  "write what failed, and how well the run went in numbers, as JSON")
+      ->type_name("FILE");
+  command.add_option("--junit", a.junit, "write how the golden log compares as JUnit XML")
+      ->type_name("FILE");
+  command.add_option("--html", a.html, "write it as a page with plots")->type_name("FILE");
+  command.add_flag("--no-page", a.no_page, "no page beside the log of a failed run");
+}
+
 void add_regress(CLI::App& app, Action& chosen) {
   CLI::App* command = app.add_subcommand("regress",
                                          "run a world with a client on a port of its own, and hold "
                                          "the run against what is expected of it");
-  const auto a = std::make_shared<RegressArguments>();
-  const auto list = [&](const char* name, std::vector<std::string>& to, const char* text,
-                        const char* type) {
-    command->add_option(name, to, text)->type_name(type)->allow_extra_args(false);
-  };
-  add_world_arguments(*command, a->world);
-  command
-      ->add_option("--client", a->client,
-                   "command line of the client, for a shell; LCM_DEFAULT_URL says where the run is")
-      ->type_name("COMMAND");
-  command->add_option("--seed", a->seed, "of all noise")->type_name("N")->capture_default_str();
-  command
-      ->add_option("--duration", a->duration,
-                   "end after so many seconds of sim time, or when the client ends")
-      ->type_name("S")
-      ->required();
-  command->add_option("--rate", a->rate, "sim time per real time, or max")
-      ->type_name("R|max")
-      ->capture_default_str();
-  command->add_option("--record", a->record, "the log of the run")->type_name("FILE")->required();
-  command
-      ->add_option("--lockstep", a->lockstep,
-                   "wait for so many clients, then go as far as all of them grant")
-      ->type_name("N")
-      ->check(CLI::Range(1, 64));
-  list("--wait-for", a->wait_for,
-       "do not pass a step at which a message on that channel is due: CHANNEL@HZ", "WAIT");
-  list("--remap", a->remaps, "give a channel another name: CHANNEL=NAME", "REMAP");
-  command
-      ->add_option("--robot", a->expected.robot,
-                   "whom the expectations are about (default: the first of the world)")
-      ->type_name("NAME");
-  list("--goal", a->goals, "base_link gets within RADIUS of X, Y by a time: X,Y,RADIUS,BY (m, s)",
-       "GOAL");
-  command->add_flag("--no-contact", a->expected.no_contact,
-                    "the robot touches nothing but the ground");
-  command->add_option("--clearance", a->clearance, "at least so far from everything (m)")
-      ->type_name("M")
-      ->check(CLI::Range(0.0, 100.0));
-  command
-      ->add_option("--odometry-error", a->odometry_error,
-                   "odometry at most so far from the truth (m)")
-      ->type_name("M")
-      ->check(CLI::Range(0.0, 1e6));
-  command
-      ->add_option("--clearance-reach", a->clearance_reach,
-                   "measure the smallest clearance below this (m), for --json")
-      ->type_name("M")
-      ->check(CLI::Range(0.0, 100.0));
-  command
-      ->add_option("--json", a->json,
-                   "write what failed, and how well the run went in numbers, as JSON")
-      ->type_name("FILE");
-  command->add_flag("--no-page", a->no_page, "no page beside the log of a failed run");
-  command->add_option("--golden", a->golden, "log to compare with")->type_name("FILE");
-  list("--keep", a->keep, "channels that golden logs hold; shell patterns (default: */pose)",
-       "PATTERN");
-  list("--tolerance", a->tolerances, "as of ruedo diff", "RULE");
-  list("--ignore", a->ignored, "as of ruedo diff", "PATTERN");
-  command->add_option("--junit", a->junit, "write how the golden log compares as JUnit XML")
-      ->type_name("FILE");
-  command->add_option("--html", a->html, "write it as a page with plots")->type_name("FILE");
-  command
-      ->add_option("--script", a->script,
-                   "command line that judges too, by its exit code; RUEDO_LOG is the run's log")
-      ->type_name("COMMAND");
-  command->add_flag("--shared-network", a->shared_network,
-                    "no network of its own: for a client that needs other machines");
-  command->add_flag("--renew", a->renew,
-                    "write the golden log anew, when all else holds; or set RUEDO_RENEW=1");
-  command->callback([a, &chosen] { chosen = [a] { return regress(*a); }; });
+  const auto arguments = std::make_shared<RegressArguments>();
+  add_world_arguments(*command, arguments->world);
+  add_course(*command, *arguments);
+  add_expectations(*command, *arguments);
+  add_golden(*command, *arguments);
+  add_reports(*command, *arguments);
+  command->callback([arguments, &chosen] { chosen = [arguments] { return regress(*arguments); }; });
 }
 
 const RegisterCommand kRegister{55, add_regress};

@@ -295,121 +295,146 @@ std::string to_bytes(std::string& text) {
   return "'" + given + "' is not allowed; 16MB and more is, such as 2GB";
 }
 
+std::string is_seed(const std::string& text) {
+  uint64_t seed = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), seed);
+  if (error == std::errc() && end == text.data() + text.size()) return "";
+  return "'" + text + "' is not allowed; a seed is a whole number from 0 to 18446744073709551615";
+}
+
+void add_pace(CLI::App& command, RunArguments& arguments) {
+  command.add_option("--seed", arguments.seed, "of all noise")
+      ->type_name("N")
+      ->capture_default_str()
+      ->check(is_seed);
+  command
+      .add_option(
+          "--rate", arguments.rate,
+          "sim time per real time, or max (default: 1); in lockstep the grants alone pace it")
+      ->type_name("R|max");
+  command.add_option("--duration", arguments.duration, "end after so many seconds of sim time")
+      ->type_name("S");
+  command.add_flag("--paused", arguments.paused, "start paused, at step 0");
+  command
+      .add_option("--wait-for", arguments.wait_for,
+                  "wait at each step where a command is due: CHANNEL@HZ")
+      ->type_name("INPUT")
+      ->allow_extra_args(false);
+  command
+      .add_option("--threads", arguments.threads,
+                  "most threads inside a module (default: one a core)")
+      ->type_name("N")
+      ->check(CLI::Range(1, 1024));
+}
+
+void add_lockstep(CLI::App& command, RunArguments& arguments) {
+  command
+      .add_option("--lockstep", arguments.lockstep,
+                  "wait for so many clients, then go as far as all of them grant")
+      ->type_name("N")
+      ->check(CLI::Range(1, 64));
+  command
+      .add_option("--lease", arguments.lease,
+                  "seconds of real time after which a silent client of lockstep has lost its lease")
+      ->type_name("S")
+      ->capture_default_str()
+      ->check(CLI::Range(0.01, 1e6));
+  command
+      .add_option("--lease-policy", arguments.lease_policy,
+                  "then: pause the run, drop the client, or fail the run with exit code 1")
+      ->capture_default_str()
+      ->check(CLI::IsMember({"pause", "drop", "fail"}));
+}
+
+void add_bus(CLI::App& command, RunArguments& arguments) {
+  command
+      .add_option("--lcm", arguments.lcm,
+                  "LCM address, or auto for a free port (default: $LCM_DEFAULT_URL, or LCM's "
+                  "group with ttl 0)")
+      ->type_name("URL|auto");
+  command.add_option("--remap", arguments.remaps, "give a channel another name: CHANNEL=NAME")
+      ->type_name("REMAP")
+      ->allow_extra_args(false);
+  command.add_option("--control", arguments.control, "serve requests: on or off")
+      ->capture_default_str()
+      ->check(CLI::IsMember({"on", "off"}));
+}
+
+void add_files(CLI::App& command, RunArguments& arguments) {
+  CLI::Option* record =
+      command.add_option("--record", arguments.record, "write a standard LCM log")
+          ->type_name("FILE");
+  command
+      .add_option("--record-limit", arguments.record_limit,
+                  "keep all that acted, and of the messages the last: FILE repeats the run, files "
+                  "numbered beside it hold what was published; 16MB at least, 2GB say, in all")
+      ->type_name("SIZE")
+      ->transform(CLI::Validator(to_bytes, "", ""))
+      ->needs(record);
+  command
+      .add_option("--snapshots", arguments.snapshots,
+                  "the folder where clients may save the state, and restore it")
+      ->type_name("FOLDER");
+  command
+      .add_option("--restore", arguments.restore,
+                  "begin with the state of a snapshot of the same world and options")
+      ->type_name("FILE");
+}
+
+// What may be given without a value: it is on when it is there.
+struct Viewers {
+  CLI::Option *console, *foxglove, *ros2;
+};
+
+Viewers add_viewers(CLI::App& command, RunArguments& arguments) {
+  const auto optional = [&](const char* name, std::string& value, const char* text,
+                            const char* type) {
+    return command.add_option(name, value, text)->type_name(type)->expected(0, 1);
+  };
+  const Viewers viewers{
+      optional("--view", arguments.view, "serve the web console (default: 127.0.0.1:8080)",
+               "[ADDRESS:PORT]"),
+      optional("--foxglove", arguments.foxglove_address,
+               "show the run in Foxglove, by its WebSocket protocol (default: 127.0.0.1:8765)",
+               "[ADDRESS:PORT]"),
+      optional("--ros2", arguments.ros2.distro,
+               "be a ROS 2 node, of that release (default: $ROS_DISTRO, or jazzy)", "[DISTRO]")};
+  command
+      .add_option("--ros2-clock", arguments.ros2.clock_hz,
+                  "/clock at most so often in a second of sim time")
+      ->type_name("HZ")
+      ->capture_default_str()
+      ->check(CLI::Range(0.1, 10000.0));
+  command
+      .add_option("--ros2-services", arguments.ros2.services,
+                  "how services are mapped: as each call came, or as one middleware does")
+      ->type_name("RMW")
+      ->capture_default_str()
+      ->check(CLI::IsMember({"auto", "cyclonedds", "fastrtps"}));
+  return viewers;
+}
+
 void add_run(CLI::App& app, Action& chosen) {
   CLI::App* command =
       app.add_subcommand("run", "serve a world: step it, publish its sensors, take commands");
   const auto arguments = std::make_shared<RunArguments>();
   add_world_arguments(*command, arguments->world);
-  command->add_option("--seed", arguments->seed, "of all noise")
-      ->type_name("N")
-      ->capture_default_str()
-      ->check([](const std::string& text) {
-        uint64_t seed = 0;
-        const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), seed);
-        return error == std::errc() && end == text.data() + text.size()
-                   ? ""
-                   : "'" + text +
-                         "' is not allowed; a seed is a whole number from 0 to "
-                         "18446744073709551615";
-      });
-  command
-      ->add_option(
-          "--rate", arguments->rate,
-          "sim time per real time, or max (default: 1); in lockstep the grants alone pace it")
-      ->type_name("R|max");
-  command->add_option("--duration", arguments->duration, "end after so many seconds of sim time")
-      ->type_name("S");
-  command
-      ->add_option("--lcm", arguments->lcm,
-                   "LCM address, or auto for a free port (default: $LCM_DEFAULT_URL, or LCM's "
-                   "group with ttl 0)")
-      ->type_name("URL|auto");
-  CLI::Option* record =
-      command->add_option("--record", arguments->record, "write a standard LCM log")
-          ->type_name("FILE");
-  command
-      ->add_option("--record-limit", arguments->record_limit,
-                   "keep all that acted, and of the messages the last: FILE repeats the run, files "
-                   "numbered beside it hold what was published; 16MB at least, 2GB say, in all")
-      ->type_name("SIZE")
-      ->transform(CLI::Validator(to_bytes, "", ""))
-      ->needs(record);
-  command->add_option("--remap", arguments->remaps, "give a channel another name: CHANNEL=NAME")
-      ->type_name("REMAP")
-      ->allow_extra_args(false);
-  CLI::Option* view = command->add_option("--view", arguments->view,
-                                          "serve the web console (default: 127.0.0.1:8080)");
-  view->type_name("[ADDRESS:PORT]")->expected(0, 1);
-  CLI::Option* foxglove = command->add_option(
-      "--foxglove", arguments->foxglove_address,
-      "show the run in Foxglove, by its WebSocket protocol (default: 127.0.0.1:8765)");
-  foxglove->type_name("[ADDRESS:PORT]")->expected(0, 1);
-  CLI::Option* ros2 =
-      command->add_option("--ros2", arguments->ros2.distro,
-                          "be a ROS 2 node, of that release (default: $ROS_DISTRO, or jazzy)");
-  ros2->type_name("[DISTRO]")->expected(0, 1);
-  command
-      ->add_option("--ros2-clock", arguments->ros2.clock_hz,
-                   "/clock at most so often in a second of sim time")
-      ->type_name("HZ")
-      ->capture_default_str()
-      ->check(CLI::Range(0.1, 10000.0));
-  command
-      ->add_option("--ros2-services", arguments->ros2.services,
-                   "how services are mapped: as each call came, or as one middleware does")
-      ->type_name("RMW")
-      ->capture_default_str()
-      ->check(CLI::IsMember({"auto", "cyclonedds", "fastrtps"}));
-  command
-      ->add_option("--wait-for", arguments->wait_for,
-                   "wait at each step where a command is due: CHANNEL@HZ")
-      ->type_name("INPUT")
-      ->allow_extra_args(false);
-  command
-      ->add_option("--snapshots", arguments->snapshots,
-                   "the folder where clients may save the state, and restore it")
-      ->type_name("FOLDER");
-  command
-      ->add_option("--restore", arguments->restore,
-                   "begin with the state of a snapshot of the same world and options")
-      ->type_name("FILE");
+  add_pace(*command, *arguments);
+  add_lockstep(*command, *arguments);
+  add_bus(*command, *arguments);
+  add_files(*command, *arguments);
+  const Viewers viewers = add_viewers(*command, *arguments);
   command->add_flag("--strict", arguments->strict,
                     "run nothing that `ruedo check --strict` would not call good");
-  command->add_flag("--paused", arguments->paused, "start paused, at step 0");
-  command
-      ->add_option("--lockstep", arguments->lockstep,
-                   "wait for so many clients, then go as far as all of them grant")
-      ->type_name("N")
-      ->check(CLI::Range(1, 64));
-  command
-      ->add_option(
-          "--lease", arguments->lease,
-          "seconds of real time after which a silent client of lockstep has lost its lease")
-      ->type_name("S")
-      ->capture_default_str()
-      ->check(CLI::Range(0.01, 1e6));
-  command
-      ->add_option("--lease-policy", arguments->lease_policy,
-                   "then: pause the run, drop the client, or fail the run with exit code 1")
-      ->capture_default_str()
-      ->check(CLI::IsMember({"pause", "drop", "fail"}));
-  command
-      ->add_option("--threads", arguments->threads,
-                   "most threads inside a module (default: one a core)")
-      ->type_name("N")
-      ->check(CLI::Range(1, 1024));
-  command->add_option("--control", arguments->control, "serve requests: on or off")
-      ->capture_default_str()
-      ->check(CLI::IsMember({"on", "off"}));
   command->add_flag("--watch-stdin", arguments->watch_stdin,
                     "end when standard input does: for programs that start a server");
   command->add_flag("--quiet", arguments->quiet,
                     "neither list the channels nor show on a terminal how far it is");
   add_sandbox_argument(*command, arguments->sandboxed);
-  command->callback([arguments, view, ros2, foxglove, &chosen] {
-    arguments->viewed = view->count() > 0;
-    arguments->foxglove = foxglove->count() > 0;
-    arguments->ros2.on = ros2->count() > 0;
+  command->callback([arguments, viewers, &chosen] {
+    arguments->viewed = viewers.console->count() > 0;
+    arguments->foxglove = viewers.foxglove->count() > 0;
+    arguments->ros2.on = viewers.ros2->count() > 0;
     chosen = [arguments] { return run_world(*arguments); };
   });
 }

@@ -33,6 +33,21 @@ class SvgPlot {
     bool dashed = false, filled = false;
     double width = 1.6;
   };
+  // From data to pixels.
+  struct Axis {
+    double low, high, from, to;
+    double at(double value) const { return from + (value - low) / (high - low) * (to - from); }
+    double tick() const;  // a round distance of ticks
+    void widen(double share);
+  };
+  struct Axes {
+    Axis x, y;
+  };
+  Axes axes(double bottom) const;
+  std::string grid(const Axes& axes) const;
+  static std::string drawn(const Curve& curve, const Axes& axes);
+  std::string legend(double left, double row) const;
+
   std::string title_, x_label_, y_label_;
   bool equal_axes_;
   std::vector<Curve> curves_;

@@ -145,23 +145,12 @@ model::WorldModel collision_shapes(const model::WorldModel& world) {
   return shown;
 }
 
-SceneData::SceneData(const model::WorldModel& world, int version) {
-  const model::BodyLayout layout(world);
-  const scene::RenderContent content(world, layout);
-  JsonWriter out;
-  out.open('{')
-      .member("version", version)
-      .member("world", world.name)
-      .member("sky", world.sky.sky)
-      .member("shadows", world.sky.shadows);
-  list(out.name("ambient"), world.sky.ambient.data(), 3);
-  list(out.name("background"), world.sky.background.data(), 3);
-  list(out.name("low"), content.bounds.low.data(), 3);
-  list(out.name("high"), content.bounds.high.data(), 3);
+namespace {
 
+Bytes write_meshes(JsonWriter& out, const std::vector<scene::RenderMesh>& meshes) {
   Blob blob;
   out.name("meshes").open('[');
-  for (const scene::RenderMesh& mesh : content.meshes) {
+  for (const scene::RenderMesh& mesh : meshes) {
     static_assert(sizeof(scene::RenderVertex) == 32);
     out.open('[')
         .value(static_cast<int64_t>(mesh.vertices.size()))
@@ -170,14 +159,13 @@ SceneData::SceneData(const model::WorldModel& world, int version) {
     blob.add(mesh.vertices);
     blob.add(mesh.indices);
   }
-  meshes = blob.take();
-  out.close(']').name("textures").open('[');
-  for (const auto& texture : content.textures) {
-    pictures.push_back(picture(*texture));
-    out.value(pictures.back().bytes != nullptr);
-  }
-  out.close(']').name("batches").open('[');
-  for (const scene::Batch& batch : content.batches) {
+  out.close(']');
+  return blob.take();
+}
+
+void write_batches(JsonWriter& out, const std::vector<scene::Batch>& batches) {
+  out.name("batches").open('[');
+  for (const scene::Batch& batch : batches) {
     out.open('[')
         .value(batch.mesh)
         .value(int64_t{batch.first_index})
@@ -186,8 +174,12 @@ SceneData::SceneData(const model::WorldModel& world, int version) {
         .value(int64_t{batch.flags})
         .close(']');
   }
-  out.close(']').name("kinds").open('[');
-  for (const scene::RenderLinkKind& kind : content.link_kinds) {
+  out.close(']');
+}
+
+void write_kinds(JsonWriter& out, const std::vector<scene::RenderLinkKind>& kinds) {
+  out.name("kinds").open('[');
+  for (const scene::RenderLinkKind& kind : kinds) {
     out.open('[');
     for (const scene::RenderPart& part : kind.parts) {
       out.open('{')
@@ -204,47 +196,89 @@ SceneData::SceneData(const model::WorldModel& world, int version) {
     }
     out.close(']');
   }
-  out.close(']').name("lights").open('[');
-  for (const scene::RenderLight& light : content.lights) write_light(out, light);
-  out.close(']').name("models").open('[');
-  for (size_t i = 0; i < world.models.size(); ++i) write_model(out, world.models[i], layout, i);
-  // The wheels of robots whose wheels are no bodies: link, robot, place among its wheels, a point
-  // on the axis, the axis.
-  out.close(']').name("wheels").open('[');
-  for (size_t r = 0; r < layout.robots.size(); ++r) {
-    const model::RobotPlacement& robot = layout.robots[r];
-    for (size_t w = 0; w < robot.wheels.size(); ++w) {
-      const model::WheelPlacement& wheel = layout.wheels[robot.wheels[w]];
-      if (layout.links[wheel.link].wheel < 0) continue;
-      out.open('[').value(wheel.link).value(static_cast<int>(r)).value(static_cast<int>(w));
+  out.close(']');
+}
+
+// The wheels of robots whose wheels are no bodies: link, robot, place among its wheels, a point
+// on the axis, the axis.
+void write_wheels(JsonWriter& out, const model::BodyLayout& layout) {
+  out.name("wheels").open('[');
+  for (const RobotIndex r : layout.robots.indices()) {
+    const auto& wheels = layout.robots[r].wheels;
+    for (size_t w = 0; w < wheels.size(); ++w) {
+      const model::WheelPlacement& wheel = layout.wheels[wheels[w]];
+      if (!layout.links[wheel.link].wheel.valid()) continue;
+      out.open('[').value(wheel.link).value(r).value(static_cast<int>(w));
       for (int k = 0; k < 3; ++k) out.value(wheel.center_in_L[k]);
       for (int k = 0; k < 3; ++k) out.value(wheel.axis_in_L[k]);
       out.close(']');
     }
   }
-  // base_link in the body that carries it, or in the world, and where it starts in the world: x, y,
-  // z, qw, qx, qy, qz.
-  out.close(']').name("bases").open('[');
+  out.close(']');
+}
+
+// base_link in the body that carries it, or in the world, and where it starts in the world: x, y,
+// z, qw, qx, qy, qz.
+void write_bases(JsonWriter& out, const model::WorldModel& world, const model::BodyLayout& layout) {
+  out.name("bases").open('[');
   for (const model::RobotPlacement& robot : layout.robots) {
     out.open('{').member("robot", world.models[robot.instance].name).member("body", robot.body);
     const Pose start =
-        robot.body < 0 ? robot.X_BBase : layout.bodies[robot.body].X_WB * robot.X_BBase;
+        robot.body.valid() ? layout.bodies[robot.body].X_WB * robot.X_BBase : robot.X_BBase;
     list(out.name("pose"), numbers(robot.X_BBase).data(), 7);
     list(out.name("start"), numbers(start).data(), 7);
     out.close('}');
   }
-  out.close(']').close('}');
-  json = out.text();
+  out.close(']');
+}
 
-  Blob placements;
-  for (size_t i = 0; i < layout.links.size(); ++i) {
+Bytes link_bytes(const model::WorldModel& world, const model::BodyLayout& layout,
+                 const scene::RenderContent& content) {
+  Blob blob;
+  for (const LinkIndex i : layout.links.indices()) {
     const model::LinkPlacement& link = layout.links[i];
     const bool removed = world.models[link.instance].removed;
-    placements.add(int32_t{removed ? -1 : content.kind_of_link[i]});
-    placements.add(int32_t{link.body});
-    for (const double value : numbers(link.X_BL)) placements.add(static_cast<float>(value));
+    blob.add(int32_t{removed ? -1 : content.kind_of_link[i]});
+    blob.add(int32_t{link.body});
+    for (const double value : numbers(link.X_BL)) blob.add(static_cast<float>(value));
   }
-  links = placements.take();
+  return blob.take();
+}
+
+}  // namespace
+
+SceneData::SceneData(const model::WorldModel& world, int version) {
+  const model::BodyLayout layout(world);
+  const scene::RenderContent content(world, layout);
+  JsonWriter out;
+  out.open('{')
+      .member("version", version)
+      .member("world", world.name)
+      .member("sky", world.sky.sky)
+      .member("shadows", world.sky.shadows);
+  list(out.name("ambient"), world.sky.ambient.data(), 3);
+  list(out.name("background"), world.sky.background.data(), 3);
+  list(out.name("low"), content.bounds.low.data(), 3);
+  list(out.name("high"), content.bounds.high.data(), 3);
+  meshes = write_meshes(out, content.meshes);
+  out.name("textures").open('[');
+  for (const auto& texture : content.textures) {
+    pictures.push_back(picture(*texture));
+    out.value(pictures.back().bytes != nullptr);
+  }
+  out.close(']');
+  write_batches(out, content.batches);
+  write_kinds(out, content.link_kinds);
+  out.name("lights").open('[');
+  for (const scene::RenderLight& light : content.lights) write_light(out, light);
+  out.close(']').name("models").open('[');
+  for (size_t i = 0; i < world.models.size(); ++i) write_model(out, world.models[i], layout, i);
+  out.close(']');
+  write_wheels(out, layout);
+  write_bases(out, world, layout);
+  out.close('}');
+  json = out.text();
+  links = link_bytes(world, layout, content);
 }
 
 }  // namespace ruedo::console

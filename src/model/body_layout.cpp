@@ -212,12 +212,11 @@ void BodyLayout::place_again(const WorldModel& world, InstanceIndex instance) {
   }
 }
 
-void BodyLayout::add(const WorldModel& world, InstanceIndex i, Known& known) {
-  const ModelInstance& instance = world.models[i];
-  const Model& model = *instance.model;
-  first_link.push_back(links.next());
-  const Grouping& grouping = known.of(model);
+namespace {
 
+void add_links(BodyLayout& layout, const ModelInstance& instance, InstanceIndex i,
+               const Grouping& grouping) {
+  const Model& model = *instance.model;
   IndexedVector<ModelLinkIndex, BodyIndex> body_of_group(model.links.size());
   for (const ModelLinkIndex l : model.links.indices()) {
     const ModelLinkIndex root(grouping.links.find(l));
@@ -231,85 +230,101 @@ void BodyLayout::add(const WorldModel& world, InstanceIndex i, Known& known) {
       const Pose& X_MB = model.links[root].X_ML;
       BodyIndex& body = body_of_group[root];
       if (!body.valid()) {
-        body = bodies.next();
-        bodies.push_back(
+        body = layout.bodies.next();
+        layout.bodies.push_back(
             {i, root, {}, instance.X_WM * X_MB, instance.name + "/" + model.links[root].name});
       }
       link.body = body;
       link.X_BL = l == root ? Pose{} : X_MB.inverse() * X_ML;
-      bodies[body].links.push_back(links.next());
+      layout.bodies[body].links.push_back(layout.links.next());
     }
-    links.push_back(link);
+    layout.links.push_back(link);
   }
+}
 
-  const RobotIndex robot = instance.is_robot() ? robots.next() : RobotIndex();
-  RobotPlacement placement;
-  placement.instance = i;
-  if (robot.valid()) {
-    ModelLinkIndex carrier(0);
-    Pose X_MBase;
-    if (model.drive) {
-      carrier = carrier_of(model);
-      X_MBase = model.drive->X_MBase;
+enum class Side { left, right, steers };
+
+void add_wheel(BodyLayout& layout, const Model& model, RobotIndex robot, RobotPlacement& placement,
+               ModelJointIndex j, Side side) {
+  const DriveDescription& drive = *model.drive;
+  const InstanceIndex i = placement.instance;
+  const Joint& joint = model.joints[j];
+  const Pose X_LM = model.links[joint.child].X_ML.inverse(), X_BaseM = drive.X_MBase.inverse();
+  WheelPlacement wheel;
+  wheel.robot = robot;
+  wheel.joint = j;
+  wheel.link = layout.link_of(i, joint.child);
+  wheel.left = side == Side::left;
+  wheel.steers = side == Side::steers;
+  Vec3 axis_M = joint.X_MJ.rotation * joint.axis.axis_in_J;
+  const Vec3 left_M = drive.X_MBase.rotation * Vec3::UnitY();
+  if (wheel.steers ? axis_M.z() < 0
+                   : drive.steering != DriveDescription::Steering::omni && axis_M.dot(left_M) < 0)
+    axis_M = -axis_M;
+  wheel.rim =
+      rim_of(drive, wheel.left, X_BaseM * joint.X_MJ.translation, X_BaseM.rotation * axis_M);
+  wheel.axis_in_L = (X_LM.rotation * axis_M).normalized();
+  wheel.center_in_L = X_LM * joint.X_MJ.translation;
+  const WheelIndex index = layout.wheels.next();
+  for (const ModelLinkIndex below : subtree(model, joint.child)) {
+    WheelIndex& turned_by = layout.links[layout.link_of(i, below)].wheel;
+    if (drive.kind == DriveDescription::Kind::kinematic && !turned_by.valid()) {
+      turned_by = index;
+      continue;
     }
+    for (const WheelIndex other : placement.wheels) {  // that hangs on this one
+      if (layout.wheels[other].link == layout.link_of(i, below)) layout.wheels[other].on = index;
+    }
+  }
+  placement.wheels.push_back(index);
+  layout.wheels.push_back(wheel);
+}
+
+void add_joints(BodyLayout& layout, const Model& model, const Grouping& grouping,
+                RobotPlacement& placement) {
+  const InstanceIndex i = placement.instance;
+  for (const ModelJointIndex j : model.joints.indices()) {
+    const Joint& joint = model.joints[j];
+    if (grouping.joined[j] || is_drive_wheel(model, j)) continue;
+    const auto body = [&](ModelLinkIndex link) {
+      return link.valid() ? layout.links[layout.link_of(i, link)].body : BodyIndex();
+    };
+    const BodyIndex parent = body(joint.parent), child = body(joint.child);
+    if (parent == child) continue;  // both static, or joined another way
+    placement.joints.push_back(layout.joints.next());
+    layout.joints.push_back({i, j, parent, child});
+  }
+}
+
+}  // namespace
+
+void BodyLayout::add(const WorldModel& world, InstanceIndex i, Known& known) {
+  const ModelInstance& instance = world.models[i];
+  const Model& model = *instance.model;
+  const Grouping& grouping = known.of(model);
+  first_link.push_back(links.next());
+  add_links(*this, instance, i, grouping);
+  RobotPlacement robot;
+  robot.instance = i;
+  if (instance.is_robot()) {
+    const ModelLinkIndex carrier = model.drive ? carrier_of(model) : ModelLinkIndex(0);
+    const Pose X_MBase = model.drive ? model.drive->X_MBase : Pose();
     const LinkPlacement& link = links[link_of(i, carrier)];
-    placement.body = link.body;
-    placement.X_BBase = link.X_BL * model.links[carrier].X_ML.inverse() * X_MBase;
+    robot.body = link.body;
+    robot.X_BBase = link.X_BL * model.links[carrier].X_ML.inverse() * X_MBase;
   }
   if (model.drive) {
-    const bool kinematic = model.drive->kind == DriveDescription::Kind::kinematic;
-    const Pose X_BaseM = model.drive->X_MBase.inverse();
-    const Vec3 left_M = model.drive->X_MBase.rotation * Vec3::UnitY();
-    const auto add_wheel = [&](ModelJointIndex j, bool left, bool steers) {
-      const Joint& joint = model.joints[j];
-      const Pose X_LM = model.links[joint.child].X_ML.inverse();
-      WheelPlacement wheel;
-      wheel.robot = robot;
-      wheel.joint = j;
-      wheel.link = link_of(i, joint.child);
-      wheel.left = left;
-      wheel.steers = steers;
-      Vec3 axis_M = joint.X_MJ.rotation * joint.axis.axis_in_J;
-      if (steers
-              ? axis_M.z() < 0
-              : model.drive->steering != DriveDescription::Steering::omni && axis_M.dot(left_M) < 0)
-        axis_M = -axis_M;
-      wheel.rim =
-          rim_of(*model.drive, left, X_BaseM * joint.X_MJ.translation, X_BaseM.rotation * axis_M);
-      wheel.axis_in_L = (X_LM.rotation * axis_M).normalized();
-      wheel.center_in_L = X_LM * joint.X_MJ.translation;
-      const WheelIndex index = wheels.next();
-      for (const ModelLinkIndex below : subtree(model, joint.child)) {
-        WheelIndex& turned_by = links[link_of(i, below)].wheel;
-        if (kinematic && !turned_by.valid()) {
-          turned_by = index;
-          continue;
-        }
-        for (const WheelIndex other : placement.wheels) {  // that hangs on this one
-          if (wheels[other].link == link_of(i, below)) wheels[other].on = index;
-        }
-      }
-      placement.wheels.push_back(index);
-      wheels.push_back(wheel);
-    };
-    for (const ModelJointIndex j : model.drive->left_joints) add_wheel(j, true, false);
-    for (const ModelJointIndex j : model.drive->right_joints) add_wheel(j, false, false);
-    for (const ModelJointIndex j : model.drive->steer_joints) add_wheel(j, false, true);
+    const RobotIndex index = instance.is_robot() ? robots.next() : RobotIndex();
+    const DriveDescription& drive = *model.drive;
+    for (const ModelJointIndex j : drive.left_joints)
+      add_wheel(*this, model, index, robot, j, Side::left);
+    for (const ModelJointIndex j : drive.right_joints)
+      add_wheel(*this, model, index, robot, j, Side::right);
+    for (const ModelJointIndex j : drive.steer_joints)
+      add_wheel(*this, model, index, robot, j, Side::steers);
   }
-  if (!model.is_static) {
-    for (const ModelJointIndex j : model.joints.indices()) {
-      const Joint& joint = model.joints[j];
-      if (grouping.joined[j] || is_drive_wheel(model, j)) continue;
-      const auto body = [&](ModelLinkIndex link) {
-        return link.valid() ? links[link_of(i, link)].body : BodyIndex();
-      };
-      const BodyIndex parent = body(joint.parent), child = body(joint.child);
-      if (parent == child) continue;  // both static, or joined another way
-      placement.joints.push_back(joints.next());
-      joints.push_back({i, j, parent, child});
-    }
-  }
-  if (robot.valid()) robots.push_back(std::move(placement));
+  if (!model.is_static) add_joints(*this, model, grouping, robot);
+  if (instance.is_robot()) robots.push_back(std::move(robot));
 }
 
 std::string body_name(const WorldModel& world, const BodyLayout& layout, LinkIndex link) {

@@ -131,8 +131,10 @@ double lowest_point_below(const Model& model, ModelJointIndex joint) {
   return lowest;
 }
 
-GuessedDrive guess_drive(const Model& model, const std::vector<std::string>& controlled) {
-  GuessedDrive result;
+namespace {
+
+// Of the wheels that a drive can be made of, those that a controller names, when there are such.
+std::vector<Wheel> driven_wheels(const Model& model, const std::vector<std::string>& controlled) {
   std::vector<Wheel> wheels = wheels_of(model, true);
   if (wheels.size() < 2) wheels = wheels_of(model, false);
   const auto is_controlled = [&](const Wheel& wheel) {
@@ -142,80 +144,113 @@ GuessedDrive guess_drive(const Model& model, const std::vector<std::string>& con
   };
   if (std::count_if(wheels.begin(), wheels.end(), is_controlled) >= 2)
     std::erase_if(wheels, [&](const Wheel& wheel) { return !is_controlled(wheel); });
-  for (const Wheel& wheel : wheels) result.wheels.push_back(model.joints[wheel.joint].name);
-  if (wheels.size() < 2) return result;
+  return wheels;
+}
 
-  const auto parallel = [&](const Wheel& wheel) {
-    return std::abs(wheel.axis.dot(wheels[0].axis)) > kParallel;
-  };
-  const bool all_parallel = std::all_of(wheels.begin(), wheels.end(), parallel);
-  const auto steered = static_cast<size_t>(std::count_if(
-      wheels.begin(), wheels.end(), [](const Wheel& wheel) { return wheel.steer.valid(); }));
-  const bool rollers = std::any_of(wheels.begin(), wheels.end(), [](const Wheel& wheel) {
-    return has_any(wheel.name, {"mecanum", "meca", "omni"});
-  });
-
-  auto drive = std::make_unique<Element>();
-  drive->name = "ruedo:drive";
-  drive->source = model.source;
-  Vec3 middle = Vec3::Zero();
-  for (const Wheel& wheel : wheels) middle += wheel.at / static_cast<double>(wheels.size());
+// To the robot's left, by the wheels' axes: what is ahead has a positive x, else a positive y.
+Vec3 left_of(const std::vector<Wheel>& wheels) {
   Vec3 left = wheels[0].axis;
   left.z() = 0;
   left.normalize();
   const Vec3 ahead = left.cross(Vec3::UnitZ());
   if (ahead.x() < -1e-6 || (std::abs(ahead.x()) <= 1e-6 && ahead.y() < 0)) left = -left;
+  return left;
+}
 
-  std::string lefts, rights, steers, steering = "differential";
-  const auto name_of = [&](ModelJointIndex joint) -> const std::string& {
-    return model.joints[joint].name;
-  };
-  const auto list = [](std::string& names, const std::string& name) {
-    names += (names.empty() ? "" : "+") + name;
-  };
-  const auto sides = [&](bool with_steered) {
-    for (const Wheel& wheel : wheels) {
-      if (!with_steered && wheel.steer.valid()) continue;
-      const double aside = left.dot(wheel.at - middle);
-      if (std::abs(aside) < kAside_m) continue;
-      add(*drive, aside > 0 ? "ruedo:left_joint" : "ruedo:right_joint", name_of(wheel.joint));
-      list(aside > 0 ? lefts : rights, name_of(wheel.joint));
+// Makes the drive's element out of wheels, and the words that say what was guessed.
+class Guesser {
+ public:
+  Guesser(const Model& model, const std::vector<Wheel>& wheels)
+      : model_(model), wheels_(wheels), left_(left_of(wheels)) {
+    drive_->name = "ruedo:drive";
+    drive_->source = model.source;
+    for (const Wheel& wheel : wheels) middle_ += wheel.at / static_cast<double>(wheels.size());
+  }
+
+  void guess(GuessedDrive& result) {
+    const std::string steering = find_steering();
+    if (lefts_.empty() || (rights_.empty() && steering != "omni")) return;
+    drive_->attributes.emplace_back("steering", steering);
+    result.in_words =
+        steering + ", " +
+        (steering == "omni" ? "wheels " + lefts_ : "left " + lefts_ + ", right " + rights_) +
+        (steers_.empty() ? "" : ", steered by " + steers_);
+    result.drive = std::move(drive_);
+  }
+
+ private:
+  std::string find_steering() {
+    const auto parallel = [&](const Wheel& wheel) {
+      return std::abs(wheel.axis.dot(wheels_[0].axis)) > kParallel;
+    };
+    const auto steered = static_cast<size_t>(std::count_if(
+        wheels_.begin(), wheels_.end(), [](const Wheel& wheel) { return wheel.steer.valid(); }));
+    if (!std::all_of(wheels_.begin(), wheels_.end(), parallel)) {
+      if (wheels_.size() < 3) return "";
+      for (const Wheel& wheel : wheels_) name("ruedo:left_joint", wheel.joint, &lefts_);
+      return "omni";
     }
-  };
-  if (!all_parallel) {
-    if (wheels.size() < 3) return result;
-    steering = "omni";
-    for (const Wheel& wheel : wheels)
-      add(*drive, "ruedo:left_joint", name_of(wheel.joint)), list(lefts, name_of(wheel.joint));
-  } else if (steered == wheels.size()) {
-    steering = "holonomic";  // each wheel turns where it has to go
-    for (const Wheel& wheel : wheels) add(*drive, "ruedo:steer_joint", name_of(wheel.steer));
-    sides(true);
-  } else if (steered > 0) {
+    if (steered == wheels_.size()) {  // each wheel turns where it has to go
+      for (const Wheel& wheel : wheels_) name("ruedo:steer_joint", wheel.steer);
+      name_sides();
+      return "holonomic";
+    }
+    if (steered > 0) {
+      const size_t joints = name_steered();
+      name_sides();
+      return joints > 1 ? "ackermann" : "tricycle";
+    }
+    name_sides();
+    const bool rollers = std::any_of(wheels_.begin(), wheels_.end(), [](const Wheel& wheel) {
+      return has_any(wheel.name, {"mecanum", "meca", "omni"});
+    });
+    return rollers && wheels_.size() == 4 ? "mecanum" : "differential";
+  }
+
+  double aside(const Wheel& wheel) const { return left_.dot(wheel.at - middle_); }
+
+  void name_sides() {
+    for (const Wheel& wheel : wheels_) {
+      if (aside(wheel) >= kAside_m)
+        name("ruedo:left_joint", wheel.joint, &lefts_);
+      else if (aside(wheel) <= -kAside_m)
+        name("ruedo:right_joint", wheel.joint, &rights_);
+    }
+  }
+
+  size_t name_steered() {
     std::vector<ModelJointIndex> joints;
-    for (const Wheel& wheel : wheels) {
+    for (const Wheel& wheel : wheels_) {
       if (!wheel.steer.valid() ||
           std::find(joints.begin(), joints.end(), wheel.steer) != joints.end())
         continue;
       joints.push_back(wheel.steer);
-      add(*drive, "ruedo:steer_joint", name_of(wheel.steer));
-      list(steers, name_of(wheel.steer));
-      if (std::abs(left.dot(wheel.at - middle)) < kAside_m)
-        add(*drive, "ruedo:left_joint", name_of(wheel.joint));
+      name("ruedo:steer_joint", wheel.steer, &steers_);
+      if (std::abs(aside(wheel)) < kAside_m) name("ruedo:left_joint", wheel.joint);
     }
-    steering = joints.size() > 1 ? "ackermann" : "tricycle";
-    sides(true);
-  } else {
-    sides(true);
-    if (rollers && wheels.size() == 4) steering = "mecanum";
+    return joints.size();
   }
-  if (lefts.empty() || (rights.empty() && steering != "omni")) return result;
-  drive->attributes.emplace_back("steering", steering);
-  result.in_words =
-      steering + ", " +
-      (steering == "omni" ? "wheels " + lefts : "left " + lefts + ", right " + rights) +
-      (steers.empty() ? "" : ", steered by " + steers);
-  result.drive = std::move(drive);
+
+  void name(const char* element, ModelJointIndex joint, std::string* words = nullptr) {
+    const std::string& joint_name = model_.joints[joint].name;
+    add(*drive_, element, joint_name);
+    if (words) *words += (words->empty() ? "" : "+") + joint_name;
+  }
+
+  const Model& model_;
+  const std::vector<Wheel>& wheels_;
+  Vec3 left_, middle_ = Vec3::Zero();
+  std::unique_ptr<Element> drive_ = std::make_unique<Element>();
+  std::string lefts_, rights_, steers_;
+};
+
+}  // namespace
+
+GuessedDrive guess_drive(const Model& model, const std::vector<std::string>& controlled) {
+  GuessedDrive result;
+  const std::vector<Wheel> wheels = driven_wheels(model, controlled);
+  for (const Wheel& wheel : wheels) result.wheels.push_back(model.joints[wheel.joint].name);
+  if (wheels.size() >= 2) Guesser(model, wheels).guess(result);
   return result;
 }
 

@@ -100,11 +100,9 @@ std::vector<std::array<Point, 3>> clip_ears(Polygon p) {
   return triangles;
 }
 
-}  // namespace
-
-Mesh extruded(const std::vector<Polygon>& written, double height) {
+// Open, without points that follow upon themselves, and simple.
+void tidy(std::vector<Polygon>& polygons) {
   constexpr size_t kMostPoints = 2000;
-  std::vector<Polygon> polygons = written;
   size_t points = 0;
   for (Polygon& p : polygons) {
     if (p.size() > 1 && p.front() == p.back()) p.pop_back();  // closed explicitly
@@ -122,7 +120,11 @@ Mesh extruded(const std::vector<Polygon>& written, double height) {
       }
     }
   }
-  // Even depth: an outline; odd: a hole of the outline around it.
+}
+
+// How many others each is inside of. Even: an outline, counter-clockwise from now on; odd: a hole
+// of the outline around it, clockwise.
+std::vector<int> nest(std::vector<Polygon>& polygons) {
   std::vector<int> depth(polygons.size(), 0);
   for (size_t i = 0; i < polygons.size(); ++i) {
     for (size_t k = 0; k < polygons.size(); ++k)
@@ -131,6 +133,15 @@ Mesh extruded(const std::vector<Polygon>& written, double height) {
     if (counter_clockwise != (depth[i] % 2 == 0))
       std::reverse(polygons[i].begin(), polygons[i].end());
   }
+  return depth;
+}
+
+}  // namespace
+
+Mesh extruded(const std::vector<Polygon>& written, double height) {
+  std::vector<Polygon> polygons = written;
+  tidy(polygons);
+  const std::vector<int> depth = nest(polygons);
 
   Mesh mesh;
   const auto add = [&](const Point& p, double z) {
@@ -138,7 +149,7 @@ Mesh extruded(const std::vector<Polygon>& written, double height) {
                                 static_cast<float>(z));
     return static_cast<uint32_t>(mesh.positions.size() - 1);
   };
-  for (size_t i = 0; i < polygons.size(); ++i) {
+  for (size_t i = 0; i < polygons.size(); ++i) {  // top and bottom
     if (depth[i] % 2) continue;
     Polygon outline = polygons[i];
     for (size_t k = 0; k < polygons.size(); ++k) {
@@ -150,8 +161,7 @@ Mesh extruded(const std::vector<Polygon>& written, double height) {
       mesh.triangles.push_back({add(t[0], 0), add(t[2], 0), add(t[1], 0)});
     }
   }
-  for (const Polygon& p :
-       polygons) {  // walls: outward for outlines and holes alike, by their directions
+  for (const Polygon& p : polygons) {  // walls: outward by the polygons' directions
     for (size_t i = 0; i < p.size(); ++i) {
       const Point &a = p[i], &b = p[(i + 1) % p.size()];
       const uint32_t low_a = add(a, 0), low_b = add(b, 0), high_a = add(a, height),

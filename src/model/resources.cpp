@@ -276,60 +276,73 @@ std::optional<std::string> ResourceFinder::find_anything(const std::string& writ
                                                          const std::string& from) const {
   const std::string uri = decoded(written);
   if (uri.empty() || uri.find('\0') != std::string::npos) return std::nullopt;
-
-  if (starts_with(uri, "http://") || starts_with(uri, "https://")) {
-    // Fuel: .../OWNER/models/NAME[/VERSION][/files/PATH]
-    const size_t models = uri.find("/models/");
-    if (models == std::string::npos) return std::nullopt;
-    std::string name = uri.substr(models + 8), rest;
-    if (const size_t files = name.find("/files/"); files != std::string::npos)
-      rest = tidy(name.substr(files + 7));
-    name = plain_name(name.substr(0, name.find('/')));
-    if (name.empty() || starts_with(rest, "..")) return std::nullopt;
-    for (const auto& root : roots_for(from)) {
-      std::vector<std::string> matches;
-      std::error_code error;
-      for (const auto& entry : fs::directory_iterator(root, error)) {
-        if (plain_name(entry.path().filename().string()) == name)
-          matches.push_back((newest_version(entry.path()) / rest).string());
-      }
-      std::sort(matches.begin(), matches.end());
-      for (const auto& match : matches) {
-        if (is_there(match)) return full_path(match);
-      }
-    }
-    return std::nullopt;
-  }
-
+  if (starts_with(uri, "http://") || starts_with(uri, "https://")) return find_fuel(uri, from);
   for (const char* scheme : {"model://", "package://"}) {
-    if (!starts_with(uri, scheme)) continue;
-    const std::string path = tidy(uri.substr(std::string(scheme).size()));
-    if (path.empty() || starts_with(path, "..")) return std::nullopt;
-    for (const auto& root : roots_for(from)) {
-      const std::string found = full_path(fs::path(root) / path);
-      if (is_there(found)) return found;
-    }
-    const size_t slash = path.find('/');
-    return in_package(path.substr(0, slash),
-                      slash == std::string::npos ? "" : path.substr(slash + 1), from);
+    if (starts_with(uri, scheme))
+      return find_by_name(tidy(uri.substr(std::string(scheme).size())), from);
   }
+  if (starts_with(uri, "file://")) {
+    const std::string path = uri.substr(7);
+    if (const auto above = find_above(path, from)) return above;
+    return find_path(path, from);
+  }
+  if (uri.find("://") != std::string::npos) return std::nullopt;
+  return find_path(uri, from);
+}
 
-  std::string path = uri;
-  if (starts_with(path, "file://"))
-    path = path.substr(7);
-  else if (path.find("://") != std::string::npos)
-    return std::nullopt;
+// A model of Fuel's that was fetched: .../OWNER/models/NAME[/VERSION][/files/PATH]
+std::optional<std::string> ResourceFinder::find_fuel(const std::string& uri,
+                                                     const std::string& from) const {
+  const size_t models = uri.find("/models/");
+  if (models == std::string::npos) return std::nullopt;
+  std::string name = uri.substr(models + 8), rest;
+  if (const size_t files = name.find("/files/"); files != std::string::npos)
+    rest = tidy(name.substr(files + 7));
+  name = plain_name(name.substr(0, name.find('/')));
+  if (name.empty() || starts_with(rest, "..")) return std::nullopt;
+  for (const auto& root : roots_for(from)) {
+    std::vector<std::string> matches;
+    std::error_code error;
+    for (const auto& entry : fs::directory_iterator(root, error)) {
+      if (plain_name(entry.path().filename().string()) == name)
+        matches.push_back((newest_version(entry.path()) / rest).string());
+    }
+    std::sort(matches.begin(), matches.end());
+    for (const auto& match : matches) {
+      if (is_there(match)) return full_path(match);
+    }
+  }
+  return std::nullopt;
+}
 
+// model://PATH and package://PATH.
+std::optional<std::string> ResourceFinder::find_by_name(const std::string& path,
+                                                        const std::string& from) const {
+  if (path.empty() || starts_with(path, "..")) return std::nullopt;
+  if (const auto found = find_in_roots(path, from)) return found;
+  const size_t slash = path.find('/');
+  return in_package(path.substr(0, slash), slash == std::string::npos ? "" : path.substr(slash + 1),
+                    from);
+}
+
+// "file://models/x/mesh.dae", from a file below that models.
+std::optional<std::string> ResourceFinder::find_above(const std::string& path,
+                                                      const std::string& from) const {
+  const std::string tidied = tidy(path);
+  if (fs::path(path).is_absolute() || tidied.empty()) return std::nullopt;
+  const fs::path top = *fs::path(tidied).begin();
+  for (fs::path folder = fs::path(from).parent_path(); folder.has_relative_path() && top != "..";
+       folder = folder.parent_path()) {
+    if (folder.filename() == top && is_there(folder.parent_path() / tidied))
+      return full_path(folder.parent_path() / tidied);
+  }
+  return std::nullopt;
+}
+
+// Beside the file that names it, else below a folder that is searched.
+std::optional<std::string> ResourceFinder::find_path(const std::string& path,
+                                                     const std::string& from) const {
   const bool absolute = fs::path(path).is_absolute();
-  if (starts_with(uri, "file://") &&
-      !absolute) {  // "file://models/x/mesh.dae", from a file below that models
-    const fs::path top = *fs::path(tidy(path)).begin();
-    for (fs::path folder = fs::path(from).parent_path(); folder.has_relative_path() && top != "..";
-         folder = folder.parent_path()) {
-      if (folder.filename() == top && is_there(folder.parent_path() / tidy(path)))
-        return full_path(folder.parent_path() / tidy(path));
-    }
-  }
   const std::string beside =
       (absolute ? fs::path(path) : fs::path(from).parent_path() / path).lexically_normal().string();
   if (is_there(beside) && ((absolute && allow_absolute_) || allowed(beside, from)))
@@ -337,8 +350,13 @@ std::optional<std::string> ResourceFinder::find_anything(const std::string& writ
   if (absolute) return std::nullopt;
   const std::string tidied = tidy(path);
   if (tidied.empty() || starts_with(tidied, "..")) return std::nullopt;
+  return find_in_roots(tidied, from);
+}
+
+std::optional<std::string> ResourceFinder::find_in_roots(const std::string& path,
+                                                         const std::string& from) const {
   for (const auto& root : roots_for(from)) {
-    const std::string found = full_path(fs::path(root) / tidied);
+    const std::string found = full_path(fs::path(root) / path);
     if (is_there(found)) return found;
   }
   return std::nullopt;

@@ -56,6 +56,11 @@ class ResourceFinder {
                                         const std::string& from) const;
   bool allowed(const std::string& path, const std::string& from) const;
   std::optional<std::string> find_anything(const std::string& uri, const std::string& from) const;
+  std::optional<std::string> find_fuel(const std::string& uri, const std::string& from) const;
+  std::optional<std::string> find_by_name(const std::string& path, const std::string& from) const;
+  std::optional<std::string> find_above(const std::string& path, const std::string& from) const;
+  std::optional<std::string> find_path(const std::string& path, const std::string& from) const;
+  std::optional<std::string> find_in_roots(const std::string& path, const std::string& from) const;
 
   std::vector<std::string> near_,
       far_;  // folders searched before and after those of the naming file

@@ -143,6 +143,34 @@ std::string value_of(const Element& element) {
   return value ? *value : element.text;
 }
 
+// Settings of Gazebo's contact and joint solvers, for which there is nothing to set here.
+constexpr std::string_view kOfSolvers[] = {"minDepth",
+                                           "min_depth",
+                                           "maxVel",
+                                           "max_vel",
+                                           "maxContacts",
+                                           "max_contacts",
+                                           "stopCfm",
+                                           "stopErp",
+                                           "stopKd",
+                                           "stopKp",
+                                           "fudgeFactor",
+                                           "fudge_factor",
+                                           "cfmDamping",
+                                           "implicitSpringDamper",
+                                           "provideFeedback",
+                                           "preserveFixedJoint",
+                                           "disableFixedJointLumping"};
+// What a link's SDF takes as it is written.
+constexpr std::string_view kOfLinks[] = {
+    "gravity", "self_collide",   "selfCollide", "enable_wind", "kinematic",    "light",
+    "battery", "velocity_decay", "projector",   "audio_sink",  "audio_source", "particle_emitter"};
+
+template <size_t kCount>
+bool is_one_of(const std::string_view (&names)[kCount], const std::string& name) {
+  return std::find(std::begin(names), std::end(names), name) != std::end(names);
+}
+
 struct Converter {
   const Element& robot;
   Findings& findings;
@@ -155,90 +183,72 @@ struct Converter {
   void read_gazebo() {
     for (const Element* block : robot.all("gazebo")) {
       const std::string* reference = block->attribute("reference");
-      for (const auto& child : block->children) {
-        const std::string& name = child->name;
-        if (!reference || reference->empty()) {
-          if (name == "plugin" || name == "static" || name == "self_collide" ||
-              name == "enable_wind" || name.rfind("ruedo:", 0) == 0) {
-            model->children.push_back(child->clone());
-          } else if (name.find(':') == std::string::npos) {
-            findings.unsupported(child->source, "robot " + urdf.getName(),
-                                 "<" + name + "> in <gazebo> is not supported and left out");
-          }
-          continue;
-        }
-        // Settings of Gazebo's contact and joint solvers, for which there is nothing to set here.
-        constexpr std::string_view kOfSolvers[] = {"minDepth",
-                                                   "min_depth",
-                                                   "maxVel",
-                                                   "max_vel",
-                                                   "maxContacts",
-                                                   "max_contacts",
-                                                   "implicitSpringDamper",
-                                                   "provideFeedback",
-                                                   "stopCfm",
-                                                   "stopErp",
-                                                   "stopKd",
-                                                   "stopKp",
-                                                   "fudgeFactor",
-                                                   "fudge_factor",
-                                                   "cfmDamping",
-                                                   "preserveFixedJoint",
-                                                   "disableFixedJointLumping"};
-        if (std::find(std::begin(kOfSolvers), std::end(kOfSolvers), name) != std::end(kOfSolvers))
-          continue;
-        const auto leave_out = [&] {
-          findings.unsupported(child->source, "robot " + urdf.getName(),
-                               "<" + name + "> in <gazebo reference=\"" + *reference +
-                                   "\"> is not supported and left out");
-        };
-        if (!urdf.getLink(*reference)) {
-          if (!urdf.getJoint(*reference)) continue;
-          if (name == "sensor")
-            joint_sensors[*reference].push_back(child.get());
-          else if (name == "springStiffness" || name == "springReference")
-            springs[*reference].push_back(child.get());
-          else
-            leave_out();
-          continue;
-        }
-        constexpr std::string_view kOfLinks[] = {
-            "gravity",   "self_collide", "selfCollide",    "enable_wind",
-            "kinematic", "light",        "velocity_decay", "battery",
-            "projector", "audio_source", "audio_sink",     "particle_emitter"};
-        GazeboLink& link = gazebo[*reference];
-        if (name == "sensor")
-          link.sensors.push_back(child.get());
-        else if (name == "material")
-          link.material = value_of(*child);
-        else if (name == "mu1")
-          link.mu1 = child.get();
-        else if (name == "mu2")
-          link.mu2 = child.get();
-        else if (name == "kp")
-          link.kp = child.get();
-        else if (name == "kd")
-          link.kd = child.get();
-        else if (name == "turnGravityOff")
-          link.gravity_off = child.get();
-        else if (name == "fdir1")
-          link.fdir1 = child.get();
-        else if (name == "visual" && child->has("material"))
-          link.colour = child->child("material");
-        else if (name == "plugin")
-          model->children.push_back(child->clone());
-        else if (std::find(std::begin(kOfLinks), std::end(kOfLinks), name) != std::end(kOfLinks))
-          link.as_written.push_back(child.get());
-        else
-          leave_out();
+      if (!reference || reference->empty()) {
+        for (const auto& child : block->children) read_of_robot(*child);
+        continue;
       }
-      if (reference && !reference->empty() && !urdf.getLink(*reference) &&
-          !urdf.getJoint(*reference)) {
+      const bool of_link = urdf.getLink(*reference) != nullptr;
+      if (!of_link && !urdf.getJoint(*reference)) {
         findings.error(
             block->source, "robot " + urdf.getName(),
             "<gazebo reference=\"" + *reference + "\">: there is no link or joint of that name");
+        continue;
+      }
+      for (const auto& child : block->children) {
+        if (is_one_of(kOfSolvers, child->name)) continue;
+        if (!(of_link ? read_of_link(*child, gazebo[*reference])
+                      : read_of_joint(*child, *reference)))
+          findings.unsupported(child->source, "robot " + urdf.getName(),
+                               "<" + child->name + "> in <gazebo reference=\"" + *reference +
+                                   "\"> is not supported and left out");
       }
     }
+  }
+
+  void read_of_robot(const Element& child) {
+    const std::string& name = child.name;
+    if (name == "plugin" || name == "static" || name == "self_collide" || name == "enable_wind" ||
+        name.rfind("ruedo:", 0) == 0) {
+      model->children.push_back(child.clone());
+    } else if (name.find(':') == std::string::npos) {
+      findings.unsupported(child.source, "robot " + urdf.getName(),
+                           "<" + name + "> in <gazebo> is not supported and left out");
+    }
+  }
+
+  bool read_of_joint(const Element& child, const std::string& joint) {
+    if (child.name == "sensor")
+      joint_sensors[joint].push_back(&child);
+    else if (child.name == "springStiffness" || child.name == "springReference")
+      springs[joint].push_back(&child);
+    else
+      return false;
+    return true;
+  }
+
+  bool read_of_link(const Element& child, GazeboLink& link) {
+    const std::string& name = child.name;
+    const std::pair<std::string_view, const Element**> single[] = {
+        {"mu1", &link.mu1}, {"mu2", &link.mu2},     {"kp", &link.kp},
+        {"kd", &link.kd},   {"fdir1", &link.fdir1}, {"turnGravityOff", &link.gravity_off}};
+    for (const auto& [known, place] : single) {
+      if (name != known) continue;
+      *place = &child;
+      return true;
+    }
+    if (name == "sensor")
+      link.sensors.push_back(&child);
+    else if (name == "material")
+      link.material = value_of(child);
+    else if (name == "visual" && child.has("material"))
+      link.colour = child.child("material");
+    else if (name == "plugin")
+      model->children.push_back(child.clone());
+    else if (is_one_of(kOfLinks, name))
+      link.as_written.push_back(&child);
+    else
+      return false;
+    return true;
   }
 
   void add_inertial(Element& link, const urdf::Link& from, const Source& source) {

@@ -213,19 +213,35 @@ Limits MotionPlanner::stricter(const Limits& own, const MoveCommand& command,
   return limits;
 }
 
-void MotionPlanner::command(const MoveCommand& command, SimTime now, double heading) {
-  const auto refused = [&](int8_t reason) { refuse(command.id, command.kind, reason); };
-  if (command.kind < Move::ADVANCE || command.kind > Move::STOP)
-    return refused(Status::REASON_BAD_KIND);
-  if (!all_finite({command.value, command.radius, command.speed, command.acceleration,
-                   command.deceleration})) {
-    return refused(Status::REASON_NOT_FINITE);
+int8_t MotionPlanner::aim_on_arc(const MoveCommand& command, Primitive& next) const {
+  const double radius = command.radius;
+  if (!(radius > 0.0)) return Status::REASON_BAD_VALUE;
+  next.axis = Axis::arc;
+  next.target = std::abs(command.value) * radius;
+  next.unit = command.value < 0.0 ? -1.0 / radius : 1.0 / radius;
+  next.curvature = next.unit;
+  if (is_steered() && std::abs(drive_.wheelbase) > math::tan(drive_.max_steering_angle) * radius)
+    return Status::REASON_NOT_POSSIBLE;
+  Limits& limits = next.limits = stricter(way_limits_, command, kUsualSpeed_m_s);
+  limits.speed = std::min(limits.speed, angle_limits_.speed * radius);
+  limits.acceleration = std::min(limits.acceleration, angle_limits_.acceleration * radius);
+  limits.deceleration = std::min(limits.deceleration, angle_limits_.deceleration * radius);
+  if (std::isfinite(drive_.max_wheel_rate)) {
+    const double outer = 1.0 + 0.5 * drive_.track / radius;
+    limits.speed = std::min(limits.speed, drive_.max_wheel_rate * drive_.wheel_radius / outer);
   }
+  return Status::REASON_NONE;
+}
+
+int8_t MotionPlanner::aim(const MoveCommand& command, double heading, Primitive& next) const {
+  if (command.kind < Move::ADVANCE || command.kind > Move::STOP) return Status::REASON_BAD_KIND;
+  if (!all_finite({command.value, command.radius, command.speed, command.acceleration,
+                   command.deceleration}))
+    return Status::REASON_NOT_FINITE;
   if (is_steered() && (command.kind == Move::ROTATE || command.kind == Move::HEADING))
-    return refused(Status::REASON_NOT_POSSIBLE);
+    return Status::REASON_NOT_POSSIBLE;
   if (command.speed < 0.0 || command.acceleration < 0.0 || command.deceleration < 0.0)
-    return refused(Status::REASON_BAD_VALUE);
-  Primitive next;
+    return Status::REASON_BAD_VALUE;
   switch (command.kind) {
     case Move::ADVANCE:
       next.axis = Axis::way;
@@ -240,41 +256,29 @@ void MotionPlanner::command(const MoveCommand& command, SimTime now, double head
       next.limits = stricter(angle_limits_, command, kUsualRate_rad_s);
       break;
     case Move::ARC:
-      if (!(command.radius > 0.0)) return refused(Status::REASON_BAD_VALUE);
-      next.axis = Axis::arc;
-      next.target = std::abs(command.value) * command.radius;
-      next.unit = command.value < 0.0 ? -1.0 / command.radius : 1.0 / command.radius;
-      next.curvature = next.unit;
-      if (is_steered() &&
-          std::abs(drive_.wheelbase) > math::tan(drive_.max_steering_angle) * command.radius)
-        return refused(Status::REASON_NOT_POSSIBLE);
-      next.limits = stricter(way_limits_, command, kUsualSpeed_m_s);
-      next.limits.speed = std::min(next.limits.speed, angle_limits_.speed * command.radius);
-      next.limits.acceleration =
-          std::min(next.limits.acceleration, angle_limits_.acceleration * command.radius);
-      next.limits.deceleration =
-          std::min(next.limits.deceleration, angle_limits_.deceleration * command.radius);
-      if (std::isfinite(drive_.max_wheel_rate)) {
-        const double outer = 1.0 + 0.5 * drive_.track / command.radius;
-        next.limits.speed =
-            std::min(next.limits.speed, drive_.max_wheel_rate * drive_.wheel_radius / outer);
-      }
+      if (const int8_t reason = aim_on_arc(command, next); reason != Status::REASON_NONE)
+        return reason;
       break;
-    default: break;  // STOP
+    default: return Status::REASON_NONE;  // STOP
   }
-  const bool measured = next.axis != Axis::none;
-  if (measured &&
-      (std::abs(next.target) > kLargestValue || std::abs(command.value) > kLargestValue ||
-       command.radius > kLargestValue || next.limits.speed < kSlowestChange ||
-       next.limits.acceleration < kSlowestChange || next.limits.deceleration < kSlowestChange)) {
-    return refused(Status::REASON_BAD_VALUE);
-  }
+  const Limits& limits = next.limits;
+  const bool too_far = std::abs(next.target) > kLargestValue ||
+                       std::abs(command.value) > kLargestValue || command.radius > kLargestValue;
+  const bool too_slow = limits.speed < kSlowestChange || limits.acceleration < kSlowestChange ||
+                        limits.deceleration < kSlowestChange;
+  return too_far || too_slow ? Status::REASON_BAD_VALUE : Status::REASON_NONE;
+}
+
+void MotionPlanner::command(const MoveCommand& command, SimTime now, double heading) {
+  Primitive next;
+  if (const int8_t reason = aim(command, heading, next); reason != Status::REASON_NONE)
+    return refuse(command.id, command.kind, reason);
   replace_running();
   holding_ = by_wheels_ = false;
   deadline_ = kNever;
   primitive_ = next;
   show(command.id, command.kind, Status::STATE_RUNNING);
-  if (measured) {
+  if (next.axis != Axis::none) {
     plan_primitive(now);
   } else {
     Limits stopping = way_limits_;

@@ -100,6 +100,9 @@ class MotionPlanner {
   void watch_for_block(SimTime now, bool touched);
   void watch_held(SimTime now, double way, double angle, bool touched);
   bool settled(SimTime now, const Lag& lag) const;
+  // What a command asks for, or the reason why it cannot be done.
+  int8_t aim(const MoveCommand& command, double heading, Primitive& next) const;
+  int8_t aim_on_arc(const MoveCommand& command, Primitive& next) const;
   static Limits stricter(const Limits& own, const MoveCommand& command, double fallback_speed);
 
   // Hot: what a step of steady motion needs.

@@ -44,6 +44,36 @@ bool round_about(const RayShape& shape, const Pose& X_LS, const Vec3& center_in_
   }
 }
 
+// As RayShape::size has it; a plane's and a mesh's is 0.
+Vec3 size_of(const model::Geometry& geometry) {
+  const Vec3& s = geometry.size;
+  switch (geometry.shape) {
+    case Shape::box: return 0.5 * s;
+    case Shape::sphere: return {s.x(), 0, 0};
+    case Shape::cylinder:
+    case Shape::capsule:
+    case Shape::cone: return {s.x(), 0.5 * s.y(), 0};
+    case Shape::ellipsoid: return s;
+    case Shape::plane:
+    case Shape::mesh: break;
+  }
+  return Vec3::Zero();
+}
+
+// Sets the box and the ball around the shape where it is now.
+void enclose(RayShape& shape, const Pose& X_FS) {
+  if (shape.kind == Shape::mesh) {
+    for (const Vec3& p : shape.mesh->positions()) shape.box_F.add(X_FS * p);
+  } else if (shape.kind != Shape::plane) {
+    const Vec3 half = shape.into.rotation.transpose().cwiseAbs() * half_box(shape);
+    shape.box_F.add(X_FS.translation - half);
+    shape.box_F.add(X_FS.translation + half);
+  }
+  if (shape.box_F.empty()) return;
+  shape.center_F = 0.5 * (shape.box_F.lower + shape.box_F.upper);
+  shape.radius = 0.5 * (shape.box_F.upper - shape.box_F.lower).norm();
+}
+
 }  // namespace
 
 RayTable::RayTable(const model::WorldModel& world, const model::BodyLayout& layout, bool visuals,
@@ -68,90 +98,72 @@ RayTable::RayTable(const model::WorldModel& world, const model::BodyLayout& layo
   }
 }
 
+std::shared_ptr<const RayMesh> RayTable::mesh_of(const model::Geometry& geometry, const Pose* X_FS,
+                                                 RTCDevice device) {
+  if (X_FS) return std::make_shared<RayMesh>(*geometry.mesh, geometry.scale, *X_FS);
+  const Vec3& scale = geometry.scale;
+  auto& shared = meshes_[{geometry.mesh.get(), scale.x(), scale.y(), scale.z()}];
+  if (!shared) {
+    const auto mesh = std::make_shared<RayMesh>(*geometry.mesh, scale, Pose());
+    if (device) mesh->build_tree(device);
+    shared = mesh;
+  }
+  return shared;
+}
+
+void RayTable::add_turning(RayShape& shape, const Pose& X_LS, const model::LinkPlacement& link,
+                           const model::BodyLayout& layout) {
+  // Parts fixed to the wheel's own link turn about the same axis, seen from their frame.
+  const Pose& X_FL = link.X_BL;
+  const model::WheelPlacement& wheel = layout.wheels[link.wheel];
+  const Pose X_LWheel = X_FL.inverse() * layout.links[wheel.link].X_BL;
+  const Vec3 axis_in_L = (X_LWheel.rotation * wheel.axis_in_L).normalized(),
+             center_in_L = X_LWheel * wheel.center_in_L;
+  if (round_about(shape, X_LS, center_in_L, axis_in_L)) return;
+  shape.turning = static_cast<int>(turning.size());
+  turning.push_back({link.wheel, X_FL, X_LS, axis_in_L, center_in_L});
+  // The ball around all it sweeps: about the point of the axis that is nearest to its centre.
+  const Vec3 axis_in_F = X_FL.rotation * axis_in_L;
+  const Vec3 center_in_F = X_FL * center_in_L;
+  const Vec3 on_axis = center_in_F + axis_in_F * axis_in_F.dot(shape.center_F - center_in_F);
+  shape.radius += (shape.center_F - on_axis).norm();
+  shape.center_F = on_axis;
+  shape.box_F.add(on_axis - Vec3::Constant(shape.radius));
+  shape.box_F.add(on_axis + Vec3::Constant(shape.radius));
+}
+
 void RayTable::add(const model::LinkPlacement& link, LinkIndex link_index, int shape_index,
                    const Pose& X_LShape, const model::Geometry& geometry,
                    const model::BodyLayout& layout, bool visuals, RTCDevice device) {
+  const bool is_mesh = geometry.shape == Shape::mesh;
+  if (is_mesh && (!geometry.mesh || geometry.mesh->triangles.empty())) return;
   RayShape shape;
   Pose X_LS = X_LShape;
   shape.kind = geometry.shape;
   shape.link = link_index;
   shape.shape = shape_index;
   shape.body = link.body;
-  const Vec3& s = geometry.size;
-  switch (geometry.shape) {
-    case Shape::box: shape.size = 0.5 * s; break;
-    case Shape::sphere: shape.size = Vec3(s.x(), 0, 0); break;
-    case Shape::cylinder:
-    case Shape::capsule:
-    case Shape::cone: shape.size = Vec3(s.x(), 0.5 * s.y(), 0); break;
-    case Shape::ellipsoid: shape.size = s; break;
-    case Shape::plane:
-      if (visuals) {  // what is drawn is a rectangle: a box without height
-        shape.kind = Shape::box;
-        shape.size = Vec3(0.5 * geometry.extent.x(), 0.5 * geometry.extent.y(), 0.0);
-        X_LS = X_LS * Pose{turned_to(geometry.normal.normalized()), Vec3::Zero()};
-      } else {
-        shape.normal = geometry.normal.normalized();
-      }
-      break;
-    case Shape::mesh: {
-      if (!geometry.mesh || geometry.mesh->triangles.empty()) return;
-      if (link.body < 0) {
-        shape.mesh = std::make_shared<RayMesh>(*geometry.mesh, geometry.scale,
-                                               (link.X_BL * X_LS).normalized());
-        break;
-      }
-      auto& shared = meshes_[{geometry.mesh.get(), geometry.scale.x(), geometry.scale.y(),
-                              geometry.scale.z()}];
-      if (!shared) {
-        const auto mesh = std::make_shared<RayMesh>(*geometry.mesh, geometry.scale, Pose());
-        if (device) mesh->build_tree(device);
-        shared = mesh;
-      }
-      shape.mesh = shared;
-      break;
+  shape.size = size_of(geometry);
+  if (geometry.shape == Shape::plane) {
+    shape.normal = geometry.normal.normalized();
+    if (visuals) {  // what is drawn is a rectangle: a box without height
+      shape.kind = Shape::box;
+      shape.size = Vec3(0.5 * geometry.extent.x(), 0.5 * geometry.extent.y(), 0.0);
+      X_LS = X_LS * Pose{turned_to(shape.normal), Vec3::Zero()};
     }
   }
-
-  const Pose X_FL = link.X_BL,
-             X_FS = shape.mesh && link.body < 0 ? Pose() : (X_FL * X_LS).normalized();
+  Pose X_FS = (link.X_BL * X_LS).normalized();
+  if (is_mesh) {
+    const bool is_static = !link.body.valid();
+    shape.mesh = mesh_of(geometry, is_static ? &X_FS : nullptr, device);
+    if (is_static) X_FS = Pose();  // it is given in the world's frame
+  }
   shape.into = IntoShape(X_FS);
-  if (shape.kind == Shape::mesh) {
-    for (const Vec3& p : shape.mesh->positions()) shape.box_F.add(X_FS * p);
-  } else if (shape.kind != Shape::plane) {
-    const Vec3 half = shape.into.rotation.transpose().cwiseAbs() * half_box(shape);
-    shape.box_F.add(X_FS.translation - half);
-    shape.box_F.add(X_FS.translation + half);
-  }
-  if (!shape.box_F.empty()) {
-    shape.center_F = 0.5 * (shape.box_F.lower + shape.box_F.upper);
-    shape.radius = 0.5 * (shape.box_F.upper - shape.box_F.lower).norm();
-  }
-  if (link.wheel >= 0 && shape.kind != Shape::plane) {
-    // Parts fixed to the wheel's own link turn about the same axis, seen from their frame.
-    const model::WheelPlacement& wheel = layout.wheels[link.wheel];
-    const Pose X_LWheel = X_FL.inverse() * layout.links[wheel.link].X_BL;
-    const Vec3 axis_in_L = (X_LWheel.rotation * wheel.axis_in_L).normalized(),
-               center_in_L = X_LWheel * wheel.center_in_L;
-    if (!round_about(shape, X_LS, center_in_L, axis_in_L)) {
-      shape.turning = static_cast<int>(turning.size());
-      turning.push_back({link.wheel, X_FL, X_LS, axis_in_L, center_in_L});
-      // The ball around all it sweeps: about the point of the axis that is nearest to its centre.
-      const Vec3 axis_in_F = X_FL.rotation * axis_in_L;
-      const Vec3 center_in_F = X_FL * center_in_L;
-      const Vec3 on_axis = center_in_F + axis_in_F * axis_in_F.dot(shape.center_F - center_in_F);
-      shape.radius += (shape.center_F - on_axis).norm();
-      shape.center_F = on_axis;
-      shape.box_F.add(on_axis - Vec3::Constant(shape.radius));
-      shape.box_F.add(on_axis + Vec3::Constant(shape.radius));
-    }
-  }
+  enclose(shape, X_FS);
+  if (link.wheel.valid() && shape.kind != Shape::plane) add_turning(shape, X_LS, link, layout);
   shape.radius *= 1.0 + 1e-9;  // rounding of the test against it
   const int index = static_cast<int>(shapes.size());
-  if (shape.body < 0)
-    statics.push_back(index);
-  else
-    bodies[shape.body].push_back(index);
+  (shape.body.valid() ? bodies[shape.body] : statics).push_back(index);
   shapes.push_back(std::move(shape));
 }
 

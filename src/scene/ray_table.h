@@ -73,6 +73,12 @@ struct RayTable {
   void add(const model::LinkPlacement& link, LinkIndex link_index, int shape_index,
            const Pose& X_LS, const model::Geometry& geometry, const model::BodyLayout& layout,
            bool visuals, RTCDevice device);
+  // With X_FS one of its own in frame F, without a tree; else one that others share.
+  std::shared_ptr<const RayMesh> mesh_of(const model::Geometry& geometry, const Pose* X_FS,
+                                         RTCDevice device);
+  // What a wheel moves: its place goes into `turning`, and its bounds hold all that it sweeps.
+  void add_turning(RayShape& shape, const Pose& X_LS, const model::LinkPlacement& link,
+                   const model::BodyLayout& layout);
   std::map<std::tuple<const model::Mesh*, double, double, double>, std::shared_ptr<const RayMesh>>
       meshes_;
 };

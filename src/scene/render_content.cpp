@@ -1,6 +1,7 @@
 #include "scene/render_content.h"
 
 #include <algorithm>
+#include <limits>
 #include <map>
 #include <tuple>
 
@@ -203,70 +204,96 @@ Pose link_pose(const model::BodyLayout& layout, const Snapshot& snapshot, LinkIn
   return snapshot.bodies[placement.body] * layout.link_in_body(link, snapshot.wheel_angles);
 }
 
-RenderContent::RenderContent(const model::WorldModel& world, const model::BodyLayout& layout) {
-  Builder builder(*this);
-  std::map<const model::Link*, int> kinds;  // looked up only
+namespace {
+
+// The class labels of a picture: 1 and on for what the world lists, 0 for the rest.
+IndexedVector<LinkIndex, uint16_t> labels_of(const model::BodyLayout& layout) {
   IndexedVector<BodyIndex, size_t> label_of_body(layout.bodies.size());
   IndexedVector<LinkIndex, size_t> label_of_static(layout.links.size());
   for (size_t i = 0; i < layout.listed.size(); ++i) {
     const model::ListedBody& listed = layout.listed[i];
-    if (listed.body.valid())
-      label_of_body[listed.body] = i + 1;
-    else
-      label_of_static[listed.link] = i + 1;
+    (listed.body.valid() ? label_of_body[listed.body] : label_of_static[listed.link]) = i + 1;
   }
-  bool first = true;
+  IndexedVector<LinkIndex, uint16_t> labels;
+  for (const LinkIndex i : layout.links.indices()) {
+    const BodyIndex body = layout.links[i].body;
+    const size_t label = body.valid() ? label_of_body[body] : label_of_static[i];
+    labels.push_back(static_cast<uint16_t>(std::min<size_t>(label, 65535)));
+  }
+  return labels;
+}
+
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+
+Bounds bounds_of(const RenderPart& part, const Pose& X_WL) {
+  Bounds bounds{Vec3::Constant(kInfinity), Vec3::Constant(-kInfinity)};
+  for (int corner = 0; corner < 8; ++corner) {
+    const Vec3 p((corner & 1) != 0 ? part.high.x() : part.low.x(),
+                 (corner & 2) != 0 ? part.high.y() : part.low.y(),
+                 (corner & 4) != 0 ? part.high.z() : part.low.z());
+    const Vec3 p_W = X_WL * Vec3(part.M_LP.leftCols<3>() * p + part.M_LP.col(3));
+    bounds.low = bounds.low.cwiseMin(p_W);
+    bounds.high = bounds.high.cwiseMax(p_W);
+  }
+  return bounds;
+}
+
+// A world without a light gets a high afternoon sun, so that something can be seen.
+model::Light afternoon_sun() {
+  model::Light sun;
+  sun.name = "default";
+  sun.type = model::Light::Type::directional;
+  sun.direction = Vec3(-0.5, 0.35, -0.9).normalized();
+  sun.diffuse = {0.8f, 0.8f, 0.8f, 1.0f};
+  sun.cast_shadows = true;
+  return sun;
+}
+
+}  // namespace
+
+RenderContent::RenderContent(const model::WorldModel& world, const model::BodyLayout& layout)
+    : label_of_link(labels_of(layout)) {
+  Builder builder(*this);
+  std::map<const model::Link*, int> kinds;  // looked up only
   for (const LinkIndex i : layout.links.indices()) {
     const model::LinkPlacement& placement = layout.links[i];
+    kind_of_link.push_back(-1);
     if (world.models[placement.instance].removed) {
-      kind_of_link.push_back(-1);
-      label_of_link.push_back(0);
+      label_of_link[i] = 0;
       continue;
     }
     const model::Link& link = world.models[placement.instance].model->links[placement.link];
-    const auto [at, inserted] = kinds.try_emplace(&link, -1);
+    const auto [kind, inserted] = kinds.try_emplace(&link, -1);
     if (inserted) {
-      RenderLinkKind kind = builder.link_kind(link);
-      if (!kind.parts.empty()) {
-        at->second = static_cast<int>(link_kinds.size());
-        link_kinds.push_back(std::move(kind));
+      RenderLinkKind built = builder.link_kind(link);
+      if (!built.parts.empty()) {
+        kind->second = static_cast<int>(link_kinds.size());
+        link_kinds.push_back(std::move(built));
       }
     }
-    kind_of_link.push_back(at->second);
+    kind_of_link[i] = kind->second;
     for (const model::Light& light : link.lights) lights.push_back({light, i});
-
-    const size_t label =
-        placement.body.valid() ? label_of_body[placement.body] : label_of_static[i];
-    label_of_link.push_back(static_cast<uint16_t>(std::min<size_t>(label, 65535)));
-
-    if (at->second < 0) continue;
-    const Pose X_WL = placement.body.valid() ? layout.bodies[placement.body].X_WB * placement.X_BL
-                                             : placement.X_BL;
-    for (const RenderPart& part : link_kinds[at->second].parts) {
-      if ((batches[part.batch].flags & kGround) != 0) continue;
-      for (int corner = 0; corner < 8; ++corner) {
-        const Vec3 p((corner & 1) != 0 ? part.high.x() : part.low.x(),
-                     (corner & 2) != 0 ? part.high.y() : part.low.y(),
-                     (corner & 4) != 0 ? part.high.z() : part.low.z());
-        const Vec3 p_W = X_WL * Vec3(part.M_LP.leftCols<3>() * p + part.M_LP.col(3));
-        if (first) bounds = {p_W, p_W};
-        bounds.low = bounds.low.cwiseMin(p_W);
-        bounds.high = bounds.high.cwiseMax(p_W);
-        first = false;
-      }
-    }
   }
   for (const model::Light& light : world.lights) lights.push_back({light, {}});
-  if (lights.empty()) {
-    // A world without a light gets a high afternoon sun, so that something can be seen.
-    model::Light sun;
-    sun.name = "default";
-    sun.type = model::Light::Type::directional;
-    sun.direction = Vec3(-0.5, 0.35, -0.9).normalized();
-    sun.diffuse = {0.8f, 0.8f, 0.8f, 1.0f};
-    sun.cast_shadows = true;
-    lights.push_back({sun, {}});
+  if (lights.empty()) lights.push_back({afternoon_sun(), {}});
+  find_bounds(layout);
+}
+
+void RenderContent::find_bounds(const model::BodyLayout& layout) {
+  Bounds all{Vec3::Constant(kInfinity), Vec3::Constant(-kInfinity)};
+  for (const LinkIndex i : layout.links.indices()) {
+    if (kind_of_link[i] < 0) continue;
+    const model::LinkPlacement& placement = layout.links[i];
+    const Pose X_WL = placement.body.valid() ? layout.bodies[placement.body].X_WB * placement.X_BL
+                                             : placement.X_BL;
+    for (const RenderPart& part : link_kinds[kind_of_link[i]].parts) {
+      if ((batches[part.batch].flags & kGround) != 0) continue;
+      const Bounds of_part = bounds_of(part, X_WL);
+      all.low = all.low.cwiseMin(of_part.low);
+      all.high = all.high.cwiseMax(of_part.high);
+    }
   }
+  if (all.low.x() <= all.high.x()) bounds = all;
 }
 
 }  // namespace ruedo::scene

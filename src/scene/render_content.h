@@ -74,6 +74,9 @@ struct RenderContent {
                 Vec3::Constant(3.0)};  // of all that is drawn at the start, but for the ground
 
   RenderContent(const model::WorldModel& world, const model::BodyLayout& layout);
+
+ private:
+  void find_bounds(const model::BodyLayout& layout);
 };
 
 // Where a link is in a snapshot, its wheel's turning included.
