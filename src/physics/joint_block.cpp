@@ -9,6 +9,7 @@
 #include <array>
 #include <cmath>
 #include <numeric>
+#include <utility>
 
 namespace ruedo::physics {
 
@@ -44,16 +45,119 @@ struct HingeAt {
     apart = from_bt(B.getOrigin() - A.getOrigin()) + arm_b - arm_a;
     first = from_bt(A.getBasis() * in_a.getBasis().getColumn(0));
     second = from_bt(A.getBasis() * in_a.getBasis().getColumn(1));
-    const Vec3 axis_b = from_bt(B.getBasis() * in_b.getBasis().getColumn(2));
-    askew = first.cross(second).cross(axis_b);
+    axis = from_bt(A.getBasis() * in_a.getBasis().getColumn(2));
+    askew = axis.cross(from_bt(B.getBasis() * in_b.getBasis().getColumn(2)));
   }
   // What the five rows must undo, in m and rad.
   double error(int row) const {
     return row < 3 ? apart[row] : row == 3 ? askew.dot(first) : askew.dot(second);
   }
-  Vec3 arm_a, arm_b, apart;   // from the centres of mass to the anchors, and from A's to B's
-  Vec3 first, second, askew;  // square to A's axis; turns A's axis into B's
+  Vec3 arm_a, arm_b, apart;  // from the centres of mass to the anchors, and from A's to B's
+  Vec3 axis, first, second;  // A's, and what is square to it
+  Vec3 askew;                // turns A's axis into B's
 };
+
+// A slider's and a fixed joint's frames.
+struct FramesAt {
+  FramesAt(const btTypedConstraint& constraint, const btTransform& in_a, const btTransform& in_b) {
+    A = constraint.getRigidBodyA().getCenterOfMassTransform() * in_a;
+    B = constraint.getRigidBodyB().getCenterOfMassTransform() * in_b;
+  }
+  Vec3 apart() const { return from_bt(B.getOrigin() - A.getOrigin()); }
+  Vec3 askew() const {
+    btVector3 sum(0, 0, 0);
+    for (int i = 0; i < 3; ++i) sum += A.getBasis().getColumn(i).cross(B.getBasis().getColumn(i));
+    return 0.5 * from_bt(sum);
+  }
+  btTransform A, B;
+};
+
+FramesAt frames_of(btTypedConstraint& constraint, JointWays::Kind kind) {
+  if (kind == JointWays::Kind::slider) {
+    auto& slider = static_cast<btSliderConstraint&>(constraint);
+    return {slider, slider.getFrameOffsetA(), slider.getFrameOffsetB()};
+  }
+  if (kind == JointWays::Kind::ball) {
+    auto& ball = static_cast<btPoint2PointConstraint&>(constraint);
+    const btMatrix3x3& same = btMatrix3x3::getIdentity();
+    return {ball, btTransform(same, ball.getPivotInA()), btTransform(same, ball.getPivotInB())};
+  }
+  auto& fixed = static_cast<btGeneric6DofSpring2Constraint&>(constraint);
+  return {fixed, fixed.getFrameOffsetA(), fixed.getFrameOffsetB()};
+}
+
+JointWays::Kind kind_of(const btTypedConstraint& constraint) {
+  using Kind = JointWays::Kind;
+  switch (constraint.getConstraintType()) {
+    case HINGE_CONSTRAINT_TYPE: {
+      const auto& hinge = static_cast<const btHingeConstraint&>(constraint);
+      return hinge.getLowerLimit() == hinge.getUpperLimit() ? Kind::other : Kind::hinge;
+    }
+    case SLIDER_CONSTRAINT_TYPE: {
+      auto& slider =
+          const_cast<btSliderConstraint&>(static_cast<const btSliderConstraint&>(constraint));
+      const bool turns = slider.getLowerAngLimit() != slider.getUpperAngLimit();
+      const bool fixed = slider.getLowerLinLimit() == slider.getUpperLinLimit();
+      return turns || fixed ? Kind::other : Kind::slider;
+    }
+    case POINT2POINT_CONSTRAINT_TYPE: return Kind::ball;
+    case D6_SPRING_2_CONSTRAINT_TYPE: return Kind::fixed;  // no other joint is of this type
+    default: return Kind::other;
+  }
+}
+
+JointWays ways_of(btTypedConstraint& constraint) {
+  JointWays ways;
+  ways.kind = kind_of(constraint);
+  if (ways.kind == JointWays::Kind::other) return ways;
+  if (ways.kind == JointWays::Kind::hinge) {
+    const HingeAt at(static_cast<btHingeConstraint&>(constraint));
+    ways.axis = at.axis;
+    ways.anchor = at.arm_b + from_bt(constraint.getRigidBodyB().getCenterOfMassPosition());
+    return ways;
+  }
+  const FramesAt at = frames_of(constraint, ways.kind);
+  ways.anchor = from_bt(at.B.getOrigin());
+  if (ways.kind == JointWays::Kind::slider) ways.axis = from_bt(at.A.getBasis().getColumn(0));
+  return ways;
+}
+
+// m and rad that the bodies are out of place by.
+std::pair<Vec3, Vec3> errors_of(JointWays::Kind kind, btTypedConstraint& constraint) {
+  if (kind == JointWays::Kind::hinge) {
+    const HingeAt at(static_cast<btHingeConstraint&>(constraint));
+    return {at.apart, at.askew};
+  }
+  const FramesAt at = frames_of(constraint, kind);
+  Vec3 apart = at.apart();
+  if (kind == JointWays::Kind::ball) return {apart, Vec3::Zero()};
+  if (kind == JointWays::Kind::slider) {
+    const Vec3 axis = from_bt(at.A.getBasis().getColumn(0));
+    apart -= axis * axis.dot(apart);
+  }
+  return {apart, at.askew()};
+}
+
+// Bullet's row of a stop that the joint is at; -1: it is at none.
+int stop_of(btTypedConstraint& constraint) {
+  constexpr int kOfAHinge = 5, kOfASlider = 4;
+  if (constraint.getConstraintType() == HINGE_CONSTRAINT_TYPE) {
+    auto& hinge = static_cast<btHingeConstraint&>(constraint);
+    if (!hinge.hasLimit()) return -1;
+    hinge.testLimit(hinge.getRigidBodyA().getCenterOfMassTransform(),
+                    hinge.getRigidBodyB().getCenterOfMassTransform());
+    return hinge.getSolveLimit() ? kOfAHinge : -1;
+  }
+  if (constraint.getConstraintType() == SLIDER_CONSTRAINT_TYPE) {
+    auto& slider = static_cast<btSliderConstraint&>(constraint);
+    btTypedConstraint::btConstraintInfo1 size;
+    slider.getInfo1(&size);
+    return slider.getSolveLinLimit() ? kOfASlider : -1;
+  }
+  return -1;
+}
+
+bool moves(const SolverBody& body) { return body.inverse_mass != Vec3::Zero(); }
 
 bool is_stop(const Row& row) { return row.lower == 0.0 || row.upper == 0.0; }
 
@@ -66,6 +170,7 @@ struct JointBlocks::Values {
 
 void JointBlocks::clear() {
   rows_.clear();
+  way_of_row_.clear();
   thirds_.clear();
   joints_.clear();
   block_count_ = 0;
@@ -162,19 +267,35 @@ double JointBlocks::relax(size_t i, SolverBodies& bodies) {
   return std::abs(more) * row.response;
 }
 
-void JointBlocks::add(btTypedConstraint& constraint, int a, int b, int reference,
-                      const SolverBodies& bodies, double substep_s) {
-  auto* motors = static_cast<JointMotors*>(constraint.getUserConstraintPtr());
+void JointBlocks::add(btTypedConstraint& constraint, int a, int b, int reference) {
   Joint& joint = joints_.emplace_back();
   joint.constraint = &constraint;
-  joint.first = rows_.size();
   joint.a = a;
   joint.b = b;
-  joint.hinge = add_hinge(constraint, joint, bodies);
-  if (!joint.hinge) add_asked(constraint, joint, bodies, substep_s);
-  if (motors && motors->first.on) add_motor(motors->first, joint, reference, bodies);
-  if (motors && motors->second.on) add_motor(motors->second, joint, reference, bodies);
+  joint.reference = reference;
+  joint.ways = ways_of(constraint);
+  joint.stop = stop_of(constraint);
+}
+
+void JointBlocks::add_rows(Joint& joint, const SolverBodies& bodies, double substep_s) {
+  Block& block = blocks_[joint.block];
+  auto* motors = static_cast<JointMotors*>(joint.constraint->getUserConstraintPtr());
+  joint.first = rows_.size();
+  joint.hinge = !block.is_tree && joint.stop < 0 && add_hinge(*joint.constraint, joint, bodies);
+  if (!joint.hinge) add_asked(*joint.constraint, joint, bodies, substep_s);
+  const size_t first_motor = rows_.size();
+  if (motors && motors->first.on) add_motor(motors->first, joint, joint.reference, bodies);
+  if (motors && motors->second.on) add_motor(motors->second, joint, joint.reference, bodies);
   joint.count = rows_.size() - joint.first;
+  way_of_row_.resize(rows_.size(), JointTree::kNone);
+  for (size_t i = joint.first; i < rows_.size(); ++i) {
+    const Row& row = rows_[i];
+    if (row.inverse == 0.0) continue;
+    const bool direct = !is_stop(row) && row.upper > 0.0 && row.lower < 0.0 &&
+                        (block.is_tree || block.free.size() < kMostInBlock);
+    (direct ? block.free : block.bounded).push_back(i);
+    if (block.is_tree && i >= first_motor) way_of_row_[i] = joint.way;
+  }
 }
 
 Row& JointBlocks::add_row(const Joint& joint) {
@@ -189,13 +310,7 @@ Row& JointBlocks::add_row(const Joint& joint) {
 bool JointBlocks::add_hinge(btTypedConstraint& constraint, Joint& joint,
                             const SolverBodies& bodies) {
   if (constraint.getConstraintType() != HINGE_CONSTRAINT_TYPE) return false;
-  auto& hinge = static_cast<btHingeConstraint&>(constraint);
-  if (hinge.hasLimit()) {
-    hinge.testLimit(hinge.getRigidBodyA().getCenterOfMassTransform(),
-                    hinge.getRigidBodyB().getCenterOfMassTransform());
-    if (hinge.getSolveLimit()) return false;
-  }
-  const HingeAt at(hinge);
+  const HingeAt at(static_cast<btHingeConstraint&>(constraint));
   for (int i = 0; i < 3; ++i) {
     Row& row = add_row(joint);
     row.linear_a = Vec3::Unit(i);
@@ -218,10 +333,12 @@ bool JointBlocks::add_hinge(btTypedConstraint& constraint, Joint& joint,
 
 void JointBlocks::add_asked(btTypedConstraint& constraint, Joint& joint, const SolverBodies& bodies,
                             double substep_s) {
+  const bool in_tree = blocks_[joint.block].is_tree;
+  if (in_tree && joint.stop < 0) return;
   Values values;
   const int n = ask(constraint, 0.0, substep_s, values);
   joint.errors_only = !says_more(constraint);
-  for (int i = 0; i < n; ++i) {
+  for (int i = in_tree ? joint.stop : 0; i < (in_tree ? joint.stop + 1 : n); ++i) {
     const size_t at = static_cast<size_t>(i) * kSkip;
     joint.errors_only = joint.errors_only && values.error[at] == 0.0;
     Row& row = add_row(joint);
@@ -288,41 +405,103 @@ size_t JointBlocks::root(size_t body) {
   return body;
 }
 
-void JointBlocks::prepare(const SolverBodies& bodies) {
-  if (rows_.empty()) return;
+void JointBlocks::prepare(const SolverBodies& bodies, double substep_s) {
+  if (joints_.empty()) return;
+  closing_per_s_ = 1.0 / substep_s;
+  unite(bodies);
+  find_blocks(bodies);
+  for (size_t b = 0; b < block_count_; ++b) blocks_[b].is_tree = make_tree(blocks_[b], bodies);
+  for (Joint& joint : joints_) add_rows(joint, bodies, substep_s);
+}
+
+void JointBlocks::unite(const SolverBodies& bodies) {
   parents_.resize(bodies.size());
   std::iota(parents_.begin(), parents_.end(), size_t{0});
-  const auto moves = [&](int body) { return bodies[body].inverse_mass != Vec3::Zero(); };
-  const auto unite = [&](int one, int other) {
-    if (!moves(one) || !moves(other)) return;
+  const auto together = [&](int one, int other) {
+    if (!moves(bodies[one]) || !moves(bodies[other])) return;
     const size_t a = root(static_cast<size_t>(one)), b = root(static_cast<size_t>(other));
     parents_[std::max(a, b)] = std::min(a, b);
   };
-  for (const Joint& joint : joints_) unite(joint.a, joint.b);
-  for (const Third& third : thirds_) {
-    unite(third.body, rows_[third.row].a);
-    unite(third.body, rows_[third.row].b);
+  for (const Joint& joint : joints_) {
+    together(joint.a, joint.b);
+    together(joint.reference, joint.a);
+    together(joint.reference, joint.b);
   }
-  constexpr size_t kNone = static_cast<size_t>(-1);
-  block_of_root_.assign(bodies.size(), kNone);
-  for (Joint& joint : joints_) {
-    size_t& block = block_of_root_[root(static_cast<size_t>(moves(joint.a) ? joint.a : joint.b))];
-    if (block == kNone) {
+}
+
+void JointBlocks::find_blocks(const SolverBodies& bodies) {
+  block_of_root_.assign(bodies.size(), JointTree::kNone);
+  joint_of_body_.assign(bodies.size(), JointTree::kNone);
+  for (size_t j = 0; j < joints_.size(); ++j) {
+    Joint& joint = joints_[j];
+    const int body = moves(bodies[joint.a]) ? joint.a : joint.b;
+    size_t& block = block_of_root_[root(static_cast<size_t>(body))];
+    if (block == JointTree::kNone) {
       block = block_count_++;
       if (blocks_.size() < block_count_) blocks_.emplace_back();
-      blocks_[block].free.clear();
-      blocks_[block].bounded.clear();
+      for (auto* list : {&blocks_[block].joints, &blocks_[block].free, &blocks_[block].bounded})
+        list->clear();
+      blocks_[block].bodies = blocks_[block].hung = 0;
       blocks_[block].factored = false;
     }
     joint.block = block;
-    for (size_t i = joint.first; i < joint.first + joint.count; ++i) {
-      const Row& row = rows_[i];
-      if (row.inverse == 0.0) continue;
-      const bool direct = !is_stop(row) && row.upper > 0.0 && row.lower < 0.0 &&
-                          blocks_[block].free.size() < kMostInBlock;
-      (direct ? blocks_[block].free : blocks_[block].bounded).push_back(i);
+    blocks_[block].joints.push_back(j);
+    blocks_[block].hung += !moves(bodies[joint.a]) || !moves(bodies[joint.b]);
+  }
+  for (size_t j = joints_.size(); j-- > 0;) {  // so that a body's first joint is its first one
+    Joint& joint = joints_[j];
+    joint.next_of_a = std::exchange(joint_of_body_[joint.a], j);
+    joint.next_of_b = std::exchange(joint_of_body_[joint.b], j);
+  }
+  for (size_t i = 1; i < bodies.size(); ++i) {
+    if (!moves(bodies[i]) || joint_of_body_[i] == JointTree::kNone) continue;
+    ++blocks_[block_of_root_[root(i)]].bodies;
+  }
+}
+
+bool JointBlocks::make_tree(Block& block, const SolverBodies& bodies) {
+  const bool hangs = block.hung == 1;
+  if (block.hung > 1 || block.joints.size() + !hangs != block.bodies) return false;
+  const auto known = [this](size_t j) {
+    return joints_[j].ways.kind != JointWays::Kind::other && joints_[j].reference == 0;
+  };
+  if (!std::all_of(block.joints.begin(), block.joints.end(), known)) return false;
+  const auto on_ground = [&](size_t j) {
+    return !moves(bodies[joints_[j].a]) || !moves(bodies[joints_[j].b]);
+  };
+  const size_t first =
+      hangs ? *std::find_if(block.joints.begin(), block.joints.end(), on_ground) : block.joints[0];
+  Joint& joint = joints_[first];
+  if (!hangs) {
+    const int body = joint.a;
+    block.tree.begin(from_bt(bodies[body].bullet->getCenterOfMassPosition()));
+    return block.tree.add_root(body, bodies) && grow(block, body, bodies);
+  }
+  const bool b = moves(bodies[joint.b]);
+  block.tree.begin(joint.ways.anchor);
+  const int body = b ? joint.b : joint.a;
+  if (!block.tree.add(body, b ? joint.a : joint.b, b, joint.ways, bodies)) return false;
+  joint.way = block.tree.only_way();
+  return grow(block, body, bodies);
+}
+
+// From the root, from body to body.
+bool JointBlocks::grow(Block& block, int root, const SolverBodies& bodies) {
+  grown_.assign(1, root);
+  for (size_t i = 0; i < grown_.size(); ++i) {
+    const int on = grown_[i];
+    for (size_t j = joint_of_body_[on]; j != JointTree::kNone;) {
+      Joint& joint = joints_[j];
+      const bool b = joint.a == on;
+      const int body = b ? joint.b : joint.a;
+      j = b ? joint.next_of_a : joint.next_of_b;
+      if (!moves(bodies[body]) || block.tree.has(body)) continue;
+      if (!block.tree.add(body, on, b, joint.ways, bodies)) return false;
+      joint.way = block.tree.only_way();
+      grown_.push_back(body);
     }
   }
+  return true;
 }
 
 // The joints of a chain follow one another, and each is tied to its neighbours alone: near the
@@ -367,8 +546,17 @@ void JointBlocks::write_matrix(Block& block) {
   }
 }
 
-// Each pivot is taken off the rows that it reaches, at once: no sum waits for another one.
 void JointBlocks::factor(Block& block) {
+  block.factored = true;
+  if (!block.is_tree) return factor_matrix(block);
+  block.tree.let_go();
+  for (const size_t i : block.free) block.tree.lead(way_of_row_[i], rows_[i].softness);
+  block.tree.factor();
+  block.exact = true;
+}
+
+// Each pivot is taken off the rows that it reaches, at once: no sum waits for another one.
+void JointBlocks::factor_matrix(Block& block) {
   find_envelope(block);
   write_matrix(block);
   const size_t n = block.free.size();
@@ -388,7 +576,6 @@ void JointBlocks::factor(Block& block) {
       for (size_t k = i; k <= end; ++k) of_i[k] -= part * of_j[k];
     }
   }
-  block.factored = true;
 }
 
 void JointBlocks::solve_lower(const Block& block, double* x) const {
@@ -400,8 +587,15 @@ void JointBlocks::solve_lower(const Block& block, double* x) const {
   }
 }
 
-void JointBlocks::solve(const Block& block, std::vector<double>& x) const {
+// What is missing of the rows' velocities, to impulses.
+void JointBlocks::solve(Block& block, std::vector<double>& x) const {
   const size_t n = block.free.size();
+  if (block.is_tree) {
+    for (size_t i = 0; i < n; ++i) block.tree.aim(way_of_row_[block.free[i]], x[i]);
+    block.tree.solve();
+    for (size_t i = 0; i < n; ++i) x[i] = block.tree.impulse(way_of_row_[block.free[i]]);
+    return;
+  }
   solve_lower(block, x.data());
   for (size_t j = n; j-- > 0;) {
     const double* of_j = &block.factor[j * n];
@@ -416,18 +610,48 @@ bool JointBlocks::exact() const {
                      [](const Block& block) { return block.exact && block.bounded.empty(); });
 }
 
+// x_: what is missing of the rows' velocities. Returns the largest.
+double JointBlocks::aim(Block& block, const SolverBodies& bodies) {
+  double worst = 0.0;
+  if (block.is_tree) {
+    worst =
+        block.tree.aim([&](int body) { return std::pair(bodies[body].v, bodies[body].w); }, 0.0);
+  }
+  x_.resize(block.free.size());
+  for (size_t i = 0; i < x_.size(); ++i) {
+    const size_t r = block.free[i];
+    const Row& row = rows_[r];
+    const double now = block.is_tree ? block.tree.rate(way_of_row_[r]) : velocity(r, bodies);
+    x_[i] = row.target - now - row.softness * row.impulse;
+    worst = std::max(worst, std::abs(x_[i]));
+  }
+  return worst;
+}
+
+double JointBlocks::aim_push(Block& block, const SolverBodies& bodies) {
+  double worst = 0.0;
+  if (block.is_tree) {
+    worst = block.tree.aim(
+        [&](int body) { return std::pair(bodies[body].push_v, bodies[body].push_w); },
+        closing_per_s_);
+  }
+  x_.resize(block.free.size());
+  for (size_t i = 0; i < x_.size(); ++i) {
+    const size_t r = block.free[i];
+    const double now = block.is_tree ? block.tree.rate(way_of_row_[r]) : push_velocity(r, bodies);
+    x_[i] = rows_[r].push_target - now;
+    worst = std::max(worst, std::abs(x_[i]));
+  }
+  return worst;
+}
+
 double JointBlocks::sweep(SolverBodies& bodies) {
   double worst = 0.0;
   for (size_t b = 0; b < block_count_; ++b) {
     Block& block = blocks_[b];
     for (size_t attempt = 0;; ++attempt) {
       if (!block.factored) factor(block);
-      x_.resize(block.free.size());
-      for (size_t i = 0; i < x_.size(); ++i) {
-        const Row& row = rows_[block.free[i]];
-        x_[i] = row.target - velocity(block.free[i], bodies) - row.softness * row.impulse;
-        worst = std::max(worst, std::abs(x_[i]));
-      }
+      worst = std::max(worst, aim(block, bodies));
       solve(block, x_);
       size_t kept = 0;
       for (size_t i = 0; i < x_.size(); ++i) {
@@ -444,7 +668,15 @@ double JointBlocks::sweep(SolverBodies& bodies) {
       block.factored = false;
       for (const size_t i : block.bounded) worst = std::max(worst, relax(i, bodies));
     }
-    for (size_t i = 0; i < x_.size(); ++i) give(block.free[i], bodies, x_[i]);
+    if (block.is_tree) {
+      for (size_t i = 0; i < x_.size(); ++i) rows_[block.free[i]].impulse += x_[i];
+      block.tree.for_each_change([&](int body, const Vec3& v, const Vec3& w) {
+        bodies[body].v += v;
+        bodies[body].w += w;
+      });
+    } else {
+      for (size_t i = 0; i < x_.size(); ++i) give(block.free[i], bodies, x_[i]);
+    }
     for (const size_t i : block.bounded) worst = std::max(worst, relax(i, bodies));
   }
   return worst;
@@ -453,7 +685,7 @@ double JointBlocks::sweep(SolverBodies& bodies) {
 size_t JointBlocks::mechanism(int body, const SolverBodies& bodies) {
   const size_t i = static_cast<size_t>(body);
   if (bodies[i].inverse_mass == Vec3::Zero()) return 0;
-  return rows_.empty() ? i : root(i);
+  return joints_.empty() ? i : root(i);
 }
 
 void JointBlocks::tell_responses(const std::vector<Row*>& contacts,
@@ -464,7 +696,9 @@ void JointBlocks::tell_responses(const std::vector<Row*>& contacts,
     for (size_t j = 0; j <= i; ++j) responses[i * n + j] = contacts[i]->coupling(*contacts[j]);
   }
   for (size_t b = 0; b < block_count_; ++b) {
-    if (blocks_[b].factored) take_off_held(blocks_[b], contacts, responses);
+    if (!blocks_[b].factored) continue;
+    blocks_[b].is_tree ? add_those_of_tree(blocks_[b], contacts, responses)
+                       : take_off_held(blocks_[b], contacts, responses);
   }
   for (size_t i = 0; i < n; ++i) {
     for (size_t j = 0; j < i; ++j) responses[j * n + i] = responses[i * n + j];
@@ -494,9 +728,57 @@ void JointBlocks::take_off_held(const Block& block, const std::vector<Row*>& con
   }
 }
 
+// An impulse moves its own bodies, and what joints do about that moves all of the mechanism.
+void JointBlocks::add_those_of_tree(Block& block, const std::vector<Row*>& contacts,
+                                    std::vector<double>& responses) {
+  const size_t n = contacts.size();
+  for (size_t i = 0; i < n; ++i) {
+    const Row& row = *contacts[i];
+    if (!block.tree.has(row.a) && !block.tree.has(row.b)) continue;
+    const auto moved = [&](int body) {
+      Vec3 v = Vec3::Zero(), w = Vec3::Zero();
+      if (body == row.a) v += row.moves_a, w += row.turns_a;
+      if (body == row.b) v += row.moves_b, w += row.turns_b;
+      return std::pair(v, w);
+    };
+    block.tree.aim(moved, 0.0);
+    for (const size_t k : block.free)
+      block.tree.aim(way_of_row_[k], -block.tree.rate(way_of_row_[k]));
+    block.tree.solve();
+    for (size_t j = 0; j <= i; ++j) {
+      const Row& other = *contacts[j];
+      double more = 0.0;
+      if (block.tree.has(other.a)) {
+        const auto [v, w] = block.tree.change(other.a);
+        more += other.linear_a.dot(v) + other.angular_a.dot(w);
+      }
+      if (block.tree.has(other.b)) {
+        const auto [v, w] = block.tree.change(other.b);
+        more += other.linear_b.dot(v) + other.angular_b.dot(w);
+      }
+      responses[i * n + j] += more;
+    }
+  }
+}
+
 double JointBlocks::look_again(double substep_s) {
   double largest = 0.0;
   for (Joint& joint : joints_) {
+    Block& block = blocks_[joint.block];
+    if (block.is_tree) {
+      const auto [apart, askew] = errors_of(joint.ways.kind, *joint.constraint);
+      const bool b = block.tree.hangs_on(joint.b, joint.a);
+      block.tree.tell_error(b ? joint.b : joint.a, apart, askew);
+      largest = std::max({largest, apart.cwiseAbs().maxCoeff() / substep_s,
+                          askew.cwiseAbs().maxCoeff() / substep_s});
+      if (joint.stop < 0) continue;
+      Values whole;
+      ask(*joint.constraint, 1.0, substep_s, whole);
+      double& target = rows_[joint.first].push_target;
+      target = whole.error[static_cast<size_t>(joint.stop) * kSkip];
+      largest = std::max(largest, std::abs(target));
+      continue;
+    }
     if (joint.hinge) {
       const HingeAt at(static_cast<btHingeConstraint&>(*joint.constraint));
       for (size_t i = 0; i < kRowsOfAHinge; ++i) {
@@ -524,14 +806,16 @@ double JointBlocks::sweep_push(SolverBodies& bodies) {
   for (size_t b = 0; b < block_count_; ++b) {
     Block& block = blocks_[b];
     if (!block.factored) factor(block);
-    x_.resize(block.free.size());
-    for (size_t i = 0; i < x_.size(); ++i) {
-      const Row& row = rows_[block.free[i]];
-      x_[i] = row.push_target - push_velocity(block.free[i], bodies);
-      worst = std::max(worst, std::abs(x_[i]));
-    }
+    worst = std::max(worst, aim_push(block, bodies));
     solve(block, x_);
-    for (size_t i = 0; i < x_.size(); ++i) give_push(block.free[i], bodies, x_[i]);
+    if (block.is_tree) {
+      block.tree.for_each_change([&](int body, const Vec3& v, const Vec3& w) {
+        bodies[body].push_v += v;
+        bodies[body].push_w += w;
+      });
+    } else {
+      for (size_t i = 0; i < x_.size(); ++i) give_push(block.free[i], bodies, x_[i]);
+    }
     for (const size_t i : block.bounded) {
       Row& row = rows_[i];
       if (!is_stop(row)) continue;  // a motor at its limit holds nothing
@@ -549,10 +833,45 @@ void JointBlocks::tell_pairs(std::vector<std::pair<int, int>>& pairs) const {
   for (const Joint& joint : joints_) pairs.emplace_back(joint.a, joint.b);
 }
 
-void JointBlocks::tell_rows(Newton& newton) {
-  for (Row& row : rows_) {
-    if (row.inverse > 0.0) newton.add(row);
+void JointBlocks::tell_rows(Newton& newton, const SolverBodies& bodies) {
+  locked_.clear();
+  for (const Joint& joint : joints_)
+    if (blocks_[joint.block].is_tree) add_locked_rows(joint, bodies);
+  for (std::vector<Row>* rows : {&locked_, &rows_}) {
+    for (Row& row : *rows)
+      if (row.inverse > 0.0) newton.add(row);
   }
+}
+
+// What a joint of a tree holds.
+void JointBlocks::add_locked_rows(const Joint& joint, const SolverBodies& bodies) {
+  using Kind = JointWays::Kind;
+  const Kind kind = joint.ways.kind;
+  const Vec3& axis = joint.ways.axis;
+  const Vec3 square = axis.unitOrthogonal();
+  const std::array<Vec3, 3> directions = {square, axis.cross(square), axis};
+  const auto arm = [&](int body) {
+    const btRigidBody* bullet = bodies[body].bullet;
+    return bullet ? Vec3(joint.ways.anchor - from_bt(bullet->getCenterOfMassPosition()))
+                  : Vec3(Vec3::Zero());
+  };
+  const auto lock = [&](const Vec3& linear, const Vec3& angular) {
+    Row& row = locked_.emplace_back();
+    row.a = joint.a;
+    row.b = joint.b;
+    row.linear_a = linear;
+    row.linear_b = -linear;
+    row.angular_a = arm(joint.a).cross(linear) + angular;
+    row.angular_b = -arm(joint.b).cross(linear) - angular;
+    row.lower = -BT_LARGE_FLOAT;
+    row.upper = BT_LARGE_FLOAT;
+    row.prepare(bodies);
+  };
+  const size_t places = kind == Kind::slider ? 2 : 3, turns = kind == Kind::ball    ? 0
+                                                              : kind == Kind::hinge ? 2
+                                                                                    : 3;
+  for (size_t i = 0; i < places; ++i) lock(directions[i], Vec3::Zero());
+  for (size_t i = 0; i < turns; ++i) lock(Vec3::Zero(), directions[i]);
 }
 
 void JointBlocks::write_back() const {

@@ -1,9 +1,10 @@
-// The joints of mechanisms as rows of the solver: those of one mechanism are a block that is solved
-// directly.
+// The joints of mechanisms: those of one mechanism are a block that is solved directly, as a tree
+// (joint_tree.h), or, where joints close a loop or are of other kinds, as rows.
 #pragma once
 
 #include <vector>
 
+#include "physics/joint_tree.h"
 #include "physics/newton.h"
 #include "physics/rows.h"
 
@@ -12,13 +13,12 @@ namespace ruedo::physics {
 class JointBlocks {
  public:
   void clear();
-  // Adds the rows of an enabled constraint between two bodies of the solver, with its motors
-  // (Bullet's user pointer). reference: the third body of a gearbox; 0: none, or what never moves.
-  void add(btTypedConstraint& constraint, int a, int b, int reference, const SolverBodies& bodies,
-           double substep_s);
-  // All are added: sorts the rows into blocks.
-  void prepare(const SolverBodies& bodies);
-  bool empty() const { return rows_.empty(); }
+  // Adds an enabled constraint between two bodies of the solver, with its motors (Bullet's user
+  // pointer). reference: the third body of a gearbox; 0: none, or what never moves.
+  void add(btTypedConstraint& constraint, int a, int b, int reference);
+  // All are added: sorts them into blocks.
+  void prepare(const SolverBodies& bodies, double substep_s);
+  bool empty() const { return joints_.empty(); }
   // A sweep has brought all rows to their targets; another one would find them there.
   bool exact() const;
   bool has_gears() const { return !thirds_.empty(); }  // their rows have three bodies
@@ -41,7 +41,7 @@ class JointBlocks {
 
   // Which bodies are tied together, and by which rows.
   void tell_pairs(std::vector<std::pair<int, int>>& pairs) const;
-  void tell_rows(Newton& newton);
+  void tell_rows(Newton& newton, const SolverBodies& bodies);
 
  private:
   struct Joint {
@@ -50,10 +50,18 @@ class JointBlocks {
     JointMotor* motors[2] = {};  // of the last rows, in that order
     bool errors_only = true;     // without reduction, no row has a target
     bool hinge = false;          // not at a stop: its five rows are ours, not Bullet's
-    int a = 0, b = 0;
+    int a = 0, b = 0, reference = 0;
+    JointWays ways;
+    int stop = -1;  // Bullet's row of a stop that it is at; -1: none
     size_t block = 0;
+    size_t way = JointTree::kNone;  // in the block's tree, where it has just one
+    size_t next_of_a = JointTree::kNone, next_of_b = JointTree::kNone;  // of the body's joints
   };
   struct Block {
+    std::vector<size_t> joints;
+    size_t bodies = 0, hung = 0;  // that move; joints to what never does
+    bool is_tree = false;         // its rows are motors and stops alone
+    JointTree tree;
     std::vector<size_t> free;     // rows that are solved directly: none of them is at a bound
     std::vector<size_t> bounded;  // rows at a bound, relaxed one by one
     // L D L^T of the free ones: D L^T, upper, by rows; 1 / D; of each row the first column that is
@@ -85,24 +93,37 @@ class JointBlocks {
     if (const Third* third = third_of(i)) act(third->body);
   }
 
+  void unite(const SolverBodies& bodies);
+  void find_blocks(const SolverBodies& bodies);
+  bool make_tree(Block& block, const SolverBodies& bodies);
+  bool grow(Block& block, int root, const SolverBodies& bodies);
+  void add_rows(Joint& joint, const SolverBodies& bodies, double substep_s);
   bool add_hinge(btTypedConstraint& constraint, Joint& joint, const SolverBodies& bodies);
   void add_asked(btTypedConstraint& constraint, Joint& joint, const SolverBodies& bodies,
                  double substep_s);
+  void add_locked_rows(const Joint& joint, const SolverBodies& bodies);
   Row& add_row(const Joint& joint);
   struct Values;
   int ask(btTypedConstraint& constraint, double reduction, double substep_s, Values& values);
   void add_motor(JointMotor& motor, Joint& joint, int reference, const SolverBodies& bodies);
   void add_third(const JointMotor& motor, int reference, const SolverBodies& bodies);
   size_t root(size_t body);
+  double aim(Block& block, const SolverBodies& bodies);
+  double aim_push(Block& block, const SolverBodies& bodies);
   void find_envelope(Block& block);
   void write_matrix(Block& block);
   void factor(Block& block);
-  void solve(const Block& block, std::vector<double>& x) const;
+  void factor_matrix(Block& block);
+  void solve(Block& block, std::vector<double>& x) const;
   void solve_lower(const Block& block, double* x) const;  // L
   void take_off_held(const Block& block, const std::vector<Row*>& contacts,
                      std::vector<double>& responses);
+  void add_those_of_tree(Block& block, const std::vector<Row*>& contacts,
+                         std::vector<double>& responses);
 
   std::vector<Row> rows_;
+  std::vector<size_t> way_of_row_;  // in its block's tree; kNone: of none
+  std::vector<Row> locked_;         // of trees, for Newton's method
   std::vector<Third> thirds_;
   std::vector<Joint> joints_;
   std::vector<size_t> parents_;  // union-find over bodies
@@ -111,7 +132,10 @@ class JointBlocks {
   std::vector<size_t> block_of_root_;
   std::vector<double> x_;              // scratch
   std::vector<size_t> first_of_body_;  // scratch: a block's first row at each body
-  std::vector<double> held_;           // scratch: of contacts
+  std::vector<size_t> joint_of_body_;  // the first one
+  std::vector<int> grown_;             // scratch: bodies of a tree
+  double closing_per_s_ = 0.0;
+  std::vector<double> held_;  // scratch: of contacts
 };
 
 }  // namespace ruedo::physics

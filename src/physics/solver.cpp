@@ -404,7 +404,7 @@ bool Solver::newton_pays() {
 
 void Solver::solve_at_once() {
   newton_.begin();
-  blocks_.tell_rows(newton_);
+  blocks_.tell_rows(newton_, bodies_);
   for (size_t c = 0; c < contact_count_; ++c) {
     ContactRows& contact = contacts_[c];
     if (contact.normal.inverse == 0.0) continue;
@@ -539,9 +539,9 @@ void Solver::solve(const std::vector<btRigidBody*>& bodies,
     const int a = tie(joint->getRigidBodyA()), b = tie(joint->getRigidBodyB());
     const auto* motors = static_cast<const JointMotors*>(joint->getUserConstraintPtr());
     btRigidBody* reference = motors ? motors->first.reference : nullptr;
-    blocks_.add(*joint, a, b, reference ? tie(*reference) : 0, bodies_, substep_s);
+    blocks_.add(*joint, a, b, reference ? tie(*reference) : 0);
   }
-  blocks_.prepare(bodies_);
+  blocks_.prepare(bodies_, substep_s);
   for (btPersistentManifold* manifold : manifolds) add_contacts(*manifold, substep_s);
   if (contact_count_ > 0 || !blocks_.empty()) {
     sweep_until_still();

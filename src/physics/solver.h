@@ -7,8 +7,8 @@
 // - Sweeps are accelerated by conjugate directions, and go on until no row changes a velocity by
 // more than a tolerance, up to
 //   a limit: a lone robot takes a few, a stack or a large ratio of masses takes more.
-// - The joints of a mechanism are one block, solved directly (Cholesky) in each sweep: a
-// chain of joints holds.
+// - The joints of a mechanism are one block, solved directly in each sweep: a tree of joints in
+// reduced coordinates (joint_tree.h), others by Cholesky: a chain of joints holds.
 // - Friction is Coulomb's cone, not a pyramid: an ellipse where a file gives two coefficients. Its
 // force points against
 //   the slip of greatest dissipation, whatever the heading.
