@@ -25,6 +25,7 @@
 #include <string>
 #include <vector>
 
+#include "ruedo/client_markers.h"
 #include "ruedo/client_samples.h"
 
 namespace ruedo::client {
@@ -403,6 +404,11 @@ class [[nodiscard]] Simulation {
   void set_twist(const std::string& name, const Vector3& linear, const Vector3& angular = {}) const;
   [[nodiscard]] State state(const std::string& name = "") const;
   void reset_odometry(const std::string& robot) const;
+  // Draws for people to see, in the web console and in the log. layer: a name of your own; what is
+  // drawn takes the place of all that was in it, and nothing empties it. frame: a robot, with whose
+  // base_link it moves; "": the world. Throws std::invalid_argument for more than a message holds.
+  void markers(const std::string& layer, const std::vector<Marker>& markers = {},
+               const std::string& frame = "") const;
   // Saves the state under a name, in the folder that the server was started with (--snapshots
   // FOLDER), and returns it.
   State snapshot(const std::string& name) const;

@@ -2,6 +2,7 @@
 // comes in parts.
 #include "console/board.h"
 
+#include "console/drawn.h"
 #include "core/utf8.h"
 #include "core/wire_size.h"
 #include "ruedo/schema.h"
@@ -37,6 +38,7 @@ void Board::put(size_t index, std::vector<uint8_t> message) {
     const Schema* schema = find_schema(fingerprint);
     channel.part_at = schema ? part_offset(*schema) : -1;
     channel.replies = schema && schema->name == "reply_t";
+    channel.layers = schema && schema->name == "markers_t";
     channel.newest.clear();
   }
   const auto at = static_cast<size_t>(channel.part_at);
@@ -44,6 +46,11 @@ void Board::put(size_t index, std::vector<uint8_t> message) {
                           (message[at] != 0 || message[at + 1] != 0);
   if (channel.replies) {
     if (channel.newest.size() >= kKeptReplies) channel.newest.erase(channel.newest.begin());
+  } else if (channel.layers) {
+    const std::string layer = layer_of(message);
+    std::erase_if(channel.newest,
+                  [&](const Message& before) { return layer_of(*before.bytes) == layer; });
+    if (channel.newest.size() >= Drawn::kMostLayers) channel.newest.erase(channel.newest.begin());
   } else if (!later_part || channel.newest.size() >= kMostParts) {
     channel.newest.clear();
   }

@@ -2,7 +2,7 @@
 // thread's alone.
 //
 // Of most channels one message is kept. Messages in parts are kept together, and so are the last
-// few replies, so that no one misses their own.
+// few replies, so that no one misses their own, and of markers the newest of each layer.
 #pragma once
 
 #include <cstdint>
@@ -30,7 +30,7 @@ class Board {
     uint64_t last_number = 0;  // of the newest message; 0: none yet
     int64_t fingerprint = 0;
     int part_at = -1;  // byte at which the number of the part stands; -1: it has none
-    bool replies = false;
+    bool replies = false, layers = false;
     int watchers = 0;  // viewers that want it
   };
 

@@ -14,6 +14,7 @@
 #include "ruedo/decode.h"
 #include "ruedo/fault_t.hpp"
 #include "ruedo/joint_command_t.hpp"
+#include "ruedo/markers_t.hpp"
 #include "ruedo/move_command_t.hpp"
 #include "ruedo/name_request_t.hpp"
 #include "ruedo/reply_t.hpp"
@@ -188,7 +189,8 @@ void Events::hear(double time_s, const std::string& channel, std::span<const uin
     if (const auto status = decoded<motion_status_t>(message)) motion(channel, *status);
   } else if (type == applied_t::getHash()) {
     const auto applied = decoded<applied_t>(message);
-    if (applied && applied->kind == 0) command(applied->channel, applied->data);
+    if (applied && applied->kind == 0 && layer_of(applied->data).empty())
+      command(applied->channel, applied->data);
     if (applied && applied->kind != 0) done(applied->kind, applied->data);
   } else if (type == request_t::getHash()) {
     const auto request = decoded<request_t>(message);
@@ -304,7 +306,9 @@ EventScan::EventScan(const log::Index& index, const model::WorldModel* world) {
     const bool needed = !written || channel.fingerprint == applied_t::getHash() ||
                         channel.fingerprint == motion_status_t::getHash();
     const Schema* schema = find_schema(channel.fingerprint);
-    if (!Events::tells(channel.fingerprint) || (!needed && !tells_touches(*schema))) continue;
+    const bool draws = channel.fingerprint == markers_t::getHash() && !written;
+    const bool tells = Events::tells(channel.fingerprint) && (needed || tells_touches(*schema));
+    if (!draws && !tells) continue;
     for (const log::Index::Entry& entry : channel.entries)
       places_.push_back({entry.time_us, entry.offset});
   }
@@ -315,8 +319,11 @@ EventScan::EventScan(const log::Index& index, const model::WorldModel* world) {
 bool EventScan::advance(log::Reader& reader, size_t messages) {
   for (; messages > 0 && next_ < places_.size(); --messages, ++next_) {
     reader.seek(places_[next_].offset);
-    if (reader.next(event_))
-      events_.hear(static_cast<double>(places_[next_].time_us) * 1e-6, event_.channel, event_.data);
+    if (!reader.next(event_)) continue;
+    events_.hear(static_cast<double>(places_[next_].time_us) * 1e-6, event_.channel, event_.data);
+    std::string layer = layer_of(event_.data);
+    if (const auto applied = decoded<applied_t>(event_.data)) layer = layer_of(applied->data);
+    if (!layer.empty()) drawn_.add(layer, {places_[next_].time_us, places_[next_].offset});
   }
   return next_ == places_.size();
 }

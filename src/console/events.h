@@ -12,6 +12,7 @@
 #include <utility>
 #include <vector>
 
+#include "console/drawn.h"
 #include "core/json.h"
 #include "log/index.h"
 #include "model/world_model.h"
@@ -77,7 +78,7 @@ class Events {
   uint64_t lost_ = 0;
 };
 
-// The events of a log, read piece by piece.
+// The events of a log, and what clients drew in it, read piece by piece.
 class EventScan {
  public:
   // world: of the log's beginning; null: not known.
@@ -86,6 +87,7 @@ class EventScan {
   // Reads up to so many messages; true when all have been read.
   bool advance(log::Reader& reader, size_t messages);
   const Events& events() const { return events_; }
+  const Drawn& drawn() const { return drawn_; }
 
  private:
   struct Place {
@@ -95,6 +97,7 @@ class EventScan {
   std::vector<Place> places_;  // of what may tell, by time
   size_t next_ = 0;
   Events events_{false};
+  Drawn drawn_;
   log::Event event_;
 };
 

@@ -31,6 +31,7 @@ class LiveSource : public Source {
 
   void pump(Board& board, bool viewers) override {
     tap_.watch(viewers);
+    std::vector<Tap::Drawing> drawn = tap_.take_drawn();  // before its channels are counted
     const size_t count = tap_.channel_count();
     for (size_t i = board.channels().size(); i < count; ++i) board.name(i, tap_.channel(i).name);
     tap_.ring().drain([&](uint32_t channel, std::vector<uint8_t> message) {
@@ -38,6 +39,7 @@ class LiveSource : public Source {
       events_.hear(0, board.channels()[channel].name, message);
       board.put(channel, std::move(message));
     });
+    for (Tap::Drawing& drawing : drawn) board.put(drawing.channel, std::move(drawing.message));
     events_.lost(host_.lost());
     choose(board);
   }

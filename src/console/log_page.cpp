@@ -10,6 +10,7 @@
 #include <limits>
 #include <map>
 #include <memory>
+#include <set>
 #include <vector>
 
 #include <fmt/format.h>
@@ -24,6 +25,7 @@
 #include "log/reader.h"
 #include "ruedo/errors.h"
 #include "ruedo/image_t.hpp"
+#include "ruedo/markers_t.hpp"
 #include "ruedo/world_info_t.hpp"
 
 namespace ruedo::console {
@@ -85,7 +87,9 @@ class Writer {
     LogPage page;
     page.fault = fault();
     add_scenes();
-    add_events();
+    EventScan scan(index_, worlds_.at(index_.begin_us()).world.get());
+    scan.advance(reader_, std::numeric_limits<size_t>::max());
+    add_events(scan.events());
     // Base64 takes four bytes for three.
     const size_t fixed = kShellSize + json_scenes_.size() + json_events_.size() +
                          64 * index_.channels().size() + 4096;
@@ -95,7 +99,8 @@ class Writer {
           {log}, fmt::format("its scene alone needs a page of {:.1f} MB",
                              static_cast<double>(fixed + bytes_.size() / 3 * 4 + 100'000) * 1e-6));
     }
-    const size_t left = room - bytes_.size();
+    const bool draws = !scan.drawn().layers().empty();
+    const size_t left = (room - bytes_.size()) / 4 * (draws ? 3 : 4);
     const SimTime pictures = interval_that_fits(index_, true, left / 2);
     const SimTime interval = interval_that_fits(
         index_, false, left - (pictures < 0 ? 0 : size_of(index_, true, pictures)));
@@ -106,6 +111,7 @@ class Writer {
                      static_cast<double>(most_bytes) * 1e-6));
     const size_t messages_at = bytes_.size();
     add_messages(interval, pictures);
+    add_drawn(scan.drawn(), left / 4);
     page.interval_s = static_cast<double>(interval) * 1e-6;
     page.pictures_s = static_cast<double>(pictures) * 1e-6;
     page.bytes = save(path, head(log, page, messages_at));
@@ -158,12 +164,34 @@ class Writer {
     bytes_.resize((bytes_.size() + 7) / 8 * 8);
   }
 
-  void add_events() {
-    EventScan scan(index_, worlds_.at(index_.begin_us()).world.get());
-    scan.advance(reader_, std::numeric_limits<size_t>::max());
+  void add_events(const Events& events) {
     JsonWriter json;
-    write_events(json, scan.events().list());
+    write_events(json, events.list());
     json_events_ = json.text();
+  }
+
+  // Each time with all that is drawn then. Of what would take more room so many are left out that
+  // they lie evenly.
+  void add_drawn(const Drawn& drawn, size_t room) {
+    std::set<SimTime> times;
+    for (const Drawn::Layer& layer : drawn.layers()) {
+      for (const Drawn::Mark& mark : layer.marks) times.insert(mark.time_us);
+    }
+    if (times.empty()) return;
+    names_.emplace_back(kMarkersChannel);
+    const std::vector<SimTime> all(times.begin(), times.end());
+    const auto at = [&](SimTime time_us) {
+      std::vector<std::vector<uint8_t>> messages;
+      for (const Drawn::Layer& layer : drawn.layers())
+        messages.push_back(Drawn::message(layer, layer.count_until(time_us), reader_));
+      return messages;
+    };
+    size_t largest = 1;
+    for (const auto& message : at(all.back())) largest += message.size() + 4;
+    const size_t every = 1 + all.size() * largest / std::max<size_t>(room, 1);
+    const auto channel = static_cast<uint32_t>(names_.size() - 1);
+    add_entry(channel, index_.begin_us() - 1, at(index_.begin_us() - 1));
+    for (size_t i = 0; i < all.size(); i += every) add_entry(channel, all[i], at(all[i]));
   }
 
   // Channel, number of messages (a message may come in parts), time in s; then of each message its
@@ -185,7 +213,7 @@ class Writer {
       names_.push_back(printable(channel.name));
       if (channel.fingerprint == world_info_t::getHash()) info_ = names_.back();
       const SimTime interval = are_pictures(channel) ? pictures_us : interval_us;
-      if (interval < 0) continue;
+      if (interval < 0 || channel.fingerprint == markers_t::getHash()) continue;  // see add_drawn
       for (const size_t i : thinned(channel, interval))
         add_entry(static_cast<uint32_t>(c), channel.entries[i].time_us, whole(channel, i));
     }

@@ -8,6 +8,7 @@
 
 #include "core/utf8.h"
 #include "core/whole.h"
+#include "ruedo/markers_t.hpp"
 #include "ruedo/schema.h"
 #include "ruedo/world_info_t.hpp"
 #include "ruedo/world_state_t.hpp"
@@ -78,6 +79,7 @@ void LogSource::pump(Board& board, bool viewers) {
   if (board.channels().empty()) {
     for (size_t i = 0; i < index_.channels().size(); ++i) board.name(i, index_.channels()[i].name);
     if (makes_info_) board.name(index_.channels().size(), info_channel_);
+    board.name(drawn_channel(), kMarkersChannel);
     if (comparison_) board.name(compared_channel(), Comparison::kStates);
   }
   if (viewers && !scanned_) scanned_ = scan_.advance(reader_, kScanned);
@@ -97,6 +99,7 @@ void LogSource::show(Board& board) {
   scene_ = &worlds_.at(time_us);
   const auto& channels = index_.channels();
   for (size_t i = 0; i < channels.size(); ++i) {
+    if (channels[i].fingerprint == markers_t::getHash()) continue;  // see show_drawn
     if (board.channels()[i].watchers == 0) {
       shown_[i] = kNothing;  // it is read again on demand
       continue;
@@ -111,7 +114,20 @@ void LogSource::show(Board& board) {
     told_ = scene_;
     for (const auto& part : scene_->info) board.put(channels.size(), part);
   }
+  show_drawn(board);
   if (comparison_) show_other(board);
+}
+
+void LogSource::show_drawn(Board& board) {
+  if (board.channels()[drawn_channel()].watchers == 0) return shown_layers_.clear();
+  const std::vector<Drawn::Layer>& layers = scan_.drawn().layers();
+  shown_layers_.resize(layers.size(), kNothing);
+  for (size_t i = 0; i < layers.size(); ++i) {
+    const size_t count = layers[i].count_until(now_us());
+    if (count == shown_layers_[i]) continue;
+    shown_layers_[i] = count;
+    board.put(drawn_channel(), Drawn::message(layers[i], count, reader_));
+  }
 }
 
 void LogSource::show_other(Board& board) {

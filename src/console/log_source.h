@@ -46,8 +46,10 @@ class LogSource : public Source {
 
   SimTime now_us() const;
   // Behind those of the log, and the info that it may not have.
-  size_t compared_channel() const { return index_.channels().size() + (makes_info_ ? 1 : 0); }
+  size_t drawn_channel() const { return index_.channels().size() + (makes_info_ ? 1 : 0); }
+  size_t compared_channel() const { return drawn_channel() + 1; }
   void show(Board& board);
+  void show_drawn(Board& board);
   void show_other(Board& board);
   void load(Board& board, size_t channel, size_t count);
   bool read(size_t channel, size_t entry);
@@ -64,6 +66,7 @@ class LogSource : public Source {
   const run::LogWorlds::Scene* told_ = nullptr;  // whose info is on the board
   std::vector<size_t>
       shown_;  // of each channel, how many messages there were when one was put on the board
+  std::vector<size_t> shown_layers_;        // of each layer, as shown_
   std::unique_ptr<Comparison> comparison_;  // null: with none
   Playback playback_;
   std::chrono::steady_clock::time_point last_;

@@ -1,6 +1,10 @@
 // The way past the publisher: counted, copied where wanted, never waited for.
 #include "console/tap.h"
 
+#include <utility>
+
+#include "console/drawn.h"
+
 namespace ruedo::console {
 
 void Tap::announce(const std::shared_ptr<const run::Announcement>& announcement) {
@@ -20,7 +24,25 @@ void Tap::message(const run::Published& message) {
 }
 
 void Tap::hear(const std::string& channel, const uint8_t* data, size_t size) {
-  if (Traffic* traffic = find(channel)) offer(*traffic, data, size);
+  Traffic* traffic = find(channel);
+  if (!traffic) return;
+  const std::span message(data, size);
+  const std::string layer = layer_of(message);
+  if (layer.empty()) return offer(*traffic, data, size);
+  count(*traffic, size);
+  if (is_drawn(message)) keep_drawn(traffic->index, layer, message);
+}
+
+void Tap::keep_drawn(uint32_t channel, const std::string& layer, std::span<const uint8_t> message) {
+  const std::lock_guard lock(drawn_mutex_);
+  std::erase_if(drawn_, [&](const Drawing& before) { return before.layer == layer; });
+  if (drawn_.size() >= Drawn::kMostLayers) drawn_.erase(drawn_.begin());
+  drawn_.push_back({channel, layer, {message.begin(), message.end()}});
+}
+
+std::vector<Tap::Drawing> Tap::take_drawn() {
+  const std::lock_guard lock(drawn_mutex_);
+  return std::exchange(drawn_, {});
 }
 
 bool Tap::takes(const std::string& channel) const {
@@ -43,9 +65,13 @@ Traffic* Tap::find(const std::string& channel) {
   return &added;
 }
 
-void Tap::offer(Traffic& traffic, const uint8_t* data, size_t size) {
+void Tap::count(Traffic& traffic, size_t size) {
   traffic.messages.fetch_add(1, std::memory_order_relaxed);
   traffic.size.store(static_cast<uint32_t>(size), std::memory_order_relaxed);
+}
+
+void Tap::offer(Traffic& traffic, const uint8_t* data, size_t size) {
+  count(traffic, size);
   if (watched_.load(std::memory_order_relaxed) && traffic.wanted.load(std::memory_order_relaxed))
     ring_.offer(traffic.index, data, size);
 }

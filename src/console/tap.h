@@ -8,6 +8,7 @@
 #include <atomic>
 #include <memory>
 #include <mutex>
+#include <span>
 #include <string>
 #include <unordered_map>
 #include <unordered_set>
@@ -29,6 +30,12 @@ struct Traffic {
 
 class Tap : public run::Sink {
  public:
+  // What a client has drawn (markers_t).
+  struct Drawing {
+    uint32_t channel;
+    std::string layer;
+    std::vector<uint8_t> message;
+  };
   static constexpr size_t kMostChannels = 65536;  // more are not shown
   static constexpr size_t kRingSize = size_t{1} << 25;
 
@@ -51,12 +58,20 @@ class Tap : public run::Sink {
   size_t channel_count() const { return count_.load(std::memory_order_acquire); }
   Traffic& channel(size_t index) const { return *list_[index].load(std::memory_order_acquire); }
   OfferRing& ring() { return ring_; }
+  // What was drawn since, the newest of each layer: whether anybody watches or not, for it is shown
+  // to those who come later, too.
+  std::vector<Drawing> take_drawn();
 
  private:
   Traffic* find(const std::string& channel);  // null: there are too many
+  static void count(Traffic& traffic, size_t size);
   void offer(Traffic& traffic, const uint8_t* data, size_t size);
 
+  void keep_drawn(uint32_t channel, const std::string& layer, std::span<const uint8_t> message);
+
   OfferRing ring_{kRingSize};
+  std::mutex drawn_mutex_;
+  std::vector<Drawing> drawn_;
   std::atomic<bool> watched_{false};
   std::vector<Traffic*> by_index_;  // of the announcement; null: not heard yet. The publisher's
 

@@ -11,6 +11,7 @@
 #include <spdlog/spdlog.h>
 
 #include "engine/faults.h"
+#include "engine/markers.h"
 #include "ruedo/decode.h"
 #include "ruedo/fault_t.hpp"
 #include "ruedo/joint_command_t.hpp"
@@ -24,12 +25,30 @@ namespace ruedo::engine {
 
 namespace {
 
+template <class Message>
+DecodeFault try_decoding(const uint8_t* data, size_t size) {
+  Message message;
+  return decode_checked(data, size, message);
+}
+
 // A fault's values, checked when it came; whether its robot has that device is seen when it acts.
 std::string check_fault_message(const uint8_t* data, size_t size, model::Fault& fault) {
   fault_t message;
   if (decode_checked(data, size, message) != DecodeFault::none) return "it is none";
   fault = fault_of(message);
   return model::check_fault(fault);
+}
+
+// What its type alone does not tell: "" or what is wrong with a message that was decoded.
+std::string check_values(Input::Kind kind, const uint8_t* data, size_t size) {
+  if (kind == Input::Kind::fault) {
+    model::Fault asked;
+    return check_fault_message(data, size, asked);
+  }
+  markers_t markers;
+  if (kind != Input::Kind::markers) return "";
+  if (decode_checked(data, size, markers) != DecodeFault::none) return "it is none";
+  return check_markers(markers);
 }
 
 }  // namespace
@@ -79,11 +98,9 @@ DecodeFault decode_command(Input::Kind kind, const uint8_t* data, size_t size,
       }
       break;
     }
-    case Input::Kind::fault: {  // it is no command of a robot's: apply() takes the bytes
-      fault_t message;
-      fault = decode_checked(data, size, message);
-      break;
-    }
+    // These are no commands of a robot's: apply() takes the bytes.
+    case Input::Kind::fault: return try_decoding<fault_t>(data, size);
+    case Input::Kind::markers: return try_decoding<markers_t>(data, size);
     case Input::Kind::reset_odometry: {
       name_request_t message;
       fault = decode_checked(data, size, message);
@@ -119,7 +136,7 @@ CommandInbox::CommandInbox(std::vector<Input> inputs, int robots)
       reset_input_(static_cast<size_t>(robots), -1),
       slots_(static_cast<size_t>(robots)) {
   for (size_t i = 0; i < inputs_.size(); ++i) listen(static_cast<int>(i));
-  waiting_.reserve(slots_.size());
+  waiting_.reserve(slots_.size() + 1);
 }
 
 void CommandInbox::listen(int index) {
@@ -179,11 +196,8 @@ void CommandInbox::receive(const std::string& channel, const uint8_t* data, size
   command.robot = input.robot;
   const DecodeFault fault = decode_command(input.kind, data, size, command);
   if (fault != DecodeFault::none) return refuse(channel, describe(fault));
-  if (input.kind == Input::Kind::fault) {
-    model::Fault asked;
-    if (const std::string why = check_fault_message(data, size, asked); !why.empty())
-      return refuse(channel, why.c_str());
-  }
+  if (const std::string why = check_values(input.kind, data, size); !why.empty())
+    return refuse(channel, why.c_str());
   keep(found->second, command, data, size);
 }
 
@@ -193,14 +207,15 @@ void CommandInbox::reset_odometry(RobotIndex robot, const std::vector<uint8_t>& 
 }
 
 CommandInbox::Entry& CommandInbox::next_entry(RobotIndex robot) {
-  Slots& slots = slots_[robot];
+  Slots& slots = slots_of(robot);
+  const size_t most = slots.entries.size();
   if (slots.size == 0) waiting_.push_back(robot);
-  if (slots.size == kKeptPerRobot) {
-    slots.first = (slots.first + 1) % kKeptPerRobot;
+  if (slots.size == most) {
+    slots.first = (slots.first + 1) % most;
     --slots.size;
     ++displaced_;
   }
-  return slots.entries[(slots.first + slots.size++) % kKeptPerRobot];
+  return slots.entries[(slots.first + slots.size++) % most];
 }
 
 void CommandInbox::keep(int input, robot::Command& command, const uint8_t* data, size_t size) {
@@ -224,9 +239,7 @@ CommandInbox::Scheduled CommandInbox::schedule(int64_t step, int input, const ui
   command.robot = inputs_[input].robot;
   if (decode_command(inputs_[input].kind, data, size, command) != DecodeFault::none)
     return Scheduled::faulty;
-  model::Fault asked;
-  if (inputs_[input].kind == Input::Kind::fault && !check_fault_message(data, size, asked).empty())
-    return Scheduled::faulty;
+  if (!check_values(inputs_[input].kind, data, size).empty()) return Scheduled::faulty;
   std::lock_guard lock(mutex_);
   if (step < next_step_) return Scheduled::late;
   if (scheduled_count_ == kMostScheduled || scheduled_bytes_ + size > kMostScheduledBytes)
@@ -272,9 +285,9 @@ void CommandInbox::apply(robot::Robots& robots, Faults& faults, int64_t step, Ba
       std::swap(next_taken(count), entry);
     }
     for (const RobotIndex robot : waiting_) {
-      Slots& slots = slots_[robot];
+      Slots& slots = slots_of(robot);
       for (size_t i = 0; i < slots.size; ++i)
-        std::swap(next_taken(count), slots.entries[(slots.first + i) % kKeptPerRobot]);
+        std::swap(next_taken(count), slots.entries[(slots.first + i) % slots.entries.size()]);
       slots.size = 0;
     }
     waiting_.clear();
@@ -283,11 +296,12 @@ void CommandInbox::apply(robot::Robots& robots, Faults& faults, int64_t step, Ba
             taken_.begin() + static_cast<std::ptrdiff_t>(count),
             [](const Entry& a, const Entry& b) { return a.arrival < b.arrival; });
   for (size_t i = 0; i < count; ++i) {
-    if (inputs_[taken_[i].input].kind == Input::Kind::fault) {
+    const Input::Kind kind = inputs_[taken_[i].input].kind;
+    if (kind == Input::Kind::fault) {
       model::Fault fault;
       if (check_fault_message(taken_[i].bytes.data(), taken_[i].bytes.size(), fault).empty())
         faults.begin(fault, taken_[i].command.robot, step);
-    } else {
+    } else if (kind != Input::Kind::markers) {
       faults.command(taken_[i].command, step, robots);
     }
     if (static_cast<size_t>(batch.applied_count) == batch.applied.size())
@@ -302,6 +316,7 @@ void CommandInbox::apply(robot::Robots& robots, Faults& faults, int64_t step, Ba
 void CommandInbox::clear() {
   std::lock_guard lock(mutex_);
   for (Slots& slots : slots_) slots.size = 0;
+  world_slots_.size = 0;
   waiting_.clear();
   scheduled_count_ = scheduled_bytes_ = 0;
 }

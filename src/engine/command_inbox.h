@@ -6,7 +6,6 @@
 // room.
 #pragma once
 
-#include <array>
 #include <atomic>
 #include <cstdint>
 #include <mutex>
@@ -22,17 +21,18 @@ namespace ruedo::engine {
 
 class Faults;
 
-// A channel on which a robot takes commands.
+// A channel on which a robot takes commands, or the world what clients draw.
 struct Input {
-  enum class Kind { velocity, wheels, move, joints, fault, reset_odometry };
+  enum class Kind { velocity, wheels, move, joints, fault, reset_odometry, markers };
   std::string channel;  // on the bus
-  RobotIndex robot;
+  RobotIndex robot;     // invalid: the world
   Kind kind = Kind::velocity;
 };
 
 class CommandInbox {
  public:
   static constexpr size_t kKeptPerRobot = 4;
+  static constexpr size_t kKeptOfWorld = 64;        // messages of markers
   static constexpr size_t kMaxMessageSize = 65536;  // bytes
   static constexpr size_t kMostScheduled = 65536;   // commands
   static constexpr size_t kMostScheduledBytes = 32u << 20;
@@ -85,11 +85,13 @@ class CommandInbox {
     std::vector<uint8_t> bytes;
   };
   struct Slots {  // a ring of the newest
-    std::array<Entry, kKeptPerRobot> entries;
+    explicit Slots(size_t most = kKeptPerRobot) : entries(most) {}
+    std::vector<Entry> entries;
     size_t first = 0, size = 0;
   };
 
   void listen(int input);
+  Slots& slots_of(RobotIndex robot) { return robot.valid() ? slots_[robot] : world_slots_; }
   Entry& next_entry(RobotIndex robot);  // with the mutex held
   void keep(int input, robot::Command& command, const uint8_t* data, size_t size);
   void refuse(const std::string& channel, const char* why);
@@ -100,7 +102,8 @@ class CommandInbox {
   std::unordered_map<std::string, int> by_channel_;  // looked up only, never walked
   std::vector<int> reset_input_;                     // of each robot
   mutable std::mutex mutex_;
-  std::vector<Slots> slots_;
+  std::vector<Slots> slots_;  // of each robot
+  Slots world_slots_{kKeptOfWorld};
   std::vector<RobotIndex> waiting_;  // with entries
   uint64_t arrivals_ = 0;
   std::vector<Entry> scheduled_;  // the first scheduled_count_ are a heap, the next step on top

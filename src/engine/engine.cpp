@@ -14,6 +14,7 @@
 #include <tbb/enumerable_thread_specific.h>
 #include <tbb/task_arena.h>
 
+#include "engine/markers.h"
 #include "engine/outcome.h"
 #include "engine/parallel.h"
 #include "engine/world_state.h"
@@ -387,6 +388,11 @@ void Engine::command(int world, const std::string& channel, std::span<const uint
           input->kind == Input::Kind::fault &&
           decode_checked(message.data(), message.size(), fault) == DecodeFault::none) {
         throw InputError({}, channel + ": " + model::check_fault(fault_of(fault)));
+      }
+      if (markers_t markers;
+          input->kind == Input::Kind::markers &&
+          decode_checked(message.data(), message.size(), markers) == DecodeFault::none) {
+        throw InputError({}, channel + ": " + check_markers(markers));
       }
       throw InputError({}, "that is no message for " + channel);
     case CommandInbox::Scheduled::late: throw InputError({}, "that is no message for " + channel);

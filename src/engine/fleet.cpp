@@ -13,6 +13,7 @@
 #include "model/read_context.h"
 #include "ruedo/fault_t.hpp"
 #include "ruedo/joint_command_t.hpp"
+#include "ruedo/markers_t.hpp"
 #include "ruedo/move_command_t.hpp"
 #include "ruedo/velocity_command_t.hpp"
 #include "ruedo/wheel_command_t.hpp"
@@ -60,8 +61,10 @@ class FleetMaker {
     }
     name_unserved(kinds);
     add_inputs();
-    if (!options_.only_robot.valid())
+    if (!options_.only_robot.valid()) {
       fleet_.modules.push_back(world_state_module(world_, layout_, options_.epoch, channels_));
+      add_markers();
+    }
     for (auto& devices : devices_of_) {
       for (device_info_t& device : devices) fleet_.devices.push_back(std::move(device));
     }
@@ -270,6 +273,11 @@ class FleetMaker {
     const std::string& name = instance(robot).name;
     const int channel = channels_.add<Message>(name + "/" + suffix, name, "", Rate{}, true);
     fleet_.inputs.push_back({channels_[channel].bus_name, robot, kind});
+  }
+
+  void add_markers() {
+    const int channel = channels_.add<markers_t>("ruedo/markers", "", "", Rate{}, true);
+    fleet_.inputs.push_back({channels_[channel].bus_name, RobotIndex(), Input::Kind::markers});
   }
 
   void add_inputs() {

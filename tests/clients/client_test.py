@@ -4,8 +4,10 @@ numbers are known.
 
 import math
 
+import lcm
 import pytest
 from conftest import HERE, PATIENCE, probe, ruedo_run
+from ruedo import lcmtypes
 
 HALL = str(HERE / "hall.sdf")
 WALL = 6.0  # m, the wall's face
@@ -141,6 +143,38 @@ def test_errors_name_what_exists(language, server):
     assert said.one("radius").startswith("ValueError: radius is 0")
     assert said.one("limit").startswith("ValueError: speed is -1")
     assert said.one("spawn").split(":")[0] in ("NotSupported", "RequestError")
+
+
+def test_markers_are_drawn_and_logged(language, tmp_path):
+    """Each library sends the same; what the server would refuse is said at once."""
+    log = tmp_path / "run.lcm"
+    with ruedo_run("--disable", "p3at/camera", "--record", log, world=HALL) as server:
+        said = probe(language, server.url, "markers", "p3at")
+    for what in ("lines", "size", "color", "cells", "layer", "large"):
+        assert said.one(what).startswith("ValueError: "), what
+    drawn = []
+    for event in lcm.EventLog(str(log)):
+        if event.channel == "ruedo/applied":
+            applied = lcmtypes.applied_t.decode(event.data)
+            if applied.channel == "ruedo/markers":
+                drawn.append(lcmtypes.markers_t.decode(applied.data))
+    assert [(each.layer, each.frame, each.n) for each in drawn] == [
+        ("plan", "p3at", 5),
+        ("gone", "", 0),
+    ]
+    lines, path, points, text, grid = drawn[0].markers
+    kinds = lcmtypes.marker_t
+    assert (lines.kind, lines.points) == (kinds.LINES, [(0, 0, 0), (1, 0, 0)])
+    assert (path.kind, path.points) == (kinds.PATH, [(0, 0, 0), (1, 0, 0), (1, 2, 0)])
+    assert (points.kind, points.points) == (kinds.POINTS, [(0, 0, 1)])
+    assert (text.kind, text.text, text.position) == (kinds.TEXT, "goal", (1, 2, 0.5))
+    assert (grid.kind, grid.columns, bytes(grid.cells)) == (kinds.MAP, 2, bytes([0, 100, 255, 50]))
+    assert grid.position == (1, 1, 0) and grid.size == pytest.approx(0.5)
+    half = math.sqrt(0.5)  # of a quarter turn about z
+    assert grid.orientation == pytest.approx((half, 0, 0, half))
+    for marker in drawn[0].markers:
+        assert marker.color == pytest.approx((1, 0, 0, 0.5))
+    assert [m.size for m in drawn[0].markers] == pytest.approx([0.02, 0.02, 0.1, 0.3, 0.5])
 
 
 def test_control(language):

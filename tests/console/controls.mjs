@@ -115,7 +115,7 @@ export default async function controls(tools) {
   const chosen = await page.evaluate(() => [...window.ruedo.page.now.layers]);
   check(
     "what robots sense and where they were is on at first",
-    chosen.join() === "rays,points,sonar,trail,odometry,contacts,clouds,ghosts",
+    chosen.join() === "rays,points,sonar,trail,odometry,contacts,clouds,ghosts,markers",
     chosen,
   );
   await until(

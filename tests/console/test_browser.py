@@ -569,6 +569,73 @@ def test_two_runs_are_compared(tmp_path):
     assert [robot["distance"] for robot in told["comparison"]["robots"]] == [0]
 
 
+def draw(sim, layer, frame=""):
+    """One marker of each kind."""
+    import ruedo
+
+    made = ruedo.markers
+    square = [[-1, -1], [1, -1], [1, 1], [-1, 1]]
+    every = [
+        made.lines(square, (1, 0.2, 0.2), 0.08),
+        made.path([*square, square[0]], (1, 0.8, 0), 0.05),
+        made.points([[x / 4, 0, 0.3] for x in range(-4, 5)], (0.2, 1, 0.4), 0.1),
+        made.text("goal\nhere", (0, 1.5, 0.5), (1, 1, 1), 0.4),
+        made.map([[100, 0, 100], [0, -1, 0], [100, 0, 100]], 0.3, (1.2, -0.5), 0.5),
+    ]
+    sim.markers(layer, every, frame=frame)
+
+
+def test_what_clients_draw_is_shown(tmp_path):
+    """Live, to a page that comes later, too; in its past; then in the log and in a page of the log,
+    at moments that the log's commands tell.
+    """
+    import ruedo
+    from ruedo.lcmtypes import applied_t, markers_t
+
+    log = tmp_path / "run.lcm"
+    with (
+        running("--disable", "p3at/camera", "--record", log) as process,
+        ruedo.connect(timeout=60) as sim,
+    ):
+        sim.sleep(0.2)
+        draw(sim, "plan", "p3at")
+        sim.sleep(0.2)
+        said = []
+        with browser(process.url, tmp_path, "markers") as page:
+            for line in page.stdout:
+                said.append(line.rstrip())
+                if line.startswith("empty the layer"):
+                    sim.markers("plan")
+            page.wait(60)
+        draw(sim, "other")
+        sim.sleep(0.5)
+        seen = judged("markers", tmp_path, said, page.returncode)
+    assert {"it moves with its robot", "and the present what is"} <= set(seen)
+    drawn, moments = {}, []
+    for channel, time_us, data in events(log):
+        if channel != "ruedo/applied":
+            continue
+        applied = applied_t.decode(data)
+        if applied.channel != "ruedo/markers":
+            continue
+        markers = markers_t.decode(applied.data)
+        if not moments:
+            moments.append({"time": time_us * 1e-6 - 0.01, "layers": {}})
+        drawn = {name: n for name, n in drawn.items() if name != markers.layer}
+        if markers.n > 0:
+            drawn[markers.layer] = markers.n
+        moments.append({"time": time_us * 1e-6, "layers": drawn})
+    assert [moment["layers"] for moment in moments] == [{}, {"plan": 5}, {}, {"other": 5}]
+    moments = moments[::-1] + moments[1:]
+    with playing(log) as process:
+        seen = browse(process.url, tmp_path, "markers", {"moments": moments})
+    assert "each moment shows what was drawn then" in seen
+    page = tmp_path / "run.html"
+    subprocess.run([RUEDO, "play", log, "--html", page], check=True, timeout=100)
+    seen = browse(page.as_uri(), tmp_path, "markers", {"moments": moments})
+    assert "each moment shows what was drawn then" in seen
+
+
 def thousand_robots(path):
     """A log of 1 000 robots in 25 rows, with their bodies and wheels but without sensors."""
     model = (SOURCE / "worlds/robots/p3dx/model.sdf").read_text()

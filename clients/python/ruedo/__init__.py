@@ -25,6 +25,7 @@ except ImportError as _error:
         "ruedo's message types were not generated: install the package (pip install clients/python) or "
         "build the target python_types and use BUILD/python"
     ) from _error
+from . import markers
 from .bus import Subscription
 from .control import State
 from .errors import (
@@ -152,5 +153,6 @@ __all__ = [
     "launch",
     "lcmtypes",
     "load_map",
+    "markers",
     "read_log",
 ]

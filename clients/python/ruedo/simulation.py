@@ -11,7 +11,7 @@ import sys
 import threading
 import time
 import weakref
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from types import TracebackType
 from typing import Any, Literal
 
@@ -23,6 +23,7 @@ from .bus import Bus, Subscription
 from .control import Session, State
 from .errors import NoServer, NotSupported, RuedoError, UnknownName
 from .lockstep import Command, Observations, Stepper, observed
+from .markers import message as made_markers
 from .motion import Driver
 from .robot import Robot
 from .stream import Stream
@@ -331,6 +332,20 @@ class Simulation:
     def reset_odometry(self, robot: str) -> None:
         """Sets a robot's odometry to zero where it stands."""
         self._session.request(lcmtypes.request_t.RESET_ODOMETRY, _name_body(robot))
+
+    def markers(
+        self, layer: str, markers: Iterable[lcmtypes.marker_t] = (), frame: str = ""
+    ) -> None:
+        """Draws for people to see, in the web console and in the log: what `ruedo.markers` makes.
+
+        layer: a name of your own; what is drawn takes the place of all that was in it, and nothing
+        empties it. frame: a robot, with whose base_link it moves; "": the world.
+        """
+        message = made_markers(layer, markers, frame, self._utime)
+        channel = next((c for c in self._info.channel_list if c.type == "markers_t"), None)
+        if channel is None:
+            raise NotSupported("this server takes no markers")
+        self._bus.publish(channel.name, message.encode())
 
     def snapshot(self, name: str) -> State:
         """Saves the state under a name, in the folder that the server was started with

@@ -13,6 +13,7 @@ import { Ghosts } from "./scene/ghosts";
 import { Labels } from "./scene/labels";
 import { Measure } from "./scene/measure";
 import { Way } from "./scene/way";
+import { Markers } from "./scene/markers";
 import { OverlaySet } from "./scene/overlay_set";
 import { Stage, type ViewMode } from "./scene/stage";
 import { Clock } from "./state/clock";
@@ -65,6 +66,7 @@ export class App {
     recall("detail") === "full",
   );
   readonly overlays = new OverlaySet(this.page, this.stage);
+  readonly markers = new Markers(this.page, this.stage);
   readonly ghosts = new Ghosts(this.page, this.stage);
   readonly clock = new Clock(this.page, (anew) => this.forgetPast(anew));
   readonly notice = new Notice(byId("notice"), this.page);
@@ -280,6 +282,7 @@ export class App {
   private onHello(hello: Hello): void {
     const before = this.page.now.hello;
     this.asked = false;
+    this.markers.clear();
     document.title = `${hello.title} – Ruedo`;
     document.body.dataset.mode = hello.mode;
     if (this.rewind) this.scenes.length = 0;
@@ -385,6 +388,7 @@ export class App {
     if (past === null && before === null && kept.end === this.page.now.kept.end) return;
     this.page.set({ past, kept });
     if (past?.now === before?.now) return;
+    if (!past || !before || past.now < before.now) this.markers.clear(); // what is drawn then comes
     if (!past || !before || Math.abs(past.now - before.now) > kJump_s) this.poses.jump();
     const shown =
       this.scenes[
@@ -476,6 +480,7 @@ export class App {
     this.editPage.transform.show();
     this.stage.frame(at, () => {
       const moved = this.ghosts.place(at);
+      this.markers.place();
       return this.overlays.place() || moved;
     });
     this.labels.follow();

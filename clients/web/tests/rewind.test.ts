@@ -27,6 +27,27 @@ class Hand implements RunLink {
   seek() {}
 }
 
+const layer = (name: string, n: number) =>
+  encode("markers_t", {
+    utime: 0n,
+    layer: name,
+    frame: "",
+    n,
+    markers: Array.from({ length: n }, () => ({
+      kind: 3,
+      position: new Float64Array(3),
+      orientation: new Float64Array([1, 0, 0, 0]),
+      color: new Float32Array(4),
+      size: 1,
+      text: "",
+      n: 0,
+      points: new Float32Array(),
+      columns: 0,
+      ncells: 0,
+      cells: new Uint8Array(),
+    })),
+  }).slice();
+
 const state = (time_s: number, x: number, epoch = 0, part = 0, nparts = 1) =>
   encode("world_state_t", {
     utime: BigInt(Math.round(time_s * 1e6)),
@@ -118,6 +139,36 @@ describe("the past", () => {
     expect(pasts.at(-1)).toBeNull();
     expect(last()).toEqual(["ruedo/world", 0, 7]);
     expect(rewind.range).toEqual({ begin: 0, end: 0 });
+  });
+
+  it("has what was drawn, all layers of it, however long ago", () => {
+    const drawn: Record<string, number> = {};
+    hand.handler.hello({ mode: "live" } as Hello);
+    vi.spyOn(rewind["handler"], "message").mockImplementation((channel, bytes) => {
+      if (channel !== "ruedo/markers") return;
+      const { layer, n } = decode("markers_t", bytes);
+      drawn[layer] = n;
+    });
+    const draw = (name: string, n: number) => hand.handler.message("ruedo/markers", layer(name, n));
+    const shown = (time_s: number) => {
+      for (const name of Object.keys(drawn)) delete drawn[name];
+      rewind.show(time_s);
+      return { ...drawn };
+    };
+    for (let t = 0; t <= 10; ++t) {
+      come(t);
+      if (t === 2) draw("plan", 1);
+      if (t === 4) draw("goals", 2);
+      if (t === 6) draw("plan", 3);
+    }
+    expect(shown(1)).toEqual({});
+    expect(shown(3)).toEqual({ plan: 1 });
+    expect(shown(5)).toEqual({ plan: 1, goals: 2 });
+    expect(shown(7)).toEqual({ plan: 3, goals: 2 });
+    for (let t = 11; t <= 2 * kMostSeconds; ++t) come(t);
+    expect(shown(kMostSeconds + 1)).toEqual({ plan: 3, goals: 2 });
+    hand.handler.message("ruedo/world", state(0, 0, 1)); // begins anew: programs have not
+    expect(shown(0)).toEqual({ plan: 3, goals: 2 });
   });
 
   it("shows messages in parts whole, and steers what runs", () => {

@@ -63,6 +63,7 @@ function state(more: Partial<PageState> = {}): PageState {
     marks: { begin: null, end: null },
     layers: new Set(),
     mode: "orbit",
+    drawn: false,
     reduced: false,
     theme: "dark",
     selected: "",
@@ -147,7 +148,7 @@ describe("the clock", () => {
 
 describe("wanted channels", () => {
   const of = (robot: string, ...types: string[]) => types.map((type) => `${robot}/${type}`);
-  const own = ["ruedo/info", "ruedo/tick", "ruedo/world", "ruedo/reply"];
+  const own = ["ruedo/info", "ruedo/tick", "ruedo/world", "ruedo/reply", "ruedo/markers"];
 
   it("are none before the greeting, then what runs, and messages of the run when all is there", () => {
     expect([...wantedChannels(state({ hello: null }), false, [])]).toEqual([]);

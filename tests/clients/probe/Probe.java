@@ -6,6 +6,7 @@ import ruedo.Device;
 import ruedo.Image;
 import ruedo.LaunchOptions;
 import ruedo.Limits;
+import ruedo.Marker;
 import ruedo.Motion;
 import ruedo.MotionStatus;
 import ruedo.Observations;
@@ -243,6 +244,37 @@ public final class Probe {
         attempt("spawn", () -> sim.spawn("no such model", 0.0, 0.0, 0.0, ""));
     }
 
+    private static void markers(Simulation sim, String name) {
+        float[] red = {1f, 0f, 0f, 0.5f};
+        List<Marker> all =
+                List.of(
+                        Marker.lines(new double[][] {{0, 0, 0}, {1, 0, 0}}, red, 0.02),
+                        Marker.path(new double[][] {{0, 0, 0}, {1, 0, 0}, {1, 2, 0}}, red, 0.02),
+                        Marker.points(new double[][] {{0, 0, 1}}, red, 0.1),
+                        Marker.text("goal", new double[] {1, 2, 0.5}, red, 0.3),
+                        Marker.map(
+                                new int[] {0, 100, 255, 50},
+                                2,
+                                0.5,
+                                new double[] {1, 1, 0},
+                                Math.PI / 2,
+                                red));
+        sim.markers("plan", all, name);
+        sim.markers("gone", List.of());
+        attempt("lines", () -> Marker.lines(new double[][] {{0, 0, 0}}, red, 0.02));
+        attempt("size", () -> Marker.points(new double[0][], red, 0.0));
+        attempt("color", () -> Marker.points(new double[0][], new float[] {2f, 0f, 0f, 1f}, 0.1));
+        attempt(
+                "cells",
+                () -> Marker.map(new int[] {101}, 1, 0.5, new double[] {0, 0, 0}, 0.0, red));
+        attempt("layer", () -> sim.markers("", List.of()));
+        attempt(
+                "large",
+                () -> sim.markers("large", List.of(Marker.points(new double[6000][3], red, 0.1))));
+        sim.state();
+        sim.sleep(0.2);
+    }
+
     private static void streams(Simulation sim, String name, double timeout) {
         Robot robot = sim.robot(name);
         attempt("lrf", () -> robot.lrf().latest(timeout));
@@ -416,6 +448,9 @@ public final class Probe {
                     break;
                 case "errors":
                     errors(sim, a[0]);
+                    break;
+                case "markers":
+                    markers(sim, a[0]);
                     break;
                 case "streams":
                     streams(sim, a[0], Double.parseDouble(a[1]));

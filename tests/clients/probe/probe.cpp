@@ -224,6 +224,26 @@ void errors(const rc::Simulation& sim, const std::string& name) {
   report("spawn", [&] { sim.spawn("no such model", 0.0, 0.0); });
 }
 
+void markers(const rc::Simulation& sim, const std::string& name) {
+  namespace rm = rc::markers;
+  const rc::Color red{1.0f, 0.0f, 0.0f, 0.5f};
+  const std::vector<rc::Marker> all{rm::lines({{0, 0, 0}, {1, 0, 0}}, red, 0.02),
+                                    rm::path({{0, 0, 0}, {1, 0, 0}, {1, 2, 0}}, red, 0.02),
+                                    rm::points({{0, 0, 1}}, red, 0.1),
+                                    rm::text("goal", {1, 2, 0.5}, red, 0.3),
+                                    rm::map({0, 100, 255, 50}, 2, 0.5, {1, 1, 0}, kPi / 2, red)};
+  sim.markers("plan", all, name);
+  sim.markers("gone");
+  report("lines", [&] { (void)rm::lines({{0, 0, 0}}, red, 0.02); });
+  report("size", [&] { (void)rm::points({}, red, 0.0); });
+  report("color", [&] { (void)rm::points({}, {2.0f, 0.0f, 0.0f, 1.0f}, 0.1); });
+  report("cells", [&] { (void)rm::map({101}, 1, 0.5, {}, 0.0, red); });
+  report("layer", [&] { sim.markers(""); });
+  report("large", [&] { sim.markers("large", {rm::points(rm::Points(6000), red, 0.1)}); });
+  (void)sim.state();
+  sim.sleep(0.2);
+}
+
 void streams(const rc::Simulation& sim, const std::string& name, double timeout) {
   const rc::Robot robot = sim.robot(name);
   report("lrf", [&] { (void)robot.lrf().latest(timeout); });
@@ -383,6 +403,7 @@ void act(const std::string& url, const std::string& command, const std::vector<s
   if (command == "primitives") primitives(sim, a[0]);
   if (command == "collisions") collisions(sim, a[0]);
   if (command == "errors") errors(sim, a[0]);
+  if (command == "markers") markers(sim, a[0]);
   if (command == "streams") streams(sim, a[0], std::stod(a[1]));
   if (command == "control") control(sim, a[0]);
   if (command == "world") world(sim, a[0]);

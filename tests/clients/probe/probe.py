@@ -175,6 +175,28 @@ def errors(sim, name):
     attempt("spawn", lambda: sim.spawn("no such model", 0.0, 0.0))
 
 
+def markers(sim, name):
+    red = (1.0, 0.0, 0.0, 0.5)
+    rm = ruedo.markers
+    every = [
+        rm.lines([[0, 0, 0], [1, 0, 0]], red, 0.02),
+        rm.path([[0, 0], [1, 0], [1, 2]], red, 0.02),
+        rm.points([[0, 0, 1]], red, 0.1),
+        rm.text("goal", (1, 2, 0.5), red, 0.3),
+        rm.map([[0, 100], [-1, 50]], 0.5, (1, 1), math.pi / 2, red),
+    ]
+    sim.markers("plan", every, frame=name)
+    sim.markers("gone")
+    attempt("lines", lambda: rm.lines([[0, 0, 0]], red, 0.02))
+    attempt("size", lambda: rm.points([], red, 0.0))
+    attempt("color", lambda: rm.points([], (2.0, 0.0, 0.0), 0.1))
+    attempt("cells", lambda: rm.map([[101]], 0.5, color=red))
+    attempt("layer", lambda: sim.markers(""))
+    attempt("large", lambda: sim.markers("large", [rm.points([[0, 0]] * 6000, red)]))
+    sim.state()
+    sim.sleep(0.2)
+
+
 def streams(sim, name, timeout):
     robot = sim.robot(name)
     attempt("lrf", lambda: robot.lrf.latest(float(timeout)))
@@ -317,6 +339,7 @@ def main():
                 "primitives": lambda: primitives(sim, *rest),
                 "collisions": lambda: collisions(sim, *rest),
                 "errors": lambda: errors(sim, *rest),
+                "markers": lambda: markers(sim, *rest),
                 "streams": lambda: streams(sim, *rest),
                 "control": lambda: control(sim, *rest),
                 "world": lambda: world(sim, *rest),

@@ -337,6 +337,28 @@ public final class Simulation implements AutoCloseable {
     }
 
     /**
+     * Draws for people to see, in the web console and in the log.
+     *
+     * @param layer a name of your own; what is drawn takes the place of all that was in it, and
+     *     nothing empties it
+     * @param frame a robot, with whose base_link it moves; "": the world
+     * @throws IllegalArgumentException for more than a message holds
+     */
+    public void markers(String layer, List<Marker> markers, String frame) {
+        for (channel_info_t channel : info().channels("")) {
+            if (!channel.input || !channel.type.equals("markers_t")) continue;
+            bus.publish(channel.name, Marker.message(layer, markers, frame));
+            return;
+        }
+        throw new RuedoException.NotSupported("this server takes no markers");
+    }
+
+    /** The same, in the world. */
+    public void markers(String layer, List<Marker> markers) {
+        markers(layer, markers, "");
+    }
+
+    /**
      * Saves the state under a name, in the folder that the server was started with (--snapshots
      * FOLDER), and returns it.
      */

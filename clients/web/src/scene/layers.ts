@@ -11,6 +11,7 @@ export const kLayers = [
   "labels",
   "shapes",
   "ghosts",
+  "markers",
 ] as const;
 export type Layer = (typeof kLayers)[number];
 
@@ -26,6 +27,7 @@ export const kLayerColours: Record<Layer, string> = {
   labels: "var(--text)",
   shapes: "#8fd14f",
   ghosts: "#b58cff",
+  markers: "#f2f2f2",
 };
 
 // Those that are off until somebody wants them.

@@ -39,6 +39,7 @@ export interface PageState {
   marks: { begin: number | null; end: number | null }; // of what is looped; null: all of it
   layers: ReadonlySet<Layer>;
   mode: ViewMode;
+  drawn: boolean; // clients have drawn something
   reduced: boolean; // drawn with fewer pixels than the page has
   theme: string;
   selected: string; // name of the model that is being edited; "" for none
@@ -76,6 +77,7 @@ export function makePage(): Page {
     marks: { begin: null, end: null },
     layers: new Set(kLayers.filter((layer) => !off.includes(layer))),
     mode: "orbit",
+    drawn: false,
     reduced: false,
     theme:
       recall("theme") ?? (matchMedia("(prefers-color-scheme: light)").matches ? "light" : "dark"),

@@ -1,8 +1,10 @@
 // Which channels the page needs: it asks for no others.
 import type { Layer } from "../scene/layers";
 import { kStates } from "./comparison";
+import { inputOf } from "./world";
 import { shownRobots, type PageState, type Tab } from "./page";
 
+const kMarkers = "ruedo/markers"; // of a log
 const kOfPage = ["world_state_t", "tick_t", "reply_t"];
 const kOfTab: Record<Exclude<Tab, "Robot">, string[]> = {
   Plots: ["pose_t", "odometry_t"],
@@ -58,6 +60,7 @@ export function wantedChannels(
     }
   }
   if (complete && hello.compared && layers.has("ghosts")) wanted.add(kStates);
+  if (complete) wanted.add(inputOf(world, "", "markers_t") ?? kMarkers);
   for (const name of opened) wanted.add(name);
   return wanted;
 }

@@ -30,8 +30,9 @@ export function makeLegend(place: HTMLElement, page: Page): void {
     "reduced detail",
   );
   place.append(...chips.values(), sign);
-  page.watch(["hello"], ({ hello }) => {
+  page.watch(["hello", "drawn"], ({ hello, drawn }) => {
     chips.get("ghosts")!.hidden = !hello?.compared;
+    chips.get("markers")!.hidden = !drawn;
   });
   page.watch(["reduced"], ({ reduced }) => {
     sign.hidden = !reduced;

@@ -13,8 +13,9 @@ const kTick_ms = 33;
 
 interface Entry {
   time: number;
-  messages: Uint8Array[];
-} // parts of one message stand together
+  messages: Uint8Array[]; // parts of one message stand together
+  size?: number; // of what clients draw, bytes of the one that came
+}
 export interface Past {
   begin: number;
   end: number;
@@ -46,6 +47,22 @@ function partOffset(type: string): number {
   return -1;
 }
 
+const kMostLayers = 64; // of markers
+const utf8 = new TextDecoder();
+
+// The layer of a markers_t: behind fingerprint and utime stand its length with a zero, and its
+// name.
+function layerOf(bytes: Uint8Array): string {
+  const size = bytes.length >= 20 ? new DataView(bytes.buffer, bytes.byteOffset).getInt32(16) : 0;
+  return utf8.decode(bytes.subarray(20, 19 + Math.max(1, size)));
+}
+
+// What is drawn when that is, too: the newest message of each layer.
+function withLayer(before: Uint8Array[], message: Uint8Array): Uint8Array[] {
+  const layer = layerOf(message);
+  return [...before.filter((each) => layerOf(each) !== layer), message].slice(-kMostLayers);
+}
+
 const kNow = new Set(["reply_t", "world_info_t"]); // go to the page whatever is shown
 const offsets = new Map<string, number>();
 
@@ -57,6 +74,7 @@ export class Rewind implements RunLink {
   private bytes = 0;
   private newest_s = 0;
   private epoch = -1;
+  private drawn: { channel: string; messages: Uint8Array[] } | null = null; // by clients, now
   private states = ""; // the channel of the bodies' states
   private isLive = true;
   private past: { now: number; playing: boolean; speed: number } | null = null; // null: the present is shown
@@ -80,6 +98,7 @@ export class Rewind implements RunLink {
       state: (link, words) => handler.state(link, words),
       hello: (hello) => {
         this.isLive = hello.mode === "live";
+        this.drawn = null;
         handler.hello(hello);
       },
       scene: () => handler.scene(),
@@ -144,6 +163,8 @@ export class Rewind implements RunLink {
   clear(): void {
     this.entries.clear();
     this.order.length = this.first = this.bytes = this.newest_s = 0;
+    // Its programs have not drawn it anew.
+    if (this.drawn) this.draw(this.drawn.channel, 0, this.drawn.messages);
     this.live();
     this.tell();
   }
@@ -177,7 +198,8 @@ export class Rewind implements RunLink {
 
   private keep(channel: string, type: string, bytes: Uint8Array): void {
     const view = new DataView(bytes.buffer, bytes.byteOffset, bytes.byteLength),
-      hasTime = kTypes[type]?.[0]?.name === "utime" && bytes.length >= 16;
+      drawn = type === "markers_t", // its time is its client's
+      hasTime = !drawn && kTypes[type]?.[0]?.name === "utime" && bytes.length >= 16;
     const time = hasTime ? Number(view.getBigInt64(8)) * 1e-6 : this.newest_s;
     this.newest_s = Math.max(this.newest_s, time);
     let offset = offsets.get(type);
@@ -187,6 +209,11 @@ export class Rewind implements RunLink {
     const last = entries.at(-1),
       later = offset >= 0 && bytes.length >= offset + 2 && view.getInt16(offset) !== 0;
     const copy = bytes.slice(); // of its own: a frame is not held by its smallest message
+    this.bytes += bytes.length;
+    if (drawn) {
+      this.draw(channel, time, withLayer(this.drawn?.messages ?? [], copy), bytes.length);
+      return this.forget();
+    }
     if (later && last) last.messages.push(copy);
     else if (last && last.time >= time)
       last.messages = [copy]; // of the same moment, the newer one
@@ -194,9 +221,22 @@ export class Rewind implements RunLink {
       entries.push({ time, messages: [copy] });
       this.order.push({ channel, size: 0, time });
     }
-    this.bytes += bytes.length;
     this.order.at(-1)!.size += bytes.length;
     this.forget();
+  }
+
+  private draw(channel: string, time: number, messages: Uint8Array[], size = 0): void {
+    this.drawn = { channel, messages };
+    const entries = this.entries.get(channel) ?? [];
+    this.entries.set(channel, entries);
+    entries.push({ time, messages, size });
+  }
+
+  // What was drawn before the oldest moment is seen in it still: the newest of that is kept.
+  private forgetDrawn(): void {
+    const entries = this.drawn ? this.entries.get(this.drawn.channel)! : [];
+    while (entries.length > 1 && entries[1]!.time <= this.range.begin)
+      this.bytes -= entries.shift()!.size ?? 0;
   }
 
   private forget(): void {
@@ -207,6 +247,7 @@ export class Rewind implements RunLink {
       const { channel, size } = this.order[this.first++]!;
       this.entries.get(channel)?.shift();
       this.bytes -= size;
+      this.forgetDrawn();
     }
     if (this.first <= 4096) return;
     this.order.splice(0, this.first);

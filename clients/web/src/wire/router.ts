@@ -9,6 +9,7 @@ import type { Clock } from "../state/clock";
 import type { Page } from "../state/page";
 import type { Poses } from "../state/poses";
 import type { Ghosts } from "../scene/ghosts";
+import type { Markers } from "../scene/markers";
 import type { OverlaySet } from "../scene/overlay_set";
 import type { Stage } from "../scene/stage";
 import type { ChannelList } from "../ui/channels";
@@ -44,6 +45,7 @@ export interface Views {
   clock: Clock;
   stage: Stage;
   overlays: OverlaySet;
+  markers: Markers;
   ghosts: Ghosts;
   pages: RobotPages;
   channels: ChannelList;
@@ -99,6 +101,7 @@ export class Router {
       poses.add(state, performance.now());
       return clock.tell(Number(state.utime) * 1e-6, state.epoch, true);
     }
+    if (type === "markers_t") return this.views.markers.take(read(type));
     if (type === "tick_t") {
       const tick = read(type);
       return clock.tell(Number(tick.utime) * 1e-6, tick.epoch, this.told === type);
