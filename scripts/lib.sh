@@ -19,10 +19,10 @@ readonly BUILD_PACKAGES=(
   musl-dev
 )
 # libsdformat is the oracle of the world reader's tests; Debian has it up to 12. clang builds the fuzzers; nftables
-# is the firewall that a test runs into; libfaketime sets clocks; debootstrap makes bare systems to try the wheel in; MPFR is the oracle of the elementary functions, and qemu has other processors.
+# is the firewall that a test runs into; libfaketime sets clocks; debootstrap makes bare systems to try the wheel in; MPFR is the oracle of the elementary functions, and qemu has other processors; ffmpeg makes videos.
 readonly TEST_PACKAGES=(
   libgtest-dev libgmock-dev libbenchmark-dev libopencv-contrib-dev "?libsdformat-dev" "?chromium" clang "?libclang-rt-dev"
-  nftables libmpfr-dev qemu-user libfaketime maven doxygen debootstrap
+  nftables libmpfr-dev qemu-user libfaketime maven doxygen debootstrap ffmpeg
 )
 
 # The web console's page is built by node and npm; a machine that has an npm of another origin keeps it.

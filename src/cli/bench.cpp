@@ -15,6 +15,7 @@
 #include "cli/bench_rows.h"
 #include "cli/bench_world.h"
 #include "cli/commands.h"
+#include "cli/range.h"
 #include "core/progress.h"
 #include "ruedo/errors.h"
 
@@ -184,7 +185,7 @@ void add_bench(CLI::App& app, Action& chosen) {
       ->add_option("--duration", arguments->duration_s,
                    "simulated seconds (default: by the number of robots)")
       ->type_name("S")
-      ->check(CLI::Range(0.1, 1e6));
+      ->check(within(0.1, 1e6));
   command
       ->add_option("--threads", arguments->threads,
                    "most threads inside a module (default: one a core)")

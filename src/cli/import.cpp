@@ -8,6 +8,7 @@
 #include <fmt/format.h>
 
 #include "cli/commands.h"
+#include "cli/range.h"
 #include "model/occupancy.h"
 #include "ruedo/errors.h"
 
@@ -75,15 +76,15 @@ void add_import(CLI::App& app, Action& chosen) {
       ->required();
   command->add_option("-o,--out", arguments->out, "the world (default: standard output)");
   command->add_option("--resolution", arguments->resolution, "of a picture: side of a pixel, m")
-      ->check(CLI::Range(1e-4, 1000.0));
+      ->check(within(1e-4, 1000.0));
   command->add_option("--width", arguments->width, "of a picture: how wide it is, m (Stage's size)")
-      ->check(CLI::Range(1e-3, 1e5));
+      ->check(within(1e-3, 1e5));
   command->add_option("--height", arguments->height, "of the walls, m")
       ->capture_default_str()
-      ->check(CLI::Range(0.01, 100.0));
+      ->check(within(0.01, 100.0));
   command->add_option("--thickness", arguments->thickness, "of a .map's lines, m")
       ->capture_default_str()
-      ->check(CLI::Range(0.001, 10.0));
+      ->check(within(0.001, 10.0));
   command->callback(
       [arguments, &chosen] { chosen = [arguments] { return import_map(*arguments); }; });
 }

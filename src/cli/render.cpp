@@ -9,7 +9,9 @@
 
 #include "cli/commands.h"
 #include "cli/cut_away.h"
+#include "cli/range.h"
 #include "cli/render_devices.h"
+#include "cli/render_log.h"
 #include "cli/render_view.h"
 #include "core/progress.h"
 #include "model/codecs.h"
@@ -25,6 +27,7 @@ struct RenderArguments {
   std::string output, camera, view = "iso", size;
   std::string cut = "auto";
   bool rays = false;
+  VideoArguments video;  // of a log; its name is "" for a picture
 };
 
 // Drawn at twice the size with smooth edges, then reduced, where memory allows.
@@ -137,7 +140,23 @@ std::optional<double> height_to_cut_at(const RenderArguments& arguments,
   return height;
 }
 
+int video(const RenderArguments& arguments) {
+  if (!arguments.output.empty() || !arguments.camera.empty() || arguments.rays)
+    throw InputError({}, "--video goes with --view, not with -o, --camera or --rays");
+  VideoArguments video = arguments.video;
+  video.log = arguments.world.world;
+  video.view = arguments.view;
+  video.size = arguments.size;
+  return render_video(video);
+}
+
 int render(const RenderArguments& arguments) {
+  if (!arguments.video.video.empty()) return video(arguments);
+  const VideoArguments& of_video = arguments.video;
+  if (of_video.from_s || of_video.to_s || !of_video.follow.empty())
+    throw InputError({}, "--from, --to and --follow go with --video");
+  if (arguments.output.empty())
+    throw InputError({}, "render: --output FILE or --video FILE is required");
   if (!arguments.camera.empty() && arguments.rays) {
     throw InputError({},
                      "--rays goes with --view, not with --camera: a camera does not see the rays");
@@ -173,13 +192,33 @@ int render(const RenderArguments& arguments) {
   return kGood;
 }
 
+void add_video_arguments(CLI::App& command, VideoArguments& arguments) {
+  command
+      .add_option("--video", arguments.video,
+                  "WORLD is a log: make it a video, .webm (VP8) or .mp4 (H.264)")
+      ->type_name("FILE");
+  command.add_option("--follow", arguments.follow, "the camera goes along with this robot")
+      ->type_name("ROBOT");
+  command.add_option("--fps", arguments.fps, "of the video, frames per second")
+      ->type_name("N")
+      ->capture_default_str()
+      ->check(within(1.0, 120.0));
+  command.add_option("--rate", arguments.rate, "of the video, log time per its time")
+      ->type_name("S")
+      ->capture_default_str()
+      ->check(within(0.001, 1000.0));
+  command.add_option("--from", arguments.from_s, "of the video, log time since its beginning, s")
+      ->type_name("T");
+  command.add_option("--to", arguments.to_s, "and where it ends, s")->type_name("T");
+}
+
 void add_render(CLI::App& app, Action& chosen) {
-  CLI::App* command = app.add_subcommand("render", "draw a picture of a world at its start");
+  CLI::App* command =
+      app.add_subcommand("render", "draw a picture of a world at its start, or a video of a log");
   const auto arguments = std::make_shared<RenderArguments>();
   add_world_arguments(*command, arguments->world);
   command->add_option("-o,--output", arguments->output, "the picture: .png or .jpg")
-      ->type_name("FILE")
-      ->required();
+      ->type_name("FILE");
   auto* camera = command->add_option("--camera", arguments->camera, "as this camera sees it")
                      ->type_name("ROBOT/DEVICE");
   command
@@ -197,6 +236,7 @@ void add_render(CLI::App& app, Action& chosen) {
   command->add_option("--size", arguments->size, "of the picture, in pixels")->type_name("WxH");
   command->add_flag("--rays", arguments->rays,
                     "draw the rays of laser scanners and the cones of sonars");
+  add_video_arguments(*command, arguments->video);
   command->callback([arguments, &chosen] { chosen = [arguments] { return render(*arguments); }; });
 }
 

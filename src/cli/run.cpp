@@ -22,6 +22,7 @@
 #include "cli/foxglove_server.h"
 #include "cli/listing.h"
 #include "cli/progress_line.h"
+#include "cli/range.h"
 #include "cli/run_command.h"
 #include "cli/sandboxed.h"
 #include "cli/view.h"
@@ -338,7 +339,7 @@ void add_lockstep(CLI::App& command, RunArguments& arguments) {
                   "seconds of real time after which a silent client of lockstep has lost its lease")
       ->type_name("S")
       ->capture_default_str()
-      ->check(CLI::Range(0.01, 1e6));
+      ->check(within(0.01, 1e6));
   command
       .add_option("--lease-policy", arguments.lease_policy,
                   "then: pause the run, drop the client, or fail the run with exit code 1")
@@ -404,7 +405,7 @@ Viewers add_viewers(CLI::App& command, RunArguments& arguments) {
                   "/clock at most so often in a second of sim time")
       ->type_name("HZ")
       ->capture_default_str()
-      ->check(CLI::Range(0.1, 10000.0));
+      ->check(within(0.1, 10000.0));
   command
       .add_option("--ros2-services", arguments.ros2.services,
                   "how services are mapped: as each call came, or as one middleware does")

@@ -117,6 +117,50 @@ def test_a_roof_is_taken_off(tmp_path):
     assert "is left out" not in render(ARENA, "-o", tmp_path / "a.png").stdout
 
 
+@pytest.fixture(scope="module")
+def log(tmp_path_factory):
+    """Two seconds of a robot that drives along the x axis."""
+    folder = tmp_path_factory.mktemp("video")
+    path = folder / "run.lcm"
+    world = folder / "mover.sdf"
+    world.write_text("""<?xml version="1.0"?>
+<sdf version="1.9" xmlns:ruedo="https://ruedo.org/sdf"><world name="mover">
+<include><uri>model://ground_plane</uri></include><include><uri>model://sun</uri></include>
+<model name="box"><pose>0 0 3 0 0 0</pose><link name="link">
+<inertial><mass>1</mass><inertia><ixx>1</ixx><iyy>1</iyy><izz>1</izz></inertia></inertial>
+<visual name="v"><geometry><box><size>1 1 1</size></box></geometry>
+<material><ambient>1 0 0 1</ambient><diffuse>1 0 0 1</diffuse></material></visual>
+<collision name="c"><geometry><box><size>1 1 1</size></box></geometry></collision>
+</link></model></world></sdf>""")
+    subprocess.run(
+        [RUEDO, "run", world, "--lcm", "memq://", "--quiet", "--rate", "max"]
+        + ["--duration", "2", "--record", path],
+        check=True,
+        timeout=120,
+    )
+    return path
+
+
+@pytest.mark.parametrize("kind", ["webm", "mp4"])
+def test_a_log_is_a_video(log, tmp_path, kind):
+    """A box that falls from 3 m: 2 s at 10 pictures a second are 21 of them. The file's head says
+    what it is; the writer reads nothing, so OpenCV's reader is asked where Python has it.
+    """
+    path = tmp_path / f"run.{kind}"
+    seen = ("--view=-8,0,1.5,0,0,0", "--size", "320x240")
+    result = render(log, "--video", path, "--fps", "10", *seen)
+    assert result.returncode == 0, result.stderr
+    assert result.stdout == f"{path}: 21 frames of 320 x 240 pixels, 2.1 s\n"
+    head = path.read_bytes()
+    if kind == "webm":
+        assert head[:4] == b"\x1a\x45\xdf\xa3" and b"webm" in head[:64] and b"V_VP8" in head
+    else:
+        assert head[4:8] == b"ftyp" and b"avc1" in head
+    part = tmp_path / f"part.{kind}"
+    result = render(log, "--video", part, "--from", "0.5", "--to", "1.5", "--rate", "0.5", *seen)
+    assert result.stdout == f"{part}: 61 frames of 320 x 240 pixels, 2.03333 s\n", result.stderr
+
+
 def test_picture_of_a_camera(tmp_path):
     path = tmp_path / "camera.png"
     result = render(ARENA, "--camera", "p3at/camera", "--size", "96x72", "-o", str(path))
@@ -151,3 +195,33 @@ def test_says_what_is_wrong(arguments, code, words):
     result = render(ARENA, *arguments)
     assert result.returncode == code, result.stderr
     assert words in result.stderr
+
+
+@pytest.mark.parametrize(
+    "arguments, code, words",
+    [
+        (["x.avi"], 2, "--video x.avi: allowed are names that end in .webm or .mp4"),
+        (["x.mp4", "-o", "x.png"], 2, "--video goes with --view"),
+        (["x.mp4", "--size", "31x20"], 2, "--size 31x20: a video's sides are even"),
+        (["x.mp4", "--size", "4000x20"], 2, "3840 pixels at most"),
+        (["x.mp4", "--fps", "0"], 2, "--fps"),
+        (["x.mp4", "--rate", "nan"], 2, "--rate"),
+        (["x.mp4", "--from", "3"], 3, "--from 3: the log has 0 to 2 s"),
+        (["x.mp4", "--to", "-1"], 3, "--to -1: the log has 0 to 2 s"),
+        (["x.mp4", "--from", "1", "--to", "0.5"], 2, "--from: it must be before --to"),
+        (["x.mp4", "--rate", "0.001", "--fps", "120"], 3, "240001 frames: a video has 100000"),
+        (["x.mp4", "--follow", "boks"], 2, "--follow boks: there is no such robot"),
+        (["/nowhere/x.mp4", "--size", "64x64"], 4, "/nowhere/x.mp4: the video cannot be written"),
+        (["x.mp4", "--from", "nan"], 3, "--from nan: the log has 0 to 2 s"),
+    ],
+)
+def test_says_what_is_wrong_with_a_video(log, tmp_path, arguments, code, words):
+    result = subprocess.run(
+        [RUEDO, "render", log, "--video", *arguments],
+        capture_output=True,
+        text=True,
+        timeout=120,
+        cwd=tmp_path,
+    )
+    assert result.returncode == code, result.stderr
+    assert words in result.stderr.splitlines()[0], result.stderr
