@@ -259,7 +259,7 @@ void FoxgloveExport::send_frames(const run::LogWorlds::Scene& scene, uint64_t ti
   for (const model::RobotPlacement& robot : layout.robots) {
     const model::ModelInstance& instance = scene.world->models[robot.instance];
     if (instance.removed) continue;
-    const model::BodyPlacement* body = robot.body < 0 ? nullptr : &layout.bodies[robot.body];
+    const model::BodyPlacement* body = robot.body.valid() ? &layout.bodies[robot.body] : nullptr;
     write_frame(json, time_ns, body ? body->name : "world", instance.name, robot.X_BBase);
     write_frame(json, time_ns, "world", instance.name + "/odom",
                 body ? body->X_WB * robot.X_BBase : robot.X_BBase);
@@ -314,8 +314,8 @@ void FoxgloveExport::send_scene(const model::WorldModel& world, uint64_t time_ns
       const auto kind = static_cast<size_t>(content.kind_of_link[link]);
       json.open('{');
       write_time(json, "timestamp", time_ns);
-      json.member("frame_id",
-                  placement.body < 0 ? std::string("world") : layout.bodies[placement.body].name);
+      json.member("frame_id", placement.body.valid() ? layout.bodies[placement.body].name
+                                                     : std::string("world"));
       json.member("id", instance.name + "/" + instance.model->links[k].name);
       write_time(json, "lifetime", 0);
       json.member("frame_locked", true).name("triangles").open('[');

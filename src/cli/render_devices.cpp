@@ -103,7 +103,7 @@ Snapshot initial_snapshot(const model::BodyLayout& layout) {
   s.robots.resize(layout.robots.size());
   for (size_t i = 0; i < layout.robots.size(); ++i) {
     const model::RobotPlacement& robot = layout.robots[i];
-    s.robots[i].X_WBase = robot.body < 0 ? robot.X_BBase : s.bodies[robot.body] * robot.X_BBase;
+    s.robots[i].X_WBase = robot.body.valid() ? s.bodies[robot.body] * robot.X_BBase : robot.X_BBase;
   }
   return s;
 }

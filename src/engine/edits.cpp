@@ -76,8 +76,8 @@ std::string why_immovable(const Simulation& simulation, InstanceIndex instance) 
   const size_t first = static_cast<size_t>(layout.first_link[instance]);
   bool moves = false, stands = false;
   for (size_t link = first; link < first + model.links.size(); ++link)
-    (layout.links[link].body >= 0 ? moves : stands) = true;
-  for (const model::Joint& joint : model.joints) stands |= joint.parent < 0;
+    (layout.links[link].body.valid() ? moves : stands) = true;
+  for (const model::Joint& joint : model.joints) stands |= !joint.parent.valid();
   if (!moves) return "is static";
   return stands ? "is fixed to the world by a joint" : "";
 }
@@ -182,9 +182,10 @@ bool stands_fast(const model::WorldModel& world, const std::string& name) {
   const InstanceIndex instance = find_model(world, name);
   if (!instance.valid()) return false;
   const model::Model& model = *world.models[instance].model;
-  return !model.path && (model.is_static ||
-                         std::any_of(model.joints.begin(), model.joints.end(),
-                                     [](const model::Joint& joint) { return joint.parent < 0; }));
+  return !model.path && (model.is_static || std::any_of(model.joints.begin(), model.joints.end(),
+                                                        [](const model::Joint& joint) {
+                                                          return !joint.parent.valid();
+                                                        }));
 }
 
 Outcome set_pose(const set_pose_request_t& request, int64_t step, Simulation& simulation,

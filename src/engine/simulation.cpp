@@ -230,7 +230,7 @@ std::string Simulation::at_work() const {
     if (place < 0 || place >= module.devices()) return "the module " + module.name() + " works";
     const Device& device = module.device(place);
     std::string name = device.name;
-    if (device.robot >= 0) {
+    if (device.robot.valid()) {
       const InstanceIndex instance = layout().robots[device.robot].instance;
       name = world().models[instance].name + "/" + name;
     }

@@ -116,10 +116,10 @@ std::vector<world_info_t> make_world_info(const world_info_t& head, const model:
     const model::LinkPlacement& link = layout.links[listed.link];
     body_info_t info{};
     info.index = -1;
-    info.is_static = listed.body < 0;
+    info.is_static = !listed.body.valid();
     if (removed(link.instance)) {
       // no name
-    } else if (listed.body < 0) {
+    } else if (!listed.body.valid()) {
       info.name = world.models[link.instance].name + "/" + link_of(world, link).name;
     } else {
       const model::BodyPlacement& body = layout.bodies[listed.body];

@@ -116,7 +116,7 @@ void Judge::see_clearance(const Snapshot& snapshot) {
 
 void Judge::see_contacts(const Snapshot& snapshot) {
   for (const Contact& contact : snapshot.contacts) {
-    if (contact.link_a < 0 || contact.link_b < 0 ||
+    if (!contact.link_a.valid() || !contact.link_b.valid() ||
         static_cast<size_t>(std::max(contact.link_a, contact.link_b)) >= own_.size())
       continue;
     const bool a = own_[contact.link_a], b = own_[contact.link_b];

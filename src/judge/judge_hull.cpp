@@ -41,9 +41,9 @@ void JudgeHull::find_hull(const model::WorldModel& world) {
   Snapshot still;
   for (const model::BodyPlacement& body : layout.bodies) still.bodies.push_back(body.X_WB);
   still.wheel_angles.resize(layout.wheels.size());
-  const Pose X_BaseW =
-      (placement.body < 0 ? placement.X_BBase : still.bodies[placement.body] * placement.X_BBase)
-          .inverse();
+  const Pose X_BaseW = (placement.body.valid() ? still.bodies[placement.body] * placement.X_BBase
+                                               : placement.X_BBase)
+                           .inverse();
   for (Pose& pose : still.bodies) pose = X_BaseW * pose;
   const auto scene = scene::make_ray_scene(scene::make_static_ray_scene(alone, layout));
   scene->update(still);

@@ -30,14 +30,14 @@ BaseOdometry::BaseOdometry(const BodyLayout& layout, RobotIndex robot,
     const Pose X_BaseB = placement.X_BBase.inverse();
     for (const int index : placement.wheels) {
       const WheelPlacement& wheel = layout.wheels[index];
-      const WheelPlacement& place = wheel.on < 0 ? wheel : layout.wheels[wheel.on];
+      const WheelPlacement& place = wheel.on.valid() ? layout.wheels[wheel.on] : wheel;
       const LinkPlacement& link = layout.links[place.link];
       Pose X_BL = link.X_BL;  // in the body that carries base_link
       if (link.body != placement.body)
         X_BL = layout.bodies[placement.body].X_WB.inverse() * layout.bodies[link.body].X_WB * X_BL;
       const Vec3 p = X_BaseB * (X_BL * place.center_in_L);
       const auto on = std::find(placement.wheels.begin(), placement.wheels.end(), wheel.on);
-      wheels_.push_back({wheel.steers, wheel.on >= 0,
+      wheels_.push_back({wheel.steers, wheel.on.valid(),
                          static_cast<int>(on - placement.wheels.begin()), p.x(), p.y()});
     }
   }

@@ -106,7 +106,7 @@ Grouping group(const Model& model) {
   const auto join = [&](ModelJointIndex j) {
     if (result.joined[j]) return;
     result.joined[j] = true;
-    if (model.joints[j].parent >= 0)
+    if (model.joints[j].parent.valid())
       result.links.join(model.joints[j].parent, model.joints[j].child);
   };
   for (const ModelJointIndex j : model.joints.indices()) {
@@ -116,7 +116,7 @@ Grouping group(const Model& model) {
   if (kinematic) {
     const Pose X_BaseM = model.drive->X_MBase.inverse();
     for (const Joint& joint : model.joints) {
-      if (joint.parent < 0 || !unlimited(joint)) continue;
+      if (!joint.parent.valid() || !unlimited(joint)) continue;
       const std::vector<ModelLinkIndex> below = subtree(model, joint.child);
       if (lowest_point(model, below, X_BaseM) > kGroundReach_m) continue;
       for (const ModelJointIndex k : model.joints.indices()) {
@@ -125,7 +125,7 @@ Grouping group(const Model& model) {
     }
   }
   for (const Joint& joint : model.joints) {
-    if (joint.parent < 0 && joint.type == JointType::fixed)
+    if (!joint.parent.valid() && joint.type == JointType::fixed)
       result.is_static[result.links.find(joint.child)] = true;
   }
   return result;
@@ -197,7 +197,7 @@ void BodyLayout::place_again(const WorldModel& world, InstanceIndex instance) {
   const ModelInstance& placed = world.models[instance];
   const Model& model = *placed.model;
   for (LinkPlacement& link : links) {
-    if (link.instance == instance && link.body < 0)
+    if (link.instance == instance && !link.body.valid())
       link.X_BL = placed.X_WM * model.links[link.link].X_ML;
   }
   for (BodyPlacement& body : bodies) {
@@ -207,7 +207,7 @@ void BodyLayout::place_again(const WorldModel& world, InstanceIndex instance) {
     body.name = placed.name + "/" + root.name;
   }
   for (RobotPlacement& robot : robots) {
-    if (robot.instance != instance || robot.body >= 0) continue;
+    if (robot.instance != instance || robot.body.valid()) continue;
     robot.X_BBase = placed.X_WM * (model.drive ? model.drive->X_MBase : Pose{});
   }
 }

@@ -70,7 +70,7 @@ std::vector<Wheel> wheels_of(const Model& model, bool by_name) {
   std::vector<Wheel> wheels;
   for (const ModelJointIndex j : model.joints.indices()) {
     const Joint& joint = model.joints[j];
-    if (!unlimited(joint) || joint.parent < 0) continue;
+    if (!unlimited(joint) || !joint.parent.valid()) continue;
     Wheel wheel;
     wheel.joint = j;
     wheel.axis = axis_in_model(joint);

@@ -151,7 +151,7 @@ void SavedState::put_back(const std::string& name, ModelInstance& instance,
     const Pose* parent = pose_of(joint.parent);
     if (const auto at = saved.joints.find(joint.name); at != saved.joints.end())
       starts[j] = at->second;
-    else if (child && (parent || joint.parent < 0))
+    else if (child && (parent || !joint.parent.valid()))
       starts[j] = position_of(*model, joint, parent ? X_MW * *parent : Pose{}, X_MW * *child);
     if (std::abs(starts[j]) < kExact) starts[j] = 0.0;
   }

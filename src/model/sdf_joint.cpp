@@ -214,7 +214,8 @@ void read_gear(const Element& element, FrameGraph& frames, Joint& joint) {
         "their gears, or 'world'");
   if (reference->text == "world") return;
   joint.gear_reference = frames.link(reference->text, *reference);
-  if (joint.gear_reference < 0) reference->fail("'" + reference->text + "' is not part of a link");
+  if (!joint.gear_reference.valid())
+    reference->fail("'" + reference->text + "' is not part of a link");
 }
 
 }  // namespace

@@ -51,8 +51,8 @@ void ContactBook::ByBody::clear() {
 
 void ContactBook::ByBody::fill(const std::vector<Contact>& contacts) {
   for (const Contact& contact : contacts) {
-    if (contact.body_a >= 0) entries_.push_back(contact);
-    if (contact.body_b >= 0) entries_.push_back(swapped(contact));
+    if (contact.body_a.valid()) entries_.push_back(contact);
+    if (contact.body_b.valid()) entries_.push_back(swapped(contact));
   }
   std::sort(entries_.begin(), entries_.end(), earlier);
   for (size_t i = 0; i < entries_.size(); ++i) {
@@ -105,7 +105,7 @@ void ContactBook::add(const std::vector<btPersistentManifold*>& manifolds, int s
                             point.m_appliedImpulseLateral2 * point.m_lateralFrictionDir2);
       }
       // Static things come second; of two bodies the lower number comes first.
-      if (contact.body_a < 0 || (contact.body_b >= 0 && contact.body_b < contact.body_a))
+      if (!contact.body_a.valid() || (contact.body_b.valid() && contact.body_b < contact.body_a))
         contact = swapped(contact);
       if (touches) {
         contacts_.push_back(contact);

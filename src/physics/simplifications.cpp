@@ -21,7 +21,7 @@ void look_at_joints(const model::WorldModel& world, const model::BodyLayout& lay
         std::any_of(layout.joints.begin(), layout.joints.end(), [&](const auto& other) {
           return other.instance == placement.instance && other.joint == joint.leader;
         });
-    if (joint.leader >= 0 && !led) {
+    if (joint.leader.valid() && !led) {
       findings.push_back({Finding::Kind::unsupported, joint.source,
                           "model " + world.models[placement.instance].name + "/joint " + joint.name,
                           "<mimic> of a driven wheel is not supported; the joint moves freely"});
@@ -43,7 +43,7 @@ void look_at_friction(const model::WorldModel& world, const model::BodyLayout& l
   for (const auto& placement : layout.links) {
     const model::ModelInstance& instance = world.models[placement.instance];
     const model::Link& link = instance.model->links[placement.link];
-    const bool rolls = placement.wheel >= 0;  // its axle is the direction
+    const bool rolls = placement.wheel.valid();  // its axle is the direction
     for (const auto& collision : link.collisions) {
       const model::Surface& surface = collision.surface;
       const std::string where =

@@ -59,9 +59,9 @@ void check_finite(const Snapshot& snapshot, const model::WorldModel& world,
   for (const Contact& contact : snapshot.contacts) {
     if (!std::isfinite(contact.position.sum() + contact.normal.sum() + contact.force +
                        contact.depth)) {
-      const BodyIndex body = contact.body_a >= 0 ? contact.body_a : contact.body_b;
-      fail(snapshot,
-           "a contact of the body '" + (body < 0 ? std::string() : layout.bodies[body].name) + "'");
+      const BodyIndex body = contact.body_a.valid() ? contact.body_a : contact.body_b;
+      fail(snapshot, "a contact of the body '" +
+                         (body.valid() ? layout.bodies[body].name : std::string()) + "'");
     }
   }
 }

@@ -23,7 +23,7 @@ const ShapeSurface& surface_at(const ObjectInfo& info, int child) {
   static const ShapeSurface kPlain;
   if (info.surfaces.empty()) return kPlain;
   const bool known =
-      info.body >= 0 && child >= 0 && static_cast<size_t>(child) < info.surfaces.size();
+      info.body.valid() && child >= 0 && static_cast<size_t>(child) < info.surfaces.size();
   return known ? info.surfaces[child] : info.surfaces.front();
 }
 

@@ -65,7 +65,7 @@ void Drive::set_state(const Pose& X_WBase, const Twist& twist) {
 // The power of the contact's force at the velocity that its point has by the plan. Of what carries
 // the robot friction does not count: it drives, and takes power where wheels slip.
 void Drive::resist(const Contact& contact) {
-  if (contact.link_b < 0) return;
+  if (!contact.link_b.valid()) return;
   const bool collides =
       std::abs(contact.normal.dot(X_WBase_.rotation * Vec3::UnitZ())) < kSupportNormal;
   const Quat to_base = X_WBase_.rotation.conjugate();

@@ -14,7 +14,7 @@ std::vector<LevelPlane> level_planes(const model::WorldModel& world,
   std::vector<LevelPlane> planes;
   for (const auto& placement : layout.links) {
     const auto& instance = world.models[placement.instance];
-    if (placement.body >= 0 || instance.removed) continue;
+    if (placement.body.valid() || instance.removed) continue;
     const auto& model = *instance.model;
     for (const auto& collision : model.links[placement.link].collisions) {
       if (collision.geometry.shape != model::Shape::plane) continue;

@@ -130,12 +130,12 @@ bool KinematicDrive::is_support(const Contact& contact, const Vec3& up) const {
 }
 
 bool KinematicDrive::on_wheel(const Contact& contact) const {
-  return !wheels_touch_ || (contact.link_a >= 0 && layout_.links[contact.link_a].wheel >= 0);
+  return !wheels_touch_ || (contact.link_a.valid() && layout_.links[contact.link_a].wheel.valid());
 }
 
 double KinematicDrive::friction(const Contact& contact) const {
   const auto of = [this](LinkIndex link, int shape) {
-    if (link < 0 || shape < 0) return 1.0;
+    if (!link.valid() || shape < 0) return 1.0;
     const auto& placed = layout_.links[link];
     const auto& collisions = world_.models[placed.instance].model->links[placed.link].collisions;
     return static_cast<size_t>(shape) < collisions.size() ? collisions[shape].surface.friction
@@ -166,7 +166,7 @@ void KinematicDrive::choose_support() {
   for (const Contact& contact : physics_.nearby(body_)) {
     if (!is_support(contact, up)) continue;
     supported_ |= contact.depth > -kStanding_m && on_wheel(contact);
-    bump |= contact.body_b >= 0 || contact.normal.z() < 1.0 - 1e-9 || !plane ||
+    bump |= contact.body_b.valid() || contact.normal.z() < 1.0 - 1e-9 || !plane ||
             std::abs(contact.position.z() - plane->height) > kNear_m;
   }
   if (plane && supported_ && !bump && up.z() > math::cos(kLevel_rad) &&
@@ -188,7 +188,7 @@ void KinematicDrive::look_at_support() {
     load += contact.force;
     grip_ += mu * contact.force;
     least = std::min(least, mu);
-    if (contact.body_b >= 0) carriers_.push_back(contact);
+    if (contact.body_b.valid()) carriers_.push_back(contact);
   }
   const double weight = mass_ * std::max(0.0, -up.dot(gravity_));
   if (load < kFirstTouch * weight && std::isfinite(least)) grip_ = least * weight;

@@ -14,9 +14,9 @@ WheelAngles::WheelAngles(const model::BodyLayout& layout, RobotIndex robot,
   const Pose X_BaseB = placement.X_BBase.inverse();
   for (const WheelIndex index : placement.wheels) {
     const model::WheelPlacement& wheel = layout.wheels[index];
-    const model::WheelPlacement& place = wheel.on < 0 ? wheel : layout.wheels[wheel.on];
+    const model::WheelPlacement& place = wheel.on.valid() ? layout.wheels[wheel.on] : wheel;
     const Vec3 p_Base = X_BaseB * (layout.links[place.link].X_BL * place.center_in_L);
-    wheels_.push_back({index, wheel.steers, wheel.on >= 0, wheel.rim, p_Base.x(), p_Base.y()});
+    wheels_.push_back({index, wheel.steers, wheel.on.valid(), wheel.rim, p_Base.x(), p_Base.y()});
   }
 }
 

@@ -50,10 +50,11 @@ void WheelsDrive::place_wheels(const model::BodyLayout& layout) {
   const Pose X_BaseW = (layout.bodies[body_].X_WB * X_BBase_).inverse();
   for (const WheelIndex index : wheels_) {
     const model::WheelPlacement& wheel = layout.wheels[index];
-    const model::WheelPlacement& place = wheel.on < 0 ? wheel : layout.wheels[wheel.on];
+    const model::WheelPlacement& place = wheel.on.valid() ? layout.wheels[wheel.on] : wheel;
     const model::LinkPlacement& link = layout.links[place.link];
     const Vec3 p_Base = X_BaseW * (layout.bodies[link.body].X_WB * (link.X_BL * place.center_in_L));
-    places_.push_back({wheel.left, wheel.steers, wheel.on >= 0, wheel.rim, p_Base.x(), p_Base.y()});
+    places_.push_back(
+        {wheel.left, wheel.steers, wheel.on.valid(), wheel.rim, p_Base.x(), p_Base.y()});
   }
 }
 

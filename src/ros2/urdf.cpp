@@ -154,7 +154,7 @@ std::string moving_joint(const LinkFrame& frame, const model::Model& model) {
   if (frame.motion == Motion::screw) return text;
   text += "<axis xyz=\"" + numbers(frame.axis) + "\"/>" +
           limits(joint.axis, frame.motion == Motion::slide || !endless);
-  if (joint.leader >= 0) {
+  if (joint.leader.valid()) {
     text += fmt::format("<mimic joint=\"{}\" multiplier=\"{:.9g}\" offset=\"{:.9g}\"/>",
                         model::escaped(model.joints[joint.leader].name), joint.mimic_multiplier,
                         joint.mimic_offset - joint.mimic_multiplier * joint.mimic_reference);

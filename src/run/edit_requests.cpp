@@ -215,7 +215,7 @@ Run::Outcome Run::save(const request_t&) {
   const EditedWorld::Saved saved = edited_->save(*world_, [&](size_t instance) {
     const model::ModelInstance& model = world_->models[instance];
     const model::LinkPlacement& link = layout.links[layout.first_link[instance]];
-    if (link.body < 0) return link.X_BL * model.model->links[0].X_ML.inverse();
+    if (!link.body.valid()) return link.X_BL * model.model->links[0].X_ML.inverse();
     return publisher_.latest()->bodies[link.body] * link.X_BL *
            model.model->links[0].X_ML.inverse();
   });

@@ -227,7 +227,7 @@ Outcome Run::get_state(const request_t&, const name_request_t& body) {
     if (!whole_model && body.name != instance.name + "/" + link.name) continue;
     Pose X_WL = placement.X_BL;
     Twist twist;
-    if (placement.body >= 0) {
+    if (placement.body.valid()) {
       const Pose& X_WB = publisher_.latest()->bodies[placement.body];
       const Twist& body_twist = publisher_.latest()->body_twists[placement.body];
       X_WL = X_WB * placement.X_BL;

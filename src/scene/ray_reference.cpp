@@ -29,7 +29,7 @@ class ReferenceRayScene : public RayScene {
 
  private:
   IntoShape into_frame(const RayShape& shape) const {
-    return shape.body < 0 ? IntoShape() : bodies_[shape.body];
+    return shape.body.valid() ? bodies_[shape.body] : IntoShape();
   }
   const IntoShape& into_shape(const RayShape& shape) const {
     return shape.turning < 0 ? shape.into : turning_[shape.turning];
@@ -45,8 +45,8 @@ class ReferenceRayScene : public RayScene {
     for (size_t i = 0; i < shapes.size(); ++i) {
       const IntoShape frame = into_frame(shapes[i]);
       FrameRays rays;
-      rays.o[0] = shapes[i].body < 0 ? ray.origin : frame.point(ray.origin);
-      rays.d[0] = shapes[i].body < 0 ? ray.direction : frame.vector(ray.direction);
+      rays.o[0] = shapes[i].body.valid() ? frame.point(ray.origin) : ray.origin;
+      rays.d[0] = shapes[i].body.valid() ? frame.vector(ray.direction) : ray.direction;
       test_shape(shapes[i], static_cast<int>(i), into_shape(shapes[i]), 1u, rays, batch);
     }
     if (batch.shape[0] == RayBatch::kNothing) return {};
@@ -55,7 +55,7 @@ class ReferenceRayScene : public RayScene {
     Hit hit{batch.t[0], shape.link, shape.shape, -ray.direction};
     if (batch.feature[0] == kInside) return hit;
     const IntoShape frame = into_frame(shape), &into = into_shape(shape);
-    const bool moves = shape.body >= 0;
+    const bool moves = shape.body.valid();
     const Vec3 o = into.point(moves ? frame.point(ray.origin) : ray.origin);
     const Vec3 d = into.vector(moves ? frame.vector(ray.direction) : ray.direction);
     hit.normal = into.vector_back(shape_normal(shape, batch.feature[0], o + hit.range * d));

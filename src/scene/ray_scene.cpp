@@ -195,13 +195,13 @@ void EmbreeRayScene::write(const RayBatch& batch, int lane, Hit& hit) const {
     hit.normal = -d;
     return;
   }
-  if (shape.kind == model::Shape::mesh && shape.body < 0) {  // in the world's frame
+  if (shape.kind == model::Shape::mesh && !shape.body.valid()) {  // in the world's frame
     const Vec3 normal = shape.mesh->normal(batch.feature[lane]);
     hit.normal = normal.dot(d) <= 0.0 ? normal : Vec3(-normal);
     return;
   }
   const IntoShape* body = nullptr;
-  if (shape.body >= 0) {
+  if (shape.body.valid()) {
     const int mover = mover_of_body_[shape.body];
     body = mover >= 0 ? &bounded_[mover].into : &unbounded_[~mover].into;
     o = body->point(o);

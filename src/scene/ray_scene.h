@@ -28,7 +28,7 @@ struct Hit {
   int shape =
       -1;  // index of the struck shape: collision of that link (or visual, as the scene is made)
   Vec3 normal = Vec3::Zero();  // unit, world, towards the ray's origin
-  bool hit() const { return link >= 0; }
+  bool hit() const { return link.valid(); }
 };
 
 // How a caster is made. `reference` is plain loops over the shapes in double precision, for tests.

@@ -15,24 +15,24 @@ Mount::Mount(const SensorSetup& setup, const Pose& X_SD)
 
 Pose Mount::start() const {
   const Pose X_BS = layout_.links[link_].X_BL * X_LS_;
-  return body_ < 0 ? X_BS : layout_.bodies[body_].X_WB * X_BS;
+  return body_.valid() ? layout_.bodies[body_].X_WB * X_BS : X_BS;
 }
 
 Pose Mount::pose(const Snapshot& now) const {
-  if (body_ < 0) return start();
+  if (!body_.valid()) return start();
   const model::LinkPlacement& link = layout_.links[link_];
-  const Pose X_BL = link.wheel >= 0 ? layout_.link_in_body(link_, now.wheel_angles) : link.X_BL;
+  const Pose X_BL = link.wheel.valid() ? layout_.link_in_body(link_, now.wheel_angles) : link.X_BL;
   return now.bodies[body_] * X_BL * X_LS_;
 }
 
 Twist Mount::twist(const Snapshot& now) const {
-  if (body_ < 0) return {};
+  if (!body_.valid()) return {};
   const Pose& X_WB = now.bodies[body_];
   const Vec3 p_WS = pose(now).translation;
   Twist twist = now.body_twists[body_];
   twist.linear += twist.angular.cross(p_WS - X_WB.translation);
   const model::LinkPlacement& link = layout_.links[link_];
-  if (link.wheel >= 0) {
+  if (link.wheel.valid()) {
     const model::WheelPlacement& wheel = layout_.wheels[link.wheel];
     const Pose X_WWheel = X_WB * layout_.link_in_body(wheel.link, now.wheel_angles);
     const Vec3 omega = now.wheel_rates[link.wheel] * (X_WWheel.rotation * wheel.axis_in_L);

@@ -5,26 +5,18 @@ tests/golden pins. Client and engine for Python in bare Debians: packaging/try_i
 
 import os
 import shutil
-import subprocess
 import sys
 import zipfile
 from pathlib import Path
 
 import pytest
+from processes import run
 
 SOURCE = Path(os.environ["RUEDO_SOURCE_DIR"])
 BUILD = Path(os.environ["RUEDO_BINARY_DIR"])
 GOLDEN = SOURCE / "tests/golden"
 WORLDS = {"arena": 1.0, "fleet": 1.0, GOLDEN / "wheels.sdf": 1.0, GOLDEN / "camera.sdf": 0.2}
 pytestmark = pytest.mark.skipif(os.geteuid() != 0, reason="debootstrap and chroot want root")
-
-
-def run(*command, **options):
-    done = subprocess.run(
-        [str(word) for word in command], capture_output=True, text=True, timeout=900, **options
-    )
-    assert done.returncode == 0, done.stdout + done.stderr
-    return done.stdout
 
 
 @pytest.fixture(scope="module")

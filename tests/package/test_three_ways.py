@@ -5,35 +5,16 @@ every option and preset."""
 import json
 import os
 import re
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
+from processes import run_tool as run
 
 SOURCE = Path(os.environ["RUEDO_SOURCE_DIR"])
 BUILD = Path(os.environ["RUEDO_BINARY_DIR"])
 CMAKE = os.environ.get("CMAKE_COMMAND", "cmake")
 PROJECT = Path(__file__).parent / "part"
 FLAGS = "-O0"
-# Where what comes from PyPI lies: the environment that runs the tests.
-ENVIRONMENT = {
-    **{k: v for k, v in os.environ.items() if not k.startswith(("RUEDO", "LCM_"))},
-    "PATH": f"{Path(sys.executable).parent}:{os.environ['PATH']}",
-}
-
-
-def run(*command, good=True, **options):
-    done = subprocess.run(
-        [str(word) for word in command],
-        stdout=subprocess.PIPE,
-        stderr=subprocess.STDOUT,
-        text=True,
-        env=ENVIRONMENT,
-        **options,
-    )
-    assert not good or done.returncode == 0, done.stdout
-    return done.stdout
 
 
 def cached(name):
@@ -119,7 +100,7 @@ def test_a_machine_without_lcm_is_told_what_to_do(tmp_path, archive):
         tmp_path / "b",
         "-DRUEDO_TESTS=OFF",
         f"-Dlcm_DIR={tmp_path}",
-        good=False,
+        code=None,
     )
     assert "LCM 1.5.3 was not found: pip install lcm==1.5.3" in " ".join(said.split())
 

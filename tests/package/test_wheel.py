@@ -3,35 +3,21 @@ anywhere: program, server, engine, picture, what C++ and Java need. In bare Debi
 packaging/try_in_debian.sh."""
 
 import os
-import subprocess
 import sys
 import sysconfig
 import zipfile
 from pathlib import Path
 
 import pytest
+from processes import run as run_somewhere
 
 SOURCE = Path(os.environ["RUEDO_SOURCE_DIR"])
 BUILD = Path(os.environ["RUEDO_BINARY_DIR"])
-CLEAN = {
-    k: v
-    for k, v in os.environ.items()
-    if not k.startswith("RUEDO") and k not in ("LCM_DEFAULT_URL", "PYTHONPATH", "LD_LIBRARY_PATH")
-}
 
 
-def run(*command, **options):
-    done = subprocess.run(
-        [str(word) for word in command],
-        capture_output=True,
-        text=True,
-        env=CLEAN,
-        timeout=600,
-        cwd="/",
-        **options,
-    )
-    assert done.returncode == 0, done.stdout + done.stderr
-    return done.stdout
+def run(*command):
+    """Where nothing of Ruedo's lies."""
+    return run_somewhere(*command, cwd="/")
 
 
 @pytest.fixture(scope="module")
