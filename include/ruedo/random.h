@@ -7,7 +7,9 @@
 
 #include <array>
 #include <cstdint>
+#include <memory>
 #include <span>
+#include <string>
 #include <string_view>
 
 namespace ruedo {
@@ -41,14 +43,23 @@ class RandomStream {
   int next_ = 4;
 };
 
-// The random source of one device of one robot.
+// The random source of one device of one robot. Copies are of the same device: what one is reseeded
+// with holds for all, so that a sensor does nothing for it. Not thread safe.
 class RandomSource {
  public:
   RandomSource(uint64_t seed, std::string_view robot, std::string_view device);
-  RandomStream stream(uint64_t sample) const { return {key_, sample}; }
+  RandomStream stream(uint64_t sample) const { return {state_->key, sample}; }
+
+  uint64_t seed() const { return state_->seed; }
+  // From here on it draws what it would have drawn from that seed all along.
+  void reseed(uint64_t seed);
 
  private:
-  uint64_t key_;
+  struct State {
+    std::string robot, device;
+    uint64_t seed, key;
+  };
+  std::shared_ptr<State> state_;
 };
 
 }  // namespace ruedo

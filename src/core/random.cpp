@@ -214,6 +214,13 @@ void RandomStream::gaussians(std::span<double> values) {
 }
 
 RandomSource::RandomSource(uint64_t seed, std::string_view robot, std::string_view device)
-    : key_(absorb(absorb(mix(seed + 0x9e3779b97f4a7c15u), robot), device)) {}
+    : state_(std::make_shared<State>(State{std::string(robot), std::string(device), 0, 0})) {
+  reseed(seed);
+}
+
+void RandomSource::reseed(uint64_t seed) {
+  state_->seed = seed;
+  state_->key = absorb(absorb(mix(seed + 0x9e3779b97f4a7c15u), state_->robot), state_->device);
+}
 
 }  // namespace ruedo

@@ -26,6 +26,12 @@ struct AppliedCommand {
 
 struct SensorFault;
 
+// From the state `step` on, whatever is drawn comes from that seed.
+struct Reseeding {
+  int64_t step;
+  uint64_t seed;
+};
+
 // By channel: whether anybody reads its messages. A channel beyond its end is read.
 using ReadChannels = std::vector<bool>;
 
@@ -41,6 +47,9 @@ struct Batch {
 
   // Of all devices, while any is faulty or was; null: none. Those of the batch's steps are in it.
   std::shared_ptr<const std::vector<SensorFault>> sensor_faults;
+
+  // By step; null: none. Those of the batch's steps are in it.
+  std::shared_ptr<const std::vector<Reseeding>> reseedings;
 
   // Null: everything is read. Pictures of cameras of which nothing is read are not drawn.
   std::shared_ptr<const ReadChannels> read;

@@ -84,7 +84,9 @@ const device_info_t* Faults::find_device(RobotIndex robot, const std::string& na
 
 std::string Faults::check(const model::Fault& fault, RobotIndex robot) const {
   if (std::string why = model::check_fault(fault); !why.empty()) return why;
-  if (of_robots_.size() + (of_sensors_ ? of_sensors_->size() : 0) >= kMostFaults)
+  if (of_robots_.size() + (of_sensors_ ? of_sensors_->size() : 0) +
+          (reseedings_ ? reseedings_->size() : 0) >=
+      kMostFaults)
     return fmt::format("there are {} faults already", kMostFaults);
   const model::FaultKind& kind = *model::find_fault_kind(fault.kind);
   if (kind.of == model::FaultKind::Of::device) {
@@ -102,7 +104,8 @@ std::string Faults::check(const model::Fault& fault, RobotIndex robot) const {
     }
     if (!applies_to(sensor_kind(fault.kind), device->kind))
       return fmt::format("{} is no fault of a {}", fault.kind, device->kind);
-  } else if (!world_.models[layout_.robots[robot].instance].model->drive) {
+  } else if (kind.of != model::FaultKind::Of::world &&
+             !world_.models[layout_.robots[robot].instance].model->drive) {
     return fmt::format("{} is a fault of robots that drive", fault.kind);
   }
   return "";
@@ -123,6 +126,8 @@ void Faults::begin_at(const model::Fault& fault, RobotIndex robot, int64_t begin
     return begin_of_device(fault, robot, message ? begin + 1 : begin,
                            message && end != INT64_MAX ? end + 1 : end);
   }
+  if (kind.of == model::FaultKind::Of::world)
+    return begin_reseeding(static_cast<uint64_t>(fault.value), message ? begin + 1 : begin);
   const std::pair<const char*, Kind> kinds[] = {
       {"encoder_stuck", Kind::encoder_stuck}, {"wheel_slip", Kind::wheel_slip},
       {"weak_motor", Kind::weak_motor},       {"commands_lost", Kind::commands_lost},
@@ -134,6 +139,26 @@ void Faults::begin_at(const model::Fault& fault, RobotIndex robot, int64_t begin
                           end, steps(fault.value), fault.value, fault});
     wheels_ever_ |= robot_kind == Kind::encoder_stuck || robot_kind == Kind::wheel_slip;
   }
+}
+
+// What has acted stays where it is: a message acts after all of it.
+void Faults::begin_reseeding(uint64_t seed, int64_t begin) {
+  auto all = reseedings_ ? std::make_shared<std::vector<Reseeding>>(*reseedings_)
+                         : std::make_shared<std::vector<Reseeding>>();
+  const auto after =
+      std::upper_bound(all->begin(), all->end(), begin,
+                       [](int64_t step, const Reseeding& one) { return step < one.step; });
+  all->insert(after, {begin, seed});
+  reseedings_ = std::move(all);
+}
+
+std::optional<uint64_t> Faults::new_seed(int64_t step) {
+  std::optional<uint64_t> seed;
+  for (; reseedings_ && reseeded_ < reseedings_->size() && (*reseedings_)[reseeded_].step <= step;
+       ++reseeded_)
+    seed = (*reseedings_)[reseeded_].seed;
+  if (seed) seed_ = *seed;
+  return seed;
 }
 
 void Faults::begin_of_device(const model::Fault& fault, RobotIndex robot, int64_t begin,
@@ -279,6 +304,10 @@ void Faults::begin_time_anew() {
   of_robots_.clear();
   late_.clear();
   of_sensors_.reset();
+  if (!reseedings_) return;
+  // The seed stays, for modules that have not come to it yet, too.
+  reseedings_ = std::make_shared<const std::vector<Reseeding>>(1, Reseeding{0, seed_});
+  reseeded_ = 1;
 }
 
 }  // namespace ruedo::engine

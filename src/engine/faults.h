@@ -9,10 +9,12 @@
 #include <cstdint>
 #include <deque>
 #include <memory>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
 
+#include "engine/batch.h"
 #include "engine/sensor_faults.h"
 #include "model/body_layout.h"
 #include "model/fault.h"
@@ -48,6 +50,11 @@ class Faults {
   // For the modules; null while there was none.
   const std::shared_ptr<const std::vector<SensorFault>>& of_sensors() const { return of_sensors_; }
 
+  // The seed of what is drawn from that state on, where it changes with it.
+  std::optional<uint64_t> new_seed(int64_t step);
+  // For the modules; null while there was none.
+  const std::shared_ptr<const std::vector<Reseeding>>& reseedings() const { return reseedings_; }
+
   void remove(RobotIndex robot);
   void begin_time_anew();  // steps count from 0: what went on is over
 
@@ -77,6 +84,7 @@ class Faults {
 
   int64_t steps(double seconds) const;
   void begin_at(const model::Fault& fault, RobotIndex robot, int64_t begin, bool message);
+  void begin_reseeding(uint64_t seed, int64_t begin);
   void begin_of_device(const model::Fault& fault, RobotIndex robot, int64_t begin, int64_t end);
   const device_info_t* find_device(RobotIndex robot, const std::string& name) const;
   const std::string& name_of(RobotIndex robot) const;
@@ -88,7 +96,9 @@ class Faults {
   const model::WorldModel& world_;
   const model::BodyLayout& layout_;
   const std::vector<device_info_t>& devices_;
-  uint64_t seed_;
+  uint64_t seed_;        // of what is drawn now
+  size_t reseeded_ = 0;  // of the reseedings, how many acted
+  std::shared_ptr<const std::vector<Reseeding>> reseedings_;
   std::shared_ptr<const std::vector<SensorFault>> of_sensors_;
   int64_t sensor_faults_ = 0;
   std::vector<RobotFault> of_robots_;

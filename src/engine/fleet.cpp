@@ -227,6 +227,7 @@ class FleetMaker {
                   wanted.name};
     device.visual_rays |= device.sensor->wants_visual_rays();
     device.channels = device_channels_;
+    device.random = setup.random;
     describe(wanted, rate, *device.sensor);
     return device;
   }

@@ -180,6 +180,7 @@ void Module::process_piece(const Batch& batch, Outbox& outbox, int piece, int be
       Slot& slot = slots_[k];
       Sensor& sensor = *setup_.devices[k].sensor;
       at_work_.store(static_cast<int>(k), std::memory_order_relaxed);
+      if (batch.reseedings) reseed(k, *batch.reseedings, snapshot.step);
       if (batch.sensor_faults) {
         sample_with_faults(batch, snapshot, k, outbox);
         continue;
@@ -192,7 +193,7 @@ void Module::process_piece(const Batch& batch, Outbox& outbox, int piece, int be
         sensor.sample(input_of(slot, snapshot), outbox);
         slot.passed_sample = -1;
       } else {
-        pass_over(slot, snapshot);
+        pass_over(k, snapshot);
       }
       slot.step = setup_.devices[k].first_step + slot.clock.step_of(++slot.sample);
     }
@@ -215,10 +216,19 @@ bool Module::needs_scenes(const ReadChannels* read) const {
   return false;
 }
 
-void Module::pass_over(Slot& slot, const Snapshot& snapshot) {
+void Module::reseed(size_t k, const std::vector<Reseeding>& reseedings, int64_t step) {
+  size_t& done = slots_[k].reseeded;
+  for (; done < reseedings.size() && reseedings[done].step <= step; ++done) {
+    if (auto& random = setup_.devices[k].random) random->reseed(reseedings[done].seed);
+  }
+}
+
+void Module::pass_over(size_t k, const Snapshot& snapshot) {
+  Slot& slot = slots_[k];
   if (!slot.passed_over) slot.passed_over = std::make_unique<Snapshot>();
   *slot.passed_over = snapshot;
   slot.passed_sample = slot.sample;
+  if (const auto& random = setup_.devices[k].random) slot.passed_seed = random->seed();
 }
 
 void Module::catch_up(int channel, Outbox& out) {
@@ -231,7 +241,11 @@ void Module::catch_up(int channel, Outbox& out) {
     SampleInput input = input_of(slot, *slot.passed_over);
     input.sample = slot.passed_sample;
     out.begin_step(slot.passed_over->step);
+    auto& random = setup_.devices[k].random;
+    const uint64_t seed = random ? random->seed() : 0;
+    if (random) random->reseed(slot.passed_seed);
     setup_.devices[k].sensor->sample(input, out);
+    if (random) random->reseed(seed);
     slot.passed_sample = -1;
   }
 }

@@ -8,6 +8,7 @@
 #include <atomic>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -49,6 +50,7 @@ struct Device {
   int64_t first_step = 0;    // its samples count from the time of this one
   std::string name = {};     // as its robot's faults name it
   std::vector<int> channels = {};
+  std::optional<RandomSource> random = {};  // the sensor's, to be reseeded
 };
 
 struct ModuleSetup {
@@ -131,11 +133,14 @@ class Module {
     std::shared_ptr<FaultFilter> faults = {};    // made when the device is first faulty
     std::unique_ptr<Snapshot> passed_over = {};  // what the last sample would have shown
     int64_t passed_sample = -1;                  // its number; -1: it was taken
+    uint64_t passed_seed = 0;                    // it would have drawn from
+    size_t reseeded = 0;                         // of the batches' reseedings, how many acted
   };
 
   Slot slot_of(const Device& device) const;
   bool is_read(const Device& device, const Slot& slot, const ReadChannels* read) const;
-  static void pass_over(Slot& slot, const Snapshot& snapshot);
+  void reseed(size_t k, const std::vector<Reseeding>& reseedings, int64_t step);
+  void pass_over(size_t k, const Snapshot& snapshot);
   void count_due();
   void process_pieces(const Batch& batch, Batch::Output& output, int begin, int end,
                       const std::atomic<bool>& left_off);

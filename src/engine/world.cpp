@@ -50,11 +50,21 @@ void World::advance(int64_t step, Snapshot& snapshot, Batch& batch) {
   if (step > 0) {
     faults_.before_commands(step - 1, *robots_);
     inbox_.apply(*robots_, faults_, step - 1, batch);  // on the state before
-    robots_->step();
   }
+  reseed(step);
+  if (step > 0) robots_->step();
   read(step, snapshot);
   batch.sensor_faults = faults_.of_sensors();
+  batch.reseedings = faults_.reseedings();
   physics::check_finite(snapshot, model_, layout_);
+}
+
+// Modules have their own time for it: with the batch that has the step.
+void World::reseed(int64_t step) {
+  const std::optional<uint64_t> seed = faults_.new_seed(step);
+  if (!seed) return;
+  options_.seed = *seed;  // of robots that come
+  robots_->reseed(*seed);
 }
 
 void World::read(int64_t step, Snapshot& snapshot) {

@@ -77,6 +77,7 @@ class World {
  private:
   InstanceIndex place(const std::string& name, const Pose& X_WM,
                       std::shared_ptr<const model::Model> model);
+  void reseed(int64_t step);
   void show_beginning(Fleet& fleet, int64_t step) const;
   void join(Fleet fleet);
   void join(ModuleSetup setup);

@@ -14,6 +14,7 @@ namespace ruedo::model {
 namespace {
 
 constexpr double kLongest_s = 1e6, kLongestDelay_s = 60.0, kFarthest_m = 1e6;
+constexpr double kLargestSeed = 1e15;  // every whole number up to it is a double
 
 [[noreturn]] void wrong(const std::string& text, const std::string& why) {
   throw InputError(
@@ -49,6 +50,7 @@ const std::vector<FaultKind>& fault_kinds() {
       {"commands_late", Of::robot, 1e-6, kLongestDelay_s, "s"},
       {"commands_doubled", Of::robot, 1e-6, kLongestDelay_s, "s until the second"},
       {"kidnapped", Of::robot, 0, 0, ""},
+      {"reseeded", Of::world, 0, kLargestSeed, "the seed"},
   };
   return kinds;
 }
@@ -89,7 +91,13 @@ std::string check_fault(const Fault& fault) {
         "target '{}' of {} is not allowed; allowed are left, right, or none for both", fault.target,
         kind->name);
   }
-  if (kind->of == FaultKind::Of::robot && !fault.target.empty())
+  if (kind->of == FaultKind::Of::world && fault.value != std::floor(fault.value))
+    return fmt::format("value {} of {} is not allowed; a seed is a whole number", fault.value,
+                       kind->name);
+  if (kind->of == FaultKind::Of::world && fault.duration_s > 0.0)
+    return kind->name + " has no duration: it lasts until the next";
+  if ((kind->of == FaultKind::Of::robot || kind->of == FaultKind::Of::world) &&
+      !fault.target.empty())
     return fmt::format("{} has no target, and '{}' is one", kind->name, fault.target);
   if (!(fault.from >= 0.0 && fault.from < fault.to && fault.to <= 1.0)) {
     return fmt::format(

@@ -23,7 +23,7 @@ struct Fault {
 };
 
 struct FaultKind {
-  enum class Of { device, wheels, robot };
+  enum class Of { device, wheels, robot, world };
   std::string name;
   Of of;
   double least, most;   // of the value; equal: it has none

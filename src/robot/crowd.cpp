@@ -212,6 +212,10 @@ Crowd::Crowd(const model::WorldModel& world, const model::BodyLayout& layout,
 
 Crowd::~Crowd() = default;
 
+void Crowd::reseed(uint64_t seed) {
+  for (const auto& group : groups_) group->random.reseed(seed);
+}
+
 void Crowd::gather(const model::BodyLayout& layout) {
   if (std::none_of(world_.models.begin(), world_.models.end(),
                    [](const auto& instance) { return is_person(*instance.model); }))

@@ -34,6 +34,7 @@ class Crowd {
 
   void add(InstanceIndex instance, const model::BodyLayout& layout);  // what they see from now on
   void remove(InstanceIndex instance);
+  void reseed(uint64_t seed);  // what people choose from now on
   void start_again(InstanceIndex instance, SimTime now);
   void shift_time(SimTime us) { thought_ -= us; }  // sim time was set back by so much
 

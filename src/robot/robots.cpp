@@ -31,6 +31,10 @@ class Robots::Impl {
   void set_twist(InstanceIndex instance, const Twist& twist);
   void start_again(InstanceIndex instance);
   SimTime set_time_to_zero();
+  void reseed(uint64_t seed) {
+    crowd_.reseed(seed);
+    wind_.reseed(seed);
+  }
 
   int64_t step_ = 0;
 
@@ -343,6 +347,7 @@ void Robots::set_pose(InstanceIndex instance, const Pose& X_WM) { impl_->set_pos
 void Robots::set_twist(InstanceIndex instance, const Twist& twist) {
   impl_->set_twist(instance, twist);
 }
+void Robots::reseed(uint64_t seed) { impl_->reseed(seed); }
 void Robots::start_again(InstanceIndex instance) { impl_->start_again(instance); }
 SimTime Robots::set_time_to_zero() { return impl_->set_time_to_zero(); }
 

@@ -62,6 +62,9 @@ class Robots {
 
   int64_t current_step() const;
 
+  // From the next step on people, and the wind, draw from that seed.
+  void reseed(uint64_t seed);
+
   // Changes between two steps; instance is an index into WorldModel::models.
   void add(InstanceIndex instance);               // the physics has it; the layout, too
   void remove(InstanceIndex instance);            // the physics has it no more

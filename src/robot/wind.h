@@ -21,6 +21,7 @@ class Wind {
 
   // m/s, world, at the end of that step; 0 is the start of the run.
   Vec3 at(int64_t step, SimTime step_us) const;
+  void reseed(uint64_t seed) { random_.reseed(seed); }
 
  private:
   model::Wind wind_;

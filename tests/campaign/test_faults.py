@@ -176,6 +176,163 @@ def test_a_command_does_what_the_option_does():
     assert len({tuple(m.ranges) for t, m in option["lrf"] if 1.0 <= t < 2.0}) == 1
 
 
+# ---- Another seed from a moment on. The robots stand: where a draw depends on the sample or the
+# step alone, what is measured from then on is what the other seed would have measured all along.
+
+INSTRUMENTS = """<static>true</static><pose>0 3 1 0 0 0</pose><link name='link'>
+<sensor name='eye' type='camera'><update_rate>10</update_rate><camera><horizontal_fov>1.2</horizontal_fov>
+<image><width>16</width><height>12</height></image><clip><near>0.05</near><far>50</far></clip>
+<noise><type>gaussian</type><mean>0</mean><stddev>0.05</stddev></noise></camera><ruedo:encoding>rgb</ruedo:encoding></sensor>
+<sensor name='pitot' type='air_speed'><update_rate>20</update_rate></sensor>
+<sensor name='imu' type='imu'><update_rate>50</update_rate><imu><angular_velocity><x><noise type='gaussian'>
+<stddev>0.1</stddev><bias_mean>1</bias_mean><bias_stddev>0.5</bias_stddev></noise></x></angular_velocity></imu></sensor>
+</link>"""
+WORLD = HALL.replace("<sdf ", "<sdf xmlns:ruedo='urn:ruedo' ").replace(
+    "</world>",
+    f"""<model name='mast'>{INSTRUMENTS}</model><wind><linear_velocity>5 0 0</linear_velocity></wind>
+<plugin filename='gz-sim-wind-effects-system' name='gz::sim::systems::WindEffects'><horizontal><magnitude>
+<time_for_rise>0</time_for_rise><noise><mean>0</mean><stddev>1</stddev></noise></magnitude></horizontal></plugin>
+<ruedo:crowd name='people'><ruedo:count>6</ruedo:count><ruedo:area>-8 -4 -2 4</ruedo:area></ruedo:crowd></world>""",
+)
+BY_SAMPLE = ["p3at/lrf", "p3at/sonar_front", "mast/eye", "mast/pitot"]  # or by step
+
+
+def standing(seed, *faults, send=None, seconds=3.0):
+    """{channel: [(step, bytes)]}; send: (step, fault_t)."""
+    with client.Engine(
+        "w", text=WORLD, seed=seed, disable=["p3at/camera"], fault=faults, record=True
+    ) as engine:
+        messages = list(engine.messages())
+        for step in [send[0]] if send else []:
+            engine.step(None, step)
+            messages += engine.messages()
+            engine.command(0, "p3at/fault", send[1])
+        engine.step(None, round(seconds / engine.dt) - engine.steps())
+        found = {}
+        for _, step, channel, data in [*messages, *engine.messages()]:
+            found.setdefault(channel, []).append((step, data))
+    return found
+
+
+def split(messages, step):
+    return [one for one in messages if one[0] < step], [one for one in messages if one[0] >= step]
+
+
+@pytest.fixture(scope="module")
+def seeds():
+    return {seed: standing(seed) for seed in (1, 7)}
+
+
+@pytest.mark.parametrize("by", ["option", "message"])
+def test_from_its_moment_on_every_draw_is_of_another_seed(seeds, by):
+    first = 300 if by == "option" else 251  # a message acts on a state: the next one shows it
+    how = {"send": (250, message("reseeded", value=7))} if by == "message" else {}
+    found = standing(1, *([":reseeded@1.5,value=7"] if by == "option" else []), **how)
+    assert found.keys() == seeds[1].keys()
+    for channel in found:
+        assert split(found[channel], first)[0] == split(seeds[1][channel], first)[0], channel
+    for channel in BY_SAMPLE:
+        shown = first + (100 if "sonar" in channel else 0)  # transducers are measured in turn
+        ours, before, other = (split(one[channel], shown)[1] for one in (found, seeds[1], seeds[7]))
+        assert ours == other != before and len(ours) > 10, channel
+    for channel in ("mast/imu", "ruedo/world"):  # with a past: a bias, people where they are
+        ours, before, other = (
+            split(one[channel], first + 100)[1] for one in (found, seeds[1], seeds[7])
+        )
+        assert ours != before and ours != other, channel
+
+
+def test_equal_branches_are_equal_and_the_last_of_two_seeds_holds(seeds):
+    one, two = (standing(1, ":reseeded@1,value=7") for _ in range(2))
+    assert one == two
+    there_and_back = standing(1, ":reseeded@2,value=1", ":reseeded@1,value=7")
+    for channel in BY_SAMPLE:
+        assert split(there_and_back[channel], 400)[0] == split(one[channel], 400)[0]
+        shown = 400 + (100 if "sonar" in channel else 0)
+        assert split(there_and_back[channel], shown)[1] == split(seeds[1][channel], shown)[1]
+
+
+def test_lost_commands_are_others_from_then_on():
+    def way(*faults):
+        return [m.encode() for _, m in run("p3at:commands_lost@0,value=0.5", *faults)["pose"]]
+
+    same, other = way(), way("p3at:reseeded@1.5,value=7")
+    moment = same.index(next(a for a, b in zip(same, other) if a != b))
+    assert len(same) == len(other) and moment >= len(same) // 2
+
+
+def test_a_picture_that_is_read_late_is_of_the_seed_of_its_moment():
+    """Another device's fault has the camera look at each step from then on."""
+    with client.Engine(
+        "w", text=WORLD, disable=["p3at/camera"], fault=["p3at:reseeded@0.35,value=7"]
+    ) as late:
+        late.step(None, 65)
+        late.command(0, "p3at/fault", message("freeze", "lrf"))
+        late.step(None, 14)  # the newest picture is of 0.3 s
+        assert late["eye.utime"][0, 0] == 300_000
+        drawn = late["eye.data"].tobytes()
+        late.step(None, 2)
+        later = late["eye.data"].tobytes()
+    assert drawn in dict(standing(1, seconds=0.4)["mast/eye"])[60]
+    assert later in dict(standing(7, seconds=0.4)["mast/eye"])[80]
+
+
+def test_a_robot_that_comes_and_time_that_begins_anew_have_the_new_seed(tmp_path):
+    (tmp_path / "w.sdf").write_text(HALL)
+
+    def scans(seed, begin, log):
+        with client.launch(
+            tmp_path / "w.sdf",
+            lockstep=True,
+            seed=seed,
+            disable=DISABLED,
+            args=["--record", str(log)],
+        ) as sim:
+            sim.step(50, [sim.robot("p3at").fault_command("reseeded", value=begin)])
+            late = sim.spawn("p3at", 0.0, 2.0, name="late")
+            found = []
+            for times in range(2):
+                for _ in range(10):
+                    seen = sim.step(20)
+                    found += [
+                        list(seen.latest(one.lrf).ranges)
+                        for one in (sim.robot("p3at"), sim.robot(late))
+                    ]
+                if times == 0:
+                    sim.reset("time")
+        assert "repeated byte for byte" in ruedo("verify", log, folder=tmp_path).stdout
+        return found
+
+    assert scans(1, 7, tmp_path / "one.lcm") == scans(7, 7, tmp_path / "two.lcm")
+
+
+def test_another_seed_is_in_the_log_and_repeats(tmp_path):
+    (tmp_path / "w.sdf").write_text(WORLD)
+    option = (
+        "--fault",
+        "p3at:reseeded@1,value=7",
+        "--fault",
+        "p3at:reseeded@2,value=123456789012345",
+    )
+    ruedo(
+        "run",
+        "w.sdf",
+        "--rate",
+        "max",
+        "--duration",
+        "3",
+        "--record",
+        "w.lcm",
+        *option,
+        folder=tmp_path,
+    )
+    for threads in ("1", "2"):
+        assert (
+            "repeated byte for byte"
+            in ruedo("verify", "w.lcm", "--threads", threads, folder=tmp_path).stdout
+        )
+
+
 WRONG = [
     (
         "p3at/lrf:freze@1",
@@ -194,6 +351,10 @@ WRONG = [
     ),
     ("p3at/lrf:blocked@1,from=0.7,to=0.2", "the smaller first"),
     ("p3at:freeze@1", "freeze needs a device"),
+    ("p3at:reseeded@1,value=1.5", "value 1.5 of reseeded is not allowed; a seed is a whole number"),
+    ("p3at:reseeded@1,value=-1", "value -1 of reseeded is not allowed; allowed are 0 to 1e.15"),
+    ("p3at:reseeded@1,for=2", "reseeded has no duration"),
+    ("p3at/lrf:reseeded@1", "reseeded has no target, and 'lrf' is one"),
 ]
 
 

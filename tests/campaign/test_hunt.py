@@ -7,10 +7,13 @@ import re
 import subprocess
 import sys
 
+import numpy as np
 import pytest
 import yaml
 from conftest import PATIENCE, SOURCE, ruedo
+from ruedo import Engine, World
 from ruedo.hunt import Hunt
+from ruedo.lcmtypes import move_command_t
 
 EXAMPLE = SOURCE / "docs/campaign-example"
 
@@ -106,6 +109,97 @@ def test_trusts_a_frozen_scan_and_the_find_is_kept_as_a_test(example):
     assert done.returncode == 0, done.stdout
     done = subprocess.run(ctest, cwd=folder, capture_output=True, text=True, timeout=PATIENCE)
     assert done.returncode == 0, done.stdout
+
+
+LUCKY = """
+import numpy as np
+
+
+class Lucky:
+    \"\"\"At 2 s it tosses a coin, the last bit of a noisy range, and drives into the wall or stays.\"\"\"
+
+    def __init__(self, bad):
+        self.bad, self.bit = bad, None
+
+    def __call__(self, view):
+        if view.time < 2.0 - 1e-9:
+            return 0.0, 0.0
+        if self.bit is None:
+            self.bit = int(view["lrf.ranges"][90:91].view(np.uint32)[0]) & 1
+        return (0.8 if self.bit == self.bad else 0.0), 0.0
+"""
+DISABLED = ["p3at/camera", "p3at/sonar_front", "p3at/sonar_rear"]
+
+
+def test_why_branches_to_other_seeds_from_a_moment_on(tmp_path):
+    """The robot stands until the toss: the coin of a seed is the same in a branch to it as in a run
+    of its own. So it is known which seeds avoid it from 2 s on; from 2.25 s on none does."""
+    world = tmp_path / "wall.sdf"
+    world.write_text(str(World("wall").wall(1.5, -2, 1.5, 2).robot("p3at")))
+    (tmp_path / "lucky.py").write_text(LUCKY)
+    coins = {}
+    for seed in range(1, 8):
+        with Engine(world, seed=seed, disable=DISABLED) as engine:
+            engine.observe("lrf.ranges")
+            engine.step(None, round(2.0 / engine.dt))
+            ranges = np.asarray(engine.observe("lrf.ranges"))[0, 0]
+            coins[seed] = int(ranges[90:91].view(np.uint32)[0]) & 1
+    bad = coins[1]
+    saved = sum(coins[seed] != bad for seed in range(2, 8))
+    assert 0 < saved < 6
+    campaign = {
+        "name": "toss",
+        "worlds": [{"name": "wall", "file": "wall.sdf"}],
+        "controllers": [{"name": "lucky", "python": "lucky.py:Lucky"}],
+        "parameters": {"bad": [bad]},
+        "disable": DISABLED,
+        "expect": {"no_contact": True},
+        "limits": {"duration": 5},
+    }
+    (tmp_path / "toss.yaml").write_text(yaml.safe_dump(campaign))
+    ruedo("campaign", "run", "toss.yaml", "--quiet", folder=tmp_path, code=1)
+    log = next((tmp_path / "toss.campaign/logs").iterdir())
+    text = ruedo("why", log, "--seeds", "6", "-o", "why.svg", folder=tmp_path).stdout
+    assert f"{saved} of 6 other seeds from 2 s on avoid it\n" in text
+    assert "0 of 6 other seeds from 2.25 s on avoid it\n" in text
+    found = json.loads(ruedo("why", log, "--seeds", "6", "--json", folder=tmp_path).stdout)["seeds"]
+    assert found == sorted(found, key=lambda one: -one["from_s"])
+    assert {one["tried"] for one in found} == {6}
+    for one in found:
+        assert one["avoided"] == (saved if one["from_s"] <= 2.0 else 0), one
+    assert "other seeds" in (tmp_path / "why.svg").read_text()
+    assert "--seeds" in ruedo("why", log, "--seeds", "-1", folder=tmp_path, code=2).stderr
+
+
+def test_why_branches_a_log_of_no_campaign_with_the_same_commands(tmp_path):
+    """One command, at 2 s, would drive the robot into the wall, and half of all commands are lost:
+    in a branch to a seed the same ones as in a run of its own."""
+    world = tmp_path / "wall.sdf"
+    world.write_text(str(World("wall").wall(1.0, -2, 1.0, 2).robot("p3at")))
+    ahead = move_command_t()
+    ahead.kind, ahead.value, ahead.speed = ahead.ADVANCE, 2.0, 0.5
+
+    def run(seed, log=""):
+        """Whether it touched the wall."""
+        with Engine(
+            world, seed=seed, disable=DISABLED, fault=["p3at:commands_lost@0,value=0.5"]
+        ) as engine:
+            engine.begin_run(seed, no_contact=True, log=str(log))
+            engine.step(None, round(2.0 / engine.dt))
+            engine.command(0, "p3at/move", ahead)
+            engine.step(None, round(4.0 / engine.dt))
+            return bool(engine.end_run()["failures"])
+
+    touched = {seed: run(seed) for seed in range(1, 8)}
+    failed = next(seed for seed in touched if touched[seed])
+    log = tmp_path / "run.lcm"
+    assert run(failed, log)
+    others = [seed for seed in range(1, 7) if seed != failed][:5]
+    saved = sum(not touched[seed] for seed in others)
+    assert saved > 0
+    text = ruedo("why", log, folder=tmp_path).stdout
+    assert f"{saved} of 5 other seeds from 2 s on avoid it\n" in text
+    assert "0 of 5 other seeds from 2.25 s on avoid it\n" in text
 
 
 def test_a_sound_controller_is_told_to_be_one(example):

@@ -160,6 +160,23 @@ TEST(RandomSource, IsKeyedBySeedRobotDeviceAndSample) {
 }
 
 // Correlation between neighbours of every kind: within 99.9 % of what independent normals give.
+TEST(RandomSource, ReseededItIsWhatItWouldHaveBeenFromTheStart) {
+  RandomSource source(1, "p3at", "lrf");
+  const RandomSource copy = source;
+  RandomStream begun = source.stream(5);
+  const uint32_t first = begun.bits();
+  source.reseed(7);
+  EXPECT_EQ(source.seed(), 7u);
+  EXPECT_EQ(copy.stream(5).bits(), RandomSource(7, "p3at", "lrf").stream(5).bits());
+  EXPECT_NE(copy.stream(5).bits(), first);
+  // What was begun goes on.
+  RandomStream same = RandomSource(1, "p3at", "lrf").stream(5);
+  same.bits();
+  EXPECT_EQ(begun.bits(), same.bits());
+  source.reseed(1);
+  EXPECT_EQ(copy.stream(5).bits(), first);
+}
+
 TEST(RandomSource, NeighboursAreIndependent) {
   constexpr int kSamples = 20000;
   const RandomSource a(1, "p3at_1", "IMU"), b(1, "p3at_2", "IMU"), c(1, "p3at_1", "IMU2"),

@@ -114,7 +114,10 @@ class Space:
         made = dict(self.faults[int(which)])
         earliest = _FIRST_MESSAGES_S if made["kind"] == "dropout" else 0.0
         made.setdefault("at", _rounded(max(choices["fault_at"], earliest)))
-        if choices["fault_for"] < self._duration and made["kind"] != "kidnapped":
+        if choices["fault_for"] < self._duration and made["kind"] not in (
+            "kidnapped",
+            "reseeded",
+        ):
             made.setdefault("duration", _rounded(choices["fault_for"]))
         if made["kind"] in _VALUES and "value" not in made:
             low, high = _VALUES[made["kind"]]

@@ -8,14 +8,14 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Iterator
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterator
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from ..campaign.case import Runner
+from ..campaign.case import Runner, fault_text
 from ..campaign.errors import CampaignError, SpecError
 from ..engine import Engine
 
@@ -29,7 +29,6 @@ MANOEUVRES = {
 _PERIOD_S = 0.25  # between moments that are tried
 _AFTER_S = 3.0  # how long a branch goes on after the run failed
 _MOST = 80  # moments
-_SEEDS = 5  # others that are tried
 
 
 @dataclass
@@ -114,14 +113,27 @@ def _options(texts: list[str], path: str) -> dict[str, Any]:
 
 
 @dataclass
+class Branches:
+    """How many of the other seeds that acted from a moment on avoided it."""
+
+    from_s: float
+    avoided: int
+    tried: int
+
+    def __str__(self) -> str:
+        return f"{self.avoided} of {self.tried} other seeds from {self.from_s:g} s on avoid it"
+
+
+@dataclass
 class Answer:
-    """failed_s: when. rescues: of each manoeuvre and moment, whether it saved the run. changes:
-    what was changed, and what came of it.
+    """failed_s: when. rescues: of each manoeuvre and moment, whether it saved the run. seeds: the
+    latest moment first. changes: what was changed, and what came of it.
     """
 
     failed_s: float
     reason: str
     rescues: dict[str, list[tuple[float, bool]]] = field(default_factory=dict)
+    seeds: list[Branches] = field(default_factory=list)
     changes: list[tuple[str, bool, str]] = field(default_factory=list)
 
     @property
@@ -142,23 +154,30 @@ class Answer:
                 else f"it could be avoided up to {at:g} s ({' or '.join(best)}), {self.failed_s - at:.2f} s before it happened; "
                 f"from {at + _PERIOD_S:g} s on no more"
             )
+        lines += map(str, self.seeds)
         for what, good, reason in self.changes:
             lines.append(
                 f"{'avoids it' if good else 'does not'}: {what}" + ("" if good else f" ({reason})")
             )
         return "\n".join(lines)
 
+    def as_dict(self) -> dict[str, Any]:
+        return {**asdict(self), "too_late_s": self.too_late_s}
 
-def why(path: str) -> Answer:
+
+def why(path: str, seeds: int = 5) -> Answer:
     """Of a log that a campaign kept, or another one of a run in which the first robot touched
-    something.
+    something. seeds: how many others are tried.
     """
     recorded = Recorded.read(path)
     case = _case_of(path)
     answer = _as_it_was(recorded, case)
     if "touched" in answer.reason:
         answer.rescues = _rescues(recorded, answer.failed_s)
-    answer.changes = list(_changes(recorded, case, answer.failed_s))
+    others = [seed for seed in range(1, seeds + 2) if seed != recorded.seed][:seeds]
+    if others:
+        answer.seeds = _branches(recorded, case, answer.failed_s, others)
+    answer.changes = list(_changes(recorded, case, answer.failed_s, others))
     return answer
 
 
@@ -236,8 +255,56 @@ def _rescues(recorded: Recorded, failed_s: float) -> dict[str, list[tuple[float,
     return found
 
 
+def _branches(
+    recorded: Recorded, case: tuple[Any, Any] | None, failed_s: float, seeds: list[int]
+) -> list[Branches]:
+    """From moments on that lie 1, 2, 4, ... periods further back, until all seeds avoid it or the
+    run is at its beginning; then between the last moment that one of them avoids it from and the
+    next.
+    """
+    avoids = _controlled(case) if case else _recorded_commands(recorded)
+    found: dict[int, Branches] = {}
+
+    def try_from(period: int) -> Branches:
+        moment = period * _PERIOD_S
+        good = sum(avoids({"kind": "reseeded", "at": moment, "value": seed}) for seed in seeds)
+        return found.setdefault(period, Branches(moment, good, len(seeds)))
+
+    period = max(0, round(failed_s / _PERIOD_S) - 1)
+    back = 1
+    while try_from(period).avoided < len(seeds) and period > 0:
+        period, back = max(0, period - back), 2 * back
+    saved = [period for period, one in found.items() if one.avoided]
+    if saved:
+        low = max(saved)
+        high = min((period for period in found if period > low), default=low)
+        while high - low > 1:
+            middle = (low + high) // 2
+            low, high = (middle, high) if try_from(middle).avoided else (low, middle)
+    return [found[period] for period in sorted(found, reverse=True)]
+
+
+def _controlled(case: tuple[Any, Any]) -> Callable[[dict[str, Any]], bool]:
+    """Whether the case, its controller answering, passes with another fault."""
+    campaign, one = case
+    runner = Runner(str(campaign.folder))
+
+    def avoids(fault: dict[str, Any]) -> bool:
+        return runner.run({**one.what, "faults": [*one.what["faults"], fault]}).status == "passed"
+
+    return avoids
+
+
+def _recorded_commands(recorded: Recorded) -> Callable[[dict[str, Any]], bool]:
+    def avoids(fault: dict[str, Any]) -> bool:
+        faults = [*recorded.options["fault"], fault_text(fault)]
+        return _open_loop(recorded, "", fault=faults)[1]
+
+    return avoids
+
+
 def _changes(
-    recorded: Recorded, case: tuple[Any, Any] | None, failed_s: float
+    recorded: Recorded, case: tuple[Any, Any] | None, failed_s: float, seeds: list[int]
 ) -> Iterator[tuple[str, bool, str]]:
     """Each alone; of a fault also the latest moment at which its end is soon enough. Of a
     campaign's case the controller answers to the change; of another log the commands stay as they
@@ -263,7 +330,8 @@ def _changes(
         without = tried(f"without the fault {fault['kind']}", faults=faults[:i] + faults[i + 1 :])
         yield without
         begin = float(fault.get("at", 0.0))
-        for moment in _moments(failed_s) if without[1] and fault["kind"] != "kidnapped" else ():
+        at_once = fault["kind"] in ("kidnapped", "reseeded")
+        for moment in _moments(failed_s) if without[1] and not at_once else ():
             if moment <= begin:
                 break
             ended = {**fault, "duration": moment - begin}
@@ -275,7 +343,7 @@ def _changes(
             if found[1]:
                 yield found
                 break
-    for seed in [number for number in range(1, _SEEDS + 2) if number != one.seed][:_SEEDS]:
+    for seed in seeds:
         yield tried(f"seed {seed}", seed=seed)
     if one.what["noise"]:
         yield tried("without noise", noise=False)
@@ -295,7 +363,10 @@ def plot(answer: Answer, file: str) -> None:
 
     drawn = new_figure(6.4, 2.6)
     axes = drawn.add_subplot()
-    for row, (_name, tries) in enumerate(answer.rescues.items()):
+    rows = dict(answer.rescues)
+    if answer.seeds:
+        rows["other seeds"] = [(one.from_s, one.avoided > 0) for one in answer.seeds]
+    for row, tries in enumerate(rows.values()):
         for good, mark, colour in ((True, "o", "#3b8f4a"), (False, "x", "#c23b22")):
             times = [at for at, saved in tries if saved == good]
             axes.plot(
@@ -305,10 +376,14 @@ def plot(answer: Answer, file: str) -> None:
                 color=colour,
                 label=("avoids it" if good else "does not") if row == 0 else None,
             )
+    for one in answer.seeds:
+        at = (one.from_s, len(rows) - 1)
+        text = f"{one.avoided}/{one.tried}"
+        axes.annotate(text, at, (0, 5), textcoords="offset points", fontsize=7, ha="center")
     axes.axvline(answer.failed_s, color="#1d2330", linewidth=1)
-    axes.text(answer.failed_s, len(answer.rescues) - 0.4, " failed", fontsize=8)
-    axes.set_yticks(range(len(answer.rescues)), list(answer.rescues))
-    axes.set_ylim(-0.6, len(answer.rescues) - 0.1)
+    axes.text(answer.failed_s, len(rows) - 0.4, " failed", fontsize=8)
+    axes.set_yticks(range(len(rows)), list(rows))
+    axes.set_ylim(-0.6, len(rows) - 0.1)
     axes.set_xlabel("from this moment on (s)")
     axes.legend(frameon=False, loc="lower left", ncols=2)
     drawn.savefig(file, metadata={"Date": None} if file.endswith(".svg") else None)

@@ -6,6 +6,8 @@ import argparse
 import json
 from typing import Any
 
+_MOST_SEEDS = 1000
+
 
 def add_why(commands: Any) -> None:
     one = commands.add_parser(
@@ -17,26 +19,23 @@ def add_why(commands: Any) -> None:
     one.set_defaults(action=_why)
     one.add_argument("LOG")
     one.add_argument("-o", "--output", metavar="FILE", help="a plot: .svg, .png or .pdf")
+    one.add_argument(
+        "--seeds", type=_count, default=5, metavar="N", help="other seeds to try (default 5)"
+    )
     one.add_argument("--json", action="store_true")
+
+
+def _count(text: str) -> int:
+    if not text.isdigit() or int(text) > _MOST_SEEDS:
+        raise argparse.ArgumentTypeError(f"'{text}' is not allowed; allowed are 0 to {_MOST_SEEDS}")
+    return int(text)
 
 
 def _why(arguments: argparse.Namespace) -> int:
     from .why import plot, why
 
-    answer = why(arguments.LOG)
-    if arguments.output and answer.rescues:
+    answer = why(arguments.LOG, arguments.seeds)
+    if arguments.output and (answer.rescues or answer.seeds):
         plot(answer, arguments.output)
-    print(
-        json.dumps(
-            {
-                "failed_s": answer.failed_s,
-                "reason": answer.reason,
-                "too_late_s": answer.too_late_s,
-                "rescues": answer.rescues,
-                "changes": answer.changes,
-            }
-        )
-        if arguments.json
-        else answer.text()
-    )
+    print(json.dumps(answer.as_dict()) if arguments.json else answer.text())
     return 0
