@@ -1,6 +1,7 @@
 """What a message costs by LCM and by --ros2: a hundred P3-ATs, processor time of the server (user
 and system, which other load hardly changes) for each message that goes out. Then how fast a
-controller over plain DDS drives the arena's robot, for which the run waits (--wait-for).
+controller over plain DDS drives the arena's robot, for which the run waits (--wait-for): without
+its camera (640 x 480, 15 Hz), with a camera that nobody reads, with one that is read.
 
 bench_ros2.py [SECONDS] [ROUNDS]      RUEDO names the program; needs cyclonedds from PyPI
 
@@ -57,6 +58,18 @@ while True:
     time.sleep(1)
 """
 
+PICTURES = (
+    READER[: READER.index("for name")]
+    + """
+@dataclass
+class Image(IdlStruct, typename="sensor_msgs::msg::dds_::Image_"):
+    first: uint8
+reader = DataReader(participant, Topic(participant, "rt/image_raw", Image), qos=qos)
+while True:
+    time.sleep(1)
+"""
+)
+
 
 @dataclass
 class Way:
@@ -106,6 +119,9 @@ def messages(world: Path, folder: Path, seconds: float) -> dict[str, int]:
 
 
 def main() -> None:
+    if sys.argv[1:] == ["driven"]:
+        report_driven()
+        return
     seconds = float(sys.argv[1]) if len(sys.argv) > 1 else 10.0
     rounds = int(sys.argv[2]) if len(sys.argv) > 2 else 3
     with tempfile.TemporaryDirectory() as name:
@@ -126,15 +142,26 @@ def main() -> None:
                     reader.kill()
                     reader.wait()
     report(spent, counts, seconds)
-    factor, cpu_s = driven(60)
-    print(f"a controller of 10 Hz: {factor:.0f} times real time, {cpu_s:.1f} s of CPU for 60 s")
+    report_driven()
 
 
-def driven(seconds: int) -> tuple[float, float]:
+def report_driven() -> None:
+    """Also by itself: `bench_ros2.py driven`."""
+    for camera, seconds in (("off", 60), ("unread", 60), ("read", 20)):
+        factor, cpu_s = driven(seconds, camera)
+        print(
+            f"a controller of 10 Hz, the camera {camera:6}: {factor:5.1f} times real time, "
+            f"{cpu_s / seconds * 1e3:6.1f} ms of CPU a second of sim time"
+        )
+
+
+def driven(seconds: int, camera: str) -> tuple[float, float]:
     """Times real time, and processor time in s, of a run that waits for a controller."""
+    arguments = [sys.executable, "-c", PICTURES, str(DOMAIN)]
+    reader = subprocess.Popen(arguments) if camera == "read" else None
     command = [RUEDO, "run", SOURCE / "worlds/arena.sdf", "--ros2", "--rate", "max", "--quiet"]
     command += ["--duration", str(seconds), "--lcm", "memq://", "--wait-for", "/cmd_vel@10"]
-    command += ["--disable=p3at/camera"]
+    command += ["--disable=p3at/camera"] if camera == "off" else []
     process = subprocess.Popen(
         [str(word) for word in command],
         env={**os.environ, "ROS_DOMAIN_ID": str(DOMAIN)},
@@ -150,8 +177,9 @@ def driven(seconds: int) -> tuple[float, float]:
     begin = time.monotonic()
     _, status, usage = os.wait4(process.pid, 0)
     wall = time.monotonic() - begin
-    controller.kill()
-    controller.wait()
+    for process in filter(None, (controller, reader)):
+        process.kill()
+        process.wait()
     if status != 0:
         sys.exit(f"with a controller: the run ended with status {status}")
     return seconds / wall, usage.ru_utime + usage.ru_stime

@@ -68,7 +68,7 @@ void export_bag(const ExportArguments& arguments, const log::Index& index,
   for (const std::string& text : arguments.remaps) options.topics.push_back(parse_remap(text));
   Rosbag bag(without_slash(arguments.bag), options);
   const uint64_t read = read_log(arguments.log, index, worlds, bag);
-  bag.finish();
+  bag.finish(index.header(), arguments.log);
   fmt::print(
       "{}: {} messages of {}, as {} of ROS 2's types; {} are of types that ROS 2 has no message "
       "for\n",

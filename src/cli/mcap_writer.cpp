@@ -23,6 +23,8 @@ enum class Op : uint8_t {
   chunk = 6,
   message_index = 7,
   chunk_index = 8,
+  attachment = 9,
+  attachment_index = 10,
   statistics = 11,
   summary_offset = 14,
   data_end = 15,
@@ -165,6 +167,70 @@ void McapWriter::end_chunk() {
   index_.clear();
 }
 
+void McapWriter::add_attachment(const std::string& name, const std::string& media_type,
+                                const std::string& path) {
+  end_chunk();
+  std::error_code error;
+  const uint64_t size = std::filesystem::file_size(path, error);
+  const std::unique_ptr<std::FILE, Close> file(error ? nullptr : std::fopen(path.c_str(), "rb"));
+  if (!file) throw EnvironmentError(path + " cannot be read: " + std::strerror(errno));
+  std::string fields;
+  put(fields, uint64_t{0});  // logged: from the beginning on
+  put(fields, uint64_t{0});  // when it was made is no part of a bag's bytes
+  put_text(fields, name);
+  put_text(fields, media_type);
+  put(fields, size);
+  const uint64_t offset = offset_;
+  std::string head(1, static_cast<char>(Op::attachment));
+  put(head, static_cast<uint64_t>(fields.size() + size + sizeof(uint32_t)));
+  write(head);
+  write(fields);
+  uint32_t crc = crc_of(fields);
+  std::vector<char> part(kChunkSize);
+  for (uint64_t left = size; left > 0;) {
+    const size_t count =
+        std::fread(part.data(), 1, std::min<uint64_t>(left, part.size()), file.get());
+    if (count == 0) throw EnvironmentError(path + " became shorter while it was read");
+    write({part.data(), count});
+    crc = crc_of({part.data(), count}, crc);
+    left -= count;
+  }
+  std::string end;
+  put(end, crc);
+  write(end);
+  attachments_.push_back({name, media_type, offset, offset_ - offset, size});
+}
+
+std::vector<std::string> McapWriter::chunk_indexes() const {
+  std::vector<std::string> indexes;
+  for (const ChunkIndex& chunk : chunks_) {
+    std::string fields;
+    for (const uint64_t value : {chunk.begin_ns, chunk.end_ns, chunk.offset, chunk.size})
+      put(fields, value);
+    put_map(fields, chunk.index_offsets);
+    put(fields, chunk.index_size);
+    put_text(fields, "");
+    put(fields, chunk.records_size);
+    put(fields, chunk.records_size);
+    indexes.push_back(record(Op::chunk_index, fields));
+  }
+  return indexes;
+}
+
+std::vector<std::string> McapWriter::attachment_indexes() const {
+  std::vector<std::string> indexes;
+  for (const Attachment& attachment : attachments_) {
+    std::string fields;
+    for (const uint64_t value : {attachment.offset, attachment.size, uint64_t{0}, uint64_t{0}})
+      put(fields, value);
+    put(fields, attachment.data_size);
+    put_text(fields, attachment.name);
+    put_text(fields, attachment.media_type);
+    indexes.push_back(record(Op::attachment_index, fields));
+  }
+  return indexes;
+}
+
 void McapWriter::write_summary() {
   const uint64_t begin = offset_;
   std::string offsets;
@@ -185,26 +251,15 @@ void McapWriter::write_summary() {
   put(statistics, messages_);
   put(statistics, static_cast<uint16_t>(schemas_.size()));
   put(statistics, static_cast<uint32_t>(channels_.size()));
-  put(statistics, uint32_t{0});  // attachments
+  put(statistics, static_cast<uint32_t>(attachments_.size()));
   put(statistics, uint32_t{0});  // metadata
   put(statistics, static_cast<uint32_t>(chunks_.size()));
   put(statistics, begin_ns_);
   put(statistics, end_ns_);
   put_map(statistics, counts_);
   group(Op::statistics, {record(Op::statistics, statistics)});
-  std::vector<std::string> indexes;
-  for (const ChunkIndex& chunk : chunks_) {
-    std::string fields;
-    for (const uint64_t value : {chunk.begin_ns, chunk.end_ns, chunk.offset, chunk.size})
-      put(fields, value);
-    put_map(fields, chunk.index_offsets);
-    put(fields, chunk.index_size);
-    put_text(fields, "");
-    put(fields, chunk.records_size);
-    put(fields, chunk.records_size);
-    indexes.push_back(record(Op::chunk_index, fields));
-  }
-  group(Op::chunk_index, indexes);
+  group(Op::chunk_index, chunk_indexes());
+  group(Op::attachment_index, attachment_indexes());
   const uint64_t offsets_begin = offset_;
   write(offsets);
   std::string footer;

@@ -32,6 +32,9 @@ class McapWriter {
   uint16_t add_channel(uint16_t schema, const std::string& topic, const std::string& encoding,
                        const Metadata& metadata = {});
   void add_message(uint16_t channel, uint64_t time_ns, std::string_view data);
+  // A file, whole. No message may follow.
+  void add_attachment(const std::string& name, const std::string& media_type,
+                      const std::string& path);
   void finish();
 
   uint64_t messages() const { return messages_; }
@@ -45,9 +48,16 @@ class McapWriter {
     std::map<uint16_t, uint64_t> index_offsets;
   };
 
+  struct Attachment {
+    std::string name, media_type;
+    uint64_t offset, size, data_size;
+  };
+
   void write(std::string_view bytes);
   void end_chunk();
   void write_summary();
+  std::vector<std::string> chunk_indexes() const;
+  std::vector<std::string> attachment_indexes() const;
 
   std::string path_;
   struct Close {
@@ -63,6 +73,7 @@ class McapWriter {
   std::map<uint16_t, std::vector<IndexEntry>> index_;
   uint64_t chunk_begin_ns_ = 0, chunk_end_ns_ = 0, begin_ns_ = 0, end_ns_ = 0, messages_ = 0;
   std::vector<ChunkIndex> chunks_;
+  std::vector<Attachment> attachments_;
   bool finished_ = false;
 };
 

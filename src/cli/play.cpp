@@ -10,6 +10,7 @@
 #include <fmt/format.h>
 
 #include "bus/lcm_bus.h"
+#include "cli/bag_log.h"
 #include "cli/commands.h"
 #include "cli/extensions.h"
 #include "cli/sandboxed.h"
@@ -48,12 +49,13 @@ bool sleep_until(Clock::time_point time) {
   return false;
 }
 
-int view(const PlayArguments& arguments, double speed) {
+int view(const PlayArguments& arguments, const std::string& log, const std::string& other,
+         double speed) {
   if (!std::isfinite(speed)) throw InputError({}, "--speed max: with --view a number is wanted");
   if (!arguments.lcm.empty())
     throw InputError(
         {}, "--lcm goes not with --view: the page shows the log, and nothing is published");
-  const auto serving = view_log(arguments.log, arguments.view, speed, arguments.other);
+  const auto serving = view_log(log, arguments.view, speed, other);
   while (!interrupted) std::this_thread::sleep_for(kLongestSleep);
   return kGood;
 }
@@ -64,10 +66,11 @@ int play(const PlayArguments& arguments) {
   const double speed = parse_rate(arguments.speed);
   std::signal(SIGINT, [](int) { interrupted = 1; });
   std::signal(SIGTERM, [](int) { interrupted = 1; });
+  const BagLog first(arguments.log), second(arguments.other);  // as logs, where they are bags
   if (!arguments.html.empty())
-    return write_page(arguments.log, arguments.html, arguments.html_size), kGood;
-  if (arguments.viewed) return view(arguments, speed);
-  log::Reader log(arguments.log);
+    return write_page(first.log(), arguments.html, arguments.html_size), kGood;
+  if (arguments.viewed) return view(arguments, first.log(), second.log(), speed);
+  log::Reader log(first.log());
   bus::LcmBus bus(arguments.lcm);
   log::Event event;
   int64_t messages = 0;
@@ -97,7 +100,8 @@ void add_play(CLI::App& app, Action& chosen) {
   CLI::App* command =
       app.add_subcommand("play", "publish a log's messages again, or show them in the web console");
   const auto arguments = std::make_shared<PlayArguments>();
-  command->add_option("LOG", arguments->log, "a standard LCM log")->required();
+  command->add_option("LOG", arguments->log, "a standard LCM log, or a ROS 2 bag of ruedo export")
+      ->required();
   command->add_option("--speed", arguments->speed, "log time per real time, or max")
       ->type_name("S|max")
       ->capture_default_str();

@@ -9,6 +9,10 @@
 
 #include <fmt/format.h>
 
+#include "core/sha256.h"
+#include "log/header.h"
+#include "model/resources.h"
+#include "ros2/restore.h"
 #include "ruedo/decode.h"
 #include "ruedo/errors.h"
 #include "ruedo/world_info_t.hpp"
@@ -62,12 +66,16 @@ Rosbag::Rosbag(const std::string& folder, ros2::ConversionOptions options)
   if (error) throw EnvironmentError(folder_ + " cannot be made: " + error.message());
   file_ = fs::path(folder_).filename().string() + "_0.mcap";
   out_ = std::make_unique<McapWriter>((fs::path(folder_) / file_).string(), "ros2");
+  rest_file_ = (fs::path(folder_) / (std::string(".") + kRest)).string();
+  rest_ = std::make_unique<log::Writer>(rest_file_);
 }
 
 Rosbag::~Rosbag() {
   if (finished_) return;
   out_.reset();  // which removes its file
+  rest_.reset();
   std::error_code error;
+  fs::remove(rest_file_, error);
   fs::remove(folder_, error);
 }
 
@@ -97,31 +105,53 @@ void Rosbag::begin_scene(const run::LogWorlds::Scene& scene, uint64_t time_ns) {
 }
 
 void Rosbag::add(const std::string& channel, uint64_t time_ns, std::span<const uint8_t> message) {
-  const bool known = conversions_ && conversions_->convert(
-                                         channel, message, [](size_t) { return true; },
-                                         [&](size_t topic, std::span<const uint8_t> cdr) {
-                                           write(conversions_->topics()[topic], time_ns, cdr);
-                                         });
+  bool said = false;
+  const auto emit = [&](size_t index, std::span<const uint8_t> cdr) {
+    const ros2::Topic& topic = conversions_->topics()[index];
+    const bool says_all = !said && std::ranges::equal(ros2::restored(topic.type, cdr), message);
+    said |= write(topic, time_ns, cdr, says_all ? channel : "");
+  };
+  const bool known =
+      conversions_ && conversions_->convert(channel, message, [](size_t) { return true; }, emit);
   if (!known) ++left_out_;
+  if (!said)
+    rest_->write(static_cast<int64_t>(time_ns / 1000), channel, message.data(), message.size());
 }
 
-void Rosbag::write(const ros2::Topic& topic, uint64_t time_ns, std::span<const uint8_t> cdr) {
+bool Rosbag::write(const ros2::Topic& topic, uint64_t time_ns, std::span<const uint8_t> cdr,
+                   const std::string& says_all_of) {
   const auto [schema, first] = schemas_.try_emplace(topic.type);
   if (first)
     schema->second =
         out_->add_schema(topic.type, "ros2msg", ros2::full_text(topic.type, options_.distro));
-  const auto [at, fresh] = topics_.try_emplace(topic.name + " " + topic.type, Recorded{topic, 0});
+  const auto [at, fresh] =
+      topics_.try_emplace(topic.name + " " + topic.type, Recorded{topic, 0, says_all_of});
   if (fresh) {
-    at->second.channel = out_->add_channel(
-        schema->second, topic.name, "cdr",
-        {{"offered_qos_profiles", qos_profile(topic.qos, options_.distro, "") + "\n"},
-         {"topic_type_hash", ros2::type_hash(topic.type, options_.distro)}});
+    McapWriter::Metadata metadata{
+        {"offered_qos_profiles", qos_profile(topic.qos, options_.distro, "") + "\n"},
+        {"topic_type_hash", ros2::type_hash(topic.type, options_.distro)}};
+    if (!says_all_of.empty()) metadata[kChannel] = says_all_of;
+    at->second.channel = out_->add_channel(schema->second, topic.name, "cdr", metadata);
   }
   begin_ns_ = out_->messages() == 0 ? time_ns : std::min(begin_ns_, time_ns);
   end_ns_ = std::max(end_ns_, time_ns);
   out_->add_message(at->second.channel, time_ns,
                     {reinterpret_cast<const char*>(cdr.data()), cdr.size()});
   ++at->second.messages;
+  return !says_all_of.empty() && at->second.says_all_of == says_all_of;
+}
+
+// A log may be a stranger's: what is not its world's, with that content, is not looked at.
+void Rosbag::attach_files(log_header_t header, const std::string& log) {
+  std::vector<std::string> names;
+  for (const log_file_t& file : header.files) names.push_back(file.path);
+  log::find_files_again(header, log);
+  const model::ResourceFinder finder(header.world_file, false);
+  for (size_t i = 0; i < names.size(); ++i) {
+    const log_file_t& file = header.files[i];
+    if (finder.reaches(file.path) && sha256_of_file(file.path) == file.sha256)
+      out_->add_attachment(names[i], "application/octet-stream", file.path);
+  }
 }
 
 std::string Rosbag::metadata() const {
@@ -159,7 +189,13 @@ std::string Rosbag::metadata() const {
   return text;
 }
 
-void Rosbag::finish() {
+void Rosbag::finish(const std::optional<log_header_t>& header, const std::string& log) {
+  rest_->flush();
+  if (!rest_->error().empty()) throw EnvironmentError(rest_file_ + ": " + rest_->error());
+  out_->add_attachment(kRest, "application/x-lcm-log", rest_file_);
+  std::error_code error;
+  fs::remove(rest_file_, error);
+  if (header) attach_files(*header, log);
   out_->finish();
   const fs::path path = fs::path(folder_) / "metadata.yaml";
   std::ofstream file(path);

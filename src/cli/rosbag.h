@@ -1,5 +1,9 @@
 // A log as a ROS 2 bag: a folder with an MCAP file of CDR messages and the metadata.yaml by which
 // rosbag2 finds it.
+//
+// Beside the topics, as attachments, which readers of ROS pass over, lies what no topic says in
+// full: a log of those messages (kRest), and the files that the world was made from. From all of it
+// BagLog makes the log again.
 #pragma once
 
 #include <cstdint>
@@ -12,7 +16,9 @@
 #include <vector>
 
 #include "cli/mcap_writer.h"
+#include "log/writer.h"
 #include "ros2/conversions.h"
+#include "ruedo/log_header_t.hpp"
 #include "run/log_worlds.h"
 
 namespace ruedo::cli {
@@ -29,7 +35,12 @@ class Rosbag {
   // A message as it came; one that ROS has no type for, or that is damaged, is left out and
   // counted.
   void add(const std::string& channel, uint64_t time_ns, std::span<const uint8_t> message);
-  void finish();
+  // header: of the log, whose file is `log`; files of it that are gone or changed are left out.
+  void finish(const std::optional<log_header_t>& header, const std::string& log);
+
+  // Of the attachment, and of a topic's metadata: the bus's channel whose messages it says in full.
+  static constexpr const char* kRest = "run.lcm";
+  static constexpr const char* kChannel = "ruedo_channel";
 
   uint64_t messages() const { return out_->messages(); }
   uint64_t left_out() const { return left_out_; }
@@ -38,16 +49,22 @@ class Rosbag {
   struct Recorded {
     ros2::Topic topic;
     uint16_t channel;
+    std::string says_all_of;  // a channel of the bus
     uint64_t messages = 0;
   };
 
-  void write(const ros2::Topic& topic, uint64_t time_ns, std::span<const uint8_t> cdr);
+  // says_all_of: the channel whose message this one says in full, or "". Returns whether a reader
+  // of the bag learns that.
+  bool write(const ros2::Topic& topic, uint64_t time_ns, std::span<const uint8_t> cdr,
+             const std::string& says_all_of = "");
+  void attach_files(log_header_t header, const std::string& log);
   std::string metadata() const;
 
-  std::string folder_, file_;
+  std::string folder_, file_, rest_file_;
   ros2::ConversionOptions options_;
   std::optional<ros2::Names> names_;
   std::unique_ptr<McapWriter> out_;
+  std::unique_ptr<log::Writer> rest_;
   std::unique_ptr<ros2::Conversions> conversions_;
   std::map<std::string, uint16_t> schemas_;
   std::map<std::string, Recorded> topics_;  // by name and type

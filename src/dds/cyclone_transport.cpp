@@ -151,7 +151,8 @@ std::string configuration(const CycloneOptions& options) {
       peers += peer_element(std::string_view(options.static_peers).substr(begin, end - begin));
     begin = end + 1;
   }
-  // Pictures go in few datagrams; the cache of a writer is bounded by its depth alone.
+  // Pictures go in few datagrams; the cache of a writer is bounded by its depth alone. What comes
+  // while others have the CPU waits in the socket, as far as the system allows (net.core.rmem_max).
   return "<CycloneDDS><Domain Id=\"any\"><General>" + general +
          "<MaxMessageSize>65500B</MaxMessageSize><FragmentSize>60000B</FragmentSize></General>"
          "<Discovery>" +
@@ -159,7 +160,8 @@ std::string configuration(const CycloneOptions& options) {
                         : "<ParticipantIndex>auto</ParticipantIndex><MaxAutoParticipantIndex>119</"
                           "MaxAutoParticipantIndex><Peers>" +
                               peers + "</Peers>") +
-         "</Discovery><Internal><Watermarks><WhcHigh>1GB</WhcHigh></Watermarks></Internal>"
+         "</Discovery><Internal><SocketReceiveBufferSize "
+         "max=\"8MiB\"/><Watermarks><WhcHigh>1GB</WhcHigh></Watermarks></Internal>"
          "<Tracing><Verbosity>none</Verbosity></Tracing></Domain></CycloneDDS>";
 }
 

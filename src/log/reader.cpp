@@ -29,10 +29,11 @@ int64_t read64(const uint8_t* bytes) {
 constexpr uint32_t kMcap = 0x894D4341;
 
 [[noreturn]] void refuse_bag(const std::string& path) {
-  throw InputError({path},
-                   "is a ROS 2 bag or an MCAP file, which Ruedo writes and does not read: play it "
-                   "by `ros2 bag play --clock`, or open it in Foxglove; LOG is the log that it was "
-                   "exported from");
+  throw InputError(
+      {path},
+      "is a ROS 2 bag or an MCAP file; a log is expected, as that which it was exported "
+      "from. `ruedo play` shows a bag of `ruedo export --ros2`, too; others play by "
+      "`ros2 bag play --clock`, or in Foxglove");
 }
 
 bool is_bag_folder(const std::string& path) {

@@ -6,14 +6,18 @@ from __future__ import annotations
 
 import math
 import os
+import random
+import shutil
 import subprocess
+import tempfile
 from pathlib import Path
 
 import lcm
+import mcap.writer
 import pytest
 from mcap.reader import make_reader
 from mcap_ros2.decoder import DecoderFactory
-from rosbags.rosbag2 import Reader
+from rosbags.rosbag2 import Reader, StoragePlugin, Writer
 from rosbags.typesys import get_types_from_msg
 from ruedo import lcmtypes
 from stores import store_of
@@ -208,10 +212,182 @@ def test_a_folder_that_is_there_is_left_alone(logged):
     assert list((logged / "mine").iterdir()) == []
 
 
+# ---- Played again.
+
+
+def play(*arguments, code=0):
+    done = subprocess.run(
+        [RUEDO, "play", *map(str, arguments)], capture_output=True, text=True, timeout=120
+    )
+    assert done.returncode == code, done.stderr
+    return done
+
+
+def page(log, to, *arguments):
+    done = play(log, "--html", to, "--html-size", "1000", *arguments)
+    assert done.stderr == ""
+    return to.read_bytes()
+
+
+def refused(bag):
+    """What is said of a bag, in one line."""
+    line = play(bag, "--html", bag.parent / "no.html", code=3).stderr
+    assert len(line.splitlines()) == 1 and line.startswith(f"ruedo: {bag}")
+    assert not (bag.parent / "no.html").exists()
+    return line
+
+
+def events(log):
+    """{channel: [(us, bytes)]}; within a step channels have no order among each other."""
+    found = {}
+    for event in lcm.EventLog(str(log), "r"):
+        found.setdefault(event.channel, []).append((event.timestamp, event.data))
+    return found
+
+
+def shown(bag, folder):
+    """The events that the console shows of a bag: of the log that `play` makes of it meanwhile."""
+    folder.mkdir()
+    environment = {**os.environ, "TMPDIR": str(folder)}
+    command = [RUEDO, "play", bag, "--view", "127.0.0.1:0"]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True, env=environment) as process:
+        try:
+            assert process.stdout.readline().startswith("View it at ")
+            (log,) = folder.glob("ruedo-bag-*/run/*.lcm")
+            found = events(log)
+        finally:
+            process.terminate()
+    assert process.returncode == 0 and list(folder.iterdir()) == []
+    return found
+
+
+def test_the_console_shows_of_a_bag_what_it_shows_of_the_log(logged, tmp_path):
+    """Every message, byte for byte; and the page of it is as large, scene and all."""
+    of_log = page(logged / "run.lcm", tmp_path / "log.html")
+    for i, bag in enumerate((logged / "run", f"{logged}/run/", logged / "run/run_0.mcap")):
+        assert shown(bag, tmp_path / str(i)) == events(logged / "run.lcm")
+        of_bag = page(bag, tmp_path / "bag.html")
+        assert len(of_bag) == pytest.approx(len(of_log), abs=100)  # the name is another one
+    with (logged / "run/run_0.mcap").open("rb") as file:
+        (rest,) = (one for one in make_reader(file).iter_attachments() if one.name == "run.lcm")
+    # Neither scans nor pictures are there twice.
+    assert {"p3at/lrf", "p3at/camera"}.isdisjoint(log_channels(rest.data, tmp_path))
+
+
+def log_channels(data, folder):
+    (folder / "rest.lcm").write_bytes(data)
+    return events(folder / "rest.lcm").keys()
+
+
+def test_raw_pictures_and_several_robots(tmp_path):
+    log, bag = tmp_path / "run.lcm", tmp_path / "run"
+    options = ["--set", "p3at/camera.ruedo:encoding=rgb", "--spawn", "p3at:other@0,3"]
+    options += ["--rate", "max", "--duration", "1", "--lcm", "auto"]
+    ruedo("run", SOURCE / "worlds/arena.sdf", "--record", log, *options)
+    ruedo("export", log, "--ros2", bag)
+    found = shown(bag, tmp_path / "temporary")
+    assert found == events(log) and {"p3at/camera", "other/camera"} < found.keys()
+
+
+def test_a_bag_has_its_world_with_it(tmp_path):
+    """On another machine the world's files are not there."""
+    home = tmp_path / "home"
+    shutil.copytree(SOURCE / "worlds/robots/p3at", home / "models/rover")
+    (home / "hall.sdf").write_text(
+        "<sdf version='1.9'><world name='hall'><include><uri>models/rover</uri><name>r</name></include>"
+        "<model name='box'><static>true</static><pose>2 0 0.5 0 0 0</pose><link name='l'><collision "
+        "name='c'><geometry><box><size>1 1 1</size></box></geometry></collision></link></model></world></sdf>"
+    )
+    log, bag = tmp_path / "run.lcm", tmp_path / "run"
+    ruedo(
+        "run",
+        home / "hall.sdf",
+        "--rate",
+        "max",
+        "--duration",
+        "1",
+        "--record",
+        log,
+        "--lcm",
+        "auto",
+        "--disable",
+        "r/camera",
+    )
+    ruedo("export", log, "--ros2", bag)
+    of_log = page(log, tmp_path / "log.html")
+    shutil.rmtree(home)
+    shutil.move(bag, tmp_path / "elsewhere/run")
+    there = page(tmp_path / "elsewhere/run", tmp_path / "bag.html")
+    assert b"box" in there and len(there) == pytest.approx(len(of_log), rel=0.001)
+    assert "cannot be shown" in play(log, "--html", tmp_path / "no.html").stderr
+
+
+def test_a_bag_of_another_program_has_no_scene(tmp_path):
+    store = store_of("jazzy")
+    for storage in (StoragePlugin.MCAP, StoragePlugin.SQLITE3):
+        bag = tmp_path / storage.name
+        with Writer(bag, version=9, storage_plugin=storage) as writer:
+            text = store.types["std_msgs/msg/String"]
+            topic = writer.add_connection("/talk", text.__msgtype__, typestore=store)
+            writer.write(topic, 1, store.serialize_cdr(text("hello"), text.__msgtype__))
+        line = refused(bag)
+        assert (
+            "sqlite3" if storage is StoragePlugin.SQLITE3 else "holds no run of Ruedo's"
+        ) in line
+    (tmp_path / "empty").mkdir()
+    assert "is a folder; allowed is a log, or a ROS 2 bag" in refused(tmp_path / "empty")
+
+
+def test_a_compressed_one_says_how_it_is_read(tmp_path):
+    with (tmp_path / "run.mcap").open("wb") as file:
+        writer = mcap.writer.Writer(file)  # zstd
+        writer.start()
+        channel = writer.register_channel("/a", "cdr", writer.register_schema("a", "ros2msg", b""))
+        writer.add_message(channel, 1, b"1234" * 100, 1)
+        writer.finish()
+    assert "is compressed (zstd)" in refused(tmp_path / "run.mcap")
+
+
+def test_damaged_bags_end_in_one_line(logged, tmp_path):
+    """Cut off at any byte, and with any byte another one: said, or shown as far as it goes."""
+    whole = (logged / "run/run_0.mcap").read_bytes()
+    bad = tmp_path / "bad.mcap"
+    for share in (0.0001, 0.01, 0.3, 0.9, 0.999):
+        bad.write_bytes(whole[: int(share * len(whole))])
+        assert " at byte " in refused(bad)
+    chance = random.Random(1)
+    for place in [8, 9, 16, *(chance.randrange(len(whole)) for _ in range(12))]:
+        bad.write_bytes(whole[:place] + bytes([whole[place] ^ 0xFF]) + whole[place + 1 :])
+        done = subprocess.run(
+            [RUEDO, "play", bad, "--html", tmp_path / "page.html"],
+            capture_output=True,
+            text=True,
+            timeout=120,
+        )
+        assert done.returncode in (0, 3) and len(done.stderr.splitlines()) <= 1, place
+        assert done.stderr == "" or str(bad) in done.stderr or "ruedo-bag-" in done.stderr
+
+
+def test_what_lies_beside_the_topics_is_read_and_written_by_others(logged, tmp_path):
+    """By the library mcap; a name that leads out of the folder is not followed."""
+    with (logged / "run/run_0.mcap").open("rb") as file:
+        found = {one.name: one.data for one in make_reader(file).iter_attachments()}
+    assert found[str(SOURCE / "worlds/arena.sdf")] == (SOURCE / "worlds/arena.sdf").read_bytes()
+    (tmp_path / "rest.lcm").write_bytes(found["run.lcm"])
+    with (tmp_path / "run.mcap").open("wb") as file:
+        writer = mcap.writer.Writer(file, compression=mcap.writer.CompressionType.NONE)
+        writer.start()
+        for name, data in (*found.items(), ("../../ruedo-escaped", b"out"), ("/", b""), ("", b"")):
+            writer.add_attachment(0, 0, name, "", data)
+        writer.finish()
+    assert page(tmp_path / "run.mcap", tmp_path / "page.html")
+    assert not (Path(tempfile.gettempdir()) / "ruedo-escaped").exists()
+
+
 @pytest.mark.parametrize("what", ["run", "run/run_0.mcap"])
-def test_play_says_who_plays_a_bag(logged, what):
+def test_what_wants_a_log_says_so_of_a_bag(logged, what):
     result = subprocess.run(
-        [RUEDO, "play", logged / what], capture_output=True, text=True, timeout=120
+        [RUEDO, "verify", logged / what], capture_output=True, text=True, timeout=120
     )
     assert result.returncode in (2, 3)
     assert "`ros2 bag play --clock`" in result.stderr and len(result.stderr.splitlines()) == 1

@@ -1,0 +1,161 @@
+// Two passes: what lies beside the topics comes out first, then both are joined by time.
+#include "cli/bag_log.h"
+
+#include <algorithm>
+#include <cerrno>
+#include <cstdlib>
+#include <cstring>
+#include <filesystem>
+#include <fstream>
+#include <set>
+#include <vector>
+
+#include <fmt/format.h>
+
+#include "cli/mcap_reader.h"
+#include "cli/rosbag.h"
+#include "core/utf8.h"
+#include "log/reader.h"
+#include "log/writer.h"
+#include "ros2/restore.h"
+#include "ruedo/errors.h"
+
+namespace ruedo::cli {
+namespace {
+
+namespace fs = std::filesystem;
+
+// The one MCAP file of a bag's folder; "" where the folder is none of a bag.
+std::string file_of_bag(const std::string& folder) {
+  std::vector<std::string> files;
+  bool is_bag = false, is_sqlite = false;
+  std::error_code error;
+  for (const fs::directory_entry& entry : fs::directory_iterator(folder, error)) {
+    if (entry.path().extension() == ".mcap") files.push_back(entry.path().string());
+    is_bag |= entry.path().filename() == "metadata.yaml";
+    is_sqlite |= entry.path().extension() == ".db3";
+  }
+  if (files.size() == 1) return files.front();
+  if (is_sqlite)
+    throw InputError({folder},
+                     "is a bag with the storage sqlite3; what is read is MCAP, as `ruedo "
+                     "export --ros2` writes it");
+  throw InputError({folder}, fmt::format("is a folder{}; allowed is a log, or a ROS 2 bag, whose "
+                                         "folder has one .mcap file, and this has {}",
+                                         is_bag ? " with a metadata.yaml" : "", files.size()));
+}
+
+void copy_part(const std::string& from, uint64_t offset, uint64_t size, const fs::path& to) {
+  fs::create_directories(to.parent_path());
+  std::ifstream in(from, std::ios::binary);
+  std::ofstream out(to, std::ios::binary);
+  in.seekg(static_cast<std::streamoff>(offset));
+  std::vector<char> part(size_t{1} << 20);
+  for (uint64_t left = size; left > 0;) {
+    const auto count = static_cast<std::streamsize>(std::min<uint64_t>(left, part.size()));
+    if (!in.read(part.data(), count)) throw InputError({from}, "became shorter while it was read");
+    out.write(part.data(), count);
+    left -= static_cast<uint64_t>(count);
+  }
+  out.close();
+  if (!out) throw EnvironmentError(to.string() + " cannot be written: " + std::strerror(errno));
+}
+
+// Below a folder, wherever it was; "" for a name that leads out of it.
+fs::path place_below(const fs::path& folder, const std::string& name) {
+  const fs::path relative = fs::path(name).lexically_normal().relative_path();
+  const bool leads_out = std::any_of(relative.begin(), relative.end(),
+                                     [](const fs::path& part) { return part == ".."; });
+  return relative.empty() || leads_out || name.find('\0') != std::string::npos ? fs::path()
+                                                                               : folder / relative;
+}
+
+}  // namespace
+
+BagLog::BagLog(const std::string& path) : log_(path) {
+  std::error_code error;
+  const bool is_folder = !path.empty() && fs::is_directory(path, error);
+  if (!is_folder && !is_mcap(path)) return;
+  const std::string file = is_folder ? file_of_bag(path) : path;
+  std::string pattern = (fs::temp_directory_path() / "ruedo-bag-XXXXXX").string();
+  if (!mkdtemp(pattern.data()))
+    throw EnvironmentError(pattern + " cannot be made: " + std::strerror(errno));
+  folder_ = pattern;
+  try {
+    restore(file, fs::path(is_folder ? fs::canonical(path) : fs::path(path)).stem().string());
+  } catch (const fs::filesystem_error& failure) {
+    fs::remove_all(folder_, error);
+    throw EnvironmentError(failure.what());
+  } catch (...) {
+    fs::remove_all(folder_, error);
+    throw;
+  }
+}
+
+BagLog::~BagLog() {
+  std::error_code error;
+  if (!folder_.empty()) fs::remove_all(folder_, error);
+}
+
+void BagLog::restore(const std::string& file, const std::string& name) {
+  const fs::path run = fs::path(folder_) / "run";  // the log, and the world's files beside it
+  const std::string rest = (fs::path(folder_) / Rosbag::kRest).string();
+  bool has_rest = false;
+  read_mcap(file, {{}, [&](const std::string& name, uint64_t offset, uint64_t size) {
+                     const bool is_rest = name == Rosbag::kRest;
+                     has_rest |= is_rest;
+                     const fs::path to = is_rest ? fs::path(rest) : place_below(run, name);
+                     if (!to.empty()) copy_part(file, offset, size, to);
+                   }});
+  if (!has_rest)
+    throw InputError({file},
+                     "holds no run of Ruedo's: its scene is not known. Bags are shown that "
+                     "`ruedo export --ros2` made of a log, and that no other program wrote "
+                     "anew");
+  fs::create_directories(run);
+  log_ = (run / (name + ".lcm")).string();
+  join(rest, file);
+}
+
+void BagLog::join(const std::string& rest, const std::string& file) {
+  log::Reader in(rest);
+  log::Writer out(log_);
+  log::Event event;
+  bool more = in.next(event);
+  std::set<std::string> written;  // channels that had a message of the rest at its last time
+  SimTime written_us = -1;
+  const auto write_rest_until = [&](SimTime time_us) {
+    for (; more && event.timestamp_us <= time_us; more = in.next(event)) {
+      if (event.timestamp_us != written_us) written.clear();
+      written_us = event.timestamp_us;
+      written.insert(event.channel);
+      out.write(event.timestamp_us, event.channel, event.data.data(), event.data.size());
+    }
+  };
+  uint64_t damaged = 0;
+  const auto message = [&](const McapChannel& channel, uint64_t time_ns,
+                           std::span<const uint8_t> cdr) {
+    const auto says_all_of = channel.metadata.find(Rosbag::kChannel);
+    if (says_all_of == channel.metadata.end()) return;
+    const auto time_us = static_cast<SimTime>(time_ns / 1000);
+    write_rest_until(time_us);
+    const std::string& name = says_all_of->second;
+    if (written_us == time_us && written.contains(name)) return;  // the topic did not say it all
+    const std::vector<uint8_t> bytes = ros2::restored(channel.type, cdr);
+    if (bytes.empty())
+      ++damaged;
+    else
+      out.write(time_us, name, bytes.data(), bytes.size());
+  };
+  read_mcap(file, {message, {}});
+  write_rest_until(INT64_MAX);
+  out.flush();
+  if (!out.error().empty()) throw EnvironmentError(log_ + " cannot be written: " + out.error());
+  if (!in.fault().empty())
+    throw InputError({file}, "its " + std::string(Rosbag::kRest) + ": " + in.fault());
+  if (damaged > 0)
+    fmt::print(stderr, "ruedo: {}: {} messages are damaged, and left out\n", for_terminal(file),
+               damaged);
+}
+
+}  // namespace ruedo::cli

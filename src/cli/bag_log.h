@@ -1,0 +1,31 @@
+// A ROS 2 bag that `ruedo export --ros2` made, as the log that it was made from: for all that reads
+// logs.
+//
+// The topics give scans and pictures; the rest, and the world's files, lie in the bag beside them
+// (Rosbag).
+#pragma once
+
+#include <string>
+
+namespace ruedo::cli {
+
+class BagLog {
+ public:
+  // path: a bag's folder, or its MCAP file, whose log is then written into a folder of its own; of
+  // anything else ("" too) log() is that path. Throws InputError for a bag that is damaged, or that
+  // has no scene; EnvironmentError where nothing can be written.
+  explicit BagLog(const std::string& path);
+  ~BagLog();  // removes the folder
+  BagLog(const BagLog&) = delete;
+  BagLog& operator=(const BagLog&) = delete;
+
+  const std::string& log() const { return log_; }
+
+ private:
+  void restore(const std::string& file, const std::string& name);
+  void join(const std::string& rest, const std::string& file);
+
+  std::string log_, folder_;
+};
+
+}  // namespace ruedo::cli

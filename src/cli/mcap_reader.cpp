@@ -1,0 +1,203 @@
+// Every length is held against what is there before anything is made of it.
+#include "cli/mcap_reader.h"
+
+#include <cstdio>
+#include <cstring>
+#include <filesystem>
+#include <memory>
+#include <vector>
+
+#include <fmt/format.h>
+
+#include "ruedo/errors.h"
+#include "run/tick.h"
+
+namespace ruedo::cli {
+namespace {
+
+enum Op : uint8_t {
+  kSchema = 3,
+  kChannel = 4,
+  kMessage = 5,
+  kChunk = 6,
+  kAttachment = 9,
+  kDataEnd = 15
+};
+constexpr char kMagic[] = "\x89MCAP0\r\n";
+constexpr size_t kMagicSize = sizeof kMagic - 1, kRecordHead = 9;
+constexpr uint64_t kMostAttachmentHead = 65536;  // bytes of its name and the like
+
+// The fields of a record; after a fault everything is empty.
+class Fields {
+ public:
+  explicit Fields(std::span<const uint8_t> bytes) : rest_(bytes) {}
+
+  template <class Number>
+  Number number() {
+    uint64_t value = 0;
+    const std::span<const uint8_t> bytes = take(sizeof(Number));
+    for (size_t i = bytes.size(); i-- > 0;) value = value << 8 | bytes[i];
+    return static_cast<Number>(value);
+  }
+  std::string text() {
+    const std::span<const uint8_t> bytes = take(number<uint32_t>());
+    return {bytes.begin(), bytes.end()};
+  }
+  std::map<std::string, std::string> texts() {
+    Fields list(take(number<uint32_t>()));
+    std::map<std::string, std::string> found;
+    while (list.good_ && !list.rest_.empty()) {
+      const std::string key = list.text();
+      found[key] = list.text();
+    }
+    good_ &= list.good_;
+    return found;
+  }
+  std::span<const uint8_t> take(uint64_t count) {
+    good_ &= count <= rest_.size();
+    if (!good_) return {};
+    const std::span<const uint8_t> taken = rest_.first(count);
+    rest_ = rest_.subspan(count);
+    return taken;
+  }
+  std::span<const uint8_t> rest() const { return rest_; }
+  bool good() const { return good_; }
+
+ private:
+  std::span<const uint8_t> rest_;
+  bool good_ = true;
+};
+
+class McapFile {
+ public:
+  McapFile(const std::string& path, const McapHandler& handler)
+      : path_(path), handler_(handler), file_(std::fopen(path.c_str(), "rb")) {
+    if (!file_) throw InputError({path}, std::string("cannot be read: ") + std::strerror(errno));
+    size_ = std::filesystem::file_size(path);
+  }
+
+  void read() {
+    if (bytes(kMagicSize) != std::vector<uint8_t>(kMagic, kMagic + kMagicSize))
+      throw InputError({path_}, "is no MCAP file");
+    while (true) {
+      begin_ = offset_;
+      const std::vector<uint8_t> head = bytes(kRecordHead);
+      const uint8_t op = head[0];
+      const auto size = Fields(std::span(head).subspan(1)).number<uint64_t>();
+      if (size > size_ - offset_) damaged("is cut off");
+      const uint64_t end = offset_ + size;
+      if (op == kDataEnd) return;
+      if (op == kAttachment) {
+        read_attachment(size);
+      } else if (op == kChunk) {
+        read_chunk(bytes(size));
+      } else if (op == kSchema || op == kChannel || op == kMessage) {
+        read_record(op, bytes(size));
+      }
+      offset_ = end;
+      if (fseeko(file_.get(), static_cast<off_t>(end), SEEK_SET) != 0) damaged("cannot be read");
+    }
+  }
+
+ private:
+  [[noreturn]] void damaged(const std::string& what) const {
+    throw InputError({path_}, fmt::format("{} at byte {}", what, begin_));
+  }
+
+  std::vector<uint8_t> bytes(uint64_t count) {
+    if (count > size_ - offset_) damaged("is cut off");
+    std::vector<uint8_t> read(count);
+    if (std::fread(read.data(), 1, count, file_.get()) != count) damaged("cannot be read");
+    offset_ += count;
+    return read;
+  }
+
+  void read_attachment(uint64_t size) {
+    const uint64_t begin = offset_;
+    const std::vector<uint8_t> head = bytes(std::min(size, kMostAttachmentHead));
+    Fields fields(head);
+    fields.take(16);  // times
+    const std::string name = fields.text();
+    fields.text();  // media type
+    const auto data_size = fields.number<uint64_t>();
+    const uint64_t before = head.size() - fields.rest().size();
+    if (!fields.good() || data_size > size - before) damaged("has a damaged attachment");
+    if (handler_.attachment) handler_.attachment(name, begin + before, data_size);
+  }
+
+  void read_chunk(const std::vector<uint8_t>& record) {
+    Fields fields(record);
+    fields.take(24);  // times, and the size when it is not compressed
+    const auto crc = fields.number<uint32_t>();
+    const std::string compression = fields.text();
+    const std::span<const uint8_t> all = fields.take(fields.number<uint64_t>());
+    if (!fields.good()) damaged("has a damaged chunk");
+    if (!compression.empty())
+      throw InputError({path_}, "is compressed (" + compression +
+                                    "); what is read here is not: `mcap compress --compression "
+                                    "none` makes such a file");
+    if (crc != 0 && run::crc32(all.data(), all.size()) != crc)
+      damaged("has a chunk that is not what was written (CRC-32)");
+    Fields records(all);
+    while (!records.rest().empty()) {
+      const auto op = records.number<uint8_t>();
+      const std::span<const uint8_t> one = records.take(records.number<uint64_t>());
+      if (!records.good()) damaged("has a damaged chunk");
+      read_record(op, one);
+    }
+  }
+
+  void read_record(uint8_t op, std::span<const uint8_t> record) {
+    Fields fields(record);
+    const auto id = fields.number<uint16_t>();
+    if (op == kSchema) {
+      schemas_[id] = fields.text();
+    } else if (op == kChannel) {
+      McapChannel channel;
+      channel.type = schemas_[fields.number<uint16_t>()];
+      channel.topic = fields.text();
+      channel.encoding = fields.text();
+      channel.metadata = fields.texts();
+      channels_[id] = std::move(channel);
+    } else if (op == kMessage) {
+      fields.number<uint32_t>();  // its place in the channel
+      const auto time_ns = fields.number<uint64_t>();
+      fields.number<uint64_t>();  // when it was sent
+      const auto channel = channels_.find(id);
+      if (channel == channels_.end()) damaged("has a message of no channel");
+      if (fields.good() && handler_.message)
+        handler_.message(channel->second, time_ns, fields.rest());
+    }
+    if (!fields.good()) damaged("has a damaged record");
+  }
+
+  struct Close {
+    void operator()(std::FILE* file) const { std::fclose(file); }
+  };
+  const std::string& path_;
+  const McapHandler& handler_;
+  std::unique_ptr<std::FILE, Close> file_;
+  uint64_t size_ = 0, offset_ = 0, begin_ = 0;  // begin_: of the record
+  std::map<uint16_t, std::string> schemas_;
+  std::map<uint16_t, McapChannel> channels_;
+};
+
+}  // namespace
+
+void read_mcap(const std::string& path, const McapHandler& handler) {
+  McapFile(path, handler).read();
+}
+
+bool is_mcap(const std::string& path) {
+  char begin[kMagicSize] = {};
+  std::error_code error;
+  if (!std::filesystem::is_regular_file(path, error)) return false;
+  std::FILE* file = std::fopen(path.c_str(), "rb");
+  if (!file) return false;
+  const bool is = std::fread(begin, 1, kMagicSize, file) == kMagicSize &&
+                  std::memcmp(begin, kMagic, kMagicSize) == 0;
+  std::fclose(file);
+  return is;
+}
+
+}  // namespace ruedo::cli
