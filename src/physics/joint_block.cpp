@@ -2,7 +2,10 @@
 //
 // Of a row with bounds (a motor's largest torque, a stop) nobody knows beforehand whether it is at
 // one. All motors begin among the rows that are solved directly; one that comes out beyond its
-// bounds goes to those that are relaxed one by one, for the rest of the substep.
+// bounds goes to those that are relaxed one by one, for the rest of the substep. In a tree it gives
+// what it can, and holds again where that is too much: the sets of those that hold and those that
+// are spent are changed until none is wrong (principal pivoting; K. Murty, "Note on a Bard-type
+// scheme for solving the complementarity problem", 1974).
 #include "physics/joint_block.h"
 
 #include <algorithm>
@@ -441,6 +444,7 @@ void JointBlocks::find_blocks(const SolverBodies& bodies) {
       if (blocks_.size() < block_count_) blocks_.emplace_back();
       for (auto* list : {&blocks_[block].joints, &blocks_[block].free, &blocks_[block].bounded})
         list->clear();
+      blocks_[block].spent.clear();
       blocks_[block].bodies = blocks_[block].hung = 0;
       blocks_[block].factored = false;
     }
@@ -552,7 +556,6 @@ void JointBlocks::factor(Block& block) {
   block.tree.let_go();
   for (const size_t i : block.free) block.tree.lead(way_of_row_[i], rows_[i].softness);
   block.tree.factor();
-  block.exact = true;
 }
 
 // Each pivot is taken off the rows that it reaches, at once: no sum waits for another one.
@@ -613,18 +616,96 @@ bool JointBlocks::exact() const {
 // x_: what is missing of the rows' velocities. Returns the largest.
 double JointBlocks::aim(Block& block, const SolverBodies& bodies) {
   double worst = 0.0;
-  if (block.is_tree) {
-    worst =
-        block.tree.aim([&](int body) { return std::pair(bodies[body].v, bodies[body].w); }, 0.0);
-  }
   x_.resize(block.free.size());
   for (size_t i = 0; i < x_.size(); ++i) {
-    const size_t r = block.free[i];
-    const Row& row = rows_[r];
-    const double now = block.is_tree ? block.tree.rate(way_of_row_[r]) : velocity(r, bodies);
-    x_[i] = row.target - now - row.softness * row.impulse;
+    const Row& row = rows_[block.free[i]];
+    x_[i] = row.target - velocity(block.free[i], bodies) - row.softness * row.impulse;
     worst = std::max(worst, std::abs(x_[i]));
   }
+  return worst;
+}
+
+// Those that hold, to what is missing of their rates; those that are spent, to what they can give.
+double JointBlocks::aim_motors(Block& block) {
+  double worst = 0.0;
+  x_.resize(block.free.size());
+  for (size_t i = 0; i < x_.size(); ++i) {
+    const Row& row = rows_[block.free[i]];
+    x_[i] = row.target - block.tree.rate(way_of_row_[block.free[i]]) - row.softness * row.impulse;
+    worst = std::max(worst, std::abs(x_[i]));
+  }
+  for (const auto& [r, upper] : block.spent) {
+    const Row& row = rows_[r];
+    const double more = (upper ? row.upper : row.lower) - row.impulse;
+    block.tree.push(way_of_row_[r], more);
+    worst = std::max(worst, std::abs(more) * row.response);
+  }
+  return worst;
+}
+
+// After a solution: moves motors that are on the wrong side, or one of them. Returns whether any
+// was.
+bool JointBlocks::choose_spent(Block& block, bool one) {
+  constexpr double kSame = 1e-9;  // rad/s, m/s
+  const size_t were_spent = block.spent.size();
+  bool any = false;
+  size_t kept = 0;
+  for (size_t i = 0; i < block.free.size(); ++i) {
+    const size_t r = block.free[i];
+    const double wanted = rows_[r].impulse + x_[i];
+    const bool holds = wanted >= rows_[r].lower && wanted <= rows_[r].upper;
+    if (holds || (one && any)) {
+      block.free[kept++] = r;
+    } else {
+      block.spent.push_back({r, wanted > rows_[r].upper});
+      any = true;
+    }
+  }
+  block.free.resize(kept);
+  kept = 0;
+  for (size_t i = 0; i < block.spent.size(); ++i) {
+    const Spent spent = block.spent[i];
+    const Row& row = rows_[spent.row];
+    const double missing = row.target - block.tree.rate_after(way_of_row_[spent.row]) -
+                           row.softness * (spent.upper ? row.upper : row.lower);
+    const bool too_much = spent.upper ? missing < -kSame : missing > kSame;
+    if (i >= were_spent || !too_much || (one && any)) {
+      block.spent[kept++] = spent;
+    } else {
+      block.free.push_back(spent.row);
+      any = true;
+    }
+  }
+  block.spent.resize(kept);
+  return any;
+}
+
+double JointBlocks::sweep_tree(Block& block, SolverBodies& bodies) {
+  constexpr int kAllAtOnce = 6, kMost = 60;  // moves from set to set; then one by one
+  double worst =
+      block.tree.aim([&](int body) { return std::pair(bodies[body].v, bodies[body].w); }, 0.0);
+  for (int i = 0; i < kMost; ++i) {
+    if (!block.factored) factor(block);
+    worst = std::max(worst, aim_motors(block));
+    solve(block, x_);
+    block.exact = !choose_spent(block, i >= kAllAtOnce);
+    if (block.exact) break;
+    block.factored = false;
+  }
+  if (!block.factored) {
+    factor(block);
+    aim_motors(block);
+    solve(block, x_);
+    block.exact = false;
+  }
+  for (size_t i = 0; i < x_.size(); ++i) rows_[block.free[i]].impulse += x_[i];
+  for (const auto& [r, upper] : block.spent)
+    rows_[r].impulse = upper ? rows_[r].upper : rows_[r].lower;
+  block.tree.for_each_change([&](int body, const Vec3& v, const Vec3& w) {
+    bodies[body].v += v;
+    bodies[body].w += w;
+  });
+  for (const size_t i : block.bounded) worst = std::max(worst, relax(i, bodies));
   return worst;
 }
 
@@ -634,6 +715,7 @@ double JointBlocks::aim_push(Block& block, const SolverBodies& bodies) {
     worst = block.tree.aim(
         [&](int body) { return std::pair(bodies[body].push_v, bodies[body].push_w); },
         closing_per_s_);
+    for (const Spent& spent : block.spent) block.tree.push(way_of_row_[spent.row], 0.0);
   }
   x_.resize(block.free.size());
   for (size_t i = 0; i < x_.size(); ++i) {
@@ -649,6 +731,10 @@ double JointBlocks::sweep(SolverBodies& bodies) {
   double worst = 0.0;
   for (size_t b = 0; b < block_count_; ++b) {
     Block& block = blocks_[b];
+    if (block.is_tree) {
+      worst = std::max(worst, sweep_tree(block, bodies));
+      continue;
+    }
     for (size_t attempt = 0;; ++attempt) {
       if (!block.factored) factor(block);
       worst = std::max(worst, aim(block, bodies));
@@ -668,15 +754,7 @@ double JointBlocks::sweep(SolverBodies& bodies) {
       block.factored = false;
       for (const size_t i : block.bounded) worst = std::max(worst, relax(i, bodies));
     }
-    if (block.is_tree) {
-      for (size_t i = 0; i < x_.size(); ++i) rows_[block.free[i]].impulse += x_[i];
-      block.tree.for_each_change([&](int body, const Vec3& v, const Vec3& w) {
-        bodies[body].v += v;
-        bodies[body].w += w;
-      });
-    } else {
-      for (size_t i = 0; i < x_.size(); ++i) give(block.free[i], bodies, x_[i]);
-    }
+    for (size_t i = 0; i < x_.size(); ++i) give(block.free[i], bodies, x_[i]);
     for (const size_t i : block.bounded) worst = std::max(worst, relax(i, bodies));
   }
   return worst;
@@ -744,6 +822,7 @@ void JointBlocks::add_those_of_tree(Block& block, const std::vector<Row*>& conta
     block.tree.aim(moved, 0.0);
     for (const size_t k : block.free)
       block.tree.aim(way_of_row_[k], -block.tree.rate(way_of_row_[k]));
+    for (const Spent& spent : block.spent) block.tree.push(way_of_row_[spent.row], 0.0);
     block.tree.solve();
     for (size_t j = 0; j <= i; ++j) {
       const Row& other = *contacts[j];

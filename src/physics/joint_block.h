@@ -57,6 +57,10 @@ class JointBlocks {
     size_t way = JointTree::kNone;  // in the block's tree, where it has just one
     size_t next_of_a = JointTree::kNone, next_of_b = JointTree::kNone;  // of the body's joints
   };
+  struct Spent {
+    size_t row = 0;
+    bool upper = false;
+  };
   struct Block {
     std::vector<size_t> joints;
     size_t bodies = 0, hung = 0;  // that move; joints to what never does
@@ -64,6 +68,7 @@ class JointBlocks {
     JointTree tree;
     std::vector<size_t> free;     // rows that are solved directly: none of them is at a bound
     std::vector<size_t> bounded;  // rows at a bound, relaxed one by one
+    std::vector<Spent> spent;     // of a tree: motors at a bound
     // L D L^T of the free ones: D L^T, upper, by rows; 1 / D; of each row the first column that is
     // not 0 below the diagonal, and the last one beyond it.
     std::vector<double> factor, inverse;
@@ -108,6 +113,9 @@ class JointBlocks {
   void add_motor(JointMotor& motor, Joint& joint, int reference, const SolverBodies& bodies);
   void add_third(const JointMotor& motor, int reference, const SolverBodies& bodies);
   size_t root(size_t body);
+  double sweep_tree(Block& block, SolverBodies& bodies);
+  double aim_motors(Block& block);
+  bool choose_spent(Block& block, bool one);
   double aim(Block& block, const SolverBodies& bodies);
   double aim_push(Block& block, const SolverBodies& bodies);
   void find_envelope(Block& block);

@@ -94,7 +94,7 @@ void JointTree::tell_error(int body, const Vec3& apart, const Vec3& askew) {
 void JointTree::let_go() {
   for (Way& way : ways_) {
     way.leads = false;
-    way.softness = 0.0;
+    way.softness = way.given = 0.0;
   }
 }
 
@@ -140,16 +140,17 @@ void JointTree::find_changes() {
   for (size_t i = 0; i < members_.size(); ++i) {
     Member& m = members_[i];
     m.pull.setZero();
+    m.told = m.aim;
     for (size_t k = m.first; k < end_of(i); ++k)
-      if (ways_[k].leads) m.aim += ways_[k].missing * ways_[k].along;
+      if (ways_[k].leads) m.told += (ways_[k].change = ways_[k].missing) * ways_[k].along;
   }
   for (size_t i = members_.size(); open_ && i-- > 0;) {
     Member& m = members_[i];
-    m.pull.noalias() += m.held * m.aim;
+    m.pull.noalias() += m.held * m.told;
     for (size_t k = m.first; k < end_of(i); ++k) {
       Way& way = ways_[k];
       if (way.leads) continue;
-      const double given = way.softness > 0.0 ? way.missing / way.softness : 0.0;
+      const double given = way.softness > 0.0 ? way.missing / way.softness : way.given;
       way.left = given - way.along.dot(m.pull);
       m.pull += (way.left * way.inverse) * way.reach;
     }
@@ -159,11 +160,12 @@ void JointTree::find_changes() {
     Member& m = members_[i];
     m.change = m.parent != kNone ? members_[m.parent].change : Six(Six::Zero());
     for (size_t k = end_of(i); k-- > m.first;) {
-      const Way& way = ways_[k];
+      Way& way = ways_[k];
       if (way.leads) continue;
-      m.change += ((way.left - way.reach.dot(m.change)) * way.inverse) * way.along;
+      way.change = (way.left - way.reach.dot(m.change)) * way.inverse;
+      m.change += way.change * way.along;
     }
-    m.change += m.aim;
+    m.change += m.told;
   }
 }
 

@@ -52,9 +52,11 @@ class JointTree {
   void tell_error(int body, const Vec3& apart, const Vec3& askew);  // of its joint, m and rad
   double rate(size_t way) const { return ways_[way].now; }          // then
   void aim(size_t way, double missing) { ways_[way].missing = missing; }
+  void push(size_t way, double impulse) { ways_[way].given = impulse; }  // along an open one
   // To changes of the velocities, and to impulses along the ways.
   void solve();
   double impulse(size_t way) const { return ways_[way].impulse; }
+  double rate_after(size_t way) const { return ways_[way].now + ways_[way].change; }
   // Act: (body, linear, angular).
   template <class Act>
   void for_each_change(Act&& act) const {
@@ -79,13 +81,14 @@ class JointTree {
     double mass = 0.0;
     Eigen::Matrix3d inertia;  // about the centre of mass
     Matrix6 held;             // inertia of all that hangs on the joint
-    Six pull, aim, change, impulse;
+    Six aim, told;  // of the joint: what the bodies are to change, without and with motors
+    Six pull, change, impulse;
   };
   struct Way {
     Six along, reach;
     bool leads = false;
     double softness = 0.0, inverse = 0.0, left = 0.0;
-    double now = 0.0, missing = 0.0, impulse = 0.0;
+    double now = 0.0, missing = 0.0, given = 0.0, change = 0.0, impulse = 0.0;
   };
 
   Member& add_member(int body, const SolverBodies& bodies);

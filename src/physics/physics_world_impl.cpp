@@ -505,22 +505,6 @@ void PhysicsWorld::Impl::step() {
   }
 }
 
-// With all that joints tie to it: a mechanism that stands still in the air falls as one.
-bool PhysicsWorld::Impl::falling(BodyIndex body) const {
-  const btVector3& gravity = rigid_.bodies[body].bullet->getGravity();
-  std::vector<BodyIndex> tied{body};
-  for (size_t i = 0; i < tied.size(); ++i) {
-    const RigidBody& rigid = rigid_.bodies[tied[i]];
-    if (motions_[tied[i]].hung || rigid.info.moved || rigid.info.gone || rigid.info.on_plane ||
-        rigid.bullet->getGravity() != gravity || !alone(tied[i]))
-      return false;
-    for (const BodyIndex other : rigid.info.joined) {
-      if (std::find(tied.begin(), tied.end(), other) == tied.end()) tied.push_back(other);
-    }
-  }
-  return true;
-}
-
 // Forces that are allowed, each on its own, can throw a light body at any speed, and what is thrown
 // so drags others along: without a bound the numbers grow from substep to substep, to infinity.
 // Bullet is never given what is not finite.
@@ -568,16 +552,17 @@ void PhysicsWorld::Impl::sleep(BodyIndex body) {
   bullet(body).setActivationState(ISLAND_SLEEPING);
 }
 
-void PhysicsWorld::Impl::read(Snapshot& snapshot) const {
+void PhysicsWorld::Impl::read(Snapshot& snapshot) {
   const double step_s = static_cast<double>(step_us_) * 1e-6;
   snapshot.bodies = poses_;
   snapshot.body_twists = twists_;
   snapshot.body_accelerations.resize(twists_.size());
   for (const BodyIndex i : twists_.indices()) {
     snapshot.body_accelerations[i] = (twists_[i].linear - last_twists_[i].linear) / step_s;
-    if (motions_[i].fresh && falling(i))
+    if (motions_[i].fresh && !motions_[i].tied && !mechanism_in_the_air(i).empty())
       snapshot.body_accelerations[i] = from_bt(rigid_.bodies[i].bullet->getGravity());
   }
+  accelerate_at_start(snapshot);
   snapshot.joint_positions.resize(joints_.size());
   snapshot.joint_velocities.resize(joints_.size());
   snapshot.joint_efforts.resize(joints_.size());

@@ -35,7 +35,7 @@ struct BodyMotion {
   bool awake = false;      // when the step began
   bool led = false;        // of a mechanism's first body: motors hold it to its way
   int still = 0;           // steps for which it hardly moved, where it is tied
-  bool fresh = true;  // put there since the last step: nothing says how it accelerates but gravity
+  bool fresh = true;       // put there since the last step: no step says how it accelerates
   Twist mean;
   Pose end;
 };
@@ -46,7 +46,7 @@ class PhysicsWorld::Impl {
   ~Impl();
 
   void step();
-  void read(Snapshot& snapshot) const;
+  void read(Snapshot& snapshot);
 
   void set_pose(BodyIndex body, const Pose& pose) {
     poses_[body] = pose;
@@ -66,7 +66,6 @@ class PhysicsWorld::Impl {
   bool alone(BodyIndex body) const {
     return broadphase_.alone(rigid_.bodies[body].bullet->getBroadphaseHandle());
   }
-  bool falling(BodyIndex body) const;
   bool sleeping(BodyIndex body) const {
     return rigid_.bodies[body].bullet->getActivationState() == ISLAND_SLEEPING;
   }
@@ -110,6 +109,11 @@ class PhysicsWorld::Impl {
   void start(BodyIndex body);  // the velocity it begins the step with
   void update_box(BodyIndex body);
   void choose_simulated();
+  std::vector<BodyIndex> mechanism_in_the_air(BodyIndex body) const;
+  Vec3 velocity_now(BodyIndex body) const;
+  void fall_at_start(const std::vector<BodyIndex>& bodies, Snapshot& snapshot) const;
+  void accelerate_at_start(Snapshot& snapshot);
+  void accelerate_at_start(const std::vector<BodyIndex>& bodies, Snapshot& snapshot);
   BodyIndex root(BodyIndex body);
   void bound_speeds(const std::vector<btRigidBody*>&
                         bodies);  // after a substep; throws StateError for what is not finite

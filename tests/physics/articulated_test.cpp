@@ -141,6 +141,33 @@ TEST(Articulated, AnArmGoesAsItsMotorsAreTold) {
 
 // A spring of 40 N m/rad under 2 kg at 0.5 m: k x = m g r cos x, and the friction of the joint lets
 // it come to rest.
+// A motor at its limit gives that, whatever it is told, and the others hold on. From the second
+// step on: the first one has a torque already, but no velocity of its middle.
+TEST(Articulated, AMotorAtItsLimitGivesThat) {
+  const auto motor = [](const char* effort) {
+    return std::string("<limit><effort>") + effort + "</effort></limit>";
+  };
+  World w("<model name='m'><link name='a'><pose>0 0 1 0 0 0</pose>" +
+              inertial("0.5 0 0 0 0 0", 2, 0.1, 0.1, 0.1) +
+              "</link><link name='b'><pose>1 0 1 0 0 0</pose>" +
+              inertial("0.5 0 0 0 0 0", 1, 0.1, 0.1, 0.1) + "</link>" +
+              hinge("j", "world", "a", "0 1 0", motor("15")) +
+              hinge("k", "a", "b", "0 1 0", motor("100")) + "</model>",
+          1000);
+  for (const JointIndex joint : {JointIndex(0), JointIndex(1)})
+    w.physics.drive_joint_velocity(joint, 0.0, 1e6);
+  for (int i = 0; i < 3; ++i) w.physics.step();
+  // As one body: 10 N m of a's weight and 15 N m of b's, about what turns J.
+  const double J = 0.1 + 2 * 0.25 + 0.1 + 1.5 * 1.5;
+  EXPECT_NEAR(w.physics.joint_velocity(JointIndex(0)), 0.003 * (25.0 - 15.0) / J, 1e-7);
+  EXPECT_NEAR(w.physics.joint_effort(JointIndex(0)), -15.0, 1e-9);
+  EXPECT_NEAR(w.physics.joint_velocity(JointIndex(1)), 0.0, 1e-9);
+  // b is accelerated at its middle, 1.5 m from the hinge, and turned; the joint bears the rest.
+  const double turns = (25.0 - 15.0) / J;
+  EXPECT_NEAR(w.physics.joint_effort(JointIndex(1)), -(5.0 - 0.1 * turns - 0.5 * 1.5 * turns),
+              1e-3);
+}
+
 TEST(Articulated, AJointsSpringHolds) {
   World w("<model name='m'><link name='arm'><pose>0 0 1 0 0 0</pose>" +
               inertial("0.5 0 0 0 0 0", 2, 0.01, 0.1, 0.1) + "</link>" +

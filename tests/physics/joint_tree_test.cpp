@@ -17,7 +17,7 @@ struct Tie {
   bool b;  // the body is the joint's second one
   JointWays ways;
   bool led;
-  double softness, target;
+  double softness, target, push;  // push: impulse along an open way
 };
 
 // Of bodies with random places, inertias and velocities.
@@ -50,14 +50,21 @@ class RandomTree {
       EXPECT_TRUE(tree.add(tie.body, tie.on, tie.b, tie.ways, bodies_));
       ways.push_back(tree.only_way());
     }
-    tree.let_go();
-    for (size_t i = 0; i < ties_.size(); ++i)
-      if (ties_[i].led) tree.lead(ways[i], ties_[i].softness);
-    tree.factor();
     tree.aim([&](int body) { return std::pair(bodies_[body].v, bodies_[body].w); }, 0.0);
-    for (size_t i = 0; i < ties_.size(); ++i)
-      if (ties_[i].led) tree.aim(ways[i], ties_[i].target - tree.rate(ways[i]));
-    tree.solve();
+    for (const bool first : {true, false}) {  // what was led at first may be open then
+      tree.let_go();
+      for (size_t i = 0; i < ties_.size(); ++i) {
+        if (ties_[i].led || (first && ways[i] != JointTree::kNone))
+          tree.lead(ways[i], first ? 0.0 : ties_[i].softness);
+      }
+      tree.factor();
+      for (size_t i = 0; i < ties_.size(); ++i) {
+        if (ways[i] == JointTree::kNone) continue;
+        tree.aim(ways[i], ties_[i].target - tree.rate(ways[i]));
+        if (!ties_[i].led && !first) tree.push(ways[i], ties_[i].push);
+      }
+      tree.solve();
+    }
     Eigen::VectorXd x = given();
     tree.for_each_change([&](int body, const Vec3& v, const Vec3& w) {
       x.segment<3>(6 * (body - 1)) += v;
@@ -68,7 +75,7 @@ class RandomTree {
     return x;
   }
 
-  // M (x - given) = J^T p; J x + softness p = target.
+  // M (x - given) = J^T p + pushes; J x + softness p = target.
   Eigen::VectorXd by_gauss() {
     const Eigen::Index n = given().size();
     Eigen::MatrixXd J(0, n);
@@ -105,7 +112,7 @@ class RandomTree {
     K.topRightCorner(n, m) = -J.transpose();
     K.bottomLeftCorner(m, n) = J;
     for (Eigen::Index i = 0; i < m; ++i) K(n + i, n + i) = softness[i], right(n + i) = target[i];
-    right.head(n) = mass() * given();
+    right.head(n) = mass() * given() + pushes();
     const Eigen::VectorXd x = K.fullPivLu().solve(right);
     for (size_t i = 0; i < ties_.size(); ++i)
       expected_.push_back(ties_[i].led ? x(n + motor[i]) : 0.0);
@@ -138,6 +145,21 @@ class RandomTree {
     for (size_t i = 1; i < bodies_.size(); ++i)
       x.segment<6>(6 * static_cast<Eigen::Index>(i - 1)) << bodies_[i].v, bodies_[i].w;
     return x;
+  }
+  Eigen::VectorXd pushes() const {
+    Eigen::VectorXd sum = Eigen::VectorXd::Zero(given().size());
+    for (const Tie& tie : ties_) {
+      const bool turns = tie.ways.kind == Kind::hinge;
+      if (tie.led || (!turns && tie.ways.kind != Kind::slider)) continue;
+      Eigen::MatrixXd J = Eigen::MatrixXd::Zero(1, sum.size());
+      const Vec3 none = Vec3::Zero();
+      put(J, tie.body, tie.b ? 1.0 : -1.0, tie, turns ? none : tie.ways.axis,
+          turns ? tie.ways.axis : none);
+      put(J, tie.on, tie.b ? -1.0 : 1.0, tie, turns ? none : tie.ways.axis,
+          turns ? tie.ways.axis : none);
+      sum += tie.push * J.transpose();
+    }
+    return sum;
   }
   Eigen::MatrixXd mass() const {
     const Eigen::Index n = given().size();
