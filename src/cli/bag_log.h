@@ -12,14 +12,14 @@ namespace ruedo::cli {
 class BagLog {
  public:
   // path: a bag's folder, or its MCAP file, whose log is then written into a folder of its own; of
-  // anything else ("" too) log() is that path. Throws InputError for a bag that is damaged, or that
-  // has no scene; EnvironmentError where nothing can be written.
+  // anything else ("" too) path() is that path. Throws InputError for a bag that is damaged, or
+  // that has no scene; EnvironmentError where nothing can be written.
   explicit BagLog(const std::string& path);
   ~BagLog();  // removes the folder
   BagLog(const BagLog&) = delete;
   BagLog& operator=(const BagLog&) = delete;
 
-  const std::string& log() const { return log_; }
+  const std::string& path() const { return log_; }
 
  private:
   void restore(const std::string& file, const std::string& name);

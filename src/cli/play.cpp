@@ -68,9 +68,9 @@ int play(const PlayArguments& arguments) {
   std::signal(SIGTERM, [](int) { interrupted = 1; });
   const BagLog first(arguments.log), second(arguments.other);  // as logs, where they are bags
   if (!arguments.html.empty())
-    return write_page(first.log(), arguments.html, arguments.html_size), kGood;
-  if (arguments.viewed) return view(arguments, first.log(), second.log(), speed);
-  log::Reader log(first.log());
+    return write_page(first.path(), arguments.html, arguments.html_size), kGood;
+  if (arguments.viewed) return view(arguments, first.path(), second.path(), speed);
+  log::Reader log(first.path());
   bus::LcmBus bus(arguments.lcm);
   log::Event event;
   int64_t messages = 0;
