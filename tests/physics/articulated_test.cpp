@@ -1,6 +1,8 @@
 // Mechanisms: pendulums against their periods and energies, an arm that holds a load.
 #include <gtest/gtest.h>
 
+#include <algorithm>
+
 #include "world.h"
 
 namespace ruedo::physics::testing {
@@ -166,6 +168,33 @@ TEST(Articulated, AMotorAtItsLimitGivesThat) {
   const double turns = (25.0 - 15.0) / J;
   EXPECT_NEAR(w.physics.joint_effort(JointIndex(1)), -(5.0 - 0.1 * turns - 0.5 * 1.5 * turns),
               1e-3);
+}
+
+// Newton's cradle, with a millimetre between its balls: the first one's height is the last one's.
+TEST(Articulated, ACradlePassesTheSpeedOn) {
+  constexpr double kReleased_rad = 0.5;
+  std::string balls;
+  for (int i = 0; i < 5; ++i) {
+    balls += "<model name='m" + std::to_string(i) + "'><pose>" + std::to_string(0.101 * i) +
+             " 0 1.2 0 " + std::to_string(i == 0 ? kReleased_rad : 0.0) +
+             " 0</pose><link name='l'><pose>0 0 -1 0 0 0</pose>" +
+             inertial("0 0 0 0 0 0", 1, 0.001, 0.001, 0.001) +
+             "<collision name='c'><geometry><sphere><radius>0.05</radius></sphere></geometry>"
+             "<surface><bounce><restitution_coefficient>1</restitution_coefficient>"
+             "<threshold>0</threshold></bounce><friction><ode><mu>0</mu><mu2>0</mu2></ode>"
+             "</friction></surface></collision></link><joint name='j' type='revolute'>"
+             "<pose>0 0 1 0 0 0</pose><parent>world</parent><child>l</child><axis><xyz>0 1 0</xyz>"
+             "</axis></joint></model>";
+  }
+  World w(balls, 1000);
+  double highest = 0.0;
+  for (int i = 0; i < 1100; ++i) {  // half a period after a quarter of it
+    w.physics.step();
+    highest = std::max(highest, w.position("m4/l").z() - 0.2);
+  }
+  EXPECT_NEAR(highest / (1 - std::cos(kReleased_rad)), 1.0, 0.03);
+  for (int i = 0; i < 4; ++i)
+    EXPECT_LT(w.position("m" + std::to_string(i) + "/l").z() - 0.2, 1e-3) << i;
 }
 
 TEST(Articulated, AJointsSpringHolds) {
