@@ -170,6 +170,28 @@ TEST(Articulated, AMotorAtItsLimitGivesThat) {
               1e-3);
 }
 
+// Motors that drive into their stops: those hold, and the motors give what they can.
+TEST(Articulated, StopsHoldWhatMotorsDrive) {
+  const std::string limit =
+      "<limit><lower>-0.2</lower><upper>0.2</upper><effort>50</effort></limit>";
+  World w("<model name='m'><link name='a'><pose>0 0 1 0 0 0</pose>" +
+              inertial("0.5 0 0 0 0 0", 2, 0.1, 0.1, 0.1) +
+              "</link><link name='b'><pose>1 0 1 0 0 0</pose>" +
+              inertial("0.5 0 0 0 0 0", 1, 0.1, 0.1, 0.1) + "</link>" +
+              hinge("j", "world", "a", "0 1 0", limit) + hinge("k", "a", "b", "0 1 0", limit) +
+              "</model>",
+          5000);
+  for (const double rate : {0.5, -0.5}) {
+    for (const JointIndex joint : {JointIndex(0), JointIndex(1)})
+      w.physics.drive_joint_velocity(joint, rate, 1e6);
+    w.run(3.0);
+    for (const JointIndex joint : {JointIndex(0), JointIndex(1)}) {
+      EXPECT_NEAR(w.physics.joint_position(joint), 0.4 * rate, 1e-4) << joint;
+      EXPECT_NEAR(w.physics.joint_effort(joint), 100.0 * rate, 1e-6) << joint;
+    }
+  }
+}
+
 // Newton's cradle, with a millimetre between its balls: the first one's height is the last one's.
 TEST(Articulated, ACradlePassesTheSpeedOn) {
   constexpr double kReleased_rad = 0.5;
