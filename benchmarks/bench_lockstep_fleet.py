@@ -2,6 +2,7 @@
 transport in turn. A decision reads the robot's scan, and commands a velocity.
 
 bench_lockstep_fleet.py [DECISIONS] [ROUNDS] [ROBOTS,...]
+bench_lockstep_fleet.py --world ROBOTS > FILE      for the same from C++ and Java
 
 Starts servers of its own; prints the median of each.
 """
@@ -46,13 +47,17 @@ def rate(file: Path, url: str | None, count: int, decisions: int) -> float:
         seen = sim.step(20)
         begin = time.perf_counter()
         for _ in range(decisions):
-            if not all(seen.latest(one) for one in scanners):
+            scans = [seen.latest(one) for one in scanners]
+            if any(scan is None or scan.ranges[12] < 0.0 for scan in scans):
                 raise ruedo.RuedoError("a robot has no scan")
             seen = sim.step(20, [one.velocity_command(0.2, 0.5) for one in robots])
         return count * decisions / (time.perf_counter() - begin)
 
 
 def main() -> None:
+    if sys.argv[1:2] == ["--world"]:
+        print(world(int(sys.argv[2])))
+        return
     decisions = int(sys.argv[1]) if len(sys.argv) > 1 else 200
     rounds = int(sys.argv[2]) if len(sys.argv) > 2 else 5
     counts = [

@@ -7,6 +7,13 @@
 #include "engine/sensor_faults.h"
 
 namespace ruedo::engine {
+namespace {
+
+// Of all pieces together: what takes less is done before another thread has woken, and TBB's go on
+// looking for work for as long again, on a core that somebody else could use.
+constexpr int64_t kQuickNs = 200'000;
+
+}  // namespace
 
 void DueSteps::add(const SampleClock& clock, int64_t first, int64_t sample) {
   // A thousand devices of one rate are one entry: the first few samples tell clocks apart well
@@ -134,11 +141,22 @@ void Module::process_pieces(const Batch& batch, Batch::Output& output, int begin
   const auto process_one = [&](int piece) {
     process_piece(batch, output.pieces[piece], piece, begin, end, left_off);
   };
-  if (pieces() == 1 || renderer_) {  // a renderer serves one thread
-    for (int piece = 0; piece < pieces(); ++piece) process_one(piece);
+  const auto timed = [&](int piece) {
+    const auto before = std::chrono::steady_clock::now();
+    process_one(piece);
+    if (piece == 0) note_cost(std::chrono::steady_clock::now() - before);
+  };
+  const bool one_thread = renderer_ != nullptr;  // that is all it serves
+  if (pieces() == 1 || one_thread || piece_ns_ < kQuickNs / pieces()) {
+    for (int piece = 0; piece < pieces(); ++piece) timed(piece);
     return;
   }
-  parallel_pieces(pieces(), process_one);
+  parallel_pieces(pieces(), timed);
+}
+
+// The last one, or what is left of a longer one before: not every time has samples to take.
+void Module::note_cost(std::chrono::nanoseconds of_piece) {
+  piece_ns_ = std::max<int64_t>(of_piece.count(), piece_ns_ - piece_ns_ / 8);
 }
 
 SampleInput Module::input_of(const Slot& slot, const Snapshot& snapshot) const {

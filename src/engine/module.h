@@ -6,6 +6,7 @@
 #pragma once
 
 #include <atomic>
+#include <chrono>
 #include <functional>
 #include <memory>
 #include <optional>
@@ -144,6 +145,7 @@ class Module {
   void count_due();
   void process_pieces(const Batch& batch, Batch::Output& output, int begin, int end,
                       const std::atomic<bool>& left_off);
+  void note_cost(std::chrono::nanoseconds of_piece);
   void sample_with_faults(const Batch& batch, const Snapshot& snapshot, size_t k, Outbox& outbox);
   SampleInput input_of(const Slot& slot, const Snapshot& snapshot) const;
   void process_piece(const Batch& batch, Outbox& outbox, int piece, int begin, int end,
@@ -153,6 +155,7 @@ class Module {
   bool observes_ = false;
   std::vector<Slot> slots_;  // one per device
   std::atomic<int> at_work_{-1};
+  int64_t piece_ns_ = 0;               // what the first piece took of real time
   DueSteps to_hand_over_, to_sample_;  // of who makes batches, of who processes them
   std::unique_ptr<scene::RayScene> rays_, visual_rays_;
   std::unique_ptr<scene::Renderer> renderer_;

@@ -126,24 +126,25 @@ std::string Lockstep::fault_of(const grant_request_t& grant, const Member& membe
 std::string Lockstep::take_commands(const grant_request_t& grant, std::vector<Held>& held) const {
   const std::vector<engine::Input>& inputs = inbox_->inputs();
   robot::Command decoded;
+  auto input = inputs.begin();  // commands mostly come in the order of the robots
   for (size_t i = 0; i < grant.commands.size(); ++i) {
     const grant_command_t& command = grant.commands[i];
-    const std::string which = fmt::format("command {} ({})", i, command.channel);
+    const auto which = [&] { return fmt::format("command {} ({})", i, command.channel); };
     if (command.step < grant.granted || command.step >= grant.step_until) {
-      return fmt::format("{} is for step {}; {} to {} is granted", which, command.step,
+      return fmt::format("{} is for step {}; {} to {} is granted", which(), command.step,
                          grant.granted, grant.step_until - 1);
     }
-    const auto input = std::find_if(inputs.begin(), inputs.end(), [&](const engine::Input& one) {
-      return one.channel == command.channel;
-    });
+    const auto names_it = [&](const engine::Input& one) { return one.channel == command.channel; };
+    input = std::find_if(input, inputs.end(), names_it);
+    if (input == inputs.end()) input = std::find_if(inputs.begin(), inputs.end(), names_it);
     if (input == inputs.end() || command.channel.empty())
-      return which + ": no robot takes commands on that channel";
+      return which() + ": no robot takes commands on that channel";
     if (command.data.size() > engine::CommandInbox::kMaxMessageSize)
-      return which + " is larger than 64 kB";
+      return which() + " is larger than 64 kB";
     const DecodeFault fault =
         engine::decode_command(input->kind, command.data.data(), command.data.size(), decoded);
-    if (fault != DecodeFault::none) return which + ": " + describe(fault);
-    if (!engine::is_finite(decoded)) return which + ": a value is not finite";
+    if (fault != DecodeFault::none) return which() + ": " + describe(fault);
+    if (!engine::is_finite(decoded)) return which() + ": a value is not finite";
     held.push_back({command.step, static_cast<int>(input - inputs.begin()), command.data});
   }
   std::stable_sort(held.begin(), held.end(),

@@ -8,6 +8,15 @@
 #include "core/whole.h"
 
 namespace ruedo::run {
+namespace {
+
+constexpr int64_t kFewSteps = 4;
+
+// Of the steps that are granted in lockstep: the sensors, the publisher and the client, who waits
+// for them, work on the first while the next are computed.
+int64_t some_of(int64_t granted) { return std::max(kFewSteps, (granted + 3) / 4); }
+
+}  // namespace
 
 Pacer::Pacer(int64_t step_us, double rate, int64_t last_step)
     : step_us_(step_us),
@@ -61,7 +70,8 @@ int Pacer::wait(int64_t& step, int limit) {
     }
     int64_t count =
         std::min<int64_t>(limit - 1, until - step) + 1;  // until may be the largest number there is
-    if (std::isfinite(rate_) && !paused_) {              // single steps are taken at once
+    if (limit_ < INT64_MAX) count = std::min(count, some_of(until - step + 1));
+    if (std::isfinite(rate_) && !paused_) {  // single steps are taken at once
       const Clock::time_point now = Clock::now();
       const Clock::time_point due_now = due(step);
       if (now < due_now) {

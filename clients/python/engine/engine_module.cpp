@@ -15,6 +15,7 @@
 #include <nanobind/stl/tuple.h>
 #include <nanobind/stl/vector.h>
 
+#include "arrivals.h"
 #include "core/plugins.h"
 #include "core/version.h"
 #include "engine/engine.h"
@@ -274,6 +275,7 @@ NB_MODULE(_engine, module) {
   // Python's own are the C library's, whose last bit differs from one system to the next.
   module.def("sin", &ruedo::math::sin);
   module.def("cos", &ruedo::math::cos);
+  add_arrivals(module);
   nb::class_<PyEngine>(module, "Engine")
       .def(nb::init<const std::string&, const std::optional<std::string>&, int, uint64_t, bool, int,
                     const std::vector<std::string>&, const std::vector<std::string>&,

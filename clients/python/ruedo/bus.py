@@ -10,6 +10,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any
 
+from . import arrivals
 from .transport import Transport
 from .unix_transport import UnixTransport
 
@@ -60,6 +61,11 @@ class Subscription:
                 log.exception(
                     "a callback on %s failed; it is called on, and this is said once", self._what
                 )
+
+
+def _hand_over(subscriptions: tuple[Subscription, ...], data: bytes) -> None:
+    for subscription in subscriptions:
+        subscription._call(data)
 
 
 class Bus:
@@ -124,14 +130,8 @@ class Bus:
                 if channel not in self._collectors:
                     self._transport.unsubscribe(channel)
 
-    def _dispatch(self, arrived: list[tuple[str, bytes]]) -> None:
-        for one in arrived:
-            channel, data = one
-            collector = self._collectors.get(channel)
-            if collector is not None:
-                collector(one)
-            for subscription in self._handlers.get(channel, ()):
-                subscription._call(data)
+    def _dispatch(self, arrived: arrivals.Arrived) -> None:
+        arrivals.dispatch(arrived, self._collectors, self._handlers, _hand_over)
 
     @contextmanager
     def receiving(self) -> Iterator[Callable[[float], bool]]:

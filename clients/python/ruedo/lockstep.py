@@ -14,11 +14,12 @@ import zlib
 from collections import deque
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
 import numpy as np
 
-from . import lcmtypes
+from . import arrivals, lcmtypes
 from .control import State
 from .errors import LeaseLost, NoServer, RequestError, RuedoError, Timeout, TypeMismatch
 from .stream import Stream
@@ -41,6 +42,9 @@ _TICK = struct.Struct(
 )  # fingerprint, utime, run_id, epoch, step, state_hash, part, nparts
 _ENTRY = struct.Struct(">iqiI")  # channel_index, sequence, size, crc
 _INT = struct.Struct(">i")
+_GRANT = struct.Struct(">8sqqqi")  # fingerprint, granted, step_until, received, ncommands
+_STEP_OF_COMMAND = struct.Struct(">q")
+_GRANT_FINGERPRINT = lcmtypes.grant_request_t._get_packed_fingerprint()
 _TICK_FINGERPRINT = lcmtypes.tick_t._get_packed_fingerprint()
 
 
@@ -72,13 +76,22 @@ class Observations(State):
     stepped.
     """
 
-    messages: list[Message]
+    _steps: list[tuple[int, arrivals.Arrived]]  # number and messages
+
+    @property
+    def messages(self) -> list[Message]:
+        made: list[Message] | None = self.__dict__.get("_messages")
+        if made is None:
+            made = [Message(step, *one) for step, came in self._steps for one in came]
+            self.__dict__["_messages"] = made
+        return made
 
     def _key(self) -> tuple[Any, ...]:
         return (*super()._key(), tuple(self.messages))
 
     def __repr__(self) -> str:
-        return f"Observations(step={self.step}, time={self.time:g}, {len(self.messages)} messages)"
+        count = sum(len(came) for _, came in self._steps)
+        return f"Observations(step={self.step}, time={self.time:g}, {count} messages)"
 
     def all(self, stream: Stream[T]) -> list[T]:
         """The samples of a device or stream, decoded, in order; none when none was due. Raises
@@ -95,10 +108,7 @@ class Observations(State):
         """Sorted once: a fleet asks for each of its robots."""
         by_channel: dict[str, list[bytes]] | None = self.__dict__.get("_by_channel")
         if by_channel is None:
-            by_channel = {}
-            for _, name, data in self.messages:
-                by_channel.setdefault(name, []).append(data)
-            self.__dict__["_by_channel"] = by_channel
+            by_channel = self.__dict__["_by_channel"] = arrivals.by_channel(self._steps)
         return by_channel.get(channel, [])
 
 
@@ -108,7 +118,9 @@ _LEVEL = np.array([1.0, 0.0, 0.0, 0.0])
 _LEVEL.setflags(write=False)
 
 
-def observed(state: State | tuple[int, int, int], messages: list[Message]) -> Observations:
+def observed(
+    state: State | tuple[int, int, int], steps: list[tuple[int, arrivals.Arrived]]
+) -> Observations:
     """state: of a STEP's reply, or utime, step and state hash."""
     made = Observations.__new__(Observations)
     values = made.__dict__
@@ -125,7 +137,7 @@ def observed(state: State | tuple[int, int, int], messages: list[Message]) -> Ob
             linear=_NOTHING,
             angular=_NOTHING,
         )
-    values["messages"] = messages
+    values["_steps"] = steps
     return made
 
 
@@ -150,12 +162,9 @@ class _Step:
     def complete(self) -> bool:
         return not self.missing and len(self.parts) == self.nparts
 
-    def messages(self, number: int, names: list[str]) -> list[Message]:
+    def messages(self, names: list[str]) -> arrivals.Arrived:
         entries = (entry for part in range(self.nparts) for entry in self.parts[part])
-        return [
-            Message(number, names[e.channel] if e.channel < len(names) else "", e.data)
-            for e in entries
-        ]
+        return [(names[e.channel] if e.channel < len(names) else "", e.data) for e in entries]
 
 
 class Stepper:
@@ -183,7 +192,7 @@ class Stepper:
         self._steps: dict[int, _Step] = {}  # those of which something is missing, and later ones
         self._names: list[str] = []  # of the channels
         # Utime, number, hash and messages of the steps up to _have that were not collected yet.
-        self._whole: list[tuple[int, int, int, list[Message] | _Step]] = []
+        self._whole: list[tuple[int, int, int, arrivals.Arrived | _Step]] = []
         self._early: dict[
             int, deque[tuple[int, int, int, bytes]]
         ] = {}  # of each channel: crc, size, utime, message
@@ -244,6 +253,7 @@ class Stepper:
         self._part = False
 
     def _take_part(self, timeout: float) -> None:
+        arrivals.compiled()
         self._subscribe()
         body = lcmtypes.grant_request_t()
         body.granted = body.received = -1
@@ -286,16 +296,18 @@ class Stepper:
         self._names = [channel.name for channel in info.channel_list]
 
     def _grant_body(self, until: int, commands: Sequence[Command]) -> bytes:
-        body = lcmtypes.grant_request_t()
-        body.granted, body.step_until, body.received = self._granted, until, self._have
+        """A grant_request_t; its own encode() takes longer than a robot's step."""
+        granted = self._granted
+        parts = [_GRANT.pack(_GRANT_FINGERPRINT, granted, until, self._have, len(commands))]
         for command in commands:
-            sent = lcmtypes.grant_command_t()
-            sent.step, sent.channel = self._granted + command.after, command.channel
-            sent.size, sent.data = len(command.data), command.data
-            body.commands.append(sent)
-        body.ncommands = len(body.commands)
-        encoded: bytes = body.encode()
-        return encoded
+            data = command.data
+            parts += (
+                _STEP_OF_COMMAND.pack(granted + command.after),
+                _encoded_name(command.channel),
+                _INT.pack(len(data)),
+                data,
+            )
+        return b"".join(parts)
 
     def _wait(self, until: int, timeout: float) -> None:
         """Until the states up to `until` are here with all their messages. After a silence the
@@ -380,15 +392,12 @@ class Stepper:
         )
 
     def _collect(self) -> Observations:
-        messages: list[Message] = []
-        for utime, number, state_hash, of_step in self._whole:
+        steps = []
+        for utime, number, state_hash, came in self._whole:
             self._last = (utime, number, state_hash)
-            if isinstance(of_step, _Step):
-                messages += of_step.messages(number, self._names)
-            else:
-                messages += of_step
+            steps.append((number, came.messages(self._names) if isinstance(came, _Step) else came))
         self._whole = []
-        return observed(self._last, messages)
+        return observed(self._last, steps)
 
     # Putting ticks and messages together, as they come: in any order, twice, or not at all.
 
@@ -448,10 +457,10 @@ class Stepper:
             if not 0 < number - self._have <= _MOST_AHEAD:
                 return
             if nparts == 1 and number == self._have + 1 and not self._steps:
-                messages = self._as_they_came(data, at, number)
-                if messages is not None:
+                came = self._as_they_came(data, at)
+                if came is not None:
                     self._have = number
-                    self._whole.append((utime, number, state_hash, messages))
+                    self._whole.append((utime, number, state_hash, came))
                     return
             self._sort()
             step = self._steps.get(number)
@@ -485,22 +494,18 @@ class Stepper:
             at += 8
         return at
 
-    def _as_they_came(self, data: bytes, at: int, number: int) -> list[Message] | None:
+    def _as_they_came(self, data: bytes, at: int) -> arrivals.Arrived | None:
         """The messages since the last tick, when they are what this one lists."""
         fresh = self._fresh
         (count,) = _INT.unpack_from(data, at)
         at += 4
         if count != len(fresh) or at + count * _ENTRY.size != len(data):
             return None
-        if not count:
-            return []
-        messages, indices, crc32, new = [], self._indices, zlib.crc32, tuple.__new__
-        for (name, message), (channel, _, size, crc) in zip(fresh, _ENTRY.iter_unpack(data[at:])):
-            if indices.get(name) != channel or len(message) != size or crc32(message) != crc:
-                return None
-            messages.append(new(Message, (number, name, message)))
+        if not arrivals.are_listed(fresh, data, at, self._indices):
+            return None
+        came = list(fresh)
         fresh.clear()
-        return messages
+        return came
 
     def _manifest(self, data: bytes, at: int) -> tuple[list[_Entry], int]:
         (count,) = _INT.unpack_from(data, at)
@@ -597,6 +602,12 @@ def _wanted(step: int, channel: int, sequence: int, offset: int) -> Any:
         offset,
     )
     return wanted
+
+
+@lru_cache(maxsize=4096)
+def _encoded_name(name: str) -> bytes:
+    encoded = name.encode() + b"\0"
+    return _INT.pack(len(encoded)) + encoded
 
 
 def _fault_of(reply: Any) -> RuedoError:

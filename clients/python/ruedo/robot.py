@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import struct
 import warnings
 from collections.abc import Callable
 from functools import partial
@@ -36,6 +37,9 @@ if TYPE_CHECKING:
     from .simulation import Simulation
 
 T = TypeVar("T")
+
+_VELOCITY = struct.Struct(">8sqddd")  # fingerprint, utime, vx, vy, omega
+_VELOCITY_FINGERPRINT = lcmtypes.velocity_command_t._get_packed_fingerprint()
 
 
 class Device(Stream[T]):
@@ -97,6 +101,8 @@ class Robot:
         self._sim = sim
         self._devices_of: Any = None  # the info that _devices_now was made from
         self._devices_now: list[Device[Any]] = []
+        self._inputs_of: Any = None  # the same, of _inputs_now
+        self._inputs_now: dict[str, str] = {}  # channels by type
 
     def __repr__(self) -> str:
         return f"<Robot {self.name}: {', '.join(d.name for d in self.devices)}>"
@@ -251,14 +257,14 @@ class Robot:
 
     def velocity_command(self, v: float, omega: float, vy: float = 0.0) -> Command:
         """What set_velocity() sends, once, for Simulation.step()."""
-        command = lcmtypes.velocity_command_t()
-        command.utime, command.vx, command.vy, command.omega = (
+        data = _VELOCITY.pack(
+            _VELOCITY_FINGERPRINT,
             self._sim._utime,
             _finite("v", v),
             _finite("vy", vy),
             _finite("omega", omega),
         )
-        return Command(self._input("velocity_command_t"), command.encode())
+        return Command(self._input("velocity_command_t"), data)
 
     def wheel_command(self, left: float, right: float) -> Command:
         """What set_wheels() sends, once, for Simulation.step()."""
@@ -448,6 +454,15 @@ class Robot:
         return self._sim._info.channels.get(self.name, [])
 
     def _input(self, type: str) -> str:
+        known = self._sim._info
+        if self._inputs_of is not known:
+            self._inputs_now, self._inputs_of = {}, known
+        channel = self._inputs_now.get(type)
+        if channel is None:
+            channel = self._inputs_now[type] = self._find_input(type)
+        return channel
+
+    def _find_input(self, type: str) -> str:
         if not self.drive:
             raise NotSupported(
                 f"{self.name} cannot be driven: its model has no drive; --drive {self.name}=LEFT+...,RIGHT+... gives it one, by its wheel joints"

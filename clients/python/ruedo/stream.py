@@ -127,11 +127,8 @@ class Stream(Reader[T]):
                     f'robot.stream("{name}", raw=True) gives the bytes'
                 )
             message, convert = samples.CONVERSIONS[self.type]
-            self._given = Form(
-                message._get_packed_fingerprint(),
-                lambda data: convert(message.decode(data)),
-                None,
-            )
+            make = samples.DECODERS.get(self.type, lambda data: convert(message.decode(data)))
+            self._given = Form(message._get_packed_fingerprint(), make, None)
         return self._given
 
     def _sample_of(self, data: bytes) -> T:

@@ -16,14 +16,15 @@ import threading
 import time
 from collections.abc import Callable
 
-Receiver = Callable[[list[tuple[str, bytes]]], None]  # channels and messages, as they came
+from . import arrivals
+
+Receiver = Callable[[arrivals.Arrived], None]
 
 _HELLO = struct.pack(">II", 0x287617FB, 0x0100)
 _HEAD = struct.Struct(">II")  # kind, length of the channel's name
 _SIZE = struct.Struct(">I")
 _PUBLISH, _SUBSCRIBE, _UNSUBSCRIBE = 1, 2, 3
 _CHUNK = 1 << 18  # bytes received at a time
-_LONGEST_CHANNEL, _LARGEST = 63, 1 << 26
 
 
 def connect(path: str) -> socket.socket:
@@ -120,34 +121,19 @@ class UnixTransport:
         except OSError:
             pass  # receive() notices
 
-    def _taken_apart(self, came: bytes) -> list[tuple[str, bytes]] | None:
+    def _taken_apart(self, came: bytes) -> arrivals.Arrived | None:
         """The whole messages; None for what no server of Ruedo's sends."""
         data = self._rest + came if self._rest else came
-        at, end = 0, len(data)
-        if not self._greeted and end >= 8:
+        at = 0
+        if not self._greeted:
+            if len(data) < 8:
+                self._rest = data
+                return []
             self._greeted, at = True, 8
-        arrived = []
-        while self._greeted and end - at >= 12:
-            _, length = _HEAD.unpack_from(data, at)
-            if length > _LONGEST_CHANNEL:
-                return None
-            name_end = at + 8 + length
-            if name_end + 4 > end:
-                break
-            (size,) = _SIZE.unpack_from(data, name_end)
-            if size > _LARGEST:
-                return None
-            message_end = name_end + 4 + size
-            if message_end > end:
-                break
-            name = data[at + 8 : name_end]
-            channel = self._names.get(name)
-            if channel is None:
-                channel = name.decode(errors="replace")
-                if len(self._names) < 65536:
-                    self._names[name] = channel
-            arrived.append((channel, data[name_end + 4 : message_end]))
-            at = message_end
+        taken = arrivals.take_apart(data, at, self._names)
+        if taken is None:
+            return None
+        arrived, at = taken
         self._rest = data[at:]
         return arrived
 

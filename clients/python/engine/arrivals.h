@@ -1,0 +1,8 @@
+// What the Python client does for every single message of a run in lockstep, in C++: hundreds come
+// with each step. bus.py, unix_transport.py and lockstep.py have the same in Python, for
+// installations without the engine; tests hold the one against the other.
+#pragma once
+
+#include <nanobind/nanobind.h>
+
+void add_arrivals(nanobind::module_& module);
