@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <filesystem>
 
+#include "model/degrees.h"
 #include "model/include_params.h"
 #include "model/no_effect.h"
 #include "model/sdf_reader.h"
@@ -44,6 +45,7 @@ SdfVersion SdfReader::version_of(const Element& root) {
         "version " + *written + " is newer than 1.12; what it adds is left out");
   }
   name_what_has_no_effect(root, context_.findings);
+  name_degrees(root, context_.findings);
   return *version;
 }
 

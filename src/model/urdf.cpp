@@ -13,6 +13,7 @@
 #include <urdf_model/model.h>
 #include <urdf_parser/urdf_parser.h>
 
+#include "model/degrees.h"
 #include "model/no_effect.h"
 #include "model/read_context.h"
 #include "model/urdf_format.h"
@@ -565,6 +566,7 @@ std::unique_ptr<Element> urdf_as_sdf(const Element& written, Findings& findings)
     whom_it_names(fault, robot).fail("urdfdom cannot read it: " + fault);
 
   name_what_urdf_lacks(robot, findings);
+  name_degrees(robot, findings);
   Converter converter{robot, findings, *urdf, {}};
   Element& model = *converter.model;
   model.name = "model";
