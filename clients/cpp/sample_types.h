@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <memory>
 #include <string>
+#include <vector>
 
 #include "ruedo/client.h"
 #include "wire_reader.h"
@@ -51,5 +52,25 @@ RawSample raw_sample(WireReader in);
 // The message type that a sample is made from: message_type<Scan>() is "planar_lidar_t".
 template <class SampleType>
 const char* message_type();
+
+// Of a whole message. Throws TypeMismatch, with the channel.
+template <class SampleType>
+SampleType decoded(const std::string& channel, const std::vector<uint8_t>& bytes) {
+  const SampleDecoder& decoder = *find_decoder(message_type<SampleType>());
+  try {
+    WireReader in(bytes.data(), bytes.size());
+    if (in.int64() == decoder.fingerprint)
+      return static_cast<const SampleType&>(*decoder.decode(in));
+  } catch (const WireError& error) {
+    throw TypeMismatch(channel + ": a message is no valid " + decoder.type + ": " + error.what());
+  }
+  throw TypeMismatch(channel + " carries another type than " + decoder.type +
+                     ", or another version of it");
+}
+
+template <>
+inline RawSample decoded<RawSample>(const std::string&, const std::vector<uint8_t>& bytes) {
+  return raw_sample(WireReader(bytes.data(), bytes.size()));
+}
 
 }  // namespace ruedo::client

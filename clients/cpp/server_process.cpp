@@ -16,6 +16,7 @@
 #include <cstdlib>
 #include <cstring>
 #include <filesystem>
+#include <fstream>
 #include <sstream>
 #include <thread>
 #include <utility>
@@ -135,6 +136,23 @@ std::string free_url(int& token) {
   throw LaunchError("no free UDP port was found in 100 tries");
 }
 
+// Python's launch() has the same words.
+void add_options(const LaunchOptions& options, std::vector<std::string>& command) {
+  const auto add = [&](const char* option, const std::string& value) {
+    command.insert(command.end(), {option, value});
+  };
+  if (options.seed >= 0) add("--seed", std::to_string(options.seed));
+  std::ostringstream rate;
+  rate << options.rate;
+  add("--rate", std::isinf(options.rate) ? "max" : rate.str());
+  if (options.lockstep != 0) add("--lockstep", std::to_string(options.lockstep));
+  for (const std::string& model : options.spawn) add("--spawn", model);
+  for (const std::string& device : options.disable) add("--disable", device);
+  for (const auto& [key, value] : options.set) add("--set", key + "=" + value);
+  if (!options.noise) command.emplace_back("--no-noise");
+  command.insert(command.end(), options.args.begin(), options.args.end());
+}
+
 // Of this user's alone, for the socket.
 fs::path make_folder() {
   const char* runtime = std::getenv("XDG_RUNTIME_DIR");
@@ -150,6 +168,8 @@ fs::path make_folder() {
 }  // namespace
 
 ServerProcess::ServerProcess(const std::string& world, const LaunchOptions& options) {
+  if (world.empty() == options.text.empty())
+    throw LaunchError("launch() needs either a world or its text");
   const std::string program = find_ruedo(options.program);
   if (options.url == "auto") {
     url_ = free_url(token_);
@@ -159,12 +179,10 @@ ServerProcess::ServerProcess(const std::string& world, const LaunchOptions& opti
   } else {
     url_ = options.url;
   }
-  std::vector<std::string> command{program, "run", world, "--lcm", url_, "--watch-stdin"};
-  if (options.seed >= 0) command.insert(command.end(), {"--seed", std::to_string(options.seed)});
-  std::ostringstream rate;
-  rate << options.rate;
-  command.insert(command.end(), {"--rate", std::isinf(options.rate) ? "max" : rate.str()});
-  command.insert(command.end(), options.args.begin(), options.args.end());
+  std::vector<std::string> command{
+      program, "run", options.text.empty() ? world : written(options.text),
+      "--lcm", url_,  "--watch-stdin"};
+  add_options(options, command);
   for (const std::string& word : command) command_ += (command_.empty() ? "" : " ") + word;
   try {
     start(command, options.verbose);
@@ -173,6 +191,18 @@ ServerProcess::ServerProcess(const std::string& world, const LaunchOptions& opti
     end();
     throw;
   }
+}
+
+// The text in a file that ends with the server; its name.
+std::string ServerProcess::written(const std::string& text) {
+  if (folder_.empty()) folder_ = make_folder();
+  const bool urdf =
+      text.find("<robot") != std::string::npos && text.find("<sdf") == std::string::npos;
+  const fs::path path = folder_ / (urdf ? "world.urdf" : "world.sdf");
+  std::ofstream file(path, std::ios::binary);
+  file << text;
+  if (!file.flush()) throw LaunchError("the world's text cannot be written to " + path.string());
+  return path;
 }
 
 ServerProcess::~ServerProcess() { end(); }

@@ -30,13 +30,14 @@ class ServerProcess {
   void end();
 
  private:
+  std::string written(const std::string& text);
   void start(const std::vector<std::string>& command, bool verbose);
   void await_port(Duration timeout);
   bool poll();  // true when it has ended; with the mutex held
   std::string last_lines() const;
 
   std::string url_, command_;
-  std::filesystem::path folder_;  // of the socket; empty: none of ours
+  std::filesystem::path folder_;  // of the socket, and of a world's text; empty: none of ours
   std::mutex mutex_;
   pid_t pid_ = -1;
   int status_ = 0;

@@ -20,6 +20,7 @@
 #include <cstdint>
 #include <functional>
 #include <limits>
+#include <map>
 #include <memory>
 #include <optional>
 #include <string>
@@ -442,12 +443,18 @@ struct LaunchOptions {
   std::string program;  // the server, unless the environment's RUEDO names one; "": of the same
                         // installation, by the PATH, or above this program
 #endif
-  int64_t seed = -1;              // -1: the server's default
-  double rate = 1.0;              // sim time per real time; kFast: as fast as it goes
-  std::vector<std::string> args;  // further options of `ruedo run`
-  std::string url;                // "": a local socket, which no other user of the machine
-                                  // reads, and plain LCM programs do not know; "auto": a free
-                                  // port for LCM
+  int64_t seed = -1;                       // -1: the server's default
+  double rate = 1.0;                       // sim time per real time; kFast: as fast as it goes
+  int lockstep = 0;                        // how many clients the run waits for
+  std::vector<std::string> spawn;          // models: "p3at@0,0", "p3at:NAME@X,Y,YAW"
+  std::vector<std::string> disable;        // devices that are left out: "p3at/camera"
+  std::map<std::string, std::string> set;  // {{"p3at/lrf.rate", "20"}}
+  bool noise = true;                       // false: ideal values
+  std::string text;                        // the world's SDF or URDF itself, where the world is ""
+  std::vector<std::string> args;           // further options of `ruedo run`
+  std::string url;                         // "": a local socket, which no other user of the machine
+                    // reads, and plain LCM programs do not know; "auto": a free
+                    // port for LCM
   std::string name = "client";
   Duration timeout = 30.0;  // of real time until the world is loaded
   bool verbose = false;     // show what the server prints; else it is shown in errors alone
@@ -457,5 +464,44 @@ struct LaunchOptions {
 // Simulation, and with this process however that ends. Throws LaunchError with what the server
 // said.
 Simulation launch(const std::string& world, const LaunchOptions& options = {});
+
+// ---- Recorded runs.
+
+class LogFile;  // clients/cpp/log.cpp
+
+/// What a run recorded (`ruedo run --record`), or any other log of LCM's: its messages by channel.
+/// They are read from the file when they are asked for. Copies share the file.
+class Log {
+ public:
+  explicit Log(std::shared_ptr<const LogFile> file) : file_(std::move(file)) {}
+
+  [[nodiscard]] std::vector<std::string> channels() const;  ///< sorted
+  /// How many messages there are on a channel; 0 on one that the log has not.
+  [[nodiscard]] size_t count(const std::string& channel) const;
+  /// "" where the file ends properly; else how it was cut off or is damaged, and at which byte.
+  /// What came before that is here.
+  [[nodiscard]] const std::string& fault() const;
+
+  /// The samples on a channel, in order: `log.samples<Scan>("p3at/lrf")`; RawSample has the bytes
+  /// of any type.
+  /// @throws UnknownName, with the channels that there are; TypeMismatch; Error when the file can
+  /// no longer be read
+  template <class SampleType>
+  [[nodiscard]] std::vector<SampleType> samples(const std::string& channel) const;
+  /// The same as objects of a class that lcm-gen made.
+  template <class Message>
+  [[nodiscard]] std::vector<Message> messages(const std::string& channel) const {
+    std::vector<Message> found;
+    for (const RawSample& raw : samples<RawSample>(channel))
+      found.push_back(MessageStream<Message>::decoded(channel, raw.bytes));
+    return found;
+  }
+
+ private:
+  std::shared_ptr<const LogFile> file_;
+};
+
+/// @throws Error for what cannot be read, and what is no log
+Log read_log(const std::string& path);
 
 }  // namespace ruedo::client

@@ -53,13 +53,13 @@ def test_python_docstring_of_the_package(server, tmp_path):
     run([sys.executable, "doc.py"], server, tmp_path)
 
 
-def test_cpp(server, tmp_path):
+def compiled(folder, block):
     """Compiled against the header and the library alone, as a user's program is."""
     from pathlib import Path
 
     import lcm
 
-    (tmp_path / "ten.cpp").write_text(blocks("clients.md")["cpp"])
+    (folder / "ten.cpp").write_text(blocks("clients.md")[block])
     library = next(Path(lcm.__file__).resolve().parent.parent.glob("**/liblcm.so"))
     subprocess.run(
         [
@@ -78,10 +78,20 @@ def test_cpp(server, tmp_path):
             "-o",
             "ten",
         ],
-        cwd=tmp_path,
+        cwd=folder,
         check=True,
     )
-    assert run(["./ten"], server, tmp_path).startswith("181 rays, 5.")
+    return "./ten"
+
+
+def test_cpp(server, tmp_path):
+    assert run([compiled(tmp_path, "cpp")], server, tmp_path).startswith("181 rays, 5.")
+
+
+def test_cpp_launches_with_arguments(tmp_path):
+    program = compiled(tmp_path, "launch_cpp")
+    done = subprocess.run([program], cwd=tmp_path, capture_output=True, text=True, timeout=PATIENCE)
+    assert done.stdout == "2 robots\n", done.stderr
 
 
 def test_java(server, tmp_path):

@@ -125,3 +125,23 @@ def test_a_server_that_dies_is_said():
         with pytest.raises(ruedo.NoServer, match="the server ended \\(signal SIGKILL\\)"):
             for _ in range(1000):
                 sim.robots[0].lrf.next(2.0)
+
+
+@pytest.mark.parametrize("as_text", [False, True])
+def test_arguments_are_the_same_words_in_every_language(language, as_text):
+    world = [HALL] if not as_text else ["", Path(HALL).read_text()]
+    said = probe(language, "-", "launch_with", *world)
+    assert said.words("robots") == ["p3at", "guest"] and said.one("seed") == "5"
+    assert "lrf" in said.words("devices") and "camera" not in said.words("devices")
+    assert said.numbers("rate") == [20.0]
+    count, ahead = said.numbers("scans")
+    assert count == 3  # at 0, 0.05 and 0.1 s
+    python = probe("python", "-", "launch_with", *world)
+    assert ahead == pytest.approx(python.numbers("scans")[1], abs=1e-5)
+
+
+def test_a_world_or_its_text_is_needed(language):
+    if language == "python":  # there it is a TypeError
+        return
+    failed = probe(language, "-", "launch_with", "").one("failed")
+    assert failed == "LaunchError: launch() needs either a world or its text"

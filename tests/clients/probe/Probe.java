@@ -6,6 +6,7 @@ import ruedo.Device;
 import ruedo.Image;
 import ruedo.LaunchOptions;
 import ruedo.Limits;
+import ruedo.Log;
 import ruedo.Marker;
 import ruedo.Motion;
 import ruedo.MotionStatus;
@@ -411,8 +412,59 @@ public final class Probe {
         while (true) Thread.sleep(1000);
     }
 
+    /** The second: the text of a world, instead of the world. */
+    private static void launchedWith(String[] a) {
+        LaunchOptions options =
+                new LaunchOptions()
+                        .seed(5)
+                        .lockstep(1)
+                        .spawn("p3at:guest@2,0")
+                        .disable("p3at/camera", "guest/camera")
+                        .set("p3at/lrf.update_rate", 20)
+                        .noise(false)
+                        .text(a.length > 1 ? a[1] : "")
+                        .timeout(400.0);
+        try (Simulation sim = Ruedo.launch(a[0], options)) {
+            List<String> names = new ArrayList<>();
+            for (Robot robot : sim.robots()) names.add(robot.name);
+            say("robots", String.join(" ", names));
+            say("seed", sim.seed());
+            Robot robot = sim.robot("p3at");
+            List<String> devices = new ArrayList<>();
+            for (Device<?> device : robot.devices()) devices.add(device.name);
+            say("devices", String.join(" ", devices));
+            say("rate", robot.lrf().rate);
+            Observations seen = sim.step(20, List.of(robot.velocityCommand(0.3, 0.0)));
+            say("scans", seen.all(robot.lrf()).size(), seen.latest(robot.lrf()).ranges[90]);
+        }
+    }
+
+    private static void readLog(String[] a) {
+        Log log = Ruedo.readLog(a[0]);
+        say("channels", String.join(" ", log.channels()));
+        List<Scan> scans = log.samples("p3at/lrf", Scan.class);
+        Scan scan = scans.get(scans.size() - 1);
+        say("scans", scans.size(), log.count("p3at/lrf"), scan.utime, scan.ranges[90]);
+        List<Pose> poses = log.samples("p3at/pose", Pose.class);
+        Pose pose = poses.get(poses.size() - 1);
+        say("poses", poses.size(), pose.utime, pose.position[0]);
+        List<byte[]> raw = log.bytes("p3at/pose");
+        say("raw", raw.get(raw.size() - 1).length);
+        say("fault", log.fault());
+        attempt("unknown", () -> log.samples("nobody", Scan.class));
+        attempt("mismatch", () -> log.samples("p3at/pose", Scan.class));
+    }
+
     private static void act(String url, String command, String[] a) throws InterruptedException {
         if (command.equals("launch")) launched(a);
+        if (command.equals("launch_with")) {
+            launchedWith(a);
+            return;
+        }
+        if (command.equals("log")) {
+            readLog(a);
+            return;
+        }
         boolean named = command.equals("lockstep") || command.equals("visited");
         try (Simulation sim =
                 command.equals("connect")

@@ -69,6 +69,8 @@ void report(const std::string& what, const std::function<void()>& call) {
     say(what, "LeaseLost:", e.what());
   } catch (const rc::RequestError& e) {
     say(what, "RequestError:", e.what());
+  } catch (const rc::Error& e) {
+    say(what, "RuedoError:", e.what());
   } catch (const std::invalid_argument& e) {
     say(what, "ValueError:", e.what());
   }
@@ -388,8 +390,50 @@ void visited(const rc::Simulation& sim, const std::vector<std::string>& a) {
   while (true) std::this_thread::sleep_for(std::chrono::seconds(1));
 }
 
+// text: of a world, instead of the world.
+void launched_with(const std::string& world, const std::string& text) {
+  rc::LaunchOptions options;
+  options.seed = 5;
+  options.lockstep = 1;
+  options.spawn = {"p3at:guest@2,0"};
+  options.disable = {"p3at/camera", "guest/camera"};
+  options.set = {{"p3at/lrf.update_rate", "20"}};
+  options.noise = false;
+  options.text = text;
+  options.timeout = 400.0;
+  const rc::Simulation sim = rc::launch(world, options);
+  std::string names;
+  for (const rc::Robot& robot : sim.robots()) names += (names.empty() ? "" : " ") + robot.name();
+  say("robots", names);
+  say("seed", sim.seed());
+  const rc::Robot robot = sim.robot("p3at");
+  std::string devices;
+  for (const rc::DeviceInfo& device : robot.devices()) devices += device.name + " ";
+  say("devices", devices);
+  say("rate", robot.lrf().info().rate);
+  const rc::Observations seen = sim.step(20, {robot.velocity_command(0.3, 0.0)});
+  say("scans", seen.all(robot.lrf()).size(), seen.latest(robot.lrf())->ranges[90]);
+}
+
+void read_log(const std::vector<std::string>& a) {
+  const rc::Log log = rc::read_log(a[0]);
+  std::string names;
+  for (const std::string& name : log.channels()) names += (names.empty() ? "" : " ") + name;
+  say("channels", names);
+  const auto scans = log.samples<rc::Scan>("p3at/lrf");
+  say("scans", scans.size(), log.count("p3at/lrf"), scans.back().utime, scans.back().ranges[90]);
+  const auto poses = log.samples<rc::Pose>("p3at/pose");
+  say("poses", poses.size(), poses.back().utime, poses.back().position[0]);
+  say("raw", log.samples<rc::RawSample>("p3at/pose").back().bytes.size());
+  say("fault", log.fault());
+  report("unknown", [&] { static_cast<void>(log.samples<rc::Scan>("nobody")); });
+  report("mismatch", [&] { static_cast<void>(log.samples<rc::Scan>("p3at/pose")); });
+}
+
 void act(const std::string& url, const std::string& command, const std::vector<std::string>& a) {
   if (command == "launch") launched(a);
+  if (command == "launch_with") return launched_with(a[0], a.size() > 1 ? a[1] : "");
+  if (command == "log") return read_log(a);
   const rc::Simulation sim =
       rc::connect(url, {.name = command == "lockstep" || command == "visited" ? a[0] : "",
                         .timeout = command == "connect" ? 2.0 : 60.0});

@@ -318,9 +318,42 @@ def launched(sim):
         time.sleep(1.0)
 
 
+def launched_with(world, text=None):
+    with ruedo.launch(
+        world or None,
+        seed=5,
+        lockstep=1,
+        spawn=["p3at:guest@2,0"],
+        disable=["p3at/camera", "guest/camera"],
+        set={"p3at/lrf.update_rate": 20},
+        noise=False,
+        text=text,
+        timeout=400.0,
+    ) as sim:
+        say("robots", " ".join(robot.name for robot in sim.robots))
+        say("seed", sim.seed)
+        robot = sim.robot("p3at")
+        say("devices", " ".join(device.name for device in robot.devices))
+        say("rate", robot.lrf.rate)
+        seen = sim.step(20, [robot.velocity_command(0.3, 0.0)])
+        say("scans", len(seen.all(robot.lrf)), seen.latest(robot.lrf).ranges[90])
+
+
+def read_log(path):
+    """As pandas has it; what C++ and Java say beside that is not Python's."""
+    log = ruedo.read_log(path)
+    say("channels", " ".join(sorted(log)))
+    scans, poses = log["p3at/lrf"], log["p3at/pose"]
+    say("scans", len(scans), len(scans), scans["utime"].iloc[-1], scans["ranges"].iloc[-1][90])
+    say("poses", len(poses), poses["utime"].iloc[-1], poses["pos"].iloc[-1][0])
+
+
 def main():
     url, command, *rest = sys.argv[1:]
     try:
+        if command in ("launch_with", "log"):
+            {"launch_with": launched_with, "log": read_log}[command](*rest)
+            return
         if command == "launch":
             launched(ruedo.launch(rest[0], seed=3, args=rest[1:]))
         with ruedo.connect(

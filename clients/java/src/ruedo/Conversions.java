@@ -143,6 +143,14 @@ final class Conversions {
         return ALL.get(type);
     }
 
+    /** Of the messages with that fingerprint; null for a type that this library does not know. */
+    static Conversion of(long fingerprint) {
+        for (Conversion conversion : ALL.values()) {
+            if (conversion.fingerprint == fingerprint) return conversion;
+        }
+        return null;
+    }
+
     private static Sample scan(WireReader in) throws IOException {
         return new Scan(
                 in.int64(),

@@ -1,11 +1,18 @@
 package ruedo;
 
+import java.util.ArrayList;
 import java.util.List;
 
 /** How a private server is started. Every setter returns this. */
 public final class LaunchOptions {
     Long seed;
     double rate = 1.0;
+    int lockstep;
+    List<String> spawn = List.of();
+    List<String> disable = List.of();
+    final List<String> set = new ArrayList<>(); // KEY=VALUE
+    boolean noise = true;
+    String text = "";
     List<String> args = List.of();
     String url = "";
     String name = "client";
@@ -21,6 +28,42 @@ public final class LaunchOptions {
     /** Sim time per real time, default 1; {@link Double#POSITIVE_INFINITY}: as fast as it goes. */
     public LaunchOptions rate(double rate) {
         this.rate = rate;
+        return this;
+    }
+
+    /** How many clients the run waits for; default 0: it is not in lockstep. */
+    public LaunchOptions lockstep(int clients) {
+        lockstep = clients;
+        return this;
+    }
+
+    /** Further models: "p3at@0,0", "p3at:NAME@X,Y,YAW". */
+    public LaunchOptions spawn(String... models) {
+        spawn = List.of(models);
+        return this;
+    }
+
+    /** Devices that are left out: "p3at/camera". */
+    public LaunchOptions disable(String... devices) {
+        disable = List.of(devices);
+        return this;
+    }
+
+    /** A setting beside those that were set before: set("p3at/lrf.rate", 20). */
+    public LaunchOptions set(String key, Object value) {
+        set.add(key + "=" + value);
+        return this;
+    }
+
+    /** False: ideal values. */
+    public LaunchOptions noise(boolean noise) {
+        this.noise = noise;
+        return this;
+    }
+
+    /** The world's SDF or URDF itself, where the world is "". */
+    public LaunchOptions text(String text) {
+        this.text = text;
         return this;
     }
 

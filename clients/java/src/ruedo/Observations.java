@@ -2,7 +2,9 @@ package ruedo;
 
 import java.io.IOException;
 import java.util.ArrayList;
+import java.util.HashMap;
 import java.util.List;
+import java.util.Map;
 
 /** What a step saw: the state after its last step, and the sensor messages of all its steps. */
 public final class Observations extends State {
@@ -28,6 +30,8 @@ public final class Observations extends State {
      * In the order in which the simulation made them; empty when a paused simulation is stepped.
      */
     public final List<Message> messages;
+
+    private Map<String, List<Message>> byChannel; // null: nobody asked yet
 
     Observations(State state, List<Message> messages) {
         super(
@@ -65,19 +69,24 @@ public final class Observations extends State {
      */
     public <T extends Sample> List<T> all(Stream<T> stream) {
         List<T> samples = new ArrayList<>();
-        for (Message message : messages) {
-            if (message.channel.equals(stream.channel)) samples.add(sample(message, stream));
-        }
+        for (Message message : on(stream.channel)) samples.add(sample(message, stream));
         return samples;
     }
 
     /** The last of them, or null. */
     public <T extends Sample> T latest(Stream<T> stream) {
-        for (int i = messages.size() - 1; i >= 0; i--) {
-            if (messages.get(i).channel.equals(stream.channel))
-                return sample(messages.get(i), stream);
+        List<Message> found = on(stream.channel);
+        return found.isEmpty() ? null : sample(found.get(found.size() - 1), stream);
+    }
+
+    /** Sorted once: a fleet asks for each of its robots. */
+    private synchronized List<Message> on(String channel) {
+        if (byChannel == null) {
+            byChannel = new HashMap<>();
+            for (Message message : messages)
+                byChannel.computeIfAbsent(message.channel, key -> new ArrayList<>()).add(message);
         }
-        return null;
+        return byChannel.getOrDefault(channel, List.of());
     }
 
     @SuppressWarnings("unchecked")

@@ -37,6 +37,14 @@ public final class Ruedo {
         return new Simulation(Address.resolve(url), name, timeout, null);
     }
 
+    /**
+     * What a run recorded (`ruedo run --record`), or any other log of LCM's. Throws RuedoException
+     * for what cannot be read, and what is no log.
+     */
+    public static Log readLog(String path) {
+        return new Log(path);
+    }
+
     /** {@link #launch(String, LaunchOptions)} in real time. */
     public static Simulation launch(String world) {
         return launch(world, new LaunchOptions());

@@ -29,18 +29,17 @@ final class ServerProcess {
     private final Path output; // null when verbose
     private ServerSocket token; // see freeUrl()
     private Path folder; // of the socket; null: none of ours
+    private Path file; // of a world's text; null: the world is somebody's own
 
     ServerProcess(String world, LaunchOptions options) {
+        if (world.isEmpty() == options.text.isEmpty())
+            throw new RuedoException.LaunchError("launch() needs either a world or its text");
         String program = findRuedo();
         if (options.url.isEmpty()) url = privateUrl();
         else url = options.url.equals("auto") ? freeUrl() : options.url;
-        command = new ArrayList<>(List.of(program, "run", world, "--lcm", url, "--watch-stdin"));
-        if (options.seed != null) command.addAll(List.of("--seed", Long.toString(options.seed)));
-        command.addAll(
-                List.of(
-                        "--rate",
-                        Double.isInfinite(options.rate) ? "max" : Double.toString(options.rate)));
-        command.addAll(options.args);
+        String file = options.text.isEmpty() ? world : written(options.text);
+        command = new ArrayList<>(List.of(program, "run", file, "--lcm", url, "--watch-stdin"));
+        command.addAll(optionsOf(options));
         try {
             output = options.verbose ? null : Files.createTempFile("ruedo-", ".log");
             if (output != null) output.toFile().deleteOnExit();
@@ -55,6 +54,35 @@ final class ServerProcess {
         } catch (IOException error) {
             throw new RuedoException.LaunchError(
                     program + " cannot be started: " + error.getMessage());
+        }
+    }
+
+    /** Python's launch() has the same words. */
+    private static List<String> optionsOf(LaunchOptions options) {
+        List<String> words = new ArrayList<>();
+        if (options.seed != null) words.addAll(List.of("--seed", Long.toString(options.seed)));
+        String rate = Double.isInfinite(options.rate) ? "max" : Double.toString(options.rate);
+        words.addAll(List.of("--rate", rate));
+        if (options.lockstep != 0)
+            words.addAll(List.of("--lockstep", Integer.toString(options.lockstep)));
+        for (String model : options.spawn) words.addAll(List.of("--spawn", model));
+        for (String device : options.disable) words.addAll(List.of("--disable", device));
+        for (String setting : options.set) words.addAll(List.of("--set", setting));
+        if (!options.noise) words.add("--no-noise");
+        words.addAll(options.args);
+        return words;
+    }
+
+    /** The text in a file that ends with the server; its name. */
+    private String written(String text) {
+        boolean urdf = text.contains("<robot") && !text.contains("<sdf");
+        try {
+            file = Files.createTempFile("ruedo-", urdf ? ".urdf" : ".sdf");
+            file.toFile().deleteOnExit();
+            return Files.writeString(file, text).toString();
+        } catch (IOException error) {
+            throw new RuedoException.LaunchError(
+                    "the world's text cannot be written: " + error.getMessage());
         }
     }
 
@@ -104,6 +132,7 @@ final class ServerProcess {
                 Files.deleteIfExists(folder);
             }
             if (output != null) Files.deleteIfExists(output);
+            if (file != null) Files.deleteIfExists(file);
         } catch (IOException error) {
             // it is gone already
         } catch (InterruptedException error) {

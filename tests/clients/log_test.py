@@ -1,0 +1,76 @@
+"""Recorded runs, read by the client libraries."""
+
+import subprocess
+
+import pytest
+from conftest import HALL, PROBES, RUEDO, probe
+
+
+@pytest.fixture(scope="module")
+def log(tmp_path_factory):
+    path = tmp_path_factory.mktemp("log") / "run.lcm"
+    options = ["--record", str(path), "--duration", "1", "--rate", "max", "--lcm", "memq://"]
+    subprocess.run(
+        [RUEDO, "run", HALL, "--disable", "p3at/camera", *options], check=True, capture_output=True
+    )
+    return path
+
+
+def events(data):
+    """Where each event of a log begins, by its format: a head of 28 bytes, channel, data."""
+    at, places = 0, []
+    while at < len(data):
+        places.append(at)
+        sizes = data[at + 20 : at + 24], data[at + 24 : at + 28]
+        at += 28 + sum(int.from_bytes(size, "big") for size in sizes)
+    return places
+
+
+def test_samples_by_channel(language, log):
+    """Python reads by LCM's own reader and lcm-gen's classes."""
+    said, python = probe(language, "-", "log", str(log)), probe("python", "-", "log", str(log))
+    # All but what has no message type of its own kind there, as ruedo/applied.
+    assert set(python.words("channels")) <= set(said.words("channels"))
+    assert {"p3at/lrf", "p3at/pose", "ruedo/header"} <= set(said.words("channels"))
+    for kind in ("scans", "poses"):
+        assert said.numbers(kind) == pytest.approx(python.numbers(kind), abs=1e-5)
+    assert said.numbers("poses")[:2] == [51, 1e6]  # 50 Hz, from 0 to 1 s
+    if language != "python":
+        assert said.one("raw") == str(8 + 8 + 16 * 8)  # fingerprint, utime, 16 doubles
+        assert "fault" not in [line[0] for line in said.lines if len(line) == 2 and line[1]]
+        unknown = said.one("unknown")
+        assert "UnknownName:" in unknown and "has no channel 'nobody'; it has " in unknown
+        assert "TypeMismatch: p3at/pose carries " in said.one("mismatch")
+
+
+def test_a_log_that_was_cut_off_is_read_up_to_there(language, log, tmp_path):
+    if language == "python":  # LCM's reader says nothing
+        return
+    data = log.read_bytes()
+    last = events(data)[-1]
+    cut = tmp_path / "cut.lcm"
+    for size in (last + 1, last + 27, len(data) - 1):
+        cut.write_bytes(data[:size])
+        said = probe(language, "-", "log", str(cut))
+        assert said.one("fault") == f"it was cut off in the event that begins at byte {last}"
+    before = events(data)[-2]
+    cut.write_bytes(data[:last] + b"\x00" * 40)
+    assert probe(language, "-", "log", str(cut)).one("fault") == f"it is damaged at byte {last}"
+    lying = data[:last] + data[before : before + 24] + b"\x3f\xff\xff\xff" + b"\x00" * 40
+    cut.write_bytes(lying)
+    said = probe(language, "-", "log", str(cut))
+    assert said.one("fault") == f"it was cut off in the event that begins at byte {last}"
+
+
+def test_what_is_no_log_is_said(language, tmp_path):
+    text = tmp_path / "text.lcm"
+    text.write_text("this is not a log, but a text that is longer than the head of an event\n")
+    for path in (text, tmp_path, tmp_path / "nothing.lcm"):
+        if language == "python" and path == text:
+            continue  # LCM's reader finds no event, and says nothing
+        result = subprocess.run(
+            [*PROBES[language], "-", "log", str(path)], capture_output=True, text=True
+        )
+        assert str(path) in result.stdout + result.stderr
+        if language != "python":
+            assert "failed " in result.stdout, result
