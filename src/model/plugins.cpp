@@ -75,8 +75,8 @@ const std::map<std::string, Known>& of_gz() {
       {"LinearBattery", {Does::dead, "its battery would run down"}},
       {"Breadcrumbs", {Does::dead, "it would drop models"}},
       {"TriggeredPublisher", {Does::dead, "messages would be answered by messages"}},
-      {"PerformerDetector", {Does::dead, "it would tell who is in its region"}},
-      {"TouchPlugin", {Does::dead, "it would tell what touches"}},
+      {"PerformerDetector", {Does::served}},  // sensor_from_plugin()
+      {"TouchPlugin", {Does::served}},
       {"DetachableJoint",
        {Does::dead, "a joint would hold another model until it is told to let go"}},
       {"Elevator", {Does::dead, kLift}},

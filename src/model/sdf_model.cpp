@@ -425,7 +425,7 @@ void SdfReader::ModelReader::read_path() {
 void SdfReader::ModelReader::read_plugin_sensors() {
   for (const Element* plugin : element_.all("plugin")) {
     read_or_leave_out(where_, "the sensor is left out", findings_, [&] {
-      const PluginSensor made = sensor_from_plugin(*plugin, where_, findings_);
+      const PluginSensor made = sensor_from_plugin(*plugin, where_, reader_.performers_, findings_);
       if (!made.sensor) return;
       const Pose pose = made.sensor->pose("pose");
       if (made.joint.empty()) {

@@ -73,6 +73,7 @@ class SdfReader {
   ReadContext& context_;
   std::vector<std::string> files_;
   std::map<std::string, Included> cache_;
+  std::vector<const Element*> performers_;  // of the world
 };
 
 // The frame in <pose relative_to=""> (SDF 1.7 on) or <pose frame=""> (before); "": none.

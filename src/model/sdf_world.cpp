@@ -76,6 +76,45 @@ void read_physics(const Element& world_element, WorldModel& world, Findings& fin
   world.gravity = world_element.vector3("gravity", world.gravity, gravity);
 }
 
+// The plugin by which gz-sim's server knows performers and levels; it has no library.
+bool has_levels(const Element& plugin) {
+  const std::string* name = plugin.attribute("name");
+  return name && (*name == "gz::sim" || *name == "ignition::gazebo");
+}
+
+std::vector<const Element*> read_performers(const Element& world, const std::string& where,
+                                            Findings& findings) {
+  std::vector<const Element*> performers;
+  for (const Element* plugin : world.all("plugin")) {
+    if (!has_levels(*plugin)) continue;
+    if (const Element* level = plugin->child("level"))
+      findings.unsupported(level->source, where,
+                           "levels are not supported: all of the world is there always");
+    for (const Element* each : plugin->all("performer")) {
+      read_or_leave_out(where, "the performer is left out", findings, [&] {
+        const Element* size = each->child("geometry/box/size");
+        if (!size) each->fail("has no <geometry><box><size>");
+        size->as_vector3(Allowed::not_negative(quantity::kLength));
+        if (each->string("ref", "").empty()) each->fail("has no <ref>");
+        performers.push_back(each);
+      });
+    }
+  }
+  return performers;
+}
+
+// Who is no model of the world is nowhere.
+void check_performers(const WorldModel& world, const std::vector<const Element*>& performers,
+                      Findings& findings) {
+  for (const Element* each : performers) {
+    const std::string ref = each->string("ref", "");
+    if (std::none_of(world.models.begin(), world.models.end(),
+                     [&](const ModelInstance& model) { return model.name == dotted(ref); }))
+      findings.error(each->source, "world " + world.name,
+                     "<performer>: the world has no model '" + ref + "'");
+  }
+}
+
 // In Gazebo, too, it takes a plugin; servers have been told to load it for every world.
 void name_wind_without_plugin(const Element& element, const WorldModel& world, Findings& findings) {
   const Wind& wind = world.environment.wind;
@@ -313,7 +352,9 @@ void SdfReader::read_world(const Element& element, SdfVersion version, WorldMode
 
   std::set<std::string> named;
   load_own_plugins(element.all("plugin"));
+  performers_ = read_performers(element, in_world, findings);
   for (const Element* plugin : element.all("plugin")) {
+    if (has_levels(*plugin)) continue;
     const PluginKind kind = kind_of(*plugin);
     const bool dead = kind.does == PluginKind::Does::dead;
     if (!dead && kind.does != PluginKind::Does::unknown) continue;
@@ -443,6 +484,7 @@ void SdfReader::read_world(const Element& element, SdfVersion version, WorldMode
     world.models.push_back(std::move(instance));
   }
   name_wind_without_plugin(element, world, findings);
+  check_performers(world, performers_, findings);
   stand_actors(actors, world);
   for (const Element* fleet : element.all("ruedo:fleet")) read_fleet(*fleet, world, kMaxModels);
   for (const Element* crowd : element.all("ruedo:crowd")) add_crowd(*crowd, world, kMaxModels);

@@ -96,6 +96,7 @@ struct Made {
   const Element& plugin;
   Element& sensor;
   std::string where;
+  const std::vector<const Element*>& performers;
   Findings& findings;
 
   void without_effect(const Words& names, const std::string& text) const {
@@ -201,6 +202,59 @@ void make_force_torque(const Made& made) {
   }
 }
 
+const Element& required(const Element& plugin, const char* name) {
+  const Element* child = plugin.child(name);
+  if (!child || child->text.empty())
+    plugin.fail(kind_of(plugin).name + " has no <" + std::string(name) + ">");
+  return *child;
+}
+
+// The last part of a topic, where it is fit for a channel's name: as short as that.
+void name_by_topic(const std::string& topic, Element& sensor) {
+  constexpr size_t kLongest = 24;
+  std::string name = topic;
+  while (!name.empty() && name.back() == '/') name.pop_back();
+  name = name.substr(name.rfind('/') + 1);
+  if (name.empty() || name.size() > kLongest) return;
+  for (auto& [key, value] : sensor.attributes) {
+    if (key == "name") value = name;
+  }
+}
+
+void make_touch(const Made& made) {
+  const Element& time = required(made.plugin, "time");
+  constexpr double kLongest_s = 1e6;
+  add(made.sensor, "ruedo:target", required(made.plugin, "target").text);
+  add(made.sensor, "ruedo:time", shown(time.as_number(Allowed::between(0, kLongest_s))));
+  for (const Element* each : made.plugin.all("collision"))
+    add(made.sensor, "ruedo:collision", each->text);
+  name_by_topic(made.plugin.string("namespace", ""), made.sensor);
+  if (!made.plugin.boolean("enabled", false))
+    made.findings.unsupported(made.plugin.source, made.where,
+                              "the plugin TouchPlugin is enabled from the start: the service that "
+                              "would enable it is not there");
+}
+
+void make_detector(const Made& made) {
+  const Element* size = made.plugin.child("geometry/box/size");
+  if (!size) made.plugin.fail("PerformerDetector has no <geometry><box><size>");
+  size->as_vector3(Allowed::not_negative(quantity::kLength));
+  add(made.sensor, "ruedo:size", size->text);
+  const Vec3 offset = made.plugin.pose("pose").translation;
+  add(made.sensor, "ruedo:offset",
+      shown(offset.x()) + " " + shown(offset.y()) + " " + shown(offset.z()));
+  for (const Element* performer : made.performers) {
+    Element& each = add(made.sensor, "ruedo:performer");
+    add(each, "ruedo:model", dotted(performer->string("ref", "")));
+    add(each, "ruedo:size", performer->string("geometry/box/size", ""));
+  }
+  if (made.performers.empty())
+    made.findings.unsupported(made.plugin.source, made.where,
+                              "PerformerDetector detects nobody: the world has no <performer>");
+  made.without_effect({"header_data"}, "messages have no header");
+  name_by_topic(made.plugin.string("topic", ""), made.sensor);
+}
+
 struct Maker {
   const char* plugin;
   const char* type;
@@ -217,6 +271,8 @@ constexpr Maker kMakers[] = {
     {"gazebo_ros_p3d", "ruedo:pose", "p3d", make_pose},
     {"gazebo_ros_ft_sensor", "force_torque", "ft_sensor", make_force_torque},
     {"OdometryPublisher", "ruedo:pose", "odometry_publisher", make_pose},
+    {"TouchPlugin", "ruedo:touch", "touch", make_touch},
+    {"PerformerDetector", "ruedo:performer_detector", "performer_detector", make_detector},
 };
 
 // <xyzOffset> and <rpyOffset>, as a <pose> of the sensor.
@@ -238,7 +294,7 @@ void add_pose(const Element& plugin, Element& sensor) {
 }  // namespace
 
 PluginSensor sensor_from_plugin(const Element& plugin, const std::string& where,
-                                Findings& findings) {
+                                const std::vector<const Element*>& performers, Findings& findings) {
   const std::string kind = kind_of(plugin).name;
   const auto maker = std::find_if(std::begin(kMakers), std::end(kMakers),
                                   [&](const Maker& each) { return each.plugin == kind; });
@@ -255,7 +311,7 @@ PluginSensor sensor_from_plugin(const Element& plugin, const std::string& where,
              Allowed::not_negative(quantity::kRange));
   if (rate > 0) add(*sensor, "update_rate", shown(rate));
   add_pose(plugin, *sensor);
-  maker->make({plugin, *sensor, where, findings});
+  maker->make({plugin, *sensor, where, performers, findings});
   const Element* body = first_of(plugin, {"bodyName", "body_name"});
   const Element* joint = first_of(plugin, {"jointName", "joint_name"});
   return {std::move(sensor), body ? body->text : "", joint ? joint->text : ""};

@@ -3,6 +3,7 @@
 
 #include <memory>
 #include <string>
+#include <vector>
 
 #include "ruedo/element.h"
 
@@ -14,8 +15,8 @@ struct PluginSensor {
   std::string joint;                // of a sensor in a joint, instead
 };
 
-// What of the plugin has no effect goes to `findings`.
+// What of the plugin has no effect goes to `findings`. performers: the world's <performer>s.
 PluginSensor sensor_from_plugin(const Element& plugin, const std::string& where,
-                                Findings& findings);
+                                const std::vector<const Element*>& performers, Findings& findings);
 
 }  // namespace ruedo::model

@@ -7,6 +7,7 @@
 #include "model/body_layout.h"
 #include "ruedo/collisions_t.hpp"
 #include "ruedo/sensor.h"
+#include "sensors/contact_points.h"
 
 namespace ruedo {
 namespace {
@@ -77,16 +78,6 @@ class Collisions : public Sensor {
     return news;
   }
 
-  void put(const Point& from, contact_point_t& point) const {
-    point.body = model::body_name(world_, layout_, from.link);
-    for (int i = 0; i < 3; ++i) {
-      point.position[i] = from.contact.position[i];
-      point.normal[i] = from.as_a ? from.contact.normal[i] : -from.contact.normal[i];
-    }
-    point.force = from.contact.force;
-    point.depth = from.contact.depth;
-  }
-
   void show(const Snapshot& now, Outbox& out) {
     shown_step_ = now.step;
     message_.utime = now.time;
@@ -98,7 +89,7 @@ class Collisions : public Sensor {
     for (const Touched& touched : touched_) {
       told_.push_back(touched.link);
       for (const Point& point : points_) {
-        if (point.link == touched.link) put(point, *next++);
+        if (point.link == touched.link) put(point.contact, point.as_a, world_, layout_, *next++);
       }
     }
     touched_.clear();

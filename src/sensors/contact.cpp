@@ -6,6 +6,7 @@
 #include "model/body_layout.h"
 #include "ruedo/contact_t.hpp"
 #include "ruedo/sensor.h"
+#include "sensors/contact_points.h"
 
 namespace ruedo {
 namespace {
@@ -60,14 +61,7 @@ class ContactSensor : public Sensor {
     for (const Contact& contact : input.snapshot.contacts) {
       const bool as_a = is_a(contact);
       if (!as_a && !is_b(contact)) continue;
-      contact_point_t& point = message_.points.emplace_back();
-      point.body = model::body_name(world_, layout_, as_a ? contact.link_b : contact.link_a);
-      for (int i = 0; i < 3; ++i) {
-        point.position[i] = contact.position[i];
-        point.normal[i] = as_a ? contact.normal[i] : -contact.normal[i];
-      }
-      point.force = contact.force;
-      point.depth = contact.depth;
+      put(contact, as_a, world_, layout_, message_.points.emplace_back());
     }
     message_.n = static_cast<int32_t>(message_.points.size());
     message_.pressed = pressed_ ? 1 : 0;

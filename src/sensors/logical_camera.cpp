@@ -44,12 +44,7 @@ class LogicalCamera : public Sensor {
       if (instance.removed || i == own_) continue;
       const Pose X_SM = X_SW * model_pose(world_, layout_, i, now);
       if (!sees(X_SM.translation)) continue;
-      logical_object_t& object = message_.objects.emplace_back();
-      object.model = instance.name;
-      const Quat& q = X_SM.rotation;
-      const double wxyz[] = {q.w(), q.x(), q.y(), q.z()};
-      std::copy(std::begin(wxyz), std::end(wxyz), object.orientation);
-      std::copy_n(X_SM.translation.data(), 3, object.position);
+      put(instance.name, X_SM, message_.objects.emplace_back());
     }
     message_.n = static_cast<int32_t>(message_.objects.size());
     out.publish(channel_, message_);

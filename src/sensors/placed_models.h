@@ -1,7 +1,11 @@
 // Models as wholes, in the world's state.
 #pragma once
 
+#include <algorithm>
+#include <string>
+
 #include "model/body_layout.h"
+#include "ruedo/logical_object_t.hpp"
 #include "ruedo/snapshot.h"
 
 namespace ruedo {
@@ -18,6 +22,15 @@ inline Pose model_pose(const model::WorldModel& world, const model::BodyLayout& 
                        InstanceIndex instance, const Snapshot& now) {
   const model::Model& model = *world.models[instance].model;
   return link_pose(layout, layout.first_link[instance], now) * model.links.front().X_ML.inverse();
+}
+
+// A model as messages show it; X_SM: it in the frame of the device.
+inline void put(const std::string& model, const Pose& X_SM, logical_object_t& object) {
+  object.model = model;
+  const Quat& q = X_SM.rotation;
+  const double wxyz[] = {q.w(), q.x(), q.y(), q.z()};
+  std::copy(std::begin(wxyz), std::end(wxyz), object.orientation);
+  std::copy_n(X_SM.translation.data(), 3, object.position);
 }
 
 }  // namespace ruedo

@@ -156,5 +156,32 @@ TEST(JointSensors, AreRead) {
   EXPECT_EQ(urdf->models.back().model->sensors.at(0).joint, 0);
 }
 
+TEST(SensorPlugins, TriggersThatCannotBeReadAreNamed) {
+  const std::string touch = "gz-sim-touch-plugin-system", name = "gz::sim::systems::TouchPlugin",
+                    detector = "gz::sim::systems::PerformerDetector";
+  EXPECT_THAT(texts(*with(touch, "<time>1</time><enabled>true</enabled>", name)),
+              ElementsAre("<plugin>: TouchPlugin has no <target>; the sensor is left out"));
+  EXPECT_THAT(texts(*with(touch, "<target>a</target><enabled>true</enabled>", name)),
+              ElementsAre("<plugin>: TouchPlugin has no <time>; the sensor is left out"));
+  EXPECT_THAT(texts(*with(touch, "<target>a</target><time>1</time>", name)),
+              ElementsAre(HasSubstr("is enabled from the start")));
+  EXPECT_THAT(
+      texts(*with("x", "", detector)),
+      ElementsAre(
+          "<plugin>: PerformerDetector has no <geometry><box><size>; the sensor is left out"));
+  EXPECT_THAT(texts(*with("x", "<geometry><box><size>1 1 1</size></box></geometry>", detector)),
+              ElementsAre("PerformerDetector detects nobody: the world has no <performer>"));
+}
+
+TEST(SensorPlugins, PerformersThatAreNowhereAndLevelsAreNamed) {
+  const auto world = world_of(
+      "<plugin name='ignition::gazebo' filename='dummy'><performer name='p'><ref>robot</ref>"
+      "<geometry><box><size>1 1 1</size></box></geometry></performer><performer name='q'><ref>m"
+      "</ref></performer><level name='l'/></plugin><model name='m'><link name='l'/></model>");
+  EXPECT_THAT(texts(*world),
+              ElementsAre(HasSubstr("levels are not supported"), HasSubstr("<geometry>"),
+                          HasSubstr("the world has no model 'robot'")));
+}
+
 }  // namespace
 }  // namespace ruedo::model

@@ -1,0 +1,22 @@
+// A contact as messages show it: from the side of who feels it.
+#pragma once
+
+#include "model/body_layout.h"
+#include "ruedo/contact_point_t.hpp"
+#include "ruedo/snapshot.h"
+
+namespace ruedo {
+
+// as_a: link_a's is the one that feels.
+inline void put(const Contact& contact, bool as_a, const model::WorldModel& world,
+                const model::BodyLayout& layout, contact_point_t& point) {
+  point.body = model::body_name(world, layout, as_a ? contact.link_b : contact.link_a);
+  for (int i = 0; i < 3; ++i) {
+    point.position[i] = contact.position[i];
+    point.normal[i] = as_a ? contact.normal[i] : -contact.normal[i];
+  }
+  point.force = contact.force;
+  point.depth = contact.depth;
+}
+
+}  // namespace ruedo
