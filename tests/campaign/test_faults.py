@@ -262,19 +262,29 @@ def test_lost_commands_are_others_from_then_on():
 
 
 def test_a_picture_that_is_read_late_is_of_the_seed_of_its_moment():
-    """Another device's fault has the camera look at each step from then on."""
-    with client.Engine(
-        "w", text=WORLD, disable=["p3at/camera"], fault=["p3at:reseeded@0.35,value=7"]
-    ) as late:
-        late.step(None, 65)
-        late.command(0, "p3at/fault", message("freeze", "lrf"))
-        late.step(None, 14)  # the newest picture is of 0.3 s
-        assert late["eye.utime"][0, 0] == 300_000
-        drawn = late["eye.data"].tobytes()
-        late.step(None, 2)
-        later = late["eye.data"].tobytes()
-    assert drawn in dict(standing(1, seconds=0.4)["mast/eye"])[60]
-    assert later in dict(standing(7, seconds=0.4)["mast/eye"])[80]
+    """Of each two cameras, which one thread draws, the second is due after the other seed has come
+    (5 / 13 s), and the first, of 0.3 s, is read after that."""
+    eye = INSTRUMENTS[
+        INSTRUMENTS.index("<sensor name='eye'") : INSTRUMENTS.index("<sensor name='pitot'")
+    ]
+    eyes = "".join(
+        eye.replace("'eye'", f"'eye_{i}'").replace(">10<", f">{13 if i % 2 else 10}<")
+        for i in range(16)
+    )
+    text = WORLD.replace(eye, eyes)
+
+    def pictures(seed, *faults, record):
+        """The newest picture of the first camera at 0.395 s."""
+        with client.Engine(
+            "w", text=text, seed=seed, disable=["p3at/camera"], fault=faults, record=record
+        ) as engine:
+            engine.step(None, 79)
+            assert engine["eye_0.utime"][0, 0] == 300_000
+            return engine["eye_0.data"].tobytes()
+
+    drawn = {seed: pictures(seed, record=True) for seed in (1, 7)}
+    assert drawn[1] != drawn[7]
+    assert pictures(1, "p3at:reseeded@0.35,value=7", record=False) == drawn[1]
 
 
 def test_a_robot_that_comes_and_time_that_begins_anew_have_the_new_seed(tmp_path):
