@@ -110,8 +110,7 @@ Comparison::Comparison(const std::string& log, const log::Index& index,
       index_(index),
       worlds_(worlds),
       other_(other),
-      other_worlds_(other_, load),
-      reader_(other) {
+      other_worlds_(other_, load) {
   for (size_t i = 0; i < other_.channels().size(); ++i) {
     if (other_.channels()[i].fingerprint == world_state_t::getHash()) states_ = i;
   }
@@ -154,8 +153,8 @@ void Comparison::find_robots() {
 // ---- ghosts
 
 // Where one of the worlds is not known, the same index is the same body.
-const std::vector<int32_t>& Comparison::matched(const run::LogWorlds::Scene& shown,
-                                                const run::LogWorlds::Scene& other) {
+const std::vector<int32_t>& Comparison::Ghosts::matched(const run::LogWorlds::Scene& shown,
+                                                        const run::LogWorlds::Scene& other) {
   if (&shown == matched_shown_ && &other == matched_other_) return matched_;
   matched_shown_ = &shown;
   matched_other_ = &other;
@@ -170,12 +169,12 @@ const std::vector<int32_t>& Comparison::matched(const run::LogWorlds::Scene& sho
   return matched_;
 }
 
-void Comparison::show(Board& board, size_t channel, SimTime time_us) {
-  if (!states_) return;
-  const log::Index::Channel& states = other_.channels()[*states_];
+void Comparison::Ghosts::show(Board& board, size_t channel, SimTime time_us) {
+  if (!comparison_->states_) return;
+  const log::Index::Channel& states = comparison_->other_.channels()[*comparison_->states_];
   const size_t count = std::max<size_t>(states.count_until(time_us), 1);
-  const run::LogWorlds::Scene& shown = worlds_.at(time_us);
-  const run::LogWorlds::Scene& other = other_worlds_.at(time_us);
+  const run::LogWorlds::Scene& shown = comparison_->worlds_.at(time_us);
+  const run::LogWorlds::Scene& other = comparison_->other_worlds_.at(time_us);
   if (count == shown_ && &shown == matched_shown_ && &other == matched_other_) return;
   shown_ = count;
   const std::vector<int32_t>& places = matched(shown, other);

@@ -37,9 +37,29 @@ class Comparison {
   // "" or what of the other run cannot be shown.
   std::string fault() const;
 
-  // Puts the other run's state of that moment on the board, where it is another one than before.
-  void show(Board& board, size_t channel, SimTime time_us);
-  void forget() { shown_ = kNothing; }  // what is on the board: it is put there again
+  // The other run's bodies, as one viewer sees them. The comparison must outlive it.
+  class Ghosts {
+   public:
+    explicit Ghosts(const Comparison& comparison)
+        : comparison_(&comparison), reader_(comparison.path_) {}
+
+    // Puts the other run's state of that moment on the board, where it is another one than before.
+    void show(Board& board, size_t channel, SimTime time_us);
+    void forget() { shown_ = kNothing; }  // what is on the board: it is put there again
+
+   private:
+    static constexpr size_t kNothing = static_cast<size_t>(-1);
+
+    const std::vector<int32_t>& matched(const run::LogWorlds::Scene& shown,
+                                        const run::LogWorlds::Scene& other);
+
+    const Comparison* comparison_;
+    log::Reader reader_;
+    size_t shown_ = kNothing;  // how many states there were when one was put on the board
+    const run::LogWorlds::Scene *matched_shown_ = nullptr, *matched_other_ = nullptr;
+    std::vector<int32_t>
+        matched_;  // of each body of the other run, its index in the log's; -1: none
+  };
 
   // Of a robot: time in s and distance in m, or angle in rad, between its pose in the log and that
   // in the other run; null where not both have such a robot.
@@ -49,7 +69,6 @@ class Comparison {
   std::string report() const;
 
  private:
-  static constexpr size_t kNothing = static_cast<size_t>(-1);
   struct Sample {
     double time_s, distance_m, angle_rad;
   };
@@ -61,21 +80,14 @@ class Comparison {
   void find_robots();
   std::vector<Sample> samples(const Robot& robot, size_t most) const;
   void write_report();
-  const std::vector<int32_t>& matched(const run::LogWorlds::Scene& shown,
-                                      const run::LogWorlds::Scene& other);
 
   std::string log_, path_, name_;
   const log::Index& index_;
   const run::LogWorlds& worlds_;
   log::Index other_;
   run::LogWorlds other_worlds_;
-  log::Reader reader_;
-  log::Event event_;
-  std::optional<size_t> states_;  // the other run's channel of world_state_t
-  size_t shown_ = kNothing;       // how many of them there were when one was put on the board
-  const run::LogWorlds::Scene *matched_shown_ = nullptr, *matched_other_ = nullptr;
-  std::vector<int32_t> matched_;  // of each body of the other run, its index in the log's; -1: none
-  std::vector<Robot> robots_;     // of both
+  std::optional<size_t> states_;              // the other run's channel of world_state_t
+  std::vector<Robot> robots_;                 // of both
   std::vector<std::string> missing_, extra_;  // robots of the one, and of the other
 
   std::atomic<bool> ending_{false};

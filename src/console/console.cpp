@@ -1,9 +1,9 @@
 // Routes, the thread, and what is looked at once a tick.
 #include "console/console.h"
 
-#include <atomic>
+#include <algorithm>
 #include <charconv>
-#include <chrono>
+#include <deque>
 #include <mutex>
 #include <optional>
 #include <thread>
@@ -23,7 +23,7 @@
 namespace ruedo::console {
 namespace {
 
-constexpr auto kPlaybackPeriod = std::chrono::milliseconds(100);
+constexpr size_t kKeptScenes = 4;  // of a log, those asked for last
 
 Bytes bytes_of(std::string_view text) {
   return std::make_shared<const std::vector<uint8_t>>(text.begin(), text.end());
@@ -48,27 +48,34 @@ std::optional<size_t> number_after(std::string_view begin, std::string_view path
 
 }  // namespace
 
+// A world as the page draws it; what is null was not asked for yet.
+struct Scene {
+  size_t number = 0;  // of a log's
+  uint64_t version = 0;
+  std::shared_ptr<const model::WorldModel> world;
+  std::unique_ptr<SceneData> looks;
+  std::unique_ptr<SceneData> shapes;  // of its collisions
+};
+
 struct Console::Impl {
   Stage stage;
-  std::shared_ptr<const model::WorldModel> world;
-  std::unique_ptr<SceneData> scene;   // of that world; null: not made yet
-  std::unique_ptr<SceneData> shapes;  // of that world's collisions; null: not asked for yet
-  std::unique_ptr<Library> library;   // null: not asked for yet
-  Playback told;                      // to the viewers
-  std::chrono::steady_clock::time_point told_at;
+  std::shared_ptr<const model::WorldModel> world;  // that runs, or the log's first
+  std::deque<Scene> scenes;                        // the newest first
+  std::unique_ptr<Library> library;                // null: not asked for yet
   std::unique_ptr<WebServer> web;
   std::thread thread;
   std::mutex words_mutex;
   std::string words = "The server has ended.";
 
   HttpResponse get(std::string_view path);
-  HttpResponse scene_file(const SceneData& data, std::string_view path);
+  HttpResponse scene_file(std::string_view path, bool shapes);
+  static HttpResponse file_of(const SceneData& data, std::string_view path);
   HttpResponse library_file(std::string_view path);
   HttpResponse history(std::string_view path);
   HttpResponse model_text(size_t index);
-  HttpResponse blob(Bytes body, const std::string& type);
+  static HttpResponse blob(Bytes body, const std::string& type);
   bool tick();
-  const SceneData* current_scene();
+  Scene* scene(size_t number);
 };
 
 HttpResponse Console::Impl::blob(Bytes body, const std::string& type) {
@@ -79,10 +86,16 @@ HttpResponse Console::Impl::blob(Bytes body, const std::string& type) {
   return response;
 }
 
-const SceneData* Console::Impl::current_scene() {
-  if (!world) return nullptr;
-  if (!scene) scene = std::make_unique<SceneData>(*world, static_cast<int>(stage.world_version));
-  return scene.get();
+// Null where there is no such world.
+Scene* Console::Impl::scene(size_t number) {
+  const auto known = std::find_if(scenes.begin(), scenes.end(),
+                                  [&](const Scene& each) { return each.number == number; });
+  if (known != scenes.end()) return &*known;
+  std::shared_ptr<const model::WorldModel> shown = stage.source->world(number);
+  if (!shown) return nullptr;
+  if (scenes.size() >= kKeptScenes) scenes.pop_back();
+  scenes.push_front({number, stage.world_version + number, std::move(shown), nullptr, nullptr});
+  return &scenes.front();
 }
 
 HttpResponse Console::Impl::get(std::string_view path) {
@@ -99,18 +112,11 @@ HttpResponse Console::Impl::get(std::string_view path) {
   if (path.starts_with(kHistory)) return history(path.substr(kHistory.size()));
   if (path.starts_with("/library"))
     return library_file(path.substr(std::string_view("/library").size()));
-  constexpr std::string_view kCollision = "/collision";
-  if (path.starts_with(kCollision) && world) {
-    if (!shapes)
-      shapes = std::make_unique<SceneData>(collision_shapes(*world),
-                                           static_cast<int>(stage.world_version));
-    return scene_file(*shapes, path.substr(kCollision.size()));
-  }
   if (const auto model = number_after("/scene/models/", path)) return model_text(*model);
-  if (!path.starts_with("/scene")) return not_found();
-  const SceneData* data = current_scene();
-  if (!data) return not_found();
-  return scene_file(*data, path.substr(std::string_view("/scene").size()));
+  for (const std::string_view begin : {"/scene", "/collision"}) {
+    if (path.starts_with(begin)) return scene_file(path.substr(begin.size()), begin[1] == 'c');
+  }
+  return not_found();
 }
 
 // "FIELD/CHANNEL": names of channels have slashes in them.
@@ -122,8 +128,27 @@ HttpResponse Console::Impl::history(std::string_view path) {
               "application/octet-stream");
 }
 
-// A file of a scene: ".json", "/meshes", "/links", "/textures/NUMBER".
-HttpResponse Console::Impl::scene_file(const SceneData& data, std::string_view path) {
+// A file of a scene; of a log's the one whose number comes first, as in "/3.json".
+HttpResponse Console::Impl::scene_file(std::string_view path, bool shapes) {
+  size_t number = 0;
+  if (path.size() > 1 && path[0] == '/' && path[1] >= '0' && path[1] <= '9') {
+    const auto [end, error] = std::from_chars(path.data() + 1, path.data() + path.size(), number);
+    if (error != std::errc()) return not_found();
+    path.remove_prefix(static_cast<size_t>(end - path.data()));
+  }
+  Scene* shown = scene(number);
+  if (!shown) return not_found();
+  std::unique_ptr<SceneData>& data = shapes ? shown->shapes : shown->looks;
+  if (!data) {
+    const auto version = static_cast<int>(shown->version);
+    data = shapes ? std::make_unique<SceneData>(collision_shapes(*shown->world), version)
+                  : std::make_unique<SceneData>(*shown->world, version);
+  }
+  return file_of(*data, path);
+}
+
+// ".json", "/meshes", "/links", "/textures/NUMBER".
+HttpResponse Console::Impl::file_of(const SceneData& data, std::string_view path) {
   if (path == ".json") return blob(bytes_of(data.json), "application/json");
   if (path == "/meshes") return blob(data.meshes, "application/octet-stream");
   if (path == "/links") return blob(data.links, "application/octet-stream");
@@ -141,37 +166,26 @@ HttpResponse Console::Impl::model_text(size_t index) {
 
 // "/library.json", and of each of its models "/library/NUMBER/scene" with the files of a scene.
 HttpResponse Console::Impl::library_file(std::string_view path) {
-  if (!world || stage.source->playback()) return not_found();
+  if (!world || stage.is_log) return not_found();
   if (!library) library = std::make_unique<Library>(world->file);
   if (path == ".json") return blob(bytes_of(library->list()), "application/json");
   const size_t end = path.find("/scene");
   const auto index = number_after("/", path.substr(0, end));
   const SceneData* data = index ? library->scene(*index) : nullptr;
   if (!data || end == std::string_view::npos) return not_found();
-  return scene_file(*data, path.substr(end + std::string_view("/scene").size()));
+  return file_of(*data, path.substr(end + std::string_view("/scene").size()));
 }
 
 bool Console::Impl::tick() {
   const uint64_t before = stage.board.newest();
-  stage.source->pump(stage.board, stage.viewers > 0);
-  if (auto now = stage.source->world(); now != world) {
+  stage.source->pump(stage.board, !stage.viewers.empty());
+  for (Viewer* viewer : stage.viewers) viewer->pump();
+  if (auto now = stage.source->world(0); now != world) {
     world = std::move(now);
-    scene.reset();
-    shapes.reset();
+    scenes.clear();
     ++stage.world_version;
   }
-  if (const Playback* playback = stage.source->playback(); playback && *playback != told) {
-    // A time that goes on is told now and then, and everything else at once.
-    const auto now = std::chrono::steady_clock::now();
-    Playback but_for_time = *playback;
-    but_for_time.now_s = told.now_s;
-    if (but_for_time != told || now - told_at >= kPlaybackPeriod) {
-      told = *playback;
-      told_at = now;
-      ++stage.playback_version;
-    }
-  }
-  return stage.viewers > 0 || before != stage.board.newest();
+  return !stage.viewers.empty() || before != stage.board.newest();
 }
 
 Console::Console(const Address& address, std::unique_ptr<Source> source, const std::string& mode,
@@ -179,7 +193,8 @@ Console::Console(const Address& address, std::unique_ptr<Source> source, const s
     : impl_(std::make_unique<Impl>()) {
   Impl& impl = *impl_;
   impl.stage.source = std::move(source);
-  impl.world = impl.stage.source->world();
+  impl.world = impl.stage.source->world(0);
+  impl.stage.is_log = mode == "log";
   JsonWriter json;
   json.open('{')
       .name("hello")
@@ -205,7 +220,7 @@ Console::Console(const Address& address, std::unique_ptr<Source> source, const s
     impl.stage.farewell = ended.text();
   };
   handler.open = [&impl]() -> std::unique_ptr<Connection> {
-    if (impl.stage.viewers >= kMostViewers) return nullptr;
+    if (impl.stage.viewers.size() >= kMostViewers) return nullptr;
     return std::make_unique<Viewer>(impl.stage);
   };
   impl.web = std::make_unique<WebServer>(

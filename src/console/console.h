@@ -13,7 +13,7 @@ namespace ruedo::console {
 
 class Console {
  public:
-  static constexpr int kMostViewers = 128;
+  static constexpr size_t kMostViewers = 128;
 
   // Starts to serve. mode: "live" or "log"; title: what is shown. Throws EnvironmentError when the
   // address cannot be had.

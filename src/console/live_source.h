@@ -58,7 +58,9 @@ class LiveSource : public Source {
     host_.receive(channel, message);
     return true;
   }
-  std::shared_ptr<const model::WorldModel> world() override { return host_.world(); }
+  std::shared_ptr<const model::WorldModel> world(size_t scene) override {
+    return scene == 0 ? host_.world() : nullptr;
+  }
   std::string model_text(const std::string& name) override { return host_.model_text(name); }
   std::string save_name() const override { return host_.save_name; }
   std::string info_channel() const override { return info_channel_; }

@@ -35,21 +35,22 @@ std::optional<double> number_at(std::span<const uint8_t> message, const std::str
   return found;
 }
 
+bool read(log::Reader& reader, const log::Index::Entry& wanted, log::Event& event) {
+  if (wanted.size > LogSource::kMostMessage) return false;
+  reader.seek(wanted.offset);
+  return reader.next(event);  // false when the file is no longer what it was
+}
+
 }  // namespace
 
 LogSource::LogSource(const std::string& path, const run::LoadRun& load, double speed,
                      const std::string& other, const run::LoadRun& load_other)
-    : index_(path),
+    : path_(path),
+      speed_(std::clamp(speed, kSlowest, kFastest)),
+      index_(path),
       worlds_(index_, load),
       scan_(index_, worlds_.at(index_.begin_us()).world.get()),
-      reader_(path),
-      scene_(&worlds_.at(index_.begin_us())),
-      shown_(index_.channels().size(), kNothing) {
-  playback_.begin_s = static_cast<double>(index_.begin_us()) * 1e-6;
-  playback_.end_s = static_cast<double>(index_.end_us()) * 1e-6;
-  playback_.now_s = playback_.begin_s;
-  playback_.speed = std::clamp(speed, kSlowest, kFastest);
-  playback_.playing = true;
+      reader_(path) {
   for (const log::Index::Channel& channel : index_.channels()) {
     if (channel.fingerprint == world_info_t::getHash()) info_channel_ = printable(channel.name);
   }
@@ -70,91 +71,14 @@ std::string LogSource::fault() const {
   return all;
 }
 
-SimTime LogSource::now_us() const {
-  if (playback_.now_s >= playback_.end_s) return index_.end_us();
-  return std::max(index_.begin_us(), microseconds(playback_.now_s));
+std::shared_ptr<const model::WorldModel> LogSource::world(size_t scene) {
+  return scene < worlds_.scenes().size() ? worlds_.scenes()[scene].world : nullptr;
 }
 
-void LogSource::pump(Board& board, bool viewers) {
-  if (board.channels().empty()) {
-    for (size_t i = 0; i < index_.channels().size(); ++i) board.name(i, index_.channels()[i].name);
-    if (makes_info_) board.name(index_.channels().size(), info_channel_);
-    board.name(drawn_channel(), kMarkersChannel);
-    if (comparison_) board.name(compared_channel(), Comparison::kStates);
-  }
+std::unique_ptr<Look> LogSource::look() { return std::make_unique<LogLook>(*this); }
+
+void LogSource::pump(Board&, bool viewers) {
   if (viewers && !scanned_) scanned_ = scan_.advance(reader_, kScanned);
-  const auto now = std::chrono::steady_clock::now();
-  const double passed_s =
-      std::min(kLongestPause_s, std::chrono::duration<double>(now - last_).count());
-  last_ = now;
-  if (viewers && playback_.playing) {
-    playback_.now_s = std::min(playback_.end_s, playback_.now_s + passed_s * playback_.speed);
-    playback_.playing = playback_.now_s < playback_.end_s;
-  }
-  show(board);
-}
-
-void LogSource::show(Board& board) {
-  const SimTime time_us = now_us();
-  scene_ = &worlds_.at(time_us);
-  const auto& channels = index_.channels();
-  for (size_t i = 0; i < channels.size(); ++i) {
-    if (channels[i].fingerprint == markers_t::getHash()) continue;  // see show_drawn
-    if (board.channels()[i].watchers == 0) {
-      shown_[i] = kNothing;  // it is read again on demand
-      continue;
-    }
-    size_t count = channels[i].count_until(time_us);
-    if (count == 0 && channels[i].fingerprint == world_info_t::getHash()) count = 1;
-    if (count == shown_[i]) continue;
-    shown_[i] = count;
-    if (count > 0) load(board, i, count);
-  }
-  if (makes_info_ && told_ != scene_) {
-    told_ = scene_;
-    for (const auto& part : scene_->info) board.put(channels.size(), part);
-  }
-  show_drawn(board);
-  if (comparison_) show_other(board);
-}
-
-void LogSource::show_drawn(Board& board) {
-  if (board.channels()[drawn_channel()].watchers == 0) return shown_layers_.clear();
-  const std::vector<Drawn::Layer>& layers = scan_.drawn().layers();
-  shown_layers_.resize(layers.size(), kNothing);
-  for (size_t i = 0; i < layers.size(); ++i) {
-    const size_t count = layers[i].count_until(now_us());
-    if (count == shown_layers_[i]) continue;
-    shown_layers_[i] = count;
-    board.put(drawn_channel(), Drawn::message(layers[i], count, reader_));
-  }
-}
-
-void LogSource::show_other(Board& board) {
-  const size_t channel = compared_channel();
-  if (board.channels()[channel].watchers == 0)
-    comparison_->forget();
-  else
-    comparison_->show(board, channel, now_us());
-}
-
-// The newest of so many messages; of one that comes in parts, the parts before it, too.
-void LogSource::load(Board& board, size_t channel, size_t count) {
-  std::vector<std::vector<uint8_t>> parts;
-  for (size_t entry = count; entry > 0 && parts.size() < Board::kMostParts; --entry) {
-    if (!read(channel, entry - 1)) break;
-    parts.push_back(event_.data);
-    if (!board.is_later_part(parts.back())) break;
-  }
-  for (auto part = parts.rbegin(); part != parts.rend(); ++part)
-    board.put(channel, std::move(*part));
-}
-
-bool LogSource::read(size_t channel, size_t entry) {
-  const log::Index::Entry& wanted = index_.channels()[channel].entries[entry];
-  if (wanted.size > kMostMessage) return false;
-  reader_.seek(wanted.offset);
-  return reader_.next(event_);  // false when the file is no longer what it was
 }
 
 // The first message and the last one are always among those that are read.
@@ -167,14 +91,14 @@ Bytes LogSource::history(const std::string& name, const std::string& field) {
       channels.begin(), channels.end(),
       [&](const log::Index::Channel& channel) { return printable(channel.name) == name; });
   if (found == channels.end()) return nullptr;
-  const auto channel = static_cast<size_t>(found - channels.begin());
   const std::vector<log::Index::Entry>& entries = found->entries;
   const size_t every = 1 + entries.size() / kMostHistory;
   std::vector<double> numbers{static_cast<double>(every)};
+  log::Event event;
   for (size_t i = 0; i < entries.size();
        i = i + 1 < entries.size() ? std::min(i + every, entries.size() - 1) : entries.size()) {
-    if (!read(channel, i)) continue;
-    const auto value = number_at(event_.data, field);
+    if (!read(reader_, entries[i], event)) continue;
+    const auto value = number_at(event.data, field);
     const double time_s = static_cast<double>(entries[i].time_us) * 1e-6;
     if (!value || (numbers.size() > 1 && time_s <= numbers[numbers.size() - 2])) continue;
     numbers.push_back(time_s);
@@ -185,16 +109,108 @@ Bytes LogSource::history(const std::string& name, const std::string& field) {
                                                       bytes + numbers.size() * sizeof(double));
 }
 
-Source::Count LogSource::traffic(size_t channel) const {
-  if (channel >= index_.channels().size()) return {};
-  const log::Index::Channel& of = index_.channels()[channel];
+LogLook::LogLook(LogSource& source)
+    : source_(source),
+      reader_(source.path_),
+      shown_(source.index_.channels().size(), kNothing),
+      last_(std::chrono::steady_clock::now()) {
+  if (source_.comparison_) ghosts_.emplace(*source_.comparison_);
+  playback_.begin_s = static_cast<double>(source.index_.begin_us()) * 1e-6;
+  playback_.end_s = static_cast<double>(source.index_.end_us()) * 1e-6;
+  playback_.now_s = playback_.begin_s;
+  playback_.speed = source.speed_;
+  playback_.playing = true;
+}
+
+SimTime LogLook::now_us() const {
+  if (playback_.now_s >= playback_.end_s) return source_.index_.end_us();
+  return std::max(source_.index_.begin_us(), microseconds(playback_.now_s));
+}
+
+void LogLook::pump(Board& board) {
+  if (board.channels().empty()) {
+    const auto& channels = source_.index_.channels();
+    for (size_t i = 0; i < channels.size(); ++i) board.name(i, channels[i].name);
+    if (source_.makes_info_) board.name(channels.size(), source_.info_channel_);
+    board.name(source_.drawn_channel(), kMarkersChannel);
+    if (ghosts_) board.name(source_.compared_channel(), Comparison::kStates);
+  }
+  const auto now = std::chrono::steady_clock::now();
+  const double passed_s =
+      std::min(kLongestPause_s, std::chrono::duration<double>(now - last_).count());
+  last_ = now;
+  if (playback_.playing) {
+    playback_.now_s = std::min(playback_.end_s, playback_.now_s + passed_s * playback_.speed);
+    playback_.playing = playback_.now_s < playback_.end_s;
+  }
+  show(board);
+}
+
+void LogLook::show(Board& board) {
+  const SimTime time_us = now_us();
+  const auto& channels = source_.index_.channels();
+  for (size_t i = 0; i < channels.size(); ++i) {
+    if (channels[i].fingerprint == markers_t::getHash()) continue;  // see show_drawn
+    if (board.channels()[i].watchers == 0) {
+      shown_[i] = kNothing;  // it is read again on demand
+      continue;
+    }
+    size_t count = channels[i].count_until(time_us);
+    if (count == 0 && channels[i].fingerprint == world_info_t::getHash()) count = 1;
+    if (count == shown_[i]) continue;
+    shown_[i] = count;
+    if (count > 0) load(board, i, count);
+  }
+  const run::LogWorlds::Scene& scene = source_.worlds_.at(time_us);
+  if (source_.makes_info_ && told_ != &scene) {
+    told_ = &scene;
+    for (const auto& part : scene.info) board.put(channels.size(), part);
+  }
+  show_drawn(board);
+  if (!ghosts_) return;
+  const size_t compared = source_.compared_channel();
+  if (board.channels()[compared].watchers == 0)
+    ghosts_->forget();
+  else
+    ghosts_->show(board, compared, time_us);
+}
+
+void LogLook::show_drawn(Board& board) {
+  const size_t channel = source_.drawn_channel();
+  if (board.channels()[channel].watchers == 0) return shown_layers_.clear();
+  const std::vector<Drawn::Layer>& layers = source_.scan_.drawn().layers();
+  shown_layers_.resize(layers.size(), kNothing);
+  for (size_t i = 0; i < layers.size(); ++i) {
+    const size_t count = layers[i].count_until(now_us());
+    if (count == shown_layers_[i]) continue;
+    shown_layers_[i] = count;
+    board.put(channel, Drawn::message(layers[i], count, reader_));
+  }
+}
+
+// The newest of so many messages; of one that comes in parts, the parts before it, too.
+void LogLook::load(Board& board, size_t channel, size_t count) {
+  const auto& entries = source_.index_.channels()[channel].entries;
+  std::vector<std::vector<uint8_t>> parts;
+  for (size_t entry = count; entry > 0 && parts.size() < Board::kMostParts; --entry) {
+    if (!read(reader_, entries[entry - 1], event_)) break;
+    parts.push_back(event_.data);
+    if (!board.is_later_part(parts.back())) break;
+  }
+  for (auto part = parts.rbegin(); part != parts.rend(); ++part)
+    board.put(channel, std::move(*part));
+}
+
+Count LogLook::traffic(size_t channel) const {
+  if (channel >= source_.index_.channels().size()) return {};
+  const log::Index::Channel& of = source_.index_.channels()[channel];
   const size_t count = of.count_until(now_us());
   if (count == 0) return {};
   constexpr uint32_t kEventHead = 28;  // bytes before channel and data
   return {count, of.entries[count - 1].size - kEventHead - static_cast<uint32_t>(of.name.size())};
 }
 
-void LogSource::play(bool on, double speed) {
+void LogLook::play(bool on, double speed) {
   playback_.speed = std::clamp(speed, kSlowest, kFastest);
   if (on && playback_.now_s >= playback_.end_s) {
     playback_.now_s = playback_.begin_s;
@@ -203,15 +219,15 @@ void LogSource::play(bool on, double speed) {
   playback_.playing = on;
 }
 
-void LogSource::seek(Board& board, double time_s) {
+void LogLook::seek(Board& board, double time_s) {
   playback_.now_s = std::clamp(time_s, playback_.begin_s, playback_.end_s);
   ++playback_.jumps;
   show(board);
 }
 
 // From one state to the next; where the log has none, from one message to the next.
-void LogSource::step(Board& board, int states) {
-  const auto& channels = index_.channels();
+void LogLook::step(Board& board, int states) {
+  const auto& channels = source_.index_.channels();
   const auto found = std::find_if(channels.begin(), channels.end(), [](const auto& channel) {
     return channel.fingerprint == world_state_t::getHash();
   });

@@ -1,10 +1,9 @@
-// A recorded run, as the console sees it: at each moment the newest message of every channel that
-// somebody watches.
-//
-// All viewers see the same moment. Time stands still without viewers.
+// A recorded run, as the console sees it: to each viewer, at a moment of its own, the newest
+// message of every channel that it watches.
 #pragma once
 
-#include <chrono>
+#include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -27,16 +26,45 @@ class LogSource : public Source {
             const std::string& other = "", const run::LoadRun& load_other = {});
 
   void pump(Board& board, bool viewers) override;
-  Count traffic(size_t channel) const override;
   bool command(const std::string&, std::span<const uint8_t>) override { return false; }
-  std::shared_ptr<const model::WorldModel> world() override { return scene_->world; }
+  std::shared_ptr<const model::WorldModel> world(size_t scene) override;
   std::string fault() const override;
   std::string info_channel() const override { return info_channel_; }
   Bytes history(const std::string& channel, const std::string& field) override;
   const Events* events() const override { return scanned_ ? &scan_.events() : nullptr; }
   std::string compared() const override { return comparison_ ? comparison_->name() : ""; }
   std::string comparison() const override { return comparison_ ? comparison_->report() : ""; }
-  const Playback* playback() const override { return &playback_; }
+  std::unique_ptr<Look> look() override;
+
+ private:
+  friend class LogLook;
+
+  // Behind those of the log, and the info that it may not have.
+  size_t drawn_channel() const { return index_.channels().size() + (makes_info_ ? 1 : 0); }
+  size_t compared_channel() const { return drawn_channel() + 1; }
+
+  const std::string path_;
+  const double speed_;
+  log::Index index_;
+  run::LogWorlds worlds_;
+  EventScan scan_;
+  bool scanned_ = false;
+  log::Reader reader_;
+  std::string info_channel_;
+  bool makes_info_ = false;  // the log has none: it is the channel after all of the log's
+  std::unique_ptr<Comparison> comparison_;  // null: with none
+};
+
+// What a viewer sees of a log. Time begins with it, and stands still where it is paused.
+class LogLook : public Look {
+ public:
+  // The source must outlive it.
+  explicit LogLook(LogSource& source);
+
+  void pump(Board& board) override;
+  Count traffic(size_t channel) const override;
+  size_t scene() const override { return source_.worlds_.number(now_us()); }
+  const Playback& playback() const override { return playback_; }
   void play(bool on, double speed) override;
   void seek(Board& board, double time_s) override;
   void step(Board& board, int states) override;
@@ -45,29 +73,18 @@ class LogSource : public Source {
   static constexpr size_t kNothing = static_cast<size_t>(-1);
 
   SimTime now_us() const;
-  // Behind those of the log, and the info that it may not have.
-  size_t drawn_channel() const { return index_.channels().size() + (makes_info_ ? 1 : 0); }
-  size_t compared_channel() const { return drawn_channel() + 1; }
   void show(Board& board);
   void show_drawn(Board& board);
-  void show_other(Board& board);
   void load(Board& board, size_t channel, size_t count);
-  bool read(size_t channel, size_t entry);
 
-  log::Index index_;
-  run::LogWorlds worlds_;
-  EventScan scan_;
-  bool scanned_ = false;
+  LogSource& source_;
   log::Reader reader_;
   log::Event event_;
-  const run::LogWorlds::Scene* scene_;
-  std::string info_channel_;
-  bool makes_info_ = false;  // the log has none: it is the channel after all of the log's
   const run::LogWorlds::Scene* told_ = nullptr;  // whose info is on the board
-  std::vector<size_t>
-      shown_;  // of each channel, how many messages there were when one was put on the board
-  std::vector<size_t> shown_layers_;        // of each layer, as shown_
-  std::unique_ptr<Comparison> comparison_;  // null: with none
+  // Of each channel, how many messages there were when one was put on the board.
+  std::vector<size_t> shown_;
+  std::vector<size_t> shown_layers_;          // of each layer, as shown_
+  std::optional<Comparison::Ghosts> ghosts_;  // none: nothing is compared
   Playback playback_;
   std::chrono::steady_clock::time_point last_;
 };

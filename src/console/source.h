@@ -21,6 +21,29 @@ struct Playback {
   friend bool operator==(const Playback&, const Playback&) = default;
 };
 
+// What has gone over a channel.
+struct Count {
+  uint64_t messages = 0;
+  uint32_t size = 0;  // bytes of the newest message
+};
+
+// What one viewer of a log sees of it: each has a playhead of its own.
+class Look {
+ public:
+  virtual ~Look() = default;
+
+  // Goes on to what is to be seen now.
+  virtual void pump(Board& board) = 0;
+  virtual Count traffic(size_t channel) const = 0;
+  // Of the log's scenes the one to show, from 0.
+  virtual size_t scene() const = 0;
+  virtual const Playback& playback() const = 0;
+  virtual void play(bool on, double speed) = 0;
+  virtual void seek(Board& board, double time_s) = 0;
+  // So many states on, or back.
+  virtual void step(Board& board, int states) = 0;
+};
+
 class Source {
  public:
   virtual ~Source() = default;
@@ -31,17 +54,18 @@ class Source {
   // of it is missed, a reply to the viewer's very next request neither.
   virtual void attend(const Board& board) { static_cast<void>(board); }
 
-  struct Count {
-    uint64_t messages = 0;
-    uint32_t size = 0;  // bytes of the newest message
-  };
-  virtual Count traffic(size_t channel) const = 0;
+  // Over the board's channel.
+  virtual Count traffic(size_t channel) const {
+    static_cast<void>(channel);
+    return {};
+  }
 
   // A viewer's message to the simulation; false where none is taken.
   virtual bool command(const std::string& channel, std::span<const uint8_t> message) = 0;
 
-  // The world to show, another pointer when it has changed; null when there is none.
-  virtual std::shared_ptr<const model::WorldModel> world() = 0;
+  // The world to show, another pointer when it has changed; null when there is none. scene: of a
+  // log, of its scenes.
+  virtual std::shared_ptr<const model::WorldModel> world(size_t scene) = 0;
   // "" or why there is no world.
   virtual std::string fault() const { return {}; }
   // The channel of world_info_t.
@@ -70,16 +94,8 @@ class Source {
   virtual std::string compared() const { return {}; }
   virtual std::string comparison() const { return {}; }
 
-  // Of logs.
-  virtual const Playback* playback() const { return nullptr; }
-  virtual void play(bool on, double speed) { static_cast<void>(on), static_cast<void>(speed); }
-  virtual void seek(Board& board, double time_s) {
-    static_cast<void>(board), static_cast<void>(time_s);
-  }
-  // So many states on, or back.
-  virtual void step(Board& board, int states) {
-    static_cast<void>(board), static_cast<void>(states);
-  }
+  // For a viewer of a log; null: all see the same, what is on the console's board.
+  virtual std::unique_ptr<Look> look() { return nullptr; }
 };
 
 }  // namespace ruedo::console

@@ -11,6 +11,7 @@ namespace ruedo::console {
 namespace {
 
 constexpr auto kTrafficPeriod = std::chrono::milliseconds(500);
+constexpr auto kPlaybackPeriod = std::chrono::milliseconds(100);
 constexpr size_t kMostNames = 2000;  // of channels in one message
 
 template <class Value>
@@ -27,14 +28,22 @@ double read_double(std::span<const uint8_t> bytes) {
 
 }  // namespace
 
-Viewer::Viewer(Stage& stage) : stage_(stage), told_world_(stage.world_version) {
-  ++stage_.viewers;
+Viewer::Viewer(Stage& stage)
+    : stage_(stage),
+      look_(stage.source->look()),
+      told_world_(look_ ? 0 : stage.world_version) {  // the page begins with a log's first scene
+  stage_.viewers.push_back(this);
   stage_.source->attend(stage_.board);
+  pump();
 }
 
 Viewer::~Viewer() {
-  --stage_.viewers;
+  std::erase(stage_.viewers, this);
   want("");
+}
+
+void Viewer::pump() {
+  if (look_) look_->pump(own_board_);
 }
 
 bool Viewer::receive(std::span<const uint8_t> message) {
@@ -61,16 +70,16 @@ bool Viewer::receive(std::span<const uint8_t> message) {
     case Operation::play:
       if (rest.size() != 9) return false;
       if (const double speed = read_double(rest.subspan(1)); std::isfinite(speed) && speed > 0.0)
-        stage_.source->play(rest[0] != 0, speed);
+        if (look_) look_->play(rest[0] != 0, speed);
       return true;
     case Operation::seek:
       if (rest.size() != 8) return false;
-      if (const double time_s = read_double(rest); std::isfinite(time_s))
-        stage_.source->seek(stage_.board, time_s);
+      if (const double time_s = read_double(rest); look_ && std::isfinite(time_s))
+        look_->seek(own_board_, time_s);
       return true;
     case Operation::step:
       if (rest.size() != 1) return false;
-      stage_.source->step(stage_.board, rest[0] != 0 ? 1 : -1);
+      if (look_) look_->step(own_board_, rest[0] != 0 ? 1 : -1);
       return true;
   }
   return false;
@@ -78,7 +87,7 @@ bool Viewer::receive(std::span<const uint8_t> message) {
 
 void Viewer::want(std::string_view names) {
   for (size_t i = 0; i < sights_.size(); ++i) {
-    if (sights_[i].wanted) --stage_.board.channels()[i].watchers;
+    if (sights_[i].wanted) --board().channels()[i].watchers;
   }
   wanted_names_.clear();
   while (!names.empty() && wanted_names_.size() < kMostWanted) {
@@ -96,7 +105,7 @@ void Viewer::want(std::string_view names) {
 }
 
 void Viewer::match_names() {
-  auto& channels = stage_.board.channels();
+  auto& channels = board().channels();
   bool more = false;
   for (size_t i = sights_.size(); i < channels.size(); ++i) {
     Sight& sight = sights_.emplace_back();
@@ -139,35 +148,18 @@ bool Viewer::next_text(std::string& text) {
     text = stage_.farewell;
     return !std::exchange(parted_, true);
   }
-  if (told_world_ != stage_.world_version) {
-    told_world_ = stage_.world_version;
+  if (const uint64_t world = look_ ? look_->scene() : stage_.world_version; world != told_world_) {
+    told_world_ = world;
     text = "{\"scene\": " + std::to_string(told_world_) + "}";
     return true;
   }
-  if (const Playback* playback = stage_.source->playback();
-      playback && told_playback_ != stage_.playback_version) {
-    told_playback_ = stage_.playback_version;
-    JsonWriter json;
-    json.open('{')
-        .name("playback")
-        .open('{')
-        .member("begin", playback->begin_s)
-        .member("end", playback->end_s)
-        .member("now", playback->now_s);
-    json.member("speed", playback->speed)
-        .member("playing", playback->playing)
-        .member("jumps", playback->jumps)
-        .close('}')
-        .close('}');
-    text = json.text();
-    return true;
-  }
+  if (look_ && next_playback(text)) return true;
   if (!compared_) {
     text = stage_.source->comparison();
     compared_ = !text.empty();
     if (compared_) return true;
   }
-  const auto& channels = stage_.board.channels();
+  const auto& channels = board().channels();
   if (told_channels_ < channels.size()) {
     JsonWriter json;
     json.open('{').member("first", static_cast<int64_t>(told_channels_)).name("channels").open('[');
@@ -178,6 +170,35 @@ bool Viewer::next_text(std::string& text) {
     return true;
   }
   return next_events(text);
+}
+
+// A time that goes on is told now and then, and everything else at once.
+bool Viewer::next_playback(std::string& text) {
+  const Playback& playback = look_->playback();
+  const auto now = std::chrono::steady_clock::now();
+  if (told_playback_) {
+    Playback but_for_time = playback;
+    but_for_time.now_s = told_playback_->now_s;
+    if (playback == *told_playback_ ||
+        (but_for_time == *told_playback_ && now - told_playback_at_ < kPlaybackPeriod))
+      return false;
+  }
+  told_playback_ = playback;
+  told_playback_at_ = now;
+  JsonWriter json;
+  json.open('{')
+      .name("playback")
+      .open('{')
+      .member("begin", playback.begin_s)
+      .member("end", playback.end_s)
+      .member("now", playback.now_s);
+  json.member("speed", playback.speed)
+      .member("playing", playback.playing)
+      .member("jumps", playback.jumps)
+      .close('}')
+      .close('}');
+  text = json.text();
+  return true;
 }
 
 // {"events": [...], "first": 0}: from that one on. From 0 on: those that were told before hold no
@@ -204,7 +225,7 @@ bool Viewer::next_messages(std::vector<uint8_t>& frame) {
   if (wanted_names_.empty()) return false;
   match_names();
   const size_t begin = frame.size();
-  const auto& channels = stage_.board.channels();
+  const auto& channels = board().channels();
   std::vector<std::pair<const Board::Message*, size_t>> fresh;  // and the channel
   for (size_t i = 0; i < sights_.size(); ++i) {
     if (!sights_[i].wanted || sights_[i].sent == channels[i].last_number) continue;
@@ -231,8 +252,8 @@ bool Viewer::next_messages(std::vector<uint8_t>& frame) {
 // one's size (4 bytes).
 void Viewer::add_traffic(std::vector<uint8_t>& frame) {
   append(frame, uint32_t{static_cast<uint8_t>(Frame::traffic)});
-  for (size_t i = 0; i < stage_.board.channels().size(); ++i) {
-    const Source::Count count = stage_.source->traffic(i);
+  for (size_t i = 0; i < board().channels().size(); ++i) {
+    const Count count = look_ ? look_->traffic(i) : stage_.source->traffic(i);
     append(frame, static_cast<uint32_t>(count.messages));
     append(frame, count.size);
   }

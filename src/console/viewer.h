@@ -5,6 +5,8 @@
 #pragma once
 
 #include <chrono>
+#include <memory>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -15,15 +17,17 @@
 
 namespace ruedo::console {
 
+class Viewer;
+
 // What all viewers share.
 struct Stage {
-  Board board;
+  Board board;  // of a running server
   std::unique_ptr<Source> source;
   std::string greeting;        // JSON, the first message to a viewer
   std::string farewell;        // JSON, the last one; "" while it goes on
-  uint64_t world_version = 0;  // another one when the scene has changed
-  uint64_t playback_version = 0;
-  int viewers = 0;
+  uint64_t world_version = 0;  // of a running server, another one when the scene has changed
+  std::vector<Viewer*> viewers;
+  bool is_log = false;
 };
 
 // What a browser sends: an operation, then what it is about.
@@ -52,15 +56,22 @@ class Viewer : public Connection {
   bool receive(std::span<const uint8_t> message) override;
   bool next(std::vector<uint8_t>& message, bool& text) override;
 
+  // Of a log: its look goes on.
+  void pump();
+
  private:
   void want(std::string_view names);
   void match_names();
   bool next_text(std::string& text);
   bool next_messages(std::vector<uint8_t>& frame);
+  bool next_playback(std::string& text);
   bool next_events(std::string& text);
   void add_traffic(std::vector<uint8_t>& frame);
+  Board& board() { return look_ ? own_board_ : stage_.board; }
 
   Stage& stage_;
+  std::unique_ptr<Look> look_;  // null: of a running server
+  Board own_board_;             // the look's
   std::vector<std::string> wanted_names_;
   struct Sight {
     bool wanted = false;
@@ -68,7 +79,9 @@ class Viewer : public Connection {
   };
   std::vector<Sight> sights_;  // of each of the board's channels
   size_t told_channels_ = 0;   // whose names the browser has
-  uint64_t told_world_ = 0, told_playback_ = 0;
+  uint64_t told_world_ = 0;    // version, or scene of a log
+  std::optional<Playback> told_playback_;
+  std::chrono::steady_clock::time_point told_playback_at_;
   size_t told_events_ = 0;                 // of the list's
   uint64_t told_generation_ = UINT64_MAX;  // whose list that is
   bool compared_ = false;                  // was told what differs

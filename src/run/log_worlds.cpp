@@ -169,11 +169,11 @@ LogWorlds::LogWorlds(const log::Index& index, const LoadRun& load) {
     fault_ += "Only the first changes of the world are shown.";
 }
 
-const LogWorlds::Scene& LogWorlds::at(SimTime time_us) const {
+size_t LogWorlds::number(SimTime time_us) const {
   const auto after =
       std::upper_bound(scenes_.begin(), scenes_.end(), time_us,
                        [](SimTime time, const Scene& scene) { return time < scene.from_us; });
-  return after == scenes_.begin() ? scenes_.front() : *(after - 1);
+  return after == scenes_.begin() ? 0 : static_cast<size_t>(after - scenes_.begin()) - 1;
 }
 
 }  // namespace ruedo::run

@@ -34,7 +34,9 @@ class LogWorlds {
 
   LogWorlds(const log::Index& index, const LoadRun& load);
 
-  const Scene& at(SimTime time_us) const;
+  const Scene& at(SimTime time_us) const { return scenes_[number(time_us)]; }
+  size_t number(SimTime time_us) const;  // of the scene, from 0
+  const std::vector<Scene>& scenes() const { return scenes_; }
   // "" or what cannot be shown, and why.
   const std::string& fault() const { return fault_; }
 

@@ -9,7 +9,20 @@ import subprocess
 import time
 
 import pytest
-from harness import ARENA, PLAY, RUEDO, SEEK, SEEN, SOURCE, TRAFFIC, WANT, Socket, get, playing
+from harness import (
+    ARENA,
+    PLAY,
+    RUEDO,
+    SEEK,
+    SEEN,
+    SOURCE,
+    TRAFFIC,
+    WANT,
+    Socket,
+    get,
+    playing,
+    running,
+)
 
 
 def record(log, world=ARENA, *arguments):
@@ -49,8 +62,10 @@ def greeting(port):
 def texts_until(viewer, member):
     while True:
         opcode, data = viewer.receive()
-        if opcode == 1 and member in json.loads(data):
-            return json.loads(data)[member]
+        told = json.loads(data) if opcode == 1 else {}
+        viewer.names = getattr(viewer, "names", []) + told.get("channels", [])
+        if member in told:
+            return told[member]
 
 
 def seek(viewer, time_s):
@@ -123,6 +138,49 @@ def test_the_time_line_goes_with_the_log(log):
         while playback["now"] != 0:
             playback = texts_until(viewer, "playback")
         assert not playback["playing"]
+
+
+def test_each_viewer_has_a_moment_of_its_own(tmp_path):
+    """A robot comes on the way. Who looks at the time before sees a world without it, while another
+    one sees it; when one of them plays, the other's time stands still.
+    """
+    import lcm
+    import ruedo
+
+    log = tmp_path / "run.lcm"
+    with (
+        running("--disable", "p3at/camera", "--record", log) as process,
+        ruedo.connect(timeout=60) as sim,
+    ):
+        sim.sleep(0.3)
+        sim.spawn("p3dx", -2.0, 2.0, name="late")
+        sim.sleep(0.3)
+    poses = [event.timestamp for event in lcm.EventLog(str(log)) if event.channel == "late/pose"]
+    with playing(log) as process:
+        early, _ = greeting(process.port)
+        late, _ = greeting(process.port)
+        seek(early, 0.1)
+        seek(late, poses[-1] * 1e-6)
+        assert texts_until(late, "scene") == 1
+        late.send(bytes([WANT]) + b"late/pose")
+        newest(late, {"late/pose": poses[-1]})
+
+        def robots(scene):
+            answer = json.loads(get(process.port, f"/scene/{scene}.json")[1])
+            return {base["robot"] for base in answer["bases"]}
+
+        assert robots(0) == {"p3at"} and robots(1) == {"p3at", "late"}
+        assert get(process.port, "/scene/2.json")[0] == 404
+        assert get(process.port, "/scene/99999999999999999999.json")[0] == 404
+        late.send(bytes([PLAY, 1]) + struct.pack("<d", 1000.0))  # begins anew at its end
+        while not (told := texts_until(late, "playback"))["playing"]:
+            pass
+        while told["now"] != told["end"]:
+            told = texts_until(late, "playback")
+        early.send(bytes([PLAY, 0]) + struct.pack("<d", 3.0))
+        while (told := texts_until(early, "playback"))["speed"] != 3:
+            pass
+        assert (told["now"], told["playing"]) == (0.1, False)
 
 
 def test_the_log_is_not_steered(log):

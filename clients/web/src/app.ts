@@ -80,6 +80,7 @@ export class App {
   private readonly file = LogFile.inPage();
   readonly rewind = this.file ? null : new Rewind(new Link()); // of what may be live
   readonly link: RunLink = this.file ?? this.rewind!;
+  private sceneNumber = 0; // of a log's
   private readonly scenes: { from: number; world: World; files: SceneFiles | null }[] = []; // of the past that is kept
   readonly session = new Session((channel, message) => this.link.command(channel, message));
   readonly control = new Control(this.page, this.link, this.session, this.clock);
@@ -259,7 +260,10 @@ export class App {
     this.link.connect({
       state: (link, words) => this.notice.onLink(link, words),
       hello: (hello) => this.loading.onHello(hello),
-      scene: () => void this.loading.onScene(),
+      scene: (number) => {
+        this.sceneNumber = number;
+        void this.loading.onScene();
+      },
       playback: (playback) => this.onPlayback(playback),
       events: (first, events) =>
         page.set({ events: [...page.now.events.slice(0, first), ...events] }),
@@ -282,6 +286,7 @@ export class App {
   private onHello(hello: Hello): void {
     const before = this.page.now.hello;
     this.asked = false;
+    this.sceneNumber = 0;
     this.markers.clear();
     document.title = `${hello.title} – Ruedo`;
     document.body.dataset.mode = hello.mode;
@@ -312,10 +317,12 @@ export class App {
 
   // As it looks, or as physics has it.
   private async loadScene(): Promise<SceneFiles | null> {
-    if (!this.page.now.layers.has("shapes")) return loadScene(this.file);
-    const shapes = await loadScene(this.file, "/collision");
+    // Of a log that is served each page has a moment of its own.
+    const at = this.page.now.hello?.mode === "log" && !this.file ? `/${this.sceneNumber}` : "";
+    if (!this.page.now.layers.has("shapes")) return loadScene(this.file, `/scene${at}`);
+    const shapes = await loadScene(this.file, `/collision${at}`);
     if (!shapes && this.page.now.scene) toast("The collision shapes are not in this page.");
-    return shapes ?? loadScene(this.file);
+    return shapes ?? loadScene(this.file, `/scene${at}`);
   }
 
   // Kept for who looks back; shown, unless the past is.

@@ -35,7 +35,7 @@ export type LinkState = "connecting" | "open" | "lost" | "ended";
 export interface LinkHandler {
   state(state: LinkState, words: string): void;
   hello(hello: Hello): void;
-  scene(): void;
+  scene(number: number): void; // another one is to be shown; of a log its number
   playback(playback: Playback): void;
   // What happened, from the event of that number on; from 0 on: earlier ones hold no more.
   events(first: number, events: RunEvent[]): void;
@@ -212,7 +212,7 @@ export class Link implements RunLink {
       refused?: string;
     };
     if (said.hello) this.handler.hello(said.hello);
-    if (said.scene !== undefined) this.handler.scene();
+    if (said.scene !== undefined) this.handler.scene(said.scene);
     if (said.playback) this.handler.playback(said.playback);
     if (said.channels)
       said.channels.forEach((name, i) => {

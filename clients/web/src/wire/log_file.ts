@@ -220,7 +220,7 @@ export class LogFile implements RunLink {
     );
     if (scene !== this.scene) {
       this.scene = scene;
-      this.handler?.scene();
+      this.handler?.scene(scene);
     }
     channels.forEach((name, i) => {
       if (!this.wanted.has(name)) return;

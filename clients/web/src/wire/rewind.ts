@@ -101,7 +101,7 @@ export class Rewind implements RunLink {
         this.drawn = null;
         handler.hello(hello);
       },
-      scene: () => handler.scene(),
+      scene: (number) => handler.scene(number),
       playback: (playback) => handler.playback(playback),
       events: (first, events) => handler.events(first, events),
       comparison: (comparison) => handler.comparison(comparison),
