@@ -9,6 +9,9 @@
 #include <fcntl.h>
 #include <unistd.h>
 
+#include "log/reader.h"
+#include "ruedo/applied_t.hpp"
+#include "ruedo/decode.h"
 #include "ruedo/errors.h"
 
 namespace ruedo::run {
@@ -98,8 +101,8 @@ std::string Journal::snapshot_path(const std::string& name) const {
   return folder_ + "/" + name + kSuffix;
 }
 
-std::string Journal::save_snapshot(const std::string& name, const state_hash_t& state,
-                                   SimTime stamp_us) {
+std::string Journal::save(const std::string& name,
+                          const std::function<std::string(log::Writer&)>& fill) {
   const std::string path = snapshot_path(name);
   PartOfFile part(folder_ + "/." + name + ".part");
   std::error_code error;
@@ -112,14 +115,54 @@ std::string Journal::save_snapshot(const std::string& name, const state_hash_t& 
   if (!writer_.error().empty()) return "the journal is incomplete: " + writer_.error();
   try {
     log::Writer snapshot(part.path());
-    const std::string fault = snapshot.append(writer_);
+    const std::string fault = fill(snapshot);
     if (!fault.empty()) return fault;
-    write(snapshot, stamp_us - base_us_, kStateHashChannel, state);
     snapshot.flush();
     return snapshot.error().empty() ? part.keep_as(path) : snapshot.error();
-  } catch (const EnvironmentError& fault) {
+  } catch (const std::runtime_error& fault) {
     return fault.what();
   }
+}
+
+std::string Journal::save_snapshot(const std::string& name, const state_hash_t& state,
+                                   SimTime stamp_us) {
+  return save(name, [&](log::Writer& snapshot) {
+    const std::string fault = snapshot.append(writer_);
+    if (fault.empty()) write(snapshot, stamp_us - base_us_, kStateHashChannel, state);
+    return fault;
+  });
+}
+
+// Without what acted on that state and on later ones.
+std::string Journal::save_past(const std::string& name, int64_t step, SimTime time_us,
+                               int32_t epoch, SimTime stamp_us) {
+  return save(name, [&](log::Writer& snapshot) -> std::string {
+    PartOfFile whole(folder_ + "/." + name + ".whole");
+    log::Writer copy(whole.path());
+    const std::string fault = copy.append(writer_);
+    copy.flush();
+    if (!fault.empty() || !copy.error().empty()) return fault + copy.error();
+    log::Reader reader(whole.path());
+    log::Event event;
+    while (reader.next(event)) {
+      applied_t applied;
+      const bool acted = event.channel == kAppliedChannel;
+      if (acted &&
+          decode_checked(event.data.data(), event.data.size(), applied) != DecodeFault::none)
+        return "the journal is damaged";
+      // Where sim time was set to 0, steps of before have earlier stamps.
+      const SimTime stamp = event.timestamp_us + base_us_;
+      if (stamp > stamp_us || (acted && stamp == stamp_us && applied.step == step)) break;
+      snapshot.write(event.timestamp_us, event.channel, event.data.data(), event.data.size());
+    }
+    state_hash_t end{};
+    end.utime = time_us;
+    end.step = step;
+    end.epoch = epoch;
+    end.last = true;
+    write(snapshot, stamp_us - base_us_, kStateHashChannel, end);
+    return "";
+  });
 }
 
 }  // namespace ruedo::run

@@ -5,6 +5,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -34,11 +35,19 @@ class Journal : public Sink {
   // Writes the journal and the state that it leads to into a file of the folder, which then is
   // whole or not there. stamp_us: of the state. The error, or "".
   std::string save_snapshot(const std::string& name, const state_hash_t& state, SimTime stamp_us);
+  // The same of a state that is past, which is not in the journal: nothing will check it. time_us:
+  // of that state.
+  std::string save_past(const std::string& name, int64_t step, SimTime time_us, int32_t epoch,
+                        SimTime stamp_us);
   // The file of a snapshot; "" for a name that is none: 1 to 63 of letters, digits, '_', '-' and
   // '.', not first a '.'.
   std::string snapshot_path(const std::string& name) const;
 
  private:
+  // A file that becomes a snapshot when fill(writer) has written it: what went wrong, or "".
+  std::string save(const std::string& name,
+                   const std::function<std::string(log::Writer& snapshot)>& fill);
+
   const std::string folder_;
   log::Writer writer_;
   SimTime base_us_ = 0;  // the stamp of its begin

@@ -23,6 +23,7 @@
 #include "ruedo/name_request_t.hpp"
 #include "ruedo/rate_request_t.hpp"
 #include "ruedo/reset_request_t.hpp"
+#include "ruedo/snapshot_request_t.hpp"
 #include "ruedo/state_reply_t.hpp"
 #include "ruedo/step_request_t.hpp"
 #include "run/beats.h"
@@ -180,7 +181,8 @@ class Run {
   Outcome say_info(const request_t&);
   Outcome quit(const request_t&);
   Outcome reset_odometry(const request_t& request, const name_request_t& body);
-  Outcome snapshot(const request_t&, const name_request_t& body);
+  Outcome snapshot(const request_t& request);
+  Outcome snapshot_of(const snapshot_request_t& past);
   Outcome restore(const request_t& request, const name_request_t& body);
 
   // Requests that change the world between two steps; in edit_requests.cpp.

@@ -1,5 +1,6 @@
 """Runs that go on: logs played, snapshots restored, controllers that the run waits for."""
 
+import shlex
 import shutil
 import signal
 import subprocess
@@ -27,7 +28,7 @@ from recorded import (
     until,
     url,
 )
-from ruedo.lcmtypes import log_header_t, world_state_t
+from ruedo.lcmtypes import log_header_t, request_t, snapshot_request_t, world_state_t
 
 LOG_ONLY = {"ruedo/header", "ruedo/applied", "ruedo/state_hash"}
 
@@ -240,6 +241,48 @@ def test_a_snapshot_in_the_same_process(tmp_path):
         "verify", tmp_path / "a.lcm"
     )  # without the snapshot's file, which the log does not need
     assert result.returncode == 0, result.stdout + result.stderr
+
+
+def test_a_snapshot_of_a_past_state(tmp_path):
+    """It leads to the state that was there then, whatever came later, and after a reset of the
+    time; commands and requests that acted on that very state are not in it.
+    """
+    server = Server(7868, "--rate", "max", "--paused", "--snapshots", tmp_path)
+    with server.connect() as simulation:
+
+        def snapshot(step, epoch, name="past"):
+            body = snapshot_request_t()
+            body.name, body.epoch, body.step = name, epoch, step
+            return simulation._session.request(request_t.SNAPSHOT, body).text
+
+        command(simulation, 0.5, 0.4)
+        simulation.step(100)
+        then = simulation.state()
+        simulation.spawn(text=BOX, x=2.5, y=-1.5, z=1.5)
+        command(simulation, 0.1, -0.4)
+        simulation.step(100)
+        told = shlex.split(snapshot(100, 0))
+        assert told[:2] == ["ruedo", "run"] and str(tmp_path / "past.snapshot") in told
+        for step, epoch in ((201, 0), (-1, 0), (100, 1)):
+            with pytest.raises(ruedo.RequestError, match="allowed are 0 to 200 of epoch 0"):
+                snapshot(step, epoch)
+        with pytest.raises(ruedo.RequestError, match="is no name of a snapshot"):
+            snapshot(100, 0, "../there")
+        simulation.reset(what="time")
+        epoch = simulation._info.epoch
+        simulation.step(20)
+        later = simulation.state()
+        simulation.step(30)
+        snapshot(20, epoch, "later")
+        simulation.quit()
+    server.end()
+    for name, expected in (("past", then), ("later", later)):
+        restored = Server(7869, "--paused", "--restore", tmp_path / f"{name}.snapshot")
+        with restored.connect() as simulation:
+            until(lambda step=expected.step: simulation.state().step == step)
+            assert simulation.state().state_hash == expected.state_hash
+            simulation.quit()
+        restored.end()
 
 
 CONTROLLER = '''

@@ -7,13 +7,26 @@ import itertools
 import json
 import math
 import re
+import shlex
 import shutil
 import socket
 import subprocess
 import time
 
 import pytest
-from harness import RUEDO, SOURCE, Socket, browse, browser, judged, needs_browser, playing, running
+from harness import (
+    ARENA,
+    RUEDO,
+    SOURCE,
+    Socket,
+    browse,
+    browser,
+    judged,
+    needs_browser,
+    playing,
+    running,
+    serving,
+)
 
 BUMPER = SOURCE / "tests" / "console" / "bumper.sdf"
 LAYERS = ("rays", "points", "sonar", "trail", "odometry", "contacts", "frames")
@@ -94,6 +107,40 @@ def test_the_past_of_a_live_run_is_looked_at(tmp_path):
         "with all that came",
         "all was seen",
     } <= set(seen)
+
+
+def test_a_second_run_branches_off_the_past(tmp_path):
+    """A driven run goes on while a state that is past is saved. The printed command begins with
+    that state, to the last bit as the first run's log has it; the second run's log can be verified.
+    """
+    import ruedo
+
+    folder = tmp_path / "my branches"
+    folder.mkdir()
+    first, second = tmp_path / "first.lcm", tmp_path / "second.lcm"
+    options = ("--disable", "p3at/camera", "--seed", "5", "--no-noise")
+    with running(*options, "--snapshots", folder, "--record", first) as process:
+        seen = browse(process.url, tmp_path, "branch")
+    told = json.loads(next(line for line in seen if line.startswith("branch "))[7:])
+    words = shlex.split(told["command"])
+    assert words[:3] == ["ruedo", "run", str(ARENA)] and "--no-noise" in words
+    with (
+        serving(*words[1:], "--paused", "--record", second) as process,
+        ruedo.connect(timeout=60) as sim,
+    ):
+        while (state := sim.state()).time < told["time"] - 1e-9:  # it runs there first
+            time.sleep(0.02)
+        assert state.time == pytest.approx(told["time"], abs=1e-9)
+        while True:
+            try:
+                sim.step(100)
+                break
+            except ruedo.RequestError as refused:
+                assert "is being restored" in str(refused)
+    there = {found[1]: found[2:4] for found in states(first, 0)}
+    gone_on = {found[1]: found[2:4] for found in states(second, 0)}
+    assert there[state.time][0] > 0.5 and gone_on[state.time] == there[state.time]
+    subprocess.run([RUEDO, "verify", second], check=True, timeout=100)
 
 
 def test_any_field_is_plotted(tmp_path):

@@ -167,6 +167,7 @@ export class App {
       seek: (time_s) => this.seek(time_s),
       live: () => this.rewind?.live(),
       step: (ahead) => this.link.step(ahead),
+      branch: () => void this.control.branch(),
     });
     if (this.rewind) {
       this.rewind.onPast = (past, kept) => this.onPast(past, kept);

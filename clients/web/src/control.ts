@@ -2,7 +2,8 @@
 import { joint_command_t, move_command_t, request_t, type reply_t } from "../generated/messages";
 import type { Clock } from "./state/clock";
 import type { Page } from "./state/page";
-import { inputOf } from "./state/world";
+import { inputOf, sees } from "./state/world";
+import { showCommand } from "./ui/command";
 import { confirmed } from "./ui/confirm";
 import { toast } from "./ui/dom";
 import { encode } from "./wire/lcm";
@@ -55,6 +56,19 @@ export class Control {
       toast((error as Error).message, "error");
       return null;
     }
+  }
+
+  // Saves the moment of the past that is shown, and says how a second run goes on from it.
+  async branch(): Promise<void> {
+    const { past, world } = this.page.now;
+    if (!past || !world) return;
+    if (!sees(world, request_t.SNAPSHOT))
+      return toast("Start the server with --snapshots FOLDER: branches are saved there.", "error");
+    const step = Math.floor((past.now * 1e6) / world.step_us + 1e-3),
+      name = `branch-${past.now.toFixed(2)}-${Date.now().toString(36)}`,
+      body = encode("snapshot_request_t", { name, epoch: this.clock.epoch, step: BigInt(step) });
+    const reply = await this.ask(request_t.SNAPSHOT, body);
+    if (reply) showCommand(`Saved at ${past.now.toFixed(2)} s`, reply.text);
   }
 
   async request(kind: number, body?: Uint8Array): Promise<boolean> {

@@ -10,6 +10,7 @@ export interface TimelineActions {
   seek(time_s: number): void;
   live(): void;
   step(ahead: boolean): void;
+  branch(): void;
 }
 
 export class Timeline {
@@ -76,6 +77,7 @@ export class Timeline {
       h("div", { class: "times" }, this.time, text),
       h("span", { class: "row tight" }, before, after, kinds, loop, this.difference()),
       this.speed,
+      this.branch(),
       this.live,
     );
     // After a click space is for playing again; who came by the keyboard stays.
@@ -104,6 +106,16 @@ export class Timeline {
     button.setAttribute("aria-label", words);
     this.page.watch(["comparison"], ({ comparison }) => {
       button.hidden = !comparison?.first;
+    });
+    return button;
+  }
+
+  // In the past of a run.
+  private branch(): HTMLElement {
+    const title = "a second run that goes on from here",
+      button = h("button", { id: "branch", title, click: () => this.actions.branch() }, "Branch");
+    this.page.watch(["past", "hello"], ({ past, hello }) => {
+      button.hidden = !past || hello?.mode !== "live";
     });
     return button;
   }

@@ -1,0 +1,26 @@
+// A command to start in a terminal, in a dialog: to be copied.
+import { h } from "./dom";
+
+export function showCommand(heading: string, command: string): void {
+  const text = h("code", { id: "command" }, command),
+    copy = h("button", { type: "button", class: "on", autofocus: true }, "Copy");
+  copy.addEventListener("click", () => {
+    // Not there on a page that came over an unencrypted connection from another machine.
+    const copied = navigator.clipboard?.writeText(command) ?? Promise.reject(new Error());
+    copied.then(
+      () => (copy.textContent = "Copied"),
+      () => getSelection()?.selectAllChildren(text),
+    );
+  });
+  const dialog = h(
+    "dialog",
+    { class: "confirm", "aria-labelledby": "command-heading" },
+    h("h2", { id: "command-heading" }, heading),
+    h("p", {}, "A second run goes on from there:"),
+    h("p", {}, text),
+    h("form", { method: "dialog", class: "row" }, copy, h("button", { value: "" }, "Close (Esc)")),
+  );
+  dialog.addEventListener("close", () => dialog.remove());
+  document.body.append(dialog);
+  dialog.showModal();
+}
