@@ -297,7 +297,7 @@ def test_strange_logs_do_not_hurt(log, tmp_path):
         (b"", "holds no message"),
         (b"hello, world" * 100, "is not an LCM log"),
         (b"\xed\xa1\xda\x01" + b"\xff" * 40, "holds no message: damaged at byte 0"),
-        ("folder", "is not a file"),
+        ("folder", "is a folder; allowed is a log, or a ROS 2 bag"),
     ],
 )
 def test_what_is_no_log_is_said(tmp_path, content, words):
