@@ -56,6 +56,7 @@ class SdfReader {
   // The instances of a <ruedo:fleet>, after what the world has already.
   void read_fleet(const Element& element, WorldModel& world, size_t most_models);
   class ModelReader;  // of one <model>
+  class WorldReader;  // of one <world>
 
   // A <model> or <include> of a world.
   struct Member {

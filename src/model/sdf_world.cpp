@@ -323,55 +323,167 @@ void stand_actors(const std::set<std::string>& actors, WorldModel& world) {
 
 }  // namespace
 
-void SdfReader::read_world(const Element& element, SdfVersion version, WorldModel& world) {
-  if (element.has("joint")) {
-    read_world(*with_joined_models(element, version), version, world);
-    return;
-  }
-  Findings& findings = context_.findings;
-  const std::string* name = element.attribute("name");  // no name is reserved for it
-  world.name = name ? *name : "";
-  if (world.name.empty()) {
-    world.name = "world";
-    findings.repaired(element.source, "world", "the world has no name; it is called 'world'");
-  }
-  report_other_children(element,
-                        {"model", "include", "light", "frame", "physics", "gravity", "scene",
-                         "actor", "joint", "atmosphere", "magnetic_field", "spherical_coordinates",
-                         "ruedo:fleet", "ruedo:crowd", "ruedo:fault"},
-                        {"gui", "wind", "audio", "plugin", "state", "population"},
-                        "world " + world.name, findings);
-  const std::string in_world = "world " + world.name;
-  read_or_leave_out(in_world, "what is usual is taken", findings,
-                    [&] { read_physics(element, world, findings); });
-  read_environment(element, world.environment, findings);
-  if (const Element* scene = element.child("scene"))
-    read_or_leave_out(in_world, "what is usual is taken", findings,
-                      [&] { read_scene(*scene, world.sky, findings); });
-  name_what_has_no_effect(element, in_world, findings);
+// Reads one <world>: its settings first, then what stands in it with names and frames, then places.
+class SdfReader::WorldReader {
+ public:
+  WorldReader(SdfReader& reader, const Element& element, SdfVersion version, WorldModel& world)
+      : reader_(reader),
+        context_(reader.context_),
+        findings_(context_.findings),
+        element_(element),
+        version_(version),
+        world_(world) {}
 
-  std::set<std::string> named;
-  load_own_plugins(element.all("plugin"));
-  performers_ = read_performers(element, in_world, findings);
-  for (const Element* plugin : element.all("plugin")) {
-    if (has_levels(*plugin)) continue;
-    const PluginKind kind = kind_of(*plugin);
-    const bool dead = kind.does == PluginKind::Does::dead;
-    if (!dead && kind.does != PluginKind::Does::unknown) continue;
-    if (!named.insert(kind.name).second) continue;
-    findings.unsupported(plugin->source, in_world,
-                         dead ? "the plugin " + kind.name + " does nothing here: " + kind.would
-                              : "plugins of Gazebo's server are not loaded: " + kind.name);
+  void read() {
+    read_settings();
+    name_plugins();
+    read_children();
+    const SavedState saved(element_, findings_);
+    for (const Placed& each : placed_) add_model(each, saved);
+    name_wind_without_plugin(element_, world_, findings_);
+    check_performers(world_, reader_.performers_, findings_);
+    stand_actors(actors_, world_);
+    for (const Element* fleet : element_.all("ruedo:fleet"))
+      reader_.read_fleet(*fleet, world_, kMaxModels);
+    for (const Element* crowd : element_.all("ruedo:crowd")) add_crowd(*crowd, world_, kMaxModels);
+    for (const Element* fault : element_.all("ruedo:fault"))
+      world_.faults.push_back(read_fault(*fault));
+    for (const Element* light : element_.all("light")) {
+      read_or_leave_out(in_world_, "the light is left out", findings_, [&] {
+        const Pose pose = frames_.pose(relative_to(*light), *light) * light->pose("pose");
+        world_.lights.push_back(read_light(*light, pose, "world/light", context_));
+        saved.put_back(world_.lights.back());
+      });
+    }
   }
-  FrameGraph frames("the world");
+
+ private:
   struct Placed {
     std::string name;
     const Element* element;
     std::shared_ptr<const ScopedModel> scope;
   };
-  std::vector<Placed> placed;
-  std::set<std::string> actors;
-  const auto place_actor = [&](const Element& actor, const std::string& name, const Element& by) {
+
+  void read_settings() {
+    const std::string* name = element_.attribute("name");  // no name is reserved for it
+    world_.name = name ? *name : "";
+    if (world_.name.empty()) {
+      world_.name = "world";
+      findings_.repaired(element_.source, "world", "the world has no name; it is called 'world'");
+    }
+    in_world_ = "world " + world_.name;
+    report_other_children(element_,
+                          {"model", "include", "light", "frame", "physics", "gravity", "scene",
+                           "actor", "joint", "atmosphere", "magnetic_field",
+                           "spherical_coordinates", "ruedo:fleet", "ruedo:crowd", "ruedo:fault"},
+                          {"gui", "wind", "audio", "plugin", "state", "population"}, in_world_,
+                          findings_);
+    read_or_leave_out(in_world_, "what is usual is taken", findings_,
+                      [&] { read_physics(element_, world_, findings_); });
+    read_environment(element_, world_.environment, findings_);
+    if (const Element* scene = element_.child("scene"))
+      read_or_leave_out(in_world_, "what is usual is taken", findings_,
+                        [&] { read_scene(*scene, world_.sky, findings_); });
+    name_what_has_no_effect(element_, in_world_, findings_);
+  }
+
+  void name_plugins() {
+    load_own_plugins(element_.all("plugin"));
+    reader_.performers_ = read_performers(element_, in_world_, findings_);
+    std::set<std::string> named;
+    for (const Element* plugin : element_.all("plugin")) {
+      if (has_levels(*plugin)) continue;
+      const PluginKind kind = kind_of(*plugin);
+      const bool dead = kind.does == PluginKind::Does::dead;
+      if (!dead && kind.does != PluginKind::Does::unknown) continue;
+      if (!named.insert(kind.name).second) continue;
+      findings_.unsupported(plugin->source, in_world_,
+                            dead ? "the plugin " + kind.name + " does nothing here: " + kind.would
+                                 : "plugins of Gazebo's server are not loaded: " + kind.name);
+    }
+  }
+
+  // Frames last: of two things of one name the frame goes.
+  void read_children() {
+    for (const bool frames : {false, true}) {
+      for (const auto& child : element_.children) {
+        if ((child->name == "frame") != frames) continue;
+        const size_t open_files = reader_.files_.size();
+        if (!read_or_leave_out(
+                in_world_,
+                "the " + (child->name == "include" ? "model" : child->name) + " is left out",
+                findings_, [&] { read_child(*child); }))
+          reader_.files_.resize(open_files);
+      }
+    }
+  }
+
+  void read_child(const Element& child) {
+    if (child.name == "model") {
+      auto model = reader_.read_model(child, version_);
+      place(std::move(model), required_name(child), child);
+    } else if (child.name == "include") {
+      read_include(child);
+    } else if (child.name == "frame") {
+      read_frame(child);
+    } else if (child.name == "actor") {
+      place_actor(child, required_name(child), child);
+    }
+  }
+
+  void read_include(const Element& child) {
+    const auto included = reader_.include(child, "world/include");
+    if (!included) return;
+    if (included->light) {
+      world_.lights.push_back(read_light(*included->light,
+                                         child.pose("pose", included->light->pose("pose")),
+                                         "world/light", context_));
+      world_.lights.back().name = included->name;
+    } else if (included->actor) {
+      place_actor(*included->actor, included->name, child);
+    } else {
+      place(included->model, included->name, child);
+    }
+  }
+
+  void read_frame(const Element& child) {
+    FrameGraph::Node node;
+    node.element = &child;
+    node.name = required_name(child);
+    if (frames_.has(node.name)) child.fail("the name '" + node.name + "' is taken in the world");
+    node.pose = child.pose("pose");
+    node.relative_to = relative_to(child);
+    if (const std::string* frame = child.attribute("attached_to")) node.attached_to = *frame;
+    if (node.relative_to.empty()) node.relative_to = node.attached_to;
+    frames_.add(std::move(node));
+  }
+
+  // A model without a link is none.
+  void place(std::shared_ptr<const ScopedModel> scope, std::string name, const Element& by) {
+    if (!scope) return;
+    if (frames_.has(name)) {
+      const std::string taken = name;
+      int& number = numbers_.try_emplace(taken, 2).first->second;
+      while (frames_.has(name = taken + "_" + std::to_string(number))) ++number;
+      findings_.error(
+          by.source, "model " + taken,
+          "a second thing of the name '" + taken + "'; this one is called '" + name + "'");
+    }
+    if (placed_.size() >= kMaxModels)
+      throw TooLarge(by.source, "<" + by.name + ">: the world has more than " +
+                                    std::to_string(kMaxModels) + " models");
+    FrameGraph::Node node;
+    node.name = name;
+    node.element = &by;
+    node.pose = scope->pose;
+    node.relative_to = scope->relative_to;
+    node.placement_frame = scope->placement_frame;
+    node.scope = scope;
+    placed_.push_back({std::move(name), &by, std::move(scope)});
+    frames_.add(std::move(node));
+  }
+
+  void place_actor(const Element& actor, const std::string& name, const Element& by) {
     auto scope = std::make_shared<ScopedModel>();
     scope->model = actor_model(actor, scope->pose, context_);
     FrameGraph::Node node;
@@ -379,124 +491,60 @@ void SdfReader::read_world(const Element& element, SdfVersion version, WorldMode
     node.element = &by;
     node.pose = scope->pose;
     node.scope = scope;
-    frames.add(node);
-    placed.push_back({name, &by, scope});
-    actors.insert(dotted(name));
-  };
-  std::map<std::string, int> numbers;  // of the next thing of a name
-  const auto read_child = [&](const std::unique_ptr<Element>& child) {
-    FrameGraph::Node node;
-    node.element = child.get();
-    if (child->name == "model" || child->name == "include") {
-      if (child->name == "model") {
-        node.scope = read_model(*child, version);
-        node.name = required_name(*child);
-      } else {
-        const auto included = include(*child, "world/include");
-        if (!included) return;
-        if (included->light) {
-          world.lights.push_back(read_light(*included->light,
-                                            child->pose("pose", included->light->pose("pose")),
-                                            "world/light", context_));
-          world.lights.back().name = included->name;
-          return;
-        }
-        if (included->actor) {
-          place_actor(*included->actor, included->name, *child);
-          return;
-        }
-        node.scope = included->model;
-        node.name = included->name;
-      }
-      if (!node.scope) return;
-      if (frames.has(node.name)) {
-        std::string name;
-        int& number = numbers.try_emplace(node.name, 2).first->second;
-        while (frames.has(name = node.name + "_" + std::to_string(number))) ++number;
-        findings.error(
-            child->source, "model " + node.name,
-            "a second thing of the name '" + node.name + "'; this one is called '" + name + "'");
-        node.name = name;
-      }
-      if (placed.size() >= kMaxModels)
-        throw TooLarge(child->source, "<" + child->name + ">: the world has more than " +
-                                          std::to_string(kMaxModels) + " models");
-      node.pose = node.scope->pose;
-      node.relative_to = node.scope->relative_to;
-      node.placement_frame = node.scope->placement_frame;
-      placed.push_back({node.name, child.get(), node.scope});
-    } else if (child->name == "frame") {
-      node.name = required_name(*child);
-      if (frames.has(node.name)) child->fail("the name '" + node.name + "' is taken in the world");
-      node.pose = child->pose("pose");
-      node.relative_to = relative_to(*child);
-      if (const std::string* frame = child->attribute("attached_to")) node.attached_to = *frame;
-      if (node.relative_to.empty()) node.relative_to = node.attached_to;
-    } else if (child->name == "actor") {
-      place_actor(*child, required_name(*child), *child);
-      return;
-    } else {
-      return;
-    }
-    frames.add(std::move(node));
-  };
-  std::vector<const std::unique_ptr<Element>*>
-      in_order;  // frames last: of two of one name the frame goes
-  for (const bool is_frame : {false, true}) {
-    for (const auto& child : element.children) {
-      if ((child->name == "frame") == is_frame) in_order.push_back(&child);
-    }
+    frames_.add(node);
+    placed_.push_back({name, &by, scope});
+    actors_.insert(dotted(name));
   }
-  for (const auto* each : in_order) {
-    const std::unique_ptr<Element>& child = *each;
-    const size_t open_files = files_.size();
-    if (!read_or_leave_out(
-            in_world, "the " + (child->name == "include" ? "model" : child->name) + " is left out",
-            findings, [&] { read_child(child); }))
-      files_.resize(open_files);
-  }
-  const SavedState saved(element, findings);
-  for (const Placed& each : placed) {
+
+  void add_model(const Placed& each, const SavedState& saved) {
     ModelInstance instance;
     instance.name = dotted(each.name);
-    if (!read_or_leave_out(in_world, "the model is left out", findings,
-                           [&] { instance.X_WM = frames.pose(each.name, *each.element); }))
-      continue;
+    if (!read_or_leave_out(in_world_, "the model is left out", findings_,
+                           [&] { instance.X_WM = frames_.pose(each.name, *each.element); }))
+      return;
     instance.model = each.scope->model;
-    saved.put_back(each.name, instance, findings);
-    if (instance.is_robot()) {
-      const std::string fit = made_fit_for_channel(instance.name);
-      std::string name = fit;
-      const auto taken = [&] {
-        return frames.has(name) ||
-               std::any_of(world.models.begin(), world.models.end(),
-                           [&](const auto& other) { return other.name == name; });
-      };
-      for (int number = 2; name != instance.name && taken(); ++number)
-        name = fit + "_" + std::to_string(number);
-      if (name != instance.name) {
-        findings.repaired(each.element->source, "model " + instance.name,
-                          "the name is not fit for a channel; the robot is called '" + name + "'");
-        instance.name = name;
-      }
-    }
+    saved.put_back(each.name, instance, findings_);
+    if (instance.is_robot()) name_robot(instance, each.element->source);
     check_channel_names(instance, each.element->source);
-    world.models.push_back(std::move(instance));
+    world_.models.push_back(std::move(instance));
   }
-  name_wind_without_plugin(element, world, findings);
-  check_performers(world, performers_, findings);
-  stand_actors(actors, world);
-  for (const Element* fleet : element.all("ruedo:fleet")) read_fleet(*fleet, world, kMaxModels);
-  for (const Element* crowd : element.all("ruedo:crowd")) add_crowd(*crowd, world, kMaxModels);
-  for (const Element* fault : element.all("ruedo:fault"))
-    world.faults.push_back(read_fault(*fault));
-  for (const Element* light : element.all("light")) {
-    read_or_leave_out(in_world, "the light is left out", findings, [&] {
-      const Pose pose = frames.pose(relative_to(*light), *light) * light->pose("pose");
-      world.lights.push_back(read_light(*light, pose, "world/light", context_));
-      saved.put_back(world.lights.back());
-    });
+
+  // Channels have the robot's name in theirs.
+  void name_robot(ModelInstance& instance, const Source& source) {
+    const std::string fit = made_fit_for_channel(instance.name);
+    std::string name = fit;
+    const auto taken = [&] {
+      return frames_.has(name) ||
+             std::any_of(world_.models.begin(), world_.models.end(),
+                         [&](const auto& other) { return other.name == name; });
+    };
+    for (int number = 2; name != instance.name && taken(); ++number)
+      name = fit + "_" + std::to_string(number);
+    if (name == instance.name) return;
+    findings_.repaired(source, "model " + instance.name,
+                       "the name is not fit for a channel; the robot is called '" + name + "'");
+    instance.name = name;
   }
+
+  SdfReader& reader_;
+  ReadContext& context_;
+  Findings& findings_;
+  const Element& element_;
+  SdfVersion version_;
+  WorldModel& world_;
+  std::string in_world_;  // for findings
+  FrameGraph frames_{"the world"};
+  std::vector<Placed> placed_;
+  std::set<std::string> actors_;
+  std::map<std::string, int> numbers_;  // of the next thing of a name
+};
+
+void SdfReader::read_world(const Element& element, SdfVersion version, WorldModel& world) {
+  if (element.has("joint")) {
+    read_world(*with_joined_models(element, version), version, world);
+    return;
+  }
+  WorldReader(*this, element, version, world).read();
 }
 
 }  // namespace ruedo::model
