@@ -288,7 +288,7 @@ class FleetMaker {
         add_input<wheel_command_t>(robot, "wheels", Input::Kind::wheels);
         add_input<move_command_t>(robot, "move", Input::Kind::move);
       }
-      if (!layout_.robots[robot].joints.empty()) {
+      if (!layout_.robots[robot].joints.empty() || !instance(robot).model->holds.empty()) {
         add_input<joint_command_t>(robot, "joint_command", Input::Kind::joints);
       }
       add_input<fault_t>(robot, "fault", Input::Kind::fault);

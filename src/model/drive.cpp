@@ -9,9 +9,13 @@
 #include "core/whole.h"
 #include "model/drive_guess.h"
 #include "model/geometry.h"
+#include "model/holds.h"
+#include "model/joint_plugins.h"
 #include "model/own_plugins.h"
+#include "model/plugin_parameters.h"
 #include "model/plugins.h"
 #include "model/ros_control.h"
+#include "model/ros_gains.h"
 #include "model/sdf_link.h"
 #include "ruedo/drive.h"
 #include "ruedo/math.h"
@@ -629,6 +633,7 @@ void read_drive_of(const Element& model_element, const std::string& where, ReadC
     model.commanded |= kind.does == PluginKind::Does::joints ||
                        kind.does == PluginKind::Does::control || moves_joints(kind);
     name_plugin(*plugin, kind, model, where, context.findings, named);
+    name_parameters(*plugin, where, context.findings);
     auto translated = drive_from_plugin(*plugin, model);
     if (!translated || model_element.has("ruedo:drive"))
       continue;  // Ruedo's own element is there instead of it
@@ -637,13 +642,20 @@ void read_drive_of(const Element& model_element, const std::string& where, ReadC
       continue;
     }
     try {
-      model.drive = read_drive(std::move(translated), odometry, model);
+      model.drive = read_drive(std::move(translated),
+                               odometry ? odometry : odometry_from_plugin(*plugin), model);
     } catch (const InputError& error) {
       context.findings.error(error.source(), where,
                              "the drive plugin cannot be used: " + error.message());
     }
   }
   if (!model.drive) find_drive(model_element, plugins, odometry, where, context, model);
+  if (!model.is_static) {
+    read_holds(plugins, where, context.findings, model);
+    read_joint_plugins(plugins, where, context.findings, model);
+    read_ros_gains(model_element, plugins, where, context, model);
+    read_joint_interfaces(model_element, model);
+  }
   if (odometry && !model.drive)
     model_element.child("ruedo:odometry")->fail("needs a drive: the model has no <ruedo:drive>");
   if (odometry && model.drive &&

@@ -23,6 +23,9 @@ DriveDescription read_drive(std::shared_ptr<const Element> drive,
 // these do; null when the plugin is another one.
 std::unique_ptr<Element> drive_from_plugin(const Element& plugin, const Model& model);
 
+// Its rate of odometry, as <ruedo:odometry>; null: it says none.
+std::unique_ptr<Element> odometry_from_plugin(const Element& plugin);
+
 // It has elements as drive plugins do, with joints of the model to the left and to the right.
 bool names_wheels(const Element& plugin, const Model& model);
 

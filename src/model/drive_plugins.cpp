@@ -32,16 +32,23 @@ constexpr Parameter kParameters[] = {
     {"steering_limit", "ruedo:max_steering_angle"},
     {"max_steer", "ruedo:max_steering_angle"},
     {"max_linear_velocity", "ruedo:max_speed"},
+    {"linear_velocity/max_velocity", "ruedo:max_speed"},
     {"max_velocity", "ruedo:max_speed"},
     {"max_speed", "ruedo:max_speed"},
     {"max_angular_velocity", "ruedo:max_turn_rate"},
+    {"angular_velocity/max_velocity", "ruedo:max_turn_rate"},
+    {"max_velocity", "ruedo:max_turn_rate"},  // of gz-sim: for both
     {"max_linear_acceleration", "ruedo:acceleration"},
+    {"linear_velocity/max_acceleration", "ruedo:acceleration"},
     {"max_acceleration", "ruedo:acceleration"},
     {"max_wheel_acceleration", "ruedo:acceleration"},
     {"wheelAcceleration", "ruedo:acceleration"},
     {"min_linear_acceleration", "ruedo:deceleration", Unit::magnitude},
+    {"linear_velocity/min_acceleration", "ruedo:deceleration", Unit::magnitude},
     {"min_acceleration", "ruedo:deceleration", Unit::magnitude},
     {"max_angular_acceleration", "ruedo:turn_acceleration"},
+    {"angular_velocity/max_acceleration", "ruedo:turn_acceleration"},
+    {"max_acceleration", "ruedo:turn_acceleration"},
     {"max_wheel_torque", "ruedo:max_wheel_torque"},
     {"wheelTorque", "ruedo:max_wheel_torque"},
     {"torque", "ruedo:max_wheel_torque"},
@@ -111,6 +118,21 @@ bool names_wheels(const Element& plugin, const Model& model) {
     });
   };
   return names(kJoints[0]) && names(kJoints[1]);
+}
+
+std::unique_ptr<Element> odometry_from_plugin(const Element& plugin) {
+  for (const char* name : {"odom_publish_frequency", "update_rate", "odometryRate", "updateRate"}) {
+    const Element* rate = plugin.child(name);
+    constexpr double kMost_hz = 1000.0;  // of Gazebo: more often than it steps
+    const double hz = rate ? rate->as_number(Allowed::any(quantity::kRange)) : 0.0;
+    if (!(hz > 0.0) || hz > kMost_hz) continue;
+    auto odometry = std::make_unique<Element>();
+    odometry->name = "ruedo:odometry";
+    odometry->source = rate->source;
+    add(*odometry, "ruedo:rate", rate->text, rate->source);
+    return odometry;
+  }
+  return nullptr;
 }
 
 std::unique_ptr<Element> drive_from_plugin(const Element& plugin, const Model& model) {

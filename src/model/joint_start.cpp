@@ -78,6 +78,7 @@ void count_from(double position, size_t j, Model& model) {
   joint.axis.upper -= position;
   joint.axis.spring_reference -= position;
   joint.mimic_offset -= position;
+  if (joint.axis.start.mode == JointStart::Mode::position) joint.axis.start.value -= position;
   for (Joint& other : model.joints) {
     if (other.leader == static_cast<int>(j)) other.mimic_reference -= position;
   }

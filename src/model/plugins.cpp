@@ -77,8 +77,7 @@ const std::map<std::string, Known>& of_gz() {
       {"TriggeredPublisher", {Does::dead, "messages would be answered by messages"}},
       {"PerformerDetector", {Does::served}},  // sensor_from_plugin()
       {"TouchPlugin", {Does::served}},
-      {"DetachableJoint",
-       {Does::dead, "a joint would hold another model until it is told to let go"}},
+      {"DetachableJoint", {Does::served}},  // read_holds()
       {"Elevator", {Does::dead, kLift}},
       {"ApplyLinkWrench", {Does::dead, "forces would be taken from messages"}},
       {"FollowActor", {Does::dead, "it would follow an actor"}},

@@ -1,113 +1,18 @@
-// Controllers of ROS 1 (ros_controllers) and ROS 2 (ros2_controllers): which files they stand in,
-// and their parameters.
-//
-// Names and defaults are those of the controllers' own documentation. A ROS 1 controller is a map
-// with a `type`; in ROS 2 the controller manager names the types, and NAME/ros__parameters holds
-// the rest, with dots or nested.
+// Parameters of controllers that drive a robot. Names and defaults are those of the controllers'
+// own documentation.
 #include "model/ros_control.h"
 
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
-#include <optional>
-#include <set>
 
-#include "model/yaml.h"
+#include "model/ros_controllers.h"
 #include "ruedo/math.h"
 
 namespace fs = std::filesystem;
 
 namespace ruedo::model {
 namespace {
-
-constexpr size_t kLargestFile = 1 << 18, kMostFiles = 300,
-                 kMostFolders = 200;  // of parameters, looked at for one robot
-
-struct Controller {
-  std::string name, type;                  // "diff_drive_controller/DiffDriveController"
-  std::vector<const Element*> parameters;  // the maps that have them
-  Source source;
-};
-
-// "a.b.c" in a tree whose keys may have dots themselves.
-const Element* below(const Element& map, const std::string& path) {
-  for (const auto& child : map.children) {
-    if (child->name == path) return child.get();
-    if (path.size() > child->name.size() && path.compare(0, child->name.size(), child->name) == 0 &&
-        path[child->name.size()] == '.') {
-      if (const Element* found = below(*child, path.substr(child->name.size() + 1))) return found;
-    }
-  }
-  return nullptr;
-}
-
-const Element* parameter(const Controller& controller, std::initializer_list<const char*> names) {
-  for (const char* name : names) {
-    for (const Element* map : controller.parameters) {
-      if (const Element* found = below(*map, name)) return found;
-    }
-  }
-  return nullptr;
-}
-
-std::vector<std::string> names_in(const Element* list) {
-  std::vector<std::string> names;
-  if (!list) return names;
-  if (!list->text.empty()) names.push_back(list->text);
-  for (const Element* item : list->all("item")) names.push_back(item->text);
-  return names;
-}
-
-bool is_true(const Element* flag) {
-  return flag && (flag->text == "true" || flag->text == "True" || flag->text == "1");
-}
-
-// A number above 0; the controllers' "no limit" is 0, NaN or nothing.
-std::optional<double> positive(const Element* written) {
-  if (!written || written->text == ".nan" || written->text == ".NaN" || written->text == "NaN")
-    return std::nullopt;
-  const double value = std::abs(written->as_number(Allowed::between(-1e9, 1e9)));
-  return value > 0 ? std::optional(value) : std::nullopt;
-}
-
-// ---- Controllers in a file.
-
-void collect_types(const Element& map, std::vector<Controller>& into) {
-  for (const auto& child : map.children) {
-    if (const Element* type = child->child("type");
-        type && type->text.find("ontroller") != std::string::npos) {
-      const bool own = child->name == "ros__parameters";  // the type stands among the rest
-      into.push_back({own ? map.name : child->name, type->text, {child.get()}, child->source});
-    }
-    collect_types(*child, into);
-  }
-}
-
-// NAME: ros__parameters: ..., with a namespace before the name or without.
-void collect_parameters(const Element& map, Controller& controller) {
-  for (const auto& child : map.children) {
-    const std::string own = child->name.substr(child->name.rfind('/') + 1);
-    const Element* parameters = child->child("ros__parameters");
-    if (parameters && own == controller.name) {
-      controller.parameters.push_back(parameters);
-      controller.source = child->source;
-    } else {
-      collect_parameters(*child, controller);
-    }
-  }
-}
-
-// One file may name the types, and another hold the parameters.
-std::vector<Controller> controllers_in(const std::vector<std::unique_ptr<Element>>& files) {
-  std::vector<Controller> all;
-  for (const auto& file : files) collect_types(*file, all);
-  for (Controller& each : all) {
-    for (const auto& file : files) collect_parameters(*file, each);
-  }
-  return all;
-}
-
-// ---- From parameters to <ruedo:drive>.
 
 struct Translation {
   const Controller& from;
@@ -350,124 +255,21 @@ void name_what_has_no_effect(const Controller& controller, const std::string& wh
          "the right wheels have the radius of the left ones");
 }
 
-// ---- Files.
-
-std::string trimmed_package_path(const std::string& path) {
-  const size_t share = path.rfind("/share/");
-  return share == std::string::npos ? "" : "package://" + path.substr(share + 7);
-}
-
-bool is_yaml(const fs::path& path) {
-  return path.extension() == ".yaml" || path.extension() == ".yml";
-}
-
-// The folders of parameters in a package.
-void add_parameter_files(const fs::path& package, std::vector<std::string>& files) {
-  std::vector<fs::path> found;
-  for (const char* name :
-       {"config", "configs", "params", "param", "control", "controllers", "yaml"}) {
-    std::error_code error;
-    size_t looked = 0;
-    for (auto at = fs::recursive_directory_iterator(
-             package / name, fs::directory_options::skip_permission_denied, error);
-         !error && at != fs::recursive_directory_iterator() && ++looked < kMostFiles;
-         at.increment(error)) {
-      if (at.depth() > 2) at.disable_recursion_pending();
-      std::error_code none;
-      if (is_yaml(at->path()) && at->is_regular_file(none) && at->file_size(none) <= kLargestFile)
-        found.push_back(at->path());
-    }
-  }
-  std::sort(found.begin(), found.end());
-  for (const fs::path& path : found) {
-    if (files.size() < kMostFiles) files.push_back(path.string());
-  }
-}
-
-// The package that the file is in, then those beside it, in the order of their names.
-std::vector<std::string> files_beside(const std::string& from) {
-  std::vector<std::string> files;
-  fs::path package = fs::path(from).parent_path();
-  std::error_code error;
-  constexpr int kHighest = 5;
-  for (int up = 0;
-       up < kHighest && package.has_relative_path() && !fs::exists(package / "package.xml", error);
-       ++up)
-    package = package.parent_path();
-  if (!fs::exists(package / "package.xml", error)) {
-    add_parameter_files(fs::path(from).parent_path(), files);
-    add_parameter_files(fs::path(from).parent_path().parent_path(), files);
-    return files;
-  }
-  add_parameter_files(package, files);
-  std::vector<fs::path> beside;
-  for (const auto& entry : fs::directory_iterator(
-           package.parent_path(), fs::directory_options::skip_permission_denied, error)) {
-    if (beside.size() >= kMostFolders) break;
-    if (entry.path() != package && fs::exists(entry.path() / "package.xml", error))
-      beside.push_back(entry.path());
-  }
-  std::sort(beside.begin(), beside.end());
-  for (const fs::path& folder : beside) add_parameter_files(folder, files);
-  return files;
-}
-
-std::vector<std::string> named_files(const std::vector<const Element*>& plugins,
-                                     const std::vector<std::string>& beside,
-                                     const std::string& where, ReadContext& context) {
-  std::vector<std::string> files;
-  for (const Element* plugin : plugins) {
-    if (kind_of(*plugin).does != PluginKind::Does::control) continue;
-    for (const Element* written : plugin->all("parameters")) {
-      auto path = context.resources.find(written->text, written->source.file);
-      if (!path)
-        path = context.resources.find(trimmed_package_path(written->text), written->source.file);
-      const auto same_name = [&](const std::string& file) {
-        return fs::path(file).filename() == fs::path(written->text).filename();
-      };
-      const auto match = std::find_if(beside.begin(), beside.end(), same_name);
-      if (!path && match != beside.end()) path = *match;
-      if (path)
-        files.push_back(*path);
-      else
-        context.findings.error(written->source, where,
-                               "the controllers' file '" + written->text + "' " +
-                                   context.resources.why_not(written->text, written->source.file));
-    }
-  }
-  return files;
-}
-
-std::unique_ptr<Element> read_yaml(const std::string& path, bool named, const std::string& where,
-                                   ReadContext& context) {
-  try {
-    const std::string text = read_text_file(path, kLargestFile);
-    if (text.find("ontroller") == std::string::npos) return nullptr;
-    return parse_yaml(text, path);
-  } catch (const InputError& error) {  // a file beside may be anything
-    if (named) context.findings.error(error.source(), where, error.message());
-    return nullptr;
-  }
-}
-
 }  // namespace
 
 ControllersDrive drive_from_controllers(const Element& model_element,
                                         const std::vector<const Element*>& plugins,
                                         const Model& model, const std::string& where,
                                         ReadContext& context) {
-  const bool controlled = model_element.has("transmission") || model_element.has("ros2_control") ||
-                          std::any_of(plugins.begin(), plugins.end(), [](const Element* each) {
-                            return kind_of(*each).does == PluginKind::Does::control;
-                          });
-  if (!controlled) return {};
+  if (!is_controlled(model_element, plugins)) return {};
   const std::vector<std::string> beside = files_beside(model_element.source.file);
   const std::vector<std::string> named = named_files(plugins, beside, where, context);
   const auto look_in = [&](const std::vector<std::string>& paths, bool is_named) {
     ControllersDrive result;
     std::vector<std::unique_ptr<Element>> files;
     for (const std::string& path : paths) {
-      if (auto file = read_yaml(path, is_named, where, context)) files.push_back(std::move(file));
+      if (auto file = read_controllers(path, is_named, where, context))
+        files.push_back(std::move(file));
     }
     for (const Controller& each : controllers_in(files)) {
       if (is_named && !known_type(each.type)) {

@@ -58,6 +58,11 @@ void append_nested(const Nested& nested, const Pose& X_MN, Model& into, Findings
     if (sensor.joint.valid()) sensor.joint += first_joint;
     into.sensors.push_back(std::move(sensor));
   }
+  for (Hold hold : from.holds) {
+    hold.link += first_link;
+    if (hold.other_model.empty()) hold.other_link = prefix + hold.other_link;
+    into.holds.push_back(std::move(hold));
+  }
   into.commanded |= from.commanded;
   if (from.drive && !into.drive) {
     into.drive = from.drive;
@@ -88,6 +93,7 @@ void bring_to_front(ModelLinkIndex canonical, ScopedModel& scope, Model& model) 
   for (Joint& joint : model.joints)
     moved(joint.parent), moved(joint.child), moved(joint.gear_reference);
   for (SensorDescription& sensor : model.sensors) moved(sensor.link);
+  for (Hold& hold : model.holds) moved(hold.link);
   for (auto& [name, frame] : scope.frames) moved(frame.link);
 }
 
@@ -196,8 +202,9 @@ std::shared_ptr<const ScopedModel> SdfReader::ModelReader::read() {
   model_->commanded |= element_.has("ruedo:joints");
   model_->commanded &=
       !model_->is_static &&
-      std::any_of(model_->joints.begin(), model_->joints.end(),
-                  [](const Joint& joint) { return joint.type != JointType::fixed; });
+      (!model_->holds.empty() ||
+       std::any_of(model_->joints.begin(), model_->joints.end(),
+                   [](const Joint& joint) { return joint.type != JointType::fixed; }));
   read_path();
   begin_at(starts_, where_, *model_, findings_);
   scope_->model = std::move(model_);

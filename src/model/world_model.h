@@ -111,6 +111,22 @@ struct Link {
 
 enum class JointType { fixed, revolute, continuous, prismatic, ball, universal, screw, gearbox };
 
+// Effort for what is missing of a position or a rate, as the controllers of Gazebo and ROS give it.
+struct Pid {
+  static constexpr double kNone = std::numeric_limits<double>::infinity();
+  double p = 0.0, i = 0.0, d = 0.0;      // per rad, rad s and rad/s, or m
+  double i_min = -kNone, i_max = kNone;  // N m or N: of the integral's part
+  double least = -kNone, most = kNone;   // N m or N
+  double offset = 0.0;                   // N m or N
+};
+
+// What a joint does until it is told something.
+struct JointStart {
+  enum class Mode { free, stay, position, velocity };  // stay: where it begins
+  Mode mode = Mode::free;
+  double value = 0.0;  // rad or m; rad/s or m/s
+};
+
 struct JointAxis {
   Vec3 axis_in_J = Vec3::UnitZ();  // unit vector, in the joint's frame (expressed_in is resolved)
   double lower = -std::numeric_limits<double>::infinity();
@@ -122,6 +138,8 @@ struct JointAxis {
   double position_gain = 20.0;  // 1/s: rate for what is missing of a position that it was told
   double rate_gain = std::numeric_limits<double>::infinity();  // N m s/rad or N s/m: effort for
                                                                // what is missing of a rate
+  std::optional<Pid> position_pid, rate_pid;                   // in place of these gains
+  JointStart start;
 };
 
 struct Joint {
@@ -203,6 +221,14 @@ struct DriveDescription {
       odometry;  // <ruedo:odometry>; null: ideal encoders, arc integrator
 };
 
+// A detachable joint: holds a link of another model until it is told to let go.
+struct Hold {
+  std::string name;
+  ModelLinkIndex link;
+  std::string other_model, other_link;  // "" for the model itself
+  Source source;
+};
+
 struct Model {
   std::string name;  // as the file says
   // By the file, or because all its parts are, or an actor without a trajectory. A model that a
@@ -216,6 +242,7 @@ struct Model {
   bool commanded =
       false;  // its joints take commands, which makes a robot of an arm without sensors
   std::shared_ptr<const Element> path;  // <ruedo:path> or an actor's trajectory; null: none
+  std::vector<Hold> holds;
   Source source;
 };
 

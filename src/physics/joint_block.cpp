@@ -294,7 +294,8 @@ void JointBlocks::add_rows(Joint& joint, const SolverBodies& bodies, double subs
   for (size_t i = joint.first; i < rows_.size(); ++i) {
     const Row& row = rows_[i];
     if (row.inverse == 0.0) continue;
-    const bool direct = !is_stop(row) && row.upper > 0.0 && row.lower < 0.0 &&
+    const bool second = block.is_tree && i > first_motor;  // a tree leads a way once
+    const bool direct = !is_stop(row) && row.upper > 0.0 && row.lower < 0.0 && !second &&
                         (block.is_tree || block.free.size() < kMostInBlock);
     (direct ? block.free : block.bounded).push_back(i);
     if (block.is_tree && i >= first_motor) way_of_row_[i] = joint.way;

@@ -196,6 +196,7 @@ void JointConstraint::set(JointSetting setting, double value) {
                                       : limits_.velocity) = value;
   if (mode_ == Mode::motor) set_motor(told_.rate, told_.lowest, told_.highest, told_.gain);
   if (mode_ == Mode::effort) set_effort(told_.effort);
+  if (mode_ == Mode::servo) set_servo(servo_);
   wake();
 }
 
@@ -232,6 +233,17 @@ bool JointConstraint::leads() const {
          motor.impulse >= kOfItsEffort * motor.lower && motor.impulse <= kOfItsEffort * motor.upper;
 }
 
+void JointConstraint::set_servo(const WheelServo& servo) {
+  constexpr double kNewEffort = 1e-3;  // N m or N
+  const double change = std::abs(servo.rate - woken_at_);
+  const bool news = mode_ != Mode::servo || change > kNewRate || servo.gain * change > kNewEffort;
+  mode_ = Mode::servo;
+  servo_ = servo;
+  if (!news) return;
+  woken_at_ = servo.rate;
+  wake();
+}
+
 void JointConstraint::wake() {
   if (!parent_.isStaticObject()) parent_.activate(true);
   if (!child_.isStaticObject()) child_.activate(true);
@@ -248,6 +260,23 @@ void JointConstraint::turn_on(JointMotor& motor, const Vec3& axis, double rate, 
   motor.lower = std::max(lowest, -kMost) * substep_s;
   motor.upper = std::min(highest, kMost) * substep_s;
   motor.softness = 0.0;
+}
+
+// What the servo and the joint's damping give is one line over the rate; friction is a row of its
+// own.
+void JointConstraint::serve(const Vec3& axis, double substep_s) {
+  const double now = velocity(), damping = limits_.damping;
+  double rate = servo_.rate;
+  if (rate * now > 0.0 && std::abs(now) >= limits_.velocity)
+    rate = std::copysign(std::min(std::abs(rate), limits_.velocity), rate);
+  const double braked = -damping * now, gain = servo_.gain + damping;
+  turn_on(motors_->first, axis, servo_.gain * rate / gain,
+          std::max(servo_.lowest_torque, -limits_.effort) + braked,
+          std::min(servo_.highest_torque, limits_.effort) + braked, substep_s);
+  motors_->first.softness = 1.0 / (gain * substep_s);
+  if (limits_.friction > 0.0 && type_ != model::JointType::universal &&
+      type_ != model::JointType::screw)
+    turn_on(motors_->second, axis, 0.0, -limits_.friction, limits_.friction, substep_s);
 }
 
 void JointConstraint::push(double effort) {
@@ -326,6 +355,7 @@ void JointConstraint::follow(double leader_position, double leader_rate, double 
 
 void JointConstraint::before_substep(double substep_s) {
   if (!constraint_ || !constraint_->isEnabled()) return;
+  motors_->second.on = false;
   if (type_ == model::JointType::gearbox) return mesh_gears(substep_s);
   if (type_ == model::JointType::screw) hold_thread(substep_s);
   if (type_ == model::JointType::revolute && limited(limits_) && !within_a_turn(limits_)) {
@@ -348,6 +378,7 @@ void JointConstraint::before_substep(double substep_s) {
     if (std::isfinite(gain_)) motors_->first.softness = 1.0 / (gain_ * substep_s);
     return;
   }
+  if (mode_ == Mode::servo) return serve(axis, substep_s);
   if (mode_ == Mode::effort) push(command_);
   const double brake = limits_.friction + limits_.damping * std::abs(velocity());
   turn_on(motors_->first, axis, 0.0, -brake, brake, substep_s);
@@ -355,8 +386,10 @@ void JointConstraint::before_substep(double substep_s) {
 
 void JointConstraint::after_substep(double substep_s) {
   if (!constraint_ || !constraint_->isEnabled()) return;
-  const bool driven = follows_ || mode_ == Mode::motor || type_ == model::JointType::gearbox;
+  const bool driven = follows_ || mode_ == Mode::motor || mode_ == Mode::servo ||
+                      type_ == model::JointType::gearbox;
   effort_ = driven ? motors_->first.impulse / substep_s : mode_ == Mode::effort ? command_ : 0.0;
+  if (mode_ == Mode::servo && !follows_) effort_ += limits_.damping * velocity();
   switch (type_) {
     case model::JointType::revolute:
     case model::JointType::continuous: {

@@ -37,13 +37,15 @@ class JointConstraint {
   // the rate is held at once.
   void set_motor(double rate, double lowest_effort, double highest_effort, double gain);
   void set_effort(double effort);  // gives that effort until another command
+  void set_servo(const WheelServo& servo);
   // Until the bodies are put back; what it is told already is held within them at once.
   void set(JointSetting setting, double value);
   bool commanded() const { return mode_ != Mode::passive; }
 
   // It may move faster than its bodies do now: it is told to, or a spring pulls.
   bool may_start() const {
-    return mode_ == Mode::effort || limits_.spring_stiffness > 0.0 || std::abs(command_) > 1e-3;
+    return mode_ == Mode::effort || mode_ == Mode::servo || limits_.spring_stiffness > 0.0 ||
+           std::abs(command_) > 1e-3;
   }
 
   // It moves as it is told, or not at all: nothing that acts on its bodies changes how.
@@ -71,11 +73,12 @@ class JointConstraint {
   void after_substep(double substep_s);
 
  private:
-  enum class Mode { passive, motor, effort };
+  enum class Mode { passive, motor, effort, servo };
   Vec3 axis_in_world() const;
   void wake();
   void turn_on(JointMotor& motor, const Vec3& axis, double rate, double lowest, double highest,
                double substep_s) const;
+  void serve(const Vec3& axis, double substep_s);
   void push(double effort);  // for one substep
   void limit_first_axis();   // of a universal joint, for one substep
   void brake_second_axis(double substep_s);
@@ -103,6 +106,8 @@ class JointConstraint {
   struct {
     double rate = 0.0, lowest = 0.0, highest = 0.0, gain = 0.0, effort = 0.0;
   } told_;  // before limits
+  WheelServo servo_;
+  double woken_at_ = 0.0;  // the servo's rate when it last woke the bodies
   btRigidBody& parent_;
   btRigidBody& child_;
   Pose X_PJ_, X_CJ_;

@@ -80,10 +80,20 @@ void PhysicsWorld::drive_joint_velocity(JointIndex joint, double rate, double ma
 void PhysicsWorld::apply_joint_effort(JointIndex joint, double effort) {
   impl_->joints_[joint].set_effort(effort);
 }
+void PhysicsWorld::servo_joint(JointIndex joint, const WheelServo& servo) {
+  impl_->joints_[joint].set_servo(servo);
+}
 
 void PhysicsWorld::set_joint(JointIndex joint, JointSetting setting, double value) {
   impl_->joints_[joint].set(setting, value);
 }
+
+TieIndex PhysicsWorld::make_tie(BodyIndex body, BodyIndex other) {
+  return impl_->make_tie(body, other);
+}
+void PhysicsWorld::close_tie(TieIndex tie) { impl_->close_tie(tie); }
+void PhysicsWorld::open_tie(TieIndex tie) { impl_->open_tie(tie); }
+bool PhysicsWorld::is_closed(TieIndex tie) const { return impl_->is_closed(tie); }
 
 double PhysicsWorld::wheel_angle(WheelIndex wheel) const {
   const int joint = impl_->wheel_joint_[wheel];

@@ -21,8 +21,9 @@ enum class Support {
   plane      // moves in its plane only (x, y, yaw of the world); no pair with the static planes
 };
 
-// The torque that a wheel's servo gives until another one is told: gain * (rate - the wheel's own),
-// within the limits. It is implicit in the step, and so stable whatever the gain.
+// The torque (or force) that the servo of a wheel or joint gives until another one is told: gain *
+// (rate - the wheel's own), within the limits. It is implicit in the step, and so stable whatever
+// the gain.
 struct WheelServo {
   double rate = 0.0;                                 // rad/s, positive rolls ahead
   double gain = 0.0;                                 // N m s/rad
@@ -35,6 +36,8 @@ enum class JointSetting { rate_gain, effort, velocity };
 // Deterministic: the same calls give the same bits, and what does not touch changes nothing of each
 // other. A step is divided into equal substeps of 5 ms at most; of 1 ms for what joints tie
 // together, wheels among them, and for all that may touch it.
+using TieIndex = Index<struct TieKind>;  // of two bodies that may be held together
+
 class PhysicsWorld {
  public:
   // world and layout must outlive it.
@@ -87,8 +90,18 @@ class PhysicsWorld {
   void drive_joint_velocity(JointIndex joint, double rate,
                             double max_effort);  // rad/s or m/s; N m or N
   void apply_joint_effort(JointIndex joint, double effort);
+  // Beside the joint's own damping and friction, and within its limits: a rate may be any, the
+  // effort ends where the joint is as fast as it may be.
+  void servo_joint(JointIndex joint, const WheelServo& servo);
   // Instead of what the file says, until the joint starts again.
   void set_joint(JointIndex joint, JointSetting setting, double value);
+
+  // A tie holds two bodies as they are to each other when it is closed; no other: to the world.
+  // Bodies that it ties together do not touch each other. Ties go open with their instances.
+  TieIndex make_tie(BodyIndex body, BodyIndex other);  // open
+  void close_tie(TieIndex tie);
+  void open_tie(TieIndex tie);
+  bool is_closed(TieIndex tie) const;
 
   // Wheels that are bodies of their own (the wheels drive); wheel as in BodyLayout::wheels.
   // Positive rolls ahead.

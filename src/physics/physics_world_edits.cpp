@@ -124,6 +124,12 @@ void PhysicsWorld::Impl::remove(InstanceIndex instance) {
     if (wheel_joint_[i] >= 0 && layout_.robots[layout_.wheels[i].robot].instance == instance)
       let_go(wheels_[wheel_joint_[i]]);
   }
+  for (const TieIndex i : ties_.indices()) {
+    const auto of_it = [&](BodyIndex body) {
+      return body.valid() && is_of(rigid_.bodies[body].info);
+    };
+    if (of_it(ties_[i].body) || of_it(ties_[i].other)) open_tie(i);
+  }
   bool has_statics = false;
   for (const auto& object : rigid_.statics) {
     if (!is_of(object->info)) continue;

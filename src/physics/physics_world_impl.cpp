@@ -50,9 +50,9 @@ bool MayTouch::may_touch(const btCollisionObject& object_a,
   if (a.gone || b.gone) return false;
   if ((a.moved || a.body < 0) && (b.moved || b.body < 0)) return false;
   if ((a.on_plane && b.plane) || (b.on_plane && a.plane)) return false;
-  if (a.instance != b.instance) return true;
   // As SDF has it: links of one model collide when it says self_collide, but never across a joint.
-  return a.self_collide && std::find(a.joined.begin(), a.joined.end(), b.body) == a.joined.end();
+  if (std::find(a.joined.begin(), a.joined.end(), b.body) != a.joined.end()) return false;
+  return a.instance != b.instance || a.self_collide;
 }
 
 PhysicsWorld::Impl::Impl(const model::WorldModel& world, const model::BodyLayout& layout)
@@ -116,6 +116,7 @@ PhysicsWorld::Impl::~Impl() {
         dynamics_.removeConstraint(joint.constraint());
     }
   }
+  for (Tie& each : ties_) dynamics_.removeConstraint(each.constraint.get());
   dynamics_.take({});
   for (size_t i = rigid_.bodies.size(); i-- > 0;) {
     broadphase_.destroyProxy(rigid_.bodies[i].bullet->getBroadphaseHandle(), &dispatcher_);

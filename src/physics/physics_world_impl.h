@@ -4,6 +4,7 @@
 // Included by physics_world.cpp and physics_world_impl.cpp only.
 #pragma once
 
+#include <memory>
 #include <vector>
 
 #include "physics/broadphase.h"
@@ -40,6 +41,14 @@ struct BodyMotion {
   Pose end;
 };
 
+// What may hold two bodies together for a while; no other: the body and the world.
+struct Tie {
+  BodyIndex body, other;
+  std::unique_ptr<btFixedConstraint> constraint;
+  bool closed = false;
+  bool hung_before = false;  // the body, by something else
+};
+
 class PhysicsWorld::Impl {
  public:
   Impl(const model::WorldModel& world, const model::BodyLayout& layout);
@@ -73,6 +82,11 @@ class PhysicsWorld::Impl {
 
   void set_wind(const Vec3& wind);
 
+  TieIndex make_tie(BodyIndex body, BodyIndex other);
+  void close_tie(TieIndex tie);
+  void open_tie(TieIndex tie);
+  bool is_closed(TieIndex tie) const { return ties_[tie].closed; }
+
   RigidBodies rigid_;
   IndexedVector<BodyIndex, Pose> poses_;
   IndexedVector<BodyIndex, Twist> twists_, last_twists_;
@@ -104,6 +118,7 @@ class PhysicsWorld::Impl {
   void step_at(int pace);
   void advance(btRigidBody& mover, double substep_s);
   void tie(BodyIndex body, BodyIndex other);
+  void untie(BodyIndex body, BodyIndex other);
   void push_to_bullet(BodyIndex body);  // our pose and twist
   void pull_from_bullet(BodyIndex body);
   void start(BodyIndex body);  // the velocity it begins the step with
@@ -130,10 +145,11 @@ class PhysicsWorld::Impl {
   Surfaces surfaces_;
   Dynamics dynamics_;
   Vec3 wind_ = Vec3::Zero();
-  std::vector<btRigidBody*> simulated_[2];                    // of each pace
-  IndexedVector<BodyIndex, BodyIndex> parents_;               // union-find over bodies
-  std::vector<BodyIndex> rolling_;                            // that are driven wheels
-  std::vector<std::pair<BodyIndex, BodyIndex>> tied_;         // that a joint ties together
+  std::vector<btRigidBody*> simulated_[2];             // of each pace
+  IndexedVector<BodyIndex, BodyIndex> parents_;        // union-find over bodies
+  std::vector<BodyIndex> rolling_;                     // that are driven wheels
+  std::vector<std::pair<BodyIndex, BodyIndex>> tied_;  // that a joint ties together
+  IndexedVector<TieIndex, Tie> ties_;
   std::vector<std::pair<btRigidBody*, btTransform>> movers_;  // and where they began the step
 };
 

@@ -37,6 +37,7 @@ const Limits* limits_of(int8_t mode) {
       {kLeastGain, quantity::kDamping.most},
       {0.0, quantity::kEffort.most},
       {0.0, quantity::kSpeed.most},
+      {0.0, 1.0},
   };
   return mode >= 0 && static_cast<size_t>(mode) < std::size(kOfModes) ? &kOfModes[mode] : nullptr;
 }
@@ -48,8 +49,11 @@ JointControl::JointControl(const model::WorldModel& world, const model::BodyLayo
     : world_(world),
       layout_(layout),
       physics_(physics),
-      largest_gain_(kGainPerStep / (static_cast<double>(world.step_us) * 1e-6)) {
+      step_s_(static_cast<double>(world.step_us) * 1e-6),
+      largest_gain_(kGainPerStep / step_s_),
+      holds_(world, layout, physics) {
   targets_.reserve(layout.joints.size());
+  for (const JointIndex joint : layout.joints.indices()) begin(joint);
 }
 
 const model::Joint& JointControl::description(JointIndex joint) const {
@@ -71,6 +75,11 @@ int8_t JointControl::check(RobotIndex robot, const std::string& name, int8_t mod
   const Limits* limits = limits_of(mode);
   if (!limits) return motion_status_t::REASON_BAD_KIND;
   if (value > limits->most || value < limits->least) return motion_status_t::REASON_BAD_VALUE;
+  if (mode == joint_command_t::ATTACHED) {
+    return holds_.has(layout_.robots[robot].instance, name) && (value == 0.0 || value == 1.0)
+               ? motion_status_t::REASON_NONE
+               : motion_status_t::REASON_BAD_VALUE;
+  }
   const JointIndex joint = find(robot, name);
   // One that mimics another, and a gearbox, take no commands.
   const bool takes = joint.valid() && !description(joint).leader.valid() &&
@@ -87,6 +96,10 @@ int8_t JointControl::apply(RobotIndex robot, const JointCommand& command) {
       return reason;
   }
   for (size_t i = 0; i < n; ++i) {
+    if (command.modes[i] == joint_command_t::ATTACHED) {
+      holds_.set(layout_.robots[robot].instance, command.names[i], command.values[i] != 0.0);
+      continue;
+    }
     const JointIndex joint = find(robot, command.names[i]);
     tell(joint, command.modes[i], command.values[i]);
     const auto& placed = layout_.joints[joint];
@@ -101,7 +114,9 @@ void JointControl::tell(JointIndex joint, int8_t mode, double value) {
   using Mode = joint_command_t;
   const auto of_joint = [joint](const auto& each) { return each.joint == joint; };
   switch (mode) {
-    case Mode::RATE_GAIN: return physics_.set_joint(joint, JointSetting::rate_gain, value);
+    case Mode::RATE_GAIN:
+      if (!is_set(joint)) gains_.push_back({joint, description(joint).axis.position_gain});
+      return physics_.set_joint(joint, JointSetting::rate_gain, value);
     case Mode::EFFORT_LIMIT: return physics_.set_joint(joint, JointSetting::effort, value);
     case Mode::VELOCITY_LIMIT: return physics_.set_joint(joint, JointSetting::velocity, value);
     case Mode::POSITION_GAIN:
@@ -109,12 +124,43 @@ void JointControl::tell(JointIndex joint, int8_t mode, double value) {
       return gains_.push_back({joint, value});
     default: break;
   }
-  std::erase_if(targets_, of_joint);
-  if (mode == Mode::VELOCITY) return physics_.drive_joint_velocity(joint, value, kUnlimited);
-  if (mode == Mode::EFFORT) return physics_.apply_joint_effort(joint, value);
+  hold(joint, mode, value);
+}
+
+// A position, a rate or an effort.
+void JointControl::hold(JointIndex joint, int8_t mode, double value) {
+  using Mode = joint_command_t;
+  std::erase_if(targets_, [joint](const Target& each) { return each.joint == joint; });
   const model::JointAxis& axis = description(joint).axis;
+  if (mode == Mode::EFFORT) return physics_.apply_joint_effort(joint, value);
+  if (mode == Mode::VELOCITY) {
+    if (!axis.rate_pid || is_set(joint))
+      return physics_.drive_joint_velocity(joint, value, kUnlimited);
+    return targets_.push_back({joint, true, value});
+  }
   const bool limited = axis.lower <= axis.upper;
-  targets_.push_back({joint, limited ? std::clamp(value, axis.lower, axis.upper) : value});
+  targets_.push_back({joint, false, limited ? std::clamp(value, axis.lower, axis.upper) : value});
+}
+
+void JointControl::begin(JointIndex joint) {
+  using Mode = joint_command_t;
+  const model::Joint& axis_of = description(joint);
+  const model::JointStart& start = axis_of.axis.start;
+  if (start.mode == model::JointStart::Mode::free || axis_of.leader.valid()) return;
+  const bool rate = start.mode == model::JointStart::Mode::velocity;
+  hold(joint, rate ? Mode::VELOCITY : Mode::POSITION, start.value);
+}
+
+void JointControl::start(InstanceIndex instance) {
+  holds_.start(instance);
+  for (const JointIndex joint : layout_.joints.indices()) {
+    if (layout_.joints[joint].instance == instance) begin(joint);
+  }
+}
+
+bool JointControl::is_set(JointIndex joint) const {
+  return std::any_of(gains_.begin(), gains_.end(),
+                     [joint](const Gain& gain) { return gain.joint == joint; });
 }
 
 double JointControl::gain_of(JointIndex joint) const {
@@ -125,6 +171,7 @@ double JointControl::gain_of(JointIndex joint) const {
 }
 
 void JointControl::forget(InstanceIndex instance) {
+  holds_.forget(instance);
   const auto of_instance = [&](const auto& each) {
     return layout_.joints[each.joint].instance == instance;
   };
@@ -132,10 +179,34 @@ void JointControl::forget(InstanceIndex instance) {
   std::erase_if(gains_, of_instance);
 }
 
+void JointControl::serve(Target& target, const model::Pid& pid) const {
+  const double now = target.is_rate ? physics_.joint_velocity(target.joint)
+                                    : physics_.joint_position(target.joint);
+  const double error = target.value - now;
+  target.integral = std::clamp(target.integral + pid.i * error * step_s_, pid.i_min, pid.i_max);
+  const double pushes = target.integral + pid.offset;
+  // Below p h a stiff joint would swing about its target from step to step.
+  const double of_step = pid.p * step_s_;
+  const double gain = target.is_rate ? pid.p : std::max(pid.d + of_step / 2.0, of_step);
+  if (gain <= 0.0)
+    return physics_.apply_joint_effort(target.joint, std::clamp(pushes, pid.least, pid.most));
+  const double rate = target.is_rate ? target.value : pid.p * error / gain;
+  physics_.servo_joint(target.joint, {rate + pushes / gain, gain, pid.least, pid.most});
+}
+
 void JointControl::before_step() {
-  for (const Target& target : targets_) {
-    const double error = target.position - physics_.joint_position(target.joint);
-    physics_.drive_joint_velocity(target.joint, gain_of(target.joint) * error, kUnlimited);
+  holds_.before_step();
+  for (Target& target : targets_) {
+    const model::JointAxis& axis = description(target.joint).axis;
+    const std::optional<model::Pid>& pid = target.is_rate ? axis.rate_pid : axis.position_pid;
+    if (pid && !is_set(target.joint)) {
+      serve(target, *pid);
+    } else if (target.is_rate) {
+      physics_.drive_joint_velocity(target.joint, target.value, kUnlimited);
+    } else {
+      const double error = target.value - physics_.joint_position(target.joint);
+      physics_.drive_joint_velocity(target.joint, gain_of(target.joint) * error, kUnlimited);
+    }
   }
 }
 

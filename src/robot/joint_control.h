@@ -1,5 +1,10 @@
 // Commands to a robot's joints that are no wheels: position, velocity, effort. A command holds
 // until the next one for that joint.
+//
+// A joint with the PID of a Gazebo plugin gets its effort, offset + p e + d (r - v) + integral,
+// with v at the end of the step and e in its middle, as a motor that gives K (rate - v), K = d +
+// p h / 2. That adds the damping p h / 2 to what Gazebo does, and with K of p h at least it is
+// stable at every step h.
 #pragma once
 
 #include <string>
@@ -7,6 +12,7 @@
 
 #include "model/body_layout.h"
 #include "physics/physics_world.h"
+#include "robot/holds.h"
 #include "robot/robots.h"
 
 namespace ruedo::robot {
@@ -20,12 +26,17 @@ class JointControl {
   // unknown names, unknown modes, numbers that are not finite or not allowed.
   int8_t apply(RobotIndex robot, const JointCommand& command);
   void before_step();
-  void forget(InstanceIndex instance);  // no command holds for its joints, nor a setting
+  // No command holds for its joints, nor a setting.
+  void forget(InstanceIndex instance);
+  void start(InstanceIndex instance);  // its joints do what they do before they are told anything
+  Holds& holds() { return holds_; }
 
  private:
   struct Target {
     JointIndex joint;
-    double position;
+    bool is_rate = false;   // one that is held by a <...pid> of the joint; the physics holds others
+    double value = 0.0;     // rad or m; rad/s or m/s
+    double integral = 0.0;  // N m or N: the integral's part of the effort
   };
   struct Gain {
     JointIndex joint;
@@ -37,13 +48,19 @@ class JointControl {
   int8_t check(RobotIndex robot, const std::string& name, int8_t mode, double value) const;
   void tell(JointIndex joint, int8_t mode, double value);
   double gain_of(JointIndex joint) const;
+  bool is_set(JointIndex joint) const;  // by a message: the gains are those of docs/world-files.md
+  void hold(JointIndex joint, int8_t mode, double value);
+  void begin(JointIndex joint);
+  void serve(Target& target, const model::Pid& pid) const;
 
   const model::WorldModel& world_;
   const model::BodyLayout& layout_;
   physics::PhysicsWorld& physics_;
+  double step_s_;
   double largest_gain_;          // 1/s, of the position controller
-  std::vector<Target> targets_;  // joints under position control
-  std::vector<Gain> gains_;      // that messages have set, in place of the file's
+  std::vector<Target> targets_;  // joints under position control, or a PID
+  Holds holds_;
+  std::vector<Gain> gains_;  // that messages have set, in place of the file's
 };
 
 }  // namespace ruedo::robot

@@ -243,6 +243,7 @@ void Robots::Impl::add(InstanceIndex instance) {
     drives_[robot] = make_drive(robot);
     driveless_[robot] = {};
   }
+  joints_.start(instance);
   crowd_.add(instance, layout_);
   surroundings_.add(instance);
   if (!Mover::moves(*world_.models[instance].model)) return;
@@ -280,8 +281,12 @@ void Robots::Impl::end_put(InstanceIndex instance) {
 
 void Robots::Impl::set_pose(InstanceIndex instance, const Pose& X_WM) {
   const Pose X_MW = model_pose(instance).inverse();
-  for_each_body(instance, [&](BodyIndex body) { put(body, X_WM * X_MW * physics_.pose(body)); });
-  end_put(instance);
+  std::vector<InstanceIndex> all = joints_.holds().carried_by(instance);
+  all.insert(all.begin(), instance);
+  for (const InstanceIndex each : all)
+    for_each_body(each, [&](BodyIndex body) { put(body, X_WM * X_MW * physics_.pose(body)); });
+  joints_.holds().moved(instance);
+  for (const InstanceIndex each : all) end_put(each);
 }
 
 void Robots::Impl::set_twist(InstanceIndex instance, const Twist& twist) {
@@ -296,6 +301,9 @@ void Robots::Impl::set_twist(InstanceIndex instance, const Twist& twist) {
 
 // A drive's wheels keep the angle that they have turned: encoders do not jump.
 void Robots::Impl::start_again(InstanceIndex instance) {
+  for (const InstanceIndex other : joints_.holds().carried_by(instance))
+    for_each_body(other, [&](BodyIndex body) { put(body, layout_.bodies[body].X_WB); });
+  joints_.holds().moved(instance);
   const RobotIndex robot = robot_of(instance);
   const BodyIndex base = robot.valid() && drives_[robot] ? layout_.robots[robot].body : BodyIndex();
   const auto is_wheel = [&](BodyIndex body) {
@@ -314,6 +322,7 @@ void Robots::Impl::start_again(InstanceIndex instance) {
     if (layout_.joints[i].instance == instance) physics_.start_again(i);
   }
   joints_.forget(instance);
+  joints_.start(instance);
   for (auto& mover : movers_)
     if (mover->instance() == instance) mover->start_again(now());
   crowd_.start_again(instance, now());

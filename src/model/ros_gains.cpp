@@ -1,0 +1,200 @@
+// Names and defaults are those of control_toolbox and of the controllers' own documentation.
+#include "model/ros_gains.h"
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+
+#include "model/ros_controllers.h"
+
+namespace ruedo::model {
+namespace {
+
+const Allowed kGain = Allowed::any(quantity::kDamping);
+
+double number(const Element& map, std::initializer_list<const char*> names, double fallback) {
+  for (const char* name : names) {
+    if (const Element* written = map.child(name)) return written->as_number(kGain);
+  }
+  return fallback;
+}
+
+// As control_toolbox has it: without a clamp the integral does nothing.
+Pid pid_of(const Element& gains) {
+  Pid pid;
+  pid.p = std::max(0.0, number(gains, {"p"}, 0.0));
+  pid.i = std::max(0.0, number(gains, {"i"}, 0.0));
+  pid.d = std::max(0.0, number(gains, {"d"}, 0.0));
+  const double clamp = std::abs(number(gains, {"i_clamp"}, 0.0));
+  pid.i_max = std::max(0.0, number(gains, {"i_clamp_max"}, clamp));
+  pid.i_min = std::min(0.0, number(gains, {"i_clamp_min"}, -clamp));
+  return pid;
+}
+
+bool is_set(const Pid& pid) { return pid.p > 0.0 || pid.d > 0.0; }
+
+enum class Gives { nothing, effort_for_position, effort_for_rate, rate_for_position };
+
+struct Interfaces {
+  const Element& model_element;
+
+  // By the <transmission> of gazebo_ros_control.
+  bool has(const std::string& joint, const char* what) const {
+    for (const Element* transmission : model_element.all("transmission")) {
+      for (const Element* each : transmission->all("joint")) {
+        const std::string* name = each->attribute("name");
+        if (name && *name == joint &&
+            each->string("hardwareInterface", "").find(what) != std::string::npos)
+          return true;
+      }
+    }
+    return false;
+  }
+};
+
+struct Reader {
+  Model& model;
+  std::vector<std::string> held;  // names of joints
+
+  bool has(const std::string& joint) const {
+    return std::any_of(model.joints.begin(), model.joints.end(),
+                       [&](const Joint& each) { return each.name == dotted(joint); });
+  }
+
+  void give(const std::string& name, Gives gives, const Pid& pid) {
+    if (!is_set(pid) || gives == Gives::nothing) return;
+    for (Joint& joint : model.joints) {
+      if (joint.name != dotted(name)) continue;
+      JointAxis& axis = joint.axis;
+      if (gives == Gives::rate_for_position) {
+        if (pid.p > 0.0) axis.position_gain = pid.p;
+      } else {
+        std::optional<Pid>& of =
+            gives == Gives::effort_for_rate ? axis.rate_pid : axis.position_pid;
+        if (of) return;  // a plugin's, or of a file before
+        of = pid;
+      }
+      if (axis.start.mode == JointStart::Mode::free) axis.start.mode = JointStart::Mode::stay;
+      held.push_back(name);
+    }
+  }
+};
+
+bool contains(const std::string& text, const char* part) {
+  return text.find(part) != std::string::npos;
+}
+
+Gives gives_of(const Controller& controller) {
+  const std::string& type = controller.type;
+  const bool rate =
+      contains(type, "JointVelocityController") || contains(type, "JointGroupVelocityController");
+  if (contains(type, "effort_controllers/"))
+    return rate ? Gives::effort_for_rate : Gives::effort_for_position;
+  if (contains(type, "velocity_controllers/"))
+    return rate ? Gives::nothing : Gives::rate_for_position;
+  if (!contains(type, "JointTrajectoryController")) return Gives::nothing;
+  for (const std::string& interface : names_in(parameter(controller, {"command_interfaces"}))) {
+    if (interface == "effort") return Gives::effort_for_position;
+    if (interface == "velocity") return Gives::rate_for_position;
+  }
+  return Gives::nothing;
+}
+
+// Of one joint in `pid`, of several in `gains`, or each in its own map.
+void read_controller(const Controller& controller, Reader& reader) {
+  const Gives gives = gives_of(controller);
+  if (gives == Gives::nothing) return;
+  const Element* pid = parameter(controller, {"pid"});
+  if (const Element* joint = parameter(controller, {"joint"}); joint && pid)
+    return reader.give(joint->text, gives, pid_of(*pid));
+  for (const std::string& joint : names_in(parameter(controller, {"joints"}))) {
+    const Element* gains = parameter(
+        controller, {("gains." + joint).c_str(), (joint + ".pid").c_str(), joint.c_str()});
+    if (gains) reader.give(joint, gives, pid_of(*gains));
+  }
+}
+
+// gazebo_ros_control/pid_gains, below whatever namespace.
+void read_pid_gains(const Element& map, const Interfaces& interfaces, Reader& reader, int depth) {
+  constexpr int kDeepest = 5;
+  if (depth > kDeepest) return;
+  for (const auto& child : map.children) {
+    if (!child->name.ends_with("pid_gains")) {
+      read_pid_gains(*child, interfaces, reader, depth + 1);
+      continue;
+    }
+    for (const auto& joint : child->children) {
+      const Gives gives = interfaces.has(joint->name, "osition")   ? Gives::effort_for_position
+                          : interfaces.has(joint->name, "elocity") ? Gives::effort_for_rate
+                                                                   : Gives::nothing;
+      if (reader.has(joint->name)) reader.give(joint->name, gives, pid_of(*joint));
+    }
+  }
+}
+
+// <param name="pos_kp"> of gazebo_ros2_control.
+void read_parameters(const Element& model_element, Reader& reader) {
+  for (const Element* system : model_element.all("ros2_control")) {
+    for (const Element* joint : system->all("joint")) {
+      const std::string* name = joint->attribute("name");
+      const auto value = [&](const std::string& wanted) {
+        for (const Element* param : joint->all("param")) {
+          const std::string* key = param->attribute("name");
+          if (key && *key == wanted) return std::max(0.0, param->as_number(kGain));
+        }
+        return 0.0;
+      };
+      for (const char* of : {"pos_", "vel_"}) {
+        const std::string prefix = of;
+        Pid pid;
+        pid.p = value(prefix + "kp");
+        pid.i = value(prefix + "ki");
+        pid.d = value(prefix + "kd");
+        pid.i_max = value(prefix + "max_integral_error");
+        pid.i_min = -pid.i_max;
+        if (name)
+          reader.give(*name, prefix == "pos_" ? Gives::effort_for_position : Gives::effort_for_rate,
+                      pid);
+      }
+    }
+  }
+}
+
+}  // namespace
+
+void read_ros_gains(const Element& model_element, const std::vector<const Element*>& plugins,
+                    const std::string& where, ReadContext& context, Model& model) {
+  if (!is_controlled(model_element, plugins)) return;
+  Reader reader{model, {}};
+  const Interfaces interfaces{model_element};
+  const std::vector<std::string> beside = files_beside(model_element.source.file),
+                                 named = named_files(plugins, beside, where, context);
+  const auto look_in = [&](const std::vector<std::string>& paths, bool is_named) {
+    std::vector<std::unique_ptr<Element>> files;
+    for (const std::string& path : paths) {
+      if (auto file = read_controllers(path, is_named, where, context))
+        files.push_back(std::move(file));
+    }
+    for (const Controller& each : controllers_in(files)) read_controller(each, reader);
+    for (const auto& file : files) read_pid_gains(*file, interfaces, reader, 0);
+  };
+  const auto guarded = [&](auto read) {
+    read_or_leave_out(where, "the gains are left out", context.findings, read);
+  };
+  guarded([&] { read_parameters(model_element, reader); });
+  guarded([&] { look_in(named, true); });
+  if (!reader.held.empty()) return;
+  for (const std::string& path : beside) {  // each may be another robot's
+    guarded([&] { look_in({path}, false); });
+    if (reader.held.empty()) continue;
+    std::string joints;
+    for (const std::string& name : reader.held) joints += (joints.empty() ? "" : ", ") + name;
+    context.documents.note(path);
+    return context.findings.repaired({path, 0}, where,
+                                     "no plugin names " +
+                                         std::filesystem::path(path).filename().string() +
+                                         "; its gains hold these joints: " + joints);
+  }
+}
+
+}  // namespace ruedo::model

@@ -1,0 +1,191 @@
+// What the controllers of joints in Gazebo's and ROS's files become.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "model/load.h"
+#include "temporary_folder.h"
+#include "text_world.h"
+
+namespace ruedo::model {
+namespace {
+
+using testing::Contains;
+using testing::ElementsAre;
+using testing::HasSubstr;
+using testing::IsEmpty;
+
+std::string arm(const std::string& plugins) {
+  return "<model name='arm'><link name='base'/><link name='a'/><link name='b'/>"
+         "<joint name='one' type='revolute'><parent>base</parent><child>a</child><axis><xyz>0 0 1"
+         "</xyz></axis></joint><joint name='two' type='revolute'><parent>a</parent><child>b</child>"
+         "<axis><xyz>0 0 1</xyz></axis></joint>" +
+         plugins + "</model>";
+}
+
+std::string plugin(const std::string& system, const std::string& inside) {
+  return "<plugin name='gz::sim::systems::" + system + "' filename='f'>" + inside + "</plugin>";
+}
+
+const JointAxis& axis(const WorldModel& world, size_t joint) {
+  return world.models.back().model->joints.at(joint).axis;
+}
+
+// The defaults of gz-sim's JointPositionController.
+TEST(JointPlugins, APositionControllersDefaults) {
+  const auto world =
+      world_of(arm(plugin("JointPositionController", "<joint_name>one</joint_name>")));
+  EXPECT_THAT(texts(*world), IsEmpty());
+  const Pid pid = axis(*world, 0).position_pid.value();
+  EXPECT_EQ(pid.p, 1.0);
+  EXPECT_EQ(pid.i, 0.1);
+  EXPECT_EQ(pid.d, 0.01);
+  EXPECT_EQ(pid.i_min, -1.0);
+  EXPECT_EQ(pid.i_max, 1.0);
+  EXPECT_EQ(pid.least, -1000.0);
+  EXPECT_EQ(pid.most, 1000.0);
+  EXPECT_EQ(axis(*world, 0).start.mode, JointStart::Mode::position);
+  EXPECT_FALSE(axis(*world, 1).position_pid);
+  EXPECT_EQ(axis(*world, 1).start.mode, JointStart::Mode::free);
+}
+
+TEST(JointPlugins, SeveralJointsOfOneAndLimitsTheWrongWayRound) {
+  const auto world = world_of(
+      arm(plugin("JointPositionController",
+                 "<joint_name>one</joint_name><joint_name>two</joint_name><p_gain>7</p_gain>"
+                 "<cmd_max>-1</cmd_max><cmd_min>0</cmd_min><initial_position>0.2"
+                 "</initial_position>")));
+  for (const size_t joint : {0u, 1u}) {
+    EXPECT_EQ(axis(*world, joint).position_pid.value().p, 7.0);
+    EXPECT_EQ(axis(*world, joint).position_pid.value().most, Pid::kNone);
+    EXPECT_EQ(axis(*world, joint).start.value, 0.2);
+  }
+}
+
+TEST(JointPlugins, ATrajectoryControllersGainsAreOfEachJoint) {
+  const auto world = world_of(
+      arm(plugin("JointTrajectoryController",
+                 "<joint_name>two</joint_name><position_p_gain>20</position_p_gain>"
+                 "<position_d_gain>2</position_d_gain><velocity_p_gain>0.5</velocity_p_gain>"
+                 "<joint_name>one</joint_name><position_p_gain>30</position_p_gain>"
+                 "<position_cmd_min>-9</position_cmd_min><position_cmd_max>9</position_cmd_max>")));
+  EXPECT_EQ(axis(*world, 1).position_pid.value().p, 20.0);
+  EXPECT_EQ(axis(*world, 1).position_pid.value().d, 2.5);
+  EXPECT_EQ(axis(*world, 1).position_pid.value().most, 9.0);
+  EXPECT_EQ(axis(*world, 1).rate_pid.value().p, 0.5);
+  EXPECT_EQ(axis(*world, 0).position_pid.value().p, 30.0);
+  EXPECT_EQ(axis(*world, 0).position_pid.value().most, Pid::kNone);
+  EXPECT_FALSE(axis(*world, 0).rate_pid);
+}
+
+TEST(JointPlugins, WhatIsWrongOrNotDoneIsNamed) {
+  const auto world = world_of(
+      arm(plugin("JointPositionController", "<joint_name>three</joint_name>") +
+          plugin("JointController",
+                 "<joint_name>one</joint_name><joint_index>1</joint_index>"
+                 "<use_force_commands>1</use_force_commands>"
+                 "<d_gain>0.1</d_gain>") +
+          plugin("JointPositionController", "<joint_name>two</joint_name><p_gain>much</p_gain>")));
+  EXPECT_THAT(texts(*world),
+              Contains("the plugin JointPositionController names the joint 'three', which the "
+                       "model does not have"));
+  EXPECT_THAT(texts(*world), Contains(HasSubstr("<joint_index> of the plugin JointController")));
+  EXPECT_THAT(texts(*world), Contains(HasSubstr("<d_gain> of the plugin JointController")));
+  EXPECT_THAT(texts(*world), Contains(HasSubstr("'much'")));
+  EXPECT_FALSE(axis(*world, 1).position_pid);
+}
+
+// ---- ROS
+
+std::string bot(const std::string& more) {
+  const std::string inertial =
+      "<inertial><mass value='1'/><inertia ixx='0.1' iyy='0.1' izz='0.1' ixy='0' ixz='0' iyz='0'/>"
+      "</inertial>";
+  return "<robot name='bot'><link name='base'>" + inertial + "</link><link name='a'>" + inertial +
+         "</link><link name='b'>" + inertial +
+         "</link><joint name='one' type='continuous'><parent link='base'/><child link='a'/><axis "
+         "xyz='0 0 1'/></joint><joint name='two' type='continuous'><parent link='a'/><child "
+         "link='b'/><axis xyz='0 0 1'/></joint>" +
+         more + "</robot>";
+}
+
+std::string transmission(const std::string& joint, const std::string& interface) {
+  return "<transmission name='t_" + joint +
+         "'><type>transmission_interface/SimpleTransmission"
+         "</type><joint name='" +
+         joint + "'><hardwareInterface>hardware_interface/" + interface +
+         "JointInterface</hardwareInterface></joint></transmission>";
+}
+
+TEST(RosGains, OfGazeboRosControl) {
+  TemporaryFolder folder;
+  folder.write("bot/package.xml", "<package><name>bot</name></package>");
+  folder.write("bot/config/control.yaml", R"(controllers: none
+/gazebo_ros_control:
+  pid_gains:
+    one: {p: 100.0, i: 1.0, d: 10.0, i_clamp: 3.0}
+    two: {p: 5.0, i: 1.0, d: 0.0}
+    other: {p: 1.0, i: 0.0, d: 0.0}
+)");
+  const auto world = load_world(folder.write(
+      "bot/urdf/bot.urdf", bot(transmission("one", "Position") + transmission("two", "Velocity"))));
+  EXPECT_THAT(texts(*world), Contains("no plugin names control.yaml; its gains hold these joints: "
+                                      "one, two"));
+  const Pid one = axis(*world, 0).position_pid.value(), two = axis(*world, 1).rate_pid.value();
+  EXPECT_EQ(one.p, 100.0);
+  EXPECT_EQ(one.d, 10.0);
+  EXPECT_EQ(one.i_max, 3.0);
+  EXPECT_EQ(one.i_min, -3.0);
+  EXPECT_EQ(two.p, 5.0);
+  EXPECT_EQ(two.i_max, 0.0);  // without a clamp nothing is left of the integral
+  EXPECT_FALSE(axis(*world, 0).rate_pid);
+}
+
+TEST(RosGains, OfControllersOfEffortAndVelocity) {
+  TemporaryFolder folder;
+  folder.write("bot/package.xml", "<package><name>bot</name></package>");
+  folder.write("bot/config/control.yaml", R"(controller_manager:
+  ros__parameters:
+    arm_controller:
+      type: joint_trajectory_controller/JointTrajectoryController
+    turn_controller:
+      type: velocity_controllers/JointPositionController
+arm_controller:
+  ros__parameters:
+    joints: [one]
+    command_interfaces: [effort]
+    gains:
+      one: {p: 12000.0, d: 50.0, i: 0.0, i_clamp: 10000.0}
+turn_controller:
+  ros__parameters:
+    joint: two
+    pid: {p: 7.0, i: 0.0, d: 0.0}
+)");
+  const auto world = load_world(folder.write(
+      "bot/urdf/bot.urdf", bot("<ros2_control name='s' type='system'><joint name='one'>"
+                               "<command_interface name='effort'/></joint></ros2_control>")));
+  EXPECT_EQ(axis(*world, 0).position_pid.value().p, 12000.0);
+  EXPECT_EQ(axis(*world, 0).start.mode, JointStart::Mode::stay);
+  EXPECT_EQ(axis(*world, 1).position_gain, 7.0);
+}
+
+TEST(RosGains, OfAJointsOwnParameters) {
+  const auto world = world_of(
+      arm("<ros2_control name='s' type='system'><joint name='one'><command_interface "
+          "name='position'/><param name='pos_kp'>10</param><param name='pos_kd'>2</param><param "
+          "name='pos_max_integral_error'>5</param></joint></ros2_control>"));
+  EXPECT_EQ(axis(*world, 0).position_pid.value().p, 10.0);
+  EXPECT_EQ(axis(*world, 0).position_pid.value().d, 2.0);
+  EXPECT_EQ(axis(*world, 0).position_pid.value().i_max, 5.0);
+}
+
+// As gazebo_ros_control and gz_ros2_control have it: arms do not fall before the first command.
+TEST(RosGains, JointsByPositionOrVelocityStayWhereTheyBegin) {
+  TemporaryFolder folder;
+  const auto world = load_world(folder.write(
+      "bot.urdf", bot(transmission("one", "Position") + transmission("two", "Effort"))));
+  EXPECT_EQ(axis(*world, 0).start.mode, JointStart::Mode::stay);
+  EXPECT_EQ(axis(*world, 1).start.mode, JointStart::Mode::free);
+}
+
+}  // namespace
+}  // namespace ruedo::model
