@@ -7,6 +7,7 @@
 #include <string_view>
 
 #include "model/read_context.h"
+#include "model/ros_controllers.h"
 
 namespace ruedo::model {
 namespace {
@@ -66,6 +67,22 @@ constexpr Known kKnown[] = {
      "suppress_child_warning"},
     {"TouchPlugin", "target collision create_contact_sensor_for_collision time namespace enabled"},
     {"PerformerDetector", "topic geometry pose header_data"},
+    {"PosePublisher",
+     "publish_link_pose publish_visual_pose publish_collision_pose publish_sensor_pose "
+     "publish_model_pose publish_nested_model_pose use_pose_vector_msg static_publisher "
+     "static_update_frequency update_frequency"},
+    {"Imu", ""},
+    {"Contact", ""},
+    {"NavSat", ""},
+    {"ForceTorque", ""},
+    {"AirPressure", ""},
+    {"AirSpeed", ""},
+    {"Altimeter", ""},
+    {"LogicalCamera", ""},
+    {"UserCommands", ""},
+    {"Magnetometer", "use_units_gauss use_earth_frame_ned"},
+    {"SceneBroadcaster", "dynamic_pose_hertz state_hertz"},
+    {"Physics", "engine include_entity_names"},
     {"Sensors",
      "render_engine render_engine_api_backend background_color ambient_light "
      "disable_on_drained_battery engine"},
@@ -85,6 +102,13 @@ struct Unsupported {
 constexpr const char* kNoise = "the <noise> of its sensor is what acts";
 constexpr const char* kJerk = "limits of the jerk are not kept";
 constexpr const char* kTrack = "the limits of the vehicle act";
+constexpr const char* kPoses = "ROBOT/pose comes 50 times a second";
+constexpr const char* kEncoders =
+    "ROBOT/odometry is that of its wheels, and ROBOT/pose the true one";
+constexpr const char* kCovariance = "odometry_t has no covariance";
+constexpr const char* kRange = "the <range> of its sensor is what acts";
+constexpr const char* kRate = "the <update_rate> of its sensor is what acts";
+constexpr const char* kLens = "the <camera> of its sensor is what acts";
 constexpr const char* kScene = "the world's <scene> says how pictures look";
 constexpr const char* kDistortion = "<distortion> in <camera> bends pictures";
 
@@ -103,9 +127,60 @@ constexpr Unsupported kUnsupported[] = {
     {"TrackController", "min_acceleration", "", kTrack},
     {"TrackController", "max_acceleration", "", kTrack},
     {"DetachableJoint", "output_topic", "", "what it holds is not told"},
+    {"PosePublisher", "update_frequency", "50", kPoses},
+    {"PosePublisher", "static_update_frequency", "50", kPoses},
+    {"JointStatePublisher", "update_rate", "0", "ROBOT/joints has its own rate"},
+    {"Magnetometer", "use_units_gauss", "false 0", "magnetometer_t is in T"},
+    {"Magnetometer", "use_earth_frame_ned", "false 0", "the world's axes are its own"},
+    {"Physics", "engine", "", "Ruedo's own physics is what acts"},
     {"Sensors", "background_color", "", kScene},
     {"Sensors", "ambient_light", "", kScene},
     {"Sensors", "disable_on_drained_battery", "false 0", "batteries do not run down"},
+    {"", "odometrySource", "encoder ENCODER 0", kEncoders},
+    {"", "odometry_source", "encoder ENCODER 0", kEncoders},
+    {"", "covariance_x", "0", kCovariance},
+    {"", "covariance_y", "0", kCovariance},
+    {"", "covariance_yaw", "0", kCovariance},
+    {"gazebo_ros_planar_move", "cmdTimeout", "-1 0", "Ruedo's watchdog is what acts"},
+    {"gazebo_ros_planar_move", "cmd_timeout", "-1 0", "Ruedo's watchdog is what acts"},
+    {"gazebo_ros_joint_state_publisher", "updateRate", "0", "ROBOT/joints has its own rate"},
+    {"gazebo_ros_joint_state_publisher", "update_rate", "0", "ROBOT/joints has its own rate"},
+    {"gazebo_ros_imu", "initialOrientationAsReference", "false 0", "it is that in the world"},
+    {"gazebo_ros_imu_sensor", "initialOrientationAsReference", "false 0",
+     "the orientation is that in the world"},
+    {"gazebo_ros_imu_sensor", "initial_orientation_as_reference", "false 0",
+     "the orientation is that in the world"},
+    {"gazebo_ros_imu_sensor", "gaussianNoise", "0", kNoise},
+    {"gazebo_ros_imu_sensor", "gaussian_noise", "0", kNoise},
+    {"gazebo_ros_imu_sensor", "updateRateHZ", "0", kRate},
+    {"gazebo_ros_laser", "gaussianNoise", "0", kNoise},
+    {"gazebo_ros_gpu_laser", "gaussianNoise", "0", kNoise},
+    {"gazebo_ros_velodyne_laser", "min_range", "0", kRange},
+    {"gazebo_ros_velodyne_laser", "max_range", "0", kRange},
+    {"gazebo_ros_velodyne_gpu_laser", "min_range", "0", kRange},
+    {"gazebo_ros_velodyne_gpu_laser", "max_range", "0", kRange},
+    {"gazebo_ros_velodyne_laser", "min_intensity", "0", kRange},
+    {"gazebo_ros_velodyne_gpu_laser", "min_intensity", "0", kRange},
+    {"gazebo_ros_range", "updateRate", "0", kRate},
+    {"gazebo_ros_range", "update_rate", "0", kRate},
+    {"hector_gazebo_ros_sonar", "updateRate", "0", kRate},
+    {"gazebo_ros_block_laser", "updateRate", "0", kRate},
+    {"gazebo_ros_bumper", "updateRate", "0", kRate},
+    {"gazebo_ros_bumper", "update_rate", "0", kRate},
+    {"gazebo_ros_camera", "updateRate", "0", kRate},
+    {"gazebo_ros_camera", "update_rate", "0", kRate},
+    {"gazebo_ros_depth_camera", "updateRate", "0", kRate},
+    {"gazebo_ros_openni_kinect", "updateRate", "0", kRate},
+    {"gazebo_ros_multicamera", "updateRate", "0", kRate},
+    {"", "focalLength", "0", kLens},
+    {"", "focal_length", "0", kLens},
+    {"", "CxPrime", "0", kLens},
+    {"", "cx_prime", "0", kLens},
+    {"", "Cx", "0", kLens},
+    {"", "Cy", "0", kLens},
+    {"", "cx", "0", kLens},
+    {"", "cy", "0", kLens},
+    {"", "triggered", "false 0", "pictures come at its rate, not on request"},
     {"gazebo_ros_block_laser", "gaussianNoise", "0", kNoise},
     {"gazebo_ros_velodyne_laser", "gaussianNoise", "0", kNoise},
     {"gazebo_ros_velodyne_laser", "gaussian_noise", "0", kNoise},
@@ -132,16 +207,6 @@ constexpr Unsupported kUnsupported[] = {
     {"", "min_depth", "0", "the camera's <clip> says how near it sees"},
     {"", "max_depth", "0", "the camera's <clip> says how far it sees"},
 };
-
-bool has_word(std::string_view words, std::string_view word) {
-  while (!words.empty()) {
-    const size_t blank = words.find(' ');
-    if (words.substr(0, blank) == word) return true;
-    if (blank == std::string_view::npos) return false;
-    words.remove_prefix(blank + 1);
-  }
-  return false;
-}
 
 // Files write 1e-8 for none.
 bool is_zero(const std::string& text) {

@@ -39,7 +39,7 @@ const std::map<std::string, Known>& of_gz() {
       {"Contact", {Does::served}},
       {"PosePublisher", {Does::served}},
       {"OdometryPublisher", {Does::served}},
-      {"LogRecord", {Does::served}},
+      {"LogRecord", {Does::dead, "it would record; here --record does"}},
       {"TrackController", {Does::served}},  // of a TrackedVehicle's tracks
       {"LogPlayback", {Does::irrelevant}},
       {"LogVideoRecorder", {Does::irrelevant}},

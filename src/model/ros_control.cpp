@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
+#include <set>
+#include <string_view>
 
 #include "model/ros_controllers.h"
 #include "ruedo/math.h"
@@ -230,6 +232,61 @@ std::unique_ptr<Element> odometry_of(const Controller& controller) {
   return odometry;
 }
 
+// Parameters of a drive that act, or that say nothing of how it drives and what it measures.
+constexpr std::string_view kDone =
+    "type left_wheel right_wheel left_wheel_names right_wheel_names wheel_radius wheel_separation "
+    "wheel_radius_multiplier left_wheel_radius_multiplier right_wheel_radius_multiplier "
+    "wheel_separation_multiplier front_left_wheel_command_joint_name "
+    "rear_left_wheel_command_joint_name front_right_wheel_command_joint_name "
+    "rear_right_wheel_command_joint_name front_left_wheel_joint back_left_wheel_joint "
+    "front_right_wheel_joint back_right_wheel_joint kinematics.wheels_radius "
+    "kinematics.sum_of_robot_center_projection_on_X_Y_axis wheel_separation_x wheel_separation_y "
+    "wheel_names rear_wheel front_steer rear_wheels_names front_wheels_names "
+    "traction_joints_names steering_joints_names traction_joint_name steering_joint_name "
+    "front_steering wheelbase wheel_separation_h wheel_separation_h_multiplier "
+    "traction_track_width rear_wheel_track front_wheel_track steering_track_width wheel_track "
+    "traction_wheels_radius rear_wheels_radius front_wheels_radius steering.max_position "
+    "steering.max_velocity traction.max_velocity cmd_vel_timeout reference_timeout "
+    "command_timeout publish_rate odom_publish_rate odom_frame_id base_frame_id base_link_frame_id "
+    "use_stamped_vel enable_odom_tf publish_cmd publish_limited_velocity use_sim_time update_rate "
+    "publish_wheel_joint_controller_state publish_wheel_data allow_multiple_cmd_vel_publishers "
+    "wheels_per_side tf_frame_prefix tf_frame_prefix_enable in_chained_mode "
+    "linear.x.has_velocity_limits linear.x.max_velocity linear.x.min_velocity "
+    "linear.x.has_acceleration_limits linear.x.max_acceleration linear.x.min_acceleration "
+    "linear.x.max_deceleration linear.x.has_jerk_limits linear.x.max_jerk linear.x.min_jerk "
+    "linear.y.has_velocity_limits linear.y.max_velocity linear.y.min_velocity "
+    "angular.z.has_velocity_limits angular.z.max_velocity angular.z.min_velocity "
+    "angular.z.has_acceleration_limits angular.z.max_acceleration angular.z.min_acceleration "
+    "angular.z.max_deceleration angular.z.has_jerk_limits angular.z.max_jerk angular.z.min_jerk";
+
+// Below a map, by dotted names; what is off, 0 or "not a number" does nothing in ROS either.
+void collect_others(const Element& map, const std::string& prefix, int depth,
+                    std::vector<std::string>& others) {
+  constexpr int kDeepest = 8;
+  static const std::set<std::string> kNothing = {"", "false", "False", "0", "0.0", ".nan", ".NaN"};
+  if (depth > kDeepest) return;
+  for (const auto& child : map.children) {
+    const std::string name = prefix + child->name;
+    const bool is_list = child->has("item");
+    if (!is_list && !child->children.empty()) {
+      collect_others(*child, name + ".", depth + 1, others);
+    } else if (!has_word(kDone, name) && (is_list || !kNothing.contains(child->text)) &&
+               std::find(others.begin(), others.end(), name) == others.end()) {
+      others.push_back(name);
+    }
+  }
+}
+
+void name_others(const Controller& controller, const std::string& where, Findings& findings) {
+  std::vector<std::string> others;
+  for (const Element* map : controller.parameters) collect_others(*map, "", 0, others);
+  if (others.empty()) return;
+  std::string list;
+  for (const std::string& name : others) list += (list.empty() ? "" : ", ") + name;
+  findings.unsupported(controller.source, where,
+                       "controller '" + controller.name + "': without effect here: " + list);
+}
+
 // What of a drive's parameters changes how it moves in ROS and not here.
 void name_what_has_no_effect(const Controller& controller, const std::string& where,
                              Findings& findings) {
@@ -292,6 +349,7 @@ ControllersDrive drive_from_controllers(const Element& model_element,
           "'" + each.name + "' of " + fs::path(each.source.file).filename().string();
       result.named = is_named;
       name_what_has_no_effect(each, where, context.findings);
+      name_others(each, where, context.findings);
       for (const std::string& path : paths) context.documents.note(path);
     }
     return result;

@@ -111,6 +111,16 @@ bool is_true(const Element* flag) {
   return flag && (flag->text == "true" || flag->text == "True" || flag->text == "1");
 }
 
+bool has_word(std::string_view words, std::string_view word) {
+  while (!words.empty()) {
+    const size_t blank = words.find(' ');
+    if (words.substr(0, blank) == word) return true;
+    if (blank == std::string_view::npos) return false;
+    words.remove_prefix(blank + 1);
+  }
+  return false;
+}
+
 std::optional<double> positive(const Element* written) {
   if (!written || written->text == ".nan" || written->text == ".NaN" || written->text == "NaN")
     return std::nullopt;

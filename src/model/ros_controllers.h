@@ -5,6 +5,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "model/read_context.h"
@@ -21,6 +22,7 @@ struct Controller {
 const Element* parameter(const Controller& controller, std::initializer_list<const char*> names);
 std::vector<std::string> names_in(const Element* list);  // of a list, or one
 bool is_true(const Element* flag);
+bool has_word(std::string_view words, std::string_view word);  // words with blanks between them
 // A number's magnitude above 0; the controllers' "no limit" is 0, NaN or nothing.
 std::optional<double> positive(const Element* written);
 

@@ -92,6 +92,16 @@ Gives gives_of(const Controller& controller) {
     return rate ? Gives::effort_for_rate : Gives::effort_for_position;
   if (contains(type, "velocity_controllers/"))
     return rate ? Gives::nothing : Gives::rate_for_position;
+  if (contains(type, "pid_controller/")) {
+    const auto states = names_in(parameter(controller, {"reference_and_state_interfaces"}));
+    const Element* command = parameter(controller, {"command_interface"});
+    const bool effort = command && command->text == "effort",
+               by_rate = !states.empty() && states[0] == "velocity";
+    if (!effort && (by_rate || !command || command->text != "velocity")) return Gives::nothing;
+    return !effort   ? Gives::rate_for_position
+           : by_rate ? Gives::effort_for_rate
+                     : Gives::effort_for_position;
+  }
   if (!contains(type, "JointTrajectoryController")) return Gives::nothing;
   for (const std::string& interface : names_in(parameter(controller, {"command_interfaces"}))) {
     if (interface == "effort") return Gives::effort_for_position;
@@ -107,11 +117,26 @@ void read_controller(const Controller& controller, Reader& reader) {
   const Element* pid = parameter(controller, {"pid"});
   if (const Element* joint = parameter(controller, {"joint"}); joint && pid)
     return reader.give(joint->text, gives, pid_of(*pid));
-  for (const std::string& joint : names_in(parameter(controller, {"joints"}))) {
+  for (const std::string& joint : names_in(parameter(controller, {"joints", "dof_names"}))) {
     const Element* gains = parameter(
         controller, {("gains." + joint).c_str(), (joint + ".pid").c_str(), joint.c_str()});
     if (gains) reader.give(joint, gives, pid_of(*gains));
   }
+}
+
+// Tolerances and goal times, of a controller of these joints.
+void name_constraints(const Controller& controller, const Reader& reader, const std::string& where,
+                      Findings& findings) {
+  const Element* constraints = parameter(controller, {"constraints"});
+  const std::vector<std::string> joints = names_in(parameter(controller, {"joints"}));
+  if (!constraints || !contains(controller.type, "JointTrajectoryController") ||
+      !std::all_of(joints.begin(), joints.end(),
+                   [&](const std::string& joint) { return reader.has(joint); }))
+    return;
+  findings.unsupported(constraints->source, where,
+                       "controller '" + controller.name +
+                           "': constraints are not supported: joints go where "
+                           "ROBOT/joint_command says, and no tolerance or goal time is watched");
 }
 
 // gazebo_ros_control/pid_gains, below whatever namespace.
@@ -175,7 +200,10 @@ void read_ros_gains(const Element& model_element, const std::vector<const Elemen
       if (auto file = read_controllers(path, is_named, where, context))
         files.push_back(std::move(file));
     }
-    for (const Controller& each : controllers_in(files)) read_controller(each, reader);
+    for (const Controller& each : controllers_in(files)) {
+      read_controller(each, reader);
+      name_constraints(each, reader, where, context.findings);
+    }
     for (const auto& file : files) read_pid_gains(*file, interfaces, reader, 0);
   };
   const auto guarded = [&](auto read) {

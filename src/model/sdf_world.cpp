@@ -10,6 +10,7 @@
 #include "model/material.h"
 #include "model/own_plugins.h"
 #include "model/placement.h"
+#include "model/plugin_parameters.h"
 #include "model/plugins.h"
 #include "model/saved_state.h"
 #include "model/sdf_link.h"
@@ -395,6 +396,7 @@ class SdfReader::WorldReader {
       if (has_levels(*plugin)) continue;
       const PluginKind kind = kind_of(*plugin);
       const bool dead = kind.does == PluginKind::Does::dead;
+      name_parameters(*plugin, in_world_, findings_);
       if (!dead && kind.does != PluginKind::Does::unknown) continue;
       if (!named.insert(kind.name).second) continue;
       findings_.unsupported(plugin->source, in_world_,

@@ -94,6 +94,51 @@ TEST(JointPlugins, WhatIsWrongOrNotDoneIsNamed) {
   EXPECT_FALSE(axis(*world, 1).position_pid);
 }
 
+struct Named {
+  std::string library, name, inside, text;
+};
+
+// Of gz-sim's systems and of Gazebo Classic's plugins: what acts in Gazebo and not here.
+TEST(PluginParameters, AreNamed) {
+  const std::string gz = "gz::sim::systems::";
+  const Named cases[] = {
+      {"f", gz + "PosePublisher", "<update_frequency>10</update_frequency>", "50 times a second"},
+      {"f", gz + "PosePublisher", "<update_rate>10</update_rate>", "is not known"},
+      {"f", gz + "JointStatePublisher", "<update_rate>10</update_rate>", "has its own rate"},
+      {"f", gz + "Imu", "<topic>imu</topic>", "is not known"},
+      {"f", gz + "Magnetometer", "<use_units_gauss>true</use_units_gauss>", "is in T"},
+      {"f", gz + "LogRecord", "<path>/tmp/log</path>", "--record does"},
+      {"libgazebo_ros_velodyne_laser.so", "p", "<min_range>0.9</min_range>", "<range>"},
+      {"libgazebo_ros_camera.so", "p", "<updateRate>5</updateRate>", "<update_rate>"},
+      {"libgazebo_ros_camera.so", "p", "<focalLength>500</focalLength>", "<camera>"},
+      {"libgazebo_ros_imu_sensor.so", "p",
+       "<initial_orientation_as_reference>true</initial_orientation_as_reference>",
+       "that in the world"},
+      {"libgazebo_ros_planar_move.so", "p", "<covariance_x>0.1</covariance_x>", "no covariance"},
+      {"libgazebo_ros_planar_move.so", "p", "<cmdTimeout>0.5</cmdTimeout>", "watchdog"},
+      {"libgazebo_ros_diff_drive.so", "p", "<odometrySource>world</odometrySource>", "its wheels"},
+  };
+  for (const Named& each : cases) {
+    const auto world = world_of(arm("<plugin filename='" + each.library + "' name='" + each.name +
+                                    "'>" + each.inside + "</plugin>"));
+    EXPECT_THAT(texts(*world), Contains(HasSubstr(each.text))) << each.name << each.inside;
+  }
+}
+
+TEST(PluginParameters, OnesThatSayTheSameAreNot) {
+  const std::string gz = "gz::sim::systems::";
+  const Named cases[] = {
+      {"f", gz + "PosePublisher", "<update_frequency>50</update_frequency>", ""},
+      {"f", gz + "Magnetometer", "<use_units_gauss>false</use_units_gauss>", ""},
+      {"libgazebo_ros_camera.so", "p", "<updateRate>0.0</updateRate><CxPrime>0</CxPrime>", ""},
+  };
+  for (const Named& each : cases) {
+    const auto world = world_of(arm("<plugin filename='" + each.library + "' name='" + each.name +
+                                    "'>" + each.inside + "</plugin>"));
+    EXPECT_THAT(texts(*world), IsEmpty()) << each.name << each.inside;
+  }
+}
+
 // ---- ROS
 
 std::string bot(const std::string& more) {
@@ -166,6 +211,42 @@ turn_controller:
   EXPECT_EQ(axis(*world, 0).position_pid.value().p, 12000.0);
   EXPECT_EQ(axis(*world, 0).start.mode, JointStart::Mode::stay);
   EXPECT_EQ(axis(*world, 1).position_gain, 7.0);
+}
+
+TEST(RosGains, OfPidControllersAndConstraintsThatAreNamed) {
+  TemporaryFolder folder;
+  folder.write("bot/package.xml", "<package><name>bot</name></package>");
+  folder.write("bot/config/control.yaml", R"(controller_manager:
+  ros__parameters:
+    hold: {type: pid_controller/PidController}
+    spin: {type: pid_controller/PidController}
+    arm: {type: joint_trajectory_controller/JointTrajectoryController}
+hold:
+  ros__parameters:
+    dof_names: [one]
+    command_interface: effort
+    reference_and_state_interfaces: [position, velocity]
+    gains: {one: {p: 40.0, i: 0.0, d: 3.0}}
+spin:
+  ros__parameters:
+    dof_names: [two]
+    command_interface: effort
+    reference_and_state_interfaces: [velocity]
+    gains: {two: {p: 6.0, i: 0.0, d: 0.0}}
+arm:
+  ros__parameters:
+    joints: [one, two]
+    constraints: {goal_time: 0.5, one: {goal: 0.01}}
+)");
+  const auto world = load_world(folder.write(
+      "bot/urdf/bot.urdf", bot("<ros2_control name='s' type='system'><joint name='one'>"
+                               "<command_interface name='effort'/></joint></ros2_control>")));
+  EXPECT_EQ(axis(*world, 0).position_pid.value().p, 40.0);
+  EXPECT_EQ(axis(*world, 0).position_pid.value().d, 3.0);
+  EXPECT_EQ(axis(*world, 1).rate_pid.value().p, 6.0);
+  EXPECT_THAT(texts(*world),
+              Contains("controller 'arm': constraints are not supported: joints go where "
+                       "ROBOT/joint_command says, and no tolerance or goal time is watched"));
 }
 
 TEST(RosGains, OfAJointsOwnParameters) {

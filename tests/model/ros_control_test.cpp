@@ -234,6 +234,26 @@ TEST(RosControl, AFileThatIsNotThereIsNamed) {
               testing::Contains("the controllers' file '$(find x)/y.yaml' is not found"));
 }
 
+TEST(RosControl, ParametersWithoutEffectAreOneFinding) {
+  TemporaryFolder folder;
+  folder.write("bot/package.xml", package("bot"));
+  folder.write("bot/config/control.yaml", R"(drive:
+  type: diff_drive_controller/DiffDriveController
+  left_wheel: [front_left, rear_left]
+  right_wheel: [front_right, rear_right]
+  publish_rate: 50
+  pose_covariance_diagonal: [0.001, 0.001, 0.001, 0.001, 0.001, 0.03]
+  open_loop: true
+  position_feedback: false
+  linear: {x: {max_velocity: 1.0, startup_boost: 2.0}}
+)");
+  const auto world =
+      load_world(folder.write("bot/urdf/bot.urdf", four_wheels(transmission("front_left"))));
+  EXPECT_THAT(texts(*world),
+              testing::Contains("controller 'drive': without effect here: "
+                                "pose_covariance_diagonal, open_loop, linear.x.startup_boost"));
+}
+
 TEST(Yaml, IsBounded) {
   EXPECT_THROW(parse_yaml("a: [", "f"), InputError);
   EXPECT_THROW(parse_yaml(std::string(2000, '['), "f"), InputError);
