@@ -31,7 +31,7 @@ bool has_position(const Joint& joint) { return turns(joint) || joint.type == Joi
 double position_of(const Model& model, const Joint& joint, const Pose& X_MParent,
                    const Pose& X_MChild) {
   const Pose& X_MC = model.links[joint.child].X_ML;
-  const Pose X_MP = joint.parent < 0 ? Pose{} : model.links[joint.parent].X_ML;
+  const Pose X_MP = joint.parent.valid() ? model.links[joint.parent].X_ML : Pose{};
   const Pose before = X_MP.inverse() * X_MC, after = X_MParent.inverse() * X_MChild;
   const Pose X_PJ = X_MP.inverse() * joint.X_MJ;
   const Pose moved = X_PJ.inverse() * after * before.inverse() * X_PJ;
