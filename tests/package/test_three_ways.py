@@ -134,3 +134,12 @@ def test_nothing_is_forced_and_nothing_depends_on_the_top():
         text = file.read_text(encoding="utf-8")
         assert not re.search(r"\bFORCE\b|\bCMAKE_SOURCE_DIR\b", text), file
         assert file.name == "RuedoRegression.cmake" or "CMAKE_BINARY_DIR" not in text, file
+
+
+@pytest.mark.parametrize("folder", ["clients/web", "scripts/lint_tools"])
+def test_the_npm_of_debian_reads_what_is_asked_of_it(folder):
+    """npm 9.2, of Debian 12 and 13, takes no lock file beside an alias in "overrides"; its `npm ci`
+    then says that there is none. Newer ones do not mind.
+    """
+    package = json.loads((SOURCE / folder / "package.json").read_text(encoding="utf-8"))
+    assert not [v for v in package.get("overrides", {}).values() if str(v).startswith("npm:")]
