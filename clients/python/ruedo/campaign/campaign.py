@@ -41,6 +41,7 @@ class Campaign:
         if isinstance(spec, dict):
             self._content, self._source = json.loads(json.dumps(spec)), Source("campaign")
             self.folder = Path(folder).resolve()
+            self.file: Path | None = None
             stem = str(spec.get("name", "campaign"))
         else:
             file = Path(spec)
@@ -49,7 +50,7 @@ class Campaign:
             except (OSError, UnicodeDecodeError) as error:
                 raise SpecError(f"{file}: cannot be read: {error}") from None
             self._content, self._source = read_yaml(str(file), text)
-            self.folder, stem = file.resolve().parent, file.stem
+            self.file, self.folder, stem = file.resolve(), file.resolve().parent, file.stem
         check(self._content, self._source)
         self._content["controllers"] = list(self._each_controller())
         check_values(self._content, self._source)

@@ -227,7 +227,7 @@ def _repeat(arguments: argparse.Namespace) -> int:
     outcome = Runner(str(campaign.folder)).run(case.what, full_log=str(log))
     row = campaign.results().row(case)
     print(f"{outcome.status}{': ' + outcome.reason if outcome.reason else ''}")
-    print(f"{log}: ruedo play {log} --console, ruedo verify {log}")
+    print(f"{log}: ruedo play {log} --view, ruedo verify {log}")
     if row is None:
         return GOOD
     same = (outcome.status, outcome.reason, outcome.state_hash) == (

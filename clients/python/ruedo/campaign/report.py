@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import html
 import io
+import shlex
 from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any
@@ -201,6 +202,7 @@ def _distributions(results: Results) -> Iterable[str]:
             label=["passed", "failed"],
         )
         axes.set_xlabel(name)
+        axes.locator_params(axis="x", nbins=6)
         axes.legend(frameon=False)
         plots.append(f"<figure>{_svg(figure)}</figure>")
     if plots:
@@ -216,7 +218,14 @@ def _heat_map(results: Results) -> Iterable[str]:
             continue
         figure = new_figure(5.2, 3.6)
         axes = figure.add_subplot()
-        drawn = axes.hexbin(*zip(*known), gridsize=24, mincnt=1, cmap="OrRd", linewidths=0.2)
+        drawn = axes.hexbin(
+            *zip(*known),
+            extent=_extent(results, world),
+            gridsize=24,
+            mincnt=1,
+            cmap="OrRd",
+            linewidths=0.2,
+        )
         figure.colorbar(drawn, label="failures")
         axes.set_aspect("equal", adjustable="datalim")
         axes.set_xlabel("x (m)")
@@ -226,6 +235,19 @@ def _heat_map(results: Results) -> Iterable[str]:
         )
     if plots:
         yield f"<h2>Where they failed</h2><div class='plots'>{''.join(plots)}</div>"
+
+
+def _extent(results: Results, world: str) -> tuple[float, float, float, float]:
+    """Least and most x and y (m) of all runs in a world, with a margin."""
+    margin_m = 0.5
+    places = [
+        place[1:]
+        for case, row in results.done
+        if case.world == world
+        for place in row["track"] or ()
+    ]
+    x, y = zip(*places)
+    return min(x) - margin_m, max(x) + margin_m, min(y) - margin_m, max(y) + margin_m
 
 
 def place_of_failure(row: dict[str, Any]) -> tuple[float, float] | None:
@@ -260,7 +282,7 @@ def _worst(campaign: Any, results: Results) -> Iterable[str]:
         return
     yield "<h2>The worst runs</h2><div class='plots'>"
     for case, row in worst:
-        yield f"<figure>{_path(case, row)}<figcaption>{_caption(results, case, row)}</figcaption></figure>"
+        yield f"<figure>{_path(case, row)}<figcaption>{_caption(campaign, results, case, row)}</figcaption></figure>"
     yield "</div>"
 
 
@@ -283,14 +305,17 @@ def _path(case: Case, row: dict[str, Any]) -> str:
     return _svg(figure)
 
 
-def _caption(results: Results, case: Case, row: dict[str, Any]) -> str:
+def _caption(campaign: Any, results: Results, case: Case, row: dict[str, Any]) -> str:
     settings = ", ".join(f"{name}={value}" for name, value in case.parameters.items())
-    log = results.log(case)
     text = f"<b>{case.number}</b> {html.escape(case.controller)}, seed {case.seed}{', ' + html.escape(settings) if settings else ''}: {html.escape(row['reason'])}"
-    if not log:
-        return text
-    path = html.escape(str(log.resolve()))
-    return f"{text}<br><a href='file://{path}'>log</a>; in the console: <code>ruedo play {path} --console</code>"
+    log = results.log(case)
+    if log:
+        text += f"<br><a href='file://{html.escape(str(log.resolve()))}'>log</a> of what acted"
+    if campaign.file:  # the console shows messages, which a kept log is without
+        again, run = shlex.quote(str(campaign.file)), f"case{case.number}.lcm"
+        shown = f"ruedo campaign repeat {again} {case.number} -o {run} &amp;&amp; ruedo play {run} --view"
+        text += f"<br>in the console: <code>{shown}</code>"
+    return text
 
 
 def _comparison(campaign: Any, baseline: str) -> Iterable[str]:
