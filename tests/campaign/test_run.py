@@ -1,5 +1,6 @@
 """Campaigns as they are run, cut off and taken up again: the same table, whoever ran what when."""
 
+import contextlib
 import fcntl
 import html
 import json
@@ -102,7 +103,8 @@ def test_kills_of_the_driver_and_of_workers_cost_the_runs_under_way_alone(whole)
         [*command[:2], "resume", *command[3:]], cwd=folder, stdout=subprocess.DEVNULL
     )
     wait_for(lambda: results_in(out) > before)
-    os.kill(children(driver.pid)[0], signal.SIGKILL)
+    with contextlib.suppress(IndexError, ProcessLookupError):  # on a fast machine it is done now
+        os.kill(children(driver.pid)[0], signal.SIGKILL)
     assert driver.wait(PATIENCE) == 1
     assert table(folder, "--out", str(out)) == expected
 
