@@ -211,95 +211,124 @@ Vec3 below_model(const Model& model) {
   return at;
 }
 
-// base_link: on the ground, in the middle of the wheels that are not steered; and what follows from
-// it.
+std::vector<ModelJointIndex> not_steered(const Model& model, const DriveDescription& drive,
+                                         const std::vector<ModelJointIndex>& wheels) {
+  std::vector<ModelJointIndex> fixed;
+  std::copy_if(wheels.begin(), wheels.end(), std::back_inserter(fixed),
+               [&](ModelJointIndex joint) { return !is_steered(model, drive, joint); });
+  return fixed;
+}
+
+bool steers(const DriveDescription& drive) {
+  return drive.steering == Steering::ackermann || drive.steering == Steering::tricycle;
+}
+
+// Where the wheels stand in the model's frame.
+struct Stance {
+  Quat heading = Quat::Identity();
+  Vec3 at = Vec3::Zero();  // on the ground, in the middle of the wheels that are not steered
+  double track = 0;        // 0: wheels on one side only, or none
+};
+
+Stance stance_of(const Element& e, const Model& model, const std::vector<ModelJointIndex>& wheels,
+                 DriveDescription& drive) {
+  const Vec3 above_ground(0, 0, drive.wheel_radius);
+  Stance stance;
+  stance.at = wheels.empty() ? below_model(model) : Vec3(middle(model, wheels) - above_ground);
+  std::vector<ModelJointIndex> lefts = drive.left_joints, rights = drive.right_joints;
+  if (steers(drive)) {
+    lefts = not_steered(model, drive, lefts);
+    rights = not_steered(model, drive, rights);
+  }
+  if (lefts.empty() || rights.empty() || drive.steering == Steering::omni) return stance;
+  const Vec3 left = middle(model, lefts), right = middle(model, rights);
+  stance.heading = heading_of(left, right, drive, e);
+  stance.at = (left + right) / 2 - above_ground;
+  stance.track = math::hypot((left - right).x(), (left - right).y());
+  return stance;
+}
+
+// How far the wheels may be steered by the limits of their joints.
+double joint_limit(const Model& model, const DriveDescription& drive) {
+  double limit = std::numeric_limits<double>::infinity();
+  for (const ModelJointIndex joint : drive.steer_joints) {
+    const JointAxis& axis = model.joints[joint].axis;
+    limit = std::min({limit, std::abs(axis.lower), std::abs(axis.upper)});
+  }
+  if (std::isinf(limit) && drive.steering == Steering::tricycle) return kMostSteering_rad;
+  return limit > 0 && !std::isinf(limit) ? limit : kUsualSteering_rad;
+}
+
+// Steered wheels: base_link is on the fixed axle, a wheelbase from the steered one.
+void read_steered(const Element& e, const Model& model, const std::vector<ModelJointIndex>& wheels,
+                  DriveDescription& drive, Stance& stance) {
+  const Allowed positive = Allowed::positive(quantity::kLength);
+  const std::vector<ModelJointIndex> fixed = not_steered(model, drive, wheels);
+  const Vec3 steered = middle(model, drive.steer_joints);
+  if (fixed.empty()) {
+    const double wheelbase = e.number("ruedo:wheelbase", 0, positive);
+    if (wheelbase == 0)
+      e.fail("has no <ruedo:wheelbase>, and no wheel that is not steered to take it from");
+    const Vec3 ahead = stance.heading * Vec3::UnitX();
+    stance.at = Vec3(steered.x(), steered.y(), stance.at.z()) - wheelbase * ahead;
+  } else {
+    const Vec3 axle = middle(model, fixed);
+    stance.at = {axle.x(), axle.y(), axle.z() - drive.wheel_radius};
+  }
+  const double ahead = (stance.heading.conjugate() * Vec3(steered - stance.at)).x();
+  if (std::abs(ahead) < 1e-3)
+    e.fail("the steered wheels are beside the fixed ones; they have to be ahead of them or behind");
+  drive.wheelbase = std::copysign(e.number("ruedo:wheelbase", std::abs(ahead), positive), ahead);
+  drive.max_steering_angle = std::min(
+      e.number("ruedo:max_steering_angle", joint_limit(model, drive), positive), kMostSteering_rad);
+  drive.max_steering_rate = e.number("ruedo:max_steering_rate", drive.max_steering_rate,
+                                     Allowed::positive(quantity::kSpeed).or_infinite());
+}
+
+// The wheels of an omni drive: left and right only say on which side they are.
+void sort_by_side(const Model& model, const std::vector<ModelJointIndex>& wheels,
+                  DriveDescription& drive) {
+  const Pose X_BaseM = drive.X_MBase.inverse();
+  drive.left_joints.clear();
+  drive.right_joints.clear();
+  for (const ModelJointIndex joint : wheels) {
+    const bool left = (X_BaseM * model.joints[joint].X_MJ.translation).y() > 0;
+    (left ? drive.left_joints : drive.right_joints).push_back(joint);
+  }
+}
+
+// From the rear to the front wheels of a mecanum drive, which are sorted by now; the mean of both
+// sides.
+double mecanum_wheelbase(const Element& e, const Model& model, const DriveDescription& drive) {
+  const Pose X_BaseM = drive.X_MBase.inverse();
+  const auto x = [&](ModelJointIndex joint) {
+    return (X_BaseM * model.joints[joint].X_MJ.translation).x();
+  };
+  const double apart = (x(drive.left_joints[0]) - x(drive.left_joints[1]) +
+                        x(drive.right_joints[0]) - x(drive.right_joints[1])) /
+                       2;
+  if (!(apart > 1e-6)) e.fail("the front and the rear wheels are in one place");
+  return apart;
+}
+
+// base_link, and what follows from it: track, wheelbase, the wheels' order.
 void place_base(const Element& e, const Model& model, DriveDescription& drive) {
+  const Allowed positive = Allowed::positive(quantity::kLength);
   std::vector<ModelJointIndex> wheels = drive.left_joints;
   wheels.insert(wheels.end(), drive.right_joints.begin(), drive.right_joints.end());
-  Quat heading = Quat::Identity();
-  Vec3 at = wheels.empty() ? below_model(model)
-                           : Vec3(middle(model, wheels) - Vec3(0, 0, drive.wheel_radius));
-  double track = 0;
-  const auto fixed_of = [&](const std::vector<ModelJointIndex>& side) {
-    std::vector<ModelJointIndex> fixed;
-    std::copy_if(side.begin(), side.end(), std::back_inserter(fixed),
-                 [&](ModelJointIndex joint) { return !is_steered(model, drive, joint); });
-    return fixed;
-  };
-  const bool steers = drive.steering == Steering::ackermann || drive.steering == Steering::tricycle;
-  const std::vector<ModelJointIndex> lefts =
-                                         steers ? fixed_of(drive.left_joints) : drive.left_joints,
-                                     rights =
-                                         steers ? fixed_of(drive.right_joints) : drive.right_joints;
-  if (!lefts.empty() && !rights.empty() && drive.steering != Steering::omni) {
-    const Vec3 left = middle(model, lefts), right = middle(model, rights);
-    heading = heading_of(left, right, drive, e);
-    at = (left + right) / 2 - Vec3(0, 0, drive.wheel_radius);
-    track = math::hypot((left - right).x(), (left - right).y());
-  }
-  const Allowed positive = Allowed::positive(quantity::kLength);
-  if (steers) {
-    const std::vector<ModelJointIndex> fixed = fixed_of(wheels);
-    const Vec3 steered = middle(model, drive.steer_joints);
-    if (fixed.empty()) {
-      const double wheelbase = e.number("ruedo:wheelbase", 0, positive);
-      if (wheelbase == 0)
-        e.fail("has no <ruedo:wheelbase>, and no wheel that is not steered to take it from");
-      const Vec3 ahead = heading * Vec3::UnitX();
-      at = Vec3(steered.x(), steered.y(), at.z()) - wheelbase * ahead;
-    } else {
-      const Vec3 axle = middle(model, fixed);
-      at = {axle.x(), axle.y(), axle.z() - drive.wheel_radius};
-    }
-    const double ahead = (heading.conjugate() * Vec3(steered - at)).x();
-    if (std::abs(ahead) < 1e-3)
-      e.fail(
-          "the steered wheels are beside the fixed ones; they have to be ahead of them or behind");
-    drive.wheelbase = std::copysign(e.number("ruedo:wheelbase", std::abs(ahead), positive), ahead);
-    double limit = std::numeric_limits<double>::infinity();
-    for (const ModelJointIndex joint : drive.steer_joints) {
-      const JointAxis& axis = model.joints[joint].axis;
-      limit = std::min({limit, std::abs(axis.lower), std::abs(axis.upper)});
-    }
-    if (!(limit > 0)) limit = kUsualSteering_rad;
-    drive.max_steering_angle = std::min(
-        e.number("ruedo:max_steering_angle",
-                 std::isinf(limit) ? (drive.steering == Steering::tricycle ? kMostSteering_rad
-                                                                           : kUsualSteering_rad)
-                                   : limit,
-                 positive),
-        kMostSteering_rad);
-    drive.max_steering_rate = e.number("ruedo:max_steering_rate", drive.max_steering_rate,
-                                       Allowed::positive(quantity::kSpeed).or_infinite());
-  }
-  drive.track = track > 0 ? e.number("ruedo:track", track, positive)
-                          : e.number("ruedo:track", 0, Allowed::not_negative(quantity::kLength));
+  Stance stance = stance_of(e, model, wheels, drive);
+  if (steers(drive)) read_steered(e, model, wheels, drive, stance);
+  drive.track = stance.track > 0
+                    ? e.number("ruedo:track", stance.track, positive)
+                    : e.number("ruedo:track", 0, Allowed::not_negative(quantity::kLength));
   if (drive.steering == Steering::tracked && drive.track == 0)
     e.fail("has no <ruedo:track>, and no wheels to take it from");
-  drive.X_MBase = {heading, at};
-  drive.X_MBase = e.pose("ruedo:base", drive.X_MBase);
-  if (drive.steering == Steering::omni) {  // left and right only say on which side they are
-    const Pose X_BaseM = drive.X_MBase.inverse();
-    drive.left_joints.clear();
-    drive.right_joints.clear();
-    for (const ModelJointIndex joint : wheels) {
-      const bool left = (X_BaseM * model.joints[joint].X_MJ.translation).y() > 0;
-      (left ? drive.left_joints : drive.right_joints).push_back(joint);
-    }
-  }
+  drive.X_MBase = e.pose("ruedo:base", {stance.heading, stance.at});
+  if (drive.steering == Steering::omni) sort_by_side(model, wheels, drive);
   sort_by_front(model, drive.X_MBase, drive.left_joints);
   sort_by_front(model, drive.X_MBase, drive.right_joints);
-  if (drive.steering == Steering::mecanum) {
-    const Pose X_BaseM = drive.X_MBase.inverse();
-    const auto x = [&](const std::vector<ModelJointIndex>& side, size_t i) {
-      return (X_BaseM * model.joints[side[i]].X_MJ.translation).x();
-    };
-    const double apart = (x(drive.left_joints, 0) - x(drive.left_joints, 1) +
-                          x(drive.right_joints, 0) - x(drive.right_joints, 1)) /
-                         2;
-    if (!(apart > 1e-6)) e.fail("the front and the rear wheels are in one place");
-    drive.wheelbase = e.number("ruedo:wheelbase", apart, positive);
-  }
+  if (drive.steering == Steering::mecanum)
+    drive.wheelbase = e.number("ruedo:wheelbase", mecanum_wheelbase(e, model, drive), positive);
 }
 
 void read_limits(const Element& e, const Model& model, DriveDescription& drive) {

@@ -265,6 +265,20 @@ Inertial read_inertial(const Element& element, const Element& link_element, cons
   return inertial;
 }
 
+// What a link may say and Ruedo does not do.
+void report_unsupported(const Element& element, const std::string& where, Findings& findings) {
+  if (const Element* decay = element.child("velocity_decay");
+      decay && (decay->number("linear", 0.0, Allowed::any(quantity::kDamping)) != 0.0 ||
+                decay->number("angular", 0.0, Allowed::any(quantity::kDamping)) != 0.0)) {
+    findings.unsupported(decay->source, where,
+                         "<velocity_decay> is not supported: nothing slows the link in the air");
+  }
+  if (element.boolean("self_collide", false)) {
+    findings.unsupported(element.child("self_collide")->source, where,
+                         "<self_collide> of a link is not supported; a model may have it");
+  }
+}
+
 }  // namespace
 
 Light read_light(const Element& element, const Pose& pose, const std::string& where,
@@ -345,17 +359,7 @@ Link read_link(const Element& element, const PoseInLink& pose_in_link, const std
   link.gravity = element.boolean("gravity", true);
   link.wind = element.boolean("enable_wind", false);
   link.kinematic = element.boolean("kinematic", false);
-  if (const Element* decay = element.child("velocity_decay");
-      decay && (decay->number("linear", 0.0, Allowed::any(quantity::kDamping)) != 0.0 ||
-                decay->number("angular", 0.0, Allowed::any(quantity::kDamping)) != 0.0)) {
-    context.findings.unsupported(
-        decay->source, where,
-        "<velocity_decay> is not supported: nothing slows the link in the air");
-  }
-  if (element.boolean("self_collide", false)) {
-    context.findings.unsupported(element.child("self_collide")->source, where,
-                                 "<self_collide> of a link is not supported; a model may have it");
-  }
+  report_unsupported(element, where, context.findings);
   std::set<std::string> names;
   const auto unique = [&](const Element& child) {
     if (names.insert(child.name + " " + required_name(child)).second) return;

@@ -144,44 +144,68 @@ export class App {
     (robot) => this.choose(robot),
   );
   private readonly router = new Router(this.page, this);
-  readonly timeline: Timeline;
+  readonly timeline = new Timeline(byId("timeline"), this.page, {
+    play: (on, speed) => this.link.play(on, speed),
+    seek: (time_s) => this.seek(time_s),
+    live: () => this.rewind?.live(),
+    step: (ahead) => this.link.step(ahead),
+    branch: () => void this.control.branch(),
+  });
+  private readonly help = byId("help") as HTMLDialogElement;
   private asked = false; // for the state, on this connection
   private shown = ""; // run and name of the robot in the panel
 
   constructor() {
-    const { page, control } = this;
-    const help = byId("help") as HTMLDialogElement;
-    fillHelp(help);
-    new Bar(byId("bar"), page, {
-      pauseOrResume: () => control.pauseOrResume(),
-      step: () => control.step(),
-      reset: () => void control.reset(),
-      rate: (rate) => control.rate(rate),
+    this.fillPage();
+    this.connectParts();
+    listenToEditing(this.page, this.editor);
+    listenToKeys(this.keys());
+    this.watch();
+    this.connect();
+    requestAnimationFrame((at) => this.frame(at));
+  }
+
+  // What stands in the page and that nobody asks for later.
+  private fillPage(): void {
+    fillHelp(this.help);
+    new Bar(byId("bar"), this.page, {
+      pauseOrResume: () => this.control.pauseOrResume(),
+      step: () => this.control.step(),
+      reset: () => void this.control.reset(),
+      rate: (rate) => this.control.rate(rate),
       mode: (mode) => this.setMode(mode),
       theme: () => this.toggleTheme(),
-      help: () => help.showModal(),
+      help: () => this.help.showModal(),
       panel: () => this.togglePanel(),
     });
-    this.timeline = new Timeline(byId("timeline"), page, {
-      play: (on, speed) => this.link.play(on, speed),
-      seek: (time_s) => this.seek(time_s),
-      live: () => this.rewind?.live(),
-      step: (ahead) => this.link.step(ahead),
-      branch: () => void this.control.branch(),
-    });
+    new Layout(this.page);
+    makeLegend(byId("legend"), this.page);
+    if (!this.stage.renderer) byId("flat").hidden = false;
+    this.makePad();
+    this.editPage.extras.append(
+      new Capture(this.stage, byId("canvas") as HTMLCanvasElement).element,
+      h(
+        "div",
+        { class: "row" },
+        h("button", { id: "link", click: () => void this.copyLink() }, "Copy link"),
+      ),
+    );
+    byId("view").append(this.measure.readout);
+    this.pages.extras.append(this.inset.chooser, this.frames.element);
+  }
+
+  // Parts that tell another one something.
+  private connectParts(): void {
+    const { page } = this;
     if (this.rewind) {
       this.rewind.onPast = (past, kept) => this.onPast(past, kept);
       this.rewind.onKept = (channel, bytes) => this.plots.message(channel, bytes);
     }
-    new Layout(page);
-    makeLegend(byId("legend"), page);
     this.stage.onDetail = (reduced) => page.set({ reduced });
-    if (!this.stage.renderer) byId("flat").hidden = false;
     this.channels.onPlot = (channel, path) => {
       this.plots.plot(channel, path, false);
       page.set({ tab: "Plots" });
     };
-    this.makePad();
     listenToClicks(
       byId("canvas"),
       page,
@@ -193,57 +217,54 @@ export class App {
       (point, further) => this.trip.go(point, further),
     );
     this.pages.onMotion = (status) => this.trip.heard(status);
-    const going = () => page.set({ tool: page.now.tool === "go" ? "select" : "go" });
-    this.pages.goButton.addEventListener("click", going);
+    this.pages.goButton.addEventListener("click", () => this.toggleGoing());
     page.watch(["tool"], ({ tool }) => this.pages.goButton.classList.toggle("on", tool === "go"));
-    this.editPage.extras.append(
-      new Capture(this.stage, byId("canvas") as HTMLCanvasElement).element,
-      h(
-        "div",
-        { class: "row" },
-        h("button", { id: "link", click: () => void this.copyLink() }, "Copy link"),
-      ),
-    );
-    byId("view").append(this.measure.readout);
-    this.pages.extras.append(this.inset.chooser, this.frames.element);
-    listenToEditing(page, this.editor);
-    listenToKeys({
+  }
+
+  private keys(): Record<string, () => void> {
+    const { page, control, stage, timeline } = this;
+    return {
       " ": () => control.pauseOrResume(),
       ".": () => this.step(true),
       ",": () => this.step(false),
-      ">": () => this.timeline.lane.jump(true),
-      "<": () => this.timeline.lane.jump(false),
+      ">": () => timeline.lane.jump(true),
+      "<": () => timeline.lane.jump(false),
       o: () => page.set({ loop: !page.now.loop }),
-      "[": () => this.timeline.lane.mark("begin"),
-      "]": () => this.timeline.lane.mark("end"),
+      "[": () => timeline.lane.mark("begin"),
+      "]": () => timeline.lane.mark("end"),
       End: () => this.rewind?.live(),
       r: () => void control.reset(),
       x: () => control.stop(),
-      g: going,
+      g: () => this.toggleGoing(),
       "1": () => this.setMode("orbit"),
       "2": () => this.setMode("follow"),
       "3": () => this.setMode("top"),
-      Home: () => this.stage.home(),
+      Home: () => stage.home(),
       n: () => this.choose((page.now.robot + 1) % Math.max(1, page.now.world?.robots.length ?? 1)),
       p: () => this.togglePanel(),
       t: () => this.toggleTheme(),
-      j: () => this.stage.turn(-kTurn_rad, 0),
-      l: () => this.stage.turn(kTurn_rad, 0),
-      i: () => this.stage.turn(0, kTurn_rad),
-      k: () => this.stage.turn(0, -kTurn_rad),
-      J: () => this.stage.pan(-kPan, 0),
-      L: () => this.stage.pan(kPan, 0),
-      I: () => this.stage.pan(0, kPan),
-      K: () => this.stage.pan(0, -kPan),
-      "+": () => this.stage.zoom(1 / kZoom),
-      "-": () => this.stage.zoom(kZoom),
+      j: () => stage.turn(-kTurn_rad, 0),
+      l: () => stage.turn(kTurn_rad, 0),
+      i: () => stage.turn(0, kTurn_rad),
+      k: () => stage.turn(0, -kTurn_rad),
+      J: () => stage.pan(-kPan, 0),
+      L: () => stage.pan(kPan, 0),
+      I: () => stage.pan(0, kPan),
+      K: () => stage.pan(0, -kPan),
+      "+": () => stage.zoom(1 / kZoom),
+      "-": () => stage.zoom(kZoom),
       b: () => this.editPage.startPlacing(),
       Escape: () => this.stopEditing(),
       m: () => page.set({ handle: "translate" }),
       e: () => page.set({ handle: "rotate" }),
       z: () => page.set({ handle: "scale" }),
-      "?": () => help.showModal(),
-    });
+      "?": () => this.help.showModal(),
+    };
+  }
+
+  // What follows when something else is known or chosen.
+  private watch(): void {
+    const { page } = this;
     page.watch(["theme"], ({ theme }) => {
       document.documentElement.dataset.theme = theme;
       this.stage.setTheme(theme === "dark");
@@ -258,6 +279,10 @@ export class App {
     });
     page.watch(["world", "scene", "robot"], () => this.showRobot());
     page.watch(["hello", "world", "scene", "robot", "layers", "tab", "panel"], () => this.want());
+  }
+
+  private connect(): void {
+    const { page } = this;
     this.link.connect({
       state: (link, words) => this.notice.onLink(link, words),
       hello: (hello) => this.loading.onHello(hello),
@@ -279,7 +304,6 @@ export class App {
           "error",
         ),
     });
-    requestAnimationFrame((at) => this.frame(at));
   }
 
   // ---- what comes in, in the order of Loading
@@ -509,6 +533,10 @@ export class App {
   setMode(mode: ViewMode): void {
     this.stage.setMode(mode);
     this.page.set({ mode });
+  }
+
+  private toggleGoing(): void {
+    this.page.set({ tool: this.page.now.tool === "go" ? "select" : "go" });
   }
 
   private toggleTheme(): void {

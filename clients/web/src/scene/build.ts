@@ -3,7 +3,7 @@
 import * as THREE from "three";
 import { mergeGeometries } from "three/addons/utils/BufferGeometryUtils.js";
 import { plainKinds } from "./plain";
-import { Flag, type LinkData, type Part, type SceneFiles } from "./description";
+import { Flag, type LinkData, type MeshData, type Part, type SceneFiles } from "./description";
 
 const kSmall = 0.5; // of a link's largest part: smaller ones are left out far away
 
@@ -67,6 +67,60 @@ export function disposeOf({ still, moving }: Built): void {
       material.dispose();
       object.dispose();
     });
+  }
+}
+
+// From the part's mesh to its link.
+function matrixOf({ matrix: m }: Part): THREE.Matrix4 {
+  return new THREE.Matrix4().fromArray([...m, 0, 0, 0, 1]).transpose();
+}
+
+// Corners of triangles, each vertex of a part once.
+class Corners {
+  private readonly positions: number[] = [];
+  private readonly normals: number[] = [];
+  private readonly uvs: number[] = [];
+  private readonly colours: number[] = [];
+  private readonly indices: number[] = [];
+
+  add(part: Part, { vertices, indices }: MeshData, first: number, count: number, flags: number) {
+    const matrix = matrixOf(part),
+      normalMatrix = new THREE.Matrix3().getNormalMatrix(matrix);
+    const colour = sRGB(part.diffuse),
+      v = new THREE.Vector3();
+    const places = new Map<number, number>();
+    for (let i = first; i < first + count; ++i) {
+      // A scale with an odd number of negative factors turns triangles inside out.
+      const corner = flags & Flag.mirrored ? [0, 2, 1][(i - first) % 3]! - ((i - first) % 3) : 0;
+      const vertex = indices[i + corner]!;
+      let place = places.get(vertex);
+      if (place === undefined) {
+        place = this.positions.length / 3;
+        places.set(vertex, place);
+        const at = 8 * vertex; // position, normal, texture coordinates
+        v.fromArray(vertices, at).applyMatrix4(matrix);
+        this.positions.push(v.x, v.y, v.z);
+        v.fromArray(vertices, at + 3)
+          .applyMatrix3(normalMatrix)
+          .normalize();
+        this.normals.push(v.x, v.y, v.z);
+        this.uvs.push(vertices[at + 6]!, vertices[at + 7]!);
+        this.colours.push(colour.r, colour.g, colour.b);
+      }
+      this.indices.push(place);
+    }
+  }
+
+  geometry(): THREE.BufferGeometry {
+    const geometry = new THREE.BufferGeometry();
+    const set = (name: string, values: number[], size: number) =>
+      geometry.setAttribute(name, new THREE.Float32BufferAttribute(values, size));
+    set("position", this.positions, 3);
+    set("normal", this.normals, 3);
+    set("uv", this.uvs, 2);
+    set("color", this.colours, 3);
+    geometry.setIndex(this.indices);
+    return geometry;
   }
 }
 
@@ -153,50 +207,7 @@ export class SceneBuilder {
   // The boxes around the larger parts: a dozen triangles each, for links of a few pixels.
   private far(parts: Part[], links: number, into: THREE.Group): Far | null {
     const boxes = parts
-      .map((part) => {
-        const [meshIndex, first, count] = this.batch(part, true);
-        const { vertices, indices } = this.files.meshes[meshIndex]!;
-        const box = new THREE.Box3(),
-          point = new THREE.Vector3(),
-          m = part.matrix;
-        for (let i = first; i < first + count; ++i)
-          box.expandByPoint(point.fromArray(vertices, 8 * indices[i]!));
-        const matrix = new THREE.Matrix4().set(
-          m[0]!,
-          m[1]!,
-          m[2]!,
-          m[3]!,
-          m[4]!,
-          m[5]!,
-          m[6]!,
-          m[7]!,
-          m[8]!,
-          m[9]!,
-          m[10]!,
-          m[11]!,
-          0,
-          0,
-          0,
-          1,
-        );
-        const size = box.getSize(new THREE.Vector3()),
-          centre = box.getCenter(new THREE.Vector3());
-        const geometry = new THREE.BoxGeometry(size.x, size.y, size.z)
-          .translate(centre.x, centre.y, centre.z)
-          .applyMatrix4(matrix);
-        const colour = sRGB(part.diffuse),
-          corners = geometry.getAttribute("position").count;
-        geometry.setAttribute(
-          "color",
-          new THREE.Float32BufferAttribute(
-            Array.from({ length: corners }, () => colour.toArray()).flat(),
-            3,
-          ),
-        );
-        geometry.computeBoundingSphere();
-        geometry.computeBoundingBox();
-        return geometry;
-      })
+      .map((part) => this.boxAround(part))
       .sort((a, b) => b.boundingSphere!.radius - a.boundingSphere!.radius);
     const seen = boxes.filter(
       (box, i) =>
@@ -216,73 +227,39 @@ export class SceneBuilder {
     return { mesh, matrices: new Float32Array(16 * links), shown: [] };
   }
 
+  // A part as a box of its colour, in the link's frame.
+  private boxAround(part: Part): THREE.BufferGeometry {
+    const [meshIndex, first, count] = this.batch(part, true);
+    const { vertices, indices } = this.files.meshes[meshIndex]!;
+    const box = new THREE.Box3(),
+      point = new THREE.Vector3();
+    for (let i = first; i < first + count; ++i)
+      box.expandByPoint(point.fromArray(vertices, 8 * indices[i]!));
+    const size = box.getSize(new THREE.Vector3()),
+      centre = box.getCenter(new THREE.Vector3());
+    const geometry = new THREE.BoxGeometry(size.x, size.y, size.z)
+      .translate(centre.x, centre.y, centre.z)
+      .applyMatrix4(matrixOf(part));
+    const colour = sRGB(part.diffuse).toArray(),
+      corners = geometry.getAttribute("position").count;
+    const colours = Array.from({ length: corners }, () => colour).flat();
+    geometry.setAttribute("color", new THREE.Float32BufferAttribute(colours, 3));
+    geometry.computeBoundingSphere();
+    geometry.computeBoundingBox();
+    return geometry;
+  }
+
   private batch(part: Part, many: boolean) {
     return this.files.description.batches[many ? part.small : part.batch]!;
   }
 
   private merge(parts: Part[], many: boolean): THREE.BufferGeometry {
-    const positions: number[] = [],
-      normals: number[] = [],
-      uvs: number[] = [],
-      colours: number[] = [],
-      indices: number[] = [];
-    const p = new THREE.Vector3(),
-      matrix = new THREE.Matrix4(),
-      normalMatrix = new THREE.Matrix3();
+    const corners = new Corners();
     for (const part of parts) {
       const [meshIndex, first, count, , flags] = this.batch(part, many);
-      const mesh = this.files.meshes[meshIndex]!;
-      const m = part.matrix;
-      matrix.set(
-        m[0]!,
-        m[1]!,
-        m[2]!,
-        m[3]!,
-        m[4]!,
-        m[5]!,
-        m[6]!,
-        m[7]!,
-        m[8]!,
-        m[9]!,
-        m[10]!,
-        m[11]!,
-        0,
-        0,
-        0,
-        1,
-      );
-      normalMatrix.getNormalMatrix(matrix);
-      const colour = sRGB(part.diffuse);
-      const places = new Map<number, number>();
-      for (let i = first; i < first + count; ++i) {
-        // A scale with an odd number of negative factors turns triangles inside out.
-        const corner = flags & Flag.mirrored ? [0, 2, 1][(i - first) % 3]! - ((i - first) % 3) : 0;
-        const vertex = mesh.indices[i + corner]!;
-        let place = places.get(vertex);
-        if (place === undefined) {
-          place = positions.length / 3;
-          places.set(vertex, place);
-          const at = 8 * vertex,
-            v = mesh.vertices;
-          p.set(v[at]!, v[at + 1]!, v[at + 2]!).applyMatrix4(matrix);
-          positions.push(p.x, p.y, p.z);
-          p.set(v[at + 3]!, v[at + 4]!, v[at + 5]!)
-            .applyMatrix3(normalMatrix)
-            .normalize();
-          normals.push(p.x, p.y, p.z);
-          uvs.push(v[at + 6]!, v[at + 7]!);
-          colours.push(colour.r, colour.g, colour.b);
-        }
-        indices.push(place);
-      }
+      corners.add(part, this.files.meshes[meshIndex]!, first, count, flags);
     }
-    const geometry = new THREE.BufferGeometry();
-    geometry.setAttribute("position", new THREE.Float32BufferAttribute(positions, 3));
-    geometry.setAttribute("normal", new THREE.Float32BufferAttribute(normals, 3));
-    geometry.setAttribute("uv", new THREE.Float32BufferAttribute(uvs, 2));
-    geometry.setAttribute("color", new THREE.Float32BufferAttribute(colours, 3));
-    geometry.setIndex(indices);
-    return geometry;
+    return corners.geometry();
   }
 
   private texture(index: number): THREE.Texture | null {

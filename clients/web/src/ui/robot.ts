@@ -2,7 +2,6 @@
 import {
   image_t,
   motion_status_t,
-  move_command_t,
   type collisions_t,
   type contact_t,
   type device_info_t,
@@ -17,6 +16,7 @@ import {
 import { textOf } from "./channels";
 import { h, say } from "./dom";
 import { JointTable } from "./joints";
+import { makeMoveForm, type Move } from "./move_form";
 import { inWorld, type Heading } from "./odometry";
 import { PolarPlot, TimePlot } from "./plots";
 
@@ -166,7 +166,7 @@ export class RobotPages {
   private reckoned: odometry_t | null = null;
 
   constructor(
-    move: (command: Omit<move_command_t, "utime" | "id">) => unknown,
+    move: (command: Move) => unknown,
     stop: () => void,
     joint: { move(name: string, position: number): void; canMove(): boolean },
   ) {
@@ -174,71 +174,13 @@ export class RobotPages {
       (name, position) => joint.move(name, position),
       () => joint.canMove(),
     );
-    const kind = h(
-      "select",
-      { "aria-label": "motion primitive" },
-      ...[
-        [1, "advance"],
-        [2, "rotate"],
-        [3, "turn to heading"],
-        [4, "arc"],
-      ].map(([value, text]) => h("option", { value: value! }, text as string)),
-    );
-    const value = h("input", { type: "number", step: 0.1, value: 1, "aria-label": "how far" }),
-      unit = h("span", { class: "dim" }, "m");
-    const radius = h("input", {
-        type: "number",
-        step: 0.1,
-        value: 1,
-        min: 0.05,
-        "aria-label": "radius",
-      }),
-      radiusRow = h("label", { class: "row" }, "radius", radius, h("span", { class: "dim" }, "m"));
-    const speed = h("input", {
-      type: "number",
-      step: 0.1,
-      value: 0,
-      min: 0,
-      "aria-label": "speed",
-      title: "0: the robot's own",
-    });
-    radiusRow.hidden = true;
-    kind.addEventListener("change", () => {
-      const turns = kind.value !== "1";
-      say(unit, turns ? "°" : "m");
-      value.value = turns ? "90" : "1";
-      value.step = turns ? "15" : "0.1";
-      radiusRow.hidden = kind.value !== "4";
-    });
-    const send = () => {
-      const turns = kind.value !== "1";
-      move({
-        kind: Number(kind.value),
-        value: Number(value.value) * (turns ? Math.PI / 180 : 1),
-        radius: kind.value === "4" ? Number(radius.value) : 0,
-        speed: Number(speed.value),
-        acceleration: 0,
-        deceleration: 0,
-      });
-    };
     this.statePage = h(
       "section",
       {},
       this.facts,
       this.jointTable.element,
       h("h2", {}, "Motion primitive"),
-      h(
-        "div",
-        { class: "row" },
-        kind,
-        value,
-        unit,
-        radiusRow,
-        h("label", { class: "row" }, "speed", speed),
-        h("button", { id: "move", click: send }, "Go"),
-        h("button", { click: stop, title: "stop (X)" }, "Stop"),
-        this.goButton,
-      ),
+      makeMoveForm(move, h("button", { click: stop, title: "stop (X)" }, "Stop"), this.goButton),
       h("h2", {}, "Ranges"),
       this.polar.element,
       h("h2", {}, "Pictures"),

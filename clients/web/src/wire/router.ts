@@ -10,6 +10,7 @@ import type { Page } from "../state/page";
 import type { Poses } from "../state/poses";
 import type { Ghosts } from "../scene/ghosts";
 import type { Markers } from "../scene/markers";
+import type { RobotOverlay } from "../scene/overlays";
 import type { OverlaySet } from "../scene/overlay_set";
 import type { Stage } from "../scene/stage";
 import type { ChannelList } from "../ui/channels";
@@ -20,23 +21,94 @@ import type { Session } from "./session";
 
 interface Route {
   type: TypeName;
-  robot: string;
+  robot: string; // "": of none
+  index: number; // of the robot in the world
   device: device_info_t | undefined;
 }
 
 // The channels whose types this page knows as the server does.
 export function routesOf(world: World): Map<string, Route> {
   const routes = new Map<string, Route>();
+  const places = new Map(world.robots.map((robot, index) => [robot.name, index]));
+  const devices = new Map(
+    world.devices.map((device) => [`${device.robot}/${device.name}`, device]),
+  );
   for (const { name, type, robot, device, fingerprint: hash } of world.channels) {
     if (fingerprint(type) !== hash) continue;
     routes.set(name, {
       type: type as TypeName,
       robot,
-      device: world.devices.find((d) => d.robot === robot && d.name === device),
+      index: places.get(robot) ?? -1,
+      device: devices.get(`${robot}/${device}`),
     });
   }
   return routes;
 }
+
+// Of one robot's message: where it comes from, and who shows it.
+interface Shown {
+  channel: string;
+  device: device_info_t | undefined;
+  index: number; // of the robot
+  overlay: RobotOverlay | undefined;
+  pages: RobotPages | undefined; // of the chosen robot alone
+  stage: Stage;
+  inset: Inset;
+}
+// A message is decoded when somebody shows it.
+type Show<Type extends TypeName> = (to: Shown, read: () => Messages[Type]) => void;
+
+// What the page does with each type of a robot's messages; those of other types go to the state
+// page, member by member.
+const kShow: { [Type in TypeName]?: Show<Type> } = {
+  planar_lidar_t({ device, overlay, pages }, read) {
+    if (!device) return;
+    const scan = read();
+    overlay?.scan(device, scan);
+    pages?.scan(device, scan);
+  },
+  sonar_t({ device, overlay, pages }, read) {
+    if (!device) return;
+    const ranges = read();
+    overlay?.sonar(device, ranges);
+    pages?.sonar(device, ranges);
+  },
+  // The robot's own; that of a device is one of its readings.
+  pose_t({ device, overlay, pages }, read) {
+    const pose = read();
+    if (device && device.kind !== "pose") return pages?.other(device, pose);
+    overlay?.pose(pose);
+    pages?.pose(pose);
+  },
+  odometry_t({ index, overlay, pages, stage }, read) {
+    const odometry = read();
+    overlay?.odometer(odometry);
+    pages?.odometry(odometry);
+    stage.wheelAngles.set(index, odometry.angle);
+  },
+  contact_t({ device, overlay, pages }, read) {
+    const contact = read();
+    overlay?.contact(contact);
+    if (device) pages?.contact(device, contact);
+  },
+  collisions_t: ({ pages }, read) => pages?.collisions(read()),
+  motion_status_t: ({ pages }, read) => pages?.motion(read()),
+  imu_t({ device, pages }, read) {
+    if (device) pages?.imu(device, read());
+  },
+  image_t({ channel, device, overlay, pages, inset }, read) {
+    const image = read();
+    const points =
+      device && isDepth(channel, "image_t") ? pointsOfDepth(image, device.fov_horizontal) : null;
+    if (points) overlay?.cloud(device!, points);
+    inset.message(channel, image);
+    pages?.camera(channel.slice(channel.indexOf("/") + 1), image);
+  },
+  lidar_t({ device, overlay }, read) {
+    if (device) overlay?.cloud(device, pointsOfLidar(read()));
+  },
+  joint_state_t: ({ pages }, read) => pages?.joints(read()),
+};
 
 export interface Views {
   loading: Loading<unknown>;
@@ -106,84 +178,27 @@ export class Router {
       const tick = read(type);
       return clock.tell(Number(tick.utime) * 1e-6, tick.epoch, this.told === type);
     }
-    if (route?.robot) this.ofRobot(route, channel, read);
+    if (route?.robot) this.ofRobot(type, route, channel, bytes);
   }
 
-  private ofRobot(
-    { type, robot, device }: Route,
+  private ofRobot<Type extends TypeName>(
+    type: Type,
+    { robot, index, device }: Route,
     channel: string,
-    read: <T extends TypeName>(name: T) => Messages[T],
+    bytes: Uint8Array,
   ): void {
-    const { world, robot: chosen } = this.page.now;
-    const overlay = this.views.overlays.of.get(robot);
-    const pages = world?.robots[chosen]?.name === robot ? this.views.pages : null;
-    switch (type) {
-      case "planar_lidar_t": {
-        const m = read(type);
-        if (device) {
-          overlay?.scan(device, m);
-          pages?.scan(device, m);
-        }
-        return;
-      }
-      case "sonar_t": {
-        const m = read(type);
-        if (device) {
-          overlay?.sonar(device, m);
-          pages?.sonar(device, m);
-        }
-        return;
-      }
-      case "pose_t": {
-        const m = read(type);
-        if (device && device.kind !== "pose") return pages?.other(device, m);
-        overlay?.pose(m);
-        pages?.pose(m);
-        return;
-      }
-      case "odometry_t": {
-        const m = read(type);
-        overlay?.odometer(m);
-        pages?.odometry(m);
-        this.views.stage.wheelAngles.set(
-          world!.robots.findIndex(({ name }) => name === robot),
-          m.angle,
-        );
-        return;
-      }
-      case "contact_t": {
-        const m = read(type);
-        overlay?.contact(m);
-        if (device) pages?.contact(device, m);
-        return;
-      }
-      case "collisions_t":
-        pages?.collisions(read(type));
-        return;
-      case "motion_status_t":
-        pages?.motion(read(type));
-        return;
-      case "imu_t":
-        if (device) pages?.imu(device, read(type));
-        return;
-      case "image_t": {
-        const m = read(type);
-        if (device && isDepth(channel, type)) {
-          const points = pointsOfDepth(m, device.fov_horizontal);
-          if (points) overlay?.cloud(device, points);
-        }
-        this.views.inset.message(channel, m);
-        pages?.camera(channel.slice(channel.indexOf("/") + 1), m);
-        return;
-      }
-      case "lidar_t":
-        if (device) overlay?.cloud(device, pointsOfLidar(read(type)));
-        return;
-      case "joint_state_t":
-        pages?.joints(read(type));
-        return;
-      default:
-        if (device) pages?.other(device, read(type));
-    }
+    const shown: Shown = {
+      channel,
+      device,
+      index,
+      overlay: this.views.overlays.of.get(robot),
+      pages: index === this.page.now.robot ? this.views.pages : undefined,
+      stage: this.views.stage,
+      inset: this.views.inset,
+    };
+    const read = () => decode(type, bytes);
+    const show: Show<Type> | undefined = kShow[type];
+    if (show) show(shown, read);
+    else if (device) shown.pages?.other(device, read());
   }
 }

@@ -1,0 +1,58 @@
+// The form of a motion primitive: kind, how far, radius and speed, and the button that sends it.
+import { move_command_t } from "../../generated/messages";
+import { h, say } from "./dom";
+
+export type Move = Omit<move_command_t, "utime" | "id">;
+
+function numberInput(label: string, more: Record<string, string | number>): HTMLInputElement {
+  return h("input", { type: "number", step: 0.1, value: 1, "aria-label": label, ...more });
+}
+
+// The buttons follow that which sends.
+export function makeMoveForm(
+  send: (move: Move) => unknown,
+  ...buttons: HTMLElement[]
+): HTMLElement {
+  const kind = h(
+    "select",
+    { "aria-label": "motion primitive" },
+    h("option", { value: move_command_t.ADVANCE }, "advance"),
+    h("option", { value: move_command_t.ROTATE }, "rotate"),
+    h("option", { value: move_command_t.HEADING }, "turn to heading"),
+    h("option", { value: move_command_t.ARC }, "arc"),
+  );
+  const value = numberInput("how far", {}),
+    unit = h("span", { class: "dim" }, "m");
+  const radius = numberInput("radius", { min: 0.05 }),
+    radiusRow = h("label", { class: "row" }, "radius", radius, h("span", { class: "dim" }, "m"));
+  const speed = numberInput("speed", { value: 0, min: 0, title: "0: the robot's own" });
+  const turns = () => Number(kind.value) !== move_command_t.ADVANCE,
+    isArc = () => Number(kind.value) === move_command_t.ARC;
+  radiusRow.hidden = true;
+  kind.addEventListener("change", () => {
+    say(unit, turns() ? "°" : "m");
+    value.value = turns() ? "90" : "1";
+    value.step = turns() ? "15" : "0.1";
+    radiusRow.hidden = !isArc();
+  });
+  const go = () =>
+    send({
+      kind: Number(kind.value),
+      value: Number(value.value) * (turns() ? Math.PI / 180 : 1),
+      radius: isArc() ? Number(radius.value) : 0,
+      speed: Number(speed.value),
+      acceleration: 0,
+      deceleration: 0,
+    });
+  return h(
+    "div",
+    { class: "row" },
+    kind,
+    value,
+    unit,
+    radiusRow,
+    h("label", { class: "row" }, "speed", speed),
+    h("button", { id: "move", click: go }, "Go"),
+    ...buttons,
+  );
+}
