@@ -2,7 +2,11 @@
 // the sources of this folder only.
 #pragma once
 
+// gcc sees an uninitialised vector in btBoxShape::getPlane that is assigned before it is read.
+#pragma GCC diagnostic push
+#pragma GCC diagnostic ignored "-Wmaybe-uninitialized"
 #include <btBulletDynamicsCommon.h>
+#pragma GCC diagnostic pop
 
 #include "ruedo/pose.h"
 

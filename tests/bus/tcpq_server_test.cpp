@@ -111,9 +111,9 @@ const std::vector<uint8_t>& hello() {
 }
 
 std::vector<uint8_t> subscription(uint8_t kind, const std::string& pattern) {
-  std::vector<uint8_t> bytes{0, 0, 0, kind, 0, 0, 0, static_cast<uint8_t>(pattern.size())};
-  bytes.insert(bytes.end(), pattern.begin(), pattern.end());
-  return bytes;
+  std::string bytes{0, 0, 0, static_cast<char>(kind), 0, 0, 0, static_cast<char>(pattern.size())};
+  bytes += pattern;
+  return {bytes.begin(), bytes.end()};
 }
 
 TEST(TcpqServer, ServesStockClientsBothWays) {

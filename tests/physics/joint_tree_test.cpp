@@ -33,8 +33,9 @@ class RandomTree {
       const Kind kind = kKinds[(static_cast<unsigned>(i) + seed) % (all_led ? 3 : 5)];
       const bool led = all_led || ((kind == Kind::hinge || kind == Kind::slider) && i % 3 != 0);
       const double softness = all_led || i % 2 == 0 ? 0.0 : 0.05;
-      ties_.push_back(
-          {i, on, i % 2 == 0, {kind, vector().normalized(), vector()}, led, softness, number()});
+      const JointWays ways{kind, vector().normalized(), vector()};
+      const double target = number();
+      ties_.push_back({i, on, i % 2 == 0, ways, led, softness, target, number()});
     }
   }
 

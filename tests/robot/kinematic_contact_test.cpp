@@ -180,7 +180,9 @@ TEST(KinematicContact, BackingOffAWallIsNotBlockedByIt) {
       EXPECT_NE(sim.robot().motion.reason, Status::REASON_BLOCKED);
     }
     EXPECT_LT(sim.position().x(), 0.35);
-    if (primitive) EXPECT_EQ(sim.robot().motion.state, Status::STATE_DONE);
+    if (primitive) {
+      EXPECT_EQ(sim.robot().motion.state, Status::STATE_DONE);
+    }
   }
 }
 

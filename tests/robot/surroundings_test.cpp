@@ -54,7 +54,9 @@ TEST(Door, OpensForARobotAndClosesBehindIt) {
   for (int i = 0; i < 200; ++i) {
     sim.run(0.05);
     widest = std::max(widest, door_at());
-    if (door_at() > 0) EXPECT_GT(sim.position().x(), 0.5);
+    if (door_at() > 0) {
+      EXPECT_GT(sim.position().x(), 0.5);
+    }
   }
   EXPECT_NEAR(widest, 1.1, 1e-12);
   EXPECT_NEAR(sim.position().x(), 4.0, 1e-3);  // it went through

@@ -91,7 +91,9 @@ TEST(Geodesy, BackFromEcefToRounding) {
       const Geodetic back = globe.from_ecef(globe.to_ecef(place));
       EXPECT_NEAR(back.latitude, place.latitude, 1e-15) << degree << " " << altitude;
       EXPECT_NEAR(back.altitude, altitude, 5e-9) << degree << " " << altitude;
-      if (std::abs(degree) < 90) EXPECT_NEAR(back.longitude, 2.0, 1e-13);
+      if (std::abs(degree) < 90) {
+        EXPECT_NEAR(back.longitude, 2.0, 1e-13);
+      }
     }
   }
 }
