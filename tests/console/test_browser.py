@@ -22,6 +22,7 @@ from harness import (
     browse,
     browser,
     judged,
+    log_of_robots,
     needs_browser,
     playing,
     running,
@@ -683,46 +684,11 @@ def test_what_clients_draw_is_shown(tmp_path):
     assert "each moment shows what was drawn then" in seen
 
 
-def thousand_robots(path):
-    """A log of 1 000 robots in 25 rows, with their bodies and wheels but without sensors."""
-    model = (SOURCE / "worlds/robots/p3dx/model.sdf").read_text()
-    shutil.copytree(SOURCE / "worlds/robots/p3dx/meshes", path / "meshes")
-    (path / "plain.sdf").write_text(re.sub(r"<sensor.*?</sensor>", "", model, flags=re.DOTALL))
-    robots = "".join(
-        f"<include><uri>plain.sdf</uri><name>r{i}</name><pose>{1.2 * (i % 40) - 24} {1.2 * (i // 40) - 15} 0 0 0 {i % 7}</pose></include>"
-        for i in range(1000)
-    )
-    (
-        path / "thousand.sdf"
-    ).write_text(f"""<?xml version="1.0"?><sdf version="1.9"><world name="thousand"><include><uri>model://sun</uri></include>
-<include><uri>model://ground_plane</uri></include>{robots}</world></sdf>""")
-    log = path / "thousand.lcm"
-    subprocess.run(
-        [
-            RUEDO,
-            "run",
-            path / "thousand.sdf",
-            "--lcm",
-            "memq://",
-            "--quiet",
-            "--rate",
-            "max",
-            "--duration",
-            "4",
-            "--record",
-            log,
-        ],
-        check=True,
-        timeout=500,
-    )
-    return log
-
-
 def test_a_thousand_robots_are_shown(tmp_path):
     """From a log, so that what is measured is the page and not the simulation beside it. What it
     says is in docs/console.md.
     """
-    with playing(thousand_robots(tmp_path)) as process:
+    with playing(log_of_robots(tmp_path, 1000)) as process:
         seen = browse(process.url, tmp_path, "fleet", {"robots": 1000, "seconds": 3})
     measured = [
         json.loads(line.split(": ", 1)[1]) for line in seen if line.startswith("measured: ")

@@ -145,7 +145,29 @@ describe("quality", () => {
     const quality = new Quality(true);
     quality.automatic = false;
     draw(quality, 0, 200, 100);
-    expect(quality.now).toEqual({ ratio: 2, shadows: true });
+    expect(quality.now).toEqual({ ratio: 2, shadows: true, plain: false });
+  });
+
+  it("is for 40 frames a second where the processor draws, on the whole and not each", () => {
+    const quality = new Quality(true);
+    draw(quality, 0, 23, 1000);
+    const { ratio, plain } = quality.now;
+    expect([ratio < 1, plain]).toEqual([true, true]);
+    // Of a display with 60 a second: every second one is missed
+    let at_ms = 30_000;
+    for (let i = 0; i < 20; ++i) quality.drawn((at_ms += i % 2 ? 16.7 : 33.3));
+    expect(quality.now.ratio).toBeLessThanOrEqual(ratio);
+    draw(quality, 40_000, 30, 20);
+    expect(quality.now.ratio).toBeLessThan(ratio);
+    draw(quality, 80_000, 16.7, 20);
+    expect(quality.now.ratio).toBe(ratio);
+  });
+
+  it("one frame that takes long is no slow drawing", () => {
+    const quality = new Quality(true);
+    let at_ms = 0;
+    for (let i = 0; i < 100; ++i)
+      expect(quality.drawn((at_ms += i % 10 === 0 ? 200 : 20))).toBe(false);
   });
 
   it("a pause between frames says nothing about them", () => {

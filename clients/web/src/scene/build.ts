@@ -2,7 +2,8 @@
 // surfaces, so that a thousand robots are a few draw calls.
 import * as THREE from "three";
 import { mergeGeometries } from "three/addons/utils/BufferGeometryUtils.js";
-import { plainKinds } from "./plain";
+import { arrived, finishesOf } from "./finish";
+import { kFewLinks, plainKinds } from "./plain";
 import { Flag, type LinkData, type MeshData, type Part, type SceneFiles } from "./description";
 
 const kSmall = 0.5; // of a link's largest part: smaller ones are left out far away
@@ -15,8 +16,10 @@ export interface Movers {
   far: Far | null;
   shown: number[];
 } // shown: what stands near, as places in indices
-// Of many links: what shows those far away, and the matrices of all of them.
+// Of many links: what shows those far away, and the matrices of all of them. always: at every
+// quality, for they are too costly.
 export interface Far {
+  always: boolean;
   mesh: THREE.InstancedMesh;
   matrices: Float32Array;
   shown: number[];
@@ -62,9 +65,10 @@ export function disposeOf({ still, moving }: Built): void {
     group.traverse((object) => {
       if (!(object instanceof THREE.InstancedMesh)) return;
       (object.geometry as THREE.BufferGeometry).dispose();
-      const material = object.material as THREE.MeshStandardMaterial;
-      material.map?.dispose();
-      material.dispose();
+      for (const material of finishesOf(object)) {
+        (material as THREE.MeshStandardMaterial).map?.dispose();
+        material.dispose();
+      }
       object.dispose();
     });
   }
@@ -154,6 +158,7 @@ export class SceneBuilder {
           mesh.castShadow = surface.shadow;
           mesh.receiveShadow = true;
           mesh.frustumCulled = !moves;
+          mesh.renderOrder = surface.ground ? 1 : 0; // what stands on it hides much of it
           mesh.userData = { links: chosen, ground: surface.ground };
           if (moves) mesh.instanceMatrix.setUsage(THREE.DynamicDrawUsage);
           into.add(mesh);
@@ -165,7 +170,7 @@ export class SceneBuilder {
           indices: chosen,
           meshes,
           shown: chosen.map((_, i) => i),
-          far: moves && plain.has(kind) ? this.far(parts, links.length, into) : null,
+          far: moves && links.length > kFewLinks ? this.far(parts, links.length, plain.has(kind), into) : null,
         };
       };
       const stillOnes = place(false, still);
@@ -205,7 +210,7 @@ export class SceneBuilder {
   }
 
   // The boxes around the larger parts: a dozen triangles each, for links of a few pixels.
-  private far(parts: Part[], links: number, into: THREE.Group): Far | null {
+  private far(parts: Part[], links: number, always: boolean, into: THREE.Group): Far | null {
     const boxes = parts
       .map((part) => this.boxAround(part))
       .sort((a, b) => b.boundingSphere!.radius - a.boundingSphere!.radius);
@@ -218,13 +223,13 @@ export class SceneBuilder {
     if (!geometry) return null;
     const mesh = new THREE.InstancedMesh(
       geometry,
-      new THREE.MeshLambertMaterial({ vertexColors: true, side: THREE.DoubleSide }),
+      new THREE.MeshLambertMaterial({ vertexColors: true }),
       links,
     );
     mesh.instanceMatrix.setUsage(THREE.DynamicDrawUsage);
     mesh.frustumCulled = false;
     into.add(mesh);
-    return { mesh, matrices: new Float32Array(16 * links), shown: [] };
+    return { mesh, matrices: new Float32Array(16 * links), shown: [], always };
   }
 
   // A part as a box of its colour, in the link's frame.
@@ -237,9 +242,11 @@ export class SceneBuilder {
       box.expandByPoint(point.fromArray(vertices, 8 * indices[i]!));
     const size = box.getSize(new THREE.Vector3()),
       centre = box.getCenter(new THREE.Vector3());
+    const matrix = matrixOf(part);
     const geometry = new THREE.BoxGeometry(size.x, size.y, size.z)
       .translate(centre.x, centre.y, centre.z)
-      .applyMatrix4(matrixOf(part));
+      .applyMatrix4(matrix);
+    if (matrix.determinant() < 0) geometry.getIndex()!.array.reverse(); // the outside stays out
     const colour = sRGB(part.diffuse).toArray(),
       corners = geometry.getAttribute("position").count;
     const colours = Array.from({ length: corners }, () => colour).flat();
@@ -274,7 +281,10 @@ export class SceneBuilder {
       );
       texture = new THREE.TextureLoader().load(
         this.files.textureUrl(index),
-        loaded,
+        (picture) => {
+          arrived(picture);
+          loaded();
+        },
         undefined,
         loaded,
       );

@@ -2,7 +2,7 @@
 // Triangles of the whole scene: beyond it, round shapes of many links have fewer segments, and
 // those far away are boxes
 const kBudget = 60_000;
-const kFewLinks = 8; // of a kind, which cost little
+export const kFewLinks = 8; // of a kind, which cost little
 
 // The kinds of links that are drawn plainly, so that the scene keeps to its budget: of each kind,
 // triangles of a link and links.

@@ -2,19 +2,24 @@
 // machines without a GPU. Without it, a page that draws by software answers keys late, and the
 // robot's watchdog stops it between two commands.
 export interface Level {
-  ratio: number;
+  ratio: number; // pixels of the canvas per pixel of the page, at most
   shadows: boolean;
-} // pixels of the canvas per pixel of the page, at most
+  plain: boolean; // surfaces without gloss
+}
 
 const kLevels: Level[] = [
-  { ratio: 2, shadows: true },
-  { ratio: 1, shadows: false },
-  { ratio: 0.6, shadows: false },
-  { ratio: 0.4, shadows: false },
+  { ratio: 2, shadows: true, plain: false },
+  { ratio: 1, shadows: false, plain: false },
+  { ratio: 1, shadows: false, plain: true },
+  { ratio: 0.6, shadows: false, plain: true },
+  { ratio: 0.4, shadows: false, plain: true },
 ];
-const kSlow_ms = 50; // a frame: less than 20 a second
-const kQuick_ms = 25;
-const kFrames = 5; // frames in a row of which the median counts
+const kSoftwareLevel = 3; // where the processor draws: the first one
+// Of a frame, where a graphics processor draws and where the processor does, which has time left for
+// nothing else: 20 frames a second, and 40.
+const kSlow_ms = { hardware: 50, software: 25 };
+const kQuick_ms = { hardware: 25, software: 18 };
+const kFrames = 5; // in a row, of which the mean counts, but for the slowest
 const kFirstWait_ms = 10_000; // until a finer level is tried; each time twice as long
 const kStill_ms = 250; // without motion, and one frame is drawn as finely as can be
 
@@ -31,6 +36,7 @@ export function drawnBySoftware(): boolean {
 
 export class Quality {
   automatic = true; // false: always the finest
+  private readonly by: "software" | "hardware";
   private level: number;
   private last_ms = -1;
   private intervals: number[] = [];
@@ -40,7 +46,8 @@ export class Quality {
   private still = false; // one frame is, or was, drawn as finely as can be: nothing moves
 
   constructor(software: boolean) {
-    this.level = software ? 2 : 0;
+    this.by = software ? "software" : "hardware";
+    this.level = software ? kSoftwareLevel : 0;
   }
 
   get now(): Level {
@@ -80,15 +87,16 @@ export class Quality {
     if (this.last_ms >= 0 && this.automatic) this.intervals.push(at_ms - this.last_ms);
     this.last_ms = at_ms;
     if (this.intervals.length < kFrames) return false;
-    const median = this.intervals.sort((a, b) => a - b)[kFrames >> 1]!;
+    const sum = this.intervals.reduce((a, b) => a + b),
+      mean = (sum - Math.max(...this.intervals)) / (kFrames - 1);
     this.intervals = [];
-    if (median > kSlow_ms && this.level + 1 < kLevels.length) {
+    if (mean > kSlow_ms[this.by] && this.level + 1 < kLevels.length) {
       ++this.level;
       this.finer_ms = at_ms + this.wait_ms;
       this.wait_ms *= 2;
       return true;
     }
-    if (median < kQuick_ms && this.level > 0 && at_ms > this.finer_ms) {
+    if (mean < kQuick_ms[this.by] && this.level > 0 && at_ms > this.finer_ms) {
       --this.level;
       this.finer_ms = at_ms + this.wait_ms;
       return true;

@@ -4,6 +4,7 @@ import * as THREE from "three";
 import { OrbitControls } from "three/addons/controls/OrbitControls.js";
 import { disposeOf, SceneBuilder, type Built, type Movers } from "./build";
 import type { Description, LightDescription, ModelDescription, SceneFiles } from "./description";
+import { finishesOf, setFinish } from "./finish";
 import { matrixOf } from "./matrix";
 import { drawnBySoftware, Quality } from "./quality";
 import type { PlanarPose } from "../state/go_to";
@@ -12,7 +13,8 @@ import type { Poses } from "../state/poses";
 export type ViewMode = "orbit" | "follow" | "top";
 const kShadowReach_m = 14;
 const kMostLamps = 6;
-// From the camera: a robot of half a metre is then some 24 pixels of a laptop's screen.
+// From the camera: a robot of half a metre is then some 24 pixels of a laptop's screen, and of a
+// picture of fewer pixels nearer.
 const kFar_m = 18;
 const kNoWheels_m = 50;
 
@@ -103,8 +105,20 @@ export class Stage {
 
   private refine(): void {
     if (this.sun) this.sun.castShadow = this.casts;
-    this.moved = true;
+    this.finish();
+    this.moved = this.regroup = true;
     this.resize();
+  }
+
+  private finish(): void {
+    for (const mesh of this.meshes()) setFinish(mesh, this.quality.now.plain);
+  }
+
+  private meshes(): THREE.InstancedMesh[] {
+    const { standing = [], movers = [] } = this.built ?? {};
+    return [...standing, ...movers].flatMap(({ meshes, far }) =>
+      far ? [...meshes, far.mesh] : meshes,
+    );
   }
 
   show(files: SceneFiles | null): void {
@@ -120,7 +134,10 @@ export class Stage {
     this.lights.clear();
     this.linkWheel.clear();
     if (files) {
-      this.built = new SceneBuilder(files).build();
+      const builder = new SceneBuilder(files);
+      this.built = builder.build();
+      for (const picture of builder.loading) void picture.then(() => this.touch());
+      this.finish();
       this.scene.add(this.built.still, this.built.moving);
       for (const [link, robot, place, x, y, z, ax, ay, az] of files.description.wheels as [
         number,
@@ -362,13 +379,8 @@ export class Stage {
   // Edges alone, or surfaces.
   setWireframe(on: boolean): void {
     this.wireframe = on;
-    for (const { meshes, far } of [
-      ...(this.built?.standing ?? []),
-      ...(this.built?.movers ?? []),
-    ]) {
-      for (const mesh of far ? [...meshes, far.mesh] : meshes)
-        (mesh.material as THREE.MeshStandardMaterial).wireframe = on;
-    }
+    for (const material of this.meshes().flatMap(finishesOf))
+      (material as THREE.MeshStandardMaterial).wireframe = on;
     this.touch();
   }
 
@@ -569,7 +581,10 @@ export class Stage {
     const near = meshes[0]!.instanceMatrix.array as Float32Array,
       away = far.mesh.instanceMatrix.array as Float32Array;
     const { matrices } = far,
-      eye = this.camera.position;
+      eye = this.camera.position,
+      { plain, ratio } = this.quality.now;
+    // As many pixels of the picture
+    const far_m = far.always || plain ? kFar_m * Math.min(1, ratio) : Infinity;
     let nearOnes = 0,
       farOnes = 0;
     for (let i = 0; i < links.length; ++i) {
@@ -578,8 +593,8 @@ export class Stage {
         dy = matrices[at + 13]! - eye.y,
         dz = matrices[at + 14]! - eye.z;
       const away_m = Math.hypot(dx, dy, dz);
-      if (away_m > kNoWheels_m && this.linkWheel.has(indices[i]!)) continue;
-      const isFar = away_m > kFar_m,
+      if (far_m < Infinity && away_m > kNoWheels_m && this.linkWheel.has(indices[i]!)) continue;
+      const isFar = away_m > far_m,
         into = isFar ? away : near,
         place = 16 * (isFar ? farOnes++ : nearOnes++);
       for (let k = 0; k < 16; ++k) into[place + k] = matrices[at + k]!;
