@@ -1,6 +1,6 @@
 // Many robots: frames a second, and what a frame costs this page's own thread: states taken,
 // matrices made, draw calls given. The rest of a frame is the rasteriser's. Given: {"robots": how
-// many there must be, "seconds": of each measurement, "views": of which, all where nothing is said}.
+// many there must be, "seconds": of each measurement, "views": of which, or all}.
 export default async function fleet({ page, given, until, check, picture }) {
   await until(
     "robots are listed",

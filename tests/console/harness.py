@@ -68,7 +68,7 @@ def serving(*arguments, cwd=None):
 
 
 def log_of_robots(path, count):
-    """A log of 4 s of so many Pioneers in rows, with their bodies and wheels but without sensors."""
+    """A log of 4 s of so many Pioneers in rows, with bodies and wheels but without sensors."""
     model = (SOURCE / "worlds/robots/p3dx/model.sdf").read_text()
     shutil.copytree(SOURCE / "worlds/robots/p3dx/meshes", path / "meshes", dirs_exist_ok=True)
     (path / "plain.sdf").write_text(re.sub(r"<sensor.*?</sensor>", "", model, flags=re.DOTALL))

@@ -6,9 +6,7 @@ import contextlib
 import itertools
 import json
 import math
-import re
 import shlex
-import shutil
 import socket
 import subprocess
 import time

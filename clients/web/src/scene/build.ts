@@ -170,7 +170,10 @@ export class SceneBuilder {
           indices: chosen,
           meshes,
           shown: chosen.map((_, i) => i),
-          far: moves && links.length > kFewLinks ? this.far(parts, links.length, plain.has(kind), into) : null,
+          far:
+            moves && links.length > kFewLinks
+              ? this.far(parts, links.length, plain.has(kind), into)
+              : null,
         };
       };
       const stillOnes = place(false, still);

@@ -1,5 +1,5 @@
-// How surfaces are drawn: finely, or plainly, where the processor draws and something moves: without
-// gloss, and with one sample of a picture a pixel. Colours and lights stay as they are.
+// How surfaces are drawn: finely, or plainly, where the processor draws and something moves:
+// without gloss, and with one sample of a picture a pixel. Colours and lights stay as they are.
 import * as THREE from "three";
 
 // Gives a mesh the finish; what was made with its fine material alone stays as it is.

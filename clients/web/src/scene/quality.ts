@@ -15,8 +15,8 @@ const kLevels: Level[] = [
   { ratio: 0.4, shadows: false, plain: true },
 ];
 const kSoftwareLevel = 3; // where the processor draws: the first one
-// Of a frame, where a graphics processor draws and where the processor does, which has time left for
-// nothing else: 20 frames a second, and 40.
+// Of a frame: 20 a second where a graphics processor draws, and 40 where the processor does, which
+// has time left for nothing else.
 const kSlow_ms = { hardware: 50, software: 25 };
 const kQuick_ms = { hardware: 25, software: 18 };
 const kFrames = 5; // in a row, of which the mean counts, but for the slowest
