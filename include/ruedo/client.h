@@ -33,54 +33,59 @@ namespace ruedo::client {
 
 // ---- What there is.
 
+/// What a robot is and can do.
 struct RobotInfo {
-  std::string name, model;
-  std::string drive;                              // "kinematic", "wheels", "": it only senses
-  double wheel_radius = 0.0, track = 0.0;         // m
-  double max_speed = 0.0, max_turn_rate = 0.0;    // m/s, rad/s
-  double acceleration = 0.0, deceleration = 0.0;  // m/s^2
-  double turn_acceleration = 0.0;                 // rad/s^2
-  double watchdog = 0.0;                          // s of sim time, 0: off
-  std::vector<std::string> wheels;                // joint names
+  std::string name, model;                        ///< its own, and that of the model it was made of
+  std::string drive;                              ///< "kinematic", "wheels", "": it only senses
+  double wheel_radius = 0.0, track = 0.0;         ///< m
+  double max_speed = 0.0, max_turn_rate = 0.0;    ///< m/s, rad/s
+  double acceleration = 0.0, deceleration = 0.0;  ///< m/s^2
+  double turn_acceleration = 0.0;                 ///< rad/s^2
+  double watchdog = 0.0;                          ///< s of sim time, 0: off
+  std::vector<std::string> wheels;                ///< joint names
 };
 
-// A set of links that do not move against each other.
+/// A set of links that do not move against each other.
 struct BodyInfo {
-  std::string name;        // MODEL/LINK: what Simulation::state() takes
-  bool is_static = false;  // it never moves
-  double mass = 0.0;       // kg; 0 of what never moves
+  std::string name;        ///< MODEL/LINK: what Simulation::state() takes
+  bool is_static = false;  ///< it never moves
+  double mass = 0.0;       ///< kg; 0 of what never moves
 };
 
+/// A sensor of a robot, or what it has besides (its pose, odometry, joints).
 struct DeviceInfo {
-  std::string robot, name;
-  std::string kind;                         // "lrf", "sonar", "odometry", "camera", "pose", ...
-  std::string channel, type;                // on the bus
-  double rate = 0.0;                        // Hz of sim time; 0: every step
-  Vector3 position{};                       // m, in base_link at the start
-  Quaternion orientation{};                 // device to base_link
-  double range_min = 0.0, range_max = 0.0;  // m
-  double fov_horizontal = 0.0, fov_vertical = 0.0;  // rad
-  int width = 0, height = 0;                        // rays and layers, transducers, or pixels
+  std::string robot, name;                  ///< the channel is ROBOT/NAME, usually
+  std::string kind;                         ///< "lrf", "sonar", "odometry", "camera", "pose", ...
+  std::string channel, type;                ///< on the bus
+  double rate = 0.0;                        ///< Hz of sim time; 0: every step
+  Vector3 position{};                       ///< m, in base_link at the start
+  Quaternion orientation{};                 ///< device to base_link
+  double range_min = 0.0, range_max = 0.0;  ///< m
+  double fov_horizontal = 0.0, fov_vertical = 0.0;  ///< rad
+  int width = 0, height = 0;                        ///< rays and layers, transducers, or pixels
   std::vector<std::array<double, 6>>
-      elements;  // a sonar's transducers: x, y, z, roll, pitch, yaw in its frame
+      elements;  ///< a sonar's transducers: x, y, z, roll, pitch, yaw in its frame
 };
 
-// The state of the simulation, and of the model or MODEL/LINK that was asked for (else name is "").
+/// The state of the simulation, and of the model or MODEL/LINK that was asked for (else name is
+/// "").
 struct State : Sample {
-  int64_t step = 0, state_hash = 0;
-  bool paused = false;
-  double rate = 0.0;  // sim time per real time that is asked for; kFast: as fast as it goes
-  std::string name;
-  Vector3 position{};           // m, world
-  Quaternion orientation{};     // to world
-  Vector3 linear{}, angular{};  // m/s, rad/s, world
+  int64_t step = 0, state_hash = 0;  ///< the hash is of the whole state, bit for bit
+  bool paused = false;               ///< no step is taken
+  double rate = 0.0;   ///< sim time per real time that is asked for; kFast: as fast as it goes
+  std::string name;    ///< what was asked for
+  Vector3 position{};  ///< m, world
+  Quaternion orientation{};     ///< to world
+  Vector3 linear{}, angular{};  ///< m/s, rad/s, world
 };
 
-// A command for Simulation::step(), as Robot::velocity_command() and its like make it.
+/// A command for Simulation::step(), as Robot::velocity_command() and its like make it.
 struct Command {
-  std::string channel;         // one of the command channels of ruedo/info
-  std::vector<uint8_t> bytes;  // the encoded message
-  int64_t after = 0;           // steps from where the call begins to the state that it acts on
+  std::string channel;         ///< one of the command channels of ruedo/info
+  std::vector<uint8_t> bytes;  ///< the encoded message
+  int64_t after = 0;           ///< steps from where the call begins to the state that it acts on
+  /// @param steps from where the call begins
+  /// @return this command at another step
   Command at(int64_t steps) const { return {channel, bytes, steps}; }
 };
 
@@ -97,13 +102,16 @@ struct MotionCore;
 /// callback throws is reported once on the terminal, and harms no other callback.
 class [[nodiscard]] Subscription {
  public:
-  Subscription() = default;
+  Subscription() = default;  ///< Of nothing.
+  /// @cond
   explicit Subscription(std::shared_ptr<CallbackCore> core) : core_(std::move(core)) {}
   Subscription(Subscription&&) noexcept = default;
   Subscription& operator=(Subscription&& other) noexcept;
   ~Subscription();
-  void close();
-  void keep();  ///< The callback stays for as long as the Simulation, without this.
+  /// @endcond
+  void close();  ///< Ends the calls; a second time nothing.
+  void keep();   ///< The callback stays for as long as the Simulation, without this.
+  /// @return false once it was closed, by whatever
   [[nodiscard]] bool open() const;
 
  private:
@@ -115,9 +123,11 @@ class [[nodiscard]] Subscription {
 /// Each Stream is a reader of its own: next() goes by what this object has returned, not by what
 /// others have. A new one begins where the channel was last read, so that `robot.lrf().next()` in a
 /// loop returns each sample once.
+/// @tparam SampleType one of client_samples.h
 template <class SampleType>
 class Stream {
  public:
+  /// @cond
   explicit Stream(std::shared_ptr<StreamCore> core);
   Stream(const Stream& other) : core_(other.core_), seen_(other.seen_.load()) {}
   Stream& operator=(const Stream& other) {
@@ -125,26 +135,32 @@ class Stream {
     seen_ = other.seen_.load();
     return *this;
   }
+  /// @endcond
+  /// @return its name on the bus
   [[nodiscard]] const std::string& channel() const;
 
   /// The newest sample; before the first one it waits.
   /// @param timeout of real time
+  /// @return a copy
   /// @throws Timeout, TypeMismatch, NoServer
   [[nodiscard]] SampleType latest(Duration timeout = 5.0) const;
   /// The newest sample that neither latest() nor next() of this object has returned yet; waits for
   /// one. A reader slower than the rate skips samples; on_sample() skips none.
   /// @param timeout of real time
+  /// @return a copy
   /// @throws Timeout, TypeMismatch, NoServer
   SampleType next(Duration timeout = 5.0) const;
   /// Calls back in the receiving thread for every sample from now on. The callback must be quick,
   /// and must not wait for other samples or replies.
+  /// @param callback what it throws is reported once on the terminal
+  /// @return ends the calls when it goes
   /// @throws TypeMismatch, NoServer
   Subscription on_sample(std::function<void(const SampleType&)> callback) const;
 
  private:
   std::shared_ptr<StreamCore> core_;
   mutable std::atomic<int64_t>
-      seen_;  // of the samples received, the newest that a call has returned
+      seen_;  ///< of the samples received, the newest that a call has returned
 };
 
 /// A stream of messages of a type of one's own: `robot.stream<thermometer_t>("temp")`.
@@ -154,18 +170,29 @@ class Stream {
 template <class Message>
 class MessageStream {
  public:
+  /// @param raw a stream of such messages
   explicit MessageStream(Stream<RawSample> raw) : raw_(std::move(raw)) {}
+  /// @return its name on the bus
   [[nodiscard]] const std::string& channel() const { return raw_.channel(); }
 
   /// As Stream::latest().
+  /// @param timeout of real time
+  /// @return the newest message
+  /// @throws Timeout, TypeMismatch, NoServer
   [[nodiscard]] Message latest(Duration timeout = 5.0) const {
     return decoded(channel(), raw_.latest(timeout).bytes);
   }
   /// As Stream::next().
+  /// @param timeout of real time
+  /// @return the newest message that was not returned yet
+  /// @throws Timeout, TypeMismatch, NoServer
   Message next(Duration timeout = 5.0) const {
     return decoded(channel(), raw_.next(timeout).bytes);
   }
   /// As Stream::on_sample(). A message of another type is reported on the terminal and skipped.
+  /// @param callback what it throws is reported once on the terminal
+  /// @return ends the calls when it goes
+  /// @throws NoServer
   Subscription on_sample(std::function<void(const Message&)> callback) const {
     return raw_.on_sample([callback = std::move(callback), name = channel()](const RawSample& raw) {
       callback(decoded(name, raw.bytes));
@@ -174,6 +201,7 @@ class MessageStream {
 
   /// @param channel names it in the error
   /// @param bytes LCM's encoding
+  /// @return the message
   /// @throws TypeMismatch when the bytes are no Message
   static Message decoded(const std::string& channel, const std::vector<uint8_t>& bytes) {
     const auto fail = [&](const char* what) -> Message {
@@ -193,21 +221,29 @@ class MessageStream {
   Stream<RawSample> raw_;
 };
 
-// What step() saw: the state after its last step, and the sensor messages of all its steps.
+/// What step() saw: the state after its last step, and the sensor messages of all its steps.
 struct Observations : State {
+  /// A message as it came.
   struct Message {
-    int64_t step = 0;
-    std::string channel;
-    std::vector<uint8_t> bytes;
+    int64_t step = 0;            ///< of the run
+    std::string channel;         ///< its name on the bus
+    std::vector<uint8_t> bytes;  ///< LCM's encoding
   };
-  std::vector<Message> messages;  // in the order in which the simulation made them
+  std::vector<Message> messages;  ///< in the order in which the simulation made them
 
-  // The samples of a device or stream, decoded, in order; none when none was due. Throw
-  // TypeMismatch.
+  /// @param stream a device or stream
+  /// @return its samples, decoded, in order; none when none was due
+  /// @throws TypeMismatch
   template <class SampleType>
   std::vector<SampleType> all(const Stream<SampleType>& stream) const;
+  /// @param stream a device or stream
+  /// @return the last of its samples
+  /// @throws TypeMismatch
   template <class SampleType>
   std::optional<SampleType> latest(const Stream<SampleType>& stream) const;
+  /// @param stream of a type of one's own
+  /// @return its messages, decoded, in order
+  /// @throws TypeMismatch
   template <class MessageType>
   std::vector<MessageType> all(const MessageStream<MessageType>& stream) const {
     std::vector<MessageType> found;
@@ -217,6 +253,9 @@ struct Observations : State {
     }
     return found;
   }
+  /// @param stream of a type of one's own
+  /// @return the last of its messages
+  /// @throws TypeMismatch
   template <class MessageType>
   std::optional<MessageType> latest(const MessageStream<MessageType>& stream) const {
     for (auto message = messages.rbegin(); message != messages.rend(); ++message) {
@@ -227,45 +266,66 @@ struct Observations : State {
   }
 };
 
-// A sensor of a robot.
+/// A sensor of a robot.
 template <class SampleType>
 class Device : public Stream<SampleType> {
  public:
+  /// @cond
   Device(std::shared_ptr<StreamCore> core, DeviceInfo info)
       : Stream<SampleType>(std::move(core)), info_(std::move(info)) {}
+  /// @endcond
+  /// @return its channel, rate, range and place
   const DeviceInfo& info() const { return info_; }
+  /// @return as the world file has it
   const std::string& name() const { return info_.name; }
 
  private:
   DeviceInfo info_;
 };
 
-// A camera; its further channels, where the world file asks for them. They throw UnknownName where
-// it does not.
+/// A camera, and its further channels.
 class Camera : public Device<Image> {
  public:
+  /// @cond
   Camera(std::shared_ptr<Core> core, std::shared_ptr<StreamCore> stream, DeviceInfo info);
+  /// @endcond
+  /// @return depth images, m
+  /// @throws UnknownName when the world file does not ask for them
   Stream<Image> depth() const;
+  /// @return images of body indices + 1
+  /// @throws UnknownName when the world file does not ask for them
   Stream<Image> labels() const;
+  /// @return the pinhole
+  /// @throws UnknownName when the world file does not ask for it
   Stream<CameraInfo> intrinsics() const;
 
  private:
   std::shared_ptr<Core> connection_;
 };
 
-// A motion primitive under way. Copies share everything.
+/// A motion primitive under way. Copies share everything.
 class Motion {
  public:
+  /// @cond
   explicit Motion(std::shared_ptr<MotionCore> core) : core_(std::move(core)) {}
+  /// @endcond
+  /// @return the number by which the robot's MotionStatus names it
   int64_t id() const;
-  bool done() const;  // true when the robot is not executing it any more, for whatever reason
+  /// @return true when the robot is not executing it any more, for whatever reason
+  bool done() const;
+  /// @return how far it is
   MotionState state() const;
-  MotionReason reason() const;     // why it ended early or was refused
-  std::string blocked_by() const;  // the body that blocked it; "": none did
-  double progress() const;         // m or rad
-  double remaining() const;        // m or rad
+  /// @return why it ended early or was refused
+  MotionReason reason() const;
+  /// @return the body that blocked it; "": none did
+  std::string blocked_by() const;
+  /// @return m or rad
+  double progress() const;
+  /// @return m or rad
+  double remaining() const;
   /// Waits until it is done.
   /// @param timeout of real time
+  /// @return itself
   /// @throws MotionError when it ended early or was refused; Timeout when it still runs: the robot
   /// goes on then; NoServer
   const Motion& wait(Duration timeout = kForever) const;
@@ -274,195 +334,336 @@ class Motion {
   std::shared_ptr<MotionCore> core_;
 };
 
-// Limits of a primitive: m/s and m/s^2, for turns on the spot rad/s and rad/s^2. 0: the robot's
-// own.
+/// Limits of a primitive: m/s and m/s^2, for turns on the spot rad/s and rad/s^2. 0: the robot's
+/// own.
 struct Limits {
-  double speed = 0.0, acceleration = 0.0, deceleration = 0.0;
+  double speed = 0.0, acceleration = 0.0, deceleration = 0.0;  ///< 0 or more
 };
 
+/// A robot of the simulation: its sensors and its drive. Copies are the same robot.
 class Robot {
  public:
+  /// @cond
   Robot(std::shared_ptr<Core> core, std::string name)
       : core_(std::move(core)), name_(std::move(name)) {}
+  /// @endcond
+  /// @return as the world file has it, or spawn() returned it
   const std::string& name() const { return name_; }
+  /// @return its drive, its size and its limits
+  /// @throws UnknownName once it was removed; NoServer
   RobotInfo info() const;
 
-  std::vector<DeviceInfo> devices() const;  // in the order of the world file
-  // The device of that name. Throws UnknownName, which lists those that exist, and TypeMismatch
-  // when its samples are of another kind.
+  /// @return all, in the order of the world file
+  /// @throws NoServer
+  std::vector<DeviceInfo> devices() const;
+  /// @tparam SampleType what it delivers: Scan, Imu, ...
+  /// @param name of the device ("front_laser")
+  /// @return the device
+  /// @throws UnknownName, which lists those that exist; TypeMismatch when its samples are of
+  /// another kind; NoServer
   template <class SampleType>
   Device<SampleType> device(const std::string& name) const;
-  /// The messages of a device or channel of this robot, by its name ("temp"), of a plugin's, too.
+  /// The messages of a device or channel of this robot, of a plugin's, too.
   /// @tparam Message a class that lcm-gen made of its .lcm file
-  /// @throws UnknownName, with those that exist
+  /// @param name of the device or channel ("temp")
+  /// @return the stream
+  /// @throws UnknownName, with those that exist; NoServer
   template <class Message>
   [[nodiscard]] MessageStream<Message> stream(const std::string& name) const {
     return MessageStream<Message>(raw_stream(name));
   }
   /// The same as bytes, whatever their type is.
+  /// @param name of the device or channel
+  /// @return the stream
+  /// @throws UnknownName, with those that exist; NoServer
   [[nodiscard]] Stream<RawSample> raw_stream(const std::string& name) const;
-  // The first device of a kind; UnknownName when there is none.
-  Device<Scan> lrf() const;
-  Device<LidarScan> lidar() const;
-  Device<SonarReading> sonar() const;
-  Device<Odometry> odometry() const;
-  Camera camera() const;
-  Device<Imu> imu() const;
-  Device<Contact> contact() const;
-  Stream<Collisions> collisions() const;  // what it runs into, and what blocks it; without a bumper
+
+  /// @name The first device of a kind
+  /// Each throws UnknownName when the robot has none.
+  /// @{
+  Device<Scan> lrf() const;            ///< @return the planar laser range finder
+  Device<LidarScan> lidar() const;     ///< @return the laser scanner of several layers
+  Device<SonarReading> sonar() const;  ///< @return the array of sonars
+  Device<Odometry> odometry() const;   ///< @return the odometry
+  Camera camera() const;               ///< @return the camera
+  Device<Imu> imu() const;             ///< @return the inertial unit
+  Device<Contact> contact() const;     ///< @return the bumper
+  /// @}
+  /// @return what it runs into, and what blocks it; it needs no bumper
+  /// @throws UnknownName, NoServer
+  Stream<Collisions> collisions() const;
   /// Calls back as Stream::on_sample() does, but only when the robot runs into a body that it did
   /// not touch a moment before.
+  /// @param callback what it throws is reported once on the terminal
+  /// @return ends the calls when it goes
   /// @throws UnknownName, TypeMismatch, NoServer
   Subscription on_collision(std::function<void(const Collisions&)> callback) const;
-  Stream<Pose> pose() const;            // the true pose
-  Stream<MotionStatus> motion() const;  // what it is executing
+  /// @return the true pose
+  /// @throws UnknownName, NoServer
+  Stream<Pose> pose() const;
+  /// @return what it is executing
+  /// @throws UnknownName, NoServer
+  Stream<MotionStatus> motion() const;
+  /// @return positions, velocities and efforts of its joints
+  /// @throws UnknownName, NoServer
   Stream<Joints> joints() const;
 
-  // Drives with v (m/s ahead) and omega (rad/s), within the robot's limits, until the next command
-  // of any kind: the command is repeated in the background, so that the watchdog does not stop the
-  // robot.
-  void set_velocity(double v, double omega,
-                    double vy = 0.0) const;  // vy: m/s to the left, of a robot that moves sideways
-  // The same with the rates of the left and the right wheels, rad/s, positive ahead.
+  /// Drives within the robot's limits until the next command of any kind: the command is repeated
+  /// in the background, so that the watchdog does not stop the robot.
+  /// @param v m/s ahead
+  /// @param omega rad/s, positive to the left
+  /// @param vy m/s to the left, of a robot that moves sideways
+  /// @throws std::invalid_argument for what is not finite; NotSupported for a robot without a
+  /// drive; NoServer
+  void set_velocity(double v, double omega, double vy = 0.0) const;
+  /// The same with the rates of the wheels.
+  /// @param left rad/s, positive ahead
+  /// @param right rad/s, positive ahead
+  /// @throws as set_velocity()
   void set_wheels(double left, double right) const;
 
-  // Each returns at once; wait() on what it returns waits for the end.
-  Motion stop(double deceleration = 0.0) const;
-  Motion advance(double distance, Limits limits = {}) const;  // m, negative: back
-  Motion rotate(double angle, Limits limits = {}) const;      // rad, on the spot
-  Motion turn_to(double heading, Limits limits = {}) const;   // rad in odom, the shorter way
-  Motion arc(double angle, double radius,
-             Limits limits = {}) const;  // rad turned (positive: left), m > 0
+  /// @name Primitives
+  /// Each returns at once; Motion::wait() waits for the end. They throw std::invalid_argument for
+  /// what is not finite or out of range, NotSupported for a robot without a drive, and NoServer.
+  /// @{
 
-  // The same as commands for Simulation::step(), which sends them; nothing repeats these. kind: a
-  // primitive; value in m or rad, of a stop 0.
+  /// @param deceleration m/s^2; 0: the robot's own
+  /// @return the primitive under way
+  Motion stop(double deceleration = 0.0) const;
+  /// @param distance m, negative: back
+  /// @param limits m/s, m/s^2
+  /// @return the primitive under way
+  Motion advance(double distance, Limits limits = {}) const;
+  /// On the spot.
+  /// @param angle rad, positive to the left
+  /// @param limits rad/s, rad/s^2
+  /// @return the primitive under way
+  Motion rotate(double angle, Limits limits = {}) const;
+  /// On the spot, the shorter way.
+  /// @param heading rad, in odom
+  /// @param limits rad/s, rad/s^2
+  /// @return the primitive under way
+  Motion turn_to(double heading, Limits limits = {}) const;
+  /// @param angle rad turned, positive to the left
+  /// @param radius m, above 0
+  /// @param limits m/s, m/s^2
+  /// @return the primitive under way
+  Motion arc(double angle, double radius, Limits limits = {}) const;
+  /// @}
+
+  /// @name Commands for Simulation::step()
+  /// It sends them; nothing repeats these. They throw what the functions above do.
+  /// @{
+
+  /// @param v m/s ahead
+  /// @param omega rad/s, positive to the left
+  /// @param vy m/s to the left, of a robot that moves sideways
+  /// @return the command
   [[nodiscard]] Command velocity_command(double v, double omega, double vy = 0.0) const;
+  /// @param left rad/s, positive ahead
+  /// @param right rad/s, positive ahead
+  /// @return the command
   [[nodiscard]] Command wheel_command(double left, double right) const;
+  /// @param kind a primitive
+  /// @param value m or rad; of a stop 0
+  /// @param limits as of the primitive
+  /// @param radius m, of an arc
+  /// @return the command
   [[nodiscard]] Command move_command(MotionKind kind, double value, Limits limits = {},
                                      double radius = 0.0) const;
+  /// @}
 
  private:
   std::shared_ptr<Core> core_;
   std::string name_;
 };
 
+/// How spawn() places a model.
 struct SpawnOptions {
-  double heading = 0.0;   // rad
-  std::string name = {};  // "": the model's own
-  std::string text = {};  // SDF or URDF sent along, instead of a model's name
-  bool on_ground = true;  // stands on the ground below; false: at z
-  double z = 0.0;         // m
+  double heading = 0.0;   ///< rad
+  std::string name = {};  ///< "": the model's own
+  std::string text = {};  ///< SDF or URDF sent along, instead of a model's name
+  bool on_ground = true;  ///< stands on the ground below; false: at z
+  double z = 0.0;         ///< m
 };
 
-enum class Reset { all, time, poses };
+/// What Simulation::reset() sets back.
+enum class Reset {
+  all,   ///< what follows equals a fresh run
+  time,  ///< sim time starts at 0 again; nothing moves
+  poses  ///< everything back to where it started, at rest; sim time goes on
+};
 
 /// A running simulation. Move-only; its destructor closes it. In lockstep, or while paused, step()
 /// drives time.
 class [[nodiscard]] Simulation {
  public:
+  /// @cond
   explicit Simulation(std::shared_ptr<Core> core);
   Simulation(Simulation&&) noexcept = default;
   Simulation& operator=(Simulation&& other) noexcept;
   ~Simulation();
+  /// @endcond
 
-  [[nodiscard]] std::string url() const;
-  [[nodiscard]] std::string version() const;  // of the server
-  [[nodiscard]] std::string world() const;
-  int64_t seed() const;
-  double step_size() const;  // s
-  double time() const;       // s, sim time of the newest message that came
-  bool paused() const;       // as ruedo/info last said it
-  [[nodiscard]] std::vector<Robot> robots() const;
-  [[nodiscard]] std::vector<BodyInfo> bodies() const;        // all that there are
-  [[nodiscard]] Robot robot(const std::string& name) const;  // UnknownName lists those that exist
-  void sleep(Duration time) const;                           // of sim time
+  /// @name What runs
+  /// They throw NoServer once this was closed or moved from.
+  /// @{
+  [[nodiscard]] std::string url() const;      ///< @return where the server is
+  [[nodiscard]] std::string version() const;  ///< @return the server's
+  [[nodiscard]] std::string world() const;    ///< @return its name
+  int64_t seed() const;                       ///< @return the run's
+  double step_size() const;                   ///< @return s
+  double time() const;                        ///< @return s of sim time, of the newest message
+  bool paused() const;                        ///< @return as ruedo/info last said it
+  [[nodiscard]] std::vector<Robot> robots() const;     ///< @return all, in the world's order
+  [[nodiscard]] std::vector<BodyInfo> bodies() const;  ///< @return all, of what never moves, too
+  bool lockstep() const;  ///< @return whether the server waits for clients
+  /// @}
+
+  /// @param name of a robot
+  /// @return the robot
+  /// @throws UnknownName, which lists those that exist; NoServer
+  [[nodiscard]] Robot robot(const std::string& name) const;
+  /// @param time of sim time
+  /// @throws NoServer
+  void sleep(Duration time) const;
   /// Calls back in the receiving thread when another server, or the same one restarted, answers
   /// at this address. Commands are not repeated into the new run, and primitives under way have
   /// ended.
+  /// @param callback what it throws is reported once on the terminal
+  /// @return ends the calls when it goes
+  /// @throws NoServer
   Subscription on_new_run(std::function<void()> callback) const;
 
-  // Each throws NotSupported where the server has no such request, RequestError when it refuses.
-  void pause() const;
-  void resume() const;
-  // Takes n steps, at most `timeout` of real time each time that nothing goes on, and returns what
-  // was seen. In lockstep (`ruedo run --lockstep N`): takes part from the first call on, grants n
-  // steps with their commands, and has every message of every step; the first call's observations
-  // begin with those of the state it found. n = 0 takes no step. Throws LeaseLost. Else: steps a
-  // paused simulation; there are no commands, and the messages are in the streams.
+  /// @name Requests
+  /// Each throws NotSupported where the server has no such request, RequestError when it refuses,
+  /// Timeout and NoServer.
+  /// @{
+
+  void pause() const;   ///< No step is taken until resume().
+  void resume() const;  ///< Steps are taken again.
+  /// Takes n steps and returns what was seen.
+  ///
+  /// In lockstep (`ruedo run --lockstep N`): takes part from the first call on, grants n steps with
+  /// their commands, and has every message of every step; the first call's observations begin with
+  /// those of the state it found. Else it steps a paused simulation; there are no commands, and the
+  /// messages are in the streams.
+  /// @param n how many; 0 takes none
+  /// @param commands in lockstep, for these steps
+  /// @param timeout of real time, each time that nothing goes on
+  /// @return the state after the last step, and in lockstep the messages of all
+  /// @throws LeaseLost when the others went on without this client; Timeout
   Observations step(int64_t n = 1, const std::vector<Command>& commands = {},
                     Duration timeout = 60.0) const;
-  bool lockstep() const;  // whether the server runs in lockstep
+  /// @param rate sim time per real time; kFast: as fast as it goes
   void set_rate(double rate) const;
-  void reset(Reset what = Reset::all, int64_t seed = -1) const;  // seed -1: the same again
-  // Returns the model's name: the server numbers one that is taken, unless it was asked for.
+  /// @param what is set back
+  /// @param seed of the new epoch; -1: the same again
+  void reset(Reset what = Reset::all, int64_t seed = -1) const;
+  /// @param model one that comes with Ruedo, or a file the server finds
+  /// @param x m, world
+  /// @param y m, world
+  /// @param options heading, name, height, or the model's text
+  /// @return the model's name: the server numbers one that is taken, unless it was asked for
   std::string spawn(const std::string& model, double x, double y,
                     const SpawnOptions& options = {}) const;
+  /// @param name of a model
   void remove(const std::string& name) const;
+  /// @param name of a model
+  /// @param position m, world
+  /// @param orientation to world
   void set_pose(const std::string& name, const Vector3& position,
                 const Quaternion& orientation) const;
+  /// @param name of a model
+  /// @param x m, world
+  /// @param y m, world
+  /// @param heading rad
+  /// @param z m, world
   void set_pose(const std::string& name, double x, double y, double heading = 0.0,
                 double z = 0.0) const;
+  /// @param name of a model
+  /// @param linear m/s, world
+  /// @param angular rad/s, world
   void set_twist(const std::string& name, const Vector3& linear, const Vector3& angular = {}) const;
+  /// @param name of a model, or MODEL/LINK; "": of none
+  /// @return the state of the simulation, and where that is
   [[nodiscard]] State state(const std::string& name = "") const;
+  /// Its odometry begins at 0 again.
+  /// @param robot its name
   void reset_odometry(const std::string& robot) const;
-  // Draws for people to see, in the web console and in the log. layer: a name of your own; what is
-  // drawn takes the place of all that was in it, and nothing empties it. frame: a robot, with whose
-  // base_link it moves; "": the world. Throws std::invalid_argument for more than a message holds.
+  /// Saves the state in the folder that the server was started with (--snapshots FOLDER).
+  /// @param name of the snapshot
+  /// @return the state
+  State snapshot(const std::string& name) const;
+  /// Puts the world back to a snapshot; what follows equals what followed it. The server runs there
+  /// from the beginning of the snapshot's run, in silence: this takes as long as that part takes at
+  /// rate max. A new epoch.
+  /// @param name of the snapshot
+  /// @return the state
+  State restore(const std::string& name) const;
+  void quit() const;  ///< Ends the server.
+  /// @}
+
+  /// Draws for people to see, in the web console and in the log.
+  /// @param layer a name of your own; what is drawn takes the place of all that was in it
+  /// @param markers what is drawn; none empties the layer
+  /// @param frame a robot, with whose base_link it moves; "": the world
+  /// @throws std::invalid_argument for more than a message holds; NoServer
   void markers(const std::string& layer, const std::vector<Marker>& markers = {},
                const std::string& frame = "") const;
-  // Saves the state under a name, in the folder that the server was started with (--snapshots
-  // FOLDER), and returns it.
-  State snapshot(const std::string& name) const;
-  // Puts the world back to a snapshot; what follows equals what followed it. The server runs there
-  // from the beginning of the snapshot's run, in silence: this takes as long as that part takes at
-  // rate max. A new epoch.
-  State restore(const std::string& name) const;
-  void quit() const;  // ends the server
 
   void
-  close();  // ends repeated commands, and a server that launch() started; a second time nothing
+  close();  ///< Ends repeated commands, and a server that launch() started; a second time nothing.
 
  private:
-  std::shared_ptr<Core> core() const;  // throws NoServer once it was moved from
+  std::shared_ptr<Core> core() const;  ///< throws NoServer once it was moved from
   std::shared_ptr<Core> core_;
 };
 
+/// How connect() joins.
 struct ConnectOptions {
-  std::string name;        // of this client; "": "client-PID"
-  Duration timeout = 2.0;  // of real time to wait for a server
+  std::string name;        ///< of this client; "": "client-PID"
+  Duration timeout = 2.0;  ///< of real time to wait for a server
 };
 
-// Joins the simulation at an LCM URL; "": LCM_DEFAULT_URL, else LCM's default group and port with
-// ttl 0. Throws NoServer.
+/// Joins a simulation that runs.
+/// @param url of LCM; "": LCM_DEFAULT_URL, else LCM's default group and port with ttl 0
+/// @param options this client's name, and how long to wait
+/// @return the simulation
+/// @throws NoServer when none answers
 Simulation connect(const std::string& url = "", const ConnectOptions& options = {});
 
+/// How launch() starts the server; the lists are as the options of `ruedo run`.
 struct LaunchOptions {
 #ifdef RUEDO_PROGRAM  // find_package(ruedo) defines it
   std::string program = RUEDO_PROGRAM;
 #else
-  std::string program;  // the server, unless the environment's RUEDO names one; "": of the same
-                        // installation, by the PATH, or above this program
+  std::string program;  ///< the server, unless the environment's RUEDO names one; "": of the same
+                        ///< installation, by the PATH, or above this program
 #endif
-  int64_t seed = -1;                       // -1: the server's default
-  double rate = 1.0;                       // sim time per real time; kFast: as fast as it goes
-  int lockstep = 0;                        // how many clients the run waits for
-  std::vector<std::string> spawn;          // models: "p3at@0,0", "p3at:NAME@X,Y,YAW"
-  std::vector<std::string> disable;        // devices that are left out: "p3at/camera"
-  std::map<std::string, std::string> set;  // {{"p3at/lrf.rate", "20"}}
-  bool noise = true;                       // false: ideal values
-  std::string text;                        // the world's SDF or URDF itself, where the world is ""
-  std::vector<std::string> args;           // further options of `ruedo run`
-  std::string url;                         // "": a local socket, which no other user of the machine
-                    // reads, and plain LCM programs do not know; "auto": a free
-                    // port for LCM
-  std::string name = "client";
-  Duration timeout = 30.0;  // of real time until the world is loaded
-  bool verbose = false;     // show what the server prints; else it is shown in errors alone
+  int64_t seed = -1;                       ///< -1: the server's default
+  double rate = 1.0;                       ///< sim time per real time; kFast: as fast as it goes
+  int lockstep = 0;                        ///< how many clients the run waits for
+  std::vector<std::string> spawn;          ///< models: "p3at@0,0", "p3at:NAME@X,Y,YAW"
+  std::vector<std::string> disable;        ///< devices that are left out: "p3at/camera"
+  std::map<std::string, std::string> set;  ///< {{"p3at/lrf.rate", "20"}}
+  bool noise = true;                       ///< false: ideal values
+  std::string text;               ///< the world's SDF or URDF itself, where the world is ""
+  std::vector<std::string> args;  ///< further options of `ruedo run`
+  std::string url;                ///< "": a local socket, which no other user of the machine
+                                  ///< reads, and plain LCM programs do not know; "auto": a free
+                                  ///< port for LCM
+  std::string name = "client";    ///< of this client
+  Duration timeout = 30.0;        ///< of real time until the world is loaded
+  bool verbose = false;           ///< show what the server prints; else it is shown in errors alone
 };
 
-// Starts `ruedo run WORLD` and joins it. The server ends with the
-// Simulation, and with this process however that ends. Throws LaunchError with what the server
-// said.
+/// Starts `ruedo run WORLD` and joins it. The server ends with the Simulation, and with this
+/// process however that ends.
+/// @param world a file, or the name of a world that comes with Ruedo; "": options.text has it
+/// @param options seed, rate, robots and so on
+/// @return the simulation
+/// @throws LaunchError with what the server said
 Simulation launch(const std::string& world, const LaunchOptions& options = {});
 
 // ---- Recorded runs.
@@ -473,22 +674,31 @@ class LogFile;  // clients/cpp/log.cpp
 /// They are read from the file when they are asked for. Copies share the file.
 class Log {
  public:
+  /// @cond
   explicit Log(std::shared_ptr<const LogFile> file) : file_(std::move(file)) {}
+  /// @endcond
 
-  [[nodiscard]] std::vector<std::string> channels() const;  ///< sorted
-  /// How many messages there are on a channel; 0 on one that the log has not.
+  /// @return their names, sorted
+  [[nodiscard]] std::vector<std::string> channels() const;
+  /// @param channel its name
+  /// @return how many messages it has; 0 for one that the log has not
   [[nodiscard]] size_t count(const std::string& channel) const;
-  /// "" where the file ends properly; else how it was cut off or is damaged, and at which byte.
-  /// What came before that is here.
+  /// @return "" where the file ends properly; else how it was cut off or is damaged, and at which
+  /// byte: what came before that is here
   [[nodiscard]] const std::string& fault() const;
 
   /// The samples on a channel, in order: `log.samples<Scan>("p3at/lrf")`; RawSample has the bytes
   /// of any type.
+  /// @param channel its name
+  /// @return all of them
   /// @throws UnknownName, with the channels that there are; TypeMismatch; Error when the file can
   /// no longer be read
   template <class SampleType>
   [[nodiscard]] std::vector<SampleType> samples(const std::string& channel) const;
   /// The same as objects of a class that lcm-gen made.
+  /// @param channel its name
+  /// @return all of them
+  /// @throws as samples()
   template <class Message>
   [[nodiscard]] std::vector<Message> messages(const std::string& channel) const {
     std::vector<Message> found;
@@ -501,6 +711,8 @@ class Log {
   std::shared_ptr<const LogFile> file_;
 };
 
+/// @param path a file
+/// @return what it has
 /// @throws Error for what cannot be read, and what is no log
 Log read_log(const std::string& path);
 

@@ -20,19 +20,21 @@ namespace ruedo::client {
 /// A span of time: any of std::chrono's, or a number of seconds. kForever has no end.
 class Duration : public std::chrono::duration<double> {
  public:
+  /// @param seconds may be kForever
   constexpr Duration(double seconds)
       : std::chrono::duration<double>(seconds) {}  // NOLINT: both are meant to convert
+  /// @param time of std::chrono
   template <class Rep, class Period>
   constexpr Duration(std::chrono::duration<Rep, Period> time)
       : std::chrono::duration<double>(time) {}  // NOLINT
 };
 
-inline constexpr double kForever = std::numeric_limits<double>::infinity();
+inline constexpr double kForever = std::numeric_limits<double>::infinity();  ///< s
 inline constexpr double kFast =
-    std::numeric_limits<double>::infinity();  // a rate: as fast as it goes
+    std::numeric_limits<double>::infinity();  ///< a rate: as fast as it goes
 
-using Vector3 = std::array<double, 3>;
-using Quaternion = std::array<double, 4>;  // w, x, y, z
+using Vector3 = std::array<double, 3>;     ///< x, y, z
+using Quaternion = std::array<double, 4>;  ///< w, x, y, z
 
 // ---- What a robot executes.
 
@@ -87,10 +89,16 @@ enum class ReplyCode : int32_t {
   not_supported = 8
 };
 
-/// The words that messages use: "advance", "running", "not finite"; "" for MotionReason::none.
+/// @param kind of a motion
+/// @return the word that messages use: "advance"
 [[nodiscard]] const char* to_string(MotionKind kind);
+/// @param state of a motion
+/// @return the word that messages use: "running"
 [[nodiscard]] const char* to_string(MotionState state);
+/// @param reason of an end
+/// @return the words that messages use: "not finite"; "" for MotionReason::none
 [[nodiscard]] const char* to_string(MotionReason reason);
+/// @cond
 inline std::ostream& operator<<(std::ostream& out, MotionKind kind) {
   return out << to_string(kind);
 }
@@ -101,8 +109,11 @@ inline std::ostream& operator<<(std::ostream& out, MotionReason reason) {
   return out << to_string(reason);
 }
 
+/// @endcond
+
 // ---- What can go wrong. Bad arguments (NaN, a radius of 0) are std::invalid_argument.
 
+/// Whatever else can go wrong; the text says what.
 struct Error : std::runtime_error {
   using std::runtime_error::runtime_error;
 };
@@ -118,6 +129,7 @@ struct LaunchError : Error {
 struct UnknownName : Error {
   using Error::Error;
 };
+/// Nothing came within the time that was given.
 struct Timeout : Error {
   using Error::Error;
 };
@@ -131,13 +143,17 @@ struct NotSupported : Error {
 };
 /// A primitive ended early or was refused.
 struct MotionError : Error {
+  /// @cond
   MotionError(const std::string& text, MotionReason why) : Error(text), reason(why) {}
-  MotionReason reason;
+  /// @endcond
+  MotionReason reason;  ///< why
 };
 /// The server refused a request.
 struct RequestError : Error {
+  /// @cond
   RequestError(const std::string& text, ReplyCode reply_code) : Error(text), code(reply_code) {}
-  ReplyCode code;
+  /// @endcond
+  ReplyCode code;  ///< why
 };
 /// Lockstep goes on without this client, which was silent too long; the next step() takes part
 /// again.
@@ -147,182 +163,202 @@ struct LeaseLost : RequestError {
 
 // ---- Samples.
 
+/// What all samples have.
 struct Sample {
-  int64_t utime = 0;  // us, sim time of the state shown
-  double time() const { return static_cast<double>(utime) * 1e-6; }  // s
+  int64_t utime = 0;  ///< us, sim time of the state shown
+  /// @return the same in s
+  double time() const { return static_cast<double>(utime) * 1e-6; }
 };
 
-// A scan of a planar laser range finder, in the device's frame.
+/// A scan of a planar laser range finder, in the device's frame.
 struct Scan : Sample {
-  std::vector<float> ranges;       // m; +inf: no return, -inf: nearer than the minimum range
-  std::vector<float> intensities;  // 0 to 1; empty when the device has none
-  double angle_min = 0.0;          // rad, of ray 0, from the device's x axis towards y (left)
-  double angle_step = 0.0;         // rad
+  std::vector<float> ranges;       ///< m; +inf: no return, -inf: nearer than the minimum range
+  std::vector<float> intensities;  ///< 0 to 1; empty when the device has none
+  double angle_min = 0.0;          ///< rad, of ray 0, from the device's x axis towards y (left)
+  double angle_step = 0.0;         ///< rad
+  /// @param ray from 0 on
+  /// @return rad, from the device's x axis towards y (left)
   double angle(size_t ray) const { return angle_min + angle_step * static_cast<double>(ray); }
-  // The smallest range between two angles (rad); +inf when nothing is there.
+  /// @param from_angle rad
+  /// @param to_angle rad
+  /// @return the smallest range between the two, m; +inf when nothing is there
   [[nodiscard]] double nearest(double from_angle, double to_angle) const;
 };
 
-// A scan of a laser scanner with several layers: element layer * columns + column.
+/// A scan of a laser scanner with several layers: element layer * columns + column.
 struct LidarScan : Sample {
-  int layers = 0, columns = 0;
-  std::vector<float> ranges;                         // m, lowest layer first; as in Scan
-  std::vector<float> intensities;                    // 0 to 1, or empty
-  double azimuth_min = 0.0, azimuth_step = 0.0;      // rad, left is positive
-  double elevation_min = 0.0, elevation_step = 0.0;  // rad, up is positive
+  int layers = 0, columns = 0;                       ///< of rays
+  std::vector<float> ranges;                         ///< m, lowest layer first; as in Scan
+  std::vector<float> intensities;                    ///< 0 to 1, or empty
+  double azimuth_min = 0.0, azimuth_step = 0.0;      ///< rad, left is positive
+  double elevation_min = 0.0, elevation_step = 0.0;  ///< rad, up is positive
 };
 
-// The last reading of each of an array's transducers; their poses are DeviceInfo::elements.
+/// The last reading of each of an array's transducers; their poses are DeviceInfo::elements.
 struct SonarReading : Sample {
-  std::vector<float> ranges;  // m from the transducer's face; without an echo: the maximum range
-  std::vector<int64_t> fired_utime;  // us, when each fired last; -1: not yet
-  std::vector<bool> fresh;           // true where the reading is of this very message
+  std::vector<float> ranges;  ///< m from the transducer's face; without an echo: the maximum range
+  std::vector<int64_t> fired_utime;  ///< us, when each fired last; -1: not yet
+  std::vector<bool> fresh;           ///< true where the reading is of this very message
 };
 
-// What the robot believes of its motion from its wheels; pose of base_link in the frame odom.
+/// What the robot believes of its motion from its wheels; pose of base_link in the frame odom.
 struct Odometry : Sample {
-  double x = 0.0, y = 0.0;      // m
-  double theta = 0.0;           // rad, not wrapped
-  double v = 0.0, omega = 0.0;  // m/s, rad/s
+  double x = 0.0, y = 0.0;      ///< m
+  double theta = 0.0;           ///< rad, not wrapped
+  double v = 0.0, omega = 0.0;  ///< m/s, rad/s
   std::vector<double>
-      wheel_angles;  // rad since the start, positive ahead; order of RobotInfo::wheels
-  std::vector<double> wheel_rates;  // rad/s
-  std::vector<int64_t> ticks;       // encoder counts
-  int32_t resets = 0;               // how often the pose was reset
+      wheel_angles;  ///< rad since the start, positive ahead; order of RobotInfo::wheels
+  std::vector<double> wheel_rates;  ///< rad/s
+  std::vector<int64_t> ticks;       ///< encoder counts
+  int32_t resets = 0;               ///< how often the pose was reset
 };
 
-// The true pose of base_link in the world; velocities are expressed in base_link.
+/// The true pose of base_link in the world; velocities are expressed in base_link.
 struct Pose : Sample {
-  Vector3 position{};  // m
-  Quaternion orientation{};
-  Vector3 velocity{};       // m/s
-  Vector3 rotation_rate{};  // rad/s
-  Vector3 acceleration{};   // m/s^2, without gravity
-  double x() const { return position[0]; }
-  double y() const { return position[1]; }
-  double heading() const;  // rad, counter-clockwise from the world's x axis, in (-pi, pi]
+  Vector3 position{};                       ///< m
+  Quaternion orientation{};                 ///< to world
+  Vector3 velocity{};                       ///< m/s
+  Vector3 rotation_rate{};                  ///< rad/s
+  Vector3 acceleration{};                   ///< m/s^2, without gravity
+  double x() const { return position[0]; }  ///< @return m
+  double y() const { return position[1]; }  ///< @return m
+  double heading() const;  ///< @return rad, counter-clockwise from the world's x axis, in (-pi, pi]
 };
 
+/// A picture of a camera.
 struct Image : Sample {
+  /// How `data` has it.
   enum class Format { unknown, jpeg, rgb, bgr, gray, gray16, float32 };
-  int width = 0, height = 0;  // pixels
+  int width = 0, height = 0;  ///< pixels
   Format format =
-      Format::unknown;        // gray16: labels (body index + 1); float32: depth, m, +inf: nothing
-  int row_stride = 0;         // bytes in a row, 0 for jpeg
-  std::vector<uint8_t> data;  // as they came: rows from the top, or a JPEG file
-  // Writes a JPEG's bytes as they are, rgb, bgr and gray as PPM or PGM. Throws Error.
+      Format::unknown;        ///< gray16: labels (body index + 1); float32: depth, m, +inf: nothing
+  int row_stride = 0;         ///< bytes in a row, 0 for jpeg
+  std::vector<uint8_t> data;  ///< as they came: rows from the top, or a JPEG file
+  /// Writes a JPEG's bytes as they are, rgb, bgr and gray as PPM or PGM.
+  /// @param path of the file
+  /// @throws Error for another format, and for what cannot be written
   void save(const std::string& path) const;
 };
 
-// A pinhole with OpenCV's distortion.
+/// A pinhole with OpenCV's distortion.
 struct CameraInfo : Sample {
-  int width = 0, height = 0;                      // pixels
-  double fx = 0.0, fy = 0.0, cx = 0.0, cy = 0.0;  // pixels
-  std::array<double, 5> distortion{};             // k1, k2, p1, p2, k3
+  int width = 0, height = 0;                      ///< pixels
+  double fx = 0.0, fy = 0.0, cx = 0.0, cy = 0.0;  ///< pixels
+  std::array<double, 5> distortion{};             ///< k1, k2, p1, p2, k3
 };
 
-struct Imu : Sample {             // in the device's frame
-  Quaternion orientation{};       // device to world
-  Vector3 angular_velocity{};     // rad/s
-  Vector3 linear_acceleration{};  // m/s^2, specific force: at rest gravity upwards
+/// An inertial unit, in its own frame.
+struct Imu : Sample {
+  Quaternion orientation{};       ///< device to world
+  Vector3 angular_velocity{};     ///< rad/s
+  Vector3 linear_acceleration{};  ///< m/s^2, specific force: at rest gravity upwards
 };
 
-// Satellite navigation (GPS).
+/// Satellite navigation (GPS).
 struct NavSat : Sample {
-  double latitude_deg = 0.0, longitude_deg = 0.0;  // degrees, north and east are positive
-  double altitude = 0.0;                           // m above the ellipsoid
-  Vector3 velocity{};                              // m/s, to the east, to the north, upwards
+  double latitude_deg = 0.0, longitude_deg = 0.0;  ///< degrees, north and east are positive
+  double altitude = 0.0;                           ///< m above the ellipsoid
+  Vector3 velocity{};                              ///< m/s, to the east, to the north, upwards
 };
 
+/// The magnetic field.
 struct Magnetometer : Sample {
-  Vector3 field{};  // T, in the device's frame
+  Vector3 field{};  ///< T, in the device's frame
 };
 
+/// Height over the start.
 struct Altimeter : Sample {
-  double altitude = 0.0;  // m above where the device was at the start
-  double velocity = 0.0;  // m/s, upwards
+  double altitude = 0.0;  ///< m above where the device was at the start
+  double velocity = 0.0;  ///< m/s, upwards
 };
 
+/// A barometer.
 struct AirPressure : Sample {
-  double pressure = 0.0;  // Pa
+  double pressure = 0.0;  ///< Pa
 };
 
-// A Pitot tube along the device's x axis.
+/// A Pitot tube along the device's x axis.
 struct AirSpeed : Sample {
-  double differential_pressure = 0.0;  // Pa, total less static; negative: from behind
-  double temperature = 0.0;            // K, of the air
+  double differential_pressure = 0.0;  ///< Pa, total less static; negative: from behind
+  double temperature = 0.0;            ///< K, of the air
 };
 
-// In a joint: what the child puts on the parent, unless the world file says otherwise.
+/// In a joint: what the child puts on the parent, unless the world file says otherwise.
 struct ForceTorque : Sample {
-  Vector3 force{};   // N
-  Vector3 torque{};  // N m, about the joint's origin
+  Vector3 force{};   ///< N
+  Vector3 torque{};  ///< N m, about the joint's origin
 };
 
-// A model that a logical camera sees, in the device's frame.
+/// A model that a logical camera sees, in the device's frame.
 struct LogicalObject {
-  std::string model;         // its name
-  Vector3 position{};        // m
-  Quaternion orientation{};  // model to device
+  std::string model;         ///< its name
+  Vector3 position{};        ///< m
+  Quaternion orientation{};  ///< model to device
 };
+/// What a logical camera sees.
 struct LogicalCamera : Sample {
-  std::vector<LogicalObject> objects;
+  std::vector<LogicalObject> objects;  ///< in the world's order
 };
 
-// A labelled object in a picture; whole numbers are the middles of pixels.
+/// A labelled object in a picture; whole numbers are the middles of pixels.
 struct Box2D {
-  int label = 0;
-  std::string name;                                    // of the model
-  double x = 0.0, y = 0.0, width = 0.0, height = 0.0;  // pixels; x, y: the middle
+  int label = 0;                                       ///< as the world file has it
+  std::string name;                                    ///< of the model
+  double x = 0.0, y = 0.0, width = 0.0, height = 0.0;  ///< pixels; x, y: the middle
 };
+/// The labelled objects in a picture.
 struct Boxes2D : Sample {
-  int width = 0, height = 0;  // pixels, of the picture
-  std::vector<Box2D> boxes;
+  int width = 0, height = 0;  ///< pixels, of the picture
+  std::vector<Box2D> boxes;   ///< one each
 };
 
-// A labelled object before the camera, in the device's frame.
+/// A labelled object before the camera, in the device's frame.
 struct Box3D {
-  int label = 0;
-  std::string name;          // of the model
-  Vector3 center{};          // m
-  Quaternion orientation{};  // box to device
-  Vector3 size{};            // m, full lengths
+  int label = 0;             ///< as the world file has it
+  std::string name;          ///< of the model
+  Vector3 center{};          ///< m
+  Quaternion orientation{};  ///< box to device
+  Vector3 size{};            ///< m, full lengths
 };
+/// The labelled objects before a camera.
 struct Boxes3D : Sample {
-  std::vector<Box3D> boxes;
+  std::vector<Box3D> boxes;  ///< one each
 };
 
+/// Where two bodies touch.
 struct ContactPoint {
-  std::string body;    // the other body
-  Vector3 position{};  // m, world
-  Vector3 normal{};    // unit vector, world, towards the sensor's body
-  double force = 0.0;  // N
-  double depth = 0.0;  // m
+  std::string body;    ///< the other body
+  Vector3 position{};  ///< m, world
+  Vector3 normal{};    ///< unit vector, world, towards the sensor's body
+  double force = 0.0;  ///< N
+  double depth = 0.0;  ///< m
 };
+/// A bumper.
 struct Contact : Sample {
-  bool pressed = false;
-  std::vector<ContactPoint> points;
+  bool pressed = false;              ///< something is touched
+  std::vector<ContactPoint> points;  ///< where
 };
 
-// What a robot runs into: with what neither carries it nor lies on it.
+/// What a robot runs into: with what neither carries it nor lies on it.
 struct Collisions : Sample {
-  std::string blocked_by;            // the body that blocks what it was told to do; "": nothing
-  std::vector<ContactPoint> points;  // empty: nothing is touched
+  std::string blocked_by;            ///< the body that blocks what it was told to do; "": nothing
+  std::vector<ContactPoint> points;  ///< empty: nothing is touched
 };
 
+/// A robot's joints, in the order of the names.
 struct Joints : Sample {
-  std::vector<std::string> names;
-  std::vector<float> positions, velocities, efforts;  // rad or m, rad/s or m/s, N m or N
+  std::vector<std::string> names;                     ///< as the file has them
+  std::vector<float> positions, velocities, efforts;  ///< rad or m, rad/s or m/s, N m or N
 };
 
-// What a robot is executing.
+/// What a robot is executing.
 struct MotionStatus : Sample {
-  int64_t id = 0;  // of the primitive; 0 for velocity and wheel commands
-  MotionKind kind = MotionKind::none;
-  MotionState state = MotionState::idle;
-  MotionReason reason = MotionReason::none;  // why it ended or was refused
-  double progress = 0.0, remaining = 0.0;    // m or rad
-  double v = 0.0, omega = 0.0;               // m/s, rad/s
+  int64_t id = 0;                         ///< of the primitive; 0 for velocity and wheel commands
+  MotionKind kind = MotionKind::none;     ///< what it was told
+  MotionState state = MotionState::idle;  ///< how far it is
+  MotionReason reason = MotionReason::none;  ///< why it ended or was refused
+  double progress = 0.0, remaining = 0.0;    ///< m or rad
+  double v = 0.0, omega = 0.0;               ///< m/s, rad/s
 };
 
 /// A message of any type, as it came.

@@ -48,6 +48,7 @@ class DriveModel {
  public:
   virtual ~DriveModel() = default;
   /// Called once a step, in order; not while the robot rests.
+  /// @param input what is asked, and how it goes
   /// @return the mean velocity of base_link over the step
   /// @throws std::exception ends the run, which says the text
   virtual BaseVelocity step(const DriveInput& input) = 0;
@@ -55,7 +56,7 @@ class DriveModel {
 
 /// A kind of drive: `<ruedo:drive type="TYPE">`.
 struct DriveKind {
-  std::string type;
+  std::string type;  ///< of the attribute
   /// Reads the element; throws InputError. Called again when the robot is put somewhere, or begins
   /// anew.
   std::function<std::unique_ptr<DriveModel>(const DriveSetup&)> make;
@@ -66,6 +67,7 @@ const std::vector<DriveKind>& drive_kinds();
 
 /// Put one at namespace scope in the drive's file: static const RegisterDrive kRegister{{...}};
 struct RegisterDrive {
+  /// @param kind one of its own type
   explicit RegisterDrive(DriveKind kind);
 };
 

@@ -9,11 +9,11 @@
 //     ruedo::EngineOptions options;
 //     options.worlds = 64;
 //     ruedo::Engine engine("arena", options);
-//     const ruedo::Observation ranges = engine.observe("lrf.ranges");      // worlds x robots x
-//     beams std::vector<double> commands(64 * 3, 0.0);                           // (m/s ahead, m/s
-//     left, rad/s) each engine.step(20, commands);                                           // 20
-//     steps of 5 ms const float nearest = *std::min_element(ranges.begin<float>(3),
-//     ranges.end<float>(3));
+//     const ruedo::Observation ranges = engine.observe("lrf.ranges");  // worlds x robots x beams
+//     std::vector<double> commands(64 * 3, 0.0);  // (m/s ahead, m/s left, rad/s) each
+//     engine.step(20, commands);                  // 20 steps of 5 ms
+//     const float* end = ranges.end<float>(3);
+//     const float nearest = *std::min_element(ranges.begin<float>(3), end);
 #pragma once
 
 #include <cstddef>
@@ -45,7 +45,9 @@ struct EngineOptions {
 
 /// A sensor of a robot.
 struct EngineDevice {
-  std::string robot, name, kind;
+  std::string robot;  ///< whose it is
+  std::string name;   ///< as the world file has it
+  std::string kind;   ///< "lrf", "odometry", ...
 };
 
 /// The values of one field of a device's messages, of all robots that have it, in all copies: they
@@ -55,12 +57,14 @@ struct EngineDevice {
 /// may outlive the engine.
 class Observation {
  public:
+  /// Of the values.
   enum class Type { boolean, byte, int8, int16, int32, int64, float32, float64 };
 
+  /// @return of the values
   [[nodiscard]] Type type() const { return type_; }
-  /// Worlds, robots, then the field's own dimensions; row by row.
+  /// @return worlds, robots, then the field's own dimensions; row by row
   [[nodiscard]] const std::vector<int64_t>& shape() const { return shape_; }
-  /// Values of one copy.
+  /// @return how many values a copy has
   [[nodiscard]] size_t size() const { return size_; }
 
   /// The values of a copy, as a span begin to end.
@@ -68,11 +72,16 @@ class Observation {
   /// @param world a copy, from 0 on
   /// @throws std::invalid_argument when the values are of another type, std::out_of_range when
   /// there is no such copy
+  /// @return its first value
   template <class T>
   [[nodiscard]] const T* begin(int world = 0) const {
     check(type_of<T>(), world);
     return reinterpret_cast<const T*>(bytes_.get()) + static_cast<size_t>(world) * size_;
   }
+  /// As begin().
+  /// @tparam T the C++ type of type()
+  /// @param world a copy, from 0 on
+  /// @return the place after its last value
   template <class T>
   [[nodiscard]] const T* end(int world = 0) const {
     return begin<T>(world) + size_;
@@ -92,11 +101,11 @@ class Observation {
 
 /// A message of a copy, as a server would publish it.
 struct EngineMessage {
-  int world;
-  int64_t step;
-  const std::string& channel;
-  const uint8_t* bytes;  ///< LCM's encoding
-  size_t size;
+  int world;                   ///< the copy, from 0 on
+  int64_t step;                ///< of its run
+  const std::string& channel;  ///< "p3at/lrf"
+  const uint8_t* bytes;        ///< LCM's encoding
+  size_t size;                 ///< of the bytes
 };
 
 /// Copies of one world. Move-only. One thread at a time; step() itself uses all cores.
@@ -110,16 +119,22 @@ class Engine {
   /// allowed
   /// @throws EnvironmentError for what the machine lacks
   explicit Engine(const std::string& world, const EngineOptions& options = {});
+  /// @cond
   Engine(Engine&&) noexcept;
   Engine& operator=(Engine&&) noexcept;
   ~Engine();
+  /// @endcond
 
+  /// @return how many copies there are
   [[nodiscard]] int worlds() const;
-  [[nodiscard]] double step_size() const;  ///< s
-  /// Robots with a drive, in the order of the world file: the second axis of commands.
+  /// @return s
+  [[nodiscard]] double step_size() const;
+  /// @return the robots with a drive, in the order of the world file: the second axis of commands
   [[nodiscard]] const std::vector<std::string>& robots() const;
+  /// @return what observe() takes fields of
   [[nodiscard]] std::vector<EngineDevice> devices() const;
-  /// What of the world file is not supported, or was repaired: file, line, element, what was done.
+  /// @return what of the world file is not supported, or was repaired: file, line, element, what
+  /// was done
   [[nodiscard]] const std::vector<std::string>& findings() const;
 
   /// Computes n states of every copy.
@@ -135,10 +150,15 @@ class Engine {
 
   /// A message on one of the channels that take commands ("p3at/move"), on the state that the copy
   /// is in.
+  /// @param world the copy
+  /// @param channel its name
+  /// @param message LCM's encoding
   /// @throws InputError for a channel that takes none, or bytes that are no such message
   void command(int world, const std::string& channel, const std::vector<uint8_t>& message);
 
-  /// A field of a device: "lrf.ranges", "LRF.ranges", "odometry.theta", "pose.pos".
+  /// A field of a device, of all robots that have it.
+  /// @param name "lrf.ranges", "LRF.ranges", "odometry.theta", "pose.pos"
+  /// @return a handle on its values
   /// @throws InputError, with what there is
   [[nodiscard]] Observation observe(const std::string& name);
 
@@ -148,13 +168,18 @@ class Engine {
   void reset(int world, uint64_t seed);
   void reset();  ///< with the seeds that they have
 
+  /// @param world the copy
+  /// @return of its run, from 0 on
   [[nodiscard]] int64_t current_step(int world = 0) const;
-  [[nodiscard]] double time(int world = 0) const;  ///< s of sim time
-  /// Of the whole state, bit for bit: the hash of the server's ticks.
+  /// @param world the copy
+  /// @return s of sim time
+  [[nodiscard]] double time(int world = 0) const;
+  /// @param world the copy
+  /// @return of the whole state, bit for bit: the hash of the server's ticks
   [[nodiscard]] uint64_t state_hash(int world = 0) const;
 
-  /// Called in step() and reset() with each message, copies and messages in order. An empty
-  /// function ends it.
+  /// Has a function called in step() and reset() with each message, copies and messages in order.
+  /// @param handler an empty one ends it
   void on_message(std::function<void(const EngineMessage&)> handler);
 
  private:

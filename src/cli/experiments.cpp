@@ -45,70 +45,68 @@ std::string table(const std::vector<Outcome>& outcomes, const std::string& exper
   return text + "\n";
 }
 
+// {E1} and so on are the experiments' tables.
+constexpr const char* kPage = R"(# The paper's experiments
+
+Ruedo began with Hernandez-Belmonte, Ayala-Ramirez and Sanchez-Yanez, "A Mobile Robot Simulator Using a Game
+Development Engine", ROSSUM 2011. This page is written by `ruedo experiments --out docs`, which runs the paper's
+experiments again on a P3-AT: in the paper's setting, and in Ruedo's.
+
+The paper's setting is taken to be a loop at 50 Hz that starts to brake when v^2 / (2 d) has reached the rest of the way.
+It notices that up to a frame late, and a frame late is up to v dt too far. The paper prints neither the loop nor its limits:
+4.2 and 0.27 m/s^2 are chosen so that a loop of this kind nearly gives the paper's two numbers, so its agreement in E1 shows that late braking
+can explain them, not that it did. Ruedo plans a primitive in closed form and evaluates it exactly at every step, so that the way
+does not depend on the step. The way is that at the step at which the primitive says that it is done.
+
+## E1: advance by one metre (the paper's Fig. 8)
+
+{E1}![Speed over time, high acceleration](experiments/e1_high_acceleration.svg)
+
+![Speed over time, high deceleration](experiments/e1_high_deceleration.svg)
+
+## E2: a square of one metre, five times (Fig. 9)
+
+The paper's measure: the mean, over the run, of the difference between the true pose and the odometry; here of its absolute
+value, at every step. The paper says: a square of 1000 mm, "several times", odometry by the trapezoidal rule. It does not say how
+many times, at which speeds and limits, at which rate, how old the odometry was when it was compared, and whether signs
+cancelled. Assumed are five times, 50 Hz, the loop of E1, and the P3-AT's usual limits: 0.6 m/s, 0.75 rad/s, acceleration 0.3 and
+deceleration 0.6 m/s^2, 1.74 rad/s^2 (AMRISim's parameters; those that the model in worlds/robots/p3at has). They were not fitted, and these rows have
+no target. Once the odometry is that of the same step: the trapezoid then runs half a frame behind the robot. Once it is that of
+the last status packet, which the real robot sends each 0.1 s. Which of both the paper did is not known.
+
+In Ruedo's setting the kinematic drive runs the primitives, by the robot's true way. With the wheels drive the wheels slip, and the
+primitives end where the robot's odometry has them, as on a real robot: one that steers by skidding turns less than its wheels say,
+so that its square does not close until its odometry believes in a wider track than the real one.
+
+{E2}![Square, late braking](experiments/e2_late_braking.svg)
+
+![Square, kinematic drive](experiments/e2_kinematic.svg)
+
+![Square, wheels in contact](experiments/e2_wheels.svg)
+
+## E3: the laser range finder among obstacles (Fig. 7)
+
+181 rays over 180 degrees, against distances computed from the obstacles' outlines.
+
+{E3}![The scene with the rays](experiments/e3_picture.png)
+
+![The rays from above](experiments/e3_rays.svg)
+
+## E4: an overloaded host
+
+The paper blames errors on the load of the host. Ruedo runs once on the host as it is, and once beside four threads a core that
+do nothing but burn time, with every module held up at random.
+
+{E4}## E5: noise on and off
+
+The LRF of E3 with a sigma of 10 mm, under 1000 seeds.
+
+{E5})";
+
 std::string page(const std::vector<Outcome>& outcomes) {
-  std::string text =
-      "# The paper's experiments\n\n"
-      "Ruedo began with Hernandez-Belmonte, Ayala-Ramirez and Sanchez-Yanez, \"A Mobile Robot "
-      "Simulator Using a Game\n"
-      "Development Engine\", ROSSUM 2011. This page is written by `ruedo experiments --out docs`, "
-      "which runs the paper's\n"
-      "experiments again on a P3-AT: in the paper's setting, and in Ruedo's.\n\n"
-      "The paper's setting is taken to be a loop at 50 Hz that starts to brake when v^2 / (2 d) "
-      "has reached the rest of the way.\n"
-      "It notices that up to a frame late, and a frame late is up to v dt too far. The paper "
-      "prints neither the loop nor its limits:\n"
-      "4.2 and 0.27 m/s^2 are chosen so that a loop of this kind nearly gives the paper's two "
-      "numbers, so its agreement in E1 shows that late braking\n"
-      "can explain them, not that it did. Ruedo plans a primitive in closed form and evaluates it "
-      "exactly at every step, so that the way\n"
-      "does not depend on the step. The way is that at the step at which the primitive says that "
-      "it is done.\n\n"
-      "## E1: advance by one metre (the paper's Fig. 8)\n\n";
-  text += table(outcomes, "E1");
-  text +=
-      "![Speed over time, high acceleration](experiments/e1_high_acceleration.svg)\n\n"
-      "![Speed over time, high deceleration](experiments/e1_high_deceleration.svg)\n\n"
-      "## E2: a square of one metre, five times (Fig. 9)\n\n"
-      "The paper's measure: the mean, over the run, of the difference between the true pose and "
-      "the odometry; here of its absolute\n"
-      "value, at every step. The paper says: a square of 1000 mm, \"several times\", odometry by "
-      "the trapezoidal rule. It does not say how\n"
-      "many times, at which speeds and limits, at which rate, how old the odometry was when it was "
-      "compared, and whether signs\n"
-      "cancelled. Assumed are five times, 50 Hz, the loop of E1, and the P3-AT's usual limits: 0.6 "
-      "m/s, 0.75 rad/s, acceleration 0.3 and\n"
-      "deceleration 0.6 m/s^2, 1.74 rad/s^2 (AMRISim's parameters; those that the model in "
-      "worlds/robots/p3at has). They were not fitted, and these rows have\n"
-      "no target. Once the odometry is that of the same step: the trapezoid then runs half a frame "
-      "behind the robot. Once it is that of\n"
-      "the last status packet, which the real robot sends each 0.1 s. Which of both the paper did "
-      "is not known.\n\n"
-      "In Ruedo's setting the kinematic drive runs the primitives, by the robot's true way. With "
-      "the wheels drive the wheels slip, and the\n"
-      "primitives end where the robot's odometry has them, as on a real robot: one that steers by "
-      "skidding turns less than its wheels say,\n"
-      "so that its square does not close until its odometry believes in a wider track than the "
-      "real one.\n\n";
-  text += table(outcomes, "E2");
-  text +=
-      "![Square, late braking](experiments/e2_late_braking.svg)\n\n"
-      "![Square, kinematic drive](experiments/e2_kinematic.svg)\n\n"
-      "![Square, wheels in contact](experiments/e2_wheels.svg)\n\n"
-      "## E3: the laser range finder among obstacles (Fig. 7)\n\n"
-      "181 rays over 180 degrees, against distances computed from the obstacles' outlines.\n\n";
-  text += table(outcomes, "E3");
-  text +=
-      "![The scene with the rays](experiments/e3_picture.png)\n\n"
-      "![The rays from above](experiments/e3_rays.svg)\n\n"
-      "## E4: an overloaded host\n\n"
-      "The paper blames errors on the load of the host. Ruedo runs once on the host as it is, and "
-      "once beside four threads a core that\n"
-      "do nothing but burn time, with every module held up at random.\n\n";
-  text += table(outcomes, "E4");
-  text +=
-      "## E5: noise on and off\n\n"
-      "The LRF of E3 with a sigma of 10 mm, under 1000 seeds.\n\n";
-  return text + table(outcomes, "E5");
+  return fmt::format(kPage, fmt::arg("E1", table(outcomes, "E1")),
+                     fmt::arg("E2", table(outcomes, "E2")), fmt::arg("E3", table(outcomes, "E3")),
+                     fmt::arg("E4", table(outcomes, "E4")), fmt::arg("E5", table(outcomes, "E5")));
 }
 
 std::string json(const std::vector<Outcome>& outcomes) {

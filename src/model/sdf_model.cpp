@@ -409,7 +409,7 @@ ModelLinkIndex SdfReader::ModelReader::canonical_link() {
   if (const std::string* name = element_.attribute("canonical_link"); name && !name->empty()) {
     read_or_leave_out(where_, "its first link is taken", findings_, [&] {
       const ModelLinkIndex link = frames_.link(*name, element_);
-      if (link < 0) element_.fail("canonical_link '" + *name + "' is no link");
+      if (!link.valid()) element_.fail("canonical_link '" + *name + "' is no link");
       canonical = link;
     });
   }
@@ -438,7 +438,7 @@ void SdfReader::ModelReader::read_plugin_sensors() {
       if (made.joint.empty()) {
         const ModelLinkIndex link =
             made.link.empty() ? ModelLinkIndex(0) : frames_.link(made.link, *plugin);
-        if (link < 0) plugin->fail("'" + made.link + "' is no link");
+        if (!link.valid()) plugin->fail("'" + made.link + "' is no link");
         model_->sensors.push_back(read_sensor(*made.sensor, link, pose));
         return;
       }

@@ -83,86 +83,90 @@ JointConstraint::JointConstraint(const model::Joint& joint, btRigidBody& parent,
       child_(child),
       X_PJ_(X_PJ),
       X_CJ_(X_CJ) {
+  constraint_ = make_constraint();
+  constraint_->setUserConstraintPtr(motors_.get());
+}
+
+JointConstraint::Constraint JointConstraint::make_constraint() {
   switch (type_) {
     case model::JointType::revolute:
-    case model::JointType::continuous: {
-      auto hinge = std::make_unique<btHingeConstraint>(
-          parent_, child_, to_bt(along(X_PJ, limits_.axis_in_J, Vec3::UnitZ())),
-          to_bt(along(X_CJ, limits_.axis_in_J, Vec3::UnitZ())), true);
-      if (type_ == model::JointType::revolute && limited(limits_) && within_a_turn(limits_)) {
-        hinge->setLimit(limits_.lower, limits_.upper, 1.0, 0.3, 0.0);
-      } else {
-        hinge->setLimit(1.0, -1.0);  // none, or a window at each substep
-      }
-      constraint_ = std::move(hinge);
-      break;
-    }
-    case model::JointType::prismatic: {
-      auto slider = std::make_unique<btSliderConstraint>(
-          parent_, child_, to_bt(along(X_PJ, limits_.axis_in_J, Vec3::UnitX())),
-          to_bt(along(X_CJ, limits_.axis_in_J, Vec3::UnitX())), true);
-      slider->setLowerLinLimit(limited(limits_) ? std::max(limits_.lower, -kNoLimit) : 1.0);
-      slider->setUpperLinLimit(limited(limits_) ? std::min(limits_.upper, kNoLimit) : -1.0);
-      slider->setLowerAngLimit(0.0);
-      slider->setUpperAngLimit(0.0);
-      constraint_ = std::move(slider);
-      break;
-    }
-    case model::JointType::screw: {  // a slider that may turn; the thread is a row of its own
-      auto slider = std::make_unique<btSliderConstraint>(
-          parent_, child_, to_bt(along(X_PJ, limits_.axis_in_J, Vec3::UnitX())),
-          to_bt(along(X_CJ, limits_.axis_in_J, Vec3::UnitX())), true);
-      const double one = bounded(limits_.lower * advance_, kNoLimit),
-                   other = bounded(limits_.upper * advance_, kNoLimit);
-      slider->setLowerLinLimit(limited(limits_) && advance_ != 0.0 ? std::min(one, other) : 1.0);
-      slider->setUpperLinLimit(limited(limits_) && advance_ != 0.0 ? std::max(one, other) : -1.0);
-      slider->setLowerAngLimit(1.0);
-      slider->setUpperAngLimit(-1.0);
-      constraint_ = std::move(slider);
-      break;
-    }
+    case model::JointType::continuous: return make_hinge();
+    case model::JointType::prismatic: return make_slider();
+    case model::JointType::screw: return make_screw();
+    case model::JointType::universal: return make_universal();
+    case model::JointType::gearbox: return make_gearbox();
     case model::JointType::ball:
-      constraint_ = std::make_unique<btPoint2PointConstraint>(
-          parent_, child_, to_bt(X_PJ.translation), to_bt(X_CJ.translation));
-      break;
-    case model::JointType::universal: {
-      // Bullet wants the two axes square to each other; in world coordinates at the start.
-      const Pose X_WJ = from_bt(parent_.getWorldTransform()) * X_PJ;
-      const Vec3 first = X_WJ.rotation * joint.axis.axis_in_J;
-      Vec3 second = X_WJ.rotation * joint.axis2.axis_in_J;
-      second -= first * first.dot(second);
-      if (second.norm() < 1e-6) second = first.unitOrthogonal();
-      btVector3 anchor = to_bt(X_WJ.translation), axis1 = to_bt(first),
-                axis2 = to_bt(Vec3(second.normalized()));
-      axis2_in_C_ =
-          (from_bt(child_.getWorldTransform()).rotation.conjugate() * second).normalized();
-      auto universal =
-          std::make_unique<btUniversalConstraint>(parent_, child_, anchor, axis1, axis2);
-      // Where nothing is amiss to the last bit, Bullet leaves a locked row out. So it is locked a
-      // nanometre aside.
-      universal->setLinearLowerLimit({kAside, kAside, kAside});
-      universal->setLinearUpperLimit({kAside, kAside, kAside});
-      set_turns(*universal->getRotationalLimitMotor(kLocked), -kAside, -kAside);
-      set_turns(*universal->getRotationalLimitMotor(kFirst), 1.0,
-                -1.0);  // none, or a window at each substep
-      set_turns(*universal->getRotationalLimitMotor(kSecond), std::max(limits2_.lower, -kSquare),
-                std::min(limits2_.upper, kSquare));
-      constraint_ = std::move(universal);
-      break;
-    }
-    case model::JointType::gearbox: {
-      const Quat to_R = rotation_of(*reference_).conjugate();
-      R_RP_ = to_R * rotation_of(parent_);
-      R_RC_ = to_R * rotation_of(child_);
-      R_RJ_ = R_RP_ * X_PJ.rotation;
-      constraint_ = std::make_unique<Unconstrained>(parent_, child_);
-      break;
-    }
-    case model::JointType::fixed:
-      constraint_ = std::make_unique<btFixedConstraint>(parent_, child_, to_bt(X_PJ), to_bt(X_CJ));
-      break;
+      return std::make_unique<btPoint2PointConstraint>(parent_, child_, to_bt(X_PJ_.translation),
+                                                       to_bt(X_CJ_.translation));
+    case model::JointType::fixed: break;
   }
-  if (constraint_) constraint_->setUserConstraintPtr(motors_.get());
+  return std::make_unique<btFixedConstraint>(parent_, child_, to_bt(X_PJ_), to_bt(X_CJ_));
+}
+
+JointConstraint::Constraint JointConstraint::make_hinge() const {
+  auto hinge = std::make_unique<btHingeConstraint>(
+      parent_, child_, to_bt(along(X_PJ_, limits_.axis_in_J, Vec3::UnitZ())),
+      to_bt(along(X_CJ_, limits_.axis_in_J, Vec3::UnitZ())), true);
+  if (type_ == model::JointType::revolute && limited(limits_) && within_a_turn(limits_)) {
+    hinge->setLimit(limits_.lower, limits_.upper, 1.0, 0.3, 0.0);
+  } else {
+    hinge->setLimit(1.0, -1.0);  // none, or a window at each substep
+  }
+  return hinge;
+}
+
+std::unique_ptr<btSliderConstraint> JointConstraint::make_slider() const {
+  auto slider = std::make_unique<btSliderConstraint>(
+      parent_, child_, to_bt(along(X_PJ_, limits_.axis_in_J, Vec3::UnitX())),
+      to_bt(along(X_CJ_, limits_.axis_in_J, Vec3::UnitX())), true);
+  slider->setLowerLinLimit(limited(limits_) ? std::max(limits_.lower, -kNoLimit) : 1.0);
+  slider->setUpperLinLimit(limited(limits_) ? std::min(limits_.upper, kNoLimit) : -1.0);
+  slider->setLowerAngLimit(0.0);
+  slider->setUpperAngLimit(0.0);
+  return slider;
+}
+
+// A slider that may turn; the thread is a row of its own.
+JointConstraint::Constraint JointConstraint::make_screw() const {
+  auto slider = make_slider();
+  const double one = bounded(limits_.lower * advance_, kNoLimit),
+               other = bounded(limits_.upper * advance_, kNoLimit);
+  slider->setLowerLinLimit(limited(limits_) && advance_ != 0.0 ? std::min(one, other) : 1.0);
+  slider->setUpperLinLimit(limited(limits_) && advance_ != 0.0 ? std::max(one, other) : -1.0);
+  slider->setLowerAngLimit(1.0);
+  slider->setUpperAngLimit(-1.0);
+  return slider;
+}
+
+// Bullet wants the two axes square to each other; in world coordinates at the start.
+JointConstraint::Constraint JointConstraint::make_universal() {
+  const Pose X_WJ = from_bt(parent_.getWorldTransform()) * X_PJ_;
+  const Vec3 first = X_WJ.rotation * limits_.axis_in_J;
+  Vec3 second = X_WJ.rotation * limits2_.axis_in_J;
+  second -= first * first.dot(second);
+  if (second.norm() < 1e-6) second = first.unitOrthogonal();
+  btVector3 anchor = to_bt(X_WJ.translation), axis1 = to_bt(first),
+            axis2 = to_bt(Vec3(second.normalized()));
+  axis2_in_C_ = (from_bt(child_.getWorldTransform()).rotation.conjugate() * second).normalized();
+  auto universal = std::make_unique<btUniversalConstraint>(parent_, child_, anchor, axis1, axis2);
+  // Where nothing is amiss to the last bit, Bullet leaves a locked row out. So it is locked a
+  // nanometre aside.
+  universal->setLinearLowerLimit({kAside, kAside, kAside});
+  universal->setLinearUpperLimit({kAside, kAside, kAside});
+  set_turns(*universal->getRotationalLimitMotor(kLocked), -kAside, -kAside);
+  set_turns(*universal->getRotationalLimitMotor(kFirst), 1.0,
+            -1.0);  // none, or a window at each substep
+  set_turns(*universal->getRotationalLimitMotor(kSecond), std::max(limits2_.lower, -kSquare),
+            std::min(limits2_.upper, kSquare));
+  return universal;
+}
+
+JointConstraint::Constraint JointConstraint::make_gearbox() {
+  const Quat to_R = rotation_of(*reference_).conjugate();
+  R_RP_ = to_R * rotation_of(parent_);
+  R_RC_ = to_R * rotation_of(child_);
+  R_RJ_ = R_RP_ * X_PJ_.rotation;
+  return std::make_unique<Unconstrained>(parent_, child_);
 }
 
 Vec3 JointConstraint::axis_in_world() const {

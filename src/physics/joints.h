@@ -74,6 +74,13 @@ class JointConstraint {
 
  private:
   enum class Mode { passive, motor, effort, servo };
+  using Constraint = std::unique_ptr<btTypedConstraint>;
+  Constraint make_constraint();  // of the joint's type
+  Constraint make_hinge() const;
+  std::unique_ptr<btSliderConstraint> make_slider() const;
+  Constraint make_screw() const;
+  Constraint make_universal();
+  Constraint make_gearbox();
   Vec3 axis_in_world() const;
   void wake();
   void turn_on(JointMotor& motor, const Vec3& axis, double rate, double lowest, double highest,
@@ -112,7 +119,7 @@ class JointConstraint {
   btRigidBody& child_;
   Pose X_PJ_, X_CJ_;
   Vec3 axis2_in_C_ = Vec3::UnitY();  // universal only
-  std::unique_ptr<btTypedConstraint> constraint_;
+  Constraint constraint_;
   std::unique_ptr<JointMotors> motors_ =
       std::make_unique<JointMotors>();  // the constraint points to it
   Mode mode_ = Mode::passive;

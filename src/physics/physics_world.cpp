@@ -96,16 +96,16 @@ void PhysicsWorld::open_tie(TieIndex tie) { impl_->open_tie(tie); }
 bool PhysicsWorld::is_closed(TieIndex tie) const { return impl_->is_closed(tie); }
 
 double PhysicsWorld::wheel_angle(WheelIndex wheel) const {
-  const int joint = impl_->wheel_joint_[wheel];
-  return joint < 0 ? 0.0 : impl_->wheel_sign_[wheel] * impl_->wheels_[joint].position();
+  const WheelJointIndex joint = impl_->wheel_joint_[wheel];
+  return joint.valid() ? impl_->wheel_sign_[wheel] * impl_->wheels_[joint].position() : 0.0;
 }
 double PhysicsWorld::wheel_rate(WheelIndex wheel) const {
-  const int joint = impl_->wheel_joint_[wheel];
-  return joint < 0 ? 0.0 : impl_->wheel_sign_[wheel] * impl_->wheels_[joint].velocity();
+  const WheelJointIndex joint = impl_->wheel_joint_[wheel];
+  return joint.valid() ? impl_->wheel_sign_[wheel] * impl_->wheels_[joint].velocity() : 0.0;
 }
 void PhysicsWorld::drive_wheel(WheelIndex wheel, const WheelServo& servo) {
-  const int joint = impl_->wheel_joint_[wheel];
-  if (joint < 0) return;
+  const WheelJointIndex joint = impl_->wheel_joint_[wheel];
+  if (!joint.valid()) return;
   const bool ahead = impl_->wheel_sign_[wheel] > 0.0;
   impl_->wheels_[joint].set_motor(ahead ? servo.rate : -servo.rate,
                                   ahead ? servo.lowest_torque : -servo.highest_torque,

@@ -91,15 +91,15 @@ void PhysicsWorld::Impl::add_joints(InstanceIndex instance) {
   }
   for (const WheelIndex i : wheel_joint_.indices()) {
     const auto& wheel = layout_.wheels[i];
-    if (wheel_joint_[i] >= 0 && layout_.robots[wheel.robot].instance == instance)
+    if (wheel_joint_[i].valid() && layout_.robots[wheel.robot].instance == instance)
       again(wheels_[wheel_joint_[i]], wheel.joint);
   }
   const JointIndex first_joint = joints_.next();
-  const size_t wheels = wheels_.size();
+  const WheelJointIndex first_wheel = wheels_.next();
   add_joints();
   for (JointIndex i = first_joint; joints_.has(i); ++i)
     if (joints_[i].constraint()) dynamics_.addConstraint(joints_[i].constraint(), true);
-  for (size_t i = wheels; i < wheels_.size(); ++i)
+  for (WheelJointIndex i = first_wheel; wheels_.has(i); ++i)
     if (wheels_[i].constraint()) dynamics_.addConstraint(wheels_[i].constraint(), true);
 }
 
@@ -121,7 +121,7 @@ void PhysicsWorld::Impl::remove(InstanceIndex instance) {
   for (const JointIndex i : joints_.indices())
     if (layout_.joints[i].instance == instance) let_go(joints_[i]);
   for (const WheelIndex i : wheel_joint_.indices()) {
-    if (wheel_joint_[i] >= 0 && layout_.robots[layout_.wheels[i].robot].instance == instance)
+    if (wheel_joint_[i].valid() && layout_.robots[layout_.wheels[i].robot].instance == instance)
       let_go(wheels_[wheel_joint_[i]]);
   }
   for (const TieIndex i : ties_.indices()) {

@@ -48,7 +48,7 @@ bool MayTouch::may_touch(const btCollisionObject& object_a,
   const ObjectInfo& b = info_of(object_b);
   if (a.links.empty() || b.links.empty()) return false;  // no shapes
   if (a.gone || b.gone) return false;
-  if ((a.moved || a.body < 0) && (b.moved || b.body < 0)) return false;
+  if ((a.moved || !a.body.valid()) && (b.moved || !b.body.valid())) return false;
   if ((a.on_plane && b.plane) || (b.on_plane && a.plane)) return false;
   // As SDF has it: links of one model collide when it says self_collide, but never across a joint.
   if (std::find(a.joined.begin(), a.joined.end(), b.body) != a.joined.end()) return false;
@@ -184,10 +184,10 @@ void PhysicsWorld::Impl::add_wheel(WheelIndex i) {
   const auto& wheel = layout_.wheels[i];
   const auto& robot = layout_.robots[wheel.robot];
   const auto& link = layout_.links[wheel.link];
-  wheel_joint_.push_back(-1);
+  wheel_joint_.emplace_back();
   wheel_sign_.push_back(1.0);
   if (!link.body.valid() || link.body == robot.body) return;
-  wheel_joint_[i] = static_cast<int>(wheels_.size());
+  wheel_joint_[i] = wheels_.next();
   rolling_.push_back(link.body);
   wheels_.push_back(make_joint(robot.instance, wheel.joint));
   const auto& model = *world_.models[robot.instance].model;

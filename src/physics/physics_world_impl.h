@@ -49,6 +49,8 @@ struct Tie {
   bool hung_before = false;  // the body, by something else
 };
 
+using WheelJointIndex = Index<struct WheelJointKind>;  // into Impl::wheels_
+
 class PhysicsWorld::Impl {
  public:
   Impl(const model::WorldModel& world, const model::BodyLayout& layout);
@@ -94,8 +96,9 @@ class PhysicsWorld::Impl {
   ContactBook contacts_;
   IndexedVector<JointIndex, JointConstraint> joints_;  // as in the layout
   IndexedVector<JointIndex, JointIndex> leaders_;      // the one that it mimics, if it does
-  std::vector<JointConstraint> wheels_;                // those that are bodies of their own
-  IndexedVector<WheelIndex, int> wheel_joint_;         // into wheels_; -1: none
+  // Of wheels that are bodies of their own; the others have none.
+  IndexedVector<WheelJointIndex, JointConstraint> wheels_;
+  IndexedVector<WheelIndex, WheelJointIndex> wheel_joint_;
   IndexedVector<WheelIndex, double> wheel_sign_;  // axis of the joint against that of the wheel
 
  private:

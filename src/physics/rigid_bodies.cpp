@@ -103,6 +103,44 @@ bool carries_kinematic_drive(const model::WorldModel& world, const model::BodyLa
   return false;
 }
 
+// Bullet's frame of a wheel: y is its axis, which lateral friction refers to.
+Pose wheel_frame(const model::BodyLayout& layout, WheelIndex wheel, const MassProperties& mass,
+                 Vec3& moments) {
+  const auto& placement = layout.wheels[wheel];
+  const Vec3 axis = layout.links[placement.link].X_BL.rotation * placement.axis_in_L;
+  const Pose X_BI{Quat::FromTwoVectors(Vec3::UnitY(), axis), mass.center};
+  const Eigen::Matrix3d R = X_BI.rotation.toRotationMatrix();
+  moments = (R.transpose() * mass.inertia * R).diagonal();
+  return X_BI;
+}
+
+// Adds a link's mass to what feels the wind.
+void feel_wind(const model::Inertial& inertial, const Pose& X_IB, const Pose& X_BL,
+               RigidBody& body) {
+  const Vec3 at = X_IB * (X_BL * inertial.X_LI.translation);
+  body.wind_mass += inertial.mass;
+  body.wind_center += (at - body.wind_center) * (inertial.mass / body.wind_mass);
+}
+
+// moments: about the axes of I.
+void make_bullet(double mass, const Vec3& moments, const Pose& X_WB, RigidBody& body) {
+  const bool kinematic = body.info.moved;
+  const double smallest = 1e-9 + 1e-6 * mass;  // of 0, a torque would turn it at any speed
+  btRigidBody::btRigidBodyConstructionInfo settings(
+      kinematic ? 0.0 : mass, nullptr, body.compound.get(),
+      kinematic ? btVector3(0, 0, 0) : to_bt(Vec3(moments.cwiseMax(smallest))));
+  settings.m_startWorldTransform = to_bt((X_WB * body.X_BI).normalized());
+  settings.m_linearSleepingThreshold = kSleepSpeed_m_s;
+  settings.m_angularSleepingThreshold = kSleepRate_rad_s;
+  body.bullet = std::make_unique<btRigidBody>(settings);
+  btRigidBody& bullet = *body.bullet;
+  if (kinematic)
+    bullet.setCollisionFlags(bullet.getCollisionFlags() | btCollisionObject::CF_KINEMATIC_OBJECT);
+  bullet.setFlags(bullet.getFlags() | BT_DISABLE_WORLD_GRAVITY);  // gravity is set for each body
+  bullet.setGravity(to_bt(body.gravity));
+  bullet.setUserPointer(&body.info);
+}
+
 }  // namespace
 
 RigidBodies::RigidBodies(const model::WorldModel& world, const model::BodyLayout& layout)
@@ -187,44 +225,19 @@ ShapeSurface RigidBodies::foot_of(const model::WorldModel& world, const model::B
   return foot;
 }
 
-void RigidBodies::make_body(const model::WorldModel& world, const model::BodyLayout& layout,
-                            BodyIndex index) {
-  const auto& placement = layout.bodies[index];
+// All collisions of a body as one shape, in Bullet's frame I, with the surface of each.
+void RigidBodies::make_compound(const model::WorldModel& world, const model::BodyLayout& layout,
+                                WheelIndex wheel, RigidBody& body) {
+  const auto& placement = layout.bodies[body.info.body];
   const auto& instance = world.models[placement.instance];
-  const model::Model& model = *instance.model;
-  RigidBody& body = bodies[index];
-  const WheelIndex wheel = driven_wheel(layout, index);
-
-  const MassProperties mass = mass_of(model, layout, placement);
-  Vec3 moments;
-  if (wheel.valid()) {  // y of I is the wheel's axis, which lateral friction refers to
-    const auto& of_wheel = layout.wheels[wheel];
-    const Vec3 axis = layout.links[of_wheel.link].X_BL.rotation * of_wheel.axis_in_L;
-    body.X_BI.rotation = Quat::FromTwoVectors(Vec3::UnitY(), axis);
-    const Eigen::Matrix3d R = body.X_BI.rotation.toRotationMatrix();
-    moments = (R.transpose() * mass.inertia * R).diagonal();
-  } else {
-    body.X_BI.rotation = principal_axes(mass.inertia, moments);
-  }
-  body.X_BI.translation = mass.center;
   const Pose X_IB = body.X_BI.inverse();
-
-  bool gravity = false, kinematic = model.path != nullptr;
-  const bool imposed =
-      carries_kinematic_drive(world, layout, index);  // its drive stands for its wheels' friction
+  // A kinematic drive stands for its wheels' friction.
+  const bool imposed = carries_kinematic_drive(world, layout, body.info.body);
   body.compound = std::make_unique<btCompoundShape>();
   std::vector<btCollisionShape*> shapes;
   for (const LinkIndex link_index : placement.links) {
     const auto& link_placement = layout.links[link_index];
-    const model::Link& link = model.links[link_placement.link];
-    gravity |= link.gravity;
-    if (link.wind) {
-      const double more = link.inertial.mass;
-      const Vec3 at = X_IB * (link_placement.X_BL * link.inertial.X_LI.translation);
-      body.wind_mass += more;
-      body.wind_center += (at - body.wind_center) * (more / body.wind_mass);
-    }
-    kinematic |= link.kinematic;
+    const model::Link& link = instance.model->links[link_placement.link];
     for (size_t c = 0; c < link.collisions.size(); ++c) {
       const auto& collision = link.collisions[c];
       shapes.clear();
@@ -243,37 +256,42 @@ void RigidBodies::make_body(const model::WorldModel& world, const model::BodyLay
         body.compound->addChildShape(to_bt(X_IC), shape);
         body.info.links.push_back(link_index);
         body.info.collisions.push_back(static_cast<int>(c));
-        body.info.surfaces.push_back(surface_of(collision.surface, X_IC.rotation));
-        ShapeSurface& surface = body.info.surfaces.back();
+        ShapeSurface surface = surface_of(collision.surface, X_IC.rotation);
         surface = wheel.valid() ? tyre_of(world, layout, wheel, surface)
                                 : foot_of(world, layout, placement.instance, surface);
         if (imposed && link_placement.wheel.valid()) surface.friction = surface.friction2 = 0.0;
+        body.info.surfaces.push_back(surface);
       }
     }
   }
+}
 
-  const double smallest =
-      1e-9 + 1e-6 * mass.mass;  // a moment of 0 would let a torque turn it at any speed
-  btRigidBody::btRigidBodyConstructionInfo settings(
-      kinematic ? 0.0 : mass.mass, nullptr, body.compound.get(),
-      kinematic ? btVector3(0, 0, 0) : to_bt(Vec3(moments.cwiseMax(smallest))));
-  settings.m_startWorldTransform = to_bt((placement.X_WB * body.X_BI).normalized());
-  settings.m_linearSleepingThreshold = kSleepSpeed_m_s;
-  settings.m_angularSleepingThreshold = kSleepRate_rad_s;
-  body.bullet = std::make_unique<btRigidBody>(settings);
-  btRigidBody& bullet = *body.bullet;
-  if (kinematic)
-    bullet.setCollisionFlags(bullet.getCollisionFlags() | btCollisionObject::CF_KINEMATIC_OBJECT);
-  bullet.setFlags(bullet.getFlags() | BT_DISABLE_WORLD_GRAVITY);  // gravity is set for each body
+void RigidBodies::make_body(const model::WorldModel& world, const model::BodyLayout& layout,
+                            BodyIndex index) {
+  const auto& placement = layout.bodies[index];
+  const model::Model& model = *world.models[placement.instance].model;
+  RigidBody& body = bodies[index];
+  const MassProperties mass = mass_of(model, layout, placement);
+  const WheelIndex wheel = driven_wheel(layout, index);
+  Vec3 moments;
+  body.X_BI = wheel.valid() ? wheel_frame(layout, wheel, mass, moments)
+                            : Pose{principal_axes(mass.inertia, moments), mass.center};
+  const Pose X_IB = body.X_BI.inverse();
+  bool gravity = false, kinematic = model.path != nullptr;
+  for (const LinkIndex link_index : placement.links) {
+    const auto& link_placement = layout.links[link_index];
+    const model::Link& link = model.links[link_placement.link];
+    gravity |= link.gravity;
+    kinematic |= link.kinematic;
+    if (link.wind) feel_wind(link.inertial, X_IB, link_placement.X_BL, body);
+  }
   body.gravity = gravity && !kinematic ? world.gravity : Vec3(0, 0, 0);
-  bullet.setGravity(to_bt(body.gravity));
-
   body.info.body = index;
   body.info.instance = placement.instance;
   body.info.self_collide = model.self_collide;
   body.info.moved = kinematic;
-  bullet.setUserPointer(&body.info);
-
+  make_compound(world, layout, wheel, body);
+  make_bullet(mass.mass, moments, placement.X_WB, body);
   if (body.compound->getNumChildShapes() > 0) {
     btVector3 low, high;
     body.compound->getAabb(to_bt(X_IB.inverse().normalized()), low, high);

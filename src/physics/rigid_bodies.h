@@ -69,6 +69,8 @@ class RigidBodies {
   ShapeSurface foot_of(const model::WorldModel& world, const model::BodyLayout& layout,
                        InstanceIndex instance, const ShapeSurface& surface) const;
   void make_body(const model::WorldModel& world, const model::BodyLayout& layout, BodyIndex index);
+  void make_compound(const model::WorldModel& world, const model::BodyLayout& layout,
+                     WheelIndex wheel, RigidBody& body);
   ShapeFactory shapes_;
 };
 

@@ -45,6 +45,87 @@ vec3 sky(vec3 direction) {
 }
 )";
 
+constexpr const char* kSurface = "in vec2 v_uv;\nuniform sampler2D surface;\n";
+
+// Lines of one metre, fading where they would be finer than a pixel.
+constexpr const char* kGrid = R"(
+  vec2 grid = v_position.xy + origin.xy;
+  vec2 width = fwidth(grid);
+  vec2 line = clamp((0.012 + 0.5 * width - abs(fract(grid + 0.5) - 0.5)) / width, 0.0, 1.0);
+  vec2 tile = step(vec2(1.0), fract(0.5 * grid) * 2.0);
+  float fade = clamp(1.4 - 3.0 * max(width.x, width.y), 0.0, 1.0);
+  float odd = abs(tile.x - tile.y);
+  albedo *= 1.0 - fade * (0.035 * odd + 0.09 * max(line.x, line.y) * clamp(0.03 / max(width.x, width.y), 0.0, 1.0));
+)";
+
+constexpr const char* kAmbient = R"(
+  vec3 n = normalize(v_normal);
+  if (!gl_FrontFacing) n = -n;
+  vec3 light = mix(ambient_down.rgb, ambient_up.rgb, 0.5 + 0.5 * dot(n, vec3(0.30, 0.20, 0.933)));
+)";
+
+// The first sun has the shadow map.
+constexpr const char* kShadow = R"(    if (i == 0) {
+      vec4 q = shadow_from_world * vec4(v_position + origin.w * n, 1.0);
+      vec3 at = vec3(0.5 + 0.5 * q.xy, q.z);
+      facing *= texture(shadow_map, at);
+    }
+)";
+
+constexpr const char* kLamp = R"(    vec3 way = lamp_position[i].xyz - v_position;
+    float d = length(way);
+    vec3 to_light_source = way / max(d, 1e-3);
+    vec3 k = lamp_attenuation[i].xyz;
+    float near = clamp(1.0 - d / lamp_position[i].w, 0.0, 1.0);
+    float strength = min(4.0 * near, 1.0) / max(k.x + d * (k.y + d * k.z), 1e-3);
+    float c = dot(-to_light_source, lamp_axis[i].xyz);
+    float cone = clamp((c - lamp_cone[i].x) / max(lamp_cone[i].y - lamp_cone[i].x, 1e-3), 0.0, 1.0);
+    strength *= mix(1.0, cone, lamp_colour[i].w);
+    strength *= max(dot(n, to_light_source), 0.0);
+    light += strength * lamp_colour[i].rgb;
+)";
+
+// What the labels of things are drawn with.
+std::string label_shader(uint32_t flags, bool cutout, const LightCounts& lights) {
+  std::string s = head(lights);
+  if ((flags & kTextured) != 0) s += kSurface;
+  s += "flat in uint v_label;\nlayout(location = 0) out uint o_label;\nvoid main() {\n";
+  if (cutout) s += "  if (texture(surface, v_uv).a < 0.5) discard;\n";
+  return s + "  o_label = v_label;\n}\n";
+}
+
+std::string colour_declarations(uint32_t flags, const LightCounts& lights) {
+  std::string s = head(lights);
+  if ((flags & kTextured) != 0) s += kSurface;
+  s += kCurve;
+  s +=
+      "in vec3 v_position;\nin vec3 v_normal;\nflat in vec4 v_diffuse;\nflat in vec4 v_emissive;\n";
+  if ((flags & kSpecular) != 0) s += "flat in vec4 v_specular;\n";
+  if ((flags & kGround) != 0) s += std::string("in vec2 v_plane;\n") + kSky;
+  if (lights.shadow) s += "uniform sampler2DShadow shadow_map;\n";
+  return s + "layout(location = 0) out vec4 o_colour;\n";
+}
+
+// `light`, and `shine` of what is specular: ambient light, suns and lamps.
+std::string lighting(bool specular, bool shadow) {
+  const auto highlight = [&](const std::string& colour) {
+    return specular ? "    shine += " + colour +
+                          " * pow(max(dot(n, normalize(to_light_source + to_eye)), 1e-4), "
+                          "v_specular.w);\n"
+                    : std::string();
+  };
+  std::string s = kAmbient;
+  if (specular)
+    s += "  vec3 shine = vec3(0.0);\n  vec3 to_eye = normalize(eye.xyz - eye.w * v_position);\n";
+  s += "  for (int i = 0; i < kSuns; ++i) {\n    vec3 to_light_source = sun_direction[i].xyz;\n"
+       "    float facing = max(dot(n, to_light_source), 0.0);\n";
+  if (shadow) s += kShadow;
+  s += "    light += facing * sun_colour[i].rgb;\n" + highlight("facing * sun_colour[i].rgb");
+  s += "  }\n  for (int i = 0; i < kLamps; ++i) {\n";
+  s += kLamp + highlight("strength * lamp_colour[i].rgb");
+  return s + "  }\n";
+}
+
 }  // namespace
 
 std::string vertex_shader(Pass pass, uint32_t flags) {
@@ -97,79 +178,21 @@ void main() {
 }
 
 std::string fragment_shader(Pass pass, uint32_t flags, bool cutout, const LightCounts& lights) {
-  std::string s = head(lights);
-  if (pass == Pass::shadow) return s + "void main() {}\n";
-  if ((flags & kTextured) != 0) s += "in vec2 v_uv;\nuniform sampler2D surface;\n";
-  if (pass == Pass::geometry) {
-    s += "flat in uint v_label;\nlayout(location = 0) out uint o_label;\nvoid main() {\n";
-    if (cutout) s += "  if (texture(surface, v_uv).a < 0.5) discard;\n";
-    return s + "  o_label = v_label;\n}\n";
+  switch (pass) {
+    case Pass::shadow: return head(lights) + "void main() {}\n";
+    case Pass::geometry: return label_shader(flags, cutout, lights);
+    case Pass::colour: break;
   }
-  s += kCurve;
-  s +=
-      "in vec3 v_position;\nin vec3 v_normal;\nflat in vec4 v_diffuse;\nflat in vec4 v_emissive;\n";
-  if ((flags & kSpecular) != 0) s += "flat in vec4 v_specular;\n";
-  if ((flags & kGround) != 0) s += std::string("in vec2 v_plane;\n") + kSky;
-  if (lights.shadow) s += "uniform sampler2DShadow shadow_map;\n";
-  s += "layout(location = 0) out vec4 o_colour;\nvoid main() {\n  vec3 albedo = v_diffuse.rgb;\n";
+  const bool specular = (flags & kSpecular) != 0, ground = (flags & kGround) != 0;
+  std::string s = colour_declarations(flags, lights);
+  s += "void main() {\n  vec3 albedo = v_diffuse.rgb;\n";
   if ((flags & kTextured) != 0) {
     s += "  vec4 texel = texture(surface, v_uv);\n";
     if (cutout) s += "  if (texel.a < 0.5) discard;\n";
     s += "  albedo *= texel.rgb;\n";
   }
-  if ((flags & kGround) != 0) {
-    // Lines of one metre, fading where they would be finer than a pixel.
-    s += R"(
-  vec2 grid = v_position.xy + origin.xy;
-  vec2 width = fwidth(grid);
-  vec2 line = clamp((0.012 + 0.5 * width - abs(fract(grid + 0.5) - 0.5)) / width, 0.0, 1.0);
-  vec2 tile = step(vec2(1.0), fract(0.5 * grid) * 2.0);
-  float fade = clamp(1.4 - 3.0 * max(width.x, width.y), 0.0, 1.0);
-  float odd = abs(tile.x - tile.y);
-  albedo *= 1.0 - fade * (0.035 * odd + 0.09 * max(line.x, line.y) * clamp(0.03 / max(width.x, width.y), 0.0, 1.0));
-)";
-  }
-  s += R"(
-  vec3 n = normalize(v_normal);
-  if (!gl_FrontFacing) n = -n;
-  vec3 light = mix(ambient_down.rgb, ambient_up.rgb, 0.5 + 0.5 * dot(n, vec3(0.30, 0.20, 0.933)));
-)";
-  const bool specular = (flags & kSpecular) != 0;
-  if (specular) {
-    s += "  vec3 shine = vec3(0.0);\n  vec3 to_eye = normalize(eye.xyz - eye.w * v_position);\n";
-  }
-  const auto highlight = [&](const std::string& colour) {
-    return specular ? "    shine += " + colour +
-                          " * pow(max(dot(n, normalize(to_light_source + to_eye)), 1e-4), "
-                          "v_specular.w);\n"
-                    : std::string();
-  };
-  s += "  for (int i = 0; i < kSuns; ++i) {\n    vec3 to_light_source = sun_direction[i].xyz;\n"
-       "    float facing = max(dot(n, to_light_source), 0.0);\n";
-  if (lights.shadow) {
-    s += R"(    if (i == 0) {
-      vec4 q = shadow_from_world * vec4(v_position + origin.w * n, 1.0);
-      vec3 at = vec3(0.5 + 0.5 * q.xy, q.z);
-      facing *= texture(shadow_map, at);
-    }
-)";
-  }
-  s += "    light += facing * sun_colour[i].rgb;\n" + highlight("facing * sun_colour[i].rgb") +
-       "  }\n";
-  s += R"(  for (int i = 0; i < kLamps; ++i) {
-    vec3 way = lamp_position[i].xyz - v_position;
-    float d = length(way);
-    vec3 to_light_source = way / max(d, 1e-3);
-    vec3 k = lamp_attenuation[i].xyz;
-    float near = clamp(1.0 - d / lamp_position[i].w, 0.0, 1.0);
-    float strength = min(4.0 * near, 1.0) / max(k.x + d * (k.y + d * k.z), 1e-3);
-    float c = dot(-to_light_source, lamp_axis[i].xyz);
-    float cone = clamp((c - lamp_cone[i].x) / max(lamp_cone[i].y - lamp_cone[i].x, 1e-3), 0.0, 1.0);
-    strength *= mix(1.0, cone, lamp_colour[i].w);
-    strength *= max(dot(n, to_light_source), 0.0);
-    light += strength * lamp_colour[i].rgb;
-)" + highlight("strength * lamp_colour[i].rgb") +
-       "  }\n";
+  if (ground) s += kGrid;
+  s += lighting(specular, lights.shadow);
   // Light beyond what a picture can show is bent in softly.
   s += R"(
   vec3 over = max(light - 0.8, vec3(0.0));
@@ -177,7 +200,7 @@ std::string fragment_shader(Pass pass, uint32_t flags, bool cutout, const LightC
   vec3 colour = to_light(albedo) * light + to_light(v_emissive.rgb);
 )";
   if (specular) s += "  colour += 0.4 * to_light(v_specular.rgb) * shine;\n";
-  if ((flags & kGround) != 0) {
+  if (ground) {
     s += "  float edge = smoothstep(0.55, 1.0, length(v_plane));\n"
          "  colour = mix(colour, sky_horizon.rgb, edge);\n";
   }

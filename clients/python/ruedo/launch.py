@@ -93,26 +93,8 @@ def launch(
     if port:
         options += ["--view", str(port)]
     program = find_ruedo()
-    folder = None
-    if (world is None) == (text is None):
-        raise TypeError("launch() needs either a world or its text")
-    if isinstance(world, World):
-        text = str(world)
-    if text is not None:
-        folder = tempfile.TemporaryDirectory(prefix="ruedo-")
-        file = os.path.join(
-            folder.name, "world.urdf" if "<robot" in text and "<sdf" not in text else "world.sdf"
-        )
-        Path(file).write_text(text, encoding="utf-8")
-    else:
-        assert world is not None and not isinstance(world, World)
-        file = os.fspath(world)
-    token: socket.socket | _Folder | None = None
-    if url == "auto":
-        token, url = _free_url()
-    elif url is None:
-        token = _Folder()
-        url = f"unix://{token.path}/bus"
+    file, folder = _world_file(world, text)
+    url, token = _address(url)
     server = _Server(
         [program, "run", file, "--lcm", url, "--watch-stdin", *options], token, verbose, folder
     )
@@ -134,6 +116,35 @@ def launch(
     except BaseException:
         server.end()
         raise
+
+
+def _world_file(
+    world: str | os.PathLike[str] | World | None, text: str | None
+) -> tuple[str, tempfile.TemporaryDirectory[str] | None]:
+    """The file to run, and the folder that is made for it where the world is a text."""
+    if (world is None) == (text is None):
+        raise TypeError("launch() needs either a world or its text")
+    if isinstance(world, World):
+        text = str(world)
+    elif world is not None:
+        return os.fspath(world), None
+    assert text is not None
+    folder = tempfile.TemporaryDirectory(prefix="ruedo-")
+    kind = "urdf" if "<robot" in text and "<sdf" not in text else "sdf"
+    file = Path(folder.name, f"world.{kind}")
+    file.write_text(text, encoding="utf-8")
+    return str(file), folder
+
+
+def _address(url: str | None) -> tuple[str, socket.socket | _Folder | None]:
+    """Where the server listens, and what keeps that place free until it does."""
+    if url == "auto":
+        token, url = _free_url()
+        return url, token
+    if url is not None:
+        return url, None
+    folder = _Folder()
+    return f"unix://{folder.path}/bus", folder
 
 
 def _free_port() -> int:

@@ -42,6 +42,39 @@ class Regression:
     output: str  # what the client and `ruedo regress` printed
 
 
+def _option(name: str, *values: object) -> list[str]:
+    return [f"--{name}={value}" for value in values if value is not None]
+
+
+def _line(words: Sequence[_PathLike] | str | None) -> str | None:
+    """For a shell."""
+    if words is None or isinstance(words, str):
+        return words
+    return shlex.join(os.fspath(word) for word in words)
+
+
+def _output_of(command: list[str], folder: _PathLike | None, timeout: float) -> str:
+    __tracebackhide__ = True
+    try:
+        done = subprocess.run(
+            command,
+            cwd=folder,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            text=True,
+            timeout=timeout,
+        )
+    except subprocess.TimeoutExpired as error:
+        raise RegressionFailed(
+            f"the regression took more than {timeout:g} s of real time; {shlex.join(command)}\n{error.output or ''}"
+        ) from None
+    if done.returncode != 0:
+        raise RegressionFailed(
+            f"{done.stdout}\n(exit code {done.returncode} of {shlex.join(command)})"
+        )
+    return done.stdout
+
+
 def run_regression(
     world: _PathLike,
     *,
@@ -75,65 +108,31 @@ def run_regression(
     ["--spawn", "p3at@1,2"]. folder: where client and script run. timeout: s of real time.
     """
     __tracebackhide__ = True
+    if goal is not None and (radius is None or by is None):
+        raise ValueError("a goal needs its radius (m) and by (s)")
     command = [
         find_ruedo(),
         "regress",
         os.fspath(world),
-        "--duration",
-        str(duration),
-        "--seed",
-        str(seed),
-        "--record",
-        os.path.abspath(record),
+        *_option("duration", duration),
+        *_option("seed", seed),
+        *_option("record", os.path.abspath(record)),
+        *(_option("goal", f"{goal[0]!r},{goal[1]!r},{radius!r},{by!r}") if goal else ()),
+        *_option("client", _line(client)),
+        *_option("script", _line(script)),
+        *_option("robot", robot),
+        *_option("clearance", clearance),
+        *_option("odometry-error", odometry_error),
+        *_option("lockstep", lockstep or None),
+        *_option("golden", None if golden is None else os.path.abspath(golden)),
+        *_option("keep", *keep),
+        *_option("tolerance", *tolerances),
+        *_option("ignore", *ignore),
+        *_option("wait-for", *wait_for),
+        *(["--no-contact"] if no_contact else ()),
+        *options,
     ]
-    if goal is not None:
-        if radius is None or by is None:
-            raise ValueError("a goal needs its radius (m) and by (s)")
-        command.append(f"--goal={goal[0]!r},{goal[1]!r},{radius!r},{by!r}")
-    for name, value in (("client", client), ("script", script)):
-        if value is not None:
-            command += [
-                f"--{name}",
-                value if isinstance(value, str) else shlex.join(os.fspath(word) for word in value),
-            ]
-    for name, one in (
-        ("robot", robot),
-        ("clearance", clearance),
-        ("odometry-error", odometry_error),
-        ("lockstep", lockstep or None),
-    ):
-        if one is not None:
-            command += [f"--{name}", str(one)]
-    if golden is not None:
-        command += ["--golden", os.path.abspath(golden)]
-    for name, several in (
-        ("keep", keep),
-        ("tolerance", tolerances),
-        ("ignore", ignore),
-        ("wait-for", wait_for),
-    ):
-        for item in several:
-            command += [f"--{name}", item]
-    if no_contact:
-        command.append("--no-contact")
-    try:
-        done = subprocess.run(
-            [*command, *options],
-            cwd=folder,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.STDOUT,
-            text=True,
-            timeout=timeout,
-        )
-    except subprocess.TimeoutExpired as error:
-        raise RegressionFailed(
-            f"the regression took more than {timeout:g} s of real time; {shlex.join(command)}\n{error.output or ''}"
-        ) from None
-    if done.returncode != 0:
-        raise RegressionFailed(
-            f"{done.stdout}\n(exit code {done.returncode} of {shlex.join(command)})"
-        )
-    return Regression(Path(record).absolute(), done.stdout)
+    return Regression(Path(record).absolute(), _output_of(command, folder, timeout))
 
 
 @pytest.fixture

@@ -91,6 +91,69 @@ def as_written(text):
     return re.sub(MISSING + "/([^/ ']+)", r"$(find \1)", text)
 
 
+def serve_packages(known):
+    """Has xacro's $(find PKG) look there; ROS is not asked."""
+
+    def get_package_share_directory(name):
+        return known.get(name, os.path.join(MISSING, name))
+
+    index = types.ModuleType("ament_index_python")
+    index.packages = types.ModuleType("ament_index_python.packages")
+    index.packages.get_package_share_directory = get_package_share_directory
+    sys.modules.update({index.__name__: index, index.packages.__name__: index.packages})
+
+
+class Notes:
+    """What xacro reads and what it does not find, by wrapping its functions."""
+
+    def __init__(self, xacro, file):
+        self.read, self.missing = [], []  # files; (file, what it wants)
+        self._xacro, self._file = xacro, file
+        self._reading = []  # files that are open, the innermost last
+        self._parse, self._include = xacro.parse, xacro.process_include
+        note_lines(self._reading)
+        xacro.parse, xacro.process_include = self._noted_parse, self._noted_include
+        functions = xacro._global_symbols.get("xacro", {})
+        if "load_yaml" in functions:
+            self._load_yaml, functions["load_yaml"] = xacro.load_yaml, self._noted_yaml
+
+    def _noted_parse(self, inp, filename=None):
+        if filename is None:
+            return self._parse(inp)
+        path = os.path.abspath(filename)
+        self._reading.append(path)
+        self.read.append(path)
+        try:
+            return self._parse(inp, filename)
+        finally:
+            self._reading.pop()
+
+    def _noted_yaml(self, filename):
+        self.read.append(os.path.abspath(self._xacro.abs_filename_spec(filename)))
+        return self._load_yaml(filename)
+
+    def _noted_include(self, elt, macros, symbols, func):
+        name = self._xacro.eval_text(elt.getAttribute("filename"), symbols)
+        path = self._xacro.abs_filename_spec(name)
+        if not re.search(r"[*?\[]", path) and not os.path.exists(path):
+            self.missing.append((self._xacro.filestack[-1] or self._file, as_written(name)))
+            elt.setAttribute("optional", "true")
+        return self._include(elt, macros, symbols, func)
+
+    def fault(self, error):
+        """One line that says what went wrong and where."""
+        stack = reversed(self._xacro.filestack or [])
+        where = next((os.path.abspath(each) for each in stack if each), self._file)
+        text = as_written(" ".join(str(error).split())) or type(error).__name__
+        lost = ", ".join(sorted({name for _, name in self.missing}))
+        return f"{where}: {text}" + (f"; not found: {lost}" if lost else "")
+
+
+def write_lines(path, lines):
+    with open(path, "w", encoding="utf-8") as out:
+        out.writelines(f"{line}\n" for line in lines)
+
+
 def main():
     parser = argparse.ArgumentParser()
     parser.add_argument("file")
@@ -108,62 +171,14 @@ def main():
         return 2
 
     file = os.path.abspath(arguments.file)
-    known = packages(roots_of(file, arguments.folder))
-
-    def get_package_share_directory(name):
-        if name in known:
-            return known[name]
-        return os.path.join(MISSING, name)
-
-    index, inner = (
-        types.ModuleType("ament_index_python"),
-        types.ModuleType("ament_index_python.packages"),
-    )
-    inner.get_package_share_directory = get_package_share_directory
-    index.packages = inner
-    sys.modules.update({"ament_index_python": index, "ament_index_python.packages": inner})
-
-    reading, read, missing = [], [], []
-    note_lines(reading)
-    parse, load_yaml, include = xacro.parse, xacro.load_yaml, xacro.process_include
-
-    def noted_parse(inp, filename=None):
-        if filename is None:
-            return parse(inp)
-        path = os.path.abspath(filename)
-        reading.append(path)
-        read.append(path)
-        try:
-            return parse(inp, filename)
-        finally:
-            reading.pop()
-
-    def noted_yaml(filename):
-        read.append(os.path.abspath(xacro.abs_filename_spec(filename)))
-        return load_yaml(filename)
-
-    def noted_include(elt, macros, symbols, func):
-        name = xacro.eval_text(elt.getAttribute("filename"), symbols)
-        path = xacro.abs_filename_spec(name)
-        if not re.search(r"[*?\[]", path) and not os.path.exists(path):
-            missing.append((xacro.filestack[-1] or file, as_written(name)))
-            elt.setAttribute("optional", "true")
-        return include(elt, macros, symbols, func)
-
-    xacro.parse, xacro.process_include = noted_parse, noted_include
-    if "load_yaml" in xacro._global_symbols.get("xacro", {}):
-        xacro._global_symbols["xacro"]["load_yaml"] = noted_yaml
+    serve_packages(packages(roots_of(file, arguments.folder)))
+    notes = Notes(xacro, file)
     try:
         document = xacro.process_file(
             file, mappings=dict(each.split(":=", 1) for each in arguments.argument)
         )
     except Exception as error:
-        where = next(
-            (os.path.abspath(each) for each in reversed(xacro.filestack or []) if each), file
-        )
-        text = as_written(" ".join(str(error).split())) or type(error).__name__
-        lost = "; not found: " + ", ".join(sorted({name for _, name in missing})) if missing else ""
-        print(f"{where}: {text}{lost}", file=sys.stderr)
+        print(notes.fault(error), file=sys.stderr)
         return 1
     with open(arguments.out, "w", encoding="utf-8") as out:
         # What is not found is named as other files have it.
@@ -172,10 +187,9 @@ def main():
             .replace("file://" + MISSING, MISSING)
             .replace(MISSING + "/", "package://")
         )
-    with open(arguments.out + ".files", "w", encoding="utf-8") as out:
-        out.writelines(f"{each}\n" for each in dict.fromkeys(read))
-    with open(arguments.out + ".missing", "w", encoding="utf-8") as out:
-        out.writelines(f"{where}\t{name}\n" for where, name in dict.fromkeys(missing))
+    write_lines(arguments.out + ".files", dict.fromkeys(notes.read))
+    missing = dict.fromkeys(notes.missing)
+    write_lines(arguments.out + ".missing", (f"{where}\t{name}" for where, name in missing))
     return 0
 
 

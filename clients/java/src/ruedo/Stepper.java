@@ -410,12 +410,7 @@ final class Stepper {
         int nparts = in.int16();
         if (run != runId || index < 0 || index >= nparts) return;
         if (tickEpoch != epoch) {
-            if (tickEpoch > epoch && fault == null) {
-                fault =
-                        new RuedoException(
-                                "the world was reset by another client: the next step begins anew");
-            }
-            notifyAll();
+            onOtherEpoch(tickEpoch);
             return;
         }
         newest = Math.max(newest, number);
@@ -434,23 +429,7 @@ final class Stepper {
         List<Entry> entries = new ArrayList<>();
         int missing = 0;
         for (int n = in.count(20); n > 0; n--) {
-            Entry entry = new Entry();
-            entry.channel = in.int32();
-            entry.sequence = in.int64();
-            entry.size = in.int32();
-            entry.crc = in.int32();
-            if (entry.channel < 0 || entry.channel >= 1 << 20)
-                throw new IOException("a channel's index");
-            while (entry.channel >= early.size())
-                early.add(new ArrayDeque<>()); // of a model that came since
-            for (Iterator<Early> all = early.get(entry.channel).iterator();
-                    all.hasNext() && !entry.here; ) {
-                Early one = all.next();
-                if (one.crc != entry.crc || one.data.length != entry.size) continue;
-                entry.data = one.data;
-                entry.here = true;
-                all.remove();
-            }
+            Entry entry = readEntry(in);
             if (!entry.here) missing++;
             entries.add(entry);
         }
@@ -458,6 +437,37 @@ final class Stepper {
         step.missing += missing;
         step.partsHere++;
         progress();
+    }
+
+    private void onOtherEpoch(int other) {
+        if (other > epoch && fault == null) {
+            fault =
+                    new RuedoException(
+                            "the world was reset by another client: the next step begins anew");
+        }
+        notifyAll();
+    }
+
+    /** A message of a step; it may have come before the tick that names it. */
+    private Entry readEntry(WireReader in) throws IOException {
+        Entry entry = new Entry();
+        entry.channel = in.int32();
+        entry.sequence = in.int64();
+        entry.size = in.int32();
+        entry.crc = in.int32();
+        if (entry.channel < 0 || entry.channel >= 1 << 20)
+            throw new IOException("a channel's index");
+        while (entry.channel >= early.size())
+            early.add(new ArrayDeque<>()); // of a model that came since
+        Iterator<Early> all = early.get(entry.channel).iterator();
+        while (all.hasNext() && !entry.here) {
+            Early one = all.next();
+            if (one.crc != entry.crc || one.data.length != entry.size) continue;
+            entry.data = one.data;
+            entry.here = true;
+            all.remove();
+        }
+        return entry;
     }
 
     private void progress() {

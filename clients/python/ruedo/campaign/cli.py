@@ -58,6 +58,21 @@ def _parser() -> argparse.ArgumentParser:
     return top
 
 
+def _add_execution(one: argparse.ArgumentParser) -> None:
+    """How the cases are run, and what is said of it."""
+    one.add_argument(
+        "--workers",
+        type=int,
+        metavar="N",
+        help="processes on this machine (default: one a core)",
+    )
+    one.add_argument("--ray", metavar="auto|ADDRESS", help="on a Ray cluster")
+    one.add_argument("--shard", metavar="I/N", help="every N-th case, from the I-th on")
+    one.add_argument("--quiet", action="store_true", help="no progress; the sum at the end")
+    one.add_argument("--json", action="store_true", help="the sum at the end as JSON")
+    one.add_argument("--junit", metavar="FILE", help="write the results for CI")
+
+
 def _add_campaign(parser: argparse.ArgumentParser) -> None:
     kinds = parser.add_subparsers(
         required=True, metavar="run|resume|status|report|show|repeat|slurm|join|export|compare"
@@ -77,18 +92,7 @@ def _add_campaign(parser: argparse.ArgumentParser) -> None:
         return one
 
     for name in ("run", "resume"):
-        one = add(name, _run, "run all cases that have no result yet")
-        one.add_argument(
-            "--workers",
-            type=int,
-            metavar="N",
-            help="processes on this machine (default: one a core)",
-        )
-        one.add_argument("--ray", metavar="auto|ADDRESS", help="on a Ray cluster")
-        one.add_argument("--shard", metavar="I/N", help="every N-th case, from the I-th on")
-        one.add_argument("--quiet", action="store_true", help="no progress; the sum at the end")
-        one.add_argument("--json", action="store_true", help="the sum at the end as JSON")
-        one.add_argument("--junit", metavar="FILE", help="write the results for CI")
+        _add_execution(add(name, _run, "run all cases that have no result yet"))
     add("status", _status, "how far it is, and how it goes").add_argument(
         "--json", action="store_true"
     )

@@ -5,7 +5,10 @@ from __future__ import annotations
 import argparse
 import json
 import sys
-from typing import Any
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from .hunt import Found
 
 
 def add_hunt(commands: Any) -> None:
@@ -66,32 +69,39 @@ def _hunt(arguments: argparse.Namespace) -> int:
         return 0
     if arguments.keep:
         found.keep(arguments.keep)
-    if arguments.json:
-        print(
-            json.dumps(
-                {
-                    "found": True,
-                    "cases": found.cases,
-                    "shrink_cases": found.shrink_cases,
-                    "status": found.status,
-                    "reason": found.reason,
-                    "choices": found.choices,
-                    "faults": found.content["faults"],
-                    "kept": arguments.keep,
-                }
-            )
-        )
-        return 1
     print(
-        f"{hunt.name}: {found.status} after {found.cases} cases, shrunk by {found.shrink_cases} more: {found.reason}"
-    )
-    for name, value in found.choices.items():
-        print(f"  {name} = {value}")
-    for fault in found.content["faults"]:
-        print(f"  fault: {', '.join(f'{key} {value}' for key, value in fault.items())}")
-    print(
-        f"kept in {arguments.keep}: pytest {arguments.keep}"
-        if arguments.keep
-        else "keep it as a regression test with --keep FOLDER"
+        _as_json(found, arguments.keep)
+        if arguments.json
+        else _as_text(found, hunt.name, arguments.keep)
     )
     return 1
+
+
+def _as_json(found: Found, kept: str | None) -> str:
+    return json.dumps(
+        {
+            "found": True,
+            "cases": found.cases,
+            "shrink_cases": found.shrink_cases,
+            "status": found.status,
+            "reason": found.reason,
+            "choices": found.choices,
+            "faults": found.content["faults"],
+            "kept": kept,
+        }
+    )
+
+
+def _as_text(found: Found, name: str, kept: str | None) -> str:
+    lines = [
+        f"{name}: {found.status} after {found.cases} cases, shrunk by {found.shrink_cases} more: {found.reason}"
+    ]
+    lines += [f"  {choice} = {value}" for choice, value in found.choices.items()]
+    for fault in found.content["faults"]:
+        lines.append(f"  fault: {', '.join(f'{key} {value}' for key, value in fault.items())}")
+    lines.append(
+        f"kept in {kept}: pytest {kept}"
+        if kept
+        else "keep it as a regression test with --keep FOLDER"
+    )
+    return "\n".join(lines)
