@@ -58,20 +58,26 @@ bool gives_way(const ShapeSurface& surface, const Vec3& force) {
   return surface.borne_along == Vec3::Zero() || surface.borne_along.dot(force) > kFromBelow;
 }
 
+// The solver divides by the squares of coefficients: what nobody could measure is none.
+double felt(double coefficient) {
+  constexpr double kLeast = 1e-9;
+  return coefficient < kLeast ? 0.0 : coefficient;
+}
+
 }  // namespace
 
 ShapeSurface surface_of(const model::Surface& surface, const Quat& R_IC) {
   ShapeSurface s;
-  s.friction = surface.friction;
+  s.friction = felt(surface.friction);
   s.along_I = surface.friction_direction == Vec3::Zero() ? Vec3(Vec3::Zero())
                                                          : Vec3(R_IC * surface.friction_direction);
-  s.friction2 = surface.friction2;
+  s.friction2 = felt(surface.friction2);
   s.slip = surface.slip;
   s.slip2 = surface.slip2;
-  s.torsional = surface.torsional;
+  s.torsional = felt(surface.torsional);
   s.patch_radius_m = surface.patch_radius;
   s.surface_radius_m = surface.surface_radius;
-  s.rolling_m = surface.rolling;
+  s.rolling_m = felt(surface.rolling);
   s.restitution = surface.restitution;
   if (surface.stiffness > 0.0 && surface.stiffness < kRigid) {
     s.stiffness = surface.stiffness;

@@ -43,6 +43,35 @@ TEST(Surfaces, FrictionIsTheSameInAllDirections) {
   }
 }
 
+// A sledge on a friction of `mu` that draws another one with a friction of 0.5: where it is after 2
+// s.
+Vec3 sledges(const std::string& mu) {
+  const auto runner = [](const std::string& friction) {
+    return shape("c", "0 0 0 0 0 0", kBox, ode("<mu>" + friction + "</mu>"));
+  };
+  World w(kPlane + "<model name='b'><pose>0 0 0.1 0 0 0</pose><link name='l'>" + runner(mu) +
+              "</link><link name='r'><pose>-0.5 0 0 0 0 0</pose>" + runner("0.5") +
+              "</link><joint name='j' type='revolute'><parent>l</parent><child>r</child><axis>"
+              "<xyz>0 0 1</xyz></axis></joint></model>",
+          5000);
+  w.run(0.2);
+  for (const char* link : {"b/l", "b/r"})
+    w.physics.set_twist(w.body(link), {{1, 0, 0}, Vec3::Zero()});
+  w.run(2.0);
+  return w.position("b/l");
+}
+
+// What no scale could tell from ice is ice, along and across, and nothing becomes infinite.
+TEST(Surfaces, NextToNoFrictionIsNone) {
+  for (const std::string mu : {"1e-300", "1e-160", "1e-12"}) {
+    EXPECT_NEAR(slide(ode("<mu>" + mu + "</mu><mu2>" + mu + "</mu2>")).x(), 2.0, 1e-6) << mu;
+    const std::string two = ode("<mu>" + mu + "</mu><mu2>0.5</mu2><fdir1>1 0 0</fdir1>");
+    EXPECT_NEAR(slide(two, 0.0).x(), 2.0, 1e-6) << mu;
+    EXPECT_NEAR(slide(two, M_PI / 2).y(), 0.1, 5e-3) << mu;
+    EXPECT_EQ(sledges(mu), sledges("0")) << mu;
+  }
+}
+
 // mu along fdir1, which turns with the shape, mu2 across.
 TEST(Surfaces, FrictionDirectionsTurnWithTheShape) {
   const std::string two = ode("<mu>0.8</mu><mu2>0.2</mu2><fdir1>1 0 0</fdir1>");
