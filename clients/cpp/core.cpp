@@ -318,10 +318,7 @@ void Core::on_tick(const uint8_t* bytes, size_t size) {
     return;
   }
   note_time(utime);
-  try {
-    stepper_.on_tick(bytes, size);
-  } catch (const WireError&) {
-  }
+  stepper_.on_tick(bytes, size);
   // Sim time may run a hundred times faster than real time: the watchdog is fed by its beat, too.
   std::vector<std::shared_ptr<Driver>> drivers;
   {

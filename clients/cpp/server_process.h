@@ -37,7 +37,7 @@ class ServerProcess {
   std::string last_lines() const;
 
   std::string url_, command_;
-  std::filesystem::path folder_;  // of the socket, and of a world's text; empty: none of ours
+  std::filesystem::path folder_;  // of the socket, and of a world's text; empty: not made
   std::mutex mutex_;
   pid_t pid_ = -1;
   int status_ = 0;

@@ -79,7 +79,11 @@ bool Stepper::fill(Step& step, int32_t channel, size_t size, uint32_t crc,
 
 void Stepper::on_tick(const uint8_t* bytes, size_t size) {
   std::lock_guard lock(mutex_);
-  if (part_) take_tick(bytes, size);
+  try {
+    if (part_) take_tick(bytes, size);
+  } catch (const WireError&) {
+    return;  // broken: it is asked for
+  }
 }
 
 void Stepper::take_tick(const uint8_t* bytes, size_t size) {
@@ -172,6 +176,7 @@ void Stepper::on_reply(const Reply& reply) {
     if (reply.sequence != grant_.sequence || grant_.taken) return;
     grant_.taken = ask_now_ = true;  // it was repeated: its ticks may be lost
   } catch (const WireError&) {
+    return;  // broken: it is asked for again
   }
 }
 

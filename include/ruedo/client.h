@@ -131,6 +131,7 @@ class Stream {
   explicit Stream(std::shared_ptr<StreamCore> core);
   Stream(const Stream& other) : core_(other.core_), seen_(other.seen_.load()) {}
   Stream& operator=(const Stream& other) {
+    if (this == &other) return *this;
     core_ = other.core_;
     seen_ = other.seen_.load();
     return *this;
@@ -171,7 +172,7 @@ template <class Message>
 class MessageStream {
  public:
   /// @param raw a stream of such messages
-  explicit MessageStream(Stream<RawSample> raw) : raw_(std::move(raw)) {}
+  explicit MessageStream(const Stream<RawSample>& raw) : raw_(raw) {}
   /// @return its name on the bus
   [[nodiscard]] const std::string& channel() const { return raw_.channel(); }
 

@@ -229,7 +229,7 @@ void LcmBus::read() {
   }
 }
 
-// Whoever lost datagrams mostly does not know: it is told here, with the cure.
+// Lost datagrams mostly go unnoticed: they are reported here, with the cure.
 void LcmBus::look_for_loss() {
   const auto now = std::chrono::steady_clock::now();
   if (now < next_look_) return;

@@ -25,7 +25,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// The one MCAP file of a bag's folder; "" where the folder is none of a bag.
+// The one MCAP file of a bag's folder; "" where the folder is not a bag.
 std::string file_of_bag(const std::string& folder) {
   std::vector<std::string> files;
   bool is_bag = false, is_sqlite = false;

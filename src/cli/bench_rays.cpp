@@ -17,7 +17,7 @@
 namespace ruedo::cli {
 namespace {
 
-constexpr int kRays = 181;  // of a scan of 180 degrees
+constexpr int kRays = 181, kMiddleRay = 90;  // of a scan of 180 degrees
 constexpr double kMaxRange_m = 8.0, kHeight_m = 0.3;
 constexpr int kFewestScans = 200, kRounds = 15;
 
@@ -58,10 +58,11 @@ std::vector<scene::Ray> scans(int robots) {
   for (int scan = 0; scan < std::max(kFewestScans, robots); ++scan) {
     const int room = scan % rooms;
     const double place = 2.0 * M_PI * random.uniform(), heading = 2.0 * M_PI * random.uniform();
-    const Vec3 at((room % side + 0.5) * kRoomSize_m + math::cos(place),
-                  (room / side + 0.5) * kRoomSize_m + math::sin(place), kHeight_m);
+    const int column = room % side, row = room / side;
+    const Vec3 at((column + 0.5) * kRoomSize_m + math::cos(place),
+                  (row + 0.5) * kRoomSize_m + math::sin(place), kHeight_m);
     for (int i = 0; i < kRays; ++i) {
-      const double angle = heading + (i - kRays / 2) * M_PI / 180.0;
+      const double angle = heading + (i - kMiddleRay) * M_PI / 180.0;
       rays.push_back({at, Vec3(math::cos(angle), math::sin(angle), 0.0), kMaxRange_m});
     }
   }

@@ -44,12 +44,11 @@ void add_scan(const LoneDevice& device, const lidar_t& scan, std::vector<scene::
   const size_t columns = static_cast<size_t>(std::max(scan.ncolumns, 1));
   const size_t stride = 1 + scan.ranges.size() / kMaxRaysDrawn;
   for (size_t i = 0; i < scan.ranges.size(); i += stride) {
-    const double azimuth =
-        static_cast<double>(scan.azimuth0) +
-        static_cast<double>(i % columns) * static_cast<double>(scan.azimuth_step);
-    const double elevation =
-        static_cast<double>(scan.elevation0) +
-        static_cast<double>(i / columns) * static_cast<double>(scan.elevation_step);
+    const size_t column = i % columns, layer = i / columns;
+    const double azimuth = static_cast<double>(scan.azimuth0) +
+                           static_cast<double>(column) * static_cast<double>(scan.azimuth_step);
+    const double elevation = static_cast<double>(scan.elevation0) +
+                             static_cast<double>(layer) * static_cast<double>(scan.elevation_step);
     add_ray(device.X_WS, direction(azimuth, elevation), static_cast<double>(scan.ranges[i]),
             device.info.range_max, lines);
   }

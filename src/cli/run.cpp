@@ -286,14 +286,14 @@ namespace {
 
 // "2GB" becomes a number of bytes; what is wrong with it, or "".
 std::string to_bytes(std::string& text) {
-  const std::string given = text;
+  const std::string refusal = "'" + text + "' is not allowed; 16MB and more is, such as 2GB";
+  const bool negative = text[0] == '-';
   try {
-    if (CLI::AsSizeValue(false)(text).empty() && text.size() <= 18 && given[0] != '-' &&
-        std::stoll(text) >= log::Ring::kLeastLimit)
-      return "";
+    if (!CLI::AsSizeValue(false)(text).empty() || text.size() > 18 || negative) return refusal;
+    return std::stoll(text) >= log::Ring::kLeastLimit ? "" : refusal;
   } catch (const CLI::Error&) {
+    return refusal;
   }
-  return "'" + given + "' is not allowed; 16MB and more is, such as 2GB";
 }
 
 std::string is_seed(const std::string& text) {

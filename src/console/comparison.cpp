@@ -250,7 +250,8 @@ Bytes Comparison::apart(const std::string& name, const std::string& field) {
                                   [&](const Robot& each) { return printable(each.name) == name; });
   if (robot == robots_.end() || (field != "distance" && field != "angle")) return nullptr;
   const size_t entries = index_.channels()[robot->shown].entries.size();
-  std::vector<double> numbers{static_cast<double>(1 + entries / kMostPlotted)};
+  const size_t every = 1 + entries / kMostPlotted;
+  std::vector<double> numbers{static_cast<double>(every)};
   for (const Sample& sample : samples(*robot, kMostPlotted)) {
     numbers.push_back(sample.time_s);
     numbers.push_back(field == "angle" ? sample.angle_rad : sample.distance_m);

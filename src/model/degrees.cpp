@@ -23,7 +23,7 @@ bool limit_reads_as_degrees(double value) {
   return reads_as_degrees(value) && size <= 360.0 && size != 10.0 && size != 50.0 && size != 100.0;
 }
 
-// What is no number is none of this file's business: its reader refuses it.
+// Text that is not a number is skipped here: the element's reader refuses it.
 std::vector<double> numbers_of(const std::string& text) {
   std::istringstream words(text);
   std::vector<double> numbers;

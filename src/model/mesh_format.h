@@ -1,8 +1,8 @@
 // The binary form in which the importer hands a mesh to the server, and in which the cache keeps
 // it.
 //
-// Whoever reads it trusts nothing: counts against the bytes that are there, indices against counts,
-// numbers against NaN and absurd sizes.
+// Its reader trusts nothing: it checks counts against the bytes that are there, indices against
+// counts, numbers against NaN and absurd sizes.
 #pragma once
 
 #include <string>

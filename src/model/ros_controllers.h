@@ -38,7 +38,7 @@ std::vector<std::string> files_beside(const std::string& from);
 std::vector<std::string> named_files(const std::vector<const Element*>& plugins,
                                      const std::vector<std::string>& beside,
                                      const std::string& where, ReadContext& context);
-// Null: it holds no controllers, or is none of YAML, which is told of one that a plugin names.
+// Null: it holds no controllers, or is not YAML, which is reported where a plugin names the file.
 std::unique_ptr<Element> read_controllers(const std::string& path, bool named,
                                           const std::string& where, ReadContext& context);
 

@@ -21,8 +21,8 @@ void leave_scope(Element& joint, const char* end, const std::string& model) {
 
 }  // namespace
 
-// What the world's models and includes are called, in their order; "" where they cannot be read,
-// which whoever reads them names.
+// What the world's models and includes are called, in their order; "" where they cannot be read:
+// the error is reported when they are.
 std::vector<SdfReader::Member> SdfReader::members(const Element& world, SdfVersion version) {
   std::vector<Member> list;
   for (const auto& child : world.children) {

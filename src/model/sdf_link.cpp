@@ -185,8 +185,8 @@ std::optional<std::pair<double, Vec3>> solid(const Geometry& geometry) {
 }
 
 // auto="true": mass, centre and moments of the collisions' solids (of SDF's default density, 1000
-// kg/m^3, where none is written), scaled to <mass> if there is one. False when a shape is none of
-// those that are known.
+// kg/m^3, where none is written), scaled to <mass> if there is one. False when the solid of a shape
+// is not known.
 bool computed_inertial(const Element& element, const Element& link_element, const Link& link,
                        Inertial& inertial) {
   const std::vector<const Element*> written = link_element.all("collision");

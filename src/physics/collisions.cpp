@@ -16,7 +16,7 @@ namespace {
 constexpr size_t kPointsOfAManifold = 4;
 // Boxes are taken for so much larger: their contacts are known before they touch.
 constexpr btScalar kAhead_m = kSeenAhead_m;
-// A point that is so far from one of the two faces is none of theirs.
+// A point this far beside one of the two faces is not part of their contact.
 constexpr btScalar kBeside_m = 2e-5;
 
 class Pair : public btCollisionAlgorithm {

@@ -28,7 +28,7 @@ final class ServerProcess {
     private final Process process;
     private final Path output; // null when verbose
     private ServerSocket token; // see freeUrl()
-    private Path folder; // of the socket; null: none of ours
+    private Path folder; // of the socket; null: not made
     private Path file; // of a world's text; null: the world is somebody's own
 
     ServerProcess(String world, LaunchOptions options) {
