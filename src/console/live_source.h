@@ -39,6 +39,11 @@ class LiveSource : public Source {
       events_.hear(0, board.channels()[channel].name, message);
       board.put(channel, std::move(message));
     });
+    if (viewers) {
+      // After what was offered, all of which is older.
+      Tap::State state = tap_.take_state(count);
+      for (std::vector<uint8_t>& part : state.parts) board.put(state.channel, std::move(part));
+    }
     for (Tap::Drawing& drawing : drawn) board.put(drawing.channel, std::move(drawing.message));
     events_.lost(host_.lost());
     choose(board);

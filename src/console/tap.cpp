@@ -1,8 +1,10 @@
 // The way past the publisher: counted, copied where wanted, never waited for.
 #include "console/tap.h"
 
+#include <algorithm>
 #include <utility>
 
+#include "console/board.h"
 #include "console/drawn.h"
 
 namespace ruedo::console {
@@ -10,6 +12,10 @@ namespace ruedo::console {
 void Tap::announce(const std::shared_ptr<const run::Announcement>& announcement) {
   const auto& channels = announcement->channels.list();
   by_index_.assign(channels.size(), nullptr);
+  const auto world = std::find_if(channels.begin(), channels.end(), [](const engine::Channel& c) {
+    return c.name == "ruedo/world" && !c.gone;
+  });
+  state_index_ = world == channels.end() ? -1 : static_cast<int>(world - channels.begin());
   const std::lock_guard lock(names_mutex_);
   inputs_.clear();
   for (const engine::Channel& channel : channels) {
@@ -20,7 +26,28 @@ void Tap::announce(const std::shared_ptr<const run::Announcement>& announcement)
 void Tap::message(const run::Published& message) {
   Traffic*& traffic = by_index_[message.index];
   if (!traffic) traffic = find(message.channel);
-  if (traffic) offer(*traffic, message.data, message.size);
+  if (!traffic) return;
+  const bool offered = offer(*traffic, message.data, message.size);
+  if (message.index == state_index_)
+    keep_state(traffic->index, {message.data, message.size}, offered);
+}
+
+void Tap::keep_state(uint32_t channel, std::span<const uint8_t> part, bool offered) {
+  const std::lock_guard lock(state_mutex_);
+  if (!Board::is_later_part(part)) {
+    state_.parts.clear();
+    state_was_told_ = true;
+  }
+  state_.channel = channel;
+  state_.parts.emplace_back(part.begin(), part.end());
+  if (!offered) state_was_told_ = false;
+}
+
+Tap::State Tap::take_state(size_t channels) {
+  const std::lock_guard lock(state_mutex_);
+  if (state_was_told_ || state_.channel >= channels) return {};
+  state_was_told_ = true;
+  return state_;
 }
 
 void Tap::hear(const std::string& channel, const uint8_t* data, size_t size) {
@@ -28,7 +55,10 @@ void Tap::hear(const std::string& channel, const uint8_t* data, size_t size) {
   if (!traffic) return;
   const std::span message(data, size);
   const std::string layer = layer_of(message);
-  if (layer.empty()) return offer(*traffic, data, size);
+  if (layer.empty()) {
+    offer(*traffic, data, size);
+    return;
+  }
   count(*traffic, size);
   if (is_drawn(message)) keep_drawn(traffic->index, layer, message);
 }
@@ -70,10 +100,11 @@ void Tap::count(Traffic& traffic, size_t size) {
   traffic.size.store(static_cast<uint32_t>(size), std::memory_order_relaxed);
 }
 
-void Tap::offer(Traffic& traffic, const uint8_t* data, size_t size) {
+// Whether the console gets it.
+bool Tap::offer(Traffic& traffic, const uint8_t* data, size_t size) {
   count(traffic, size);
-  if (watched_.load(std::memory_order_relaxed) && traffic.wanted.load(std::memory_order_relaxed))
-    ring_.offer(traffic.index, data, size);
+  return watched_.load(std::memory_order_relaxed) &&
+         traffic.wanted.load(std::memory_order_relaxed) && ring_.offer(traffic.index, data, size);
 }
 
 }  // namespace ruedo::console

@@ -1,8 +1,8 @@
 // What goes through a run, for the console: the messages that it publishes, and the commands and
 // requests that come to it, whichever way they come.
 //
-// Who publishes pays two counters a message, and a copy of those that a viewer watches. It waits
-// for nothing: when the ring is full, the console misses a message.
+// Who publishes pays two counters a message, and a copy of those that a viewer watches and of the
+// bodies' newest state. It waits for nothing: when the ring is full, the console misses a message.
 #pragma once
 
 #include <atomic>
@@ -62,16 +62,30 @@ class Tap : public run::Sink {
   // to those who come later, too.
   std::vector<Drawing> take_drawn();
 
+  // The newest state of the bodies.
+  struct State {
+    uint32_t channel = 0;
+    std::vector<std::vector<uint8_t>> parts;
+  };
+  // Where it was not offered, and not taken before: a run that stands still tells no other one to
+  // those who come. Empty where there is none, or not on one of the first so many channels.
+  State take_state(size_t channels);
+
  private:
   Traffic* find(const std::string& channel);  // null: there are too many
   static void count(Traffic& traffic, size_t size);
-  void offer(Traffic& traffic, const uint8_t* data, size_t size);
+  bool offer(Traffic& traffic, const uint8_t* data, size_t size);
+  void keep_state(uint32_t channel, std::span<const uint8_t> part, bool offered);
 
   void keep_drawn(uint32_t channel, const std::string& layer, std::span<const uint8_t> message);
 
   OfferRing ring_{kRingSize};
   std::mutex drawn_mutex_;
   std::vector<Drawing> drawn_;
+  std::mutex state_mutex_;
+  State state_;
+  bool state_was_told_ = true;  // the console has it, or will find it in the ring
+  int state_index_ = -1;        // of the announcement. The publisher's
   std::atomic<bool> watched_{false};
   std::vector<Traffic*> by_index_;  // of the announcement; null: not heard yet. The publisher's
 

@@ -6,13 +6,18 @@
 #include <filesystem>
 #include <span>
 
+#include <fmt/format.h>
+
 #include "core/sha256.h"
+#include "core/utf8.h"
 #include "engine/world_editor.h"
 #include "model/placement.h"
 #include "model/read_context.h"
 
 namespace ruedo::engine {
 namespace {
+
+constexpr size_t kLongestName = 255;  // bytes
 
 Outcome bad(const std::string& text) { return Outcome::refuse(reply_t::BAD_REQUEST, text); }
 Outcome refused(const std::string& text) { return Outcome::refuse(reply_t::REFUSED, text); }
@@ -53,13 +58,11 @@ Pose pose_of(const double (&position)[3], const double (&orientation)[4]) {
               Vec3(position[0], position[1], position[2])};
 }
 
-// "": it may be a model's. Names go into channels, logs and terminals.
+// "": it may be a model's, as in a world's file; a robot's must be fit for channels, too.
 std::string fault_of_name(const std::string& name) {
-  if (name.empty() || name.size() > 63)
-    return "has " + std::to_string(name.size()) + " characters; allowed are 1 to 63";
-  const bool fit = std::all_of(name.begin(), name.end(),
-                               [](char c) { return c > 0x20 && c < 0x7f && c != '/'; });
-  if (!fit) return "is not fit for a channel: letters, digits and signs but '/' are allowed";
+  if (name.empty() || name.size() > kLongestName)
+    return fmt::format("has {} bytes; allowed are 1 to {}", name.size(), kLongestName);
+  if (for_terminal(name) != name) return "is no UTF-8 text without control characters";
   if (name == "ruedo" || name == "world") return "is kept for Ruedo itself; choose another";
   return "";
 }

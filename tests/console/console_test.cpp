@@ -421,6 +421,53 @@ TEST_F(TapTest, CommandsAreTakenWhereTheRunTakesThem) {
   EXPECT_FALSE(tap.takes("c"));
 }
 
+// The state of the bodies is there for those who come when no other one will be told.
+TEST_F(TapTest, TheNewestStateIsKeptForThoseWhoComeLater) {
+  auto announced = std::make_shared<run::Announcement>();
+  announced->channels.add<world_state_t>("ruedo/world", "", "", {});
+  announcement = announced;
+  tap.announce(announcement);
+  const auto tell = [&](int64_t utime, int16_t part, int16_t nparts) {
+    world_state_t state{};
+    state.utime = utime;
+    state.part = part;
+    state.nparts = nparts;
+    const std::vector<uint8_t> bytes = encoded(state);
+    tap.message({.kind = run::Kind::sample,
+                 .time_us = utime,
+                 .stamp_us = utime,
+                 .channel = announcement->channels[0].bus_name,
+                 .index = 0,
+                 .sequence = 0,
+                 .data = bytes.data(),
+                 .size = bytes.size()});
+  };
+  const auto taken = [&] {
+    std::vector<std::pair<int64_t, int16_t>> times;
+    for (const std::vector<uint8_t>& part : tap.take_state(tap.channel_count()).parts) {
+      world_state_t state;
+      EXPECT_GT(state.decode(part.data(), 0, static_cast<int>(part.size())), 0);
+      times.emplace_back(state.utime, state.part);
+    }
+    return times;
+  };
+  using testing::ElementsAre, testing::IsEmpty, testing::Pair;
+  EXPECT_THAT(taken(), IsEmpty());
+  tell(1, 0, 1);
+  tell(2, 0, 2);
+  tell(2, 1, 2);
+  EXPECT_THAT(tap.take_state(0).parts, IsEmpty());
+  EXPECT_THAT(taken(), ElementsAre(Pair(2, 0), Pair(2, 1)));
+  EXPECT_THAT(taken(), IsEmpty());  // once
+  tap.watch(true);
+  tell(3, 0, 1);
+  EXPECT_THAT(taken(), IsEmpty());  // it is in the ring
+  tap.watch(false);
+  tell(4, 0, 1);
+  tap.watch(true);
+  EXPECT_THAT(taken(), ElementsAre(Pair(4, 0)));
+}
+
 // A reply goes out while the request's own thread still shows the request: both are seen.
 TEST_F(TapTest, NothingIsMissedWhenTwoThreadsOfferInTheSameMoment) {
   constexpr int kEach = 20000;

@@ -67,8 +67,8 @@ def serving(*arguments, cwd=None):
         process.wait(30)
 
 
-def log_of_robots(path, count):
-    """A log of 4 s of so many Pioneers in rows, with bodies and wheels but without sensors."""
+def world_of_robots(path, count):
+    """A world of so many Pioneers in rows, with bodies and wheels but without sensors."""
     model = (SOURCE / "worlds/robots/p3dx/model.sdf").read_text()
     shutil.copytree(SOURCE / "worlds/robots/p3dx/meshes", path / "meshes", dirs_exist_ok=True)
     (path / "plain.sdf").write_text(re.sub(r"<sensor.*?</sensor>", "", model, flags=re.DOTALL))
@@ -79,10 +79,16 @@ def log_of_robots(path, count):
         f"<pose>{1.2 * (i % columns) + x0} {1.2 * (i // columns) + y0} 0 0 0 {i % 7}</pose></include>"
         for i in range(count)
     )
-    world, log = path / f"robots_{count}.sdf", path / f"robots_{count}.lcm"
+    world = path / f"robots_{count}.sdf"
     world.write_text(f"""<?xml version="1.0"?><sdf version="1.9"><world name="fleet">
 <include><uri>model://sun</uri></include><include><uri>model://ground_plane</uri></include>
 {robots}</world></sdf>""")
+    return world
+
+
+def log_of_robots(path, count):
+    """4 s of them."""
+    world, log = world_of_robots(path, count), path / f"robots_{count}.lcm"
     options = ["--lcm", "memq://", "--quiet", "--rate", "max", "--duration", "4", "--record", log]
     subprocess.run([RUEDO, "run", world, *options], check=True, timeout=500)
     return log

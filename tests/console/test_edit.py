@@ -5,6 +5,8 @@ import json
 import re
 import struct
 import subprocess
+import time
+from xml.etree import ElementTree
 
 import pytest
 from harness import (
@@ -17,6 +19,7 @@ from harness import (
     browse,
     get,
     needs_browser,
+    running,
     serving,
 )
 
@@ -126,6 +129,74 @@ def test_a_world_is_made_in_the_browser(tmp_path):
         [RUEDO, "verify", tmp_path / "run.lcm"], capture_output=True, text=True, check=False
     )
     assert verified.returncode == 0, verified.stdout + verified.stderr
+
+
+STANDING = """<?xml version="1.0"?>
+<sdf version="1.9"><world name="it stands">
+  <include><uri>model://sun</uri></include>
+  <include><uri>model://ground_plane</uri></include>
+  <!-- in the air -->
+  <model name="na\u00efve &lt;b&gt; box / 1"><pose>1 2 1.25 0 0 0</pose><link name="l">
+    <collision name="c"><geometry><box><size>.5 .5 .5</size></box></geometry></collision>
+    <visual name="v"><geometry><box><size>.5 .5 .5</size></box></geometry></visual></link></model>
+  <include><uri>model://p3dx</uri><pose>-2 0 0 0 0 0.5</pose></include>
+</world></sdf>
+"""
+NAME = "na\u00efve <b> box / 1"
+
+
+def poses_of(world):
+    """{model or uri: its <pose> as numbers}."""
+    return {
+        each.get("name") or each.findtext("uri"): [float(v) for v in each.findtext("pose").split()]
+        for each in ElementTree.parse(world).iter()
+        if each.tag in ("model", "include") and each.find("pose") is not None
+    }
+
+
+@needs_browser
+def test_a_world_that_stands_is_seen_and_edited(tmp_path):
+    """Nothing was stepped before somebody looked, and a model's name is any text."""
+    world = tmp_path / "w.sdf"
+    world.write_text(STANDING, encoding="utf-8")
+    before = poses_of(world)
+    with editing("w.sdf", folder=tmp_path) as process:
+        given = {"model": NAME, "pose": [1, 2, 1.25, 1, 0, 0, 0]}
+        browse(process.url, tmp_path, "standing", given)
+    assert listed(world).returncode == 0
+    after = poses_of(world)
+    assert after.keys() == before.keys()
+    for name, pose in before.items():
+        assert after[name] == pytest.approx(pose, abs=2e-3)
+    assert "<!-- in the air -->" in world.read_text(encoding="utf-8")
+
+
+def comes_to_know(process, utime):
+    """A page that comes now gets the bodies' state of that time."""
+    from ruedo.lcmtypes import world_state_t
+
+    viewer = Socket(process.port)
+    viewer.send(bytes([WANT]) + b"ruedo/world")
+    while True:
+        (message,) = viewer.frame().values()
+        state = world_state_t.decode(message)
+        if state.utime == utime:
+            break
+    assert state.n > 0
+    viewer.close()
+
+
+def test_who_comes_late_to_a_run_that_stands_is_told_how_it_stands(tmp_path):
+    import ruedo
+
+    with running("--paused", "--disable", "p3at/camera") as process:
+        time.sleep(1)  # its first state is told
+        comes_to_know(process, 0)
+        time.sleep(1)
+        with ruedo.connect(timeout=60) as sim:
+            sim.step(200)  # nobody watches
+            utime = round(200 * sim.step_size * 1e6)
+        comes_to_know(process, utime)
 
 
 def test_what_was_not_changed_is_saved_to_the_byte(tmp_path):

@@ -84,11 +84,8 @@ export class App {
   private readonly scenes: { from: number; world: World; files: SceneFiles | null }[] = []; // of the past that is kept
   readonly session = new Session((channel, message) => this.link.command(channel, message));
   readonly control = new Control(this.page, this.link, this.session, this.clock);
-  readonly editor = new Editor(
-    this.page,
-    this.poses,
-    this.control,
-    (model) => this.stage.boxOf(model).min.z,
+  readonly editor = new Editor(this.page, this.poses, this.control, (model) =>
+    this.stage.boxOf(model),
   );
   readonly gizmo = new Gizmo(
     this.page,

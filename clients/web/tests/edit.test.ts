@@ -1,7 +1,10 @@
 // Steps that are taken back, and SDF as text: what is drawn, scaled, and cut.
 import { describe, expect, it } from "vitest";
+import type { world_state_t } from "../generated/messages";
 import { History, type HistoryState } from "../src/edit/history";
-import { numbersOf, poseFrom } from "../src/edit/pose";
+import { numbersOf, poseFrom, poseNow } from "../src/edit/pose";
+import type { ModelDescription } from "../src/scene/description";
+import { Poses } from "../src/state/poses";
 import { boxModel, places, roomModel, scaled, wallModel, withDoor } from "../src/edit/sdf";
 
 describe("history", () => {
@@ -53,6 +56,31 @@ describe("poses", () => {
     expect(numbersOf([1, 2, 3, 0.5, 0.5, 0.5, 0.5]).map((v) => Number(v.toFixed(6)))).toEqual([
       1, 2, 3, 90, 0, 90,
     ]);
+  });
+
+  it("are those that were told, and none is made up", () => {
+    const poses = new Poses(),
+      model = { name: "box", body: 1, pose: [0, 0, 0.5, 1, 0, 0, 0] } as ModelDescription;
+    expect(poseNow(model, poses)).toBeNull();
+    const told = (body: number) =>
+      poses.add(
+        {
+          utime: 0n,
+          epoch: 0,
+          part: 0,
+          nparts: 1,
+          n: 1,
+          index: new Int32Array([body]),
+          position: new Float64Array([3, 4, 1]),
+          orientation: new Float64Array([1, 0, 0, 0]),
+        } as unknown as world_state_t,
+        0,
+      );
+    told(2); // another one, of a higher number
+    expect(poseNow(model, poses)).toBeNull();
+    told(1);
+    expect(poseNow(model, poses)).toEqual([3, 4, 1.5, 1, 0, 0, 0]);
+    expect(poseNow({ ...model, body: -1 }, poses)).toEqual(model.pose);
   });
 });
 

@@ -1,4 +1,5 @@
 // Changes of the world, as requests that any client could make, each of which can be taken back.
+import type { Box3 } from "three";
 import { request_t } from "../../generated/messages";
 import type { Control } from "../control";
 import type { ModelDescription } from "../scene/description";
@@ -11,7 +12,7 @@ import { History } from "./history";
 import { poseNow, samePose, type Pose7 } from "./pose";
 import { scaled, withDoor, type Door, type Size } from "./sdf";
 
-const kCopyAside_m = 0.5;
+const kCopyAside_m = 0.1; // between a model and its copy
 const kRest_m = 2e-4; // in a moment: less is rest
 const kLook_ms = 250; // between two looks at what settles
 const kLongestSettling_s = 10; // of sim time
@@ -20,12 +21,12 @@ export class Editor {
   readonly history: History;
   private readonly given = new Set<string>(); // names of what was placed, maybe not in the scene yet
 
-  // lowest: height of a model's lowest point as it is seen.
+  // box: around a model as it is seen; empty where it shows nothing.
   constructor(
     private readonly page: Page,
     private readonly poses: Poses,
     private readonly control: Control,
-    private readonly lowest: (model: ModelDescription) => number,
+    private readonly box: (model: ModelDescription) => Box3,
   ) {
     this.history = new History((edits) => page.set({ edits }));
     page.watch(["scene"], ({ scene, selected }) => {
@@ -85,7 +86,7 @@ export class Editor {
       text = await this.text(name);
     if (!from || text === null) return false;
     const copy = this.unusedName(name),
-      to = [from[0]! + kCopyAside_m, ...from.slice(1)];
+      to = [from[0]! + this.width(name) + kCopyAside_m, ...from.slice(1)];
     this.given.add(copy);
     const good = await this.history.do({
       name: `duplicate ${name}`,
@@ -96,11 +97,17 @@ export class Editor {
     return good;
   }
 
+  private width(name: string): number {
+    const model = this.find(name),
+      box = model && this.box(model);
+    return box && !box.isEmpty() ? box.max.x - box.min.x : 0;
+  }
+
   // What stands on the ground goes on standing there.
   scale(name: string, factor: Size): Promise<boolean> {
     const model = this.find(name),
       pose = this.pose(name),
-      low = model ? this.lowest(model) : 0;
+      low = model ? this.box(model).min.z : 0;
     const raise = pose && Number.isFinite(low) ? (pose[2]! - low) * (factor[2] - 1) : 0;
     return this.rewrite(name, `scale ${name}`, (text) => scaled(text, factor), raise);
   }
@@ -116,11 +123,11 @@ export class Editor {
     return this.history.do({
       name: "settle",
       apply: async () => {
-        before = new Map(
-          this.models
-            .filter(({ fast, path }) => !fast && !path)
-            .map((model) => [model.name, poseNow(model, this.poses)]),
-        );
+        before = new Map();
+        for (const model of this.models) {
+          const pose = poseNow(model, this.poses);
+          if (pose && !model.fast && !model.path) before.set(model.name, pose);
+        }
         if (!(await this.control.request(request_t.RESUME))) return false;
         await this.rest();
         return this.control.request(request_t.PAUSE);

@@ -32,11 +32,11 @@ export function poseFrom(numbers: number[]): Pose7 {
   return [x, y, z, q.w, q.x, q.y, q.z];
 }
 
-// Where a model is now.
-export function poseNow(model: ModelDescription, poses: Poses): Pose7 {
+// Where a model is now; null while no state has told it.
+export function poseNow(model: ModelDescription, poses: Poses): Pose7 | null {
   const matrix = matrixOf(model.pose, 0, new THREE.Matrix4());
-  if (model.body >= 0 && model.body < poses.size)
-    matrix.premultiply(matrixOf(poses.to, 7 * model.body, new THREE.Matrix4()));
+  if (model.body >= 0 && !poses.known[model.body]) return null;
+  if (model.body >= 0) matrix.premultiply(matrixOf(poses.to, 7 * model.body, new THREE.Matrix4()));
   return poseOf(matrix);
 }
 
