@@ -62,7 +62,9 @@ Pose pose_of(const double (&position)[3], const double (&orientation)[4]) {
 std::string fault_of_name(const std::string& name) {
   if (name.empty() || name.size() > kLongestName)
     return fmt::format("has {} bytes; allowed are 1 to {}", name.size(), kLongestName);
-  if (for_terminal(name) != name) return "is no UTF-8 text without control characters";
+  const bool is_line =
+      std::none_of(name.begin(), name.end(), [](unsigned char c) { return c < 0x20 || c == 0x7f; });
+  if (!is_line || for_terminal(name) != name) return "is no UTF-8 text without control characters";
   if (name == "ruedo" || name == "world") return "is kept for Ruedo itself; choose another";
   return "";
 }
