@@ -241,32 +241,3 @@ await import("data:text/javascript," + encodeURIComponent(out.outputFiles[0].tex
         name, value = line.split()
         kind = getattr(types, name)
         assert int(value) == struct.unpack(">Q", kind._get_packed_fingerprint())[0], name
-
-
-def test_less_is_drawn_where_drawing_is_slow(tmp_path):
-    """Frames 100 ms apart take the page down level by level, after five each; when they are 10 ms
-    apart for long, up again.
-    """
-    script = tmp_path / "quality.mjs"
-    script.write_text(f"""import {{ build }} from "{BUILD}/web/node_modules/esbuild/lib/main.js";
-const out = await build({{ entryPoints: ["{BUILD}/web/src/scene/quality.ts"], bundle: true, write: false, preserveSymlinks: true, format: "esm" }});
-const {{ Quality }} = await import("data:text/javascript," + encodeURIComponent(out.outputFiles[0].text));
-let at = 0;
-const draw = (q, frames, apart) => {{ for (let i = 0; i < frames; ++i) q.drawn(at += apart); return q.now.ratio; }};
-const q = new Quality(false), software = new Quality(true), full = new Quality(false), hiccup = new Quality(false);
-full.automatic = false;
-console.log(q.now.ratio, draw(q, 6, 100), draw(q, 5, 100), draw(q, 50, 100), draw(q, 2000, 10), draw(q, 2000, 10));
-console.log(software.now.ratio, draw(full, 50, 100), draw(hiccup, 4, 10), hiccup.drawn(at += 3000), draw(hiccup, 50, 10));
-for (let i = 0; i < 50; ++i) {{ hiccup.drawn(at += 100); hiccup.idle(); }}
-console.log(hiccup.now.ratio);
-""")
-    lines = subprocess.run(
-        [NODE, script], capture_output=True, text=True, check=True, timeout=300
-    ).stdout.splitlines()
-    assert (
-        lines[0] == "2 1 0.6 0.4 0.4 0.6"
-    )  # the wait is 10, 20, 40 s: not over after 26 s, but after 46 s
-    assert (
-        lines[1] == "0.6 2 2 false 2"
-    )  # software begins low; full detail stays; one long frame changes nothing
-    assert lines[2] == "2"  # nor do pauses between frames
