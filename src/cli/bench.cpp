@@ -1,10 +1,6 @@
 // ruedo bench: what this machine does. Robots against real time, each with an LRF, sixteen sonars
 // and odometry in rooms with contacts; the same with the messages on LCM; cameras; the latency of
 // commands and the pacing of the loop; rays. docs/performance.md says what the figures mean.
-#include <spawn.h>
-#include <sys/wait.h>
-#include <unistd.h>
-
 #include <algorithm>
 #include <cstdio>
 #include <fstream>
@@ -16,10 +12,9 @@
 #include "cli/bench_world.h"
 #include "cli/commands.h"
 #include "cli/range.h"
+#include "core/program_output.h"
 #include "core/progress.h"
 #include "ruedo/errors.h"
-
-extern char** environ;
 
 namespace ruedo::cli {
 namespace {
@@ -216,40 +211,15 @@ std::vector<std::string> measure_apart(const BenchTask& task) {
   if (task.duration_s > 0.0)
     words.insert(words.end(), {"--duration", fmt::format("{}", task.duration_s)});
   if (task.threads > 0) words.insert(words.end(), {"--threads", std::to_string(task.threads)});
-  std::vector<char*> argv;
-  for (std::string& word : words) argv.push_back(word.data());
-  argv.push_back(nullptr);
-
-  int ends[2];
-  if (pipe(ends) != 0) throw EnvironmentError("no pipe could be made");
-  posix_spawn_file_actions_t actions;
-  posix_spawn_file_actions_init(&actions);
-  posix_spawn_file_actions_adddup2(&actions, ends[1], STDOUT_FILENO);
-  posix_spawn_file_actions_addclose(&actions, ends[0]);
-  posix_spawn_file_actions_addclose(&actions, ends[1]);
-  pid_t child = 0;
-  const int fault = posix_spawn(&child, argv[0], &actions, nullptr, argv.data(), environ);
-  posix_spawn_file_actions_destroy(&actions);
-  close(ends[1]);
-  if (fault != 0) {
-    close(ends[0]);
-    throw EnvironmentError("the benchmark's process could not be started");
-  }
-  std::string text;
-  char buffer[512];
-  for (ssize_t count = 0; (count = read(ends[0], buffer, sizeof buffer)) > 0;)
-    text.append(buffer, static_cast<size_t>(count));
-  close(ends[0]);
-  int status = 0;
-  waitpid(child, &status, 0);
-  if (!WIFEXITED(status) || WEXITSTATUS(status) != 0 || text.empty()) {
+  const auto text = output_of(std::move(words), ItsErrors::shown);
+  if (!text || text->empty()) {
     throw EnvironmentError(fmt::format("the measurement '{}' with {} robots did not finish",
                                        name_of(task.table), task.robots));
   }
   std::vector<std::string> rows;
-  for (size_t at = 0; at < text.size();) {
-    const size_t end = std::min(text.find('\n', at), text.size());
-    rows.push_back(text.substr(at, end - at));
+  for (size_t at = 0; at < text->size();) {
+    const size_t end = std::min(text->find('\n', at), text->size());
+    rows.push_back(text->substr(at, end - at));
     at = end + 1;
   }
   return rows;

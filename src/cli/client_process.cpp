@@ -1,4 +1,4 @@
-// fork and exec of a shell, and a thread that waits for it.
+// fork and exec of a shell (posix_spawn knows no PR_SET_PDEATHSIG), and a thread that waits for it.
 #include "cli/client_process.h"
 
 #include <cerrno>

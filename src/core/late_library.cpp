@@ -6,12 +6,11 @@
 #include <string_view>
 
 #include <dlfcn.h>
-#include <fcntl.h>
 #include <link.h>
-#include <spawn.h>
 #include <sys/auxv.h>
-#include <sys/wait.h>
 #include <unistd.h>
+
+#include "core/program_output.h"
 
 namespace ruedo {
 namespace {
@@ -60,31 +59,7 @@ std::string path_of(const char* name) {
   return "";
 }
 
-// What the loader prints of a library's dependencies: a line "NAME => PATH (ADDRESS)" of each.
-std::string listing(const std::string& library) {
-  int ends[2];
-  if (::pipe2(ends, O_CLOEXEC) != 0) return "";
-  const std::string program = loader();
-  const char* words[] = {program.c_str(), "--list", library.c_str(), nullptr};
-  posix_spawn_file_actions_t actions;
-  posix_spawn_file_actions_init(&actions);
-  posix_spawn_file_actions_adddup2(&actions, ends[1], STDOUT_FILENO);
-  posix_spawn_file_actions_addopen(&actions, STDERR_FILENO, "/dev/null", O_WRONLY, 0);
-  pid_t child = -1;
-  const int fault =
-      ::posix_spawn(&child, program.c_str(), &actions, nullptr, const_cast<char**>(words), environ);
-  posix_spawn_file_actions_destroy(&actions);
-  ::close(ends[1]);
-  std::string text;
-  char part[4096];
-  for (ssize_t size = 0; fault == 0 && (size = ::read(ends[0], part, sizeof part)) > 0;)
-    text.append(part, static_cast<size_t>(size));
-  ::close(ends[0]);
-  int status = 1;
-  if (fault != 0 || ::waitpid(child, &status, 0) != child || status != 0) return "";
-  return text;
-}
-
+// lines: what the loader prints of a library's dependencies, NAME => PATH (ADDRESS) of each.
 void add_files(std::string_view lines, std::vector<std::string>& files) {
   constexpr std::string_view kArrow = " => ";
   for (size_t begin = 0; begin < lines.size();) {
@@ -120,7 +95,9 @@ const std::vector<std::string>& files_of_late_libraries() {
     for (const LateLibrary library : kAll) {
       if (::dlopen(file_of(library), RTLD_LAZY | RTLD_NOLOAD) != nullptr) continue;
       const std::string path = path_of(file_of(library));
-      if (!path.empty()) add_files(listing(path), found);
+      if (path.empty()) continue;
+      if (const auto lines = output_of({loader(), "--list", path}, ItsErrors::dropped))
+        add_files(*lines, found);
     }
     return found;
   }();

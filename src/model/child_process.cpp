@@ -86,7 +86,7 @@ std::optional<int> run_limited(std::vector<std::string> words, const std::string
   std::vector<char*> arguments;
   for (std::string& word : words) arguments.push_back(word.data());
   arguments.push_back(nullptr);
-  const pid_t child = ::fork();
+  const pid_t child = ::fork();  // posix_spawn sets no limits
   if (child < 0) fail("no process can be started");
   if (child == 0) become(arguments.data(), log.c_str(), limits);
 
