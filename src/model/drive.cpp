@@ -11,6 +11,7 @@
 #include "model/geometry.h"
 #include "model/holds.h"
 #include "model/joint_plugins.h"
+#include "model/lifts.h"
 #include "model/own_plugins.h"
 #include "model/plugin_parameters.h"
 #include "model/plugins.h"
@@ -522,39 +523,26 @@ void name_plugin(const Element& plugin, const PluginKind& kind, const Model& mod
     text = "the plugin " + kind.name + " does nothing in a model: it belongs into <world>";
   if (kind.does == PluginKind::Does::dead)
     text = "the plugin " + kind.name + " does nothing here: " + kind.would;
+  if (kind.name == "slotcar")
+    text = "the paths of a fleet manager are not driven; ROBOT/velocity and ROBOT/move drive it";
   if (kind.does == PluginKind::Does::unknown) text = "plugins are not loaded: " + kind.name;
   if (!text.empty() && named.insert(text).second) findings.unsupported(plugin.source, where, text);
 }
 
-// Whether a joint that moves carries the link of that name.
-bool is_carried(const Model& model, const std::string& link) {
-  return std::any_of(model.joints.begin(), model.joints.end(), [&](const Joint& joint) {
-    return joint.type != JointType::fixed && model.links[joint.child].name == link;
-  });
-}
-
-// A track of no vehicle, a conveyor; and those of flippers, which only turn.
-void name_lone_track(const std::vector<const Element*>& plugins, const Model& model,
-                     const std::string& where, Findings& findings) {
-  const auto of_kind = [&](const char* name) {
-    return std::find_if(plugins.begin(), plugins.end(),
-                        [&](const Element* each) { return kind_of(*each).name == name; });
-  };
-  const auto track = of_kind("TrackController");
-  if (track == plugins.end()) return;
-  if (of_kind("TrackedVehicle") != plugins.end()) {
-    for (const Element* each : plugins) {
-      if (kind_of(*each).name == "TrackController" && is_carried(model, each->string("link", "")))
-        findings.unsupported(
-            each->source, where,
-            "the belt of a flipper does not run: its joint takes commands, and the "
-            "tracks that are fixed to the robot drive it");
-    }
-    return;
+// A track that no vehicle has: a conveyor, or one that is told on a topic of its own.
+void name_lone_tracks(const std::vector<const Element*>& plugins, const Model& model,
+                      const std::string& where, Findings& findings) {
+  for (const Element* each : plugins) {
+    if (kind_of(*each).name != "TrackController") continue;
+    const std::string link = dotted(each->string("link", ""));
+    const bool driven =
+        model.drive && std::any_of(model.drive->belts.begin(), model.drive->belts.end(),
+                                   [&](auto belt) { return model.links[belt].name == link; });
+    if (!driven)
+      findings.unsupported(each->source, where,
+                           "the plugin TrackController does nothing here: its belt would run as it "
+                           "is told; <ruedo:belt> has one run");
   }
-  findings.unsupported((*track)->source, where,
-                       "the plugin TrackController does nothing here: its belt would run as it is "
-                       "told; <ruedo:belt> has one run");
 }
 
 bool looks_like_robot(const Element& model_element, const std::vector<const Element*>& plugins,
@@ -635,11 +623,20 @@ void find_drive(const Element& model_element, const std::vector<const Element*>&
   }
 }
 
-// Whose joints somebody else has to tell where to go.
-bool moves_joints(const PluginKind& kind) {
-  static const std::set<std::string> kKinds = {"Elevator", "ElevatorPlugin", "gazebo_ros_elevator",
-                                               "lift", "door"};
-  return kKinds.contains(kind.name);
+// The drive of a plugin, where it is one.
+void take_drive(const Element& plugin, const std::shared_ptr<const Element>& odometry,
+                const std::string& where, Findings& findings, Model& model) {
+  try {
+    auto translated = drive_from_plugin(plugin, model);
+    if (!translated) return;
+    if (model.drive)
+      return findings.unsupported(plugin.source, where, "a second drive; the first one is used");
+    model.drive = read_drive(std::move(translated),
+                             odometry ? odometry : odometry_from_plugin(plugin), model);
+    model.drive->belts = belts_from_plugin(plugin, model);
+  } catch (const InputError& error) {
+    findings.error(error.source(), where, "the drive plugin cannot be used: " + error.message());
+  }
 }
 
 }  // namespace
@@ -656,32 +653,21 @@ void read_drive_of(const Element& model_element, const std::string& where, ReadC
     model.drive = read_drive(drives[0]->clone(), odometry, model);
   }
   std::set<std::string> named;
-  name_lone_track(plugins, model, where, context.findings);
   for (const Element* plugin : plugins) {
     const PluginKind kind = kind_of(*plugin);
-    model.commanded |= kind.does == PluginKind::Does::joints ||
-                       kind.does == PluginKind::Does::control || moves_joints(kind);
+    model.commanded |=
+        kind.does == PluginKind::Does::joints || kind.does == PluginKind::Does::control;
     name_plugin(*plugin, kind, model, where, context.findings, named);
     name_parameters(*plugin, where, context.findings);
-    auto translated = drive_from_plugin(*plugin, model);
-    if (!translated || model_element.has("ruedo:drive"))
-      continue;  // Ruedo's own element is there instead of it
-    if (model.drive) {
-      context.findings.unsupported(plugin->source, where, "a second drive; the first one is used");
-      continue;
-    }
-    try {
-      model.drive = read_drive(std::move(translated),
-                               odometry ? odometry : odometry_from_plugin(*plugin), model);
-    } catch (const InputError& error) {
-      context.findings.error(error.source(), where,
-                             "the drive plugin cannot be used: " + error.message());
-    }
+    if (!model_element.has("ruedo:drive"))  // Ruedo's own element is there instead of it
+      take_drive(*plugin, odometry, where, context.findings, model);
   }
+  name_lone_tracks(plugins, model, where, context.findings);
   if (!model.drive) find_drive(model_element, plugins, odometry, where, context, model);
   if (!model.is_static) {
     read_holds(plugins, where, context.findings, model);
     read_joint_plugins(plugins, where, context.findings, model);
+    read_lifts(plugins, where, context.findings, model);
     read_ros_gains(model_element, plugins, where, context, model);
     read_joint_interfaces(model_element, model);
   }

@@ -23,6 +23,9 @@ DriveDescription read_drive(std::shared_ptr<const Element> drive,
 // these do; null when the plugin is another one.
 std::unique_ptr<Element> drive_from_plugin(const Element& plugin, const Model& model);
 
+// The links of a tracked vehicle whose surface is a belt, those of flippers among them.
+std::vector<ModelLinkIndex> belts_from_plugin(const Element& plugin, const Model& model);
+
 // Its rate of odometry, as <ruedo:odometry>; null: it says none.
 std::unique_ptr<Element> odometry_from_plugin(const Element& plugin);
 

@@ -108,7 +108,58 @@ bool is_joint_of(const Element& named, const Model& model) {
                      [&](const Joint& joint) { return joint.name == dotted(named.text); });
 }
 
+// RMF's robots that drive lanes: names of joints and numbers are the plugin's own.
+void add_slotcar(const Element& plugin, const Model& model, Element& drive) {
+  struct Given {
+    const char *theirs, *ours;
+    double usual;
+  };
+  constexpr Given kAll[] = {
+      {"tire_radius", "ruedo:wheel_radius", 0.1},
+      {"base_width", "ruedo:track", 0.52},
+      {"nominal_drive_speed", "ruedo:max_speed", 0.5},
+      {"nominal_drive_acceleration", "ruedo:acceleration", 0.05},
+      {"max_drive_acceleration", "ruedo:deceleration", 0.1},
+      {"nominal_turn_speed", "ruedo:max_turn_rate", M_PI / 8},
+      {"nominal_turn_acceleration", "ruedo:turn_acceleration", M_PI / 10},
+  };
+  for (const Given& each : kAll) {
+    const double value =
+        plugin.number(each.theirs, each.usual, Allowed::positive(quantity::kSpeed));
+    const Element* given = plugin.child(each.theirs);
+    add(drive, each.ours, shown(value), given ? given->source : plugin.source);
+  }
+  const auto has = [&](const char* name) {
+    return std::any_of(model.joints.begin(), model.joints.end(),
+                       [&](const Joint& joint) { return joint.name == name; });
+  };
+  if (has("joint_tire_left") && has("joint_tire_right")) {
+    add(drive, "ruedo:left_joint", "joint_tire_left", plugin.source);
+    add(drive, "ruedo:right_joint", "joint_tire_right", plugin.source);
+  } else {  // those of gz-sim move as a whole
+    drive.attributes.emplace_back("steering", "tracked");
+  }
+}
+
 }  // namespace
+
+std::vector<ModelLinkIndex> belts_from_plugin(const Element& plugin, const Model& model) {
+  std::vector<ModelLinkIndex> belts;
+  const auto take = [&](const std::string& name) {
+    for (const ModelLinkIndex i : model.links.indices()) {
+      if (model.links[i].name == dotted(name)) belts.push_back(i);
+    }
+  };
+  const std::string kind = kind_of(plugin).name;
+  if (kind != "TrackedVehicle" && kind != "SimpleTrackedVehiclePlugin") return belts;
+  for (const char* side : {"left_track", "right_track", "left_flipper", "right_flipper"}) {
+    for (const Element* track : plugin.all(side)) {
+      if (!track->text.empty()) take(track->text);
+      for (const Element* link : track->all("link")) take(link->text);
+    }
+  }
+  return belts;
+}
 
 bool names_wheels(const Element& plugin, const Model& model) {
   const auto names = [&](const Joints& side) {
@@ -148,6 +199,10 @@ std::unique_ptr<Element> drive_from_plugin(const Element& plugin, const Model& m
   drive->source = plugin.source;
   const auto steered = std::find_if(std::begin(kSteering), std::end(kSteering),
                                     [&](const Steered& each) { return each.plugin == kind.name; });
+  if (kind.name == "slotcar") {
+    add_slotcar(plugin, model, *drive);
+    return drive;
+  }
   if (steered != std::end(kSteering)) drive->attributes.emplace_back("steering", steered->steering);
   for (const Joints& each : kJoints) {
     for (const char* name : each.theirs) {

@@ -9,6 +9,7 @@
 #include "core/progress.h"
 #include "model/drive.h"
 #include "model/holds.h"
+#include "model/lifts.h"
 #include "model/own_plugins.h"
 #include "model/placement.h"
 #include "model/sdf_link.h"
@@ -59,6 +60,7 @@ class Loader {
     for (Fault& fault : world_.faults) name_robot(fault);
     name_stuck_robots(world_, findings_);
     check_holds(world_, findings_);
+    check_lifts(world_, findings_);
     world_.findings = findings_.list();
     std::erase_if(world_.findings, [&](const Finding& finding) { return is_settled(finding); });
     for (const std::string& file : meshes_.files_read()) documents_.note(file);

@@ -65,6 +65,16 @@ constexpr Known kKnown[] = {
     {"DetachableJoint",
      "parent_link child_model child_link topic attach_topic detach_topic output_topic "
      "suppress_child_warning"},
+    {"Elevator",
+     "update_rate floor_link_prefix door_joint_prefix cabin_joint initial_floor "
+     "open_door_wait_duration state_topic state_publish_rate cmd_topic"},
+    {"ElevatorPlugin", "lift_joint door_joint floor_height door_wait_time topic"},
+    {"slotcar",
+     "nominal_drive_speed nominal_drive_acceleration max_drive_acceleration nominal_turn_speed "
+     "nominal_turn_acceleration max_turn_acceleration tire_radius base_width stop_distance "
+     "stop_radius reversible steering min_turning_radius turning_right_angle_mul_offset "
+     "lookahead_distance display_markers nominal_voltage nominal_capacity charging_current mass "
+     "inertia friction_coefficient nominal_power"},
     {"TouchPlugin", "target collision create_contact_sensor_for_collision time namespace enabled"},
     {"PerformerDetector", "topic geometry pose header_data"},
     {"PosePublisher",
@@ -106,6 +116,10 @@ constexpr const char* kPoses = "ROBOT/pose comes 50 times a second";
 constexpr const char* kEncoders =
     "ROBOT/odometry is that of its wheels, and ROBOT/pose the true one";
 constexpr const char* kCovariance = "odometry_t has no covariance";
+constexpr const char* kBattery = "batteries do not run down";
+constexpr const char* kCircle = "it turns as a differential drive does";
+constexpr const char* kObstacles = "nothing stops it before an obstacle";
+constexpr const char* kFloors = "ROBOT/joints shows where its cabin and its doors are";
 constexpr const char* kRange = "the <range> of its sensor is what acts";
 constexpr const char* kRate = "the <update_rate> of its sensor is what acts";
 constexpr const char* kLens = "the <camera> of its sensor is what acts";
@@ -126,6 +140,21 @@ constexpr Unsupported kUnsupported[] = {
     {"TrackController", "max_velocity", "", kTrack},
     {"TrackController", "min_acceleration", "", kTrack},
     {"TrackController", "max_acceleration", "", kTrack},
+    {"Elevator", "state_topic", "", kFloors},
+    {"Elevator", "initial_floor", "0", "it begins where its cabin is"},
+    {"slotcar", "max_turn_acceleration", "", "it brakes its turns as it begins them"},
+    {"slotcar", "stop_distance", "", kObstacles},
+    {"slotcar", "stop_radius", "", kObstacles},
+    {"slotcar", "reversible", "true 1", "it drives backwards where it is told to"},
+    {"slotcar", "steering", "diff_drive", kCircle},
+    {"slotcar", "min_turning_radius", "", kCircle},
+    {"slotcar", "nominal_voltage", "", kBattery},
+    {"slotcar", "nominal_capacity", "", kBattery},
+    {"slotcar", "charging_current", "", kBattery},
+    {"slotcar", "nominal_power", "", kBattery},
+    {"slotcar", "mass", "", kBattery},
+    {"slotcar", "inertia", "", kBattery},
+    {"slotcar", "friction_coefficient", "", kBattery},
     {"DetachableJoint", "output_topic", "", "what it holds is not told"},
     {"PosePublisher", "update_frequency", "50", kPoses},
     {"PosePublisher", "static_update_frequency", "50", kPoses},

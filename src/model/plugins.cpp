@@ -16,9 +16,6 @@ struct Known {
   const char* would = "";
 };
 
-constexpr const char* kLift =
-    "a lift would go where it is called; its joints go where ROBOT/joint_command says";
-
 // gz-sim's systems, by the name of their class.
 constexpr Known kSystems[] = {
     {"DiffDrive", Does::drive},
@@ -79,7 +76,7 @@ constexpr Known kSystems[] = {
     {"PerformerDetector", Does::served},  // sensor_from_plugin()
     {"TouchPlugin", Does::served},
     {"DetachableJoint", Does::served},  // read_holds()
-    {"Elevator", Does::dead, kLift},
+    {"Elevator", Does::served},         // read_lifts()
     {"ApplyLinkWrench", Does::dead, "forces would be taken from messages"},
     {"FollowActor", Does::dead, "it would follow an actor"},
     {"TrajectoryFollower", Does::dead, "it would follow its waypoints"},
@@ -186,22 +183,21 @@ constexpr Known kLibraries[] = {
     {"ActorPlugin", Does::dead, "actors would walk by forces instead of their trajectory"},
     {"ActorCollisionsPlugin", Does::served},
     {"RandomVelocityPlugin", Does::dead, "it would move at random"},
-    {"ElevatorPlugin", Does::dead, kLift},
+    {"ElevatorPlugin", Does::served},  // read_lifts()
     {"VacuumGripperPlugin", Does::dead, "a gripper would suck"},
     {"gazebo_ros_vacuum_gripper", Does::dead, "a gripper would suck"},
     {"gazebo_grasp_fix", Does::dead, "what is grasped would stick to the gripper"},
     {"gazebo_mimic_joint_plugin", Does::served},  // read_mimic_plugin()
     {"roboticsgroup_upatras_gazebo_mimic_joint_plugin", Does::served},
     {"roboticsgroup_gazebo_mimic_joint_plugin", Does::served},
-    {"gazebo_ros_elevator", Does::dead, kLift},
+    {"gazebo_ros_elevator", Does::served},
     {"gazebo_ros_projector", Does::dead, "a pattern would be projected"},
     {"gazebo_ros_harness", Does::dead, "a harness would hold it"},
     {"gazebo_ros_light", Does::dead, "lights would go on and off"},
-    {"slotcar", Does::dead, "it would drive the lanes of a fleet manager"},
-    {"door", Does::dead,
-     "doors would open on request; <ruedo:door> opens for who comes near, and its joints take "
-     "commands"},
-    {"lift", Does::dead, kLift},
+    {"slotcar", Does::drive},
+    {"door", Does::served},  // read_lifts()
+    {"lift", Does::served},
+    {"register_component", Does::served},
     {"TeleportDispenserPlugin", Does::dead, "things would be handed to robots"},
     {"TeleportIngestorPlugin", Does::dead, "things would be taken from robots"},
     {"readonly", Does::irrelevant},

@@ -33,6 +33,33 @@ Joint anchor(const std::string& name, ModelLinkIndex link, const Pose& X_MJ, con
   return joint;
 }
 
+// Doors and lifts that are called like a joint have its scoped name.
+void append_lifts(const Model& from, const std::string& prefix, int first_joint, Model& into) {
+  const auto scoped = [&](const std::string& name) {
+    const bool of_joint = std::any_of(from.doors.begin(), from.doors.end(), [&](const Door& door) {
+      return door.name == name && door.leaves.front().joint_name == name;
+    });
+    return of_joint ? prefix + name : name;
+  };
+  for (Door door : from.doors) {
+    door.name = scoped(door.name);
+    for (Door::Leaf& leaf : door.leaves) {
+      if (!leaf.joint.valid()) continue;
+      leaf.joint += first_joint;
+      leaf.joint_name = prefix + leaf.joint_name;
+    }
+    into.doors.push_back(std::move(door));
+  }
+  for (Lift lift : from.lifts) {
+    lift.name = prefix + lift.name;
+    lift.cabin += first_joint;
+    for (Lift::Floor& floor : lift.floors) {
+      for (std::string& door : floor.doors) door = scoped(door);
+    }
+    into.lifts.push_back(std::move(lift));
+  }
+}
+
 // Takes over a nested model: links, joints and sensors with the scoped name.
 void append_nested(const Nested& nested, const Pose& X_MN, Model& into, Findings& findings) {
   const Model& from = *nested.scope->model;
@@ -63,9 +90,11 @@ void append_nested(const Nested& nested, const Pose& X_MN, Model& into, Findings
     if (hold.other_model.empty()) hold.other_link = prefix + hold.other_link;
     into.holds.push_back(std::move(hold));
   }
+  append_lifts(from, prefix, first_joint, into);
   into.commanded |= from.commanded;
   if (from.drive && !into.drive) {
     into.drive = from.drive;
+    for (ModelLinkIndex& belt : into.drive->belts) belt += first_link;
     for (auto* joints :
          {&into.drive->left_joints, &into.drive->right_joints, &into.drive->steer_joints}) {
       for (ModelJointIndex& joint : *joints) joint += first_joint;

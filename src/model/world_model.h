@@ -184,6 +184,7 @@ struct DriveDescription {
       right_joints;  // wheel joints, front first; holonomic and tracked may have none
   std::vector<ModelJointIndex> steer_joints;  // Ackermann, tricycle: turn about the vertical, with
                                               // the wheels that hang on them
+  std::vector<ModelLinkIndex> belts;          // tracked: links whose surface is a belt
   double wheel_radius = 0.0;                  // m
   double track = 0.0;                         // m, between the left and right wheels
   double wheelbase = 0.0;  // m: Ackermann, tricycle: from the fixed axle to the steered one;
@@ -229,6 +230,42 @@ struct Hold {
   Source source;
 };
 
+// How a door or a cabin moves whose joint has no controller of its own: a trapezoid of the rate.
+struct Trapezoid {
+  double rate = 0.2;           // m/s or rad/s
+  double acceleration = 0.08;  // m/s^2 or rad/s^2
+  double effort = 100.0;       // N or N m
+};
+
+// Opens and closes when it is told, by its name.
+struct Door {
+  struct Leaf {
+    std::string joint_name;
+    ModelJointIndex joint;  // none: the model does not have it
+    double closed = 0.0, open = 0.0;
+    bool left = false;  // of RMF: closed at its upper stop
+  };
+  std::string name;
+  std::vector<Leaf> leaves;
+  std::optional<Trapezoid> motion;  // none: the controllers of its joints move it
+  Source source;
+};
+
+// Goes to the floors that it is called to, opens the doors there, waits and closes them.
+struct Lift {
+  struct Floor {
+    double position = 0.0;           // of the cabin's joint
+    std::vector<std::string> doors;  // of the model, or where it has none of that name, of others
+  };
+  std::string name;  // of the cabin's joint
+  ModelJointIndex cabin;
+  std::vector<Floor> floors;
+  int initial_floor = -1;           // -1: it stays where it is
+  std::optional<int64_t> wait_us;   // none: until the next call
+  std::optional<Trapezoid> motion;  // none: the controller of its joint moves it
+  Source source;
+};
+
 struct Model {
   std::string name;  // as the file says
   // By the file, or because all its parts are, or an actor without a trajectory. A model that a
@@ -243,6 +280,8 @@ struct Model {
       false;  // its joints take commands, which makes a robot of an arm without sensors
   std::shared_ptr<const Element> path;  // <ruedo:path> or an actor's trajectory; null: none
   std::vector<Hold> holds;
+  std::vector<Door> doors;
+  std::vector<Lift> lifts;
   Source source;
 };
 

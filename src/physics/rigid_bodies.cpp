@@ -141,6 +141,13 @@ void make_bullet(double mass, const Vec3& moments, const Pose& X_WB, RigidBody& 
   bullet.setUserPointer(&body.info);
 }
 
+// Of a kinematic drive, which stands for its friction too.
+bool is_belt(const model::Model& model, ModelLinkIndex link) {
+  if (!model.drive || model.drive->kind != model::DriveDescription::Kind::kinematic) return false;
+  const auto& belts = model.drive->belts;
+  return std::find(belts.begin(), belts.end(), link) != belts.end();
+}
+
 }  // namespace
 
 RigidBodies::RigidBodies(const model::WorldModel& world, const model::BodyLayout& layout)
@@ -259,7 +266,9 @@ void RigidBodies::make_compound(const model::WorldModel& world, const model::Bod
         ShapeSurface surface = surface_of(collision.surface, X_IC.rotation);
         surface = wheel.valid() ? tyre_of(world, layout, wheel, surface)
                                 : foot_of(world, layout, placement.instance, surface);
-        if (imposed && link_placement.wheel.valid()) surface.friction = surface.friction2 = 0.0;
+        if ((imposed && link_placement.wheel.valid()) ||
+            is_belt(*instance.model, link_placement.link))
+          surface.friction = surface.friction2 = 0.0;
         body.info.surfaces.push_back(surface);
       }
     }

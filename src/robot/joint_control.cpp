@@ -38,6 +38,8 @@ const Limits* limits_of(int8_t mode) {
       {0.0, quantity::kEffort.most},
       {0.0, quantity::kSpeed.most},
       {0.0, 1.0},
+      {0.0, quantity::kLength.most},
+      {0.0, 1.0},
   };
   return mode >= 0 && static_cast<size_t>(mode) < std::size(kOfModes) ? &kOfModes[mode] : nullptr;
 }
@@ -51,7 +53,8 @@ JointControl::JointControl(const model::WorldModel& world, const model::BodyLayo
       physics_(physics),
       step_s_(static_cast<double>(world.step_us) * 1e-6),
       largest_gain_(kGainPerStep / step_s_),
-      holds_(world, layout, physics) {
+      holds_(world, layout, physics),
+      lifts_(world, layout, physics) {
   targets_.reserve(layout.joints.size());
   for (const JointIndex joint : layout.joints.indices()) begin(joint);
 }
@@ -75,16 +78,31 @@ int8_t JointControl::check(RobotIndex robot, const std::string& name, int8_t mod
   const Limits* limits = limits_of(mode);
   if (!limits) return motion_status_t::REASON_BAD_KIND;
   if (value > limits->most || value < limits->least) return motion_status_t::REASON_BAD_VALUE;
-  if (mode == joint_command_t::ATTACHED) {
-    return holds_.has(layout_.robots[robot].instance, name) && (value == 0.0 || value == 1.0)
-               ? motion_status_t::REASON_NONE
-               : motion_status_t::REASON_BAD_VALUE;
-  }
+  const InstanceIndex instance = layout_.robots[robot].instance;
+  const auto if_so = [](bool good) {
+    return good ? motion_status_t::REASON_NONE : motion_status_t::REASON_BAD_VALUE;
+  };
+  const bool yes_or_no = value == 0.0 || value == 1.0;
+  if (mode == joint_command_t::ATTACHED) return if_so(yes_or_no && holds_.has(instance, name));
+  if (mode == joint_command_t::OPEN) return if_so(yes_or_no && lifts_.has_door(instance, name));
+  if (mode == joint_command_t::FLOOR) return if_so(lifts_.has_floor(instance, name, value));
   const JointIndex joint = find(robot, name);
   // One that mimics another, and a gearbox, take no commands.
   const bool takes = joint.valid() && !description(joint).leader.valid() &&
                      description(joint).type != model::JointType::gearbox;
-  return takes ? motion_status_t::REASON_NONE : motion_status_t::REASON_BAD_VALUE;
+  return if_so(takes);
+}
+
+// What is no joint's own: a hold, a lift, a door. True: it was.
+bool JointControl::tell_others(InstanceIndex instance, const std::string& name, int8_t mode,
+                               double value) {
+  using Mode = joint_command_t;
+  switch (mode) {
+    case Mode::ATTACHED: holds_.set(instance, name, value != 0.0); return true;
+    case Mode::FLOOR: lifts_.call(instance, name, static_cast<int>(value)); return true;
+    case Mode::OPEN: lifts_.open(instance, name, value != 0.0); return true;
+    default: return false;
+  }
 }
 
 int8_t JointControl::apply(RobotIndex robot, const JointCommand& command) {
@@ -96,10 +114,9 @@ int8_t JointControl::apply(RobotIndex robot, const JointCommand& command) {
       return reason;
   }
   for (size_t i = 0; i < n; ++i) {
-    if (command.modes[i] == joint_command_t::ATTACHED) {
-      holds_.set(layout_.robots[robot].instance, command.names[i], command.values[i] != 0.0);
+    if (tell_others(layout_.robots[robot].instance, command.names[i], command.modes[i],
+                    command.values[i]))
       continue;
-    }
     const JointIndex joint = find(robot, command.names[i]);
     tell(joint, command.modes[i], command.values[i]);
     const auto& placed = layout_.joints[joint];
@@ -153,6 +170,7 @@ void JointControl::begin(JointIndex joint) {
 
 void JointControl::start(InstanceIndex instance) {
   holds_.start(instance);
+  lifts_.start(instance);
   for (const JointIndex joint : layout_.joints.indices()) {
     if (layout_.joints[joint].instance == instance) begin(joint);
   }
@@ -172,6 +190,7 @@ double JointControl::gain_of(JointIndex joint) const {
 
 void JointControl::forget(InstanceIndex instance) {
   holds_.forget(instance);
+  lifts_.forget(instance);
   const auto of_instance = [&](const auto& each) {
     return layout_.joints[each.joint].instance == instance;
   };
@@ -196,6 +215,8 @@ void JointControl::serve(Target& target, const model::Pid& pid) const {
 
 void JointControl::before_step() {
   holds_.before_step();
+  for (const Lifts::Order& order : lifts_.before_step())
+    hold(order.joint, joint_command_t::POSITION, order.position);
   for (Target& target : targets_) {
     const model::JointAxis& axis = description(target.joint).axis;
     const std::optional<model::Pid>& pid = target.is_rate ? axis.rate_pid : axis.position_pid;

@@ -13,6 +13,7 @@
 #include "model/body_layout.h"
 #include "physics/physics_world.h"
 #include "robot/holds.h"
+#include "robot/lifts.h"
 #include "robot/robots.h"
 
 namespace ruedo::robot {
@@ -47,6 +48,7 @@ class JointControl {
   JointIndex find(RobotIndex robot, const std::string& name) const;  // none of that name: invalid
   int8_t check(RobotIndex robot, const std::string& name, int8_t mode, double value) const;
   void tell(JointIndex joint, int8_t mode, double value);
+  bool tell_others(InstanceIndex instance, const std::string& name, int8_t mode, double value);
   double gain_of(JointIndex joint) const;
   bool is_set(JointIndex joint) const;  // by a message: the gains are those of docs/world-files.md
   void hold(JointIndex joint, int8_t mode, double value);
@@ -60,6 +62,7 @@ class JointControl {
   double largest_gain_;          // 1/s, of the position controller
   std::vector<Target> targets_;  // joints under position control, or a PID
   Holds holds_;
+  Lifts lifts_;
   std::vector<Gain> gains_;  // that messages have set, in place of the file's
 };
 

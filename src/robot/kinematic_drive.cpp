@@ -35,6 +35,24 @@ bool have_shapes(const model::WorldModel& world, const model::BodyLayout& layout
   });
 }
 
+bool have_shapes(const model::Model& model) {
+  return std::any_of(model.drive->belts.begin(), model.drive->belts.end(),
+                     [&](auto belt) { return !model.links[belt].collisions.empty(); });
+}
+
+// What joints carry of the robot's belts.
+std::vector<BodyIndex> flippers_of(const model::WorldModel& world, const model::BodyLayout& layout,
+                                   InstanceIndex instance, BodyIndex base) {
+  std::vector<BodyIndex> flippers;
+  for (const auto belt : world.models[instance].model->drive->belts) {
+    const BodyIndex body = layout.links[layout.link_of(instance, belt)].body;
+    if (body.valid() && body != base &&
+        std::find(flippers.begin(), flippers.end(), body) == flippers.end())
+      flippers.push_back(body);
+  }
+  return flippers;
+}
+
 Quat about_z(double angle) {
   const auto [sine, cosine] = math::sincos(0.5 * angle);
   return {cosine, 0.0, 0.0, sine};
@@ -53,6 +71,8 @@ KinematicDrive::KinematicDrive(const model::WorldModel& world, const model::Body
       lowest_(lowest_of_wheels(world, layout, robot)),
       wheel_friction_(friction_of_wheels(world, layout, robot)),
       wheels_touch_(have_shapes(world, layout, wheels_)),
+      belts_touch_(have_shapes(*world.models[layout.robots[robot].instance].model)),
+      flippers_(flippers_of(world, layout, layout.robots[robot].instance, body_)),
       mass_(physics.mass(body_)),
       yaw_inertia_((X_WBase_.rotation * Vec3::UnitZ())
                        .dot(physics.inertia(body_) * (X_WBase_.rotation * Vec3::UnitZ()))),
@@ -129,8 +149,44 @@ bool KinematicDrive::is_support(const Contact& contact, const Vec3& up) const {
   return contact.normal.dot(up) > kSupportNormal;
 }
 
+bool KinematicDrive::is_belt(LinkIndex link) const {
+  const auto& belts = description_.belts;
+  return link.valid() &&
+         std::find(belts.begin(), belts.end(), layout_.links[link].link) != belts.end();
+}
+
 bool KinematicDrive::on_wheel(const Contact& contact) const {
+  if (belts_touch_) return is_belt(contact.link_a);
   return !wheels_touch_ || (contact.link_a.valid() && layout_.links[contact.link_a].wheel.valid());
+}
+
+bool KinematicDrive::is_own(const Contact& contact) const {
+  return contact.body_b.valid() &&
+         layout_.bodies[contact.body_b].instance == layout_.robots[robot_].instance;
+}
+
+// A flipper that stands on something may lift the robot.
+bool KinematicDrive::flipper_stands(const Vec3& up) const {
+  return std::any_of(flippers_.begin(), flippers_.end(), [&](BodyIndex flipper) {
+    const auto contacts = physics_.nearby(flipper);
+    return std::any_of(contacts.begin(), contacts.end(), [&](const Contact& contact) {
+      return is_support(contact, up) && !is_own(contact) && contact.depth > -kStanding_m;
+    });
+  });
+}
+
+bool KinematicDrive::is_alone() const {
+  return physics_.alone(body_) && std::all_of(flippers_.begin(), flippers_.end(),
+                                              [&](BodyIndex each) { return physics_.alone(each); });
+}
+
+// Of the robot's base and its flippers, in the last step.
+template <class Visit>
+void KinematicDrive::for_each_contact(Visit visit) const {
+  for (const Contact& contact : physics_.contacts(body_)) visit(contact);
+  for (const BodyIndex flipper : flippers_)
+    for (const Contact& contact : physics_.contacts(flipper))
+      if (!is_own(contact)) visit(contact);
 }
 
 double KinematicDrive::friction(const Contact& contact) const {
@@ -158,10 +214,10 @@ void KinematicDrive::choose_support() {
     for (const Contact& contact : physics_.nearby(body_)) {
       if (is_support(contact, up) && contact.depth > -kSeesBump_m) return leave_plane();
     }
+    if (flipper_stands(up)) leave_plane();
     return;
   }
-  supported_ = false;
-  bool bump = false;
+  bool bump = supported_ = flipper_stands(up);
   const auto plane = nearest_plane(planes_, X_WBase_.translation.z() + lowest_);
   for (const Contact& contact : physics_.nearby(body_)) {
     if (!is_support(contact, up)) continue;
@@ -182,14 +238,19 @@ void KinematicDrive::look_at_support() {
   double load = 0.0, least = std::numeric_limits<double>::infinity();
   grip_ = 0.0;
   carriers_.clear();
-  for (const Contact& contact : physics_.nearby(body_)) {
-    if (!is_support(contact, up) || !on_wheel(contact) || contact.depth < -kStanding_m) continue;
+  const auto look_at = [&](const Contact& contact) {
+    if (!is_support(contact, up) || !on_wheel(contact) || is_own(contact) ||
+        contact.depth < -kStanding_m)
+      return;
     const double mu = friction(contact);
     load += contact.force;
     grip_ += mu * contact.force;
     least = std::min(least, mu);
     if (contact.body_b.valid()) carriers_.push_back(contact);
-  }
+  };
+  for (const Contact& contact : physics_.nearby(body_)) look_at(contact);
+  for (const BodyIndex flipper : flippers_)
+    for (const Contact& contact : physics_.nearby(flipper)) look_at(contact);
   const double weight = mass_ * std::max(0.0, -up.dot(gravity_));
   if (load < kFirstTouch * weight && std::isfinite(least)) grip_ = least * weight;
   carrier_ = Twist{Vec3::Zero(), Vec3::Zero()};
@@ -262,7 +323,7 @@ void KinematicDrive::before_step(SimTime now) {
     way_ = along_arc(made.v, made.omega);
   }
   wheel_angles_.advance(way_);
-  if (!physics_.alone(body_)) {
+  if (!is_alone()) {
     choose_support();
   } else if (!on_plane_) {
     supported_ = false;
@@ -376,8 +437,7 @@ PlaneMotion KinematicDrive::of_wheels() const {
 void KinematicDrive::finish(SimTime now, double way, double angle, bool touched) {
   if (description_.on_odometry && planner_.has_primitive())
     return planner_.finish(now, planned_.way, planned_.angle, false);
-  if (touched)
-    for (const Contact& contact : physics_.contacts(body_)) resist(contact);
+  if (touched) for_each_contact([&](const Contact& contact) { resist(contact); });
   planner_.finish(now, way, angle, touched, lag_);
   if (touched || !planner_.has_primitive())
     lag_ = {0.0, 0.0, lag_.moving};  // a velocity is not made up for
@@ -385,7 +445,8 @@ void KinematicDrive::finish(SimTime now, double way, double angle, bool touched)
 
 void KinematicDrive::after_on_plane(SimTime now) {
   held_ = touched_;
-  touched_ = !physics_.contacts(body_).empty();
+  touched_ = false;
+  for_each_contact([&](const Contact&) { touched_ = true; });
   if (!touched_ && !behind_) {
     heading_ += way_.angle;
     if (std::abs(heading_) > M_PI) heading_ = wrap_angle(heading_);
@@ -416,7 +477,7 @@ void KinematicDrive::after_on_contacts(SimTime now) {
   const Vec3 up = X_WBase_.rotation * Vec3::UnitZ();
   held_ = touched_;
   touched_ = false;
-  for (const Contact& contact : physics_.contacts(body_)) touched_ |= !is_support(contact, up);
+  for_each_contact([&](const Contact& contact) { touched_ |= !is_support(contact, up); });
   Pose X_WBase = base_pose().normalized();
   const Quat turn = X_WBase_.rotation.conjugate() * X_WBase.rotation;
   const double bullet_angle = 2.0 * math::atan2(turn.z(), turn.w());

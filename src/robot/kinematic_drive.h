@@ -59,6 +59,12 @@ class KinematicDrive final : public Drive {
   bool servo(Twist& twist, double force, const Vec3& gravity);
   bool is_support(const Contact& contact, const Vec3& up) const;
   bool on_wheel(const Contact& contact) const;
+  bool is_belt(LinkIndex link) const;
+  bool is_own(const Contact& contact) const;  // with another part of the robot
+  bool flipper_stands(const Vec3& up) const;
+  bool is_alone() const;
+  template <class Visit>
+  void for_each_contact(Visit visit) const;
   double friction(const Contact& contact) const;
   double grip_on_plane() const;
   void look_at_support();
@@ -90,7 +96,9 @@ class KinematicDrive final : public Drive {
   const model::BodyLayout& layout_;
   const double lowest_;  // of the wheels below base_link
   const double wheel_friction_;
-  const bool wheels_touch_;  // they have shapes
+  const bool wheels_touch_;          // they have shapes
+  const bool belts_touch_;           // the same of a tracked vehicle's links that are belts
+  std::vector<BodyIndex> flippers_;  // belts that joints carry
   const double mass_, yaw_inertia_, lever_, max_force_;
   const Vec3 gravity_;
 };

@@ -190,6 +190,62 @@ TEST(DrivePlugins, OfEveryKindAreTranslated) {
             Steering::mecanum);
 }
 
+// A number that is none leaves out the drive, not the model.
+TEST(DrivePlugins, WithAnOddNumberLeaveTheModel) {
+  const auto world =
+      world_of("<model name='m'><link name='base'/>" + wheel("l", "0 0.2 0.1 0 0 0") +
+               wheel("r", "0 -0.2 0.1 0 0 0") +
+               "<plugin name='p' filename='libgazebo_ros_diff_drive.so'><leftJoint>j_l</leftJoint>"
+               "<rightJoint>j_r</rightJoint><wheelSeparation>wide</wheelSeparation></plugin>"
+               "</model>");
+  ASSERT_EQ(world->models.size(), 1u);
+  EXPECT_THAT(texts(*world), testing::Contains(testing::HasSubstr(
+                                 "the drive plugin cannot be used: <wheelSeparation>: ")));
+}
+
+// RMF's robots: the plugin's own numbers, its wheels where the model has them, and its defaults.
+TEST(DrivePlugins, TheSlotcarOfRmfDrives) {
+  const auto robot = [](const std::string& wheels, const std::string& inside) {
+    return world_of("<model name='m'><link name='base'/>" + wheels +
+                    "<plugin name='slotcar' filename='libslotcar.so'>" + inside +
+                    "</plugin></model>");
+  };
+  std::string tires = wheel("l", "0 0.16 0.1 0 0 0") + wheel("r", "0 -0.16 0.1 0 0 0");
+  for (const auto& [from, to] :
+       {std::pair("'j_l'", "'joint_tire_left'"), std::pair("'j_r'", "'joint_tire_right'")})
+    tires.replace(tires.find(from), 5, to);
+  const auto tiny = robot(
+      tires,
+      "<nominal_drive_speed>0.5</nominal_drive_speed><nominal_drive_acceleration>0.25"
+      "</nominal_drive_acceleration><max_drive_acceleration>0.75</max_drive_acceleration>"
+      "<nominal_turn_speed>0.6</nominal_turn_speed><nominal_turn_acceleration>1.5"
+      "</nominal_turn_acceleration><tire_radius>0.1</tire_radius><base_width>0.3206"
+      "</base_width><stop_distance>0.75</stop_distance><nominal_voltage>12</nominal_voltage>");
+  EXPECT_THAT(
+      texts(*tiny),
+      testing::UnorderedElementsAre(
+          "the paths of a fleet manager are not driven; ROBOT/velocity and ROBOT/move drive "
+          "it",
+          "<stop_distance> of the plugin slotcar is not supported: nothing stops it before "
+          "an obstacle",
+          "<nominal_voltage> of the plugin slotcar is not supported: batteries do not run "
+          "down"));
+  const auto& drive = *tiny->models[0].model->drive;
+  EXPECT_EQ(drive.steering, Steering::differential);
+  EXPECT_EQ(drive.left_joints.size(), 1u);
+  EXPECT_EQ(drive.track, 0.3206);
+  EXPECT_EQ(drive.max_speed, 0.5);
+  EXPECT_EQ(drive.acceleration, 0.25);
+  EXPECT_EQ(drive.deceleration, 0.75);
+  EXPECT_EQ(drive.max_turn_rate, 0.6);
+  EXPECT_EQ(drive.turn_acceleration, 1.5);
+  const auto whole = robot("", "");
+  ASSERT_TRUE(whole->models[0].model->drive);
+  EXPECT_EQ(whole->models[0].model->drive->steering, Steering::tracked);
+  EXPECT_EQ(whole->models[0].model->drive->track, 0.52);
+  EXPECT_EQ(whole->models[0].model->drive->acceleration, 0.05);
+}
+
 // A vendor's own library, with the elements that others have, drives; one without wheels of the
 // model does not.
 TEST(DrivePlugins, OneThatIsNotKnownDrivesByTheWheelsThatItNames) {

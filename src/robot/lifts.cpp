@@ -1,0 +1,263 @@
+// The state machines of lifts and doors.
+#include "robot/lifts.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace ruedo::robot {
+
+namespace {
+
+// So near, and so slow, a joint has come to where it goes. A cabin on a controller without an
+// integral hangs a little below its floor.
+constexpr double kCabinNear_m = 0.15, kDoorNear = 0.05, kStands = 0.01;
+constexpr double kAgainst = 0.5;  // cosine to the way of a leaf from which on it is blocked
+constexpr int64_t kTryAgain_us = 2'000'000;  // after which a blocked door closes once more
+
+}  // namespace
+
+Lifts::Lifts(const model::WorldModel& world, const model::BodyLayout& layout,
+             physics::PhysicsWorld& physics)
+    : world_(world),
+      layout_(layout),
+      physics_(physics),
+      step_us_(world.step_us),
+      step_s_(static_cast<double>(world.step_us) * 1e-6) {
+  for (const InstanceIndex instance : world.models.indices()) start(instance);
+}
+
+JointIndex Lifts::joint_of(InstanceIndex instance, ModelJointIndex joint) const {
+  for (const JointIndex i : layout_.joints.indices()) {
+    if (layout_.joints[i].instance == instance && layout_.joints[i].joint == joint) return i;
+  }
+  return {};  // both its ends stand fast
+}
+
+void Lifts::add_door(InstanceIndex instance, const model::Door& description) {
+  const model::Model& model = *world_.models[instance].model;
+  Door door{instance, &description, {}, {}};
+  for (const model::Door::Leaf& leaf : description.leaves) {
+    if (!leaf.joint.valid()) continue;
+    const JointIndex index = joint_of(instance, leaf.joint);
+    if (!index.valid()) continue;
+    const model::Joint& joint = model.joints[leaf.joint];
+    const model::LinkPlacement& link = layout_.links[layout_.link_of(instance, joint.child)];
+    if (!link.body.valid()) continue;  // it stands fast, and what it hangs on moves
+    const Pose X_BJ = link.X_BL * model.links[joint.child].X_ML.inverse() * joint.X_MJ;
+    door.leaves.push_back({index, link.body, X_BJ.rotation * joint.axis.axis_in_J, X_BJ.translation,
+                           joint.type == model::JointType::prismatic, leaf.closed, leaf.open});
+    door.ways.push_back({index, leaf.closed});
+  }
+  doors_.push_back(std::move(door));
+}
+
+void Lifts::add_lift(InstanceIndex instance, const model::Lift& description) {
+  const JointIndex joint = joint_of(instance, description.cabin);
+  if (!joint.valid()) return;
+  Lift lift;
+  lift.instance = instance;
+  lift.description = &description;
+  lift.way = {joint, physics_.joint_position(joint)};
+  if (description.initial_floor >= 0) {
+    lift.calls = {description.initial_floor};
+    lift.opens = false;
+    lift.doing = Doing::closing;
+  }
+  lifts_.push_back(std::move(lift));
+}
+
+void Lifts::start(InstanceIndex instance) {
+  forget(instance);
+  const model::ModelInstance& placed = world_.models[instance];
+  if (placed.removed || placed.model->is_static) return;
+  for (const model::Door& door : placed.model->doors) add_door(instance, door);
+  for (const model::Lift& lift : placed.model->lifts) add_lift(instance, lift);
+}
+
+void Lifts::forget(InstanceIndex instance) {
+  const auto of_it = [instance](const auto& each) { return each.instance == instance; };
+  std::erase_if(doors_, of_it);
+  std::erase_if(lifts_, of_it);
+}
+
+bool Lifts::has_floor(InstanceIndex instance, const std::string& name, double floor) const {
+  return std::any_of(lifts_.begin(), lifts_.end(), [&](const Lift& lift) {
+    return lift.instance == instance && lift.description->name == name && floor >= 0.0 &&
+           floor < static_cast<double>(lift.description->floors.size()) &&
+           floor == std::floor(floor);
+  });
+}
+
+bool Lifts::has_door(InstanceIndex instance, const std::string& name) const {
+  return std::any_of(doors_.begin(), doors_.end(), [&](const Door& door) {
+    return door.instance == instance && door.description->name == name;
+  });
+}
+
+void Lifts::call(InstanceIndex instance, const std::string& name, int floor) {
+  for (Lift& lift : lifts_) {
+    if (lift.instance != instance || lift.description->name != name) continue;
+    if (std::find(lift.calls.begin(), lift.calls.end(), floor) != lift.calls.end()) return;
+    if (lift.doing == Doing::waiting && lift.floor == floor) {
+      lift.waited_us = 0;
+      return;
+    }
+    lift.calls.push_back(floor);
+  }
+}
+
+void Lifts::open(InstanceIndex instance, const std::string& name, bool open) {
+  for (Door& door : doors_) {
+    if (door.instance == instance && door.description->name == name) door.wanted_open = open;
+  }
+}
+
+Lifts::Door* Lifts::find_door(InstanceIndex instance, const std::string& name) {
+  Door* found = nullptr;
+  for (Door& door : doors_) {
+    if (door.description->name != name) continue;
+    if (door.instance == instance) return &door;
+    if (!found) found = &door;
+  }
+  return found;
+}
+
+template <class Visit>
+void Lifts::for_each_door(const Lift& lift, Visit visit) {
+  for (const std::string& name : lift.description->floors[lift.floor].doors) {
+    if (Door* door = find_door(lift.instance, name)) visit(*door);
+  }
+}
+
+// Something of another model that can move is where a leaf goes.
+bool Lifts::is_blocked(const Door& door) const {
+  for (const Leaf& leaf : door.leaves) {
+    const Pose& X_WB = physics_.pose(leaf.body);
+    const Vec3 axis = X_WB.rotation * leaf.axis_B;
+    for (const Contact& contact : physics_.contacts(leaf.body)) {
+      if (!contact.body_b.valid() || layout_.bodies[contact.body_b].instance == door.instance)
+        continue;
+      Vec3 way = leaf.slides ? axis : axis.cross(contact.position - X_WB * leaf.origin_B);
+      if (leaf.closed < leaf.open) way = -way;
+      if (-contact.normal.dot(way.normalized()) > kAgainst) return true;
+    }
+  }
+  return false;
+}
+
+bool Lifts::is_there(const Way& way, double near) const {
+  return std::abs(way.target - physics_.joint_position(way.joint)) < near &&
+         std::abs(physics_.joint_velocity(way.joint)) < kStands;
+}
+
+bool Lifts::is_at(const Door& door, bool open) const {
+  for (size_t i = 0; i < door.leaves.size(); ++i) {
+    const double wanted = open ? door.leaves[i].open : door.leaves[i].closed;
+    if (door.ways[i].target != wanted || !is_there(door.ways[i], kDoorNear)) return false;
+  }
+  return true;
+}
+
+void Lifts::set_target(Way& way, double target) {
+  if (way.told && way.target == target) return;
+  way.target = target;
+  way.told = false;
+}
+
+// As fast as it can still brake in the way that is left.
+void Lifts::move(Way& way, const std::optional<model::Trapezoid>& motion) {
+  const auto wake = [&] {
+    const model::JointPlacement& joint = layout_.joints[way.joint];
+    for (const BodyIndex body : {joint.parent_body, joint.child_body})
+      if (body.valid()) physics_.wake(body);
+  };
+  if (!motion) {
+    if (!way.told) {
+      orders_.push_back({way.joint, way.target});
+      wake();
+    }
+    way.told = true;
+    return;
+  }
+  const double missing = way.target - physics_.joint_position(way.joint);
+  const double far = std::abs(missing);
+  const double before = std::copysign(1.0, missing) * way.rate;
+  double rate = std::min({motion->rate, std::sqrt(2.0 * motion->acceleration * far),
+                          std::max(before, 0.0) + motion->acceleration * step_s_, far / step_s_});
+  if (far < 1e-6) rate = 0.0;
+  rate = std::copysign(rate, missing);
+  if (way.told && rate == way.rate) return;
+  if (!way.told) wake();
+  physics_.drive_joint_velocity(way.joint, rate, motion->effort);
+  way.rate = rate;
+  way.told = true;
+}
+
+void Lifts::move_door(Door& door) {
+  door.held_us = std::max<int64_t>(0, door.held_us - step_us_);
+  if (!door.wanted_open && door.held_us == 0 && !is_at(door, false) && is_blocked(door))
+    door.held_us = kTryAgain_us;
+  const bool open = door.wanted_open || door.held_us > 0;
+  for (size_t i = 0; i < door.leaves.size(); ++i) {
+    set_target(door.ways[i], open ? door.leaves[i].open : door.leaves[i].closed);
+    move(door.ways[i], door.description->motion);
+  }
+}
+
+void Lifts::next(Lift& lift) {
+  using enum Doing;
+  bool ready = true;
+  const model::Lift& description = *lift.description;
+  switch (lift.doing) {
+    case nothing:
+      if (!lift.calls.empty()) lift.doing = closing;
+      break;
+    case closing:
+      for_each_door(lift, [&](Door& door) {
+        door.wanted_open = false;
+        ready &= is_at(door, false);
+      });
+      if (!ready) break;
+      if (lift.calls.empty()) {
+        lift.doing = nothing;
+        break;
+      }
+      lift.doing = going;
+      set_target(lift.way, description.floors[lift.calls.front()].position);
+      break;
+    case going:
+      if (!is_there(lift.way, kCabinNear_m)) break;
+      lift.floor = lift.calls.front();
+      lift.calls.erase(lift.calls.begin());
+      lift.doing = lift.opens ? opening : closing;
+      lift.opens = true;
+      break;
+    case opening:
+      for_each_door(lift, [&](Door& door) {
+        door.wanted_open = true;
+        ready &= is_at(door, true);
+      });
+      if (!ready) break;
+      lift.doing = waiting;
+      lift.waited_us = 0;
+      break;
+    case waiting:
+      lift.waited_us += step_us_;
+      if (description.wait_us ? lift.waited_us >= *description.wait_us : !lift.calls.empty())
+        lift.doing = closing;
+      break;
+  }
+}
+
+const std::vector<Lifts::Order>& Lifts::before_step() {
+  orders_.clear();
+  for (Lift& lift : lifts_) {
+    next(lift);
+    if (lift.doing != Doing::nothing || lift.description->motion)
+      move(lift.way, lift.description->motion);
+  }
+  for (Door& door : doors_) move_door(door);
+  return orders_;
+}
+
+}  // namespace ruedo::robot
