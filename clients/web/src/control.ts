@@ -122,7 +122,7 @@ export class Control {
       robot = world?.robots[chosen];
     const channel = robot && inputOf(world!, robot.name, "move_command_t");
     if (!channel) {
-      toast("This robot takes no motion primitives.", "error");
+      toast(robot ? "This robot takes no motion primitives." : "There is no robot.", "error");
       return null;
     }
     const id = ++this.motionId;

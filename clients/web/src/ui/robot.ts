@@ -21,6 +21,9 @@ import { inWorld, type Heading } from "./odometry";
 import { PolarPlot, TimePlot } from "./plots";
 
 const kStates = ["idle", "running", "done", "ended", "refused"];
+const kLevel_m = 0.5; // nearer to the world's zero, a height says nothing; a robot may fall, too
+const fixed = (value: number) => (Math.abs(value) < 5e-4 ? 0 : value).toFixed(3);
+
 export const kReasons = [
   "",
   "replaced by a newer command",
@@ -229,11 +232,13 @@ export class RobotPages {
   pose(m: pose_t): void {
     this.truth = m;
     const t = Number(m.utime) * 1e-6;
+    const [x, y, z] = m.pos as unknown as [number, number, number];
     this.fact(
       "pose",
-      `${m.pos[0]!.toFixed(3)} m, ${m.pos[1]!.toFixed(3)} m, ${heading(yawOf(m.orientation))}`,
+      `${fixed(x)} m, ${fixed(y)} m, ${heading(yawOf(m.orientation))}` +
+        (Math.abs(z) > kLevel_m ? `, at a height of ${fixed(z)} m` : ""),
     );
-    this.fact("speed", `${m.vel[0]!.toFixed(3)} m/s, ${m.rotation_rate[2]!.toFixed(3)} rad/s`);
+    this.fact("speed", `${fixed(m.vel[0]!)} m/s, ${fixed(m.rotation_rate[2]!)} rad/s`);
     this.speed.add(0, t, m.vel[0]!);
     this.speed.add(2, t, m.rotation_rate[2]!);
     this.path.add(0, t, m.pos[0]!);
