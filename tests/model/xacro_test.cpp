@@ -56,6 +56,16 @@ TEST(Xacro, IsExpandedWithArgumentsAndPackages) {
   EXPECT_EQ(texts(*world), std::vector<std::string>{});
 }
 
+// A description that was copied without its package.xml.
+TEST(Xacro, FindsAPackageByTheNameOfAFolderAbove) {
+  const TemporaryFolder folder;
+  folder.write("parts/urdf/box.xacro", kPart);
+  const auto world = load_world(folder.write("parts/robots/bot.urdf.xacro", kBase));
+  EXPECT_EQ(link_of(*world->models.back().model, "left_box").source.str(),
+            folder / "parts/urdf/box.xacro:3");
+  EXPECT_EQ(texts(*world), std::vector<std::string>{});
+}
+
 TEST(Xacro, IsKnownByItsElementsToo) {
   const Packages packages;
   packages.folder.write("bot/bot.urdf", kBase);

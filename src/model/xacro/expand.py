@@ -5,8 +5,8 @@
 OUT gets the robot, each element with the attribute ruedo_at="FILE:LINE" that says where it was
 written; OUT.files the files that were read, a line each; OUT.missing "FILE\tWHAT" for includes that
 are not there and were passed over. $(find PKG) is the folder whose package.xml has that name: above
-the file, beside its package, or in the folders given. Errors go to stderr, in one line; the exit
-code is 1, or 2 where the package xacro is missing.
+the file, beside its package, or in the folders given; else a folder of that name above the file.
+Errors go to stderr, in one line; the exit code is 1, or 2 where the package xacro is missing.
 """
 
 import argparse
@@ -91,11 +91,21 @@ def as_written(text):
     return re.sub(MISSING + "/([^/ ']+)", r"$(find \1)", text)
 
 
-def serve_packages(known):
+def folder_above(file, name):
+    """A copied description without its package.xml is known by its folder's name."""
+    folder, home = os.path.dirname(file), os.path.expanduser("~")
+    while folder != os.path.dirname(folder):
+        if os.path.basename(folder) == name and not f"{home}/".startswith(f"{folder}/"):
+            return folder
+        folder = os.path.dirname(folder)
+    return None
+
+
+def serve_packages(known, file):
     """Has xacro's $(find PKG) look there; ROS is not asked."""
 
     def get_package_share_directory(name):
-        return known.get(name, os.path.join(MISSING, name))
+        return known.get(name) or folder_above(file, name) or os.path.join(MISSING, name)
 
     index = types.ModuleType("ament_index_python")
     index.packages = types.ModuleType("ament_index_python.packages")
@@ -171,7 +181,7 @@ def main():
         return 2
 
     file = os.path.abspath(arguments.file)
-    serve_packages(packages(roots_of(file, arguments.folder)))
+    serve_packages(packages(roots_of(file, arguments.folder)), file)
     notes = Notes(xacro, file)
     try:
         document = xacro.process_file(
