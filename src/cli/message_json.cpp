@@ -106,7 +106,7 @@ class Walk {
       case Primitive::boolean: json.value(take(1) != 0); return;
       case Primitive::byte: json.value(integer = static_cast<int64_t>(take(1))); return;
       case Primitive::int8:
-        json.value(integer = static_cast<int64_t>(static_cast<int8_t>(take(1))));
+        json.value(integer = static_cast<int8_t>(take(1)));  // NOLINT(bugprone-signed-char-misuse)
         return;
       case Primitive::int16: json.value(integer = static_cast<int16_t>(take(2))); return;
       case Primitive::int32: json.value(integer = static_cast<int32_t>(take(4))); return;
