@@ -575,6 +575,20 @@ std::string joined(const std::vector<std::string>& names, const char* between) {
   return text;
 }
 
+// Null where what looked like wheels is none.
+std::optional<DriveDescription> guessed_drive(std::unique_ptr<Element> guess,
+                                              std::shared_ptr<const Element> odometry,
+                                              const Model& model) {
+  if (!guess) return std::nullopt;
+  try {
+    DriveDescription drive = read_drive(std::move(guess), std::move(odometry), model);
+    drive.guessed = true;
+    return drive;
+  } catch (const InputError&) {
+    return std::nullopt;
+  }
+}
+
 // The drive of a robot for which no element and no plugin of a drive speaks.
 void find_drive(const Element& model_element, const std::vector<const Element*>& plugins,
                 std::shared_ptr<const Element> odometry, const std::string& where,
@@ -604,16 +618,12 @@ void find_drive(const Element& model_element, const std::vector<const Element*>&
                   [&](const std::string& wheel) { return is_turned_by_plugin(plugins, wheel); }))
     return;
   const std::string flag = "--drive " + model.name + "=LEFT+...,RIGHT+...";
-  if (guess.drive) {
-    try {
-      model.drive = read_drive(std::move(guess.drive), odometry, model);
-      model.drive->guessed = true;
-      context.findings.repaired(model_element.source, where,
-                                std::string(kNoDriveIsWritten) + "; guessed from its wheels: " +
-                                    guess.in_words + " (" + flag + " says it otherwise)");
-      return;
-    } catch (const InputError&) {  // what looked like wheels is none
-    }
+  model.drive = guessed_drive(std::move(guess.drive), odometry, model);
+  if (model.drive) {
+    context.findings.repaired(model_element.source, where,
+                              std::string(kNoDriveIsWritten) + "; guessed from its wheels: " +
+                                  guess.in_words + " (" + flag + " says it otherwise)");
+    return;
   }
   if (!guess.wheels.empty()) {
     context.findings.unsupported(model_element.source, where,
