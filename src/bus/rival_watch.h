@@ -27,6 +27,8 @@ class RivalWatch : public Bus {
                  const std::vector<std::string>& own = {}) override;
   void flush() override { bus_->flush(); }
   void stop() override { bus_->stop(); }
+  bool is_heard(const std::string& channel) const override { return bus_->is_heard(channel); }
+  uint64_t audience() const override { return bus_->audience(); }
   uint64_t failed() const override { return bus_->failed(); }
 
  private:

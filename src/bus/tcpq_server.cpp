@@ -159,6 +159,7 @@ void TcpqServer::serve() {
          ++i) {
     }
   }
+  std::lock_guard lock(mutex_);
   clients_.clear();
   listener_ = FileHandle();
 }
@@ -188,7 +189,10 @@ void TcpqServer::accept_all() {
     set(socket.get(), IPPROTO_TCP, TCP_KEEPIDLE, kKeepAlive_s);
     set(socket.get(), IPPROTO_TCP, TCP_KEEPINTVL, kKeepAliveAgain_s);
     set(socket.get(), IPPROTO_TCP, TCP_KEEPCNT, kKeepAlives);
-    Client& client = clients_.emplace_back();
+    Client& client = [this]() -> Client& {
+      std::lock_guard lock(mutex_);
+      return clients_.emplace_back();
+    }();
     client.socket = std::move(socket);
     client.since = client.moved = Clock::now();
     epoll_event event{};
@@ -271,29 +275,41 @@ void TcpqServer::receive(Client& client) {
 void TcpqServer::take(Client& client, const tcpq::Frame& frame) {
   client.spoke = true;
   const bool had_none = client.filter.empty();
-  switch (frame.kind) {
-    case tcpq::Frame::Kind::subscribe: client.filter.subscribe(frame.channel); break;
-    case tcpq::Frame::Kind::unsubscribe: client.filter.unsubscribe(frame.channel); break;
-    case tcpq::Frame::Kind::publish: {
-      if (!stop_) {
-        const std::string channel(frame.channel);
-        if (is_heard(channel)) handler_(channel, frame.data.data(), frame.data.size());
-      }
-      if (listeners_ == 0) return;
-      frame_.clear();
-      tcpq::append_publish(frame_, frame.channel, frame.data);
-      ring_.append(number_of(frame.channel), frame_);
-      return;
+  if (frame.kind == tcpq::Frame::Kind::publish) {
+    if (!stop_) {
+      const std::string channel(frame.channel);
+      if (is_listened_to(channel)) handler_(channel, frame.data.data(), frame.data.size());
     }
+    if (listeners_ == 0) return;
+    frame_.clear();
+    tcpq::append_publish(frame_, frame.channel, frame.data);
+    ring_.append(number_of(frame.channel), frame_);
+    return;
   }
-  client.wants.clear();
+  change(client, frame);
   if (had_none && !client.filter.empty()) client.place = ring_.end(), ++listeners_;
   if (!had_none && client.filter.empty()) --listeners_;
 }
 
-bool TcpqServer::is_heard(const std::string& channel) {
+bool TcpqServer::is_listened_to(const std::string& channel) {
   std::lock_guard lock(mutex_);
   return channels_.contains(channel);
+}
+
+bool TcpqServer::is_heard(const std::string& channel) const {
+  std::lock_guard lock(mutex_);
+  return std::any_of(clients_.begin(), clients_.end(),
+                     [&](const Client& client) { return client.filter.passes(channel); });
+}
+
+void TcpqServer::change(Client& client, const tcpq::Frame& frame) {
+  std::lock_guard lock(mutex_);
+  if (frame.kind == tcpq::Frame::Kind::subscribe)
+    client.filter.subscribe(frame.channel);
+  else
+    client.filter.unsubscribe(frame.channel);
+  client.wants.clear();
+  ++audience_;
 }
 
 void TcpqServer::drop(Client& client, const std::string& why) {
@@ -444,7 +460,9 @@ void TcpqServer::sweep() {
     }
     if (!client->filter.empty()) --listeners_;
     received_ -= client->reader.held();
+    std::lock_guard lock(mutex_);
     client = clients_.erase(client);
+    ++audience_;
   }
   if (accept_again_ != Clock::time_point{} && now >= accept_again_) {
     accept_again_ = {};

@@ -53,6 +53,8 @@ class TcpqServer : public Bus {
   // closes all connections.
   void stop() override;
   uint64_t failed() const override { return failed_; }
+  bool is_heard(const std::string& channel) const override;
+  uint64_t audience() const override { return audience_; }
 
   // Counts since the start.
   uint64_t connections() const { return connections_; }
@@ -83,7 +85,8 @@ class TcpqServer : public Bus {
   Client* of_largest_share(const FileHandle& newcomer);
   void receive(Client& client);
   void take(Client& client, const tcpq::Frame& frame);
-  bool is_heard(const std::string& channel);
+  void change(Client& client, const tcpq::Frame& frame);  // of its subscriptions
+  bool is_listened_to(const std::string& channel);
   void drop(Client& client, const std::string& why);
   void collect();
   void send_all();
@@ -100,15 +103,15 @@ class TcpqServer : public Bus {
   FileHandle listener_, poll_, wake_;
   Handler handler_;
 
-  std::mutex mutex_;                          // of the next three
+  mutable std::mutex mutex_;                  // of the next three
   std::unordered_set<std::string> channels_;  // listened to
   std::vector<uint8_t> waiting_;              // frames, each behind its size
   bool woken_ = false;
   std::atomic<int> listeners_{0};  // clients with a subscription
   std::atomic<bool> stop_{false};
-  std::atomic<uint64_t> failed_{0}, connections_{0}, dropped_clients_{0}, skipped_{0};
+  std::atomic<uint64_t> failed_{0}, connections_{0}, dropped_clients_{0}, skipped_{0}, audience_{0};
 
-  // The thread's own.
+  // The thread's own; but clients_ and their filters change with the mutex held, for is_heard().
   std::vector<uint8_t> collected_;
   MessageRing ring_{kRing};
   std::unordered_map<std::string, uint32_t>

@@ -54,7 +54,7 @@ std::vector<Finding> find_all(const WorldArguments& arguments, bool& loaded) {
     options.disabled = arguments.disabled;
     options.keep_going = true;
     const Progress progress("making " + world->name);
-    const engine::World made(world, options, channels, of_run);
+    const engine::World made(std::make_shared<engine::Plan>(*world), options, channels, of_run);
     loaded = !made.refused();
     findings.insert(findings.end(), of_run.list().begin(), of_run.list().end());
   } catch (const InputError& error) {

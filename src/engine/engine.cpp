@@ -84,7 +84,7 @@ class Engine::Borrowed {
 struct Engine::Copy {
   std::shared_ptr<const model::WorldModel> model;  // before anything was drawn
   model::Drawn drawn;
-  std::shared_ptr<StaticScenes> statics;
+  std::shared_ptr<Plan> plan;
   Channels channels;
   std::unique_ptr<World> world;
   int64_t step = -1;              // of the state that there is
@@ -149,25 +149,24 @@ std::unique_ptr<Engine::Copy> Engine::make_copy(std::shared_ptr<const model::Wor
   fleet.seed = seed;
   Findings findings;
   const bool own = !options_.draws.empty();
-  const auto drawn = own ? randomized(*model, options_.draws, seed, &copy->drawn) : model;
-  copy->statics = own ? nullptr : statics_of(model);
-  copy->world = std::make_unique<World>(drawn, fleet, copy->channels,
-                                        first_made_ ? findings : findings_, copy->statics);
+  copy->plan = own ? std::make_shared<Plan>(*randomized(*model, options_.draws, seed, &copy->drawn))
+                   : plan_of(model);
+  copy->world = std::make_unique<World>(copy->plan, fleet, copy->channels,
+                                        first_made_ ? findings : findings_);
   copy->model = std::move(model);
   return copy;
 }
 
-std::shared_ptr<StaticScenes> Engine::statics_of(
-    const std::shared_ptr<const model::WorldModel>& model) {
+std::shared_ptr<Plan> Engine::plan_of(const std::shared_ptr<const model::WorldModel>& model) {
   const std::lock_guard lock(shared_mutex_);
-  std::erase_if(shared_, [](const auto& each) { return each.second.statics.expired(); });
+  std::erase_if(shared_, [](const auto& each) { return each.second.plan.expired(); });
   Shared& shared = shared_[model.get()];
-  auto statics = shared.model.lock() == model ? shared.statics.lock() : nullptr;
-  if (!statics) {
-    statics = std::make_shared<StaticScenes>();
-    shared = {model, statics};
+  auto plan = shared.model.lock() == model ? shared.plan.lock() : nullptr;
+  if (!plan) {
+    plan = std::make_shared<Plan>(*model);
+    shared = {model, plan};
   }
-  return statics;
+  return plan;
 }
 
 void Engine::for_each(size_t count, const std::function<void(size_t)>& body) {

@@ -120,7 +120,7 @@ class Engine {
 
   std::unique_ptr<Copy> make_copy(std::shared_ptr<const model::WorldModel> model, uint64_t seed);
   void reset_one(const Reset& reset);
-  std::shared_ptr<StaticScenes> statics_of(const std::shared_ptr<const model::WorldModel>& model);
+  std::shared_ptr<Plan> plan_of(const std::shared_ptr<const model::WorldModel>& model);
   void count_touching(Copy& copy, const Batch& batch, int32_t* counts) const;
   void take_velocities(size_t world);
   void compute(size_t world, int64_t steps);
@@ -133,10 +133,10 @@ class Engine {
 
   std::shared_ptr<const model::WorldModel> world_;
   EngineOptions options_;
-  // What never moves, of worlds that several copies may have: while one of them has it.
+  // Of worlds that several copies may have: while one of them has it.
   struct Shared {
     std::weak_ptr<const model::WorldModel> model;
-    std::weak_ptr<StaticScenes> statics;
+    std::weak_ptr<Plan> plan;
   };
   std::mutex shared_mutex_;
   std::map<const model::WorldModel*, Shared> shared_;  // looked up only

@@ -35,7 +35,7 @@ int batch_steps(const model::BodyLayout& layout) {
 Simulation::Simulation(std::shared_ptr<const model::WorldModel> world,
                        const SimulationOptions& options, Channels& channels, Findings& findings,
                        Wakeup& finished)
-    : world_(std::move(world), options.fleet, channels, findings),
+    : world_(std::make_shared<Plan>(*world), options.fleet, channels, findings),
       before_batch_(options.before_batch),
       finished_(finished),
       batches_(kBatches) {

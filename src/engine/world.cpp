@@ -14,18 +14,18 @@ std::shared_ptr<const scene::StaticRayScene> StaticScenes::get(const model::Worl
   return scene;
 }
 
-World::World(std::shared_ptr<const model::WorldModel> world, const FleetOptions& options,
-             Channels& channels, Findings& findings, std::shared_ptr<StaticScenes> statics)
-    : model_(*world),
-      layout_(model_),
+World::World(std::shared_ptr<Plan> plan, const FleetOptions& options, Channels& channels,
+             Findings& findings)
+    : plan_(std::move(plan)),
+      model_(plan_->model),
+      layout_(plan_->layout),
       options_(options),
       fleet_(make_fleet(model_, layout_, options, channels, findings)),
       devices_(std::move(fleet_.devices)),
       inbox_(std::move(fleet_.inputs), static_cast<int>(layout_.robots.size())),
       faults_(model_, layout_, devices_, options.seed),
       physics_(std::make_unique<physics::PhysicsWorld>(model_, layout_)),
-      robots_(std::make_unique<robot::Robots>(model_, layout_, *physics_, options.seed)),
-      statics_(statics ? std::move(statics) : std::make_shared<StaticScenes>()) {
+      robots_(std::make_unique<robot::Robots>(model_, layout_, *physics_, options.seed)) {
   for (const Finding& finding : physics_->findings()) {
     switch (finding.kind) {
       case Finding::Kind::unsupported:
@@ -76,9 +76,11 @@ void World::read(int64_t step, Snapshot& snapshot) {
 
 SceneMakers World::scene_makers() const {
   SceneMakers makers;
-  makers.rays = [this] { return scene::make_ray_scene(statics_->get(model_, layout_, false)); };
+  makers.rays = [this] {
+    return scene::make_ray_scene(plan_->statics->get(model_, layout_, false));
+  };
   makers.visual_rays = [this] {
-    return scene::make_ray_scene(statics_->get(model_, layout_, true));
+    return scene::make_ray_scene(plan_->statics->get(model_, layout_, true));
   };
   makers.renderer = [this] { return scene::make_renderer(model_, layout_); };
   return makers;

@@ -35,11 +35,20 @@ class StaticScenes {
   std::shared_ptr<const scene::StaticRayScene> collisions_, visuals_;
 };
 
+// What is made of a world's model once: copies of one world share it, and then none of them may be
+// changed.
+struct Plan {
+  explicit Plan(const model::WorldModel& world) : model(world), layout(model) {}
+  model::WorldModel model;
+  model::BodyLayout layout;
+  std::shared_ptr<StaticScenes> statics = std::make_shared<StaticScenes>();
+};
+
 class World {
  public:
-  // Announces its channels. statics: of another copy of the same world, or null. Throws InputError.
-  World(std::shared_ptr<const model::WorldModel> world, const FleetOptions& options,
-        Channels& channels, Findings& findings, std::shared_ptr<StaticScenes> statics = nullptr);
+  // Announces its channels. Throws InputError.
+  World(std::shared_ptr<Plan> plan, const FleetOptions& options, Channels& channels,
+        Findings& findings);
 
   // Computes the next state into the snapshot: what acts on the state before it is applied (and
   // noted in the batch), then the physics step. States follow on one another from 0, the initial
@@ -61,8 +70,9 @@ class World {
   const std::vector<std::unique_ptr<Module>>& modules() const { return modules_; }
   SceneMakers scene_makers() const;  // valid until a model comes or goes
 
-  // ---- Changes between two steps, while no module is at work; in world_edits.cpp. When models
-  // have come or gone, modules may be others, and those that have scenes need new ones.
+  // ---- Changes between two steps, while no module is at work, of a world whose plan is its own;
+  // in world_edits.cpp. When models have come or gone, modules may be others, and those that have
+  // scenes need new ones.
 
   // Puts a model in, which is seen from the next state on; `step` is that state's number. Returns
   // its index in model().models. Throws InputError; the world is then as it was.
@@ -83,8 +93,9 @@ class World {
   void join(ModuleSetup setup);
   void renew_world_state();
 
-  model::WorldModel model_;
-  model::BodyLayout layout_;
+  std::shared_ptr<Plan> plan_;
+  model::WorldModel& model_;
+  model::BodyLayout& layout_;
   FleetOptions options_;
   Fleet fleet_;  // its parts move into what follows
   std::vector<device_info_t> devices_;
@@ -94,7 +105,6 @@ class World {
   std::unique_ptr<robot::Robots> robots_;
   int world_channel_ = -1;  // of ruedo/world
   std::vector<std::unique_ptr<Module>> modules_;
-  std::shared_ptr<StaticScenes> statics_;
 };
 
 }  // namespace ruedo::engine

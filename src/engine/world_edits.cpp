@@ -55,7 +55,7 @@ InstanceIndex World::add_model(const std::string& name, const Pose& X_WM,
   if (robot.valid()) inbox_.add(fleet.inputs, static_cast<int>(layout_.robots.size()));
   if (step > 0) show_beginning(fleet, step - 1);
   join(std::move(fleet));
-  statics_ = std::make_shared<StaticScenes>();
+  plan_->statics = std::make_shared<StaticScenes>();
   renew_world_state();
   return instance;
 }
@@ -86,7 +86,7 @@ void World::remove_model(InstanceIndex instance, Channels& channels) {
   WorldEditor(model_).remove(instance);
   physics_->remove(instance);
   robots_->remove(instance);
-  statics_ = std::make_shared<StaticScenes>();
+  plan_->statics = std::make_shared<StaticScenes>();
   renew_world_state();
 }
 

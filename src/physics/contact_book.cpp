@@ -17,13 +17,6 @@ constexpr size_t kRoom = 64, kRoomPerBody = 8;
 
 // The entry of a child shape in one of ObjectInfo's lists; Bullet says no child for what is a
 // single shape.
-template <typename Entry>
-Entry entry_of(const ObjectInfo& info, const std::vector<Entry>& list, int child) {
-  if (!info.body.valid() || child < 0 || static_cast<size_t>(child) >= list.size())
-    return list.empty() ? Entry(-1) : list.front();
-  return list[child];
-}
-
 bool earlier(const Contact& a, const Contact& b) {
   const auto key = [](const Contact& c) {
     return std::tuple(c.body_a, c.link_a, c.body_b, c.link_b, c.position.x(), c.position.y(),
@@ -89,10 +82,12 @@ void ContactBook::add(const std::vector<btPersistentManifold*>& manifolds, int s
       Contact contact;
       contact.body_a = a.body;
       contact.body_b = b.body;
-      contact.link_a = entry_of(a, a.links, point.m_index0);
-      contact.link_b = entry_of(b, b.links, point.m_index1);
-      contact.shape_a = entry_of(a, a.collisions, point.m_index0);
-      contact.shape_b = entry_of(b, b.collisions, point.m_index1);
+      const ObjectInfo::Shape &shape_a = shape_of(a, point.m_index0),
+                              &shape_b = shape_of(b, point.m_index1);
+      contact.link_a = shape_a.link;
+      contact.link_b = shape_b.link;
+      contact.shape_a = shape_a.collision;
+      contact.shape_b = shape_b.collision;
       contact.position = from_bt(point.getPositionWorldOnB());
       contact.normal = from_bt(point.m_normalWorldOnB);
       contact.depth = -point.getDistance();

@@ -19,7 +19,7 @@ void PhysicsWorld::Impl::refilter_all() {
 }
 
 void PhysicsWorld::Impl::add_static(StaticObject& object) {
-  dynamics_.addCollisionObject(object.bullet.get(), btBroadphaseProxy::StaticFilter,
+  dynamics_.addCollisionObject(&object.bullet, btBroadphaseProxy::StaticFilter,
                                btBroadphaseProxy::AllFilter ^ btBroadphaseProxy::StaticFilter);
 }
 
@@ -34,10 +34,11 @@ void PhysicsWorld::Impl::add(InstanceIndex instance) {
   for (const auto& object : rigid_.statics) {
     if (!is_of(object->info)) continue;
     object->info.gone = false;
-    const auto& link = layout_.links[object->info.links.front()];
-    const auto& collision =
-        world_.models[instance].model->links[link.link].collisions[object->info.collisions.front()];
-    object->bullet->setWorldTransform(to_bt((link.X_BL * collision.X_LC).normalized()));
+    const auto& link = layout_.links[object->info.shapes.front().link];
+    const auto& collision = world_.models[instance]
+                                .model->links[link.link]
+                                .collisions[object->info.shapes.front().collision];
+    object->bullet.setWorldTransform(to_bt((link.X_BL * collision.X_LC).normalized()));
     add_static(*object);
     has_statics = true;
   }
@@ -147,8 +148,8 @@ void PhysicsWorld::Impl::remove(InstanceIndex instance) {
   refilter_all();  // no pair may refer to them when their boxes go
   for (const auto& object : rigid_.statics) {
     if (!is_of(object->info)) continue;
-    broadphase_.destroyProxy(object->bullet->getBroadphaseHandle(), &dispatcher_);
-    object->bullet->setBroadphaseHandle(nullptr);
+    broadphase_.destroyProxy(object->bullet.getBroadphaseHandle(), &dispatcher_);
+    object->bullet.setBroadphaseHandle(nullptr);
   }
 }
 

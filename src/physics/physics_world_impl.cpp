@@ -9,7 +9,6 @@
 #include <numeric>
 #include <span>
 
-#include "physics/collisions.h"
 #include "physics/state_check.h"
 #include "ruedo/errors.h"
 #include "ruedo/quantity.h"
@@ -30,23 +29,13 @@ constexpr double kContactReach_m = 0.02;
 // place.
 constexpr int kMostPairs = 200'000;
 
-// Bullet's pools, of pairs and of their contacts, are 8 MB for 4096 of each, written when they are
-// made: of a small world that is most of what making it costs. What goes beyond them is allocated.
-btDefaultCollisionConstructionInfo pools_for(size_t bodies) {
-  constexpr size_t kPairsOfABody = 8, kLeast = 16, kMost = 4096;
-  btDefaultCollisionConstructionInfo info;
-  info.m_defaultMaxPersistentManifoldPoolSize = info.m_defaultMaxCollisionAlgorithmPoolSize =
-      static_cast<int>(std::min(kLeast + kPairsOfABody * bodies, kMost));
-  return info;
-}
-
 }  // namespace
 
 bool MayTouch::may_touch(const btCollisionObject& object_a,
                          const btCollisionObject& object_b) const {
   const ObjectInfo& a = info_of(object_a);
   const ObjectInfo& b = info_of(object_b);
-  if (a.links.empty() || b.links.empty()) return false;  // no shapes
+  if (a.shapes.empty() || b.shapes.empty()) return false;  // no shapes
   if (a.gone || b.gone) return false;
   if ((a.moved || !a.body.valid()) && (b.moved || !b.body.valid())) return false;
   if ((a.on_plane && b.plane) || (b.on_plane && a.plane)) return false;
@@ -62,18 +51,14 @@ PhysicsWorld::Impl::Impl(const model::WorldModel& world, const model::BodyLayout
       layout_(layout),
       step_us_(world.step_us),
       ground_(btRigidBody::btRigidBodyConstructionInfo(0.0, nullptr, nullptr)),
-      configuration_(pools_for(layout.bodies.size())),
-      dispatcher_(&configuration_),
+      detection_(layout.bodies.size()),
+      dispatcher_(detection_.dispatcher()),
       broadphase_(filter_),
-      dynamics_(dispatcher_, broadphase_, configuration_, surfaces_,
+      dynamics_(dispatcher_, broadphase_, detection_.configuration(), surfaces_,
                 SolverSettings{world.solver.iterations, world.solver.tolerance,
                                world.solver.error_reduction}) {
   gContactBreakingThreshold = kContactReach_m;  // Bullet's globals: the same in every world
   gDisableDeactivation = false;
-  dispatcher_.setDispatcherFlags(
-      dispatcher_.getDispatcherFlags() &
-      ~btCollisionDispatcher::CD_USE_RELATIVE_CONTACT_BREAKING_THRESHOLD);
-  register_collisions(dispatcher_);
   dynamics_.setForceUpdateAllAabbs(false);
   substeps_[kCoarse] = substeps_for(kLongestSubstep_us);
   substeps_[kFine] = substeps_for(kLongestSubstepOfJoints_us);
@@ -122,7 +107,7 @@ PhysicsWorld::Impl::~Impl() {
     broadphase_.destroyProxy(rigid_.bodies[i].bullet->getBroadphaseHandle(), &dispatcher_);
   }
   for (size_t i = rigid_.statics.size(); i-- > 0;) {
-    btBroadphaseProxy* proxy = rigid_.statics[i]->bullet->getBroadphaseHandle();
+    btBroadphaseProxy* proxy = rigid_.statics[i]->bullet.getBroadphaseHandle();
     if (proxy) broadphase_.destroyProxy(proxy, &dispatcher_);
   }
 }
@@ -239,7 +224,7 @@ void PhysicsWorld::Impl::pull_from_bullet(BodyIndex body) {
 void PhysicsWorld::Impl::update_box(BodyIndex body) {
   const RigidBody& rigid = rigid_.bodies[body];
   btBroadphaseProxy* proxy = rigid.bullet->getBroadphaseHandle();
-  if (!proxy || rigid.info.links.empty()) return;
+  if (!proxy || rigid.info.shapes.empty()) return;
   const BodyMotion& motion = motions_[body];
   const double step_s = static_cast<double>(step_us_) * 1e-6;
   const auto half_of = [&rigid](const Pose& X) {

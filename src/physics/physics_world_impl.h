@@ -9,6 +9,7 @@
 
 #include "physics/broadphase.h"
 #include "physics/contact_book.h"
+#include "physics/detection.h"
 #include "physics/dynamics.h"
 #include "physics/joints.h"
 #include "physics/physics_world.h"
@@ -142,8 +143,8 @@ class PhysicsWorld::Impl {
   int substeps_[2] = {1, 1};  // of each pace
   MayTouch filter_;
   btRigidBody ground_;  // what joints to the world hold on to
-  btDefaultCollisionConfiguration configuration_;
-  btCollisionDispatcher dispatcher_;
+  Detection detection_;
+  btCollisionDispatcher& dispatcher_;
   Broadphase broadphase_;
   Surfaces surfaces_;
   Dynamics dynamics_;

@@ -150,6 +150,14 @@ bool is_belt(const model::Model& model, ModelLinkIndex link) {
 
 }  // namespace
 
+const ObjectInfo::Shape& shape_of(const ObjectInfo& info, int child) {
+  static const ObjectInfo::Shape kNone;
+  if (info.shapes.empty()) return kNone;
+  const bool known =
+      info.body.valid() && child >= 0 && static_cast<size_t>(child) < info.shapes.size();
+  return known ? info.shapes[child] : info.shapes.front();
+}
+
 RigidBodies::RigidBodies(const model::WorldModel& world, const model::BodyLayout& layout)
     : findings(simplifications(world, layout)) {
   for (const LinkIndex link : layout.links.indices()) make_statics(world, layout, link);
@@ -180,17 +188,14 @@ void RigidBodies::make_statics(const model::WorldModel& world, const model::Body
     btCollisionShape* shape = shapes_.fixed(collision.geometry);
     if (!shape) continue;
     auto object = std::make_unique<StaticObject>();
-    object->bullet = std::make_unique<btCollisionObject>();
-    btCollisionObject& bullet = *object->bullet;
+    btCollisionObject& bullet = object->bullet;
     bullet.setCollisionShape(shape);
     bullet.setWorldTransform(to_bt((placement.X_BL * collision.X_LC).normalized()));
     bullet.setCollisionFlags(btCollisionObject::CF_STATIC_OBJECT);
-    object->info.surfaces.push_back(
-        surface_of(collision.surface, Quat::Identity()));  // Bullet's frame is the collision's
     object->info.instance = placement.instance;
     object->info.plane = collision.geometry.shape == model::Shape::plane;
-    object->info.links.push_back(index);
-    object->info.collisions.push_back(static_cast<int>(c));
+    object->info.shapes.push_back(  // Bullet's frame is the collision's
+        {index, static_cast<int>(c), surface_of(collision.surface, Quat::Identity())});
     bullet.setUserPointer(&object->info);
     statics.push_back(std::move(object));
   }
@@ -261,15 +266,13 @@ void RigidBodies::make_compound(const model::WorldModel& world, const model::Bod
       const Pose X_IC = (X_IB * link_placement.X_BL * collision.X_LC).normalized();
       for (btCollisionShape* shape : shapes) {
         body.compound->addChildShape(to_bt(X_IC), shape);
-        body.info.links.push_back(link_index);
-        body.info.collisions.push_back(static_cast<int>(c));
         ShapeSurface surface = surface_of(collision.surface, X_IC.rotation);
         surface = wheel.valid() ? tyre_of(world, layout, wheel, surface)
                                 : foot_of(world, layout, placement.instance, surface);
         if ((imposed && link_placement.wheel.valid()) ||
             is_belt(*instance.model, link_placement.link))
           surface.friction = surface.friction2 = 0.0;
-        body.info.surfaces.push_back(surface);
+        body.info.shapes.push_back({link_index, static_cast<int>(c), surface});
       }
     }
   }

@@ -18,18 +18,25 @@ struct ObjectInfo {
   InstanceIndex instance;
   bool self_collide = false;  // of its model
   bool plane = false;
-  bool on_plane = false;               // held up by a plane without a contact pair
-  bool moved = false;                  // kinematic: moved from outside, never by contacts
-  bool gone = false;                   // its model was removed: it is nowhere
-  std::vector<LinkIndex> links;        // of each child shape; one entry for a single shape
-  std::vector<int> collisions;         // of each child shape, in its link
-  std::vector<ShapeSurface> surfaces;  // of each child shape
-  std::vector<BodyIndex> joined;       // that a joint ties to this one
+  bool on_plane = false;  // held up by a plane without a contact pair
+  bool moved = false;     // kinematic: moved from outside, never by contacts
+  bool gone = false;      // its model was removed: it is nowhere
+  struct Shape {
+    LinkIndex link;
+    int collision = -1;  // in its link
+    ShapeSurface surface;
+  };
+  std::vector<Shape> shapes;      // of each child shape; one entry for a single shape
+  std::vector<BodyIndex> joined;  // that a joint ties to this one
 };
 
 inline const ObjectInfo& info_of(const btCollisionObject& object) {
   return *static_cast<const ObjectInfo*>(object.getUserPointer());
 }
+
+// What Bullet's number of a child shape stands for; of a static object its only shape, of one
+// without shapes nothing.
+const ObjectInfo::Shape& shape_of(const ObjectInfo& info, int child);
 
 // A moving body. Bullet's own frame I has its origin in the centre of mass and the principal axes
 // of inertia.
@@ -45,7 +52,7 @@ struct RigidBody {
 };
 
 struct StaticObject {
-  std::unique_ptr<btCollisionObject> bullet;
+  btCollisionObject bullet;
   ObjectInfo info;
 };
 

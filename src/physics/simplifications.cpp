@@ -46,18 +46,21 @@ void look_at_friction(const model::WorldModel& world, const model::BodyLayout& l
     const bool rolls = placement.wheel.valid();  // its axle is the direction
     for (const auto& collision : link.collisions) {
       const model::Surface& surface = collision.surface;
-      const std::string where =
-          "model " + instance.name + "/link " + link.name + "/collision " + collision.name;
+      const auto find = [&](const char* what) {
+        findings.push_back(
+            {Finding::Kind::unsupported, collision.source,
+             "model " + instance.name + "/link " + link.name + "/collision " + collision.name,
+             what});
+      };
       if (!rolls && surface.friction2 != surface.friction &&
           surface.friction_direction == Vec3::Zero()) {
-        findings.push_back(
-            {Finding::Kind::unsupported, collision.source, where,
-             "mu2 differs from mu, and there is no fdir1: mu counts in all directions"});
+        find("mu2 differs from mu, and there is no fdir1: mu counts in all directions");
       }
       if (surface.torsional > 0.0 && surface.patch_radius <= 0.0 && surface.surface_radius <= 0.0) {
-        findings.push_back({Finding::Kind::unsupported, collision.source, where,
-                            "a torsional coefficient without patch_radius or surface_radius has no "
-                            "lever: it brakes nothing"});
+        find(
+            "a torsional coefficient without patch_radius or surface_radius has no lever: it "
+            "brakes "
+            "nothing");
       }
     }
   }

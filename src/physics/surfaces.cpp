@@ -19,14 +19,6 @@ constexpr double kRigid = 1e8;
 // pressure).
 constexpr double kPatch = 3.0 * M_PI / 16.0;
 
-const ShapeSurface& surface_at(const ObjectInfo& info, int child) {
-  static const ShapeSurface kPlain;
-  if (info.surfaces.empty()) return kPlain;
-  const bool known =
-      info.body.valid() && child >= 0 && static_cast<size_t>(child) < info.surfaces.size();
-  return known ? info.surfaces[child] : info.surfaces.front();
-}
-
 // Where `friction` acts along, in the world; not projected yet.
 Vec3 direction_of(const ShapeSurface& surface, const btCollisionObject& object,
                   const Vec3& normal) {
@@ -88,8 +80,8 @@ ShapeSurface surface_of(const model::Surface& surface, const Quat& R_IC) {
 
 ContactSurface Surfaces::at(const btCollisionObject& a, const btCollisionObject& b,
                             const btManifoldPoint& point) const {
-  const ShapeSurface& of_a = surface_at(info_of(a), point.m_index0);
-  const ShapeSurface& of_b = surface_at(info_of(b), point.m_index1);
+  const ShapeSurface& of_a = shape_of(info_of(a), point.m_index0).surface;
+  const ShapeSurface& of_b = shape_of(info_of(b), point.m_index1).surface;
   const Vec3 normal = from_bt(point.m_normalWorldOnB);
   ContactSurface both;
   const Vec3 along_a = direction_of(of_a, a, normal), along_b = direction_of(of_b, b, normal);

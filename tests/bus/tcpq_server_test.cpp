@@ -154,6 +154,33 @@ TEST(TcpqServer, SendsAtOnce) {
   EXPECT_EQ(accepted, 1);
 }
 
+TEST(TcpqServer, KnowsWhatIsHeard) {
+  Served served;
+  EXPECT_FALSE(served.server.is_heard("out/1"));
+  uint64_t audience = served.server.audience();
+  const auto changes = [&] {
+    const bool changed = soon([&] { return served.server.audience() != audience; });
+    audience = served.server.audience();
+    return changed;
+  };
+  {
+    const Raw client(served.server.port());
+    client.send(hello());
+    client.send(subscription(2, "out/.*"));
+    ASSERT_TRUE(changes());
+    EXPECT_TRUE(served.server.is_heard("out/1"));
+    EXPECT_FALSE(served.server.is_heard("other"));
+    client.send(subscription(3, "out/.*"));
+    ASSERT_TRUE(changes());
+    EXPECT_FALSE(served.server.is_heard("out/1"));
+    client.send(subscription(2, "other"));
+    ASSERT_TRUE(changes());
+    EXPECT_TRUE(served.server.is_heard("other"));
+  }
+  ASSERT_TRUE(changes());  // it is gone
+  EXPECT_FALSE(served.server.is_heard("other"));
+}
+
 TEST(TcpqServer, PassesRawPictures) {
   Served served;
   Stock listener(served.url, "camera");

@@ -60,6 +60,8 @@ class FakeBus : public Bus {
               const std::vector<std::string>&) override {
     channels = names, handler = std::move(to);
   }
+  bool is_heard(const std::string& channel) const override { return channel == "p3at/lrf"; }
+  uint64_t audience() const override { return 7; }
 };
 
 std::vector<uint8_t> info_of(int64_t run_id) {
@@ -96,6 +98,13 @@ TEST(RivalWatch, NamesEachRivalOnceAndNeverItself) {
   for (int64_t id = 100; id < 200; ++id)
     fake.handler("ruedo/info", info_of(id).data(), rival.size());
   EXPECT_EQ(said.size(), 8u);
+}
+
+TEST(RivalWatch, KnowsWhatItsBusKnowsOfListeners) {
+  const RivalWatch watch(std::make_unique<FakeBus>(), [](const std::string&) {});
+  EXPECT_TRUE(watch.is_heard("p3at/lrf"));
+  EXPECT_FALSE(watch.is_heard("p3at/camera"));
+  EXPECT_EQ(watch.audience(), 7u);
 }
 
 }  // namespace

@@ -198,7 +198,20 @@ def test_messages_are_those_of_the_channels():
             TypeError,
             "n is a whole number of steps, not 2.5; a step is 0.005 s",
         ),
-        (lambda e: e.step(None, 0), ValueError, "1 step or more, not 0"),
+        (lambda e: e.step(None, 0), ValueError, "n is 0; allowed are 1 to"),
+        (lambda e: e.step("fast"), TypeError, "commands are numbers, (m/s, rad/s)"),
+        (lambda e: e.step(None, 1, [0]), ValueError, "a mask, True or False for each of 2 worlds"),
+        (lambda e: e.observe(5), TypeError, "named by a text, DEVICE.FIELD, not by 5"),
+        (
+            lambda e: e.command(0, "r0/velocity", 5),
+            TypeError,
+            "one of ruedo.lcmtypes, or its bytes",
+        ),
+        (lambda e: e.reset(0, seed=1.5), TypeError, "seed is a whole number, not 1.5"),
+        (lambda e: e.reset(0, seed=2**64), ValueError, "seed is 18446744073709551616; allowed are"),
+        (lambda e: e.reset([0, 0]), ValueError, "world 0 is to be reset twice at once"),
+        (lambda e: e.reset(0, text=5), TypeError, "text is a list of texts, not 5"),
+        (lambda e: e.collisions("r0"), TypeError, "a world's index is a whole number, not 'r0'"),
         (lambda e: e.step(3), ValueError, "their shape is ()"),
         (
             lambda e: e.step(np.zeros((7, 2))),
@@ -232,6 +245,20 @@ def test_errors_say_what_is_wrong(call, error, text):
     assert text in str(caught.value)
 
 
+def test_what_is_refused_changes_nothing():
+    with engine(worlds=2) as e:
+        before = [e.state_hash(i) for i in range(2)]
+        for refused in ({"seed": -1}, {"seed": [3]}, {"seed": 7, "text": "<sdf"}):
+            with pytest.raises(ValueError):
+                e.reset(**refused)
+        e.reset()
+        assert [e.state_hash(i) for i in range(2)] == before
+        e.step(None, 40)  # with the noise of the seeds that it had
+        with engine(worlds=2) as fresh:
+            fresh.step(None, 40)
+            assert (e["scan.ranges"] == fresh["scan.ranges"]).all()
+
+
 @pytest.mark.parametrize(
     "options, error, text",
     [
@@ -241,7 +268,14 @@ def test_errors_say_what_is_wrong(call, error, text):
             "no world of that name; there are arena, crossing, empty, field, fleet, maze, office",
         ),
         ({"world": "no/such.sdf"}, ValueError, "no/such.sdf: no such file"),
-        ({"world": "arena", "worlds": 0}, ValueError, "1 world or more, not 0"),
+        ({"world": 5}, TypeError, "world is a file or the name of a world, not 5"),
+        ({"world": "arena", "worlds": 0}, ValueError, "worlds is 0; allowed are 1 to"),
+        ({"world": "arena", "worlds": 2.5}, TypeError, "worlds is a whole number, not 2.5"),
+        ({"world": "arena", "seed": -1}, ValueError, "seed is -1; allowed are 0 to"),
+        ({"world": "arena", "noise": "no"}, TypeError, "noise is True or False, not 'no'"),
+        ({"world": "arena", "set": ["a=1"]}, TypeError, "set is a dict, {"),
+        ({"world": "arena", "disable": [5]}, TypeError, "disable is a list of texts; 5 is none"),
+        ({"text": 5}, TypeError, "text is a world's SDF as text, not 5"),
         ({"world": "arena", "disable": "p3at/camera"}, TypeError, "disable is a list of texts"),
         ({"world": "arena", "spawn": ["p3at"]}, ValueError, "MODEL[:NAME]@X,Y[,YAW]"),
         ({"world": "arena", "set": {"p3at/LRF.update_rate": "fast"}}, ValueError, "update_rate"),
@@ -266,6 +300,24 @@ def test_worlds_are_found_by_name_from_anywhere(tmp_path, monkeypatch):
     )
     assert e.robots == ("p3at", "guest") and "2 " not in repr(e)
     assert e["lrf.ranges"].shape == (1, 2, 181)
+
+
+def test_a_second_thread_is_refused():
+    import threading
+
+    with engine(worlds=8) as e:
+        long = threading.Thread(target=e.step, args=(None, 20_000))
+        long.start()
+        said = []
+        while long.is_alive() and not said:
+            for use in (e.step, e.reset, e.steps, e.close):
+                try:
+                    use()
+                except RuntimeError as error:
+                    said.append(str(error))
+        long.join()
+        assert "at work in another thread" in said[0]
+        e.step()
 
 
 def test_copies_that_share_a_world_outlive_the_first():

@@ -358,8 +358,33 @@ def test_a_fleet_sees_its_goals():
         ({"split": "all"}, "allowed are 'train' and 'test'"),
         ({"render_mode": "ansi"}, "allowed are None, 'rgb_array' and 'human'"),
         ({"render_mode": "human"}, "'human' is for one environment"),
+        ({"beams": 2.5}, "beams is a whole number, not 2.5"),
+        ({"obstacles": -1}, "obstacles is -1; allowed are 0 to 100"),
+        ({"randomize": ["p3at.x"]}, "randomize is a dict"),
     ],
 )
 def test_wrong_options_are_refused(options, text):
-    with pytest.raises(ValueError, match=text):
+    with pytest.raises((ValueError, TypeError), match=text):
         ruedo.gym.NavigateVectorEnv(2, **options)
+
+
+def test_wrong_actions_are_refused():
+    envs = ruedo.gym.NavigateVectorEnv(2, beams=2)
+    good = np.zeros((2, 2), np.float32)
+    with pytest.raises(gymnasium.error.ResetNeeded):
+        envs.step(good)
+    envs.reset(seed=1)
+    for actions, text in (
+        (good[:1], r"the shape \(2, 2\), not \(1, 2\)"),
+        (good * math.nan, "finite numbers"),
+        ("ahead", "actions are numbers of shape"),
+    ):
+        with pytest.raises((ValueError, TypeError), match=text):
+            envs.step(actions)
+    envs.step(good)
+    envs.close()
+    fleet = ruedo.gym.FleetEnv(2, beams=2)
+    fleet.reset(seed=1)
+    with pytest.raises(ValueError, match="no action for robot1"):
+        fleet.step({"robot0": good[0]})
+    fleet.close()

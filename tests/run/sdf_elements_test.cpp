@@ -18,7 +18,7 @@ TEST(SdfElements, NoneOfASensorIsSilent) {
     Findings of_devices;
     engine::FleetOptions options;
     options.keep_going = true;
-    const engine::World made(world, options, channels, of_devices);
+    const engine::World made(std::make_shared<engine::Plan>(*world), options, channels, of_devices);
     for (const Finding& finding : of_devices.list()) found.insert(finding.text);
   };
   EXPECT_EQ(test::silent_ones(of_sensors, load), "");
@@ -32,7 +32,7 @@ TEST(SdfElements, AnUnknownOneInASensorIsNamedOnce) {
     Findings of_devices;
     engine::FleetOptions options;
     options.keep_going = true;
-    const engine::World made(world, options, channels, of_devices);
+    const engine::World made(std::make_shared<engine::Plan>(*world), options, channels, of_devices);
     int found = 0;
     for (const Finding& each : world->findings) found += each.text.find(word) != std::string::npos;
     for (const Finding& each : of_devices.list())

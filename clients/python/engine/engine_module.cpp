@@ -118,16 +118,20 @@ class PyEngine {
 
   Engine& engine() const {
     if (!engine_) throw std::runtime_error("the engine was closed");
+    refuse_others();
     return *engine_;
   }
 
-  void close() { engine_.reset(); }
+  void close() {
+    refuse_others();
+    engine_.reset();
+  }
 
   void step(int64_t steps,
             const std::optional<nb::ndarray<const uint8_t, nb::c_contig, nb::device::cpu>>& which) {
     Engine& engine = this->engine();
     recorded_.clear();
-    const nb::gil_scoped_release release;
+    const AtWork at_work(*this);
     which ? engine.step(steps, {which->data(), which->size()}) : engine.step(steps);
   }
 
@@ -144,7 +148,7 @@ class PyEngine {
              const std::vector<std::string>& texts) {
     Engine& engine = this->engine();
     recorded_.clear();
-    const nb::gil_scoped_release release;
+    const AtWork at_work(*this);
     std::vector<Engine::Reset> resets;
     for (size_t i = 0; i < worlds.size(); ++i)
       resets.push_back({worlds[i], seeds[i], texts.empty() ? nullptr : read(texts[i])});
@@ -170,7 +174,7 @@ class PyEngine {
     expected.clearance = clearance;
     expected.odometry_error = odometry_error;
     expected.clearance_reach = clearance_reach;
-    const nb::gil_scoped_release release;
+    const AtWork at_work(*this);
     run_.reset();
     if (!header_)
       header_ = ruedo::log::make_log_header(*world_, seed,
@@ -244,6 +248,26 @@ class PyEngine {
   const std::vector<std::string>& findings() const { return findings_; }
 
  private:
+  // Other Python threads run, and may not use this engine meanwhile.
+  class AtWork {
+   public:
+    explicit AtWork(PyEngine& engine) : mark_(engine.at_work_) {}
+
+   private:
+    struct Mark {
+      explicit Mark(bool& which) : at_work(which) { at_work = true; }
+      ~Mark() { at_work = false; }
+      bool& at_work;
+    };
+    Mark mark_;
+    nb::gil_scoped_release release_;  // taken again first
+  };
+  void refuse_others() const {
+    if (at_work_)
+      throw std::runtime_error(
+          "the engine is at work in another thread: it is for one at a time; make one for each");
+  }
+
   // Texts that come again are read once.
   std::shared_ptr<const ruedo::model::WorldModel> read(const std::string& text) {
     constexpr size_t kMostKept = 256;
@@ -256,7 +280,7 @@ class PyEngine {
   std::unique_ptr<ruedo::model::TextLoader> texts_;
   std::unordered_map<std::string, std::shared_ptr<const ruedo::model::WorldModel>> read_;
   std::unique_ptr<Engine> engine_;
-  bool randomized_ = false;
+  bool randomized_ = false, at_work_ = false;
   std::shared_ptr<const ruedo::model::WorldModel> world_;
   std::vector<std::string> findings_, result_options_;
   std::optional<ruedo::log_header_t> header_;

@@ -12,7 +12,6 @@ the same steps. There is no network and no clock.
 
 from __future__ import annotations
 
-import operator
 import os
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
@@ -21,8 +20,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from . import _engine
+from .arguments import MOST_SEED, MOST_WHOLE, named, switch, texts, whole
 
 __all__ = ["Engine"]
+
+MOST_WORLDS = 2**31 - 1
 
 
 class Engine:
@@ -45,7 +47,7 @@ class Engine:
 
     def __init__(
         self,
-        world: str = "world",
+        world: str | os.PathLike[str] = "world",
         *,
         text: str | None = None,
         worlds: int = 1,
@@ -61,31 +63,31 @@ class Engine:
         plugin: Iterable[str | os.PathLike[str]] = (),
         record: bool = False,
     ) -> None:
-        for name, value in (
-            ("plugin", plugin),
-            ("spawn", spawn),
-            ("drive", drive),
-            ("disable", disable),
-            ("fault", fault),
-        ):
-            if isinstance(value, str):
-                raise TypeError(f"{name} is a list of texts, not one: {name}=[{value!r}]")
-        settings = [f"{key}={value}" for key, value in (set or {}).items()]
+        if not isinstance(world, (str, os.PathLike)):
+            raise TypeError(f"world is a file or the name of a world, not {world!r}")
+        if not isinstance(text, (str, type(None))):
+            raise TypeError(f"text is a world's SDF as text, not {text!r}")
+        if isinstance(plugin, str):
+            raise TypeError(f"plugin is a list of texts, not one: plugin=[{plugin!r}]")
+        worlds = whole("worlds", worlds, 1, MOST_WORLDS)
+        seed = whole("seed", seed, 0, MOST_SEED - worlds + 1)
+        settings = named("set", set, '{"p3at/lrf.update_rate": 10}')
+        draws = named("randomize", randomize, '{"p3at.x": "uniform(-2, 2)"}')
         self._core = _engine.Engine(
-            str(world),
+            os.fspath(world),
             text=text,
-            worlds=operator.index(worlds),
-            seed=operator.index(seed),
-            noise=bool(noise),
-            threads=operator.index(threads),
-            spawn=list(spawn),
-            drive=list(drive),
-            set=settings,
-            disable=list(disable),
-            fault=list(fault),
-            randomize=[f"{target}={drawn}" for target, drawn in (randomize or {}).items()],
+            worlds=worlds,
+            seed=seed,
+            noise=switch("noise", noise),
+            threads=whole("threads", threads, 0, 4096),
+            spawn=texts("spawn", spawn),
+            drive=texts("drive", drive),
+            set=[f"{key}={value}" for key, value in settings.items()],
+            disable=texts("disable", disable),
+            fault=texts("fault", fault),
+            randomize=[f"{target}={drawn}" for target, drawn in draws.items()],
             plugin=[os.fspath(one) for one in plugin],
-            record=bool(record),
+            record=switch("record", record),
         )
         self._worlds = self._core.worlds()
         self._seeds = [seed + i for i in range(self._worlds)]
@@ -143,8 +145,9 @@ class Engine:
         that ``ruedo verify`` repeats; with everything: all messages, else only what acted on the
         run and hashes of its state.
         """
+        seed = whole("seed", seed, 0, MOST_SEED)
         self._core.begin_run(
-            operator.index(seed),
+            seed,
             goals=list(goals),
             no_contact=no_contact,
             clearance=clearance,
@@ -154,7 +157,7 @@ class Engine:
             log=log,
             everything=everything,
         )
-        self._seeds[0] = operator.index(seed)
+        self._seeds[0] = seed
 
     def end_run(self) -> dict[str, Any]:
         """What came of it: {"failures": [{"what", "time_s", "text"}], "metrics": {name: number},
@@ -184,6 +187,8 @@ class Engine:
         engine's memory, cannot be written to, and is written anew by ``step`` and ``reset``: copy
         what you keep. Robots are those that have the device, in the order of the world file.
         """
+        if not isinstance(name, str):
+            raise TypeError(f"a field is named by a text, DEVICE.FIELD, not by {name!r}")
         device, dot, field = name.rpartition(".")
         if not dot or not device or not field:
             raise ValueError(f"{name!r} is no DEVICE.FIELD; for example 'lrf.ranges'")
@@ -207,20 +212,22 @@ class Engine:
         command. What was commanded before holds, until the robot's watchdog (600 ms of sim time by
         default).
         """
+        if not hasattr(n, "__index__"):
+            raise TypeError(f"n is a whole number of steps, not {n!r}; a step is {self.dt:g} s")
+        count = whole("n", n, 1)
         which = None
         if worlds is not None:
-            which = np.ascontiguousarray(worlds, bool).view(np.uint8)
+            mask = np.asarray(worlds)
+            if mask.dtype != bool or mask.shape != (self._worlds,):
+                raise ValueError(
+                    f"worlds is a mask, True or False for each of {self._worlds} worlds, not {worlds!r}"
+                )
+            which = np.ascontiguousarray(mask).view(np.uint8)
         if commands is not None:
             rows = self._velocities(commands)
             if which is not None:
                 rows[which == 0] = np.nan
             self._core.drive(rows)
-        try:
-            count = operator.index(n)
-        except TypeError:
-            raise TypeError(
-                f"n is a whole number of steps, not {n!r}; a step is {self.dt:g} s"
-            ) from None
         self._core.step(count, which)
 
     def command(self, world: int, channel: str, message: Any) -> None:
@@ -229,11 +236,15 @@ class Engine:
 
         message: one of ``ruedo.lcmtypes``, or its bytes.
         """
-        self._core.command(
-            self._checked(world),
-            channel,
-            message if isinstance(message, bytes) else message.encode(),
-        )
+        if not isinstance(channel, str):
+            raise TypeError(f"a channel is named by a text, ROBOT/velocity, not by {channel!r}")
+        if not isinstance(message, bytes):
+            if isinstance(message, str) or not hasattr(message, "encode"):
+                raise TypeError(
+                    f"a message is one of ruedo.lcmtypes, or its bytes, not {message!r}"
+                )
+            message = message.encode()
+        self._core.command(self._checked(world), channel, message)
 
     def touching(self) -> NDArray[np.int32]:
         """(worlds, driven robots): in how many of the states of the last ``step`` a robot ran into
@@ -265,20 +276,25 @@ class Engine:
         that texts name are read once, when they are first named.
         """
         indices = self._indices(worlds)
-        if seed is not None:
-            seeds = (
-                [seed + i for i in range(len(indices))]
-                if isinstance(seed, (int, np.integer))
-                else [operator.index(s) for s in seed]
-            )
-            if len(seeds) != len(indices):
-                raise ValueError(f"{len(seeds)} seeds for {len(indices)} worlds")
-            for index, one in zip(indices, seeds):
-                self._seeds[index] = one
-        texts = [text] * len(indices) if isinstance(text, str) else list(text or ())
-        if texts and len(texts) != len(indices):
-            raise ValueError(f"{len(texts)} texts for {len(indices)} worlds")
-        self._core.reset(indices, [self._seeds[index] for index in indices], texts)
+        count = len(indices)
+        if seed is None:
+            seeds = [self._seeds[index] for index in indices]
+        elif isinstance(seed, (Sequence, np.ndarray)) and not isinstance(seed, str):
+            seeds = [whole("seed", one, 0, MOST_SEED) for one in seed]
+            if len(seeds) != count:
+                raise ValueError(f"{len(seeds)} seeds for {count} worlds")
+        else:
+            first = whole("seed", seed, 0, MOST_SEED - max(count - 1, 0))
+            seeds = [first + i for i in range(count)]
+        if text is None:
+            worlds_of = []
+        else:
+            worlds_of = [text] * count if isinstance(text, str) else texts("text", text)
+            if len(worlds_of) != count:
+                raise ValueError(f"{len(worlds_of)} texts for {count} worlds")
+        self._core.reset(indices, seeds, worlds_of)
+        for index, one in zip(indices, seeds):
+            self._seeds[index] = one
 
     def drawn(self, world: int = 0) -> dict[str, float]:
         """What was drawn for a copy, by target, from ``randomize`` and its seed.
@@ -312,7 +328,12 @@ class Engine:
         return f"<ruedo.Engine: {self._worlds} worlds, robots {', '.join(self._robots) or 'none'}, steps of {self.dt * 1e3:g} ms>"
 
     def _velocities(self, commands: ArrayLike) -> NDArray[np.float64]:
-        given = np.asarray(commands, dtype=np.float64)
+        try:
+            given = np.asarray(commands, dtype=np.float64)
+        except (TypeError, ValueError):
+            raise TypeError(
+                f"commands are numbers, (m/s, rad/s) for each robot of each world, not {commands!r}"
+            ) from None
         if given.ndim == 0 or given.shape[-1] not in (2, 3):
             raise ValueError(
                 f"commands have 2 values for a robot (m/s, rad/s) or 3 (m/s ahead, m/s left, rad/s) in their last axis; "
@@ -333,7 +354,7 @@ class Engine:
         return full
 
     def _checked(self, world: int) -> int:
-        index = operator.index(world)
+        index = whole("a world's index", world, -MOST_WHOLE)
         if not 0 <= index < self._worlds:
             raise IndexError(f"world {index} of {self._worlds}")
         return index

@@ -13,7 +13,8 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
-from ..engine import Engine
+from ..arguments import whole
+from ..engine import MOST_WORLDS, Engine
 from ..rooms import TEST_ROOMS, Scene
 
 if TYPE_CHECKING:
@@ -56,6 +57,7 @@ class TaskVectorEnv(VectorEnv):
         disabled: tuple[str, ...] = (),
         randomize: dict[str, str] | None = None,
     ) -> None:
+        num_envs = whole("num_envs", num_envs, 1, MOST_WORLDS)
         if split not in ("train", "test"):
             raise ValueError(f"split is {split!r}; allowed are 'train' and 'test'")
         if render_mode not in MODES:
@@ -142,6 +144,9 @@ class TaskVectorEnv(VectorEnv):
         self, actions: NDArray[Any]
     ) -> tuple[NDArray[Any], NDArray[np.float64], NDArray[np.bool_], NDArray[np.bool_], Info]:
         """One action of 0.1 s in every environment."""
+        if not hasattr(self, "_generators"):
+            raise gymnasium.error.ResetNeeded("call reset() before the first step()")
+        actions = checked_actions(actions, self.action_space)
         begun = None  # these show their beginning: their first action is the next one
         if self.autoreset_mode is AutoresetMode.NEXT_STEP and self._over.any():
             begun = self._over.copy()
@@ -247,9 +252,8 @@ class TaskEnv(gymnasium.Env):
         return observations[0], {}
 
     def step(self, action: NDArray[Any]) -> tuple[NDArray[Any], float, bool, bool, Info]:
-        observations, rewards, terminated, truncated, info = self._one.step(
-            np.asarray(action)[None]
-        )
+        one = checked_actions(action, self.action_space)
+        observations, rewards, terminated, truncated, info = self._one.step(one[None])
         return (
             observations[0],
             float(rewards[0]),
@@ -294,9 +298,20 @@ def seen(ranges: NDArray[np.float32]) -> NDArray[np.float32]:
 
 
 def checked_beams(beams: int) -> int:
-    if not 2 <= beams <= 1024:
-        raise ValueError(f"beams is {beams}; allowed are 2 to 1024")
-    return beams
+    return whole("beams", beams, 2, 1024)
+
+
+def checked_actions(actions: Any, space: spaces.Space[Any]) -> NDArray[np.float64]:
+    """Finite numbers in the space's shape. Raises TypeError and ValueError."""
+    try:
+        given = np.asarray(actions, np.float64)
+    except (TypeError, ValueError):
+        raise TypeError(f"actions are numbers of shape {space.shape}, not {actions!r}") from None
+    if given.shape != space.shape:
+        raise ValueError(f"actions have the shape {space.shape}, not {given.shape}")
+    if not np.isfinite(given).all():
+        raise ValueError(f"actions are finite numbers, not {actions!r}")
+    return given
 
 
 DRIVE = spaces.Box(-1.0, 1.0, (2,), np.float32)

@@ -16,6 +16,7 @@ from __future__ import annotations
 
 from typing import Any
 
+from ..arguments import whole
 from ..rooms import Room, make_crowd_hall
 from .base import TaskEnv
 from .navigate import NavigateVectorEnv
@@ -33,9 +34,7 @@ class CrowdVectorEnv(NavigateVectorEnv):
     def __init__(self, num_envs: int = 1, *, people: int = 8, **options: Any) -> None:
         if "obstacles" in options:
             raise TypeError("Crowd-v0 has no obstacles but people: people=8")
-        if not 0 <= people <= MOST_PEOPLE:
-            raise ValueError(f"people is {people}; allowed are 0 to {MOST_PEOPLE}")
-        self._people = people
+        self._people = whole("people", people, 0, MOST_PEOPLE)
         super().__init__(num_envs, **options)
 
     def _scene(self, number: int) -> Room:

@@ -15,9 +15,10 @@ from gymnasium import spaces
 from numpy.typing import NDArray
 from pettingzoo import ParallelEnv  # type: ignore[import-untyped, unused-ignore]
 
+from ..arguments import whole
 from ..engine import Engine
 from ..rooms import TEST_ROOMS, make_fleet_room
-from .base import DRIVE, PICTURE, STEPS, checked_beams, drive_commands
+from .base import DRIVE, PICTURE, STEPS, checked_actions, checked_beams, drive_commands
 from .navigate import GOAL_M, LIMITS, observation
 
 Each = dict[str, Any]
@@ -42,8 +43,7 @@ class FleetEnv(ParallelEnv):  # type: ignore[misc]    # PettingZoo's generics
         noise: bool = True,
         render_mode: Literal["rgb_array"] | None = None,
     ) -> None:
-        if not 1 <= robots <= 32:
-            raise ValueError(f"robots is {robots}; allowed are 1 to 32")
+        robots = whole("robots", robots, 1, 32)
         if split not in ("train", "test"):
             raise ValueError(f"split is {split!r}; allowed are 'train' and 'test'")
         if render_mode not in (None, "rgb_array"):
@@ -104,7 +104,10 @@ class FleetEnv(ParallelEnv):  # type: ignore[misc]    # PettingZoo's generics
         commands = np.zeros((1, len(self.possible_agents), 2))
         for i, name in enumerate(self.possible_agents):
             if name in self.agents:
-                commands[0, i] = drive_commands(actions[name])[0, 0]
+                if name not in actions:
+                    raise ValueError(f"no action for {name}; each of {self.agents} wants one")
+                action = checked_actions(actions[name], self._drives[name])
+                commands[0, i] = drive_commands(action)[0, 0]
         self._engine.step(commands, STEPS)
         self._actions += 1
         before, self._distance = self._distance, self._distances()

@@ -24,6 +24,7 @@ from gymnasium import spaces
 from gymnasium.vector import AutoresetMode
 from numpy.typing import NDArray
 
+from ..arguments import whole
 from ..rooms import Room, make_room
 from .base import (
     DRIVE,
@@ -58,7 +59,7 @@ class NavigateVectorEnv(TaskVectorEnv):
         render_mode: Literal["rgb_array", "human"] | None = None,
     ) -> None:
         self._beams = checked_beams(beams)
-        self._obstacles = obstacles
+        self._obstacles = whole("obstacles", obstacles, 0, 100)
         low = np.concatenate([np.zeros(beams + 1), -LIMITS[1:]]).astype(np.float32)
         high = np.concatenate([np.ones(beams), LIMITS]).astype(np.float32)
         super().__init__(
