@@ -114,11 +114,43 @@ def test_arguments_instead_of_options():
         ({"disable": "p3at/camera"}, "disable is 'p3at/camera': it must be a list"),
         ({"set": ["p3at/lrf.rate=20"]}, "set is .*: it must be a dict"),
         ({"text": "<sdf/>"}, "either a world or its text"),
+        ({"spawn": [5]}, "spawn is a list of texts; 5 is none"),
+        ({"lockstep": 1.5}, "lockstep is a whole number, not 1.5"),
+        ({"seed": "x"}, "seed is a whole number, not 'x'"),
+        ({"noise": "no"}, "noise is True or False, not 'no'"),
+        ({"timeout": "long"}, "timeout is a number, not 'long'"),
     ],
 )
 def test_wrong_arguments_say_what_is_right(wrong, says):
     with pytest.raises(TypeError, match=says):
         ruedo.launch(HALL, **wrong)
+
+
+def test_what_is_no_world_is_said():
+    for call, says in (
+        (lambda: ruedo.launch(5), "world is a file, the name of a world or a World, not 5"),
+        (lambda: ruedo.launch(text=5), "text is a text, not 5"),
+        (lambda: ruedo.World().robot(5), "model is a text, not 5"),
+    ):
+        with pytest.raises(TypeError, match=says):
+            call()
+
+
+@pytest.mark.parametrize(
+    "call, says",
+    [
+        (lambda sim: sim.spawn(5), "model is a text, not 5"),
+        (lambda sim: sim.spawn("p3at", "left"), "x is a number, not 'left'"),
+        (lambda sim: sim.set_pose("p3at", 0.0, None), "y is a number, not None"),
+        (lambda sim: sim.set_twist("p3at", 1.0), "linear is 3 numbers, not 1.0"),
+        (lambda sim: sim.state(5), "name is a text, not 5"),
+        (lambda sim: sim.step(0).latest("lrf"), "a device or stream is wanted.*not 'lrf'"),
+        (lambda sim: sim.step(2, [5]), "commands are made by robot.velocity_command.*5 is none"),
+    ],
+)
+def test_wrong_types_in_calls_say_what_is_right(call, says):
+    with ruedo.launch(HALL, lockstep=1, **QUICK) as sim, pytest.raises(TypeError, match=says):
+        call(sim)
 
 
 def test_worlds_are_found_by_name():

@@ -48,3 +48,27 @@ def switch(what: str, value: Any) -> bool:
     if isinstance(value, (str, bytes)) or value is None:
         raise TypeError(f"{what} is True or False, not {value!r}")
     return bool(value)
+
+
+def text(what: str, value: Any) -> str:
+    """A text. Raises TypeError."""
+    if not isinstance(value, str):
+        raise TypeError(f"{what} is a text, not {value!r}")
+    return value
+
+
+def number(what: str, value: Any) -> float:
+    """A number. Raises TypeError."""
+    if isinstance(value, (str, bytes)) or not hasattr(value, "__float__"):
+        raise TypeError(f"{what} is a number, not {value!r}")
+    return float(value)
+
+
+def numbers(what: str, values: Any, count: int) -> list[float]:
+    """So many of them. Raises TypeError and ValueError."""
+    if isinstance(values, (str, bytes)) or not isinstance(values, Iterable):
+        raise TypeError(f"{what} is {count} numbers, not {values!r}")
+    given = [number(what, one) for one in values]
+    if len(given) != count:
+        raise ValueError(f"{what} is {count} numbers, not {len(given)}")
+    return given

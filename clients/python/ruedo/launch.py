@@ -21,6 +21,7 @@ from pathlib import Path
 from typing import IO, Any, Literal
 from urllib.parse import urlsplit
 
+from . import arguments
 from .address import has_multicast_route
 from .errors import LaunchError, NoServer
 from .simulation import Simulation
@@ -88,6 +89,7 @@ def launch(
     prints (else it is shown in the errors alone). view: the web console, which show() of the
     simulation opens. Raises LaunchError with what the server said.
     """
+    timeout = arguments.number("timeout", timeout)
     options = _options(seed, rate, args, lockstep, spawn, disable, set, noise)
     port = _free_port() if view else 0
     if port:
@@ -127,8 +129,10 @@ def _world_file(
     if isinstance(world, World):
         text = str(world)
     elif world is not None:
+        if not isinstance(world, (str, os.PathLike)):
+            raise TypeError(f"world is a file, the name of a world or a World, not {world!r}")
         return os.fspath(world), None
-    assert text is not None
+    text = arguments.text("text", text)
     folder = tempfile.TemporaryDirectory(prefix="ruedo-")
     kind = "urdf" if "<robot" in text and "<sdf" not in text else "sdf"
     file = Path(folder.name, f"world.{kind}")
@@ -170,22 +174,25 @@ def _options(
             raise TypeError(
                 f"{name} is {several!r}: it must be a list, {name}={str(several).split()!r}"
             )
+        for one in several:
+            if not isinstance(one, (str, os.PathLike)):
+                raise TypeError(f"{name} is a list of texts; {one!r} is none")
     if set is not None and not isinstance(set, Mapping):
         raise TypeError(f"set is {set!r}: it must be a dict, such as {{'p3at/lrf.rate': 20}}")
     options = []
     if seed is not None:
-        options += ["--seed", str(seed)]
+        options += ["--seed", str(arguments.whole("seed", seed, 0, arguments.MOST_SEED))]
     if rate is not None:
         options += ["--rate", "max" if rate == "max" or rate == math.inf else str(rate)]
     if lockstep:
-        options += ["--lockstep", str(int(lockstep))]
+        options += ["--lockstep", str(arguments.whole("lockstep", lockstep))]
     for model in spawn:
         options += ["--spawn", model]
     for device in disable:
         options += ["--disable", device]
     for key, value in (set or {}).items():
         options += ["--set", f"{key}={str(value).lower() if isinstance(value, bool) else value}"]
-    if not noise:
+    if not arguments.switch("noise", noise):
         options.append("--no-noise")
     return options + list(args)
 

@@ -97,19 +97,23 @@ class Observations(State):
         """The samples of a device or stream, decoded, in order; none when none was due. Raises
         TypeMismatch.
         """
-        return [stream._sample_of(data) for data in self._on(stream.channel)]
+        return [stream._sample_of(data) for data in self._of(stream)]
 
     def latest(self, stream: Stream[T]) -> T | None:
         """The last of them."""
-        on_channel = self._on(stream.channel)
+        on_channel = self._of(stream)
         return stream._sample_of(on_channel[-1]) if on_channel else None
 
-    def _on(self, channel: str) -> list[bytes]:
+    def _of(self, stream: Stream[T]) -> list[bytes]:
         """Sorted once: a fleet asks for each of its robots."""
+        if not hasattr(stream, "channel"):
+            raise TypeError(
+                f"a device or stream is wanted, such as sim.robot('p3at').lrf, not {stream!r}"
+            )
         by_channel: dict[str, list[bytes]] | None = self.__dict__.get("_by_channel")
         if by_channel is None:
             by_channel = self.__dict__["_by_channel"] = arrivals.by_channel(self._steps)
-        return by_channel.get(channel, [])
+        return by_channel.get(stream.channel, [])
 
 
 _NOTHING = np.zeros(3)
@@ -210,6 +214,10 @@ class Stepper:
         if n < 0:
             raise ValueError(f"n is {n}: it must be at least 0")
         for command in commands:
+            if not isinstance(command, Command):
+                raise TypeError(
+                    f"commands are made by robot.velocity_command() and the like; {command!r} is none"
+                )
             if not 0 <= command.after < n:
                 raise ValueError(
                     f"a command is for {command.after} steps on; of {n} steps 0 to {n - 1} is allowed"

@@ -56,7 +56,7 @@ def load_map(path: str | os.PathLike[str]) -> OccupancyMap:
     file = Path(path)
     try:
         head = yaml.safe_load(file.read_text(encoding="utf-8"))
-    except yaml.YAMLError as error:
+    except (yaml.YAMLError, UnicodeDecodeError) as error:
         raise ValueError(f"{file}: {error}") from None
     if not isinstance(head, dict):
         raise ValueError(f"{file}: a map of image, resolution and origin is wanted")

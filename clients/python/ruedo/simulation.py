@@ -17,7 +17,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from . import control, lcmtypes
+from . import arguments, control, lcmtypes
 from .address import is_claimed, resolve_url
 from .bus import Bus, Subscription
 from .control import Session, State
@@ -283,8 +283,10 @@ class Simulation:
         given; heading in rad. The server refuses to put it into something. Returns the model's
         name: the server numbers one that is taken, unless it was asked for."""
         body = lcmtypes.spawn_request_t()
-        body.name, body.model, body.text, body.on_ground = name, model, text, z is None
-        body.position, body.orientation = [x, y, z or 0.0], _about_z(heading)
+        body.name, body.on_ground = arguments.text("name", name), z is None
+        body.model, body.text = arguments.text("model", model), arguments.text("text", text)
+        body.position = [arguments.number(*one) for one in (("x", x), ("y", y), ("z", z or 0.0))]
+        body.orientation = _about_z(arguments.number("heading", heading))
         before = self._known
         reply = self._session.request(lcmtypes.request_t.SPAWN, body, 60.0)
         self._refresh_info(before)
@@ -309,8 +311,13 @@ class Simulation:
         (rad).
         """
         body = lcmtypes.set_pose_request_t()
-        body.name, body.position = name, [x, y, z]
-        body.orientation = list(orientation) if orientation is not None else _about_z(heading)
+        body.name = arguments.text("name", name)
+        body.position = [arguments.number(*one) for one in (("x", x), ("y", y), ("z", z))]
+        body.orientation = (
+            _about_z(arguments.number("heading", heading))
+            if orientation is None
+            else arguments.numbers("orientation", orientation, 4)
+        )
         self._session.request(lcmtypes.request_t.SET_POSE, body)
 
     def set_twist(
@@ -318,7 +325,9 @@ class Simulation:
     ) -> None:
         """Gives a model a velocity (m/s) and a turn rate (rad/s), in the world."""
         body = lcmtypes.set_twist_request_t()
-        body.name, body.linear, body.angular = name, list(linear), list(angular)
+        body.name = arguments.text("name", name)
+        body.linear = arguments.numbers("linear", linear, 3)
+        body.angular = arguments.numbers("angular", angular, 3)
         self._session.request(lcmtypes.request_t.SET_TWIST, body)
 
     def state(self, name: str = "") -> State:
@@ -622,7 +631,7 @@ def _name_hash(name: str) -> int:
 
 def _name_body(name: str) -> Any:
     body = lcmtypes.name_request_t()
-    body.name = name
+    body.name = arguments.text("name", name)
     return body
 
 

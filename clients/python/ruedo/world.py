@@ -7,6 +7,8 @@ import os
 from html import escape  # xml.sax brings in urllib and ssl, 20 ms at each start of a program
 from pathlib import Path
 
+from . import arguments
+
 
 class World:
     """Builds a world: a plane, and what is put on it. Lengths in m, angles in rad, positions of
@@ -100,6 +102,7 @@ class World:
         """model: one of Ruedo's ("p3at"), or a file or model:// that the server finds. name:
         default the model's.
         """
+        arguments.text("model", model)
         uri = model if "://" in model or os.sep in model else f"model://{model}"
         own = self._unused(name or Path(model).stem)
         self._models.append(
