@@ -17,7 +17,8 @@ template <std::integral Whole = int64_t>
 Whole whole(double value) {
   // The bounds are powers of two, or 0, which a double holds exactly.
   constexpr double kBegin = static_cast<double>(std::numeric_limits<Whole>::min());
-  constexpr double kEnd = 2.0 * static_cast<double>(std::numeric_limits<Whole>::max() / 2 + 1);
+  constexpr Whole kHalf = std::numeric_limits<Whole>::max() / 2 + 1;
+  constexpr double kEnd = 2.0 * static_cast<double>(kHalf);
   if (!(value > kBegin - 1.0 || value == kBegin) || !(value < kEnd)) {
     throw std::out_of_range(std::to_string(value) + " is no whole number that can be counted with");
   }

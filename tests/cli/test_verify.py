@@ -29,7 +29,14 @@ from recorded import (
     url,
     write,
 )
-from ruedo.lcmtypes import applied_t, joint_command_t, log_header_t, planar_lidar_t, state_hash_t
+from ruedo.lcmtypes import (
+    applied_t,
+    joint_command_t,
+    joint_state_t,
+    log_header_t,
+    planar_lidar_t,
+    state_hash_t,
+)
 
 ARMS = str(SOURCE / "tests" / "golden" / "arms.sdf")
 
@@ -302,6 +309,38 @@ def test_a_lockstep_log_verifies(tmp_path):
     assert server.end()[0] == 0
     assert sum(channel == "ruedo/applied" for _, channel, _ in events(tmp_path / "a.lcm")) >= 40
     result = program("verify", tmp_path / "a.lcm")
+    assert result.returncode == 0, result.stdout + result.stderr
+
+
+LIFT = """<sdf version="1.9"><world name="house"><model name="Lift1"><link name="platform"><inertial>
+<mass>1200</mass><inertia><ixx>100</ixx><iyy>100</iyy><izz>100</izz></inertia></inertial><collision
+name="c"><geometry><box><size>1 1 0.1</size></box></geometry></collision></link>
+<joint name="cabin_joint" type="prismatic"><parent>world</parent><child>platform</child><axis>
+<xyz>0 0 1</xyz></axis></joint><plugin name="lift" filename="liblift.so"><floor name="L1"
+elevation="0"/><floor name="L2" elevation="1.5"/><v_max_cabin>2</v_max_cabin><a_nom_cabin>1
+</a_nom_cabin><f_max_cabin>25323</f_max_cabin><cabin_joint_name>cabin_joint</cabin_joint_name>
+</plugin></model></world></sdf>"""
+
+
+def test_a_lift_that_is_called_is_repeated(tmp_path):
+    world, log = tmp_path / "house.sdf", tmp_path / "lift.lcm"
+    world.write_text(LIFT)
+    order = joint_command_t()
+    order.n, order.name, order.mode = 1, ["cabin_joint"], bytes([joint_command_t.FLOOR])
+    order.value = [1.0]
+    server = Server(7838, "--lockstep", "1", "--record", log, world=world)
+    with server.connect() as simulation:
+        simulation.step(600, [ruedo.Command("Lift1/joint_command", order.encode())])
+        simulation.quit()
+    assert server.end()[0] == 0
+    heights = [
+        joint_state_t.decode(data).joint_position[0]
+        for _, channel, data in events(log)
+        if channel == "Lift1/joints"
+    ]
+    assert heights[0] == pytest.approx(0.0, abs=1e-6)
+    assert heights[-1] == pytest.approx(1.5, abs=0.005)
+    result = program("verify", log)
     assert result.returncode == 0, result.stdout + result.stderr
 
 
