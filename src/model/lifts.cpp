@@ -72,7 +72,7 @@ struct Reader {
     const double height = plugin.number("floor_height", 3.0, Allowed::positive(quantity::kLength));
     const double top = model.joints[lift.cabin].axis.upper;
     const int floors = top < kMostFloors * height
-                           ? static_cast<int>(std::floor(std::max(top, 0.0) / height + 1e-6)) + 1
+                           ? rounded_down<int>(std::max(top, 0.0) / height + 1e-6) + 1
                            : kMostFloors;
     const std::string& name = model.joints[leaf].name;
     for (int i = 0; i < floors; ++i) lift.floors.push_back({i * height, {name}});

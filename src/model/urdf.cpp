@@ -2,10 +2,8 @@
 #include "model/urdf.h"
 
 #include <algorithm>
-#include <locale>
 #include <map>
 #include <set>
-#include <sstream>
 #include <string_view>
 #include <vector>
 
@@ -17,6 +15,7 @@
 #include "model/no_effect.h"
 #include "model/read_context.h"
 #include "model/urdf_format.h"
+#include "model/urdf_repair.h"
 
 namespace ruedo::model {
 namespace {
@@ -444,38 +443,6 @@ const Element& whom_it_names(const std::string& fault, const Element& robot) {
   return robot;
 }
 
-bool is_three_numbers(const std::string& text) {
-  std::istringstream in(text);
-  in.imbue(std::locale::classic());
-  double value = 0.0;
-  int count = 0;
-  while (in >> value) ++count;
-  return in.eof() && count == 3;
-}
-
-// urdfdom gives the whole robot up for a joint whose place or axis is no three numbers: commas
-// between them are taken for blanks, and what cannot be read is as if it were not there.
-void repair_places(Element& element, const std::string& where, Findings& findings) {
-  const std::string* name = element.attribute("name");
-  const std::string inside = name ? element.name + " " + *name : where;
-  for (const auto& child : element.children) repair_places(*child, inside, findings);
-  if (element.name != "origin" && element.name != "axis") return;
-  for (auto& [attribute, value] : element.attributes) {
-    if ((attribute != "xyz" && attribute != "rpy") || is_three_numbers(value)) continue;
-    const std::string written =
-        attribute + "=\"" + value + "\" of <" + element.name + "> is not three numbers";
-    std::string blanks = value;
-    std::replace(blanks.begin(), blanks.end(), ',', ' ');
-    if (is_three_numbers(blanks)) {
-      findings.repaired(element.source, where, written + "; its commas are taken for blanks");
-      value = blanks;
-    } else {
-      value = element.name == "axis" ? "1 0 0" : "0 0 0";
-      findings.error(element.source, where, written + "; " + value + " is taken");
-    }
-  }
-}
-
 struct Parsed {
   urdf::ModelInterfaceSharedPtr model;  // null: urdfdom gave up
   std::vector<std::string> errors;      // what it said
@@ -544,16 +511,7 @@ std::unique_ptr<Element> urdf_as_sdf(const Element& written, Findings& findings)
   if (!robot.attribute("name") && !robot.child("link"))
     robot.fail("has no name and no link; a file of xacro macros alone is for others to include");
   const std::string name = required_name(robot);
-  for (const char* kind : {"link", "joint"}) {
-    std::map<std::string, const Element*> seen;
-    for (const Element* each : robot.all(kind)) {
-      if (!seen.try_emplace(name_of(*each), each).second)
-        each->fail("a second <" + std::string(kind) + "> of the name '" + name_of(*each) + "'");
-    }
-  }
-  for (const auto& child : robot.children) {
-    if (child->name == "joint") repair_places(*child, "", findings);
-  }
+  repair_urdf(robot, findings);
   Parsed parsed = parse(robot);
   constexpr int kMostFaults = 20;  // in one link
   for (int i = 0; i < kMostFaults && parsed.model && parsed.model->getRoot() &&

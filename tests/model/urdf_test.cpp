@@ -64,6 +64,74 @@ TEST(Urdf, APlaceThatCannotBeReadIsNamedAndTheRobotStays) {
                 "6 joint two xyz=\"0 up 0\" of <axis> is not three numbers; 1 0 0 is taken"}));
 }
 
+// One faulty link or joint does not cost the robot: it is mended or left out, and named.
+TEST(Urdf, OneFaultyJointDoesNotCostTheRobot) {
+  const std::string ends = "<parent link='base'/><child link='arm'/>", limit = "<limit lower='-1' ";
+  struct Case {
+    std::string inside;  // in line 2, after base, arm and a hand that is fixed to the arm
+    std::string said;
+    size_t links, joints;
+  };
+  const Case cases[] = {
+      {"<joint name='j' type='revolute'>" + ends + "</joint>",
+       "a revolute joint without <limit>; it has none", 3, 2},
+      {"<joint name='j' type='prismatic'>" + ends + limit +
+           "upper='x' effort='1' velocity='1'/></joint>",
+       "<limit>: upper=\"x\" is not a number; it is left out", 3, 2},
+      {"<joint name='j' type='hinge'>" + ends + "</joint>",
+       "type 'hinge' is none; allowed are fixed, revolute, continuous, prismatic, planar and "
+       "floating; it is taken as fixed",
+       3, 2},
+      {"<joint name='j'>" + ends + "</joint>",
+       "type '' is none; allowed are fixed, revolute, continuous, prismatic, planar and floating; "
+       "it is taken as fixed",
+       3, 2},
+      {"<joint name='j' type='continuous'>" + ends + "<mimic multiplier='2'/></joint>",
+       "<mimic>: it names no joint; it is left out", 3, 2},
+      {"<joint name='j' type='continuous'>" + ends + "<dynamics damping='some'/></joint>",
+       "<dynamics>: damping=\"some\" is not a number; it is left out", 3, 2},
+      {"<joint name='j' type='fixed'><child link='arm'/></joint>",
+       "names no parent link; the joint is left out", 2, 1},
+      {"<joint name='j' type='fixed'><parent link='nowhere'/><child link='arm'/></joint>",
+       "its parent link 'nowhere' is not there; the joint is left out", 2, 1},
+      {"<joint name='j' type='fixed'>" + ends +
+           "</joint><joint name='k' type='fixed'><parent "
+           "link='hand'/><child link='base'/></joint>",
+       "'arm' would hang on itself; the joint is left out", 3, 2},
+      {"<joint type='fixed'>" + ends + "</joint>",
+       "a <joint> without a name; the joint is left out", 2, 1},
+      {"<joint name='j' type='fixed'>" + ends + "</joint><link name='arm'/>",
+       "a second <link> of the name 'arm'; the link is left out", 3, 2},
+      {"<joint name='j' type='fixed'>" + ends + "</joint><link name='far'/>",
+       "does not hang on 'base'; the link is left out", 3, 2},
+  };
+  for (const Case& each : cases) {
+    TemporaryFolder folder;
+    const auto world = load_world(folder.write(
+        "bot.urdf",
+        "<robot name='bot'><link name='base'/><link name='arm'/><link name='hand'/><joint name='h' "
+        "type='continuous'><parent link='arm'/><child link='hand'/></joint>\n" +
+            each.inside + "</robot>"));
+    ASSERT_EQ(world->models.back().model->links.size(), each.links) << each.inside;
+    EXPECT_EQ(world->models.back().model->joints.size(), each.joints) << each.inside;
+    EXPECT_TRUE(std::any_of(world->findings.begin(), world->findings.end(), [&](const Finding& f) {
+      return f.kind == Finding::Kind::error && f.source.line == 2 && f.text == each.said;
+    })) << each.inside;
+  }
+}
+
+// A joint without limits is turned and slid as far as one likes.
+TEST(Urdf, AJointWithoutLimitsHasNone) {
+  TemporaryFolder folder;
+  const auto world = load_world(folder.write(
+      "bot.urdf",
+      "<robot name='bot'><link name='a'/><link name='b'/><joint name='j' type='prismatic'><parent "
+      "link='a'/><child link='b'/></joint></robot>"));
+  const auto& axis = world->models.back().model->joints[ModelJointIndex(0)].axis;
+  EXPECT_EQ(axis.lower, -std::numeric_limits<double>::infinity());
+  EXPECT_EQ(axis.upper, std::numeric_limits<double>::infinity());
+}
+
 TEST(Urdf, OnlyTheRootMayBeTheWorld) {
   TemporaryFolder folder;
   const std::string file = folder.write("arm.urdf", R"(<robot name="arm"><link name="base"/>

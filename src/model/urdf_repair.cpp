@@ -1,0 +1,236 @@
+#include "model/urdf_repair.h"
+
+#include <algorithm>
+#include <locale>
+#include <map>
+#include <set>
+#include <sstream>
+#include <vector>
+
+namespace ruedo::model {
+namespace {
+
+// Numbers that stand between blanks, as urdfdom reads them; -1: something else stands there, too.
+int count_of_numbers(const std::string& text) {
+  std::istringstream in(text);
+  in.imbue(std::locale::classic());
+  double value = 0.0;
+  int count = 0;
+  while (in >> value) ++count;
+  return in.eof() ? count : -1;
+}
+
+std::string name_of(const Element& element) {
+  const std::string* name = element.attribute("name");
+  return name ? *name : "";
+}
+
+// The link that a joint's <parent> or <child> names; "": none.
+std::string end_of(const Element& joint, const char* which) {
+  const Element* end = joint.child(which);
+  const std::string* link = end ? end->attribute("link") : nullptr;
+  return link ? *link : "";
+}
+
+class Repair {
+ public:
+  Repair(Element& robot, Findings& findings) : robot_(robot), findings_(findings) {}
+
+  void run() {
+    leave_out_namesakes();
+    for (const auto& child : robot_.children) {
+      if (child->name != "joint") continue;
+      places(*child, "");
+      numbers(*child);
+      type(*child);
+    }
+    leave_out_joints();
+    leave_out_loose_links();
+  }
+
+ private:
+  // Takes what `odd` gives a reason for out of the robot, and names it.
+  template <typename Odd>
+  void leave_out(const Odd& odd) {
+    std::erase_if(robot_.children, [&](const auto& child) {
+      if (child->name != "link" && child->name != "joint") return false;
+      const std::string reason = odd(*child);
+      if (reason.empty()) return false;
+      findings_.error(child->source, child->name + " " + name_of(*child),
+                      reason + "; the " + child->name + " is left out");
+      return true;
+    });
+  }
+
+  void leave_out_namesakes() {
+    std::set<std::string> links, joints;
+    leave_out([&](const Element& each) -> std::string {
+      const std::string name = name_of(each);
+      if (name.empty()) return "a <" + each.name + "> without a name";
+      return (each.name == "link" ? links : joints).insert(name).second
+                 ? ""
+                 : "a second <" + each.name + "> of the name '" + name + "'";
+    });
+  }
+
+  // Commas between a place's numbers are taken for blanks; what cannot be read is as if it were
+  // not there.
+  void places(Element& element, const std::string& where) {
+    const std::string* name = element.attribute("name");
+    const std::string inside = name ? element.name + " " + *name : where;
+    for (const auto& child : element.children) places(*child, inside);
+    if (element.name != "origin" && element.name != "axis") return;
+    for (auto& [attribute, value] : element.attributes) {
+      if ((attribute != "xyz" && attribute != "rpy") || count_of_numbers(value) == 3) continue;
+      const std::string written =
+          attribute + "=\"" + value + "\" of <" + element.name + "> is not three numbers";
+      std::string blanks = value;
+      std::replace(blanks.begin(), blanks.end(), ',', ' ');
+      if (count_of_numbers(blanks) == 3) {
+        findings_.repaired(element.source, where, written + "; its commas are taken for blanks");
+        value = blanks;
+      } else {
+        value = element.name == "axis" ? "1 0 0" : "0 0 0";
+        findings_.error(element.source, where, written + "; " + value + " is taken");
+      }
+    }
+  }
+
+  // Of <limit>, <dynamics>, <mimic> and what nobody here needs: all are numbers but a name.
+  void numbers(Element& joint) {
+    static const std::set<std::string> kOfNumbers = {"limit", "dynamics", "mimic",
+                                                     "safety_controller", "calibration"};
+    std::erase_if(joint.children, [&](const auto& child) {
+      if (kOfNumbers.count(child->name) == 0) return false;
+      std::string reason;
+      for (const auto& [attribute, value] : child->attributes) {
+        if (attribute != "joint" && count_of_numbers(value) != 1)
+          reason = attribute + "=\"" + value + "\" is not a number";
+      }
+      if (child->name == "mimic" && !child->attribute("joint")) reason = "it names no joint";
+      if (reason.empty()) return false;
+      findings_.error(child->source, "joint " + name_of(joint),
+                      "<" + child->name + ">: " + reason + "; it is left out");
+      return true;
+    });
+  }
+
+  void type(Element& joint) {
+    static const std::set<std::string> kTypes = {"fixed",     "revolute", "continuous",
+                                                 "prismatic", "planar",   "floating"};
+    const auto found = std::find_if(joint.attributes.begin(), joint.attributes.end(),
+                                    [](const auto& each) { return each.first == "type"; });
+    const std::string written = found == joint.attributes.end() ? "" : found->second;
+    if (kTypes.count(written) == 0) {
+      findings_.error(joint.source, "joint " + name_of(joint),
+                      "type '" + written +
+                          "' is none; allowed are fixed, revolute, continuous, prismatic, planar "
+                          "and floating; it is taken as fixed");
+      if (found == joint.attributes.end())
+        joint.attributes.emplace_back("type", "fixed");
+      else
+        found->second = "fixed";
+    } else if ((written == "revolute" || written == "prismatic") && !joint.has("limit")) {
+      findings_.error(joint.source, "joint " + name_of(joint),
+                      "a " + written + " joint without <limit>; it has none");
+      auto limit = std::make_unique<Element>();
+      limit->name = "limit";
+      limit->source = joint.source;
+      // Beyond what a limit of ours can be, which is none.
+      limit->attributes = {
+          {"lower", "-1e17"}, {"upper", "1e17"}, {"effort", "0"}, {"velocity", "0"}};
+      joint.children.push_back(std::move(limit));
+    }
+  }
+
+  void leave_out_joints() {
+    std::set<std::string> links;
+    for (const Element* link : robot_.all("link")) links.insert(name_of(*link));
+    leave_out([&](const Element& joint) -> std::string {
+      if (joint.name != "joint") return "";
+      for (const char* which : {"parent", "child"}) {
+        const std::string link = end_of(joint, which);
+        if (link.empty()) return std::string("names no ") + which + " link";
+        if (links.count(link) == 0)
+          return std::string("its ") + which + " link '" + link + "' is not there";
+      }
+      return "";
+    });
+    const std::set<const Element*> circular = closing_circles();
+    leave_out([&](const Element& joint) -> std::string {
+      return circular.count(&joint) == 0 ? ""
+                                         : "'" + end_of(joint, "child") + "' would hang on itself";
+    });
+  }
+
+  // The joints by which a link would hang on itself: depth first, from each link to what it hangs
+  // on.
+  std::set<const Element*> closing_circles() const {
+    std::map<std::string, std::vector<const Element*>> joints_of;  // by the joints' child
+    for (const Element* joint : robot_.all("joint"))
+      joints_of[end_of(*joint, "child")].push_back(joint);
+    enum class State { unseen, on_the_way, done };
+    std::map<std::string, State> states;
+    std::set<const Element*> closing;
+    for (const Element* link : robot_.all("link")) {
+      const std::string first = name_of(*link);
+      std::vector<std::pair<std::string, size_t>> way;  // links, and how many joints were followed
+      if (states[first] == State::unseen) way.emplace_back(first, 0);
+      while (!way.empty()) {
+        auto& [at, followed] = way.back();
+        states[at] = State::on_the_way;
+        const auto hangs_by = joints_of.find(at);
+        if (hangs_by == joints_of.end() || followed == hangs_by->second.size()) {
+          states[at] = State::done;
+          way.pop_back();
+          continue;
+        }
+        const Element* joint = hangs_by->second[followed++];
+        const std::string parent = end_of(*joint, "parent");
+        if (states[parent] == State::on_the_way) closing.insert(joint);
+        if (states[parent] == State::unseen) way.emplace_back(parent, 0);
+      }
+    }
+    return closing;
+  }
+
+  // Keeps the links that hang together and are the most, the first ones of them.
+  void leave_out_loose_links() {
+    std::map<std::string, std::string> next;  // towards one link of all that hang together
+    const auto one_of = [&](std::string link) {
+      for (auto at = next.find(link); at != next.end(); at = next.find(link)) {
+        if (const auto after = next.find(at->second); after != next.end())
+          at->second = after->second;
+        link = at->second;
+      }
+      return link;
+    };
+    for (const Element* joint : robot_.all("joint")) {
+      const std::string child = one_of(end_of(*joint, "child")),
+                        parent = one_of(end_of(*joint, "parent"));
+      if (child != parent) next[child] = parent;
+    }
+    std::vector<std::string> all;
+    std::map<std::string, int> sizes;
+    for (const Element* link : robot_.all("link")) {
+      const std::string one = one_of(name_of(*link));
+      if (++sizes[one] == 1) all.push_back(one);
+    }
+    if (all.size() < 2) return;
+    const std::string kept = *std::max_element(
+        all.begin(), all.end(), [&](const auto& a, const auto& b) { return sizes[a] < sizes[b]; });
+    leave_out([&](const Element& each) -> std::string {
+      const std::string link = each.name == "link" ? name_of(each) : end_of(each, "child");
+      return one_of(link) == kept ? "" : "does not hang on '" + kept + "'";
+    });
+  }
+
+  Element& robot_;
+  Findings& findings_;
+};
+
+}  // namespace
+
+void repair_urdf(Element& robot, Findings& findings) { Repair(robot, findings).run(); }
+
+}  // namespace ruedo::model
