@@ -180,9 +180,10 @@ export default async function access({ page, until, check, ready, picture, expec
 
   // ---- colours and motion that the system asks for
   await page.emulateMedia({ forcedColors: "active", reducedMotion: "reduce" });
-  check(
+  // The page hears of it with its next frame.
+  await until(
     "no motion for who wants none",
-    await page.evaluate(() => !window.ruedo.stage.controls.enableDamping),
+    () => !window.ruedo.stage.controls.enableDamping,
   );
   check(
     "what is chosen can be seen in forced colours",
