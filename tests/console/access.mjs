@@ -181,10 +181,7 @@ export default async function access({ page, until, check, ready, picture, expec
   // ---- colours and motion that the system asks for
   await page.emulateMedia({ forcedColors: "active", reducedMotion: "reduce" });
   // The page hears of it with its next frame.
-  await until(
-    "no motion for who wants none",
-    () => !window.ruedo.stage.controls.enableDamping,
-  );
+  await until("no motion for who wants none", () => !window.ruedo.stage.controls.enableDamping);
   check(
     "what is chosen can be seen in forced colours",
     await page.evaluate(
