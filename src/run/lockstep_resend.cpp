@@ -11,6 +11,12 @@
 #include "run/lockstep.h"
 
 namespace ruedo::run {
+namespace {
+
+// What a reply and each of its parts take beside the text and the data.
+constexpr size_t kReplyHead = 8 + 8 + 4 + 1 + 4, kPartHead = 8 + 4 + 8 + 4 + 4 + 4;
+
+}  // namespace
 
 // What fits into a part goes whole; only what is larger than a part by itself goes in pieces.
 engine::Outcome Lockstep::resend(const request_t& request, const Session& session) {
@@ -36,14 +42,18 @@ engine::Outcome Lockstep::resend(const request_t& request, const Session& sessio
   resend_reply_t reply;
   reply.step = published_;
   reply.waits_for = waits_for(published_);
-  size_t room = engine::kMaxPartSize;
+  // The whole reply, heads included, fits into one datagram. Where a fragment comes twice and
+  // another is lost, stock LCM takes the message for complete and hands over whatever the memory
+  // held.
+  size_t room = engine::kMaxPartSize - kReplyHead - reply.waits_for.size();
   for (const resend_wanted_t& wanted :
        std::span(body.wanted).first(std::min(body.wanted.size(), kMostWanted))) {
     const std::span<const uint8_t> bytes =
         kept_.find(wanted.step, wanted.channel_index, wanted.sequence);
     if (wanted.offset < 0 || static_cast<size_t>(wanted.offset) >= bytes.size()) continue;
     const size_t left = bytes.size() - static_cast<size_t>(wanted.offset);
-    if (left > room && !reply.parts.empty()) break;
+    if (room <= kPartHead || (left > room - kPartHead && !reply.parts.empty())) break;
+    room -= kPartHead;
     const std::span<const uint8_t> piece =
         bytes.subspan(static_cast<size_t>(wanted.offset), std::min(left, room));
     resend_part_t& part = reply.parts.emplace_back();

@@ -1,10 +1,12 @@
 // Lockstep's leases, and grants that are none.
+#include <algorithm>
 #include <atomic>
 #include <cmath>
 #include <optional>
 
 #include <gtest/gtest.h>
 
+#include "engine/world_state.h"
 #include "lockstep_client.h"
 #include "log/reader.h"
 #include "ruedo/applied_t.hpp"
@@ -325,6 +327,31 @@ TEST_F(HostileGrants, AllAtOnceGoesAsFarAsIsKept) {
   body.nwanted = static_cast<int32_t>(body.wanted.size());
   EXPECT_EQ(client_->ask(request_t::RESEND, 101, engine::encoded(body)).code,
             reply_t::OK);  // the last one is not looked at
+}
+
+// A message of LCM's that is cut in fragments may come together wrongly where some are lost.
+TEST_F(HostileGrants, AReplyIsOneDatagram) {
+  client_->send(request_t::GRANT, client_->next_sequence(), engine::encoded(grant(4, 5, 4)));
+  while (newest(*client_, 4) < 5) {
+  }
+  const std::vector<engine::Channel>& channels = server_->channels().list();
+  const auto tick = std::find_if(channels.begin(), channels.end(),
+                                 [](const auto& channel) { return channel.type == "tick_t"; });
+  resend_wanted_t small;
+  small.step = 5;
+  small.channel_index = static_cast<int32_t>(tick - channels.begin());
+  small.sequence = small.offset = 0;
+  resend_request_t body;
+  body.received = 4;
+  body.wanted.resize(Lockstep::kMostWanted, small);
+  body.nwanted = static_cast<int32_t>(body.wanted.size());
+  const reply_t reply = client_->ask(request_t::RESEND, 100, engine::encoded(body));
+  ASSERT_EQ(reply.code, reply_t::OK);
+  resend_reply_t resent;
+  ASSERT_EQ(decode_checked(reply.body.data(), reply.body.size(), resent), DecodeFault::none);
+  const size_t part = reply.body.size() / resent.parts.size();
+  EXPECT_LE(reply.body.size(), engine::kMaxPartSize);
+  EXPECT_GT(reply.body.size() + part, engine::kMaxPartSize);  // as many as go into it
 }
 
 }  // namespace
