@@ -1,10 +1,11 @@
-"""The walls between the layers; run by pytest.
+"""The walls between the layers, and between the modules of the Python client; run by pytest.
 
 The layers and what each may use are read from the ruedo_layer() lines of the top CMakeLists.txt, so
-that there is one list. Libraries that live in one layer alone are listed below. The rule is also
-run on small trees that break it.
+that there is one list. Libraries that live in one layer alone are listed below. The rules are also
+run on small trees that break them.
 """
 
+import ast
 import os
 import re
 import subprocess
@@ -134,7 +135,70 @@ def bare_conversions(root):
     return problems
 
 
-@pytest.mark.parametrize("rule", [broken_walls, bare_conversions])
+PYTHON_CLIENT = "clients/python/ruedo"
+OTHERS_PRIVATE = {
+    "_get_packed_fingerprint"
+}  # of the classes that lcm-gen makes: it has no other name
+
+
+def is_private(name):
+    return name.startswith("_") and not name.endswith("__")
+
+
+def own_members(tree):
+    """The private members that a module's classes define or assign, without overrides, which call
+    what they override.
+    """
+    found, overrides = set(), set()
+    for node in (
+        n for top in ast.walk(tree) if isinstance(top, ast.ClassDef) for n in ast.walk(top)
+    ):
+        owner = ast.unparse(node.value) if isinstance(node, ast.Attribute) else ""
+        if isinstance(node, (ast.FunctionDef, ast.AsyncFunctionDef)):
+            found.add(node.name)
+        elif isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store):
+            found.add(node.id)
+        elif owner in ("self", "cls") and isinstance(node.ctx, ast.Store):
+            found.add(node.attr)
+        elif owner == "super()":
+            overrides.add(node.attr)
+    return {name for name in found - overrides if is_private(name)}
+
+
+def foreign_members(root):
+    """Private members of the Python client that are used outside of the module that defines them.
+
+    An object's class is not known here. So a private name that is used on another object than self
+    must be a member of this module's classes and of no other module's.
+    """
+    modules = {
+        path: ast.parse(path.read_text(encoding="utf-8"))
+        for path in sorted((root / PYTHON_CLIENT).rglob("*.py"))
+        if "lcmtypes" not in path.parts
+    }
+    members = {path: own_members(tree) for path, tree in modules.items()}
+    problems = []
+    for path, tree in modules.items():
+        others = set().union(*(names for other, names in members.items() if other != path))
+        for node in ast.walk(tree):
+            used = ""
+            if isinstance(node, ast.Attribute):
+                if ast.unparse(node.value) not in ("self", "cls", "super()"):
+                    used = node.attr
+            elif isinstance(node, ast.Call) and ast.unparse(node.func) in ("getattr", "setattr"):
+                name = node.args[1]
+                used = name.value if isinstance(name, ast.Constant) else ""
+            elif isinstance(node, ast.ImportFrom) and node.module:
+                used = next((one.name for one in node.names if is_private(one.name)), "")
+            if not is_private(used) or used in OTHERS_PRIVATE | (members[path] - others):
+                continue
+            problems.append(
+                f"{path.relative_to(root)}:{node.lineno}: {ast.unparse(node)}: {used} is another module's own"
+            )
+    return problems
+
+
+@pytest.mark.parametrize("rule", [broken_walls, bare_conversions, foreign_members])
 def test_tree_keeps(rule):
     problems = rule(ROOT)
     assert not problems, "\n" + "\n".join(problems)
@@ -329,3 +393,30 @@ def test_bare_conversions_are_seen(tmp_path, text, good):
         )
         == []
     ) == good
+
+
+@pytest.mark.parametrize(
+    "text, good",
+    [
+        ("class B:\n    def f(self): return self._own\n", True),
+        ("class B:\n    _own: int\n    def f(self, other): return other._own\n", True),
+        ("class B:\n    def _g(self): return super()._g()\n", True),
+        ("FINGERPRINT = tick_t._get_packed_fingerprint()\n", True),
+        ("from . import _engine\n", True),
+        ("from ._version import __version__\n", True),
+        ("class B:\n    def f(self): return self.a._info\n", False),
+        ("class B:\n    def f(self): self._info = self.a._info\n", False),  # A has one, too
+        ("def f(a): a._info = 1\n", False),
+        ("def f(a): return getattr(a, '_info')\n", False),
+        ("from .a import _helper\n", False),
+        ("from . import a\na._helper()\n", False),
+    ],
+)
+def test_members_of_other_modules_are_seen(tmp_path, text, good):
+    client = tmp_path / PYTHON_CLIENT
+    client.mkdir(parents=True)
+    (client / "a.py").write_text(
+        "class A:\n    def __init__(self): self._info = 0\ndef _helper(): pass\n"
+    )
+    (client / "b.py").write_text(text)
+    assert (foreign_members(tmp_path) == []) == good

@@ -159,7 +159,7 @@ class PyEngine {
     return engine().drawn(world);
   }
 
-  // Copy 0 begins anew with that seed and is watched from its first state on. log: "" or the file
+  // Copy 0 is reset with that seed and is watched from its first state on. log: "" or the file
   // of what acts on it.
   void begin_run(uint64_t seed, const std::vector<std::string>& goals, bool no_contact,
                  std::optional<double> clearance, std::optional<double> odometry_error,

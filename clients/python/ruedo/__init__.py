@@ -26,7 +26,7 @@ except ImportError as _error:
         "build the target python_types and use BUILD/python"
     ) from _error
 from . import markers
-from .bus import Subscription
+from .callbacks import Subscription
 from .control import State
 from .errors import (
     LaunchError,

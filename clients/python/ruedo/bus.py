@@ -2,70 +2,20 @@
 
 from __future__ import annotations
 
-import logging
 import math
 import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from typing import Any
+from functools import partial
 
 from . import arrivals
+from .callbacks import Callbacks, Subscription
 from .transport import Transport
 from .unix_transport import UnixTransport
 
 Handler = Callable[[bytes], None]
-log = logging.getLogger("ruedo")
 _LEND_SECONDS = 0.02
-
-
-class Subscription:
-    """A callback that is called until close(), which a with-block does at its end. What it raises
-    is logged once, and hurts nobody else."""
-
-    def __init__(
-        self, callback: Callable[..., Any], what: str, leave: Callable[[Subscription], None]
-    ):
-        self._callback, self._what, self._leave = callback, what, leave
-        self._failed = False
-        self.closed = False
-
-    def close(self) -> None:
-        """From the return on it is not called any more; another thread may just be in it."""
-        if not self.closed:
-            self.closed = True
-            self._leave(self)
-
-    def __enter__(self) -> Subscription:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.close()
-
-    def __repr__(self) -> str:
-        return f"<Subscription to {self._what}{', closed' if self.closed else ''}>"
-
-    def _call(self, *arguments: Any) -> None:
-        if self.closed:
-            return
-        try:
-            self._callback(*arguments)
-        except BaseException as error:
-            if (
-                isinstance(error, KeyboardInterrupt)
-                and threading.current_thread() is threading.main_thread()
-            ):
-                raise  # Ctrl-C, while step() receives for itself
-            if not self._failed:
-                self._failed = True
-                log.exception(
-                    "a callback on %s failed; it is called on, and this is said once", self._what
-                )
-
-
-def _hand_over(subscriptions: tuple[Subscription, ...], data: bytes) -> None:
-    for subscription in subscriptions:
-        subscription._call(data)
 
 
 class Bus:
@@ -75,7 +25,7 @@ class Bus:
         self._transport = transport
         self.loses_nothing = isinstance(transport, UnixTransport)
         self._closed = threading.Event()
-        self._handlers: dict[str, tuple[Subscription, ...]] = {}
+        self._handlers: dict[str, Callbacks] = {}
         self._collectors: dict[str, Callable[[tuple[str, bytes]], object]] = {}
         self._lock = threading.Lock()
         self._turn = threading.Lock()  # to receive
@@ -87,13 +37,15 @@ class Bus:
         self._thread.start()
 
     def subscribe(self, channel: str, handler: Handler) -> Subscription:
-        subscription = Subscription(handler, channel, lambda one: self._leave(channel, one))
         with self._lock:
-            others = self._handlers.get(channel, ())
-            self._handlers[channel] = (*others, subscription)
-            if not others and channel not in self._collectors:
+            handlers = self._handlers.get(channel)
+            if handlers is not None:
+                return handlers.add(handler)
+            handlers = self._handlers[channel] = Callbacks(channel, partial(self._left, channel))
+            subscription = handlers.add(handler)
+            if channel not in self._collectors:
                 self._transport.subscribe(channel)
-        return subscription
+            return subscription
 
     def collect(self, channel: str, collector: Callable[[tuple[str, bytes]], object]) -> None:
         """Every message of the channel goes to a collector, too, with its channel: at most one, and
@@ -119,19 +71,18 @@ class Bus:
         if self._thread.is_alive() and self._thread is not threading.current_thread():
             self._thread.join()
 
-    def _leave(self, channel: str, subscription: Subscription) -> None:
+    def _left(self, channel: str) -> None:
+        """A handler of the channel was taken back."""
         with self._lock:
-            before = self._handlers.get(channel, ())
-            others = tuple(one for one in before if one is not subscription)
-            if others:
-                self._handlers[channel] = others
-            elif before:
-                del self._handlers[channel]
-                if channel not in self._collectors:
-                    self._transport.unsubscribe(channel)
+            handlers = self._handlers.get(channel)
+            if handlers is None or handlers:
+                return
+            del self._handlers[channel]
+            if channel not in self._collectors:
+                self._transport.unsubscribe(channel)
 
     def _dispatch(self, arrived: arrivals.Arrived) -> None:
-        arrivals.dispatch(arrived, self._collectors, self._handlers, _hand_over)
+        arrivals.dispatch(arrived, self._collectors, self._handlers, Callbacks.call)
 
     @contextmanager
     def receiving(self) -> Iterator[Callable[[float], bool]]:

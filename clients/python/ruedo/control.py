@@ -12,10 +12,10 @@ from typing import TYPE_CHECKING, Any
 from . import lcmtypes
 from .errors import NotSupported, RequestError, Timeout, TypeMismatch
 from .geometry import Floats
-from .samples import _floats, _Value
+from .samples import Value, floats
 
 if TYPE_CHECKING:
-    from .simulation import Simulation
+    from .connection import Connection
 
 _REPEAT_SECONDS = 0.1
 
@@ -35,7 +35,7 @@ _CODES = _names(lcmtypes.reply_t)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class State(_Value):
+class State(Value):
     """The state of the simulation, and of the model or MODEL/LINK that was asked for (else name is
     "").
     """
@@ -60,8 +60,8 @@ class State(_Value):
 class Session:
     """A client's session with the server: joins on the first request."""
 
-    def __init__(self, sim: Simulation, name: str):
-        self._sim = sim
+    def __init__(self, connection: Connection, name: str):
+        self._connection = connection
         self._name = name
         self.name = name.encode()
         self._one_at_a_time = threading.Lock()
@@ -80,8 +80,8 @@ class Session:
             return self.request_in_turn(kind, body, timeout)
 
     def request_in_turn(self, kind: int, body: Any = None, timeout: float = 5.0) -> Any:
-        self._sim._check_open()
-        info = self._sim._info
+        self._connection.check_open()
+        info = self._connection.info
         if not info.features >> kind & 1:
             raise NotSupported(f"this server (Ruedo {info.version}) has no {_KINDS[kind]} request")
         for attempt in (1, 2):
@@ -109,7 +109,7 @@ class Session:
 
     def leave(self) -> None:
         """Gives the session back, without waiting for an answer."""
-        if self._session and self._sim._info.features >> lcmtypes.request_t.LEAVE & 1:
+        if self._session and self._connection.info.features >> lcmtypes.request_t.LEAVE & 1:
             self._sequence += 1
             self.publish(lcmtypes.request_t.LEAVE, self._session, self._sequence, b"")
             self._session = 0
@@ -129,7 +129,7 @@ class Session:
                 self._news.notify_all()
                 return
         if ours and reply.kind in (lcmtypes.request_t.GRANT, lcmtypes.request_t.RESEND):
-            self._sim._stepper.on_reply(reply)
+            self._connection.stepper.on_reply(reply)
 
     def _join(self, run_id: int, timeout: float) -> None:
         join = lcmtypes.join_t()
@@ -150,22 +150,22 @@ class Session:
                     raise Timeout(f"no reply to {_KINDS[kind]} on ruedo/reply within {timeout:g} s")
                 self.publish(kind, session, sequence, encoded)
                 self._news.wait(_REPEAT_SECONDS)
-                self._sim._check_server()
+                self._connection.check_server()
             reply, self._awaited = self._reply, None
         return reply
 
     def publish(self, kind: int, session: int, sequence: int, body: bytes, epoch: int = -1) -> None:
         head = _REQUEST.pack(
             _REQUEST_FINGERPRINT,
-            self._sim._utime,
-            self._sim._info.run_id,
+            self._connection.clock.utime,
+            self._connection.info.run_id,
             epoch,
             session,
             sequence,
             kind,
             len(body),
         )
-        self._sim._bus.publish("ruedo/request", head + body)
+        self._connection.bus.publish("ruedo/request", head + body)
 
     @staticmethod
     def _checked(reply: Any) -> Any:
@@ -194,8 +194,8 @@ def state_of(reply: Any) -> State:
         m.paused,
         m.rate,
         m.name,
-        _floats(m.position),
-        _floats(m.orientation),
-        _floats(m.linear),
-        _floats(m.angular),
+        floats(m.position),
+        floats(m.orientation),
+        floats(m.linear),
+        floats(m.angular),
     )

@@ -139,7 +139,7 @@ class Engine:
         log: str = "",
         everything: bool = False,
     ) -> None:
-        """Begins copy 0 anew with that seed, and judges it as ``ruedo regress`` does.
+        """Resets copy 0 with that seed, and judges it as ``ruedo regress`` does.
 
         goals: "X,Y,RADIUS,BY". clearance_reach: m, smaller clearances are measured. log: a file
         that ``ruedo verify`` repeats; with everything: all messages, else only what acted on the

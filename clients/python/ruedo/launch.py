@@ -107,9 +107,7 @@ def launch(
             url,
             name,
             max(until - time.monotonic(), 1.0),
-            server.ended,
-            server.end,
-            forked=server.forked,
+            server,
             view=f"http://127.0.0.1:{port}/" if port else None,
         )
     except NoServer as error:  # with what the server said, when it ended

@@ -22,10 +22,10 @@ import numpy as np
 from . import arrivals, lcmtypes
 from .control import State
 from .errors import LeaseLost, NoServer, RequestError, RuedoError, Timeout, TypeMismatch
-from .stream import Stream
+from .stream import Stream, sample_of
 
 if TYPE_CHECKING:
-    from .simulation import Simulation
+    from .connection import Connection
 
 T = TypeVar("T")
 
@@ -97,12 +97,12 @@ class Observations(State):
         """The samples of a device or stream, decoded, in order; none when none was due. Raises
         TypeMismatch.
         """
-        return [stream._sample_of(data) for data in self._of(stream)]
+        return [sample_of(stream, data) for data in self._of(stream)]
 
     def latest(self, stream: Stream[T]) -> T | None:
         """The last of them."""
         on_channel = self._of(stream)
-        return stream._sample_of(on_channel[-1]) if on_channel else None
+        return sample_of(stream, on_channel[-1]) if on_channel else None
 
     def _of(self, stream: Stream[T]) -> list[bytes]:
         """Sorted once: a fleet asks for each of its robots."""
@@ -174,8 +174,8 @@ class _Step:
 class Stepper:
     """Called with the simulation's turn: one step() at a time."""
 
-    def __init__(self, sim: Simulation):
-        self._sim = sim
+    def __init__(self, connection: Connection):
+        self._connection = connection
         self._part = False  # takes part
         self._info: Any = None  # whose channels are subscribed
         self._indices: dict[str, int] = {}  # of the channels that are subscribed
@@ -207,7 +207,7 @@ class Stepper:
     def step(self, n: int, commands: Sequence[Command], timeout: float) -> Observations:
         if isinstance(n, bool) or not isinstance(n, (int, np.integer)):
             raise TypeError(
-                f"n is {n!r}: it must be a whole number of steps; {self._sim.step_size:g} s is one"
+                f"n is {n!r}: it must be a whole number of steps; {self._connection.info.step_us * 1e-6:g} s is one"
             )
         if isinstance(commands, Command):
             raise TypeError("commands is one Command: put it into a list, [command]")
@@ -222,13 +222,13 @@ class Stepper:
                 raise ValueError(
                     f"a command is for {command.after} steps on; of {n} steps 0 to {n - 1} is allowed"
                 )
-        session = self._sim._session
+        session = self._connection.session
         with session.turn():
-            self._sim._check_open()
-            if self._part and self._sim._info.run_id != self._run_id:
+            self._connection.check_open()
+            if self._part and self._connection.info.run_id != self._run_id:
                 self._part = False
                 raise NoServer(
-                    f"the run that this client took part in has ended; another is at {self._sim.url} now"
+                    f"the run that this client took part in has ended; another is at {self._connection.url} now"
                 )
             if not self._part:
                 self._take_part(timeout)
@@ -249,10 +249,10 @@ class Stepper:
             self._wait(until, timeout)
             if (
                 max(self._early, default=0) >= len(self._info.channel_list)
-                or self._info is not self._sim._info
+                or self._info is not self._connection.info
             ):  # a model came
-                if max(self._early, default=0) >= len(self._sim._info.channel_list):
-                    self._sim._refresh_info()
+                if max(self._early, default=0) >= len(self._connection.info.channel_list):
+                    self._connection.refresh_info()
                 self._subscribe()
             return self._collect()
 
@@ -265,14 +265,14 @@ class Stepper:
         self._subscribe()
         body = lcmtypes.grant_request_t()
         body.granted = body.received = -1
-        reply = self._sim._session.request_in_turn(lcmtypes.request_t.GRANT, body, timeout)
+        reply = self._connection.session.request_in_turn(lcmtypes.request_t.GRANT, body, timeout)
         try:
             stands = lcmtypes.grant_reply_t.decode(reply.body)
         except Exception:
             raise TypeMismatch(
                 "the reply to GRANT is no grant_reply_t of this client's version"
             ) from None
-        self._run_id, self._epoch = self._sim._info.run_id, reply.epoch
+        self._run_id, self._epoch = self._connection.info.run_id, reply.epoch
         self._granted, self._have, self._newest = stands.granted, stands.received, stands.step
         self._acknowledged = self._have
         self._steps.clear()
@@ -283,7 +283,7 @@ class Stepper:
 
     def _subscribe(self) -> None:
         """To all that the simulation publishes: a manifest names any of it."""
-        info = self._sim._info
+        info = self._connection.info
         if self._info is info:
             return
         wanted = {
@@ -293,12 +293,12 @@ class Stepper:
         }
         for name, index in list(self._indices.items()):
             if wanted.get(index) != name:
-                self._sim._bus.collect_no_more(name)
+                self._connection.bus.collect_no_more(name)
                 del self._indices[name]
         for index, name in wanted.items():
             self._early.setdefault(index, deque(maxlen=_MOST_EARLY))
             if name not in self._indices:
-                self._sim._bus.collect(name, self._fresh.append)
+                self._connection.bus.collect(name, self._fresh.append)
             self._indices[name] = index
         self._info = info
         self._names = [channel.name for channel in info.channel_list]
@@ -322,9 +322,9 @@ class Stepper:
         grant, or the request for what is missing, goes out again, sooner at first."""
         if self._taken and self._have >= until:
             return
-        first = _LAST_REPEAT if self._sim._bus.loses_nothing else _FIRST_REPEAT
+        first = _LAST_REPEAT if self._connection.bus.loses_nothing else _FIRST_REPEAT
         repeat, deadline = first, time.monotonic() + timeout
-        with self._sim._bus.receiving() as receive:
+        with self._connection.bus.receiving() as receive:
             while True:
                 had, quiet_at = self._have, time.monotonic() + repeat
                 heard = True
@@ -355,7 +355,7 @@ class Stepper:
                 if self._have > had:
                     deadline = time.monotonic() + timeout
                 elif silence:
-                    self._sim._check_server()
+                    self._connection.check_server()
                     if time.monotonic() >= deadline:
                         waits = f": the run waits for {self._waits_for}" if self._waits_for else ""
                         raise Timeout(
@@ -363,7 +363,7 @@ class Stepper:
                         )
 
     def _grant_again(self) -> None:
-        session = self._sim._session
+        session = self._connection.session
         session.publish(
             lcmtypes.request_t.GRANT, session.id, self._grant[0], self._grant[2], self._epoch
         )
@@ -394,7 +394,7 @@ class Stepper:
         del body.wanted[_MOST_WANTED:]  # the rest when these have come
         body.nwanted = len(body.wanted)
         self._resends += 1
-        session = self._sim._session
+        session = self._connection.session
         session.publish(
             lcmtypes.request_t.RESEND, session.id, self._resends, body.encode(), self._epoch
         )
@@ -494,7 +494,7 @@ class Stepper:
             if (
                 not self._taken
                 and number > self._grant[1]
-                and data[at - size : at - 1] == self._sim._session.name
+                and data[at - size : at - 1] == self._connection.session.name
             ):
                 self._taken = (
                     int.from_bytes(data[at : at + 8], "big", signed=True) >= self._grant[0]

@@ -14,8 +14,10 @@ from .errors import MotionError, Timeout, UnknownName
 from .samples import Collisions, MotionStatus
 
 if TYPE_CHECKING:
-    from .bus import Subscription
-    from .simulation import Simulation
+    from .callbacks import Subscription
+    from .connection import Connection
+    from .robot import Robot
+    from .world_info import WorldInfo
 
 log = logging.getLogger("ruedo")
 
@@ -28,14 +30,14 @@ _UNSEEN_SECONDS = 1.0
 class Motion:
     """A motion primitive under way. state: "sent", then the states of MotionStatus."""
 
-    def __init__(self, sim: Simulation, robot: str, id: int, kind: str, amount: float):
+    def __init__(self, connection: Connection, robot: str, id: int, kind: str, amount: float):
         self.id, self.kind = id, kind
         self.state = "sent"
         self.progress = 0.0  # m or rad done
         self.remaining = amount  # m or rad
         self.reason = ""  # why it ended early or was refused: MotionStatus's, "removed", "new run"
         self.blocked_by = ""  # the body that blocked it
-        self._sim, self._robot = sim, robot
+        self._connection, self._robot = connection, robot
         self._unseen = 0
         self._utime = (
             -1
@@ -61,7 +63,7 @@ class Motion:
                     )
                 left = 0.5 if deadline is None else max(0.0, min(0.5, deadline - time.monotonic()))
                 self._news.wait(left)
-                self._sim._check_server()
+                self._connection.check_server()
         if self.state != "done":
             raise MotionError(
                 f"{self._robot}: {self.kind} {'was refused' if self.state == 'refused' else 'ended'}: "
@@ -110,12 +112,12 @@ class Motion:
 
 
 class Driver:
-    """The commands to one robot: what is repeated, and the primitives under way. The simulation has
+    """The commands to one robot: what is repeated, and the primitives under way. A connection has
     one for each name.
     """
 
-    def __init__(self, sim: Simulation, robot: str):
-        self._sim, self._robot = sim, robot
+    def __init__(self, connection: Connection, robot: Robot):
+        self._connection, self._robot = connection, robot
         self._lock = threading.Lock()
         self._held: tuple[str, bytes] | None = None
         self._motions: list[Motion] = []
@@ -132,13 +134,13 @@ class Driver:
         with self._lock:
             self._held = (channel, data) if not self._ended else None
             self._running = False
-            self._sim._bus.publish(channel, data)
-        self._sim._keep_repeating(self)
+            self._connection.bus.publish(channel, data)
+        self._connection.drivers.keep_repeating(self)
 
     def repeat(self) -> None:
         with self._lock:
             if self._held:
-                self._sim._bus.publish(*self._held)
+                self._connection.bus.publish(*self._held)
 
     def period(self) -> float:
         """s of real time between repetitions: a quarter of the watchdog's time, at most 0.1."""
@@ -147,11 +149,11 @@ class Driver:
 
     def move(self, channel: str, command: lcmtypes.move_command_t, kind: str) -> Motion:
         self._listen()
-        motion = Motion(self._sim, self._robot, command.id, kind, abs(command.value))
+        motion = Motion(self._connection, self._robot.name, command.id, kind, abs(command.value))
         with self._lock:
             self._held = None  # a repetition after this would replace the primitive
             self._motions = [m for m in self._motions if not m.done] + [motion]
-            self._sim._bus.publish(channel, command.encode())
+            self._connection.bus.publish(channel, command.encode())
         return motion
 
     def end(self, reason: str) -> None:
@@ -168,26 +170,25 @@ class Driver:
             motion._end(reason)
 
     def begin_epoch(self) -> None:
-        """Sim time was set back."""
+        """Sim time was reset."""
         with self._lock:
             for motion in self._motions:
                 motion._utime = -1
 
     def _watchdog(self) -> float:
-        robot = self._sim._info.robots.get(self._robot)  # None: removed meanwhile
+        robot = self._connection.info.robots.get(self._robot.name)  # None: removed meanwhile
         return float(robot.watchdog_us) * 1e-6 if robot else 0.0
 
     def _listen(self) -> None:
         with self._lock:
             if self._ended:  # while the command was being made
-                raise UnknownName(f"{self._robot} is gone: {self._ended}")
+                raise UnknownName(f"{self._robot.name} is gone: {self._ended}")
             if self._statuses is None:
-                robot = self._sim.robot(self._robot)
                 try:  # of a step they come before the status
-                    self._collisions = robot.collisions.on_sample(self._on_collisions)
+                    self._collisions = self._robot.collisions.on_sample(self._on_collisions)
                 except UnknownName:
                     pass  # switched off: a motion that is blocked does not know by what
-                self._statuses = robot.motion.on_sample(self._on_status)
+                self._statuses = self._robot.motion.on_sample(self._on_status)
 
     def _on_collisions(self, collisions: Collisions) -> None:
         with self._lock:
@@ -209,9 +210,85 @@ class Driver:
         if stopped:
             log.warning(
                 "%s: stopped by its watchdog: no command came for %g s of sim time",
-                self._robot,
+                self._robot.name,
                 self._watchdog(),
             )
         for motion in motions:
             if not motion.done:
                 motion._update(status, blocked_by)
+
+
+class Drivers:
+    """The drivers of a connection, by robot, and the thread that repeats their commands. Safe to
+    use from any thread.
+    """
+
+    def __init__(self, connection: Connection):
+        self._connection = connection
+        self._lock = threading.Lock()
+        self._all: dict[str, Driver] = {}
+        self._repeating: set[Driver] = set()
+        self._wake = threading.Condition()
+        self._thread: threading.Thread | None = None
+
+    def get(self, robot: Robot) -> Driver:
+        self._connection.check_open()
+        with self._lock:
+            return self._all.setdefault(robot.name, Driver(self._connection, robot))
+
+    def keep_repeating(self, driver: Driver) -> None:
+        with self._wake:
+            self._repeating.add(driver)
+            if self._thread is None:
+                self._thread = threading.Thread(
+                    target=self._repeat_until_closed, name="ruedo-repeat", daemon=True
+                )
+                self._thread.start()
+            self._wake.notify_all()
+
+    def repeat(self) -> None:
+        for driver in tuple(self._repeating):
+            driver.repeat()
+
+    def wake(self) -> None:
+        """The thread sees whether the connection was closed."""
+        with self._wake:
+            self._wake.notify_all()
+
+    def begin_epoch(self) -> None:
+        """Sim time was reset."""
+        with self._lock:
+            drivers = list(self._all.values())
+        for driver in drivers:
+            driver.begin_epoch()
+
+    def end_removed(self, info: WorldInfo) -> None:
+        """Ends those of robots that are gone."""
+        with self._lock:
+            gone = [self._all.pop(name) for name in list(self._all) if name not in info.robots]
+        self._end(gone, "removed")
+
+    def end_all(self, reason: str) -> None:
+        with self._lock:
+            drivers = list(self._all.values())
+            self._all.clear()
+        self._end(drivers, reason)
+
+    def _end(self, drivers: list[Driver], reason: str) -> None:
+        with self._wake:
+            self._repeating.difference_update(drivers)
+        for driver in drivers:
+            driver.end(reason)
+
+    def _repeat_until_closed(self) -> None:
+        """Feeds the watchdogs in real time."""
+        period = 0.1
+        while True:
+            with self._wake:
+                if not self._connection.closed:
+                    self._wake.wait(period)
+                if self._connection.closed:
+                    return
+            if not self._connection.another_run:
+                self.repeat()
+            period = min((driver.period() for driver in tuple(self._repeating)), default=0.1)

@@ -33,8 +33,8 @@ from .samples import (
 from .stream import RAW, Form, Stream, form_of
 
 if TYPE_CHECKING:
-    from .bus import Subscription
-    from .simulation import Simulation
+    from .callbacks import Subscription
+    from .connection import Connection
 
 T = TypeVar("T")
 
@@ -51,8 +51,8 @@ class Device(Stream[T]):
     pixels. elements (n, 6): a sonar's transducers, x, y, z, roll, pitch, yaw in its frame.
     """
 
-    def __init__(self, sim: Simulation, robot: str, info: Any, channel: Any):
-        super().__init__(sim, channel.name, channel.type, channel.fingerprint, info.rate)
+    def __init__(self, connection: Connection, robot: str, info: Any, channel: Any):
+        super().__init__(connection, channel.name, channel.type, channel.fingerprint, info.rate)
         self.robot: str = robot
         self.name: str = info.name
         self.kind: str = info.kind
@@ -85,7 +85,7 @@ class Camera(Device[Image]):
         return self._part("info")
 
     def _part(self, part: str) -> Stream[Any]:
-        return self._sim.robot(self.robot)._camera_part(self.name, part)
+        return _camera_part(self._connection, self.robot, self.name, part)
 
 
 class Robot:
@@ -96,9 +96,9 @@ class Robot:
     never. wheels: names of the wheel joints.
     """
 
-    def __init__(self, sim: Simulation, name: str):
+    def __init__(self, connection: Connection, name: str):
         self.name = name
-        self._sim = sim
+        self._connection = connection
         self._devices_of: Any = None  # the info that _devices_now was made from
         self._devices_now: list[Device[Any]] = []
         self._inputs_of: Any = None  # the same, of _inputs_now
@@ -111,7 +111,7 @@ class Robot:
 
     @property
     def _info(self) -> Any:
-        return self._sim._robot_info(self.name)
+        return self._connection.robot_info(self.name)
 
     @property
     def model(self) -> str:
@@ -153,7 +153,7 @@ class Robot:
     @property
     def devices(self) -> list[Device[Any]]:
         """All devices, in the order of the world file."""
-        known = self._sim._info
+        known = self._connection.info
         if self._devices_of is not known:
             found = [self._device(info) for info in known.devices.get(self.name, ())]
             self._devices_now = [device for device in found if device is not None]
@@ -246,20 +246,20 @@ class Robot:
         not stop the robot. vy: m/s to the left, of a robot that moves sideways; others refuse
         it."""
         command = self.velocity_command(v, omega, vy)
-        self._sim._driver(self.name).hold(command.channel, command.data)
+        self._connection.drivers.get(self).hold(command.channel, command.data)
 
     def set_wheels(self, left: float, right: float) -> None:
         """Turns the wheels of the left and right side (rad/s, positive ahead), until the next
         command.
         """
         command = self.wheel_command(left, right)
-        self._sim._driver(self.name).hold(command.channel, command.data)
+        self._connection.drivers.get(self).hold(command.channel, command.data)
 
     def velocity_command(self, v: float, omega: float, vy: float = 0.0) -> Command:
         """What set_velocity() sends, once, for Simulation.step()."""
         data = _VELOCITY.pack(
             _VELOCITY_FINGERPRINT,
-            self._sim._utime,
+            self._connection.clock.utime,
             _finite("v", v),
             _finite("vy", vy),
             _finite("omega", omega),
@@ -269,7 +269,7 @@ class Robot:
     def wheel_command(self, left: float, right: float) -> Command:
         """What set_wheels() sends, once, for Simulation.step()."""
         command = lcmtypes.wheel_command_t()
-        command.utime, command.n = self._sim._utime, 2
+        command.utime, command.n = self._connection.clock.utime, 2
         command.rate = [_finite("left", left), _finite("right", right)]
         return Command(self._input("wheel_command_t"), command.encode())
 
@@ -310,7 +310,7 @@ class Robot:
         place: of "kidnapped", m, m, rad.
         """
         fault = lcmtypes.fault_t()
-        fault.utime, fault.kind, fault.target = self._sim._utime, kind, target
+        fault.utime, fault.kind, fault.target = self._connection.clock.utime, kind, target
         fault.duration, fault.value = _finite("duration", duration), _finite("value", value)
         fault.view_begin, fault.view_end = (_finite("view", one) for one in view)
         fault.x, fault.y, fault.heading = (_finite("place", one) for one in place)
@@ -321,7 +321,7 @@ class Robot:
         says what acted; a wrong one is ignored.
         """
         command = self.fault_command(kind, target, **how)
-        self._sim._bus.publish(command.channel, command.data)
+        self._connection.bus.publish(command.channel, command.data)
 
     def stop(self, deceleration: float = 0.0) -> Motion:
         """Comes to rest. deceleration: limit in m/s^2, 0: the robot's own."""
@@ -408,7 +408,7 @@ class Robot:
         deceleration: float = 0.0,
     ) -> Motion:
         command = self._move_message(kind, value, radius, speed, acceleration, deceleration)
-        return self._sim._driver(self.name).move(self._input("move_command_t"), command, name)
+        return self._connection.drivers.get(self).move(self._input("move_command_t"), command, name)
 
     def _move_message(
         self,
@@ -420,7 +420,11 @@ class Robot:
         deceleration: float,
     ) -> Any:
         command = lcmtypes.move_command_t()
-        command.utime, command.id, command.kind = self._sim._utime, self._sim._next_id(), kind
+        command.utime, command.id, command.kind = (
+            self._connection.clock.utime,
+            self._connection.next_id(),
+            kind,
+        )
         command.value, command.radius = _finite("value", value), _finite("radius", radius)
         command.speed = _limit("speed", speed)
         command.acceleration = _limit("acceleration", acceleration)
@@ -451,10 +455,10 @@ class Robot:
 
     @property
     def _channels(self) -> list[Any]:
-        return self._sim._info.channels.get(self.name, [])
+        return self._connection.info.channels.get(self.name, [])
 
     def _input(self, type: str) -> str:
-        known = self._sim._info
+        known = self._connection.info
         if self._inputs_of is not known:
             self._inputs_now, self._inputs_of = {}, known
         channel = self._inputs_now.get(type)
@@ -476,8 +480,8 @@ class Robot:
         for channel in self._channels:
             if channel.device == info.name and not channel.input:
                 make = Camera if channel.type == "image_t" else Device
-                stream = self._sim._stream(
-                    channel, partial(make, self._sim, self.name, info, channel)
+                stream = self._connection.streams.get(
+                    channel, partial(make, self._connection, self.name, info, channel)
                 )
                 return stream if isinstance(stream, Device) else None
         return None
@@ -500,25 +504,32 @@ class Robot:
                 return self._plain(channel)
         raise UnknownName(f"{self.name} publishes no {what}")
 
-    def _camera_part(self, camera: str, part: str) -> Any:
-        for channel in self._channels:
-            named = channel.device == f"{camera}/{part}" or (
-                channel.device == camera and channel.name.endswith("/" + part)
-            )
-            if named and not channel.input:
-                return self._plain(channel)
-        raise UnknownName(
-            f"{self.name}/{camera} publishes no {part}; <ruedo:{part}> in the world file switches it on"
-        )
-
     def _plain(self, channel: Any, form: Form | None = None) -> Stream[Any]:
-        return self._sim._stream(
-            channel,
-            lambda: Stream(
-                self._sim, channel.name, channel.type, channel.fingerprint, channel.rate, form
-            ),
-            form.key if form else None,
+        return _plain(self._connection, channel, form)
+
+
+def _plain(connection: Connection, channel: Any, form: Form | None = None) -> Stream[Any]:
+    """A stream that is no device's."""
+    return connection.streams.get(
+        channel,
+        lambda: Stream(
+            connection, channel.name, channel.type, channel.fingerprint, channel.rate, form
+        ),
+        form,
+    )
+
+
+def _camera_part(connection: Connection, robot: str, camera: str, part: str) -> Stream[Any]:
+    connection.robot_info(robot)  # raises UnknownName
+    for channel in connection.info.channels.get(robot, []):
+        named = channel.device == f"{camera}/{part}" or (
+            channel.device == camera and channel.name.endswith("/" + part)
         )
+        if named and not channel.input:
+            return _plain(connection, channel)
+    raise UnknownName(
+        f"{robot}/{camera} publishes no {part}; <ruedo:{part}> in the world file switches it on"
+    )
 
 
 def _radians(call: str, angle: float, usual: float) -> None:

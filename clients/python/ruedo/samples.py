@@ -53,7 +53,7 @@ _MOTION_REASONS = {
 }
 
 
-class _Value:
+class Value:
     """Equal when all is equal, NaN to NaN too; hashed alike; and shown in a line."""
 
     def _key(self) -> tuple[Any, ...]:
@@ -96,7 +96,7 @@ def _short(value: Any) -> str:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Sample(_Value):
+class Sample(Value):
     """utime: us of sim time. Nothing in a sample can be written into: others may have the same
     one.
     """
@@ -368,7 +368,7 @@ class ForceTorque(Sample):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class LogicalObject(_Value):
+class LogicalObject(Value):
     """A model that a logical camera sees, in the device's frame."""
 
     model: str  # its name
@@ -382,7 +382,7 @@ class LogicalCamera(Sample):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Box2D(_Value):
+class Box2D(Value):
     """A labelled object in a picture; whole numbers are the middles of pixels."""
 
     label: int
@@ -401,7 +401,7 @@ class Boxes2D(Sample):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Box3D(_Value):
+class Box3D(Value):
     """A labelled object before the camera, in the device's frame."""
 
     label: int
@@ -417,7 +417,7 @@ class Boxes3D(Sample):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class ContactPoint(_Value):
+class ContactPoint(Value):
     body: str  # the other body
     position: Floats  # (3,) m, world
     normal: Floats  # (3,) unit vector, world, towards the sensor's body
@@ -473,16 +473,16 @@ def _fixed(values: NDArray[Any]) -> NDArray[Any]:
     return values
 
 
-def _floats(values: Any) -> Floats:
+def floats(values: Any) -> Floats:
     return _fixed(np.array(values, np.float64))
 
 
 def _scan(m: Any) -> Scan:
     return Scan(
         m.utime,
-        _floats(m.ranges),
+        floats(m.ranges),
         _fixed(m.rad0 + m.radstep * np.arange(m.nranges)),
-        _floats(m.intensities),
+        floats(m.intensities),
     )
 
 
@@ -492,17 +492,17 @@ def _lidar(m: Any) -> LidarScan:
     shape = (m.nlayers, m.ncolumns)
     return LidarScan(
         m.utime,
-        _floats(m.ranges).reshape(shape),
+        floats(m.ranges).reshape(shape),
         _fixed(m.azimuth0 + m.azimuth_step * np.arange(m.ncolumns)),
         _fixed(m.elevation0 + m.elevation_step * np.arange(m.nlayers)),
-        _floats(m.intensities).reshape(shape if m.nintensities else (0, 0)),
+        floats(m.intensities).reshape(shape if m.nintensities else (0, 0)),
     )
 
 
 def _sonar(m: Any) -> SonarReading:
     return SonarReading(
         m.utime,
-        _floats(m.range),
+        floats(m.range),
         _fixed(np.array(m.fired_utime, np.int64)),
         _fixed(np.array(m.fresh, np.bool_)),
     )
@@ -516,8 +516,8 @@ def _odometry(m: Any) -> Odometry:
         m.theta,
         m.v,
         m.omega,
-        _floats(m.angle),
-        _floats(m.rate),
+        floats(m.angle),
+        floats(m.rate),
         _fixed(np.array(m.ticks, np.int64)),
         m.resets,
     )
@@ -526,11 +526,11 @@ def _odometry(m: Any) -> Odometry:
 def _pose(m: Any) -> Pose:
     return Pose(
         m.utime,
-        _floats(m.pos),
-        _floats(m.orientation),
-        _floats(m.vel),
-        _floats(m.rotation_rate),
-        _floats(m.accel),
+        floats(m.pos),
+        floats(m.orientation),
+        floats(m.vel),
+        floats(m.rotation_rate),
+        floats(m.accel),
     )
 
 
@@ -547,21 +547,21 @@ def _image(m: Any) -> Image:
 
 
 def _camera_info(m: Any) -> CameraInfo:
-    return CameraInfo(m.utime, m.width, m.height, m.fx, m.fy, m.cx, m.cy, _floats(m.distortion))
+    return CameraInfo(m.utime, m.width, m.height, m.fx, m.fy, m.cx, m.cy, floats(m.distortion))
 
 
 def _imu(m: Any) -> Imu:
     return Imu(
-        m.utime, _floats(m.orientation), _floats(m.angular_velocity), _floats(m.linear_acceleration)
+        m.utime, floats(m.orientation), floats(m.angular_velocity), floats(m.linear_acceleration)
     )
 
 
 def _navsat(m: Any) -> NavSat:
-    return NavSat(m.utime, m.latitude_deg, m.longitude_deg, m.altitude, _floats(m.velocity))
+    return NavSat(m.utime, m.latitude_deg, m.longitude_deg, m.altitude, floats(m.velocity))
 
 
 def _magnetometer(m: Any) -> Magnetometer:
-    return Magnetometer(m.utime, _floats(m.field))
+    return Magnetometer(m.utime, floats(m.field))
 
 
 def _altimeter(m: Any) -> Altimeter:
@@ -577,14 +577,14 @@ def _air_speed(m: Any) -> AirSpeed:
 
 
 def _force_torque(m: Any) -> ForceTorque:
-    return ForceTorque(m.utime, _floats(m.force), _floats(m.torque))
+    return ForceTorque(m.utime, floats(m.force), floats(m.torque))
 
 
 def _logical_camera(m: Any) -> LogicalCamera:
     _counted(m.n)
     return LogicalCamera(
         m.utime,
-        [LogicalObject(o.model, _floats(o.position), _floats(o.orientation)) for o in m.objects],
+        [LogicalObject(o.model, floats(o.position), floats(o.orientation)) for o in m.objects],
     )
 
 
@@ -597,7 +597,7 @@ def _boxes_2d(m: Any) -> Boxes2D:
 def _boxes_3d(m: Any) -> Boxes3D:
     _counted(m.n)
     boxes = [
-        Box3D(b.label, b.name, _floats(b.center), _floats(b.orientation), _floats(b.size))
+        Box3D(b.label, b.name, floats(b.center), floats(b.orientation), floats(b.size))
         for b in m.boxes
     ]
     return Boxes3D(m.utime, boxes)
@@ -611,7 +611,7 @@ def _counted(length: int) -> None:
 def _points(m: Any) -> list[ContactPoint]:
     _counted(m.n)
     return [
-        ContactPoint(p.body, _floats(p.position), _floats(p.normal), p.force, p.depth)
+        ContactPoint(p.body, floats(p.position), floats(p.normal), p.force, p.depth)
         for p in m.points
     ]
 
@@ -628,9 +628,9 @@ def _joints(m: Any) -> Joints:
     return Joints(
         m.utime,
         list(m.joint_name),
-        _floats(m.joint_position),
-        _floats(m.joint_velocity),
-        _floats(m.joint_effort),
+        floats(m.joint_position),
+        floats(m.joint_velocity),
+        floats(m.joint_effort),
     )
 
 

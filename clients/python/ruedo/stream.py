@@ -8,11 +8,12 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, Generic, NamedTuple, TypeVar
 
 from . import samples
-from .bus import Subscription
+from .callbacks import Callbacks, Subscription
 from .errors import RuedoError, Timeout, TypeMismatch
 
 if TYPE_CHECKING:
-    from .simulation import Simulation
+    from .connection import Connection
+    from .world_info import WorldInfo
 
 T = TypeVar("T")
 
@@ -51,13 +52,13 @@ class Reader(Generic[T]):
         """The newest sample. Before the first one it waits, at most timeout seconds of real
         time.
         """
-        return self._stream._read(self, False, timeout)
+        return self._stream._sample_for(self, False, timeout)
 
     def next(self, timeout: float = 5.0) -> T:
         """The newest sample that neither latest() nor next() has returned yet; waits for one, at
         most timeout seconds of real time. A reader slower than the rate skips samples; on_sample()
         skips none."""
-        return self._stream._read(self, True, timeout)
+        return self._stream._sample_for(self, True, timeout)
 
 
 class Stream(Reader[T]):
@@ -70,7 +71,7 @@ class Stream(Reader[T]):
 
     def __init__(
         self,
-        sim: Simulation,
+        connection: Connection,
         channel: str,
         type: str,
         fingerprint: int,
@@ -80,14 +81,14 @@ class Stream(Reader[T]):
         super().__init__(self)
         self._given = form
         self.channel, self.type, self.rate = channel, type, rate
-        self._sim = sim
+        self._connection = connection
         self._fingerprint = fingerprint & 0xFFFFFFFFFFFFFFFF
         self._news = threading.Condition()
         self._source: Subscription | None = None
         self._sample: T | None = None
         self._count = 0  # samples received
         self._fault: RuedoError | None = None
-        self._callbacks: tuple[Subscription, ...] = ()
+        self._callbacks = Callbacks(channel)
 
     def reader(self) -> Reader[T]:
         """A reader that has seen nothing yet."""
@@ -97,25 +98,18 @@ class Stream(Reader[T]):
         """Calls callback(sample) in the receiving thread for every sample from now on, until
         close() of what it returns (or of the simulation). It must be quick, and must not wait for
         other samples or replies."""
-        subscription = Subscription(callback, self.channel, self._leave)
         self._subscribe()
-        with self._news:
-            self._callbacks += (subscription,)
-        return subscription
-
-    def _leave(self, subscription: Subscription) -> None:
-        with self._news:
-            self._callbacks = tuple(one for one in self._callbacks if one is not subscription)
+        return self._callbacks.add(callback)
 
     def _subscribe(self) -> None:
-        self._sim._check_open()
+        self._connection.check_open()
         with self._news:
             if self._source:
                 return
             form = self._form()
             if form.fingerprint and self._fingerprint != int.from_bytes(form.fingerprint, "big"):
                 raise self._mismatch(self._fingerprint, form.fingerprint)
-            self._source = self._sim._bus.subscribe(self.channel, self._receive)
+            self._source = self._connection.bus.subscribe(self.channel, self._receive)
 
     def _form(self) -> Form:
         if self._given is None:
@@ -144,7 +138,7 @@ class Stream(Reader[T]):
             ) from None
         return sample
 
-    def _end(self) -> None:
+    def _unsubscribe(self) -> None:
         """Its robot is gone."""
         with self._news:
             source, self._source = self._source, None
@@ -167,7 +161,7 @@ class Stream(Reader[T]):
         return TypeMismatch(
             f"{self.channel} carries another version of {self.type} (fingerprint {fingerprint:016x}) than "
             f"this client reads ({ours:016x}): the server is Ruedo "
-            f"{self._sim.version}; install the client of the same version"
+            f"{self._connection.version}; install the client of the same version"
         )
 
     def _receive(self, data: bytes) -> None:
@@ -182,14 +176,12 @@ class Stream(Reader[T]):
             self._sample, self._fault = sample, None
             self._count += 1
             self._news.notify_all()
-            callbacks = self._callbacks
         utime = getattr(sample, "utime", None)  # a type of a user's own may have none
         if isinstance(utime, int):
-            self._sim._note_time(utime)
-        for callback in callbacks:
-            callback._call(sample)
+            self._connection.clock.note(utime)
+        self._callbacks.call(sample)
 
-    def _read(self, reader: Reader[T], a_new_one: bool, timeout: float) -> T:
+    def _sample_for(self, reader: Reader[T], a_new_one: bool, timeout: float) -> T:
         if isinstance(timeout, bool) or not isinstance(timeout, (int, float)):
             raise TypeError(
                 f"timeout is {timeout!r}: it must be a number of seconds of real time; of lockstep's observations "
@@ -205,15 +197,54 @@ class Stream(Reader[T]):
                 left = deadline - time.monotonic()
                 if left <= 0.0:
                     raise Timeout(
-                        f"no sample on {self.channel} within {timeout:g} s ({self._sim._what_is_known(self.rate)})"
+                        f"no sample on {self.channel} within {timeout:g} s ({self._connection.what_is_known(self.rate)})"
                     )
                 self._news.wait(min(left, 0.5))
-                self._sim._check_server()
+                self._connection.check_server()
             reader._seen = self._count
             return self._sample
 
     def __repr__(self) -> str:
         return f"<{type(self).__name__} {self.channel} ({self.type})>"
+
+
+def sample_of(stream: Stream[T], data: bytes) -> T:
+    """What a stream makes of a message. Raises TypeMismatch."""
+    return stream._sample_of(data)
+
+
+class Streams:
+    """The streams of a connection, by channel and form. Safe to use from any thread."""
+
+    def __init__(self) -> None:
+        self._lock = threading.Lock()
+        self._all: dict[tuple[str, Any], Stream[Any]] = {}
+
+    def get(
+        self, channel: Any, make: Callable[[], Stream[Any]], form: Form | None = None
+    ) -> Stream[Any]:
+        """The stream of a channel, made on first use."""
+        key = channel.name, form.key if form else None
+        with self._lock:
+            known = self._all.get(key)
+            if known is None or known.type != channel.type:  # the next run's may be another
+                known = self._all[key] = make()
+            return known
+
+    def end_removed(self, info: WorldInfo) -> None:
+        """Ends those of channels that are gone."""
+        channels = {channel.name for channel in info.channel_list}
+        with self._lock:
+            gone = [self._all.pop(key) for key in list(self._all) if key[0] not in channels]
+        for stream in gone:
+            stream._unsubscribe()
+
+    def forget(self) -> None:
+        """What came is of a run that has ended."""
+        with self._lock:
+            streams = list(self._all.values())
+        for stream in streams:
+            stream._forget()
 
 
 AnyStream = Stream[Any]

@@ -64,7 +64,7 @@ class WorldInfoAssembler:
     """
 
     def __init__(self) -> None:
-        self._key: tuple[int, int, int, int] | None = None
+        self._group: tuple[int, int, int, int] | None = None
         self._parts: dict[int, bytes] = {}
         self._last: list[bytes] = []
 
@@ -83,13 +83,13 @@ class WorldInfoAssembler:
         _, utime, run_id, epoch, part, nparts = _HEAD.unpack_from(data)
         if not 0 <= part < nparts:
             return None
-        if self._key != (run_id, epoch, utime, nparts):
-            self._key, self._parts = (run_id, epoch, utime, nparts), {}
+        if self._group != (run_id, epoch, utime, nparts):
+            self._group, self._parts = (run_id, epoch, utime, nparts), {}
         self._parts[part] = data
         if len(self._parts) < nparts:
             return None
         parts = [self._parts[i] for i in range(nparts)]
-        self._key, self._parts = None, {}
+        self._group, self._parts = None, {}
         content = [p[16:] for p in parts]  # all but fingerprint and utime
         if content == self._last:
             return None

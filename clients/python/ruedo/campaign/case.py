@@ -103,7 +103,7 @@ class Runner:
         robot = expect.get("robot") or (engine.robots[0] if engine.robots else "")
         engine.begin_run(
             what["seed"],
-            goals=_goals(what),
+            goals=goals(what),
             no_contact=expect.get("no_contact", False),
             clearance=expect.get("clearance"),
             odometry_error=expect.get("odometry_error"),
@@ -316,7 +316,7 @@ def regress_command(what: dict[str, Any], log: str, verdict: str = "") -> list[s
         ("disable", what["disable"]),
         ("wait-for", made.get("wait_for", ())),
         ("remap", made.get("remap", ())),
-        ("goal", _goals(what)),
+        ("goal", goals(what)),
         ("tolerance", expect.get("tolerances", ())),
         ("ignore", expect.get("ignore", ())),
         ("fault", [fault_text(one) for one in what["faults"]]),
@@ -387,7 +387,7 @@ def _copy_channels(log: str, to: str, kept: Any, last_of: str = "") -> bytes:
     return last
 
 
-def _goals(what: dict[str, Any]) -> list[str]:
+def goals(what: dict[str, Any]) -> list[str]:
     by = what["limits"]["duration"]
     return [
         f"{float(one['x'])!r},{float(one['y'])!r},{float(one['radius'])!r},{float(one.get('by', by))!r}"

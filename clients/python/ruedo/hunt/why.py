@@ -203,13 +203,13 @@ def _case_of(path: str) -> tuple[Any, Any] | None:
 
 
 def _as_it_was(recorded: Recorded, case: tuple[Any, Any] | None) -> Answer:
-    from ..campaign.case import _goals
+    from ..campaign.case import goals
 
     expect: dict[str, Any] = case[1].what["expect"] if case else {"no_contact": True}
     with recorded.engine() as engine:
         engine.begin_run(
             recorded.seed,
-            goals=_goals(case[1].what) if case else (),
+            goals=goals(case[1].what) if case else (),
             no_contact=expect.get("no_contact", False),
             clearance=expect.get("clearance"),
             robot=expect.get("robot", ""),

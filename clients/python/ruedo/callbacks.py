@@ -1,0 +1,84 @@
+"""Callbacks that can be taken back while other threads call them."""
+
+from __future__ import annotations
+
+import logging
+import threading
+from collections.abc import Callable
+from typing import Any
+
+log = logging.getLogger("ruedo")
+
+
+class Subscription:
+    """A callback that is called until close(), which a with-block does at its end. What it raises
+    is logged once, and hurts nobody else."""
+
+    def __init__(
+        self, callback: Callable[..., Any], what: str, leave: Callable[[Subscription], None]
+    ):
+        self._callback, self._what, self._leave = callback, what, leave
+        self._failed = False
+        self.closed = False
+
+    def close(self) -> None:
+        """From the return on it is not called any more; another thread may just be in it."""
+        if not self.closed:
+            self.closed = True
+            self._leave(self)
+
+    def __enter__(self) -> Subscription:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def __repr__(self) -> str:
+        return f"<Subscription to {self._what}{', closed' if self.closed else ''}>"
+
+    def _call(self, *arguments: Any) -> None:
+        if self.closed:
+            return
+        try:
+            self._callback(*arguments)
+        except BaseException as error:
+            if (
+                isinstance(error, KeyboardInterrupt)
+                and threading.current_thread() is threading.main_thread()
+            ):
+                raise  # Ctrl-C, while step() receives for itself
+            if not self._failed:
+                self._failed = True
+                log.exception(
+                    "a callback on %s failed; it is called on, and this is said once", self._what
+                )
+
+
+class Callbacks:
+    """All callbacks on one thing. Safe to use from any thread.
+
+    what: they are called on, for the log. left: called after one was taken back.
+    """
+
+    def __init__(self, what: str, left: Callable[[], None] = lambda: None):
+        self._what, self._left = what, left
+        self._lock = threading.Lock()
+        self._all: tuple[Subscription, ...] = ()  # replaced, never changed: call() takes no lock
+
+    def __bool__(self) -> bool:
+        return bool(self._all)
+
+    def add(self, callback: Callable[..., Any]) -> Subscription:
+        subscription = Subscription(callback, self._what, self._remove)
+        with self._lock:
+            self._all += (subscription,)
+        return subscription
+
+    def call(self, *arguments: Any) -> None:
+        for subscription in self._all:
+            subscription._call(*arguments)
+
+    def _remove(self, subscription: Subscription) -> None:
+        with self._lock:
+            self._all = tuple(one for one in self._all if one is not subscription)
+        self._left()

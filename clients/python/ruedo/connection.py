@@ -1,0 +1,284 @@
+"""What stands behind a Simulation: the bus, the session, what the server says of itself, and sim
+time."""
+
+from __future__ import annotations
+
+import atexit
+import logging
+import os
+import struct
+import threading
+import time
+import weakref
+from collections.abc import Callable
+from typing import Any, Protocol
+
+from . import lcmtypes
+from .address import is_claimed
+from .bus import Bus
+from .callbacks import Callbacks, Subscription
+from .clock import Clock
+from .control import Session
+from .errors import NoServer, RuedoError, UnknownName
+from .lockstep import Stepper
+from .motion import Drivers
+from .stream import Streams
+from .transport import Transport, open_transport
+from .world_info import WorldInfo, WorldInfoAssembler
+
+_SILENCE_SECONDS = 5.0
+_CLOSED = "this simulation was closed"
+_FORKED = "this simulation is the parent process's: connect() again after a fork"
+_TICK = struct.Struct(">8sqq")  # fingerprint, utime, run_id
+_TICK_FINGERPRINT = lcmtypes.tick_t._get_packed_fingerprint()
+log = logging.getLogger("ruedo")
+
+
+class PrivateServer(Protocol):
+    """A server that ends with its client."""
+
+    def ended(self) -> str | None:
+        """Why it is gone; None while it runs."""
+
+    def end(self) -> None: ...
+
+    def forked(self) -> None:
+        """In a fork's child: the server is the parent's."""
+
+
+class Connection:
+    """A client's connection to a server, which streams, robots, motions and the façade Simulation
+    share. Safe to use from any thread.
+
+    server: a private one, which close() ends. transport: instead of the one that the URL names.
+    Begins to receive with join().
+    """
+
+    def __init__(
+        self,
+        url: str,
+        name: str,
+        server: PrivateServer | None = None,
+        transport: Transport | None = None,
+    ):
+        self.url = url
+        self.closed = ""  # why: what every call says
+        self.another_run = False  # is what the last tick was of
+        self.clock = Clock()
+        self.session = Session(self, name)
+        self.stepper = Stepper(self)
+        self.streams = Streams()
+        self.drivers = Drivers(self)
+        self._server = server
+        self._news = threading.Condition()
+        self._assembler = WorldInfoAssembler()
+        self._known: WorldInfo | None = None
+        self._fault: RuedoError | None = None
+        self._asked = 0.0  # for info, s of time.monotonic()
+        self._ids = _name_hash(name) << 20  # two clients number their primitives apart
+        self._new_run = Callbacks("a new run")
+        self._closing = threading.Lock()
+        self.bus = Bus(transport or open_transport(url))
+        atexit.register(self.close)
+        _all.add(self)
+
+    def join(self, timeout: float) -> None:
+        """Begins to receive, and waits for the server's info. Raises NoServer."""
+        self.bus.subscribe("ruedo/info", self._on_info)
+        self.bus.subscribe("ruedo/tick", self._on_tick)
+        self.bus.subscribe("ruedo/reply", self.session.receive)
+        self.bus.start()
+        self._await_info(timeout)
+
+    def close(self) -> None:
+        """Repeated commands end, and so does a private server."""
+        if self.closed:  # in a fork's child the lock may be held for ever
+            return
+        with self._closing:
+            if self.closed:
+                return
+            self.closed = _CLOSED
+        self.drivers.wake()
+        if self._known:
+            self.session.leave()
+        self.bus.close()
+        if self._server:
+            self._server.end()
+        atexit.unregister(self.close)
+
+    def check_open(self) -> None:
+        if self.closed:
+            raise NoServer(self.closed)
+
+    def check_server(self) -> None:
+        """Raises NoServer when the private server ended, or nothing was heard for long; a server
+        gives a sign of life each second. One of this machine that is stopped, or in a debugger, is
+        waited for."""
+        self.check_open()
+        self._check_private_server()
+        if self.clock.silence() > _SILENCE_SECONDS and not is_claimed(self.url):
+            raise NoServer(
+                f"nothing was heard from the server at {self.url} for {_SILENCE_SECONDS:g} s"
+            )
+
+    def what_is_known(self, rate: float) -> str:
+        """Why a stream of that rate (Hz) may be silent."""
+        silence = self.clock.silence()
+        if silence > 3.0:
+            return f"nothing at all was heard from the server for {silence:.1f} s"
+        if self.info.paused:
+            return "the simulation is paused"
+        return (
+            f"its rate is {rate:g} Hz of sim time, which is now {self.clock.utime * 1e-6:.2f} s"
+            if rate
+            else "it sends when something happens"
+        )
+
+    # What the server says of itself.
+
+    @property
+    def info(self) -> WorldInfo:
+        assert self._known is not None
+        return self._known
+
+    @property
+    def version(self) -> str:
+        """Of the server."""
+        return self.info.version
+
+    def robot_info(self, name: str) -> Any:
+        """Raises UnknownName."""
+        robots = self.info.robots
+        if name not in robots:
+            raise UnknownName(f"there is no robot {name!r}; there is {', '.join(robots) or 'none'}")
+        return robots[name]
+
+    def refresh_info(self, before: WorldInfo | None = None) -> None:
+        """Waits for another info than `before`, by default than the one that is known. The new one
+        may be there already.
+        """
+        before, deadline = before or self._known, time.monotonic() + 10.0
+        with self._news:
+            while self._known is before and time.monotonic() < deadline:
+                self._ask_info()
+                self._news.wait(0.1)
+
+    def on_new_run(self, callback: Callable[[], None]) -> Subscription:
+        self.check_open()
+        return self._new_run.add(callback)
+
+    def next_id(self) -> int:
+        """A number for a motion primitive."""
+        with self._news:
+            self._ids += 1
+            return self._ids
+
+    def _check_private_server(self) -> None:
+        ended = self._server and self._server.ended()
+        if ended:
+            raise NoServer(ended)
+
+    def _await_info(self, timeout: float) -> None:
+        deadline = time.monotonic() + timeout
+        with self._news:
+            while self._known is None:
+                if self._fault:
+                    raise self._fault
+                self._check_private_server()
+                if time.monotonic() >= deadline:
+                    raise NoServer(
+                        f"no Ruedo server answered at {self.url} within {timeout:g} s. Is `ruedo run` started, "
+                        "with the same --lcm or LCM_DEFAULT_URL? `ruedo doctor` looks for what is wrong"
+                    )
+                self._ask_info()
+                self._news.wait(0.1)
+
+    def _ask_info(self) -> None:
+        self._asked = time.monotonic()
+        request = lcmtypes.request_t()
+        request.epoch, request.kind = -1, lcmtypes.request_t.INFO
+        self.bus.publish("ruedo/request", request.encode())
+
+    # The receiving thread.
+
+    def _on_info(self, data: bytes) -> None:
+        try:
+            info = self._assembler.add(data)
+        except RuedoError as error:
+            with self._news:
+                self._fault = error
+                self._news.notify_all()
+            return
+        self.clock.note_sign()
+        with self._news:
+            before = self._known
+            new_epoch = bool(before and info and info.epoch != before.epoch)
+            if info:
+                self._known = info
+                self.another_run = False
+                if new_epoch:
+                    self.clock.reset()
+            self._news.notify_all()
+        if not info:
+            return
+        if new_epoch:
+            self.drivers.begin_epoch()
+        # No command is repeated to a robot that is gone, nor to the next one of its name.
+        self.drivers.end_removed(info)
+        self.streams.end_removed(info)
+        if before and info.run_id != before.run_id:
+            self._begin_run()
+
+    def _begin_run(self) -> None:
+        """The server was restarted, or another has taken its place."""
+        self.clock.reset()
+        self.drivers.end_all("new run")
+        self.streams.forget()
+        log.warning("another run has begun at %s: commands are not repeated into it", self.url)
+        self._new_run.call()
+
+    def _on_tick(self, data: bytes) -> None:
+        if len(data) < _TICK.size:
+            return
+        fingerprint, utime, run_id = _TICK.unpack_from(data)
+        known = self._known
+        if fingerprint != _TICK_FINGERPRINT or known is None:
+            return
+        self.another_run = run_id != known.run_id
+        if self.another_run:  # it may be the server's next one
+            if time.monotonic() - self._asked > 0.1:
+                self._ask_info()
+            return
+        self.clock.note(utime)
+        self.stepper.on_tick(data)
+        # Sim time may run a hundred times faster than real time: the watchdog is fed by its beat,
+        # too.
+        self.drivers.repeat()
+
+    def _forked(self) -> None:
+        self.closed = _FORKED
+        if self._server:
+            self._server.forked()
+
+
+_all: weakref.WeakSet[Connection] = weakref.WeakSet()
+
+
+def _after_fork() -> None:
+    """Connections are the parent's: its threads do not run here, and its server is not this
+    process's to end.
+    """
+    for connection in list(_all):
+        connection._forked()
+
+
+if hasattr(os, "register_at_fork"):
+    os.register_at_fork(after_in_child=_after_fork)
+
+
+def _name_hash(name: str) -> int:
+    """31 bits of FNV-1a."""
+    value = 2166136261
+    for byte in name.encode():
+        value = (value ^ byte) * 16777619 & 0xFFFFFFFF
+    return value & 0x7FFFFFFF
