@@ -16,6 +16,18 @@ MOST_BYTES = {
     "map": 8 * 1024,
 }  # larger ones only take time to decode
 
+# Of fuzz_lockstep: another client and what it asks, with its numbers. 0, or nothing more: what is usual.
+STEPS, JOIN, LEAVE = b"\0\7\xc7", b"\0\0", b"\0\3\0"
+TAKE_PART, GRANT = b"\0\1\1" + bytes(5), b"\0\1\0\0\xef" + bytes(3)
+RESEND = b"\0\2\0\xff" + bytes(4 * 255 + 1)
+CONVERSATIONS = [
+    5 * STEPS,
+    JOIN + TAKE_PART + 3 * (STEPS + GRANT) + LEAVE + STEPS,
+    JOIN + TAKE_PART + 20 * (b"\0\7\2" + GRANT + RESEND),
+    JOIN + TAKE_PART + STEPS + b"\0\6\x1d" + STEPS + JOIN + TAKE_PART + STEPS,
+    b"".join(bytes([0, 4, kind, 0]) for kind in range(1, 30)) + STEPS,
+]
+
 HAND_MADE = {
     "map": [
         b"\x02image: map.pgm\nresolution: 0.05\norigin: [-1.0, -2.0, 0.5]\nnegate: 0\noccupied_thresh: 0.65\nfree_thresh: 0.196\n",
@@ -35,6 +47,7 @@ HAND_MADE = {
         b"<sdf version='1.9'><model name='m'><include><uri>../x</uri></include></model></sdf>",
     ],
     "log": [b"\x00", b"\x00\xed\xa1\xda\x01" + bytes(24), b"\x01" + bytes(200)],
+    "lockstep": [policy + conversation for policy in (b"\0", b"\1") for conversation in CONVERSATIONS],
     "messages": [bytes([kind]) + bytes(size) for kind in range(17) for size in (16, 32, 40, 64)],
     "mesh": [
         b"\x00v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n",
@@ -60,7 +73,7 @@ def target_of(path):
 
 def main(out, *folders):
     shutil.rmtree(out, ignore_errors=True)
-    for name in ("world", "urdf", "spawn", "mesh", "map", "yaml", "messages", "log"):
+    for name in ("world", "urdf", "spawn", "mesh", "map", "yaml", "messages", "log", "lockstep"):
         (out / name).mkdir(parents=True)
         for number, seed in enumerate(HAND_MADE.get(name, [])):
             (out / name / f"hand_{number}").write_bytes(seed)
