@@ -8,7 +8,6 @@
 #include <opencv2/imgproc.hpp>
 
 #include "cli/commands.h"
-#include "cli/cut_away.h"
 #include "cli/range.h"
 #include "cli/render_devices.h"
 #include "cli/render_log.h"
@@ -18,6 +17,7 @@
 #include "model/settings.h"
 #include "ruedo/errors.h"
 #include "ruedo/image_t.hpp"
+#include "scene/cut_away.h"
 
 namespace ruedo::cli {
 namespace {
@@ -133,7 +133,8 @@ std::optional<double> height_to_cut_at(const RenderArguments& arguments,
   const bool from_outside = arguments.view == "top" || arguments.view == "iso";
   if (arguments.cut == "none") return std::nullopt;
   if (arguments.cut == "auto")
-    return arguments.camera.empty() && from_outside ? height_of_ceiling(world) : std::nullopt;
+    return arguments.camera.empty() && from_outside ? scene::height_of_ceiling(world)
+                                                    : std::nullopt;
   const std::optional<double> height = parse_number(arguments.cut);
   if (!height)
     throw InputError({}, "--cut " + arguments.cut + ": allowed are a height in m, auto and none");
@@ -171,7 +172,7 @@ int render(const RenderArguments& arguments) {
   auto world = load(arguments);
   print_findings(world->findings);
   if (const auto height = height_to_cut_at(arguments, *world)) {
-    world = without_what_is_above(*world, *height);
+    world = scene::without_what_is_above(*world, *height);
     if (arguments.cut == "auto")
       fmt::print(
           "what is above {:.3g} m is left out, since it hides the rest; --cut none shows it\n",

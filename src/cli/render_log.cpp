@@ -9,7 +9,6 @@
 #include <opencv2/imgproc.hpp>
 
 #include "cli/commands.h"
-#include "cli/cut_away.h"
 #include "cli/logged_run.h"
 #include "cli/render_devices.h"
 #include "cli/render_view.h"
@@ -21,6 +20,7 @@
 #include "ruedo/errors.h"
 #include "ruedo/world_state_t.hpp"
 #include "run/log_worlds.h"
+#include "scene/cut_away.h"
 #include "scene/render_scene.h"
 
 namespace ruedo::cli {
@@ -154,8 +154,8 @@ class Scene {
   static std::shared_ptr<const model::WorldModel> without_roof(
       std::shared_ptr<const model::WorldModel> world, const std::string& view) {
     const bool from_outside = view == "top" || view == "iso";
-    const auto height = from_outside ? height_of_ceiling(*world) : std::nullopt;
-    return height ? without_what_is_above(*world, *height) : world;
+    const auto height = from_outside ? scene::height_of_ceiling(*world) : std::nullopt;
+    return height ? scene::without_what_is_above(*world, *height) : world;
   }
 
   RobotIndex robot_of(const std::string& name) const {

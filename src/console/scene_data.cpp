@@ -7,6 +7,7 @@
 #include <filesystem>
 #include <fstream>
 #include <iterator>
+#include <limits>
 #include <map>
 #include <memory>
 
@@ -15,6 +16,7 @@
 #include "core/json.h"
 #include "model/body_layout.h"
 #include "model/codecs.h"
+#include "scene/cut_away.h"
 #include "scene/render_content.h"
 #include "scene/render_texture.h"
 
@@ -260,6 +262,8 @@ SceneData::SceneData(const model::WorldModel& world, int version) {
   list(out.name("background"), world.sky.background.data(), 3);
   list(out.name("low"), content.bounds.low.data(), 3);
   list(out.name("high"), content.bounds.high.data(), 3);
+  constexpr double kOpen = std::numeric_limits<double>::infinity();  // null in JSON
+  out.member("ceiling", scene::height_of_ceiling(world).value_or(kOpen));
   meshes = write_meshes(out, content.meshes);
   out.name("textures").open('[');
   for (const auto& texture : content.textures) {

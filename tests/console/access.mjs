@@ -176,7 +176,9 @@ export default async function access({ page, until, check, ready, picture, expec
   await picture("still");
   await page.locator("#canvas").focus();
   await page.keyboard.press(" ");
+  await page.keyboard.down("a");
   await until("(and less again)", () => !document.getElementById("reduced").hidden);
+  await page.keyboard.up("a");
 
   // ---- colours and motion that the system asks for
   await page.emulateMedia({ forcedColors: "active", reducedMotion: "reduce" });

@@ -327,6 +327,44 @@ def test_the_order_of_loading_is_one(tmp_path):
     } and len(seen) == len(parts) + 1
 
 
+BARE = """<sdf version="1.9"><world name="bare"><include><uri>model://sun</uri></include>
+<include><uri>model://ground_plane</uri></include>%s</world></sdf>"""
+HALL = "".join(
+    f"""<visual name="{name}"><pose>{pose}</pose><geometry><box><size>{size}</size></box></geometry>
+</visual>"""
+    for name, pose, size in (
+        ("roof", "0 0 3 0 0 0", "10 8 0.1"),
+        ("left", "0 4 1.5 0 0 0", "10 0.1 3"),
+        ("right", "0 -4 1.5 0 0 0", "10 0.1 3"),
+    )
+)
+
+
+@pytest.mark.parametrize("what", ["bare", "log", "watched", "hall"])
+def test_only_what_can_be_done_is_offered(tmp_path, what):
+    world = tmp_path / "world.sdf"
+    model = f"""<model name="hall"><static>1</static><link name="l">{HALL}</link></model>"""
+    world.write_text(BARE % (model if what == "hall" else ""))
+    log = tmp_path / "run.lcm"
+    if what == "log":
+        options = ["--lcm", "memq://", "--quiet", "--rate", "max", "--duration", "1"]
+        subprocess.run([RUEDO, "run", ARENA, *options, "--record", log], check=True, timeout=120)
+        console = playing(log)
+    elif what == "watched":
+        console = running("--control", "off")
+    else:
+        console = running(world=world)
+    with console as process:
+        browse(process.url, tmp_path, "offers", {"is": what})
+
+
+def test_who_stands_is_drawn_with_all_pixels(tmp_path):
+    """Though its range finder goes on, each scan with other noise."""
+    with running() as process:
+        seen = browse(process.url, tmp_path, "rest")
+    assert "and with all again when it stands" in seen
+
+
 def test_everybody_can_use_it(tmp_path):
     with running() as process:
         seen = browse(process.url, tmp_path, "access")

@@ -268,6 +268,9 @@ export class App {
       this.pages.restyle();
       this.plots.restyle();
     });
+    page.watch(["scene", "layers"], ({ scene, layers }) =>
+      this.stage.cutAt(layers.has("roof") ? null : (scene?.ceiling ?? null)),
+    );
     let shapes = page.now.layers.has("shapes");
     page.watch(["layers"], ({ layers }) => {
       if (shapes === layers.has("shapes")) return;
@@ -275,6 +278,11 @@ export class App {
       if (page.now.hello) void this.loading.onScene();
     });
     page.watch(["world", "scene", "robot"], () => this.showRobot());
+    page.watch(["hello", "world", "robot"], ({ world }) => {
+      this.pages.showNone(world?.robots.length === 0);
+      this.pages.showMotions(this.control.canMove);
+      byId("pad").hidden = !this.control.canDrive;
+    });
     page.watch(["hello", "world", "scene", "robot", "layers", "tab", "panel"], () => this.want());
   }
 
@@ -293,14 +301,23 @@ export class App {
       comparison: (comparison) => page.set({ comparison }),
       message: (channel, bytes) => this.router.onMessage(channel, bytes),
       traffic: (channels, messages, sizes) => this.channels.traffic(channels, messages, sizes),
-      refused: (channel) =>
-        toast(
-          page.now.hello?.mode === "log"
-            ? "A recorded run cannot be steered."
-            : `Nobody listens on ${channel}.`,
-          "error",
-        ),
+      refused: (channel) => this.onRefused(channel),
     });
+  }
+
+  // A run with --control off takes no requests; the page asks one, for what runs, before it knows.
+  private onRefused(channel: string): void {
+    const { hello, world } = this.page.now,
+      isRequest = channel === "ruedo/request";
+    if (isRequest && hello?.mode === "live" && !world) return;
+    toast(
+      hello?.mode === "log"
+        ? "A recorded run cannot be steered."
+        : isRequest
+          ? "This run takes no requests (--control off)."
+          : `Nobody listens on ${channel}.`,
+      "error",
+    );
   }
 
   // ---- what comes in, in the order of Loading
@@ -558,9 +575,6 @@ export class App {
         );
     });
     byId("pad").append(drive.stick, readout);
-    this.page.watch(["world"], ({ world }) => {
-      byId("pad").hidden = world !== null && world.robots.length === 0;
-    });
   }
 
   // What was begun is left; then, what was selected.

@@ -130,11 +130,20 @@ export class Control {
     return id;
   }
 
-  // Where the chosen robot takes commands to its joints.
-  get jointChannel(): string | undefined {
+  // Where the chosen robot takes commands of that type; nowhere in a log.
+  private input(type: string): string | undefined {
     const { world, robot: chosen } = this.page.now,
       robot = world?.robots[chosen];
-    return robot && !this.isLog ? inputOf(world!, robot.name, "joint_command_t") : undefined;
+    return robot && !this.isLog ? inputOf(world!, robot.name, type) : undefined;
+  }
+  get jointChannel(): string | undefined {
+    return this.input("joint_command_t");
+  }
+  get canMove(): boolean {
+    return this.input("move_command_t") !== undefined;
+  }
+  get canDrive(): boolean {
+    return this.input("velocity_command_t") !== undefined;
   }
 
   joint(name: string, position: number): void {

@@ -4,7 +4,7 @@ import type { world_state_t } from "../generated/messages";
 import { Poses } from "../src/state/poses";
 import { inWorld } from "../src/ui/odometry";
 import { plainKinds } from "../src/scene/plain";
-import { Quality } from "../src/scene/quality";
+import { Quality, type Change } from "../src/scene/quality";
 
 function stateAt(
   utime: number,
@@ -48,6 +48,22 @@ describe("poses between two states", () => {
     expect([poses.now[0], yawOf(poses, 0)].map((v) => Number(v!.toFixed(4)))).toEqual([10.1, 0.4]);
     expect(poses.settled).toBe(true);
     expect(poses.advance(10_300)).toBe(false);
+  });
+
+  it("have not moved where a state is the same, or differs by less than is seen", () => {
+    const poses = moving();
+    let moves = 0;
+    for (let i = 101; i <= 110; ++i) {
+      poses.add(stateAt(i * 100_000, [[0, 10 + 1e-6 * (i % 2), 0]]), i * 100);
+      for (let k = 1; k <= 6; ++k) if (poses.advance(i * 100 + 16 * k)) ++moves;
+    }
+    expect(moves).toBe(0);
+    for (let i = 111; i <= 130; ++i) {
+      // slowly, but it is seen in time
+      poses.add(stateAt(i * 100_000, [[0, 10 + 5e-5 * (i - 110), 0]]), i * 100);
+      if (poses.advance(i * 100 + 100)) ++moves;
+    }
+    expect(moves).toBeGreaterThan(4);
   });
 
   it("turn the short way", () => {
@@ -174,24 +190,55 @@ describe("quality", () => {
     const quality = new Quality(false);
     for (let i = 0; i < 50; ++i) {
       expect(quality.drawn(i * 1000)).toBe(false);
-      quality.idle(i * 1000 + 1);
+      quality.next(i * 1000 + 1, "none");
     }
   });
 
+  // What a change at that moment leads to: whether it is drawn, at another level, reduced.
+  const next = (quality: Quality, at_ms: number, change: Change) => {
+    const { draw, other } = quality.next(at_ms, change);
+    return [draw, other, quality.reduced];
+  };
+
   it("draws one frame as finely as can be once nothing moves, and less again when something does", () => {
     const quality = new Quality(true);
-    expect([quality.moves(0), quality.reduced]).toEqual([false, true]);
-    expect([quality.idle(100), quality.reduced]).toEqual([false, true]);
-    expect([quality.idle(400), quality.reduced, quality.now.shadows]).toEqual([true, false, true]);
-    expect([quality.idle(1000), quality.reduced]).toEqual([false, false]); // once is enough
-    expect([quality.moves(1100), quality.reduced]).toEqual([true, true]);
-    expect(quality.idle(1200)).toBe(false);
-    expect(quality.idle(1400)).toBe(true);
+    expect(next(quality, 0, "motion")).toEqual([true, false, true]);
+    expect(next(quality, 100, "none")).toEqual([false, false, true]);
+    expect(next(quality, 400, "none")).toEqual([true, true, false]);
+    expect(quality.now.shadows).toBe(true);
+    expect(next(quality, 1000, "none")).toEqual([false, false, false]); // once is enough
+    expect(next(quality, 1100, "motion")).toEqual([true, true, true]);
+    expect(next(quality, 1200, "none")).toEqual([false, false, true]);
+    expect(next(quality, 1400, "none")).toEqual([true, true, false]);
+  });
+
+  it("draws all pixels of scans while nothing moves, a third of the time at most", () => {
+    const quality = new Quality(true);
+    next(quality, 0, "motion");
+    expect(next(quality, 100, "sensing")).toEqual([true, false, true]); // it may go on
+    expect(next(quality, 300, "sensing")).toEqual([true, true, false]);
+    quality.took(80);
+    expect(next(quality, 400, "sensing")).toEqual([false, false, false]);
+    expect(next(quality, 540, "sensing")).toEqual([true, false, false]);
+    expect(next(quality, 1000, "none")).toEqual([false, false, false]); // the next scan may be late
+    expect(next(quality, 1600, "none")).toEqual([true, true, false]);
+    expect(quality.now.shadows).toBe(true);
+    expect(next(quality, 1700, "sensing")).toEqual([false, false, false]);
+    expect(next(quality, 1900, "sensing")).toEqual([true, true, false]);
+    expect(next(quality, 1910, "motion")).toEqual([true, true, true]);
+  });
+
+  it("draws scans as all else where that is quick", () => {
+    const quality = new Quality(false);
+    next(quality, 0, "motion");
+    quality.took(80);
+    for (let at_ms = 1000; at_ms < 1100; at_ms += 16)
+      expect(next(quality, at_ms, "sensing")).toEqual([true, false, false]);
   });
 
   it("has nothing finer to draw where it is the finest already", () => {
     const quality = new Quality(false);
-    quality.moves(0);
-    expect(quality.idle(10_000)).toBe(false);
+    next(quality, 0, "motion");
+    expect(next(quality, 10_000, "none")).toEqual([false, false, false]);
   });
 });

@@ -44,6 +44,7 @@ export interface Description {
   background: number[];
   low: number[];
   high: number[];
+  ceiling: number | null; // above it things hide what is below; null: the world lies open
   meshes: [vertices: number, indices: number][];
   textures: boolean[];
   batches: [mesh: number, first: number, count: number, texture: number, flags: number][];

@@ -20,6 +20,7 @@ export function finishesOf(mesh: THREE.Mesh): THREE.Material[] {
 function plainOf(fine: THREE.MeshStandardMaterial): THREE.MeshLambertMaterial {
   const { vertexColors, emissive, side, transparent, opacity, depthWrite, alphaTest, wireframe } =
     fine;
+  const { clippingPlanes, clipShadows } = fine;
   fine.userData.plain ??= new THREE.MeshLambertMaterial({
     vertexColors,
     emissive,
@@ -29,6 +30,8 @@ function plainOf(fine: THREE.MeshStandardMaterial): THREE.MeshLambertMaterial {
     depthWrite,
     alphaTest,
     wireframe,
+    clippingPlanes,
+    clipShadows,
     map: fine.map && plainPicture(fine.map),
   });
   return fine.userData.plain as THREE.MeshLambertMaterial;

@@ -32,7 +32,7 @@ export class Ghosts {
     }
     this.built.moving.visible = false;
     this.stage.scene.add(this.built.moving);
-    this.poses.settled = false;
+    this.poses.forgetSeen();
   }
 
   // At that moment of the display; true when there is something to draw.

@@ -10,6 +10,7 @@ export const kLayers = [
   "clouds",
   "labels",
   "shapes",
+  "roof",
   "ghosts",
   "markers",
 ] as const;
@@ -26,9 +27,23 @@ export const kLayerColours: Record<Layer, string> = {
   clouds: "linear-gradient(90deg,#f33,#3f3,#33f)",
   labels: "var(--text)",
   shapes: "#8fd14f",
+  roof: "#a0764a",
   ghosts: "#b58cff",
   markers: "#f2f2f2",
 };
 
+// What robots sense and where they are.
+export const kOfRobots: readonly Layer[] = [
+  "rays",
+  "points",
+  "sonar",
+  "trail",
+  "odometry",
+  "contacts",
+  "frames",
+  "clouds",
+  "labels",
+];
+
 // Those that are off until somebody wants them.
-export const kOffAtFirst: readonly Layer[] = ["frames", "labels", "shapes"];
+export const kOffAtFirst: readonly Layer[] = ["frames", "labels", "shapes", "roof"];

@@ -46,7 +46,7 @@ export class Markers {
       this.stage.scene.add(group);
     }
     this.page.set({ drawn: this.layers.size > 0 });
-    this.stage.touch();
+    this.stage.sense();
   }
 
   // Nothing of it holds any more.

@@ -1,6 +1,7 @@
 // How finely is drawn: as finely as the display can, and less where a frame takes too long, as on
 // machines without a GPU. Without it, a page that draws by software answers keys late, and the
 // robot's watchdog stops it between two commands.
+export type Change = "motion" | "sensing" | "none";
 export interface Level {
   ratio: number; // pixels of the canvas per pixel of the page, at most
   shadows: boolean;
@@ -15,6 +16,8 @@ const kLevels: Level[] = [
   { ratio: 0.4, shadows: false, plain: true },
 ];
 const kSoftwareLevel = 3; // where the processor draws: the first one
+const kSensing = 2; // the coarsest where nothing moves, though what is sensed changes: all pixels
+const kSensingShare = 3; // of the time, one part at most goes into drawing that
 // Of a frame: 20 a second where a graphics processor draws, and 40 where the processor does, which
 // has time left for nothing else.
 const kSlow_ms = { hardware: 50, software: 25 };
@@ -22,6 +25,7 @@ const kQuick_ms = { hardware: 25, software: 18 };
 const kFrames = 5; // in a row, of which the mean counts, but for the slowest
 const kFirstWait_ms = 10_000; // until a finer level is tried; each time twice as long
 const kStill_ms = 250; // without motion, and one frame is drawn as finely as can be
+const kSensed_ms = 1000; // the same after what is sensed, of which there may be more soon
 
 // Whether WebGL is done by the processor here.
 export function drawnBySoftware(): boolean {
@@ -42,8 +46,10 @@ export class Quality {
   private intervals: number[] = [];
   private finer_ms = 0; // when a finer level is tried
   private wait_ms = kFirstWait_ms;
-  private moved_ms = -1; // when something was drawn last
-  private still = false; // one frame is, or was, drawn as finely as can be: nothing moves
+  private moved_ms = -Infinity; // when something moved last
+  private drawn_ms = -1; // when something was drawn last
+  private phase: "moving" | "sensing" | "still" = "moving";
+  private cost_ms = 0; // of a frame while sensing
 
   constructor(software: boolean) {
     this.by = software ? "software" : "hardware";
@@ -51,35 +57,49 @@ export class Quality {
   }
 
   get now(): Level {
-    return kLevels[this.automatic && !this.still ? this.level : 0]!;
+    if (!this.automatic || this.phase === "still") return kLevels[0]!;
+    return kLevels[this.phase === "sensing" ? Math.min(this.level, kSensing) : this.level]!;
   }
   get reduced(): boolean {
     return this.now.ratio < 1;
   }
 
-  // Nothing is to be drawn: the next frame's interval says nothing. True when it has been so for a
-  // while, and what is seen is to be drawn once more, as finely as can be.
-  idle(at_ms: number): boolean {
-    this.last_ms = -1;
-    if (
-      this.still ||
-      !this.automatic ||
-      this.level === 0 ||
-      this.moved_ms < 0 ||
-      at_ms - this.moved_ms < kStill_ms
-    )
-      return false;
-    this.still = true;
-    return true;
+  // Whether a frame is drawn now, and at another level than the one before. `motion`: something is
+  // elsewhere. `sensing`: nothing is, but what robots sense is another scan; that is drawn with all
+  // pixels, and seldom enough to leave most of the time to others. `none`: what is seen holds; when
+  // it has done so for a while, it is drawn once more, as finely as can be.
+  next(at_ms: number, change: Change): { draw: boolean; other: boolean } {
+    const not = { draw: false, other: false },
+      was = this.phase;
+    if (change === "motion") {
+      this.phase = "moving";
+      this.moved_ms = at_ms;
+    } else if (change === "sensing") {
+      const standing = this.coarse && at_ms - this.moved_ms >= kStill_ms;
+      if (standing && at_ms - this.drawn_ms < kSensingShare * this.cost_ms) return not;
+      this.phase = standing ? "sensing" : "moving";
+    } else {
+      this.last_ms = -1;
+      const wait_ms = was === "sensing" ? kSensed_ms : kStill_ms,
+        fresh = this.drawn_ms < 0 || at_ms - this.drawn_ms < wait_ms;
+      if (was === "still" || !this.automatic || this.level === 0 || fresh) return not;
+      this.phase = "still";
+    }
+    if (this.phase !== "moving") this.last_ms = -1; // the next interval says nothing
+    this.drawn_ms = at_ms;
+    return { draw: true, other: this.phase !== was };
   }
 
-  // Something is to be drawn that moves. True when that is at another level than what was drawn
-  // before.
-  moves(at_ms: number): boolean {
-    this.moved_ms = at_ms;
-    const was = this.still;
-    this.still = false;
-    return was;
+  private get coarse(): boolean {
+    return this.automatic && this.level > kSensing;
+  }
+
+  // Whether how long a frame takes is to be told.
+  get isSensing(): boolean {
+    return this.phase === "sensing";
+  }
+  took(cost_ms: number): void {
+    this.cost_ms = cost_ms;
   }
 
   // A frame was drawn. True when what comes next is drawn at another level.

@@ -5,6 +5,7 @@ import { OrbitControls } from "three/addons/controls/OrbitControls.js";
 import { disposeOf, SceneBuilder, type Built, type Movers } from "./build";
 import type { Description, LightDescription, ModelDescription, SceneFiles } from "./description";
 import { finishesOf, setFinish } from "./finish";
+import { FrameTimer } from "./frame_timer";
 import { matrixOf } from "./matrix";
 import { drawnBySoftware, Quality } from "./quality";
 import type { PlanarPose } from "../state/go_to";
@@ -17,6 +18,13 @@ const kMostLamps = 6;
 // picture of fewer pixels nearer.
 const kFar_m = 18;
 const kNoWheels_m = 50;
+// Home: what of the world is in view, how high it looks, and the share of the view that this fills
+const kMostHome_m = 60,
+  kLookedAt_m = 1,
+  kHomeShare = 0.95;
+// What turns or goes less looks as it did
+const kSeen_rad = 1e-3,
+  kSeen_m2 = 1e-8;
 
 export class Stage {
   readonly scene = new THREE.Scene();
@@ -34,8 +42,11 @@ export class Stage {
   private lights = new THREE.Group();
   private sun: THREE.DirectionalLight | null = null;
   private dirty = true;
+  private sensed = false; // what robots sense has changed, and is not drawn yet
+  private timer: FrameTimer | null = null;
   private moved = false;
   private wireframe = false;
+  private ceiling = Infinity; // m, of what is shown of things that stand
   private moving: { first: number; end: number; by: THREE.Matrix4 } | null = null; // links that are shown elsewhere
   private regroup = false; // what is near and what is far has changed
   private linkWheel = new Map<
@@ -45,7 +56,8 @@ export class Stage {
   private readonly followed = new THREE.Vector3();
   private following = -1; // index into the description's bases
   private lastBase: THREE.Vector3 | null = null;
-  wheelAngles = new Map<number, Float64Array>(); // of robots whose odometry is known
+  private readonly wheelAngles = new Map<number, Float64Array>(); // of robots whose odometry is known
+  private spun = false; // wheels that are not drawn so yet
   // With each frame: whether it has fewer pixels than the page
   onDetail: (reduced: boolean) => void = () => undefined;
 
@@ -58,6 +70,8 @@ export class Stage {
     const software = !full && drawnBySoftware();
     this.quality = new Quality(software);
     this.renderer = makeRenderer(canvas, !software);
+    if (this.renderer)
+      this.timer = new FrameTimer(this.renderer.getContext() as WebGL2RenderingContext);
     this.camera.up.set(0, 0, 1);
     this.camera.position.set(-4, -5, 4);
     this.controls = new OrbitControls(this.camera, canvas);
@@ -79,6 +93,11 @@ export class Stage {
 
   touch(): void {
     this.dirty = true;
+  }
+
+  // What is drawn over the scene has changed, where nothing moves.
+  sense(): void {
+    this.sensed = true;
   }
 
   setTheme(dark: boolean): void {
@@ -167,6 +186,7 @@ export class Stage {
       this.lights.add(grid);
     }
     if (this.wireframe) this.setWireframe(true);
+    this.cut();
     this.place(true);
     this.touch();
   }
@@ -245,14 +265,30 @@ export class Stage {
   home(): void {
     const low = this.description?.low ?? [-3, -3, 0],
       high = this.description?.high ?? [3, 3, 1];
-    const centre = new THREE.Vector3((low[0]! + high[0]!) / 2, (low[1]! + high[1]!) / 2, 0);
-    const reach = Math.max(
-      3,
-      Math.min(60, 0.5 * Math.hypot(high[0]! - low[0]!, high[1]! - low[1]!)),
+    const half = [0, 1].map((i) => Math.max(2, Math.min(kMostHome_m, (high[i]! - low[i]!) / 2))),
+      top = Math.max(0, Math.min(kMostHome_m, high[2]!, this.description?.ceiling ?? Infinity));
+    const centre = new THREE.Vector3(
+      (low[0]! + high[0]!) / 2,
+      (low[1]! + high[1]!) / 2,
+      Math.min(top / 2, kLookedAt_m),
     );
-    const back = reach * 1.9 * Math.max(1, 1.1 / this.camera.aspect);
+    // As near as all corners are still in view
+    const eye = new THREE.Vector3(-0.5, -0.62, 0.62).normalize(),
+      right = new THREE.Vector3(0, 0, 1).cross(eye).normalize(),
+      up = eye.clone().cross(right);
+    const upwards = kHomeShare * Math.tan((this.camera.fov * Math.PI) / 360),
+      sideways = upwards * this.camera.aspect;
+    let away = 0;
+    for (const x of [-half[0]!, half[0]!])
+      for (const y of [-half[1]!, half[1]!])
+        for (const z of [-centre.z, top - centre.z]) {
+          const corner = new THREE.Vector3(x, y, z),
+            wide = Math.abs(corner.dot(right)) / sideways,
+            high = Math.abs(corner.dot(up)) / upwards;
+          away = Math.max(away, Math.max(wide, high) + corner.dot(eye));
+        }
     this.controls.target.copy(centre);
-    this.camera.position.set(centre.x - 0.5 * back, centre.y - 0.62 * back, 0.62 * back);
+    this.camera.position.copy(centre).addScaledVector(eye, away);
     this.controls.update();
     this.touch();
   }
@@ -376,6 +412,23 @@ export class Stage {
     this.renderer?.render(this.scene, this.camera);
   }
 
+  // Shows what stands up to a height (m) only, so that no roof hides the rest; null: all of it.
+  cutAt(height: number | null): void {
+    if (this.ceiling === (height ?? Infinity)) return;
+    this.ceiling = height ?? Infinity;
+    this.cut();
+    this.moved = true; // shadows
+    this.touch();
+  }
+
+  private cut(): void {
+    const planes =
+      this.ceiling < Infinity ? [new THREE.Plane(new THREE.Vector3(0, 0, -1), this.ceiling)] : null;
+    for (const { meshes } of this.built?.standing ?? [])
+      for (const material of meshes.flatMap(finishesOf))
+        Object.assign(material, { clippingPlanes: planes, clipShadows: true, needsUpdate: true });
+  }
+
   // Edges alone, or surfaces.
   setWireframe(on: boolean): void {
     this.wireframe = on;
@@ -425,15 +478,15 @@ export class Stage {
   private seen(caster: THREE.Raycaster): { model: number; point: THREE.Vector3 } | null {
     let nearest = Infinity,
       found: { model: number; point: THREE.Vector3 } | null = null;
-    for (const { indices, meshes, far, shown } of [
-      ...(this.built?.standing ?? []),
-      ...(this.built?.movers ?? []),
-    ]) {
+    const { standing = [], movers = [] } = this.built ?? {};
+    for (const part of [...standing, ...movers]) {
+      const { indices, meshes, far, shown } = part,
+        top = standing.includes(part) ? this.ceiling : Infinity;
       for (const mesh of far ? [...meshes, far.mesh] : meshes) {
         if (mesh.userData.ground) continue;
         mesh.boundingSphere = null; // of all instances, where they were once
         for (const { distance, instanceId, point } of caster.intersectObject(mesh, false)) {
-          if (distance >= nearest) continue;
+          if (distance >= nearest || point.z > top) continue;
           nearest = distance;
           const place = (mesh === far?.mesh ? far.shown : shown)[instanceId!]!;
           found = { model: this.modelOf(indices[place]!), point: point.clone() };
@@ -500,29 +553,51 @@ export class Stage {
     this.touch();
   }
 
+  // Wheels may turn where the robot stays.
+  turnWheels(robot: number, angles: Float64Array): void {
+    const before = this.wheelAngles.get(robot);
+    if (before && angles.every((angle, i) => Math.abs(angle - before[i]!) < kSeen_rad)) return;
+    this.wheelAngles.set(robot, angles);
+    this.spun = true;
+  }
+
   // One frame at that moment; overlays: called when bodies may have moved.
   frame(at_ms: number, overlays: () => boolean): void {
-    if (this.poses.advance(at_ms)) {
+    if (this.poses.advance(at_ms) || this.spun) {
+      this.spun = false;
       this.place(false);
       this.touch();
     }
-    if (overlays()) this.touch();
+    if (overlays()) this.sense();
     this.track();
     this.controls.update();
-    if (!this.renderer) return;
-    if (this.dirty ? this.quality.moves(at_ms) : this.quality.idle(at_ms)) this.refine();
-    else if (!this.dirty) return;
-    else if (this.quality.drawn(at_ms)) this.refine();
-    this.dirty = false;
+    if (!this.renderer || !this.drawsNow(at_ms)) return;
+    this.dirty = this.sensed = false;
     const begun = performance.now();
     if (this.regroup) for (const movers of this.built?.movers ?? []) this.group(movers);
     this.regroup = false;
     this.aimSun();
     this.renderer.render(this.scene, this.camera);
+    if (this.quality.isSensing) this.timer!.begin();
     this.onDetail(this.quality.reduced);
     ++this.frames;
     if (this.built && this.firstDrawn_ms === 0) this.firstDrawn_ms = performance.now();
     this.frameCost_ms += 0.1 * (performance.now() - begun - this.frameCost_ms);
+  }
+
+  // Whether this frame is to be drawn, and made ready for that.
+  private drawsNow(at_ms: number): boolean {
+    const cost_ms = this.timer?.done();
+    if (cost_ms) this.quality.took(cost_ms);
+    const change = this.dirty ? "motion" : this.sensed ? "sensing" : "none";
+    if (change === "sensing" && this.timer?.running) return false;
+    const { draw, other } = this.quality.next(at_ms, change);
+    if (
+      other ||
+      (draw && change !== "none" && !this.quality.isSensing && this.quality.drawn(at_ms))
+    )
+      this.refine();
+    return draw;
   }
 
   private place(all: boolean): void {
@@ -618,10 +693,11 @@ export class Stage {
       return;
     }
     const shift = this.followed.clone().sub(this.lastBase);
+    if (shift.lengthSq() < kSeen_m2) return;
     this.controls.target.add(shift);
     this.camera.position.add(shift);
     this.lastBase.copy(this.followed);
-    if (shift.lengthSq() > 0) this.touch();
+    this.touch();
   }
 
   private aimSun(): void {
@@ -644,6 +720,7 @@ function makeRenderer(canvas: HTMLCanvasElement, antialias: boolean): THREE.WebG
       antialias,
       powerPreference: "high-performance",
     });
+    renderer.localClippingEnabled = true;
     renderer.shadowMap.enabled = true;
     renderer.shadowMap.type = THREE.PCFShadowMap;
     renderer.shadowMap.autoUpdate = false;

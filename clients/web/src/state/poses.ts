@@ -3,6 +3,7 @@
 import type { world_state_t } from "../../generated/messages";
 
 const kMostBodies = 1_000_000;
+const kSeen = 1e-4; // m, or of a quaternion's parts: what moves less looks as it did
 const kJump_m = 1.5; // further in one interval is no motion but a new place
 
 export class Poses {
@@ -11,6 +12,7 @@ export class Poses {
   utime = 0; // us, of the newest state
   private from = new Float32Array(0);
   to = new Float32Array(0); // of the newest state
+  private seen = new Float32Array(0); // as `now` was when it was last said to have moved
   known = new Uint8Array(0);
   private arrived = 0;
   private interval = 33;
@@ -23,6 +25,12 @@ export class Poses {
     this.jumped = true;
   }
 
+  // Other things are drawn from now on, none of them yet.
+  forgetSeen(): void {
+    this.settled = false;
+    this.seen.fill(Infinity);
+  }
+
   private grow(size: number): void {
     if (size <= this.size) return;
     const larger = (old: Float32Array) => {
@@ -33,6 +41,7 @@ export class Poses {
     this.now = larger(this.now);
     this.from = larger(this.from);
     this.to = larger(this.to);
+    this.seen = larger(this.seen);
     const known = new Uint8Array(size);
     known.set(this.known);
     this.known = known;
@@ -73,7 +82,7 @@ export class Poses {
     }
   }
 
-  // Brings `now` to the moment; false when nothing has moved since.
+  // Brings `now` to the moment; false when nothing has moved visibly since that was said last.
   advance(at_ms: number): boolean {
     if (this.settled) return false;
     const t = Math.max(0, Math.min(1, (at_ms - this.arrived) / this.interval));
@@ -93,6 +102,8 @@ export class Poses {
       for (let k = 3; k < 7; ++k) now[at + k]! *= scale;
     }
     if (t >= 1) this.settled = true;
-    return true;
+    const moved = now.some((value, i) => Math.abs(value - this.seen[i]!) > kSeen);
+    if (moved) this.seen.set(now);
+    return moved;
   }
 }

@@ -1,5 +1,5 @@
 // The chips that switch what is drawn over the scene.
-import { kLayerColours, kLayers, type Layer } from "../scene/layers";
+import { kLayerColours, kLayers, kOfRobots, type Layer } from "../scene/layers";
 import type { Page } from "../state/page";
 import { h } from "./dom";
 
@@ -33,6 +33,10 @@ export function makeLegend(place: HTMLElement, page: Page): void {
   page.watch(["hello", "drawn"], ({ hello, drawn }) => {
     chips.get("ghosts")!.hidden = !hello?.compared;
     chips.get("markers")!.hidden = !drawn;
+  });
+  page.watch(["scene", "world"], ({ scene, world }) => {
+    chips.get("roof")!.hidden = typeof scene?.ceiling !== "number";
+    for (const layer of kOfRobots) chips.get(layer)!.hidden = world?.robots.length === 0;
   });
   page.watch(["reduced"], ({ reduced }) => {
     sign.hidden = !reduced;

@@ -50,6 +50,7 @@ export class Panel {
     page.watch(["panel"], ({ panel }) =>
       document.getElementById("app")!.classList.toggle("closed", !panel),
     );
+    this.search.hidden = this.robots.hidden = true;
     page.watch(["world", "robot"], ({ world, robot }) => {
       const names = world?.robots.map(({ name }) => name) ?? [];
       if (names.join("\n") !== this.names.join("\n")) {

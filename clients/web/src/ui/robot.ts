@@ -21,6 +21,7 @@ import { inWorld, type Heading } from "./odometry";
 import { PolarPlot, TimePlot } from "./plots";
 
 const kStates = ["idle", "running", "done", "ended", "refused"];
+const kFacts = ["drive", "pose", "speed", "odometry", "odometry error", "motion", "runs into"];
 const kLevel_m = 0.5; // nearer to the world's zero, a height says nothing; a robot may fall, too
 const fixed = (value: number) => (Math.abs(value) < 5e-4 ? 0 : value).toFixed(3);
 
@@ -140,6 +141,11 @@ export class RobotPages {
   private readonly pictureList = h("div");
   private readonly jointTable: JointTable;
   readonly extras = h("div"); // more of the robot
+  private readonly motions: HTMLElement;
+  private readonly ranges: HTMLElement;
+  private readonly about: HTMLElement; // a robot: all of the page
+  private readonly none = h("p", { class: "dim" }, "This world has no robot.");
+  private order: string[] = []; // of the facts
   private readonly values = new Map<string, HTMLElement>();
   private readonly polar = new PolarPlot();
   private readonly speed = new TimePlot("Velocity profile", "m/s, rad/s", [
@@ -177,20 +183,38 @@ export class RobotPages {
       (name, position) => joint.move(name, position),
       () => joint.canMove(),
     );
-    this.statePage = h(
+    this.motions = h(
       "section",
+      { id: "motions" },
+      h("h2", {}, "Motion primitive"),
+      makeMoveForm(move, h("button", { click: stop, title: "stop (X)" }, "Stop"), this.goButton),
+    );
+    this.ranges = h("section", { id: "ranges" }, h("h2", {}, "Ranges"), this.polar.element);
+    this.about = h(
+      "div",
       {},
       this.facts,
       this.jointTable.element,
-      h("h2", {}, "Motion primitive"),
-      makeMoveForm(move, h("button", { click: stop, title: "stop (X)" }, "Stop"), this.goButton),
-      h("h2", {}, "Ranges"),
-      this.polar.element,
+      this.motions,
+      this.ranges,
       h("h2", {}, "Pictures"),
       this.pictureList,
       this.extras,
     );
+    this.statePage = h("section", {}, this.none, this.about);
     this.plotPage = h("section", {}, this.speed.element, this.path.element, this.error.element);
+    this.showNone(true);
+  }
+
+  // Whether there is no robot that the pages could be about.
+  showNone(none: boolean): void {
+    this.none.hidden = !none;
+    this.about.hidden = this.plotPage.hidden = none;
+  }
+
+  // Whether the robot takes motion primitives here.
+  showMotions(can: boolean): void {
+    this.motions.hidden = !can;
   }
 
   // Where odometry begins, as a pose; undefined: not known yet.
@@ -206,6 +230,8 @@ export class RobotPages {
     this.truth = this.reckoned = null;
     this.polar.clear();
     for (const plot of [this.speed, this.path, this.error]) plot.clear();
+    this.ranges.hidden = true; // until there are some
+    this.order = [...kFacts, ...devices.map(({ name }) => name)];
     this.fact("drive", `${robot.model}, ${robot.drive || "no drive"}`);
     const cameras = devices.filter((d) => d.kind === "camera");
     this.pictureList.replaceChildren(
@@ -224,7 +250,13 @@ export class RobotPages {
     if (!value) {
       value = h("dd", { "data-fact": name });
       this.values.set(name, value);
-      this.facts.append(h("dt", {}, name), value);
+      // Always in the same order, whatever comes first
+      const at = this.order.indexOf(name),
+        next = [...this.facts.children].find(
+          (term) => term.localName === "dt" && this.order.indexOf(term.textContent) > at,
+        );
+      this.facts.insertBefore(h("dt", {}, name), next ?? null);
+      this.facts.insertBefore(value, next ?? null);
     }
     say(value, text);
   }
@@ -325,6 +357,7 @@ export class RobotPages {
     this.fact("runs into", (touched || "nothing") + blocked);
   }
   scan(device: device_info_t, m: planar_lidar_t): void {
+    this.ranges.hidden = false;
     this.polar.scan(device, m);
     const nearest = m.ranges.reduce(
       (least, r) => (Number.isFinite(r) && r < least ? r : least),
@@ -336,6 +369,7 @@ export class RobotPages {
     );
   }
   sonar(device: device_info_t, m: sonar_t): void {
+    this.ranges.hidden = false;
     this.polar.sonar(device, m);
   }
   camera(name: string, m: image_t): void {

@@ -1,5 +1,5 @@
 // By shapes and triangles: what reaches below the height stays whole.
-#include "cli/cut_away.h"
+#include "scene/cut_away.h"
 
 #include <algorithm>
 #include <cmath>
@@ -7,7 +7,7 @@
 
 #include "model/geometry.h"
 
-namespace ruedo::cli {
+namespace ruedo::scene {
 namespace {
 
 constexpr double kPerson_m = 1.8;
@@ -145,4 +145,4 @@ std::shared_ptr<const model::WorldModel> without_what_is_above(const model::Worl
   return open;
 }
 
-}  // namespace ruedo::cli
+}  // namespace ruedo::scene

@@ -6,7 +6,7 @@
 
 #include "model/world_model.h"
 
-namespace ruedo::cli {
+namespace ruedo::scene {
 
 // The height (m, world) above which things hide what is below them: where more than half of the
 // world, as seen from above, lies under visuals higher than a person. nullopt: it lies open.
@@ -17,4 +17,4 @@ std::optional<double> height_of_ceiling(const model::WorldModel& world);
 std::shared_ptr<const model::WorldModel> without_what_is_above(const model::WorldModel& world,
                                                                double height_m);
 
-}  // namespace ruedo::cli
+}  // namespace ruedo::scene
