@@ -186,7 +186,7 @@ void draw_picture(const Experiments& all, const LaserBench& bench,
   view.cx = 480;
   view.cy = 320;
   scene::Picture picture;
-  renderer->draw(bench.start, view, picture, lines);
+  renderer->draw(bench.start, view, picture, {.lines = lines});
   for (size_t i = 0; i + 2 < picture.rgb.size(); i += 3)
     std::swap(picture.rgb[i], picture.rgb[i + 2]);  // OpenCV's order
   const cv::Mat image(view.height, view.width, CV_8UC3, picture.rgb.data());

@@ -8,9 +8,11 @@
 
 #include <fmt/format.h>
 
+#include "cli/foxglove_json.h"
 #include "cli/message_json.h"
 #include "core/json.h"
 #include "core/utf8.h"
+#include "engine/markers.h"
 #include "model/body_layout.h"
 #include "ruedo/decode.h"
 #include "ruedo/math.h"
@@ -21,48 +23,6 @@ namespace {
 
 constexpr int kManyLinks =
     150;  // of a kind: round shapes get fewer triangles then, as on the console's page
-
-void write_time(JsonWriter& json, const char* name, uint64_t time_ns) {
-  json.name(name)
-      .open('{')
-      .member("sec", static_cast<int64_t>(time_ns / 1'000'000'000))
-      .member("nsec", static_cast<int64_t>(time_ns % 1'000'000'000))
-      .close('}');
-}
-
-void write_xyz(JsonWriter& json, const char* name, double x, double y, double z) {
-  json.name(name)
-      .open('{')
-      .name("x")
-      .raw(json_number(x))
-      .name("y")
-      .raw(json_number(y))
-      .name("z")
-      .raw(json_number(z))
-      .close('}');
-}
-
-void write_rotation(JsonWriter& json, const char* name, double w, double x, double y, double z) {
-  json.name(name)
-      .open('{')
-      .name("x")
-      .raw(json_number(x))
-      .name("y")
-      .raw(json_number(y))
-      .name("z")
-      .raw(json_number(z))
-      .name("w")
-      .raw(json_number(w))
-      .close('}');
-}
-
-void write_pose(JsonWriter& json, const Pose& X) {
-  const Quat& q = X.rotation;
-  json.name("pose").open('{');
-  write_xyz(json, "position", X.translation.x(), X.translation.y(), X.translation.z());
-  write_rotation(json, "orientation", q.w(), q.x(), q.y(), q.z());
-  json.close('}');
-}
 
 void write_frame(JsonWriter& json, uint64_t time_ns, const std::string& parent,
                  const std::string& child, const Pose& X) {
@@ -191,18 +151,11 @@ void write_part(JsonWriter& json, const scene::RenderContent& content,
   json.name("points").open('[');
   for (const uint32_t vertex : vertices) {
     const auto& p = mesh.vertices[vertex].position;
-    const Vec3 at = M.leftCols<3>() * Vec3(p[0], p[1], p[2]) + M.col(3);
-    json.raw(fmt::format(R"({{"x": {:.5g}, "y": {:.5g}, "z": {:.5g}}})", at.x(), at.y(), at.z()));
+    write_point(json, M.leftCols<3>() * Vec3(p[0], p[1], p[2]) + M.col(3));
   }
   json.close(']');
-  const model::Rgba& c = part.diffuse;
-  json.name("color")
-      .open('{')
-      .member("r", double{c[0]})
-      .member("g", double{c[1]})
-      .member("b", double{c[2]})
-      .member("a", double{c[3]})
-      .close('}');
+  json.name("color");
+  write_color(json, part.diffuse.data());
   json.name("colors").open('[').close(']').name("indices").open('[');
   for (const size_t corner : corners) json.value(static_cast<int64_t>(corner));
   json.close(']').close('}');
@@ -221,7 +174,7 @@ uint16_t FoxgloveExport::channel(const std::string& topic, const std::string& na
 
 void FoxgloveExport::send(const std::string& topic, const foxglove::Type& type, uint64_t time_ns,
                           const std::string& json) {
-  out_.add_message(channel(topic, type.name, type.schema), time_ns, json);
+  out_.add_message(channel(topic, type.name, type.schema), time_ns, json, "");
 }
 
 void FoxgloveExport::begin_scene(const run::LogWorlds::Scene& scene, uint64_t time_ns) {
@@ -400,9 +353,19 @@ FoxgloveExport::Shown FoxgloveExport::convert(const Place& place,
   return shown;
 }
 
+bool FoxgloveExport::add_drawn(uint64_t time_ns, std::span<const uint8_t> message) {
+  const auto markers = engine::markers_in(message);
+  if (!markers) return false;
+  const foxglove::Type& type = foxglove::scene_update();
+  out_.add_message(channel(kMarkers, type.name, type.schema), time_ns,
+                   markers_json(*markers, time_ns), markers->layer);
+  return true;
+}
+
 void FoxgloveExport::add(const std::string& name, uint64_t time_ns,
                          std::span<const uint8_t> message) {
   const std::string topic = printable(name);
+  if (add_drawn(time_ns, message) && fingerprint_of(message) == markers_t::getHash()) return;
   if (!out_.wants(topic)) return;
   const Shown shown = convert({topic, time_ns}, message);
   if (shown == Shown::wholly) return;
@@ -414,7 +377,7 @@ void FoxgloveExport::add(const std::string& name, uint64_t time_ns,
   }
   // What Foxglove's type leaves out is there.
   const std::string own = shown == Shown::partly ? topic + "/values" : topic;
-  out_.add_message(channel(own, "ruedo." + schema->name, json_schema(*schema)), time_ns, json);
+  out_.add_message(channel(own, "ruedo." + schema->name, json_schema(*schema)), time_ns, json, "");
 }
 
 }  // namespace ruedo::cli

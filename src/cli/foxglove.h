@@ -31,7 +31,9 @@ class FoxgloveOutput {
   // Both return an id. schema: JSON Schema; messages are JSON.
   virtual uint16_t add_schema(const std::string& name, const std::string& schema) = 0;
   virtual uint16_t add_channel(uint16_t schema, const std::string& topic) = 0;
-  virtual void add_message(uint16_t channel, uint64_t time_ns, const std::string& json) = 0;
+  // key: of what holds until the next message of that key; "": of nothing.
+  virtual void add_message(uint16_t channel, uint64_t time_ns, const std::string& json,
+                           const std::string& key) = 0;
   // False when no client wants what comes on this topic, or on TOPIC/values.
   virtual bool wants(const std::string& topic) const {
     static_cast<void>(topic);
@@ -48,7 +50,8 @@ class FoxgloveFile : public FoxgloveOutput {
   uint16_t add_channel(uint16_t schema, const std::string& topic) override {
     return file_.add_channel(schema, topic, "json");
   }
-  void add_message(uint16_t channel, uint64_t time_ns, const std::string& json) override {
+  void add_message(uint16_t channel, uint64_t time_ns, const std::string& json,
+                   const std::string&) override {
     file_.add_message(channel, time_ns, json);
   }
 
@@ -60,6 +63,8 @@ class FoxgloveExport {
  public:
   // Topics of what holds until another scene begins.
   static constexpr const char *kFrames = "ruedo/frames", *kScene = "ruedo/scene";
+  // Of what clients draw, layer by layer.
+  static constexpr const char* kMarkers = "ruedo/markers";
 
   explicit FoxgloveExport(FoxgloveOutput& out) : out_(out) {}
 
@@ -67,6 +72,9 @@ class FoxgloveExport {
   void begin_scene(const run::LogWorlds::Scene& scene, uint64_t time_ns);
   // A message as it came. One of an unknown type, or damaged, is left out and counted.
   void add(const std::string& channel, uint64_t time_ns, std::span<const uint8_t> message);
+
+  // What a client drew, in a markers_t or an applied_t; false for all else.
+  bool add_drawn(uint64_t time_ns, std::span<const uint8_t> message);
 
   uint64_t left_out() const { return left_out_; }
 

@@ -63,12 +63,37 @@ std::string triangles() {
                                                    {"colors", list(colour())},
                                                    {"indices", list(kCount)}});
 }
+std::string lines() {
+  return object("foxglove.LinePrimitive", {{"type", kCount},
+                                           {"pose", pose()},
+                                           {"thickness", kNumber},
+                                           {"scale_invariant", kFlag},
+                                           {"points", list(point3())},
+                                           {"color", colour()},
+                                           {"colors", list(colour())},
+                                           {"indices", list(kCount)}});
+}
+std::string spheres() {
+  return object("foxglove.SpherePrimitive",
+                {{"pose", pose()}, {"size", vector3()}, {"color", colour()}});
+}
+std::string texts() {
+  return object("foxglove.TextPrimitive", {{"pose", pose()},
+                                           {"billboard", kFlag},
+                                           {"font_size", kNumber},
+                                           {"scale_invariant", kFlag},
+                                           {"color", colour()},
+                                           {"text", kText}});
+}
 std::string entity() {
   return object("foxglove.SceneEntity", {{"timestamp", time("time")},
                                          {"frame_id", kText},
                                          {"id", kText},
                                          {"lifetime", time("duration")},
                                          {"frame_locked", kFlag},
+                                         {"lines", list(lines())},
+                                         {"spheres", list(spheres())},
+                                         {"texts", list(texts())},
                                          {"triangles", list(triangles())}});
 }
 

@@ -43,6 +43,7 @@ constexpr int kPort = 8765;                        // Foxglove's own default
 constexpr size_t kMostQueued = size_t{64} << 20;   // bytes between the run and this
 constexpr size_t kMostWaiting = size_t{32} << 20;  // bytes that wait for one viewer
 constexpr size_t kMostViewers = 16;
+constexpr size_t kMostLayers = 64;  // of what clients draw, for who comes later
 constexpr size_t kMostChannels = 65'000;
 constexpr size_t kMostSubscriptions = 100'000, kMostPublished = 100;  // of one viewer
 constexpr SimTime kClockPeriod_us = 20'000;
@@ -59,8 +60,14 @@ void put(std::string& bytes, Integer value) {
 
 struct Channel {
   std::string topic, schema_name, schema;
-  std::vector<std::pair<uint64_t, Text>> kept;  // for who comes later
-  bool lasts = false;                           // keeps its messages
+  struct Kept {
+    uint64_t time_ns;
+    Text text;
+    std::string key;
+  };
+  std::vector<Kept> kept;  // for who comes later
+  // Keeps its messages until models come or go; those with a key until the next of that key.
+  bool lasts = false;
 };
 
 // A velocity from Foxglove's Teleop panel: a geometry_msgs/Twist as JSON. Nothing for what is none.
@@ -229,11 +236,11 @@ class Viewer : public console::Connection {
       if (each.second == id) return complain(fmt::format("subscription {} is there already", id));
     }
     subscribed_.emplace(channel, id);
-    for (const auto& [time_ns, message] : hub_.channels[channel].kept) {
+    for (const Channel::Kept& kept : hub_.channels[channel].kept) {
       std::string head(1, kMessageData);
       put(head, id);
-      put(head, time_ns);
-      push({message, std::move(head)});
+      put(head, kept.time_ns);
+      push({kept.text, std::move(head)});
     }
   }
 
@@ -336,21 +343,27 @@ class LiveFoxglove : public FoxgloveServer, public run::Sink, private FoxgloveOu
 
   // ---- The run's, in the queue's thread.
 
-  Hears hears() const override { return {.samples = true}; }
+  // Of records what clients draw.
+  Hears hears() const override { return {.samples = true, .records = true}; }
   void announce(const std::shared_ptr<const run::Announcement>& announcement) override {
     run::LogWorlds::Scene scene;
     scene.world = server_.world();
     for (const world_info_t& part : announcement->info) scene.info.push_back(engine::encoded(part));
     {
       const std::lock_guard lock(hub_.mutex);
-      for (Channel& channel : hub_.channels) channel.kept.clear();
+      for (Channel& channel : hub_.channels)
+        std::erase_if(channel.kept, [](const Channel::Kept& kept) { return kept.key.empty(); });
       find_inputs(announcement->channels);
     }
     export_.begin_scene(scene, nanoseconds(last_us_));
   }
   void message(const run::Published& message) override {
     last_us_ = message.stamp_us;
-    export_.add(message.channel, nanoseconds(message.stamp_us), {message.data, message.size});
+    const std::span<const uint8_t> bytes(message.data, message.size);
+    if (message.kind == run::Kind::record)
+      export_.add_drawn(nanoseconds(message.stamp_us), bytes);
+    else
+      export_.add(message.channel, nanoseconds(message.stamp_us), bytes);
   }
   void flush() override {
     if (last_us_ < clock_us_ + kClockPeriod_us) return;
@@ -391,11 +404,22 @@ class LiveFoxglove : public FoxgloveServer, public run::Sink, private FoxgloveOu
     for (Viewer* viewer : hub_.viewers) viewer->say(hub_.advertised({id}));
     return static_cast<uint16_t>(id);
   }
-  void add_message(uint16_t id, uint64_t time_ns, const std::string& text) override {
+  void add_message(uint16_t id, uint64_t time_ns, const std::string& text,
+                   const std::string& key) override {
     const auto message = std::make_shared<const std::string>(text);
     const std::lock_guard lock(hub_.mutex);
-    if (hub_.channels[id].lasts) hub_.channels[id].kept.emplace_back(time_ns, message);
+    keep(hub_.channels[id], {time_ns, message, key});
     for (Viewer* viewer : hub_.viewers) viewer->send(id, time_ns, message);
+  }
+  static void keep(Channel& channel, Channel::Kept message) {
+    std::vector<Channel::Kept>& kept = channel.kept;
+    if (!message.key.empty()) {
+      std::erase_if(kept, [&](const Channel::Kept& each) { return each.key == message.key; });
+      if (kept.size() >= kMostLayers) kept.erase(kept.begin());
+    } else if (!channel.lasts) {
+      return;
+    }
+    kept.push_back(std::move(message));
   }
   // The first message of a topic says which channels there are.
   bool wants(const std::string& topic) const override {

@@ -56,7 +56,7 @@ cv::Mat picture_of_world(const RenderArguments& arguments, const model::WorldMod
   scene::Picture picture;
   const std::vector<scene::Line> lines =
       arguments.rays ? device_rays(world, layout) : std::vector<scene::Line>();
-  renderer->draw(initial_snapshot(layout), view, picture, lines);
+  renderer->draw(initial_snapshot(layout), view, picture, {.lines = lines});
   cv::Mat rgb(view.height, view.width, CV_8UC3, picture.rgb.data()), reduced, bgr;
   cv::resize(rgb, reduced, wanted, 0, 0, cv::INTER_AREA);
   cv::cvtColor(reduced, bgr, cv::COLOR_RGB2BGR);

@@ -9,6 +9,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "cli/commands.h"
+#include "cli/drawn_markers.h"
 #include "cli/logged_run.h"
 #include "cli/render_devices.h"
 #include "cli/render_view.h"
@@ -138,11 +139,17 @@ class Scene {
     view_.samples = 4;
   }
 
-  cv::Mat draw(States& states, SimTime time_us) {
+  cv::Mat draw(States& states, DrawnMarkers& drawn, SimTime time_us) {
     states.show(time_us, snapshot_);
     scene::View view = view_;
     if (robot_.valid()) view.X_WCamera = followed() * view_.X_WCamera;
-    renderer_->draw(snapshot_, view, picture_);
+    facets_.clear();
+    for (const auto& [layer, markers] : drawn.at(time_us)) {
+      const RobotIndex robot = find_robot(markers.frame);
+      if (!markers.frame.empty() && !robot.valid()) continue;
+      add_facets(markers, robot.valid() ? base_of(robot) : Pose{}, view, facets_);
+    }
+    renderer_->draw(snapshot_, view, picture_, {.facets = facets_});
     const cv::Mat rgb(view.height, view.width, CV_8UC3, picture_.rgb.data());
     cv::Mat bgr;
     cv::cvtColor(rgb, bgr, cv::COLOR_RGB2BGR);
@@ -158,23 +165,34 @@ class Scene {
     return height ? scene::without_what_is_above(*world, *height) : world;
   }
 
-  RobotIndex robot_of(const std::string& name) const {
-    if (name.empty()) return {};
-    std::vector<std::string> names;
+  const std::string& name_of(RobotIndex robot) const {
+    return world_->models[layout_.robots[robot].instance].name;
+  }
+  // Invalid: there is none of that name.
+  RobotIndex find_robot(const std::string& name) const {
     for (const RobotIndex robot : layout_.robots.indices()) {
-      names.push_back(world_->models[layout_.robots[robot].instance].name);
-      if (names.back() == name) return robot;
+      if (name_of(robot) == name) return robot;
     }
+    return {};
+  }
+
+  RobotIndex robot_of(const std::string& name) const {
+    if (const RobotIndex robot = find_robot(name); name.empty() || robot.valid()) return robot;
+    std::vector<std::string> names;
+    for (const RobotIndex robot : layout_.robots.indices()) names.push_back(name_of(robot));
     const std::string near = nearest_word(name, names);
     throw InputError({}, "--follow " + name + ": there is no such robot" +
                              (near.empty() ? "" : "; did you mean " + near + "?"));
   }
 
-  // Where the robot is; seen from top or iso without its heading.
+  Pose base_of(RobotIndex index) const {
+    const model::RobotPlacement& robot = layout_.robots[index];
+    return robot.body.valid() ? snapshot_.bodies[robot.body] * robot.X_BBase : robot.X_BBase;
+  }
+
+  // Where the robot is that is followed; seen from top or iso without its heading.
   Pose followed() const {
-    const model::RobotPlacement& robot = layout_.robots[robot_];
-    const Pose base =
-        robot.body.valid() ? snapshot_.bodies[robot.body] * robot.X_BBase : robot.X_BBase;
+    const Pose base = base_of(robot_);
     const double yaw = placed_ ? heading(base.rotation) : 0.0;
     return Pose::from_xyz_rpy(base.translation, {0, 0, yaw});
   }
@@ -185,6 +203,7 @@ class Scene {
   Snapshot snapshot_;
   scene::View view_;
   scene::Picture picture_;
+  std::vector<scene::Facet> facets_;  // what clients drew
   RobotIndex robot_;
   bool placed_ = false;
 };
@@ -239,6 +258,7 @@ int render_video(const VideoArguments& arguments) {
     throw InputError({arguments.log}, "its world is not known: " + worlds.fault());
   if (!worlds.fault().empty()) fmt::print(stderr, "ruedo: {}: {}\n", arguments.log, worlds.fault());
   States states(index, arguments.log);
+  DrawnMarkers drawn(index, arguments.log);
   const run::LogWorlds::Scene* shown = nullptr;
   std::unique_ptr<Scene> scene;
   Video video(arguments.video, {size.width, size.height}, arguments.fps);
@@ -250,7 +270,7 @@ int render_video(const VideoArguments& arguments) {
       shown = &now;
       scene = std::make_unique<Scene>(now.world, arguments, size);
     }
-    video.write(scene->draw(states, time_us));
+    video.write(scene->draw(states, drawn, time_us));
     progress.to(frame + 1);
   }
   video.close();

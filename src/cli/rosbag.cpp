@@ -10,6 +10,7 @@
 #include <fmt/format.h>
 
 #include "core/sha256.h"
+#include "engine/markers.h"
 #include "log/header.h"
 #include "model/resources.h"
 #include "ros2/restore.h"
@@ -113,9 +114,19 @@ void Rosbag::add(const std::string& channel, uint64_t time_ns, std::span<const u
   };
   const bool known =
       conversions_ && conversions_->convert(channel, message, [](size_t) { return true; }, emit);
-  if (!known) ++left_out_;
+  if (!add_drawn(time_ns, message) && !known) ++left_out_;
   if (!said)
     rest_->write(static_cast<int64_t>(time_ns / 1000), channel, message.data(), message.size());
+}
+
+bool Rosbag::add_drawn(uint64_t time_ns, std::span<const uint8_t> message) {
+  const auto markers = engine::markers_in(message);
+  if (!markers || !names_) return false;
+  const std::string frame =
+      markers->frame.empty() ? "world" : names_->frame(markers->frame, "base_link");
+  write({names_->topic("", "markers"), ros2::MarkerArrays::kType, ros2::kLatchedQos}, time_ns,
+        markers_.message(*markers, static_cast<int64_t>(time_ns / 1000), frame));
+  return true;
 }
 
 bool Rosbag::write(const ros2::Topic& topic, uint64_t time_ns, std::span<const uint8_t> cdr,

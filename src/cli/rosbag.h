@@ -18,6 +18,7 @@
 #include "cli/mcap_writer.h"
 #include "log/writer.h"
 #include "ros2/conversions.h"
+#include "ros2/markers.h"
 #include "ruedo/log_header_t.hpp"
 #include "run/log_worlds.h"
 
@@ -57,6 +58,8 @@ class Rosbag {
   // of the bag learns that.
   bool write(const ros2::Topic& topic, uint64_t time_ns, std::span<const uint8_t> cdr,
              const std::string& says_all_of = "");
+  // What a client drew; false for all else.
+  bool add_drawn(uint64_t time_ns, std::span<const uint8_t> message);
   void attach_files(log_header_t header, const std::string& log);
   std::string metadata() const;
 
@@ -66,6 +69,7 @@ class Rosbag {
   std::unique_ptr<McapWriter> out_;
   std::unique_ptr<log::Writer> rest_;
   std::unique_ptr<ros2::Conversions> conversions_;
+  ros2::MarkerArrays markers_;
   std::map<std::string, uint16_t> schemas_;
   std::map<std::string, Recorded> topics_;  // by name and type
   uint64_t begin_ns_ = 0, end_ns_ = 0, left_out_ = 0;

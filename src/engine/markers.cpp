@@ -6,6 +6,9 @@
 #include <fmt/format.h>
 
 #include "core/utf8.h"
+#include "ruedo/applied_t.hpp"
+#include "ruedo/decode.h"
+#include "ruedo/schema.h"
 
 namespace ruedo::engine {
 namespace {
@@ -84,6 +87,40 @@ std::string check_markers(const markers_t& markers) {
     if (!why.empty()) return fmt::format("marker {}: {}", i, why);
   }
   return "";
+}
+
+std::optional<markers_t> markers_in(std::span<const uint8_t> message) {
+  applied_t applied;
+  const bool is_applied = fingerprint_of(message) == applied_t::getHash();
+  if (is_applied) {
+    if (decode_checked(message.data(), message.size(), applied) != DecodeFault::none)
+      return std::nullopt;
+    message = applied.data;
+  }
+  markers_t markers;
+  if (fingerprint_of(message) != markers_t::getHash() ||
+      decode_checked(message.data(), message.size(), markers) != DecodeFault::none ||
+      !check_markers(markers).empty())
+    return std::nullopt;
+  return markers;
+}
+
+std::array<float, 4> cell_color(uint8_t cell, const float* color) {
+  if (cell == kUnknown) return {0.5f, 0.5f, 0.5f, color[3] / 4};
+  return {color[0], color[1], color[2], color[3] * static_cast<float>(cell) / kMostCell};
+}
+
+std::vector<CellRun> runs_of(const marker_t& map) {
+  std::vector<CellRun> runs;
+  const int32_t rows = map.columns > 0 ? map.ncells / map.columns : 0;
+  for (int32_t row = 0; row < rows; ++row) {
+    const uint8_t* cells = map.cells.data() + static_cast<ptrdiff_t>(row) * map.columns;
+    for (int32_t begin = 0, end = 0; begin < map.columns; begin = end) {
+      while (end < map.columns && cells[end] == cells[begin]) ++end;
+      if (cells[begin] != 0) runs.push_back({row, begin, end, cell_color(cells[begin], map.color)});
+    }
+  }
+  return runs;
 }
 
 }  // namespace ruedo::engine

@@ -13,6 +13,7 @@ constexpr Definition kDefinitions[] = {
     {"std_msgs/msg/Bool", "bool data\n"},
     {"std_msgs/msg/String", "string data\n"},
     {"std_msgs/msg/UInt32", "uint32 data\n"},
+    {"std_msgs/msg/ColorRGBA", "float32 r\nfloat32 g\nfloat32 b\nfloat32 a\n"},
     {"std_msgs/msg/MultiArrayDimension", "string label\nuint32 size\nuint32 stride\n"},
     {"std_msgs/msg/MultiArrayLayout", "MultiArrayDimension[] dim\nuint32 data_offset\n"},
     {"std_msgs/msg/Float64MultiArray", "MultiArrayLayout layout\nfloat64[] data\n"},
@@ -119,6 +120,16 @@ constexpr Definition kDefinitions[] = {
      "std_msgs/Header header\nObjectHypothesisWithPose[] results\nBoundingBox3D bbox\nstring id\n"},
     {"vision_msgs/msg/Detection2DArray", "std_msgs/Header header\nDetection2D[] detections\n"},
     {"vision_msgs/msg/Detection3DArray", "std_msgs/Header header\nDetection3D[] detections\n"},
+    {"visualization_msgs/msg/UVCoordinate", "float32 u\nfloat32 v\n"},
+    {"visualization_msgs/msg/MeshFile", "string filename\nuint8[] data\n"},
+    {"visualization_msgs/msg/Marker",
+     "std_msgs/Header header\nstring ns\nint32 id\nint32 type\nint32 action\ngeometry_msgs/Pose "
+     "pose\ngeometry_msgs/Vector3 scale\nstd_msgs/ColorRGBA color\nbuiltin_interfaces/Duration "
+     "lifetime\nbool frame_locked\ngeometry_msgs/Point[] points\nstd_msgs/ColorRGBA[] "
+     "colors\nstring texture_resource\nsensor_msgs/CompressedImage texture\nUVCoordinate[] "
+     "uv_coordinates\nstring text\nstring mesh_resource\nMeshFile mesh_file\nbool "
+     "mesh_use_embedded_materials\n"},
+    {"visualization_msgs/msg/MarkerArray", "Marker[] markers\n"},
     {"service_msgs/msg/ServiceEventInfo",
      "uint8 event_type\nbuiltin_interfaces/Time stamp\nchar[16] client_gid\nint64 "
      "sequence_number\n"},

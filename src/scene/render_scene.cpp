@@ -67,7 +67,7 @@ class GlRenderer : public Renderer {
   }
 
   void draw(const Snapshot& snapshot, const View& view, Picture& picture,
-            std::span<const Line> lines) override {
+            const Overlay& overlay) override {
     device_.context().make_current();
     culler_.update(snapshot);
     const Vec3 eye = view.X_WCamera.translation;
@@ -90,7 +90,7 @@ class GlRenderer : public Renderer {
       draw_sky(view);
       if (!visible_.transparent.empty())
         device_.draw(Pass::colour, visible_.instances, {}, visible_.transparent);
-      if (!lines.empty()) draw_lines(view, lines);
+      draw_overlay(view, overlay);
       device_.read_rgb(picture.rgb.data());
       if (picture.want_depth && depth_from_colour) device_.read_depth(picture.depth.data());
     }
@@ -181,10 +181,30 @@ class GlRenderer : public Renderer {
     device_.draw_sky(corners);
   }
 
-  // Lines as ribbons that face the viewer, so that their width is in pixels with every driver.
-  void draw_lines(const View& view, std::span<const Line> lines) {
-    const Matrix4 M = clip_from_world(view);
+  void draw_overlay(const View& view, const Overlay& overlay) {
     overlay_.clear();
+    add_lines(view, overlay.lines);
+    add_facets(view, overlay.facets);
+    if (!overlay_.empty()) device_.draw_overlay(overlay_);
+  }
+
+  void add_corner(Eigen::Vector4d corner, const std::array<float, 4>& rgba) {
+    corner.z() += 1e-4 * std::abs(corner.z());  // before the surface that it lies on
+    for (int i = 0; i < 4; ++i) overlay_.push_back(static_cast<float>(corner[i]));
+    overlay_.insert(overlay_.end(), rgba.begin(), rgba.end());
+  }
+
+  void add_facets(const View& view, std::span<const Facet> facets) {
+    const Matrix4 M = clip_from_world(view);
+    for (const Facet& facet : facets) {
+      for (const Vec3& corner : facet.corners)
+        add_corner(M * (corner - view.X_WCamera.translation).homogeneous(), facet.rgba);
+    }
+  }
+
+  // Lines as ribbons that face the viewer, so that their width is in pixels with every driver.
+  void add_lines(const View& view, std::span<const Line> lines) {
+    const Matrix4 M = clip_from_world(view);
     for (const Line& line : lines) {
       Eigen::Vector4d a, b;
       a << line.from - view.X_WCamera.translation, 1.0;
@@ -204,13 +224,8 @@ class GlRenderer : public Renderer {
                                  along.x() * kLinePixels / view.height, 0, 0);
       const Eigen::Vector4d corners[6] = {a - a.w() * side, a + a.w() * side, b + b.w() * side,
                                           a - a.w() * side, b + b.w() * side, b - b.w() * side};
-      for (Eigen::Vector4d corner : corners) {
-        corner.z() += 1e-4 * std::abs(corner.z());  // before the surface that a ray ends on
-        for (int i = 0; i < 4; ++i) overlay_.push_back(static_cast<float>(corner[i]));
-        overlay_.insert(overlay_.end(), line.rgba.begin(), line.rgba.end());
-      }
+      for (const Eigen::Vector4d& corner : corners) add_corner(corner, line.rgba);
     }
-    if (!overlay_.empty()) device_.draw_overlay(overlay_);
   }
 
   static void to_metres(const View& view, std::vector<float>& depth) {

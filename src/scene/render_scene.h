@@ -44,10 +44,19 @@ struct Picture {
                                  // static links; 0: nothing
 };
 
-// Coloured lines drawn over the world, for rays and cones in ruedo render.
+// Coloured lines drawn over the world, for rays and cones in ruedo render, some pixels wide.
 struct Line {
   Vec3 from, to;
   std::array<float, 4> rgba;
+};
+// A triangle in the world, seen from both sides, in a colour that light does not change.
+struct Facet {
+  std::array<Vec3, 3> corners;
+  std::array<float, 4> rgba;
+};
+struct Overlay {
+  std::span<const Line> lines = {};
+  std::span<const Facet> facets = {};
 };
 
 // A box along the world's axes, m.
@@ -60,7 +69,7 @@ class Renderer {
   virtual ~Renderer() = default;
   // Draws the world as in `snapshot`; the picture's vectors keep their capacity.
   virtual void draw(const Snapshot& snapshot, const View& view, Picture& picture,
-                    std::span<const Line> lines = {}) = 0;
+                    const Overlay& overlay = {}) = 0;
   // Of all that is drawn, at the start, but for the ground; around the origin where there is
   // nothing.
   virtual Bounds bounds() const = 0;

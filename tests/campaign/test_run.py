@@ -274,6 +274,26 @@ def test_the_commands_of_the_report_show_the_run(whole):
     assert f" {option} " in ruedo("play", "--help", folder=folder).stdout
 
 
+def test_the_report_has_pages_of_the_worst_runs(whole):
+    """Repeated, since what was kept of them has no messages; made once."""
+    folder, _ = whole
+    report = ("campaign", "report", "c.yaml", "-o", "look.html", "--pages")
+    ruedo(*report, "1", folder=folder)
+    (first,) = (folder / "look.pages").iterdir()
+    when = first.stat().st_mtime_ns
+    said = ruedo(*report, "5", folder=folder)
+    assert said.stdout == "look.html\n" and said.stderr == ""
+    links = re.findall(r"<a href='(look\.pages/\w+\.html)'>look at it", (folder / "look.html").read_text())
+    assert len(links) == len(set(links)) == 2 and first.stat().st_mtime_ns == when  # that failed
+    for link in links:
+        page = (folder / link).read_text()
+        assert "<script" in page and 100_000 < len(page) < 6_000_000
+    ruedo("campaign", "report", "c.yaml", "-o", "none.html", "--pages", "0", folder=folder)
+    assert not (folder / "none.pages").exists()
+    wrong = ruedo("campaign", "report", "c.yaml", "--pages", "some", folder=folder, code=2)
+    assert "'some': allowed is a whole number" in wrong.stderr
+
+
 def test_two_campaigns_compared(whole):
     folder, _ = whole
     (folder / "controller.py").write_text(CONTROLLER.replace('not view.parameters["bold"]', "True"))

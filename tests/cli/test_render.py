@@ -2,9 +2,11 @@
 options.
 """
 
+import math
 import os
 import struct
 import subprocess
+import sys
 import zlib
 from pathlib import Path
 
@@ -12,6 +14,7 @@ import numpy as np
 import pytest
 
 RUEDO = os.environ["RUEDO"]
+sys.path.insert(0, str(Path(RUEDO).parents[1] / "python"))
 ARENA = str(Path(os.environ["RUEDO_SOURCE_DIR"]) / "worlds/arena.sdf")
 
 
@@ -159,6 +162,73 @@ def test_a_log_is_a_video(log, tmp_path, kind):
     part = tmp_path / f"part.{kind}"
     result = render(log, "--video", part, "--from", "0.5", "--to", "1.5", "--rate", "0.5", *seen)
     assert result.stdout == f"{part}: 61 frames of 320 x 240 pixels, 2.03333 s\n", result.stderr
+
+
+DRAWN = """<?xml version="1.0"?><sdf version="1.9"><world name="drawn">
+<include><uri>model://sun</uri></include><include><uri>model://ground_plane</uri></include>
+<include><uri>model://p3at</uri><pose>1 2 0 0 0 1.5707963267948966</pose></include>
+</world></sdf>"""
+
+
+def frames_of(video, width, height):
+    """Its pictures, by the program that writes them."""
+    command = ["ffmpeg", "-v", "error", "-i", video, "-f", "rawvideo", "-pix_fmt", "rgb24", "-"]
+    raw = subprocess.run(command, check=True, capture_output=True, timeout=60).stdout
+    return np.frombuffer(raw, np.uint8).reshape(-1, height, width, 3).astype(int)
+
+
+def test_what_clients_drew_is_in_a_video(tmp_path):
+    """Seen from straight above: up in the picture is x, left is y."""
+    import ruedo
+
+    made = ruedo.markers
+    world, log, video = tmp_path / "w.sdf", tmp_path / "run.lcm", tmp_path / "run.mp4"
+    world.write_text(DRAWN)
+    with ruedo.launch(world, args=["--disable", "p3at/camera", "--record", str(log)]) as sim:
+        sim.sleep(0.3)
+        sim.markers(
+            "world",
+            [
+                made.points([[0, 0, 0.02]], (1, 0, 0), 1),
+                made.path([[-3, -3, 0.02], [-3, 3, 0.02]], (1, 1, 0), 0.5),
+                made.points([[3, 0, -1]], (1, 0, 0), 1),  # below the ground
+                made.text("#####", (-1.5, 0, 0.1), (1, 0, 1), 1),
+            ],
+        )
+        sim.markers("robot", [made.map([[100, 0]], 1, (1, -0.5), color=(0, 0, 1))], frame="p3at")
+        sim.sleep(0.3)
+        sim.markers("world")
+        sim.sleep(0.3)
+    size = 320
+    seen = ("--view=0,0,12,0,1.5707963267948966,0", "--size", f"{size}x{size}", "--fps", "20")
+    result = render(log, "--video", video, *seen)
+    assert result.returncode == 0, result.stderr
+    frames = frames_of(video, size, size)
+
+    def spot(frame, color):
+        """(pixels, middle row, middle column) of what has a colour."""
+        channels = np.array(color, bool)
+        like = (frame[..., channels] > 150).all(-1) & (frame[..., ~channels] < 110).all(-1)
+        rows, columns = np.nonzero(like)
+        return len(rows), rows.mean() if len(rows) else 0, columns.mean() if len(rows) else 0
+
+    middle = (size - 1) / 2
+    shown = [spot(frame, (1, 0, 0))[0] > 20 for frame in frames]
+    first, last = shown.index(True), len(shown) - 1 - shown[::-1].index(True)
+    assert 2 < first < last < len(frames) - 3  # not before it was drawn, nor after it was taken away
+    frame = frames[(first + last) // 2]
+    red, yellow, blue = (spot(frame, c) for c in ((1, 0, 0), (1, 1, 0), (0, 0, 1)))
+    assert red[1:] == pytest.approx((middle, middle), abs=1.5)
+    scale = (yellow[1] - middle) / 3  # pixels a metre
+    assert yellow[2] == pytest.approx(middle, abs=2) and scale > 8
+    assert red[0] == pytest.approx(math.pi * (scale / 2) ** 2, rel=0.25)  # and nothing below ground
+    assert yellow[0] == pytest.approx(6 * 0.5 * scale**2, rel=0.25)
+    # In front of the robot, which looks along y from (1, 2): x from 0.5 to 1.5, y from 3 to 4.
+    assert blue[1:] == pytest.approx((middle - 1 * scale, middle - 3.5 * scale), abs=2)
+    assert blue[0] == pytest.approx(scale**2, rel=0.25)
+    pink = spot(frame, (1, 0, 1))
+    assert pink[0] > 20 and pink[1:] == pytest.approx((middle + 1.5 * scale, middle), abs=4)
+    assert spot(frames[-1], (0, 0, 1))[0] == pytest.approx(blue[0], rel=0.2)  # a layer of its own
 
 
 def test_picture_of_a_camera(tmp_path):

@@ -380,3 +380,148 @@ def test_a_fix_is_a_place_on_the_map(tmp_path):
         assert fix["altitude"] == pytest.approx(110, abs=1e-8)
         assert fix["frame_id"].endswith("/gps") and fix["position_covariance"] == [0] * 9
         assert fix["position_covariance_type"] == 0
+
+
+@pytest.fixture(scope="module")
+def drawn(tmp_path_factory):
+    """A log in which a client drew: one of each kind along with a robot, then fewer in the world,
+    then nothing.
+    """
+    import ruedo
+
+    folder = tmp_path_factory.mktemp("drawn")
+    (folder / "wall.sdf").write_text(WORLD)
+    made = ruedo.markers
+    arguments = ["--disable", "p3at/camera", "--record", str(folder / "run.lcm")]
+    with ruedo.launch(folder / "wall.sdf", args=arguments) as sim:
+        sim.sleep(0.1)
+        square = [[-1, -1], [1, -1], [1, 1], [-1, 1]]
+        lines = made.lines(square, (1, 0.5, 0, 0.5), 0.125)
+        lines.position, lines.orientation = [1, 2, 3], [math.sqrt(0.5), 0, 0, math.sqrt(0.5)]
+        points = made.points([[0, 0, 0.5], [1, 2, 3]], (0, 1, 0), 0.5)
+        points.position = [1, 0, 0]
+        sim.markers(
+            "all",
+            [
+                lines,
+                made.path(square, (1, 1, 0), 0.25),
+                points,
+                made.text("goal", (0, 1, 0.5), (1, 1, 1), 0.5),
+                made.map([[100, 100, 0], [0, -1, 50]], 0.25, (1, -0.5), color=(0.5, 0, 1)),
+            ],
+            frame="p3at",
+        )
+        sim.sleep(0.1)
+        sim.markers("all", [made.points([[1, 0]])])
+        sim.markers("other", [made.points([[1, 0]])])
+        sim.sleep(0.1)
+        sim.markers("all")
+        sim.sleep(0.1)
+    return folder
+
+
+def places_of(primitive):
+    """Its points, in the frame of its entity: by its pose, with the conjugation of a quaternion."""
+    turn, at = primitive["pose"]["orientation"], primitive["pose"]["position"]
+    x, y, z, w = (turn[name] for name in "xyzw")
+    rows = (
+        (1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)),
+        (2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)),
+        (2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)),
+    )
+    return [
+        tuple(
+            round(at[name] + sum(r * p[axis] for r, axis in zip(row, "xyz", strict=True)), 6)
+            for name, row in zip("xyz", rows, strict=True)
+        )
+        for p in primitive["points"]
+    ]
+
+
+def test_what_clients_drew_is_in_foxgloves_file(drawn):
+    subprocess.run(
+        [RUEDO, "export", drawn / "run.lcm", drawn / "run.mcap"], check=True, timeout=120
+    )
+    updates = [value for name, _, value in messages(drawn / "run.mcap")["ruedo/markers"]]
+    assert [len(update["entities"]) for update in updates] == [1, 1, 1, 0]
+    (everything,) = updates[0]["entities"]
+    assert (everything["frame_id"], everything["id"]) == ("p3at", "all")
+    lines, path = everything["lines"]
+    assert (lines["type"], path["type"]) == (2, 0)  # a list, a strip
+    assert (lines["thickness"], path["thickness"]) == (0.125, 0.25)
+    assert lines["color"] == {"r": 1, "g": 0.5, "b": 0, "a": 0.5}
+    # turned by a quarter about the place
+    assert places_of(lines) == [(2, 1, 3), (2, 3, 3), (0, 3, 3), (0, 1, 3)]
+    balls = everything["spheres"]
+    assert [tuple(ball["pose"]["position"].values()) for ball in balls] == [(1, 0, 0.5), (2, 2, 3)]
+    assert balls[0]["size"] == {"x": 0.5, "y": 0.5, "z": 0.5}
+    (text,) = everything["texts"]
+    assert (text["text"], text["font_size"], text["billboard"]) == ("goal", 0.5, True)
+    (cells,) = everything["triangles"]
+    # two occupied cells in one, one unknown, one half; the clear ones are left out
+    assert len(cells["points"]) == len(cells["colors"]) == 12 and len(cells["indices"]) == 18
+    at = places_of(cells)
+    assert at[:4] == [(1, -0.5, 0), (1.5, -0.5, 0), (1.5, -0.25, 0), (1, -0.25, 0)]
+    assert at[4:6] == [(1.25, -0.25, 0), (1.5, -0.25, 0)]
+    colors = [tuple(cells["colors"][i].values()) for i in (0, 4, 8)]
+    assert colors == [(0.5, 0, 1, 1), (0.5, 0.5, 0.5, 0.25), (0.5, 0, 1, 0.5)]
+    assert updates[1]["entities"][0]["frame_id"] == "world"
+    assert [gone["id"] for gone in updates[3]["deletions"]] == ["all"]
+    with open(drawn / "run.mcap", "rb") as stream:
+        for schema, channel, message in make_reader(stream).iter_messages(["ruedo/markers"]):
+            assert schema.name == "foxglove.SceneUpdate"
+            fits(json.loads(schema.data), json.loads(message.data))
+
+
+def test_what_clients_drew_is_in_a_bag(drawn):
+    from rosbags.rosbag2 import Reader
+    from rosbags.typesys import Stores, get_typestore
+
+    store = get_typestore(Stores.ROS2_JAZZY)
+    said = subprocess.run(
+        [RUEDO, "export", drawn / "run.lcm", "--ros2", drawn / "bag"],
+        check=True,
+        timeout=120,
+        capture_output=True,
+        text=True,
+    )
+    assert said.stderr == ""
+    arrays = []
+    with Reader(drawn / "bag") as reader:
+        (topic,) = [c for c in reader.connections if c.topic == "/markers"]
+        assert topic.digest == store.hash_rihs01("visualization_msgs/msg/MarkerArray")
+        for _, _, raw in reader.messages([topic]):
+            array = store.deserialize_cdr(raw, topic.msgtype)
+            assert bytes(store.serialize_cdr(array, topic.msgtype)) == bytes(raw)
+            arrays.append(array.markers)
+    first = arrays[0]
+    assert [(m.ns, m.id, m.type, m.action) for m in first] == [
+        ("all", i, kind, 0) for i, kind in enumerate([5, 4, 7, 9, 6])
+    ]
+    lines, path, points, text, cells = first
+    assert {m.header.frame_id for m in first} == {"base_link"} and lines.frame_locked
+    assert (lines.pose.position.x, lines.pose.position.z) == (1, 3)
+    assert lines.pose.orientation.z == pytest.approx(math.sqrt(0.5))
+    assert [(p.x, p.y, p.z) for p in lines.points] == [
+        (-1, -1, 0),
+        (1, -1, 0),
+        (1, 1, 0),
+        (-1, 1, 0),
+    ]
+    assert [m.scale.x for m in (lines, path, points, cells)] == [0.125, 0.25, 0.5, 0.25]
+    assert (text.text, text.scale.z, text.pose.position.y) == ("goal", 0.5, 1)
+    assert [(p.x, p.y) for p in cells.points] == [
+        (0.125, 0.125),
+        (0.375, 0.125),
+        (0.375, 0.375),
+        (0.625, 0.375),
+    ]
+    assert [(c.r, c.a) for c in cells.colors] == [(0.5, 1), (0.5, 1), (0.5, 0.25), (0.5, 0.5)]
+    # What is not there any more is deleted.
+    assert [(m.id, m.action) for m in arrays[1]] == [(0, 0), (1, 2), (2, 2), (3, 2), (4, 2)]
+    assert arrays[1][0].header.frame_id == "world"
+    assert [(m.ns, m.id, m.action) for m in arrays[3]] == [("all", 0, 2)]
+    # `play` makes the log from the bag again, with what was drawn once.
+    page = drawn / "bag.html"
+    subprocess.run([RUEDO, "play", drawn / "bag", "--html", page], check=True, timeout=100)
+    assert page.stat().st_size > 100_000

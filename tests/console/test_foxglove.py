@@ -209,3 +209,32 @@ def test_only_foxgloves_own_pages_and_programs_come_in() -> None:
             assert b"403" in open_socket(url, origin)[1], origin
         for origin in ("https://app.foxglove.dev", ""):
             assert b"101 " in open_socket(url, origin)[1], origin
+
+
+def test_who_comes_later_sees_what_clients_drew() -> None:
+    """The newest of each layer, once."""
+    import ruedo
+
+    points = ruedo.markers.points
+    with (
+        serving("--disable", "p3at/camera") as (_, url),
+        ruedo.connect(timeout=60) as sim,
+    ):
+        sim.markers("plan", [points([[0, 0], [1, 0]])])
+        sim.markers("plan", [points([[3, 0]], size=0.5)], frame="p3at")
+        sim.markers("other", [points([[0, 0]])])
+        sim.sleep(0.5)
+        lines = seen(url, 3, "ruedo/markers")
+    updates = [json.loads(line["text"]) for line in lines if line.get("topic") == "ruedo/markers"]
+    entities = [entity for update in updates for entity in update["entities"]]
+    assert [(one["id"], one["frame_id"]) for one in entities] == [
+        ("plan", "p3at"),
+        ("other", "world"),
+    ]
+    assert [ball["size"]["x"] for ball in entities[0]["spheres"]] == [0.5]
+    schemas = [
+        line["channel"]["schemaName"]
+        for line in lines
+        if "channel" in line and line["channel"]["topic"] == "ruedo/markers"
+    ]
+    assert schemas == ["foxglove.SceneUpdate"]

@@ -73,6 +73,13 @@ def _add_execution(one: argparse.ArgumentParser) -> None:
     one.add_argument("--junit", metavar="FILE", help="write the results for CI")
 
 
+def _count(text: str) -> int:
+    number = int(text) if text.isascii() and text.isdigit() else -1
+    if not 0 <= number <= 1000:
+        raise argparse.ArgumentTypeError(f"{text!r}: allowed is a whole number from 0 to 1000")
+    return number
+
+
 def _add_campaign(parser: argparse.ArgumentParser) -> None:
     kinds = parser.add_subparsers(
         required=True, metavar="run|resume|status|report|show|repeat|slurm|join|export|compare"
@@ -102,6 +109,14 @@ def _add_campaign(parser: argparse.ArgumentParser) -> None:
     )
     one.add_argument(
         "--baseline", metavar="FOLDER", help="results of another campaign, to compare with"
+    )
+    one.add_argument(
+        "--pages",
+        type=_count,
+        default=3,
+        metavar="N",
+        help="failed runs, the worst, that are repeated and put beside the report as pages of the "
+        "web console (default: 3)",
     )
     add("show", _show, "all there is of a case").add_argument(
         "CASE", help="its number, or the beginning of its id"
@@ -190,7 +205,7 @@ def _report(arguments: argparse.Namespace) -> int:
 
     campaign = _campaign(arguments)
     file = Path(arguments.output or campaign.out / "report.html")
-    write_report(campaign, file, arguments.baseline)
+    write_report(campaign, file, arguments.baseline, arguments.pages)
     print(file)
     return GOOD
 

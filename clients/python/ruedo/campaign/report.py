@@ -10,9 +10,11 @@ import shlex
 from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any
+from urllib.parse import quote
 
 from .compare import compare_with
 from .errors import missing
+from .pages import make_pages
 from .plan import Case
 from .stats import wilson
 from .store import Results
@@ -31,16 +33,23 @@ code { background: #f2f4f8; padding: .1em .3em; user-select: all } svg { max-wid
 """
 
 
-def write_report(campaign: Any, file: Path, baseline: str | None = None) -> None:
-    """Of what there is so far. baseline: as of compare_with()."""
+def write_report(
+    campaign: Any, file: Path, baseline: str | None = None, pages: int = 0
+) -> None:
+    """Of what there is so far. baseline: as of compare_with(). pages: of so many failed runs, the
+    worst, a page of the console is put into the folder beside `file` that is called as it is, with
+    .pages at its end.
+    """
     results: Results = campaign.results()
+    worst = _worst_of(results)
+    shown = make_pages(campaign, worst[:pages], file.absolute().with_suffix(".pages"))
     parts = [
         _head(campaign, results),
         *_by_parameter(results),
         *_reasons(results),
         *_distributions(results),
         *_heat_map(results),
-        *_worst(campaign, results),
+        *_worst(campaign, results, worst, shown),
     ]
     if baseline:
         parts += _comparison(campaign, baseline)
@@ -276,13 +285,25 @@ def badness(row: dict[str, Any]) -> tuple[float, ...]:
     )
 
 
-def _worst(campaign: Any, results: Results) -> Iterable[str]:
-    worst = sorted(results.failed, key=lambda one: (badness(one[1]), one[0].number))[:_WORST]
+def _worst_of(results: Results) -> list[tuple[Case, dict[str, Any]]]:
+    return sorted(results.failed, key=lambda one: (badness(one[1]), one[0].number))
+
+
+def _worst(
+    campaign: Any,
+    results: Results,
+    worst: list[tuple[Case, dict[str, Any]]],
+    pages: dict[str, Path],
+) -> Iterable[str]:
     if not worst:
         return
     yield "<h2>The worst runs</h2><div class='plots'>"
-    for case, row in worst:
-        yield f"<figure>{_path(case, row)}<figcaption>{_caption(campaign, results, case, row)}</figcaption></figure>"
+    for case, row in worst[: max(_WORST, len(pages))]:
+        caption = _caption(campaign, results, case, row)
+        if case.id in pages:
+            page = pages[case.id]
+            caption += f"<br><a href='{quote(page.parent.name)}/{quote(page.name)}'>look at it</a>"
+        yield f"<figure>{_path(case, row)}<figcaption>{caption}</figcaption></figure>"
     yield "</div>"
 
 
