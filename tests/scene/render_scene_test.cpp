@@ -520,7 +520,7 @@ TEST(RenderScene, LinesAreDrawnOverThePicture) {
                         {{4, -1, 1.2}, {4, 1, 1.2}, {1, 0, 0, 1}},
                         {{-5, 0, 1.4}, {2.9, 0, 1.4}, {0, 1, 0, 1}}};
   Picture picture;
-  make_renderer(w.world, layout)->draw(start(layout), view, picture, lines);
+  make_renderer(w.world, layout)->draw(start(layout), view, picture, {.lines = lines});
   const auto pixel = [&](int u, double v) {
     return &picture.rgb[3 * at(view, u, static_cast<int>(std::lround(v)))];
   };
@@ -529,6 +529,33 @@ TEST(RenderScene, LinesAreDrawnOverThePicture) {
   EXPECT_EQ(pixel(120, 120 - view.fy * 0.2 / 4)[0], pixel(120, 120 - view.fy * 0.2 / 4)[1])
       << "hidden by the wall";
   EXPECT_EQ(pixel(160, 120 - view.fy * 0.4 / 2.0)[1], 255) << "cut where it is behind the eye";
+}
+
+// From both sides, mixed with what is behind, and cut by the near plane.
+TEST(RenderScene, FacetsStandInTheWorld) {
+  World w;
+  w.box("wall", {3.5, 0, 1}, {1, 40, 20}, kGrey);
+  const model::BodyLayout layout(w.world);
+  const View view = ahead();
+  const auto across = [](double x, double y, std::array<float, 4> rgba) {
+    return Facet{{Vec3(x, y, 0.5), Vec3(x, y + 0.6, 0.5), Vec3(x, y, 1.6)}, rgba};
+  };
+  const Facet facets[] = {
+      across(2, 0.1, {1, 0, 0, 1}),
+      {{Vec3(2, -0.1, 0.5), Vec3(2, -0.1, 1.6), Vec3(2, -0.7, 0.5)}, {0, 1, 0, 1}},
+      across(4, -0.1, {0, 0, 1, 1}),
+      {{Vec3(-5, -9, 1.9), Vec3(-5, 9, 1.9), Vec3(2, 0, 1.9)}, {0, 0, 1, 1}}};
+  Picture picture;
+  make_renderer(w.world, layout)->draw(start(layout), view, picture, {.facets = facets});
+  const auto pixel = [&](double y, double z, double x = 2.0) {
+    const int u = static_cast<int>(std::lround(view.cx - view.fx * y / x));
+    const int v = static_cast<int>(std::lround(view.cy - view.fy * (z - 1.0) / x));
+    return &picture.rgb[3 * at(view, u, v)];
+  };
+  EXPECT_TRUE(pixel(0.2, 0.7)[0] == 255 && pixel(0.2, 0.7)[1] == 0);
+  EXPECT_TRUE(pixel(-0.2, 0.7)[1] == 255 && pixel(-0.2, 0.7)[0] == 0) << "from its back";
+  EXPECT_EQ(pixel(0.0, 0.7)[2], pixel(0.0, 0.7)[0]) << "hidden by the wall";
+  EXPECT_EQ(pixel(0.0, 1.9, 1.9)[2], 255) << "cut where it is behind the eye";
 }
 
 }  // namespace
