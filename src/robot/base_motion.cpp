@@ -61,7 +61,7 @@ Displacement over_piece(const Profile::Segment& v, const Profile::Segment& u,
 }  // namespace
 
 Displacement along_twist(double way, double side, double angle) {
-  const double half = 0.5 * angle, part = angle == 0.0 ? 1.0 : math::sin(half) / half;
+  const double half = 0.5 * angle, part = half == 0.0 ? 1.0 : math::sin(half) / half;
   const double c = part * math::cos(half), s = part * math::sin(half);
   return {way * c - side * s, way * s + side * c, angle, way, side};
 }

@@ -56,11 +56,11 @@ Displacement along_arc(double way, double angle) {
   Displacement result;
   result.way = way;
   result.angle = angle;
-  if (angle == 0.0) {
+  const double half = 0.5 * angle;
+  if (half == 0.0) {  // half of the smallest number above 0, too
     result.x = way;
     return result;
   }
-  const double half = 0.5 * angle;
   const auto [sine, cosine] = math::sincos(half);
   const double chord =
       way * (sine / half);  // sin(h) / h is well conditioned down to the smallest angles

@@ -5,6 +5,7 @@
 
 #include <gtest/gtest.h>
 
+#include "robot/base_motion.h"
 #include "robot/unicycle.h"
 
 namespace ruedo::robot {
@@ -96,6 +97,15 @@ TEST(Unicycle, TinyAnglesAreWellConditioned) {
   const Displacement d = along_arc(1.0, 1e-12);
   EXPECT_EQ(d.x, 1.0);
   EXPECT_NEAR(d.y, 0.5e-12, 1e-27);
+}
+
+TEST(Unicycle, TheSmallestAnglesLeadStraightOn) {
+  for (const double angle : {5e-324, -5e-324, 1e-323, 1e-310}) {
+    for (const Displacement& d : {along_arc(0.5, angle), along_twist(0.5, 0.25, angle)}) {
+      EXPECT_EQ(d.x, 0.5) << angle;
+      EXPECT_NEAR(d.y, d.side, 1e-300) << angle;
+    }
+  }
 }
 
 // theta = t^2 / 2 at v = 1: a clothoid; x = integral of cos(t^2 / 2). Values of the series, summed
