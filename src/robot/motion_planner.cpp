@@ -10,6 +10,7 @@
 #include <ruedo/move_command_t.hpp>
 
 #include "ruedo/math.h"
+#include "ruedo/quantity.h"
 
 namespace ruedo::robot {
 
@@ -38,6 +39,11 @@ constexpr double kSettling_s = 1.0;
 Limits sane(double speed, double acceleration, double deceleration, double fastest) {
   return {std::clamp(speed, 0.0, fastest), std::max(acceleration, kSlowestChange),
           std::max(deceleration, kSlowestChange)};
+}
+
+// A wheel's rate that sums stay finite with; no robot comes near it.
+double countable(double rate) {
+  return std::clamp(rate, -quantity::kSpeed.most, quantity::kSpeed.most);
 }
 
 bool all_finite(std::initializer_list<double> values) {
@@ -129,7 +135,8 @@ void MotionPlanner::command(const WheelCommand& command, SimTime now) {
   // The wheels of a side are tied together: their mean counts.
   const size_t of_left = n == 2 ? 1 : left;
   double left_rate = 0.0, right_rate = 0.0;
-  for (size_t i = 0; i < n; ++i) (i < of_left ? left_rate : right_rate) += command.rates[i];
+  for (size_t i = 0; i < n; ++i)
+    (i < of_left ? left_rate : right_rate) += countable(command.rates[i]);
   left_rate /= static_cast<double>(of_left);
   right_rate /= static_cast<double>(n - of_left);
   const PlaneMotion motion = kinematics_.motion({left_rate, right_rate});
@@ -144,7 +151,7 @@ void MotionPlanner::hold_wheels(const WheelCommand& command, SimTime now) {
     if (!std::isfinite(command.rates[i]))
       return refuse(0, Status::KIND_WHEELS, Status::REASON_NOT_FINITE);
     normal += rims_[i] * rims_[i].transpose();
-    sum += rims_[i] * (drive_.wheel_radius * command.rates[i]);
+    sum += rims_[i] * (drive_.wheel_radius * countable(command.rates[i]));
   }
   const Vec3 twist = normal.ldlt().solve(sum);
   if (!twist.allFinite()) return refuse(0, Status::KIND_WHEELS, Status::REASON_BAD_VALUE);

@@ -5,6 +5,7 @@
 
 #include <ruedo/joint_command_t.hpp>
 
+#include "physics/state_check.h"
 #include "sim.h"
 
 namespace ruedo::robot::testing {
@@ -184,6 +185,20 @@ TEST_F(Gimbal, SettingsThatAreNotAllowedAreRefused) {
   tell("tilt", kVelocity, 2.0);
   sim.run(0.2);
   EXPECT_NEAR(rate("tilt"), 0.5, 5e-3);
+}
+
+TEST_F(Gimbal, ExtremeNumbersLeaveAState) {
+  for (const char* joint : {"pan", "tilt", "lift"}) {
+    for (int8_t mode = 0; mode < 11; ++mode) {
+      for (const double value : extremes()) {
+        const std::string what =
+            joint + (" mode " + std::to_string(mode)) + " " + ::testing::PrintToString(value);
+        tell(joint, mode, value);
+        ASSERT_NO_THROW(sim.step(3)) << what;
+        ASSERT_NO_THROW(physics::check_finite(sim.state, *sim.world, sim.layout)) << what;
+      }
+    }
+  }
 }
 
 }  // namespace

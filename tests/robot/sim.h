@@ -1,8 +1,11 @@
 // A world from SDF text with its physics and robots, for tests that drive.
 #pragma once
 
+#include <cmath>
+#include <limits>
 #include <memory>
 #include <string>
+#include <vector>
 
 #include <ruedo/motion_status_t.hpp>
 #include <ruedo/move_command_t.hpp>
@@ -39,6 +42,21 @@ struct Move {
   static constexpr int8_t ARC = move_command_t::ARC;
   static constexpr int8_t STOP = move_command_t::STOP;
 };
+
+// Numbers that arithmetic stumbles over.
+inline const std::vector<double>& extremes() {
+  static const std::vector<double> values = [] {
+    std::vector<double> made = {0.0, std::numeric_limits<double>::infinity(), std::nan("")};
+    // The smallest number above 0, what becomes 0 when it is halved or squared, and so on up.
+    for (const double size : {5e-324, 1e-323, 1e-310, 1e-200, 1e-160, 1e-100, 1e-16, 1e-9, 1e-6,
+                              1.0, 1e3, 1e6, 1e16, 1e100, 1e154, 1e200, 1e308}) {
+      made.push_back(size);
+      made.push_back(-size);
+    }
+    return made;
+  }();
+  return values;
+}
 
 // A four-wheeled robot of 20 kg: wheel radius 0.1 m, track 0.4 m, chassis 0.5 x 0.3 x 0.15 m;
 // base_link at its pose. `drive` goes into <ruedo:drive>, beside the joints.
