@@ -16,7 +16,8 @@ MOST_BYTES = {
     "map": 8 * 1024,
 }  # larger ones only take time to decode
 
-# Of fuzz_lockstep: another client and what it asks, with its numbers. 0, or nothing more: what is usual.
+# Of fuzz_lockstep: another client and what it asks, with its numbers. 0, or nothing more, is the
+# usual one.
 STEPS, JOIN, LEAVE = b"\0\7\xc7", b"\0\0", b"\0\3\0"
 TAKE_PART, GRANT = b"\0\1\1" + bytes(5), b"\0\1\0\0\xef" + bytes(3)
 RESEND = b"\0\2\0\xff" + bytes(4 * 255 + 1)
