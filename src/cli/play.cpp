@@ -62,6 +62,7 @@ int view(const PlayArguments& arguments, const std::string& log, const std::stri
 
 int play(const PlayArguments& arguments) {
   load_given_plugins();
+  read_given_types();
   if (arguments.sandboxed) enter_sandbox(arguments.log, {arguments.html}, arguments.other);
   const double speed = parse_rate(arguments.speed);
   std::signal(SIGINT, [](int) { interrupted = 1; });
@@ -127,6 +128,7 @@ void add_play(CLI::App& app, Action& chosen) {
                    "LCM address (default: $LCM_DEFAULT_URL, or LCM's group)")
       ->type_name("URL");
   add_plugin_argument(*command);
+  add_types_argument(*command);
   add_sandbox_argument(*command, arguments->sandboxed);
   command->callback([arguments, view, compare, &chosen] {
     arguments->viewed = view->count() > 0 || compare->count() > 0;

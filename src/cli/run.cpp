@@ -226,6 +226,7 @@ int strict_check(const WorldArguments& world) {
 int run_world(const RunArguments& arguments) {
   run::RunOptions options = server_options(arguments);
   load_given_plugins();
+  read_given_types();
   if (arguments.sandboxed)
     enter_sandbox(model::world_file(arguments.world.world),
                   {arguments.record, arguments.snapshots, socket_of(arguments.lcm)});
@@ -356,6 +357,7 @@ void add_bus(CLI::App& command, RunArguments& arguments) {
   command.add_option("--remap", arguments.remaps, "give a channel another name: CHANNEL=NAME")
       ->type_name("REMAP")
       ->allow_extra_args(false);
+  add_types_argument(command);
   command.add_option("--control", arguments.control, "serve requests: on or off")
       ->capture_default_str()
       ->check(CLI::IsMember({"on", "off"}));

@@ -14,6 +14,7 @@
 #include "console/assets.h"
 #include "console/library.h"
 #include "console/scene_data.h"
+#include "console/types.h"
 #include "console/viewer.h"
 #include "console/web_server.h"
 #include "core/json.h"
@@ -110,6 +111,7 @@ HttpResponse Console::Impl::get(std::string_view path) {
   }
   constexpr std::string_view kHistory = "/history/";
   if (path.starts_with(kHistory)) return history(path.substr(kHistory.size()));
+  if (path == "/types.json") return blob(bytes_of(types_json()), "application/json");
   if (path.starts_with("/library"))
     return library_file(path.substr(std::string_view("/library").size()));
   if (const auto model = number_after("/scene/models/", path)) return model_text(*model);

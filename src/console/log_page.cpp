@@ -19,6 +19,7 @@
 #include "console/board.h"
 #include "console/events.h"
 #include "console/scene_data.h"
+#include "console/types.h"
 #include "core/json.h"
 #include "core/utf8.h"
 #include "log/index.h"
@@ -148,6 +149,8 @@ class Writer {
           .member("from", static_cast<double>(scene.from_us) * 1e-6)
           .name("files")
           .open('{');
+      const std::string types = types_json();
+      add_file(json, "/types.json", {types.begin(), types.end()});
       if (scene.world) {
         const SceneData data(*scene.world, static_cast<int>(scenes_.size()));
         add_file(json, "/scene.json", {data.json.begin(), data.json.end()});

@@ -297,4 +297,8 @@ void read_types(const std::vector<std::string>& places) {
 
 std::span<const Schema> schemas() { return registry().schemas(); }
 
+std::span<const Schema> read_schemas() {
+  return own_registry() ? own_registry()->schemas() : std::span<const Schema>();
+}
+
 }  // namespace ruedo

@@ -2,8 +2,11 @@
 // then knows them, too.
 #pragma once
 
+#include <span>
 #include <string>
 #include <vector>
+
+#include "ruedo/schema.h"
 
 namespace ruedo {
 
@@ -11,5 +14,8 @@ namespace ruedo {
 // They may hold types of Ruedo's. Once, before any thread asks. Throws InputError with file and
 // line.
 void read_types(const std::vector<std::string>& places);
+
+// Those that were read; empty before.
+std::span<const Schema> read_schemas();
 
 }  // namespace ruedo

@@ -27,6 +27,7 @@ export default async function fleet({ page, given, until, check, picture }) {
     poses.add = (state, at) => {
       const begun = performance.now();
       add(state, at);
+      poses.forgetSeen(); // as if all of them moved
       adding += performance.now() - begun;
       if (state.part === 0) ++window.states;
     };

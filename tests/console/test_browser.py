@@ -9,7 +9,9 @@ import math
 import shlex
 import socket
 import subprocess
+import sys
 import time
+from pathlib import Path
 
 import pytest
 from harness import (
@@ -718,6 +720,42 @@ def test_what_clients_draw_is_shown(tmp_path):
     subprocess.run([RUEDO, "play", log, "--html", page], check=True, timeout=100)
     seen = browse(page.as_uri(), tmp_path, "markers", {"moments": moments})
     assert "each moment shows what was drawn then" in seen
+
+
+PROBE = """package lab;
+struct spot_t { double x; double y; }
+struct probe_t { int64_t utime; spot_t at; int16_t n; float heat[n]; int8_t grid[2][3]; string where; }
+"""
+
+
+def test_types_of_ones_own_are_shown(tmp_path):
+    """In a log that is served, and in a page of it."""
+    import lcm
+
+    (tmp_path / "probe.lcm").write_text(PROBE)
+    lcm_gen = Path(sys.executable).with_name("lcm-gen")
+    subprocess.run([lcm_gen, "-p", "--ppath", tmp_path, tmp_path / "probe.lcm"], check=True)
+    sys.path.insert(0, str(tmp_path))
+    from lab import probe_t, spot_t
+
+    probe = probe_t()
+    probe.utime, probe.where = 500_000, "der Hörsaal"
+    probe.at = spot_t()
+    probe.at.x, probe.at.y = 1.5, -2.25
+    probe.n, probe.heat = 3, [20.5, 21.5, 22.5]
+    probe.grid = [[1, 2, 3], [4, 5, 6]]
+    log = tmp_path / "run.lcm"
+    written = lcm.EventLog(str(log), "w", overwrite=True)
+    for i in range(10):
+        written.write_event(100_000 * i, "lab/probe", probe.encode())
+    written.close()
+    shows = ["heat", "21.5", "x: 1.5", "-2.25", "der Hörsaal"]
+    given = {"channel": "lab/probe", "shows": shows}
+    with playing(log, "--types", tmp_path) as process:
+        browse(process.url, tmp_path, "types", given)
+    page = tmp_path / "run.html"
+    subprocess.run([RUEDO, "play", log, "--types", tmp_path, "--html", page], check=True, timeout=99)
+    browse(page.as_uri(), tmp_path, "types", given)
 
 
 def test_a_thousand_robots_are_shown(tmp_path):

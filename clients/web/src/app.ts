@@ -42,7 +42,7 @@ import { Notice } from "./ui/notice";
 import { Panel } from "./ui/panel";
 import { kReasons, RobotPages } from "./ui/robot";
 import { Timeline } from "./ui/timeline";
-import { encode } from "./wire/lcm";
+import { addTypes, encode } from "./wire/lcm";
 import { Link, type Hello, type Playback, type RunLink } from "./wire/link";
 import { LogFile, newestAt } from "./wire/log_file";
 import { Rewind, type Past } from "./wire/rewind";
@@ -158,7 +158,7 @@ export class App {
     listenToEditing(this.page, this.editor);
     listenToKeys(this.keys());
     this.watch();
-    this.connect();
+    void this.connect();
     requestAnimationFrame((at) => this.frame(at));
   }
 
@@ -286,8 +286,16 @@ export class App {
     page.watch(["hello", "world", "scene", "robot", "layers", "tab", "panel"], () => this.want());
   }
 
-  private connect(): void {
+  // Types of plugins, and of --types.
+  private async fetchTypes(): Promise<void> {
+    const bytes = this.file?.file("/types.json");
+    const answer = this.file ? bytes && new Response(bytes) : await fetch("/types.json");
+    if (answer?.ok) addTypes((await answer.json()) as Parameters<typeof addTypes>[0]);
+  }
+
+  private async connect(): Promise<void> {
     const { page } = this;
+    await this.fetchTypes().catch(() => undefined); // the link says what is wrong
     this.link.connect({
       state: (link, words) => this.notice.onLink(link, words),
       hello: (hello) => this.loading.onHello(hello),

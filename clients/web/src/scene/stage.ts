@@ -19,7 +19,8 @@ const kMostLamps = 6;
 const kFar_m = 18;
 const kNoWheels_m = 50;
 // Home: what of the world is in view, how high it looks, and the share of the view that this fills
-const kMostHome_m = 60,
+const kLeastHome_m = 3,
+  kMostHome_m = 60,
   kLookedAt_m = 1,
   kHomeShare = 0.95;
 // What turns or goes less looks as it did
@@ -265,7 +266,9 @@ export class Stage {
   home(): void {
     const low = this.description?.low ?? [-3, -3, 0],
       high = this.description?.high ?? [3, 3, 1];
-    const half = [0, 1].map((i) => Math.max(2, Math.min(kMostHome_m, (high[i]! - low[i]!) / 2))),
+    const half = [0, 1].map((i) =>
+        Math.max(kLeastHome_m, Math.min(kMostHome_m, (high[i]! - low[i]!) / 2)),
+      ),
       top = Math.max(0, Math.min(kMostHome_m, high[2]!, this.description?.ceiling ?? Infinity));
     const centre = new THREE.Vector3(
       (low[0]! + high[0]!) / 2,

@@ -43,7 +43,7 @@ export class Inset {
       ...names.map((name) => h("option", {}, name)),
     );
     this.choice.value = names.includes(chosen) ? chosen : "";
-    this.choice.disabled = names.length === 0;
+    this.chooser.hidden = names.length === 0;
     if (this.choice.value !== (this.picture?.name ?? "")) this.show();
   }
 

@@ -38,6 +38,14 @@ export function fingerprint(name: string): bigint {
   return value;
 }
 
+// Types that the program knows beside those of this page, before a message of theirs is read.
+// Ruedo's own stay as they are.
+export function addTypes(types: Record<string, Field[]>): void {
+  for (const [name, fields] of Object.entries(types)) kTypes[name] ??= fields;
+  fingerprints.clear();
+  typesByFingerprint = undefined;
+}
+
 let typesByFingerprint: Map<bigint, TypeName> | undefined;
 export function typeOf(message: Uint8Array): TypeName | undefined {
   if (!typesByFingerprint)
