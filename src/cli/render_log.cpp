@@ -119,8 +119,9 @@ class States {
 // A world of the log, and what draws it.
 class Scene {
  public:
-  Scene(std::shared_ptr<const model::WorldModel> world, const VideoArguments& arguments, Size size)
-      : world_(without_roof(std::move(world), arguments.view)),
+  Scene(const std::shared_ptr<const model::WorldModel>& world, const VideoArguments& arguments,
+        Size size)
+      : world_(without_roof(world, arguments.view)),
         layout_(*world_),
         renderer_(scene::make_renderer(*world_, layout_)),
         snapshot_(initial_snapshot(layout_)) {
@@ -159,7 +160,7 @@ class Scene {
  private:
   // Seen from outside, a roof would hide what goes on.
   static std::shared_ptr<const model::WorldModel> without_roof(
-      std::shared_ptr<const model::WorldModel> world, const std::string& view) {
+      const std::shared_ptr<const model::WorldModel>& world, const std::string& view) {
     const bool from_outside = view == "top" || view == "iso";
     const auto height = from_outside ? scene::height_of_ceiling(*world) : std::nullopt;
     return height ? scene::without_what_is_above(*world, *height) : world;
