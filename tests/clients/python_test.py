@@ -115,6 +115,7 @@ def test_arguments_instead_of_options():
         ({"set": ["p3at/lrf.rate=20"]}, "set is .*: it must be a dict"),
         ({"text": "<sdf/>"}, "either a world or its text"),
         ({"spawn": [5]}, "spawn is a list of texts; 5 is none"),
+        ({"spawn": None}, "spawn is a list of texts, not None"),
         ({"lockstep": 1.5}, "lockstep is a whole number, not 1.5"),
         ({"seed": "x"}, "seed is a whole number, not 'x'"),
         ({"noise": "no"}, "noise is True or False, not 'no'"),

@@ -16,7 +16,7 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import IO, Any, Literal
 from urllib.parse import urlsplit
@@ -172,6 +172,8 @@ def _options(
             raise TypeError(
                 f"{name} is {several!r}: it must be a list, {name}={str(several).split()!r}"
             )
+        if not isinstance(several, Iterable):
+            raise TypeError(f"{name} is a list of texts, not {several!r}")
         for one in several:
             if not isinstance(one, (str, os.PathLike)):
                 raise TypeError(f"{name} is a list of texts; {one!r} is none")
