@@ -1,5 +1,5 @@
 // Many copies of a world in one process, as ruedo.Engine has them: environment steps a second, and
-// what a reset costs.
+// what a reset, a snapshot and its restoring cost.
 //
 // bench_engine WORLD [COPIES] [BEAMS] [THREADS] [SECONDS]      a world with one Pioneer 3-AT named
 // "robot" or "p3at"
@@ -25,6 +25,15 @@ double cpu_s() {
 
 double wall_s() {
   return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
+}
+
+// Of a call, which is given its number; on average over so many seconds.
+template <class Call>
+double cost_us(double seconds, const Call& call) {
+  int64_t calls = 0;
+  const double begin = cpu_s();
+  for (; cpu_s() - begin < seconds; ++calls) call(calls);
+  return 1e6 * (cpu_s() - begin) / static_cast<double>(calls);
 }
 
 constexpr int kSteps = 20;  // of 5 ms: a decision at 10 Hz
@@ -75,11 +84,12 @@ int main(int argc, char** argv) {
   std::printf("%d copies, %d beams: %.0f steps/s, %.2f us of CPU a step (%lld steps); ", copies,
               beams, static_cast<double>(decisions) / wall,
               1e6 * used / static_cast<double>(decisions), static_cast<long long>(decisions));
-  int64_t resets = 0;
-  const double reset_begin = cpu_s();
-  for (uint64_t seed = 2; cpu_s() - reset_begin < seconds / 4; ++seed, ++resets)
-    engine.reset(static_cast<int>(seed) % copies, seed);
-  std::printf("%.1f us of CPU a reset (%lld resets)\n",
-              1e6 * (cpu_s() - reset_begin) / static_cast<double>(resets),
-              static_cast<long long>(resets));
+  const double reset = cost_us(seconds / 4, [&](int64_t i) {
+    engine.reset(static_cast<int>(i % copies), 2 + static_cast<uint64_t>(i));
+  });
+  const auto saved = engine.save(0);
+  const double save = cost_us(seconds / 4, [&](int64_t) { engine.save(0); });
+  const int itself[] = {0};
+  const double restore = cost_us(seconds / 4, [&](int64_t) { engine.restore(*saved, itself); });
+  std::printf("us of CPU: %.1f a reset, %.1f a save, %.1f a restore\n", reset, save, restore);
 }

@@ -198,7 +198,26 @@ def foreign_members(root):
     return problems
 
 
-@pytest.mark.parametrize("rule", [broken_walls, bare_conversions, foreign_members])
+def states_left_behind(root):
+    """Sensors of which a snapshot would not have the state: SensorOf copies it. Those that draw
+    pictures have none.
+    """
+    problems = []
+    for path in sorted((root / "src").rglob("*.cpp")):
+        text = path.read_text(encoding="utf-8")
+        if ".needs_renderer = true" in text:
+            continue
+        problems += [
+            f"{path.relative_to(root)}: {name} is a Sensor, but no SensorOf<{name}>"
+            for name, base in re.findall(r"class (\w+)[^;{]*: public (Sensor\w*(?:<\w+>)?)", text)
+            if base not in (f"SensorOf<{name}>",) and base.startswith("Sensor")
+        ]
+    return problems
+
+
+@pytest.mark.parametrize(
+    "rule", [broken_walls, bare_conversions, foreign_members, states_left_behind]
+)
 def test_tree_keeps(rule):
     problems = rule(ROOT)
     assert not problems, "\n" + "\n".join(problems)

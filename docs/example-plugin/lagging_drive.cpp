@@ -21,6 +21,10 @@ class LaggingDrive : public DriveModel {
     return {follow(v_.ahead, input.asked.ahead), follow(v_.left, input.asked.left),
             follow(v_.turn, input.asked.turn)};
   }
+  bool take(const DriveModel& other) override {
+    *this = static_cast<const LaggingDrive&>(other);
+    return true;
+  }
 
  private:
   double follow(double& v, double asked) const {

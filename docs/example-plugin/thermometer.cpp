@@ -13,7 +13,7 @@ namespace {
 
 using namespace ruedo;
 
-class Thermometer : public Sensor {
+class Thermometer : public SensorOf<Thermometer> {
  public:
   explicit Thermometer(const SensorSetup& setup)
       : random_(setup.random),

@@ -52,6 +52,11 @@ class DriveModel {
   /// @return the mean velocity of base_link over the step
   /// @throws std::exception ends the run, which says the text
   virtual BaseVelocity step(const DriveInput& input) = 0;
+  /// For snapshots of an engine: becomes what another one is, the same robot's in another copy of
+  /// the world. Where all that it keeps are values: `*this = static_cast<const MyDrive&>(other)`.
+  /// @param other made by the same kind from the same element
+  /// @return false: it cannot; then a world with this drive has no snapshots
+  virtual bool take([[maybe_unused]] const DriveModel& other) { return false; }
 };
 
 /// A kind of drive: `<ruedo:drive type="TYPE">`.

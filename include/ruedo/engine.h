@@ -108,6 +108,26 @@ struct EngineMessage {
   size_t size;                 ///< of the bytes
 };
 
+namespace engine {
+class SavedWorld;
+}
+
+/// A copy of an engine's world as it was; it does not change, and may outlive the engine.
+class SavedWorld {
+ public:
+  /// @return the copy that it was
+  [[nodiscard]] int world() const { return world_; }
+  /// @return of its run, from 0 on
+  [[nodiscard]] int64_t step() const { return step_; }
+
+ private:
+  friend class Engine;
+  std::shared_ptr<const engine::SavedWorld> saved_;
+  int world_ = 0;
+  int64_t step_ = 0;
+  uint64_t seed_ = 0;
+};
+
 /// Copies of one world. Move-only. One thread at a time; step() itself uses all cores.
 class Engine {
  public:
@@ -167,6 +187,19 @@ class Engine {
   /// @param seed of the copy
   void reset(int world, uint64_t seed);
   void reset();  ///< with the seeds that they have
+
+  /// A copy as it stands, with all that decides what follows, and with what was commanded already.
+  /// It costs about as much as a reset, however long the copy has run.
+  /// @param world the copy
+  /// @throws InputError for a plugin's sensor or drive that cannot be copied
+  /// @return what restore() takes
+  [[nodiscard]] SavedWorld save(int world = 0);
+  /// Makes copies what save() gave: for the same commands, what follows is what followed there,
+  /// byte for byte. They have its seed from then on.
+  /// @param saved by this engine
+  /// @param worlds the copies; none: the one that was saved
+  /// @throws InputError for what another engine saved
+  void restore(const SavedWorld& saved, const std::vector<int>& worlds = {});
 
   /// @param world the copy
   /// @return of its run, from 0 on

@@ -44,10 +44,15 @@ class RandomStream {
 };
 
 // The random source of one device of one robot. Copies are of the same device: what one is reseeded
-// with holds for all, so that a sensor does nothing for it. Not thread safe.
+// with holds for all, so that a sensor does nothing for it. One that is assigned draws as the other
+// one does from then on, and so do all its copies; they stay apart from the other one's. Not thread
+// safe.
 class RandomSource {
  public:
   RandomSource(uint64_t seed, std::string_view robot, std::string_view device);
+  RandomSource(const RandomSource&) = default;
+  RandomSource& operator=(const RandomSource& other);
+  ~RandomSource() = default;
   RandomStream stream(uint64_t sample) const { return {state_->key, sample}; }
 
   uint64_t seed() const { return state_->seed; }

@@ -118,9 +118,24 @@ class Sensor {
   // keeps of times goes with it. The step that follows shows the same state as the last one, at
   // time 0, and samples count from 0 again.
   virtual void shift_time(SimTime us) { static_cast<void>(us); }
+  // For snapshots of an engine: becomes what `other` is, the same device's in another copy of the
+  // world. False: it cannot; then a world with this device has no snapshots. SensorOf does it. Not
+  // asked of pictures, which depend on no other sample (SensorKind::needs_renderer).
+  virtual bool take(const Sensor& other) { return static_cast<void>(other), false; }
   // Fills in what ruedo/info says of the device; robot, name, kind, rate and pose are filled in
   // already.
   virtual void describe(device_info_t&) const {}
+};
+
+// A sensor all of whose members are values, or Bound to its world: class Sonar : public
+// SensorOf<Sonar>.
+template <class Self>
+class SensorOf : public Sensor {
+ public:
+  bool take(const Sensor& other) final {
+    static_cast<Self&>(*this) = static_cast<const Self&>(other);
+    return true;
+  }
 };
 
 // A kind of sensor. A module is a thread: it serves the devices of its kinds on all robots. Kinds

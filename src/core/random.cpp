@@ -218,6 +218,11 @@ RandomSource::RandomSource(uint64_t seed, std::string_view robot, std::string_vi
   reseed(seed);
 }
 
+RandomSource& RandomSource::operator=(const RandomSource& other) {
+  *state_ = *other.state_;
+  return *this;
+}
+
 void RandomSource::reseed(uint64_t seed) {
   state_->seed = seed;
   state_->key = absorb(absorb(mix(seed + 0x9e3779b97f4a7c15u), state_->robot), state_->device);

@@ -132,11 +132,10 @@ bool is_finite(const robot::Command& command) {
 }
 
 CommandInbox::CommandInbox(std::vector<Input> inputs, int robots)
-    : inputs_(std::move(inputs)),
-      reset_input_(static_cast<size_t>(robots), -1),
-      slots_(static_cast<size_t>(robots)) {
+    : inputs_(std::move(inputs)), reset_input_(static_cast<size_t>(robots), -1) {
+  waits_.slots.resize(static_cast<size_t>(robots));
   for (size_t i = 0; i < inputs_.size(); ++i) listen(static_cast<int>(i));
-  waiting_.reserve(slots_.size() + 1);
+  waits_.robots.reserve(waits_.slots.size() + 1);
 }
 
 void CommandInbox::listen(int index) {
@@ -151,7 +150,7 @@ void CommandInbox::listen(int index) {
 void CommandInbox::add(const std::vector<Input>& inputs, int robots) {
   std::lock_guard lock(mutex_);
   reset_input_.resize(static_cast<size_t>(robots), -1);
-  slots_.resize(static_cast<size_t>(robots));
+  waits_.slots.resize(static_cast<size_t>(robots));
   for (const Input& input : inputs) {
     // A robot in the place of one that was removed has the same inputs.
     auto at = std::find_if(inputs_.begin(), inputs_.end(), [&](const Input& old) {
@@ -170,21 +169,21 @@ void CommandInbox::remove(RobotIndex robot) {
     by_channel_.erase(input.channel);
     input.channel.clear();
   }
-  slots_[robot].size = 0;
-  std::erase(waiting_, robot);
+  waits_.slots[robot].size = 0;
+  std::erase(waits_.robots, robot);
   const auto is_of = [robot](const Entry& entry) { return entry.command.robot == robot; };
-  const auto end = scheduled_.begin() + static_cast<std::ptrdiff_t>(scheduled_count_);
-  const auto kept = std::stable_partition(scheduled_.begin(), end,
+  const auto end = waits_.scheduled.begin() + static_cast<std::ptrdiff_t>(waits_.scheduled_count);
+  const auto kept = std::stable_partition(waits_.scheduled.begin(), end,
                                           [&](const Entry& entry) { return !is_of(entry); });
-  for (auto entry = kept; entry != end; ++entry) scheduled_bytes_ -= entry->bytes.size();
-  scheduled_count_ = static_cast<size_t>(kept - scheduled_.begin());
-  std::make_heap(scheduled_.begin(), kept, later);
+  for (auto entry = kept; entry != end; ++entry) waits_.scheduled_bytes -= entry->bytes.size();
+  waits_.scheduled_count = static_cast<size_t>(kept - waits_.scheduled.begin());
+  std::make_heap(waits_.scheduled.begin(), kept, later);
 }
 
 void CommandInbox::begin_time_anew() {
   std::lock_guard lock(mutex_);
-  scheduled_count_ = scheduled_bytes_ = 0;
-  next_step_ = 0;
+  waits_.scheduled_count = waits_.scheduled_bytes = 0;
+  waits_.next_step = 0;
 }
 
 void CommandInbox::receive(const std::string& channel, const uint8_t* data, size_t size) {
@@ -209,7 +208,7 @@ void CommandInbox::reset_odometry(RobotIndex robot, const std::vector<uint8_t>& 
 CommandInbox::Entry& CommandInbox::next_entry(RobotIndex robot) {
   Slots& slots = slots_of(robot);
   const size_t most = slots.entries.size();
-  if (slots.size == 0) waiting_.push_back(robot);
+  if (slots.size == 0) waits_.robots.push_back(robot);
   if (slots.size == most) {
     slots.first = (slots.first + 1) % most;
     --slots.size;
@@ -221,7 +220,7 @@ CommandInbox::Entry& CommandInbox::next_entry(RobotIndex robot) {
 void CommandInbox::keep(int input, robot::Command& command, const uint8_t* data, size_t size) {
   std::lock_guard lock(mutex_);
   Entry& entry = next_entry(command.robot);
-  entry.arrival = arrivals_++;
+  entry.arrival = waits_.arrivals++;
   entry.input = input;
   std::swap(entry.command, command);
   entry.bytes.assign(data, data + size);
@@ -241,19 +240,21 @@ CommandInbox::Scheduled CommandInbox::schedule(int64_t step, int input, const ui
     return Scheduled::faulty;
   if (!check_values(inputs_[input].kind, data, size).empty()) return Scheduled::faulty;
   std::lock_guard lock(mutex_);
-  if (step < next_step_) return Scheduled::late;
-  if (scheduled_count_ == kMostScheduled || scheduled_bytes_ + size > kMostScheduledBytes)
+  if (step < waits_.next_step) return Scheduled::late;
+  if (waits_.scheduled_count == kMostScheduled ||
+      waits_.scheduled_bytes + size > kMostScheduledBytes)
     return Scheduled::full;
-  if (scheduled_count_ == scheduled_.size()) scheduled_.emplace_back();
-  Entry& entry = scheduled_[scheduled_count_++];
+  if (waits_.scheduled_count == waits_.scheduled.size()) waits_.scheduled.emplace_back();
+  Entry& entry = waits_.scheduled[waits_.scheduled_count++];
   entry.step = step;
-  entry.arrival = arrivals_++;
+  entry.arrival = waits_.arrivals++;
   entry.input = input;
   std::swap(entry.command, command);
   entry.bytes.assign(data, data + size);
-  scheduled_bytes_ += size;
-  std::push_heap(scheduled_.begin(),
-                 scheduled_.begin() + static_cast<std::ptrdiff_t>(scheduled_count_), later);
+  waits_.scheduled_bytes += size;
+  std::push_heap(waits_.scheduled.begin(),
+                 waits_.scheduled.begin() + static_cast<std::ptrdiff_t>(waits_.scheduled_count),
+                 later);
   return Scheduled::kept;
 }
 
@@ -274,23 +275,24 @@ void CommandInbox::apply(robot::Robots& robots, Faults& faults, int64_t step, Ba
   size_t scheduled = 0, count = 0;
   {
     std::lock_guard lock(mutex_);
-    next_step_ = step + 1;
+    waits_.next_step = step + 1;
     // Buffers are swapped, never copied, and what is taken leaves its buffers behind for what
     // comes.
-    for (; scheduled_count_ > 0 && scheduled_.front().step <= step; ++scheduled) {
-      std::pop_heap(scheduled_.begin(),
-                    scheduled_.begin() + static_cast<std::ptrdiff_t>(scheduled_count_), later);
-      Entry& entry = scheduled_[--scheduled_count_];
-      scheduled_bytes_ -= entry.bytes.size();
+    for (; waits_.scheduled_count > 0 && waits_.scheduled.front().step <= step; ++scheduled) {
+      std::pop_heap(waits_.scheduled.begin(),
+                    waits_.scheduled.begin() + static_cast<std::ptrdiff_t>(waits_.scheduled_count),
+                    later);
+      Entry& entry = waits_.scheduled[--waits_.scheduled_count];
+      waits_.scheduled_bytes -= entry.bytes.size();
       std::swap(next_taken(count), entry);
     }
-    for (const RobotIndex robot : waiting_) {
+    for (const RobotIndex robot : waits_.robots) {
       Slots& slots = slots_of(robot);
       for (size_t i = 0; i < slots.size; ++i)
         std::swap(next_taken(count), slots.entries[(slots.first + i) % slots.entries.size()]);
       slots.size = 0;
     }
-    waiting_.clear();
+    waits_.robots.clear();
   }
   std::sort(taken_.begin() + static_cast<std::ptrdiff_t>(scheduled),
             taken_.begin() + static_cast<std::ptrdiff_t>(count),
@@ -315,10 +317,10 @@ void CommandInbox::apply(robot::Robots& robots, Faults& faults, int64_t step, Ba
 
 void CommandInbox::clear() {
   std::lock_guard lock(mutex_);
-  for (Slots& slots : slots_) slots.size = 0;
-  world_slots_.size = 0;
-  waiting_.clear();
-  scheduled_count_ = scheduled_bytes_ = 0;
+  for (Slots& slots : waits_.slots) slots.size = 0;
+  waits_.world_slots.size = 0;
+  waits_.robots.clear();
+  waits_.scheduled_count = waits_.scheduled_bytes = 0;
 }
 
 }  // namespace ruedo::engine

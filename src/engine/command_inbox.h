@@ -64,7 +64,7 @@ class CommandInbox {
   // The first state that commands may still act on. Any thread.
   int64_t next_step() const {
     const std::lock_guard lock(mutex_);
-    return next_step_;
+    return waits_.next_step;
   }
   void clear();
 
@@ -72,6 +72,9 @@ class CommandInbox {
   void add(const std::vector<Input>& inputs, int robots);
   void remove(RobotIndex robot);
   void begin_time_anew();  // steps count from 0: what was scheduled is dropped
+  // What waits becomes what waits in another copy of the world; while nothing is received or
+  // applied.
+  void take(const CommandInbox& other) { waits_ = other.waits_; }
 
   uint64_t refused() const { return refused_; }      // faulty messages
   uint64_t displaced() const { return displaced_; }  // commands that newer ones pushed out
@@ -91,7 +94,9 @@ class CommandInbox {
   };
 
   void listen(int input);
-  Slots& slots_of(RobotIndex robot) { return robot.valid() ? slots_[robot] : world_slots_; }
+  Slots& slots_of(RobotIndex robot) {
+    return robot.valid() ? waits_.slots[robot] : waits_.world_slots;
+  }
   Entry& next_entry(RobotIndex robot);  // with the mutex held
   void keep(int input, robot::Command& command, const uint8_t* data, size_t size);
   void refuse(const std::string& channel, const char* why);
@@ -102,13 +107,15 @@ class CommandInbox {
   std::unordered_map<std::string, int> by_channel_;  // looked up only, never walked
   std::vector<int> reset_input_;                     // of each robot
   mutable std::mutex mutex_;
-  std::vector<Slots> slots_;  // of each robot
-  Slots world_slots_{kKeptOfWorld};
-  std::vector<RobotIndex> waiting_;  // with entries
-  uint64_t arrivals_ = 0;
-  std::vector<Entry> scheduled_;  // the first scheduled_count_ are a heap, the next step on top
-  size_t scheduled_count_ = 0, scheduled_bytes_ = 0;
-  int64_t next_step_ = 0;     // what was applied is all before it
+  struct Waits {
+    std::vector<Slots> slots;  // of each robot
+    Slots world_slots{kKeptOfWorld};
+    std::vector<RobotIndex> robots;  // with entries
+    uint64_t arrivals = 0;
+    std::vector<Entry> scheduled;  // the first scheduled_count are a heap, the next step on top
+    size_t scheduled_count = 0, scheduled_bytes = 0;
+    int64_t next_step = 0;  // what was applied is all before it
+  } waits_;
   std::vector<Entry> taken_;  // the simulation thread's
   std::atomic<uint64_t> refused_{0}, displaced_{0};
   int64_t last_warning_ns_ = 0;  // the bus thread's

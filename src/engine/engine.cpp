@@ -83,6 +83,7 @@ class Engine::Borrowed {
 
 struct Engine::Copy {
   std::shared_ptr<const model::WorldModel> model;  // before anything was drawn
+  uint64_t seed = 1;                               // that it was made with
   model::Drawn drawn;
   std::shared_ptr<Plan> plan;
   Channels channels;
@@ -100,8 +101,16 @@ struct Engine::Copy {
   // met them.
   std::vector<std::vector<LinkIndex>> met;
 
-  void make_scenes(const ReadChannels* read);
+  void make_scenes(const ReadChannels* read, const std::vector<SensorFault>* faults = nullptr);
   void keep_newest(const Batch& batch);
+  void take(const Copy& other);
+};
+
+class SavedWorld {
+ public:
+  std::shared_ptr<const char> engine;  // its identity
+  std::unique_ptr<Engine::Copy> copy;  // which is never stepped
+  std::vector<int32_t> touching;       // its row
 };
 
 struct Engine::Observer {
@@ -154,7 +163,22 @@ std::unique_ptr<Engine::Copy> Engine::make_copy(std::shared_ptr<const model::Wor
   copy->world = std::make_unique<World>(copy->plan, fleet, copy->channels,
                                         first_made_ ? findings : findings_);
   copy->model = std::move(model);
+  copy->seed = seed;
   return copy;
+}
+
+// As it began.
+std::unique_ptr<Engine::Copy> Engine::make_another(const Copy& copy) const {
+  auto other = std::make_unique<Copy>();
+  FleetOptions fleet = options_.fleet;
+  fleet.seed = copy.seed;
+  Findings findings;
+  other->model = copy.model;
+  other->seed = copy.seed;
+  other->drawn = copy.drawn;
+  other->plan = copy.plan;
+  other->world = std::make_unique<World>(other->plan, fleet, other->channels, findings);
+  return other;
 }
 
 std::shared_ptr<Plan> Engine::plan_of(const std::shared_ptr<const model::WorldModel>& model) {
@@ -189,7 +213,6 @@ void Engine::compute(size_t index, int64_t steps) {
   Batch& batch = *borrowed;
   take_velocities(index);
   batch.read = handler_ ? nullptr : read_;
-  copy.make_scenes(batch.read.get());
   auto* const touching =
       reinterpret_cast<int32_t*>(touching_->values.data()) + index * driven_.size();
   std::fill_n(touching, driven_.size(), 0);
@@ -202,6 +225,7 @@ void Engine::compute(size_t index, int64_t steps) {
     for (int i = 0; i < batch.count; ++i)
       world.advance(batch.first_step + i, batch.snapshots[i], batch);
     copy.step += batch.count;
+    copy.make_scenes(batch.read.get(), batch.sensor_faults.get());
     for (size_t m = 0; m < world.modules().size(); ++m) {
       Module& module = *world.modules()[m];
       batch.outputs[m].woken = module.wants(copy.step);
@@ -217,11 +241,11 @@ void Engine::compute(size_t index, int64_t steps) {
 }
 
 // A renderer when the first picture is read: most copies never need one.
-void Engine::Copy::make_scenes(const ReadChannels* read) {
+void Engine::Copy::make_scenes(const ReadChannels* read, const std::vector<SensorFault>* faults) {
   const auto& modules = world->modules();
   scenes_made.resize(modules.size(), false);
   for (size_t m = 0; m < modules.size(); ++m) {
-    if (scenes_made[m] || !modules[m]->needs_scenes(read)) continue;
+    if (scenes_made[m] || !modules[m]->needs_scenes(read, faults)) continue;
     modules[m]->make_scenes(world->scene_makers());
     scenes_made[m] = true;
   }
@@ -429,6 +453,56 @@ void Engine::reset_one(const Reset& reset) {
   }
   copies_[index] = std::move(copy);
   compute(index, 1);
+}
+
+void Engine::Copy::take(const Copy& other) {
+  world->take(*other.world);
+  step = other.step;
+  driven = false;
+  newest = other.newest;
+  met = other.met;
+}
+
+std::shared_ptr<const SavedWorld> Engine::save(int world) {
+  const auto index = static_cast<size_t>(world);
+  const Copy& copy = *copies_.at(index);
+  const DefaultFloatingPoint floating_point;
+  take_velocities(index);
+  auto saved = std::make_shared<SavedWorld>();
+  saved->engine = identity_;
+  saved->copy = make_another(copy);
+  saved->copy->take(copy);
+  const auto* touching = reinterpret_cast<const int32_t*>(touching_->values.data());
+  saved->touching.assign(touching + index * driven_.size(),
+                         touching + (index + 1) * driven_.size());
+  return saved;
+}
+
+void Engine::restore(const SavedWorld& saved, std::span<const int> worlds) {
+  if (saved.engine != identity_) throw InputError({}, "another engine saved that world");
+  const DefaultFloatingPoint floating_point;
+  std::vector<bool> named(copies_.size(), false);
+  for (const int world : worlds) {
+    if (named.at(static_cast<size_t>(world)))
+      throw InputError({}, "world " + std::to_string(world) + " is to be restored twice at once");
+    named[world] = true;
+  }
+  for_each(worlds.size(), [&](size_t i) { restore_one(saved, static_cast<size_t>(worlds[i])); });
+}
+
+// A copy of another plan or seed is made anew: what it drew when it was made would stay.
+void Engine::restore_one(const SavedWorld& saved, size_t world) {
+  const Copy& from = *saved.copy;
+  if (copies_[world]->plan != from.plan || copies_[world]->seed != from.seed)
+    copies_[world] = make_another(from);
+  Copy& copy = *copies_[world];
+  copy.take(from);
+  std::copy(saved.touching.begin(), saved.touching.end(),
+            reinterpret_cast<int32_t*>(touching_->values.data()) + world * driven_.size());
+  copy.make_scenes(read_.get());
+  for (size_t channel = 0; channel < read_->size(); ++channel)
+    if ((*read_)[channel]) catch_up(copy, static_cast<int>(channel));
+  for (auto& observer : observers_) update(*observer, world);
 }
 
 const model::Drawn& Engine::drawn(int world) const {

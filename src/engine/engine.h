@@ -37,6 +37,10 @@ struct FieldArray {
   std::vector<std::byte> values;  // row by row, in the host's byte order
 };
 
+// A copy as it was at some step, with all that decides what follows. It does not change, and may
+// outlive its engine.
+class SavedWorld;
+
 class Engine {
  public:
   // A message of a copy: step, channel, bytes.
@@ -88,6 +92,15 @@ class Engine {
     reset(std::span(&one, 1));
   }
 
+  // A copy as it stands, in time and memory that do not depend on how long it has run: about those
+  // of a reset. What was commanded already is part of it. Throws InputError for a plugin's device
+  // or drive that cannot be copied.
+  std::shared_ptr<const SavedWorld> save(int world);
+  // Makes copies what that one was: what follows equals what followed there, byte for byte, for the
+  // same commands. Arrays show what they showed then. Throws InputError for what another engine
+  // saved.
+  void restore(const SavedWorld& saved, std::span<const int> worlds);
+
   // What was drawn for a copy.
   const model::Drawn& drawn(int world) const;
 
@@ -114,11 +127,14 @@ class Engine {
   const std::vector<Input>& inputs(int world) const;
 
  private:
+  friend class SavedWorld;
   struct Copy;
   struct Observer;
   class Borrowed;
 
   std::unique_ptr<Copy> make_copy(std::shared_ptr<const model::WorldModel> model, uint64_t seed);
+  std::unique_ptr<Copy> make_another(const Copy& copy) const;
+  void restore_one(const SavedWorld& saved, size_t world);
   void reset_one(const Reset& reset);
   std::shared_ptr<Plan> plan_of(const std::shared_ptr<const model::WorldModel>& model);
   void count_touching(Copy& copy, const Batch& batch, int32_t* counts) const;
@@ -133,6 +149,7 @@ class Engine {
 
   std::shared_ptr<const model::WorldModel> world_;
   EngineOptions options_;
+  std::shared_ptr<const char> identity_ = std::make_shared<char>();  // saved worlds are of it
   // Of worlds that several copies may have: while one of them has it.
   struct Shared {
     std::weak_ptr<const model::WorldModel> model;

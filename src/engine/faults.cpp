@@ -65,16 +65,16 @@ Faults::Faults(const model::WorldModel& world, const model::BodyLayout& layout,
 }
 
 const std::string& Faults::name_of(RobotIndex robot) const {
-  return world_.models[layout_.robots[robot].instance].name;
+  return world_->models[layout_->robots[robot].instance].name;
 }
 
 int64_t Faults::steps(double seconds) const {
-  return std::max<int64_t>(1, rounded(seconds * 1e6 / static_cast<double>(world_.step_us)));
+  return std::max<int64_t>(1, rounded(seconds * 1e6 / static_cast<double>(world_->step_us)));
 }
 
 const device_info_t* Faults::find_device(RobotIndex robot, const std::string& name) const {
   for (const bool by_kind : {false, true}) {
-    for (const device_info_t& device : devices_) {
+    for (const device_info_t& device : *devices_) {
       if (device.robot == name_of(robot) && same_name(by_kind ? device.kind : device.name, name))
         return &device;
     }
@@ -91,13 +91,13 @@ std::string Faults::check(const model::Fault& fault, RobotIndex robot) const {
   const model::FaultKind& kind = *model::find_fault_kind(fault.kind);
   if (kind.of == model::FaultKind::Of::device) {
     const device_info_t* device = find_device(robot, fault.target);
-    const std::vector<std::string>& disabled = world_.disabled;
+    const std::vector<std::string>& disabled = world_->disabled;
     if (!device && std::find(disabled.begin(), disabled.end(),
                              name_of(robot) + "/" + fault.target) != disabled.end())
       return "";
     if (!device) {
       std::vector<std::string> names;
-      for (const device_info_t& one : devices_)
+      for (const device_info_t& one : *devices_)
         if (one.robot == name_of(robot)) names.push_back(one.name);
       return fmt::format("there is no device '{}' to be faulty; {} has {}", fault.target,
                          name_of(robot), fmt::join(names, ", "));
@@ -105,7 +105,7 @@ std::string Faults::check(const model::Fault& fault, RobotIndex robot) const {
     if (!applies_to(sensor_kind(fault.kind), device->kind))
       return fmt::format("{} is no fault of a {}", fault.kind, device->kind);
   } else if (kind.of != model::FaultKind::Of::world &&
-             !world_.models[layout_.robots[robot].instance].model->drive) {
+             !world_->models[layout_->robots[robot].instance].model->drive) {
     return fmt::format("{} is a fault of robots that drive", fault.kind);
   }
   return "";
@@ -190,7 +190,7 @@ void Faults::before_commands(int64_t step, robot::Robots& robots) {
   for (RobotFault& fault : of_robots_) {
     if (fault.kind != Kind::kidnapped || fault.done || step < fault.begin) continue;
     fault.done = true;
-    const InstanceIndex instance = layout_.robots[fault.robot].instance;
+    const InstanceIndex instance = layout_->robots[fault.robot].instance;
     Pose X_WM = robots.model_pose(instance);
     X_WM.translation.x() = fault.asked.x;
     X_WM.translation.y() = fault.asked.y;
@@ -204,7 +204,7 @@ bool Faults::is_lost(RobotIndex robot, int64_t step) {
   bool lost = false;
   for (const RobotFault& fault : of_robots_) {
     if (fault.kind != Kind::commands_lost || !fault.acts(robot, step)) continue;
-    draws_.resize(layout_.robots.size());
+    draws_.resize(layout_->robots.size());
     lost |= RandomSource(seed_, name_of(robot), "commands_lost").stream(draws_[robot]++).uniform() <
             fault.value;
   }
@@ -248,7 +248,7 @@ robot::Command Faults::weakened(robot::Command command, int64_t step) const {
                right = left_of(command.robot, false, step), least = std::min(left, right);
   if (left == 1.0 && right == 1.0) return command;
   const model::DriveDescription& drive =
-      *world_.models[layout_.robots[command.robot].instance].model->drive;
+      *world_->models[layout_->robots[command.robot].instance].model->drive;
   if (auto* velocity = std::get_if<robot::VelocityCommand>(&command.what)) {
     const double half = 0.5 * drive.track;
     velocity->vy *= least;
@@ -275,7 +275,7 @@ void Faults::show_wheels(Snapshot& snapshot) {
   if (true_angles_.size() != snapshot.wheel_angles.size())
     true_angles_ = shown_angles_ = snapshot.wheel_angles;
   for (size_t i = 0; i < snapshot.wheel_angles.size(); ++i) {
-    const model::WheelPlacement& wheel = layout_.wheels[i];
+    const model::WheelPlacement& wheel = layout_->wheels[i];
     double factor = 1.0;
     for (const RobotFault& fault : of_robots_) {
       if (!fault.acts(wheel.robot, snapshot.step) || !(wheel.left ? fault.left : fault.right) ||

@@ -19,6 +19,7 @@
 #include "model/body_layout.h"
 #include "model/fault.h"
 #include "robot/robots.h"
+#include "ruedo/bound.h"
 #include "ruedo/device_info_t.hpp"
 #include "ruedo/fault_t.hpp"
 #include "ruedo/random.h"
@@ -93,9 +94,9 @@ class Faults {
   robot::Command weakened(robot::Command command, int64_t step) const;
   bool is_lost(RobotIndex robot, int64_t step);
 
-  const model::WorldModel& world_;
-  const model::BodyLayout& layout_;
-  const std::vector<device_info_t>& devices_;
+  Bound<const model::WorldModel> world_;
+  Bound<const model::BodyLayout> layout_;
+  Bound<const std::vector<device_info_t>> devices_;
   uint64_t seed_;        // of what is drawn now
   size_t reseeded_ = 0;  // of the reseedings, how many acted
   std::shared_ptr<const std::vector<Reseeding>> reseedings_;

@@ -99,6 +99,22 @@ void Module::begin_time_anew(SimTime us) {
   count_due();
 }
 
+// Scenes are of the step that was looked at last, and of nothing before.
+const Device* Module::take(const Module& other) {
+  for (size_t k = 0; k < slots_.size(); ++k) {
+    Device& device = setup_.devices[k];
+    const Device& there = other.setup_.devices[k];
+    const bool keeps_nothing = setup_.wants_renderer && !slots_[k].observes;
+    if (!keeps_nothing && !device.sensor->take(*there.sensor)) return &device;
+    device.first_step = there.first_step;
+    device.random = there.random;
+  }
+  slots_ = other.slots_;
+  to_hand_over_ = other.to_hand_over_;
+  to_sample_ = other.to_sample_;
+  return nullptr;
+}
+
 void Module::make_scenes(const SceneMakers& makers) {
   if (setup_.wants_rays) rays_ = makers.rays();
   if (setup_.wants_visual_rays) visual_rays_ = makers.visual_rays();
@@ -177,13 +193,9 @@ void Module::sample_with_faults(const Batch& batch, const Snapshot& snapshot, si
   own.begin_step(snapshot.step);
   Outbox& out = faulty ? own : outbox;
   if (slot.observes) device.sensor->observe(snapshot, out);
-  if (slot.step == snapshot.step) {
-    device.sensor->sample(input_of(slot, snapshot), out);
-    slot.passed_sample = -1;
-    slot.step = device.first_step + slot.clock.step_of(++slot.sample);
-  }
+  if (slot.step == snapshot.step) take_sample(batch, snapshot, k, out);
   if (!faulty) return;
-  if (!slot.faults) slot.faults = std::make_shared<FaultFilter>(setup_.step_us);
+  if (!slot.faults) slot.faults = std::make_unique<FaultFilter>(setup_.step_us);
   slot.faults->pass(own, *batch.sensor_faults, device.robot, device.name, snapshot.step, outbox);
 }
 
@@ -207,29 +219,41 @@ void Module::process_piece(const Batch& batch, Outbox& outbox, int piece, int be
       if (slot.step != snapshot.step) continue;
       if (left_off.load(std::memory_order_relaxed))
         return;  // a thousand pictures may be in the batch
-      if (is_read(setup_.devices[k], slot, batch.read.get())) {
-        sensor.sample(input_of(slot, snapshot), outbox);
-        slot.passed_sample = -1;
-      } else {
-        pass_over(k, snapshot);
-      }
-      slot.step = setup_.devices[k].first_step + slot.clock.step_of(++slot.sample);
+      take_sample(batch, snapshot, k, outbox);
     }
   }
 }
 
-// Only of pictures, whose samples do not depend on those before (SensorKind::needs_renderer).
-bool Module::is_read(const Device& device, const Slot& slot, const ReadChannels* read) const {
-  if (!setup_.wants_renderer || !read || slot.observes) return true;
+void Module::take_sample(const Batch& batch, const Snapshot& snapshot, size_t k, Outbox& out) {
+  Slot& slot = slots_[k];
+  if (is_read(k, batch.read.get(), batch.sensor_faults.get())) {
+    setup_.devices[k].sensor->sample(input_of(slot, snapshot), out);
+    slot.passed_sample = -1;
+  } else {
+    pass_over(k, snapshot);
+  }
+  slot.step = setup_.devices[k].first_step + slot.clock.step_of(++slot.sample);
+}
+
+// Only pictures are not, whose samples do not depend on those before (SensorKind::needs_renderer);
+// what becomes of them where the device is faulty does.
+bool Module::is_read(size_t k, const ReadChannels* read,
+                     const std::vector<SensorFault>* faults) const {
+  const Device& device = setup_.devices[k];
+  if (!setup_.wants_renderer || !read || slots_[k].observes) return true;
+  const auto is_of_it = [&](const SensorFault& fault) {
+    return fault.robot == device.robot && fault.device == device.name;
+  };
+  if (faults && std::any_of(faults->begin(), faults->end(), is_of_it)) return true;
   return std::any_of(device.channels.begin(), device.channels.end(), [&](int channel) {
     return static_cast<size_t>(channel) >= read->size() || (*read)[channel];
   });
 }
 
-bool Module::needs_scenes(const ReadChannels* read) const {
+bool Module::needs_scenes(const ReadChannels* read, const std::vector<SensorFault>* faults) const {
   if (!setup_.wants_renderer) return true;
   for (size_t k = 0; k < slots_.size(); ++k) {
-    if (is_read(setup_.devices[k], slots_[k], read)) return true;
+    if (is_read(k, read, faults)) return true;
   }
   return false;
 }

@@ -14,13 +14,32 @@
 #include <vector>
 
 #include "engine/batch.h"
+#include "engine/sensor_faults.h"
 #include "ruedo/sensor.h"
 #include "scene/ray_scene.h"
 #include "scene/render_scene.h"
 
 namespace ruedo::engine {
 
-class FaultFilter;
+// What may be missing, and is copied with what has it.
+template <class T>
+class Owned : public std::unique_ptr<T> {
+ public:
+  using std::unique_ptr<T>::operator=;
+  Owned() = default;
+  Owned(Owned&&) noexcept = default;
+  Owned& operator=(Owned&&) noexcept = default;
+  Owned(const Owned& other) : Owned() { *this = other; }
+  Owned& operator=(const Owned& other) {
+    if (*this && other) {
+      **this = *other;
+    } else {
+      *this = other ? std::make_unique<T>(*other) : nullptr;
+    }
+    return *this;
+  }
+  ~Owned() = default;
+};
 
 // The steps at which any of some devices takes a sample.
 class DueSteps {
@@ -81,9 +100,9 @@ class Module {
   // Makes its scenes, in the thread that will process batches: a renderer's context belongs to it.
   // Throws what making them threw.
   void make_scenes(const SceneMakers& makers);
-  // Whether it needs them for batches of which only that is read: one that draws pictures does when
-  // any of them is.
-  bool needs_scenes(const ReadChannels* read) const;
+  // Whether it needs them for a batch: one that draws pictures does when any of them is read, or
+  // may be faulty.
+  bool needs_scenes(const ReadChannels* read, const std::vector<SensorFault>* faults) const;
   bool has_scenes() const {
     return setup_.wants_rays || setup_.wants_visual_rays || setup_.wants_renderer;
   }
@@ -110,6 +129,10 @@ class Module {
   void replace_sensor(std::unique_ptr<Sensor> sensor);  // of the only device, whose samples go on
   void begin_time_anew(SimTime us);  // sim time was set back by so much, and steps count from 0
 
+  // Between two batches: its devices, their clocks and faults become what they are in another copy
+  // of the world. Returns a device whose sensor cannot, or null.
+  const Device* take(const Module& other);
+
   // The device that began to work last, by its place; -1: none has. Any thread.
   int at_work() const { return at_work_.load(std::memory_order_relaxed); }
   const Device& device(int place) const { return setup_.devices[place]; }
@@ -131,15 +154,15 @@ class Module {
     SampleClock clock;
     int64_t sample, step;
     bool observes, visual_rays;
-    std::shared_ptr<FaultFilter> faults = {};    // made when the device is first faulty
-    std::unique_ptr<Snapshot> passed_over = {};  // what the last sample would have shown
-    int64_t passed_sample = -1;                  // its number; -1: it was taken
-    uint64_t passed_seed = 0;                    // it would have drawn from
-    size_t reseeded = 0;                         // of the batches' reseedings, how many acted
+    Owned<FaultFilter> faults = {};    // made when the device is first faulty
+    Owned<Snapshot> passed_over = {};  // what the last sample would have shown
+    int64_t passed_sample = -1;        // its number; -1: it was taken
+    uint64_t passed_seed = 0;          // it would have drawn from
+    size_t reseeded = 0;               // of the batches' reseedings, how many acted
   };
 
   Slot slot_of(const Device& device) const;
-  bool is_read(const Device& device, const Slot& slot, const ReadChannels* read) const;
+  bool is_read(size_t k, const ReadChannels* read, const std::vector<SensorFault>* faults) const;
   void reseed(size_t k, const std::vector<Reseeding>& reseedings, int64_t step);
   void pass_over(size_t k, const Snapshot& snapshot);
   void count_due();
@@ -148,6 +171,7 @@ class Module {
   void note_cost(std::chrono::nanoseconds of_piece);
   void sample_with_faults(const Batch& batch, const Snapshot& snapshot, size_t k, Outbox& outbox);
   SampleInput input_of(const Slot& slot, const Snapshot& snapshot) const;
+  void take_sample(const Batch& batch, const Snapshot& snapshot, size_t k, Outbox& out);
   void process_piece(const Batch& batch, Outbox& outbox, int piece, int begin, int end,
                      const std::atomic<bool>& left_off);
 

@@ -2,6 +2,7 @@
 #include "engine/world.h"
 
 #include "physics/state_check.h"
+#include "ruedo/errors.h"
 
 namespace ruedo::engine {
 
@@ -57,6 +58,22 @@ void World::advance(int64_t step, Snapshot& snapshot, Batch& batch) {
   batch.sensor_faults = faults_.of_sensors();
   batch.reseedings = faults_.reseedings();
   physics::check_finite(snapshot, model_, layout_);
+}
+
+void World::take(const World& other) {
+  options_.seed = other.options_.seed;
+  inbox_.take(other.inbox_);
+  faults_ = other.faults_;
+  physics_->take(*other.physics_);
+  robots_->take(*other.robots_);
+  for (size_t m = 0; m < modules_.size(); ++m) {
+    const Device* uncopied = modules_[m]->take(*other.modules_[m]);
+    if (!uncopied) continue;
+    const std::string robot =
+        uncopied->robot.valid() ? model_.models[layout_.robots[uncopied->robot].instance].name : "";
+    throw InputError({}, "the device '" + robot + "/" + uncopied->name +
+                             "' is a plugin's that cannot be copied: it lacks Sensor::take()");
+  }
 }
 
 // Modules have their own time for it: with the batch that has the step.

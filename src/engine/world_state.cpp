@@ -12,7 +12,7 @@ constexpr Rate kWorldRate{30, 1};
 constexpr size_t kBytesOfBody = 4 + 3 * 8 + 4 * 8;
 constexpr size_t kBodiesInPart = (kMaxPartSize - 64) / kBytesOfBody;
 
-class WorldState : public Sensor {
+class WorldState : public SensorOf<WorldState> {
  public:
   WorldState(const std::vector<int32_t>& indices, int epoch, int channel) : channel_(channel) {
     const size_t bodies = indices.size();

@@ -137,6 +137,31 @@ void Broadphase::remove_pair(Proxy& a, Proxy& b, btDispatcher* dispatcher) {
   if (b.moves) std::erase(b.partners, &a);
 }
 
+void Broadphase::take(const Broadphase& other, btDispatcher* dispatcher) {
+  auto from = other.proxies_.begin();  // the same numbers
+  for (auto& [id, proxy] : proxies_) {
+    while (!proxy.partners.empty()) remove_pair(proxy, *proxy.partners.back(), dispatcher);
+    const Proxy& there = (from++)->second;
+    proxy.m_aabbMin = there.m_aabbMin;
+    proxy.m_aabbMax = there.m_aabbMax;
+    if (!proxy.moves || (proxy.leaf->volume.Mins() == there.leaf->volume.Mins() &&
+                         proxy.leaf->volume.Maxs() == there.leaf->volume.Maxs()))
+      continue;
+    btDbvtVolume volume = there.leaf->volume;
+    moving_.update(proxy.leaf, volume);
+  }
+  const auto here = [this](const btBroadphaseProxy& proxy) {
+    return &proxies_.at(proxy.m_uniqueId);
+  };
+  const btBroadphasePairArray& pairs = other.pairs_.getOverlappingPairArray();
+  for (int i = 0; i < pairs.size(); ++i)
+    pairs_.addOverlappingPair(here(*pairs[i].m_pProxy0), here(*pairs[i].m_pProxy1));
+  from = other.proxies_.begin();
+  for (auto& [id, proxy] : proxies_) {
+    for (const Proxy* partner : (from++)->second.partners) proxy.partners.push_back(here(*partner));
+  }
+}
+
 void Broadphase::getAabb(btBroadphaseProxy* proxy, btVector3& low, btVector3& high) const {
   low = proxy->m_aabbMin;
   high = proxy->m_aabbMax;

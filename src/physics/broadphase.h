@@ -43,6 +43,10 @@ class Broadphase final : public btBroadphaseInterface {
   // before its proxy is destroyed.
   void refilter(btBroadphaseProxy* proxy, btDispatcher* dispatcher);
 
+  // Becomes what it is in another copy of the world, whose filter answers as this one's does. The
+  // pairs are in the other one's order; nothing was done with them yet.
+  void take(const Broadphase& other, btDispatcher* dispatcher);
+
   // What btBroadphaseInterface asks for. Objects of the static filter group never move; boxes of
   // the others are kept kSlack_m wider than given, so that few of their moves need the trees.
   btBroadphaseProxy* createProxy(const btVector3& low, const btVector3& high, int shape_type,

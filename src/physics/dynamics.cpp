@@ -5,6 +5,7 @@
 #include <numeric>
 #include <tuple>
 
+#include "physics/contact_copies.h"
 #include "physics/mesh_edges.h"
 
 namespace ruedo::physics {
@@ -134,6 +135,17 @@ void Dynamics::take(const std::vector<btRigidBody*>& bodies) {
         (takes_part(joint.getRigidBodyA()) || takes_part(joint.getRigidBodyB())))
       joints_.push_back(&joint);
   }
+}
+
+void Dynamics::take(const Dynamics& other,
+                    const std::function<btTypedConstraint*(btTypedConstraint*)>& joint_here) {
+  const auto& from =
+      const_cast<Dynamics&>(other).getPairCache()->getOverlappingPairArray();  // as Bullet has it
+  auto& to = getPairCache()->getOverlappingPairArray();
+  for (int i = 0; i < to.size(); ++i)
+    copy_contacts(from[i], to[i], *getDispatcher(), getDispatchInfo());
+  for (int i = 0; i < m_constraints.size(); ++i)  // in the order in which they are solved
+    m_constraints[i] = joint_here(other.m_constraints[i]);
 }
 
 bool Dynamics::awake() const {

@@ -5,6 +5,7 @@
 // order that others decide; here an island's bits depend on its own bodies alone.
 #pragma once
 
+#include <functional>
 #include <vector>
 
 #include "physics/bullet.h"
@@ -26,6 +27,12 @@ class Dynamics final : public btDiscreteDynamicsWorld {
   // them.
   void take(const std::vector<btRigidBody*>& bodies);
   bool awake() const;  // one of them is
+
+  // Becomes what it is in another copy of the world, whose pairs are the same in the same order:
+  // what Bullet keeps of them. All objects must be awake. joint_here: the joint that one of the
+  // other's is here.
+  void take(const Dynamics& other,
+            const std::function<btTypedConstraint*(btTypedConstraint*)>& joint_here);
 
   // One substep: forces and gravity to contacts, contacts to velocities, velocities to poses.
   void substep(double substep_s);

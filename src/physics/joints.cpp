@@ -70,14 +70,13 @@ double angle_about(const Vec3& axis, const Quat& turn) {
 
 JointConstraint::JointConstraint(const model::Joint& joint, btRigidBody& parent, btRigidBody& child,
                                  const Pose& X_PJ, const Pose& X_CJ, btRigidBody* reference)
-    : type_(joint.type),
+    : JointState(joint),
+      type_(joint.type),
       advance_(joint.advance),
       multiplier_(joint.mimic_multiplier),
       offset_(joint.mimic_offset - joint.mimic_multiplier * joint.mimic_reference),
       ratio_(joint.gear_ratio),
       reference_(reference),
-      limits_(joint.axis),
-      limits2_(joint.axis2),
       written_{joint.axis.effort, joint.axis.velocity, joint.axis.rate_gain},
       parent_(parent),
       child_(child),
@@ -167,6 +166,15 @@ JointConstraint::Constraint JointConstraint::make_gearbox() {
   R_RC_ = to_R * rotation_of(child_);
   R_RJ_ = R_RP_ * X_PJ_.rotation;
   return std::make_unique<Unconstrained>(parent_, child_);
+}
+
+// Of Bullet's constraint, all else follows from the joint and its bodies in each substep.
+void JointConstraint::take(const JointConstraint& other) {
+  JointState::operator=(other);
+  *motors_ = *other.motors_;
+  for (JointMotor* motor : {&motors_->first, &motors_->second})
+    if (motor->reference) motor->reference = reference_;
+  if (constraint_) constraint_->setEnabled(other.constraint_->isEnabled());
 }
 
 Vec3 JointConstraint::axis_in_world() const {

@@ -15,7 +15,26 @@
 
 namespace ruedo::physics {
 
-class JointConstraint {
+// What a joint was told and what it did: all of it that changes from substep to substep.
+struct JointState {
+  explicit JointState(const model::Joint& joint) : limits_(joint.axis), limits2_(joint.axis2) {}
+
+  enum class Mode { passive, motor, effort, servo };
+  bool follows_ = false;  // in the coming substep, at follow_rate_
+  double follow_rate_ = 0.0;
+  double parent_position_ = 0.0;       // rad about the first axis
+  model::JointAxis limits_, limits2_;  // of the second axis: universal and gearbox only
+  struct {
+    double rate = 0.0, lowest = 0.0, highest = 0.0, gain = 0.0, effort = 0.0;
+  } told_;  // before limits
+  WheelServo servo_;
+  double woken_at_ = 0.0;  // the servo's rate when it last woke the bodies
+  Mode mode_ = Mode::passive;
+  double command_ = 0.0, lowest_effort_ = 0.0, highest_effort_ = 0.0, gain_ = 0.0;
+  double position_ = 0.0, effort_ = 0.0;
+};
+
+class JointConstraint : private JointState {
  public:
   // X_PJ, X_CJ: the joint's frame in Bullet's frames I of parent and child. reference: a gearbox's;
   // others have none.
@@ -66,6 +85,9 @@ class JointConstraint {
     start_again();
   }
 
+  // Becomes what the same joint is in another copy of the world.
+  void take(const JointConstraint& other);
+
   // For the coming substep: another joint leads, and this one goes along, with its largest effort
   // at most. The leader does not feel it.
   void follow(double leader_position, double leader_rate, double substep_s);
@@ -73,7 +95,6 @@ class JointConstraint {
   void after_substep(double substep_s);
 
  private:
-  enum class Mode { passive, motor, effort, servo };
   using Constraint = std::unique_ptr<btTypedConstraint>;
   Constraint make_constraint();  // of the joint's type
   Constraint make_hinge() const;
@@ -100,21 +121,12 @@ class JointConstraint {
   model::JointType type_;
   double advance_;              // m/rad: screw only
   double multiplier_, offset_;  // of the leader's position
-  bool follows_ = false;        // in the coming substep, at follow_rate_
-  double follow_rate_ = 0.0;
-  double ratio_;  // gearbox only, as what follows
+  double ratio_;                // gearbox only, as what follows
   btRigidBody* reference_;
   Quat R_RJ_, R_RP_, R_RC_;  // at the start: the joint's frame and both bodies' in the reference
-  double parent_position_ = 0.0;       // rad about the first axis
-  model::JointAxis limits_, limits2_;  // of the second axis: universal and gearbox only
   struct {
     double effort, velocity, rate_gain;
   } written_;  // as the file has them
-  struct {
-    double rate = 0.0, lowest = 0.0, highest = 0.0, gain = 0.0, effort = 0.0;
-  } told_;  // before limits
-  WheelServo servo_;
-  double woken_at_ = 0.0;  // the servo's rate when it last woke the bodies
   btRigidBody& parent_;
   btRigidBody& child_;
   Pose X_PJ_, X_CJ_;
@@ -122,9 +134,6 @@ class JointConstraint {
   Constraint constraint_;
   std::unique_ptr<JointMotors> motors_ =
       std::make_unique<JointMotors>();  // the constraint points to it
-  Mode mode_ = Mode::passive;
-  double command_ = 0.0, lowest_effort_ = 0.0, highest_effort_ = 0.0, gain_ = 0.0;
-  double position_ = 0.0, effort_ = 0.0;
 };
 
 }  // namespace ruedo::physics

@@ -109,6 +109,11 @@ class PhysicsWorld {
   double wheel_rate(WheelIndex wheel) const;   // rad/s
   void drive_wheel(WheelIndex wheel, const WheelServo& servo);
 
+  // Between two steps: becomes what another copy of the same world is, by the same WorldModel and
+  // BodyLayout; what follows equals what follows there, bit for bit. Neither had an instance added
+  // or removed. Throws std::logic_error where Bullet keeps what cannot be copied.
+  void take(const PhysicsWorld& other);
+
   // Between two steps. `instance` is new at the end of the world and the layout, or was removed and
   // placed again: its bodies are where the layout has them, at rest.
   void add(InstanceIndex instance);

@@ -59,6 +59,7 @@ class PhysicsWorld::Impl {
 
   void step();
   void read(Snapshot& snapshot);
+  void take(const Impl& other);
 
   void set_pose(BodyIndex body, const Pose& pose) {
     poses_[body] = pose;
@@ -121,6 +122,8 @@ class PhysicsWorld::Impl {
   BodyIndex body_of(JointIndex joint) const;  // that moves
   void step_at(int pace);
   void advance(btRigidBody& mover, double substep_s);
+  void take_ties(const Impl& other);
+  void take_body(BodyIndex body, const Impl& other);
   void tie(BodyIndex body, BodyIndex other);
   void untie(BodyIndex body, BodyIndex other);
   void push_to_bullet(BodyIndex body);  // our pose and twist

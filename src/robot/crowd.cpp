@@ -116,9 +116,9 @@ struct Crowd::Group {
   model::CrowdDescription description;
   double floor = 0.0;
   std::shared_ptr<const Plan> plan;
-  const model::FloorPlan& walls;
+  Bound<const model::FloorPlan> walls;
   std::vector<model::Rect> goals;
-  std::vector<model::Route> routes;  // as goals
+  std::shared_ptr<const std::vector<model::Route>> routes;  // as goals
   RandomSource random;
 
   uint64_t people = 0;
@@ -130,17 +130,19 @@ struct Crowd::Group {
         plan(plan_for(world, first, description)),
         walls(plan->walls),
         goals(description.goals),
-        routes(plan->routes),
+        routes(plan, &plan->routes),
         random(seed, description.name, "people"),
         element(first.model->path.get()) {
     if (!goals.empty()) return;
     model::CrowdDescription places = description;
     places.count = kPlaces;
     places.name += "/goals";
+    auto ways = std::make_shared<std::vector<model::Route>>();
     for (const Vec2& at : model::places_of(places, walls, {}, seed)) {
       goals.push_back({at, at});
-      routes.push_back(walls.route_to(goals.back(), description.radius, clearance()));
+      ways->push_back(walls->route_to(goals.back(), description.radius, clearance()));
     }
+    routes = std::move(ways);
   }
   double clearance() const { return description.radius + kBesideWalls_m; }
 };
@@ -148,7 +150,7 @@ struct Crowd::Group {
 struct Crowd::Person {
   InstanceIndex instance;
   BodyIndex body;
-  Group* group;
+  Bound<Group> group;
   uint64_t number;  // in the group
   Vec2 start = Vec2::Zero();
   Vec2 p = Vec2::Zero(), before = Vec2::Zero();  // m, when they last thought, and a tick before
@@ -201,7 +203,8 @@ Crowd::Crowd(const model::WorldModel& world, const model::BodyLayout& layout,
   for (const auto& group : groups_) {
     const std::vector<Vec2> places =
         model::places_of(group->description, group->walls, taken, seed_);
-    for (size_t i = 0; first + i < people_.size() && people_[first + i].group == group.get(); ++i) {
+    for (size_t i = 0; first + i < people_.size() && &*people_[first + i].group == group.get();
+         ++i) {
       people_[first + i].start = places[i];
       taken.push_back({places[i], group->description.radius});
     }
@@ -212,17 +215,25 @@ Crowd::Crowd(const model::WorldModel& world, const model::BodyLayout& layout,
 
 Crowd::~Crowd() = default;
 
+void Crowd::take(const Crowd& other) {
+  seed_ = other.seed_;
+  thought_ = other.thought_;
+  for (size_t i = 0; i < groups_.size(); ++i) *groups_[i] = *other.groups_[i];
+  for (size_t i = 0; i < people_.size(); ++i) people_[i] = other.people_[i];
+  others_ = other.others_;
+}
+
 void Crowd::reseed(uint64_t seed) {
   for (const auto& group : groups_) group->random.reseed(seed);
 }
 
 void Crowd::gather(const model::BodyLayout& layout) {
-  if (std::none_of(world_.models.begin(), world_.models.end(),
+  if (std::none_of(world_->models.begin(), world_->models.end(),
                    [](const auto& instance) { return is_person(*instance.model); }))
     return;
   for (const BodyIndex body : layout.bodies.indices()) {
-    is_person(*world_.models[layout.bodies[body].instance].model) ? add_person(layout, body)
-                                                                  : add_other(layout, body);
+    is_person(*world_->models[layout.bodies[body].instance].model) ? add_person(layout, body)
+                                                                   : add_other(layout, body);
   }
 }
 
@@ -235,7 +246,7 @@ void Crowd::add(InstanceIndex instance, const model::BodyLayout& layout) {
 
 void Crowd::add_other(const model::BodyLayout& layout, BodyIndex body) {
   const model::BodyPlacement& placed = layout.bodies[body];
-  const model::ModelInstance& instance = world_.models[placed.instance];
+  const model::ModelInstance& instance = world_->models[placed.instance];
   Other other{placed.instance, body, instance.is_robot(), {}};
   for (const LinkIndex l : placed.links) {
     const model::LinkPlacement& link = layout.links[l];
@@ -253,15 +264,15 @@ void Crowd::add_other(const model::BodyLayout& layout, BodyIndex body) {
 
 void Crowd::add_person(const model::BodyLayout& layout, BodyIndex body) {
   const InstanceIndex index = layout.bodies[body].instance;
-  const model::ModelInstance& instance = world_.models[index];
+  const model::ModelInstance& instance = world_->models[index];
   const auto known = std::find_if(groups_.begin(), groups_.end(), [&](const auto& group) {
     return group->element == instance.model->path.get();
   });
   if (known == groups_.end()) {
     groups_.push_back(std::make_unique<Group>(world_, instance, seed_));
-    people_.push_back({index, body, groups_.back().get(), 0});
+    people_.push_back({index, body, *groups_.back(), 0});
   } else {
-    people_.push_back({index, body, known->get(), (*known)->people});
+    people_.push_back({index, body, **known, (*known)->people});
   }
   ++people_.back().group->people;
 }
@@ -281,8 +292,8 @@ void Crowd::begin(Person& person) {
   look_for_way(person);
   const Vec2 ahead = person.next - person.p;
   person.heading = person.heading_before = math::atan2(ahead.y(), ahead.x());
-  physics_.set_pose(person.body, {Quat(Eigen::AngleAxisd(person.heading, Vec3::UnitZ())),
-                                  {person.p.x(), person.p.y(), person.group->floor}});
+  physics_->set_pose(person.body, {Quat(Eigen::AngleAxisd(person.heading, Vec3::UnitZ())),
+                                   {person.p.x(), person.p.y(), person.group->floor}});
 }
 
 void Crowd::put(Person& person, const Vec2& at) {
@@ -318,11 +329,11 @@ void Crowd::before_step(SimTime now) {
                     {at.x(), at.y(), person.group->floor}};
     Twist mean;
     if (!person.jumped) {
-      const Pose& was = physics_.pose(person.body);
+      const Pose& was = physics_->pose(person.body);
       mean.linear = (X_WB.translation - was.translation) / step_s;
       mean.angular.z() = wrap_angle(heading(X_WB.rotation) - heading(was.rotation)) / step_s;
     }
-    physics_.guide(person.body, mean, X_WB);
+    physics_->guide(person.body, mean, X_WB);
   }
 }
 
@@ -356,7 +367,7 @@ void Crowd::think() {
 
 void Crowd::see_others() {
   for (Other& other : others_) {
-    const Pose& X_WB = physics_.pose(other.body);
+    const Pose& X_WB = physics_->pose(other.body);
     const Eigen::Matrix3d R = X_WB.rotation.toRotationMatrix();
     const double middle = (X_WB * Vec3(other.box.center())).z(),
                  half = 0.5 * R.row(2).cwiseAbs().dot(other.box.sizes());
@@ -366,7 +377,7 @@ void Crowd::see_others() {
     other.c = math::cos(yaw);
     other.s = math::sin(yaw);
     other.at = X_WB.translation.head<2>();
-    other.v = physics_.twist(other.body).linear.head<2>();
+    other.v = physics_->twist(other.body).linear.head<2>();
   }
 }
 
@@ -463,7 +474,7 @@ Crowd::Vec2 Crowd::of_others(const Person& person, const Vec2& ahead) const {
 Crowd::Vec2 Crowd::of_walls(const Person& person) const {
   const double radius = person.group->description.radius;
   model::FloorPlan::Near near[2];
-  const int count = person.group->walls.nearest(person.p, kSeesWalls_m, near);
+  const int count = person.group->walls->nearest(person.p, kSeesWalls_m, near);
   Vec2 sum = Vec2::Zero();
   for (int i = 0; i < count; ++i) {
     const Vec2 d = near[i].inside ? Vec2(near[i].point - person.p) : Vec2(person.p - near[i].point);
@@ -505,8 +516,8 @@ void Crowd::choose_goal(Person& person) {
 
 void Crowd::look_for_way(Person& person) {
   const Group& group = *person.group;
-  person.next = group.walls.next(group.routes[person.goal], group.goals[person.goal], person.p,
-                                 group.clearance());
+  person.next = group.walls->next((*group.routes)[person.goal], group.goals[person.goal], person.p,
+                                  group.clearance());
   go_around_what_stands(person);
 }
 
@@ -538,7 +549,7 @@ bool Crowd::come_again(Person& person) {
   const model::CrowdDescription& crowd = group.description;
   const auto is_free = [&](const Vec2& at) {
     model::FloorPlan::Near near[2];
-    if (group.walls.nearest(at, crowd.radius, near) > 0) return false;
+    if (group.walls->nearest(at, crowd.radius, near) > 0) return false;
     for (const Person& other : people_) {
       if (&other != &person && !other.gone &&
           (other.p - at).norm() < other.group->description.radius + crowd.radius + kRoom_m)

@@ -18,6 +18,7 @@
 
 #include "model/crowd.h"
 #include "physics/physics_world.h"
+#include "ruedo/bound.h"
 #include "ruedo/random.h"
 
 namespace ruedo::robot {
@@ -34,7 +35,8 @@ class Crowd {
 
   void add(InstanceIndex instance, const model::BodyLayout& layout);  // what they see from now on
   void remove(InstanceIndex instance);
-  void reseed(uint64_t seed);  // what people choose from now on
+  void take(const Crowd& other);  // becomes what it is in another copy of the world
+  void reseed(uint64_t seed);     // what people choose from now on
   void start_again(InstanceIndex instance, SimTime now);
   void shift_time(SimTime us) { thought_ -= us; }  // sim time was set back by so much
 
@@ -62,10 +64,10 @@ class Crowd {
   void go_around_what_stands(Person& person) const;
   bool come_again(Person& person);
 
-  const model::WorldModel& world_;
-  physics::PhysicsWorld& physics_;
-  const uint64_t seed_;
-  const int64_t step_us_;
+  Bound<const model::WorldModel> world_;
+  Bound<physics::PhysicsWorld> physics_;
+  uint64_t seed_;
+  int64_t step_us_;
   SimTime thought_ = 0;  // the people's own states are of this time and of one tick before
   std::vector<std::unique_ptr<Group>> groups_;
   std::vector<Person> people_;

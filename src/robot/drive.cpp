@@ -42,8 +42,8 @@ Drive::Drive(const model::WorldModel& world, const model::BodyLayout& layout,
 }
 
 Twist Drive::base_twist(const Pose& X_WBase) const {
-  const Twist& of_body = physics_.twist(body_);
-  const Vec3 arm = physics_.pose(body_).rotation * X_BBase_.translation;
+  const Twist& of_body = physics_->twist(body_);
+  const Vec3 arm = physics_->pose(body_).rotation * X_BBase_.translation;
   const Quat to_base = X_WBase.rotation.conjugate();
   return {to_base * (of_body.linear + of_body.angular.cross(arm)), to_base * of_body.angular};
 }

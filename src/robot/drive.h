@@ -8,6 +8,7 @@
 #include "physics/physics_world.h"
 #include "robot/motion_planner.h"
 #include "robot/wheel_kinematics.h"
+#include "ruedo/bound.h"
 #include "ruedo/snapshot.h"
 
 namespace ruedo::robot {
@@ -25,7 +26,10 @@ class Drive {
         physics::PhysicsWorld& physics, RobotIndex robot);
   virtual ~Drive() = default;
   Drive(const Drive&) = delete;
-  Drive& operator=(const Drive&) = delete;
+
+  // Becomes what the same robot's drive is in another copy of the world. Throws InputError where a
+  // plugin's drive cannot.
+  virtual void take(const Drive& other) = 0;
 
   // Before and after physics.step(), which leads from sim time now to now + one step.
   virtual void before_step(SimTime now) = 0;
@@ -40,8 +44,8 @@ class Drive {
   void read(Snapshot& snapshot) const;
   // As the robot's primitives measure it: the true one, or what its odometry makes of its wheels.
   double heading_in_odom() const {
-    return description_.on_odometry ? believed_heading_
-                                    : wrap_angle(heading(X_WBase_.rotation) - odom_heading_);
+    return description_->on_odometry ? believed_heading_
+                                     : wrap_angle(heading(X_WBase_.rotation) - odom_heading_);
   }
   void reset_odometry();
 
@@ -52,10 +56,12 @@ class Drive {
   virtual void ground_changed() {}
 
  protected:
+  Drive& operator=(const Drive&) = default;
+
   // Resets what the drive remembers of its motion.
   virtual void begin_at_rest() = 0;
   // base_link as the physics has it, and the twist of base_link expressed in it.
-  Pose base_pose() const { return physics_.pose(body_) * X_BBase_; }
+  Pose base_pose() const { return physics_->pose(body_) * X_BBase_; }
   Twist base_twist(const Pose& X_WBase) const;
   // The other way round: the twist of the body's frame B in the world.
   Twist body_twist(const Pose& X_WBase, const Twist& of_base) const;
@@ -63,14 +69,14 @@ class Drive {
   // Tells the motion what a contact of the robot took from what it is told to do.
   void resist(const Contact& contact);
 
-  physics::PhysicsWorld& physics_;
-  const RobotIndex robot_;
-  const BodyIndex body_;
-  const int64_t step_us_;
-  const double step_s_;
-  const Pose X_BBase_, X_BaseB_;
-  const std::vector<WheelIndex> wheels_;
-  const model::DriveDescription& description_;
+  Bound<physics::PhysicsWorld> physics_;
+  RobotIndex robot_;
+  BodyIndex body_;
+  int64_t step_us_;
+  double step_s_;
+  Pose X_BBase_, X_BaseB_;
+  std::vector<WheelIndex> wheels_;
+  Bound<const model::DriveDescription> description_;
   MotionPlanner planner_;
   Pose X_WBase_;
   Twist twist_;                       // of base_link in base_link

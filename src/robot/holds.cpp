@@ -24,7 +24,7 @@ void Holds::set(InstanceIndex instance, const std::string& name, bool attached) 
 }
 
 void Holds::start(InstanceIndex instance) {
-  const model::ModelInstance& placed = world_.models[instance];
+  const model::ModelInstance& placed = world_->models[instance];
   for (const model::Hold& description : placed.model->holds) {
     const auto known = std::find_if(held_.begin(), held_.end(), [&](const Held& each) {
       return each.instance == instance && each.description == &description;
@@ -71,43 +71,43 @@ void Holds::before_step() {
 }
 
 InstanceIndex Holds::find(const std::string& name) const {
-  for (const InstanceIndex i : world_.models.indices()) {
-    if (world_.models[i].name == name && !world_.models[i].removed) return i;
+  for (const InstanceIndex i : world_->models.indices()) {
+    if (world_->models[i].name == name && !world_->models[i].removed) return i;
   }
   return {};
 }
 
 LinkIndex Holds::link_of(InstanceIndex instance, const std::string& name) const {
-  const auto& links = world_.models[instance].model->links;
+  const auto& links = world_->models[instance].model->links;
   for (const ModelLinkIndex link : links.indices()) {
-    if (links[link].name == name) return layout_.link_of(instance, link);
+    if (links[link].name == name) return layout_->link_of(instance, link);
   }
   return {};
 }
 
 bool Holds::is_closed(const Held& held) const {
-  return held.tie.valid() && physics_.is_closed(held.tie);
+  return held.tie.valid() && physics_->is_closed(held.tie);
 }
 
 void Holds::close(Held& held) {
-  if (world_.models[held.instance].removed) return;
+  if (world_->models[held.instance].removed) return;
   const model::Hold& description = *held.description;
   const InstanceIndex other =
       description.other_model.empty() ? held.instance : find(description.other_model);
   if (!other.valid()) return;
   const LinkIndex child_link = link_of(other, description.other_link);
   if (!child_link.valid()) return;
-  const BodyIndex body = layout_.links[layout_.link_of(held.instance, description.link)].body;
-  const BodyIndex child = layout_.links[child_link].body;
+  const BodyIndex body = layout_->links[layout_->link_of(held.instance, description.link)].body;
+  const BodyIndex child = layout_->links[child_link].body;
   if (child == body) return;  // one body, or neither moves
   if (!held.tie.valid() || held.other != other)
-    held.tie = child.valid() ? physics_.make_tie(child, body) : physics_.make_tie(body, child);
+    held.tie = child.valid() ? physics_->make_tie(child, body) : physics_->make_tie(body, child);
   held.other = other;
-  physics_.close_tie(held.tie);
+  physics_->close_tie(held.tie);
 }
 
 void Holds::open(Held& held) {
-  if (is_closed(held)) physics_.open_tie(held.tie);
+  if (is_closed(held)) physics_->open_tie(held.tie);
 }
 
 }  // namespace ruedo::robot

@@ -9,6 +9,7 @@
 
 #include "model/body_layout.h"
 #include "physics/physics_world.h"
+#include "ruedo/bound.h"
 
 namespace ruedo::robot {
 
@@ -45,9 +46,9 @@ class Holds {
   void open(Held& held);
   bool is_closed(const Held& held) const;
 
-  const model::WorldModel& world_;
-  const model::BodyLayout& layout_;
-  physics::PhysicsWorld& physics_;
+  Bound<const model::WorldModel> world_;
+  Bound<const model::BodyLayout> layout_;
+  Bound<physics::PhysicsWorld> physics_;
   std::vector<Held> held_;
 };
 

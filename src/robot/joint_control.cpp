@@ -60,12 +60,12 @@ JointControl::JointControl(const model::WorldModel& world, const model::BodyLayo
 }
 
 const model::Joint& JointControl::description(JointIndex joint) const {
-  const auto& placed = layout_.joints[joint];
-  return world_.models[placed.instance].model->joints[placed.joint];
+  const auto& placed = layout_->joints[joint];
+  return world_->models[placed.instance].model->joints[placed.joint];
 }
 
 JointIndex JointControl::find(RobotIndex robot, const std::string& name) const {
-  const std::vector<JointIndex>& joints = layout_.robots[robot].joints;
+  const std::vector<JointIndex>& joints = layout_->robots[robot].joints;
   const auto found = std::find_if(joints.begin(), joints.end(), [&](JointIndex joint) {
     return description(joint).name == name;
   });
@@ -78,7 +78,7 @@ int8_t JointControl::check(RobotIndex robot, const std::string& name, int8_t mod
   const Limits* limits = limits_of(mode);
   if (!limits) return motion_status_t::REASON_BAD_KIND;
   if (value > limits->most || value < limits->least) return motion_status_t::REASON_BAD_VALUE;
-  const InstanceIndex instance = layout_.robots[robot].instance;
+  const InstanceIndex instance = layout_->robots[robot].instance;
   const auto if_so = [](bool good) {
     return good ? motion_status_t::REASON_NONE : motion_status_t::REASON_BAD_VALUE;
   };
@@ -114,14 +114,14 @@ int8_t JointControl::apply(RobotIndex robot, const JointCommand& command) {
       return reason;
   }
   for (size_t i = 0; i < n; ++i) {
-    if (tell_others(layout_.robots[robot].instance, command.names[i], command.modes[i],
+    if (tell_others(layout_->robots[robot].instance, command.names[i], command.modes[i],
                     command.values[i]))
       continue;
     const JointIndex joint = find(robot, command.names[i]);
     tell(joint, command.modes[i], command.values[i]);
-    const auto& placed = layout_.joints[joint];
-    if (placed.parent_body.valid()) physics_.wake(placed.parent_body);
-    if (placed.child_body.valid()) physics_.wake(placed.child_body);
+    const auto& placed = layout_->joints[joint];
+    if (placed.parent_body.valid()) physics_->wake(placed.parent_body);
+    if (placed.child_body.valid()) physics_->wake(placed.child_body);
   }
   return motion_status_t::REASON_NONE;
 }
@@ -133,9 +133,9 @@ void JointControl::tell(JointIndex joint, int8_t mode, double value) {
   switch (mode) {
     case Mode::RATE_GAIN:
       if (!is_set(joint)) gains_.push_back({joint, description(joint).axis.position_gain});
-      return physics_.set_joint(joint, JointSetting::rate_gain, value);
-    case Mode::EFFORT_LIMIT: return physics_.set_joint(joint, JointSetting::effort, value);
-    case Mode::VELOCITY_LIMIT: return physics_.set_joint(joint, JointSetting::velocity, value);
+      return physics_->set_joint(joint, JointSetting::rate_gain, value);
+    case Mode::EFFORT_LIMIT: return physics_->set_joint(joint, JointSetting::effort, value);
+    case Mode::VELOCITY_LIMIT: return physics_->set_joint(joint, JointSetting::velocity, value);
     case Mode::POSITION_GAIN:
       std::erase_if(gains_, of_joint);
       return gains_.push_back({joint, value});
@@ -149,10 +149,10 @@ void JointControl::hold(JointIndex joint, int8_t mode, double value) {
   using Mode = joint_command_t;
   std::erase_if(targets_, [joint](const Target& each) { return each.joint == joint; });
   const model::JointAxis& axis = description(joint).axis;
-  if (mode == Mode::EFFORT) return physics_.apply_joint_effort(joint, value);
+  if (mode == Mode::EFFORT) return physics_->apply_joint_effort(joint, value);
   if (mode == Mode::VELOCITY) {
     if (!axis.rate_pid || is_set(joint))
-      return physics_.drive_joint_velocity(joint, value, kUnlimited);
+      return physics_->drive_joint_velocity(joint, value, kUnlimited);
     return targets_.push_back({joint, true, value});
   }
   const bool limited = axis.lower <= axis.upper;
@@ -171,8 +171,8 @@ void JointControl::begin(JointIndex joint) {
 void JointControl::start(InstanceIndex instance) {
   holds_.start(instance);
   lifts_.start(instance);
-  for (const JointIndex joint : layout_.joints.indices()) {
-    if (layout_.joints[joint].instance == instance) begin(joint);
+  for (const JointIndex joint : layout_->joints.indices()) {
+    if (layout_->joints[joint].instance == instance) begin(joint);
   }
 }
 
@@ -192,15 +192,15 @@ void JointControl::forget(InstanceIndex instance) {
   holds_.forget(instance);
   lifts_.forget(instance);
   const auto of_instance = [&](const auto& each) {
-    return layout_.joints[each.joint].instance == instance;
+    return layout_->joints[each.joint].instance == instance;
   };
   std::erase_if(targets_, of_instance);
   std::erase_if(gains_, of_instance);
 }
 
 void JointControl::serve(Target& target, const model::Pid& pid) const {
-  const double now = target.is_rate ? physics_.joint_velocity(target.joint)
-                                    : physics_.joint_position(target.joint);
+  const double now = target.is_rate ? physics_->joint_velocity(target.joint)
+                                    : physics_->joint_position(target.joint);
   const double error = target.value - now;
   target.integral = std::clamp(target.integral + pid.i * error * step_s_, pid.i_min, pid.i_max);
   const double pushes = target.integral + pid.offset;
@@ -208,9 +208,9 @@ void JointControl::serve(Target& target, const model::Pid& pid) const {
   const double of_step = pid.p * step_s_;
   const double gain = target.is_rate ? pid.p : std::max(pid.d + of_step / 2.0, of_step);
   if (gain <= 0.0)
-    return physics_.apply_joint_effort(target.joint, std::clamp(pushes, pid.least, pid.most));
+    return physics_->apply_joint_effort(target.joint, std::clamp(pushes, pid.least, pid.most));
   const double rate = target.is_rate ? target.value : pid.p * error / gain;
-  physics_.servo_joint(target.joint, {rate + pushes / gain, gain, pid.least, pid.most});
+  physics_->servo_joint(target.joint, {rate + pushes / gain, gain, pid.least, pid.most});
 }
 
 void JointControl::before_step() {
@@ -223,10 +223,10 @@ void JointControl::before_step() {
     if (pid && !is_set(target.joint)) {
       serve(target, *pid);
     } else if (target.is_rate) {
-      physics_.drive_joint_velocity(target.joint, target.value, kUnlimited);
+      physics_->drive_joint_velocity(target.joint, target.value, kUnlimited);
     } else {
-      const double error = target.value - physics_.joint_position(target.joint);
-      physics_.drive_joint_velocity(target.joint, gain_of(target.joint) * error, kUnlimited);
+      const double error = target.value - physics_->joint_position(target.joint);
+      physics_->drive_joint_velocity(target.joint, gain_of(target.joint) * error, kUnlimited);
     }
   }
 }

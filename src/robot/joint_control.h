@@ -15,6 +15,7 @@
 #include "robot/holds.h"
 #include "robot/lifts.h"
 #include "robot/robots.h"
+#include "ruedo/bound.h"
 
 namespace ruedo::robot {
 
@@ -55,9 +56,9 @@ class JointControl {
   void begin(JointIndex joint);
   void serve(Target& target, const model::Pid& pid) const;
 
-  const model::WorldModel& world_;
-  const model::BodyLayout& layout_;
-  physics::PhysicsWorld& physics_;
+  Bound<const model::WorldModel> world_;
+  Bound<const model::BodyLayout> layout_;
+  Bound<physics::PhysicsWorld> physics_;
   double step_s_;
   double largest_gain_;          // 1/s, of the position controller
   std::vector<Target> targets_;  // joints under position control, or a PID

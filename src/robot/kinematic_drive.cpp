@@ -76,19 +76,28 @@ KinematicDrive::KinematicDrive(const model::WorldModel& world, const model::Body
       mass_(physics.mass(body_)),
       yaw_inertia_((X_WBase_.rotation * Vec3::UnitZ())
                        .dot(physics.inertia(body_) * (X_WBase_.rotation * Vec3::UnitZ()))),
-      lever_(description_.track > 0.0 ? 0.5 * description_.track : kLeverWithoutWheels_m),
-      max_force_(std::min(description_.max_force, mass_ * world.gravity.norm())),
+      lever_(description_->track > 0.0 ? 0.5 * description_->track : kLeverWithoutWheels_m),
+      max_force_(std::min(description_->max_force, mass_ * world.gravity.norm())),
       gravity_(world.gravity) {
   make_model();
   stand_on_near_plane();
 }
 
+void KinematicDrive::take(const Drive& other) {
+  const auto& from = static_cast<const KinematicDrive&>(other);
+  if (model_ && !model_->take(*from.model_)) {
+    throw InputError({}, "the drive of robot '" + robot_name() +
+                             "' is a plugin's that cannot be copied: it lacks DriveModel::take()");
+  }
+  *this = from;
+}
+
 const std::string& KinematicDrive::robot_name() const {
-  return world_.models[layout_.robots[robot_].instance].name;
+  return world_->models[layout_->robots[robot_].instance].name;
 }
 
 void KinematicDrive::make_model() {
-  const Element* element = description_.element.get();
+  const Element* element = description_->element.get();
   const std::string* type = element ? element->attribute("type") : nullptr;
   if (!type) return;
   for (const DriveKind& kind : drive_kinds()) {
@@ -113,9 +122,9 @@ void KinematicDrive::stand_on_plane(const LevelPlane& plane) {
   heading_ = heading(X_WBase_.rotation);
   X_WBase_.rotation = about_z(heading_);
   X_WBase_.translation.z() = plane.height - lowest_;
-  physics_.set_support(body_, physics::Support::plane);
-  physics_.set_gravity(body_, Vec3::Zero());
-  physics_.set_pose(body_, X_WBase_ * X_BaseB_);
+  physics_->set_support(body_, physics::Support::plane);
+  physics_->set_gravity(body_, Vec3::Zero());
+  physics_->set_pose(body_, X_WBase_ * X_BaseB_);
 }
 
 void KinematicDrive::begin_at_rest() {
@@ -142,7 +151,7 @@ void KinematicDrive::leave_plane() {
   grip_ = grip_on_plane();
   on_plane_ = false;
   supported_ = true;
-  physics_.set_support(body_, physics::Support::contacts);
+  physics_->set_support(body_, physics::Support::contacts);
 }
 
 bool KinematicDrive::is_support(const Contact& contact, const Vec3& up) const {
@@ -150,25 +159,25 @@ bool KinematicDrive::is_support(const Contact& contact, const Vec3& up) const {
 }
 
 bool KinematicDrive::is_belt(LinkIndex link) const {
-  const auto& belts = description_.belts;
+  const auto& belts = description_->belts;
   return link.valid() &&
-         std::find(belts.begin(), belts.end(), layout_.links[link].link) != belts.end();
+         std::find(belts.begin(), belts.end(), layout_->links[link].link) != belts.end();
 }
 
 bool KinematicDrive::on_wheel(const Contact& contact) const {
   if (belts_touch_) return is_belt(contact.link_a);
-  return !wheels_touch_ || (contact.link_a.valid() && layout_.links[contact.link_a].wheel.valid());
+  return !wheels_touch_ || (contact.link_a.valid() && layout_->links[contact.link_a].wheel.valid());
 }
 
 bool KinematicDrive::is_own(const Contact& contact) const {
   return contact.body_b.valid() &&
-         layout_.bodies[contact.body_b].instance == layout_.robots[robot_].instance;
+         layout_->bodies[contact.body_b].instance == layout_->robots[robot_].instance;
 }
 
 // A flipper that stands on something may lift the robot.
 bool KinematicDrive::flipper_stands(const Vec3& up) const {
   return std::any_of(flippers_.begin(), flippers_.end(), [&](BodyIndex flipper) {
-    const auto contacts = physics_.nearby(flipper);
+    const auto contacts = physics_->nearby(flipper);
     return std::any_of(contacts.begin(), contacts.end(), [&](const Contact& contact) {
       return is_support(contact, up) && !is_own(contact) && contact.depth > -kStanding_m;
     });
@@ -176,24 +185,25 @@ bool KinematicDrive::flipper_stands(const Vec3& up) const {
 }
 
 bool KinematicDrive::is_alone() const {
-  return physics_.alone(body_) && std::all_of(flippers_.begin(), flippers_.end(),
-                                              [&](BodyIndex each) { return physics_.alone(each); });
+  return physics_->alone(body_) &&
+         std::all_of(flippers_.begin(), flippers_.end(),
+                     [&](BodyIndex each) { return physics_->alone(each); });
 }
 
 // Of the robot's base and its flippers, in the last step.
 template <class Visit>
 void KinematicDrive::for_each_contact(Visit visit) const {
-  for (const Contact& contact : physics_.contacts(body_)) visit(contact);
+  for (const Contact& contact : physics_->contacts(body_)) visit(contact);
   for (const BodyIndex flipper : flippers_)
-    for (const Contact& contact : physics_.contacts(flipper))
+    for (const Contact& contact : physics_->contacts(flipper))
       if (!is_own(contact)) visit(contact);
 }
 
 double KinematicDrive::friction(const Contact& contact) const {
   const auto of = [this](LinkIndex link, int shape) {
     if (!link.valid() || shape < 0) return 1.0;
-    const auto& placed = layout_.links[link];
-    const auto& collisions = world_.models[placed.instance].model->links[placed.link].collisions;
+    const auto& placed = layout_->links[link];
+    const auto& collisions = world_->models[placed.instance].model->links[placed.link].collisions;
     return static_cast<size_t>(shape) < collisions.size() ? collisions[shape].surface.friction
                                                           : 1.0;
   };
@@ -203,7 +213,7 @@ double KinematicDrive::friction(const Contact& contact) const {
 // With what it carries; what it leans on lightens it.
 double KinematicDrive::grip_on_plane() const {
   double load = mass_ * gravity_.norm();
-  for (const Contact& contact : physics_.contacts(body_))
+  for (const Contact& contact : physics_->contacts(body_))
     load -= contact.normal.z() * contact.force;
   return std::min(wheel_friction_, plane_friction_) * std::max(load, 0.0);
 }
@@ -211,7 +221,7 @@ double KinematicDrive::grip_on_plane() const {
 void KinematicDrive::choose_support() {
   const Vec3 up = X_WBase_.rotation * Vec3::UnitZ();
   if (on_plane_) {
-    for (const Contact& contact : physics_.nearby(body_)) {
+    for (const Contact& contact : physics_->nearby(body_)) {
       if (is_support(contact, up) && contact.depth > -kSeesBump_m) return leave_plane();
     }
     if (flipper_stands(up)) leave_plane();
@@ -219,7 +229,7 @@ void KinematicDrive::choose_support() {
   }
   bool bump = supported_ = flipper_stands(up);
   const auto plane = nearest_plane(planes_, X_WBase_.translation.z() + lowest_);
-  for (const Contact& contact : physics_.nearby(body_)) {
+  for (const Contact& contact : physics_->nearby(body_)) {
     if (!is_support(contact, up)) continue;
     supported_ |= contact.depth > -kStanding_m && on_wheel(contact);
     bump |= contact.body_b.valid() || contact.normal.z() < 1.0 - 1e-9 || !plane ||
@@ -248,16 +258,16 @@ void KinematicDrive::look_at_support() {
     least = std::min(least, mu);
     if (contact.body_b.valid()) carriers_.push_back(contact);
   };
-  for (const Contact& contact : physics_.nearby(body_)) look_at(contact);
+  for (const Contact& contact : physics_->nearby(body_)) look_at(contact);
   for (const BodyIndex flipper : flippers_)
-    for (const Contact& contact : physics_.nearby(flipper)) look_at(contact);
+    for (const Contact& contact : physics_->nearby(flipper)) look_at(contact);
   const double weight = mass_ * std::max(0.0, -up.dot(gravity_));
   if (load < kFirstTouch * weight && std::isfinite(least)) grip_ = least * weight;
   carrier_ = Twist{Vec3::Zero(), Vec3::Zero()};
   const Quat to_base = X_WBase_.rotation.conjugate();
   for (const Contact& contact : carriers_) {
-    const Twist& twist = physics_.twist(contact.body_b);
-    const Vec3 arm = X_WBase_.translation - physics_.pose(contact.body_b).translation;
+    const Twist& twist = physics_->twist(contact.body_b);
+    const Vec3 arm = X_WBase_.translation - physics_->pose(contact.body_b).translation;
     const double part = 1.0 / static_cast<double>(carriers_.size());
     carrier_.linear += part * (to_base * (twist.linear + twist.angular.cross(arm)));
     carrier_.angular += part * (to_base * twist.angular);
@@ -268,18 +278,18 @@ void KinematicDrive::look_at_support() {
 void KinematicDrive::push_back(const Vec3& impulse) {
   const double part = 1.0 / static_cast<double>(carriers_.size());
   for (const Contact& contact : carriers_) {
-    if (physics_.mass(contact.body_b) <= 0.0) continue;
+    if (physics_->mass(contact.body_b) <= 0.0) continue;
     const Vec3 share = -part * impulse;
-    physics_.apply_impulse(
+    physics_->apply_impulse(
         contact.body_b, share,
-        (contact.position - physics_.center_of_mass(contact.body_b)).cross(share));
+        (contact.position - physics_->center_of_mass(contact.body_b)).cross(share));
   }
 }
 
 void KinematicDrive::wake() {
   asleep_ = false;
   still_us_ = 0;
-  physics_.wake(body_);
+  physics_->wake(body_);
 }
 
 // What the plugin's drive makes of the plan.
@@ -290,7 +300,7 @@ Displacement KinematicDrive::follow_model(SimTime now) {
   made_ = model_->step({now, asked, actual, X_WBase_});
   if (!std::isfinite(made_.ahead) || !std::isfinite(made_.left) || !std::isfinite(made_.turn)) {
     throw physics::StateError(
-        robot_name() + ": its drive '" + *description_.element->attribute("type") +
+        robot_name() + ": its drive '" + *description_->element->attribute("type") +
         "' gave the velocity " + std::to_string(made_.ahead) + ", " + std::to_string(made_.left) +
         ", " + std::to_string(made_.turn) + " at " + std::to_string(now) + " us");
   }
@@ -309,13 +319,13 @@ bool KinematicDrive::is_still() const {
 
 void KinematicDrive::before_step(SimTime now) {
   if (asleep_) {
-    if (physics_.sleeping(body_)) return;
+    if (physics_->sleeping(body_)) return;
     wake();
   }
   way_ = planned_ = planner_.step(now, step_us_);
   if (model_) way_ = follow_model(now);
-  if (description_.on_odometry) {  // the wheels turn as the robot believes it must; what comes of
-                                   // it depends on what they are
+  if (description_->on_odometry) {  // the wheels turn as the robot believes it must; what comes of
+                                    // it depends on what they are
     believed_heading_ = wrap_angle(believed_heading_ + planned_.angle);
     const SideRates turned =
         WheelKinematics::believed(description_).wheels({planned_.way, planned_.angle});
@@ -380,31 +390,31 @@ void KinematicDrive::before_on_plane() {
     Twist twist = twist_;
     carriers_.clear();
     behind_ =
-        !servo(twist, description_.traction ? std::min(max_force_, grip_on_plane()) : max_force_,
+        !servo(twist, description_->traction ? std::min(max_force_, grip_on_plane()) : max_force_,
                Vec3::Zero());
     if (behind_) {
-      physics_.drive(body_, body_twist(X_WBase_, twist));
+      physics_->drive(body_, body_twist(X_WBase_, twist));
       return;
     }
   }
   const Pose X_WB = next * X_BaseB_;
-  const Twist mean{(X_WB.translation - physics_.pose(body_).translation) / step_s_,
+  const Twist mean{(X_WB.translation - physics_->pose(body_).translation) / step_s_,
                    {0.0, 0.0, way_.angle / step_s_}};
-  physics_.guide(body_, mean, X_WB);
+  physics_->guide(body_, mean, X_WB);
 }
 
 void KinematicDrive::before_on_contacts() {
   if (!supported_) {
-    physics_.set_gravity(body_, gravity_);
+    physics_->set_gravity(body_, gravity_);
     return;
   }
   const Vec3 up = X_WBase_.rotation * Vec3::UnitZ();
-  physics_.set_gravity(body_, up * up.dot(gravity_));
+  physics_->set_gravity(body_, up * up.dot(gravity_));
   Twist twist = twist_;
   const double force = touched_ || behind_ ? max_force_ : std::numeric_limits<double>::infinity();
   const Vec3 along_plane = X_WBase_.rotation.conjugate() * Vec3(gravity_ - up * up.dot(gravity_));
-  behind_ = !servo(twist, description_.traction ? std::min(force, grip_) : force, along_plane);
-  physics_.drive(body_, body_twist(X_WBase_, twist));
+  behind_ = !servo(twist, description_->traction ? std::min(force, grip_) : force, along_plane);
+  physics_->drive(body_, body_twist(X_WBase_, twist));
 }
 
 void KinematicDrive::after_step(SimTime now) {
@@ -428,14 +438,14 @@ void KinematicDrive::after_step(SimTime now) {
 // What the wheels, at the rates of the plan, make of speed and turn rate.
 PlaneMotion KinematicDrive::of_wheels() const {
   if (model_) return {made_.ahead, made_.turn};
-  if (!description_.on_odometry) return {planner_.v(), planner_.omega()};
+  if (!description_->on_odometry) return {planner_.v(), planner_.omega()};
   return WheelKinematics::real(description_)
       .motion(WheelKinematics::believed(description_).wheels({planner_.v(), planner_.omega()}));
 }
 
 // On odometry the wheels do as planned, and the robot believes them.
 void KinematicDrive::finish(SimTime now, double way, double angle, bool touched) {
-  if (description_.on_odometry && planner_.has_primitive())
+  if (description_->on_odometry && planner_.has_primitive())
     return planner_.finish(now, planned_.way, planned_.angle, false);
   if (touched) for_each_contact([&](const Contact& contact) { resist(contact); });
   planner_.finish(now, way, angle, touched, lag_);
@@ -454,7 +464,7 @@ void KinematicDrive::after_on_plane(SimTime now) {
     const PlaneMotion wheels = of_wheels();
     const Twist twist{{wheels.v, side(), 0.0}, {0.0, 0.0, wheels.omega}};
     set_state(next_, twist);
-    physics_.set_twist(body_, body_twist(X_WBase_, twist));
+    physics_->set_twist(body_, body_twist(X_WBase_, twist));
     fall_asleep_when_still(true);
     return;
   }
@@ -500,8 +510,8 @@ void KinematicDrive::after_on_contacts(SimTime now) {
   twist.linear.x() = wheels.v + carrier_.linear.x();
   twist.linear.y() = side() + carrier_.linear.y();
   twist.angular.z() = wheels.omega + carrier_.angular.z();
-  physics_.set_pose(body_, X_WBase * X_BaseB_);
-  physics_.set_twist(body_, body_twist(X_WBase, twist));
+  physics_->set_pose(body_, X_WBase * X_BaseB_);
+  physics_->set_twist(body_, body_twist(X_WBase, twist));
   set_state(X_WBase, twist);
   const bool carried_along =
       carrier_.linear.norm() > kStill_m_s || carrier_.angular.norm() > kStill_rad_s;
@@ -519,7 +529,7 @@ void KinematicDrive::fall_asleep_when_still(bool still) {
   asleep_ = true;
   twist_ = {};
   way_ = {};
-  physics_.sleep(body_);
+  physics_->sleep(body_);
 }
 
 void KinematicDrive::read_wheels(Snapshot& snapshot) const {

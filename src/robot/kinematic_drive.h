@@ -18,6 +18,7 @@
 #include "robot/drive.h"
 #include "robot/ground.h"
 #include "robot/wheel_angles.h"
+#include "ruedo/bound.h"
 #include "ruedo/drive.h"
 
 namespace ruedo::robot {
@@ -33,9 +34,11 @@ class KinematicDrive final : public Drive {
   void after_step(SimTime now) override;
   void read_wheels(Snapshot& snapshot) const override;
   void wake() override;
+  void take(const Drive& other) override;
   void ground_changed() override;
 
  private:
+  KinematicDrive& operator=(const KinematicDrive&) = default;
   void begin_at_rest() override;
   const std::string& robot_name() const;
   void make_model();
@@ -81,26 +84,31 @@ class KinematicDrive final : public Drive {
   Twist carrier_{
       Vec3::Zero(),
       Vec3::Zero()};  // of what carries it, at base_link and in it; zero: it stands still
-  std::vector<Contact> carriers_;      // contacts of the wheels with what can move
-  double plane_friction_ = 1.0;        // of the plane that it stands on
-  Displacement way_, planned_;         // that the wheels make in this step, and the plan
-  std::unique_ptr<DriveModel> model_;  // a plugin's drive; null: the base does as planned
-  BaseVelocity made_;                  // what the plugin's drive gave last
-  Lag lag_;                            // of what it made, behind the plan
-  double heading_ = 0.0;               // of base_link on a plane, rad
+  std::vector<Contact> carriers_;  // contacts of the wheels with what can move
+  double plane_friction_ = 1.0;    // of the plane that it stands on
+  Displacement way_, planned_;     // that the wheels make in this step, and the plan
+  // A plugin's drive; null: the base does as planned.
+  struct Model : std::unique_ptr<DriveModel> {
+    using std::unique_ptr<DriveModel>::operator=;
+    Model() = default;
+    Model& operator=(const Model&) { return *this; }  // that is apart, in take()
+  } model_;
+  BaseVelocity made_;     // what the plugin's drive gave last
+  Lag lag_;               // of what it made, behind the plan
+  double heading_ = 0.0;  // of base_link on a plane, rad
   WheelAngles wheel_angles_;
   SimTime still_us_ = 0;
   Pose next_;  // of base_link after this step, on a plane
-  const std::vector<LevelPlane>& planes_;
-  const model::WorldModel& world_;
-  const model::BodyLayout& layout_;
-  const double lowest_;  // of the wheels below base_link
-  const double wheel_friction_;
-  const bool wheels_touch_;          // they have shapes
-  const bool belts_touch_;           // the same of a tracked vehicle's links that are belts
+  Bound<const std::vector<LevelPlane>> planes_;
+  Bound<const model::WorldModel> world_;
+  Bound<const model::BodyLayout> layout_;
+  double lowest_;  // of the wheels below base_link
+  double wheel_friction_;
+  bool wheels_touch_;                // they have shapes
+  bool belts_touch_;                 // the same of a tracked vehicle's links that are belts
   std::vector<BodyIndex> flippers_;  // belts that joints carry
-  const double mass_, yaw_inertia_, lever_, max_force_;
-  const Vec3 gravity_;
+  double mass_, yaw_inertia_, lever_, max_force_;
+  Vec3 gravity_;
 };
 
 }  // namespace ruedo::robot

@@ -27,21 +27,21 @@ Lifts::Lifts(const model::WorldModel& world, const model::BodyLayout& layout,
 }
 
 JointIndex Lifts::joint_of(InstanceIndex instance, ModelJointIndex joint) const {
-  for (const JointIndex i : layout_.joints.indices()) {
-    if (layout_.joints[i].instance == instance && layout_.joints[i].joint == joint) return i;
+  for (const JointIndex i : layout_->joints.indices()) {
+    if (layout_->joints[i].instance == instance && layout_->joints[i].joint == joint) return i;
   }
   return {};  // both its ends stand fast
 }
 
 void Lifts::add_door(InstanceIndex instance, const model::Door& description) {
-  const model::Model& model = *world_.models[instance].model;
+  const model::Model& model = *world_->models[instance].model;
   Door door{instance, &description, {}, {}};
   for (const model::Door::Leaf& leaf : description.leaves) {
     if (!leaf.joint.valid()) continue;
     const JointIndex index = joint_of(instance, leaf.joint);
     if (!index.valid()) continue;
     const model::Joint& joint = model.joints[leaf.joint];
-    const model::LinkPlacement& link = layout_.links[layout_.link_of(instance, joint.child)];
+    const model::LinkPlacement& link = layout_->links[layout_->link_of(instance, joint.child)];
     if (!link.body.valid()) continue;  // it stands fast, and what it hangs on moves
     const Pose X_BJ = link.X_BL * model.links[joint.child].X_ML.inverse() * joint.X_MJ;
     door.leaves.push_back({index, link.body, X_BJ.rotation * joint.axis.axis_in_J, X_BJ.translation,
@@ -57,7 +57,7 @@ void Lifts::add_lift(InstanceIndex instance, const model::Lift& description) {
   Lift lift;
   lift.instance = instance;
   lift.description = &description;
-  lift.way = {joint, physics_.joint_position(joint)};
+  lift.way = {joint, physics_->joint_position(joint)};
   if (description.initial_floor >= 0) {
     lift.calls = {description.initial_floor};
     lift.opens = false;
@@ -68,7 +68,7 @@ void Lifts::add_lift(InstanceIndex instance, const model::Lift& description) {
 
 void Lifts::start(InstanceIndex instance) {
   forget(instance);
-  const model::ModelInstance& placed = world_.models[instance];
+  const model::ModelInstance& placed = world_->models[instance];
   if (placed.removed || placed.model->is_static) return;
   for (const model::Door& door : placed.model->doors) add_door(instance, door);
   for (const model::Lift& lift : placed.model->lifts) add_lift(instance, lift);
@@ -132,10 +132,10 @@ void Lifts::for_each_door(const Lift& lift, Visit visit) {
 // Something of another model that can move is where a leaf goes.
 bool Lifts::is_blocked(const Door& door) const {
   for (const Leaf& leaf : door.leaves) {
-    const Pose& X_WB = physics_.pose(leaf.body);
+    const Pose& X_WB = physics_->pose(leaf.body);
     const Vec3 axis = X_WB.rotation * leaf.axis_B;
-    for (const Contact& contact : physics_.contacts(leaf.body)) {
-      if (!contact.body_b.valid() || layout_.bodies[contact.body_b].instance == door.instance)
+    for (const Contact& contact : physics_->contacts(leaf.body)) {
+      if (!contact.body_b.valid() || layout_->bodies[contact.body_b].instance == door.instance)
         continue;
       Vec3 way = leaf.slides ? axis : axis.cross(contact.position - X_WB * leaf.origin_B);
       if (leaf.closed < leaf.open) way = -way;
@@ -146,8 +146,8 @@ bool Lifts::is_blocked(const Door& door) const {
 }
 
 bool Lifts::is_there(const Way& way, double near) const {
-  return std::abs(way.target - physics_.joint_position(way.joint)) < near &&
-         std::abs(physics_.joint_velocity(way.joint)) < kStands;
+  return std::abs(way.target - physics_->joint_position(way.joint)) < near &&
+         std::abs(physics_->joint_velocity(way.joint)) < kStands;
 }
 
 bool Lifts::is_at(const Door& door, bool open) const {
@@ -167,9 +167,9 @@ void Lifts::set_target(Way& way, double target) {
 // As fast as it can still brake in the way that is left.
 void Lifts::move(Way& way, const std::optional<model::Trapezoid>& motion) {
   const auto wake = [&] {
-    const model::JointPlacement& joint = layout_.joints[way.joint];
+    const model::JointPlacement& joint = layout_->joints[way.joint];
     for (const BodyIndex body : {joint.parent_body, joint.child_body})
-      if (body.valid()) physics_.wake(body);
+      if (body.valid()) physics_->wake(body);
   };
   if (!motion) {
     if (!way.told) {
@@ -179,7 +179,7 @@ void Lifts::move(Way& way, const std::optional<model::Trapezoid>& motion) {
     way.told = true;
     return;
   }
-  const double missing = way.target - physics_.joint_position(way.joint);
+  const double missing = way.target - physics_->joint_position(way.joint);
   const double far = std::abs(missing);
   const double before = std::copysign(1.0, missing) * way.rate;
   double rate = std::min({motion->rate, std::sqrt(2.0 * motion->acceleration * far),
@@ -188,7 +188,7 @@ void Lifts::move(Way& way, const std::optional<model::Trapezoid>& motion) {
   rate = std::copysign(rate, missing);
   if (way.told && rate == way.rate) return;
   if (!way.told) wake();
-  physics_.drive_joint_velocity(way.joint, rate, motion->effort);
+  physics_->drive_joint_velocity(way.joint, rate, motion->effort);
   way.rate = rate;
   way.told = true;
 }

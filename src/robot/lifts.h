@@ -11,6 +11,7 @@
 
 #include "model/body_layout.h"
 #include "physics/physics_world.h"
+#include "ruedo/bound.h"
 
 namespace ruedo::robot {
 
@@ -88,11 +89,11 @@ class Lifts {
   void set_target(Way& way, double target);
   void move(Way& way, const std::optional<model::Trapezoid>& motion);
 
-  const model::WorldModel& world_;
-  const model::BodyLayout& layout_;
-  physics::PhysicsWorld& physics_;
-  const int64_t step_us_;
-  const double step_s_;
+  Bound<const model::WorldModel> world_;
+  Bound<const model::BodyLayout> layout_;
+  Bound<physics::PhysicsWorld> physics_;
+  int64_t step_us_;
+  double step_s_;
   std::vector<Door> doors_;
   std::vector<Lift> lifts_;
   std::vector<Order> orders_;

@@ -73,12 +73,12 @@ MotionPlanner::MotionPlanner(const model::DriveDescription& drive, const std::ve
 using Steering = model::DriveDescription::Steering;
 
 bool MotionPlanner::is_steered() const {
-  return drive_.steering == Steering::ackermann || drive_.steering == Steering::tricycle;
+  return drive_->steering == Steering::ackermann || drive_->steering == Steering::tricycle;
 }
 
 bool MotionPlanner::moves_sideways() const {
-  return drive_.steering == Steering::mecanum || drive_.steering == Steering::omni ||
-         drive_.steering == Steering::holonomic;
+  return drive_->steering == Steering::mecanum || drive_->steering == Steering::omni ||
+         drive_->steering == Steering::holonomic;
 }
 
 void MotionPlanner::show(int64_t id, int8_t kind, int8_t state, int8_t reason,
@@ -120,13 +120,13 @@ void MotionPlanner::command(const VelocityCommand& command, SimTime now) {
 }
 
 void MotionPlanner::command(const WheelCommand& command, SimTime now) {
-  const size_t left = drive_.left_joints.size(), right = drive_.right_joints.size(),
+  const size_t left = drive_->left_joints.size(), right = drive_->right_joints.size(),
                n = command.rates.size();
   if (!rims_.empty() && n == rims_.size()) return hold_wheels(command, now);
   const bool sides =
-      drive_.steering == Steering::differential || drive_.steering == Steering::tracked;
-  if (!sides || (n != 2 && n != left + right) || !(drive_.wheel_radius > 0.0) ||
-      !(drive_.track > 0.0)) {
+      drive_->steering == Steering::differential || drive_->steering == Steering::tracked;
+  if (!sides || (n != 2 && n != left + right) || !(drive_->wheel_radius > 0.0) ||
+      !(drive_->track > 0.0)) {
     return refuse(0, Status::KIND_WHEELS, Status::REASON_BAD_VALUE);
   }
   for (const double rate : command.rates) {
@@ -151,7 +151,7 @@ void MotionPlanner::hold_wheels(const WheelCommand& command, SimTime now) {
     if (!std::isfinite(command.rates[i]))
       return refuse(0, Status::KIND_WHEELS, Status::REASON_NOT_FINITE);
     normal += rims_[i] * rims_[i].transpose();
-    sum += rims_[i] * (drive_.wheel_radius * countable(command.rates[i]));
+    sum += rims_[i] * (drive_->wheel_radius * countable(command.rates[i]));
   }
   const Vec3 twist = normal.ldlt().solve(sum);
   if (!twist.allFinite()) return refuse(0, Status::KIND_WHEELS, Status::REASON_BAD_VALUE);
@@ -160,14 +160,14 @@ void MotionPlanner::hold_wheels(const WheelCommand& command, SimTime now) {
 
 // All together may be too fast for a wheel: the direction is kept.
 void MotionPlanner::keep_wheel_rates(double& v, double& side, double& omega) const {
-  if (!std::isfinite(drive_.max_wheel_rate) || is_steered()) return;
-  double fastest = std::abs(v) + 0.5 * drive_.track * std::abs(omega);
+  if (!std::isfinite(drive_->max_wheel_rate) || is_steered()) return;
+  double fastest = std::abs(v) + 0.5 * drive_->track * std::abs(omega);
   if (!rims_.empty()) {
     fastest = 0.0;
     for (const Vec3& rim : rims_)
       fastest = std::max(fastest, std::abs(rim.dot(Vec3(v, side, omega))));
   }
-  const double allowed = drive_.max_wheel_rate * drive_.wheel_radius;
+  const double allowed = drive_->max_wheel_rate * drive_->wheel_radius;
   if (fastest <= allowed) return;
   v *= allowed / fastest;
   side *= allowed / fastest;
@@ -176,11 +176,11 @@ void MotionPlanner::keep_wheel_rates(double& v, double& side, double& omega) con
 
 // Standing still it can only turn its wheels.
 void MotionPlanner::steer_for(double v, double omega) {
-  const double most = drive_.max_steering_angle;
+  const double most = drive_->max_steering_angle;
   if (v != 0.0)
-    target_steering_ = std::clamp(math::atan(drive_.wheelbase * omega / v), -most, most);
+    target_steering_ = std::clamp(math::atan(drive_->wheelbase * omega / v), -most, most);
   else if (omega != 0.0)
-    target_steering_ = std::copysign(most, omega * drive_.wheelbase);
+    target_steering_ = std::copysign(most, omega * drive_->wheelbase);
 }
 
 void MotionPlanner::hold(double v, double side, double omega, SimTime now, int8_t kind) {
@@ -192,7 +192,7 @@ void MotionPlanner::hold(double v, double side, double omega, SimTime now, int8_
   by_wheels_ = kind == Status::KIND_WHEELS;
   const bool same = holding_ && v == target_v_ && omega == target_omega_ && side == target_side_;
   holding_ = true;
-  deadline_ = drive_.watchdog_us > 0 ? now + drive_.watchdog_us : kNever;
+  deadline_ = drive_->watchdog_us > 0 ? now + drive_->watchdog_us : kNever;
   const bool blocked =
       same && log_.current().kind == kind && log_.current().reason == Status::REASON_BLOCKED;
   show(0, kind, Status::STATE_RUNNING, blocked ? Status::REASON_BLOCKED : Status::REASON_NONE,
@@ -227,15 +227,15 @@ int8_t MotionPlanner::aim_on_arc(const MoveCommand& command, Primitive& next) co
   next.target = std::abs(command.value) * radius;
   next.unit = command.value < 0.0 ? -1.0 / radius : 1.0 / radius;
   next.curvature = next.unit;
-  if (is_steered() && std::abs(drive_.wheelbase) > math::tan(drive_.max_steering_angle) * radius)
+  if (is_steered() && std::abs(drive_->wheelbase) > math::tan(drive_->max_steering_angle) * radius)
     return Status::REASON_NOT_POSSIBLE;
   Limits& limits = next.limits = stricter(way_limits_, command, kUsualSpeed_m_s);
   limits.speed = std::min(limits.speed, angle_limits_.speed * radius);
   limits.acceleration = std::min(limits.acceleration, angle_limits_.acceleration * radius);
   limits.deceleration = std::min(limits.deceleration, angle_limits_.deceleration * radius);
-  if (std::isfinite(drive_.max_wheel_rate)) {
-    const double outer = 1.0 + 0.5 * drive_.track / radius;
-    limits.speed = std::min(limits.speed, drive_.max_wheel_rate * drive_.wheel_radius / outer);
+  if (std::isfinite(drive_->max_wheel_rate)) {
+    const double outer = 1.0 + 0.5 * drive_->track / radius;
+    limits.speed = std::min(limits.speed, drive_->max_wheel_rate * drive_->wheel_radius / outer);
   }
   return Status::REASON_NONE;
 }
@@ -303,7 +303,7 @@ void MotionPlanner::set_plan(const Profile& v, const Profile& omega, SimTime now
   plan_omega_ = omega;
   if (moves_sideways()) plan_side_ = Profile::to_velocity(side_, side, side_limits_);
   if (is_steered())
-    plan_steering_ = SteeringPlan::between(steering_, target_steering_, drive_.max_steering_rate);
+    plan_steering_ = SteeringPlan::between(steering_, target_steering_, drive_->max_steering_rate);
   take_speeds(now);
 }
 
@@ -318,7 +318,7 @@ void MotionPlanner::take_speeds(SimTime to) {
     steady_ = steady_ && t >= plan_side_.end();
   } else if (is_steered()) {
     steering_ = plan_steering_.angle(t);
-    omega_ = v_ * math::tan(steering_) / drive_.wheelbase;
+    omega_ = v_ * math::tan(steering_) / drive_->wheelbase;
     steady_ = t >= plan_v_.end() && t >= plan_steering_.end;
   }
   const bool stopping =
@@ -334,14 +334,14 @@ void MotionPlanner::plan_primitive(SimTime now) {
   p.begins = p.begins_at = 0.0;
   Profile v, omega;
   if (is_steered()) {
-    target_steering_ = p.axis == Axis::arc ? math::atan(drive_.wheelbase * p.curvature) : 0.0;
+    target_steering_ = p.axis == Axis::arc ? math::atan(drive_->wheelbase * p.curvature) : 0.0;
     if (p.axis == Axis::way || steering_ == target_steering_) {
       v = Profile::to_distance(v_, rest, p.limits);
     } else {  // an arc begins at rest, when its wheels are steered
       v = Profile::to_velocity(v_, 0.0, way_limits_);
       p.begins = std::max(
           v.end(),
-          SteeringPlan::between(steering_, target_steering_, drive_.max_steering_rate).end);
+          SteeringPlan::between(steering_, target_steering_, drive_->max_steering_rate).end);
       p.begins_at = v.position(p.begins);
       v.append(Profile::to_distance(0.0, rest, p.limits), p.begins);
     }
@@ -392,7 +392,8 @@ void MotionPlanner::shift_time(SimTime us) {
 }
 
 Displacement MotionPlanner::way_of(double begin, double end) const {
-  if (is_steered()) return integrate_steered(plan_v_, plan_steering_, drive_.wheelbase, begin, end);
+  if (is_steered())
+    return integrate_steered(plan_v_, plan_steering_, drive_->wheelbase, begin, end);
   if (moves_sideways()) return integrate(plan_v_, plan_side_, plan_omega_, begin, end);
   return integrate(plan_v_, plan_omega_, begin, end);
 }

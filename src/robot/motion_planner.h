@@ -15,6 +15,7 @@
 #include "robot/motion_log.h"
 #include "robot/robots.h"
 #include "robot/wheel_kinematics.h"
+#include "ruedo/bound.h"
 #include "ruedo/math.h"
 
 namespace ruedo::robot {
@@ -56,7 +57,7 @@ class MotionPlanner {
   double omega() const { return omega_; }
   double side() const { return side_; }  // m/s to the left
   double curvature() const {
-    return is_steered() ? math::tan(steering_) / drive_.wheelbase : 0.0;
+    return is_steered() ? math::tan(steering_) / drive_->wheelbase : 0.0;
   }  // 1/m
   bool has_primitive() const { return primitive_.axis != Axis::none; }
   bool by_wheels() const { return by_wheels_; }  // the last command was one of wheel rates
@@ -109,7 +110,7 @@ class MotionPlanner {
   double v_ = 0.0, omega_ = 0.0, side_ = 0.0, steering_ = 0.0;
   bool steady_ = true, resting_ = true;
   SimTime deadline_;  // of the watchdog; far away when it does not run
-  const model::DriveDescription& drive_;
+  Bound<const model::DriveDescription> drive_;
   WheelKinematics kinematics_;  // as the drive turns speeds into wheel rates
   Limits way_limits_, angle_limits_, side_limits_;
   std::vector<Vec3> rims_;  // of mecanum and omni wheels

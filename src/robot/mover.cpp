@@ -28,7 +28,7 @@ Mover::Mover(const model::WorldModel& world, const model::BodyLayout& layout,
 void Mover::start_again(SimTime now) {
   offset_ = -now;
   const Pose X_WM = pose_at(0);
-  for (const Part& part : parts_) physics_.set_pose(part.body, (X_WM * part.X_MB).normalized());
+  for (const Part& part : parts_) physics_->set_pose(part.body, (X_WM * part.X_MB).normalized());
 }
 
 void check_path(const Element& path) {
@@ -96,12 +96,12 @@ void Mover::before_step(SimTime now) {
   const double step_s = static_cast<double>(step_us_) * 1e-6;
   for (const Part& part : parts_) {
     const Pose end = (X_WM * part.X_MB).normalized();
-    const Pose& begin = physics_.pose(part.body);
+    const Pose& begin = physics_->pose(part.body);
     const Eigen::AngleAxisd turn(end.rotation * begin.rotation.conjugate());
     Twist mean{(end.translation - begin.translation) / step_s,
                turn.axis() * (turn.angle() / step_s)};
     if (mean.linear.norm() > kJump_m_s) mean = {};  // to where its loop begins: it hits nothing
-    physics_.guide(part.body, mean, end);
+    physics_->guide(part.body, mean, end);
   }
 }
 

@@ -5,6 +5,7 @@
 
 #include "model/body_layout.h"
 #include "physics/physics_world.h"
+#include "ruedo/bound.h"
 
 namespace ruedo::robot {
 
@@ -50,7 +51,7 @@ class Mover {
     Pose X_MB;
   };
 
-  physics::PhysicsWorld& physics_;
+  Bound<physics::PhysicsWorld> physics_;
   InstanceIndex instance_;
   int64_t step_us_;
   SimTime offset_ = 0;  // time of the path less sim time

@@ -31,6 +31,7 @@ class Robots::Impl {
   void set_twist(InstanceIndex instance, const Twist& twist);
   void start_again(InstanceIndex instance);
   SimTime set_time_to_zero();
+  void take(const Impl& other);
   void reseed(uint64_t seed) {
     crowd_.reseed(seed);
     wind_.reseed(seed);
@@ -149,6 +150,18 @@ void Robots::Impl::step() {
   for (auto& drive : drives_)
     if (drive) drive->after_step(now());
   for (MotionLog& log : driveless_) log.advance();
+}
+
+void Robots::Impl::take(const Impl& other) {
+  step_ = other.step_;
+  for (const RobotIndex i : drives_.indices())
+    if (drives_[i]) drives_[i]->take(*other.drives_[i]);
+  driveless_ = other.driveless_;
+  for (size_t i = 0; i < movers_.size(); ++i) *movers_[i] = *other.movers_[i];
+  crowd_.take(other.crowd_);
+  surroundings_ = other.surroundings_;
+  joints_ = other.joints_;
+  wind_ = other.wind_;
 }
 
 void Robots::Impl::read(Snapshot& snapshot) const {
@@ -348,6 +361,7 @@ Robots::~Robots() = default;
 void Robots::apply(const Command& command) { impl_->apply(command); }
 void Robots::step() { impl_->step(); }
 void Robots::read(Snapshot& snapshot) const { impl_->read(snapshot); }
+void Robots::take(const Robots& other) { impl_->take(*other.impl_); }
 int64_t Robots::current_step() const { return impl_->step_; }
 void Robots::add(InstanceIndex instance) { impl_->add(instance); }
 void Robots::remove(InstanceIndex instance) { impl_->remove(instance); }

@@ -62,6 +62,10 @@ class Robots {
 
   int64_t current_step() const;
 
+  // Between two steps: becomes what another copy of the same world is, of whose physics this one's
+  // has taken the state. Throws InputError for a plugin's drive that cannot be copied.
+  void take(const Robots& other);
+
   // From the next step on people, and the wind, draw from that seed.
   void reseed(uint64_t seed);
 

@@ -50,7 +50,7 @@ Surroundings::Surroundings(const model::WorldModel& world, const model::BodyLayo
 }
 
 void Surroundings::add(InstanceIndex instance) {
-  const model::ModelInstance& placed = world_.models[instance];
+  const model::ModelInstance& placed = world_->models[instance];
   if (is(*placed.model, "ruedo:belt"))
     belts_.push_back({instance, parts_of(instance), placed.X_WM,
                       placed.X_WM.rotation * velocity_of(*placed.model->path)});
@@ -63,9 +63,10 @@ void Surroundings::add(InstanceIndex instance) {
 
 std::vector<Surroundings::Part> Surroundings::parts_of(InstanceIndex instance) const {
   std::vector<Part> parts;
-  const Pose X_MW = world_.models[instance].X_WM.inverse();
-  for (const BodyIndex b : layout_.bodies.indices()) {
-    if (layout_.bodies[b].instance == instance) parts.push_back({b, X_MW * layout_.bodies[b].X_WB});
+  const Pose X_MW = world_->models[instance].X_WM.inverse();
+  for (const BodyIndex b : layout_->bodies.indices()) {
+    if (layout_->bodies[b].instance == instance)
+      parts.push_back({b, X_MW * layout_->bodies[b].X_WB});
   }
   return parts;
 }
@@ -96,11 +97,11 @@ Pose Surroundings::Door::pose() const {
 
 // A robot or a person, at its middle, seen from above.
 bool Surroundings::is_near(const Door& door) const {
-  for (const BodyIndex b : layout_.bodies.indices()) {
-    const model::ModelInstance& instance = world_.models[layout_.bodies[b].instance];
+  for (const BodyIndex b : layout_->bodies.indices()) {
+    const model::ModelInstance& instance = world_->models[layout_->bodies[b].instance];
     const bool walks = is(*instance.model, "ruedo:path") || is(*instance.model, "ruedo:crowd");
     if (instance.removed || !(walks || instance.is_robot())) continue;
-    const Vec3 way = physics_.pose(b).translation - door.X_WM.translation;
+    const Vec3 way = physics_->pose(b).translation - door.X_WM.translation;
     if (way.head<2>().norm() < door.distance_m) return true;
   }
   return false;
@@ -109,9 +110,9 @@ bool Surroundings::is_near(const Door& door) const {
 void Surroundings::guide(const std::vector<Part>& parts, const Pose& X_WM) {
   for (const Part& part : parts) {
     const Pose end = (X_WM * part.X_MB).normalized();
-    const Pose& begin = physics_.pose(part.body);
+    const Pose& begin = physics_->pose(part.body);
     const Eigen::AngleAxisd turn(end.rotation * begin.rotation.conjugate());
-    physics_.guide(
+    physics_->guide(
         part.body,
         {(end.translation - begin.translation) / step_s_, turn.axis() * (turn.angle() / step_s_)},
         end);
@@ -121,8 +122,8 @@ void Surroundings::guide(const std::vector<Part>& parts, const Pose& X_WM) {
 void Surroundings::before_step(SimTime now) {
   for (const Belt& belt : belts_) {
     for (const Part& part : belt.parts)
-      physics_.guide(part.body, {belt.velocity, Vec3::Zero()},
-                     (belt.X_WM * part.X_MB).normalized());
+      physics_->guide(part.body, {belt.velocity, Vec3::Zero()},
+                      (belt.X_WM * part.X_MB).normalized());
   }
   for (Door& door : doors_) {
     if (is_near(door)) door.wanted = now;

@@ -6,6 +6,7 @@
 
 #include "model/body_layout.h"
 #include "physics/physics_world.h"
+#include "ruedo/bound.h"
 
 namespace ruedo::robot {
 
@@ -52,10 +53,10 @@ class Surroundings {
   bool is_near(const Door& door) const;
   void guide(const std::vector<Part>& parts, const Pose& X_WM);
 
-  const model::WorldModel& world_;
-  const model::BodyLayout& layout_;
-  physics::PhysicsWorld& physics_;
-  const double step_s_;
+  Bound<const model::WorldModel> world_;
+  Bound<const model::BodyLayout> layout_;
+  Bound<physics::PhysicsWorld> physics_;
+  double step_s_;
   std::vector<Belt> belts_;
   std::vector<Door> doors_;
 };

@@ -28,7 +28,7 @@ WheelsDrive::WheelsDrive(const model::WorldModel& world, const model::BodyLayout
                          physics::PhysicsWorld& physics, RobotIndex robot)
     : Drive(world, layout, physics, robot),
       servos_(wheels_.size()),
-      max_torque_(description_.max_wheel_torque),
+      max_torque_(description_->max_wheel_torque),
       believed_(WheelKinematics::believed(description_)) {
   place_wheels(layout);
   bodies_.push_back(body_);
@@ -46,7 +46,7 @@ WheelsDrive::WheelsDrive(const model::WorldModel& world, const model::BodyLayout
 
 void WheelsDrive::place_wheels(const model::BodyLayout& layout) {
   if (model::BaseOdometry::is_for(description_))
-    base_.emplace(layout, robot_, description_, description_.track_error, 0.0);
+    base_.emplace(layout, robot_, description_, description_->track_error, 0.0);
   const Pose X_BaseW = (layout.bodies[body_].X_WB * X_BBase_).inverse();
   for (const WheelIndex index : wheels_) {
     const model::WheelPlacement& wheel = layout.wheels[index];
@@ -59,11 +59,11 @@ void WheelsDrive::place_wheels(const model::BodyLayout& layout) {
 }
 
 void WheelsDrive::set_gains(double mass) {
-  const double r = description_.wheel_radius;
+  const double r = description_->wheel_radius;
   const auto rolling = static_cast<double>(
       std::count_if(places_.begin(), places_.end(), [](const Place& at) { return !at.steers; }));
-  if (rolling > 0) max_torque_ = std::min(max_torque_, description_.max_force * r / rolling);
-  max_torque_ = std::min(max_torque_, description_.stall_torque * description_.gear);
+  if (rolling > 0) max_torque_ = std::min(max_torque_, description_->max_force * r / rolling);
+  max_torque_ = std::min(max_torque_, description_->stall_torque * description_->gear);
   for (size_t i = 0; i < servos_.size(); ++i) {
     Servo& servo = servos_[i];
     const double inertia = mass * r * r / rolling;
@@ -73,9 +73,9 @@ void WheelsDrive::set_gains(double mass) {
       continue;
     }
     servo.rate_gain =
-        description_.servo_rate_gain > 0.0 ? description_.servo_rate_gain : inertia / kRateTime_s;
-    servo.angle_gain = description_.servo_angle_gain > 0.0 ? description_.servo_angle_gain
-                                                           : servo.rate_gain / kAngleTime_s;
+        description_->servo_rate_gain > 0.0 ? description_->servo_rate_gain : inertia / kRateTime_s;
+    servo.angle_gain = description_->servo_angle_gain > 0.0 ? description_->servo_angle_gain
+                                                            : servo.rate_gain / kAngleTime_s;
   }
 }
 
@@ -84,7 +84,7 @@ SideRates WheelsDrive::mean_of_sides(const std::vector<double>& of_wheels) const
   SideRates sum{};
   for (size_t i = 0; i < of_wheels.size(); ++i)
     (places_[i].left ? sum.left : sum.right) += of_wheels[i];
-  const size_t left = description_.left_joints.size();
+  const size_t left = description_->left_joints.size();
   return {sum.left / static_cast<double>(left),
           sum.right / static_cast<double>(wheels_.size() - left)};
 }
@@ -92,19 +92,19 @@ SideRates WheelsDrive::mean_of_sides(const std::vector<double>& of_wheels) const
 void WheelsDrive::begin_at_rest() {
   last_angles_.resize(wheels_.size());
   for (size_t i = 0; i < wheels_.size(); ++i)
-    last_angles_[i] = servos_[i].angle = physics_.wheel_angle(wheels_[i]);
+    last_angles_[i] = servos_[i].angle = physics_->wheel_angle(wheels_[i]);
   way_missing_ = angle_missing_ = yaw_integral_ = 0.0;
 }
 
 void WheelsDrive::wake() {
   asleep_ = false;
   still_us_ = 0;
-  for (const BodyIndex body : bodies_) physics_.wake(body);
+  for (const BodyIndex body : bodies_) physics_->wake(body);
 }
 
 void WheelsDrive::before_step(SimTime now) {
   if (asleep_) {
-    if (physics_.sleeping(body_)) return;
+    if (physics_->sleeping(body_)) return;
     wake();
   }
   way_ = planner_.step(now, step_us_);
@@ -115,7 +115,7 @@ void WheelsDrive::before_step(SimTime now) {
 
 // rad/s, from what the gyro says; wheel commands go past it.
 double WheelsDrive::yaw_correction() {
-  const double gain = description_.yaw_gain;
+  const double gain = description_->yaw_gain;
   if (gain <= 0.0 || planner_.by_wheels()) return 0.0;
   const double error = std::clamp(angle_missing_, -kLargestYawError_rad, kLargestYawError_rad);
   yaw_integral_ += 0.25 * gain * gain * error * step_s_;  // critically damped
@@ -136,7 +136,7 @@ void WheelsDrive::turn_wheels(const Displacement& way) {
     const double rate = base_             ? rate_of(i, twist, curvature)
                         : places_[i].left ? sides.left
                                           : sides.right;
-    drive_wheel(i, std::clamp(rate, -description_.max_wheel_rate, description_.max_wheel_rate));
+    drive_wheel(i, std::clamp(rate, -description_->max_wheel_rate, description_->max_wheel_rate));
   }
 }
 
@@ -144,8 +144,8 @@ void WheelsDrive::turn_wheels(const Displacement& way) {
 double WheelsDrive::rate_of(size_t wheel, const Vec3& twist, double curvature) const {
   const Place& at = places_[wheel];
   const double radius =
-      description_.wheel_radius * (1.0 + description_.radius_error[at.left ? 0 : 1]);
-  const double lever = 1.0 + description_.track_error;
+      description_->wheel_radius * (1.0 + description_->radius_error[at.left ? 0 : 1]);
+  const double lever = 1.0 + description_->track_error;
   if (base_->rolls_sideways())
     return Vec3(at.rim.x(), at.rim.y(), at.rim.z() * lever).dot(twist) / radius;
   const double along = 1.0 - curvature * lever * at.y;
@@ -155,25 +155,25 @@ double WheelsDrive::rate_of(size_t wheel, const Vec3& twist, double curvature) c
 // Across the line to the middle of the circle.
 double WheelsDrive::steering_of(size_t wheel, double curvature) const {
   const Place& at = places_[wheel];
-  const double lever = 1.0 + description_.track_error;
+  const double lever = 1.0 + description_->track_error;
   return math::atan2(curvature * lever * at.x, 1.0 - curvature * lever * at.y);
 }
 
 void WheelsDrive::steer(size_t wheel, double angle) {
   Servo& servo = servos_[wheel];
-  const double missing = angle - physics_.wheel_angle(wheels_[wheel]);
+  const double missing = angle - physics_->wheel_angle(wheels_[wheel]);
   physics::WheelServo command;
   command.rate = std::min(servo.angle_gain / servo.rate_gain, kMostOfLag / step_s_) * missing;
   command.gain = servo.rate_gain;
   command.highest_torque = kSteeringTorque * servo.rate_gain;
   command.lowest_torque = -command.highest_torque;
-  physics_.drive_wheel(wheels_[wheel], command);
+  physics_->drive_wheel(wheels_[wheel], command);
 }
 
 void WheelsDrive::drive_wheel(size_t wheel, double rate) {
   Servo& servo = servos_[wheel];
-  const double angle = physics_.wheel_angle(wheels_[wheel]),
-               most = kLargestLag_m / description_.wheel_radius;
+  const double angle = physics_->wheel_angle(wheels_[wheel]),
+               most = kLargestLag_m / description_->wheel_radius;
   const double lag = std::clamp(servo.angle + rate * step_s_ - angle, -most, most);
   servo.angle = angle + lag;
   physics::WheelServo command;
@@ -182,9 +182,9 @@ void WheelsDrive::drive_wheel(size_t wheel, double rate) {
   // The motor's line: less torque the faster it turns, and more against its turning, up to that at
   // stall.
   const double part =
-      physics_.wheel_rate(wheels_[wheel]) * description_.gear / description_.no_load_rate;
-  const double stall = std::isfinite(description_.stall_torque)
-                           ? description_.stall_torque * description_.gear
+      physics_->wheel_rate(wheels_[wheel]) * description_->gear / description_->no_load_rate;
+  const double stall = std::isfinite(description_->stall_torque)
+                           ? description_->stall_torque * description_->gear
                            : max_torque_;
   command.highest_torque = std::isfinite(stall)
                                ? std::min(max_torque_, stall * std::clamp(1.0 - part, 0.0, 1.0))
@@ -192,14 +192,14 @@ void WheelsDrive::drive_wheel(size_t wheel, double rate) {
   command.lowest_torque = std::isfinite(stall)
                               ? -std::min(max_torque_, stall * std::clamp(1.0 + part, 0.0, 1.0))
                               : -max_torque_;
-  physics_.drive_wheel(wheels_[wheel], command);
+  physics_->drive_wheel(wheels_[wheel], command);
 }
 
 bool WheelsDrive::touches_something() {
   const Vec3 up = X_WBase_.rotation * Vec3::UnitZ();
   bool touched = false;
   for (const BodyIndex body : bodies_) {
-    for (const Contact& contact : physics_.contacts(body)) {
+    for (const Contact& contact : physics_->contacts(body)) {
       if (std::abs(contact.normal.dot(up)) >= kSupportNormal) continue;
       touched = true;
       resist(contact);
@@ -226,8 +226,9 @@ void WheelsDrive::after_step(SimTime now) {
   believed_rate_ = way / step_s_;
   PlaneMotion made{way.x(), way.z()};
   read_wheel_rates();
-  if (description_.yaw_gain > 0.0)
-    made.omega = turned * (1.0 + description_.gyro_scale_error) + description_.gyro_bias * step_s_;
+  if (description_->yaw_gain > 0.0)
+    made.omega =
+        turned * (1.0 + description_->gyro_scale_error) + description_->gyro_bias * step_s_;
   believed_heading_ = wrap_angle(believed_heading_ + made.omega);
   way_missing_ -= made.v;
   angle_missing_ -= made.omega;
@@ -248,7 +249,7 @@ void WheelsDrive::after_step(SimTime now) {
 Lag WheelsDrive::lag() const {
   const bool moving =
       std::abs(wheel_v_) > kSettled_m_s || std::abs(wheel_omega_) > kSettled_rad_s ||
-      (description_.yaw_gain > 0.0 && std::abs(twist_.angular.z()) > kSettled_rad_s);
+      (description_->yaw_gain > 0.0 && std::abs(twist_.angular.z()) > kSettled_rad_s);
   return {way_missing_, angle_missing_, moving};
 }
 
@@ -257,9 +258,9 @@ Vec3 WheelsDrive::believed_way() {
   const SideRates before = mean_of_sides(last_angles_);
   std::vector<double> ways(wheels_.size());
   for (size_t i = 0; i < wheels_.size(); ++i) {
-    const double angle = physics_.wheel_angle(wheels_[i]);
-    ways[i] = (angle - last_angles_[i]) * description_.wheel_radius *
-              (1.0 + description_.radius_error[places_[i].left ? 0 : 1]);
+    const double angle = physics_->wheel_angle(wheels_[i]);
+    ways[i] = (angle - last_angles_[i]) * description_->wheel_radius *
+              (1.0 + description_->radius_error[places_[i].left ? 0 : 1]);
     last_angles_[i] = angle;
   }
   if (base_) return base_->moved(ways, last_angles_);
@@ -275,7 +276,7 @@ void WheelsDrive::read_wheel_rates() {
     return;
   }
   std::vector<double> rates;
-  for (const WheelIndex wheel : wheels_) rates.push_back(physics_.wheel_rate(wheel));
+  for (const WheelIndex wheel : wheels_) rates.push_back(physics_->wheel_rate(wheel));
   const PlaneMotion motion = WheelKinematics::real(description_).motion(mean_of_sides(rates));
   wheel_v_ = motion.v;
   wheel_omega_ = motion.omega;
@@ -290,13 +291,13 @@ void WheelsDrive::fall_asleep_when_still() {
   twist_ = {};
   wheel_v_ = wheel_omega_ = 0.0;
   begin_at_rest();
-  for (const BodyIndex body : bodies_) physics_.sleep(body);
+  for (const BodyIndex body : bodies_) physics_->sleep(body);
 }
 
 void WheelsDrive::read_wheels(Snapshot& snapshot) const {
   for (const WheelIndex wheel : wheels_) {
-    snapshot.wheel_angles[wheel] = physics_.wheel_angle(wheel);
-    snapshot.wheel_rates[wheel] = asleep_ ? 0.0 : physics_.wheel_rate(wheel);
+    snapshot.wheel_angles[wheel] = physics_->wheel_angle(wheel);
+    snapshot.wheel_rates[wheel] = asleep_ ? 0.0 : physics_->wheel_rate(wheel);
   }
 }
 

@@ -30,8 +30,10 @@ class WheelsDrive final : public Drive {
   void after_step(SimTime now) override;
   void read_wheels(Snapshot& snapshot) const override;
   void wake() override;
+  void take(const Drive& other) override { *this = static_cast<const WheelsDrive&>(other); }
 
  private:
+  WheelsDrive& operator=(const WheelsDrive&) = default;
   void begin_at_rest() override;
   SideRates mean_of_sides(const std::vector<double>& of_wheels) const;
   double yaw_correction();

@@ -2,13 +2,14 @@
 // atmosphere (air.h). Its height above sea level is its z in the world above <reference_altitude>,
 // without one above the world's elevation. The flow about the robot does not change it.
 #include "ruedo/air_pressure_t.hpp"
+#include "ruedo/bound.h"
 #include "sensors/air.h"
 #include "sensors/mount.h"
 
 namespace ruedo {
 namespace {
 
-class AirPressure : public Sensor {
+class AirPressure : public SensorOf<AirPressure> {
  public:
   explicit AirPressure(const SensorSetup& setup)
       : environment_(setup.world.environment),
@@ -18,7 +19,7 @@ class AirPressure : public Sensor {
     setup.element.refuse_unknown({"ruedo:phase"});
     name_what_does_not_act(setup, setup.element.child("air_pressure"),
                            {"reference_altitude", "pressure"});
-    origin_m_ = setup.element.number("air_pressure/reference_altitude", environment_.elevation,
+    origin_m_ = setup.element.number("air_pressure/reference_altitude", environment_->elevation,
                                      Allowed::any(quantity::kLength));
   }
 
@@ -34,7 +35,7 @@ class AirPressure : public Sensor {
   void shift_time(SimTime us) override { noises_.shift_time(us); }
 
  private:
-  const model::Environment& environment_;
+  Bound<const model::Environment> environment_;
   Mount mount_;
   Noises<1> noises_;
   double origin_m_ = 0.0;  // above sea level, of the world's z = 0

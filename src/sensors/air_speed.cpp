@@ -3,6 +3,7 @@
 // of the standard atmosphere at its height (air.h). The air moves with the
 // world's wind (robot/wind.h), the same everywhere.
 #include <cmath>
+#include "ruedo/bound.h"
 
 #include "ruedo/air_speed_t.hpp"
 #include "sensors/air.h"
@@ -18,7 +19,7 @@ std::array<std::string, 1> noise_path(const SensorSetup& setup) {
   return {older ? "air_speed/airspeed/noise" : "air_speed/pressure/noise"};
 }
 
-class AirSpeed : public Sensor {
+class AirSpeed : public SensorOf<AirSpeed> {
  public:
   explicit AirSpeed(const SensorSetup& setup)
       : environment_(setup.world.environment),
@@ -31,7 +32,7 @@ class AirSpeed : public Sensor {
 
   void sample(const SampleInput& input, Outbox& out) override {
     const Pose X_WS = mount_.pose(input.snapshot);
-    const Air air = air_at(environment_, environment_.elevation + X_WS.translation.z());
+    const Air air = air_at(environment_, environment_->elevation + X_WS.translation.z());
     const Vec3 ahead = X_WS.rotation * Vec3::UnitX();
     const double v = (mount_.twist(input.snapshot).linear - input.snapshot.wind).dot(ahead);
     air_speed_t message;
@@ -45,7 +46,7 @@ class AirSpeed : public Sensor {
   void shift_time(SimTime us) override { noises_.shift_time(us); }
 
  private:
-  const model::Environment& environment_;
+  Bound<const model::Environment> environment_;
   Mount mount_;
   Noises<1> noises_;
   int channel_;

@@ -5,7 +5,7 @@
 namespace ruedo {
 namespace {
 
-class Altimeter : public Sensor {
+class Altimeter : public SensorOf<Altimeter> {
  public:
   explicit Altimeter(const SensorSetup& setup)
       : mount_(setup),

@@ -14,7 +14,7 @@ std::array<std::string, 6> noise_paths() {
   return {velocity, velocity, velocity, turn_rate, turn_rate, turn_rate};
 }
 
-class BodyPose : public Sensor {
+class BodyPose : public SensorOf<BodyPose> {
  public:
   explicit BodyPose(const SensorSetup& setup)
       : mount_(setup), noises_(setup, noise_paths()), channel_(setup.channel<pose_t>()) {

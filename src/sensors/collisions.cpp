@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "model/body_layout.h"
+#include "ruedo/bound.h"
 #include "ruedo/collisions_t.hpp"
 #include "ruedo/sensor.h"
 #include "sensors/contact_points.h"
@@ -12,7 +13,7 @@
 namespace ruedo {
 namespace {
 
-class Collisions : public Sensor {
+class Collisions : public SensorOf<Collisions> {
  public:
   explicit Collisions(const SensorSetup& setup)
       : world_(setup.world),
@@ -97,8 +98,8 @@ class Collisions : public Sensor {
     out.publish(channel_, message_);
   }
 
-  const model::WorldModel& world_;
-  const model::BodyLayout& layout_;
+  Bound<const model::WorldModel> world_;
+  Bound<const model::BodyLayout> layout_;
   RobotIndex robot_;
   int channel_;
   LinkIndex blocked_by_;

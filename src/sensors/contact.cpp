@@ -4,6 +4,7 @@
 #include <algorithm>
 
 #include "model/body_layout.h"
+#include "ruedo/bound.h"
 #include "ruedo/contact_t.hpp"
 #include "ruedo/sensor.h"
 #include "sensors/contact_points.h"
@@ -17,7 +18,7 @@ std::string without_scope(const std::string& name) {
   return colons == std::string::npos ? name : name.substr(colons + 2);
 }
 
-class ContactSensor : public Sensor {
+class ContactSensor : public SensorOf<ContactSensor> {
  public:
   explicit ContactSensor(const SensorSetup& setup)
       : world_(setup.world),
@@ -27,9 +28,9 @@ class ContactSensor : public Sensor {
     setup.element.refuse_unknown({"ruedo:phase"});  // the server reads it
     const Element* contact = setup.element.child("contact");
     if (!contact) return;
-    const model::LinkPlacement& placement = layout_.links[link_];
+    const model::LinkPlacement& placement = layout_->links[link_];
     const std::vector<model::Collision>& shapes =
-        world_.models[placement.instance].model->links[placement.link].collisions;
+        world_->models[placement.instance].model->links[placement.link].collisions;
     for (const Element* named : contact->all("collision")) {
       const std::string name = without_scope(named->text);
       const auto found =
@@ -81,8 +82,8 @@ class ContactSensor : public Sensor {
     return contact.link_b == link_ && counts(contact.shape_b);
   }
 
-  const model::WorldModel& world_;
-  const model::BodyLayout& layout_;
+  Bound<const model::WorldModel> world_;
+  Bound<const model::BodyLayout> layout_;
   LinkIndex link_;
   int channel_;
   std::vector<int> shapes_;  // indices into the link's collisions; empty: all

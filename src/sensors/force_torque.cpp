@@ -8,6 +8,7 @@
 // child that tells no force - the world, a path, the kinematic drive - the parent's side is weighed
 // instead; where that is held as well, or the joint is part of a loop, there is no value.
 #include <algorithm>
+#include "ruedo/bound.h"
 
 #include "model/body_layout.h"
 #include "ruedo/force_torque_t.hpp"
@@ -47,7 +48,7 @@ Side side(const model::Model& model, ModelLinkIndex link, ModelJointIndex cut) {
   return in;
 }
 
-class ForceTorque : public Sensor {
+class ForceTorque : public SensorOf<ForceTorque> {
  public:
   explicit ForceTorque(const SensorSetup& setup)
       : layout_(setup.layout),
@@ -60,7 +61,7 @@ class ForceTorque : public Sensor {
     frame_ = setup.element.choice("force_torque/frame", "child", {"child", "parent", "sensor"});
     by_parent_ = setup.element.choice("force_torque/measure_direction", "child_to_parent",
                                       {"child_to_parent", "parent_to_child"}) == "parent_to_child";
-    instance_ = layout_.links[setup.link].instance;
+    instance_ = layout_->links[setup.link].instance;
     model_ = setup.world.models[instance_].model.get();
     find_joint(setup);
     choose_side(setup);
@@ -116,7 +117,7 @@ class ForceTorque : public Sensor {
       if (sensor.name == setup.device) joint_ = sensor.joint;
     }
     if (!joint_.valid()) {  // on a link: in the joint that carries the link
-      const ModelLinkIndex link = layout_.links[setup.link].link;
+      const ModelLinkIndex link = layout_->links[setup.link].link;
       const auto carries = std::find_if(model_->joints.begin(), model_->joints.end(),
                                         [&](const Joint& joint) { return joint.child == link; });
       if (carries != model_->joints.end())
@@ -136,7 +137,7 @@ class ForceTorque : public Sensor {
     const DriveDescription* drive = driven ? &*model_->drive : nullptr;
     const bool wheelless = drive && drive->left_joints.empty() && drive->right_joints.empty();
     for (const ModelLinkIndex i : in.indices()) {
-      const model::LinkPlacement& link = layout_.links[layout_.link_of(instance_, i)];
+      const model::LinkPlacement& link = layout_->links[layout_->link_of(instance_, i)];
       if (!in[i]) continue;
       if (model_->is_static || model_->links[i].kinematic) return true;
       if (driven && (link.wheel.valid() || (wheelless && i == 0))) return true;
@@ -146,8 +147,8 @@ class ForceTorque : public Sensor {
 
   void choose_side(const SensorSetup& setup) {
     const Joint& joint = model_->joints[joint_];
-    child_ = layout_.link_of(instance_, joint.child);
-    if (joint.parent.valid()) parent_ = layout_.link_of(instance_, joint.parent);
+    child_ = layout_->link_of(instance_, joint.child);
+    if (joint.parent.valid()) parent_ = layout_->link_of(instance_, joint.parent);
     const Pose& X_MC = model_->links[joint.child].X_ML;
     p_CJ_ = (X_MC.inverse() * joint.X_MJ).translation;
     X_CS_ = setup.X_LS;
@@ -171,17 +172,17 @@ class ForceTorque : public Sensor {
     weighs_child_ = child;
     for (const ModelLinkIndex i : in.indices()) {
       if (!in[i]) continue;
-      weighed_.push_back(layout_.link_of(instance_, i));
-      const BodyIndex body = layout_.links[weighed_.back()].body;
+      weighed_.push_back(layout_->link_of(instance_, i));
+      const BodyIndex body = layout_->links[weighed_.back()].body;
       if (body.valid() && std::find(bodies_.begin(), bodies_.end(), body) == bodies_.end())
         bodies_.push_back(body);
     }
   }
 
   Pose link_pose(const Snapshot& now, LinkIndex link) const {
-    const model::LinkPlacement& placement = layout_.links[link];
+    const model::LinkPlacement& placement = layout_->links[link];
     if (!placement.body.valid()) return placement.X_BL;
-    return now.bodies[placement.body] * layout_.link_in_body(link, now.wheel_angles);
+    return now.bodies[placement.body] * layout_->link_in_body(link, now.wheel_angles);
   }
 
   Quat axes(const Snapshot& now, const Pose& X_WC) const {
@@ -193,7 +194,7 @@ class ForceTorque : public Sensor {
   // Adds what moves a link as it moves, against gravity.
   void weigh(const Snapshot& now, LinkIndex link, const Vec3& p_WJ, Vec3& force,
              Vec3& torque) const {
-    const model::LinkPlacement& placement = layout_.links[link];
+    const model::LinkPlacement& placement = layout_->links[link];
     const model::Link& described = model_->links[placement.link];
     const Pose X_WI = link_pose(now, link) * described.inertial.X_LI;
     Vec3 a = Vec3::Zero(), omega = Vec3::Zero(), alpha = Vec3::Zero();
@@ -223,7 +224,7 @@ class ForceTorque : public Sensor {
     }
   }
 
-  const model::BodyLayout& layout_;
+  Bound<const model::BodyLayout> layout_;
   const model::Model* model_ = nullptr;
   Vec3 gravity_;
   Noises<6> noises_;

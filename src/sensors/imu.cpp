@@ -14,7 +14,7 @@
 namespace ruedo {
 namespace {
 
-class Imu : public Sensor {
+class Imu : public SensorOf<Imu> {
  public:
   explicit Imu(const SensorSetup& setup)
       : random_(setup.random), gravity_(setup.world.gravity), channel_(setup.channel<imu_t>()) {

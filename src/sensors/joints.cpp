@@ -7,7 +7,7 @@
 namespace ruedo {
 namespace {
 
-class Joints : public Sensor {
+class Joints : public SensorOf<Joints> {
  public:
   explicit Joints(const SensorSetup& setup) : channel_(setup.channel<joint_state_t>()) {
     const model::RobotPlacement& robot = setup.layout.robots[setup.robot_index];

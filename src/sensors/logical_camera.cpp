@@ -2,6 +2,7 @@
 // them; the camera's own model is not among them. The frustum has <horizontal_fov> and <near> and
 // <far> along x, and its height is its width divided by <aspect_ratio>.
 #include "model/body_layout.h"
+#include "ruedo/bound.h"
 #include "ruedo/device_info_t.hpp"
 #include "ruedo/logical_camera_t.hpp"
 #include "ruedo/math.h"
@@ -11,7 +12,7 @@
 namespace ruedo {
 namespace {
 
-class LogicalCamera : public Sensor {
+class LogicalCamera : public SensorOf<LogicalCamera> {
  public:
   explicit LogicalCamera(const SensorSetup& setup)
       : world_(setup.world),
@@ -39,8 +40,8 @@ class LogicalCamera : public Sensor {
     const Pose X_SW = mount_.pose(now).inverse();
     message_.utime = now.time;
     message_.objects.clear();
-    for (const InstanceIndex i : world_.models.indices()) {
-      const model::ModelInstance& instance = world_.models[i];
+    for (const InstanceIndex i : world_->models.indices()) {
+      const model::ModelInstance& instance = world_->models[i];
       if (instance.removed || i == own_) continue;
       const Pose X_SM = X_SW * model_pose(world_, layout_, i, now);
       if (!sees(X_SM.translation)) continue;
@@ -63,8 +64,8 @@ class LogicalCamera : public Sensor {
            std::abs(p.z()) <= half_height_ * p.x();
   }
 
-  const model::WorldModel& world_;
-  const model::BodyLayout& layout_;
+  Bound<const model::WorldModel> world_;
+  Bound<const model::BodyLayout> layout_;
   InstanceIndex own_;
   Mount mount_;
   int channel_;

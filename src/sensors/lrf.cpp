@@ -71,7 +71,7 @@ struct Sweep {
   double angle(int64_t i) const { return first + static_cast<double>(i) * step; }
 };
 
-class Lrf : public Sensor {
+class Lrf : public SensorOf<Lrf> {
  public:
   explicit Lrf(const SensorSetup& setup) : mount_(setup), random_(setup.random) {
     const Element& e = setup.element;

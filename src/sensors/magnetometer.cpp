@@ -21,7 +21,7 @@ std::array<std::string, 3> noise_paths() {
   return {"magnetometer/x/noise", "magnetometer/y/noise", "magnetometer/z/noise"};
 }
 
-class Magnetometer : public Sensor {
+class Magnetometer : public SensorOf<Magnetometer> {
  public:
   explicit Magnetometer(const SensorSetup& setup)
       : environment_(setup.world.environment),

@@ -10,7 +10,7 @@
 namespace ruedo {
 namespace {
 
-class MotionStatus : public Sensor {
+class MotionStatus : public SensorOf<MotionStatus> {
  public:
   explicit MotionStatus(const SensorSetup& setup)
       : robot_(setup.robot_index), channel_(setup.channel<motion_status_t>()) {}

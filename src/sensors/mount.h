@@ -4,6 +4,7 @@
 #include <array>
 #include <string>
 
+#include "ruedo/bound.h"
 #include "ruedo/sensor.h"
 #include "sensors/noise.h"
 
@@ -20,7 +21,7 @@ class Mount {
   Twist twist(const Snapshot& now) const;   // of S's origin, in the world's axes
 
  private:
-  const model::BodyLayout& layout_;
+  Bound<const model::BodyLayout> layout_;
   LinkIndex link_;
   BodyIndex body_;
   Pose X_LS_;

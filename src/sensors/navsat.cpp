@@ -54,7 +54,7 @@ model::Environment place_of(const SensorSetup& setup) {
   return place;
 }
 
-class NavSat : public Sensor {
+class NavSat : public SensorOf<NavSat> {
  public:
   explicit NavSat(const SensorSetup& setup)
       : mount_(setup),

@@ -73,7 +73,7 @@ double sinc(double x) {
   return x2 < 1e-4 ? 1.0 - x2 / 6.0 * (1.0 - x2 / 20.0) : math::sin(x) / x;
 }
 
-class Odometry : public Sensor {
+class Odometry : public SensorOf<Odometry> {
  public:
   explicit Odometry(const SensorSetup& setup)
       : configuration_(setup.element),

@@ -6,6 +6,7 @@
 #include <algorithm>
 
 #include "model/body_layout.h"
+#include "ruedo/bound.h"
 #include "ruedo/logical_camera_t.hpp"
 #include "ruedo/sensor.h"
 #include "sensors/placed_models.h"
@@ -13,7 +14,7 @@
 namespace ruedo {
 namespace {
 
-class PerformerDetector : public Sensor {
+class PerformerDetector : public SensorOf<PerformerDetector> {
  public:
   explicit PerformerDetector(const SensorSetup& setup)
       : world_(setup.world),
@@ -58,14 +59,14 @@ class PerformerDetector : public Sensor {
   }
 
   bool is(const Performer& performer, InstanceIndex instance) const {
-    return world_.models.has(instance) && !world_.models[instance].removed &&
-           world_.models[instance].name == performer.model;
+    return world_->models.has(instance) && !world_->models[instance].removed &&
+           world_->models[instance].name == performer.model;
   }
 
   void find(Performer& performer) const {
     if (is(performer, performer.instance)) return;
     performer.instance = {};
-    for (const InstanceIndex i : world_.models.indices()) {
+    for (const InstanceIndex i : world_->models.indices()) {
       if (is(performer, i)) performer.instance = i;
     }
   }
@@ -101,8 +102,8 @@ class PerformerDetector : public Sensor {
     out.publish(channel_, message_);
   }
 
-  const model::WorldModel& world_;
-  const model::BodyLayout& layout_;
+  Bound<const model::WorldModel> world_;
+  Bound<const model::BodyLayout> layout_;
   InstanceIndex own_;
   int channel_;
   Vec3 half_, offset_M_ = Vec3::Zero();

@@ -7,7 +7,7 @@
 namespace ruedo {
 namespace {
 
-class TruePose : public Sensor {
+class TruePose : public SensorOf<TruePose> {
  public:
   explicit TruePose(const SensorSetup& setup)
       : robot_(setup.robot_index), channel_(setup.channel<pose_t>()) {}

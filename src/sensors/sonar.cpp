@@ -75,7 +75,7 @@ int64_t rays_for(double horizontal_rad, double vertical_rad) {
                                  std::max(vertical_rad, kApart_rad) / (kApart_rad * kApart_rad)));
 }
 
-class Sonar : public Sensor {
+class Sonar : public SensorOf<Sonar> {
  public:
   explicit Sonar(const SensorSetup& setup)
       : mount_(setup), random_(setup.random), channel_(setup.channel<sonar_t>()) {

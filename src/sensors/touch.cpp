@@ -9,6 +9,7 @@
 
 #include "core/whole.h"
 #include "model/body_layout.h"
+#include "ruedo/bound.h"
 #include "ruedo/contact_t.hpp"
 #include "ruedo/sensor.h"
 #include "sensors/contact_points.h"
@@ -20,7 +21,7 @@ bool ends_with(const std::string& text, const std::string& end) {
   return text == end || text.ends_with("::" + end);
 }
 
-class Touch : public Sensor {
+class Touch : public SensorOf<Touch> {
  public:
   explicit Touch(const SensorSetup& setup)
       : world_(setup.world),
@@ -60,7 +61,7 @@ class Touch : public Sensor {
   }
 
  private:
-  const model::Model& model() const { return *world_.models[own_].model; }
+  const model::Model& model() const { return *world_->models[own_].model; }
 
   void find_shapes(const SensorSetup& setup) {
     const std::vector<const Element*> named = setup.element.all("ruedo:collision");
@@ -73,7 +74,7 @@ class Touch : public Sensor {
                           : std::any_of(named.begin(), named.end(), [&](const Element* each) {
                               return ends_with(name, each->text) || ends_with(each->text, name);
                             });
-        if (chosen) shapes_.emplace_back(layout_.link_of(own_, link), static_cast<int>(i));
+        if (chosen) shapes_.emplace_back(layout_->link_of(own_, link), static_cast<int>(i));
       }
     }
     if (!shapes_.empty() || !setup.findings) return;
@@ -97,7 +98,7 @@ class Touch : public Sensor {
   }
 
   bool feels(LinkIndex link, int shape) const {
-    if (layout_.links[link].instance != own_) return false;
+    if (layout_->links[link].instance != own_) return false;
     return shapes_.empty() || std::any_of(shapes_.begin(), shapes_.end(), [&](const auto& each) {
              return each.first == link && (shape < 0 || each.second == shape);
            });
@@ -105,8 +106,8 @@ class Touch : public Sensor {
 
   // In both ways in which Gazebo writes it: model/M/link/L/collision/C, and M::L::C.
   bool is_target(LinkIndex index, int shape) const {
-    const model::LinkPlacement& placed = layout_.links[index];
-    const model::ModelInstance& instance = world_.models[placed.instance];
+    const model::LinkPlacement& placed = layout_->links[index];
+    const model::ModelInstance& instance = world_->models[placed.instance];
     const model::Link& link = instance.model->links[placed.link];
     std::string path, classic;
     for (std::string rest = instance.name + "." + link.name; !rest.empty();) {
@@ -147,8 +148,8 @@ class Touch : public Sensor {
     out.publish(channel_, message_);
   }
 
-  const model::WorldModel& world_;
-  const model::BodyLayout& layout_;
+  Bound<const model::WorldModel> world_;
+  Bound<const model::BodyLayout> layout_;
   InstanceIndex own_;
   int channel_;
   std::string target_;

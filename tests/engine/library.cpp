@@ -66,6 +66,20 @@ void look(const std::string& world) {
   expect(engine.time(0) == 1.0 && engine.current_step(1) == 200, "a second");
   expect(position.begin<double>(0)[0] > 0.05, "copy 0 has moved");
   expect(position.begin<double>(1)[0] == 0.0, "copy 1 has not");
+  const ruedo::SavedWorld saved = engine.save(0);
+  expect(saved.world() == 0 && saved.step() == 200, "what was saved");
+  engine.step(100);
+  const uint64_t after = engine.state_hash(0);
+  engine.restore(saved);
+  engine.restore(saved, {1});
+  expect(engine.current_step(1) == 200, "restored");
+  engine.step(100);
+  expect(engine.state_hash(0) == after && engine.state_hash(1) == after, "what followed follows");
+  expect_error<std::out_of_range>([&] { (void)engine.save(2); }, "there are 2");
+  expect_error<std::out_of_range>([&] { engine.restore(saved, {2}); }, "there are 2");
+  expect_error<ruedo::InputError>([&] { engine.restore(ruedo::SavedWorld()); }, "never saved");
+  ruedo::Engine other(world, options);
+  expect_error<ruedo::InputError>([&] { other.restore(saved); }, "another engine");
   engine.reset();
   expect(engine.state_hash(0) == first && position.begin<double>(0)[0] == 0.0, "a fresh run");
 }

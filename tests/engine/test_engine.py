@@ -402,6 +402,19 @@ def test_a_picture_that_is_read_late_is_the_one_that_was_due():
         assert (late["eye.utime"][:, 0] == [450_000, 0]).all()
 
 
+@pytest.mark.parametrize("fault", ["r0/scan:lag@0,value=0.05", "r0/eye:freeze@0.1"])
+def test_pictures_and_faults(fault):
+    """A camera that nobody reads has no renderer while others are faulty; one that is faulty
+    itself gives what it gives to who reads it from the beginning.
+    """
+    with with_camera(fault=[fault]) as early, with_camera(fault=[fault]) as late:
+        seen = early["eye.data"]
+        for e in (early, late):
+            e.step([0.3, 0.1], 64)
+        assert (late["eye.data"] == seen).all()
+        assert late["eye.utime"] == early["eye.utime"]
+
+
 def test_pictures_are_drawn_for_those_who_read_them(monkeypatch):
     """Without a renderer all goes well until a picture is read."""
     monkeypatch.setenv("RUEDO_RENDERER", "none")

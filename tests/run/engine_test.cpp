@@ -159,6 +159,52 @@ TEST(Engine, ACopyThatIsResetIsAFreshOne) {
   EXPECT_TRUE(by_engine(used, after, 200) == by_engine(fresh, after, 200));
 }
 
+// The bytes of other worlds and devices are tests/engine/test_snapshots.py's.
+TEST(Engine, ASavedWorldGoesOnAsItWentOn) {
+  for (unsigned seed = 1; seed < 5; ++seed) {
+    std::mt19937 random(seed);
+    const auto world = load_text(random_models(random, 2));
+    engine::EngineOptions options;
+    options.worlds = 2;
+    Engine engine(world, options);
+    by_engine(engine, random_commands(random, 2, 300), 300);
+    const auto saved = engine.save(1);
+    const int64_t step = engine.current_step(1);
+    const auto go_on = [&](int copy) {
+      std::vector<uint64_t> hashes;
+      const double ahead[] = {0.3, 0, 0.4, -0.2, 0, 1, 0.3, 0, 0.4, -0.2, 0, 1};
+      for (int i = 0; i < 20; ++i) {
+        engine.drive(ahead);
+        engine.step(10);
+        hashes.push_back(engine.state_hash(copy));
+      }
+      return hashes;
+    };
+    const std::vector<uint64_t> went = go_on(1);
+    const int both[] = {0, 1};
+    engine.restore(*saved, both);
+    EXPECT_EQ(engine.current_step(0), step);
+    EXPECT_EQ(go_on(0), went);
+    engine.restore(*saved, both);
+    EXPECT_EQ(go_on(1), went);
+  }
+}
+
+// Of sensors that do not say how: Noise of test_determinism.cpp.
+TEST(Engine, ASensorThatCannotBeCopiedIsNamed) {
+  Engine engine(load_text(robot_sdf("a", 0, 0, "<sensor name='S' type='test_noise'/>")), {});
+  engine.step(10);
+  const uint64_t before = engine.state_hash(0);
+  try {
+    engine.save(0);
+    FAIL() << "it was saved";
+  } catch (const InputError& error) {
+    EXPECT_THAT(error.what(), testing::HasSubstr("the device 'a/S' is a plugin's that cannot be "
+                                                 "copied: it lacks Sensor::take()"));
+  }
+  EXPECT_EQ(engine.state_hash(0), before);
+}
+
 double value_of(const engine::FieldArray& array, size_t index) {
   double value;
   std::memcpy(&value, array.values.data() + index * sizeof value, sizeof value);

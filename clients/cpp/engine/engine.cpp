@@ -157,6 +157,24 @@ void Engine::reset() {
   for (int i = 0; i < worlds(); ++i) impl_->copies.reset(i, impl_->seeds[static_cast<size_t>(i)]);
 }
 
+SavedWorld Engine::save(int world) {
+  impl_->check(world);
+  SavedWorld made;
+  made.saved_ = impl_->copies.save(world);
+  made.world_ = world;
+  made.step_ = impl_->copies.current_step(world);
+  made.seed_ = impl_->seeds[static_cast<size_t>(world)];
+  return made;
+}
+
+void Engine::restore(const SavedWorld& saved, const std::vector<int>& worlds) {
+  const std::vector<int> which = worlds.empty() ? std::vector{saved.world_} : worlds;
+  for (const int world : which) impl_->check(world);
+  if (!saved.saved_) throw InputError({}, "that world was never saved");
+  impl_->copies.restore(*saved.saved_, which);
+  for (const int world : which) impl_->seeds[static_cast<size_t>(world)] = saved.seed_;
+}
+
 int64_t Engine::current_step(int world) const {
   impl_->check(world);
   return impl_->copies.current_step(world);

@@ -1,5 +1,6 @@
 // The module ruedo._engine: the engine in the process of a Python program. ruedo/engine.py is what
 // people call.
+#include <algorithm>
 #include <memory>
 #include <optional>
 #include <stdexcept>
@@ -31,6 +32,7 @@ namespace nb = nanobind;
 using ruedo::Primitive;
 using ruedo::engine::Engine;
 using ruedo::engine::FieldArray;
+using ruedo::engine::SavedWorld;
 
 namespace {
 
@@ -64,6 +66,10 @@ struct Recorded {
   int64_t step;
   std::string channel;
   std::string bytes;
+};
+
+struct Saved {
+  std::shared_ptr<const SavedWorld> world;
 };
 
 class PyEngine {
@@ -153,6 +159,21 @@ class PyEngine {
     for (size_t i = 0; i < worlds.size(); ++i)
       resets.push_back({worlds[i], seeds[i], texts.empty() ? nullptr : read(texts[i])});
     engine.reset(resets);
+  }
+
+  std::shared_ptr<const SavedWorld> save(int world) {
+    Engine& engine = this->engine();
+    const AtWork at_work(*this);
+    return engine.save(world);
+  }
+
+  void restore(const Saved& saved, const std::vector<int>& worlds) {
+    Engine& engine = this->engine();
+    if (run_ && std::find(worlds.begin(), worlds.end(), 0) != worlds.end())
+      throw ruedo::InputError({}, "a run that is judged goes ahead alone: end_run() comes first");
+    recorded_.clear();
+    const AtWork at_work(*this);
+    engine.restore(*saved.world, worlds);
   }
 
   std::vector<std::pair<std::string, double>> drawn(int world) const {
@@ -300,6 +321,7 @@ NB_MODULE(_engine, module) {
   module.def("sin", &ruedo::math::sin);
   module.def("cos", &ruedo::math::cos);
   add_arrivals(module);
+  nb::class_<Saved>(module, "Saved");
   nb::class_<PyEngine>(module, "Engine")
       .def(nb::init<const std::string&, const std::optional<std::string>&, int, uint64_t, bool, int,
                     const std::vector<std::string>&, const std::vector<std::string>&,
@@ -318,6 +340,8 @@ NB_MODULE(_engine, module) {
       .def("command", &PyEngine::command)
       .def("reset", &PyEngine::reset, nb::arg("worlds"), nb::arg("seeds"),
            nb::arg("texts") = nb::list())
+      .def("save", [](PyEngine& self, int world) { return Saved{self.save(world)}; })
+      .def("restore", &PyEngine::restore)
       .def("drawn", &PyEngine::drawn)
       .def("observe", &PyEngine::observe)
       .def("begin_run", &PyEngine::begin_run, nb::arg("seed"), nb::kw_only(), nb::arg("goals"),

@@ -81,19 +81,19 @@ from .world_info import Body
 
 
 def __getattr__(name: str) -> object:
-    """``ruedo.Engine``, which needs the compiled part of the package: loaded when it is first asked
-    for.
+    """``ruedo.Engine`` and what it saves, which need the compiled part of the package: loaded when
+    it is first asked for.
     """
-    if name != "Engine":
+    if name not in ("Engine", "SavedWorld"):
         raise AttributeError(f"module 'ruedo' has no attribute {name!r}")
     try:
-        from .engine import Engine
+        from . import engine
     except ImportError as error:
         raise ImportError(
-            "ruedo.Engine is not in this installation of the client: it comes with Ruedo's wheel, for Python 3.11 "
+            f"ruedo.{name} is not in this installation of the client: it comes with Ruedo's wheel, for Python 3.11 "
             f"and newer, and with a build of Ruedo, for the Python that built it ({error})"
         ) from error
-    return Engine
+    return getattr(engine, name)
 
 
 __all__ = [

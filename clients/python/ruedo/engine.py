@@ -22,9 +22,28 @@ from numpy.typing import ArrayLike, NDArray
 from . import _engine
 from .arguments import MOST_SEED, MOST_WHOLE, named, switch, texts, whole
 
-__all__ = ["Engine"]
+__all__ = ["Engine", "SavedWorld"]
 
 MOST_WORLDS = 2**31 - 1
+
+
+class SavedWorld:
+    """A copy of an :class:`Engine`'s world as it was; it does not change.
+
+    world: the copy that it was. seed: that it had. steps: the number of the state. time: s.
+    """
+
+    __slots__ = ("_saved_core", "seed", "steps", "time", "world")
+
+    def __init__(self, core: Any, world: int, seed: int, steps: int, time: float) -> None:
+        self._saved_core = core
+        self.world = world
+        self.seed = seed
+        self.steps = steps
+        self.time = time
+
+    def __repr__(self) -> str:
+        return f"<ruedo.SavedWorld: world {self.world} at {self.time:g} s>"
 
 
 class Engine:
@@ -295,6 +314,34 @@ class Engine:
         self._core.reset(indices, seeds, worlds_of)
         for index, one in zip(indices, seeds):
             self._seeds[index] = one
+
+    def save(self, world: int = 0) -> SavedWorld:
+        """A copy as it stands, with all that decides what follows: bodies, contacts, drives,
+        sensors, people, faults, random numbers, and what was commanded already.
+
+        It costs about as much as a reset, however long the copy has run.
+        """
+        index = self._checked(world)
+        saved = self._core.save(index)
+        return SavedWorld(saved, index, self._seeds[index], self.steps(index), self.time(index))
+
+    def restore(
+        self,
+        saved: SavedWorld,
+        worlds: int | Sequence[int] | NDArray[Any] | None = None,
+    ) -> None:
+        """Makes copies what :meth:`save` gave: for the same commands, what follows is what followed
+        there, byte for byte, and arrays show what they showed then.
+
+        worlds: an index, several, a mask, or None for the one that was saved. From then on they
+        have its seed, too.
+        """
+        if not isinstance(saved, SavedWorld):
+            raise TypeError(f"restore() takes what save() gave, not {saved!r}")
+        indices = [saved.world] if worlds is None else self._indices(worlds)
+        self._core.restore(saved._saved_core, indices)
+        for index in indices:
+            self._seeds[index] = saved.seed
 
     def drawn(self, world: int = 0) -> dict[str, float]:
         """What was drawn for a copy, by target, from ``randomize`` and its seed.

@@ -1,0 +1,144 @@
+// A pair has an algorithm; that of compounds has one for each two children that are near each
+// other; and each of these has a manifold of up to four points, with the impulses that the solver
+// starts from. Of all of it only the points are more than a choice by the shapes: the algorithms
+// are made as Bullet makes them, and the points copied.
+#include "physics/contact_copies.h"
+
+#include <stdexcept>
+#include <string>
+
+#include <BulletCollision/CollisionDispatch/btCollisionObjectWrapper.h>
+#include <BulletCollision/CollisionDispatch/btCompoundCompoundCollisionAlgorithm.h>
+
+namespace ruedo::physics {
+
+namespace {
+
+using Wrapper = btCollisionObjectWrapper;
+
+// Where Bullet keeps the algorithms of children, which it shows to nobody. The arguments of an
+// explicit instantiation may name private members.
+template <auto member>
+struct Opened {
+  friend btHashedSimplePairCache& children_of(btCompoundCompoundCollisionAlgorithm& compounds) {
+    return *(compounds.*member);
+  }
+};
+btHashedSimplePairCache& children_of(btCompoundCompoundCollisionAlgorithm& compounds);
+template struct Opened<&btCompoundCompoundCollisionAlgorithm::m_childCollisionAlgorithmCache>;
+
+struct OpenCompound : btCompoundCollisionAlgorithm {
+  static btAlignedObjectArray<btCollisionAlgorithm*>& children(
+      btCompoundCollisionAlgorithm& compound) {
+    return compound.*&OpenCompound::m_childCollisionAlgorithms;
+  }
+  static bool swapped(const btCompoundCollisionAlgorithm& compound) {
+    return compound.*&OpenCompound::m_isSwapped;
+  }
+};
+
+[[noreturn]] void refuse(const char* what) {
+  throw std::logic_error(std::string("contacts cannot be copied: ") + what);
+}
+
+Wrapper whole(btCollisionObject& object) {
+  return {nullptr, object.getCollisionShape(), &object, object.getWorldTransform(), -1, -1};
+}
+
+class Copier {
+ public:
+  Copier(btDispatcher& dispatcher, const btDispatcherInfo& info)
+      : dispatcher_(dispatcher), info_(info) {}
+
+  btCollisionAlgorithm* made(const Wrapper& a, const Wrapper& b) {
+    return dispatcher_.findAlgorithm(&a, &b, nullptr, BT_CONTACT_POINT_ALGORITHMS);
+  }
+
+  void copy_compounds(btCompoundCompoundCollisionAlgorithm& from,
+                      btCompoundCompoundCollisionAlgorithm& to, const Wrapper& a,
+                      const Wrapper& b) {
+    const btSimplePairArray& children = children_of(from).getOverlappingPairArray();
+    for (int i = 0; i < children.size(); ++i) {
+      const btSimplePair& child = children[i];
+      on_child(a, child.m_indexA, [&](const Wrapper& child_a) {
+        on_child(b, child.m_indexB, [&](const Wrapper& child_b) {
+          btCollisionAlgorithm* algorithm = made(child_a, child_b);
+          children_of(to).addOverlappingPair(child.m_indexA, child.m_indexB)->m_userPointer =
+              algorithm;
+          copy_points(*static_cast<btCollisionAlgorithm*>(child.m_userPointer), *algorithm, child_a,
+                      child_b);
+        });
+      });
+    }
+  }
+
+  void copy_compound(btCompoundCollisionAlgorithm& from, btCompoundCollisionAlgorithm& to,
+                     const Wrapper& a, const Wrapper& b) {
+    const bool swapped = OpenCompound::swapped(from);
+    const Wrapper &compound = swapped ? b : a, &other = swapped ? a : b;
+    auto &here = OpenCompound::children(from), &there = OpenCompound::children(to);
+    for (int i = 0; i < here.size(); ++i) {
+      if (!here[i]) continue;
+      on_child(compound, i, [&](const Wrapper& child) {
+        if (!there[i]) there[i] = made(child, other);
+        copy_points(*here[i], *there[i], child, other);
+      });
+    }
+  }
+
+  // Of two shapes that are not compounds.
+  void copy_points(btCollisionAlgorithm& from, btCollisionAlgorithm& to, const Wrapper& a,
+                   const Wrapper& b) {
+    here_.resizeNoInitialize(0);
+    from.getAllContactManifolds(here_);
+    if (here_.size() == 0) return;
+    if (here_.size() > 1) refuse("two shapes with several manifolds");
+    if (!manifold_of(to)) {  // made with the first points, which are then replaced
+      btManifoldResult result(&a, &b);
+      to.processCollision(&a, &b, info_, &result);
+    }
+    btPersistentManifold* there = manifold_of(to);
+    if (!there) refuse("two shapes without a manifold");
+    there->clearManifold();
+    for (int i = 0; i < here_[0]->getNumContacts(); ++i)
+      there->addManifoldPoint(here_[0]->getContactPoint(i));
+  }
+
+ private:
+  template <class Do>
+  static void on_child(const Wrapper& of, int index, Do&& act) {
+    const auto& compound = static_cast<const btCompoundShape&>(*of.getCollisionShape());
+    const btTransform X_WC = of.getWorldTransform() * compound.getChildTransform(index);
+    act(Wrapper(&of, compound.getChildShape(index), of.getCollisionObject(), X_WC, -1, index));
+  }
+  btPersistentManifold* manifold_of(btCollisionAlgorithm& algorithm) {
+    there_.resizeNoInitialize(0);
+    algorithm.getAllContactManifolds(there_);
+    return there_.size() == 1 ? there_[0] : nullptr;
+  }
+
+  btDispatcher& dispatcher_;
+  const btDispatcherInfo& info_;
+  btManifoldArray here_, there_;
+};
+
+}  // namespace
+
+void copy_contacts(const btBroadphasePair& from, btBroadphasePair& to, btDispatcher& dispatcher,
+                   const btDispatcherInfo& info) {
+  if (!from.m_algorithm) return;
+  auto& object_a = *static_cast<btCollisionObject*>(to.m_pProxy0->m_clientObject);
+  auto& object_b = *static_cast<btCollisionObject*>(to.m_pProxy1->m_clientObject);
+  const Wrapper a = whole(object_a), b = whole(object_b);
+  Copier copier(dispatcher, info);
+  to.m_algorithm = copier.made(a, b);
+  if (auto* both = dynamic_cast<btCompoundCompoundCollisionAlgorithm*>(from.m_algorithm))
+    copier.copy_compounds(
+        *both, dynamic_cast<btCompoundCompoundCollisionAlgorithm&>(*to.m_algorithm), a, b);
+  if (auto* one = dynamic_cast<btCompoundCollisionAlgorithm*>(from.m_algorithm))
+    copier.copy_compound(*one, dynamic_cast<btCompoundCollisionAlgorithm&>(*to.m_algorithm), a, b);
+  else
+    copier.copy_points(*from.m_algorithm, *to.m_algorithm, a, b);
+}
+
+}  // namespace ruedo::physics
