@@ -74,3 +74,14 @@ def test_what_is_no_log_is_said(language, tmp_path):
         assert str(path) in result.stdout + result.stderr
         if language != "python":
             assert "failed " in result.stdout, result
+
+
+def test_read_log_says_what_is_no_log(tmp_path):
+    ruedo = pytest.importorskip("ruedo")
+    pytest.importorskip("pandas")
+    path = tmp_path / "noise.bin"
+    path.write_bytes(bytes(range(1, 200)))
+    with pytest.raises(ValueError, match=r"noise\.bin: no LCM log: it begins with 01 02 03 04"):
+        ruedo.read_log(path)
+    path.write_bytes(b"")
+    assert ruedo.read_log(path) == {}

@@ -10,14 +10,16 @@ import lcm
 from . import lcmtypes
 from .errors import NotSupported
 
+EVENT = b"\xed\xa1\xda\x01"  # that LCM's logs begin each message with
+
 
 def read_log(path: str | os.PathLike[str], channels: list[str] | None = None) -> dict[str, Any]:
     """The messages of a log, a DataFrame for each channel: the index is `time` (s of sim time), the
     columns are the type's fields; an array's cells are lists. channels: those that are wanted,
     None: all whose type is one of Ruedo's.
 
-    Needs pandas (pip install 'ruedo[logs]'). A message that is no valid one of its type is left
-    out.
+    Needs pandas (pip install 'ruedo[logs]'). Raises ValueError for a file that is no log. A message
+    that is no valid one of its type is left out.
     """
     try:
         import pandas
@@ -32,6 +34,12 @@ def read_log(path: str | os.PathLike[str], channels: list[str] | None = None) ->
     rows: dict[str, list[dict[str, Any]]] = {}
     if not os.path.isfile(path):
         raise FileNotFoundError(f"{os.fspath(path)}: no such file")
+    with open(path, "rb") as file:
+        begin = file.read(len(EVENT))
+    if begin not in (EVENT, b""):
+        raise ValueError(
+            f"{os.fspath(path)}: no LCM log: it begins with {begin.hex(' ')}, an event with {EVENT.hex(' ')}"
+        )
     for event in lcm.EventLog(os.fspath(path), "r"):
         message_type = types.get(event.data[:8])
         if message_type is None or (channels is not None and event.channel not in channels):
