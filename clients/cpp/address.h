@@ -1,4 +1,4 @@
-// LCM URLs: which one is meant, and whether anything can come from it.
+// LCM URLs: which one is meant, and whether it can be reached.
 #pragma once
 
 #include <string>

@@ -33,9 +33,9 @@ class Bus {
   void receive_directly();  // as Transport's
   void close();             // in a handler, too: the thread ends when that returns
 
-  // Who waits for much may receive for himself: handing each message from thread to thread takes as
-  // long as getting it. While one of these lives, and a moment longer, the receiving thread sleeps,
-  // and handle() runs the handlers.
+  // Lets the caller receive in its own thread: handing each message from thread to thread takes as
+  // long as receiving it. While one of these lives, and a moment longer, the receiving thread
+  // sleeps, and handle() runs the handlers.
   class Turn {
    public:
     explicit Turn(Bus& bus);

@@ -21,8 +21,8 @@ class CallbackCore {
   explicit CallbackCore(std::string what) : what_(std::move(what)) {}
   virtual ~CallbackCore() = default;
 
-  // From the return on it is not called any more: waits for a call in another thread. May be called
-  // from the callback itself.
+  // After it returns, the callback is not called any more: it waits for a call in another thread.
+  // May be called from the callback itself.
   void close();
   bool closed() const { return closed_; }
   // What is to be done when it was taken back.
@@ -31,7 +31,7 @@ class CallbackCore {
  protected:
   void say_failed(const char* why);
 
-  const std::string what_;  // is called on what
+  const std::string what_;  // it is called on, for the log
   std::recursive_mutex running_;
   std::atomic<bool> closed_{false};
 
@@ -64,8 +64,8 @@ class Callback : public CallbackCore {
   const Function function_;
 };
 
-// Those who are called together. Thread safe; who comes or goes meanwhile is not called or called
-// once more.
+// All callbacks on one thing. Thread safe; one that is added or removed during a call may or may
+// not be called.
 template <class... Arguments>
 class CallbackList : public std::enable_shared_from_this<CallbackList<Arguments...>> {
  public:

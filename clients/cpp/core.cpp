@@ -113,7 +113,7 @@ RobotInfo Core::robot_info(const std::string& name) const {
 std::shared_ptr<StreamCore> Core::stream(const ChannelInfo& channel, bool raw) {
   const std::lock_guard lock(mutex_);
   auto& stream = streams_[{channel.name, raw}];
-  if (!stream || stream->type() != channel.type) {  // the next run's may be another
+  if (!stream || stream->type() != channel.type) {  // in the next run it may be another type
     stream = std::make_shared<StreamCore>(weak_from_this(), channel,
                                           raw ? raw_decoder() : find_decoder(channel.type));
   }
@@ -158,7 +158,7 @@ Subscription Core::on_new_run(std::function<void()> callback) {
   return Subscription(new_run_->add("a new run", std::move(callback)));
 }
 
-// With the mutex free: nothing is repeated by them any more.
+// Without the mutex. They repeat nothing any more.
 void Core::end_drivers(const std::vector<std::shared_ptr<Driver>>& drivers, MotionReason reason) {
   {
     const std::lock_guard lock(mutex_);
@@ -244,7 +244,7 @@ void Core::check_server() {
   if (server_) {
     if (const auto ended = server_->ended()) throw NoServer(*ended);
   }
-  // One of this machine that is stopped, or in a debugger, is waited for.
+  // A server on this machine that is stopped, or in a debugger, is waited for.
   if (silence() > kSilence && !is_claimed(url_))
     throw NoServer("nothing was heard from the server at " + url_ + " for 5 s");
 }
@@ -313,7 +313,7 @@ void Core::on_tick(const uint8_t* bytes, size_t size) {
   const auto known = info();
   if (!known) return;
   another_run_ = in.int64() != known->run_id;
-  if (another_run_) {  // it may be the server's next one
+  if (another_run_) {  // it may be the same server's next run
     if (Clock::now().time_since_epoch() - Clock::duration(asked_.load()) > kAskAgain) ask_info();
     return;
   }

@@ -90,7 +90,7 @@ class Core : public std::enable_shared_from_this<Core> {
   std::atomic<int64_t> utime_{0}, ids_{0};
   std::atomic<Clock::time_point::rep> last_sign_;
   std::atomic<Clock::time_point::rep> asked_{0};  // for info
-  std::atomic<bool> another_run_{false};          // is what the last tick was of
+  std::atomic<bool> another_run_{false};          // the last tick was of another run
   std::atomic<bool> closed_{false};
   const std::shared_ptr<CallbackList<>> new_run_ = std::make_shared<CallbackList<>>();
   std::thread repeater_;

@@ -57,11 +57,11 @@ class Driver : public std::enable_shared_from_this<Driver> {
 
   std::shared_ptr<MotionCore> move(Bus& bus, const std::string& channel,
                                    const move_command_t& command, const std::string& kind);
-  // collisions may be null: what is blocked does not know by what then. Throws UnknownName when the
-  // robot is gone.
+  // collisions may be null: a blocked motion then does not know by what. Throws UnknownName when
+  // the robot is gone.
   void listen(const std::shared_ptr<StreamCore>& motion,
               const std::shared_ptr<StreamCore>& collisions);
-  void begin_epoch();             // sim time was set back
+  void begin_epoch();             // sim time was reset
   void end(MotionReason reason);  // its robot, or its run, is gone: nothing is repeated to the next
                                   // one of that name
 

@@ -77,7 +77,7 @@ bool LogFile::add_event(int64_t begin, int64_t& next) {
   if (file_.gcount() < kHeadSize) return wrong(kCutOff);
   const int64_t name_size = number(&head[20]), size = number(&head[24]);
   if (name_size > kLongestChannel || size > kLargest) return wrong("it is damaged at byte ");
-  // A length that lies must not make memory run out.
+  // A false length must not exhaust the memory.
   if (begin + kHeadSize + name_size + size > size_) return wrong(kCutOff);
   std::string name(static_cast<size_t>(name_size), '\0');
   file_.read(name.data(), name_size);

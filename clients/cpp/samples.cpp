@@ -116,7 +116,7 @@ const Word<Enum>* word_of(Enum value) {
   return found == end ? nullptr : found;
 }
 
-// Of a later server's message a value may be unknown here.
+// A later server may send values that are unknown here.
 template <class Enum>
 Enum known(int8_t value) {
   return word_of(static_cast<Enum>(value)) ? static_cast<Enum>(value) : Enum::unknown;
@@ -204,7 +204,7 @@ std::shared_ptr<const Sample> decode_image(WireReader& in) {
   s->row_stride = in.int32();
   s->format = image_format(in.int32());
   s->data = in.bytes(in.count(1));
-  return s;  // the metadata behind is not used
+  return s;  // the metadata that follows is not used
 }
 
 std::shared_ptr<const Sample> decode_camera_info(WireReader& in) {

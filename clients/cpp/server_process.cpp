@@ -153,7 +153,7 @@ void add_options(const LaunchOptions& options, std::vector<std::string>& command
   command.insert(command.end(), options.args.begin(), options.args.end());
 }
 
-// Of this user's alone, for the socket.
+// A folder for the socket, which no other user may enter.
 fs::path make_folder() {
   const char* runtime = std::getenv("XDG_RUNTIME_DIR");
   constexpr size_t kLongest = 60;  // a socket's path has 107 bytes at most
@@ -244,8 +244,8 @@ void ServerProcess::start(const std::vector<std::string>& command, bool verbose)
   }
 }
 
-// A server listens on a socket or by tcpq once its world is loaded; who ends before that is found
-// out by the connection.
+// A server listens on its socket or by tcpq once its world is loaded. If it ends before, connecting
+// reports that.
 void ServerProcess::await_port(Duration timeout) {
   const auto deadline = deadline_after(timeout);
   while (!is_served(url_) && !ended() && std::chrono::steady_clock::now() < deadline) {

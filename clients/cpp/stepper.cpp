@@ -42,12 +42,12 @@ Observations Stepper::step(int64_t n, const std::vector<Command>& commands, Dura
     take_part(timeout);
     lock.lock();
   }
-  wait(lock, have_, timeout);  // for nothing, unless the call before gave up
+  wait(lock, have_, timeout);  // returns at once, unless the previous call gave up
   const int64_t until = n > INT64_MAX - granted_ ? INT64_MAX : granted_ + n;
   if (n > 0) {
     grant_ = {core_.session().next_sequence(), granted_, grant_body(until, commands), false};
     granted_ = until;
-    acknowledged_ = have_;  // the grant says it
+    acknowledged_ = have_;  // the grant says so
     grant_again();
   }
   wait(lock, until, timeout);
@@ -99,7 +99,7 @@ void Stepper::take_part(Duration timeout) {
   part_ = true;
 }
 
-// All that the simulation publishes: a manifest names any of it.
+// Subscribes to everything that the simulation publishes: a manifest may name any of it.
 void Stepper::subscribe() {
   const auto info = core_.info();
   if (info_ == info) return;
@@ -181,7 +181,7 @@ void Stepper::wait(std::unique_lock<std::mutex>& lock, int64_t until, Duration t
     } else if (silence || ask_now_) {
       ask_for_lost(until);
     } else if (have_ - acknowledged_ >= kAcknowledgedTogether) {
-      ask_for_lost(have_);  // for nothing: it says what is here
+      ask_for_lost(have_);  // asks for nothing, but says what is here
     }
     ask_now_ = false;
     repeat = silence ? std::min<Clock::duration>(2 * repeat, kLastRepeat)

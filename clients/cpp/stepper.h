@@ -1,8 +1,8 @@
-// The client's side of lockstep: grants, and the messages of every step, whatever is lost on the
-// way.
+// The client's side of lockstep: grants steps, and collects every message of every step, whatever
+// is lost on the way.
 //
-// The caller of step() grants, receives for himself while he waits, and asks again for what does
-// not come.
+// The caller of step() grants, receives in its own thread while it waits, and asks again for what
+// does not come.
 #pragma once
 
 #include <chrono>

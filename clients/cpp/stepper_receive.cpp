@@ -153,7 +153,7 @@ void Stepper::progress() {
        step != steps_.end() && step->first == have_ + 1 && step->second.complete(); ++step) {
     ++have_;
     for (const std::vector<Entry>& part : step->second.parts) {
-      for (const Entry& entry : part) {  // what is left of the time before came twice
+      for (const Entry& entry : part) {  // what is left from earlier times came twice
         std::deque<Early>& early = early_[static_cast<size_t>(entry.channel)];
         while (!early.empty() && early.front().utime <= step->second.utime) early.pop_front();
       }
@@ -176,7 +176,7 @@ void Stepper::on_reply(const Reply& reply) {
     if (reply.sequence != grant_.sequence || grant_.taken) return;
     grant_.taken = ask_now_ = true;  // it was repeated: its ticks may be lost
   } catch (const WireError&) {
-    return;  // broken: it is asked for again
+    return;  // damaged: it is asked for again
   }
 }
 

@@ -1,4 +1,4 @@
-// A subscription to one channel: the newest sample, those who wait for it, and what went wrong.
+// A subscription to one channel: the newest sample, its readers, and what went wrong.
 #pragma once
 
 #include <atomic>

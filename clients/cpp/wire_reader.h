@@ -1,5 +1,5 @@
-// Reads an LCM message field by field, and never beyond its end: what a length promises must be
-// there.
+// Reads an LCM message field by field, and never beyond its end: a length that promises more is
+// refused.
 #pragma once
 
 #include <array>

@@ -38,7 +38,7 @@ struct WorldInfo {
 };
 
 // Takes messages of ruedo/info as they come. The parts of one info share run, epoch and utime. An
-// info that says again what the last one said, which is the rule, is known by its bytes and not
+// info with the same content as the last one, which is the rule, is recognised by its bytes and not
 // decoded.
 class WorldInfoAssembler {
  public:

@@ -29,20 +29,25 @@
 #include "ruedo/client_markers.h"
 #include "ruedo/client_samples.h"
 
+/// The client of a running simulation.
 namespace ruedo::client {
 
 // ---- What there is.
 
 /// What a robot is and can do.
 struct RobotInfo {
-  std::string name, model;                        ///< its own, and that of the model it was made of
-  std::string drive;                              ///< "kinematic", "wheels", "": it only senses
-  double wheel_radius = 0.0, track = 0.0;         ///< m
-  double max_speed = 0.0, max_turn_rate = 0.0;    ///< m/s, rad/s
-  double acceleration = 0.0, deceleration = 0.0;  ///< m/s^2
-  double turn_acceleration = 0.0;                 ///< rad/s^2
-  double watchdog = 0.0;                          ///< s of sim time, 0: off
-  std::vector<std::string> wheels;                ///< joint names
+  std::string name;                 ///< its own
+  std::string model;                ///< that it was made of
+  std::string drive;                ///< "kinematic", "wheels", "": it only senses
+  double wheel_radius = 0.0;        ///< m
+  double track = 0.0;               ///< m between the left and the right wheels
+  double max_speed = 0.0;           ///< m/s
+  double max_turn_rate = 0.0;       ///< rad/s
+  double acceleration = 0.0;        ///< m/s^2
+  double deceleration = 0.0;        ///< m/s^2
+  double turn_acceleration = 0.0;   ///< rad/s^2
+  double watchdog = 0.0;            ///< s of sim time, 0: off
+  std::vector<std::string> wheels;  ///< joint names
 };
 
 /// A set of links that do not move against each other.
@@ -54,15 +59,20 @@ struct BodyInfo {
 
 /// A sensor of a robot, or what it has besides (its pose, odometry, joints).
 struct DeviceInfo {
-  std::string robot, name;                  ///< the channel is ROBOT/NAME, usually
-  std::string kind;                         ///< "lrf", "sonar", "odometry", "camera", "pose", ...
-  std::string channel, type;                ///< on the bus
-  double rate = 0.0;                        ///< Hz of sim time; 0: every step
-  Vector3 position{};                       ///< m, in base_link at the start
-  Quaternion orientation{};                 ///< device to base_link
-  double range_min = 0.0, range_max = 0.0;  ///< m
-  double fov_horizontal = 0.0, fov_vertical = 0.0;  ///< rad
-  int width = 0, height = 0;                        ///< rays and layers, transducers, or pixels
+  std::string robot;            ///< its name
+  std::string name;             ///< the channel is ROBOT/NAME, usually
+  std::string kind;             ///< "lrf", "sonar", "odometry", "camera", "pose", ...
+  std::string channel;          ///< on the bus
+  std::string type;             ///< of its messages
+  double rate = 0.0;            ///< Hz of sim time; 0: every step
+  Vector3 position{};           ///< m, in base_link at the start
+  Quaternion orientation{};     ///< device to base_link
+  double range_min = 0.0;       ///< m
+  double range_max = 0.0;       ///< m
+  double fov_horizontal = 0.0;  ///< rad
+  double fov_vertical = 0.0;    ///< rad
+  int width = 0;                ///< rays, transducers, or pixels
+  int height = 0;               ///< layers, or pixels
   std::vector<std::array<double, 6>>
       elements;  ///< a sonar's transducers: x, y, z, roll, pitch, yaw in its frame
 };
@@ -70,13 +80,15 @@ struct DeviceInfo {
 /// The state of the simulation, and of the model or MODEL/LINK that was asked for (else name is
 /// "").
 struct State : Sample {
-  int64_t step = 0, state_hash = 0;  ///< the hash is of the whole state, bit for bit
-  bool paused = false;               ///< no step is taken
-  double rate = 0.0;   ///< sim time per real time that is asked for; kFast: as fast as it goes
-  std::string name;    ///< what was asked for
-  Vector3 position{};  ///< m, world
-  Quaternion orientation{};     ///< to world
-  Vector3 linear{}, angular{};  ///< m/s, rad/s, world
+  int64_t step = 0;        ///< its number
+  int64_t state_hash = 0;  ///< of the whole state, bit for bit
+  bool paused = false;     ///< no step is taken
+  double rate = 0.0;       ///< sim time per real time that is asked for; kFast: as fast as it goes
+  std::string name;        ///< what was asked for
+  Vector3 position{};      ///< m, world
+  Quaternion orientation{};  ///< to world
+  Vector3 linear{};          ///< m/s, world
+  Vector3 angular{};         ///< rad/s, world
 };
 
 /// A command for Simulation::step(), as Robot::velocity_command() and its like make it.
@@ -338,7 +350,9 @@ class Motion {
 /// Limits of a primitive: m/s and m/s^2, for turns on the spot rad/s and rad/s^2. 0: the robot's
 /// own.
 struct Limits {
-  double speed = 0.0, acceleration = 0.0, deceleration = 0.0;  ///< 0 or more
+  double speed = 0.0;         ///< 0 or more
+  double acceleration = 0.0;  ///< 0 or more
+  double deceleration = 0.0;  ///< 0 or more
 };
 
 /// A robot of the simulation: its sensors and its drive. Copies are the same robot.
@@ -558,7 +572,7 @@ class [[nodiscard]] Simulation {
                     Duration timeout = 60.0) const;
   /// @param rate sim time per real time; kFast: as fast as it goes
   void set_rate(double rate) const;
-  /// @param what is set back
+  /// @param what is reset
   /// @param seed of the new epoch; -1: the same again
   void reset(Reset what = Reset::all, int64_t seed = -1) const;
   /// @param model one that comes with Ruedo, or a file the server finds

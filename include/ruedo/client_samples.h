@@ -187,11 +187,14 @@ struct Scan : Sample {
 
 /// A scan of a laser scanner with several layers: element layer * columns + column.
 struct LidarScan : Sample {
-  int layers = 0, columns = 0;                       ///< of rays
-  std::vector<float> ranges;                         ///< m, lowest layer first; as in Scan
-  std::vector<float> intensities;                    ///< 0 to 1, or empty
-  double azimuth_min = 0.0, azimuth_step = 0.0;      ///< rad, left is positive
-  double elevation_min = 0.0, elevation_step = 0.0;  ///< rad, up is positive
+  int layers = 0;                  ///< of rays
+  int columns = 0;                 ///< rays in a layer
+  std::vector<float> ranges;       ///< m, lowest layer first; as in Scan
+  std::vector<float> intensities;  ///< 0 to 1, or empty
+  double azimuth_min = 0.0;        ///< rad, of the first column; left is positive
+  double azimuth_step = 0.0;       ///< rad from column to column
+  double elevation_min = 0.0;      ///< rad, of the lowest layer; up is positive
+  double elevation_step = 0.0;     ///< rad from layer to layer
 };
 
 /// The last reading of each of an array's transducers; their poses are DeviceInfo::elements.
@@ -203,9 +206,11 @@ struct SonarReading : Sample {
 
 /// What the robot believes of its motion from its wheels; pose of base_link in the frame odom.
 struct Odometry : Sample {
-  double x = 0.0, y = 0.0;      ///< m
-  double theta = 0.0;           ///< rad, not wrapped
-  double v = 0.0, omega = 0.0;  ///< m/s, rad/s
+  double x = 0.0;      ///< m
+  double y = 0.0;      ///< m
+  double theta = 0.0;  ///< rad, not wrapped
+  double v = 0.0;      ///< m/s
+  double omega = 0.0;  ///< rad/s
   std::vector<double>
       wheel_angles;  ///< rad since the start, positive ahead; order of RobotInfo::wheels
   std::vector<double> wheel_rates;  ///< rad/s
@@ -229,7 +234,8 @@ struct Pose : Sample {
 struct Image : Sample {
   /// How `data` has it.
   enum class Format { unknown, jpeg, rgb, bgr, gray, gray16, float32 };
-  int width = 0, height = 0;  ///< pixels
+  int width = 0;   ///< pixels
+  int height = 0;  ///< pixels
   Format format =
       Format::unknown;        ///< gray16: labels (body index + 1); float32: depth, m, +inf: nothing
   int row_stride = 0;         ///< bytes in a row, 0 for jpeg
@@ -242,9 +248,13 @@ struct Image : Sample {
 
 /// A pinhole with OpenCV's distortion.
 struct CameraInfo : Sample {
-  int width = 0, height = 0;                      ///< pixels
-  double fx = 0.0, fy = 0.0, cx = 0.0, cy = 0.0;  ///< pixels
-  std::array<double, 5> distortion{};             ///< k1, k2, p1, p2, k3
+  int width = 0;                       ///< pixels
+  int height = 0;                      ///< pixels
+  double fx = 0.0;                     ///< focal length along a row, pixels
+  double fy = 0.0;                     ///< focal length along a column, pixels
+  double cx = 0.0;                     ///< principal point along a row, pixels
+  double cy = 0.0;                     ///< principal point along a column, pixels
+  std::array<double, 5> distortion{};  ///< k1, k2, p1, p2, k3
 };
 
 /// An inertial unit, in its own frame.
@@ -256,9 +266,10 @@ struct Imu : Sample {
 
 /// Satellite navigation (GPS).
 struct NavSat : Sample {
-  double latitude_deg = 0.0, longitude_deg = 0.0;  ///< degrees, north and east are positive
-  double altitude = 0.0;                           ///< m above the ellipsoid
-  Vector3 velocity{};                              ///< m/s, to the east, to the north, upwards
+  double latitude_deg = 0.0;   ///< degrees, north is positive
+  double longitude_deg = 0.0;  ///< degrees, east is positive
+  double altitude = 0.0;       ///< m above the ellipsoid
+  Vector3 velocity{};          ///< m/s, to the east, to the north, upwards
 };
 
 /// The magnetic field.
@@ -302,14 +313,18 @@ struct LogicalCamera : Sample {
 
 /// A labelled object in a picture; whole numbers are the middles of pixels.
 struct Box2D {
-  int label = 0;                                       ///< as the world file has it
-  std::string name;                                    ///< of the model
-  double x = 0.0, y = 0.0, width = 0.0, height = 0.0;  ///< pixels; x, y: the middle
+  int label = 0;        ///< as the world file has it
+  std::string name;     ///< of the model
+  double x = 0.0;       ///< of the middle, pixels from the left
+  double y = 0.0;       ///< of the middle, pixels from the top
+  double width = 0.0;   ///< pixels
+  double height = 0.0;  ///< pixels
 };
 /// The labelled objects in a picture.
 struct Boxes2D : Sample {
-  int width = 0, height = 0;  ///< pixels, of the picture
-  std::vector<Box2D> boxes;   ///< one each
+  int width = 0;             ///< of the picture, pixels
+  int height = 0;            ///< of the picture, pixels
+  std::vector<Box2D> boxes;  ///< one each
 };
 
 /// A labelled object before the camera, in the device's frame.
@@ -347,8 +362,10 @@ struct Collisions : Sample {
 
 /// A robot's joints, in the order of the names.
 struct Joints : Sample {
-  std::vector<std::string> names;                     ///< as the file has them
-  std::vector<float> positions, velocities, efforts;  ///< rad or m, rad/s or m/s, N m or N
+  std::vector<std::string> names;  ///< as the file has them
+  std::vector<float> positions;    ///< rad, or m
+  std::vector<float> velocities;   ///< rad/s, or m/s
+  std::vector<float> efforts;      ///< N m, or N
 };
 
 /// What a robot is executing.
@@ -357,8 +374,10 @@ struct MotionStatus : Sample {
   MotionKind kind = MotionKind::none;     ///< what it was told
   MotionState state = MotionState::idle;  ///< how far it is
   MotionReason reason = MotionReason::none;  ///< why it ended or was refused
-  double progress = 0.0, remaining = 0.0;    ///< m or rad
-  double v = 0.0, omega = 0.0;               ///< m/s, rad/s
+  double progress = 0.0;                     ///< done, m or rad
+  double remaining = 0.0;                    ///< m or rad
+  double v = 0.0;                            ///< m/s
+  double omega = 0.0;                        ///< rad/s
 };
 
 /// A message of any type, as it came.

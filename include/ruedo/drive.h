@@ -62,12 +62,12 @@ class DriveModel {
 /// A kind of drive: `<ruedo:drive type="TYPE">`.
 struct DriveKind {
   std::string type;  ///< of the attribute
-  /// Reads the element; throws InputError. Called again when the robot is put somewhere, or begins
-  /// anew.
+  /// Reads the element; throws InputError. Called again when the robot is put somewhere or reset.
   std::function<std::unique_ptr<DriveModel>(const DriveSetup&)> make;
 };
 
-/// All registered kinds, by type.
+/// All registered kinds.
+/// @return sorted by type
 const std::vector<DriveKind>& drive_kinds();
 
 /// Put one at namespace scope in the drive's file: static const RegisterDrive kRegister{{...}};

@@ -8,56 +8,75 @@
 
 namespace ruedo {
 
-// A place in a file. line 0: the file as a whole.
+/// A place in a file.
 struct Source {
-  std::string file;
-  int line = 0;
+  std::string file;  ///< as it was named
+  int line = 0;      ///< from 1; 0: the file as a whole
+  /// @return FILE:LINE
   std::string str() const { return line > 0 ? file + ":" + std::to_string(line) : file; }
 };
 
-// A bad input file or option: says where, what was found, and what is allowed. Exit code 3.
+/// A bad input file or option: says where, what was found, and what is allowed. Exit code 3.
 class InputError : public std::runtime_error {
  public:
+  /// @param source where
+  /// @param what was found, and what is allowed
   InputError(Source source, const std::string& what)
       : std::runtime_error(source.file.empty() ? what : source.str() + ": " + what),
         source_(std::move(source)),
         message_(what) {}
+  /// @return where
   const Source& source() const { return source_; }
-  const std::string& message() const { return message_; }  // without the place
+  /// @return the text without the place
+  const std::string& message() const { return message_; }
 
  private:
   Source source_;
   std::string message_;
 };
 
-// The machine lacks something (a route, a renderer, room on a disk). The text holds the cure. Exit
-// code 4.
+/// The machine lacks something (a route, a renderer, room on a disk). The text holds the cure. Exit
+/// code 4.
 class EnvironmentError : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;
 };
 
-// What a loader noticed and went on from.
+/// Something that a loader noticed and went on from.
 struct Finding {
+  /// Not supported, wrong and repaired, or wrong.
   enum class Kind { unsupported, repaired, error };
-  Kind kind;
-  Source source;
-  std::string element;  // path of the element: "model p3at/link chassis/inertial"
-  std::string text;     // what was found, and what Ruedo does instead
+  Kind kind;            ///< how bad it is
+  Source source;        ///< where
+  std::string element;  ///< path of the element: "model p3at/link chassis/inertial"
+  std::string text;     ///< what was found, and what Ruedo does instead
 };
 
-// Collects findings; the same text about the same kind of thing is kept once per place.
+/// Collects findings; the same text about the same kind of thing is kept once per place.
 class Findings {
  public:
+  /// Adds something that Ruedo does not have.
+  /// @param source where
+  /// @param element its path
+  /// @param text what was found, and what Ruedo does instead
   void unsupported(const Source& source, const std::string& element, const std::string& text) {
     add({Finding::Kind::unsupported, source, element, text});
   }
+  /// Adds something wrong that was repaired.
+  /// @param source where
+  /// @param element its path
+  /// @param text what was found, and what Ruedo does instead
   void repaired(const Source& source, const std::string& element, const std::string& text) {
     add({Finding::Kind::repaired, source, element, text});
   }
+  /// Adds something wrong.
+  /// @param source where
+  /// @param element its path
+  /// @param text what was found, and what Ruedo does instead
   void error(const Source& source, const std::string& element, const std::string& text) {
     add({Finding::Kind::error, source, element, text});
   }
+  /// @return all of them, in the order of adding
   const std::vector<Finding>& list() const { return list_; }
 
  private:

@@ -15,8 +15,8 @@ namespace ruedo {
 /// The symbol `ruedo_plugin_entry` of every plugin.
 struct PluginEntry {
   const char* abi;  ///< RUEDO_PLUGIN_ABI of the headers that it was built with
-  const std::vector<SensorKind>& (*sensors)();
-  const std::vector<DriveKind>& (*drives)();
+  const std::vector<SensorKind>& (*sensors)();  ///< the kinds that it registered
+  const std::vector<DriveKind>& (*drives)();    ///< likewise
 };
 
 }  // namespace ruedo

@@ -24,7 +24,7 @@ namespace {
 
 constexpr std::chrono::milliseconds kBetweenLooks{1000}, kBetweenWarnings{60000};
 constexpr int kConnectMs = 2000;
-constexpr int kTakenTogether = 64;  // messages, before it is looked whether the bus ends
+constexpr int kTakenTogether = 64;  // messages between two checks whether the bus is closing
 constexpr const char* kSelfTest = "LCM_SELF_TEST";
 constexpr auto kSelfTestTime = std::chrono::milliseconds(50);
 constexpr std::chrono::milliseconds kFirstPause{50},
@@ -117,8 +117,8 @@ void LcmBus::listen_to(const std::vector<std::string>& channels, const std::vect
   taken_up_.wait(lock, [this] { return !waits_; });
 }
 
-// LCM is subscribed to in the thread that handles its messages, and the instance stays: nothing
-// that is on its way is lost.
+// Subscribes in the thread that handles LCM's messages, on the same instance: no message in flight
+// is lost.
 void LcmBus::take_up() {
   std::lock_guard lock(mutex_);
   if (!waits_) return;
@@ -159,8 +159,8 @@ void LcmBus::open() {
     throw EnvironmentError("LCM cannot listen on '" + url_.str() + "': run `ruedo doctor`");
 }
 
-// Our first message comes back and tells from where LCM sends. Where it does not, all of them come
-// back, and are passed over.
+// Our first message comes back, and shows the address from which LCM sends. If it does not come
+// back, all our messages do, and are ignored.
 void LcmBus::ignore_own() {
   uint8_t mark[16];
   std::random_device random;

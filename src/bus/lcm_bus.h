@@ -43,7 +43,7 @@ class LcmBus : public Bus {
   void listen_to(const std::vector<std::string>& channels,
                  const std::vector<std::string>& own = {}) override;
   void stop() override;
-  // With memq nobody is there but this process.
+  // With memq there is only this process.
   bool is_heard(const std::string&) const override { return url_.scheme != "memq"; }
   uint64_t failed() const override { return failed_; }
 

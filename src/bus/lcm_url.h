@@ -23,8 +23,8 @@ struct LcmUrl {
 };
 
 // Reads an address; "" is $LCM_DEFAULT_URL, or kDefaultUrl. A udpm address without a ttl gets ttl
-// 0: nothing leaves the machine unless it is asked to; a tcpq address without host and port gets
-// LCM's, 127.0.0.1:7700. Throws InputError for what is none.
+// 0, so that nothing leaves the machine by default; a tcpq address without host and port gets
+// LCM's, 127.0.0.1:7700. Throws InputError for anything else.
 LcmUrl parse_url(const std::string& text);
 
 // True when this machine has a way to a udpm address's group. Takes microseconds, as the next.

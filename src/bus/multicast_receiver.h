@@ -1,4 +1,4 @@
-// Receives what LCM programs send by multicast, in the thread that asks.
+// Receives what LCM programs send by multicast, in the caller's thread.
 //
 // LCM itself puts a thread and a pipe in between, which takes longer than a message does. The wire
 // format is LCM's ("udpm"): short messages in one datagram, long ones in fragments. Needs nothing
@@ -38,14 +38,14 @@ class MulticastReceiver {
     bool operator==(const Sender&) const = default;
   };
 
-  // Takes one datagram and calls the handler when a message is whole with it. False: none is there.
-  // What is not LCM's is passed over.
+  // Takes one datagram, and calls the handler when it completes a message. False: there is none.
+  // Datagrams that are not LCM's are ignored.
   bool take(const Handler& handler);
   // The same for a datagram that came in another way.
   void read(const uint8_t* bytes, size_t size, Sender sender, const Handler& handler);
 
   Sender sender() const { return sender_; }  // of the datagram that was taken last
-  // Not to be woken for the datagrams of that one any more: false where the system cannot.
+  // Has the kernel drop that sender's datagrams; false where the system cannot.
   bool ignore(Sender sender);
 
  private:

@@ -15,9 +15,9 @@ namespace ruedo::bus {
 // A server's place on the network, held for as long as this lives.
 struct ServerBus {
   LcmUrl url;
-  // The address was not the one that clients find by themselves: they need LCM_DEFAULT_URL.
+  // Clients do not find the address by themselves: they need LCM_DEFAULT_URL.
   bool announce = false;
-  // Why it is another than was asked for; "" mostly.
+  // Why the address differs from the one asked for; "": it does not.
   std::string note;
   FileHandle token;  // keeps `auto` and the client libraries' launch() from the same port
   std::unique_ptr<UrlClaim> claim;

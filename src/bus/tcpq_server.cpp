@@ -23,16 +23,15 @@
 namespace ruedo::bus {
 namespace {
 
-constexpr auto kGreetingTime =
-    std::chrono::seconds(3);  // until a client must have said that it is one
+constexpr auto kGreetingTime = std::chrono::seconds(3);  // for a client to identify itself
 constexpr auto kAcceptPause = std::chrono::milliseconds(200);
 constexpr auto kFarewellTime = std::chrono::seconds(2);
 constexpr auto kStuckTime =
-    std::chrono::seconds(30);  // that a client may take nothing of what waits for it
+    std::chrono::seconds(30);  // after which a client that takes nothing is disconnected
 constexpr int kKeepAlive_s = 30, kKeepAliveAgain_s = 10,
-              kKeepAlives = 3;        // until a machine that is gone is noticed
+              kKeepAlives = 3;        // before a vanished machine is noticed
 constexpr size_t kChunk = 64 * 1024;  // bytes received from one client at a time
-constexpr int kMostChunks = 4;        // and then the others have their turn
+constexpr int kMostChunks = 4;        // then it is the others' turn
 constexpr size_t kMostNumbers = 32768;
 constexpr int kMostPieces = 64;  // messages in one call of the system
 
@@ -208,8 +207,8 @@ void TcpqServer::look_again_soon() {
   ::epoll_ctl(poll_.get(), EPOLL_CTL_DEL, listener_.get(), nullptr);
 }
 
-// All places are taken: the oldest that has not greeted goes, else the oldest that greeted and said
-// nothing more, else one of who has most. False when the newcomer is one of too many itself.
+// All places are taken: ends the oldest connection without a greeting, else the oldest with nothing
+// but a greeting, else one of the peer with the most. False when that peer is the newcomer's own.
 bool TcpqServer::make_place(const FileHandle& newcomer) {
   for (const bool greeted : {false, true}) {
     for (Client& client : clients_) {
@@ -220,7 +219,7 @@ bool TcpqServer::make_place(const FileHandle& newcomer) {
     }
   }
   Client* client = of_largest_share(newcomer);
-  look_again_soon();  // finding out who has how many takes a while: a flood of newcomers must not
+  look_again_soon();  // counting the connections takes a while: a flood of newcomers must not
                       // stop the bus
   if (!client) return false;
   drop(*client, "there are too many, and its process has most of them");
@@ -446,7 +445,7 @@ void TcpqServer::watch(Client& client, bool for_room) {
   ::epoll_ctl(poll_.get(), EPOLL_CTL_MOD, client.socket.get(), &event);
 }
 
-// Ends the connections of those who are gone, and of those who do not say what they are.
+// Ends connections whose peers are gone or have not identified themselves.
 void TcpqServer::sweep() {
   const Clock::time_point now = Clock::now();
   for (auto client = clients_.begin(); client != clients_.end();) {

@@ -5,9 +5,9 @@
 // ring behind loses messages. What clients publish goes to the simulation and to all clients that
 // subscribed to it, as on any LCM bus.
 //
-// Where all places are taken, who connects gets that of a connection that said nothing, else of the
-// process (of another machine: the address) that has most of them, if that has more than the
-// newcomer's own would have.
+// When all places are taken, a newcomer replaces a connection that has said nothing. If there is
+// none, it replaces one of the process (on another machine: the address) with the most connections,
+// provided that this has more than the newcomer's own would then have.
 #pragma once
 
 #include <atomic>
@@ -34,7 +34,7 @@ class TcpqServer : public Bus {
   static constexpr size_t kMostWaiting = 16 << 20;  // bytes between publish() and the thread
   static constexpr size_t kRing = 16 << 20;         // bytes
   static constexpr size_t kMostReceived =
-      64 << 20;  // bytes of frames that are not whole yet, all clients together
+      64 << 20;  // bytes of incomplete frames, all clients together
 
   // Listens at the address of a tcpq URL, and nowhere else. Throws EnvironmentError when it is
   // taken.
@@ -49,8 +49,7 @@ class TcpqServer : public Bus {
               const std::vector<std::string>& own = {}) override;
   void listen_to(const std::vector<std::string>& channels,
                  const std::vector<std::string>& own = {}) override;
-  // Sends what was published so far to clients that take it, waits half a second at most, and
-  // closes all connections.
+  // Sends what was published so far, for at most half a second, and closes all connections.
   void stop() override;
   uint64_t failed() const override { return failed_; }
   bool is_heard(const std::string& channel) const override;
@@ -59,7 +58,7 @@ class TcpqServer : public Bus {
   // Counts since the start.
   uint64_t connections() const { return connections_; }
   uint64_t dropped_clients() const { return dropped_clients_; }
-  uint64_t skipped() const { return skipped_; }  // times that a slow client lost messages
+  uint64_t skipped() const { return skipped_; }  // how often a slow client lost messages
 
  private:
   using Clock = std::chrono::steady_clock;
@@ -74,7 +73,7 @@ class TcpqServer : public Bus {
     std::vector<uint8_t> rest;  // of a message that was sent in part
     size_t rest_sent = 0;
     bool blocked = false;     // waits for room in the socket
-    Clock::time_point moved;  // when the socket last took something, or nothing was left
+    Clock::time_point moved;  // when the socket last accepted bytes, or had none left to send
     bool spoke = false;       // published or subscribed
     bool gone = false;
   };

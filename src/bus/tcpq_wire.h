@@ -38,8 +38,8 @@ struct Frame {
   std::span<const uint8_t> data;  // of a publish
 };
 
-// Takes one client's stream apart. Holds the bytes of the frame that is not whole yet, never more
-// than came.
+// Splits one client's stream into frames. Holds the bytes of the incomplete frame, never more than
+// were received.
 class Reader {
  public:
   void add(std::span<const uint8_t> bytes) {

@@ -21,8 +21,7 @@
 namespace ruedo::bus {
 namespace {
 
-constexpr auto kGreetingTime =
-    std::chrono::seconds(3);  // until a client must have said that it is one
+constexpr auto kGreetingTime = std::chrono::seconds(3);  // for a client to identify itself
 constexpr auto kFarewellTime = std::chrono::seconds(2);
 constexpr size_t kChunk = 64 * 1024;             // bytes received from one client at a time
 constexpr int kMostPieces = 256;                 // of memory, in one call of the system
@@ -248,7 +247,7 @@ void UnixServer::accept_all() {
     FileHandle socket(::accept4(listener_.get(), nullptr, nullptr, SOCK_CLOEXEC | SOCK_NONBLOCK));
     if (!socket) {
       if (errno == EINTR || errno == ECONNABORTED) continue;
-      return;  // the next round looks again, if it was for want of file descriptors
+      return;  // tried again in the next round, in case file descriptors ran out
     }
     ++connections_;
     if (!is_own_peer(socket.get()) || clients_.size() >= kMostClients) {

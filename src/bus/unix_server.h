@@ -3,8 +3,8 @@
 // The socket has mode 0600, and the kernel names its peer: no other user reads or sends.
 // The frames are tcpq's (tcpq_wire.h). What is published waits for flush(), and then goes to each
 // client in one call of the system; what a client does not take at once is kept for it, in order.
-// So nothing is lost on the way, but for a client that falls kMostBehind behind: it loses whole
-// messages, and logs that.
+// Nothing is lost, except by a client that falls kMostBehind behind: it loses whole messages, and
+// the loss is logged.
 #pragma once
 
 #include <atomic>
@@ -42,8 +42,7 @@ class UnixServer : public Bus {
               const std::vector<std::string>& own = {}) override;
   void listen_to(const std::vector<std::string>& channels,
                  const std::vector<std::string>& own = {}) override;
-  // Sends what was published to clients that take it, waits two seconds at most, and closes all
-  // connections.
+  // Sends what was published, for at most two seconds, and closes all connections.
   void stop() override;
   uint64_t failed() const override { return failed_; }
   bool is_heard(const std::string& channel) const override;

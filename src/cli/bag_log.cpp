@@ -1,4 +1,4 @@
-// Two passes: what lies beside the topics comes out first, then both are joined by time.
+// Two passes: the attachments are extracted first, then they and the topics are merged by time.
 #include "cli/bag_log.h"
 
 #include <algorithm>
@@ -140,7 +140,8 @@ void BagLog::join(const std::string& rest, const std::string& file) {
     const auto time_us = static_cast<SimTime>(time_ns / 1000);
     write_rest_until(time_us);
     const std::string& name = says_all_of->second;
-    if (written_us == time_us && written.contains(name)) return;  // the topic did not say it all
+    if (written_us == time_us && written.contains(name))
+      return;  // the topic's message is not complete
     const std::vector<uint8_t> bytes = ros2::restored(channel.type, cdr);
     if (bytes.empty())
       ++damaged;

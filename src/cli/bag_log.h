@@ -1,5 +1,4 @@
-// A ROS 2 bag that `ruedo export --ros2` made, as the log that it was made from: for all that reads
-// logs.
+// Restores the log from a ROS 2 bag that `ruedo export --ros2` made, for all that reads logs.
 //
 // The topics give scans and pictures; the rest, and the world's files, lie in the bag beside them
 // (Rosbag).

@@ -68,8 +68,8 @@ class TimedBus : public Bus {
   }
   void stop() override { bus_.stop(); }
 
-  // How late each step is against the earliest one: the pacing is k steps after k steps' time, so
-  // this does not add up.
+  // How late each step is relative to the earliest one. Deadlines are absolute, so delays do not
+  // add up.
   std::vector<double> lateness_ms() const {
     std::vector<double> late;
     for (const Sent& sent : times_)
@@ -149,7 +149,7 @@ int run_client(const std::string& url, int commands, int pipe) {
     rows += client.run("command that replaces a running one", 3.0, commands) + "\n";
     return write(pipe, rows.data(), rows.size()) == static_cast<ssize_t>(rows.size()) ? 0 : 1;
   } catch (const std::exception&) {
-    return 1;  // the server's own LcmBus says what is wrong
+    return 1;  // the server's LcmBus reports what is wrong
   }
 }
 

@@ -65,7 +65,7 @@ double cpu_seconds() {
   return seconds(now.ru_utime) + seconds(now.ru_stime);
 }
 
-// Around its circle for ever: a primitive needs no repeating.
+// In its circle for ever: a primitive need not be repeated.
 std::vector<uint8_t> circle_command() {
   move_command_t command{};
   command.kind = move_command_t::ARC;

@@ -17,7 +17,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// One line for what is not installed, instead of a traceback.
+// One line for a missing package, instead of a traceback.
 constexpr const char* kStart = R"py(import sys
 try:
     from ruedo.campaign.cli import main
@@ -70,7 +70,7 @@ int hand_over(const char* command, const std::vector<std::string>& arguments) {
 
 void add(CLI::App& app, Action& chosen, const char* name, const char* description) {
   CLI::App* command = app.add_subcommand(name, description);
-  command->prefix_command();  // what follows is Python's to read
+  command->prefix_command();  // Python reads what follows
   command->set_help_flag();
   command->callback([command, name, &chosen] {
     chosen = [command, name] { return hand_over(name, command->remaining()); };

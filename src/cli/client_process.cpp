@@ -67,7 +67,8 @@ bool ClientProcess::end() {
   while (!over_ && std::chrono::steady_clock::now() < begin + kPatience)
     std::this_thread::sleep_for(kLook);
   ::kill(-pid_,
-         SIGKILL);  // and what it left behind; its own number is not free before it is waited for
+         SIGKILL);  // and the processes that it left behind; its own id is not reused before it is
+                    // waited for
   waiter_.join();
   ::waitpid(pid_, &status_, 0);
   pid_ = -1;

@@ -22,8 +22,8 @@ class ClientProcess {
                 std::function<void()> ended);
   ~ClientProcess();
 
-  // Asks it to end, and ends it when it has not after some seconds. True when it had ended by
-  // itself before.
+  // Asks it to end, and kills it when it has not ended after some seconds. True when it had already
+  // ended by itself.
   bool end();
 
   // Waits until it has ended by itself.

@@ -50,7 +50,7 @@ struct WorldArguments {
 // WORLD, --spawn, --drive, --set, --disable, --fault, --xacro-arg, --no-noise, --allow-absolute,
 // --fast-pixels.
 void add_world_arguments(CLI::App& command, WorldArguments& arguments);
-// Throws InputError; without a file in it for wrong usage.
+// Throws InputError; for wrong usage it names no file.
 model::LoadOptions load_options(const WorldArguments& arguments);
 std::shared_ptr<const model::WorldModel> load(const WorldArguments& arguments);
 // Those of them that change a result, as on the command line: for a log's header.
@@ -61,7 +61,7 @@ run::WaitForOption parse_wait_for(const std::string& text);                // CH
 double parse_rate(const std::string& text);          // a number above 0, or "max": +inf
 int64_t parse_duration_us(const std::string& text);  // seconds
 
-// Findings that say the same of several places, together.
+// The findings with the same text, of several places.
 struct FindingGroup {
   Finding::Kind kind;
   std::string text;

@@ -65,7 +65,7 @@ void check_multicast(Report& report, const bus::LcmUrl& url) {
   }
 }
 
-// What listeners of this machine have lost, as the kernel has counted it.
+// Datagrams that listeners on this machine have lost, as counted by the kernel.
 void check_loss(Report& report, const bus::LcmUrl& url) {
   const auto loss = bus::datagram_loss(static_cast<uint16_t>(url.port));
   if (!loss) return report.hint("datagrams", "whether any were lost is not known on this system");
@@ -84,8 +84,8 @@ void check_loss(Report& report, const bus::LcmUrl& url) {
                                bus::cure_of_datagram_loss());
 }
 
-// Who serves the address, or would. Where the environment names none and there is no multicast,
-// that is TCP.
+// The address that is served, or would be. Without multicast, and without an address in the
+// environment, it is TCP.
 void check_server(Report& report, const bus::LcmUrl& url) {
   if (url.scheme == "memq")
     return report.good("server", url.str() + " stays inside of one process");

@@ -44,7 +44,7 @@ class Mailbox {
     ready_.notify_one();
   }
 
-  // False when nothing came until then.
+  // False when nothing came in time.
   bool take(Message& message, Clock::time_point until) {
     std::unique_lock lock(mutex_);
     if (!ready_.wait_until(lock, until, [this] { return !waiting_.empty(); })) return false;

@@ -31,7 +31,7 @@ bool is_world_file(const std::string& path) {
   return ending == ".sdf" || ending == ".world";
 }
 
-// A name that is no file yet: a new world.
+// The name of a file that does not exist yet: a new world.
 bool is_new(const EditArguments& arguments) {
   return arguments.world.empty() || (!is_there(arguments.world) && is_world_file(arguments.world));
 }
@@ -47,7 +47,7 @@ std::string target(const EditArguments& arguments) {
   if (arguments.world.empty()) return kNewWorld;
   if (is_new(arguments)) return arguments.world;
   if (!is_there(arguments.world)) {
-    model::world_file(arguments.world);  // or it says that there is none
+    model::world_file(arguments.world);  // throws when there is none
     throw InputError({}, "'" + arguments.world +
                              "' is the name of a world that comes with Ruedo or lies in "
                              "RUEDO_PATH: say where to save it by --save-as FILE");

@@ -30,7 +30,8 @@ uint64_t nanoseconds(SimTime time_us) {
   return static_cast<uint64_t>(std::clamp(time_us, SimTime{0}, kLatest_us)) * 1000;
 }
 
-// Gives every message to `out`, which is told what runs from when on. Returns how many there were.
+// Passes every message to `out`, and tells it when another world begins. Returns the number of
+// messages.
 template <class Export>
 uint64_t read_log(const std::string& path, const log::Index& index, const run::LogWorlds& worlds,
                   Export& out) {

@@ -33,7 +33,7 @@ std::vector<std::string> plugin_options() {
   return options;
 }
 
-// A log may be a stranger's: it names a plugin, and does not say where it is. wanted: NAME@SHA256.
+// A log may be a stranger's, so it names a plugin without its path. wanted: NAME@SHA256.
 void load_logged_plugin(const std::string& wanted, const std::string& log) {
   const std::string name = wanted.substr(0, wanted.rfind('@')),
                     hash = name.size() < wanted.size() ? wanted.substr(name.size() + 1) : "";

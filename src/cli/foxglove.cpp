@@ -236,9 +236,9 @@ void FoxgloveExport::send_frames(const run::LogWorlds::Scene& scene, uint64_t ti
 void FoxgloveExport::send_scene(const model::WorldModel& world, uint64_t time_ns) {
   const model::BodyLayout layout(world);
   const scene::RenderContent content(world, layout);
-  std::vector<int> links_of_kind(content.link_kinds.size());
-  for (const int kind : content.kind_of_link) {
-    if (kind >= 0) ++links_of_kind[kind];
+  IndexedVector<scene::RenderKindIndex, int> links_of_kind(content.link_kinds.size());
+  for (const scene::RenderKindIndex kind : content.kind_of_link) {
+    if (kind.valid()) ++links_of_kind[kind];
   }
   if (scene_sent_) {
     JsonWriter all;
@@ -263,8 +263,8 @@ void FoxgloveExport::send_scene(const model::WorldModel& world, uint64_t time_ns
     for (size_t k = 0; k < instance.model->links.size(); ++k) {
       const size_t link = static_cast<size_t>(layout.first_link[m]) + k;
       const model::LinkPlacement& placement = layout.links[link];
-      if (content.kind_of_link[link] < 0) continue;
-      const auto kind = static_cast<size_t>(content.kind_of_link[link]);
+      const scene::RenderKindIndex kind = content.kind_of_link[link];
+      if (!kind.valid()) continue;
       json.open('{');
       write_time(json, "timestamp", time_ns);
       json.member("frame_id", placement.body.valid() ? layout.bodies[placement.body].name

@@ -24,7 +24,7 @@
 
 namespace ruedo::cli {
 
-// Where the messages go: a file, or who looks on.
+// Where the messages go: a file, or viewers.
 class FoxgloveOutput {
  public:
   virtual ~FoxgloveOutput() = default;
@@ -61,7 +61,7 @@ class FoxgloveFile : public FoxgloveOutput {
 
 class FoxgloveExport {
  public:
-  // Topics of what holds until another scene begins.
+  // Topics whose last message holds until another scene begins.
   static constexpr const char *kFrames = "ruedo/frames", *kScene = "ruedo/scene";
   // Of what clients draw, layer by layer.
   static constexpr const char* kMarkers = "ruedo/markers";

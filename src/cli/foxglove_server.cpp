@@ -47,7 +47,7 @@ constexpr size_t kMostLayers = 64;  // of what clients draw, for who comes later
 constexpr size_t kMostChannels = 65'000;
 constexpr size_t kMostSubscriptions = 100'000, kMostPublished = 100;  // of one viewer
 constexpr SimTime kClockPeriod_us = 20'000;
-// Pages that may come in beside programs, which have no origin: anyone's page could else look on.
+// Web pages that may connect. Programs have no origin and may; any other web page could be spying.
 const std::vector<std::string> kOrigins = {"https://app.foxglove.dev",
                                            "https://studio.foxglove.dev"};
 
@@ -65,12 +65,12 @@ struct Channel {
     Text text;
     std::string key;
   };
-  std::vector<Kept> kept;  // for who comes later
+  std::vector<Kept> kept;  // for viewers that come later
   // Keeps its messages until models come or go; those with a key until the next of that key.
   bool lasts = false;
 };
 
-// A velocity from Foxglove's Teleop panel: a geometry_msgs/Twist as JSON. Nothing for what is none.
+// A velocity from Foxglove's Teleop panel: a geometry_msgs/Twist as JSON. Nothing for other JSON.
 std::vector<uint8_t> velocity_of(std::string_view text) {
   const json twist = json::parse(text, nullptr, false);
   const auto number = [&](const char* part, const char* axis) {
@@ -123,7 +123,7 @@ struct Hub {
   }
 };
 
-// One program that looks on. All but the constructor and the destructor under the hub's lock.
+// One viewer. Everything but the constructor and the destructor needs the hub's lock.
 class Viewer : public console::Connection {
  public:
   explicit Viewer(Hub& hub, const std::string& greeting) : hub_(hub) {
@@ -195,7 +195,7 @@ class Viewer : public console::Connection {
     if (bytes_ > kMostWaiting) {
       ++hub_.dropped;
       if (!std::exchange(told_, true)) {
-        waiting_.clear();  // it is far behind: it goes on with what comes from now on
+        waiting_.clear();  // it is too far behind: what waits is dropped
         bytes_ = 0;
         complain("messages were dropped: this connection is slower than the run");
       }
@@ -226,7 +226,7 @@ class Viewer : public console::Connection {
     } else if (op == "unadvertise") {
       for (const json& one : asked.at("channelIds")) published_.erase(id_of(one));
     }
-    return true;  // what else there is in the protocol is not offered
+    return true;  // the rest of the protocol is not supported
   }
 
   void subscribe(uint32_t id, size_t channel) {

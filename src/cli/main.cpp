@@ -31,7 +31,7 @@ void say(const std::string& text) {
              ruedo::for_terminal(text), style.off);
 }
 
-// A hint for what CLI11 did not know: the nearest command or option.
+// A hint for an unknown argument: the nearest command or option.
 std::string suggestion(const CLI::App& app, int argc, char** argv) {
   const CLI::App* command = &app;
   for (int i = 1; i < argc; ++i) {
@@ -59,8 +59,8 @@ std::string suggestion(const CLI::App& app, int argc, char** argv) {
   return "";
 }
 
-// What neither threads nor libraries can do without, and what they hang or crash for: said here,
-// where it can be said.
+// Checks what threads and libraries cannot do without, and would hang or crash for want of, where
+// an error can still be reported.
 void check_limits() {
   constexpr rlim_t kFiles = 64, kMemory = rlim_t{1024} << 20;
   rlimit limit{};
@@ -92,7 +92,8 @@ void add_place(CLI::App& app, const std::string& option, const std::string& path
   app.add_flag_callback(option, show, description);
 }
 
-// To each command that has no such option of its own, and no other program to hand it to.
+// Added to each command that has no such option, and does not pass its arguments to another
+// program.
 void add_quiet(CLI::App& app) {
   const std::string description = "do not show on a terminal how far it is";
   for (CLI::App* command : app.get_subcommands([](const CLI::App*) { return true; })) {

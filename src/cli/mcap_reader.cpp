@@ -1,4 +1,4 @@
-// Every length is held against what is there before anything is made of it.
+// Every length is checked against the bytes that are there before it is used.
 #include "cli/mcap_reader.h"
 
 #include <cstdio>

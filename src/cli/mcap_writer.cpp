@@ -176,7 +176,7 @@ void McapWriter::add_attachment(const std::string& name, const std::string& medi
   if (!file) throw EnvironmentError(path + " cannot be read: " + std::strerror(errno));
   std::string fields;
   put(fields, uint64_t{0});  // logged: from the beginning on
-  put(fields, uint64_t{0});  // when it was made is no part of a bag's bytes
+  put(fields, uint64_t{0});  // a bag's bytes must not depend on when it was made
   put_text(fields, name);
   put_text(fields, media_type);
   put(fields, size);

@@ -1,5 +1,5 @@
-// ruedo bench and ruedo experiments: a program of its own, ruedo-measure, so that what serves does
-// not carry what measures.
+// ruedo bench and ruedo experiments: a program of its own, ruedo-measure, so that the server does
+// not contain the measurements.
 #include <cerrno>
 #include <cstring>
 

@@ -23,7 +23,7 @@ using Clock = Progress::Clock;
 constexpr auto kNext = std::chrono::milliseconds(200);
 constexpr double kEnoughToGuess_s = 2.0;  // of what was done, before the rest is guessed from it
 
-// What is done sooner needs no line. Tests want one at once.
+// A quick command needs no line. Tests want one at once.
 std::chrono::milliseconds first_after() {
   const char* named = std::getenv("RUEDO_PROGRESS_AFTER_MS");
   return std::chrono::milliseconds(named != nullptr ? std::atoi(named) : 1000);
@@ -58,7 +58,7 @@ std::string text_of(const Progress::State& state, size_t width) {
   return what + figures;
 }
 
-// Lives as long as the program: what ends in another thread may still tell it.
+// Lives as long as the program: another thread may still report its end to it.
 class Line {
  public:
   void begin() {

@@ -1,5 +1,5 @@
-// ruedo regress: one regression of a user's: a world, a client, and what must come of it. ctest and
-// pytest run it.
+// ruedo regress: a user's regression test: a world, a client, and what is expected of the run.
+// ctest and pytest run it.
 #include <charconv>
 #include <cmath>
 #include <cstdlib>
@@ -153,7 +153,7 @@ std::string run_script(const RegressArguments& arguments) {
              : "the script ended with " + script.fault() + ": " + arguments.script;
 }
 
-// The failed run as a page beside its log, to be looked at where no ruedo is.
+// The failed run as a page beside its log, for machines without ruedo.
 void attach_page(const std::string& log) {
 #ifdef RUEDO_CONSOLE
   try {
@@ -166,7 +166,7 @@ void attach_page(const std::string& log) {
 #endif
 }
 
-// What did not hold, the log's messages seen to.
+// The expectations that were not met, judged by the log's messages.
 std::vector<judge::Failure> judged(judge::Judge& judge, const std::string& record) {
   log::Reader log(record);
   log::Event event;
@@ -226,7 +226,7 @@ int regress(RegressArguments arguments) {
     const std::string kept = arguments.record + ".kept";
     if (const fs::path folder = fs::path(arguments.golden).parent_path();
         renew && !folder.empty()) {
-      std::error_code error;  // the log's own opening says what is wrong
+      std::error_code error;  // opening the log reports what is wrong
       fs::create_directories(folder, error);
     }
     keep_channels(arguments.record, renew && failures.empty() ? arguments.golden : kept,

@@ -79,7 +79,7 @@ void require_camera(const std::string& camera, const model::WorldModel& world) {
               (near.empty() ? "" : "; did you mean " + near + "?"));
 }
 
-// What the camera itself gives: with its lens, noise and exposure, but not compressed.
+// The camera's own picture: with its lens, noise and exposure, but not compressed.
 cv::Mat picture_of_camera(const RenderArguments& arguments, const model::WorldModel& world,
                           const model::BodyLayout& layout) {
   const auto device = make_lone_device(world, layout, arguments.camera, !arguments.world.no_noise);
@@ -114,7 +114,7 @@ std::shared_ptr<const model::WorldModel> load(const RenderArguments& arguments) 
   const Size size = arguments.size.empty() ? Size{} : parse_size(arguments.size);
   std::vector<model::Setting> settings{{robot, device, "ruedo:encoding", "rgb"}};
   settings.insert(settings.end(), options.settings.begin(),
-                  options.settings.end());  // what the user sets comes later and holds
+                  options.settings.end());  // the user's settings come later and win
   if (size.width != 0) {
     settings.push_back({robot, device, "camera.image.width", std::to_string(size.width)});
     settings.push_back({robot, device, "camera.image.height", std::to_string(size.height)});

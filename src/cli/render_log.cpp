@@ -158,7 +158,7 @@ class Scene {
   }
 
  private:
-  // Seen from outside, a roof would hide what goes on.
+  // From outside a roof would hide what is in the rooms.
   static std::shared_ptr<const model::WorldModel> without_roof(
       const std::shared_ptr<const model::WorldModel>& world, const std::string& view) {
     const bool from_outside = view == "top" || view == "iso";

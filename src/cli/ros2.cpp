@@ -55,7 +55,7 @@ std::vector<run::WaitForOption> with_channels(std::vector<run::WaitForOption> op
 namespace {
 
 constexpr size_t kMostQueued = size_t{64} << 20;           // bytes
-constexpr auto kLook = std::chrono::milliseconds(10);      // at who is there
+constexpr auto kLook = std::chrono::milliseconds(10);      // between two looks at who is there
 constexpr auto kSettled = std::chrono::milliseconds(300);  // since the last one came
 constexpr auto kPatience = std::chrono::seconds(1);
 

@@ -152,7 +152,7 @@ bool Rosbag::write(const ros2::Topic& topic, uint64_t time_ns, std::span<const u
   return !says_all_of.empty() && at->second.says_all_of == says_all_of;
 }
 
-// A log may be a stranger's: what is not its world's, with that content, is not looked at.
+// A log may be a stranger's: only files of its world with the expected content are read.
 void Rosbag::attach_files(log_header_t header, const std::string& log) {
   std::vector<std::string> names;
   for (const log_file_t& file : header.files) names.push_back(file.path);

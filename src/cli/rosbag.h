@@ -1,9 +1,9 @@
 // A log as a ROS 2 bag: a folder with an MCAP file of CDR messages and the metadata.yaml by which
 // rosbag2 finds it.
 //
-// Beside the topics, as attachments, which readers of ROS pass over, lies what no topic says in
-// full: a log of those messages (kRest), and the files that the world was made from. From all of it
-// BagLog makes the log again.
+// What no topic holds in full is in attachments, which ROS's readers ignore: a log of those
+// messages (kRest), and the files that the world was made from. BagLog restores the log from all of
+// it.
 #pragma once
 
 #include <cstdint>
@@ -31,7 +31,7 @@ class Rosbag {
   Rosbag(const std::string& folder, ros2::ConversionOptions options);
   ~Rosbag();  // a bag that was not finished is removed
 
-  // What runs from now on.
+  // The run that the next messages are of.
   void begin_scene(const run::LogWorlds::Scene& scene, uint64_t time_ns);
   // A message as it came; one that ROS has no type for, or that is damaged, is left out and
   // counted.

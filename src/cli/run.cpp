@@ -36,9 +36,9 @@
 namespace ruedo::cli {
 namespace {
 
-// Takes SIGINT, SIGTERM, and SIGHUP where it is not ignored (nohup), in a thread of its own: a
-// handler could do next to nothing. Make it before any other thread, which then inherits that the
-// signals are blocked. A closed pipe is an error of write() here, not a signal.
+// Handles SIGINT, SIGTERM, and SIGHUP unless it is ignored (nohup), in a thread of its own: a
+// signal handler may do next to nothing. Make it before any other thread, so that all inherit the
+// blocked signals. A closed pipe is reported by write(), not by a signal.
 class SignalThread {
  public:
   SignalThread() {
@@ -65,7 +65,7 @@ class SignalThread {
       if (done_) return;
       run::Run* server = server_;
       if (!server || asked_)
-        std::_Exit(128 + signal);  // nothing to end cleanly, or it does not end
+        std::_Exit(128 + signal);  // there is no run to end cleanly, or it does not end
       asked_ = true;
       server->stop();
     }
@@ -155,7 +155,7 @@ run::RunOptions server_options(const RunArguments& arguments) {
   options.record_limit = static_cast<int64_t>(arguments.record_limit);
   options.result_options = result_options(arguments.world);
   for (const std::string& text : arguments.remaps) {
-    if (text.starts_with('/')) continue;  // ROS's names, which change nothing of the run
+    if (text.starts_with('/')) continue;  // ROS's names, which do not affect the run
     options.remaps.push_back(parse_remap(text));
     options.result_options.push_back("--remap=" + text);
   }
@@ -173,7 +173,7 @@ run::RunOptions server_options(const RunArguments& arguments) {
   return options;
 }
 
-// What of the options is ROS's: names that begin with a slash.
+// The options for ROS: names that begin with a slash.
 Ros2Arguments ros2_arguments(const RunArguments& arguments, const run::RunOptions& options) {
   Ros2Arguments ros2 = arguments.ros2;
   for (const std::string& text : arguments.remaps) {
@@ -188,7 +188,7 @@ Ros2Arguments ros2_arguments(const RunArguments& arguments, const run::RunOption
   return ros2;
 }
 
-// What clients need to find this server, where they would not find it by themselves.
+// What clients need in order to find this server, when they would not by default.
 void announce(const bus::ServerBus& place) {
   if (!place.note.empty()) spdlog::warn(place.note);
   if (place.announce) fmt::print("{}\n", bus::export_line(place.url));
@@ -264,8 +264,9 @@ int run_world(const RunArguments& arguments) {
     if (foxglove) foxglove->print();
   });
   if (!is_read)
-    server.on_state(
-        [&server](const Snapshot&) { server.stop(); });   // as by SIGTERM: the log gets its end
+    server.on_state([&server](const Snapshot&) {
+      server.stop();
+    });  // as after SIGTERM: the log is closed properly
   if (!is_read && arguments.lockstep > 0) server.stop();  // no state comes by itself
   end_progress_line();
   StatusLine status(arguments.quiet);
@@ -384,7 +385,7 @@ void add_files(CLI::App& command, RunArguments& arguments) {
       ->type_name("FILE");
 }
 
-// What may be given without a value: it is on when it is there.
+// An option without a value is on when it is given.
 struct Viewers {
   CLI::Option *console, *foxglove, *ros2;
 };

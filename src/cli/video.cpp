@@ -48,7 +48,7 @@ void Video::check_name(const std::string& file) {
 Video::Video(const std::string& file, cv::Size size, double fps)
     : file_(std::filesystem::absolute(file).string()) {
   check_name(file);
-  std::signal(SIGPIPE, SIG_IGN);  // a child that has ended is told by its exit code
+  std::signal(SIGPIPE, SIG_IGN);  // the exit code tells that the child has ended
   complaints_ = std::tmpfile();
   int ends[2];
   if (complaints_ == nullptr || ::pipe2(ends, O_CLOEXEC) != 0) {
@@ -95,7 +95,7 @@ void Video::close() {
   if (!written || !WIFEXITED(status_) || WEXITSTATUS(status_) != 0) fail();
 }
 
-// With the last line of what it complained of.
+// With the last line of its error output.
 void Video::fail() {
   if (pictures_) std::fclose(std::exchange(pictures_, nullptr));
   if (child_ > 0) ::waitpid(std::exchange(child_, -1), &status_, 0);

@@ -139,7 +139,7 @@ void Events::add(const std::string& kind, const std::string& robot, const std::s
   if (list_.size() < kMost) list_.push_back({now_s_, kind, printable(robot), printable(text)});
 }
 
-void Events::begin_anew() {
+void Events::reset() {
   list_.clear();
   touched_.clear();
   heard_.clear();
@@ -277,10 +277,10 @@ void Events::command(const std::string& channel, std::span<const uint8_t> messag
 void Events::done(int32_t kind, std::span<const uint8_t> body) {
   const std::string verb = verb_of(kind);
   if (verb.empty()) return;
-  const bool anew = kind == request_t::RESET || kind == request_t::RESTORE;
-  if (anew && live_) begin_anew();
-  const std::string name = anew ? "" : name_in(kind, body);
-  add(anew ? "reset" : "request", "", name.empty() ? verb : verb + " " + name);
+  const bool resets = kind == request_t::RESET || kind == request_t::RESTORE;
+  if (resets && live_) reset();
+  const std::string name = resets ? "" : name_in(kind, body);
+  add(resets ? "reset" : "request", "", name.empty() ? verb : verb + " " + name);
 }
 
 // A request that was done. Who repeats one that is done gets the same answer again.

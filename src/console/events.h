@@ -33,7 +33,7 @@ class Events {
  public:
   static constexpr size_t kMost = 20'000;  // later ones are not kept
 
-  // live: the time is that of the messages themselves, and a reset begins the list anew.
+  // live: the time is that of the messages themselves, and a reset empties the list.
   explicit Events(bool live) : live_(live) {}
 
   // Whether messages of that type may tell of something.
@@ -48,7 +48,7 @@ class Events {
 
   // In the order in which they were heard.
   const std::vector<Event>& list() const { return list_; }
-  // Another one when the list has begun anew.
+  // Another one when the list was reset.
   uint64_t generation() const { return generation_; }
 
  private:
@@ -60,7 +60,7 @@ class Events {
   void command(const std::string& channel, std::span<const uint8_t> message);
   void done(int32_t kind, std::span<const uint8_t> body);
   void replied(std::span<const uint8_t> message);
-  void begin_anew();
+  void reset();
   void come_due();
 
   bool live_;

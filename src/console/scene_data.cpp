@@ -240,7 +240,7 @@ Bytes link_bytes(const model::WorldModel& world, const model::BodyLayout& layout
   for (const LinkIndex i : layout.links.indices()) {
     const model::LinkPlacement& link = layout.links[i];
     const bool removed = world.models[link.instance].removed;
-    blob.add(int32_t{removed ? -1 : content.kind_of_link[i]});
+    blob.add(int32_t{removed ? -1 : content.kind_of_link[i]});  // -1: nothing to draw
     blob.add(int32_t{link.body});
     for (const double value : numbers(link.X_BL)) blob.add(static_cast<float>(value));
   }

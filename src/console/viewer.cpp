@@ -206,9 +206,9 @@ bool Viewer::next_playback(std::string& text) {
 bool Viewer::next_events(std::string& text) {
   const Events* events = stage_.source->events();
   if (!events) return false;
-  const bool anew = told_generation_ != events->generation();
-  if (!anew && told_events_ == events->list().size()) return false;
-  if (anew) told_events_ = 0;
+  const bool reset = told_generation_ != events->generation();
+  if (!reset && told_events_ == events->list().size()) return false;
+  if (reset) told_events_ = 0;
   told_generation_ = events->generation();
   const size_t count = std::min(kMostEvents, events->list().size() - told_events_);
   JsonWriter json;

@@ -180,7 +180,7 @@ void CommandInbox::remove(RobotIndex robot) {
   std::make_heap(waits_.scheduled.begin(), kept, later);
 }
 
-void CommandInbox::begin_time_anew() {
+void CommandInbox::reset_time() {
   std::lock_guard lock(mutex_);
   waits_.scheduled_count = waits_.scheduled_bytes = 0;
   waits_.next_step = 0;

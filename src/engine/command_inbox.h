@@ -71,7 +71,7 @@ class CommandInbox {
   // Robots that come and go; while nothing is received or applied. `inputs` are all of one robot.
   void add(const std::vector<Input>& inputs, int robots);
   void remove(RobotIndex robot);
-  void begin_time_anew();  // steps count from 0: what was scheduled is dropped
+  void reset_time();  // steps count from 0: what was scheduled is dropped
   // What waits becomes what waits in another copy of the world; while nothing is received or
   // applied.
   void take(const CommandInbox& other) { waits_ = other.waits_; }

@@ -238,7 +238,7 @@ Outcome set_twist(const set_twist_request_t& request, Simulation& simulation) {
 void reset_poses(Simulation& simulation) {
   const auto& models = simulation.world().models;
   for (const InstanceIndex i : models.indices()) {
-    if (!models[i].removed && !models[i].model->is_static) simulation.robots().start_again(i);
+    if (!models[i].removed && !models[i].model->is_static) simulation.robots().reset(i);
   }
 }
 

@@ -300,7 +300,7 @@ void Faults::remove(RobotIndex robot) {
   of_sensors_ = std::move(rest);
 }
 
-void Faults::begin_time_anew() {
+void Faults::reset_time() {
   of_robots_.clear();
   late_.clear();
   of_sensors_.reset();

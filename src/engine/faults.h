@@ -57,7 +57,7 @@ class Faults {
   const std::shared_ptr<const std::vector<Reseeding>>& reseedings() const { return reseedings_; }
 
   void remove(RobotIndex robot);
-  void begin_time_anew();  // steps count from 0: what went on is over
+  void reset_time();  // steps count from 0: what went on is over
 
  private:
   enum class Kind {

@@ -90,7 +90,7 @@ void Module::replace_sensor(std::unique_ptr<Sensor> sensor) {
   setup_.devices[0].sensor = std::move(sensor);
 }
 
-void Module::begin_time_anew(SimTime us) {
+void Module::reset_time(SimTime us) {
   for (size_t i = 0; i < slots_.size(); ++i) {
     setup_.devices[i].first_step = 0;
     setup_.devices[i].sensor->shift_time(us);

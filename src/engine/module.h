@@ -127,7 +127,7 @@ class Module {
   void add(ModuleSetup more);  // its devices, in the order of robots
   void remove(RobotIndex robot);
   void replace_sensor(std::unique_ptr<Sensor> sensor);  // of the only device, whose samples go on
-  void begin_time_anew(SimTime us);  // sim time was set back by so much, and steps count from 0
+  void reset_time(SimTime us);  // sim time went back by so much, and steps count from 0
 
   // Between two batches: its devices, their clocks and faults become what they are in another copy
   // of the world. Returns a device whose sensor cannot, or null.

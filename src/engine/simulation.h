@@ -95,7 +95,7 @@ class Simulation {
                           std::shared_ptr<const model::Model> model, int64_t step,
                           Channels& channels, Findings& findings);
   void remove_model(InstanceIndex instance, Channels& channels);
-  SimTime begin_time_anew(int epoch) { return world_.begin_time_anew(epoch); }
+  SimTime reset_time(int epoch) { return world_.reset_time(epoch); }
 
  private:
   const Batch* advance();

@@ -87,7 +87,7 @@ class World {
   // Takes one out. Its numbers stay free until the same model comes again.
   void remove_model(InstanceIndex instance, Channels& channels);
   // The state that there is becomes state 0. Returns what the time was.
-  SimTime begin_time_anew(int epoch);
+  SimTime reset_time(int epoch);
 
  private:
   InstanceIndex place(const std::string& name, const Pose& X_WM,

@@ -1,4 +1,4 @@
-// Models that come and go, and time that starts over.
+// Models that come and go, and the reset of time.
 #include <algorithm>
 #include <thread>
 
@@ -127,12 +127,12 @@ void World::renew_world_state() {
   }
 }
 
-SimTime World::begin_time_anew(int epoch) {
+SimTime World::reset_time(int epoch) {
   options_.epoch = epoch;
   const SimTime was = robots_->set_time_to_zero();
-  inbox_.begin_time_anew();
-  faults_.begin_time_anew();
-  for (auto& module : modules_) module->begin_time_anew(was);
+  inbox_.reset_time();
+  faults_.reset_time();
+  for (auto& module : modules_) module->reset_time(was);
   renew_world_state();
   return was;
 }

@@ -1,8 +1,7 @@
 // Compares two logs message by message and field by field, with a tolerance for each.
 //
-// Messages are matched by channel, timestamp and, within those, their order. Types that Ruedo does
-// not know are compared by their bytes. The channel ruedo/header, which tells the machine, is not
-// compared.
+// Messages are matched by channel, timestamp and order. Messages of unknown types are compared by
+// their bytes. The channel ruedo/header describes the machine and is not compared.
 #pragma once
 
 #include <functional>
@@ -15,8 +14,8 @@
 
 namespace ruedo::log {
 
-// What may differ. A value is good when any of the three tolerances holds; the last rule that fits
-// a field counts.
+// What may differ. A value passes when it is within any of the three tolerances; the last rule that
+// matches a field applies.
 struct DiffRule {
   std::string channel = "*";  // shell patterns
   std::string field = "*";    // without indices: "points.position"
@@ -59,8 +58,8 @@ struct Diff {
   bool same() const;
 };
 
-// Throws InputError when one of them is not a log. goes_on: asked now and then; where it says no,
-// what was found so far is returned.
+// Throws InputError when one of them is not a log. goes_on: asked now and then; when it returns
+// false, the result so far is returned.
 Diff diff_logs(const std::string& golden, const std::string& other,
                const std::vector<DiffRule>& rules, const std::function<bool()>& goes_on = {});
 

@@ -1,4 +1,4 @@
-// Versions and features are read from the process itself, so that no other layer is asked for them.
+// Versions and features are read from the process itself, so that this depends on no other layer.
 #include "log/header.h"
 
 #include <algorithm>
@@ -219,7 +219,8 @@ void check_files_of_spawned(const std::string& log) {
   }
 }
 
-// A log may be a stranger's: it is not told what is on this machine, not even by a hash.
+// The log may be a stranger's: it must not reveal which files are on this machine, not even by a
+// hash.
 void check_files(const log_header_t& header, const std::string& log) {
   const model::ResourceFinder finder(header.world_file, false);
   for (const log_file_t& file : header.files) {

@@ -30,10 +30,10 @@ log_header_t make_log_header(const model::WorldModel& world, uint64_t seed,
 // With their SHA-256.
 std::vector<log_file_t> hashed_files(const std::vector<std::string>& paths);
 
-// A log may have been made elsewhere: a file that is not where it was is looked for beside the log,
-// and among Ruedo's own worlds, by the end of its path and its SHA-256; one that is there, but
-// where nothing may be looked at, as another installation's, among the latter. The header then
-// names what was found.
+// A log may have been made elsewhere. A file that is not at its path is looked for beside the log
+// and among Ruedo's own worlds, by the end of its path and its SHA-256. A file that is there but
+// may not be read for a stranger's log (another installation's) is looked for among Ruedo's own
+// worlds. The header then names what was found.
 void find_files_again(log_header_t& header, const std::string& log);
 
 // Throws InputError when a file that the log was made from is gone or was changed: names the first.
@@ -41,8 +41,8 @@ void check_files(const log_header_t& header, const std::string& log);
 // The same for the models that came later in the log.
 void check_files_of_spawned(const std::string& log);
 
-// What determines a run's bytes beside its log and is not the same here, a line each: Ruedo's
-// version and build, the CPU, the C library, other libraries.
+// What else determines a run's bytes and differs here, a line each: Ruedo's version and build, the
+// CPU, the C library, other libraries.
 std::vector<std::string> machine_differences(const log_header_t& log, const log_header_t& here);
 
 // Throws InputError when a run with the header `here` is another one than the log's: other files,

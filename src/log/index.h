@@ -2,7 +2,7 @@
 // log.
 //
 // The log is read through once; of most messages only the place is kept. Times never go back: an
-// event that does counts as at the time of the one before it.
+// event whose time does is given the time of the event before it.
 #pragma once
 
 #include <cstdint>

@@ -1,4 +1,5 @@
-// A log of bounded size for runs without end: the last of what was published, and all that acted.
+// A log of bounded size for endless runs: the latest messages, and everything that acted on the
+// run.
 //
 // run.lcm gets what repeats the run: the header, what acted, hashes of the state. Beside it,
 // run.000001.lcm and so on hold everything, each for a while; when all files together are larger
@@ -33,7 +34,7 @@ class Ring {
 
   // What went wrong, or "".
   const std::string& error() const { return error_; }
-  // False: what acted takes half of the limit, and is not kept any more.
+  // False: the record of what acted fills half of the limit, and is no longer kept.
   bool repeats() const { return repeats_; }
 
  private:

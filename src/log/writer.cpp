@@ -41,7 +41,7 @@ Writer::~Writer() {
   flush();
   struct stat status{};
   if (::fstat(file_, &status) == 0 && status.st_nlink > 0)
-    ::fdatasync(file_);  // a power cut must not take back what was closed
+    ::fdatasync(file_);  // what was closed must survive a power cut
   ::close(file_);
 }
 

@@ -23,10 +23,10 @@ class Writer {
   // Adds an event. After a failure this does nothing: see error().
   void write(int64_t timestamp_us, const std::string& channel, const uint8_t* data, size_t size);
 
-  // Hands everything so far to the operating system.
+  // Writes everything so far to the operating system.
   void flush();
 
-  // Starts over with an empty file, whatever went wrong before.
+  // Begins with an empty file again, whatever went wrong before.
   void truncate();
 
   // Adds the events of another log that was written from its beginning and flushed, to an empty

@@ -128,8 +128,7 @@ void SavedState::read_parts(const Element& element, const std::string& prefix, S
   }
 }
 
-void SavedState::put_back(const std::string& name, ModelInstance& instance,
-                          Findings& findings) const {
+void SavedState::apply(const std::string& name, ModelInstance& instance, Findings& findings) const {
   const auto found = models_.find(name);
   if (found == models_.end() || instance.model->path) return;
   const SavedModel& saved = found->second;
@@ -171,7 +170,7 @@ void SavedState::put_back(const std::string& name, ModelInstance& instance,
   }
 }
 
-void SavedState::put_back(Light& light) const {
+void SavedState::apply(Light& light) const {
   if (const auto found = lights_.find(light.name); found != lights_.end())
     light.pose = found->second;
 }

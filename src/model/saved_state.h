@@ -16,8 +16,8 @@ class SavedState {
   SavedState(const Element& world, Findings& findings);
 
   // Where it was, and its joints; what cannot be is named.
-  void put_back(const std::string& name, ModelInstance& instance, Findings& findings) const;
-  void put_back(Light& light) const;
+  void apply(const std::string& name, ModelInstance& instance, Findings& findings) const;
+  void apply(Light& light) const;
 
  private:
   struct Link {

@@ -353,7 +353,7 @@ class SdfReader::WorldReader {
       read_or_leave_out(in_world_, "the light is left out", findings_, [&] {
         const Pose pose = frames_.pose(relative_to(*light), *light) * light->pose("pose");
         world_.lights.push_back(read_light(*light, pose, "world/light", context_));
-        saved.put_back(world_.lights.back());
+        saved.apply(world_.lights.back());
       });
     }
   }
@@ -505,7 +505,7 @@ class SdfReader::WorldReader {
                            [&] { instance.X_WM = frames_.pose(each.name, *each.element); }))
       return;
     instance.model = each.scope->model;
-    saved.put_back(each.name, instance, findings_);
+    saved.apply(each.name, instance, findings_);
     if (instance.is_robot()) name_robot(instance, each.element->source);
     check_channel_names(instance, each.element->source);
     world_.models.push_back(std::move(instance));

@@ -141,23 +141,23 @@ std::pair<Vec3, Vec3> errors_of(JointWays::Kind kind, btTypedConstraint& constra
   return {apart, at.askew()};
 }
 
-// Bullet's row of a stop that the joint is at; -1: it is at none.
-int stop_of(btTypedConstraint& constraint) {
+// Bullet's row of the stop that the joint is at.
+std::optional<int> stop_of(btTypedConstraint& constraint) {
   constexpr int kOfAHinge = 5, kOfASlider = 4;
   if (constraint.getConstraintType() == HINGE_CONSTRAINT_TYPE) {
     auto& hinge = static_cast<btHingeConstraint&>(constraint);
-    if (!hinge.hasLimit()) return -1;
+    if (!hinge.hasLimit()) return std::nullopt;
     hinge.testLimit(hinge.getRigidBodyA().getCenterOfMassTransform(),
                     hinge.getRigidBodyB().getCenterOfMassTransform());
-    return hinge.getSolveLimit() ? kOfAHinge : -1;
+    return hinge.getSolveLimit() ? std::optional(kOfAHinge) : std::nullopt;
   }
   if (constraint.getConstraintType() == SLIDER_CONSTRAINT_TYPE) {
     auto& slider = static_cast<btSliderConstraint&>(constraint);
     btTypedConstraint::btConstraintInfo1 size;
     slider.getInfo1(&size);
-    return slider.getSolveLinLimit() ? kOfASlider : -1;
+    return slider.getSolveLinLimit() ? std::optional(kOfASlider) : std::nullopt;
   }
-  return -1;
+  return std::nullopt;
 }
 
 bool moves(const SolverBody& body) { return body.inverse_mass != Vec3::Zero(); }
@@ -284,7 +284,7 @@ void JointBlocks::add_rows(Joint& joint, const SolverBodies& bodies, double subs
   Block& block = blocks_[joint.block];
   auto* motors = static_cast<JointMotors*>(joint.constraint->getUserConstraintPtr());
   joint.first = rows_.size();
-  joint.hinge = !block.is_tree && joint.stop < 0 && add_hinge(*joint.constraint, joint, bodies);
+  joint.hinge = !block.is_tree && !joint.stop && add_hinge(*joint.constraint, joint, bodies);
   if (!joint.hinge) add_asked(*joint.constraint, joint, bodies, substep_s);
   const size_t first_motor = rows_.size();
   if (motors && motors->first.on) add_motor(motors->first, joint, joint.reference, bodies);
@@ -338,11 +338,11 @@ bool JointBlocks::add_hinge(btTypedConstraint& constraint, Joint& joint,
 void JointBlocks::add_asked(btTypedConstraint& constraint, Joint& joint, const SolverBodies& bodies,
                             double substep_s) {
   const bool in_tree = blocks_[joint.block].is_tree;
-  if (in_tree && joint.stop < 0) return;
+  if (in_tree && !joint.stop) return;
   Values values;
   const int n = ask(constraint, 0.0, substep_s, values);
   joint.errors_only = !says_more(constraint);
-  for (int i = in_tree ? joint.stop : 0; i < (in_tree ? joint.stop + 1 : n); ++i) {
+  for (int i = in_tree ? *joint.stop : 0; i < (in_tree ? *joint.stop + 1 : n); ++i) {
     const size_t at = static_cast<size_t>(i) * kSkip;
     joint.errors_only = joint.errors_only && values.error[at] == 0.0;
     Row& row = add_row(joint);
@@ -851,11 +851,11 @@ double JointBlocks::look_again(double substep_s) {
       block.tree.tell_error(b ? joint.b : joint.a, apart, askew);
       largest = std::max({largest, apart.cwiseAbs().maxCoeff() / substep_s,
                           askew.cwiseAbs().maxCoeff() / substep_s});
-      if (joint.stop < 0) continue;
+      if (!joint.stop) continue;
       Values whole;
       ask(*joint.constraint, 1.0, substep_s, whole);
       double& target = rows_[joint.first].push_target;
-      target = whole.error[static_cast<size_t>(joint.stop) * kSkip];
+      target = whole.error[static_cast<size_t>(*joint.stop) * kSkip];
       largest = std::max(largest, std::abs(target));
       continue;
     }

@@ -2,6 +2,7 @@
 // (joint_tree.h), or, where joints close a loop or are of other kinds, as rows.
 #pragma once
 
+#include <optional>
 #include <vector>
 
 #include "physics/joint_tree.h"
@@ -52,7 +53,7 @@ class JointBlocks {
     bool hinge = false;          // not at a stop: its five rows are ours, not Bullet's
     int a = 0, b = 0, reference = 0;
     JointWays ways;
-    int stop = -1;  // Bullet's row of a stop that it is at; -1: none
+    std::optional<int> stop;  // Bullet's row of the stop that it is at
     size_t block = 0;
     size_t way = JointTree::kNone;  // in the block's tree, where it has just one
     size_t next_of_a = JointTree::kNone, next_of_b = JointTree::kNone;  // of the body's joints

@@ -57,7 +57,7 @@ class JointConstraint : private JointState {
   void set_motor(double rate, double lowest_effort, double highest_effort, double gain);
   void set_effort(double effort);  // gives that effort until another command
   void set_servo(const WheelServo& servo);
-  // Until the bodies are put back; what it is told already is held within them at once.
+  // Until the bodies are reset; what it is told already is held within them at once.
   void set(JointSetting setting, double value);
   bool commanded() const { return mode_ != Mode::passive; }
 
@@ -70,8 +70,8 @@ class JointConstraint : private JointState {
   // It moves as it is told, or not at all: nothing that acts on its bodies changes how.
   bool leads() const;
 
-  // The bodies were put back to where they started: the position is 0, and no command holds.
-  void start_again() {
+  // The bodies were reset to where they started: the position is 0, and no command holds.
+  void reset() {
     position_ = effort_ = command_ = 0.0;
     parent_position_ = 0.0;
     mode_ = Mode::passive;
@@ -82,7 +82,7 @@ class JointConstraint : private JointState {
 
   void disable() {  // it holds nothing any more
     if (constraint_) constraint_->setEnabled(false);
-    start_again();
+    reset();
   }
 
   // Becomes what the same joint is in another copy of the world.

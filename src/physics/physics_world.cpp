@@ -116,7 +116,7 @@ void PhysicsWorld::drive_wheel(WheelIndex wheel, const WheelServo& servo) {
 void PhysicsWorld::add(InstanceIndex instance) { impl_->add(instance); }
 void PhysicsWorld::remove(InstanceIndex instance) { impl_->remove(instance); }
 void PhysicsWorld::disturb(BodyIndex body) { impl_->disturb(body); }
-void PhysicsWorld::start_again(JointIndex joint) { impl_->joints_[joint].start_again(); }
+void PhysicsWorld::reset(JointIndex joint) { impl_->joints_[joint].reset(); }
 
 const std::vector<Finding>& PhysicsWorld::findings() const { return impl_->rigid_.findings; }
 void PhysicsWorld::read(Snapshot& snapshot) const { impl_->read(snapshot); }

@@ -93,7 +93,7 @@ class PhysicsWorld {
   // Beside the joint's own damping and friction, and within its limits: a rate may be any, the
   // effort ends where the joint is as fast as it may be.
   void servo_joint(JointIndex joint, const WheelServo& servo);
-  // Instead of what the file says, until the joint starts again.
+  // Instead of what the file says, until the joint is reset.
   void set_joint(JointIndex joint, JointSetting setting, double value);
 
   // A tie holds two bodies as they are to each other when it is closed; no other: to the world.
@@ -122,9 +122,9 @@ class PhysicsWorld {
   void remove(InstanceIndex instance);
   // Wakes a body and all that it could touch: before it is put elsewhere, and after.
   void disturb(BodyIndex body);
-  // Its bodies were put back to where they started: a joint that is no wheel of a drive is at 0,
+  // Its bodies were reset to where they started: a joint that is no wheel of a drive is at 0,
   // and no command holds.
-  void start_again(JointIndex joint);
+  void reset(JointIndex joint);
 
   // Shapes that Bullet can only approximate.
   const std::vector<Finding>& findings() const;

@@ -20,7 +20,7 @@ class Kept {
         pose_(body.getWorldTransform()),
         linear_(body.getLinearVelocity()),
         angular_(body.getAngularVelocity()) {}
-  void put_back() const {
+  void restore() const {
     body_.setWorldTransform(pose_);
     body_.updateInertiaTensor();
     body_.setLinearVelocity(linear_);
@@ -131,7 +131,7 @@ void PhysicsWorld::Impl::accelerate_at_start(const std::vector<BodyIndex>& bodie
     Vec3& acceleration = snapshot.body_accelerations[body];
     acceleration = (acceleration + velocity_now(body)) / kInstant_s;
   }
-  for (const Kept& body : kept) body.put_back();
+  for (const Kept& body : kept) body.restore();
   for (size_t i = 0; i < constraints.size(); ++i)
     *static_cast<JointMotors*>(constraints[i]->getUserConstraintPtr()) = motors[i];
 }

@@ -306,7 +306,7 @@ void Crowd::remove(InstanceIndex instance) {
   std::erase_if(others_, [&](const Other& other) { return other.instance == instance; });
 }
 
-void Crowd::start_again(InstanceIndex instance, SimTime now) {
+void Crowd::reset(InstanceIndex instance, SimTime now) {
   for (Person& person : people_) {
     if (person.instance != instance || person.gone) continue;
     begin(person);

@@ -37,8 +37,8 @@ class Crowd {
   void remove(InstanceIndex instance);
   void take(const Crowd& other);  // becomes what it is in another copy of the world
   void reseed(uint64_t seed);     // what people choose from now on
-  void start_again(InstanceIndex instance, SimTime now);
-  void shift_time(SimTime us) { thought_ -= us; }  // sim time was set back by so much
+  void reset(InstanceIndex instance, SimTime now);
+  void shift_time(SimTime us) { thought_ -= us; }  // sim time went back by so much
 
  private:
   using Vec2 = model::Vec2;

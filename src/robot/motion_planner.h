@@ -41,7 +41,7 @@ class MotionPlanner {
 
   // The robot was put somewhere, at rest: whatever it was asked to do is replaced by nothing.
   void stand_still(SimTime now);
-  void shift_time(SimTime us);  // sim time was set back by so much
+  void shift_time(SimTime us);  // sim time went back by so much
 
   // The way that the plan makes from now to now + step_us.
   Displacement step(SimTime now, int64_t step_us);

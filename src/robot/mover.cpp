@@ -22,10 +22,10 @@ Mover::Mover(const model::WorldModel& world, const model::BodyLayout& layout,
     if (layout.bodies[i].instance != instance) continue;
     parts_.push_back({i, placed.X_WM.inverse() * layout.bodies[i].X_WB});
   }
-  start_again(0);
+  reset(0);
 }
 
-void Mover::start_again(SimTime now) {
+void Mover::reset(SimTime now) {
   offset_ = -now;
   const Pose X_WM = pose_at(0);
   for (const Part& part : parts_) physics_->set_pose(part.body, (X_WM * part.X_MB).normalized());

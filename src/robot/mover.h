@@ -25,11 +25,9 @@ class Mover {
   Pose pose_at(SimTime time) const;
 
   InstanceIndex instance() const { return instance_; }
-  // The path starts over at that sim time.
-  void start_again(SimTime now);
-  void shift_time(SimTime us) {
-    offset_ += us;
-  }  // sim time was set back by so much; the path goes on
+  // The path begins at that sim time.
+  void reset(SimTime now);
+  void shift_time(SimTime us) { offset_ += us; }  // sim time went back by so much; the path goes on
 
   // Sends its bodies to where they are one step later.
   void before_step(SimTime now);

@@ -29,7 +29,7 @@ class Robots::Impl {
   Pose model_pose(InstanceIndex instance) const;
   void set_pose(InstanceIndex instance, const Pose& X_WM);
   void set_twist(InstanceIndex instance, const Twist& twist);
-  void start_again(InstanceIndex instance);
+  void reset(InstanceIndex instance);
   SimTime set_time_to_zero();
   void take(const Impl& other);
   void reseed(uint64_t seed) {
@@ -261,7 +261,7 @@ void Robots::Impl::add(InstanceIndex instance) {
   surroundings_.add(instance);
   if (!Mover::moves(*world_.models[instance].model)) return;
   movers_.push_back(std::make_unique<Mover>(world_, layout_, physics_, instance));
-  movers_.back()->start_again(now());
+  movers_.back()->reset(now());
 }
 
 void Robots::Impl::remove(InstanceIndex instance) {
@@ -313,7 +313,7 @@ void Robots::Impl::set_twist(InstanceIndex instance, const Twist& twist) {
 }
 
 // A drive's wheels keep the angle that they have turned: encoders do not jump.
-void Robots::Impl::start_again(InstanceIndex instance) {
+void Robots::Impl::reset(InstanceIndex instance) {
   for (const InstanceIndex other : joints_.holds().carried_by(instance))
     for_each_body(other, [&](BodyIndex body) { put(body, layout_.bodies[body].X_WB); });
   joints_.holds().moved(instance);
@@ -332,14 +332,14 @@ void Robots::Impl::start_again(InstanceIndex instance) {
                     : layout_.bodies[body].X_WB);
   });
   for (const JointIndex i : layout_.joints.indices()) {
-    if (layout_.joints[i].instance == instance) physics_.start_again(i);
+    if (layout_.joints[i].instance == instance) physics_.reset(i);
   }
   joints_.forget(instance);
   joints_.start(instance);
   for (auto& mover : movers_)
-    if (mover->instance() == instance) mover->start_again(now());
-  crowd_.start_again(instance, now());
-  surroundings_.start_again(instance);
+    if (mover->instance() == instance) mover->reset(now());
+  crowd_.reset(instance, now());
+  surroundings_.reset(instance);
   end_put(instance);
 }
 
@@ -371,7 +371,7 @@ void Robots::set_twist(InstanceIndex instance, const Twist& twist) {
   impl_->set_twist(instance, twist);
 }
 void Robots::reseed(uint64_t seed) { impl_->reseed(seed); }
-void Robots::start_again(InstanceIndex instance) { impl_->start_again(instance); }
+void Robots::reset(InstanceIndex instance) { impl_->reset(instance); }
 SimTime Robots::set_time_to_zero() { return impl_->set_time_to_zero(); }
 
 }  // namespace ruedo::robot

@@ -77,9 +77,9 @@ class Robots {
   // odometry stays.
   void set_pose(InstanceIndex instance, const Pose& X_WM);
   void set_twist(InstanceIndex instance,
-                 const Twist& twist);        // of the model's frame, expressed in the world
-  void start_again(InstanceIndex instance);  // back where it started, at rest; paths start over
-  SimTime set_time_to_zero();                // nothing moves; returns what the time was
+                 const Twist& twist);  // of the model's frame, expressed in the world
+  void reset(InstanceIndex instance);  // back to where it started, at rest
+  SimTime set_time_to_zero();          // nothing moves; returns what the time was
 
  private:
   class Impl;

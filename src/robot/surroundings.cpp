@@ -77,7 +77,7 @@ void Surroundings::remove(InstanceIndex instance) {
   std::erase_if(doors_, of_it);
 }
 
-void Surroundings::start_again(InstanceIndex instance) {
+void Surroundings::reset(InstanceIndex instance) {
   for (Door& door : doors_) {
     if (door.instance != instance) continue;
     door.open = 0.0;

@@ -23,8 +23,8 @@ class Surroundings {
 
   void add(InstanceIndex instance);
   void remove(InstanceIndex instance);
-  void start_again(InstanceIndex instance);
-  void shift_time(SimTime us);  // sim time was set back by so much
+  void reset(InstanceIndex instance);
+  void shift_time(SimTime us);  // sim time went back by so much
 
  private:
   struct Part {

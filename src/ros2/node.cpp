@@ -122,7 +122,7 @@ void Node::add_pictures(const std::vector<world_info_t>& info) {
 }
 
 void Node::announce(const std::shared_ptr<const run::Announcement>& announcement) {
-  next_clock_us_ = 0;  // sim time may begin again
+  next_clock_us_ = 0;  // sim time may have been reset
   if (!is_same(announcement->info, info_)) take_over(announcement->info);
 }
 

@@ -1,4 +1,4 @@
-// All of it comes from the state that was published last.
+// All beats come from the last state that was published.
 #include "run/beats.h"
 
 #include "engine/world_state.h"

@@ -31,7 +31,7 @@ bool Control::receive(const uint8_t* data, size_t size) {
 
 namespace {
 
-// Names in it may be anybody's: clients show it, and replies are kept.
+// It may contain names that a client made up: clients show them, and replies are kept.
 std::string fit_text(const std::string& text) {
   if (text.size() <= Control::kLongestText) return for_terminal(text);
   return for_terminal(text.substr(0, Control::kLongestText)) + "...";
@@ -73,13 +73,13 @@ void Control::serve(const request_t& request) {
   if (request.run_id != 0 && request.run_id != run_id_)
     return answer_with(reply_t::WRONG_RUN, "this is another run of the server");
   if (request.kind == request_t::JOIN) return join(request, reply);
-  if (request.kind == request_t::LEAVE) {  // as often as one likes
+  if (request.kind == request_t::LEAVE) {  // may be repeated at will
     if (host_.left) host_.left(request.session);
     sessions_.leave(request.session);
     return publish(reply);
   }
   if (request.kind == request_t::INFO &&
-      request.session == 0) {  // who has not joined yet may ask what there is to join
+      request.session == 0) {  // a client may ask what there is before it joins
     host_.execute(request, Session{});
     return;
   }
@@ -88,7 +88,7 @@ void Control::serve(const request_t& request) {
   session->last_heard = std::chrono::steady_clock::now();
   session->spoke = true;
   if (request.kind ==
-      request_t::RESEND) {  // changes nothing: it may come as often as one likes, in any order
+      request_t::RESEND) {  // changes nothing: it may come any number of times, in any order
     engine::Outcome outcome = host_.execute(request, *session);
     reply.body = std::move(outcome.body);
     reply.size = static_cast<int32_t>(reply.body.size());
@@ -96,14 +96,14 @@ void Control::serve(const request_t& request) {
   }
   if (judge(request, *session, reply) != Sessions::Verdict::execute) return;
   if (host_.early && request.kind == request_t::GRANT && host_.early(request, *session)) return;
-  // After the sequence: a repeated RESET, of the epoch that it ended, gets its answer again.
+  // Checked after the sequence, so that a repeated RESET, of the epoch that it ended, is answered.
   if (request.epoch != -1 && request.epoch != reply.epoch)
     return answer_with(reply_t::WRONG_EPOCH, "the world was reset since");
   if (must_wait(request)) return hold(request);
   execute(request, *session, reply);
 }
 
-// Answers what is not to be executed.
+// Answers requests that are not executed.
 Sessions::Verdict Control::judge(const request_t& request, const Session& session, reply_t& reply) {
   const reply_t* kept = nullptr;
   if (is_waiting(request.session, request.sequence))
@@ -147,7 +147,7 @@ void Control::execute(const request_t& request, Session& session, reply_t& reply
   }
 }
 
-// Behind one that waits, all of its session do: they are executed in their order.
+// While one request waits, the later ones of its session wait, too: they are executed in order.
 bool Control::must_wait(const request_t& request) const {
   const RequestKind* kind = find_request_kind(request.kind);
   if ((!kind || kind->waits == RequestKind::for_state) && host_.state_comes()) return true;
@@ -155,7 +155,7 @@ bool Control::must_wait(const request_t& request) const {
                      [&](const request_t& held) { return held.session == request.session; });
 }
 
-// Beyond its share a client repeats what it asks for.
+// A client that has used up its share has to ask again.
 void Control::hold(const request_t& request) {
   const auto of_session = [&](const request_t& held) { return held.session == request.session; };
   const auto same = [&](const request_t& held) {
@@ -166,7 +166,7 @@ void Control::hold(const request_t& request) {
     held_.push_back(request);
 }
 
-// There is room for a PAUSE when there is none for a STEP.
+// There is still room for a PAUSE when there is none for a STEP.
 bool Control::has_too_many(const request_t& request) const {
   const auto waiting =
       static_cast<size_t>(std::count_if(waiting_.begin(), waiting_.end(), [&](const Waiting& each) {

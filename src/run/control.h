@@ -1,8 +1,8 @@
 // Simulation control: requests in, each executed once, replies out.
 //
 // The bus's thread puts requests into a bounded inbox; the publisher executes them between batches.
-// What a request does is the server's; who may ask, and that nothing is done twice, is seen to
-// here.
+// The server says what a request does. This file checks who may ask, and that no request is
+// executed twice.
 #pragma once
 
 #include <atomic>
@@ -26,7 +26,7 @@ inline constexpr int64_t kMostSteps = 1'000'000'000;
 class Control {
  public:
   static constexpr size_t kMostWaiting =
-      256;  // requests; more are dropped, their clients repeat them
+      256;  // requests; further ones are dropped, and repeated by their clients
   static constexpr size_t kMostWaitingBytes = 16u << 20;
   static constexpr size_t kMaxRequestSize = 1 << 20;  // bytes
   static constexpr size_t kMostHeld = 8;  // requests of one session that wait for the first state

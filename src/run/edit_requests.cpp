@@ -20,7 +20,7 @@ constexpr size_t kFindingsTold = 5;
 bool Run::stand_still() {
   const int64_t last = pacer_->hold();
   while (publisher_.step() < last) {
-    if (simulation_->over()) return false;  // a state that cannot be ends a run before its time
+    if (simulation_->over()) return false;  // a run whose state became invalid has ended early
     if (const engine::Batch* batch = simulation_->take())
       publish(*batch);
     else
@@ -31,7 +31,7 @@ bool Run::stand_still() {
 
 void Run::let_go() {
   pacer_->release();
-  wakeup_.set();  // what came meanwhile
+  wakeup_.set();  // for requests that came meanwhile
 }
 
 Run::Outcome Run::change(const request_t& request, bool models,
@@ -61,8 +61,8 @@ Run::Outcome Run::change(const request_t& request, bool models,
   return outcome;
 }
 
-// Who edits a world that stands still sees what has become of it, though no state comes. As a
-// service, which is in no log: a log is the same with and without viewers.
+// Shows the change to an editor of a world that stands still, where no new state would. It is a
+// service message, which is in no log: a log is the same with and without viewers.
 void Run::show_change() {
   if (!options_.edited || repeating_ || !pacer_->paused() || !publisher_.latest()) return;
   const std::vector<engine::Channel>& channels = channels_.list();
@@ -134,11 +134,11 @@ Run::Outcome Run::reset_time(const request_t& request) {
   if (!repeating_) control_.cancel("sim time was reset");
   note(request);
   header_.epoch = ++epoch_;
-  pacer_->begin_time_anew();
+  pacer_->reset_time();
   publisher_.begin_epoch(epoch_);
   {
     const std::lock_guard lock(simulation_mutex_);
-    simulation_->begin_time_anew(epoch_);
+    simulation_->reset_time(epoch_);
     mode().begin(stage(), -1);
   }
   announce();
@@ -156,7 +156,7 @@ Run::Outcome Run::spawn(const request_t& request, const spawn_request_t& body) {
   }
 }
 
-// What was granted is computed first: so who waits for the answer knows the step.
+// Granted steps are computed first, so that the client knows at which step the request acts.
 void Run::spawn_ready() {
   for (;; made_.reset()) {
     if (!made_) {
@@ -188,7 +188,7 @@ Run::Outcome Run::put_in(const request_t& request, const spawn_request_t& body,
     const Finding& finding = loaded.findings[i];
     spdlog::warn("{}: {}: {}", finding.source.str(), finding.element, finding.text);
   }
-  name_request_t which;  // the answer says what its name is, and where it stands
+  name_request_t which;  // the answer gives its name and its pose
   which.name = name;
   return publisher_.latest() ? get_state(request, which) : outcome;
 }
@@ -209,7 +209,7 @@ Run::Outcome Run::set_pose(const request_t& request, const set_pose_request_t& b
   return outcome;
 }
 
-// The poses that the file gets are those of the last state that is out.
+// The file gets the poses of the last published state.
 Run::Outcome Run::save(const request_t&) {
   const model::BodyLayout& layout = simulation_->layout();
   const EditedWorld::Saved saved = edited_->save(*world_, [&](size_t instance) {

@@ -1,4 +1,4 @@
-// A file is written beside the old one, and takes its name when it is on the disk.
+// A file is written beside the old one and renamed once it is on the disk.
 #include "run/edited_world.h"
 
 #include <fcntl.h>
@@ -42,7 +42,7 @@ bool write_all(int file, const std::string& bytes) {
   return true;
 }
 
-// What went wrong, or "". The old file stays whole until the new one is.
+// What went wrong, or "". The old file stays intact until the new one is complete.
 std::string write_file(const std::string& path, const std::string& bytes) {
   const fs::path folder = fs::path(path).parent_path();
   std::string part = (folder / ("." + fs::path(path).filename().string() + ".XXXXXX")).string();
@@ -66,7 +66,7 @@ std::string write_file(const std::string& path, const std::string& bytes) {
   return "";
 }
 
-// Links are followed: what they lead to is written.
+// Follows symbolic links: writes the file that they lead to.
 std::string full(const std::string& file) {
   if (file.empty()) return "";
   std::error_code error;

@@ -1,5 +1,5 @@
-// What a run's world has become, as text: models for SPAWN, and all of it for the one file that may
-// be written.
+// The current world of a run as text: single models for SPAWN, and the whole for the file that SAVE
+// writes.
 #pragma once
 
 #include <functional>

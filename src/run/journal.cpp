@@ -21,7 +21,7 @@ namespace fs = std::filesystem;
 
 constexpr const char* kSuffix = ".snapshot";
 
-// A file without a name, which goes when it is closed, however the process ends.
+// A file without a name: it disappears when it is closed, however the process ends.
 int open_nameless(const std::string& folder) {
   const int file = ::open(folder.c_str(), O_TMPFILE | O_RDWR | O_CLOEXEC, 0600);
   if (file >= 0) return file;
@@ -34,8 +34,7 @@ int open_nameless(const std::string& folder) {
   return named;
 }
 
-// A file that is removed again unless it is kept: what was written of a snapshot would go on taking
-// a full disk's room.
+// A file that is removed unless it is kept: half a snapshot must not take up room on a full disk.
 class PartOfFile {
  public:
   explicit PartOfFile(std::string path) : path_(std::move(path)) {}
@@ -45,7 +44,7 @@ class PartOfFile {
   PartOfFile(const PartOfFile&) = delete;
   PartOfFile& operator=(const PartOfFile&) = delete;
   const std::string& path() const { return path_; }
-  // Under its own name, on the disk before this returns; what went wrong, or "".
+  // Renames it to its own name; it is on the disk before this returns. What went wrong, or "".
   std::string keep_as(const std::string& path) {
     std::string fault = synced(path_, O_RDONLY);
     if (fault.empty() && ::rename(path_.c_str(), path.c_str()) != 0) fault = std::strerror(errno);
@@ -150,7 +149,7 @@ std::string Journal::save_past(const std::string& name, int64_t step, SimTime ti
       if (acted &&
           decode_checked(event.data.data(), event.data.size(), applied) != DecodeFault::none)
         return "the journal is damaged";
-      // Where sim time was set to 0, steps of before have earlier stamps.
+      // Where sim time was reset, earlier steps have earlier stamps.
       const SimTime stamp = event.timestamp_us + base_us_;
       if (stamp > stamp_us || (acted && stamp == stamp_us && applied.step == step)) break;
       snapshot.write(event.timestamp_us, event.channel, event.data.data(), event.data.size());

@@ -1,7 +1,7 @@
 // What acted on the world since its epoch began, from which snapshots are made.
 //
 // A file without a name in the snapshots' folder: it grows with what acts on the world and with
-// nothing else, and begins again with the world.
+// nothing else, and is reset with the world.
 #pragma once
 
 #include <cstdint>
@@ -35,7 +35,7 @@ class Journal : public Sink {
   // Writes the journal and the state that it leads to into a file of the folder, which then is
   // whole or not there. stamp_us: of the state. The error, or "".
   std::string save_snapshot(const std::string& name, const state_hash_t& state, SimTime stamp_us);
-  // The same of a state that is past, which is not in the journal: nothing will check it. time_us:
+  // The same for a past state. Its hash is not in the journal, so it will not be checked. time_us:
   // of that state.
   std::string save_past(const std::string& name, int64_t step, SimTime time_us, int32_t epoch,
                         SimTime stamp_us);

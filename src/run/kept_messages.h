@@ -1,4 +1,5 @@
-// The messages of the last steps, for those who have lost some: kept until all have received them.
+// The messages of the last steps, for clients that have lost some: kept until all have received
+// them.
 #pragma once
 
 #include <cstdint>
@@ -33,7 +34,7 @@ class KeptMessages : public Sink {
   void forget(int64_t step);  // all up to and with that one
   void clear() { forget(INT64_MAX); }
 
-  // A batch of steps may go beyond: who asks stops before the next.
+  // One batch of steps may exceed it; the caller then takes no other.
   bool full() const { return steps_.size() >= kMostSteps || bytes_ >= kMostBytes; }
   bool empty() const { return steps_.empty(); }
   size_t bytes() const { return bytes_; }

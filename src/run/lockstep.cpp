@@ -13,7 +13,7 @@ namespace ruedo::run {
 namespace {
 
 constexpr auto kLastWords =
-    std::chrono::seconds(1);  // who wants something after the end asks within that
+    std::chrono::seconds(1);  // for clients to ask again for lost messages after the end
 
 // Reads what decides whether a grant is early, without decoding all of it.
 bool read_grant(const request_t& request, grant_request_t& grant) {
@@ -70,7 +70,7 @@ engine::Outcome Lockstep::take_part(const Session& session) {
     if (!place->silent)
       return engine::Outcome::refuse(reply_t::REFUSED,
                                      "a client called '" + session.client + "' takes part already");
-    place->session = session.id;  // its grants stand where they stood
+    place->session = session.id;  // its grants are kept
     place->silent = false;
     place->grants.clear();
     note(request_t::JOIN, *place);
@@ -101,7 +101,7 @@ bool Lockstep::early(const request_t& request, const Session& session) const {
          !has_room(*member, grant.commands.size(), bytes);
 }
 
-// Each has the same share of what is held, so that none takes another's.
+// Every client has the same share of the room, so that none takes another's.
 bool Lockstep::has_room(const Member& member, size_t count, size_t bytes) const {
   const size_t share = std::max<size_t>(members_.size(), 1);
   return member.held.size() + count <= kMostHeld / share &&
@@ -160,7 +160,7 @@ std::string Lockstep::refusal(int32_t kind, bool) const {
     case request_t::RESEND:
     case request_t::INFO:
     case request_t::QUIT:
-    case request_t::STEP: return "";  // a STEP says that grants step
+    case request_t::STEP: return "";  // a STEP is answered that grants take steps here
     default:
       return begun() ? ""
                      : "lockstep has not begun: call step(0), or grant. It waits for " +

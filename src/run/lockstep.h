@@ -35,7 +35,7 @@ struct LockstepOptions {
     fail,   // the run ends with LeaseEnded
   };
   int clients = 0;        // that step 0 waits for; 0: no lockstep
-  double lease_s = 10.0;  // of real time: who is silent for longer has lost it
+  double lease_s = 10.0;  // of real time; a client that is silent for longer loses it
   Policy policy = Policy::pause;
 };
 
@@ -54,7 +54,7 @@ class Lockstep : public Mode {
 
   // Everyone's grants stand at `step`, or at 0.
   void begin(const Stage& stage, int64_t step) override;
-  // False when the messages that not everybody has received are as many as are kept.
+  // False when no more messages can be kept for clients that have not received them all.
   bool has_room() const override { return !kept_.full(); }
   bool takes_grants() const override { return true; }
   std::string waits_for(int64_t step) const override;

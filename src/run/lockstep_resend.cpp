@@ -18,7 +18,7 @@ constexpr size_t kReplyHead = 8 + 8 + 4 + 1 + 4, kPartHead = 8 + 4 + 8 + 4 + 4 +
 
 }  // namespace
 
-// What fits into a part goes whole; only what is larger than a part by itself goes in pieces.
+// A message that fits into a part is sent whole; only one larger than a part is sent in pieces.
 engine::Outcome Lockstep::resend(const request_t& request, const Session& session) {
   resend_request_t body;
   if (decode_checked(request.body.data(), request.body.size(), body) != DecodeFault::none) {

@@ -162,7 +162,7 @@ LogWorlds::LogWorlds(const log::Index& index, const LoadRun& load) {
     } catch (const std::exception& error) {
       fault_ += (fault_.empty() ? "" : " ") +
                 std::string("What was spawned in the log cannot be shown: ") + error.what();
-      return;  // the places of what comes after it are not known
+      return;  // the poses of later models are then unknown
     }
   }
   if (index.edits().size() >= log::Index::kMostEdits)

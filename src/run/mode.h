@@ -58,7 +58,7 @@ class Mode {
   // Clients say how far it goes: every step has its tick, and the publisher computes a few steps
   // itself.
   virtual bool takes_grants() const { return false; }
-  // Who has to do what before the state after `step` can be computed, in words; "": no client.
+  // Which client has to do what before the state after `step` can be computed; "": none.
   virtual std::string waits_for(int64_t step) const {
     static_cast<void>(step);
     return "";
@@ -72,29 +72,29 @@ class Mode {
 
   // All states up to this one, with their ticks.
   virtual void published(int64_t step) { static_cast<void>(step); }
-  // To be asked until there is nothing to do. Throws InputError.
+  // Call it until there is nothing to do. Throws InputError.
   virtual Turn turn(int64_t step) {
     static_cast<void>(step);
     return {};
   }
-  // What came of the request of the last turn. Throws InputError.
+  // The outcome of the last turn's request. Throws InputError.
   virtual void executed(const engine::Outcome& outcome) { static_cast<void>(outcome); }
-  // Who asked what last, for the tick of that step.
+  // The last request of each client, for the tick of that step.
   virtual void add_applied(TickWriter& tick, int64_t step, const std::vector<Session>& sessions) {
     static_cast<void>(step);
     for (const Session& session : sessions) tick.add_applied(session.client, session.last_sequence);
   }
-  // Hears what is published; null: it need not.
+  // A sink that sees what is published; null: none is needed.
   virtual Sink* sink() { return nullptr; }
 
   // ---- When next?
 
-  // Looks after what depends on real time.
+  // Does what depends on real time.
   virtual Attended attend(const std::vector<Session>& sessions, int64_t step, Time now) {
     static_cast<void>(sessions), static_cast<void>(step), static_cast<void>(now);
     return {};
   }
-  // No state comes any more. finished(): no client wants anything.
+  // No more states will come. finished(): no client waits for anything.
   virtual void end() {}
   virtual bool finished(const std::vector<Session>& sessions, Time now) const {
     static_cast<void>(sessions), static_cast<void>(now);
@@ -103,7 +103,7 @@ class Mode {
 
   // ---- Clients
 
-  // A command, as it came; true: the mode has seen to it.
+  // A command as it came; true: the mode has handled it.
   virtual bool receive(const std::string& channel, const uint8_t* data, size_t size) {
     static_cast<void>(channel), static_cast<void>(data), static_cast<void>(size);
     return false;

@@ -79,7 +79,7 @@ ModelWorker::Made ModelWorker::make(Order order) {
   } catch (const std::exception& error) {
     made.fault = error.what();
   }
-  // A mesh that cost too much may only be left out where a file is read on purpose.
+  // A mesh over the budget may only be left out when the user loads a file, not in a SPAWN.
   if (!budget_->fault().empty())
     made.fault = "the model costs too much to be made ready: " + budget_->fault();
   return made;

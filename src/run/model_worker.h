@@ -39,7 +39,7 @@ class ModelWorker {
   // ready: set whenever take() may have something. before: called in the worker's thread before
   // each model; may be empty. Both, and the store, must outlive it.
   ModelWorker(engine::ModelStore& store, engine::Wakeup& ready, std::function<void()> before);
-  ~ModelWorker();  // leaves off
+  ~ModelWorker();  // abandons what is left
 
   // The publisher's, as take(). The outcome is pending, or a refusal.
   engine::Outcome add(Order order);

@@ -12,8 +12,8 @@ namespace {
 
 constexpr int64_t kFewSteps = 4;
 
-// Of the steps that are granted in lockstep: the sensors, the publisher and the client, who waits
-// for them, work on the first while the next are computed.
+// Of the steps granted in lockstep: the sensors, the publisher and the waiting client work on the
+// first ones while the next are computed.
 int64_t some_of(int64_t granted) { return std::max(kFewSteps, (granted + 3) / 4); }
 
 }  // namespace
@@ -95,7 +95,7 @@ int Pacer::borrow(int64_t& step, int limit) {
   std::lock_guard lock(mutex_);
   const int64_t until = std::min(until_, limit_);
   if (lent_ || granted_ >= until) return 0;
-  const bool paced = std::isfinite(rate_) && !paused_;  // it is real time that says when
+  const bool paced = std::isfinite(rate_) && !paused_;  // real time decides
   if (!asleep_ || hold_ || stopped_ || paced || until - granted_ > limit) {
     changed_.notify_all();
     return 0;
@@ -142,7 +142,7 @@ void Pacer::release() {
   changed_.notify_all();
 }
 
-void Pacer::begin_time_anew() {
+void Pacer::reset_time() {
   std::lock_guard lock(mutex_);
   granted_ = -1;
   until_ = paused_ ? 0 : last_step_;

@@ -42,7 +42,7 @@ class Pacer : public engine::Pace, public Gate {
   int64_t hold();
   bool wait_until_held();
   void release();
-  void begin_time_anew();  // while held: the next state is 0
+  void reset_time();  // while held: the next state is 0
 
   bool paused() const override;
   // Whether nothing is to be computed now: a pause, the end of the run, or real time.
@@ -55,8 +55,7 @@ class Pacer : public engine::Pace, public Gate {
   void reset();
   void sleep(std::unique_lock<std::mutex>& lock);
 
-  // A host that was held up catches up by at most this much; beyond it, the run is simply late from
-  // then on.
+  // After a delay the run catches up by at most this much; what is beyond it stays lost.
   static constexpr auto kMostCatchUp = std::chrono::milliseconds(250);
 
   const int64_t step_us_;

@@ -26,7 +26,7 @@ class Publisher {
 
   // The channels and info from now on.
   void announce(Announcement announcement);
-  // Sim time begins again at 0, and no state was published yet. Stamps go on.
+  // Sim time was reset to 0, and no state was published yet. Stamps go on.
   void begin_epoch(int32_t epoch);
 
   // A state of the batch, and its messages.

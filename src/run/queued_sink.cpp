@@ -32,7 +32,7 @@ QueuedSink::Entry& QueuedSink::add(What what) {
   return entry;
 }
 
-// Who misses messages must still know which channels there are.
+// A sink that misses messages must still know which channels there are.
 void QueuedSink::announce(const std::shared_ptr<const Announcement>& announcement) {
   add(What::announcement).announcement = announcement;
 }

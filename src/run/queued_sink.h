@@ -35,7 +35,7 @@ class QueuedSink : public Sink {
   // The sink must outlive it, and is called from the queue's thread alone, but for hears(), wants()
   // and audience().
   QueuedSink(Sink& sink, Options options);
-  ~QueuedSink() override;  // hands on all there is, then ends the thread
+  ~QueuedSink() override;  // delivers what is queued, then ends the thread
 
   Hears hears() const override { return sink_.hears(); }
   bool wants(const std::string& channel) const override { return sink_.wants(channel); }
@@ -46,7 +46,7 @@ class QueuedSink : public Sink {
   void end_step(const Step& step) override;
   void flush() override;
 
-  // Returns when the sink has all that came so far, and has flushed it.
+  // Returns when the sink has received and flushed everything so far.
   void drain();
 
   // Whether the run waits for the sink, or it misses steps. Any thread, as the next.

@@ -15,7 +15,7 @@ Repeating::Repeating(const std::string& path, const Mode* after) : replay_(path)
 void Repeating::begin(const Stage& stage, int64_t) {
   stage_ = stage;
   if (begin_us_ < 0) begin_us_ = stage.base_us;
-  stage_.gate->set_limit(-1);  // turn() says how far
+  stage_.gate->set_limit(-1);  // turn() sets the limit
 }
 
 Mode::Turn Repeating::turn(int64_t step) {

@@ -27,7 +27,7 @@ log_header_t first_event(log::Reader& reader, log::Event& event) {
   return header;
 }
 
-// Who joined and left says nothing to the world.
+// Joining and leaving does not affect the world.
 bool acts(int32_t kind) {
   const RequestKind* known = find_request_kind(kind);
   return known && known->effect == RequestKind::acts;
@@ -84,7 +84,7 @@ const applied_t* Replay::advance(int64_t step, const Target& target) {
 
 void Replay::executed() {
   waits_ = false;
-  known_ = -1;  // sim time may start over
+  known_ = -1;  // sim time may be reset
 }
 
 void Replay::read(const Target& target) {

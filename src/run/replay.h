@@ -31,7 +31,7 @@ class Replay {
                        // set to 0
   };
 
-  // Throws InputError for what is no log, or has no header of a run at its beginning.
+  // Throws InputError for a file that is no log, or does not begin with the header of a run.
   explicit Replay(const std::string& path);
 
   const log_header_t& header() const { return header_; }
@@ -63,7 +63,7 @@ class Replay {
   applied_t applied_;  // the next thing that acted, if waits_
   bool waits_ = false;
   bool ended_ = false;
-  int64_t known_ = -1;  // everything is known that acts on states before this one
+  int64_t known_ = -1;  // all that acts on the states before this one is known
   int64_t end_step_ = -1;
   state_hash_t end_{};
 };

@@ -155,7 +155,7 @@ Outcome Run::ask(const request_t& request, const Session& session) {
 }
 
 Outcome Run::execute(const request_t& request, const Session& session) {
-  tell_readers();  // a STEP is for those who have subscribed before it
+  tell_readers();  // whoever subscribed before the STEP must see its messages
   const RequestKind* kind = find_request_kind(request.kind);
   if (!kind || !kind->execute) {
     return Outcome::refuse(reply_t::NOT_SUPPORTED, "this server does not know requests of kind " +
@@ -319,8 +319,8 @@ Outcome Run::snapshot_of(const snapshot_request_t& past) {
   return outcome;
 }
 
-// In the log it is a reset, and the run up to the snapshot's step: so the log needs no other file
-// to be repeated.
+// In the log it is a reset and the run up to the snapshot's step, so that the log can be repeated
+// without another file.
 Outcome Run::restore(const request_t& request, const name_request_t& body) {
   const std::string path = journal_->snapshot_path(body.name);
   if (path.empty() || !std::filesystem::exists(path)) {

@@ -84,7 +84,7 @@ Run::Run(std::shared_ptr<const model::WorldModel> world, RunOptions options, Bus
 
 Run::~Run() { bus_.stop(); }
 
-// What the mode keeps for clients is kept before the tick says that it was sent.
+// The mode keeps messages for clients before the tick says that they were sent.
 void Run::add_sinks() {
   publisher_.add(bus_sink_);
   if (log_) publisher_.add(*log_);

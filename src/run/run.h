@@ -2,8 +2,8 @@
 //
 // run() is the publisher: it takes finished batches in order, hands their messages to the sinks,
 // executes requests between batches, and ends when the run does. Everything goes out from its
-// thread, in one order. How it goes on is its mode's (mode.h), what goes where its sinks' (sink.h),
-// what a request does is in the table of requests.cpp.
+// thread, in one order. The mode (mode.h) decides when it goes on, the sinks (sink.h) take the
+// messages, and the table in requests.cpp says what each request does.
 #pragma once
 
 #include <atomic>
@@ -51,15 +51,15 @@ struct RunOptions {
   LockstepOptions lockstep;  // wants control
   std::string record;        // file; "": none
   int64_t record_limit = 0;  // bytes of all files that --record makes; 0: none
-  bool edited = false;       // models are told as text, for who edits the world
+  bool edited = false;       // keeps the models' text, for editors of the world
   std::string save;          // file that SAVE writes; "": none
   std::string snapshots;     // folder that SNAPSHOT and RESTORE use; "": none
   std::vector<WaitForOption> wait_for;
   std::string repeat;            // log or snapshot to begin with: what acted on that run acts again
   bool end_with_repeat = false;  // and then end; else go on, and publish from there on
   Watcher watcher;               // sees what a log would get
-  Bus::Handler hearer;  // sees each command and request before it is taken, in the thread that
-                        // brings it
+  Bus::Handler hearer;           // sees each command and request before it is accepted, in the
+                                 // thread that received it
   std::function<void()> before_model;  // for tests: called in the worker's thread before a SPAWN's
                                        // model is made ready
   std::vector<std::string> result_options;  // for the log's header
@@ -81,7 +81,7 @@ class Run {
   ~Run();
 
   // Runs until the duration is over, stop(), or QUIT. Throws EnvironmentError when the log cannot
-  // be written any more, and LeaseEnded; the log is then whole up to there.
+  // be written any more, and LeaseEnded; the log is complete up to that point.
   void run();
 
   void stop();  // any thread, as the next
@@ -91,8 +91,8 @@ class Run {
   // the run.
   void add(Sink& sink) { publisher_.add(sink); }
 
-  // A command on one of the input channels, or a request, as it would come over the bus: bytes that
-  // nobody has checked, from the bus or another way that clients speak. Any thread.
+  // A command on one of the input channels, or a request, from the bus or another transport. Its
+  // bytes have not been checked. Any thread.
   void receive(const std::string& channel, const uint8_t* data, size_t size);
   void receive(const std::string& channel, const std::vector<uint8_t>& bytes) {
     receive(channel, bytes.data(), bytes.size());
@@ -102,7 +102,7 @@ class Run {
   uint64_t lost() const { return bus_.failed(); }
 
   const engine::Channels& channels() const { return channels_; }
-  // What clients are told of the world; until models come or go.
+  // What clients are told of the world; valid until models come or go.
   const std::vector<world_info_t>& info() const { return publisher_.announcement().info; }
   const Findings& findings() const { return findings_; }
   // The world as it is now: another object when models have come or gone. Any thread.
@@ -111,15 +111,15 @@ class Run {
     return world_;
   }
   int64_t run_id() const { return run_id_; }
-  // SDF or URDF of a model that is there, as SPAWN takes it; "": it is not told. Any thread.
+  // SDF or URDF of a model of this world, as SPAWN takes it; "": not known. Any thread.
   std::string model_text(const std::string& name) const;
   const engine::CommandInbox& inbox() const { return simulation_->inbox(); }
 
   // Called by run() with each state that is published. Set before run().
   void on_state(std::function<void(const Snapshot&)> handler) { on_state_ = std::move(handler); }
 
-  // Called when the run does not go on for two seconds, with the reason; in any thread. Set before
-  // run(); else the reason is logged.
+  // Called with the reason when the run has stood still for two seconds; in any thread. Set before
+  // run(). Without it the reason is logged.
   void on_stall(std::function<void(const std::string&)> handler) { on_stall_ = std::move(handler); }
 
   // Called by run() every half second of real time.
@@ -139,7 +139,7 @@ class Run {
   void tell_readers();         // what is read by now
   bool compute_here();         // a few steps that were granted; false: there are none
   void serve();                // requests, and models that are ready
-  Clock::time_point attend();  // to what real time brings; returns when next
+  Clock::time_point attend();  // does what is due by real time; returns when it is due next
   void tell_status();
   std::string why_idle();
   std::string takes_no_messages() const;

@@ -10,7 +10,7 @@
 
 namespace ruedo::run {
 
-// Everything that has a state is made here. What is repeated goes as fast as it can, whatever the
+// Makes everything that has a state. A repetition runs as fast as possible, whatever rate the
 // clients want.
 void Run::make_world() {
   if (!repeating_ && pacer_) wanted_ = {pacer_->rate(), pacer_->paused()};
@@ -89,7 +89,7 @@ void Run::take_turns() {
     take_turn();
   } catch (const InputError& error) {
     if (!options_.repeat.empty()) throw;
-    // Who asked for it is told, and the world stays where it got to.
+    // The client that asked is told, and the world stays where it is.
     control_.cancel(error.what());
     spdlog::error("{}. The run is paused", error.what());
     end_repeat(true);

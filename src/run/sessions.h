@@ -1,5 +1,5 @@
-// Who has joined, and which of their requests were executed: each request once, however often it is
-// repeated.
+// The clients that have joined, and which of their requests were executed: each request once,
+// however often it is repeated.
 #pragma once
 
 #include <chrono>
@@ -44,7 +44,7 @@ class Sessions {
   Session* join(const std::string& client, int64_t sequence, Time now,
                 const std::function<bool(int64_t)>& keeps = {});
   void leave(int64_t id);
-  // The process was deaf for so long: no client is blamed for silence.
+  // The process could not listen for that long: no client is blamed for its silence.
   void forgive(Time::duration deaf);
 
   // answer_again: `reply` is the one to send.

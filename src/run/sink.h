@@ -29,10 +29,10 @@ enum class Kind {
 struct Published {
   Kind kind;
   SimTime time_us;             // sim time in this epoch
-  SimTime stamp_us;            // the same for logs: it goes on when sim time begins again
+  SimTime stamp_us;            // the same for logs: it goes on when sim time is reset
   const std::string& channel;  // as it is called on the bus
   int index;         // of the channel in Announcement::channels; -1: a record, which has none
-  int64_t sequence;  // the how many-th on its channel in this epoch, from 0; of a tick: its part
+  int64_t sequence;  // number on its channel in this epoch, from 0; of a tick: its part
   const uint8_t* data;
   size_t size;
 };
@@ -60,7 +60,7 @@ class Sink {
 
   virtual ~Sink() = default;
 
-  // The same for its whole life.
+  // Does not change.
   virtual Hears hears() const { return {}; }
 
   // Whether it wants the samples of that channel. Pictures that no sink wants are not drawn: then
@@ -69,10 +69,10 @@ class Sink {
     static_cast<void>(channel);
     return true;
   }
-  // Grows whenever wants() may say something else than before.
+  // Grows whenever the answer of wants() may have changed.
   virtual uint64_t audience() const { return 0; }
 
-  // Before anything else, and again whenever models have come or gone, or sim time begins again.
+  // Before anything else, and again whenever models have come or gone, or sim time was reset.
   virtual void announce(const std::shared_ptr<const Announcement>& announcement) {
     static_cast<void>(announcement);
   }
@@ -80,7 +80,7 @@ class Sink {
   virtual void message(const Published& message) = 0;
   virtual void end_step(const Step& step) { static_cast<void>(step); }
 
-  // What came so far is to go on its way: once for each batch of steps, and when there is nothing
+  // Sends off what has come so far: called after each batch of steps, and when there is nothing
   // else to do.
   virtual void flush() {}
 };

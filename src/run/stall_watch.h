@@ -26,9 +26,9 @@ class StallWatch {
   enum class At { rest, steps, messages, request };  // what the publisher is at
 
   struct Host {
-    // Gets the reason in words. Any thread, one call at a time.
+    // Called with the reason. Any thread, one call at a time.
     std::function<void(const std::string& reason)> tell;
-    // What takes no messages, in words. The watch's thread.
+    // Describes what takes no messages. Called in the watch's thread.
     std::function<std::string()> takes_none;
   };
 

@@ -38,8 +38,8 @@ void TickWriter::add_message(int channel, int64_t sequence, const uint8_t* data,
 
 void TickWriter::finish(int64_t state_hash, const std::function<void(const tick_t&)>& publish) {
   constexpr size_t kMessageSize = 4 + 8 + 4 + 4;
-  constexpr size_t kInPart =
-      (engine::kMaxPartSize - 16'384) / kMessageSize;  // the rest: the head, and 64 clients' names
+  constexpr size_t kInPart = (engine::kMaxPartSize - 16'384) /
+                             kMessageSize;  // the rest is for the head and 64 clients' names
   const size_t nparts = std::max<size_t>(1, (manifest_.size() + kInPart - 1) / kInPart);
   for (size_t part = 0; part < nparts; ++part) {
     part_.utime = head_.utime;

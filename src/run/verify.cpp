@@ -91,7 +91,7 @@ class Verifier::Impl {
   std::vector<std::string> differences;
 
  private:
-  // What acted is what the repetition was given; the header is the machine's.
+  // What acted is the input of the repetition; the header describes the machine.
   bool is_compared(const std::string& channel) const {
     return channel != kAppliedChannel && channel != kHeaderChannel &&
            (kept_.empty() || kept_.contains(channel));
@@ -128,7 +128,7 @@ class Verifier::Impl {
     if (progress_) progress_->to(log_.offset());
     if (channel == kStateHashChannel) note_epoch(stamp, data, size);
     if (!next_logged()) {
-      // A log that was cut off ends before the run does; one that has its end holds all of it.
+      // A log that was cut off ends before the run does; a complete one does not.
       if (ended_) differ(stamp, channel, "the end of the run", "a message");
       return;
     }

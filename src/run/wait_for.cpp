@@ -1,5 +1,5 @@
-// Each message gets the step at which it acts when it comes, and the pacer's limit follows the
-// slowest channel.
+// Each message is given the step at which it acts as it comes, and the slowest channel sets the
+// pacer's limit.
 #include "run/wait_for.h"
 
 #include <algorithm>

@@ -254,20 +254,20 @@ model::Light afternoon_sun() {
 RenderContent::RenderContent(const model::WorldModel& world, const model::BodyLayout& layout)
     : label_of_link(labels_of(layout)) {
   Builder builder(*this);
-  std::map<const model::Link*, int> kinds;  // looked up only
+  std::map<const model::Link*, RenderKindIndex> kinds;  // looked up only
   for (const LinkIndex i : layout.links.indices()) {
     const model::LinkPlacement& placement = layout.links[i];
-    kind_of_link.push_back(-1);
+    kind_of_link.emplace_back();
     if (world.models[placement.instance].removed) {
       label_of_link[i] = 0;
       continue;
     }
     const model::Link& link = world.models[placement.instance].model->links[placement.link];
-    const auto [kind, inserted] = kinds.try_emplace(&link, -1);
+    const auto [kind, inserted] = kinds.try_emplace(&link);
     if (inserted) {
       RenderLinkKind built = builder.link_kind(link);
       if (!built.parts.empty()) {
-        kind->second = static_cast<int>(link_kinds.size());
+        kind->second = link_kinds.next();
         link_kinds.push_back(std::move(built));
       }
     }
@@ -282,7 +282,7 @@ RenderContent::RenderContent(const model::WorldModel& world, const model::BodyLa
 void RenderContent::find_bounds(const model::BodyLayout& layout) {
   Bounds all{Vec3::Constant(kInfinity), Vec3::Constant(-kInfinity)};
   for (const LinkIndex i : layout.links.indices()) {
-    if (kind_of_link[i] < 0) continue;
+    if (!kind_of_link[i].valid()) continue;
     const model::LinkPlacement& placement = layout.links[i];
     const Pose X_WL = placement.body.valid() ? layout.bodies[placement.body].X_WB * placement.X_BL
                                              : placement.X_BL;

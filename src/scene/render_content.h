@@ -62,12 +62,14 @@ struct RenderLight {
   LinkIndex link;  // none: the world
 };
 
+using RenderKindIndex = Index<RenderLinkKind>;  // into RenderContent::link_kinds
+
 struct RenderContent {
   std::vector<RenderMesh> meshes;
   std::vector<std::shared_ptr<const model::Texture>> textures;
   std::vector<Batch> batches;
-  std::vector<RenderLinkKind> link_kinds;
-  IndexedVector<LinkIndex, int> kind_of_link;  // -1: nothing to draw
+  IndexedVector<RenderKindIndex, RenderLinkKind> link_kinds;
+  IndexedVector<LinkIndex, RenderKindIndex> kind_of_link;  // not valid: nothing to draw
   IndexedVector<LinkIndex, uint16_t> label_of_link;
   std::vector<RenderLight> lights;
   Bounds bounds{Vec3::Constant(-3.0),

@@ -49,7 +49,7 @@ Culler::Culler(const model::BodyLayout& layout, const RenderContent& content)
   for (const LinkIndex i : layout.links.indices()) {
     const bool is_static = !layout.links[i].body.valid();
     if (is_static) M_WL_[i] = to_affine(layout.links[i].X_BL);
-    if (content.kind_of_link[i] < 0) continue;
+    if (!content.kind_of_link[i].valid()) continue;
     visible_links_.push_back(i);
     (is_static ? static_links_ : moving_links_).push_back(i);
   }

@@ -100,7 +100,7 @@ class Sonar : public SensorOf<Sonar> {
     configure(ours ? *ours : kNothing, aperture, setup);
   }
 
-  // What fired before time was set back counts as fired at its beginning.
+  // What fired before the reset of time counts as fired at its beginning.
   void shift_time(SimTime us) override {
     for (int64_t& fired : message_.fired_utime)
       fired = fired < 0 ? -1 : std::max<int64_t>(0, fired - us);

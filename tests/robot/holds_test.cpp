@@ -100,8 +100,8 @@ TEST(Holds, WhoIsPutElsewhereTakesItAlong) {
   EXPECT_NEAR((place(sim, "box/l") - Vec3(5.0, 2.6, 0.3)).norm(), 0.0, 5e-3);
   tell(sim, "box", 0.0);
   sim.run(1.0);
-  sim.robots.start_again(InstanceIndex(1));
-  sim.robots.start_again(InstanceIndex(2));
+  sim.robots.reset(InstanceIndex(1));
+  sim.robots.reset(InstanceIndex(2));
   sim.run(0.5);
   EXPECT_NEAR((place(sim, "box/l") - Vec3(0.6, 0.0, 0.3)).norm(), 0.0, 5e-3);
 }

@@ -157,7 +157,7 @@ TEST_F(Gimbal, ARateGainComesByMessage) {
 TEST_F(Gimbal, SettingsEndWhenItStartsAgain) {
   tell("tilt", joint_command_t::VELOCITY_LIMIT, 0.1);
   tell("pan", joint_command_t::POSITION_GAIN, 1e-3);
-  sim.robots.start_again(InstanceIndex(1));
+  sim.robots.reset(InstanceIndex(1));
   tell("tilt", kVelocity, 2.0);
   tell("pan", kPosition, 1.0);
   sim.run(1.0);

@@ -166,7 +166,7 @@ TEST(JointPid, StartsWithItsInitialCommand) {
   Machine turned(machine(plugin("JointController", gain("initial_velocity", 1.5))));
   turned.run(1.0);
   EXPECT_NEAR(turned.rate(), 1.5, 1e-6);
-  turned.robots.start_again(InstanceIndex(0));
+  turned.robots.reset(InstanceIndex(0));
   turned.run(1.0);
   EXPECT_NEAR(turned.at(), 1.5, 0.01);  // from 0 again
 }

@@ -282,7 +282,7 @@ TEST(Lifts, BeginAnewWithTheirWorld) {
     return joint(sim, "lift");
   };
   const double first = way();
-  sim.robots.start_again(InstanceIndex(0));
+  sim.robots.reset(InstanceIndex(0));
   EXPECT_EQ(way(), first);
 }
 

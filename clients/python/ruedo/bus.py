@@ -29,7 +29,9 @@ class Bus:
         self._collectors: dict[str, Callable[[tuple[str, bytes]], object]] = {}
         self._lock = threading.Lock()
         self._turn = threading.Lock()  # to receive
-        self._lent_until = 0.0  # until then the thread leaves it to who has received last
+        self._lent_until = (
+            0.0  # until then the thread leaves receiving to the last caller of receiving()
+        )
         self._thread = threading.Thread(target=self._receive, name="ruedo-receive", daemon=True)
 
     def start(self) -> None:
@@ -48,8 +50,8 @@ class Bus:
             return subscription
 
     def collect(self, channel: str, collector: Callable[[tuple[str, bytes]], object]) -> None:
-        """Every message of the channel goes to a collector, too, with its channel: at most one, and
-        one that raises nothing. For who takes all there is."""
+        """Every message of the channel also goes to a collector, with its channel. There is at most
+        one, and it must not raise. For a client that takes every message."""
         with self._lock:
             others = channel in self._handlers or channel in self._collectors
             self._collectors[channel] = collector
@@ -86,8 +88,8 @@ class Bus:
 
     @contextmanager
     def receiving(self) -> Iterator[Callable[[float], bool]]:
-        """The caller receives instead of the thread: calls what it is given, which handles what
-        came, or waits for it at most so many seconds and returns False."""
+        """Lets the caller receive instead of the thread: what is given to it handles the messages
+        that came, or waits at most that many seconds for one and returns False."""
         self._lent_until = math.inf
         with self._turn:
             try:

@@ -11,8 +11,8 @@ log = logging.getLogger("ruedo")
 
 
 class Subscription:
-    """A callback that is called until close(), which a with-block does at its end. What it raises
-    is logged once, and hurts nobody else."""
+    """A callback that is called until close(), or the end of a with block. What it raises is
+    logged once, and does not affect others."""
 
     def __init__(
         self, callback: Callable[..., Any], what: str, leave: Callable[[Subscription], None]
@@ -22,7 +22,7 @@ class Subscription:
         self.closed = False
 
     def close(self) -> None:
-        """From the return on it is not called any more; another thread may just be in it."""
+        """No call begins after this returns; one in another thread may still be running."""
         if not self.closed:
             self.closed = True
             self._leave(self)

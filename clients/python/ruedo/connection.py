@@ -63,7 +63,7 @@ class Connection:
     ):
         self.url = url
         self.closed = ""  # why: what every call says
-        self.another_run = False  # is what the last tick was of
+        self.another_run = False  # the last tick was of another run
         self.clock = Clock()
         self.session = Session(self, name)
         self.stepper = Stepper(self)
@@ -245,7 +245,7 @@ class Connection:
         if fingerprint != _TICK_FINGERPRINT or known is None:
             return
         self.another_run = run_id != known.run_id
-        if self.another_run:  # it may be the server's next one
+        if self.another_run:  # it may be the same server's next run
             if time.monotonic() - self._asked > 0.1:
                 self._ask_info()
             return
@@ -253,7 +253,8 @@ class Connection:
         self.stepper.on_tick(data)
         # Sim time may run a hundred times faster than real time: the watchdog is fed by its beat,
         # too.
-        self.drivers.repeat()
+        if self.drivers.repeating:  # else a call for each tick
+            self.drivers.repeat()
 
     def _forked(self) -> None:
         self.closed = _FORKED

@@ -198,7 +198,7 @@ def _options(
 
 
 class _Folder:
-    """Of this user's alone, for the socket."""
+    """A folder for the socket, which no other user may enter."""
 
     def __init__(self) -> None:
         runtime = os.environ.get("XDG_RUNTIME_DIR", "")
@@ -282,8 +282,8 @@ class _Server:
         return f"the server ended ({how}): {self._last_lines() or 'it said nothing'}\n(`{' '.join(self._command)}`)"
 
     def await_port(self, url: str, until: float) -> None:
-        """Waits for a tcpq or unix server to listen; one that does not until then is the
-        connection's affair.
+        """Waits for a tcpq or unix server to listen. If it does not in time, connecting reports
+        that.
         """
         parts = urlsplit(url)
         if parts.scheme not in ("tcpq", "unix"):

@@ -1,8 +1,8 @@
-"""The client's side of lockstep: grants, and the messages of every step, whatever is lost on the
-way.
+"""The client's side of lockstep: grants steps, and collects every message of every step, whatever
+is lost on the way.
 
-The caller of step() receives for itself meanwhile: handing each message from thread to thread would
-take longer than the step.
+The caller of step() receives in its own thread meanwhile: handing each message from thread to
+thread would take longer than the step.
 """
 
 from __future__ import annotations
@@ -190,8 +190,9 @@ class Stepper:
         )  # the one under way: sequence, from, body
         self._taken = True
         self._resends = 0
-        # Mostly all comes once and in order: a step's messages, then its tick. Then they are a step
-        # as they are; only when something is lost, twice or late, each is put into its place.
+        # Usually everything comes once and in order, a step's messages and then its tick, and is
+        # taken as it came. Only when something is lost, late or comes twice is each message put
+        # into its place.
         self._fresh: deque[tuple[str, bytes]] = deque(maxlen=_MOST_FRESH)  # since the last tick
         self._steps: dict[int, _Step] = {}  # those of which something is missing, and later ones
         self._names: list[str] = []  # of the channels
@@ -233,7 +234,7 @@ class Stepper:
             if not self._part:
                 self._take_part(timeout)
             until = min(self._granted + n, _LONGEST)
-            self._wait(self._have, timeout)  # for nothing, unless the call before gave up
+            self._wait(self._have, timeout)  # returns at once, unless the previous call gave up
             if n > 0:
                 self._grant = (
                     session.next_sequence(),
@@ -244,7 +245,7 @@ class Stepper:
                     until,
                     False,
                     self._have,
-                )  # the grant says what is here
+                )  # the grant says so
                 self._grant_again()
             self._wait(until, timeout)
             if (
@@ -282,7 +283,7 @@ class Stepper:
         self._part = True
 
     def _subscribe(self) -> None:
-        """To all that the simulation publishes: a manifest names any of it."""
+        """To everything that the simulation publishes: a manifest may name any of it."""
         info = self._connection.info
         if self._info is info:
             return
@@ -349,7 +350,7 @@ class Stepper:
                 elif silence or self._ask_now:
                     self._ask_for_lost(until)
                 elif self._have - self._acknowledged >= _ACKNOWLEDGED_TOGETHER:
-                    self._ask_for_lost(self._have)  # for nothing: it says what is here
+                    self._ask_for_lost(self._have)  # asks for nothing, but says what is here
                 self._ask_now = False
                 repeat = min(2.0 * repeat, _LAST_REPEAT) if silence else first
                 if self._have > had:
@@ -540,7 +541,7 @@ class Stepper:
         while step is not None and step.complete():
             self._have += 1
             for part in step.parts.values():
-                for entry in part:  # what is left of the time before came twice
+                for entry in part:  # what is left from earlier times came twice
                     early = self._early[entry.channel]
                     while early and early[0][2] <= step.utime:
                         early.popleft()
@@ -562,7 +563,7 @@ class Stepper:
             try:
                 self._take_pieces(lcmtypes.resend_reply_t.decode(reply.body))
             except Exception:
-                return  # broken: it is asked for again
+                return  # damaged: it is asked for again
         elif reply.sequence == self._grant[0] and not self._taken:
             self._taken = self._ask_now = True  # it was repeated: its ticks may be lost
 

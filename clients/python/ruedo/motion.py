@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 log = logging.getLogger("ruedo")
 
-# A primitive that no status has shown after this many statuses and seconds was lost or replaced at
+# A primitive that no status has shown after so many statuses and seconds was lost, or replaced at
 # once.
 _UNSEEN_STATUSES = 20
 _UNSEEN_SECONDS = 1.0
@@ -227,7 +227,7 @@ class Drivers:
         self._connection = connection
         self._lock = threading.Lock()
         self._all: dict[str, Driver] = {}
-        self._repeating: set[Driver] = set()
+        self.repeating: set[Driver] = set()  # those that were told to hold a command
         self._wake = threading.Condition()
         self._thread: threading.Thread | None = None
 
@@ -238,7 +238,7 @@ class Drivers:
 
     def keep_repeating(self, driver: Driver) -> None:
         with self._wake:
-            self._repeating.add(driver)
+            self.repeating.add(driver)
             if self._thread is None:
                 self._thread = threading.Thread(
                     target=self._repeat_until_closed, name="ruedo-repeat", daemon=True
@@ -247,7 +247,7 @@ class Drivers:
             self._wake.notify_all()
 
     def repeat(self) -> None:
-        for driver in tuple(self._repeating):
+        for driver in tuple(self.repeating):
             driver.repeat()
 
     def wake(self) -> None:
@@ -276,7 +276,7 @@ class Drivers:
 
     def _end(self, drivers: list[Driver], reason: str) -> None:
         with self._wake:
-            self._repeating.difference_update(drivers)
+            self.repeating.difference_update(drivers)
         for driver in drivers:
             driver.end(reason)
 
@@ -291,4 +291,4 @@ class Drivers:
                     return
             if not self._connection.another_run:
                 self.repeat()
-            period = min((driver.period() for driver in tuple(self._repeating)), default=0.1)
+            period = min((driver.period() for driver in tuple(self.repeating)), default=0.1)

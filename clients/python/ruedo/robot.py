@@ -533,8 +533,8 @@ def _camera_part(connection: Connection, robot: str, camera: str, part: str) -> 
 
 
 def _radians(call: str, angle: float, usual: float) -> None:
-    """Whole degrees that are many turns as radians are taken for a mistake, and named; they are
-    obeyed all the same.
+    """Warns of whole numbers that would be many turns as radians, as they are probably degrees;
+    they are executed all the same.
     """
     if abs(angle) > usual and float(angle).is_integer():
         warnings.warn(

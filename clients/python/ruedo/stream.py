@@ -208,9 +208,7 @@ class Stream(Reader[T]):
         return f"<{type(self).__name__} {self.channel} ({self.type})>"
 
 
-def sample_of(stream: Stream[T], data: bytes) -> T:
-    """What a stream makes of a message. Raises TypeMismatch."""
-    return stream._sample_of(data)
+sample_of = Stream._sample_of  # what a stream makes of a message, for observations
 
 
 class Streams:

@@ -58,8 +58,8 @@ class WorldInfo:
 class WorldInfoAssembler:
     """Takes messages of ruedo/info as they come. Used by the receiving thread alone.
 
-    The parts of one info share run, epoch and utime. An info that says again what the last one
-    said, which is the rule, is known by its bytes and not decoded: with a thousand robots decoding
+    The parts of one info share run, epoch and utime. An info with the same content as the last one,
+    which is the rule, is recognised by its bytes and not decoded: with a thousand robots decoding
     takes half a second.
     """
 

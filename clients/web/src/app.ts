@@ -68,7 +68,7 @@ export class App {
   readonly overlays = new OverlaySet(this.page, this.stage);
   readonly markers = new Markers(this.page, this.stage);
   readonly ghosts = new Ghosts(this.page, this.stage);
-  readonly clock = new Clock(this.page, (anew) => this.forgetPast(anew));
+  readonly clock = new Clock(this.page, (reset) => this.forgetPast(reset));
   readonly notice = new Notice(byId("notice"), this.page);
   readonly loading = new Loading<SceneFiles>({
     fetchScene: () => this.loadScene(),
@@ -465,10 +465,10 @@ export class App {
   }
 
   // What was drawn along the way is not of this moment.
-  private forgetPast(anew: boolean): void {
-    if (anew) this.editor.history.clear();
-    if (anew) this.plots.clear();
-    if (anew) this.trip.forget();
+  private forgetPast(reset: boolean): void {
+    if (reset) this.editor.history.clear();
+    if (reset) this.plots.clear();
+    if (reset) this.trip.forget();
     this.overlays.forget();
     this.pages.forget();
     this.poses.jump();

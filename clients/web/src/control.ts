@@ -94,7 +94,7 @@ export class Control {
     if (
       !(await confirmed(
         "Reset the world?",
-        "The run begins anew at 0 s: everything goes back to where it started, and what was " +
+        "The run is reset to 0 s: everything goes back to where it started, and what was " +
           "placed goes away.",
         "Reset",
       ))

@@ -76,7 +76,7 @@ final class Driver {
         return motion;
     }
 
-    /** Sim time was set back. */
+    /** Sim time was reset. */
     synchronized void beginEpoch() {
         for (Motion motion : motions) motion.beginEpoch();
     }

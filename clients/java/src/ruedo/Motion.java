@@ -101,7 +101,7 @@ public final class Motion {
         return this;
     }
 
-    /** Sim time was set back. */
+    /** Sim time was reset. */
     synchronized void beginEpoch() {
         utime = -1;
     }

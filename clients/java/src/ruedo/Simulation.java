@@ -148,8 +148,8 @@ public final class Simulation implements AutoCloseable {
     }
 
     /**
-     * Calls back in the receiving thread when another server, or the same one started anew, answers
-     * at this address. Commands are not repeated into the new run, and primitives under way have
+     * Calls back in the receiving thread when another server, or the same one restarted, answers at
+     * this address. Commands are not repeated into the new run, and primitives under way have
      * ended.
      */
     public Subscription onNewRun(Runnable callback) {
@@ -238,12 +238,12 @@ public final class Simulation implements AutoCloseable {
         POSES
     }
 
-    /** Starts everything anew, with the same seed. */
+    /** Resets everything, with the same seed. */
     public void reset() {
         reset(Reset.ALL, -1);
     }
 
-    /** Starts anew. seed: of what follows, -1: the same again. */
+    /** Resets everything. seed: of what follows, -1: the same again. */
     public void reset(Reset what, long seed) {
         reset_request_t body = new reset_request_t();
         body.what =
@@ -545,7 +545,7 @@ public final class Simulation implements AutoCloseable {
         for (Driver driver : gone) driver.end(reason);
     }
 
-    /** The server was started anew, or another has taken its place. */
+    /** The server was restarted, or another has taken its place. */
     private void beginRun() {
         List<Driver> all;
         List<Stream<?>> known;

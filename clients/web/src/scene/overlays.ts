@@ -346,7 +346,7 @@ export class RobotOverlay {
       (object.material as THREE.Material).dispose();
     });
   }
-  // Trails begin anew, and contacts are none until some are told.
+  // Trails are cleared, and contacts are none until some are told.
   forget(): void {
     this.truth.clear();
     this.odometry.clear();

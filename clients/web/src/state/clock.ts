@@ -7,10 +7,10 @@ export class Clock {
   epoch = -1;
   private last: { wall_s: number; sim_s: number } | null = null;
 
-  // forget: what was drawn along the way is not of this moment. anew: the world has begun anew.
+  // forget: what was drawn along the way is not of this moment. reset: the world was reset.
   constructor(
     private readonly page: Page,
-    private readonly forget: (anew: boolean) => void,
+    private readonly forget: (reset: boolean) => void,
   ) {}
 
   // isState: only states say that the past is over; of what else comes, some is older than they
@@ -18,9 +18,9 @@ export class Clock {
   tell(time_s: number, epoch: number, isState = false): void {
     const before_s = this.page.now.time_s;
     if (isState && (epoch !== this.epoch || time_s < before_s - kBack_s)) {
-      const anew = epoch !== this.epoch;
+      const reset = epoch !== this.epoch;
       this.epoch = epoch;
-      this.jump(anew);
+      this.jump(reset);
     } else if (epoch !== this.epoch || time_s < before_s) return;
     this.page.set({ time_s });
     const wall_s = performance.now() / 1000;
@@ -30,9 +30,9 @@ export class Clock {
     this.last = { wall_s, sim_s: time_s };
   }
 
-  jump(anew = false): void {
+  jump(reset = false): void {
     this.last = null;
-    this.forget(anew);
+    this.forget(reset);
   }
 }
 

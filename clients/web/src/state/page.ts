@@ -35,7 +35,7 @@ export interface PageState {
   comparison: Comparison | null; // with the other log; null: none, or not known yet
   events: readonly RunEvent[]; // what happened, in the order of time
   eventKind: string; // which of them are shown; "" for all
-  loop: boolean; // what plays begins anew when it has ended
+  loop: boolean; // what plays starts over when it has ended
   marks: { begin: number | null; end: number | null }; // of what is looped; null: all of it
   layers: ReadonlySet<Layer>;
   mode: ViewMode;

@@ -239,7 +239,7 @@ export class RobotPages {
     );
   }
 
-  // Plots begin anew.
+  // Clears the plots.
   forget(): void {
     this.truth = this.reckoned = null;
     for (const plot of [this.speed, this.path, this.error]) plot.clear();

@@ -185,7 +185,7 @@ export class Rewind implements RunLink {
     if (!this.past) this.handler.message(channel, bytes);
   }
 
-  // A world that begins anew has no past.
+  // A world that was reset has no past.
   private heed(type: string, bytes: Uint8Array): void {
     const view = new DataView(bytes.buffer, bytes.byteOffset, bytes.byteLength),
       at = type === "world_state_t" ? 16 : epochOffset();
