@@ -283,7 +283,9 @@ def test_the_report_has_pages_of_the_worst_runs(whole):
     when = first.stat().st_mtime_ns
     said = ruedo(*report, "5", folder=folder)
     assert said.stdout == "look.html\n" and said.stderr == ""
-    links = re.findall(r"<a href='(look\.pages/\w+\.html)'>look at it", (folder / "look.html").read_text())
+    links = re.findall(
+        r"<a href='(look\.pages/\w+\.html)'>look at it", (folder / "look.html").read_text()
+    )
     assert len(links) == len(set(links)) == 2 and first.stat().st_mtime_ns == when  # that failed
     for link in links:
         page = (folder / link).read_text()

@@ -215,7 +215,9 @@ def test_what_clients_drew_is_in_a_video(tmp_path):
     middle = (size - 1) / 2
     shown = [spot(frame, (1, 0, 0))[0] > 20 for frame in frames]
     first, last = shown.index(True), len(shown) - 1 - shown[::-1].index(True)
-    assert 2 < first < last < len(frames) - 3  # not before it was drawn, nor after it was taken away
+    assert (
+        2 < first < last < len(frames) - 3
+    )  # not before it was drawn, nor after it was taken away
     frame = frames[(first + last) // 2]
     red, yellow, blue = (spot(frame, c) for c in ((1, 0, 0), (1, 1, 0), (0, 0, 1)))
     assert red[1:] == pytest.approx((middle, middle), abs=1.5)

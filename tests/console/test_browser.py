@@ -754,7 +754,9 @@ def test_types_of_ones_own_are_shown(tmp_path):
     with playing(log, "--types", tmp_path) as process:
         browse(process.url, tmp_path, "types", given)
     page = tmp_path / "run.html"
-    subprocess.run([RUEDO, "play", log, "--types", tmp_path, "--html", page], check=True, timeout=99)
+    subprocess.run(
+        [RUEDO, "play", log, "--types", tmp_path, "--html", page], check=True, timeout=99
+    )
     browse(page.as_uri(), tmp_path, "types", given)
 
 

@@ -468,7 +468,7 @@ def test_what_clients_drew_is_in_foxgloves_file(drawn):
     assert updates[1]["entities"][0]["frame_id"] == "world"
     assert [gone["id"] for gone in updates[3]["deletions"]] == ["all"]
     with open(drawn / "run.mcap", "rb") as stream:
-        for schema, channel, message in make_reader(stream).iter_messages(["ruedo/markers"]):
+        for schema, _channel, message in make_reader(stream).iter_messages(["ruedo/markers"]):
             assert schema.name == "foxglove.SceneUpdate"
             fits(json.loads(schema.data), json.loads(message.data))
 

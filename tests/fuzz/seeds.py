@@ -48,7 +48,9 @@ HAND_MADE = {
         b"<sdf version='1.9'><model name='m'><include><uri>../x</uri></include></model></sdf>",
     ],
     "log": [b"\x00", b"\x00\xed\xa1\xda\x01" + bytes(24), b"\x01" + bytes(200)],
-    "lockstep": [policy + conversation for policy in (b"\0", b"\1") for conversation in CONVERSATIONS],
+    "lockstep": [
+        policy + conversation for policy in (b"\0", b"\1") for conversation in CONVERSATIONS
+    ],
     "messages": [bytes([kind]) + bytes(size) for kind in range(17) for size in (16, 32, 40, 64)],
     "mesh": [
         b"\x00v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n",

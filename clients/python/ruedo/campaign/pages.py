@@ -34,7 +34,7 @@ def make_pages(
 
 
 def _make_page(campaign: Any, case: Case, row: dict[str, Any], page: Path) -> str:
-    """"" or why there is none."""
+    """ "" or why there is none."""
     with tempfile.TemporaryDirectory(prefix="ruedo-page-") as scratch:
         log = Path(scratch) / "run.lcm"
         outcome = Runner(str(campaign.folder)).run(case.what, full_log=str(log))

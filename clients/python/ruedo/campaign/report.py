@@ -33,9 +33,7 @@ code { background: #f2f4f8; padding: .1em .3em; user-select: all } svg { max-wid
 """
 
 
-def write_report(
-    campaign: Any, file: Path, baseline: str | None = None, pages: int = 0
-) -> None:
+def write_report(campaign: Any, file: Path, baseline: str | None = None, pages: int = 0) -> None:
     """Of what there is so far. baseline: as of compare_with(). pages: of so many failed runs, the
     worst, a page of the console is put into the folder beside `file` that is called as it is, with
     .pages at its end.
