@@ -192,8 +192,10 @@ const tools = {
 };
 try {
   if (process.env.RUEDO_PAGE === "sources") await serveSources();
+  const steps = await import(`./${scenario}.mjs`);
+  expected = steps.expected ?? null; // of the page's first moments, too
   await page.goto(url, { waitUntil: "load" });
-  await (await import(`./${scenario}.mjs`)).default(tools);
+  await steps.default(tools);
 } catch (error) {
   console.log(`error: ${error.message.split("\n")[0]}`);
   await page

@@ -1,7 +1,8 @@
 // Messages of types that this page was not built with: their fields are shown. Given: {"channel",
 // "shows": what stands there}.
-export default async function types({ page, given, until, expect }) {
-  expect(/404/); // the log has no world
+export const expected = /404/; // the log has no world
+
+export default async function types({ page, given, until }) {
   await until(
     "the log is shown",
     () => window.ruedo?.page.now.playback && window.ruedo.stage.frames,
