@@ -57,6 +57,79 @@ def test_an_episode_repeats_from_its_seed(task):
         assert all(np.array_equal(a, b) for a, b in zip(runs[0], other))
 
 
+def followed(envs, actions):
+    """What these actions lead to: arrays with a row for each environment."""
+    told = []
+    for action in actions:
+        observations, rewards, terminated, truncated, info = envs.step(action)
+        told += [observations, rewards, terminated, truncated, info["success"], info["collision"]]
+        told.append(np.array([scene.number for scene in envs.scenes]))
+    return told
+
+
+def same(one, other):
+    return len(one) == len(other) and all(np.array_equal(a, b) for a, b in zip(one, other))
+
+
+@pytest.mark.parametrize("mode", ["NextStep", "SameStep"])
+@pytest.mark.parametrize("task", TASKS)
+def test_what_follows_a_saved_episode_is_what_followed(task, mode):
+    """Through the ends of episodes, in their own environments and in others."""
+    envs = gymnasium.make_vec(
+        f"ruedo/{task}-v0", num_envs=3, autoreset_mode=AutoresetMode(mode)
+    ).unwrapped
+    envs.most_actions = 25
+    envs.reset(seed=3)
+    envs.action_space.seed(5)
+    actions = [envs.action_space.sample() for _ in range(40)]
+    for action in actions[:12]:
+        envs.step(action)
+    saved = envs.save()
+    assert len(saved) == 3 and repr(saved) == "<ruedo.gym.SavedEpisodes: 3>"
+    shown = envs._observe()
+    one = envs.save(1)
+    after = followed(envs, actions)
+    envs.reset(seed=9)
+    observations, info = envs.restore(saved)
+    assert np.array_equal(observations, shown) and info == {}
+    assert same(followed(envs, actions), after)
+    envs.restore(saved, [2, 0, 1])
+    turned = followed(envs, [action[[1, 2, 0]] for action in actions])
+    assert same(turned, [rows[[1, 2, 0]] for rows in after])
+    envs.restore(one, range(3))
+    alike = followed(envs, [action[[1, 1, 1]] for action in actions])
+    assert same(alike, [rows[[1, 1, 1]] for rows in after])
+    envs.close()
+
+
+def test_saved_episodes_go_where_they_belong():
+    envs = ruedo.gym.NavigateVectorEnv(num_envs=2, beams=5)
+    with pytest.raises(gymnasium.error.ResetNeeded, match="reset"):
+        envs.save()
+    envs.reset(seed=1)
+    saved = envs.save()
+    with pytest.raises(TypeError, match=r"restore\(\) takes what save\(\) gave, not 3"):
+        envs.restore(3)
+    with pytest.raises(ValueError, match="2 episodes were saved: they go into as many"):
+        envs.restore(saved, [0])
+    with pytest.raises(ValueError, match="twice at once"):
+        envs.restore(saved, [0, 0])
+    with pytest.raises(ValueError, match="an environment's index is 2; allowed are 0 to 1"):
+        envs.save(2)
+    other = ruedo.gym.NavigateVectorEnv(num_envs=2, beams=5)
+    with pytest.raises(ValueError, match="another engine saved that world"):
+        other.restore(saved)
+    envs.close(), other.close()
+    env = gymnasium.make("ruedo/Push-v0").unwrapped
+    env.reset(seed=4)
+    actions = np.random.default_rng(1).uniform(-1, 1, (30, 2))
+    episode = env.save()
+    first = [env.step(action)[0] for action in actions]
+    env.restore(episode)
+    assert same([env.step(action)[0] for action in actions], first)
+    env.close()
+
+
 def test_the_goal_is_where_the_room_says():
     env = ruedo.gym.NavigateEnv(beams=5, noise=False)
     observation, _ = env.reset(seed=11)
