@@ -215,8 +215,84 @@ def states_left_behind(root):
     return problems
 
 
+WEB = "clients/web/src"
+# The layers of the console's page, folders or single files, and what each may import beside itself.
+WEB_LAYERS = {
+    "wire": set(),
+    "widgets": set(),
+    "state": {"wire"},
+    "control": {"state", "widgets", "wire"},
+    "scene": {"state", "widgets", "wire"},
+    "edit": {"control", "scene", "state", "widgets", "wire"},
+    "ui": {"edit", "scene", "state", "widgets", "wire"},
+    "app": {"control", "edit", "scene", "state", "ui", "widgets", "wire"},
+    "main": {"app", "state"},
+}
+MOST_LINES_OF_APP = 250  # a module that knows many others is a short one
+
+
+def web_imports(root):
+    """{module: the modules of the page that it imports, types too}, both by their paths without
+    ".ts".
+    """
+    found = {}
+    for path in sorted((root / WEB).rglob("*.ts")):
+        text = path.read_text(encoding="utf-8")
+        names = re.findall(r'^(?:import|export)\b[^;"]*?from "(\.[^"]+)"', text, re.MULTILINE)
+        targets = {(path.parent / name).resolve() for name in names}
+        base = (root / WEB).resolve()
+        found[path.relative_to(root / WEB).with_suffix("").as_posix()] = {
+            target.relative_to(base).as_posix() for target in targets if base in target.parents
+        }
+    return found
+
+
+def circles(imports):
+    """Each circle of imports once, as its modules in the order of the import."""
+    found, done = [], set()
+
+    def walk(module, path):
+        if module in path:
+            found.append([*path[path.index(module) :], module])
+        elif module not in done:
+            for target in sorted(imports.get(module, ())):
+                walk(target, [*path, module])
+            done.add(module)
+
+    for module in imports:
+        walk(module, [])
+    return found
+
+
+def broken_web_walls(root):
+    """The page's modules import those of the layers below alone, none in a circle; and a view is
+    used by one module: by the page, or by the view that it is a part of.
+    """
+    imports = web_imports(root)
+    problems = [f"{WEB}: a circle: {' -> '.join(circle)}" for circle in circles(imports)]
+    for module, targets in imports.items():
+        layer = module.split("/")[0]
+        if layer not in WEB_LAYERS:
+            problems.append(f"{WEB}/{module}.ts: {layer} is no layer of the page")
+            continue
+        for target in sorted(targets):
+            below = target.split("/")[0]
+            if below != layer and below not in WEB_LAYERS[layer]:
+                problems.append(f"{WEB}/{module}.ts: {layer} may not import {target}")
+        lines = len((root / WEB / f"{module}.ts").read_text(encoding="utf-8").splitlines())
+        if layer == "app" and lines > MOST_LINES_OF_APP:
+            problems.append(f"{WEB}/{module}.ts: {lines} lines, of {MOST_LINES_OF_APP}")
+    for view in (module for module in imports if module.startswith("ui/")):
+        users = sorted(module for module, targets in imports.items() if view in targets)
+        inside = [user for user in users if user.startswith("ui/")]
+        if len(inside) > 1 or (inside and len(users) > len(inside)):
+            problems.append(f"{WEB}/{view}.ts is a part of more than one: {', '.join(users)}")
+    return problems
+
+
 @pytest.mark.parametrize(
-    "rule", [broken_walls, bare_conversions, foreign_members, states_left_behind]
+    "rule",
+    [broken_walls, bare_conversions, foreign_members, states_left_behind, broken_web_walls],
 )
 def test_tree_keeps(rule):
     problems = rule(ROOT)
@@ -439,3 +515,27 @@ def test_members_of_other_modules_are_seen(tmp_path, text, good):
     )
     (client / "b.py").write_text(text)
     assert (foreign_members(tmp_path) == []) == good
+
+
+@pytest.mark.parametrize(
+    "files, problem",
+    [
+        ({"ui/a": "../state/b", "state/b": ""}, None),
+        ({"state/b": "../ui/a", "ui/a": ""}, "state may not import ui/a"),
+        ({"ui/a": "./b", "ui/b": ""}, None),
+        ({"ui/a": "./b", "ui/b": "", "ui/c": "./b"}, "more than one: ui/a, ui/c"),
+        ({"ui/a": "./b", "ui/b": "", "app/c": "../ui/b"}, "more than one: app/c, ui/a"),
+        ({"state/a": "./b", "state/b": "./a"}, "a circle: state/a -> state/b -> state/a"),
+        ({"more/a": ""}, "more is no layer"),
+        ({"app/a": "", "app/long": "\n" * (MOST_LINES_OF_APP + 1)}, "251 lines"),
+    ],
+)
+def test_walls_of_the_page_are_seen(tmp_path, files, problem):
+    for name, target in files.items():
+        path = tmp_path / WEB / f"{name}.ts"
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(
+            target if "\n" in target else f'import type {{\n  A,\n}} from "{target}";\n'
+        )
+    found = broken_web_walls(tmp_path)
+    assert len(found) == (problem is not None) and all(problem in line for line in found)

@@ -3,12 +3,13 @@ import { joint_command_t, move_command_t, request_t, type reply_t } from "../gen
 import type { Clock } from "./state/clock";
 import type { Page } from "./state/page";
 import { inputOf, sees } from "./state/world";
-import { showCommand } from "./ui/command";
-import { confirmed } from "./ui/confirm";
-import { toast } from "./ui/dom";
+import { showCommand } from "./widgets/command";
+import { confirmed } from "./widgets/confirm";
+import { toast } from "./widgets/elements";
 import { encode } from "./wire/lcm";
-import type { RunLink } from "./wire/link";
+import type { RunLink } from "./wire/protocol";
 import type { Session } from "./wire/session";
+import type { Move } from "./state/go_to";
 
 const kFastest_m_s = 1.0,
   kQuickestTurn_rad_s = 1.5; // that the page drives at
@@ -21,7 +22,6 @@ const kStop = {
   deceleration: 0,
 };
 
-export type Move = Omit<move_command_t, "utime" | "id">;
 export interface Speeds {
   robot: string;
   vx: number;

@@ -1,14 +1,17 @@
 // Starts the page.
 import "./style.css";
-import { App } from "./app";
+import { App } from "./app/app";
+import { chooseRobot } from "./state/choices";
 
 declare global {
   interface Window {
-    ruedo: App;
-  } // for tests and the curious
+    ruedo: object;
+  } // the parts of the page, for tests and the curious
 }
 try {
-  window.ruedo = new App();
+  const { model, scene, editing, panel, robot, arrivals } = new App(),
+    choose = (at: number) => chooseRobot(model.page, at);
+  window.ruedo = { ...model, ...scene, ...editing, ...panel, ...robot, ...arrivals, choose };
 } catch (error) {
   const notice = document.getElementById("notice")!;
   notice.hidden = false;

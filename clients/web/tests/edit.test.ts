@@ -1,9 +1,10 @@
 // Steps that are taken back, and SDF as text: what is drawn, scaled, and cut.
 import { describe, expect, it } from "vitest";
 import type { world_state_t } from "../generated/messages";
-import { History, type HistoryState } from "../src/edit/history";
+import { History } from "../src/edit/history";
+import type { HistoryState } from "../src/state/page";
 import { numbersOf, poseFrom, poseNow } from "../src/edit/pose";
-import type { ModelDescription } from "../src/scene/description";
+import type { ModelDescription } from "../src/wire/description";
 import { Poses } from "../src/state/poses";
 import { boxModel, places, roomModel, scaled, wallModel, withDoor } from "../src/edit/sdf";
 

@@ -1,6 +1,6 @@
 // Fields of messages by their paths, what is said of their values, and tables of them.
 import { describe, expect, it } from "vitest";
-import { csvOf, fieldsOf, statisticsOf, valueAt } from "../src/state/fields";
+import { csvOf, fieldsOf, statisticsOf, valueAt } from "../src/wire/fields";
 
 describe("fields", () => {
   it("are listed down to the numbers", () => {

@@ -2,7 +2,7 @@
 import { describe, expect, it } from "vitest";
 import type { world_info_t } from "../generated/messages";
 import { Loading } from "../src/state/loading";
-import type { Hello } from "../src/wire/link";
+import type { Hello } from "../src/wire/protocol";
 
 const kHello: Hello = {
   mode: "live",

@@ -1,7 +1,8 @@
 // A log in the page: at each moment the newest message of every channel that is wanted.
 import { describe, expect, it, vi } from "vitest";
 import { encode } from "../src/wire/lcm";
-import { historyOf, type LinkHandler } from "../src/wire/link";
+import { historyOf } from "../src/wire/link";
+import type { LinkHandler } from "../src/wire/protocol";
 import { LogFile, newestAt } from "../src/wire/log_file";
 
 describe("a log in the page", () => {

@@ -1,7 +1,7 @@
 // The past of a live run: what is kept, what is shown of it, and what goes on meanwhile.
 import { beforeEach, describe, expect, it, vi } from "vitest";
 import { decode, encode } from "../src/wire/lcm";
-import type { Hello, LinkHandler, RunLink } from "../src/wire/link";
+import type { Hello, LinkHandler, RunLink } from "../src/wire/protocol";
 import { kMostSeconds, Rewind, type Past } from "../src/wire/rewind";
 
 // A link whose end is in the test's hands.

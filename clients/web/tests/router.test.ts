@@ -5,7 +5,7 @@ import { Store } from "../src/state/store";
 import type { PageState } from "../src/state/page";
 import type { World } from "../src/state/world";
 import { encode, fingerprint, type TypeName } from "../src/wire/lcm";
-import { Router, routesOf, type Views } from "../src/wire/router";
+import { Router, routesOf, type Views } from "../src/app/router";
 
 const channel = (
   name: string,
@@ -60,13 +60,7 @@ function made(complete = true) {
       },
     );
   const views = {
-    loading: new Proxy(
-      {},
-      {
-        get: (_, key) =>
-          key === "complete" ? complete : () => called.push(`loading.${String(key)}`),
-      },
-    ),
+    loading: note("loading"),
     session: note("session"),
     poses: note("poses"),
     clock: note("clock"),
@@ -80,7 +74,7 @@ function made(complete = true) {
       ]),
     },
   } as unknown as Views;
-  const page = new Store({ world: kWorld, robot: 1 } as PageState);
+  const page = new Store({ world: kWorld, complete, robot: 1 } as PageState);
   return { router: new Router(page, views), called, views, page };
 }
 

@@ -49,6 +49,7 @@ function state(more: Partial<PageState> = {}): PageState {
     controlled: true,
     world: worldOf(["a"]),
     scene: null,
+    complete: true,
     robot: 0,
     paused: false,
     time_s: 0,
@@ -151,18 +152,18 @@ describe("wanted channels", () => {
   const own = ["ruedo/info", "ruedo/tick", "ruedo/world", "ruedo/reply", "ruedo/markers"];
 
   it("are none before the greeting, then what runs, and messages of the run when all is there", () => {
-    expect([...wantedChannels(state({ hello: null }), false, [])]).toEqual([]);
-    expect([...wantedChannels(state({ world: null }), false, [])]).toEqual([
+    expect([...wantedChannels(state({ hello: null }), [])]).toEqual([]);
+    expect([...wantedChannels(state({ world: null }), [])]).toEqual(["ruedo/info", "ruedo/reply"]);
+    expect([...wantedChannels(state({ complete: false }), [])].sort()).toEqual([
       "ruedo/info",
       "ruedo/reply",
     ]);
-    expect([...wantedChannels(state(), false, [])].sort()).toEqual(["ruedo/info", "ruedo/reply"]);
-    expect([...wantedChannels(state(), true, [])].sort()).toEqual([...own, "a/odometry_t"].sort());
+    expect([...wantedChannels(state(), [])].sort()).toEqual([...own, "a/odometry_t"].sort());
   });
 
   it("are those of the layers and of the open page", () => {
     const wanted = (more: Partial<PageState>) =>
-      [...wantedChannels(state(more), true, [])].filter((name) => name.startsWith("a/")).sort();
+      [...wantedChannels(state(more), [])].filter((name) => name.startsWith("a/")).sort();
     expect(wanted({ layers: new Set(["rays"]) })).toEqual(of("a", "odometry_t", "planar_lidar_t"));
     expect(wanted({ layers: new Set(["sonar", "trail", "contacts", "frames"]) })).toEqual(
       of("a", "contact_t", "odometry_t", "pose_t", "sonar_t"),
@@ -176,16 +177,16 @@ describe("wanted channels", () => {
     const few = state({ world: worldOf(["a", "b", "c", "d"]), robot: 1 }),
       many = state({ world: worldOf(["a", "b", "c", "d", "e"]), robot: 1 });
     expect([shownRobots(few), shownRobots(many)]).toEqual([["a", "b", "c", "d"], ["b"]]);
-    expect(
-      [...wantedChannels(few, true, [])].filter((name) => name.endsWith("odometry_t")),
-    ).toHaveLength(4);
-    expect(
-      [...wantedChannels(many, true, [])].filter((name) => name.endsWith("odometry_t")),
-    ).toEqual(["b/odometry_t"]);
+    expect([...wantedChannels(few, [])].filter((name) => name.endsWith("odometry_t"))).toHaveLength(
+      4,
+    );
+    expect([...wantedChannels(many, [])].filter((name) => name.endsWith("odometry_t"))).toEqual([
+      "b/odometry_t",
+    ]);
   });
 
   it("are those whose values are opened, too", () => {
-    expect(wantedChannels(state(), true, ["a/image_t"]).has("a/image_t")).toBe(true);
+    expect(wantedChannels(state(), ["a/image_t"]).has("a/image_t")).toBe(true);
   });
 });
 

@@ -3,7 +3,7 @@ import * as THREE from "three";
 import { matrixOf } from "../scene/matrix";
 import type { Stage } from "../scene/stage";
 import type { Page } from "../state/page";
-import { toast } from "../ui/dom";
+import { toast } from "../widgets/elements";
 import type { Editor } from "./editor";
 import type { Door } from "./sdf";
 

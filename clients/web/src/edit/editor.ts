@@ -2,11 +2,10 @@
 import type { Box3 } from "three";
 import { request_t } from "../../generated/messages";
 import type { Control } from "../control";
-import type { ModelDescription } from "../scene/description";
-import type { Page } from "../state/page";
+import type { ModelDescription } from "../wire/description";
+import type { Page, Thing } from "../state/page";
 import type { Poses } from "../state/poses";
-import { toast } from "../ui/dom";
-import type { Thing } from "../ui/things";
+import { toast } from "../widgets/elements";
 import { encode } from "../wire/lcm";
 import { History } from "./history";
 import { poseNow, samePose, type Pose7 } from "./pose";

@@ -1,15 +1,12 @@
 // What was done and can be taken back: steps one after the other, each of which may wait for the
 // server.
+import type { HistoryState } from "../state/page";
+
 export interface Step {
   name: string; // "move box_1"
   apply(): Promise<boolean>; // false: it did not come to pass
   revert(): Promise<boolean>;
 }
-export interface HistoryState {
-  undo: string | null;
-  redo: string | null;
-  changes: number;
-} // names of the next steps; how many were done, to and fro
 
 const kMostSteps = 500;
 

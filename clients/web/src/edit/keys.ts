@@ -1,7 +1,7 @@
 // Keys of the page World: take back, do again, copy, delete, save.
 import type { Page } from "../state/page";
-import { dialogIsOpen } from "../ui/confirm";
-import { isTyping } from "../ui/drive";
+import { dialogIsOpen } from "../widgets/confirm";
+import { isTyping } from "../widgets/typing";
 import type { Editor } from "./editor";
 
 export function listenToEditing(page: Page, editor: Editor): void {

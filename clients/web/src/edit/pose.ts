@@ -1,7 +1,7 @@
 // Poses as seven numbers x, y, z, qw, qx, qy, qz, and as the six that people write: x, y, z in
 // metres, roll, pitch and yaw in degrees.
 import * as THREE from "three";
-import type { ModelDescription } from "../scene/description";
+import type { ModelDescription } from "../wire/description";
 import { matrixOf } from "../scene/matrix";
 import type { Poses } from "../state/poses";
 

@@ -4,7 +4,13 @@ import * as THREE from "three";
 import { mergeGeometries } from "three/addons/utils/BufferGeometryUtils.js";
 import { arrived, finishesOf } from "./finish";
 import { kFewLinks, plainKinds } from "./plain";
-import { Flag, type LinkData, type MeshData, type Part, type SceneFiles } from "./description";
+import {
+  Flag,
+  type LinkData,
+  type MeshData,
+  type Part,
+  type SceneFiles,
+} from "../wire/description";
 
 const kSmall = 0.5; // of a link's largest part: smaller ones are left out far away
 

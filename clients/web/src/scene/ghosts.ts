@@ -3,8 +3,8 @@ import * as THREE from "three";
 import type { Page } from "../state/page";
 import { Poses } from "../state/poses";
 import { disposeOf, SceneBuilder, type Built } from "./build";
-import type { SceneFiles } from "./description";
-import { kLayerColours } from "./layers";
+import type { SceneFiles } from "../wire/description";
+import { kLayerColours } from "../state/layers";
 import { matrixOf } from "./matrix";
 import type { Stage } from "./stage";
 

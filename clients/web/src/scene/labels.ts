@@ -1,7 +1,7 @@
 // Names over robots and models, as text over the view.
 import * as THREE from "three";
 import type { Page } from "../state/page";
-import { h } from "../ui/dom";
+import { h } from "../widgets/elements";
 import type { Stage } from "./stage";
 
 const kMost = 60; // the nearest

@@ -1,7 +1,7 @@
 // Where the pointer is in the world, and the way between two points that are clicked.
 import * as THREE from "three";
 import type { Page } from "../state/page";
-import { h, say } from "../ui/dom";
+import { h, say } from "../widgets/elements";
 import type { Stage } from "./stage";
 
 const kLook_ms = 60; // between two looks at what is under the pointer

@@ -10,7 +10,7 @@ import type {
   pose_t,
   sonar_t,
 } from "../../generated/messages";
-import type { Layer } from "./layers";
+import type { Layer } from "../state/layers";
 import { Cloud } from "./clouds";
 import { matrixOf } from "./matrix";
 

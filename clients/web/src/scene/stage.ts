@@ -3,15 +3,20 @@
 import * as THREE from "three";
 import { OrbitControls } from "three/addons/controls/OrbitControls.js";
 import { disposeOf, SceneBuilder, type Built, type Movers } from "./build";
-import type { Description, LightDescription, ModelDescription, SceneFiles } from "./description";
+import type {
+  Description,
+  LightDescription,
+  ModelDescription,
+  SceneFiles,
+} from "../wire/description";
 import { finishesOf, setFinish } from "./finish";
 import { FrameTimer } from "./frame_timer";
 import { matrixOf } from "./matrix";
 import { drawnBySoftware, Quality } from "./quality";
 import type { PlanarPose } from "../state/go_to";
 import type { Poses } from "../state/poses";
+import type { ViewMode } from "../state/page";
 
-export type ViewMode = "orbit" | "follow" | "top";
 const kShadowReach_m = 14;
 const kMostLamps = 6;
 // From the camera: a robot of half a metre is then some 24 pixels of a laptop's screen, and of a

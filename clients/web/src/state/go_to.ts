@@ -1,7 +1,22 @@
 // Sends a robot to points that were clicked, one after the other: it turns towards a point, goes
 // there by what is left of the way, and looks again, since odometry, by which it moves, drifts.
 import { motion_status_t, move_command_t } from "../../generated/messages";
-import type { Move } from "../control";
+
+// A motion primitive as it is asked for.
+export type Move = Omit<move_command_t, "utime" | "id">;
+
+// Why one has ended, by motion_status_t's reason.
+export const kReasons = [
+  "",
+  "replaced by a newer command",
+  "blocked by contact",
+  "stopped by the watchdog: no command came",
+  "refused: not a finite number",
+  "refused: unknown kind",
+  "refused: value out of range",
+  "refused: the robot cannot move",
+  "refused: its drive cannot do that",
+];
 
 const kNear_m = 0.05; // so near it is there
 const kAligned_rad = 0.02; // so little it need not turn

@@ -3,7 +3,7 @@
 // together, for the one says little without the other, and only from then on messages of the run
 // are asked for and taken.
 import type { world_info_t } from "../../generated/messages";
-import type { Hello } from "../wire/link";
+import type { Hello } from "../wire/protocol";
 import { InfoAssembler, type World } from "./world";
 
 export interface LoadingEvents<Scene> {

@@ -1,23 +1,37 @@
 // The page's state: what runs, what is shown of it, and how.
-import type { Hello, LinkState, Playback, RunEvent } from "../wire/link";
+import type { Hello, LinkState, Playback, RunEvent, Comparison } from "../wire/protocol";
 import type { Past } from "../wire/rewind";
-import type { Comparison } from "./comparison";
-import type { Description } from "../scene/description";
-import { kLayers, kOffAtFirst, type Layer } from "../scene/layers";
-import type { ViewMode } from "../scene/stage";
-import { recall } from "../ui/dom";
-import type { HistoryState } from "../edit/history";
-import type { Thing } from "../ui/things";
+import type { Description } from "../wire/description";
+import { kLayers, kOffAtFirst, type Layer } from "./layers";
+import { recall } from "./memory";
 import { Store } from "./store";
 import type { World } from "./world";
 
 export const kTabs = ["Robot", "Plots", "Channels", "World"] as const;
 export type Tab = (typeof kTabs)[number];
 
+export type ViewMode = "orbit" | "follow" | "top";
+
+// What can be placed. name: its model gets; a model of the server's, or SDF.
+export interface Thing {
+  name: string;
+  model: string;
+  text: string;
+  label?: string;
+}
+
 // What a click on the scene does: selects, sends the chosen robot there, places a thing, or draws.
 export type Tool = "select" | "go" | "wall" | "room" | "door" | "measure" | Thing;
 // What the handles of the selected model do.
 export type Handle = "translate" | "rotate" | "scale";
+
+// What can be taken back and done again: names of the next steps, and how many were done, to and
+// fro.
+export interface HistoryState {
+  undo: string | null;
+  redo: string | null;
+  changes: number;
+}
 
 export interface PageState {
   link: LinkState;
@@ -25,6 +39,7 @@ export interface PageState {
   controlled: boolean; // the run takes requests
   world: World | null; // and its scene: both of one moment, by Loading
   scene: Description | null;
+  complete: boolean; // both are there, of this connection: messages of the run mean something
   robot: number; // chosen, index into world.robots; -1 for none
   paused: boolean;
   time_s: number; // sim time
@@ -63,6 +78,7 @@ export function makePage(): Page {
     controlled: false,
     world: null,
     scene: null,
+    complete: false,
     robot: -1,
     paused: false,
     time_s: 0,

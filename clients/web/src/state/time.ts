@@ -1,6 +1,6 @@
 // The time line: what of a run can be shown, what happened around a moment, and when what plays
 // begins anew.
-import type { RunEvent } from "../wire/link";
+import type { RunEvent } from "../wire/protocol";
 import type { PageState } from "./page";
 
 export interface Shown {

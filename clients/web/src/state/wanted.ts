@@ -1,8 +1,9 @@
 // Which channels the page needs: it asks for no others.
-import type { Layer } from "../scene/layers";
+import type { Layer } from "./layers";
 import { kStates } from "./comparison";
 import { inputOf } from "./world";
-import { shownRobots, type PageState, type Tab } from "./page";
+import type { RunLink } from "../wire/protocol";
+import { shownRobots, type Page, type PageState, type Tab } from "./page";
 
 const kMarkers = "ruedo/markers"; // of a log
 const kOfPage = ["world_state_t", "tick_t", "reply_t"];
@@ -26,13 +27,9 @@ export const isDepth = (channel: string, type: string) =>
 const onTab = (tab: Tab, type: string) =>
   tab === "Robot" ? !kNotOnRobotPage.includes(type) : kOfTab[tab].includes(type);
 
-// complete: the world and its scene are there; until then messages of the run mean nothing.
-export function wantedChannels(
-  state: Readonly<PageState>,
-  complete: boolean,
-  opened: Iterable<string>,
-): Set<string> {
-  const { hello, world, robot, layers, tab, panel } = state;
+// opened: what views need beside what the page always does.
+export function wantedChannels(state: Readonly<PageState>, opened: Iterable<string>): Set<string> {
+  const { hello, world, complete, robot, layers, tab, panel } = state;
   const wanted = new Set<string>();
   if (!hello) return wanted;
   wanted.add(hello.info);
@@ -63,4 +60,38 @@ export function wantedChannels(
   if (complete) wanted.add(inputOf(world, "", "markers_t") ?? kMarkers);
   for (const name of opened) wanted.add(name);
   return wanted;
+}
+
+// Tells the link what is needed, whenever that may have changed.
+export class Wanted {
+  private readonly sources: (() => Iterable<string>)[] = [];
+
+  constructor(
+    private readonly page: Page,
+    private readonly link: Pick<RunLink, "want" | "watchTraffic">,
+  ) {}
+
+  // Channels that a view needs beside those of the page; it calls update() when they are others.
+  add(channels: () => Iterable<string>): void {
+    this.sources.push(channels);
+  }
+
+  // From now on, when all views are there.
+  watch(): void {
+    this.page.watch(
+      ["hello", "world", "scene", "complete", "robot", "layers", "tab", "panel"],
+      () => this.update(),
+    );
+  }
+
+  update(): void {
+    const { tab, panel } = this.page.now;
+    this.link.want(
+      wantedChannels(
+        this.page.now,
+        this.sources.flatMap((channels) => [...channels()]),
+      ),
+    );
+    this.link.watchTraffic(panel && tab === "Channels");
+  }
 }

@@ -1,6 +1,6 @@
 // Pictures and videos of the view, as files: made by the browser, of what it draws.
 import type { Stage } from "../scene/stage";
-import { h, say, toast } from "./dom";
+import { h, say, toast } from "../widgets/elements";
 
 const kFrames_hz = 30;
 const kTypes = ["video/webm;codecs=vp9", "video/webm;codecs=vp8", "video/webm", "video/mp4"];

@@ -1,13 +1,13 @@
 // The list of all channels: type, rate, size, and the last values of the ones that are opened.
 import { decode, typeOf } from "../wire/lcm";
 import type { World } from "../state/world";
-import { fieldsOf } from "../state/fields";
-import { h, say } from "./dom";
-import { kDragType } from "./field_plots";
+import { fieldsOf } from "../wire/fields";
+import { h, say } from "../widgets/elements";
+import { kDragType } from "../widgets/drag";
+import { textOf } from "../widgets/text";
 
 const kMostRows = 300;
 const kMostFields = 60; // to plot
-const kMostShown = 12; // elements of an array
 
 interface Row {
   element: HTMLElement;
@@ -17,25 +17,6 @@ interface Row {
   last: number;
   at: number;
   hz: number;
-}
-
-export function textOf(value: unknown, depth = 0): string {
-  if (typeof value === "number")
-    return Number.isInteger(value) ? String(value) : value.toPrecision(5);
-  if (typeof value === "bigint" || typeof value === "boolean") return String(value);
-  if (typeof value === "string") return JSON.stringify(value);
-  if (value instanceof Uint8Array) return `${value.length} bytes`;
-  if (ArrayBuffer.isView(value) || Array.isArray(value)) {
-    const list = value as unknown as ArrayLike<unknown>;
-    const shown = Array.from({ length: Math.min(list.length, kMostShown) }, (_, i) =>
-      textOf(list[i], depth + 1),
-    );
-    return `[${shown.join(", ")}${list.length > kMostShown ? `, … ${list.length}` : ""}]`;
-  }
-  const members = Object.entries(value as object).map(
-    ([name, inner]) => `${name}: ${textOf(inner, depth + 1)}`,
-  );
-  return depth > 0 ? `{${members.join(", ")}}` : members.join("\n");
 }
 
 export class ChannelList {

@@ -1,8 +1,9 @@
 // What differs between the log that is shown and another one: the first difference, and how far
 // apart the robots are.
-import { apartChannel, wordsOf, type Comparison } from "../state/comparison";
+import { apartChannel, wordsOf } from "../state/comparison";
+import type { Comparison } from "../wire/protocol";
 import type { Page } from "../state/page";
-import { h } from "./dom";
+import { h } from "../widgets/elements";
 
 const kMostRows = 20,
   kMostNames = 8;

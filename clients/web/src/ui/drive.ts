@@ -1,8 +1,9 @@
 // Driving by keyboard, gamepad and an on-screen stick: all of them give a share of the robot's
 // speed and turn rate, which is sent as velocity commands ten times a second, and a stop when it is
 // let go.
-import { dialogIsOpen } from "./confirm";
-import { h } from "./dom";
+import { dialogIsOpen } from "../widgets/confirm";
+import { h } from "../widgets/elements";
+import { isTyping } from "../widgets/typing";
 
 const kPeriod_ms = 100;
 const kKeys: Record<string, [number, number]> = {
@@ -113,7 +114,3 @@ export class Drive {
     this.active = moving;
   }
 }
-
-export const isTyping = (target: EventTarget | null) =>
-  target instanceof HTMLElement &&
-  (target.isContentEditable || ["INPUT", "SELECT", "TEXTAREA"].includes(target.tagName));

@@ -3,9 +3,10 @@ import type { Draw } from "../edit/draw";
 import type { Editor } from "../edit/editor";
 import type { Page, Tool } from "../state/page";
 import type { Stage } from "../scene/stage";
-import { h, recall, remember, say } from "./dom";
+import { h, say } from "../widgets/elements";
+import { recall, remember } from "../state/memory";
 import { Library } from "./library";
-import { kThings } from "./things";
+import { kThings } from "../edit/things";
 import { Transform } from "./transform";
 import { Tree } from "./tree";
 

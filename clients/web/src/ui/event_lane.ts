@@ -3,9 +3,9 @@
 import { eventOf } from "../state/comparison";
 import type { Page, PageState } from "../state/page";
 import { eventAfter, eventBefore, shownOf } from "../state/time";
-import type { RunEvent } from "../wire/link";
-import { iconButton } from "./bar";
-import { h, say } from "./dom";
+import type { RunEvent } from "../wire/protocol";
+import { iconButton } from "../widgets/icons";
+import { h, say } from "../widgets/elements";
 
 const kColours: Record<string, string> = {
   collision: "#ff2d8a",

@@ -2,17 +2,18 @@
 // statistics, as a table, and with a cursor that is the time line's.
 import uPlot from "uplot";
 import { isCompared } from "../state/comparison";
-import { csvOf, fieldsOf, statisticsOf, valueAt } from "../state/fields";
+import { csvOf, fieldsOf, statisticsOf, valueAt } from "../wire/fields";
 import type { Page } from "../state/page";
 import { decode, typeOf } from "../wire/lcm";
-import type { History, RunLink } from "../wire/link";
-import { h, recall, remember, toast } from "./dom";
-import { padded } from "./plots";
+import type { History, RunLink } from "../wire/protocol";
+import { h, toast } from "../widgets/elements";
+import { recall, remember } from "../state/memory";
+import { padded } from "../widgets/plots";
+import { kDragType } from "../widgets/drag";
 
 const kMostPoints = 40_000; // of a series; then every second one stays
 const kMostPanes = 8;
 const kColours = ["--true", "--odometry", "--sonar", "--rays", "--accent", "--text"];
-export const kDragType = "text/ruedo-field";
 
 const css = (name: string) =>
   getComputedStyle(document.documentElement).getPropertyValue(name).trim();

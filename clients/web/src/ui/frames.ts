@@ -4,7 +4,7 @@ import type { Page } from "../state/page";
 import type { Stage } from "../scene/stage";
 import * as THREE from "three";
 import { matrixOf } from "../scene/matrix";
-import { h, say } from "./dom";
+import { h, say } from "../widgets/elements";
 
 const kNoFrame = new Set(["odometry", "pose", "motion", "collisions", "joints"]);
 const kMostLinks = 200;

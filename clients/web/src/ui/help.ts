@@ -1,5 +1,5 @@
 // The keys, in a dialog.
-import { h } from "./dom";
+import { h } from "../widgets/elements";
 
 const kKeys: [string[], string][] = [
   [["W", "A", "S", "D"], "drive the chosen robot (arrow keys, a gamepad and the stick, too)"],

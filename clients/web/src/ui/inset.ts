@@ -1,8 +1,9 @@
 // A camera's picture in a corner of the view, whatever the panel shows.
 import type { image_t } from "../../generated/messages";
 import type { Page } from "../state/page";
-import { h, recall, remember } from "./dom";
-import { Picture } from "./robot";
+import { h } from "../widgets/elements";
+import { recall, remember } from "../state/memory";
+import { Picture } from "../widgets/picture";
 
 export class Inset {
   private readonly choice = h("select", { id: "inset", "aria-label": "camera in the view" });

@@ -1,6 +1,6 @@
 // The joints of the chosen robot: where they are, and a slider for each that can be moved.
 import type { joint_state_t } from "../../generated/messages";
-import { h, say } from "./dom";
+import { h, say } from "../widgets/elements";
 
 const kReach = Math.PI; // of a slider, rad or m to both sides
 

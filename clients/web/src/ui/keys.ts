@@ -1,6 +1,6 @@
 // The page's keys. None of them acts while something is typed or a dialog is open.
-import { dialogIsOpen } from "./confirm";
-import { isTyping } from "./drive";
+import { dialogIsOpen } from "../widgets/confirm";
+import { isTyping } from "../widgets/typing";
 
 // Names as KeyboardEvent.key has them; a capital is with Shift. Those that turn the view repeat.
 const kRepeat = new Set([..."ijklIJKL+-"]);

@@ -1,8 +1,8 @@
 // What of the page is open, kept for each world by itself. A world that is new has what was open
 // last.
-import { kLayers } from "../scene/layers";
+import { kLayers } from "../state/layers";
 import { kTabs, type Page } from "../state/page";
-import { recallFor, rememberFor } from "./dom";
+import { recallFor, rememberFor } from "../state/memory";
 
 const kNarrow_px = 860; // there the panel covers the view, and is closed at first
 

@@ -1,7 +1,7 @@
 // The chips that switch what is drawn over the scene.
-import { kLayerColours, kLayers, kOfRobots, type Layer } from "../scene/layers";
+import { kLayerColours, kLayers, kOfRobots, type Layer } from "../state/layers";
 import type { Page } from "../state/page";
-import { h } from "./dom";
+import { h } from "../widgets/elements";
 
 export function makeLegend(place: HTMLElement, page: Page): void {
   const chips = new Map(

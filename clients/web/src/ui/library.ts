@@ -1,11 +1,10 @@
 // Models to choose from, with pictures that the page draws itself.
 import * as THREE from "three";
 import { disposeOf, SceneBuilder } from "../scene/build";
-import { loadScene } from "../scene/description";
+import { loadScene } from "../wire/description";
 import { matrixOf } from "../scene/matrix";
-import type { Page } from "../state/page";
-import { h } from "./dom";
-import type { Thing } from "./things";
+import type { Page, Thing } from "../state/page";
+import { h } from "../widgets/elements";
 
 interface Entry {
   name: string;

@@ -1,8 +1,7 @@
 // The form of a motion primitive: kind, how far, radius and speed, and the button that sends it.
 import { move_command_t } from "../../generated/messages";
-import { h, say } from "./dom";
-
-export type Move = Omit<move_command_t, "utime" | "id">;
+import { h, say } from "../widgets/elements";
+import type { Move } from "../state/go_to";
 
 function numberInput(label: string, more: Record<string, string | number>): HTMLInputElement {
   return h("input", { type: "number", step: 0.1, value: 1, "aria-label": label, ...more });

@@ -1,7 +1,7 @@
 // Words that stay until they do not hold any more, or are clicked away.
 import type { Page } from "../state/page";
-import type { LinkState } from "../wire/link";
-import { say, toast } from "./dom";
+import type { LinkState } from "../wire/protocol";
+import { say, toast } from "../widgets/elements";
 
 export class Notice {
   private wasOpen = false;

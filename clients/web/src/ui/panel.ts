@@ -1,6 +1,6 @@
 // The panel beside the view: pages for the robot, its plots, the channels, and the world.
 import { kTabs, type Page, type Tab } from "../state/page";
-import { h } from "./dom";
+import { h } from "../widgets/elements";
 
 const kSearched = 12; // more robots than these can be searched
 

@@ -13,29 +13,21 @@ import {
   type robot_info_t,
   type sonar_t,
 } from "../../generated/messages";
-import { textOf } from "./channels";
-import { h, say } from "./dom";
+import { textOf } from "../widgets/text";
+import { h, say } from "../widgets/elements";
 import { JointTable } from "./joints";
-import { makeMoveForm, type Move } from "./move_form";
+import { makeMoveForm } from "./move_form";
+import type { Move } from "../state/go_to";
 import { inWorld, type Heading } from "./odometry";
-import { PolarPlot, TimePlot } from "./plots";
+import { PolarPlot, TimePlot } from "../widgets/plots";
+import { kReasons } from "../state/go_to";
+import { Picture } from "../widgets/picture";
 
 const kStates = ["idle", "running", "done", "ended", "refused"];
 const kFacts = ["drive", "pose", "speed", "odometry", "odometry error", "motion", "runs into"];
 const kLevel_m = 0.5; // nearer to the world's zero, a height says nothing; a robot may fall, too
 const fixed = (value: number) => (Math.abs(value) < 5e-4 ? 0 : value).toFixed(3);
 
-export const kReasons = [
-  "",
-  "replaced by a newer command",
-  "blocked by contact",
-  "stopped by the watchdog: no command came",
-  "refused: not a finite number",
-  "refused: unknown kind",
-  "refused: value out of range",
-  "refused: the robot cannot move",
-  "refused: its drive cannot do that",
-];
 const kKinds: Record<number, string> = {
   1: "advance",
   2: "rotate",
@@ -51,87 +43,6 @@ const heading = (rad: number) => degrees(wrap(rad)); // all headings alike, from
 const yawOf = (q: ArrayLike<number>) =>
   Math.atan2(2 * (q[0]! * q[3]! + q[1]! * q[2]!), 1 - 2 * (q[2]! ** 2 + q[3]! ** 2));
 const wrap = (angle: number) => Math.atan2(Math.sin(angle), Math.cos(angle));
-
-// Pictures of a camera: JPEG as it comes, raw formats by way of a canvas.
-export class Picture {
-  readonly image = h("img", { class: "picture", alt: "" });
-  readonly canvas = h("canvas", { class: "picture" });
-  readonly caption = h("figcaption");
-  readonly element: HTMLElement;
-  private url = "";
-
-  constructor(readonly name: string) {
-    this.image.alt = `picture of ${name}`;
-    this.canvas.hidden = true;
-    this.element = h("figure", { "data-camera": name }, this.image, this.canvas, this.caption);
-    say(this.caption, `${name}: no picture yet`);
-  }
-
-  show(message: image_t): void {
-    const { width, height, pixelformat, data, row_stride } = message;
-    say(
-      this.caption,
-      `${this.name} · ${width} × ${height} · ${(Number(message.utime) * 1e-6).toFixed(2)} s`,
-    );
-    const jpeg = pixelformat === image_t.PIXEL_FORMAT_MJPEG;
-    this.image.hidden = !jpeg;
-    this.canvas.hidden = jpeg;
-    if (jpeg) {
-      const old = this.url;
-      this.url = URL.createObjectURL(new Blob([data as BlobPart], { type: "image/jpeg" }));
-      this.image.onload = () => {
-        if (old) URL.revokeObjectURL(old);
-      };
-      this.image.src = this.url;
-      return;
-    }
-    if (width <= 0 || height <= 0 || width * height > 1 << 24) return;
-    this.canvas.width = width;
-    this.canvas.height = height;
-    const pixels = new ImageData(width, height),
-      view = new DataView(data.buffer, data.byteOffset, data.byteLength);
-    const stride = row_stride || data.length / height;
-    for (let y = 0; y < height; ++y) {
-      for (let x = 0; x < width; ++x) {
-        const to = 4 * (y * width + x);
-        const [r, g, b] = pixel(pixelformat, view, y * stride, x);
-        pixels.data[to] = r;
-        pixels.data[to + 1] = g;
-        pixels.data[to + 2] = b;
-        pixels.data[to + 3] = 255;
-      }
-    }
-    this.canvas.getContext("2d")!.putImageData(pixels, 0, 0);
-  }
-}
-
-function pixel(format: number, view: DataView, row: number, x: number): [number, number, number] {
-  const byte = (at: number) => (at < view.byteLength ? view.getUint8(at) : 0);
-  switch (format) {
-    case image_t.PIXEL_FORMAT_RGB:
-      return [byte(row + 3 * x), byte(row + 3 * x + 1), byte(row + 3 * x + 2)];
-    case image_t.PIXEL_FORMAT_BGR:
-      return [byte(row + 3 * x + 2), byte(row + 3 * x + 1), byte(row + 3 * x)];
-    case image_t.PIXEL_FORMAT_FLOAT_GRAY32: {
-      // near is bright
-      const depth =
-        row + 4 * x + 4 <= view.byteLength ? view.getFloat32(row + 4 * x, true) : Infinity;
-      const grey = Number.isFinite(depth) ? 255 / (1 + depth / 3) : 0;
-      return [grey, grey, grey];
-    }
-    case image_t.PIXEL_FORMAT_LE_GRAY16: {
-      // a colour for each label
-      const label = row + 2 * x + 2 <= view.byteLength ? view.getUint16(row + 2 * x, true) : 0;
-      return label === 0
-        ? [0, 0, 0]
-        : [((label * 97) % 200) + 55, ((label * 57) % 200) + 55, ((label * 151) % 200) + 55];
-    }
-    default: {
-      const grey = byte(row + x);
-      return [grey, grey, grey];
-    }
-  }
-}
 
 export class RobotPages {
   readonly facts = h("dl", { class: "facts", id: "facts" });

@@ -1,8 +1,8 @@
 // The time line of a recorded run, and of the last minutes of a live one: play, scrub, speed.
 import type { Page } from "../state/page";
 import { loopedTo, shownOf, type Shown } from "../state/time";
-import { h, say } from "./dom";
-import { icon, iconButton } from "./bar";
+import { h, say } from "../widgets/elements";
+import { icon, iconButton } from "../widgets/icons";
 import { EventLane } from "./event_lane";
 
 export interface TimelineActions {

@@ -2,7 +2,8 @@
 import type { Editor } from "../edit/editor";
 import { numbersOf, poseFrom, samePose } from "../edit/pose";
 import type { Handle, Page } from "../state/page";
-import { h, remember, say } from "./dom";
+import { h, say } from "../widgets/elements";
+import { remember } from "../state/memory";
 
 const kFields = [
   ["x", "m"],

@@ -1,9 +1,9 @@
 // The models of the world as a tree that can be searched: robots, things that move, and what stands
 // fast, each with its links.
 import type { Editor } from "../edit/editor";
-import type { ModelDescription } from "../scene/description";
+import type { ModelDescription } from "../wire/description";
 import type { Page } from "../state/page";
-import { h, say } from "./dom";
+import { h, say } from "../widgets/elements";
 
 const kMostRows = 200;
 const kGroups: [title: string, holds: (model: ModelDescription) => boolean][] = [

@@ -1,14 +1,7 @@
 // A recorded run that is in the page itself: it answers as the program would, from the bytes behind
 // the page.
-import {
-  historyOf,
-  type Hello,
-  type History,
-  type LinkHandler,
-  type Playback,
-  type RunEvent,
-  type RunLink,
-} from "./link";
+import { historyOf } from "./link";
+import type { Hello, History, LinkHandler, Playback, RunEvent, RunLink } from "./protocol";
 import { typeOf } from "./lcm";
 
 interface Head {

@@ -3,7 +3,8 @@
 // whatever is shown.
 
 import { kTypes } from "../../generated/messages";
-import { historyOf, type History, type LinkHandler, type RunLink } from "./link";
+import { historyOf } from "./link";
+import type { History, LinkHandler, RunLink } from "./protocol";
 import { newestAt } from "./log_file";
 import { typeOf } from "./lcm";
 

@@ -1,5 +1,5 @@
 // A command to start in a terminal, in a dialog: to be copied.
-import { h } from "./dom";
+import { h } from "./elements";
 
 export function showCommand(heading: string, command: string): void {
   const text = h("code", { id: "command" }, command),

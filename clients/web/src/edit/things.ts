@@ -1,13 +1,6 @@
 // What can be placed in a world.
-import { boxModel, cylinderModel, sphereModel } from "../edit/sdf";
-
-// name: its model gets; a model of the server's, or SDF.
-export interface Thing {
-  name: string;
-  model: string;
-  text: string;
-  label?: string;
-}
+import { boxModel, cylinderModel, sphereModel } from "./sdf";
+import type { Thing } from "../state/page";
 
 export const kThings: Thing[] = [
   { label: "a box", name: "box", model: "", text: boxModel("box", [0.4, 0.4, 0.4]) },

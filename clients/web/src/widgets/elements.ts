@@ -35,24 +35,5 @@ export function toast(text: string, kind: "info" | "error" = "info"): void {
   setTimeout(() => note.remove(), kToast_ms);
 }
 
-export const remember = (key: string, value: string) => {
-  try {
-    localStorage.setItem(`ruedo.${key}`, value);
-  } catch {
-    /* private mode */
-  }
-};
-// Of a world, and for those that are new.
-export function rememberFor(world: string, key: string, value: string): void {
-  remember(key, value);
-  remember(`${key} of ${world}`, value);
-}
-export const recallFor = (world: string, key: string) =>
-  recall(`${key} of ${world}`) ?? recall(key);
-export const recall = (key: string) => {
-  try {
-    return localStorage.getItem(`ruedo.${key}`);
-  } catch {
-    return null;
-  }
-};
+// An element that the page has from the beginning.
+export const byId = (id: string) => document.getElementById(id)!;

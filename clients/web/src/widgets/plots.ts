@@ -3,7 +3,7 @@
 import uPlot from "uplot";
 import "uplot/dist/uPlot.min.css";
 import type { planar_lidar_t, sonar_t, device_info_t } from "../../generated/messages";
-import { h } from "./dom";
+import { h } from "./elements";
 
 const kWindow_s = 30;
 const css = (name: string) =>

@@ -16,8 +16,8 @@ import type { Stage } from "../scene/stage";
 import type { ChannelList } from "../ui/channels";
 import type { Inset } from "../ui/inset";
 import type { RobotPages } from "../ui/robot";
-import { decode, fingerprint, typeOf, type TypeName } from "./lcm";
-import type { Session } from "./session";
+import { decode, fingerprint, typeOf, type TypeName } from "../wire/lcm";
+import type { Session } from "../wire/session";
 
 interface Route {
   type: TypeName;
@@ -111,7 +111,7 @@ const kShow: { [Type in TypeName]?: Show<Type> } = {
 };
 
 export interface Views {
-  loading: Loading<unknown>;
+  loading: Pick<Loading<unknown>, "onInfo">;
   session: Session;
   poses: Poses;
   clock: Clock;
@@ -153,7 +153,7 @@ export class Router {
 
   // Where the other run's bodies are.
   private ofOther(bytes: Uint8Array): void {
-    if (typeOf(bytes) === "world_state_t" && this.views.loading.complete)
+    if (typeOf(bytes) === "world_state_t" && this.page.now.complete)
       this.views.ghosts.poses.add(decode("world_state_t", bytes), performance.now());
   }
 
@@ -167,7 +167,7 @@ export class Router {
     const { loading, session, poses, clock } = this.views;
     if (type === "world_info_t") return loading.onInfo(read(type));
     if (type === "reply_t") return session.onReply(bytes);
-    if (!loading.complete) return;
+    if (!this.page.now.complete) return;
     if (type === "world_state_t") {
       const state = read(type);
       poses.add(state, performance.now());

@@ -1,5 +1,5 @@
 // A question before what cannot be taken back. Enter says yes, Esc no.
-import { h } from "./dom";
+import { h } from "./elements";
 
 export function confirmed(question: string, words: string, yes: string): Promise<boolean> {
   const dialog = h(

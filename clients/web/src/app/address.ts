@@ -1,0 +1,30 @@
+// The place that the page's address holds: moment, camera, robot, selected model.
+import type { Stage } from "../scene/stage";
+import { chooseRobot } from "../state/choices";
+import { hashOf, placeOf } from "../state/place";
+import { toast } from "../widgets/elements";
+import type { Model } from "./model";
+
+export function goToAddress({ page, link }: Model, stage: Stage): void {
+  const { time_s, camera, robot, selected } = placeOf(location.hash);
+  if (camera) stage.viewpoint = camera;
+  chooseRobot(page, page.now.world?.robots.findIndex(({ name }) => name === robot) ?? -1);
+  if (selected) page.set({ selected });
+  if (time_s !== null && page.now.hello?.mode === "log") {
+    link.play(false, 1);
+    link.seek(time_s);
+  }
+}
+
+export async function copyLink({ page }: Model, stage: Stage): Promise<void> {
+  const { hello, playback, past, world, robot, selected } = page.now,
+    time_s = hello?.mode === "log" ? (playback?.now ?? null) : (past?.now ?? null);
+  const name = world?.robots[robot]?.name ?? "";
+  location.hash = hashOf({ time_s, camera: stage.viewpoint, robot: name, selected });
+  try {
+    await navigator.clipboard.writeText(location.href);
+    toast("The link is copied.");
+  } catch {
+    toast("The link is in the address bar.");
+  }
+}

@@ -1,0 +1,119 @@
+// The page as a whole: makes its parts, each of which knows those above it alone, and draws them.
+import { listenToClicks } from "../edit/clicks";
+import { togglePanel, toggleTheme } from "../state/choices";
+import { Bar } from "../ui/bar";
+import { Drive } from "../ui/drive";
+import { fillHelp } from "../ui/help";
+import { listenToKeys } from "../ui/keys";
+import { Layout } from "../ui/layout";
+import { makeLegend } from "../ui/legend";
+import { Notice } from "../ui/notice";
+import { Timeline } from "../ui/timeline";
+import { byId, h, say } from "../widgets/elements";
+import { Arrivals } from "./arrivals";
+import { ChosenRobot } from "./chosen_robot";
+import { Connection } from "./connection";
+import { Editing } from "./editing";
+import { Model } from "./model";
+import { PanelView } from "./panel_view";
+import { Router } from "./router";
+import { SceneView } from "./scene_view";
+import { shortcutsOf } from "./shortcuts";
+import { ShownWorld } from "./shown_world";
+
+export class App {
+  readonly model = new Model();
+  readonly scene: SceneView;
+  readonly editing: Editing;
+  readonly panel: PanelView;
+  readonly robot: ChosenRobot;
+  readonly arrivals: Arrivals;
+  private readonly help = byId("help") as HTMLDialogElement;
+
+  constructor() {
+    const { model } = this,
+      { page } = model;
+    // First: views take their colours from it
+    page.watch(["theme"], ({ theme }) => (document.documentElement.dataset.theme = theme));
+    this.scene = new SceneView(model);
+    this.editing = new Editing(model, this.scene);
+    this.panel = new PanelView(model, this.scene, this.editing);
+    this.robot = new ChosenRobot(model, this.scene, this.panel.pages);
+    const world = new ShownWorld(model, this.scene),
+      notice = new Notice(byId("notice"), page);
+    this.arrivals = new Arrivals(model, world, notice);
+    this.makeControls();
+    this.makePad();
+    this.listen();
+    model.wanted.watch();
+    const { loading } = this.arrivals,
+      { channels } = this.panel,
+      router = new Router(page, { ...model, ...this.scene, ...this.panel, loading });
+    void new Connection(model, { loading, world, router, channels, notice }).open();
+    requestAnimationFrame((at_ms) => this.frame(at_ms));
+  }
+
+  private makeControls(): void {
+    const { model, scene, help } = this,
+      { page, control } = model;
+    fillHelp(help);
+    new Bar(byId("bar"), page, {
+      pauseOrResume: () => control.pauseOrResume(),
+      step: () => control.step(),
+      reset: () => void control.reset(),
+      rate: (rate) => control.rate(rate),
+      mode: (mode) => scene.setMode(mode),
+      theme: () => toggleTheme(page),
+      help: () => help.showModal(),
+      panel: () => togglePanel(page),
+    });
+    new Layout(page);
+    makeLegend(byId("legend"), page);
+    byId("view").append(scene.measure.readout);
+    const timeline = new Timeline(byId("timeline"), page, {
+      play: (on, speed) => model.link.play(on, speed),
+      seek: (time_s) => model.seek(time_s),
+      live: () => model.live(),
+      step: (ahead) => model.link.step(ahead),
+      branch: () => void control.branch(),
+    });
+    listenToKeys(shortcutsOf(model, scene, this.panel.editPage, timeline, help));
+  }
+
+  // The stick, and what it sends.
+  private makePad(): void {
+    const { page, control } = this.model,
+      readout = h("div", { class: "readout", id: "readout" });
+    const drive = new Drive((ahead, left) => {
+      const speeds = control.drive(ahead, left);
+      if (speeds)
+        say(
+          readout,
+          `${speeds.robot}\n${speeds.vx.toFixed(2)} m/s  ${speeds.omega.toFixed(2)} rad/s`,
+        );
+    });
+    byId("pad").append(drive.stick, readout);
+    page.watch(["hello", "world", "robot"], () => (byId("pad").hidden = !control.canDrive));
+  }
+
+  private listen(): void {
+    const { model, scene, editing, panel, robot } = this;
+    listenToClicks(
+      scene.canvas,
+      model.page,
+      scene.stage,
+      editing.editor,
+      panel.editPage.door,
+      () => editing.gizmo.seized,
+      (point) => scene.measure.click(point),
+      (point, further) => robot.trip.go(point, further),
+    );
+  }
+
+  private frame(at_ms: number): void {
+    this.editing.frame();
+    this.scene.frame(at_ms);
+    this.panel.frame(at_ms);
+    requestAnimationFrame((next_ms) => this.frame(next_ms));
+  }
+}

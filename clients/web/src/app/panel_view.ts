@@ -1,0 +1,112 @@
+// The panel and its pages.
+import { chooseRobot } from "../state/choices";
+import { Capture } from "../ui/capture";
+import { ChannelList } from "../ui/channels";
+import { Compared } from "../ui/compared";
+import { EditPage } from "../ui/edit_page";
+import { FieldPlots } from "../ui/field_plots";
+import { FrameTree } from "../ui/frames";
+import { Inset } from "../ui/inset";
+import { Panel } from "../ui/panel";
+import { RobotPages } from "../ui/robot";
+import { byId, h } from "../widgets/elements";
+import { copyLink } from "./address";
+import type { Editing } from "./editing";
+import type { Model } from "./model";
+import type { SceneView } from "./scene_view";
+
+export class PanelView {
+  readonly pages: RobotPages; // about the chosen robot
+  readonly plots: FieldPlots;
+  readonly channels: ChannelList;
+  readonly editPage: EditPage;
+  readonly inset: Inset;
+  private readonly frames: FrameTree;
+
+  constructor(
+    private readonly model: Model,
+    scene: SceneView,
+    editing: Editing,
+  ) {
+    const { page, control, wanted } = model;
+    this.pages = new RobotPages(
+      (command) => control.move(command),
+      () => control.stop(),
+      {
+        move: (name, position) => control.joint(name, position),
+        canMove: () => control.jointChannel !== undefined,
+      },
+    );
+    const want = () => wanted.update(),
+      seek = (time_s: number) => model.seek(time_s);
+    this.editPage = new EditPage(page, scene.stage, editing.editor, editing.draw);
+    this.channels = new ChannelList(want);
+    this.frames = new FrameTree(page, scene.stage);
+    this.inset = new Inset(byId("view"), page, want);
+    this.plots = new FieldPlots(page, model.link, seek, want);
+    const compared = new Compared(page, {
+      seek,
+      plot: (channel, field) => this.plots.plot(channel, field, field === "distance"),
+    });
+    this.pages.extras.append(this.inset.chooser, this.frames.element);
+    this.editPage.extras.append(
+      new Capture(scene.stage, scene.canvas).element,
+      h(
+        "div",
+        { class: "row" },
+        h("button", { id: "link", click: () => void copyLink(model, scene.stage) }, "Copy link"),
+      ),
+    );
+    new Panel(
+      byId("panel"),
+      page,
+      {
+        Robot: this.pages.statePage,
+        Plots: h("div", {}, compared.element, this.pages.plotPage, this.plots.element),
+        Channels: this.channels.element,
+        World: this.editPage.element,
+      },
+      (robot) => chooseRobot(page, robot),
+    );
+    this.connect();
+  }
+
+  // With the rest of the page.
+  private connect(): void {
+    const { model, pages, plots, channels, inset } = this,
+      { page, control } = model;
+    model.wanted.add(() => [
+      ...channels.opened,
+      ...plots.channels,
+      ...(inset.channel ? [inset.channel] : []),
+    ]);
+    channels.onPlot = (channel, path) => {
+      plots.plot(channel, path, false);
+      page.set({ tab: "Plots" });
+    };
+    if (model.rewind) model.rewind.onKept = (channel, bytes) => plots.message(channel, bytes);
+    model.onForget((reset) => {
+      if (reset) plots.clear();
+      pages.forget();
+    });
+    page.watch(["theme"], () => {
+      pages.restyle();
+      plots.restyle();
+    });
+    page.watch(["world"], ({ world }) => {
+      if (world) channels.show(world);
+    });
+    page.watch(["hello", "world", "robot"], ({ world }) => {
+      pages.showNone(world?.robots.length === 0);
+      pages.showMotions(control.canMove);
+    });
+    page.watch(["tool"], ({ tool }) => pages.goButton.classList.toggle("on", tool === "go"));
+  }
+
+  frame(at_ms: number): void {
+    this.plots.draw();
+    this.editPage.transform.show();
+    this.frames.follow(at_ms);
+    this.pages.draw();
+  }
+}

@@ -1,0 +1,22 @@
+// What this browser keeps of the page for the next time.
+export const remember = (key: string, value: string) => {
+  try {
+    localStorage.setItem(`ruedo.${key}`, value);
+  } catch {
+    /* private mode */
+  }
+};
+// Of a world, and for those that are new.
+export function rememberFor(world: string, key: string, value: string): void {
+  remember(key, value);
+  remember(`${key} of ${world}`, value);
+}
+export const recallFor = (world: string, key: string) =>
+  recall(`${key} of ${world}`) ?? recall(key);
+export const recall = (key: string) => {
+  try {
+    return localStorage.getItem(`ruedo.${key}`);
+  } catch {
+    return null;
+  }
+};

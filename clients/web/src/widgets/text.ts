@@ -1,0 +1,21 @@
+// A message in words: a line for each member, long lists cut short.
+const kMostShown = 12; // elements of an array
+
+export function textOf(value: unknown, depth = 0): string {
+  if (typeof value === "number")
+    return Number.isInteger(value) ? String(value) : value.toPrecision(5);
+  if (typeof value === "bigint" || typeof value === "boolean") return String(value);
+  if (typeof value === "string") return JSON.stringify(value);
+  if (value instanceof Uint8Array) return `${value.length} bytes`;
+  if (ArrayBuffer.isView(value) || Array.isArray(value)) {
+    const list = value as unknown as ArrayLike<unknown>;
+    const shown = Array.from({ length: Math.min(list.length, kMostShown) }, (_, i) =>
+      textOf(list[i], depth + 1),
+    );
+    return `[${shown.join(", ")}${list.length > kMostShown ? `, … ${list.length}` : ""}]`;
+  }
+  const members = Object.entries(value as object).map(
+    ([name, inner]) => `${name}: ${textOf(inner, depth + 1)}`,
+  );
+  return depth > 0 ? `{${members.join(", ")}}` : members.join("\n");
+}
