@@ -124,7 +124,7 @@ bool Rosbag::add_drawn(uint64_t time_ns, std::span<const uint8_t> message) {
   if (!markers || !names_) return false;
   const std::string frame =
       markers->frame.empty() ? "world" : names_->frame(markers->frame, "base_link");
-  write({names_->topic("", "markers"), ros2::MarkerArrays::kType, ros2::kLatchedQos}, time_ns,
+  write({names_->topic("", "markers"), ros2::MarkerArrays::kType, ros2::kMarkersQos}, time_ns,
         markers_.message(*markers, static_cast<int64_t>(time_ns / 1000), frame));
   return true;
 }

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <span>
+#include <utility>
 
 #include "engine/markers.h"
 #include "ros2/cdr.h"
@@ -94,7 +95,8 @@ void put_rest(CdrWriter& out, const std::string& text) {
 
 std::vector<uint8_t> MarkerArrays::message(const markers_t& markers, int64_t utime,
                                            const std::string& frame) {
-  size_t& shown = shown_[markers.layer];
+  const auto before = shown_.find(markers.layer);
+  const size_t shown = before == shown_.end() ? 0 : before->second;
   const size_t count = markers.markers.size();
   CdrWriter out;
   out.put_length(std::max(shown, count));
@@ -112,8 +114,44 @@ std::vector<uint8_t> MarkerArrays::message(const markers_t& markers, int64_t uti
     put_marker(out, marker);
     put_rest(out, marker.text);
   }
-  shown = count;
+  if (count > 0)
+    shown_[markers.layer] = count;
+  else if (shown > 0)
+    shown_.erase(before);
   return out.bytes();
+}
+
+DrawnTopic::DrawnTopic(std::unique_ptr<Writer> writer, const Names& names)
+    : writer_(std::move(writer)), names_(names) {}
+
+void DrawnTopic::take(std::span<const uint8_t> record, int64_t utime) {
+  auto markers = engine::markers_in(record);
+  if (!markers) return;
+  std::erase_if(layers_, [&](const markers_t& layer) { return layer.layer == markers->layer; });
+  send(*markers, utime);
+  if (markers->markers.empty()) return;
+  if (layers_.size() >= kMostLayers) {
+    markers_t oldest = std::move(layers_.front());
+    layers_.erase(layers_.begin());
+    oldest.n = 0;
+    oldest.markers.clear();
+    send(oldest, utime);
+  }
+  layers_.push_back(std::move(*markers));
+}
+
+void DrawnTopic::look(int64_t utime) {
+  const size_t readers = writer_->readers();
+  if (readers > readers_) {
+    for (const markers_t& layer : layers_) send(layer, utime);
+  }
+  readers_ = readers;
+}
+
+void DrawnTopic::send(const markers_t& markers, int64_t utime) {
+  const std::string frame =
+      markers.frame.empty() ? "world" : names_.frame(markers.frame, "base_link");
+  writer_->write(arrays_.message(markers, utime, frame));
 }
 
 }  // namespace ruedo::ros2

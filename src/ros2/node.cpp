@@ -58,6 +58,8 @@ Node::Node(NodeOptions options, std::unique_ptr<Transport> transport,
       clock_period_us_(std::max<int64_t>(1, rounded(1e6 / options_.clock_hz))) {
   clock_topic_ = {names_.topic("", "clock"), "rosgraph_msgs/msg/Clock", kStateQos};
   clock_ = transport_->add_writer(endpoint(clock_topic_));
+  drawn_topic_ = {names_.topic("", "markers"), MarkerArrays::kType, kMarkersQos};
+  drawn_ = std::make_unique<DrawnTopic>(transport_->add_writer(endpoint(drawn_topic_)), names_);
   services_ = std::make_unique<Services>(
       ServiceContext{*transport_, options_.conversion.distro, options_.mapping, names_}, requests_);
   graph_ = transport_->add_writer(
@@ -96,6 +98,7 @@ void Node::flush() {
   if (now < next_look_) return;
   next_look_ = now + kLook;
   look_for_readers();
+  drawn_->look(time_us_);
 }
 
 void Node::look_for_readers() {
@@ -128,6 +131,7 @@ void Node::announce(const std::shared_ptr<const run::Announcement>& announcement
 
 // Before what is measured at that time.
 void Node::begin_step(const run::Step& step) {
+  time_us_ = step.time_us;
   if (step.time_us < next_clock_us_) return;
   next_clock_us_ = step.time_us / clock_period_us_ * clock_period_us_ + clock_period_us_;
   send(*clock_, clock_message(step.time_us));
@@ -136,6 +140,8 @@ void Node::begin_step(const run::Step& step) {
 void Node::message(const run::Published& message) {
   if (message.kind == run::Kind::service && message.channel == reply_channel_)
     requests_.reply({message.data, message.size});
+  if (message.kind == run::Kind::record)
+    drawn_->take({message.data, message.size}, message.time_us);
   if (message.kind != run::Kind::sample) return;
   conversions_->convert(
       message.channel, {message.data, message.size},
@@ -223,10 +229,11 @@ void Node::tell_graph() {
   out.put_length(readers_.size() + services_->readers().size());
   for (const auto& [name, reader] : readers_) put_gid(reader->gid());
   for (const Reader* reader : services_->readers()) put_gid(reader->gid());
-  out.put_length(writers_.size() + standing_.size() + services_->writers().size() + 1);
+  out.put_length(writers_.size() + standing_.size() + services_->writers().size() + 2);
   for (const auto& [name, writer] : writers_) put_gid(writer->gid());
   for (const Writer* writer : services_->writers()) put_gid(writer->gid());
   put_gid(clock_->gid());
+  put_gid(drawn_->writer().gid());
   for (const auto& [name, writer] : standing_) put_gid(writer->gid());
   graph_->write(out.bytes());
 }
@@ -296,6 +303,7 @@ size_t Node::peers() const {
 std::vector<Topic> Node::outputs() const {
   std::vector<Topic> topics = conversions_->topics();
   topics.push_back(clock_topic_);
+  topics.push_back(drawn_topic_);
   for (const Conversions::Standing& each : conversions_->standing()) topics.push_back(each.topic);
   return topics;
 }

@@ -16,6 +16,7 @@
 
 #include "ros2/commands.h"
 #include "ros2/conversions.h"
+#include "ros2/markers.h"
 #include "ros2/requests.h"
 #include "ros2/services.h"
 #include "ros2/transport.h"
@@ -44,7 +45,8 @@ class Node : public run::Sink {
   void stop();
 
   Hears hears() const override {
-    return {.samples = true, .records = false, .services = true, .repeated = false};
+    // Of records what clients draw.
+    return {.samples = true, .records = true, .services = true, .repeated = false};
   }
   bool wants(const std::string& channel) const override;
   uint64_t audience() const override { return audience_; }
@@ -93,8 +95,10 @@ class Node : public run::Sink {
   std::unique_ptr<Conversions> conversions_;
   std::map<std::string, std::unique_ptr<Writer>> writers_;  // by name and type
   std::vector<Writer*> writer_of_topic_;
-  Topic clock_topic_;
+  Topic clock_topic_, drawn_topic_;
   std::unique_ptr<Writer> clock_, graph_;
+  std::unique_ptr<DrawnTopic> drawn_;
+  int64_t time_us_ = 0;                                      // sim time
   std::map<std::string, std::unique_ptr<Writer>> standing_;  // by name and type
   std::map<std::string, std::unique_ptr<Reader>> readers_;
   std::map<std::string, Command> commands_;  // by name and type

@@ -18,6 +18,8 @@ inline constexpr Qos kSensorQos{true, false, 5};
 inline constexpr Qos kStateQos{true, false, 10};
 inline constexpr Qos kTfQos{true, false, 100};
 inline constexpr Qos kLatchedQos{true, true, 1};
+// What clients draw: a message is of one layer, and who misses it misses that.
+inline constexpr Qos kMarkersQos{true, true, 100};
 inline constexpr Qos kCommandQos{true, false, 10};
 // Of all clients of a service together: what one of them sends, or is sent, must not displace what
 // another is. The transport bounds the bytes, and each client's share.

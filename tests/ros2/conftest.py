@@ -70,12 +70,16 @@ class Run:
     """`ruedo run WORLD --ros2` in a domain of its own; ends with the with-block."""
 
     def __init__(
-        self, *arguments: str, world: str = ARENA, environment: dict[str, str] | None = None
+        self,
+        *arguments: str,
+        world: str = ARENA,
+        environment: dict[str, str] | None = None,
+        lcm: str = "auto",
     ):
         self.domain = next(_domains)
         environment = {**os.environ, "ROS_DOMAIN_ID": str(self.domain), **(environment or {})}
         self.process = subprocess.Popen(
-            [RUEDO, "run", world, "--ros2", "--lcm", "auto", *arguments],
+            [RUEDO, "run", world, "--ros2", "--lcm", lcm, *arguments],
             env=environment,
             stdin=subprocess.DEVNULL,
             stdout=subprocess.PIPE,
