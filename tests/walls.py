@@ -141,6 +141,32 @@ OTHERS_PRIVATE = {
 }  # of the classes that lcm-gen makes: it has no other name
 
 
+def dangling_ranges(root):
+    """Loops over what a temporary pointer owns: `for (x : make()->list)`. C++20 destroys the
+    pointer before the first turn.
+    """
+    problems = []
+    for path in sorted(
+        p
+        for top in ("src", "include", "clients/cpp", "clients/python/engine", "tests")
+        for p in (root / top).rglob("*")
+        if p.suffix in (".cpp", ".h")
+    ):
+        text = re.sub(r"//[^\n]*", "", path.read_text(encoding="utf-8"))
+        for match in re.finditer(r"\bfor \(", text):
+            inside = argument(text, match.end() - 1)
+            colon = re.search(r"(?<!:):(?!:)", inside)
+            if ";" in inside or not colon:
+                continue
+            owner = re.search(r"(\w+)(<[^()]*>)?\([^()]*\)->", inside[colon.end() :])
+            if owner and owner.group(1) != "static_cast":
+                line = text.count("\n", 0, match.start()) + 1
+                problems.append(
+                    f"{path.relative_to(root)}:{line}: name what {owner.group(1)}() returns"
+                )
+    return problems
+
+
 def is_private(name):
     return name.startswith("_") and not name.endswith("__")
 
@@ -292,7 +318,14 @@ def broken_web_walls(root):
 
 @pytest.mark.parametrize(
     "rule",
-    [broken_walls, bare_conversions, foreign_members, states_left_behind, broken_web_walls],
+    [
+        broken_walls,
+        bare_conversions,
+        dangling_ranges,
+        foreign_members,
+        states_left_behind,
+        broken_web_walls,
+    ],
 )
 def test_tree_keeps(rule):
     problems = rule(ROOT)
@@ -488,6 +521,21 @@ def test_bare_conversions_are_seen(tmp_path, text, good):
         )
         == []
     ) == good
+
+
+@pytest.mark.parametrize(
+    "text, good",
+    [
+        ("for (const auto& x : make(a)->list) f(x);", False),
+        ("for (const X& x :\n     core()->info()->robots)\n  f(x);", False),
+        ("for (const auto& x : made->list) f(x);", True),
+        ("for (const auto& x : make(a).list) f(x);", True),  # lives as long as the loop
+        ("for (const P* p : static_cast<const B*>(b)->all) f(p);", True),
+        ("for (int i = 0; i < make()->n; ++i) f(a ? i : 0);", True),
+    ],
+)
+def test_dangling_ranges_are_seen(tmp_path, text, good):
+    assert (dangling_ranges(tree(tmp_path, {"src/core/a.cpp": text + "\n"})) == []) == good
 
 
 @pytest.mark.parametrize(

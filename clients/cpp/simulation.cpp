@@ -111,8 +111,9 @@ bool Simulation::paused() const { return core()->info()->paused; }
 std::vector<BodyInfo> Simulation::bodies() const { return core()->info()->bodies; }
 
 std::vector<Robot> Simulation::robots() const {
+  const auto info = core()->info();  // the receiving thread may replace it at any time
   std::vector<Robot> robots;
-  for (const RobotInfo& robot : core()->info()->robots) robots.emplace_back(core(), robot.name);
+  for (const RobotInfo& robot : info->robots) robots.emplace_back(core(), robot.name);
   return robots;
 }
 

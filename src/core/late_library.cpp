@@ -73,10 +73,17 @@ void add_files(std::string_view lines, std::vector<std::string>& files) {
   }
 }
 
+// By its path: a sanitizer's dlopen() would search where the sanitizer's own library says.
+void* load(LateLibrary library) {
+  const char* name = file_of(library);
+  const std::string path = path_of(name);
+  return ::dlopen(path.empty() ? name : path.c_str(), RTLD_NOW | RTLD_LOCAL);
+}
+
 }  // namespace
 
 void* late_symbol(LateLibrary library, const char* name, std::string& why) {
-  void* loaded = ::dlopen(file_of(library), RTLD_NOW | RTLD_LOCAL);
+  void* loaded = load(library);
   void* symbol = loaded == nullptr ? nullptr : ::dlsym(loaded, name);
   if (symbol == nullptr) {
     const char* error = ::dlerror();
@@ -86,7 +93,7 @@ void* late_symbol(LateLibrary library, const char* name, std::string& why) {
 }
 
 void load_late_libraries() {
-  for (const LateLibrary library : kAll) ::dlopen(file_of(library), RTLD_NOW | RTLD_LOCAL);
+  for (const LateLibrary library : kAll) load(library);
 }
 
 const std::vector<std::string>& files_of_late_libraries() {

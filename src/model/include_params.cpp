@@ -54,7 +54,8 @@ bool remove(Element& from, const Element* what) {
 
 // Values of `change` take the place of those that there are; what is not there is added.
 void modify(Element& element, const Element& change) {
-  for (const auto& [name, value] : as_written(change)->attributes) {
+  const auto values = as_written(change);  // outlives the loop over what it holds
+  for (const auto& [name, value] : values->attributes) {
     const auto same = [&, key = name](const auto& each) { return each.first == key; };
     std::erase_if(element.attributes, same);
     element.attributes.emplace_back(name, value);

@@ -11,8 +11,8 @@ TEST(SdfElements, NoneOfAWorldIsSilent) {
     return path.find("/sensor") == std::string::npos;
   };
   const auto load = [](const std::string& text, std::multiset<std::string>& found) {
-    for (const Finding& finding : load_world_text(text, "/nowhere/w.sdf")->findings)
-      found.insert(finding.text);
+    const auto world = load_world_text(text, "/nowhere/w.sdf");
+    for (const Finding& finding : world->findings) found.insert(finding.text);
   };
   ASSERT_GT(test::rows().size(), 1000u);
   EXPECT_EQ(test::silent_ones(of_the_world, load), "");
