@@ -610,9 +610,9 @@ class [[nodiscard]] Simulation {
   /// @param name of the snapshot
   /// @return the state
   State snapshot(const std::string& name) const;
-  /// Puts the world back to a snapshot; what follows equals what followed it. The server runs there
-  /// from the beginning of the snapshot's run, in silence: this takes as long as that part takes at
-  /// rate max. A new epoch.
+  /// Puts the world back to a snapshot; what follows equals what followed it. A new epoch. One of
+  /// the last that this server saved takes milliseconds; to another one it runs from the beginning
+  /// of the snapshot's run, in silence, which takes as long as that part takes at rate max.
   /// @param name of the snapshot
   /// @return the state
   State restore(const std::string& name) const;

@@ -121,6 +121,16 @@ void Simulation::remove_model(InstanceIndex instance, Channels& channels) {
   }
 }
 
+void Simulation::save(World& copy) const {
+  copy.take(world_);
+  copy.inbox().clear();
+}
+
+void Simulation::restore(const World& copy, int epoch) {
+  world_.take(copy);
+  world_.set_epoch(epoch);
+}
+
 void Simulation::simulate() {
   pthread_setname_np(pthread_self(), "kinematics");
   std::fesetenv(FE_DFL_ENV);

@@ -97,6 +97,12 @@ class Simulation {
   void remove_model(InstanceIndex instance, Channels& channels);
   SimTime reset_time(int epoch) { return world_.reset_time(epoch); }
 
+  // Makes another copy of the world what this one is, but for commands that nobody applied yet.
+  // Throws as World::take.
+  void save(World& copy) const;
+  // Becomes what save() made, in a new epoch.
+  void restore(const World& copy, int epoch);
+
  private:
   const Batch* advance();
   void simulate();

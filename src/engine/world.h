@@ -57,10 +57,13 @@ class World {
   // The state that there is, whose number is `step`.
   void read(int64_t step, Snapshot& snapshot);
 
-  // Becomes what another copy of the same plan, seed and options is: what follows equals what
-  // follows there, byte for byte. Both stand between two steps, and no model came or went. Throws
-  // InputError for a plugin's device or drive that cannot be copied; it may be half done then.
+  // Becomes what another copy of the same plan (or one of the same model), seed and options is:
+  // what follows equals what follows there, byte for byte. Both stand between two steps, and no
+  // model came or went. Throws InputError for a plugin's device or drive that cannot be copied; it
+  // may be half done then.
   void take(const World& other);
+  // From now on ruedo/world carries that epoch.
+  void set_epoch(int epoch);
 
   const model::WorldModel& model() const { return model_; }
   const model::BodyLayout& layout() const { return layout_; }

@@ -127,13 +127,17 @@ void World::renew_world_state() {
   }
 }
 
-SimTime World::reset_time(int epoch) {
+void World::set_epoch(int epoch) {
   options_.epoch = epoch;
+  renew_world_state();
+}
+
+SimTime World::reset_time(int epoch) {
   const SimTime was = robots_->set_time_to_zero();
   inbox_.reset_time();
   faults_.reset_time();
   for (auto& module : modules_) module->reset_time(was);
-  renew_world_state();
+  set_epoch(epoch);
   return was;
 }
 

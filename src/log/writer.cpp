@@ -2,6 +2,7 @@
 // big-endian.
 #include "log/writer.h"
 
+#include <algorithm>
 #include <cerrno>
 #include <cstring>
 
@@ -88,10 +89,28 @@ void Writer::truncate() {
 }
 
 std::string Writer::append(const Writer& other) {
+  const std::string fault = copy(other.file_, other.path_, 0, other.written_);
+  if (fault.empty()) events_ = other.events_;
+  return fault;
+}
+
+std::string Writer::append(const std::string& path, int64_t begin, int64_t end, int64_t events) {
+  flush();
+  if (!error_.empty()) return error_;
+  const int file = ::open(path.c_str(), O_RDONLY | O_CLOEXEC);
+  if (file < 0) return path + ": " + std::strerror(errno);
+  const std::string fault = copy(file, path, begin, end);
+  ::close(file);
+  if (fault.empty()) events_ += events;
+  return fault;
+}
+
+std::string Writer::copy(int file, const std::string& path, int64_t begin, int64_t end) {
   std::vector<uint8_t> piece(kFlushSize);
-  for (int64_t done = 0; done < other.written_;) {
-    const ssize_t got = ::pread(other.file_, piece.data(), piece.size(), done);
-    if (got <= 0) return got < 0 ? std::strerror(errno) : other.path_ + " is shorter than it was";
+  for (int64_t done = begin; done < end;) {
+    const size_t wanted = std::min(piece.size(), static_cast<size_t>(end - done));
+    const ssize_t got = ::pread(file, piece.data(), wanted, done);
+    if (got <= 0) return got < 0 ? std::strerror(errno) : path + " is shorter than it was";
     for (ssize_t put = 0; put < got;) {
       const ssize_t count = ::write(file_, piece.data() + put, static_cast<size_t>(got - put));
       if (count <= 0) return std::strerror(count < 0 ? errno : ENOSPC);
@@ -99,8 +118,7 @@ std::string Writer::append(const Writer& other) {
     }
     done += got;
   }
-  written_ = other.written_;
-  events_ = other.events_;
+  written_ += end - begin;
   return "";
 }
 

@@ -32,6 +32,8 @@ class Writer {
   // Adds the events of another log that was written from its beginning and flushed, to an empty
   // one. What went wrong, or "".
   std::string append(const Writer& other);
+  // Adds so many events of a log, which lie at these bytes of its file. What went wrong, or "".
+  std::string append(const std::string& path, int64_t begin, int64_t end, int64_t events);
 
   // What went wrong ("no space left on device"), or "". The file then ends with the last whole
   // event that had room.
@@ -39,8 +41,10 @@ class Writer {
   const std::string& path() const { return path_; }
   // Bytes so far, with what is not handed over yet.
   int64_t size() const { return written_ + static_cast<int64_t>(buffer_.size()); }
+  int64_t events() const { return events_; }
 
  private:
+  std::string copy(int file, const std::string& path, int64_t begin, int64_t end);
   void fail(int error_number);
 
   std::string path_;

@@ -44,6 +44,7 @@ Run::Outcome Run::change(const request_t& request, bool models,
   {
     const std::lock_guard lock(simulation_mutex_);
     outcome = apply();
+    if (models) as_made_ = false;
     if (models) world_ = std::make_shared<const model::WorldModel>(simulation_->world());
   }
   if (outcome.code == reply_t::OK) {
@@ -139,6 +140,7 @@ Run::Outcome Run::reset_time(const request_t& request) {
   {
     const std::lock_guard lock(simulation_mutex_);
     simulation_->reset_time(epoch_);
+    as_made_ = false;
     mode().begin(stage(), -1);
   }
   announce();

@@ -86,10 +86,15 @@ EditedWorld::EditedWorld(const model::WorldModel& first, std::string file)
   if (saves()) known_ = bytes_of(file_);
 }
 
-void EditedWorld::begin() {
+void EditedWorld::begin(std::set<std::string> put) {
   const std::lock_guard lock(mutex_);
   spawned_.clear();
-  put_.clear();
+  put_ = std::move(put);
+}
+
+std::set<std::string> EditedWorld::put() const {
+  const std::lock_guard lock(mutex_);
+  return put_;
 }
 
 void EditedWorld::spawned(const std::string& name, const spawn_request_t& body) {

@@ -22,11 +22,12 @@ class EditedWorld {
   EditedWorld(const model::WorldModel& first, std::string file);
 
   // The run tells what requests have done.
-  void begin();  // the world is rebuilt
+  void begin(std::set<std::string> put = {});  // the world is rebuilt; what put() was then
   void spawned(const std::string& name, const spawn_request_t& body);
   void put(const std::string& name);
   void removed(const std::string& name);
 
+  std::set<std::string> put() const;  // that were put somewhere
   bool saves() const { return !file_.empty(); }
   // SDF or URDF of a model, as SPAWN takes it; "" where there is none. Any thread.
   std::string model_text(const std::string& name) const;

@@ -82,6 +82,14 @@ void Journal::begin(const log_header_t& header, SimTime stamp_us) {
   writer_.truncate();
   base_us_ = stamp_us;
   write(writer_, 0, kHeaderChannel, header);
+  header_end_ = writer_.size();
+  fault_.clear();
+}
+
+void Journal::begin_with(const log_header_t& header, SimTime stamp_us, const std::string& snapshot,
+                         const Extent& extent) {
+  begin(header, stamp_us);
+  fault_ = writer_.append(snapshot, extent.header_end, extent.end, extent.events);
 }
 
 void Journal::message(const Published& message) {
@@ -111,7 +119,8 @@ std::string Journal::save(const std::string& name,
   if (files >= kMostSnapshots && !fs::exists(path, error))
     return "the folder holds " + std::to_string(files) + " snapshots already";
   writer_.flush();
-  if (!writer_.error().empty()) return "the journal is incomplete: " + writer_.error();
+  const std::string& incomplete = writer_.error().empty() ? fault_ : writer_.error();
+  if (!incomplete.empty()) return "the journal is incomplete: " + incomplete;
   try {
     log::Writer snapshot(part.path());
     const std::string fault = fill(snapshot);

@@ -29,6 +29,16 @@ class Journal : public Sink {
   // The world is built, or rebuilt, at that stamp.
   void begin(const log_header_t& header, SimTime stamp_us);
 
+  // How much there is of it. A snapshot that is saved now begins with that.
+  struct Extent {
+    int64_t header_end = 0, end = 0;  // bytes
+    int64_t events = 0;               // between them
+  };
+  Extent extent() const { return {header_end_, writer_.size(), writer_.events() - 1}; }
+  // The world is rebuilt, and what it was when that snapshot was saved. stamp_us: of sim time 0.
+  void begin_with(const log_header_t& header, SimTime stamp_us, const std::string& snapshot,
+                  const Extent& extent);
+
   Hears hears() const override { return {.samples = false, .records = true, .repeated = true}; }
   void message(const Published& message) override;
 
@@ -51,6 +61,8 @@ class Journal : public Sink {
   const std::string folder_;
   log::Writer writer_;
   SimTime base_us_ = 0;  // the stamp of its begin
+  int64_t header_end_ = 0;
+  std::string fault_;  // why it is not whole
 };
 
 }  // namespace ruedo::run

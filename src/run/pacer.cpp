@@ -149,6 +149,13 @@ void Pacer::reset_time() {
   reset();
 }
 
+void Pacer::go_on_from(int64_t step) {
+  std::lock_guard lock(mutex_);
+  granted_ = step;
+  until_ = paused_ ? step : last_step_;
+  reset();
+}
+
 void Pacer::stop() {
   {
     std::lock_guard lock(mutex_);

@@ -42,7 +42,8 @@ class Pacer : public engine::Pace, public Gate {
   int64_t hold();
   bool wait_until_held();
   void release();
-  void reset_time();  // while held: the next state is 0
+  void reset_time();              // while held: the next state is 0
+  void go_on_from(int64_t step);  // while held, or before wait(): that state is there
 
   bool paused() const override;
   // Whether nothing is to be computed now: a pause, the end of the run, or real time.

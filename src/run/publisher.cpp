@@ -62,6 +62,13 @@ void Publisher::begin_epoch(int32_t epoch) {
   sequences_.assign(sequences_.size(), 0);
 }
 
+void Publisher::go_on_from(const Snapshot& state, const std::vector<int64_t>& sequences) {
+  step_ = state.step;
+  time_us_ = state.time;
+  latest_ = &state;
+  sequences_ = sequences;
+}
+
 void Publisher::publish(engine::Simulation& simulation, const engine::Batch& batch,
                         const Snapshot& state) {
   step_ = state.step;

@@ -28,6 +28,9 @@ class Publisher {
   void announce(Announcement announcement);
   // Sim time was reset to 0, and no state was published yet. Stamps go on.
   void begin_epoch(int32_t epoch);
+  // Then: it goes on from a state of another epoch, whose messages had these sequences().
+  void go_on_from(const Snapshot& state, const std::vector<int64_t>& sequences);
+  const std::vector<int64_t>& sequences() const { return sequences_; }
 
   // A state of the batch, and its messages.
   void publish(engine::Simulation& simulation, const engine::Batch& batch, const Snapshot& state);

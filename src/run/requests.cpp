@@ -1,47 +1,15 @@
 // The table of requests, and those that steer the run or look at it. Those that change the world
-// are in edit_requests.cpp.
+// are in edit_requests.cpp, those of snapshots in snapshot_requests.cpp.
 #include <algorithm>
-#include <cctype>
-#include <filesystem>
 #include <iterator>
-#include <string_view>
 
 #include "engine/world_state.h"
-#include "log/header.h"
-#include "ruedo/errors.h"
 #include "run/request_table.h"
 #include "run/run.h"
 
 namespace ruedo::run {
 
 using engine::Outcome;
-
-namespace {
-
-// A word of a command line.
-std::string in_shell(const std::string& word) {
-  const auto plain = [](char c) {
-    return std::isalnum(static_cast<unsigned char>(c)) ||
-           std::string_view("_-+=./:,@%").find(c) != std::string_view::npos;
-  };
-  if (!word.empty() && std::all_of(word.begin(), word.end(), plain)) return word;
-  std::string quoted = "'";
-  for (const char c : word) quoted += c == '\'' ? "'\\''" : std::string(1, c);
-  return quoted + "'";
-}
-
-// How to go on from a snapshot of that run.
-std::string command_for(const std::string& snapshot, const log_header_t& header) {
-  std::string command = "ruedo run " + in_shell(header.world_file);
-  for (const std::string& option : header.options) {  // "--spawn p3at@0,1"
-    const size_t space = option.find(' ');
-    command += " " + option.substr(0, space);
-    if (space != std::string::npos) command += " " + in_shell(option.substr(space + 1));
-  }
-  return command + " --restore " + in_shell(snapshot) + " --view 0";
-}
-
-}  // namespace
 
 // The functions of Run, as the table has them.
 class RequestTable {
@@ -280,71 +248,6 @@ Outcome Run::reset_odometry(const request_t& request, const name_request_t& body
     return {};
   }
   return Outcome::refuse(reply_t::UNKNOWN_NAME, "there is no robot called '" + body.name + "'");
-}
-
-Outcome Run::snapshot(const request_t& request) {
-  name_request_t now;
-  snapshot_request_t past;
-  const bool is_past = read_body(request, past);
-  if (!is_past && !read_body(request, now)) return bad_body<name_request_t>();
-  const std::string& name = is_past ? past.name : now.name;
-  if (journal_->snapshot_path(name).empty()) {
-    return Outcome::refuse(reply_t::BAD_REQUEST, "'" + name +
-                                                     "' is no name of a snapshot: 1 to 63 letters, "
-                                                     "digits, '_', '-' and '.', not first a '.'");
-  }
-  if (is_past) return snapshot_of(past);
-  const std::string fault =
-      journal_->save_snapshot(name, hashes_.now(true), publisher_.base_us() + publisher_.time_us());
-  if (!fault.empty())
-    return Outcome::refuse(reply_t::REFUSED, "the snapshot was not saved: " + fault);
-  return Outcome::with(engine::encoded(state()));
-}
-
-Outcome Run::snapshot_of(const snapshot_request_t& past) {
-  if (past.epoch != publisher_.epoch() || past.step < 0 || past.step > publisher_.step()) {
-    return Outcome::refuse(reply_t::BAD_REQUEST,
-                           "there was no step " + std::to_string(past.step) + " of epoch " +
-                               std::to_string(past.epoch) + ": allowed are 0 to " +
-                               std::to_string(publisher_.step()) + " of epoch " +
-                               std::to_string(publisher_.epoch()));
-  }
-  const SimTime time_us = past.step * world_->step_us;
-  const std::string fault = journal_->save_past(past.name, past.step, time_us, past.epoch,
-                                                publisher_.base_us() + time_us);
-  if (!fault.empty())
-    return Outcome::refuse(reply_t::REFUSED, "the snapshot was not saved: " + fault);
-  Outcome outcome;
-  outcome.text = command_for(journal_->snapshot_path(past.name), header_);
-  return outcome;
-}
-
-// In the log it is a reset and the run up to the snapshot's step, so that the log can be repeated
-// without another file.
-Outcome Run::restore(const request_t& request, const name_request_t& body) {
-  const std::string path = journal_->snapshot_path(body.name);
-  if (path.empty() || !std::filesystem::exists(path)) {
-    return Outcome::refuse(reply_t::UNKNOWN_NAME, "there is no snapshot '" + body.name + "'");
-  }
-  try {
-    reset_request_t reset;
-    reset.what = reset_request_t::ALL;
-    const log_header_t header = read_header(path);
-    log::check_same_run(header, header_, path);
-    reset.seed = header.seed == header_.seed ? -1 : header.seed;
-    control_.cancel("a snapshot is restored");
-    request_t noted = request;
-    noted.kind = request_t::RESET;
-    noted.body = engine::encoded(reset);
-    noted.size = static_cast<int32_t>(noted.body.size());
-    note(noted);
-    begin_repeat(path);
-  } catch (const InputError& error) {
-    return Outcome::refuse(reply_t::REFUSED, error.what());
-  }
-  begin_epoch();
-  take_turns();
-  return Outcome::after(0);
 }
 
 }  // namespace ruedo::run

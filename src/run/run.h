@@ -36,6 +36,7 @@
 #include "run/publisher.h"
 #include "run/repeating.h"
 #include "run/request_table.h"
+#include "run/saved_states.h"
 #include "run/sinks.h"
 #include "run/stall_watch.h"
 #include "run/wait_for.h"
@@ -164,7 +165,8 @@ class Run {
   void take_turns();
   void end_repeat(bool paused);
 
-  // Requests; in requests.cpp. Those of clients go through ask(), those of a log are executed.
+  // Requests; in requests.cpp, and those of snapshots in snapshot_requests.cpp. Those of clients go
+  // through ask(), those of a log are executed.
   Outcome ask(const request_t& request, const Session& session);
   Outcome execute(const request_t& request, const Session& session);
   bool serves(const RequestKind& kind) const;
@@ -184,6 +186,9 @@ class Run {
   Outcome snapshot(const request_t& request);
   Outcome snapshot_of(const snapshot_request_t& past);
   Outcome restore(const request_t& request, const name_request_t& body);
+  bool keeps_states() const;  // SNAPSHOT does, beside its files
+  void keep_state(const std::string& path);
+  Outcome put_back(const SavedState& saved, const std::string& path);
 
   // Requests that change the world between two steps; in edit_requests.cpp.
   bool stand_still();  // false: the run is over
@@ -212,6 +217,7 @@ class Run {
   Bus& bus_;
   const int64_t run_id_;
   int32_t epoch_ = 0;
+  bool as_made_ = true;  // no model came or went in this epoch, and sim time was not reset
   uint64_t audience_ = UINT64_MAX;  // of the publisher, when the simulation was told what is read
   engine::Channels channels_;
   engine::SimulationChannels own_;
@@ -233,6 +239,8 @@ class Run {
   std::unique_ptr<LogSink> log_;  // null: none, as the next two
   std::unique_ptr<WatcherSink> watcher_;
   std::unique_ptr<Journal> journal_;
+  SavedStates saved_states_;
+  std::shared_ptr<engine::Plan> plan_of_saved_;  // of their worlds
   HashBeat hashes_;
   WatchdogWarnings watchdogs_;
   Ticks ticks_;

@@ -26,6 +26,7 @@ void Run::make_simulation(const Pace& pace) {
   simulation_.reset();
   world_ = first_world_;
   if (edited_) edited_->begin();
+  as_made_ = true;
   channels_.clear();
   own_ = engine::add_simulation_channels(channels_, options_.control);
   if (own_.request >= 0 && request_channel_.empty())

@@ -7,6 +7,7 @@
 // gravity upwards, on a ramp along the ramp's axes. A wheel that is part of B turns the device
 // about its hub H: the same from B to H, then from H to S with the wheel's own omega.
 #include "model/body_layout.h"
+#include "ruedo/bound.h"
 #include "ruedo/imu_t.hpp"
 #include "ruedo/sensor.h"
 #include "sensors/noise.h"
@@ -17,13 +18,16 @@ namespace {
 class Imu : public SensorOf<Imu> {
  public:
   explicit Imu(const SensorSetup& setup)
-      : random_(setup.random), gravity_(setup.world.gravity), channel_(setup.channel<imu_t>()) {
+      : random_(setup.random),
+        gravity_(setup.world.gravity),
+        channel_(setup.channel<imu_t>()),
+        layout_(setup.layout) {
     const model::LinkPlacement& link = setup.layout.links[setup.link];
     body_ = link.body;
     X_LS_ = setup.X_LS;
     X_BS_ = link.X_BL * X_LS_;
     if (body_.valid() && link.wheel.valid()) {
-      layout_ = &setup.layout;
+      on_wheel_ = true;
       link_ = setup.link;
       wheel_ = link.wheel;
       const model::WheelPlacement& wheel = layout_->wheels[wheel_];
@@ -62,11 +66,11 @@ class Imu : public SensorOf<Imu> {
     Vec3 omega = Vec3::Zero(), acceleration = Vec3::Zero();  // of S, in the world's axes
     if (body_.valid()) {
       const Pose& X_WB = now.bodies[body_];
-      const Pose X_BS = layout_ ? layout_->link_in_body(link_, now.wheel_angles) * X_LS_ : X_BS_;
+      const Pose X_BS = on_wheel_ ? layout_->link_in_body(link_, now.wheel_angles) * X_LS_ : X_BS_;
       X_WS = X_WB * X_BS;
       acceleration = now.body_accelerations[body_];
       omega = now.body_twists[body_].angular;
-      if (layout_) {
+      if (on_wheel_) {
         const Vec3 hub = X_WB.rotation * hub_B_;
         acceleration += alpha_of_body_.cross(hub) + omega.cross(omega.cross(hub));
         omega += of_wheel(now);
@@ -97,7 +101,7 @@ class Imu : public SensorOf<Imu> {
  private:
   // rad/s, world: what the wheel turns the device more than the body does.
   Vec3 of_wheel(const Snapshot& now) const {
-    if (!layout_) return Vec3::Zero();
+    if (!on_wheel_) return Vec3::Zero();
     return now.bodies[body_].rotation * (now.wheel_rates[wheel_] * axis_B_);
   }
 
@@ -137,9 +141,10 @@ class Imu : public SensorOf<Imu> {
   RandomSource random_;
   Vec3 gravity_;
   int channel_;
-  BodyIndex body_;                             // none: does not move
-  Pose X_LS_, X_BS_;                           // X_BS_: X_WS when it does not move
-  const model::BodyLayout* layout_ = nullptr;  // only when a wheel of that body turns the device
+  BodyIndex body_;    // none: does not move
+  Pose X_LS_, X_BS_;  // X_BS_: X_WS when it does not move
+  Bound<const model::BodyLayout> layout_;
+  bool on_wheel_ = false;  // a wheel of that body turns the device
   LinkIndex link_;
   WheelIndex wheel_;
   Vec3 hub_B_ = Vec3::Zero(), axis_B_ = Vec3::Zero();  // p_BH; unit

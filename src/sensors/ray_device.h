@@ -3,6 +3,7 @@
 #pragma once
 
 #include "model/body_layout.h"
+#include "ruedo/bound.h"
 #include "ruedo/sensor.h"
 #include "scene/ray_scene.h"
 
@@ -12,7 +13,7 @@ namespace ruedo {
 class RayMount {
  public:
   explicit RayMount(const SensorSetup& setup)
-      : world_(&setup.world), layout_(&setup.layout), link_(setup.link) {
+      : world_(setup.world), layout_(setup.layout), link_(setup.link) {
     const model::LinkPlacement& link = setup.layout.links[setup.link];
     body_ = link.body;
     X_LS_ = setup.X_LS;
@@ -37,8 +38,8 @@ class RayMount {
   }
 
  private:
-  const model::WorldModel* world_;
-  const model::BodyLayout* layout_;
+  Bound<const model::WorldModel> world_;
+  Bound<const model::BodyLayout> layout_;
   LinkIndex link_;
   BodyIndex body_;      // none: does not move, X_BS_ is then X_WS
   bool turns_ = false;  // with a wheel that is part of that body

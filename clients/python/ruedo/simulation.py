@@ -292,15 +292,18 @@ class Simulation:
 
     def snapshot(self, name: str) -> State:
         """Saves the state under a name, in the folder that the server was started with
-        (`--snapshots FOLDER`), and returns it. A snapshot is what acted on the world so far."""
+        (`--snapshots FOLDER`), and returns it. The file holds what acted on the world so far."""
         return control.state_of(
             self._session.request(lcmtypes.request_t.SNAPSHOT, _name_body(name), 60.0)
         )
 
     def restore(self, name: str) -> State:
-        """Puts the world back to a snapshot; what follows equals what followed it. The server runs
-        there from the beginning of the snapshot's run, in silence: this takes as long as that part
-        takes at rate max. A new epoch."""
+        """Puts the world back to a snapshot; what follows equals what followed it. A new epoch.
+
+        One of the last that this server saved takes milliseconds. To another one the server runs
+        from the beginning of the snapshot's run, in silence: as long as that part takes at rate
+        max. docs/determinism.md says which is which.
+        """
         state = control.state_of(
             self._session.request(lcmtypes.request_t.RESTORE, _name_body(name), 3600.0)
         )

@@ -367,9 +367,9 @@ public final class Simulation implements AutoCloseable {
     }
 
     /**
-     * Puts the world back to a snapshot; what follows equals what followed it. The server runs
-     * there from the beginning of the snapshot's run, in silence: this takes as long as that part
-     * takes at rate max. A new epoch.
+     * Puts the world back to a snapshot; what follows equals what followed it. A new epoch. One of
+     * the last that this server saved takes milliseconds; to another one it runs from the beginning
+     * of the snapshot's run, in silence, which takes as long as that part takes at rate max.
      */
     public State restore(String name) {
         State state = State.of(session.request(request_t.RESTORE, nameBody(name), RESTORE_SECONDS));

@@ -1,0 +1,178 @@
+// SNAPSHOT and RESTORE. A state that this process saved is put back as it is; another one by
+// running there again.
+#include <algorithm>
+#include <cctype>
+#include <filesystem>
+#include <string_view>
+
+#include <spdlog/spdlog.h>
+
+#include "engine/world_state.h"
+#include "log/header.h"
+#include "ruedo/errors.h"
+#include "run/request_table.h"
+#include "run/run.h"
+
+namespace ruedo::run {
+
+using engine::Outcome;
+
+namespace {
+
+// A word of a command line.
+std::string in_shell(const std::string& word) {
+  const auto plain = [](char c) {
+    return std::isalnum(static_cast<unsigned char>(c)) ||
+           std::string_view("_-+=./:,@%").find(c) != std::string_view::npos;
+  };
+  if (!word.empty() && std::all_of(word.begin(), word.end(), plain)) return word;
+  std::string quoted = "'";
+  for (const char c : word) quoted += c == '\'' ? "'\\''" : std::string(1, c);
+  return quoted + "'";
+}
+
+// How to go on from a snapshot of that run.
+std::string command_for(const std::string& snapshot, const log_header_t& header) {
+  std::string command = "ruedo run " + in_shell(header.world_file);
+  for (const std::string& option : header.options) {  // "--spawn p3at@0,1"
+    const size_t space = option.find(' ');
+    command += " " + option.substr(0, space);
+    if (space != std::string::npos) command += " " + in_shell(option.substr(space + 1));
+  }
+  return command + " --restore " + in_shell(snapshot) + " --view 0";
+}
+
+}  // namespace
+
+Outcome Run::snapshot(const request_t& request) {
+  name_request_t now;
+  snapshot_request_t past;
+  const bool is_past = read_body(request, past);
+  if (!is_past && !read_body(request, now)) return bad_body<name_request_t>();
+  const std::string& name = is_past ? past.name : now.name;
+  if (journal_->snapshot_path(name).empty()) {
+    return Outcome::refuse(reply_t::BAD_REQUEST, "'" + name +
+                                                     "' is no name of a snapshot: 1 to 63 letters, "
+                                                     "digits, '_', '-' and '.', not first a '.'");
+  }
+  saved_states_.forget(journal_->snapshot_path(name));
+  if (is_past) return snapshot_of(past);
+  const bool stands = keeps_states() && stand_still();
+  const std::string fault =
+      journal_->save_snapshot(name, hashes_.now(true), publisher_.base_us() + publisher_.time_us());
+  if (stands && fault.empty()) keep_state(journal_->snapshot_path(name));
+  const Outcome outcome =
+      fault.empty() ? Outcome::with(engine::encoded(state()))
+                    : Outcome::refuse(reply_t::REFUSED, "the snapshot was not saved: " + fault);
+  if (stands) let_go();
+  return outcome;
+}
+
+// A log gets the messages of the past, too, when it is restored, and in lockstep nothing is. Where
+// models have come or gone, or sim time went back, the world is not one as it is made.
+bool Run::keeps_states() const {
+  return as_made_ && !log_ && !watcher_ && !mode_->takes_grants() && publisher_.latest();
+}
+
+void Run::keep_state(const std::string& path) {
+  if (!plan_of_saved_) plan_of_saved_ = std::make_shared<engine::Plan>(*first_world_);
+  engine::Channels channels(options_.remaps);
+  engine::add_simulation_channels(channels, options_.control);
+  Findings findings;
+  SavedState saved;
+  saved.world = std::make_unique<engine::World>(plan_of_saved_, options_.simulation.fleet, channels,
+                                                findings);
+  try {
+    simulation_->save(*saved.world);
+  } catch (const std::exception&) {  // a plugin's device: there remains the way through the past
+    return;
+  }
+  saved.state = *publisher_.latest();
+  Snapshot kept;
+  saved.world->read(saved.state.step, kept);
+  if (engine::state_hash(kept) != engine::state_hash(saved.state)) return;
+  saved.seed = options_.simulation.fleet.seed;
+  saved.sequences = publisher_.sequences();
+  saved.journal = journal_->extent();
+  if (edited_) saved.put = edited_->put();
+  saved_states_.keep(path, std::move(saved));
+}
+
+// The state that is put back is the one that was published when it was saved.
+Outcome Run::put_back(const SavedState& saved, const std::string& path) {
+  const bool anew = !as_made_ || options_.simulation.fleet.seed != saved.seed;
+  if (!stand_still()) return Outcome::refuse(reply_t::REFUSED, "the run is over");
+  control_.cancel("a snapshot is restored");
+  options_.simulation.fleet.seed = saved.seed;
+  options_.simulation.fleet.epoch = ++epoch_;
+  header_.epoch = epoch_;
+  header_.seed = static_cast<int64_t>(saved.seed);
+  {
+    const std::lock_guard lock(simulation_mutex_);
+    if (anew)
+      make_simulation({pacer_->rate(), pacer_->paused()});
+    else
+      publisher_.begin_epoch(epoch_);
+    simulation_->restore(*saved.world, epoch_);
+    changed_ = saved.state;
+    pacer_->go_on_from(changed_.step);
+    publisher_.go_on_from(changed_, saved.sequences);
+    if (edited_) edited_->begin(saved.put);
+    mode_->begin(stage(), changed_.step);
+  }
+  announce();
+  journal_->begin_with(header_, publisher_.base_us(), path, saved.journal);
+  info_beat_.say();
+  Outcome outcome = Outcome::with(engine::encoded(state()));
+  anew ? simulation_->start(*pacer_) : let_go();
+  return outcome;
+}
+
+Outcome Run::snapshot_of(const snapshot_request_t& past) {
+  if (past.epoch != publisher_.epoch() || past.step < 0 || past.step > publisher_.step()) {
+    return Outcome::refuse(reply_t::BAD_REQUEST,
+                           "there was no step " + std::to_string(past.step) + " of epoch " +
+                               std::to_string(past.epoch) + ": allowed are 0 to " +
+                               std::to_string(publisher_.step()) + " of epoch " +
+                               std::to_string(publisher_.epoch()));
+  }
+  const SimTime time_us = past.step * world_->step_us;
+  const std::string fault = journal_->save_past(past.name, past.step, time_us, past.epoch,
+                                                publisher_.base_us() + time_us);
+  if (!fault.empty())
+    return Outcome::refuse(reply_t::REFUSED, "the snapshot was not saved: " + fault);
+  Outcome outcome;
+  outcome.text = command_for(journal_->snapshot_path(past.name), header_);
+  return outcome;
+}
+
+// In the log it is a reset and the run up to the snapshot's step, so that the log can be repeated
+// without another file.
+Outcome Run::restore(const request_t& request, const name_request_t& body) {
+  const std::string path = journal_->snapshot_path(body.name);
+  if (path.empty() || !std::filesystem::exists(path)) {
+    return Outcome::refuse(reply_t::UNKNOWN_NAME, "there is no snapshot '" + body.name + "'");
+  }
+  if (const SavedState* saved = saved_states_.find(path)) return put_back(*saved, path);
+  try {
+    reset_request_t reset;
+    reset.what = reset_request_t::ALL;
+    const log_header_t header = read_header(path);
+    log::check_same_run(header, header_, path);
+    reset.seed = header.seed == header_.seed ? -1 : header.seed;
+    control_.cancel("a snapshot is restored");
+    request_t noted = request;
+    noted.kind = request_t::RESET;
+    noted.body = engine::encoded(reset);
+    noted.size = static_cast<int32_t>(noted.body.size());
+    note(noted);
+    begin_repeat(path);
+  } catch (const InputError& error) {
+    return Outcome::refuse(reply_t::REFUSED, error.what());
+  }
+  begin_epoch();
+  take_turns();
+  return Outcome::after(0);
+}
+
+}  // namespace ruedo::run

@@ -1,0 +1,221 @@
+// RESTORE of a state that the same process saved: it is put back as it is, and what follows is what
+// followed, as after running there again. Other worlds and devices: tests/engine/test_restore.py.
+#include <atomic>
+#include <filesystem>
+#include <fstream>
+
+#include <gtest/gtest.h>
+
+#include "control_client.h"
+#include "ruedo/rate_request_t.hpp"
+#include "ruedo/tick_t.hpp"
+#include "ruedo/velocity_command_t.hpp"
+#include "ruedo/world_state_t.hpp"
+#include "run/saved_states.h"
+
+namespace ruedo::run {
+namespace {
+
+namespace fs = std::filesystem;
+
+const char* const kRobot =
+    "<include><uri>model://p3at</uri><name>r</name></include><model name='box'><pose>1 0.1 0.2 0 0 "
+    "0</pose><link name='l'><inertial><mass>1</mass></inertial><collision name='c'><geometry><box>"
+    "<size>0.4 0.4 0.4</size></box></geometry></collision></link></model>";
+
+class RestoreTest : public testing::Test, protected Controlled {
+ protected:
+  RestoreTest() {
+    std::string made = (fs::temp_directory_path() / "ruedo-restore-XXXXXX").string();
+    folder_ = ::mkdtemp(made.data());
+  }
+  ~RestoreTest() override {
+    end();
+    fs::remove_all(folder_);
+  }
+  void start_paused(RunOptions options = paused_server()) {
+    options.snapshots = folder_;
+    options.simulation.fleet.disabled = {"r/camera"};
+    options.simulation.before_batch = [this](const std::string& module) {
+      batches_ += module == "kinematics";
+    };
+    begin(std::move(options), kRobot);
+    velocity_command_t command{};
+    command.vx = 0.6;
+    command.omega = 0.1;
+    bus.send("r/velocity", engine::encoded(command));
+  }
+  reply_t named(int32_t kind, const std::string& name) {
+    name_request_t body;
+    body.name = name;
+    return ask(kind, engine::encoded(body));
+  }
+  state_reply_t save(const std::string& name) {
+    const reply_t reply = named(request_t::SNAPSHOT, name);
+    EXPECT_EQ(reply.code, reply_t::OK) << reply.text;
+    return decoded_as<state_reply_t>(reply.body);
+  }
+  // Restores it; whether that ran the past again.
+  bool restore(const std::string& name) {
+    const int before = batches_;
+    const reply_t reply = named(request_t::RESTORE, name);
+    EXPECT_EQ(reply.code, reply_t::OK) << reply.text;
+    const auto back = decoded_as<state_reply_t>(reply.body);
+    EXPECT_EQ(back.step, saved_.step);
+    EXPECT_EQ(back.state_hash, saved_.state_hash);
+    EXPECT_EQ(reply.utime, saved_.utime);
+    EXPECT_EQ(info().epoch, reply.epoch);
+    return batches_ > before + 5;  // the end of one run and the beginning of the next are some, too
+  }
+  // What the next steps send, and a command on the way; without the epoch.
+  std::vector<std::pair<std::string, std::vector<uint8_t>>> go_on(int64_t steps = 300) {
+    const size_t from = bus.messages().size();
+    step(steps);
+    velocity_command_t command{};
+    command.vx = -0.4;
+    bus.send("r/velocity", engine::encoded(command));
+    step(steps);
+    std::vector<std::pair<std::string, std::vector<uint8_t>>> sent;
+    const std::vector<Message> all = bus.messages();
+    for (size_t i = from; i < all.size(); ++i) {
+      if (all[i].channel == "ruedo/info" || all[i].channel == "ruedo/reply") continue;
+      sent.emplace_back(all[i].channel, all[i].bytes);
+      if (all[i].channel == "ruedo/world") {
+        auto world = decoded_as<world_state_t>(all[i].bytes);
+        world.epoch = 0;
+        sent.back().second = engine::encoded(world);
+      } else if (all[i].channel == "ruedo/tick") {
+        auto tick = decoded_as<tick_t>(all[i].bytes);  // with the number of each message
+        tick.epoch = 0;
+        for (auto& manifest : tick.manifest)
+          if (server().channels()[manifest.channel_index].name == "ruedo/world") manifest.crc = 0;
+        tick.applied.clear();
+        tick.napplied = 0;
+        sent.back().second = engine::encoded(tick);
+      }
+    }
+    EXPECT_GT(sent.size(), 300u);
+    return sent;
+  }
+  std::string file(const std::string& name) const { return folder_ + "/" + name + ".snapshot"; }
+
+  state_reply_t saved_;
+  std::string folder_;
+  std::atomic<int> batches_{0};
+};
+
+TEST_F(RestoreTest, WhatFollowsIsWhatFollowed) {
+  start_paused();
+  step(400);  // against the box
+  saved_ = save("here");
+  const auto followed = go_on();
+  EXPECT_FALSE(restore("here"));
+  EXPECT_EQ(go_on(), followed);
+  reset(reset_request_t::ALL, 9);
+  step(10);
+  EXPECT_FALSE(restore("here")) << "into another seed's world";
+  EXPECT_EQ(info().seed, 1);
+  EXPECT_EQ(go_on(), followed);
+  ASSERT_EQ(spawn(as_file(box_sdf("b", "0.2 0.2 0.2", false)), 2, 2, "b").code, reply_t::OK);
+  step(10);
+  EXPECT_FALSE(restore("here")) << "into a world that models came into";
+  EXPECT_EQ(go_on(), followed);
+  EXPECT_FALSE(restore("here"));
+  ASSERT_EQ(set_pose("box", Vec3(3, 3, 0.2)).code, reply_t::OK);
+  reset(reset_request_t::TIME);
+  step(10);
+  EXPECT_FALSE(restore("here")) << "after a reset of the time";
+  EXPECT_EQ(go_on(), followed);
+  fs::last_write_time(file("here"), fs::file_time_type::clock::now());
+  EXPECT_TRUE(restore("here")) << "a file that was touched";
+  EXPECT_EQ(go_on(), followed);
+}
+
+TEST_F(RestoreTest, TheFileOfAStateThatWasPutBackLeadsThere) {
+  start_paused();
+  step(400);
+  saved_ = save("first");
+  go_on();
+  EXPECT_FALSE(restore("first"));
+  ASSERT_EQ(set_pose("box", Vec3(0.5, 1.0, 0.2)).code, reply_t::OK);
+  step(100);
+  saved_ = save("second");
+  const auto followed = go_on();
+  fs::last_write_time(file("second"), fs::file_time_type::clock::now());
+  EXPECT_TRUE(restore("second"));
+  EXPECT_EQ(go_on(), followed);
+}
+
+TEST_F(RestoreTest, WhatWasNotAppliedYetIsNotSaved) {
+  start_paused();
+  step(100);
+  velocity_command_t command{};
+  command.vx = -1.0;
+  bus.send("r/velocity", engine::encoded(command));
+  saved_ = save("here");
+  step(50);
+  fs::last_write_time(file("here"), fs::file_time_type::clock::now());
+  EXPECT_TRUE(restore("here"));
+  const auto followed = go_on();
+  EXPECT_TRUE(restore("here"));
+  saved_ = save("here");  // now in memory
+  bus.send("r/velocity", engine::encoded(command));
+  EXPECT_FALSE(restore("here"));
+  EXPECT_EQ(go_on(), followed);
+}
+
+TEST_F(RestoreTest, OneWhoseWorldWasEditedRunsThePastAgain) {
+  start_paused();
+  step(200);
+  ASSERT_EQ(spawn(as_file(box_sdf("b", "0.2 0.2 0.2", false)), 2, 2, "b").code, reply_t::OK);
+  step(200);
+  saved_ = save("edited");
+  const auto followed = go_on();
+  EXPECT_TRUE(restore("edited"));
+  EXPECT_EQ(go_on(), followed);
+}
+
+TEST_F(RestoreTest, AndSoDoesOneWhoseRunIsLogged) {
+  TemporaryFile log("restored.lcm");
+  RunOptions options = paused_server();
+  options.record = log.path();
+  start_paused(options);
+  step(400);
+  saved_ = save("here");
+  const auto followed = go_on();
+  EXPECT_TRUE(restore("here"));
+  EXPECT_EQ(go_on(), followed);
+}
+
+TEST_F(RestoreTest, OfManyTheNewestAreKept) {
+  start_paused();
+  step(400);
+  saved_ = save("0");
+  for (size_t i = 1; i < SavedStates::kMost; ++i) save(std::to_string(i));
+  EXPECT_FALSE(restore("0"));
+  save("another");
+  EXPECT_TRUE(restore("0"));
+  EXPECT_FALSE(restore("1"));
+}
+
+TEST_F(RestoreTest, ARunThatDoesNotStandStillIsSavedAndPutBack) {
+  start_paused();
+  ask(request_t::RESUME);
+  rate_request_t rate;
+  rate.rate = std::numeric_limits<double>::infinity();
+  ask(request_t::RATE, engine::encoded(rate));
+  saved_ = save("here");
+  for (int i = 0; i < 20; ++i) {
+    const reply_t reply = named(request_t::RESTORE, "here");
+    ASSERT_EQ(reply.code, reply_t::OK) << reply.text;
+    const auto back = decoded_as<state_reply_t>(reply.body);
+    ASSERT_EQ(back.step, saved_.step);
+    ASSERT_EQ(back.state_hash, saved_.state_hash);
+    ASSERT_FALSE(back.paused);
+  }
+  ask(request_t::PAUSE);
+  EXPECT_FALSE(restore("here"));
+}
+
+}  // namespace
+}  // namespace ruedo::run
