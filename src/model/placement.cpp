@@ -24,8 +24,8 @@ constexpr double kClearance_m = 0.02;  // what a model may sink into bumps of th
 constexpr double kSteepest = 0.7;      // slope that something is put on: 35 degrees
 constexpr double kBump_m = 0.05;       // what ground under a model may differ from a plane
 constexpr double kFar_m = 1e5;
-constexpr double kCell_m = 2;      // of the grid over what stands in the world
-constexpr double kMostCells = 64;  // a thing that covers more is kept in a list of its own
+constexpr double kCell_m = 2;       // of the grid over what stands in the world
+constexpr int64_t kMostCells = 64;  // a thing that covers more is kept in a list of its own
 
 using Box = Eigen::AlignedBox3d;
 
@@ -65,6 +65,20 @@ std::optional<double> top_of(const Convex& shape, const Box& box, double x, doub
   return low;
 }
 
+// A rectangle of a grid's cells, both ends included.
+struct Cells {
+  int64_t x0, x1, y0, y1;
+
+  int64_t count() const { return (x1 - x0 + 1) * (y1 - y0 + 1); }
+
+  template <class Visit>
+  void for_each(Visit visit) const {
+    for (int64_t y = y0; y <= y1; ++y) {
+      for (int64_t x = x0; x <= x1; ++x) visit(x, y);
+    }
+  }
+};
+
 // The triangles of a mesh, by the column of the world in which they are.
 class TriangleGrid {
  public:
@@ -82,9 +96,12 @@ class TriangleGrid {
       triangles_.push_back({points[t[0]], points[t[1]], points[t[2]]});
       Box around;
       for (const Vec3& corner : triangles_.back()) around.extend(corner);
-      for_each_cell(around, [&](std::vector<uint32_t>& cell) {
-        cell.push_back(static_cast<uint32_t>(triangles_.size() - 1));
-      });
+      const uint32_t index = static_cast<uint32_t>(triangles_.size() - 1);
+      if (const Cells covered = cells_of(around); covered.count() > kMostCells) {
+        large_.push_back(index);
+      } else {
+        covered.for_each([&](int64_t x, int64_t y) { cells_[y * side_ + x].push_back(index); });
+      }
     }
   }
 
@@ -93,32 +110,29 @@ class TriangleGrid {
   template <class Visit>
   bool any(const Box& box, Visit visit) {
     bool found = false;
-    for_each_cell(box, [&](const std::vector<uint32_t>& cell) {
-      for (const uint32_t t : cell) {
-        if (found) return;
-        found = visit(triangles_[t]);
-      }
-    });
+    const auto visit_each = [&](const std::vector<uint32_t>& some) {
+      for (size_t i = 0; i < some.size() && !found; ++i) found = visit(triangles_[some[i]]);
+    };
+    visit_each(large_);
+    cells_of(box).for_each([&](int64_t x, int64_t y) { visit_each(cells_[y * side_ + x]); });
     return found;
   }
 
  private:
-  template <class Visit>
-  void for_each_cell(const Box& box, Visit visit) {
+  Cells cells_of(const Box& box) const {
     const auto cell = [&](double at, int axis) {
       const double size = std::max(box_.sizes()[axis], 1e-9);
-      return whole<int>(std::clamp((at - box_.min()[axis]) / size * side_, 0.0, side_ - 1.0));
+      return whole<int64_t>(std::clamp((at - box_.min()[axis]) / size * side_, 0.0, side_ - 1.0));
     };
-    const int y1 = cell(box.max().y(), 1), x1 = cell(box.max().x(), 0);
-    for (int y = cell(box.min().y(), 1); y <= y1; ++y) {
-      for (int x = cell(box.min().x(), 0); x <= x1; ++x) visit(cells_[y * side_ + x]);
-    }
+    return {cell(box.min().x(), 0), cell(box.max().x(), 0), cell(box.min().y(), 1),
+            cell(box.max().y(), 1)};
   }
 
   Box box_;
   int side_ = 1;
   std::vector<std::array<Vec3, 3>> triangles_;
   std::vector<std::vector<uint32_t>> cells_;
+  std::vector<uint32_t> large_;  // triangles that cover many cells
 };
 
 }  // namespace
@@ -135,11 +149,15 @@ struct Room::Index {
   std::vector<std::pair<std::string, std::shared_ptr<const Model>>> instances;
   std::vector<Solid> solids;
   std::vector<int> planes, large;                        // indices into solids
-  std::unordered_map<uint64_t, std::vector<int>> cells;  // looked up only, never walked through
-  std::unordered_map<const Geometry*, Box> boxes;        // likewise
+  std::unordered_map<uint64_t, std::vector<int>> cells;  // what is found there is sorted
+  std::unordered_map<const Geometry*, Box> boxes;        // looked up only
   std::map<int, TriangleGrid> triangles;                 // of the solids that were asked for
 
   static int64_t cell_of(double at) { return rounded_down(std::clamp(at, -1e7, 1e7) / kCell_m); }
+  static Cells cells_of(const Box& box) {
+    return {cell_of(box.min().x()), cell_of(box.max().x()), cell_of(box.min().y()),
+            cell_of(box.max().y())};
+  }
   static uint64_t key(int64_t x, int64_t y) {
     return static_cast<uint64_t>(x) << 32 ^ (static_cast<uint64_t>(y) & 0xffffffffu);
   }
@@ -170,14 +188,10 @@ struct Room::Index {
         if (c.geometry.shape == Shape::plane) {
           planes.push_back(solid);
         } else if (!box.isEmpty()) {
-          const int64_t x0 = cell_of(box.min().x()), x1 = cell_of(box.max().x()),
-                        y0 = cell_of(box.min().y()), y1 = cell_of(box.max().y());
-          if (static_cast<double>(x1 - x0 + 1) * static_cast<double>(y1 - y0 + 1) > kMostCells) {
+          if (const Cells covered = cells_of(box); covered.count() > kMostCells) {
             large.push_back(solid);
-            continue;
-          }
-          for (int64_t x = x0; x <= x1; ++x) {
-            for (int64_t y = y0; y <= y1; ++y) cells[key(x, y)].push_back(solid);
+          } else {
+            covered.for_each([&](int64_t x, int64_t y) { cells[key(x, y)].push_back(solid); });
           }
         }
       }
@@ -187,11 +201,15 @@ struct Room::Index {
   // The solids whose boxes meet that one, planes left out, in the order of the world.
   std::vector<int> near(const Box& box) const {
     std::vector<int> found = large;
-    for (int64_t x = cell_of(box.min().x()); x <= cell_of(box.max().x()); ++x) {
-      for (int64_t y = cell_of(box.min().y()); y <= cell_of(box.max().y()); ++y) {
-        if (const auto cell = cells.find(key(x, y)); cell != cells.end())
-          found.insert(found.end(), cell->second.begin(), cell->second.end());
-      }
+    const auto take = [&](const std::vector<int>& some) {
+      found.insert(found.end(), some.begin(), some.end());
+    };
+    if (const Cells covered = cells_of(box); covered.count() > static_cast<int64_t>(cells.size())) {
+      for (const auto& cell : cells) take(cell.second);
+    } else {
+      covered.for_each([&](int64_t x, int64_t y) {
+        if (const auto cell = cells.find(key(x, y)); cell != cells.end()) take(cell->second);
+      });
     }
     std::erase_if(found, [&](int solid) { return !solids[solid].box.intersects(box); });
     std::sort(found.begin(), found.end());
@@ -343,7 +361,8 @@ std::optional<Pose> Room::on_slope(const Model& model, const Pose& X_WM, double 
   Eigen::Matrix<double, kSamples * kSamples, 3> A;
   Eigen::Matrix<double, kSamples * kSamples, 1> heights;
   for (int i = 0; i < kSamples * kSamples; ++i) {
-    const Vec3 part(i % kSamples / (kSamples - 1.0), i / kSamples / (kSamples - 1.0), 0);
+    const int column = i % kSamples, row = i / kSamples;
+    const Vec3 part(column / (kSamples - 1.0), row / (kSamples - 1.0), 0);
     const Vec3 at = X_WM.rotation * Vec3(foot.min() + part.cwiseProduct(foot.sizes()));
     A.row(i) << 1, at.x(), at.y();
     heights[i] = ground_height(place.x() + at.x(), place.y() + at.y());
