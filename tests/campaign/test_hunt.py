@@ -7,13 +7,14 @@ import re
 import subprocess
 import sys
 
+import lcm
 import numpy as np
 import pytest
 import yaml
 from conftest import PATIENCE, SOURCE, ruedo
 from ruedo import Engine, World
 from ruedo.hunt import Hunt
-from ruedo.lcmtypes import move_command_t
+from ruedo.lcmtypes import move_command_t, state_hash_t
 
 EXAMPLE = SOURCE / "docs/campaign-example"
 
@@ -112,6 +113,7 @@ def test_trusts_a_frozen_scan_and_the_find_is_kept_as_a_test(example):
 
 
 LUCKY = """
+import lcm
 import numpy as np
 
 
@@ -200,6 +202,28 @@ def test_why_branches_a_log_of_no_campaign_with_the_same_commands(tmp_path):
     text = ruedo("why", log, folder=tmp_path).stdout
     assert f"{saved} of 5 other seeds from 2 s on avoid it\n" in text
     assert "0 of 5 other seeds from 2.25 s on avoid it\n" in text
+
+
+@pytest.mark.parametrize("harm", ["no message", "a far step"])
+def test_why_names_what_is_broken_in_a_log(tmp_path, harm):
+    """The first was a traceback, the second ran for ever."""
+    log, bad = tmp_path / "run.lcm", tmp_path / "bad.lcm"
+    options = ["--rate", "max", "--duration", "2", "--lcm", "memq://", "--record", str(log)]
+    world = tmp_path / "wall.sdf"
+    world.write_text(str(World("wall").wall(1.0, -2, 1.0, 2).robot("p3at")))
+    ruedo("run", world, "--quiet", "--disable", "p3at/camera", *options, folder=tmp_path)
+    written = lcm.EventLog(str(bad), "w", overwrite=True)
+    for event in lcm.EventLog(str(log), "r"):
+        data = event.data
+        if event.channel == "ruedo/state_hash" and event.timestamp == 1_000_000:
+            state = state_hash_t.decode(data)
+            state.step = 2**40
+            data = state.encode() if harm == "a far step" else data[:8] + b"\x01" + data[9:-20]
+        written.write_event(event.timestamp, event.channel, data)
+    written.close()
+    said = ruedo("why", bad, folder=tmp_path, code=3).stderr
+    assert "bad.lcm: " in said and "at 1 s" in said
+    assert said.count("\n") == 1
 
 
 def test_a_sound_controller_is_told_to_be_one(example):

@@ -85,3 +85,26 @@ def test_read_log_says_what_is_no_log(tmp_path):
         ruedo.read_log(path)
     path.write_bytes(b"")
     assert ruedo.read_log(path) == {}
+
+
+def test_read_log_warns_where_a_log_is_damaged(tmp_path, log, caplog):
+    """LCM's own reader ended there without a word: a part passed for the whole."""
+    ruedo = pytest.importorskip("ruedo")
+    pytest.importorskip("pandas")
+    whole = {channel: len(frame) for channel, frame in ruedo.read_log(log).items()}
+    assert not caplog.records
+    data = log.read_bytes()
+    places = events(data)
+    middle = places[len(places) // 2]
+    damaged = bytearray(data)
+    damaged[middle + 1] ^= 1
+    for bad, why in (
+        (damaged, f"it is damaged at byte {middle}"),
+        (data[: middle + 30], f"it was cut off in the event that begins at byte {middle}"),
+    ):
+        path = tmp_path / "bad.lcm"
+        path.write_bytes(bad)
+        caplog.clear()
+        frames = ruedo.read_log(path)
+        assert caplog.messages == [f"{path}: {why}"]
+        assert 0 < sum(map(len, frames.values())) < sum(whole.values())

@@ -2,21 +2,59 @@
 
 from __future__ import annotations
 
+import logging
 import os
-from typing import Any
-
-import lcm
+import struct
+from collections.abc import Iterator
+from typing import Any, NamedTuple
 
 from . import lcmtypes
 from .errors import NotSupported
 
 EVENT = b"\xed\xa1\xda\x01"  # that LCM's logs begin each message with
+_HEAD = struct.Struct(
+    ">4sqqii"
+)  # EVENT, number, timestamp, sizes of the channel's name and the data
+log = logging.getLogger("ruedo")
+
+
+class Event(NamedTuple):
+    """A message of a log."""
+
+    timestamp: int  # us, sim time
+    channel: str
+    data: bytes
+
+
+def events(path: str | os.PathLike[str]) -> Iterator[Event]:
+    """The messages of a log, up to where it is damaged or cut off, which is logged as a warning.
+    LCM's own reader ends there without a word, or looks for the next message.
+    """
+    with open(path, "rb") as file:
+        size = os.fstat(file.fileno()).st_size
+        at = 0
+        while at < size:
+            head = file.read(_HEAD.size)
+            if len(head) == _HEAD.size:
+                event, _, timestamp, name_size, data_size = _HEAD.unpack(head)
+                if event != EVENT or name_size < 0 or data_size < 0:
+                    log.warning("%s: it is damaged at byte %d", os.fspath(path), at)
+                    return
+            if len(head) < _HEAD.size or at + _HEAD.size + name_size + data_size > size:
+                log.warning(
+                    "%s: it was cut off in the event that begins at byte %d", os.fspath(path), at
+                )
+                return
+            name = file.read(name_size).decode("utf-8", "replace")
+            yield Event(timestamp, name, file.read(data_size))
+            at += _HEAD.size + name_size + data_size
 
 
 def read_log(path: str | os.PathLike[str], channels: list[str] | None = None) -> dict[str, Any]:
     """The messages of a log, a DataFrame for each channel: the index is `time` (s of sim time), the
     columns are the type's fields; an array's cells are lists. channels: those that are wanted,
-    None: all whose type is one of Ruedo's.
+    None: all whose type is one of Ruedo's. A log that is damaged or was cut off is read up to there
+    and no further, which is logged as a warning.
 
     Needs pandas (pip install 'ruedo[logs]'). Raises ValueError for a file that is no log. A message
     that is no valid one of its type is left out.
@@ -40,7 +78,7 @@ def read_log(path: str | os.PathLike[str], channels: list[str] | None = None) ->
         raise ValueError(
             f"{os.fspath(path)}: no LCM log: it begins with {begin.hex(' ')}, an event with {EVENT.hex(' ')}"
         )
-    for event in lcm.EventLog(os.fspath(path), "r"):
+    for event in events(path):
         message_type = types.get(event.data[:8])
         if message_type is None or (channels is not None and event.channel not in channels):
             continue

@@ -18,6 +18,7 @@ import numpy as np
 from ..campaign.case import Runner, fault_text
 from ..campaign.errors import CampaignError, SpecError
 from ..engine import Engine
+from ..logs import Event, events
 
 # What somebody could have done from a moment on: m/s, rad/s.
 MANOEUVRES = {
@@ -29,6 +30,7 @@ MANOEUVRES = {
 _PERIOD_S = 0.25  # between moments that are tried
 _AFTER_S = 3.0  # how long a branch goes on after the run failed
 _MOST = 80  # moments
+_HASHES_US = 1_000_000  # sim time between the states whose hash is in a log
 
 
 @dataclass
@@ -44,27 +46,41 @@ class Recorded:
 
     @staticmethod
     def read(path: str) -> Recorded:
-        import lcm
-
         from ..lcmtypes import applied_t, log_header_t, state_hash_t
+
+        def decoded(message_type: Any, event: Event) -> Any:
+            try:
+                return message_type.decode(event.data)
+            except Exception:
+                raise SpecError(
+                    f"{path}: a message of {event.channel}, at {event.timestamp * 1e-6:g} s, is broken"
+                ) from None
 
         if not os.path.isfile(path):
             raise SpecError(f"{path}: no such file")
         header = None
         commands: list[tuple[int, str, bytes]] = []
-        steps = 0
-        for event in lcm.EventLog(path, "r"):
+        steps = utime = 0
+        for event in events(path):
             if event.channel == "ruedo/header" and header is None:
-                header = log_header_t.decode(event.data)
+                header = decoded(log_header_t, event)
             elif event.channel == "ruedo/applied":
-                applied = applied_t.decode(event.data)
+                applied = decoded(applied_t, event)
                 if applied.channel.startswith("ruedo/"):
                     raise SpecError(
                         f"{path}: a request acted on the run (at {applied.utime * 1e-6:g} s); runs with commands alone can be branched"
                     )
                 commands.append((applied.step, applied.channel, bytes(applied.data)))
             elif event.channel == "ruedo/state_hash":
-                steps = max(steps, state_hash_t.decode(event.data).step)
+                state = decoded(state_hash_t, event)
+                step_us = header.step_us if header else 0
+                latest = utime + max(_HASHES_US, step_us)
+                if state.utime != state.step * step_us or not utime <= state.utime <= latest:
+                    raise SpecError(
+                        f"{path}: no run has a state of step {state.step} at {state.utime * 1e-6:g} s "
+                        f"after that of step {steps} at {utime * 1e-6:g} s"
+                    )
+                steps, utime = state.step, state.utime
         if header is None:
             raise SpecError(f"{path}: is no log of a run")
         return Recorded(
