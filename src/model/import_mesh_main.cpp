@@ -256,7 +256,11 @@ void import(const fs::path& input, const fs::path& output) {
   const aiScene* scene = importer.ReadFile(
       input.string(), aiProcess_Triangulate | aiProcess_SortByPType | aiProcess_RemoveComponent |
                           aiProcess_JoinIdenticalVertices);
-  if (!scene || !scene->mRootNode) throw std::runtime_error(importer.GetErrorString());
+  if (!scene || !scene->mRootNode) {
+    const std::string why = importer.GetErrorString();
+    if (why == std::bad_alloc().what()) throw std::bad_alloc();  // assimp caught it
+    throw std::runtime_error(why);
+  }
 
   MeshPackage package;
   append(*scene, *scene->mRootNode, to_z_up(*scene, extension), package.mesh, 0);

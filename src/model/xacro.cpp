@@ -89,7 +89,8 @@ std::shared_ptr<const Element> expand(const std::string& path, ReadContext& cont
   const int code = run(words, log);
   if (code != 0) {
     std::string why = text_or_nothing(log);
-    why.erase(std::find(why.begin(), why.end(), '\n'), why.end());
+    why.erase(why.find_last_not_of('\n') + 1);
+    why.erase(0, why.rfind('\n') + 1);  // xacro's warnings come before
     if (code == 127) why = "Python is missing (" + words[0] + "); xacro needs it";
     if (code == -1) why = "it needs more than " + std::to_string(kCpu_s) + " s, or more than 2 GB";
     throw InputError({path, 0}, "the xacro file cannot be expanded: " +

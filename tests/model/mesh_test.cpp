@@ -348,6 +348,10 @@ TEST_F(Meshes, ImporterThatEatsMemoryIsStopped) {
   MeshImport settings = import();
   settings.memory_limit_bytes = size_t{90} << 20;
   EXPECT_NE(fault_of(path, settings), "");
+  std::string many = ply();
+  many.replace(many.find("element vertex ") + 15, 0, "99999999");
+  EXPECT_EQ(fault_of(folder.write("many.ply", many), import()),
+            "it needs more memory than is allowed");
 }
 #endif
 

@@ -116,6 +116,8 @@ TEST(Xacro, WhatIsWrongIsSaidInOneLine) {
                              HasSubstr("'nothing' is not defined")));
   EXPECT_THAT(error_of(head + "<xacro:unknown/></robot>"),
               HasSubstr("unknown macro name: xacro:unknown"));
+  EXPECT_THAT(error_of(head + "<link name='${range(1)[7]}'/></robot>"),
+              testing::AllOf(HasSubstr("index out of range"), testing::Not(HasSubstr("warning"))));
   EXPECT_THAT(error_of(head + "<link"), HasSubstr("not XML"));
   EXPECT_THAT(error_of("<robot xmlns:xacro='x'><xacro:macro name='m' params=''><link name='l'/>"
                        "</xacro:macro></robot>"),
