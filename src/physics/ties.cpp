@@ -15,7 +15,9 @@ TieIndex PhysicsWorld::Impl::make_tie(BodyIndex body, BodyIndex other) {
   made.constraint->setEnabled(false);
   // It shares its place with a number that is not 0.
   made.constraint->setUserConstraintPtr(nullptr);
-  dynamics_.addConstraint(made.constraint.get(), true);
+  // Bullet would keep bodies of a joint from each other for good: refilter() does while it is
+  // closed.
+  dynamics_.addConstraint(made.constraint.get(), false);
   const TieIndex tie = ties_.next();
   ties_.push_back(std::move(made));
   return tie;

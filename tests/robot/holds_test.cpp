@@ -106,6 +106,20 @@ TEST(Holds, WhoIsPutElsewhereTakesItAlong) {
   EXPECT_NEAR((place(sim, "box/l") - Vec3(0.6, 0.0, 0.3)).norm(), 0.0, 5e-3);
 }
 
+TEST(Holds, WhatIsLetGoLandsOnWhatHeldIt) {
+  Sim sim(plane_sdf() +
+          with(box_sdf("tray", "0 0 0.25 0 0 0", "1 1 0.5", 20.0), hold("box", "l", "l")) +
+          box_sdf("box", "0.1 0 0.9 0 0 0", "0.2 0.2 0.2", 1.0));
+  sim.run(0.5);
+  EXPECT_NEAR(place(sim, "box/l").z(), 0.9, 5e-3);
+  tell(sim, "box", 0.0);
+  sim.run(1.5);
+  EXPECT_NEAR(place(sim, "box/l").z(), 0.6, 5e-3);  // and does not fall through it
+  sim.robots.reset(InstanceIndex(2));
+  sim.run(1.5);
+  EXPECT_NEAR(place(sim, "box/l").z(), 0.6, 5e-3) << "once more";
+}
+
 TEST(Holds, ANameThatItDoesNotHoldIsRefused) {
   Sim sim(plane_sdf() + with(robot_sdf("r", "0 0 0 0 0 0"), hold("box")) +
           box_sdf("box", "0.6 0 0.3 0 0 0", "0.2 0.2 0.2", 0.5));
