@@ -62,12 +62,16 @@ std::string described(const Allowed& allowed, const char* what) {
 // One element's text and how it is called in messages: the path from the element that was asked.
 struct Value {
   const Element& element;
-  std::string path;
+  std::string_view asked, child = {};  // names
+
+  std::string path() const {
+    return std::string(asked) + (child.empty() ? "" : "/" + std::string(child));
+  }
 
   std::string_view text() const { return trimmed(element.text); }
 
   [[noreturn]] void refuse(const std::string& why, std::string_view value) const {
-    throw InputError(element.source, "<" + path + ">: " + quoted(value) + " " + why);
+    throw InputError(element.source, "<" + path() + ">: " + quoted(value) + " " + why);
   }
   [[noreturn]] void refuse(const std::string& why) const { refuse(why, text()); }
 };
@@ -256,18 +260,18 @@ std::vector<const Element*> Element::all(std::string_view child_name) const {
 double Element::number(std::string_view path, double fallback, Allowed allowed) const {
   const Element* found = child(path);
   if (!found) return fallback;
-  const Value value{*found, name + "/" + std::string(path)};
+  const Value value{*found, name, path};
   return number_of(value, value.text(), allowed);
 }
 
 int64_t Element::integer(std::string_view path, int64_t fallback, Allowed allowed) const {
   const Element* found = child(path);
-  return found ? integer_of({*found, name + "/" + std::string(path)}, allowed) : fallback;
+  return found ? integer_of({*found, name, path}, allowed) : fallback;
 }
 
 bool Element::boolean(std::string_view path, bool fallback) const {
   const Element* found = child(path);
-  return found ? boolean_of({*found, name + "/" + std::string(path)}) : fallback;
+  return found ? boolean_of({*found, name, path}) : fallback;
 }
 
 std::string Element::string(std::string_view path, std::string_view fallback) const {
@@ -287,19 +291,19 @@ Rate Element::rate(std::string_view path, Rate fallback) const {
 
 Vec3 Element::vector3(std::string_view path, const Vec3& fallback, Allowed allowed) const {
   const Element* found = child(path);
-  return found ? vector3_of({*found, name + "/" + std::string(path)}, allowed) : fallback;
+  return found ? vector3_of({*found, name, path}, allowed) : fallback;
 }
 
 Pose Element::pose(std::string_view path, const Pose& fallback) const {
   const Element* found = child(path);
-  return found ? pose_of({*found, name + "/" + std::string(path)}) : fallback;
+  return found ? pose_of({*found, name, path}) : fallback;
 }
 
 std::string Element::choice(std::string_view path, std::string_view fallback,
                             const std::vector<std::string>& choices) const {
   const Element* found = child(path);
   if (!found) return std::string(fallback);
-  const Value value{*found, name + "/" + std::string(path)};
+  const Value value{*found, name, path};
   const std::string text(value.text());
   if (std::find(choices.begin(), choices.end(), text) != choices.end()) return text;
   std::string list;

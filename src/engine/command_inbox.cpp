@@ -207,7 +207,8 @@ void CommandInbox::reset_odometry(RobotIndex robot, const std::vector<uint8_t>& 
 
 CommandInbox::Entry& CommandInbox::next_entry(RobotIndex robot) {
   Slots& slots = slots_of(robot);
-  const size_t most = slots.entries.size();
+  const size_t most = slots.most;
+  slots.entries.resize(most);
   if (slots.size == 0) waits_.robots.push_back(robot);
   if (slots.size == most) {
     slots.first = (slots.first + 1) % most;

@@ -88,8 +88,9 @@ class CommandInbox {
     std::vector<uint8_t> bytes;
   };
   struct Slots {  // a ring of the newest
-    explicit Slots(size_t most = kKeptPerRobot) : entries(most) {}
-    std::vector<Entry> entries;
+    explicit Slots(size_t most = kKeptPerRobot) : most(most) {}
+    size_t most;
+    std::vector<Entry> entries;  // none before the first that is kept
     size_t first = 0, size = 0;
   };
 

@@ -152,7 +152,7 @@ Engine::Engine(std::shared_ptr<const model::WorldModel> world, EngineOptions opt
 Engine::~Engine() = default;
 
 std::unique_ptr<Engine::Copy> Engine::make_copy(std::shared_ptr<const model::WorldModel> model,
-                                                uint64_t seed) {
+                                                uint64_t seed, World* ended) {
   auto copy = std::make_unique<Copy>();
   FleetOptions fleet = options_.fleet;
   fleet.seed = seed;
@@ -161,7 +161,7 @@ std::unique_ptr<Engine::Copy> Engine::make_copy(std::shared_ptr<const model::Wor
   copy->plan = own ? std::make_shared<Plan>(*randomized(*model, options_.draws, seed, &copy->drawn))
                    : plan_of(model);
   copy->world = std::make_unique<World>(copy->plan, fleet, copy->channels,
-                                        first_made_ ? findings : findings_);
+                                        first_made_ ? findings : findings_, ended);
   copy->model = std::move(model);
   copy->seed = seed;
   return copy;
@@ -438,7 +438,7 @@ void Engine::reset_one(const Reset& reset) {
   const auto index = static_cast<size_t>(reset.world);
   const auto& before = copies_[index]->model;
   const bool other = reset.model && reset.model != before;
-  auto copy = make_copy(other ? reset.model : before, reset.seed);
+  auto copy = make_copy(other ? reset.model : before, reset.seed, copies_[index]->world.get());
   if (other) {
     const auto same = [](const Channel& a, const Channel& b) {
       return a.name == b.name && a.fingerprint == b.fingerprint;

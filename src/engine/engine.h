@@ -132,7 +132,8 @@ class Engine {
   struct Observer;
   class Borrowed;
 
-  std::unique_ptr<Copy> make_copy(std::shared_ptr<const model::WorldModel> model, uint64_t seed);
+  std::unique_ptr<Copy> make_copy(std::shared_ptr<const model::WorldModel> model, uint64_t seed,
+                                  World* ended = nullptr);
   std::unique_ptr<Copy> make_another(const Copy& copy) const;
   void restore_one(const SavedWorld& saved, size_t world);
   void reset_one(const Reset& reset);

@@ -150,7 +150,7 @@ class FleetMaker {
     setup.piece_size = setup.wants_rays || setup.wants_visual_rays ? 4 : 16;
     // Pictures: each renderer has a thread of its own, with a stretch of the cameras. Which
     // renderer draws which camera changes no pixel.
-    const size_t cores = std::max(1u, std::thread::hardware_concurrency());
+    static const size_t cores = std::max(1u, std::thread::hardware_concurrency());  // reads a file
     const size_t threads = setup.wants_renderer && !options_.only_robot.valid()
                                ? std::min({wanted.size(), cores, size_t{8}})
                                : 1;

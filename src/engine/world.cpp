@@ -15,8 +15,14 @@ std::shared_ptr<const scene::StaticRayScene> StaticScenes::get(const model::Worl
   return scene;
 }
 
+const physics::PhysicsWorld& Plan::beginning() {
+  const std::lock_guard lock(mutex_);
+  if (!beginning_) beginning_ = std::make_unique<physics::PhysicsWorld>(model, layout);
+  return *beginning_;
+}
+
 World::World(std::shared_ptr<Plan> plan, const FleetOptions& options, Channels& channels,
-             Findings& findings)
+             Findings& findings, World* ended)
     : plan_(std::move(plan)),
       model_(plan_->model),
       layout_(plan_->layout),
@@ -25,7 +31,7 @@ World::World(std::shared_ptr<Plan> plan, const FleetOptions& options, Channels& 
       devices_(std::move(fleet_.devices)),
       inbox_(std::move(fleet_.inputs), static_cast<int>(layout_.robots.size())),
       faults_(model_, layout_, devices_, options.seed),
-      physics_(std::make_unique<physics::PhysicsWorld>(model_, layout_)),
+      physics_(physics_of(ended)),
       robots_(std::make_unique<robot::Robots>(model_, layout_, *physics_, options.seed)) {
   for (const Finding& finding : physics_->findings()) {
     switch (finding.kind) {
@@ -47,7 +53,15 @@ World::World(std::shared_ptr<Plan> plan, const FleetOptions& options, Channels& 
   }
 }
 
+std::shared_ptr<physics::PhysicsWorld> World::physics_of(World* ended) const {
+  if (!ended || ended->plan_ != plan_ || !ended->sound_)
+    return std::make_shared<physics::PhysicsWorld>(model_, layout_);
+  ended->physics_->take(plan_->beginning());
+  return ended->physics_;
+}
+
 void World::advance(int64_t step, Snapshot& snapshot, Batch& batch) {
+  sound_ = false;
   if (step > 0) {
     faults_.before_commands(step - 1, *robots_);
     inbox_.apply(*robots_, faults_, step - 1, batch);  // on the state before
@@ -58,6 +72,7 @@ void World::advance(int64_t step, Snapshot& snapshot, Batch& batch) {
   batch.sensor_faults = faults_.of_sensors();
   batch.reseedings = faults_.reseedings();
   physics::check_finite(snapshot, model_, layout_);
+  sound_ = true;
 }
 
 void World::take(const World& other) {

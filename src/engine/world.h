@@ -42,13 +42,22 @@ struct Plan {
   model::WorldModel model;
   model::BodyLayout layout;
   std::shared_ptr<StaticScenes> statics = std::make_shared<StaticScenes>();
+
+  // A world's physics as it begins; made when it is first asked for, and never stepped.
+  const physics::PhysicsWorld& beginning();
+
+ private:
+  std::mutex mutex_;
+  std::unique_ptr<physics::PhysicsWorld> beginning_;
 };
 
 class World {
  public:
-  // Announces its channels. Throws InputError.
+  // Announces its channels. ended: a world of the same plan that will not be used any more, whose
+  // physics it takes over, since the tables of Bullet's worlds take long to make; null: none.
+  // Throws InputError.
   World(std::shared_ptr<Plan> plan, const FleetOptions& options, Channels& channels,
-        Findings& findings);
+        Findings& findings, World* ended = nullptr);
 
   // Computes the next state into the snapshot: what acts on the state before it is applied (and
   // noted in the batch), then the physics step. States follow on one another from 0, the initial
@@ -93,6 +102,7 @@ class World {
   SimTime reset_time(int epoch);
 
  private:
+  std::shared_ptr<physics::PhysicsWorld> physics_of(World* ended) const;
   InstanceIndex place(const std::string& name, const Pose& X_WM,
                       std::shared_ptr<const model::Model> model);
   void reseed(int64_t step);
@@ -109,7 +119,8 @@ class World {
   std::vector<device_info_t> devices_;
   CommandInbox inbox_;
   Faults faults_;
-  std::unique_ptr<physics::PhysicsWorld> physics_;
+  bool sound_ = true;                               // no step failed
+  std::shared_ptr<physics::PhysicsWorld> physics_;  // shared with one that has ended
   std::unique_ptr<robot::Robots> robots_;
   int world_channel_ = -1;  // of ruedo/world
   std::vector<std::unique_ptr<Module>> modules_;
