@@ -14,6 +14,7 @@
 #include "model/picture.h"
 #include "model/read_context.h"
 #include "ruedo/math.h"
+#include "ruedo/quantity.h"
 
 namespace fs = std::filesystem;
 
@@ -148,11 +149,16 @@ OccupancyGrid grid_of(const cv::Mat& grey, double resolution, CellOf cell_of) {
 OccupancyGrid read_map(const std::string& path) {
   const FlatYaml yaml(path);
   const double resolution = yaml.real("resolution");
-  if (!(resolution > 0 && resolution <= 1000))
+  if (!(resolution >= 0.0001 && resolution <= 1000))
     throw InputError(yaml.source("resolution"),
                      "resolution: '" + yaml.text("resolution") +
-                         "' is not allowed; allowed are numbers above 0, in m");
+                         "' is not allowed; allowed is 0.0001 to 1000 m");
   const std::vector<double> origin = yaml.list("origin");
+  const auto is_far = [](double number) { return std::abs(number) > quantity::kLength.most; };
+  if (std::any_of(origin.begin(), origin.end(), is_far))
+    throw InputError(
+        yaml.source("origin"),
+        "origin: '" + yaml.text("origin") + "' is not allowed; allowed is up to 1000000 m and rad");
   if (origin.size() != 3 && origin.size() != 2)
     throw InputError(yaml.source("origin"), "origin: '" + yaml.text("origin") +
                                                 "' is not allowed; allowed is [x, y, yaw]");

@@ -180,7 +180,11 @@ TEST(Map, WrongFilesSayWhatIsWrong) {
   EXPECT_EQ(error("a.yaml", "image: ok.pgm\nresolution: fine\norigin: [0,0,0]\n"),
             "a.yaml:2: resolution: 'fine' is not a number");
   EXPECT_EQ(error("a.yaml", "image: ok.pgm\nresolution: -1\norigin: [0,0,0]\n"),
-            "a.yaml:2: resolution: '-1' is not allowed; allowed are numbers above 0, in m");
+            "a.yaml:2: resolution: '-1' is not allowed; allowed is 0.0001 to 1000 m");
+  EXPECT_EQ(error("a.yaml", "image: ok.pgm\nresolution: 1e-308\norigin: [0,0,0]\n"),
+            "a.yaml:2: resolution: '1e-308' is not allowed; allowed is 0.0001 to 1000 m");
+  EXPECT_EQ(error("a.yaml", "image: ok.pgm\nresolution: 1\norigin: [0, 1e308, 0]\n"),
+            "a.yaml:3: origin: '[0, 1e308, 0]' is not allowed; allowed is up to 1000000 m and rad");
   EXPECT_EQ(error("a.yaml", "image: ok.pgm\nresolution: 1\norigin: [0]\n"),
             "a.yaml:3: origin: '[0]' is not allowed; allowed is [x, y, yaw]");
   EXPECT_EQ(error("a.yaml", "image: none.pgm\nresolution: 1\norigin: [0, 0, 0]\n"),
