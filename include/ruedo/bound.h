@@ -13,7 +13,7 @@ class Bound {
  public:
   Bound(T& to) : to_(&to) {}  // NOLINT(google-explicit-constructor): as a reference is bound
   Bound(const Bound&) = default;
-  Bound& operator=(const Bound&) { return *this; }  // NOLINT(cert-oop54-cpp): nothing is copied
+  Bound& operator=(const Bound&) { return *this; }  // NOLINT(*-self-assignment,cert-oop54-cpp)
   ~Bound() = default;
 
   operator T&() const { return *to_; }  // NOLINT(google-explicit-constructor)
