@@ -86,6 +86,27 @@ export default async function live({
   await until("it goes on", () => document.getElementById("state").textContent === "running");
   await page.getByRole("tab", { name: "Robot" }).click();
   await page.keyboard.press("t");
+  const left = await page.evaluate(() => {
+    // Pictures that come faster than the browser reads them
+    const { createObjectURL, revokeObjectURL } = URL,
+      open = new Set(),
+      { pages } = window.ruedo,
+      data = new Uint8Array([0xff, 0xd8, 0xff, 0xd9]);
+    URL.createObjectURL = (blob) => {
+      const url = createObjectURL.call(URL, blob);
+      open.add(url);
+      return url;
+    };
+    URL.revokeObjectURL = (url) => {
+      open.delete(url);
+      revokeObjectURL.call(URL, url);
+    };
+    for (let i = 0; i < 50; ++i)
+      pages.camera("camera", { utime: 0n, width: 1, height: 1, pixelformat: 1196444237, data });
+    Object.assign(URL, { createObjectURL, revokeObjectURL });
+    return open.size;
+  });
+  check("of pictures that came too fast one is held", left === 1, left);
   await page.setViewportSize({ width: 390, height: 844 });
   await still();
   await picture("phone");

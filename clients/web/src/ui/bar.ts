@@ -66,6 +66,18 @@ export class Bar {
       this.modes.set(mode, button);
       view.append(button);
     }
+    const more = h(
+      "span",
+      { id: "more", popover: true },
+      this.factor,
+      this.rate,
+      this.resetButton,
+      view,
+    );
+    more.append(
+      iconButton("theme", "dark or light (T)", () => actions.theme()),
+      iconButton("help", "keys (?)", () => actions.help()),
+    );
     place.append(
       h(
         "h1",
@@ -79,14 +91,21 @@ export class Bar {
       this.state,
       h("span", { class: "grow" }),
       this.clock,
-      this.factor,
       this.pause,
       this.stepButton,
-      this.rate,
-      this.resetButton,
-      view,
-      iconButton("theme", "dark or light (T)", () => actions.theme(), "roomy"),
-      iconButton("help", "keys (?)", () => actions.help()),
+      more,
+      // On a phone: the rest
+      h(
+        "button",
+        {
+          id: "open-more",
+          class: "icon",
+          popovertarget: "more",
+          title: "more",
+          "aria-label": "more",
+        },
+        icon("more"),
+      ),
       iconButton("panel", "panel (P)", () => actions.panel()),
     );
     this.show();

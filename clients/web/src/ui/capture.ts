@@ -1,15 +1,10 @@
 // Pictures and videos of the view, as files: made by the browser, of what it draws.
 import type { Stage } from "../scene/stage";
+import { download } from "../widgets/download";
 import { h, say, toast } from "../widgets/elements";
 
 const kFrames_hz = 30;
 const kTypes = ["video/webm;codecs=vp9", "video/webm;codecs=vp8", "video/webm", "video/mp4"];
-
-function download(blob: Blob, name: string): void {
-  const link = h("a", { href: URL.createObjectURL(blob), download: name });
-  link.click();
-  setTimeout(() => URL.revokeObjectURL(link.href), 1000);
-}
 
 export class Capture {
   readonly element: HTMLElement;

@@ -9,6 +9,7 @@ import type { History, RunLink } from "../wire/protocol";
 import { h, toast } from "../widgets/elements";
 import { recall, remember } from "../state/memory";
 import { padded } from "../widgets/plots";
+import { download } from "../widgets/download";
 import { kDragType } from "../widgets/drag";
 
 const kMostPoints = 40_000; // of a series; then every second one stays
@@ -166,12 +167,7 @@ class Pane {
       this.series.map(labelOf),
       this.series.map(({ times, values }) => [times, values]),
     );
-    const link = h("a", {
-      href: URL.createObjectURL(new Blob([text], { type: "text/csv" })),
-      download: "ruedo.csv",
-    });
-    link.click();
-    URL.revokeObjectURL(link.href);
+    download(new Blob([text], { type: "text/csv" }), "ruedo.csv");
   }
 
   private build(): void {

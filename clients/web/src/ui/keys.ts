@@ -17,7 +17,7 @@ export function listenToKeys(actions: Record<string, () => void>): void {
       ((event.key === " " || event.key === "Enter") && event.target instanceof HTMLButtonElement)
     )
       return;
-    event.preventDefault();
+    if (event.key !== "Escape") event.preventDefault(); // the browser closes what is open by it, too
     action();
   });
 }

@@ -26,11 +26,9 @@ export class Picture {
     this.image.hidden = !jpeg;
     this.canvas.hidden = jpeg;
     if (jpeg) {
-      const old = this.url;
+      // At once: on a busy machine the next one comes before this one is read.
+      URL.revokeObjectURL(this.url);
       this.url = URL.createObjectURL(new Blob([data as BlobPart], { type: "image/jpeg" }));
-      this.image.onload = () => {
-        if (old) URL.revokeObjectURL(old);
-      };
       this.image.src = this.url;
       return;
     }

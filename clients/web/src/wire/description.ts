@@ -83,6 +83,7 @@ export interface SceneFiles {
 // A page that has its run in itself has the scene's files, too.
 export interface FileStore {
   file(path: string): Uint8Array<ArrayBuffer> | null;
+  url(path: string): string; // where the page finds it
 }
 
 // Null when there is no world to show. base: where its files are. store: null for the program that
@@ -129,7 +130,7 @@ export async function loadScene(
   }
   const textureUrl = (index: number) => {
     const path = `${base}/textures/${index}`;
-    return store ? URL.createObjectURL(new Blob([store.file(path) ?? new Uint8Array()])) : path;
+    return store ? store.url(path) : path;
   };
   return { description, meshes, links, textureUrl };
 }

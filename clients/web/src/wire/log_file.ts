@@ -51,6 +51,7 @@ export class LogFile implements RunLink {
   private last_ms = 0;
   private traffic_ms = -Infinity; // when it was told
   private handler: LinkHandler | undefined;
+  private readonly urls = new Map<number, string>(); // of files, by where they lie
 
   // Null where the page has none.
   static inPage(): LogFile | null {
@@ -108,6 +109,16 @@ export class LogFile implements RunLink {
     return place
       ? (this.bytes.slice(place[0], place[0] + place[1]) as Uint8Array<ArrayBuffer>)
       : null;
+  }
+
+  // Where the page finds it, the same address for the same bytes; "" where there is none.
+  url(path: string): string {
+    const place = this.head.scenes[this.scene]?.files[path],
+      bytes = this.file(path);
+    if (!place || !bytes) return "";
+    let url = this.urls.get(place[0]);
+    if (!url) this.urls.set(place[0], (url = URL.createObjectURL(new Blob([bytes]))));
+    return url;
   }
 
   connect(handler: LinkHandler): void {
