@@ -39,7 +39,7 @@ export default async function disk({ page, given, until, check, picture }) {
   if (given.pictures)
     await until(
       "a picture has come",
-      () => document.querySelector("img.picture")?.naturalWidth > 0,
+      () => document.querySelector("canvas.picture:not([hidden])")?.width === 640,
     );
   await page.getByRole("tab", { name: "Plots" }).click();
   await page.evaluate(() => {

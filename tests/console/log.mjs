@@ -83,7 +83,7 @@ export default async function log({ page, given, seen, until, check, picture }) 
     );
     await until(
       "a picture has come",
-      () => document.querySelector("img.picture")?.naturalWidth > 0,
+      () => document.querySelector("canvas.picture:not([hidden])")?.width === 640,
     );
   }
 

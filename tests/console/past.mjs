@@ -19,6 +19,14 @@ export default async function past({ page, seen, until, check, ready, server, pi
   await page.keyboard.down("KeyW");
   await until("(it drives)", (x) => window.ruedo.poses.to[0] > x + 0.5, begin.x);
   await page.keyboard.up("KeyW");
+  await page.evaluate(() => {
+    const { rewind } = window.ruedo;
+    rewind.show(rewind.range.end - 0.5);
+  });
+  await until("a moment ago is called so, where nothing came or went since", () =>
+    /s ago$/.test(document.getElementById("state").textContent),
+  );
+  await page.locator("#live").click();
   await page.keyboard.press("b");
   const place = await page.evaluate(() => {
     const { stage } = window.ruedo,

@@ -19,17 +19,13 @@ export class Bar {
   private readonly name = h("span");
   private readonly state = h("span", { class: "pill", id: "state" }, "connecting");
   private readonly clock = h("span", { class: "clock", id: "clock", title: "sim time" }, "–");
-  private readonly factor = h(
-    "span",
-    { class: "pill roomy", title: "sim time per real time" },
-    "–",
-  );
+  private readonly factor = h("span", { class: "pill", title: "sim time per real time" }, "–");
   private readonly pause: HTMLButtonElement;
   private readonly stepButton: HTMLButtonElement;
   private readonly resetButton: HTMLButtonElement;
   private readonly rate = h(
     "select",
-    { class: "roomy", title: "sim time per real time that is asked for", "aria-label": "rate" },
+    { title: "sim time per real time that is asked for", "aria-label": "rate" },
     // Nobody has asked for one here; what it is stands beside
     h("option", { value: "", hidden: true }, "rate"),
     ...["0.1", "0.25", "0.5", "1", "2", "5", "10", "max"].map((value) =>
@@ -52,32 +48,6 @@ export class Bar {
     this.rate.addEventListener("change", () =>
       actions.rate(this.rate.value === "max" ? Infinity : Number(this.rate.value)),
     );
-    const view = h("span", { class: "row", style: "flex-wrap: nowrap; gap: 4px" });
-    for (const [mode, key] of [
-      ["orbit", "1"],
-      ["follow", "2"],
-      ["top", "3"],
-    ] as const) {
-      const button = h(
-        "button",
-        { class: "roomy", title: `${mode} view (${key})`, click: () => actions.mode(mode) },
-        mode,
-      );
-      this.modes.set(mode, button);
-      view.append(button);
-    }
-    const more = h(
-      "span",
-      { id: "more", popover: true },
-      this.factor,
-      this.rate,
-      this.resetButton,
-      view,
-    );
-    more.append(
-      iconButton("theme", "dark or light (T)", () => actions.theme()),
-      iconButton("help", "keys (?)", () => actions.help()),
-    );
     place.append(
       h(
         "h1",
@@ -93,7 +63,7 @@ export class Bar {
       this.clock,
       this.pause,
       this.stepButton,
-      more,
+      this.more(actions),
       // On a phone: the rest
       h(
         "button",
@@ -111,6 +81,34 @@ export class Bar {
     this.show();
   }
 
+  // What is needed less often.
+  private more(actions: BarActions): HTMLElement {
+    const view = h("span", { class: "row", style: "flex-wrap: nowrap; gap: 4px" });
+    for (const [mode, key] of [
+      ["orbit", "1"],
+      ["follow", "2"],
+      ["top", "3"],
+    ] as const) {
+      const button = h(
+        "button",
+        { title: `${mode} view (${key})`, click: () => actions.mode(mode) },
+        mode,
+      );
+      this.modes.set(mode, button);
+      view.append(button);
+    }
+    return h(
+      "span",
+      { id: "more", popover: true },
+      this.factor,
+      this.rate,
+      this.resetButton,
+      view,
+      iconButton("theme", "dark or light (T)", () => actions.theme()),
+      iconButton("help", "keys (?)", () => actions.help()),
+    );
+  }
+
   // What the page knows, in the bar.
   private show(): void {
     const { page } = this;
@@ -120,7 +118,7 @@ export class Bar {
         for (const element of [this.stepButton, this.rate, this.resetButton, this.factor])
           element.remove();
     });
-    page.watch(["link", "hello", "world", "paused", "playback"], (state) => {
+    page.watch(["link", "hello", "world", "paused", "playback", "past"], (state) => {
       const [words, good] = stateWords(state);
       say(this.state, words);
       this.state.className = `pill ${good === null ? "" : good ? "good" : "bad"}`;

@@ -1,55 +1,82 @@
-// Pictures of a camera: JPEG as it comes, raw formats by way of a canvas.
+// Pictures of a camera, JPEG and raw formats, on a canvas: the browser's cache of images would hold
+// what nobody sees any more.
 import { image_t } from "../../generated/messages";
 import { h, say } from "./elements";
 
+const kMostPixels = 1 << 24;
+
 export class Picture {
-  readonly image = h("img", { class: "picture", alt: "" });
-  readonly canvas = h("canvas", { class: "picture" });
-  readonly caption = h("figcaption");
+  private readonly canvas: HTMLCanvasElement;
+  private readonly caption = h("figcaption");
   readonly element: HTMLElement;
-  private url = "";
+  private next: Blob | null = null; // the newest JPEG, while another one is read
+  private reading = false;
 
   constructor(readonly name: string) {
-    this.image.alt = `picture of ${name}`;
-    this.canvas.hidden = true;
-    this.element = h("figure", { "data-camera": name }, this.image, this.canvas, this.caption);
+    this.canvas = h("canvas", {
+      class: "picture",
+      role: "img",
+      "aria-label": `picture of ${name}`,
+      hidden: true,
+    });
+    this.element = h("figure", { "data-camera": name }, this.canvas, this.caption);
     say(this.caption, `${name}: no picture yet`);
   }
 
   show(message: image_t): void {
-    const { width, height, pixelformat, data, row_stride } = message;
+    const { width, height, pixelformat, data } = message;
     say(
       this.caption,
       `${this.name} · ${width} × ${height} · ${(Number(message.utime) * 1e-6).toFixed(2)} s`,
     );
-    const jpeg = pixelformat === image_t.PIXEL_FORMAT_MJPEG;
-    this.image.hidden = !jpeg;
-    this.canvas.hidden = jpeg;
-    if (jpeg) {
-      // At once: on a busy machine the next one comes before this one is read.
-      URL.revokeObjectURL(this.url);
-      this.url = URL.createObjectURL(new Blob([data as BlobPart], { type: "image/jpeg" }));
-      this.image.src = this.url;
+    if (pixelformat === image_t.PIXEL_FORMAT_MJPEG) {
+      this.next = new Blob([data as BlobPart], { type: "image/jpeg" });
+      void this.read();
       return;
     }
-    if (width <= 0 || height <= 0 || width * height > 1 << 24) return;
-    this.canvas.width = width;
-    this.canvas.height = height;
-    const pixels = new ImageData(width, height),
-      view = new DataView(data.buffer, data.byteOffset, data.byteLength);
-    const stride = row_stride || data.length / height;
-    for (let y = 0; y < height; ++y) {
-      for (let x = 0; x < width; ++x) {
-        const to = 4 * (y * width + x);
-        const [r, g, b] = pixel(pixelformat, view, y * stride, x);
-        pixels.data[to] = r;
-        pixels.data[to + 1] = g;
-        pixels.data[to + 2] = b;
-        pixels.data[to + 3] = 255;
-      }
-    }
-    this.canvas.getContext("2d")!.putImageData(pixels, 0, 0);
+    this.next = null;
+    if (width > 0 && height > 0 && width * height <= kMostPixels)
+      this.draw(width, height, (context) => context.putImageData(pixelsOf(message), 0, 0));
   }
+
+  // One at a time: of those that come meanwhile the newest.
+  private async read(): Promise<void> {
+    if (this.reading) return;
+    this.reading = true;
+    for (let blob = this.next; blob; blob = this.next) {
+      this.next = null;
+      const bitmap = await createImageBitmap(blob).catch(() => null); // damaged: the last one stays
+      if (!bitmap) continue;
+      this.draw(bitmap.width, bitmap.height, (context) => context.drawImage(bitmap, 0, 0));
+      bitmap.close();
+    }
+    this.reading = false;
+  }
+
+  private draw(
+    width: number,
+    height: number,
+    paint: (context: CanvasRenderingContext2D) => void,
+  ): void {
+    const { canvas } = this;
+    if (canvas.width !== width || canvas.height !== height)
+      Object.assign(canvas, { width, height });
+    canvas.hidden = false;
+    paint(canvas.getContext("2d")!);
+  }
+}
+
+function pixelsOf({ width, height, pixelformat, data, row_stride }: image_t): ImageData {
+  const pixels = new ImageData(width, height),
+    view = new DataView(data.buffer, data.byteOffset, data.byteLength);
+  const stride = row_stride || data.length / height;
+  for (let y = 0; y < height; ++y) {
+    for (let x = 0; x < width; ++x) {
+      const [r, g, b] = pixel(pixelformat, view, y * stride, x);
+      pixels.data.set([r, g, b, 255], 4 * (y * width + x));
+    }
+  }
+  return pixels;
 }
 
 function pixel(format: number, view: DataView, row: number, x: number): [number, number, number] {
