@@ -17,6 +17,7 @@
 #include "core/whole.h"
 #include "ruedo/errors.h"
 #include "ruedo/sim_time.h"
+#include "run/pacer.h"
 #include "scene/gl_context.h"
 
 namespace ruedo::cli {
@@ -105,8 +106,8 @@ run::WaitForOption parse_wait_for(const std::string& text) {
 double parse_rate(const std::string& text) {
   double rate = 0.0;
   if (text == "max") return std::numeric_limits<double>::infinity();
-  if (!read_number(text, rate) || rate <= 0.0)
-    refuse_option("--rate", text, "a number above 0 (1 is real time), or max");
+  if (!read_number(text, rate) || !run::Pacer::takes(rate))
+    refuse_option("--rate", text, "0.001 to 1e6 (1 is real time), or max");
   return rate;
 }
 

@@ -9,6 +9,7 @@
 #include <chrono>
 #include <condition_variable>
 #include <cstdint>
+#include <limits>
 #include <mutex>
 
 #include "engine/pace.h"
@@ -20,7 +21,15 @@ class Pacer : public engine::Pace, public Gate {
  public:
   using Clock = std::chrono::steady_clock;
 
-  // rate: simulated per real time, > 0; +inf: as fast as it goes. last_step: of the run, INT64_MAX:
+  // Rates that make sense, beside +inf: a run that takes one step an hour looks like one that
+  // hangs.
+  static constexpr double kSlowest = 1e-3, kFastest = 1e6;
+  static bool takes(double rate) {
+    return rate == std::numeric_limits<double>::infinity() ||
+           (rate >= kSlowest && rate <= kFastest);
+  }
+
+  // rate: simulated per real time; +inf: as fast as possible. last_step: of the run, INT64_MAX:
   // none.
   Pacer(int64_t step_us, double rate, int64_t last_step);
 

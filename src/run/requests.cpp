@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <iterator>
 
+#include <fmt/format.h>
+
 #include "engine/world_state.h"
 #include "run/request_table.h"
 #include "run/run.h"
@@ -168,8 +170,13 @@ Outcome Run::step(const request_t&, const step_request_t& body) {
 }
 
 Outcome Run::set_rate(const request_t&, const rate_request_t& body) {
-  if (!(body.rate > 0.0))
-    return Outcome::refuse(reply_t::BAD_REQUEST, "a rate is above 0, +inf for as fast as it goes");
+  if (!Pacer::takes(body.rate)) {
+    return Outcome::refuse(reply_t::BAD_REQUEST,
+                           fmt::format("the rate {} is not allowed; allowed are {} to {}, and +inf",
+                                       body.rate, Pacer::kSlowest, Pacer::kFastest));
+  }
+  if (mode().takes_grants())
+    return Outcome::refuse(reply_t::REFUSED, "in lockstep the clients' grants set the pace");
   pacer_->set_rate(body.rate);
   return Outcome::with(engine::encoded(state()));
 }

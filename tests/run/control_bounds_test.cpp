@@ -5,6 +5,7 @@
 #include "control_client.h"
 #include "ruedo/grant_reply_t.hpp"
 #include "ruedo/grant_request_t.hpp"
+#include "ruedo/rate_request_t.hpp"
 #include "ruedo/resend_reply_t.hpp"
 #include "ruedo/resend_request_t.hpp"
 
@@ -127,6 +128,18 @@ grant_request_t grant(int64_t granted, int64_t until) {
   body.received = -1;
   body.ncommands = 0;
   return body;
+}
+
+// A rate that nobody waits for would stop the run of those who grant.
+TEST(InLockstep, NobodyElseSetsThePace) {
+  Controlled client;
+  client.begin(in_lockstep(), kRobot);
+  EXPECT_EQ(client.ask(request_t::GRANT, engine::encoded(grant(-1, -1))).code, reply_t::OK);
+  rate_request_t slow;
+  slow.rate = 0.001;
+  const reply_t reply = client.ask(request_t::RATE, engine::encoded(slow));
+  EXPECT_EQ(reply.code, reply_t::REFUSED);
+  EXPECT_NE(reply.text.find("grants"), std::string::npos) << reply.text;
 }
 
 // Before its first state lockstep answers what cannot be done yet, and everybody behind it.
