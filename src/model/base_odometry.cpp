@@ -43,7 +43,7 @@ BaseOdometry::BaseOdometry(const BodyLayout& layout, RobotIndex robot,
   }
 }
 
-// 1/m, as the wheels that steer show it, each for itself, in the mean.
+// The curvature of the path, 1/m: the mean of what each steering wheel's angle gives by itself.
 double BaseOdometry::curvature(const std::vector<double>& angles) const {
   double sum = 0.0;
   int count = 0;
@@ -74,7 +74,7 @@ Vec3 BaseOdometry::moved(const std::vector<double>& ways, const std::vector<doub
   for (size_t i = 0; i < wheels_.size(); ++i) {
     const Wheel& wheel = wheels_[i];
     if (wheel.steers || (any_fixed && wheel.steered)) continue;
-    // A wheel on a circle about the same middle; base_link's way is in proportion.
+    // A wheel runs on a circle about the same centre as base_link; their paths are in proportion.
     const double part = wheel.steered ? math::hypot(1.0 - middle * wheel.y, middle * wheel.x)
                                       : 1.0 - middle * wheel.y;
     way += ways[i] / part;
@@ -90,7 +90,8 @@ Vec3 BaseOdometry::moved(const Pose& before, const Pose& after) const {
   const Vec3 chord = after.translation - before.translation;
   const double c = math::cos(heading(before.rotation) + half),
                s = math::sin(heading(before.rotation) + half);
-  const double part = half == 0.0 ? 1.0 : half / math::sin(half);  // of an arc to its chord
+  // ratio of an arc's length to its chord
+  const double part = half == 0.0 ? 1.0 : half / math::sin(half);
   return {part * (c * chord.x() + s * chord.y()), part * (c * chord.y() - s * chord.x()),
           angle / lever_};
 }

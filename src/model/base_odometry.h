@@ -1,6 +1,6 @@
-// What bases that are no differential drive make of their encoders: mecanum and omni wheels by
-// least squares, steered ones by the bicycle model. A base without wheels (Gazebo's planar move,
-// tracks) has the way that it really made, as there.
+// Odometry of bases other than differential drives, from their encoders: least squares for mecanum
+// and omni wheels, the bicycle model for steered ones. A base without wheels (Gazebo's planar move,
+// tracks) reports its true motion, as Gazebo does.
 #pragma once
 
 #include <vector>
@@ -13,15 +13,15 @@ class BaseOdometry {
  public:
   static bool is_for(const DriveDescription& drive);
 
-  // track_error: of the lever between turning and the wheels' ways, relative. steering_error: rad.
+  // track_error: relative error of the lever arm between yaw and wheel travel. steering_error: rad.
   BaseOdometry(const BodyLayout& layout, RobotIndex robot, const DriveDescription& drive,
                double track_error, double steering_error);
 
   bool rolls_sideways() const { return !rims_.empty(); }
   bool has_wheels() const { return !wheels_.empty() || !rims_.empty(); }
 
-  // m ahead, m to the left, rad, of base_link in a step. Of the robot's wheels in their order:
-  // ways, m; angles, rad, after it.
+  // Motion of base_link in one step: m forward, m to the left, rad. For the robot's wheels in
+  // order: the distance each travelled (m), and its angle after the step (rad).
   Vec3 moved(const std::vector<double>& ways, const std::vector<double>& angles);
   Vec3 moved(const Pose& before, const Pose& after) const;
 
@@ -33,8 +33,8 @@ class BaseOdometry {
   };
   double curvature(const std::vector<double>& angles) const;
 
-  std::vector<Wheel> wheels_;  // of a base that is steered
-  std::vector<Vec3> rims_;     // of mecanum and omni wheels
+  std::vector<Wheel> wheels_;  // steered bases only
+  std::vector<Vec3> rims_;     // mecanum and omni wheels only
   Eigen::Matrix3d normal_ = Eigen::Matrix3d::Identity();
   double lever_, steering_error_;
   double curvature_before_ = 0.0;

@@ -1,6 +1,5 @@
-// Which links move as one. Links are joined by fixed joints, by the wheels of a kinematic drive,
-// and by its passive wheels (casters): what hangs on a free joint and reaches down to the ground
-// the robot stands on.
+// Which links move as one body. Links are merged by fixed joints, by the wheels of a kinematic
+// drive, and by its passive wheels (casters): links on a free joint that reach down to the ground.
 #include "model/body_layout.h"
 
 #include <algorithm>
@@ -14,7 +13,7 @@ namespace {
 
 constexpr double kGroundReach_m = 0.01;
 
-// Groups of things that are one; the representative is the lowest number.
+// Disjoint sets; the representative of a set is its lowest number.
 class Groups {
  public:
   explicit Groups(size_t n) : parent_(n) { std::iota(parent_.begin(), parent_.end(), 0); }
@@ -80,7 +79,7 @@ bool is_drive_wheel(const Model& model, ModelJointIndex joint) {
          in(model.drive->steer_joints);
 }
 
-// The link that a drive moves: what its wheels hang on, be it by way of what steers them.
+// The link that a drive moves: the parent of its wheels, or of the joints that steer them.
 ModelLinkIndex carrier_of(const Model& model) {
   const DriveDescription& drive = *model.drive;
   const std::vector<ModelJointIndex>& first = !drive.steer_joints.empty()  ? drive.steer_joints
@@ -90,8 +89,8 @@ ModelLinkIndex carrier_of(const Model& model) {
   return carrier.valid() ? carrier : ModelLinkIndex(0);
 }
 
-// What of a model moves as one, and which links turn with which of its joints: the same for all its
-// instances.
+// What of a model moves as one body, and which links turn with which of its joints. The same for
+// all instances of the model.
 struct Grouping {
   Groups links;
   IndexedVector<ModelJointIndex, bool> joined;  // its links are one
@@ -135,12 +134,13 @@ Grouping group(const Model& model) {
 
 namespace {
 
-// The rim's speed for a speed of base_link of 1 ahead, 1 to the left, and 1 rad/s. p: the wheel in
-// base_link; axis: about which it turns, there.
+// The rim speed for a base_link velocity of 1 m/s forward, 1 m/s to the left and 1 rad/s. p: the
+// wheel's position in base_link; axis: its axis of rotation, in base_link.
 Vec3 rim_of(const DriveDescription& drive, bool left, const Vec3& p, const Vec3& axis) {
   using Steering = DriveDescription::Steering;
   const double side = left ? -1.0 : 1.0;
-  if (drive.steering == Steering::omni) {  // rollers across: only what is along its rim turns it
+  // rollers lie across: only motion along the rim turns the wheel
+  if (drive.steering == Steering::omni) {
     const Vec3 along = axis.cross(Vec3::UnitZ()).normalized();
     return {along.x(), along.y(), p.x() * along.y() - p.y() * along.x()};
   }
@@ -155,7 +155,7 @@ Vec3 rim_of(const DriveDescription& drive, bool left, const Vec3& p, const Vec3&
 
 }  // namespace
 
-// Of the last models seen: fleets follow one another.
+// Cache of the last models seen: the robots of a fleet follow one another.
 struct BodyLayout::Known {
   std::vector<std::pair<const Model*, Grouping>> groupings;
 
@@ -272,7 +272,7 @@ void add_wheel(BodyLayout& layout, const Model& model, RobotIndex robot, RobotPl
       turned_by = index;
       continue;
     }
-    for (const WheelIndex other : placement.wheels) {  // that hangs on this one
+    for (const WheelIndex other : placement.wheels) {  // the wheels that hang on this one
       if (layout.wheels[other].link == layout.link_of(i, below)) layout.wheels[other].on = index;
     }
   }
@@ -290,7 +290,7 @@ void add_joints(BodyLayout& layout, const Model& model, const Grouping& grouping
       return link.valid() ? layout.links[layout.link_of(i, link)].body : BodyIndex();
     };
     const BodyIndex parent = body(joint.parent), child = body(joint.child);
-    if (parent == child) continue;  // both static, or joined another way
+    if (parent == child) continue;  // both static, or merged in another way
     placement.joints.push_back(layout.joints.next());
     layout.joints.push_back({i, j, parent, child});
   }

@@ -18,7 +18,7 @@ struct LinkPlacement {
   ModelLinkIndex link;
   BodyIndex body;    // none: static, X_BL is then X_WL
   Pose X_BL;         // at wheel angle 0
-  WheelIndex wheel;  // that turns the link
+  WheelIndex wheel;  // the wheel that turns the link
 };
 
 struct WheelPlacement {
@@ -26,7 +26,7 @@ struct WheelPlacement {
   ModelJointIndex joint;
   LinkIndex link;
   bool left = false;
-  bool steers = false;             // its angle is that of steering, about the vertical
+  bool steers = false;             // it steers: its angle is about the vertical
   WheelIndex on;                   // the steering joint that it hangs on
   Vec3 rim = Vec3::UnitX();        // its rim's speed is rim . (vx, vy, omega) of base_link; not for
                                    // wheels that are steered
@@ -59,7 +59,7 @@ struct RobotPlacement {
   std::vector<JointIndex> joints;
 };
 
-// What ruedo/info lists as a body, and pictures label with its place in that list + 1.
+// What ruedo/info lists as a body. Segmentation labels it with its place in that list + 1.
 struct ListedBody {
   BodyIndex body;  // none: a static link
   LinkIndex link;  // of a body its first
@@ -77,10 +77,10 @@ struct BodyLayout {
 
   explicit BodyLayout(const WorldModel& world);
 
-  // The world has a new instance at its end. All that there was keeps its numbers.
+  // Appends the world's newest instance. Everything that exists keeps its number.
   void append(const WorldModel& world);
-  // An instance that was removed stands somewhere else now, with another name: the same model, the
-  // same numbers.
+  // A removed instance is in use again, at another place and under another name. Same model, same
+  // numbers.
   void place_again(const WorldModel& world, InstanceIndex instance);
 
   LinkIndex link_of(InstanceIndex instance, ModelLinkIndex link) const {
@@ -91,12 +91,12 @@ struct BodyLayout {
   Pose link_in_body(LinkIndex link, const IndexedVector<WheelIndex, double>& wheel_angles) const;
 
  private:
-  struct Known;  // what was worked out of models
+  struct Known;  // what was worked out for a model
   void add(const WorldModel& world, InstanceIndex instance, Known& known);
   void list(BodyIndex first_body, LinkIndex first_link);
 };
 
-// As ruedo/info names what a link belongs to: its body's MODEL/LINK, or its own where it is static.
+// The name under which ruedo/info lists a link: its body's MODEL/LINK, or its own if it is static.
 std::string body_name(const WorldModel& world, const BodyLayout& layout, LinkIndex link);
 
 }  // namespace ruedo::model

@@ -28,7 +28,7 @@ void set_limit(decltype(RLIMIT_AS) which, rlim_t value) {
   ::setrlimit(which, &limit);
 }
 
-// In the child, between fork and exec: system calls alone. posix_spawn sets no limits.
+// Runs in the child, between fork and exec: system calls only. posix_spawn cannot set limits.
 [[noreturn]] void become(char* const* arguments, const char* log, const ProcessLimits& limits) {
   ::setpgid(0, 0);
   set_limit(RLIMIT_CORE, 0);
@@ -65,7 +65,7 @@ class ProcessHandle {
 
 void kill_group(pid_t process) {
   ::kill(-process, SIGKILL);
-  ::kill(process, SIGKILL);  // it may not have its group yet
+  ::kill(process, SIGKILL);  // the child may not have its own process group yet
   ::waitpid(process, nullptr, 0);
 }
 

@@ -11,7 +11,7 @@
 
 namespace ruedo::model {
 
-// A new folder below the system's temporary one; removed with all that is in it.
+// A new folder in the system's temporary folder; removed with its contents.
 class TemporaryFolder {
  public:
   // Throws std::runtime_error.
@@ -27,15 +27,15 @@ class TemporaryFolder {
 
 struct ProcessLimits {
   rlim_t cpu_s = 0;
-  rlim_t file_bytes = 0;    // of each file that it writes
-  rlim_t memory_bytes = 0;  // of addresses; 0: no limit
+  rlim_t file_bytes = 0;    // size limit of each file that it writes
+  rlim_t memory_bytes = 0;  // address space; 0: no limit
   int wall_s = 0;
 };
 
-// Runs words[0], found as a shell finds it, in a process group of its own, with its error messages
-// in the file `log` and no other input and output. The status as waitpid() gives it, with exit code
-// 127 where there is no such program; nullopt: it ran out of real time, or `give_up`, which is
-// asked every 20 ms, said so, and it was killed with its children. Throws std::runtime_error.
+// Runs words[0], found in PATH, in a process group of its own. Its stderr goes to the file `log`;
+// stdin and stdout are closed off. Returns the status as waitpid() gives it, with exit code 127 if
+// there is no such program; nullopt if it ran out of wall time, or if `give_up`, which is polled
+// every 20 ms, returned true: it was then killed with its children. Throws std::runtime_error.
 std::optional<int> run_limited(std::vector<std::string> words, const std::string& log,
                                const ProcessLimits& limits,
                                const std::function<bool()>& give_up = nullptr);

@@ -1,4 +1,4 @@
-// Pictures as files have them: OpenCV's codecs, which are loaded with the first picture.
+// Encoding and decoding of picture files, by OpenCV's codecs, which are loaded when first used.
 #pragma once
 
 #include <cstddef>
@@ -7,11 +7,12 @@
 #include <vector>
 
 #include <opencv2/core.hpp>
-#include <opencv2/imgcodecs.hpp>  // names of ways to read and write; its functions are not linked
+#include <opencv2/imgcodecs.hpp>  // for its constants; its functions are not linked
 
 namespace ruedo::model {
 
-// As cv::imdecode: an empty picture, or cv::Exception, for what is none. `how` is cv::IMREAD_...
+// As cv::imdecode: an empty picture, or cv::Exception, for bytes that are not a picture. `how` is
+// cv::IMREAD_...
 // These throw EnvironmentError where the codecs cannot be loaded.
 cv::Mat decode_picture(const void* bytes, size_t size, int how);
 // As cv::imencode: `kind` is ".png" or ".jpg".

@@ -1,5 +1,5 @@
-// libruedo_codecs.so, which alone is linked to OpenCV's codecs and to the hundred libraries that
-// those are linked to.
+// libruedo_codecs.so, the only library that links OpenCV's codecs and the hundred libraries they
+// need.
 #include "model/codecs_module.h"
 
 #include <opencv2/imgcodecs.hpp>

@@ -1,4 +1,4 @@
-// The functions of libruedo_codecs.so (model/codecs.h), under names that C++ leaves alone.
+// The functions of libruedo_codecs.so (model/codecs.h), with C linkage.
 #pragma once
 
 #include <cstddef>

@@ -1,5 +1,4 @@
-// GJK in double precision. Touching within a micrometre counts as overlap or not: callers keep a
-// margin.
+// GJK in double precision. Contact within a micrometre may count either way: callers keep a margin.
 #include "model/convex.h"
 
 #include <array>
@@ -54,8 +53,8 @@ struct Simplex {
   }
 };
 
-// Keeps the part of the simplex nearest to the origin and turns `direction` to it; true: the origin
-// is inside.
+// Keeps the part of the simplex nearest to the origin and points `direction` towards the origin.
+// True: the origin is inside.
 bool reduce(Simplex& s, Vec3& direction) {
   const auto line = [&](const Vec3& a, const Vec3& b) {
     const Vec3 ab = b - a;
@@ -132,7 +131,7 @@ bool overlap(const Convex& a, const Convex& b) {
     simplex.p[simplex.n++] = point;
     if (reduce(simplex, direction)) return true;
   }
-  return true;  // it hovers at the border
+  return true;  // no progress: the origin is on the boundary
 }
 
 }  // namespace ruedo::model

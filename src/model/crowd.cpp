@@ -1,4 +1,4 @@
-// Reading <ruedo:crowd>, and the places where its people begin.
+// Reads <ruedo:crowd> and draws where its people start.
 #include "model/crowd.h"
 
 #include <algorithm>
@@ -14,8 +14,9 @@ namespace ruedo::model {
 namespace {
 
 constexpr int kMostTries = 1000;  // places drawn for one person before there is no room
-constexpr double kAround_m = 5;   // of what lies about areas and goals, where ways are looked for
-constexpr double kCutAt_m[] = {0.3, 1.2};  // above the floor: what is there is in people's way
+constexpr double kAround_m = 5;   // margin around areas and goals in which routes are planned
+// heights above the floor at which the world is cut: what is there is an obstacle for people
+constexpr double kCutAt_m[] = {0.3, 1.2};
 constexpr double kCell_m = 0.05;
 
 // "x y", or two corners "x y x y".
@@ -139,7 +140,7 @@ std::vector<Vec2> places_of(const CrowdDescription& crowd, const FloorPlan& wall
 
 namespace {
 
-// The lowest ground of its corners and its middle: the others may be under something.
+// The lowest ground among its corners and its centre: the others may be under something.
 double floor_of(const Rect& area, const WorldModel& world) {
   const Room room(world);
   const Vec2 middle = (area.low + area.high) / 2;

@@ -1,4 +1,4 @@
-// A walk over the document, as it is written.
+// A walk over the document as written.
 #include "model/degrees.h"
 
 #include <algorithm>
@@ -17,7 +17,7 @@ bool reads_as_degrees(double value) {
   return std::abs(value) > kTurn && std::fmod(value, 5.0) == 0.0;
 }
 
-// Of 10, 50, 100 and of more than a turn's degrees people make stops that are never reached.
+// Limits of 10, 50 or 100 rad, or beyond 360, are written for "never reached".
 bool limit_reads_as_degrees(double value) {
   const double size = std::abs(value);
   return reads_as_degrees(value) && size <= 360.0 && size != 10.0 && size != 50.0 && size != 100.0;

@@ -1,12 +1,12 @@
-// Degrees where radians are meant.
+// Finds degrees written where radians are meant.
 #pragma once
 
 #include "ruedo/element.h"
 
 namespace ruedo::model {
 
-// Names the rotations and limits of joints below the root of a document, SDF or URDF, whose numbers
-// read as degrees: whole multiples of 5 beyond a turn in radians. They are taken as they are
+// Reports rotations and joint limits below the root of an SDF or URDF document whose numbers look
+// like degrees: whole multiples of 5 beyond a full turn in radians. Their values are used as
 // written.
 void name_degrees(const Element& root, Findings& findings);
 

@@ -1,4 +1,4 @@
-// Names of devices and robots: unique, and fit for channels.
+// Names of devices and robots: unique, and usable in channel names.
 #include <algorithm>
 #include <map>
 #include <string_view>

@@ -1,4 +1,4 @@
-// Files to element trees, by tinyxml2.
+// Reads files into element trees, with tinyxml2.
 #include "model/document.h"
 
 #include <fcntl.h>
@@ -17,8 +17,8 @@ namespace ruedo::model {
 namespace {
 
 constexpr size_t kMaxFileBytes = 64u << 20;
-// What a document may hold. The parser's own costs grow with the square of some of these, so they
-// are counted before it runs.
+// Limits of a document. Some of the parser's own costs grow with the square of these, so they are
+// counted before it runs.
 constexpr size_t kMaxElements = 2'000'000, kMaxAttributes = 64, kMaxDepth = 200,
                  kMaxAttributeBytes = 64 << 10, kMaxTextBytes = 1 << 20;
 
@@ -45,8 +45,8 @@ bool is_utf8(const std::string& text) {
   return true;
 }
 
-// Goes over a text as a parser would, counts, and refuses what holds too much. What is not XML is
-// left to the parser to name.
+// Scans a text as a parser would, counts, and refuses what exceeds a limit. Text that is not XML is
+// left for the parser to report.
 class Counter {
  public:
   Counter(std::string_view text, const std::string& file) : text_(text), file_(file) {}
@@ -180,7 +180,7 @@ std::unique_ptr<Element> parse_document(const std::string& text, const std::stri
   if (text.find('\0') != std::string::npos)
     throw InputError({file, 1}, "not a text file: it holds zero bytes");
   std::string_view start = text;
-  if (start.starts_with("\xEF\xBB\xBF")) start.remove_prefix(3);  // UTF-8's mark
+  if (start.starts_with("\xEF\xBB\xBF")) start.remove_prefix(3);  // the UTF-8 byte order mark
   const size_t begin = start.find_first_not_of(" \t\r\n\f\v");
   if (begin == std::string_view::npos) throw InputError({file, 0}, "the file is empty");
   if (start[begin] != '<') throw InputError({file, 1}, "not XML: the text does not begin with '<'");
@@ -198,7 +198,7 @@ std::unique_ptr<Element> parse_document(const std::string& text, const std::stri
 }
 
 std::string read_text_file(const std::string& path, size_t max_bytes) {
-  // Opened once, without waiting for a FIFO's writer: what is looked at is what is read.
+  // Opened once, without blocking on a FIFO: the file that is checked is the file that is read.
   const int descriptor = ::open(path.c_str(), O_RDONLY | O_NONBLOCK | O_CLOEXEC);
   if (descriptor < 0)
     throw InputError({path, 0}, errno == ENOENT

@@ -26,11 +26,11 @@ class DocumentStore {
  public:
   std::shared_ptr<const Element> read(const std::string& path);
   void add(const std::string& path, std::shared_ptr<const Element> root);
-  // What else was read for the world: pictures, scripts.
+  // Other files that the world was read from: pictures, scripts.
   void note(const std::string& path) {
     if (std::find(files_.begin(), files_.end(), path) == files_.end()) files_.push_back(path);
   }
-  // In the order of first reading, each once.
+  // In order of first reading, each once.
   std::vector<std::string> files_read() const;
 
  private:

@@ -1,4 +1,4 @@
-// <ruedo:drive> and <ruedo:odometry>, with what they leave out taken from the wheels' joints and
+// <ruedo:drive> and <ruedo:odometry>. What they leave out is derived from the wheels' joints and
 // shapes.
 #include "model/drive.h"
 
@@ -46,8 +46,8 @@ ModelJointIndex joint_of(const Element& element, const Model& model) {
                (near.empty() ? "" : "; did you mean '" + near + "'?"));
 }
 
-// The radius of the wheel on a joint: of the round shapes of its link and of the links fixed to it,
-// across the axis; 0 when there is none.
+// The radius of the wheel on a joint: of the round shapes of its link, and of links fixed to it,
+// measured across the axis. 0: there is none.
 double radius_of(const Model& model, const Joint& joint) {
   std::vector<ModelLinkIndex> links{joint.child};
   for (size_t i = 0; i < links.size(); ++i) {
@@ -81,8 +81,8 @@ Vec3 middle(const Model& model, const std::vector<ModelJointIndex>& joints) {
   return sum / static_cast<double>(joints.size());
 }
 
-// x ahead, with the left wheels to the left. Wheels named the other way round (some robots have
-// that) keep the model's own x ahead.
+// x points forward, with the left wheels on the left. If the wheels are named the other way round
+// (as in some robots), the model's own x stays forward.
 Quat heading_of(const Vec3& left, const Vec3& right, DriveDescription& drive,
                 const Element& element) {
   Vec3 across = left - right;
@@ -97,7 +97,7 @@ Quat heading_of(const Vec3& left, const Vec3& right, DriveDescription& drive,
   return Quat(Eigen::AngleAxisd(math::atan2(ahead.y(), ahead.x()), Vec3::UnitZ()));
 }
 
-// Front first, whatever the order in the file.
+// Sorted front first, whatever their order in the file.
 void sort_by_front(const Model& model, const Pose& X_MBase, std::vector<ModelJointIndex>& joints) {
   const Pose X_BaseM = X_MBase.inverse();
   std::stable_sort(joints.begin(), joints.end(), [&](ModelJointIndex a, ModelJointIndex b) {
@@ -108,7 +108,7 @@ void sort_by_front(const Model& model, const Pose& X_MBase, std::vector<ModelJoi
 
 using Steering = DriveDescription::Steering;
 
-constexpr double kMostSteering_rad = 1.56;  // a wheel across the robot would not roll
+constexpr double kMostSteering_rad = 1.56;  // a wheel that points sideways cannot roll
 constexpr double kUsualSteering_rad = 0.6;
 
 const std::vector<std::pair<std::string, Steering>>& steerings() {
@@ -193,7 +193,7 @@ void read_joints(const Element& e, const Model& model, DriveDescription& drive) 
   }
 }
 
-// The lowest point of what collides, below the model's first link.
+// The lowest point of the collision shapes, below the model's first link.
 Vec3 below_model(const Model& model) {
   Vec3 at = model.links[0].X_ML.translation;
   double lowest = std::numeric_limits<double>::infinity();
@@ -227,7 +227,7 @@ bool steers(const DriveDescription& drive) {
 // Where the wheels stand in the model's frame.
 struct Stance {
   Quat heading = Quat::Identity();
-  Vec3 at = Vec3::Zero();  // on the ground, in the middle of the wheels that are not steered
+  Vec3 at = Vec3::Zero();  // on the ground, at the centre of the wheels that are not steered
   double track = 0;        // 0: wheels on one side only, or none
 };
 
@@ -249,7 +249,7 @@ Stance stance_of(const Element& e, const Model& model, const std::vector<ModelJo
   return stance;
 }
 
-// How far the wheels may be steered by the limits of their joints.
+// The steering range that the joints' limits allow.
 double joint_limit(const Model& model, const DriveDescription& drive) {
   double limit = std::numeric_limits<double>::infinity();
   for (const ModelJointIndex joint : drive.steer_joints) {
@@ -286,7 +286,7 @@ void read_steered(const Element& e, const Model& model, const std::vector<ModelJ
                                      Allowed::positive(quantity::kSpeed).or_infinite());
 }
 
-// The wheels of an omni drive: left and right only say on which side they are.
+// The wheels of an omni drive: left and right only say on which side they lie.
 void sort_by_side(const Model& model, const std::vector<ModelJointIndex>& wheels,
                   DriveDescription& drive) {
   const Pose X_BaseM = drive.X_MBase.inverse();
@@ -298,8 +298,8 @@ void sort_by_side(const Model& model, const std::vector<ModelJointIndex>& wheels
   }
 }
 
-// From the rear to the front wheels of a mecanum drive, which are sorted by now; the mean of both
-// sides.
+// Distance from the rear to the front wheels of a mecanum drive, which are sorted by now; the mean
+// of both sides.
 double mecanum_wheelbase(const Element& e, const Model& model, const DriveDescription& drive) {
   const Pose X_BaseM = drive.X_MBase.inverse();
   const auto x = [&](ModelJointIndex joint) {
@@ -312,7 +312,7 @@ double mecanum_wheelbase(const Element& e, const Model& model, const DriveDescri
   return apart;
 }
 
-// base_link, and what follows from it: track, wheelbase, the wheels' order.
+// base_link and what follows from it: track, wheelbase, the order of the wheels.
 void place_base(const Element& e, const Model& model, DriveDescription& drive) {
   const Allowed positive = Allowed::positive(quantity::kLength);
   std::vector<ModelJointIndex> wheels = drive.left_joints;
@@ -365,7 +365,7 @@ void read_servo(const Element& e, DriveDescription& drive) {
       e.number("ruedo:gyro_scale_error", 0.0, {.min = -1.0, .max = 1.0, .min_excluded = true});
 }
 
-// The sensor reads the rest, and says what is wrong with these.
+// The sensor's own reader reads the rest, and reports what is wrong with these.
 void read_odometry(const Element& odometry, DriveDescription& drive) {
   drive.odometry_rate = odometry.rate("ruedo:rate", drive.odometry_rate);
   if (const Element* errors = odometry.child("ruedo:radius_error")) {
@@ -511,7 +511,7 @@ DriveDescription read_drive(std::shared_ptr<const Element> element,
 
 namespace {
 
-// What nothing stands in for, each once.
+// What has no counterpart here, each once.
 void name_plugin(const Element& plugin, const PluginKind& kind, const Model& model,
                  const std::string& where, Findings& findings, std::set<std::string>& named) {
   std::string text;
@@ -529,7 +529,7 @@ void name_plugin(const Element& plugin, const PluginKind& kind, const Model& mod
   if (!text.empty() && named.insert(text).second) findings.unsupported(plugin.source, where, text);
 }
 
-// A track that no vehicle has: a conveyor, or one that is told on a topic of its own.
+// A track that is not part of a vehicle: a conveyor, or one that is commanded on its own topic.
 void name_lone_tracks(const std::vector<const Element*>& plugins, const Model& model,
                       const std::string& where, Findings& findings) {
   for (const Element* each : plugins) {
@@ -557,7 +557,7 @@ bool looks_like_robot(const Element& model_element, const std::vector<const Elem
   });
 }
 
-// Joints that a plugin of their own turns are no drive's.
+// Joints that have a plugin of their own are not part of a drive.
 bool is_turned_by_plugin(const std::vector<const Element*>& plugins, const std::string& joint) {
   return std::any_of(plugins.begin(), plugins.end(), [&](const Element* each) {
     if (kind_of(*each).does != PluginKind::Does::joints ||
@@ -575,7 +575,7 @@ std::string joined(const std::vector<std::string>& names, const char* between) {
   return text;
 }
 
-// Null where what looked like wheels is none.
+// Null if what looked like wheels turns out not to be.
 std::optional<DriveDescription> guessed_drive(std::unique_ptr<Element> guess,
                                               std::shared_ptr<const Element> odometry,
                                               const Model& model) {
@@ -589,7 +589,7 @@ std::optional<DriveDescription> guessed_drive(std::unique_ptr<Element> guess,
   }
 }
 
-// The drive of a robot for which no element and no plugin of a drive speaks.
+// The drive of a robot that neither an element nor a drive plugin describes.
 void find_drive(const Element& model_element, const std::vector<const Element*>& plugins,
                 std::shared_ptr<const Element> odometry, const std::string& where,
                 ReadContext& context, Model& model) {
@@ -633,7 +633,7 @@ void find_drive(const Element& model_element, const std::vector<const Element*>&
   }
 }
 
-// The drive of a plugin, where it is one.
+// The drive that a plugin describes, if it is a drive plugin.
 void take_drive(const Element& plugin, const std::shared_ptr<const Element>& odometry,
                 const std::string& where, Findings& findings, Model& model) {
   try {
@@ -669,7 +669,7 @@ void read_drive_of(const Element& model_element, const std::string& where, ReadC
         kind.does == PluginKind::Does::joints || kind.does == PluginKind::Does::control;
     name_plugin(*plugin, kind, model, where, context.findings, named);
     name_parameters(*plugin, where, context.findings);
-    if (!model_element.has("ruedo:drive"))  // Ruedo's own element is there instead of it
+    if (!model_element.has("ruedo:drive"))  // Ruedo's own element takes precedence
       take_drive(*plugin, odometry, where, context.findings, model);
   }
   name_lone_tracks(plugins, model, where, context.findings);

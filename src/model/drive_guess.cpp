@@ -1,5 +1,5 @@
-// Wheels are joints that turn without end about a level axis and stand on the ground. Those with
-// "wheel" in their names count first; without any, the round things that stand in pairs.
+// Wheels are continuous joints with a level axis whose link touches the ground. Links with "wheel"
+// in their name come first; without any, round links that come in pairs.
 #include "model/drive_guess.h"
 
 #include <algorithm>
@@ -11,9 +11,9 @@
 namespace ruedo::model {
 namespace {
 
-constexpr double kLevel = 0.35;     // of an axis' unit vector, upwards
+constexpr double kLevel = 0.35;     // z component of the axis' unit vector
 constexpr double kGround_m = 0.03;  // above the lowest wheel
-constexpr double kAside_m = 0.02;   // nearer to the middle is neither left nor right
+constexpr double kAside_m = 0.02;   // closer to the centre line, a wheel is neither left nor right
 constexpr double kParallel = 0.95;  // cosine
 
 std::string lower(std::string text) {
@@ -36,13 +36,13 @@ Vec3 axis_in_model(const Joint& joint) { return joint.X_MJ.rotation * joint.axis
 
 struct Wheel {
   ModelJointIndex joint;
-  ModelJointIndex steer;  // the joint about the vertical that it hangs on
+  ModelJointIndex steer;  // the vertical joint that it hangs on
   Vec3 axis, at;          // in the model
   double lowest = 0.0;
-  std::string name;  // of joint and link, in small letters
+  std::string name;  // of joint and link, in lower case
 };
 
-// The joint about the vertical between the wheel and the base, if there is one.
+// The vertical joint between the wheel and the base, if there is one.
 ModelJointIndex steering_above(const Model& model, ModelJointIndex joint) {
   ModelLinkIndex link = model.joints[joint].parent;
   for (size_t steps = 0; link.valid() && steps <= model.joints.size(); ++steps) {
@@ -133,7 +133,7 @@ double lowest_point_below(const Model& model, ModelJointIndex joint) {
 
 namespace {
 
-// Of the wheels that a drive can be made of, those that a controller names, when there are such.
+// The candidate wheels; if a controller names some of them, only those.
 std::vector<Wheel> driven_wheels(const Model& model, const std::vector<std::string>& controlled) {
   std::vector<Wheel> wheels = wheels_of(model, true);
   if (wheels.size() < 2) wheels = wheels_of(model, false);
@@ -147,7 +147,8 @@ std::vector<Wheel> driven_wheels(const Model& model, const std::vector<std::stri
   return wheels;
 }
 
-// To the robot's left, by the wheels' axes: what is ahead has a positive x, else a positive y.
+// Points to the robot's left along the wheel axes, so that forward has a positive x, or else a
+// positive y.
 Vec3 left_of(const std::vector<Wheel>& wheels) {
   Vec3 left = wheels[0].axis;
   left.z() = 0;
@@ -157,7 +158,7 @@ Vec3 left_of(const std::vector<Wheel>& wheels) {
   return left;
 }
 
-// Makes the drive's element out of wheels, and the words that say what was guessed.
+// Builds the <ruedo:drive> element from the wheels, and a text that says what was guessed.
 class Guesser {
  public:
   Guesser(const Model& model, const std::vector<Wheel>& wheels)
@@ -190,7 +191,7 @@ class Guesser {
       for (const Wheel& wheel : wheels_) name("ruedo:left_joint", wheel.joint, &lefts_);
       return "omni";
     }
-    if (steered == wheels_.size()) {  // each wheel turns where it has to go
+    if (steered == wheels_.size()) {  // every wheel can be steered
       for (const Wheel& wheel : wheels_) name("ruedo:steer_joint", wheel.steer);
       name_sides();
       return "holonomic";

@@ -1,4 +1,4 @@
-// The drive plugins of Gazebo Classic and gz-sim, as the <ruedo:drive> that says the same.
+// Translates the drive plugins of Gazebo Classic and gz-sim to <ruedo:drive>.
 //
 // Names of parameters are those of the plugins' own documentation; each plugin has had several
 // spellings.
@@ -37,7 +37,7 @@ constexpr Parameter kParameters[] = {
     {"max_speed", "ruedo:max_speed"},
     {"max_angular_velocity", "ruedo:max_turn_rate"},
     {"angular_velocity/max_velocity", "ruedo:max_turn_rate"},
-    {"max_velocity", "ruedo:max_turn_rate"},  // of gz-sim: for both
+    {"max_velocity", "ruedo:max_turn_rate"},  // gz-sim's limit applies to both
     {"max_linear_acceleration", "ruedo:acceleration"},
     {"linear_velocity/max_acceleration", "ruedo:acceleration"},
     {"max_acceleration", "ruedo:acceleration"},
@@ -108,7 +108,7 @@ bool is_joint_of(const Element& named, const Model& model) {
                      [&](const Joint& joint) { return joint.name == dotted(named.text); });
 }
 
-// RMF's robots that drive lanes: names of joints and numbers are the plugin's own.
+// RMF's robots that follow lanes: names of joints and numbers are the plugin's own.
 void add_slotcar(const Element& plugin, const Model& model, Element& drive) {
   struct Given {
     const char *theirs, *ours;
@@ -136,7 +136,7 @@ void add_slotcar(const Element& plugin, const Model& model, Element& drive) {
   if (has("joint_tire_left") && has("joint_tire_right")) {
     add(drive, "ruedo:left_joint", "joint_tire_left", plugin.source);
     add(drive, "ruedo:right_joint", "joint_tire_right", plugin.source);
-  } else {  // those of gz-sim move as a whole
+  } else {  // in gz-sim they move as a whole
     drive.attributes.emplace_back("steering", "tracked");
   }
 }
@@ -174,7 +174,8 @@ bool names_wheels(const Element& plugin, const Model& model) {
 std::unique_ptr<Element> odometry_from_plugin(const Element& plugin) {
   for (const char* name : {"odom_publish_frequency", "update_rate", "odometryRate", "updateRate"}) {
     const Element* rate = plugin.child(name);
-    constexpr double kMost_hz = 1000.0;  // of Gazebo: more often than it steps
+    // Gazebo's limit; higher rates than the step rate have no effect
+    constexpr double kMost_hz = 1000.0;
     const double hz = rate ? rate->as_number(Allowed::any(quantity::kRange)) : 0.0;
     if (!(hz > 0.0) || hz > kMost_hz) continue;
     auto odometry = std::make_unique<Element>();
@@ -190,7 +191,7 @@ std::unique_ptr<Element> drive_from_plugin(const Element& plugin, const Model& m
   const PluginKind kind = kind_of(plugin);
   const bool alike = kind.does == PluginKind::Does::unknown && names_wheels(plugin, model);
   if (kind.does != PluginKind::Does::drive && !alike) return nullptr;
-  // One that only starts something moving, as obstacles are, takes no commands on the ground.
+  // A plugin that only sets something in motion, like an obstacle, takes no ground commands.
   if (kind.name == "VelocityControl" &&
       (plugin.has("initial_linear") || plugin.has("initial_angular")))
     return nullptr;
@@ -222,7 +223,7 @@ std::unique_ptr<Element> drive_from_plugin(const Element& plugin, const Model& m
     if (each.unit == Unit::half) value /= 2;
     if (each.unit == Unit::magnitude) value = std::abs(value);
     if (value > 0)
-      add(*drive, each.ours, shown(value), given->source);  // 0: the plugins' "no limit"
+      add(*drive, each.ours, shown(value), given->source);  // 0 means "no limit" in the plugin
   }
   return drive;
 }

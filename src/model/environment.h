@@ -1,4 +1,4 @@
-// Reads where the world lies and what surrounds it.
+// Reads the world's location and environment.
 #pragma once
 
 #include "model/world_model.h"
@@ -6,10 +6,10 @@
 namespace ruedo::model {
 
 // <spherical_coordinates>, <atmosphere>, <wind>, <magnetic_field> (SDF before 1.6: in <physics>).
-// What is wrong in one of them is named, and that element is left out.
+// An element with an error is reported and left out.
 void read_environment(const Element& world, Environment& environment, Findings& findings);
 
-// The plugins WindEffects and WindPlugin: the wind pushes, and changes.
+// The plugins WindEffects and WindPlugin: wind that pushes links and varies.
 void read_wind_plugin(const Element& plugin, Wind& wind, Findings& findings);
 
 }  // namespace ruedo::model

@@ -1,4 +1,5 @@
-// Rectangles in blocks of 2 m, and Dijkstra's ways over cells of 0.15 m, larger on large floors.
+// Rectangles indexed by blocks of 2 m; Dijkstra's shortest paths over cells of 0.15 m, larger on
+// large floors.
 #include "model/floor_plan.h"
 
 #include <algorithm>
@@ -12,18 +13,18 @@ namespace ruedo::model {
 namespace {
 
 constexpr double kBlock_m = 2.0;
-constexpr double kMostCells = 100'000;  // of a floor, for ways
-constexpr int kLookAhead = 40;  // cells of the way within which the next place is looked for
-constexpr int kAtLeast = 3;     // ... and who stands beside a wall looks so far, whatever he sees
-constexpr double kSqueezes = 0.9;    // of a person's radius: nearer to walls he cannot go
-constexpr double kBesideWall = 3.0;  // cost of a way nearer to walls than one likes
+constexpr double kMostCells = 100'000;  // cells of one floor, for path planning
+constexpr int kLookAhead = 40;  // cells of the path among which the next waypoint is looked for
+constexpr int kAtLeast = 3;     // ... and at least so many, even beside a wall that hides the rest
+constexpr double kSqueezes = 0.9;    // of a person's radius: the closest they can pass a wall
+constexpr double kBesideWall = 3.0;  // cost factor of paths closer to walls than people like
 constexpr float kNoWay = std::numeric_limits<float>::infinity();
 
 int block_of(double at, double from, int most) {
   return std::clamp(rounded_down<int>(std::clamp((at - from) / kBlock_m, -1.0, 1e6)), 0, most - 1);
 }
 
-// The nearest edge of a rectangle to a point in it.
+// The point on a rectangle's edge that is nearest to a point inside it.
 Vec2 edge_of(const Rect& wall, const Vec2& p) {
   const double gaps[] = {p.x() - wall.low.x(), wall.high.x() - p.x(), p.y() - wall.low.y(),
                          wall.high.y() - p.y()};
@@ -33,7 +34,7 @@ Vec2 edge_of(const Rect& wall, const Vec2& p) {
   return {p.x(), least == 2 ? wall.low.y() : wall.high.y()};
 }
 
-// Liang and Barsky: whether the way from a to b meets a rectangle.
+// Liang and Barsky's test: whether the segment from a to b meets a rectangle.
 bool meets(const Rect& wall, const Vec2& a, const Vec2& b) {
   double enter = 0.0, leave = 1.0;
   for (int axis = 0; axis < 2; ++axis) {
@@ -72,7 +73,7 @@ FloorPlan::FloorPlan(std::vector<Rect> walls, const Rect& within)
   }
 }
 
-// Some walls more than once.
+// Some walls come up more than once.
 template <class Visit>
 void FloorPlan::for_each_near(const Vec2& low, const Vec2& high, Visit visit) const {
   if (walls_.empty()) return;
@@ -136,7 +137,7 @@ Route FloorPlan::route_to(const Rect& goal, double radius, double clearance) con
   Route route;
   const size_t cells = static_cast<size_t>(columns_) * static_cast<size_t>(rows_);
   route.left.assign(cells, kNoWay);
-  if (walls_.empty()) return route;  // everybody sees the goal
+  if (walls_.empty()) return route;  // the goal is visible from everywhere
   std::vector<double> cost(cells, 1.0);
   for (size_t i = 0; i < cells; ++i) {
     const Vec2 at = middle(static_cast<int>(i));
@@ -145,7 +146,7 @@ Route FloorPlan::route_to(const Rect& goal, double radius, double clearance) con
     const bool blocked = near[0].inside || (near[0].point - at).norm() < kSqueezes * radius;
     cost[i] = blocked ? kNoWay : kBesideWall;
   }
-  using Entry = std::pair<float, int>;  // of equal ways the lower cell first
+  using Entry = std::pair<float, int>;  // ties go to the lower cell
   std::priority_queue<Entry, std::vector<Entry>, std::greater<>> open;
   for (int r = row(goal.low.y()); r <= row(goal.high.y()); ++r) {
     for (int c = column(goal.low.x()); c <= column(goal.high.x()); ++c) {
@@ -177,7 +178,7 @@ Route FloorPlan::route_to(const Rect& goal, double radius, double clearance) con
 
 Vec2 FloorPlan::next(const Route& route, const Rect& goal, const Vec2& p, double clearance) const {
   const Vec2 target = goal.nearest(p);
-  // Between walls that are nearer than `clearance` to both sides: the middle of a narrow door.
+  // Between walls closer than `clearance` on both sides: the centre of a narrow door.
   if (walls_.empty() || is_free(p, target, 0.8 * clearance)) return target;
   int cell = row(p.y()) * columns_ + column(p.x());
   Vec2 seen = p;

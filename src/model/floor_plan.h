@@ -1,5 +1,5 @@
-// What of a world is in the way of people on a floor, seen from above: rectangles, the nearest
-// walls of a place, and the ways around them.
+// Obstacles for people on a floor, seen from above, as rectangles; the walls nearest to a point,
+// and paths around them.
 #pragma once
 
 #include <cstdint>
@@ -13,32 +13,32 @@ namespace ruedo::model {
 
 using Vec2 = Eigen::Vector2d;
 
-// Shortest ways to a goal, over cells.
+// Shortest paths to a goal, over cells.
 struct Route {
-  std::vector<float> left;  // m to go from each cell; infinity: there is no way
+  std::vector<float> left;  // remaining path length from each cell, m; infinity: there is no path
 };
 
 class FloorPlan {
  public:
   FloorPlan() = default;
-  // Ways are looked for in `within`.
+  // Paths are planned inside `within`.
   FloorPlan(std::vector<Rect> walls, const Rect& within);
 
-  // From the nearest wall, and from the nearest of those that lie on its other side: at most two
-  // points, within `reach`. In a wall the point is its nearest edge, and `inside` is true.
+  // The nearest points of the nearest wall, and of the nearest wall on the opposite side: at most
+  // two points, within `reach`. Inside a wall the point is on its nearest edge, and `inside` is
+  // true.
   struct Near {
     Vec2 point;
     bool inside;
   };
   int nearest(const Vec2& p, double reach, Near (&near)[2]) const;
 
-  // No wall is nearer to the way from a to b than that.
+  // Whether no wall comes closer than that to the segment from a to b.
   bool is_free(const Vec2& a, const Vec2& b, double clearance) const;
 
-  // For people of that radius, who keep `clearance` from walls where they can.
+  // For people of that radius, who keep `clearance` from walls if they can.
   Route route_to(const Rect& goal, double radius, double clearance) const;
-  // Where to head for from p: a place that is seen from there, on the way; p itself where there is
-  // no way.
+  // Where to head from p: a point on the path that is visible from p; p itself if there is no path.
   Vec2 next(const Route& route, const Rect& goal, const Vec2& p, double clearance) const;
 
  private:
@@ -52,7 +52,7 @@ class FloorPlan {
   Rect within_;
   int columns_ = 0, rows_ = 0;
   double cell_m_ = 0.15;
-  std::vector<std::vector<int>> of_block_;  // walls near each block of cells
+  std::vector<std::vector<int>> of_block_;  // the walls near each block of cells
   int blocks_x_ = 0, blocks_y_ = 0;
 };
 

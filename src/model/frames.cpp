@@ -39,7 +39,8 @@ bool FrameGraph::find(const std::string& name, Found& found) const {
     found = {at->second};
     return true;
   }
-  // A nested model's own name may hold "::" only by nesting, so the first one ends the node's name.
+  // "::" in a nested model's own name comes from nesting only, so the first one ends the node's
+  // name.
   if (const size_t colons = name.find("::"); colons != std::string::npos) {
     const auto at = by_name_.find(name.substr(0, colons));
     if (at != by_name_.end() && nodes_[at->second].scope) {

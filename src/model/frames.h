@@ -1,8 +1,8 @@
 // Frames by name: links, joints, <frame>s and nested models of one model, or the models and frames
 // of a world, each placed relative to another.
 //
-// Poses are those of the file, at the start: every frame is then fixed to every other, so one pose
-// in the scope's own frame says it all. Names with "::" reach into nested models.
+// Poses are those of the file, at the start. As every frame is fixed relative to every other then,
+// one pose in the scope's own frame describes it. Names with "::" reach into nested models.
 #pragma once
 
 #include <map>
@@ -14,8 +14,8 @@
 
 namespace ruedo::model {
 
-// A frame of a model that was read: X_MF, and the link it moves with (none: a static scope's or the
-// world's).
+// A frame of a model that has been read: X_MF, and the link it moves with (none: it belongs to a
+// static scope or to the world).
 struct FrameInModel {
   Pose X_MF;
   ModelLinkIndex link;
@@ -26,7 +26,8 @@ struct ScopedModel {
   std::shared_ptr<const Model> model;
   std::map<std::string, FrameInModel, std::less<>> frames;  // by SDF's scoped names, "arm::wrist"
   Pose pose;                                                // <pose>, relative to
-  std::string relative_to;      // this, in the scope of who places it; "": its frame
+  // this frame, in the scope that places the model; "": that scope's own frame
+  std::string relative_to;
   std::string placement_frame;  // the frame that <pose> places; "": the model's own
 };
 
@@ -51,16 +52,16 @@ class FrameGraph {
   // Throws InputError when the name is taken.
   void add(Node node);
 
-  // The pose of a frame in the scope, and the link it moves with. `asker` is blamed when there is
-  // no such frame, or when frames go in a circle.
+  // The pose of a frame in the scope, and the link it moves with. The error for a missing frame or
+  // a cycle of frames names `asker`.
   Pose pose(const std::string& name, const Element& asker);
   ModelLinkIndex link(const std::string& name, const Element& asker);
   bool has(const std::string& name);
-  // Whether that frame comes from this element.
+  // Whether that frame was declared by this element.
   bool is_from(const std::string& name, const Element& element) const;
-  // Forgets a frame that cannot be placed.
+  // Removes a frame that cannot be placed.
   void drop(const std::string& name) { by_name_.erase(name); }
-  // Names that exist, for messages.
+  // The names that exist, for error messages.
   std::vector<std::string> names() const;
 
  private:

@@ -1,4 +1,4 @@
-// <geometry> to Geometry.
+// Reads <geometry> into Geometry.
 #include "model/geometry.h"
 
 #include <stdexcept>
@@ -74,8 +74,8 @@ std::optional<Geometry> read_polyline(const Element& geometry_element, const Ele
   }
 }
 
-// The first <texture>'s diffuse picture, tiled over the ground. Gazebo blends further ones in by
-// height; here they are named.
+// The first <texture>'s diffuse picture, tiled over the ground. Gazebo blends in further ones by
+// height; these are reported.
 void cover_with_texture(const Element& element, const Vec3& size, Mesh& mesh,
                         const std::string& where, ReadContext& context) {
   const Element* texture = element.child("texture");
@@ -142,7 +142,7 @@ std::optional<Geometry> read_heightmap(const Element& element, const std::string
   return geometry;
 }
 
-// The corners of a mesh, times its scale, are lengths that no reader of numbers has seen.
+// Checks the corners of a mesh times its scale: no number reader has checked these lengths.
 bool is_too_large(const Geometry& g, const Element& element, const std::string& where,
                   ReadContext& context) {
   const Eigen::AlignedBox3d box = bounds(g);
@@ -156,8 +156,8 @@ bool is_too_large(const Geometry& g, const Element& element, const std::string& 
   return true;
 }
 
-// Reads the shapes that are a few numbers. Converters write sizes of zero for what has no shape:
-// they are nothing. Negative sizes are errors.
+// Reads the shapes given by a few numbers. Converters write sizes of zero for "no shape": there is
+// none then. Negative sizes are errors.
 class SizedShape {
  public:
   SizedShape(const Element& shape, const std::string& where, Findings& findings)
@@ -191,7 +191,7 @@ double SizedShape::required(const char* name) const {
   return shape_.number(name, 0, Allowed::not_negative(quantity::kLength));
 }
 
-// Where SDF has a default, a file may rely on it.
+// Where SDF has a default, a file may omit the value.
 void SizedShape::tell_default(const char* name, const std::string& value) {
   if (shape_.has(name)) return;
   findings_.repaired(shape_.source, where_,
@@ -242,7 +242,7 @@ Geometry SizedShape::plane() {
   const Element* size = shape_.child("size");
   if (!size) return g;
   std::vector<double> v = size->as_numbers(Allowed::any(quantity::kLength));
-  if (v.size() == 3) {  // of a box, which some files have here
+  if (v.size() == 3) {  // <size> of a box, which some files write here
     findings_.repaired(size->source, where_,
                        "<size> of a plane has two numbers; the third is left out");
     v.pop_back();
@@ -253,7 +253,7 @@ Geometry SizedShape::plane() {
   return g;
 }
 
-// The one shape of a <geometry>; nullptr: it has none, or says so.
+// The one shape of a <geometry>; nullptr: there is none, or it is <empty/>.
 const Element* shape_of(const Element& element) {
   const Element* shape = nullptr;
   for (const auto& child : element.children) {

@@ -1,4 +1,4 @@
-// Shapes: SDF's <geometry>, and the meshes that polylines and heightmaps become.
+// Shapes: SDF's <geometry>, and the meshes made from polylines and heightmaps.
 #pragma once
 
 #include <optional>
@@ -9,21 +9,20 @@
 
 namespace ruedo::model {
 
-// Reads <geometry>. nullopt: there is no shape, or a mesh that is missing or broken; the findings
-// say which.
+// Reads <geometry>. nullopt: there is no shape, or its mesh is missing or broken; the findings say
+// which.
 std::optional<Geometry> read_geometry(const Element& geometry, const std::string& where,
                                       ReadContext& context);
 
 // Prisms over the polygons (even-odd: a polygon inside another is a hole) from z = 0 to `height`.
-// Throws std::runtime_error for polygons that have no area or cross themselves.
+// Throws std::runtime_error for polygons without area or with crossing edges.
 Mesh extruded(const std::vector<std::vector<Eigen::Vector2d>>& polygons, double height);
 
-// A grid of heights, one a pixel, from a picture file; size in metres, centred at the origin.
+// A heightmap from a picture file, one height per pixel; size in metres, centred at the origin.
 // Throws std::runtime_error for a picture that cannot be read.
 Mesh heightmap(const std::string& picture, const Vec3& size);
 
-// A shape's points furthest out, in its own frame: the corners of its bounding box. Planes have
-// none.
+// The corners of a shape's bounding box, in the shape's frame. Planes have none.
 Eigen::AlignedBox3d bounds(const Geometry& geometry);
 
 }  // namespace ruedo::model

@@ -1,4 +1,4 @@
-// Names of parameters are those of the plugin's documentation.
+// Parameter names follow the plugin's documentation.
 #include "model/holds.h"
 
 #include <algorithm>
@@ -20,7 +20,7 @@ bool has_link(const Model& model, const std::string& name) {
                      [&](const Link& link) { return link.name == name; });
 }
 
-// A nested model's links are those of the model that it is in.
+// The links of a nested model belong to the model that contains it.
 void resolve(Hold& hold, const Model& model) {
   const std::string nested = hold.other_model + "." + hold.other_link;
   if (hold.other_model == model.name || hold.other_model == "__model__") {

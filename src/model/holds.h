@@ -9,11 +9,12 @@
 
 namespace ruedo::model {
 
-// Gives the model what its plugins hold, and makes it take commands. Its links are complete.
+// Adds what the model's plugins hold, and makes the model take commands. Its links must be
+// complete.
 void read_holds(const std::vector<const Element*>& plugins, const std::string& where,
                 Findings& findings, Model& model);
 
-// Names what a model of the world is to hold and what is not there.
+// Reports models and links to be held that do not exist.
 void check_holds(const WorldModel& world, Findings& findings);
 
 }  // namespace ruedo::model

@@ -1,8 +1,8 @@
-// ruedo-import-mesh INPUT OUTPUT: turns a mesh file into Ruedo's binary form, by assimp.
+// ruedo-import-mesh INPUT OUTPUT: converts a mesh file to Ruedo's binary form, with assimp.
 //
-// It runs as a child of the server, with limits on memory and time that the server sets, and in a
-// sandbox of its own: assimp aborts or hangs on some malformed files, and may do worse on others.
-// Exit code 0: OUTPUT is complete; else the first line on stderr says why.
+// Runs as a child of the server, under the server's limits on memory and time and in a sandbox of
+// its own: some malformed files make assimp abort or hang, and others may do worse. Exit code 0:
+// OUTPUT is complete; otherwise the first line on stderr says why.
 #include <cmath>
 #include <cstdio>
 #include <cstring>
@@ -34,7 +34,7 @@ extern "C" int __lsan_is_turned_off() { return 1; }  // NOLINT(bugprone-reserved
 
 namespace {
 
-// Opens files in the mesh's own folder and below only, and notes each, so that the cache knows what
+// Opens files only in the mesh's folder and below, and records each, so that the cache knows what
 // the result depends on.
 class NotingFiles : public Assimp::DefaultIOSystem {
  public:
@@ -62,7 +62,7 @@ class NotingFiles : public Assimp::DefaultIOSystem {
   }
 
  private:
-  // assimp takes a colour with a blank before its first number (" 0.3 0.3 0.3 1") for none, and
+  // assimp does not recognise a colour with a space before its first number (" 0.3 0.3 0.3 1"), and
   // refuses the file.
   Assimp::IOStream* without_leading_blanks() const {
     const std::string text = read_text_file(mesh_.string(), MeshLimits::kFileBytes);
@@ -118,7 +118,7 @@ Material material_of(const aiScene& scene, const aiMaterial& from) {
       from.GetTexture(aiTextureType_BASE_COLOR, 0, &path) == AI_SUCCESS) {
     auto texture = std::make_shared<Texture>();
     if (const aiTexture* embedded = scene.GetEmbeddedTexture(path.C_Str())) {
-      // mHeight 0: mWidth bytes of an encoded picture. Raw texels are left out.
+      // mHeight 0: mWidth bytes of an encoded picture. Raw texels are dropped.
       if (embedded->mHeight == 0) {
         const auto* bytes = reinterpret_cast<const uint8_t*>(embedded->pcData);
         texture->embedded.assign(bytes, bytes + embedded->mWidth);
@@ -128,7 +128,7 @@ Material material_of(const aiScene& scene, const aiMaterial& from) {
     }
     if (texture->path.size() > 4000) texture->path.clear();
     if (!texture->path.empty() || !texture->embedded.empty()) to.texture = texture;
-    // Exporters leave the colour black where the texture says it all.
+    // Exporters leave the colour black when a texture gives it.
     if (to.texture && to.diffuse[0] + to.diffuse[1] + to.diffuse[2] == 0)
       to.diffuse = {1, 1, 1, to.diffuse[3]};
   }
@@ -148,8 +148,8 @@ void append(const aiScene& scene, const aiNode& node, const aiMatrix4x4& parent,
     const size_t first = mesh.positions.size();
     if (first + from.mNumVertices > MeshLimits::kVertices)
       throw std::runtime_error("it has more than 8000000 vertices");
-    // One array for all parts: a part without normals or texture coordinates gets none for all but
-    // the first.
+    // One array for all parts: a part without normals or texture coordinates removes them from all
+    // but the first.
     const bool with_normals = from.HasNormals(), with_uvs = from.HasTextureCoords(0);
     if (with_normals && mesh.normals.size() < first)
       mesh.normals.resize(first, Eigen::Vector3f::Zero());
@@ -186,8 +186,8 @@ void append(const aiScene& scene, const aiNode& node, const aiMatrix4x4& parent,
     append(scene, *node.mChildren[c], X, mesh, depth + 1);
 }
 
-// Normals of zero length (a part without any beside parts that have them) become those of the
-// triangles.
+// Normals of zero length (from parts without normals beside parts that have them) are replaced by
+// those of the triangles.
 void fill_missing_normals(Mesh& mesh) {
   if (mesh.normals.empty()) return;
   for (const auto& t : mesh.triangles) {
@@ -202,19 +202,19 @@ void fill_missing_normals(Mesh& mesh) {
   }
 }
 
-// What brings the scene to metres and z up. COLLADA's unit is in its root node, and its up axis is
-// left alone, as Gazebo leaves it. glTF is y up by its specification; assimp turns 3DS to y up, and
-// FBX from 5.4 on, by its root node. Before, FBX is as its own settings say.
+// The transform that brings the scene to metres and z up. COLLADA's unit is in its root node; its
+// up axis is ignored, as Gazebo does. glTF is y up by its specification. assimp turns 3DS to y up,
+// and FBX from version 5.4 on, in the root node; before that, FBX is as its own settings say.
 aiMatrix4x4 to_z_up(const aiScene& scene, const std::string& extension) {
   aiMatrix4x4 turn, scale;
   aiMatrix4x4::RotationX(static_cast<float>(M_PI / 2), turn);
-  // Exact zeroes and ones: a quarter turn leaves no rounding in the coordinates.
+  // Exact zeroes and ones: a quarter turn introduces no rounding.
   turn.b2 = turn.c3 = 0;
   turn.b3 = -1;
   turn.c2 = 1;
   if (extension == "gltf" || extension == "glb" || extension == "3ds") return turn;
   if (extension == "fbx") {
-    float centimetres = 1.0f;  // in one of the file's units
+    float centimetres = 1.0f;  // centimetres per unit of the file
     int up = 1;
     if (scene.mMetaData) {
       double wide = 0;
@@ -236,7 +236,7 @@ void import(const fs::path& input, const fs::path& output) {
   if (!extension.empty()) extension.erase(0, 1);
 
   Assimp::Importer importer;
-  // Only the one for this file's extension: a file's bytes cannot choose another.
+  // Only the importer for this file's extension: a file's bytes cannot select another.
   for (size_t i = importer.GetImporterCount(); i-- > 0;) {
     Assimp::BaseImporter* each = importer.GetImporter(i);
     std::set<std::string> extensions;

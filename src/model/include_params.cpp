@@ -1,4 +1,4 @@
-// Finding elements by their scoped names, and the four actions.
+// Finds elements by their scoped names, and applies the four actions.
 #include "model/include_params.h"
 
 #include <algorithm>
@@ -11,7 +11,8 @@ std::string name_of(const Element& element) {
   return name ? *name : "";
 }
 
-// The child of that scoped name; of that kind, where one is given. Names may have "::" themselves.
+// The child with that scoped name, and of that kind if one is given. Names may contain "::"
+// themselves.
 Element* find(Element& in, const std::string& id, const std::string& kind) {
   for (const auto& child : in.children) {
     const std::string name = name_of(*child);
@@ -23,7 +24,7 @@ Element* find(Element& in, const std::string& id, const std::string& kind) {
   return nullptr;
 }
 
-// The child that a change is about: of the same kind, and of its name where it has one.
+// The child that a change refers to: of the same kind, and of the same name if it has one.
 Element* same_child(Element& in, const Element& change) {
   const std::string name = name_of(change);
   for (const auto& child : in.children) {
@@ -32,7 +33,7 @@ Element* same_child(Element& in, const Element& change) {
   return nullptr;
 }
 
-// Without what only says how to change something.
+// A copy without the elements and attributes that only say how to change something.
 std::unique_ptr<Element> as_written(const Element& change) {
   auto copy = change.clone();
   std::erase_if(copy->attributes, [](const auto& each) {
@@ -41,7 +42,7 @@ std::unique_ptr<Element> as_written(const Element& change) {
   return copy;
 }
 
-// True where it was there.
+// Whether it was there.
 bool remove(Element& from, const Element* what) {
   for (const auto& child : from.children) {
     if (child.get() == what || remove(*child, what)) {
@@ -52,7 +53,7 @@ bool remove(Element& from, const Element* what) {
   return false;
 }
 
-// Values of `change` take the place of those that there are; what is not there is added.
+// Values in `change` replace existing ones; missing ones are added.
 void modify(Element& element, const Element& change) {
   const auto values = as_written(change);  // outlives the loop over what it holds
   for (const auto& [name, value] : values->attributes) {
@@ -113,7 +114,7 @@ class Changes {
       remove(model_, &element);
       return;
     }
-    for (const auto& child : change.children) {  // these of it
+    for (const auto& child : change.children) {  // only these of its children are removed
       if (const Element* there = same_child(element, *child))
         remove(element, there);
       else

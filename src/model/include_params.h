@@ -7,9 +7,9 @@
 
 namespace ruedo::model {
 
-// Adds, modifies, removes and replaces what the children of `params` name by their element_id
-// ("LINK::SENSOR") in `model`, as SDF's proposal for parameter passing has it. One that cannot be
-// done goes to `findings` as an error, and the others are done.
+// Adds, modifies, removes and replaces elements of `model`. Each child of `params` names one by its
+// element_id ("LINK::SENSOR"), as in SDF's proposal for parameter passing. A change that cannot be
+// made goes to `findings` as an error; the others are made.
 void apply_params(const Element& params, Element& model, const std::string& where,
                   Findings& findings);
 

@@ -1,4 +1,4 @@
-// Names and defaults of parameters are those of the plugins' own documentation.
+// Parameter names and defaults follow the plugins' documentation.
 #include "model/joint_plugins.h"
 
 #include <algorithm>
@@ -12,7 +12,7 @@ namespace {
 
 const Allowed kAnyGain = Allowed::any(quantity::kDamping);
 
-// The plugin's n-th element of that name; of fewer than n the last one counts where `repeats`.
+// The plugin's n-th element of that name; if there are fewer and `repeats` is set, the last one.
 const Element* nth(const Element& plugin, const std::string& name, size_t n) {
   const std::vector<const Element*> all = plugin.all(name);
   return n < all.size() ? all[n] : nullptr;
@@ -22,7 +22,7 @@ struct Defaults {
   double p, i, d, i_min, i_max, least, most;
 };
 
-// Of gz-sim's Pid: limits the wrong way round are none.
+// In gz-sim's Pid, limits in reverse order mean no limits.
 Pid read_pid(const Element& plugin, const std::string& prefix, size_t n, const Defaults& usual) {
   const auto number = [&](const char* name, double fallback) {
     const Element* written = nth(plugin, prefix + name, n);
@@ -72,7 +72,7 @@ struct Reader {
           "<" + std::string(element) + "> of the plugin " + name + " is not supported: " + text);
   }
 
-  // Both turn only the first axis here.
+  // Only the first axis turns here.
   void name_axis() const {
     if (plugin.integer("joint_index", 0, Allowed::between(0, 1)) == 1)
       without_effect("joint_index", "commands turn the first axis of a joint");
@@ -112,7 +112,7 @@ struct Reader {
     }
   }
 
-  // What follows a rate brakes a joint that is to stand: the two PIDs are one.
+  // A joint that follows a rate has to brake at rate 0: both PIDs are the same.
   void trajectory() const {
     constexpr Defaults kNothing = {0.0, 0.0, 0.0, 0.0, -1.0, 0.0, -1.0};
     std::vector<Joint*> joints;

@@ -1,4 +1,4 @@
-// How joints' controllers hold them: the plugins of gz-sim and Gazebo Classic, and the gains of
+// How joint controllers hold the joints: the plugins of gz-sim and Gazebo Classic, and the gains of
 // ros_control and ros2_control.
 #pragma once
 
@@ -9,13 +9,13 @@
 
 namespace ruedo::model {
 
-// Gives the joints the PIDs that plugins of the model write, and what they do until they are told
-// something; names what of them is not done. The model's joints are complete.
+// Sets the joints' PIDs from the model's plugins, and what the joints do before the first command;
+// reports what is not supported. The model's joints must be complete.
 void read_joint_plugins(const std::vector<const Element*>& plugins, const std::string& where,
                         Findings& findings, Model& model);
 
-// What <transmission> and <ros2_control> say of how joints are commanded: those by position or
-// velocity stay where they are until they are told something.
+// Applies the command interfaces in <transmission> and <ros2_control>: joints commanded by position
+// or velocity hold their position before the first command.
 void read_joint_interfaces(const Element& model_element, Model& model);
 
 }  // namespace ruedo::model

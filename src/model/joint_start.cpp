@@ -43,21 +43,21 @@ double position_of(const Model& model, const Joint& joint, const Pose& X_MParent
 
 namespace {
 
-// Where each link goes, in the model, from where it was.
+// Where each link moves to, in the model, relative to where it was.
 IndexedVector<ModelLinkIndex, Pose> moves_of_links(const Model& model,
                                                    const JointPositions& positions) {
   IndexedVector<ModelLinkIndex, ModelJointIndex> carrier(model.links.size());  // of each link
   for (const ModelJointIndex j : model.joints.indices()) {
-    if (model.joints[j].type != JointType::gearbox)  // which carries nothing
+    if (model.joints[j].type != JointType::gearbox)  // a gearbox carries nothing
       carrier[model.joints[j].child] = j;
   }
   IndexedVector<ModelLinkIndex, Pose> moves(model.links.size());
   IndexedVector<ModelLinkIndex, bool> done(model.links.size());
   for (const ModelLinkIndex link : model.links.indices()) {
-    std::vector<ModelLinkIndex> way;  // towards the root, as far as it is not done yet
+    std::vector<ModelLinkIndex> way;  // towards the root, as far as not done yet
     for (ModelLinkIndex at = link; at.valid() && !done[at] && carrier[at].valid();
          at = model.joints[carrier[at]].parent) {
-      done[at] = true;  // a loop of joints ends here, too
+      done[at] = true;  // ends at a loop of joints, too
       way.push_back(at);
     }
     for (; !way.empty(); way.pop_back()) {
@@ -71,7 +71,7 @@ IndexedVector<ModelLinkIndex, Pose> moves_of_links(const Model& model,
   return moves;
 }
 
-// Of a joint that reads 0 where its file has `position`.
+// Of a joint that reads 0 at the file's `position`.
 void count_from(double position, size_t j, Model& model) {
   Joint& joint = model.joints[j];
   joint.axis.lower -= position;

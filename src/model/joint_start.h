@@ -1,5 +1,4 @@
-// Models whose joints begin elsewhere than their files have them: a saved <state>,
-// <initial_position>.
+// Models whose joints start elsewhere than in their files: a saved <state>, <initial_position>.
 #pragma once
 
 #include <vector>
@@ -8,19 +7,19 @@
 
 namespace ruedo::model {
 
-// Joints of one axis: those that may begin elsewhere than at 0.
+// Joints with one axis: those that may start elsewhere than at 0.
 bool has_position(const Joint& joint);
 
-// The position (rad or m) at which a joint of one axis has its child there, as seen from its
-// parent; both in the model. Of joints of other kinds 0.
+// The position (rad or m) at which a joint with one axis puts its child there, relative to its
+// parent; both poses in the model. 0 for other joints.
 double position_of(const Model& model, const Joint& joint, const Pose& X_MParent,
                    const Pose& X_MChild);
 
 using JointPositions = IndexedVector<ModelJointIndex, double>;  // rad or m
 
-// Moves what each joint carries to these positions (those at the end may be missing: 0).
-// The joints' positions count from there: limits, springs and who follows are shifted, and each is
-// named.
+// Moves what each joint carries to these positions (missing ones at the end count as 0). Positions
+// count from there: limits, springs and mimic offsets are shifted accordingly, and each shift is
+// reported.
 void begin_at(const JointPositions& positions, const std::string& where, Model& model,
               Findings& findings);
 

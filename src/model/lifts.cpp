@@ -1,4 +1,4 @@
-// Names of parameters and their defaults are those of the plugins' documentation.
+// Parameter names and defaults follow the plugins' documentation.
 #include "model/lifts.h"
 
 #include <algorithm>
@@ -43,7 +43,7 @@ struct Reader {
     return element.number(name, 5.0, Allowed::between(0.0, kMostWait_s));
   }
 
-  // gz-sim's: a link and a door for each floor, and a controller for each joint.
+  // gz-sim's lift: a link and a door for each floor, and a controller for each joint.
   void elevator() const {
     Lift lift = lift_of(plugin.string("cabin_joint", "lift"));
     const std::string floor = plugin.string("floor_link_prefix", "floor_"),
@@ -64,7 +64,7 @@ struct Reader {
     model.lifts.push_back(std::move(lift));
   }
 
-  // Gazebo Classic's: one door, in the cabin, and PIDs of its own.
+  // Gazebo Classic's lift: one door, in the cabin, with PIDs of its own.
   void elevator_of_classic() const {
     Lift lift = lift_of(plugin.string("lift_joint", ""));
     const std::string door = plugin.string("door_joint", "");
@@ -189,7 +189,7 @@ constexpr Kind kKinds[] = {
     {"register_component", &Reader::components},
 };
 
-// A door in the cabin of RMF's lift is a model of its own, and its joints are the lift's.
+// The door in the cabin of RMF's lift is a model of its own, but its joints belong to the lift.
 void find_leaves(Model& model) {
   for (Door& door : model.doors) {
     for (Door::Leaf& leaf : door.leaves) {

@@ -1,5 +1,5 @@
-// Lifts that are called by floor, and doors that open when they are told: Gazebo's Elevator and
-// ElevatorPlugin, and the doors and lifts of RMF.
+// Lifts that are called to floors, and doors that open on command: Gazebo's Elevator and
+// ElevatorPlugin, and RMF's doors and lifts.
 #pragma once
 
 #include <vector>
@@ -9,12 +9,12 @@
 
 namespace ruedo::model {
 
-// Gives the model the doors and lifts of its plugins, and makes it take commands. Its links and
-// joints are complete; those of a door may be the joints of a model that this one is part of.
+// Adds the doors and lifts of the model's plugins, and makes the model take commands. Links and
+// joints must be complete; a door may use joints of a model that contains this one.
 void read_lifts(const std::vector<const Element*>& plugins, const std::string& where,
                 Findings& findings, Model& model);
 
-// Names joints and doors that are not there.
+// Reports joints and doors that do not exist.
 void check_lifts(const WorldModel& world, Findings& findings);
 
 }  // namespace ruedo::model

@@ -1,11 +1,11 @@
-// Where a link is in its body, which sensors and scenes ask at every step.
+// The pose of a link in its body, which sensors and scenes need at every step.
 #include "model/body_layout.h"
 #include "ruedo/math.h"
 
 namespace ruedo::model {
 namespace {
 
-// What turning by an angle does to the link, in its own frame.
+// The displacement of the link when its wheel turns by an angle, in the link's frame.
 Pose turned(const WheelPlacement& wheel, double angle) {
   const Quat turn(Eigen::AngleAxisd(angle, wheel.axis_in_L));
   return {turn, wheel.center_in_L - turn * wheel.center_in_L};

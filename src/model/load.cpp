@@ -1,4 +1,4 @@
-// From a file, or a text, to the world: SDF or URDF, then the options of the command line.
+// From a file or text to a world: reads SDF or URDF, then applies the command line's options.
 #include "model/load.h"
 
 #include <algorithm>
@@ -84,13 +84,13 @@ class Loader {
                                        (names.empty() ? "no robot" : names));
   }
 
-  // Where a robot or a model stands that is loaded without a world.
+  // The empty world in which a robot or model is loaded on its own.
   void read_empty_world() {
     const auto root = parse_document(kEmptyWorld, path_);
     reader_.read_world(*root->child("world"), {1, 9}, world_);
   }
 
-  // The name of a file's robot, as its channels can have it.
+  // The name of a file's robot, made usable in channel names.
   std::string name_in_world(const std::string& name, const std::shared_ptr<const Model>& model,
                             const Source& source) {
     const std::string fit =
@@ -127,13 +127,13 @@ class Loader {
           for (const ModelInstance& other : world_.models) {
             if (other.name == name && any) child->fail("a second model of the name '" + name + "'");
           }
-          // A ground plane of the user's own stands in for ours.
+          // The user's own ground plane replaces ours.
           std::erase_if(world_.models, [&](const auto& other) { return other.name == name; });
           add(name, scope->pose, scope->model, child->source);
         }
         any = true;
       } else if (child->name == "light") {
-        if (!own_light) world_.lights.clear();  // it stands in for our sun
+        if (!own_light) world_.lights.clear();  // it replaces our sun
         own_light = any = true;
         world_.lights.push_back(read_light(*child, child->pose("pose"), "light", context_));
       } else if (child->name == "actor") {
@@ -203,7 +203,7 @@ class Loader {
     room.add(world_.models.back());
   }
 
-  // A guess at a drive, for a model that an <include> or --drive gave one.
+  // A guessed drive, for a model that has got one from an <include> or --drive.
   bool is_settled(const Finding& finding) const {
     if (finding.text.rfind(kNoDriveIsWritten, 0) != 0) return false;
     return std::none_of(world_.models.begin(), world_.models.end(), [&](const ModelInstance& each) {
@@ -212,7 +212,7 @@ class Loader {
     });
   }
 
-  // In rings about the place that was wanted: "; the nearest free place is 1.5,2".
+  // Searches in rings around the requested place: "; the nearest free place is 1.5,2".
   static std::string nearest_place(const Model& model, const Spawn& spawn, const Room& room) {
     constexpr double kApart_m = 0.25;
     constexpr int kRings = 40, kAround = 16;
@@ -263,7 +263,7 @@ class TextLoader::Impl {
     try {
       loader_->documents().add(path_, root);
       return loader_->load(*root, options_);
-    } catch (...) {  // it was left in the middle
+    } catch (...) {  // it was left half read
       loader_.reset();
       throw;
     }

@@ -1,7 +1,7 @@
-// What reading a model may cost when anybody may have asked for it: time, and memory of its meshes.
+// What loading a model from an untrusted source may cost: time, and memory for its meshes.
 //
-// Who reads asks take_time() before what is long, and tells what it takes; anybody may leave_off().
-// Thread safe.
+// The reader calls take_time() before long operations, and reports the memory it uses; anybody may
+// call leave_off(). Thread-safe.
 #pragma once
 
 #include <atomic>
@@ -19,12 +19,12 @@ class LoadBudget {
   LoadBudget(std::chrono::seconds time, size_t mesh_bytes)
       : time_(time), end_(Clock::now() + time), bytes_left_(mesh_bytes), bytes_(mesh_bytes) {}
 
-  // Ends the reading as soon as it asks again.
+  // Makes the reader stop when it asks next.
   void leave_off() { left_off_ = true; }
   bool is_over() const { return left_off_ || Clock::now() > end_; }
 
-  // These throw std::runtime_error when there is nothing left; the whole model is to be refused
-  // then, by fault().
+  // These throw std::runtime_error when nothing is left; the whole model must then be refused, with
+  // fault().
   void take_time() {
     if (is_over())
       fail(left_off_ ? "the run ended"
@@ -36,7 +36,7 @@ class LoadBudget {
     bytes_left_ -= bytes;
   }
 
-  // "": it was enough. The reader's.
+  // "": the budget sufficed. For the reader's thread.
   const std::string& fault() const { return fault_; }
 
  private:

@@ -1,4 +1,4 @@
-// The readers of a world file, for one model of it. Who asks may be anybody: see
+// Reads one model with the readers of world files. The source may be untrusted: see
 // ResourceFinder::for_strangers.
 #include "model/load_model.h"
 
@@ -11,7 +11,7 @@ namespace fs = std::filesystem;
 namespace ruedo::model {
 namespace {
 
-// A file of the world's folder that is not there.
+// A missing file of the world's folder.
 std::string path_of_text(const std::string& world_file) {
   return (fs::path(world_file).parent_path() / "the text").string();
 }

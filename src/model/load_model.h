@@ -1,4 +1,4 @@
-// A model alone, for a world that runs already.
+// Loads a single model, for a world that is already running.
 #pragma once
 
 #include <memory>
@@ -14,26 +14,27 @@ inline constexpr size_t kMostLinksOfSpawned = 1000;
 
 struct LoadedModel {
   std::shared_ptr<const Model> model;
-  std::string name;  // as the file says; a robot's is fit for channels
+  std::string name;  // as in the file; a robot's name is usable in channel names
   std::vector<Finding> findings;
   std::vector<std::string> files_read;  // absolute paths: its own, meshes, pictures
 };
 
-// Of a file or by a name, SDF or URDF, from the folders that are searched for a world, and from
-// nowhere else. Throws InputError, with file and line. budget: may be null; who gives one asks it
-// for its fault afterwards.
+// Loads a file or a name, SDF or URDF, from the folders that are searched for a world and from
+// nowhere else. Throws InputError with file and line. budget: may be null; a caller that gives one
+// asks it for its fault afterwards.
 LoadedModel load_model(const std::string& name, const std::string& world_file,
                        LoadBudget* budget = nullptr);
 
-// Of a text. What it names is searched as if it stood in the world's folder; errors call it "the
+// Loads a text. Its resources are searched as if it were in the world's folder; errors call it "the
 // text".
 LoadedModel load_model_text(const std::string& text, const std::string& world_file,
                             LoadBudget* budget = nullptr);
 
-// Checks that the names of an instance and of its devices are fit for channels. Throws InputError.
+// Checks that the names of an instance and of its devices are usable in channel names. Throws
+// InputError.
 void check_channel_names(const ModelInstance& instance, const Source& source);
 
-// The file that load_model() would read. Throws InputError when there is none.
+// The file that load_model() would read. Throws InputError if there is none.
 std::string model_file(const std::string& name, const std::string& world_file);
 
 }  // namespace ruedo::model

@@ -1,4 +1,4 @@
-// Options as users write them, read strictly: a wrong one says what it should look like.
+// Parses options as users write them, strictly: errors show the expected form.
 #include <charconv>
 #include <cmath>
 #include <string_view>

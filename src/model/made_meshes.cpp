@@ -1,5 +1,4 @@
-// Meshes that are made here: prisms over polylines (ear clipping, holes joined by bridges) and
-// heightmaps.
+// Procedural meshes: prisms over polylines (ear clipping, holes joined by bridges) and heightmaps.
 #include <algorithm>
 #include <cmath>
 #include <stdexcept>
@@ -39,7 +38,7 @@ bool inside(const Point& q, const Polygon& p) {
   return in;
 }
 
-// Whether the open segments cross in one point.
+// Whether the open segments cross at one point.
 bool cross_properly(const Point& a, const Point& b, const Point& c, const Point& d) {
   return cross(a, b, c) * cross(a, b, d) < 0 && cross(c, d, a) * cross(c, d, b) < 0;
 }
@@ -53,8 +52,8 @@ bool sees(const Point& a, const Point& b, const std::vector<Polygon>& walls) {
   return true;
 }
 
-// Joins a hole (clockwise) to the outline (counter-clockwise) by the shortest bridge that crosses
-// no wall.
+// Joins a hole (clockwise) to the outline (counter-clockwise) with the shortest bridge that crosses
+// no edge.
 void join_hole(Polygon& outline, const Polygon& hole, const std::vector<Polygon>& walls) {
   double best = std::numeric_limits<double>::infinity();
   size_t best_outer = 0, best_inner = 0;
@@ -75,8 +74,7 @@ void join_hole(Polygon& outline, const Polygon& hole, const std::vector<Polygon>
   outline = std::move(joined);
 }
 
-// Triangles of a simple polygon that runs counter-clockwise (bridges run through twice are
-// allowed).
+// Triangulates a simple, counter-clockwise polygon (bridges are traversed twice).
 std::vector<std::array<Point, 3>> clip_ears(Polygon p) {
   std::vector<std::array<Point, 3>> triangles;
   while (p.size() > 3) {
@@ -100,7 +98,7 @@ std::vector<std::array<Point, 3>> clip_ears(Polygon p) {
   return triangles;
 }
 
-// Open, without points that follow upon themselves, and simple.
+// Opens the polygon, drops repeated points, and checks that it is simple.
 void tidy(std::vector<Polygon>& polygons) {
   constexpr size_t kMostPoints = 2000;
   size_t points = 0;
@@ -122,8 +120,8 @@ void tidy(std::vector<Polygon>& polygons) {
   }
 }
 
-// How many others each is inside of. Even: an outline, counter-clockwise from now on; odd: a hole
-// of the outline around it, clockwise.
+// How many others each polygon is inside of. Even: an outline, made counter-clockwise; odd: a hole
+// in the outline around it, made clockwise.
 std::vector<int> nest(std::vector<Polygon>& polygons) {
   std::vector<int> depth(polygons.size(), 0);
   for (size_t i = 0; i < polygons.size(); ++i) {
@@ -161,7 +159,7 @@ Mesh extruded(const std::vector<Polygon>& written, double height) {
       mesh.triangles.push_back({add(t[0], 0), add(t[2], 0), add(t[1], 0)});
     }
   }
-  for (const Polygon& p : polygons) {  // walls: outward by the polygons' directions
+  for (const Polygon& p : polygons) {  // walls: outward by the direction of the polygons
     for (size_t i = 0; i < p.size(); ++i) {
       const Point &a = p[i], &b = p[(i + 1) % p.size()];
       const uint32_t low_a = add(a, 0), low_b = add(b, 0), high_a = add(a, height),
@@ -197,7 +195,8 @@ Mesh heightmap(const std::string& picture, const Vec3& size) {
   const double white = grey.depth() == CV_8U ? 255.0 : 65535.0;
   Mesh mesh;
   mesh.positions.reserve(static_cast<size_t>(grey.cols) * grey.rows);
-  for (int row = 0; row < grey.rows; ++row) {  // the picture's first row is the farthest in +y
+  // the picture's first row is the one with the largest y
+  for (int row = 0; row < grey.rows; ++row) {
     for (int column = 0; column < grey.cols; ++column) {
       const double value =
           grey.depth() == CV_8U ? grey.at<uint8_t>(row, column) : grey.at<uint16_t>(row, column);

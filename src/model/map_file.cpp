@@ -21,7 +21,7 @@ namespace fs = std::filesystem;
 namespace ruedo::model {
 namespace {
 
-constexpr int kMostPixels = 20'000;  // each way
+constexpr int kMostPixels = 20'000;  // width and height
 
 struct Line {
   int number;
@@ -54,8 +54,8 @@ double number(const std::string& text, const Source& source, const std::string& 
   return value;
 }
 
-// The flat YAML that map_server writes: "key: value" lines, lists in brackets or as "- value"
-// lines.
+// Parses the flat YAML that map_server writes: "key: value" lines, with lists in brackets or as "-
+// value" lines.
 class FlatYaml {
  public:
   explicit FlatYaml(const std::string& path) : path_(path) {
@@ -110,7 +110,7 @@ class FlatYaml {
   std::map<std::string, std::pair<int, std::string>> values_;
 };
 
-// A picture in grey, 8 bits, its first row at the top.
+// A picture in 8-bit grey, with its first row at the top.
 cv::Mat read_picture(const std::string& path) {
   const std::string bytes = read_text_file(path, 256u << 20);
   if (bytes.empty()) throw InputError({path, 0}, "the file is empty");
@@ -144,8 +144,8 @@ OccupancyGrid grid_of(const cv::Mat& grey, double resolution, CellOf cell_of) {
 
 }  // namespace
 
-// The rules of map_server's "trinary" mode, by which "scale" maps are cut here, too; a "raw" map
-// has the per cent themselves.
+// Thresholds as in map_server's "trinary" mode, also applied to "scale" maps; "raw" maps hold
+// percentages.
 OccupancyGrid read_map(const std::string& path) {
   const FlatYaml yaml(path);
   const double resolution = yaml.real("resolution");
@@ -222,7 +222,7 @@ std::vector<WallPiece> read_armap(const std::string& path, double thickness,
   enum class Part { head, lines, points };
   Part part = Part::head;
   std::vector<WallPiece> lines, points;
-  std::map<std::string, int> others;  // kinds of the map's objects, and how many
+  std::map<std::string, int> others;  // other kinds of map objects, with their counts
   double point_size = 0.02;
   bool is_map = false;
   for (const auto& [line, raw] : lines_of(path, 256u << 20)) {
@@ -254,7 +254,7 @@ std::vector<WallPiece> read_armap(const std::string& path, double thickness,
         points.push_back({v[0], v[1], 0, point_size, point_size});
       } else {
         const double dx = v[2] - v[0], dy = v[3] - v[1];
-        // As thick at its ends as at its sides: corners close.
+        // Extended by its thickness at both ends: corners close.
         lines.push_back({(v[0] + v[2]) / 2, (v[1] + v[3]) / 2, math::atan2(dy, dx),
                          math::hypot(dx, dy) + thickness, thickness});
       }

@@ -1,5 +1,4 @@
-// <material>, the table of Gazebo's colours, and a reader for what simple OGRE material scripts
-// say.
+// <material>, Gazebo's colour table, and a reader for simple OGRE material scripts.
 #include "model/material.h"
 
 #include <algorithm>
@@ -17,8 +16,8 @@ struct NamedColour {
   float r, g, b;
 };
 
-// Diffuse colours of Gazebo's material library; for its textured materials, the texture's mean
-// colour.
+// Diffuse colours of Gazebo's material library; for textured materials, the mean colour of the
+// texture.
 constexpr NamedColour kGazeboColours[] = {
     {"Grey", 0.7f, 0.7f, 0.7f},
     {"LightGrey", 0.8f, 0.8f, 0.8f},
@@ -81,8 +80,8 @@ bool strip_suffix(std::string& text, const std::string& suffix) {
 }
 
 // OGRE's script: "material NAME { technique { pass { diffuse r g b a ... texture_unit { texture
-// FILE ... } } } }", one statement a line, // comments. Only the first pass is read; inheritance
-// and shaders are not.
+// FILE ... } } } }", one statement per line, // for comments. Only the first pass is read;
+// inheritance and shaders are not supported.
 struct OgreMaterial {
   Material material;
   std::string texture;
@@ -104,7 +103,8 @@ std::optional<OgreMaterial> read_ogre_script(const std::string& script, const st
       if (const size_t brace = name.find('{'); brace != std::string::npos) name.resize(brace);
       if (name == wanted) {
         result.emplace();
-        result->material.diffuse = {1, 1, 1, 1};  // OGRE's default, which leaves a texture as it is
+        // OGRE's default, which leaves a texture unchanged
+        result->material.diffuse = {1, 1, 1, 1};
       }
     } else if (result && word == "pass") {
       ++passes;

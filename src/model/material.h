@@ -10,14 +10,14 @@
 
 namespace ruedo::model {
 
-// Reads <material>. nullopt: it says nothing that Ruedo understands, which is then in the findings.
+// Reads <material>. nullopt: it holds nothing that Ruedo supports; the findings say so.
 std::optional<Material> read_material(const Element& material, const std::string& where,
                                       ReadContext& context);
 
 // One of Gazebo's own materials by name ("Gazebo/Grey"); nullopt when the name is not known.
 std::optional<Material> gazebo_material(const std::string& name);
 
-// "r g b" or "r g b a", each in [0, 1] (values beyond are clamped).
+// "r g b" or "r g b a"; values are clamped to [0, 1].
 Rgba read_colour(const Element& element);
 
 }  // namespace ruedo::model

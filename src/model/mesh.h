@@ -1,4 +1,4 @@
-// Triangle meshes and their materials, as they come out of a mesh file, a polyline or a heightmap.
+// Triangle meshes and their materials, from a mesh file, a polyline or a heightmap.
 #pragma once
 
 #include <array>
@@ -13,14 +13,13 @@ namespace ruedo::model {
 
 using Rgba = std::array<float, 4>;
 
-// A picture that is not decoded yet: a file, or the bytes of one that was embedded in a mesh file.
+// A picture that has not been decoded: a file, or bytes embedded in a mesh file.
 struct Texture {
   std::string path;               // empty when embedded
   std::vector<uint8_t> embedded;  // an encoded image (png, jpeg, ...)
 };
 
-// Colours in [0, 1], linear in the renderer's sense of SDF; a texture multiplies the diffuse
-// colour.
+// Colours in [0, 1], linear as SDF's renderers have them; a texture multiplies the diffuse colour.
 struct Material {
   Rgba ambient{0.7f, 0.7f, 0.7f, 1.0f};
   Rgba diffuse{0.7f, 0.7f, 0.7f, 1.0f};
@@ -31,8 +30,8 @@ struct Material {
   bool double_sided = false;
 };
 
-// Immutable after loading and shared by all that use the file. Metres, z up, x ahead: a mesh file's
-// unit and up axis are already applied; SDF's <scale> is not.
+// Immutable once loaded, and shared by all users of the file. Metres, z up, x forward: the mesh
+// file's unit and up axis have been applied, SDF's <scale> has not.
 struct Mesh {
   struct Part {  // triangles [first, first + count) of one material, of one submesh
     std::string name;
@@ -48,7 +47,7 @@ struct Mesh {
   std::vector<std::array<uint32_t, 3>> triangles;  // counter-clockwise seen from outside
   std::vector<Part> parts;
   std::vector<Material> materials;
-  bool closed = false;  // every edge belongs to two triangles: there is an inside
+  bool closed = false;  // every edge belongs to two triangles, so that the mesh has an inside
 };
 
 }  // namespace ruedo::model

@@ -89,7 +89,7 @@ uint64_t mixed(uint64_t h) {
   return h ^ (h >> 33);
 }
 
-// Eight bytes at a time, each mixed in by a multiplication and a rotation.
+// Hashes eight bytes at a time, mixing each word in with a multiplication and a rotation.
 uint64_t hashed(std::string_view bytes, uint64_t seed, uint64_t factor) {
   uint64_t h = seed ^ (bytes.size() * factor);
   size_t i = 0;
@@ -107,7 +107,7 @@ uint64_t hashed(std::string_view bytes, uint64_t seed, uint64_t factor) {
 
 uint64_t content_hash(std::string_view bytes) {
   const uint64_t h = hashed(bytes, 0x9e3779b97f4a7c15ull, 0x87c37b91114253d5ull);
-  return h ? h : 1;  // 0 is kept for "not there"
+  return h ? h : 1;  // 0 is reserved for "does not exist"
 }
 
 std::string content_key(std::string_view bytes) {
@@ -253,7 +253,7 @@ std::string mesh_fault(const Mesh& mesh) {
 bool is_closed(const Mesh& mesh) {
   const size_t n = mesh.positions.size();
   if (mesh.triangles.size() < 4) return false;
-  // Equal positions get one number.
+  // Gives equal positions the same number.
   std::vector<uint32_t> order(n), point(n);
   std::iota(order.begin(), order.end(), 0u);
   const auto less = [&](uint32_t a, uint32_t b) {
@@ -270,7 +270,7 @@ bool is_closed(const Mesh& mesh) {
   edges.reserve(mesh.triangles.size() * 3);
   for (const auto& t : mesh.triangles) {
     const uint32_t p[3] = {point[t[0]], point[t[1]], point[t[2]]};
-    if (p[0] == p[1] || p[1] == p[2] || p[2] == p[0]) continue;  // no area, no edge
+    if (p[0] == p[1] || p[1] == p[2] || p[2] == p[0]) continue;  // degenerate: no area, no edges
     for (int k = 0; k < 3; ++k) edges.emplace_back(p[k], p[(k + 1) % 3]);
   }
   if (edges.empty()) return false;

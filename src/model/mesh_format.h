@@ -1,8 +1,8 @@
-// The binary form in which the importer hands a mesh to the server, and in which the cache keeps
+// The binary form in which the importer passes a mesh to the server, and in which the cache stores
 // it.
 //
-// Its reader trusts nothing: it checks counts against the bytes that are there, indices against
-// counts, numbers against NaN and absurd sizes.
+// The reader trusts nothing: it checks counts against the available bytes, indices against counts,
+// and numbers for NaN and excessive sizes.
 #pragma once
 
 #include <string>
@@ -13,7 +13,8 @@
 
 namespace ruedo::model {
 
-// Bump it when the importer's results or this form change: old cache entries are then ignored.
+// Increment it when the importer's results or this format change: old cache entries are then
+// ignored.
 constexpr uint32_t kMeshFormatVersion = 3;
 
 struct MeshLimits {
@@ -25,30 +26,30 @@ struct MeshLimits {
   static constexpr float kExtent_m = 1e6f;            // largest coordinate
 };
 
-// Another file that the mesh file refers to (a material library, a buffer), by its path from the
-// mesh's folder.
+// Another file that the mesh file refers to (a material library, a buffer), by its path relative to
+// the mesh's folder.
 struct MeshDependency {
   std::string path;
-  uint64_t hash = 0;  // content_hash of its bytes; 0: it was not there
+  uint64_t hash = 0;  // content_hash of its bytes; 0: it did not exist
 };
 
 struct MeshPackage {
-  Mesh mesh;  // texture paths as the file writes them
+  Mesh mesh;  // texture paths as written in the file
   std::vector<MeshDependency> dependencies;
 };
 
-// Two independent 64-bit hashes of the bytes, as 32 hexadecimal digits; and one of them alone.
+// Two independent 64-bit hashes of the bytes as 32 hexadecimal digits; and one of the two.
 std::string content_key(std::string_view bytes);
 uint64_t content_hash(std::string_view bytes);
 
 std::string pack_mesh(const MeshPackage& package);
-// Throws std::runtime_error that says what is wrong.
+// Throws std::runtime_error saying what is wrong.
 MeshPackage unpack_mesh(std::string_view bytes);
 
-// What is wrong with the mesh's numbers and indices, "" when nothing is.
+// What is wrong with the mesh's numbers and indices; "" if nothing is.
 std::string mesh_fault(const Mesh& mesh);
 
-// Whether every edge belongs to exactly two triangles, run through in opposite directions; equal
+// Whether every edge belongs to exactly two triangles, traversed in opposite directions; equal
 // positions count as one.
 bool is_closed(const Mesh& mesh);
 

@@ -38,7 +38,7 @@ std::string first_line(const std::string& file) {
   if (line.size() > 300) line.resize(300);
   for (char& c : line) {
     if (static_cast<unsigned char>(c) < 0x20 || static_cast<unsigned char>(c) >= 0x7f)
-      c = '?';  // bytes of the file, perhaps
+      c = '?';  // may be bytes of the file
   }
   return line;
 }
@@ -54,7 +54,7 @@ constexpr bool kLimitAddressSpace = false;  // sanitizers reserve terabytes of a
 constexpr bool kLimitAddressSpace = true;
 #endif
 
-// Runs the importer; throws what is wrong.
+// Runs the importer; throws if it fails.
 void run_importer(const MeshImport& import, const std::string& input, const std::string& output,
                   const std::string& log) {
   ProcessLimits limits;
@@ -116,8 +116,8 @@ bool dependencies_hold(const MeshPackage& package, const fs::path& folder) {
       });
 }
 
-// Into the cache by renaming, so that no other process reads half an entry. A cache that cannot be
-// written is no fault.
+// Written into the cache by renaming, so that no other process reads half an entry. A cache that
+// cannot be written is not an error.
 void store(const std::string& folder, const std::string& name, const std::string& bytes) {
   std::error_code error;
   fs::create_directories(folder, error);
@@ -191,7 +191,7 @@ Mesh MeshLoader::import_or_cached(const std::string& path) {
         MeshPackage package = unpack_mesh(bytes_of(entry, kMostBytes));
         if (dependencies_hold(package, file.parent_path())) return taken(std::move(package), path);
       } catch (const std::runtime_error&) {
-        // A broken entry is imported again, and replaced.
+        // A broken entry is imported again and replaced.
       }
     }
   }

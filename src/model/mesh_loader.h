@@ -1,8 +1,8 @@
-// Meshes from files: imported by a child process with limits on memory and time, kept in a cache on
-// disk, read once a load.
+// Meshes from files: imported by a child process with limits on memory and time, cached on disk,
+// read once per load.
 //
-// The child is the program ruedo-import-mesh: a malformed file may hang it, abort it or eat its
-// memory, and the server goes on without that mesh.
+// The child is ruedo-import-mesh. If a malformed file makes it hang, abort or run out of memory,
+// the server goes on without that mesh.
 #pragma once
 
 #include <map>
@@ -19,38 +19,36 @@ namespace ruedo::model {
 struct MeshPackage;
 
 struct MeshImport {
-  std::string importer;      // the program; empty: beside this program, or where it was built
+  std::string importer;  // the program; empty: the one beside this program, or in the build folder
   std::string cache_folder;  // empty: $XDG_CACHE_HOME/ruedo or ~/.cache/ruedo
   bool cache = true;
   int wall_limit_s = 60;
   int cpu_limit_s = 30;
   size_t memory_limit_bytes = size_t{3} << 30;
-  LoadBudget* budget = nullptr;  // of all meshes together; null: none
+  LoadBudget* budget = nullptr;  // for all meshes together; null: none
 };
 
-// Where imported meshes are kept unless an import says otherwise; "" when there is no such place.
+// The default cache folder; "" if there is none.
 std::string mesh_cache_folder();
 
 class MeshLoader {
  public:
   explicit MeshLoader(const ResourceFinder& resources, MeshImport import = {});
 
-  // The mesh of a file with an absolute path. Throws std::runtime_error that says what is wrong
-  // with it.
+  // The mesh in a file, by absolute path. Throws std::runtime_error saying what is wrong with it.
   std::shared_ptr<const Mesh> load(const std::string& path);
 
-  // One submesh by name, moved so that its bounding box is centred at the origin when `center`.
+  // One submesh by name; if `center`, moved so that its bounding box is centred at the origin.
   std::shared_ptr<const Mesh> load_submesh(const std::string& path, const std::string& submesh,
                                            bool center);
 
-  // What was read so far: meshes, what they name, and their textures. A mesh file that is broken,
-  // too.
+  // The files read so far: meshes, files they refer to, and textures. Includes broken mesh files.
   const std::vector<std::string>& files_read() const { return files_; }
 
  private:
   struct Entry {
     std::shared_ptr<const Mesh> mesh;
-    std::string fault;  // why there is none
+    std::string fault;  // why there is no mesh
   };
   Mesh import_or_cached(const std::string& path);
   Mesh taken(MeshPackage package, const std::string& path);

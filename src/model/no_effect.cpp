@@ -12,9 +12,9 @@ namespace ruedo::model {
 namespace {
 
 struct NoEffect {
-  std::string_view path;  // the end of an element's path
+  std::string_view path;  // the last parts of an element's path
   std::string_view
-      usual;  // values that ask for nothing, with '|' between them; "": its presence does
+      usual;  // values without effect, separated by '|'; "": the element's presence has none
   const char* text;
 };
 
@@ -96,7 +96,7 @@ constexpr NoEffect kTable[] = {
     {"model/@namespace", "", kChannels},
 };
 
-// What may stand in an element; of those that are not here readers name what they do not know.
+// The elements that may occur in an element. Unknown ones are reported by the readers.
 const std::map<std::string_view, std::string_view>& children_in_sdf() {
   static const std::map<std::string_view, std::string_view> table = {
 #include "model/sdf_children.inc"
@@ -110,7 +110,7 @@ constexpr std::string_view kReadersName[] = {
     "heightmap",    "state",   "geometry", "air_pressure", "air_speed",     "altimeter",
     "force_torque", "gps",     "navsat",   "magnetometer", "logical_camera"};
 
-// A sensor of another type is a plugin's, and so is what stands in it.
+// A sensor of an unknown type belongs to a plugin, and so does its content.
 constexpr std::string_view kSensorTypes[] = {"air_pressure",
                                              "air_speed",
                                              "altimeter",
@@ -205,7 +205,7 @@ class Walk {
   }
 
  private:
-  // False where nothing in it counts.
+  // Whether anything in it matters.
   bool name_element(const Element& parent, const Element& child, const std::string& path,
                     const std::string& where) {
     bool known = may_stand_in(parent, child);
@@ -237,7 +237,7 @@ class Walk {
     }
   }
 
-  // Of no format of ours: what readers name as a whole, or take as it is.
+  // Not a format of ours: readers report it as a whole, or take it as it is.
   static bool is_of_others(const std::string& name) {
     return name == "plugin" || name == "transmission" || name == "ros2_control" || name == "gui";
   }

@@ -1,13 +1,12 @@
-// Elements of SDF that change what Gazebo does and nothing here.
+// SDF elements that change what Gazebo does, but have no effect here.
 #pragma once
 
 #include "ruedo/element.h"
 
 namespace ruedo::model {
 
-// Names them, below an <sdf> element, where they say more than the format's own default. What
-// readers name themselves is not among them; what no result depends on is not named
-// (docs/world-files.md has both lists).
+// Reports them below an <sdf> element where they differ from the format's default. Excludes what
+// the readers report themselves, and what no result depends on (docs/world-files.md lists both).
 void name_what_has_no_effect(const Element& sdf, Findings& findings);
 
 }  // namespace ruedo::model

@@ -1,4 +1,4 @@
-// A world cut at a height, and grids as walls.
+// Cuts a world at a height, and turns grids into walls.
 #include "model/occupancy.h"
 
 #include <algorithm>
@@ -18,8 +18,8 @@ namespace {
 constexpr double kMargin_m = 1;
 constexpr double kMostCells = 1e8;
 constexpr size_t kMostWalls =
-    100'000;                      // rectangles of a map; a checkerboard's every other cell is one
-constexpr double kShrunk = 1e-3;  // of a cell, at each side: what only touches a cell is not in it
+    100'000;  // rectangles of a map; a checkerboard would need one for every other cell
+constexpr double kShrunk = 1e-3;  // of a cell, at each side: touching a cell does not occupy it
 
 using Box = Eigen::AlignedBox3d;
 
@@ -148,7 +148,7 @@ OccupancyGrid occupancy_of(const WorldModel& world, double resolution, double he
   if (box.isEmpty()) box.extend(Vec3::Zero());
   OccupancyGrid grid;
   grid.resolution = resolution;
-  // In whole cells from the world's origin: maps of one world lie on each other.
+  // Aligned to whole cells from the world's origin, so that maps of one world line up.
   const double x0 = std::floor((box.min().x() - kMargin_m) / resolution),
                x1 = std::ceil((box.max().x() + kMargin_m) / resolution);
   const double y0 = std::floor((box.min().y() - kMargin_m) / resolution),

@@ -1,5 +1,5 @@
-// <plugin name="ruedo" filename="NAME">: a plugin with sensors and drives of a user's own, which a
-// world or model needs.
+// <plugin name="ruedo" filename="NAME">: a user's own plugin with sensors and drives, required by a
+// world or model.
 #pragma once
 
 #include <vector>
@@ -8,8 +8,8 @@
 
 namespace ruedo::model {
 
-// While one of these lives, this thread's readers load the plugins that a file names: it is one
-// that the user named. Models that come over a network may name those that are loaded.
+// While one of these lives, this thread's readers load the plugins that a file names, because the
+// user chose the file. Models from the network may only name plugins that are already loaded.
 class LoadsPlugins {
  public:
   LoadsPlugins();
@@ -18,7 +18,7 @@ class LoadsPlugins {
   LoadsPlugins& operator=(const LoadsPlugins&) = delete;
 };
 
-// Of a world's or model's <plugin>s those that are named "ruedo" or "ruedo::...". Throws
+// Loads those of a world's or model's <plugin>s that are named "ruedo" or "ruedo::...". Throws
 // InputError.
 void load_own_plugins(const std::vector<const Element*>& plugins);
 

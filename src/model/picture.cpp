@@ -1,5 +1,5 @@
-// Width and height of PNG (its IHDR), JPEG (its first SOF), BMP (its information header), TIFF (its
-// first directory) and the portable maps. What is of another kind is no picture.
+// Width and height of PNG (from IHDR), JPEG (first SOF), BMP (information header), TIFF (first
+// directory) and the portable maps. Everything else is not a picture.
 #include "model/picture.h"
 
 #include <algorithm>
@@ -8,7 +8,8 @@
 namespace ruedo::model {
 namespace {
 
-constexpr int64_t kMostPixelsInAll = 100'000'000;  // of whatever a few bytes decode to
+// width times height: a few bytes may decode to any number
+constexpr int64_t kMostPixelsInAll = 100'000'000;
 
 struct Size {
   int64_t width = 0, height = 0;  // 0: not found
@@ -49,7 +50,7 @@ Size jpeg_size(const Bytes& bytes) {
   return {};
 }
 
-// Two numbers after "P1" to "P6", with comments between.
+// Two numbers after "P1" to "P6", with optional comments.
 Size portable_size(const Bytes& bytes) {
   int64_t numbers[2] = {0, 0};
   size_t i = 2;
@@ -89,7 +90,7 @@ Size size_of(const Bytes& bytes) {
   if (bytes.begins("\x89PNG\r\n\x1a\n", 8)) return {bytes.big32(16), bytes.big32(20)};
   if (bytes.begins("\xFF\xD8", 2)) return jpeg_size(bytes);
   if (bytes.begins("BM", 2)) {
-    const int64_t height = bytes.little32(22);  // negative: from the top down
+    const int64_t height = bytes.little32(22);  // negative: rows run top to bottom
     return {bytes.little32(18), height > INT32_MAX ? (int64_t{1} << 32) - height : height};
   }
   if (bytes.begins("II*\0", 4) || bytes.begins("MM\0*", 4))
@@ -103,7 +104,7 @@ Size size_of(const Bytes& bytes) {
 
 std::string picture_fault(std::span<const uint8_t> span, int64_t most) {
   const Size size = size_of(Bytes(span));
-  // Of another kind, a decoder would have to be asked how much it is going to need.
+  // For another kind, only its decoder could tell how much memory it needs.
   if (size.width <= 0 || size.height <= 0)
     return "it is no picture that can be read (pgm, png, jpeg, bmp, tiff)";
   if (size.width <= most && size.height <= most && size.width * size.height <= kMostPixelsInAll)

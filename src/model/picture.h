@@ -1,5 +1,5 @@
-// How large a picture is, from its head: decoders allocate before they know what is in it, and a
-// file of a few kilobytes can ask for gigabytes.
+// The size of a picture, from its header: decoders allocate before they look at the data, and a
+// file of a few kilobytes can demand gigabytes.
 #pragma once
 
 #include <cstdint>
@@ -8,8 +8,8 @@
 
 namespace ruedo::model {
 
-// What is wrong with the size, in words; "" for a picture of at most `most` pixels each way and
-// kMostPixelsInAll. Known are PNG, JPEG, BMP, TIFF and PBM, PGM, PPM; what is of another kind is no
+// What is wrong with the size; "" for a picture of at most `most` pixels in width and height and
+// kMostPixelsInAll. Supports PNG, JPEG, BMP, TIFF, PBM, PGM and PPM; everything else is not a
 // picture.
 std::string picture_fault(std::span<const uint8_t> bytes, int64_t most);
 

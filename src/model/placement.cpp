@@ -1,5 +1,5 @@
-// Heights by vertical lines through the static collisions, room by GJK against the collisions
-// nearby.
+// Heights from vertical lines through static collisions; free space by GJK against nearby
+// collisions.
 #include "model/placement.h"
 
 #include <algorithm>
@@ -19,17 +19,18 @@
 namespace ruedo::model {
 namespace {
 
-constexpr double kStep_m = 0.5;        // what counts as ground above the lowest surface
-constexpr double kClearance_m = 0.02;  // what a model may sink into bumps of the ground
-constexpr double kSteepest = 0.7;      // slope that something is put on: 35 degrees
-constexpr double kBump_m = 0.05;       // what ground under a model may differ from a plane
+// up to this height above the lowest surface, a surface counts as ground
+constexpr double kStep_m = 0.5;
+constexpr double kClearance_m = 0.02;  // how deep a model may sink into bumps of the ground
+constexpr double kSteepest = 0.7;      // the steepest ground that models are put on: 35 degrees
+constexpr double kBump_m = 0.05;       // how far the ground under a model may differ from a plane
 constexpr double kFar_m = 1e5;
 constexpr double kCell_m = 2;       // of the grid over what stands in the world
 constexpr int64_t kMostCells = 64;  // a thing that covers more is kept in a list of its own
 
 using Box = Eigen::AlignedBox3d;
 
-// The box of a shape that is turned and moved.
+// The bounding box of a shape at a pose.
 Box placed(const Box& box, const Pose& X_WG) {
   Box result;
   if (box.isEmpty()) return result;
@@ -49,8 +50,8 @@ std::optional<double> height_of(const std::array<Vec3, 3>& t, double x, double y
   return t[0].z() + u * ab.z() + v * ac.z();
 }
 
-// The top of a convex shape over (x, y): the highest z at which a thin vertical needle from far
-// above meets it, by halving.
+// The top of a convex shape at (x, y): the highest z at which a thin vertical needle from far above
+// meets it, by bisection.
 std::optional<double> top_of(const Convex& shape, const Box& box, double x, double y) {
   const auto meets_above = [&](double z) {
     const Vec3 needle[2] = {{x, y, z}, {x, y, box.max().z() + 1}};
@@ -105,7 +106,7 @@ class TriangleGrid {
     }
   }
 
-  // Every triangle whose box may meet that one; some more than once. Ends when `visit` returns
+  // Visits every triangle whose box may meet that box, some more than once, until `visit` returns
   // true.
   template <class Visit>
   bool any(const Box& box, Visit visit) {
@@ -168,7 +169,7 @@ struct Room::Index {
     return at->second;
   }
 
-  // The same of a model that may live shorter than this index.
+  // The same for a model that may not outlive this index.
   Box known_box_of(const Geometry& g) const {
     const auto at = boxes.find(&g);
     return at == boxes.end() ? bounds(g) : at->second;
@@ -198,7 +199,7 @@ struct Room::Index {
     }
   }
 
-  // The solids whose boxes meet that one, planes left out, in the order of the world.
+  // The solids whose boxes meet that box, without planes, in the order of the world.
   std::vector<int> near(const Box& box) const {
     std::vector<int> found = large;
     const auto take = [&](const std::vector<int>& some) {
@@ -222,7 +223,7 @@ struct Room::Index {
     return triangles.try_emplace(solid, *s.geometry, s.X_WG).first->second;
   }
 
-  // Whether a convex thing with that box shares space with a solid.
+  // Whether a convex thing with that box overlaps a solid.
   bool meets(const Convex& thing, const Box& box, int solid) {
     const Solid& s = solids[solid];
     if (!s.box.intersects(box)) return false;
@@ -252,7 +253,7 @@ struct Room::Index {
       }
     }
     if (parts.empty()) return "";
-    // Walls meet in corners: what never moves may stand in what never moves.
+    // Walls meet at corners: static models may overlap each other.
     const auto counts = [&](int solid) {
       const bool is_static = solids[solid].is_static;
       return of_static ? is_static : !(is_static && model.is_static);
@@ -295,7 +296,7 @@ void Room::add(const ModelInstance& instance) {
 
 namespace {
 
-// The lowest, and what can be stepped on from there.
+// The lowest surface, and those that can be reached from it in steps.
 double walkable(const std::vector<double>& heights) {
   const double lowest = *std::min_element(heights.begin(), heights.end());
   double ground = lowest;
@@ -340,7 +341,7 @@ double Room::ground_height(double x, double y) const {
 
 double Room::floor_height(double x, double y, double z) const {
   constexpr double kHips_m = 1.3,
-                   kAbove_m = 0.25;  // skins have their origin there, or in the floor
+                   kAbove_m = 0.25;  // skins have their origin at this height, or at the floor
   std::vector<double> heights = surfaces(x, y);
   std::erase_if(heights, [&](double at) { return at > z + kAbove_m || at < z - kHips_m; });
   if (!heights.empty()) return walkable(heights);
@@ -348,7 +349,7 @@ double Room::floor_height(double x, double y, double z) const {
 }
 
 // The ground under a model at its level pose, as a plane: z = c[0] + c[1] (x - x0) + c[2] (y - y0)
-// about the place (x0, y0). nullopt: it is level, too steep, or no plane.
+// about (x0, y0). nullopt: it is level, too steep, or not a plane.
 std::optional<Pose> Room::on_slope(const Model& model, const Pose& X_WM, double lowest) const {
   Box foot;
   for (const Link& link : model.links) {
@@ -357,7 +358,7 @@ std::optional<Pose> Room::on_slope(const Model& model, const Pose& X_WM, double 
   }
   if (foot.isEmpty()) return std::nullopt;
   const Vec3 place(X_WM.translation.x(), X_WM.translation.y(), 0);
-  constexpr int kSamples = 3;  // each way
+  constexpr int kSamples = 3;  // in each direction
   Eigen::Matrix<double, kSamples * kSamples, 3> A;
   Eigen::Matrix<double, kSamples * kSamples, 1> heights;
   for (int i = 0; i < kSamples * kSamples; ++i) {
@@ -374,7 +375,7 @@ std::optional<Pose> Room::on_slope(const Model& model, const Pose& X_WM, double 
     return std::nullopt;
   const Vec3 up = Vec3(-c[1], -c[2], 1).normalized(), level_ahead = X_WM.rotation * Vec3::UnitX();
   const Vec3 ahead = (level_ahead + Vec3(0, 0, c[1] * level_ahead.x() + c[2] * level_ahead.y()))
-                         .normalized();  // of the same heading
+                         .normalized();  // keeps the heading
   Eigen::Matrix3d axes;
   axes << ahead, up.cross(ahead), up;
   return Pose{Quat(axes), place + Vec3(0, 0, c[0]) + up * (bumps.maxCoeff() - lowest)};
@@ -390,8 +391,8 @@ Pose Room::standing_on(const Model& model, double x, double y, double yaw) const
           lowest, Convex{&c.geometry, X_WM * link.X_ML * c.X_LC, {}}.support(-Vec3::UnitZ()).z());
     }
   }
-  // A drive says better where the ground is than a wheel's shape, which may be a little larger or
-  // smaller.
+  // A drive knows better where the ground is than the shape of a wheel, which may be a little too
+  // large or too small.
   if (model.drive) lowest = std::min(lowest, model.drive->X_MBase.translation.z());
   if (!std::isfinite(lowest)) lowest = 0;
   X_WM.translation.z() = ground_height(x, y) - lowest;

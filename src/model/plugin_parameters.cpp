@@ -12,8 +12,8 @@
 namespace ruedo::model {
 namespace {
 
-// Done, or without effect on results: words with blanks between them. A plugin that is not here may
-// have any.
+// Parameters that are supported, or have no effect on results, separated by blanks. A plugin that
+// is not listed here may have any.
 struct Known {
   std::string_view plugin, words;
 };
@@ -102,9 +102,9 @@ constexpr Known kKnown[] = {
 #undef RUEDO_LIMITS
 #undef RUEDO_PID
 
-// Without effect here; named where it says more than `usual`.
+// No effect here; reported where the value differs from `usual`.
 struct Unsupported {
-  std::string_view plugin;  // "": of each
+  std::string_view plugin;  // "": any plugin
   std::string_view parameter, usual;
   const char* text;
 };
@@ -237,7 +237,7 @@ constexpr Unsupported kUnsupported[] = {
     {"", "max_depth", "0", "the camera's <clip> says how far it sees"},
 };
 
-// Files write 1e-8 for none.
+// Files write 1e-8 for "no limit".
 bool is_zero(const std::string& text) {
   constexpr double kNone = 1e-6;
   std::istringstream in(text);
@@ -251,7 +251,7 @@ bool says_more(const Element& written, std::string_view usual) {
   return usual.empty() || !has_word(usual, written.text);
 }
 
-// A robot is as fast both ways here.
+// Robots have the same limits in both directions here.
 void name_backwards(const Element& plugin, const std::string& name, const std::string& where,
                     Findings& findings) {
   for (const char* axis : {"velocity", "linear_velocity", "angular_velocity"}) {

@@ -1,4 +1,4 @@
-// Parameters of plugins whose job Ruedo does: which of them change nothing here.
+// Parameters of the plugins that Ruedo replaces: which of them have no effect here.
 #pragma once
 
 #include <string>
@@ -7,9 +7,9 @@
 
 namespace ruedo::model {
 
-// Names each parameter of a plugin that Ruedo serves that changes what Gazebo does and nothing
-// here, and each that the plugin's documentation does not know. What only gives names (topics,
-// frames) or tunes a display is passed over.
+// Reports each parameter of a replaced plugin that changes what Gazebo does but has no effect here,
+// and each that is not in the plugin's documentation. Skips what only sets names (topics, frames)
+// or tunes a display.
 void name_parameters(const Element& plugin, const std::string& where, Findings& findings);
 
 }  // namespace ruedo::model

@@ -1,4 +1,4 @@
-// The table of plugins that are known.
+// The table of known plugins.
 #include "model/plugins.h"
 
 #include <algorithm>
@@ -16,7 +16,7 @@ struct Known {
   const char* would = "";
 };
 
-// gz-sim's systems, by the name of their class.
+// gz-sim's systems, by class name.
 constexpr Known kSystems[] = {
     {"DiffDrive", Does::drive},
     {"MecanumDrive", Does::drive},
@@ -101,7 +101,7 @@ constexpr Known kSystems[] = {
     {"HydrodynamicsPlugin", Does::dead, "water would slow it"},
 };
 
-// Gazebo Classic's and ROS's plugins, by their library without "lib" and ".so".
+// The plugins of Gazebo Classic and ROS, by library name without "lib" and ".so".
 constexpr Known kLibraries[] = {
     {"gazebo_ros_diff_drive", Does::drive},
     {"gazebo_ros_skid_steer_drive", Does::drive},
@@ -214,7 +214,7 @@ bool ends_with(const std::string& text, const std::string& end) {
   return text.size() >= end.size() && text.compare(text.size() - end.size(), end.size(), end) == 0;
 }
 
-// Without folder, "lib" and ".so".
+// Without the folder, "lib" and ".so".
 std::string library_of(const std::string& filename) {
   std::string name = filename.substr(filename.rfind('/') + 1);
   if (const size_t dot = name.find(".so"); dot != std::string::npos) name.erase(dot);
@@ -252,7 +252,7 @@ std::string system_of(const std::string& library) {
 PluginKind kind_of(const Element& plugin) {
   const std::string* name = plugin.attribute("name");
   const std::string* filename = plugin.attribute("filename");
-  // A user's own: own_plugins.h.
+  // a user's own: own_plugins.h
   if (name && (*name == "ruedo" || begins_with(*name, "ruedo::")))
     return {filename ? *filename : "", Does::served, ""};
   const std::string library = filename ? library_of(*filename) : "";
@@ -264,8 +264,8 @@ PluginKind kind_of(const Element& plugin) {
                  ? "Ros2Control"
                  : name->substr(at + std::string(space).size());
   }
-  // Libraries have names of their own spelling ("imu" for Imu, "rf-comms" for RFComms): case does
-  // not count.
+  // Libraries spell the names in their own way ("imu" for Imu, "rf-comms" for RFComms): case is
+  // ignored.
   const auto same = [](std::string_view a, std::string_view b) {
     return std::equal(a.begin(), a.end(), b.begin(), b.end(), [](unsigned char x, unsigned char y) {
       return std::tolower(x) == std::tolower(y);

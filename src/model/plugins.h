@@ -1,9 +1,8 @@
-// Plugins of Gazebo Classic and gz-sim by what they do: which of them Ruedo's own parts stand in
-// for.
+// Plugins of Gazebo Classic and gz-sim by what they do, and which of them parts of Ruedo replace.
 //
-// gz-sim's are known by the class that `name` has ("gz::sim::systems::DiffDrive",
-// "ignition::gazebo::systems::...") or by their library; Classic's by their library alone, for
-// their names are free.
+// gz-sim's are recognised by the class in `name` ("gz::sim::systems::DiffDrive",
+// "ignition::gazebo::systems::...") or by their library; Classic's by their library only, because
+// their names are arbitrary.
 #pragma once
 
 #include <string>
@@ -14,15 +13,15 @@ namespace ruedo::model {
 
 struct PluginKind {
   enum class Does {
-    drive,       // drives a robot: drive_from_plugin() translates it, or says why not
-    joints,      // moves a model's joints: ROBOT/joint_command does
-    control,     // ros_control or ros2_control: a file of controllers says what it does
-    served,      // Ruedo's own part does its job
-    irrelevant,  // nothing of what is simulated depends on it
-    dead,        // its job is not done: `would` says which
+    drive,       // drives a robot: drive_from_plugin() translates it, or says why it cannot
+    joints,      // moves a model's joints, as ROBOT/joint_command does
+    control,     // ros_control or ros2_control: a file of controllers defines what it does
+    served,      // a part of Ruedo replaces it
+    irrelevant,  // nothing that is simulated depends on it
+    dead,        // not supported: `would` says what is missing
     unknown,
   };
-  std::string name;  // "DiffDrive", "gazebo_ros_planar_move"; of an unknown one its filename
+  std::string name;  // "DiffDrive", "gazebo_ros_planar_move"; the filename of an unknown one
   Does does = Does::unknown;
   const char* would = "";  // what it would have done: "the wind would blow"
 };

@@ -1,5 +1,5 @@
-// Draws into a copy of the world: settings first, then masses, friction and lights, then places, of
-// the models in world order.
+// Applies the draws to a copy of the world: settings first, then masses, friction and lights, then
+// positions, of the models in world order.
 #include "model/randomization.h"
 
 #include <algorithm>
@@ -63,7 +63,7 @@ double value_of(const Distribution& distribution, RandomStream stream) {
   return p[std::min(p.size() - 1, static_cast<size_t>(stream.uniform() * n))];
 }
 
-// A target's model or light, and what of it.
+// The model or light of a target, and which of its values.
 struct Target {
   std::string name, key;
   bool setting = false;
@@ -177,7 +177,7 @@ class Randomizer {
       }
       if (!any) none(*draw, "model", target);
     }
-    for (const bool robots : {false, true}) {  // obstacles first: robots look where there is room
+    for (const bool robots : {false, true}) {  // obstacles first: robots need free space among them
       for (size_t i = 0; i < world_.models.size(); ++i) {
         if (!of_model[i].empty() && world_.models[i].is_robot() == robots)
           robots ? place_robot(i, of_model) : move(world_.models[i], of_model[i], 0);
@@ -201,7 +201,7 @@ class Randomizer {
     }
   }
 
-  // Robots that come after it and are drawn, too, are not there yet.
+  // Robots that are drawn later are not placed yet.
   void place_robot(size_t index, const std::vector<std::vector<const Draw*>>& of_model) {
     Room room;
     for (size_t i = 0; i < world_.models.size(); ++i) {

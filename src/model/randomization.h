@@ -1,8 +1,7 @@
-// Domain randomisation: what of a world is drawn again for each seed, and from which distributions.
+// Domain randomisation: what of a world is drawn for each seed, and from which distributions.
 //
-// A description is a list of draws, TARGET=DISTRIBUTION, as --randomize and ruedo.Engine take them.
-// What a seed gives depends on the seed and the target alone: not on the other draws, nor on their
-// order.
+// A description is a list of draws, TARGET=DISTRIBUTION, as taken by --randomize and ruedo.Engine.
+// The value for a seed depends on the seed and the target alone, not on other draws or their order.
 #pragma once
 
 #include <memory>
@@ -21,13 +20,13 @@ struct Distribution {
 };
 
 // Targets are
-// - MODEL.x, .y, .z (m) and .yaw (rad): where it stands at the start. Robots that are put somewhere
-// are drawn again while they would share space with something.
+// - MODEL.x, .y, .z (m) and .yaw (rad): the start pose. A robot is drawn again as long as it would
+// overlap something.
 // - MODEL.mass: a factor for the masses and inertias of its links.
 // - MODEL.friction: the friction coefficient of all of its collisions.
 // - LIGHT.brightness: a factor for the intensity of one of the world's lights.
-// - ROBOT/DEVICE.KEY: as --set has it.
-// "*" in MODEL or LIGHT matches any text; each match draws for itself.
+// - ROBOT/DEVICE.KEY: as in --set.
+// "*" in MODEL or LIGHT matches any text; each match is drawn separately.
 struct Draw {
   std::string target;
   Distribution distribution;
@@ -37,12 +36,12 @@ struct Draw {
 // InputError.
 Draw parse_draw(const std::string& text);
 
-// What was drawn: the target, with the model's own name, and its value.
+// A draw: the target, with the model's own name, and its value.
 using Drawn = std::vector<std::pair<std::string, double>>;
 
-// The world of that seed. What is not drawn is shared with `world`. Throws InputError for a target
-// that is not there, a value that its reader refuses, and a robot for which no free place was
-// found.
+// The world for a seed. What is not drawn is shared with `world`. Throws InputError for a target
+// that does not exist, a value that its reader refuses, and a robot for which there was no free
+// place.
 std::shared_ptr<const WorldModel> randomized(const WorldModel& world,
                                              const std::vector<Draw>& draws, uint64_t seed,
                                              Drawn* drawn = nullptr);

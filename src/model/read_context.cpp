@@ -1,4 +1,4 @@
-// Small helpers of all readers: names, elements that no reader knows, numbers in messages.
+// Helpers of all readers: names, unknown elements, numbers in messages.
 #include "model/read_context.h"
 
 #include <algorithm>

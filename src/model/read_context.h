@@ -1,4 +1,4 @@
-// What every part of the file readers shares during one load.
+// State shared by all readers of the files of one load.
 #pragma once
 
 #include <string>
@@ -19,26 +19,25 @@ struct ReadContext {
   std::vector<std::string> xacro_arguments = {};  // "NAME:=VALUE"
 };
 
-// The name attribute. Throws InputError when it is absent, empty or reserved by SDF ("world",
+// The name attribute. Throws InputError if it is missing, empty or reserved by SDF ("world",
 // "__model__").
 std::string required_name(const Element& element);
 
-// Looks at the children that a reader does not read: unknown ruedo: elements are errors with a
-// suggestion, known but unsupported or unknown elements are findings, those in `silent` and of
-// other namespaces are passed over.
+// Checks the children that a reader does not read: unknown ruedo: elements are errors with a
+// suggestion, unsupported or unknown elements are findings, and those in `silent` or of other
+// namespaces are ignored.
 void report_other_children(const Element& element, const std::vector<std::string>& known,
                            const std::vector<std::string>& silent, const std::string& where,
                            Findings& findings);
 
-// A file that grows without end: it is refused as a whole, not part by part.
+// A file that grows without end is refused as a whole, not part by part.
 class TooLarge : public InputError {
  public:
   using InputError::InputError;
 };
 
-// Runs read(). What is wrong with an element of the format is named, `what` is left out ("the
-// shape"), and false comes back; what is wrong with one of Ruedo's own is the author's, and throws
-// on.
+// Runs read(). An error in a standard element is reported, `what` ("the shape") is left out, and
+// the result is false. An error in one of Ruedo's own elements is thrown on.
 template <class Read>
 bool read_or_leave_out(const std::string& where, const std::string& what, Findings& findings,
                        Read read) {
@@ -55,10 +54,10 @@ bool read_or_leave_out(const std::string& where, const std::string& what, Findin
   }
 }
 
-// "arm::wrist", as SDF scopes names, to "arm.wrist", as channels have it.
+// From "arm::wrist", SDF's scoped name, to "arm.wrist", as in channel names.
 std::string dotted(const std::string& scoped);
 
-// A number in words for messages: 0.5, not 0.500000.
+// A number for messages: 0.5, not 0.500000.
 std::string shown(double value);
 
 }  // namespace ruedo::model

@@ -1,5 +1,5 @@
-// The search for files, in a fixed order: the naming file's own surroundings, the top file's,
-// Ruedo's own worlds, then the variables that Ruedo's and Gazebo's users set.
+// Searches for files in a fixed order: around the naming file, around the top file, Ruedo's own
+// worlds, then the environment variables of Ruedo and Gazebo.
 #include "model/resources.h"
 
 #include <algorithm>
@@ -38,8 +38,7 @@ void add_folder(std::vector<std::string>& folders, const fs::path& folder) {
   if (std::find(folders.begin(), folders.end(), path) == folders.end()) folders.push_back(path);
 }
 
-// A file's folder, `models` in and beside it, and the folder above, in which a model's neighbours
-// are.
+// A file's folder, `models` in and beside it, and its parent folder, where neighbouring models lie.
 void add_surroundings(std::vector<std::string>& folders, const fs::path& folder) {
   add_folder(folders, folder);
   add_folder(folders, folder / "models");
@@ -60,7 +59,7 @@ void add_variable(std::vector<std::string>& folders, const char* name) {
   }
 }
 
-// "Ground Plane" and "ground_plane" are one name.
+// "Ground Plane" and "ground_plane" are the same name.
 std::string plain_name(const std::string& name) {
   std::string plain;
   for (const unsigned char c : name) {
@@ -94,7 +93,7 @@ std::string tidy(const std::string& path) {
   return text;
 }
 
-// Fuel's own folders hold a model's versions, each in a folder of its number.
+// Fuel's cache holds a model's versions, each in a folder named by its number.
 fs::path newest_version(const fs::path& model) {
   if (is_there(model / "model.config") || is_there(model / "model.sdf")) return model;
   int newest = 0;
@@ -108,7 +107,7 @@ fs::path newest_version(const fs::path& model) {
   return newest > 0 ? model / std::to_string(newest) : model;
 }
 
-// The name that a ROS package's manifest gives; "" when there is none that can be read.
+// The name in a ROS package's manifest; "" if there is none that can be read.
 std::string package_name(const fs::path& folder) {
   const fs::path manifest = folder / "package.xml";
   if (!is_there(manifest)) return "";
@@ -120,15 +119,15 @@ std::string package_name(const fs::path& folder) {
   }
 }
 
-// Where a package's own files lie, its folder is above them; that of the user holds more than a
-// package.
+// The folder above a package's folder, where its own files lie; the user's home may hold more than
+// packages.
 bool may_be_package(const fs::path& folder) {
   const char* home = std::getenv("HOME");
   return folder.parent_path().has_relative_path() &&
          (!home || !starts_with(full_path(home) + "/", (folder.string() + "/").c_str()));
 }
 
-// Where the packages of a workspace lie beside the one that holds the file; "": it lies in none.
+// The workspace folder that holds the packages beside the file's own; "": the file is in none.
 std::string workspace_of(const std::string& file) {
   for (fs::path folder = fs::path(file).parent_path(); folder.has_relative_path();
        folder = folder.parent_path()) {
@@ -223,7 +222,7 @@ std::vector<std::string> ResourceFinder::roots_for(const std::string& from) cons
   return roots;
 }
 
-// Links are followed where they lead: they were made by the user, not by the world file.
+// Links are followed here: the user made them, not the world file.
 bool ResourceFinder::allowed(const std::string& path, const std::string& from) const {
   for (const auto& root : roots_for(from)) {
     if (path == root || starts_with(path, (root + "/").c_str())) return true;
@@ -231,9 +230,9 @@ bool ResourceFinder::allowed(const std::string& path, const std::string& from) c
   return false;
 }
 
-// ROS packages may live in a folder of another name: one whose package.xml has the name counts too,
-// be it above the naming file, beside its package, a folder that is searched, or in one. Above it
-// the folder's own name will do.
+// A ROS package may lie in a folder of another name: one whose package.xml has the name counts too,
+// whether above the naming file, beside its package, or in or below a search folder. Above the
+// naming file, the folder's own name suffices.
 std::optional<std::string> ResourceFinder::in_package(const std::string& package,
                                                       const std::string& rest,
                                                       const std::string& from) const {
@@ -290,7 +289,7 @@ std::optional<std::string> ResourceFinder::find_anything(const std::string& writ
   return find_path(uri, from);
 }
 
-// A model of Fuel's that was fetched: .../OWNER/models/NAME[/VERSION][/files/PATH]
+// A model fetched from Fuel: .../OWNER/models/NAME[/VERSION][/files/PATH]
 std::optional<std::string> ResourceFinder::find_fuel(const std::string& uri,
                                                      const std::string& from) const {
   const size_t models = uri.find("/models/");
@@ -325,7 +324,7 @@ std::optional<std::string> ResourceFinder::find_by_name(const std::string& path,
                     from);
 }
 
-// "file://models/x/mesh.dae", from a file below that models.
+// "file://models/x/mesh.dae", named by a file below that `models` folder.
 std::optional<std::string> ResourceFinder::find_above(const std::string& path,
                                                       const std::string& from) const {
   const std::string tidied = tidy(path);
@@ -339,7 +338,7 @@ std::optional<std::string> ResourceFinder::find_above(const std::string& path,
   return std::nullopt;
 }
 
-// Beside the file that names it, else below a folder that is searched.
+// Beside the file that names it, or below a search folder.
 std::optional<std::string> ResourceFinder::find_path(const std::string& path,
                                                      const std::string& from) const {
   const bool absolute = fs::path(path).is_absolute();
@@ -362,7 +361,7 @@ std::optional<std::string> ResourceFinder::find_in_roots(const std::string& path
   return std::nullopt;
 }
 
-// The deepest folder that both are in.
+// The deepest common folder.
 static std::string folder_of_both(const fs::path& one, const std::string& other) {
   const fs::path two = fs::absolute(other).lexically_normal();
   fs::path both;
@@ -395,7 +394,7 @@ std::optional<std::string> ResourceFinder::find_model(const std::string& uri,
     const auto found = find(uri, from);
     at->second = found ? model_file(*found) : std::nullopt;
     if (at->second && for_strangers_ && !reaches(*at->second))
-      at->second = std::nullopt;  // a link in the model's folder
+      at->second = std::nullopt;  // a link inside the model's folder
   }
   return at->second;
 }
@@ -406,7 +405,7 @@ std::optional<std::string> ResourceFinder::model_file(const std::string& path) {
   const fs::path config = folder / "model.config";
   if (is_there(config)) {
     const auto root = parse_document(read_text_file(config.string(), 1 << 20), config.string());
-    // The newest that Ruedo reads; a version that cannot be read counts as the oldest.
+    // The newest version that Ruedo reads; a version that cannot be parsed counts as the oldest.
     std::string best;
     SdfVersion best_version{0, 0};
     for (const Element* sdf : root->all("sdf")) {
@@ -431,7 +430,7 @@ std::optional<std::string> ResourceFinder::model_file(const std::string& path) {
 std::optional<std::string> ResourceFinder::find_texture(const std::string& name,
                                                         const std::string& from) const {
   if (auto found = find(name, from); found && !is_folder(*found)) return found;
-  // Exporters write paths of their own machine; the picture is then beside the mesh or in the
+  // Exporters write paths of their own machine; the picture then lies beside the mesh or in the
   // model's folders.
   std::string slashes = name;
   std::replace(slashes.begin(), slashes.end(), '\\', '/');

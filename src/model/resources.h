@@ -1,6 +1,6 @@
-// Where the files that a world names are: model://, package://, file://, Fuel addresses, absolute
-// and relative paths. Nothing is ever fetched from a network, and no address leads out of the
-// folders that are searched.
+// Finds the files that a world names: model://, package://, file://, Fuel addresses, absolute and
+// relative paths. Nothing is ever fetched from a network, and no address leads out of the search
+// folders.
 #pragma once
 
 #include <map>
@@ -12,42 +12,41 @@
 
 namespace ruedo::model {
 
-// Not for several threads at once.
+// Not thread-safe.
 class ResourceFinder {
  public:
-  // `top_file` is the file on the command line; its folder, the `models` folder in and beside it
-  // are searched first. allow_absolute: absolute paths and file:// may lead anywhere; else only
-  // into the folders that are searched.
+  // `top_file` is the file on the command line; its folder, and the `models` folders in and beside
+  // it, are searched first. allow_absolute: absolute paths and file:// may lead anywhere; otherwise
+  // only into the search folders.
   ResourceFinder(const std::string& top_file, bool allow_absolute);
 
-  // For what comes over a network, or stands in a log: it reaches the folder of the world's file,
-  // the `models` folders in and beside it, and those that the user's variables name; nothing in
-  // folders or files whose names begin with a dot, and nothing that a link leads out of them. What
-  // lies elsewhere is not found, and no message says that it is there.
+  // For input from the network or from a log. It reaches the folder of the world file, the `models`
+  // folders in and beside it, and those in the user's environment variables; no folders or files
+  // whose names begin with a dot, and nothing outside through links. Files elsewhere are not found,
+  // and no message reveals that they exist.
   static ResourceFinder for_strangers(const std::string& world_file);
-  // Whether a file lies in the folders that are searched, wherever links lead, and below none whose
+  // Whether a file lies in the search folders after following links, and not below a folder whose
   // name begins with a dot.
   bool reaches(const std::string& path) const;
 
-  // The absolute path of what `uri`, written in the file `from`, names: a file or a folder.
+  // The absolute path of the file or folder that `uri`, written in the file `from`, names.
   std::optional<std::string> find(const std::string& uri, const std::string& from) const;
 
   // The SDF file of the model that `uri` names: a file itself, or a folder's newest by its
-  // model.config. Throws InputError for a folder with a model.config that names no file that is
-  // there.
+  // model.config. Throws InputError if model.config names no existing file.
   std::optional<std::string> find_model(const std::string& uri, const std::string& from) const;
 
-  // The same of a file or folder that the user named, wherever it is.
+  // The same for a file or folder given by the user, wherever it lies.
   static std::optional<std::string> model_file(const std::string& path);
 
-  // Why find() gave nothing, for messages: "is not found", or that it leads out of the folders that
-  // are searched.
+  // Why find() found nothing, for messages: "is not found", or that it leads out of the search
+  // folders.
   std::string why_not(const std::string& uri, const std::string& from) const;
 
-  // The folders that are searched wherever a file lies.
+  // The folders that are searched for any file.
   std::vector<std::string> folders() const;
 
-  // A texture, named in `from`: as find(), then by its file name in the usual folders beside.
+  // A texture, named in `from`: like find(), then by its file name in the usual folders nearby.
   std::optional<std::string> find_texture(const std::string& name, const std::string& from) const;
 
  private:
@@ -68,7 +67,7 @@ class ResourceFinder {
   bool for_strangers_ = false;
   mutable std::map<std::string, std::optional<std::string>> models_;  // by uri and naming file
   mutable std::map<std::string, std::map<std::string, std::string>>
-      packages_;  // in each folder: by name, once looked for
+      packages_;  // by folder: packages by name, filled on first use
 };
 
 // The folder of the worlds and robots that come with Ruedo; "" when there is none.

@@ -1,5 +1,5 @@
-// Parameters of controllers that drive a robot. Names and defaults are those of the controllers'
-// own documentation.
+// Parameters of controllers that drive a robot. Names and defaults follow the controllers'
+// documentation.
 #include "model/ros_control.h"
 
 #include <algorithm>
@@ -51,7 +51,7 @@ struct Translation {
     }
   }
 
-  // A limit of ROS: with a switch in the first generations, without in the later ones.
+  // A limit in ROS: with a switch in early generations, without in later ones.
   void limit(const char* ours, const std::string& axis, const char* kind,
              std::initializer_list<const char*> names) {
     const Element* has = parameter(from, {(axis + ".has_" + kind + "_limits").c_str()});
@@ -66,8 +66,8 @@ struct Translation {
     return positive(parameter(from, names)).value_or(1.0);
   }
 
-  // The middles of the two sides' wheels apart, as the ROS 1 controllers measure it where it is not
-  // written.
+  // The distance between the middles of the two sides' wheels, as the ROS 1 controllers measure it
+  // if it is not given.
   double separation() const {
     const auto middle = [&](const char* side) {
       Vec3 sum = Vec3::Zero();
@@ -126,7 +126,7 @@ void mecanum(Translation& t) {
            t.multiplier({"wheel_radius_multiplier"}));
   t.number("ruedo:track", {"wheel_separation_y"});
   t.number("ruedo:wheelbase", {"wheel_separation_x"});
-  // Half the way between the axles and half the track, in one.
+  // Half the wheelbase plus half the track, as a single parameter.
   const Element* arm = parameter(t.from, {"kinematics.sum_of_robot_center_projection_on_X_Y_axis"});
   if (const auto sum = positive(arm)) {
     const double track = t.separation();
@@ -168,10 +168,10 @@ void car(Translation& t) {
 
 struct KnownType {
   const char* in_type;
-  Read read;  // null: it drives nothing; its joints take commands, or Ruedo's own part does its job
+  Read read;  // null: it drives nothing; its joints take commands, or a part of Ruedo replaces it
 };
 
-// In this order: "tricycle_steering_controller" has "steering_controller" in it, too.
+// Order matters: "tricycle_steering_controller" contains "steering_controller".
 constexpr KnownType kTypes[] = {
     {"diff_drive_controller", differential},
     {"DiffDriveController", differential},
@@ -203,7 +203,7 @@ const KnownType* known_type(const std::string& type) {
   return found == std::end(kTypes) ? nullptr : found;
 }
 
-// The drive that a controller is; null where it is none, or is one of other joints.
+// The drive that a controller describes; null: it describes none, or one of other joints.
 std::unique_ptr<Element> drive_of(const Controller& controller, const Model& model) {
   const KnownType* type = known_type(controller.type);
   if (!type || !type->read) return nullptr;
@@ -232,7 +232,7 @@ std::unique_ptr<Element> odometry_of(const Controller& controller) {
   return odometry;
 }
 
-// Parameters of a drive that act, or that say nothing of how it drives and what it measures.
+// Drive parameters that are supported, or that do not concern motion or odometry.
 constexpr std::string_view kDone =
     "type left_wheel right_wheel left_wheel_names right_wheel_names wheel_radius wheel_separation "
     "wheel_radius_multiplier left_wheel_radius_multiplier right_wheel_radius_multiplier "
@@ -259,7 +259,7 @@ constexpr std::string_view kDone =
     "angular.z.has_acceleration_limits angular.z.max_acceleration angular.z.min_acceleration "
     "angular.z.max_deceleration angular.z.has_jerk_limits angular.z.max_jerk angular.z.min_jerk";
 
-// Below a map, by dotted names; what is off, 0 or "not a number" does nothing in ROS either.
+// Entries below a map, by dotted names; what is off, 0 or NaN has no effect in ROS either.
 void collect_others(const Element& map, const std::string& prefix, int depth,
                     std::vector<std::string>& others) {
   constexpr int kDeepest = 8;
@@ -287,7 +287,7 @@ void name_others(const Controller& controller, const std::string& where, Finding
                        "controller '" + controller.name + "': without effect here: " + list);
 }
 
-// What of a drive's parameters changes how it moves in ROS and not here.
+// The drive parameters that change the motion in ROS, but have no effect here.
 void name_what_has_no_effect(const Controller& controller, const std::string& where,
                              Findings& findings) {
   const auto name = [&](const Element* written, const std::string& text) {
@@ -355,7 +355,7 @@ ControllersDrive drive_from_controllers(const Element& model_element,
     return result;
   };
   if (ControllersDrive found = look_in(named, true); found.drive) return found;
-  for (const std::string& path : beside) {  // each may be another robot's
+  for (const std::string& path : beside) {  // each may belong to another robot
     if (ControllersDrive found = look_in({path}, false); found.drive) return found;
   }
   return {};

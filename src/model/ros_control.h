@@ -1,5 +1,5 @@
-// A robot's drive as ros_control and ros2_control have it: the parameters of a controller, from its
-// YAML, as the <ruedo:drive> that says the same.
+// A robot's drive as defined by ros_control and ros2_control: translates a controller's parameters,
+// from its YAML file, to <ruedo:drive>.
 #pragma once
 
 #include <memory>
@@ -19,16 +19,16 @@ struct ControllersDrive {
   bool named = false;      // by the plugin; false: found in a package's config folder
 };
 
-// Looks for a controller that drives the model's joints: in the files that the plugins of
-// ros_control name, then in the config folders of the package and of those beside it. Names what of
-// it is not done.
+// Looks for a controller that drives the model's joints: first in the files named by ros_control's
+// plugins, then in the config folders of the package and its neighbours. Reports what of it is not
+// supported.
 ControllersDrive drive_from_controllers(const Element& model_element,
                                         const std::vector<const Element*>& plugins,
                                         const Model& model, const std::string& where,
                                         ReadContext& context);
 
-// The joints that <transmission> and <ros2_control> let a controller turn: those by velocity, or
-// all where none is.
+// The joints that <transmission> and <ros2_control> let a controller turn: those with a velocity
+// interface, or all if there is none.
 std::vector<std::string> controlled_joints(const Element& model_element);
 
 }  // namespace ruedo::model

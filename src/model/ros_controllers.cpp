@@ -1,4 +1,4 @@
-// Which files hold a robot's controllers, and what stands in them.
+// Which files hold a robot's controllers, and how they are laid out.
 //
 // A ROS 1 controller is a map with a `type`; in ROS 2 the controller manager names the types, and
 // NAME/ros__parameters holds the rest, with dots or nested.
@@ -17,9 +17,9 @@ namespace ruedo::model {
 namespace {
 
 constexpr size_t kLargestFile = 1 << 18, kMostFiles = 300,
-                 kMostFolders = 200;  // of parameters, looked at for one robot
+                 kMostFolders = 200;  // limit of parameter folders searched for one robot
 
-// "a.b.c" in a tree whose keys may have dots themselves.
+// Looks up "a.b.c" in a tree whose keys may contain dots themselves.
 const Element* below(const Element& map, const std::string& path) {
   for (const auto& child : map.children) {
     if (child->name == path) return child.get();
@@ -35,14 +35,14 @@ void collect_types(const Element& map, std::vector<Controller>& into) {
   for (const auto& child : map.children) {
     if (const Element* type = child->child("type");
         type && type->text.find("ontroller") != std::string::npos) {
-      const bool own = child->name == "ros__parameters";  // the type stands among the rest
+      const bool own = child->name == "ros__parameters";  // the type is one of the parameters
       into.push_back({own ? map.name : child->name, type->text, {child.get()}, child->source});
     }
     collect_types(*child, into);
   }
 }
 
-// NAME: ros__parameters: ..., with a namespace before the name or without.
+// NAME: ros__parameters: ..., with or without a namespace before the name.
 void collect_parameters(const Element& map, Controller& controller) {
   for (const auto& child : map.children) {
     const std::string own = child->name.substr(child->name.rfind('/') + 1);
@@ -65,7 +65,7 @@ bool is_yaml(const fs::path& path) {
   return path.extension() == ".yaml" || path.extension() == ".yml";
 }
 
-// The folders of parameters in a package.
+// The folders of a package that may hold parameters.
 void add_parameter_files(const fs::path& package, std::vector<std::string>& files) {
   std::vector<fs::path> found;
   for (const char* name :
@@ -203,7 +203,7 @@ std::unique_ptr<Element> read_controllers(const std::string& path, bool named,
     const std::string text = read_text_file(path, kLargestFile);
     if (text.find("ontroller") == std::string::npos) return nullptr;
     return parse_yaml(text, path);
-  } catch (const InputError& error) {  // a file beside may be anything
+  } catch (const InputError& error) {  // a neighbouring file may be anything
     if (named) context.findings.error(error.source(), where, error.message());
     return nullptr;
   }

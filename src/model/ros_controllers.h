@@ -14,31 +14,33 @@ namespace ruedo::model {
 
 struct Controller {
   std::string name, type;                  // "diff_drive_controller/DiffDriveController"
-  std::vector<const Element*> parameters;  // the maps that have them
+  std::vector<const Element*> parameters;  // the maps that hold them
   Source source;
 };
 
-// The first of these parameters that the controller has; "a.b" may be written nested or so.
+// The first of these parameters that the controller has; "a.b" may also be nested.
 const Element* parameter(const Controller& controller, std::initializer_list<const char*> names);
-std::vector<std::string> names_in(const Element* list);  // of a list, or one
+// the texts of a list, or of a single value
+std::vector<std::string> names_in(const Element* list);
 bool is_true(const Element* flag);
-bool has_word(std::string_view words, std::string_view word);  // words with blanks between them
-// A number's magnitude above 0; the controllers' "no limit" is 0, NaN or nothing.
+bool has_word(std::string_view words, std::string_view word);  // words separated by blanks
+// The absolute value of a number, if it is not 0; 0, NaN or nothing mean "no limit" to the
+// controllers.
 std::optional<double> positive(const Element* written);
 
-// One file may name the types, and another hold the parameters.
+// One file may give the types, and another the parameters.
 std::vector<Controller> controllers_in(const std::vector<std::unique_ptr<Element>>& files);
 
-// Whether files of controllers say anything of a model.
+// Whether controller files can concern a model.
 bool is_controlled(const Element& model_element, const std::vector<const Element*>& plugins);
-// The files in the folders of parameters of the package that `from` is in, then of those beside it,
-// in the order of their names.
+// The files in the parameter folders of the package that contains `from`, then of neighbouring
+// packages, sorted by name.
 std::vector<std::string> files_beside(const std::string& from);
-// Those that the plugins of ros_control name; one that is not found is told.
+// Those named by ros_control's plugins; a missing one is reported.
 std::vector<std::string> named_files(const std::vector<const Element*>& plugins,
                                      const std::vector<std::string>& beside,
                                      const std::string& where, ReadContext& context);
-// Null: it holds no controllers, or is not YAML, which is reported where a plugin names the file.
+// Null: it holds no controllers, or is not YAML, which is reported if a plugin names the file.
 std::unique_ptr<Element> read_controllers(const std::string& path, bool named,
                                           const std::string& where, ReadContext& context);
 

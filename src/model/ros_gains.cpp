@@ -1,4 +1,4 @@
-// Names and defaults are those of control_toolbox and of the controllers' own documentation.
+// Names and defaults follow the documentation of control_toolbox and of the controllers.
 #include "model/ros_gains.h"
 
 #include <algorithm>
@@ -19,7 +19,7 @@ double number(const Element& map, std::initializer_list<const char*> names, doub
   return fallback;
 }
 
-// As control_toolbox has it: without a clamp the integral does nothing.
+// As in control_toolbox: without a clamp, the integral part has no effect.
 Pid pid_of(const Element& gains) {
   Pid pid;
   pid.p = std::max(0.0, number(gains, {"p"}, 0.0));
@@ -38,7 +38,7 @@ enum class Gives { nothing, effort_for_position, effort_for_rate, rate_for_posit
 struct Interfaces {
   const Element& model_element;
 
-  // By the <transmission> of gazebo_ros_control.
+  // From the <transmission> of gazebo_ros_control.
   bool has(const std::string& joint, const char* what) const {
     for (const Element* transmission : model_element.all("transmission")) {
       for (const Element* each : transmission->all("joint")) {
@@ -71,7 +71,7 @@ struct Reader {
       } else {
         std::optional<Pid>& of =
             gives == Gives::effort_for_rate ? axis.rate_pid : axis.position_pid;
-        if (of) return;  // a plugin's, or of a file before
+        if (of) return;  // set by a plugin or an earlier file
         of = pid;
       }
       if (axis.start.mode == JointStart::Mode::free) axis.start.mode = JointStart::Mode::stay;
@@ -110,7 +110,7 @@ Gives gives_of(const Controller& controller) {
   return Gives::nothing;
 }
 
-// Of one joint in `pid`, of several in `gains`, or each in its own map.
+// For one joint in `pid`, for several in `gains`, or each in a map of its own.
 void read_controller(const Controller& controller, Reader& reader) {
   const Gives gives = gives_of(controller);
   if (gives == Gives::nothing) return;
@@ -124,7 +124,7 @@ void read_controller(const Controller& controller, Reader& reader) {
   }
 }
 
-// Tolerances and goal times, of a controller of these joints.
+// Tolerances and goal times of a controller for these joints.
 void name_constraints(const Controller& controller, const Reader& reader, const std::string& where,
                       Findings& findings) {
   const Element* constraints = parameter(controller, {"constraints"});
@@ -139,7 +139,7 @@ void name_constraints(const Controller& controller, const Reader& reader, const 
                            "ROBOT/joint_command says, and no tolerance or goal time is watched");
 }
 
-// gazebo_ros_control/pid_gains, below whatever namespace.
+// gazebo_ros_control/pid_gains, in any namespace.
 void read_pid_gains(const Element& map, const Interfaces& interfaces, Reader& reader, int depth) {
   constexpr int kDeepest = 5;
   if (depth > kDeepest) return;
@@ -212,7 +212,7 @@ void read_ros_gains(const Element& model_element, const std::vector<const Elemen
   guarded([&] { read_parameters(model_element, reader); });
   guarded([&] { look_in(named, true); });
   if (!reader.held.empty()) return;
-  for (const std::string& path : beside) {  // each may be another robot's
+  for (const std::string& path : beside) {  // each may belong to another robot
     guarded([&] { look_in({path}, false); });
     if (reader.held.empty()) continue;
     std::string joints;

@@ -1,4 +1,4 @@
-// The gains of joints in the files of ros_control and ros2_control.
+// The joints' gains from the files of ros_control and ros2_control.
 #pragma once
 
 #include <string>
@@ -9,8 +9,8 @@
 
 namespace ruedo::model {
 
-// Gives the joints the PIDs that gazebo_ros_control, gazebo_ros2_control and the controllers of
-// effort have in their files, and the gains of controllers of velocity.
+// Sets the joints' PIDs from gazebo_ros_control, gazebo_ros2_control and effort controllers, and
+// the gains of velocity controllers.
 void read_ros_gains(const Element& model_element, const std::vector<const Element*>& plugins,
                     const std::string& where, ReadContext& context, Model& model);
 

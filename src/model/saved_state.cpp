@@ -8,9 +8,9 @@
 namespace ruedo::model {
 namespace {
 
-constexpr double kAside_m = 0.01;  // from where the joints put a link
-constexpr double kExact = 1e-6;    // rad, m: what saving with few digits makes of 0
-constexpr double kMoving = 0.01;   // m/s, rad/s: what rests has less
+constexpr double kAside_m = 0.01;  // difference to the pose that the joints imply
+constexpr double kExact = 1e-6;    // rad, m: rounding in states saved with few digits
+constexpr double kMoving = 0.01;   // m/s, rad/s: slower things are at rest
 
 std::vector<const Element*> states_of(const Element& parent, const std::string& what) {
   std::vector<const Element*> list = parent.all(what + "_state");
@@ -19,7 +19,7 @@ std::vector<const Element*> states_of(const Element& parent, const std::string& 
   return list;
 }
 
-// The position of its first axis; false: none is written.
+// The position of its first axis; false: not given.
 bool position_in(const Element& joint, double& position) {
   if (const Element* written = joint.child("axis_state/position")) {
     const std::string* degrees = written->attribute("degrees");
@@ -36,7 +36,7 @@ bool position_in(const Element& joint, double& position) {
   return false;
 }
 
-// However far a wheel has turned, it begins at 0.
+// A wheel starts at 0, however far it has turned.
 bool is_of_drive(const Model& model, ModelJointIndex joint) {
   if (!model.drive) return false;
   const DriveDescription& drive = *model.drive;
@@ -46,7 +46,7 @@ bool is_of_drive(const Model& model, ModelJointIndex joint) {
   return false;
 }
 
-// Everything begins at rest.
+// Everything starts at rest.
 void name_motion(const Element& link, const std::string& where, Findings& findings) {
   const Element* velocity = link.child("velocity");
   if (!velocity) return;
@@ -95,7 +95,7 @@ SavedState::SavedState(const Element& world, Findings& findings) {
 void SavedState::read_model(const Element& element, Findings& findings) {
   const std::string* name = element.attribute("name");
   if (!name) return;
-  // A simulation that went wrong saves numbers that are none; the models have poses of their own.
+  // A simulation that diverged saves NaN; the models' own poses are used then.
   read_or_leave_out("state/model " + *name, "it is where its own pose says", findings, [&] {
     SavedModel saved{element.pose("pose"), element.source, {}, {}};
     read_parts(element, "", saved, findings);

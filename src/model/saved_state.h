@@ -1,4 +1,5 @@
-// <state>: a world that was saved while it ran is as it was then, not as its models' own poses say.
+// <state>: a world that was saved while running starts as it was saved, not at its models' own
+// poses.
 #pragma once
 
 #include <map>
@@ -10,12 +11,12 @@
 
 namespace ruedo::model {
 
-// In the words of SDF 1.12 (<model_state>, ...) and in those before it (<model>, ...).
+// In the syntax of SDF 1.12 (<model_state>, ...) and of earlier versions (<model>, ...).
 class SavedState {
  public:
   SavedState(const Element& world, Findings& findings);
 
-  // Where it was, and its joints; what cannot be is named.
+  // Applies a model's pose and joint positions; what cannot be applied is reported.
   void apply(const std::string& name, ModelInstance& instance, Findings& findings) const;
   void apply(Light& light) const;
 
@@ -28,7 +29,7 @@ class SavedState {
     Pose X_WM;
     Source source;
     std::vector<Link> links;
-    std::map<std::string, double> joints;  // rad or m, where they are written
+    std::map<std::string, double> joints;  // rad or m, for the joints that are given
   };
   void read_model(const Element& element, Findings& findings);
   void read_parts(const Element& element, const std::string& prefix, SavedModel& saved,

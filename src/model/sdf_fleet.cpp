@@ -1,6 +1,5 @@
-// <ruedo:fleet> in <world>: many instances of one model in a grid, on a ring or at random, each on
-// the ground and none in another thing. The places come from the file alone: the run's seed does
-// not move them.
+// <ruedo:fleet> in <world>: many instances of one model, in a grid, on a ring or at random, each on
+// the ground and clear of other things. Positions depend on the file alone, not on the run's seed.
 #include <cmath>
 #include <numbers>
 #include <unordered_map>
@@ -15,8 +14,9 @@
 namespace ruedo::model {
 namespace {
 
-constexpr int kMostTries = 1000;  // places drawn for one robot before there is no room
-constexpr double kGap_m = 0.2;    // between neighbours, unless the file says more
+// positions drawn for one robot before it counts as having no room
+constexpr int kMostTries = 1000;
+constexpr double kGap_m = 0.2;  // between neighbours, unless the file asks for more
 
 struct Place {
   double x, y, yaw;
@@ -74,7 +74,7 @@ struct Fleet {
             center.y() + offset(i / columns, rows), heading};
   }
 
-  // Neighbours are `spacing` apart, as the crow flies; they look outwards.
+  // Neighbours are `spacing` apart in a straight line; robots look outwards.
   Place on_ring(int64_t i) const {
     const double turn = 2 * std::numbers::pi / static_cast<double>(count);
     const double smallest = count > 1 ? spacing / (2 * math::sin(turn / 2)) : 0;
@@ -86,7 +86,7 @@ struct Fleet {
   }
 };
 
-// Draws places in a rectangle, none nearer than `spacing` to one that was kept.
+// Draws positions in a rectangle, none closer than `spacing` to one already accepted.
 class RandomPlaces {
  public:
   explicit RandomPlaces(const Fleet& fleet)
@@ -132,7 +132,7 @@ class RandomPlaces {
   RandomSource source_;
   Eigen::Vector2d size_;
   std::unordered_map<uint64_t, std::vector<Eigen::Vector2d>>
-      kept_;  // looked up only, never walked through
+      kept_;  // only looked up, never iterated: its order is not defined
 };
 
 }  // namespace
@@ -151,7 +151,7 @@ void SdfReader::read_fleet(const Element& element, WorldModel& world, size_t mos
       includes[0]->child(child)->fail("is not allowed here; the fleet names and places its robots");
   }
   const auto included = include(*includes[0], "world/ruedo:fleet");
-  if (!included) return;  // not found: told
+  if (!included) return;  // not found, which has been reported
   if (!included->model) includes[0]->fail("is no model; a fleet is of models");
   const auto model = included->model->model;
   const Fleet fleet(element, *model);

@@ -1,4 +1,4 @@
-// <include>: the file it names, once for all who include it, and what the <include> changes in it.
+// <include>: the file, read once for all who include it, and the changes that the <include> makes.
 #include <algorithm>
 #include <filesystem>
 
@@ -70,11 +70,11 @@ SdfReader::Included SdfReader::read_file(const std::string& path, const Element&
   Included result;
   result.document = context_.documents.read(path);
   if (is_xacro(path, result.document.get())) result.document = expand_xacro(path, context_);
-  std::error_code none;  // it says which file of its folder is the model's
+  std::error_code none;  // receives the error; it says which file of its folder is the model's
   const auto config = std::filesystem::path(path).parent_path() / "model.config";
   if (std::filesystem::is_regular_file(config, none)) context_.documents.note(config.string());
   if (result.document->name == "robot") {
-    // A URDF: as the SDF file that says the same, so that an <include> can change it.
+    // A URDF, converted to an equivalent SDF file, so that an <include> can change it.
     auto converted = std::make_shared<Element>();
     converted->name = "sdf";
     converted->source = result.document->source;
@@ -95,7 +95,7 @@ SdfReader::Included SdfReader::read_file(const std::string& path, const Element&
       result.name = required_name(*child);
       break;
     }
-    if (child->name == "include") {  // of a SPAWN's text: as it stands in a world
+    if (child->name == "include") {  // in the text of a SPAWN: handled as in a world
       const auto inner = include(*child, "include");
       if (!inner) child->fail("the model that it names is not found");
       result = *inner;
@@ -109,7 +109,7 @@ SdfReader::Included SdfReader::read_file(const std::string& path, const Element&
   return cache_[path] = result;
 }
 
-// Reads the model again with what <include> says beside its own elements: static, plugins, sensors,
+// Reads the model again with the <include>'s additions to its elements: static, plugins, sensors,
 // ruedo:.
 std::shared_ptr<const ScopedModel> SdfReader::read_overridden(const Element& model,
                                                               const Element& include,
@@ -140,13 +140,14 @@ std::shared_ptr<const ScopedModel> SdfReader::read_overridden(const Element& mod
 
 namespace {
 
-// What of an <include> changes the model itself, not only where it stands.
+// What an <include> changes in the model itself, beyond its pose.
 bool is_override(const Element& child) {
   return child.name == "static" || child.name == "enable_wind" || child.name == "plugin" ||
          child.name == "sensor" || child.name == kParams || child.name.rfind("ruedo:", 0) == 0;
 }
 
-// False also for <static> alone with the value that the model has: nothing is to be read again.
+// Also false if <static> alone is given, with the value that the model has: nothing has to be read
+// again.
 bool changes_model(const Element& include, const Model& model) {
   return std::any_of(include.children.begin(), include.children.end(), [&](const auto& child) {
     return is_override(*child) &&
@@ -154,7 +155,7 @@ bool changes_model(const Element& include, const Model& model) {
   });
 }
 
-// Equal for equal overrides (a fleet's), which share one model.
+// Equal for equal overrides (those of a fleet), which share one model.
 std::string override_key(const std::string& path, const Element& include) {
   std::string key = path;
   for (const auto& child : include.children) {
@@ -170,7 +171,7 @@ void report_not_found(const Element& element, const std::string& uri, const std:
                       ReadContext& context) {
   if (uri.rfind("https://fuel.", 0) == 0 || uri.rfind("http://fuel.", 0) == 0) {
     context.findings.error(element.source,
-                           where + " " + uri,  // one text, so that they are one list
+                           where + " " + uri,  // one text, so that all are reported as one list
                            "models of Fuel that are not here; the world goes on without them. "
                            "`gz fuel download -u URI` fetches each");
     return;
@@ -180,7 +181,7 @@ void report_not_found(const Element& element, const std::string& uri, const std:
                              "; the world goes on without it");
 }
 
-// The model where <pose> and <placement_frame> of the <include> put it.
+// The model, placed by <pose> and <placement_frame> of the <include>.
 std::shared_ptr<const ScopedModel> placed_by(const Element& include,
                                              std::shared_ptr<const ScopedModel> model) {
   if (!include.has("pose") && !include.has("placement_frame")) return model;

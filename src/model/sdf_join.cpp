@@ -1,4 +1,4 @@
-// <joint> in <world>: the models that it ties together are read as one model that holds them.
+// <joint> in <world>: the models that it connects are read as one model that contains them.
 #include <algorithm>
 #include <set>
 
@@ -7,13 +7,13 @@
 namespace ruedo::model {
 namespace {
 
-// "post" of "post::link"; "" of "world" and what names no link of a model.
+// "post" for "post::link"; "" for "world" and for names that are not a model's link.
 std::string model_in(const std::string& scoped) {
   const size_t colons = scoped.find("::");
   return colons == std::string::npos ? "" : scoped.substr(0, colons);
 }
 
-// The end of a joint, where the model that it is in gives its parts no scope.
+// The name of a joint's end in a merged model, where the model's parts have no scope of their own.
 void leave_scope(Element& joint, const char* end, const std::string& model) {
   Element* written = joint.child(end);
   if (written && model_in(written->text) == model) written->text.erase(0, model.size() + 2);
@@ -21,8 +21,8 @@ void leave_scope(Element& joint, const char* end, const std::string& model) {
 
 }  // namespace
 
-// What the world's models and includes are called, in their order; "" where they cannot be read:
-// the error is reported when they are.
+// The names of the world's models and includes, in order; "" for those that cannot be read: the
+// error is reported when they are.
 std::vector<SdfReader::Member> SdfReader::members(const Element& world, SdfVersion version) {
   std::vector<Member> list;
   for (const auto& child : world.children) {
@@ -53,9 +53,9 @@ std::unique_ptr<Element> SdfReader::with_joined_models(const Element& world, Sdf
         std::find_if(all.begin(), all.end(), [&](const Member& each) { return each.name == name; });
     return found == all.end() || name.empty() ? -1 : static_cast<int>(found - all.begin());
   };
-  std::vector<int> group(all.size());  // the first member that it is tied to
+  std::vector<int> group(all.size());  // for each, the first member of its group
   for (size_t i = 0; i < all.size(); ++i) group[i] = static_cast<int>(i);
-  std::vector<std::pair<const Element*, int>> joints;  // with their group's first member, later
+  std::vector<std::pair<const Element*, int>> joints;  // with their group's first member, set later
   for (const Element* joint : world.all("joint")) {
     read_or_leave_out("world", "the joint is left out", context_.findings, [&] {
       const std::string parent = joint_end(*joint, "parent"), child = joint_end(*joint, "child");

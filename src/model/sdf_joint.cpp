@@ -24,7 +24,7 @@ JointAxis read_axis(const Element& element, SdfVersion version, const Pose& X_MJ
   xyz.normalize();
   const Element* written = element.child("xyz");
   const std::string* frame = written ? written->attribute("expressed_in") : nullptr;
-  // Before SDF 1.5 an axis was written in the model's frame; 1.5 and 1.6 have a switch for that.
+  // Before SDF 1.5, axes were given in the model's frame; 1.5 and 1.6 have a switch.
   const bool in_model =
       version < SdfVersion{1, 5} || element.boolean("use_parent_model_frame", false);
   if (frame && !frame->empty()) {
@@ -65,7 +65,7 @@ JointAxis read_axis(const Element& element, SdfVersion version, const Pose& X_MJ
   return axis;
 }
 
-// Whether a joint's settings of the solver say anything but what Gazebo writes out for all of them.
+// Whether a joint's solver settings differ from the ones that Gazebo writes for every joint.
 bool sets_anything(const Element& element) {
   if (element.children.empty() && !element.text.empty()) {
     for (const char* usual : {"0", "0.0", "1", "0.2", "true", "false"}) {
@@ -77,8 +77,8 @@ bool sets_anything(const Element& element) {
                      [](const auto& child) { return sets_anything(*child); });
 }
 
-// m/rad; right-handed threads are positive. <thread_pitch>, which SDF had before, is in rad/m and
-// counts left-handed ones.
+// m/rad; right-handed threads are positive. The older <thread_pitch> is in rad/m and counts
+// left-handed threads.
 double read_advance(const Element& joint) {
   if (joint.has("screw_thread_pitch"))
     return joint.number("screw_thread_pitch", 1.0, Allowed::any(quantity::kLength)) / (2.0 * M_PI);

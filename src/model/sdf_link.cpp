@@ -1,5 +1,4 @@
-// Links. Inertias that no body can have are replaced by those of a box as large as the collisions,
-// and told.
+// Links. Impossible inertias are replaced by those of a box around the collisions, and reported.
 #include "model/sdf_link.h"
 
 #include <cmath>
@@ -14,7 +13,7 @@
 namespace ruedo::model {
 namespace {
 
-// Of a surface, what changes how things move in Gazebo and does not here.
+// Surface parameters that change motion in Gazebo, but have no effect here.
 void name_what_has_no_effect(const Element& surface, const std::string& where, Findings& findings) {
   const auto name = [&](const char* path, const std::string& text) {
     findings.unsupported(surface.child(path)->source, where,
@@ -31,7 +30,7 @@ void name_what_has_no_effect(const Element& surface, const std::string& where, F
     name("contact/collide_without_contact", "the shape collides as others do");
 }
 
-// Friction beside mu and mu2, and what the contact yields.
+// Friction other than mu and mu2, and compliance of the contact.
 void read_contact(const Element& surface, Surface& s) {
   const Allowed friction = Allowed::not_negative(quantity::kFriction),
                 direction = Allowed::any(quantity::kFactor),
@@ -64,7 +63,7 @@ Surface read_surface(const Element& surface, const std::string& where, ReadConte
   Surface s;
   const Allowed part = Allowed::between(0, 1),
                 friction = Allowed::not_negative(quantity::kFriction);
-  // gz-sim reads friction/ode; friction/bullet is what an author gave for Bullet alone.
+  // gz-sim reads friction/ode; friction/bullet holds an author's values for Bullet alone.
   const char* engine = !surface.has("friction/ode") && surface.has("friction/bullet")
                            ? "friction/bullet/"
                            : "friction/ode/";
@@ -119,7 +118,7 @@ Visual read_visual(const Element& element, const Pose& X_LV, Geometry geometry,
   return v;
 }
 
-constexpr double kLightest_kg = 1e-9;  // of less, an impulse would make any speed
+constexpr double kLightest_kg = 1e-9;  // with less, an impulse could produce any speed
 
 // A moment of inertia; NaN where exporters wrote nan.
 double moment(const Element& inertia, const char* name, double fallback) {
@@ -129,12 +128,12 @@ double moment(const Element& inertia, const char* name, double fallback) {
   return inertia.number(name, fallback, Allowed::any(quantity::kInertia));
 }
 
-// What is wrong with an inertia, "" when a body can have it. A thousandth is left for rounded
-// figures.
+// What is wrong with an inertia; "" if a body can have it. A tolerance of a thousandth allows for
+// rounding.
 std::string inertia_fault(const Inertial& inertial) {
   if (!inertial.inertia.allFinite()) return "a moment of inertia is not a number";
   Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver(inertial.inertia);
-  const Vec3 moments = solver.eigenvalues();  // ascending
+  const Vec3 moments = solver.eigenvalues();  // sorted, ascending
   if (!(moments[0] > 0)) return "the moments of inertia are not all positive";
   if (moments[0] + moments[1] < moments[2] * (1 - 1e-3))
     return "one moment of inertia is larger than the sum of the two others";
@@ -146,7 +145,7 @@ std::string in_words(const Vec3& size) {
   return rounded(size.x()) + " x " + rounded(size.y()) + " x " + rounded(size.z()) + " m";
 }
 
-// The inertia of a box around the collisions, or of 0.1 m where there are none.
+// The inertia of a box around the collisions; of a cube of 0.1 m if there are none.
 Eigen::Matrix3d box_inertia(double mass, const Link& link, Vec3& size) {
   Eigen::AlignedBox3d box;
   for (const Collision& c : link.collisions) {
@@ -163,8 +162,8 @@ Eigen::Matrix3d box_inertia(double mass, const Link& link, Vec3& size) {
       .asDiagonal();
 }
 
-// Volume, and the moments about the middle for a density of 1; nullopt: a shape of which they are
-// not known.
+// Volume, and moments about the centre for density 1; nullopt: a shape for which they are not
+// known.
 std::optional<std::pair<double, Vec3>> solid(const Geometry& geometry) {
   const double x = geometry.size.x(), y = geometry.size.y(), z = geometry.size.z();
   const auto with = [](double volume, double xx, double yy, double zz) {
@@ -184,9 +183,9 @@ std::optional<std::pair<double, Vec3>> solid(const Geometry& geometry) {
   }
 }
 
-// auto="true": mass, centre and moments of the collisions' solids (of SDF's default density, 1000
-// kg/m^3, where none is written), scaled to <mass> if there is one. False when the solid of a shape
-// is not known.
+// auto="true": mass, centre and moments of the collisions' solids (with SDF's default density of
+// 1000 kg/m^3 if none is given), scaled to <mass> if there is one. False if the solid of a shape is
+// not known.
 bool computed_inertial(const Element& element, const Element& link_element, const Link& link,
                        Inertial& inertial) {
   const std::vector<const Element*> written = link_element.all("collision");
@@ -265,7 +264,7 @@ Inertial read_inertial(const Element& element, const Element& link_element, cons
   return inertial;
 }
 
-// What a link may say and Ruedo does not do.
+// Parts of a link that Ruedo does not support.
 void report_unsupported(const Element& element, const std::string& where, Findings& findings) {
   if (const Element* decay = element.child("velocity_decay");
       decay && (decay->number("linear", 0.0, Allowed::any(quantity::kDamping)) != 0.0 ||

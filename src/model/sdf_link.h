@@ -1,5 +1,5 @@
-// <link> and what it holds: inertia, collisions, visuals, lights, sensors. And <light>, wherever it
-// is.
+// <link> and its contents: inertia, collisions, visuals, lights, sensors. Also <light> anywhere
+// else.
 #pragma once
 
 #include <functional>
@@ -11,10 +11,10 @@
 
 namespace ruedo::model {
 
-// The pose of a link's child (its <pose>, relative_to included) in the link's frame.
+// The pose of a link's child (<pose>, with relative_to) in the link's frame.
 using PoseInLink = std::function<Pose(const Element&)>;
 
-// The link without its X_ML; its sensors are appended to `sensors` with the index `link`.
+// The link, without its X_ML; its sensors are appended to `sensors`, with the index `link`.
 Link read_link(const Element& element, const PoseInLink& pose_in_link, const std::string& where,
                ReadContext& context, ModelLinkIndex link, std::vector<SensorDescription>& sensors);
 
@@ -22,10 +22,10 @@ Link read_link(const Element& element, const PoseInLink& pose_in_link, const std
 Light read_light(const Element& element, const Pose& pose, const std::string& where,
                  ReadContext& context);
 
-// A sensor; its name as written, with "::" as ".".
+// A sensor, with its name as written except that "::" becomes ".".
 SensorDescription read_sensor(const Element& element, ModelLinkIndex link, const Pose& X_LS);
 
-// Files of another layout than SDF's sensors say what plugins they name.
+// The plugins of a sensor in a file whose layout differs from SDF.
 void collect_plugins(const Element& element, std::vector<const Element*>& plugins);
 
 }  // namespace ruedo::model

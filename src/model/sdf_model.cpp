@@ -1,4 +1,4 @@
-// <model>: its frames, links and joints; nested models flattened into it.
+// <model>: its frames, links and joints. Nested models are flattened into it.
 #include <algorithm>
 #include <set>
 
@@ -13,7 +13,7 @@
 namespace ruedo::model {
 namespace {
 
-constexpr size_t kMaxLinks = 20'000;  // of one model: includes of includes cannot grow without end
+constexpr size_t kMaxLinks = 20'000;  // per model: includes of includes cannot grow without end
 
 struct Nested {
   std::shared_ptr<const ScopedModel> scope;
@@ -22,7 +22,7 @@ struct Nested {
   bool merged = false;
 };
 
-// A joint that keeps what a static nested model brings from moving with the rest.
+// The joint that fixes the links of a static nested model to the world.
 Joint anchor(const std::string& name, ModelLinkIndex link, const Pose& X_MJ, const Source& source) {
   Joint joint;
   joint.name = name + ".anchor";
@@ -33,7 +33,7 @@ Joint anchor(const std::string& name, ModelLinkIndex link, const Pose& X_MJ, con
   return joint;
 }
 
-// Doors and lifts that are called like a joint have its scoped name.
+// Doors and lifts that share a joint's name get its scoped name.
 void append_lifts(const Model& from, const std::string& prefix, int first_joint, Model& into) {
   const auto scoped = [&](const std::string& name) {
     const bool of_joint = std::any_of(from.doors.begin(), from.doors.end(), [&](const Door& door) {
@@ -60,7 +60,7 @@ void append_lifts(const Model& from, const std::string& prefix, int first_joint,
   }
 }
 
-// Takes over a nested model: links, joints and sensors with the scoped name.
+// Merges a nested model: links, joints and sensors, with scoped names.
 void append_nested(const Nested& nested, const Pose& X_MN, Model& into, Findings& findings) {
   const Model& from = *nested.scope->model;
   const std::string prefix = nested.merged ? "" : dotted(nested.name) + ".";
@@ -108,7 +108,7 @@ void append_nested(const Nested& nested, const Pose& X_MN, Model& into, Findings
   if (from.path && !into.path && into.links.size() == from.links.size()) into.path = from.path;
 }
 
-// Makes `canonical` link 0; every index follows.
+// Makes `canonical` link 0, and renumbers all indices.
 void bring_to_front(ModelLinkIndex canonical, ScopedModel& scope, Model& model) {
   if (canonical <= 0) return;
   std::rotate(model.links.begin(), model.links.begin() + canonical,
@@ -126,7 +126,7 @@ void bring_to_front(ModelLinkIndex canonical, ScopedModel& scope, Model& model) 
   for (auto& [name, frame] : scope.frames) moved(frame.link);
 }
 
-// A sensor of a joint sits on the joint's child.
+// A sensor in a joint is carried by the joint's child.
 SensorDescription joint_sensor(const Element& element, const Joint& joint, const Pose& X_MS,
                                const Model& model) {
   const Pose& X_ML = model.links[joint.child].X_ML;
@@ -135,7 +135,7 @@ SensorDescription joint_sensor(const Element& element, const Joint& joint, const
   return sensor;
 }
 
-// Without a frame of its own its <pose> is in the joint's.
+// Unless it names another frame, its <pose> is relative to the joint.
 void read_joint_sensor(const Element& element, FrameGraph& frames, Model& model) {
   const Joint& joint = model.joints.back();
   const std::string frame = relative_to(element);
@@ -145,8 +145,8 @@ void read_joint_sensor(const Element& element, FrameGraph& frames, Model& model)
 
 }  // namespace
 
-// Reads one <model>: first the names of all its parts, then their poses, since frames may be
-// written in any order.
+// Reads one <model>: the names of all its parts first, then their poses, since frames may be
+// declared in any order.
 class SdfReader::ModelReader {
  public:
   ModelReader(SdfReader& reader, const Element& element, SdfVersion version)
@@ -157,7 +157,7 @@ class SdfReader::ModelReader {
         where_("model " + required_name(element)),
         frames_(where_) {}
 
-  // nullptr: it has no link, which is told.
+  // nullptr: it has no link, which is reported.
   std::shared_ptr<const ScopedModel> read();
 
  private:
@@ -199,8 +199,8 @@ class SdfReader::ModelReader {
   ModelLinkIndex first_own_link_;
   JointPositions starts_;  // <initial_position> of each joint
   bool parts_missing_ = false;
-  bool all_static_ = true;             // all that it consists of
-  std::set<const Element*> left_out_;  // children
+  bool all_static_ = true;             // whether all its parts are static
+  std::set<const Element*> left_out_;  // children that are left out
   std::set<std::string> joint_names_;
   std::vector<Joint> anchors_;
 };
@@ -258,7 +258,8 @@ void SdfReader::ModelReader::read_attributes() {
 }
 
 void SdfReader::ModelReader::read_parts() {
-  std::vector<const Element*> in_order;  // frames last: of two of one name the frame goes
+  // frames last: of two things with one name, the frame is dropped
+  std::vector<const Element*> in_order;
   const auto rank = [](const Element& child) {
     return child.name == "frame" ? 2 : child.name == "joint" ? 1 : 0;
   };
@@ -298,7 +299,8 @@ void SdfReader::ModelReader::read_part(const Element& child) {
   } else if (child.name == "frame") {
     const std::string* frame = child.attribute("attached_to");
     node = attached_node(child, frame ? *frame : "");
-    // A frame may be named like something else, which is told; everything else may not.
+    // A frame may not share its name with anything else: it is dropped and reported. For other
+    // duplicates the model is refused.
     if (frames_.has(node->name)) child.fail("the name '" + node->name + "' is taken in " + where_);
   } else if (child.name == "model" || child.name == "include") {
     node = nested_node(child);
@@ -310,7 +312,7 @@ void SdfReader::ModelReader::read_part(const Element& child) {
                                      std::to_string(kMaxLinks) + " links");
 }
 
-// What is called and placed as its element says.
+// The node of a part, with name and pose from its element.
 FrameGraph::Node SdfReader::ModelReader::framed(const Element& child) const {
   FrameGraph::Node node;
   node.element = &child;
@@ -336,7 +338,7 @@ FrameGraph::Node SdfReader::ModelReader::attached_node(const Element& child,
   return node;
 }
 
-// nullopt: the part is missing, which is told.
+// nullopt: the part is missing, which has been reported.
 std::optional<FrameGraph::Node> SdfReader::ModelReader::nested_node(const Element& child) {
   std::optional<Nested> part = nested_part(child);
   if (!part) {
@@ -365,7 +367,7 @@ std::optional<Nested> SdfReader::ModelReader::nested_part(const Element& child) 
   if (child.name == "model") {
     part.scope = reader_.read_model(child, version_);
     part.name = required_name(child);
-    part.merged = child.attribute("merge") != nullptr;  // by a joint of the world
+    part.merged = child.attribute("merge") != nullptr;  // merged because of a joint of the world
   } else {
     auto included = reader_.include(child, where_ + "/include");
     if (included && !included->model) child.fail("is no model; a model can include models only");
@@ -377,7 +379,7 @@ std::optional<Nested> SdfReader::ModelReader::nested_part(const Element& child) 
   return part;
 }
 
-// Links and nested models in the file's order, as the indices were given.
+// Links and nested models in file order, the order in which indices were assigned.
 void SdfReader::ModelReader::append_links() {
   size_t next_nested = 0;
   for (const auto& child : element_.children) {
@@ -388,7 +390,7 @@ void SdfReader::ModelReader::append_links() {
                (child->name == "model" || child->name == "include") &&
                model_->links.size() == nested_[next_nested].first_link) {
       const Nested& part = nested_[next_nested];
-      // A part that is missing left no entry: this one is told by whose element it is.
+      // A missing part left no entry: it is recognised by the element of the entry.
       if (!frames_.is_from(part.name, *child)) continue;
       ++next_nested;
       append_part(part, *child);
@@ -424,7 +426,7 @@ void SdfReader::ModelReader::append_part(const Nested& part, const Element& chil
         anchor(model_->links[i].name, ModelLinkIndex(i), model_->links[i].X_ML, child.source));
 }
 
-// Every name's pose and link, for files that nest or place this model.
+// The pose and link of every name, for files that nest or place this model.
 void SdfReader::ModelReader::export_frames() {
   for (const std::string& name : frames_.names()) {
     read_or_leave_out(where_, "the frame '" + name + "' is left out", findings_, [&] {
@@ -504,7 +506,7 @@ void SdfReader::ModelReader::read_joints() {
   }
 }
 
-// Of Gazebo Classic, where a joint had no <mimic>.
+// For Gazebo Classic, whose joints had no <mimic>.
 void SdfReader::ModelReader::read_mimic_plugin(const Element& plugin) {
   const auto named = [&](const char* what) -> Joint& {
     const std::string name = dotted(plugin.string(what, ""));
@@ -559,7 +561,7 @@ void SdfReader::ModelReader::read_initial_position(const Element& child, const s
   });
 }
 
-// <ros2_control>: where gz_ros2_control puts a joint at the start.
+// <ros2_control>: the position at which gz_ros2_control starts a joint.
 void SdfReader::ModelReader::read_initial_values(const Element& system) {
   for (const Element* joint : system.all("joint")) {
     const std::string* name = joint->attribute("name");
@@ -580,7 +582,7 @@ void SdfReader::ModelReader::read_initial_values(const Element& system) {
   }
 }
 
-// What was not found may have held its links.
+// Missing parts may have contained its links.
 bool SdfReader::ModelReader::lacks_an_end(const Element& joint) {
   const std::string parent = joint_end(joint, "parent");
   return (parent != "world" && !frames_.has(parent)) || !frames_.has(joint_end(joint, "child"));

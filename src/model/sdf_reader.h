@@ -1,8 +1,8 @@
-// SDF 1.3 to 1.12: worlds and models, includes, nested models, joints. The element tree in, models
-// out.
+// Reads SDF 1.3 to 1.12: worlds and models, includes, nested models, joints. Turns the element tree
+// into models.
 //
-// What is wrong throws InputError; what can be gone on from is in the context's findings. One
-// reader serves one load; a file that is included a thousand times is read once.
+// Errors throw InputError; recoverable faults go to the context's findings. One reader serves one
+// load; a file that is included a thousand times is read once.
 #pragma once
 
 #include <map>
@@ -22,27 +22,27 @@ class SdfReader {
  public:
   explicit SdfReader(ReadContext& context) : context_(context) {}
 
-  // The file's <sdf> element, checked: its version, and that it is one.
+  // The file's <sdf> element, after checking its name and version.
   SdfVersion version_of(const Element& root);
 
   // Adds the world's physics, scene, lights and models.
   void read_world(const Element& world, SdfVersion version, WorldModel& result);
 
-  // A model, as its own element says. nullptr: it has no link (told as a finding).
+  // A model from its own element. nullptr: it has no link (reported as a finding).
   std::shared_ptr<const ScopedModel> read_model(const Element& element, SdfVersion version);
 
-  // The model of a file, or of the folder that holds one: for --spawn and includes.
+  // The model in a file, or in the folder that holds one: for --spawn and includes.
   struct Included {
-    std::shared_ptr<const ScopedModel> model;  // null: `light` it is, or an actor
+    std::shared_ptr<const ScopedModel> model;  // null: it is a `light`, or an actor
     std::shared_ptr<const Element> document;
     const Element* light = nullptr;
     const Element* actor = nullptr;
     SdfVersion version;
-    std::string name;  // <include>'s, or the file's
+    std::string name;  // the <include>'s name, or the file's
   };
   Included read_file(const std::string& path, const Element& asker);
 
-  // Files that are being read, from the outermost: a file that is in it already includes itself.
+  // Files being read, outermost first: naming one of them again would be a cycle.
   void enter(const std::string& path, const Element& asker);
   void leave() { files_.pop_back(); }
 
@@ -53,7 +53,7 @@ class SdfReader {
   std::optional<Included> include(const Element& element, const std::string& where);
   std::shared_ptr<const ScopedModel> read_overridden(const Element& model, const Element& include,
                                                      SdfVersion version);
-  // The instances of a <ruedo:fleet>, after what the world has already.
+  // Adds the instances of a <ruedo:fleet> after the world's existing models.
   void read_fleet(const Element& element, WorldModel& world, size_t most_models);
   class ModelReader;  // of one <model>
   class WorldReader;  // of one <world>
@@ -65,7 +65,7 @@ class SdfReader {
     bool is_robot;
   };
   std::vector<Member> members(const Element& world, SdfVersion version);
-  // A world with joints of its own, as one without: models that they tie together are in one.
+  // Rewrites a world with joints of its own to one without: connected models become one.
   std::unique_ptr<Element> with_joined_models(const Element& world, SdfVersion version);
   std::unique_ptr<Element> join(const std::vector<Member>& all, const std::vector<int>& group,
                                 int which,
@@ -80,31 +80,31 @@ class SdfReader {
 // The frame in <pose relative_to=""> (SDF 1.7 on) or <pose frame=""> (before); "": none.
 std::string relative_to(const Element& owner);
 
-// A name without '/', spaces and control characters: each becomes '_', '?' for what is not UTF-8
-// and for its control characters.
+// A name without '/', spaces and control characters: each becomes '_', and '?' replaces bytes that
+// are not UTF-8 and UTF-8's control characters.
 std::string made_fit_for_channel(const std::string& name);
 
-// Makes the devices' names fit for channels and unique: of two sensors with one name, each becomes
-// LINK-SENSOR. Throws InputError for names that Ruedo's own channels have, and for two that stay
-// the same.
+// Makes the devices' names unique and usable in channel names: sensors with the same name become
+// LINK-SENSOR. Throws InputError for names reserved for Ruedo's own channels, and for names that
+// stay equal.
 void make_sensor_names_unique(Model& model, const std::string& where, Findings& findings);
 
-// Checks that the names of an instance and of its devices are fit for channels.
+// Checks that the names of an instance and of its devices are usable in channel names.
 void check_channel_names(const ModelInstance& instance, const Source& source);
 
-// The frame of a joint: of its name, or one beside it where a link has the name.
+// The frame of a joint: by its name, or by a substitute name if a link has the same name.
 std::string joint_frame(FrameGraph& frames, const std::string& joint);
 std::string beside_link(const std::string& joint);
 
-// The name in a joint's <parent> or <child>, which old files write in <link_name>; "" when there is
+// The name in a joint's <parent> or <child>, which old files write in <link_name>; "" if there is
 // none.
 std::string joint_end(const Element& joint, const char* which);
 
-// <joint> to Joint; the frames are those of its model.
+// Reads <joint>; its frames are those of the model.
 Joint read_joint(const Element& element, SdfVersion version, FrameGraph& frames,
                  const IndexedVector<ModelLinkIndex, Link>& links, const std::string& where,
                  ReadContext& context);
-// Its <mimic>, when all joints of the model are read.
+// Reads its <mimic>, once all joints of the model are read.
 void read_mimic(const Element& element, const IndexedVector<ModelJointIndex, Joint>& joints,
                 Joint& joint);
 

@@ -1,4 +1,4 @@
-// Versions of SDF: read, compared, and which of them Ruedo understands.
+// Versions of SDF: parsing, comparison, and which of them Ruedo supports.
 #pragma once
 
 #include <compare>
@@ -12,7 +12,7 @@ struct SdfVersion {
   int minor = 9;
   auto operator<=>(const SdfVersion&) const = default;
 
-  // "1.9"; nothing else than two whole numbers.
+  // "1.9": exactly two whole numbers.
   static std::optional<SdfVersion> parse(const std::string& text) {
     const size_t dot = text.find('.');
     if (dot == std::string::npos) return std::nullopt;

@@ -77,7 +77,7 @@ void read_physics(const Element& world_element, WorldModel& world, Findings& fin
   world.gravity = world_element.vector3("gravity", world.gravity, gravity);
 }
 
-// The plugin by which gz-sim's server knows performers and levels; it has no library.
+// The plugin that declares performers and levels to gz-sim's server; it has no library.
 bool has_levels(const Element& plugin) {
   const std::string* name = plugin.attribute("name");
   return name && (*name == "gz::sim" || *name == "ignition::gazebo");
@@ -104,7 +104,7 @@ std::vector<const Element*> read_performers(const Element& world, const std::str
   return performers;
 }
 
-// Who is no model of the world is nowhere.
+// Performers that are not models of the world are reported and ignored.
 void check_performers(const WorldModel& world, const std::vector<const Element*>& performers,
                       Findings& findings) {
   for (const Element* each : performers) {
@@ -116,7 +116,7 @@ void check_performers(const WorldModel& world, const std::vector<const Element*>
   }
 }
 
-// In Gazebo, too, it takes a plugin; servers have been told to load it for every world.
+// In Gazebo it takes a plugin as well, which servers may have been told to load for every world.
 void name_wind_without_plugin(const Element& element, const WorldModel& world, Findings& findings) {
   const Wind& wind = world.environment.wind;
   if (wind.pushes || wind.velocity == Vec3::Zero()) return;
@@ -130,8 +130,8 @@ void name_wind_without_plugin(const Element& element, const WorldModel& world, F
   }
 }
 
-// Of a world, what changes things in Gazebo and does not here, where it says more than the format's
-// own default.
+// World parameters that change Gazebo's results, but have no effect here, where they differ from
+// the format's default.
 void name_what_has_no_effect(const Element& world, const std::string& where, Findings& findings) {
   const auto name = [&](const char* path, const std::string& text) {
     if (const Element* element = world.child(path))
@@ -188,9 +188,8 @@ Fault read_fault(const Element& e) {
 
 namespace {
 
-// The trajectories of an actor's <script>, one after another, each with a clock of its own, as one
-// list of waypoints "time x y z 0 0 yaw". Skins lie on their back in their own frame; a person
-// walks upright.
+// Joins the trajectories in an actor's <script>, each with its own clock, to one list of waypoints
+// "time x y z 0 0 yaw". Skins lie on their back in their own frame; a person walks upright.
 class Script {
  public:
   Script(const Element& script, const std::string& where, Findings& findings)
@@ -221,14 +220,15 @@ class Script {
       if (at.size() != 6)
         waypoint->child("pose")->fail("'" + waypoint->child("pose")->text +
                                       "' is not allowed; allowed are x y z roll pitch yaw");
-      if (last < 0 && time > 0) walk(begin, at);  // there from the start
+      if (last < 0 && time > 0) walk(begin, at);  // stands there from the start
       walk(begin + time, at);
       last = time;
     }
   }
 
   void walk(double time, const std::vector<double>& at) {
-    constexpr double kJump_s = 1e-6;  // to where the next trajectory begins
+    // time in which the actor jumps to the start of the next trajectory
+    constexpr double kJump_s = 1e-6;
     if (!waypoints_.empty() && time <= end_) time = end_ + kJump_s;
     end_ = time;
     std::string text;
@@ -256,8 +256,8 @@ void name_plugins_of_actor(const Element& actor, const std::string& where, Findi
 
 }  // namespace
 
-// An actor is a person: a cylinder that stands on the floor and moves along his trajectories,
-// without a skin.
+// An actor becomes a person: a cylinder on the floor that moves along its trajectories, without a
+// skin.
 std::shared_ptr<const Model> SdfReader::actor_model(const Element& actor, Pose& X_WM,
                                                     ReadContext& context) {
   constexpr double kHeight = 1.7, kRadius = 0.25;  // m
@@ -292,7 +292,7 @@ std::shared_ptr<const Model> SdfReader::actor_model(const Element& actor, Pose& 
 
 namespace {
 
-// Puts an actor's feet on the floor of each of his waypoints: only the world knows where that is.
+// Puts an actor's feet on the floor at each waypoint: the floor is only known once the world is.
 void stand_actor(const Room& room, ModelInstance& instance) {
   Vec3& at = instance.X_WM.translation;
   at.z() = room.floor_height(at.x(), at.y(), at.z());
@@ -324,7 +324,8 @@ void stand_actors(const std::set<std::string>& actors, WorldModel& world) {
 
 }  // namespace
 
-// Reads one <world>: its settings first, then what stands in it with names and frames, then places.
+// Reads one <world>: its settings first, then the names and frames of its contents, then their
+// positions.
 class SdfReader::WorldReader {
  public:
   WorldReader(SdfReader& reader, const Element& element, SdfVersion version, WorldModel& world)
@@ -366,7 +367,7 @@ class SdfReader::WorldReader {
   };
 
   void read_settings() {
-    const std::string* name = element_.attribute("name");  // no name is reserved for it
+    const std::string* name = element_.attribute("name");  // any name is allowed for a world
     world_.name = name ? *name : "";
     if (world_.name.empty()) {
       world_.name = "world";
@@ -405,7 +406,7 @@ class SdfReader::WorldReader {
     }
   }
 
-  // Frames last: of two things of one name the frame goes.
+  // Frames last: of two things with one name, the frame is dropped.
   void read_children() {
     for (const bool frames : {false, true}) {
       for (const auto& child : element_.children) {
@@ -511,7 +512,7 @@ class SdfReader::WorldReader {
     world_.models.push_back(std::move(instance));
   }
 
-  // Channels have the robot's name in theirs.
+  // Channel names contain the robot's name.
   void name_robot(ModelInstance& instance, const Source& source) {
     const std::string fit = made_fit_for_channel(instance.name);
     std::string name = fit;
@@ -538,7 +539,7 @@ class SdfReader::WorldReader {
   FrameGraph frames_{"the world"};
   std::vector<Placed> placed_;
   std::set<std::string> actors_;
-  std::map<std::string, int> numbers_;  // of the next thing of a name
+  std::map<std::string, int> numbers_;  // the next number for each name
 };
 
 void SdfReader::read_world(const Element& element, SdfVersion version, WorldModel& world) {

@@ -1,6 +1,6 @@
-// IMUs, GPS receivers, magnetometers, barometers, force-torque sensors and poses of gazebo_plugins,
-// hector_gazebo_plugins and gz-sim. Names of parameters are those of the plugins' own
-// documentation; each has had several spellings.
+// IMU, GPS, magnetometer, barometer, force-torque and pose plugins of gazebo_plugins,
+// hector_gazebo_plugins and gz-sim. Parameter names follow the plugins' documentation; each has had
+// several spellings.
 #include "model/sensor_plugins.h"
 
 #include <algorithm>
@@ -24,7 +24,7 @@ Element& add(Element& parent, const std::string& name, const std::string& text =
   return child;
 }
 
-// The first of these children that the plugin has.
+// The first of these children that is given.
 const Element* first_of(const Element& plugin, const Words& names) {
   for (const std::string& name : names) {
     if (const Element* child = plugin.child(name)) return child;
@@ -37,7 +37,7 @@ double number(const Element& plugin, const Words& names, double fallback, Allowe
   return written ? written->as_number(allowed) : fallback;
 }
 
-// One number for all axes, or one each.
+// One number for all axes, or one for each.
 std::vector<double> axes(const Element* written, double fallback) {
   if (!written) return {fallback, fallback, fallback};
   std::vector<double> values = written->as_numbers(Allowed::any(quantity::kNoise));
@@ -47,14 +47,14 @@ std::vector<double> axes(const Element* written, double fallback) {
   return values;
 }
 
-// hector's model of errors (sensor_model.h): white noise, a constant offset, and a drift, which is
-// a Gauss-Markov process of that stationary deviation and of the correlation time 1 / frequency. As
-// SDF's dynamic bias, whose stationary variance is sigma^2 tau / 2, sigma is drift sqrt(2
+// hector's error model (sensor_model.h): white noise, a constant offset, and a drift, which is a
+// Gauss-Markov process with that stationary deviation and correlation time 1 / frequency. Expressed
+// as SDF's dynamic bias, whose stationary variance is sigma^2 tau / 2, sigma is drift sqrt(2
 // frequency).
 struct Errors {
   std::vector<double> noise, offset, drift, frequency;
 
-  // prefix: "", "velocity", "accel", "rate". usual: where the prefixed noise is not given.
+  // prefix: "", "velocity", "accel", "rate". usual: used where the prefixed noise is not given.
   Errors(const Element& plugin, const std::string& prefix, const Element* usual = nullptr) {
     constexpr double kDriftFrequency = 1.0 / 3600.0;  // Hz, hector's default
     const auto of = [&](std::string name) {
@@ -68,7 +68,7 @@ struct Errors {
     frequency = axes(of("driftFrequency"), kDriftFrequency);
   }
 
-  // <noise> of an axis, scaled into the unit of what it is added to.
+  // The <noise> of an axis, scaled to the unit of the value that it is added to.
   void add_to(Element& quantity, size_t axis, double scale = 1.0) const {
     if (noise[axis] == 0.0 && offset[axis] == 0.0 && drift[axis] == 0.0) return;
     Element& element = add(quantity, "noise");
@@ -120,8 +120,8 @@ void make_imu(const Made& made) {
                       "the orientation is the true one");
 }
 
-// hector's x axis of the world is at the compass heading <referenceHeading>; 49.9 N, 8.9 E are its
-// defaults.
+// In hector's plugin, the world's x axis points to the compass heading <referenceHeading>; 49.9 N,
+// 8.9 E are its defaults.
 void make_gps(const Made& made) {
   Element& navsat = add(made.sensor, "navsat");
   Errors(made.plugin, "").add_horizontal_and_vertical(add(navsat, "position_sensing"));
@@ -141,7 +141,7 @@ void make_gps(const Made& made) {
   made.without_effect({"status", "service"}, "every fix is a good one");
 }
 
-// In the unit of <magnitude>; the x axis of the world is at the compass heading <referenceHeading>.
+// In the unit of <magnitude>; the world's x axis points to the compass heading <referenceHeading>.
 void make_magnetometer(const Made& made) {
   constexpr double kDegree = M_PI / 180.0;
   Errors(made.plugin, "").add_axes(add(made.sensor, "magnetometer"));
@@ -157,7 +157,7 @@ void make_magnetometer(const Made& made) {
       shown(field[0]) + " " + shown(field[1]) + " " + shown(field[2]));
 }
 
-// Its noise is in metres of height; 12.013 Pa are a metre at sea level, p g / (R T).
+// The plugin's noise is in metres of height; a metre is 12.013 Pa at sea level, p g / (R T).
 void make_barometer(const Made& made) {
   Element& air = add(made.sensor, "air_pressure");
   add(air, "reference_altitude",
@@ -209,7 +209,7 @@ const Element& required(const Element& plugin, const char* name) {
   return *child;
 }
 
-// The last part of a topic, where it is fit for a channel's name: as short as that.
+// The last part of a topic, if it is usable in a channel name.
 void name_by_topic(const std::string& topic, Element& sensor) {
   constexpr size_t kLongest = 24;
   std::string name = topic;
@@ -258,7 +258,7 @@ void make_detector(const Made& made) {
 struct Maker {
   const char* plugin;
   const char* type;
-  const char* name;  // where the plugin's own name is none for a device
+  const char* name;  // used if the plugin's own name cannot be a device's
   void (*make)(const Made&);
 };
 
@@ -275,7 +275,7 @@ constexpr Maker kMakers[] = {
     {"PerformerDetector", "ruedo:performer_detector", "performer_detector", make_detector},
 };
 
-// <xyzOffset> and <rpyOffset>, as a <pose> of the sensor.
+// <xyzOffset> and <rpyOffset>, as the <pose> of the sensor.
 void add_pose(const Element& plugin, Element& sensor) {
   const auto three = [&](const Words& names) {
     const Element* written = first_of(plugin, names);

@@ -1,4 +1,4 @@
-// Plugins that make a sensor without a <sensor>: the <sensor> that says the same.
+// Plugins that provide a sensor without a <sensor> element: translated to an equivalent <sensor>.
 #pragma once
 
 #include <memory>
@@ -10,12 +10,12 @@
 namespace ruedo::model {
 
 struct PluginSensor {
-  std::unique_ptr<Element> sensor;  // null: the plugin makes none that there is here
-  std::string link;                 // whose it is; "": the model's first
-  std::string joint;                // of a sensor in a joint, instead
+  std::unique_ptr<Element> sensor;  // null: the plugin provides no sensor supported here
+  std::string link;                 // that carries it; "": the model's first link
+  std::string joint;                // for a sensor in a joint, in place of a link
 };
 
-// What of the plugin has no effect goes to `findings`. performers: the world's <performer>s.
+// Parameters without effect go to `findings`. performers: the world's <performer>s.
 PluginSensor sensor_from_plugin(const Element& plugin, const std::string& where,
                                 const std::vector<const Element*>& performers, Findings& findings);
 

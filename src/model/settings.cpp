@@ -1,4 +1,4 @@
-// Settings edit a copy of a sensor's or a drive's element, which its own reader then reads as if
+// Settings edit a copy of the element of a sensor or drive, which the usual reader then reads as if
 // the file said so.
 #include "model/settings.h"
 
@@ -26,8 +26,8 @@ std::string listed(const std::vector<std::string>& names) {
   return text.empty() ? "none" : text;
 }
 
-// What robots have without a <sensor>: what takes commands, and the devices that are attached to
-// them.
+// The devices of a robot that need no <sensor>: those that take commands, and those derived from
+// it.
 bool is_fixed_device(const std::string& name) {
   if (contains(kDriveDevices, name) || name == "joint_command") return true;
   return std::any_of(sensor_kinds().begin(), sensor_kinds().end(), [&](const SensorKind& kind) {
@@ -66,7 +66,7 @@ class RobotsByName {
   std::map<std::string, ModelInstance*> robots_;
 };
 
-// Keys of a sensor, so that what a file leaves out can be set, too.
+// All keys of a sensor, so that values missing in the file can be set, too.
 std::vector<std::string> known_keys(const std::string& type) {
   std::vector<std::string> keys = {"update_rate", "always_on", "pose"};
   for (const SensorKind& kind : sensor_kinds()) {
@@ -76,7 +76,7 @@ std::vector<std::string> known_keys(const std::string& type) {
   return keys;
 }
 
-// Every path below the element that ends in a text.
+// All paths below the element that end in a text.
 void collect_keys(const Element& element, const std::string& prefix,
                   std::vector<std::string>& keys) {
   for (const auto& child : element.children) {
@@ -96,8 +96,7 @@ std::string without_prefixes(std::string key) {
   return key;
 }
 
-// The one key that is meant: in full, or by an ending ("range.max"), "ruedo:" left out as one
-// likes.
+// The unique key that matches: in full, or by its ending ("range.max"); "ruedo:" may be omitted.
 std::string resolved(const std::string& wanted, const std::vector<std::string>& keys,
                      const std::string& option) {
   const std::string plain = without_prefixes(wanted);
@@ -154,7 +153,7 @@ void set_in_drive(Model& model, const Setting& setting, const std::string& optio
   copy->name = odometry ? "ruedo:odometry" : "ruedo:drive";
   set_text(*copy, resolved(setting.key, keys, option), setting.value, source);
   std::shared_ptr<const Element> edited = std::move(copy);
-  // base_link may have been moved by nesting, which the drive's own element does not know.
+  // Nesting may have moved base_link, which the drive's own element does not know.
   const Pose X_MBase = model.drive->X_MBase;
   auto drive = read_drive(odometry ? model.drive->element : edited,
                           odometry ? edited : model.drive->odometry, model);
@@ -248,7 +247,7 @@ void apply_disabled(const std::vector<std::string>& disabled, WorldModel& world)
     const std::string device = each.substr(slash + 1);
     const auto is_it = [&](const auto& sensor) { return sensor.name == device; };
     if (std::any_of(instance.model->sensors.begin(), instance.model->sensors.end(), is_it)) {
-      // A model without drive or sensors is not a robot.
+      // Without a drive and sensors, a model is not a robot.
       auto& less = without[{instance.model, device}];
       if (!less) {
         auto model = std::make_shared<Model>(*instance.model);

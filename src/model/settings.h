@@ -1,4 +1,4 @@
-// --drive, --set and --disable: changes to single robots of a world that is read.
+// --drive, --set and --disable: changes to individual robots of a loaded world.
 #pragma once
 
 #include <string>
@@ -8,16 +8,16 @@
 
 namespace ruedo::model {
 
-// Each robot that is changed gets a model of its own; the others go on sharing theirs. Throws
-// InputError for a robot, device or key that is not there, listing those that are.
+// Each changed robot gets a model of its own; the others keep sharing theirs. Throws InputError for
+// a robot, device or key that does not exist, listing those that do.
 void apply_settings(const std::vector<Setting>& settings, WorldModel& world);
 
-// Gives models a kinematic drive by their wheel joints; one that they have is replaced. The
-// odometry stays.
+// Gives models a kinematic drive by their wheel joints, in place of any that they have. Their
+// odometry is kept.
 void apply_drives(const std::vector<DriveOption>& drives, WorldModel& world);
 
-// "ROBOT/DEVICE": sensors are removed; a robot's own channels (odometry, pose, ...) are noted in
-// the world.
+// "ROBOT/DEVICE": sensors are removed; for a robot's own channels (odometry, pose, ...) it is
+// recorded in the world.
 void apply_disabled(const std::vector<std::string>& disabled, WorldModel& world);
 
 }  // namespace ruedo::model

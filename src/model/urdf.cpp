@@ -1,4 +1,4 @@
-// URDF to SDF elements. urdfdom says what the robot is; the tree of elements says in which lines.
+// Converts URDF to SDF elements. urdfdom parses the robot; the element tree provides line numbers.
 #include "model/urdf.h"
 
 #include <algorithm>
@@ -20,7 +20,7 @@
 namespace ruedo::model {
 namespace {
 
-// What urdfdom logs instead of throwing.
+// Collects what urdfdom logs instead of throwing.
 class Listener : public console_bridge::OutputHandler {
  public:
   Listener() { console_bridge::useOutputHandler(this); }
@@ -46,7 +46,7 @@ std::string escaped(const std::string& text) {
   return result;
 }
 
-// Back to text for urdfdom, without what it does not read.
+// Serialises elements for urdfdom, without the parts it does not read.
 void write_xml(const Element& element, std::string& out) {
   if (element.name == "gazebo" || element.name == "transmission" || element.name == "ros2_control")
     return;
@@ -113,10 +113,10 @@ void add_geometry(Element& parent, const urdf::Geometry* geometry, const Source&
   }
 }
 
-// What <gazebo reference="NAME"> blocks say of a link.
+// What the <gazebo reference="NAME"> blocks of a link say.
 struct GazeboLink {
   std::vector<const Element*> sensors;
-  std::vector<const Element*> as_written;  // elements of an SDF link, as Gazebo puts them there
+  std::vector<const Element*> as_written;  // elements of an SDF link, inserted as in Gazebo
   const Element* colour = nullptr;         // <visual><material>
   const Element* fdir1 = nullptr;
   std::string material;
@@ -127,8 +127,8 @@ struct GazeboLink {
   const Element* gravity_off = nullptr;
 };
 
-// The root link of this name is the world: what hangs on it is fixed to the world by its
-// joint, as Gazebo has it.
+// A root link of this name is the world: its children are fixed to the world by their joints, as in
+// Gazebo.
 constexpr const char* kWorld = "world";
 
 std::string name_of(const Element& link_or_joint) {
@@ -137,13 +137,13 @@ std::string name_of(const Element& link_or_joint) {
                                                                  : required_name(link_or_joint);
 }
 
-// In <gazebo> a value is an attribute or the text.
+// In <gazebo>, a value is an attribute or text.
 std::string value_of(const Element& element) {
   const std::string* value = element.attribute("value");
   return value ? *value : element.text;
 }
 
-// Settings of Gazebo's contact and joint solvers, for which there is nothing to set here.
+// Settings of Gazebo's contact and joint solvers that have no counterpart here.
 constexpr std::string_view kOfSolvers[] = {"minDepth",
                                            "min_depth",
                                            "maxVel",
@@ -161,7 +161,7 @@ constexpr std::string_view kOfSolvers[] = {"minDepth",
                                            "provideFeedback",
                                            "preserveFixedJoint",
                                            "disableFixedJointLumping"};
-// What a link's SDF takes as it is written.
+// The elements that a link's SDF takes over unchanged.
 constexpr std::string_view kOfLinks[] = {
     "gravity", "self_collide",   "selfCollide", "enable_wind", "kinematic",    "light",
     "battery", "velocity_decay", "projector",   "audio_sink",  "audio_source", "particle_emitter"};
@@ -177,7 +177,7 @@ struct Converter {
   const urdf::ModelInterface& urdf;
   std::map<std::string, GazeboLink> gazebo;
   std::map<std::string, std::vector<const Element*>> joint_sensors = {};
-  std::map<std::string, std::vector<const Element*>> springs = {};  // of joints
+  std::map<std::string, std::vector<const Element*>> springs = {};  // by joint
   std::unique_ptr<Element> model = std::make_unique<Element>();
 
   void read_gazebo() {
@@ -252,7 +252,8 @@ struct Converter {
   }
 
   void add_inertial(Element& link, const urdf::Link& from, const Source& source) {
-    // A link without mass is a frame: light enough not to matter, heavy enough for the physics.
+    // A link without mass is a frame: light enough not to matter, heavy enough for the physics
+    // engine.
     constexpr double kFrameMass_kg = 1e-3, kFrameInertia = 1e-6;
     Element& inertial = add(link, "inertial", source);
     double mass = kFrameMass_kg;
@@ -380,7 +381,7 @@ struct Converter {
                                                       {urdf::Joint::PRISMATIC, "prismatic"},
                                                       {urdf::Joint::PLANAR, "planar"}};
     const auto type = kTypes.find(from->type);
-    if (type == kTypes.end()) return;  // floating: nothing ties the two
+    if (type == kTypes.end()) return;  // floating: no constraint
     const Source& source = written.source;
     Element& joint = add(*model, "joint", source);
     joint.attributes.emplace_back("name", from->name);
@@ -398,7 +399,7 @@ struct Converter {
         add(limit, "lower", source, shown(from->limits->lower));
         add(limit, "upper", source, shown(from->limits->upper));
       }
-      // URDF requires both; robots that never moved in a simulator have zeroes there.
+      // URDF requires both; robots that were never simulated have zeroes there.
       if (from->limits->effort > 0) add(limit, "effort", source, shown(from->limits->effort));
       if (from->limits->velocity > 0) add(limit, "velocity", source, shown(from->limits->velocity));
     }
@@ -429,7 +430,7 @@ void refuse_xacro(const Element& element) {
   for (const auto& child : element.children) refuse_xacro(*child);
 }
 
-// urdfdom names what it stumbles over, without the line: the link or joint whose name its message
+// urdfdom names the faulty part without its line: finds the link or joint whose name its message
 // has in brackets or quotes.
 const Element& whom_it_names(const std::string& fault, const Element& robot) {
   for (const char* kind : {"joint", "link"}) {
@@ -444,8 +445,8 @@ const Element& whom_it_names(const std::string& fault, const Element& robot) {
 }
 
 struct Parsed {
-  urdf::ModelInterfaceSharedPtr model;  // null: urdfdom gave up
-  std::vector<std::string> errors;      // what it said
+  urdf::ModelInterfaceSharedPtr model;  // null: urdfdom refused the robot
+  std::vector<std::string> errors;      // its messages
 };
 
 Parsed parse(const Element& robot) {
@@ -462,8 +463,8 @@ Parsed parse(const Element& robot) {
   return parsed;
 }
 
-// The part of a link at which urdfdom stopped, for it leaves out what comes after a fault; null: it
-// read all of them. It reads the inertia first, then what is seen, then what collides.
+// The part of a link at which urdfdom stopped, since it drops everything after a fault; null: it
+// read all parts. It reads the inertia first, then visuals, then collisions.
 const Element* faulty_part(const Element& link, const urdf::Link& read,
                            const std::set<std::string>& of_bad_inertia) {
   if (link.has("inertial") && of_bad_inertia.count(name_of(link)) > 0)
@@ -474,7 +475,7 @@ const Element* faulty_part(const Element& link, const urdf::Link& read,
   return nullptr;
 }
 
-// Takes the parts out that urdfdom cannot read, so that it reads the others; true when there were
+// Removes the parts that urdfdom cannot parse, so that it parses the others; true if there were
 // any.
 bool leave_out_faults(Element& robot, const Parsed& parsed, Findings& findings) {
   constexpr size_t kMostSaid = 300;
@@ -513,7 +514,7 @@ std::unique_ptr<Element> urdf_as_sdf(const Element& written, Findings& findings)
   const std::string name = required_name(robot);
   repair_urdf(robot, findings);
   Parsed parsed = parse(robot);
-  constexpr int kMostFaults = 20;  // in one link
+  constexpr int kMostFaults = 20;  // per link
   for (int i = 0; i < kMostFaults && parsed.model && parsed.model->getRoot() &&
                   leave_out_faults(robot, parsed, findings);
        ++i)
@@ -535,11 +536,12 @@ std::unique_ptr<Element> urdf_as_sdf(const Element& written, Findings& findings)
   converter.read_gazebo();
   for (const Element* link : robot.all("link")) converter.add_link(*link);
   for (const Element* joint : robot.all("joint")) converter.add_joint(*joint);
-  for (const char* kind : {"transmission", "ros2_control"}) {  // for the drive's reader
+  for (const char* kind : {"transmission", "ros2_control"}) {  // needed by the drive's reader
     for (const Element* each : robot.all(kind)) model.children.push_back(each->clone());
   }
   if (!model.has("ruedo:joints"))
-    add(model, "ruedo:joints", robot.source);  // a <robot> is one, be it an arm without sensors
+    // makes any <robot> a robot, even an arm without sensors
+    add(model, "ruedo:joints", robot.source);
   Element sdf;
   sdf.name = "sdf";
   sdf.children.push_back(std::move(converter.model));

@@ -1,4 +1,4 @@
-// URDF robots: read by urdfdom, handed on as the SDF model that says the same, so that one reader
+// URDF robots: parsed by urdfdom and converted to an equivalent SDF model, so that one reader
 // serves both.
 #pragma once
 
@@ -8,8 +8,8 @@
 
 namespace ruedo::model {
 
-// The <model> for a <robot>; elements keep the file and line of what they were. Throws InputError
-// for what urdfdom refuses and for xacro that is not expanded.
+// The <model> for a <robot>; its elements keep the original file and line. Throws InputError for
+// what urdfdom refuses, and for unexpanded xacro.
 std::unique_ptr<Element> urdf_as_sdf(const Element& robot, Findings& findings);
 
 }  // namespace ruedo::model

@@ -15,7 +15,7 @@ struct Format {
   Words children, attributes;
 };
 
-// With what no simulator reads: <safety_controller>, <calibration>, <verbose>.
+// Including parts that no simulator reads: <safety_controller>, <calibration>, <verbose>.
 const std::map<std::string_view, Format>& formats() {
   static const std::map<std::string_view, Format> table = {
       {"robot",
@@ -69,7 +69,7 @@ void look(const Element& element, const std::string& where, Findings& findings) 
   if (format == formats().end()) return;
   const auto& [children, attributes] = format->second;
   for (const auto& [name, value] : element.attributes) {
-    // Others mean nothing to any simulator: a <geometry>'s name, an <axis>'s rpy.
+    // No simulator reads others, such as a <geometry>'s name or an <axis>'s rpy.
     if (holds(attributes, name) || nearest_word(name, attributes).empty()) continue;
     findings.unsupported(element.source, where,
                          name + "=\"" + value + "\" of <" + element.name +

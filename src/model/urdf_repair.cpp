@@ -10,7 +10,7 @@
 namespace ruedo::model {
 namespace {
 
-// Numbers that stand between blanks, as urdfdom reads them; -1: something else stands there, too.
+// The numbers separated by blanks, as urdfdom parses them; -1: the text holds something else.
 int count_of_numbers(const std::string& text) {
   std::istringstream in(text);
   in.imbue(std::locale::classic());
@@ -25,7 +25,7 @@ std::string name_of(const Element& element) {
   return name ? *name : "";
 }
 
-// The link that a joint's <parent> or <child> names; "": none.
+// The link named by a joint's <parent> or <child>; "": none.
 std::string end_of(const Element& joint, const char* which) {
   const Element* end = joint.child(which);
   const std::string* link = end ? end->attribute("link") : nullptr;
@@ -49,7 +49,7 @@ class Repair {
   }
 
  private:
-  // Takes what `odd` gives a reason for out of the robot, and names it.
+  // Removes the elements for which `odd` returns a reason, and reports them.
   template <typename Odd>
   void leave_out(const Odd& odd) {
     std::erase_if(robot_.children, [&](const auto& child) {
@@ -73,8 +73,7 @@ class Repair {
     });
   }
 
-  // Commas between a place's numbers are taken for blanks; what cannot be read is as if it were
-  // not there.
+  // Commas between coordinates are replaced by blanks; a pose that cannot be parsed is dropped.
   void places(Element& element, const std::string& where) {
     const std::string* name = element.attribute("name");
     const std::string inside = name ? element.name + " " + *name : where;
@@ -96,7 +95,8 @@ class Repair {
     }
   }
 
-  // Of <limit>, <dynamics>, <mimic> and what nobody here needs: all are numbers but a name.
+  // For <limit>, <dynamics>, <mimic> and elements that are not used here: all attributes but names
+  // are numbers.
   void numbers(Element& joint) {
     static const std::set<std::string> kOfNumbers = {"limit", "dynamics", "mimic",
                                                      "safety_controller", "calibration"};
@@ -136,7 +136,7 @@ class Repair {
       auto limit = std::make_unique<Element>();
       limit->name = "limit";
       limit->source = joint.source;
-      // Beyond what a limit of ours can be, which is none.
+      // Values beyond our limits mean "no limit".
       limit->attributes = {
           {"lower", "-1e17"}, {"upper", "1e17"}, {"effort", "0"}, {"velocity", "0"}};
       joint.children.push_back(std::move(limit));
@@ -163,8 +163,7 @@ class Repair {
     });
   }
 
-  // The joints by which a link would hang on itself: depth first, from each link to what it hangs
-  // on.
+  // The joints that close a cycle: depth-first search from each link to its parents.
   std::set<const Element*> closing_circles() const {
     std::map<std::string, std::vector<const Element*>> joints_of;  // by the joints' child
     for (const Element* joint : robot_.all("joint"))
@@ -174,7 +173,8 @@ class Repair {
     std::set<const Element*> closing;
     for (const Element* link : robot_.all("link")) {
       const std::string first = name_of(*link);
-      std::vector<std::pair<std::string, size_t>> way;  // links, and how many joints were followed
+      // links, with the number of joints followed so far
+      std::vector<std::pair<std::string, size_t>> way;
       if (states[first] == State::unseen) way.emplace_back(first, 0);
       while (!way.empty()) {
         auto& [at, followed] = way.back();
@@ -194,9 +194,10 @@ class Repair {
     return closing;
   }
 
-  // Keeps the links that hang together and are the most, the first ones of them.
+  // Keeps the largest connected group of links; the first one of equal size.
   void leave_out_loose_links() {
-    std::map<std::string, std::string> next;  // towards one link of all that hang together
+    // disjoint sets: a link closer to the group's representative
+    std::map<std::string, std::string> next;
     const auto one_of = [&](std::string link) {
       for (auto at = next.find(link); at != next.end(); at = next.find(link)) {
         if (const auto after = next.find(at->second); after != next.end())

@@ -1,13 +1,13 @@
-// Faults for which urdfdom gives a whole robot up.
+// Repairs faults for which urdfdom would reject a whole robot.
 #pragma once
 
 #include "ruedo/element.h"
 
 namespace ruedo::model {
 
-// Mends what is wrong with single links and joints of a <robot>, or leaves them out, and names
-// each, so that the rest of the robot is read: names, types, limits and places of joints, joints
-// between links that are not there or in a circle, links that do not hang on the others.
+// Repairs faulty links and joints of a <robot>, or removes them, and reports each, so that the rest
+// is read: names, types, limits and poses of joints, joints to missing links or in a cycle,
+// disconnected links.
 void repair_urdf(Element& robot, Findings& findings);
 
 }  // namespace ruedo::model

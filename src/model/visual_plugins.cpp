@@ -17,7 +17,7 @@ struct Seen {
   double temperature = 0.0;
 };
 
-// What the plugins of one element say; what they leave open stays.
+// The values given by one element's plugins; others keep their value.
 Seen read(const Element& element, Seen seen, const std::string& where, Findings& findings) {
   const Allowed kelvin = Allowed{.min = 0.0, .max = 10'000.0, .min_excluded = true};
   for (const Element* plugin : element.all("plugin")) {
@@ -42,7 +42,7 @@ Seen read(const Element& element, Seen seen, const std::string& where, Findings&
   return seen;
 }
 
-// Its children of that kind, by name as a link of the model has it; looked up only.
+// The children of that kind, by their name in the model; only looked up, never iterated.
 std::unordered_map<std::string, const Element*> by_name(const Element& element,
                                                         std::string_view kind) {
   std::unordered_map<std::string, const Element*> found;

@@ -1,12 +1,13 @@
-// gz-sim's plugins Label and Thermal: what visuals are to segmentation, boxes and thermal cameras.
+// gz-sim's plugins Label and Thermal: how visuals appear to segmentation, bounding-box and thermal
+// cameras.
 #pragma once
 
 #include "model/world_model.h"
 
 namespace ruedo::model {
 
-// Gives the visuals of a model's own links their labels and temperatures. A visual's own plugin
-// goes before its link's, and that before the model's.
+// Sets labels and temperatures of the visuals of a model's own links. A visual's own plugin takes
+// precedence over its link's, and that over the model's.
 void read_labels_and_temperatures(const Element& model_element, const std::string& where,
                                   Findings& findings, Model& model);
 

@@ -1,4 +1,4 @@
-// The plugins WindEffects of gz-sim and WindPlugin of Gazebo Classic, which have the same elements.
+// The plugins WindEffects of gz-sim and WindPlugin of Gazebo Classic, which share their elements.
 #include <cmath>
 
 #include "model/environment.h"
@@ -9,7 +9,7 @@ namespace {
 
 const Allowed kSeconds = Allowed::not_negative(quantity::kTime);
 
-// Only Gaussian noise that is drawn anew in each step.
+// Only Gaussian noise that is drawn independently in each step.
 Wind::Noise read_noise(const Element& of, const char* unit_name, double unit, Findings& findings) {
   Wind::Noise noise;
   const Element* written = of.child("noise");
@@ -53,7 +53,8 @@ void read_horizontal(const Element& horizontal, Wind& wind, Findings& findings) 
 }  // namespace
 
 void read_wind_plugin(const Element& plugin, Wind& wind, Findings& findings) {
-  constexpr double kMostGain = 100.0;  // with more a link would follow within a step
+  // a higher gain would make a link follow the wind within a step
+  constexpr double kMostGain = 100.0;
   Wind read = wind;
   read.pushes = true;
   read.rise_s = read.vertical_rise_s = 1.0;

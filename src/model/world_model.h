@@ -1,8 +1,8 @@
-// The world as the files describe it: immutable once loaded, shared by every other part of the
+// The world as described by its files: immutable once loaded, and shared by all other parts of the
 // program.
 //
-// A Model is what one file says; a ModelInstance places it. A thousand robots of one kind share one
-// Model. Nested models are flattened: their links, joints and sensors carry the scoped name
+// A Model is what one file describes; a ModelInstance places it. A thousand robots of one kind
+// share a Model. Nested models are flattened: their links, joints and sensors have scoped names
 // ("arm.wrist"). Frames: W world, M model, L link, J joint, S sensor, C collision, V visual.
 #pragma once
 
@@ -31,28 +31,28 @@ struct Geometry {
   // radius in x, length of the cylindrical part in y; ellipsoid: radii; plane: unused. Metres.
   Vec3 size = Vec3::Ones();
   Vec3 normal = Vec3::UnitZ();  // plane only; the plane goes through the origin and is infinite
-  Eigen::Vector2d extent{100, 100};  // plane only: how much of it is drawn
+  Eigen::Vector2d extent{100, 100};  // plane only: the size that is drawn
   std::shared_ptr<const Mesh> mesh;  // mesh only; polylines and heightmaps are meshes too
   Vec3 scale = Vec3::Ones();         // mesh only
 };
 
-// What contact and rays need to know of a surface.
+// Surface properties for contacts and rays.
 struct Surface {
   double friction = 1.0;   // Coulomb, SDF's mu
-  double friction2 = 1.0;  // across, SDF's mu2
+  double friction2 = 1.0;  // in the second direction, SDF's mu2
   Vec3 friction_direction =
-      Vec3::Zero();  // of `friction`, in the collision's frame, SDF's fdir1; zero: none
+      Vec3::Zero();  // direction of `friction` in the collision's frame, SDF's fdir1; zero: none
   double slip = 0.0, slip2 = 0.0;  // m/s per N, along and across, SDF's slip1 and slip2
-  double torsional = 0.0;          // coefficient of the friction that turning on the spot meets
+  double torsional = 0.0;          // friction coefficient against turning on the spot
   double patch_radius =
-      0.0;  // m, of that; 0: from the depth of the contact and the surface's radius
+      0.0;  // m, radius of that friction; 0: from the contact's depth and the surface's radius
   double surface_radius = 0.0;  // m
   double rolling =
-      0.0;  // m: moment that rolling meets for a newton of load, friction/bullet/rolling_friction
+      0.0;  // m: rolling resistance moment per newton of load, friction/bullet/rolling_friction
   double stiffness = 0.0, damping = 0.0;  // N/m, N s/m, SDF's kp and kd; 0: rigid
   double restitution = 0.0;
   double laser_reflectance = 1.0;     // ruedo:laser_reflectance, 0 to 1
-  double laser_mirror = 0.0;          // part of the light that leaves like from a mirror
+  double laser_mirror = 0.0;          // fraction of light reflected specularly
   double acoustic_reflectance = 1.0;  // ruedo:acoustic_reflectance, 0 to 1
 };
 
@@ -71,9 +71,9 @@ struct Visual {
   std::optional<Material> material;  // absent: the mesh's own, or grey
   double transparency = 0.0;         // 0 opaque, 1 invisible
   bool cast_shadows = true;
-  // Of gz-sim's plugins Label and Thermal, in the visual, its link or its model.
-  int label = 0;             // 1 to 255: the class that segmentation and boxes show; 0: none
-  double temperature = 0.0;  // K, what thermal cameras see; 0: that of the air
+  // From gz-sim's plugins Label and Thermal in the visual, its link or its model.
+  int label = 0;             // 1 to 255: the class in segmentation and bounding-box images; 0: none
+  double temperature = 0.0;  // K, as seen by thermal cameras; 0: that of the air
 };
 
 struct Light {
@@ -92,7 +92,7 @@ struct Light {
 
 struct Inertial {
   double mass = 1.0;                                      // kg
-  Pose X_LI;                                              // centre of mass, axes of the moments
+  Pose X_LI;                                              // centre of mass and principal axes
   Eigen::Matrix3d inertia = Eigen::Matrix3d::Identity();  // kg m^2, about the centre of mass, in I
 };
 
@@ -101,7 +101,7 @@ struct Link {
   Pose X_ML;
   Inertial inertial;
   bool gravity = true;
-  bool wind = false;  // feels it
+  bool wind = false;  // whether the wind pushes it
   bool kinematic = false;
   std::vector<Collision> collisions;
   std::vector<Visual> visuals;
@@ -111,18 +111,18 @@ struct Link {
 
 enum class JointType { fixed, revolute, continuous, prismatic, ball, universal, screw, gearbox };
 
-// Effort for what is missing of a position or a rate, as the controllers of Gazebo and ROS give it.
+// Effort from a position or rate error, as in Gazebo's and ROS's controllers.
 struct Pid {
   static constexpr double kNone = std::numeric_limits<double>::infinity();
   double p = 0.0, i = 0.0, d = 0.0;      // per rad, rad s and rad/s, or m
-  double i_min = -kNone, i_max = kNone;  // N m or N: of the integral's part
+  double i_min = -kNone, i_max = kNone;  // N m or N: limits of the integral part
   double least = -kNone, most = kNone;   // N m or N
   double offset = 0.0;                   // N m or N
 };
 
-// What a joint does until it is told something.
+// What a joint does before its first command.
 struct JointStart {
-  enum class Mode { free, stay, position, velocity };  // stay: where it begins
+  enum class Mode { free, stay, position, velocity };  // stay: holds the start position
   Mode mode = Mode::free;
   double value = 0.0;  // rad or m; rad/s or m/s
 };
@@ -134,11 +134,11 @@ struct JointAxis {
   double effort = std::numeric_limits<double>::infinity();
   double velocity = std::numeric_limits<double>::infinity();
   double damping = 0.0, friction = 0.0;
-  double spring_stiffness = 0.0, spring_reference = 0.0;  // N m/rad or N/m, towards that position
-  double position_gain = 20.0;  // 1/s: rate for what is missing of a position that it was told
-  double rate_gain = std::numeric_limits<double>::infinity();  // N m s/rad or N s/m: effort for
-                                                               // what is missing of a rate
-  std::optional<Pid> position_pid, rate_pid;                   // in place of these gains
+  double spring_stiffness = 0.0, spring_reference = 0.0;  // N m/rad or N/m, and the rest position
+  double position_gain = 20.0;  // 1/s: rate per position error under a position command
+  // N m s/rad or N s/m: effort per rate error
+  double rate_gain = std::numeric_limits<double>::infinity();
+  std::optional<Pid> position_pid, rate_pid;  // in place of these gains
   JointStart start;
 };
 
@@ -150,51 +150,51 @@ struct Joint {
   Pose X_MJ;              // at the start
   JointAxis axis, axis2;  // axis2: universal and gearbox only
   double advance = 0.0;   // m/rad along the axis: screw only
-  // Gearbox only: against the reference (a link; none: the world) the child turns -gear_ratio times
-  // as far about axis2 as the parent does about axis.
+  // Gearbox only. Relative to the reference (a link; none: the world), the child turns -gear_ratio
+  // times the parent's angle: the child about axis2, the parent about axis.
   double gear_ratio = 1.0;
   ModelLinkIndex gear_reference;
-  ModelJointIndex leader;  // the one that this one mimics
+  ModelJointIndex leader;  // the joint that this one mimics
   double mimic_multiplier = 1.0, mimic_offset = 0.0,
          mimic_reference = 0.0;  // multiplier (leader - reference) + offset
   Source source;
 };
 
-// A sensor of a file, still as its element: the sensor's own source file reads it.
+// A sensor in a file, as its element: the sensor's own source file reads it.
 struct SensorDescription {
-  std::string name;  // the device's name: unique in its model, fit for a channel
+  std::string name;  // device name: unique in its model, usable in channel names
   std::string type;  // SDF's type: "ray", "gpu_lidar", "lidar", "sonar", "camera", "custom", ...
   ModelLinkIndex link{0};
   Pose X_LS;
   std::shared_ptr<const Element> element;
-  ModelJointIndex joint;  // the one that carries it; link is then its child
+  ModelJointIndex joint;  // the joint that carries it; `link` is then the joint's child
 };
 
-// How a robot drives: read from <ruedo:drive>, or mapped from a Gazebo plugin. See
+// How a robot drives: from <ruedo:drive>, or translated from a Gazebo plugin. See
 // docs/world-files.md.
 struct DriveDescription {
   enum class Kind { kinematic, wheels };
-  // How its wheels let it move. holonomic: in every direction, whatever its wheels are (Gazebo's
+  // How its wheels constrain it. holonomic: moves in all directions, whatever its wheels (Gazebo's
   // planar move).
   enum class Steering { differential, tracked, ackermann, tricycle, mecanum, omni, holonomic };
   Kind kind = Kind::kinematic;
   Steering steering = Steering::differential;
-  bool guessed = false;  // no file says how the robot drives; its joints look like wheels
+  bool guessed = false;  // no file describes the drive; the joints look like wheels
   std::vector<ModelJointIndex> left_joints,
       right_joints;  // wheel joints, front first; holonomic and tracked may have none
-  std::vector<ModelJointIndex> steer_joints;  // Ackermann, tricycle: turn about the vertical, with
-                                              // the wheels that hang on them
-  std::vector<ModelLinkIndex> belts;          // tracked: links whose surface is a belt
-  double wheel_radius = 0.0;                  // m
-  double track = 0.0;                         // m, between the left and right wheels
-  double wheelbase = 0.0;  // m: Ackermann, tricycle: from the fixed axle to the steered one;
-                           // mecanum: between the axles
-  double max_steering_angle = 0.0;  // rad, of a wheel in the middle of the steered axle
+  // Ackermann, tricycle: vertical joints that carry the steered wheels
+  std::vector<ModelJointIndex> steer_joints;
+  std::vector<ModelLinkIndex> belts;  // tracked: links whose surface is a belt
+  double wheel_radius = 0.0;          // m
+  double track = 0.0;                 // m, distance between left and right wheels
+  // m. Ackermann, tricycle: from the fixed to the steered axle; mecanum: between the axles
+  double wheelbase = 0.0;
+  double max_steering_angle = 0.0;  // rad, of a virtual wheel at the centre of the steered axle
   double max_steering_rate = std::numeric_limits<double>::infinity();  // rad/s, of that wheel
-  Pose X_MBase;  // base_link: on the ground below the centre of rotation, x ahead
-  double max_speed = std::numeric_limits<double>::infinity();          // m/s
-  double max_side_speed = std::numeric_limits<double>::infinity();     // m/s to the left or right:
-                                                                       // mecanum, omni, holonomic
+  Pose X_MBase;  // base_link: on the ground below the centre of rotation, x forward
+  double max_speed = std::numeric_limits<double>::infinity();  // m/s
+  // m/s, sideways: mecanum, omni, holonomic
+  double max_side_speed = std::numeric_limits<double>::infinity();
   double max_turn_rate = std::numeric_limits<double>::infinity();      // rad/s
   double acceleration = std::numeric_limits<double>::infinity();       // m/s^2
   double deceleration = std::numeric_limits<double>::infinity();       // m/s^2
@@ -203,26 +203,27 @@ struct DriveDescription {
   double max_wheel_torque = std::numeric_limits<double>::infinity();   // N m, wheels drive
   double max_wheel_rate = std::numeric_limits<double>::infinity();     // rad/s
   int64_t watchdog_us = 600'000;                                       // 0: off
-  bool traction = true;  // kinematic: no more force than friction under its wheels gives, where it
-                         // drives on contacts
-  bool on_odometry = false;  // primitives measure their way by the odometry; wheels: always
-  // What the robot believes of itself is off by these parts: <ruedo:odometry>'s errors.
+  // kinematic: where it drives on contacts, its force is limited by the friction under its wheels
+  bool traction = true;
+  // primitives measure distance by odometry; always so with the wheels drive
+  bool on_odometry = false;
+  // Relative errors in the robot's own idea of its geometry: those of <ruedo:odometry>.
   double radius_error[2] = {0.0, 0.0}, track_error = 0.0;  // left, right
-  // wheels: the servo of each wheel's encoder, and its motor, at the motor's shaft.
-  double servo_rate_gain = 0.0;   // N m s/rad at the wheel; 0: from the robot's mass
-  double servo_angle_gain = 0.0;  // N m/rad at the wheel; 0: from the gain of the rate
-  double gear = 1.0;              // turns of the motor for one of the wheel
+  // wheels: the servo on each wheel's encoder, and the motor's parameters at the motor shaft.
+  double servo_rate_gain = 0.0;   // N m s/rad at the wheel; 0: derived from the robot's mass
+  double servo_angle_gain = 0.0;  // N m/rad at the wheel; 0: derived from the rate gain
+  double gear = 1.0;              // motor turns per wheel turn
   double stall_torque = std::numeric_limits<double>::infinity();  // N m
   double no_load_rate = std::numeric_limits<double>::infinity();  // rad/s
-  double yaw_gain = 0.0;  // 1/s: turns the robot back to the heading of its gyro; 0: off
+  double yaw_gain = 0.0;  // 1/s: gain of the heading hold on its gyro; 0: off
   double gyro_bias = 0.0, gyro_scale_error = 0.0;  // rad/s; relative
   Rate odometry_rate{50, 1}, pose_rate{50, 1}, status_rate{10, 1};
-  std::shared_ptr<const Element> element;  // <ruedo:drive> or <plugin>; null when synthesised
+  std::shared_ptr<const Element> element;  // <ruedo:drive> or <plugin>; null if synthesised
   std::shared_ptr<const Element>
       odometry;  // <ruedo:odometry>; null: ideal encoders, arc integrator
 };
 
-// A detachable joint: holds a link of another model until it is told to let go.
+// A detachable joint: holds a link of another model until it is told to release it.
 struct Hold {
   std::string name;
   ModelLinkIndex link;
@@ -230,20 +231,20 @@ struct Hold {
   Source source;
 };
 
-// How a door or a cabin moves whose joint has no controller of its own: a trapezoid of the rate.
+// How a door or cabin moves if its joint has no controller: a trapezoidal velocity profile.
 struct Trapezoid {
   double rate = 0.2;           // m/s or rad/s
   double acceleration = 0.08;  // m/s^2 or rad/s^2
   double effort = 100.0;       // N or N m
 };
 
-// Opens and closes when it is told, by its name.
+// A door: opens and closes on command, by its name.
 struct Door {
   struct Leaf {
     std::string joint_name;
-    ModelJointIndex joint;  // none: the model does not have it
+    ModelJointIndex joint;  // none: missing in the model
     double closed = 0.0, open = 0.0;
-    bool left = false;  // of RMF: closed at its upper stop
+    bool left = false;  // RMF: closed at its upper limit
   };
   std::string name;
   std::vector<Leaf> leaves;
@@ -251,25 +252,26 @@ struct Door {
   Source source;
 };
 
-// Goes to the floors that it is called to, opens the doors there, waits and closes them.
+// A lift: goes to the floors it is called to, opens the doors there, waits, and closes them.
 struct Lift {
   struct Floor {
-    double position = 0.0;           // of the cabin's joint
-    std::vector<std::string> doors;  // of the model, or where it has none of that name, of others
+    double position = 0.0;  // position of the cabin's joint, m
+    // of the model; names that it does not have belong to other models
+    std::vector<std::string> doors;
   };
-  std::string name;  // of the cabin's joint
+  std::string name;  // name of the cabin's joint
   ModelJointIndex cabin;
   std::vector<Floor> floors;
-  int initial_floor = -1;           // -1: it stays where it is
-  std::optional<int64_t> wait_us;   // none: until the next call
+  int initial_floor = -1;           // -1: stays where it is
+  std::optional<int64_t> wait_us;   // none: the doors stay open until the next call
   std::optional<Trapezoid> motion;  // none: the controller of its joint moves it
   Source source;
 };
 
 struct Model {
-  std::string name;  // as the file says
-  // By the file, or because all its parts are, or an actor without a trajectory. A model that a
-  // joint holds to the world is not.
+  std::string name;  // as in the file
+  // In the file, or because all its parts are static, or an actor without a trajectory. Not a model
+  // that a joint fixes to the world.
   bool is_static = false;
   bool self_collide = false;
   IndexedVector<ModelLinkIndex, Link> links;  // links[0] is the canonical link, or the first
@@ -277,7 +279,7 @@ struct Model {
   std::vector<SensorDescription> sensors;
   std::optional<DriveDescription> drive;
   bool commanded =
-      false;  // its joints take commands, which makes a robot of an arm without sensors
+      false;  // its joints take commands, which makes even an arm without sensors a robot
   std::shared_ptr<const Element> path;  // <ruedo:path> or an actor's trajectory; null: none
   std::vector<Hold> holds;
   std::vector<Door> doors;
@@ -286,10 +288,11 @@ struct Model {
 };
 
 struct ModelInstance {
-  std::string name;  // unique in the world, fit for a channel
+  std::string name;  // unique in the world, usable in channel names
   Pose X_WM;
   std::shared_ptr<const Model> model;
-  bool removed = false;  // while the world runs: its place in all lists stays, and it is nowhere
+  // while the world runs: keeps its place in all lists, but is not in the world
+  bool removed = false;
   bool is_robot() const {
     return model->drive.has_value() || !model->sensors.empty() || model->commanded;
   }
@@ -302,45 +305,45 @@ struct Sky {
   bool shadows = true;
 };
 
-// <physics><bullet>: how contacts and joints are solved.
+// <physics><bullet>: parameters of the contact and joint solver.
 struct SolverDescription {
-  int iterations = 500;     // sweeps at most
-  double tolerance = 1e-5;  // m/s: a sweep that changes no velocity by more is the last one
-  double error_reduction =
-      0.2;  // part of a penetration or of a joint's error that a substep undoes
+  int iterations = 500;          // maximum number of sweeps
+  double tolerance = 1e-5;       // m/s: stops when a sweep changes no velocity by more
+  double error_reduction = 0.2;  // fraction of a penetration or joint error that a substep corrects
   int substeps =
-      0;  // of a step, for everything; 0: as many as steps of 5 ms take, of 1 ms where joints are
+      0;  // of a step, for all bodies; 0: enough for substeps of 5 ms, of 1 ms where joints are
 };
 
-// <wind>, and what the plugin WindEffects makes of it: robot/wind.h.
+// <wind>, and the parameters of the plugin WindEffects: robot/wind.h.
 struct Wind {
   struct Noise {
     double mean = 0.0, stddev = 0.0;
   };
   Vec3 velocity = Vec3::Zero();  // m/s, in the world's axes
-  bool pushes = false;           // there is the plugin: links with <enable_wind> feel it
+  bool pushes = false;           // the plugin is there: links with <enable_wind> are pushed
   double gain = 1.0;             // 1/s: the force is gain mass (wind - velocity of the link)
   double rise_s = 0.0, vertical_rise_s = 0.0;     // time constants
-  double swing = 0.0, swing_period_s = 1.0;       // of the speed: a part of it
-  double turn_rad = 0.0, turn_period_s = 1.0;     // of the direction
+  double swing = 0.0, swing_period_s = 1.0;       // variation of the speed, relative
+  double turn_rad = 0.0, turn_period_s = 1.0;     // variation of the direction
   Noise speed_noise, turn_noise, vertical_noise;  // m/s, rad, m/s
 };
 
-// Where the world lies, and what surrounds it: <spherical_coordinates>, <atmosphere>, <wind> and
+// The world's location and environment: <spherical_coordinates>, <atmosphere>, <wind> and
 // <magnetic_field>.
 struct Environment {
-  bool placed = false;                                        // the file says where
+  bool placed = false;                                        // the file gives a location
   double equatorial_radius = 6378137.0;                       // m, WGS 84
   double polar_radius = 6378137.0 * (1 - 1 / 298.257223563);  // m
   double latitude = 0.0, longitude = 0.0;                     // rad, of the world's origin
   double elevation = 0.0;                                     // m above the ellipsoid
-  double heading = 0.0;                   // rad from east to the world's x axis, towards north
+  double heading = 0.0;                   // rad, counter-clockwise from east to the world's x axis
   double temperature = 288.15;            // K, at sea level
   double temperature_gradient = -0.0065;  // K/m
   double pressure = 101325.0;             // Pa, at sea level
   Wind wind;
-  std::optional<Vec3> magnetic_field;  // T, in the world's axes; empty: the earth's dipole where
-                                       // the world is placed, else SDF's default
+  // T, in the world's axes; empty: the earth's dipole field where the world has a location, else
+  // SDF's default
+  std::optional<Vec3> magnetic_field;
 };
 
 struct WorldModel {
@@ -352,11 +355,12 @@ struct WorldModel {
   SolverDescription solver;
   Sky sky;
   std::vector<Light> lights;
-  IndexedVector<InstanceIndex, ModelInstance> models;  // in file order; --spawn's after them
-  std::vector<Finding> findings;                       // what was unsupported or repaired
+  // in file order, followed by those of --spawn
+  IndexedVector<InstanceIndex, ModelInstance> models;
+  std::vector<Finding> findings;        // what is unsupported or was repaired
   std::vector<std::string> files_read;  // absolute paths, in the order of first reading
   std::vector<std::string>
-      disabled;  // "ROBOT/odometry", ...: channels of a robot itself that are switched off
+      disabled;               // "ROBOT/odometry", ...: a robot's own channels that are switched off
   std::vector<Fault> faults;  // each names a robot of the world
 };
 

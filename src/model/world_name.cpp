@@ -1,4 +1,4 @@
-// Worlds by name: a file that lies where Ruedo's own worlds do, or in a folder of RUEDO_PATH.
+// Worlds by name: files beside Ruedo's own worlds, or in a folder of RUEDO_PATH.
 #include "model/world_name.h"
 
 #include <algorithm>

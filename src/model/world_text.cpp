@@ -1,5 +1,5 @@
-// Elements are paired with models by the file and line that a model came from, and its name; then
-// each change is a replacement of a few bytes.
+// Matches elements with models by the file and line that a model came from, and its name; each
+// change then replaces a few bytes.
 #include "model/world_text.h"
 
 #include <algorithm>
@@ -47,7 +47,7 @@ const char* const kEmptyWorld = R"(<?xml version="1.0"?>
 
 namespace {
 
-constexpr double kSettled_m = 1e-3, kSettled_rad = 1e-3;  // what the solver moves things by
+constexpr double kSettled_m = 1e-3, kSettled_rad = 1e-3;  // displacements by the solver
 constexpr double kPut_m = 1e-6, kPut_rad = 1e-6;
 
 bool same_place(const Pose& a, const Pose& b, bool exactly) {
@@ -55,7 +55,7 @@ bool same_place(const Pose& a, const Pose& b, bool exactly) {
          a.rotation.angularDistance(b.rotation) <= (exactly ? kPut_rad : kSettled_rad);
 }
 
-// To a micrometre, without zeros at the end.
+// To a micrometre, without trailing zeros.
 std::string number(double value) {
   std::string text = fmt::format("{:.6f}", value);
   text.erase(text.find_last_not_of('0') + 1);
@@ -66,7 +66,7 @@ std::string number(double value) {
 std::string pose_text(const Pose& X) {
   const Eigen::Matrix3d R = X.rotation.toRotationMatrix();
   const double level = math::hypot(R(0, 0), R(1, 0));
-  const bool upright = level < 1e-9;  // roll and yaw turn about one axis: yaw alone does
+  const bool upright = level < 1e-9;  // roll and yaw are about the same axis: only yaw is written
   const double roll = upright ? 0.0 : math::atan2(R(2, 1), R(2, 2));
   const double pitch = math::atan2(-R(2, 0), level);
   const double yaw = upright ? math::atan2(-R(0, 1), R(1, 1)) : math::atan2(R(1, 0), R(0, 0));
@@ -77,7 +77,7 @@ std::string pose_text(const Pose& X) {
   return text;
 }
 
-// The spaces before an element where it begins a line, with the end of the line before it.
+// The indentation before an element that begins a line, with the preceding line end.
 std::string gap_before(const std::string& text, const TextElement& element) {
   const size_t last = text.find_last_not_of(" \t\r\n", element.begin - 1);
   const size_t begin = last == std::string::npos ? 0 : last + 1;
@@ -85,12 +85,12 @@ std::string gap_before(const std::string& text, const TextElement& element) {
   return line != std::string::npos && line >= begin ? text.substr(line, element.begin - line) : "";
 }
 
-// Writes a child's text, or a new child.
+// Replaces a child's text, or adds a child.
 void set_child(const std::string& text, const TextElement& of, const std::string& name,
                const std::string& value, TextPatch& patch) {
   const std::string written = "<" + name + ">" + value + "</" + name + ">";
   if (const TextElement* child = of.child(name)) {
-    // Its attributes say in which frame, and how, the old one was meant.
+    // Its attributes said in which frame and format the old value was.
     if (child->closed() || !child->attributes.empty())
       patch.replace(child->begin, child->end, written);
     else
@@ -113,7 +113,7 @@ void drop_child(const TextElement& of, const char* name, TextPatch& patch) {
 // A <model> or <include> there.
 void put(const std::string& text, const TextElement& element, const Pose& X_WM, TextPatch& patch) {
   set_child(text, element, "pose", pose_text(X_WM), patch);
-  drop_child(element, "placement_frame", patch);  // it is the model's own frame that stands there
+  drop_child(element, "placement_frame", patch);  // the pose is that of the model's own frame
   if (const auto* frame = element.attribute("placement_frame"))
     patch.replace(frame->begin, frame->end, "");
 }
@@ -125,7 +125,7 @@ void call(const std::string& text, const TextElement& element, const std::string
     patch.replace(written->value, written->past, escaped(name));
 }
 
-// Elements as text, for what was no SDF.
+// Elements as text, for sources that are not SDF.
 std::string written(const Element& element, const std::string& indent) {
   std::string text = indent + "<" + element.name;
   for (const auto& [name, value] : element.attributes)
@@ -139,7 +139,7 @@ std::string written(const Element& element, const std::string& indent) {
   return text + "\n" + indent + "</" + element.name + ">";
 }
 
-// The element of a model that was spawned, as it stands in a world's file.
+// The element of a spawned model, as written in a world file.
 std::string element_of(const ModelNow& model) {
   const std::string what = "the model '" + model.name + "'";
   std::string text = model.spawned;
@@ -167,7 +167,7 @@ std::string element_of(const ModelNow& model) {
   return changed.substr(whole->begin, whole->end - whole->begin);
 }
 
-// "box_2" may be what a file calls "box".
+// "box_2" may be called "box" in the file.
 bool may_be_called(const std::string& name, const std::string& in_file) {
   const auto plain = [](std::string text) {
     for (char& c : text)
@@ -203,14 +203,14 @@ WorldText::WorldText(std::string text, const WorldModel& first)
 
 void WorldText::match(const WorldModel& first) {
   const ResourceFinder resources(first.file, true);
-  std::map<std::string, std::string> files;  // of the addresses that were looked for
+  std::map<std::string, std::string> files;  // by the addresses looked up so far
   const auto file_of = [&](const std::string& uri) {
     const auto [at, fresh] = files.try_emplace(uri);
     if (fresh) at->second = resources.find_model(uri, first.file).value_or("");
     return at->second;
   };
   std::vector<bool> taken(first.models.size());
-  size_t from = 0;  // models come in the file's order
+  size_t from = 0;  // models come in file order
   for (size_t i = 0; i < world_->children.size(); ++i) {
     const Element& element = *world_->children[i];
     if (element.name != "model" && element.name != "include") continue;
@@ -248,7 +248,7 @@ std::string WorldText::model_text(const std::string& name) const {
          text_.substr(place.begin, place.end - place.begin) + "\n</sdf>\n";
 }
 
-// What stands in frames of those models, too: other frames.
+// Contents whose frames belong to those models now have other frames.
 std::set<std::string> WorldText::moved_with(std::set<std::string> changed) const {
   for (bool more = true; more;) {
     more = false;
@@ -264,7 +264,7 @@ std::set<std::string> WorldText::moved_with(std::set<std::string> changed) const
   return changed;
 }
 
-// With its line, where it has one of its own.
+// With its line, if it has one of its own.
 void WorldText::drop(const TextElement& element, TextPatch& patch) const {
   size_t begin = element.begin, end = element.end;
   const size_t line = text_.find_last_not_of(" \t", begin - 1);
@@ -293,7 +293,7 @@ WorldText::Written WorldText::with(const std::vector<ModelNow>& models) const {
   Written result;
   std::map<std::string, const ModelNow*> now;
   for (const ModelNow& model : models) now.emplace(model.name, &model);
-  // What was removed and is back as it was is of the file again.
+  // What was removed and then restored is taken from the file again.
   const auto own = [&](const ModelNow& model) {
     return model.spawned.empty() || model.spawned == model_text(model.name);
   };

@@ -1,5 +1,5 @@
-// A world's file as text, and the text of the same world with models elsewhere, gone, and new. What
-// has not changed stays as it was written, to the byte: comments, order, spaces.
+// Writes a world file with models moved, removed and added. What has not changed stays byte for
+// byte as it was written: comments, order, whitespace.
 #pragma once
 
 #include <memory>
@@ -12,13 +12,14 @@
 
 namespace ruedo::model {
 
-// A model of the world as it is now.
+// A model's current state.
 struct ModelNow {
   std::string name;
   Pose X_WM;
-  std::string spawned;  // SDF or URDF that it came from; "": it is of the file
-  bool put = false;     // placed by a user: micrometres count, else what is less than a
-                        // millimetre is the solver's
+  std::string spawned;  // the SDF or URDF that it came from; "": the file
+  // placed by a user: kept to a micrometre; otherwise displacements below a millimetre are the
+  // solver's
+  bool put = false;
 };
 
 class WorldText {
@@ -26,14 +27,14 @@ class WorldText {
   // text: SDF with a <world>, from which `first` was loaded. Throws InputError.
   WorldText(std::string text, const WorldModel& first);
 
-  // SDF of a model of the file, as SPAWN takes it; "" where it has no element of its own.
+  // SDF of a model in the file, as SPAWN takes it; "": it has no element of its own.
   std::string model_text(const std::string& name) const;
 
   struct Written {
     std::string text;
-    std::vector<std::string> left_out;  // what cannot be said in the file: one sentence each
+    std::vector<std::string> left_out;  // what the file cannot express, one sentence each
   };
-  // Throws InputError for a model whose text cannot stand in a world.
+  // Throws InputError for a model whose text cannot be part of a world.
   Written with(const std::vector<ModelNow>& models) const;
 
  private:
@@ -56,17 +57,17 @@ class WorldText {
   const Element* world_ = nullptr;
   const TextElement* world_place_ = nullptr;
   std::vector<Entry> entries_;
-  std::vector<ModelInstance> others_;  // without an element of their own: of a fleet, actors
+  std::vector<ModelInstance> others_;  // without an element of their own: those of a fleet, actors
 };
 
-// The text of the world that a file is loaded as: the file's own, or, of a robot or a model, that
-// of a floor with it.
+// The text of the world that a file is loaded as: the file's own text; for a robot or model, a
+// world with a floor and the model.
 std::string world_text_of(const WorldModel& world);
 
 // A floor and a sun.
 extern const char* const kEmptyWorld;
 
-// The same text for a file in another folder: relative paths lead to the same files.
+// The same text for a file in another folder: relative paths are adjusted.
 std::string moved_to(const std::string& text, const std::string& from_folder,
                      const std::string& to_folder);
 

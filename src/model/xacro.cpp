@@ -1,4 +1,4 @@
-// The child process, and what it leaves behind.
+// Runs the child process and reads its output.
 #include "model/xacro.h"
 
 #include <sys/wait.h>
@@ -28,7 +28,7 @@ std::string script() {
   return !error && fs::exists(installed, error) ? installed.string() : RUEDO_XACRO_DIR "/expand.py";
 }
 
-// Exit code, or -1 for a child that was ended.
+// Exit code, or -1 for a child that was killed.
 int run(std::vector<std::string> words, const std::string& log) {
   const std::optional<int> status =
       run_limited(std::move(words), log, {kCpu_s, kFile_bytes, kMemory_bytes, kWall_s});
@@ -43,7 +43,7 @@ std::string text_or_nothing(const std::string& path) {
   }
 }
 
-// "FILE:LINE", which expand.py gave each element.
+// "FILE:LINE", added to each element by expand.py.
 void take_lines(Element& element, const Source& above) {
   element.source = above;
   const auto at = std::find_if(element.attributes.begin(), element.attributes.end(),
@@ -59,7 +59,7 @@ void take_lines(Element& element, const Source& above) {
 
 }  // namespace
 
-// Ruedo's own where there is one, for it has the package.
+// Ruedo's own if it exists, since it has the package.
 std::string xacro_python() {
   if (const char* chosen = std::getenv("RUEDO_PYTHON")) return chosen;
   std::error_code error;
@@ -67,8 +67,7 @@ std::string xacro_python() {
 }
 
 bool is_xacro(const std::string& path, const Element* root) {
-  std::error_code
-      error;  // a text that came with a request is none: only what is on the disk is run
+  std::error_code error;  // a text from a request does not get here: only files are expanded
   if (!fs::is_regular_file(path, error)) return false;
   if (fs::path(path).extension() == ".xacro") return true;
   if (!root || root->name != "robot") return false;
@@ -117,7 +116,7 @@ std::shared_ptr<const Element> expand_xacro(const std::string& path, ReadContext
     return expand(path, context);
   } catch (const InputError&) {
     throw;
-  } catch (const std::runtime_error& error) {  // of the folder or the process
+  } catch (const std::runtime_error& error) {  // from the folder or the process
     throw InputError({path, 0}, std::string("the xacro file cannot be expanded: ") + error.what());
   }
 }

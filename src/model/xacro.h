@@ -1,6 +1,6 @@
 // xacro: robots as macros, expanded by the Python package of that name in a child process with
-// limits (xacro/expand.py). xacro evaluates Python, so that a reader of our own could only read a
-// part of it; ROS is not needed for it.
+// limits (xacro/expand.py). xacro evaluates Python, so a reader of our own could support only a
+// part of it; ROS is not needed.
 #pragma once
 
 #include <memory>
@@ -10,15 +10,14 @@
 
 namespace ruedo::model {
 
-// Whether a file is one: by its name, or because its <robot> has elements of xacro.
+// Whether a file is xacro: by its name, or because its <robot> contains xacro elements.
 bool is_xacro(const std::string& path, const Element* root);
 
-// The Python that expands it: a path, or a name for the search path.
+// The Python interpreter that expands it: a path, or a name to be found in PATH.
 std::string xacro_python();
 
-// The <robot> that it expands to; its elements name the files and lines where they were written.
-// $(find PKG) finds packages by their package.xml. What it includes and is not there is named.
-// Throws InputError.
+// The expanded <robot>; its elements keep the original files and lines. $(find PKG) finds packages
+// by their package.xml. Missing includes are reported. Throws InputError.
 std::shared_ptr<const Element> expand_xacro(const std::string& path, ReadContext& context);
 
 }  // namespace ruedo::model

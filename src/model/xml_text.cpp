@@ -1,4 +1,4 @@
-// One pass over the text. Comments, declarations and CDATA are passed over.
+// A single pass over the text. Comments, declarations and CDATA are skipped.
 #include "model/xml_text.h"
 
 #include <algorithm>
@@ -31,7 +31,7 @@ class Scanner {
     return found + what.size();
   }
 
-  // The next '<' of an element's tag from there on.
+  // The next '<' of an element's tag from that position.
   size_t next_tag(size_t at) const {
     for (;;) {
       at = text_.find('<', at);
@@ -48,7 +48,7 @@ class Scanner {
     }
   }
 
-  // Where a name ends.
+  // The end of a name.
   size_t name_end(size_t at) const {
     return std::min(text_.find_first_of(" \t\r\n\f\v/>=", at), text_.size());
   }

@@ -1,5 +1,5 @@
-// Where the elements of an XML text stand in it: a part is changed, and all else stays as it was
-// written, to the byte.
+// Where the elements of an XML text are: a part can be changed while all else stays as written,
+// byte for byte.
 #pragma once
 
 #include <cstddef>
@@ -13,24 +13,25 @@ struct TextElement {
   struct Attribute {
     std::string name;
     size_t begin, end;   // with the space before it
-    size_t value, past;  // of what is between its quotes
+    size_t value, past;  // the value between its quotes
   };
 
   std::string name;
-  size_t begin = 0, end = 0;    // of all of it
-  size_t inside = 0, past = 0;  // of what is between its tags; both `end` where it is <closed/>
+  size_t begin = 0, end = 0;    // the whole element
+  size_t inside = 0, past = 0;  // the content between its tags; both `end` for <closed/>
   std::vector<Attribute> attributes;
   std::vector<TextElement> children;
 
   bool closed() const { return inside == end; }
-  const TextElement* child(std::string_view name) const;  // the first; null: none
+  // the first child of that name; null: none
+  const TextElement* child(std::string_view name) const;
   const Attribute* attribute(std::string_view name) const;
 };
 
-// The root of a text that parse_document() has taken.
+// The root of a text that parse_document() has accepted.
 TextElement places_in(std::string_view text);
 
-// Changes of a text, each of another part of it.
+// Changes to a text, each to a different part.
 class TextPatch {
  public:
   void replace(size_t begin, size_t end, std::string with);
@@ -46,7 +47,7 @@ class TextPatch {
   std::vector<Change> changes_;
 };
 
-// Text as it stands between tags and in quotes.
+// Escapes text for use between tags and in quotes.
 std::string escaped(std::string_view text);
 
 }  // namespace ruedo::model

@@ -1,4 +1,4 @@
-// yaml-cpp's nodes to elements.
+// Converts yaml-cpp's nodes to elements.
 #include "model/yaml.h"
 
 #include <yaml-cpp/yaml.h>
@@ -7,7 +7,7 @@ namespace ruedo::model {
 namespace {
 
 constexpr int kDeepest = 32;
-constexpr size_t kMostNodes = 100'000;  // aliases can name the same node again and again
+constexpr size_t kMostNodes = 100'000;  // aliases can refer to the same node many times
 
 struct Converter {
   const std::string& file;

@@ -1,4 +1,4 @@
-// YAML as the tree of elements that XML files become, so that the same typed reads name file and
+// YAML as the same trees of elements that XML files become, so that typed reads report file and
 // line. yaml-cpp is used in yaml.cpp only.
 #pragma once
 
@@ -9,8 +9,9 @@
 
 namespace ruedo::model {
 
-// Keys become names of children, the entries of a list children named "item", scalars texts. Throws
-// InputError for what is no YAML, nests too deep or grows too large by its aliases.
+// Keys become names of children, list entries become children named "item", and scalars become
+// texts. Throws InputError for text that is not YAML, nests too deep, or grows too large by
+// aliases.
 std::unique_ptr<Element> parse_yaml(const std::string& text, const std::string& file);
 
 }  // namespace ruedo::model

@@ -1,4 +1,4 @@
-// The two trees, and the pairs that overlapping boxes make.
+// The two trees, and the pairs of overlapping boxes.
 #include "physics/broadphase.h"
 
 #include <algorithm>
@@ -9,7 +9,7 @@ namespace {
 
 constexpr double kSlack_m = 0.05;
 constexpr size_t kPartners = 8,
-                 kFound = 64;  // room for so many beforehand: the running loop allocates none
+                 kFound = 64;  // capacity reserved for results: no allocation in the running loop
 
 btDbvtVolume widened(const btVector3& low, const btVector3& high, double by) {
   btDbvtVolume volume = btDbvtVolume::FromMM(low, high);
@@ -17,7 +17,7 @@ btDbvtVolume widened(const btVector3& low, const btVector3& high, double by) {
   return volume;
 }
 
-// A plane has half a space inside: a box overlaps it when its lowest corner along the normal is
+// A plane has a half-space inside: a box overlaps it if its lowest corner along the normal is
 // below.
 bool reaches_plane(const btDbvtVolume& box, const btCollisionObject& object) {
   const auto* plane = static_cast<const btStaticPlaneShape*>(object.getCollisionShape());
@@ -44,7 +44,7 @@ btBroadphaseProxy* Broadphase::createProxy(const btVector3& low, const btVector3
                                            btDispatcher* dispatcher) {
   const int id = ++made_;
   Proxy& proxy = proxies_[id];
-  const bool empty = low.x() > high.x();  // of a compound without shapes
+  const bool empty = low.x() > high.x();  // a compound without shapes
   proxy.m_aabbMin = empty ? btVector3(0, 0, 0) : low;
   proxy.m_aabbMax = empty ? btVector3(0, 0, 0) : high;
   proxy.m_clientObject = object;
@@ -124,7 +124,7 @@ void Broadphase::find_pairs(Proxy& proxy, btDispatcher* dispatcher) {
   }
 }
 
-// Only moving bodies keep partners: a wall need not know who is near it.
+// Only moving bodies keep partners: a wall need not know what is near it.
 void Broadphase::add_pair(Proxy& a, Proxy& b) {
   pairs_.addOverlappingPair(&a, &b);
   a.partners.push_back(&b);
@@ -138,7 +138,7 @@ void Broadphase::remove_pair(Proxy& a, Proxy& b, btDispatcher* dispatcher) {
 }
 
 void Broadphase::take(const Broadphase& other, btDispatcher* dispatcher) {
-  auto from = other.proxies_.begin();  // the same numbers
+  auto from = other.proxies_.begin();  // numbered the same
   for (auto& [id, proxy] : proxies_) {
     while (!proxy.partners.empty()) remove_pair(proxy, *proxy.partners.back(), dispatcher);
     const Proxy& there = (from++)->second;
@@ -174,7 +174,7 @@ void Broadphase::aabbTest(const btVector3& low, const btVector3& high,
   }
 }
 
-// Rays are cast by the scene, never here; this only keeps the interface whole.
+// Rays are cast by the scene; this only completes the interface.
 void Broadphase::rayTest(const btVector3&, const btVector3&, btBroadphaseRayCallback& callback,
                          const btVector3&, const btVector3&) {
   for (auto& [id, proxy] : proxies_) callback.process(&proxy);

@@ -1,5 +1,5 @@
-// Bullet's headers in double precision, and the conversions between its types and ours. Included by
-// the sources of this folder only.
+// Bullet's headers in double precision, and conversions between its types and ours. Only for the
+// sources of this folder.
 #pragma once
 
 // gcc sees an uninitialised vector in btBoxShape::getPlane that is assigned before it is read.
@@ -10,8 +10,7 @@
 
 #include "ruedo/pose.h"
 
-// Without BT_USE_DOUBLE_PRECISION, Bullet's headers compile all the same, and everything breaks at
-// run time.
+// Without BT_USE_DOUBLE_PRECISION, Bullet's headers would still compile, but break at run time.
 static_assert(sizeof(btScalar) == 8, "Bullet must be used in double precision");
 
 namespace ruedo::physics {

@@ -1,4 +1,4 @@
-// Bullet's algorithms hold the manifold of a pair; these fill it with all points of a substep.
+// Bullet's algorithms own the manifold of a pair; these fill it with all points of a substep.
 #include "physics/collisions.h"
 
 #include <algorithm>
@@ -14,9 +14,9 @@ namespace ruedo::physics {
 namespace {
 
 constexpr size_t kPointsOfAManifold = 4;
-// Boxes are taken for so much larger: their contacts are known before they touch.
+// Boxes are enlarged by this: contacts are known before they touch.
 constexpr btScalar kAhead_m = kSeenAhead_m;
-// A point this far beside one of the two faces is not part of their contact.
+// A point farther beside either face is not part of their contact.
 constexpr btScalar kBeside_m = 2e-5;
 
 class Pair : public btCollisionAlgorithm {
@@ -69,7 +69,7 @@ Points corners(const btCollisionShape& shape) {
   return points;
 }
 
-// Of each rim, the points that are lowest, highest and half way between; up: in the shape's frame.
+// From each rim the lowest and highest points and those in between; up: in the shape's frame.
 Points rim_points(const btCollisionShape& shape, const btVector3& up) {
   const auto& cylinder = static_cast<const btCylinderShapeZ&>(shape);
   const btScalar radius = cylinder.getRadius(), half = cylinder.getHalfExtentsWithMargin().z();
@@ -85,7 +85,7 @@ Points rim_points(const btCollisionShape& shape, const btVector3& up) {
   return points;
 }
 
-// The four points that are lowest; the plane is the second object where `swapped` is false.
+// The four lowest points; if `swapped` is false, the plane is the second object.
 template <bool swapped, bool box>
 class OnPlane final : public Pair {
  public:
@@ -114,12 +114,12 @@ class OnPlane final : public Pair {
       const btVector3 at = X_WS * points[i];
       heights[i] = {up.dot(at) - ground, i, at};
     }
-    // Those that are equally low to rounding are taken by number.
+    // Ties within rounding are broken by number.
     const auto lower = [](const Height& one, const Height& two) {
       return one.height < two.height - 1e-9 ||
              (one.height < two.height + 1e-9 && one.point < two.point);
     };
-    for (size_t i = 1; i < heights.size(); ++i) {  // few, and mostly in order
+    for (size_t i = 1; i < heights.size(); ++i) {  // insertion sort: few points, mostly in order
       for (size_t k = i; k > 0 && lower(heights[k], heights[k - 1]); --k)
         std::swap(heights[k], heights[k - 1]);
     }
@@ -128,7 +128,7 @@ class OnPlane final : public Pair {
   }
 };
 
-// What Bullet finds of two boxes that are larger, brought back to these.
+// Bullet's contacts of two enlarged boxes, corrected to their real size.
 class OnRealBoxes final : public btDiscreteCollisionDetectorInterface::Result {
  public:
   OnRealBoxes(const btTransform& X_WA, const btVector3& half_a, const btTransform& X_WB,
@@ -157,7 +157,7 @@ class OnRealBoxes final : public btDiscreteCollisionDetectorInterface::Result {
   }
 
  private:
-  // Moves a point across the normal so that `at` comes to the box. Returns by how much.
+  // Moves a point tangentially so that `at` lies in the box. Returns the distance moved.
   static btScalar move_beside(const btTransform& X_WS, const btVector3& half,
                               const btVector3& normal, const btVector3& at, btVector3& point) {
     btVector3 local = X_WS.invXform(at);
@@ -175,7 +175,7 @@ class OnRealBoxes final : public btDiscreteCollisionDetectorInterface::Result {
   btManifoldResult& result_;
 };
 
-// A robot that its drive moves along a plane touches what it overlaps, and nothing before.
+// A robot that its drive moves along a plane only touches what it overlaps.
 bool moves_along_plane(const btCollisionObjectWrapper& box) {
   const auto* body = btRigidBody::upcast(box.getCollisionObject());
   return body && body->getLinearFactor().z() == 0.0;

@@ -1,16 +1,16 @@
-// Contacts that Bullet finds one at a time, or too late, found at once: of boxes and cylinders on
-// planes, and of boxes with each other.
+// Finds contacts at once that Bullet finds one at a time or too late: of boxes and cylinders on
+// planes, and between boxes.
 //
-// Bullet gives a body on a plane one point a substep, and two boxes none before they overlap. What
-// is put down would first tip over that one corner, or fall by a rounding error and be stopped: a
-// stack rocked for a second.
+// Bullet gives a body on a plane one point per substep, and two boxes none before they overlap. A
+// body that is put down would first tip over that corner, or fall by a rounding error and be
+// stopped: a stack would rock for a second.
 #pragma once
 
 #include "physics/bullet.h"
 
 namespace ruedo::physics {
 
-// For all worlds.
+// Registers them for all worlds.
 void register_collisions(btCollisionDispatcher& dispatcher);
 
 }  // namespace ruedo::physics

@@ -1,4 +1,5 @@
-// Manifolds to contacts. The order is by links and then by place, and does not depend on Bullet's.
+// Converts manifolds to contacts. Their order is by links and then by position, independent of
+// Bullet's.
 #include "physics/contact_book.h"
 
 #include <algorithm>
@@ -10,13 +11,13 @@ namespace ruedo::physics {
 
 namespace {
 
-// The contacts of several substeps are one where they are so near each other.
+// Contacts of several substeps within this distance are merged.
 constexpr double kSamePlace_m = 5e-3;
-// Room beforehand: a face has four points, and most bodies touch two others at most.
+// Reserved capacity: a face has four points, and most bodies touch at most two others.
 constexpr size_t kRoom = 64, kRoomPerBody = 8;
 
-// The entry of a child shape in one of ObjectInfo's lists; Bullet says no child for what is a
-// single shape.
+// The entry of a child shape in one of ObjectInfo's lists; Bullet gives no child index for a single
+// shape.
 bool earlier(const Contact& a, const Contact& b) {
   const auto key = [](const Contact& c) {
     return std::tuple(c.body_a, c.link_a, c.body_b, c.link_b, c.position.x(), c.position.y(),
@@ -99,7 +100,7 @@ void ContactBook::add(const std::vector<btPersistentManifold*>& manifolds, int s
             per_s * from_bt(point.m_appliedImpulseLateral1 * point.m_lateralFrictionDir1 +
                             point.m_appliedImpulseLateral2 * point.m_lateralFrictionDir2);
       }
-      // Static things come second; of two bodies the lower number comes first.
+      // Static things come second; of two bodies the one with the lower number comes first.
       if (!contact.body_a.valid() || (contact.body_b.valid() && contact.body_b < contact.body_a))
         contact = swapped(contact);
       if (touches) {
@@ -111,10 +112,10 @@ void ContactBook::add(const std::vector<btPersistentManifold*>& manifolds, int s
   }
 }
 
-// The same place in several substeps: their impulses add up.
+// The same place in several substeps: their impulses are added.
 void ContactBook::merge() {
   merged_.clear();
-  size_t first = 0;  // of the same two links
+  size_t first = 0;  // of contacts between the same two links
   for (const Contact& contact : contacts_) {
     if (!merged_.empty() &&
         (merged_.back().link_a != contact.link_a || merged_.back().link_b != contact.link_b)) {

@@ -1,5 +1,5 @@
 // The contacts of a step: read from Bullet's manifolds after each substep, put into a fixed order,
-// and sorted by the bodies that take part.
+// and grouped by the bodies involved.
 #pragma once
 
 #include <span>
@@ -15,24 +15,24 @@ class ContactBook {
   explicit ContactBook(size_t bodies) : touching_(bodies), near_(bodies) { make_room(bodies); }
 
   void resize(size_t bodies) { touching_.resize(bodies), near_.resize(bodies), make_room(bodies); }
-  // For so many contacts memory is taken beforehand, so that new ones do not allocate in the
-  // running loop. What is not used costs addresses only.
+  // Capacity reserved in advance, so that new contacts do not allocate in the running loop. What is
+  // not used costs address space only.
   size_t room() const { return contacts_.capacity(); }
 
   // Starts a step of that length (s).
   void clear(double step_s);
-  // Adds what manifolds hold after a substep; the last one of a step says what is near. Where
+  // Adds the manifolds' contacts after a substep; the last substep defines what is near. If
   // everything sleeps, one call counts as `substeps`.
   void add(const std::vector<btPersistentManifold*>& manifolds, int substeps, bool last);
   // Ends the step.
   void finish();
 
-  const std::vector<Contact>& all() const { return contacts_; }  // those that touched
+  const std::vector<Contact>& all() const { return contacts_; }  // contacts with a force
   std::span<const Contact> touching(BodyIndex body) const { return touching_.of(body); }
   std::span<const Contact> near(BodyIndex body) const { return near_.of(body); }
 
  private:
-  // Contacts grouped by body, that body always first in them.
+  // Contacts grouped by body, with that body as `a`.
   class ByBody {
    public:
     explicit ByBody(size_t bodies) : ranges_(bodies, {0, 0}) {}
@@ -54,7 +54,7 @@ class ContactBook {
   void merge();
 
   double step_s_ = 0.0;
-  bool several_ = false;  // substeps of the same manifolds
+  bool several_ = false;  // several substeps share the manifolds
   std::vector<Contact> contacts_;
   std::vector<Contact> near_only_;  // of the last substep
   std::vector<Contact> merged_;     // scratch

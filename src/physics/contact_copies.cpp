@@ -1,7 +1,7 @@
-// A pair has an algorithm; that of compounds has one for each two children that are near each
-// other; and each of these has a manifold of up to four points, with the impulses that the solver
-// starts from. Of all of it only the points are more than a choice by the shapes: the algorithms
-// are made as Bullet makes them, and the points copied.
+// A pair has an algorithm; a pair of compounds has one for each two children near each other; and
+// each of these has a manifold of up to four points, with the impulses that warm-start the solver.
+// Everything but the points follows from the shapes: the algorithms are created as Bullet would,
+// and the points are copied.
 #include "physics/contact_copies.h"
 
 #include <stdexcept>
@@ -16,8 +16,8 @@ namespace {
 
 using Wrapper = btCollisionObjectWrapper;
 
-// Where Bullet keeps the algorithms of children, which it shows to nobody. The arguments of an
-// explicit instantiation may name private members.
+// Accesses Bullet's private list of child algorithms: the arguments of an explicit instantiation
+// may name private members.
 template <auto member>
 struct Opened {
   friend btHashedSimplePairCache& children_of(btCompoundCompoundCollisionAlgorithm& compounds) {
@@ -86,14 +86,14 @@ class Copier {
     }
   }
 
-  // Of two shapes that are not compounds.
+  // For two shapes that are not compounds.
   void copy_points(btCollisionAlgorithm& from, btCollisionAlgorithm& to, const Wrapper& a,
                    const Wrapper& b) {
     here_.resizeNoInitialize(0);
     from.getAllContactManifolds(here_);
     if (here_.size() == 0) return;
     if (here_.size() > 1) refuse("two shapes with several manifolds");
-    if (!manifold_of(to)) {  // made with the first points, which are then replaced
+    if (!manifold_of(to)) {  // created by adding points, which are then replaced
       btManifoldResult result(&a, &b);
       to.processCollision(&a, &b, info_, &result);
     }

@@ -1,15 +1,16 @@
 // Convex shapes that Bullet lacks: an exact ellipsoid, and a tyre, which touches the ground in one
-// point as a sphere does but is no wider than the wheel. And Bullet's own, seen a little ahead.
+// point like a sphere but is no wider than the wheel. Also Bullet's own shapes, with enlarged
+// bounds.
 //
-// Ellipsoid and tyre are given to Bullet's GJK by their support function.
+// Ellipsoid and tyre are given to Bullet's GJK by their support functions.
 #pragma once
 
 #include "physics/bullet.h"
 
 namespace ruedo::physics {
 
-// Bullet looks for contacts where the bounds of two shapes overlap. With these, before they touch:
-// what was put down exactly shall not fall by a rounding error.
+// Bullet looks for contacts where the bounds of two shapes overlap. These bounds overlap before the
+// shapes touch: something put down exactly must not fall by a rounding error.
 constexpr btScalar kSeenAhead_m = 2e-4;
 
 template <class Shape>
@@ -56,9 +57,8 @@ class EllipsoidShape : public ConvexShape {
   btVector3 radii_;
 };
 
-// All points within width / 2 of a disc: the shape of a wheel with a round tyre. The axis is z;
-// radius and width (m) are the outer ones. The tyre's roundness is Bullet's collision margin, the
-// disc its core.
+// All points within width / 2 of a disc: a wheel with a round tyre. The axis is z; radius and width
+// (m) are the outer ones. The rounding is Bullet's collision margin, the disc its core.
 class TyreShape : public ConvexShape {
  public:
   TyreShape(btScalar radius, btScalar width) : core_(radius - btMin(width / 2, radius)) {

@@ -1,4 +1,4 @@
-// A list of those that no world has now.
+// A list of instances that no world is using.
 #include "physics/detection.h"
 
 #include <algorithm>
@@ -12,8 +12,8 @@
 namespace ruedo::physics {
 namespace {
 
-// Bullet's pools, of pairs and of their contacts, are 8 MB for 4096 of each, written when they are
-// made. What goes beyond them is allocated.
+// Bullet's pools of pairs and contacts take 8 MB for 4096 of each, and are written when created.
+// Beyond them, Bullet allocates.
 int room_for(size_t bodies) {
   constexpr size_t kPairsOfABody = 8, kLeast = 16, kMost = 4096;
   return static_cast<int>(std::min(kLeast + kPairsOfABody * bodies, kMost));
@@ -29,7 +29,7 @@ btDefaultCollisionConstructionInfo pools(int room) {
 
 class Detection::Spare {
  public:
-  // A world that ends with the program finds it still there.
+  // A world destroyed at program exit still needs it: never freed.
   static Spare& all() {
     static auto& spare = *new Spare;
     return spare;

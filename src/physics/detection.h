@@ -1,9 +1,8 @@
-// Bullet's collision detection with no world in it: which algorithm serves which two shapes, and
-// the memory of pairs and contacts.
+// Bullet's collision detection without a world: which algorithm serves which two shapes, and the
+// memory for pairs and contacts.
 //
-// Making one costs more than the rest of a small world. So those of worlds that have ended serve
-// the next ones: a world that is made again finds its tables filled. Nothing of a world is left in
-// one that is kept.
+// Creating one costs more than the rest of a small world. Instances of finished worlds are
+// therefore reused. A kept instance contains nothing of its former world.
 #pragma once
 
 #include <cstddef>
@@ -15,9 +14,9 @@ namespace ruedo::physics {
 
 class Detection {
  public:
-  // For a world of so many bodies that move. Any thread, as its end.
+  // For a world with that many moving bodies. Constructor and destructor may run in any thread.
   explicit Detection(size_t bodies);
-  ~Detection();  // all objects of the world are gone
+  ~Detection();  // all objects of the world must be gone
   Detection(const Detection&) = delete;
 
   btCollisionDispatcher& dispatcher() { return parts_->dispatcher; }
@@ -27,7 +26,7 @@ class Detection {
   struct Parts {
     explicit Parts(int room);
     bool empty();
-    const int room;  // of pairs
+    const int room;  // capacity for pairs
     btDefaultCollisionConfiguration configuration;
     btCollisionDispatcher dispatcher;
   };

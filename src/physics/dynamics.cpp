@@ -1,4 +1,4 @@
-// Pairs to manifolds, manifolds to islands, islands to the solver and to sleep.
+// From pairs to manifolds to islands, which are solved and put to sleep.
 #include "physics/dynamics.h"
 
 #include <algorithm>
@@ -12,14 +12,14 @@ namespace ruedo::physics {
 
 namespace {
 
-constexpr size_t kTouchingABody = 8;  // usually, and at most
+constexpr size_t kTouchingABody = 8;  // expected maximum
 
-// Bullet's island tag is a body's number in bodies_; of what takes no part it is negative.
+// Bullet's island tag is a body's index in bodies_; negative for bodies that do not take part.
 bool takes_part(const btCollisionObject& object) { return object.getIslandTag() >= 0; }
 size_t number(const btCollisionObject& object) {
   return static_cast<size_t>(object.getIslandTag());
 }
-// What the solver may move: a mover and a wall tie nothing together.
+// Whether the solver may move it: movers and walls do not connect islands.
 bool can_be_moved(const btCollisionObject& object) {
   return takes_part(object) && !object.isStaticOrKinematicObject();
 }
@@ -43,11 +43,11 @@ std::tuple<int, int, int, int> place_of(const btPersistentManifold& manifold) {
   return {id_of(*manifold.getBody0()), id_of(*manifold.getBody1()), first.m_index0, first.m_index1};
 }
 
-// Bullet finds one contact of a lying cylinder a substep, at one of its ends, and keeps what it
-// found at the other. Those points roll with the cylinder, to behind its axle, and lift it from
-// there: it would roll faster and faster. So they are moved back to below the axle. `outward` is
-// the contact's normal away from `body`; p and q are the contact's points on the body and on the
-// other one.
+// Bullet finds one contact of a lying cylinder per substep, at one of its ends, and keeps the
+// contact found earlier at the other end. That point rolls with the cylinder to behind its axle and
+// lifts it there, so that it would roll faster and faster. It is moved back to below the axle.
+// `outward` is the contact's normal away from `body`; p and q are the contact points on the body
+// and on the other one.
 void keep_below_its_axle(const btCollisionObject& body, const btCollisionObject& other,
                          btManifoldPoint& point, int child, const btVector3& outward,
                          btVector3& p_W, btVector3& p_Body, btVector3& q_W, btVector3& q_Other) {
@@ -62,7 +62,7 @@ void keep_below_its_axle(const btCollisionObject& body, const btCollisionObject&
   if (shape->getShapeType() != CYLINDER_SHAPE_PROXYTYPE) return;
   const btVector3 axis = X_WS.getBasis().getColumn(2);
   const btVector3 down = outward - outward.dot(axis) * axis;
-  constexpr btScalar kLying = 0.7;  // of a unit normal across the axis
+  constexpr btScalar kLying = 0.7;  // component of a unit normal across the axis
   if (down.length2() < kLying * kLying) return;
   const btScalar radius = static_cast<const btCylinderShapeZ*>(shape)->getRadius();
   const btVector3 moved =
@@ -140,11 +140,12 @@ void Dynamics::take(const std::vector<btRigidBody*>& bodies) {
 void Dynamics::take(const Dynamics& other,
                     const std::function<btTypedConstraint*(btTypedConstraint*)>& joint_here) {
   const auto& from =
-      const_cast<Dynamics&>(other).getPairCache()->getOverlappingPairArray();  // as Bullet has it
+      // as Bullet's interface has it
+      const_cast<Dynamics&>(other).getPairCache()->getOverlappingPairArray();
   auto& to = getPairCache()->getOverlappingPairArray();
   for (int i = 0; i < to.size(); ++i)
     copy_contacts(from[i], to[i], *getDispatcher(), getDispatchInfo());
-  for (int i = 0; i < m_constraints.size(); ++i)  // in the order in which they are solved
+  for (int i = 0; i < m_constraints.size(); ++i)  // in solving order
     m_constraints[i] = joint_here(other.m_constraints[i]);
 }
 
@@ -215,7 +216,7 @@ void Dynamics::find_islands() {
   island_of_root_.resize(bodies_.size());
   for (size_t i = 0; i < bodies_.size(); ++i) {
     if (!can_be_moved(*bodies_[i])) continue;
-    const size_t of = root(i);  // the smallest number of all
+    const size_t of = root(i);  // the smallest number of the set
     if (of == i) {
       island_of_root_[i] = island_count_++;
       if (islands_.size() < island_count_) islands_.emplace_back();

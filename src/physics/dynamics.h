@@ -1,8 +1,9 @@
-// Bullet's dynamics world, stepped by us: only the bodies that need it take part, island by island.
+// Bullet's dynamics world with a step of our own: only bodies that need it take part, island by
+// island.
 //
-// Bullet's own stepSimulation goes over every object of the world several times; with a thousand
-// robots that touch nothing, that is most of its cost. It also solves islands together, and in an
-// order that others decide; here an island's bits depend on its own bodies alone.
+// Bullet's stepSimulation visits every object of the world several times; with a thousand robots
+// that touch nothing, that is most of its cost. It also solves islands together, in an order that
+// depends on other bodies; here an island's bits depend on its own bodies alone.
 #pragma once
 
 #include <functional>
@@ -19,25 +20,25 @@ class Dynamics final : public btDiscreteDynamicsWorld {
            btCollisionConfiguration& configuration, const ContactSurfaces& surfaces,
            const SolverSettings& settings);
 
-  // Room for so many bodies and what they usually touch: until there is more, substeps allocate
-  // nothing.
+  // Reserves capacity for that many bodies and their usual contacts: up to there substeps do not
+  // allocate.
   void reserve(size_t bodies);
 
-  // From now on only these bodies are simulated. All bodies of all pairs and joints must be among
-  // them.
+  // Selects the bodies that are simulated from now on. All bodies of all pairs and joints must be
+  // among them.
   void take(const std::vector<btRigidBody*>& bodies);
-  bool awake() const;  // one of them is
+  bool awake() const;  // whether one of them is awake
 
-  // Becomes what it is in another copy of the world, whose pairs are the same in the same order:
-  // what Bullet keeps of them. All objects must be awake. joint_here: the joint that one of the
-  // other's is here.
+  // Takes the state of another copy of the world that has the same pairs in the same order, as far
+  // as Bullet keeps any. All objects must be awake. joint_here maps the other world's joints to
+  // those of this one.
   void take(const Dynamics& other,
             const std::function<btTypedConstraint*(btTypedConstraint*)>& joint_here);
 
-  // One substep: forces and gravity to contacts, contacts to velocities, velocities to poses.
+  // One substep: forces and gravity, contacts, velocities, poses.
   void substep(double substep_s);
 
-  // Of the bodies that take part, those that touch or are near, in a fixed order.
+  // Of the simulated bodies, those that touch something or are near it, in a fixed order.
   const std::vector<btPersistentManifold*>& manifolds() const { return manifolds_; }
   void find_manifolds();
 
@@ -57,7 +58,7 @@ class Dynamics final : public btDiscreteDynamicsWorld {
 
   Solver solver_;
   std::vector<btRigidBody*> bodies_;
-  std::vector<btBroadphasePair*> pairs_;  // of bodies_, in the order of their numbers
+  std::vector<btBroadphasePair*> pairs_;  // of bodies_, ordered by their numbers
   std::vector<btPersistentManifold*> manifolds_;
   std::vector<btTypedConstraint*> joints_;
   std::vector<size_t> parents_, island_of_root_;  // union-find over bodies_

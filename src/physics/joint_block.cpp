@@ -1,11 +1,11 @@
-// Bullet's constraints to rows, and their direct solution.
+// Converts Bullet's constraints to rows and solves them directly.
 //
-// Of a row with bounds (a motor's largest torque, a stop) nobody knows beforehand whether it is at
-// one. All motors begin among the rows that are solved directly; one that comes out beyond its
-// bounds goes to those that are relaxed one by one, for the rest of the substep. In a tree it gives
-// what it can, and holds again where that is too much: the sets of those that hold and those that
-// are spent are changed until none is wrong (principal pivoting; K. Murty, "Note on a Bard-type
-// scheme for solving the complementarity problem", 1974).
+// For a row with bounds (a motor's maximum torque, a stop) it is not known in advance whether it is
+// at one. All motors start among the rows that are solved directly; one that exceeds its bounds is
+// relaxed iteratively with the others of that kind for the rest of the substep. In a tree such a
+// motor gives its maximum, and holds again where that is too much: motors are exchanged between the
+// sets of those that hold and those at a bound until none is wrong (principal pivoting; K. Murty,
+// "Note on a Bard-type scheme for solving the complementarity problem", 1974).
 #include "physics/joint_block.h"
 
 #include <algorithm>
@@ -18,18 +18,19 @@ namespace ruedo::physics {
 
 namespace {
 
-constexpr double kUnbounded = 1e17;    // Bullet's "infinity" is 1e18 or more
-constexpr double kRegular = 1e-10;     // part of the diagonal: loops of joints say the same twice
-constexpr double kIndependent = 1e-6;  // of its response that no other row has
-constexpr size_t kMostRows = 8;        // of one of Bullet's constraints
+constexpr double kUnbounded = 1e17;  // Bullet's "infinity" is 1e18 or more
+// relative to the diagonal: loops of joints contain redundant rows
+constexpr double kRegular = 1e-10;
+constexpr double kIndependent = 1e-6;  // part of a row's response that is independent of the others
+constexpr size_t kMostRows = 8;        // of one Bullet constraint
 constexpr size_t kRowsOfAHinge = 5;
-constexpr size_t kSkip = 12;  // numbers of a row's Jacobian
+constexpr size_t kSkip = 12;  // numbers in a row's Jacobian
 constexpr size_t kMostInBlock =
-    256;  // rows that are solved directly; a longer mechanism's others are relaxed
+    256;  // rows that are solved directly; the remaining rows of a longer mechanism are relaxed
 
 Vec3 vector_at(const btScalar* v) { return {v[0], v[1], v[2]}; }
 
-// A universal joint's rows have a target of their own, whatever part of the error is undone.
+// A universal joint's rows have a target of their own, independent of the error reduction.
 bool says_more(const btTypedConstraint& constraint) {
   return constraint.getConstraintType() == D6_CONSTRAINT_TYPE ||
          constraint.getConstraintType() == D6_SPRING_CONSTRAINT_TYPE ||
@@ -37,7 +38,7 @@ bool says_more(const btTypedConstraint& constraint) {
          constraint.getConstraintType() == FIXED_CONSTRAINT_TYPE;
 }
 
-// Where a hinge's frames are.
+// The frames of a hinge.
 struct HingeAt {
   explicit HingeAt(btHingeConstraint& hinge) {
     const btTransform &A = hinge.getRigidBodyA().getCenterOfMassTransform(),
@@ -51,16 +52,16 @@ struct HingeAt {
     axis = from_bt(A.getBasis() * in_a.getBasis().getColumn(2));
     askew = axis.cross(from_bt(B.getBasis() * in_b.getBasis().getColumn(2)));
   }
-  // What the five rows must undo, in m and rad.
+  // The errors that the five rows correct, in m and rad.
   double error(int row) const {
     return row < 3 ? apart[row] : row == 3 ? askew.dot(first) : askew.dot(second);
   }
-  Vec3 arm_a, arm_b, apart;  // from the centres of mass to the anchors, and from A's to B's
-  Vec3 axis, first, second;  // A's, and what is square to it
-  Vec3 askew;                // turns A's axis into B's
+  Vec3 arm_a, arm_b, apart;  // from the centres of mass to the anchors, and from A's anchor to B's
+  Vec3 axis, first, second;  // A's axis, and two vectors perpendicular to it
+  Vec3 askew;                // rotation from A's axis to B's
 };
 
-// A slider's and a fixed joint's frames.
+// The frames of a slider or fixed joint.
 struct FramesAt {
   FramesAt(const btTypedConstraint& constraint, const btTransform& in_a, const btTransform& in_b) {
     A = constraint.getRigidBodyA().getCenterOfMassTransform() * in_a;
@@ -104,7 +105,7 @@ JointWays::Kind kind_of(const btTypedConstraint& constraint) {
       return turns || fixed ? Kind::other : Kind::slider;
     }
     case POINT2POINT_CONSTRAINT_TYPE: return Kind::ball;
-    case D6_SPRING_2_CONSTRAINT_TYPE: return Kind::fixed;  // no other joint is of this type
+    case D6_SPRING_2_CONSTRAINT_TYPE: return Kind::fixed;  // no other joint has this type
     default: return Kind::other;
   }
 }
@@ -125,7 +126,7 @@ JointWays ways_of(btTypedConstraint& constraint) {
   return ways;
 }
 
-// m and rad that the bodies are out of place by.
+// The position error of the bodies in m and rad.
 std::pair<Vec3, Vec3> errors_of(JointWays::Kind kind, btTypedConstraint& constraint) {
   if (kind == JointWays::Kind::hinge) {
     const HingeAt at(static_cast<btHingeConstraint&>(constraint));
@@ -141,7 +142,7 @@ std::pair<Vec3, Vec3> errors_of(JointWays::Kind kind, btTypedConstraint& constra
   return {apart, at.askew()};
 }
 
-// Bullet's row of the stop that the joint is at.
+// Bullet's row for the stop that the joint is at.
 std::optional<int> stop_of(btTypedConstraint& constraint) {
   constexpr int kOfAHinge = 5, kOfASlider = 4;
   if (constraint.getConstraintType() == HINGE_CONSTRAINT_TYPE) {
@@ -166,7 +167,7 @@ bool is_stop(const Row& row) { return row.lower == 0.0 || row.upper == 0.0; }
 
 }  // namespace
 
-// What Bullet says of a constraint's rows.
+// The rows of a constraint, as Bullet gives them.
 struct JointBlocks::Values {
   std::array<btScalar, kSkip * kMostRows> jacobian{}, error{}, softness{}, lower{}, upper{};
 };
@@ -179,8 +180,8 @@ void JointBlocks::clear() {
   block_count_ = 0;
 }
 
-// Returns how many rows there are. `reduction` is the part of the joint's error that the rows'
-// velocities undo in a substep.
+// Returns the number of rows. `reduction` is the part of the joint's error that the rows' target
+// velocities correct in a substep.
 int JointBlocks::ask(btTypedConstraint& constraint, double reduction, double substep_s,
                      Values& values) {
   btTypedConstraint::btConstraintInfo1 size;
@@ -294,7 +295,8 @@ void JointBlocks::add_rows(Joint& joint, const SolverBodies& bodies, double subs
   for (size_t i = joint.first; i < rows_.size(); ++i) {
     const Row& row = rows_[i];
     if (row.inverse == 0.0) continue;
-    const bool second = block.is_tree && i > first_motor;  // a tree leads a way once
+    // a tree can prescribe one degree of freedom only once
+    const bool second = block.is_tree && i > first_motor;
     const bool direct = !is_stop(row) && row.upper > 0.0 && row.lower < 0.0 && !second &&
                         (block.is_tree || block.free.size() < kMostInBlock);
     (direct ? block.free : block.bounded).push_back(i);
@@ -309,8 +311,8 @@ Row& JointBlocks::add_row(const Joint& joint) {
   return row;
 }
 
-// Anchor to anchor and axis to axis, as Bullet has it. Returns false for what Bullet is asked for:
-// other joints, and a hinge at a stop.
+// Anchor to anchor and axis to axis, as Bullet does. Returns false if Bullet has to provide the
+// rows: for other joints, and for a hinge at a stop.
 bool JointBlocks::add_hinge(btTypedConstraint& constraint, Joint& joint,
                             const SolverBodies& bodies) {
   if (constraint.getConstraintType() != HINGE_CONSTRAINT_TYPE) return false;
@@ -358,7 +360,7 @@ void JointBlocks::add_asked(btTypedConstraint& constraint, Joint& joint, const S
   }
 }
 
-// Positive as the child, body b, moves against the parent.
+// Positive when the child, body b, moves relative to the parent.
 void JointBlocks::add_motor(JointMotor& motor, Joint& joint, int reference,
                             const SolverBodies& bodies) {
   Row row;
@@ -391,7 +393,7 @@ void JointBlocks::add_motor(JointMotor& motor, Joint& joint, int reference,
   if (motor.reference && reference > 0) add_third(motor, reference, bodies);
 }
 
-// The last row's: the reference bears what the moments on parent and child leave over.
+// For the last row: the reference bears the remaining moment of parent and child.
 void JointBlocks::add_third(const JointMotor& motor, int reference, const SolverBodies& bodies) {
   Third third;
   third.row = rows_.size() - 1;
@@ -453,7 +455,7 @@ void JointBlocks::find_blocks(const SolverBodies& bodies) {
     blocks_[block].joints.push_back(j);
     blocks_[block].hung += !moves(bodies[joint.a]) || !moves(bodies[joint.b]);
   }
-  for (size_t j = joints_.size(); j-- > 0;) {  // so that a body's first joint is its first one
+  for (size_t j = joints_.size(); j-- > 0;) {  // reversed, so that a body's first joint comes first
     Joint& joint = joints_[j];
     joint.next_of_a = std::exchange(joint_of_body_[joint.a], j);
     joint.next_of_b = std::exchange(joint_of_body_[joint.b], j);
@@ -490,7 +492,7 @@ bool JointBlocks::make_tree(Block& block, const SolverBodies& bodies) {
   return grow(block, body, bodies);
 }
 
-// From the root, from body to body.
+// From the root, body by body.
 bool JointBlocks::grow(Block& block, int root, const SolverBodies& bodies) {
   grown_.assign(1, root);
   for (size_t i = 0; i < grown_.size(); ++i) {
@@ -509,8 +511,8 @@ bool JointBlocks::grow(Block& block, int root, const SolverBodies& bodies) {
   return true;
 }
 
-// The joints of a chain follow one another, and each is tied to its neighbours alone: near the
-// diagonal is all that there is, and Cholesky's factor has it there, too.
+// The joints of a chain are consecutive, and each is coupled to its neighbours only: the matrix is
+// banded, and so is its Cholesky factor.
 void JointBlocks::find_envelope(Block& block) {
   constexpr size_t kNone = static_cast<size_t>(-1);
   const size_t n = block.free.size();
@@ -525,7 +527,7 @@ void JointBlocks::find_envelope(Block& block) {
   for (size_t i = 0; i < n; ++i) {
     block.begin[i] = i;
     for_each_body(block.free[i], [&](int body) {
-      if (body == 0) return;  // nothing moves it
+      if (body == 0) return;  // immovable
       size_t& first = first_of_body_[body];
       if (first == kNone) first = i;
       block.begin[i] = std::min(block.begin[i], first);
@@ -559,7 +561,8 @@ void JointBlocks::factor(Block& block) {
   block.tree.factor();
 }
 
-// Each pivot is taken off the rows that it reaches, at once: no sum waits for another one.
+// Right-looking: each pivot is subtracted at once from the rows it reaches, so that no sum waits
+// for another.
 void JointBlocks::factor_matrix(Block& block) {
   find_envelope(block);
   write_matrix(block);
@@ -591,7 +594,7 @@ void JointBlocks::solve_lower(const Block& block, double* x) const {
   }
 }
 
-// What is missing of the rows' velocities, to impulses.
+// From velocity errors of the rows to impulses.
 void JointBlocks::solve(Block& block, std::vector<double>& x) const {
   const size_t n = block.free.size();
   if (block.is_tree) {
@@ -604,7 +607,8 @@ void JointBlocks::solve(Block& block, std::vector<double>& x) const {
   for (size_t j = n; j-- > 0;) {
     const double* of_j = &block.factor[j * n];
     double sum = x[j];
-    for (size_t i = block.end[j]; i > j; --i) sum -= of_j[i] * x[i];  // the newest one comes last
+    // from the last column, whose x is the newest
+    for (size_t i = block.end[j]; i > j; --i) sum -= of_j[i] * x[i];
     x[j] = sum * block.inverse[j];
   }
 }
@@ -614,7 +618,7 @@ bool JointBlocks::exact() const {
                      [](const Block& block) { return block.exact && block.bounded.empty(); });
 }
 
-// x_: what is missing of the rows' velocities. Returns the largest.
+// x_: the velocity errors of the rows. Returns the largest.
 double JointBlocks::aim(Block& block, const SolverBodies& bodies) {
   double worst = 0.0;
   x_.resize(block.free.size());
@@ -626,7 +630,7 @@ double JointBlocks::aim(Block& block, const SolverBodies& bodies) {
   return worst;
 }
 
-// Those that hold, to what is missing of their rates; those that are spent, to what they can give.
+// Motors that hold get their rate error; those at a bound get what they can give.
 double JointBlocks::aim_motors(Block& block) {
   double worst = 0.0;
   x_.resize(block.free.size());
@@ -644,8 +648,8 @@ double JointBlocks::aim_motors(Block& block) {
   return worst;
 }
 
-// After a solution: moves motors that are on the wrong side, or one of them. Returns whether any
-// was.
+// After a solution: moves motors in the wrong set to the other one, or only one of them. Returns
+// whether any was moved.
 bool JointBlocks::choose_spent(Block& block, bool one) {
   constexpr double kSame = 1e-9;  // rad/s, m/s
   const size_t were_spent = block.spent.size();
@@ -682,7 +686,7 @@ bool JointBlocks::choose_spent(Block& block, bool one) {
 }
 
 double JointBlocks::sweep_tree(Block& block, SolverBodies& bodies) {
-  constexpr int kAllAtOnce = 6, kMost = 60;  // moves from set to set; then one by one
+  constexpr int kAllAtOnce = 6, kMost = 60;  // exchanges of all at once; then one by one
   double worst =
       block.tree.aim([&](int body) { return std::pair(bodies[body].v, bodies[body].w); }, 0.0);
   for (int i = 0; i < kMost; ++i) {
@@ -784,7 +788,7 @@ void JointBlocks::tell_responses(const std::vector<Row*>& contacts,
   }
 }
 
-// C^T K^-1 C, where K = L D L^T is the rows' own response and C that to the contacts.
+// C^T K^-1 C, where K = L D L^T is the response of the rows and C their coupling to the contacts.
 void JointBlocks::take_off_held(const Block& block, const std::vector<Row*>& contacts,
                                 std::vector<double>& responses) {
   const size_t n = contacts.size(), m = block.free.size();
@@ -807,7 +811,7 @@ void JointBlocks::take_off_held(const Block& block, const std::vector<Row*>& con
   }
 }
 
-// An impulse moves its own bodies, and what joints do about that moves all of the mechanism.
+// An impulse moves its own bodies, and through the joints all of the mechanism.
 void JointBlocks::add_those_of_tree(Block& block, const std::vector<Row*>& contacts,
                                     std::vector<double>& responses) {
   const size_t n = contacts.size();
@@ -923,7 +927,7 @@ void JointBlocks::tell_rows(Newton& newton, const SolverBodies& bodies) {
   }
 }
 
-// What a joint of a tree holds.
+// What a joint of a tree transmits.
 void JointBlocks::add_locked_rows(const Joint& joint, const SolverBodies& bodies) {
   using Kind = JointWays::Kind;
   const Kind kind = joint.ways.kind;

@@ -1,5 +1,5 @@
-// The joints of mechanisms: those of one mechanism are a block that is solved directly, as a tree
-// (joint_tree.h), or, where joints close a loop or are of other kinds, as rows.
+// The joints of mechanisms. Those of one mechanism form a block that is solved directly: as a tree
+// (joint_tree.h), or as rows if joints close a loop or are of other kinds.
 #pragma once
 
 #include <optional>
@@ -15,32 +15,32 @@ class JointBlocks {
  public:
   void clear();
   // Adds an enabled constraint between two bodies of the solver, with its motors (Bullet's user
-  // pointer). reference: the third body of a gearbox; 0: none, or what never moves.
+  // pointer). reference: the third body of a gearbox; 0: none, or immovable.
   void add(btTypedConstraint& constraint, int a, int b, int reference);
-  // All are added: sorts them into blocks.
+  // To be called after all are added: sorts them into blocks.
   void prepare(const SolverBodies& bodies, double substep_s);
   bool empty() const { return joints_.empty(); }
-  // A sweep has brought all rows to their targets; another one would find them there.
+  // Whether the last sweep brought all rows to their targets, so that another one would change
+  // nothing.
   bool exact() const;
-  bool has_gears() const { return !thirds_.empty(); }  // their rows have three bodies
+  bool has_gears() const { return !thirds_.empty(); }  // the rows of a gearbox couple three bodies
 
-  // Brings all rows to their targets, as far as their bounds allow. Returns how far off the worst
-  // was, m/s or rad/s.
+  // Brings all rows to their targets as far as their bounds allow. Returns the largest error
+  // before, m/s or rad/s.
   double sweep(SolverBodies& bodies);
   double sweep_push(SolverBodies& bodies);
-  // The bodies have moved. Sets the rows' push targets to the velocities that bring the joints back
-  // together within a substep; returns the largest.
+  // To be called after the bodies have moved. Sets the rows' push targets to the velocities that
+  // correct the joints' errors within a substep; returns the largest.
   double look_again(double substep_s);
   void write_back() const;  // to the motors
 
-  // The mechanism of a body, as the number of its first body; 0: what nothing moves. Joints are
-  // prepared.
+  // The mechanism of a body, named by its first body; 0: immovable. The joints must be prepared.
   size_t mechanism(int body, const SolverBodies& bodies);
-  // Of contacts: what an impulse of each changes in the velocity of each while the rows that are
-  // solved directly hold, by rows of a square matrix. A sweep was made.
+  // For contacts: the change in each one's velocity due to an impulse at each, while the directly
+  // solved rows hold; a square matrix by rows. A sweep must have been made.
   void tell_responses(const std::vector<Row*>& contacts, std::vector<double>& responses);
 
-  // Which bodies are tied together, and by which rows.
+  // Which bodies are coupled, and by which rows.
   void tell_pairs(std::vector<std::pair<int, int>>& pairs) const;
   void tell_rows(Newton& newton, const SolverBodies& bodies);
 
@@ -49,13 +49,13 @@ class JointBlocks {
     size_t first = 0, count = 0;  // rows
     btTypedConstraint* constraint = nullptr;
     JointMotor* motors[2] = {};  // of the last rows, in that order
-    bool errors_only = true;     // without reduction, no row has a target
-    bool hinge = false;          // not at a stop: its five rows are ours, not Bullet's
+    bool errors_only = true;     // without error reduction, no row has a target
+    bool hinge = false;          // not at a stop: we compute its five rows, not Bullet
     int a = 0, b = 0, reference = 0;
     JointWays ways;
-    std::optional<int> stop;  // Bullet's row of the stop that it is at
+    std::optional<int> stop;  // Bullet's row for the stop that the joint is at
     size_t block = 0;
-    size_t way = JointTree::kNone;  // in the block's tree, where it has just one
+    size_t way = JointTree::kNone;  // its degree of freedom in the block's tree, if it has just one
     size_t next_of_a = JointTree::kNone, next_of_b = JointTree::kNone;  // of the body's joints
   };
   struct Spent {
@@ -64,21 +64,22 @@ class JointBlocks {
   };
   struct Block {
     std::vector<size_t> joints;
-    size_t bodies = 0, hung = 0;  // that move; joints to what never does
-    bool is_tree = false;         // its rows are motors and stops alone
+    size_t bodies = 0, hung = 0;  // movable ones; joints to immovable ones
+    bool is_tree = false;         // its rows are motors and stops only
     JointTree tree;
-    std::vector<size_t> free;     // rows that are solved directly: none of them is at a bound
-    std::vector<size_t> bounded;  // rows at a bound, relaxed one by one
-    std::vector<Spent> spent;     // of a tree: motors at a bound
-    // L D L^T of the free ones: D L^T, upper, by rows; 1 / D; of each row the first column that is
+    std::vector<size_t> free;     // rows that are solved directly: none is at a bound
+    std::vector<size_t> bounded;  // rows at a bound, relaxed iteratively
+    std::vector<Spent> spent;     // in a tree: motors at a bound
+    // L D L^T of the free rows: D L^T, upper, by rows; 1 / D; and for each row the first column
+    // below the diagonal that is not 0, and the last one above it.
     // not 0 below the diagonal, and the last one beyond it.
     std::vector<double> factor, inverse;
     std::vector<size_t> begin, end;
     bool factored = false;
-    bool exact = false;  // no row says what others say already: solving once is enough
+    bool exact = false;  // no row is redundant: one solution suffices
   };
 
-  // What a gearbox's row does to its reference.
+  // The effect of a gearbox's row on its reference.
   struct Third {
     size_t row = 0;
     int body = 0;
@@ -131,7 +132,7 @@ class JointBlocks {
                          std::vector<double>& responses);
 
   std::vector<Row> rows_;
-  std::vector<size_t> way_of_row_;  // in its block's tree; kNone: of none
+  std::vector<size_t> way_of_row_;  // in its block's tree; kNone: in none
   std::vector<Row> locked_;         // of trees, for Newton's method
   std::vector<Third> thirds_;
   std::vector<Joint> joints_;
@@ -141,10 +142,10 @@ class JointBlocks {
   std::vector<size_t> block_of_root_;
   std::vector<double> x_;              // scratch
   std::vector<size_t> first_of_body_;  // scratch: a block's first row at each body
-  std::vector<size_t> joint_of_body_;  // the first one
+  std::vector<size_t> joint_of_body_;  // the first joint of each body
   std::vector<int> grown_;             // scratch: bodies of a tree
   double closing_per_s_ = 0.0;
-  std::vector<double> held_;  // scratch: of contacts
+  std::vector<double> held_;  // scratch: for contacts
 };
 
 }  // namespace ruedo::physics

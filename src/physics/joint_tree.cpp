@@ -103,7 +103,7 @@ void JointTree::lead(size_t way, double softness) {
   ways_[way].softness = softness;
 }
 
-// About the point of reference: momentum is this times the twist.
+// About the reference point: momentum is this times the twist.
 void JointTree::set_inertia(Member& m) const {
   const Eigen::Matrix3d arm = m.mass * cross_matrix(m.arm);
   m.held.topLeftCorner<3, 3>() = m.inertia - cross_matrix(m.arm) * arm;
@@ -169,7 +169,7 @@ void JointTree::find_changes() {
   }
 }
 
-// Of each joint: what changes the momentum of all that hangs on it.
+// For each joint: the change in momentum of everything it carries.
 void JointTree::find_impulses() {
   for (Member& m : members_) {
     const Vec3 w = m.change.head<3>();

@@ -1,10 +1,11 @@
 // A mechanism whose joints make a tree, solved in reduced coordinates: the articulated-body
 // algorithm, for impulses (R. Featherstone, "Rigid Body Dynamics Algorithms", 2008, chapter 7).
 //
-// What a joint leaves open (a hinge one way to move, a ball three) is eliminated from the leaves to
-// the root, and velocities follow from the root to the leaves: the cost grows with the number of
-// bodies, not with its cube. All twists and impulses are about one point, so that none has to be
-// carried from link to link. A way that a motor leads is not open: it moves as it is told.
+// The degrees of freedom of a joint (one for a hinge, three for a ball) are eliminated from the
+// leaves to the root, and velocities are then propagated from the root to the leaves: the cost is
+// linear in the number of bodies, not cubic. All twists and impulses are about one point, so that
+// none has to be shifted from link to link. A degree of freedom with a motor is not free: its
+// velocity is prescribed.
 #pragma once
 
 #include <vector>
@@ -13,7 +14,8 @@
 
 namespace ruedo::physics {
 
-// How a joint lets its second body move against the first one, which has axis and anchor.
+// The degrees of freedom of a joint's second body relative to the first one, which carries axis and
+// anchor.
 struct JointWays {
   enum class Kind : uint8_t { other, hinge, slider, fixed, ball };
   Kind kind = Kind::other;
@@ -25,39 +27,42 @@ class JointTree {
   static constexpr size_t kNone = static_cast<size_t>(-1);
 
   void begin(const Vec3& about);
-  // The root, where nothing holds it. Returns whether it can be one.
+  // The root, if nothing holds it. Returns whether it can be one.
   bool add_root(int body, const SolverBodies& bodies);
-  // A body on one that was added, or on what never moves. b: the joint's second one, which the ways
-  // are of. Returns whether it can be one of a tree.
+  // Adds a body that hangs on an added one, or on something immovable. b: the joint's second body,
+  // to which the degrees of freedom refer. Returns whether the body can be part of a tree.
   bool add(int body, int on, bool b, const JointWays& ways, const SolverBodies& bodies);
   bool has(int body) const {
     return static_cast<size_t>(body) < place_.size() && place_[body] != kNone;
   }
-  // Of two bodies that a joint ties: whether this one hangs on the other.
+  // Whether the one of two jointed bodies is the child of the other.
   bool hangs_on(int body, int on) const { return has(body) && members_[place_[body]].on == on; }
-  // Of the last one that was added, where it has just one.
+  // The degree of freedom of the body added last, if it has just one.
   size_t only_way() const {
     return members_.back().first + 1 == ways_.size() ? members_.back().first : kNone;
   }
-  // A way that is led comes to its target; with a softness, in part.
-  void let_go();  // all ways are open
+  // Prescribes the velocity of a degree of freedom; with a softness, approximately.
+  void let_go();  // all degrees of freedom become free
   void lead(size_t way, double softness);
 
   void factor();
 
-  // What is missing of the joints' velocities, in velocities of the bodies (`velocity_of`: linear
-  // and angular), where they shall close errors in a substep (1/s; 0: none). Returns the largest.
+  // Computes the joints' velocity errors in terms of the bodies' velocities (`velocity_of`: linear
+  // and angular), including the correction of position errors in a substep (1/s; 0: none). Returns
+  // the largest.
   template <class VelocityOf>
   double aim(const VelocityOf& velocity_of, double closing);
-  void tell_error(int body, const Vec3& apart, const Vec3& askew);  // of its joint, m and rad
-  double rate(size_t way) const { return ways_[way].now; }          // then
+  // of the body's joint, m and rad
+  void tell_error(int body, const Vec3& apart, const Vec3& askew);
+  double rate(size_t way) const { return ways_[way].now; }  // in the current velocities
   void aim(size_t way, double missing) { ways_[way].missing = missing; }
-  void push(size_t way, double impulse) { ways_[way].given = impulse; }  // along an open one
-  // To changes of the velocities, and to impulses along the ways.
+  // of a free degree of freedom
+  void push(size_t way, double impulse) { ways_[way].given = impulse; }
+  // Converts them to velocity changes, and to impulses along the degrees of freedom.
   void solve();
   double impulse(size_t way) const { return ways_[way].impulse; }
   double rate_after(size_t way) const { return ways_[way].now + ways_[way].change; }
-  // Act: (body, linear, angular).
+  // Calls act(body, linear, angular) for each.
   template <class Act>
   void for_each_change(Act&& act) const {
     for (const Member& m : members_) {
@@ -74,14 +79,14 @@ class JointTree {
     int body = 0, on = 0;
     size_t parent = kNone;  // member
     size_t first = 0;       // way
-    double sign = 1.0;      // of the ways: -1 where the body is the joint's first one
+    double sign = 1.0;      // -1 if the body is the joint's first one
     JointWays::Kind kind = JointWays::Kind::other;
-    Vec3 axis, anchor, apart, askew;  // from here on places are from the point of reference
+    Vec3 axis, anchor, apart, askew;  // from here on positions are relative to the reference point
     Vec3 arm, arm_of_on;              // centres of mass
     double mass = 0.0;
     Eigen::Matrix3d inertia;  // about the centre of mass
-    Matrix6 held;             // inertia of all that hangs on the joint
-    Six aim, told;  // of the joint: what the bodies are to change, without and with motors
+    Matrix6 held;             // articulated inertia of everything that the joint carries
+    Six aim, told;            // of the joint: velocity changes wanted without and with motors
     Six pull, change, impulse;
   };
   struct Way {
@@ -101,10 +106,10 @@ class JointTree {
   void find_impulses();
 
   Vec3 about_ = Vec3::Zero();
-  bool open_ = false;            // something moves otherwise than told
-  std::vector<Member> members_;  // each after the one that it hangs on
+  bool open_ = false;            // a degree of freedom is free
+  std::vector<Member> members_;  // parents before children
   std::vector<Way> ways_;
-  std::vector<size_t> place_;  // of a body: its member
+  std::vector<size_t> place_;  // index of a body in members_
 };
 
 template <class VelocityOf>

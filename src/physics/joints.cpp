@@ -1,5 +1,5 @@
-// Hinges, sliders, balls and universal joints. Damping and friction act as a motor does, with the
-// rate 0 and a bounded impulse: however large they are, they never reverse a motion.
+// Hinges, sliders, ball and universal joints. Damping and friction act like a motor with rate 0 and
+// a bounded impulse: however large they are, they never reverse a motion.
 #include "physics/joints.h"
 
 #include <algorithm>
@@ -11,33 +11,34 @@ namespace ruedo::physics {
 
 namespace {
 
-// A limit of SDF's that is so large is none.
+// SDF limits beyond this mean "no limit".
 constexpr double kNoLimit = 1e9;
 
 bool limited(const model::JointAxis& axis) {
   return (axis.lower > -kNoLimit || axis.upper < kNoLimit) && axis.lower <= axis.upper;
 }
 
-// Bullet's hinge knows its angle within a turn. Limits beyond that, or on one side only, are held
-// by a window of so much (rad) to both sides of where the joint is, cut off at the limits.
+// Bullet's hinge knows its angle modulo a turn. Limits beyond that, or on one side only, are
+// enforced by a window of this size (rad) on both sides of the current angle, clipped at the
+// limits.
 constexpr double kWindow = 1.5;
 
 bool within_a_turn(const model::JointAxis& axis) { return axis.lower > -M_PI && axis.upper < M_PI; }
 
-// A frame at J whose x or z axis is the joint's.
+// A frame at J with its x or z axis along the joint's axis.
 Pose along(const Pose& X, const Vec3& axis_in_J, const Vec3& unit) {
   return {X.rotation * Quat::FromTwoVectors(unit, axis_in_J), X.translation};
 }
 
-// A motor's rate that changes by less (m/s or rad/s) wakes nothing that sleeps.
+// Changes of a motor's rate below this (m/s or rad/s) do not wake sleeping bodies.
 constexpr double kNewRate = 1e-3;
 
-// Bullet's universal joint counts its angles the other way round; the first is about its frame's z,
-// the second about y.
+// Bullet's universal joint counts its angles in the opposite direction; the first is about its
+// frame's z, the second about y.
 constexpr int kFirst = 2, kSecond = 1, kLocked = 0;
 constexpr double kAside = 1e-9;
 constexpr double kSquare =
-    M_PI / 2 - 1e-3;  // further it cannot turn about the second: there the first axis lies in line
+    M_PI / 2 - 1e-3;  // range of the second angle: at the end the first axis is aligned with it
 
 void set_turns(btRotationalLimitMotor& turns, double lower, double upper) {
   turns.m_loLimit = -upper;
@@ -46,7 +47,7 @@ void set_turns(btRotationalLimitMotor& turns, double lower, double upper) {
 
 double bounded(double value, double limit) { return std::clamp(value, -limit, limit); }
 
-// Holds nothing itself: its motor is all that there is.
+// Holds nothing itself: it only carries its motor.
 class Unconstrained : public btTypedConstraint {
  public:
   Unconstrained(btRigidBody& a, btRigidBody& b) : btTypedConstraint(GEAR_CONSTRAINT_TYPE, a, b) {}
@@ -60,7 +61,7 @@ Quat rotation_of(const btRigidBody& body) {
   return from_bt(body.getWorldTransform().getRotation());
 }
 
-// rad, about an axis that the turn need not be about altogether.
+// rad, about an axis that need not be the rotation's own.
 double angle_about(const Vec3& axis, const Quat& turn) {
   const Vec3 square = axis.unitOrthogonal(), now = turn * square;
   return math::atan2(axis.dot(square.cross(now)), square.dot(now));
@@ -109,7 +110,7 @@ JointConstraint::Constraint JointConstraint::make_hinge() const {
   if (type_ == model::JointType::revolute && limited(limits_) && within_a_turn(limits_)) {
     hinge->setLimit(limits_.lower, limits_.upper, 1.0, 0.3, 0.0);
   } else {
-    hinge->setLimit(1.0, -1.0);  // none, or a window at each substep
+    hinge->setLimit(1.0, -1.0);  // no limit, or a window in each substep
   }
   return hinge;
 }
@@ -125,7 +126,7 @@ std::unique_ptr<btSliderConstraint> JointConstraint::make_slider() const {
   return slider;
 }
 
-// A slider that may turn; the thread is a row of its own.
+// A slider that may rotate; the thread is a separate row.
 JointConstraint::Constraint JointConstraint::make_screw() const {
   auto slider = make_slider();
   const double one = bounded(limits_.lower * advance_, kNoLimit),
@@ -137,7 +138,7 @@ JointConstraint::Constraint JointConstraint::make_screw() const {
   return slider;
 }
 
-// Bullet wants the two axes square to each other; in world coordinates at the start.
+// Bullet needs perpendicular axes, in world coordinates at the start.
 JointConstraint::Constraint JointConstraint::make_universal() {
   const Pose X_WJ = from_bt(parent_.getWorldTransform()) * X_PJ_;
   const Vec3 first = X_WJ.rotation * limits_.axis_in_J;
@@ -148,13 +149,12 @@ JointConstraint::Constraint JointConstraint::make_universal() {
             axis2 = to_bt(Vec3(second.normalized()));
   axis2_in_C_ = (from_bt(child_.getWorldTransform()).rotation.conjugate() * second).normalized();
   auto universal = std::make_unique<btUniversalConstraint>(parent_, child_, anchor, axis1, axis2);
-  // Where nothing is amiss to the last bit, Bullet leaves a locked row out. So it is locked a
-  // nanometre aside.
+  // Bullet drops a locked row whose error is exactly zero. It is therefore locked a nanometre off.
   universal->setLinearLowerLimit({kAside, kAside, kAside});
   universal->setLinearUpperLimit({kAside, kAside, kAside});
   set_turns(*universal->getRotationalLimitMotor(kLocked), -kAside, -kAside);
   set_turns(*universal->getRotationalLimitMotor(kFirst), 1.0,
-            -1.0);  // none, or a window at each substep
+            -1.0);  // no limit, or a window in each substep
   set_turns(*universal->getRotationalLimitMotor(kSecond), std::max(limits2_.lower, -kSquare),
             std::min(limits2_.upper, kSquare));
   return universal;
@@ -168,7 +168,8 @@ JointConstraint::Constraint JointConstraint::make_gearbox() {
   return std::make_unique<Unconstrained>(parent_, child_);
 }
 
-// Of Bullet's constraint, all else follows from the joint and its bodies in each substep.
+// The part that belongs to Bullet's constraint; everything else follows from the joint and its
+// bodies in each substep.
 void JointConstraint::take(const JointConstraint& other) {
   JointState::operator=(other);
   *motors_ = *other.motors_;
@@ -237,7 +238,7 @@ void JointConstraint::set_effort(double effort) {
 }
 
 bool JointConstraint::leads() const {
-  constexpr double kOfItsEffort = 0.99;  // more is its limit, and it may lag
+  constexpr double kOfItsEffort = 0.99;  // beyond this it is at its limit, and may lag
   if (!constraint_ || !constraint_->isEnabled() || type_ == model::JointType::fixed) return true;
   if (mode_ != Mode::motor || follows_ || std::isfinite(gain_)) return false;
   const JointMotor& motor = motors_->first;
@@ -263,7 +264,7 @@ void JointConstraint::wake() {
 
 void JointConstraint::turn_on(JointMotor& motor, const Vec3& axis, double rate, double lowest,
                               double highest, double substep_s) const {
-  constexpr double kMost = 1e9;  // an infinite impulse is none
+  constexpr double kMost = 1e9;  // stands for infinity, which an impulse cannot be
   motor.on = highest > 0.0 || lowest < 0.0;
   motor.linear = type_ == model::JointType::prismatic;
   motor.axis = axis;
@@ -274,8 +275,8 @@ void JointConstraint::turn_on(JointMotor& motor, const Vec3& axis, double rate, 
   motor.softness = 0.0;
 }
 
-// What the servo and the joint's damping give is one line over the rate; friction is a row of its
-// own.
+// The servo and the joint's damping are one linear function of the rate; friction is a separate
+// row.
 void JointConstraint::serve(const Vec3& axis, double substep_s) {
   const double now = velocity(), damping = limits_.damping;
   double rate = servo_.rate;
@@ -303,7 +304,7 @@ void JointConstraint::push(double effort) {
   }
 }
 
-// Bullet counts no whole turns: a window about where the joint is.
+// Bullet does not count full turns: a window around the current angle.
 void JointConstraint::limit_first_axis() {
   const double lower = std::max(limits_.lower, position_ - kWindow),
                upper = std::min(limits_.upper, position_ + kWindow);
@@ -326,7 +327,7 @@ double JointConstraint::advanced() const {
 }
 
 void JointConstraint::hold_thread(double substep_s) {
-  constexpr double kEachSubstep = 0.2;  // of an error that is undone
+  constexpr double kEachSubstep = 0.2;  // of the error corrected
   constexpr double kAnything = 1e9;     // N
   const double error = advanced() - advance_ * position_;
   turn_on(motors_->second, axis_in_world(), -kEachSubstep * error / substep_s, -kAnything,
@@ -347,7 +348,7 @@ double JointConstraint::turned(const btRigidBody& body, const Quat& start_in_R,
 }
 
 void JointConstraint::mesh_gears(double substep_s) {
-  constexpr double kEachSubstep = 0.2;  // of an error that is undone
+  constexpr double kEachSubstep = 0.2;  // of the error corrected
   constexpr double kAnything = 1e9;     // N m
   const double error = position_ + ratio_ * parent_position_;
   turn_on(motors_->first, gear_axis(limits2_), -kEachSubstep * error / substep_s, -kAnything,
@@ -357,7 +358,7 @@ void JointConstraint::mesh_gears(double substep_s) {
 }
 
 void JointConstraint::follow(double leader_position, double leader_rate, double substep_s) {
-  constexpr double kEachSubstep = 0.3;  // of what it lags
+  constexpr double kEachSubstep = 0.3;  // of the lag corrected
   follows_ = true;
   follow_rate_ =
       bounded(multiplier_ * leader_rate +
@@ -423,8 +424,8 @@ void JointConstraint::after_substep(double substep_s) {
       parent_position_ = turned(parent_, R_RP_, limits_, parent_position_);
       break;
     case model::JointType::universal: {
-      // A turn about the parent's axis, then one about the child's: where the child's second axis
-      // points, seen along the first.
+      // A rotation about the parent's axis, then one about the child's: where the child's second
+      // axis points, seen along the first.
       const Quat R_PC = from_bt(parent_.getWorldTransform().getRotation()).conjugate() *
                         from_bt(child_.getWorldTransform().getRotation());
       const Vec3 first = X_PJ_.rotation * limits_.axis_in_J;

@@ -1,7 +1,7 @@
-// Joints between bodies as Bullet's constraints: limits, damping, friction, motors.
+// Joints between bodies as Bullet constraints: limits, damping, friction, motors.
 //
-// A joint's position is 0 at the start and is positive as the child turns or moves about or along
-// the axis.
+// A joint's position is 0 at the start, and grows as the child rotates about the axis or moves
+// along it.
 #pragma once
 
 #include <cmath>
@@ -15,20 +15,20 @@
 
 namespace ruedo::physics {
 
-// What a joint was told and what it did: all of it that changes from substep to substep.
+// The joint's command and response: all state that changes between substeps.
 struct JointState {
   explicit JointState(const model::Joint& joint) : limits_(joint.axis), limits2_(joint.axis2) {}
 
   enum class Mode { passive, motor, effort, servo };
-  bool follows_ = false;  // in the coming substep, at follow_rate_
+  bool follows_ = false;  // in the coming substep, with follow_rate_
   double follow_rate_ = 0.0;
   double parent_position_ = 0.0;       // rad about the first axis
-  model::JointAxis limits_, limits2_;  // of the second axis: universal and gearbox only
+  model::JointAxis limits_, limits2_;  // limits2_: second axis of universal joints and gearboxes
   struct {
     double rate = 0.0, lowest = 0.0, highest = 0.0, gain = 0.0, effort = 0.0;
-  } told_;  // before limits
+  } told_;  // before limits are applied
   WheelServo servo_;
-  double woken_at_ = 0.0;  // the servo's rate when it last woke the bodies
+  double woken_at_ = 0.0;  // the servo's rate when the bodies were last woken
   Mode mode_ = Mode::passive;
   double command_ = 0.0, lowest_effort_ = 0.0, highest_effort_ = 0.0, gain_ = 0.0;
   double position_ = 0.0, effort_ = 0.0;
@@ -36,7 +36,8 @@ struct JointState {
 
 class JointConstraint : private JointState {
  public:
-  // X_PJ, X_CJ: the joint's frame in Bullet's frames I of parent and child. reference: a gearbox's;
+  // X_PJ, X_CJ: the joint's frame in Bullet's frames I of parent and child. reference: for a
+  // gearbox.
   // others have none.
   JointConstraint(const model::Joint& joint, btRigidBody& parent, btRigidBody& child,
                   const Pose& X_PJ, const Pose& X_CJ, btRigidBody* reference = nullptr);
@@ -45,32 +46,32 @@ class JointConstraint : private JointState {
     return constraint_.get();
   }  // null: nothing to hold (no such joint)
 
-  // Of a universal joint these, and what it is told, are about its first axis; of a gearbox the
-  // child's, about the second one, against the reference; a ball joint has none: 0.
+  // For a universal joint, these and the commands refer to its first axis; for a gearbox, to the
+  // child's axis, relative to the reference; 0 for a ball joint.
   double position() const { return position_; }  // rad or m
   double velocity() const;
   double effort() const { return effort_; }
 
-  // Holds that rate within these efforts until another command (rad/s or m/s; N m or N). With a
-  // gain (N m s/rad or N s/m) the effort is in proportion to what is missing of the rate; infinite:
-  // the rate is held at once.
+  // Holds that rate within these efforts until the next command (rad/s or m/s; N m or N). With a
+  // gain (N m s/rad or N s/m) the effort is proportional to the rate error; with an infinite gain
+  // the rate is held exactly.
   void set_motor(double rate, double lowest_effort, double highest_effort, double gain);
-  void set_effort(double effort);  // gives that effort until another command
+  void set_effort(double effort);  // gives that effort until the next command
   void set_servo(const WheelServo& servo);
-  // Until the bodies are reset; what it is told already is held within them at once.
+  // Applies until the bodies are reset; the current command is limited at once.
   void set(JointSetting setting, double value);
   bool commanded() const { return mode_ != Mode::passive; }
 
-  // It may move faster than its bodies do now: it is told to, or a spring pulls.
+  // Whether it may move faster than its bodies do now: by a command or a spring.
   bool may_start() const {
     return mode_ == Mode::effort || mode_ == Mode::servo || limits_.spring_stiffness > 0.0 ||
            std::abs(command_) > 1e-3;
   }
 
-  // It moves as it is told, or not at all: nothing that acts on its bodies changes how.
+  // Whether its motion is prescribed or zero: forces on its bodies do not change it.
   bool leads() const;
 
-  // The bodies were reset to where they started: the position is 0, and no command holds.
+  // The bodies were reset to the start: position 0, no command.
   void reset() {
     position_ = effort_ = command_ = 0.0;
     parent_position_ = 0.0;
@@ -80,16 +81,16 @@ class JointConstraint : private JointState {
     limits_.rate_gain = written_.rate_gain;
   }
 
-  void disable() {  // it holds nothing any more
+  void disable() {  // it holds nothing from now on
     if (constraint_) constraint_->setEnabled(false);
     reset();
   }
 
-  // Becomes what the same joint is in another copy of the world.
+  // Takes the state of the same joint in another copy of the world.
   void take(const JointConstraint& other);
 
-  // For the coming substep: another joint leads, and this one goes along, with its largest effort
-  // at most. The leader does not feel it.
+  // For the coming substep: follows another joint, with at most its maximum effort. The leader does
+  // not feel it.
   void follow(double leader_position, double leader_rate, double substep_s);
   void before_substep(double substep_s);
   void after_substep(double substep_s);
@@ -114,26 +115,26 @@ class JointConstraint : private JointState {
   void hold_thread(double substep_s);
   Vec3 gear_axis(const model::JointAxis& axis) const;  // world
   void mesh_gears(double substep_s);
-  // rad about an axis of the reference, since the start, nearest to what it was
+  // rad about an axis of the reference since the start, unwrapped using the previous value
   double turned(const btRigidBody& body, const Quat& start_in_R, const model::JointAxis& axis,
                 double before) const;
 
   model::JointType type_;
   double advance_;              // m/rad: screw only
-  double multiplier_, offset_;  // of the leader's position
-  double ratio_;                // gearbox only, as what follows
+  double multiplier_, offset_;  // applied to the leader's position
+  double ratio_;                // gearbox only, like the following
   btRigidBody* reference_;
-  Quat R_RJ_, R_RP_, R_RC_;  // at the start: the joint's frame and both bodies' in the reference
+  Quat R_RJ_, R_RP_, R_RC_;  // at the start: the joint's frame and both bodies in the reference
   struct {
     double effort, velocity, rate_gain;
-  } written_;  // as the file has them
+  } written_;  // as in the file
   btRigidBody& parent_;
   btRigidBody& child_;
   Pose X_PJ_, X_CJ_;
   Vec3 axis2_in_C_ = Vec3::UnitY();  // universal only
   Constraint constraint_;
   std::unique_ptr<JointMotors> motors_ =
-      std::make_unique<JointMotors>();  // the constraint points to it
+      std::make_unique<JointMotors>();  // never moves in memory: the constraint points to it
 };
 
 }  // namespace ruedo::physics

@@ -1,4 +1,5 @@
-// Conjugate gradients from zero: they end at the least impulses that do the same to the bodies.
+// Conjugate gradients from zero: they converge to the least impulses with the same effect on the
+// bodies.
 #include "physics/load_shares.h"
 
 #include <algorithm>
@@ -9,9 +10,11 @@ namespace ruedo::physics {
 
 namespace {
 
-// Of unit normals: others press against each other, and how firmly is no share of a load.
+// Between unit normals: contacts in other directions press against each other, and do not share a
+// load.
 constexpr double kSameDirection = 0.7;
-// Three contacts in a triangle have no choice; this part of its longest side is no height.
+// Three contacts in a triangle have a unique solution; below this fraction of its longest side its
+// height counts as none.
 constexpr double kInLine = 1e-3;
 constexpr size_t kUsually = 16;  // contacts of a group
 
@@ -42,7 +45,7 @@ void LoadShares::gather(size_t first) {
   }
 }
 
-// A wheel that lies on a line of two points is as stiff as one on a single point.
+// A wheel in contact along a line of two points is as stiff as one with a single point.
 void LoadShares::weigh() {
   const size_t n = rows_.size();
   units_.resize(n);
@@ -79,7 +82,7 @@ bool LoadShares::spread(SolverBodies& bodies, JointBlocks& blocks, double tolera
   return any;
 }
 
-// least_: of the loads that move the bodies as loads_ do. Contacts that bear nothing stay out.
+// least_: the smallest loads that move the bodies like loads_. Contacts without load are excluded.
 void LoadShares::least() {
   const size_t n = rows_.size();
   const auto times = [&](const std::vector<double>& x, size_t i) {
@@ -99,7 +102,7 @@ void LoadShares::least() {
   heading_ = residual_;
   const double start = square(residual_);
   double left = start;
-  constexpr double kNothing = 1e-24;  // of a square
+  constexpr double kNothing = 1e-24;  // for a squared quantity
   for (size_t k = 0; k < 2 * n && left > kNothing * start; ++k) {
     double curvature = 0.0;
     for (size_t i = 0; i < n; ++i) {
@@ -117,7 +120,7 @@ void LoadShares::least() {
   }
 }
 
-// Part of the way from loads_ to least_ on which nothing pulls.
+// How far loads_ can move towards least_ until a contact would pull.
 double LoadShares::to_the_first_zero() const {
   double part = 1.0;
   for (size_t i = 0; i < loads_.size(); ++i)

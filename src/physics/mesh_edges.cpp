@@ -1,4 +1,4 @@
-// Neighbours of triangles, and Bullet's contacts sifted by them.
+// Neighbours of triangles, and filtering of Bullet's contacts with them.
 #include "physics/mesh_edges.h"
 
 #include <algorithm>
@@ -9,9 +9,8 @@ namespace ruedo::physics {
 
 namespace {
 
-constexpr double kOnEdge = 1e-4;  // of a triangle's height above that edge
-// Sine by which a normal may lean over an edge towards the neighbour: meshes are read in single
-// precision.
+constexpr double kOnEdge = 1e-4;  // relative to the triangle's height above that edge
+// Sine of the tolerance for normals that lean over an edge: meshes are read in single precision.
 constexpr double kLean = 2e-3;
 
 class MeshContacts final : public btManifoldResult {
@@ -22,7 +21,7 @@ class MeshContacts final : public btManifoldResult {
         mesh_(mesh),
         edges_(*static_cast<const MeshEdges*>(mesh.getCollisionShape()->getUserPointer())) {}
 
-  // B is the manifold's second object, whichever of the two that is.
+  // B is the manifold's second object, whichever of the two it is.
   void addContactPoint(const btVector3& normal_on_b, const btVector3& point_on_b,
                        btScalar depth) override {
     const bool mesh_is_b = m_manifoldPtr->getBody1() == &mesh_;
@@ -128,7 +127,7 @@ bool MeshEdges::belongs_elsewhere(int triangle, const Vec3& point, const Vec3& n
     edge = static_cast<int>(i);
   }
   if (on_edges == 0) return false;
-  if (on_edges >= 2) {  // a corner: whatever edge from it comes nearer
+  if (on_edges >= 2) {  // a vertex: any edge from it that comes nearer decides
     const uint32_t corner = on[0] && on[1] ? t[1] : on[1] && on[2] ? t[2] : t[0];
     for (size_t k = first_in_ring_[corner]; k < first_in_ring_[corner + 1]; ++k) {
       if (leads_there(vertices_[ring_[k]] - vertices_[corner])) return true;

@@ -1,9 +1,8 @@
-// Which contacts with a triangle mesh are of the surface, and which of an edge that only divides
-// it.
+// Tells contacts with the surface of a triangle mesh from contacts with edges that only divide it.
 //
-// Bullet looks at one triangle at a time. Beside the triangle that carries a ball lies another,
-// whose nearest point is on the edge between the two: a contact there would lean against the ball
-// as if the edge stood out of the floor.
+// Bullet tests one triangle at a time. Next to the triangle that carries a ball lies another, whose
+// nearest point is on their common edge: a contact there would push sideways, as if the edge stood
+// out of the floor.
 #pragma once
 
 #include <array>
@@ -19,25 +18,25 @@ class MeshEdges {
  public:
   MeshEdges(const model::Mesh& mesh, const Vec3& scale);
 
-  // Whether another part of the mesh is nearer to what lies from `point`, on that triangle, in the
-  // direction of `normal` (unit). Both in the mesh's frame, scaled.
+  // Whether another part of the mesh is nearer to something in the direction of `normal` (unit)
+  // from `point` on that triangle. Both in the mesh's frame, scaled.
   bool belongs_elsewhere(int triangle, const Vec3& point, const Vec3& normal) const;
 
  private:
-  static constexpr int kNone = -1;  // no other triangle has that edge, or several have
+  static constexpr int kNone = -1;  // no other triangle has that edge, or several do
 
   void join_vertices(const model::Mesh& mesh, const Vec3& scale);
   void find_neighbours();
   void find_rings();
 
-  std::vector<Vec3> vertices_;  // no two in one place
+  std::vector<Vec3> vertices_;  // without duplicates
   std::vector<std::array<uint32_t, 3>> triangles_;
   std::vector<std::array<int, 3>> neighbours_;  // across the edge from corner i to i + 1
-  std::vector<size_t> first_in_ring_;           // of each vertex, in ring_
-  std::vector<uint32_t> ring_;                  // vertices that an edge leads to
+  std::vector<size_t> first_in_ring_;           // for each vertex, in ring_
+  std::vector<uint32_t> ring_;                  // vertices connected by an edge
 };
 
-// Takes the place of Bullet's near callback for pairs one of which is a mesh that never moves.
+// Replaces Bullet's near callback for pairs with a static mesh.
 bool is_mesh(const btCollisionObject& object);
 void collide_with_mesh(btBroadphasePair& pair, btDispatcher& dispatcher,
                        const btDispatcherInfo& info);

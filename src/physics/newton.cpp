@@ -1,4 +1,4 @@
-// Newton's steps, the band and its Cholesky factor.
+// Newton's method, the banded matrix and its Cholesky factor.
 #include "physics/newton.h"
 
 #include <algorithm>
@@ -10,18 +10,18 @@ namespace ruedo::physics {
 
 namespace {
 
-// Part of its response by which a row yields to its impulse: the stiffer, the fewer multipliers and
-// the more steps for each.
+// The softness of a row's spring relative to the row's response: the stiffer, the fewer multiplier
+// updates, and the more Newton steps for each.
 constexpr double kYields = 1e-3;
 constexpr int kMostHalvings = 6;
-// A step may end where the potential rises again with this part of the slope it began with.
+// A line search may end at a slope of this fraction of the initial one.
 constexpr double kSlopeLeft = 0.3;
 
 bool can_move(const SolverBody& body) {
   return body.inverse_mass != Vec3::Zero() || !body.inverse_inertia.isZero(0.0);
 }
 
-// Cholesky of what may have zeros: axes about which a body cannot turn.
+// Cholesky factor of a semidefinite matrix: a body may be unable to rotate about an axis.
 Eigen::Matrix3d root_of(const Eigen::Matrix3d& A) {
   Eigen::Matrix3d L = Eigen::Matrix3d::Zero();
   const double nothing = 1e-14 * A.trace();
@@ -41,7 +41,7 @@ Eigen::Matrix3d root_of(const Eigen::Matrix3d& A) {
 
 }  // namespace
 
-// What usual islands need is there from the start: steady runs allocate nothing.
+// Capacity for usual islands is reserved: steady runs do not allocate.
 Newton::Newton() {
   constexpr size_t kBodies = 8, kEntries = 64;
   bodies_.reserve(kBodies);
@@ -79,7 +79,7 @@ double Newton::prepare(const SolverBodies& bodies, const std::vector<std::pair<i
   return products;
 }
 
-// From a body with few neighbours to its neighbours, to theirs; then the other way round.
+// Breadth-first from a body with few neighbours; then reversed.
 void Newton::put_in_order(const std::vector<std::pair<int, int>>& pairs) {
   const auto movable = [&](int body) {
     return body > 0 &&
@@ -306,7 +306,7 @@ void Newton::substitute() {
   }
 }
 
-// What the rows pull with becomes what they hold. Returns the largest change, as a velocity.
+// Updates the multipliers by the rows' current impulses. Returns the largest change, as a velocity.
 double Newton::take_multipliers() {
   double change = 0.0;
   for (Entry& entry : entries_) {

@@ -1,12 +1,12 @@
-// All rows of an island at once, where sweeps would carry a load from box to box: the method of
-// multipliers, its steps found by Newton's method (as in X. Li, D. Sun, K.-C. Toh, "A highly
+// Solves all rows of an island at once, where sweeps would carry a load from box to box: the method
+// of multipliers, with Newton's method for its steps (as in X. Li, D. Sun, K.-C. Toh, "A highly
 // efficient semismooth Newton augmented Lagrangian method", 2018; here for contacts with friction).
 //
-// Each row pulls as a stiff spring does, within its bounds, on top of the impulse that it had: a
-// convex problem in the velocities of the bodies, six unknowns a body. Its solution gives the next
-// impulses and limits of friction, until nothing changes. Bodies are ordered by Cuthill and McKee,
-// so that the matrix is a narrow band for stacks, walls and chains; its envelope is factored by
-// Cholesky in blocks of a body.
+// Each row acts like a stiff spring within its bounds, in addition to its previous impulse: a
+// convex problem in the bodies' velocities, six unknowns per body. Its solution gives the next
+// impulses and friction bounds, until nothing changes. Bodies are ordered by the Cuthill-McKee
+// algorithm, so that the matrix has a narrow band for stacks, walls and chains; its envelope is
+// factored by a Cholesky method in blocks of one body.
 #pragma once
 
 #include <utility>
@@ -20,44 +20,45 @@ class Newton {
  public:
   Newton();
 
-  // Of a new island: which of its bodies rows tie together. Returns what a factorization costs, in
-  // products of numbers.
+  // Sets up a new island: which of its bodies are coupled by rows. Returns the cost of a
+  // factorization, in multiplications.
   double prepare(const SolverBodies& bodies, const std::vector<std::pair<int, int>>& pairs);
 
   void begin() { entries_.clear(); }
-  // A row with bounds of its own. Returns its number.
+  // Adds a row with fixed bounds. Returns its number.
   size_t add(Row& row);
-  // A row whose bounds are so much of the impulse of the row `load`.
+  // Adds a row bounded by multiples of the impulse of the row `load`.
   void add(Row& row, size_t load, double lever);
-  // Friction along two rows: within an ellipse of these coefficients, not 0, times that impulse.
+  // Adds friction along two rows: within an ellipse with these coefficients, not 0, times that
+  // impulse.
   void add(Row& along, Row& across, double friction, double friction2, size_t load);
 
-  // Changes impulses and velocities, until the next step would change no velocity by more than
-  // `tolerance`, or for so many steps.
+  // Changes impulses and velocities until the next step would change no velocity by more than
+  // `tolerance`, or for at most that many steps.
   void solve(SolverBodies& bodies, double tolerance, int most_steps);
 
  private:
   using Block = Eigen::Matrix<double, 6, 6>;
   using Six = Eigen::Matrix<double, 6, 1>;
   struct Body {
-    int place = -1;                                          // in the order; -1: nothing moves it
-    Vec3 root_mass = Vec3::Zero();                           // M^-1 = L L^T
+    int place = -1;                 // in the elimination order; -1: immovable
+    Vec3 root_mass = Vec3::Zero();  // M^-1 = L L^T
     Eigen::Matrix3d root_inertia = Eigen::Matrix3d::Zero();  // lower triangle
   };
   enum class Kind : uint8_t { bounded, on_load, along, across };
   struct Entry {
     Row* row = nullptr;
     Kind kind = Kind::bounded;
-    int a = -1, b = -1;               // places
-    size_t load = 0;                  // entry whose impulse bounds this one
-    double scale = 1.0;               // the entry's impulse is the row's, divided by this
+    int a = -1, b = -1;               // places of the bodies
+    size_t load = 0;                  // the entry whose impulse bounds this one
+    double scale = 1.0;               // the entry's impulse is the row's divided by this
     double weight = 0.0;              // of the spring
     double lower = 0.0, upper = 0.0;  // of the impulse; friction: upper is the radius
-    double missing = 0.0;             // of the velocity where the solution began
-    double begun = 0.0, held = 0.0;   // impulse there, and that of the last multipliers
-    double pulls = 0.0;               // impulse now
-    double stiffness = 0.0;           // its derivative, along `turn` where friction slips
-    double turn = 0.0;                // of the combination of both rows of friction
+    double missing = 0.0;             // velocity error at the start of the solution
+    double begun = 0.0, held = 0.0;   // impulse at the start, and at the last multiplier update
+    double pulls = 0.0;               // current impulse
+    double stiffness = 0.0;           // its derivative; along `turn` for slipping friction
+    double turn = 0.0;                // angle of the combination of both friction rows
     bool active = false, was_active = false;
     Six J_a = Six::Zero(), J_b = Six::Zero();  // scale J L
   };
@@ -69,7 +70,8 @@ class Newton {
   }
   Entry& enter(Row& row, Kind kind, double scale, double response);
   void set_bounds();
-  double slope(const std::vector<Six>& y);  // pulls and gradient at y; its product with the step
+  // Computes `pulls` and the gradient at y; returns its product with the step.
+  double slope(const std::vector<Six>& y);
   void pull(Entry& entry, double wanted);
   void rub(Entry& along, Entry& across, double first, double second);
   bool same_set() const;
@@ -84,10 +86,10 @@ class Newton {
   std::vector<int> movable_, degree_, order_;  // bodies; order_: by place
   std::vector<size_t> first_neighbour_;
   std::vector<int> neighbours_;
-  std::vector<int> first_;     // of each place: the first one that its blocks reach
-  std::vector<size_t> start_;  // of each place: its blocks in blocks_
+  std::vector<int> first_;     // for each place, the first one that its blocks reach
+  std::vector<size_t> start_;  // for each place, its blocks in blocks_
   std::vector<Block> blocks_;
-  std::vector<Six> y_, trial_, gradient_, step_;  // of places, L^-1 v
+  std::vector<Six> y_, trial_, gradient_, step_;  // by place, as L^-1 v
   std::vector<Entry> entries_;
 };
 

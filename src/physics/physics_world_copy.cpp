@@ -1,7 +1,7 @@
-// One copy of a world becomes what another one is.
+// Gives one copy of a world the state of another.
 //
-// What a body, a joint, a pair of boxes and a contact keep from step to step is copied; the rest,
-// the trees of boxes, the islands and the solver, follows from that in each step.
+// Copies what bodies, joints, pairs and contacts keep between steps; everything else, the trees of
+// boxes, the islands and the solver's data, follows from that in each step.
 #include <map>
 
 #include "physics/physics_world_impl.h"
@@ -22,7 +22,7 @@ void PhysicsWorld::Impl::take(const Impl& other) {
   for (const BodyIndex i : motions_.indices()) take_body(i, other);
   broadphase_.take(other.broadphase_, &dispatcher_);
 
-  std::map<const btTypedConstraint*, btTypedConstraint*> here;  // looked up only
+  std::map<const btTypedConstraint*, btTypedConstraint*> here;  // only looked up, never iterated
   const auto add = [&](const auto& there, auto& joints) {
     for (const auto i : joints.indices())
       here[const_cast<JointConstraint&>(there[i]).constraint()] = joints[i].constraint();
@@ -33,8 +33,7 @@ void PhysicsWorld::Impl::take(const Impl& other) {
     here[other.ties_[i].constraint.get()] = ties_[i].constraint.get();
   dynamics_.take(other.dynamics_, [&](btTypedConstraint* there) { return here.at(there); });
 
-  for (const BodyIndex i :
-       motions_.indices()) {  // contacts are copied between those that are awake
+  for (const BodyIndex i : motions_.indices()) {  // contacts are copied between awake objects
     const btRigidBody& there = *other.rigid_.bodies[i].bullet;
     bullet(i).forceActivationState(there.getActivationState());
     bullet(i).setDeactivationTime(there.getDeactivationTime());

@@ -1,7 +1,8 @@
-// Instances that come and go between two steps.
+// Adds and removes instances between two steps.
 //
-// What is removed keeps its place in the lists, so that all numbers stay; the broadphase refuses
-// all its pairs, and no step looks at it. The same model may be put into that place again.
+// Removed things keep their place in the lists, so that numbers do not change; the broadphase
+// refuses all their pairs, and no step considers them. The same model may be put into that place
+// again.
 #include "physics/physics_world_impl.h"
 
 namespace ruedo::physics {
@@ -65,7 +66,7 @@ void PhysicsWorld::Impl::add(InstanceIndex instance) {
   if (has_statics) refilter_all();
 }
 
-// As a new body where the layout has it.
+// Resets it to a new body at the layout's pose.
 void PhysicsWorld::Impl::reset_body(BodyIndex body) {
   RigidBody& rigid = rigid_.bodies[body];
   rigid.info.gone = rigid.info.on_plane = false;
@@ -145,7 +146,7 @@ void PhysicsWorld::Impl::remove(InstanceIndex instance) {
     broadphase_.refilter(rigid.bullet->getBroadphaseHandle(), &dispatcher_);
   }
   if (!has_statics) return;
-  refilter_all();  // no pair may refer to them when their boxes go
+  refilter_all();  // no pair may refer to them once their boxes are gone
   for (const auto& object : rigid_.statics) {
     if (!is_of(object->info)) continue;
     broadphase_.destroyProxy(object->bullet.getBroadphaseHandle(), &dispatcher_);

@@ -1,7 +1,7 @@
 // A step of the physics world.
 //
-// For repeatable runs: pairs and contacts in the order of their numbers, objects added in world
-// order, and a broadphase that knows no addresses. A world that is made again gives the same bits.
+// For repeatable runs: pairs and contacts in numerical order, objects added in world order, and a
+// broadphase that does not depend on addresses. A world that is created again gives the same bits.
 #include "physics/physics_world_impl.h"
 
 #include <algorithm>
@@ -17,15 +17,15 @@ namespace ruedo::physics {
 
 namespace {
 
-// What joints tie together wants shorter substeps; so does what touches it. Nothing else: what
-// an unrelated robot does must not change one bit of a stack.
+// What joints connect needs shorter substeps, and so does what touches it. Nothing else: an
+// unrelated robot must not change one bit of a stack.
 constexpr int64_t kLongestSubstep_us = 5000, kLongestSubstepOfJoints_us = 1000;
 enum Pace { kCoarse, kFine };
-// Distance at which Bullet begins to see a contact: a body may come so near in one substep without
-// touching.
+// Distance at which Bullet starts to see a contact: a body may come this near in one substep
+// without touching.
 constexpr double kContactReach_m = 0.02;
 
-// Of bodies near each other at the start: their number grows with the square of what stands in one
+// Limit of nearby pairs at the start: their number grows with the square of the bodies in one
 // place.
 constexpr int kMostPairs = 200'000;
 
@@ -39,7 +39,7 @@ bool MayTouch::may_touch(const btCollisionObject& object_a,
   if (a.gone || b.gone) return false;
   if ((a.moved || !a.body.valid()) && (b.moved || !b.body.valid())) return false;
   if ((a.on_plane && b.plane) || (b.on_plane && a.plane)) return false;
-  // As SDF has it: links of one model collide when it says self_collide, but never across a joint.
+  // As in SDF: links of one model collide if it has self_collide, but never across a joint.
   if (std::find(a.joined.begin(), a.joined.end(), b.body) != a.joined.end()) return false;
   return a.instance != b.instance || a.self_collide;
 }
@@ -57,7 +57,7 @@ PhysicsWorld::Impl::Impl(const model::WorldModel& world, const model::BodyLayout
       dynamics_(dispatcher_, broadphase_, detection_.configuration(), surfaces_,
                 SolverSettings{world.solver.iterations, world.solver.tolerance,
                                world.solver.error_reduction}) {
-  gContactBreakingThreshold = kContactReach_m;  // Bullet's globals: the same in every world
+  gContactBreakingThreshold = kContactReach_m;  // a global of Bullet: the same in every world
   gDisableDeactivation = false;
   dynamics_.setForceUpdateAllAabbs(false);
   substeps_[kCoarse] = substeps_for(kLongestSubstep_us);
@@ -220,7 +220,7 @@ void PhysicsWorld::Impl::pull_from_bullet(BodyIndex body) {
   twist.linear = from_bt(rigid.bullet->getLinearVelocity()) - twist.angular.cross(arm);
 }
 
-// The box that the body may be in during the step, with the reach of its contacts.
+// The box that the body may occupy during the step, plus the reach of contacts.
 void PhysicsWorld::Impl::update_box(BodyIndex body) {
   const RigidBody& rigid = rigid_.bodies[body];
   btBroadphaseProxy* proxy = rigid.bullet->getBroadphaseHandle();
@@ -289,7 +289,7 @@ BodyIndex PhysicsWorld::Impl::root(BodyIndex body) {
   return body;
 }
 
-// Bodies that joints tie together, and all that may touch them in this step, go at the shorter
+// Bodies connected by joints, and everything that may touch them in this step, use the shorter
 // substeps.
 void PhysicsWorld::Impl::choose_pace() {
   for (auto& bodies : simulated_) bodies.clear();
@@ -325,8 +325,8 @@ void PhysicsWorld::Impl::choose_pace() {
   }
 }
 
-// A mechanism on the world whose motors lead every joint, and that touches nothing, goes as it is
-// told: shorter substeps would find it on the same way.
+// A mechanism fixed to the world whose motors prescribe every joint, and that touches nothing,
+// moves as prescribed: shorter substeps would give the same path.
 void PhysicsWorld::Impl::find_led() {
   for (BodyMotion& motion : motions_) motion.led = false;
   for (const BodyIndex i : motions_.indices()) {
@@ -340,12 +340,12 @@ void PhysicsWorld::Impl::find_led() {
       if (body.valid() && motions_[body].simulated) motions_[root(body)].led = false;
     };
     if (!joints_[i].leads()) stray(body_of(i));
-    if (leaders_[i].valid()) stray(body_of(leaders_[i]));  // what follows goes along with it
+    if (leaders_[i].valid()) stray(body_of(leaders_[i]));  // a mimic joint moves with its leader
   }
 }
 
-// A mechanism that has stood still for a while, and that nothing tells to move, needs no short
-// substeps: an arm that holds its load.
+// A mechanism that has been still for a while, without a command to move, needs no short substeps:
+// an arm that holds its load.
 void PhysicsWorld::Impl::find_hurried() {
   constexpr double kStill_m_s = 1e-3, kStill_rad_s = 1e-3;
   constexpr int kStillSteps = 20;
@@ -368,7 +368,7 @@ void PhysicsWorld::Impl::find_hurried() {
   }
 }
 
-// A mover goes on along its way; Bullet leaves it where it is.
+// A mover continues along its path; Bullet leaves its pose unchanged.
 void PhysicsWorld::Impl::advance(btRigidBody& mover, double substep_s) {
   btTransform next;
   btTransformUtil::integrateTransform(mover.getWorldTransform(), mover.getLinearVelocity(),
@@ -376,7 +376,7 @@ void PhysicsWorld::Impl::advance(btRigidBody& mover, double substep_s) {
   mover.setWorldTransform(next);
 }
 
-// What feels the wind does not fall asleep: it may freshen.
+// Bodies that feel the wind do not fall asleep: it may rise.
 void PhysicsWorld::Impl::set_wind(const Vec3& wind) {
   wind_ = wind;
   if (!world_.environment.wind.pushes || wind_ == Vec3::Zero()) return;
@@ -386,8 +386,8 @@ void PhysicsWorld::Impl::set_wind(const Vec3& wind) {
   }
 }
 
-// The approximation of Gazebo's WindEffects: proportional to the mass of what feels the wind, and
-// to how much faster it blows.
+// The approximation of Gazebo's WindEffects: proportional to the mass exposed, and to the
+// difference in velocity.
 void PhysicsWorld::Impl::blow(int pace) {
   if (!world_.environment.wind.pushes) return;
   const double gain = world_.environment.wind.gain;
@@ -425,7 +425,7 @@ void PhysicsWorld::Impl::after_substep(int pace, double substep_s) {
   }
 }
 
-// One that takes no part goes on at the shorter substeps, as it was.
+// A body that takes no part keeps its short substeps.
 bool PhysicsWorld::Impl::at_pace(JointIndex joint, int pace) const {
   const BodyIndex body = body_of(joint);
   const bool coarse = body.valid() && motions_[body].simulated && !motions_[body].fine;
@@ -453,7 +453,7 @@ void PhysicsWorld::Impl::step_at(int pace) {
   }
   dynamics_.take(bodies);
   const double substep_s = static_cast<double>(step_us_) * 1e-6 / substeps_[pace];
-  if (!moving && !dynamics_.awake()) {  // what rests still touches
+  if (!moving && !dynamics_.awake()) {  // things at rest keep their contacts
     dynamics_.find_manifolds();
     contacts_.add(dynamics_.manifolds(), substeps_[pace], true);
     return;
@@ -467,7 +467,7 @@ void PhysicsWorld::Impl::step_at(int pace) {
     for (auto& [mover, start] : movers) advance(*mover, substep_s);
   }
   for (auto& [mover, start] : movers)
-    mover->setWorldTransform(start);  // the other pace begins there, too
+    mover->setWorldTransform(start);  // the other substep length starts there, too
 }
 
 void PhysicsWorld::Impl::step() {
@@ -491,9 +491,9 @@ void PhysicsWorld::Impl::step() {
   }
 }
 
-// Forces that are allowed, each on its own, can throw a light body at any speed, and what is thrown
-// so drags others along: without a bound the numbers grow from substep to substep, to infinity.
-// Bullet is never given what is not finite.
+// Forces that are all allowed can together accelerate a light body without bound, and fast bodies
+// drag others along: unbounded, numbers would grow to infinity from substep to substep. Bullet is
+// never given a value that is not finite.
 void PhysicsWorld::Impl::bound_speeds(const std::vector<btRigidBody*>& bodies) {
   constexpr double kFastest2 = quantity::kSpeed.most * quantity::kSpeed.most;
   const auto bounded = [](const btVector3& v) {

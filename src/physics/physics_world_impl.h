@@ -1,5 +1,4 @@
-// Inside of PhysicsWorld: bodies, joints, broadphase and Bullet's solver, and which bodies need a
-// step of Bullet.
+// Inside PhysicsWorld: bodies, joints, broadphase and solver, and which bodies need a Bullet step.
 //
 // Included by physics_world.cpp and physics_world_impl.cpp only.
 #pragma once
@@ -18,31 +17,31 @@
 
 namespace ruedo::physics {
 
-// Which pairs of objects may touch at all: as SDF has it, and as set_support() says.
+// Which pairs of objects may touch at all: by SDF's rules and set_support().
 class MayTouch final : public PairFilter {
  public:
   bool may_touch(const btCollisionObject& object_a,
                  const btCollisionObject& object_b) const override;
 };
 
-// How a body goes through the coming step.
+// How a body moves in the coming step.
 struct BodyMotion {
   enum class Kind : uint8_t { free, driven, guided };
   Kind kind = Kind::free;
   bool dirty = false;      // our pose and twist are newer than Bullet's
-  bool tied = false;       // by a joint: always simulated while awake
-  bool hung = false;       // by a joint to what never moves
+  bool tied = false;       // has a joint: always simulated while awake
+  bool hung = false;       // has a joint to something immovable
   bool simulated = false;  // in this step
-  bool fine = false;       // ... in the shorter substeps
+  bool fine = false;       // ... with the shorter substeps
   bool awake = false;      // when the step began
-  bool led = false;        // of a mechanism's first body: motors hold it to its way
-  int still = 0;           // steps for which it hardly moved, where it is tied
-  bool fresh = true;       // put there since the last step: no step says how it accelerates
+  bool led = false;        // for a mechanism's first body: motors prescribe its motion
+  int still = 0;           // number of steps with hardly any motion, for bodies with joints
+  bool fresh = true;       // placed since the last step, so that its acceleration is not known
   Twist mean;
   Pose end;
 };
 
-// What may hold two bodies together for a while; no other: the body and the world.
+// What may hold two bodies together temporarily; without a second one, the body and the world.
 struct Tie {
   BodyIndex body, other;
   std::unique_ptr<btFixedConstraint> constraint;
@@ -96,21 +95,22 @@ class PhysicsWorld::Impl {
   IndexedVector<BodyIndex, Twist> twists_, last_twists_;
   IndexedVector<BodyIndex, BodyMotion> motions_;
   ContactBook contacts_;
-  IndexedVector<JointIndex, JointConstraint> joints_;  // as in the layout
-  IndexedVector<JointIndex, JointIndex> leaders_;      // the one that it mimics, if it does
-  // Of wheels that are bodies of their own; the others have none.
+  IndexedVector<JointIndex, JointConstraint> joints_;  // numbered as in the layout
+  IndexedVector<JointIndex, JointIndex> leaders_;      // the joint that it mimics, if any
+  // For wheels that are separate bodies.
   IndexedVector<WheelJointIndex, JointConstraint> wheels_;
   IndexedVector<WheelIndex, WheelJointIndex> wheel_joint_;
-  IndexedVector<WheelIndex, double> wheel_sign_;  // axis of the joint against that of the wheel
+  // sign of the joint's axis relative to the wheel's
+  IndexedVector<WheelIndex, double> wheel_sign_;
 
  private:
-  void add_joints();  // those that are new
+  void add_joints();  // new ones
   void blow(int pace);
   void before_substep(int pace, double substep_s);
   void after_substep(int pace, double substep_s);
   void add_wheel(WheelIndex wheel);
   JointConstraint make_joint(InstanceIndex instance, ModelJointIndex joint);
-  void add_joints(InstanceIndex instance);  // in the simulation, too
+  void add_joints(InstanceIndex instance);  // also in the running simulation
   void add_static(StaticObject& object);
   void reset_body(BodyIndex body);
   void refilter_all();
@@ -119,16 +119,16 @@ class PhysicsWorld::Impl {
   void find_led();
   void find_hurried();
   bool at_pace(JointIndex joint, int pace) const;
-  BodyIndex body_of(JointIndex joint) const;  // that moves
+  BodyIndex body_of(JointIndex joint) const;  // the body that moves
   void step_at(int pace);
   void advance(btRigidBody& mover, double substep_s);
   void take_ties(const Impl& other);
   void take_body(BodyIndex body, const Impl& other);
   void tie(BodyIndex body, BodyIndex other);
   void untie(BodyIndex body, BodyIndex other);
-  void push_to_bullet(BodyIndex body);  // our pose and twist
+  void push_to_bullet(BodyIndex body);  // transfers our pose and twist
   void pull_from_bullet(BodyIndex body);
-  void start(BodyIndex body);  // the velocity it begins the step with
+  void start(BodyIndex body);  // sets its velocity at the start of the step
   void update_box(BodyIndex body);
   void choose_simulated();
   std::vector<BodyIndex> mechanism_in_the_air(BodyIndex body) const;
@@ -138,26 +138,27 @@ class PhysicsWorld::Impl {
   void accelerate_at_start(const std::vector<BodyIndex>& bodies, Snapshot& snapshot);
   BodyIndex root(BodyIndex body);
   void bound_speeds(const std::vector<btRigidBody*>&
-                        bodies);  // after a substep; throws StateError for what is not finite
+                        bodies);  // after a substep; throws StateError if anything is not finite
 
   const model::WorldModel& world_;
   const model::BodyLayout& layout_;
   int64_t step_us_;
-  int substeps_[2] = {1, 1};  // of each pace
+  int substeps_[2] = {1, 1};  // for each substep length
   MayTouch filter_;
-  btRigidBody ground_;  // what joints to the world hold on to
+  btRigidBody ground_;  // the other end of joints to the world
   Detection detection_;
   btCollisionDispatcher& dispatcher_;
   Broadphase broadphase_;
   Surfaces surfaces_;
   Dynamics dynamics_;
   Vec3 wind_ = Vec3::Zero();
-  std::vector<btRigidBody*> simulated_[2];             // of each pace
+  std::vector<btRigidBody*> simulated_[2];             // for each substep length
   IndexedVector<BodyIndex, BodyIndex> parents_;        // union-find over bodies
-  std::vector<BodyIndex> rolling_;                     // that are driven wheels
-  std::vector<std::pair<BodyIndex, BodyIndex>> tied_;  // that a joint ties together
+  std::vector<BodyIndex> rolling_;                     // driven wheels
+  std::vector<std::pair<BodyIndex, BodyIndex>> tied_;  // pairs connected by a joint
   IndexedVector<TieIndex, Tie> ties_;
-  std::vector<std::pair<btRigidBody*, btTransform>> movers_;  // and where they began the step
+  // with their poses at the start of the step
+  std::vector<std::pair<btRigidBody*, btTransform>> movers_;
 };
 
 }  // namespace ruedo::physics

@@ -1,6 +1,6 @@
-// How what joints hold accelerates before the first step: by two substeps so short that nothing
-// moves, which are undone. A substep leaves the velocity of its middle, so that the first one does
-// not know what keeps a link on its arc.
+// The initial acceleration of what joints hold: from two substeps so short that nothing moves,
+// which are then undone. A substep ends with the velocity at its middle, so that the first one does
+// not include what keeps a link on its arc.
 #include <algorithm>
 
 #include "physics/physics_world_impl.h"
@@ -12,7 +12,7 @@ namespace {
 
 constexpr double kInstant_s = 1e-4;
 
-// Puts a body back to where it was.
+// Restores a body's state.
 class Kept {
  public:
   explicit Kept(btRigidBody& body)
@@ -36,7 +36,7 @@ class Kept {
 
 }  // namespace
 
-// All that joints tie to a body; empty where something touches it, or holds it otherwise.
+// All bodies connected to a body by joints; empty if anything touches or otherwise holds them.
 std::vector<BodyIndex> PhysicsWorld::Impl::mechanism_in_the_air(BodyIndex body) const {
   std::vector<BodyIndex> tied{body};
   for (size_t i = 0; i < tied.size(); ++i) {
@@ -49,7 +49,7 @@ std::vector<BodyIndex> PhysicsWorld::Impl::mechanism_in_the_air(BodyIndex body) 
   return tied;
 }
 
-// Of the body's origin, as Bullet has it.
+// Acceleration of the body's origin, in Bullet's frame.
 Vec3 PhysicsWorld::Impl::velocity_now(BodyIndex body) const {
   const RigidBody& rigid = rigid_.bodies[body];
   const Pose X_IB = rigid.X_BI.inverse();
@@ -70,7 +70,7 @@ void PhysicsWorld::Impl::accelerate_at_start(Snapshot& snapshot) {
   }
 }
 
-// As one, where nothing holds them.
+// As one rigid body, if nothing holds them.
 void PhysicsWorld::Impl::fall_at_start(const std::vector<BodyIndex>& bodies,
                                        Snapshot& snapshot) const {
   const btVector3& gravity = rigid_.bodies[bodies[0]].bullet->getGravity();
@@ -86,7 +86,7 @@ void PhysicsWorld::Impl::accelerate_at_start(const std::vector<BodyIndex>& bodie
   for (const JointIndex i : joints_.indices()) {
     const BodyIndex body = body_of(i);
     if (!body.valid() || std::find(bodies.begin(), bodies.end(), body) == bodies.end()) continue;
-    if (leaders_[i].valid()) return fall_at_start(bodies, snapshot);  // it jumps to its place
+    if (leaders_[i].valid()) return fall_at_start(bodies, snapshot);  // it jumps to its position
     btTypedConstraint* constraint = joints_[i].constraint();
     if (constraint && constraint->isEnabled()) joints.push_back(&joints_[i]);
   }

@@ -1,5 +1,5 @@
-// Mass properties and compounds. Inertia is that of the links about the common centre of mass
-// (parallel axes).
+// Mass properties and compound shapes. Inertias of the links are combined about the common centre
+// of mass (parallel axes).
 #include "physics/rigid_bodies.h"
 
 #include <algorithm>
@@ -14,10 +14,10 @@ namespace ruedo::physics {
 namespace {
 
 constexpr double kSmallestMass_kg = 1e-6;
-// Driven wheels: the tyre gives way by about so much under the robot's weight, which spreads the
-// weight over all wheels (four rigid ones on a rigid floor stand on any two).
+// Driven wheels: the tyre is compressed by about this much by the robot's weight, which distributes
+// the weight over all wheels (four rigid wheels on a rigid floor stand on any two or three).
 constexpr double kTyreGives_m = 5e-4, kTyreDamping = 1.0;
-// Velocities below which a body may fall asleep (after 2 s).
+// Velocities below which a body may fall asleep, after 2 s.
 constexpr double kSleepSpeed_m_s = 0.005, kSleepRate_rad_s = 0.01;
 
 struct MassProperties {
@@ -50,8 +50,7 @@ MassProperties mass_of(const model::Model& model, const model::BodyLayout& layou
   return sum;
 }
 
-// Principal axes as a rotation; the axes of B where they are principal already, so that no rounding
-// creeps in.
+// Principal axes as a rotation; the axes of B if they are principal already, to avoid rounding.
 Quat principal_axes(const Eigen::Matrix3d& inertia, Vec3& moments) {
   Eigen::Matrix3d off = inertia;
   off.diagonal().setZero();
@@ -71,7 +70,7 @@ const model::RobotPlacement* robot_of(const model::BodyLayout& layout, InstanceI
   return robot != layout.robots.end() && robot->instance == instance ? &*robot : nullptr;
 }
 
-// The wheel of a wheels drive that this body is, if it is one.
+// The wheel that this body is, with a wheels drive.
 WheelIndex driven_wheel(const model::BodyLayout& layout, BodyIndex index) {
   const model::RobotPlacement* robot = robot_of(layout, layout.bodies[index].instance);
   if (!robot || robot->body == index) return {};
@@ -103,7 +102,7 @@ bool carries_kinematic_drive(const model::WorldModel& world, const model::BodyLa
   return false;
 }
 
-// Bullet's frame of a wheel: y is its axis, which lateral friction refers to.
+// Bullet's frame of a wheel: y is its axle, to which lateral friction refers.
 Pose wheel_frame(const model::BodyLayout& layout, WheelIndex wheel, const MassProperties& mass,
                  Vec3& moments) {
   const auto& placement = layout.wheels[wheel];
@@ -114,7 +113,7 @@ Pose wheel_frame(const model::BodyLayout& layout, WheelIndex wheel, const MassPr
   return X_BI;
 }
 
-// Adds a link's mass to what feels the wind.
+// Adds a link's mass to the mass exposed to the wind.
 void feel_wind(const model::Inertial& inertial, const Pose& X_IB, const Pose& X_BL,
                RigidBody& body) {
   const Vec3 at = X_IB * (X_BL * inertial.X_LI.translation);
@@ -125,7 +124,7 @@ void feel_wind(const model::Inertial& inertial, const Pose& X_IB, const Pose& X_
 // moments: about the axes of I.
 void make_bullet(double mass, const Vec3& moments, const Pose& X_WB, RigidBody& body) {
   const bool kinematic = body.info.moved;
-  const double smallest = 1e-9 + 1e-6 * mass;  // of 0, a torque would turn it at any speed
+  const double smallest = 1e-9 + 1e-6 * mass;  // with less, a torque could produce any angular rate
   btRigidBody::btRigidBodyConstructionInfo settings(
       kinematic ? 0.0 : mass, nullptr, body.compound.get(),
       kinematic ? btVector3(0, 0, 0) : to_bt(Vec3(moments.cwiseMax(smallest))));
@@ -136,12 +135,12 @@ void make_bullet(double mass, const Vec3& moments, const Pose& X_WB, RigidBody& 
   btRigidBody& bullet = *body.bullet;
   if (kinematic)
     bullet.setCollisionFlags(bullet.getCollisionFlags() | btCollisionObject::CF_KINEMATIC_OBJECT);
-  bullet.setFlags(bullet.getFlags() | BT_DISABLE_WORLD_GRAVITY);  // gravity is set for each body
+  bullet.setFlags(bullet.getFlags() | BT_DISABLE_WORLD_GRAVITY);  // gravity is set per body
   bullet.setGravity(to_bt(body.gravity));
   bullet.setUserPointer(&body.info);
 }
 
-// Of a kinematic drive, which stands for its friction too.
+// Of a kinematic drive, which also represents its friction.
 bool is_belt(const model::Model& model, ModelLinkIndex link) {
   if (!model.drive || model.drive->kind != model::DriveDescription::Kind::kinematic) return false;
   const auto& belts = model.drive->belts;
@@ -173,7 +172,7 @@ void RigidBodies::append(const model::WorldModel& world, const model::BodyLayout
   }
   bodies.resize(layout.bodies.size());
   for (BodyIndex i(0); i < first; ++i)
-    bodies[i].bullet->setUserPointer(&bodies[i].info);  // they may have moved
+    bodies[i].bullet->setUserPointer(&bodies[i].info);  // they may have moved in memory
   for (BodyIndex i = first; bodies.has(i); ++i) make_body(world, layout, i);
 }
 
@@ -210,20 +209,20 @@ ShapeSurface RigidBodies::tyre_of(const model::WorldModel& world, const model::B
   using Steering = model::DriveDescription::Steering;
   const bool rolls_sideways = model.drive && (model.drive->steering == Steering::mecanum ||
                                               model.drive->steering == Steering::omni);
-  if (rolls_sideways) {  // it grips along the roller's axis only; the roller turns freely
+  if (rolls_sideways) {  // it grips along the roller's axis only; the roller rotates freely
     const Vec3& rim = layout.wheels[wheel].rim;
     tyre.along_I.setZero();
     tyre.friction2 = 0.0;
     if (model.drive->steering == Steering::mecanum) tyre.roller_rad = math::atan2(rim.y(), rim.x());
   }
   if (tyre.along_I == Vec3::Zero()) tyre.axle_I = Vec3::UnitY();
-  if (tyre.stiffness > 0.0) return tyre;  // the file says how it gives
+  if (tyre.stiffness > 0.0) return tyre;  // the file gives the compliance
   make_it_give(mass_on_each_wheel(model, robot), world.gravity, tyre);
   return tyre;
 }
 
-// What else a robot stands on, casters above all, gives way like its tyres: rigid, it would bear
-// all and leave the wheels nothing. Against what it runs into it is as hard as before.
+// Other supports of a robot, above all casters, are as compliant as its tyres: rigid ones would
+// bear all the weight and leave none for the wheels. Against what it runs into, it stays rigid.
 ShapeSurface RigidBodies::foot_of(const model::WorldModel& world, const model::BodyLayout& layout,
                                   InstanceIndex instance, const ShapeSurface& surface) const {
   const model::Model& model = *world.models[instance].model;
@@ -243,7 +242,7 @@ void RigidBodies::make_compound(const model::WorldModel& world, const model::Bod
   const auto& placement = layout.bodies[body.info.body];
   const auto& instance = world.models[placement.instance];
   const Pose X_IB = body.X_BI.inverse();
-  // A kinematic drive stands for its wheels' friction.
+  // A kinematic drive represents its wheels' friction.
   const bool imposed = carries_kinematic_drive(world, layout, body.info.body);
   body.compound = std::make_unique<btCompoundShape>();
   std::vector<btCollisionShape*> shapes;

@@ -1,4 +1,4 @@
-// From the world's links to Bullet's collision objects: a static object for each collision that
+// Converts the world's links to Bullet's collision objects: a static object for each collision that
 // never moves, a compound rigid body for each body of the layout.
 #pragma once
 
@@ -12,7 +12,7 @@
 
 namespace ruedo::physics {
 
-// What a collision object is to the rest of Ruedo; Bullet's user pointer leads to it.
+// Links a collision object to the rest of Ruedo; Bullet's user pointer leads here.
 struct ObjectInfo {
   BodyIndex body;  // none: static
   InstanceIndex instance;
@@ -20,34 +20,34 @@ struct ObjectInfo {
   bool plane = false;
   bool on_plane = false;  // held up by a plane without a contact pair
   bool moved = false;     // kinematic: moved from outside, never by contacts
-  bool gone = false;      // its model was removed: it is nowhere
+  bool gone = false;      // its model was removed
   struct Shape {
     LinkIndex link;
     int collision = -1;  // in its link
     ShapeSurface surface;
   };
-  std::vector<Shape> shapes;      // of each child shape; one entry for a single shape
-  std::vector<BodyIndex> joined;  // that a joint ties to this one
+  std::vector<Shape> shapes;      // for each child shape; one entry for a single shape
+  std::vector<BodyIndex> joined;  // bodies connected to this one by a joint
 };
 
 inline const ObjectInfo& info_of(const btCollisionObject& object) {
   return *static_cast<const ObjectInfo*>(object.getUserPointer());
 }
 
-// What Bullet's number of a child shape stands for; of a static object its only shape, of one
-// without shapes nothing.
+// The shape for a child index of Bullet; for a static object its only shape; for one without shapes
+// none.
 const ObjectInfo::Shape& shape_of(const ObjectInfo& info, int child);
 
-// A moving body. Bullet's own frame I has its origin in the centre of mass and the principal axes
-// of inertia.
+// A moving body. Bullet's frame I has its origin at the centre of mass, along the principal axes of
+// inertia.
 struct RigidBody {
   std::unique_ptr<btCompoundShape> compound;
   std::unique_ptr<btRigidBody> bullet;
   ObjectInfo info;
   Pose X_BI;
   Vec3 gravity = Vec3::Zero();                              // at the start
-  double wind_mass = 0.0;                                   // kg, of its links that feel the wind
-  Vec3 wind_center = Vec3::Zero();                          // of that mass, in I
+  double wind_mass = 0.0;                                   // kg, of its links exposed to the wind
+  Vec3 wind_center = Vec3::Zero();                          // centre of that mass, in I
   Vec3 box_center = Vec3::Zero(), box_half = Vec3::Zero();  // bounds of the shapes, in B
 };
 
@@ -60,11 +60,11 @@ class RigidBodies {
  public:
   RigidBodies(const model::WorldModel& world, const model::BodyLayout& layout);
 
-  // Makes what the layout has of a new instance, at the end of the lists.
+  // Creates what the layout has for a new instance, at the end of the lists.
   void append(const model::WorldModel& world, const model::BodyLayout& layout,
               InstanceIndex instance);
 
-  IndexedVector<BodyIndex, RigidBody> bodies;          // as in the layout
+  IndexedVector<BodyIndex, RigidBody> bodies;          // numbered as in the layout
   std::vector<std::unique_ptr<StaticObject>> statics;  // in world order
   std::vector<Finding> findings;
 

@@ -1,6 +1,6 @@
-// Geometry to Bullet's shapes: margins that keep primitives exact, triangle meshes with an
-// unquantised BVH (a quantised one loses contacts), hulls of the connected parts of meshes that
-// move.
+// Converts geometry to Bullet's shapes: margins that keep primitives exact, triangle meshes with an
+// unquantised BVH (a quantised one loses contacts), and hulls of the connected parts of moving
+// meshes.
 #include "physics/shapes.h"
 
 #include <algorithm>
@@ -23,7 +23,7 @@ namespace {
 constexpr double kMargin_m = 1e-3;
 constexpr size_t kMaxPieces = 32;
 constexpr size_t kMaxHullVertices = 128;
-// A mesh whose hulls enclose so much more than it does counts as concave.
+// A mesh is concave if its hulls enclose that much more volume than it does.
 constexpr double kConcavity = 0.02;
 
 double margin_for(double smallest_half_size) {
@@ -34,7 +34,7 @@ btVector3 scaled(const Eigen::Vector3f& p, const Vec3& scale) {
   return {p.x() * scale.x(), p.y() * scale.y(), p.z() * scale.z()};
 }
 
-// Labels every vertex with the connected part it belongs to; vertices in one place are one.
+// Labels every vertex with its connected part; vertices in the same place are one.
 std::vector<int> connected_parts(const model::Mesh& mesh, int& count) {
   const size_t n = mesh.positions.size();
   std::vector<uint32_t> order(n), parent(n);
@@ -82,8 +82,8 @@ double volume_of(const btConvexHullComputer& hull) {
   return std::abs(six_volumes) / 6.0;
 }
 
-// The corners of the hull of `points`, thinned out to those that are extreme in evenly spread
-// directions when there are too many.
+// The vertices of the convex hull of `points`; if there are too many, only the extreme ones in
+// evenly distributed directions.
 std::unique_ptr<btConvexHullShape> hull_of(const std::vector<btVector3>& points, double& volume) {
   btConvexHullComputer computer;
   computer.compute(&points[0].m_floats[0], sizeof(btVector3), static_cast<int>(points.size()), 0,
@@ -164,7 +164,7 @@ btCollisionShape* ShapeFactory::primitive(const model::Geometry& geometry) {
       return own(std::make_unique<SeenAhead<EllipsoidShape>>(to_bt(size)));
     case model::Shape::cone: {
       auto cone = std::make_unique<SeenAhead<btConeShapeZ>>(size.x(), size.y());
-      cone->setMargin(0.0);  // a cone's margin is added outside
+      cone->setMargin(0.0);  // a cone's margin would be added outside
       return own(std::move(cone));
     }
     case model::Shape::plane:

@@ -1,5 +1,5 @@
-// Collision geometry as Bullet's shapes. Primitives are exact; a mesh that never moves is the mesh
-// itself, one that moves becomes convex pieces, and says so where that changes it.
+// Collision geometry as Bullet's shapes. Primitives are exact. A static mesh is the mesh itself; a
+// moving one becomes convex pieces, which is reported if it changes the shape.
 #pragma once
 
 #include <map>
@@ -12,22 +12,22 @@
 
 namespace ruedo::physics {
 
-// Makes and owns shapes; those of one mesh at one scale are shared. Must outlive all that use its
-// shapes.
+// Creates and owns shapes; those of the same mesh and scale are shared. Must outlive all users of
+// its shapes.
 class ShapeFactory {
  public:
   ShapeFactory();
   ~ShapeFactory();
 
-  // For a body that never moves. Null for a mesh without triangles. Planes: through the origin.
+  // For a static body. Null for a mesh without triangles. Planes pass through the origin.
   btCollisionShape* fixed(const model::Geometry& geometry);
 
-  // For a body that moves: one shape, or for a mesh the convex hull of each connected part. Appends
-  // to `shapes`; nothing is appended for a plane, which cannot move. Returns false when the shape
-  // is not quite the geometry: a concave mesh.
+  // For a moving body: one shape, or for a mesh the convex hull of each connected part. Appends to
+  // `shapes`; nothing for a plane, which cannot move. Returns false if the shape differs from the
+  // geometry: for a concave mesh.
   bool moving(const model::Geometry& geometry, std::vector<btCollisionShape*>& shapes);
 
-  // A wheel of that radius and width about its z axis (m).
+  // A wheel with that radius and width about its z axis (m).
   btCollisionShape* tyre(double radius, double width);
 
  private:
@@ -37,7 +37,7 @@ class ShapeFactory {
     bool exact = true;
   };
   using MeshKey =
-      std::tuple<const model::Mesh*, double, double, double>;  // looked up, never iterated
+      std::tuple<const model::Mesh*, double, double, double>;  // only looked up, never iterated
 
   btCollisionShape* primitive(const model::Geometry& geometry);
   template <class Shape>

@@ -1,4 +1,4 @@
-// Joints and surfaces that are simplified. Said once, while a world loads, so that nobody has to
+// Joints and surfaces that are simplified. Reported once while a world loads, so that nobody has to
 // find out.
 #include "physics/simplifications.h"
 
@@ -37,13 +37,14 @@ void look_at_joints(const model::WorldModel& world, const model::BodyLayout& lay
   }
 }
 
-// Without a direction two coefficients are one; a torsional one without a patch has no lever.
+// Without a direction only one coefficient is used; torsional friction without a patch has no lever
+// arm.
 void look_at_friction(const model::WorldModel& world, const model::BodyLayout& layout,
                       std::vector<Finding>& findings) {
   for (const auto& placement : layout.links) {
     const model::ModelInstance& instance = world.models[placement.instance];
     const model::Link& link = instance.model->links[placement.link];
-    const bool rolls = placement.wheel.valid();  // its axle is the direction
+    const bool rolls = placement.wheel.valid();  // its axle gives the direction
     for (const auto& collision : link.collisions) {
       const model::Surface& surface = collision.surface;
       const auto find = [&](const char* what) {

@@ -1,4 +1,4 @@
-// What of a world the physics does more simply than its file says, by file and line.
+// What the physics simplifies compared to the world's files, with file and line.
 #pragma once
 
 #include <vector>
@@ -7,7 +7,7 @@
 
 namespace ruedo::physics {
 
-// Ball and universal joints (they hold; their state and motors are partial), and bodies whose
+// Ball and universal joints (they hold, but their state and motors are partial), and bodies whose
 // shapes have different friction.
 std::vector<Finding> simplifications(const model::WorldModel& world,
                                      const model::BodyLayout& layout);

@@ -12,24 +12,24 @@ namespace ruedo::physics {
 namespace {
 
 constexpr double kSlowestBounce_m_s = 1e-3;
-// So deep a contact is left in peace. Were it undone, too, what rests would be lifted a little,
+// Penetration up to this depth is not corrected: otherwise bodies at rest would be lifted a little,
 // fall a little, and rock.
 constexpr double kRestingDepth_m = 5e-5;
-// What bore a load bears it up to so small a gap, and nothing stands so much higher than the rest.
-// Surfaces yield by more.
+// A loaded contact keeps its load up to this gap, and nothing stands higher than the rest by more.
+// Real surfaces yield by more.
 constexpr double kTouching_m = 1e-5;
 constexpr double kStanding_m_s = 1e-3;
 constexpr int kPushSweeps = 30;
 constexpr double kPushTolerance_m_s = 1e-5;
-// Sweeps that come first, and again after so many. One factorization may cost as much as so many
+// Sweeps before the first check, and between checks; a factorization may cost as much as that many
 // sweeps.
 constexpr int kSweepsBeforeNewton = 1, kSweepsBetweenNewton = 40, kNewtonSteps = 15;
-// Where friction holds a load, it does not become still while a few contacts bear all.
+// With friction, sweeps do not converge while few contacts bear the whole load.
 constexpr int kSweepsBeforeSharing = 10;
-constexpr int kSweepsOfMechanisms = 20;  // before Newton: their joints are solved at once anyway
-constexpr size_t kFewBodies = 2;         // what never moves, and another one: sweeps are faster
+constexpr int kSweepsOfMechanisms = 20;  // before Newton: their joints are solved directly anyway
+constexpr size_t kFewBodies = 2;         // something immovable and one body: sweeps are faster
 constexpr double kSweepsForAFactor = 30.0, kProductsOfARow = 40.0, kSmall = 20'000.0;
-// A joint that comes apart faster did so by no motion of its own: it was pushed, or put.
+// Beyond this a joint did not come apart by its own motion: it was pushed, or placed so.
 constexpr double kFastestClosing_m_s = 0.5;
 
 Eigen::Matrix3d matrix(const btMatrix3x3& m) {
@@ -38,7 +38,7 @@ Eigen::Matrix3d matrix(const btMatrix3x3& m) {
   return result;
 }
 
-// Two directions across n, the same ones while n stays the same.
+// Two tangential directions for n; the same as long as n does not change.
 void across(const Vec3& n, Vec3& first, Vec3& second) {
   const Vec3 off = std::abs(n.z()) < 0.7 ? Vec3::UnitZ() : Vec3::UnitX();
   first = (off - n * n.dot(off)).normalized();
@@ -71,7 +71,7 @@ Quat turned_by(const Quat& rotation, const Vec3& turn) {
                      : rotation;
 }
 
-// Free rotation over h: the angular momentum stays, the axes turn. Runge and Kutta's fourth order.
+// Free rotation over h: conserves angular momentum. Fourth-order Runge-Kutta.
 void turn_freely(const btRigidBody& body, Quat& rotation, Vec3& w, double h) {
   const Vec3 inverse = from_bt(body.getInvInertiaDiagLocal());
   const Vec3 momentum = rotation * (rotation.conjugate() * w).cwiseQuotient(inverse);
@@ -91,8 +91,7 @@ void turn_freely(const btRigidBody& body, Quat& rotation, Vec3& w, double h) {
   w = rate(rotation);
 }
 
-// Of bodies that differ in all by many orders of magnitude, the error of a joint can grow with each
-// attempt to undo it.
+// For bodies that differ by many orders of magnitude, each correction may increase a joint's error.
 Vec3 bounded(const Vec3& velocity) {
   const double norm = velocity.norm();
   return norm > quantity::kSpeed.most ? Vec3(velocity * (quantity::kSpeed.most / norm)) : velocity;
@@ -127,7 +126,7 @@ void Solver::set_normal(ContactRows& contact, const ContactSurface& surface, dou
   const double gap = contact.gap;
   double reduction = settings_.error_reduction;
   contact.soft = surface.stiffness > 0.0;
-  if (contact.soft) {  // an implicit spring and damper
+  if (contact.soft) {  // implicit spring and damper
     const double hard = substep_s * surface.stiffness + surface.damping;
     row.softness = 1.0 / (substep_s * hard);
     reduction = substep_s * surface.stiffness / hard;
@@ -144,7 +143,7 @@ void Solver::set_normal(ContactRows& contact, const ContactSurface& surface, dou
                         ? -reduction * (gap + kRestingDepth_m) / substep_s
                         : 0.0;
   if (surface.restitution <= 0.0) return;
-  // The speed at the moment of touching, somewhere within the substep: forces act up to there only.
+  // The velocity at the time of impact, somewhere within the substep: forces act until then only.
   const SolverBody& A = bodies_[row.a];
   const SolverBody& B = bodies_[row.b];
   const double before = -(row.linear_a.dot(A.v0) + row.angular_a.dot(A.w0) +
@@ -217,8 +216,7 @@ void Solver::add_contact(btManifoldPoint& point, const ContactSurface& surface, 
   start_from_last(contact, substep_s);
 }
 
-// The impulses of the substep before. m_prevRHS, which Bullet does not use, holds how long that
-// was.
+// Impulses of the previous substep. m_prevRHS, which Bullet does not use, stores its length.
 void Solver::start_from_last(ContactRows& contact, double substep_s) {
   const btManifoldPoint& point = *contact.point;
   if (!(point.m_prevRHS > 0.0) || !(point.m_appliedImpulse > 0.0)) return;
@@ -241,14 +239,13 @@ void Solver::add_contacts(btPersistentManifold& manifold, double substep_s) {
   }
 }
 
-// Both directions of friction at once: what holds, where that is within the ellipse of Coulomb's
-// law; else the projection of a step against the slip onto it, in coordinates in which the ellipse
-// is a circle.
+// Both friction directions at once: sticking friction if it lies within the ellipse of Coulomb's
+// law; otherwise the projection of a step against the slip onto it, in coordinates in which the
+// ellipse is a circle.
 double Solver::rub(ContactRows& contact) {
   Row& first = contact.along;
   Row& second = contact.across;
-  const double load =
-      std::max(contact.normal.impulse, 0.0);  // a conjugate step may have gone too far
+  const double load = std::max(contact.normal.impulse, 0.0);  // a conjugate step may have overshot
   if (load == 0.0 && first.impulse == 0.0 && second.impulse == 0.0) return 0.0;
   const double v1 = first.velocity(bodies_) + first.softness * first.impulse,
                v2 = second.velocity(bodies_) + second.softness * second.impulse;
@@ -276,7 +273,8 @@ double Solver::rub(ContactRows& contact) {
 
 double Solver::sweep(int number) {
   double worst = blocks_.sweep(bodies_);
-  // To and fro: a load goes all the way through a stack in one sweep, whichever way it is numbered.
+  // Alternating directions: a load passes through a whole stack in one sweep, however it is
+  // numbered.
   const auto nth = [&](size_t c) -> ContactRows& {
     return contacts_[number % 2 == 0 ? c : contact_count_ - 1 - c];
   };
@@ -298,11 +296,11 @@ double Solver::sweep(int number) {
   return worst;
 }
 
-// Where that is not soon still, all rows are solved at once; where that did no good, it is undone.
-// Between the sweeps the impulses go on along conjugate directions (M. Silcowitz-Hansen, S. Niebel,
-// K. Erleben, "A nonsmooth nonlinear conjugate gradient method for interactive contact force
-// problems", 2010): stacks and large ratios of masses take a part of the sweeps. The next sweep
-// brings them back within their bounds; the last one goes nowhere.
+// If that does not converge soon, all rows are solved at once; a solution that did not improve
+// matters is discarded. Between sweeps, impulses continue along conjugate directions (M.
+// Silcowitz-Hansen, S. Niebel, K. Erleben, "A nonsmooth nonlinear conjugate gradient method for
+// interactive contact force problems", 2010): stacks and large mass ratios then take a fraction of
+// the sweeps. The next sweep restores the bounds; the last one makes no such step.
 void Solver::sweep_until_still() {
   const int first = blocks_.empty() ? kSweepsBeforeNewton : kSweepsOfMechanisms;
   const auto start_conjugates = [](Row& row) { row.before = row.impulse, row.heading = 0.0; };
@@ -385,7 +383,7 @@ void Solver::go_on_along_conjugates(double& last_square, int sweep) {
   last_square = square;
 }
 
-// Asked for an island whose sweeps do not come to an end soon.
+// Whether to use Newton's method for an island whose sweeps do not converge soon.
 bool Solver::newton_pays() {
   if (newton_known_) return newton_pays_;
   newton_known_ = true;
@@ -418,7 +416,7 @@ void Solver::solve_at_once() {
   newton_.solve(bodies_, settings_.tolerance_m_s, kNewtonSteps);
 }
 
-// Of contacts: by velocities that move the bodies in this substep and are not kept.
+// Corrects penetration by velocities that move the bodies in this substep and are not kept.
 void Solver::undo_penetration() {
   bool any = false;
   for (size_t c = 0; c < contact_count_; ++c) any |= contacts_[c].normal.push_target > 0.0;
@@ -438,10 +436,11 @@ void Solver::undo_penetration() {
   }
 }
 
-// The bodies of a mechanism went straight on where its joints lead along arcs. What brings them
-// back together is part of their motion, and so is its velocity (J.-P. Ryckaert et al., "Numerical
+// The bodies of a mechanism moved along straight lines where its joints prescribe arcs. The
+// correction is part of their motion, and so is its velocity (J.-P. Ryckaert et al., "Numerical
 // integration of the cartesian equations of motion of a system with constraints", 1977: SHAKE): a
-// pendulum keeps its energy. An error that no motion makes is undone without.
+// pendulum keeps its energy. Errors that motion did not cause are corrected without changing
+// velocities.
 void Solver::close_joints(double substep_s) {
   if (blocks_.empty()) return;
   for (SolverBody& s : bodies_) s.push_v = s.push_w = Vec3::Zero();
@@ -486,7 +485,7 @@ void Solver::advance(double substep_s) {
   }
 }
 
-// Bodies have reached what they hit; now they leave it.
+// Bodies have reached what they hit; now they rebound.
 void Solver::bounce() {
   bool any = false;
   for (size_t c = 0; c < contact_count_; ++c) {

@@ -1,21 +1,20 @@
-// Contacts and joints to velocities: the constraint solver of an island, the bodies that touch or
-// are tied to each other.
+// The constraint solver: computes velocities from the contacts and joints of an island, a set of
+// bodies that touch or are connected.
 //
-// Projected Gauss-Seidel on impulses, started with those of the last substep, as in Bullet's own
-// sequential impulses (E. Catto, "Iterative dynamics with temporal coherence", 2005), with five
+// Projected Gauss-Seidel on impulses, warm-started with those of the last substep, like Bullet's
+// own sequential impulses (E. Catto, "Iterative dynamics with temporal coherence", 2005), with five
 // differences that were measured to matter:
-// - Sweeps are accelerated by conjugate directions, and go on until no row changes a velocity by
-// more than a tolerance, up to
-//   a limit: a lone robot takes a few, a stack or a large ratio of masses takes more.
+// - Sweeps are accelerated by conjugate directions, and continue until no row changes a velocity by
+// more than a tolerance, up to a limit: a lone robot takes a few, a stack or a large mass ratio
+// more.
 // - The joints of a mechanism are one block, solved directly in each sweep: a tree of joints in
-// reduced coordinates (joint_tree.h), others by Cholesky: a chain of joints holds.
-// - Friction is Coulomb's cone, not a pyramid: an ellipse where a file gives two coefficients. Its
-// force points against
-//   the slip of greatest dissipation, whatever the heading.
-// - Penetration and joint errors are undone by velocities of their own, which are forgotten: they
-// add no energy.
-// - A load that more contacts bear than need to is shared as equal springs share it
-// (load_shares.h).
+// reduced coordinates (joint_tree.h), others by Cholesky factorization, so that long chains of
+// joints hold.
+// - Friction is Coulomb's cone, not a pyramid; an ellipse where a file gives two coefficients. Its
+// force opposes the slip by maximum dissipation, whatever the heading.
+// - Penetration and joint errors are corrected by pseudo-velocities, which are discarded: they add
+// no energy.
+// - A load on more contacts than necessary is distributed as by equal springs (load_shares.h).
 #pragma once
 
 #include <array>
@@ -29,18 +28,18 @@
 
 namespace ruedo::physics {
 
-// What acts between two shapes, of both together.
+// The combined properties of two surfaces in contact.
 struct ContactSurface {
-  double friction = 1.0, friction2 = 1.0;  // along `along` and across it
+  double friction = 1.0, friction2 = 1.0;  // in the direction `along` and across it
   Vec3 along = Vec3::Zero();       // m/s, world, need not be unit; zero: the same in all directions
   double slip = 0.0, slip2 = 0.0;  // m/s per N, along and across
   double spinning = 0.0,
-         rolling = 0.0;  // m: largest moment about the normal, and across it, for a newton of load
+         rolling = 0.0;  // m: largest moment about the normal, and across it, per newton of load
   double restitution = 0.0;
   double stiffness = 0.0, damping = 0.0;  // N/m, N s/m; 0: rigid
 };
 
-// Says what acts at a contact point.
+// Gives the combined properties at a contact point.
 class ContactSurfaces {
  public:
   virtual ~ContactSurfaces() = default;
@@ -49,9 +48,9 @@ class ContactSurfaces {
 };
 
 struct SolverSettings {
-  int iterations = 500;          // at most
-  double tolerance_m_s = 1e-5;   // a sweep that changes no velocity by more is the last one
-  double error_reduction = 0.2;  // part of a penetration or joint error that a substep undoes
+  int iterations = 500;          // maximum number of sweeps
+  double tolerance_m_s = 1e-5;   // stops when a sweep changes no velocity by more
+  double error_reduction = 0.2;  // fraction of a penetration or joint error that a substep corrects
 };
 
 class Solver {
@@ -63,13 +62,13 @@ class Solver {
     pairs_.reserve(kUsually);
   }
 
-  // Solves one island for a substep: forces and gravity, which the bodies hold, are added;
-  // velocities and poses are advanced. The order of the arguments decides the last bits.
+  // Solves one island for a substep: applies the bodies' forces and gravity, and advances
+  // velocities and poses. The order of the arguments affects the last bits.
   void solve(const std::vector<btRigidBody*>& bodies,
              const std::vector<btPersistentManifold*>& manifolds,
              const std::vector<btTypedConstraint*>& joints, double substep_s);
 
-  int sweeps() const { return sweeps_; }  // of the last call
+  int sweeps() const { return sweeps_; }  // in the last call
 
  private:
   struct ContactRows {
@@ -77,14 +76,14 @@ class Solver {
     const btPersistentManifold* manifold = nullptr;
     Row normal, along, across, spin, roll[2];
     double friction = 0.0, friction2 = 0.0, spinning = 0.0, rolling = 0.0;
-    double step = 0.0;     // of the projected gradient for both directions of friction
+    double step = 0.0;     // of the projected gradient, for both friction directions
     double gap = 0.0;      // m, negative: overlap
-    double rebound = 0.0;  // m/s that a bounce leaves with
+    double rebound = 0.0;  // m/s, normal velocity after a bounce
     bool soft = false;
     std::array<Row*, 3> main_rows() { return {&normal, &along, &across}; }
   };
 
-  static constexpr size_t kUsually = 64;  // bodies, and contacts, of an island
+  static constexpr size_t kUsually = 64;  // expected bodies, and contacts, of an island
 
   int body_of(const btCollisionObject& object);
   void add_body(btRigidBody& body, double substep_s);
@@ -122,8 +121,8 @@ class Solver {
   JointBlocks blocks_;
   LoadShares shares_;
   Newton newton_;
-  bool newton_known_ = false, newton_pays_ = false;  // of this island
-  std::vector<std::pair<int, int>> pairs_;           // of bodies that rows tie together
+  bool newton_known_ = false, newton_pays_ = false;  // for this island
+  std::vector<std::pair<int, int>> pairs_;           // bodies coupled by rows
 };
 
 }  // namespace ruedo::physics

@@ -1,5 +1,5 @@
-// Sums find what is not finite: one infinity or NaN in a sum makes it infinite or NaN, and what is
-// added here is far from the largest double.
+// Sums find non-finite values: one infinity or NaN makes the sum non-finite, and the values added
+// here are far below the largest double.
 #include "physics/state_check.h"
 
 #include <cmath>

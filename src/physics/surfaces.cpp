@@ -1,5 +1,5 @@
-// Of two coefficients of friction the lower one holds, as in ODE and Gazebo; what yields yields
-// together.
+// The lower of two friction coefficients counts, as in ODE and Gazebo; two compliant surfaces act
+// as springs in series.
 #include "physics/surfaces.h"
 
 #include <algorithm>
@@ -12,14 +12,13 @@ namespace ruedo::physics {
 
 namespace {
 
-// A contact stiffer than this (N/m) is rigid: at 1 ms it would sink less than a micrometre under a
-// robot.
+// A contact stiffer than this (N/m) is rigid: under a robot it would be compressed by less than a
+// micrometre at 1 ms.
 constexpr double kRigid = 1e8;
-// Moment of friction about the normal of a round patch, of its radius times the load (Hertz's
-// pressure).
+// Torsional friction of a round patch, relative to its radius times the load (Hertzian pressure).
 constexpr double kPatch = 3.0 * M_PI / 16.0;
 
-// Where `friction` acts along, in the world; not projected yet.
+// The direction of `friction`, in the world; not yet projected.
 Vec3 direction_of(const ShapeSurface& surface, const btCollisionObject& object,
                   const Vec3& normal) {
   const auto in_world = [&](const Vec3& v) {
@@ -28,7 +27,7 @@ Vec3 direction_of(const ShapeSurface& surface, const btCollisionObject& object,
   if (surface.along_I != Vec3::Zero()) return in_world(surface.along_I);
   if (surface.axle_I == Vec3::Zero() || surface.friction == surface.friction2) return Vec3::Zero();
   const Vec3 axle = in_world(surface.axle_I), ahead = axle.cross(normal);
-  if (ahead.norm() <= 1e-3) return Vec3::Zero();  // a wheel that lies on its side has none
+  if (ahead.norm() <= 1e-3) return Vec3::Zero();  // a wheel lying on its side has no such direction
   if (surface.roller_rad == 0.0) return ahead;
   return math::cos(surface.roller_rad) * ahead.normalized() + math::sin(surface.roller_rad) * axle;
 }
@@ -44,13 +43,13 @@ double in_series(double k1, double k2) {
   return k1 > 0.0 && k2 > 0.0 ? k1 * k2 / (k1 + k2) : std::max(k1, k2);
 }
 
-// force: direction of what the contact does to the shape.
+// force: direction of the contact force on the shape.
 bool gives_way(const ShapeSurface& surface, const Vec3& force) {
   constexpr double kFromBelow = 0.7;
   return surface.borne_along == Vec3::Zero() || surface.borne_along.dot(force) > kFromBelow;
 }
 
-// The solver divides by the squares of coefficients: what nobody could measure is none.
+// The solver divides by squared coefficients: values too small to measure count as none.
 double felt(double coefficient) {
   constexpr double kLeast = 1e-9;
   return coefficient < kLeast ? 0.0 : coefficient;
@@ -86,7 +85,7 @@ ContactSurface Surfaces::at(const btCollisionObject& a, const btCollisionObject&
   ContactSurface both;
   const Vec3 along_a = direction_of(of_a, a, normal), along_b = direction_of(of_b, b, normal);
   const bool directed_a = along_a != Vec3::Zero(), directed_b = along_b != Vec3::Zero();
-  // Without a direction the two coefficients are one.
+  // Without a direction both coefficients are equal.
   const double a2 = directed_a ? of_a.friction2 : of_a.friction,
                b2 = directed_b ? of_b.friction2 : of_b.friction;
   both.friction = std::min(of_a.friction, of_b.friction);

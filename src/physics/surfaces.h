@@ -1,5 +1,5 @@
-// What two shapes' surfaces make of a contact: friction, slip, bounce, stiffness. A surface belongs
-// to a shape, so that a caster without friction keeps that on a chassis with some.
+// Combines two shapes' surfaces at a contact: friction, slip, bounce, stiffness. A surface belongs
+// to a shape, so that a frictionless caster stays so on a chassis with friction.
 #pragma once
 
 #include <vector>
@@ -9,11 +9,10 @@
 
 namespace ruedo::physics {
 
-// A shape's surface in the terms of its body.
+// A shape's surface, in the frame of its body.
 struct ShapeSurface {
   double friction = 1.0, friction2 = 1.0;
-  Vec3 along_I =
-      Vec3::Zero();  // direction of `friction` in the body's frame I; zero: none is given
+  Vec3 along_I = Vec3::Zero();  // direction of `friction` in the body's frame I; zero: not given
   Vec3 axle_I =
       Vec3::Zero();  // of a wheel: `friction` acts across it, `friction2` along it; zero: no wheel
   double roller_rad =
@@ -21,19 +20,19 @@ struct ShapeSurface {
             // towards it, along the axis of the roller that stands on the ground
   double slip = 0.0, slip2 = 0.0;  // m/s per N
   double torsional = 0.0;          // coefficient
-  double patch_radius_m = 0.0;     // of the torsional friction; 0: from the two below
+  double patch_radius_m = 0.0;     // of the torsional friction; 0: from the following two
   double surface_radius_m = 0.0;
   double rolling_m = 0.0;
   double restitution = 0.0;
   double stiffness = 0.0, damping = 0.0;  // 0: rigid
-  // World. Where it is given, the shape gives way only to what bears it along this direction.
+  // World. If given, the shape only yields to loads along this direction.
   Vec3 borne_along = Vec3::Zero();
 };
 
 // R_IC: the collision's axes in the body's frame.
 ShapeSurface surface_of(const model::Surface& surface, const Quat& R_IC);
 
-// By way of ObjectInfo.
+// Found through ObjectInfo.
 class Surfaces final : public ContactSurfaces {
  public:
   ContactSurface at(const btCollisionObject& a, const btCollisionObject& b,

@@ -1,4 +1,4 @@
-// Ties: rigid joints that close and open between two steps.
+// Ties: fixed joints that are closed and opened between two steps.
 #include <algorithm>
 
 #include "physics/physics_world_impl.h"
@@ -57,7 +57,7 @@ void PhysicsWorld::Impl::open_tie(TieIndex tie_index) {
   }
 }
 
-// One joint less; other ones of these bodies stay.
+// Removes one joint between the bodies; others remain.
 void PhysicsWorld::Impl::untie(BodyIndex body, BodyIndex other) {
   const auto forget = [&](BodyIndex one, BodyIndex partner) {
     std::vector<BodyIndex>& joined = rigid_.bodies[one].info.joined;

@@ -1,4 +1,4 @@
-// Quadratures over the pieces in which profiles and steering are smooth.
+// Quadrature over the intervals in which profiles and steering are smooth.
 #include "robot/base_motion.h"
 
 #include <algorithm>
@@ -17,7 +17,7 @@ constexpr std::array<double, 4> kNodes = {0.1834346424956498, 0.5255324099163290
 constexpr std::array<double, 4> kWeights = {0.3626837833783620, 0.3137066458778873,
                                             0.2223810344533745, 0.1012285362903763};
 constexpr double kLargestPanel_rad = 1.0;
-constexpr double kLongestSteering_s = 0.05;  // of a piece in which the steering turns
+constexpr double kLongestSteering_s = 0.05;  // longest interval while the steering moves
 
 template <class Add>
 void quadrature(double begin, double end, Add add) {

@@ -1,4 +1,4 @@
-// Forces, ways and goals of people.
+// Forces, paths and goals of people.
 #include "robot/crowd.h"
 
 #include <algorithm>
@@ -22,23 +22,25 @@ constexpr double kTick_s = 1e-6 * kTick_us;
 // Helbing and Molnar 1995.
 constexpr double kRelaxation_s = 0.5, kLookAhead_s = 2.0;
 constexpr double kPotential = 2.1, kReachOfThings_m = 0.3;  // m^2/s^2
-constexpr double kCosineOfSight = -0.17364817766693033;     // of 100 degrees to each side
+constexpr double kCosineOfSight = -0.17364817766693033;     // 100 degrees to each side
 constexpr double kBehind = 0.5, kFasterThanLiked = 1.3;
 // Helbing, Farkas and Vicsek 2000, divided by 80 kg.
 constexpr double kKeepsAway_m_s2 = 2000.0 / 80.0, kReach_m = 0.08;
 constexpr double kBody = 1.2e5 / 80.0, kSliding = 2.4e5 / 80.0;  // 1/s^2, 1/(m s)
 
-constexpr double kSeesPeople_m = 2.0, kSeesWalls_m = 1.5;  // beyond, forces are below 1e-4 m/s^2
-constexpr double kBesideWalls_m = 0.2;                     // of ways, from a person's side
-constexpr double kAtGoal_m = 0.75;                         // of a goal that is a place
-constexpr int kLooksEvery = 20;                            // ticks, for the way
-constexpr int kPlaces = 8;          // to wander between, where the file names no goal
-constexpr double kTurns_m_s = 0.2;  // slower, a person looks where he looked
-constexpr double kRoom_m = 0.1;     // around who comes again
-constexpr int kTriesToCome = 8;     // in a tick
-constexpr double kSeesThings_m = 4.0, kStands_m_s = 0.2;  // things to go around
+// farther away, forces are below 1e-4 m/s^2
+constexpr double kSeesPeople_m = 2.0, kSeesWalls_m = 1.5;
+constexpr double kBesideWalls_m = 0.2;  // clearance of paths, from a person's side
+constexpr double kAtGoal_m = 0.75;      // for a goal that is a point
+constexpr int kLooksEvery = 20;         // ticks between path updates
+constexpr int kPlaces = 8;              // wander targets, if the file gives no goal
+constexpr double kTurns_m_s = 0.2;      // slower people keep their heading
+constexpr double kRoom_m = 0.1;         // free space around a person who reappears
+constexpr int kTriesToCome = 8;         // attempts per tick
+// obstacles to walk around: within this distance and slower than this
+constexpr double kSeesThings_m = 4.0, kStands_m_s = 0.2;
 constexpr double kBesideThings_m = 0.2;
-constexpr double kAboveFloor_m = 0.1;  // what is lower is stepped over
+constexpr double kAboveFloor_m = 0.1;  // lower things are stepped over
 
 bool is_person(const model::Model& model) {
   return model.path && model.path->name == "ruedo:crowd";
@@ -48,7 +50,8 @@ Vec2 turned(const Vec2& v, double c, double s) {
   return {c * v.x() - s * v.y(), s * v.x() + c * v.y()};
 }
 
-// Repulsion by what is d away (from it to me) and moves by `way` while I look ahead: eqs. 3 and 4.
+// Repulsion by something at distance vector d (pointing to me) that moves by `way` during the
+// look-ahead time: eqs. 3 and 4.
 Vec2 repulsion(const Vec2& d, const Vec2& way) {
   const double here = d.norm(), there = (d - way).norm();
   if (here < 1e-9 || there < 1e-9) return Vec2::Zero();
@@ -59,20 +62,21 @@ Vec2 repulsion(const Vec2& d, const Vec2& way) {
   return kPotential / kReachOfThings_m * math::exp(-b / kReachOfThings_m) * gradient;
 }
 
-// What comes from where I do not look counts less: eq. 8.
+// Influences from outside the field of view count less: eq. 8.
 Vec2 as_seen(const Vec2& force, const Vec2& ahead) {
   return ahead.dot(-force) >= force.norm() * kCosineOfSight ? force : Vec2(kBehind * force);
 }
 
-// Of two that overlap by `deep`; n towards me, `slides` the other's velocity less mine: eq. 2.
+// Between two people who overlap by `deep`; n points to me, `slides` is the other's velocity minus
+// mine: eq. 2.
 Vec2 of_contact(double deep, const Vec2& n, const Vec2& slides) {
   const Vec2 t(-n.y(), n.x());
-  // In one tick friction ends a sliding at most.
+  // Within a tick, friction can at most stop the sliding.
   const double friction = std::min(kSliding * deep, 0.5 / kTick_s);
   return kBody * deep * n + friction * slides.dot(t) * t;
 }
 
-// The same of two that keep apart, too: eqs. 2 and 3.
+// The same, with the repulsion of people who do not touch: eqs. 2 and 3.
 Vec2 of_neighbour(double deep, const Vec2& n, const Vec2& slides) {
   const Vec2 apart = kKeepsAway_m_s2 * math::exp(deep / kReach_m) * n;
   return deep > 0.0 ? Vec2(apart + of_contact(deep, n, slides)) : apart;
@@ -82,7 +86,7 @@ Vec2 of_neighbour(double deep, const Vec2& n, const Vec2& slides) {
 
 namespace {
 
-// The walls, and the ways to the goals that the file names.
+// The walls, and the paths to the goals in the file.
 struct Plan {
   model::FloorPlan walls;
   std::vector<model::Route> routes;
@@ -94,7 +98,8 @@ struct Plan {
   }
 };
 
-// One for all copies of a world: it depends on the file alone, and takes some tenths of a second.
+// Shared by all copies of a world: it depends on the file alone, and takes a few tenths of a
+// second.
 std::shared_ptr<const Plan> plan_for(const model::WorldModel& world,
                                      const model::ModelInstance& first,
                                      const model::CrowdDescription& crowd) {
@@ -118,7 +123,7 @@ struct Crowd::Group {
   std::shared_ptr<const Plan> plan;
   Bound<const model::FloorPlan> walls;
   std::vector<model::Rect> goals;
-  std::shared_ptr<const std::vector<model::Route>> routes;  // as goals
+  std::shared_ptr<const std::vector<model::Route>> routes;  // by goal
   RandomSource random;
 
   uint64_t people = 0;
@@ -151,13 +156,13 @@ struct Crowd::Person {
   InstanceIndex instance;
   BodyIndex body;
   Bound<Group> group;
-  uint64_t number;  // in the group
+  uint64_t number;  // in its group
   Vec2 start = Vec2::Zero();
-  Vec2 p = Vec2::Zero(), before = Vec2::Zero();  // m, when they last thought, and a tick before
+  Vec2 p = Vec2::Zero(), before = Vec2::Zero();  // m, at the last tick and the one before
   Vec2 v = Vec2::Zero();
-  Vec2 next = Vec2::Zero();  // where to head for
+  Vec2 next = Vec2::Zero();  // the waypoint to walk to
   double heading = 0.0, heading_before = 0.0;
-  double speed = 0.0;  // m/s that he likes
+  double speed = 0.0;  // m/s, preferred speed
   size_t goal = 0;
   bool arrived = false, gone = false, jumped = false;
   uint64_t ticks = 0;
@@ -281,7 +286,7 @@ void Crowd::begin(Person& person) {
   person.ticks = 0;
   const model::CrowdDescription& crowd = person.group->description;
   RandomStream stream = person.draw(0);
-  constexpr double kSlowest = 0.3;  // of the mean
+  constexpr double kSlowest = 0.3;  // relative to the mean
   person.speed =
       std::max(kSlowest * crowd.speed, crowd.speed + crowd.speed_deviation * stream.gaussian());
   person.v.setZero();
@@ -337,7 +342,7 @@ void Crowd::before_step(SimTime now) {
   }
 }
 
-// One tick: all forces from one state, then all move.
+// One tick: all forces are computed from the same state, then everybody moves.
 void Crowd::think() {
   see_others();
   sort_into_cells();
@@ -382,7 +387,7 @@ void Crowd::see_others() {
 }
 
 void Crowd::sort_into_cells() {
-  constexpr double kWidest_m = 500.0;  // a grid over who is farther apart has wider cells
+  constexpr double kWidest_m = 500.0;  // people spread farther apart get a grid with larger cells
   Vec2 low = Vec2::Constant(1e9), high = Vec2::Constant(-1e9);
   for (const Person& person : people_) {
     low = low.cwiseMin(person.p);
@@ -442,14 +447,13 @@ Crowd::Vec2 Crowd::of_people(const Person& person, size_t index) const {
   return sum;
 }
 
-// A thing keeps people away as a person at its nearest point would, whose middle is a radius
-// behind.
+// A thing repels like a person at its nearest point, whose centre is one radius behind it.
 Crowd::Vec2 Crowd::of_others(const Person& person, const Vec2& ahead) const {
   const model::CrowdDescription& crowd = person.group->description;
   Vec2 sum = Vec2::Zero();
   for (size_t i = 0; i < others_.size();) {
     const InstanceIndex instance = others_[i].instance;
-    const Other* near = nullptr;  // of all bodies of a model
+    const Other* near = nullptr;  // nearest of all bodies of a model
     double least = kSeesThings_m;
     Vec2 d = Vec2::Zero();
     for (; i < others_.size() && others_[i].instance == instance; ++i) {
@@ -486,7 +490,7 @@ Crowd::Vec2 Crowd::of_walls(const Person& person) const {
   return sum;
 }
 
-// The next one, when a goal is reached.
+// The next goal, once one is reached.
 void Crowd::choose_goal(Person& person) {
   const Group& group = *person.group;
   const model::CrowdDescription& crowd = group.description;
@@ -521,8 +525,8 @@ void Crowd::look_for_way(Person& person) {
   go_around_what_stands(person);
 }
 
-// Beside the first thing that stands in the way, on the side that is nearer: forces alone would
-// hold him before it.
+// A waypoint beside the first obstacle on the path, on the nearer side: with forces alone the
+// person would stop in front of it.
 void Crowd::go_around_what_stands(Person& person) const {
   const model::CrowdDescription& crowd = person.group->description;
   const Vec2 way = person.next - person.p;
@@ -533,7 +537,7 @@ void Crowd::go_around_what_stands(Person& person) const {
   for (const Other& other : others_) {
     if (!other.is_in_way_of(crowd, person.group->floor) || other.v.norm() > kStands_m_s) continue;
     const Vec2 to = other.middle() - person.p;
-    const double half = 0.5 * (other.box.sizes().head<2>()).norm();  // whichever way it points
+    const double half = 0.5 * (other.box.sizes().head<2>()).norm();  // for any orientation
     const double along = to.dot(ahead), beside = to.dot(left);
     const double needs = half + crowd.radius;
     if (along < 0.0 || along - half > first || std::abs(beside) > needs) continue;
@@ -543,7 +547,7 @@ void Crowd::go_around_what_stands(Person& person) const {
   }
 }
 
-// Somewhere in the area where they began, where there is room.
+// A free place in the area where they started.
 bool Crowd::come_again(Person& person) {
   const Group& group = *person.group;
   const model::CrowdDescription& crowd = group.description;

@@ -1,16 +1,16 @@
-// People who walk to their goals and around each other, walls and robots: <ruedo:crowd>.
+// People who walk to their goals, avoiding each other, walls and robots: <ruedo:crowd>.
 //
-// The social force model: each person comes to the speed that he likes, towards his goal, within
-// 0.5 s. Other people and walls keep him away, press and slow him by the forces of D. Helbing,
+// The social force model. A person approaches the preferred velocity towards the goal with a time
+// constant of 0.5 s. Other people and walls repel, press and slow down by the forces of D. Helbing,
 // I. Farkas and T. Vicsek, "Simulating dynamical features of escape panic", Nature 407 (2000) 487
-// (eqs. 1 to 3), divided by their 80 kg; robots and other things by those of D. Helbing and
-// P. Molnar, "Social force model for pedestrian dynamics", Phys. Rev. E 51 (1995) 4282 (eqs. 3, 4
-// and 8), by which he looks ahead by the way that they make in 2 s and sees half as much of what is
-// behind him. The ways around walls are the shortest, over cells; what stands in the way is gone
-// around. People push things as a moving wall would, and are pushed by nothing.
+// (eqs. 1 to 3), divided by their 80 kg; robots and other things by those of D. Helbing and P.
+// Molnar, "Social force model for pedestrian dynamics", Phys. Rev. E 51 (1995) 4282 (eqs. 3, 4 and
+// 8), with a look-ahead of 2 s and half the weight for what is behind. Paths around walls are the
+// shortest over cells; obstacles on them are walked around. People push things like a moving wall,
+// and cannot be pushed.
 //
-// They think every 10 ms of simulated time, whatever the step is, all from the same state and in
-// the order of the world: the same bytes for one seed, whatever else is computed beside them.
+// They are updated every 10 ms of sim time, whatever the step, all from the same state and in world
+// order: the same bytes for a seed, whatever else is computed.
 #pragma once
 
 #include <memory>
@@ -25,27 +25,28 @@ namespace ruedo::robot {
 
 class Crowd {
  public:
-  // All people of the world. They are put where the seed has them.
+  // All people of the world. Their start places depend on the seed.
   Crowd(const model::WorldModel& world, const model::BodyLayout& layout,
         physics::PhysicsWorld& physics, uint64_t seed);
   ~Crowd();
 
-  // Sends them to where they are one step later.
+  // Moves them to their places one step later.
   void before_step(SimTime now);
 
-  void add(InstanceIndex instance, const model::BodyLayout& layout);  // what they see from now on
+  // what they react to from now on
+  void add(InstanceIndex instance, const model::BodyLayout& layout);
   void remove(InstanceIndex instance);
-  void take(const Crowd& other);  // becomes what it is in another copy of the world
-  void reseed(uint64_t seed);     // what people choose from now on
+  void take(const Crowd& other);  // takes the state of another copy of the world
+  void reseed(uint64_t seed);     // for people's choices from now on
   void reset(InstanceIndex instance, SimTime now);
-  void shift_time(SimTime us) { thought_ -= us; }  // sim time went back by so much
+  void shift_time(SimTime us) { thought_ -= us; }  // sim time was set back by that much
 
  private:
   using Vec2 = model::Vec2;
   struct Group;  // a <ruedo:crowd>
   struct Person;
-  struct Other;  // a body that moves and is no person of a crowd
-  struct Push;   // of a tick
+  struct Other;  // a moving body other than a crowd's person
+  struct Push;   // the forces of a tick
 
   void gather(const model::BodyLayout& layout);
   void add_other(const model::BodyLayout& layout, BodyIndex body);
@@ -68,11 +69,11 @@ class Crowd {
   Bound<physics::PhysicsWorld> physics_;
   uint64_t seed_;
   int64_t step_us_;
-  SimTime thought_ = 0;  // the people's own states are of this time and of one tick before
+  SimTime thought_ = 0;  // the time of the people's own states, one tick after those before
   std::vector<std::unique_ptr<Group>> groups_;
   std::vector<Person> people_;
   std::vector<Other> others_;
-  std::vector<std::vector<int>> cells_;  // people by where they are, in their order
+  std::vector<std::vector<int>> cells_;  // the people in each cell of a grid, in their order
   Vec2 cells_from_ = Vec2::Zero();
   int columns_ = 1, rows_ = 1;
 };

@@ -1,4 +1,4 @@
-// Frames and published state of a drive.
+// Frames and the published state of a drive.
 #include "robot/drive.h"
 
 #include <algorithm>
@@ -62,8 +62,8 @@ void Drive::set_state(const Pose& X_WBase, const Twist& twist) {
   velocity_ = velocity;
 }
 
-// The power of the contact's force at the velocity that its point has by the plan. Of what carries
-// the robot friction does not count: it drives, and takes power where wheels slip.
+// The power of the contact force at the planned velocity of its point. Friction with the supporting
+// surface is excluded: it propels the robot, and dissipates power when wheels slip.
 void Drive::resist(const Contact& contact) {
   if (!contact.link_b.valid()) return;
   const bool collides =

@@ -1,4 +1,4 @@
-// Where a robot stands: the level planes of a world, and the lowest points of a robot's wheels.
+// What a robot stands on: the level planes of a world, and the lowest points of a robot's wheels.
 #pragma once
 
 #include <optional>
@@ -19,15 +19,15 @@ std::vector<LevelPlane> level_planes(const model::WorldModel& world,
 // The plane nearest to that height.
 std::optional<LevelPlane> nearest_plane(const std::vector<LevelPlane>& planes, double height);
 
-// The least friction of the shapes of a robot's wheels; 1 where they have none.
+// The lowest friction among the shapes of a robot's wheels; 1 if there are none.
 double friction_of_wheels(const model::WorldModel& world, const model::BodyLayout& layout,
                           RobotIndex robot);
 
 // Height of the lowest point of a shape at X_FC, along z of F.
 double lowest_point(const model::Geometry& geometry, const Pose& X_FC);
 
-// Height of the lowest point of a robot's wheels, along z of base_link and from its origin. Of
-// wheels without collision shapes, the drive's wheel radius below the wheel's centre.
+// Height of the lowest point of a robot's wheels, along z of base_link, from its origin. Wheels
+// without collision shapes reach down by the drive's wheel radius.
 double lowest_of_wheels(const model::WorldModel& world, const model::BodyLayout& layout,
                         RobotIndex robot);
 

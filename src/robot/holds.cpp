@@ -1,4 +1,4 @@
-// A hold is a tie of the physics, made when both bodies are there.
+// A hold is a tie in the physics, created once both bodies exist.
 #include "robot/holds.h"
 
 #include <algorithm>
@@ -99,7 +99,7 @@ void Holds::close(Held& held) {
   if (!child_link.valid()) return;
   const BodyIndex body = layout_->links[layout_->link_of(held.instance, description.link)].body;
   const BodyIndex child = layout_->links[child_link].body;
-  if (child == body) return;  // one body, or neither moves
+  if (child == body) return;  // the same body, or neither moves
   if (!held.tie.valid() || held.other != other)
     held.tie = child.valid() ? physics_->make_tie(child, body) : physics_->make_tie(body, child);
   held.other = other;

@@ -1,7 +1,7 @@
-// Detachable joints: what a model holds of other models, by name, until it is told to let go.
+// Detachable joints: a model holds other models, by name, until it is told to release them.
 //
-// They are closed at the start, where both models stand then; a model that comes later is held
-// where it is as it comes. Not thread safe: the kinematics module owns it.
+// They are closed at the start, with both models where they are then; a model that arrives later is
+// held where it arrives. Not thread-safe: owned by the kinematics module.
 #pragma once
 
 #include <string>
@@ -15,20 +15,20 @@ namespace ruedo::robot {
 
 class Holds {
  public:
-  // All must outlive it.
+  // The arguments must outlive it.
   Holds(const model::WorldModel& world, const model::BodyLayout& layout,
         physics::PhysicsWorld& physics);
 
   bool has(InstanceIndex instance, const std::string& name) const;
-  // Takes hold where both are now, or lets go, at the beginning of the next step.
+  // Holds both where they are, or releases, at the beginning of the next step.
   void set(InstanceIndex instance, const std::string& name, bool attached);
   void before_step();
 
   // Changes between two steps.
-  void start(InstanceIndex instance);   // its holds are as at the start
+  void start(InstanceIndex instance);   // resets its holds to those at the start
   void forget(InstanceIndex instance);  // its holds are open
-  void moved(InstanceIndex instance);   // others that hold it do so where it is now
-  // What it holds, and what that holds.
+  void moved(InstanceIndex instance);   // others keep holding it, where it is now
+  // The instances that it holds, directly or indirectly.
   std::vector<InstanceIndex> carried_by(InstanceIndex instance) const;
 
  private:
@@ -36,8 +36,8 @@ class Holds {
     InstanceIndex instance;
     const model::Hold* description;
     bool wanted = true;
-    InstanceIndex other = {};    // that is held
-    physics::TieIndex tie = {};  // none until it is closed for the first time
+    InstanceIndex other = {};    // the one held
+    physics::TieIndex tie = {};  // none until first closed
   };
 
   InstanceIndex find(const std::string& name) const;

@@ -1,4 +1,4 @@
-// Position control is a velocity in proportion to the error, within the joint's own limits of rate
+// Position control commands a velocity proportional to the error, within the joint's limits of rate
 // and effort.
 #include "robot/joint_control.h"
 
@@ -18,15 +18,15 @@ namespace {
 
 using physics::JointSetting;
 
-constexpr double kGainPerStep = 0.2;  // no more than this part of the error in a step
-// The joint's own limit, which the physics knows, holds.
+constexpr double kGainPerStep = 0.2;  // at most this fraction of the error per step
+// The joint's own limit applies, which the physics knows.
 constexpr double kUnlimited = std::numeric_limits<double>::infinity();
 
 struct Limits {
   double least, most;
 };
 
-// Of a command's value; null: there is no such mode.
+// For a command's value; null: unknown mode.
 const Limits* limits_of(int8_t mode) {
   constexpr double kLeastGain = 1e-9;
   static constexpr Limits kOfModes[] = {
@@ -87,13 +87,13 @@ int8_t JointControl::check(RobotIndex robot, const std::string& name, int8_t mod
   if (mode == joint_command_t::OPEN) return if_so(yes_or_no && lifts_.has_door(instance, name));
   if (mode == joint_command_t::FLOOR) return if_so(lifts_.has_floor(instance, name, value));
   const JointIndex joint = find(robot, name);
-  // One that mimics another, and a gearbox, take no commands.
+  // Mimic joints and gearboxes take no commands.
   const bool takes = joint.valid() && !description(joint).leader.valid() &&
                      description(joint).type != model::JointType::gearbox;
   return if_so(takes);
 }
 
-// What is no joint's own: a hold, a lift, a door. True: it was.
+// Commands to a hold, lift or door rather than a joint. True: it was one.
 bool JointControl::tell_others(InstanceIndex instance, const std::string& name, int8_t mode,
                                double value) {
   using Mode = joint_command_t;
@@ -126,7 +126,7 @@ int8_t JointControl::apply(RobotIndex robot, const JointCommand& command) {
   return motion_status_t::REASON_NONE;
 }
 
-// What passed check().
+// Applies a command that passed check().
 void JointControl::tell(JointIndex joint, int8_t mode, double value) {
   using Mode = joint_command_t;
   const auto of_joint = [joint](const auto& each) { return each.joint == joint; };
@@ -144,7 +144,7 @@ void JointControl::tell(JointIndex joint, int8_t mode, double value) {
   hold(joint, mode, value);
 }
 
-// A position, a rate or an effort.
+// A position, rate or effort command.
 void JointControl::hold(JointIndex joint, int8_t mode, double value) {
   using Mode = joint_command_t;
   std::erase_if(targets_, [joint](const Target& each) { return each.joint == joint; });
@@ -204,7 +204,7 @@ void JointControl::serve(Target& target, const model::Pid& pid) const {
   const double error = target.value - now;
   target.integral = std::clamp(target.integral + pid.i * error * step_s_, pid.i_min, pid.i_max);
   const double pushes = target.integral + pid.offset;
-  // Below p h a stiff joint would swing about its target from step to step.
+  // Below p h, a stiff joint would oscillate about its target.
   const double of_step = pid.p * step_s_;
   const double gain = target.is_rate ? pid.p : std::max(pid.d + of_step / 2.0, of_step);
   if (gain <= 0.0)

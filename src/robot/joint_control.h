@@ -1,10 +1,10 @@
-// Commands to a robot's joints that are no wheels: position, velocity, effort. A command holds
-// until the next one for that joint.
+// Commands to a robot's joints other than wheels: position, velocity, effort. A command applies
+// until the joint's next one.
 //
-// A joint with the PID of a Gazebo plugin gets its effort, offset + p e + d (r - v) + integral,
-// with v at the end of the step and e in its middle, as a motor that gives K (rate - v), K = d +
-// p h / 2. That adds the damping p h / 2 to what Gazebo does, and with K of p h at least it is
-// stable at every step h.
+// A joint with the PID of a Gazebo plugin gets the effort offset + p e + d (r - v) + integral, with
+// v at the end of the step and e at its middle, realised as a motor with K (rate - v), K = d + p h
+// / 2. This adds the damping p h / 2 to Gazebo's controller, and is stable for every step h as long
+// as K is at least p h.
 #pragma once
 
 #include <string>
@@ -24,21 +24,21 @@ class JointControl {
   JointControl(const model::WorldModel& world, const model::BodyLayout& layout,
                physics::PhysicsWorld& physics);
 
-  // Returns a reason of motion_status_t: 0 for accepted. A refused command changes no joint:
-  // unknown names, unknown modes, numbers that are not finite or not allowed.
+  // Returns a reason of motion_status_t: 0 if accepted. A refused command changes no joint: unknown
+  // names or modes, values that are not finite or not allowed.
   int8_t apply(RobotIndex robot, const JointCommand& command);
   void before_step();
-  // No command holds for its joints, nor a setting.
+  // Clears commands and settings of its joints.
   void forget(InstanceIndex instance);
-  void start(InstanceIndex instance);  // its joints do what they do before they are told anything
+  void start(InstanceIndex instance);  // its joints return to what they do before any command
   Holds& holds() { return holds_; }
 
  private:
   struct Target {
     JointIndex joint;
-    bool is_rate = false;   // one that is held by a <...pid> of the joint; the physics holds others
+    bool is_rate = false;   // a rate held by the joint's <...pid>; the physics holds others
     double value = 0.0;     // rad or m; rad/s or m/s
-    double integral = 0.0;  // N m or N: the integral's part of the effort
+    double integral = 0.0;  // N m or N: integral part of the effort
   };
   struct Gain {
     JointIndex joint;
@@ -46,7 +46,8 @@ class JointControl {
   };
 
   const model::Joint& description(JointIndex joint) const;
-  JointIndex find(RobotIndex robot, const std::string& name) const;  // none of that name: invalid
+  // invalid: no joint has that name
+  JointIndex find(RobotIndex robot, const std::string& name) const;
   int8_t check(RobotIndex robot, const std::string& name, int8_t mode, double value) const;
   void tell(JointIndex joint, int8_t mode, double value);
   bool tell_others(InstanceIndex instance, const std::string& name, int8_t mode, double value);
@@ -61,10 +62,10 @@ class JointControl {
   Bound<physics::PhysicsWorld> physics_;
   double step_s_;
   double largest_gain_;          // 1/s, of the position controller
-  std::vector<Target> targets_;  // joints under position control, or a PID
+  std::vector<Target> targets_;  // joints with position control or a PID
   Holds holds_;
   Lifts lifts_;
-  std::vector<Gain> gains_;  // that messages have set, in place of the file's
+  std::vector<Gain> gains_;  // set by messages, overriding the file's
 };
 
 }  // namespace ruedo::robot

@@ -15,16 +15,18 @@ namespace ruedo::robot {
 
 namespace {
 
-constexpr double kStanding_m = 2e-3;  // a wheel so near to the ground stands on it
-constexpr double kSeesBump_m = 1e-2;  // a bump so near makes the robot leave the plane's support
-// A robot so level, near and calm goes over to the plane's support; at the start its height may be
-// further off, as wheels of many models are a little in the ground.
+constexpr double kStanding_m = 2e-3;  // a wheel this close to the ground stands on it
+// a bump this close takes the robot off the plane's analytic support
+constexpr double kSeesBump_m = 1e-2;
+// Tolerances for returning to the plane's support; at the start the height may be further off,
+// since the wheels of many models reach into the ground.
 constexpr double kLevel_rad = 5e-3, kNear_m = 2e-3, kCalm_m_s = 0.05, kNearAtStart_m = 5e-3;
-constexpr double kLeverWithoutWheels_m = 0.25;  // of the force that turns a robot without wheels
+// lever arm of the turning force for a robot without wheels
+constexpr double kLeverWithoutWheels_m = 0.25;
 constexpr SimTime kFallAsleep_us = 500'000;
-constexpr double kStill_m_s = 2e-3, kStill_rad_s = 1e-2;  // of what Bullet moves
+constexpr double kStill_m_s = 2e-3, kStill_rad_s = 1e-2;  // thresholds of rest when moved by Bullet
 
-// A lighter load than this part of its weight is a first touch, not what it stands with.
+// A load below this fraction of its weight is a first touch, not a support.
 constexpr double kFirstTouch = 0.05;
 
 bool have_shapes(const model::WorldModel& world, const model::BodyLayout& layout,
@@ -40,7 +42,7 @@ bool have_shapes(const model::Model& model) {
                      [&](auto belt) { return !model.links[belt].collisions.empty(); });
 }
 
-// What joints carry of the robot's belts.
+// The belts that are carried by joints.
 std::vector<BodyIndex> flippers_of(const model::WorldModel& world, const model::BodyLayout& layout,
                                    InstanceIndex instance, BodyIndex base) {
   std::vector<BodyIndex> flippers;
@@ -137,7 +139,7 @@ void KinematicDrive::begin_at_rest() {
   stand_on_near_plane();
 }
 
-// The plane that it stands on may be gone.
+// The plane below may have been removed.
 void KinematicDrive::ground_changed() {
   if (!on_plane_) return;
   const auto plane = nearest_plane(planes_, X_WBase_.translation.z() + lowest_);
@@ -174,7 +176,7 @@ bool KinematicDrive::is_own(const Contact& contact) const {
          layout_->bodies[contact.body_b].instance == layout_->robots[robot_].instance;
 }
 
-// A flipper that stands on something may lift the robot.
+// A flipper in contact may lift the robot.
 bool KinematicDrive::flipper_stands(const Vec3& up) const {
   return std::any_of(flippers_.begin(), flippers_.end(), [&](BodyIndex flipper) {
     const auto contacts = physics_->nearby(flipper);
@@ -190,7 +192,7 @@ bool KinematicDrive::is_alone() const {
                      [&](BodyIndex each) { return physics_->alone(each); });
 }
 
-// Of the robot's base and its flippers, in the last step.
+// Contact forces on the robot's base and flippers in the last step.
 template <class Visit>
 void KinematicDrive::for_each_contact(Visit visit) const {
   for (const Contact& contact : physics_->contacts(body_)) visit(contact);
@@ -210,7 +212,7 @@ double KinematicDrive::friction(const Contact& contact) const {
   return std::min(of(contact.link_a, contact.shape_a), of(contact.link_b, contact.shape_b));
 }
 
-// With what it carries; what it leans on lightens it.
+// Includes what it carries; what it leans on reduces the load.
 double KinematicDrive::grip_on_plane() const {
   double load = mass_ * gravity_.norm();
   for (const Contact& contact : physics_->contacts(body_))

@@ -56,14 +56,14 @@ class KinematicDrive final : public Drive {
   PlaneMotion of_wheels() const;
   void finish(SimTime now, double way, double angle, bool touched);
   void fall_asleep_when_still(bool still);
-  // Brings `twist` (of base_link, in it) to the plan's mean velocities in the plane, relative to
-  // what carries it, as far as `force` (N) allows, which `gravity` (m/s^2, in base_link) along the
-  // plane takes its part of. Returns whether it got there.
+  // Changes `twist` (of base_link, expressed in it) towards the plan's mean velocities in the
+  // plane, relative to the supporting body, as far as `force` (N) allows after compensating
+  // `gravity` (m/s^2, in base_link) along the plane. Returns whether it got there.
   bool servo(Twist& twist, double force, const Vec3& gravity);
   bool is_support(const Contact& contact, const Vec3& up) const;
   bool on_wheel(const Contact& contact) const;
   bool is_belt(LinkIndex link) const;
-  bool is_own(const Contact& contact) const;  // with another part of the robot
+  bool is_own(const Contact& contact) const;  // contact with another part of the robot
   bool flipper_stands(const Vec3& up) const;
   bool is_alone() const;
   template <class Visit>
@@ -75,38 +75,39 @@ class KinematicDrive final : public Drive {
   double plane_gap(double height) const { return X_WBase_.translation.z() + lowest_ - height; }
 
   bool on_plane_ = false, asleep_ = false;
-  bool touched_ = false;      // by more than the support, in the last step
+  bool touched_ = false;      // by other things than its support, in the last step
   bool held_ = false;         // ... and in the step before
-  bool behind_ = false;       // the servo did not reach the plan's velocities
-  Vec3 sent_ = Vec3::Zero();  // what the servo gave last: m/s ahead, m/s to the left, rad/s
+  bool behind_ = false;       // the servo did not reach the planned velocities
+  Vec3 sent_ = Vec3::Zero();  // the servo's last command: m/s forward, m/s to the left, rad/s
   bool supported_ = false;    // on contacts: wheels stand on something
-  double grip_ = 0.0;         // on contacts: N that friction under the wheels can give
+  double grip_ = 0.0;         // on contacts: N, friction force available under the wheels
   Twist carrier_{
       Vec3::Zero(),
-      Vec3::Zero()};  // of what carries it, at base_link and in it; zero: it stands still
-  std::vector<Contact> carriers_;  // contacts of the wheels with what can move
-  double plane_friction_ = 1.0;    // of the plane that it stands on
-  Displacement way_, planned_;     // that the wheels make in this step, and the plan
-  // A plugin's drive; null: the base does as planned.
+      // velocity of the supporting body, at base_link and expressed in it; zero: it does not move
+      Vec3::Zero()};
+  std::vector<Contact> carriers_;  // contacts of the wheels with movable things
+  double plane_friction_ = 1.0;    // of the plane below
+  Displacement way_, planned_;     // the wheels' motion in this step, and the planned one
+  // A plugin's drive; null: the base moves as planned.
   struct Model : std::unique_ptr<DriveModel> {
     using std::unique_ptr<DriveModel>::operator=;
     Model() = default;
-    Model& operator=(const Model&) { return *this; }  // that is apart, in take()
+    Model& operator=(const Model&) { return *this; }  // copied separately, in take()
   } model_;
-  BaseVelocity made_;     // what the plugin's drive gave last
-  Lag lag_;               // of what it made, behind the plan
+  BaseVelocity made_;     // the plugin drive's last output
+  Lag lag_;               // of the plugin drive's output, behind the plan
   double heading_ = 0.0;  // of base_link on a plane, rad
   WheelAngles wheel_angles_;
   SimTime still_us_ = 0;
-  Pose next_;  // of base_link after this step, on a plane
+  Pose next_;  // base_link after this step, on a plane
   Bound<const std::vector<LevelPlane>> planes_;
   Bound<const model::WorldModel> world_;
   Bound<const model::BodyLayout> layout_;
-  double lowest_;  // of the wheels below base_link
+  double lowest_;  // of the wheels, below base_link
   double wheel_friction_;
-  bool wheels_touch_;                // they have shapes
-  bool belts_touch_;                 // the same of a tracked vehicle's links that are belts
-  std::vector<BodyIndex> flippers_;  // belts that joints carry
+  bool wheels_touch_;                // whether they have shapes
+  bool belts_touch_;                 // likewise for a tracked vehicle's belts
+  std::vector<BodyIndex> flippers_;  // belts carried by joints
   double mass_, yaw_inertia_, lever_, max_force_;
   Vec3 gravity_;
 };

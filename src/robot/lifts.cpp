@@ -8,11 +8,12 @@ namespace ruedo::robot {
 
 namespace {
 
-// So near, and so slow, a joint has come to where it goes. A cabin on a controller without an
-// integral hangs a little below its floor.
+// Tolerances for having arrived. A cabin with a controller without an integral part stays a little
+// below its floor.
 constexpr double kCabinNear_m = 0.15, kDoorNear = 0.05, kStands = 0.01;
-constexpr double kAgainst = 0.5;  // cosine to the way of a leaf from which on it is blocked
-constexpr int64_t kTryAgain_us = 2'000'000;  // after which a blocked door closes once more
+// cosine between a leaf's motion and a contact's direction above which the leaf is blocked
+constexpr double kAgainst = 0.5;
+constexpr int64_t kTryAgain_us = 2'000'000;  // time until a blocked door tries to close again
 
 }  // namespace
 
@@ -30,7 +31,7 @@ JointIndex Lifts::joint_of(InstanceIndex instance, ModelJointIndex joint) const 
   for (const JointIndex i : layout_->joints.indices()) {
     if (layout_->joints[i].instance == instance && layout_->joints[i].joint == joint) return i;
   }
-  return {};  // both its ends stand fast
+  return {};  // both ends are static
 }
 
 void Lifts::add_door(InstanceIndex instance, const model::Door& description) {
@@ -42,7 +43,7 @@ void Lifts::add_door(InstanceIndex instance, const model::Door& description) {
     if (!index.valid()) continue;
     const model::Joint& joint = model.joints[leaf.joint];
     const model::LinkPlacement& link = layout_->links[layout_->link_of(instance, joint.child)];
-    if (!link.body.valid()) continue;  // it stands fast, and what it hangs on moves
+    if (!link.body.valid()) continue;  // it is static, and what it hangs on moves
     const Pose X_BJ = link.X_BL * model.links[joint.child].X_ML.inverse() * joint.X_MJ;
     door.leaves.push_back({index, link.body, X_BJ.rotation * joint.axis.axis_in_J, X_BJ.translation,
                            joint.type == model::JointType::prismatic, leaf.closed, leaf.open});
@@ -129,7 +130,7 @@ void Lifts::for_each_door(const Lift& lift, Visit visit) {
   }
 }
 
-// Something of another model that can move is where a leaf goes.
+// Whether something movable of another model is in the way of a leaf.
 bool Lifts::is_blocked(const Door& door) const {
   for (const Leaf& leaf : door.leaves) {
     const Pose& X_WB = physics_->pose(leaf.body);
@@ -164,7 +165,7 @@ void Lifts::set_target(Way& way, double target) {
   way.told = false;
 }
 
-// As fast as it can still brake in the way that is left.
+// The highest speed from which it can still brake in the remaining distance.
 void Lifts::move(Way& way, const std::optional<model::Trapezoid>& motion) {
   const auto wake = [&] {
     const model::JointPlacement& joint = layout_->joints[way.joint];

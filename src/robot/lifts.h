@@ -1,9 +1,8 @@
-// Lifts that go to the floors that they are called to, and doors that open when they are told.
+// Lifts that go to floors when called, and doors that open on command.
 //
-// A lift at rest has its doors closed. Called, it goes to the floor, opens its doors there, waits,
-// closes them, and goes to the next floor that was called, in the order of the calls. A door that
-// meets something that can move while it closes opens again, and tries later. Not thread safe: the
-// kinematics module owns it.
+// A lift at rest has its doors closed. When called, it goes to the floor, opens its doors, waits,
+// closes them, and goes to the next floor in the order of calls. A closing door that meets
+// something movable opens again and retries later. Not thread-safe: owned by the kinematics module.
 #pragma once
 
 #include <string>
@@ -17,26 +16,26 @@ namespace ruedo::robot {
 
 class Lifts {
  public:
-  // All must outlive it.
+  // The arguments must outlive it.
   Lifts(const model::WorldModel& world, const model::BodyLayout& layout,
         physics::PhysicsWorld& physics);
 
-  // Whether the instance has a lift of that name with that floor, from 0; or a door.
+  // Whether the instance has a lift of that name with that floor, counted from 0; or a door.
   bool has_floor(InstanceIndex instance, const std::string& lift, double floor) const;
   bool has_door(InstanceIndex instance, const std::string& door) const;
   void call(InstanceIndex instance, const std::string& lift, int floor);
   void open(InstanceIndex instance, const std::string& door, bool open);
 
-  // Where a joint is to go whose own controller takes it there.
+  // A target for a joint that has its own controller.
   struct Order {
     JointIndex joint;
     double position;  // rad or m
   };
-  // Moves the others; returns what is new for these.
+  // Moves joints without a controller; returns new targets for the others.
   const std::vector<Order>& before_step();
 
   // Changes between two steps.
-  void start(InstanceIndex instance);  // doors are closed, nobody has called
+  void start(InstanceIndex instance);  // doors closed, no calls
   void forget(InstanceIndex instance);
 
  private:
@@ -47,20 +46,20 @@ class Lifts {
     bool slides;
     double closed, open;
   };
-  // A joint that goes somewhere.
+  // A joint that is moving to a target.
   struct Way {
     JointIndex joint;
     double target = 0.0;
-    double rate = 0.0;  // of the trapezoid
+    double rate = 0.0;  // of the trapezoidal profile
     bool told = false;
   };
   struct Door {
     InstanceIndex instance;
     const model::Door* description;
     std::vector<Leaf> leaves;
-    std::vector<Way> ways;  // as leaves
+    std::vector<Way> ways;  // leaves
     bool wanted_open = false;
-    int64_t held_us = 0;  // it stays open for so long: something was in its way
+    int64_t held_us = 0;  // remaining time to stay open, after something was in its way
   };
   enum class Doing { nothing, closing, going, opening, waiting };
   struct Lift {
@@ -68,9 +67,9 @@ class Lifts {
     const model::Lift* description = nullptr;
     Way way;
     Doing doing = Doing::nothing;
-    std::vector<int> calls;  // floors; the first is where it goes
-    int floor = 0;           // where it is, or was last
-    bool opens = true;       // where it comes to
+    std::vector<int> calls;  // floors; the first is the current target
+    int floor = 0;           // the current or last floor
+    bool opens = true;       // whether to open doors on arrival
     int64_t waited_us = 0;
   };
 

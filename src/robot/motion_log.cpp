@@ -4,7 +4,7 @@
 namespace ruedo::robot {
 
 void MotionLog::mention(const MotionState& state) {
-  shown_ends_ = 0;  // of the step before: read by now
+  shown_ends_ = 0;  // of the step before: already read
   if (new_ends_ < kEnds) ends_[new_ends_++] = state;
 }
 

@@ -1,5 +1,5 @@
-// Commands to plans. The plan's clock is whole microseconds; what happens inside a step (the
-// watchdog's end) splits it.
+// Turns commands into plans. The plan's clock counts whole microseconds; events within a step (the
+// watchdog) split it.
 #include "robot/motion_planner.h"
 
 #include <algorithm>
@@ -20,19 +20,19 @@ using Status = ruedo::motion_status_t;
 using Move = ruedo::move_command_t;
 
 constexpr SimTime kNever = std::numeric_limits<SimTime>::max();
-// A drive without limits of its own still has these.
+// Default limits of a drive that has none.
 constexpr double kFastest_m_s = 100.0, kFastest_rad_s = 100.0, kSlowestChange = 1e-6;
-// Speeds of a primitive on a robot that has no limits and is given none.
+// Speeds of a primitive without limits on a robot without limits.
 constexpr double kUsualSpeed_m_s = 0.5, kUsualRate_rad_s = 1.0;
 constexpr double kLargestValue = 1e6;  // m or rad
-constexpr double kDone = 1e-6;         // m or rad: a touched primitive is done when so near
-// A primitive is blocked when in so long a time something touched and less than this part of the
-// plan was done.
+constexpr double kDone = 1e-6;  // m or rad: a disturbed primitive is done within this tolerance
+// A primitive is blocked if, for this time, something touched the robot and less than this fraction
+// of the plan was executed.
 constexpr SimTime kBlockWindow_us = 500'000;
 constexpr double kBlockedPart = 0.1;
-constexpr double kJitter = 5e-3;  // m or rad in that time: no way and no turn
-// Behind its plan by less, a robot has settled. One that does not within this time after the plan's
-// end (a slope that it slides on) is done as far as it came.
+constexpr double kJitter = 5e-3;  // m or rad in that time: counts as no motion
+// A robot this close to its plan has settled. If it does not settle within this time after the
+// plan's end (as when sliding on a slope), the primitive ends where the robot is.
 constexpr double kSettled_m = 5e-4, kSettled_rad = 1e-3;
 constexpr double kSettling_s = 1.0;
 
@@ -41,7 +41,7 @@ Limits sane(double speed, double acceleration, double deceleration, double faste
           std::max(deceleration, kSlowestChange)};
 }
 
-// A wheel's rate that sums stay finite with; no robot comes near it.
+// A wheel rate beyond any robot's, for which sums stay finite.
 double countable(double rate) {
   return std::clamp(rate, -quantity::kSpeed.most, quantity::kSpeed.most);
 }
@@ -132,7 +132,7 @@ void MotionPlanner::command(const WheelCommand& command, SimTime now) {
   for (const double rate : command.rates) {
     if (!std::isfinite(rate)) return refuse(0, Status::KIND_WHEELS, Status::REASON_NOT_FINITE);
   }
-  // The wheels of a side are tied together: their mean counts.
+  // The wheels of a side are coupled: their mean counts.
   const size_t of_left = n == 2 ? 1 : left;
   double left_rate = 0.0, right_rate = 0.0;
   for (size_t i = 0; i < n; ++i)
@@ -143,7 +143,7 @@ void MotionPlanner::command(const WheelCommand& command, SimTime now) {
   hold(motion.v, 0.0, motion.omega, now, Status::KIND_WHEELS);
 }
 
-// Of mecanum and omni wheels: the twist that fits the rates best, in the sense of least squares.
+// For mecanum and omni wheels: the twist with the least squared error of rates.
 void MotionPlanner::hold_wheels(const WheelCommand& command, SimTime now) {
   Eigen::Matrix3d normal = Eigen::Matrix3d::Zero();
   Vec3 sum = Vec3::Zero();
@@ -158,7 +158,7 @@ void MotionPlanner::hold_wheels(const WheelCommand& command, SimTime now) {
   hold(twist.x(), twist.y(), twist.z(), now, Status::KIND_WHEELS);
 }
 
-// All together may be too fast for a wheel: the direction is kept.
+// The combination may be too fast for a wheel: the direction is kept.
 void MotionPlanner::keep_wheel_rates(double& v, double& side, double& omega) const {
   if (!std::isfinite(drive_->max_wheel_rate) || is_steered()) return;
   double fastest = std::abs(v) + 0.5 * drive_->track * std::abs(omega);
@@ -174,7 +174,7 @@ void MotionPlanner::keep_wheel_rates(double& v, double& side, double& omega) con
   omega *= allowed / fastest;
 }
 
-// Standing still it can only turn its wheels.
+// At rest it can only turn its wheels.
 void MotionPlanner::steer_for(double v, double omega) {
   const double most = drive_->max_steering_angle;
   if (v != 0.0)
@@ -197,7 +197,7 @@ void MotionPlanner::hold(double v, double side, double omega, SimTime now, int8_
       same && log_.current().kind == kind && log_.current().reason == Status::REASON_BLOCKED;
   show(0, kind, Status::STATE_RUNNING, blocked ? Status::REASON_BLOCKED : Status::REASON_NONE,
        blocked ? log_.current().blocked_by : LinkIndex());
-  if (same) return;  // a repeated command only feeds the watchdog
+  if (same) return;  // a repeated command only resets the watchdog
   begin_window(now);
   target_v_ = v;
   target_omega_ = omega;
@@ -307,7 +307,7 @@ void MotionPlanner::set_plan(const Profile& v, const Profile& omega, SimTime now
   take_speeds(now);
 }
 
-// Takes the plan's velocities at that time; an unlimited acceleration is over at once.
+// Takes the plan's velocities at that time; infinite accelerations are completed.
 void MotionPlanner::take_speeds(SimTime to) {
   const double t = seconds(to);
   v_ = plan_v_.velocity(t);
@@ -337,7 +337,7 @@ void MotionPlanner::plan_primitive(SimTime now) {
     target_steering_ = p.axis == Axis::arc ? math::atan(drive_->wheelbase * p.curvature) : 0.0;
     if (p.axis == Axis::way || steering_ == target_steering_) {
       v = Profile::to_distance(v_, rest, p.limits);
-    } else {  // an arc begins at rest, when its wheels are steered
+    } else {  // an arc starts at rest, where its wheels are steered
       v = Profile::to_velocity(v_, 0.0, way_limits_);
       p.begins = std::max(
           v.end(),
@@ -354,7 +354,7 @@ void MotionPlanner::plan_primitive(SimTime now) {
   } else if (std::abs(omega_ - p.curvature * v_) <= 1e-12 * (1.0 + std::abs(omega_))) {
     v = Profile::to_distance(v_, rest, p.limits);
     omega = v.scaled(p.curvature);
-  } else {  // an arc begins where its curvature can: at rest
+  } else {  // an arc starts at rest, where its curvature is possible
     v = Profile::to_velocity(v_, 0.0, way_limits_);
     omega = Profile::to_velocity(omega_, 0.0, angle_limits_);
     p.begins = std::max(v.end(), omega.end());
@@ -382,7 +382,7 @@ void MotionPlanner::stand_still(SimTime now) {
   if (state.state != Status::STATE_RUNNING) return;
   show(state.id, state.kind, Status::STATE_ENDED, Status::REASON_REPLACED);
   log_.progress(state.done, state.remaining);
-  take_speeds(now);  // at rest for good
+  take_speeds(now);  // at rest from now on
 }
 
 void MotionPlanner::shift_time(SimTime us) {
@@ -470,7 +470,7 @@ void MotionPlanner::finish(SimTime now, double way, double angle, bool touched, 
   watch_for_block(now, touched);
   publish_progress();
   if (touched && p.axis != Axis::none && t >= p.begins)
-    plan_primitive(now);  // what is left, from where it really is
+    plan_primitive(now);  // the remainder, from where it really is
 }
 
 void MotionPlanner::begin_window(SimTime now) {
@@ -490,7 +490,7 @@ void MotionPlanner::resist(LinkIndex link, double work) {
   }
 }
 
-// What took the most work from the robot since the window began; of equal ones the lowest link.
+// The link that absorbed the most work in the window; among equals the lowest link.
 LinkIndex MotionPlanner::strongest() const {
   const auto weaker = [](const auto& a, const auto& b) {
     return a.second < b.second || (a.second == b.second && a.first > b.first);
@@ -499,14 +499,14 @@ LinkIndex MotionPlanner::strongest() const {
   return most == window_work_.end() ? LinkIndex() : most->first;
 }
 
-// A velocity holds on; its status says while it leads nowhere.
+// A velocity command keeps running; its status says while it makes no progress.
 void MotionPlanner::watch_held(SimTime now, double way, double angle, bool touched) {
   window_touched_ |= touched;
   window_done_ += way;
   window_turned_ += angle;
   window_fastest_ = std::max(window_fastest_, std::abs(v_));
   window_fastest_turn_ = std::max(window_fastest_turn_, std::abs(omega_));
-  // It still brakes from the other way: that leads nowhere yet, and nothing blocks it.
+  // It is still braking from the opposite direction: no progress yet, but not blocked.
   if (v_ * target_v_ < 0.0 || omega_ * target_omega_ < 0.0) return begin_window(now);
   if (now - window_start_ < kBlockWindow_us) return;
   const double seconds = static_cast<double>(now - window_start_) * 1e-6;
@@ -528,7 +528,7 @@ void MotionPlanner::watch_for_block(SimTime now, bool touched) {
   window_touched_ |= touched;
   const double planned = primitive_.axis == Axis::angle ? omega_ : v_;
   window_fastest_ = std::max(window_fastest_, std::abs(planned));
-  // It still brakes, before its own way begins.
+  // It is still braking, before its own motion begins.
   if (seconds(now) < primitive_.begins || planned * (primitive_.target - primitive_.done) < 0.0) {
     begin_window(now);
     window_done_ = primitive_.done;

@@ -1,9 +1,9 @@
-// What one robot has been asked to do: commands and motion primitives become a plan of speed and
-// turn rate, which keeps the robot's limits, and a state to be published.
+// What a robot has been commanded to do: turns commands and motion primitives into a plan of speed
+// and turn rate within the robot's limits, and a state to publish.
 //
-// A plan starts at a whole microsecond and is evaluated in closed form, so that a robot's way does
-// not depend on the step size. A new command replans from the velocities of that moment, so that
-// nothing jumps beyond the limits.
+// A plan starts at a whole microsecond and is evaluated in closed form, so that a robot's path does
+// not depend on the step size. A new command replans from the current velocities, so that nothing
+// exceeds the limits.
 #pragma once
 
 #include <cstdint>
@@ -20,69 +20,67 @@
 
 namespace ruedo::robot {
 
-// How far a robot is behind its plan. A drive that follows its plan exactly never is.
+// The distance of a robot behind its plan. 0 for a drive that follows its plan exactly.
 struct Lag {
   double way = 0.0, angle = 0.0;  // m, rad
-  bool moving = false;            // faster than a robot that has come to rest
+  bool moving = false;            // not at rest yet
 };
 
 class MotionPlanner {
  public:
-  // rims: of its rolling wheels, in their order (model::WheelPlacement::rim); needed where they can
-  // roll sideways.
+  // rims: of its rolling wheels, in order (model::WheelPlacement::rim); needed if they can roll
+  // sideways.
   explicit MotionPlanner(const model::DriveDescription& drive, const std::vector<Vec3>& rims = {});
 
-  // Commands, at sim time now. Bad values are refused, and nothing changes but the log.
+  // Commands, at sim time `now`. Invalid values are refused, and only the log changes.
   void command(const VelocityCommand& command, SimTime now);
   void command(const WheelCommand& command, SimTime now);
   // heading: of base_link in odom (rad).
   void command(const MoveCommand& command, SimTime now, double heading);
   void refuse(int64_t id, int8_t kind, int8_t reason);
 
-  // The robot was put somewhere, at rest: whatever it was asked to do is replaced by nothing.
+  // The robot was placed somewhere, at rest: its current motion is cancelled.
   void stand_still(SimTime now);
-  void shift_time(SimTime us);  // sim time went back by so much
+  void shift_time(SimTime us);  // sim time was set back by that much
 
-  // The way that the plan makes from now to now + step_us.
+  // The displacement planned from now to now + step_us.
   Displacement step(SimTime now, int64_t step_us);
-  // Before finish(): a link of another thing that the robot touched in this step, and the work (J)
-  // that it took from what the robot is told to do.
+  // Before finish(): a foreign link that the robot touched in this step, and the work (J) that it
+  // absorbed from the commanded motion.
   void resist(LinkIndex link, double work);
-  // After step(): how it came out, with the way (m) and angle (rad) that base_link really made.
-  // `touched`: by something that may have changed them. Ends primitives: when the plan is over and
-  // the robot has settled, too.
+  // After step(): the actual result, with base_link's travelled distance (m) and angle (rad).
+  // `touched`: by something that may have changed them. Ends primitives, also those whose plan is
+  // over once the robot has settled.
   void finish(SimTime now, double way, double angle, bool touched, const Lag& lag = {});
 
   double v() const { return v_; }  // m/s and rad/s at the end of the last step, as planned
   double omega() const { return omega_; }
-  double side() const { return side_; }  // m/s to the left
+  double side() const { return side_; }  // m/s, to the left
   double curvature() const {
     return is_steered() ? math::tan(steering_) / drive_->wheelbase : 0.0;
   }  // 1/m
   bool has_primitive() const { return primitive_.axis != Axis::none; }
-  bool by_wheels() const { return by_wheels_; }  // the last command was one of wheel rates
-  bool resting() const {
-    return resting_;
-  }  // stands still, and nothing happens until a command comes
+  bool by_wheels() const { return by_wheels_; }  // the last command gave wheel rates
+  bool resting() const { return resting_; }  // at rest, and nothing happens until the next command
   const MotionLog& log() const { return log_; }
   void show_step() { log_.advance(); }
 
  private:
   enum class Axis { none, way, angle, arc };
   struct Primitive {
-    Axis axis = Axis::none;  // none: nothing runs
-    double target = 0.0;     // m; rad for angle; an arc's way in m
-    double unit = 1.0;       // published measure for each m or rad of `target`
+    Axis axis = Axis::none;  // none: no primitive is running
+    double target = 0.0;     // m; rad for angle; distance along an arc in m
+    double unit = 1.0;       // published units per m or rad of `target`
     double curvature = 0.0;  // arc: 1/m
-    double done = 0.0;       // what was really done, m or rad
+    double done = 0.0;       // m or rad that were executed
     double done_before_plan = 0.0;
-    double begins = 0.0;     // s since the start of the plan, after which the primitive itself runs
-    double begins_at = 0.0;  // position of the profile then
+    double begins = 0.0;  // s from the start of the plan to the start of the primitive's own motion
+    double begins_at = 0.0;  // position of the profile at that time
     Limits limits;
   };
 
   double seconds(SimTime now) const { return static_cast<double>(now - start_) * 1e-6; }
-  bool is_steered() const;  // turns by steering alone: not on the spot
+  bool is_steered() const;  // turns by steering only: not on the spot
   bool moves_sideways() const;
   void hold(double v, double side, double omega, SimTime now, int8_t kind);
   void hold_wheels(const WheelCommand& command, SimTime now);
@@ -101,17 +99,17 @@ class MotionPlanner {
   void watch_for_block(SimTime now, bool touched);
   void watch_held(SimTime now, double way, double angle, bool touched);
   bool settled(SimTime now, const Lag& lag) const;
-  // What a command asks for, or the reason why it cannot be done.
+  // The plan for a command, or the reason why it is not possible.
   int8_t aim(const MoveCommand& command, double heading, Primitive& next) const;
   int8_t aim_on_arc(const MoveCommand& command, Primitive& next) const;
   static Limits stricter(const Limits& own, const MoveCommand& command, double fallback_speed);
 
-  // Hot: what a step of steady motion needs.
+  // Hot: used in each step of steady motion.
   double v_ = 0.0, omega_ = 0.0, side_ = 0.0, steering_ = 0.0;
   bool steady_ = true, resting_ = true;
-  SimTime deadline_;  // of the watchdog; far away when it does not run
+  SimTime deadline_;  // of the watchdog; far in the future if it is off
   Bound<const model::DriveDescription> drive_;
-  WheelKinematics kinematics_;  // as the drive turns speeds into wheel rates
+  WheelKinematics kinematics_;  // converts speeds to wheel rates, as in the drive
   Limits way_limits_, angle_limits_, side_limits_;
   std::vector<Vec3> rims_;  // of mecanum and omni wheels
   // The plan.
@@ -120,15 +118,16 @@ class MotionPlanner {
   SteeringPlan plan_steering_;
   double target_v_ = 0.0, target_omega_ = 0.0, target_side_ = 0.0, target_steering_ = 0.0;
   bool by_wheels_ = false;
-  bool holding_ = false;  // a velocity or wheel command is in force
+  bool holding_ = false;  // a velocity or wheel command is active
   Primitive primitive_;
-  // Watching for a block: since when, what was done then, the fastest that the plan was since,
-  // whether anything touched.
+  // Detection of blocks: start of the window, progress at that time, the highest planned speed
+  // since, and whether anything touched.
   SimTime window_start_ = 0;
   double window_done_ = 0.0, window_fastest_ = 0.0;
-  double window_turned_ = 0.0, window_fastest_turn_ = 0.0;  // beside the way, of a velocity command
+  // rotation, monitored separately for a velocity command
+  double window_turned_ = 0.0, window_fastest_turn_ = 0.0;
   bool window_touched_ = false;
-  std::vector<std::pair<LinkIndex, double>> window_work_;  // by link that resisted, J
+  std::vector<std::pair<LinkIndex, double>> window_work_;  // by resisting link, J
   MotionLog log_;
 };
 

@@ -1,4 +1,4 @@
-// Waypoints to poses. Times are whole microseconds, so that a loop repeats exactly.
+// Converts waypoints to poses. Times are whole microseconds, so that a loop repeats exactly.
 #include "robot/mover.h"
 
 #include <algorithm>
@@ -10,7 +10,7 @@
 namespace ruedo::robot {
 
 namespace {
-constexpr double kJump_m_s = 1000.0;  // nothing moves so fast
+constexpr double kJump_m_s = 1000.0;  // faster than anything moves
 }  // namespace
 
 Mover::Mover(const model::WorldModel& world, const model::BodyLayout& layout,
@@ -100,7 +100,8 @@ void Mover::before_step(SimTime now) {
     const Eigen::AngleAxisd turn(end.rotation * begin.rotation.conjugate());
     Twist mean{(end.translation - begin.translation) / step_s,
                turn.axis() * (turn.angle() / step_s)};
-    if (mean.linear.norm() > kJump_m_s) mean = {};  // to where its loop begins: it hits nothing
+    // the jump to the start of a loop: it hits nothing
+    if (mean.linear.norm() > kJump_m_s) mean = {};
     physics_->guide(part.body, mean, end);
   }
 }

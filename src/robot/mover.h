@@ -1,4 +1,4 @@
-// A model that moves along waypoints (<ruedo:path>, or an actor's trajectory), whatever it meets.
+// A model that follows waypoints (<ruedo:path>, or an actor's trajectory), whatever it meets.
 #pragma once
 
 #include <vector>
@@ -15,21 +15,21 @@ class Mover {
   static bool moves(const model::Model& model) {
     return model.path && model.path->name == "ruedo:path";
   }
-  // Throws InputError for waypoints that are not numbers, or whose times do not grow.
+  // Throws InputError for waypoints that are not numbers, or with times that do not increase.
   Mover(const model::WorldModel& world, const model::BodyLayout& layout,
         physics::PhysicsWorld& physics, InstanceIndex instance);
 
-  // The model's pose in the world at a time: linear between waypoints, rotations by slerp. Before
-  // the first one it is there already; after the last one it stays, or begins again where the path
-  // is a loop.
+  // The model's pose in the world at a time: linear between waypoints, with slerp for rotations.
+  // Before the first waypoint it is there already; after the last it stays there, or starts over in
+  // a loop.
   Pose pose_at(SimTime time) const;
 
   InstanceIndex instance() const { return instance_; }
-  // The path begins at that sim time.
+  // Starts the path at that sim time.
   void reset(SimTime now);
-  void shift_time(SimTime us) { offset_ += us; }  // sim time went back by so much; the path goes on
+  void shift_time(SimTime us) { offset_ += us; }  // sim time was set back; the path continues
 
-  // Sends its bodies to where they are one step later.
+  // Moves its bodies to their poses one step later.
   void before_step(SimTime now);
 
   struct Waypoint {
@@ -40,7 +40,7 @@ class Mover {
     bool loop = true;
     std::vector<Waypoint> waypoints;
   };
-  // Throws InputError for waypoints that are not numbers, or whose times do not grow.
+  // Throws InputError for waypoints that are not numbers, or with times that do not increase.
   static Path read(const Element& path);
 
  private:
@@ -52,7 +52,7 @@ class Mover {
   Bound<physics::PhysicsWorld> physics_;
   InstanceIndex instance_;
   int64_t step_us_;
-  SimTime offset_ = 0;  // time of the path less sim time
+  SimTime offset_ = 0;  // path time minus sim time
   Path path_;
   std::vector<Part> parts_;
 };

@@ -1,4 +1,4 @@
-// Plans of velocity profiles: v^2 = 2 a s, solved for the peak or the cruise.
+// Planning of velocity profiles: v^2 = 2 a s, solved for the peak or cruise speed.
 #include "robot/profile.h"
 
 #include <algorithm>
@@ -7,7 +7,7 @@
 
 namespace ruedo::robot {
 
-// While a profile is being planned its last segment is the end of what is planned so far.
+// While a profile is being planned, its last segment marks the end of the plan so far.
 void Profile::add(double duration, double velocity, double acceleration) {
   if (!(duration > 0.0)) return;
   assert(count_ < kCapacity);
@@ -32,7 +32,7 @@ void Profile::keep_at(double velocity, double position) {
 
 Profile Profile::to_velocity(double velocity, double target, const Limits& limits) {
   Profile profile;
-  if (velocity * target < 0.0) {  // first to rest
+  if (velocity * target < 0.0) {  // first brake to rest
     profile.add(std::abs(velocity) / limits.deceleration, velocity,
                 std::copysign(limits.deceleration, -velocity));
     velocity = 0.0;
@@ -52,7 +52,7 @@ Profile Profile::to_distance(double velocity, double distance, const Limits& lim
   const double a = limits.acceleration, d = limits.deceleration;
   double rest = distance, v = velocity;
   const double braking_way = v * std::abs(v) / (2.0 * d);
-  // Going the wrong way, or too fast to stop in time: brake to rest, and go from there.
+  // Going the wrong way, or too fast to stop in time: brake to rest, and continue from there.
   if (v != 0.0 && (v * distance <= 0.0 || std::abs(braking_way) > std::abs(distance))) {
     profile.add(std::abs(v) / d, v, std::copysign(d, -v));
     rest -= braking_way;
@@ -62,7 +62,7 @@ Profile Profile::to_distance(double velocity, double distance, const Limits& lim
   rest = std::abs(rest);
   v = std::abs(v);
   double way_to_stop = v * v / (2.0 * d);
-  if (v > limits.speed) {  // brake to the speed allowed
+  if (v > limits.speed) {  // brake to the allowed speed
     profile.add((v - limits.speed) / d, sign * v, -sign * d);
     rest -= way_to_stop - limits.speed * limits.speed / (2.0 * d);
     v = limits.speed;

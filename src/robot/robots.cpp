@@ -1,4 +1,4 @@
-// All robots of a world: which drive each has, and the order of a step.
+// All robots of a world: their drives, and the order of a step.
 #include <algorithm>
 #include <cmath>
 
@@ -48,7 +48,7 @@ class Robots::Impl {
       if (layout_.bodies[i].instance == instance) visit(i);
     }
   }
-  RobotIndex robot_of(InstanceIndex instance) const;  // invalid: it is none
+  RobotIndex robot_of(InstanceIndex instance) const;  // invalid: not a robot
   void put(BodyIndex body, const Pose& X_WB);
   void end_put(InstanceIndex instance);
   void read_driveless(RobotIndex robot, RobotState& state) const;
@@ -60,8 +60,9 @@ class Robots::Impl {
   const model::BodyLayout& layout_;
   physics::PhysicsWorld& physics_;
   std::vector<LevelPlane> planes_;
-  IndexedVector<RobotIndex, std::unique_ptr<Drive>> drives_;  // null: it has none, or cannot move
-  IndexedVector<RobotIndex, MotionLog> driveless_;            // refusals of those
+  // null: the robot has none, or cannot move
+  IndexedVector<RobotIndex, std::unique_ptr<Drive>> drives_;
+  IndexedVector<RobotIndex, MotionLog> driveless_;  // refusals of robots without a drive
   IndexedVector<LinkIndex, RobotIndex> robot_of_link_;
   std::vector<std::unique_ptr<Mover>> movers_;
   Crowd crowd_;
@@ -172,7 +173,7 @@ void Robots::Impl::read(Snapshot& snapshot) const {
   snapshot.robots.resize(drives_.size());
   snapshot.motion_ends.clear();
   snapshot.wheel_angles.assign(layout_.wheels.size(),
-                               0.0);  // of a robot that is gone, too: a snapshot is used again
+                               0.0);  // also for removed robots: snapshots are reused
   snapshot.wheel_rates.assign(layout_.wheels.size(), 0.0);
   for (const RobotIndex i : drives_.indices()) {
     if (drives_[i]) {
@@ -196,14 +197,14 @@ void Robots::Impl::number_robots() {
 
 void Robots::Impl::read_collisions(Snapshot& snapshot) const {
   snapshot.collisions.clear();
-  snapshot.collisions.reserve(2 * snapshot.contacts.capacity());  // so that none is made in a run
+  snapshot.collisions.reserve(2 * snapshot.contacts.capacity());  // avoids allocations in the run
   const auto robot_of_link = [this](LinkIndex link) {
     return link.valid() ? robot_of_link_[link] : RobotIndex();
   };
   for (size_t i = 0; i < snapshot.contacts.size(); ++i) {
     const Contact& contact = snapshot.contacts[i];
     const RobotIndex a = robot_of_link(contact.link_a), b = robot_of_link(contact.link_b);
-    if (a == b) continue;  // no robot's, or a robot's own links
+    if (a == b) continue;  // no robot involved, or links of the same robot
     const auto add = [&](RobotIndex robot, bool as_a) {
       if (!robot.valid()) return;
       const Vec3 up = snapshot.robots[robot].X_WBase.rotation * Vec3::UnitZ();
@@ -219,7 +220,7 @@ void Robots::Impl::read_collisions(Snapshot& snapshot) const {
             });
 }
 
-// A robot that only senses: base_link is where its body is.
+// A robot with sensors only: base_link is where its body is.
 void Robots::Impl::read_driveless(RobotIndex robot, RobotState& state) const {
   const auto& placement = layout_.robots[robot];
   state = {};
@@ -280,7 +281,7 @@ Pose Robots::Impl::model_pose(InstanceIndex instance) const {
 }
 
 void Robots::Impl::put(BodyIndex body, const Pose& X_WB) {
-  physics_.disturb(body);  // what leaned on it
+  physics_.disturb(body);  // wakes what leaned on it
   physics_.set_twist(body, {});
   physics_.set_pose(body, X_WB.normalized());
 }
@@ -312,7 +313,7 @@ void Robots::Impl::set_twist(InstanceIndex instance, const Twist& twist) {
   });
 }
 
-// A drive's wheels keep the angle that they have turned: encoders do not jump.
+// A drive's wheels keep their angle: encoders do not jump.
 void Robots::Impl::reset(InstanceIndex instance) {
   for (const InstanceIndex other : joints_.holds().carried_by(instance))
     for_each_body(other, [&](BodyIndex body) { put(body, layout_.bodies[body].X_WB); });

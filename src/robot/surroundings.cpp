@@ -1,4 +1,4 @@
-// Belts and doors are moved bodies, as what goes along a path is.
+// Belts and doors are moved bodies, like models on a path.
 #include "robot/surroundings.h"
 
 #include <algorithm>
@@ -95,7 +95,7 @@ Pose Surroundings::Door::pose() const {
   return X_WM * Pose{Quat::Identity().slerp(open, X_MOpen.rotation), open * X_MOpen.translation};
 }
 
-// A robot or a person, at its middle, seen from above.
+// The centre of a robot or person, seen from above.
 bool Surroundings::is_near(const Door& door) const {
   for (const BodyIndex b : layout_->bodies.indices()) {
     const model::ModelInstance& instance = world_->models[layout_->bodies[b].instance];

@@ -1,5 +1,5 @@
-// What moves of its own accord: conveyor belts (<ruedo:belt>), and doors that open for who comes
-// near (<ruedo:door>).
+// Things that move on their own: conveyor belts (<ruedo:belt>), and doors that open for whoever
+// comes near (<ruedo:door>).
 #pragma once
 
 #include <vector>
@@ -24,21 +24,21 @@ class Surroundings {
   void add(InstanceIndex instance);
   void remove(InstanceIndex instance);
   void reset(InstanceIndex instance);
-  void shift_time(SimTime us);  // sim time went back by so much
+  void shift_time(SimTime us);  // sim time was set back by that much
 
  private:
   struct Part {
     BodyIndex body;
     Pose X_MB;
   };
-  // Stands where it is, with a surface that moves.
+  // Stays in place, with a moving surface.
   struct Belt {
     InstanceIndex instance;
     std::vector<Part> parts;
     Pose X_WM;
     Vec3 velocity;  // m/s, in the world
   };
-  // Moves from where the file has it by X_MOpen and back.
+  // Moves between its pose in the file and X_MOpen.
   struct Door {
     InstanceIndex instance;
     std::vector<Part> parts;
@@ -46,7 +46,7 @@ class Surroundings {
     double opening_s, distance_m;
     SimTime hold_us;
     double open = 0.0;    // 0 to 1
-    SimTime wanted = -1;  // when a body was last near; -1: never
+    SimTime wanted = -1;  // when somebody was last near; -1: never
     Pose pose() const;
   };
   std::vector<Part> parts_of(InstanceIndex instance) const;

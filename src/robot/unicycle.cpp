@@ -13,7 +13,7 @@ namespace ruedo::robot {
 namespace {
 
 // Gauss-Legendre of order 8 on [-1, 1] (Abramowitz and Stegun, table 25.4): over an angle of 1 rad
-// the error is below 1e-18 of the way.
+// the error is below 1e-18 of the distance.
 constexpr std::array<double, 4> kNodes = {0.1834346424956498, 0.5255324099163290,
                                           0.7966664774136267, 0.9602898564975363};
 constexpr std::array<double, 4> kWeights = {0.3626837833783620, 0.3137066458778873,
@@ -24,7 +24,7 @@ constexpr double kLargestPanel_rad = 1.0;
 Displacement over_piece(double v0, double a, double w0, double b, double duration) {
   const double way = (v0 + 0.5 * a * duration) * duration;
   const double angle = (w0 + 0.5 * b * duration) * duration;
-  // Constant curvature: v and omega in proportion, or one of them zero throughout.
+  // Constant curvature: v and omega in constant proportion, or one of them zero.
   if (std::abs(v0 * b - w0 * a) <= 1e-15 * (std::abs(v0 * b) + std::abs(w0 * a)))
     return along_arc(way, angle);
 
@@ -57,7 +57,7 @@ Displacement along_arc(double way, double angle) {
   result.way = way;
   result.angle = angle;
   const double half = 0.5 * angle;
-  if (half == 0.0) {  // half of the smallest number above 0, too
+  if (half == 0.0) {  // also half of the smallest number above 0
     result.x = way;
     return result;
   }

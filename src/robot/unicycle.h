@@ -9,23 +9,23 @@
 
 namespace ruedo::robot {
 
-// Displacement over a span of time, in the frame of base_link at its beginning.
+// Displacement over an interval, in base_link's frame at its start.
 struct Displacement {
   double x = 0.0, y = 0.0;  // m
   double angle = 0.0;       // rad, not wrapped
-  double way = 0.0;         // m, integral of v
-  double side = 0.0;        // m, integral of the speed to the left, of bases that move sideways
+  double way = 0.0;         // m, path length: integral of v
+  double side = 0.0;        // m, integral of the lateral speed, for bases that move sideways
 };
 
-// With constant curvature (a line, an arc, or speed and turn rate in proportion): closed form.
+// For constant curvature (a line, an arc, or speed and turn rate in proportion): closed form.
 Displacement along_arc(double way, double angle);
 
-// From `begin` to `end` (s since the start of both profiles). Where v and omega vary apart from
-// each other, by Gauss-Legendre quadrature over each piece between changes of the profiles: exact
-// to rounding.
+// From `begin` to `end` (s since the start of both profiles). If v and omega vary independently, by
+// Gauss-Legendre quadrature over each interval between changes of the profiles: exact up to
+// rounding.
 Displacement integrate(const Profile& v, const Profile& omega, double begin, double end);
 
-// first, then second.
+// `first`, followed by `second`.
 Displacement chained(const Displacement& first, const Displacement& second);
 
 }  // namespace ruedo::robot

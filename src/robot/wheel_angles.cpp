@@ -1,4 +1,5 @@
-// Rolling without slip: each wheel's rim has the speed of the ground below it, along the wheel.
+// Rolling without slip: each wheel's rim moves at the speed of the ground below it, along the
+// wheel.
 #include "robot/wheel_angles.h"
 
 #include <cmath>
@@ -35,7 +36,7 @@ void WheelAngles::read(Snapshot& snapshot, const Vec3& twist, double curvature) 
   const Vec3 sums(way_, side_, angle_);
   for (const Wheel& wheel : wheels_) {
     double angle = 0.0, rate = 0.0;
-    if (wheel.steers) {  // across the line to the middle of the circle
+    if (wheel.steers) {  // perpendicular to the line to the centre of the circle
       angle = math::atan2(curvature * wheel.x, 1.0 - curvature * wheel.y);
     } else if (radius_ > 0.0 && wheel.steered) {
       angle = wheel.rolled / radius_;

@@ -1,5 +1,5 @@
-// How far the wheels of a kinematic drive have turned, and where those that steer point, from the
-// way of base_link.
+// The rotation of a kinematic drive's wheels, and the angles of its steered wheels, from the motion
+// of base_link.
 #pragma once
 
 #include <vector>
@@ -16,16 +16,16 @@ class WheelAngles {
               const model::DriveDescription& drive);
 
   void advance(const Displacement& way);
-  // twist: m/s ahead, m/s to the left, rad/s. curvature: 1/m, of the way that the steering sets.
+  // twist: m/s forward, m/s to the left, rad/s. curvature: 1/m, of the path that the steering sets.
   void read(Snapshot& snapshot, const Vec3& twist, double curvature) const;
 
  private:
   struct Wheel {
     WheelIndex index;
-    bool steers, steered;  // it is a steering joint; it rolls and hangs on one
+    bool steers, steered;  // steers: a steering joint; steered: a rolling wheel that hangs on one
     Vec3 rim;
-    double x, y;          // m, in base_link: of a steered wheel the joint that steers it
-    double rolled = 0.0;  // m, of a steered wheel
+    double x, y;          // m, in base_link: for a steered wheel, that of its steering joint
+    double rolled = 0.0;  // m, for a steered wheel
   };
 
   double radius_;

@@ -1,6 +1,5 @@
-// What the wheels of a differential drive make of speed and turn rate, and the other way round: v =
-// (r_l w_l + r_r w_r) / 2 and omega = (r_r w_r - r_l w_l) / track. The same holds for ways and
-// angles.
+// Conversion between wheel rates and the speed and turn rate of a differential drive: v = (r_l w_l
+// + r_r w_r) / 2 and omega = (r_r w_r - r_l w_l) / track. The same holds for distances and angles.
 #pragma once
 
 #include "model/world_model.h"
@@ -16,7 +15,8 @@ struct PlaneMotion {
 
 class WheelKinematics {
  public:
-  // As the robot is, or as it believes to be: with the errors of <ruedo:odometry>.
+  // With the robot's true geometry, or with what it believes: including the errors of
+  // <ruedo:odometry>.
   static WheelKinematics real(const model::DriveDescription& drive) {
     return {drive.wheel_radius, drive.wheel_radius, drive.track};
   }

@@ -10,16 +10,18 @@ namespace ruedo::robot {
 
 namespace {
 
-// Where the file gives no gains: a wheel with its share of the robot comes to its rate within so
-// long, and loses what it lags behind in so long.
+// Default gains if the file gives none: time constants for a wheel, with its share of the robot's
+// mass, to reach its rate, and to make up for its lag.
 constexpr double kRateTime_s = 0.01, kAngleTime_s = 0.02;
-// What a servo may lag behind; a robot that is held does not wind it up further.
+// maximum lag of a servo; if the robot is held, it does not wind up further
 constexpr double kLargestLag_m = 0.05;
-constexpr double kSteeringTorque = 100.0;  // rad/s missing, for which steering gives all it can
-constexpr double kMostOfLag = 0.5;  // of it, that one step may make good: more would overshoot
+constexpr double kSteeringTorque = 100.0;  // N m per rad/s of error: steering uses all its torque
+// fraction of the lag corrected in one step; more would overshoot
+constexpr double kMostOfLag = 0.5;
 constexpr double kLargestYawError_rad = 0.3;
 constexpr SimTime kFallAsleep_us = 500'000;
-constexpr double kSettled_m_s = 2e-3, kSettled_rad_s = 1e-2;  // a primitive ends below these
+// thresholds for the end of a primitive
+constexpr double kSettled_m_s = 2e-3, kSettled_rad_s = 1e-2;
 constexpr double kStill_m_s = 5e-3, kStill_rad_s = 2e-2;
 
 }  // namespace
@@ -79,7 +81,7 @@ void WheelsDrive::set_gains(double mass) {
   }
 }
 
-// Of what each wheel has, in the order of wheels_.
+// The values of each wheel, in the order of wheels_.
 SideRates WheelsDrive::mean_of_sides(const std::vector<double>& of_wheels) const {
   SideRates sum{};
   for (size_t i = 0; i < of_wheels.size(); ++i)
@@ -113,7 +115,7 @@ void WheelsDrive::before_step(SimTime now) {
   turn_wheels(way_);
 }
 
-// rad/s, from what the gyro says; wheel commands go past it.
+// rad/s, from the gyro; wheel commands are not affected.
 double WheelsDrive::yaw_correction() {
   const double gain = description_->yaw_gain;
   if (gain <= 0.0 || planner_.by_wheels()) return 0.0;
@@ -140,7 +142,7 @@ void WheelsDrive::turn_wheels(const Displacement& way) {
   }
 }
 
-// rad/s, by what the robot believes of its radii and levers; curvature: 1/m, of a base that steers.
+// rad/s, from the radii and lever arms that the robot believes; curvature: 1/m, for steered bases.
 double WheelsDrive::rate_of(size_t wheel, const Vec3& twist, double curvature) const {
   const Place& at = places_[wheel];
   const double radius =
@@ -152,7 +154,7 @@ double WheelsDrive::rate_of(size_t wheel, const Vec3& twist, double curvature) c
   return twist.x() * (at.steered ? math::hypot(along, curvature * lever * at.x) : along) / radius;
 }
 
-// Across the line to the middle of the circle.
+// Perpendicular to the line to the centre of the circle.
 double WheelsDrive::steering_of(size_t wheel, double curvature) const {
   const Place& at = places_[wheel];
   const double lever = 1.0 + description_->track_error;
@@ -179,8 +181,8 @@ void WheelsDrive::drive_wheel(size_t wheel, double rate) {
   physics::WheelServo command;
   command.rate = rate + std::min(servo.angle_gain / servo.rate_gain, kMostOfLag / step_s_) * lag;
   command.gain = servo.rate_gain;
-  // The motor's line: less torque the faster it turns, and more against its turning, up to that at
-  // stall.
+  // The motor's torque-speed line: less torque the faster it turns, and more against its rotation,
+  // up to the stall torque.
   const double part =
       physics_->wheel_rate(wheels_[wheel]) * description_->gear / description_->no_load_rate;
   const double stall = std::isfinite(description_->stall_torque)
@@ -233,12 +235,13 @@ void WheelsDrive::after_step(SimTime now) {
   way_missing_ -= made.v;
   angle_missing_ -= made.omega;
   const bool touched = touches_something();
-  // A primitive ends by what the robot believes; whether a velocity leads anywhere, the room says.
+  // A primitive ends by the robot's own estimate; whether a velocity makes progress is judged by
+  // its true motion.
   const bool believes = planner_.has_primitive();
   planner_.finish(now, believes ? made.v : ahead, believes ? made.omega : turned, touched, lag());
   if (touched && planner_.has_primitive())
-    way_missing_ = angle_missing_ = 0.0;  // it was replanned from where the robot believes to be
-  if (!planner_.has_primitive()) {        // a velocity is not made up for later
+    way_missing_ = angle_missing_ = 0.0;  // it was replanned from its estimated position
+  if (!planner_.has_primitive()) {        // for a velocity command the lag is not made up
     way_missing_ = 0.0;
     angle_missing_ = std::clamp(angle_missing_, -kLargestYawError_rad, kLargestYawError_rad);
   }
@@ -253,7 +256,7 @@ Lag WheelsDrive::lag() const {
   return {way_missing_, angle_missing_, moving};
 }
 
-// m ahead, m to the left, rad: of this step, by the encoders.
+// m forward, m to the left, rad: of this step, by the encoders.
 Vec3 WheelsDrive::believed_way() {
   const SideRates before = mean_of_sides(last_angles_);
   std::vector<double> ways(wheels_.size());

@@ -1,16 +1,15 @@
 // The wheels drive: motorised wheels in friction contact, and the controller that a real base has
 // around them.
 //
-// The plan of speed and turn rate (the same as the kinematic drive's) becomes wheel rates by the
-// robot's own kinematics, with what it believes of its radii and track. A servo at each wheel's
-// encoder follows them: torque = rate gain * (rate missing)
-// + angle gain * (angle missing), within the torque limit and the motor's line from stall to no
-// load. What the body does is physics. The robot knows its encoders only: primitives measure their
-// way by its odometry, so what slips, it does not know. With <ruedo:yaw_gain> its gyro's heading
-// takes the place of the odometry's, and a loop turns it there.
+// The plan of speed and turn rate (the same as for the kinematic drive) is converted to wheel rates
+// with the geometry that the robot believes it has. A servo on each wheel's encoder follows them:
+// torque = rate gain * (rate error) + angle gain * (angle error), within the torque limit and the
+// motor's torque-speed line. What the body does is physics. The robot knows its encoders only:
+// primitives measure distance by its odometry and do not notice slip. With <ruedo:yaw_gain>, its
+// gyro's heading replaces the odometry's, and a control loop turns the robot back to it.
 //
-// Wheels that steer are held at the angles that the plan's circle asks for, each for itself; those
-// with rollers grip along the axis of the roller below them only.
+// Steered wheels are held at the angles that the planned circle requires, each individually; wheels
+// with rollers grip only along the axis of the roller below them.
 #pragma once
 
 #include <optional>
@@ -51,24 +50,24 @@ class WheelsDrive final : public Drive {
   void fall_asleep_when_still();
 
   struct Servo {
-    double angle = 0.0;  // rad, where the wheel should be
+    double angle = 0.0;  // rad, target angle of the wheel
     double rate_gain = 0.0, angle_gain = 0.0;
   };
   struct Place {
-    bool left, steers, steered;  // steered: by another one
+    bool left, steers, steered;  // steered: carried by a steering joint
     Vec3 rim;
-    double x, y;  // m, in base_link: of what steers it, where something does
+    double x, y;  // m, in base_link: of its steering joint, if there is one
   };
   std::vector<Servo> servos_;      // as wheels_
   std::vector<Place> places_;      // as wheels_
-  std::vector<BodyIndex> bodies_;  // the robot's own: chassis and wheels
+  std::vector<BodyIndex> bodies_;  // its own: chassis and wheels
   double max_torque_;              // N m, each wheel
   WheelKinematics believed_;
-  std::optional<model::BaseOdometry> base_;         // of what is no differential drive
-  std::vector<double> last_angles_;                 // of the encoders, as wheels_
+  std::optional<model::BaseOdometry> base_;         // for drives other than differential ones
+  std::vector<double> last_angles_;                 // of the encoders, as in wheels_
   Vec3 believed_rate_ = Vec3::Zero();               // of the base, by the encoders
-  Displacement way_;                                // that the plan makes in this step
-  double way_missing_ = 0.0, angle_missing_ = 0.0;  // m, rad: planned less believed
+  Displacement way_;                                // planned for this step
+  double way_missing_ = 0.0, angle_missing_ = 0.0;  // m, rad: planned minus estimated
   double yaw_integral_ = 0.0;                       // rad/s
   SimTime still_us_ = 0;
   bool asleep_ = false;

@@ -1,12 +1,12 @@
-// The wind: the same everywhere, and as the plugin WindEffects of Gazebo has it.
+// The wind: uniform in space, with the model of Gazebo's plugin WindEffects.
 //
-// Model: with t since the start of the run, and the file's velocity of the speed s (in the plane),
+// Model: with t since the start of the run, and from the file's velocity the horizontal speed s,
 // the direction d and the vertical speed z,
 //   speed     = s (1 - exp(-t / rise)) (1 + swing sin(2 pi t / swing_period)) + noise
 //   direction = d + turn sin(2 pi t / turn_period) + noise
 //   vertical  = z (1 - exp(-t / vertical_rise)) + noise,
-// where noise is N(mean, stddev), drawn anew in each step. Gazebo's filter adds up over its steps
-// what stands here in closed form. Without the plugin it is the file's velocity, and pushes
+// where noise is N(mean, stddev), drawn independently in each step. Gazebo's filter accumulates
+// over steps what is in closed form here. Without the plugin it is the file's velocity, and pushes
 // nothing.
 #pragma once
 

@@ -1,4 +1,4 @@
-// By shapes and triangles: what reaches below the height stays whole.
+// Decides by shapes and triangles: whatever reaches below the height is kept whole.
 #include "scene/cut_away.h"
 
 #include <algorithm>
@@ -12,7 +12,7 @@ namespace {
 
 constexpr double kPerson_m = 1.8;
 constexpr double kCovered = 0.5;  // of the world's area
-constexpr double kShown_m = 2.0;  // of walls, above the lowest thing
+constexpr double kShown_m = 2.0;  // how much of the walls stays visible above the lowest thing
 
 using Box = Eigen::AlignedBox3d;
 
@@ -42,7 +42,7 @@ Vec3 corner_of(const model::Geometry& g, const Pose& X_WG, uint32_t index) {
   return X_WG * g.scale.cwiseProduct(g.mesh->positions[index].cast<double>());
 }
 
-// m^2, as seen from above, of what lies wholly above that height, and of what does not.
+// Areas in m^2, seen from above: of what lies entirely above that height, and of the rest.
 struct Area {
   double above = 0.0, below = 0.0;
 };
@@ -129,7 +129,7 @@ std::optional<double> height_of_ceiling(const model::WorldModel& world) {
     area.below += own.below;
   });
   if (has_ground_plane(world)) area.below += whole;
-  // A mountain hides nothing: it has no floor below it.
+  // A mountain hides nothing: there is no floor below it.
   if (area.above < kCovered * whole || area.below < kCovered * whole) return std::nullopt;
   return floor + kShown_m;
 }

@@ -14,13 +14,13 @@ namespace {
 class EglContext : public GlContext {
  public:
   EglContext(EGLDisplay display, EGLContext context) : display_(display), context_(context) {}
-  // The display is the process's only one and other contexts may use it: it is not terminated.
+  // The process has a single display, which other contexts may use: it is not terminated.
   ~EglContext() override { eglDestroyContext(display_, context_); }
   EglContext(const EglContext&) = delete;
   EglContext& operator=(const EglContext&) = delete;
 
   void make_current() override {
-    eglBindAPI(EGL_OPENGL_API);  // is a state of the thread
+    eglBindAPI(EGL_OPENGL_API);  // per-thread state
     if (eglMakeCurrent(display_, EGL_NO_SURFACE, EGL_NO_SURFACE, context_) == EGL_FALSE) {
       throw EnvironmentError("EGL refuses to make its context current");
     }

@@ -88,8 +88,7 @@ struct GlFunctions {
 #undef RUEDO_GL_MEMBER
 };
 
-// Fills the table from a context that is current. Throws EnvironmentError that names a function it
-// lacks.
+// Fills the table from the current context. Throws EnvironmentError naming a missing function.
 GlFunctions load_gl_functions(const GlContext& context);
 
 }  // namespace ruedo::scene

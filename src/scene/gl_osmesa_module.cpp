@@ -30,7 +30,7 @@ class OsMesaContext : public GlContext {
 
  private:
   static constexpr int kSize =
-      16;  // OSMesa wants a picture of its own; everything is drawn to framebuffer objects
+      16;  // OSMesa needs a buffer of its own; everything is drawn to framebuffer objects
   OSMesaContext context_;
   std::array<uint8_t, 4 * kSize * kSize> unused_{};
 };
@@ -38,7 +38,7 @@ class OsMesaContext : public GlContext {
 }  // namespace
 }  // namespace ruedo::scene
 
-// Null, with the reason in `why`; else the caller's.
+// Null, with the reason in `why`; otherwise owned by the caller.
 extern "C" ruedo::scene::GlContext* ruedo_make_osmesa_context(std::string& why) {
   const int attributes[] = {OSMESA_FORMAT,
                             OSMESA_RGBA,

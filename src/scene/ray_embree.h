@@ -1,5 +1,5 @@
-// The little of Embree that rays need, the same over Embree 3 and 4: a device, packets of eight,
-// and room for data of our own beside Embree's context.
+// The parts of Embree that the caster needs, the same for Embree 3 and 4: a device, packets of
+// eight rays, and room for our own data beside Embree's context.
 #pragma once
 
 #include <algorithm>
@@ -50,7 +50,7 @@ inline void intersect(RTCScene scene, EmbreeContext& context, const int* valid, 
 }
 #endif
 
-// Building may switch denormals off; physics in the same thread must not notice.
+// A build may change the thread's denormal mode; physics in the same thread must not be affected.
 class KeepFloatMode {
  public:
 #if defined(__SSE2__)
@@ -73,11 +73,11 @@ struct ReleaseEmbree {
 using DevicePtr = std::unique_ptr<std::remove_pointer_t<RTCDevice>, ReleaseEmbree>;
 using ScenePtr = std::unique_ptr<std::remove_pointer_t<RTCScene>, ReleaseEmbree>;
 
-// Not with "threads=1", though only builds would use more: Embree would limit TBB in the whole
-// process by it, and the modules' pieces would find no second core.
+// Without "threads=1", although only builds would use more: Embree would apply the limit to TBB in
+// the whole process, and take the second core from the modules.
 inline DevicePtr make_device() { return DevicePtr(rtcNewDevice("set_affinity=0")); }
 
-// A float a little above t >= 0.
+// A float slightly above t >= 0.
 inline float just_beyond(double t) { return static_cast<float>(t) * (1.0f + 2.5e-7f); }
 
 // The smallest float that is not below x, and the largest that is not above it.
@@ -99,7 +99,7 @@ inline unsigned lanes_of(const RTCIntersectFunctionNArguments& arguments) {
   return lanes;
 }
 
-// Ends each ray at far(lane) >= 0, or just beyond: what is as near is still looked at.
+// Ends each ray at far(lane) >= 0 or just beyond, so that hits at equal distance are still found.
 template <class Far>
 void shorten(const RTCIntersectFunctionNArguments& arguments, Far far) {
   RTCRayN* rays = RTCRayHitN_RayN(arguments.rayhit, arguments.N);
@@ -129,9 +129,9 @@ struct Box {
   bool contains(const Vec3& p) const {
     return (p.array() >= lower.array()).all() && (p.array() <= upper.array()).all();
   }
-  // How far boxes within this one are grown, so that the single-precision traversal never misses
-  // what the test in double finds: rays start in this box, and their errors are a few parts in 2^22
-  // of its coordinates.
+  // How far boxes within this one are enlarged so that the single-precision traversal never misses
+  // what the double-precision test would find: rays start in this box, and their rounding errors
+  // are a few parts in 2^22 of its coordinates.
   double margin() const {
     return empty()
                ? 0.0
@@ -141,7 +141,8 @@ struct Box {
     return {round_down(lower.x()), round_down(lower.y()), round_down(lower.z()), 0.0f,
             round_up(upper.x()),   round_up(upper.y()),   round_up(upper.z()),   0.0f};
   }
-  // Of coordinates of this size, generously; what is grown by it is not missed in double precision.
+  // A generous bound for coordinates of this size: a box enlarged by it is not missed in double
+  // precision.
   double rounding() const {
     return 1e-9 + 1e-12 * std::max(lower.cwiseAbs().maxCoeff(), upper.cwiseAbs().maxCoeff());
   }
@@ -149,7 +150,7 @@ struct Box {
     return (lower.array() <= other.upper.array()).all() &&
            (other.lower.array() <= upper.array()).all();
   }
-  // Narrows [enter, exit] of the line to what is in the box; false when nothing is left.
+  // Narrows [enter, exit] to the part of the line inside the box; false if nothing is left.
   bool clip(const Vec3& o, const Vec3& d, double& enter, double& exit) const {
     for (int axis = 0; axis < 3; ++axis) {
       if (d[axis] == 0.0) {
@@ -163,7 +164,7 @@ struct Box {
     }
     return enter <= exit;
   }
-  // Where the ray enters the box, 0 when it starts inside; +inf when it misses.
+  // Distance at which the ray enters the box, 0 if it starts inside; +inf if it misses.
   double entry(const Vec3& o, const Vec3& d) const {
     if (contains(o)) return 0.0;
     double enter = 0.0, exit = std::numeric_limits<double>::infinity();
@@ -171,8 +172,8 @@ struct Box {
   }
 };
 
-// Eight rays on their way into Embree. Each starts where it enters the scene's box, so that its
-// coordinates are of the scene's size; `start` is that distance.
+// Eight rays for Embree. Each starts where it enters the scene's box, so that its coordinates are
+// of the scene's magnitude; `start` is that distance.
 struct Packet {
   RTCRayHit8 rays;
   alignas(32) int valid[kLanes];
@@ -207,7 +208,7 @@ struct Packet {
     last = lane;
   }
 
-  // Without AVX, Embree looks at all lanes, in other groups: a ray that ends before it starts.
+  // Without AVX, Embree tests inactive lanes too, in other groups: they end before they start.
   void blank(int lane) {
     add(lane, Vec3::Zero(), Vec3::UnitX(), 0.0, 0.0);
     rays.ray.tfar[lane] = -1.0f;
@@ -215,7 +216,7 @@ struct Packet {
     --active;
   }
 
-  // Casts what was added; a lone ray goes singly, which is faster and gives the same.
+  // Casts the rays added; a lone ray is cast singly, which is faster and gives the same result.
   void cast(RTCScene scene, EmbreeContext& context) {
     if (active == 0) return;
     if (active > 1) {

@@ -2,7 +2,7 @@
 
 namespace ruedo::scene {
 
-// The context of a packet's run through the tree; lanes are found by the ray's id.
+// The context of a packet's traversal; rays carry their lane as id.
 struct RayMesh::Query : EmbreeContext {
   const RayMesh* mesh;
   const FrameRays* rays = nullptr;
@@ -13,7 +13,7 @@ struct RayMesh::Query : EmbreeContext {
   Shear shear;
   int crossings = 0;
 
-  // Keeps the nearer hit; of equals the lower triangle.
+  // Keeps the nearer hit; among equals that of the lower triangle.
   void offer(int lane, double t, int triangle) {
     ShapeHit& hit = hits[lane];
     if (t <= t_max[lane] && (t < hit.t || (t == hit.t && triangle < hit.feature)))
@@ -115,7 +115,7 @@ void RayMesh::intersect(unsigned lanes, const FrameRays& rays, const double* t_m
 int RayMesh::crossing(int triangle, const Vec3& o, const Shear& shear) const {
   const Seen s = seen(triangle, o, shear);
   const auto sign = [](double edge, double dy,
-                       double dx) {  // a tie is broken as if the ray were moved by (e, e^2)
+                       double dx) {  // ties are broken as if the ray were displaced by (e, e^2)
     const double first = edge != 0.0 ? edge : dy != 0.0 ? dy : dx;
     return (first > 0.0) - (first < 0.0);
   };
@@ -128,7 +128,7 @@ int RayMesh::crossing(int triangle, const Vec3& o, const Shear& shear) const {
 
 const Vec3& RayMesh::way_out() {
   static const Vec3 kUp =
-      Vec3(0.0123, 0.0171, 1.0).normalized();  // along no face or edge that people draw
+      Vec3(0.0123, 0.0171, 1.0).normalized();  // not parallel to faces or edges in usual meshes
   return kUp;
 }
 

@@ -1,9 +1,9 @@
-// A triangle mesh for rays: a watertight test in double precision, and an Embree tree over the
-// triangles.
+// A triangle mesh for ray casting: a watertight test in double precision, and an Embree tree over
+// the triangles.
 //
 // The test is that of Woop, Benthin and Wald, "Watertight Ray/Triangle Intersection", JCGT 2013:
-// corners are taken into a plane across the ray, the same in all triangles, so no ray slips through
-// at an edge or a corner.
+// vertices are projected onto a plane across the ray, identically for all triangles, so that no ray
+// slips through an edge or a vertex.
 #pragma once
 
 #include <array>
@@ -17,7 +17,7 @@
 
 namespace ruedo::scene {
 
-// How a ray sees the world: sheared so that it points along one axis.
+// The shear that makes the ray point along one coordinate axis.
 struct Shear {
   int kx, ky, kz;
   double sx, sy, sz;
@@ -34,7 +34,7 @@ struct Shear {
   }
 };
 
-// Eight rays in some frame; the shears are for meshes only.
+// Eight rays in some frame; the shears are used by meshes only.
 struct FrameRays {
   Vec3 o[kLanes], d[kLanes];
   Shear shear[kLanes];
@@ -45,39 +45,39 @@ class RayMesh {
   // The mesh, scaled, in frame F.
   RayMesh(const model::Mesh& mesh, const Vec3& scale, const Pose& X_FMesh);
 
-  // Makes a tree of its own, for intersect() and inside(); without it they loop over the triangles.
+  // Builds a tree, for intersect() and inside(); without it they loop over the triangles.
   void build_tree(RTCDevice device);
 
-  // The nearest hit of each of the lanes (bits) not beyond t_max[lane]; hits[lane].feature is the
-  // triangle.
+  // The nearest hit of each lane (bit) up to t_max[lane]; hits[lane].feature is the triangle.
   void intersect(unsigned lanes, const FrameRays& rays, const double* t_max, ShapeHit* hits) const;
 
-  // Is the point inside the closed mesh? Counts the signed crossings of the surface on the way out
-  // (the winding number), so overlapping parts count once. False for an open mesh.
+  // Whether the point is inside the closed mesh: counts signed crossings of the surface along a
+  // line (the winding number), so overlapping parts count once. False for an open mesh.
   bool inside(const Vec3& point) const;
 
   // Calls found(lane, t) for the lanes that hit the triangle.
   template <class Found>
   void test(int triangle, unsigned lanes, const FrameRays& rays, Found found) const;
-  // +1 where the ray leaves through the triangle, -1 where it enters, 0 where it misses. A ray
-  // through an edge or corner is moved aside by less than any number, the same way for all
-  // triangles: each crossing counts once.
+  // +1 if the ray leaves through the triangle, -1 if it enters, 0 if it misses. A ray through an
+  // edge or vertex is displaced by an infinitesimal amount, identically for all triangles, so that
+  // each crossing counts once.
   int crossing(int triangle, const Vec3& o, const Shear& shear) const;
-  static const Vec3& way_out();  // direction in which inside() counts
+  static const Vec3& way_out();  // the direction in which inside() counts
 
   Vec3 normal(int triangle) const;  // unit, by the winding
   size_t size() const { return triangles_.size(); }
-  // Neighbours in the list that share an edge are one primitive of the trees: half the leaves.
-  // Primitive i holds the triangles from pairs()[i] up to pairs()[i + 1].
+  // Consecutive triangles that share an edge form one primitive of the trees, which halves the
+  // leaves. Primitive i holds the triangles from pairs()[i] up to pairs()[i + 1].
   const std::vector<int>& pairs() const { return pairs_; }
   Box pair_box(unsigned pair) const;
-  const Box& box() const { return box_; }  // grown by its margin()
+  const Box& box() const { return box_; }  // enlarged by its margin()
   bool closed() const { return closed_; }
   const std::vector<Vec3>& positions() const { return positions_; }
 
  private:
   struct Query;
-  // A triangle as a ray sees it: corners across and along the ray, and the edge functions.
+  // A triangle in the ray's sheared coordinates: vertices across and along the ray, and the edge
+  // functions.
   struct Seen {
     double ax, ay, az, bx, by, bz, cx, cy, cz, u, v, w;
     Seen(const Vec3& a, const Vec3& b, const Vec3& c, const Vec3& o, const Shear& s) {
@@ -117,7 +117,7 @@ inline void RayMesh::test(int triangle, unsigned lanes, const FrameRays& rays, F
     const int lane = std::countr_zero(rest);
     const Seen s = seen(triangle, rays.o[lane], rays.shear[lane]);
     if ((s.u < 0.0 || s.v < 0.0 || s.w < 0.0) && (s.u > 0.0 || s.v > 0.0 || s.w > 0.0)) continue;
-    if (s.u + s.v + s.w == 0.0) continue;  // edge on, or no area
+    if (s.u + s.v + s.w == 0.0) continue;  // edge-on, or degenerate
     const double t = s.t(rays.shear[lane]);
     if (t >= 0.0) found(lane, t);
   }

@@ -19,7 +19,7 @@ void MoverTree::build_nodes() {
   built_area_ = fit();
 }
 
-// Halves the movers by their centres along the longest side.
+// Splits the movers in half by their centres along the longest side.
 void MoverTree::split(int* first, int* last) {
   const size_t index = nodes_.size();
   nodes_.emplace_back();
@@ -45,7 +45,7 @@ void MoverTree::split(int* first, int* last) {
   split(middle, last);
 }
 
-// From the leaves up; returns the sum of the inner boxes' surfaces.
+// Bottom-up; returns the sum of the inner boxes' surfaces.
 double MoverTree::fit() {
   double area = 0.0;
   for (size_t i = nodes_.size(); i-- > 0;) {
@@ -65,7 +65,7 @@ double MoverTree::fit() {
 }
 
 void MoverTree::refit() {
-  // A tree whose neighbours have parted is rebuilt.
+  // A tree is rebuilt when its boxes have grown too much.
   if (fit() > 2.0 * built_area_) build_nodes();
 }
 

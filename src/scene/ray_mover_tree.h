@@ -1,8 +1,8 @@
-// The tree over the boxes of the movers: a binary tree of our own in double precision, because it
-// is brought up to date in a twentieth of the time that Embree takes (which builds user geometry
-// again, whatever quality is asked for).
+// The tree over the movers' boxes: our own binary tree in double precision, because refitting it
+// takes a twentieth of the time that Embree needs (which rebuilds user geometry, whatever quality
+// is requested).
 //
-// What it gives does not depend on its shape: every mover whose box a ray meets is visited.
+// Results do not depend on the tree's shape: every mover whose box a ray meets is visited.
 #pragma once
 
 #include <vector>
@@ -13,14 +13,14 @@ namespace ruedo::scene {
 
 class MoverTree {
  public:
-  // One box a mover, numbered from 0; an empty box is met by no ray.
+  // One box per mover, numbered from 0; no ray meets an empty box.
   void build(std::vector<Box> boxes);
   Box& box(size_t mover) { return boxes_[mover]; }
-  void refit();  // after boxes were changed
+  void refit();  // after boxes have changed
 
-  // Calls visit(mover, lanes, beam) for the movers whose boxes meet `beam`, the box around the
-  // pieces of these lanes (bits) up to t that lie within the box of all movers. Whether a lane
-  // meets the mover's own box is left to meeting().
+  // Calls visit(mover, lanes, beam) for movers whose boxes meet `beam`, the box around the segments
+  // of these lanes (bits) up to t inside the box of all movers. Whether a lane meets the mover's
+  // own box is tested by meeting().
   template <class Visit>
   void visit(unsigned lanes, const FrameRays& rays, const double* t, Visit visit) const;
 
@@ -47,7 +47,7 @@ class MoverTree {
 template <class Visit>
 void MoverTree::visit(unsigned lanes, const FrameRays& rays, const double* t, Visit visit) const {
   if (nodes_.empty()) return;
-  // Rays of one packet run side by side.
+  // Rays of one packet that run close together.
   const Box& root = nodes_[0].box;
   Box beam;
   unsigned within = 0;
@@ -67,7 +67,7 @@ void MoverTree::visit(unsigned lanes, const FrameRays& rays, const double* t, Vi
   }
   if (within == 0) return;
   beam.grow(root.rounding());
-  int stack[64];  // a tree of median splits is as deep as the binary logarithm of its leaves
+  int stack[64];  // median splits make the tree as deep as the binary logarithm of its leaves
   int depth = 0;
   stack[depth++] = 0;
   while (depth > 0) {

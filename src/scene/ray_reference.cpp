@@ -1,5 +1,5 @@
-// The slow caster that the fast one is held against: each ray against every shape, one after
-// another, without trees, packets, bounds or single precision.
+// The slow reference caster for tests: every ray against every shape, without trees, packets,
+// bounds or single precision.
 #include "scene/ray_static.h"
 
 namespace ruedo::scene {

@@ -1,5 +1,5 @@
-// The fast caster: trees find the boxes that a ray may run through, the tests in double decide.
-// Movers are one box a body, so that bringing a thousand robots up to date means a thousand boxes.
+// The fast caster: trees find candidate boxes, the tests in double precision decide. A mover has
+// one box per body, so that updating a thousand robots means updating a thousand boxes.
 #include "scene/ray_scene.h"
 
 #include "scene/ray_mover_tree.h"
@@ -125,8 +125,8 @@ void EmbreeRayScene::test_unbounded(const Mover& mover, unsigned lanes, RayBatch
   for (const int index : statics_->table.bodies[mover.body]) test_near(index, lanes, body, batch);
 }
 
-// Most packets that come near a mover start on it and pass over its wheels: the beam's box in the
-// body's frame says so for all lanes at once, before any ray is turned into that frame.
+// Most packets that come near a mover start on it and pass over its wheels: testing the beam's box
+// in the body's frame rejects all lanes at once, before any ray is transformed.
 void EmbreeRayScene::test_bounded(size_t bounded, unsigned lanes, const Box& beam,
                                   RayBatch& batch) const {
   const Mover& mover = bounded_[bounded];

@@ -1,8 +1,8 @@
-// Rays against the collision geometry: exact, in double precision, the same from every thread, for
-// single rays and packets alike.
+// Rays against collision geometry: exact, in double precision, with the same results from every
+// thread, and for single rays and packets alike.
 //
-// StaticRayScene holds what never moves and is shared by all; a RayScene adds the movers and
-// belongs to one module. Between update() calls, cast() is const and safe from many threads.
+// StaticRayScene holds what never moves and is shared; a RayScene adds the movers and belongs to
+// one module. Between update() calls, cast() is const and thread-safe.
 #pragma once
 
 #include <limits>
@@ -14,7 +14,7 @@
 
 namespace ruedo::scene {
 
-// A ray that is none (not finite, a direction that is no unit vector within 0.1 %) hits nothing.
+// An invalid ray (not finite, or a direction whose length is off by more than 0.1 %) hits nothing.
 struct Ray {
   Vec3 origin = Vec3::Zero();                                  // m, world
   Vec3 direction = Vec3::UnitX();                              // unit, world
@@ -22,21 +22,21 @@ struct Ray {
 };
 
 struct Hit {
-  double range = std::numeric_limits<double>::infinity();  // m; +inf: nothing; 0: the origin is
-                                                           // inside a closed shape
-  LinkIndex link;                                          // none: nothing
+  // m; +inf: no hit; 0: the origin is inside a closed shape
+  double range = std::numeric_limits<double>::infinity();
+  LinkIndex link;  // none: nothing
   int shape =
-      -1;  // index of the struck shape: collision of that link (or visual, as the scene is made)
+      -1;  // index of the shape hit: a collision of that link (or a visual, see StaticRayScene)
   Vec3 normal = Vec3::Zero();  // unit, world, towards the ray's origin
   bool hit() const { return link.valid(); }
 };
 
-// How a caster is made. `reference` is plain loops over the shapes in double precision, for tests.
+// `reference`: plain loops over the shapes in double precision, for tests.
 enum class Backend { embree, reference };
 
 class StaticRayScene;
 
-// world and layout must outlive the scene. `visuals` true: rays hit visuals instead of collisions.
+// world and layout must outlive the scene. visuals: rays hit visuals instead of collisions.
 std::shared_ptr<const StaticRayScene> make_static_ray_scene(const model::WorldModel& world,
                                                             const model::BodyLayout& layout,
                                                             bool visuals = false,
@@ -46,12 +46,12 @@ class RayScene {
  public:
   virtual ~RayScene() = default;
 
-  // Moves the movers to where the snapshot has them. Not safe while another thread casts.
+  // Moves the movers to their poses in the snapshot. Not safe while another thread casts.
   virtual void update(const Snapshot& snapshot) = 0;
 
-  // Casts rays[i] and writes hits[i]: the nearest hit, ties by the lowest link and shape.
-  // `ignored_link` is not seen: a sensor's own link.
-  // Faster for many rays near each other.
+  // Casts rays[i] and writes hits[i]: the nearest hit, with ties going to the lowest link and
+  // shape. `ignored_link` is invisible: a sensor's own link. Faster for rays that are close
+  // together.
   virtual void cast(std::span<const Ray> rays, std::span<Hit> hits,
                     LinkIndex ignored_link = {}) const = 0;
 

@@ -1,9 +1,9 @@
-// Exact tests of rays against the primitive shapes, in double precision and in the shape's own
+// Exact intersections of rays with the primitive shapes, in double precision and in the shape's own
 // frame.
 //
 // Every shape here is convex and solid: the part of a line inside it is one interval. A ray that
-// starts in the interval has range 0, one that starts before it has its lower end. Directions are
-// unit vectors.
+// starts in the interval has range 0; one that starts before it has the interval's lower end.
+// Directions are unit vectors.
 #pragma once
 
 #include <algorithm>
@@ -16,8 +16,8 @@ namespace ruedo::scene {
 
 inline constexpr double kNoHit = std::numeric_limits<double>::infinity();
 
-// Where a shape was struck; with the point it gives the normal. Triangles of a mesh have feature =
-// their index.
+// Where a shape was hit; together with the point it gives the normal. For triangles of a mesh,
+// `feature` is their index.
 enum Feature : int {
   kInside = -1,
   kSide = 0,
@@ -30,7 +30,7 @@ struct ShapeHit {
   int feature = kInside;
 };
 
-// The part of a line inside a solid, with the features where it enters; empty when enter > exit.
+// The part of a line inside a solid, with the feature where it enters; empty if enter > exit.
 struct Interval {
   double enter = -kNoHit, exit = kNoHit;
   int feature = kInside;
@@ -51,7 +51,7 @@ struct Interval {
 };
 
 // Between the planes at -half and +half of one axis. Features: low for the plane at -half, high for
-// +half.
+// the other one.
 inline Interval slab(double o, double d, double half, int low, int high) {
   if (d == 0.0) return std::abs(o) <= half ? Interval{} : Interval::none();
   const double inverse = 1.0 / d;
@@ -59,8 +59,8 @@ inline Interval slab(double o, double d, double half, int low, int high) {
   return d > 0.0 ? Interval{at_low, at_high, low} : Interval{at_high, at_low, high};
 }
 
-// Inside x^2 + y^2 + z^2 <= radius^2 for vectors of two or three components that are not zero in d.
-// The nearest point to the centre is taken first, so that distant origins lose no digits.
+// Inside x^2 + y^2 + z^2 <= radius^2, for vectors of two or three components; d must not be zero.
+// Starts from the point nearest to the centre, so that distant origins lose no digits.
 template <class Vector>
 Interval ball(const Vector& o, const Vector& d, double radius, int feature = kSide) {
   const double dd = d.squaredNorm();
@@ -107,13 +107,13 @@ inline ShapeHit intersect_cylinder(const Vec3& o, const Vec3& d, double radius,
   return inside.hit();
 }
 
-// A cylinder and two balls: where the line enters the first of the three, it enters the capsule.
+// A cylinder and two spheres: the line enters the capsule where it first enters one of them.
 inline ShapeHit intersect_capsule(const Vec3& o, const Vec3& d, double radius, double half_length) {
   const Vec3 end(0.0, 0.0, half_length);
   const ShapeHit wall = intersect_cylinder(o, d, radius, half_length);
   const ShapeHit top = ball<Vec3>(o - end, d, radius, kTop).hit();
   const ShapeHit bottom = ball<Vec3>(o + end, d, radius, kBottom).hit();
-  // The caps of the cylinder lie inside the balls, but for rounding; there the ball counts.
+  // The cylinder's caps lie inside the spheres except for rounding; the sphere counts there.
   ShapeHit first = bottom;
   if (top.t < first.t) first = top;
   if (wall.t < first.t) first = wall;
@@ -126,7 +126,7 @@ inline ShapeHit intersect_cone(const Vec3& origin, const Vec3& d, double radius,
   const double shift = -origin.dot(d);  // work from the point nearest to the centre
   const Vec3 o = origin + shift * d;
   const double slope = radius / (2.0 * half_length), slope2 = slope * slope;
-  const double below = half_length - o.z();  // below the apex; below - t d.z at t
+  const double below = half_length - o.z();  // of the apex; at t it is below - t d.z
   // Inside: x^2 + y^2 - (slope * below)^2 <= 0, that is a t^2 + 2 b t + c <= 0, in the lower half
   // only.
   const double a = d.x() * d.x() + d.y() * d.y() - slope2 * d.z() * d.z();
@@ -135,22 +135,22 @@ inline ShapeHit intersect_cone(const Vec3& origin, const Vec3& d, double radius,
   const double discriminant = b * b - a * c;
   if (a > 0.0 && discriminant < 0.0) return {};
   const double q = -(b + std::copysign(std::sqrt(std::max(discriminant, 0.0)),
-                                       b));  // no difference of like numbers
+                                       b));  // avoids cancellation
   Interval inside;
   inside.feature = kSide;
-  if (a > 0.0) {  // flatter than the wall: through one half, from wall to wall
+  if (a > 0.0) {  // flatter than the surface: crosses one half, from side to side
     const double t0 = q / a, t1 = q != 0.0 ? c / q : t0;
     inside.enter = std::min(t0, t1);
     inside.exit = std::max(t0, t1);
     if (below - 0.5 * (inside.enter + inside.exit) * d.z() < 0.0)
       return {};  // the half above the apex
-  } else {        // steeper: inside the lower half from the wall on downwards
+  } else {        // steeper: inside the lower half below the intersection
     double crossing;
     if (a < 0.0) {
       const double t0 = q / a, t1 = q != 0.0 ? c / q : t0;
       crossing = d.z() > 0.0 ? std::min(t0, t1) : std::max(t0, t1);
     } else {
-      if (!(b * d.z() > 0.0)) return {};  // parallel to the wall and below it nowhere
+      if (!(b * d.z() > 0.0)) return {};  // parallel to the surface and nowhere below it
       crossing = c / q;
     }
     (d.z() > 0.0 ? inside.exit : inside.enter) = crossing;
@@ -162,11 +162,12 @@ inline ShapeHit intersect_cone(const Vec3& origin, const Vec3& d, double radius,
   return inside.hit();
 }
 
-// The plane through the origin with that unit normal, seen from both sides; it has no inside.
+// The plane through the origin with that unit normal, visible from both sides; it has no inside.
 inline ShapeHit intersect_plane(const Vec3& o, const Vec3& d, const Vec3& normal) {
   const double t = -normal.dot(o) / normal.dot(d);
   return t >= 0.0 && t < kNoHit ? ShapeHit{t, kSide}
-                                : ShapeHit{};  // NaN: within the plane, which is not seen
+                                // NaN: the ray lies in the plane, which is invisible edge-on
+                                : ShapeHit{};
 }
 
 }  // namespace ruedo::scene

@@ -41,8 +41,8 @@ void StaticRayScene::cast(unsigned lanes, TreeQuery& query) const {
   tree_.cast(lanes, query);
 }
 
-// Triangles know nothing of an inside, so the closed meshes around a ray's origin are looked for on
-// their own: once for all rays that start there.
+// Triangles alone have no inside, so the closed meshes around a ray's origin are found separately:
+// once for all rays with the same origin.
 void StaticRayScene::cast_inside(unsigned lanes, TreeQuery& query) const {
   RayBatch& batch = query.batch;
   for (unsigned rest = lanes; rest != 0; rest &= rest - 1) {

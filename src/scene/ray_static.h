@@ -1,4 +1,4 @@
-// What ray scenes of all modules share: the table of shapes, the Embree device, and the tree of the
+// What all modules' ray scenes share: the table of shapes, the Embree device, and the tree over
 // static shapes. Internal to src/scene.
 #pragma once
 
@@ -7,35 +7,35 @@
 
 namespace ruedo::scene {
 
-// The context of a packet's run through a tree; lanes are found by the ray's id.
+// The context of a packet's traversal; rays carry their lane as id.
 struct TreeQuery : EmbreeContext {
   RayBatch batch;
   Packet packet;
   const void* owner = nullptr;        // for the callback
   const RayMesh* counting = nullptr;  // not null: count the signed crossings of this mesh instead
   Vec3 counting_from = Vec3::Zero();
-  Shear shear;  // of the way out
+  Shear shear;  // of the counting direction
   int crossings = 0;
 
   TreeQuery() { init_context(*this); }
 };
 
-// An Embree tree over boxes of our own, with a callback that tests what is in them, and over the
-// triangles of meshes that are given in the world's frame.
+// An Embree tree over our own boxes, with a callback that tests their contents, and over the
+// triangles of meshes given in the world's frame.
 class RayTree {
  public:
-  // Embree keeps its address.
+  // Not movable: Embree keeps its address.
   RayTree() = default;
   RayTree(const RayTree&) = delete;
   RayTree& operator=(const RayTree&) = delete;
 
-  // boxes: one a primitive. meshes: with their index in the table; they must outlive the tree.
+  // boxes: one per primitive. meshes: with their index in the table; they must outlive the tree.
   void build(RTCDevice device, std::vector<Box> boxes, RTCIntersectFunctionN callback,
              const std::vector<std::pair<int, const RayShape*>>& meshes = {});
 
   // Casts the lanes (bits) of query.batch.
   void cast(unsigned lanes, TreeQuery& query) const;
-  // Is the point inside that mesh, one of those given to build()? As RayMesh::inside.
+  // Whether the point is inside one of the meshes given to build(). As RayMesh::inside.
   bool inside(const RayMesh& mesh, const Vec3& point) const;
 
  private:
@@ -62,16 +62,17 @@ class StaticRayScene {
   StaticRayScene(const model::WorldModel& world, const model::BodyLayout& layout, bool visuals,
                  Backend backend);
 
-  const model::BodyLayout layout;  // its own: worlds that share it come and go
+  const model::BodyLayout layout;  // a copy: the worlds that share it come and go
   const Backend backend;
 
  private:
-  DevicePtr device_;  // before what is made with it
+  DevicePtr device_;  // declared before everything made with it
 
  public:
   const RayTable table;
   RTCDevice device() const { return device_.get(); }
-  bool has_meshes() const { return has_meshes_; }  // rays in the world's frame need their shear
+  // rays in the world's frame then need their shear
+  bool has_meshes() const { return has_meshes_; }
   // Static shapes, for the lanes (bits) of query.batch.
   void cast(unsigned lanes, TreeQuery& query) const;
 
@@ -89,7 +90,7 @@ class StaticRayScene {
 // Embree's limit on coordinates is 1.8e18.
 inline constexpr double kFarthest = 1e15;  // m
 
-// Is there a ray at all? Others hit nothing.
+// Whether the ray is valid. Others hit nothing.
 inline bool usable(const Ray& ray) {
   return ray.origin.cwiseAbs().maxCoeff() <= kFarthest && ray.origin.allFinite() &&
          ray.max_range >= 0.0 && std::abs(ray.direction.squaredNorm() - 1.0) <= 1e-3;

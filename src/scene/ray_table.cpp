@@ -30,7 +30,7 @@ Quat turned_to(const Vec3& n) {
   return Quat(1.0 + n.z(), -n.y(), n.x(), 0.0).normalized();
 }
 
-// Does turning about the axis through that point of the link leave the shape as it is?
+// Whether the shape is unchanged by rotation about the axis through that point of the link.
 bool round_about(const RayShape& shape, const Pose& X_LS, const Vec3& center_in_L,
                  const Vec3& axis_in_L) {
   const auto along_axis = [&](const Vec3& v) { return v.cross(axis_in_L).norm() <= 1e-9; };
@@ -44,7 +44,7 @@ bool round_about(const RayShape& shape, const Pose& X_LS, const Vec3& center_in_
   }
 }
 
-// As RayShape::size has it; a plane's and a mesh's is 0.
+// As RayShape::size defines it; 0 for a plane or mesh.
 Vec3 size_of(const model::Geometry& geometry) {
   const Vec3& s = geometry.size;
   switch (geometry.shape) {
@@ -60,7 +60,7 @@ Vec3 size_of(const model::Geometry& geometry) {
   return Vec3::Zero();
 }
 
-// Sets the box and the ball around the shape where it is now.
+// Computes the box and bounding sphere of the shape in its current place.
 void enclose(RayShape& shape, const Pose& X_FS) {
   if (shape.kind == Shape::mesh) {
     for (const Vec3& p : shape.mesh->positions()) shape.box_F.add(X_FS * p);
@@ -113,7 +113,7 @@ std::shared_ptr<const RayMesh> RayTable::mesh_of(const model::Geometry& geometry
 
 void RayTable::add_turning(RayShape& shape, const Pose& X_LS, const model::LinkPlacement& link,
                            const model::BodyLayout& layout) {
-  // Parts fixed to the wheel's own link turn about the same axis, seen from their frame.
+  // Parts fixed to the wheel's own link rotate about the same axis, expressed in their frame.
   const Pose& X_FL = link.X_BL;
   const model::WheelPlacement& wheel = layout.wheels[link.wheel];
   const Pose X_LWheel = X_FL.inverse() * layout.links[wheel.link].X_BL;
@@ -122,7 +122,7 @@ void RayTable::add_turning(RayShape& shape, const Pose& X_LS, const model::LinkP
   if (round_about(shape, X_LS, center_in_L, axis_in_L)) return;
   shape.turning = static_cast<int>(turning.size());
   turning.push_back({link.wheel, X_FL, X_LS, axis_in_L, center_in_L});
-  // The ball around all it sweeps: about the point of the axis that is nearest to its centre.
+  // The sphere around all it sweeps, centred at the point of the axis nearest to its centre.
   const Vec3 axis_in_F = X_FL.rotation * axis_in_L;
   const Vec3 center_in_F = X_FL * center_in_L;
   const Vec3 on_axis = center_in_F + axis_in_F * axis_in_F.dot(shape.center_F - center_in_F);
@@ -146,7 +146,7 @@ void RayTable::add(const model::LinkPlacement& link, LinkIndex link_index, int s
   shape.size = size_of(geometry);
   if (geometry.shape == Shape::plane) {
     shape.normal = geometry.normal.normalized();
-    if (visuals) {  // what is drawn is a rectangle: a box without height
+    if (visuals) {  // a drawn plane is a rectangle: a box without height
       shape.kind = Shape::box;
       shape.size = Vec3(0.5 * geometry.extent.x(), 0.5 * geometry.extent.y(), 0.0);
       X_LS = X_LS * Pose{turned_to(shape.normal), Vec3::Zero()};
@@ -156,12 +156,12 @@ void RayTable::add(const model::LinkPlacement& link, LinkIndex link_index, int s
   if (is_mesh) {
     const bool is_static = !link.body.valid();
     shape.mesh = mesh_of(geometry, is_static ? &X_FS : nullptr, device);
-    if (is_static) X_FS = Pose();  // it is given in the world's frame
+    if (is_static) X_FS = Pose();  // given in the world's frame already
   }
   shape.into = IntoShape(X_FS);
   enclose(shape, X_FS);
   if (link.wheel.valid() && shape.kind != Shape::plane) add_turning(shape, X_LS, link, layout);
-  shape.radius *= 1.0 + 1e-9;  // rounding of the test against it
+  shape.radius *= 1.0 + 1e-9;  // against rounding in the test
   const int index = static_cast<int>(shapes.size());
   (shape.body.valid() ? bodies[shape.body] : statics).push_back(index);
   shapes.push_back(std::move(shape));

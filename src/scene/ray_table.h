@@ -1,4 +1,4 @@
-// All shapes that rays can hit, ordered by link and shape, each with its place in the frame F that
+// All shapes that rays can hit, ordered by link and shape, each with its pose in the frame F that
 // carries it: the world for static links, the body's frame for movers. Built once and shared by all
 // backends.
 #pragma once
@@ -31,21 +31,22 @@ struct IntoShape {
 
 struct RayShape {
   model::Shape kind = model::Shape::box;
-  LinkIndex link;            // as in Hit
-  int shape = -1;            // likewise
-  BodyIndex body;            // none: static
-  int turning = -1;          // index into RayTable::turning: its place depends on a wheel's angle
-  IntoShape into;            // at wheel angle 0
-  Vec3 size = Vec3::Zero();  // box: half lengths; sphere, cylinder, capsule, cone: radius, half
-                             // length; ellipsoid: radii
+  LinkIndex link;  // as in Hit
+  int shape = -1;  // likewise
+  BodyIndex body;  // none: static
+  // index into RayTable::turning: its pose depends on a wheel's angle; -1: it does not
+  int turning = -1;
+  IntoShape into;               // at wheel angle 0
+  Vec3 size = Vec3::Zero();     // box: half lengths; sphere, cylinder, capsule, cone: radius, half
+                                // length; ellipsoid: radii
   Vec3 normal = Vec3::UnitZ();  // plane
   std::shared_ptr<const RayMesh> mesh;
-  Box box_F;                     // around the shape at every wheel angle; empty for a plane
-  Vec3 center_F = Vec3::Zero();  // ball around the same
+  Box box_F;                     // bounds at every wheel angle; empty for a plane
+  Vec3 center_F = Vec3::Zero();  // bounding sphere, likewise
   double radius = 0.0;
 };
 
-// A shape that is not round about its wheel's axis.
+// A shape that is not rotationally symmetric about its wheel's axis.
 struct TurningShape {
   WheelIndex wheel;
   Pose X_FL, X_LS;  // at angle 0
@@ -65,7 +66,7 @@ struct RayTable {
   std::vector<TurningShape> turning;
 
   // Meshes of static links are given in the world's frame, without a tree. Those of movers are
-  // shared and have one; device null: none.
+  // shared and have one; device null: no tree.
   RayTable(const model::WorldModel& world, const model::BodyLayout& layout, bool visuals,
            RTCDevice device);
 
@@ -73,10 +74,11 @@ struct RayTable {
   void add(const model::LinkPlacement& link, LinkIndex link_index, int shape_index,
            const Pose& X_LS, const model::Geometry& geometry, const model::BodyLayout& layout,
            bool visuals, RTCDevice device);
-  // With X_FS one of its own in frame F, without a tree; else one that others share.
+  // With X_FS: its own mesh in frame F, without a tree; otherwise a shared one.
   std::shared_ptr<const RayMesh> mesh_of(const model::Geometry& geometry, const Pose* X_FS,
                                          RTCDevice device);
-  // What a wheel moves: its place goes into `turning`, and its bounds hold all that it sweeps.
+  // Marks shapes moved by a wheel: they get an entry in `turning`, and bounds for all that they
+  // sweep.
   void add_turning(RayShape& shape, const Pose& X_LS, const model::LinkPlacement& link,
                    const model::BodyLayout& layout);
   std::map<std::tuple<const model::Mesh*, double, double, double>, std::shared_ptr<const RayMesh>>
@@ -93,13 +95,12 @@ struct RayBatch {
   int feature[kLanes];
   LinkIndex ignored_link;
 
-  // The last origin that the static closed meshes were asked about, and the first that it is inside
-  // of.
+  // The last origin tested against the static closed meshes, and the first mesh that contains it.
   bool asked_statics = false;
   Vec3 asked_at = Vec3::Zero();
   int inside_static = kNothing;
 
-  // Keeps the nearer hit; of equals the one of the lower shape and feature.
+  // Keeps the nearer hit; among equals that of the lower shape and feature.
   void offer(int lane, const ShapeHit& hit, int index) {
     if (hit.t < t[lane] ||
         (hit.t == t[lane] && hit.t < kNoHit &&
@@ -110,7 +111,7 @@ struct RayBatch {
     }
   }
 
-  // Whether a point is inside a closed mesh is asked again and again by the rays of one device.
+  // Caches whether a point is inside a closed mesh: the rays of one device ask again and again.
   bool inside_mesh(const RayShape& shape, int index, const Vec3& p_F, const Vec3& p_S);
 
  private:
@@ -130,7 +131,7 @@ void test_shape(const RayShape& shape, int index, const IntoShape& into, unsigne
 // Outward normal in the shape's frame at a point of its surface.
 Vec3 shape_normal(const RayShape& shape, int feature, const Vec3& p_S);
 
-// Does the ray come near the shape's ball?
+// Whether the ray comes near the shape's bounding sphere.
 inline bool near_ball(const RayShape& shape, const Vec3& o, const Vec3& d) {
   const Vec3 to_center = shape.center_F - o;
   const double along = to_center.dot(d);

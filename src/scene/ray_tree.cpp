@@ -1,4 +1,4 @@
-// Embree's side of the caster: which boxes and triangles a packet of rays may hit.
+// The Embree side of the caster: finds boxes and triangles that a packet of rays may hit.
 #include "scene/ray_static.h"
 
 namespace ruedo::scene {

@@ -10,13 +10,13 @@ namespace {
 
 using model::Rgba;
 
-// Segments around round shapes, seen near and from afar.
+// Segments of round shapes, close up and at a distance.
 constexpr int kSegments = 32, kFewSegments = 10;
 
-// A level plane of at least so many metres is taken for the ground.
+// A horizontal plane of at least this size in metres counts as the ground.
 constexpr double kGroundExtent = 20.0;
 
-// Builds the tables of a RenderContent; equal things get one entry.
+// Builds the tables of a RenderContent; equal things share an entry.
 class Builder {
  public:
   explicit Builder(RenderContent& content) : content_(content) {}
@@ -88,7 +88,7 @@ class Builder {
 
   int texture(const std::shared_ptr<const model::Texture>& texture) {
     if (!texture) return -1;
-    // Many materials name one file: it is uploaded once.
+    // Many materials may name the same file: it is uploaded once.
     for (size_t i = 0; i < content_.textures.size(); ++i) {
       const model::Texture& other = *content_.textures[i];
       if (&other == texture.get() || (!texture->path.empty() && other.path == texture->path))
@@ -161,11 +161,11 @@ class Builder {
   static void shade(const model::Material& material, const model::Visual& visual,
                     RenderPart& part) {
     part.diffuse = material.diffuse;
-    // Old worlds often give the ambient colour only.
+    // Old worlds often give only the ambient colour.
     const auto black = [](const Rgba& c) { return c[0] + c[1] + c[2] < 0.003f; };
     if (black(part.diffuse) && !black(material.ambient)) part.diffuse = material.ambient;
-    // Many files write the opacity 0 and mean 1 (COLLADA has two opposite conventions); what is to
-    // be invisible has SDF's transparency.
+    // Many files write opacity 0 where they mean 1 (COLLADA has two opposite conventions); things
+    // that are meant to be invisible have SDF's transparency.
     const float opacity = material.diffuse[3] < 0.004f ? 1.0f : material.diffuse[3];
     part.diffuse[3] =
         std::clamp(opacity * static_cast<float>(1.0 - visual.transparency), 0.0f, 1.0f);
@@ -178,7 +178,7 @@ class Builder {
 
   RenderContent& content_;
   std::map<std::tuple<const void*, int, double, double, int>, int>
-      meshes_;  // looked up only: its order shows nowhere
+      meshes_;  // only looked up, never iterated: its order is not defined
   std::map<Batch, int> batches_;
 };
 
@@ -206,7 +206,7 @@ Pose link_pose(const model::BodyLayout& layout, const Snapshot& snapshot, LinkIn
 
 namespace {
 
-// The class labels of a picture: 1 and on for what the world lists, 0 for the rest.
+// The labels of a picture: from 1 on for what the world lists, 0 for everything else.
 IndexedVector<LinkIndex, uint16_t> labels_of(const model::BodyLayout& layout) {
   IndexedVector<BodyIndex, size_t> label_of_body(layout.bodies.size());
   IndexedVector<LinkIndex, size_t> label_of_static(layout.links.size());
@@ -238,7 +238,7 @@ Bounds bounds_of(const RenderPart& part, const Pose& X_WL) {
   return bounds;
 }
 
-// A world without a light gets a high afternoon sun, so that something can be seen.
+// A world without a light gets a high afternoon sun, so that something is visible.
 model::Light afternoon_sun() {
   model::Light sun;
   sun.name = "default";
@@ -254,7 +254,7 @@ model::Light afternoon_sun() {
 RenderContent::RenderContent(const model::WorldModel& world, const model::BodyLayout& layout)
     : label_of_link(labels_of(layout)) {
   Builder builder(*this);
-  std::map<const model::Link*, RenderKindIndex> kinds;  // looked up only
+  std::map<const model::Link*, RenderKindIndex> kinds;  // only looked up, never iterated
   for (const LinkIndex i : layout.links.indices()) {
     const model::LinkPlacement& placement = layout.links[i];
     kind_of_link.emplace_back();

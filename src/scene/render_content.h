@@ -1,6 +1,6 @@
-// What there is to draw, worked out once from the world: meshes, surfaces, and for each kind of
-// link its parts. Plain data, without OpenGL. A thousand robots of one model share their parts; all
-// boxes of a world share a mesh.
+// What there is to draw, prepared once from the world: meshes, surfaces, and the parts of each kind
+// of link. Plain data, without OpenGL. A thousand robots of one model share their parts; all boxes
+// of a world share a mesh.
 #pragma once
 
 #include <cstdint>
@@ -19,16 +19,16 @@ using Affine = Eigen::Matrix<double, 3, 4>;  // [M | t]: p' = M p + t
 Affine to_affine(const Pose& pose);
 Affine compose(const Affine& a, const Affine& b);  // first b, then a
 
-// How a batch is shaded; a set of these picks the program and the culling.
+// Shading flags of a batch; a combination selects the program and face culling.
 enum BatchFlags : uint32_t {
   kTextured = 1,     // a texture multiplies the diffuse colour
   kSpecular = 2,     // has a highlight
-  kGround = 4,       // an untextured ground plane: grid, and fades out at its edge
+  kGround = 4,       // an untextured ground plane: has a grid and fades out at its edge
   kDoubleSided = 8,  // back faces are drawn
   kMirrored = 16,    // the scale has an odd number of negative factors: clockwise is outside
 };
 
-// Triangles that can be drawn in one call with many instances.
+// Triangles that one draw call can draw in many instances.
 struct Batch {
   int mesh = 0;
   uint32_t first_index = 0, index_count = 0;
@@ -37,13 +37,13 @@ struct Batch {
   friend auto operator<=>(const Batch&, const Batch&) = default;
 };
 
-// A piece of a visual, in the frame of its link.
+// A part of a visual, in the frame of its link.
 struct RenderPart {
   Affine M_LP;                   // from mesh coordinates to the link
   Vec3 centre_L = Vec3::Zero();  // bounding sphere
   double radius = 0.0;
   Vec3 low = Vec3::Zero(), high = Vec3::Zero();  // bounding box, in mesh coordinates
-  int batch = 0, small_batch = 0;  // indices into RenderContent::batches; small: for a distant view
+  int batch = 0, small_batch = 0;  // indices into RenderContent::batches; small: for distant views
   model::Rgba diffuse{}, specular{},
       emissive{};  // specular[3] is the shininess; diffuse[3] the opacity
   bool transparent = false;
@@ -56,7 +56,7 @@ struct RenderLinkKind {
   double radius = 0.0;
 };
 
-// A light and what carries it.
+// A light and the link that carries it.
 struct RenderLight {
   model::Light light;
   LinkIndex link;  // none: the world
@@ -73,7 +73,8 @@ struct RenderContent {
   IndexedVector<LinkIndex, uint16_t> label_of_link;
   std::vector<RenderLight> lights;
   Bounds bounds{Vec3::Constant(-3.0),
-                Vec3::Constant(3.0)};  // of all that is drawn at the start, but for the ground
+                // bounds of all that is drawn at the start, except the ground
+                Vec3::Constant(3.0)};
 
   RenderContent(const model::WorldModel& world, const model::BodyLayout& layout);
 
@@ -81,7 +82,7 @@ struct RenderContent {
   void find_bounds(const model::BodyLayout& layout);
 };
 
-// Where a link is in a snapshot, its wheel's turning included.
+// The pose of a link in a snapshot, including its wheel's rotation.
 Pose link_pose(const model::BodyLayout& layout, const Snapshot& snapshot, LinkIndex link);
 
 }  // namespace ruedo::scene

@@ -6,9 +6,9 @@
 namespace ruedo::scene {
 namespace {
 
-// Below so many pixels of radius a part is left out, or drawn from few triangles.
+// Parts with a smaller radius in pixels are left out, or drawn with few triangles.
 constexpr double kInvisiblePixels = 0.3, kSmallPixels = 14.0;
-// Round shapes below this radius in metres cast the shadow of few triangles.
+// Round shapes with a smaller radius in metres cast shadows as coarse shapes.
 constexpr double kCoarseShadowRadius = 0.25;
 
 }  // namespace
@@ -17,7 +17,7 @@ Region view_region(const View& view) {
   const auto& [rotation, eye] = view.X_WCamera;
   const Vec3 ahead = rotation * Vec3::UnitX(), left = rotation * Vec3::UnitY(),
              up = rotation * Vec3::UnitZ();
-  // Edges of the picture, half a pixel beyond the outermost pixel centres.
+  // The edges of the picture, half a pixel beyond the outermost pixel centres.
   const double l = (view.cx + 0.5) / view.fx, r = (view.width - 0.5 - view.cx) / view.fx;
   const double t = (view.cy + 0.5) / view.fy, b = (view.height - 0.5 - view.cy) / view.fy;
   Region region;
@@ -53,7 +53,7 @@ Culler::Culler(const model::BodyLayout& layout, const RenderContent& content)
     visible_links_.push_back(i);
     (is_static ? static_links_ : moving_links_).push_back(i);
   }
-  // Programs change least often, then textures; the ground last, as most of it is hidden by then.
+  // Sorted by program, then by texture; the ground last, as most of it is hidden by then.
   std::vector<int> order(content.batches.size());
   std::iota(order.begin(), order.end(), 0);
   const auto key = [&](int i) {
@@ -102,7 +102,7 @@ void Culler::collect(const Region& region, const Vec3& origin, double pixels_per
       const Vec3 centre = M.leftCols<3>() * part.centre_L + M.col(3);
       if (kind.parts.size() > 1 && !region.touches(centre, part.radius)) continue;
       const double distance = (centre - origin).norm();
-      // From the eye to the nearest point of the sphere; a parallel view has no distance.
+      // From the eye to the nearest point of the sphere; 0 in a parallel view.
       const double depth = orthographic ? 1.0 : std::max(distance - part.radius, 1e-3);
       const double pixels = pixels_per_radian > 0.0 ? part.radius * pixels_per_radian / depth : 1e9;
       if (pixels < kInvisiblePixels) continue;

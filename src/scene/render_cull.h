@@ -1,6 +1,6 @@
-// Which parts of the world a view sees, as runs of instances in the order in which they are drawn.
+// Finds the parts of the world that a view sees, as runs of instances in drawing order.
 //
-// Everything depends on the snapshot and the view alone, never on what was drawn before.
+// The result depends on the snapshot and the view alone, never on earlier pictures.
 #pragma once
 
 #include <cstdint>
@@ -14,7 +14,7 @@ namespace ruedo::scene {
 
 // One part to draw: the vertex attributes 3 to 9 of the shaders.
 struct Instance {
-  float rows[3][4];  // mesh coordinates to the world's axes around the eye
+  float rows[3][4];  // from mesh coordinates to the world's axes, relative to the eye
   model::Rgba diffuse, specular, emissive;
   uint32_t label;
   uint32_t padding[3];
@@ -27,13 +27,14 @@ struct Run {
 
 struct DrawList {
   std::vector<Instance> instances;
-  std::vector<Run> opaque;       // by batch, near ones first
-  std::vector<Run> transparent;  // far ones first
+  std::vector<Run> opaque;       // by batch, front to back
+  std::vector<Run> transparent;  // back to front
   std::vector<std::pair<Vec3, double>>
       spheres;  // collect_casters() only: bounds of the links, m, world
 };
 
-// A convex region of planes n.p + d >= 0, n pointing inwards, world coordinates.
+// A convex region bounded by planes n.p + d >= 0 with normals pointing inwards, in world
+// coordinates.
 struct Region {
   struct Plane {
     Vec3 normal;
@@ -54,14 +55,14 @@ enum class Movers { only_static, only_moving };
 
 class Culler {
  public:
-  // All must outlive it.
+  // The arguments must outlive it.
   Culler(const model::BodyLayout& layout, const RenderContent& content);
 
   void update(const Snapshot& snapshot);
   const Affine& link_pose(LinkIndex link) const { return M_WL_[link]; }
 
-  // Instances are relative to `origin`. pixels_per_radian: for leaving out what is smaller than a
-  // pixel and for coarser round shapes; 0: everything in full.
+  // Instances are relative to `origin`. pixels_per_radian: for dropping what is smaller than a
+  // pixel, and for coarser round shapes; 0: everything in full.
   void collect(const Region& region, const Vec3& origin, double pixels_per_radian,
                bool orthographic, DrawList& list);
   // What casts shadows in the region, relative to `origin`.
@@ -79,7 +80,7 @@ class Culler {
 
   const model::BodyLayout& layout_;
   const RenderContent& content_;
-  std::vector<int> rank_;  // of a batch: the drawing order
+  std::vector<int> rank_;  // drawing order of each batch
   IndexedVector<LinkIndex, Affine> M_WL_;
   std::vector<LinkIndex> visible_links_, moving_links_, static_links_;  // with something to draw
   std::vector<Item> opaque_, transparent_;

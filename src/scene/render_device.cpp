@@ -92,15 +92,15 @@ GLuint RenderDevice::compile(const std::string& vertex, const std::string& fragm
   const GLuint block = gl.GetUniformBlockIndex(program, "Frame");
   if (block != GL_INVALID_INDEX) gl.UniformBlockBinding(program, block, kFrameBinding);
   gl.UseProgram(program);
-  // Unit 0 is a part's texture, unit 1 the shadow map. Names that a program does not have are
-  // ignored.
+  // Unit 0 is a part's texture, unit 1 the shadow map. Uniforms that a program does not use are
+  // skipped.
   gl.Uniform1i(gl.GetUniformLocation(program, "surface"), 0);
   gl.Uniform1i(gl.GetUniformLocation(program, "shadow_map"), 1);
   return program;
 }
 
 GLuint RenderDevice::program(Pass pass, uint32_t flags, bool cutout) {
-  // Flags that do not change the program, and textures that a pass does not look at, share one.
+  // Batches that differ only in what a pass does not look at share an entry.
   uint32_t used = flags & (kTextured | kSpecular | kGround | kMirrored);
   if (pass != Pass::colour) used = cutout && pass == Pass::geometry ? uint32_t{kTextured} : 0u;
   const ProgramKey key{pass, used, cutout && (used & kTextured) != 0};
@@ -204,7 +204,7 @@ void RenderDevice::begin_colour(int width, int height, int samples) {
   gl.Viewport(0, 0, width, height);
   gl.DepthMask(GL_TRUE);
   const float far_depth = 0.0f;
-  gl.ClearBufferfv(GL_DEPTH, 0, &far_depth);  // colours need no clearing: the sky covers the rest
+  gl.ClearBufferfv(GL_DEPTH, 0, &far_depth);  // colours need no clearing: the sky fills the rest
   gl.Enable(GL_DEPTH_TEST);
   gl.DepthFunc(GL_GREATER);
   gl.Disable(GL_BLEND);
@@ -239,7 +239,7 @@ void RenderDevice::make_shadow_map(ShadowMap& map, int size) {
   gl.TexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MAG_FILTER, GL_LINEAR);
   gl.TexParameteri(GL_TEXTURE_2D, GL_TEXTURE_COMPARE_MODE, GL_COMPARE_REF_TO_TEXTURE);
   gl.TexParameteri(GL_TEXTURE_2D, GL_TEXTURE_COMPARE_FUNC, GL_LEQUAL);
-  // Outside of the map there is no shadow.
+  // No shadow outside the map.
   const float lit[4] = {1.0f, 1.0f, 1.0f, 1.0f};
   gl.TexParameteri(GL_TEXTURE_2D, GL_TEXTURE_WRAP_S, GL_CLAMP_TO_BORDER);
   gl.TexParameteri(GL_TEXTURE_2D, GL_TEXTURE_WRAP_T, GL_CLAMP_TO_BORDER);
@@ -254,7 +254,7 @@ void RenderDevice::make_shadow_map(ShadowMap& map, int size) {
 void RenderDevice::begin_still_shadow(int size) {
   if (still_shadow_.texture == 0) {
     make_shadow_map(still_shadow_, size);
-    make_shadow_map(shadow_, size);  // the later one stays bound to unit 1
+    make_shadow_map(shadow_, size);  // the one made last stays bound to unit 1
     gl.ActiveTexture(GL_TEXTURE0);
   }
   gl.BindFramebuffer(GL_FRAMEBUFFER, still_shadow_.framebuffer);
@@ -306,8 +306,8 @@ void RenderDevice::draw_run(Pass pass, const Run& run) {
   } else {
     gl.Enable(GL_CULL_FACE);
   }
-  // Rows go from the top, so that pictures need no turning: outside is clockwise in OpenGL's
-  // window.
+  // Rows run from the top, so that pictures need no flipping: outside faces are clockwise in
+  // OpenGL's window.
   gl.FrontFace((flags & kMirrored) != 0 ? GL_CCW : GL_CW);
   gl.BindVertexArray(meshes_[batch.mesh].vertex_array);
   const size_t at = run.first * sizeof(Instance);
@@ -346,7 +346,7 @@ void RenderDevice::draw_sky(const std::array<float, 21>& corners) {
   gl.BufferData(GL_ARRAY_BUFFER, sizeof corners, corners.data(), GL_STREAM_DRAW);
   gl.UseProgram(sky_program_);
   gl.Disable(GL_CULL_FACE);
-  gl.DepthFunc(GL_EQUAL);  // at depth 0, where nothing is
+  gl.DepthFunc(GL_EQUAL);  // depth 0 is where nothing was drawn
   gl.DepthMask(GL_FALSE);
   gl.DrawArrays(GL_TRIANGLES, 0, 3);
   gl.DepthMask(GL_TRUE);

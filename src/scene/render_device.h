@@ -1,5 +1,5 @@
-// The OpenGL side of the renderer: programs, uploaded meshes and textures, framebuffers, and the
-// draw calls. Its context must be current in the calling thread.
+// The OpenGL side of the renderer: programs, uploaded meshes and textures, framebuffers, draw
+// calls. Its context must be current in the calling thread.
 #pragma once
 
 #include <map>
@@ -17,7 +17,7 @@
 namespace ruedo::scene {
 
 struct PixelBox {
-  int x0 = 0, y0 = 0, x1 = 0, y1 = 0;  // the upper bounds are outside
+  int x0 = 0, y0 = 0, x1 = 0, y1 = 0;  // the upper bounds are exclusive
   bool empty() const { return x1 <= x0 || y1 <= y0; }
 };
 
@@ -33,29 +33,27 @@ class RenderDevice {
 
   void set_frame(const FrameBlock& frame);
 
-  // Where the following draws go, cleared: a colour picture (`samples` above 1: smoothed edges),
-  // labels, or the shadow map. Depths run from 1 at the near plane to 0 at the far one, but in the
-  // shadow map.
+  // Selects and clears the target of the following draws: a colour picture (`samples` above 1:
+  // antialiased), labels, or the shadow map. Depth runs from 1 at the near plane to 0 at the far
+  // plane, except in the shadow map.
   void begin_colour(int width, int height, int samples);
   void begin_geometry(int width, int height);
-  // Shadow maps are square, of `size` texels: that of what stands still is kept, and the one in use
-  // is it with the movers drawn over. `stale`: where the one in use has to be taken from the other
-  // first.
+  // Shadow maps are squares of `size` texels. One holds static casters and is kept; the one in use
+  // is a copy with the movers drawn on top. `stale`: the area to be copied anew first.
   void begin_still_shadow(int size);
   void begin_shadow(int size, const PixelBox& stale);
 
   void draw(Pass pass, const std::vector<Instance>& instances, std::span<const Run> opaque,
             std::span<const Run> transparent = {});
-  // Fills what nothing was drawn on; corners are three clip positions and world directions, 7
-  // floats each.
+  // Fills the background. Each corner has a clip position and a world direction, 7 floats.
   void draw_sky(const std::array<float, 21>& corners);
-  // Triangles of 8 floats a corner, over the picture where nothing hides them: clip position and
-  // colour.
+  // Draws triangles over the picture where nothing hides them. Each corner has a clip position and
+  // a colour, 8 floats.
   void draw_overlay(const std::vector<float>& vertices);
 
   // Rows from the top, of the last begin_colour() or begin_geometry().
   void read_rgb(uint8_t* rgb);
-  void read_depth(float* depth);  // as OpenGL stores it
+  void read_depth(float* depth);  // as stored by OpenGL
   void read_labels(uint16_t* labels);
 
  private:

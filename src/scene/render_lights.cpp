@@ -15,7 +15,7 @@ Vec4 vec4(const Vec3& v, double w) {
           static_cast<float>(w)};
 }
 
-// A displayed colour as light: the square (see the shaders' curve).
+// Converts a displayed colour to light: its square (see the shaders' curve).
 Vec4 as_light(const model::Rgba& c, float factor) {
   return {factor * c[0] * c[0], factor * c[1] * c[1], factor * c[2] * c[2], 0.0f};
 }
@@ -26,7 +26,7 @@ Vec4 light_colour(const model::Light& light) {
           light.type == model::Light::Type::spot ? 1.0f : 0.0f};
 }
 
-// Shadows reach so far around a camera that stands among the things, m.
+// Range of shadows around a camera among the things, m.
 constexpr double kShadowReach = 20.0;
 
 }  // namespace
@@ -47,7 +47,7 @@ RenderLights::RenderLights(const model::WorldModel& world, const RenderContent& 
     const size_t limit = &list == &suns_ ? kMaxDirectionalLights : kMaxLocalLights;
     if (list.size() < limit) list.push_back(&light);
   }
-  // The first sun that casts shadows is the one with a shadow map.
+  // The first sun that casts shadows gets the shadow map.
   std::stable_partition(suns_.begin(), suns_.end(),
                         [](const RenderLight* l) { return l->light.cast_shadows; });
   counts_.suns = static_cast<int>(suns_.size());
@@ -58,7 +58,7 @@ RenderLights::RenderLights(const model::WorldModel& world, const RenderContent& 
 void RenderLights::fill(const Culler& culler, const View& view, FrameBlock& frame) {
   const Vec3 eye = view.X_WCamera.translation;
   const model::Sky& sky = world_.sky;
-  // Light from the sky is stronger than what the ground throws back.
+  // Light from the sky is stronger than light reflected by the ground.
   frame.ambient_up = as_light(sky.ambient, 1.9f);
   frame.ambient_down = as_light(sky.ambient, 0.9f);
   if (sky.sky) {
@@ -81,8 +81,7 @@ void RenderLights::fill(const Culler& culler, const View& view, FrameBlock& fram
       place_shadow(to_sun, view);
       Eigen::Map<Eigen::Matrix4f>(frame.shadow_from_world.data()) =
           shadow_.map_from_world(eye).cast<float>();
-      // Surfaces are looked up a texel and a half before them, so that they do not shade
-      // themselves.
+      // Lookups are offset by a texel and a half, so that surfaces do not shadow themselves.
       frame.origin[3] = static_cast<float>(1.5 * 2.0 * shadow_.half / ShadowRegion::kSize);
     }
   }
@@ -100,7 +99,7 @@ void RenderLights::fill(const Culler& culler, const View& view, FrameBlock& fram
 }
 
 void RenderLights::place_shadow(const Vec3& to_sun, const View& view) {
-  // The whole world where it is small or seen from outside, else the surroundings of the camera.
+  // The whole world if it is small or seen from outside, otherwise the camera's surroundings.
   const Vec3 eye = view.X_WCamera.translation;
   const Vec3 middle = 0.5 * (content_.bounds.low + content_.bounds.high);
   const double whole = std::max(0.5 * (content_.bounds.high - content_.bounds.low).norm(), 1.0);
@@ -116,13 +115,13 @@ void RenderLights::place_shadow(const Vec3& to_sun, const View& view) {
       (std::abs(to_sun.z()) > 0.99 ? Vec3::UnitX() : Vec3::UnitZ()).cross(to_sun).normalized();
   const Vec3 up = to_sun.cross(right);
   if (half < whole) {
-    // In steps of a few metres, so that shadows' edges do not swim as the camera moves.
+    // Snapped to a grid of a few metres, so that shadow edges do not swim as the camera moves.
     const double step = 0.2 * half;
     centre = right * step * std::round(centre.dot(right) / step) +
              up * step * std::round(centre.dot(up) / step) +
              to_sun * step * std::round(centre.dot(to_sun) / step);
   }
-  const double reach = half + whole;  // along the rays: casters far above count too
+  const double reach = half + whole;  // along the rays: casters far above count, too
   shadow_.centre = centre;
   shadow_.right = right;
   shadow_.up = up;

@@ -10,14 +10,14 @@
 
 namespace ruedo::scene {
 
-// Where the first sun's shadows are worked out: a box along its rays.
+// The region with shadows from the first sun: a box along its rays.
 struct ShadowRegion {
-  static constexpr int kSize = 2048;  // texels a side of the shadow map
+  static constexpr int kSize = 2048;  // side of the shadow map in texels
   Region region;
   Vec3 centre = Vec3::Zero();                                              // m, world
   Vec3 right = Vec3::UnitX(), up = Vec3::UnitY(), to_sun = Vec3::UnitZ();  // its axes
-  double half = 1.0;                                                       // m, half a side
-  double reach = 1.0;  // m, half its length along the rays
+  double half = 1.0;   // m, half the side length
+  double reach = 1.0;  // m, half the length along the rays
 
   // From world coordinates relative to `origin` to the map: x and y in [-1, 1], depth in [0, 1].
   Eigen::Matrix4d map_from_world(const Vec3& origin) const;
@@ -34,7 +34,7 @@ class RenderLights {
 
   const LightCounts& counts() const { return counts_; }
 
-  // Writes all of the frame that is about light. The culler has the links' poses.
+  // Writes everything in the frame that concerns light. The culler supplies the links' poses.
   void fill(const Culler& culler, const View& view, FrameBlock& frame);
   const ShadowRegion& shadow() const { return shadow_; }  // of the last fill()
 

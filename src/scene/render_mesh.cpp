@@ -11,8 +11,8 @@ namespace {
 using Eigen::Vector2f;
 using Eigen::Vector3f;
 
-// Pieces of mesh files have at most so many triangles: small enough for culling to pay, large
-// enough that the draw calls do not cost more than they save.
+// Maximum triangles of a piece of a mesh file: small enough for culling to pay off, large enough
+// that draw calls do not cost more than it saves.
 constexpr uint32_t kPieceTriangles = 4000;
 
 void bound(const RenderMesh& mesh, RenderMesh::Piece& piece) {
@@ -50,7 +50,7 @@ struct Ring {
 void revolve(RenderMesh& mesh, const std::vector<Ring>& rings, int segments) {
   const auto first = static_cast<uint32_t>(mesh.vertices.size());
   const auto row =
-      static_cast<uint32_t>(segments + 1);  // the seam twice, for its texture coordinates
+      static_cast<uint32_t>(segments + 1);  // the seam is doubled for its texture coordinates
   for (const Ring& ring : rings) {
     for (int i = 0; i <= segments; ++i) {
       const double angle = 2.0 * M_PI * (i % segments) / segments;
@@ -63,7 +63,7 @@ void revolve(RenderMesh& mesh, const std::vector<Ring>& rings, int segments) {
   for (uint32_t r = 0; r + 1 < rings.size(); ++r) {
     for (uint32_t i = 0; i + 1 < row; ++i) {
       const uint32_t a = first + r * row + i, b = a + 1, c = b + row, d = a + row;
-      // A ring of radius 0 is a point: one of the two triangles has no area.
+      // A ring of radius 0 is a point: one of the two triangles is degenerate.
       if (rings[r].radius > 0.0f) mesh.indices.insert(mesh.indices.end(), {a, b, c});
       if (rings[r + 1].radius > 0.0f) mesh.indices.insert(mesh.indices.end(), {a, c, d});
     }
@@ -146,7 +146,7 @@ RenderMesh cylinder_mesh(int segments) {
 
 RenderMesh cone_mesh(int segments) {
   RenderMesh mesh;
-  const float slope = std::sqrt(0.5f);  // radius 1 over length 1; the scaled normal stays right
+  const float slope = std::sqrt(0.5f);  // radius 1 and length 1; normals stay correct when scaled
   revolve(mesh, {{-0.5f, 1.0f, slope, slope, 0.0f}, {0.5f, 0.0f, slope, slope, 1.0f}}, segments);
   disc(mesh, -0.5f, 1.0f, false, segments);
   return finish(std::move(mesh));
@@ -171,7 +171,7 @@ Vector3f centroid3(const model::Mesh& mesh, const Triangle& t) {
   return mesh.positions[t[0]] + mesh.positions[t[1]] + mesh.positions[t[2]];
 }
 
-// Halves the triangles along their longest axis until each part is a piece; [begin, end) get
+// Splits the triangles along their longest axis until each part is small enough; [begin, end) is
 // reordered.
 void cut(const model::Mesh& mesh, std::vector<Triangle>& triangles, size_t begin, size_t end,
          std::vector<std::pair<size_t, size_t>>& parts) {
@@ -190,7 +190,8 @@ void cut(const model::Mesh& mesh, std::vector<Triangle>& triangles, size_t begin
   const size_t middle = begin + (end - begin) / 2;
   const auto less = [&](const Triangle& a, const Triangle& b) {
     const float ca = centroid3(mesh, a)[axis], cb = centroid3(mesh, b)[axis];
-    return ca != cb ? ca < cb : a < b;  // a total order: the same pieces with every library
+    // a total order gives the same pieces with every standard library
+    return ca != cb ? ca < cb : a < b;
   };
   std::nth_element(triangles.begin() + static_cast<long>(begin),
                    triangles.begin() + static_cast<long>(middle),

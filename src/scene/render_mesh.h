@@ -1,5 +1,5 @@
-// Triangles as the renderer uploads them: primitives tessellated at unit size, and mesh files cut
-// into pieces that can be culled one by one.
+// Triangles as uploaded by the renderer: tessellated unit primitives, and mesh files cut into
+// pieces that are culled individually.
 #pragma once
 
 #include <cstdint>
@@ -17,7 +17,7 @@ struct RenderVertex {
 };
 
 struct RenderMesh {
-  // A run of triangles of one material, small enough to be worth culling by its bounding sphere.
+  // A run of triangles of one material, small enough to be culled by its bounding sphere.
   struct Piece {
     uint32_t first_index = 0, index_count = 0;
     int material = -1;           // index into the model::Mesh's materials; -1: none
@@ -40,8 +40,8 @@ RenderMesh cone_mesh(int segments);      // radius 1, length 1, apex up
 RenderMesh capsule_mesh(double radius, double length,
                         int segments);  // length of the cylindrical part
 
-// A mesh file's triangles; flat normals where it has none. Triangles that name a vertex it does not
-// have are left out.
+// The triangles of a mesh file; flat normals if it has none. Triangles with invalid vertex indices
+// are dropped.
 RenderMesh file_mesh(const model::Mesh& mesh);
 
 }  // namespace ruedo::scene

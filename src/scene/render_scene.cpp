@@ -19,7 +19,7 @@ std::array<float, 16> to_floats(const Matrix4& m) {
   return out;
 }
 
-// The camera's axes right, down, ahead as rows: world directions to the optical frame.
+// The camera's axes right, down and forward as rows: world directions to the optical frame.
 Eigen::Matrix3d optical_from_world(const View& view) {
   const Eigen::Matrix3d R = view.X_WCamera.rotation.toRotationMatrix();
   Eigen::Matrix3d rows;
@@ -27,7 +27,7 @@ Eigen::Matrix3d optical_from_world(const View& view) {
   return rows;
 }
 
-// Depth is near / Z in perspective (a little less, so that the far plane is at 0), linear in a
+// Depth is near / Z in perspective (slightly less, so that the far plane is at 0), and linear in a
 // parallel view: floats keep their precision at both ends.
 struct DepthCurve {
   double a, b;  // perspective: d = a + b / Z; parallel: d = a + b Z
@@ -40,7 +40,7 @@ struct DepthCurve {
 
 Matrix4 clip_from_world(const View& v) {
   const DepthCurve depth(v);
-  // OpenGL counts pixels from their corners: half a pixel more. Rows count downwards in both, as
+  // OpenGL counts pixels from their corners, half a pixel more. Rows run downwards in both, as
   // pictures are drawn upside down.
   const double sx = 2.0 * v.fx / v.width, sy = 2.0 * v.fy / v.height;
   const double ox = 2.0 * (v.cx + 0.5) / v.width - 1.0, oy = 2.0 * (v.cy + 0.5) / v.height - 1.0;
@@ -125,9 +125,9 @@ class GlRenderer : public Renderer {
                     static_cast<float>(view.exposure), 0.0f};
   }
 
-  // The map of what stands still is drawn once for each place of the region, and the movers each
-  // time. Both are worked out around the region's centre, not the eye: what was drawn before must
-  // not show.
+  // The static map is drawn once for each position of the region, the movers for each picture. Both
+  // are computed relative to the region's centre, not the eye: earlier pictures must leave no
+  // trace.
   void draw_shadows() {
     if (!lights_.counts().shadow) return;
     const ShadowRegion& shadow = lights_.shadow();
@@ -189,7 +189,7 @@ class GlRenderer : public Renderer {
   }
 
   void add_corner(Eigen::Vector4d corner, const std::array<float, 4>& rgba) {
-    corner.z() += 1e-4 * std::abs(corner.z());  // before the surface that it lies on
+    corner.z() += 1e-4 * std::abs(corner.z());  // in front of the surface that it lies on
     for (int i = 0; i < 4; ++i) overlay_.push_back(static_cast<float>(corner[i]));
     overlay_.insert(overlay_.end(), rgba.begin(), rgba.end());
   }
@@ -202,7 +202,8 @@ class GlRenderer : public Renderer {
     }
   }
 
-  // Lines as ribbons that face the viewer, so that their width is in pixels with every driver.
+  // Lines as ribbons facing the viewer, so that their width in pixels is the same with every
+  // driver.
   void add_lines(const View& view, std::span<const Line> lines) {
     const Matrix4 M = clip_from_world(view);
     for (const Line& line : lines) {
@@ -211,7 +212,7 @@ class GlRenderer : public Renderer {
       b << line.to - view.X_WCamera.translation, 1.0;
       a = M * a;
       b = M * b;
-      if (!view.orthographic) {  // cut at the near plane
+      if (!view.orthographic) {  // clipped at the near plane
         if (a.w() < view.near_m && b.w() < view.near_m) continue;
         if (a.w() < view.near_m) a += (b - a) * ((view.near_m - a.w()) / (b.w() - a.w()));
         if (b.w() < view.near_m) b += (a - b) * ((view.near_m - b.w()) / (a.w() - b.w()));
@@ -248,9 +249,9 @@ class GlRenderer : public Renderer {
   std::string description_;
   DrawList visible_, casters_;
   std::vector<float> overlay_;
-  ShadowRegion shadow_place_;  // of the kept shadow map
+  ShadowRegion shadow_place_;  // region of the kept shadow map
   bool shadow_drawn_ = false;
-  PixelBox stale_;  // where movers are in the shadow map in use
+  PixelBox stale_;  // where the shadow map in use contains movers
 };
 
 }  // namespace

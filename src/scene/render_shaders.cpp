@@ -30,8 +30,8 @@ layout(std140) uniform Frame {
   return s;
 }
 
-// Displayed values are the square roots of light: near enough to sRGB's curve, and cheap. Colours
-// of files are displayed values.
+// Displayed values are the square roots of light: close enough to sRGB's curve, and cheap. Colours
+// in files are displayed values.
 constexpr const char* kCurve = R"(
 vec3 to_light(vec3 c) { return c * c; }
 vec3 to_display(vec3 light) { return sqrt(light); }
@@ -47,7 +47,7 @@ vec3 sky(vec3 direction) {
 
 constexpr const char* kSurface = "in vec2 v_uv;\nuniform sampler2D surface;\n";
 
-// Lines of one metre, fading where they would be finer than a pixel.
+// Grid lines of one metre, fading where they would be finer than a pixel.
 constexpr const char* kGrid = R"(
   vec2 grid = v_position.xy + origin.xy;
   vec2 width = fwidth(grid);
@@ -85,7 +85,7 @@ constexpr const char* kLamp = R"(    vec3 way = lamp_position[i].xyz - v_positio
     light += strength * lamp_colour[i].rgb;
 )";
 
-// What the labels of things are drawn with.
+// Draws the labels of things.
 std::string label_shader(uint32_t flags, bool cutout, const LightCounts& lights) {
   std::string s = head(lights);
   if ((flags & kTextured) != 0) s += kSurface;
@@ -106,7 +106,7 @@ std::string colour_declarations(uint32_t flags, const LightCounts& lights) {
   return s + "layout(location = 0) out vec4 o_colour;\n";
 }
 
-// `light`, and `shine` of what is specular: ambient light, suns and lamps.
+// Computes `light`, and `shine` for specular surfaces, from ambient light, suns and lamps.
 std::string lighting(bool specular, bool shadow) {
   const auto highlight = [&](const std::string& colour) {
     return specular ? "    shine += " + colour +
@@ -161,8 +161,8 @@ void main() {
   if ((flags & kTextured) != 0) s += "  v_uv = a_uv;\n";
   if (pass == Pass::geometry) s += "  v_label = a_label;\n";
   if (pass == Pass::colour) {
-    // The cofactor matrix turns normals as the inverse transpose does, also for flat and mirrored
-    // scales.
+    // The cofactor matrix transforms normals like the inverse transpose, and also works for flat
+    // and mirrored scales.
     s += R"(
   v_position = position;
   vec3 c0 = cross(a_row1.xyz, a_row2.xyz), c1 = cross(a_row2.xyz, a_row0.xyz), c2 = cross(a_row0.xyz, a_row1.xyz);
@@ -193,7 +193,7 @@ std::string fragment_shader(Pass pass, uint32_t flags, bool cutout, const LightC
   }
   if (ground) s += kGrid;
   s += lighting(specular, lights.shadow);
-  // Light beyond what a picture can show is bent in softly.
+  // Compresses light beyond the displayable range softly.
   s += R"(
   vec3 over = max(light - 0.8, vec3(0.0));
   light = min(light, vec3(0.8)) + over / (1.0 + over);

@@ -1,4 +1,4 @@
-// The GLSL programs of the renderer, and the block of numbers that a frame gives to all of them.
+// The renderer's GLSL programs, and the uniform block that a frame gives to all of them.
 #pragma once
 
 #include <array>
@@ -7,14 +7,14 @@
 
 namespace ruedo::scene {
 
-// Lights beyond so many are left out, in file order.
+// Further lights are ignored, in file order.
 constexpr int kMaxDirectionalLights = 2, kMaxLocalLights = 8;
 
-// The uniform block Frame, in std140's layout. Positions are relative to the camera, axes are the
-// world's.
+// The uniform block Frame, in std140 layout. Positions are relative to the camera, with the world's
+// axes.
 struct FrameBlock {
   using Vec4 = std::array<float, 4>;
-  std::array<float, 16> clip_from_world;  // column by column
+  std::array<float, 16> clip_from_world;  // column-major
   std::array<float, 16> shadow_from_world;
   Vec4 eye;     // towards the eye: eye.xyz - eye.w * position
   Vec4 origin;  // xy: the camera's position modulo the ground grid, m; z: exposure; w: shadow bias,
@@ -31,7 +31,7 @@ struct FrameBlock {
 
 enum class Pass { colour, geometry, shadow };
 
-// How many lights a world has; fixed in the programs.
+// The number of lights in a world; constant in the programs.
 struct LightCounts {
   int suns = 0, lamps = 0;
   bool shadow = false;  // suns[0] has a shadow map

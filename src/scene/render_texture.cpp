@@ -15,9 +15,9 @@
 namespace ruedo::scene {
 namespace {
 
-// Larger pictures are reduced: finer than any camera sees, and slow to draw from.
+// Larger pictures are downscaled: they are finer than any camera can see, and slow to sample.
 constexpr int kMaxSide = 2048;
-constexpr int kMostPixels = 16384;  // each way; a larger one is not decoded
+constexpr int kMostPixels = 16384;  // width and height; larger pictures are not decoded
 
 cv::Mat to_rgba(cv::Mat image) {
   if (image.depth() == CV_16U) image.convertTo(image, CV_8U, 1.0 / 257.0);
@@ -38,8 +38,8 @@ std::vector<uint8_t> read_bytes(const std::string& path) {
   return {std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
 }
 
-// libpng complains on stderr of colour profiles that many programs write, and that are not used
-// here.
+// Removes colour profiles, which are not used here: libpng complains on stderr about those of many
+// programs.
 void remove_png_profile(std::vector<uint8_t>& bytes) {
   constexpr std::string_view kSignature = "\x89PNG\r\n\x1a\n";
   const auto text = [&](size_t at, size_t length) {

@@ -1,4 +1,4 @@
-// Decodes the pictures that materials name.
+// Decodes the pictures named by materials.
 #pragma once
 
 #include <cstdint>
@@ -10,11 +10,11 @@ namespace ruedo::scene {
 
 struct TexturePixels {
   int width = 0, height = 0;  // 0: missing, broken or of a kind that cannot be read
-  bool holes = false;         // parts of it are transparent: drawn as cut out
-  std::vector<uint8_t> rgba;  // rows from the bottom, as OpenGL counts
+  bool holes = false;         // partly transparent: drawn as a cutout
+  std::vector<uint8_t> rgba;  // rows from the bottom, as in OpenGL
 };
 
-// Never throws: a texture that cannot be had is empty, and its surface gets its plain colour.
+// Never throws: a texture that cannot be loaded is empty, and its surface keeps its plain colour.
 TexturePixels decode_texture(const model::Texture& texture);
 
 }  // namespace ruedo::scene
