@@ -20,7 +20,7 @@ Air air_at(const model::Environment& environment, double altitude) {
   const double h =
       std::clamp(kEarthRadius * altitude / (kEarthRadius + altitude), kLowest, kHighest);
   const double troposphere = std::min(h, kTropopause), gradient = environment.temperature_gradient;
-  // A gradient that an author gave may cool the air to nothing below the tropopause.
+  // With a gradient from a file, the temperature may reach zero below the tropopause.
   const double temperature = std::max(environment.temperature + gradient * troposphere, 1.0);
   double pressure = environment.pressure;
   if (gradient == 0.0) {

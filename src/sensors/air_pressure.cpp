@@ -1,6 +1,6 @@
-// A barometer: the pressure of the air at the device, on ROBOT/BAROMETER, by the standard
-// atmosphere (air.h). Its height above sea level is its z in the world above <reference_altitude>,
-// without one above the world's elevation. The flow about the robot does not change it.
+// A barometer: the air pressure at the device, on ROBOT/BAROMETER, by the standard atmosphere
+// (air.h). Its height above sea level is its z in the world plus <reference_altitude>, or plus the
+// world's elevation if there is none. The flow around the robot has no effect.
 #include "ruedo/air_pressure_t.hpp"
 #include "ruedo/bound.h"
 #include "sensors/air.h"
@@ -38,7 +38,7 @@ class AirPressure : public SensorOf<AirPressure> {
   Bound<const model::Environment> environment_;
   Mount mount_;
   Noises<1> noises_;
-  double origin_m_ = 0.0;  // above sea level, of the world's z = 0
+  double origin_m_ = 0.0;  // of the world's z = 0, above sea level
   int channel_;
 };
 

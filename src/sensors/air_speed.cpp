@@ -1,7 +1,6 @@
-// A Pitot tube: the differential pressure rho v |v| / 2 of the air that comes along the device's x
-// axis at v, and the temperature of the air, on ROBOT/AIRSPEED. Density and temperature are those
-// of the standard atmosphere at its height (air.h). The air moves with the
-// world's wind (robot/wind.h), the same everywhere.
+// A Pitot tube: the differential pressure rho v |v| / 2 of air flowing along the device's x axis at
+// v, and the air temperature, on ROBOT/AIRSPEED. Density and temperature follow the standard
+// atmosphere (air.h). The air moves with the world's wind (robot/wind.h).
 #include <cmath>
 #include "ruedo/bound.h"
 
@@ -12,7 +11,7 @@
 namespace ruedo {
 namespace {
 
-// gz-sim reads <pressure>, SDF's page has <airspeed>.
+// gz-sim reads <pressure>; SDF's documentation has <airspeed>.
 std::array<std::string, 1> noise_path(const SensorSetup& setup) {
   const bool older = setup.element.has("air_speed/airspeed/noise") &&
                      !setup.element.has("air_speed/pressure/noise");

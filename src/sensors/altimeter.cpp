@@ -1,4 +1,5 @@
-// An altimeter: height above the start and vertical speed of the device, on ROBOT/ALTIMETER.
+// An altimeter: vertical distance from the start and vertical speed of the device, on
+// ROBOT/ALTIMETER.
 #include "ruedo/altimeter_t.hpp"
 #include "sensors/mount.h"
 

@@ -26,7 +26,7 @@ class BodyPose : public SensorOf<BodyPose> {
 
   bool observes() const override { return true; }
 
-  // The acceleration of the device is the change of its velocity over the last step.
+  // The device's acceleration is the change of its velocity over the last step.
   void observe(const Snapshot& now, Outbox&) override {
     const Vec3 velocity = mount_.twist(now).linear;
     if (time_ >= 0 && now.time > time_)
@@ -72,9 +72,9 @@ class BodyPose : public SensorOf<BodyPose> {
 
  private:
   Mount mount_;
-  Noises<6> noises_;  // of the velocity, of the turn rate
+  Noises<6> noises_;  // linear velocity, then angular velocity
   int channel_;
-  bool flat_ = false;  // x, y and heading alone
+  bool flat_ = false;  // only x, y and heading
   SimTime time_ = -1;
   Vec3 velocity_ = Vec3::Zero(), acceleration_ = Vec3::Zero();  // world
 };

@@ -1,11 +1,11 @@
-// A bounding-box camera: where the models with a label are in its picture, or before it, on
-// ROBOT/CAMERA, intrinsics on /info. Labels are those of gz-sim's plugin Label.
+// A bounding-box camera: where labelled models are in its picture, or in space, on ROBOT/CAMERA;
+// intrinsics on /info. Labels are those of gz-sim's plugin Label.
 //
-// <box_type> 2d, visible_2d, visible_box_2d: around the pixels that are seen of a model. full_2d,
-// full_box_2d: around the corners of the boxes of its labelled visuals, as if nothing stood before
-// it, cut at the picture's edge; models of which no pixel is seen have none. 3d: the box along the
-// model's axes around those corners, of models of which a pixel is seen. Of a box that is exact, of
-// other shapes a little large. What is partly behind the camera has the part before it.
+// <box_type> 2d, visible_2d, visible_box_2d: around the visible pixels of a model. full_2d,
+// full_box_2d: around the projected corners of the boxes of its labelled visuals, as if nothing
+// were in front, clipped to the picture; only for models with a visible pixel. 3d: the box along
+// the model's axes around those corners, for models with a visible pixel; exact for boxes, slightly
+// too large for other shapes. Of a model partly behind the camera, the part in front counts.
 #include <algorithm>
 #include <map>
 
@@ -21,7 +21,7 @@ namespace {
 
 enum class Kind { visible, full, solid };
 
-// A rectangle of pixels, in coordinates of their middles.
+// A rectangle in pixel-centre coordinates.
 using Rectangle = Eigen::AlignedBox2d;
 
 class BoxesCamera : public Sensor {
@@ -53,7 +53,7 @@ class BoxesCamera : public Sensor {
  private:
   struct Seen {
     int label = 0;
-    Rectangle pixels;  // that are seen
+    Rectangle pixels;  // visible ones
   };
 
   static Kind kind_of(const Element& sensor) {
@@ -89,7 +89,7 @@ class BoxesCamera : public Sensor {
       box.name = world_.models[instance].name;
       box.x = around.center().x();
       box.y = around.center().y();
-      // A pixel is as wide as itself; projected edges lie where they lie.
+      // A pixel has its full width; projected edges are exact.
       const double more = kind_ == Kind::full ? 0.0 : 1.0;
       box.width = around.sizes().x() + more;
       box.height = around.sizes().y() + more;
@@ -122,7 +122,7 @@ class BoxesCamera : public Sensor {
     out.publish(channel_, solids_);
   }
 
-  // Visits the corners of the boxes of a model's labelled visuals, in the frame F; X_FW.
+  // Visits the corners of the boxes of a model's labelled visuals, in frame F; takes X_FW.
   template <class Visit>
   void each_corner(InstanceIndex instance, const Snapshot& now, const Pose& X_FW,
                    const Visit& visit) const {
@@ -156,7 +156,7 @@ class BoxesCamera : public Sensor {
   int channel_;
   CameraView view_;
   SeenThings things_;
-  std::map<InstanceIndex, Seen> seen_;  // by instance: in the order of the world
+  std::map<InstanceIndex, Seen> seen_;  // by instance: in world order
   boxes_2d_t boxes_;
   boxes_3d_t solids_;
 };

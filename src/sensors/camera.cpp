@@ -1,10 +1,10 @@
 // Cameras: colour or grey pictures on ROBOT/CAMERA, depth on /depth, labels on /labels, intrinsics
 // on /info.
 //
-// A pinhole with square pixels, fx = width / (2 tan(hfov / 2)), bent by its lens (camera_lens.h),
-// then developed: light lost in the corners and noise in each pixel (pixel_noise.h). Depth is along
-// the optical axis and has neither. Pictures are drawn from visuals, by the renderer that the
-// module gives.
+// A pinhole camera with square pixels, fx = width / (2 tan(hfov / 2)), distorted by its lens
+// (camera_lens.h), with vignetting and noise in each pixel (pixel_noise.h). Depth is along the
+// optical axis and has neither. Pictures are drawn from visuals by the renderer that the module
+// provides.
 #include "ruedo/camera_info_t.hpp"
 #include "ruedo/device_info_t.hpp"
 #include "ruedo/image_t.hpp"
@@ -112,7 +112,8 @@ class Camera : public Sensor {
     const bool colour =
         format == "R8G8B8" || format == "RGB_INT8" || format == "B8G8R8" || format == "BGR_INT8";
     const bool depth = depth_channel_ >= 0 &&
-                       (format == "R_FLOAT32" || format == "FLOAT32");  // as it is published beside
+                       // depth is published in addition
+                       (format == "R_FLOAT32" || format == "FLOAT32");
     if (!grey_ && !colour && !depth && setup.findings) {
       setup.findings->unsupported(
           camera.child("image/format")->source, "sensor " + setup.device + "/camera/image/format",
@@ -204,8 +205,8 @@ class Camera : public Sensor {
   PixelNoise noise_;
   Vignette vignette_;
   int channel_, info_channel_, depth_channel_ = -1, labels_channel_ = -1;
-  BodyIndex body_;  // none: does not move
-  Pose X_BC_;       // X_WC when it does not move
+  BodyIndex body_;  // none: static
+  Pose X_BC_;       // X_WC if static
   const model::BodyLayout* layout_ = nullptr;
   LinkIndex link_;
   Pose X_LC_;
@@ -215,7 +216,7 @@ class Camera : public Sensor {
   std::optional<LensMap> map_;
   scene::View view_;
 
-  // Kept from sample to sample, so that nothing is allocated.
+  // Kept between samples to avoid allocations.
   scene::Picture picture_;
   cv::Mat bent_, bent_plane_, grey_picture_, bgr_;
   image_t image_, plane_;

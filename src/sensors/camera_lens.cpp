@@ -11,10 +11,10 @@
 namespace ruedo {
 namespace {
 
-constexpr double kMaxPixels = 8192;  // a side
-// A pinhole's picture grows without end towards 180 degrees.
+constexpr double kMaxPixels = 8192;  // width and height
+// The width of a pinhole's picture goes to infinity towards 180 degrees.
 constexpr double kMaxHfov = 3.0;
-// The ideal picture is at most so many times as wide and high as the lens's.
+// Maximum size of the ideal picture relative to the lens's.
 constexpr double kMaxGrowth = 2.5;
 
 }  // namespace
@@ -59,8 +59,8 @@ Eigen::Vector2d Lens::distort(const Eigen::Vector2d& p) const {
 
 bool Lens::undistort(const Eigen::Vector2d& distorted, Eigen::Vector2d& p) const {
   const auto& [k1, k2, p1, p2, k3] = distortion;
-  // Along the ray from the middle outwards, so that the branch is the one that begins there: beyond
-  // a fold of the lens there is no answer.
+  // Along the ray from the centre outwards, to stay on the branch that starts there: beyond a fold
+  // of the lens there is no solution.
   p = Eigen::Vector2d::Zero();
   constexpr int kStages = 8;
   for (int stage = 1; stage <= kStages; ++stage) {
@@ -69,7 +69,8 @@ bool Lens::undistort(const Eigen::Vector2d& distorted, Eigen::Vector2d& p) const
     for (int i = 0; i < 20 && !converged; ++i) {
       const double x = p.x(), y = p.y(), r2 = x * x + y * y;
       const double radial = 1.0 + r2 * (k1 + r2 * (k2 + r2 * k3));
-      const double slope = 2.0 * (k1 + r2 * (2.0 * k2 + 3.0 * k3 * r2));  // of radial, over x or y
+      // derivative of `radial`, divided by x or y
+      const double slope = 2.0 * (k1 + r2 * (2.0 * k2 + 3.0 * k3 * r2));
       Eigen::Matrix2d J;
       J << radial + slope * x * x + 2.0 * p1 * y + 6.0 * p2 * x,
           slope * x * y + 2.0 * p1 * x + 2.0 * p2 * y, slope * x * y + 2.0 * p1 * x + 2.0 * p2 * y,
@@ -85,7 +86,7 @@ bool Lens::undistort(const Eigen::Vector2d& distorted, Eigen::Vector2d& p) const
 }
 
 LensMap::LensMap(const Lens& lens) {
-  // Where each pixel of the lens's picture is in the ideal one.
+  // The position of each pixel of the lens's picture in the ideal picture.
   cv::Mat x(lens.height, lens.width, CV_32F), y(lens.height, lens.width, CV_32F);
   const float nowhere = -1e6f;
   double x_min = 0, x_max = 0, y_min = 0, y_max = 0;
@@ -105,7 +106,7 @@ LensMap::LensMap(const Lens& lens) {
       y_max = std::max(y_max, p.y());
     }
   }
-  // The ideal picture covers all of these, with a margin of two pixels for blending.
+  // The ideal picture covers all of them, with a margin of two pixels for interpolation.
   ideal_.fx = lens.fx;
   ideal_.fy = lens.fy;
   ideal_.cx = std::ceil(-x_min * lens.fx) + 2.0;

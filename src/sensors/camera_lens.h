@@ -1,5 +1,5 @@
-// A camera's optics: SDF's <camera> read into a pinhole, and the maps that bend an ideal picture as
-// its lens does.
+// A camera's optics: reads SDF's <camera> into a pinhole, and computes the maps that distort an
+// ideal picture like the lens.
 //
 // Distortion is the model of Brown and Conrady that SDF and OpenCV use (OpenCV, "Camera Calibration
 // and 3D Reconstruction"): the ideal point (x, y) at depth 1 is seen at x' = x (1 + k1 r^2 + k2 r^4
@@ -17,7 +17,7 @@ namespace ruedo {
 
 struct Lens {
   int width = 320, height = 240;          // pixels
-  double fx = 0, fy = 0, cx = 0, cy = 0;  // pixels; whole numbers are the middles of pixels
+  double fx = 0, fy = 0, cx = 0, cy = 0;  // pixels; integers are pixel centres
   double near_m = 0.1, far_m = 100.0;
   double hfov = 1.047;                 // rad
   std::array<double, 5> distortion{};  // k1, k2, p1, p2, k3: OpenCV's order
@@ -27,21 +27,20 @@ struct Lens {
   explicit Lens(const Element& camera);
 
   bool distorts() const { return distortion != std::array<double, 5>{}; }
-  // Where the ideal point (x, y) at depth 1 is seen, in the same units.
+  // Where the lens shows the ideal point (x, y) at depth 1, in the same units.
   Eigen::Vector2d distort(const Eigen::Vector2d& p) const;
-  // The reverse, by Newton's method; false where the lens folds the picture over and nothing is
-  // seen.
+  // The inverse, by Newton's method; false where the lens folds the picture and shows nothing.
   bool undistort(const Eigen::Vector2d& distorted, Eigen::Vector2d& p) const;
 };
 
-// Draws a larger ideal picture and takes the lens's picture from it.
+// Draws a larger ideal picture and resamples it to the lens's picture.
 class LensMap {
  public:
-  explicit LensMap(const Lens& lens);  // the lens distorts
+  explicit LensMap(const Lens& lens);  // only for lenses with distortion
 
-  const scene::View& ideal() const { return ideal_; }  // what to draw; its pose is the caller's
-  // Colours and grey: blended between pixels. Depth and labels: the nearest pixel's. What the lens
-  // does not see is black, label 0 and `nothing`.
+  const scene::View& ideal() const { return ideal_; }  // what to draw; the caller sets its pose
+  // Interpolates colour and grey; takes the nearest pixel for depth and labels. Outside the lens's
+  // view, pixels are black, label 0 and `nothing`.
   void blend(const cv::Mat& from, cv::Mat& to) const;
   void pick(const cv::Mat& from, cv::Mat& to, double nothing) const;
 

@@ -1,4 +1,4 @@
-// Pictures of labels, through a lens.
+// Label pictures through a lens.
 #include "sensors/camera_view.h"
 
 #include <algorithm>

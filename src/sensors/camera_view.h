@@ -1,4 +1,4 @@
-// What the cameras share that show no light but what things are: optics, place, and camera_info_t.
+// Common to cameras that show labels rather than light: optics, pose, and camera_info_t.
 #pragma once
 
 #include <optional>
@@ -11,18 +11,18 @@
 
 namespace ruedo {
 
-// Of a lens; without utime.
+// Without utime.
 camera_info_t camera_info(const Lens& lens);
 void describe_lens(const Lens& lens, device_info_t& info);
 
-// Finds the <camera> of a sensor; throws InputError where there is none.
+// The <camera> of a sensor; throws InputError if there is none.
 const Element& camera_of(const SensorSetup& setup);
 
-// Names what other cameras read of their <camera> and this one does not; `read`: what it does. What
-// no camera reads, or no <camera> has, was named when the file was read.
+// Reports children of <camera> that other cameras read and this one does not; `read`: those that it
+// reads. Children that no camera reads were reported when the file was read.
 void name_rest_of_camera(const SensorSetup& setup, const std::vector<std::string>& read);
 
-// SensorKind::settings that every camera has.
+// SensorKind::settings common to all cameras.
 std::vector<std::string> camera_settings(const std::string& type);
 
 class CameraView {
@@ -31,10 +31,10 @@ class CameraView {
   CameraView(const SensorSetup& setup, const std::vector<std::string>& own);
 
   const Lens& lens() const { return lens_; }
-  Pose pose(const Snapshot& now) const { return mount_.pose(now); }  // x ahead
-  // Draws labels as the lens sees them: places in BodyLayout::listed + 1, 0 for nothing.
+  Pose pose(const Snapshot& now) const { return mount_.pose(now); }  // x forward
+  // Draws labels through the lens: index in BodyLayout::listed + 1, 0 for nothing.
   const cv::Mat& labels(const SampleInput& input);
-  // Where a point in the camera's frame is seen, in pixels; it has to be before the camera.
+  // The projection of a point in the camera's frame, in pixels; the point must be in front.
   Eigen::Vector2d seen_at(const Vec3& p_C) const;
 
   void publish_info(const SampleInput& input, Outbox& out);

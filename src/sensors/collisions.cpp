@@ -1,6 +1,6 @@
-// What every robot runs into, on ROBOT/collisions: no sensor that a robot has, but what a program
-// wants to know of it. Ends of touches wait for the next sample, so that one that trembles does not
-// flood the channel.
+// A robot's collisions, on ROBOT/collisions: not a sensor of the robot, but information for
+// programs. The end of a touch is reported with the next sample, so that a trembling contact does
+// not flood the channel.
 #include <algorithm>
 #include <vector>
 
@@ -43,11 +43,11 @@ class Collisions : public SensorOf<Collisions> {
   }
 
  private:
-  // Links touched between two messages: as many as this without new memory, four points each.
+  // Capacity for links touched between two messages, with four points each.
   static constexpr size_t kUsual = 8;
 
   struct Touched {
-    LinkIndex link;  // the other's
+    LinkIndex link;  // the other link
     int64_t step;
   };
   struct Point {
@@ -56,7 +56,7 @@ class Collisions : public SensorOf<Collisions> {
     bool as_a;
   };
 
-  // Notes what is touched. True when some of it was not in the last message.
+  // Records what is touched. True if some of it was not in the last message.
   bool gather(const Snapshot& now) {
     const auto own =
         std::equal_range(now.collisions.begin(), now.collisions.end(), Collision{robot_, 0, true},
@@ -86,7 +86,7 @@ class Collisions : public SensorOf<Collisions> {
     message_.n = static_cast<int32_t>(points_.size());
     if (message_.points.size() < points_.size()) message_.points.resize(points_.size());
     told_.clear();
-    auto next = message_.points.begin();  // which keeps its memory: n of them count
+    auto next = message_.points.begin();  // keeps its capacity: the first n count
     for (const Touched& touched : touched_) {
       told_.push_back(touched.link);
       for (const Point& point : points_) {
@@ -103,8 +103,8 @@ class Collisions : public SensorOf<Collisions> {
   RobotIndex robot_;
   int channel_;
   LinkIndex blocked_by_;
-  std::vector<Touched> touched_;  // since the last message, in the order in which it came
-  std::vector<Point> points_;     // of each, at the last step at which it was touched
+  std::vector<Touched> touched_;  // since the last message, in order of occurrence
+  std::vector<Point> points_;     // for each, at the last step with contact
   std::vector<LinkIndex> told_;   // links in the last message
   int64_t shown_step_ = -1;
   collisions_t message_;

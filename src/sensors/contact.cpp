@@ -1,6 +1,6 @@
-// A contact sensor (bumper): what the collision shapes named by SDF's <contact>, or the whole link,
-// touch, on ROBOT/CONTACT. A touch between two samples is not lost: `pressed` tells of every step
-// since the last one.
+// A contact sensor (bumper): contacts of the collision shapes named by SDF's <contact>, or of the
+// whole link, on ROBOT/CONTACT. Contacts between samples are not lost: `pressed` covers every step
+// since the last sample.
 #include <algorithm>
 
 #include "model/body_layout.h"
@@ -12,7 +12,7 @@
 namespace ruedo {
 namespace {
 
-// "robot::chassis::bumper" names the same shape as "bumper".
+// "robot::chassis::bumper" is the same shape as "bumper".
 std::string without_scope(const std::string& name) {
   const size_t colons = name.rfind("::");
   return colons == std::string::npos ? name : name.substr(colons + 2);
@@ -25,7 +25,7 @@ class ContactSensor : public SensorOf<ContactSensor> {
         layout_(setup.layout),
         link_(setup.link),
         channel_(setup.channel<contact_t>()) {
-    setup.element.refuse_unknown({"ruedo:phase"});  // the server reads it
+    setup.element.refuse_unknown({"ruedo:phase"});  // read by the server
     const Element* contact = setup.element.child("contact");
     if (!contact) return;
     const model::LinkPlacement& placement = layout_->links[link_];

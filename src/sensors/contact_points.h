@@ -1,4 +1,4 @@
-// A contact as messages show it: from the side of who feels it.
+// Contacts as in messages: from the side of the sensor.
 #pragma once
 
 #include "model/body_layout.h"
@@ -7,7 +7,7 @@
 
 namespace ruedo {
 
-// as_a: link_a's is the one that feels.
+// as_a: the sensor is on link_a.
 inline void put(const Contact& contact, bool as_a, const model::WorldModel& world,
                 const model::BodyLayout& layout, contact_point_t& point) {
   point.body = model::body_name(world, layout, as_a ? contact.link_b : contact.link_a);

@@ -1,12 +1,12 @@
-// A force-torque sensor in a joint of any kind, on ROBOT/SENSOR.
+// A force-torque sensor in any kind of joint, on ROBOT/SENSOR.
 //
-// Newton and Euler for what the joint carries: of the links beyond it, sum m (a - g) less the
-// forces of their contacts is what the parent puts on the child, and the sum of their moments about
-// the joint's origin its torque; forces in joints among them cancel. Accelerations are the changes
-// of velocities over the last step, contacts (normal force and friction along the surface, not the
-// friction of turning and rolling) the mean over it: so is the value. Where something holds the
-// child that tells no force - the world, a path, the kinematic drive - the parent's side is weighed
-// instead; where that is held as well, or the joint is part of a loop, there is no value.
+// Newton-Euler for what the joint carries: the force of the parent on the child is, summed over the
+// links beyond the joint, m (a - g) minus their contact forces; the torque is the corresponding sum
+// of moments about the joint's origin. Forces in joints between those links cancel. Accelerations
+// are velocity changes over the last step, contacts (normal force and tangential friction, without
+// torsional and rolling friction) the mean over it: so the value is a mean, too. If the child is
+// held by something without a known force - the world, a path, the kinematic drive - the parent's
+// side is used instead; if that is held as well, or the joint is part of a loop, there is no value.
 #include <algorithm>
 #include "ruedo/bound.h"
 
@@ -29,7 +29,7 @@ std::array<std::string, 6> noise_paths() {
   return paths;
 }
 
-// The links of a model that hang together when one joint is cut.
+// The links of a model that remain connected when one joint is cut.
 using Side = IndexedVector<ModelLinkIndex, bool>;
 
 Side side(const model::Model& model, ModelLinkIndex link, ModelJointIndex cut) {
@@ -88,10 +88,10 @@ class ForceTorque : public SensorOf<ForceTorque> {
     const Snapshot& now = input.snapshot;
     const Pose X_WC = link_pose(now, child_);
     const Vec3 p_WJ = X_WC * p_CJ_;
-    Vec3 force = Vec3::Zero(), torque = Vec3::Zero();  // on the weighed side, world
+    Vec3 force = Vec3::Zero(), torque = Vec3::Zero();  // on the side used, world
     for (const LinkIndex link : weighed_) weigh(now, link, p_WJ, force, torque);
     for (const Contact& contact : now.contacts) take_contact(contact, p_WJ, force, torque);
-    // So far what the other side puts on this one.
+    // So far this is what the other side exerts on this one.
     if (weighs_child_ != by_parent_) force = -force, torque = -torque;
     const Quat R_FW = axes(now, X_WC).conjugate();
     force = R_FW * force;
@@ -127,7 +127,7 @@ class ForceTorque : public SensorOf<ForceTorque> {
       setup.element.fail("a force-torque sensor stands in a <joint>, or on a joint's child");
   }
 
-  // Held by what tells no force.
+  // Whether it is held by something without a known force.
   bool held(const Side& in, ModelJointIndex cut) const {
     for (const ModelJointIndex j : model_->joints.indices()) {
       const Joint& joint = model_->joints[j];
@@ -191,14 +191,14 @@ class ForceTorque : public SensorOf<ForceTorque> {
     return parent_.valid() ? link_pose(now, parent_).rotation : Quat::Identity();
   }
 
-  // Adds what moves a link as it moves, against gravity.
+  // Adds the force that a link's motion requires, against gravity.
   void weigh(const Snapshot& now, LinkIndex link, const Vec3& p_WJ, Vec3& force,
              Vec3& torque) const {
     const model::LinkPlacement& placement = layout_->links[link];
     const model::Link& described = model_->links[placement.link];
     const Pose X_WI = link_pose(now, link) * described.inertial.X_LI;
     Vec3 a = Vec3::Zero(), omega = Vec3::Zero(), alpha = Vec3::Zero();
-    if (placement.body.valid()) {  // else it is fixed to the world
+    if (placement.body.valid()) {  // otherwise it is fixed to the world
       const BodyIndex body = placement.body;
       const Vec3 arm = X_WI.translation - now.bodies[body].translation;
       omega = omega_[body];
@@ -213,7 +213,7 @@ class ForceTorque : public SensorOf<ForceTorque> {
     torque += (X_WI.translation - p_WJ).cross(f) + inertia * alpha + omega.cross(inertia * omega);
   }
 
-  // Takes off what contacts put on the weighed links.
+  // Subtracts the contact forces on the links of that side.
   void take_contact(const Contact& contact, const Vec3& p_WJ, Vec3& force, Vec3& torque) const {
     const Vec3 on_a = contact.force * contact.normal + contact.friction;
     for (const LinkIndex link : weighed_) {
@@ -234,11 +234,11 @@ class ForceTorque : public SensorOf<ForceTorque> {
   InstanceIndex instance_;
   ModelJointIndex joint_;
   LinkIndex child_, parent_;  // parent: none is the world
-  Vec3 p_CJ_ = Vec3::Zero();  // the joint's origin in the child
+  Vec3 p_CJ_ = Vec3::Zero();  // the joint's origin, in the child
   Pose X_CS_;
   bool weighs_child_ = true;
-  std::vector<LinkIndex> weighed_;                // empty: there is no value
-  std::vector<BodyIndex> bodies_;                 // theirs
+  std::vector<LinkIndex> weighed_;  // links of the side used; empty: there is no value
+  std::vector<BodyIndex> bodies_;   // their bodies
   IndexedVector<BodyIndex, Vec3> omega_, alpha_;  // world
   SimTime time_ = 0;
 };

@@ -38,10 +38,10 @@ Vec3 Globe::to_ecef(const Geodetic& place) const {
 }
 
 Geodetic Globe::from_ecef(const Vec3& p) const {
-  constexpr int kIterations = 4;  // each gains some three digits at least; near the surface six
+  constexpr int kIterations = 4;  // each gains at least three digits; six near the surface
   const double rho = math::hypot(p.x(), p.y()), z = p.z();
   const double second_e2 = (a_ / b_) * (a_ / b_) - 1.0;
-  double beta = math::atan2(a_ * z, b_ * rho), latitude = 0.0;  // parametric, geodetic
+  double beta = math::atan2(a_ * z, b_ * rho), latitude = 0.0;  // parametric and geodetic latitude
   for (int i = 0; i < kIterations; ++i) {
     const double s = math::sin(beta), c = math::cos(beta);
     latitude = math::atan2(z + second_e2 * b_ * s * s * s, rho - e2_ * a_ * c * c * c);
@@ -49,7 +49,7 @@ Geodetic Globe::from_ecef(const Vec3& p) const {
   }
   const double s = math::sin(latitude), c = math::cos(latitude);
   const double w = std::sqrt(1.0 - e2_ * s * s);
-  // Of all forms of the height the one that is exact at the poles and at the equator.
+  // The formula for the height that is exact at the poles and at the equator.
   return {latitude, math::atan2(p.y(), p.x()), rho * c + z * s - a_ * w};
 }
 

@@ -1,11 +1,11 @@
-// An inertial measurement unit: gyroscope and accelerometer with noise, bias and wandering bias as
-// SDF's <imu> writes them, on ROBOT/IMU.
+// An inertial measurement unit: gyroscope and accelerometer with noise, bias and drifting bias as
+// in SDF's <imu>, on ROBOT/IMU.
 //
-// Ideal values, in the device's frame S at p = p_BS in the body B: the gyroscope shows omega; the
-// accelerometer the specific force a_S - g, with a_S = a_B + alpha x p + omega x (omega x p). a_B
-// comes from the snapshot; alpha is the change of omega over the last step. At rest it shows
-// gravity upwards, on a ramp along the ramp's axes. A wheel that is part of B turns the device
-// about its hub H: the same from B to H, then from H to S with the wheel's own omega.
+// Ideal values, in the device's frame S at p = p_BS in the body B: the gyroscope measures omega;
+// the accelerometer the specific force a_S - g, with a_S = a_B + alpha x p + omega x (omega x p).
+// a_B comes from the snapshot; alpha is the change of omega over the last step. At rest it measures
+// gravity upwards, on a ramp along the ramp's axes. A wheel that is part of B rotates the device
+// about its hub H: the same formula from B to H, then from H to S with the wheel's own omega.
 #include "model/body_layout.h"
 #include "ruedo/bound.h"
 #include "ruedo/imu_t.hpp"
@@ -35,11 +35,11 @@ class Imu : public SensorOf<Imu> {
       hub_B_ = X_BWheel * wheel.center_in_L;
       axis_B_ = X_BWheel.rotation * wheel.axis_in_L;
     }
-    setup.element.refuse_unknown({"ruedo:phase"});  // the server reads it
+    setup.element.refuse_unknown({"ruedo:phase"});  // read by the server
     if (const Element* imu = setup.element.child("imu")) configure(*imu, setup);
   }
 
-  // For alpha.
+  // To compute alpha.
   bool observes() const override { return body_.valid(); }
 
   void observe(const Snapshot& now, Outbox&) override {
@@ -63,7 +63,7 @@ class Imu : public SensorOf<Imu> {
   void sample(const SampleInput& input, Outbox& out) override {
     const Snapshot& now = input.snapshot;
     Pose X_WS = X_BS_;
-    Vec3 omega = Vec3::Zero(), acceleration = Vec3::Zero();  // of S, in the world's axes
+    Vec3 omega = Vec3::Zero(), acceleration = Vec3::Zero();  // of S, expressed in the world
     if (body_.valid()) {
       const Pose& X_WB = now.bodies[body_];
       const Pose X_BS = on_wheel_ ? layout_->link_in_body(link_, now.wheel_angles) * X_LS_ : X_BS_;
@@ -99,7 +99,7 @@ class Imu : public SensorOf<Imu> {
   }
 
  private:
-  // rad/s, world: what the wheel turns the device more than the body does.
+  // rad/s, world: the wheel's rotation relative to the body.
   Vec3 of_wheel(const Snapshot& now) const {
     if (!on_wheel_) return Vec3::Zero();
     return now.bodies[body_].rotation * (now.wheel_rates[wheel_] * axis_B_);

@@ -1,5 +1,5 @@
-// The joints of a robot that are neither fixed nor wheels of its drive, on ROBOT/joints: positions,
-// velocities and the motors' efforts, without noise.
+// A robot's joints other than fixed ones and wheels of its drive, on ROBOT/joints: positions,
+// velocities and motor efforts, without noise.
 #include "model/body_layout.h"
 #include "ruedo/joint_state_t.hpp"
 #include "ruedo/sensor.h"

@@ -1,4 +1,4 @@
-// Few pictures need more than one try: the rest is searched by halves.
+// Few pictures need more than one attempt: otherwise a bisection.
 #include "sensors/jpeg.h"
 
 #include <algorithm>
@@ -14,7 +14,7 @@ constexpr int kStep = 8;
 }  // namespace
 
 void encode_jpeg(const cv::Mat& picture, int quality, std::vector<uint8_t>& bytes) {
-  int tried = 0;  // steps below the wanted quality
+  int tried = 0;  // steps below the requested quality
   const auto fits = [&](int steps) {
     tried = steps;
     model::encode_picture(
@@ -28,7 +28,7 @@ void encode_jpeg(const cv::Mat& picture, int quality, std::vector<uint8_t>& byte
     const int middle = (too_few + enough) / 2;
     (fits(middle) ? enough : too_few) = middle;
   }
-  if (tried != enough) fits(enough);  // the least quality is taken whether it does or not
+  if (tried != enough) fits(enough);  // the lowest quality is used whether it fits or not
 }
 
 }  // namespace ruedo

@@ -1,4 +1,4 @@
-// Pictures as JPEG that fit one datagram.
+// JPEG pictures that fit into one datagram.
 #pragma once
 
 #include <cstdint>
@@ -10,9 +10,9 @@ namespace ruedo {
 
 constexpr int kLeastJpegQuality = 10;
 
-// Encodes a picture (grey, or in OpenCV's order of colours) with the wanted quality, or with the
-// best one below it, in steps of 8, at which it fits one datagram with room for LCM's head. What
-// comes out depends on this picture alone, not on those before it.
+// Encodes a picture (grey, or in OpenCV's colour order) with the requested quality, or with the
+// highest lower one, in steps of 8, at which it fits into one datagram with LCM's header. The
+// result depends on this picture alone.
 void encode_jpeg(const cv::Mat& picture, int quality, std::vector<uint8_t>& bytes);
 
 }  // namespace ruedo

@@ -1,6 +1,6 @@
-// A logical camera: the models whose origins lie in its frustum, on ROBOT/CAMERA. Nothing hides
-// them; the camera's own model is not among them. The frustum has <horizontal_fov> and <near> and
-// <far> along x, and its height is its width divided by <aspect_ratio>.
+// A logical camera: the models whose origins lie in its frustum, on ROBOT/CAMERA, without occlusion
+// and without its own model. The frustum is given by <horizontal_fov> and by <near> and <far> along
+// x; its height is its width divided by <aspect_ratio>.
 #include "model/body_layout.h"
 #include "ruedo/bound.h"
 #include "ruedo/device_info_t.hpp"

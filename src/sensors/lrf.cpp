@@ -1,12 +1,11 @@
-// A laser range finder, flat (planar_lidar_t) or of several layers (lidar_t), on ROBOT/LRF.
+// A laser range finder with one layer (planar_lidar_t) or several (lidar_t), on ROBOT/LRF.
 // docs/world-files.md lists its elements.
 //
-// Model: each ray has its own exact range from the collision shapes. A surface with laser
-// reflectance rho, of which the part m leaves as from a mirror, returns the intensity m_way rho (1
-// - m) cos(incidence), m_way being the loss at mirrors passed before, there and back; below
-// kFaintest nothing comes back and the mirrored part, if any, goes on. Noise is drawn for every
-// ray, so that what one ray meets changes no other's noise; then follow the resolution and the
-// limits.
+// Model: each ray has its own exact range to the collision shapes. A surface with laser reflectance
+// rho, of which the fraction m is specular, returns the intensity m_path rho (1 - m)
+// cos(incidence), where m_path is the loss at mirrors passed before, both ways. Below kFaintest
+// nothing is detected and the specular part, if any, continues. Noise is drawn for every ray, so
+// that a ray's hit does not affect another ray's noise; resolution and limits are applied last.
 #include <cmath>
 #include <map>
 #include <memory>
@@ -30,23 +29,22 @@ namespace {
 using scene::Hit;
 using scene::Ray;
 
-constexpr double kFaintest = 0.02;  // part of the light; less is not seen
-constexpr int kMirrors = 4;         // that a ray follows, one after another
+constexpr double kFaintest = 0.02;  // fraction of the light; less is not detected
+constexpr int kMirrors = 4;         // reflections per ray
 constexpr int64_t kMaxRays = 1'000'000;
 
-// One of SDF's <horizontal> and <vertical>: evenly spaced angles, the ends included.
+// One of SDF's <horizontal> and <vertical>: evenly spaced angles, including both ends.
 struct Sweep {
   int64_t count = 1;
   double first = 0.0, step = 0.0;  // rad
 
   Sweep() = default;
-  // limit_rad: of the angles; whole_rad: of their span.
+  // limit_rad: for the angles; whole_rad: for their span.
   Sweep(const Element& e, int64_t samples_if_absent, double limit_rad, double whole_rad) {
     const int64_t samples =
         e.integer("samples", samples_if_absent, Allowed::between(0, static_cast<double>(kMaxRays)));
     const double resolution = e.number("resolution", 1.0, Allowed::not_negative(quantity::kFactor));
-    // A widespread lidar has one layer, and a resolution of 0.01 for it: one ray at least, as in
-    // Gazebo.
+    // Many planar lidars have one layer with a resolution of 0.01: at least one ray, as in Gazebo.
     const double rays = std::max(1.0, std::round(static_cast<double>(samples) * resolution));
     if (rays > static_cast<double>(kMaxRays)) {
       e.fail("<samples> times <resolution> is " + std::to_string(rays) + " rays; allowed: 1 to " +
@@ -58,11 +56,11 @@ struct Sweep {
     if (high < low)
       e.fail("<max_angle> " + std::to_string(high) + " is below <min_angle> " +
              std::to_string(low));
-    constexpr double kOverlap_rad = 0.1;  // -3.15 to 3.15 is a full turn, too
+    constexpr double kOverlap_rad = 0.1;  // -3.15 to 3.15 still counts as a full turn
     if (high - low > whole_rad + kOverlap_rad)
       e.fail("from <min_angle> to <max_angle> is more than a full turn");
     if (count == 1) {
-      first = 0.5 * (low + high);  // a lone ray looks along the middle
+      first = 0.5 * (low + high);  // a single ray is in the middle
     } else {
       first = low;
       step = (high - low) / static_cast<double>(count - 1);
@@ -106,7 +104,7 @@ class Lrf : public SensorOf<Lrf> {
 
   bool wants_visual_rays() const override { return visuals_; }
 
-  // The way that the device took during the sweep.
+  // The device's motion during the sweep.
   bool observes() const override { return sweep_us_ > 0; }
   void observe(const Snapshot& now, Outbox&) override {
     track_.push_back({now.time, mount_.X_WS(now)});
@@ -129,7 +127,7 @@ class Lrf : public SensorOf<Lrf> {
         sampled_ ? 1e-6 * static_cast<double>(input.snapshot.time - sample_time_) : 0.0;
     sampled_ = true;
     sample_time_ = input.snapshot.time;
-    const bool drawn = !noise_.none() && !noise_.wanders();  // one draw a ray, all at once
+    const bool drawn = !noise_.none() && !noise_.wanders();  // one draw per ray, all at once
     if (drawn) stream.gaussians(scratch.draws);
     for (size_t i = 0; i < rays.size(); ++i) {
       const Return back = returned(*input.rays, rays[i], scratch.hits[i]);
@@ -153,7 +151,7 @@ class Lrf : public SensorOf<Lrf> {
 
  private:
   struct Return {
-    double range = std::numeric_limits<double>::infinity();  // m, along the ray's way
+    double range = std::numeric_limits<double>::infinity();  // m, along the ray's path
     double intensity = 0.0;                                  // 0 to 1
   };
   struct Place {
@@ -161,12 +159,12 @@ class Lrf : public SensorOf<Lrf> {
     Pose X_WS;
   };
 
-  // What a sample is computed in, and what nobody reads after it. It is the thread's, not the
-  // device's: of a thousand devices it stays in the processor's cache.
+  // Scratch memory of a sample, not read afterwards. It belongs to the thread, not the device:
+  // shared by a thousand devices, it stays in the cache.
   struct Scratch {
     std::vector<Ray> rays;
     std::vector<Hit> hits;
-    std::vector<double> draws;  // of the bearings, then of the ranges
+    std::vector<double> draws;  // for the bearings, then for the ranges
     std::vector<float> ranges, intensities;
   };
   Scratch& scratch_for(size_t rays) const {
@@ -202,7 +200,8 @@ class Lrf : public SensorOf<Lrf> {
     resolution_ = range->number("resolution", 0.0, Allowed::not_negative(quantity::kRange));
   }
 
-  // Directions in the device's frame, and messages of their final size: nothing grows later.
+  // Precomputes directions in the device's frame, and messages of their final size: nothing grows
+  // later.
   void prepare(const SensorSetup& setup) {
     directions_ = shared_directions();
     const size_t n = directions_->size();
@@ -226,7 +225,7 @@ class Lrf : public SensorOf<Lrf> {
     }
   }
 
-  // Devices with the same angles have one array of them: copies of a world, and robots of a fleet.
+  // Devices with the same angles share an array: copies of a world, and the robots of a fleet.
   std::shared_ptr<const std::vector<Vec3>> shared_directions() const {
     using Key = std::tuple<int64_t, double, double, int64_t, double, double>;
     static std::mutex mutex;
@@ -253,7 +252,7 @@ class Lrf : public SensorOf<Lrf> {
     return {up.cosine * around.cosine, up.cosine * around.sine, up.sine};
   }
 
-  // Puts the rays into the world. All layers of a column are taken at once.
+  // Transforms the rays to the world. All layers of a column share a time.
   void aim(const Snapshot& now, RandomStream& stream, Scratch& scratch) {
     std::vector<Ray>& rays = scratch.rays;
     const std::vector<Vec3>& directions = *directions_;
@@ -285,7 +284,7 @@ class Lrf : public SensorOf<Lrf> {
     }
   }
 
-  // Where the device was, between two steps on the straight way; before the start it stood still.
+  // The device's pose between two steps, interpolated linearly; before the start it was at rest.
   Pose place(SimTime time) const {
     if (time <= track_.front().time) return track_.front().X_WS;
     size_t after = track_.size() - 1;
@@ -310,7 +309,7 @@ class Lrf : public SensorOf<Lrf> {
       mirrored *= surface.laser_mirror * surface.laser_mirror;
       if (mirrored < kFaintest || mirrors == kMirrors || hit.range == 0.0) break;
       ray.origin += hit.range * ray.direction +
-                    1e-9 * hit.normal;  // off the mirror, or it would be met again
+                    1e-9 * hit.normal;  // off the mirror, so that it is not hit again
       ray.direction -= 2.0 * ray.direction.dot(hit.normal) * hit.normal;
       ray.max_range = max_ - way;
       hit = scene.cast(ray, ignored_link_);
@@ -337,7 +336,7 @@ class Lrf : public SensorOf<Lrf> {
   int64_t sweep_us_ = 0;
   int channel_ = -1;
 
-  std::vector<Place> track_;  // over the sweep time
+  std::vector<Place> track_;  // over the duration of the sweep
   SimTime sample_time_ = 0;
   bool sampled_ = false;
   std::shared_ptr<const std::vector<Vec3>> directions_;  // in S, layer by layer

@@ -1,11 +1,11 @@
 // A magnetometer: the magnetic field in the device's frame, on ROBOT/MAGNETOMETER.
 //
-// The field is the sensor's own <ruedo:magnetic_field>, else the world's <magnetic_field>. Where
-// the file has none, but says where the world lies, it is the earth's centred dipole with the
+// The field is the sensor's own <ruedo:magnetic_field>, or else the world's <magnetic_field>. If
+// the file has neither, but gives the world's location, it is the earth's centred dipole with the
 // coefficients of IGRF-13 for 2020: V = a (a/r)^2 (g . r^), B = -grad V = (a/r)^3 (3 (g . r^) r^ -
-// g). That is right to about a fifth of the field and to 10 degrees of declination in most places;
-// no anomaly, no iron of the robot, no motor bends it. Without either it is SDF's default,
-// (5.5645, 22.8758, -42.3884) uT in the world's axes.
+// g). That is accurate to about a fifth of the field and to 10 degrees of declination in most
+// places. Anomalies, and iron and motors of the robot, are not modelled. Without a location it is
+// SDF's default, (5.5645, 22.8758, -42.3884) uT in the world's axes.
 #include "ruedo/magnetometer_t.hpp"
 #include "sensors/geodesy.h"
 #include "sensors/mount.h"
@@ -13,9 +13,9 @@
 namespace ruedo {
 namespace {
 
-constexpr double kReferenceRadius = 6371200.0;           // m, IGRF's
+constexpr double kReferenceRadius = 6371200.0;           // m, of IGRF
 const Vec3 kDipole(-1450.9e-9, 4652.5e-9, -29404.8e-9);  // T: g11, h11, g10 of IGRF-13, 2020
-const Vec3 kUsual(5.5645e-6, 22.8758e-6, -42.3884e-6);   // T, of SDF
+const Vec3 kUsual(5.5645e-6, 22.8758e-6, -42.3884e-6);   // T, SDF's default
 
 std::array<std::string, 3> noise_paths() {
   return {"magnetometer/x/noise", "magnetometer/y/noise", "magnetometer/z/noise"};

@@ -1,6 +1,6 @@
-// What a robot is executing, on ROBOT/motion: at the drive's status rate, and at once when a
-// command or a primitive begins, ends or is refused. The last message of a step shows what holds;
-// ends and refusals come before it.
+// What a robot is executing, on ROBOT/motion: at the drive's status rate, and immediately when a
+// command or primitive starts, ends or is refused. The last message of a step has the current
+// state; ends and refusals precede it.
 #include <algorithm>
 
 #include "model/body_layout.h"

@@ -1,4 +1,4 @@
-// Where a device is and how it moves, from a snapshot. On a wheel it turns with the wheel.
+// The pose and motion of a device, from a snapshot. On a wheel it rotates with the wheel.
 #pragma once
 
 #include <array>
@@ -12,13 +12,13 @@ namespace ruedo {
 
 class Mount {
  public:
-  // X_SD: of what is measured, in the device's frame.
+  // X_SD: what is measured, in the device's frame.
   explicit Mount(const SensorSetup& setup, const Pose& X_SD = {});
 
-  BodyIndex body() const { return body_; }  // none: does not move
-  Pose start() const;                       // X_WS of the world's first state
+  BodyIndex body() const { return body_; }  // none: static
+  Pose start() const;                       // X_WS in the world's initial state
   Pose pose(const Snapshot& now) const;     // X_WS
-  Twist twist(const Snapshot& now) const;   // of S's origin, in the world's axes
+  Twist twist(const Snapshot& now) const;   // of S's origin, expressed in the world
 
  private:
   Bound<const model::BodyLayout> layout_;
@@ -27,12 +27,13 @@ class Mount {
   Pose X_LS_;
 };
 
-// The noises of a device: read in one order, drawn in that order from the device's own numbers.
+// The noises of a device: read in a fixed order, and drawn in that order from the device's own
+// random numbers.
 template <size_t count>
 class Noises {
  public:
-  // Where each is in the sensor's element: "altimeter/vertical_position/noise"; several may name
-  // the same.
+  // Their paths in the sensor's element: "altimeter/vertical_position/noise"; several may have the
+  // same.
   Noises(const SensorSetup& setup, const std::array<std::string, count>& paths)
       : random_(setup.random) {
     RandomStream constants = random_.stream(kConstantDraws);
@@ -65,12 +66,12 @@ class Noises {
   bool sampled_ = false;
 };
 
-// Of a <sensor>'s own element (<navsat>, <altimeter>): children that are not in `read` are named as
-// without effect.
+// For a <sensor>'s own element (<navsat>, <altimeter>): reports children not in `read` as having no
+// effect.
 void name_what_does_not_act(const SensorSetup& setup, const Element* element,
                             const std::vector<std::string>& read);
 
-// Names these children of a <sensor>'s element as without effect.
+// Reports these children of a <sensor>'s element as having no effect.
 void name_where_written(const SensorSetup& setup, const Element& element,
                         const std::vector<std::string>& children);
 

@@ -1,11 +1,10 @@
-// A satellite navigation receiver: geodetic position and velocity to the east, the north and
-// upwards, on ROBOT/NAVSAT.
+// A satellite navigation receiver: geodetic position, and velocity towards east, north and up, on
+// ROBOT/NAVSAT.
 //
-// The world's frame is the plane that touches the ellipsoid at <spherical_coordinates>: positions
-// go by way of ECEF (geodesy.h), so that the ground bends away below it, 8 cm at 1 km. Noise is in
-// metres and m/s, as SDF has it: of the two horizontal directions each its own draw, of the
-// vertical one, in the axes of the place. There are no satellites: no outages, and every fix is a
-// good one.
+// The world's frame is tangential to the ellipsoid at <spherical_coordinates>: positions are
+// converted through ECEF (geodesy.h), so that the ground curves away below it, by 8 cm at 1 km.
+// Noise is in metres and m/s, as in SDF: drawn separately for each horizontal direction and for the
+// vertical one, in local axes. Satellites are not modelled: no outages, and every fix is good.
 #include "ruedo/navsat_t.hpp"
 #include "sensors/geodesy.h"
 #include "sensors/mount.h"
@@ -25,7 +24,7 @@ std::array<std::string, 6> noise_paths(const std::string& element) {
           velocity + "horizontal/noise", velocity + "vertical/noise"};
 }
 
-// Where the world lies: <spherical_coordinates>, else what the receiver itself says (hector's GPS
+// The world's location: <spherical_coordinates>, or else what the receiver gives (hector's GPS
 // plugin).
 model::Environment place_of(const SensorSetup& setup) {
   constexpr double kDegree = M_PI / 180.0;
@@ -101,7 +100,7 @@ class NavSat : public SensorOf<NavSat> {
   Mount mount_;
   model::Environment place_;
   Globe globe_;
-  Noises<6> noises_;  // east, north, up; of the position, of the velocity
+  Noises<6> noises_;  // east, north, up; of position, then velocity
   int channel_;
 };
 

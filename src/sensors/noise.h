@@ -1,11 +1,11 @@
-// SDF's <noise>: Gaussian noise with a constant bias, a bias that wanders, and quantisation, of one
-// measured value. Every sensor that reads <noise> may use it; docs/adding-a-sensor.md shows how.
+// SDF's <noise>: Gaussian noise with a constant bias, a drifting bias, and quantisation, for one
+// measured value. For every sensor that reads <noise>; docs/adding-a-sensor.md shows how.
 //
 // Model: measured = ideal + N(mean, stddev) + bias + walk, rounded to multiples of `precision` for
-// gaussian_quantized. The bias is drawn once, N(bias_mean, bias_stddev). The walk is the
-// Gauss-Markov process that Gazebo uses: over dt it becomes exp(-dt/tau) walk + N(0, s), s^2 =
-// sigma^2 tau/2 (1 - exp(-2 dt/tau)), with sigma dynamic_bias_stddev and tau
-// dynamic_bias_correlation_time; tau 0 is tau without end, a random walk with s^2 = sigma^2 dt.
+// gaussian_quantized. The bias is drawn once, N(bias_mean, bias_stddev). The walk is Gazebo's
+// Gauss-Markov process: over dt it becomes exp(-dt/tau) walk + N(0, s), s^2 = sigma^2 tau/2 (1 -
+// exp(-2 dt/tau)), with sigma dynamic_bias_stddev and tau dynamic_bias_correlation_time; tau 0
+// means infinite tau, a random walk with s^2 = sigma^2 dt.
 #pragma once
 
 #include <cmath>
@@ -17,22 +17,22 @@
 
 namespace ruedo {
 
-// Number of the stream from which a device draws what holds for the whole run; samples have those
-// from 0 on.
+// Stream number from which a device draws values for the whole run; samples use the streams from 0
+// on.
 inline constexpr uint64_t kConstantDraws = ~uint64_t{0};
 
-// The settings of a <noise> there, for SensorKind::settings: "lidar.noise".
+// The settings of a <noise> at that path, for SensorKind::settings: "lidar.noise".
 std::vector<std::string> noise_settings(const std::string& at);
 
 class Noise {
  public:
-  Noise() = default;  // none
+  Noise() = default;  // no noise
 
-  // Reads a <noise> element: its type is an attribute, or (old files) a child: none, gaussian,
+  // Reads a <noise> element: its type is an attribute, or (in old files) a child: none, gaussian,
   // gaussian_quantized. null: no noise. Throws InputError.
   explicit Noise(const Element* noise);
 
-  // Reads <mean>, <stddev>, ... of an element that is no <noise> itself (<rate> and <accel> of old
+  // Reads <mean>, <stddev>, ... from an element that is not a <noise> (<rate> and <accel> of old
   // IMUs).
   static Noise from_parameters(const Element& parameters, bool quantized);
 
@@ -40,16 +40,16 @@ class Noise {
   double stddev() const { return stddev_; }
   bool wanders() const { return walk_stddev_ > 0.0; }
 
-  // Draws the constant bias; once, from the device's stream kConstantDraws. Without it the bias is
+  // Draws the constant bias; once, from the device's stream kConstantDraws. Otherwise the bias is
   // its mean.
   void draw_bias(RandomStream& constants);
 
-  // The measured value. dt_s: time since the last call, 0 in the first, for the wandering bias.
-  // Draws one Gaussian, and a second one where the bias wanders; none() draws nothing and returns
-  // `ideal` itself.
+  // The measured value. dt_s: time since the last call, 0 in the first, for the drifting bias.
+  // Draws one Gaussian, and a second one if the bias drifts; if none(), draws nothing and returns
+  // `ideal` unchanged.
   double apply(double ideal, double dt_s, RandomStream& stream);
 
-  // The same with the draw given, for noise that is there and does not wander.
+  // The same with a given draw, for noise without drift.
   double apply_draw(double ideal, double gaussian) const {
     return rounded(ideal + mean_ + stddev_ * gaussian + (bias_ + walk_));
   }
@@ -67,7 +67,7 @@ class Noise {
   double precision_ = 0.0;
 
   double bias_ = 0.0, walk_ = 0.0;
-  double known_dt_s_ = -1.0, decay_ = 1.0, drive_ = 0.0;  // of the walk, for the last dt
+  double known_dt_s_ = -1.0, decay_ = 1.0, drive_ = 0.0;  // of the walk, cached for the last dt
 };
 
 }  // namespace ruedo

@@ -1,6 +1,6 @@
-// Odometry: the pose that a robot computes from its wheel encoders, on ROBOT/odometry. What
-// encoders see, and what the robot makes of it, with the errors of both: ticks, wrap-around, slip,
-// wrong radius, wrong track.
+// Odometry: the pose that a robot computes from its wheel encoders, on ROBOT/odometry. Models the
+// encoders and the robot's estimate with their errors: ticks, wrap-around, slip, wrong radius,
+// wrong track.
 //
 // The wheels are read at every step. With s_l and s_r the way of the left and right wheels in a
 // step (the mean of a side's wheels, times the radius that the robot believes in), d = (s_l + s_r)
@@ -36,7 +36,7 @@ struct Configuration {
   double radius_error[2] = {0.0, 0.0};  // left, right; relative
   double track_error = 0.0;             // relative
   double slip_noise = 0.0;              // sqrt(m)
-  double steering_error = 0.0;          // rad, added to what the steering's encoder shows
+  double steering_error = 0.0;          // rad, added to the reading of the steering encoder
 
   explicit Configuration(const Element& element) {
     element.refuse_unknown({"ruedo:rate", "ruedo:integrator", "ruedo:ticks_per_turn",
@@ -133,7 +133,8 @@ class Odometry : public SensorOf<Odometry> {
     double speed[2] = {0.0, 0.0};
     for (size_t i = 0; i < wheels_.size(); ++i) {
       Wheel& wheel = wheels_[i];
-      // Within a step ticks and slip say little of the rate: it is the mean since the last sample.
+      // Within a step, ticks and slip make the rate meaningless: it is the mean since the last
+      // sample.
       double rate = wheel.rate;
       if (configuration_.ticks_per_turn > 0 || configuration_.slip_noise > 0.0)
         rate = period_s > 0.0 ? (wheel.measured - wheel.sampled) / period_s : 0.0;
@@ -161,9 +162,9 @@ class Odometry : public SensorOf<Odometry> {
     int side;                 // 0 left, 1 right
     bool steers;              // its angle is that of steering
     double true_angle = 0.0;  // rad
-    double slipped = 0.0;     // rad, what slip has added to the encoder's angle so far
-    int64_t counter = 0;      // as the encoder shows it, wrapped
-    int64_t ticks = 0;        // as the robot unwraps it
+    double slipped = 0.0;     // rad, the total that slip added to the encoder's angle
+    int64_t counter = 0;      // as shown by the encoder, wrapped
+    int64_t ticks = 0;        // as unwrapped by the robot
     double measured = 0.0;    // rad since the start
     double rate = 0.0;        // rad/s
     double turned = 0.0;      // rad, measured in the last step
@@ -198,7 +199,7 @@ class Odometry : public SensorOf<Odometry> {
                ? ticks
                : ticks & ((int64_t{1} << configuration_.counter_bits) - 1);
   }
-  // What the robot takes the difference of two counter values for: the smaller way round.
+  // The difference of two counter values as the robot takes it: the shorter way around.
   int64_t unwrapped(int64_t difference) const {
     if (configuration_.counter_bits == 0) return difference;
     const int64_t range = int64_t{1} << configuration_.counter_bits;
@@ -206,9 +207,9 @@ class Odometry : public SensorOf<Odometry> {
     return positive >= range / 2 ? positive - range : positive;
   }
 
-  // Reads the encoders: turned, measured, rate of every wheel.
+  // Reads the encoders: updates turned, measured and rate of every wheel.
   void turn_wheels(const Snapshot& now, double dt_s) {
-    double way[2] = {0.0, 0.0};  // m, of each side, true
+    double way[2] = {0.0, 0.0};  // m, true distance of each side
     for (Wheel& wheel : wheels_) {
       const double angle = now.wheel_angles[wheel.index];
       wheel.turned = angle - wheel.true_angle;
@@ -313,17 +314,17 @@ class Odometry : public SensorOf<Odometry> {
   RandomSource random_;
   RobotIndex robot_;
   int channel_;
-  double radius_ = 0.0, track_ = 0.0;  // m; the track is the one that the robot believes in
+  double radius_ = 0.0, track_ = 0.0;  // m; the track that the robot believes
   std::vector<Wheel> wheels_;
   int wheels_of_side_[2] = {0, 0};
-  std::optional<model::BaseOdometry> base_;  // of what is no differential drive
-  Pose X_WBase_;                             // at the step before
-  Vec3 rate_ = Vec3::Zero();  // m/s ahead and to the left, rad/s: of the last step, with base_
+  std::optional<model::BaseOdometry> base_;  // for other than differential drives
+  Pose X_WBase_;                             // at the previous step
+  Vec3 rate_ = Vec3::Zero();  // m/s forward and to the left, rad/s, in the last step; with base_
   std::vector<double> ways_, angles_;
 
   SimTime time_ = -1, sample_time_ = 0;
   double x_ = 0.0, y_ = 0.0, theta_ = 0.0;  // m, m, rad: base_link in odom
-  double speed_before_[2] = {0.0, 0.0};     // m/s, left and right at the step before
+  double speed_before_[2] = {0.0, 0.0};     // m/s, left and right, at the previous step
   int32_t resets_ = 0;
   odometry_t message_;
 };

@@ -1,8 +1,8 @@
-// Who is in a region, as gz-sim's PerformerDetector has it, on ROBOT/DEVICE: at once when a
-// performer comes or goes, and at its rate.
+// Performers in a region, like gz-sim's PerformerDetector, on ROBOT/DEVICE: published at once when
+// one enters or leaves, and at its rate.
 //
-// The region is a box along the world's axes, about its model's origin and <ruedo:offset>, which
-// turns with the model. A performer is there when its own box, along the same axes, touches it.
+// The region is an axis-aligned box around its model's origin plus <ruedo:offset>, which turns with
+// the model. A performer is inside if its own axis-aligned box touches it.
 #include <algorithm>
 
 #include "model/body_layout.h"
@@ -48,7 +48,7 @@ class PerformerDetector : public SensorOf<PerformerDetector> {
   struct Performer {
     std::string model;
     Vec3 half;               // m, of its box
-    InstanceIndex instance;  // where it was found last
+    InstanceIndex instance;  // where it was last found
     bool inside;
   };
 
@@ -71,7 +71,7 @@ class PerformerDetector : public SensorOf<PerformerDetector> {
     }
   }
 
-  // True when somebody came or went.
+  // True if somebody entered or left.
   bool look(const Snapshot& now) {
     const Vec3 middle = model_pose(world_, layout_, own_, now) * offset_M_;
     bool news = false;
@@ -107,7 +107,7 @@ class PerformerDetector : public SensorOf<PerformerDetector> {
   InstanceIndex own_;
   int channel_;
   Vec3 half_, offset_M_ = Vec3::Zero();
-  std::vector<Performer> performers_;  // in the order of the file
+  std::vector<Performer> performers_;  // in file order
   int64_t shown_step_ = -1;
   logical_camera_t message_;
 };

@@ -30,14 +30,14 @@ uint64_t split_mix(uint64_t x) {
 
 PixelNoise::PixelNoise(double mean, double stddev)
     : mean_(static_cast<float>(255.0 * mean)), scale_(static_cast<float>(255.0 * stddev)) {
-  if (scale_ > 0.0f) normal_table();  // made now, not in the first sample
+  if (scale_ > 0.0f) normal_table();  // built now, not in the first sample
 }
 
 void PixelNoise::apply(RandomStream stream, std::span<uint8_t> pixels) const {
   if (none()) return;
   const float* table = normal_table().data();
   const uint64_t key = (uint64_t{stream.bits()} << 32) | stream.bits();
-  // 256 is added so that cutting to an integer rounds down below zero too.
+  // Adding 256 makes the truncation to an integer round down below zero, too.
   const float base = mean_ + 256.5f;
   for (size_t i = 0, counter = 1; i < pixels.size(); i += 4, ++counter) {
     uint64_t bits = split_mix(key + counter * 0x9e3779b97f4a7c15u);

@@ -1,4 +1,4 @@
-// Models as wholes, in the world's state.
+// Whole models in the world's current state.
 #pragma once
 
 #include <algorithm>
@@ -17,14 +17,14 @@ inline Pose link_pose(const model::BodyLayout& layout, LinkIndex link, const Sna
   return now.bodies[placement.body] * layout.link_in_body(link, now.wheel_angles);
 }
 
-// X_WM, of a model that goes with its first link.
+// X_WM; the model moves with its first link.
 inline Pose model_pose(const model::WorldModel& world, const model::BodyLayout& layout,
                        InstanceIndex instance, const Snapshot& now) {
   const model::Model& model = *world.models[instance].model;
   return link_pose(layout, layout.first_link[instance], now) * model.links.front().X_ML.inverse();
 }
 
-// A model as messages show it; X_SM: it in the frame of the device.
+// A model as in messages; X_SM: its pose in the device's frame.
 inline void put(const std::string& model, const Pose& X_SM, logical_object_t& object) {
   object.model = model;
   const Quat& q = X_SM.rotation;

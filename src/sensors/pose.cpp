@@ -1,4 +1,4 @@
-// The true pose of a robot's base_link, on ROBOT/pose: ground truth for the clients' errors. No
+// The true pose of a robot's base_link, on ROBOT/pose: ground truth to measure errors against. No
 // noise.
 #include "model/body_layout.h"
 #include "ruedo/pose_t.hpp"

@@ -1,5 +1,4 @@
-// What sensors that cast rays have in common: where the device is, and what the surfaces that it
-// sees are like.
+// Common to sensors that cast rays: the device's pose, and the properties of surfaces that it hits.
 #pragma once
 
 #include "model/body_layout.h"
@@ -9,7 +8,7 @@
 
 namespace ruedo {
 
-// A device's place on its robot.
+// A device's mount on its robot.
 class RayMount {
  public:
   explicit RayMount(const SensorSetup& setup)
@@ -28,7 +27,7 @@ class RayMount {
     return turns_ ? X_WB * layout_->link_in_body(link_, now.wheel_angles) * X_LS_ : X_WB * X_BS_;
   }
 
-  // The surface that a ray struck; visuals have none, they are as if of the default surface.
+  // The surface that a ray hit; visuals have the default surface.
   const model::Surface& surface(const scene::Hit& hit, bool visuals = false) const {
     static const model::Surface kDefault;
     if (visuals) return kDefault;
@@ -41,7 +40,7 @@ class RayMount {
   Bound<const model::WorldModel> world_;
   Bound<const model::BodyLayout> layout_;
   LinkIndex link_;
-  BodyIndex body_;      // none: does not move, X_BS_ is then X_WS
+  BodyIndex body_;      // none: static, X_BS_ is then X_WS
   bool turns_ = false;  // with a wheel that is part of that body
   Pose X_LS_;
   Pose X_BS_;

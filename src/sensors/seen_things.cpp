@@ -26,8 +26,7 @@ SeenThings::Thing SeenThings::thing_of(const model::ListedBody& listed) {
 void SeenThings::update() {
   if (things_.size() == layout_.listed.size() + 1) return;
   things_.assign(1, Thing{});
-  std::map<int, std::vector<InstanceIndex>>
-      of_label;  // instances of each label, in the order of the world
+  std::map<int, std::vector<InstanceIndex>> of_label;  // instances with each label, in world order
   for (const model::ListedBody& listed : layout_.listed) {
     Thing& thing = things_.emplace_back(thing_of(listed));
     if (thing.label == 0) continue;

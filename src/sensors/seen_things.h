@@ -1,7 +1,7 @@
-// What the labels drawn by the renderer mean: classes of objects, and temperatures.
+// The meaning of labels drawn by the renderer: classes of objects, and temperatures.
 //
-// Pictures tell bodies apart, not the visuals of one: a body has the first label and the first
-// temperature of its visuals.
+// Pictures distinguish bodies, not visuals: a body has the first label and the first temperature
+// among its visuals.
 #pragma once
 
 #include <vector>
@@ -17,16 +17,16 @@ class SeenThings {
 
   struct Thing {
     int label = 0;             // 0: none
-    double temperature = 0.0;  // K; 0: that of the air
+    double temperature = 0.0;  // K; 0: air temperature
     InstanceIndex instance;
-    int number = 0;  // of its model among those of the label, from 1
+    int number = 0;  // its model's number among those with the label, from 1
   };
-  // By the value of a pixel; 0 is nothing. Valid until the next call of update().
+  // By pixel value; 0 is nothing. Valid until the next call of update().
   const Thing& operator[](uint16_t pixel) const {
     return things_[pixel < things_.size() ? pixel : 0];
   }
   const std::vector<Thing>& all() const { return things_; }
-  // Of models that were added since.
+  // Adds models that have joined since.
   void update();
 
  private:

@@ -1,8 +1,8 @@
-// A segmentation camera: for each pixel the class of what is seen, on ROBOT/CAMERA, intrinsics on
-// /info. Classes are those of gz-sim's plugin Label; 0 is what has none.
+// A segmentation camera: the class of what each pixel shows, on ROBOT/CAMERA; intrinsics on /info.
+// Classes are those of gz-sim's plugin Label; 0 is unlabelled.
 //
 // <segmentation_type> semantic: 8 bits, the class. instance, panoptic: 16 bits, 256 times the class
-// plus the number of the model among those of its class, from 1 (255 at most).
+// plus the model's number in its class, from 1 (at most 255).
 #include <algorithm>
 
 #include "ruedo/image_t.hpp"
@@ -19,7 +19,7 @@ class SegmentationCamera : public Sensor {
         view_(setup, {"segmentation_type"}),
         things_(setup.world, setup.layout) {
     setup.element.refuse_unknown({"ruedo:phase"});
-    // Older files have it beside <camera>.
+    // In older files it is beside <camera>.
     const char* const path = setup.element.has("camera/segmentation_type")
                                  ? "camera/segmentation_type"
                                  : "segmentation_type";

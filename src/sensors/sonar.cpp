@@ -1,12 +1,12 @@
 // An array of sonar transducers, on ROBOT/SONAR-ARRAY. docs/world-files.md lists its elements.
 //
-// Model: a transducer's cone is sampled by rays in a fixed pattern, see cone(). A ray hears an echo
-// where it meets a surface of acoustic reflectance of at least kQuietest, at an incidence of at
-// most the specular angle. The reading is the average of all rays, those without echo counting as
-// the maximum range (Hernandez-Belmonte, Ayala-Ramirez, Sanchez-Yanez, ROSSUM 2011), or the nearest
-// echo, as real sonars give it. It is not below the minimum range, in which a transducer still
-// rings. The nearest echo is looked for with rays a degree apart or closer, and then about the
-// nearest of them, ever closer, until it is nearest. Noise is added to readings with an echo.
+// Model: a transducer's cone is sampled by rays in a fixed pattern, see cone(). A ray gets an echo
+// from a surface with an acoustic reflectance of at least kQuietest, at an incidence up to the
+// specular angle. The reading is the average of all rays, where rays without an echo count as the
+// maximum range (Hernandez-Belmonte, Ayala-Ramirez, Sanchez-Yanez, ROSSUM 2011), or the nearest
+// echo, as in real sonars. It is not below the minimum range, in which a transducer still rings.
+// The nearest echo is searched with rays at most a degree apart, and then around the nearest of
+// them with decreasing distance. Noise is added to readings with an echo.
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -26,13 +26,14 @@ namespace {
 using scene::Hit;
 using scene::Ray;
 
-constexpr double kQuietest = 0.05;  // acoustic reflectance; less is not heard
+constexpr double kQuietest = 0.05;  // acoustic reflectance; less gives no echo
 
-// Directions of n rays in a cone about x, each for an equal part of its solid angle: one along the
-// axis, the others on K rings, K = round((sqrt(1 + 4 (n - 1) / 3) - 1) / 2) but at least 1, with
-// rays in proportion to the rings' numbers, the first ray of odd rings on top, of even ones half a
-// ray further. A ring halves the solid angle of its part of the cone. Full angles in rad; where
-// they differ, the cone is elliptic and the parts are equal for small angles.
+// Directions of n rays in a cone about x, each representing an equal part of its solid angle: one
+// along the axis, the others on K rings, K = round((sqrt(1 + 4 (n - 1) / 3) - 1) / 2) but at least
+// 1. The number of rays grows in proportion to the ring's number; the first ray of odd rings is at
+// the top, that of even rings half a spacing further. A ring halves the solid angle of its part of
+// the cone. Full angles in rad; if they differ, the cone is elliptic and the parts are equal for
+// small angles.
 std::vector<Vec3> cone(int64_t n, double horizontal_rad, double vertical_rad) {
   std::vector<Vec3> directions{Vec3::UnitX()};
   const int64_t rest = n - 1;
@@ -49,7 +50,7 @@ std::vector<Vec3> cone(int64_t n, double horizontal_rad, double vertical_rad) {
                           static_cast<double>(on_ring);
       const double left = -0.5 * horizontal_rad * math::sin(turn),
                    up = 0.5 * vertical_rad * math::cos(turn);
-      const double edge = math::hypot(left, up);  // rad from the axis to the cone's edge
+      const double edge = math::hypot(left, up);  // rad, from the axis to the cone's edge
       if (edge == 0.0) {
         directions.push_back(Vec3::UnitX());
         continue;
@@ -63,14 +64,14 @@ std::vector<Vec3> cone(int64_t n, double horizontal_rad, double vertical_rad) {
   return directions;
 }
 
-constexpr double kApart_rad = M_PI / 180.0;  // rays that look for the nearest echo
-constexpr double kClosest_rad = 1e-5;        // how finely it is found
+constexpr double kApart_rad = M_PI / 180.0;  // spacing of rays in the search for the nearest echo
+constexpr double kClosest_rad = 1e-5;        // resolution of the search
 constexpr int kMostRounds = 60;
-constexpr size_t kAround = 6;  // rays of a round
+constexpr size_t kAround = 6;  // rays per round
 
-// As many rays as a cone needs for that distance from one to the next.
+// The number of rays for that spacing in a cone.
 int64_t rays_for(double horizontal_rad, double vertical_rad) {
-  constexpr int64_t kMost = 2000;  // of a cone that is wider than sonars' are
+  constexpr int64_t kMost = 2000;  // for cones wider than those of real sonars
   return std::min(kMost, rounded(0.25 * M_PI * std::max(horizontal_rad, kApart_rad) *
                                  std::max(vertical_rad, kApart_rad) / (kApart_rad * kApart_rad)));
 }
@@ -100,7 +101,7 @@ class Sonar : public SensorOf<Sonar> {
     configure(ours ? *ours : kNothing, aperture, setup);
   }
 
-  // What fired before the reset of time counts as fired at its beginning.
+  // A transducer that fired before the reset of time counts as fired at time 0.
   void shift_time(SimTime us) override {
     for (int64_t& fired : message_.fired_utime)
       fired = fired < 0 ? -1 : std::max<int64_t>(0, fired - us);
@@ -138,7 +139,7 @@ class Sonar : public SensorOf<Sonar> {
 
  private:
   struct Transducer {
-    Pose X_ST;  // x is the axis of the cone
+    Pose X_ST;  // x is the cone's axis
     Noise noise;
   };
 
@@ -223,11 +224,11 @@ class Sonar : public SensorOf<Sonar> {
     double range =
         nearest_ ? std::max(search(R_WS * transducer.X_ST.rotation, input), min_) : reading();
     const double measured =
-        transducer.noise.apply(range, dt_s, stream);  // drawn with an echo or without
+        transducer.noise.apply(range, dt_s, stream);  // drawn with or without an echo
     if (range < max_) range = std::clamp(measured, min_, max_);
     if (cross_talk_ > 0.0) {
-      // The echo of the one that fired before, heard by this one, is taken for its own when it
-      // comes first.
+      // Crosstalk: the echo of the transducer that fired before is taken for this one's own if it
+      // arrives first.
       const bool heard = stream.uniform() < cross_talk_;
       if (heard && last_fired_ >= 0 && last_fired_ != index)
         range = std::min(range, static_cast<double>(message_.range[last_fired_]));
@@ -238,7 +239,7 @@ class Sonar : public SensorOf<Sonar> {
     message_.fresh[i] = 1;
   }
 
-  // Of the cone's rays, without noise; max_ without an echo.
+  // From the cone's rays, without noise; max_ if there is no echo.
   double reading() const {
     double sum = 0.0, nearest = max_;
     for (size_t k = 0; k < rays_.size(); ++k) {
@@ -251,8 +252,8 @@ class Sonar : public SensorOf<Sonar> {
     return std::max(range, min_);
   }
 
-  // The nearest echo of the cone: from the nearest of its rays on, downhill. R_WT: of the
-  // transducer, x along the axis.
+  // The nearest echo in the cone: a descent from the nearest ray. R_WT: of the transducer, x along
+  // the axis.
   double search(const Eigen::Matrix3d& R_WT, const SampleInput& input) {
     double best = max_;
     Vec3 at = Vec3::UnitX();  // in T
@@ -285,7 +286,7 @@ class Sonar : public SensorOf<Sonar> {
     return best;
   }
 
-  // The direction (T) itself, or the one on the cone's edge on its side.
+  // The direction (T) itself, or its projection onto the cone's edge.
   Vec3 within_cone(const Vec3& direction) const {
     const double a = std::max(0.5 * horizontal_, kClosest_rad),
                  b = std::max(0.5 * vertical_, kClosest_rad);
@@ -310,7 +311,7 @@ class Sonar : public SensorOf<Sonar> {
   std::vector<Transducer> transducers_;
   std::vector<int> order_;
   bool nearest_ = false, all_ = false;
-  double least_cosine_ = 0.0;  // of the incidence that is still heard; 0: every one
+  double least_cosine_ = 0.0;  // of the largest incidence with an echo; 0: any
   double cross_talk_ = 0.0;
 
   std::vector<Vec3> directions_;  // in S, transducer by transducer

@@ -1,10 +1,10 @@
-// A thermal camera: the temperature of what is seen, on ROBOT/CAMERA, intrinsics on /info.
+// A thermal camera: the temperature of what each pixel shows, on ROBOT/CAMERA; intrinsics on /info.
 //
-// What is simulated: a body has the one temperature of gz-sim's plugin Thermal, everything else and
-// the sky that of the air at sea level (<atmosphere>). Emissivity is 1; nothing is reflected,
-// nothing conducts, and no distance weakens. A pixel is the temperature divided by <resolution>
-// (0.01 K with 16 bits, 3 K with the format L8) of the plugin ThermalSensor, within its <min_temp>
-// and <max_temp>, rounded; <noise> of the camera is in K.
+// Model: a body has the single temperature given by gz-sim's plugin Thermal; everything else and
+// the sky have the air temperature at sea level (<atmosphere>). Emissivity is 1; there is no
+// reflection, conduction or attenuation. A pixel is the temperature divided by <resolution> (0.01 K
+// with 16 bits, 3 K with the format L8) of the plugin ThermalSensor, within its <min_temp> and
+// <max_temp>, rounded; the camera's <noise> is in K.
 #include <algorithm>
 
 #include "core/whole.h"
@@ -102,7 +102,7 @@ class ThermalCamera : public Sensor {
   CameraView view_;
   SeenThings things_;
   Noise noise_;
-  int bytes_ = 2;                                               // of a pixel
+  int bytes_ = 2;                                               // per pixel
   double resolution_ = 0.01, lowest_ = 0.0, highest_ = 655.35;  // K
   image_t image_;
 };

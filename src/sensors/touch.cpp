@@ -1,9 +1,9 @@
-// A touch trigger, as gz-sim's TouchPlugin: tells when its model has touched a target for a while,
-// on ROBOT/DEVICE. At once, when it has; besides at its rate. Where Gazebo sends one message and
-// stops, `pressed` stays true here, for who comes later.
+// A touch trigger, like gz-sim's TouchPlugin: tells when its model has touched a target for some
+// time, on ROBOT/DEVICE; at once, and also at its rate. Where Gazebo sends one message and stops,
+// `pressed` stays true here, for late subscribers.
 //
-// It feels by the collisions that its contact sensors have; those that it names are a choice of
-// them. The target is a part of the scoped name of a collision: of a model's, a link's or its own.
+// It uses the collisions of its contact sensors, or the subset that it names. The target is a part
+// of the scoped name of a collision: of a model's, a link's or its own.
 #include <algorithm>
 #include <optional>
 
@@ -83,7 +83,7 @@ class Touch : public SensorOf<Touch> {
                                 "of its collisions feel");
   }
 
-  // By a contact sensor.
+  // From a contact sensor.
   bool is_felt(ModelLinkIndex link, const std::string& shape) const {
     return std::any_of(model().sensors.begin(), model().sensors.end(),
                        [&](const model::SensorDescription& each) {
@@ -104,7 +104,7 @@ class Touch : public SensorOf<Touch> {
            });
   }
 
-  // In both ways in which Gazebo writes it: model/M/link/L/collision/C, and M::L::C.
+  // In both notations used by Gazebo: model/M/link/L/collision/C, and M::L::C.
   bool is_target(LinkIndex index, int shape) const {
     const model::LinkPlacement& placed = layout_->links[index];
     const model::ModelInstance& instance = world_->models[placed.instance];
@@ -126,7 +126,7 @@ class Touch : public SensorOf<Touch> {
                        [&](const model::Collision& each) { return is_it(each.name); });
   }
 
-  // What of the contact is the model's: 1 for a, -1 for b; 0: it is none with the target.
+  // Which side of the contact is the model's: 1 for a, -1 for b; 0: not a contact with the target.
   int side(const Contact& contact) const {
     const bool as_a = feels(contact.link_a, contact.shape_a);
     if (!as_a && !feels(contact.link_b, contact.shape_b)) return 0;
@@ -154,8 +154,8 @@ class Touch : public SensorOf<Touch> {
   int channel_;
   std::string target_;
   SimTime time_us_ = 0;
-  std::vector<std::pair<LinkIndex, int>> shapes_;  // that feel; empty: all
-  std::optional<SimTime> since_;                   // it touches without a break
+  std::vector<std::pair<LinkIndex, int>> shapes_;  // sensitive ones; empty: all
+  std::optional<SimTime> since_;                   // start of the uninterrupted contact
   bool pressed_ = false;
   int64_t shown_step_ = -1;
   contact_t message_;

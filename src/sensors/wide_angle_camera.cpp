@@ -1,11 +1,12 @@
 // A wide-angle camera (fisheye): SDF's <lens> on ROBOT/CAMERA.
 //
-// A ray at the angle theta from the axis is seen at the radius r = c1 f fun(theta / c2 + c3) from
-// the middle, with fun and the constants of <type>: gnomonical tan, stereographic 2 tan(theta / 2),
-// equidistant theta, equisolid_angle 2 sin(theta / 2), orthographic sin, or <custom_function>. With
-// <scale_to_hfov> f is such that <horizontal_fov> fills the width. Nothing is seen beyond
-// <cutoff_angle> (pi / 2). Each picture is put together from those of a cube around the camera, so
-// that up to 2 pi are seen; pixels are blended from the four next to them. Light as for cameras.
+// A ray at the angle theta from the axis appears at the radius r = c1 f fun(theta / c2 + c3) from
+// the centre, with fun and the constants given by <type>: gnomonical tan, stereographic 2 tan(theta
+// / 2), equidistant theta, equisolid_angle 2 sin(theta / 2), orthographic sin, or
+// <custom_function>. With <scale_to_hfov>, f is such that <horizontal_fov> fills the width. Nothing
+// is visible beyond <cutoff_angle> (pi / 2). Each picture is assembled from those of a cube around
+// the camera, so that up to 2 pi are visible; pixels are interpolated between their four
+// neighbours. Lighting as for cameras.
 #include <cmath>
 #include <optional>
 
@@ -22,7 +23,8 @@ namespace {
 
 constexpr int kQuality = 85;
 
-// Of <lens>: angle to radius, and back by bisection, since fun grows on the way to the cutoff.
+// From <lens>: angle to radius, and the inverse by bisection, since fun is increasing up to the
+// cutoff.
 class Projection {
  public:
   Projection(const Element& camera, double hfov) {
@@ -56,7 +58,7 @@ class Projection {
 
   double radius(double theta) const { return c1_ * f_ * fun(theta / c2_ + c3_); }
 
-  // The angle at which a radius is seen; empty beyond the cutoff.
+  // The angle for a radius; empty beyond the cutoff.
   std::optional<double> angle(double r) const {
     if (r > radius(cutoff_)) return std::nullopt;
     double low = 0, high = cutoff_;
@@ -91,7 +93,7 @@ class Projection {
   double c1_ = 1, c2_ = 1, c3_ = 0, f_ = 1, cutoff_ = M_PI / 2;
 };
 
-// The faces of the cube: the axes of each in the camera's frame, as a rotation of it.
+// The faces of the cube: the orientation of each in the camera's frame.
 const Quat kFaces[] = {
     Quat::Identity(),                                   // ahead
     Quat(Eigen::AngleAxisd(M_PI / 2, Vec3::UnitZ())),   // left
@@ -100,7 +102,7 @@ const Quat kFaces[] = {
     Quat(Eigen::AngleAxisd(M_PI / 2, Vec3::UnitY())),   // down
     Quat(Eigen::AngleAxisd(M_PI, Vec3::UnitZ())),       // back
 };
-constexpr int kMargin = 2;  // pixels of the neighbours around a face, for blending
+constexpr int kMargin = 2;  // pixels of the neighbouring faces around each face, for interpolation
 
 class WideAngleCamera : public Sensor {
  public:
@@ -181,10 +183,10 @@ class WideAngleCamera : public Sensor {
           "the format '" + format->text + "' is not supported: the camera gives R8G8B8");
   }
 
-  // Where each pixel is on the faces, which lie below each other.
+  // The position of each pixel on the faces, which are stacked vertically.
   void make_map(const Projection& projection, int face_pixels) {
     view_.width = view_.height = face_pixels + 2 * kMargin;
-    view_.fx = view_.fy = face_pixels / 2.0;  // 90 degrees without the margin
+    view_.fx = view_.fy = face_pixels / 2.0;  // 90 degrees, without the margin
     view_.cx = view_.cy = (view_.width - 1) / 2.0;
     atlas_ =
         cv::Mat::zeros(view_.height * static_cast<int>(std::size(kFaces)), view_.width, CV_8UC3);
@@ -237,7 +239,7 @@ class WideAngleCamera : public Sensor {
   bool raw_ = false;
   int quality_ = kQuality;
   scene::View view_;       // of a face
-  std::vector<int> used_;  // faces of which anything is seen
+  std::vector<int> used_;  // visible faces
   scene::Picture picture_;
   cv::Mat atlas_, at_, bent_, bgr_;
   image_t image_;
