@@ -1,5 +1,5 @@
-// What belongs together is told from the message types' description: a type with a field `part`
-// comes in parts.
+// Messages that belong together are recognised by the description of their type: a type with a
+// field `part` comes in parts.
 #include "console/board.h"
 
 #include "console/drawn.h"
@@ -10,8 +10,8 @@
 namespace ruedo::console {
 namespace {
 
-// Where the field `part`, an int16, stands in a message; -1 where there is none, or not always at
-// one place.
+// The offset of the field `part`, an int16, in a message; -1 if there is none, or if its offset
+// varies.
 int part_offset(const Schema& schema) {
   int at = 8;  // after the fingerprint
   for (const Field& field : schema.fields) {

@@ -1,8 +1,7 @@
-// The newest messages of each channel, as the console's viewers are to see them. The console
-// thread's alone.
+// The newest messages of each channel, for the console's viewers. Used by the console thread only.
 //
-// Of most channels one message is kept. Messages in parts are kept together, and so are the last
-// few replies, so that no one misses their own, and of markers the newest of each layer.
+// For most channels one message is kept. Messages in parts are kept together, also the last few
+// replies, so that no client misses its own, and the newest markers of each layer.
 #pragma once
 
 #include <cstdint>
@@ -21,7 +20,7 @@ class Board {
   static constexpr size_t kMostParts = 256;
 
   struct Message {
-    uint64_t number;  // counts all messages that came to this board
+    uint64_t number;  // counts all messages that reached this board
     Bytes bytes;
   };
   struct Channel {
@@ -29,16 +28,16 @@ class Board {
     std::vector<Message> newest;
     uint64_t last_number = 0;  // of the newest message; 0: none yet
     int64_t fingerprint = 0;
-    int part_at = -1;  // byte at which the number of the part stands; -1: it has none
+    int part_at = -1;  // offset of the number of the part; -1: it has none
     bool replies = false, layers = false;
     int watchers = 0;  // viewers that want it
   };
 
-  // Makes room up to that channel. Names that are not UTF-8 are shown with '?'.
+  // Adds channels up to that one. Names that are not UTF-8 are shown with '?'.
   void name(size_t channel, const std::string& name);
   void put(size_t channel, std::vector<uint8_t> message);
 
-  // Whether it belongs to the message before it: a part of one, but not its first.
+  // Whether it continues the previous message: a part, but not the first.
   static bool is_later_part(std::span<const uint8_t> message);
 
   std::vector<Channel>& channels() { return channels_; }

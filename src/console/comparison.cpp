@@ -1,4 +1,4 @@
-// Bodies of both runs are matched by their names, robots by the channels of their poses.
+// Bodies of both runs are matched by name, robots by the channels of their poses.
 #include "console/comparison.h"
 
 #include <algorithm>
@@ -25,7 +25,7 @@ namespace {
 constexpr size_t kMostPlotted = 100'000;   // poses of a robot that are read for a plot
 constexpr size_t kMostReported = 200'000;  // and of all robots together, for the report
 constexpr uint32_t kMostMessage = 1u << 20;
-constexpr double kAnyAngle_rad = 1e-9;  // below that acos of a rounded product tells nothing
+constexpr double kAnyAngle_rad = 1e-9;  // acos of a rounded product has no smaller values
 
 template <class Message>
 std::optional<Message> decoded(std::span<const uint8_t> bytes) {
@@ -57,7 +57,7 @@ std::map<std::string, int32_t> bodies_of(const run::LogWorlds::Scene& scene) {
 
 constexpr std::string_view kPose = "/pose";
 
-// Of a channel ROBOT/pose of poses; "" for any other.
+// The robot of a pose channel ROBOT/pose; "" for any other channel.
 std::string robot_of(const log::Index::Channel& channel) {
   if (channel.fingerprint != pose_t::getHash() || !channel.name.ends_with(kPose)) return "";
   return channel.name.substr(0, channel.name.size() - kPose.size());
@@ -73,7 +73,7 @@ double angle_between(const Quat& a, const Quat& b) {
   return angle < kAnyAngle_rad ? 0.0 : angle;
 }
 
-// What differs first, over all channels.
+// The first difference over all channels.
 struct First {
   SimTime time_us = 0;
   std::string channel, field, shown, other;
@@ -152,7 +152,7 @@ void Comparison::find_robots() {
 
 // ---- ghosts
 
-// Where one of the worlds is not known, the same index is the same body.
+// If one of the worlds is not known, bodies are matched by index.
 const std::vector<int32_t>& Comparison::Ghosts::matched(const run::LogWorlds::Scene& shown,
                                                         const run::LogWorlds::Scene& other) {
   if (&shown == matched_shown_ && &other == matched_other_) return matched_;
@@ -210,8 +210,7 @@ void Comparison::Ghosts::show(Board& board, size_t channel, SimTime time_us) {
 
 // ---- how far apart
 
-// At the times of the log's poses; the other run's pose in between lies on the line from the one
-// before to the next.
+// At the times of the log's poses; the other run's pose is interpolated linearly.
 std::vector<Comparison::Sample> Comparison::samples(const Robot& robot, size_t most) const {
   log::Reader shown_reader(log_), other_reader(path_);
   const auto& ours = index_.channels()[robot.shown].entries;

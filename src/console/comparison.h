@@ -1,8 +1,8 @@
-// Another run beside the one that is shown: where its bodies are at each moment, how far apart
-// robots are, and what differs first.
+// Compares the run shown with another one: where its bodies are at each moment, how far apart the
+// robots are, and the first difference.
 //
-// Both are compared in a thread of its own, for a long log takes a while; all else is the console
-// thread's.
+// The comparison runs in a thread of its own, as a long log takes a while; everything else belongs
+// to the console's thread.
 #pragma once
 
 #include <atomic>
@@ -20,11 +20,12 @@ namespace ruedo::console {
 
 class Comparison {
  public:
-  // What it adds to the channels of the log that is shown.
+  // Channels added to those of the log shown.
   static constexpr const char* kStates = "compared/ruedo/world";  // the other run's world_state_t
-  static constexpr const char* kApart = "compared/";  // ROBOT: with fields "distance" and "angle"
+  // followed by ROBOT: with fields "distance" and "angle"
+  static constexpr const char* kApart = "compared/";
 
-  // Throws InputError for what is no log. index, worlds: of the log that is shown; they must
+  // Throws InputError for a file that is not a log. index, worlds: of the log shown; they must
   // outlive it.
   Comparison(const std::string& log, const log::Index& index, const run::LogWorlds& worlds,
              const std::string& other, const run::LoadRun& load);
@@ -34,18 +35,18 @@ class Comparison {
 
   // The other run's file name.
   const std::string& name() const { return name_; }
-  // "" or what of the other run cannot be shown.
+  // "", or what of the other run cannot be shown.
   std::string fault() const;
 
-  // The other run's bodies, as one viewer sees them. The comparison must outlive it.
+  // The other run's bodies for one viewer. The comparison must outlive it.
   class Ghosts {
    public:
     explicit Ghosts(const Comparison& comparison)
         : comparison_(&comparison), reader_(comparison.path_) {}
 
-    // Puts the other run's state of that moment on the board, where it is another one than before.
+    // Puts the other run's state at that moment on the board, if it has changed.
     void show(Board& board, size_t channel, SimTime time_us);
-    void forget() { shown_ = kNothing; }  // what is on the board: it is put there again
+    void forget() { shown_ = kNothing; }  // the board has been cleared: put it there again
 
    private:
     static constexpr size_t kNothing = static_cast<size_t>(-1);
@@ -55,17 +56,17 @@ class Comparison {
 
     const Comparison* comparison_;
     log::Reader reader_;
-    size_t shown_ = kNothing;  // how many states there were when one was put on the board
+    size_t shown_ = kNothing;  // number of states up to the one put on the board
     const run::LogWorlds::Scene *matched_shown_ = nullptr, *matched_other_ = nullptr;
     std::vector<int32_t>
-        matched_;  // of each body of the other run, its index in the log's; -1: none
+        matched_;  // for each body of the other run, its index in the log's; -1: none
   };
 
-  // Of a robot: time in s and distance in m, or angle in rad, between its pose in the log and that
-  // in the other run; null where not both have such a robot.
+  // For a robot: time in s and distance in m, or angle in rad, between its poses in the log and in
+  // the other run; null unless both have the robot.
   Bytes apart(const std::string& robot, const std::string& field);
 
-  // {"comparison": ...}; "" while it is not known.
+  // {"comparison": ...}; "" until it is known.
   std::string report() const;
 
  private:
@@ -87,12 +88,12 @@ class Comparison {
   log::Index other_;
   run::LogWorlds other_worlds_;
   std::optional<size_t> states_;              // the other run's channel of world_state_t
-  std::vector<Robot> robots_;                 // of both
-  std::vector<std::string> missing_, extra_;  // robots of the one, and of the other
+  std::vector<Robot> robots_;                 // in both
+  std::vector<std::string> missing_, extra_;  // robots that only one of them has
 
   std::atomic<bool> ending_{false};
   mutable std::mutex mutex_;
-  std::string report_;  // guarded
+  std::string report_;  // guarded by the mutex
   std::thread thread_;  // last: it uses all of the above
 };
 

@@ -1,4 +1,4 @@
-// Routes, the thread, and what is looked at once a tick.
+// Routes, the thread, and the work of each tick.
 #include "console/console.h"
 
 #include <algorithm>
@@ -24,7 +24,7 @@
 namespace ruedo::console {
 namespace {
 
-constexpr size_t kKeptScenes = 4;  // of a log, those asked for last
+constexpr size_t kKeptScenes = 4;  // of a log: those requested last
 
 Bytes bytes_of(std::string_view text) {
   return std::make_shared<const std::vector<uint8_t>>(text.begin(), text.end());
@@ -37,7 +37,7 @@ HttpResponse not_found() {
   return response;
 }
 
-// The number that stands after that beginning, and nothing behind it.
+// The number after that prefix, with nothing behind it.
 std::optional<size_t> number_after(std::string_view begin, std::string_view path) {
   if (!path.starts_with(begin)) return std::nullopt;
   path.remove_prefix(begin.size());
@@ -49,9 +49,9 @@ std::optional<size_t> number_after(std::string_view begin, std::string_view path
 
 }  // namespace
 
-// A world as the page draws it; what is null was not asked for yet.
+// A world as the page draws it; parts that are null have not been requested.
 struct Scene {
-  size_t number = 0;  // of a log's
+  size_t number = 0;  // a log's scenes are numbered
   uint64_t version = 0;
   std::shared_ptr<const model::WorldModel> world;
   std::unique_ptr<SceneData> looks;
@@ -60,9 +60,9 @@ struct Scene {
 
 struct Console::Impl {
   Stage stage;
-  std::shared_ptr<const model::WorldModel> world;  // that runs, or the log's first
-  std::deque<Scene> scenes;                        // the newest first
-  std::unique_ptr<Library> library;                // null: not asked for yet
+  std::shared_ptr<const model::WorldModel> world;  // the running one, or the log's first
+  std::deque<Scene> scenes;                        // newest first
+  std::unique_ptr<Library> library;                // null: not requested yet
   std::unique_ptr<WebServer> web;
   std::thread thread;
   std::mutex words_mutex;
@@ -87,7 +87,7 @@ HttpResponse Console::Impl::blob(Bytes body, const std::string& type) {
   return response;
 }
 
-// Null where there is no such world.
+// Null if there is no such world.
 Scene* Console::Impl::scene(size_t number) {
   const auto known = std::find_if(scenes.begin(), scenes.end(),
                                   [&](const Scene& each) { return each.number == number; });
@@ -121,7 +121,7 @@ HttpResponse Console::Impl::get(std::string_view path) {
   return not_found();
 }
 
-// "FIELD/CHANNEL": names of channels have slashes in them.
+// "FIELD/CHANNEL": channel names contain slashes.
 HttpResponse Console::Impl::history(std::string_view path) {
   const size_t slash = path.find('/');
   if (slash == std::string_view::npos) return not_found();
@@ -130,7 +130,7 @@ HttpResponse Console::Impl::history(std::string_view path) {
               "application/octet-stream");
 }
 
-// A file of a scene; of a log's the one whose number comes first, as in "/3.json".
+// A file of a scene; for a log, its number comes first, as in "/3.json".
 HttpResponse Console::Impl::scene_file(std::string_view path, bool shapes) {
   size_t number = 0;
   if (path.size() > 1 && path[0] == '/' && path[1] >= '0' && path[1] <= '9') {
@@ -159,14 +159,14 @@ HttpResponse Console::Impl::file_of(const SceneData& data, std::string_view path
   return blob(data.pictures[*picture].bytes, data.pictures[*picture].type);
 }
 
-// What SPAWN would take to make that model.
+// The text that SPAWN would take to create that model.
 HttpResponse Console::Impl::model_text(size_t index) {
   if (!world || index >= world->models.size() || world->models[index].removed) return not_found();
   const std::string text = stage.source->model_text(world->models[index].name);
   return text.empty() ? not_found() : blob(bytes_of(text), "text/plain; charset=utf-8");
 }
 
-// "/library.json", and of each of its models "/library/NUMBER/scene" with the files of a scene.
+// "/library.json", and for each of its models "/library/NUMBER/scene" with the files of a scene.
 HttpResponse Console::Impl::library_file(std::string_view path) {
   if (!world || stage.is_log) return not_found();
   if (!library) library = std::make_unique<Library>(world->file);
@@ -249,7 +249,7 @@ void Console::end(const std::string& words) {
 Console::~Console() {
   impl_->web->stop();
   impl_->thread.join();
-  impl_->web.reset();  // its viewers, before the stage
+  impl_->web.reset();  // its viewers first, then the stage
 }
 
 }  // namespace ruedo::console

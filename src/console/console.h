@@ -1,5 +1,5 @@
-// The web console: serves the page, and lets browsers see and steer what its source shows. In a
-// thread of its own.
+// The web console: serves the page, and lets browsers watch and steer what its source shows. Runs
+// in a thread of its own.
 #pragma once
 
 #include <memory>
@@ -15,17 +15,17 @@ class Console {
  public:
   static constexpr size_t kMostViewers = 128;
 
-  // Starts to serve. mode: "live" or "log"; title: what is shown. Throws EnvironmentError when the
-  // address cannot be had.
+  // Starts serving. mode: "live" or "log"; title: what is shown. Throws EnvironmentError if the
+  // address is not available.
   Console(const Address& address, std::unique_ptr<Source> source, const std::string& mode,
           const std::string& title);
-  // Tells the viewers that it is over, and ends.
+  // Tells the viewers that the run has ended, and stops.
   ~Console();
 
-  // Where a browser finds it: "http://127.0.0.1:8080/", with the token where one is needed.
+  // The address for browsers: "http://127.0.0.1:8080/", with the token if one is needed.
   const std::vector<std::string>& urls() const { return urls_; }
 
-  // What the viewers are told at the end.
+  // The last message to viewers.
   void end(const std::string& words);
 
  private:

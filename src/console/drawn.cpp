@@ -10,7 +10,7 @@
 
 namespace ruedo::console {
 
-// Behind fingerprint and utime stands its length with a zero, then the name.
+// After fingerprint and utime come the length of the name (including the final zero) and the name.
 std::string layer_of(std::span<const uint8_t> message) {
   constexpr size_t kAt = 16, kName = kAt + 4;
   if (message.size() < kName || fingerprint_of(message) != markers_t::getHash()) return "";

@@ -1,5 +1,5 @@
-// What clients drew in a run (markers_t), as its log has it: the newest message of each layer at
-// any moment. Of each message only the place is kept.
+// What clients drew in a run (markers_t), from its log: the newest message of each layer at any
+// moment. Only the messages' places are kept.
 #pragma once
 
 #include <cstdint>
@@ -13,20 +13,20 @@ namespace ruedo::console {
 
 constexpr const char* kMarkersChannel = "ruedo/markers";
 
-// The layer of an encoded markers_t; "" for what is none.
+// The layer of an encoded markers_t; "" for other bytes.
 std::string layer_of(std::span<const uint8_t> message);
-// Whether a run would take it.
+// Whether a run would accept it.
 bool is_drawn(std::span<const uint8_t> message);
-// A markers_t that empties a layer.
+// A markers_t that clears a layer.
 std::vector<uint8_t> empty_layer(const std::string& layer);
 
 class Drawn {
  public:
-  static constexpr size_t kMostLayers = 64;  // further ones are not shown
+  static constexpr size_t kMostLayers = 64;  // further layers are not shown
 
   struct Mark {
     SimTime time_us;
-    int64_t offset;  // of the event in the file: of it, or of the applied_t that has it
+    int64_t offset;  // file offset of the event: a markers_t, or the applied_t that contains it
   };
   struct Layer {
     std::string name;
@@ -35,12 +35,12 @@ class Drawn {
     size_t count_until(SimTime time_us) const;
   };
 
-  // In the order of the log.
+  // In log order.
   void add(const std::string& layer, Mark mark);
   const std::vector<Layer>& layers() const { return layers_; }
 
-  // The message of a layer after so many of them: empty after none, and where no run would take it
-  // or the file is not what it was.
+  // The message of a layer after that many of them: empty after none, if no run would accept it, or
+  // if the file has changed.
   static std::vector<uint8_t> message(const Layer& layer, size_t count, log::Reader& reader);
 
  private:

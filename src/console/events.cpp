@@ -1,4 +1,4 @@
-// By type: which messages follow each other on a channel, and what is new in them.
+// By message type: compares successive messages of a channel.
 #include "console/events.h"
 
 #include <algorithm>
@@ -29,8 +29,8 @@
 namespace ruedo::console {
 namespace {
 
-constexpr double kSameTouch_s = 0.5;    // apart, touches of one body are one collision
-constexpr double kSameCommand_s = 1.0;  // so is what a client commands again and again
+constexpr double kSameTouch_s = 0.5;    // contacts of a body with shorter gaps are one collision
+constexpr double kSameCommand_s = 1.0;  // likewise repeated commands
 constexpr size_t kMostAsked = 256, kMostBodies = 256;
 
 template <class Message>
@@ -40,14 +40,14 @@ std::optional<Message> decoded(std::span<const uint8_t> bytes) {
   return message;
 }
 
-// Points of contact, whoever tells of them.
+// Contact points, from any type that has them.
 bool tells_touches(const Schema& schema) {
   return std::any_of(schema.fields.begin(), schema.fields.end(), [](const Field& field) {
     return field.name == "points" && field.type && field.type->name == "contact_point_t";
   });
 }
 
-// ROBOT/DEVICE, and ROBOT alone for a channel that was given another name.
+// ROBOT/DEVICE; only ROBOT for a renamed channel.
 std::string robot_of(const std::string& channel) {
   return channel.substr(0, std::min(channel.find('/'), channel.size()));
 }
@@ -87,7 +87,7 @@ std::string words_of(const std::string& fault, const std::string& target, double
   return text;
 }
 
-// The name in a request's body; "" for none.
+// The name in a request's body; "" if there is none.
 std::string name_in(int32_t kind, std::span<const uint8_t> body) {
   if (kind == request_t::SPAWN) {
     const auto spawn = decoded<spawn_request_t>(body);
@@ -105,7 +105,7 @@ std::string name_in(int32_t kind, std::span<const uint8_t> body) {
   return name ? name->name : "";
 }
 
-// What a request does; "" for one that changes nothing.
+// The effect of a request; "" if it changes nothing.
 const char* verb_of(int32_t kind) {
   switch (kind) {
     case request_t::RESET: return "reset";
@@ -206,7 +206,8 @@ void Events::hear(double time_s, const std::string& channel, std::span<const uin
   }
 }
 
-// Bodies that were not touched a moment before. What a channel tells first lasts already.
+// Bodies that were not touched a moment before. The first message of a channel reports ongoing
+// contacts.
 void Events::touches(const std::string& channel, std::span<const uint8_t> message) {
   std::set<std::string> bodies;
   std::optional<std::string> blocked_by;
@@ -246,7 +247,8 @@ void Events::motion(const std::string& channel, const motion_status_t& now) {
   if (now.state == motion_status_t::STATE_REFUSED) {
     add("refused", robot, words_of(now.kind, now.done) + ": " + why_refused(now.reason));
   } else if (now.reason == motion_status_t::REASON_BLOCKED) {
-    if (blocked_by_.contains(robot) && !ended) return;  // who tells by what tells that, too
+    // the sender's other messages report that already
+    if (blocked_by_.contains(robot) && !ended) return;
     add("blocked", robot, what + (ended ? " ended: blocked" : " is blocked"));
   } else if (now.reason == motion_status_t::REASON_WATCHDOG && ended) {
     add("watchdog", robot, "no command came: stopped");
@@ -283,7 +285,7 @@ void Events::done(int32_t kind, std::span<const uint8_t> body) {
   add(resets ? "reset" : "request", "", name.empty() ? verb : verb + " " + name);
 }
 
-// A request that was done. Who repeats one that is done gets the same answer again.
+// A request that succeeded. Repeating it gives the same answer again.
 void Events::replied(std::span<const uint8_t> message) {
   const auto reply = decoded<reply_t>(message);
   if (!reply) return;
@@ -298,7 +300,7 @@ void Events::replied(std::span<const uint8_t> message) {
 EventScan::EventScan(const log::Index& index, const model::WorldModel* world) {
   if (world) events_.plan(world->faults);
   const auto& channels = index.channels();
-  // Where all that acted is written down, the messages that asked for it say nothing new.
+  // If the log records everything that acted, the messages that asked for it add nothing.
   const bool written = std::any_of(channels.begin(), channels.end(), [](const auto& channel) {
     return channel.name == log::kAppliedChannel;
   });

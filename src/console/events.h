@@ -1,7 +1,7 @@
-// What happened in a run, as moments to jump to: collisions, commands, requests, resets, the
-// watchdog, goals, faults, messages that were lost.
+// The events of a run, as moments to jump to: collisions, commands, requests, resets, watchdog
+// stops, goals, faults, lost messages.
 //
-// It is told from messages as they follow each other; what lasts, or is repeated, is one event.
+// Derived from the sequence of messages; what lasts or is repeated counts as one event.
 #pragma once
 
 #include <cstdint>
@@ -22,7 +22,7 @@
 namespace ruedo::console {
 
 struct Event {
-  double time_s = 0;  // the time line's
+  double time_s = 0;  // on the time line
   std::string kind;   // "collision", "blocked", "command", "request", "reset", "watchdog", "goal",
                       // "refused", "fault", "lost"
   std::string robot;  // "" for the whole run
@@ -31,28 +31,28 @@ struct Event {
 
 class Events {
  public:
-  static constexpr size_t kMost = 20'000;  // later ones are not kept
+  static constexpr size_t kMost = 20'000;  // later ones are dropped
 
-  // live: the time is that of the messages themselves, and a reset empties the list.
+  // live: times are those of the messages, and a reset clears the list.
   explicit Events(bool live) : live_(live) {}
 
-  // Whether messages of that type may tell of something.
+  // Whether messages of that type can give events.
   static bool tells(int64_t fingerprint);
 
-  // The faults that the run will have of itself.
+  // The faults that the run will have on its own.
   void plan(const std::vector<model::Fault>& faults);
-  // A message, in the order in which they came. What is no whole message is no event.
+  // Messages in order of arrival. An incomplete message gives no event.
   void hear(double time_s, const std::string& channel, std::span<const uint8_t> message);
-  // So many messages could not be sent so far.
+  // The number of messages that could not be sent so far.
   void lost(uint64_t count);
 
-  // In the order in which they were heard.
+  // In order of occurrence.
   const std::vector<Event>& list() const { return list_; }
-  // Another one when the list was reset.
+  // Changes when the list is cleared.
   uint64_t generation() const { return generation_; }
 
  private:
-  using Touched = std::map<std::string, double>;  // bodies, and when each was touched last
+  using Touched = std::map<std::string, double>;  // bodies with the time of their last contact
 
   void add(const std::string& kind, const std::string& robot, const std::string& text);
   void touches(const std::string& channel, std::span<const uint8_t> message);
@@ -67,24 +67,24 @@ class Events {
   std::vector<Event> list_;
   uint64_t generation_ = 0;
   double now_s_ = 0;
-  std::map<std::string, Touched> touched_;                  // by robot
-  std::set<std::string> heard_;                             // channels of touches
-  std::map<std::string, motion_status_t> motions_;          // by channel, the newest
-  std::map<std::string, std::string> blocked_by_;           // by robot, of those that tell
-  std::map<std::string, double> commanded_;                 // by channel, when last
-  std::map<std::pair<int64_t, int64_t>, request_t> asked_;  // by session and sequence; not answered
-  std::vector<model::Fault> planned_;                       // by time
-  size_t due_ = 0;                                          // of them, those that have come
+  std::map<std::string, Touched> touched_;          // by robot
+  std::set<std::string> heard_;                     // channels with contacts
+  std::map<std::string, motion_status_t> motions_;  // by channel, the newest
+  std::map<std::string, std::string> blocked_by_;   // by robot: the channel that reports its blocks
+  std::map<std::string, double> commanded_;         // by channel: time of the last command
+  std::map<std::pair<int64_t, int64_t>, request_t> asked_;  // by session and sequence; unanswered
+  std::vector<model::Fault> planned_;                       // sorted by time
+  size_t due_ = 0;                                          // number of those that have started
   uint64_t lost_ = 0;
 };
 
-// The events of a log, and what clients drew in it, read piece by piece.
+// The events of a log and what clients drew in it, read piece by piece.
 class EventScan {
  public:
-  // world: of the log's beginning; null: not known.
+  // world: of the log's start; null: not known.
   EventScan(const log::Index& index, const model::WorldModel* world);
 
-  // Reads up to so many messages; true when all have been read.
+  // Reads up to that many messages; true once all have been read.
   bool advance(log::Reader& reader, size_t messages);
   const Events& events() const { return events_; }
   const Drawn& drawn() const { return drawn_; }
@@ -94,7 +94,7 @@ class EventScan {
     SimTime time_us;
     int64_t offset;
   };
-  std::vector<Place> places_;  // of what may tell, by time
+  std::vector<Place> places_;  // messages that may give events, by time
   size_t next_ = 0;
   Events events_{false};
   Drawn drawn_;

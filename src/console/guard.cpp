@@ -1,6 +1,6 @@
-// Loopback: only who calls this machine by a loopback name comes in, so that a page elsewhere whose
-// name was made to point here does not. Elsewhere: only who has the token. A page of another origin
-// never gets a socket.
+// On loopback, a request must name this machine by a loopback name, which stops pages elsewhere
+// whose name was redirected here (DNS rebinding). On other addresses it needs the token. A page of
+// another origin never gets a socket.
 #include "console/guard.h"
 
 #include <arpa/inet.h>
@@ -31,7 +31,7 @@ std::string_view host_name(std::string_view host) {
 }
 
 bool equal(std::string_view a,
-           std::string_view b) {  // in a time that tells nothing of where they differ
+           std::string_view b) {  // constant time: reveals nothing about where they differ
   unsigned difference = a.size() == b.size() ? 0 : 1;
   for (size_t i = 0; i < std::min(a.size(), b.size()); ++i)
     difference |= static_cast<unsigned char>(a[i]) ^ static_cast<unsigned char>(b[i]);

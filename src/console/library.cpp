@@ -1,4 +1,4 @@
-// Folders are looked through once; models are read when their pictures are asked for.
+// Folders are searched once; models are read when their pictures are requested.
 #include "console/library.h"
 
 #include <algorithm>
@@ -22,7 +22,7 @@ bool is_model(const fs::path& folder) {
          fs::is_regular_file(folder / "model.config", error);
 }
 
-// Those folders of a folder that are models, by name.
+// The subfolders that are models, by name.
 std::set<std::string> models_in(const fs::path& folder) {
   std::set<std::string> names;
   std::error_code error;
@@ -40,7 +40,7 @@ std::set<std::string> models_in(const fs::path& folder) {
 const std::vector<Library::Entry>& Library::entries() {
   if (std::exchange(listed_, true)) return entries_;
   const fs::path shipped = model::shipped_worlds(), beside = fs::path(world_file_).parent_path();
-  std::set<std::string> known{"sun", "ground_plane"};  // what each world has
+  std::set<std::string> known{"sun", "ground_plane"};  // part of every world
   const auto add = [&](const fs::path& folder, bool robots) {
     for (const std::string& name : models_in(folder)) {
       if (entries_.size() < kMostModels && known.insert(name).second)
@@ -75,7 +75,7 @@ const SceneData* Library::scene(size_t index) {
     model::WorldModel world;
     world.name = loaded.name;
     world.file = world_file_;
-    auto still = std::make_shared<model::Model>(*loaded.model);  // its links where they begin
+    auto still = std::make_shared<model::Model>(*loaded.model);  // its links at their start poses
     still->is_static = true;
     still->drive.reset();
     world.models.push_back({loaded.name, {}, std::move(still)});

@@ -1,5 +1,5 @@
-// The models that a world can be furnished with: those of Ruedo, and those in the `models` folders
-// beside the world's file. Served as a list, and each as a scene of its own for a picture.
+// The models that can be added to a world: Ruedo's own, and those in the `models` folders beside
+// the world's file. Served as a list, and each as a scene of its own for a picture.
 #pragma once
 
 #include <list>
@@ -15,13 +15,13 @@ namespace ruedo::console {
 class Library {
  public:
   static constexpr size_t kMostModels = 1000;
-  static constexpr size_t kKept = 8;  // scenes that are kept
+  static constexpr size_t kKept = 8;  // scenes that are kept in memory
 
   explicit Library(std::string world_file) : world_file_(std::move(world_file)) {}
 
   // [{"name": "desk", "robot": false}, ...]: names that SPAWN takes.
   std::string list();
-  // Null for a number that is not in the list, and for a model that cannot be read.
+  // Null for a number that is not in the list, or a model that cannot be read.
   const SceneData* scene(size_t index);
 
  private:
@@ -34,7 +34,7 @@ class Library {
   std::string world_file_;
   std::vector<Entry> entries_;
   bool listed_ = false;
-  std::list<std::pair<size_t, std::unique_ptr<SceneData>>> scenes_;  // the last used first
+  std::list<std::pair<size_t, std::unique_ptr<SceneData>>> scenes_;  // most recently used first
 };
 
 }  // namespace ruedo::console

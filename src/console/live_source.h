@@ -1,4 +1,4 @@
-// A running server, as the console sees it: what goes through its run, and its world.
+// A running server, as the console sees it: the messages in its run, and its world.
 #pragma once
 
 #include <functional>
@@ -11,13 +11,13 @@
 
 namespace ruedo::console {
 
-// What it asks the run for; from any thread.
+// Requests to the run; from any thread.
 struct LiveHost {
   std::function<std::shared_ptr<const model::WorldModel>()> world;
   std::function<std::string(const std::string& name)> model_text;
   std::function<void(const std::string& channel, std::span<const uint8_t> message)> receive;
   std::function<uint64_t()> lost;  // messages that the bus could not send
-  std::string save_name;           // of the file that SAVE writes
+  std::string save_name;           // of the file written by SAVE
 };
 
 class LiveSource : public Source {
@@ -40,7 +40,7 @@ class LiveSource : public Source {
       board.put(channel, std::move(message));
     });
     if (viewers) {
-      // After what was offered, all of which is older.
+      // Called after the offered messages, which are all older.
       Tap::State state = tap_.take_state(count);
       for (std::vector<uint8_t>& part : state.parts) board.put(state.channel, std::move(part));
     }
@@ -75,7 +75,7 @@ class LiveSource : public Source {
   void choose(const Board& board) {
     for (size_t i = 0; i < board.channels().size(); ++i) {
       const Board::Channel& channel = board.channels()[i];
-      // What a channel carries is known by its first message.
+      // A channel's type is known from its first message.
       const bool heard = channel.last_number == 0 || Events::tells(channel.fingerprint);
       tap_.channel(i).wanted.store(heard || channel.watchers > 0, std::memory_order_relaxed);
     }

@@ -1,5 +1,5 @@
-// The file is the page (kShell, made by build.mjs), a JSON text that says what is where, and all
-// bytes as one base64 text.
+// The file consists of the page (kShell, made by build.mjs), a JSON index, and all bytes as one
+// base64 text.
 #include "console/log_page.h"
 
 #include <algorithm>
@@ -32,12 +32,12 @@
 namespace ruedo::console {
 namespace {
 
-constexpr uint32_t kMostMessage = 16u << 20;  // bytes; a larger one is left out
+constexpr uint32_t kMostMessage = 16u << 20;  // bytes; larger messages are left out
 constexpr SimTime kFirstInterval_us = 20'000;
-constexpr size_t kHead = 16;  // bytes before an entry's messages: channel, their number, time
+constexpr size_t kHead = 16;  // bytes before an entry's messages: channel, count, time
 
 template <class Value>
-void append(std::vector<uint8_t>& bytes, Value value) {  // little endian, as browsers are
+void append(std::vector<uint8_t>& bytes, Value value) {  // little endian, as in browsers
   const auto* from = reinterpret_cast<const uint8_t*>(&value);
   bytes.insert(bytes.end(), from, from + sizeof value);
 }
@@ -46,8 +46,8 @@ bool are_pictures(const log::Index::Channel& channel) {
   return channel.fingerprint == image_t::getHash();
 }
 
-// Which entries of a channel remain when no two are closer than that; the first and the last always
-// do.
+// Which entries of a channel remain if no two are closer than that; always including the first and
+// the last.
 std::vector<size_t> thinned(const log::Index::Channel& channel, SimTime interval_us) {
   std::vector<size_t> kept;
   for (size_t i = 0; i < channel.entries.size(); ++i) {
@@ -69,7 +69,7 @@ size_t size_of(const log::Index& index, bool pictures, SimTime interval_us) {
   return sum;
 }
 
-// The least interval with which they fit; -1 where none does.
+// The smallest interval for which they fit; -1 if there is none.
 SimTime interval_that_fits(const log::Index& index, bool pictures, size_t room) {
   for (SimTime interval_us = 0;
        interval_us <= 2 * (index.end_us() - index.begin_us() + kFirstInterval_us);
@@ -91,7 +91,7 @@ class Writer {
     EventScan scan(index_, worlds_.at(index_.begin_us()).world.get());
     scan.advance(reader_, std::numeric_limits<size_t>::max());
     add_events(scan.events());
-    // Base64 takes four bytes for three.
+    // Base64 encodes three bytes as four.
     const size_t fixed = kShellSize + json_scenes_.size() + json_events_.size() +
                          64 * index_.channels().size() + 4096;
     const size_t room = most_bytes > fixed ? (most_bytes - fixed) / 4 * 3 : 0;
@@ -135,7 +135,7 @@ class Writer {
     bytes_.insert(bytes_.end(), bytes.begin(), bytes.end());
   }
 
-  // Each scene that the run had, from when on.
+  // Each scene of the run, with its start time.
   void add_scenes() {
     std::vector<SimTime> times{index_.begin_us()};
     for (const log::Index::Edit& edit : index_.edits()) times.push_back(edit.time_us);
@@ -173,8 +173,8 @@ class Writer {
     json_events_ = json.text();
   }
 
-  // Each time with all that is drawn then. Of what would take more room so many are left out that
-  // they lie evenly.
+  // Each time with all that is drawn then. If there is not enough room, some are left out at even
+  // distances.
   void add_drawn(const Drawn& drawn, size_t room) {
     std::set<SimTime> times;
     for (const Drawn::Layer& layer : drawn.layers()) {
@@ -197,8 +197,8 @@ class Writer {
     for (size_t i = 0; i < all.size(); i += every) add_entry(channel, all[i], at(all[i]));
   }
 
-  // Channel, number of messages (a message may come in parts), time in s; then of each message its
-  // size and bytes.
+  // Channel, number of messages (a message may come in parts), time in s; then each message's size
+  // and bytes.
   void add_entry(uint32_t channel, SimTime time_us,
                  const std::vector<std::vector<uint8_t>>& messages) {
     append(bytes_, channel);
@@ -227,7 +227,7 @@ class Writer {
       add_entry(static_cast<uint32_t>(names_.size() - 1), scene->from_us, scene->info);
   }
 
-  // A message with the parts that came before it, as far as it is one of several.
+  // A message with the preceding parts, if it is one of several.
   std::vector<std::vector<uint8_t>> whole(const log::Index::Channel& channel, size_t entry) {
     std::vector<std::vector<uint8_t>> parts;
     for (size_t i = entry + 1; i-- > 0 && parts.size() < Board::kMostParts;) {
@@ -255,7 +255,8 @@ class Writer {
     for (const std::string& name : names_) json.value(name);
     json.close(']').name("events").raw(json_events_).name("scenes").raw(json_scenes_).close('}');
     std::string text;
-    for (const char c : json.text()) {  // nothing in it ends the element that it stands in
+    // escaped, so that nothing in it ends the element that contains it
+    for (const char c : json.text()) {
       if (c == '<') {
         text += "\\u003c";
       } else {

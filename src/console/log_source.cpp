@@ -1,5 +1,5 @@
-// Playing and seeking are one thing: the time is another one, and channels whose newest message has
-// changed are read.
+// Playing and seeking are the same: the time changes, and channels whose newest message has changed
+// are read.
 #include "console/log_source.h"
 
 #include <algorithm>
@@ -17,10 +17,11 @@ namespace ruedo::console {
 namespace {
 
 constexpr double kLongestPause_s =
-    0.5;  // between two looks at the clock; after a longer one the log does not jump
+    // longest interval between two looks at the clock; after a longer one the log does not jump
+    0.5;
 constexpr double kSlowest = 0.01, kFastest = 1000.0;
 
-// The number at a field's path; none where the message has none there.
+// The number at a field's path; none if the message has none there.
 std::optional<double> number_at(std::span<const uint8_t> message, const std::string& path) {
   const Schema* schema = find_schema(fingerprint_of(message));
   std::optional<double> found;
@@ -38,7 +39,7 @@ std::optional<double> number_at(std::span<const uint8_t> message, const std::str
 bool read(log::Reader& reader, const log::Index::Entry& wanted, log::Event& event) {
   if (wanted.size > LogSource::kMostMessage) return false;
   reader.seek(wanted.offset);
-  return reader.next(event);  // false when the file is no longer what it was
+  return reader.next(event);  // false if the file has changed
 }
 
 }  // namespace
@@ -81,7 +82,7 @@ void LogSource::pump(Board&, bool viewers) {
   if (viewers && !scanned_) scanned_ = scan_.advance(reader_, kScanned);
 }
 
-// The first message and the last one are always among those that are read.
+// The first and the last message are always among those read.
 Bytes LogSource::history(const std::string& name, const std::string& field) {
   const std::string_view apart = Comparison::kApart;
   if (comparison_ && name.starts_with(apart))
@@ -152,7 +153,7 @@ void LogLook::show(Board& board) {
   for (size_t i = 0; i < channels.size(); ++i) {
     if (channels[i].fingerprint == markers_t::getHash()) continue;  // see show_drawn
     if (board.channels()[i].watchers == 0) {
-      shown_[i] = kNothing;  // it is read again on demand
+      shown_[i] = kNothing;  // read again on demand
       continue;
     }
     size_t count = channels[i].count_until(time_us);
@@ -188,7 +189,7 @@ void LogLook::show_drawn(Board& board) {
   }
 }
 
-// The newest of so many messages; of one that comes in parts, the parts before it, too.
+// The newest of that many messages; for one in parts, including the previous parts.
 void LogLook::load(Board& board, size_t channel, size_t count) {
   const auto& entries = source_.index_.channels()[channel].entries;
   std::vector<std::vector<uint8_t>> parts;
@@ -225,7 +226,7 @@ void LogLook::seek(Board& board, double time_s) {
   show(board);
 }
 
-// From one state to the next; where the log has none, from one message to the next.
+// From state to state; if the log has none, from message to message.
 void LogLook::step(Board& board, int states) {
   const auto& channels = source_.index_.channels();
   const auto found = std::find_if(channels.begin(), channels.end(), [](const auto& channel) {

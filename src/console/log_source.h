@@ -1,5 +1,5 @@
-// A recorded run, as the console sees it: to each viewer, at a moment of its own, the newest
-// message of every channel that it watches.
+// A recorded run, as the console sees it: gives each viewer the newest message of every channel
+// that it watches, at the viewer's own moment.
 #pragma once
 
 #include <memory>
@@ -16,12 +16,12 @@ namespace ruedo::console {
 
 class LogSource : public Source {
  public:
-  static constexpr size_t kMostHistory = 100'000;  // messages of a channel that are read for a plot
-  static constexpr size_t kScanned = 2'000;        // messages at a time, for what happened
-  static constexpr uint32_t kMostMessage = 64u << 20;  // bytes; a larger one is not shown
+  static constexpr size_t kMostHistory = 100'000;      // messages of a channel read for a plot
+  static constexpr size_t kScanned = 2'000;            // messages scanned for events at a time
+  static constexpr uint32_t kMostMessage = 64u << 20;  // bytes; larger ones are not shown
 
-  // Throws InputError for what is no log. speed: log time per real time.
-  // other: a log that is compared with it; "" for none. It is loaded by load_other.
+  // Throws InputError for a file that is not a log. speed: log time per wall time. other: a log to
+  // compare with, loaded by load_other; "" for none.
   LogSource(const std::string& path, const run::LoadRun& load, double speed,
             const std::string& other = "", const run::LoadRun& load_other = {});
 
@@ -39,7 +39,7 @@ class LogSource : public Source {
  private:
   friend class LogLook;
 
-  // Behind those of the log, and the info that it may not have.
+  // After those of the log, and the info channel if the log has none.
   size_t drawn_channel() const { return index_.channels().size() + (makes_info_ ? 1 : 0); }
   size_t compared_channel() const { return drawn_channel() + 1; }
 
@@ -51,11 +51,11 @@ class LogSource : public Source {
   bool scanned_ = false;
   log::Reader reader_;
   std::string info_channel_;
-  bool makes_info_ = false;  // the log has none: it is the channel after all of the log's
-  std::unique_ptr<Comparison> comparison_;  // null: with none
+  bool makes_info_ = false;  // the log has none: its channel follows those of the log
+  std::unique_ptr<Comparison> comparison_;  // null: no comparison
 };
 
-// What a viewer sees of a log. Time begins with it, and stands still where it is paused.
+// One viewer's view of a log. Its time starts with it, and stops while paused.
 class LogLook : public Look {
  public:
   // The source must outlive it.
@@ -81,10 +81,10 @@ class LogLook : public Look {
   log::Reader reader_;
   log::Event event_;
   const run::LogWorlds::Scene* told_ = nullptr;  // whose info is on the board
-  // Of each channel, how many messages there were when one was put on the board.
+  // For each channel, the number of messages up to the one put on the board.
   std::vector<size_t> shown_;
-  std::vector<size_t> shown_layers_;          // of each layer, as shown_
-  std::optional<Comparison::Ghosts> ghosts_;  // none: nothing is compared
+  std::vector<size_t> shown_layers_;          // for each layer, like shown_
+  std::optional<Comparison::Ghosts> ghosts_;  // none: no comparison
   Playback playback_;
   std::chrono::steady_clock::time_point last_;
 };

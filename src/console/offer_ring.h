@@ -1,9 +1,8 @@
-// Messages on their way from the run to the console: a ring of bytes in which nobody who writes
-// waits for anybody.
+// Passes messages from the run to the console: a ring buffer in which writers never wait.
 //
-// Any number of writers, one reader. A writer takes its place, fills it, and marks it as filled
-// last; the reader stops at the first place that is not filled yet. What has no room is dropped and
-// counted.
+// Any number of writers, one reader. A writer reserves space, fills it, and marks it as filled
+// last; the reader stops at the first space that is not filled yet. A message that does not fit is
+// dropped and counted.
 #pragma once
 
 #include <algorithm>
@@ -17,15 +16,15 @@ namespace ruedo::console {
 
 class OfferRing {
  public:
-  // size: a power of two, in bytes, from 16 on.
+  // size: in bytes, a power of two, at least 16.
   explicit OfferRing(size_t size) : words_(size / kWord), mask_(size / kWord - 1) {}
 
-  // Of any thread. False when there is no room for it now.
+  // Any thread. False if there is no room now.
   bool offer(uint32_t channel, const uint8_t* data, size_t size) {
     const uint64_t needed = words_for(size);
     uint64_t begin = taken_.load(std::memory_order_relaxed);
     do {
-      // Acquired: the reader has emptied what it gave back.
+      // Acquire: the reader has cleared the space that it released.
       if (begin + needed - read_.load(std::memory_order_acquire) > words_.size()) {
         dropped_.fetch_add(1, std::memory_order_relaxed);
         return false;
@@ -37,7 +36,7 @@ class OfferRing {
     return true;
   }
 
-  // The reader's: handler(channel, bytes) for each message that waits, in their order.
+  // For the reader: calls handler(channel, bytes) for each waiting message, in order.
   template <class Handler>
   void drain(const Handler& handler) {
     for (uint64_t begin = read_.load(std::memory_order_relaxed);;) {
@@ -47,7 +46,7 @@ class OfferRing {
       std::vector<uint8_t> message((filled & 0xffffffff) - 1);
       copy(begin + 1, message.size(), [&](void* place, size_t at, size_t count) {
         std::memcpy(message.data() + at, place, count);
-        std::memset(place, 0, count);  // any word may be the head of a later message
+        std::memset(place, 0, count);  // any word may become the header of a later message
       });
       head(begin).store(0, std::memory_order_relaxed);
       begin += words_for(message.size());
@@ -61,12 +60,13 @@ class OfferRing {
  private:
   static constexpr size_t kWord = sizeof(uint64_t);
 
-  // A head, which is 0 until the message is there, and the bytes.
+  // A header, which is 0 until the message is complete, and the bytes.
   static uint64_t words_for(size_t size) { return 1 + (size + kWord - 1) / kWord; }
 
   std::atomic_ref<uint64_t> head(uint64_t at) { return std::atomic_ref(words_[at & mask_]); }
 
-  // part(place in the ring, offset in the message, count) for the up to two pieces of a message.
+  // Calls part(place in the ring, offset in the message, count) for the one or two pieces of a
+  // message.
   template <class Part>
   void copy(uint64_t at, size_t size, const Part& part) {
     if (size == 0) return;
@@ -77,7 +77,7 @@ class OfferRing {
 
   std::vector<uint64_t> words_;
   const uint64_t mask_;
-  alignas(64) std::atomic<uint64_t> taken_{0};  // words since the beginning, as read_
+  alignas(64) std::atomic<uint64_t> taken_{0};  // words since the beginning, like read_
   alignas(64) std::atomic<uint64_t> read_{0};
   std::atomic<uint64_t> dropped_{0};
 };

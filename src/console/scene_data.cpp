@@ -1,5 +1,4 @@
-// What a camera of the simulation draws is what a viewer gets: the same tessellation, surfaces and
-// lights.
+// A viewer gets what the simulation's cameras draw: the same tessellation, surfaces and lights.
 #include "console/scene_data.h"
 
 #include <array>
@@ -23,7 +22,7 @@
 namespace ruedo::console {
 namespace {
 
-constexpr size_t kMostPictureBytes = size_t{32} << 20;  // of a file that is served as it is
+constexpr size_t kMostPictureBytes = size_t{32} << 20;  // of a file served unchanged
 
 template <class Number>
 void list(JsonWriter& json, const Number* numbers, size_t count) {
@@ -56,8 +55,8 @@ class Blob {
   std::vector<uint8_t> bytes_;
 };
 
-// PNG and JPEG go out as they are; what browsers do not know, and what is larger than any screen,
-// is made a PNG.
+// PNG and JPEG are served as they are; formats that browsers do not know, and pictures larger than
+// any screen, are converted to PNG.
 Picture picture(const model::Texture& texture) {
   std::vector<uint8_t> bytes = texture.embedded;
   std::error_code error;
@@ -104,7 +103,7 @@ void write_light(JsonWriter& json, const scene::RenderLight& light) {
   json.member("shadows", l.cast_shadows).close('}');
 }
 
-// fast: it stands fast. body: that carries the model; -1: none, and the pose is that in the world.
+// fast: it is fixed. body: the one that carries the model; -1: none, and the pose is in the world.
 void write_model(JsonWriter& json, const model::ModelInstance& instance,
                  const model::BodyLayout& layout, size_t index) {
   const model::LinkPlacement& first = layout.links[layout.first_link[index]];
@@ -125,7 +124,8 @@ void write_model(JsonWriter& json, const model::ModelInstance& instance,
 model::WorldModel collision_shapes(const model::WorldModel& world) {
   constexpr model::Rgba kStanding{0.55f, 0.6f, 0.66f, 1}, kMoving{0.56f, 0.82f, 0.31f, 1};
   model::WorldModel shown = world;
-  std::map<const model::Model*, std::shared_ptr<const model::Model>> made;  // looked up only
+  // only looked up, never iterated
+  std::map<const model::Model*, std::shared_ptr<const model::Model>> made;
   for (model::ModelInstance& instance : shown.models) {
     auto& replaced = made[instance.model.get()];
     if (!replaced) {
@@ -201,8 +201,7 @@ void write_kinds(JsonWriter& out, const std::vector<scene::RenderLinkKind>& kind
   out.close(']');
 }
 
-// The wheels of robots whose wheels are no bodies: link, robot, place among its wheels, a point
-// on the axis, the axis.
+// Wheels that are not bodies: link, robot, index among its wheels, a point on the axis, the axis.
 void write_wheels(JsonWriter& out, const model::BodyLayout& layout) {
   out.name("wheels").open('[');
   for (const RobotIndex r : layout.robots.indices()) {
@@ -219,8 +218,7 @@ void write_wheels(JsonWriter& out, const model::BodyLayout& layout) {
   out.close(']');
 }
 
-// base_link in the body that carries it, or in the world, and where it starts in the world: x, y,
-// z, qw, qx, qy, qz.
+// base_link in its body, or in the world, and its start pose in the world: x, y, z, qw, qx, qy, qz.
 void write_bases(JsonWriter& out, const model::WorldModel& world, const model::BodyLayout& layout) {
   out.name("bases").open('[');
   for (const model::RobotPlacement& robot : layout.robots) {

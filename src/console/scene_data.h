@@ -1,7 +1,7 @@
-// The still part of what a viewer draws: meshes, pictures, surfaces, lights, and which body carries
-// which link.
+// The static part of what a viewer draws: meshes, pictures, surfaces, lights, and which body
+// carries which link.
 //
-// Made from the world once, and again when the world has changed; served as one JSON text and two
+// Built from the world once, and again when the world has changed; served as one JSON text and two
 // blobs.
 #pragma once
 
@@ -19,20 +19,20 @@ struct Picture {
   Bytes bytes;
 };
 
-// The world with what physics and range finders know of it in place of what it looks like.
+// The collision shapes known to physics and range finders, in place of visuals.
 model::WorldModel collision_shapes(const model::WorldModel& world);
 
 struct SceneData {
-  // Of each link: int32 kind, int32 body (-1: does not move), float32 x, y, z, qw, qx, qy, qz of
-  // the link in its body, or in the world; little endian.
+  // For each link: int32 kind, int32 body (-1: static), float32 x, y, z, qw, qx, qy, qz of the link
+  // in its body, or in the world; little endian.
   static constexpr size_t kLinkSize = 36;
 
   std::string json;
-  Bytes meshes;  // of each mesh its vertices (float32 x, y, z, nx, ny, nz, u, v), then its indices
-                 // (uint32); little endian
+  // for each mesh its vertices (float32 x, y, z, nx, ny, nz, u, v), then its indices (uint32);
+  // little endian
+  Bytes meshes;
   Bytes links;
-  std::vector<Picture>
-      pictures;  // in the order of the JSON's textures; without bytes where there is none
+  std::vector<Picture> pictures;  // in the order of the JSON's textures; empty if there is none
 
   explicit SceneData(const model::WorldModel& world, int version);
 };

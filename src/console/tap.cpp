@@ -1,4 +1,4 @@
-// The way past the publisher: counted, copied where wanted, never waited for.
+// The console's branch of the publisher: counts, copies on demand, never waits.
 #include "console/tap.h"
 
 #include <algorithm>

@@ -1,8 +1,8 @@
-// What goes through a run, for the console: the messages that it publishes, and the commands and
-// requests that come to it, whichever way they come.
+// What goes through a run, for the console: messages that it publishes, and the commands and
+// requests that reach it by any route.
 //
-// Who publishes pays two counters a message, and a copy of those that a viewer watches and of the
-// bodies' newest state. It waits for nothing: when the ring is full, the console misses a message.
+// The publisher pays two counters per message, and a copy of those that a viewer watches and of the
+// newest state of the bodies. It never waits: when the ring is full, the console misses a message.
 #pragma once
 
 #include <atomic>
@@ -19,13 +19,13 @@
 
 namespace ruedo::console {
 
-// What has gone over a channel so far.
+// The traffic on a channel so far.
 struct Traffic {
   std::string name;
   uint32_t index = 0;  // its number among the channels
   std::atomic<uint64_t> messages{0};
   std::atomic<uint32_t> size{0};   // bytes, of the newest
-  std::atomic<bool> wanted{true};  // its messages are offered; until the console says otherwise
+  std::atomic<bool> wanted{true};  // whether its messages are offered; set by the console
 };
 
 class Tap : public run::Sink {
@@ -36,30 +36,30 @@ class Tap : public run::Sink {
     std::string layer;
     std::vector<uint8_t> message;
   };
-  static constexpr size_t kMostChannels = 65536;  // more are not shown
+  static constexpr size_t kMostChannels = 65536;  // further ones are not shown
   static constexpr size_t kRingSize = size_t{1} << 25;
 
-  // The run's; in the publisher's thread.
+  // For the run; in the publisher's thread.
   Hears hears() const override { return {.samples = true, .services = true}; }
   void announce(const std::shared_ptr<const run::Announcement>& announcement) override;
   void message(const run::Published& message) override;
 
-  // A command or request that came to the run, before it is taken. Any thread.
+  // A command or request that reached the run, before it is handled. Any thread.
   void hear(const std::string& channel, const uint8_t* data, size_t size);
 
-  // The rest is the console's.
+  // The rest is for the console.
 
-  // Whether the run takes commands or requests on it.
+  // Whether the run accepts commands or requests on it.
   bool takes(const std::string& channel) const;
 
-  // Whether anybody watches; without that, messages are only counted.
+  // Whether anybody watches; otherwise messages are only counted.
   void watch(bool on) { watched_.store(on, std::memory_order_relaxed); }
 
   size_t channel_count() const { return count_.load(std::memory_order_acquire); }
   Traffic& channel(size_t index) const { return *list_[index].load(std::memory_order_acquire); }
   OfferRing& ring() { return ring_; }
-  // What was drawn since, the newest of each layer: whether anybody watches or not, for it is shown
-  // to those who come later, too.
+  // What was drawn since the last call, the newest of each layer: also while nobody watches, for
+  // later viewers.
   std::vector<Drawing> take_drawn();
 
   // The newest state of the bodies.
@@ -67,8 +67,8 @@ class Tap : public run::Sink {
     uint32_t channel = 0;
     std::vector<std::vector<uint8_t>> parts;
   };
-  // Where it was not offered, and not taken before: a run that stands still tells no other one to
-  // those who come. Empty where there is none, or not on one of the first so many channels.
+  // The state, if it was neither offered nor taken before: a paused run sends no further one to new
+  // viewers. Empty if there is none, or if its channel is beyond the limit.
   State take_state(size_t channels);
 
  private:
@@ -85,9 +85,10 @@ class Tap : public run::Sink {
   std::mutex state_mutex_;
   State state_;
   bool state_was_told_ = true;  // the console has it, or will find it in the ring
-  int state_index_ = -1;        // of the announcement. The publisher's
+  int state_index_ = -1;        // in the announcement. Publisher's thread
   std::atomic<bool> watched_{false};
-  std::vector<Traffic*> by_index_;  // of the announcement; null: not heard yet. The publisher's
+  // by index in the announcement; null: not heard yet. Publisher's thread
+  std::vector<Traffic*> by_index_;
 
   mutable std::mutex names_mutex_;                     // held for a look-up, and to add a channel
   std::unordered_map<std::string, uint32_t> by_name_;  // looked up only

@@ -1,4 +1,4 @@
-// Frames are made when the socket can take one, from what is newest then.
+// Frames are made when the socket is ready, from what is newest at that time.
 #include "console/viewer.h"
 
 #include <algorithm>
@@ -31,7 +31,7 @@ double read_double(std::span<const uint8_t> bytes) {
 Viewer::Viewer(Stage& stage)
     : stage_(stage),
       look_(stage.source->look()),
-      told_world_(look_ ? 0 : stage.world_version) {  // the page begins with a log's first scene
+      told_world_(look_ ? 0 : stage.world_version) {  // the page starts with a log's first scene
   stage_.viewers.push_back(this);
   stage_.source->attend(stage_.board);
   pump();
@@ -172,7 +172,7 @@ bool Viewer::next_text(std::string& text) {
   return next_events(text);
 }
 
-// A time that goes on is told now and then, and everything else at once.
+// A running time is sent now and then, everything else at once.
 bool Viewer::next_playback(std::string& text) {
   const Playback& playback = look_->playback();
   const auto now = std::chrono::steady_clock::now();
@@ -201,8 +201,7 @@ bool Viewer::next_playback(std::string& text) {
   return true;
 }
 
-// {"events": [...], "first": 0}: from that one on. From 0 on: those that were told before hold no
-// more.
+// {"events": [...], "first": 0}: starting at that index. From 0: those sent before are invalid.
 bool Viewer::next_events(std::string& text) {
   const Events* events = stage_.source->events();
   if (!events) return false;
@@ -219,14 +218,14 @@ bool Viewer::next_events(std::string& text) {
   return true;
 }
 
-// A frame: its kind (4 bytes), then of each message channel (4 bytes), size (4 bytes), bytes. In
-// the order in which they came, over all channels: an answer is newer than what was said before it.
+// A frame: its kind (4 bytes), then for each message channel (4 bytes), size (4 bytes), bytes. In
+// order of arrival over all channels: an answer is newer than what was said before it.
 bool Viewer::next_messages(std::vector<uint8_t>& frame) {
   if (wanted_names_.empty()) return false;
   match_names();
   const size_t begin = frame.size();
   const auto& channels = board().channels();
-  std::vector<std::pair<const Board::Message*, size_t>> fresh;  // and the channel
+  std::vector<std::pair<const Board::Message*, size_t>> fresh;  // with its channel
   for (size_t i = 0; i < sights_.size(); ++i) {
     if (!sights_[i].wanted || sights_[i].sent == channels[i].last_number) continue;
     for (const Board::Message& message : channels[i].newest) {
@@ -248,8 +247,8 @@ bool Viewer::next_messages(std::vector<uint8_t>& frame) {
   return true;
 }
 
-// Its kind (4 bytes), then of each channel the count of messages (4 bytes, wraps) and the newest
-// one's size (4 bytes).
+// Its kind (4 bytes), then for each channel the number of messages (4 bytes, wraps) and the size of
+// the newest one (4 bytes).
 void Viewer::add_traffic(std::vector<uint8_t>& frame) {
   append(frame, uint32_t{static_cast<uint8_t>(Frame::traffic)});
   for (size_t i = 0; i < board().channels().size(); ++i) {

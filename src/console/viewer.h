@@ -1,6 +1,6 @@
-// One browser: what it wants to see, what it has seen, and what it asks for.
+// One browser: what it wants to see, what it has received, and what it asks for.
 //
-// A viewer gets the next messages only when it has taken the last ones, so one that is slow sees
+// A viewer gets new messages only after it has received the previous ones, so a slow viewer gets
 // fewer of them.
 #pragma once
 
@@ -21,32 +21,32 @@ class Viewer;
 
 // What all viewers share.
 struct Stage {
-  Board board;  // of a running server
+  Board board;  // for a running server
   std::unique_ptr<Source> source;
   std::string greeting;        // JSON, the first message to a viewer
   std::string farewell;        // JSON, the last one; "" while it goes on
-  uint64_t world_version = 0;  // of a running server, another one when the scene has changed
+  uint64_t world_version = 0;  // for a running server; changes when the scene does
   std::vector<Viewer*> viewers;
   bool is_log = false;
 };
 
-// What a browser sends: an operation, then what it is about.
+// Messages from a browser: an operation, then its data.
 enum class Operation : uint8_t {
-  seen = 1,     // the oldest frame that is on its way has been taken
-  want = 2,     // names of channels, one a line: these and no others
-  command = 3,  // length of the name (1 byte), name, message: onto that channel
-  traffic = 4,  // 1 or 0: how much goes over each channel, once a second
-  play = 5,     // of a log: 1 or 0 (1 byte), speed (float64, little endian)
-  seek = 6,     // of a log: time in s (float64, little endian)
-  step = 7,     // of a log: 1 or 0 (1 byte): to the next state, or the one before
+  seen = 1,     // the oldest outstanding frame has been received
+  want = 2,     // names of channels, one per line: replaces the previous ones
+  command = 3,  // length of the name (1 byte), name, message: sent on that channel
+  traffic = 4,  // 1 or 0: send the traffic of each channel once a second
+  play = 5,     // for a log: 1 or 0 (1 byte), speed (float64, little endian)
+  seek = 6,     // for a log: time in s (float64, little endian)
+  step = 7,     // for a log: 1 or 0 (1 byte): to the next or the previous state
 };
-// What it gets as binary messages; what is text is JSON.
+// Binary messages to the browser; text messages are JSON.
 enum class Frame : uint8_t { messages = 1, traffic = 2 };
 
 class Viewer : public Connection {
  public:
   static constexpr int kMostUnseen = 2;                  // frames
-  static constexpr size_t kMostFrame = size_t{8} << 20;  // bytes; one message more may pass it
+  static constexpr size_t kMostFrame = size_t{8} << 20;  // bytes; may be exceeded by one message
   static constexpr size_t kMostWanted = 4096;            // channels
   static constexpr size_t kMostEvents = 1000;            // in one message
 
@@ -56,7 +56,7 @@ class Viewer : public Connection {
   bool receive(std::span<const uint8_t> message) override;
   bool next(std::vector<uint8_t>& message, bool& text) override;
 
-  // Of a log: its look goes on.
+  // For a log: advances its view.
   void pump();
 
  private:
@@ -70,23 +70,23 @@ class Viewer : public Connection {
   Board& board() { return look_ ? own_board_ : stage_.board; }
 
   Stage& stage_;
-  std::unique_ptr<Look> look_;  // null: of a running server
-  Board own_board_;             // the look's
+  std::unique_ptr<Look> look_;  // null: a running server
+  Board own_board_;             // for the view of a log
   std::vector<std::string> wanted_names_;
   struct Sight {
     bool wanted = false;
     uint64_t sent = 0;  // number of the newest message sent
   };
-  std::vector<Sight> sights_;  // of each of the board's channels
-  size_t told_channels_ = 0;   // whose names the browser has
+  std::vector<Sight> sights_;  // for each of the board's channels
+  size_t told_channels_ = 0;   // number of channels whose names the browser has
   uint64_t told_world_ = 0;    // version, or scene of a log
   std::optional<Playback> told_playback_;
   std::chrono::steady_clock::time_point told_playback_at_;
-  size_t told_events_ = 0;                 // of the list's
-  uint64_t told_generation_ = UINT64_MAX;  // whose list that is
-  bool compared_ = false;                  // was told what differs
+  size_t told_events_ = 0;                 // in the list
+  uint64_t told_generation_ = UINT64_MAX;  // generation of that list
+  bool compared_ = false;                  // the differences have been sent
   bool greeted_ = false, parted_ = false, traffic_ = false;
-  std::string note_;  // to say next
+  std::string note_;  // to be sent next
   int unseen_ = 0;
   std::chrono::steady_clock::time_point next_traffic_;
 };

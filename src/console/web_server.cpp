@@ -1,5 +1,5 @@
-// The event loop: who comes in is judged (guard.h), pages are sent in chunks, sockets when they can
-// take more.
+// The event loop: requests are checked (guard.h), pages are sent in chunks, sockets are written
+// when they are ready.
 #include "console/web_server.h"
 
 #include <arpa/inet.h>
@@ -25,12 +25,12 @@ namespace {
 
 constexpr lws_usec_t kTick_us = 16'000;
 constexpr lws_usec_t kIdleTick_us = 250'000;
-constexpr lws_usec_t kFarewell_us = 300'000;  // for the last words to viewers
+constexpr lws_usec_t kFarewell_us = 300'000;  // for the last messages to viewers
 constexpr size_t kChunk = 64 * 1024;
 constexpr lws_retry_bo_t kIdlePolicy = {nullptr, 0,  0,
                                         20,      60, 0};  // seconds: ping after 20, gone after 60
 
-// The port that the address gives, or a free one for 0. libwebsockets itself says only that it
+// Checks the port in the address, or picks a free one for 0. libwebsockets only reports that it
 // failed.
 int checked_port(const WebPlace& place) {
   const Address& address = place.address;
@@ -59,7 +59,7 @@ int checked_port(const WebPlace& place) {
 }  // namespace
 
 struct WebServer::Impl {
-  struct Transfer {  // of a response's body
+  struct Transfer {  // state of a response's body
     Bytes body;
     size_t sent = 0;
   };
@@ -68,20 +68,20 @@ struct WebServer::Impl {
     std::vector<uint8_t> incoming;
   };
   struct Timer {
-    lws_sorted_usec_list_t entry{};  // the first member: libwebsockets hands its address back
+    lws_sorted_usec_list_t entry{};  // must be the first member: libwebsockets returns its address
     Impl* owner = nullptr;
   };
 
   WebPlace place;
   WebHandler handler;
-  std::vector<lws_protocols> protocols;  // the last is none
+  std::vector<lws_protocols> protocols;  // the last one is empty
   lws_context* context = nullptr;
   lws_vhost* vhost = nullptr;
   Timer timer;
   std::map<lws*, Transfer> transfers;  // looked up only
   std::map<lws*, Socket> sockets;
   size_t open = 0;          // connections of any kind
-  std::deque<lws*> silent;  // of them, those that have asked for nothing yet: oldest first
+  std::deque<lws*> silent;  // those that have not sent a request yet, oldest first
   std::vector<uint8_t> message;
   std::atomic<bool> stopping{false};
   bool over = false;
@@ -167,7 +167,7 @@ void WebServer::Impl::on_timer(lws_sorted_usec_list_t* entry) {
   if (impl.stopping) {
     impl.over = true;
     lws_cancel_service(
-        impl.context);  // or this very call of lws_service goes on to wait for something else
+        impl.context);  // wakes lws_service, which would go on waiting in this very call
     return;
   }
   if (impl.handler.tick()) {
@@ -263,7 +263,7 @@ int WebServer::Impl::write(lws* wsi) {
   if (lws_write(wsi, message.data() + LWS_PRE, message.size() - LWS_PRE,
                 text ? LWS_WRITE_TEXT : LWS_WRITE_BINARY) < 0)
     return -1;
-  lws_callback_on_writable(wsi);  // until there is nothing left to say
+  lws_callback_on_writable(wsi);  // until everything is sent
   return 0;
 }
 

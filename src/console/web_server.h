@@ -1,7 +1,7 @@
 // HTTP and WebSocket for the console, over libwebsockets: one thread, one port, everything bounded.
 //
-// Why libwebsockets: a small C library that every distribution has, with one event loop for HTTP
-// and WebSocket.
+// Why libwebsockets: a small C library, available in every distribution, with one event loop for
+// HTTP and WebSocket.
 #pragma once
 
 #include <functional>
@@ -21,54 +21,55 @@ struct HttpResponse {
   std::string type = "text/plain; charset=utf-8";
   Bytes body;
   bool gzip = false;     // the body is compressed
-  bool lasting = false;  // may be kept by the browser
+  bool lasting = false;  // may be cached by the browser
 };
 
 // One browser's WebSocket.
 class Connection {
  public:
   virtual ~Connection() = default;
-  // A whole message; false ends the connection.
+  // Handles a whole message; false closes the connection.
   virtual bool receive(std::span<const uint8_t> message) = 0;
-  // The next message to send, into `message`; false when there is none now.
+  // Puts the next message into `message`; false if there is none now.
   virtual bool next(std::vector<uint8_t>& message, bool& text) = 0;
 };
 
-// What is served where, and who may come.
+// What is served, and to whom.
 struct WebPlace {
   Address address;
-  std::string token;                               // "": none is asked for
-  std::string option = "--view";                   // that gives the address, for messages
-  std::string socket = "/socket";                  // the WebSocket's path
+  std::string token;               // "": none is required
+  std::string option = "--view";   // the option that gives the address, for messages
+  std::string socket = "/socket";  // the WebSocket's path
   std::vector<std::string> protocols = {"ruedo"};  // WebSocket subprotocols
-  std::vector<std::string> origins;  // of pages from elsewhere that may open the WebSocket
+  std::vector<std::string> origins;  // other origins whose pages may open the WebSocket
 };
 
 struct WebHandler {
   std::function<HttpResponse(std::string_view path)> get;
   std::function<std::unique_ptr<Connection>()> open;  // null: there are too many
-  std::function<void()> end;                          // before the last messages are sent
-  std::function<bool()> tick;  // every few milliseconds while there are connections; true: they may
-                               // have something to send
+  std::function<void()> end;                          // called before the last messages are sent
+  // called every few milliseconds while there are connections; true: they may have something to
+  // send
+  std::function<bool()> tick;
 };
 
 class WebServer {
  public:
   static constexpr size_t kMostConnections = 320;  // HTTP and WebSocket together
   static constexpr size_t kMostSilent =
-      64;  // of them that have asked for nothing yet; beyond, the oldest goes
+      64;  // of those that have sent no request yet; beyond, the oldest is closed
   static constexpr size_t kMostMessage = size_t{1}
                                          << 20;  // bytes that a browser may send as one message
   static constexpr size_t kMostHeaders = 4096;   // bytes of a request's headers
 
-  // Binds the port. Throws EnvironmentError, with the cure, when that cannot be had.
+  // Binds the port. Throws EnvironmentError, with the remedy, if it is not available.
   WebServer(WebPlace place, WebHandler handler);
   ~WebServer();
   WebServer(const WebServer&) = delete;
   WebServer& operator=(const WebServer&) = delete;
 
   int port() const;
-  // Serves until stop(); then gives what waits a moment to be sent.
+  // Serves until stop(); then sends what is waiting, for a moment.
   void run();
   void stop();  // any thread
 

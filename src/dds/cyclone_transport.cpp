@@ -35,9 +35,9 @@ using ros2::Endpoint;
 using ros2::Gid;
 using ros2::Role;
 
-constexpr uint32_t kLastDomain = 232;  // ports of higher ones do not exist
-constexpr int kMostTaken = 64;         // samples at once
-constexpr auto kLook = DDS_MSECS(2);   // after requests that have to wait
+constexpr uint32_t kLastDomain = 232;  // higher domains have no valid ports
+constexpr int kMostTaken = 64;         // samples taken at once
+constexpr auto kLook = DDS_MSECS(2);   // interval for requests that have to wait
 
 struct QosDeleter {
   void operator()(dds_qos_t* qos) const { dds_delete_qos(qos); }
@@ -72,7 +72,7 @@ QosPointer qos_of(const Endpoint& endpoint) {
   const ros2::Qos& wanted = endpoint.topic.qos;
   QosPointer qos(dds_create_qos());
   dds_qset_history(qos.get(), DDS_HISTORY_KEEP_LAST, wanted.depth);
-  // Nobody waits for a slow reader: what it has no room for is dropped.
+  // Never waits for a slow reader: samples beyond its queue are dropped.
   dds_qset_reliability(qos.get(),
                        wanted.reliable ? DDS_RELIABILITY_RELIABLE : DDS_RELIABILITY_BEST_EFFORT, 0);
   dds_qset_durability(
@@ -90,7 +90,7 @@ QosPointer qos_of(const Endpoint& endpoint) {
   return qos;
 }
 
-// An element of Cyclone's configuration that holds text from the environment.
+// A configuration element of Cyclone with text from the environment.
 std::string peer_element(std::string_view address) {
   std::string text;
   for (const char c : address) {
@@ -106,10 +106,10 @@ std::string peer_element(std::string_view address) {
   return "<Peer Address=\"" + text + "\"/>";
 }
 
-// All nodes of this machine, and no other: multicast goes over the loopback interface alone, which
-// finds those that listen to multicast on whatever interface; those that do without it, as ROS's
-// LOCALHOST has it, are asked one by one. The other interfaces are named because Cyclone takes a
-// node for unreachable whose address is on none of its own.
+// Nodes of this machine only: multicast goes over the loopback interface, which reaches those that
+// listen to multicast on any interface; nodes without multicast, as with ROS's LOCALHOST, are
+// contacted individually. The other interfaces are listed because Cyclone considers a node
+// unreachable if its address is on none of its own.
 std::string local_interfaces() {
   constexpr size_t kMost = 3;  // Cyclone has room for four
   std::string text = "<NetworkInterface address=\"127.0.0.1\" multicast=\"true\"/>";
@@ -151,8 +151,9 @@ std::string configuration(const CycloneOptions& options) {
       peers += peer_element(std::string_view(options.static_peers).substr(begin, end - begin));
     begin = end + 1;
   }
-  // Pictures go in few datagrams; the cache of a writer is bounded by its depth alone. What comes
-  // while others have the CPU waits in the socket, as far as the system allows (net.core.rmem_max).
+  // Pictures need few datagrams; a writer's cache is limited by its depth only. Data that arrives
+  // while others have the CPU waits in the socket buffer, as far as the system allows
+  // (net.core.rmem_max).
   return "<CycloneDDS><Domain Id=\"any\"><General>" + general +
          "<MaxMessageSize>65500B</MaxMessageSize><FragmentSize>60000B</FragmentSize></General>"
          "<Discovery>" +
@@ -165,8 +166,8 @@ std::string configuration(const CycloneOptions& options) {
          "<Tracing><Verbosity>none</Verbosity></Tracing></Domain></CycloneDDS>";
 }
 
-// Cyclone's own warnings, of which strangers can cause any number: once a second at most. Samples
-// that were refused are counted elsewhere.
+// Cyclone's own warnings, of which strangers can cause any number: at most one a second. Refused
+// samples are counted elsewhere.
 void tell(void*, const dds_log_data_t* data) {
   constexpr int64_t kPeriod_ns = 1'000'000'000;
   static std::atomic<int64_t> next_ns{0};
@@ -251,8 +252,8 @@ class CycloneReader : public ros2::Reader {
                : 0;
   }
 
-  // What is left to do here; the transport's thread. One batch at a time, so that who sends without
-  // end leaves others their turn.
+  // Deferred work, in the transport's thread. One batch at a time, so that a writer that sends
+  // without end leaves time for others.
   enum class Left { nothing, waiting, more };
   Left take() {
     uint32_t status = 0;
@@ -281,7 +282,7 @@ class CycloneReader : public ros2::Reader {
     void operator()(ddsi_serdata* sample) const { ddsi_serdata_unref(sample); }
   };
   using SamplePointer = std::unique_ptr<ddsi_serdata, Unref>;
-  // While they wait they have their writer's share of the topic's room.
+  // While waiting they count towards their writer's share of the topic's memory.
   struct WaitingRequests {
     WaitingRequests(dds_entity_t requests, dds_entity_t replies) : ends(requests, replies) {}
     ReplyEnds ends;
@@ -372,7 +373,7 @@ class CycloneTransport : public ros2::Transport {
   void receive() {
     using Left = CycloneReader::Left;
     dds_attach_t woken[kMostTaken];
-    std::set<CycloneReader*> readers;  // that have something left to do
+    std::set<CycloneReader*> readers;  // those with deferred work
     dds_duration_t patience = DDS_INFINITY;
     while (!stopping_) {
       const dds_return_t count = dds_waitset_wait(waitset_, woken, kMostTaken, patience);

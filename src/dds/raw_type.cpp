@@ -1,5 +1,4 @@
-// The operations that Cyclone DDS asks of a type, for one that has no keys and whose samples are
-// bytes.
+// The operations that Cyclone DDS needs for a type without keys whose samples are raw bytes.
 #include "dds/raw_type.h"
 
 #include <algorithm>
@@ -22,11 +21,11 @@ namespace {
 
 std::atomic<uint64_t> refused{0};
 
-// The room that samples of a topic take until they are dealt with: a share for each writer, so that
-// one that sends without end displaces nothing of others.
+// The memory for a topic's samples that are waiting, with a share for each writer, so that one that
+// sends without end displaces nobody's samples.
 class Room {
  public:
-  // False: there is none.
+  // False: there is no room.
   bool take(const ros2::Gid& writer, size_t size) {
     const std::lock_guard lock(mutex_);
     const auto [own, fresh] = samples_of_.try_emplace(writer, 0);
@@ -48,17 +47,17 @@ class Room {
 };
 
 struct RawType : ddsi_sertype {
-  std::shared_ptr<Room> room = std::make_shared<Room>();  // samples may live longer than their type
+  std::shared_ptr<Room> room = std::make_shared<Room>();  // samples may outlive their type
 };
 
 struct RawSample : ddsi_serdata {
   ~RawSample() {
     if (room) room->give_back(writer, size);
   }
-  std::shared_ptr<Room> room;  // null: it takes none
+  std::shared_ptr<Room> room;  // null: takes no room
   ros2::Gid writer{};
-  std::vector<uint8_t> bytes;  // with CDR's header, filled up to a multiple of four
-  size_t size = 0;             // without what fills up
+  std::vector<uint8_t> bytes;  // with CDR's header, padded to a multiple of four
+  size_t size = 0;             // without padding
   ros2::SampleIdentity identity;
   bool is_related = false;
   std::array<uint8_t, 2> vendor{};
@@ -88,7 +87,7 @@ bool is_too_large(ddsi_serdata_kind kind, size_t size) {
   return too_large;
 }
 
-// From the datagram that the sample came in.
+// From the datagram that contained the sample.
 DataIdentity identity_of(const nn_rdata& first) {
   const unsigned char* packet = NN_RMSG_PAYLOAD(first.rmsg);
   return identity_in({packet, NN_RDATA_PAYLOAD_OFF(&first)}, NN_RDATA_SUBMSG_OFF(&first));
@@ -102,7 +101,7 @@ void identify(RawSample& sample, const DataIdentity& found) {
   if (found.related) sample.identity.writer = *found.related;
 }
 
-// Fragments come in the order of their offsets and may overlap.
+// Fragments are sorted by offset and may overlap.
 ddsi_serdata* from_fragments(const ddsi_sertype* type, ddsi_serdata_kind kind,
                              const nn_rdata* fragment, size_t size) {
   if (is_too_large(kind, size)) return nullptr;
@@ -144,7 +143,7 @@ ddsi_serdata* from_keyhash(const ddsi_sertype* type, const ddsi_keyhash*) {
   return new_sample(type, SDK_KEY, 0);
 }
 
-// Only Cyclone itself calls these two with samples of this type: to make an instance of no key.
+// Only called by Cyclone itself for samples of this type: to create an instance without a key.
 ddsi_serdata* from_sample(const ddsi_sertype* type, ddsi_serdata_kind kind, const void*) {
   return new_sample(type, kind, 0);
 }
@@ -200,7 +199,7 @@ void free_type(ddsi_sertype* type) {
   ddsi_sertype_fini(type);
   delete static_cast<RawType*>(type);
 }
-// Called for types of one name and these operations alone.
+// Called for types with the same name and these operations only.
 bool equal_types(const ddsi_sertype*, const ddsi_sertype*) { return true; }
 uint32_t hash_type(const ddsi_sertype* type) {
   return static_cast<uint32_t>(std::hash<std::string_view>{}(type->type_name));
@@ -238,7 +237,7 @@ ddsi_serdata* make_sample(const ddsi_sertype* type, std::span<const uint8_t> byt
   RawSample* sample = new_sample(type, SDK_DATA, bytes.size());
   std::memcpy(sample->bytes.data(), bytes.data(), bytes.size());
   sample->bytes[3] =
-      static_cast<uint8_t>(sample->bytes.size() - bytes.size());  // how many bytes fill up
+      static_cast<uint8_t>(sample->bytes.size() - bytes.size());  // number of padding bytes
   return sample;
 }
 

@@ -1,5 +1,5 @@
-// A type of Cyclone DDS whose samples are CDR bytes as they go over the wire: no generated code, no
-// copy through a struct.
+// A Cyclone DDS type whose samples are CDR bytes as on the wire: no generated code, no copy through
+// a struct.
 #pragma once
 
 #include <cstddef>
@@ -15,21 +15,21 @@
 
 namespace ruedo::dds {
 
-// Samples that come in and are larger are dropped, and counted.
+// Larger incoming samples are dropped and counted.
 inline constexpr size_t kMostReceived = size_t{1} << 20;
-// As are those for which there is no room beside those of their topic that wait to be dealt with.
+// Likewise samples for which there is no room beside the waiting ones of their topic.
 inline constexpr size_t kMostWaiting = size_t{16} << 20;  // bytes
 inline constexpr size_t kMostOfWriter = 100;              // samples
 
-// A topic with that name and that type's name, and the type for its samples, which lives as long.
-// Negative: Cyclone's error.
+// A topic with that name and type name, and the type of its samples, which lives as long. Negative:
+// a Cyclone error.
 dds_entity_t create_raw_topic(dds_entity_t participant, const char* topic, const char* type,
                               const ddsi_sertype** sample_type);
 
-// A sample of that topic's type to be written by dds_writecdr(), which takes it over.
+// A sample for that topic, to be written by dds_writecdr(), which takes ownership.
 ddsi_serdata* make_sample(const ddsi_sertype* type, std::span<const uint8_t> bytes);
 
-// What a sample that dds_takecdr() gave holds, while that lives.
+// The bytes of a sample from dds_takecdr(), valid while it lives.
 ros2::Sample as_sample(const ddsi_serdata* sample);
 
 uint64_t refused_samples();

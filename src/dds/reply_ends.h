@@ -1,5 +1,6 @@
-// Whether it is known who reads a client's replies, which would be lost before: ends of a client
-// are discovered one after another. rmw_cyclonedds waits for that, too.
+// Tracks whether a client's reply reader has been discovered; replies sent earlier would be lost,
+// since the endpoints of a client are discovered one after another. rmw_cyclonedds waits for that,
+// too.
 #pragma once
 
 #include <array>
@@ -15,10 +16,10 @@ class ReplyEnds {
  public:
   using Clock = std::chrono::steady_clock;
 
-  // A client that hears nothing is waited for so long, and no more from then on.
+  // A client without a reply reader is waited for this long, and not again.
   static constexpr auto kLongest = std::chrono::milliseconds(500);
 
-  // Of a reader of requests and the writer of their replies.
+  // For a reader of requests and the writer of their replies.
   ReplyEnds(dds_entity_t requests, dds_entity_t replies) : requests_(requests), replies_(replies) {}
 
   // Whether a request of that writer may be answered now.
@@ -30,14 +31,14 @@ class ReplyEnds {
   bool hears(dds_instance_handle_t writer);
   bool look(dds_instance_handle_t writer);
   void give_up(dds_instance_handle_t writer);
-  // How many more writers of requests than readers of replies the writer's participant has.
+  // How many more request writers than reply readers the writer's participant has.
   size_t missing(const Participant& whose) const;
 
   dds_entity_t requests_, replies_;
-  std::map<dds_instance_handle_t, bool> hears_;  // what was found, as long as no end comes
-  std::map<dds_instance_handle_t, Clock::time_point> until_;  // those that are waited for
-  uint32_t ends_ = 0;                                         // that have come since the beginning
-  std::map<Participant, size_t> deaf_;                        // how many were waited for in vain
+  std::map<dds_instance_handle_t, bool> hears_;               // cached until endpoints change
+  std::map<dds_instance_handle_t, Clock::time_point> until_;  // those being waited for
+  uint32_t ends_ = 0;                   // number of endpoints discovered so far
+  std::map<Participant, size_t> deaf_;  // how many were waited for in vain
 };
 
 }  // namespace ruedo::dds

@@ -1,6 +1,6 @@
-// CDR as ROS 2 has it on the wire: plain XCDR1, little endian, four bytes of header, each number
-// aligned to its own size counted from behind the header. Reading refuses what does not fit into
-// the bytes, and never allocates more than they hold.
+// CDR as ROS 2 uses it: plain XCDR1, little endian, with a header of four bytes, each number
+// aligned to its own size relative to the end of the header. Reading checks every length against
+// the available bytes, and never allocates more than they hold.
 #pragma once
 
 #include <bit>
@@ -22,7 +22,7 @@ class CdrWriter {
  public:
   CdrWriter() { clear(); }
 
-  // Begins a message; what was allocated stays.
+  // Starts a message; keeps the allocated memory.
   void clear() { bytes_ = {0, 1, 0, 0}; }
 
   template <class Number>
@@ -41,7 +41,7 @@ class CdrWriter {
   CdrWriter& put(const std::string& text) { return put(std::string_view(text)); }
   CdrWriter& put(const char* text) { return put(std::string_view(text)); }
 
-  // Numbers one after the other, as in an array; a sequence has its length before.
+  // Numbers in sequence, as in an array; a sequence has its length in front.
   template <class Number>
   CdrWriter& put_array(std::span<const Number> values) {
     if (values.empty()) return *this;
@@ -69,11 +69,11 @@ class CdrWriter {
   std::vector<uint8_t> bytes_;
 };
 
-// Reads what a peer sent. After a fault every value is 0 and good() is false.
+// Reads what a peer sent. After an error every value is 0 and good() is false.
 class CdrReader {
  public:
   explicit CdrReader(std::span<const uint8_t> bytes) : bytes_(bytes) {
-    // Plain CDR of either byte order; parameter lists and XCDR2 are not ROS's.
+    // Plain CDR in either byte order; ROS does not use parameter lists and XCDR2.
     good_ = bytes.size() >= kCdrHeader && bytes[0] == 0 && bytes[1] <= 1;
     swap_ = good_ && bytes[1] == 0;
   }
@@ -103,12 +103,12 @@ class CdrReader {
     if (!good_ || !fits(offset_, size)) return fail<std::string>();
     const char* begin = reinterpret_cast<const char*>(bytes_.data()) + kCdrHeader + offset_;
     offset_ += size;
-    if (size == 0) return {};  // not allowed, but some write an empty text so
+    if (size == 0) return {};  // not allowed, but some write an empty string like this
     if (begin[size - 1] != 0) return fail<std::string>();
     return std::string(begin, size - 1);
   }
 
-  // Length of a sequence whose elements take at least `element_size` bytes each.
+  // The length of a sequence whose elements take at least `element_size` bytes each.
   size_t get_length(size_t element_size) {
     const auto size = get<uint32_t>();
     if (!good_ || size > (bytes_.size() - kCdrHeader - offset_) / element_size)
@@ -132,7 +132,7 @@ class CdrReader {
     for (size_t i = 0; i < count && good_; ++i) get<Number>();
   }
 
-  // Everything so far was there, and lay within the bytes.
+  // Whether everything so far lay within the bytes.
   bool good() const { return good_; }
 
  private:
@@ -147,7 +147,7 @@ class CdrReader {
   }
 
   std::span<const uint8_t> bytes_;
-  size_t offset_ = 0;  // behind the header
+  size_t offset_ = 0;  // after the header
   bool good_ = false, swap_ = false;
 };
 

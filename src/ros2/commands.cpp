@@ -1,5 +1,5 @@
-// cmd_vel of either type is taken, since releases differ in it. A command's utime is 0: what is
-// recorded of a run must not depend on when a node wrote it.
+// cmd_vel is accepted with either type, since releases differ in it. A command's utime is 0: what
+// is recorded of a run must not depend on when a node sent it.
 #include "ros2/commands.h"
 
 #include "engine/outcome.h"
@@ -53,7 +53,7 @@ std::vector<uint8_t> joint_command(const std::vector<std::string>& names, int8_t
   return encoded(command);
 }
 
-// The last point: where the trajectory ends. The joints' own limits decide how fast.
+// The last point: where the trajectory ends. The joints' own limits determine the speed.
 Bytes from_trajectory(std::span<const uint8_t> cdr, const std::vector<std::string>&) {
   CdrReader in(cdr);
   skip_header(in);

@@ -1,5 +1,5 @@
-// The one table of what Ruedo takes from ROS: a topic and its type in, a command on one of the
-// run's input channels out.
+// The table of what Ruedo accepts from ROS: a topic and its type in, a command on an input channel
+// of the run out.
 #pragma once
 
 #include <cstdint>
@@ -20,18 +20,17 @@ struct Command {
   Topic topic;
   std::string robot;
   std::string channel;  // on the bus
-  // The command, encoded; nothing for what is no message of that type.
+  // The encoded command; none for bytes that are not a message of that type.
   std::function<std::optional<std::vector<uint8_t>>(std::span<const uint8_t> cdr)> convert;
 };
 
-// Of every robot that takes commands. joints: names of the joints of a robot, in the order of
+// For every robot that takes commands. joints: names of a robot's joints, in the order of
 // joint_states.
 using JointNames = std::function<std::vector<std::string>(const std::string& robot)>;
 std::vector<Command> commands_of(const std::vector<world_info_t>& info, const JointNames& joints,
                                  Names& names);
 
-// The same as pairs of a topic and the name of the channel, of a robot of which nothing more is
-// known.
+// The same as pairs of a topic and a channel name, for a robot of which nothing else is known.
 std::vector<std::pair<std::string, std::string>> command_topics(const std::string& robot,
                                                                 Names& names);
 

@@ -37,20 +37,20 @@
 namespace ruedo::ros2 {
 namespace {
 
-// A link that a wheel's angle or a joint's position moves.
+// A link that is moved by a wheel's angle or a joint's position.
 struct MovedLink {
   double sign = 1.0;
   std::optional<LinkFrame> frame;  // none: no frame moves with it
   std::string parent, child;
 };
 
-// Where a message comes from, for those who write it down.
+// The origin of a message.
 struct Source {
   std::string robot;
   std::vector<std::string> wheels;       // names of their joints
-  std::vector<MovedLink> turned, moved;  // by odometry_t and joint_state_t, in their order
+  std::vector<MovedLink> turned, moved;  // by odometry_t and joint_state_t, in order
   device_info_t device{};
-  std::string part;   // of the channel's name behind the device: "depth", "info", ...
+  std::string part;   // the channel's name after the device: "depth", "info", ...
   double rate = 0.0;  // Hz
   std::string base, odom, frame, optical, world;
   int element = -1;  // of a sonar
@@ -95,7 +95,7 @@ void put_point_fields(CdrWriter& out) {
   for (uint32_t i = 0; i < 4; ++i) out.put(kNames[i]).put(4 * i).put(kFloat32).put(uint32_t{1});
 }
 
-// A row a layer; rays without a return are NaN, so that neighbours stay neighbours.
+// One row per layer; rays without a return are NaN, so that neighbours stay neighbours.
 void write_points(const lidar_t& lidar, const Source& from, CdrWriter& out) {
   put_header(out, lidar.utime, from.frame);
   const auto columns = static_cast<uint32_t>(std::max(0, lidar.ncolumns));
@@ -146,7 +146,7 @@ void write_range(const sonar_t& sonar, const Source& from, CdrWriter& out) {
   if (from.distro != Distro::humble) out.put(0.0f);  // variance: not known
 }
 
-// Echoes alone, each on the axis of its transducer.
+// Only echoes, each on its transducer's axis.
 void write_sonar_points(const sonar_t& sonar, const Source& from, CdrWriter& out) {
   put_header(out, sonar.utime, from.frame);
   std::vector<float> points;
@@ -261,7 +261,7 @@ void write_fix(const navsat_t& navsat, const Source& from, CdrWriter& out) {
   out.put(kCovarianceUnknown);
 }
 
-// To the east, the north and upwards, as drivers of receivers have it.
+// East, north, up, as in receivers' drivers.
 void write_fix_velocity(const navsat_t& navsat, const Source& from, CdrWriter& out) {
   put_header(out, navsat.utime, from.frame);
   put_vector(out, navsat.velocity);
@@ -312,7 +312,7 @@ void write_ground_truth(const pose_t& pose, const Source& from, CdrWriter& out) 
   put_zeros<36>(out);
 }
 
-// Of a plugin's device: the frame is its own.
+// For a plugin's device: the frame is its own.
 void write_device_pose(const pose_t& pose, const Source& from, CdrWriter& out) {
   Source device = from;
   device.base = from.frame;
@@ -356,7 +356,7 @@ void write_camera_info(const camera_info_t& camera, const Source& from, CdrWrite
       .put(uint32_t{0})
       .put(uint32_t{0})
       .put(uint32_t{0})
-      .put(false);  // region of interest: all
+      .put(false);  // region of interest: everything
 }
 
 void put_entity(CdrWriter& out, const std::string& name) {
@@ -364,7 +364,7 @@ void put_entity(CdrWriter& out, const std::string& name) {
   out.put(uint64_t{0}).put(name).put(kLink);
 }
 
-// A point of contact each, of what `own` names; the force acts on it along the normal.
+// One contact point each, of what `own` names; the force acts there along the normal.
 void put_contacts(int64_t utime, const std::string& own, std::span<const contact_point_t> points,
                   const Source& from, CdrWriter& out) {
   put_header(out, utime, from.world);
@@ -401,7 +401,7 @@ void write_bumper(const contact_t& contact, const Source&, CdrWriter& out) {
   out.put(static_cast<bool>(contact.pressed));
 }
 
-// What a detection is taken for, and where; sure of it.
+// The hypothesis and pose of a detection, with certainty.
 void put_hypothesis(CdrWriter& out, const std::string& what, const double* position,
                     const double* wxyz) {
   out.put_length(1).put(what).put(1.0);
@@ -425,7 +425,7 @@ void write_logical_camera(const logical_camera_t& seen, const Source& from, CdrW
   }
 }
 
-// The class is the label's number, the id the model's name.
+// The class is the label's number, the id is the model's name.
 void write_boxes_2d(const boxes_2d_t& seen, const Source& from, CdrWriter& out) {
   put_header(out, seen.utime, from.optical);
   out.put_length(seen.boxes.size());
@@ -449,7 +449,7 @@ void write_boxes_3d(const boxes_3d_t& seen, const Source& from, CdrWriter& out) 
   }
 }
 
-// Whose topic it is: a device's, each transducer's, the robot's, or one for all.
+// Whose topic it is: a device's, each transducer's, the robot's, or a common one.
 enum class Scope { device, element, robot, world };
 
 template <class Message>
@@ -458,8 +458,8 @@ struct Row {
   const char* type;
   Qos qos;
   void (*write)(const Message&, const Source&, CdrWriter&);
-  bool (*applies)(const Source&) = nullptr;                 // null: always
-  bool (*is_due)(const Message&, const Source&) = nullptr;  // null: in every message
+  bool (*applies)(const Source&) = nullptr;                 // null: always applies
+  bool (*is_due)(const Message&, const Source&) = nullptr;  // null: due with every message
   Scope scope = Scope::device;
 };
 
@@ -474,7 +474,7 @@ bool is_colour(const Source& from) {
 bool is_depth(const Source& from) { return from.part == "depth"; }
 bool is_labels(const Source& from) { return from.part == "labels"; }
 
-// What each type becomes.
+// The conversions of each type.
 template <class Message>
 std::span<const Row<Message>> rows();
 
@@ -550,13 +550,14 @@ struct Conversions::Route {
   virtual bool run(std::span<const uint8_t> message, const Wanted& wanted, const Emit& emit) = 0;
 };
 
-// All that is known of a run, looked up by robot and device.
+// Everything known about a run, looked up by robot and device.
 struct Conversions::Plan {
   const ConversionOptions& options;
   Names& names;
   std::map<std::string, const robot_info_t*> robots;
-  std::map<std::string, const device_info_t*> devices;      // by "ROBOT/DEVICE"
-  std::map<std::pair<std::string, std::string>, int> uses;  // of a robot's topic, by its devices
+  std::map<std::string, const device_info_t*> devices;  // by "ROBOT/DEVICE"
+  // number of uses of a robot's topic by its devices
+  std::map<std::pair<std::string, std::string>, int> uses;
   std::map<std::string, RobotFrames> links;
 
   std::vector<MovedLink> moved(const std::string& robot,
@@ -612,7 +613,7 @@ struct Conversions::Plan {
     }
   }
 
-  // "scan" where the robot has one; else "DEVICE/scan".
+  // "scan" if the robot has one; otherwise "DEVICE/scan".
   template <class Message>
   std::string topic(const Row<Message>& row, const channel_info_t& channel) {
     const bool alone = row.scope == Scope::robot || row.scope == Scope::world ||
@@ -658,8 +659,8 @@ class TypedRoute : public Conversions::Route {
   CdrWriter out_;
 };
 
-// Calls visit.operator()<Message>() with the type that has that name; the list of all types that
-// become anything.
+// Calls visit.operator()<Message>() with the type of that name; this is the list of all types that
+// are converted.
 template <class Visit>
 void with_type(const std::string& type, const Visit& visit) {
   const auto match = [&]<class... Messages>() {
@@ -747,7 +748,8 @@ void Conversions::add_frame(const std::string& parent, const std::string& child,
 }
 
 void Conversions::add_frames(const device_info_t& device, const Plan& plan) {
-  static const Pose kOptical{Quat(0.5, -0.5, 0.5, -0.5), Vec3::Zero()};  // z ahead, x right, y down
+  // z forward, x right, y down
+  static const Pose kOptical{Quat(0.5, -0.5, 0.5, -0.5), Vec3::Zero()};
   if (device.kind == "odometry" || device.kind == "pose" || device.kind == "motion" ||
       device.kind == "collisions" || device.kind == "joints")
     return;

@@ -1,7 +1,6 @@
-// The one table of what Ruedo publishes and what it becomes in ROS: a bus message in, one or more
-// ROS messages out.
+// The table of what Ruedo publishes in ROS: a bus message in, one or more ROS messages out.
 //
-// It knows no network: `ruedo run --ros2` sends what comes out, `ruedo export --ros2` writes it
+// Independent of any network: `ruedo run --ros2` sends the result, `ruedo export --ros2` writes it
 // into a bag.
 #pragma once
 
@@ -29,7 +28,7 @@ struct ConversionOptions {
   std::string root;  // the robot without a namespace; "": none
   Remaps topics;     // of ROS names
   std::vector<std::pair<std::string, std::string>> channels;  // the bus's --remap
-  // The links of the robots that there are now; none: what links there are is not known.
+  // The links of the current robots; none: not known.
   std::function<std::map<std::string, RobotFrames>()> robots = [] {
     return std::map<std::string, RobotFrames>();
   };
@@ -47,14 +46,14 @@ class Conversions {
 
   const std::vector<Topic>& topics() const { return topics_; }
 
-  // What becomes of a channel, as places in topics().
+  // The topics for a channel, as indices into topics().
   const std::vector<size_t>& topics_of(const std::string& channel) const;
 
-  // Converts what is wanted of a message. False: it is not of its channel's type, or damaged.
+  // Converts the wanted topics of a message. False: wrong type for the channel, or damaged.
   bool convert(const std::string& channel, std::span<const uint8_t> message, const Wanted& wanted,
                const Emit& emit);
 
-  // Published once, also for late subscribers: where the links and devices sit on their robots
+  // Published once, also for late subscribers: the poses of links and devices on their robots
   // (/tf_static), and each robot_description.
   struct Standing {
     Topic topic;
@@ -85,7 +84,7 @@ class Conversions {
   std::vector<Standing> standing_;
 };
 
-// rosgraph_msgs/msg/Clock, and the others that have no bus message.
+// rosgraph_msgs/msg/Clock, and others without a bus message.
 std::vector<uint8_t> clock_message(int64_t utime);
 
 void put_time(CdrWriter& out, int64_t utime);

@@ -1,5 +1,5 @@
-// The texts of the interfaces; interfaces.cpp reads them. Comments and constants are left out: no
-// hash and no byte depends on them.
+// The texts of the interfaces, parsed by interfaces.cpp. Without comments and constants: no hash
+// and no byte depends on them.
 #pragma once
 
 #include <span>
@@ -8,9 +8,9 @@ namespace ruedo::ros2 {
 
 struct Definition {
   const char*
-      name;  // "sensor_msgs/msg/LaserScan"; a service's request and response are apart by "---"
+      name;  // "sensor_msgs/msg/LaserScan"; a service's request and response are separated by "---"
   const char* text;
-  const char* humble = nullptr;  // where Humble's is another
+  const char* humble = nullptr;  // if Humble's differs
 };
 
 std::span<const Definition> definitions();

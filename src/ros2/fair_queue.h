@@ -1,6 +1,6 @@
-// What clients ask of a service, in the order in which it is answered: the clients in turn, each
-// one's calls as they came, and all no faster than a pace. So who calls without end keeps nobody
-// waiting, and drowns nobody in answers: each answer of a service goes to all its clients.
+// The requests to a service, in the order in which they are answered: round-robin over clients,
+// each client's calls in order, at a limited rate. A client that calls without end delays nobody,
+// and floods nobody with answers: each answer of a service goes to all its clients.
 #pragma once
 
 #include <algorithm>
@@ -31,8 +31,8 @@ class FairQueue {
     ++size_;
   }
 
-  // What is next; none: nothing waits, or all that does has to wait longer. may: whether that
-  // client, whose turn it is, may be answered.
+  // The next request; none: nothing is waiting, or it has to wait longer. may: whether the client
+  // whose turn it is may be answered.
   template <class May>
   std::optional<std::pair<uint64_t, Item>> next(Clock::time_point now, May may) {
     refill(now);
@@ -62,9 +62,9 @@ class FairQueue {
   }
 
   Pace pace_;
-  std::map<uint64_t, std::deque<Item>> waiting_;  // by client; none is empty
+  std::map<uint64_t, std::deque<Item>> waiting_;  // by client; no empty entries
   size_t size_ = 0;
-  uint64_t last_ = 0;  // whose turn it was
+  uint64_t last_ = 0;  // who had the last turn
   double credit_;      // answers that may be given now
   Clock::time_point refilled_;
 };

@@ -1,4 +1,4 @@
-// Reads the definitions once and derives the rest from them.
+// Parses the definitions once and derives everything else.
 #include "ros2/interfaces.h"
 
 #include <algorithm>
@@ -21,7 +21,7 @@ namespace {
 
 constexpr std::array kDistros{"humble", "iron", "jazzy", "kilted", "lyrical"};
 
-// What type_description_interfaces/msg/FieldType calls the types.
+// Numbers of the types in type_description_interfaces/msg/FieldType.
 const std::map<std::string, int, std::less<>> kTypeIds{
     {"int8", 2},   {"uint8", 3}, {"int16", 4},  {"uint16", 5},   {"int32", 6},
     {"uint32", 7}, {"int64", 8}, {"uint64", 9}, {"float32", 10}, {"float64", 11},
@@ -87,7 +87,7 @@ struct Library {
   }
 
   void add(const std::string& name, const std::string& text) {
-    const size_t half = text.find("---\n");  // a service, an action's among them
+    const size_t half = text.find("---\n");  // a service, or a service of an action
     if (half == std::string::npos) return put(name, text);
     put(name + "_Request", text.substr(0, half));
     put(name + "_Response", text.substr(half + 4));
@@ -119,7 +119,7 @@ void collect(std::string_view type, Distro distro, std::set<std::string>& used) 
   }
 }
 
-// .msg's char is an unsigned byte, which is what it becomes on the way to the description.
+// .msg's char is an unsigned byte in the description.
 int type_id(const Field& field) {
   const auto known = kTypeIds.find(field.type);
   int id = known == kTypeIds.end()   ? kNested
@@ -135,7 +135,7 @@ int type_id(const Field& field) {
   return id;
 }
 
-// JSON as Python's json.dumps() writes it: the hash is of these very bytes.
+// JSON as written by Python's json.dumps(): the hash is over exactly these bytes.
 std::string description(std::string_view type, Distro distro) {
   std::string fields;
   for (const Field& field : fields_of(type, distro)) {

@@ -1,9 +1,8 @@
-// What robots, devices and frames are called in ROS.
+// Names of robots, devices and frames in ROS.
 //
 // A robot that is alone when a run begins has the root namespace and plain frames ("/scan",
-// "base_link"); every other has its own
-// ("/alice/scan", "alice/base_link"), those that come later, too. Names that ROS does not allow are
-// made so that it does, and each is given once.
+// "base_link"); every other one, including those that join later, has its own ("/alice/scan",
+// "alice/base_link"). Names that ROS does not allow are changed, and each is given only once.
 #pragma once
 
 #include <map>
@@ -18,15 +17,15 @@ using Remaps = std::vector<std::pair<std::string, std::string>>;  // "/scan", "/
 
 class Names {
  public:
-  // root: the robot without a namespace; "": none. remaps: of topics and services, whole names.
+  // root: the robot without a namespace; "": none. remaps: full names of topics and services.
   Names(std::string root, Remaps remaps) : root_(std::move(root)), remaps_(std::move(remaps)) {}
 
-  // "/alice/scan" for ("alice", "scan"); the world's own have robot "". Throws InputError when two
-  // remaps make one name of two.
+  // "/alice/scan" for ("alice", "scan"); the world's own names have robot "". Throws InputError if
+  // two remaps give the same name.
   std::string topic(const std::string& robot, const std::string& name);
   std::string frame(const std::string& robot, const std::string& name) const;
 
-  // Throws InputError when a remap names no topic that was asked for.
+  // Throws InputError if a remap names no topic that was asked for.
   void check_remaps() const;
 
  private:
@@ -37,7 +36,7 @@ class Names {
   std::set<std::string> asked_;
 };
 
-// Letters, digits and underscores; no digit ahead.
+// Letters, digits and underscores; no leading digit.
 std::string ros_name(const std::string& name);
 
 }  // namespace ruedo::ros2

@@ -16,11 +16,11 @@
 namespace ruedo::ros2 {
 namespace {
 
-constexpr auto kLook = std::chrono::milliseconds(20);  // at who reads pictures
+constexpr auto kLook = std::chrono::milliseconds(20);  // interval of checks who reads pictures
 
 std::string key(const Topic& topic) { return topic.name + " " + topic.type; }
 
-// What names and channels depend on; not the time, and whether the run is paused.
+// What names and channels depend on: not the time, nor whether the run is paused.
 bool is_same(const std::vector<world_info_t>& a, const std::vector<world_info_t>& b) {
   const auto names = [](const std::vector<world_info_t>& info) {
     std::vector<std::string> all;
@@ -85,7 +85,7 @@ Endpoint Node::endpoint(const Topic& topic, Role role) const {
   return {role, topic, type_hash(topic.type, options_.conversion.distro)};
 }
 
-// Of pictures as it was at the last look; all else costs little.
+// For pictures, the result of the last check; everything else costs little.
 bool Node::wants(const std::string& channel) const {
   const std::lock_guard lock(pictures_mutex_);
   const auto picture = pictures_.find(channel);
@@ -111,7 +111,7 @@ void Node::look_for_readers() {
   }
 }
 
-// Their first are drawn, until somebody has looked.
+// The first pictures are drawn, until the first check.
 void Node::add_pictures(const std::vector<world_info_t>& info) {
   const std::lock_guard lock(pictures_mutex_);
   pictures_.clear();
@@ -129,7 +129,7 @@ void Node::announce(const std::shared_ptr<const run::Announcement>& announcement
   if (!is_same(announcement->info, info_)) take_over(announcement->info);
 }
 
-// Before what is measured at that time.
+// Before measurements of that time.
 void Node::begin_step(const run::Step& step) {
   time_us_ = step.time_us;
   if (step.time_us < next_clock_us_) return;
@@ -180,7 +180,7 @@ void Node::take_over(const std::vector<world_info_t>& info) {
   tell_graph();
 }
 
-// The description of a robot that is gone is withdrawn.
+// The description of a removed robot is withdrawn.
 void Node::tell_standing() {
   std::map<std::string, std::unique_ptr<Writer>> writers;
   for (const Conversions::Standing& each : conversions_->standing()) {
@@ -193,7 +193,7 @@ void Node::tell_standing() {
   standing_ = std::move(writers);
 }
 
-// Of a robot that is gone, the run itself refuses what comes.
+// The run itself refuses commands to a removed robot.
 void Node::add_commands(const std::vector<world_info_t>& info) {
   for (Command& command : commands_of(info, options_.joints, names_)) {
     const std::string name = key(command.topic);
@@ -245,7 +245,7 @@ void Node::receive(const Command& command, std::span<const uint8_t> cdr) {
   count_faulty(command.topic.name, command.topic.type, cdr.size());
 }
 
-// The robot is put where the message says: the map's frame is the world's.
+// The robot is placed where the message says: the map frame is the world.
 void Node::receive_pose(const std::string& robot, const std::string& topic, const Sample& sample) {
   ++received_;
   if (!injecting_) return;

@@ -1,7 +1,7 @@
-// A run as a ROS 2 node: what the run publishes goes out as ROS messages, commands come in.
+// A run as a ROS 2 node: published messages go out as ROS messages, commands come in.
 //
-// It is a sink that may be slow: it belongs behind a QueuedSink. Nothing here reaches the run but
-// through `inject`, as if it had come over the bus.
+// A slow sink: it belongs behind a QueuedSink. It reaches the run only through `inject`, as if from
+// the bus.
 #pragma once
 
 #include <atomic>
@@ -26,7 +26,7 @@ namespace ruedo::ros2 {
 
 struct NodeOptions {
   ConversionOptions conversion;
-  double clock_hz = 100.0;  // of sim time, at most
+  double clock_hz = 100.0;  // maximum rate of /clock, in sim time
   ServiceMapping mapping = ServiceMapping::automatic;
   JointNames joints = [](const std::string&) { return std::vector<std::string>(); };
 };
@@ -35,12 +35,12 @@ class Node : public run::Sink {
  public:
   using Inject = std::function<void(const std::string& channel, std::span<const uint8_t> message)>;
 
-  // info: of the run as it begins. Throws InputError for a remap of nothing, EnvironmentError.
+  // info: at the start of the run. Throws InputError for a remap without a match, EnvironmentError.
   Node(NodeOptions options, std::unique_ptr<Transport> transport,
        const std::vector<world_info_t>& info, Inject inject);
   ~Node() override;
 
-  // Commands are taken from now on; and after stop() no more.
+  // Commands are accepted from start() to stop().
   void start();
   void stop();
 
@@ -61,8 +61,8 @@ class Node : public run::Sink {
   Counts counts() const {
     return {sent_, received_, dropped_, faulty_ + services_->faulty() + transport_->refused()};
   }
-  // Before the run begins: whether anybody reads a sensor's topic, publishes on that one, and how
-  // many of both there are.
+  // Before the run begins: whether anybody subscribes to a sensor's topic or publishes on a
+  // command's, and how many of each.
   bool is_read() const;
   bool is_written(const std::string& topic) const;
   size_t peers() const;
@@ -72,7 +72,7 @@ class Node : public run::Sink {
   std::vector<Topic> services() const { return services_->list(); }
 
  private:
-  void take_over(const std::vector<world_info_t>& info);  // of robots that have come or gone
+  void take_over(const std::vector<world_info_t>& info);  // for robots that have joined or left
   void add_pictures(const std::vector<world_info_t>& info);
   void look_for_readers();  // of pictures
   void add_commands(const std::vector<world_info_t>& info);
@@ -88,10 +88,10 @@ class Node : public run::Sink {
 
   NodeOptions options_;
   std::unique_ptr<Transport> transport_;
-  Inject inject_;  // before what uses it
+  Inject inject_;  // declared before its users
   Names names_;
 
-  // Of the thread that the sink is called in.
+  // For the thread that calls the sink.
   std::unique_ptr<Conversions> conversions_;
   std::map<std::string, std::unique_ptr<Writer>> writers_;  // by name and type
   std::vector<Writer*> writer_of_topic_;
@@ -102,7 +102,7 @@ class Node : public run::Sink {
   std::map<std::string, std::unique_ptr<Writer>> standing_;  // by name and type
   std::map<std::string, std::unique_ptr<Reader>> readers_;
   std::map<std::string, Command> commands_;  // by name and type
-  std::map<std::string, Topic> poses_;       // initialpose of each robot, by name and type
+  std::map<std::string, Topic> poses_;       // for each robot, by name and type
   Requests requests_;
   std::unique_ptr<Services> services_;
   std::string reply_channel_;
@@ -111,7 +111,7 @@ class Node : public run::Sink {
   Requests::Clock::time_point next_look_;
 
   mutable std::mutex pictures_mutex_;
-  std::map<std::string, bool> pictures_;  // channels of pictures; whether anybody reads them
+  std::map<std::string, bool> pictures_;  // channels of pictures, and whether anybody reads them
   std::atomic<uint64_t> audience_{0};
 
   std::atomic<bool> injecting_{false};

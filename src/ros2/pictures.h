@@ -1,4 +1,4 @@
-// Pictures as ROS wants them: raw pixels, or JPEG.
+// Pictures for ROS: raw pixels, or JPEG.
 #pragma once
 
 #include <cstdint>
@@ -9,15 +9,15 @@
 namespace ruedo::ros2 {
 
 struct RawPicture {
-  uint32_t width = 0, height = 0, step = 0;  // step: bytes in a row
+  uint32_t width = 0, height = 0, step = 0;  // step: bytes per row
   const char* encoding = "rgb8";             // sensor_msgs/image_encodings.hpp
   std::vector<uint8_t> data;
 };
 
-// A JPEG picture is decoded; one that is damaged is empty.
+// Decodes a JPEG picture; empty if it is damaged.
 RawPicture raw_picture(const image_t& image);
 
-// Of raw pixels in grey or colour; empty for anything else.
+// Encodes raw grey or colour pixels; empty for anything else.
 std::vector<uint8_t> jpeg_of(const image_t& image);
 
 }  // namespace ruedo::ros2

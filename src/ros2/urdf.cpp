@@ -1,5 +1,5 @@
-// A robot as URDF. What URDF has no element for (planes, cones, ellipsoids, meshes that no file
-// holds) is left out, and a comment says so.
+// Writes a robot as URDF. What URDF cannot express (planes, cones, ellipsoids, meshes without a
+// file) is left out, with a comment.
 #include <filesystem>
 #include <limits>
 
@@ -28,7 +28,7 @@ Vec3 rpy_of(const Quat& rotation) {
   const Eigen::Matrix3d R = rotation.toRotationMatrix();
   const double level = std::sqrt(R(0, 0) * R(0, 0) + R(1, 0) * R(1, 0));
   const double pitch = math::atan2(-R(2, 0), level);
-  constexpr double kUpright = 1e-9;  // where roll and yaw are the same: no yaw
+  constexpr double kUpright = 1e-9;  // gimbal lock: yaw is set to 0
   if (level < kUpright) return {math::atan2(-R(1, 2), R(1, 1)), pitch, 0.0};
   return {math::atan2(R(2, 1), R(2, 2)), pitch, math::atan2(R(1, 0), R(0, 0))};
 }
@@ -49,7 +49,7 @@ std::string file_uri(const std::string& path) {
 }
 
 struct Piece {
-  Pose X_GP;         // in the geometry's frame
+  Pose X_GP;         // in the frame of the geometry
   std::string text;  // "<box .../>"
 };
 
@@ -80,7 +80,7 @@ std::vector<Piece> pieces_of(const Geometry& geometry) {
                        "\" scale=\"" + numbers(geometry.scale) + "\"/>"}};
 }
 
-// A comment cannot hold two hyphens in a row.
+// XML comments cannot contain two consecutive hyphens.
 std::string left_out(const char* element, const std::string& name) {
   std::string safe;
   for (const char c : model::escaped(name)) safe += c == '-' ? '_' : c;
@@ -89,7 +89,7 @@ std::string left_out(const char* element, const std::string& name) {
 
 std::string colour(const model::Visual& visual, const std::string& name) {
   const bool own = visual.geometry.shape == Shape::mesh;
-  if (!visual.material && own) return {};  // the mesh's
+  if (!visual.material && own) return {};  // the mesh's own
   const model::Rgba rgba =
       visual.material ? visual.material->diffuse : model::Rgba{0.7f, 0.7f, 0.7f, 1.0f};
   return fmt::format(
