@@ -1,7 +1,7 @@
-// A few steps on their way through the server: their snapshots, and what the modules make of them.
+// A few steps on their way through the server: their snapshots, and the modules' output for them.
 //
-// Handing steps over singly costs more than a small world's step does, so they travel in batches.
-// Batches are recycled: after the first round none of this allocates.
+// Passing on single steps would cost more than computing a step of a small world, so they travel in
+// batches. Batches are recycled: after the first round nothing here allocates.
 #pragma once
 
 #include <atomic>
@@ -17,22 +17,22 @@
 
 namespace ruedo::engine {
 
-// A command that took effect on the state of `step`.
+// A command that acted on the state of `step`.
 struct AppliedCommand {
   int64_t step = 0;
   int input = -1;              // index into CommandInbox's inputs
-  std::vector<uint8_t> bytes;  // the message, as it came
+  std::vector<uint8_t> bytes;  // the message, as received
 };
 
 struct SensorFault;
 
-// From the state `step` on, whatever is drawn comes from that seed.
+// From the state `step` on, random numbers are drawn from that seed.
 struct Reseeding {
   int64_t step;
   uint64_t seed;
 };
 
-// By channel: whether anybody reads its messages. A channel beyond its end is read.
+// By channel: whether anybody reads its messages. Channels beyond its end are read.
 using ReadChannels = std::vector<bool>;
 
 // Written by the simulation thread, then by each module into its own output, then read by the
@@ -40,33 +40,33 @@ using ReadChannels = std::vector<bool>;
 struct Batch {
   int64_t first_step = 0;
   int count = 0;
-  bool last = false;                    // nothing follows
+  bool last = false;  // no batch follows
   std::vector<Snapshot> snapshots;      // the first `count` are valid
   std::vector<AppliedCommand> applied;  // the first `applied_count` are valid
   int applied_count = 0;
 
-  // Of all devices, while any is faulty or was; null: none. Those of the batch's steps are in it.
+  // Of all devices, while any is or was faulty; null: none. Includes those of the batch's steps.
   std::shared_ptr<const std::vector<SensorFault>> sensor_faults;
 
-  // By step; null: none. Those of the batch's steps are in it.
+  // By step; null: none. Includes those of the batch's steps.
   std::shared_ptr<const std::vector<Reseeding>> reseedings;
 
-  // Null: everything is read. Pictures of cameras of which nothing is read are not drawn.
+  // Null: everything is read. Pictures that nobody reads are not drawn.
   std::shared_ptr<const ReadChannels> read;
 
   struct Output {
-    bool woken = false;  // false: the rest is of an earlier round
-    bool here = false;   // worked through by who computed the batch
+    bool woken = false;  // false: the rest is from an earlier round
+    bool here = false;  // processed by the thread that computed the batch
     std::vector<Outbox> pieces;
   };
   std::vector<Output> outputs;  // one per module, in the order of the schedule
 
-  // Modules that still work on it; kFree when none does.
+  // The number of modules still working on it; kFree if it is not in use.
   static constexpr int kFree = -1;
   std::atomic<int> pending{kFree};
   std::atomic<bool> failed{false};
-  std::string failure;  // of the module that set `failed`
-  std::string end;      // why it is the last, where the state could not be gone on from
+  std::string failure;  // from the module that set `failed`
+  std::string end;  // why it is the last one, if the state was not valid
 };
 
 }  // namespace ruedo::engine

@@ -1,4 +1,4 @@
-// The channel table: names, lengths and remaps are checked here, once, before the run.
+// The channel table: checks names, lengths and remaps once, before the run.
 #include "engine/channels.h"
 
 #include <algorithm>
@@ -28,7 +28,7 @@ int Channels::add(Channel channel) {
   };
   auto place = channels_.end();
   if (by_bus_name_.size() <
-      channels_.size()) {  // some are gone; they are not needed while a world is loaded
+      channels_.size()) {  // a removed one may be reused; not while a world is loaded
     place = std::find_if(channels_.begin(), channels_.end(),
                          [&](const Channel& old) { return free(old) && old.name == channel.name; });
     if (place == channels_.end()) place = std::find_if(channels_.begin(), channels_.end(), free);

@@ -1,5 +1,4 @@
-// The channels of a run: which there are, what they carry, and under which names they go over the
-// bus.
+// The channels of a run: what they carry, and their names on the bus.
 #pragma once
 
 #include <cstdint>
@@ -17,13 +16,13 @@ inline constexpr size_t kMaxChannelName = 63;  // LCM's limit
 struct Channel {
   std::string name;      // "p3at/LRF"
   std::string bus_name;  // after --remap
-  std::string robot;     // "" for the simulation's
+  std::string robot;  // "" for channels of the simulation
   std::string device;    // "" for commands
   std::string type;      // "planar_lidar_t"
   int64_t fingerprint = 0;
-  Rate rate;           // 0: every step, or when something happens
+  Rate rate;  // 0: every step, or on events
   bool input = false;  // clients publish on it
-  bool gone = false;   // its robot was removed; the next channel of the type takes its place
+  bool gone = false;  // its robot was removed; the next channel of the type reuses its place
 };
 
 class Channels {
@@ -45,10 +44,10 @@ class Channels {
   const std::vector<Channel>& list() const { return channels_; }
   const Channel& operator[](int index) const { return channels_[index]; }
 
-  // A robot is gone, or one device of it. The indices of all other channels stay.
+  // Removes a robot's channels, or those of one of its devices. All other indices remain valid.
   void remove(const std::string& robot, const std::string& device = "");
 
-  // Throws InputError, with a suggestion, when a remap names no channel.
+  // Throws InputError, with a suggestion, if a remap matches no channel.
   void check_remaps() const;
   void clear() {
     channels_.clear();
@@ -58,10 +57,11 @@ class Channels {
  private:
   std::vector<std::pair<std::string, std::string>> remaps_;
   std::vector<Channel> channels_;
-  std::unordered_map<std::string, int> by_bus_name_;  // looked up only, never walked through
+  // only looked up, never iterated: its order is not defined
+  std::unordered_map<std::string, int> by_bus_name_;
 };
 
-// The channels of the simulation itself, but for ruedo/world, which its module announces.
+// The channels of the simulation itself, except ruedo/world, which its module announces.
 struct SimulationChannels {
   int tick = -1, info = -1, request = -1, reply = -1;  // request and reply: -1 without control
 };

@@ -31,7 +31,7 @@ DecodeFault try_decoding(const uint8_t* data, size_t size) {
   return decode_checked(data, size, message);
 }
 
-// A fault's values, checked when it came; whether its robot has that device is seen when it acts.
+// A fault's values are checked on arrival; whether its robot has that device, when it acts.
 std::string check_fault_message(const uint8_t* data, size_t size, model::Fault& fault) {
   fault_t message;
   if (decode_checked(data, size, message) != DecodeFault::none) return "it is none";
@@ -39,7 +39,7 @@ std::string check_fault_message(const uint8_t* data, size_t size, model::Fault& 
   return model::check_fault(fault);
 }
 
-// What its type alone does not tell: "" or what is wrong with a message that was decoded.
+// What the type does not guarantee: "" or what is wrong with a decoded message.
 std::string check_values(Input::Kind kind, const uint8_t* data, size_t size) {
   if (kind == Input::Kind::fault) {
     model::Fault asked;
@@ -58,7 +58,7 @@ DecodeFault decode_command(Input::Kind kind, const uint8_t* data, size_t size,
   DecodeFault fault = DecodeFault::none;
   switch (kind) {
     case Input::Kind::velocity: {
-      // Programs that know bot_core's types and no others have a velocity in pose_t.
+      // Programs that only know bot_core's types send a velocity as pose_t.
       if (fingerprint_of({data, size}) == pose_t::getHash()) {
         pose_t pose;
         fault = decode_checked(data, size, pose);
@@ -98,7 +98,7 @@ DecodeFault decode_command(Input::Kind kind, const uint8_t* data, size_t size,
       }
       break;
     }
-    // These are no commands of a robot's: apply() takes the bytes.
+    // Not commands to a robot: apply() takes the bytes.
     case Input::Kind::fault: return try_decoding<fault_t>(data, size);
     case Input::Kind::markers: return try_decoding<markers_t>(data, size);
     case Input::Kind::reset_odometry: {
@@ -152,7 +152,7 @@ void CommandInbox::add(const std::vector<Input>& inputs, int robots) {
   reset_input_.resize(static_cast<size_t>(robots), -1);
   waits_.slots.resize(static_cast<size_t>(robots));
   for (const Input& input : inputs) {
-    // A robot in the place of one that was removed has the same inputs.
+    // A robot that takes the place of a removed one has the same inputs.
     auto at = std::find_if(inputs_.begin(), inputs_.end(), [&](const Input& old) {
       return old.robot == input.robot && old.kind == input.kind;
     });
@@ -277,8 +277,7 @@ void CommandInbox::apply(robot::Robots& robots, Faults& faults, int64_t step, Ba
   {
     std::lock_guard lock(mutex_);
     waits_.next_step = step + 1;
-    // Buffers are swapped, never copied, and what is taken leaves its buffers behind for what
-    // comes.
+    // Buffers are swapped, never copied; those taken are replaced by empty ones.
     for (; waits_.scheduled_count > 0 && waits_.scheduled.front().step <= step; ++scheduled) {
       std::pop_heap(waits_.scheduled.begin(),
                     waits_.scheduled.begin() + static_cast<std::ptrdiff_t>(waits_.scheduled_count),
