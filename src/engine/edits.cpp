@@ -1,4 +1,4 @@
-// Checks come first, all of them; what throws after them leaves the world as it was.
+// Everything is checked first; an exception afterwards leaves the world unchanged.
 #include "engine/edits.h"
 
 #include <algorithm>
@@ -28,7 +28,7 @@ std::string list_of(std::span<const double> values) {
   return "(" + text + ")";
 }
 
-// "": they are all numbers, none beyond `most`.
+// "": all are numbers, and none is beyond `most`.
 std::string fault_of(const char* what, std::span<const double> values, double most,
                      const char* unit) {
   for (const double value : values) {
@@ -47,7 +47,7 @@ std::string fault_of_pose(const double (&position)[3], const double (&orientatio
     return fault;
   double squared = 0.0;
   for (const double part : orientation) squared += part * part;
-  if (!(std::abs(squared - 1.0) <= 2e-3)) {  // not for NaN either
+  if (!(std::abs(squared - 1.0) <= 2e-3)) {  // also false for NaN
     return "orientation is " + list_of(orientation) + ": a unit quaternion w, x, y, z is wanted";
   }
   return "";
@@ -58,7 +58,7 @@ Pose pose_of(const double (&position)[3], const double (&orientation)[4]) {
               Vec3(position[0], position[1], position[2])};
 }
 
-// "": it may be a model's, as in a world's file; a robot's must be fit for channels, too.
+// "": valid for a model, as in a world file; a robot's name must also be usable in channel names.
 std::string fault_of_name(const std::string& name) {
   if (name.empty() || name.size() > kLongestName)
     return fmt::format("has {} bytes; allowed are 1 to {}", name.size(), kLongestName);
@@ -124,7 +124,7 @@ model::LoadedModel ModelStore::load(const spawn_request_t& request, model::LoadB
   known.model = loaded.model;
   known.rest = loaded;
   known.rest.model.reset();
-  known.rest.files_read.clear();  // the log has them once
+  known.rest.files_read.clear();  // the log records them only once
   return loaded;
 }
 

@@ -1,9 +1,8 @@
-// Changes of the world that requests ask for: models come and go, are put elsewhere, are pushed.
+// Changes to the world by requests: models are spawned, removed, moved and pushed.
 //
-// Each function checks a request's body and carries it out on a simulation that stands still; the
-// effect is on the state that was computed last. The same body on the same state does the same, so
-// a log needs no more than the bodies: a name that is left to the server, and the height of the
-// ground, follow from the state.
+// Each function checks a request's body and executes it while the simulation stands still; it acts
+// on the state computed last. The same body has the same effect on the same state, so a log only
+// needs the bodies: a generated name and the height of the ground follow from the state.
 #pragma once
 
 #include <functional>
@@ -23,11 +22,12 @@
 namespace ruedo::engine {
 
 inline constexpr double kFarthest_m = 1e6, kFastest_m_s = 1e3,
-                        kFastest_rad_s = 1e4;  // that a request may ask for
-inline constexpr size_t kMostModels = 10'000;  // of a world, the places of removed ones included
+                        kFastest_rad_s = 1e4;  // maximum in requests
+// models in a world, including the places of removed ones
+inline constexpr size_t kMostModels = 10'000;
 
-// Models that came with requests. A file that was not touched since, or the same text, is read once
-// as long as any model of a world is of it. Thread safe.
+// Models from requests. As long as any model of a world comes from it, an unchanged file, or the
+// same text, is not read again. Thread-safe.
 class ModelStore {
  public:
   explicit ModelStore(std::string world_file) : world_file_(std::move(world_file)) {}
@@ -37,31 +37,32 @@ class ModelStore {
  private:
   struct Known {
     std::weak_ptr<const model::Model> model;
-    model::LoadedModel rest;  // without the model
+    model::LoadedModel rest;  // everything but the model
   };
   std::string world_file_;
   std::mutex mutex_;
   std::map<std::string, Known> known_;
 };
 
-// That name, or with _2, _3, ... when it is taken: of a spawned model that was given none.
+// The name, or with _2, _3, ... appended if it is taken: for a spawned model without a requested
+// name.
 std::string unused_name(const model::WorldModel& world, const std::string& name);
 
-// What can be said before the model is read; OK: nothing is wrong.
+// What can be checked before the model is read; OK: nothing is wrong.
 Outcome check_spawn(const spawn_request_t& request);
-// step: of the first state that shows it. name: becomes the model's.
+// step: the first state that shows it. name: is set to the model's name.
 Outcome spawn(const spawn_request_t& request, const model::LoadedModel& loaded, int64_t step,
               Simulation& simulation, Channels& channels, std::string& name);
 Outcome remove(const std::string& name, Simulation& simulation, Channels& channels);
-// A model that stands fast, static or by a joint with the world, is taken out and put in again.
-// step: of the first state that shows it.
+// A fixed model, static or with a joint to the world, is removed and inserted again. step: the
+// first state that shows it.
 Outcome set_pose(const set_pose_request_t& request, int64_t step, Simulation& simulation,
                  Channels& channels);
 Pose pose_of(const set_pose_request_t& request);
-// Whether the model of that name is one of those; false where there is none.
+// Whether the model of that name is fixed; false if there is none.
 bool stands_fast(const model::WorldModel& world, const std::string& name);
 Outcome set_twist(const set_twist_request_t& request, Simulation& simulation);
-// Everything that is there back to where it started or was spawned, at rest.
+// Returns all models to where they started or were spawned, at rest.
 void reset_poses(Simulation& simulation);
 
 }  // namespace ruedo::engine

@@ -1,5 +1,5 @@
-// Each copy is computed by one task, modules and all; arrays are written by the task of the copy
-// that they show.
+// Each copy is computed by one task, including its modules; arrays are written by the task of the
+// copy that they show.
 #include "engine/engine.h"
 
 #include <algorithm>
@@ -27,8 +27,8 @@ namespace {
 constexpr int64_t kBatchSteps = 32;
 const std::atomic<bool> kNeverLeftOff{false};
 
-// Rounding and denormals as in every thread that computes, whatever the caller's program has set;
-// put back at the end.
+// Sets rounding and denormal modes as in every computing thread, whatever the caller's program
+// uses; restores them at the end.
 class DefaultFloatingPoint {
  public:
   DefaultFloatingPoint() {
@@ -51,13 +51,13 @@ bool same_name(const std::string& a, const std::string& b) {
 
 struct Engine::Arena {
   tbb::task_arena tasks;
-  // What a copy's steps are computed in, and what nobody reads after step(): snapshots and
-  // messages. They are a thread's, so that with many copies they stay in its cache; more than one
-  // where TBB lets a thread that waits begin with another copy.
+  // Scratch memory for computing a copy's steps, not read after step(): snapshots and messages. It
+  // belongs to the thread, so that it stays in the cache even with many copies; there may be more
+  // than one, because TBB may let a waiting thread start with another copy.
   tbb::enumerable_thread_specific<std::vector<std::unique_ptr<Batch>>> spare;
 };
 
-// A batch of the thread's, as long as it is needed.
+// Borrows one of the thread's batches.
 class Engine::Borrowed {
  public:
   Borrowed(Arena& arena, const World& world) : spare_(arena.spare.local()) {
@@ -82,23 +82,22 @@ class Engine::Borrowed {
 };
 
 struct Engine::Copy {
-  std::shared_ptr<const model::WorldModel> model;  // before anything was drawn
-  uint64_t seed = 1;                               // that it was made with
+  std::shared_ptr<const model::WorldModel> model;  // before any draws
+  uint64_t seed = 1;                               // with which it was created
   model::Drawn drawn;
   std::shared_ptr<Plan> plan;
   Channels channels;
   std::unique_ptr<World> world;
-  int64_t step = -1;              // of the state that there is
-  bool driven = false;            // velocities_ has rows of it that the inbox does not have yet
-  std::vector<bool> scenes_made;  // of each module
-  std::vector<std::vector<uint8_t>> newest;  // message of each channel; empty: none yet
+  int64_t step = -1;                         // of the current state
+  bool driven = false;                       // velocities_ has rows that are not in its inbox yet
+  std::vector<bool> scenes_made;             // for each module
+  std::vector<std::vector<uint8_t>> newest;  // the newest message of each channel; empty: none yet
   struct Place {
     const Outbox* outbox;
     const Outbox::Entry* entry;
   };
   std::vector<Place> places;  // of the newest messages of a batch
-  // Of each driven robot, the links that it ran into in the last step(), in the order in which it
-  // met them.
+  // For each driven robot, the links that it ran into during the last step(), in order.
   std::vector<std::vector<LinkIndex>> met;
 
   void make_scenes(const ReadChannels* read, const std::vector<SensorFault>* faults = nullptr);
@@ -108,17 +107,17 @@ struct Engine::Copy {
 
 class SavedWorld {
  public:
-  std::shared_ptr<const char> engine;  // its identity
-  std::unique_ptr<Engine::Copy> copy;  // which is never stepped
-  std::vector<int32_t> touching;       // its row
+  std::shared_ptr<const char> engine;  // identity of the engine
+  std::unique_ptr<Engine::Copy> copy;  // never stepped
+  std::vector<int32_t> touching;       // the saved row
 };
 
 struct Engine::Observer {
   std::string device, field;
   FieldReader reader;
-  std::vector<int> channels;  // of the robots, in their order
+  std::vector<int> channels;  // of the robots, in order
   std::shared_ptr<FieldArray> array = std::make_shared<FieldArray>();
-  size_t count = 0;  // values of one robot
+  size_t count = 0;  // values per robot
 };
 
 Engine::Engine(std::shared_ptr<const model::WorldModel> world, EngineOptions options)
@@ -129,7 +128,7 @@ Engine::Engine(std::shared_ptr<const model::WorldModel> world, EngineOptions opt
   const DefaultFloatingPoint floating_point;
   copies_.resize(static_cast<size_t>(options_.worlds));
   copies_[0] = make_copy(
-      world_, options_.fleet.seed);  // the first says what is wrong, and builds what all share
+      world_, options_.fleet.seed);  // the first one reports errors, and builds what all share
   first_made_ = true;
   read_ = std::make_shared<const ReadChannels>(copies_[0]->channels.list().size(), false);
   for_each(copies_.size(), [this](size_t i) {
@@ -167,7 +166,7 @@ std::unique_ptr<Engine::Copy> Engine::make_copy(std::shared_ptr<const model::Wor
   return copy;
 }
 
-// As it began.
+// The initial state.
 std::unique_ptr<Engine::Copy> Engine::make_another(const Copy& copy) const {
   auto other = std::make_unique<Copy>();
   FleetOptions fleet = options_.fleet;
@@ -240,7 +239,7 @@ void Engine::compute(size_t index, int64_t steps) {
   for (auto& observer : observers_) update(*observer, index);
 }
 
-// A renderer when the first picture is read: most copies never need one.
+// Creates a renderer when the first picture is read: most copies never need one.
 void Engine::Copy::make_scenes(const ReadChannels* read, const std::vector<SensorFault>* faults) {
   const auto& modules = world->modules();
   scenes_made.resize(modules.size(), false);
@@ -267,7 +266,7 @@ void Engine::Copy::keep_newest(const Batch& batch) {
   }
 }
 
-// In the order in which a server publishes them: step by step, then by the schedule.
+// In the order in which a server publishes: step by step, then by the schedule.
 void Engine::tell(size_t index, const Batch& batch) {
   const Copy& copy = *copies_[index];
   for (int64_t step = batch.first_step; step < batch.first_step + batch.count; ++step) {
@@ -321,7 +320,7 @@ std::vector<std::vector<std::string>> Engine::collisions(int world) const {
 
 namespace {
 
-// Of a device that has published nothing since its world began: NaN, of whole numbers 0.
+// For a device that has not published yet: NaN, or 0 for integers.
 void put_nothing(Primitive type, std::byte* row, size_t size) {
   const auto fill = [&](auto nothing) {
     for (size_t at = 0; at < size; at += sizeof nothing)
@@ -369,12 +368,12 @@ void Engine::drive(std::span<const double> velocities) {
   if (velocities.size() != 3 * rows)
     throw InputError({}, "velocities are " + std::to_string(rows) +
                              " rows of 3, one for each driven robot of each world");
-  for (size_t i = 0; i < copies_.size(); ++i) take_velocities(i);  // of a call before
+  for (size_t i = 0; i < copies_.size(); ++i) take_velocities(i);  // from an earlier call
   velocities_.assign(velocities.begin(), velocities.end());
   for (auto& copy : copies_) copy->driven = true;
 }
 
-// Puts what drive() was given into the copy's inbox: when it is computed, by the thread that does.
+// Moves what drive() was given into the copy's inbox: in the thread that computes the copy.
 void Engine::take_velocities(size_t index) {
   Copy& copy = *copies_[index];
   if (!std::exchange(copy.driven, false)) return;
@@ -395,7 +394,7 @@ void Engine::take_velocities(size_t index) {
 
 void Engine::command(int world, const std::string& channel, std::span<const uint8_t> message) {
   Copy& copy = *copies_.at(static_cast<size_t>(world));
-  take_velocities(static_cast<size_t>(world));  // which came first
+  take_velocities(static_cast<size_t>(world));  // it came first
   CommandInbox& inbox = copy.world->inbox();
   const auto input = std::find_if(inbox.inputs().begin(), inbox.inputs().end(),
                                   [&](const Input& one) { return one.channel == channel; });
@@ -490,7 +489,7 @@ void Engine::restore(const SavedWorld& saved, std::span<const int> worlds) {
   for_each(worlds.size(), [&](size_t i) { restore_one(saved, static_cast<size_t>(worlds[i])); });
 }
 
-// A copy of another plan or seed is made anew: what it drew when it was made would stay.
+// A copy with another plan or seed is created again: what it drew on creation would remain.
 void Engine::restore_one(const SavedWorld& saved, size_t world) {
   const Copy& from = *saved.copy;
   if (copies_[world]->plan != from.plan || copies_[world]->seed != from.seed)
@@ -542,7 +541,7 @@ std::shared_ptr<const FieldArray> Engine::observe(const std::string& device,
   };
   for (const auto& known : observers_) {
     if (known->device != device || known->field != field) continue;
-    refuse_nothing(known->channels);  // since a reset
+    refuse_nothing(known->channels);  // after a reset
     return known->array;
   }
   const std::vector<int> channels = channels_of(device);
@@ -569,7 +568,7 @@ std::shared_ptr<const FieldArray> Engine::observe(const std::string& device,
   return observers_.back()->array;
 }
 
-// From now on they are read, and so are their newest messages, which may not have been made.
+// From now on they are read, including their newest messages, which may not have been computed.
 void Engine::read(const std::vector<int>& channels) {
   auto read = std::make_shared<ReadChannels>(*read_);
   for (const int channel : channels) (*read)[channel] = true;

@@ -1,9 +1,9 @@
-// Many copies of one world in the caller's process, stepped together over all cores.
+// Many copies of one world in the caller's process, stepped together on all cores.
 //
-// The same code as a server's run, and the same bytes: copy i with the seed s + i, given the same
-// commands at the same steps, makes the messages of `ruedo run --lockstep --seed s+i`. What never
-// moves is shared between the copies. Pictures that nobody reads, neither by observe() nor by
-// on_message(), are not drawn. Not thread safe: one thread at a time.
+// The same code as in a server's run, and the same bytes: copy i with the seed s + i, given the
+// same commands at the same steps, produces the messages of `ruedo run --lockstep --seed s+i`. What
+// never moves is shared between copies. Pictures that nobody reads, by observe() or on_message(),
+// are not drawn. Not thread-safe: one thread at a time.
 #pragma once
 
 #include <atomic>
@@ -24,29 +24,29 @@ namespace ruedo::engine {
 
 struct EngineOptions {
   int worlds = 1;
-  FleetOptions fleet;              // its seed is that of copy 0
-  int threads = 0;                 // 0: one a core
-  std::vector<model::Draw> draws;  // of each copy and reset, from the seed
+  FleetOptions fleet;              // its seed is for copy 0
+  int threads = 0;                 // 0: one per core
+  std::vector<model::Draw> draws;  // for each copy and reset, from the seed
 };
 
-// A field of one device on all robots that have it, in all copies. It follows the runs: after each
-// step it holds what the newest message of each said.
+// A field of one device on all robots that have it, in all copies. It is kept up to date: after
+// each step it holds the values of the newest message of each device.
 struct FieldArray {
   Primitive type = Primitive::none;
-  std::vector<int64_t> shape;     // copies, robots, then the field's own
-  std::vector<std::byte> values;  // row by row, in the host's byte order
+  std::vector<int64_t> shape;     // copies, robots, then the field's own dimensions
+  std::vector<std::byte> values;  // row-major, in the host's byte order
 };
 
-// A copy as it was at some step, with all that decides what follows. It does not change, and may
-// outlive its engine.
+// A copy at some step, with everything that determines how it continues. Immutable, and may outlive
+// its engine.
 class SavedWorld;
 
 class Engine {
  public:
-  // A message of a copy: step, channel, bytes.
+  // Called with a copy's message: step, channel, bytes.
   using MessageHandler = std::function<void(int world, int64_t step, const Channel& channel,
                                             std::span<const uint8_t> bytes)>;
-  // A state of a copy: its snapshot, and the batch that tells what acted on the state before it.
+  // Called with a copy's state: its snapshot, and the batch with what acted on the state before it.
   using StateHandler = std::function<void(int world, const Snapshot& snapshot, const Batch& batch)>;
 
   // Computes state 0 of each copy. Throws InputError and EnvironmentError.
@@ -59,66 +59,65 @@ class Engine {
   const model::WorldModel& model() const { return *world_; }
   const std::vector<device_info_t>& devices() const;
   const std::vector<Channel>& channels() const;
-  // Robots with a drive, in the order of the world file: the second axis of drive().
+  // Robots with a drive, in world-file order: the second axis of drive().
   const std::vector<std::string>& driven() const { return driven_; }
   const Findings& findings() const { return findings_; }
 
-  // Computes that many states, 1 or more: of every copy, or of those that have a 1 in `which`.
-  // Throws std::runtime_error when a module failed.
+  // Computes that many states, at least 1: of every copy, or of those with a 1 in `which`. Throws
+  // std::runtime_error if a module failed.
   void step(int64_t steps, std::span<const uint8_t> which = {});
 
-  // A velocity for every driven robot of every copy, on the states that there are: copies x driven
-  // robots x (m/s ahead, m/s left, rad/s), row by row. A row with a NaN gives no command: what was
-  // commanded before holds.
+  // A velocity for every driven robot of every copy, acting on the current states: copies x driven
+  // robots x (m/s forward, m/s left, rad/s), row-major. A row with a NaN gives no command: the
+  // previous command stays in force.
   void drive(std::span<const double> velocities);
 
-  // A message as it would come over the bus, on the state that there is. Throws InputError for a
-  // channel that takes no commands, or bytes that are no such message.
+  // A message as on the bus, acting on the current state. Throws InputError for a channel that
+  // takes no commands, or invalid bytes.
   void command(int world, const std::string& channel, std::span<const uint8_t> message);
 
-  // Resets a copy.
+  // A reset of a copy.
   struct Reset {
     int world = 0;
     uint64_t seed = 1;
-    // Another world, which from then on is that copy's; null: the one that it has. Its channels are
-    // the first one's: the same robots with the same devices, in the same order.
+    // Another world for that copy from now on; null: the current one. It must have the channels of
+    // the first world: the same robots with the same devices, in the same order.
     std::shared_ptr<const model::WorldModel> model = nullptr;
   };
-  // Makes copies as they were at the beginning, each with its seed: what follows equals a fresh
-  // run. Throws InputError; then some of them may be as they were.
+  // Restarts copies, each with its seed: what follows equals a fresh run. Throws InputError; some
+  // copies may then be unchanged.
   void reset(std::span<const Reset> resets);
   void reset(int world, uint64_t seed, std::shared_ptr<const model::WorldModel> model = nullptr) {
     const Reset one{world, seed, std::move(model)};
     reset(std::span(&one, 1));
   }
 
-  // A copy as it stands, in time and memory that do not depend on how long it has run: about those
-  // of a reset. What was commanded already is part of it. Throws InputError for a plugin's device
-  // or drive that cannot be copied.
+  // A copy in its current state, in time and memory that do not depend on the length of its run:
+  // about those of a reset. Includes commands given already. Throws InputError for a plugin's
+  // device or drive that cannot be copied.
   std::shared_ptr<const SavedWorld> save(int world);
-  // Makes copies what that one was: what follows equals what followed there, byte for byte, for the
-  // same commands. Arrays show what they showed then. Throws InputError for what another engine
-  // saved.
+  // Gives copies the saved state: given the same commands, what follows equals what followed there,
+  // byte for byte. Arrays show what they showed then. Throws InputError for a world saved by
+  // another engine.
   void restore(const SavedWorld& saved, std::span<const int> worlds);
 
-  // What was drawn for a copy.
+  // The values drawn for a copy.
   const model::Drawn& drawn(int world) const;
 
-  // The array of a field, kept up to date as long as the engine lives. device: the name of one
-  // ("LRF"), or of its kind
-  // ("lrf") where each robot has at most one of them. Throws InputError, and EnvironmentError where
+  // The array of a field, kept up to date for the engine's lifetime. device: a name ("LRF"), or a
+  // kind ("lrf") if each robot has at most one of it. Throws InputError, and EnvironmentError if
   // pictures cannot be drawn here.
   std::shared_ptr<const FieldArray> observe(const std::string& device, const std::string& field);
 
-  // Of each copy and driven robot (int32): how many of the states of the last step() it ran into
-  // something in (Snapshot::collisions).
+  // For each copy and driven robot (int32): during how many of the states of the last step() it ran
+  // into something (Snapshot::collisions).
   std::shared_ptr<const FieldArray> touching() const { return touching_; }
-  // Of each driven robot of a copy: the bodies that it ran into in these states, sorted.
+  // For each driven robot of a copy: the bodies that it ran into in these states, sorted.
   std::vector<std::vector<std::string>> collisions(int world) const;
 
   uint64_t state_hash(int world) const;
 
-  // Called in step() and reset() with each message, copies and messages in order; nothing is
+  // Called in step() and reset() with each message, in the order of copies and messages; nothing is
   // computed in parallel then.
   void on_message(MessageHandler handler) { handler_ = std::move(handler); }
   // The same for each state, before its messages.
@@ -150,24 +149,24 @@ class Engine {
 
   std::shared_ptr<const model::WorldModel> world_;
   EngineOptions options_;
-  std::shared_ptr<const char> identity_ = std::make_shared<char>();  // saved worlds are of it
-  // Of worlds that several copies may have: while one of them has it.
+  std::shared_ptr<const char> identity_ = std::make_shared<char>();  // identifies its saved worlds
+  // For worlds that several copies use: kept while one of them does.
   struct Shared {
     std::weak_ptr<const model::WorldModel> model;
     std::weak_ptr<Plan> plan;
   };
   std::mutex shared_mutex_;
-  std::map<const model::WorldModel*, Shared> shared_;  // looked up only
+  std::map<const model::WorldModel*, Shared> shared_;  // only looked up, never iterated
   Findings findings_;
   std::vector<std::unique_ptr<Copy>> copies_;
-  bool first_made_ = false;  // the first copy tells what is wrong with the world
+  bool first_made_ = false;  // the first copy reports what is wrong with the world
   std::vector<std::string> driven_;
-  std::vector<int> velocity_inputs_;  // of the driven robots
+  std::vector<int> velocity_inputs_;  // for the driven robots
   std::vector<RobotIndex> driven_robots_;
-  std::vector<double> velocities_;  // of the last drive(): see Copy::driven
+  std::vector<double> velocities_;  // from the last drive(): see Copy::driven
   std::shared_ptr<FieldArray> touching_ = std::make_shared<FieldArray>();
   std::vector<std::unique_ptr<Observer>> observers_;
-  std::shared_ptr<const ReadChannels> read_;  // by observers; the same of each copy
+  std::shared_ptr<const ReadChannels> read_;  // set by observers; the same for each copy
   MessageHandler handler_;
   StateHandler state_handler_;
   struct Arena;

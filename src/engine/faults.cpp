@@ -1,4 +1,4 @@
-// Faults as intervals of steps, each looked up when something of its robot happens.
+// Faults as intervals of steps, looked up when something happens to their robot.
 #include "engine/faults.h"
 
 #include <algorithm>
@@ -15,7 +15,7 @@
 namespace ruedo::engine {
 namespace {
 
-constexpr size_t kMostFaults = 1000;  // of each sort at once; more are refused
+constexpr size_t kMostFaults = 1000;  // of each kind at once; more are refused
 constexpr size_t kMostLate = 65536;   // commands
 
 bool same_name(const std::string& a, const std::string& b) {
@@ -141,7 +141,7 @@ void Faults::begin_at(const model::Fault& fault, RobotIndex robot, int64_t begin
   }
 }
 
-// What has acted stays where it is: a message acts after all of it.
+// Faults that have acted keep their place: a message acts after all of them.
 void Faults::begin_reseeding(uint64_t seed, int64_t begin) {
   auto all = reseedings_ ? std::make_shared<std::vector<Reseeding>>(*reseedings_)
                          : std::make_shared<std::vector<Reseeding>>();
@@ -241,8 +241,8 @@ double Faults::left_of(RobotIndex robot, bool left, int64_t step) const {
   return rest;
 }
 
-// A weak motor, or a wheel that slips, makes less of what is asked. A primitive's limits are those
-// of its slower side.
+// A weak motor or a slipping wheel executes less than commanded. A primitive gets the limits of its
+// slower side.
 robot::Command Faults::weakened(robot::Command command, int64_t step) const {
   const double left = left_of(command.robot, true, step),
                right = left_of(command.robot, false, step), least = std::min(left, right);
@@ -305,7 +305,7 @@ void Faults::reset_time() {
   late_.clear();
   of_sensors_.reset();
   if (!reseedings_) return;
-  // The seed stays, for modules that have not come to it yet, too.
+  // The seed is kept, also for modules that have not reached it yet.
   reseedings_ = std::make_shared<const std::vector<Reseeding>>(1, Reseeding{0, seed_});
   reseeded_ = 1;
 }

@@ -1,9 +1,9 @@
-// What goes wrong with the robots of a world, and when: from its file, and from commands on
+// What goes wrong with the robots of a world, and when: from its file, and from messages on
 // ROBOT/fault.
 //
-// The simulation thread's. Sensors' faults go with the batches to the modules (sensor_faults.h);
-// those of wheels and commands act here, on what the drives are told and on the wheel angles that
-// encoders see.
+// For the simulation thread. Sensor faults travel with the batches to the modules
+// (sensor_faults.h); faults of wheels and commands act here, on what the drives are commanded and
+// on the wheel angles that encoders see.
 #pragma once
 
 #include <cstdint>
@@ -27,37 +27,37 @@
 
 namespace ruedo::engine {
 
-// A message's fault, as if a file had it; the robot is the channel's.
+// A message's fault, as from a file; the robot is the channel's.
 model::Fault fault_of(const fault_t& message);
 
 class Faults {
  public:
-  // Takes the world's own. All must outlive it. Throws InputError for one that names no device of
-  // its robot.
+  // Takes the world's own faults. The arguments must outlive it. Throws InputError for a fault that
+  // names no device of its robot.
   Faults(const model::WorldModel& world, const model::BodyLayout& layout,
          const std::vector<device_info_t>& devices, uint64_t seed);
 
   // What is wrong with a fault of that robot, or "".
   std::string check(const model::Fault& fault, RobotIndex robot) const;
-  // It acts on the state `step`: samples of later ones show it. One that is wrong changes nothing.
+  // Acts on the state `step`: samples of later states show it. An invalid one changes nothing.
   void begin(const model::Fault& fault, RobotIndex robot, int64_t step);
 
-  // Before the commands on the state `step`: what was late acts, who is kidnapped is put elsewhere.
+  // Before the commands on the state `step`: delayed commands act, kidnapped robots are moved.
   void before_commands(int64_t step, robot::Robots& robots);
-  // A command on the state `step`, or what becomes of it.
+  // A command on the state `step`, as changed by faults.
   void command(const robot::Command& command, int64_t step, robot::Robots& robots);
-  // The wheels of a new state as encoders see them.
+  // The wheel angles of a new state as encoders see them.
   void show_wheels(Snapshot& snapshot);
-  // For the modules; null while there was none.
+  // For the modules; null if there are none.
   const std::shared_ptr<const std::vector<SensorFault>>& of_sensors() const { return of_sensors_; }
 
-  // The seed of what is drawn from that state on, where it changes with it.
+  // The seed for draws from that state on, if it changes there.
   std::optional<uint64_t> new_seed(int64_t step);
-  // For the modules; null while there was none.
+  // For the modules; null if there are none.
   const std::shared_ptr<const std::vector<Reseeding>>& reseedings() const { return reseedings_; }
 
   void remove(RobotIndex robot);
-  void reset_time();  // steps count from 0: what went on is over
+  void reset_time();  // steps count from 0: current faults end
 
  private:
   enum class Kind {
@@ -73,11 +73,11 @@ class Faults {
     Kind kind;
     RobotIndex robot;
     bool left, right;    // which wheels
-    int64_t begin, end;  // of steps
+    int64_t begin, end;  // in steps
     int64_t delay_steps;
     double value;
     model::Fault asked;
-    bool done = false;  // of who was kidnapped
+    bool done = false;  // a kidnapped robot has been moved
     bool acts(int of_robot, int64_t step) const {
       return robot == of_robot && step >= begin && step < end;
     }
@@ -90,23 +90,23 @@ class Faults {
   const device_info_t* find_device(RobotIndex robot, const std::string& name) const;
   const std::string& name_of(RobotIndex robot) const;
   double left_of(RobotIndex robot, bool left,
-                 int64_t step) const;  // of the commanded speed of a side
+                 int64_t step) const;  // applied to the commanded speed of a side
   robot::Command weakened(robot::Command command, int64_t step) const;
   bool is_lost(RobotIndex robot, int64_t step);
 
   Bound<const model::WorldModel> world_;
   Bound<const model::BodyLayout> layout_;
   Bound<const std::vector<device_info_t>> devices_;
-  uint64_t seed_;        // of what is drawn now
-  size_t reseeded_ = 0;  // of the reseedings, how many acted
+  uint64_t seed_;        // currently in use
+  size_t reseeded_ = 0;  // number of seed changes that have happened
   std::shared_ptr<const std::vector<Reseeding>> reseedings_;
   std::shared_ptr<const std::vector<SensorFault>> of_sensors_;
   int64_t sensor_faults_ = 0;
   std::vector<RobotFault> of_robots_;
-  std::deque<std::pair<int64_t, robot::Command>> late_;  // by the step on which they act, in order
-  std::vector<uint64_t> draws_;                          // of each robot
+  std::deque<std::pair<int64_t, robot::Command>> late_;  // sorted by the step on which they act
+  std::vector<uint64_t> draws_;                          // for each robot
   bool wheels_ever_ = false;
-  std::vector<double> true_angles_, shown_angles_;  // of each wheel, while encoders may be wrong
+  std::vector<double> true_angles_, shown_angles_;  // for each wheel, while encoders may be wrong
 };
 
 }  // namespace ruedo::engine

@@ -1,4 +1,4 @@
-// LCM's encoding: the fields one after the other, big endian, arrays without a length of their own.
+// LCM's encoding: fields in sequence, big endian, arrays without a length of their own.
 #include "engine/field_reader.h"
 
 #include <algorithm>
@@ -32,8 +32,8 @@ void copy_swapped(const uint8_t* from, std::byte* to, size_t count) {
   }
 }
 
-// Values of the fields that say how long others are, of the message that is read: messages are read
-// in many threads at once.
+// Values of the length fields of the message being read; on the stack, since messages are read in
+// many threads at once.
 std::vector<int64_t>& counts_of_thread() {
   thread_local std::vector<int64_t> counts;
   return counts;
@@ -51,8 +51,7 @@ FieldReader::FieldReader(const Schema& schema, const std::string& field) : schem
   std::string readable;
   for (size_t i = 0; i < schema.fields.size(); ++i) {
     const Field& one = schema.fields[i];
-    if (one.primitive == Primitive::none)
-      break;  // what lies behind has no place that can be computed
+    if (one.primitive == Primitive::none) break;  // the offset of what follows cannot be computed
     if (one.primitive == Primitive::string) {
       if (!one.dimensions.empty()) break;
       continue;
@@ -80,7 +79,7 @@ int64_t FieldReader::length(const Field& field, const std::vector<int64_t>& coun
 FieldReader::Place FieldReader::find(std::span<const uint8_t> message) const {
   std::vector<int64_t>& counts = counts_of_thread();
   counts.assign(schema_->fields.size(), 0);
-  size_t offset = sizeof(int64_t);  // the fingerprint
+  size_t offset = sizeof(int64_t);  // after the fingerprint
   for (size_t i = 0; i < target_; ++i) {
     const Field& field = schema_->fields[i];
     if (field.primitive == Primitive::string) {

@@ -1,5 +1,5 @@
-// One field of a message type, read straight from the messages' bytes: numbers in the host's byte
-// order, no allocation.
+// Reads one field of a message type directly from messages' bytes: numbers in the host's byte
+// order, without allocation.
 #pragma once
 
 #include <cstddef>
@@ -14,19 +14,17 @@ namespace ruedo::engine {
 
 class FieldReader {
  public:
-  // field: a number, or an array of them ("ranges", "position"). Throws InputError, which lists the
-  // fields that can be read, for one that is not there, is text, or lies behind a list of
-  // structures.
+  // field: a number, or an array of numbers ("ranges", "position"). Throws InputError, listing the
+  // readable fields, if it does not exist, is text, or comes after a list of structures.
   FieldReader(const Schema& schema, const std::string& field);
 
   Primitive type() const { return type_; }
-  size_t value_size() const;  // bytes of one value
+  size_t value_size() const;  // bytes per value
 
-  // The field's dimensions in this message, which must be well formed; empty: one value.
+  // The field's dimensions in this message, which must be well-formed; empty: a single value.
   std::vector<int64_t> shape(std::span<const uint8_t> message) const;
 
-  // Writes its values into `out`, `count` of them; false, and nothing written, when the message
-  // holds another number.
+  // Writes `count` values into `out`; false, without writing, if the message holds another number.
   bool read(std::span<const uint8_t> message, std::byte* out, size_t count) const;
 
  private:

@@ -1,4 +1,4 @@
-// Makes the devices of all robots from the kinds of sensors that are linked in.
+// Creates the devices of all robots from the kinds of sensors that are linked in.
 #include "engine/fleet.h"
 
 #include <algorithm>
@@ -26,7 +26,7 @@ const Element& no_element() {
   return element;
 }
 
-// One device that is to be made.
+// A device to be created.
 struct Wanted {
   const SensorKind* kind;
   RobotIndex robot;
@@ -34,7 +34,7 @@ struct Wanted {
   const Element* element;
   LinkIndex link;
   Pose X_LS;
-  std::optional<Rate> rate;  // empty: as its element says
+  std::optional<Rate> rate;  // empty: as in its element
 };
 
 class FleetMaker {
@@ -52,7 +52,7 @@ class FleetMaker {
   }
 
   Fleet make() {
-    const std::vector<SensorKind>& kinds = sensor_kinds();  // those of a module are neighbours
+    const std::vector<SensorKind>& kinds = sensor_kinds();  // those of a module are adjacent
     for (auto first = kinds.begin(); first != kinds.end();) {
       const auto last = std::find_if(
           first, kinds.end(), [&](const SensorKind& kind) { return kind.module != first->module; });
@@ -72,7 +72,7 @@ class FleetMaker {
   }
 
  private:
-  // The robots whose devices are made.
+  // The robots whose devices are created.
   std::vector<RobotIndex> robots() const {
     if (options_.only_robot.valid()) return {options_.only_robot};
     std::vector<RobotIndex> all;
@@ -88,7 +88,7 @@ class FleetMaker {
     return disabled_.contains(instance(robot).name + "/" + device);
   }
 
-  // The devices of a kind on a robot, in the order of its file.
+  // The devices of a kind on a robot, in file order.
   void collect(const SensorKind& kind, RobotIndex robot, std::vector<Wanted>& wanted) const {
     const model::Model& model = *instance(robot).model;
     if (kind.attach_to.empty()) {
@@ -119,7 +119,7 @@ class FleetMaker {
       if (kind.drive_rate) rate = kind.drive_rate(drive);
     }
     const model::RobotPlacement& placement = layout_.robots[robot];
-    const LinkIndex link = placement.body.valid()  // it sits in base_link
+    const LinkIndex link = placement.body.valid()  // it is at base_link
                                ? layout_.bodies[placement.body].links.front()
                                : layout_.first_link[placement.instance];
     wanted.push_back({&kind, robot, kind.device_name, element, link,
@@ -163,8 +163,8 @@ class FleetMaker {
     }
   }
 
-  // As everywhere in a file: what is wrong with an element of the format costs the sensor and is
-  // named; what is wrong with one of Ruedo's own, or with names and options, is the author's.
+  // As everywhere: an error in a standard element leaves out the sensor and is reported; an error
+  // in one of Ruedo's own elements, or in names and options, is thrown.
   void add_device(const Wanted& wanted, ModuleSetup& module) {
     const std::string& robot = instance(wanted.robot).name;
     const std::string where = robot + "/" + wanted.name;
@@ -180,7 +180,7 @@ class FleetMaker {
       findings_.error(error.source(), where, error.message());
       fleet_.refused = true;
     }
-    channels_.remove(robot, wanted.name);  // what it had announced
+    channels_.remove(robot, wanted.name);  // those announced already
   }
 
   Device make_device(const Wanted& wanted) {
@@ -301,8 +301,8 @@ class FleetMaker {
   const FleetOptions& options_;
   Channels& channels_;
   Findings& findings_;
-  std::exception_ptr channel_refused_;  // why the device that is made cannot have a channel
-  std::vector<int> device_channels_;    // of the device that is made
+  std::exception_ptr channel_refused_;  // why the device being created cannot have a channel
+  std::vector<int> device_channels_;    // of the device being created
   Fleet fleet_;
   std::set<std::string> disabled_;  // "ROBOT/DEVICE"
   IndexedVector<RobotIndex, std::vector<device_info_t>> devices_of_;

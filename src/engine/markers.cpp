@@ -23,7 +23,7 @@ bool is_utf8(const std::string& text) { return printable(text) == text; }
 
 bool is_within(double value, double least, double most) { return value >= least && value <= most; }
 
-// Of any kind.
+// For any kind.
 std::string check_place(const marker_t& marker) {
   for (const double value : marker.position) {
     if (!is_within(value, -kMostAway_m, kMostAway_m))

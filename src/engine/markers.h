@@ -1,4 +1,4 @@
-// What clients draw, as it is checked before it is taken.
+// Checks what clients draw before it is accepted.
 #pragma once
 
 #include <array>
@@ -15,16 +15,16 @@ namespace ruedo::engine {
 // "" or what is wrong with it.
 std::string check_markers(const markers_t& markers);
 
-// What a client drew, of an encoded markers_t, or of the applied_t by which logs have it. nullopt:
-// it is neither, or damaged, or what no run takes.
+// What a client drew, from an encoded markers_t, or from the applied_t in which logs store it.
+// nullopt: it is neither, damaged, or no run would accept it.
 std::optional<markers_t> markers_in(std::span<const uint8_t> message);
 
-// A cell's colour, of a map of that colour: free is clear, unknown grey.
+// The colour of a cell in a map of that colour: free is transparent, unknown grey.
 std::array<float, 4> cell_color(uint8_t cell, const float* color);
 
-// Cells of one value beside each other in a row, none of them clear.
+// Adjacent cells of equal value in a row, none of them transparent.
 struct CellRun {
-  int32_t row, begin, end;  // columns, without `end`
+  int32_t row, begin, end;  // columns, excluding `end`
   std::array<float, 4> color;
 };
 std::vector<CellRun> runs_of(const marker_t& map);

@@ -1,4 +1,4 @@
-// TBB splits the devices over the cores in pieces that the devices alone fix.
+// TBB distributes the devices over cores in pieces that depend on the devices alone.
 #include "engine/module.h"
 
 #include <algorithm>
@@ -9,15 +9,15 @@
 namespace ruedo::engine {
 namespace {
 
-// Of all pieces together: what takes less is done before another thread has woken, and TBB's go on
+// For all pieces together: less work is done before another thread wakes up, and TBB's threads keep
 // looking for work for as long again, on a core that somebody else could use.
 constexpr int64_t kQuickNs = 200'000;
 
 }  // namespace
 
 void DueSteps::add(const SampleClock& clock, int64_t first, int64_t sample) {
-  // A thousand devices of one rate are one entry: the first few samples tell clocks apart well
-  // enough, since a surplus entry costs time but changes nothing.
+  // A thousand devices with one rate share an entry: the first few samples distinguish clocks well
+  // enough, since a superfluous entry costs time but changes nothing.
   const auto same = [&](const Entry& entry) {
     return entry.first == first && entry.sample == sample &&
            entry.clock.every_step() == clock.every_step() &&
@@ -54,7 +54,7 @@ Module::Slot Module::slot_of(const Device& device) const {
           device.visual_rays};
 }
 
-// From what is due of each device; of all batches so far each has been handed over and finished.
+// From each device's due samples; every batch so far has been passed on and finished.
 void Module::count_due() {
   observes_ = false;
   to_hand_over_.clear();
@@ -99,7 +99,7 @@ void Module::reset_time(SimTime us) {
   count_due();
 }
 
-// Scenes are of the step that was looked at last, and of nothing before.
+// Scenes show the step looked at last, and depend on nothing earlier.
 const Device* Module::take(const Module& other) {
   for (size_t k = 0; k < slots_.size(); ++k) {
     Device& device = setup_.devices[k];
@@ -139,7 +139,7 @@ void Module::process(const Batch& batch, Batch::Output& output, const std::atomi
     }
     return;
   }
-  // The scene of the movers stands at one step at a time, and only where a device looks.
+  // The scene of the movers shows one step at a time, and only where a device looks.
   int begin = 0;
   for (int i = 0; i < batch.count; ++i) {
     if (to_sample_.next() != batch.first_step + i) continue;
@@ -162,7 +162,7 @@ void Module::process_pieces(const Batch& batch, Batch::Output& output, int begin
     process_one(piece);
     if (piece == 0) note_cost(std::chrono::steady_clock::now() - before);
   };
-  const bool one_thread = renderer_ != nullptr;  // that is all it serves
+  const bool one_thread = renderer_ != nullptr;  // all that the renderer supports
   if (pieces() == 1 || one_thread || piece_ns_ < kQuickNs / pieces()) {
     for (int piece = 0; piece < pieces(); ++piece) timed(piece);
     return;
@@ -170,7 +170,7 @@ void Module::process_pieces(const Batch& batch, Batch::Output& output, int begin
   parallel_pieces(pieces(), timed);
 }
 
-// The last one, or what is left of a longer one before: not every time has samples to take.
+// The last one, or the remainder of a longer one: samples are not due every time.
 void Module::note_cost(std::chrono::nanoseconds of_piece) {
   piece_ns_ = std::max<int64_t>(of_piece.count(), piece_ns_ - piece_ns_ / 8);
 }
@@ -180,7 +180,7 @@ SampleInput Module::input_of(const Slot& slot, const Snapshot& snapshot) const {
           renderer_.get()};
 }
 
-// The device itself notices nothing: what it publishes is changed on its way out.
+// The device itself is not affected: its output is changed afterwards.
 void Module::sample_with_faults(const Batch& batch, const Snapshot& snapshot, size_t k,
                                 Outbox& outbox) {
   Slot& slot = slots_[k];
@@ -218,7 +218,7 @@ void Module::process_piece(const Batch& batch, Outbox& outbox, int piece, int be
       if (slot.observes) sensor.observe(snapshot, outbox);
       if (slot.step != snapshot.step) continue;
       if (left_off.load(std::memory_order_relaxed))
-        return;  // a thousand pictures may be in the batch
+        return;  // there may be a thousand pictures in the batch
       take_sample(batch, snapshot, k, outbox);
     }
   }
@@ -235,8 +235,8 @@ void Module::take_sample(const Batch& batch, const Snapshot& snapshot, size_t k,
   slot.step = setup_.devices[k].first_step + slot.clock.step_of(++slot.sample);
 }
 
-// Only pictures are not, whose samples do not depend on those before (SensorKind::needs_renderer);
-// what becomes of them where the device is faulty does.
+// Only pictures may stay undrawn: their samples do not depend on earlier ones
+// (SensorKind::needs_renderer), except in a faulty device.
 bool Module::is_read(size_t k, const ReadChannels* read,
                      const std::vector<SensorFault>* faults) const {
   const Device& device = setup_.devices[k];

@@ -1,8 +1,8 @@
-// A module: the devices of one kind on all robots of a world, and when each of them takes a sample.
+// A module: the devices of one kind on all robots of a world, with their sample times.
 //
-// Its bytes do not depend on threads: devices are cut into pieces of a fixed size, each piece has
-// an outbox of its own, and they are read in order, whichever was finished first. Who hosts the
-// world gives a module a thread (ModuleThread), or works through it in its own.
+// Its bytes do not depend on threads: devices are divided into pieces of a fixed size, each with
+// its own outbox, which are read in order. The world's host gives a module a thread (ModuleThread),
+// or runs it in its own.
 #pragma once
 
 #include <atomic>
@@ -21,7 +21,7 @@
 
 namespace ruedo::engine {
 
-// What may be missing, and is copied with what has it.
+// Owns an optional object, and copies it with its owner.
 template <class T>
 class Owned : public std::unique_ptr<T> {
  public:
@@ -44,11 +44,11 @@ class Owned : public std::unique_ptr<T> {
 // The steps at which any of some devices takes a sample.
 class DueSteps {
  public:
-  // first: the step that the clock counts from; sample: the next one.
+  // first: the step from which the clock counts; sample: the next one.
   void add(const SampleClock& clock, int64_t first = 0, int64_t sample = 0);
   void clear() { entries_.clear(), update(); }
   int64_t next() const { return next_; }  // INT64_MAX: never
-  void pass(int64_t step);                // everything up to and with `step` is done
+  void pass(int64_t step);                // everything up to and including `step` is done
 
  private:
   struct Entry {
@@ -60,23 +60,23 @@ class DueSteps {
   int64_t next_ = INT64_MAX;
 };
 
-// One device as its module sees it.
+// A device as its module sees it.
 struct Device {
   std::unique_ptr<Sensor> sensor;
   Rate rate;
   int64_t phase_us = 0;
   bool visual_rays = false;  // its rays hit visuals, not collisions
   RobotIndex robot = {};     // none: the simulation's
-  int64_t first_step = 0;    // its samples count from the time of this one
-  std::string name = {};     // as its robot's faults name it
+  int64_t first_step = 0;    // its samples count from the time of this step
+  std::string name = {};     // the name used in faults
   std::vector<int> channels = {};
-  std::optional<RandomSource> random = {};  // the sensor's, to be reseeded
+  std::optional<RandomSource> random = {};  // the sensor's random source, to be reseeded
 };
 
 struct ModuleSetup {
   std::string name;
   std::vector<Device> devices;  // in world order: robot, then device
-  int piece_size = 16;          // devices that are worked through one after the other
+  int piece_size = 16;          // devices processed one after the other
   int64_t step_us = 5000;
   int rank = 0;  // in the schedule; modules of one kind share it
   bool wants_rays = false, wants_visual_rays = false, wants_renderer = false;
@@ -86,8 +86,8 @@ struct ModuleSetup {
   }
 };
 
-// What a module needs of the world to make its scenes, in its own thread. An entry may be empty
-// when no module wants it.
+// What a module needs from the world to create its scenes, in its own thread. Entries that no
+// module needs may be empty.
 struct SceneMakers {
   std::function<std::unique_ptr<scene::RayScene>()> rays, visual_rays;
   std::function<std::unique_ptr<scene::Renderer>()> renderer;
@@ -97,11 +97,11 @@ class Module {
  public:
   explicit Module(ModuleSetup setup);
 
-  // Makes its scenes, in the thread that will process batches: a renderer's context belongs to it.
-  // Throws what making them threw.
+  // Creates its scenes, in the thread that will process batches: a renderer's context belongs to
+  // it. Throws what creating them threw.
   void make_scenes(const SceneMakers& makers);
-  // Whether it needs them for a batch: one that draws pictures does when any of them is read, or
-  // may be faulty.
+  // Whether it needs them for a batch: a module that draws pictures does if any is read, or may be
+  // faulty.
   bool needs_scenes(const ReadChannels* read, const std::vector<SensorFault>* faults) const;
   bool has_scenes() const {
     return setup_.wants_rays || setup_.wants_visual_rays || setup_.wants_renderer;
@@ -109,38 +109,39 @@ class Module {
   void drop_renderer() { renderer_.reset(); }
   bool has_renderer() const { return renderer_ != nullptr; }
 
-  // For the maker of batches: whether one up to `last_step` has work for it; and that it gets that
-  // batch.
+  // For the thread that makes batches: whether a batch up to `last_step` has work for it; and that
+  // it gets that batch.
   bool wants(int64_t last_step) const { return observes_ || to_hand_over_.next() <= last_step; }
   void pass(int64_t last_step) { to_hand_over_.pass(last_step); }
 
   // Lets its devices observe and sample the states of a batch, and writes their messages into
-  // `output`. Batches come in order; left_off: once it is true samples are no longer wanted.
+  // `output`. Batches come in order; left_off: once true, samples are no longer wanted.
   void process(const Batch& batch, Batch::Output& output, const std::atomic<bool>& left_off);
-  // Lets the device of a channel take the last sample that it passed over because nobody read it,
-  // and no later one was due; nothing when there is none.
+  // Lets the device of a channel take the last sample that it skipped because nobody read it, if no
+  // later one was due; does nothing if there is none.
   void catch_up(int channel, Outbox& out);
   // Whether a sample is due before that step.
   bool is_due(int64_t before_step) const { return to_sample_.next() < before_step; }
 
   // Changes between two batches, while it has none.
-  void add(ModuleSetup more);  // its devices, in the order of robots
+  void add(ModuleSetup more);  // `more` has its devices in the order of robots
   void remove(RobotIndex robot);
-  void replace_sensor(std::unique_ptr<Sensor> sensor);  // of the only device, whose samples go on
-  void reset_time(SimTime us);  // sim time went back by so much, and steps count from 0
+  // of the only device, whose samples continue
+  void replace_sensor(std::unique_ptr<Sensor> sensor);
+  void reset_time(SimTime us);  // sim time was set back, and steps count from 0
 
-  // Between two batches: its devices, their clocks and faults become what they are in another copy
-  // of the world. Returns a device whose sensor cannot, or null.
+  // Between two batches: takes the devices, clocks and faults of another copy of the world. Returns
+  // a device whose sensor does not support it, or null.
   const Device* take(const Module& other);
 
-  // The device that began to work last, by its place; -1: none has. Any thread.
+  // Index of the device that started to work last; -1: none. Any thread.
   int at_work() const { return at_work_.load(std::memory_order_relaxed); }
   const Device& device(int place) const { return setup_.devices[place]; }
   int devices() const { return static_cast<int>(setup_.devices.size()); }
 
   int rank() const { return setup_.rank; }
   bool wants_visual_rays() const { return setup_.wants_visual_rays; }
-  // True when it serves a robot that comes after that one.
+  // Whether it serves a robot after that one.
   bool robots_after(RobotIndex robot) const {
     return !setup_.devices.empty() && setup_.devices.back().robot > robot;
   }
@@ -154,11 +155,11 @@ class Module {
     SampleClock clock;
     int64_t sample, step;
     bool observes, visual_rays;
-    Owned<FaultFilter> faults = {};    // made when the device is first faulty
-    Owned<Snapshot> passed_over = {};  // what the last sample would have shown
-    int64_t passed_sample = -1;        // its number; -1: it was taken
-    uint64_t passed_seed = 0;          // it would have drawn from
-    size_t reseeded = 0;               // of the batches' reseedings, how many acted
+    Owned<FaultFilter> faults = {};    // created when the device is first faulty
+    Owned<Snapshot> passed_over = {};  // what the skipped sample would have shown
+    int64_t passed_sample = -1;        // its number; -1: none was skipped
+    uint64_t passed_seed = 0;          // the seed that it would have used
+    size_t reseeded = 0;               // number of seed changes in batches that have happened
   };
 
   Slot slot_of(const Device& device) const;
@@ -179,8 +180,9 @@ class Module {
   bool observes_ = false;
   std::vector<Slot> slots_;  // one per device
   std::atomic<int> at_work_{-1};
-  int64_t piece_ns_ = 0;               // what the first piece took of real time
-  DueSteps to_hand_over_, to_sample_;  // of who makes batches, of who processes them
+  int64_t piece_ns_ = 0;  // wall time of the first piece
+  // for the thread that makes batches, and for the one that processes them
+  DueSteps to_hand_over_, to_sample_;
   std::unique_ptr<scene::RayScene> rays_, visual_rays_;
   std::unique_ptr<scene::Renderer> renderer_;
 };

@@ -1,4 +1,4 @@
-// Batches and renewals of the scenes come through one queue, so that they keep their order.
+// Batches and renewals of the scenes share one queue, so that they keep their order.
 #include "engine/module_thread.h"
 
 #include <cfenv>
@@ -29,7 +29,8 @@ void ModuleThread::start(const SceneMakers& makers) {
   thread_ = std::thread([this, &ready, &makers] {
     pthread_setname_np(pthread_self(), module_.name().substr(0, 15).c_str());
     std::fesetenv(
-        FE_DFL_ENV);  // rounding and denormals as everywhere, whatever libraries did to the parent
+        // default rounding and denormal modes, whatever libraries did to the parent thread
+        FE_DFL_ENV);
     try {
       module_.make_scenes(makers);
       ready.set_value();

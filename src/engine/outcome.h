@@ -1,4 +1,4 @@
-// What came of a request to change or read a world: an answer, or why it is refused.
+// The result of a request: an answer, or the reason for a refusal.
 #pragma once
 
 #include <cstdint>
@@ -14,10 +14,9 @@ struct Outcome {
   int32_t code = reply_t::OK;
   std::string text;  // what went wrong
   std::vector<uint8_t> body;
-  int64_t after_step = -1;  // answer when this state was published; -1: at once
-  bool pending =
-      false;  // what is asked for is being made ready: Control::finish() brings the outcome
-  bool quiet = false;  // the reply goes out only if the request is repeated
+  int64_t after_step = -1;  // answered once this state is published; -1: at once
+  bool pending = false;     // still being prepared: Control::finish() supplies the outcome
+  bool quiet = false;       // the reply is only sent if the request is repeated
 
   static Outcome refuse(int32_t code, std::string text) { return {code, std::move(text), {}}; }
   static Outcome with(std::vector<uint8_t> body) { return {reply_t::OK, {}, std::move(body)}; }

@@ -1,8 +1,7 @@
-// A parallel loop over pieces, by TBB.
+// A parallel loop over pieces, with TBB.
 //
-// TBB is not instrumented for the thread sanitizer, which would take every body for a race. A build
-// with the sanitizer runs the bodies in plain threads, so that it sees all that they do, and a race
-// between them shows.
+// TBB is not instrumented for the thread sanitizer, which would report every body as a race. Builds
+// with that sanitizer run the bodies in plain threads, so that real races between them are found.
 #pragma once
 
 #if defined(__SANITIZE_THREAD__)

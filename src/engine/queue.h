@@ -1,5 +1,5 @@
-// What the threads of a simulation wait on: a bounded queue from one thread to another, and a flag
-// that wakes a waiter. Mutexes live here, in the pacer and in the inboxes, and nowhere else.
+// Synchronisation between a simulation's threads: a bounded queue from one thread to another, and a
+// flag that wakes a waiting thread. Mutexes exist only here, in the pacer and in the inboxes.
 #pragma once
 
 #include <chrono>
@@ -9,13 +9,13 @@
 
 namespace ruedo::engine {
 
-// A queue of at most `capacity` values, from one thread to one other. Its memory is taken once.
+// A queue of at most `capacity` values between two threads. Its memory is allocated once.
 template <class Value>
 class Queue {
  public:
   explicit Queue(size_t capacity) : values_(capacity) {}
 
-  // Waits while the queue is full.
+  // Blocks while the queue is full.
   void push(Value value) {
     {
       std::unique_lock lock(mutex_);
@@ -25,7 +25,7 @@ class Queue {
     changed_.notify_one();
   }
 
-  // Waits while the queue is empty.
+  // Blocks while the queue is empty.
   Value pop() {
     Value value;
     {
@@ -46,7 +46,7 @@ class Queue {
   size_t first_ = 0, size_ = 0;
 };
 
-// Set from any thread, waited for by one. Setting it twice is as good as once.
+// Set from any thread, awaited by one. Setting it twice has the same effect as once.
 class Wakeup {
  public:
   void set() {
@@ -64,7 +64,7 @@ class Wakeup {
     set_ = false;
   }
 
-  // False when the time came first.
+  // False on a timeout.
   bool wait_until(std::chrono::steady_clock::time_point time) {
     std::unique_lock lock(mutex_);
     const bool was_set = changed_.wait_until(lock, time, [&] { return set_; });

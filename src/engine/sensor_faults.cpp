@@ -1,4 +1,4 @@
-// Messages are changed as bytes where that does, else decoded, changed and encoded again.
+// Messages are changed as bytes if possible; otherwise decoded, changed and encoded again.
 #include "engine/sensor_faults.h"
 
 #include <algorithm>
@@ -33,7 +33,7 @@ void set_time(std::vector<uint8_t>& bytes, int64_t time) {
     bytes[i] = static_cast<uint8_t>(rest);
 }
 
-// As Outbox takes it.
+// As expected by Outbox.
 struct Encoded {
   const std::vector<uint8_t>& bytes;
   int getEncodedSize() const { return static_cast<int>(bytes.size()); }
@@ -42,7 +42,7 @@ struct Encoded {
   }
 };
 
-// What is no return, or nearer than the minimum, stays so.
+// Missing returns, and those below the minimum, are unchanged.
 template <class Number>
 Number wrong(const SensorFault& fault, Number value) {
   if (!std::isfinite(value)) return value;
@@ -74,13 +74,14 @@ void change(const SensorFault& fault, sonar_t& message) {
 void change(const SensorFault& fault, lidar_t& message) {
   change_rays(fault, message.ranges, static_cast<size_t>(std::max(message.ncolumns, 0)));
 }
-void change(const SensorFault& fault, odometry_t& message) {  // a bias is of its heading
+void change(const SensorFault& fault, odometry_t& message) {  // a bias applies to its heading
   message.theta = wrong(fault, message.theta);
   if (fault.kind == SensorFault::Kind::bias) return;
   for (double* value : {&message.x, &message.y, &message.v, &message.omega})
     *value = wrong(fault, *value);
 }
-void change(const SensorFault& fault, imu_t& message) {  // a bias is of the turn rate about its z
+// a bias applies to the rate about its z axis
+void change(const SensorFault& fault, imu_t& message) {
   if (fault.kind == SensorFault::Kind::bias) {
     message.angular_velocity[2] += fault.value;
     return;
@@ -143,8 +144,8 @@ void FaultFilter::pass(const Outbox& published, const std::vector<SensorFault>& 
   for (const Message& message : messages) out.publish(message.channel, Encoded{message.bytes});
 }
 
-// The first message under the fault comes again and again, with the time of its day: a driver that
-// hangs puts new stamps on its old data.
+// The first message under the fault is repeated with current times: a hanging driver puts new
+// stamps on old data.
 void FaultFilter::freeze(const SensorFault& fault, std::vector<Message>& messages) {
   for (Message& message : messages) {
     const auto [kept, first] = frozen_.try_emplace({fault.id, message.channel}, message.bytes);
@@ -155,7 +156,7 @@ void FaultFilter::freeze(const SensorFault& fault, std::vector<Message>& message
   }
 }
 
-// Old messages with their own time. What is still under way when the fault ends is lost.
+// Old messages keep their time. Those still delayed when the fault ends are lost.
 void FaultFilter::lag(const SensorFault& fault, int64_t step, std::vector<Message>& messages) {
   auto& under_way = under_way_[fault.id];
   for (Message& message : messages) under_way.emplace_back(step, std::move(message));

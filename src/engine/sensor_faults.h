@@ -1,4 +1,4 @@
-// Faults of sensors: what a device publishes is changed between it and the world.
+// Sensor faults: change what a device publishes on its way out.
 #pragma once
 
 #include <cstdint>
@@ -12,14 +12,14 @@
 
 namespace ruedo::engine {
 
-// Of one device, from a step on.
+// For one device, from a step on.
 struct SensorFault {
   enum class Kind { dropout, freeze, lag, bias, scale, blocked, clock_drift };
-  int64_t id = 0;  // counts them: states of faults are kept by it
+  int64_t id = 0;  // identifies the fault's state
   Kind kind = Kind::dropout;
   RobotIndex robot;
   std::string device;
-  int64_t begin = 0, end = INT64_MAX;  // samples of begin <= step < end
+  int64_t begin = 0, end = INT64_MAX;  // affects samples with begin <= step < end
   int64_t lag_steps = 0;
   double value = 0.0, from = 0.0, to = 1.0;
 
@@ -28,15 +28,15 @@ struct SensorFault {
   }
 };
 
-// Whether a device of that kind can be faulty so: a camera has no number to add a bias to.
+// Whether a kind of device can have that fault: a camera has no number to add a bias to.
 bool applies_to(SensorFault::Kind fault, const std::string& device_kind);
 
-// The faults of one device as they go on. Belongs to its module.
+// The current faults of one device. Owned by its module.
 class FaultFilter {
  public:
   explicit FaultFilter(int64_t step_us) : step_us_(step_us) {}
 
-  // What becomes of what the device published at a step. Faults act in their order.
+  // Applies the faults, in order, to what the device published at a step.
   void pass(const Outbox& published, const std::vector<SensorFault>& faults, RobotIndex robot,
             const std::string& device, int64_t step, Outbox& out);
 

@@ -1,4 +1,5 @@
-// The loop: pace, take commands, step, hand over; and the ring of batches between the threads.
+// The loop: wait for the pace, take commands, step, pass on; and the ring of batches between
+// threads.
 #include "engine/simulation.h"
 
 #include <algorithm>
@@ -18,9 +19,9 @@ constexpr size_t kMaxSnapshotMemory = 64u << 20;  // bytes of all batches togeth
 constexpr int kMaxBatchSteps = 32;
 constexpr int kFewSteps = 4;
 constexpr int64_t kQuickNs =
-    1'000'000;  // of a step that the publisher may wait for: it gives the signs of life
+    1'000'000;  // for which the publisher may wait for a step: it also sends the signs of life
 
-// Large worlds gain nothing from many steps in flight, and their snapshots are large.
+// Large worlds gain nothing from many steps in flight, and have large snapshots.
 int batch_steps(const model::BodyLayout& layout) {
   const size_t snapshot = sizeof(Snapshot) +
                           layout.bodies.size() * (sizeof(Pose) + sizeof(Twist) + sizeof(Vec3)) +
@@ -47,7 +48,7 @@ Simulation::Simulation(std::shared_ptr<const model::WorldModel> world,
 Simulation::~Simulation() {
   if (!thread_.joinable()) return;
   leave_off();
-  while (!last_taken_) {  // the simulation thread needs free batches to come to its end
+  while (!last_taken_) {  // the simulation thread needs free batches to finish
     if (!advance()) finished_.wait();
   }
   thread_.join();
@@ -114,7 +115,7 @@ void Simulation::remove_model(InstanceIndex instance, Channels& channels) {
       if (thread->running()) thread->renew_scenes(makers);
     }
   } catch (const std::exception&
-               error) {  // a module without its scene or renderer would sample nothing, or crash
+               error) {  // without its scene or renderer, a module would sample nothing, or crash
     throw SceneLost(
         std::string("what sensors see cannot be made again after a change of the world: ") +
         error.what());
@@ -134,7 +135,7 @@ void Simulation::restore(const World& copy, int epoch) {
 void Simulation::simulate() {
   pthread_setname_np(pthread_self(), "kinematics");
   std::fesetenv(FE_DFL_ENV);
-  prctl(PR_SET_TIMERSLACK, 1);  // ns: the kernel may otherwise wake us 50 us late
+  prctl(PR_SET_TIMERSLACK, 1);  // ns: otherwise the kernel may wake us 50 us late
   const int limit = static_cast<int>(batches_[0].snapshots.size());
   for (int64_t first_step = 0;;) {
     const int count = pace_->wait(first_step, limit);
@@ -188,12 +189,11 @@ void Simulation::compute(Batch& batch, int64_t first_step, int count) {
   try {
     for (int i = 0; i < count && !batch.last; ++i) {
       if (left_off_)
-        batch.count =
-            0;  // the publisher still holds the last state, in a batch that is free already
+        batch.count = 0;  // the publisher still holds the last state, in a batch that is free again
       if (batch.count == 0) break;
       try {
         world_.advance(first_step + i, batch.snapshots[i], batch);
-      } catch (const physics::StateError& error) {  // the steps before it are good
+      } catch (const physics::StateError& error) {  // the steps before it are valid
         batch.end = error.what();
         batch.count = i;
         batch.last = true;
@@ -217,7 +217,7 @@ void Simulation::dispatch(Batch& batch, bool here) {
     batch.outputs[m].woken = batch.count > 0 && threads_[m]->module().wants(last_step);
     woken += batch.outputs[m].woken;
   }
-  // One more than the modules: it is not finished before all have it.
+  // One more than the modules: it is not finished before all have received it.
   batch.pending.store(woken + 1, std::memory_order_release);
   bool any_here = false;
   for (size_t m = 0; m < threads_.size(); ++m) {

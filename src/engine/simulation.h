@@ -1,9 +1,9 @@
-// A world on threads, for one epoch of a run.
+// Runs a world on threads, for one epoch of a run.
 //
 // The simulation thread (the module "kinematics") takes commands, drives the robots and steps
-// Bullet; batches of snapshots go to the modules that have something due; the publisher takes
-// finished batches, in order. At most kBatches batches are on their way: a slow module makes the
-// others wait, and nothing is dropped.
+// Bullet; batches of snapshots go to the modules with something due; the publisher takes finished
+// batches, in order. At most kBatches batches are in flight: a slow module makes the others wait,
+// and nothing is dropped.
 #pragma once
 
 #include <atomic>
@@ -23,14 +23,14 @@
 namespace ruedo::engine {
 
 // After a change of the world, or the attempt, a module has no scene or renderer any more: the
-// simulation cannot go on.
+// simulation cannot continue.
 struct SceneLost : std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
 struct SimulationOptions {
   FleetOptions fleet;
-  int batch_steps = 0;  // most steps in a batch; 0: by the size of the world
+  int batch_steps = 0;  // maximum steps in a batch; 0: by the size of the world
   // For tests: called in a module's thread ("kinematics" too) before each batch.
   std::function<void(const std::string& module)> before_batch;
 };
@@ -39,42 +39,41 @@ class Simulation {
  public:
   static constexpr int kBatches = 4;
 
-  // Makes everything but threads; channels are announced. finished: set whenever take() may have
+  // Creates everything but threads, and announces channels. finished: set whenever take() may have
   // something. Throws InputError.
   Simulation(std::shared_ptr<const model::WorldModel> world, const SimulationOptions& options,
              Channels& channels, Findings& findings, Wakeup& finished);
-  ~Simulation();  // leaves off, then waits for all threads
+  ~Simulation();  // stops, and waits for all threads
 
-  // Starts the threads. Throws EnvironmentError when a module cannot be served here. The pace must
-  // outlive it.
+  // Starts the threads. Throws EnvironmentError if a module cannot run here. The pace must outlive
+  // it.
   void start(Pace& pace);
 
   // From the next batch on, only these channels are read (Batch::read). Any thread.
   void read_only(ReadChannels read);
 
-  // Computes the next steps in the caller's thread, the publisher's, where they are few, may be
-  // computed now, and the simulation thread waits for them: waking it, and waiting for it, takes
-  // longer than a small world's step. Else wakes it, and returns false.
+  // Computes the next steps in the caller's thread, the publisher's, if they are few, may be
+  // computed now, and the simulation thread is waiting for them: waking it and waiting for it takes
+  // longer than a step of a small world. Otherwise wakes it, and returns false.
   bool go();
 
-  // The publisher's: the next finished batch in order, or null when there is none yet. The batch
-  // stays valid until the next call that returns one. Throws std::runtime_error when a module
-  // failed.
+  // For the publisher: the next finished batch in order, or null if there is none yet. The batch
+  // stays valid until the next call that returns one. Throws std::runtime_error if a module failed.
   const Batch* take();
-  // Whether the last batch was taken, and why it was before its time; "": it was not.
+  // Whether the last batch was taken, and why the run ended early; "": it did not.
   bool over() const { return last_taken_; }
   const std::string& end() const { return end_; }
 
-  // What is at work when take() has nothing, in words: a sensor, or a step; "": nothing. The
-  // publisher's.
+  // What is being computed if take() has nothing, in words: a sensor, or a step; "": nothing. For
+  // the publisher.
   std::string at_work() const;
 
-  // Ends the run here: what was not taken yet is left unfinished, so that the last batch comes
-  // soon, and no steps with it.
+  // Ends the run here: what has not been taken yet is not finished, so that the last batch comes
+  // soon, without steps.
   void leave_off();
 
-  // Calls handler(step, channel index, bytes, size) for each message of one step of a batch, in the
-  // schedule's order. Steps of a batch must be asked for in order, from its first.
+  // Calls handler(step, channel index, bytes, size) for each message of a step of a batch, in
+  // schedule order. The steps of a batch must be requested in order, from the first.
   template <class Handler>
   void messages(const Batch& batch, int64_t step, Handler&& handler);
 
@@ -85,12 +84,12 @@ class Simulation {
   const physics::PhysicsWorld& physics() const { return world_.physics(); }
   robot::Robots& robots() { return world_.robots(); }
 
-  // ---- Changes of the world, while it stands still: its pace holds, all batches are taken, every
-  // thread waits. What is written then is handed to the threads by the locks of the pace and of the
-  // modules' queues.
+  // ---- Changes of the world while it stands still: its pace holds, all batches are taken, every
+  // thread waits. What is written then becomes visible to the threads through the locks of the pace
+  // and the modules' queues.
 
-  // As World's. Throws EnvironmentError, too, when a module cannot be served here; the world is
-  // then as it was. Both throw SceneLost.
+  // As in World. They also throw EnvironmentError if a module cannot run here; the world is then
+  // unchanged. Both throw SceneLost.
   InstanceIndex add_model(const std::string& name, const Pose& X_WM,
                           std::shared_ptr<const model::Model> model, int64_t step,
                           Channels& channels, Findings& findings);
@@ -108,7 +107,7 @@ class Simulation {
   void simulate();
   void compute(Batch& batch, int64_t first_step, int count);
   void dispatch(Batch& batch, bool here);
-  void fit_threads();  // to the world's modules, and the batches to them
+  void fit_threads();  // adapts them to the world's modules, and the batches to them
 
   World world_;
   bool started_ = false;
@@ -117,12 +116,12 @@ class Simulation {
   std::mutex read_mutex_;
   std::shared_ptr<const ReadChannels> read_;  // null: everything
   std::atomic<bool> left_off_{false};
-  std::atomic<int64_t> computing_{-1};  // the first step that is being computed; -1: none
-  std::vector<std::unique_ptr<ModuleThread>> threads_;  // of the world's modules, in their order
+  std::atomic<int64_t> computing_{-1};                  // the first step being computed; -1: none
+  std::vector<std::unique_ptr<ModuleThread>> threads_;  // of the world's modules, in order
   std::vector<Batch> batches_;
   Wakeup batch_freed_;
-  std::atomic<int64_t> step_ns_{INT64_MAX};  // what the last step took of real time
-  size_t round_ = 0;                         // of the batches; whose thread counts it
+  std::atomic<int64_t> step_ns_{INT64_MAX};  // wall time of the last step
+  size_t round_ = 0;  // number of the batch round, counted by the simulation thread
   Pace* pace_ = nullptr;
   std::thread thread_;
 
@@ -131,7 +130,7 @@ class Simulation {
   Batch* taken_ = nullptr;
   bool last_taken_ = false;
   std::string end_;
-  std::vector<std::vector<size_t>> cursors_;  // of each module's pieces in taken_
+  std::vector<std::vector<size_t>> cursors_;  // for each module, into its pieces in taken_
 };
 
 template <class Handler>

@@ -1,11 +1,11 @@
-// How many threads work inside of the modules. It changes no result, only how fast it comes.
+// How many threads work inside the modules. Affects only the speed, never a result.
 #pragma once
 
 #include <memory>
 
 namespace ruedo::engine {
 
-// Holds while it lives. 0: one thread a core.
+// Applies while it lives. 0: one thread per core.
 class ThreadLimit {
  public:
   explicit ThreadLimit(int threads);

@@ -1,4 +1,4 @@
-// The making of a world, and its step.
+// Creates a world, and steps it.
 #include "engine/world.h"
 
 #include "physics/state_check.h"
@@ -64,7 +64,7 @@ void World::advance(int64_t step, Snapshot& snapshot, Batch& batch) {
   sound_ = false;
   if (step > 0) {
     faults_.before_commands(step - 1, *robots_);
-    inbox_.apply(*robots_, faults_, step - 1, batch);  // on the state before
+    inbox_.apply(*robots_, faults_, step - 1, batch);  // on the previous state
   }
   reseed(step);
   if (step > 0) robots_->step();
@@ -91,11 +91,11 @@ void World::take(const World& other) {
   }
 }
 
-// Modules have their own time for it: with the batch that has the step.
+// Modules switch on their own: with the batch that contains the step.
 void World::reseed(int64_t step) {
   const std::optional<uint64_t> seed = faults_.new_seed(step);
   if (!seed) return;
-  options_.seed = *seed;  // of robots that come
+  options_.seed = *seed;  // for robots that join
   robots_->reseed(*seed);
 }
 

@@ -1,8 +1,8 @@
 // One world that can be stepped: its model, physics, robots and devices.
 //
-// It knows no threads, no clock and no network; its host does: Simulation runs one over threads,
-// Engine many in the caller's process. Not thread safe, but that its modules may be processed
-// beside each other and beside advance(), each by one thread.
+// Independent of threads, clocks and networks, which belong to its host: Simulation runs one world
+// on threads, Engine many in the caller's process. Not thread-safe, except that its modules may be
+// processed in parallel to each other and to advance(), each by one thread.
 #pragma once
 
 #include <memory>
@@ -23,8 +23,7 @@
 
 namespace ruedo::engine {
 
-// The geometry that never moves, built when it is first asked for: shared by all modules, and by
-// copies of one world.
+// The static geometry, built on first use: shared by all modules, and by copies of a world.
 class StaticScenes {
  public:
   std::shared_ptr<const scene::StaticRayScene> get(const model::WorldModel& world,
@@ -35,7 +34,7 @@ class StaticScenes {
   std::shared_ptr<const scene::StaticRayScene> collisions_, visuals_;
 };
 
-// What is made of a world's model once: copies of one world share it, and then none of them may be
+// What is made once from a world's model: copies of a world share it, and none of them may then be
 // changed.
 struct Plan {
   explicit Plan(const model::WorldModel& world) : model(world), layout(model) {}
@@ -59,11 +58,11 @@ class World {
   World(std::shared_ptr<Plan> plan, const FleetOptions& options, Channels& channels,
         Findings& findings, World* ended = nullptr);
 
-  // Computes the next state into the snapshot: what acts on the state before it is applied (and
-  // noted in the batch), then the physics step. States follow on one another from 0, the initial
-  // one. Throws physics::StateError for a state that is not finite.
+  // Computes the next state into the snapshot: applies what acts on the previous state (and records
+  // it in the batch), then steps the physics. States are consecutive from 0, the initial one.
+  // Throws physics::StateError for a state that is not finite.
   void advance(int64_t step, Snapshot& snapshot, Batch& batch);
-  // The state that there is, whose number is `step`.
+  // The current state, whose number is `step`.
   void read(int64_t step, Snapshot& snapshot);
 
   // Becomes what another copy of the same plan (or one of the same model), seed and options is:
@@ -82,23 +81,23 @@ class World {
   const Faults& faults() const { return faults_; }
   const physics::PhysicsWorld& physics() const { return *physics_; }
   robot::Robots& robots() { return *robots_; }
-  // In the order of the schedule.
+  // In schedule order.
   std::vector<std::unique_ptr<Module>>& modules() { return modules_; }
   const std::vector<std::unique_ptr<Module>>& modules() const { return modules_; }
-  SceneMakers scene_makers() const;  // valid until a model comes or goes
+  SceneMakers scene_makers() const;  // valid until a model joins or leaves
 
-  // ---- Changes between two steps, while no module is at work, of a world whose plan is its own;
-  // in world_edits.cpp. When models have come or gone, modules may be others, and those that have
+  // ---- Changes between two steps, while no module is working, for a world with its own plan; in
+  // world_edits.cpp. When models have joined or left, modules may have changed, and those with
   // scenes need new ones.
 
-  // Puts a model in, which is seen from the next state on; `step` is that state's number. Returns
-  // its index in model().models. Throws InputError; the world is then as it was.
+  // Inserts a model, visible from the next state on; `step` is that state's number. Returns its
+  // index in model().models. Throws InputError; the world is then unchanged.
   InstanceIndex add_model(const std::string& name, const Pose& X_WM,
                           std::shared_ptr<const model::Model> model, int64_t step,
                           Channels& channels, Findings& findings);
-  // Takes one out. Its numbers stay free until the same model comes again.
+  // Removes one. Its numbers stay free until the same model is inserted again.
   void remove_model(InstanceIndex instance, Channels& channels);
-  // The state that there is becomes state 0. Returns what the time was.
+  // The current state becomes state 0. Returns the time before.
   SimTime reset_time(int epoch);
 
  private:
@@ -115,14 +114,14 @@ class World {
   model::WorldModel& model_;
   model::BodyLayout& layout_;
   FleetOptions options_;
-  Fleet fleet_;  // its parts move into what follows
+  Fleet fleet_;  // its parts are moved into the following members
   std::vector<device_info_t> devices_;
   CommandInbox inbox_;
   Faults faults_;
   bool sound_ = true;                               // no step failed
   std::shared_ptr<physics::PhysicsWorld> physics_;  // shared with one that has ended
   std::unique_ptr<robot::Robots> robots_;
-  int world_channel_ = -1;  // of ruedo/world
+  int world_channel_ = -1;  // for ruedo/world
   std::vector<std::unique_ptr<Module>> modules_;
 };
 

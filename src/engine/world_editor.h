@@ -1,8 +1,8 @@
-// Models that come to a world and leave it, as the host of a run and a reader of its log both do
-// it: names and places in the lists come out the same.
+// Inserts and removes models, identically in a running world and in the reader of its log: names
+// and places in the lists come out the same.
 //
-// What has left keeps its place in the list of models, which the next instance of the same model
-// takes: when models come and go for days, the lists do not grow.
+// A removed model keeps its place in the list, which the next instance of the same model reuses:
+// the lists do not grow when models come and go for days.
 #pragma once
 
 #include <memory>
@@ -20,7 +20,7 @@ class WorldEditor {
 
   struct Placed {
     InstanceIndex instance;  // index into the world's models
-    bool reused;             // in the place of one that has left
+    bool reused;             // in the place of a removed one
   };
   Placed place(const std::string& name, const Pose& X_WM,
                std::shared_ptr<const model::Model> model);
@@ -30,10 +30,10 @@ class WorldEditor {
   model::WorldModel& world_;
 };
 
-// Index of the model of that name; -1: there is none.
+// Index of the model with that name; -1: there is none.
 InstanceIndex find_model(const model::WorldModel& world, const std::string& name);
 
-// Where a SPAWN puts a model: as it says, or standing on the ground below.
+// The pose for a SPAWN: as requested, or standing on the ground below.
 Pose spawn_pose(const model::WorldModel& world, const model::Model& model,
                 const spawn_request_t& request);
 
