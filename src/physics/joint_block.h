@@ -72,7 +72,6 @@ class JointBlocks {
     std::vector<Spent> spent;     // in a tree: motors at a bound
     // L D L^T of the free rows: D L^T, upper, by rows; 1 / D; and for each row the first column
     // below the diagonal that is not 0, and the last one above it.
-    // not 0 below the diagonal, and the last one beyond it.
     std::vector<double> factor, inverse;
     std::vector<size_t> begin, end;
     bool factored = false;

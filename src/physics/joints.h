@@ -38,7 +38,6 @@ class JointConstraint : private JointState {
  public:
   // X_PJ, X_CJ: the joint's frame in Bullet's frames I of parent and child. reference: for a
   // gearbox.
-  // others have none.
   JointConstraint(const model::Joint& joint, btRigidBody& parent, btRigidBody& child,
                   const Pose& X_PJ, const Pose& X_CJ, btRigidBody* reference = nullptr);
 
