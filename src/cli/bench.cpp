@@ -183,7 +183,7 @@ void add_bench(CLI::App& app, Action& chosen) {
       ->check(within(0.1, 1e6));
   command
       ->add_option("--threads", arguments->threads,
-                   "most threads inside a module (default: one a core)")
+                   "maximum number of threads in a module (default: one per core)")
       ->type_name("N")
       ->check(CLI::Range(1, 1024));
   command

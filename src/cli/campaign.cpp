@@ -83,7 +83,7 @@ void add_campaign(CLI::App& app, Action& chosen) {
   add(app, chosen, "hunt",
       "search for the case that breaks a controller, and shrink it to a regression test");
   add(app, chosen, "why",
-      "since when a failed run could not be saved, and which single change would have saved it");
+      "until when a failed run could have been saved, and which single change would have saved it");
 }
 
 const RegisterCommand kRegister{56, add_campaign};

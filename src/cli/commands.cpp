@@ -74,10 +74,11 @@ void add_world_arguments(CLI::App& command, WorldArguments& arguments) {
       ->type_name("FAULT")
       ->allow_extra_args(false);
   command.add_flag("--no-noise", arguments.no_noise, "sensors give their ideal values");
-  command.add_flag("--fast-pixels", arguments.fast_pixels,
-                   "draw with all that this CPU has: faster, and other last bits on other CPUs");
+  command.add_flag(
+      "--fast-pixels", arguments.fast_pixels,
+      "draw with this CPU's widest vectors: faster, but pixels may differ between CPUs");
   command.add_flag("--allow-absolute", arguments.allow_absolute,
-                   "absolute paths in the files may lead out of the folders that are searched");
+                   "absolute paths in files may lead out of the search folders");
 }
 
 std::pair<std::string, std::string> parse_remap(const std::string& text) {

@@ -219,10 +219,10 @@ void add(CLI::App& app, Action& chosen, const char* name, const char* help, cons
 
 void add_echo(CLI::App& app, Action& chosen) {
   add(app, chosen, "echo", "print the messages on a channel, field by field",
-      "end after so many messages", echo);
+      "end after this many messages", echo);
 }
 void add_hz(CLI::App& app, Action& chosen) {
-  add(app, chosen, "hz", "measure how often a channel's messages come", "end after so many seconds",
+  add(app, chosen, "hz", "measure the rate of a channel's messages", "end after this many seconds",
       hz);
 }
 

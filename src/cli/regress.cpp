@@ -265,7 +265,7 @@ void add_course(CLI::App& command, RegressArguments& a) {
   command.add_option("--seed", a.seed, "of all noise")->type_name("N")->capture_default_str();
   command
       .add_option("--duration", a.duration,
-                  "end after so many seconds of sim time, or when the client ends")
+                  "end after this many seconds of sim time, or when the client ends")
       ->type_name("S")
       ->required();
   command.add_option("--rate", a.rate, "sim time per real time, or max")
@@ -274,7 +274,7 @@ void add_course(CLI::App& command, RegressArguments& a) {
   command.add_option("--record", a.record, "the log of the run")->type_name("FILE")->required();
   command
       .add_option("--lockstep", a.lockstep,
-                  "wait for so many clients, then go as far as all of them grant")
+                  "wait for this many clients, then advance as far as all of them allow")
       ->type_name("N")
       ->check(CLI::Range(1, 64));
   add_list(command, "--wait-for", a.wait_for,
@@ -319,7 +319,7 @@ void add_golden(CLI::App& command, RegressArguments& a) {
   add_list(command, "--tolerance", a.tolerances, "as of ruedo diff", "RULE");
   add_list(command, "--ignore", a.ignored, "as of ruedo diff", "PATTERN");
   command.add_flag("--renew", a.renew,
-                   "write the golden log anew, when all else holds; or set RUEDO_RENEW=1");
+                   "rewrite the golden log if everything else holds; or set RUEDO_RENEW=1");
 }
 
 void add_reports(CLI::App& command, RegressArguments& a) {

@@ -315,7 +315,7 @@ void add_pace(CLI::App& command, RunArguments& arguments) {
           "--rate", arguments.rate,
           "sim time per real time, or max (default: 1); in lockstep the grants alone pace it")
       ->type_name("R|max");
-  command.add_option("--duration", arguments.duration, "end after so many seconds of sim time")
+  command.add_option("--duration", arguments.duration, "end after this many seconds of sim time")
       ->type_name("S");
   command.add_flag("--paused", arguments.paused, "start paused, at step 0");
   command
@@ -325,7 +325,7 @@ void add_pace(CLI::App& command, RunArguments& arguments) {
       ->allow_extra_args(false);
   command
       .add_option("--threads", arguments.threads,
-                  "most threads inside a module (default: one a core)")
+                  "maximum number of threads in a module (default: one per core)")
       ->type_name("N")
       ->check(CLI::Range(1, 1024));
 }
@@ -333,12 +333,12 @@ void add_pace(CLI::App& command, RunArguments& arguments) {
 void add_lockstep(CLI::App& command, RunArguments& arguments) {
   command
       .add_option("--lockstep", arguments.lockstep,
-                  "wait for so many clients, then go as far as all of them grant")
+                  "wait for this many clients, then advance as far as all of them allow")
       ->type_name("N")
       ->check(CLI::Range(1, 64));
   command
       .add_option("--lease", arguments.lease,
-                  "seconds of real time after which a silent client of lockstep has lost its lease")
+                  "seconds of real time after which a silent client of lockstep loses its lease")
       ->type_name("S")
       ->capture_default_str()
       ->check(within(0.01, 1e6));
@@ -369,9 +369,10 @@ void add_files(CLI::App& command, RunArguments& arguments) {
       command.add_option("--record", arguments.record, "write a standard LCM log")
           ->type_name("FILE");
   command
-      .add_option("--record-limit", arguments.record_limit,
-                  "keep all that acted, and of the messages the last: FILE repeats the run, files "
-                  "numbered beside it hold what was published; 16MB at least, 2GB say, in all")
+      .add_option(
+          "--record-limit", arguments.record_limit,
+          "limit the size of the recording (16MB or more, for example 2GB): FILE keeps what "
+          "repeats the run, numbered files beside it the latest messages")
       ->type_name("SIZE")
       ->transform(CLI::Validator(to_bytes, "", ""))
       ->needs(record);
@@ -405,7 +406,7 @@ Viewers add_viewers(CLI::App& command, RunArguments& arguments) {
                "be a ROS 2 node, of that release (default: $ROS_DISTRO, or jazzy)", "[DISTRO]")};
   command
       .add_option("--ros2-clock", arguments.ros2.clock_hz,
-                  "/clock at most so often in a second of sim time")
+                  "maximum rate of /clock, per second of sim time")
       ->type_name("HZ")
       ->capture_default_str()
       ->check(within(0.1, 10000.0));
@@ -429,11 +430,11 @@ void add_run(CLI::App& app, Action& chosen) {
   add_files(*command, *arguments);
   const Viewers viewers = add_viewers(*command, *arguments);
   command->add_flag("--strict", arguments->strict,
-                    "run nothing that `ruedo check --strict` would not call good");
+                    "refuse to run if `ruedo check --strict` finds anything");
   command->add_flag("--watch-stdin", arguments->watch_stdin,
-                    "end when standard input does: for programs that start a server");
+                    "end when standard input is closed: for programs that start a server");
   command->add_flag("--quiet", arguments->quiet,
-                    "neither list the channels nor show on a terminal how far it is");
+                    "neither list the channels nor show progress on a terminal");
   add_sandbox_argument(*command, arguments->sandboxed);
   command->callback([arguments, viewers, &chosen] {
     arguments->viewed = viewers.console->count() > 0;

@@ -20,7 +20,7 @@ namespace ruedo::cli {
 void add_sandbox_argument(CLI::App& command, bool& sandboxed) {
   command.add_flag(
       "--sandbox", sandboxed,
-      "for files of strangers: reach no file but theirs, and the model folders (see ruedo doctor)");
+      "for untrusted files: reach only their folder and the model folders (see ruedo doctor)");
 }
 
 namespace {

@@ -85,7 +85,7 @@ void add_verify(CLI::App& app, Action& chosen) {
   command->add_option("LOG", arguments->log, "recorded by ruedo run --record")->required();
   command
       ->add_option("--threads", arguments->threads,
-                   "most threads inside a module (default: one a core)")
+                   "maximum number of threads in a module (default: one per core)")
       ->type_name("N")
       ->check(CLI::Range(1, 1024));
   add_plugin_argument(*command);

@@ -12,7 +12,7 @@ _MOST_SEEDS = 1000
 def add_why(commands: Any) -> None:
     one = commands.add_parser(
         "why",
-        help="since when a failed run could not be saved, and what would have saved it",
+        help="until when a failed run could have been saved, and what would have saved it",
         description="Since when a failed run could not be saved, and which single change would have saved it. LOG is one that "
         "a campaign kept, or another one of a run with commands alone in which the robot touched something.",
     )
