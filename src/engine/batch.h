@@ -40,7 +40,7 @@ using ReadChannels = std::vector<bool>;
 struct Batch {
   int64_t first_step = 0;
   int count = 0;
-  bool last = false;  // no batch follows
+  bool last = false;                    // no batch follows
   std::vector<Snapshot> snapshots;      // the first `count` are valid
   std::vector<AppliedCommand> applied;  // the first `applied_count` are valid
   int applied_count = 0;
@@ -56,7 +56,7 @@ struct Batch {
 
   struct Output {
     bool woken = false;  // false: the rest is from an earlier round
-    bool here = false;  // processed by the thread that computed the batch
+    bool here = false;   // processed by the thread that computed the batch
     std::vector<Outbox> pieces;
   };
   std::vector<Output> outputs;  // one per module, in the order of the schedule
@@ -66,7 +66,7 @@ struct Batch {
   std::atomic<int> pending{kFree};
   std::atomic<bool> failed{false};
   std::string failure;  // from the module that set `failed`
-  std::string end;  // why it is the last one, if the state was not valid
+  std::string end;      // why it is the last one, if the state was not valid
 };
 
 }  // namespace ruedo::engine

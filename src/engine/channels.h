@@ -16,13 +16,13 @@ inline constexpr size_t kMaxChannelName = 63;  // LCM's limit
 struct Channel {
   std::string name;      // "p3at/LRF"
   std::string bus_name;  // after --remap
-  std::string robot;  // "" for channels of the simulation
+  std::string robot;     // "" for channels of the simulation
   std::string device;    // "" for commands
   std::string type;      // "planar_lidar_t"
   int64_t fingerprint = 0;
-  Rate rate;  // 0: every step, or on events
+  Rate rate;           // 0: every step, or on events
   bool input = false;  // clients publish on it
-  bool gone = false;  // its robot was removed; the next channel of the type reuses its place
+  bool gone = false;   // its robot was removed; the next channel of the type reuses its place
 };
 
 class Channels {
