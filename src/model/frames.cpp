@@ -4,6 +4,14 @@
 #include <algorithm>
 
 namespace ruedo::model {
+namespace {
+
+// The names of the scope's own frame.
+bool is_scope(const std::string& name) {
+  return name.empty() || name == "__model__" || name == "world";
+}
+
+}  // namespace
 
 void FrameGraph::add(Node node) {
   if (const auto taken = by_name_.find(node.name); taken != by_name_.end()) {
@@ -32,6 +40,7 @@ void FrameGraph::add(Node node) {
   nodes_.push_back(std::move(node));
   states_.push_back(State::unknown);
   poses_.emplace_back();
+  links_.emplace_back();
 }
 
 bool FrameGraph::find(const std::string& name, Found& found) const {
@@ -99,55 +108,83 @@ bool FrameGraph::is_from(const std::string& name, const Element& element) const 
   return at != by_name_.end() && nodes_[at->second].element == &element;
 }
 
-Pose FrameGraph::node_pose(size_t index) {
-  if (states_[index] == State::known) return poses_[index];
-  const Node& node = nodes_[index];
-  if (states_[index] == State::asked) {
-    node.element->fail("'" + node.name + "' is placed relative to itself, through other frames");
-  }
-  states_[index] = State::asked;
-  Pose placed = node.pose;
-  if (!node.relative_to.empty()) placed = pose(node.relative_to, *node.element) * node.pose;
+// Where a frame is whose <pose> leads to X in the scope.
+Pose FrameGraph::placed(const Node& node, Pose X) {
   if (node.scope && !node.placement_frame.empty()) {
     const auto& frames = node.scope->frames;
     const auto inner = frames.find(node.placement_frame);
     if (inner != frames.end()) {
-      placed = placed * inner->second.X_MF.inverse();
+      X = X * inner->second.X_MF.inverse();
     } else if (node.placement_frame != "__model__") {
       node.element->fail("placement_frame '" + node.placement_frame +
                          "' is no frame of the model '" + node.scope->model->name + "'");
     }
   }
-  states_[index] = State::known;
-  return poses_[index] = placed.normalized();
+  return X.normalized();
+}
+
+// Without recursion: a file may have any number of frames, each relative to the next.
+Pose FrameGraph::node_pose(size_t index) {
+  std::vector<std::pair<size_t, std::optional<Found>>> chain;  // with what each is relative to
+  for (size_t at = index; states_[at] != State::known;) {
+    const Node& node = nodes_[at];
+    if (states_[at] == State::asked)
+      node.element->fail("'" + node.name + "' is placed relative to itself, through other frames");
+    states_[at] = State::asked;
+    chain.emplace_back(at, std::nullopt);
+    if (is_scope(node.relative_to)) break;
+    at = chain.back().second.emplace(require(node.relative_to, *node.element)).node;
+  }
+  for (; !chain.empty(); chain.pop_back()) {
+    const auto& [at, reference] = chain.back();
+    Pose X = nodes_[at].pose;
+    if (reference) {
+      const Pose& outer = poses_[reference->node];
+      X = (reference->inner ? outer * reference->inner->X_MF : outer) * X;
+    }
+    poses_[at] = placed(nodes_[at], X);
+    states_[at] = State::known;
+  }
+  return poses_[index];
 }
 
 Pose FrameGraph::pose(const std::string& name, const Element& asker) {
-  if (name.empty() || name == "__model__" || name == "world") return {};
+  if (is_scope(name)) return {};
   const Found found = require(name, asker);
   const Pose outer = node_pose(found.node);
   return found.inner ? outer * found.inner->X_MF : outer;
 }
 
-ModelLinkIndex FrameGraph::node_link(size_t index, int depth) {
-  const Node& node = nodes_[index];
-  if (depth > static_cast<int>(nodes_.size()))
-    node.element->fail("'" + node.name + "' is attached to itself, through other frames");
-  if (node.scope) return node.first_link;  // a model moves with its canonical link
-  if (node.link.valid()) return node.link;
-  if (node.attached_to.empty() || node.attached_to == "__model__" || node.attached_to == "world")
-    return {};
-  const Found found = require(node.attached_to, *node.element);
-  return found.inner ? ModelLinkIndex(nodes_[found.node].first_link + found.inner->link)
-                     : node_link(found.node, depth + 1);
+ModelLinkIndex FrameGraph::node_link(size_t index) {
+  std::vector<size_t> chain;
+  std::optional<ModelLinkIndex> link;
+  for (size_t at = index; !link;) {
+    const Node& node = nodes_[at];
+    if (links_[at]) {
+      link = links_[at];
+    } else if (node.scope) {
+      link = node.first_link;  // a model moves with its canonical link
+    } else if (node.link.valid() || is_scope(node.attached_to)) {
+      link = node.link;
+    } else {
+      if (chain.size() > nodes_.size())
+        node.element->fail("'" + node.name + "' is attached to itself, through other frames");
+      chain.push_back(at);
+      const Found found = require(node.attached_to, *node.element);
+      if (found.inner) link = ModelLinkIndex(nodes_[found.node].first_link + found.inner->link);
+      at = found.node;
+    }
+  }
+  for (const size_t at : chain) links_[at] = link;
+  return *link;
 }
 
 ModelLinkIndex FrameGraph::link(const std::string& name, const Element& asker) {
-  if (name.empty() || name == "__model__" || name == "world") return {};
+  if (is_scope(name)) return {};
   const Found found = require(name, asker);
   return found.inner
              ? ModelLinkIndex(nodes_[found.node].first_link + std::max<int>(found.inner->link, 0))
-             : node_link(found.node, 0);
+             : node_link(found.node);
 }
 
 }  // namespace ruedo::model

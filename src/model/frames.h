@@ -7,6 +7,7 @@
 
 #include <map>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -71,14 +72,16 @@ class FrameGraph {
   };
   bool find(const std::string& name, Found& found) const;
   Found require(const std::string& name, const Element& asker) const;
+  static Pose placed(const Node& node, Pose X);
   Pose node_pose(size_t index);
-  ModelLinkIndex node_link(size_t index, int depth);
+  ModelLinkIndex node_link(size_t index);
 
   enum class State { unknown, asked, known };
   std::string scope_name_;
   std::vector<Node> nodes_;
   std::vector<State> states_;
   std::vector<Pose> poses_;
+  std::vector<std::optional<ModelLinkIndex>> links_;  // of the frames that were asked about
   std::map<std::string, size_t, std::less<>> by_name_;
   std::vector<size_t> merged_;
 };

@@ -56,6 +56,28 @@ TEST(Poses, RelativeFramesByHand) {
   EXPECT_LT(((m.X_WM * b.X_ML).translation - Vec3(8, 1, 1)).norm(), 1e-12);
 }
 
+// 100 000 frames, each placed on the next: nothing follows them by recursion, nor each from its
+// end.
+TEST(Poses, AChainOfFramesMayBeOfAnyLength) {
+  constexpr int kFrames = 100'000;
+  std::string frames;
+  for (int i = 0; i < kFrames; ++i) {
+    const std::string next = i + 1 < kFrames ? "f" + std::to_string(i + 1) : "base";
+    frames += "<frame name='f" + std::to_string(i) + "' attached_to='" + next +
+              "'><pose>0.5 0 0 0 0 0</pose></frame>";
+  }
+  const auto world = load_world_text(
+      "<sdf version='1.9'><world name='w'><model name='m'><link name='base'/>" + frames +
+          "<link name='tip'><pose relative_to='f0'>0 2 0 0 0 0</pose></link>"
+          "<joint name='j' type='fixed'><parent>base</parent><child>f0</child></joint>"
+          "</model></world></sdf>",
+      "/nowhere/w.sdf");
+  ASSERT_EQ(world->models.size(), 1u);
+  const Model& model = *world->models[InstanceIndex(0)].model;
+  EXPECT_NEAR(model.links[ModelLinkIndex(1)].X_ML.translation.x(), 0.5 * kFrames, 1e-6);
+  EXPECT_NEAR(model.links[ModelLinkIndex(1)].X_ML.translation.y(), 2.0, 1e-12);
+}
+
 TEST(Poses, OldFrameAttributeMeansRelativeTo) {
   const auto world = load_world_text(
       "<sdf version='1.4'><world name='w'><model name='m'><link name='a'><pose>0 0 1 0 0 "
