@@ -89,7 +89,7 @@ void Run::note(const request_t& request) {
 }
 
 void Run::note_files(const std::vector<std::string>& files) {
-  if (files.empty() || !publisher_.has_recorders()) return;
+  if (files.empty() || !header_made_) return;
   log_header_t header = header_;
   header.utime = publisher_.time_us();
   header.files = log::hashed_files(files);

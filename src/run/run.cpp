@@ -74,6 +74,7 @@ Run::Run(std::shared_ptr<const model::WorldModel> world, RunOptions options, Bus
   if (publisher_.has_recorders() || repeating_) {
     header_ =
         log::make_log_header(*world_, options_.simulation.fleet.seed, options_.result_options);
+    header_made_ = true;
     header_.epoch = epoch_;
     publisher_.record(kHeaderChannel, header_);
     if (journal_) journal_->begin(header_, 0);

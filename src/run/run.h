@@ -245,8 +245,9 @@ class Run {
   WatchdogWarnings watchdogs_;
   Ticks ticks_;
   InfoBeat info_beat_;
-  log_header_t header_;  // of this epoch
-  Snapshot changed_;     // the last state, after requests
+  log_header_t header_;       // of this epoch
+  bool header_made_ = false;  // those who only look on (ROS 2, Foxglove) come later, and need none
+  Snapshot changed_;          // the last state, after requests
   std::function<void(const Status&)> on_status_;
   std::function<void(const std::string&)> on_stall_;
   std::function<void(const Snapshot&)> on_state_;

@@ -50,6 +50,7 @@ class Viewer:
 def test_what_is_drawn_is_seen_and_taken_away(run):
     viewer = Viewer(run)
     with ruedo.connect(LCM, timeout=60) as sim:
+        sim.sleep(0.1)  # markers have the time of the state on which they are drawn
 
         def draw():
             sim.markers(

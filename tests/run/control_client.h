@@ -30,12 +30,13 @@ class ControlledOn {
  public:
   ~ControlledOn() { end(); }
 
-  void begin(RunOptions options, const std::string& models) {
-    start(std::move(options), models);
+  void begin(RunOptions options, const std::string& models, Sink* onlooker = nullptr) {
+    start(std::move(options), models, onlooker);
     join();
   }
-  void start(RunOptions options, const std::string& models) {
+  void start(RunOptions options, const std::string& models, Sink* onlooker = nullptr) {
     server_ = std::make_unique<run::Run>(load_text(models), std::move(options), bus);
+    if (onlooker) server_->add(*onlooker);
     thread_ = std::thread([this] { server_->run(); });
   }
   reply_t join() {

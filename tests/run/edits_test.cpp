@@ -36,6 +36,31 @@ std::string noisy_ray() {
                     "<noise><type>gaussian</type><mean>0</mean><stddev>0.05</stddev></noise>");
 }
 
+// As ROS 2 and Foxglove: they hear records, and the run was made when nobody recorded it, so that
+// it has no header of a log.
+class Onlooker : public Sink {
+ public:
+  Hears hears() const override { return {.samples = false, .records = true}; }
+  void message(const Published& message) override {
+    headers_ += message.channel == "ruedo/header";
+    changes_ += message.channel == "ruedo/applied";
+  }
+  int headers_ = 0, changes_ = 0;
+};
+
+TEST_F(EditsTest, WhoOnlyLooksOnHearsOfAModelAndOfNoLog) {
+  Onlooker onlooker;
+  begin(paused_server(), robot_sdf("r", 0, 0), &onlooker);
+  step(10);
+  spawn_request_t file = spawning("", 2, 1);
+  file.model = "p3dx";  // of which files are read, which a log's header would name
+  EXPECT_EQ(spawn(file).code, reply_t::OK);
+  step(10);
+  end();
+  EXPECT_EQ(onlooker.changes_, 1);
+  EXPECT_EQ(onlooker.headers_, 0);
+}
+
 TEST_F(EditsTest, ASpawnedRobotIsThereAndDrives) {
   begin(paused_server(), robot_sdf("r", 0, 0));
   step(10);
