@@ -104,11 +104,11 @@ run::WaitForOption parse_wait_for(const std::string& text) {
   return option;
 }
 
-double parse_rate(const std::string& text) {
+double parse_rate(const std::string& text, const std::string& option) {
   double rate = 0.0;
   if (text == "max") return std::numeric_limits<double>::infinity();
   if (!read_number(text, rate) || !run::Pacer::takes(rate))
-    refuse_option("--rate", text, "0.001 to 1e6 (1 is real time), or max");
+    refuse_option(option, text, "0.0001 to 1e6 (1 is real time), or max");
   return rate;
 }
 

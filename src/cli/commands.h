@@ -58,7 +58,8 @@ std::vector<std::string> result_options(const WorldArguments& arguments);
 
 std::pair<std::string, std::string> parse_remap(const std::string& text);  // CHANNEL=NAME
 run::WaitForOption parse_wait_for(const std::string& text);                // CHANNEL@HZ
-double parse_rate(const std::string& text);          // a number above 0, or "max": +inf
+// 0.0001 to 1e6, or "max": +inf. option: names it in the error.
+double parse_rate(const std::string& text, const std::string& option = "--rate");
 int64_t parse_duration_us(const std::string& text);  // seconds
 
 // The findings with the same text, of several places.

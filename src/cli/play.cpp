@@ -64,7 +64,7 @@ int play(const PlayArguments& arguments) {
   load_given_plugins();
   read_given_types();
   if (arguments.sandboxed) enter_sandbox(arguments.log, {arguments.html}, arguments.other);
-  const double speed = parse_rate(arguments.speed);
+  const double speed = parse_rate(arguments.speed, "--speed");
   std::signal(SIGINT, [](int) { interrupted = 1; });
   std::signal(SIGTERM, [](int) { interrupted = 1; });
   const BagLog first(arguments.log), second(arguments.other);  // as logs, where they are bags

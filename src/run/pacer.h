@@ -23,7 +23,7 @@ class Pacer : public engine::Pace, public Gate {
 
   // Rates that make sense, beside +inf: a run that takes one step an hour looks like one that
   // hangs.
-  static constexpr double kSlowest = 1e-3, kFastest = 1e6;
+  static constexpr double kSlowest = 1e-4, kFastest = 1e6;
   static bool takes(double rate) {
     return rate == std::numeric_limits<double>::infinity() ||
            (rate >= kSlowest && rate <= kFastest);

@@ -118,7 +118,7 @@ TEST_F(ControlTest, RefusesOtherRunsEpochsAndSessions) {
   EXPECT_EQ(ask(other).code, reply_t::UNKNOWN_SESSION);
   EXPECT_EQ(ask(999).code, reply_t::NOT_SUPPORTED);
   EXPECT_EQ(ask(request_t::STEP, {1, 2, 3}).code, reply_t::BAD_REQUEST);
-  for (const double value : {std::nan(""), 0.0, -1.0, 1e-310, 9e-4, 1.1e6, 1e308}) {
+  for (const double value : {std::nan(""), 0.0, -1.0, 1e-310, 9e-5, 1.1e6, 1e308}) {
     rate_request_t rate;
     rate.rate = value;
     EXPECT_EQ(ask(request_t::RATE, engine::encoded(rate)).code, reply_t::BAD_REQUEST) << value;
