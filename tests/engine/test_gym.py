@@ -413,6 +413,57 @@ def test_pettingzoo_finds_nothing_wrong():
     env.close()
 
 
+def fleet_followed(env, actions):
+    """What these actions lead to, through the ends of robots and of the episode, into the next."""
+    told = []
+    for action in actions:
+        if not env.agents:
+            told.append(env.reset())
+        told.append(env.step({name: action[i] for i, name in enumerate(env.possible_agents)}))
+        told.append((list(env.agents), list(env._goals), env._engine.state_hash()))
+        told.append(None if env.render_mode is None else env.render().tobytes())
+    with np.printoptions(threshold=10**6, floatmode="unique"):
+        return repr(told)
+
+
+@pytest.mark.parametrize("render_mode", [None, "rgb_array"])
+def test_what_follows_a_saved_fleet_is_what_followed(render_mode):
+    env = ruedo.gym.FleetEnv(4, beams=6, render_mode=render_mode)
+    env.most_actions = 120
+    env.reset(seed=3)
+    actions = np.random.default_rng(5).uniform([0, -0.4], [1, 0.4], (160, 4, 2))
+    for action in actions:
+        env.step({name: action[i] for i, name in enumerate(env.possible_agents)})
+        if len(env.agents) < 4:  # one has run into something
+            break
+    assert 0 < len(env.agents) < 4
+    saved, agents, shown = env.save(), list(env.agents), env._observations()
+    assert repr(saved) == f"<ruedo.gym.SavedFleet: at {env._engine.time():g} s>"
+    after = fleet_followed(env, actions)
+    for seed in (9, None):
+        env.reset(seed=seed)
+        observations, infos = env.restore(saved)
+        assert env.agents == agents == list(observations) and infos == {one: {} for one in agents}
+        for i, name in enumerate(env.possible_agents):
+            assert name not in agents or np.array_equal(observations[name], shown[i])
+        assert fleet_followed(env, actions) == after
+    env.close()
+
+
+def test_a_saved_fleet_goes_where_it_belongs():
+    env, other = (ruedo.gym.FleetEnv(2, beams=5) for _ in range(2))
+    for call in (env.save, lambda: env.step({})):
+        with pytest.raises(gymnasium.error.ResetNeeded, match="reset"):
+            call()
+    env.reset(seed=1), other.reset(seed=1)
+    with pytest.raises(TypeError, match=r"restore\(\) takes what save\(\) gave, not 3"):
+        env.restore(3)
+    with pytest.raises(ValueError, match="another engine saved that world"):
+        other.restore(env.save())
+    assert other.agents == ["robot0", "robot1"]
+    env.close(), other.close()
+
+
 def test_a_fleet_sees_its_goals():
     env = ruedo.gym.FleetEnv(2, beams=5, noise=False)
     observations, _ = env.reset(seed=1)

@@ -8,20 +8,32 @@ stands where it is, seen by the others. ``infos[robot]`` has ``success`` and ``c
 
 from __future__ import annotations
 
+import copy
 from typing import Any, ClassVar, Literal
 
+import gymnasium
 import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 from pettingzoo import ParallelEnv  # type: ignore[import-untyped, unused-ignore]
 
 from ..arguments import whole
-from ..engine import Engine
+from ..engine import Engine, SavedWorld
 from ..rooms import TEST_ROOMS, make_fleet_room
 from .base import DRIVE, PICTURE, STEPS, checked_actions, checked_beams, drive_commands
 from .navigate import GOAL_M, LIMITS, observation
 
 Each = dict[str, Any]
+
+
+class SavedFleet:
+    """What `FleetEnv.save` gave; it does not change."""
+
+    def __init__(self, world: SavedWorld, episode: Each) -> None:
+        self._world, self._episode = world, episode
+
+    def __repr__(self) -> str:
+        return f"<ruedo.gym.SavedFleet: at {self._world.time:g} s>"
 
 
 class FleetEnv(ParallelEnv):  # type: ignore[misc]    # PettingZoo's generics
@@ -98,9 +110,10 @@ class FleetEnv(ParallelEnv):  # type: ignore[misc]    # PettingZoo's generics
         self.agents = list(self.possible_agents)
         self._actions = 0
         self._distance = self._distances()
-        return self._of_agents(self._observations()), {name: {} for name in self.agents}
+        return self._begun()
 
     def step(self, actions: Each) -> tuple[Each, Each, Each, Each, Each]:
+        self._check_begun("the first step()")
         commands = np.zeros((1, len(self.possible_agents), 2))
         for i, name in enumerate(self.possible_agents):
             if name in self.agents:
@@ -135,6 +148,24 @@ class FleetEnv(ParallelEnv):  # type: ignore[misc]    # PettingZoo's generics
         ]
         return result
 
+    def save(self) -> SavedFleet:
+        """The episode as it stands, with all that decides what follows: the world, the goals, who
+        is still on the way, and the seeds of the episodes to come.
+        """
+        self._check_begun("save()")
+        return SavedFleet(self._engine.save(), self._episode())
+
+    def restore(self, saved: SavedFleet) -> tuple[Each, Each]:
+        """Makes the episode what it was: for the same actions, what follows is what followed, byte
+        for byte. Returns the observations and infos of those on the way, as `reset` does.
+        """
+        if not isinstance(saved, SavedFleet):
+            raise TypeError(f"restore() takes what save() gave, not {saved!r}")
+        self._engine.restore(saved._world)
+        for name, value in copy.deepcopy(saved._episode).items():
+            setattr(self, name, value)
+        return self._begun()
+
     def render(self) -> NDArray[np.uint8] | None:
         """Seen from above, (256, 256, 3)."""
         if self.render_mode is None:
@@ -144,6 +175,18 @@ class FleetEnv(ParallelEnv):  # type: ignore[misc]    # PettingZoo's generics
 
     def close(self) -> None:
         self._engine.close()
+
+    def _check_begun(self, call: str) -> None:
+        if not hasattr(self, "_distance"):
+            raise gymnasium.error.ResetNeeded(f"call reset() before {call}")
+
+    def _begun(self) -> tuple[Each, Each]:
+        return self._of_agents(self._observations()), {name: {} for name in self.agents}
+
+    def _episode(self) -> Each:
+        """What is kept of an episode besides the engine's world."""
+        names = ("agents", "_goals", "_distance", "_actions", "_generator")
+        return copy.deepcopy({name: getattr(self, name) for name in names})
 
     def _text(self, number: int) -> str:
         scene, self._goals = make_fleet_room(number, len(self.possible_agents))
