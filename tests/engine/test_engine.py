@@ -2,7 +2,9 @@
 tests/run/engine_test.cpp's.
 """
 
+import copy
 import math
+import pickle
 
 import numpy as np
 import pytest
@@ -318,6 +320,13 @@ def test_a_second_thread_is_refused():
         long.join()
         assert "at work in another thread" in said[0]
         e.step()
+
+
+def test_an_engine_is_not_copied():
+    with engine() as e:
+        for call in (copy.copy, copy.deepcopy, pickle.dumps):
+            with pytest.raises(TypeError, match="neither copied nor pickled: make another one"):
+                call(e)
 
 
 def test_copies_that_share_a_world_outlive_the_first():

@@ -2,7 +2,9 @@
 says.
 """
 
+import copy
 import math
+import pickle
 import urllib.request
 import xml.etree.ElementTree as ET
 
@@ -127,6 +129,94 @@ def test_saved_episodes_go_where_they_belong():
     first = [env.step(action)[0] for action in actions]
     env.restore(episode)
     assert same([env.step(action)[0] for action in actions], first)
+    env.close()
+
+
+def test_seeds_and_masks_of_many():
+    envs = ruedo.gym.NavigateVectorEnv(3, beams=5, autoreset_mode="Disabled")
+    alone = ruedo.gym.NavigateEnv(beams=5)
+
+    def rooms():
+        return [scene.number for scene in envs.scenes]
+
+    envs.reset(seed=5)
+    counted = rooms()
+    alone.reset(seed=np.int64(5))
+    assert alone.scene.number == counted[0]
+    for seeds in ([5, 6, 7], (5, 6, 7), np.array([5, 6, 7]), np.int64(5)):
+        envs.reset(seed=seeds)
+        assert rooms() == counted
+    envs.reset()
+    later = rooms()
+    assert not set(later) & set(counted)
+    envs.reset(seed=[5, None, None])  # the others go on with the draws that they have
+    assert rooms()[0] == counted[0] and not set(rooms()[1:]) & {*counted, *later}
+    envs.reset(seed=5)
+    envs.reset(seed=50, options={"reset_mask": np.array([False, True, False])})
+    assert [rooms()[0], rooms()[2]] == [counted[0], counted[2]] and rooms()[1] != counted[1]
+    envs.reset()
+    assert [rooms()[0], rooms()[2]] == [later[0], later[2]] and rooms()[1] != later[1]
+    envs.close(), alone.close()
+
+
+@pytest.mark.parametrize(
+    "wrong, text",
+    [
+        ({"seed": -1}, "seed is -1; allowed are 0 to"),
+        ({"seed": 1.5}, "seed is a whole number, not 1.5"),
+        ({"seed": "5"}, "seed is a whole number, not '5'"),
+        ({"seed": [1]}, "1 seeds for 2 environments"),
+        ({"seed": [1, "a"]}, "seed is a whole number, not 'a'"),
+        ({"options": {"reset_mask": [True]}}, "True or False for each of 2 environments"),
+        ({"options": {"reset_mask": [1, 0]}}, "True or False for each of 2 environments"),
+        ({"options": {"reset_mask": None}}, "True or False for each of 2 environments"),
+    ],
+)
+def test_a_reset_that_is_refused_changes_nothing(wrong, text):
+    envs = ruedo.gym.NavigateVectorEnv(2, beams=5)
+    envs.reset(seed=3)
+    saved, ahead = envs.save(), [np.ones((2, 2))] * 150
+    after = followed(envs, ahead)
+    envs.restore(saved)
+    with pytest.raises((ValueError, TypeError), match=text):
+        envs.reset(**wrong)
+    assert same(followed(envs, ahead), after)
+    envs.close()
+
+
+@pytest.mark.parametrize(
+    "copied", [copy.copy, copy.deepcopy, lambda e: pickle.loads(pickle.dumps(e))]
+)
+@pytest.mark.parametrize(
+    "make",
+    [
+        lambda: gymnasium.make("ruedo/Navigate-v0", beams=7),
+        lambda: gymnasium.make_vec("ruedo/Crowd-v0", num_envs=2, beams=7, people=3),
+        lambda: ruedo.gym.FleetEnv(2, beams=7),
+    ],
+)
+def test_a_copied_environment_is_one_of_its_own(make, copied):
+    """Made with the same arguments, as by Gymnasium's EzPickle; a wrapper's shallow copy is of the
+    wrapper alone.
+    """
+    env = make()
+    first = env.reset(seed=2)[0]
+    other = copied(env.unwrapped)
+    if isinstance(env, gymnasium.Env):
+        assert other.spec == env.unwrapped.spec
+    env.close()
+    again = other.reset(seed=2)[0]
+    assert repr(again) == repr(first)
+    other.close()
+
+
+def test_what_was_saved_stays_in_the_process():
+    env = ruedo.gym.NavigateEnv(beams=5)
+    env.reset(seed=1)
+    saved = env.save()
+    assert copy.deepcopy({"node": saved})["node"] is saved and copy.copy(saved) is saved
+    with pytest.raises(TypeError, match="SavedEpisodes: 1> cannot be pickled"):
+        pickle.dumps(saved)
     env.close()
 
 
@@ -509,6 +599,13 @@ def test_wrong_actions_are_refused():
     envs.close()
     fleet = ruedo.gym.FleetEnv(2, beams=2)
     fleet.reset(seed=1)
-    with pytest.raises(ValueError, match="no action for robot1"):
-        fleet.step({"robot0": good[0]})
+    for actions, text in (
+        ({"robot0": good[0]}, "no action for robot1"),
+        ({"robot0": good[0], "robot1": good[0], "robot2": good[0]}, "'robot2' is none of"),
+        (good, "actions are a dict"),
+    ):
+        with pytest.raises((ValueError, TypeError), match=text):
+            fleet.step(actions)
+    with pytest.raises(TypeError, match="seed is a whole number, not '3'"):
+        fleet.reset(seed="3")
     fleet.close()

@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterable, Mapping, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -22,12 +22,32 @@ from numpy.typing import ArrayLike, NDArray
 from . import _engine
 from .arguments import MOST_SEED, MOST_WHOLE, named, switch, texts, whole
 
+if TYPE_CHECKING:
+    from typing_extensions import Self
+
 __all__ = ["Engine", "SavedWorld"]
 
 MOST_WORLDS = 2**31 - 1
 
 
-class SavedWorld:
+class Saved:
+    """What an engine keeps of its past: it does not change, so that copies of it are itself, and
+    does not leave the process.
+    """
+
+    __slots__ = ()
+
+    def __copy__(self) -> Self:
+        return self
+
+    def __deepcopy__(self, memo: object) -> Self:
+        return self
+
+    def __reduce__(self) -> Any:
+        raise TypeError(f"{self!r} cannot be pickled: it is of the engine that saved it")
+
+
+class SavedWorld(Saved):
     """A copy of an :class:`Engine`'s world as it was; it does not change.
 
     world: the copy that it was. seed: that it had. steps: the number of the state. time: s.
@@ -370,6 +390,12 @@ class Engine:
 
     def __exit__(self, *exception: object) -> None:
         self.close()
+
+    def __reduce__(self) -> Any:
+        raise TypeError(
+            "a ruedo.Engine can be neither copied nor pickled: make another one with the same "
+            "arguments; save() and restore() keep and put back what it computes"
+        )
 
     def __repr__(self) -> str:
         return f"<ruedo.Engine: {self._worlds} worlds, robots {', '.join(self._robots) or 'none'}, steps of {self.dt * 1e3:g} ms>"

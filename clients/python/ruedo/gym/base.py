@@ -16,15 +16,19 @@ from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
 from ..arguments import whole
-from ..engine import MOST_WORLDS, Engine, SavedWorld
+from ..engine import MOST_WORLDS, Engine, Saved, SavedWorld
 from ..rooms import TEST_ROOMS, Scene
 
 if TYPE_CHECKING:
+    from typing_extensions import Self
+
     from .console import Console
 
 STEPS = 20  # of the world in an action: 0.1 s
 PICTURE = 256  # pixels, the width and height of a rendered frame
 MODES = (None, "rgb_array", "human")
+
+MOST_SEED = 2**128 - 1  # that of numpy's SeedSequence
 
 Info = dict[str, Any]
 Outcome = tuple[NDArray[np.float64], NDArray[np.bool_], NDArray[np.bool_]]
@@ -43,7 +47,7 @@ class _SavedEpisode:
         self.world, self.scene, self.generator, self.rows = world, scene, generator, rows
 
 
-class SavedEpisodes:
+class SavedEpisodes(Saved):
     """What `TaskVectorEnv.save` gave; it does not change. ``len()``: how many episodes."""
 
     def __init__(self, episodes: list[_SavedEpisode]) -> None:
@@ -56,7 +60,28 @@ class SavedEpisodes:
         return f"<ruedo.gym.SavedEpisodes: {len(self)}>"
 
 
-class TaskVectorEnv(VectorEnv):
+class MadeAnew:
+    """Copied or pickled, an environment is made anew with the same arguments, as by Gymnasium's
+    EzPickle; it wants a reset.
+    """
+
+    _made_with: tuple[tuple[Any, ...], Info]
+
+    def __new__(cls, *arguments: Any, **options: Any) -> Self:
+        one = super().__new__(cls)
+        one._made_with = arguments, options
+        return one
+
+    def __reduce__(self) -> Any:
+        spec = getattr(self, "spec", None)
+        return _make_anew, (type(self), *self._made_with), {"spec": spec}
+
+
+def _make_anew(kind: type, arguments: tuple[Any, ...], options: Info) -> Any:
+    return kind(*arguments, **options)
+
+
+class TaskVectorEnv(MadeAnew, VectorEnv):
     """``num_envs`` episodes of a task, each in a scene of its own.
 
     A task says which scene has which number (`_scene`), what an action commands (`_commands`), what
@@ -151,22 +176,21 @@ class TaskVectorEnv(VectorEnv):
     # ---- Gymnasium's interface.
 
     def reset(
-        self, *, seed: int | list[int | None] | None = None, options: Info | None = None
+        self, *, seed: int | Sequence[int | None] | None = None, options: Info | None = None
     ) -> tuple[NDArray[Any], Info]:
-        """Begins new episodes in all environments, or where ``options["reset_mask"]`` says."""
-        if isinstance(seed, list):
-            self._generators = [np.random.default_rng(one) for one in seed]
-        elif seed is not None or not hasattr(self, "_generators"):
-            self._generators = [
-                np.random.default_rng(None if seed is None else seed + i)
-                for i in range(self.num_envs)
-            ]
-        mask = (
-            np.ones(self.num_envs, bool)
-            if not options or "reset_mask" not in options
-            else np.asarray(options["reset_mask"], bool)
-        )
-        self._begin(np.flatnonzero(mask))
+        """Begins new episodes in all environments, or where ``options["reset_mask"]`` says.
+
+        seed: environment i draws its scenes from ``seed + i``; or one for each; None goes on with
+        the draws that there are.
+        """
+        seeds = self._seeds(seed)
+        begin = self._masked(options)
+        if not hasattr(self, "_generators"):
+            self._generators = [np.random.default_rng() for _ in range(self.num_envs)]
+        for i in begin:
+            if seeds[i] is not None:
+                self._generators[i] = np.random.default_rng(seeds[i])
+        self._begin(begin)
         return self._observe(), {}
 
     def step(
@@ -296,6 +320,27 @@ class TaskVectorEnv(VectorEnv):
             and value.shape[:1] == (self.num_envs,)
         }
 
+    def _seeds(self, seed: int | Sequence[int | None] | None) -> list[int | None]:
+        if seed is None:
+            return [None] * self.num_envs
+        if not isinstance(seed, (list, tuple, np.ndarray)):
+            first = whole("seed", seed, 0, MOST_SEED - self.num_envs + 1)
+            return [first + i for i in range(self.num_envs)]
+        if len(seed) != self.num_envs:
+            raise ValueError(f"{len(seed)} seeds for {self.num_envs} environments")
+        return [None if one is None else whole("seed", one, 0, MOST_SEED) for one in seed]
+
+    def _masked(self, options: Info | None) -> NDArray[np.intp]:
+        if not options or "reset_mask" not in options:
+            return np.arange(self.num_envs)
+        mask = np.asarray(options["reset_mask"])
+        if mask.dtype != bool or mask.shape != (self.num_envs,):
+            raise ValueError(
+                f"reset_mask is True or False for each of {self.num_envs} environments, "
+                f"not {options['reset_mask']!r}"
+            )
+        return np.flatnonzero(mask)
+
     def _indices(self, indices: int | Sequence[int] | None) -> list[int]:
         if indices is None:
             return list(range(self.num_envs))
@@ -340,7 +385,7 @@ class TaskVectorEnv(VectorEnv):
         return heading
 
 
-class TaskEnv(gymnasium.Env):
+class TaskEnv(MadeAnew, gymnasium.Env):
     """One episode of a task at a time."""
 
     metadata: Info = {"render_modes": ["rgb_array", "human"], "render_fps": 10}
@@ -359,6 +404,8 @@ class TaskEnv(gymnasium.Env):
     def reset(
         self, *, seed: int | None = None, options: Info | None = None
     ) -> tuple[NDArray[Any], Info]:
+        if seed is not None:
+            seed = whole("seed", seed, 0, MOST_SEED)
         super().reset(seed=seed)
         observations, _ = self._one.reset(seed=seed)
         return observations[0], {}

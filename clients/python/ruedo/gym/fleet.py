@@ -18,15 +18,24 @@ from numpy.typing import NDArray
 from pettingzoo import ParallelEnv  # type: ignore[import-untyped, unused-ignore]
 
 from ..arguments import whole
-from ..engine import Engine, SavedWorld
+from ..engine import Engine, Saved, SavedWorld
 from ..rooms import TEST_ROOMS, make_fleet_room
-from .base import DRIVE, PICTURE, STEPS, checked_actions, checked_beams, drive_commands
+from .base import (
+    DRIVE,
+    MOST_SEED,
+    PICTURE,
+    STEPS,
+    MadeAnew,
+    checked_actions,
+    checked_beams,
+    drive_commands,
+)
 from .navigate import GOAL_M, LIMITS, observation
 
 Each = dict[str, Any]
 
 
-class SavedFleet:
+class SavedFleet(Saved):
     """What `FleetEnv.save` gave; it does not change."""
 
     def __init__(self, world: SavedWorld, episode: Each) -> None:
@@ -36,7 +45,7 @@ class SavedFleet:
         return f"<ruedo.gym.SavedFleet: at {self._world.time:g} s>"
 
 
-class FleetEnv(ParallelEnv):  # type: ignore[misc]    # PettingZoo's generics
+class FleetEnv(MadeAnew, ParallelEnv):  # type: ignore[misc]    # PettingZoo's generics
     """``robots`` of them, called robot0, robot1, ..."""
 
     metadata: ClassVar[Each] = {
@@ -102,7 +111,7 @@ class FleetEnv(ParallelEnv):  # type: ignore[misc]    # PettingZoo's generics
 
     def reset(self, seed: int | None = None, options: Each | None = None) -> tuple[Each, Each]:
         if seed is not None:
-            self._generator = np.random.default_rng(seed)
+            self._generator = np.random.default_rng(whole("seed", seed, 0, MOST_SEED))
         number = int(self._generator.integers(TEST_ROOMS))
         self._engine.reset(
             0, seed=int(self._generator.integers(2**31)), text=self._text(self._first + number)
@@ -114,6 +123,10 @@ class FleetEnv(ParallelEnv):  # type: ignore[misc]    # PettingZoo's generics
 
     def step(self, actions: Each) -> tuple[Each, Each, Each, Each, Each]:
         self._check_begun("the first step()")
+        if not isinstance(actions, dict):
+            raise TypeError(f"actions are a dict, an action for each robot, not {actions!r}")
+        if strangers := [name for name in actions if name not in self.possible_agents]:
+            raise ValueError(f"{strangers[0]!r} is none of {self.possible_agents}")
         commands = np.zeros((1, len(self.possible_agents), 2))
         for i, name in enumerate(self.possible_agents):
             if name in self.agents:
