@@ -52,11 +52,11 @@ Ruedo began with Hernandez-Belmonte, Ayala-Ramirez and Sanchez-Yanez, "A Mobile 
 Development Engine", ROSSUM 2011. This page is written by `ruedo experiments --out docs`, which runs the paper's
 experiments again on a P3-AT: in the paper's setting, and in Ruedo's.
 
-The paper's setting is taken to be a loop at 50 Hz that starts to brake when v^2 / (2 d) has reached the rest of the way.
-It notices that up to a frame late, and a frame late is up to v dt too far. The paper prints neither the loop nor its limits:
-4.2 and 0.27 m/s^2 are chosen so that a loop of this kind nearly gives the paper's two numbers, so its agreement in E1 shows that late braking
-can explain them, not that it did. Ruedo plans a primitive in closed form and evaluates it exactly at every step, so that the way
-does not depend on the step. The way is that at the step at which the primitive says that it is done.
+The paper's setting is assumed to be a control loop at 50 Hz that starts to brake when the braking distance v^2 / (2 d) has reached the remaining distance.
+It notices this up to one frame late, and so drives up to v dt too far. The paper prints neither the loop nor its limits:
+4.2 and 0.27 m/s^2 are chosen so that such a loop nearly reproduces the paper's two numbers. The agreement in E1 therefore shows that late braking
+can explain them, not that it did. Ruedo plans a primitive in closed form and evaluates it exactly at every step, so that the distance
+does not depend on the step. The distance is measured at the step at which the primitive reports that it is done.
 
 ## E1: advance by one metre (the paper's Fig. 8)
 
@@ -66,17 +66,17 @@ does not depend on the step. The way is that at the step at which the primitive 
 
 ## E2: a square of one metre, five times (Fig. 9)
 
-The paper's measure: the mean, over the run, of the difference between the true pose and the odometry; here of its absolute
-value, at every step. The paper says: a square of 1000 mm, "several times", odometry by the trapezoidal rule. It does not say how
-many times, at which speeds and limits, at which rate, how old the odometry was when it was compared, and whether signs
-cancelled. Assumed are five times, 50 Hz, the loop of E1, and the P3-AT's usual limits: 0.6 m/s, 0.75 rad/s, acceleration 0.3 and
-deceleration 0.6 m/s^2, 1.74 rad/s^2 (AMRISim's parameters; those that the model in worlds/robots/p3at has). They were not fitted, and these rows have
-no target. Once the odometry is that of the same step: the trapezoid then runs half a frame behind the robot. Once it is that of
-the last status packet, which the real robot sends each 0.1 s. Which of both the paper did is not known.
+The paper reports the mean difference between the true pose and the odometry over the run; here it is the mean of the absolute
+differences at every step. The paper says: a square of 1000 mm, "several times", odometry by the trapezoidal rule. It does not say how
+many times, with which speeds and limits, at which rate, how old the odometry was when it was compared, and whether signs
+cancelled. Assumed here are five times, 50 Hz, the loop of E1, and the P3-AT's usual limits: 0.6 m/s, 0.75 rad/s, acceleration 0.3 and
+deceleration 0.6 m/s^2, 1.74 rad/s^2 (AMRISim's parameters, which the model in worlds/robots/p3at uses, too). They were not fitted, and these rows have
+no target. In the first three rows the odometry is that of the same step: the trapezoid then lags half a frame behind the robot. In the next three it is that of
+the last status packet, which the real robot sends every 0.1 s. Which of the two the paper used is not known.
 
-In Ruedo's setting the kinematic drive runs the primitives, by the robot's true way. With the wheels drive the wheels slip, and the
-primitives end where the robot's odometry has them, as on a real robot: one that steers by skidding turns less than its wheels say,
-so that its square does not close until its odometry believes in a wider track than the real one.
+In Ruedo's setting the kinematic drive executes the primitives along the robot's true path. With the wheels drive the wheels slip, and the
+primitives end by the robot's odometry, as on a real robot. A skid-steered robot turns less than its wheels suggest,
+so its square does not close until its odometry assumes a wider track than the real one.
 
 {E2}![Square, late braking](experiments/e2_late_braking.svg)
 
@@ -94,12 +94,12 @@ so that its square does not close until its odometry believes in a wider track t
 
 ## E4: an overloaded host
 
-The paper blames errors on the load of the host. Ruedo runs once on the host as it is, and once beside four threads a core that
-do nothing but burn time, with every module held up at random.
+The paper attributes errors to the load of the host. Ruedo runs once on the host as it is, and once beside four busy threads per core,
+with every module delayed at random.
 
 {E4}## E5: noise on and off
 
-The LRF of E3 with a sigma of 10 mm, under 1000 seeds.
+The LRF of E3 with a sigma of 10 mm, with 1000 seeds.
 
 {E5})";
 

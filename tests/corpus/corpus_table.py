@@ -19,9 +19,9 @@ from sections import put
 
 KINDS = {".world", ".sdf", ".urdf", ".xacro"}
 TITLE = "Every file"
-HEAD = """Made by `tests/corpus/corpus_table.py RUEDO FOLDER -o docs/corpus.md` from public files: TurtleBot3's simulations, AWS RoboMaker's small warehouse,
+HEAD = """Written by `tests/corpus/corpus_table.py RUEDO FOLDER -o docs/corpus.md` from public files: TurtleBot3's simulations, AWS RoboMaker's small warehouse,
 Gazebo's models, Husky, linorobot2, neobotix, and MobileRobots' descriptions of their robots. They are not part of Ruedo. Every file is run for two simulated seconds
-(`ruedo run FILE --rate max --duration 2`): "Runs" says whether it did, or the exit code; the error beside it says why the file cannot run. A xacro file of macros alone holds no robot.
+(`ruedo run FILE --rate max --duration 2`). "Runs" says whether it ran, or gives the exit code; the error in the last column then says why the file cannot run. A xacro file that contains only macros has no robot.
 """
 
 

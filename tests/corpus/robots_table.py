@@ -21,9 +21,9 @@ import ruedo
 from sections import put
 
 TITLE = "Robots, driven"
-HEAD = """Made by `tests/corpus/robots_table.py RUEDO FOLDER -o docs/corpus.md`, and held by a test: each robot is commanded 0.3 m/s for 2 s, comes to rest, and
-is commanded 0.5 rad/s for 2 s, without noise. "Way" and "turn" are what it did; limits of acceleration that its files give are in them. "Sensors" counts those
-that published. Files that this folder lacks (meshes, included xacro) are named with the rest.
+HEAD = """Written by `tests/corpus/robots_table.py RUEDO FOLDER -o docs/corpus.md`, and checked by a test. Each robot is commanded 0.3 m/s for 2 s, comes to rest, and
+is then commanded 0.5 rad/s for 2 s, without noise. "Way" and "turn" are the measured results, within the acceleration limits that its files give. "Sensors" counts those
+that published. "Named" is what Ruedo reported, including files that the folder lacks (meshes, included xacro).
 """
 
 # Files with a robot that Gazebo drives; what is expanded from a xacro file stands beside it.
