@@ -147,11 +147,26 @@ def test_what_is_no_world_is_said():
         (lambda sim: sim.state(5), "name is a text, not 5"),
         (lambda sim: sim.step(0).latest("lrf"), "a device or stream is wanted.*not 'lrf'"),
         (lambda sim: sim.step(2, [5]), "commands are made by robot.velocity_command.*5 is none"),
+        (lambda sim: sim.step(2, 5), "commands is a list of what robot.velocity_command.*not 5"),
+        (lambda sim: sim.step(2, sim.robot("p3at")), "commands is a list.*not <Robot p3at"),
+        (lambda sim: sim.robot("p3at").velocity_command("a", 0), "v is a number, not 'a'"),
+        (lambda sim: sim.robot("p3at").set_velocity(0.1, None), "omega is a number, not None"),
+        (lambda sim: sim.robot("p3at").advance("1"), "value is a number, not '1'"),
+        (lambda sim: sim.robot("p3at").advance(1, speed="1"), "speed is a number, not '1'"),
+        (lambda sim: sim.robot("p3at").rotate("90"), "angle is a number, not '90'"),
+        (lambda sim: sim.set_rate("fast"), "rate is a number, not 'fast'"),
     ],
 )
 def test_wrong_types_in_calls_say_what_is_right(call, says):
     with ruedo.launch(HALL, lockstep=1, **QUICK) as sim, pytest.raises(TypeError, match=says):
         call(sim)
+
+
+def test_who_waits_in_lockstep_is_told_that_steps_are_wanted():
+    with ruedo.launch(HALL, lockstep=1, **QUICK) as sim:
+        robot = sim.robot("p3at")
+        with pytest.raises(ruedo.Timeout, match=r"in lockstep.*sim\.step\(20\)\.latest\(robot"):
+            robot.lrf.next(timeout=0.2)
 
 
 def test_worlds_are_found_by_name():

@@ -128,6 +128,11 @@ class Connection:
             return f"nothing at all was heard from the server for {silence:.1f} s"
         if self.info.paused:
             return "the simulation is paused"
+        if self.info.features >> lcmtypes.request_t.GRANT & 1:
+            return (
+                "in lockstep it stands still between calls of step(), whose observations have the "
+                f"samples, as in sim.step(20).latest(robot.lrf); it is at {self.clock.utime * 1e-6:.2f} s"
+            )
         return (
             f"its rate is {rate:g} Hz of sim time, which is now {self.clock.utime * 1e-6:.2f} s"
             if rate

@@ -12,7 +12,7 @@ import struct
 import time
 import zlib
 from collections import deque
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
@@ -212,6 +212,11 @@ class Stepper:
             )
         if isinstance(commands, Command):
             raise TypeError("commands is one Command: put it into a list, [command]")
+        if not isinstance(commands, Iterable):
+            raise TypeError(
+                "commands is a list of what robot.velocity_command() and the like make, "
+                f"not {commands!r}"
+            )
         if n < 0:
             raise ValueError(f"n is {n}: it must be at least 0")
         for command in commands:

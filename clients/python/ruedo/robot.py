@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any, Literal, TypeVar
 import numpy as np
 
 from . import lcmtypes
+from .arguments import number
 from .errors import NotSupported, UnknownName
 from .geometry import Floats
 from .lockstep import Command
@@ -536,7 +537,7 @@ def _radians(call: str, angle: float, usual: float) -> None:
     """Warns of whole numbers that would be many turns as radians, as they are probably degrees;
     they are executed all the same.
     """
-    if abs(angle) > usual and float(angle).is_integer():
+    if abs(number("angle", angle)) > usual and float(angle).is_integer():
         warnings.warn(
             f"{call}({angle:g}) is {abs(angle) / (2.0 * math.pi):.1f} turns: angles are in radians, {call}(math.radians({angle:g}))",
             stacklevel=3,
@@ -544,13 +545,14 @@ def _radians(call: str, angle: float, usual: float) -> None:
 
 
 def _finite(name: str, value: float) -> float:
-    if not math.isfinite(value):
+    finite = number(name, value)
+    if not math.isfinite(finite):
         raise ValueError(f"{name} is {value}: it must be a finite number")
-    return float(value)
+    return finite
 
 
 def _limit(name: str, value: float) -> float:
-    if not (math.isfinite(value) and value >= 0.0):
+    if not (math.isfinite(number(name, value)) and value >= 0.0):
         raise ValueError(
             f"{name} is {value}: it must be a finite number >= 0; 0 is the robot's own limit"
         )

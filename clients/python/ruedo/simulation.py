@@ -171,7 +171,7 @@ class Simulation:
     def set_rate(self, rate: float) -> None:
         """Sim time per real time, > 0; math.inf: as fast as it goes."""
         body = lcmtypes.rate_request_t()
-        body.rate = rate
+        body.rate = arguments.number("rate", rate)
         self._session.request(lcmtypes.request_t.RATE, body)
 
     def show(self, width: int | str = "100%", height: int = 500) -> Any:
