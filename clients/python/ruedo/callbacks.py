@@ -69,6 +69,8 @@ class Callbacks:
         return bool(self._all)
 
     def add(self, callback: Callable[..., Any]) -> Subscription:
+        if not callable(callback):
+            raise TypeError(f"a callback is a function of one sample, not {callback!r}")
         subscription = Subscription(callback, self._what, self._remove)
         with self._lock:
             self._all += (subscription,)

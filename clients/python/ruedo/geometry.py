@@ -35,5 +35,7 @@ def rotation(orientation: Floats) -> Floats:
 
 
 def transformed(points: Floats, by: Placed) -> Floats:
-    """(n, 3) points of a frame that is placed so, in the frame above."""
+    """(n, 3) points of a frame that is placed so, in the frame above. Raises TypeError."""
+    if not hasattr(by, "orientation") or not hasattr(by, "position"):
+        raise TypeError(f"a device or a pose is wanted, such as robot.lrf, not {by!r}")
     return points @ rotation(by.orientation).T + by.position

@@ -257,6 +257,7 @@ class _Server:
         self._command = command
         self._folder = folder  # of the world's file, when it is ours
         self._token = token
+        self._said = ""  # by the end, its last lines
         self._output: IO[bytes] | None = None if verbose else tempfile.TemporaryFile()
         try:
             # A session of its own: Ctrl-C in a terminal reaches the client alone, which may still
@@ -318,6 +319,10 @@ class _Server:
             self._token.close()
         if self._folder:
             self._folder.cleanup()
+        if self._output:
+            self._said = self._last_lines()
+            self._output.close()
+            self._output = None
 
     def forked(self) -> None:
         """In a fork's child: the pipe is not to keep the server alive."""
@@ -326,7 +331,7 @@ class _Server:
 
     def _last_lines(self) -> str:
         if self._output is None:
-            return ""
+            return self._said
         end = self._output.seek(0, os.SEEK_END)
         self._output.seek(max(0, end - 4000))
         return "\n".join(self._output.read().decode(errors="replace").strip().splitlines()[-12:])

@@ -70,6 +70,8 @@ def read_log(path: str | os.PathLike[str], channels: list[str] | None = None) ->
         if hasattr(one, "_get_packed_fingerprint")
     }
     rows: dict[str, list[dict[str, Any]]] = {}
+    if os.path.isdir(path):
+        raise IsADirectoryError(f"{os.fspath(path)}: a folder, and no log")
     if not os.path.isfile(path):
         raise FileNotFoundError(f"{os.fspath(path)}: no such file")
     with open(path, "rb") as file:

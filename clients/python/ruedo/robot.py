@@ -215,6 +215,8 @@ class Robot:
         """Calls callback(collisions) as on_sample() does, but only when the robot runs into a body
         that it did not touch a moment before.
         """
+        if not callable(callback):
+            raise TypeError(f"a callback is a function of one sample, not {callback!r}")
         touched: list[str] = []
 
         def see(sample: Collisions) -> None:

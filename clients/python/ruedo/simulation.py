@@ -195,7 +195,8 @@ class Simulation:
         kinds = {"all": body.ALL, "time": body.TIME, "poses": body.POSES}
         if what not in kinds:
             raise ValueError(f"what is {what!r}: it must be one of {', '.join(map(repr, kinds))}")
-        body.what, body.seed = kinds[what], -1 if seed is None else seed
+        body.what = kinds[what]
+        body.seed = -1 if seed is None else arguments.whole("seed", seed)
         self._session.request(lcmtypes.request_t.RESET, body, 60.0)
         if what != "poses":
             self._connection.clock.reset()

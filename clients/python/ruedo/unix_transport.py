@@ -101,9 +101,11 @@ class UnixTransport:
 
     def close(self) -> None:
         self._closed = True
-        if connection := self._socket:
+        connection, self._socket = self._socket, None
+        if connection:
             with contextlib.suppress(OSError):
                 connection.shutdown(socket.SHUT_RDWR)  # the server keeps nothing for it any more
+            connection.close()
 
     def _connect(self) -> None:
         self._socket = connect(self._path)
@@ -115,9 +117,10 @@ class UnixTransport:
         )
 
     def _send(self, frames: bytes) -> None:
+        connection = self._socket  # close() in another thread takes it away
         try:
-            if self._socket is not None:
-                self._socket.sendall(frames)
+            if connection is not None:
+                connection.sendall(frames)
         except OSError:
             pass  # receive() notices
 
