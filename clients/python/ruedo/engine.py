@@ -414,7 +414,7 @@ class Engine:
             )
         shape = (self._worlds, len(self._robots), given.shape[-1])
         try:
-            rows = np.broadcast_to(given, shape)
+            rows = given if given.shape == shape else np.broadcast_to(given, shape)
         except ValueError:
             raise ValueError(
                 f"commands of shape {given.shape} do not fit (worlds, robots, {shape[2]}) = {shape}"

@@ -197,9 +197,13 @@ class TaskVectorEnv(MadeAnew, VectorEnv):
         self, actions: NDArray[Any]
     ) -> tuple[NDArray[Any], NDArray[np.float64], NDArray[np.bool_], NDArray[np.bool_], Info]:
         """One action of 0.1 s in every environment."""
+        return self._act(checked_actions(actions, self.action_space))
+
+    def _act(
+        self, actions: NDArray[np.float64]
+    ) -> tuple[NDArray[Any], NDArray[np.float64], NDArray[np.bool_], NDArray[np.bool_], Info]:
         if not hasattr(self, "_generators"):
             raise gymnasium.error.ResetNeeded("call reset() before the first step()")
-        actions = checked_actions(actions, self.action_space)
         begun = None  # these show their beginning: their first action is the next one
         if self.autoreset_mode is AutoresetMode.NEXT_STEP and self._over.any():
             begun = self._over.copy()
@@ -412,7 +416,7 @@ class TaskEnv(MadeAnew, gymnasium.Env):
 
     def step(self, action: NDArray[Any]) -> tuple[NDArray[Any], float, bool, bool, Info]:
         one = checked_actions(action, self.action_space)
-        observations, rewards, terminated, truncated, info = self._one.step(one[None])
+        observations, rewards, terminated, truncated, info = self._one._act(one[None])
         return (
             observations[0],
             float(rewards[0]),
@@ -450,10 +454,9 @@ RANGE_M = 8.0
 
 def drive_commands(actions: NDArray[Any]) -> NDArray[np.float64]:
     """Actions in [-1, 1]: the speed ahead, from 0 to 0.5 m/s, and the turn rate, 1 rad/s at 1."""
-    wanted = np.clip(np.asarray(actions, np.float64).reshape(-1, 2), -1.0, 1.0)
-    commands = np.empty((len(wanted), 1, 2))
-    commands[:, 0, 0] = (wanted[:, 0] + 1.0) * (0.5 * SPEED_M_S)
-    commands[:, 0, 1] = wanted[:, 1] * TURN_RAD_S
+    commands = clipped(np.asarray(actions, np.float64).reshape(-1, 1, 2), -1.0, 1.0)
+    commands[..., 0] += 1.0
+    commands *= (0.5 * SPEED_M_S, TURN_RAD_S)
     return commands
 
 
@@ -461,8 +464,13 @@ def seen(ranges: NDArray[np.float32]) -> NDArray[np.float32]:
     """A scan as a network likes it: divided by 8 m and cut at 1; what is nearer than the device can
     measure is 0.
     """
-    scaled: NDArray[np.float32] = np.clip(ranges * np.float32(1.0 / RANGE_M), 0.0, 1.0)
-    return scaled
+    return clipped(ranges * np.float32(1.0 / RANGE_M), 0.0, 1.0)
+
+
+def clipped(values: NDArray[Any], low: Any, high: Any) -> NDArray[Any]:
+    """np.clip, in a third of its time with few values."""
+    result: NDArray[Any] = np.minimum(np.maximum(values, low), high)
+    return result
 
 
 def checked_beams(beams: int) -> int:

@@ -29,6 +29,7 @@ from .base import (
     TaskEnv,
     TaskVectorEnv,
     checked_beams,
+    clipped,
     drive_commands,
     seen,
 )
@@ -103,7 +104,7 @@ class CorridorVectorEnv(TaskVectorEnv):
         begin, along = self._middles[:, :-1], np.diff(self._middles, axis=1)
         here = self._places[:, 0, None, :2] - begin
         length = self._lengths()
-        part = np.clip((here * along).sum(axis=2) / np.maximum(length**2, 1e-12), 0.0, 1.0)
+        part = clipped((here * along).sum(axis=2) / np.maximum(length**2, 1e-12), 0.0, 1.0)
         apart = np.linalg.norm(here - part[..., None] * along, axis=2)
         nearest = apart.argmin(axis=1)
         before = np.cumsum(length, axis=1) - length
@@ -115,8 +116,8 @@ class CorridorVectorEnv(TaskVectorEnv):
     def _observe(self) -> NDArray[np.float32]:
         result = np.empty((self.num_envs, self._beams + 2), np.float32)
         result[:, : self._beams] = seen(self._ranges)
-        result[:, -2] = np.clip(self._speed / SPEED_M_S, -2.0, 2.0)
-        result[:, -1] = np.clip(self._turn, -4.0, 4.0)
+        result[:, -2] = clipped(self._speed / SPEED_M_S, -2.0, 2.0)
+        result[:, -1] = clipped(self._turn, -4.0, 4.0)
         return result
 
 

@@ -34,6 +34,7 @@ from .base import (
     TaskEnv,
     TaskVectorEnv,
     checked_beams,
+    clipped,
     drive_commands,
     seen,
 )
@@ -133,8 +134,7 @@ def observation(
     result[:, beams + 2] = np.sin(bearing)
     result[:, beams + 3] = speed / SPEED_M_S
     result[:, beams + 4] = turn
-    rest = result[:, beams:]
-    np.clip(rest, -LIMITS, LIMITS, out=rest)
+    result[:, beams:] = clipped(result[:, beams:], -LIMITS, LIMITS)
     return result
 
 

@@ -24,7 +24,7 @@ from gymnasium.vector import AutoresetMode
 from numpy.typing import NDArray
 
 from ..rooms import PushRoom, make_push_room
-from .base import DRIVE, SPEED_M_S, TURN_RAD_S, Outcome, TaskEnv, TaskVectorEnv
+from .base import DRIVE, SPEED_M_S, TURN_RAD_S, Outcome, TaskEnv, TaskVectorEnv, clipped
 
 PLACE_M = 0.3
 ROOM_M = 6.0
@@ -74,7 +74,7 @@ class PushVectorEnv(TaskVectorEnv):
         self._apart[indices] = self._distances()[indices]
 
     def _commands(self, actions: NDArray[Any]) -> NDArray[np.float64]:
-        wanted = np.clip(np.asarray(actions, np.float64).reshape(-1, 1, 2), -1.0, 1.0)
+        wanted = clipped(np.asarray(actions, np.float64).reshape(-1, 1, 2), -1.0, 1.0)
         return wanted * (SPEED_M_S, TURN_RAD_S)
 
     def _outcome(self) -> Outcome:
@@ -115,7 +115,7 @@ class PushVectorEnv(TaskVectorEnv):
             self._turn,
         ]
         result = np.stack(columns, axis=1).astype(np.float32)
-        return np.clip(result, -LIMITS, LIMITS)
+        return clipped(result, -LIMITS, LIMITS)
 
 
 class PushEnv(TaskEnv):
