@@ -27,7 +27,7 @@ double wall_s() {
   return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
 }
 
-// Of a call, which is given its number; on average over so many seconds.
+// Seconds for one call, which gets its number; the mean over the given time.
 template <class Call>
 double cost_us(double seconds, const Call& call) {
   int64_t calls = 0;

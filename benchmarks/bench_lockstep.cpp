@@ -1,5 +1,5 @@
-// Lockstep over the wire: steps a second, one step to a round trip, from C++; bench_lockstep.py is
-// the same from Python.
+// Lockstep over the wire: steps per second from C++, one step per round trip; bench_lockstep.py
+// does the same from Python.
 //
 //     bench_lockstep WORLD [STEPS] [ROUNDS]      starts a server of its own; prints each round and
 //     the median

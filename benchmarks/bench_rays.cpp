@@ -138,7 +138,7 @@ std::vector<scene::Ray> scans(const std::vector<BoxAt>& boxes, int count) {
   return rays;
 }
 
-// Of this thread alone, so that other programs disturb less.
+// The CPU time of this thread alone, so that other programs disturb less.
 double cpu_time_us() {
   timespec now;
   clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
@@ -236,8 +236,8 @@ void compare(const std::string& name, const std::vector<BoxAt>& boxes,
               embree_error, bullet_error);
 }
 
-// Robots of seven shapes among the walls: what it costs to bring them up to date, and scans from
-// the first 100 of them.
+// Robots of seven shapes among the walls: the cost of updating them, and scans from the first 100
+// of them.
 void fleet(int robots, const std::vector<BoxAt>& boxes, int repeats) {
   model::WorldModel world = world_of(boxes, nullptr);
   auto robot = std::make_shared<model::Model>();

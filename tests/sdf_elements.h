@@ -1,5 +1,6 @@
-// SDF 1.12, element by element, for tests that none is silent: each is read, named in a finding, or
-// among those that no result depends on. The list is run/sdf_elements.txt, by run/sdf_elements.py.
+// SDF 1.12, element by element, for tests that none is ignored silently: each is read, or named in
+// a finding, or among those that affect no result. The list is run/sdf_elements.txt, by
+// run/sdf_elements.py.
 #pragma once
 
 #include <algorithm>
@@ -58,7 +59,7 @@ inline bool ends_with(const std::string& path, const std::string& end) {
   return path == end || path.ends_with("/" + end);
 }
 
-// Of a path, what its element says in the list below whose path is its end, the first such.
+// For a path, what its element contains in the list below: the first entry whose path is its end.
 using ByEnd = std::vector<std::pair<std::string, std::string>>;
 inline std::string by_end(const ByEnd& list, const std::string& path,
                           const std::string& fallback = "") {
@@ -68,7 +69,7 @@ inline std::string by_end(const ByEnd& list, const std::string& path,
   return fallback;
 }
 
-// What a sensor must be for the reader to look at that part of it.
+// The type that a sensor must have for the reader to look at that part of it.
 inline std::string sensor_type(const std::string& path) {
   static const ByEnd kTypes = {
       {"camera/segmentation_type", "segmentation"}, {"camera/box_type", "boundingbox_camera"},
@@ -120,7 +121,7 @@ inline std::string attributes(const std::string& element, const std::string& pat
   return " name='n'";
 }
 
-// What an element needs beside the one that is looked at.
+// What an element needs beside the one under test.
 inline std::vector<std::string> beside(const std::string& element, const std::string& path) {
   const bool in_state = path.starts_with("world/state");
   if (element == "world" && in_state)
@@ -202,7 +203,7 @@ inline std::string value_of(const Row& row) {
 
 constexpr int kLine = 100;  // where the element under test stands
 
-// A world that holds it with what it needs; without it, where `with` is false.
+// A world that contains it with what it needs; without it, if `with` is false.
 inline std::string world_with(const Row& row, bool with) {
   std::vector<std::string> steps = steps_of(row.path);
   std::string attribute;
@@ -248,7 +249,7 @@ struct Outcome {
   bool read = false;
 };
 
-// Loads a text, adds what is found to the list.
+// Loads a text, and adds the findings to the list.
 using Loader = std::function<void(const std::string& text, std::multiset<std::string>& findings)>;
 
 inline Outcome load(const Row& row, bool with, const Loader& loader) {
@@ -263,7 +264,7 @@ inline Outcome load(const Row& row, bool with, const Loader& loader) {
   return outcome;
 }
 
-// What is told of a world with the element, and not of the same without.
+// What is reported for a world with the element, and not for the same world without it.
 inline bool is_named(const Row& row, const Outcome& with, const Loader& loader) {
   const Outcome without = load(row, false, loader);
   return std::any_of(with.findings.begin(), with.findings.end(), [&](const std::string& text) {
@@ -271,7 +272,7 @@ inline bool is_named(const Row& row, const Outcome& with, const Loader& loader) 
   });
 }
 
-// What is named by a word about something else: the fog as a whole, the kind of a joint.
+// Elements that are named by a word for something else: the fog as a whole, the kind of a joint.
 inline bool is_told_of(const Row& row, const Outcome& with) {
   static const ByEnd kWords = {
       {"fog/color", "<fog>"},         {"fog/start", "<fog>"},
@@ -283,7 +284,7 @@ inline bool is_told_of(const Row& row, const Outcome& with) {
                      [&](const std::string& text) { return text.find(word) != std::string::npos; });
 }
 
-// What no result depends on, by the ends of paths; docs/world-files.md says it.
+// Elements that affect no result, by the ends of their paths; docs/world-files.md lists them.
 inline bool is_of_no_effect(const std::string& path) {
   static const char* const kOfNoEffect[] = {"gui",
                                             "world/physics/ode",
@@ -317,7 +318,7 @@ inline bool is_of_no_effect(const std::string& path) {
                                             "state/real_time",
                                             "state/sim_time",
                                             "state/wall_time"};
-  // Of a saved state: what follows from the rest.
+  // Parts of a saved state that follow from the rest.
   static const std::set<std::string> kFollows = {"acceleration", "wrench", "frame", "collision",
                                                  "@namespace",   "axis",   "axis2"};
   const bool saved = path.starts_with("world/state/");
@@ -331,7 +332,7 @@ inline bool is_of_no_effect(const std::string& path) {
   });
 }
 
-// The paths of those that nobody reads and nothing names, a line each.
+// The paths of elements that nobody reads and nothing names, one per line.
 inline std::string silent_ones(const std::function<bool(const std::string&)>& wanted,
                                const Loader& loader) {
   std::set<std::string> named;  // whose parts say no more

@@ -1,4 +1,4 @@
-// Taking callbacks back, and what they throw.
+// Cancelling callbacks, and what they throw.
 #include "callbacks.h"
 
 #include <cstdio>

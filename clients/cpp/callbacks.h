@@ -1,4 +1,4 @@
-// Callbacks that can be taken back while other threads call them.
+// Callbacks that can be cancelled while other threads call them.
 #pragma once
 
 #include <algorithm>
@@ -25,7 +25,7 @@ class CallbackCore {
   // May be called from the callback itself.
   void close();
   bool closed() const { return closed_; }
-  // What is to be done when it was taken back.
+  // Called once it was cancelled.
   void at_close(std::function<void()> leave) { leave_ = std::move(leave); }
 
  protected:

@@ -61,7 +61,7 @@ bool UnixTransport::receive(std::chrono::milliseconds timeout, const Receiver& r
     }
     return false;
   }
-  // Being woken takes as long as a small world's step: it is mostly there before one would sleep.
+  // Waking a thread takes as long as a step of a small world: poll before sleeping.
   static const bool may_look_again = std::thread::hardware_concurrency() > 1;
   const auto sleep_at = std::chrono::steady_clock::now() + kLookTime;
   do {

@@ -54,7 +54,7 @@ struct Socket {
   uint16_t port() const { return ntohs(address.sin_port); }
 };
 
-// What was sent and does not come was lost, as a socket on loopback has nowhere else to lose it.
+// A datagram that was sent and does not arrive was lost: on loopback only the socket can lose it.
 TEST(DatagramLoss, IsWhatAListenerMissed) {
   constexpr int kSent = 200;
   const Socket listener, sender;

@@ -1,7 +1,6 @@
-// LCM's multicast taken apart: datagrams written by hand after LCM's format, and others that mean
-// harm.
+// The parser of LCM's multicast: datagrams written by hand in LCM's format, and malicious ones.
 //
-// Messages of LCM's own to and from a server come in the wire tests (tests/clients, tests/cli).
+// LCM's own messages to and from a server are tested by the wire tests (tests/clients, tests/cli).
 #include "bus/multicast_receiver.h"
 
 #include <algorithm>

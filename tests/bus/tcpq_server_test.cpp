@@ -1,4 +1,4 @@
-// The tcpq server over loopback, against LCM's own client and against connections that mean harm.
+// The tcpq server over loopback, against LCM's own client and against malicious connections.
 #include "bus/tcpq_server.h"
 
 #include <chrono>
@@ -69,7 +69,7 @@ struct Stock {
   }
 };
 
-// How many messages the client has, once all are there that were published so far.
+// The number of messages that the client has, once all that were published so far have arrived.
 int settled(Served& served, const Stock& client, const std::string& channel) {
   const std::vector<uint8_t> marker(10);
   served.publish(channel, marker);
@@ -91,8 +91,7 @@ struct Raw {
   bool send(const std::vector<uint8_t>& bytes) const {
     return ::send(socket.get(), bytes.data(), bytes.size(), MSG_NOSIGNAL) >= 0;
   }
-  // Reads what comes until nothing does for so long (ms, above 0); true at the end of the
-  // connection.
+  // Reads until nothing arrives for that long (ms, above 0); true at the end of the connection.
   bool closed(int ms) const {
     timeval time{ms / 1000, ms % 1000 * 1000};
     ::setsockopt(socket.get(), SOL_SOCKET, SO_RCVTIMEO, &time, sizeof time);
@@ -129,8 +128,8 @@ TEST(TcpqServer, ServesStockClientsBothWays) {
   EXPECT_EQ(served.server.failed(), 0u);
 }
 
-// Small messages do not wait for acknowledgements (Nagle's algorithm): of the sockets of this
-// process, those that the server accepted.
+// Small messages must not wait for acknowledgements (Nagle's algorithm): checks the sockets that
+// the server in this process has accepted.
 TEST(TcpqServer, SendsAtOnce) {
   Served served;
   Stock client(served.url, "out");
@@ -247,7 +246,7 @@ TEST(TcpqServer, BindsToItsHostAlone) {
   }
 }
 
-// Those that mean harm. After each, a stock client still gets what it asks for.
+// Malicious peers. After each of them a stock client still gets what it asks for.
 class TcpqHostile : public ::testing::Test {
  protected:
   void TearDown() override {
@@ -314,7 +313,7 @@ TEST_F(TcpqHostile, AThousandSilentConnections) {
   EXPECT_TRUE(soon([&] { return served.server.connections() == 1000; }));
 }
 
-// A process that holds all places, as subscribers that read nothing; ends with its object.
+// A process that takes all places with subscribers that never read; it ends with its object.
 struct Crowd {
   FileHandle end;
   pid_t process = -1;

@@ -1,5 +1,5 @@
-// tcpq's frames and channel patterns, against bytes written out by hand and what a stock LCM client
-// sends; the ring.
+// tcpq's frames and channel patterns, against bytes written by hand and bytes that a stock LCM
+// client sends; the ring.
 #include "bus/tcpq_wire.h"
 
 #include <random>
@@ -166,7 +166,7 @@ TEST(MessageRing, KeepsTheNewest) {
     all.emplace_back(i, Bytes(random() % (ring.largest() + 1), static_cast<uint8_t>(i)));
     places.push_back(ring.end());
     ASSERT_TRUE(ring.append(i, all.back().second));
-    // What is left is the end of what came, whole and in order, and at least the last message.
+    // What is left is the end of the stream, complete and in order, and at least the last message.
     size_t kept = 0;
     for (uint64_t place = ring.begin(); place < ring.end(); ++kept) place = ring.at(place).next;
     ASSERT_GE(kept, 1u);

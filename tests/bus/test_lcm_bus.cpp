@@ -69,8 +69,7 @@ TEST(ChannelPatterns, OneForNamesThatCountUp) {
     EXPECT_FALSE(std::regex_match("oddxname/move", std::regex(pattern)));
 }
 
-// Somebody accepts, and ends each connection at once: between one and the next there is a pause,
-// which grows.
+// The peer accepts and closes each connection at once: the pause between attempts grows.
 TEST(LcmBus, LooksForALostServerWithPauses) {
   const FileHandle listener(::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0));
   sockaddr_in address{};

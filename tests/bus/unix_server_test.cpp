@@ -1,4 +1,4 @@
-// The Unix-domain socket: whose it is, that nothing is lost, and clients that mean harm.
+// The Unix domain socket: its owner, that nothing is lost, and malicious clients.
 #include "bus/unix_server.h"
 
 #include <condition_variable>
@@ -63,7 +63,7 @@ struct Served {
 struct Client {
   UnixConnection connection;
   std::vector<std::pair<std::string, std::string>> came;
-  // Subscribed when the server has taken what follows the subscription.
+  // Returns when the server has received what follows the subscription, and thus the subscription.
   Client(Served& served, const std::vector<std::string>& channels)
       : connection(served.folder.url().host) {
     size_t before = 0;

@@ -1,4 +1,4 @@
-// One server an address: claims, and servers that meet all the same.
+// One server per address: claims, and servers that share an address in spite of them.
 #include "bus/url_claim.h"
 
 #include <gtest/gtest.h>
@@ -92,7 +92,7 @@ TEST(RivalWatch, NamesEachRivalOnceAndNeverItself) {
   ASSERT_EQ(said.size(), 1u);
   EXPECT_NE(said[0].find("run 22, world hall?2; this one is run 11"), std::string::npos) << said[0];
   EXPECT_EQ(heard, std::vector<std::string>{"p3at/velocity"});
-  // What only looks like an info, and a crowd.
+  // Messages that only look like an info, and a large number of servers.
   fake.handler("ruedo/info", rival.data(), 20);
   fake.handler("ruedo/info", info_of(33).data(), 30);
   for (int64_t id = 100; id < 200; ++id)

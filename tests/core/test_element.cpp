@@ -1,5 +1,5 @@
-// Typed reads: what is accepted, what is refused, and that errors say place, element, value and
-// what is allowed.
+// Typed reads: what is accepted, what is refused, and that errors name the place, the element, the
+// value and what is allowed.
 #include "ruedo/element.h"
 
 #include <clocale>

@@ -1,6 +1,6 @@
-// The elementary functions against MPFR with 200 bits: within 1 ulp, over the ranges that are met
-// and far outside; what C's Annex F says of zeros, infinities and NaN; and that Eigen calls the
-// same.
+// The elementary functions against MPFR with 200 bits: within 1 ulp, over the usual ranges and far
+// outside; the values that C's Annex F prescribes for zeros, infinities and NaN; and that Eigen
+// uses the same functions.
 #include "ruedo/math.h"
 
 #include <algorithm>
@@ -143,7 +143,7 @@ TEST(ArcTangentOfTwo, KnowsZerosAndInfinities) {  // C11, F.10.1.4
   EXPECT_TRUE(std::isnan(math::atan2(std::nan(""), 1.0)));
 }
 
-// Angles of every size, the limits between which the library goes other ways among them.
+// Angles of every size, among them the limits between the branches of the implementation.
 TEST(SineAndCosine, AtOnceAreTheSameBits) {
   RandomStream random(7, 1);
   std::vector<double> angles{0.0, -0.0, 0x1p-27, 0x1.6a09ep-27, 0x1p-26, M_PI / 4, M_PI / 2, M_PI};

@@ -86,8 +86,8 @@ TEST(NormalQuantile, IsOddAboutOneHalf) {
     EXPECT_EQ(normal_quantile(p), -normal_quantile(1.0 - p)) << p;
 }
 
-// Many at once are the same draws, wherever in the stream they begin and end; the stream goes on as
-// if nothing was.
+// Drawing many at once gives the same values, wherever in the stream they begin and end, and the
+// stream continues normally.
 TEST(RandomStream, ManyGaussiansAreTheSameOneByOne) {
   for (const int before : {0, 1, 2, 3, 4, 5}) {
     for (const size_t count : {0u, 1u, 2u, 3u, 7u, 8u, 9u, 24u, 31u, 32u, 33u, 64u, 181u, 1000u}) {
@@ -159,7 +159,7 @@ TEST(RandomSource, IsKeyedBySeedRobotDeviceAndSample) {
   EXPECT_EQ(keys.size(), 4000u);
 }
 
-// Correlation between neighbours of every kind: within 99.9 % of what independent normals give.
+// Correlation between neighbours of every kind: within the 99.9 % interval of independent normals.
 TEST(RandomSource, ReseededItIsWhatItWouldHaveBeenFromTheStart) {
   RandomSource source(1, "p3at", "lrf");
   const RandomSource copy = source;

@@ -1,4 +1,4 @@
-// Each test enters a sandbox in a child process, for nothing takes it back.
+// Each test enters a sandbox in a child process, because a sandbox cannot be left.
 #include "core/sandbox.h"
 
 #include <cerrno>
@@ -88,7 +88,7 @@ TEST_F(SandboxTest, ReachesTheListedFilesAndNoOthers) {
   }
 }
 
-// A link is followed to where it leads.
+// A symbolic link is followed to its target.
 TEST_F(SandboxTest, LinksLeadNowhere) {
   ASSERT_EQ(symlink(outside_.c_str(), (folder_.path() + "/read/link").c_str()), 0);
   EXPECT_EQ(within(sandbox_, [&] { return opened(folder_.path() + "/read/link", O_RDONLY); }),

@@ -1,4 +1,4 @@
-// The schemas against what lcm-gen made of the same files, and against bytes that lie.
+// The schemas against what lcm-gen makes of the same files, and against malformed bytes.
 #include <gtest/gtest.h>
 
 #include <map>
@@ -128,7 +128,7 @@ TEST(Schema, RefusesWhatIsNotOneWholeMessage) {
   EXPECT_FALSE(well_formed(schema, cut)) << "a zero within a string";
 }
 
-// Every single-byte change must be survived (the sanitizers look on), and the two walks must agree.
+// Every single-byte change must be handled (the sanitizers watch), and the two walks must agree.
 TEST(Schema, SurvivesEveryByteChange) {
   const Schema& schema = *find_schema("contact_t");
   const auto good = encode(two_contacts());

@@ -119,7 +119,7 @@ TEST(SampleClock, AMillionHoursDoNotOverflow) {
   EXPECT_EQ(fast.samples_before(seconds * 1'000'000 + 1), k + 1);
 }
 
-// The two directions are inverse of each other for many rates, steps and phases.
+// The two directions are inverses of each other for many rates, steps and phases.
 TEST(SampleClock, StepOfAndSamplesBeforeAgree) {
   for (const char* rate : {"0.1", "1", "7.3", "29.97", "33.333333333", "59.94", "100", "166.7"}) {
     for (const int64_t step_us : {100, 999, 5000, 50'000}) {

@@ -1,4 +1,4 @@
-// Texts that hold what is not text.
+// Texts that contain bytes that are not UTF-8.
 #include "core/utf8.h"
 
 #include <gtest/gtest.h>

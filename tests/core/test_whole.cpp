@@ -1,4 +1,4 @@
-// From floating-point numbers to whole ones, at the edges of each type; and the table of
+// Conversions from floating point to integers at the limits of each type, and the table of
 // quantities.
 #include "core/whole.h"
 

@@ -73,7 +73,7 @@ TEST(Identity, OfOtherMessagesChangesNothing) {
 }
 
 TEST(Identity, OfARequestIsItsWritersNumberOrTheReaderThatWaits) {
-  // As Cyclone leaves it on such a machine: words of GUIDs are turned.
+  // As Cyclone leaves it on such a machine: the words of GUIDs are byte-swapped.
   static_assert(std::endian::native == std::endian::little);
   Bytes plain = joined({kHeader, kTime, data(5, {})});
   for (const std::ptrdiff_t word : {8, 12, 16, 20 + 12 + 12})
@@ -93,8 +93,7 @@ TEST(Identity, OfARequestIsItsWritersNumberOrTheReaderThatWaits) {
   }
 }
 
-// Every message that ends too early, and every one with a byte that is another, is read without a
-// fault.
+// Every truncated message, and every message with one changed byte, is read without a fault.
 TEST(Identity, OfDamagedMessagesIsNone) {
   const Bytes message = joined({kHeader, data(7, joined({kRelated, kSentinel}))});
   for (size_t size = 0; size < message.size(); ++size)

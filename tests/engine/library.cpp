@@ -1,5 +1,5 @@
-// ruedo::engine as C++ programs use it: prints its messages, which test_library.py holds against
-// the Python module's, after looking at its arrays, errors and resets.
+// Uses ruedo::engine as C++ programs do: checks its arrays, errors and resets, then prints its
+// messages, which test_library.py compares with those of the Python module.
 #include <cstdio>
 #include <exception>
 #include <limits>

@@ -1,6 +1,6 @@
-// What one input may cost: CPU time is measured, since a slow input is a finding, too, and wall
-// time would depend on what else the machine does. Memory is libFuzzer's to measure
-// (-malloc_limit_mb, -rss_limit_mb).
+// What one input may cost. CPU time is measured here, since a slow input is a finding, too, and
+// wall time would depend on the machine's load. libFuzzer measures the memory (-malloc_limit_mb,
+// -rss_limit_mb).
 #pragma once
 
 #include <cstdio>

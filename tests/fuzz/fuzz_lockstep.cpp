@@ -1,6 +1,6 @@
-// Conversations in lockstep: bytes say which of four clients asks what, with which numbers. However
-// the other three behave, the run never goes beyond what the first has granted, nor farther ahead
-// than is allowed; and once they have left, the first gets what it grants.
+// Conversations in lockstep: the input says which of four clients sends which request with which
+// numbers. However the other three behave, the run never goes beyond what the first has granted,
+// nor farther ahead than allowed; and once they have left, the first gets what it grants.
 #include <chrono>
 #include <cstdio>
 #include <cstdlib>
@@ -64,13 +64,13 @@ class FakeGate : public Gate {
   bool is_paused = false;
 };
 
-// The input, taken apart; zeros after its end.
+// The input, decoded; zeros after its end.
 class Choices {
  public:
   Choices(const uint8_t* data, size_t size) : data_(data), end_(data + size) {}
   bool any() const { return data_ < end_; }
   uint8_t byte() { return any() ? *data_++ : uint8_t{0}; }
-  // Mostly near `usual`; sometimes any number at all.
+  // Mostly near `usual`; sometimes any number.
   int64_t number(int64_t usual) {
     const uint8_t kind = byte();
     if (kind < 160) return usual;
@@ -218,14 +218,14 @@ class Conversation {
     return body;
   }
 
-  // The first client's, who does all as it should be.
+  // The first client, which behaves correctly.
   void good_grants(int64_t from, int64_t until) {
     last_code_ = reply_t::OK;  // there is no reply to a grant that is taken at once
     send(request_t::GRANT, 0, next(0), engine::encoded(granting(from, until, published_)));
     if (last_code_ != reply_t::OK) fail(("a good grant is refused: " + last_text_).c_str());
   }
   void good_steps(int64_t steps) {
-    // A pause holds it up, and so does a client that has granted less: then its grants wait.
+    // A pause delays it, and so does a client that has granted less: then its grants wait.
     if (granted_ - published_ > kLongestGrant) return;
     good_grants(granted_, granted_ + steps);
     granted_ += steps;
@@ -281,7 +281,7 @@ class Conversation {
     control_.serve();
   }
 
-  // Some seconds later; who was silent for ten has lost its lease. The first client is heard.
+  // Some seconds pass; whoever was silent for ten has lost its lease. The first client is heard.
   void attend(int seconds) {
     std::vector<Session> sessions = control_.sessions().list();
     const auto now = std::chrono::steady_clock::now() + std::chrono::seconds(clock_s_ += seconds);

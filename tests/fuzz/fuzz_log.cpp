@@ -1,4 +1,4 @@
-// Logs. The first byte says what the others are: 0: a file; else: the body of its header,
+// Logs. If the first byte is 0, the rest is a file; otherwise it is the body of the log's header,
 // ruedo/header, whose files are looked for.
 #include <cstring>
 #include <string>

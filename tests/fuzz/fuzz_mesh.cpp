@@ -1,6 +1,5 @@
-// Meshes: the first byte says what the others are. 0 to 7: a file of one of the known kinds,
-// through the importer in its child process; else: an entry of the cache, as it is unpacked in the
-// server.
+// Meshes. If the first byte is 0 to 7, the rest is a file of one of the known formats, for the
+// importer in its child process; otherwise it is an entry of the cache, as the server unpacks it.
 #include <stdexcept>
 
 #include "model/mesh_format.h"

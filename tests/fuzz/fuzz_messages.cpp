@@ -1,5 +1,5 @@
-// Messages from the network: what is decoded encodes to the same bytes again, and no bytes do harm.
-// The fingerprint is put in, so that every input reaches the decoders.
+// Messages from the network: what decodes encodes to the same bytes again, and no bytes do harm.
+// The fingerprint is filled in, so that every input reaches the decoders.
 #include <cstdlib>
 #include <cstring>
 #include <vector>

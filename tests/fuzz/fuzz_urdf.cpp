@@ -1,5 +1,5 @@
-// Any text as a robot: the same, with <robot> around what does not begin so, that the mutations
-// stay in the URDF reader.
+// Any text as a robot, with <robot> around it where it does not begin so, to keep the mutations
+// within the URDF reader.
 #include <string>
 
 #include "budget.h"

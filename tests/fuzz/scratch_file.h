@@ -1,4 +1,4 @@
-// A file of bytes for what reads files only; one for each process, written over and over.
+// A file of bytes, for functions that only read files; one for each process, overwritten each time.
 #pragma once
 
 #include <unistd.h>

@@ -67,7 +67,7 @@ class Hash {
   EVP_MD_CTX* context_;
 };
 
-// Every robot wanders on a way of its own; every so often one stops or backs off.
+// Every robot wanders on a path of its own; every so often one stops or backs off.
 void drive(engine::Engine& engine, int turn) {
   std::vector<double> commands;
   for (size_t i = 0; i < engine.driven().size(); ++i) {

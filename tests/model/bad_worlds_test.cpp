@@ -1,4 +1,4 @@
-// Wrong world files, each with the whole error that its author reads.
+// Faulty world files, each with the complete error that its author reads.
 #include <gtest/gtest.h>
 
 #include "model/load.h"
@@ -352,8 +352,8 @@ TEST(BadFiles, IncludesThatMultiplyAreRefused) {
             std::string::npos);
 }
 
-// From a file as from a text: two folders up is out, by whatever way, unless the user lets absolute
-// paths in.
+// From a file as from a text: two folders up is refused, by whatever path, unless the user allows
+// absolute paths.
 TEST(BadFiles, NothingIsReadOutsideTheSearchPath) {
   TemporaryFolder folder;
   const std::string model =
@@ -386,7 +386,8 @@ TEST(BadFiles, NothingIsReadOutsideTheSearchPath) {
     options.allow_absolute = true;
     EXPECT_EQ(load_world(path, options)->models.size(), why == absolute ? 1u : 0u) << uri;
   }
-  // Absolute paths into the search folders, and links that lead out, are the user's own.
+  // Absolute paths into the search folders, and links that lead out of them, are the user's own
+  // choice.
   std::filesystem::create_symlink(secret, folder / "a/b/link.sdf");
   for (const std::string& uri : {folder / "a/b/near.sdf", std::string("link.sdf")}) {
     EXPECT_EQ(load_world(folder.write("a/b/world.sdf",

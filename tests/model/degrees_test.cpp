@@ -44,7 +44,7 @@ TEST(Degrees, OfAPoseThatSaysSoAndRadiansAreNotNamed) {
     EXPECT_THAT(of_pose(degrees, "0 0 0.5 0 0 90"), IsEmpty()) << degrees;
   EXPECT_EQ(of_pose(" degrees='false'", "0 0 0.5 0 0 90").size(), 1u);
   EXPECT_THAT(of_pose(" rotation_format='quat_xyzw'", "90 45 10 0 0 0 1"), IsEmpty());
-  // Places may be any number; a turn is 6.28 rad, and multiples of 5 below it are plausible.
+  // Positions may be any number; a turn is 6.28 rad, and multiples of 5 below it are plausible.
   for (const char* text : {"90 45 180 0 0 0", "0 0 0 5 -5 0", "0 0 0 0 0 6.283185307179586",
                            "0 0 0 0 0 7.853981633974483", "0 0 0 0 0 91.5", "0 0 0 0 0 7"})
     EXPECT_THAT(of_pose("", text), IsEmpty()) << text;
@@ -55,7 +55,7 @@ TEST(Degrees, OfStopsAreNamedWhereTheJointTurns) {
               ElementsAre(std::string("<lower>-180</lower>") + kRadians + "write radians",
                           std::string("<upper>135</upper>") + kRadians + "write radians"));
   EXPECT_THAT(of_joint("prismatic", "-180", "135"), IsEmpty());
-  // What is never reached.
+  // Limits that do not look like degrees.
   for (const char* far : {"1e16", "1000", "100", "50", "10", "360.5", "3.14", "inf"})
     EXPECT_THAT(of_joint("revolute", std::string("-") + far, far), IsEmpty()) << far;
 }

@@ -64,7 +64,7 @@ TEST(DriveKinds, ACarTurnsAboutItsRearAxle) {
   EXPECT_TRUE(layout.wheels[4].steers);
   EXPECT_EQ(layout.wheels[0].on, 4);  // the front left one hangs on the left knuckle
   EXPECT_EQ(layout.wheels[1].on, -1);
-  // Turned by a quarter and then rolled: the wheel's axle points ahead, whatever it has rolled;
+  // Turned by a quarter and then rolled: the wheel's axle points ahead, however far it has rolled;
   // both knuckles turn the same way.
   std::vector<double> angles(6, 0.0);
   angles[4] = angles[5] = M_PI / 2;
@@ -190,7 +190,7 @@ TEST(DrivePlugins, OfEveryKindAreTranslated) {
             Steering::mecanum);
 }
 
-// A number that is none leaves out the drive, not the model.
+// A value that is not a number leaves out the drive, not the model.
 TEST(DrivePlugins, WithAnOddNumberLeaveTheModel) {
   const auto world =
       world_of("<model name='m'><link name='base'/>" + wheel("l", "0 0.2 0.1 0 0 0") +
@@ -246,8 +246,8 @@ TEST(DrivePlugins, TheSlotcarOfRmfDrives) {
   EXPECT_EQ(whole->models[0].model->drive->acceleration, 0.05);
 }
 
-// A vendor's own library, with the elements that others have, drives; one without wheels of the
-// model does not.
+// A vendor's plugin library drives if it has the usual elements; one without wheels of the model
+// does not.
 TEST(DrivePlugins, OneThatIsNotKnownDrivesByTheWheelsThatItNames) {
   const auto robot = [](const std::string& file, const std::string& inside) {
     return world_of("<model name='m'><link name='base'/>" + wheel("l", "0 0.2 0.1 0 0 0") +
@@ -276,7 +276,7 @@ TEST(DrivePlugins, OneThatIsNotKnownDrivesByTheWheelsThatItNames) {
   EXPECT_THAT(texts(*other), ElementsAre("plugins are not loaded: libacme_doors.so"));
 }
 
-// A name alone makes no drive, and each plugin has its class.
+// A name alone makes no drive, and each plugin has its own class.
 TEST(DrivePlugins, AreKnownByTheirLibraryOrTheirClass) {
   const auto kind = [](const std::string& name, const std::string& filename) {
     Element plugin;

@@ -59,7 +59,7 @@ TEST(Environment, OldFilesHaveTheFieldInTheirPhysics) {
   EXPECT_EQ(*world->environment.magnetic_field, Vec3(0, 0, 1e-5));
 }
 
-// What is wrong is named and left out; the world goes on.
+// Faulty elements are reported and left out; the world still loads.
 TEST(Environment, WhatIsWrongIsNamed) {
   struct Case {
     const char* inside;

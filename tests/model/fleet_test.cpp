@@ -1,4 +1,5 @@
-// <ruedo:fleet> and --drive: places by hand, room, names, one model for all, and what is refused.
+// <ruedo:fleet> and --drive: positions computed by hand, room, names, a shared model, and what is
+// refused.
 #include <cmath>
 #include <numbers>
 

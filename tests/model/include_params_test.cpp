@@ -1,4 +1,4 @@
-// <experimental:params> of an <include>: what of the included model becomes another.
+// <experimental:params> of an <include>: which parts of the included model change.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-// What the controllers of joints in Gazebo's and ROS's files become.
+// How joint controllers in Gazebo's and ROS's files are read.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -98,7 +98,7 @@ struct Named {
   std::string library, name, inside, text;
 };
 
-// Of gz-sim's systems and of Gazebo Classic's plugins: what acts in Gazebo and not here.
+// Systems of gz-sim and plugins of Gazebo Classic that act in Gazebo but not here.
 TEST(PluginParameters, AreNamed) {
   const std::string gz = "gz::sim::systems::";
   const Named cases[] = {
@@ -259,7 +259,7 @@ TEST(RosGains, OfAJointsOwnParameters) {
   EXPECT_EQ(axis(*world, 0).position_pid.value().i_max, 5.0);
 }
 
-// As gazebo_ros_control and gz_ros2_control have it: arms do not fall before the first command.
+// As in gazebo_ros_control and gz_ros2_control: arms do not fall before the first command.
 TEST(RosGains, JointsByPositionOrVelocityStayWhereTheyBegin) {
   TemporaryFolder folder;
   const auto world = load_world(folder.write(

@@ -1,5 +1,5 @@
-// Occupancy maps: a world cut by hand, the round trip through map_server's files, ArMap, and wrong
-// files.
+// Occupancy maps: a cut through a world computed by hand, the round trip through map_server's
+// files, ArMap, and faulty files.
 #include <fstream>
 #include <sstream>
 
@@ -27,7 +27,7 @@ std::shared_ptr<const WorldModel> load(const std::string& models) {
   return load_world_text(world_of(models), "/nowhere/w.sdf");
 }
 
-// As text, the far row first, as one looks at a map.
+// As text, with the far row first, as one looks at a map.
 std::string drawn(const OccupancyGrid& grid) {
   std::string text;
   for (int row = grid.height - 1; row >= 0; --row) {
@@ -121,7 +121,7 @@ TEST(Map, MapServerFile) {
   EXPECT_NEAR(walls[0].y, 20.25, 1e-12);
   EXPECT_NEAR(walls[0].length, 0.5, 1e-12);
   EXPECT_NEAR(walls[0].width, 1.0, 1e-12);
-  // A raw map has the per cent of being occupied, and 255 for what is unknown.
+  // A raw map holds the occupancy in per cent, and 255 for unknown.
   folder.write("raw.pgm", std::string("P5\n3 1\n255\n") + "\x64\xff" + std::string(1, '\0'));
   EXPECT_EQ(
       drawn(read_map(folder.write(

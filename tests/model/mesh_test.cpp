@@ -364,8 +364,8 @@ TEST_F(Meshes, MalformedFilesAreFaults) {
   std::string far = stl();
   far.replace(far.find("vertex 0.0"), 15, "vertex 1e30 0 0");
   EXPECT_NE(fault_of(folder.write("far.stl", far), import()), "");
-  // A cut file is a mesh or a fault, never more. This one, cut in its header, keeps assimp busy for
-  // ever.
+  // A truncated file is a mesh or a fault, nothing else. This one, truncated in its header, keeps
+  // assimp busy for ever.
   MeshImport impatient = import();
   impatient.cpu_limit_s = 1;
   EXPECT_NE(fault_of(folder.write("cut.ply", ply().substr(0, 151)), impatient), "");
@@ -451,7 +451,7 @@ TEST(MadeMeshes, HeightmapOfTwoByTwo) {
   EXPECT_THROW(heightmap(folder.write("x.png", "no picture"), {1, 1, 1}), std::runtime_error);
 }
 
-// A few bytes that ask for gigabytes: the head is read before anything is decoded.
+// A few bytes that announce gigabytes: the header is checked before anything is decoded.
 TEST(Pictures, TooLargeByTheirHeads) {
   const std::string big("\x00\x00\xEA\x60", 4), small("\x00\x00\x00\x10", 4);  // 60000 and 16
   const auto png = [](const std::string& w, const std::string& h) {

@@ -56,8 +56,8 @@ TEST(Poses, RelativeFramesByHand) {
   EXPECT_LT(((m.X_WM * b.X_ML).translation - Vec3(8, 1, 1)).norm(), 1e-12);
 }
 
-// 100 000 frames, each placed on the next: nothing follows them by recursion, nor each from its
-// end.
+// 100 000 frames, each relative to the next: they are followed neither by recursion nor each from
+// its own end.
 TEST(Poses, AChainOfFramesMayBeOfAnyLength) {
   constexpr int kFrames = 100'000;
   std::string frames;
@@ -229,7 +229,7 @@ TEST(Names, ASecondThingIsRenamedAndTold) {
       (std::vector<std::string>{"a second thing of the name 'box'; this one is called 'box_2'"}));
 }
 
-// What grows with the square of their number would take minutes.
+// An algorithm that is quadratic in their number would take minutes.
 TEST(Names, ManyThingsOfOneNameLoadAtOnce) {
   std::string boxes;
   for (int i = 0; i < 20'000; ++i) boxes += "<model name='box'><link name='l'/></model>";
@@ -252,7 +252,7 @@ TEST(Model, SpringsOfJointsAreRead) {
   EXPECT_EQ(axis.spring_reference, 0.2);
 }
 
-// A surface with all that it can say.
+// A surface with all its elements.
 TEST(Model, SurfacesAreRead) {
   const auto world = world_of(
       "<model name='m'><link name='a'><collision "
@@ -437,7 +437,7 @@ TEST(Layout, KinematicRobotIsOneBody) {
   EXPECT_TRUE(layout.wheels[0].left);
   EXPECT_EQ(layout.wheels[0].axis_in_L, Vec3(0, 1, 0));
   EXPECT_LT((layout.wheels[0].center_in_L - Vec3(0.2, 0.25, 0)).norm(), 1e-12);
-  // A wheel's axle stays where it is however the wheel turns.
+  // A wheel's axle keeps its direction however far the wheel turns.
   const int left = layout.wheels[0].link;
   for (const double angle : {0.0, 1.0, 10.0}) {
     const Pose X_BL = layout.link_in_body(LinkIndex(left), {angle, 0});

@@ -57,7 +57,7 @@ TEST(OddElements, APlaneOfThreeNumbers) {
               ElementsAre("<size> of a plane has two numbers; the third is left out"));
 }
 
-// A frame yields to what has its name, wherever it stands.
+// A frame gives way to another thing of the same name, wherever that is.
 TEST(OddElements, AFrameNamedLikeSomethingElse) {
   const auto world = world_of("<frame name='box'/>" + std::string(kBox));
   ASSERT_EQ(world->models.size(), 1u);
@@ -169,7 +169,7 @@ TEST(OddElements, WhatUrdfDoesNotHaveIsNamed) {
   EXPECT_EQ(world->findings[1].source.line, 2);
 }
 
-// A list of their addresses, with the command that fetches them, instead of a text each.
+// One list of their addresses with the command that fetches them, instead of a text for each.
 TEST(OddElements, MissingModelsOfFuelAreOneList) {
   const auto world = world_of(
       "<include><uri>https://fuel.gazebosim.org/1.0/OpenRobotics/models/No Such "
@@ -180,7 +180,7 @@ TEST(OddElements, MissingModelsOfFuelAreOneList) {
   EXPECT_THAT(world->findings[1].element, HasSubstr("models/Nor This"));
 }
 
-// assimp takes a colour with a blank before it for none, and with it gave up the mesh.
+// assimp takes a colour with a leading blank for no colour, and then rejects the whole mesh.
 TEST(OddElements, ColladaWithABlankBeforeItsColours) {
   TemporaryFolder folder;
   folder.write(
@@ -193,7 +193,7 @@ TEST(OddElements, ColladaWithABlankBeforeItsColours) {
 <triangles material="s" count="4"><input semantic="VERTEX" source="#v" offset="0"/><p> 0 2 1 0 1 3 0 3 2 1 2 3</p></triangles></mesh></geometry></library_geometries>
 <library_visual_scenes><visual_scene id="vs"><node id="n"><instance_geometry url="#g"><bind_material><technique_common><instance_material symbol="s" target="#m"/></technique_common></bind_material></instance_geometry></node></visual_scene></library_visual_scenes>
 <scene><instance_visual_scene url="#vs"/></scene></COLLADA>)");
-  // And by an address that begins at the folder above the models.
+  // Also by an address that begins at the folder above the models.
   const auto world =
       load_world(folder.write("models/bench/model.sdf",
                               "<sdf version='1.6'><model name='bench'><link name='l'><visual "

@@ -23,7 +23,7 @@ const char* kRobot = R"(<sdf version='1.9'><model name='bot'>
 <ruedo:drive><ruedo:left_joint>jl</ruedo:left_joint><ruedo:right_joint>jr</ruedo:right_joint></ruedo:drive>
 </model></sdf>)";
 
-// What the lidar's kind says that a file may leave out.
+// The elements that the lidar's kind allows a file to leave out.
 const RegisterSensor kLidar{{.module = "lidar",
                              .order = 0,
                              .types = {"lidar"},
@@ -75,7 +75,7 @@ class Options : public testing::Test {
   std::string world;
 };
 
-// Without the free place that it names.
+// The error without the free place that it suggests.
 std::string without_place(const std::string& error) {
   return error.substr(0, error.find("; the nearest"));
 }

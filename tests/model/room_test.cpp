@@ -1,4 +1,4 @@
-// What a question for room costs: the things in the world count, not the metres that they cover.
+// The cost of finding room: it depends on the things in the world, not on the metres they cover.
 #include <gtest/gtest.h>
 
 #include "model/load.h"
@@ -24,7 +24,7 @@ class Rooms : public testing::Test {
   TemporaryFolder folder;
 };
 
-// Looked for cell by cell of 2 m, the room of 900 km took hours.
+// A search by cells of 2 m took hours for the room of 900 km.
 TEST_F(Rooms, OfSomethingHugeIsFoundAtOnce) {
   const auto world =
       load(box("far", "1000 0 0 0 0 0", "1 1 1") + box("high", "0 0 9 0 0 0", "1 1 1"));
@@ -36,7 +36,7 @@ TEST_F(Rooms, OfSomethingHugeIsFoundAtOnce) {
   EXPECT_DOUBLE_EQ(standing_on(*world, huge, 0, 0, 0).translation.z(), 0.5);
 }
 
-// Each of them in every cell of the mesh that it covers was gigabytes.
+// Storing each of them in every cell that the mesh covers took gigabytes.
 TEST_F(Rooms, AmongTrianglesThatCoverTheWholeMesh) {
   constexpr int kTriangles = 100000;
   std::string mesh;

@@ -1,4 +1,5 @@
-// Drives that stand in the YAML of ros_control and ros2_control, and drives that stand nowhere.
+// Drives that the YAML files of ros_control and ros2_control define, and drives that no file
+// defines.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -65,8 +66,8 @@ std::vector<std::string> names(const WorldModel& world,
   return list;
 }
 
-// ROS 1: the package beside has the file, nobody names it; radius and separation are the robot's
-// own, multiplied.
+// ROS 1: the file is in a neighbouring package and nothing names it; radius and separation are the
+// robot's own, times the multipliers.
 TEST(RosControl, DiffDriveOfRos1) {
   TemporaryFolder folder;
   folder.write("bot_description/package.xml", package("bot_description"));
@@ -116,8 +117,8 @@ bot_velocity_controller:
   EXPECT_DOUBLE_EQ(drive.odometry_rate.hz(), 40.0);
 }
 
-// ROS 2: the plugin names the file as the author's machine had it; names and types are apart; keys
-// with dots.
+// ROS 2: the plugin names the file by its path on the author's machine; names and types are
+// separate; keys contain dots.
 TEST(RosControl, DiffDriveOfRos2) {
   TemporaryFolder folder;
   folder.write("bot/package.xml", package("bot"));
@@ -300,7 +301,7 @@ TEST(Guess, TheFlagSaysItOtherwise) {
   EXPECT_EQ(drive_of(*world).left_joints.size(), 1u);
 }
 
-// An arm has no wheels, a cart of furniture no driver.
+// An arm has no wheels, and a cart that is furniture has no drive.
 TEST(Guess, WhatIsNoRobotIsNoneAfterwards) {
   TemporaryFolder folder;
   const auto arm = load_world(folder.write(

@@ -1,4 +1,4 @@
-// Worlds that were saved while they ran, in the words of both formats.
+// Worlds that were saved while they ran, in both formats.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -57,7 +57,7 @@ TEST(SavedState, PutsJointsBackByTheirPositions) {
       "</model_state></state>"));
 }
 
-// A drawer that is a third open; who follows it does so as before.
+// A drawer that is a third open; a joint that mimics it follows as before.
 TEST(InitialPosition, MovesWhatTheJointCarries) {
   const auto world = world_of(
       "<model name='m'><link name='a'/><link name='b'/><link name='c'/><joint name='j' "

@@ -88,8 +88,8 @@ TEST(Scene, OgreScriptsGiveColourAndTexture) {
   EXPECT_TRUE(texts(*world).empty());
 }
 
-// As Gazebo Classic saves a world whose models were moved. Names that the world lacks, and numbers
-// that are none, change nothing.
+// As Gazebo Classic saves a world whose models were moved. Names that the world does not have, and
+// values that are not numbers, change nothing.
 TEST(Scene, ASavedStateMovesItsModels) {
   const std::string model = "<link name='l'/></model>";
   const auto world =
@@ -116,7 +116,7 @@ TEST(Scene, ASavedStateMovesItsModels) {
                 "where the model has it"});
 }
 
-// Three by three heights of which the middle one is full: a pyramid of 2 m on a square of 4 m.
+// Three by three heights with a peak in the middle: a pyramid of 2 m on a square of 4 m.
 TEST(Scene, HeightmapsStandAtTheirPlaces) {
   TemporaryFolder folder;
   folder.write("hill.pgm", std::string("P5\n3 3\n255\n") + std::string("\0\0\0\0\xff\0\0\0\0", 9));

@@ -1,5 +1,5 @@
-// What a SPAWN request's text may reach: the world's folder and the models' folders, and nothing
-// else, said or unsaid.
+// What the text of a SPAWN request may reach: the world's folder and the models' folders, and
+// nothing else, explicitly or not.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 

@@ -1,5 +1,5 @@
-// What Ruedo does not simulate, as the files have it: each is named, and the rest of the world is
-// there.
+// What Ruedo does not simulate, as files write it: each element is reported, and the rest of the
+// world is loaded.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -170,7 +170,8 @@ TEST(Mimic, APluginOfClassicSaysWhoLeads) {
               testing::HasSubstr("'l' is none of the model's joints"));
 }
 
-// A leader that is not there, or follows its own follower, is an error; the joint moves on its own.
+// A leader that does not exist, or that follows its own follower, is an error; the joint then moves
+// on its own.
 TEST(Mimic, NobodyFollowsNobodyOrItself) {
   const auto finding = [](const std::string& leader) {
     const auto world = load_world_text(

@@ -1,6 +1,6 @@
-// What robots' files do in the wild: URDF with a root named world, values as attributes, packages
-// found by the folder they are in; arms without sensors; names with spaces; SDF with the elements
-// of its first versions.
+// Robot files as they are in the wild: URDF with a root link named world, values as attributes,
+// packages found by their folders; arms without sensors; names with spaces; SDF with elements of
+// its first versions.
 #include <cstdlib>
 
 #include <gtest/gtest.h>
@@ -64,7 +64,7 @@ TEST(Urdf, APlaceThatCannotBeReadIsNamedAndTheRobotStays) {
                 "6 joint two xyz=\"0 up 0\" of <axis> is not three numbers; 1 0 0 is taken"}));
 }
 
-// One faulty link or joint does not cost the robot: it is mended or left out, and named.
+// One faulty link or joint does not cost the robot: it is repaired or left out, and reported.
 TEST(Urdf, OneFaultyJointDoesNotCostTheRobot) {
   const std::string ends = "<parent link='base'/><child link='arm'/>", limit = "<limit lower='-1' ";
   struct Case {
@@ -120,7 +120,7 @@ TEST(Urdf, OneFaultyJointDoesNotCostTheRobot) {
   }
 }
 
-// A joint without limits is turned and slid as far as one likes.
+// A joint without limits may turn and slide without bounds.
 TEST(Urdf, AJointWithoutLimitsHasNone) {
   TemporaryFolder folder;
   const auto world = load_world(folder.write(
@@ -182,8 +182,8 @@ std::shared_ptr<const WorldModel> world_with(const TemporaryFolder& folder,
       folder.write("w.sdf", "<sdf version='1.9'><world name='w'>" + models + "</world></sdf>"));
 }
 
-// An arm without sensors is a robot: its joints can be told what to do. A door is none, until
-// somebody says so.
+// An arm without sensors is a robot: its joints take commands. A door is not, until the user says
+// so.
 TEST(Robots, AreModelsWhoseJointsTakeCommands) {
   TemporaryFolder folder;
   const std::string
@@ -241,7 +241,7 @@ TEST(Robots, NamesAreMadeFitForChannels) {
 }
 
 // auto="true": a box of 0.2 x 0.4 x 0.6 m and 500 kg/m^3, 1 m up; two spheres on a line; a cylinder
-// that lies.
+// on its side.
 TEST(AutoInertia, IsThatOfTheSolids) {
   TemporaryFolder folder;
   const auto world = [&](const std::string& inertial, const std::string& collisions) {

@@ -1,4 +1,4 @@
-// <joint> in <world>: models that it ties together are one.
+// <joint> in <world>: the models that it connects become one.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -51,7 +51,7 @@ TEST(WorldJoints, ARobotKeepsItsName) {
   EXPECT_EQ(world->models[0].model->sensors.at(0).name, "imu");
 }
 
-// The world itself may be the parent; what is no link of a model is named.
+// The world itself may be the parent; a name that is no link of a model is reported.
 TEST(WorldJoints, ToTheWorldAndToNothing) {
   const auto world = world_of(
       kGate +

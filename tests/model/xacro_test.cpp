@@ -1,4 +1,4 @@
-// xacro files: expanded without ROS, with the lines where things were written.
+// xacro files: expanded without ROS, keeping the lines in which things were written.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -49,7 +49,7 @@ TEST(Xacro, IsExpandedWithArgumentsAndPackages) {
   EXPECT_EQ(link_of(model, "left_box").source.str(),
             packages.folder / "somewhere/urdf/box.xacro:3");
   EXPECT_EQ(link_of(model, "base").source.line, 5);
-  // A log's header has to know all of them.
+  // The header of a log has to list all of them.
   EXPECT_THAT(world->files_read,
               testing::IsSupersetOf({packages.folder / "bot/urdf/bot.urdf.xacro",
                                      packages.folder / "somewhere/urdf/box.xacro"}));
@@ -85,7 +85,7 @@ TEST(Xacro, AnIncludeThatIsNotThereIsPassedOver) {
               ElementsAre("the include '$(find nowhere)/x.xacro' is not found; it is passed over"));
 }
 
-// Nobody has a folder of the name that stands in for a package that is not there.
+// Nobody has a folder with the name that replaces a missing package.
 TEST(Xacro, WhatLiesInAPackageThatIsNotThereIsNamedAsWritten) {
   const Packages packages;
   const auto world = load_world(packages.folder.write(
@@ -124,7 +124,7 @@ TEST(Xacro, WhatIsWrongIsSaidInOneLine) {
               HasSubstr("a file of xacro macros alone is for others to include"));
 }
 
-// What comes with a request is not run: only what is on the disk.
+// Text that comes with a request is never executed; only files on the disk are.
 TEST(Xacro, OfATextIsRefused) {
   const Packages packages;
   EXPECT_THROW(load_model_text(kBase, packages.folder.write("bot/w.sdf", "")), InputError);

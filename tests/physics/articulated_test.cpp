@@ -31,7 +31,7 @@ double period(double J, double mgr, double amplitude) {
   return 2 * M_PI * std::sqrt(J / mgr) / a;
 }
 
-// Let go at an amplitude, it is there again after its period.
+// Released at an amplitude, it is back there after its period.
 TEST(Articulated, APendulumHasItsPeriodAtAnyAmplitude) {
   for (const double amplitude : {0.1, 1.5, 3.0}) {
     // Hangs from (0, 0, 1); at 0 the arm's centre is at x = 0.5, so the start is amplitude - pi / 2
@@ -113,8 +113,8 @@ TEST(Articulated, AnArmHoldsItsLoadWithoutCreeping) {
   EXPECT_NEAR(w.physics.joint_effort(JointIndex(0)), -10 * (2.5 + 6.6), 0.5);
 }
 
-// Its joints have turned by what they were told in all, and its tip is where that puts it: the
-// product of the joints' rotations.
+// Its joints have turned by the commanded angles in total, and its tip is where these put it: at
+// the product of the joints' rotations.
 TEST(Articulated, AnArmGoesAsItsMotorsAreTold) {
   for (const int64_t step_us : {5000, 10000}) {
     World w(arm(), step_us);
@@ -141,10 +141,10 @@ TEST(Articulated, AnArmGoesAsItsMotorsAreTold) {
   }
 }
 
-// A spring of 40 N m/rad under 2 kg at 0.5 m: k x = m g r cos x, and the friction of the joint lets
-// it come to rest.
-// A motor at its limit gives that, whatever it is told, and the others hold on. From the second
-// step on: the first one has a torque already, but no velocity of its middle.
+// A spring of 40 N m/rad under 2 kg at 0.5 m: k x = m g r cos x; the joint's friction brings it to
+// rest.
+// A motor at its limit gives exactly its limit, whatever it is commanded, and the others hold. From
+// the second step on: in the first there is a torque already, but the middle has no velocity yet.
 TEST(Articulated, AMotorAtItsLimitGivesThat) {
   const auto motor = [](const char* effort) {
     return std::string("<limit><effort>") + effort + "</effort></limit>";
@@ -170,7 +170,7 @@ TEST(Articulated, AMotorAtItsLimitGivesThat) {
               1e-3);
 }
 
-// Motors that drive into their stops: those hold, and the motors give what they can.
+// Motors that drive into their stops: the stops hold, and the motors give what they can.
 TEST(Articulated, StopsHoldWhatMotorsDrive) {
   const std::string limit =
       "<limit><lower>-0.2</lower><upper>0.2</upper><effort>50</effort></limit>";

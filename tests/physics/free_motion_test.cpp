@@ -17,8 +17,8 @@ TEST(FreeMotion, FlightIsTheParabolaAtAnyStep) {
   }
 }
 
-// What falls at the start accelerates by gravity in the first state, what stands does not; as soon
-// as they are simulated they say so themselves.
+// In the first state what falls accelerates by gravity and what stands does not; from the first
+// step on the simulation decides.
 TEST(FreeMotion, TheFirstStateKnowsWhatFalls) {
   World w(kPlane + thing("falling", "0 0 5 0 0 0", kBall, 1) +
               thing("standing", "2 0 0.1 0 0 0", kBall, 1) + thing("post", "4 0 1 0 0 0", kBox, 0),
@@ -36,7 +36,7 @@ TEST(FreeMotion, TheFirstStateKnowsWhatFalls) {
 }
 
 // A mechanism in the air falls as one; one that hangs on the world, or of which a part stands on
-// something, does not.
+// something, does not fall.
 TEST(FreeMotion, TheFirstStateKnowsWhichMechanismFalls) {
   const auto two = [](const std::string& name, const std::string& pose, const std::string& more) {
     const std::string inertial =
@@ -66,7 +66,7 @@ TEST(FreeMotion, TheFirstStateKnowsWhichMechanismFalls) {
       EXPECT_NEAR(z("standing"), 0.0, 1e-3) << link;
     }
   }
-  // The ball joint bears its link at the middle; the other one hangs at the end of it.
+  // The ball joint supports its link at the middle; the other link hangs by its end.
   EXPECT_NEAR(first.body_accelerations[w.body("hanging/a")].norm(), 0.0, 1e-6);
   EXPECT_NEAR(first.body_accelerations[w.body("hanging/b")].z(),
               -10.0 * 0.15 * 0.15 / (0.01 + 0.15 * 0.15), 1e-3);
@@ -105,7 +105,7 @@ TEST(FreeMotion, TheFirstStateKnowsWhatHangs) {
   EXPECT_NEAR(acceleration("turning").x(), -kOmega * kOmega * 0.5, 2e-2);
   EXPECT_NEAR(acceleration("turning").z(), down(10.0), 2e-2);
 
-  // Nothing has moved by that.
+  // This has moved nothing.
   EXPECT_EQ(w.position("hanging/l"), Vec3(0.5, 0, 5));
   EXPECT_EQ(w.physics.twist(w.body("hanging/l")).linear, Vec3(0, 0, 0));
 }

@@ -1,4 +1,4 @@
-// Joints that are led by others, threads, and the gains of a file.
+// Mimic joints, screws, gearboxes, and gains from a file.
 #include <gtest/gtest.h>
 
 #include "world.h"
@@ -19,7 +19,7 @@ std::string joint(const std::string& name, const std::string& type, const std::s
          child + "</child><axis><xyz>" + xyz + "</xyz>" + axis + "</axis>" + more + "</joint>";
 }
 
-// A gripper: one finger is told, the other follows with -1 times its way, 2 cm off.
+// A gripper: one finger is commanded, the other follows with -1 times its travel, 2 cm off.
 TEST(JointKinds, AMimicFollowsItsLeader) {
   World w(
       "<model name='m'>" + link("l", "0 0 1 0 0 0") + link("r", "0 0 1 0 0 0") +
@@ -40,8 +40,9 @@ TEST(JointKinds, AMimicFollowsItsLeader) {
   EXPECT_NEAR(w.physics.joint_velocity(JointIndex(follower)), -0.1, 1e-4);
 }
 
-// A load of 1 kg on a vertical thread of 10 mm a turn: it goes down at 10 mm a turn when it is
-// turned, and where nothing holds it falls with m g = (m + J / p^2) a, p the way of a radian.
+// A load of 1 kg on a vertical screw of 10 mm per turn: it goes down by 10 mm per turn when it is
+// turned, and where nothing holds it, it falls with m g = (m + J / p^2) a, where p is the travel
+// per radian.
 TEST(JointKinds, AScrewAdvancesByItsPitch) {
   const double pitch = 0.6, p = pitch / (2 * M_PI);  // a steep thread turns by its load
   World w("<model name='m'>" + link("nut", "0 0 1 0 0 0") +
@@ -61,7 +62,7 @@ TEST(JointKinds, AScrewAdvancesByItsPitch) {
   EXPECT_NEAR(w.physics.joint_effort(JointIndex(0)), 10.0 * p, 0.02 * 10.0 * p);
 }
 
-// A stop at two turns of a right-handed thread, in either of the ways to write it.
+// A stop at two turns of a right-handed screw, in both notations.
 TEST(JointKinds, AScrewHasLimitsAndItsOldPitchIsLeftHanded) {
   World w("<model name='m'>" + link("nut", "0 0 1 0 0 0") +
               joint("s", "screw", "world", "nut", "0 0 1",
@@ -75,8 +76,8 @@ TEST(JointKinds, AScrewHasLimitsAndItsOldPitchIsLeftHanded) {
   EXPECT_NEAR(w.position("m/nut").z(), 1.2, 1e-3);
 }
 
-// With 500 N m s/rad an arm of m g r = 5 N m that is told to stand still sinks at 0.01 rad/s, as
-// long as it is level.
+// With 500 N m s/rad an arm of m g r = 5 N m that is commanded to stand still sinks at 0.01 rad/s
+// while it is level.
 TEST(JointKinds, ARateGainYields) {
   World w(
       "<model name='m'><link name='arm'><pose>0 0 1 0 0 0</pose><inertial><pose>0.5 0 0 0 0 "
@@ -99,7 +100,7 @@ std::string gearbox(const std::string& reference, double ratio, const std::strin
 }
 constexpr int kTable = 0, kParent = 1, kChild = 2, kGear = 3;  // joints
 
-// Two wheels of 0.01 kg m^2 on a table, which turns or is held; geared by g = 3.
+// Two wheels of 0.01 kg m^2 on a table that turns or is held; geared by g = 3.
 std::string geared(const std::string& table_joint, const std::string& reference) {
   return "<model name='m'>" + link("r", "0 0 1 0 0 0") + link("p", "0.2 0 1 0 0 0") +
          link("c", "-0.3 0 1 0 0 0") + joint("t", table_joint, "world", "r", "0 0 1") +
@@ -127,7 +128,7 @@ TEST(JointKinds, AGearboxHoldsItsRatio) {
   EXPECT_NEAR(std::abs(w.physics.joint_effort(JointIndex(2))), 0.01 * 3.0 * alpha, 1e-3);
 }
 
-// The axes may be square to each other, as of a bevel gear, and the ratio negative.
+// The axes may be perpendicular, as of a bevel gear, and the ratio negative.
 TEST(JointKinds, ABevelGear) {
   World w("<model name='m'>" + link("p", "0.2 0 1 0 0 0") + link("c", "-0.3 0 1 0 0 0") +
               joint("jp", "continuous", "world", "p", "0 0 1") +
@@ -141,7 +142,7 @@ TEST(JointKinds, ABevelGear) {
               0.5 * w.physics.joint_position(JointIndex(0)), 1e-6);
 }
 
-// On a table that turns freely no moment comes from outside: with S the moment of inertia of all,
+// On a table that turns freely there is no external moment: with S the moment of inertia of all,
 // and those of table and wheels about its axis, S w + (J - g J) theta1' = 0, and
 // (J + g^2 J - (J - g J)^2 / S) theta1'' = tau.
 TEST(JointKinds, AGearboxTurnsWhatCarriesIt) {
@@ -158,7 +159,7 @@ TEST(JointKinds, AGearboxTurnsWhatCarriesIt) {
               w.physics.joint_position(JointIndex(kChild)), 1e-6);
 }
 
-// Carried round on a table, gears that nothing turns against it stand still against it.
+// Carried round on a table, gears that nothing turns relative to it stay at rest relative to it.
 TEST(JointKinds, AGearboxIsCarriedRound) {
   World w(geared("continuous", "r"), 5000);
   w.physics.drive_joint_velocity(JointIndex(kTable), 3.0, 1e3);

@@ -1,5 +1,6 @@
-// Trees of joints against Gauss's principle: of all velocities that the joints allow, those that
-// differ least from the given ones, by kinetic energy. It is solved here as one dense system.
+// Trees of joints against Gauss's principle: of all velocities that the joints allow, the solution
+// differs least from the given ones, measured by kinetic energy. Here it is solved as one dense
+// system.
 #include <gtest/gtest.h>
 
 #include <memory>
@@ -20,7 +21,7 @@ struct Tie {
   double softness, target, push;  // push: impulse along an open way
 };
 
-// Of bodies with random places, inertias and velocities.
+// Bodies with random poses, inertias and velocities.
 class RandomTree {
  public:
   RandomTree(unsigned seed, int bodies, bool hung, bool all_led = false) : random_(seed) {
@@ -174,7 +175,7 @@ class RandomTree {
     }
     return M;
   }
-  // Of the last row: how fast the anchor on a body moves, and the body turns.
+  // Of the last row: the velocity of the anchor on a body, and the body's turn rate.
   void put(Eigen::MatrixXd& J, int body, double sign, const Tie& tie, const Vec3& moves,
            const Vec3& turns) const {
     if (body == 0) return;
@@ -203,7 +204,7 @@ TEST(JointTree, MovesByGaussPrinciple) {
   }
 }
 
-// Where no way is open, inertias say nothing of how it moves, but what the motors bear.
+// Where no direction is free, inertias do not matter for the motion, but for what the motors bear.
 TEST(JointTree, WhatIsLedMovesAsItIsTold) {
   for (unsigned seed = 0; seed < 5; ++seed) {
     RandomTree tree(seed, 6, true, true);

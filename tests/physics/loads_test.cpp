@@ -1,4 +1,4 @@
-// Loads of rigid bodies on more contacts than they need: as of equal springs, whatever the order.
+// Loads of rigid bodies on more contacts than necessary: as on equal springs, whatever the order.
 #include <algorithm>
 #include <vector>
 
@@ -34,7 +34,7 @@ double load_at(const World& world, const std::string& body, double x, double y) 
 
 using Places = std::vector<std::pair<double, double>>;
 
-// Of a weight at (x, y) on a spring at each place.
+// For a weight at (x, y) on a spring at each place.
 std::vector<double> on_springs(const Places& places, double weight, double x, double y) {
   Eigen::Matrix3d stiffness = Eigen::Matrix3d::Zero();
   for (const auto& [px, py] : places) {
@@ -71,8 +71,8 @@ TEST(Loads, OfATableAreThoseOfEqualSprings) {
   }
 }
 
-// Each of two bodies that no joint ties shares what it bears among its own contacts: a table on the
-// other one's top.
+// Two bodies that no joint connects each share their load among their own contacts: a table on top
+// of another.
 TEST(Loads, OfATableOnATable) {
   std::string feet;
   for (size_t i = 0; i < kTable.size(); ++i) feet += foot(i, kTable[i].first, kTable[i].second);
@@ -89,12 +89,12 @@ TEST(Loads, OfATableOnATable) {
   for (size_t i = 0; i < kTable.size(); ++i) {
     const auto& [x, y] = kTable[i];
     EXPECT_NEAR(load_at(world, "upper/l", x, y), wanted[i], 0.01 * wanted[i]) << i;
-    // Its own foot bears both tables, and the upper one's foot stands above it.
+    // The lower table's foot bears both tables, and the upper one's foot stands above it.
     EXPECT_NEAR(load_at(world, "lower/l", x, y), 3 * wanted[i], 0.03 * wanted[i]) << i;
   }
 }
 
-// Set down with one foot first, and once after a slide: what was before is forgotten.
+// Set down with one foot first, and once after sliding: the history is forgotten.
 TEST(Loads, DoNotRememberHowItCameThere) {
   std::string feet;
   for (size_t i = 0; i < kTable.size(); ++i) feet += foot(i, kTable[i].first, kTable[i].second);
@@ -109,7 +109,7 @@ TEST(Loads, DoNotRememberHowItCameThere) {
   }
 }
 
-// Three supports in a line are one too many as well.
+// Three supports in a line are one too many, too.
 TEST(Loads, OfAPlankOnThreeSupports) {
   const Places places = {{-1.0, 0.0}, {0.0, 0.0}, {0.5, 0.0}};
   std::string feet;
@@ -126,7 +126,7 @@ TEST(Loads, OfAPlankOnThreeSupports) {
   }
 }
 
-// A cart without a drive: its four wheels are bodies of their own, tied by joints.
+// A cart without a drive: its four wheels are bodies of their own, connected by joints.
 TEST(Loads, OfACartsWheels) {
   const Places places = {{0.3, 0.2}, {0.3, -0.2}, {-0.2, 0.2}, {-0.2, -0.2}};
   for (const bool reversed : {false, true}) {
@@ -155,9 +155,9 @@ TEST(Loads, OfACartsWheels) {
   }
 }
 
-// A rocker on each side and a ball in front: five contacts that leave no choice, since a rocker
-// shares by its levers. 20 kg at x = 0.1, pivots at 0, ball at 0.5: 40 N on the ball, 80 N on each
-// rocker, of 1 to 3 on its feet at 0.15 and -0.05.
+// A rocker on each side and a ball in front: five contacts whose loads are determined, since a
+// rocker distributes by its levers. 20 kg at x = 0.1, pivots at 0, ball at 0.5: 40 N on the ball,
+// and 80 N on each rocker, split 1 to 3 between its feet at 0.15 and -0.05.
 TEST(Loads, OfARockerGoByItsLevers) {
   const auto rocker = [](const std::string& name, double y) {
     return "<link name='" + name + "'><pose>0 " + number(y) + " 0 0 0 0</pose>" +
@@ -178,7 +178,7 @@ TEST(Loads, OfARockerGoByItsLevers) {
   }
 }
 
-// How firmly a thing is held between two others is no share of a load, and stays: jaws with a
+// How firmly a thing is clamped between two others is no share of a load, and stays: jaws with a
 // spring of 30 N each.
 TEST(Loads, AGripStays) {
   const auto jaw = [](const std::string& name, double x, double sign) {

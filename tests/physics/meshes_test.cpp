@@ -1,4 +1,4 @@
-// Floors of triangles: the edges that only divide a surface are not felt, those that stand out are.
+// Floors of triangles: edges that only divide a surface are not felt, edges that stand out are.
 #include <filesystem>
 #include <fstream>
 #include <functional>
@@ -106,8 +106,8 @@ TEST_F(Meshes, AnEdgeThatStandsOutIsFelt) {
   EXPECT_LT(w.position("r/l").x(), 1.9);
 }
 
-// Into a valley of 0.2 rad and out of it: nothing is lost to the crease, but for what the turn of
-// the velocity takes.
+// Into a valley of 0.2 rad and out of it: the crease costs nothing except what the change of the
+// velocity's direction takes.
 TEST_F(Meshes, ARidgeCarries) {
   // A ridge along x: a ball on top of it rests on its edge alone.
   World w(floor([](double, double y) { return -std::abs(y - 0.04) * 0.5; }, 0.08) +

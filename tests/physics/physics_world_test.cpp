@@ -193,7 +193,7 @@ TEST(Joints, LimitsHoldOnOneSideAndBeyondATurn) {
   EXPECT_NEAR(wide.physics.joint_position(JointIndex(0)), -4.0, 0.02);
 }
 
-// What is held more simply than the file says is told, once and with its name.
+// A joint that is approximated is reported, once and by name.
 TEST(Physics, SimplerJointsAndFrictionAreNamed) {
   const auto shape = [](const std::string& name, const std::string& friction) {
     return "<collision name='" + name + "'><geometry>" + kBall + "</geometry><surface><friction>" +
@@ -404,8 +404,7 @@ TEST(Physics, AGuidedBodyEndsExactlyThereUnlessItTouches) {
   }
 }
 
-// A barrel lies on its side; pushed, it rolls on as fast as it was pushed, for nothing brakes it
-// and nothing drives it.
+// A barrel on its side, pushed, rolls on at that speed, since nothing brakes or drives it.
 TEST(Physics, ARollingCylinderKeepsItsSpeed) {
   const std::string barrel = "<cylinder><radius>0.15</radius><length>0.5</length></cylinder>";
   const std::string floor =

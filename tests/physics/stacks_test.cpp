@@ -1,5 +1,5 @@
-// Things upon things: they stand, whatever stands on whatever, and nobody else's doings change a
-// bit of them.
+// Stacks: they stand whatever their contents, and nothing elsewhere in the world changes a bit of
+// them.
 #include <vector>
 
 #include <gtest/gtest.h>
@@ -20,7 +20,7 @@ std::string stack(int boxes, double top = 1.0, const std::string& at = "0 0") {
   return models;
 }
 
-// The furthest that a body is from where it began, all kept awake.
+// The largest distance of a body from its initial place, with all bodies kept awake.
 double drift(World& w, double seconds, const std::string& first = "s0/l") {
   std::vector<Vec3> start;
   for (size_t i = 0; i < w.layout.bodies.size(); ++i)
@@ -53,7 +53,7 @@ TEST(Stacks, AHundredTimesTheWeightOnTopStands) {
   }
 }
 
-// What is put down exactly stays: all corners are found at once, and before they touch.
+// What is placed exactly stays: all corners are found at once, and before they touch.
 TEST(Stacks, WhatIsPutDownExactlyDoesNotRock) {
   World w(kPlane + stack(15), 5000);
   EXPECT_LT(drift(w, 1), 5e-5);
@@ -82,7 +82,7 @@ TEST(Stacks, AWallOfBricksStands) {
   EXPECT_LT(drift(w, 5), 2e-3);
 }
 
-// A hinged thing 70 m away wants shorter substeps, for itself.
+// A mechanism 70 m away requests shorter substeps, for itself only.
 TEST(Stacks, WhatDoesNotTouchChangesNoBit) {
   const std::string windmill =
       "<model name='mill'><pose>70 0 0 0 0 0</pose><link "
@@ -115,7 +115,7 @@ TEST(Stacks, WhatDoesNotTouchChangesNoBit) {
   EXPECT_GT((alone.back().translation - alone[4].translation).norm(), 0.01);  // something happened
 }
 
-// The settings of the world act: with two sweeps a stack falls that stands with the default.
+// The world's settings take effect: with two sweeps a stack falls that stands with the default.
 TEST(Stacks, TheWorldsSolverActs) {
   World w(kPlane + stack(10), 5000, "<solver><iters>2</iters></solver>");
   EXPECT_GT(drift(w, 20), 0.05);

@@ -1,4 +1,4 @@
-// States that cannot be, and forces that would lead to them.
+// Impossible states, and forces that would lead to them.
 #include "physics/state_check.h"
 
 #include <gmock/gmock.h>
@@ -66,7 +66,7 @@ TEST(StateCheck, NamesWhatIsNotFinite) {
               HasSubstr("a contact of the body 'm/b'"));
 }
 
-// The largest effort on the lightest and the heaviest of bodies.
+// The largest effort on the lightest and on the heaviest body.
 TEST(StateCheck, EffortsThatAreAllowedStayFinite) {
   for (const auto& [mass, moment] : {std::pair{"1e-9", "1e-15"},
                                      {"1e-9", "1e15"},

@@ -1,5 +1,5 @@
-// What a file says of surfaces acts, shape by shape: friction and its directions, slip, torsion,
-// rolling, stiffness, bounce.
+// Surface parameters act per shape: friction and its directions, slip, torsion, rolling, stiffness,
+// bounce.
 #include <gtest/gtest.h>
 
 #include "world.h"
@@ -43,8 +43,7 @@ TEST(Surfaces, FrictionIsTheSameInAllDirections) {
   }
 }
 
-// A sledge on a friction of `mu` that draws another one with a friction of 0.5: where it is after 2
-// s.
+// A sledge with friction `mu` that pulls another one with a friction of 0.5: its place after 2 s.
 Vec3 sledges(const std::string& mu) {
   const auto runner = [](const std::string& friction) {
     return shape("c", "0 0 0 0 0 0", kBox, ode("<mu>" + friction + "</mu>"));
@@ -61,7 +60,7 @@ Vec3 sledges(const std::string& mu) {
   return w.position("b/l");
 }
 
-// What no scale could tell from ice is ice, along and across, and nothing becomes infinite.
+// Friction too small to measure is no friction, along and across, and nothing becomes infinite.
 TEST(Surfaces, NextToNoFrictionIsNone) {
   for (const std::string mu : {"1e-300", "1e-160", "1e-12"}) {
     EXPECT_NEAR(slide(ode("<mu>" + mu + "</mu><mu2>" + mu + "</mu2>")).x(), 2.0, 1e-6) << mu;
@@ -80,8 +79,8 @@ TEST(Surfaces, FrictionDirectionsTurnWithTheShape) {
   EXPECT_NEAR(slide(two, 0.0, "1.5707963267948966").norm(), 1.0 / 4, 5e-3);
 }
 
-// A slab on two feet, one of them of ice: pushed, it turns about the other. As one body of one
-// friction it would not.
+// A slab on two feet, one of them frictionless: pushed, it turns about the other. A single body
+// with one friction would not.
 TEST(Surfaces, FrictionBelongsToAShape) {
   const std::string foot = "<box><size>0.1 0.1 0.1</size></box>";
   World w(kPlane + body("b", "0 0 0.05 0 0 0",

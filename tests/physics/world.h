@@ -12,7 +12,7 @@ namespace ruedo::physics::testing {
 
 class World {
  public:
-  // solver: what stands in <bullet>.
+  // solver: the content of <bullet>.
   explicit World(const std::string& models, int64_t step_us = 2000, const std::string& solver = "")
       : world(model::load_world_text("<sdf version='1.9' xmlns:ruedo='https://ruedo.org'><world "
                                      "name='w'><gravity>0 0 -10</gravity>"

@@ -1,4 +1,4 @@
-// Drives that are no differential ones, on a free plane: the closed forms of their motion, their
+// Drives other than differential ones, on a free plane: the closed forms of their motion, their
 // limits, their wheels.
 #include <cmath>
 
@@ -47,7 +47,7 @@ TEST(BaseMotion, ConstantTwistIsACircle) {
   EXPECT_NEAR(way.y, (vy * std::sin(omega * t) - vx * (std::cos(omega * t) - 1)) / omega, 1e-15);
 }
 
-// However the time is cut, the way is the same.
+// However the time is divided, the path is the same.
 TEST(BaseMotion, QuadraturesDoNotDependOnTheStep) {
   const Limits limits{2.0, 0.7, 0.7};
   const Profile v = Profile::to_velocity(0.2, 1.0, limits),

@@ -1,5 +1,5 @@
-// The bases that are no differential drive, on wheels of their own: what friction makes of them
-// comes near to the closed forms of the kinematic drive, and their odometry to where they are.
+// Bases other than differential ones, on real wheels: with friction they come close to the closed
+// forms of the kinematic drive, and their odometry to the true pose.
 #include <cmath>
 #include <fstream>
 #include <sstream>
@@ -11,7 +11,7 @@
 namespace ruedo::robot::testing {
 namespace {
 
-// A robot that comes with Ruedo, with the drive on its wheels, and more in the drive's element.
+// A robot that comes with Ruedo, with the wheels drive, and more elements in the drive.
 std::string on_wheels(const std::string& name, const std::string& more = "",
                       const std::string& odometry = "") {
   std::ifstream file(std::string(RUEDO_SOURCE_DIR "/worlds/robots/") + name + "/model.sdf");
@@ -79,7 +79,8 @@ TEST(TricycleOnWheels, GoesStraightAndRound) {
   EXPECT_NEAR(sim.position().y(), 0.0, 0.01);
 }
 
-// A roller that turns freely lets the wheel go along its own axle: all of the twist is the rims'.
+// A roller that turns freely lets the wheel move along its own axle: all of the twist comes from
+// the rims.
 TEST(MecanumOnWheels, MovesInEveryDirection) {
   const double twists[][3] = {
       {0.3, 0, 0}, {0, 0.3, 0}, {0.2, -0.2, 0}, {0, 0, 0.6}, {0.2, 0.1, 0.4}};
@@ -98,7 +99,7 @@ TEST(MecanumOnWheels, ItsPrimitivesAndItsBelief) {
   sim.run(6.0);
   EXPECT_EQ(sim.robot().motion.state, Status::STATE_DONE);
   EXPECT_NEAR(sim.yaw(), M_PI / 2, 0.03);
-  // It believes its levers to be longer by a tenth, and turns too far by as much.
+  // It assumes its levers to be longer by a tenth, and turns too far by as much.
   OnWheels wrong(on_wheels("mecanum", "", "<ruedo:track_error>0.1</ruedo:track_error>"));
   wrong.move(Move::ROTATE, 1.0);
   wrong.run(6.0);
@@ -116,7 +117,7 @@ TEST(OmniOnWheels, MovesInEveryDirection) {
   }
 }
 
-// Tracks as rows of wheels: they skid through turns, and turn by less than the rims say.
+// Tracks as rows of wheels: they skid in turns, and turn by less than the rims suggest.
 TEST(TrackedOnWheels, DrivesAndSkids) {
   OnWheels sim(on_wheels("crawler"));
   sim.hold(0.3, 0.0, 0.0, 2.0);

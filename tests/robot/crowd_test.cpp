@@ -1,4 +1,4 @@
-// People: how one walks, what they walk around, and the cases that papers about crowds describe.
+// People: how one walks, what they avoid, and the cases that papers about crowds describe.
 #include <cmath>
 #include <map>
 
@@ -17,7 +17,7 @@ std::string crowd_sdf(const std::string& name, int count, const std::string& are
 
 std::string goal(const std::string& at) { return "<ruedo:goal>" + at + "</ruedo:goal>"; }
 
-// Without chance: everybody likes 1.3 m/s.
+// Without randomness: everybody prefers 1.3 m/s.
 const char* const kAlike = "<ruedo:speed>1.3</ruedo:speed><ruedo:fluctuation>0</ruedo:fluctuation>";
 
 class People : public Sim {
@@ -138,9 +138,9 @@ TEST(Crowd, GoesToItsGoalsInTurnAndAgain) {
 }
 
 // D. Helbing and P. Molnar (1995), section III: in a corridor people who walk in the same direction
-// form lanes. Told by the order parameter of M. Rex and H. Lowen (Phys. Rev. E 75 (2007) 051402):
-// the mean of ((n_same - n_other) / n)^2 over who is in the same lane of 0.75 m, with n = n_same +
-// n_other. Where directions mix by chance each is 1 / n in the mean.
+// form lanes. Measured by the order parameter of M. Rex and H. Lowen (Phys. Rev. E 75 (2007)
+// 051402): the mean of ((n_same - n_other) / n)^2 over the people in the same lane of 0.75 m, with
+// n = n_same + n_other. Where directions mix at random each is 1 / n on average.
 struct Lanes {
   double order = 0, by_chance = 0, speed = 0;
   int count = 0;

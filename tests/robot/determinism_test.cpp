@@ -1,4 +1,4 @@
-// The same world and commands give the same bits, also after the world is made again in other
+// The same world and commands give the same bits, even if the world is created again elsewhere in
 // memory.
 #include <cstring>
 #include <vector>

@@ -1,5 +1,5 @@
-// Commands of every kind with the numbers that arithmetic stumbles over, one field at a time: what
-// is refused is refused, and no state that follows has a value that is none.
+// Commands of every kind with numbers that upset arithmetic, one field at a time: some are refused,
+// and after the others every state stays finite.
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-// Tracked vehicles whose flippers have belts, too: these drive what stands on them.
+// Tracked vehicles whose flippers have belts, which drive what touches them.
 #include <cmath>
 
 #include <gtest/gtest.h>
@@ -77,7 +77,7 @@ TEST(Flippers, DriveTheRobotThatStandsOnThem) {
     sim.velocity(0.3, 0.0);
     sim.run(0.1);
   }
-  // From rest friction of 0.7 takes it to 0.3 m/s: v^2 / (2 mu g) are missing.
+  // Friction of 0.7 takes it from rest to 0.3 m/s: v^2 / (2 mu g) are missing.
   EXPECT_NEAR(sim.position().x() - start, 0.6 - 0.0066, 1e-3);
   EXPECT_NEAR(height(sim), kOnFlippers_m, 1e-3);
   sim.velocity(0.0, 0.0);

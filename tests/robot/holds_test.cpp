@@ -1,4 +1,4 @@
-// Detachable joints: what is held moves with its holder, and falls when it is let go.
+// Detachable joints: a held thing moves with its holder, and falls when it is released.
 #include <cmath>
 
 #include <gtest/gtest.h>
@@ -21,7 +21,7 @@ std::string hold(const std::string& model, const std::string& link = "l",
          "</child_link></plugin>";
 }
 
-// A box of 2 kg that the world holds at 0 0 3, and what it holds.
+// A box of 2 kg that the world holds at 0 0 3, and what the box holds.
 std::string gantry(const std::string& plugins) {
   return "<model name='gantry'><pose>0 0 3 0 0 0</pose><link name='base'><inertial><mass>2</mass>"
          "<inertia><ixx>0.1</ixx><iyy>0.1</iyy><izz>0.1</izz></inertia></inertial></link><joint "

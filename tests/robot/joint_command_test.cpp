@@ -64,7 +64,7 @@ TEST_F(Gimbal, GoesToItsPositionsWhileItDrives) {
   EXPECT_NEAR(position("tilt"), -0.6, 5e-3);
   EXPECT_NEAR(position("lift"), 0.25, 5e-3);
   EXPECT_NEAR(sim.yaw(), 0.8, 1e-9);  // the drive keeps to its closed form
-  // Both turn about the vertical: the head looks where the sum points.
+  // Both turn about the vertical: the head looks in the direction of the sum.
   EXPECT_NEAR(heading(sim.state.bodies[sim.body("r/head")].rotation), 1.6, 1e-2);
 }
 
@@ -153,7 +153,7 @@ TEST_F(Gimbal, ARateGainComesByMessage) {
   EXPECT_NEAR(rate("lift"), -9.8 / 196.0, 1e-3);
 }
 
-// Started again it is as its file says.
+// After a reset it is as its file says.
 TEST_F(Gimbal, SettingsEndWhenItStartsAgain) {
   tell("tilt", joint_command_t::VELOCITY_LIMIT, 0.1);
   tell("pan", joint_command_t::POSITION_GAIN, 1e-3);
@@ -175,7 +175,7 @@ TEST_F(Gimbal, SettingsThatAreNotAllowedAreRefused) {
         Case{joint_command_t::RATE_GAIN, 0.0}, Case{joint_command_t::RATE_GAIN, 1e30},
         Case{joint_command_t::EFFORT_LIMIT, -1e-3}, Case{joint_command_t::VELOCITY_LIMIT, -1.0},
         Case{joint_command_t::VELOCITY_LIMIT, std::nan("")}, Case{7, 1.0}, Case{-1, 1.0}}) {
-    // The first of the two is fine; with the other one neither counts.
+    // The first of the two is valid; together with the other neither counts.
     sim.robots.apply({RobotIndex(0), JointCommand{{"tilt", "tilt"},
                                                   {joint_command_t::VELOCITY_LIMIT, each.mode},
                                                   {0.1, each.value}}});

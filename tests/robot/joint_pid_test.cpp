@@ -15,7 +15,7 @@ constexpr int8_t kPosition = joint_command_t::POSITION, kVelocity = joint_comman
                  kPositionGain = joint_command_t::POSITION_GAIN;
 constexpr double kJ = 0.1, kG = 9.8;
 
-// more: in the joint's <axis>. center: of the child's mass, before the axis, which is `xyz`.
+// more: in the joint's <axis>. center: of the child's mass, with the axis `xyz`.
 std::string machine(const std::string& plugins, const std::string& more = "",
                     const std::string& xyz = "0 0 1", const std::string& center = "0 0 0") {
   const std::string moments = "<inertia><ixx>0.1</ixx><iyy>0.1</iyy><izz>0.1</izz></inertia>";
@@ -83,7 +83,7 @@ TEST(JointPid, IsStableAtStepsThatGazebosWouldNotBe) {
   EXPECT_NEAR(machine.at(), 0.5, 1e-3);
 }
 
-// It sags by m g l / p; the integral takes that away, as far as its limits let it.
+// It sags by m g l / p; the integral removes that, as far as its limits allow.
 TEST(JointPid, HoldsFromTheStartAndSagsByWhatTheIntegralLeaves) {
   const auto sag = [](double p, double i, double most) {
     Machine lever(machine(plugin("JointPositionController",
@@ -182,7 +182,7 @@ TEST(JointPid, AnExactControllerIsAsFastAsItsCommandMayBe) {
   EXPECT_NEAR(machine.at(), 1.0, 1e-4);
 }
 
-// The rate's gain brakes: d of the position's is the sum.
+// The velocity gain brakes: it adds to d of the position's.
 TEST(JointPid, ATrajectorysTwoControllersAreOne) {
   Machine machine(::ruedo::robot::testing::machine(plugin(
       "JointTrajectoryController", gain("position_p_gain", 10.0) + gain("position_d_gain", 0.4) +

@@ -1,5 +1,5 @@
-// The kinematic robot as a body: cargo, slopes, falls, what carries it, and what it believes of its
-// wheels.
+// The kinematic robot as a body: cargo, slopes, falls, what carries it, and what it assumes about
+// its wheels.
 #include <cmath>
 
 #include <gtest/gtest.h>
@@ -94,8 +94,8 @@ std::string mover(const std::string& size, const std::string& waypoints) {
          "</geometry></collision></link><ruedo:path>" + waypoints + "</ruedo:path></model>";
 }
 
-// A platform of 0.2 m, its top at 0.2 m, goes 2 m ahead in 4 s; the robot on it stays where it is
-// on it, and drives on it.
+// A platform of 0.2 m, its top at 0.2 m, moves 2 m ahead in 4 s; the robot keeps its place on it,
+// and drives on it.
 TEST(KinematicBody, APlatformCarriesIt) {
   for (const double v : {0.0, 0.1}) {
     Sim sim(
@@ -126,8 +126,8 @@ TEST(KinematicBody, ATurntableTurnsIt) {
   EXPECT_NEAR(sim.position().y(), 0.4 * std::sin(1.0), 0.02);
 }
 
-// Primitives on the odometry: with a radius believed 2 % too large a metre is 1 / 1.02 m, with a
-// track believed 5 % too wide a quarter turn is 1.05 of one.
+// Primitives measured by odometry: with a radius assumed 2 % too large a metre is 1 / 1.02 m, with
+// a track assumed 5 % too wide a quarter turn is 1.05 of one.
 TEST(KinematicBody, PrimitivesOnTheOdometryMissAsARealRobotDoes) {
   std::string robot = robot_sdf(
       "r", "0 0 0 0 0 0", limits(1, 1, 1, 1, 1) + "<ruedo:primitives>odometry</ruedo:primitives>");

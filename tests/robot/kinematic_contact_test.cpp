@@ -65,7 +65,7 @@ TEST(KinematicContact, TheForceOnAWallIsTheDrivesLimit) {
 }
 
 TEST(KinematicContact, SlidesAlongASlantedWall) {
-  // A wall turned by 30 degrees to the robot's way.
+  // A wall at 30 degrees to the robot's path.
   Sim sim(plane_sdf() + robot_sdf("r", "0 0 0 0 0 0", kNoWatchdog) +
           box_sdf("wall", "2 0.2 0.5 0 0 0.5236", "8 0.2 1"));
   sim.velocity(0.5, 0.0);
@@ -109,7 +109,7 @@ TEST(KinematicContact, APrimitiveBlockedByAWallEnds) {
   EXPECT_EQ(sim.robot().wheel_v, 0.0);
 }
 
-// A velocity holds, and its status says that it leads nowhere, until it does again.
+// A velocity command stays active, and its status says that the robot is blocked, until it is not.
 TEST(KinematicContact, AVelocityBlockedByAWallSaysSo) {
   Sim sim(plane_sdf() + robot_sdf("r", "0 0 0 0 0 0", kNoWatchdog) +
           box_sdf("wall", "1.1 0 0.5 0 0 0", "0.2 4 1"));
@@ -132,7 +132,7 @@ std::string blocked_by(const Sim& sim, int robot = 0) {
   return model::body_name(*sim.world, sim.layout, sim.robot(robot).motion.blocked_by);
 }
 
-// The robot rubs along a wall at its side all the way, and stands before a crate in the end.
+// The robot rubs along a wall at its side all the way, and stops at a crate in the end.
 TEST(KinematicContact, WhatBlocksIsNamed) {
   for (const char* drive : {"kinematic", "wheels"}) {
     Sim sim(plane_sdf() + robot_sdf("r", "0 0 0 0 0 0", kNoWatchdog, drive) +
@@ -164,8 +164,8 @@ TEST(KinematicContact, WhatBlocksAPrimitiveIsNamedUntilTheNextCommand) {
   EXPECT_EQ(blocked_by(sim), "");
 }
 
-// It is told to back off while its wheels still turn ahead: they brake at the wall for 1.2 s, which
-// is no block of what it was told.
+// It is commanded to back off while its wheels still turn ahead: they brake at the wall for 1.2 s,
+// which does not count as blocked.
 TEST(KinematicContact, BackingOffAWallIsNotBlockedByIt) {
   for (const bool primitive : {true, false}) {
     Sim sim(plane_sdf() +
@@ -197,7 +197,7 @@ TEST(KinematicContact, WhatBlocksATurnIsNamed) {
   EXPECT_TRUE(blocked_by(sim) == "post/l" || blocked_by(sim) == "other/l") << blocked_by(sim);
 }
 
-// A slope that is too steep blocks as a wall does.
+// A slope that is too steep blocks like a wall.
 TEST(KinematicContact, ASlopeThatIsTooSteepIsNamed) {
   Sim sim(plane_sdf() + robot_sdf("r", "0 0 0 0 0 0", kNoWatchdog) +
           box_sdf("ramp", "2.3 0 0.4 0 -0.9 0", "3 3 0.1"));
@@ -207,8 +207,8 @@ TEST(KinematicContact, ASlopeThatIsTooSteepIsNamed) {
   EXPECT_EQ(blocked_by(sim), "ramp/l");
 }
 
-// The robot whose file says that it runs on its odometry believes its wheels, but what blocks a
-// velocity is a matter of the room.
+// A robot whose file says that its primitives end by odometry trusts its wheels, but whether a
+// velocity is blocked depends on the surroundings.
 TEST(KinematicContact, ARobotThatBelievesItsWheelsIsBlockedAllTheSame) {
   Sim sim(
       plane_sdf() +
@@ -233,7 +233,7 @@ std::vector<std::string> collides_with(const Sim& sim, int robot = 0) {
   return names;
 }
 
-// Each of two robots that meet has the other, whichever is first in the world; what carries them
+// Two robots that meet each report the other, whichever is first in the world; what carries them
 // and what they carry is left out.
 TEST(KinematicContact, CollisionsAreWithNeitherTheFloorNorTheCargo) {
   for (const char* drive : {"kinematic", "wheels"}) {
@@ -251,7 +251,7 @@ TEST(KinematicContact, CollisionsAreWithNeitherTheFloorNorTheCargo) {
   }
 }
 
-// What has come to rest against something still touches it.
+// What has come to rest against something still reports the contact.
 TEST(KinematicContact, AsleepAtAWallItStillTouchesIt) {
   for (const char* drive : {"kinematic", "wheels"}) {
     Sim sim(plane_sdf() + robot_sdf("a", "0 0 0 0 0 0", "", drive) +

@@ -16,8 +16,9 @@ std::string free_robot(const std::string& drive = limits(2.0, 2.0, 0.5, 1.0, 1.5
 
 class FreeAtAnyStep : public ::testing::TestWithParam<int64_t> {};
 
-// E1 of the paper: 1 m with a triangular profile, the acceleration limit above the deceleration
-// limit and the other way round. The paper's simulator made 1126.40 mm and 1016.96 mm of it.
+// E1 of the paper: 1 m with a triangular profile, with the acceleration limit above the
+// deceleration limit and the other way round. The paper's simulator drove 1126.40 mm and 1016.96
+// mm.
 TEST_P(FreeAtAnyStep, AdvanceOneMetreByTriangles) {
   for (const auto& [a, d] : {std::pair(4.2, 0.27), std::pair(0.27, 4.2)}) {
     Sim sim(free_robot(limits(5.0, 2.0, a, d, 1.0)), GetParam());
@@ -32,8 +33,8 @@ TEST_P(FreeAtAnyStep, AdvanceOneMetreByTriangles) {
   }
 }
 
-// The same commands at the same times: the same way, to rounding. Commands come on multiples of 50
-// ms.
+// The same commands at the same times give the same path, up to rounding. Commands come at
+// multiples of 50 ms.
 TEST_P(FreeAtAnyStep, FreeMotionDoesNotDependOnTheStep) {
   const auto drive = [](int64_t step_us) {
     Sim sim(free_robot(), step_us);
@@ -142,7 +143,7 @@ TEST(KinematicFree, HeadingIsInOdomAndTheShortestWay) {
   EXPECT_EQ(sim.robot().odometry_resets, 1);
 }
 
-// Whatever takes over whatever, no velocity changes faster than the limits.
+// Whatever command replaces another, no velocity changes faster than the limits.
 TEST(KinematicFree, TakeOverWithinTheLimits) {
   Sim sim(free_robot(limits(1.0, 1.5, 0.5, 1.0, 1.5)));
   double v = 0.0, omega = 0.0;

@@ -36,8 +36,8 @@ std::string controller(const std::string& joint, double p, double d) {
          "</d_gain><cmd_max>100000</cmd_max><cmd_min>-100000</cmd_min></plugin>";
 }
 
-// gz-sim's: a cabin that has its floor at the joint's height, three floors 2 m apart, and on each
-// a leaf of 1 m across the way in at x = 0.6, which slides aside along y.
+// gz-sim's: a cabin whose floor is at the joint's height, three floors 2 m apart, and on each a
+// leaf of 1 m across the entrance at x = 0.6, which slides aside along y.
 std::string elevator(const std::string& more = "") {
   std::string text = "<model name='lift'>" + box("cabin", "0 0 -0.05 0 0 0", "1 1 0.1", 100) +
                      slider("lift", "world", "cabin", "0 0 1", -0.1, 5) +
@@ -192,8 +192,8 @@ TEST(Doors, OfRmfOpenAndCloseAsTheyAreTold) {
   }
 }
 
-// As RMF's map tools write it: the cabin's door is a model in the lift's, the shaft's one beside
-// it, and the doors stay open until the next call.
+// As RMF's map tools write it: the cabin's door is a model within the lift's, the shaft's door is a
+// separate model, and the doors stay open until the next call.
 TEST(Lifts, OfRmfMoveTheDoorsOfCabinAndShaft) {
   const std::string cabin_door =
       "<model name='CabinDoor'><pose>0.6 0 0 0 0 1.5707963</pose>" +
@@ -273,7 +273,7 @@ TEST(Lifts, WhatIsNotThereIsNamed) {
                   "<plugin>: the joint 'lift' is none of the model's joints; it takes no calls"));
 }
 
-// Starting again is as at the start: the same way, bit for bit.
+// A reset goes back to the start: the same motion, bit for bit.
 TEST(Lifts, BeginAnewWithTheirWorld) {
   Sim sim(elevator(), 1000);
   const auto way = [&] {

@@ -1,5 +1,4 @@
-// How a robot's weight is shared by what it stands on, where there is more of it than rigid bodies
-// need: as of a body on equal springs.
+// How a robot's weight is shared by more supports than rigid bodies need: as by equal springs.
 #include <algorithm>
 #include <cmath>
 #include <vector>
@@ -29,7 +28,7 @@ std::string caster(const Stand& stand, size_t index) {
          "</geometry>" + kNoFriction + "</collision>";
 }
 
-// A round one touches at one point, which is known beforehand.
+// A round one touches at a single point, which is known beforehand.
 std::string wheel(const Stand& stand, size_t index, const std::string& mu, bool round) {
   const std::string shape =
       round ? "<sphere><radius>" + number(kRadius) + "</radius></sphere>"
@@ -65,7 +64,8 @@ std::string standing(const std::vector<Stand>& stands, double ahead, const std::
          "</ruedo:drive></model>";
 }
 
-// Of a body on a spring at each place: its sinking is a plane, a + b x + c y, and so are the loads.
+// For a body on a spring at each place: its deflection is a plane, a + b x + c y, and so are the
+// loads.
 std::vector<double> on_springs(const std::vector<Stand>& stands, double ahead) {
   double weight = kBody_kg, moment_x = kBody_kg * ahead, moment_y = 0.0;
   Eigen::Matrix3d stiffness = Eigen::Matrix3d::Zero();
@@ -122,7 +122,7 @@ TEST(Loads, AreThoseOfABodyOnEqualSprings) {
   }
 }
 
-// A kinematic robot is one body; on what is no plane it stands by its contacts.
+// A kinematic robot is one body; on anything but a plane it stands on its contacts.
 TEST(Loads, OfOneBodyAreSharedToo) {
   for (const auto& stands : {kTwoWheelsTwoCasters, kSixWheels}) {
     Sim sim(box_sdf("floor", "0 0 -0.1 0 0 0", "10 10 0.2") +

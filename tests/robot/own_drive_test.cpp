@@ -1,4 +1,4 @@
-// Drives of plugins in snapshots: they say how they are copied, or are refused by name.
+// Plugin drives in snapshots: they define how they are copied, or are refused by name.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -11,7 +11,7 @@ namespace {
 
 using ::testing::HasSubstr;
 
-// Each step a little faster than what is asked: it has a state of its own.
+// In each step a little faster than commanded: it has a state of its own.
 class Growing : public DriveModel {
  public:
   BaseVelocity step(const DriveInput& input) override {

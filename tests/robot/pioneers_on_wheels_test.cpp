@@ -1,6 +1,5 @@
 // The Pioneers of worlds/robots with the wheels drive: four wheels that skid, two wheels and a
-// caster; on the level, over bumps and ramps, against things and robots, and back to where they
-// came from.
+// caster; on level ground, over bumps and ramps, against objects and robots, and back to the start.
 #include <algorithm>
 #include <cmath>
 
@@ -11,7 +10,7 @@
 namespace ruedo::robot::testing {
 namespace {
 
-// As a world file puts them on wheels. Speed limits above what the tests ask for.
+// As a world file selects the drive. Its speed limits are above what the tests command.
 std::string p3at(const std::string& pose, const std::string& more = "") {
   return "<include><uri>model://p3at</uri><name>p3at</name><pose>" + pose +
          "</pose><ruedo:drive type='wheels'>"
@@ -51,7 +50,7 @@ class OnWheels : public ::testing::TestWithParam<Pioneer> {
   }
 };
 
-// Steps until the primitive is over, and says whether it is done.
+// Steps until the primitive has ended; returns whether it is done.
 bool done(Sim& sim) {
   for (int i = 0; i < 6000; ++i) {
     sim.step();
@@ -72,7 +71,7 @@ TEST_P(OnWheels, StandsUpright) {
   EXPECT_NEAR(sim.yaw(), 0.5, 2e-3);
 }
 
-// E1's two cases among them: at the moment of DONE, not a second later.
+// Includes the two cases of E1: measured at the moment of DONE, not a second later.
 TEST_P(OnWheels, IsOneMetreOnWhenItSaysDone) {
   Sim sim(plane_sdf() + robot("0 0 0 0 0 0.4"));
   sim.run(1.0);
@@ -106,7 +105,7 @@ TEST_P(OnWheels, TurnsByAnAngleAndAtARate) {
 }
 
 TEST_P(OnWheels, CrossesABump) {
-  // A bar of 15 mm across the way of all wheels.
+  // A bar of 15 mm in the path of all wheels.
   Sim sim(plane_sdf() + robot("0 0 0 0 0 0") +
           box_sdf("bump", "0.8 0 0.0075 0 0 0", "0.1 2 0.015", 0.0, 1.0));
   sim.run(0.5);
@@ -198,7 +197,7 @@ TEST_P(OnWheels, AContactWakesIt) {
   EXPECT_TRUE(sim.physics.sleeping(BodyIndex(body)));  // left alone, it sleeps again
 }
 
-// There by arc, line and turn, and back the same way: what is missing is slip.
+// There by arc, line and turn, and back the same way: the difference is slip.
 TEST_P(OnWheels, ComesBackTheWayItWent) {
   Sim sim(plane_sdf() + robot("0 0 0 0 0 0"));
   sim.run(1.0);

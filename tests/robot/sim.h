@@ -43,7 +43,7 @@ struct Move {
   static constexpr int8_t STOP = move_command_t::STOP;
 };
 
-// Numbers that arithmetic stumbles over.
+// Numbers that upset arithmetic.
 inline const std::vector<double>& extremes() {
   static const std::vector<double> values = [] {
     std::vector<double> made = {0.0, std::numeric_limits<double>::infinity(), std::nan("")};

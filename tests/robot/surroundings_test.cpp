@@ -1,4 +1,4 @@
-// Belts that carry, and doors that open for who comes near.
+// Conveyor belts, and doors that open for whoever comes near.
 #include <cmath>
 
 #include <gtest/gtest.h>

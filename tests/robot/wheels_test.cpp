@@ -1,5 +1,5 @@
-// The wheels drive: servos that follow wheel rates, odometry that believes them, and physics that
-// decides what comes of it.
+// The wheels drive: servos that follow wheel rates, odometry that trusts them, and physics that
+// decides the result.
 #include <cmath>
 
 #include <gtest/gtest.h>
@@ -40,7 +40,7 @@ TEST(Wheels, AdvancesOneMetre) {
   }
 }
 
-// Steps until the primitive is done; s that it took, 0 when it was not.
+// Steps until the primitive is done; returns the time in s, 0 if it was not done.
 double run_until_done(Sim& sim) {
   for (int i = 1; i < 4000; ++i) {
     sim.step();
@@ -49,7 +49,7 @@ double run_until_done(Sim& sim) {
   return 0.0;
 }
 
-// What a client sees that takes the primitive's end for its end: the robot is there, and stands.
+// What a client sees when the primitive reports its end: the robot has arrived, and stands.
 TEST(Wheels, IsAtItsGoalAndAtRestWhenItSaysDone) {
   struct Case {
     double acceleration, deceleration, seconds;
@@ -71,9 +71,9 @@ TEST(Wheels, IsAtItsGoalAndAtRestWhenItSaysDone) {
   }
 }
 
-// Four wheels at (+-a, +-b) with the same friction in all directions: a turn on the spot is where
-// the moment of what slips vanishes, at omega = omega_wheels b^2 / (a^2 + b^2). Neither friction
-// nor load nor heading is in it.
+// Four wheels at (+-a, +-b) with the same friction in all directions: in a turn on the spot the
+// moment of the slipping wheels vanishes at omega = omega_wheels b^2 / (a^2 + b^2), which depends
+// neither on friction nor on load or heading.
 TEST(Wheels, SkidSteeringTurnsAsCoulombHasIt) {
   const double a = 0.13, b = 0.2;
   for (const double heading : {0.0, 0.4, 2.0}) {
@@ -107,7 +107,7 @@ TEST(Wheels, TheTorqueLimitLimitsTheAcceleration) {
 }
 
 // A motor of 0.2 N m and 400 rad/s behind a gear of 20: 4 N m at stall, 20 rad/s without a load.
-// The robot comes near to that as v = v0 (1 - exp(-t / tau)), tau = M v0 / F, and no further.
+// The robot approaches that as v = v0 (1 - exp(-t / tau)), tau = M v0 / F, and no further.
 TEST(Wheels, TheMotorsLineEndsAtItsNoLoadRate) {
   Sim sim(plane_sdf() +
           wheeled("0 0 0 0 0 0",
@@ -132,7 +132,7 @@ TEST(Wheels, FourWheelsShareTheWeight) {
     EXPECT_NEAR(contact.force, 20.0 * 9.8 / 4.0, 2.0);
 }
 
-// A loop over the gyro makes up for what skids; a wrong gyro is believed.
+// A control loop over the gyro compensates for skidding; a wrong gyro is trusted.
 TEST(Wheels, AYawLoopTurnsAtTheGyrosRate) {
   for (const double error : {0.0, 0.05}) {
     Sim sim(plane_sdf() + wheeled("0 0 0 0 0 0.3",
@@ -145,8 +145,8 @@ TEST(Wheels, AYawLoopTurnsAtTheGyrosRate) {
   }
 }
 
-// Primitives end where the odometry has them: a rotation by 90 degrees that skids is done too
-// early, and one of a robot whose track is calibrated to what skids is right.
+// Primitives end by the odometry: a rotation by 90 degrees that skids ends too early, and one with
+// a track that is calibrated for skidding is right.
 TEST(Wheels, PrimitivesBelieveTheOdometry) {
   const double skid = (0.13 * 0.13 + 0.2 * 0.2) / (0.2 * 0.2);
   for (const bool calibrated : {false, true}) {
@@ -220,8 +220,8 @@ TEST(Wheels, StandsAcrossASlopeWithTheFrictionOfItsFile) {
   }
 }
 
-// Two wheels, and a caster before and behind: rigid, the casters may carry all of the load, for
-// nothing says how it is shared. Sprung ones leave it to the wheels.
+// Two wheels, and a caster ahead and behind: rigid casters may carry all of the load, since rigid
+// bodies do not determine how it is shared. Sprung ones leave it to the wheels.
 TEST(Wheels, SprungCastersLeaveTheLoadToTheWheels) {
   const auto wheel = [](const std::string& name, const std::string& y) {
     return "<link name='" + name + "'><pose>0 " + y +

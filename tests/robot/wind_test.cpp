@@ -1,4 +1,4 @@
-// The wind, and what it pushes: closed forms of dv/dt = gain (wind - v).
+// Wind and what it pushes: closed forms of dv/dt = gain (wind - v).
 #include "robot/wind.h"
 
 #include <cmath>
@@ -116,8 +116,8 @@ TEST(Wind, MovesWhatStandsWhenItIsStrongEnough) {
   EXPECT_GT(position(strong, "crate/l").x(), 0.05);
 }
 
-// The model says it for its links, and a link for itself; of links that are one body those that
-// feel it are pushed, where they are.
+// A model may enable wind for its links, and a link for itself; of links that form one body the
+// enabled ones are pushed, where they are.
 TEST(Wind, OfAModelAndOfOneLink) {
   const auto pair = [](const std::string& name, const std::string& of_model,
                        const std::string& of_link, const std::string& y) {

@@ -1,4 +1,4 @@
-// CDR by hand: alignment, texts, sequences, both byte orders, and bytes that lie.
+// CDR by hand: alignment, strings, sequences, both byte orders, and malformed bytes.
 #include "ros2/cdr.h"
 
 #include <gmock/gmock.h>

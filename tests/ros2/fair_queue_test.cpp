@@ -1,4 +1,4 @@
-// In turn, and at a pace: times by hand.
+// Fair turns and a limited rate, with times set by hand.
 #include "ros2/fair_queue.h"
 
 #include <chrono>

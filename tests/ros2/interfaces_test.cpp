@@ -1,5 +1,4 @@
-// Hashes against those that ROS 2's own packages have; test_bag.py holds all of them against
-// rosbags.
+// Hashes against those of ROS 2's own packages; test_bag.py compares all of them with rosbags.
 #include "ros2/interfaces.h"
 
 #include <gmock/gmock.h>

@@ -1,4 +1,4 @@
-// The node over a transport of the test's own.
+// The node over a transport that the test provides.
 #include "ros2/node.h"
 
 #include <map>

@@ -1,4 +1,4 @@
-// Requests of many ROS clients as one client of the run's.
+// Requests of many ROS clients reach the run as those of one client.
 #include "ros2/requests.h"
 
 #include <chrono>
@@ -15,7 +15,7 @@
 namespace ruedo::ros2 {
 namespace {
 
-// A run that answers when the test says so.
+// A run that answers when the test tells it to.
 struct FakeRun {
   std::vector<request_t> got;
   std::vector<int32_t> answers;  // their codes
@@ -56,7 +56,7 @@ TEST(Requests, WhoAsksMuchHasItsShare) {
   FakeRun run;
   run.join();
   for (int i = 0; i < 100; ++i) run.ask(1, 1);
-  // 4 at the run, 32 wait; the others are refused.
+  // 4 are with the run, 32 wait; the others are refused.
   EXPECT_EQ(run.got.size(), Requests::kMostPendingOfOne);
   EXPECT_EQ(run.answers, std::vector<int32_t>(64, reply_t::REFUSED));
   run.ask(2, 2);

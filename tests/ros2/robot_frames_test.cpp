@@ -15,8 +15,8 @@ namespace {
 using testing::HasSubstr;
 using testing::Not;
 
-// A robot whose links lie beside their joints, whose left wheel's axis points to the right, and
-// whose names are those of others.
+// A robot whose links are not at their joints, whose left wheel's axis points to the right, and
+// whose names are already taken.
 constexpr const char* kRobot = R"(
   <sdf version='1.9' xmlns:ruedo='urn:ruedo'><world name='w'><model name='bot'>
     <link name='base_link'><pose>0 0 0.3 0 0 0</pose>
@@ -46,7 +46,7 @@ const LinkFrame& frame(const RobotFrames& robot, const std::string& name) {
   throw std::runtime_error("no frame " + name);
 }
 
-// The bodies of Eigen's vectors compare exactly, and here nothing is rounded but by addition.
+// Compares Eigen's vectors exactly: here nothing is rounded except by additions.
 void expect_at(const Pose& X, double x, double y, double z) {
   EXPECT_LT((X.translation - Vec3(x, y, z)).norm(), 1e-12) << X.translation.transpose();
 }

@@ -1,4 +1,4 @@
-// A state that is not finite: the run ends with the one before, and says of which body.
+// A state that is not finite: the run ends with the state before it, and names the body.
 #include <algorithm>
 
 #include <gmock/gmock.h>
@@ -37,7 +37,7 @@ TEST(BrokenState, EndsTheRunAndIsNotPublished) {
   const auto thing = std::find_if(bodies.begin(), bodies.end(),
                                   [](const auto& body) { return body.name == "thing/l"; });
   ASSERT_NE(thing, bodies.end());
-  // No input does this, so the test reaches into the physics, which stands still.
+  // No input causes this, so the test manipulates the physics while it stands still.
   const_cast<physics::PhysicsWorld&>(simulation.physics())
       .set_twist(BodyIndex(thing - bodies.begin()), {Vec3(nan, 0, 0), Vec3::Zero()});
   pacer.set_limit(1000);
@@ -46,8 +46,8 @@ TEST(BrokenState, EndsTheRunAndIsNotPublished) {
   EXPECT_THAT(simulation.end(), testing::HasSubstr("'thing/l'"));
 }
 
-// The renderer is made again when a model comes or goes, and may not be had a second time; nor for
-// the way back.
+// The renderer is created again when a model comes or goes, which may fail the second time, and
+// again on the way back.
 TEST(BrokenState, NobodyGoesOnWithoutARenderer) {
   engine::Channels channels;
   Findings findings;

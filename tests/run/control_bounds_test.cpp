@@ -1,5 +1,5 @@
-// What one client asks for holds nobody else up, and is bounded: STEPs, sequences, sessions, texts,
-// requests before there is a state.
+// What one client asks for is bounded, and delays nobody else: STEPs, sequences, sessions, texts,
+// requests before the first state.
 #include <gtest/gtest.h>
 
 #include "control_client.h"
@@ -130,7 +130,7 @@ grant_request_t grant(int64_t granted, int64_t until) {
   return body;
 }
 
-// A rate that nobody waits for would stop the run of those who grant.
+// A rate that is too slow to wait for would stop the run of the clients that grant.
 TEST(InLockstep, NobodyElseSetsThePace) {
   Controlled client;
   client.begin(in_lockstep(), kRobot);
@@ -142,7 +142,8 @@ TEST(InLockstep, NobodyElseSetsThePace) {
   EXPECT_NE(reply.text.find("grants"), std::string::npos) << reply.text;
 }
 
-// Before its first state lockstep answers what cannot be done yet, and everybody behind it.
+// Before its first state a lockstep run refuses what is not possible yet, and still answers
+// everybody else.
 TEST(BeforeLockstep, NobodyIsHeldUp) {
   Controlled client;
   client.begin(in_lockstep(), kRobot);

@@ -1,5 +1,5 @@
-// Resets of the time and of the poses alone, of everything after models came; hostile requests;
-// comings and goings for long.
+// Resets of the time, of the poses, and of everything after models were spawned; hostile requests;
+// models that come and go for a long time.
 #include <cmath>
 #include <fstream>
 
@@ -134,8 +134,8 @@ TEST_F(EditsResetTest, TheLogHasWhatWasChangedAndWhen) {
   EXPECT_EQ(applied, expected);
 }
 
-// Spawns, commands to guests, poses, twists, resets of parts and of all: repeated from the log, the
-// same bytes.
+// Spawns, commands to spawned robots, poses, twists, partial and full resets: repeated from the
+// log, they give the same bytes.
 TEST_F(EditsResetTest, ARunWithChangesIsRepeatedFromItsLog) {
   const std::string models =
       robot_sdf("r", 0, 0, imu()) + box_sdf("box", "0.2 0.2 0.2", false, 2, 0, 0.1);
@@ -176,7 +176,7 @@ TEST_F(EditsResetTest, ARunWithChangesIsRepeatedFromItsLog) {
   EXPECT_GT(verification.messages, 300);
 }
 
-// Each is answered with what is wrong; nothing stops, and nothing changes.
+// Each is answered with its error; nothing stops, and nothing changes.
 TEST_F(EditsResetTest, HostileRequestsAreAnsweredInWords) {
   begin(paused_server(), robot_sdf("r", 0, 0) + box_sdf("box", "0.2 0.2 0.2", false, 2, 0, 0.1));
   step(10);

@@ -85,7 +85,7 @@ TEST_F(EditsTest, ASpawnedRobotIsThereAndDrives) {
   step(200);
   EXPECT_NEAR(state("guest").position[0], 2.5, 1e-9);
   EXPECT_NEAR(state("r").position[0], 0.0, 1e-12);
-  // Samples count from the step that first showed it: 11, then every 20 ms.
+  // Samples count from the step that first showed the robot: 11, then every 20 ms.
   const auto poses = on<pose_t>("guest/pose", from);
   ASSERT_EQ(poses.size(), 50u);
   EXPECT_EQ(poses[0].utime, 55'000);
@@ -113,7 +113,7 @@ TEST_F(EditsTest, RaysMeetWhatCameAndNotWhatWent) {
   EXPECT_NEAR(range(), 2.9, 1e-6);
   ASSERT_EQ(remove("wall").code, reply_t::OK);
   EXPECT_EQ(range(), static_cast<float>(kInfinity));
-  // In the place of the one that was removed, elsewhere.
+  // In the slot of the removed one, at another place.
   ASSERT_EQ(spawn(as_file(box_sdf("wall", "0.2 2 1", true)), 5, 0).code, reply_t::OK);
   EXPECT_NEAR(range(), 4.9, 1e-6);
 }

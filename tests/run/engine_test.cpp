@@ -31,7 +31,7 @@ struct Command {
   }
 };
 
-// One message as both sides tell it.
+// One message in a form that both sides share.
 using Told = std::vector<std::pair<std::string, std::vector<uint8_t>>>;
 
 const char* const kScan =
@@ -95,7 +95,7 @@ std::map<int64_t, Told> by_server(const std::shared_ptr<const model::WorldModel>
   return told;
 }
 
-// Each copy of the world, with the same commands.
+// Each copy of the world gets the same commands.
 std::vector<std::map<int64_t, Told>> by_engine(Engine& engine, const std::vector<Command>& commands,
                                                int64_t steps) {
   std::vector<std::map<int64_t, Told>> told(static_cast<size_t>(engine.worlds()));
@@ -159,7 +159,7 @@ TEST(Engine, ACopyThatIsResetIsAFreshOne) {
   EXPECT_TRUE(by_engine(used, after, 200) == by_engine(fresh, after, 200));
 }
 
-// The bytes of other worlds and devices are tests/engine/test_snapshots.py's.
+// tests/engine/test_snapshots.py compares the bytes of other worlds and devices.
 TEST(Engine, ASavedWorldGoesOnAsItWentOn) {
   for (unsigned seed = 1; seed < 5; ++seed) {
     std::mt19937 random(seed);
@@ -190,7 +190,7 @@ TEST(Engine, ASavedWorldGoesOnAsItWentOn) {
   }
 }
 
-// Of sensors that do not say how: Noise of test_determinism.cpp.
+// Sensors that do not define it: Noise of test_determinism.cpp.
 TEST(Engine, ASensorThatCannotBeCopiedIsNamed) {
   Engine engine(load_text(robot_sdf("a", 0, 0, "<sensor name='S' type='test_noise'/>")), {});
   engine.step(10);
@@ -235,8 +235,8 @@ TEST(Engine, ArraysFollowTheRuns) {
   EXPECT_EQ(value_of(position, 0), 0.0);
 }
 
-// What is wrong with a <sensor> costs that sensor, and is told; the rest of the world runs. A wrong
-// element of Ruedo's own is its author's.
+// A faulty <sensor> costs only that sensor, and is reported; the rest of the world runs. A faulty
+// element of Ruedo's own is an error.
 TEST(Engine, GoesOnWithoutASensorThatIsWrittenWrongly) {
   const std::string wrong =
       "<sensor name='laser' type='ray'><ray><scan><horizontal><samples>-3</samples></horizontal>"

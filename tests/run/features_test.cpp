@@ -1,5 +1,5 @@
-// The bitmap in ruedo/info against what the server answers: a kind is served exactly where its bit
-// says so.
+// The bitmap in ruedo/info against what the server answers: a request kind is served exactly if its
+// bit is set.
 #include <filesystem>
 
 #include "control_client.h"
@@ -10,7 +10,7 @@ namespace {
 
 class Features : public testing::Test, protected Controlled {
  protected:
-  // Requests with an empty body: what is served finds something wrong with it, or does it.
+  // Requests with an empty body: a served kind reports an error in it, or is executed.
   void expect_truth(const RunOptions& options) {
     begin(options, robot_sdf("r", 0, 0));
     if (options.lockstep.clients > 0) {  // step 0 waits for its client

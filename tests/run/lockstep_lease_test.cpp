@@ -1,4 +1,4 @@
-// Lockstep's leases, and grants that are none.
+// Lockstep's leases, and invalid grants.
 #include <algorithm>
 #include <atomic>
 #include <cmath>
@@ -59,7 +59,7 @@ class LockstepTest : public testing::Test {
   }
   LockstepClient client(const std::string& name) { return {bus_, server_->channels(), name}; }
 
-  // The newest state, as the server answers a client that has received so much.
+  // The newest state, as the server answers a client that has received that much.
   static int64_t newest(LockstepClient& client, int64_t received) {
     resend_request_t body;
     body.received = received;
@@ -89,8 +89,8 @@ class LockstepTest : public testing::Test {
 TEST_F(LockstepTest, PausesForASilentClientAndGoesOnWithIt) {
   begin(2, Policy::pause, 0.3);
   TWO_CLIENTS
-  // While its lease lasts nobody else has its name; when it has ended somebody may, and begins
-  // where it stood.
+  // While the lease lasts nobody else can take its name; after it has ended somebody may, and
+  // begins where it stood.
   LockstepClient other = client("b");
   other.join();
   for (bool there = false; !there;) {
@@ -108,7 +108,8 @@ TEST_F(LockstepTest, PausesForASilentClientAndGoesOnWithIt) {
   stepping.join();
   EXPECT_EQ(a.have(), 10);
   EXPECT_EQ(other.have(), 10);
-  // It gets all that b has not said it has: all, or what came after b asked for a lost message.
+  // It gets everything that b has not acknowledged: all, or what came after b asked for a lost
+  // message.
   const int64_t first = other.seen().begin()->first;
   EXPECT_LE(first, b.have() + 1);
   EXPECT_EQ(other.seen().size(), static_cast<size_t>(10 - first + 1));
@@ -166,7 +167,7 @@ TEST_F(LockstepTest, LeavingAndJoiningOnTheWayAreRecorded) {
   EXPECT_EQ(found, (std::vector<std::string>{"join a 0", "join b 0", "leave b 3", "join c 10"}));
 }
 
-// A grant and what came of it: the code, 0 for good, -1 for no answer.
+// A grant and its result: the code, 0 for success, -1 for no answer.
 class HostileGrants : public LockstepTest {
  protected:
   int32_t code(const grant_request_t& grant) {
@@ -266,8 +267,8 @@ TEST_F(HostileGrants, MoreCommandsThanAreHeldAreRefused) {
   std::vector<uint8_t> bytes = engine::encoded(many);
   ASSERT_GT(bytes.size(), 1u << 19);
   EXPECT_EQ(code(many), reply_t::BAD_REQUEST);  // the first has no channel
-  // 512 kB a grant, all for a far step: at the limit they wait without an answer, and the run goes
-  // on.
+  // 512 kB in each grant, all for a distant step: at the limit grants wait without an answer, and
+  // the run continues.
   const std::vector<uint8_t> good = velocity(0.1);
   int taken = 0;
   int64_t granted = 4;
@@ -332,7 +333,7 @@ TEST_F(HostileGrants, AllAtOnceGoesAsFarAsIsKept) {
             reply_t::OK);  // the last one is not looked at
 }
 
-// A message of LCM's that is cut in fragments may come together wrongly where some are lost.
+// If fragments are lost, LCM may reassemble a fragmented message wrongly.
 TEST_F(HostileGrants, AReplyIsOneDatagram) {
   client_->send(request_t::GRANT, client_->next_sequence(), engine::encoded(grant(4, 5, 4)));
   while (newest(*client_, 4) < 5) {

@@ -1,5 +1,5 @@
-// Lockstep over a bus that loses, doubles and reorders: the same states and every message, whatever
-// is lost.
+// Lockstep over a bus that loses, duplicates and reorders: the same states and every message,
+// whatever is lost.
 #include <cmath>
 #include <map>
 #include <set>
@@ -41,8 +41,8 @@ struct Result {
   size_t lost = 0;
 };
 
-// A run with `clients` clients, each in a thread of its own and with grants of its own length. Each
-// drives the robot of its number, and all of them say something different to r0 at every 50th step.
+// A run with `clients` clients, each in a thread of its own and with its own grant length. Each
+// drives the robot with its number, and at every 50th step all send r0 different commands.
 Result run(int clients, Faults faults, unsigned seed) {
   LossyBus bus(faults, seed);
   RunOptions options = fast(1e6);

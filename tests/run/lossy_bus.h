@@ -1,5 +1,5 @@
-// A bus that loses, doubles and reorders messages, each way and for each listener apart, by a
-// seeded generator.
+// A bus that loses, duplicates and reorders messages, independently for each direction and
+// listener, by a seeded generator.
 #pragma once
 
 #include <chrono>
@@ -27,7 +27,7 @@ class LossyLink {
  public:
   LossyLink(Faults faults, unsigned seed) : faults_(faults), random_(seed) {}
 
-  // Calls deliver for what arrives now.
+  // Calls deliver for each message that arrives now.
   template <class Deliver>
   void pass(const Message& message, Deliver&& deliver) {
     std::optional<Message> before = std::move(late_);

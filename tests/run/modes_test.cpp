@@ -1,4 +1,4 @@
-// The three modes without a run: what each lets go, on a gate that only writes down its limit.
+// The three modes without a run: which steps each permits, with a gate that only records its limit.
 #include <limits>
 
 #include <gmock/gmock.h>

@@ -1,4 +1,4 @@
-// A log of bounded size: what acted is whole, what was published is there up to the end.
+// A log of bounded size: inputs are complete, and the published messages are there up to the end.
 #include <filesystem>
 #include <set>
 

@@ -27,7 +27,7 @@ struct Message {
   std::vector<uint8_t> bytes;
 };
 
-// Keeps what is published, and lets a test send.
+// Keeps what is published, and lets a test send messages.
 class MemoryBus : public Bus {
  public:
   bool keep = true;  // false: only counts
@@ -97,7 +97,7 @@ class MemoryBus : public Bus {
   size_t count_ = 0;
 };
 
-// A file that goes with the test.
+// A file that a test needs beside its world.
 class TemporaryFile {
  public:
   explicit TemporaryFile(const std::string& name)
@@ -154,7 +154,7 @@ inline std::shared_ptr<const model::WorldModel> load_text(const std::string& mod
   return model::load_world_text(world_sdf(models), "test.sdf");
 }
 
-// As fast as it goes, for `seconds` of sim time.
+// At full speed, for `seconds` of sim time.
 inline RunOptions fast(double seconds, uint64_t seed = 1) {
   RunOptions options;
   options.rate = std::numeric_limits<double>::infinity();

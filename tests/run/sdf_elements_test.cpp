@@ -24,7 +24,7 @@ TEST(SdfElements, NoneOfASensorIsSilent) {
   EXPECT_EQ(test::silent_ones(of_sensors, load), "");
 }
 
-// Where the file is read, or where the device is made: not twice.
+// Reported when the file is read, or when the device is created, but not twice.
 TEST(SdfElements, AnUnknownOneInASensorIsNamedOnce) {
   const auto count = [](const std::string& text, const std::string& word) {
     const auto world = model::load_world_text(text, "/nowhere/w.sdf");

@@ -1,4 +1,4 @@
-// Sinks beside the bus: what they hear, and that a slow one holds nobody up.
+// Sinks beside the bus: what they receive, and that a slow one delays nobody.
 #include <atomic>
 #include <condition_variable>
 #include <mutex>
@@ -13,7 +13,7 @@
 namespace ruedo::run {
 namespace {
 
-// Writes down what it is called with; may be held up.
+// Records its calls; may be blocked.
 class Notes : public Sink {
  public:
   explicit Notes(Hears hears = {}) : hears_(hears) {}
@@ -141,7 +141,7 @@ TEST(Run, HandsTheSameMessagesToEverySink) {
   EXPECT_GT(by_bus["ruedo/tick"], 0);
 }
 
-// A middleware of its own: it hears in a thread, and commands from there.
+// Another middleware: it receives in a thread, and sends commands from there.
 TEST(Run, TakesCommandsFromASink) {
   class Driver : public Sink {
    public:
@@ -169,7 +169,7 @@ TEST(Run, TakesCommandsFromASink) {
   server.run();  // ends because the robot drives
 }
 
-// The robot is there again, and its commands are heard again.
+// The robot is there again, and its commands are received again.
 TEST(Run, ListensToARobotThatAResetBringsBack) {
   class ListeningBus : public MemoryBus {
    public:

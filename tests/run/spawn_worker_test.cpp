@@ -1,4 +1,4 @@
-// SPAWN: its model is made ready beside the run, and enters at a step that the log has.
+// SPAWN: its model is prepared beside the run, and enters at a step that the log records.
 #include <future>
 
 #include <gtest/gtest.h>
@@ -15,7 +15,7 @@ namespace {
 const std::string kRobot = robot_sdf("r", 0, 0);
 const std::string kBox = as_file(box_sdf("box", "0.2 0.2 0.2", false));
 
-// Holds models back until it is opened.
+// Holds back models until it is opened.
 struct Gate {
   std::promise<void> open;
   std::shared_future<void> opened = open.get_future().share();
@@ -105,7 +105,7 @@ TEST(SpawnWorker, FewWait) {
   gate.open.set_value();
 }
 
-// What the end of a run may wait for is no import of meshes.
+// The end of a run never waits for the import of a mesh.
 TEST(SpawnWorker, TheEndWaitsForNoModel) {
   Gate gate;
   Controlled client;

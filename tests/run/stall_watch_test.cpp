@@ -1,4 +1,4 @@
-// A run that does not go on says why: whom it waits for, which sensor, which request, which sink.
+// A run that does not progress says why: the client, sensor, request or sink that it waits for.
 #include <condition_variable>
 #include <mutex>
 
@@ -42,7 +42,7 @@ TEST(StallWatch, TellsOnceWhoIsWaitedFor) {
   EXPECT_EQ(told.size(), 2u);
 }
 
-// What is told; and something that waits until it was.
+// Records what is reported, and waits for a report.
 class Told {
  public:
   void tell(const std::string& reason) {
@@ -70,7 +70,7 @@ TEST(StallWatch, TellsWhichRequestHoldsThePublisherUp) {
   EXPECT_EQ(told.wait(), "a request is being executed: RESTORE of 'planner'");
 }
 
-// A run that is held up until it has said why.
+// A run that is blocked until it has said why.
 std::string reason_of(RunOptions options, const std::string& inside, MemoryBus& bus, Told& told) {
   Run run(load_text(robot_sdf("r", 0, 0, inside)), std::move(options), bus);
   run.on_stall([&](const std::string& reason) {

@@ -1,4 +1,4 @@
-// Requests over the bus: pause, step, reset, exactly once; and commands that are none.
+// Requests over the bus: pause, step, reset, exactly once; and malformed commands.
 #include <algorithm>
 #include <atomic>
 #include <cmath>
@@ -55,7 +55,7 @@ TEST_F(ControlTest, StartsPausedAndSteps) {
   EXPECT_EQ(decoded<state_reply_t>(reply.body).step, 1);
   reply = step(99);
   EXPECT_EQ(decoded<state_reply_t>(reply.body).step, 100);
-  // All of its messages are out before the reply: poses at 0, 20, ... 500 ms.
+  // All messages of the steps are out before the reply: poses at 0, 20, ... 500 ms.
   int poses = 0;
   for (const Message& message : bus_.messages()) poses += message.channel == "r/pose";
   EXPECT_EQ(poses, 26);
@@ -187,7 +187,7 @@ std::vector<uint8_t> with_bytes(std::vector<uint8_t> bytes, size_t at,
   return bytes;
 }
 
-// Messages that are none: each is counted, nothing stops, and the last good command stays.
+// Malformed messages: each is counted, nothing stops, and the last valid command stays in effect.
 TEST_F(ControlTest, SurvivesHostileMessages) {
   begin(paused());
   join();
@@ -244,17 +244,17 @@ TEST_F(ControlTest, SurvivesHostileMessages) {
     EXPECT_EQ(server().inbox().refused(), before + 1)
         << channel << " with " << bytes.size() << " bytes";
   }
-  // Of other channels, or of robots that there are not: nothing at all.
+  // On other channels, or for robots that do not exist: ignored.
   bus_.send("nobody/velocity", velocity);
   bus_.send("", {});
   bus_.send("r/joint_command", with_bytes(joints, 20, {0x7f, 0xff, 0xff, 0xff}));
-  // Values that are none are refused by the robot; its last good command stays.
+  // The robot refuses values that are not finite; its last valid command stays in effect.
   for (const double bad : {std::nan(""), HUGE_VAL, -HUGE_VAL}) {
     velocity_command_t command = good;
     command.vx = bad;
     bus_.send("r/velocity", engine::encoded(command));
   }
-  // Requests that are none.
+  // Malformed requests.
   for (const auto& bytes : {std::vector<uint8_t>{}, std::vector<uint8_t>(8, 0xff), velocity})
     bus_.send("ruedo/request", bytes);
   std::vector<uint8_t> bad = engine::encoded(request(request_t::PAUSE));
@@ -268,7 +268,7 @@ TEST_F(ControlTest, SurvivesHostileMessages) {
   EXPECT_NEAR(state.position[0], 0.25, 1e-9);  // 1 s at 0.25 m/s, without a gap
 }
 
-// A flood costs nothing but the flooder's own commands: the newest count.
+// A flood displaces only the sender's own commands: the newest ones count.
 TEST_F(ControlTest, KeepsTheNewestCommands) {
   begin(paused());
   join();
@@ -304,7 +304,7 @@ TEST_F(ControlTest, ControlOff) {
   for (const Message& message : bus_.messages()) EXPECT_NE(message.channel, "ruedo/reply");
 }
 
-// Without a server: the world's first state is late, and who asks for it waits in order.
+// Without a server: the world's first state is late, and requests wait for it in order.
 TEST(Control, WaitsForTheFirstState) {
   bool state_comes = true;
   std::vector<int32_t> executed;

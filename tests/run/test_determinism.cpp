@@ -1,5 +1,4 @@
-// The bytes of a run depend on the world, the seed and the commands, and on nothing that threads
-// do.
+// The bytes of a run depend on the world, the seed and the commands, and not on thread scheduling.
 #include <random>
 
 #include <gtest/gtest.h>
@@ -12,7 +11,7 @@
 namespace ruedo::run {
 namespace {
 
-// A sensor that tells pure noise, at 50 Hz.
+// A sensor that publishes pure noise, at 50 Hz.
 class Noise : public Sensor {
  public:
   explicit Noise(const SensorSetup& setup)
@@ -30,7 +29,8 @@ class Noise : public Sensor {
   int channel_;
 };
 
-// The same, wrongly: all devices draw from one generator, so that the order of the threads shows.
+// The same, done wrongly: all devices draw from one generator, so that the order of the threads
+// shows.
 class SharedNoise : public Sensor {
  public:
   explicit SharedNoise(const SensorSetup& setup) : channel_(setup.channel<pose_t>()) {}
@@ -85,7 +85,7 @@ struct Variation {
   double rate = std::numeric_limits<double>::infinity();
 };
 
-// The log of two seconds of driving robots. The commands wait before the first step.
+// The log of two seconds of driving robots. The commands are queued before the first step.
 std::string log_of(const std::shared_ptr<const model::WorldModel>& world,
                    const Variation& variation) {
   const TemporaryFile file("determinism.lcmlog");
@@ -134,8 +134,8 @@ TEST(Determinism, ThreadsBatchesAndSleepsChangeNothing) {
   EXPECT_TRUE(one == log_of(world, {.rate = 20.0}));
 }
 
-// Were this to fail, the comparison above would prove nothing: a module whose devices share a
-// generator must show.
+// If this failed, the comparison above would prove nothing: a module whose devices share a
+// generator must give different bytes.
 TEST(Determinism, SharedGeneratorIsCaught) {
   const auto world = load_text(fleet(40, "test_shared"));
   const std::string first = log_of(world, {.threads = 4, .sleeps = true});

@@ -1,5 +1,5 @@
 // A hundred P3-ATs with all their ray sensors: the same bytes with every number of threads, and no
-// allocation once they are on their way.
+// allocations in the steady state.
 #include <gtest/gtest.h>
 
 #include <thread>
@@ -80,7 +80,7 @@ TEST(Hundred, SameBytesForOneTwoAndEightThreads) {
   EXPECT_TRUE(one == log_of(robots, 8));
 }
 
-// Straight on, into the walls and into those who stand there already.
+// Straight ahead, into the walls and into robots that stand there already.
 void drive_into_walls(run::Run& server, int robots) {
   move_command_t command{};
   command.kind = move_command_t::ADVANCE;
@@ -112,7 +112,7 @@ uint64_t allocations_in_thousand_steps(int robots, void (*drive)(run::Run&, int)
   return at_end - at_start;
 }
 
-// On a busy machine a worker may take its first piece of work late, and makes its buffers then.
+// On a busy machine a worker may get its first piece of work late, and allocates its buffers then.
 uint64_t of_late_workers() {
   constexpr uint64_t kBuffersOfAThread = 5;
   return kBuffersOfAThread * std::thread::hardware_concurrency();
@@ -134,7 +134,7 @@ TEST(Hundred, NewContactsAllocateNothing) {
 #if defined(__SANITIZE_THREAD__)
   GTEST_SKIP() << "with the thread sanitizer a parallel loop starts threads, which allocates";
 #endif
-  // Reports of collisions grow with what is touched: a batch's buffer of messages may grow once.
+  // Collision messages grow with the number of contacts: a batch's message buffer may grow once.
   EXPECT_LE(allocations_in_thousand_steps(10, drive_into_walls),
             engine::Simulation::kBatches + of_late_workers());
 }

@@ -1,4 +1,4 @@
-// Logs: the format, the header, the commands that took effect, and a full disk.
+// Logs: the format, the header, the applied commands, and a full disk.
 #include <algorithm>
 
 #include <gtest/gtest.h>
@@ -68,7 +68,7 @@ TEST(Writer, AFullDiskIsSaid) {
   EXPECT_THROW(log::Writer("/nowhere/at/all.lcmlog"), EnvironmentError);
 }
 
-// However many bytes there is room for, the log ends with the last whole event.
+// However many bytes there is room for, the log ends with a complete event.
 TEST(Writer, ADiskThatIsFullAtAnyByteLeavesAWholeLog) {
   const uint8_t bytes[100] = {};
   constexpr int64_t kEvent = 28 + 7 + 100;  // head, channel, data

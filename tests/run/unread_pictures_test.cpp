@@ -1,4 +1,4 @@
-// Pictures that nobody reads are not drawn, and those that somebody reads are what they would be.
+// Pictures that nobody reads are not drawn, and those that somebody reads are the same as ever.
 #include <algorithm>
 #include <atomic>
 #include <mutex>
@@ -12,7 +12,7 @@
 namespace ruedo::run {
 namespace {
 
-// Knows who listens, as a bus of connections does.
+// Knows its listeners, as a bus with connections does.
 class HeardBus : public MemoryBus {
  public:
   void hear(const std::string& channel) {
@@ -66,7 +66,7 @@ TEST(UnreadPictures, WhoComesLaterReadsWhatAllOthersWouldHaveRead) {
   server.run();
   const auto all = on(everything, "r/eye"), late = on(bus, "r/eye");
   ASSERT_EQ(all.size(), 61u);
-  // Not those of the first 100 steps; but soon: at most 4 batches of 32 steps are on their way.
+  // Not those of the first 100 steps, but soon: at most 4 batches of 32 steps are in flight.
   ASSERT_LT(late.size(), 51u);
   ASSERT_GT(late.size(), 30u);
   EXPECT_TRUE(std::equal(late.rbegin(), late.rend(), all.rbegin()));
@@ -89,7 +89,7 @@ TEST(UnreadPictures, ALogHasAll) {
   EXPECT_EQ(intrinsics, 21);
 }
 
-// Whoever subscribes before a STEP or a RESET has its pictures.
+// A client that subscribes before a STEP or a RESET gets its pictures.
 TEST(UnreadPictures, AStepIsForThoseWhoListen) {
   ControlledOn<HeardBus> server;
   RunOptions options = fast(1e9);

@@ -21,7 +21,7 @@ TEST(WorldEditor, FindsTheFirstUnusedName) {
   EXPECT_EQ(unused_name(with({"cart"}), "cart"), "cart_2");
   EXPECT_EQ(unused_name(with({"cart", "cart_2", "cart_4"}), "cart"), "cart_3");
   EXPECT_EQ(unused_name(with({"cart", "cart_3"}), "cart"), "cart_2");
-  // Not of that row: 0 and 1, what is no number, and numbers written otherwise.
+  // Not part of that series: 0 and 1, what is not a number, and numbers in another notation.
   EXPECT_EQ(unused_name(with({"cart", "cart_0", "cart_1", "cart_x", "cart_", "cart_02", "cart_2x",
                               "cart_-2", "carts_2"}),
                         "cart"),

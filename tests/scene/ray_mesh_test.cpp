@@ -22,7 +22,7 @@ struct Alone {
 };
 
 // From outside through every corner, edge and face of a closed mesh, aimed as exactly as doubles
-// allow; the ray must stop at the surface and not on the far side.
+// allow; the ray must hit the near surface and not the far one.
 TEST(RayMesh, ClosedMeshNeverLeaks) {
   const auto mesh = ball_mesh(24, 1.0f);
   const Pose pose = Pose::from_xyz_rpy({0.3, -0.2, 0.1}, {0.1, 0.2, 0.3});
@@ -61,7 +61,7 @@ TEST(RayMesh, AxisAlignedRaysThroughAxisAlignedEdges) {
       }
 }
 
-// A closed mesh in another's overlap counts once, and a hole in it is not inside.
+// Where closed meshes overlap each counts once, and a point in a hole is not inside.
 TEST(RayMesh, InsideByWinding) {
   auto two = cube_mesh();  // [-1, 1]^3 and the same moved by 1 along x: they overlap in [0, 1]
   const auto cube = cube_mesh();

@@ -1,5 +1,5 @@
-// The fast caster against the slow one, ray by ray and bit by bit, in random worlds; and what a
-// scene promises: movers, ignored links, ties, limits, bad rays, threads.
+// The fast caster against the slow one, ray by ray and bit by bit, in random worlds; and a scene's
+// guarantees: movers, ignored links, ties, limits, bad rays, threads.
 #include <cstring>
 #include <thread>
 
@@ -107,7 +107,7 @@ TEST(RayScene, RandomWorldsEqualTheReference) {
   EXPECT_GT(inside, 200);
 }
 
-// Many small steps: what is refitted must stay as right as what is built anew.
+// Many small steps: after refitting the results must equal those of a new scene.
 TEST(RayScene, MoversStayRightAfterManySteps) {
   RandomStream random = RandomSource(8, "rays", "movers").stream(0);
   Scenes scenes;
@@ -322,8 +322,8 @@ TEST(RayScene, ThreadsCastTheSame) {
     for (size_t i = 0; i < rays.size(); ++i) ASSERT_TRUE(same_bits(hits[0][i], hits[k][i])) << i;
 }
 
-// Embree takes its threads from TBB, as the modules do for their pieces: it must not keep them from
-// those.
+// Embree takes its threads from TBB, as the modules do for their pieces: it must not withhold them
+// from the modules.
 TEST(RayScene, LeavesTbbItsThreads) {
   constexpr auto kThreads = tbb::global_control::max_allowed_parallelism;
   const tbb::global_control four(kThreads, 4);  // on one core, too

@@ -225,7 +225,7 @@ TEST(RayShapes, HandComputed) {
       }
 }
 
-// The same shapes by their implicit equations: nothing of the ray tests is used here.
+// The same shapes by their implicit equations, which share nothing with the ray tests.
 bool solid(Shape shape, const Vec3& s, const Vec3& p) {
   const double around = std::hypot(p.x(), p.y());
   switch (shape) {

@@ -1,5 +1,4 @@
-// Pictures against what geometry says they must show: depth, labels and places in the picture
-// worked out by hand.
+// Pictures against geometry computed by hand: depth, labels and places in the picture.
 #include <cmath>
 #include <cstdlib>
 #include <fstream>
@@ -17,7 +16,7 @@ namespace {
 
 using model::Shape;
 
-// A world written down in code. Each thing is a model of one link.
+// A world defined in code. Each thing is a model of one link.
 struct World {
   model::WorldModel world;
 

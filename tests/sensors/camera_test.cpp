@@ -57,7 +57,7 @@ const std::string kWall =
     box("wall", "3.5 0 1 0 0 0", "1 40 40", "<diffuse>0.5 0.5 0.5 1</diffuse>");
 const std::string kRaw = "<ruedo:encoding>rgb</ruedo:encoding>";
 
-// A camera with what it sent for one sample.
+// A camera with what it published for one sample.
 struct Shot {
   explicit Shot(const std::string& sdf, SensorBench::Options options = {}, int64_t sample = 0)
       : bench(sdf),
@@ -208,7 +208,7 @@ TEST(Camera, JpegByDefaultInOneDatagram) {
   const cv::Mat picture = cv::imdecode(image.data, cv::IMREAD_COLOR);
   EXPECT_EQ(picture.cols, 640);
   EXPECT_EQ(picture.rows, 480);
-  // A picture of noise hardly shrinks: its quality is lowered until it fits.
+  // A picture of noise hardly compresses: its quality is lowered until it fits.
   Shot noisy(world_with(kWall, "<noise type='gaussian'><stddev>0.1</stddev></noise>"));
   EXPECT_LE(noisy.image().data.size(), 60000u);
   EXPECT_GT(noisy.image().data.size(), 30000u);
@@ -386,7 +386,7 @@ TEST(Camera, VignettingTakesLightInTheCorners) {
   const image_t dark =
       Shot(world_with(kWall, "", kRaw + "<ruedo:vignetting>0.75</ruedo:vignetting>")).image();
   EXPECT_EQ(Shot::value(dark, 320, 240), Shot::value(plain, 320, 240));
-  // Light is the square of the value: a quarter of the light is half the value.
+  // Light is the square of the value: a quarter of the light is half of the value.
   EXPECT_NEAR(Shot::value(dark, 0, 0), 0.5 * Shot::value(plain, 0, 0), 1.0);
 }
 
@@ -424,7 +424,7 @@ TEST(CameraLens, DistortionIsOpenCvs) {
 }
 
 TEST(CameraLens, NothingIsSeenBeyondAFold) {
-  // r (1 - 0.5 r^2) has its maximum 0.5443 at r = 0.8165: no ideal point is seen farther out.
+  // r (1 - 0.5 r^2) has its maximum 0.5443 at r = 0.8165: no ideal point beyond that is visible.
   const Lens lens = lens_of("<distortion><k1>-0.5</k1></distortion>");
   Eigen::Vector2d p;
   EXPECT_TRUE(lens.undistort({0.54, 0.0}, p));
@@ -480,7 +480,7 @@ TEST(Camera, RefusesWhatItCannotBe) {
       {"", "<ruedo:encodings>rgb</ruedo:encodings>", "ruedo:encoding"},
   };
   for (const Case& c : cases) {
-    // The case's elements come first, and the first of a name is read.
+    // The case's elements come first, and of several elements of a name the first is read.
     std::string sdf = world_with("", "", c.in_sensor);
     sdf.replace(sdf.find("<camera>"), 8, "<camera>" + std::string(c.in_camera));
     try {

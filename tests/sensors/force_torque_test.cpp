@@ -54,7 +54,7 @@ struct Bench {
     test::step(device, now, out, index);
     return Device::decode<force_torque_t>(out);
   }
-  // Of a link, by its place in the model.
+  // For a link, by its position in the model.
   size_t body(size_t link) const { return static_cast<size_t>(bench.layout.links.at(link).body); }
   SensorBench bench;
   Device device;
@@ -121,7 +121,7 @@ TEST(ForceTorque, AnArmThatBeginsToTurn) {
   EXPECT_NEAR(m.force[2], -3 * kG + (2 * 0.5 + 1) * alpha, 1e-12);
 }
 
-// The hand lies on a table that carries 4 N of it and rubs it by 1 N to the left.
+// The hand lies on a table that supports 4 N of it and rubs it with 1 N to the left.
 TEST(ForceTorque, ContactsTakeTheirPart) {
   Bench bench(rig(""));
   Contact contact;

@@ -1,6 +1,5 @@
-// Satellite navigation, magnetometer, altimeter, barometer and Pitot tube: values by hand, from
-// published tables and from other programs; noise; what is refused and what is named; many =
-// single.
+// Satellite navigation, magnetometer, altimeter, barometer and Pitot tube: values computed by hand,
+// from published tables and from other programs; noise; errors and findings; many = single.
 #include <cmath>
 #include <functional>
 
@@ -372,7 +371,7 @@ std::vector<uint8_t> encoded(const Message& message) {
   return bytes;
 }
 
-// A device served among others says what it says alone.
+// A device served among others publishes the same as alone.
 TEST(Instruments, ManyEqualSingle) {
   const std::string noise =
       "<noise type='gaussian'><stddev>2</stddev><dynamic_bias_stddev>1"

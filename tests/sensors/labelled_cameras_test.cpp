@@ -39,8 +39,8 @@ std::string box(const std::string& name, const std::string& pose, const std::str
 }
 
 // 100 pixels for a slope of 1, the middle at (100, 50). A crate whose front face is 4.5 m ahead, a
-// second one 3 m to its right, a wall 7.5 m ahead, and a board near by that hides all to the left
-// of the middle, but for nothing of the second crate.
+// second one 3 m to its right, a wall 7.5 m ahead, and a near board that hides everything to the
+// left of the middle, but nothing of the second crate.
 const std::string kThings =
     box("crate", "5 0 1 0 0 0", "1 1 1", thermal("<temperature>310</temperature>"), label(7)) +
     box("other", "5 -3 1 0 0 0", "1 1 1", "", label(7)) +
@@ -145,7 +145,7 @@ TEST(BoxesCamera, FullBoxesAreThoseOfTheCorners) {
   expect_box(seen.boxes[2], "wall", 3, 100, 50, 610 / 7.5, 100 / 7.5, 1e-9);
 }
 
-// Partly outside of the picture, it ends at its edge.
+// Partly outside of the picture, it is cut off at the picture's edge.
 TEST(BoxesCamera, FullBoxesEndAtThePicturesEdge) {
   const boxes_2d_t seen = Shot(world("boundingbox", "<box_type>full_box_2d</box_type>", "",
                                      box("crate", "5 -5 1 0 0 0", "1 2 1", "", label(1))))

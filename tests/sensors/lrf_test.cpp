@@ -1,5 +1,5 @@
 // The laser range finder against scenes worked out by hand; its limits, noise, mirrors and sweep;
-// its refusals.
+// refused configurations.
 #include <cmath>
 
 #include <gmock/gmock.h>
@@ -220,7 +220,8 @@ TEST(Lrf, ResolutionMultipliesTheRays) {
   EXPECT_FLOAT_EQ(scan.radstep, 2.0 / 24);
 }
 
-// As in much copied files: one layer of a hundredth of a ray, and a little more than a full turn.
+// As in a file that is often copied: one layer of a hundredth of a ray, and a little more than a
+// full turn.
 TEST(Lrf, OneRayAtLeast) {
   RayBench bench(
       robot_world(
@@ -246,8 +247,8 @@ TEST(Lrf, FullCircle) {
   EXPECT_NEAR(scan.ranges[180], 2.0, 1e-6);
 }
 
-// Seen at 5 m/s towards a wall at x = 10: with a sweep of 0.1 s the first ray leaves 0.5 m further
-// behind.
+// Moving at 5 m/s towards a wall at x = 10: with a sweep of 0.1 s the first ray starts 0.5 m
+// further back.
 TEST(Lrf, SweepTakesTime) {
   RayBench bench(robot_world(solid("wall", "10.5 0 0 0 0 0", box(1, 9, 9)),
                              lrf(horizontal(3, 0, 0.0), "<max>20</max>",
@@ -331,12 +332,12 @@ TEST(Lrf, NoiseIsTheDevicesOwnAndOfItsSample) {
   EXPECT_NE(first, scan(room, 2, "LRF", 0));
   EXPECT_NE(first, scan(room, 1, "LRF2", 0));
   EXPECT_NE(first, scan(room, 1, "LRF", 1));
-  // A post before the first ray changes the first range and no other.
+  // A post in front of the first ray changes the first range and no other.
   auto with_post = scan(room + solid("post", "2 -1.0926 0 0 0 0", box(0.1, 0.1, 2)), 1, "LRF", 0);
   EXPECT_LT(with_post[0], 2.6f);
   with_post[0] = first[0];
   EXPECT_EQ(with_post, first);
-  // Nor does one that returns nothing.
+  // Nor does a ray without a return.
   auto with_black = scan(room + solid("black", "2 -1.0926 0 0 0 0", box(0.1, 0.1, 2),
                                       "<ruedo:laser_reflectance>0</ruedo:laser_reflectance>"),
                          1, "LRF", 0);

@@ -1,5 +1,5 @@
-// Devices on a wheel that is part of a kinematic robot's body: they turn with it, and the IMU feels
-// that.
+// Devices on a wheel that is part of a kinematic robot's body: they turn with it, and the IMU
+// measures that.
 #include <cmath>
 
 #include <gtest/gtest.h>

@@ -1,5 +1,5 @@
-// A bench on which one sensor is tested without physics and server: an inline world, a snapshot
-// that the test writes itself, and the sensor's messages decoded.
+// A bench that tests one sensor without physics and server: an inline world, a snapshot that the
+// test fills in, and the sensor's messages, decoded.
 #pragma once
 
 #include <memory>
@@ -15,7 +15,7 @@
 
 namespace ruedo::test {
 
-// What a sensor sent: decoded messages of one type on one channel, in order.
+// What a sensor published: decoded messages of one type on one channel, in order.
 struct Device {
   const SensorKind* kind = nullptr;
   Rate rate;
@@ -47,7 +47,7 @@ class SensorBench {
     std::string named_device;
   };
 
-  // `sdf` is a whole SDF file, as if it lay in the folder for temporary files.
+  // `sdf` is a complete SDF file, as if it were in the folder for temporary files.
   explicit SensorBench(const std::string& sdf)
       : world(model::load_world_text(sdf, testing::TempDir() + "/bench.sdf")), layout(*world) {}
 

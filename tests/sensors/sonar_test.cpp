@@ -1,5 +1,5 @@
-// Sonar arrays against scenes worked out by hand: the cone's pattern, average and nearest, firing,
-// echoes that are lost, cross-talk, noise; and the configurations that are refused.
+// Sonar arrays against scenes worked out by hand: the cone's pattern, average and nearest, firing
+// order, lost echoes, crosstalk, noise; and refused configurations.
 #include <cmath>
 
 #include <gmock/gmock.h>

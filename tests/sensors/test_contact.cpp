@@ -1,4 +1,4 @@
-// The contact sensor: which contacts are its own, from whose side they are shown, and that no touch
+// The contact sensor: which contacts are its own, from which side they are shown, and that no touch
 // is lost.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

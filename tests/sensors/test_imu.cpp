@@ -1,5 +1,5 @@
-// The IMU against hand-computed accelerations: at rest, on a ramp, on a lever arm; its noise; its
-// refusals.
+// The IMU against hand-computed accelerations: at rest, on a ramp, on a lever arm; its noise;
+// refused configurations.
 #include <cmath>
 #include <functional>
 
@@ -68,7 +68,7 @@ TEST(Imu, AtRestItShowsGravityUpwards) {
   EXPECT_EQ(bench.device.channels, (std::vector<std::string>{"box/IMU"}));
 }
 
-// Nose up by 0.3 rad (pitch -0.3): gravity is felt along x and z.
+// Nose up by 0.3 rad (pitch -0.3): gravity acts along x and z.
 TEST(Imu, OnARampGravityIsAlongTheRampsAxes) {
   Bench bench(world("", "0 0 0 0 0 0", "0 0 0.5 0 -0.3 1.1"));
   const imu_t m = bench.sample();

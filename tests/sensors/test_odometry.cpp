@@ -44,7 +44,7 @@ std::string world(const std::string& odometry, bool four_wheels = false) {
          odometry + "</ruedo:odometry></model></world></sdf>";
 }
 
-// Turns the wheels of one robot and hands the states to its odometry.
+// Turns the wheels of one robot and passes the states to its odometry.
 class Drive {
  public:
   explicit Drive(const std::string& odometry, bool four_wheels = false,
@@ -155,7 +155,7 @@ TEST(Odometry, TrapezoidFollowsThePapersEquations) {
   EXPECT_NEAR(m.x, 0.025 * std::cos(0.05) + 0.025 * (std::cos(0.15) + std::cos(0.05)), 1e-15);
 }
 
-// Distance (or angle) after t of a way with a trapezoidal speed profile, and its speed.
+// Distance (or angle) after t along a path with a trapezoidal speed profile, and the speed.
 struct Profile {
   double length, speed, acceleration;
   double ramp() const { return speed / acceleration; }
@@ -209,7 +209,7 @@ TEST(Odometry, SquaresCloseWithArcAtEveryStepSize) {
 }
 
 TEST(Odometry, EncoderTicksKeepTheSquareWithinHalfAMillimetre) {
-  // A P3-AT counts some 34 000 ticks a turn of its wheels; with as many the error is below 0.5 mm.
+  // A P3-AT counts some 34 000 ticks per turn of a wheel; with as many the error is below 0.5 mm.
   Drive drive(
       "<ruedo:ticks_per_turn>34000</ruedo:ticks_per_turn><ruedo:counter_bits>16</"
       "ruedo:counter_bits>");
@@ -248,8 +248,8 @@ TEST(Odometry, CountersWrapAndTheRobotUnwrapsThem) {
   EXPECT_EQ(narrow.last().y, wide.last().y);
   EXPECT_EQ(narrow.last().theta, wide.last().theta);
   EXPECT_EQ(narrow.last().angle, wide.last().angle);
-  // More than half the range in a step is taken for the other way, as on the real robot: 200 is
-  // -56.
+  // More than half the range in one step is taken for the opposite direction, as on the real robot:
+  // 200 is -56.
   Drive fast(
       "<ruedo:ticks_per_turn>500</ruedo:ticks_per_turn><ruedo:counter_bits>8</ruedo:counter_bits>");
   fast.to(2 * M_PI * 200.5 / 500, 0, 5000);

@@ -109,7 +109,7 @@ TEST(MotionStatus, AtItsRateAndAtOnceWhenItChanges) {
   EXPECT_EQ(out.entries()[1].step, 4);
 }
 
-// A command replaces a primitive: its step shows how that ended, then what runs now.
+// A command replaces a primitive: its step reports the end of that, then the new one.
 TEST(MotionStatus, TheSuccessorShowsAtTheStepOfItsCommand) {
   SensorBench bench(kWorld);
   Device device = bench.make("rover", "motion");
@@ -156,7 +156,7 @@ class CollisionsOf : public ::testing::Test {
     }
     throw std::logic_error(name);
   }
-  // Robot "one" touches these; the force tells one step's contact from another's.
+  // Robot "one" touches these; the force distinguishes the contacts of the steps.
   void step(const std::vector<std::string>& others, bool due = false, double force = 1.0) {
     ++now_.step;
     now_.time += 5000;

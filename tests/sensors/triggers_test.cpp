@@ -1,4 +1,4 @@
-// TouchPlugin and PerformerDetector of gz-sim: when they tell, and of whom.
+// TouchPlugin and PerformerDetector of gz-sim: when they report, and what.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -16,12 +16,12 @@ using testing::IsEmpty;
 
 constexpr SimTime kStep_us = 5000;
 
-// What a device sends in steps that the test makes; the first is the initial state.
+// What a device publishes in steps that the test makes; the first is the initial state.
 template <class Message>
 struct Bench {
   Bench(const std::string& sdf, const std::string& robot, const std::string& name)
       : bench(sdf), device(bench.make(robot, name)), now(bench.snapshot()) {}
-  // `sample`: one is due.
+  // `sample`: one is due in this step.
   std::vector<Message> step(bool sample = false) {
     Outbox out;
     test::step(device, now, out, sample ? 0 : -1);

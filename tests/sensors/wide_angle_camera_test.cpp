@@ -1,4 +1,4 @@
-// Wide-angle cameras: where small bright things at known angles are seen.
+// Wide-angle cameras: where they show small bright objects at known angles.
 #include <cmath>
 
 #include <gmock/gmock.h>

@@ -1,6 +1,5 @@
-// Sends a server everything that it should not get, so often and at most at a given rate, and
-// counts it: hostile URL COUNT RATE [SEED [only-bad]]; only-bad: none that a
-// robot would answer
+// Sends a server everything that it must reject, COUNT times at RATE a second at most, and counts
+// it: hostile URL COUNT RATE [SEED [only-bad]]; only-bad: nothing that a robot would obey.
 #include <algorithm>
 #include <chrono>
 #include <cmath>

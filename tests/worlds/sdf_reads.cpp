@@ -1,5 +1,5 @@
 // sdf_reads FILE: a world as libsdformat reads it: a line "NAME<tab>x y z roll pitch yaw" for each
-// model. Ends with 1, and says why, for what it complains about.
+// model. Exits with 1, and says why, if libsdformat complains.
 #include <cstdio>
 #include <filesystem>
 #include <sdf/sdf.hh>

@@ -1,4 +1,4 @@
-// Worlds as text: what was not touched stays to the byte, and what was reads back as it is.
+// Worlds as text: what was not edited stays as it was, byte for byte; edits read back correctly.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 

@@ -1,5 +1,5 @@
-// Our own worlds as our own reader sees them: nothing to complain of, and the robots' numbers are
-// those of the sources that they name (masses, axles, devices, limits).
+// Our own worlds, read by our own reader: it reports nothing, and the robots' numbers are those of
+// the sources that they cite (masses, axles, devices, limits).
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 

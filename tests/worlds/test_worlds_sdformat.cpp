@@ -1,5 +1,5 @@
-// Our own worlds as libsdformat sees them: users load them with other programs too, so they must be
-// clean there.
+// Our own worlds, read by libsdformat: users load them with other programs too, so it must not
+// complain about them.
 #include <gtest/gtest.h>
 
 #include <filesystem>
@@ -34,15 +34,14 @@ TEST_P(Libsdformat, LoadsOurFileCleanly) {
   config.SetUnrecognizedElementsPolicy(sdf::EnforcementPolicy::ERR);
   sdf::Root root;
   for (const auto& error : root.Load(kWorlds + GetParam(), config)) {
-    // It reads elements of other namespaces, and reports them under this policy: ours are meant to
-    // be there.
+    // It reports elements of other namespaces under this policy; ours are intended.
     if (error.Message().find("ruedo:") == std::string::npos) ADD_FAILURE() << error.Message();
   }
   EXPECT_TRUE(root.WorldCount() == 1 || root.Model() || root.Light());
   sdf::Console::Instance()->GetMsgStream().SetStream(nullptr);
 }
 
-// A world as `ruedo edit` saves it: what was moved, what came, and what went.
+// A world as `ruedo edit` saves it: with moved, added and removed models.
 TEST(LibsdformatText, ReadsWhatTheEditorSaves) {
   using ruedo::Pose;
   const auto world = ruedo::model::load_world(kWorlds + "arena.sdf");

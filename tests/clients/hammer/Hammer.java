@@ -9,8 +9,8 @@ import java.util.concurrent.atomic.AtomicLong;
 import java.util.function.Consumer;
 
 /**
- * Eight threads that subscribe, publish and leave while a ninth receives; hammer.py says what it
- * does.
+ * Eight threads that subscribe, publish and leave while a ninth receives; hammer.py explains the
+ * test.
  */
 public final class Hammer {
     private static final int THREADS = 8;

@@ -1,5 +1,4 @@
-// Eight threads that subscribe, publish and leave while a ninth receives; hammer.py says what it
-// does.
+// Eight threads subscribe, publish and leave while a ninth receives; hammer.py explains the test.
 #include <atomic>
 #include <chrono>
 #include <cstdio>

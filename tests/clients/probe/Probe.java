@@ -34,8 +34,8 @@ import java.util.function.Supplier;
 import java.util.zip.CRC32;
 
 /**
- * The Java probe: does what a test asks of a client and prints what came of it. probe.py and
- * probe.cpp are its twins: same commands, same output.
+ * The Java probe: does what a test asks of a client and prints the results. probe.py and probe.cpp
+ * are its twins, with the same commands and output.
  */
 public final class Probe {
     private static final double PATIENCE = 300.0; // s, for what comes sooner or later
@@ -131,8 +131,8 @@ public final class Probe {
     }
 
     /**
-     * At its speed, and for so long without an interruption: a client that gets no time for long
-     * has to begin anew.
+     * At the commanded speed, and for that long without a gap: a client that was not scheduled for
+     * a long time has to start over.
      */
     private static void drive(Simulation sim, String[] a, boolean wheels) {
         Robot robot = sim.robot(a[0]);

@@ -1,5 +1,5 @@
-// The C++ probe: does what a test asks of a client and prints what came of it. probe.py and
-// Probe.java are its twins: same commands, same output.
+// The C++ probe: does what a test asks of a client and prints the results. probe.py and Probe.java
+// are its twins, with the same commands and output.
 #include <algorithm>
 #include <chrono>
 #include <cmath>
@@ -123,8 +123,8 @@ double chord(double v, double omega, double time) {
   return std::abs(omega == 0.0 ? v * time : 2.0 * v / omega * std::sin(omega * time / 2.0));
 }
 
-// At its speed, and for so long without an interruption: a client that gets no time for long has to
-// begin anew.
+// At the commanded speed, and for that long without a gap: a client that was not scheduled for a
+// long time has to start over.
 void drive(const rc::Simulation& sim, const std::vector<std::string>& a, bool wheels) {
   const rc::Robot robot = sim.robot(a[0]);
   const double first = std::stod(a[1]), second = std::stod(a[2]);

@@ -14,8 +14,8 @@ import java.util.concurrent.CountDownLatch;
 import java.util.concurrent.atomic.AtomicInteger;
 
 /**
- * Callbacks that are taken back or throw, readers, closing, and a server that is started anew;
- * lifetimes_test.py says what is right.
+ * Callbacks that are cancelled or throw, readers, close(), and a restarted server;
+ * lifetimes_test.py defines the expected results.
  */
 public final class Lifetimes {
     private static final double PATIENCE = 300.0; // s

@@ -1,5 +1,5 @@
-// A server in memory, as far as a client needs one: it says what there is, takes sessions, and
-// notes what it hears.
+// A server in memory, as far as a client needs one: it announces its channels, accepts sessions,
+// and records what it receives.
 #pragma once
 
 #include <chrono>
@@ -95,7 +95,7 @@ class FakeServer {
     send(robot + "/motion", status);
   }
 
-  // How many messages of a channel came from the client so far.
+  // How many messages the client has sent on a channel so far.
   int64_t heard(const std::string& channel) {
     const std::lock_guard lock(mutex_);
     return heard_[channel];
@@ -103,7 +103,7 @@ class FakeServer {
   void await(const std::function<bool()>& ready) {
     while (!ready()) std::this_thread::sleep_for(std::chrono::milliseconds(1));
   }
-  // All that was sent so far has been handed to the client's handlers.
+  // Returns when the client's handlers have received everything sent so far.
   void await_delivery() {
     std::unique_lock lock(mutex_);
     news_.wait(lock, [&] { return to_client_.empty() && !delivering_; });

@@ -1,5 +1,5 @@
-// Handles and callbacks that outlive what they belong to, or go before it. Under the sanitizers:
-// nothing is used once it is freed.
+// Handles and callbacks that outlive their owner, or are destroyed before it. Under the sanitizers:
+// no memory is used after it was freed.
 #include <gtest/gtest.h>
 
 #include <atomic>

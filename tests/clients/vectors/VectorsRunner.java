@@ -10,7 +10,7 @@ import java.util.List;
 import java.util.Locale;
 import java.util.zip.CRC32;
 
-/** What the Java client makes of the test vectors; runner.py says how. */
+/** Runs the test vectors against the Java client; runner.py describes the output. */
 public final class VectorsRunner {
     private VectorsRunner() {}
 

@@ -1,4 +1,4 @@
-// What the C++ client makes of the test vectors; runner.py says how.
+// Runs the test vectors against the C++ client; runner.py describes the output.
 #include <arpa/inet.h>
 #include <poll.h>
 #include <unistd.h>

@@ -28,7 +28,7 @@ final class Address {
     final String path; // of a local socket; else null
     private final String options;
 
-    /** Throws NoServer for what is no such URL. */
+    /** Throws NoServer for a text that is no such URL. */
     Address(String url) {
         this.url = url;
         URI uri;
@@ -91,7 +91,7 @@ final class Address {
         }
     }
 
-    /** Whether a server on this machine has the address: its claim goes with its process. */
+    /** Whether a server on this machine has the address; its claim ends with its process. */
     boolean isClaimed() {
         if (path != null) return isServed();
         String claim = " @ruedo/" + (multicast ? "udpm" : "tcpq") + "/" + host + ":" + port;

@@ -79,7 +79,7 @@ final class Bus implements Transport.Receiver {
         }
     }
 
-    /** Handlers hear nothing any more. */
+    /** From now on no handler is called. */
     void close() {
         closed = true;
         transport.close();

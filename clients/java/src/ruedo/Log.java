@@ -84,12 +84,12 @@ public final class Log {
         return -1;
     }
 
-    /** Those of the log, sorted. */
+    /** The channels of the log, sorted. */
     public List<String> channels() {
         return List.copyOf(places.keySet());
     }
 
-    /** How many messages there are on a channel; 0 on one that the log has not. */
+    /** The number of messages on a channel; 0 for one that is not in the log. */
     public int count(String channel) {
         return places.getOrDefault(channel, List.of()).size();
     }

@@ -119,7 +119,7 @@ public final class Robot {
         return (Device<SonarReading>) first("sonar_t", "sonar");
     }
 
-    /** What its wheels say. */
+    /** Wheel odometry. */
     @SuppressWarnings("unchecked")
     public Device<Odometry> odometry() {
         return (Device<Odometry>) first("odometry_t", "odometry");

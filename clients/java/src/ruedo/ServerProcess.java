@@ -57,7 +57,7 @@ final class ServerProcess {
         }
     }
 
-    /** Python's launch() has the same words. */
+    /** Python's launch() takes the same options. */
     private static List<String> optionsOf(LaunchOptions options) {
         List<String> words = new ArrayList<>();
         if (options.seed != null) words.addAll(List.of("--seed", Long.toString(options.seed)));
@@ -187,7 +187,7 @@ final class ServerProcess {
                         + " PATH (a Maven project names it by RUEDO; `scripts/run` builds it)");
     }
 
-    /** Those that this jar lies in, from the nearest on; none for a jar in a strange place. */
+    /** The folders that contain this jar, the nearest first; none if they are unknown. */
     private static List<File> foldersAbove() {
         List<File> folders = new ArrayList<>();
         try {
@@ -211,9 +211,7 @@ final class ServerProcess {
         return file.isFile() && file.canExecute();
     }
 
-    /**
-     * A local socket in a folder of this user's alone; Java before 16 has none, and takes a port.
-     */
+    /** A local socket in a folder that only this user can enter; a port before Java 16. */
     private String privateUrl() {
         if (Runtime.version().feature() < 16) return freeUrl();
         String runtime = System.getenv("XDG_RUNTIME_DIR");

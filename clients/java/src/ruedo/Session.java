@@ -56,7 +56,7 @@ final class Session {
         }
     }
 
-    /** Gives the session back, without waiting for an answer. */
+    /** Leaves the session, without waiting for an answer. */
     synchronized void leave() {
         if (session == 0 || !sim.info().supports(request_t.LEAVE)) return;
         publish(request_t.LEAVE, session, ++sequence, new byte[0]);

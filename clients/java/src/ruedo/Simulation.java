@@ -193,9 +193,9 @@ public final class Simulation implements AutoCloseable {
     }
 
     /**
-     * Takes n steps, at most timeout seconds of real time each time that nothing goes on, and
-     * returns what was seen. In lockstep (`ruedo run --lockstep N`): takes part from the first call
-     * on, grants n steps with their commands, and has every message of every step; the first call's
+     * Takes n steps and returns what was seen; timeout: the longest pause without progress, s of
+     * real time. In lockstep (`ruedo run --lockstep N`): takes part from the first call on, grants
+     * n steps with their commands, and has every message of every step; the first call's
      * observations begin with those of the state it found. n = 0 takes no step. Throws LeaseLost.
      * Else: steps a paused simulation; there are no commands, and the messages are in the streams.
      */
@@ -234,7 +234,7 @@ public final class Simulation implements AutoCloseable {
         ALL,
         /** Sim time alone. */
         TIME,
-        /** Everything back to where it started, at rest. */
+        /** Every model back to where it started, at rest. */
         POSES
     }
 
@@ -367,9 +367,9 @@ public final class Simulation implements AutoCloseable {
     }
 
     /**
-     * Puts the world back to a snapshot; what follows equals what followed it. A new epoch. One of
-     * the last that this server saved takes milliseconds; to another one it runs from the beginning
-     * of the snapshot's run, in silence, which takes as long as that part takes at rate max.
+     * Restores a snapshot; what follows equals what followed the snapshot. Begins a new epoch. One
+     * of the last snapshots that this server saved takes milliseconds. For another one the server
+     * repeats the snapshot's run from its beginning, without publishing, at rate max.
      */
     public State restore(String name) {
         State state = State.of(session.request(request_t.RESTORE, nameBody(name), RESTORE_SECONDS));
@@ -649,7 +649,7 @@ public final class Simulation implements AutoCloseable {
         refreshInfo(known);
     }
 
-    /** Waits for another info than that, which may be there already. */
+    /** Waits for an info other than that one, which may have arrived already. */
     synchronized void refreshInfo(WorldInfo before) {
         Deadline deadline = new Deadline(10.0);
         while (known == before && !deadline.passed()) {

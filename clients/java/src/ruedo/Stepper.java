@@ -136,7 +136,7 @@ final class Stepper {
         }
     }
 
-    /** The client has reset the world: the next step takes part anew. */
+    /** The client has reset the world: the next step joins again. */
     synchronized void forget() {
         part = false;
     }
@@ -179,7 +179,7 @@ final class Stepper {
         }
     }
 
-    /** To all that the simulation publishes: a manifest names any of it. */
+    /** Subscribes to all that the simulation publishes: a manifest may name any of it. */
     private void subscribe() {
         WorldInfo found = sim.info();
         if (info == found) return;

@@ -4,7 +4,7 @@ import java.util.function.Consumer;
 
 /**
  * A callback that is called until close(), which try-with-resources does at its end. What it
- * throws, an Error too, is said on the terminal once, and hurts nobody else.
+ * throws, even an Error, is printed once, and affects no other callback.
  */
 public final class Subscription implements AutoCloseable {
     private final Runnable callback;
@@ -33,7 +33,7 @@ public final class Subscription implements AutoCloseable {
         return new Subscription(what, callback, null, leave);
     }
 
-    /** From the return on it is not called any more; another thread may just be in it. */
+    /** After it returns no new call begins; a call in another thread may still be running. */
     @Override
     public void close() {
         synchronized (this) {

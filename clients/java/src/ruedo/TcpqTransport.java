@@ -120,10 +120,7 @@ final class TcpqTransport implements Transport {
         for (String channel : subscriptions) send(named(SUBSCRIBE, pattern(channel), 0));
     }
 
-    /**
-     * The connection that there is, made again if need be; null: none can be had now, or this is
-     * closed.
-     */
+    /** The connection, reopened if necessary; null if none is possible now, or after close(). */
     private synchronized DataInputStream input() throws IOException {
         if (link == null && !closed) {
             try {

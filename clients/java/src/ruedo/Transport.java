@@ -7,7 +7,7 @@ interface Transport {
      * thread.
      */
     interface Receiver {
-        /** Whether anybody listens to that channel: else its messages are passed over. */
+        /** Whether anybody listens to that channel; otherwise its messages are skipped. */
         boolean wants(String channel);
 
         /** message: all of its bytes, the receiver's from now on. */
@@ -23,12 +23,12 @@ interface Transport {
     /** Begins to receive. */
     void start(Receiver receiver);
 
-    /** From the return on, every message of that channel is received. */
+    /** After it returns, every message of that channel is received. */
     void subscribe(String channel);
 
     void unsubscribe(String channel);
 
-    /** What cannot be sent is lost, as any datagram may be; who waits for an answer repeats. */
+    /** What cannot be sent is lost, as any datagram may be; unanswered requests are repeated. */
     void publish(String channel, byte[] message);
 
     void close();

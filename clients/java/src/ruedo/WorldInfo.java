@@ -146,8 +146,8 @@ final class WorldInfo {
 
     /**
      * Takes messages of ruedo/info as they come. The parts of one info share run, epoch and utime.
-     * An info that says again what the last one said, which is the rule, is known by its bytes and
-     * not decoded.
+     * An info with the content of the last one, which is the usual case, is recognised by its bytes
+     * and not decoded.
      */
     static final class Assembler {
         private static final int HEAD =
