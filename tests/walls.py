@@ -460,7 +460,7 @@ def test_what_is_built_takes_no_elementary_function_from_outside():
         assert not foreign, f"{path.name} takes {', '.join(sorted(foreign))} from the C library"
 
 
-# The rule itself, on trees that break it.
+# The rules themselves, on trees that break them.
 
 
 def tree(folder, files):

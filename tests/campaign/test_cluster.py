@@ -176,7 +176,7 @@ def test_two_builds_on_two_nodes_are_one_line(whole, other_build):
         cluster.wait_for_nodes()
         command = ["campaign", "run", "c.yaml", "--ray", cluster.address, "--out", "other"]
         done = ruedo(*command, folder=folder, code=4)
-        # Ray itself says that it finds no way out of the test's network.
+        # Ray itself reports that it has no route out of the test's network.
         lines = [line for line in done.stderr.splitlines() if "network_util.cc" not in line]
         assert len(lines) == 1, lines
         assert re.fullmatch(
@@ -186,7 +186,7 @@ def test_two_builds_on_two_nodes_are_one_line(whole, other_build):
         )
     finally:
         cluster.shutdown()
-    # Nothing is lost, and what was not run is run elsewhere.
+    # Nothing is lost: cases that were not run yet are run on other nodes.
     ruedo("campaign", "resume", "c.yaml", "--out", "other", folder=folder, code=1)
     assert table(folder, "--out", "other") == table(folder)
 

@@ -1,5 +1,5 @@
-"""Faults as inputs of a run: what each does to what, in the world's file, as an option, and from a
-client; and they repeat.
+"""Faults as inputs of a run: their effects, from the world's file, an option or a client; and that
+they repeat.
 """
 
 import math

@@ -1,5 +1,5 @@
-"""Hunts find what was planted, shrink it, and keep it as a test that fails until it is mended; why
-says since when.
+"""Hunts find planted faults, shrink them, and keep each as a test that fails until it is fixed;
+`why` says when it began.
 """
 
 import json
@@ -206,7 +206,7 @@ def test_why_branches_a_log_of_no_campaign_with_the_same_commands(tmp_path):
 
 @pytest.mark.parametrize("harm", ["no message", "a far step"])
 def test_why_names_what_is_broken_in_a_log(tmp_path, harm):
-    """The first was a traceback, the second ran for ever."""
+    """Regressions: the first gave a traceback, the second ran for ever."""
     log, bad = tmp_path / "run.lcm", tmp_path / "bad.lcm"
     options = ["--rate", "max", "--duration", "2", "--lcm", "memq://", "--record", str(log)]
     world = tmp_path / "wall.sdf"

@@ -1,4 +1,4 @@
-"""Campaigns as they are run, cut off and taken up again: the same table, whoever ran what when."""
+"""Campaigns that are run, interrupted and resumed: the same table, whatever ran where and when."""
 
 import contextlib
 import fcntl
@@ -259,7 +259,7 @@ def test_the_report_needs_no_network(whole):
 
 
 def test_the_commands_of_the_report_show_the_run(whole):
-    """A kept log is of what acted: played is the log of all messages that `repeat` makes."""
+    """A kept log holds the inputs; what is played is the full log that `repeat` makes of it."""
     folder, _ = whole
     ruedo("campaign", "report", "c.yaml", "-o", "r.html", folder=folder)
     page = html.unescape((folder / "r.html").read_text())
@@ -275,7 +275,7 @@ def test_the_commands_of_the_report_show_the_run(whole):
 
 
 def test_the_report_has_pages_of_the_worst_runs(whole):
-    """Repeated, since what was kept of them has no messages; made once."""
+    """Repeated, since the kept logs hold no messages; made once."""
     folder, _ = whole
     report = ("campaign", "report", "c.yaml", "-o", "look.html", "--pages")
     ruedo(*report, "1", folder=folder)
@@ -333,7 +333,7 @@ limits: {duration: 3}
 
 
 def test_the_labs_of_a_class_are_marked_in_one_command(tmp_path):
-    """The labs' own answers pass; each of the others fails where it was made to."""
+    """The labs' own answers pass; each of the wrong ones fails where it should."""
     shutil.copytree(SOURCE / "clients/python/examples/labs", tmp_path / "labs")
     folder = tmp_path / "labs/marking"
     first = "import sys\nfrom pathlib import Path\n\nsys.path.append(str(Path(__file__).parents[1]))\nimport labs\n"

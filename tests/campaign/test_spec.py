@@ -1,4 +1,4 @@
-"""What a campaign's file may hold, what becomes of it, and how a wrong one is told."""
+"""What a campaign file may contain, how it is expanded, and how errors in it are reported."""
 
 import math
 

@@ -1,4 +1,4 @@
-"""ruedo check, as its users call it: what hostile and broken files give, the JSON list, exit codes,
+"""ruedo check, as users call it: results for hostile and broken files, the JSON list, exit codes,
 and colour on a terminal.
 """
 

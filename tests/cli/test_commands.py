@@ -112,7 +112,7 @@ def test_a_firewall_is_one_line_with_its_cure():
         )
 
 
-# Who listens and never reads: the server says that datagrams are lost, with the cure; doctor, too.
+# A listener that never reads: the server and doctor report the lost datagrams, with the cure.
 LISTENS_AND_NEVER_READS = """
 import socket, struct, subprocess, sys
 listener = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)

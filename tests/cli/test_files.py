@@ -1,4 +1,4 @@
-"""What people bring: ruedo import, ruedo map, --drive, --allow-absolute and ruedo check, as their
+"""Files that users bring: ruedo import, ruedo map, --drive, --allow-absolute and ruedo check, as
 users call them.
 """
 
@@ -98,7 +98,7 @@ def test_absolute_paths_are_let_in_by_the_user_only(tmp_path):
 
 @pytest.mark.skipif(os.geteuid() != 0, reason="needs root to become a user without rights")
 def test_a_file_without_permission_is_named(tmp_path):
-    """Root may read all, so an ordinary user asks."""
+    """Root may read everything, so this runs as an ordinary user."""
     world = Path("/tmp") / f"ruedo-denied-{os.getpid()}.sdf"
     world.write_text("<sdf version='1.9'/>")
     world.chmod(0)

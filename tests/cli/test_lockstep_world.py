@@ -59,7 +59,7 @@ def no_server_outlives_its_test():
 
 
 def published(log):
-    """What a log has of every channel that the run published: equal for equal runs."""
+    """The messages of every published channel in a log: equal for equal runs."""
     return [
         (event.timestamp, event.channel, event.data)
         for event in lcm.EventLog(str(log), "r")

@@ -1,4 +1,4 @@
-"""Runs that go on: logs played, snapshots restored, controllers that the run waits for."""
+"""Runs that continue: logs played, snapshots restored, and controllers that the run waits for."""
 
 import shlex
 import shutil
@@ -58,8 +58,8 @@ class Listener:
 
 @pytest.fixture
 def exchange(tmp_path):
-    """The address of a server of LCM over TCP, which passes on what the tests send. It serves a
-    world without a body.
+    """The address of a server of LCM over TCP that relays what the tests send. It serves an empty
+    world.
     """
     world = tmp_path / "empty.sdf"
     world.write_text("<sdf version='1.9'><world name='empty'/></sdf>")

@@ -1,5 +1,5 @@
-"""--sandbox: what a stranger's world or log may have is there, and nothing else; what comes of it
-is the same.
+"""--sandbox: a stranger's world or log reaches what it may, and nothing else; the results are the
+same.
 """
 
 import os

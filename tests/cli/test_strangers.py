@@ -1,5 +1,5 @@
-"""Files of strangers: logs that name what they should not, and small files that would cost much.
-Each ends soon, in one line.
+"""Files from strangers: logs that name files that they must not, and small files that would cost
+much. Each ends soon, with one line.
 """
 
 import hashlib

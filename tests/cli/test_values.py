@@ -1,6 +1,7 @@
-"""What check can load, run runs, and what it cannot, run refuses with the same words: over every
-bad file there is. And values that no robot needs: each is named with its place and what is allowed;
-where the rest of the world can do without it, it runs."""
+"""For every bad file: what `check` can load `run` runs, and what it cannot load `run` refuses with
+the same words. Absurd values are each reported with their place and what is allowed; the world runs
+if it can do without them.
+"""
 
 import json
 import os

@@ -150,7 +150,7 @@ def test_a_changed_file_is_named_first(tmp_path):
 
 
 def test_a_log_of_another_installation_that_is_still_there(tmp_path):
-    """Whose models lie in no folder of ours, but are ours."""
+    """Its models are copies of ours that are in none of our folders."""
     for folder in ("there/bin", "there/share/ruedo", "mine/worlds"):
         (tmp_path / folder).mkdir(parents=True)
     shutil.copy(RUEDO, tmp_path / "there/bin")

@@ -1,5 +1,5 @@
-"""The vocabulary, in each language, against the real server: the probes print what they saw, the
-numbers are known.
+"""Each method of the clients, in each language, against the real server: the probes print what they
+saw, and the expected numbers are known.
 """
 
 import math

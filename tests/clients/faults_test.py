@@ -1,5 +1,6 @@
-"""What befalls machines and networks: lost, doubled and late datagrams, a stopped process, clocks
-that jump, an interface that goes down."""
+"""Faults of machines and networks: lost, duplicated and late datagrams, a stopped process, clocks
+that jump, an interface that goes down.
+"""
 
 from __future__ import annotations
 

@@ -1,6 +1,4 @@
-"""Servers that lie, or are not there: each first mistake is answered in words, and nothing
-breaks.
-"""
+"""Servers that lie or do not exist: each fault is reported clearly, and nothing breaks."""
 
 import sys
 import time

@@ -1,5 +1,5 @@
-"""The labs of clients/python/examples/labs: what each is to show, by a formula or from what was
-planted.
+"""The labs of clients/python/examples/labs: the results that each should show, from a formula or
+from planted values.
 """
 
 import math
@@ -39,7 +39,7 @@ def test_sonars_keep_it_from_what_is_near():
     assert way > 8.0 and clearance > 0.3
 
 
-# UMBmark finds what was planted.
+# UMBmark finds the planted errors.
 @pytest.mark.parametrize("track_error, radius_error", [(0.02, 0.0), (0.0, 0.002)])
 def test_umbmark_finds_the_planted_errors(track_error, radius_error):
     track, radius, worst = umbmark.umbmark(track_error, radius_error, runs=1)

@@ -1,5 +1,5 @@
-"""Networks as they are: LCM over TCP from the server itself, no multicast route, one server an
-address, two hosts.
+"""Real networks: LCM over TCP from the server itself, no multicast route, one server per address,
+two hosts.
 """
 
 import math

@@ -1,4 +1,4 @@
-"""What is handed out: the wheel, its types, and the jar."""
+"""What is distributed: the wheel, its types, and the jar."""
 
 import os
 import subprocess

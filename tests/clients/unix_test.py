@@ -1,6 +1,4 @@
-"""The local socket: whose it is, and that the three libraries see over it what they see over
-multicast.
-"""
+"""The local socket: its owner, and that the three libraries see the same over it as over multicast."""
 
 import os
 import stat

@@ -1,5 +1,5 @@
-"""The example of each language, 20 s of sim time in the arena without touching anything; and as its
-user ends it.
+"""The example of each language: 20 s of sim time in the arena without touching anything; and ended
+as a user ends it.
 """
 
 import signal

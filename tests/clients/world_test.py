@@ -1,6 +1,4 @@
-"""Models that come and go, over the wire, in each language: what the probes saw has known
-numbers.
-"""
+"""Models that come and go, over the wire, in each language: the probes see known numbers."""
 
 import pytest
 from conftest import HERE, probe, ruedo_run

@@ -1,5 +1,5 @@
-"""A log and a client of the last version: they work, or it is said what to do (README.md beside
-this says what is kept).
+"""A log and a client of the last version: they work, or the error says what to do (README.md here
+says what is kept).
 """
 
 import os

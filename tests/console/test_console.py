@@ -1,4 +1,4 @@
-"""The web console from outside: its pages and its socket in right and wrong hands."""
+"""The web console from outside: its pages and its socket, used properly and abused."""
 
 import contextlib
 import os
@@ -150,7 +150,7 @@ def test_garbage_and_a_hundred_viewers_do_not_hurt(server):
 
 
 def test_half_open_connections_give_way(server):
-    """More than the console has places for; each has sent the beginning of a request, or
+    """More connections than the console accepts; each has sent the beginning of a request, or
     nothing.
     """
     waiting = [socket.create_connection(("127.0.0.1", server.port), timeout=20) for _ in range(400)]

@@ -1,5 +1,5 @@
-"""Recorded runs in the console: what a viewer gets at each moment, and logs that are cut off,
-strange, or none.
+"""Recorded runs in the console: what a viewer gets at each moment, and truncated, odd or invalid
+logs.
 """
 
 import json

@@ -26,7 +26,7 @@ is then commanded 0.5 rad/s for 2 s, without noise. "Way" and "turn" are the mea
 that published. "Named" is what Ruedo reported, including files that the folder lacks (meshes, included xacro).
 """
 
-# Files with a robot that Gazebo drives; what is expanded from a xacro file stands beside it.
+# Files with a robot that Gazebo drives, as a xacro file and as it expands.
 ROBOTS = {
     "TurtleBot3 burger": "turtlebot3/models/turtlebot3_burger/model.sdf",
     "TurtleBot3 burger (Classic)": "turtlebot3/models/turtlebot3_burger/model-1_4.sdf",

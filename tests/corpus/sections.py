@@ -1,4 +1,4 @@
-"""A document of which scripts write one section each."""
+"""A document whose sections are written by one script each."""
 
 import re
 
@@ -12,7 +12,7 @@ def section(path, title):
 
 
 def put(path, title, text):
-    """Writes that section anew, at its place or at the end."""
+    """Rewrites that section, in its place or at the end."""
     old = path.read_text(encoding="utf-8")
     new = f"## {title}\n\n{text.strip()}\n"
     pattern = rf"(?ms)^## {re.escape(title)}\n.*?(?=^## |\Z)"

@@ -1,4 +1,6 @@
-"""Domain randomisation: what is drawn, that it acts, and that a reset equals a fresh engine."""
+"""Domain randomisation: what is drawn, that it has an effect, and that a reset equals a fresh
+engine.
+"""
 
 import math
 
@@ -83,7 +85,7 @@ def test_what_is_drawn_follows_its_distribution():
     assert set(ground) == {0.25, 0.5} and 140 < ground.count(0.25) < 260
 
 
-# A value is its target's and its seed's: other draws and their order change nothing of it.
+# A value depends on its target and its seed alone, not on other draws or their order.
 def test_a_draw_depends_on_seed_and_target_alone():
     with (
         ruedo.Engine(**ARENA, seed=9, randomize={"p3at.mass": "uniform(1, 2)"}) as alone,

@@ -52,8 +52,8 @@ def test_the_changes_begin_with_it():
 
 
 def test_it_stands_nowhere_else():
-    """Where a file says what version this project has; a log's version and others' are no affair of
-    this test.
+    """Where files name this project's version; the versions of logs and of other projects do not
+    matter here.
     """
     places = {
         "CMakeLists.txt": r"project\(ruedo VERSION \d",

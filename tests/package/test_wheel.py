@@ -16,7 +16,7 @@ BUILD = Path(os.environ["RUEDO_BINARY_DIR"])
 
 
 def run(*command):
-    """Where nothing of Ruedo's lies."""
+    """A folder without any of Ruedo's files."""
     return run_somewhere(*command, cwd="/")
 
 
@@ -66,7 +66,7 @@ def test_the_wheel_is_for_debian_12_and_holds_licences(wheel):
 
 
 def test_nothing_is_loaded_from_outside(venv):
-    """But for what every Debian has."""
+    """Except for what every Debian has."""
     prefix = run(venv / "bin/ruedo", "--prefix").strip()
     loaded = [
         line.split()

@@ -1,4 +1,4 @@
-"""What strangers send: counted, harmless, and said once a second at most."""
+"""Input from strangers: counted, harmless, and reported once a second at most."""
 
 import itertools
 import math
@@ -25,7 +25,7 @@ RIG = str(Path(__file__).resolve().parent / "sensors.sdf")
 
 @dataclass
 class NotATwist(IdlStruct, typename="geometry_msgs::msg::dds_::Twist_"):
-    """Says it is a Twist."""
+    """Bytes that claim to be a Twist."""
 
     data: sequence[uint8]
 

@@ -1,5 +1,5 @@
 """What clients draw in a run, as rviz gets it on /markers: kinds and numbers by
-visualization_msgs/Marker, as a peer reads them that no one here wrote.
+visualization_msgs/Marker, read by an independent peer.
 """
 
 from __future__ import annotations

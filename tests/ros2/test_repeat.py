@@ -54,7 +54,7 @@ def test_a_plain_controller_drives_twice_with_the_same_bytes(tmp_path):
 
 
 def test_a_run_without_ros2_has_the_same_bytes(tmp_path):
-    """What is recorded does not depend on who reads."""
+    """A recording does not depend on its readers."""
     logs = []
     for name, arguments in (("with", ["--ros2"]), ("without", [])):
         log = tmp_path / f"{name}.lcm"

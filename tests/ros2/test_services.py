@@ -1,6 +1,4 @@
-"""simulation_interfaces over DDS, as rmw_cyclonedds maps services, called by a peer that no one
-here wrote.
-"""
+"""simulation_interfaces over DDS, as rmw_cyclonedds maps services, called by an independent peer."""
 
 from __future__ import annotations
 

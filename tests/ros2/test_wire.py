@@ -1,4 +1,4 @@
-"""Topics out and in over DDS, as a peer sees them that no one here wrote."""
+"""Topics out and in over DDS, as an independent peer sees them."""
 
 from __future__ import annotations
 

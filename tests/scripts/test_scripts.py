@@ -1,5 +1,5 @@
-"""scripts/lib.sh with stand-ins for apt and dpkg: what is asked for, of whom, and when nothing is
-done.
+"""scripts/lib.sh with stand-ins for apt and dpkg: which packages are requested, by which command,
+and when nothing is done.
 """
 
 import os

@@ -1,5 +1,5 @@
-"""People who walk, and things on paths, as every kind of sensor sees them; and the same again in a
-second run.
+"""Walking people and things on paths, as every kind of sensor sees them; and the same in a second
+run.
 """
 
 import os

@@ -1,5 +1,5 @@
-"""What scripts generate is what they generate now: meshes of the robots, the office world, its
-textures.
+"""The generated files are up to date with their scripts: meshes of the robots, the office world,
+its textures.
 """
 
 import importlib.util

@@ -1,5 +1,6 @@
-"""The Python probe: does what a test asks of a client and prints what came of it. probe.cpp and
-Probe.java are its twins: same commands, same output."""
+"""The Python probe: does what a test asks of a client and prints the results. probe.cpp and
+Probe.java are its twins, with the same commands and output.
+"""
 
 import math
 import sys
@@ -74,8 +75,8 @@ def read(sim, name):
 
 
 def drive(sim, name, first, second, seconds, wheels):
-    """At its speed, and for so long without an interruption: a client that gets no time for long
-    has to begin anew.
+    """At the commanded speed, and for that long without a gap: a client that was not scheduled for
+    a long time has to start over.
     """
     robot = sim.robot(name)
     first, second = float(first), float(second)
