@@ -1,4 +1,4 @@
-# Finds what Ruedo is built on; docs/getting-started.md lists the packages.
+# Finds Ruedo's dependencies; docs/getting-started.md lists the packages.
 find_package(PkgConfig REQUIRED)
 find_package(Threads REQUIRED GLOBAL)    # of ruedo::client, which others link
 find_package(Eigen3 REQUIRED NO_MODULE)
@@ -15,7 +15,7 @@ pkg_check_modules(SECCOMP REQUIRED IMPORTED_TARGET libseccomp)
 # Double precision: its own libraries, and -DBT_USE_DOUBLE_PRECISION in the flags.
 pkg_check_modules(BULLET REQUIRED bullet-float64)
 
-# What computes results, as copies that call our elementary functions.
+# Libraries that compute results, as copies that call our elementary functions.
 include(RuedoMath)
 function(ruedo_find_for_copies out)
   set(found "")
@@ -85,7 +85,7 @@ if(NOT lcm_FOUND)
   message(FATAL_ERROR "LCM 1.5.3 was not found: pip install lcm==1.5.3 into a virtual environment, and give the folder of its lcmConfig.cmake "
     "as -Dlcm_DIR=VENV/lib/python3.X/site-packages/lib/lcm/cmake")
 endif()
-# LCM's package has targets of general names, `lcm` and `lcm-gen`, for this folder; who uses ours meets this one.
+# LCM's package defines targets with general names, `lcm` and `lcm-gen`, in this folder only; users of Ruedo see this one.
 add_library(ruedo::lcm SHARED IMPORTED GLOBAL)
 get_target_property(location lcm LOCATION)
 get_target_property(headers lcm INTERFACE_INCLUDE_DIRECTORIES)

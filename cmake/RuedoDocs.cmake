@@ -1,4 +1,4 @@
-# The public C++ headers as pages, BUILD/docs/api/index.html: target ruedo-docs. What doxygen warns of fails it.
+# The public C++ headers as pages, BUILD/docs/api/index.html: target ruedo-docs. A warning of doxygen fails it.
 find_program(RUEDO_DOXYGEN doxygen)
 mark_as_advanced(RUEDO_DOXYGEN)
 if(RUEDO_DOXYGEN)

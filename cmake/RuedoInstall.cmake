@@ -9,7 +9,7 @@ install(DIRECTORY ${PROJECT_SOURCE_DIR}/worlds DESTINATION ${CMAKE_INSTALL_DATAD
 install(FILES ${PROJECT_SOURCE_DIR}/src/model/xacro/expand.py DESTINATION ${CMAKE_INSTALL_DATADIR}/ruedo/xacro)
 install(DIRECTORY ${PROJECT_SOURCE_DIR}/proto DESTINATION ${CMAKE_INSTALL_DATADIR}/ruedo FILES_MATCHING PATTERN "*.lcm")
 
-# LCM, which came from a wheel and may not be there where this is moved to; libraries that call our elementary functions.
+# LCM, which comes from a wheel and may be missing where the tree is moved to; libraries that call our elementary functions.
 get_target_property(lcm_library ruedo::lcm LOCATION)
 install(FILES ${lcm_library} DESTINATION ${CMAKE_INSTALL_LIBDIR}/ruedo RENAME liblcm.so.1)
 get_property(copies GLOBAL PROPERTY RUEDO_OWN_MATH_COPIES)
@@ -64,7 +64,7 @@ file(WRITE ${metadata}/METADATA "Metadata-Version: 2.1\nName: ruedo\nVersion: ${
 file(WRITE ${metadata}/entry_points.txt "[pytest11]\nruedo = ruedo.regression\n")
 install(DIRECTORY ${metadata} DESTINATION ${python})
 
-# The licences of all that lies here.
+# The licences of everything that is installed.
 set(copyright ${PROJECT_BINARY_DIR}/licences/copyright)
 file(MAKE_DIRECTORY ${PROJECT_BINARY_DIR}/licences)
 add_custom_command(OUTPUT ${copyright}
@@ -73,7 +73,7 @@ add_custom_command(OUTPUT ${copyright}
 add_custom_target(licences ALL DEPENDS ${copyright})
 install(FILES ${copyright} DESTINATION ${CMAKE_INSTALL_DOCDIR})
 
-# The types of all messages as C++, for programs that speak LCM themselves; with LCM's headers, apart, where no other LCM's are.
+# The types of all messages as C++, for programs that speak LCM themselves; with LCM's headers in a folder of their own, for systems without LCM.
 install(DIRECTORY ${PROJECT_BINARY_DIR}/proto/ruedo DESTINATION ${CMAKE_INSTALL_INCLUDEDIR} FILES_MATCHING PATTERN "*.hpp")
 get_filename_component(lcm_wheel ${lcm_DIR}/../../.. ABSOLUTE)
 install(DIRECTORY ${lcm_wheel}/include/lcm DESTINATION lib/ruedo/include FILES_MATCHING PATTERN "*.h" PATTERN "*.hpp")

@@ -9,8 +9,8 @@ endif()
 
 # Sanitizers: -DRUEDO_SANITIZE=address,undefined or thread (see CMakePresets.json).
 if(RUEDO_SANITIZE)
-  # With -O2, or with the checks taken out here, GCC 12 needs up to nine minutes for one file that uses Eigen. What a
-  # null or misplaced pointer leads to is found by the address sanitizer when it is used.
+  # With -O2, or with the checks that are disabled here, GCC 12 needs up to nine minutes for one file that uses Eigen. The
+  # address sanitizer finds null and misaligned pointers when they are used.
   add_compile_options(-O1 -fsanitize=${RUEDO_SANITIZE} -fno-omit-frame-pointer -g1)
   if(RUEDO_SANITIZE MATCHES undefined)
     add_compile_options(-fno-sanitize=null,alignment,vptr,object-size)

@@ -1,5 +1,5 @@
 # The Debian package, by `cpack -G DEB` in the build folder: what `cmake --install` puts into /usr, with man pages, completion and what
-# Debian wants besides.
+# else Debian requires.
 install(FILES ${PROJECT_SOURCE_DIR}/packaging/ruedo.bash-completion DESTINATION ${CMAKE_INSTALL_DATADIR}/bash-completion/completions RENAME ruedo)
 # The pages are made by the target man-pages, which a release builds: it starts the program twice for each command.
 set(pages ${PROJECT_BINARY_DIR}/man1)
@@ -10,7 +10,7 @@ add_custom_target(man-pages DEPENDS ${pages}/ruedo.1.gz)
 file(MAKE_DIRECTORY ${pages})
 install(DIRECTORY ${pages} DESTINATION ${CMAKE_INSTALL_MANDIR})
 
-# What the package alone holds, beside what is installed: changelog, lintian's overrides, the way for Python.
+# Files of the package alone: changelog, lintian's overrides, and the .pth file for Python.
 set(debian ${PROJECT_BINARY_DIR}/debian)
 file(GLOB of_debian ${PROJECT_SOURCE_DIR}/packaging/debian/*)
 add_custom_command(OUTPUT ${debian}/usr/share/doc/ruedo/changelog.gz

@@ -5,7 +5,7 @@
 set(RUEDO_PLUGIN_HEADERS include/ruedo/decode.h include/ruedo/drive.h include/ruedo/element.h include/ruedo/errors.h include/ruedo/index.h
   include/ruedo/math.h include/ruedo/plugin.h include/ruedo/pose.h include/ruedo/quantity.h include/ruedo/random.h include/ruedo/schema.h include/ruedo/sensor.h
   include/ruedo/sim_time.h include/ruedo/snapshot.h)
-# Of the layers below: as sources in this tree include them.
+# Headers of the lower layers, under the names by which sources in this tree include them.
 set(RUEDO_PLUGIN_LAYER_HEADERS model/body_layout.h model/fault.h model/mesh.h model/world_model.h scene/ray_scene.h scene/render_scene.h sensors/noise.h)
 
 set(headers ${RUEDO_PLUGIN_HEADERS})
@@ -34,7 +34,7 @@ target_include_directories(ruedo_plugin
          $<BUILD_INTERFACE:${CMAKE_CURRENT_BINARY_DIR}/plugin>
          $<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}> $<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}/ruedo/plugin>
          $<INSTALL_INTERFACE:lib/ruedo/include>)
-# The same results in a plugin as in Ruedo; its symbols are its own; every one that is missing is told when it is linked.
+# The same results in a plugin as in Ruedo; its symbols are hidden; missing symbols are reported when it is linked.
 target_compile_options(ruedo_plugin INTERFACE -ffp-contract=off -fvisibility=hidden)
 target_link_options(ruedo_plugin INTERFACE LINKER:--exclude-libs,ALL LINKER:--no-undefined)
 target_sources(ruedo_plugin INTERFACE $<BUILD_INTERFACE:${CMAKE_CURRENT_SOURCE_DIR}/cmake/plugin_entry.cpp>

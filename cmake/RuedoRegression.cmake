@@ -1,21 +1,20 @@
 # ruedo_add_regression(NAME name WORLD file DURATION seconds [CLIENT command...] ...): a test of ctest that runs a world with
-# a client as fast as it goes, in a network of its own, and fails with the first thing that is not as expected.
-# docs/regressions.md says it in full.
+# a client at full speed, in a network of its own, and fails with the first unmet expectation. docs/regressions.md has the details.
 #
 #   NAME WORLD DURATION            what and how long (s of sim time); the client's end ends it sooner
 #   CLIENT command...              a program or target and its arguments; it finds the run by LCM_DEFAULT_URL
 #   SEED n                         default 1
-#   LOCKSTEP n | WAIT_FOR ch@hz... how the client is kept in step (repeatable); neither: it runs beside
-#   GOLDEN file                    log to compare with; KEEP patterns... what it holds (default */pose),
+#   LOCKSTEP n | WAIT_FOR ch@hz... how the client is kept in step (repeatable); neither: it runs freely
+#   GOLDEN file                    log to compare with; KEEP patterns... what the golden log keeps (default */pose),
 #   TOLERANCES rules... IGNORE patterns...    as of `ruedo diff`
-#   ROBOT name                     whom the next are about; default: the first of the world
+#   ROBOT name                     the robot of the following options; default: the first of the world
 #   GOAL x y RADIUS r BY s         gets there in time
 #   NO_CONTACT CLEARANCE m ODOMETRY_ERROR m
 #   SCRIPT command...              judges by its exit code; RUEDO_LOG is the log of the run
 #   OPTIONS options...             more of `ruedo regress`: --spawn, --set, --disable, --remap, ...
 #   TIMEOUT s                      of real time; default 300
 #
-# The target renew-goldens writes all golden logs anew: cmake --build BUILD --target renew-goldens.
+# The target renew-goldens rewrites all golden logs: cmake --build BUILD --target renew-goldens.
 
 function(ruedo_add_regression)
   cmake_parse_arguments(PARSE_ARGV 0 ARG "NO_CONTACT"

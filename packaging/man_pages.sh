@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# man_pages.sh RUEDO FOLDER: ruedo.1 and a page for each command in FOLDER, compressed, from what the program's --help says.
+# man_pages.sh RUEDO FOLDER: ruedo.1 and a page for each command in FOLDER, compressed, from the program's --help.
 set -euo pipefail
 ruedo=$1 folder=$2
 mkdir -p "$folder"

@@ -14,7 +14,7 @@ root=$folder/$suite
 if [[ ! -e $root/etc/debian_version ]]; then
   debootstrap --variant=minbase --include=ca-certificates "$suite" "$root" >"$folder/$suite.log"
 fi
-# apt in there gets at the same packages as here.
+# apt in there uses the same package sources as here.
 cp /etc/resolv.conf "$root/etc/resolv.conf"
 cp -r /etc/apt/apt.conf.d/. "$root/etc/apt/apt.conf.d/"
 rm -f "$root"/etc/apt/apt.conf.d/docker-*
@@ -91,7 +91,7 @@ public class Drive {
 JAVA
 java -cp "$(ruedo --jar)" Drive.java'
 
-# Python as root leaves its caches among the files; nothing may be left all the same.
+# Python as root leaves its caches among the files; still nothing may be left.
 inside 'python3 -c "import ruedo" && dpkg -P ruedo'
 left=0
 while read -r file; do

@@ -1,6 +1,6 @@
 # Shared by scripts/run and scripts/test: packages, virtual environment, build, multicast route.
-# Sourced, never run. Every step looks first and does something only when something is missing, so that a second
-# start needs no network and no rights.
+# Sourced, never run. Every step checks first, and acts only if something is missing, so that a second
+# start needs neither network nor privileges.
 # shellcheck shell=bash disable=SC2034  # the constants are for the scripts that source this
 
 ruedo_root=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
@@ -25,7 +25,7 @@ readonly TEST_PACKAGES=(
   nftables libmpfr-dev qemu-user libfaketime maven doxygen debootstrap ffmpeg
 )
 
-# The web console's page is built by node and npm; a machine that has an npm of another origin keeps it.
+# The web console's page is built by node and npm; a machine with an npm from elsewhere keeps that.
 console_packages=()
 command -v npm >/dev/null || console_packages=(nodejs npm)
 
@@ -127,7 +127,7 @@ build_jobs() {
 # build PRESET [-DNAME=VALUE...]: configures where that is not done with these options yet, then builds.
 build() {
   local preset=$1 folder=$ruedo_root/build/$1 options=("${@:2}")
-  # Another user's, as in a container: what is built is taken as it is.
+  # Another user's folder, as in a container: what is built is used as it is.
   [[ ! -e $folder/built || -w $folder ]] || return 0
   if command -v ccache >/dev/null; then
     options+=(-DCMAKE_CXX_COMPILER_LAUNCHER=ccache -DCMAKE_C_COMPILER_LAUNCHER=ccache)
@@ -171,7 +171,7 @@ import socket
 socket.socket(socket.AF_INET, socket.SOCK_DGRAM).connect(("239.255.76.67", 7667))' 2>/dev/null
 }
 
-# Gives LCM a route over the loopback interface where there is none and it may; says so. False when it may not.
+# Adds a route for LCM over the loopback interface if there is none, and says so. False without the privileges.
 ensure_multicast_route() {
   has_multicast_route && return
   local as_root=()
