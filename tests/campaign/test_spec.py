@@ -1,6 +1,7 @@
 """What a campaign file may contain, how it is expanded, and how errors in it are reported."""
 
 import math
+import os
 
 import pytest
 from conftest import CAMPAIGN, ruedo
@@ -90,6 +91,30 @@ def test_the_command_line_says_it_in_one_line_with_exit_code_3(folder):
     done = ruedo("campaign", "run", "c.yaml", folder=folder, code=3)
     assert done.stderr.count("\n") == 1 and "c.yaml:10" in done.stderr
     assert "cannot be read" in ruedo("campaign", "run", "none.yaml", folder=folder, code=3).stderr
+
+
+ALIASES = "a0: &a0 [x, x, x, x, x, x, x, x, x, x]\n" + "".join(
+    f"a{i}: &a{i} [{', '.join([f'*a{i - 1}'] * 10)}]\n" for i in range(1, 9)
+)
+
+
+@pytest.mark.parametrize(
+    "content, text",
+    [
+        (ALIASES, "stands for more than 100000 values"),
+        ("[" * 50_000, "nested too deep"),
+        ("x" * (1 << 21), "allowed are 1048576"),
+        (os.mkfifo, "not a regular file"),
+        (lambda path: os.symlink("/dev/zero", path), "not a regular file"),
+    ],
+    ids=["aliases", "depth", "size", "fifo", "device"],
+)
+def test_a_hostile_file_is_refused_at_once(folder, content, text):
+    """Not after hours, and not for gigabytes."""
+    path = folder / "hostile\x1b[31m.yaml"
+    path.write_text(content) if isinstance(content, str) else content(path)
+    done = ruedo("campaign", "status", path.name, folder=folder, code=3)
+    assert text in done.stderr and done.stderr.count("\n") == 1 and "\x1b" not in done.stderr
 
 
 def test_a_python_without_what_it_takes_is_told_in_one_line(folder):

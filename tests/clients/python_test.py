@@ -5,6 +5,7 @@ for wrong types, forks, logs.
 import gc
 import math
 import os
+import resource
 import sys
 import time
 import warnings
@@ -423,7 +424,7 @@ def test_a_map_is_an_array(tmp_path):
         ("[1, 2]", "a map of image, resolution and origin is wanted"),
         (
             "image: m.pgm\nresolution: -1\norigin: [0, 0, 0]\n",
-            "resolution is -1: a number above 0 is wanted",
+            "resolution is -1: a number above 0, .* at most, is wanted",
         ),
         ("image: m.pgm\nresolution: 1\norigin: [0, 0]\n", "origin is .*: three numbers are wanted"),
         (
@@ -436,6 +437,63 @@ def test_a_wrong_map_says_what_is_wrong(text, says, tmp_path):
     (tmp_path / "m.pgm").write_bytes(b"P5 9 9 255\n1")
     (tmp_path / "m.yaml").write_text(text)
     with pytest.raises(ValueError, match=f"m.(yaml|pgm): {says}"):
+        ruedo.load_map(tmp_path / "m.yaml")
+
+
+YAML_BOMB = "a0: &a0 [x, x, x, x, x, x, x, x, x, x]\n" + "".join(
+    f"a{i}: &a{i} [{', '.join([f'*a{i - 1}'] * 10)}]\n" for i in range(1, 9)
+)
+MERGE_BOMB = "a0: &a0 {x: 1}\n" + "".join(
+    f"a{i}: &a{i} {{<<: [{', '.join([f'*a{i - 1}'] * 10)}]}}\n" for i in range(1, 9)
+)
+
+
+@pytest.mark.parametrize(
+    "what, says",
+    [
+        (YAML_BOMB, "it stands for more than 100000 values"),
+        (MERGE_BOMB, "it stands for more than 100000 values"),
+        ("&a [*a]", "it stands for more than 100000 values"),
+        ("[" * 100_000, "it is nested too deep"),
+        ("2000-99-99", "month must be in 1..12"),
+        ("x" * (1 << 20) + "y", "it has 1048577 bytes; allowed are 1048576"),
+        (os.mkfifo, "it is not a regular file"),
+        (lambda path: os.symlink("/dev/zero", path), "it is not a regular file"),
+        (os.mkdir, "it is not a regular file"),
+    ],
+)
+def test_a_hostile_map_or_picture_is_refused_at_once(what, says, tmp_path):
+    """Not after hours, and not for gigabytes."""
+    hostile, good = tmp_path / "hostile", tmp_path / "m.yaml"
+    hostile.write_text(what) if isinstance(what, str) else what(hostile)
+    soft, hard = resource.getrlimit(resource.RLIMIT_DATA)
+    resource.setrlimit(resource.RLIMIT_DATA, (4 << 30, hard))
+    try:
+        with pytest.raises((ValueError, OSError), match=says):
+            ruedo.load_map(hostile)
+        good.write_text("image: hostile\nresolution: 1\norigin: [0, 0, 0]\n")
+        with pytest.raises((ValueError, OSError)):
+            ruedo.load_map(good)
+    finally:
+        resource.setrlimit(resource.RLIMIT_DATA, (soft, hard))
+
+
+@pytest.mark.parametrize(
+    "picture, says",
+    [
+        (b"P5" + b"9" * 5000 + b" 1 255\n1", "is no PGM"),
+        (b"P5 0 5 255\n", "0 x 5 pixels is wanted"),
+        (b"P5 999999999 999999999 255\n1", "pixels is wanted, and 1 bytes are there"),
+        (b"P5" + b"#\n" * 100_000, "is no PGM"),
+        (b"\x89PNG\r\n\x1a\n" + b"\xff" * 50, "is no picture that can be read"),
+    ],
+)
+def test_a_broken_picture_of_a_map_is_named(picture, says, tmp_path):
+    if not picture.startswith(b"P5"):
+        pytest.importorskip("PIL")
+    (tmp_path / "m.pgm").write_bytes(picture)
+    (tmp_path / "m.yaml").write_text("image: m.pgm\nresolution: 1\norigin: [0, 0, 0]\n")
+    with pytest.raises(ValueError, match=f"m.pgm: .*{says}"):
         ruedo.load_map(tmp_path / "m.yaml")
 
 

@@ -10,11 +10,13 @@ from typing import Any, NamedTuple
 
 from . import lcmtypes
 from .errors import NotSupported
+from .files import open_regular
 
 EVENT = b"\xed\xa1\xda\x01"  # that LCM's logs begin each message with
 _HEAD = struct.Struct(
     ">4sqqii"
 )  # EVENT, number, timestamp, sizes of the channel's name and the data
+LONGEST_CHANNEL, LARGEST = 1000, 1 << 30  # bytes; as `ruedo` itself reads them
 log = logging.getLogger("ruedo")
 
 
@@ -30,14 +32,16 @@ def events(path: str | os.PathLike[str]) -> Iterator[Event]:
     """The messages of a log, up to where it is damaged or cut off, which is logged as a warning.
     LCM's own reader ends there without a word, or looks for the next message.
     """
-    with open(path, "rb") as file:
+    with open_regular(path) as file:
         size = os.fstat(file.fileno()).st_size
         at = 0
         while at < size:
             head = file.read(_HEAD.size)
             if len(head) == _HEAD.size:
                 event, _, timestamp, name_size, data_size = _HEAD.unpack(head)
-                if event != EVENT or name_size < 0 or data_size < 0:
+                if event != EVENT or not (
+                    0 <= name_size <= LONGEST_CHANNEL and 0 <= data_size <= LARGEST
+                ):
                     log.warning("%s: it is damaged at byte %d", os.fspath(path), at)
                     return
             if len(head) < _HEAD.size or at + _HEAD.size + name_size + data_size > size:
@@ -72,9 +76,9 @@ def read_log(path: str | os.PathLike[str], channels: list[str] | None = None) ->
     rows: dict[str, list[dict[str, Any]]] = {}
     if os.path.isdir(path):
         raise IsADirectoryError(f"{os.fspath(path)}: a folder, and no log")
-    if not os.path.isfile(path):
+    if not os.path.exists(path):
         raise FileNotFoundError(f"{os.fspath(path)}: no such file")
-    with open(path, "rb") as file:
+    with open_regular(path) as file:
         begin = file.read(len(EVENT))
     if begin not in (EVENT, b""):
         raise ValueError(

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import io
 import os
+import re
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -11,8 +13,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .errors import NotSupported
+from .files import MOST_YAML_BYTES, parse_yaml, read_bytes
 
 FREE, OCCUPIED, UNKNOWN = 0, 100, -1
+FARTHEST = 1e6  # m, rad
+MOST_BYTES, MOST_PIXELS, LONGEST_SIDE = 256 << 20, 100_000_000, 20_000  # of a picture
+_PGM = re.compile(rb"P5" + 3 * rb"(?:\s|#[^\n]*\n)+(\d{1,9})" + rb"\s")
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,7 +61,7 @@ def load_map(path: str | os.PathLike[str]) -> OccupancyMap:
         raise NotSupported("load_map() needs PyYAML: pip install pyyaml") from None
     file = Path(path)
     try:
-        head = yaml.safe_load(file.read_text(encoding="utf-8"))
+        _, head = parse_yaml(read_bytes(file, MOST_YAML_BYTES).decode())
     except (yaml.YAMLError, UnicodeDecodeError) as error:
         raise ValueError(f"{file}: {error}") from None
     if not isinstance(head, dict):
@@ -67,10 +73,10 @@ def load_map(path: str | os.PathLike[str]) -> OccupancyMap:
     if not (
         isinstance(origin, list)
         and len(origin) == 3
-        and all(isinstance(one, (int, float)) for one in origin)
+        and all(isinstance(one, (int, float)) and abs(one) <= FARTHEST for one in origin)
     ):
         raise ValueError(
-            f"{file}: origin is {origin!r}: three numbers are wanted, x, y and heading"
+            f"{file}: origin is {origin!r:.100}: three numbers are wanted, x, y and heading"
         )
     grey = _grey(file.parent / str(head["image"])).astype(np.float64) / 255.0
     dark = grey if head.get("negate") else 1.0 - grey
@@ -84,36 +90,41 @@ def load_map(path: str | os.PathLike[str]) -> OccupancyMap:
 
 def _number(file: Path, head: dict[str, Any], key: str, fallback: float | None = None) -> float:
     value = head.get(key, fallback)
-    if isinstance(value, bool) or not isinstance(value, (int, float)) or not value > 0:
-        raise ValueError(f"{file}: {key} is {value!r}: a number above 0 is wanted")
+    if isinstance(value, bool) or not isinstance(value, (int, float)) or not 0 < value <= FARTHEST:
+        raise ValueError(
+            f"{file}: {key} is {value!r:.100}: a number above 0, {FARTHEST:g} at most, is wanted"
+        )
     return float(value)
 
 
 def _grey(picture: Path) -> NDArray[np.uint8]:
-    content = picture.read_bytes()
+    content = read_bytes(picture, MOST_BYTES)
     if not content.startswith(b"P5"):
-        try:
-            from PIL import Image  # type: ignore[import-not-found, unused-ignore]
-        except ImportError:
-            raise NotSupported(
-                f"{picture}: pictures other than PGM need Pillow: pip install pillow"
-            ) from None
-        return np.asarray(Image.open(picture).convert("L"))
-    words: list[bytes] = []
-    rest = content[2:]
-    while len(words) < 3:  # width, height and largest value; comments between them
-        rest = rest.lstrip()
-        if rest.startswith(b"#"):
-            rest = rest.partition(b"\n")[2]
-            continue
-        word = rest.split(None, 1)[0] if rest.split(None, 1) else b""
-        if not word.isdigit():
-            raise ValueError(f"{picture}: is no PGM")
-        words.append(word)
-        rest = rest[len(word) :]
-    width, height, largest = map(int, words)
-    if largest != 255 or len(rest) - 1 < width * height:
+        return _by_pillow(picture, content)
+    head = _PGM.match(content)
+    if not head:
+        raise ValueError(f"{picture}: is no PGM")
+    width, height, largest = map(int, head.groups())
+    pixels = len(content) - head.end()
+    if largest != 255 or not 0 < width * height <= pixels:
         raise ValueError(
-            f"{picture}: a PGM of 8 bits with {width} x {height} pixels is wanted, and {len(rest) - 1} bytes are there"
+            f"{picture}: a PGM of 8 bits with {width} x {height} pixels is wanted, and {pixels} bytes are there"
         )
-    return np.frombuffer(rest, np.uint8, width * height, 1).reshape(height, width)
+    return np.frombuffer(content, np.uint8, width * height, head.end()).reshape(height, width)
+
+
+def _by_pillow(picture: Path, content: bytes) -> NDArray[np.uint8]:
+    try:
+        from PIL import Image  # type: ignore[import-not-found, unused-ignore]
+    except ImportError:
+        raise NotSupported(
+            f"{picture}: pictures other than PGM need Pillow: pip install pillow"
+        ) from None
+    try:
+        image = Image.open(io.BytesIO(content), formats=("PNG", "JPEG", "BMP", "TIFF", "PPM"))
+        width, height = image.size
+        if max(width, height) > LONGEST_SIDE or width * height > MOST_PIXELS:
+            raise ValueError(f"{width} x {height} pixels are too many")
+        return np.asarray(image.convert("L"))
+    except Exception as error:  # Pillow has many, of its own and of Python's
+        raise ValueError(f"{picture}: is no picture that can be read: {error}") from None

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from .. import _engine
+from ..files import MOST_YAML_BYTES, read_bytes
 from .cluster import run_on_ray
 from .errors import CampaignError, SpecError
 from .local import Done, cores, run_local
@@ -46,7 +47,7 @@ class Campaign:
         else:
             file = Path(spec)
             try:
-                text = file.read_text(encoding="utf-8")
+                text = read_bytes(file, MOST_YAML_BYTES).decode()
             except (OSError, UnicodeDecodeError) as error:
                 raise SpecError(f"{file}: cannot be read: {error}") from None
             self._content, self._source = read_yaml(str(file), text)

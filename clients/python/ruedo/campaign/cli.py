@@ -19,7 +19,7 @@ GOOD, FAILED, USAGE, BAD_INPUT, ENVIRONMENT = range(5)
 
 def main(words: list[str]) -> int:
     try:
-        from .errors import CampaignError
+        from .errors import CampaignError, for_terminal
     except ImportError as error:
         print(f"ruedo: {error}; pip install 'ruedo[campaign]'", file=sys.stderr)
         return ENVIRONMENT
@@ -27,7 +27,7 @@ def main(words: list[str]) -> int:
         arguments = _parser().parse_args(words)
         return int(arguments.action(arguments))
     except CampaignError as error:
-        print(f"ruedo: {error}", file=sys.stderr)
+        print(f"ruedo: {for_terminal(str(error))}", file=sys.stderr)
         return error.exit_code
     except ImportError as error:
         print(f"ruedo: {error}; pip install 'ruedo[campaign]'", file=sys.stderr)

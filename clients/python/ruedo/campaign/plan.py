@@ -16,6 +16,7 @@ from pathlib import Path
 from statistics import NormalDist
 from typing import Any
 
+from ..files import sha256_of
 from .errors import SpecError
 from .functions import Function
 from .schema import Source
@@ -390,9 +391,11 @@ class Planner:
     def _sha256(self, path: tuple[Any, ...], name: str) -> str:
         if name not in self._hashes:
             try:
-                self._hashes[name] = hashlib.sha256((self._folder / name).read_bytes()).hexdigest()
+                self._hashes[name] = sha256_of(self._folder / name)
             except OSError as error:
-                raise self._source.error(path, f"{name} cannot be read: {error.strerror}") from None
+                raise self._source.error(
+                    path, f"{name} cannot be read: {error.strerror or error}"
+                ) from None
         return self._hashes[name]
 
 

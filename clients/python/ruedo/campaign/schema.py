@@ -7,6 +7,7 @@ from __future__ import annotations
 import difflib
 from typing import Any
 
+from ..files import parse_yaml
 from .errors import SpecError, missing
 
 _NAME = {"type": "string", "pattern": "^[A-Za-z0-9][A-Za-z0-9_.-]{0,62}$"}
@@ -198,8 +199,7 @@ def read_yaml(path: str, text: str) -> tuple[Any, Source]:
     except ImportError:
         raise missing("PyYAML", "campaign") from None
     try:
-        node = yaml.compose(text, Loader=yaml.SafeLoader)
-        content = yaml.safe_load(text)
+        node, content = parse_yaml(text)
     except yaml.MarkedYAMLError as error:
         line = f":{error.problem_mark.line + 1}" if error.problem_mark else ""
         raise SpecError(f"{path}{line}: no YAML: {error.problem or error.context}") from None

@@ -1,0 +1,75 @@
+"""Files that others wrote: what is read of them goes through here.
+
+A file is opened once and never waited for, so that a FIFO cannot stall the program, a device cannot
+feed it for ever, and what was looked at is what is read. YAML is bounded by what it stands for, not
+by how it is written.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import stat
+from typing import Any, BinaryIO
+
+MOST_YAML_BYTES = 1 << 20
+MOST_YAML_VALUES = 100_000  # with each alias counted as what it stands for
+
+
+def open_regular(path: str | os.PathLike[str]) -> BinaryIO:
+    """A regular file, to be read. Raises OSError."""
+    file = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)
+    if stat.S_ISREG(os.fstat(file).st_mode):
+        return open(file, "rb")
+    os.close(file)
+    raise OSError(f"{os.fspath(path)}: it is not a regular file")
+
+
+def read_bytes(path: str | os.PathLike[str], most: int) -> bytes:
+    """Raises OSError, also for a file of more than `most` bytes."""
+    with open_regular(path) as file:
+        size = os.fstat(file.fileno()).st_size
+        if size > most:
+            raise OSError(f"{os.fspath(path)}: it has {size} bytes; allowed are {most}")
+        return file.read(most)
+
+
+def sha256_of(path: str | os.PathLike[str]) -> str:
+    """As `sha256sum` prints it. Raises OSError."""
+    digest = hashlib.sha256()
+    with open_regular(path) as file:
+        while piece := file.read(1 << 20):
+            digest.update(piece)
+    return digest.hexdigest()
+
+
+def parse_yaml(text: str) -> tuple[Any, Any]:
+    """PyYAML's node, and the content. Raises yaml.YAMLError, also for what is nested too deep or
+    stands for more than MOST_YAML_VALUES values.
+    """
+    import yaml
+
+    try:
+        node = yaml.compose(text, Loader=yaml.SafeLoader)
+        if node is not None and _values(node, {}) > MOST_YAML_VALUES:
+            raise yaml.YAMLError(f"it stands for more than {MOST_YAML_VALUES} values")
+        return node, yaml.safe_load(text)
+    except RecursionError:
+        raise yaml.YAMLError("it is nested too deep") from None
+    except (ValueError, OverflowError) as error:  # a date or a number that there is not
+        raise yaml.YAMLError(str(error)) from None
+
+
+def _values(node: Any, known: dict[int, int]) -> int:
+    """Of a node and all below it; each is counted once, and multiplied by its aliases."""
+    import yaml
+
+    if id(node) not in known:
+        known[id(node)] = MOST_YAML_VALUES + 1  # one that holds itself stands for endless values
+        inner: list[Any] = []
+        if isinstance(node, yaml.MappingNode):
+            inner = [part for pair in node.value for part in pair]
+        elif isinstance(node, yaml.SequenceNode):
+            inner = node.value
+        known[id(node)] = 1 + sum(_values(part, known) for part in inner)
+    return known[id(node)]
