@@ -136,7 +136,7 @@ std::string free_url(int& token) {
   throw LaunchError("no free UDP port was found in 100 tries");
 }
 
-// Python's launch() has the same words.
+// Python's launch() takes the same options.
 void add_options(const LaunchOptions& options, std::vector<std::string>& command) {
   const auto add = [&](const char* option, const std::string& value) {
     command.insert(command.end(), {option, value});
@@ -148,7 +148,8 @@ void add_options(const LaunchOptions& options, std::vector<std::string>& command
   if (options.lockstep != 0) add("--lockstep", std::to_string(options.lockstep));
   for (const std::string& model : options.spawn) add("--spawn", model);
   for (const std::string& device : options.disable) add("--disable", device);
-  for (const auto& [key, value] : options.set) add("--set", key + "=" + value);
+  for (const auto& [key, value] : options.set)
+    add("--set", std::string(key).append("=").append(value));
   if (!options.noise) command.emplace_back("--no-noise");
   command.insert(command.end(), options.args.begin(), options.args.end());
 }

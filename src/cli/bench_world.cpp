@@ -83,8 +83,9 @@ std::string bench_world(int robots) {
       "    </model>\n",
       robots, walls.sdf());
   for (int robot = 0; robot < robots; ++robot) {
-    const double x = (robot % side + 0.5) * kRoomSize_m + kCircleRadius_m;
-    const double y = (robot / side + 0.5) * kRoomSize_m;
+    const int column = robot % side, row = robot / side;
+    const double x = (column + 0.5) * kRoomSize_m + kCircleRadius_m;
+    const double y = (row + 0.5) * kRoomSize_m;
     sdf += fmt::format(
         "    <include><uri>model://p3at</uri><name>r{}</name><pose>{:.3f} {:.3f} 0 0 0 "
         "1.5707963267948966</pose></include>\n",

@@ -10,17 +10,23 @@
 namespace ruedo::console {
 namespace {
 
-// The offset of the field `part`, an int16, in a message; -1 if there is none, or if its offset
-// varies.
-int part_offset(const Schema& schema) {
-  int at = 8;  // after the fingerprint
+// The offset of the field `part`, an int16, in a message; none if there is no such field, or if its
+// offset varies.
+std::optional<size_t> part_offset(const Schema& schema) {
+  size_t at = 8;  // after the fingerprint
   for (const Field& field : schema.fields) {
     if (field.name == "part" && field.primitive == Primitive::int16) return at;
-    const auto size = static_cast<int>(wire_size(field.primitive));
-    if (size == 0 || !field.dimensions.empty()) return -1;
+    const size_t size = wire_size(field.primitive);
+    if (size == 0 || !field.dimensions.empty()) return std::nullopt;
     at += size;
   }
-  return -1;
+  return std::nullopt;
+}
+
+// Whether it is a part, but not the first.
+bool is_later(std::span<const uint8_t> message, std::optional<size_t> part_at) {
+  return part_at && message.size() >= *part_at + 2 &&
+         (message[*part_at] != 0 || message[*part_at + 1] != 0);
 }
 
 }  // namespace
@@ -36,14 +42,12 @@ void Board::put(size_t index, std::vector<uint8_t> message) {
   if (fingerprint != channel.fingerprint) {
     channel.fingerprint = fingerprint;
     const Schema* schema = find_schema(fingerprint);
-    channel.part_at = schema ? part_offset(*schema) : -1;
+    channel.part_at = schema ? part_offset(*schema) : std::nullopt;
     channel.replies = schema && schema->name == "reply_t";
     channel.layers = schema && schema->name == "markers_t";
     channel.newest.clear();
   }
-  const auto at = static_cast<size_t>(channel.part_at);
-  const bool later_part = channel.part_at >= 0 && message.size() >= at + 2 &&
-                          (message[at] != 0 || message[at + 1] != 0);
+  const bool later_part = is_later(message, channel.part_at);
   if (channel.replies) {
     if (channel.newest.size() >= kKeptReplies) channel.newest.erase(channel.newest.begin());
   } else if (channel.layers) {
@@ -61,9 +65,7 @@ void Board::put(size_t index, std::vector<uint8_t> message) {
 
 bool Board::is_later_part(std::span<const uint8_t> message) {
   const Schema* schema = find_schema(fingerprint_of(message));
-  const int offset = schema ? part_offset(*schema) : -1;
-  const auto at = static_cast<size_t>(offset);
-  return offset >= 0 && message.size() >= at + 2 && (message[at] != 0 || message[at + 1] != 0);
+  return schema && is_later(message, part_offset(*schema));
 }
 
 }  // namespace ruedo::console

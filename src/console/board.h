@@ -6,6 +6,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -28,7 +29,7 @@ class Board {
     std::vector<Message> newest;
     uint64_t last_number = 0;  // of the newest message; 0: none yet
     int64_t fingerprint = 0;
-    int part_at = -1;  // offset of the number of the part; -1: it has none
+    std::optional<size_t> part_at;  // offset of the number of the part
     bool replies = false, layers = false;
     int watchers = 0;  // viewers that want it
   };

@@ -15,7 +15,8 @@ void Tap::announce(const std::shared_ptr<const run::Announcement>& announcement)
   const auto world = std::find_if(channels.begin(), channels.end(), [](const engine::Channel& c) {
     return c.name == "ruedo/world" && !c.gone;
   });
-  state_index_ = world == channels.end() ? -1 : static_cast<int>(world - channels.begin());
+  state_index_ = world == channels.end() ? engine::ChannelIndex()
+                                         : engine::ChannelIndex(world - channels.begin());
   const std::lock_guard lock(names_mutex_);
   inputs_.clear();
   for (const engine::Channel& channel : channels) {

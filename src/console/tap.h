@@ -84,8 +84,8 @@ class Tap : public run::Sink {
   std::vector<Drawing> drawn_;
   std::mutex state_mutex_;
   State state_;
-  bool state_was_told_ = true;  // the console has it, or will find it in the ring
-  int state_index_ = -1;        // in the announcement. Publisher's thread
+  bool state_was_told_ = true;        // the console has it, or will find it in the ring
+  engine::ChannelIndex state_index_;  // in the announcement. Publisher's thread
   std::atomic<bool> watched_{false};
   // by index in the announcement; null: not heard yet. Publisher's thread
   std::vector<Traffic*> by_index_;

@@ -17,10 +17,12 @@
 
 namespace ruedo::engine {
 
+using InputIndex = Index<struct InputKind>;  // into CommandInbox::inputs()
+
 // A command that acted on the state of `step`.
 struct AppliedCommand {
   int64_t step = 0;
-  int input = -1;              // index into CommandInbox's inputs
+  InputIndex input;
   std::vector<uint8_t> bytes;  // the message, as received
 };
 

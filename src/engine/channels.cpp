@@ -12,7 +12,7 @@
 
 namespace ruedo::engine {
 
-int Channels::add(Channel channel) {
+ChannelIndex Channels::add(Channel channel) {
   channel.bus_name = channel.name;
   for (const auto& [name, bus_name] : remaps_) {
     if (name == channel.name) channel.bus_name = bus_name;
@@ -33,7 +33,7 @@ int Channels::add(Channel channel) {
                          [&](const Channel& old) { return free(old) && old.name == channel.name; });
     if (place == channels_.end()) place = std::find_if(channels_.begin(), channels_.end(), free);
   }
-  const int index = static_cast<int>(place - channels_.begin());
+  const ChannelIndex index(place - channels_.begin());
   if (const auto [other, added] = by_bus_name_.try_emplace(channel.bus_name, index); !added) {
     throw InputError({}, "two channels are called '" + channel.bus_name + "': '" +
                              channels_[other->second].name + "' and '" + channel.name + "'");

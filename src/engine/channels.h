@@ -7,6 +7,7 @@
 #include <utility>
 #include <vector>
 
+#include "ruedo/index.h"
 #include "ruedo/sim_time.h"
 
 namespace ruedo::engine {
@@ -25,24 +26,26 @@ struct Channel {
   bool gone = false;   // its robot was removed; the next channel of the type reuses its place
 };
 
+using ChannelIndex = Index<struct ChannelKind>;  // into Channels::list()
+
 class Channels {
  public:
   // remaps: pairs of a channel's name and its name on the bus.
   explicit Channels(std::vector<std::pair<std::string, std::string>> remaps = {})
       : remaps_(std::move(remaps)) {}
 
-  // Returns the channel's index. Throws InputError for a name that is too long or taken.
-  int add(Channel channel);
+  // Throws InputError for a name that is too long or taken.
+  ChannelIndex add(Channel channel);
 
   template <class Message>
-  int add(const std::string& name, const std::string& robot, const std::string& device, Rate rate,
-          bool input = false) {
+  ChannelIndex add(const std::string& name, const std::string& robot, const std::string& device,
+                   Rate rate, bool input = false) {
     return add(
         {name, name, robot, device, Message::getTypeName(), Message::getHash(), rate, input});
   }
 
-  const std::vector<Channel>& list() const { return channels_; }
-  const Channel& operator[](int index) const { return channels_[index]; }
+  const IndexedVector<ChannelIndex, Channel>& list() const { return channels_; }
+  const Channel& operator[](ChannelIndex index) const { return channels_[index]; }
 
   // Removes a robot's channels, or those of one of its devices. All other indices remain valid.
   void remove(const std::string& robot, const std::string& device = "");
@@ -56,14 +59,15 @@ class Channels {
 
  private:
   std::vector<std::pair<std::string, std::string>> remaps_;
-  std::vector<Channel> channels_;
+  IndexedVector<ChannelIndex, Channel> channels_;
   // only looked up, never iterated: its order is not defined
-  std::unordered_map<std::string, int> by_bus_name_;
+  std::unordered_map<std::string, ChannelIndex> by_bus_name_;
 };
 
 // The channels of the simulation itself, except ruedo/world, which its module announces.
 struct SimulationChannels {
-  int tick = -1, info = -1, request = -1, reply = -1;  // request and reply: -1 without control
+  ChannelIndex tick, info;
+  ChannelIndex request, reply;  // none without control
 };
 inline constexpr Rate kTickRate{10, 1}, kInfoRate{1, 1};
 SimulationChannels add_simulation_channels(Channels& channels, bool control);

@@ -132,13 +132,13 @@ bool is_finite(const robot::Command& command) {
 }
 
 CommandInbox::CommandInbox(std::vector<Input> inputs, int robots)
-    : inputs_(std::move(inputs)), reset_input_(static_cast<size_t>(robots), -1) {
+    : inputs_(std::move(inputs)), reset_input_(static_cast<size_t>(robots)) {
   waits_.slots.resize(static_cast<size_t>(robots));
-  for (size_t i = 0; i < inputs_.size(); ++i) listen(static_cast<int>(i));
+  for (const InputIndex input : inputs_.indices()) listen(input);
   waits_.robots.reserve(waits_.slots.size() + 1);
 }
 
-void CommandInbox::listen(int index) {
+void CommandInbox::listen(InputIndex index) {
   const Input& input = inputs_[index];
   if (input.kind == Input::Kind::reset_odometry) {
     reset_input_[input.robot] = index;
@@ -149,7 +149,7 @@ void CommandInbox::listen(int index) {
 
 void CommandInbox::add(const std::vector<Input>& inputs, int robots) {
   std::lock_guard lock(mutex_);
-  reset_input_.resize(static_cast<size_t>(robots), -1);
+  reset_input_.resize(static_cast<size_t>(robots));
   waits_.slots.resize(static_cast<size_t>(robots));
   for (const Input& input : inputs) {
     // A robot that takes the place of a removed one has the same inputs.
@@ -158,7 +158,7 @@ void CommandInbox::add(const std::vector<Input>& inputs, int robots) {
     });
     if (at == inputs_.end()) at = inputs_.insert(at, input);
     at->channel = input.channel;
-    listen(static_cast<int>(at - inputs_.begin()));
+    listen(InputIndex(at - inputs_.begin()));
   }
 }
 
@@ -218,7 +218,8 @@ CommandInbox::Entry& CommandInbox::next_entry(RobotIndex robot) {
   return slots.entries[(slots.first + slots.size++) % most];
 }
 
-void CommandInbox::keep(int input, robot::Command& command, const uint8_t* data, size_t size) {
+void CommandInbox::keep(InputIndex input, robot::Command& command, const uint8_t* data,
+                        size_t size) {
   std::lock_guard lock(mutex_);
   Entry& entry = next_entry(command.robot);
   entry.arrival = waits_.arrivals++;
@@ -231,10 +232,9 @@ bool CommandInbox::later(const Entry& a, const Entry& b) {
   return std::tie(a.step, a.arrival) > std::tie(b.step, b.arrival);
 }
 
-CommandInbox::Scheduled CommandInbox::schedule(int64_t step, int input, const uint8_t* data,
+CommandInbox::Scheduled CommandInbox::schedule(int64_t step, InputIndex input, const uint8_t* data,
                                                size_t size) {
-  if (input < 0 || static_cast<size_t>(input) >= inputs_.size() || size > kMaxMessageSize)
-    return Scheduled::faulty;
+  if (!inputs_.has(input) || size > kMaxMessageSize) return Scheduled::faulty;
   robot::Command command;
   command.robot = inputs_[input].robot;
   if (decode_command(inputs_[input].kind, data, size, command) != DecodeFault::none)

@@ -49,17 +49,17 @@ class CommandInbox {
   void reset_odometry(RobotIndex robot, const std::vector<uint8_t>& body);
 
   // Schedules a command, encoded as on the bus, for exactly that state: it acts before the live
-  // commands of that step, in the order of scheduling. input: index into inputs(). late: the state
+  // commands of that step, in the order of scheduling. late: the state
   // has passed; full: no room until others have been applied. A refused command changes nothing.
   // Any thread.
-  Scheduled schedule(int64_t step, int input, const uint8_t* data, size_t size);
+  Scheduled schedule(int64_t step, InputIndex input, const uint8_t* data, size_t size);
 
   // Applies the commands for the state `step` and records them in the batch: scheduled ones first,
   // then the waiting ones in order of arrival. For the simulation thread, for one step after the
   // other.
   void apply(robot::Robots& robots, Faults& faults, int64_t step, Batch& batch);
 
-  const std::vector<Input>& inputs() const { return inputs_; }
+  const IndexedVector<InputIndex, Input>& inputs() const { return inputs_; }
   // The first state that commands can still act on. Any thread.
   int64_t next_step() const {
     const std::lock_guard lock(mutex_);
@@ -82,7 +82,7 @@ class CommandInbox {
   struct Entry {
     int64_t step = -1;  // of a scheduled command
     uint64_t arrival = 0;
-    int input = -1;
+    InputIndex input;
     robot::Command command;
     std::vector<uint8_t> bytes;
   };
@@ -93,19 +93,19 @@ class CommandInbox {
     size_t first = 0, size = 0;
   };
 
-  void listen(int input);
+  void listen(InputIndex input);
   Slots& slots_of(RobotIndex robot) {
     return robot.valid() ? waits_.slots[robot] : waits_.world_slots;
   }
   Entry& next_entry(RobotIndex robot);  // the mutex must be held
-  void keep(int input, robot::Command& command, const uint8_t* data, size_t size);
+  void keep(InputIndex input, robot::Command& command, const uint8_t* data, size_t size);
   void refuse(const std::string& channel, const char* why);
   Entry& next_taken(size_t& count);
   static bool later(const Entry& a, const Entry& b);  // the heap's order
 
-  std::vector<Input> inputs_;
-  std::unordered_map<std::string, int> by_channel_;  // only looked up, never iterated
-  std::vector<int> reset_input_;                     // for each robot
+  IndexedVector<InputIndex, Input> inputs_;
+  std::unordered_map<std::string, InputIndex> by_channel_;  // only looked up, never iterated
+  IndexedVector<RobotIndex, InputIndex> reset_input_;
   mutable std::mutex mutex_;
   struct Waits {
     std::vector<Slots> slots;  // for each robot

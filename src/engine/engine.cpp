@@ -134,12 +134,12 @@ Engine::Engine(std::shared_ptr<const model::WorldModel> world, EngineOptions opt
   for_each(copies_.size(), [this](size_t i) {
     if (i > 0) copies_[i] = make_copy(world_, options_.fleet.seed + i);
   });
-  const std::vector<Input>& inputs = copies_[0]->world->inbox().inputs();
-  for (size_t i = 0; i < inputs.size(); ++i) {
+  const auto& inputs = copies_[0]->world->inbox().inputs();
+  for (const InputIndex i : inputs.indices()) {
     if (inputs[i].kind != Input::Kind::velocity) continue;
     const InstanceIndex instance = copies_[0]->world->layout().robots[inputs[i].robot].instance;
     driven_.push_back(world_->models[instance].name);
-    velocity_inputs_.push_back(static_cast<int>(i));
+    velocity_inputs_.push_back(i);
     driven_robots_.push_back(inputs[i].robot);
   }
   touching_->type = Primitive::int32;
@@ -278,7 +278,7 @@ void Engine::tell(size_t index, const Batch& batch) {
       for (const Outbox& outbox : output.pieces) {
         for (const Outbox::Entry& entry : outbox.entries()) {
           if (entry.step == step)
-            handler_(static_cast<int>(index), step, copy.channels[entry.channel],
+            handler_(static_cast<int>(index), step, copy.channels[ChannelIndex(entry.channel)],
                      {outbox.data(entry), entry.size});
         }
       }
@@ -400,8 +400,8 @@ void Engine::command(int world, const std::string& channel, std::span<const uint
                                   [&](const Input& one) { return one.channel == channel; });
   if (channel.empty() || input == inbox.inputs().end())
     throw InputError({}, "no robot takes commands on '" + channel + "'");
-  switch (inbox.schedule(copy.step, static_cast<int>(input - inbox.inputs().begin()),
-                         message.data(), message.size())) {
+  switch (inbox.schedule(copy.step, InputIndex(input - inbox.inputs().begin()), message.data(),
+                         message.size())) {
     case CommandInbox::Scheduled::kept: return;
     case CommandInbox::Scheduled::full:
       throw InputError({}, "more commands wait than a world keeps: step it first");
@@ -545,7 +545,7 @@ std::shared_ptr<const FieldArray> Engine::observe(const std::string& device,
     return known->array;
   }
   const std::vector<int> channels = channels_of(device);
-  const Schema* schema = find_schema(copies_[0]->channels[channels[0]].fingerprint);
+  const Schema* schema = find_schema(copies_[0]->channels[ChannelIndex(channels[0])].fingerprint);
   if (!schema)
     throw InputError({}, "the messages of '" + device + "' are of a type without a description");
   auto observer =

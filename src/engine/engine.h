@@ -161,7 +161,7 @@ class Engine {
   std::vector<std::unique_ptr<Copy>> copies_;
   bool first_made_ = false;  // the first copy reports what is wrong with the world
   std::vector<std::string> driven_;
-  std::vector<int> velocity_inputs_;  // for the driven robots
+  std::vector<InputIndex> velocity_inputs_;  // for the driven robots
   std::vector<RobotIndex> driven_robots_;
   std::vector<double> velocities_;  // from the last drive(): see Copy::driven
   std::shared_ptr<FieldArray> touching_ = std::make_shared<FieldArray>();

@@ -272,12 +272,13 @@ class FleetMaker {
   template <class Message>
   void add_input(RobotIndex robot, const std::string& suffix, Input::Kind kind) {
     const std::string& name = instance(robot).name;
-    const int channel = channels_.add<Message>(name + "/" + suffix, name, "", Rate{}, true);
+    const ChannelIndex channel =
+        channels_.add<Message>(name + "/" + suffix, name, "", Rate{}, true);
     fleet_.inputs.push_back({channels_[channel].bus_name, robot, kind});
   }
 
   void add_markers() {
-    const int channel = channels_.add<markers_t>("ruedo/markers", "", "", Rate{}, true);
+    const ChannelIndex channel = channels_.add<markers_t>("ruedo/markers", "", "", Rate{}, true);
     fleet_.inputs.push_back({channels_[channel].bus_name, RobotIndex(), Input::Kind::markers});
   }
 

@@ -49,7 +49,7 @@ World::World(std::shared_ptr<Plan> plan, const FleetOptions& options, Channels& 
   for (ModuleSetup& setup : fleet_.modules)
     modules_.push_back(std::make_unique<Module>(std::move(setup)));
   for (size_t i = 0; i < channels.list().size(); ++i) {
-    if (channels.list()[i].name == "ruedo/world") world_channel_ = static_cast<int>(i);
+    if (channels.list()[i].name == "ruedo/world") world_channel_ = ChannelIndex(i);
   }
 }
 

@@ -121,7 +121,7 @@ class World {
   bool sound_ = true;                               // no step failed
   std::shared_ptr<physics::PhysicsWorld> physics_;  // shared with one that has ended
   std::unique_ptr<robot::Robots> robots_;
-  int world_channel_ = -1;  // for ruedo/world
+  ChannelIndex world_channel_;  // for ruedo/world
   std::vector<std::unique_ptr<Module>> modules_;
 };
 

@@ -14,7 +14,8 @@ constexpr size_t kBodiesInPart = (kMaxPartSize - 64) / kBytesOfBody;
 
 class WorldState : public SensorOf<WorldState> {
  public:
-  WorldState(const std::vector<int32_t>& indices, int epoch, int channel) : channel_(channel) {
+  WorldState(const std::vector<int32_t>& indices, int epoch, ChannelIndex channel)
+      : channel_(channel) {
     const size_t bodies = indices.size();
     const size_t nparts = std::max<size_t>(1, (bodies + kBodiesInPart - 1) / kBodiesInPart);
     for (size_t part = 0; part < nparts; ++part) {
@@ -48,7 +49,7 @@ class WorldState : public SensorOf<WorldState> {
   }
 
  private:
-  int channel_;
+  ChannelIndex channel_;
   std::vector<world_state_t> parts_;
 };
 
@@ -92,19 +93,19 @@ std::vector<int32_t> bodies_of(const model::WorldModel& world, const model::Body
 
 std::unique_ptr<Sensor> world_state_sensor(const model::WorldModel& world,
                                            const model::BodyLayout& layout, int epoch,
-                                           int channel) {
+                                           ChannelIndex channel) {
   return std::make_unique<WorldState>(bodies_of(world, layout), epoch, channel);
 }
 
 std::vector<world_state_t> world_states(const model::WorldModel& world,
                                         const model::BodyLayout& layout, int epoch,
                                         const Snapshot& state) {
-  return WorldState(bodies_of(world, layout), epoch, -1).shown(state);
+  return WorldState(bodies_of(world, layout), epoch, ChannelIndex()).shown(state);
 }
 
 ModuleSetup world_state_module(const model::WorldModel& world, const model::BodyLayout& layout,
                                int epoch, Channels& channels) {
-  const int channel = channels.add<world_state_t>("ruedo/world", "", "", kWorldRate);
+  const ChannelIndex channel = channels.add<world_state_t>("ruedo/world", "", "", kWorldRate);
   ModuleSetup module;
   module.name = "world";
   module.step_us = world.step_us;

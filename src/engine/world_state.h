@@ -17,7 +17,8 @@ ModuleSetup world_state_module(const model::WorldModel& world, const model::Body
 
 // Its device, for bodies or an epoch that are others now. channel: as the module announced it.
 std::unique_ptr<Sensor> world_state_sensor(const model::WorldModel& world,
-                                           const model::BodyLayout& layout, int epoch, int channel);
+                                           const model::BodyLayout& layout, int epoch,
+                                           ChannelIndex channel);
 
 // The same of one state.
 std::vector<world_state_t> world_states(const model::WorldModel& world,

@@ -107,9 +107,9 @@ void Newton::put_in_order(const std::vector<std::pair<int, int>>& pairs) {
   std::sort(movable_.begin(), movable_.end(), fewer);
   order_.clear();
   const auto visit = [&](int body) {
-    int& place = bodies_[body].place;
-    if (place >= 0) return;
-    place = 0;
+    PlaceIndex& place = bodies_[body].place;
+    if (place.valid()) return;
+    place = PlaceIndex(0);
     order_.push_back(body);
   };
   for (const int body : movable_) {
@@ -124,17 +124,17 @@ void Newton::put_in_order(const std::vector<std::pair<int, int>>& pairs) {
     }
   }
   std::reverse(order_.begin(), order_.end());
-  for (size_t i = 0; i < order_.size(); ++i) bodies_[order_[i]].place = static_cast<int>(i);
+  for (size_t i = 0; i < order_.size(); ++i) bodies_[order_[i]].place = PlaceIndex(i);
 }
 
 void Newton::lay_out(const std::vector<std::pair<int, int>>& pairs) {
   first_.resize(order_.size());
   for (size_t i = 0; i < first_.size(); ++i) first_[i] = static_cast<int>(i);
   for (const auto& [a, b] : pairs) {
-    const int p = bodies_[a].place, q = bodies_[b].place;
-    if (p < 0 || q < 0) continue;
+    const PlaceIndex p = bodies_[a].place, q = bodies_[b].place;
+    if (!p.valid() || !q.valid()) continue;
     int& first = first_[std::max(p, q)];
-    first = std::min(first, std::min(p, q));
+    first = std::min<int>(first, std::min(p, q));
   }
   start_.resize(first_.size());
   size_t blocks = 0;
@@ -152,10 +152,11 @@ Newton::Entry& Newton::enter(Row& row, Kind kind, double scale, double response)
   entry.scale = scale;
   entry.weight = 1.0 / (scale * scale * (row.softness + kYields * response));
   entry.begun = entry.held = row.impulse / scale;
-  const auto scaled = [&](int body, const Vec3& linear, const Vec3& angular, int& place, Six& J) {
+  const auto scaled = [&](int body, const Vec3& linear, const Vec3& angular, PlaceIndex& place,
+                          Six& J) {
     const Body& of = bodies_[body];
     place = of.place;
-    if (place < 0) return;
+    if (!place.valid()) return;
     J.head<3>() = scale * linear.cwiseProduct(of.root_mass);
     J.tail<3>() = scale * (of.root_inertia.transpose() * angular);
   };
@@ -216,8 +217,8 @@ double Newton::slope(const std::vector<Six>& y) {
   for (size_t i = 0; i < entries_.size(); ++i) {
     Entry& entry = entries_[i];
     double missing = entry.missing;
-    if (entry.a >= 0) missing -= entry.J_a.dot(y[entry.a]);
-    if (entry.b >= 0) missing -= entry.J_b.dot(y[entry.b]);
+    if (entry.a.valid()) missing -= entry.J_a.dot(y[entry.a]);
+    if (entry.b.valid()) missing -= entry.J_b.dot(y[entry.b]);
     missing -= entry.scale * entry.scale * entry.row->softness * (entry.held - entry.begun);
     const double wanted = entry.held + entry.weight * missing;
     if (entry.kind == Kind::along) {
@@ -232,8 +233,8 @@ double Newton::slope(const std::vector<Six>& y) {
     for (size_t k = entry.kind == Kind::across ? i - 1 : i; k <= i; ++k) {
       const Entry& each = entries_[k];
       const double more = each.pulls - each.begun;
-      if (each.a >= 0) gradient_[each.a] -= more * each.J_a;
-      if (each.b >= 0) gradient_[each.b] -= more * each.J_b;
+      if (each.a.valid()) gradient_[each.a] -= more * each.J_a;
+      if (each.b.valid()) gradient_[each.b] -= more * each.J_b;
     }
   }
   double sum = 0.0;
@@ -249,9 +250,9 @@ bool Newton::same_set() const {
 }
 
 void Newton::add_row(const Entry& entry, const Six& J_a, const Six& J_b, double weight) {
-  if (entry.a >= 0) block(entry.a, entry.a).noalias() += J_a * (weight * J_a).transpose();
-  if (entry.b >= 0) block(entry.b, entry.b).noalias() += J_b * (weight * J_b).transpose();
-  if (entry.a < 0 || entry.b < 0) return;
+  if (entry.a.valid()) block(entry.a, entry.a).noalias() += J_a * (weight * J_a).transpose();
+  if (entry.b.valid()) block(entry.b, entry.b).noalias() += J_b * (weight * J_b).transpose();
+  if (!entry.a.valid() || !entry.b.valid()) return;
   if (entry.a > entry.b) {
     block(entry.a, entry.b).noalias() += J_a * (weight * J_b).transpose();
   } else {

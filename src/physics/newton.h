@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "physics/rows.h"
+#include "ruedo/index.h"
 
 namespace ruedo::physics {
 
@@ -40,16 +41,17 @@ class Newton {
  private:
   using Block = Eigen::Matrix<double, 6, 6>;
   using Six = Eigen::Matrix<double, 6, 1>;
+  using PlaceIndex = Index<struct PlaceKind>;  // in the elimination order
   struct Body {
-    int place = -1;                 // in the elimination order; -1: immovable
-    Vec3 root_mass = Vec3::Zero();  // M^-1 = L L^T
+    PlaceIndex place;                                        // none: immovable
+    Vec3 root_mass = Vec3::Zero();                           // M^-1 = L L^T
     Eigen::Matrix3d root_inertia = Eigen::Matrix3d::Zero();  // lower triangle
   };
   enum class Kind : uint8_t { bounded, on_load, along, across };
   struct Entry {
     Row* row = nullptr;
     Kind kind = Kind::bounded;
-    int a = -1, b = -1;               // places of the bodies
+    PlaceIndex a, b;                  // of the bodies
     size_t load = 0;                  // the entry whose impulse bounds this one
     double scale = 1.0;               // the entry's impulse is the row's divided by this
     double weight = 0.0;              // of the spring

@@ -66,12 +66,11 @@ Run::Outcome Run::change(const request_t& request, bool models,
 // service message, which is in no log: a log is the same with and without viewers.
 void Run::show_change() {
   if (!options_.edited || repeating_ || !pacer_->paused() || !publisher_.latest()) return;
-  const std::vector<engine::Channel>& channels = channels_.list();
-  for (size_t i = 0; i < channels.size(); ++i) {
-    if (channels[i].name != "ruedo/world") continue;
+  for (const engine::ChannelIndex channel : channels_.list().indices()) {
+    if (channels_[channel].name != "ruedo/world") continue;
     for (const world_state_t& state :
          engine::world_states(*world_, simulation_->layout(), epoch_, changed_))
-      publisher_.service(static_cast<int>(i), state, state.part);
+      publisher_.service(channel, state, state.part);
   }
 }
 

@@ -15,7 +15,8 @@ void KeptMessages::begin_step(int64_t step) {
   steps_.back().step = step;
 }
 
-void KeptMessages::keep(int channel, int64_t sequence, const uint8_t* data, size_t size) {
+void KeptMessages::keep(engine::ChannelIndex channel, int64_t sequence, const uint8_t* data,
+                        size_t size) {
   KeptStep& step = steps_.back();
   step.entries.push_back({channel, sequence, step.bytes.size(), size});
   step.bytes.insert(step.bytes.end(), data, data + size);
@@ -34,7 +35,8 @@ void KeptMessages::forget(int64_t step) {
   }
 }
 
-std::span<const uint8_t> KeptMessages::find(int64_t step, int channel, int64_t sequence) const {
+std::span<const uint8_t> KeptMessages::find(int64_t step, engine::ChannelIndex channel,
+                                            int64_t sequence) const {
   if (steps_.empty() || step < steps_.front().step || step > steps_.back().step) return {};
   const KeptStep& kept = steps_[step - steps_.front().step];
   for (const Entry& entry : kept.entries) {

@@ -29,7 +29,7 @@ class KeptMessages : public Sink {
 
   // Steps follow on one another. keep() belongs to the last one.
   void begin_step(int64_t step);
-  void keep(int channel, int64_t sequence, const uint8_t* data, size_t size);
+  void keep(engine::ChannelIndex channel, int64_t sequence, const uint8_t* data, size_t size);
 
   void forget(int64_t step);  // all up to and with that one
   void clear() { forget(INT64_MAX); }
@@ -40,11 +40,11 @@ class KeptMessages : public Sink {
   size_t bytes() const { return bytes_; }
 
   // Empty when it is not there; valid until the next call that changes something.
-  std::span<const uint8_t> find(int64_t step, int channel, int64_t sequence) const;
+  std::span<const uint8_t> find(int64_t step, engine::ChannelIndex channel, int64_t sequence) const;
 
  private:
   struct Entry {
-    int channel;
+    engine::ChannelIndex channel;
     int64_t sequence;
     size_t offset, size;
   };
@@ -56,7 +56,7 @@ class KeptMessages : public Sink {
   static constexpr size_t kSpareBytes = 64u
                                         << 10;  // a buffer larger than this goes back to the system
 
-  int tick_ = -1;  // channel
+  engine::ChannelIndex tick_;
   std::deque<KeptStep> steps_;
   std::vector<KeptStep> spare_;  // their memory is used again
   size_t bytes_ = 0;

@@ -124,7 +124,7 @@ std::string Lockstep::fault_of(const grant_request_t& grant, const Member& membe
 }
 
 std::string Lockstep::take_commands(const grant_request_t& grant, std::vector<Held>& held) const {
-  const std::vector<engine::Input>& inputs = inbox_->inputs();
+  const auto& inputs = inbox_->inputs();
   robot::Command decoded;
   auto input = inputs.begin();  // commands mostly come in the order of the robots
   for (size_t i = 0; i < grant.commands.size(); ++i) {
@@ -145,7 +145,7 @@ std::string Lockstep::take_commands(const grant_request_t& grant, std::vector<He
         engine::decode_command(input->kind, command.data.data(), command.data.size(), decoded);
     if (fault != DecodeFault::none) return which() + ": " + describe(fault);
     if (!engine::is_finite(decoded)) return which() + ": a value is not finite";
-    held.push_back({command.step, static_cast<int>(input - inputs.begin()), command.data});
+    held.push_back({command.step, engine::InputIndex(input - inputs.begin()), command.data});
   }
   std::stable_sort(held.begin(), held.end(),
                    [](const Held& a, const Held& b) { return a.step < b.step; });

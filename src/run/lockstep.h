@@ -80,7 +80,7 @@ class Lockstep : public Mode {
  private:
   struct Held {  // a command for a step to come, or for one that is not published yet
     int64_t step;
-    int input;
+    engine::InputIndex input;
     std::vector<uint8_t> bytes;
   };
   struct Grant {

@@ -49,7 +49,7 @@ engine::Outcome Lockstep::resend(const request_t& request, const Session& sessio
   for (const resend_wanted_t& wanted :
        std::span(body.wanted).first(std::min(body.wanted.size(), kMostWanted))) {
     const std::span<const uint8_t> bytes =
-        kept_.find(wanted.step, wanted.channel_index, wanted.sequence);
+        kept_.find(wanted.step, engine::ChannelIndex(wanted.channel_index), wanted.sequence);
     if (wanted.offset < 0 || static_cast<size_t>(wanted.offset) >= bytes.size()) continue;
     const size_t left = bytes.size() - static_cast<size_t>(wanted.offset);
     if (room <= kPartHead || (left > room - kPartHead && !reply.parts.empty())) break;

@@ -77,7 +77,8 @@ void Publisher::publish(engine::Simulation& simulation, const engine::Batch& bat
   const Step step{step_, time_us_, epoch_};
   const SimTime stamp_us = base_us_ + time_us_;
   for (Sink* sink : audience_.steps) sink->begin_step(step);
-  simulation.messages(batch, step_, [&](int64_t, int index, const uint8_t* data, size_t size) {
+  simulation.messages(batch, step_, [&](int64_t, int channel, const uint8_t* data, size_t size) {
+    const engine::ChannelIndex index(channel);
     int64_t& sequence = sequences_[index];
     const Published message{
         Kind::sample, time_us_, stamp_us, announcement_->channels[index].bus_name,
@@ -89,8 +90,8 @@ void Publisher::publish(engine::Simulation& simulation, const engine::Batch& bat
   for (Sink* sink : audience_.steps) sink->end_step(step);
 }
 
-void Publisher::send(Kind kind, SimTime time_us, const std::string& channel, int index,
-                     int64_t sequence) {
+void Publisher::send(Kind kind, SimTime time_us, const std::string& channel,
+                     engine::ChannelIndex index, int64_t sequence) {
   const Published message{kind,  time_us,  base_us_ + time_us, channel,
                           index, sequence, buffer_.data(),     buffer_.size()};
   for (Sink* sink : kind == Kind::record ? audience_.records : audience_.services)

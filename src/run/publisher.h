@@ -37,7 +37,7 @@ class Publisher {
 
   // A message of the run itself, at the time of the last state. sequence: as in Published.
   template <class Message>
-  void service(int channel, const Message& message, int64_t sequence = 0) {
+  void service(engine::ChannelIndex channel, const Message& message, int64_t sequence = 0) {
     encode(message);
     send(Kind::service, time_us_, announcement_->channels[channel].bus_name, channel, sequence);
     ++messages_;
@@ -46,7 +46,7 @@ class Publisher {
   template <class Message>
   void record(const std::string& channel, const Message& message) {
     encode(message);
-    send(Kind::record, message.utime, channel, -1, 0);
+    send(Kind::record, message.utime, channel, {}, 0);
   }
 
   void flush();
@@ -79,7 +79,8 @@ class Publisher {
   };
 
   void choose_audience();
-  void send(Kind kind, SimTime time_us, const std::string& channel, int index, int64_t sequence);
+  void send(Kind kind, SimTime time_us, const std::string& channel, engine::ChannelIndex index,
+            int64_t sequence);
   template <class Message>
   void encode(const Message& message) {
     buffer_.resize(static_cast<size_t>(message.getEncodedSize()));

@@ -62,7 +62,7 @@ class QueuedSink : public Sink {
     Step step{};
     SimTime time_us = 0, stamp_us = 0;
     const std::string* channel = nullptr;
-    int index = -1;
+    engine::ChannelIndex index;
     int64_t sequence = 0;
     size_t offset = 0, size = 0;
     std::shared_ptr<const Announcement> announcement;

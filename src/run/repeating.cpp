@@ -62,17 +62,17 @@ bool Repeating::early(const request_t&, const Session&) const {
   return after_ && after_->takes_grants();
 }
 
-int Repeating::input_of(const applied_t& applied) const {
+engine::InputIndex Repeating::input_of(const applied_t& applied) const {
   const bool is_request = applied.channel == "ruedo/request";
-  if (is_request && applied.kind != request_t::RESET_ODOMETRY) return -1;
+  if (is_request && applied.kind != request_t::RESET_ODOMETRY) return {};
   name_request_t body;
   if (is_request) decode_checked(applied.data.data(), applied.data.size(), body);
-  const std::vector<engine::Input>& inputs = stage_.inbox->inputs();
-  for (size_t i = 0; i < inputs.size(); ++i) {
+  const auto& inputs = stage_.inbox->inputs();
+  for (const engine::InputIndex i : inputs.indices()) {
     const bool reset = inputs[i].kind == engine::Input::Kind::reset_odometry;
     const bool fits = is_request ? reset && stage_.robot_name(inputs[i].robot) == body.name
                                  : !reset && inputs[i].channel == applied.channel;
-    if (fits) return static_cast<int>(i);
+    if (fits) return i;
   }
   throw InputError(
       {path()}, "cannot be repeated: there is no channel '" + applied.channel + "' in this world");

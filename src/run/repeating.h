@@ -32,7 +32,8 @@ class Repeating : public Mode {
   bool early(const request_t& request, const Session& session) const override;
 
  private:
-  int input_of(const applied_t& applied) const;  // -1: a request that the run executes
+  // None: a request that the run executes.
+  engine::InputIndex input_of(const applied_t& applied) const;
 
   Replay replay_;
   const Mode* after_;

@@ -54,7 +54,7 @@ const applied_t* Replay::advance(int64_t step, const Target& target) {
   };
   for (;;) {
     if (waits_) {
-      if (const int input = target.input_of(applied_); input >= 0) {
+      if (const engine::InputIndex input = target.input_of(applied_); input.valid()) {
         switch (target.inbox.schedule(applied_.step, input,
                                       reinterpret_cast<const uint8_t*>(applied_.data.data()),
                                       applied_.data.size())) {

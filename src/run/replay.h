@@ -26,7 +26,7 @@ class Replay {
     Gate& gate;
     // The input that takes it; -1: it is a request. Throws InputError for a channel that there is
     // not.
-    std::function<int(const applied_t&)> input_of;
+    std::function<engine::InputIndex(const applied_t&)> input_of;
     SimTime begin_us;  // of the epoch, in stamps of the log: what went on before sim time was last
                        // set to 0
   };

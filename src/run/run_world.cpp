@@ -29,7 +29,7 @@ void Run::make_simulation(const Pace& pace) {
   as_made_ = true;
   channels_.clear();
   own_ = engine::add_simulation_channels(channels_, options_.control);
-  if (own_.request >= 0 && request_channel_.empty())
+  if (own_.request.valid() && request_channel_.empty())
     request_channel_ = channels_[own_.request].bus_name;  // once: other threads read it
   options_.simulation.fleet.epoch = epoch_;
   findings_ = Findings();

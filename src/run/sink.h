@@ -31,8 +31,8 @@ struct Published {
   SimTime time_us;             // sim time in this epoch
   SimTime stamp_us;            // the same for logs: it goes on when sim time is reset
   const std::string& channel;  // as it is called on the bus
-  int index;         // of the channel in Announcement::channels; -1: a record, which has none
-  int64_t sequence;  // number on its channel in this epoch, from 0; of a tick: its part
+  engine::ChannelIndex index;  // in Announcement::channels; none: a record
+  int64_t sequence;            // number on its channel in this epoch, from 0; of a tick: its part
   const uint8_t* data;
   size_t size;
 };

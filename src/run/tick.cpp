@@ -28,7 +28,8 @@ void TickWriter::add_applied(const std::string& client, int64_t sequence) {
   entry.sequence = sequence;
 }
 
-void TickWriter::add_message(int channel, int64_t sequence, const uint8_t* data, size_t size) {
+void TickWriter::add_message(engine::ChannelIndex channel, int64_t sequence, const uint8_t* data,
+                             size_t size) {
   tick_message_t& entry = manifest_.emplace_back();
   entry.channel_index = channel;
   entry.sequence = sequence;

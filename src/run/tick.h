@@ -5,6 +5,7 @@
 #include <functional>
 #include <vector>
 
+#include "engine/channels.h"
 #include "ruedo/tick_t.hpp"
 
 namespace ruedo::run {
@@ -17,7 +18,8 @@ class TickWriter {
  public:
   void begin(int64_t utime, int64_t run_id, int32_t epoch, int64_t step);
   void add_applied(const std::string& client, int64_t sequence);
-  void add_message(int channel, int64_t sequence, const uint8_t* data, size_t size);
+  void add_message(engine::ChannelIndex channel, int64_t sequence, const uint8_t* data,
+                   size_t size);
 
   // Calls publish for each part.
   void finish(int64_t state_hash, const std::function<void(const tick_t&)>& publish);

@@ -16,7 +16,7 @@ namespace ruedo::run {
 WaitFor::WaitFor(std::vector<WaitForOption> options, int64_t step_us) {
   for (WaitForOption& option : options) {
     const SampleClock clock(option.rate, step_us);
-    waited_.push_back({std::move(option), clock, -1, {}, 0, false});
+    waited_.push_back({std::move(option), clock, {}, {}, 0, false});
   }
 }
 
@@ -42,7 +42,7 @@ void WaitFor::attach(const engine::Channels& channels, engine::CommandInbox& inb
       throw InputError({}, "--wait-for: there is no input channel '" + waited.option.channel + "'" +
                                (near.empty() ? "" : "; did you mean '" + near + "'?"));
     }
-    waited.input = static_cast<int>(found - inputs.begin());
+    waited.input = engine::InputIndex(found - inputs.begin());
     waited.next = waited.clock.samples_before(std::max<int64_t>(step, 0));
   }
   limit();

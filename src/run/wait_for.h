@@ -43,7 +43,7 @@ class WaitFor {
   struct Waited {
     WaitForOption option;
     SampleClock clock;
-    int input = -1;
+    engine::InputIndex input;
     std::string channel;  // on the bus
     int64_t next = 0;     // number of the message that comes next
     bool told = false;

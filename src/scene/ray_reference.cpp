@@ -17,7 +17,7 @@ class ReferenceRayScene : public RayScene {
 
   void update(const Snapshot& snapshot) override {
     for (size_t i = 0; i < bodies_.size(); ++i) bodies_[i] = IntoShape(snapshot.bodies[i]);
-    for (size_t i = 0; i < turning_.size(); ++i) {
+    for (const TurningIndex i : turning_.indices()) {
       const TurningShape& shape = statics_->table.turning[i];
       turning_[i] = shape.at(snapshot.wheel_angles[shape.wheel]);
     }
@@ -32,7 +32,7 @@ class ReferenceRayScene : public RayScene {
     return shape.body.valid() ? bodies_[shape.body] : IntoShape();
   }
   const IntoShape& into_shape(const RayShape& shape) const {
-    return shape.turning < 0 ? shape.into : turning_[shape.turning];
+    return shape.turning.valid() ? turning_[shape.turning] : shape.into;
   }
 
   Hit cast_one(const Ray& ray, LinkIndex ignored_link) const {
@@ -65,7 +65,8 @@ class ReferenceRayScene : public RayScene {
   }
 
   std::shared_ptr<const StaticRayScene> statics_;
-  std::vector<IntoShape> bodies_, turning_;
+  std::vector<IntoShape> bodies_;
+  IndexedVector<TurningIndex, IntoShape> turning_;
 };
 
 }  // namespace

@@ -35,7 +35,8 @@ class EmbreeRayScene : public RayScene {
   std::shared_ptr<const StaticRayScene> statics_;
   std::vector<Mover> bounded_, unbounded_;
   IndexedVector<BodyIndex, int> mover_of_body_;  // index into bounded_, or ~index into unbounded_
-  std::vector<IntoShape> turning_;  // as RayTable::turning, at the snapshot's wheel angles
+  // As RayTable::turning, at the snapshot's wheel angles.
+  IndexedVector<TurningIndex, IntoShape> turning_;
   MoverTree tree_;
 };
 
@@ -87,7 +88,7 @@ void EmbreeRayScene::update(const Snapshot& snapshot) {
     const Box box{center - half, center + half};
     tree_.box(i) = mover.there ? box : Box{};
   }
-  for (size_t i = 0; i < turning_.size(); ++i) {
+  for (const TurningIndex i : turning_.indices()) {
     const TurningShape& shape = statics_->table.turning[i];
     turning_[i] = shape.at(snapshot.wheel_angles[shape.wheel]);
   }
@@ -114,7 +115,7 @@ void EmbreeRayScene::test_near(int index, unsigned lanes, const FrameRays& body,
       if (near_ball(shape, body.o[lane], body.d[lane])) near |= 1u << lane;
     }
   }
-  const IntoShape& into = shape.turning < 0 ? shape.into : turning_[shape.turning];
+  const IntoShape& into = shape.turning.valid() ? turning_[shape.turning] : shape.into;
   if (near) test_shape(shape, index, into, near, body, batch);
 }
 
@@ -207,7 +208,7 @@ void EmbreeRayScene::write(const RayBatch& batch, int lane, Hit& hit) const {
     o = body->point(o);
     d = body->vector(d);
   }
-  const IntoShape& into = shape.turning < 0 ? shape.into : turning_[shape.turning];
+  const IntoShape& into = shape.turning.valid() ? turning_[shape.turning] : shape.into;
   o = into.point(o);
   d = into.vector(d);
   Vec3 normal = into.vector_back(shape_normal(shape, batch.feature[lane], o + hit.range * d));

@@ -120,7 +120,7 @@ void RayTable::add_turning(RayShape& shape, const Pose& X_LS, const model::LinkP
   const Vec3 axis_in_L = (X_LWheel.rotation * wheel.axis_in_L).normalized(),
              center_in_L = X_LWheel * wheel.center_in_L;
   if (round_about(shape, X_LS, center_in_L, axis_in_L)) return;
-  shape.turning = static_cast<int>(turning.size());
+  shape.turning = turning.next();
   turning.push_back({link.wheel, X_FL, X_LS, axis_in_L, center_in_L});
   // The sphere around all it sweeps, centred at the point of the axis nearest to its centre.
   const Vec3 axis_in_F = X_FL.rotation * axis_in_L;

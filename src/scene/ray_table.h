@@ -29,13 +29,14 @@ struct IntoShape {
   Vec3 vector_back(const Vec3& v_S) const { return rotation.transpose() * v_S; }
 };
 
+using TurningIndex = Index<struct TurningKind>;  // into RayTable::turning
+
 struct RayShape {
   model::Shape kind = model::Shape::box;
-  LinkIndex link;  // as in Hit
-  int shape = -1;  // likewise
-  BodyIndex body;  // none: static
-  // index into RayTable::turning: its pose depends on a wheel's angle; -1: it does not
-  int turning = -1;
+  LinkIndex link;               // as in Hit
+  int shape = -1;               // likewise
+  BodyIndex body;               // none: static
+  TurningIndex turning;         // its pose depends on a wheel's angle; none: it does not
   IntoShape into;               // at wheel angle 0
   Vec3 size = Vec3::Zero();     // box: half lengths; sphere, cylinder, capsule, cone: radius, half
                                 // length; ellipsoid: radii
@@ -63,7 +64,7 @@ struct RayTable {
   std::vector<RayShape> shapes;                       // by (link, shape)
   IndexedVector<BodyIndex, std::vector<int>> bodies;  // indices into shapes
   std::vector<int> statics;                           // indices into shapes
-  std::vector<TurningShape> turning;
+  IndexedVector<TurningIndex, TurningShape> turning;
 
   // Meshes of static links are given in the world's frame, without a tree. Those of movers are
   // shared and have one; device null: no tree.

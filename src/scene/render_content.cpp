@@ -86,16 +86,17 @@ class Builder {
     return only_mesh(mesh({g.mesh.get(), 0, 0, 0, 0}, [&] { return file_mesh(*g.mesh); }), g.scale);
   }
 
-  int texture(const std::shared_ptr<const model::Texture>& texture) {
-    if (!texture) return -1;
+  TextureIndex texture(const std::shared_ptr<const model::Texture>& texture) {
+    if (!texture) return {};
     // Many materials may name the same file: it is uploaded once.
-    for (size_t i = 0; i < content_.textures.size(); ++i) {
+    for (const TextureIndex i : content_.textures.indices()) {
       const model::Texture& other = *content_.textures[i];
       if (&other == texture.get() || (!texture->path.empty() && other.path == texture->path))
-        return static_cast<int>(i);
+        return i;
     }
+    const TextureIndex index = content_.textures.next();
     content_.textures.push_back(texture);
-    return static_cast<int>(content_.textures.size()) - 1;
+    return index;
   }
 
   int batch(const Batch& wanted) {
@@ -127,12 +128,12 @@ class Builder {
       shade(material, visual, part);
       if (part.diffuse[3] < 0.004f) continue;  // invisible
       Batch b{pair.mesh, piece.first_index, piece.index_count, texture(material.texture), 0};
-      if (b.texture >= 0) b.flags |= kTextured;
+      if (b.texture.valid()) b.flags |= kTextured;
       if (std::max({part.specular[0], part.specular[1], part.specular[2]}) > 0.02f)
         b.flags |= kSpecular;
       if (material.double_sided) b.flags |= kDoubleSided;
       if (M_LP.leftCols<3>().determinant() < 0.0) b.flags |= kMirrored;
-      if (g.shape == model::Shape::plane && b.texture < 0 && g.normal.z() > 0.999 &&
+      if (g.shape == model::Shape::plane && !b.texture.valid() && g.normal.z() > 0.999 &&
           g.extent.minCoeff() >= kGroundExtent) {
         b.flags |= kGround;
       }

@@ -28,11 +28,13 @@ enum BatchFlags : uint32_t {
   kMirrored = 16,    // the scale has an odd number of negative factors: clockwise is outside
 };
 
+using TextureIndex = Index<struct TextureKind>;  // into RenderContent::textures
+
 // Triangles that one draw call can draw in many instances.
 struct Batch {
   int mesh = 0;
   uint32_t first_index = 0, index_count = 0;
-  int texture = -1;
+  TextureIndex texture;
   uint32_t flags = 0;
   friend auto operator<=>(const Batch&, const Batch&) = default;
 };
@@ -66,7 +68,7 @@ using RenderKindIndex = Index<RenderLinkKind>;  // into RenderContent::link_kind
 
 struct RenderContent {
   std::vector<RenderMesh> meshes;
-  std::vector<std::shared_ptr<const model::Texture>> textures;
+  IndexedVector<TextureIndex, std::shared_ptr<const model::Texture>> textures;
   std::vector<Batch> batches;
   IndexedVector<RenderKindIndex, RenderLinkKind> link_kinds;
   IndexedVector<LinkIndex, RenderKindIndex> kind_of_link;  // not valid: nothing to draw

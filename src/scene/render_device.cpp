@@ -138,7 +138,7 @@ void RenderDevice::upload(const RenderMesh& mesh) {
   }
 }
 
-const RenderDevice::TextureState& RenderDevice::texture(int index) {
+const RenderDevice::TextureState& RenderDevice::texture(TextureIndex index) {
   TextureState& state = textures_[index];
   if (state.tried) return state;
   state.tried = true;
@@ -289,7 +289,7 @@ void RenderDevice::draw_run(Pass pass, const Run& run) {
   const Batch& batch = content_.batches[run.batch];
   uint32_t flags = batch.flags;
   bool cutout = false;
-  if (batch.texture >= 0 && pass != Pass::shadow) {
+  if (batch.texture.valid() && pass != Pass::shadow) {
     const TextureState& state = texture(batch.texture);
     if (state.name == 0) {
       flags &= ~uint32_t{kTextured};

@@ -80,7 +80,7 @@ class RenderDevice {
   GLuint compile(const std::string& vertex, const std::string& fragment);
   GLuint program(Pass pass, uint32_t flags, bool cutout);
   void upload(const RenderMesh& mesh);
-  const TextureState& texture(int index);
+  const TextureState& texture(TextureIndex index);
   Target& target(int width, int height, int samples, bool labels);
   void attach(GLenum attachment, GLenum format, int width, int height, int samples);
   void make_shadow_map(ShadowMap& map, int size);
@@ -92,7 +92,7 @@ class RenderDevice {
   RenderContent& content_;
   LightCounts lights_;
   std::vector<MeshBuffers> meshes_;
-  std::vector<TextureState> textures_;
+  IndexedVector<TextureIndex, TextureState> textures_;
   std::map<ProgramKey, GLuint> programs_;
   std::map<std::array<int, 4>, Target> targets_;
   GLuint instance_buffer_ = 0, frame_buffer_ = 0, overlay_buffer_ = 0;

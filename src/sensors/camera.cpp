@@ -79,11 +79,11 @@ class Camera : public Sensor {
     view_.X_WCamera = X_WC(input.snapshot);
     input.renderer->draw(input.snapshot, view_, picture_);
     publish_picture(input, out);
-    if (depth_channel_ >= 0)
-      publish_plane(input, out, depth_channel_, image_t::PIXEL_FORMAT_FLOAT_GRAY32, CV_32F,
+    if (depth_channel_)
+      publish_plane(input, out, *depth_channel_, image_t::PIXEL_FORMAT_FLOAT_GRAY32, CV_32F,
                     picture_.depth.data());
-    if (labels_channel_ >= 0)
-      publish_plane(input, out, labels_channel_, image_t::PIXEL_FORMAT_LE_GRAY16, CV_16U,
+    if (labels_channel_)
+      publish_plane(input, out, *labels_channel_, image_t::PIXEL_FORMAT_LE_GRAY16, CV_16U,
                     picture_.labels.data());
     info_.utime = input.snapshot.time;
     out.publish(info_channel_, info_);
@@ -111,7 +111,7 @@ class Camera : public Sensor {
     grey_ = encoding_ == Encoding::grey || format == "L8" || format == "L_INT8";
     const bool colour =
         format == "R8G8B8" || format == "RGB_INT8" || format == "B8G8R8" || format == "BGR_INT8";
-    const bool depth = depth_channel_ >= 0 &&
+    const bool depth = depth_channel_ &&
                        // depth is published in addition
                        (format == "R_FLOAT32" || format == "FLOAT32");
     if (!grey_ && !colour && !depth && setup.findings) {
@@ -204,7 +204,8 @@ class Camera : public Sensor {
   Lens lens_;
   PixelNoise noise_;
   Vignette vignette_;
-  int channel_, info_channel_, depth_channel_ = -1, labels_channel_ = -1;
+  int channel_, info_channel_;
+  std::optional<int> depth_channel_, labels_channel_;
   BodyIndex body_;  // none: static
   Pose X_BC_;       // X_WC if static
   const model::BodyLayout* layout_ = nullptr;

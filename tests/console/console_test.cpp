@@ -1,5 +1,5 @@
-// The console's parts that need no socket: who may come in, the ring past the publisher, what is
-// kept of each channel.
+// The parts of the console that need no socket: access control, the ring beside the publisher, and
+// what is kept of each channel.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -107,7 +107,7 @@ TEST(OfferRing, KeepsOrderAcrossItsEndAndDropsWhatHasNoRoom) {
   EXPECT_EQ(ring.dropped(), 50u);
 }
 
-// Where there is room nothing is missed, whoever writes in the same moment.
+// As long as there is room nothing is missed, even with writers in other threads.
 TEST(OfferRing, HoldsAllThatManyThreadsWriteInTheOrderOfEach) {
   constexpr uint32_t kWriters = 3, kEach = 20000;
   OfferRing ring(size_t{1} << 23);
@@ -136,7 +136,7 @@ TEST(OfferRing, HoldsAllThatManyThreadsWriteInTheOrderOfEach) {
   EXPECT_EQ(ring.dropped(), 0u);
 }
 
-// A reader that follows, in a ring that is full again and again.
+// A reader that keeps up, with a ring that fills again and again.
 TEST(OfferRing, WhatIsDroppedLeavesTheRestWhole) {
   OfferRing ring(1024);
   std::atomic<int> writing{2};
@@ -188,7 +188,7 @@ TEST(Board, KeepsTheNewestAllPartsAndTheLastReplies) {
   EXPECT_EQ(board.channels()[0].newest.size(), 1u);
 }
 
-// What is heard of a run, one message after the other.
+// The messages of a run, one after the other.
 class EventsTest : public testing::Test {
  protected:
   template <class Message>
@@ -377,7 +377,8 @@ class TapTest : public testing::Test {
     announcement = announced;
     tap.announce(announcement);
   }
-  void publish(int index) {
+  void publish(int place) {
+    const engine::ChannelIndex index(place);
     tap.message({.kind = run::Kind::sample,
                  .time_us = 0,
                  .stamp_us = 0,
@@ -436,8 +437,8 @@ TEST_F(TapTest, TheNewestStateIsKeptForThoseWhoComeLater) {
     tap.message({.kind = run::Kind::sample,
                  .time_us = utime,
                  .stamp_us = utime,
-                 .channel = announcement->channels[0].bus_name,
-                 .index = 0,
+                 .channel = announcement->channels.list()[0].bus_name,
+                 .index = engine::ChannelIndex(0),
                  .sequence = 0,
                  .data = bytes.data(),
                  .size = bytes.size()});

@@ -1,4 +1,4 @@
-// Commands for steps to come: each acts on exactly its step, in one order, within bounds.
+// Commands for future steps: each acts on exactly its step, in a fixed order, within bounds.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -26,7 +26,7 @@ class InboxTest : public testing::Test {
  protected:
   Scheduled schedule(int64_t step, double vx) {
     const auto bytes = velocity(vx);
-    return inbox_.schedule(step, 0, bytes.data(), bytes.size());
+    return inbox_.schedule(step, engine::InputIndex(0), bytes.data(), bytes.size());
   }
   void receive(double vx) {
     const auto bytes = velocity(vx);
@@ -81,10 +81,13 @@ TEST_F(InboxTest, RefusesWhatIsLateOrFaulty) {
   EXPECT_EQ(schedule(1, 0.1), Scheduled::late);
   EXPECT_EQ(schedule(-1, 0.1), Scheduled::late);
   const auto bytes = velocity(0.1);
-  EXPECT_EQ(inbox_.schedule(5, 1, bytes.data(), bytes.size()), Scheduled::faulty);
-  EXPECT_EQ(inbox_.schedule(5, -1, bytes.data(), bytes.size()), Scheduled::faulty);
-  EXPECT_EQ(inbox_.schedule(5, 0, bytes.data(), bytes.size() - 1), Scheduled::faulty);
-  EXPECT_EQ(inbox_.schedule(5, 0, nullptr, 0), Scheduled::faulty);
+  EXPECT_EQ(inbox_.schedule(5, engine::InputIndex(1), bytes.data(), bytes.size()),
+            Scheduled::faulty);
+  EXPECT_EQ(inbox_.schedule(5, engine::InputIndex(-1), bytes.data(), bytes.size()),
+            Scheduled::faulty);
+  EXPECT_EQ(inbox_.schedule(5, engine::InputIndex(0), bytes.data(), bytes.size() - 1),
+            Scheduled::faulty);
+  EXPECT_EQ(inbox_.schedule(5, engine::InputIndex(0), nullptr, 0), Scheduled::faulty);
   for (int64_t step = 2; step < 7; ++step) EXPECT_THAT(apply(step), ElementsAre());
 }
 
@@ -97,7 +100,7 @@ TEST_F(InboxTest, IsBounded) {
   EXPECT_EQ(apply(1).back(), 0.2);
 }
 
-// Whatever the threads do, what was kept acts once, on its step.
+// However threads are scheduled, each kept command acts once, on its step.
 TEST_F(InboxTest, ManyThreads) {
   std::atomic<int> kept{0};
   std::vector<std::thread> threads;

@@ -1,4 +1,4 @@
-// A client of lockstep from the protocol's page alone: it knows the message types, and nothing of
+// A lockstep client written from the protocol's page alone: it knows the message types, but none of
 // the client libraries.
 #pragma once
 
@@ -30,7 +30,7 @@ class LockstepClient {
         messages;  // of the manifest, in its order
   };
 
-  // channels: of the server, whose indices a manifest counts by.
+  // channels: the server's, whose indices are those of a manifest.
   LockstepClient(LossyBus& bus, const engine::Channels& channels, std::string name)
       : bus_(bus), channels_(channels), listener_(bus.connect()), name_(std::move(name)) {
     for (size_t i = 0; i < channels.list().size(); ++i) {
@@ -46,7 +46,7 @@ class LockstepClient {
         ask(request_t::JOIN, std::random_device{}() + int64_t{1}, engine::encoded(join)).session;
   }
 
-  // Takes part from where the run stands.
+  // Joins at the run's current state.
   void begin() {
     grant_request_t grant;
     grant.granted = grant.step_until = grant.received = -1;
@@ -75,7 +75,7 @@ class LockstepClient {
     commands_.push_back(command);
   }
 
-  // Grants n steps, with the commands that were given, and waits for all of their messages.
+  // Grants n steps with the given commands, and waits for all of their messages.
   void step(int64_t n) {
     grant_request_t grant;
     grant.granted = granted_;
@@ -150,7 +150,7 @@ class LockstepClient {
     std::map<std::pair<int32_t, int64_t>, std::vector<uint8_t>> resent;
   };
 
-  // True when the message says that the grant was executed.
+  // Whether the message says that the grant was executed.
   bool take(const Message& message, int64_t sequence) {
     bool taken = false;
     if (message.channel == "ruedo/tick") {
@@ -195,7 +195,7 @@ class LockstepClient {
     }
   }
 
-  // Empty when it is not here.
+  // Empty if it has not arrived.
   const std::vector<uint8_t>* find(const Step& step, const tick_message_t& entry) const {
     const auto whole = [&](const std::vector<uint8_t>& bytes) {
       return bytes.size() == static_cast<size_t>(entry.size) &&
@@ -218,7 +218,7 @@ class LockstepClient {
         for (const tick_message_t& entry : tick.manifest) {
           const std::vector<uint8_t>* bytes = find(step->second, entry);
           if (!bytes) return;
-          seen.messages.emplace_back(channels_[entry.channel_index].bus_name, *bytes);
+          seen.messages.emplace_back(channels_.list()[entry.channel_index].bus_name, *bytes);
         }
       }
       seen_[++have_] = std::move(seen);

@@ -1,5 +1,5 @@
-// What clients draw is checked before it is taken, costs no robot's command its place, and is in
-// the batch for the log.
+// What clients draw is checked before it is accepted, displaces no robot's command, and is in the
+// batch for the log.
 #include "engine/markers.h"
 
 #include <functional>
@@ -113,8 +113,10 @@ TEST(Markers, TheInboxTakesWholeOnesAlone) {
   const auto bad = bytes_of(markers);
   inbox.receive("ruedo/markers", bad.data(), bad.size());
   EXPECT_EQ(inbox.refused(), 1u);
-  EXPECT_EQ(inbox.schedule(3, 0, bad.data(), bad.size()), CommandInbox::Scheduled::faulty);
-  EXPECT_EQ(inbox.schedule(3, 0, good.data(), good.size()), CommandInbox::Scheduled::kept);
+  EXPECT_EQ(inbox.schedule(3, InputIndex(0), bad.data(), bad.size()),
+            CommandInbox::Scheduled::faulty);
+  EXPECT_EQ(inbox.schedule(3, InputIndex(0), good.data(), good.size()),
+            CommandInbox::Scheduled::kept);
   for (size_t i = 0; i < CommandInbox::kKeptOfWorld; ++i)
     inbox.receive("ruedo/markers", good.data(), good.size());
   EXPECT_EQ(inbox.displaced(), 1u);  // the oldest of them, no robot's command

@@ -1,5 +1,6 @@
-// RESTORE of a state that the same process saved: it is put back as it is, and what follows is what
-// followed, as after running there again. Other worlds and devices: tests/engine/test_restore.py.
+// RESTORE of a state that the same process saved: the state is put back as it was, and what follows
+// is the same as after running there again. tests/engine/test_restore.py has other worlds and
+// devices.
 #include <atomic>
 #include <filesystem>
 #include <fstream>
@@ -88,7 +89,8 @@ class RestoreTest : public testing::Test, protected Controlled {
         auto tick = decoded_as<tick_t>(all[i].bytes);  // with the number of each message
         tick.epoch = 0;
         for (auto& manifest : tick.manifest)
-          if (server().channels()[manifest.channel_index].name == "ruedo/world") manifest.crc = 0;
+          if (server().channels().list()[manifest.channel_index].name == "ruedo/world")
+            manifest.crc = 0;
         tick.applied.clear();
         tick.napplied = 0;
         sent.back().second = engine::encoded(tick);

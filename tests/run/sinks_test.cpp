@@ -66,8 +66,8 @@ class Notes : public Sink {
 void send_step(Sink& sink, int64_t step, const std::vector<uint8_t>& bytes) {
   const std::string channel = "r/camera";
   sink.begin_step({step, step * 5000, 0});
-  sink.message(
-      {Kind::sample, step * 5000, step * 5000, channel, 3, step, bytes.data(), bytes.size()});
+  sink.message({Kind::sample, step * 5000, step * 5000, channel, engine::ChannelIndex(3), step,
+                bytes.data(), bytes.size()});
   sink.end_step({step, step * 5000, 0});
   sink.flush();
 }

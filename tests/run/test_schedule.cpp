@@ -83,7 +83,7 @@ TEST(Schedule, StampsOfAnOddRate) {
   EXPECT_EQ(k, 30 * 60 + 1);
 }
 
-// A sink that blocks stops the simulation within the batches that may be on their way.
+// A sink that blocks stops the simulation within the batches that may be in flight.
 TEST(Schedule, SlowSinkBoundsTheRun) {
   MemoryBus bus;
   bus.keep = false;
@@ -106,7 +106,7 @@ TEST(Schedule, SlowSinkBoundsTheRun) {
   run::Run server(load_text(robot_sdf("r", 0, 0)), options, bus);
   std::thread thread([&] { server.run(); });
   rounds.wait(0);
-  // In the time of a whole run that nothing blocks, this one could have ended.
+  // In the time of a whole unblocked run this one could have ended.
   MemoryBus other_bus;
   other_bus.keep = false;
   run::Run(load_text(robot_sdf("r", 0, 0)), fast(10.0), other_bus).run();
@@ -155,7 +155,7 @@ TEST(Schedule, TickListsTheMessagesOfItsStep) {
     ASSERT_LE(static_cast<size_t>(tick.nmanifest), i);
     for (int32_t k = 0; k < tick.nmanifest; ++k) {
       const Message& message = messages[i - static_cast<size_t>(tick.nmanifest - k)];
-      EXPECT_EQ(server.channels()[tick.manifest[k].channel_index].bus_name, message.channel);
+      EXPECT_EQ(server.channels().list()[tick.manifest[k].channel_index].bus_name, message.channel);
       EXPECT_EQ(static_cast<size_t>(tick.manifest[k].size), message.bytes.size());
       EXPECT_EQ(static_cast<uint32_t>(tick.manifest[k].crc),
                 crc32(message.bytes.data(), message.bytes.size()));
