@@ -39,10 +39,10 @@ class SavedFleet(Saved):
     """What `FleetEnv.save` gave; it does not change."""
 
     def __init__(self, world: SavedWorld, episode: Each) -> None:
-        self._world, self._episode = world, episode
+        self._saved_world, self._episode = world, episode
 
     def __repr__(self) -> str:
-        return f"<ruedo.gym.SavedFleet: at {self._world.time:g} s>"
+        return f"<ruedo.gym.SavedFleet: at {self._saved_world.time:g} s>"
 
 
 class FleetEnv(MadeAnew, ParallelEnv):  # type: ignore[misc]    # PettingZoo's generics
@@ -174,7 +174,7 @@ class FleetEnv(MadeAnew, ParallelEnv):  # type: ignore[misc]    # PettingZoo's g
         """
         if not isinstance(saved, SavedFleet):
             raise TypeError(f"restore() takes what save() gave, not {saved!r}")
-        self._engine.restore(saved._world)
+        self._engine.restore(saved._saved_world)
         for name, value in copy.deepcopy(saved._episode).items():
             setattr(self, name, value)
         return self._begun()
