@@ -110,7 +110,7 @@ export default async function access({ page, until, check, ready, picture, expec
       const {
           camera: { position: p },
           controls: { target: t },
-        } = window.ruedo.stage,
+        } = window.ruedo.stage.view,
         d = [p.x - t.x, p.y - t.y, p.z - t.z];
       return {
         away: Math.hypot(...d),
@@ -193,7 +193,10 @@ export default async function access({ page, until, check, ready, picture, expec
   // ---- colours and motion that the system asks for
   await page.emulateMedia({ forcedColors: "active", reducedMotion: "reduce" });
   // The page hears of it with its next frame.
-  await until("no motion for who wants none", () => !window.ruedo.stage.controls.enableDamping);
+  await until(
+    "no motion for who wants none",
+    () => !window.ruedo.stage.view.controls.enableDamping,
+  );
   check(
     "what is chosen can be seen in forced colours",
     await page.evaluate(

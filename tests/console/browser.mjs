@@ -54,9 +54,10 @@ page.on("console", (message) => {
   if (message.type() === "error") wrong(message.text());
 });
 page.on("pageerror", (error) => wrong(String(error)));
-// A picture that the next one replaces while it is read is no error.
+// A picture that the next one replaces while it is read is no error, nor a server that does not
+// answer in time when the page asks whether it is there.
 page.on("requestfailed", (request) => {
-  if (!request.url().startsWith("blob:"))
+  if (!request.url().startsWith("blob:") && !request.url().endsWith("/icon.svg"))
     wrong(`${request.url()}: ${request.failure()?.errorText}`);
 });
 page.on("request", (request) => {
@@ -173,8 +174,8 @@ const tools = {
   // Until nothing moves on the canvas: the camera has come to rest.
   still: () =>
     tools.until("(the camera is at rest)", () => {
-      window.ruedo.stage.camera.updateMatrixWorld(); // else it is of the last frame
-      const is = [...window.ruedo.stage.camera.matrixWorld.elements]
+      window.ruedo.stage.view.camera.updateMatrixWorld(); // else it is of the last frame
+      const is = [...window.ruedo.stage.view.camera.matrixWorld.elements]
           .map((v) => v.toFixed(3))
           .join(),
         was = window.camera;
@@ -186,7 +187,7 @@ const tools = {
       "(the world is drawn)",
       () =>
         window.ruedo?.page.now.world?.robots.length > 0 &&
-        window.ruedo.stage.description &&
+        window.ruedo.stage.bodies.description &&
         window.ruedo.stage.frames > 1,
     ),
 };

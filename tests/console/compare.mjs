@@ -2,7 +2,12 @@
 // difference. Given: of both logs, as an independent reader found them, where the robot is at a
 // moment, what differs first, and how far apart it is at most.
 export default async function compare({ page, given, seen, until, check, picture }) {
-  await until("the world is shown", () => window.ruedo?.stage.frames > 1);
+  // Not by frames alone: an empty view is drawn before the page is connected, and what is asked of
+  // the log then is lost.
+  await until(
+    "the world is shown",
+    () => window.ruedo?.page.now.playback && window.ruedo.stage.frames > 1,
+  );
   await page.evaluate(() => window.ruedo.link.play(false, 1));
   await page.getByRole("tab", { name: "Plots" }).click();
   await until("the first difference is told", () => document.getElementById("difference-words"));

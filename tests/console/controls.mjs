@@ -160,8 +160,8 @@ export default async function controls(tools) {
   await page.evaluate(() => {
     // from where the points on the wall can be seen
     const { stage } = window.ruedo;
-    stage.controls.target.set(0, -1, 0);
-    stage.camera.position.set(-2, 5, 6);
+    stage.view.controls.target.set(0, -1, 0);
+    stage.view.camera.position.set(-2, 5, 6);
     stage.setAutomatic(false);
   });
   await still();
@@ -169,7 +169,7 @@ export default async function controls(tools) {
   const draw = () =>
     page.evaluate(() => {
       const { stage } = window.ruedo;
-      stage.renderer.render(stage.scene, stage.camera);
+      stage.renderer.render(stage.scene, stage.view.camera);
       return document.getElementById("canvas").toDataURL();
     });
   await until("(nothing is left to draw)", () => {
@@ -218,10 +218,10 @@ export default async function controls(tools) {
     const [px, py, gx, gy] = await page.evaluate(([gx, gy]) => {
       const { stage } = window.ruedo,
         box = document.getElementById("canvas").getBoundingClientRect();
-      const p = stage.camera.position.clone().set(gx, gy, 0).project(stage.camera);
+      const p = stage.view.camera.position.clone().set(gx, gy, 0).project(stage.view.camera);
       const sx = Math.round(box.left + ((p.x + 1) / 2) * box.width),
         sy = Math.round(box.top + ((1 - p.y) / 2) * box.height);
-      const { ground } = stage.pick(sx, sy);
+      const { ground } = stage.picker.pick(sx, sy);
       return [sx, sy, ground.x, ground.y];
     }, at);
     await page.mouse.click(px, py);
@@ -247,7 +247,7 @@ export default async function controls(tools) {
     "a box was placed",
     () =>
       window.ruedo.page.now.world.bodies.some((b) => b.name === "box/link") &&
-      window.ruedo.stage.description.models.some((m) => m.name === "box"),
+      window.ruedo.stage.bodies.description.models.some((m) => m.name === "box"),
   );
   await until(
     "the box stands where the click was",
@@ -283,7 +283,7 @@ export default async function controls(tools) {
   const way = await page.evaluate(() => {
     const { stage, way } = window.ruedo,
       picture = () => {
-        stage.renderer.render(stage.scene, stage.camera);
+        stage.renderer.render(stage.scene, stage.view.camera);
         return document.getElementById("canvas").toDataURL();
       };
     const visible = way.line.visible && way.ends.visible,
@@ -315,8 +315,8 @@ export default async function controls(tools) {
     "the robot goes to where the clicks were",
     ([x, y]) => {
       const { stage, trip, way } = window.ruedo,
-        base = stage.description.bases.findIndex(({ robot }) => robot === "p3dx"),
-        at = stage.planar(base);
+        base = stage.bodies.description.bases.findIndex(({ robot }) => robot === "p3dx"),
+        at = stage.bodies.planar(base);
       return (
         !way.line.visible && trip.points().length === 0 && Math.hypot(at.x - x, at.y - y) < 0.06
       );
@@ -361,7 +361,7 @@ export default async function controls(tools) {
     "a reset takes away what was placed",
     () =>
       !window.ruedo.page.now.world.bodies.some((b) => b.name === "box/link") &&
-      window.ruedo.stage.description.models.every((m) => m.name !== "box") &&
+      window.ruedo.stage.bodies.description.models.every((m) => m.name !== "box") &&
       window.ruedo.page.now.world.robots.length === 2,
   );
   await page.getByRole("tab", { name: "Robot" }).click();

@@ -8,7 +8,7 @@ export default async function disk({ page, given, until, check, picture }) {
     "the run is there",
     () =>
       window.ruedo?.page.now.world?.robots.length > 0 &&
-      window.ruedo.stage.description &&
+      window.ruedo.stage.bodies.description &&
       window.ruedo.stage.frames > 1,
   );
   await until(

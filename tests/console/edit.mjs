@@ -6,7 +6,7 @@ export default async function edit({ page, seen, until, check, picture, still, g
     "(the world is drawn)",
     () =>
       window.ruedo?.page.now.world &&
-      window.ruedo.stage.description &&
+      window.ruedo.stage.bodies.description &&
       window.ruedo.stage.frames > 1,
   );
   check(
@@ -30,7 +30,7 @@ export default async function edit({ page, seen, until, check, picture, still, g
       ([x, y, z]) => {
         const { stage } = window.ruedo,
           box = document.getElementById("canvas").getBoundingClientRect(),
-          p = stage.camera.position.clone().set(x, y, z).project(stage.camera);
+          p = stage.view.camera.position.clone().set(x, y, z).project(stage.view.camera);
         return [
           Math.round(box.left + ((p.x + 1) / 2) * box.width),
           Math.round(box.top + ((1 - p.y) / 2) * box.height),

@@ -1,6 +1,38 @@
-// Many robots: frames a second, and what a frame costs this page's own thread: states taken,
-// matrices made, draw calls given. The rest of a frame is the rasteriser's. Given: {"robots": how
-// many there must be, "seconds": of each measurement, "views": of which, or all}.
+// Many robots, all of them in motion: frames a second, what a frame costs this page's own thread
+// (states taken, matrices made, draw calls given), and the processor time of the browser's
+// processes for a frame. Given: {"robots": how many there must be, "seconds": of each measurement,
+// "views": of which, or all}.
+import { readFileSync, readdirSync } from "node:fs";
+
+const kTicks_per_s = 100; // of /proc
+
+// Processor time (s) so far, by kind of process, of all that this one has started.
+function cpuTimes() {
+  const processes = readdirSync("/proc")
+    .filter((name) => /^\d+$/.test(name))
+    .flatMap((name) => {
+      try {
+        const [, rest] = readFileSync(`/proc/${name}/stat`, "utf8").split(") "),
+          fields = rest.split(" ");
+        const command = readFileSync(`/proc/${name}/cmdline`, "utf8"),
+          kind = command.match(/--type=([a-z]+)/)?.[1] ?? "browser";
+        const ticks = Number(fields[11]) + Number(fields[12]);
+        return [{ id: Number(name), parent: Number(fields[1]), kind, ticks }];
+      } catch {
+        return []; // it has ended
+      }
+    });
+  const times = {},
+    add = (parent) => {
+      for (const { id, kind, ticks } of processes.filter((each) => each.parent === parent)) {
+        times[kind] = (times[kind] ?? 0) + ticks / kTicks_per_s;
+        add(id);
+      }
+    };
+  add(process.pid);
+  return times;
+}
+
 export default async function fleet({ page, given, until, check, picture }) {
   await until(
     "robots are listed",
@@ -9,7 +41,7 @@ export default async function fleet({ page, given, until, check, picture }) {
   );
   await until(
     "the world is drawn",
-    () => window.ruedo.stage.description && window.ruedo.stage.frames > 2,
+    () => window.ruedo.stage.bodies.description && window.ruedo.stage.frames > 2,
   );
   // The log's beginning again and again: it always moves on.
   await page.evaluate(() =>
@@ -24,10 +56,15 @@ export default async function fleet({ page, given, until, check, picture }) {
       add = poses.add.bind(poses);
     let adding = 0;
     window.costs = [];
+    // Robots of the log stand. Here each goes round in a circle of 0.2 m at 0.4 m/s.
     poses.add = (state, at) => {
+      const angle = Number(state.utime) / 500_000;
+      for (let i = 0; i < state.index.length; ++i) {
+        state.position[3 * i] += 0.2 * Math.cos(angle);
+        state.position[3 * i + 1] += 0.2 * Math.sin(angle);
+      }
       const begun = performance.now();
       add(state, at);
-      poses.forgetSeen(); // as if all of them moved
       adding += performance.now() - begun;
       if (state.part === 0) ++window.states;
     };
@@ -55,6 +92,7 @@ export default async function fleet({ page, given, until, check, picture }) {
     await until("(it is drawn so)", (n) => window.ruedo.stage.frames > n + 5, before);
     // Until it has come to its level
     if (automatic) await page.waitForTimeout(given.seconds * 1000);
+    const cpuBefore = cpuTimes();
     const { frames, wall, costs, states, level } = await page.evaluate(
       (s) =>
         new Promise((done) => {
@@ -78,6 +116,12 @@ export default async function fleet({ page, given, until, check, picture }) {
         }),
       given.seconds,
     );
+    const cpu = Object.fromEntries(
+      Object.entries(cpuTimes()).map(([kind, time_s]) => [
+        kind,
+        Math.round((10_000 * (time_s - (cpuBefore[kind] ?? 0))) / frames) / 10,
+      ]),
+    );
     const { calls, triangles } = await page.evaluate(() => window.ruedo.stage.renderer.info.render);
     check("they are a few draw calls", calls < 200, calls);
     costs.sort((a, b) => a - b);
@@ -96,6 +140,7 @@ export default async function fleet({ page, given, until, check, picture }) {
         ms_per_frame: round(wall / frames),
         own_ms_median: round(costs[costs.length >> 1]),
         own_ms_least: round(costs[0]),
+        cpu_ms_per_frame: cpu,
       })}`,
     );
   };

@@ -5,7 +5,7 @@ export default async function log({ page, given, seen, until, check, picture }) 
   await until("robots are listed", () => window.ruedo?.page.now.world?.robots.length > 0);
   await until(
     "the world is shown",
-    () => window.ruedo.stage.description?.world && window.ruedo.stage.frames > 1,
+    () => window.ruedo.stage.bodies.description?.world && window.ruedo.stage.frames > 1,
   );
   const playback = () => page.evaluate(() => window.ruedo.page.now.playback);
   await until(

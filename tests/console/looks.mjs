@@ -16,10 +16,10 @@ export default async function looks({ page, until, check, ready, still }) {
       (place) => {
         const { stage } = window.ruedo,
           box = document.getElementById("canvas").getBoundingClientRect(),
-          p = stage.camera.position
+          p = stage.view.camera.position
             .clone()
             .set(...place)
-            .project(stage.camera);
+            .project(stage.view.camera);
         return [box.left + ((p.x + 1) / 2) * box.width, box.top + ((1 - p.y) / 2) * box.height];
       },
       [x, y, z],
@@ -43,7 +43,7 @@ export default async function looks({ page, until, check, ready, still }) {
   await page.locator("#measure").click();
   const lines = () =>
     page.evaluate(() =>
-      window.ruedo.stage.built.standing.every(({ meshes }) =>
+      window.ruedo.stage.bodies.built.standing.every(({ meshes }) =>
         meshes.every((mesh) => mesh.material.wireframe),
       ),
     );
@@ -73,7 +73,7 @@ export default async function looks({ page, until, check, ready, still }) {
     film,
   );
   await page.locator('[data-model="box_1"]').click();
-  const before = await page.evaluate(() => window.ruedo.stage.viewpoint);
+  const before = await page.evaluate(() => window.ruedo.stage.view.at);
   await page.locator("#link").click();
   await until("(the address has it)", () => location.hash.includes("selected=box_1"));
   await page.reload();
@@ -81,7 +81,7 @@ export default async function looks({ page, until, check, ready, still }) {
     "a link leads back to camera and selection",
     (was) =>
       window.ruedo?.page.now.selected === "box_1" &&
-      window.ruedo.stage.viewpoint.every((v, i) => Math.abs(v - was[i]) < 0.01),
+      window.ruedo.stage.view.at.every((v, i) => Math.abs(v - was[i]) < 0.01),
     before,
   );
 }

@@ -44,7 +44,7 @@ export default async function markers({ page, given, seen, until, check, ready, 
     kinds.join() === "LineSegments2,LineSegments2,Points,Sprite,Mesh",
     kinds,
   );
-  await page.evaluate(() => window.ruedo.stage.setMode("top"));
+  await page.evaluate(() => window.ruedo.stage.view.setMode("top"));
   await picture("markers");
   // The layer moves with its robot.
   const place = () => {

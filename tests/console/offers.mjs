@@ -34,7 +34,7 @@ export default async function offers({ page, given, until, check, picture }) {
         const { left, top, width, height } = document
           .getElementById("canvas")
           .getBoundingClientRect();
-        return window.ruedo.stage.pick(left + width / 2, top + height / 2).point?.z ?? 0;
+        return window.ruedo.stage.picker.pick(left + width / 2, top + height / 2).point?.z ?? 0;
       });
     check("what is below the roof is seen and clicked", (await height()) < 2, await height());
     await picture("hall");
@@ -45,10 +45,10 @@ export default async function offers({ page, given, until, check, picture }) {
       const corners = [-5, 5].flatMap((x) => [-4, 4].flatMap((y) => [0, 2].map((z) => [x, y, z])));
       return Math.max(
         ...corners.flatMap((corner) => {
-          const p = stage.camera.position
+          const p = stage.view.camera.position
             .clone()
             .set(...corner)
-            .project(stage.camera);
+            .project(stage.view.camera);
           return [Math.abs(p.x), Math.abs(p.y)];
         }),
       );

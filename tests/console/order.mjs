@@ -60,7 +60,7 @@ export default async function order({ page, seen, until, expect }) {
     await page.locator("#canvas").focus();
     await page.keyboard.press("2");
     await until("(the view follows the robot)", () => {
-      const { x, y } = window.ruedo.stage.controls.target;
+      const { x, y } = window.ruedo.stage.view.controls.target;
       return Math.hypot(x - 1, y - 2) < 0.01;
     });
     await until("(and both trails begin where it is)", () => {

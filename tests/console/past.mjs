@@ -31,7 +31,7 @@ export default async function past({ page, seen, until, check, ready, server, pi
   const place = await page.evaluate(() => {
     const { stage } = window.ruedo,
       box = document.getElementById("canvas").getBoundingClientRect(),
-      p = stage.camera.position.clone().set(-1.5, 0.4, 0).project(stage.camera); // nothing is there
+      p = stage.view.camera.position.clone().set(-1.5, 0.4, 0).project(stage.view.camera); // nothing is there
     return [box.left + ((p.x + 1) / 2) * box.width, box.top + ((1 - p.y) / 2) * box.height];
   });
   await page.mouse.click(...place);

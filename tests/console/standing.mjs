@@ -2,7 +2,7 @@
 // names are any text is taken back as if nothing had been. Given: {"model": its name, "pose": as
 // the page has it in numbers}.
 export default async function standing({ page, given, until, check }) {
-  await page.waitForFunction(() => window.ruedo?.stage.description);
+  await page.waitForFunction(() => window.ruedo?.stage.bodies.description);
   const known = () =>
     window.ruedo.editor.models.every(({ name }) => window.ruedo.editor.pose(name));
   await until("where all models are is known", known);
@@ -50,7 +50,7 @@ export default async function standing({ page, given, until, check }) {
     [given.model, given.pose],
   );
   await page.reload();
-  await page.waitForFunction(() => window.ruedo?.stage.description);
+  await page.waitForFunction(() => window.ruedo?.stage.bodies.description);
   await until("a page that is loaded again knows it, too", known);
   check("as it is", are(await numbers()), await numbers());
   await page.evaluate(() => window.ruedo.editor.save());

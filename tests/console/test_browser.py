@@ -7,6 +7,7 @@ import itertools
 import json
 import math
 import shlex
+import signal
 import socket
 import subprocess
 import sys
@@ -597,6 +598,21 @@ def test_what_was_placed_and_reset_is_in_the_log_too(steered, tmp_path):
     }
     with playing(log) as process:
         browse(process.url, tmp_path, "log", given)
+
+
+def test_a_server_that_does_not_answer_is_told(tmp_path):
+    with running() as process, browser(process.url, tmp_path, "silent") as page:
+        said = []
+        for line in page.stdout:
+            said.append(line.rstrip())
+            signals = {"stop": signal.SIGSTOP, "go on": signal.SIGCONT}
+            if said[-1] in signals:
+                process.send_signal(signals[said[-1]])
+                page.stdin.write("done\n")
+                page.stdin.flush()
+        process.send_signal(signal.SIGCONT)
+        judged("silent", tmp_path, said, page.wait())
+    assert {"a low window has room for the view", "but that it answers"} <= set(said)
 
 
 def test_two_runs_are_compared(tmp_path):

@@ -64,7 +64,7 @@ function made(complete = true) {
     session: note("session"),
     poses: note("poses"),
     clock: note("clock"),
-    stage: note("stage"),
+    stage: { bodies: note("bodies") },
     pages: note("pages"),
     channels: note("channels"),
     overlays: {
@@ -137,7 +137,7 @@ describe("a message", () => {
       } as never),
     );
     expect(called).toContain("overlay b.odometer");
-    expect(called).toContain("stage.turnWheels 1");
+    expect(called).toContain("bodies.turnWheels 1");
   });
 
   it("of the run is not taken before all is loaded; what is loaded and answered is", () => {

@@ -7,7 +7,7 @@ import type { Model } from "./model";
 
 export function goToAddress({ page, link }: Model, stage: Stage): void {
   const { time_s, camera, robot, selected } = placeOf(location.hash);
-  if (camera) stage.viewpoint = camera;
+  if (camera) stage.view.at = camera;
   chooseRobot(page, page.now.world?.robots.findIndex(({ name }) => name === robot) ?? -1);
   if (selected) page.set({ selected });
   if (time_s !== null && page.now.hello?.mode === "log") {
@@ -20,7 +20,7 @@ export async function copyLink({ page }: Model, stage: Stage): Promise<void> {
   const { hello, playback, past, world, robot, selected } = page.now,
     time_s = hello?.mode === "log" ? (playback?.now ?? null) : (past?.now ?? null);
   const name = world?.robots[robot]?.name ?? "";
-  location.hash = hashOf({ time_s, camera: stage.viewpoint, robot: name, selected });
+  location.hash = hashOf({ time_s, camera: stage.view.at, robot: name, selected });
   try {
     await navigator.clipboard.writeText(location.href);
     toast("The link is copied.");

@@ -46,7 +46,7 @@ export class ChosenRobot {
   }
 
   private pose(): PlanarPose | null {
-    return this.scene.stage.planar(this.base);
+    return this.scene.stage.bodies.planar(this.base);
   }
 
   private motionChannels(): string[] {
@@ -60,7 +60,7 @@ export class ChosenRobot {
     const { world, scene } = this.model.page.now,
       { robot, base } = this;
     if (!world || !robot) return;
-    this.scene.stage.follow(base);
+    this.scene.stage.view.follow(base);
     this.pages.beginAt(scene ? scene.bases[base]?.start : [0, 0, 0, 1, 0, 0, 0]);
     const key = `${world.runId} ${robot.name}`;
     if (key === this.shown) return;

@@ -15,7 +15,7 @@ export class Editing {
 
   constructor(model: Model, { stage, canvas }: SceneView) {
     const { page } = model;
-    this.editor = new Editor(page, model.poses, model.control, (of) => stage.boxOf(of));
+    this.editor = new Editor(page, model.poses, model.control, (of) => stage.bodies.boxOf(of));
     this.gizmo = new Gizmo(page, stage, this.editor, canvas);
     this.outline = new Outline(page, stage, this.editor);
     this.draw = new Draw(page, stage, this.editor, canvas);

@@ -84,7 +84,7 @@ const kShow: { [Type in TypeName]?: Show<Type> } = {
     const odometry = read();
     overlay?.odometer(odometry);
     pages?.odometry(odometry);
-    stage.turnWheels(index, odometry.angle);
+    stage.bodies.turnWheels(index, odometry.angle);
   },
   contact_t({ device, overlay, pages }, read) {
     const contact = read();

@@ -50,7 +50,7 @@ export class SceneView {
   }
 
   setMode(mode: ViewMode): void {
-    this.stage.setMode(mode);
+    this.stage.view.setMode(mode);
     this.model.page.set({ mode });
   }
 

@@ -33,7 +33,7 @@ export function listenToClicks(
     )
       return;
     const { tool } = page.now,
-      picked = stage.pick(event.clientX, event.clientY);
+      picked = stage.picker.pick(event.clientX, event.clientY);
     if (tool === "wall" || tool === "room") return;
     if (tool === "measure") {
       const point = picked.point ?? picked.ground;

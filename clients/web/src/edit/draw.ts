@@ -33,7 +33,7 @@ export class Draw {
     stage.scene.add(this.ghost);
     page.watch(["tool"], () => {
       this.cancel();
-      stage.controls.enabled = !this.drawing;
+      stage.view.controls.enabled = !this.drawing;
     });
     canvas.addEventListener("pointerdown", (event) => {
       if (this.drawing && event.button === 0) this.begin(canvas, event);
@@ -57,7 +57,7 @@ export class Draw {
   }
 
   private ground(event: PointerEvent): Point | null {
-    const point = this.stage.ground(event.clientX, event.clientY),
+    const point = this.stage.picker.ground(event.clientX, event.clientY),
       snap = this.page.now.snap_m;
     if (!point) return null;
     const near = (value: number) => (snap > 0 ? Math.round(value / snap) * snap : value);

@@ -23,12 +23,12 @@ export class Gizmo {
     private readonly editor: Editor,
     canvas: HTMLCanvasElement,
   ) {
-    this.controls = new TransformControls(stage.camera, canvas);
+    this.controls = new TransformControls(stage.view.camera, canvas);
     this.controls.size = 0.8;
     stage.scene.add(this.handle, this.controls.getHelper());
     this.controls.addEventListener("change", () => stage.touch());
     this.controls.addEventListener("dragging-changed", ({ value }) => {
-      stage.controls.enabled = !value;
+      stage.view.controls.enabled = !value;
     });
     this.controls.addEventListener("mouseDown", () => this.begun.copy(this.handle.matrix));
     this.controls.addEventListener("objectChange", () => this.preview());

@@ -22,7 +22,7 @@ export class Outline {
   follow(): void {
     const { selected, tab } = this.page.now,
       model = tab === "World" ? this.editor.find(selected) : undefined;
-    if (model) this.box.copy(this.stage.boxOf(model));
+    if (model) this.box.copy(this.stage.bodies.boxOf(model));
     this.helper.visible = model !== undefined && !this.box.isEmpty();
   }
 }

@@ -2,6 +2,7 @@
 // surfaces, so that a thousand robots are a few draw calls.
 import * as THREE from "three";
 import { mergeGeometries } from "three/addons/utils/BufferGeometryUtils.js";
+import { Crowd } from "./crowd";
 import { arrived, finishesOf } from "./finish";
 import { kFewLinks, plainKinds } from "./plain";
 import {
@@ -26,7 +27,7 @@ export interface Movers {
 // quality, for they are too costly.
 export interface Far {
   always: boolean;
-  mesh: THREE.InstancedMesh;
+  mesh: Crowd;
   matrices: Float32Array;
   shown: number[];
 }
@@ -69,7 +70,7 @@ function gridTexture(): THREE.Texture {
 export function disposeOf({ still, moving }: Built): void {
   for (const group of [still, moving]) {
     group.traverse((object) => {
-      if (!(object instanceof THREE.InstancedMesh)) return;
+      if (!(object instanceof THREE.InstancedMesh || object instanceof Crowd)) return;
       (object.geometry as THREE.BufferGeometry).dispose();
       for (const material of finishesOf(object)) {
         (material as THREE.MeshStandardMaterial).map?.dispose();
@@ -230,13 +231,7 @@ export class SceneBuilder {
     );
     const geometry = seen.length > 0 ? mergeGeometries(seen) : null;
     if (!geometry) return null;
-    const mesh = new THREE.InstancedMesh(
-      geometry,
-      new THREE.MeshLambertMaterial({ vertexColors: true }),
-      links,
-    );
-    mesh.instanceMatrix.setUsage(THREE.DynamicDrawUsage);
-    mesh.frustumCulled = false;
+    const mesh = new Crowd(geometry, links);
     into.add(mesh);
     return { mesh, matrices: new Float32Array(16 * links), shown: [], always };
   }

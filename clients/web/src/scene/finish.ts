@@ -1,6 +1,7 @@
 // How surfaces are drawn: finely, or plainly, where the processor draws and something moves:
 // without gloss, and with one sample of a picture a pixel. Colours and lights stay as they are.
 import * as THREE from "three";
+import { plainMaterial } from "./plain_material";
 
 // Gives a mesh the finish; what was made with its fine material alone stays as it is.
 export function setFinish(mesh: THREE.Mesh, plain: boolean): void {
@@ -21,7 +22,7 @@ function plainOf(fine: THREE.MeshStandardMaterial): THREE.MeshLambertMaterial {
   const { vertexColors, emissive, side, transparent, opacity, depthWrite, alphaTest, wireframe } =
     fine;
   const { clippingPlanes, clipShadows } = fine;
-  fine.userData.plain ??= new THREE.MeshLambertMaterial({
+  fine.userData.plain ??= plainMaterial({
     vertexColors,
     emissive,
     side,
@@ -41,6 +42,7 @@ function plainOf(fine: THREE.MeshStandardMaterial): THREE.MeshLambertMaterial {
 function plainPicture(fine: THREE.Texture): THREE.Texture {
   const plain = fine.clone();
   plain.anisotropy = 1;
+  plain.colorSpace = THREE.NoColorSpace; // see plainMaterial
   plain.minFilter = THREE.LinearMipmapNearestFilter;
   fine.userData.plain = plain;
   arrived(fine);

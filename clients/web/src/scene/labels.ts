@@ -43,9 +43,9 @@ export class Labels {
     this.isMade = true;
     if (scene && layers.has("labels")) {
       scene.models.forEach((model, index) => {
-        const box = model.name ? this.stage.boxOf(model) : null;
+        const box = model.name ? this.stage.bodies.boxOf(model) : null;
         if (!box || box.isEmpty() || this.labels.length >= kMost) return;
-        this.stage.modelAt(model, this.matrix);
+        this.stage.bodies.modelAt(model, this.matrix);
         const above = box.max.z - this.matrix.elements[14]! + kOver_m;
         this.labels.push({ element: h("span", {}, model.name), model: index, above });
       });
@@ -59,10 +59,10 @@ export class Labels {
     const { clientWidth: width, clientHeight: height } = this.place,
       { scene } = this.page.now;
     for (const { element, model, above } of scene && this.isMade ? this.labels : []) {
-      this.stage.modelAt(scene!.models[model]!, this.matrix);
+      this.stage.bodies.modelAt(scene!.models[model]!, this.matrix);
       this.at.setFromMatrixPosition(this.matrix);
       this.at.z += above;
-      this.at.project(this.stage.camera);
+      this.at.project(this.stage.view.camera);
       element.hidden = this.at.z > 1 || Math.abs(this.at.x) > 1 || Math.abs(this.at.y) > 1;
       const x = ((this.at.x + 1) / 2) * width,
         y = ((1 - this.at.y) / 2) * height;

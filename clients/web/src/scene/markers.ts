@@ -62,7 +62,7 @@ export class Markers {
       visible = layers.has("markers");
     for (const { frame, group } of this.layers.values()) {
       const base = frame ? (scene?.bases.findIndex(({ robot }) => robot === frame) ?? -1) : -1;
-      group.visible = visible && (!frame || this.stage.base(base, this.at));
+      group.visible = visible && (!frame || this.stage.bodies.base(base, this.at));
       if (frame && group.visible) group.matrix.copy(this.at);
     }
   }

@@ -68,8 +68,8 @@ export class Measure {
     this.looked_ms = event.timeStamp;
     const measuring = this.page.now.tool === "measure";
     const point = measuring
-      ? this.stage.point(event.clientX, event.clientY)
-      : this.stage.ground(event.clientX, event.clientY);
+      ? this.stage.picker.point(event.clientX, event.clientY)
+      : this.stage.picker.ground(event.clientX, event.clientY);
     if (point && this.from) this.draw(point);
     else if (point && !this.words) say(this.readout, `${number(point.x)}, ${number(point.y)} m`);
   }

@@ -63,7 +63,12 @@ export class OverlaySet {
       chosen = world?.robots[robot]?.name;
     let changed = false;
     for (const [name, overlay] of this.of) {
-      if (!this.stage.base(scene?.bases.findIndex((base) => base.robot === name) ?? -1, this.base))
+      if (
+        !this.stage.bodies.base(
+          scene?.bases.findIndex((base) => base.robot === name) ?? -1,
+          this.base,
+        )
+      )
         continue;
       changed = overlay.place(this.base, layers) || changed;
       if (name !== chosen) continue;

@@ -13,14 +13,15 @@ const kLevels: Level[] = [
   { ratio: 1, shadows: false, plain: false },
   { ratio: 1, shadows: false, plain: true },
   { ratio: 0.6, shadows: false, plain: true },
+  { ratio: 0.5, shadows: false, plain: true },
   { ratio: 0.4, shadows: false, plain: true },
 ];
 const kSoftwareLevel = 3; // where the processor draws: the first one
 const kSensing = 2; // the coarsest where nothing moves, though what is sensed changes: all pixels
 const kSensingShare = 3; // of the time, one part at most goes into drawing that
-// Of a frame: 20 a second where a graphics processor draws, and 40 where the processor does, which
-// has time left for nothing else.
-const kSlow_ms = { hardware: 50, software: 25 };
+// Of a frame: 20 a second where a graphics processor draws, and 48 where the processor does, which
+// has time left for nothing else: 40, and a fifth more against what else the machine does.
+const kSlow_ms = { hardware: 50, software: 21 };
 const kQuick_ms = { hardware: 25, software: 18 };
 const kFrames = 5; // in a row, of which the mean counts, but for the slowest
 const kFirstWait_ms = 10_000; // until a finer level is tried; each time twice as long

@@ -109,6 +109,12 @@ export function makePage(): Page {
 }
 
 // What is said of the run in the bar, and whether that is good; null: neither.
+const kLinkWords = {
+  connecting: "connecting",
+  silent: "no answer",
+  lost: "no connection",
+  ended: "ended",
+};
 export function stateWords({
   link,
   hello,
@@ -117,8 +123,7 @@ export function stateWords({
   playback,
   past,
 }: Readonly<PageState>): [words: string, good: boolean | null] {
-  if (link !== "open")
-    return [link === "ended" ? "ended" : link === "lost" ? "no connection" : "connecting", false];
+  if (link !== "open") return [kLinkWords[link], false];
   if (hello?.mode === "log" && playback) return [playback.playing ? "log" : "log, paused", null];
   if (!world) return ["connected", true];
   if (past) return [`${(past.end - past.now).toFixed(1)} s ago`, null];

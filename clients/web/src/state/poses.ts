@@ -14,8 +14,10 @@ export class Poses {
   to = new Float32Array(0); // of the newest state
   private seen = new Float32Array(0); // as `now` was when it was last said to have moved
   known = new Uint8Array(0);
-  private arrived = 0;
-  private interval = 33;
+  private arrived = 0; // when the newest state came
+  private interval = 33; // between two states, smoothed
+  private shown = -Infinity; // the moment that `now` is for
+  private begun = 0; // when the way from `from` to `to` began
   private epoch = -1;
   private jumped = false;
   settled = false;
@@ -60,6 +62,9 @@ export class Poses {
       if (!fresh && at_ms > this.arrived)
         this.interval += 0.2 * (Math.min(500, at_ms - this.arrived) - this.interval);
       this.arrived = at_ms;
+      // From what is shown and when: counted from this moment, the next frame, which the display
+      // may have timed before it, would show nothing new.
+      this.begun = Math.min(at_ms, Math.max(this.shown, at_ms - this.interval));
       this.from.set(this.now);
     }
     if (state.part === state.nparts - 1) this.jumped = false;
@@ -85,8 +90,9 @@ export class Poses {
   // Brings `now` to the moment; false when nothing has moved visibly since that was said last.
   advance(at_ms: number): boolean {
     if (this.settled) return false;
-    const t = Math.max(0, Math.min(1, (at_ms - this.arrived) / this.interval));
-    const { from, to, now } = this;
+    const { from, to, now, begun, arrived, interval } = this;
+    const t = Math.max(0, Math.min(1, (at_ms - begun) / (arrived + interval - begun)));
+    this.shown = at_ms;
     for (let at = 0; at < now.length; at += 7) {
       for (let k = 0; k < 3; ++k) now[at + k] = from[at + k]! + t * (to[at + k]! - from[at + k]!);
       let dot = 0;

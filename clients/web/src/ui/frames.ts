@@ -86,7 +86,12 @@ export class FrameTree {
     this.shown_ms = at_ms;
     const { world, scene, robot } = this.page.now,
       name = world?.robots[robot]?.name;
-    if (!this.stage.base(scene?.bases.findIndex((base) => base.robot === name) ?? -1, this.matrix))
+    if (
+      !this.stage.bodies.base(
+        scene?.bases.findIndex((base) => base.robot === name) ?? -1,
+        this.matrix,
+      )
+    )
       return;
     say(this.basePose, this.words(this.matrix));
     this.matrix.invert();

@@ -20,10 +20,11 @@ export class Notice {
   }
 
   onLink(link: LinkState, words: string): void {
+    const was = this.page.now.link;
     this.page.set({ link });
     this.show(words);
     if (link !== "open") return;
-    if (this.wasOpen) toast("Connected again.");
+    if (this.wasOpen) toast(was === "silent" ? "The server answers again." : "Connected again.");
     this.wasOpen = true;
   }
 }

@@ -2,6 +2,7 @@
 // by itself when the connection is lost.
 
 import { valueAt } from "./fields";
+import { Heartbeat } from "./heartbeat";
 import { decode, typeOf } from "./lcm";
 import type {
   Comparison,
@@ -47,6 +48,9 @@ const enum Frame {
   traffic = 2,
 }
 
+const kLook_ms = 1000; // between two looks whether the server answers
+const kAnswer_ms = 5000; // it has to answer
+
 export class Link implements RunLink {
   private handler!: LinkHandler;
   private socket: WebSocket | undefined;
@@ -55,6 +59,21 @@ export class Link implements RunLink {
   private wantsTraffic = false;
   private retry_ms = 300;
   private over = false;
+  private readonly heartbeat = new Heartbeat(
+    () => fetch("/icon.svg", { cache: "no-store", signal: AbortSignal.timeout(kAnswer_ms) }),
+    (silent) => {
+      if (this.socket?.readyState !== WebSocket.OPEN || this.over) return;
+      if (silent) this.handler.state("silent", "The server does not answer. Waiting …");
+      else this.handler.state("open", "");
+    },
+  );
+
+  constructor() {
+    setInterval(() => {
+      if (this.socket?.readyState === WebSocket.OPEN && !this.over)
+        void this.heartbeat.look(performance.now());
+    }, kLook_ms);
+  }
 
   connect(handler: LinkHandler): void {
     this.handler = handler;
@@ -67,11 +86,13 @@ export class Link implements RunLink {
     socket.onopen = () => {
       this.retry_ms = 300;
       this.over = false;
+      this.heartbeat.restart(performance.now());
       this.wanted.clear(); // what is wanted of whom comes with the greeting
       this.handler.state("open", "");
       if (this.wantsTraffic) this.send([Operation.traffic, 1]);
     };
     socket.onmessage = (event: MessageEvent<ArrayBuffer | string>) => {
+      this.heartbeat.heard(performance.now());
       if (typeof event.data === "string") this.onText(event.data);
       else this.onFrame(event.data);
     };

@@ -25,7 +25,8 @@ export interface RunEvent {
   robot: string; // "" for the whole run
   text: string;
 }
-export type LinkState = "connecting" | "open" | "lost" | "ended";
+// silent: it is connected, but the server does not answer.
+export type LinkState = "connecting" | "open" | "silent" | "lost" | "ended";
 
 // Where another log first differs from the one that is shown.
 export interface Difference {

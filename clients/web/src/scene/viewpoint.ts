@@ -1,0 +1,198 @@
+// Where the view is seen from: by the pointer, by keys, after a robot, or all of the world at once.
+import * as THREE from "three";
+import { OrbitControls } from "three/addons/controls/OrbitControls.js";
+import type { ViewMode } from "../state/page";
+
+// Home: what of the world is in view, how high it looks, and the share of the view that this fills
+const kLeastHome_m = 3,
+  kMostHome_m = 60,
+  kLookedAt_m = 1,
+  kHomeShare = 0.95;
+const kSeen_m2 = 1e-8; // what goes less looks as it did
+
+// The part of the world that home shows: its corners, from the floor up.
+export interface Shown {
+  low: number[];
+  high: number[];
+}
+
+// What of a world is shown, as the description tells its bounds. ceiling: above it nothing is.
+export function shownOf(
+  world: { low: number[]; high: number[]; ceiling: number | null } | null,
+): Shown {
+  const { low, high, ceiling } = world ?? { low: [-3, -3, 0], high: [3, 3, 1], ceiling: null };
+  const centre = [0, 1].map((i) => (low[i]! + high[i]!) / 2),
+    half = [0, 1].map((i) =>
+      Math.max(kLeastHome_m, Math.min(kMostHome_m, (high[i]! - low[i]!) / 2)),
+    ),
+    top = Math.max(0, Math.min(kMostHome_m, high[2]!, ceiling ?? Infinity));
+  return {
+    low: [centre[0]! - half[0]!, centre[1]! - half[1]!, 0],
+    high: [centre[0]! + half[0]!, centre[1]! + half[1]!, top],
+  };
+}
+
+// As near as all corners are still in view: where the camera is, and what it looks at.
+export function homeOf(
+  { low, high }: Shown,
+  fov_deg: number,
+  aspect: number,
+): { eye: THREE.Vector3; target: THREE.Vector3 } {
+  const target = new THREE.Vector3(
+    (low[0]! + high[0]!) / 2,
+    (low[1]! + high[1]!) / 2,
+    Math.min(high[2]! / 2, kLookedAt_m),
+  );
+  const back = new THREE.Vector3(-0.5, -0.62, 0.62).normalize(),
+    right = new THREE.Vector3(0, 0, 1).cross(back).normalize(),
+    up = back.clone().cross(right);
+  const upwards = kHomeShare * Math.tan((fov_deg * Math.PI) / 360),
+    sideways = upwards * aspect;
+  let away = 0;
+  for (const x of [low[0]!, high[0]!])
+    for (const y of [low[1]!, high[1]!])
+      for (const z of [low[2]!, high[2]!]) {
+        const corner = new THREE.Vector3(x, y, z).sub(target),
+          wide = Math.abs(corner.dot(right)) / sideways,
+          tall = Math.abs(corner.dot(up)) / upwards;
+        away = Math.max(away, Math.max(wide, tall) + corner.dot(back));
+      }
+  return { eye: target.clone().addScaledVector(back, away), target };
+}
+
+export class Viewpoint {
+  readonly camera = new THREE.PerspectiveCamera(50, 1, 0.05, 400);
+  readonly controls: OrbitControls;
+  mode: ViewMode = "orbit";
+  private following = -1; // index into the description's bases
+  private readonly followed = new THREE.Vector3();
+  private lastBase: THREE.Vector3 | null = null;
+
+  // changed: the view is another one. base: where a robot's base_link is; false when that is not
+  // known.
+  constructor(
+    canvas: HTMLCanvasElement,
+    private readonly changed: () => void,
+    private readonly base: (robot: number, into: THREE.Matrix4) => boolean,
+  ) {
+    this.camera.up.set(0, 0, 1);
+    this.camera.position.set(-4, -5, 4);
+    this.controls = new OrbitControls(this.camera, canvas);
+    const calm = matchMedia("(prefers-reduced-motion: reduce)");
+    this.controls.enableDamping = !calm.matches;
+    calm.addEventListener("change", () => {
+      this.controls.enableDamping = !calm.matches;
+    });
+    this.controls.dampingFactor = 0.15;
+    this.controls.maxPolarAngle = Math.PI / 2 - 0.02;
+    this.controls.addEventListener("change", changed);
+  }
+
+  setAspect(aspect: number): void {
+    this.camera.aspect = aspect;
+    this.camera.updateProjectionMatrix();
+  }
+
+  // All of that in view.
+  home(shown: Shown): void {
+    const { eye, target } = homeOf(shown, this.camera.fov, this.camera.aspect);
+    this.controls.target.copy(target);
+    this.look(eye.sub(target));
+  }
+
+  setMode(mode: ViewMode): void {
+    this.mode = mode;
+    this.lastBase = null;
+    this.controls.enableRotate = mode !== "top";
+    if (mode === "top") {
+      const height = Math.max(4, this.camera.position.distanceTo(this.controls.target));
+      this.camera.position.set(
+        this.controls.target.x,
+        this.controls.target.y - 0.001 * height,
+        this.controls.target.z + height,
+      );
+    }
+    this.controls.minPolarAngle = 0;
+    this.controls.update();
+    this.changed();
+  }
+
+  // Where the camera stands and where it looks.
+  get at(): number[] {
+    return [...this.camera.position.toArray(), ...this.controls.target.toArray()];
+  }
+  set at(at: number[]) {
+    this.camera.position.fromArray(at);
+    this.controls.target.fromArray(at, 3);
+    this.controls.update();
+    this.changed();
+  }
+
+  // Turns the view by radians to the right and upwards.
+  turn(right: number, up: number): void {
+    const offset = this.camera.position.clone().sub(this.controls.target),
+      at = new THREE.Spherical().setFromVector3(new THREE.Vector3(offset.x, offset.z, -offset.y));
+    at.theta -= right;
+    at.phi = Math.max(0.02, Math.min(this.controls.maxPolarAngle, at.phi - up));
+    const turned = new THREE.Vector3().setFromSpherical(at);
+    this.look(new THREE.Vector3(turned.x, -turned.z, turned.y));
+  }
+
+  // As many times as far from what is looked at.
+  zoom(times: number): void {
+    this.look(this.camera.position.clone().sub(this.controls.target).multiplyScalar(times));
+  }
+
+  // Shares of the distance, to the right and ahead over the ground.
+  pan(right: number, ahead: number): void {
+    const offset = this.camera.position.clone().sub(this.controls.target),
+      reach = offset.length();
+    const forward = this.camera.getWorldDirection(new THREE.Vector3()).setZ(0);
+    if (forward.lengthSq() < 1e-6) forward.set(0, 1, 0);
+    forward.normalize();
+    this.controls.target
+      .addScaledVector(forward, ahead * reach)
+      .addScaledVector(new THREE.Vector3(forward.y, -forward.x, 0), right * reach);
+    this.look(offset);
+  }
+
+  private look(offset: THREE.Vector3): void {
+    this.camera.position.copy(this.controls.target).add(offset);
+    this.controls.update();
+    this.changed();
+  }
+
+  follow(robot: number): void {
+    if (robot === this.following) return;
+    this.following = robot;
+    this.lastBase = null;
+    this.changed();
+  }
+
+  // Before each frame.
+  frame(): void {
+    this.track();
+    this.controls.update();
+  }
+
+  private track(): void {
+    if (this.mode !== "follow" || !this.base(this.following, kBase)) return;
+    this.followed.setFromMatrixPosition(kBase);
+    if (!this.lastBase) {
+      const offset = this.camera.position.clone().sub(this.controls.target);
+      if (offset.length() > 7) offset.setLength(5);
+      this.controls.target.copy(this.followed);
+      this.camera.position.copy(this.followed).add(offset);
+      this.lastBase = this.followed.clone();
+      return;
+    }
+    const shift = this.followed.clone().sub(this.lastBase);
+    if (shift.lengthSq() < kSeen_m2) return;
+    this.controls.target.add(shift);
+    this.camera.position.add(shift);
+    this.lastBase.copy(this.followed);
+    this.changed();
+  }
+}
+
+const kBase = new THREE.Matrix4();

@@ -1,0 +1,48 @@
+// Whether a server that is connected still answers. A connection outlives a server that was stopped
+// and a network that broke, and then nothing says that what is shown is old.
+const kQuiet_ms = 3000; // without a word, and it is asked
+
+export class Heartbeat {
+  private heard_ms = 0;
+  private asking = false;
+  private silent = false;
+
+  // ask: resolves when the server has answered, rejects when it did not within some seconds.
+  // told: that it is silent now, or answers again.
+  constructor(
+    private readonly ask: () => Promise<unknown>,
+    private readonly told: (silent: boolean) => void,
+  ) {}
+
+  // Something came from the server.
+  heard(at_ms: number): void {
+    this.heard_ms = at_ms;
+    this.turn(false);
+  }
+
+  // The connection is another one: nothing is known of it.
+  restart(at_ms: number): void {
+    this.heard_ms = at_ms;
+    this.silent = false;
+  }
+
+  // To be called now and then while it is connected.
+  async look(at_ms: number): Promise<void> {
+    if (this.asking || at_ms - this.heard_ms < kQuiet_ms) return;
+    const before = this.heard_ms;
+    this.asking = true;
+    const answered = await this.ask().then(
+      () => true,
+      () => false,
+    );
+    this.asking = false;
+    if (answered) this.heard(at_ms);
+    else if (this.heard_ms === before) this.turn(true);
+  }
+
+  private turn(silent: boolean): void {
+    if (silent === this.silent) return;
+    this.silent = silent;
+    this.told(silent);
+  }
+}

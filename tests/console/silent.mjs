@@ -1,0 +1,37 @@
+// A server that is connected but does not answer, as it is stopped from outside. Says when it is to
+// be stopped, and when to go on.
+export default async function silent({ page, seen, until, check, ready, told, picture }) {
+  await page.setViewportSize({ width: 683, height: 384 }); // a laptop's window at 200 %
+  await ready();
+  const height = () =>
+    page.evaluate(() => document.getElementById("view").getBoundingClientRect().height);
+  check("a low window has room for the view", (await height()) > 200, `${await height()} px`);
+  check(
+    "and all of its bars",
+    await page.evaluate(() =>
+      [...document.querySelectorAll("#bar > *, #timeline button, #timeline select")]
+        .filter((element) => element.checkVisibility())
+        .every((element) => {
+          const { left, right, top, bottom } = element.getBoundingClientRect();
+          return left >= 0 && right <= innerWidth && top >= 0 && bottom <= innerHeight;
+        }),
+    ),
+  );
+  await picture("low");
+  seen("stop");
+  await told();
+  const state = () => document.getElementById("state").textContent;
+  await until("the page says that nobody answers", () =>
+    /does not answer/.test(document.getElementById("notice").textContent),
+  );
+  check("and not that it runs", (await page.evaluate(state)) === "no answer");
+  await picture("silent");
+  seen("go on");
+  await told();
+  await until("it runs again", () => document.getElementById("state").textContent === "running");
+  check("nothing is said any more", !(await page.locator("#notice").isVisible()));
+  check(
+    "but that it answers",
+    await page.evaluate(() => window.notes.includes("The server answers again.")),
+  );
+}
