@@ -179,6 +179,45 @@ TEST_F(Lifetimes, ACallbackMayDestroyTheSimulation) {
   EXPECT_FALSE(sim);
 }
 
+TEST_F(Lifetimes, TwoSimulationsInAProcessEndInEitherOrder) {
+  for (const bool first_ends_first : {true, false}) {
+    const auto first_server = std::make_shared<FakeServer>(),
+               second_server = std::make_shared<FakeServer>();
+    std::optional<Simulation> first(simulation(first_server)), second(simulation(second_server));
+    const auto odometry = first->robot("p3at").odometry(), other = second->robot("p3at").odometry();
+    std::promise<void> done;
+    Subscription closing = odometry.on_sample([&](const Odometry&) {
+      second->close();  // by a callback of the first
+      done.set_value();
+    });
+    first_server->send_odometry("p3at", 1000, 1.0);
+    done.get_future().wait();
+    closing.close();
+    EXPECT_EQ(error_of([&] { other.next(); }), "this simulation was closed");
+    first_server->send_odometry("p3at", 2000, 2.0);
+    first_server->await_delivery();
+    EXPECT_EQ(odometry.latest(kPatience).x, 2.0);  // the first goes on
+    (first_ends_first ? first : second).reset();
+    (first_ends_first ? second : first).reset();
+    EXPECT_EQ(error_of([&] { odometry.next(); }), "this simulation was closed");
+    EXPECT_EQ(error_of([&] { other.next(); }), "this simulation was closed");
+  }
+}
+
+TEST_F(Lifetimes, ACallbackOfANewRunMayDestroyTheSimulation) {
+  std::optional<Simulation> sim(simulation(server));
+  std::promise<void> done;
+  sim->on_new_run([&] {
+       sim.reset();
+       done.set_value();
+     })
+      .keep();
+  server->run_id = 8;
+  auto ended = done.get_future();
+  while (ended.wait_for(1ms) != std::future_status::ready) server->send_tick(1000);
+  EXPECT_FALSE(sim);
+}
+
 TEST_F(Lifetimes, WhatACallbackThrowsIsSaidOnceAndHurtsNobody) {
   const Simulation sim = simulation(server);
   const auto odometry = sim.robot("p3at").odometry();
