@@ -1,4 +1,4 @@
-// What the user does with the run: requests, driving, motion primitives, placing.
+// What the user does with the run: requests, driving, motion primitives, placing models.
 import { joint_command_t, move_command_t, request_t, type reply_t } from "../generated/messages";
 import type { Clock } from "./state/clock";
 import type { Page } from "./state/page";
@@ -12,7 +12,7 @@ import type { Session } from "./wire/session";
 import type { Move } from "./state/go_to";
 
 const kFastest_m_s = 1.0,
-  kQuickestTurn_rad_s = 1.5; // that the page drives at
+  kQuickestTurn_rad_s = 1.5; // the fastest that the page drives at
 const kStop = {
   kind: move_command_t.STOP,
   value: 0,
@@ -42,7 +42,7 @@ export class Control {
     return this.page.now.hello?.mode === "log";
   }
 
-  // The reply, when it was done; else says why not.
+  // The reply if the request succeeded; otherwise says why not.
   async ask(kind: number, body?: Uint8Array): Promise<reply_t | null> {
     try {
       const reply = await this.session.ask(kind, body);
@@ -58,7 +58,8 @@ export class Control {
     }
   }
 
-  // Saves the moment of the past that is shown, and says how a second run goes on from it.
+  // Saves the shown moment of the past, and shows the command for a second run that continues from
+  // there.
   async branch(): Promise<void> {
     const { past, world } = this.page.now;
     if (!past || !world) return;
@@ -103,8 +104,8 @@ export class Control {
     await this.request(request_t.RESET, encode("reset_request_t", { what: 0, seed: -1n }));
   }
 
-  // A share of the chosen robot's speed ahead and of its turn rate to the left; null where it takes
-  // no velocities.
+  // Drives with a share of the chosen robot's speed ahead and of its turn rate to the left; null if
+  // it takes no velocities.
   drive(ahead: number, left: number): Speeds | null {
     const { world, robot: chosen } = this.page.now,
       robot = world?.robots[chosen];
@@ -116,7 +117,7 @@ export class Control {
     return { robot: robot.name, vx, omega };
   }
 
-  // Returns the primitive's id; null, said in a note, where the robot takes none.
+  // Returns the primitive's id; null, with a note, if the robot takes none.
   move(command: Move): bigint | null {
     const { world, robot: chosen } = this.page.now,
       robot = world?.robots[chosen];
@@ -130,7 +131,7 @@ export class Control {
     return id;
   }
 
-  // Where the chosen robot takes commands of that type; nowhere in a log.
+  // The channel on which the chosen robot takes commands of that type; none in a log.
   private input(type: string): string | undefined {
     const { world, robot: chosen } = this.page.now,
       robot = world?.robots[chosen];

@@ -6,7 +6,7 @@ import { chooseRobot } from "./state/choices";
 declare global {
   interface Window {
     ruedo: object;
-  } // the parts of the page, for tests and the curious
+  } // the page's parts, for tests and the curious
 }
 try {
   const { model, scene, editing, panel, robot, arrivals } = new App(),
@@ -18,6 +18,6 @@ try {
   notice.textContent = `This browser cannot show the console: ${(error as Error).message}`;
   throw error;
 }
-// The token of the address is kept by a cookie.
+// A cookie keeps the token of the URL.
 if (location.search && location.protocol !== "file:")
   history.replaceState(null, "", `/${location.hash}`);

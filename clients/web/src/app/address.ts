@@ -1,4 +1,4 @@
-// The place that the page's address holds: moment, camera, robot, selected model.
+// The place in the page's URL: moment, camera, robot, selected model.
 import type { Stage } from "../scene/stage";
 import { chooseRobot } from "../state/choices";
 import { hashOf, placeOf } from "../state/place";

@@ -1,4 +1,5 @@
-// The page as a whole: makes its parts, each of which knows those above it alone, and draws them.
+// The page as a whole: creates its parts and draws them. Each part knows only those created before
+// it.
 import { listenToClicks } from "../edit/clicks";
 import { togglePanel, toggleTheme } from "../state/choices";
 import { Bar } from "../ui/bar";
@@ -33,7 +34,7 @@ export class App {
   constructor() {
     const { model } = this,
       { page } = model;
-    // First: views take their colours from it
+    // First, since views take their colours from it
     page.watch(["theme"], ({ theme }) => (document.documentElement.dataset.theme = theme));
     this.scene = new SceneView(model);
     this.editing = new Editing(model, this.scene);
@@ -80,7 +81,7 @@ export class App {
     listenToKeys(shortcutsOf(model, scene, this.panel.editPage, timeline, help));
   }
 
-  // The stick, and what it sends.
+  // The stick, and the speeds that it sends.
   private makePad(): void {
     const { page, control } = this.model,
       readout = h("div", { class: "readout", id: "readout" });

@@ -1,4 +1,4 @@
-// The greeting, what runs, and what it looks like, as they arrive in the order of Loading.
+// Greeting, info and scene as they arrive, in the order that Loading gives them.
 import { request_t } from "../../generated/messages";
 import { Loading } from "../state/loading";
 import { inputOf, type World } from "../state/world";
@@ -61,8 +61,8 @@ export class Arrivals {
       live = page.now.hello?.mode === "live";
     session.begin(world.runId, request);
     page.set({ controlled: request !== "" || !live, ...(live ? { paused: world.paused } : {}) });
-    // The info that was kept for newcomers may be older than the last pause: the state itself is
-    // asked for.
+    // The info kept for newcomers may be older than the last pause, so the state itself is
+    // requested.
     if (live && request !== "" && !this.asked) {
       this.asked = true;
       void control.request(request_t.GET_STATE, encode("name_request_t", { name: "" }));

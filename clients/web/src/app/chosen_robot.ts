@@ -1,4 +1,4 @@
-// The chosen robot: followed in the view, shown in the panel, and sent to points that are clicked.
+// The chosen robot: followed by the camera, shown in the panel, and sent to clicked points.
 import type { robot_info_t } from "../../generated/messages";
 import { GoTo, kReasons, type PlanarPose } from "../state/go_to";
 import { toggleGoing } from "../state/choices";
@@ -39,7 +39,7 @@ export class ChosenRobot {
     return world?.robots[robot];
   }
 
-  // Of the scene's; -1 where it has none.
+  // Its index in the scene; -1 if the scene does not have it.
   private get base(): number {
     const name = this.robot?.name;
     return this.model.page.now.scene?.bases.findIndex((base) => base.robot === name) ?? -1;

@@ -1,4 +1,4 @@
-// What the link brings, and who takes it.
+// Passes on what the link receives.
 import type { Loading } from "../state/loading";
 import type { ChannelList } from "../ui/channels";
 import type { Notice } from "../ui/notice";
@@ -24,11 +24,11 @@ export class Connection implements LinkHandler {
   ) {}
 
   async open(): Promise<void> {
-    await this.fetchTypes().catch(() => undefined); // the link says what is wrong
+    await this.fetchTypes().catch(() => undefined); // the link will report what is wrong
     this.model.link.connect(this);
   }
 
-  // Types of plugins, and of --types.
+  // Types of plugins and of --types.
   private async fetchTypes(): Promise<void> {
     const { file } = this.model,
       bytes = file?.file("/types.json");
@@ -66,7 +66,8 @@ export class Connection implements LinkHandler {
     this.to.channels.traffic(channels, messages, sizes);
   }
 
-  // A run with --control off takes no requests; the page asks one, for what runs, before it knows.
+  // A run with --control off refuses all requests; the page makes one (for ruedo/info) before it
+  // knows.
   refused(channel: string): void {
     const { hello, world } = this.model.page.now,
       isRequest = channel === "ruedo/request";

@@ -1,4 +1,4 @@
-// Changing the world: what does it, and the handles and lines by which it is done in the view.
+// Editing the world: the editor, and the handles and lines in the view.
 import { Draw } from "../edit/draw";
 import { Editor } from "../edit/editor";
 import { Gizmo } from "../edit/gizmo";
@@ -25,7 +25,7 @@ export class Editing {
     });
   }
 
-  // With what is moved.
+  // Once a frame.
   frame(): void {
     this.gizmo.follow();
     this.outline.follow();

@@ -1,5 +1,5 @@
-// What the page is about, without anything that shows it: what is known of a run, where that comes
-// from, and what can be asked of it.
+// The page's data, without any views: what is known of a run, where that comes from, and what can
+// be requested.
 import { Control } from "../control";
 import { Clock } from "../state/clock";
 import { makePage } from "../state/page";
@@ -14,8 +14,8 @@ import { Session } from "../wire/session";
 export class Model {
   readonly page = makePage();
   readonly poses = new Poses();
-  readonly file = LogFile.inPage(); // the log of a page that has it in itself; null: it is served
-  readonly rewind = this.file ? null : new Rewind(new Link()); // of what may be live
+  readonly file = LogFile.inPage(); // the log embedded in the page; null if the page is served
+  readonly rewind = this.file ? null : new Rewind(new Link()); // of a served run
   readonly link: RunLink = this.file ?? this.rewind!;
   readonly session = new Session((channel, message) => this.link.command(channel, message));
   readonly clock = new Clock(this.page, (reset) => this.forget(reset));
@@ -23,8 +23,8 @@ export class Model {
   readonly wanted = new Wanted(this.page, this.link);
   private readonly forgetters: ((reset: boolean) => void)[] = [];
 
-  // Calls when what was drawn along the way is not of this moment any more. reset: the world was
-  // reset.
+  // Registers a call for when what was drawn so far is of another moment. reset: because the world
+  // was reset.
   onForget(call: (reset: boolean) => void): void {
     this.forgetters.push(call);
   }
@@ -33,20 +33,20 @@ export class Model {
     for (const call of this.forgetters) call(reset);
   }
 
-  // A moment of a log, or of the past of a live run.
+  // Shows a moment of a log, or of the past of a live run.
   seek(time_s: number): void {
     if (this.page.now.hello?.mode === "log") this.link.seek(time_s);
     else this.rewind?.show(time_s);
   }
 
-  // A step of a live run, or a state of what is past, to and fro.
+  // One step of a paused live run; in a log or the past, to the next state or the previous one.
   step(ahead: boolean): void {
     const { past, paused, hello } = this.page.now;
     if (ahead && hello?.mode !== "log" && !past && paused) this.control.step();
     else this.link.step(ahead);
   }
 
-  // What runs now.
+  // Back to the present.
   live(): void {
     this.rewind?.live();
   }

@@ -71,7 +71,7 @@ export class PanelView {
     this.connect();
   }
 
-  // With the rest of the page.
+  // Once a frame.
   private connect(): void {
     const { model, pages, plots, channels, inset } = this,
       { page, control } = model;

@@ -1,4 +1,4 @@
-// Messages to those who show them. Which type a channel has is told by ruedo/info.
+// Passes messages to the views that show them. ruedo/info tells the type of each channel.
 import type { device_info_t, Messages } from "../../generated/messages";
 import { isCompared } from "../state/comparison";
 import type { Loading } from "../state/loading";
@@ -21,12 +21,12 @@ import type { Session } from "../wire/session";
 
 interface Route {
   type: TypeName;
-  robot: string; // "": of none
+  robot: string; // "" for none
   index: number; // of the robot in the world
   device: device_info_t | undefined;
 }
 
-// The channels whose types this page knows as the server does.
+// The channels whose types page and server define alike.
 export function routesOf(world: World): Map<string, Route> {
   const routes = new Map<string, Route>();
   const places = new Map(world.robots.map((robot, index) => [robot.name, index]));
@@ -45,21 +45,21 @@ export function routesOf(world: World): Map<string, Route> {
   return routes;
 }
 
-// Of one robot's message: where it comes from, and who shows it.
+// The source of a robot's message, and the views that show it.
 interface Shown {
   channel: string;
   device: device_info_t | undefined;
   index: number; // of the robot
   overlay: RobotOverlay | undefined;
-  pages: RobotPages | undefined; // of the chosen robot alone
+  pages: RobotPages | undefined; // for the chosen robot only
   stage: Stage;
   inset: Inset;
 }
-// A message is decoded when somebody shows it.
+// Messages are decoded only if a view shows them.
 type Show<Type extends TypeName> = (to: Shown, read: () => Messages[Type]) => void;
 
-// What the page does with each type of a robot's messages; those of other types go to the state
-// page, member by member.
+// How each type of a robot's messages is shown; other types are listed on the page Robot, member by
+// member.
 const kShow: { [Type in TypeName]?: Show<Type> } = {
   planar_lidar_t({ device, overlay, pages }, read) {
     if (!device) return;
@@ -73,7 +73,7 @@ const kShow: { [Type in TypeName]?: Show<Type> } = {
     overlay?.sonar(device, ranges);
     pages?.sonar(device, ranges);
   },
-  // The robot's own; that of a device is one of its readings.
+  // The robot's own pose; that of a device is one of its readings.
   pose_t({ device, overlay, pages }, read) {
     const pose = read();
     if (device && device.kind !== "pose") return pages?.other(device, pose);
@@ -126,7 +126,7 @@ export interface Views {
 
 export class Router {
   private routes = new Map<string, Route>();
-  private told = ""; // the type that tells the time
+  private told = ""; // the type of message that sets the clock
 
   constructor(
     private readonly page: Page,
@@ -151,7 +151,7 @@ export class Router {
     }
   }
 
-  // Where the other run's bodies are.
+  // The bodies of the other run.
   private ofOther(bytes: Uint8Array): void {
     if (typeOf(bytes) === "world_state_t" && this.page.now.complete)
       this.views.ghosts.poses.add(decode("world_state_t", bytes), performance.now());

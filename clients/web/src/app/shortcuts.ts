@@ -68,7 +68,7 @@ const ofPage = ({ page }: Model, editPage: EditPage): Shortcuts => ({
   p: () => togglePanel(page),
   t: () => toggleTheme(page),
   b: () => editPage.startPlacing(),
-  // What was begun is left; then, what was selected.
+  // First cancels what was begun, then clears the selection.
   Escape: () => (page.now.tool !== "select" ? editPage.stop() : page.set({ selected: "" })),
   m: () => page.set({ handle: "translate" }),
   e: () => page.set({ handle: "rotate" }),

@@ -1,4 +1,4 @@
-// Which world is shown: that of the run, or, to who looks back, the one that was there then.
+// Which world is shown: the present one, or, when looking back, the one of that time.
 import type { World } from "../state/world";
 import { toast } from "../widgets/elements";
 import { loadScene, type SceneFiles } from "../wire/description";
@@ -8,12 +8,12 @@ import { goToAddress } from "./address";
 import type { Model } from "./model";
 import type { SceneView } from "./scene_view";
 
-const kMostScenes = 32; // that are kept for the past
-const kJump_s = 0.5; // further is another moment, not the next one
+const kMostScenes = 32; // kept for the past
+const kJump_s = 0.5; // a longer step is a jump
 
 export class ShownWorld {
-  sceneNumber = 0; // of a log's
-  private readonly scenes: { from: number; world: World; files: SceneFiles | null }[] = []; // of the past that is kept
+  sceneNumber = 0; // of a log's scenes
+  private readonly scenes: { from: number; world: World; files: SceneFiles | null }[] = []; // of the past
 
   constructor(
     private readonly model: Model,
@@ -22,18 +22,18 @@ export class ShownWorld {
     if (model.rewind) model.rewind.onPast = (past, kept) => this.onPast(past, kept);
   }
 
-  // Another connection, maybe to another run.
+  // A new connection, perhaps to another run.
   forget(): void {
     this.sceneNumber = 0;
     this.scene.markers.clear();
     if (this.model.rewind) this.scenes.length = 0;
   }
 
-  // As it looks, or as physics has it.
+  // Its visual shapes, or its collision shapes.
   async fetch(): Promise<SceneFiles | null> {
     const { file } = this.model,
       { hello, layers, scene } = this.model.page.now;
-    // Of a log that is served each page has a moment of its own.
+    // In a served log, each page has a moment, and thus a scene, of its own.
     const at = hello?.mode === "log" && !file ? `/${this.sceneNumber}` : "";
     if (!layers.has("shapes")) return loadScene(file, `/scene${at}`);
     const shapes = await loadScene(file, `/collision${at}`);
@@ -41,7 +41,7 @@ export class ShownWorld {
     return shapes ?? loadScene(file, `/scene${at}`);
   }
 
-  // Kept for who looks back; shown, unless the past is.
+  // Kept for looking back; shown unless the past is.
   take(world: World, files: SceneFiles | null): void {
     const { past, scene } = this.model.page.now,
       last = this.scenes.at(-1),
@@ -50,13 +50,13 @@ export class ShownWorld {
         last.files?.description.version === files?.description.version;
     const isShown = !past || scene === last?.files?.description;
     if (last && isSame)
-      last.files = files; // the same world in another form
+      last.files = files; // the same world with other shapes
     else this.scenes.push({ from: this.model.rewind?.range.end ?? 0, world, files });
     if (this.scenes.length > kMostScenes) this.scenes.shift();
     if (!past || (isSame && isShown)) this.show(world, files);
   }
 
-  // The chosen robot stays, by its name.
+  // The chosen robot stays chosen, by its name.
   private show(world: World, files: SceneFiles | null): void {
     const { page } = this.model,
       { world: before, robot } = page.now,
@@ -70,7 +70,7 @@ export class ShownWorld {
     if (before === null) goToAddress(this.model, this.scene.stage);
   }
 
-  // What is shown is another moment of a live run, or the present again.
+  // Another moment of a live run is shown, or the present again.
   private onPast(past: Past | null, kept: { begin: number; end: number }): void {
     const { page, poses } = this.model;
     if (page.now.hello?.mode !== "live") return;
@@ -78,7 +78,8 @@ export class ShownWorld {
     if (past === null && before === null && kept.end === page.now.kept.end) return;
     page.set({ past, kept });
     if (past?.now === before?.now) return;
-    if (!past || !before || past.now < before.now) this.scene.markers.clear(); // what is drawn then comes
+    // markers of that time will follow
+    if (!past || !before || past.now < before.now) this.scene.markers.clear();
     if (!past || !before || Math.abs(past.now - before.now) > kJump_s) poses.jump();
     const times = this.scenes.map(({ from }) => ({ time: from })),
       shown = this.scenes[Math.max(0, newestAt(times, past?.now ?? Infinity))];

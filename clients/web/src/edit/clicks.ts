@@ -1,4 +1,4 @@
-// A click on the scene: chooses, selects, sends a robot, places a thing, or makes a door.
+// Clicks on the scene: choose, select, send a robot, place a thing, or make a door.
 import * as THREE from "three";
 import { matrixOf } from "../scene/matrix";
 import type { Stage } from "../scene/stage";
@@ -7,7 +7,7 @@ import { toast } from "../widgets/elements";
 import type { Editor } from "./editor";
 import type { Door } from "./sdf";
 
-const kClick_px = 5; // what the pointer may have moved
+const kClick_px = 5; // the pointer may move this far in a click
 
 export function listenToClicks(
   canvas: HTMLElement,
@@ -65,7 +65,7 @@ export function listenToClicks(
   });
 }
 
-// Doors go all the way through: where along the wall is what counts.
+// A door takes the full thickness of its wall; only the position along the wall matters.
 function makeDoor(name: string, point: THREE.Vector3 | null, editor: Editor, door: Door): void {
   const pose = editor.pose(name);
   if (!name || !point || !pose) return toast("There is no wall here.", "error");

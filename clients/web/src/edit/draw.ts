@@ -1,4 +1,4 @@
-// Walls and rooms, drawn on the floor by a drag.
+// Drawing walls and rooms on the floor by dragging.
 import * as THREE from "three";
 import type { Stage } from "../scene/stage";
 import type { Page } from "../state/page";
@@ -10,7 +10,7 @@ type Point = { x: number; y: number };
 
 export class Draw {
   style: WallStyle = { height: 1.2, thickness: 0.1 };
-  onLength: (words: string) => void = () => undefined; // what is being drawn, in words
+  onLength: (words: string) => void = () => undefined; // the dimensions of what is being drawn
   private from: Point | null = null;
   private to: Point = { x: 0, y: 0 };
   private readonly ghost = new THREE.LineSegments(

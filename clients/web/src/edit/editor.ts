@@ -1,4 +1,4 @@
-// Changes of the world, as requests that any client could make, each of which can be taken back.
+// Changes of the world, as requests that any client could make. Each can be undone.
 import type { Box3 } from "three";
 import { request_t } from "../../generated/messages";
 import type { Control } from "../control";
@@ -12,15 +12,16 @@ import { poseNow, samePose, type Pose7 } from "./pose";
 import { scaled, withDoor, type Door, type Size } from "./sdf";
 
 const kCopyAside_m = 0.1; // between a model and its copy
-const kRest_m = 2e-4; // in a moment: less is rest
-const kLook_ms = 250; // between two looks at what settles
+const kRest_m = 2e-4; // smaller motions between two looks count as rest
+const kLook_ms = 250; // between two looks while settling
 const kLongestSettling_s = 10; // of sim time
 
 export class Editor {
   readonly history: History;
-  private readonly given = new Set<string>(); // names of what was placed, maybe not in the scene yet
+  // names of placed models that may not be in the scene yet
+  private readonly given = new Set<string>();
 
-  // box: around a model as it is seen; empty where it shows nothing.
+  // box: around a model's visible shapes; empty if it has none.
   constructor(
     private readonly page: Page,
     private readonly poses: Poses,
@@ -34,7 +35,7 @@ export class Editor {
     });
   }
 
-  // The models that are there.
+  // The existing models.
   get models(): ModelDescription[] {
     return this.page.now.scene?.models.filter(({ name }) => name !== "") ?? [];
   }
@@ -46,7 +47,7 @@ export class Editor {
     return model ? poseNow(model, this.poses) : null;
   }
 
-  // ---- what can be done
+  // ---- changes
 
   move(name: string, to: Pose7): Promise<boolean> {
     const from = this.pose(name);
@@ -58,7 +59,7 @@ export class Editor {
     });
   }
 
-  // Onto the ground there, or at a pose.
+  // On the ground at that point, or at a pose.
   add({ name: base, model, text }: Thing, to: Pose7, onGround: boolean): Promise<boolean> {
     const name = this.unusedName(base);
     this.given.add(name);
@@ -102,7 +103,7 @@ export class Editor {
     return box && !box.isEmpty() ? box.max.x - box.min.x : 0;
   }
 
-  // What stands on the ground goes on standing there.
+  // What stands on the ground stays on the ground.
   scale(name: string, factor: Size): Promise<boolean> {
     const model = this.find(name),
       pose = this.pose(name),
@@ -116,7 +117,7 @@ export class Editor {
     return this.rewrite(name, `door in ${name}`, (text) => withDoor(text, at, door));
   }
 
-  // Lets physics go on until nothing moves any more.
+  // Runs the physics until nothing moves any more.
   settle(): Promise<boolean> {
     let before = new Map<string, Pose7>();
     return this.history.do({
@@ -151,7 +152,7 @@ export class Editor {
     return true;
   }
 
-  // ---- how it is asked for
+  // ---- requests
 
   private setPose(name: string, pose: Pose7): Promise<boolean> {
     return this.control.request(
@@ -177,8 +178,8 @@ export class Editor {
     return this.control.request(request_t.REMOVE, encode("name_request_t", { name }));
   }
 
-  // Another text for a model, raised by so much; where the new one cannot stand there, the old one
-  // comes back.
+  // Replaces a model by another text, raised by that much. If the new one cannot stand there, the
+  // old one is restored.
   private async rewrite(
     name: string,
     what: string,
@@ -198,7 +199,7 @@ export class Editor {
     const exchange = async (text: string, back: string, up: number) => {
       const pose = this.pose(name) ?? from,
         raised = [pose[0]!, pose[1]!, pose[2]! + up, ...pose.slice(3)];
-      this.given.add(name); // it is gone for a moment
+      this.given.add(name); // it is missing for a moment
       if (!(await this.control.request(request_t.REMOVE, encode("name_request_t", { name }))))
         return false;
       if (await this.spawn(name, { model: "", text }, raised, false)) return true;
@@ -212,7 +213,7 @@ export class Editor {
     });
   }
 
-  // What SPAWN takes to make that model; null, said in a note, where there is none.
+  // The request that SPAWNs that model again; null, with a note, if there is none.
   private async text(name: string): Promise<string | null> {
     const index = this.page.now.scene?.models.findIndex((model) => model.name === name) ?? -1;
     const answer = index >= 0 ? await fetch(`/scene/models/${index}`).catch(() => null) : null;

@@ -1,5 +1,5 @@
-// The handles at the selected model: they move, turn or scale what is seen at once, and the world
-// when they are let go.
+// The handles at the selected model: while they are dragged only the view changes; when they are
+// released, the world does.
 import * as THREE from "three";
 import { TransformControls } from "three/addons/controls/TransformControls.js";
 import { matrixOf } from "../scene/matrix";
@@ -15,7 +15,7 @@ const kTurnSnap_rad = Math.PI / 12,
 export class Gizmo {
   private readonly controls: TransformControls;
   private readonly handle = new THREE.Object3D();
-  private readonly begun = new THREE.Matrix4(); // of the handle, when it was seized
+  private readonly begun = new THREE.Matrix4(); // of the handle, at the start of the drag
 
   constructor(
     private readonly page: Page,
@@ -45,12 +45,12 @@ export class Gizmo {
     });
   }
 
-  // Whether the pointer is on it: a click there means nothing else.
+  // Whether the pointer is on a handle, so that a click means nothing else.
   get seized(): boolean {
     return this.controls.axis !== null && this.controls.object !== undefined;
   }
 
-  // Follows what moves by itself.
+  // Follows a model that moves by itself.
   follow(): void {
     if (this.controls.dragging || !this.controls.object) return;
     const pose = this.editor.pose(this.page.now.selected);

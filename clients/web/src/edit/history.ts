@@ -1,10 +1,9 @@
-// What was done and can be taken back: steps one after the other, each of which may wait for the
-// server.
+// Undo and redo: steps one after the other, each of which may wait for the server.
 import type { HistoryState } from "../state/page";
 
 export interface Step {
   name: string; // "move box_1"
-  apply(): Promise<boolean>; // false: it did not come to pass
+  apply(): Promise<boolean>; // false if it failed
   revert(): Promise<boolean>;
 }
 
@@ -18,7 +17,7 @@ export class History {
 
   constructor(private readonly changed: (state: HistoryState) => void) {}
 
-  // Does a step. One that fails leaves no trace.
+  // Performs a step. A failed one is not recorded.
   do(step: Step): Promise<boolean> {
     return this.after(async () => {
       if (!(await step.apply())) return false;
@@ -36,7 +35,7 @@ export class History {
     return this.after(() => this.shift("apply"));
   }
 
-  // The world is another one.
+  // Another world has no history yet.
   clear(): void {
     this.done = [];
     this.undone = [];
@@ -48,12 +47,12 @@ export class History {
     const [from, to] = how === "revert" ? [this.done, this.undone] : [this.undone, this.done];
     const step = from.pop();
     if (!step) return false;
-    if (!(await step[how]())) return false; // what cannot be taken back is forgotten: the world has gone on without it
+    if (!(await step[how]())) return false; // what cannot be undone is dropped: the world has changed since
     to.push(step);
     return true;
   }
 
-  // One at a time, in the order in which they were asked for.
+  // One at a time, in the requested order.
   private after(work: () => Promise<boolean>): Promise<boolean> {
     const result = this.queue.then(async () => {
       const good = await work();

@@ -1,4 +1,4 @@
-// Keys of the page World: take back, do again, copy, delete, save.
+// Keys of the page World: undo, redo, duplicate, delete, save.
 import type { Page } from "../state/page";
 import { dialogIsOpen } from "../widgets/confirm";
 import { isTyping } from "../widgets/typing";
@@ -24,7 +24,7 @@ export function listenToEditing(page: Page, editor: Editor): void {
     event.preventDefault();
     action();
   });
-  // What is not saved is asked about.
+  // Asks before unsaved changes are left.
   addEventListener("beforeunload", (event) => {
     const { hello, edits, saved } = page.now;
     if (hello?.save && edits.changes !== saved) event.preventDefault();

@@ -17,7 +17,7 @@ export function poseOf(matrix: THREE.Matrix4): Pose7 {
   return [p.x, p.y, p.z, q.w, q.x, q.y, q.z];
 }
 
-// Fixed axes, roll first: SDF's.
+// Fixed axes, roll first, as in SDF.
 export function numbersOf(pose: Pose7): number[] {
   const [x, y, z, w, a, b, c] = pose as [number, number, number, number, number, number, number];
   const euler = new THREE.Euler().setFromQuaternion(new THREE.Quaternion(a, b, c, w), "ZYX");
@@ -32,7 +32,7 @@ export function poseFrom(numbers: number[]): Pose7 {
   return [x, y, z, q.w, q.x, q.y, q.z];
 }
 
-// Where a model is now; null while no state has told it.
+// The current pose of a model; null until a state has arrived.
 export function poseNow(model: ModelDescription, poses: Poses): Pose7 | null {
   const matrix = matrixOf(model.pose, 0, new THREE.Matrix4());
   if (model.body >= 0 && !poses.known[model.body]) return null;

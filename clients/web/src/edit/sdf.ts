@@ -1,5 +1,5 @@
-// SDF as text: of what is drawn on the floor, and of models with another name, another size, a
-// door. A text is changed where it must be, and stays as it was written elsewhere.
+// SDF as text: of drawn things, and of models that get another name, another size, or a door. Only
+// what must change is changed; the rest stays as it was written.
 
 // ---- making
 
@@ -23,7 +23,7 @@ export const cylinderOf = (radius: number, length: number) =>
   `<cylinder><radius>${text(radius)}</radius><length>${text(length)}</length></cylinder>`;
 export const sphereOf = (radius: number) => `<sphere><radius>${text(radius)}</radius></sphere>`;
 
-// In a world's file models stand at four spaces.
+// Models in a world file are indented by four spaces.
 function model(name: string, inertial: string, parts: Part[]): string {
   const shown = parts
     .map(
@@ -56,7 +56,7 @@ const inertia = (mass: number, moments: Size) => `
           <inertia><ixx>${moments[0].toPrecision(4)}</ixx><ixy>0</ixy><ixz>0</ixz><iyy>${moments[1].toPrecision(4)}</iyy><iyz>0</iyz><izz>${moments[2].toPrecision(4)}</izz></inertia>
         </inertial>`;
 
-// Of that density, kg/m^3; standing on its origin's height is left to who places it.
+// Of solid things, kg/m^3. Whoever places one chooses its height.
 const kDensity = 100;
 export function boxModel(name: string, size: Size): string {
   const [x, y, z] = size,
@@ -85,7 +85,7 @@ export interface WallStyle {
   height: number;
   thickness: number;
 }
-// Along x, its middle in the model's origin, on the ground.
+// Along x, centred at the model's origin, on the ground.
 export function wallModel(name: string, length: number, { height, thickness }: WallStyle): string {
   return model(name, "", [
     {
@@ -96,7 +96,7 @@ export function wallModel(name: string, length: number, { height, thickness }: W
     },
   ]);
 }
-// Four walls about the origin, their inner faces so far apart.
+// Four walls around the origin, given the inner dimensions.
 export function roomModel(
   name: string,
   width: number,
@@ -131,7 +131,7 @@ export interface Place {
   children: Place[];
 }
 
-// The elements of a text, each with where it stands. Throws for what is not XML.
+// The elements of a text with their positions. Throws if it is not XML.
 export function places(xml: string): Place[] {
   const root: Place = {
       name: "",
@@ -202,8 +202,8 @@ function each(place: Place, name: string, found: (place: Place) => void): void {
   }
 }
 
-// Larger or smaller by a factor along each of its axes: shapes, and what stands apart in it. Masses
-// go with the volume. Throws where it cannot be: in words.
+// Scales a model along each of its axes: shapes and their positions; masses scale with the volume.
+// Throws, with the reason, if it cannot be scaled.
 export function scaled(xml: string, factor: Size): string {
   const top = topModel(xml),
     changes: Change[] = [],
@@ -226,7 +226,7 @@ export function scaled(xml: string, factor: Size): string {
   return changed(xml, changes);
 }
 
-// Numbers, each by its factor.
+// Numbers, each multiplied by its factor.
 function multiply(
   xml: string,
   place: Place | undefined,
@@ -266,7 +266,7 @@ function scaleShapes(
   });
 }
 
-// Moments of a body's second moments, each of which goes with the square of its axis.
+// Moments of inertia from second moments, each of which scales with the square of its axis.
 function scaleMoments(xml: string, place: Place, [fx, fy, fz]: Size, changes: Change[]): void {
   const value = (name: string) => {
     const found = child(place, name);
@@ -300,8 +300,8 @@ export interface Door {
   height: number;
 }
 
-// A door in the wall that holds a point of the model: the wall becomes what is left of it, right of
-// it and above it. Throws where there is no wall, in words.
+// Makes a door in the wall that contains a point of the model: what remains is a piece to the left,
+// one to the right and one above. Throws, with the reason, if there is no wall.
 export function withDoor(xml: string, [px, py]: [x: number, y: number], door: Door): string {
   const top = topModel(xml),
     changes: Change[] = [],
@@ -397,7 +397,7 @@ function pieces(
     .join(gap);
 }
 
-// A collision or visual with another name, place and size.
+// A collision or visual with that name, position and size.
 function rewritten(own: string, suffix: string, pose: number[], size: Size): string {
   const [element] = places(own),
     changes: Change[] = [],

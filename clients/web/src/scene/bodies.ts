@@ -1,4 +1,4 @@
-// The bodies of the world that is shown, each at its pose, with wheels as they turn.
+// The bodies of the shown world at their poses, with turning wheels.
 import * as THREE from "three";
 import type { PlanarPose } from "../state/go_to";
 import type { Poses } from "../state/poses";
@@ -7,26 +7,27 @@ import type { Built, Movers } from "./build";
 import { shareOut, spread, type Eye } from "./detail";
 import { matrixOf } from "./matrix";
 
-const kSeen_rad = 1e-3; // what turns less looks as it did
+const kSeen_rad = 1e-3; // smaller turns cannot be seen
 
 export class Bodies {
   description: Description | null = null;
   built: Built | null = null;
-  private moving: { first: number; end: number; by: THREE.Matrix4 } | null = null; // links that are shown elsewhere
+  // links of a model that is shown elsewhere
+  private moving: { first: number; end: number; by: THREE.Matrix4 } | null = null;
   private readonly linkWheel = new Map<
     number,
     { robot: number; place: number; axis: THREE.Vector3; centre: THREE.Vector3 }
   >();
   private readonly wheelAngles = new Map<number, Float64Array>(); // of robots whose odometry is known
-  private spun = false; // wheels that are not drawn so yet
+  private spun = false; // wheels have turned and are not drawn yet
 
-  // changed: what is drawn is elsewhere.
+  // changed: called when something was moved.
   constructor(
     private readonly poses: Poses,
     private readonly changed: () => void,
   ) {}
 
-  // Another world, or none.
+  // Takes another world, or none.
   show(description: Description | null, built: Built | null): void {
     this.description = description;
     this.built = built;
@@ -49,20 +50,20 @@ export class Bodies {
     );
   }
 
-  // At that moment of the display.
+  // Moves everything to where it is at that time.
   advance(at_ms: number): void {
     if (!this.poses.advance(at_ms) && !this.spun) return;
     this.spun = false;
     this.place(false);
   }
 
-  // What is near and what is far, as it is seen from there.
+  // Chooses the level of detail of each link, as seen from there.
   shareOut(eye: Eye, plain: boolean): void {
     for (const movers of this.built?.movers ?? [])
       shareOut(movers, eye, plain, (link) => this.linkWheel.has(link));
   }
 
-  // Where a robot's base_link is; false when that is not known.
+  // The pose of a robot's base_link; false if it is unknown.
   base(robot: number, into: THREE.Matrix4, poses: ArrayLike<number> = this.poses.now): boolean {
     const base = this.description?.bases[robot];
     if (!base) return false;
@@ -76,8 +77,8 @@ export class Bodies {
     return true;
   }
 
-  // Where the newest message has it on the floor, and its heading, of which what is drawn is a
-  // little behind; null when that is not known.
+  // A robot's pose on the floor in the newest message, slightly ahead of what is drawn; null if it
+  // is unknown.
   planar(robot: number): PlanarPose | null {
     const at = new THREE.Matrix4();
     if (robot < 0 || !this.base(robot, at, this.poses.to)) return null;
@@ -85,21 +86,21 @@ export class Bodies {
     return { x: at.elements[12], y: at.elements[13], heading: Math.atan2(sine, cosine) };
   }
 
-  // Where a model is.
+  // The pose of a model.
   modelAt(model: ModelDescription, into: THREE.Matrix4): void {
     matrixOf(model.pose, 0, into);
     if (model.body >= 0 && model.body < this.poses.size)
       into.premultiply(matrixOf(this.poses.now, 7 * model.body, kScratch));
   }
 
-  // The model that a link belongs to.
+  // The index of the model that a link belongs to.
   modelOf(link: number): number {
     return this.description!.models.findIndex(
       ({ first_link, links }) => link >= first_link && link < first_link + links,
     );
   }
 
-  // Shows a model elsewhere, by what it is moved from where it is; null: as it is.
+  // Shows a model moved by that transform; null: where it is.
   preview(model: ModelDescription | null, by: THREE.Matrix4): void {
     this.moving = model
       ? { first: model.first_link, end: model.first_link + model.links, by: by.clone() }
@@ -107,7 +108,7 @@ export class Bodies {
     this.place(true);
   }
 
-  // The box around a model as it is seen; empty where it shows nothing.
+  // The box around a model's visible shapes; empty if it has none.
   boxOf(model: ModelDescription): THREE.Box3 {
     const box = new THREE.Box3(),
       part = new THREE.Box3(),
@@ -130,7 +131,7 @@ export class Bodies {
     return box;
   }
 
-  // Wheels may turn where the robot stays.
+  // Sets a robot's wheel angles; wheels may turn while the robot stands.
   turnWheels(robot: number, angles: Float64Array): void {
     const before = this.wheelAngles.get(robot);
     if (before && angles.every((angle, i) => Math.abs(angle - before[i]!) < kSeen_rad)) return;
@@ -178,7 +179,7 @@ export class Bodies {
     for (const mesh of meshes) mesh.computeBoundingSphere();
   }
 
-  // A link's place while its model is shown elsewhere.
+  // Applies the preview to a link.
   private shift(link: number, matrix: THREE.Matrix4): THREE.Matrix4 {
     const { moving } = this;
     return moving && link >= moving.first && link < moving.end

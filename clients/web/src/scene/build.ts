@@ -1,5 +1,5 @@
 // Turns the description into instanced meshes: all links of a kind are one mesh for each of its
-// surfaces, so that a thousand robots are a few draw calls.
+// surfaces, so that a thousand robots take a few draw calls.
 import * as THREE from "three";
 import { mergeGeometries } from "three/addons/utils/BufferGeometryUtils.js";
 import { Crowd } from "./crowd";
@@ -13,7 +13,7 @@ import {
   type SceneFiles,
 } from "../wire/description";
 
-const kSmall = 0.5; // of a link's largest part: smaller ones are left out far away
+const kSmall = 0.5; // share of a link's largest part; smaller parts are left out at a distance
 
 // Links of one kind that move, and the meshes that show them.
 export interface Movers {
@@ -22,9 +22,9 @@ export interface Movers {
   meshes: THREE.InstancedMesh[];
   far: Far | null;
   shown: number[];
-} // shown: what stands near, as places in indices
-// Of many links: what shows those far away, and the matrices of all of them. always: at every
-// quality, for they are too costly.
+} // shown: the near ones, as indices into `indices`
+// For numerous links: the mesh of the distant ones, and the matrices of all. always: at every
+// quality, since they are costly.
 export interface Far {
   always: boolean;
   mesh: Crowd;
@@ -66,7 +66,7 @@ function gridTexture(): THREE.Texture {
   return texture;
 }
 
-// Gives back what the graphics memory holds of it.
+// Frees the GPU memory.
 export function disposeOf({ still, moving }: Built): void {
   for (const group of [still, moving]) {
     group.traverse((object) => {
@@ -81,12 +81,12 @@ export function disposeOf({ still, moving }: Built): void {
   }
 }
 
-// From the part's mesh to its link.
+// The transform from a part's mesh to its link.
 function matrixOf({ matrix: m }: Part): THREE.Matrix4 {
   return new THREE.Matrix4().fromArray([...m, 0, 0, 0, 1]).transpose();
 }
 
-// Corners of triangles, each vertex of a part once.
+// Collects triangles, each vertex of a part once.
 class Corners {
   private readonly positions: number[] = [];
   private readonly normals: number[] = [];
@@ -136,7 +136,7 @@ class Corners {
 }
 
 export class SceneBuilder {
-  readonly loading: Promise<void>[] = []; // pictures that are on their way
+  readonly loading: Promise<void>[] = []; // textures being loaded
   private readonly textures = new Map<number, THREE.Texture>();
 
   constructor(private readonly files: SceneFiles) {}
@@ -165,7 +165,8 @@ export class SceneBuilder {
           mesh.castShadow = surface.shadow;
           mesh.receiveShadow = true;
           mesh.frustumCulled = !moves;
-          mesh.renderOrder = surface.ground ? 1 : 0; // what stands on it hides much of it
+          // drawn last, since things on it hide much of it
+          mesh.renderOrder = surface.ground ? 1 : 0;
           mesh.userData = { links: chosen, ground: surface.ground };
           if (moves) mesh.instanceMatrix.setUsage(THREE.DynamicDrawUsage);
           into.add(mesh);
@@ -195,8 +196,8 @@ export class SceneBuilder {
     return parts.reduce((sum, part) => sum + this.batch(part, false)[2] / 3, 0);
   }
 
-  // What a kind of link looks like, in the link's frame: all plain opaque parts are one surface
-  // with coloured corners.
+  // The surfaces of a kind of link, in the link's frame: all plain opaque parts are one surface
+  // with vertex colours.
   private surfaces(parts: Part[], many: boolean): Surface[] {
     const groups = new Map<string, Part[]>();
     for (const part of parts) {
@@ -219,7 +220,7 @@ export class SceneBuilder {
     });
   }
 
-  // The boxes around the larger parts: a dozen triangles each, for links of a few pixels.
+  // The bounding boxes of the larger parts: a dozen triangles each, for links of a few pixels.
   private far(parts: Part[], links: number, always: boolean, into: THREE.Group): Far | null {
     const boxes = parts
       .map((part) => this.boxAround(part))
@@ -236,7 +237,7 @@ export class SceneBuilder {
     return { mesh, matrices: new Float32Array(16 * links), shown: [], always };
   }
 
-  // A part as a box of its colour, in the link's frame.
+  // A part's bounding box in its colour, in the link's frame.
   private boxAround(part: Part): THREE.BufferGeometry {
     const [meshIndex, first, count] = this.batch(part, true);
     const { vertices, indices } = this.files.meshes[meshIndex]!;
@@ -250,7 +251,7 @@ export class SceneBuilder {
     const geometry = new THREE.BoxGeometry(size.x, size.y, size.z)
       .translate(centre.x, centre.y, centre.z)
       .applyMatrix4(matrix);
-    if (matrix.determinant() < 0) geometry.getIndex()!.array.reverse(); // the outside stays out
+    if (matrix.determinant() < 0) geometry.getIndex()!.array.reverse(); // keeps the outside out
     const colour = sRGB(part.diffuse).toArray(),
       corners = geometry.getAttribute("position").count;
     const colours = Array.from({ length: corners }, () => colour).flat();

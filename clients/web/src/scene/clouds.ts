@@ -1,11 +1,11 @@
-// Points in space: what 3-D range finders and depth cameras see, in the device's frame.
+// Point clouds of 3-D range finders and depth cameras, in the device's frame.
 import * as THREE from "three";
 import { image_t, type device_info_t, type lidar_t } from "../../generated/messages";
 import { matrixOf } from "./matrix";
 
-const kMostPoints = 40_000; // of a picture; of more every second or third row and column
+const kMostPoints = 40_000; // of a picture; of larger ones every second or third row and column
 
-// x, y, z of each return, one after the other.
+// x, y, z of each return in turn.
 export function pointsOfLidar(scan: lidar_t): Float32Array {
   const { nlayers, ncolumns, ranges } = scan,
     points = new Float32Array(3 * ranges.length);
@@ -26,8 +26,8 @@ export function pointsOfLidar(scan: lidar_t): Float32Array {
   return points.subarray(0, at);
 }
 
-// Of a picture of depths along the optical axis, whose width spans the field of view: x ahead, y
-// left, z up, as the device's frame has them. Null for another kind of picture.
+// The points of a picture of depths along the optical axis: x forward, y left, z up, in the
+// device's frame. Null for pictures of another kind.
 export function pointsOfDepth(picture: image_t, fov: number): Float32Array | null {
   const { width, height, pixelformat, data, row_stride } = picture;
   if (pixelformat !== image_t.PIXEL_FORMAT_FLOAT_GRAY32 || width < 1 || height < 1) return null;

@@ -1,21 +1,21 @@
-// Many copies of one small geometry, each at a place of its own. Instanced drawing is made for
-// this; but software rasterisers draw instance by instance, which for boxes of a dozen triangles
-// takes longer than the boxes. Here a block of copies is one instance: its geometry holds them all,
-// and each vertex reads its copy's matrix from a picture, of which a block is a row.
+// Many copies of one small geometry, each with its own matrix. Instancing is the usual means, but
+// software rasterisers draw instance by instance, and for boxes of a dozen triangles that overhead
+// exceeds the drawing. Here one instance is a block of copies: its geometry contains all of them,
+// and each vertex reads its copy's matrix from a texture with one row for each block.
 import * as THREE from "three";
 import { kTexels, plainMaterial } from "./plain_material";
 
-const kBlock = 64; // copies
+const kBlock = 64; // copies in a block
 
 export class Crowd extends THREE.Mesh {
   declare geometry: THREE.InstancedBufferGeometry;
-  // Of each copy, 16 numbers, columns first.
+  // 16 numbers for each copy, column by column.
   readonly matrices: Float32Array;
   private shown = 0;
   private readonly picture: THREE.DataTexture;
-  private readonly one: THREE.Mesh; // a copy, for what hits it
+  private readonly one: THREE.Mesh; // a single copy, for raycasts
 
-  // most: copies that can be shown.
+  // most: the largest number of copies.
   constructor(geometry: THREE.BufferGeometry, most: number) {
     const blocks = Math.max(1, Math.ceil(most / kBlock)),
       matrices = new Float32Array(blocks * kBlock * 16);
@@ -34,13 +34,14 @@ export class Crowd extends THREE.Mesh {
     this.showFirst(0);
   }
 
-  // Shows so many copies, with their matrices as they are now.
+  // Shows the first copies, with their current matrices.
   showFirst(count: number): void {
     const blocks = Math.ceil(count / kBlock);
     this.shown = count;
     this.visible = count > 0;
     this.geometry.instanceCount = blocks;
-    this.matrices.fill(0, 16 * count, 16 * kBlock * blocks); // the rest of the last block is nowhere
+    // the unused copies of the last block have no size
+    this.matrices.fill(0, 16 * count, 16 * kBlock * blocks);
     if (count > 0) this.picture.needsUpdate = true;
   }
 
@@ -60,7 +61,7 @@ export class Crowd extends THREE.Mesh {
   }
 }
 
-// The geometry as often as a block has copies; `copy` says at each vertex which one it is of.
+// The geometry repeated for a block; the attribute `copy` says which copy a vertex belongs to.
 function blockOf(one: THREE.BufferGeometry): THREE.InstancedBufferGeometry {
   const block = new THREE.InstancedBufferGeometry(),
     vertices = one.getAttribute("position").count,

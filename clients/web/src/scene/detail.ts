@@ -1,23 +1,23 @@
-// What of many links is drawn finely, as boxes, or not at all: by how large it is in the picture.
+// The level of detail of numerous links: fine, as boxes, or not drawn, by their size on the screen.
 import type * as THREE from "three";
 import type { Movers } from "./build";
 
-// Where half a metre is fewer pixels of the picture than this, a link is drawn as boxes; where a
-// fifth of a metre is fewer, a wheel is left out.
+// Links are boxes where half a metre covers fewer pixels than this; wheels are not drawn where 0.2
+// m covers fewer.
 const kFine_px = 20,
   kWheel_px = 1.5;
 
 export interface Eye {
   position: { x: number; y: number; z: number };
-  metre_px: number; // pixels of the picture that a metre is, a metre away
+  metre_px: number; // pixels that 1 m covers at a distance of 1 m
 }
 
-// Pixels of a picture that a metre is, a metre away.
+// Pixels that 1 m covers at a distance of 1 m.
 export const metrePixels = (height_px: number, fov_deg: number) =>
   height_px / 2 / Math.tan((fov_deg * Math.PI) / 360);
 
-// Shares many links out by their matrices. plain: those far away are boxes, where they are not so
-// always.
+// Assigns the links to the near and the far meshes, by their matrices. plain: distant links are
+// boxes even if they are cheap.
 export function shareOut(
   { links, indices, meshes, far, shown }: Movers,
   { position, metre_px }: Eye,
@@ -53,7 +53,7 @@ export function shareOut(
   spread(meshes);
 }
 
-// Gives the first mesh's matrices to the others.
+// Copies the first mesh's matrices to the others.
 export function spread(meshes: THREE.InstancedMesh[]): void {
   for (const mesh of meshes) {
     if (mesh !== meshes[0])

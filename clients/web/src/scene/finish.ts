@@ -1,9 +1,9 @@
-// How surfaces are drawn: finely, or plainly, where the processor draws and something moves:
-// without gloss, and with one sample of a picture a pixel. Colours and lights stay as they are.
+// How surfaces are drawn: finely, or, where a software rasteriser draws something that moves,
+// plainly: without gloss, and with one texture sample per pixel. Colours and lights stay the same.
 import * as THREE from "three";
 import { plainMaterial } from "./plain_material";
 
-// Gives a mesh the finish; what was made with its fine material alone stays as it is.
+// Gives a mesh that finish. Meshes whose only material is plain keep it.
 export function setFinish(mesh: THREE.Mesh, plain: boolean): void {
   const fine = (mesh.userData.fine ?? mesh.material) as THREE.Material;
   if (!(fine instanceof THREE.MeshStandardMaterial)) return;
@@ -38,7 +38,7 @@ function plainOf(fine: THREE.MeshStandardMaterial): THREE.MeshLambertMaterial {
   return fine.userData.plain as THREE.MeshLambertMaterial;
 }
 
-// The same picture for the graphics memory, sampled otherwise.
+// The same texture with cheaper sampling.
 function plainPicture(fine: THREE.Texture): THREE.Texture {
   const plain = fine.clone();
   plain.anisotropy = 1;
@@ -49,7 +49,7 @@ function plainPicture(fine: THREE.Texture): THREE.Texture {
   return plain;
 }
 
-// A picture's data are there: those of its plain twin, too.
+// A texture's image has been loaded; its plain twin shares it.
 export function arrived(fine: THREE.Texture): void {
   const plain = fine.userData.plain as THREE.Texture | undefined;
   if (plain && fine.image) plain.needsUpdate = true;

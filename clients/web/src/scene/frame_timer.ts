@@ -1,4 +1,4 @@
-// How long a frame takes to be drawn: by a fence behind its commands, which nobody waits for.
+// How long a frame takes to be drawn, measured by a fence that nobody waits for.
 export class FrameTimer {
   private fence: WebGLSync | null = null;
   private begun_ms = 0;
@@ -9,7 +9,7 @@ export class FrameTimer {
     return this.fence !== null;
   }
 
-  // The commands of a frame have just been given.
+  // To be called after a frame's commands.
   begin(): void {
     if (this.fence) this.gl.deleteSync(this.fence);
     this.fence = this.gl.fenceSync(this.gl.SYNC_GPU_COMMANDS_COMPLETE, 0);
@@ -17,7 +17,7 @@ export class FrameTimer {
     this.begun_ms = performance.now();
   }
 
-  // How long it took, once; 0: it is not done, or none was begun.
+  // The time, once; 0 if it is not finished, or none was begun.
   done(): number {
     const { gl, fence } = this;
     if (!fence || gl.getSyncParameter(fence, gl.SYNC_STATUS) !== gl.SIGNALED) return 0;

@@ -1,4 +1,4 @@
-// The bodies of another run, see-through, where they are at the same moment.
+// The bodies of the other run at the same moment, translucent.
 import * as THREE from "three";
 import type { Page } from "../state/page";
 import { Poses } from "../state/poses";
@@ -17,7 +17,7 @@ export class Ghosts {
     private readonly stage: Stage,
   ) {}
 
-  // Those of that scene; what there is comes with the next state.
+  // Shows those of that scene, from the next state on.
   show(files: SceneFiles | null): void {
     if (this.built) {
       this.stage.scene.remove(this.built.moving);
@@ -35,7 +35,7 @@ export class Ghosts {
     this.poses.forgetSeen();
   }
 
-  // At that moment of the display; true when there is something to draw.
+  // Moves them to where they are at that time; true if there is something to draw.
   place(at_ms: number): boolean {
     if (!this.built) return false;
     const { moving, movers } = this.built,
@@ -60,7 +60,7 @@ export class Ghosts {
   }
 }
 
-// Behind what it coincides with: only what differs is seen.
+// Drawn behind coinciding surfaces, so that only differences are visible.
 function makeGhost(mesh: THREE.InstancedMesh): void {
   const old = mesh.material as THREE.MeshStandardMaterial;
   old.map?.dispose();

@@ -5,12 +5,12 @@ import { h } from "../widgets/elements";
 import type { Stage } from "./stage";
 
 const kMost = 60; // the nearest
-const kOver_m = 0.15; // the top of what is named
+const kOver_m = 0.15; // above the top of the named thing
 
 interface Label {
   element: HTMLElement;
   model: number;
-  above: number; // m, over the model's frame
+  above: number; // m, above the model's frame
 }
 
 export class Labels {
@@ -31,7 +31,7 @@ export class Labels {
     });
   }
 
-  // Where moving things are is known with the first state.
+  // Poses of moving things are known from the first state on.
   private get isReady(): boolean {
     const models = this.page.now.scene?.models ?? [];
     return this.stage.poses.size > 0 || models.every(({ body }) => body < 0);

@@ -4,17 +4,17 @@ import type { Description, LightDescription } from "../wire/description";
 
 const kShadowReach_m = 14;
 const kMostLamps = 6;
-const kSunStays_m = 0.5; // what is looked at may be so far from where the sun was aimed
+const kSunStays_m = 0.5; // the target may move this far before the sun follows
 
 export class Lights {
   readonly group = new THREE.Group();
   private sun: THREE.DirectionalLight | null = null;
-  private stale = false; // the shadows are not those of what is seen
+  private stale = false; // the shadow map is out of date
 
-  // Those of a world; null: of an empty floor, on which a grid lies.
+  // The lights of a world; null: of an empty floor with a grid.
   show(description: Description | null): void {
     for (const light of this.group.children)
-      if (light instanceof THREE.Light || light instanceof THREE.GridHelper) light.dispose(); // a light has its shadows' picture
+      if (light instanceof THREE.Light || light instanceof THREE.GridHelper) light.dispose(); // also frees its shadow map
     this.group.clear();
     this.sun = null;
     if (description) return this.make(description);
@@ -24,7 +24,7 @@ export class Lights {
     this.group.add(grid);
   }
 
-  // Something has moved, so that its shadow is another one.
+  // Something has moved, so shadows must be redrawn.
   moved(): void {
     this.stale = true;
   }
@@ -34,7 +34,7 @@ export class Lights {
     this.stale = true;
   }
 
-  // Before a frame is drawn. Whether the shadows are to be drawn anew.
+  // To be called before each frame. True if the shadow map must be redrawn.
   aim(target: THREE.Vector3): boolean {
     const { sun } = this;
     if (!sun?.castShadow) return false;

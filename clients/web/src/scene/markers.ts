@@ -1,5 +1,5 @@
-// What clients draw: lines, paths, points, texts and maps, layer by layer, in the world or along
-// with a robot.
+// What clients draw: lines, paths, points, texts and maps, in layers, in the world or moving with a
+// robot.
 import * as THREE from "three";
 import { LineMaterial } from "three/addons/lines/LineMaterial.js";
 import { LineSegments2 } from "three/addons/lines/LineSegments2.js";
@@ -9,10 +9,10 @@ import type { Page } from "../state/page";
 import { matrixOf } from "./matrix";
 import type { Stage } from "./stage";
 
-const kMostLayers = 64; // the newest of them
+const kMostLayers = 64; // the newest ones are kept
 const kTextHeight_px = 64;
 const kUnknown = 255;
-// Over the floor that a map lies on
+// Height above the floor that a map lies on
 const kMapAbove_m = 0.01;
 
 interface Layer {
@@ -31,7 +31,7 @@ export class Markers {
     page.watch(["layers"], () => stage.touch());
   }
 
-  // Takes the place of all that was in its layer.
+  // Replaces everything in its layer.
   take({ layer, frame, markers }: markers_t): void {
     this.drop(layer);
     if (markers.length > 0) {
@@ -49,14 +49,14 @@ export class Markers {
     this.stage.sense();
   }
 
-  // Nothing of it holds any more.
+  // Removes everything.
   clear(): void {
     for (const layer of [...this.layers.keys()]) this.drop(layer);
     this.page.set({ drawn: false });
     this.stage.touch();
   }
 
-  // Where their robots are now; what moves with one that is not there is not shown.
+  // Moves markers with their robots; those of a missing robot are hidden.
   place(): void {
     const { scene, layers } = this.page.now,
       visible = layers.has("markers");
@@ -123,7 +123,7 @@ function paintOf(marker: marker_t) {
   };
 }
 
-// Both ends of each line of a path.
+// Both ends of each segment of a path.
 export function segmentsOf(points: Float32Array): Float32Array {
   const corners = Math.floor(points.length / 3),
     segments = new Float32Array(6 * Math.max(0, corners - 1));
@@ -152,7 +152,7 @@ function pointsOf(marker: marker_t): THREE.Object3D {
   return points;
 }
 
-// Lines of text that face the camera, the marker's place in their middle.
+// Lines of text that face the camera, centred at the marker's position.
 function textOf(marker: marker_t): THREE.Object3D {
   const lines = marker.text.split("\n"),
     canvas = document.createElement("canvas"),
@@ -187,8 +187,8 @@ function textOf(marker: marker_t): THREE.Object3D {
   return sprite;
 }
 
-// The colour of a map's cell, red, green, blue, alpha: free is clear, occupied the marker's colour,
-// unknown grey.
+// The colour of a map's cell (red, green, blue, alpha): free is transparent, occupied has the
+// marker's colour, unknown is grey.
 export function cellColour(cell: number, color: Float32Array): [number, number, number, number] {
   const [red, green, blue, alpha] = [...color].map((value) => Math.round(255 * value));
   if (cell === kUnknown) return [128, 128, 128, Math.round(alpha! / 4)];

@@ -1,4 +1,4 @@
-// Where the pointer is in the world, and the way between two points that are clicked.
+// The coordinates under the pointer, and the distance between two clicked points.
 import * as THREE from "three";
 import type { Page } from "../state/page";
 import { h, say } from "../widgets/elements";
@@ -41,7 +41,7 @@ export class Measure {
     });
   }
 
-  // A point of the way: the first, then the second.
+  // Adds a point: the first one, then the second.
   click(point: THREE.Vector3): void {
     if (!this.from) {
       this.from = point.clone();

@@ -1,4 +1,4 @@
-// The overlays of the robots that show what they sense, and the ring around the chosen one.
+// The overlays of the robots whose sensors are drawn, and the ring around the chosen one.
 import * as THREE from "three";
 import { shownRobots, type Page } from "../state/page";
 import { RobotOverlay } from "./overlays";
@@ -29,7 +29,7 @@ export class OverlaySet {
     page.watch(["layers"], () => stage.touch());
   }
 
-  // An overlay, with its trails, stays as long as its robot is the same one.
+  // An overlay and its trails last as long as their robot.
   private make(): void {
     const { world, scene } = this.page.now,
       before = new Map(this.of);
@@ -38,7 +38,7 @@ export class OverlaySet {
       const start = scene
         ? scene.bases.find(({ robot }) => robot === name)?.start
         : [0, 0, 0, 1, 0, 0, 0];
-      if (!start) continue; // it has just come, and is not in the scene yet
+      if (!start) continue; // it has just been added and is not in the scene yet
       const devices = world!.devices.filter((device) => device.robot === name);
       const key = [
         ...start,
@@ -57,7 +57,7 @@ export class OverlaySet {
     this.stage.touch();
   }
 
-  // Where the robots are now; true when there is something to draw.
+  // Moves them with the robots; true if there is something to draw.
   place(): boolean {
     const { world, scene, robot, layers } = this.page.now,
       chosen = world?.robots[robot]?.name;

@@ -1,6 +1,5 @@
-// What robots sense and where they have been, drawn over the scene: rays and points of range
-// finders, sonar cones, trails, contacts and frames. Of the chosen robot, or of all while they are
-// few.
+// Sensor data and trails drawn over the scene: rays and points of range finders, sonar cones,
+// trails, contacts and frames; of the chosen robot, or of all if they are few.
 import * as THREE from "three";
 import type {
   contact_t,
@@ -29,7 +28,7 @@ function devicePose(device: device_info_t, into: THREE.Matrix4): THREE.Matrix4 {
   return matrixOf([...device.position, ...device.orientation], 0, into);
 }
 
-// Vertices of a geometry that changes its length.
+// A geometry with a varying number of vertices.
 class Strip<T extends THREE.Object3D & { geometry: THREE.BufferGeometry }> {
   private capacity = 0;
   constructor(readonly object: T) {
@@ -250,7 +249,7 @@ class Trail {
   }
 }
 
-// All of one robot.
+// All overlays of one robot.
 export class RobotOverlay {
   readonly group = new THREE.Group();
   private readonly scans = new Map<string, ScanView>();
@@ -346,7 +345,7 @@ export class RobotOverlay {
       (object.material as THREE.Material).dispose();
     });
   }
-  // Trails are cleared, and contacts are none until some are told.
+  // Clears the trails, and the contacts until new ones arrive.
   forget(): void {
     this.truth.clear();
     this.odometry.clear();

@@ -3,7 +3,7 @@ import * as THREE from "three";
 import type { Bodies } from "./bodies";
 
 export class Picker {
-  ceiling = Infinity; // m: what stands is shown up to there
+  ceiling = Infinity; // m, up to which standing things are shown
 
   constructor(
     private readonly canvas: HTMLCanvasElement,
@@ -11,7 +11,7 @@ export class Picker {
     private readonly bodies: Bodies,
   ) {}
 
-  // Where the floor is under a point of the canvas; null above the horizon.
+  // The point of the floor under a point of the canvas; null above the horizon.
   ground(x: number, y: number): THREE.Vector3 | null {
     return this.caster(x, y).ray.intersectPlane(
       new THREE.Plane(new THREE.Vector3(0, 0, 1), 0),
@@ -19,13 +19,13 @@ export class Picker {
     );
   }
 
-  // What is seen under a point of the canvas, the floor included.
+  // The visible point under a point of the canvas, of the floor if nothing else is there.
   point(x: number, y: number): THREE.Vector3 | null {
     return this.seen(this.caster(x, y))?.point ?? this.ground(x, y);
   }
 
-  // What is under a point of the canvas: a robot (-1 for none), the name of a model ("" for none)
-  // and the point of it that is seen, and where the floor is there.
+  // What is under a point of the canvas: a robot (-1 for none), the name of a model ("" for none),
+  // the point of it that is visible, and the point of the floor.
   pick(
     x: number,
     y: number,
@@ -40,7 +40,7 @@ export class Picker {
     const place = new THREE.Matrix4(),
       at = new THREE.Vector3();
     for (let i = 0; robot < 0 && !model && i < bases.length; ++i) {
-      // near it is enough
+      // close to it is enough
       if (!this.bodies.base(i, place)) continue;
       at.setFromMatrixPosition(place);
       at.z += 0.2;
@@ -61,7 +61,7 @@ export class Picker {
     return caster;
   }
 
-  // The nearest model, but for the floor.
+  // The nearest model other than the floor.
   private seen(caster: THREE.Raycaster): { model: number; point: THREE.Vector3 } | null {
     let nearest = Infinity,
       found: { model: number; point: THREE.Vector3 } | null = null;
@@ -71,7 +71,8 @@ export class Picker {
         top = standing.includes(part) ? this.ceiling : Infinity;
       for (const mesh of far ? [...meshes, far.mesh] : meshes) {
         if (mesh.userData.ground) continue;
-        if (mesh instanceof THREE.InstancedMesh) mesh.boundingSphere = null; // of all instances, where they were once
+        // the old one holds instances as they once were
+        if (mesh instanceof THREE.InstancedMesh) mesh.boundingSphere = null;
         for (const { distance, instanceId, point } of caster.intersectObject(mesh, false)) {
           if (distance >= nearest || point.z > top) continue;
           nearest = distance;

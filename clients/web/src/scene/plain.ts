@@ -1,11 +1,12 @@
-// Which links are drawn plainly, so that many of them do not make every frame slow.
-// Triangles of the whole scene: beyond it, round shapes of many links have fewer segments, and
-// those far away are boxes
-const kBudget = 60_000;
-export const kFewLinks = 8; // of a kind, which cost little
+// Which links are drawn plainly, so that many of them do not slow down every frame.
 
-// The kinds of links that are drawn plainly, so that the scene keeps to its budget: of each kind,
-// triangles of a link and links.
+// Triangles of the whole scene. Beyond this, round shapes of numerous links have fewer segments,
+// and distant ones are boxes
+const kBudget = 60_000;
+export const kFewLinks = 8; // of one kind: these cost little
+
+// The kinds of links to draw plainly so that the scene keeps to its budget. Given for each kind:
+// triangles of one link, and the number of links.
 export function plainKinds(triangles: number[], links: number[]): Set<number> {
   const cost = triangles.map((each, kind) => each * links[kind]!),
     plain = new Set<number>();

@@ -1,12 +1,12 @@
-// A material for software rasterisers (SwiftShader, llvmpipe), whose time goes into the program
-// that is run for every pixel. Looks as MeshLambertMaterial does without shadows, for a fraction of
-// its cost: light is computed at the vertices, and the sRGB curves are approximated.
+// A material for software rasterisers (SwiftShader, llvmpipe), whose time goes into the fragment
+// shader. It looks like MeshLambertMaterial without shadows at a fraction of the cost: light is
+// computed per vertex, and the sRGB curves are approximated.
 import * as THREE from "three";
 
-// Texels of a matrix in the picture `places` (see crowd.ts)
+// Texels of one matrix in the texture `places` (crowd.ts)
 export const kTexels = 4;
 
-// Light at a vertex, from what lights it.
+// Irradiance at a vertex
 const kLightOn = /* glsl */ `
 vec3 lightOn(vec3 normal, vec3 position) {
   vec3 irradiance = ambientLightColor;
@@ -75,8 +75,8 @@ void main() {
 }
 `;
 
-// The sRGB curve from roots, and its inverse as a polynomial (Ian Taylor, "sRGB approximations for
-// HLSL", chilliant.blogspot.com, 2012): at most 0.0005 off, and 0.01 where it is all but black.
+// The sRGB curve by square roots, and its inverse by a polynomial (Ian Taylor, "sRGB approximations
+// for HLSL", chilliant.blogspot.com, 2012): errors up to 0.0005, and 0.01 near black.
 const kColours = /* glsl */ `
 vec3 encoded(vec3 linear) {
   vec3 s1 = sqrt(linear), s2 = sqrt(s1), s3 = sqrt(s2);
@@ -126,13 +126,13 @@ void main() {
 }
 `;
 
-// One program where there are lamps, another where there are none.
+// One shader if the world has lamps, another if it has none.
 const either = (lamps: string, none: string) =>
   `#if (NUM_POINT_LIGHTS + NUM_SPOT_LIGHTS) > 0\n${lamps}\n#else\n${none}\n#endif\n`;
 
-// A map is taken as it is stored, in sRGB: its colorSpace must be none. places: of the copies of a
-// crowd; those are small enough that lamps, too, are computed at their vertices. On a large surface
-// a lamp lights the middle more than the corners.
+// A map is sampled as stored, in sRGB: its colorSpace must be NoColorSpace. places: the matrices of
+// a crowd. Its copies are small, so that even lamps are computed per vertex; on large surfaces a
+// lamp is brighter in the middle than at the corners, and is computed per pixel.
 export function plainMaterial(
   parameters: THREE.MeshLambertMaterialParameters,
   places: THREE.Texture | null = null,

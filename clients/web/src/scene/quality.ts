@@ -1,9 +1,9 @@
-// How finely is drawn: as finely as the display can, and less where a frame takes too long, as on
-// machines without a GPU. Without it, a page that draws by software answers keys late, and the
-// robot's watchdog stops it between two commands.
+// The level of detail: as high as the display allows, and lower where frames take too long, as on
+// machines without a GPU. Otherwise a page that draws in software would answer keys late, and a
+// robot's watchdog would stop it between two commands.
 export type Change = "motion" | "sensing" | "none";
 export interface Level {
-  ratio: number; // pixels of the canvas per pixel of the page, at most
+  ratio: number; // canvas pixels per CSS pixel, at most
   shadows: boolean;
   plain: boolean; // surfaces without gloss
 }
@@ -16,19 +16,19 @@ const kLevels: Level[] = [
   { ratio: 0.5, shadows: false, plain: true },
   { ratio: 0.4, shadows: false, plain: true },
 ];
-const kSoftwareLevel = 3; // where the processor draws: the first one
-const kSensing = 2; // the coarsest where nothing moves, though what is sensed changes: all pixels
-const kSensingShare = 3; // of the time, one part at most goes into drawing that
-// Of a frame: 20 a second where a graphics processor draws, and 48 where the processor does, which
-// has time left for nothing else: 40, and a fifth more against what else the machine does.
+const kSoftwareLevel = 3; // the first level of a software rasteriser
+const kSensing = 2; // the coarsest level while only sensor data changes: all pixels
+const kSensingShare = 3; // at most one part in so many of the time is spent on that
+// Longest time of a frame: 20 frames a second on a GPU; 48 with a software rasteriser, which takes
+// all the processor: 40, and a fifth more as a reserve.
 const kSlow_ms = { hardware: 50, software: 21 };
 const kQuick_ms = { hardware: 25, software: 18 };
-const kFrames = 5; // in a row, of which the mean counts, but for the slowest
-const kFirstWait_ms = 10_000; // until a finer level is tried; each time twice as long
-const kStill_ms = 250; // without motion, and one frame is drawn as finely as can be
-const kSensed_ms = 1000; // the same after what is sensed, of which there may be more soon
+const kFrames = 5; // consecutive frames that are averaged, without the slowest
+const kFirstWait_ms = 10_000; // until a finer level is tried; doubled each time
+const kStill_ms = 250; // without motion, until one frame is drawn at the highest level
+const kSensed_ms = 1000; // the same after sensor data, of which more may come soon
 
-// Whether WebGL is done by the processor here.
+// Whether WebGL is emulated in software here.
 export function drawnBySoftware(): boolean {
   const gl = document.createElement("canvas").getContext("webgl2");
   const names = gl?.getExtension("WEBGL_debug_renderer_info");
@@ -40,17 +40,17 @@ export function drawnBySoftware(): boolean {
 }
 
 export class Quality {
-  automatic = true; // false: always the finest
+  automatic = true; // false: always the highest level
   private readonly by: "software" | "hardware";
   private level: number;
   private last_ms = -1;
   private intervals: number[] = [];
   private finer_ms = 0; // when a finer level is tried
   private wait_ms = kFirstWait_ms;
-  private moved_ms = -Infinity; // when something moved last
-  private drawn_ms = -1; // when something was drawn last
+  private moved_ms = -Infinity; // the last motion
+  private drawn_ms = -1; // the last frame
   private phase: "moving" | "sensing" | "still" = "moving";
-  private cost_ms = 0; // of a frame while sensing
+  private cost_ms = 0; // of a frame while only sensor data changes
 
   constructor(software: boolean) {
     this.by = software ? "software" : "hardware";
@@ -65,10 +65,10 @@ export class Quality {
     return this.now.ratio < 1;
   }
 
-  // Whether a frame is drawn now, and at another level than the one before. `motion`: something is
-  // elsewhere. `sensing`: nothing is, but what robots sense is another scan; that is drawn with all
-  // pixels, and seldom enough to leave most of the time to others. `none`: what is seen holds; when
-  // it has done so for a while, it is drawn once more, as finely as can be.
+  // Whether to draw a frame now, and whether at another level than the last one. `motion`:
+  // something has moved. `sensing`: only sensor data has changed; it is drawn with all pixels, and
+  // rarely enough to leave most of the time to others. `none`: nothing has changed; after a while
+  // the scene is drawn once more at the highest level.
   next(at_ms: number, change: Change): { draw: boolean; other: boolean } {
     const not = { draw: false, other: false },
       was = this.phase;
@@ -86,7 +86,7 @@ export class Quality {
       if (was === "still" || !this.automatic || this.level === 0 || fresh) return not;
       this.phase = "still";
     }
-    if (this.phase !== "moving") this.last_ms = -1; // the next interval says nothing
+    if (this.phase !== "moving") this.last_ms = -1; // the next interval is not a frame's duration
     this.drawn_ms = at_ms;
     return { draw: true, other: this.phase !== was };
   }
@@ -95,7 +95,7 @@ export class Quality {
     return this.automatic && this.level > kSensing;
   }
 
-  // Whether how long a frame takes is to be told.
+  // Whether the duration of frames is to be measured.
   get isSensing(): boolean {
     return this.phase === "sensing";
   }
@@ -103,7 +103,7 @@ export class Quality {
     this.cost_ms = cost_ms;
   }
 
-  // A frame was drawn. True when what comes next is drawn at another level.
+  // To be called after each frame. True if the level has changed.
   drawn(at_ms: number): boolean {
     if (this.last_ms >= 0 && this.automatic) this.intervals.push(at_ms - this.last_ms);
     this.last_ms = at_ms;

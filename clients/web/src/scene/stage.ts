@@ -1,5 +1,4 @@
-// The 3-D view: what there is in it, and when it is drawn. It is drawn only when something has
-// changed.
+// The 3-D view: its contents, and when it is drawn, which is only when something has changed.
 import * as THREE from "three";
 import type { Poses } from "../state/poses";
 import type { ModelDescription, SceneFiles } from "../wire/description";
@@ -15,25 +14,25 @@ import { shownOf, Viewpoint } from "./viewpoint";
 
 export class Stage {
   readonly scene = new THREE.Scene();
-  readonly renderer: THREE.WebGLRenderer | null; // null: no WebGL here, and nothing is drawn
+  readonly renderer: THREE.WebGLRenderer | null; // null without WebGL: nothing is drawn
   readonly quality: Quality;
   readonly view: Viewpoint;
   readonly bodies: Bodies;
   readonly picker: Picker;
   frames = 0; // drawn so far
   frameCost_ms = 0; // of this thread, smoothed
-  firstDrawn_ms = 0; // when the world was drawn first, since the page was asked for
+  firstDrawn_ms = 0; // when the world was first drawn, since navigation
   private readonly lights = new Lights();
   private readonly timer: FrameTimer | null = null;
-  private shadows = true; // are wanted
+  private shadows = true; // what the user wants
   private wireframe = false;
   private dirty = true;
-  private sensed = false; // what robots sense has changed, and is not drawn yet
-  private regroup = false; // what is near and what is far has changed
-  // With each frame: whether it has fewer pixels than the page
+  private sensed = false; // sensor data has changed and is not drawn yet
+  private regroup = false; // distances from the camera have changed
+  // Called with each frame: whether it has fewer pixels than the display
   onDetail: (reduced: boolean) => void = () => undefined;
 
-  // full: in full detail even where the processor draws.
+  // full: full detail even with a software rasteriser.
   constructor(
     private readonly canvas: HTMLCanvasElement,
     readonly poses: Poses,
@@ -59,17 +58,17 @@ export class Stage {
     this.resize();
   }
 
-  // Something has changed: it is drawn with the next frame.
+  // Something has changed: draw with the next frame.
   touch(): void {
     this.dirty = true;
   }
 
-  // What is drawn over the scene has changed, where nothing moves.
+  // Only what is drawn over the scene has changed; nothing moves.
   sense(): void {
     this.sensed = true;
   }
 
-  // Things are seen from elsewhere, or are elsewhere.
+  // The camera or something in the scene has moved.
   private turned(): void {
     this.regroup = true;
     this.touch();
@@ -87,13 +86,13 @@ export class Stage {
     this.refine();
   }
 
-  // Whether less is drawn where drawing is slow.
+  // Whether detail is reduced where drawing is slow.
   setAutomatic(on: boolean): void {
     this.quality.automatic = on;
     this.refine();
   }
 
-  // Draws at the quality that is due now.
+  // Applies the current quality.
   private refine(): void {
     const { shadows, plain } = this.quality.now;
     this.lights.cast(this.shadows && shadows);
@@ -102,7 +101,7 @@ export class Stage {
     this.resize();
   }
 
-  // Another world, or none.
+  // Shows another world, or none.
   show(files: SceneFiles | null): void {
     const { built, description } = this.bodies,
       first = description === null;
@@ -123,23 +122,24 @@ export class Stage {
     this.touch();
   }
 
-  // All of the world in view.
+  // Shows all of the world.
   home(): void {
     this.view.home(shownOf(this.bodies.description));
   }
 
-  // Shows a model elsewhere, by what it is moved from where it is; null: as it is.
+  // Shows a model moved by that transform; null: where it is.
   preview(model: ModelDescription | null, by: THREE.Matrix4): void {
     this.bodies.preview(model, by);
     this.touch();
   }
 
-  // Draws at once, and all pixels of it.
+  // Draws at once.
   redraw(): void {
     this.renderer?.render(this.scene, this.view.camera);
   }
 
-  // Shows what stands up to a height (m) only, so that no roof hides the rest; null: all of it.
+  // Shows standing things up to a height (m) only, so that no roof hides the rest; null: all of
+  // them.
   cutAt(height: number | null): void {
     const ceiling = height ?? Infinity;
     if (this.picker.ceiling === ceiling) return;
@@ -157,7 +157,7 @@ export class Stage {
         Object.assign(material, { clippingPlanes: planes, clipShadows: true, needsUpdate: true });
   }
 
-  // Edges alone, or surfaces.
+  // Edges only, or surfaces.
   setWireframe(on: boolean): void {
     this.wireframe = on;
     for (const material of this.bodies.meshes().flatMap(finishesOf))
@@ -174,7 +174,7 @@ export class Stage {
     this.turned();
   }
 
-  // One frame at that moment; overlays: called when bodies may have moved.
+  // Draws the frame of that time, if needed. overlays: called once the bodies are placed.
   frame(at_ms: number, overlays: () => boolean): void {
     this.bodies.advance(at_ms);
     if (overlays()) this.sense();
@@ -201,7 +201,7 @@ export class Stage {
     renderer.render(this.scene, camera);
   }
 
-  // Whether this frame is to be drawn, and made ready for that.
+  // Whether this frame is to be drawn; applies its quality if so.
   private drawsNow(at_ms: number): boolean {
     const cost_ms = this.timer?.done();
     if (cost_ms) this.quality.took(cost_ms);

@@ -1,22 +1,23 @@
-// Where the view is seen from: by the pointer, by keys, after a robot, or all of the world at once.
+// The camera: moved by the pointer or by keys, following a robot, or showing the whole world.
 import * as THREE from "three";
 import { OrbitControls } from "three/addons/controls/OrbitControls.js";
 import type { ViewMode } from "../state/page";
 
-// Home: what of the world is in view, how high it looks, and the share of the view that this fills
+// Home: bounds on how much of the world it shows, the height that it looks at, and the share of the
+// view that the world fills
 const kLeastHome_m = 3,
   kMostHome_m = 60,
   kLookedAt_m = 1,
   kHomeShare = 0.95;
-const kSeen_m2 = 1e-8; // what goes less looks as it did
+const kSeen_m2 = 1e-8; // shorter ways cannot be seen
 
-// The part of the world that home shows: its corners, from the floor up.
+// The part of the world that home shows, as a box.
 export interface Shown {
   low: number[];
   high: number[];
 }
 
-// What of a world is shown, as the description tells its bounds. ceiling: above it nothing is.
+// What home shows of a world with those bounds. ceiling: nothing above it is drawn.
 export function shownOf(
   world: { low: number[]; high: number[]; ceiling: number | null } | null,
 ): Shown {
@@ -32,7 +33,7 @@ export function shownOf(
   };
 }
 
-// As near as all corners are still in view: where the camera is, and what it looks at.
+// The position closest to the target from which all corners are in view.
 export function homeOf(
   { low, high }: Shown,
   fov_deg: number,
@@ -64,12 +65,12 @@ export class Viewpoint {
   readonly camera = new THREE.PerspectiveCamera(50, 1, 0.05, 400);
   readonly controls: OrbitControls;
   mode: ViewMode = "orbit";
-  private following = -1; // index into the description's bases
+  private following = -1; // index into the description's bases; -1 for none
   private readonly followed = new THREE.Vector3();
   private lastBase: THREE.Vector3 | null = null;
 
-  // changed: the view is another one. base: where a robot's base_link is; false when that is not
-  // known.
+  // changed: called when the camera has moved. base: the pose of a robot's base_link; false if it
+  // is unknown.
   constructor(
     canvas: HTMLCanvasElement,
     private readonly changed: () => void,
@@ -93,7 +94,7 @@ export class Viewpoint {
     this.camera.updateProjectionMatrix();
   }
 
-  // All of that in view.
+  // Shows all of that.
   home(shown: Shown): void {
     const { eye, target } = homeOf(shown, this.camera.fov, this.camera.aspect);
     this.controls.target.copy(target);
@@ -117,7 +118,7 @@ export class Viewpoint {
     this.changed();
   }
 
-  // Where the camera stands and where it looks.
+  // Position and target.
   get at(): number[] {
     return [...this.camera.position.toArray(), ...this.controls.target.toArray()];
   }
@@ -128,7 +129,7 @@ export class Viewpoint {
     this.changed();
   }
 
-  // Turns the view by radians to the right and upwards.
+  // Turns the camera by that many radians to the right and upwards.
   turn(right: number, up: number): void {
     const offset = this.camera.position.clone().sub(this.controls.target),
       at = new THREE.Spherical().setFromVector3(new THREE.Vector3(offset.x, offset.z, -offset.y));
@@ -138,12 +139,12 @@ export class Viewpoint {
     this.look(new THREE.Vector3(turned.x, -turned.z, turned.y));
   }
 
-  // As many times as far from what is looked at.
+  // Multiplies the distance from the target.
   zoom(times: number): void {
     this.look(this.camera.position.clone().sub(this.controls.target).multiplyScalar(times));
   }
 
-  // Shares of the distance, to the right and ahead over the ground.
+  // Moves to the right and ahead over the ground, by shares of the distance.
   pan(right: number, ahead: number): void {
     const offset = this.camera.position.clone().sub(this.controls.target),
       reach = offset.length();
@@ -169,7 +170,7 @@ export class Viewpoint {
     this.changed();
   }
 
-  // Before each frame.
+  // To be called before each frame.
   frame(): void {
     this.track();
     this.controls.update();

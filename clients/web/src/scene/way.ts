@@ -1,4 +1,4 @@
-// The way that a robot has been sent, on the floor.
+// The path that a robot has been sent along, on the floor.
 import * as THREE from "three";
 import type { Planar } from "../state/go_to";
 import type { Stage } from "./stage";
@@ -24,12 +24,12 @@ export class Way {
     for (const object of [this.line, this.ends]) {
       object.visible = false;
       object.frustumCulled = false;
-      object.renderOrder = 1; // over what robots sense
+      object.renderOrder = 1; // over sensor data
       stage.scene.add(object);
     }
   }
 
-  // from: the robot.
+  // from: the robot's position.
   show(from: Planar | null, points: readonly Planar[]): void {
     const at = ({ x, y }: Planar) => new THREE.Vector3(x, y, kAbove_m);
     this.line.visible = this.ends.visible = points.length > 0;

@@ -21,7 +21,7 @@ export function togglePanel(page: Page): void {
   page.set({ panel: !page.now.panel });
 }
 
-// Whether a click sends the chosen robot there.
+// Whether a click sends the chosen robot to that point.
 export function toggleGoing(page: Page): void {
   page.set({ tool: page.now.tool === "go" ? "select" : "go" });
 }

@@ -1,20 +1,20 @@
-// The time that is shown, from the messages that tell one.
+// The time that is shown, taken from the messages.
 import type { Page } from "./page";
 
-const kBack_s = 0.5; // further back than this is another past, not a message that came late
+const kBack_s = 0.5; // a longer step back is a jump, not a message that came late
 
 export class Clock {
   epoch = -1;
   private last: { wall_s: number; sim_s: number } | null = null;
 
-  // forget: what was drawn along the way is not of this moment. reset: the world was reset.
+  // forget: called when what was drawn so far is of another moment. reset: because the world was
+  // reset.
   constructor(
     private readonly page: Page,
     private readonly forget: (reset: boolean) => void,
   ) {}
 
-  // isState: only states say that the past is over; of what else comes, some is older than they
-  // are.
+  // isState: only states announce a jump back; other messages may be older than the last state.
   tell(time_s: number, epoch: number, isState = false): void {
     const before_s = this.page.now.time_s;
     if (isState && (epoch !== this.epoch || time_s < before_s - kBack_s)) {
@@ -36,7 +36,7 @@ export class Clock {
   }
 }
 
-// With as many decimals as the steps have, at least two.
+// With as many decimals as the time step has, at least two.
 export function clockText(time_s: number, step_us: number): string {
   let decimals = 2;
   while (decimals < 6 && step_us > 0 && step_us % 10 ** (6 - decimals) !== 0) ++decimals;

@@ -1,7 +1,7 @@
-// Another log beside the one that is shown: what differs, as the program found it.
+// The comparison with another log, as the server made it.
 import type { Comparison, Difference, RunEvent } from "../wire/protocol";
 
-export const kStates = "compared/ruedo/world"; // the other run's, as a channel
+export const kStates = "compared/ruedo/world"; // the other run's states, as a channel
 export const apartChannel = (robot: string) => `compared/${robot}`; // with distance and angle
 export const isCompared = (channel: string) => channel.startsWith("compared/");
 
@@ -9,7 +9,7 @@ export function wordsOf({ channel, field, shown, other }: Difference, name: stri
   return `${channel}${field ? ` ${field}` : ""}: ${shown}, in ${name} ${other}`;
 }
 
-// The first difference as something that happened.
+// The first difference as an event.
 export function eventOf(comparison: Comparison | null): RunEvent | null {
   if (!comparison?.first) return null;
   const { first, other } = comparison;

@@ -1,11 +1,11 @@
-// Sends a robot to points that were clicked, one after the other: it turns towards a point, goes
-// there by what is left of the way, and looks again, since odometry, by which it moves, drifts.
+// Sends a robot to points that were clicked, one after the other: it turns towards a point, drives
+// the remaining distance, and checks again, since the odometry that it moves by drifts.
 import { motion_status_t, move_command_t } from "../../generated/messages";
 
-// A motion primitive as it is asked for.
+// A motion primitive to be requested.
 export type Move = Omit<move_command_t, "utime" | "id">;
 
-// Why one has ended, by motion_status_t's reason.
+// Why a primitive ended, by motion_status_t's reason.
 export const kReasons = [
   "",
   "replaced by a newer command",
@@ -18,8 +18,8 @@ export const kReasons = [
   "refused: its drive cannot do that",
 ];
 
-const kNear_m = 0.05; // so near it is there
-const kAligned_rad = 0.02; // so little it need not turn
+const kNear_m = 0.05; // closer than this, it has arrived
+const kAligned_rad = 0.02; // smaller errors of heading need no turn
 const kMostTries = 5; // for one point
 
 export interface Planar {
@@ -31,10 +31,10 @@ export interface PlanarPose extends Planar {
 }
 
 export interface Driven {
-  pose(): PlanarPose | null; // in the world; null: not known
-  move(command: Move): bigint | null; // its id; null: the robot takes no motion primitives
+  pose(): PlanarPose | null; // in the world; null if unknown
+  move(command: Move): bigint | null; // its id; null if the robot takes no motion primitives
   failed(reason: number): void; // motion_status_t's reason
-  changed(): void; // points()
+  changed(): void; // points() has changed
 }
 
 export class GoTo {
@@ -44,12 +44,12 @@ export class GoTo {
 
   constructor(private readonly robot: Driven) {}
 
-  // The points that are left, the next one first.
+  // The remaining points, the next one first.
   points(): readonly Planar[] {
     return this.ahead;
   }
 
-  // further: after those that are left; else instead of them.
+  // further: add to the remaining points instead of replacing them.
   go(point: Planar, further: boolean): void {
     const underWay = further && this.ahead.length > 0;
     if (!further) this.ahead = [];
@@ -67,7 +67,7 @@ export class GoTo {
     this.robot.changed();
   }
 
-  // The robot's status, each that comes.
+  // To be called with each status of the robot.
   heard(status: motion_status_t): void {
     if (this.running === null || status.id !== this.running) return;
     if (status.state === motion_status_t.STATE_DONE) {

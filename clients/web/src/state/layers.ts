@@ -32,7 +32,7 @@ export const kLayerColours: Record<Layer, string> = {
   markers: "#f2f2f2",
 };
 
-// What robots sense and where they are.
+// What robots sense, and where they are.
 export const kOfRobots: readonly Layer[] = [
   "rays",
   "points",
@@ -45,5 +45,5 @@ export const kOfRobots: readonly Layer[] = [
   "labels",
 ];
 
-// Those that are off until somebody wants them.
+// Off until the user turns them on.
 export const kOffAtFirst: readonly Layer[] = ["frames", "labels", "shapes", "roof"];

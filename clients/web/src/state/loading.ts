@@ -1,17 +1,17 @@
-// The one order in which a page comes together, in whatever order its parts arrive: the greeting
-// says what is shown, ruedo/info what runs, the scene what it looks like. Both of the last are told
-// together, for the one says little without the other, and only from then on messages of the run
-// are asked for and taken.
+// The order in which a page comes together, in whatever order its parts arrive: the greeting says
+// what is shown, ruedo/info what runs, and the scene what it looks like. Info and scene are
+// published together, since one means little without the other; only from then on are the run's
+// messages requested and processed.
 import type { world_info_t } from "../../generated/messages";
 import type { Hello } from "../wire/protocol";
 import { InfoAssembler, type World } from "./world";
 
 export interface LoadingEvents<Scene> {
-  fetchScene(): Promise<Scene | null>; // null: there is no scene to show
+  fetchScene(): Promise<Scene | null>; // null if there is no scene to show
   greeted(hello: Hello): void;
-  // The world has come, maybe before its scene: it can be steered.
+  // The world is known, perhaps before its scene: it can be controlled.
   running(world: World): void;
-  // Both are there; and again when either is another.
+  // Both are known; called again when either changes.
   complete(world: World, scene: Scene | null): void;
   failed(words: string): void;
 }
@@ -30,7 +30,7 @@ export class Loading<Scene> {
     return this.world !== null && this.hasScene;
   }
 
-  // A connection is there: what was known may be of another run.
+  // A new connection: what was known may be of another run.
   onHello(hello: Hello): void {
     this.hello = hello;
     this.world = null;
@@ -48,7 +48,7 @@ export class Loading<Scene> {
     if (!same) this.tell();
   }
 
-  // There is another scene. Of several that are on their way the one asked for last counts.
+  // Another scene was announced. Of several requests under way, the last one counts.
   async onScene(): Promise<void> {
     const fetch = ++this.fetches;
     for (let tries = 0; ; ++tries) {
@@ -59,7 +59,7 @@ export class Loading<Scene> {
         break;
       } catch (error) {
         if (fetch !== this.fetches) return;
-        if (tries === 0) continue; // it may have changed while it was read
+        if (tries === 0) continue; // the scene may have changed while it was being read
         this.events.failed((error as Error).message);
         this.scene = null;
         break;

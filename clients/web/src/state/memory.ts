@@ -1,4 +1,4 @@
-// What this browser keeps of the page for the next time.
+// What this browser remembers of the page.
 export const remember = (key: string, value: string) => {
   try {
     localStorage.setItem(`ruedo.${key}`, value);
@@ -6,7 +6,7 @@ export const remember = (key: string, value: string) => {
     /* private mode */
   }
 };
-// Of a world, and for those that are new.
+// For one world, and as the default for new ones.
 export function rememberFor(world: string, key: string, value: string): void {
   remember(key, value);
   remember(`${key} of ${world}`, value);

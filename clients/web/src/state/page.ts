@@ -12,7 +12,7 @@ export type Tab = (typeof kTabs)[number];
 
 export type ViewMode = "orbit" | "follow" | "top";
 
-// What can be placed. name: its model gets; a model of the server's, or SDF.
+// What can be placed: one of the server's models, or SDF. name: of the model that is made.
 export interface Thing {
   name: string;
   model: string;
@@ -20,13 +20,12 @@ export interface Thing {
   label?: string;
 }
 
-// What a click on the scene does: selects, sends the chosen robot there, places a thing, or draws.
+// What a click on the scene does: select, send the chosen robot there, place a thing, or draw.
 export type Tool = "select" | "go" | "wall" | "room" | "door" | "measure" | Thing;
 // What the handles of the selected model do.
 export type Handle = "translate" | "rotate" | "scale";
 
-// What can be taken back and done again: names of the next steps, and how many were done, to and
-// fro.
+// What can be undone and redone: the names of the next steps, and the net number of changes.
 export interface HistoryState {
   undo: string | null;
   redo: string | null;
@@ -37,34 +36,36 @@ export interface PageState {
   link: LinkState;
   hello: Hello | null;
   controlled: boolean; // the run takes requests
-  world: World | null; // and its scene: both of one moment, by Loading
+  world: World | null; // set together with its scene by Loading
   scene: Description | null;
-  complete: boolean; // both are there, of this connection: messages of the run mean something
-  robot: number; // chosen, index into world.robots; -1 for none
+  // world and scene of this connection are known, so that messages can be interpreted
+  complete: boolean;
+  robot: number; // the chosen one, an index into world.robots; -1 for none
   paused: boolean;
   time_s: number; // sim time
   factor: number | null; // sim time per real time
   playback: Playback | null; // of a log
-  past: Past | null; // of a live run: the earlier moment that is shown; null: the present
-  kept: { begin: number; end: number }; // what can be shown of it
-  comparison: Comparison | null; // with the other log; null: none, or not known yet
-  events: readonly RunEvent[]; // what happened, in the order of time
+  past: Past | null; // of a live run: the earlier moment that is shown; null for the present
+  kept: { begin: number; end: number }; // what can be shown of the past
+  comparison: Comparison | null; // with the other log; null if there is none, or not yet
+  events: readonly RunEvent[]; // in order of time
   eventKind: string; // which of them are shown; "" for all
-  loop: boolean; // what plays starts over when it has ended
-  marks: { begin: number | null; end: number | null }; // of what is looped; null: all of it
+  loop: boolean; // playback starts over at the end
+  // of the part that is looped; null: from the beginning, to the end
+  marks: { begin: number | null; end: number | null };
   layers: ReadonlySet<Layer>;
   mode: ViewMode;
   drawn: boolean; // clients have drawn something
-  reduced: boolean; // drawn with fewer pixels than the page has
+  reduced: boolean; // drawn with fewer pixels than the display has
   theme: string;
-  selected: string; // name of the model that is being edited; "" for none
+  selected: string; // name of the model being edited; "" for none
   tool: Tool;
   handle: Handle;
   snap_m: number; // 0: off
   edits: HistoryState;
-  saved: number; // changes that were done when the world was saved
+  saved: number; // number of changes when the world was last saved
   tab: Tab;
-  panel: boolean; // is open
+  panel: boolean; // whether it is open
 }
 
 export type Page = Store<PageState>;
@@ -108,7 +109,7 @@ export function makePage(): Page {
   });
 }
 
-// What is said of the run in the bar, and whether that is good; null: neither.
+// The state of the run in words, and whether it is good; null: neither.
 const kLinkWords = {
   connecting: "connecting",
   silent: "no answer",
@@ -130,7 +131,7 @@ export function stateWords({
   return paused ? ["paused", false] : ["running", true];
 }
 
-// The robots that show what they sense in the view: all while they are few, else the chosen one.
+// The robots whose sensors are drawn: all if they are few, else the chosen one.
 export const kShownRobots = 4;
 export function shownRobots({ world, robot }: Readonly<PageState>): string[] {
   const names = world?.robots.map(({ name }) => name) ?? [];

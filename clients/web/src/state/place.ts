@@ -1,7 +1,7 @@
-// A place to come back to: time, camera, robot and selected model, as the end of an address.
+// A place to return to (time, camera, robot and selected model), as the fragment of a URL.
 export interface Place {
   time_s: number | null; // sim time of a live run, log time of a log
-  camera: number[] | null; // where it stands and where it looks: x, y, z, x, y, z
+  camera: number[] | null; // position and target: x, y, z, x, y, z
   robot: string;
   selected: string;
 }
@@ -15,7 +15,7 @@ export function hashOf({ time_s, camera, robot, selected }: Place): string {
   return `#${parts.toString()}`;
 }
 
-// What is not there, or is no number, is left out.
+// Missing or malformed parts are left out.
 export function placeOf(hash: string): Place {
   const parts = new URLSearchParams(hash.replace(/^#/, "")),
     time = parts.get("t"),

@@ -1,10 +1,10 @@
-// Where the bodies are, at the display's rate: between the last two states, one interval behind the
-// newest.
+// Where the bodies are at the display's rate: interpolated between the last two states, one
+// interval behind the newest.
 import type { world_state_t } from "../../generated/messages";
 
 const kMostBodies = 1_000_000;
-const kSeen = 1e-4; // m, or of a quaternion's parts: what moves less looks as it did
-const kJump_m = 1.5; // further in one interval is no motion but a new place
+const kSeen = 1e-4; // m, or of a quaternion's components: smaller motions cannot be seen
+const kJump_m = 1.5; // a longer way in one interval is a jump, not motion
 
 export class Poses {
   size = 0; // bodies known
@@ -12,22 +12,22 @@ export class Poses {
   utime = 0; // us, of the newest state
   private from = new Float32Array(0);
   to = new Float32Array(0); // of the newest state
-  private seen = new Float32Array(0); // as `now` was when it was last said to have moved
+  private seen = new Float32Array(0); // `now` when motion was last reported
   known = new Uint8Array(0);
   private arrived = 0; // when the newest state came
   private interval = 33; // between two states, smoothed
   private shown = -Infinity; // the moment that `now` is for
-  private begun = 0; // when the way from `from` to `to` began
+  private begun = 0; // when the motion from `from` to `to` began
   private epoch = -1;
   private jumped = false;
   settled = false;
 
-  // What comes next is another moment, not the next one: nothing moves there.
+  // The next state is of another moment: nothing is interpolated.
   jump(): void {
     this.jumped = true;
   }
 
-  // Other things are drawn from now on, none of them yet.
+  // Something else is drawn from now on: report motion once more.
   forgetSeen(): void {
     this.settled = false;
     this.seen.fill(Infinity);
@@ -50,7 +50,7 @@ export class Poses {
     this.size = size;
   }
 
-  // A state, or a part of one.
+  // A state, or one part of it.
   add(state: world_state_t, at_ms: number): void {
     let highest = -1;
     for (const index of state.index) highest = Math.max(highest, index);
@@ -62,8 +62,8 @@ export class Poses {
       if (!fresh && at_ms > this.arrived)
         this.interval += 0.2 * (Math.min(500, at_ms - this.arrived) - this.interval);
       this.arrived = at_ms;
-      // From what is shown and when: counted from this moment, the next frame, which the display
-      // may have timed before it, would show nothing new.
+      // Motion starts at the last frame, not at this message: the next frame's timestamp may be
+      // earlier than this moment, and it would repeat the last picture.
       this.begun = Math.min(at_ms, Math.max(this.shown, at_ms - this.interval));
       this.from.set(this.now);
     }
@@ -87,7 +87,7 @@ export class Poses {
     }
   }
 
-  // Brings `now` to the moment; false when nothing has moved visibly since that was said last.
+  // Moves `now` to that time; false if nothing has moved visibly since motion was last reported.
   advance(at_ms: number): boolean {
     if (this.settled) return false;
     const { from, to, now, begun, arrived, interval } = this;

@@ -1,5 +1,4 @@
-// What the page knows, in one place: whoever learns something sets it here, and views are told of
-// what they watch.
+// What the page knows, in one place: values are set here, and views watch those that they show.
 export class Store<State extends object> {
   private readonly watchers: { keys: (keyof State)[]; call: () => void }[] = [];
 
@@ -9,7 +8,7 @@ export class Store<State extends object> {
     return this.values;
   }
 
-  // Tells who watches a value that is another one now.
+  // Notifies the watchers of values that have changed.
   set(patch: Partial<State>): void {
     const changed = (Object.keys(patch) as (keyof State)[]).filter(
       (key) => !Object.is(patch[key], this.values[key]),
@@ -20,7 +19,7 @@ export class Store<State extends object> {
       if (keys.some((key) => changed.includes(key))) call();
   }
 
-  // Calls at once, and whenever one of these values is another.
+  // Calls at once, and whenever one of these values changes.
   watch(keys: (keyof State)[], call: (state: Readonly<State>) => void): void {
     const told = () => call(this.values);
     this.watchers.push({ keys, call: told });

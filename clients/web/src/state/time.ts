@@ -1,5 +1,5 @@
-// The time line: what of a run can be shown, what happened around a moment, and when what plays
-// begins anew.
+// The time line: which part of a run can be shown, the events around a moment, and when a loop
+// starts over.
 import type { RunEvent } from "../wire/protocol";
 import type { PageState } from "./page";
 
@@ -11,9 +11,9 @@ export interface Shown {
   playing: boolean;
 }
 
-const kFewest_s = 0.2; // of a live run's past, before it can be looked at
+const kFewest_s = 0.2; // least length of a live run's past before it is offered
 
-// Null: nothing.
+// Null if there is nothing to show.
 export function shownOf({
   hello,
   playback,
@@ -27,7 +27,7 @@ export function shownOf({
     : null;
 }
 
-// The next one in time; of several at once the first. Null: there is none.
+// The next event; of several at the same time, the first. Null if there is none.
 export function eventAfter(events: readonly RunEvent[], now_s: number): RunEvent | null {
   let found: RunEvent | null = null;
   for (const event of events) {
@@ -44,7 +44,7 @@ export function eventBefore(events: readonly RunEvent[], now_s: number): RunEven
   return found;
 }
 
-// Where what played a moment before goes on; null: as it is.
+// Where looping playback continues; null: no jump.
 export function loopedTo(
   { loop, marks }: Pick<PageState, "loop" | "marks">,
   { begin, end, now }: Shown,

@@ -1,18 +1,18 @@
-// Which channels the page needs: it asks for no others.
+// Which channels the page needs; it subscribes to no others.
 import type { Layer } from "./layers";
 import { kStates } from "./comparison";
 import { inputOf } from "./world";
 import type { RunLink } from "../wire/protocol";
 import { shownRobots, type Page, type PageState, type Tab } from "./page";
 
-const kMarkers = "ruedo/markers"; // of a log
+const kMarkers = "ruedo/markers"; // in a log
 const kOfPage = ["world_state_t", "tick_t", "reply_t"];
 const kOfTab: Record<Exclude<Tab, "Robot">, string[]> = {
   Plots: ["pose_t", "odometry_t"],
   Channels: [],
   World: [],
 };
-const kNotOnRobotPage = ["lidar_t", "camera_info_t"]; // it shows all others
+const kNotOnRobotPage = ["lidar_t", "camera_info_t"]; // the page Robot shows all others
 const kOfLayer: Partial<Record<Layer, string>> = {
   rays: "planar_lidar_t",
   points: "planar_lidar_t",
@@ -27,14 +27,14 @@ export const isDepth = (channel: string, type: string) =>
 const onTab = (tab: Tab, type: string) =>
   tab === "Robot" ? !kNotOnRobotPage.includes(type) : kOfTab[tab].includes(type);
 
-// opened: what views need beside what the page always does.
+// opened: channels that views need in addition.
 export function wantedChannels(state: Readonly<PageState>, opened: Iterable<string>): Set<string> {
   const { hello, world, complete, robot, layers, tab, panel } = state;
   const wanted = new Set<string>();
   if (!hello) return wanted;
   wanted.add(hello.info);
   if (!world) {
-    wanted.add("ruedo/reply"); // of the first requests
+    wanted.add("ruedo/reply"); // to the first requests
     return wanted;
   }
   const shown = new Set(shownRobots(state)),
@@ -42,7 +42,7 @@ export function wantedChannels(state: Readonly<PageState>, opened: Iterable<stri
   const drawn = new Set<string | undefined>([
     "odometry_t",
     ...[...layers].map((layer) => kOfLayer[layer]),
-  ]); // the wheels turn by odometry
+  ]); // wheels are turned by odometry
   const depths = layers.has("clouds");
   for (const { name, type, robot: of, input } of world.channels) {
     if (input) continue;
@@ -62,7 +62,7 @@ export function wantedChannels(state: Readonly<PageState>, opened: Iterable<stri
   return wanted;
 }
 
-// Tells the link what is needed, whenever that may have changed.
+// Tells the link what is needed whenever that may have changed.
 export class Wanted {
   private readonly sources: (() => Iterable<string>)[] = [];
 
@@ -71,12 +71,12 @@ export class Wanted {
     private readonly link: Pick<RunLink, "want" | "watchTraffic">,
   ) {}
 
-  // Channels that a view needs beside those of the page; it calls update() when they are others.
+  // Registers a source of additional channels; it calls update() when they change.
   add(channels: () => Iterable<string>): void {
     this.sources.push(channels);
   }
 
-  // From now on, when all views are there.
+  // Starts watching, once all views exist.
   watch(): void {
     this.page.watch(
       ["hello", "world", "scene", "complete", "robot", "layers", "tab", "panel"],

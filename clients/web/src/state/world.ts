@@ -1,4 +1,4 @@
-// What runs: put together from the parts of ruedo/info.
+// What runs, assembled from the parts of ruedo/info.
 import type {
   body_info_t,
   channel_info_t,
@@ -26,7 +26,7 @@ export interface World {
 export class InfoAssembler {
   private parts: world_info_t[] = [];
 
-  // The world, when this part was its last one.
+  // The world if this was its last missing part.
   add(part: world_info_t): World | undefined {
     const first = this.parts[0];
     if (

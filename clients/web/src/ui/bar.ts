@@ -1,4 +1,4 @@
-// The bar at the top: what runs, its clock, and the control of the simulation.
+// The bar at the top: what runs, the clock, and the controls of the simulation.
 import { clockText } from "../state/clock";
 import { stateWords, type Page, type ViewMode } from "../state/page";
 import { h, say } from "../widgets/elements";
@@ -26,7 +26,7 @@ export class Bar {
   private readonly rate = h(
     "select",
     { title: "sim time per real time that is asked for", "aria-label": "rate" },
-    // Nobody has asked for one here; what it is stands beside
+    // Shown until the user chooses a rate; the actual one stands beside it
     h("option", { value: "", hidden: true }, "rate"),
     ...["0.1", "0.25", "0.5", "1", "2", "5", "10", "max"].map((value) =>
       h("option", { value }, value === "max" ? "max" : `× ${value}`),
@@ -64,7 +64,7 @@ export class Bar {
       this.pause,
       this.stepButton,
       this.more(actions),
-      // On a phone: the rest
+      // On a phone: opens the rest
       h(
         "button",
         {
@@ -81,7 +81,7 @@ export class Bar {
     this.show();
   }
 
-  // What is needed less often.
+  // Less frequently used controls.
   private more(actions: BarActions): HTMLElement {
     const view = h("span", { class: "row", style: "flex-wrap: nowrap; gap: 4px" });
     for (const [mode, key] of [
@@ -109,7 +109,7 @@ export class Bar {
     );
   }
 
-  // What the page knows, in the bar.
+  // Shows the page's state.
   private show(): void {
     const { page } = this;
     page.watch(["hello"], ({ hello }) => {

@@ -1,4 +1,4 @@
-// Pictures and videos of the view, as files: made by the browser, of what it draws.
+// Screenshots and videos of the view, made by the browser.
 import type { Stage } from "../scene/stage";
 import { download } from "../widgets/download";
 import { h, say, toast } from "../widgets/elements";
@@ -25,7 +25,7 @@ export class Capture {
   }
 
   private picture(): void {
-    this.stage.redraw(); // what was drawn last may be gone
+    this.stage.redraw(); // the last frame may no longer be in the buffer
     this.canvas.toBlob((blob) => {
       if (blob) download(blob, "ruedo.png");
     }, "image/png");

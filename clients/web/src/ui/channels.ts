@@ -1,4 +1,4 @@
-// The list of all channels: type, rate, size, and the last values of the ones that are opened.
+// The list of all channels: type, rate, size, and the last values of those that are open.
 import { decode, typeOf } from "../wire/lcm";
 import type { World } from "../state/world";
 import { fieldsOf } from "../wire/fields";
@@ -124,7 +124,8 @@ export class ChannelList {
     row.element.after(h("tr", {}, h("td", { colspan: 4 }, row.values)));
   }
 
-  // Fields to plot, by a click or a drag onto the page Plots; once for each row that is opened.
+  // Fields that can be plotted by a click or a drag onto the page Plots; made once for each open
+  // row.
   private offerFields(channel: string, type: string, values: HTMLElement): void {
     if (values.nextElementSibling) return;
     const fields = fieldsOf(type).filter((path) => path !== "utime");

@@ -1,5 +1,4 @@
-// What differs between the log that is shown and another one: the first difference, and how far
-// apart the robots are.
+// The comparison with another log: the first difference, and how far apart the robots are.
 import { apartChannel, wordsOf } from "../state/comparison";
 import type { Comparison } from "../wire/protocol";
 import type { Page } from "../state/page";
@@ -52,7 +51,7 @@ export class Compared {
     );
   }
 
-  // The farthest apart first.
+  // The largest distance first.
   private table({ robots }: Comparison): HTMLElement {
     const rows = [...robots].sort((a, b) => b.distance - a.distance).slice(0, kMostRows);
     return h(

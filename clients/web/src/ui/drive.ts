@@ -1,6 +1,5 @@
-// Driving by keyboard, gamepad and an on-screen stick: all of them give a share of the robot's
-// speed and turn rate, which is sent as velocity commands ten times a second, and a stop when it is
-// let go.
+// Driving by keyboard, gamepad and on-screen stick: each gives a share of the robot's speed and
+// turn rate, sent as velocity commands ten times a second, with a stop when it is released.
 import { dialogIsOpen } from "../widgets/confirm";
 import { h } from "../widgets/elements";
 import { isTyping } from "../widgets/typing";
@@ -109,7 +108,7 @@ export class Drive {
     }
     const clamp = (v: number) => Math.max(-1, Math.min(1, v));
     const moving = ahead !== 0 || left !== 0;
-    // Once more than needed: the stop
+    // One more command than needed: the stop
     if (moving || this.active) this.send(clamp(ahead), clamp(left));
     this.active = moving;
   }

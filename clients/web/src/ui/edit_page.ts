@@ -1,4 +1,4 @@
-// The panel's page about the world: its models, what is selected, tools, and things to place.
+// The panel's page about the world: its models, the selection, tools, and things to place.
 import type { Draw } from "../edit/draw";
 import type { Editor } from "../edit/editor";
 import type { Page, Tool } from "../state/page";
@@ -25,7 +25,7 @@ export interface DoorSize {
 export class EditPage {
   readonly element: HTMLElement;
   readonly door: DoorSize = { width: 0.9, height: 1 };
-  readonly extras = h("div"); // more of the view
+  readonly extras = h("div"); // for further settings of the view
   readonly transform: Transform;
   readonly library: Library;
 

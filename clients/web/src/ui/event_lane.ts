@@ -1,5 +1,5 @@
-// What happened, below the time line: a stroke for each event, jumps from one to the next, and the
-// part of the run that is looped.
+// Events below the time line: a mark for each, buttons to jump between them, and the looped part of
+// the run.
 import { eventOf } from "../state/comparison";
 import type { Page, PageState } from "../state/page";
 import { eventAfter, eventBefore, shownOf } from "../state/time";
@@ -20,7 +20,8 @@ const kColours: Record<string, string> = {
   lost: "#8a8f98",
   difference: "#b58cff",
 };
-const kThumb_px = 8; // of the slider, half of it: its ends stand so far from the line's
+// half the slider's thumb: the ends of its range are so far from those of the line
+const kThumb_px = 8;
 const kNear_px = 6;
 const kHeight_px = 14;
 
@@ -69,7 +70,7 @@ export class EventLane {
   }
   private drawn = { begin: 0, end: 0 };
 
-  // To the next event of the kinds that are shown, or the one before.
+  // Jumps to the next event of the shown kinds, or the previous one.
   jump(ahead: boolean): void {
     const shown = shownOf(this.page.now);
     if (!shown) return;
@@ -78,7 +79,7 @@ export class EventLane {
     else say(this.text, ahead ? "no later event" : "no earlier event");
   }
 
-  // What is looped begins or ends at the moment that is shown; again: no more.
+  // Sets the loop's begin or end to the shown moment; a second time clears it.
   mark(which: "begin" | "end"): void {
     const shown = shownOf(this.page.now);
     if (!shown) return;
@@ -99,7 +100,7 @@ export class EventLane {
     this.seek(event.t);
   }
 
-  // The first difference to another log is one of them.
+  // Includes the first difference to the other log.
   private get all(): readonly RunEvent[] {
     const { events, comparison } = this.page.now,
       difference = eventOf(comparison);

@@ -1,5 +1,5 @@
-// Plots of any fields of any channels, in panes: over the whole of what is known of a run, with its
-// statistics, as a table, and with a cursor that is the time line's.
+// Plots of any fields of any channels, in panes: over the whole run, with statistics, as a table,
+// and with a cursor tied to the time line.
 import uPlot from "uplot";
 import { isCompared } from "../state/comparison";
 import { csvOf, fieldsOf, statisticsOf, valueAt } from "../wire/fields";
@@ -12,7 +12,7 @@ import { padded } from "../widgets/plots";
 import { download } from "../widgets/download";
 import { kDragType } from "../widgets/drag";
 
-const kMostPoints = 40_000; // of a series; then every second one stays
+const kMostPoints = 40_000; // of a series; then every second one is dropped
 const kMostPanes = 8;
 const kColours = ["--true", "--odometry", "--sonar", "--rays", "--accent", "--text"];
 
@@ -24,9 +24,9 @@ interface Series {
   path: string;
   times: number[];
   values: number[];
-  stride: number; // every so many messages is kept
+  stride: number; // every n-th message is kept
   skipped: number;
-  note: string; // what of it is missing; "" for nothing
+  note: string; // what is missing; "" for nothing
 }
 
 class Pane {
@@ -67,7 +67,7 @@ class Pane {
 
   take(series: Series, time_s: number, value: number): void {
     const { times, values } = series;
-    if (times.length > 0 && time_s <= times.at(-1)!) return; // of the past, which is here already
+    if (times.length > 0 && time_s <= times.at(-1)!) return; // the past, which is here already
     if (++series.skipped < series.stride) return;
     series.skipped = 0;
     times.push(time_s);
@@ -80,7 +80,7 @@ class Pane {
     this.dirty = true;
   }
 
-  // What is known so far, and behind it what has come meanwhile.
+  // The history, followed by what has arrived meanwhile.
   begin(series: Series, { every, times, values }: History): void {
     const { times: laterTimes, values: laterValues } = series;
     Object.assign(series, { times, values });
@@ -89,7 +89,7 @@ class Pane {
     this.dirty = true;
   }
 
-  // Where the time line begins: 0 s of what is drawn.
+  // The beginning of the time line: 0 s of the plot.
   private get origin(): number {
     return this.page.now.playback?.begin ?? 0;
   }
@@ -217,12 +217,12 @@ const labelOf = ({ channel, path }: { channel: string; path: string }) => `${cha
 export class FieldPlots {
   readonly element: HTMLElement;
   private readonly panes: Pane[] = [];
-  private of = ""; // the world whose panes they are
+  private of = ""; // the world that the panes belong to
   private readonly list = h("div");
   private readonly channel = h("select", { "aria-label": "channel to plot", class: "wide" });
   private readonly field = h("select", { "aria-label": "field to plot", class: "wide" });
 
-  // changed: other channels are wanted.
+  // changed: called when other channels are needed.
   constructor(
     private readonly page: Page,
     private readonly link: RunLink,
@@ -267,7 +267,7 @@ export class FieldPlots {
     return this.panes.flatMap(({ series }) => series.map(({ channel }) => channel));
   }
 
-  // A field in the last pane, or in a new one.
+  // Adds a field to the last pane, or to a new one.
   plot(channel: string, path: string, apart: boolean): void {
     if (!channel || !path) return;
     let pane = this.panes.at(-1);
@@ -286,7 +286,7 @@ export class FieldPlots {
   }
 
   message(channel: string, bytes: Uint8Array): void {
-    if (this.page.now.hello?.mode === "log") return; // all of it was asked for at once
+    if (this.page.now.hello?.mode === "log") return; // its whole history was requested at once
     for (const pane of this.panes) {
       for (const series of pane.series)
         if (series.channel === channel) this.take(pane, series, bytes);
@@ -305,7 +305,7 @@ export class FieldPlots {
     for (const pane of this.panes) pane.restyle();
   }
 
-  // What was plotted when this world was left.
+  // The plots that were open when this world was last shown.
   private restore(): void {
     for (const { element } of this.panes.splice(0)) element.remove();
     try {

@@ -1,5 +1,5 @@
-// The tree of frames of a robot: world, odom and base_link, and below it the frame of each device
-// and of each link that moves against it.
+// The frames of a robot as a tree: world, odom and base_link, below it the frame of each device and
+// of each link that moves relative to it.
 import type { Page } from "../state/page";
 import type { Stage } from "../scene/stage";
 import * as THREE from "three";
@@ -80,7 +80,7 @@ export class FrameTree {
     );
   }
 
-  // Once a frame: where base_link is now, and links in it.
+  // Once a frame: the poses of base_link and of the links in it.
   follow(at_ms: number): void {
     if (!(this.element as HTMLDetailsElement).open || at_ms - this.shown_ms < kPeriod_ms) return;
     this.shown_ms = at_ms;

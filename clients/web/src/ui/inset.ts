@@ -1,4 +1,4 @@
-// A camera's picture in a corner of the view, whatever the panel shows.
+// A camera picture in a corner of the view, independent of the panel.
 import type { image_t } from "../../generated/messages";
 import type { Page } from "../state/page";
 import { h } from "../widgets/elements";
@@ -11,7 +11,7 @@ export class Inset {
   private picture: Picture | null = null;
   readonly chooser = h("label", { class: "row" }, "camera in the view", this.choice);
 
-  // changed: another channel is wanted.
+  // changed: called when another channel is needed.
   constructor(
     view: HTMLElement,
     private readonly page: Page,

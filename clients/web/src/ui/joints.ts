@@ -1,20 +1,20 @@
-// The joints of the chosen robot: where they are, and a slider for each that can be moved.
+// The joints of the chosen robot: their positions, and a slider for each that can be moved.
 import type { joint_state_t } from "../../generated/messages";
 import { h, say } from "../widgets/elements";
 
-const kReach = Math.PI; // of a slider, rad or m to both sides
+const kReach = Math.PI; // range of a slider, rad or m to both sides
 
 interface Row {
   values: HTMLElement[];
   slider: HTMLInputElement | null;
-  moved: boolean; // by hand: it no longer follows the joint
+  moved: boolean; // moved by hand: the slider no longer follows the joint
 }
 
 export class JointTable {
   readonly element = h("table", { class: "statistics", id: "joints", hidden: true });
   private rows = new Map<string, Row>();
 
-  // move: asks a joint for a position. canMove: whether the robot takes that.
+  // move: requests a position of a joint. canMove: whether the robot accepts that.
   constructor(
     private readonly move: (joint: string, position: number) => void,
     private readonly canMove: () => boolean,

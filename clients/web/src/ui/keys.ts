@@ -1,8 +1,8 @@
-// The page's keys. None of them acts while something is typed or a dialog is open.
+// The page's keyboard shortcuts, inactive while typing or while a dialog is open.
 import { dialogIsOpen } from "../widgets/confirm";
 import { isTyping } from "../widgets/typing";
 
-// Names as KeyboardEvent.key has them; a capital is with Shift. Those that turn the view repeat.
+// Names as in KeyboardEvent.key; a capital means Shift. Keys that turn the view repeat.
 const kRepeat = new Set([..."ijklIJKL+-"]);
 
 export function listenToKeys(actions: Record<string, () => void>): void {
@@ -17,7 +17,8 @@ export function listenToKeys(actions: Record<string, () => void>): void {
       ((event.key === " " || event.key === "Enter") && event.target instanceof HTMLButtonElement)
     )
       return;
-    if (event.key !== "Escape") event.preventDefault(); // the browser closes what is open by it, too
+    // the browser needs Escape to close what is open
+    if (event.key !== "Escape") event.preventDefault();
     action();
   });
 }

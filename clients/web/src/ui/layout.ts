@@ -1,13 +1,12 @@
-// What of the page is open, kept for each world by itself. A world that is new has what was open
-// last.
+// Which parts of the page are open, kept for each world. A new world starts with the last layout.
 import { kLayers } from "../state/layers";
 import { kTabs, type Page } from "../state/page";
 import { recallFor, rememberFor } from "../state/memory";
 
-const kNarrow_px = 860; // there the panel covers the view, and is closed at first
+const kNarrow_px = 860; // below this the panel takes much of the page, and is closed at first
 
 export class Layout {
-  private of = ""; // the world whose it is
+  private of = ""; // the world that the layout belongs to
 
   constructor(private readonly page: Page) {
     page.watch(["world"], ({ world }) => {

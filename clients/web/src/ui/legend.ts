@@ -1,4 +1,4 @@
-// The chips that switch what is drawn over the scene.
+// The chips that turn layers over the scene on and off.
 import { kLayerColours, kLayers, kOfRobots, type Layer } from "../state/layers";
 import type { Page } from "../state/page";
 import { h } from "../widgets/elements";

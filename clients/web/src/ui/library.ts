@@ -1,4 +1,4 @@
-// Models to choose from, with pictures that the page draws itself.
+// Models to place, with previews that the page renders itself.
 import * as THREE from "three";
 import { disposeOf, SceneBuilder } from "../scene/build";
 import { loadScene } from "../wire/description";
@@ -27,7 +27,7 @@ export class Library {
     });
   }
 
-  // When it is seen first.
+  // When it first becomes visible.
   async fill(): Promise<void> {
     if (this.asked) return;
     this.asked = true;
@@ -56,7 +56,7 @@ export class Library {
   }
 }
 
-// Draws a model alone, seen from in front and above.
+// Renders one model, seen from the front and above.
 class Painter {
   private readonly renderer: THREE.WebGLRenderer | null = makeRenderer();
 

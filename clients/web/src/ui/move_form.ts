@@ -1,4 +1,4 @@
-// The form of a motion primitive: kind, how far, radius and speed, and the button that sends it.
+// The form for a motion primitive: kind, distance, radius, speed, and the button that sends it.
 import { move_command_t } from "../../generated/messages";
 import { h, say } from "../widgets/elements";
 import type { Move } from "../state/go_to";
@@ -7,7 +7,7 @@ function numberInput(label: string, more: Record<string, string | number>): HTML
   return h("input", { type: "number", step: 0.1, value: 1, "aria-label": label, ...more });
 }
 
-// The buttons follow that which sends.
+// buttons: placed after the one that sends.
 export function makeMoveForm(
   send: (move: Move) => unknown,
   ...buttons: HTMLElement[]

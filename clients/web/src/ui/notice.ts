@@ -1,4 +1,4 @@
-// Words that stay until they do not hold any more, or are clicked away.
+// A message that stays until it no longer holds, or is clicked away.
 import type { Page } from "../state/page";
 import type { LinkState } from "../wire/protocol";
 import { say, toast } from "../widgets/elements";

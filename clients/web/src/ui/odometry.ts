@@ -1,7 +1,7 @@
-// Where odometry has a robot in the world.
+// Odometry poses in the world frame.
 export type Heading = [x: number, y: number, heading: number]; // m, m, rad
 
-// start: odom in the world.
+// start: the pose of odom in the world.
 export function inWorld(
   m: { x: number; y: number; theta: number },
   [x0, y0, a0]: Heading,

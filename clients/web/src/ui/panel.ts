@@ -2,7 +2,7 @@
 import { kTabs, type Page, type Tab } from "../state/page";
 import { h } from "../widgets/elements";
 
-const kSearched = 12; // more robots than these can be searched
+const kSearched = 12; // a search field is shown for more robots than these
 
 export class Panel {
   private readonly tabs = new Map<Tab, HTMLButtonElement>();
@@ -33,7 +33,7 @@ export class Panel {
       tabs.append(button);
     }
     tabs.addEventListener("keydown", (event) => this.byArrows(event));
-    const plots = this.tabs.get("Plots")!; // a field that is dragged onto it is plotted
+    const plots = this.tabs.get("Plots")!; // fields can be dropped onto it
     plots.addEventListener("dragover", (event) => {
       event.preventDefault();
       this.open("Plots");
@@ -41,7 +41,7 @@ export class Panel {
     this.robots.addEventListener("change", () => choose(this.names.indexOf(this.robots.value)));
     this.search.addEventListener("input", () => this.fill());
     this.search.addEventListener("keydown", (event) => {
-      // the first that is found
+      // the first match
       if (event.key === "Enter" && this.robots.options.length > 0)
         choose(this.names.indexOf(this.robots.options[0]!.value));
     });
@@ -91,7 +91,7 @@ export class Panel {
     );
   }
 
-  // As in any list of tabs: arrows, Home and End go from one to the next.
+  // As in any tab list: arrows, Home and End change the tab.
   private byArrows(event: KeyboardEvent): void {
     const at = kTabs.indexOf(this.page.now.tab),
       last = kTabs.length - 1;
@@ -103,7 +103,7 @@ export class Panel {
     }[event.key];
     if (to === undefined) return;
     event.preventDefault();
-    event.stopPropagation(); // arrows drive elsewhere
+    event.stopPropagation(); // elsewhere arrows drive
     this.open(kTabs[to]!);
     this.tabs.get(kTabs[to]!)!.focus();
   }

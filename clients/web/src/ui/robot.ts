@@ -1,4 +1,4 @@
-// The panel's pages about one robot: its state, pictures, ranges, motion primitives, and its plots.
+// The panel's pages about one robot: state, pictures, ranges, motion primitives, and plots.
 import {
   image_t,
   motion_status_t,
@@ -25,7 +25,7 @@ import { Picture } from "../widgets/picture";
 
 const kStates = ["idle", "running", "done", "ended", "refused"];
 const kFacts = ["drive", "pose", "speed", "odometry", "odometry error", "motion", "runs into"];
-const kLevel_m = 0.5; // nearer to the world's zero, a height says nothing; a robot may fall, too
+const kLevel_m = 0.5; // smaller heights, up or down, are not shown
 const fixed = (value: number) => (Math.abs(value) < 5e-4 ? 0 : value).toFixed(3);
 
 const kKinds: Record<number, string> = {
@@ -39,7 +39,7 @@ const kKinds: Record<number, string> = {
 };
 const shortly = (values: Iterable<number>) => [...values].map((v) => v.toFixed(2)).join(", ");
 const degrees = (rad: number) => `${((rad * 180) / Math.PI).toFixed(1)}°`;
-const heading = (rad: number) => degrees(wrap(rad)); // all headings alike, from -180 to 180
+const heading = (rad: number) => degrees(wrap(rad)); // all headings in the same range, -180 to 180
 const yawOf = (q: ArrayLike<number>) =>
   Math.atan2(2 * (q[0]! * q[3]! + q[1]! * q[2]!), 1 - 2 * (q[2]! ** 2 + q[3]! ** 2));
 const wrap = (angle: number) => Math.atan2(Math.sin(angle), Math.cos(angle));
@@ -51,10 +51,10 @@ export class RobotPages {
   private readonly pictures = new Map<string, Picture>();
   private readonly pictureList = h("div");
   private readonly jointTable: JointTable;
-  readonly extras = h("div"); // more of the robot
+  readonly extras = h("div"); // for further views of the robot
   private readonly motions: HTMLElement;
   private readonly ranges: HTMLElement;
-  private readonly about: HTMLElement; // a robot: all of the page
+  private readonly about: HTMLElement; // the whole page
   private readonly none = h("p", { class: "dim" }, "This world has no robot.");
   private order: string[] = []; // of the facts
   private readonly values = new Map<string, HTMLElement>();
@@ -75,13 +75,13 @@ export class RobotPages {
     { label: "distance, m", colour: "--rays" },
     { label: "heading, °", colour: "--sonar", scale: "w" },
   ]);
-  // Sends the robot to where one clicks.
+  // Sends the robot to clicked points.
   readonly goButton = h(
     "button",
     { id: "go", title: "with Shift, further points; Esc leaves it" },
     "Go to a click (G)",
   );
-  private start: Heading | null = null; // odom in the world; null: not known
+  private start: Heading | null = null; // the pose of odom in the world; null if unknown
   private truth: pose_t | null = null;
   private reckoned: odometry_t | null = null;
 
@@ -117,18 +117,18 @@ export class RobotPages {
     this.showNone(true);
   }
 
-  // Whether there is no robot that the pages could be about.
+  // Says whether there is no robot to show.
   showNone(none: boolean): void {
     this.none.hidden = !none;
     this.about.hidden = this.plotPage.hidden = none;
   }
 
-  // Whether the robot takes motion primitives here.
+  // Whether the robot accepts motion primitives.
   showMotions(can: boolean): void {
     this.motions.hidden = !can;
   }
 
-  // Where odometry begins, as a pose; undefined: not known yet.
+  // The pose where odometry begins; undefined if unknown.
   beginAt(start: number[] | undefined): void {
     this.start = start ? [start[0]!, start[1]!, yawOf(start.slice(3))] : null;
   }
@@ -141,7 +141,7 @@ export class RobotPages {
     this.truth = this.reckoned = null;
     this.polar.clear();
     for (const plot of [this.speed, this.path, this.error]) plot.clear();
-    this.ranges.hidden = true; // until there are some
+    this.ranges.hidden = true; // until ranges arrive
     this.order = [...kFacts, ...devices.map(({ name }) => name)];
     this.fact("drive", `${robot.model}, ${robot.drive || "no drive"}`);
     const cameras = devices.filter((d) => d.kind === "camera");
@@ -161,7 +161,7 @@ export class RobotPages {
     if (!value) {
       value = h("dd", { "data-fact": name });
       this.values.set(name, value);
-      // Always in the same order, whatever comes first
+      // Always in the same order, whichever arrives first
       const at = this.order.indexOf(name),
         next = [...this.facts.children].find(
           (term) => term.localName === "dt" && this.order.indexOf(term.textContent) > at,
@@ -202,7 +202,7 @@ export class RobotPages {
     this.compare();
   }
 
-  // Odometry against the pose of the same moment, whichever comes last.
+  // Compares odometry with the pose of the same moment, whichever arrives last.
   private compare(): void {
     const { truth, reckoned } = this;
     if (!this.start || !truth || !reckoned || truth.utime !== reckoned.utime) return;
@@ -244,7 +244,7 @@ export class RobotPages {
   joints(m: joint_state_t): void {
     this.jointTable.show(m);
   }
-  // Of a device that the page does not know: its members by name.
+  // For a device of an unknown type: its members by name.
   other(device: device_info_t, m: object): void {
     const shown = (value: unknown) =>
       typeof value === "number" ? String(Number(value.toPrecision(9))) : textOf(value, 1);

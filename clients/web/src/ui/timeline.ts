@@ -1,4 +1,4 @@
-// The time line of a recorded run, and of the last minutes of a live one: play, scrub, speed.
+// The time line of a recorded run, or of the last minutes of a live one: play, scrub, speed.
 import type { Page } from "../state/page";
 import { loopedTo, shownOf, type Shown } from "../state/time";
 import { h, say } from "../widgets/elements";
@@ -33,7 +33,7 @@ export class Timeline {
   );
   readonly lane: EventLane;
   private held = false;
-  private played = false; // when it was shown last
+  private played = false; // when it was last shown
   private lastSeek = 0;
 
   constructor(
@@ -49,7 +49,7 @@ export class Timeline {
     );
     this.speed.value = "1";
     this.speed.addEventListener("change", () => {
-      this.speed.blur(); // space is for playing
+      this.speed.blur(); // so that space plays
       actions.play(shownOf(page.now)?.playing ?? false, Number(this.speed.value));
     });
     this.slider.addEventListener("pointerdown", () => {
@@ -80,7 +80,7 @@ export class Timeline {
       this.branch(),
       this.live,
     );
-    // After a click space is for playing again; who came by the keyboard stays.
+    // After a click the focus is given back, so that space plays; keyboard users keep it.
     place.addEventListener("click", (event) => {
       if (event.detail > 0) (event.target as Element).closest("button")?.blur();
     });
@@ -95,7 +95,7 @@ export class Timeline {
     });
   }
 
-  // Where another log is shown beside this one.
+  // Shown if there is another log to compare with.
   private difference(): HTMLElement {
     const words = "the first difference",
       button = h(
@@ -110,7 +110,7 @@ export class Timeline {
     return button;
   }
 
-  // In the past of a run.
+  // Shown in the past of a run.
   private branch(): HTMLElement {
     const title = "a second run that goes on from here",
       button = h("button", { id: "branch", title, click: () => this.actions.branch() }, "Branch");
@@ -124,7 +124,7 @@ export class Timeline {
     const { past, kept } = this.page.now,
       shown = shownOf(this.page.now);
     if (this.page.now.hello?.mode === "live" && !past)
-      this.actions.seek(kept.end); // it stands still from here on
+      this.actions.seek(kept.end); // pauses at the present moment
     else this.actions.play(!shown?.playing, Number(this.speed.value));
   }
 
@@ -137,7 +137,7 @@ export class Timeline {
   private show(shown: Shown | null): void {
     const { hello, past } = this.page.now,
       isLive = hello?.mode === "live";
-    // After a reset there is no past for a moment: nothing moves on the page for that.
+    // After a reset the past is empty for a moment; the layout stays.
     this.place.hidden = shown === null && (!isLive || hello.save !== "");
     this.live.hidden = !isLive;
     this.speed.hidden = isLive && !past;

@@ -1,4 +1,4 @@
-// The selected model in numbers: where it stands, its handles, its copy and its end.
+// The selected model in numbers: its pose, its handles, duplicate and delete.
 import type { Editor } from "../edit/editor";
 import { numbersOf, poseFrom, samePose } from "../edit/pose";
 import type { Handle, Page } from "../state/page";
@@ -114,7 +114,7 @@ export class Transform {
     ];
   }
 
-  // The numbers, as things move; what is being typed stays.
+  // Updates the numbers as things move, except while they are being edited.
   show(): void {
     const { selected } = this.page.now,
       pose = this.editor.pose(selected);
@@ -133,7 +133,7 @@ export class Transform {
       numbers = this.fields.map((field) => Number(field.value)),
       pose = this.editor.pose(selected);
     if (!pose || numbers.some((value) => !Number.isFinite(value))) return;
-    // What was not typed is as it was, to the last digit.
+    // Values that were not edited keep all their digits.
     const before = numbersOf(pose),
       to = poseFrom(
         numbers.map((value, i) =>

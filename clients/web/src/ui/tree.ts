@@ -1,5 +1,5 @@
-// The models of the world as a tree that can be searched: robots, things that move, and what stands
-// fast, each with its links.
+// The models of the world as a searchable tree: robots, movable and fixed things, each with its
+// links.
 import type { Editor } from "../edit/editor";
 import type { ModelDescription } from "../wire/description";
 import type { Page } from "../state/page";
@@ -109,7 +109,7 @@ export class Tree {
   private byKeys(event: KeyboardEvent): void {
     if (event.key !== "ArrowDown" && event.key !== "ArrowUp") return;
     event.preventDefault();
-    event.stopPropagation(); // arrows drive elsewhere
+    event.stopPropagation(); // elsewhere arrows drive
     this.step(event.key === "ArrowDown" ? 1 : -1, false);
   }
 

@@ -1,11 +1,11 @@
-// A command to start in a terminal, in a dialog: to be copied.
+// A dialog with a command to copy into a terminal.
 import { h } from "./elements";
 
 export function showCommand(heading: string, command: string): void {
   const text = h("code", { id: "command" }, command),
     copy = h("button", { type: "button", class: "on", autofocus: true }, "Copy");
   copy.addEventListener("click", () => {
-    // Not there on a page that came over an unencrypted connection from another machine.
+    // The clipboard is missing on pages from another machine over an unencrypted connection.
     const copied = navigator.clipboard?.writeText(command) ?? Promise.reject(new Error());
     copied.then(
       () => (copy.textContent = "Copied"),

@@ -1,4 +1,4 @@
-// A question before what cannot be taken back. Enter says yes, Esc no.
+// A question before something that cannot be undone. Enter confirms, Esc cancels.
 import { h } from "./elements";
 
 export function confirmed(question: string, words: string, yes: string): Promise<boolean> {
@@ -24,5 +24,5 @@ export function confirmed(question: string, words: string, yes: string): Promise
   });
 }
 
-// While a dialog is open, keys are its own.
+// Keys belong to the dialog while it is open.
 export const dialogIsOpen = () => document.querySelector("dialog[open]") !== null;

@@ -1,4 +1,4 @@
-// A file that the browser saves.
+// Offers a file for download.
 import { h } from "./elements";
 
 export function download(blob: Blob, name: string): void {

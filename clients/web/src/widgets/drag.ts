@@ -1,2 +1,2 @@
-// The type of what is dragged from the list of channels onto a plot: a channel and a field.
+// The data type of a field that is dragged from the list of channels onto a plot.
 export const kDragType = "text/ruedo-field";

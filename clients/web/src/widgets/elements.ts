@@ -1,4 +1,4 @@
-// Small helpers to make elements.
+// Small helpers that make elements.
 type Child = Node | string | null | undefined | false;
 type Attributes = Record<string, string | number | boolean | ((event: Event) => void) | undefined>;
 
@@ -21,7 +21,7 @@ export function h<K extends keyof HTMLElementTagNameMap>(
   return element;
 }
 
-// Sets a text only when it is another one: most values do not change.
+// Sets a text only if it differs: most values do not change.
 export function say(element: Element, text: string): void {
   if (element.textContent !== text) element.textContent = text;
 }
@@ -35,5 +35,5 @@ export function toast(text: string, kind: "info" | "error" = "info"): void {
   setTimeout(() => note.remove(), kToast_ms);
 }
 
-// An element that the page has from the beginning.
+// An element of index.html.
 export const byId = (id: string) => document.getElementById(id)!;

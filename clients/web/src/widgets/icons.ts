@@ -1,4 +1,4 @@
-// Pictures on buttons.
+// Icons on buttons.
 import { h } from "./elements";
 
 const kIcons = {

@@ -1,5 +1,5 @@
-// Pictures of a camera, JPEG and raw formats, on a canvas: the browser's cache of images would hold
-// what nobody sees any more.
+// Camera pictures, JPEG and raw, on a canvas: the browser's cache of images would keep those that
+// nobody sees any more.
 import { image_t } from "../../generated/messages";
 import { h, say } from "./elements";
 
@@ -9,7 +9,7 @@ export class Picture {
   private readonly canvas: HTMLCanvasElement;
   private readonly caption = h("figcaption");
   readonly element: HTMLElement;
-  private next: Blob | null = null; // the newest JPEG, while another one is read
+  private next: Blob | null = null; // the newest JPEG, while another one is being decoded
   private reading = false;
 
   constructor(readonly name: string) {
@@ -39,13 +39,14 @@ export class Picture {
       this.draw(width, height, (context) => context.putImageData(pixelsOf(message), 0, 0));
   }
 
-  // One at a time: of those that come meanwhile the newest.
+  // One at a time; of those that arrive meanwhile, only the newest.
   private async read(): Promise<void> {
     if (this.reading) return;
     this.reading = true;
     for (let blob = this.next; blob; blob = this.next) {
       this.next = null;
-      const bitmap = await createImageBitmap(blob).catch(() => null); // damaged: the last one stays
+      // damaged: the last picture stays
+      const bitmap = await createImageBitmap(blob).catch(() => null);
       if (!bitmap) continue;
       this.draw(bitmap.width, bitmap.height, (context) => context.drawImage(bitmap, 0, 0));
       bitmap.close();

@@ -1,5 +1,5 @@
-// Live plots of the chosen robot: velocity profile, path and odometry error over time, and ranges
-// around the robot.
+// Live plots of the chosen robot: velocity, path and odometry error over time, and ranges around
+// the robot.
 import uPlot from "uplot";
 import "uplot/dist/uPlot.min.css";
 import type { planar_lidar_t, sonar_t, device_info_t } from "../../generated/messages";
@@ -16,7 +16,7 @@ export interface SeriesDescription {
   dash?: number[];
 }
 
-// Values over sim time, the last half minute of them.
+// Values over sim time, for the last half minute.
 export class TimePlot {
   readonly element = h("div", { class: "plot" });
   private plot: uPlot | undefined;
@@ -32,7 +32,7 @@ export class TimePlot {
     new ResizeObserver(() => this.build()).observe(this.element);
   }
 
-  // One value at that time of the series; the others keep theirs.
+  // Adds one value at that time; the other series keep their last one.
   add(series: number, time_s: number, value: number): void {
     const times = this.data[0]!;
     const last = times.length - 1;
@@ -127,7 +127,7 @@ export function padded(low: number, high: number): [number, number] {
   return [low - pad, high + pad];
 }
 
-// Ranges seen from above, the robot's heading upwards.
+// Ranges seen from above, with the robot's heading up.
 export class PolarPlot {
   readonly element = h("canvas", { class: "polar", "aria-label": "ranges around the robot" });
   private readonly scans = new Map<string, [device_info_t, planar_lidar_t]>();

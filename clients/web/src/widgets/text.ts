@@ -1,5 +1,5 @@
-// A message in words: a line for each member, long lists cut short.
-const kMostShown = 12; // elements of an array
+// A message as text: one line for each member, long lists shortened.
+const kMostShown = 12; // elements shown of an array
 
 export function textOf(value: unknown, depth = 0): string {
   if (typeof value === "number")

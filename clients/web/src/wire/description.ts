@@ -1,4 +1,4 @@
-// The still part of the scene, as the program serves it: one JSON text and two blobs.
+// The static part of the scene, as the server provides it: one JSON text and two blobs.
 export interface Part {
   batch: number;
   small: number;
@@ -23,8 +23,8 @@ export interface LightDescription {
   quadratic: number;
   shadows: boolean;
 }
-// fast: it never moves. body: that carries the model, -1 for none; pose: x, y, z, qw, qx, qy, qz of
-// the model in it, or in the world. A model that was removed has no name.
+// fast: it never moves. body: the one that carries the model, -1 if none does. pose: x, y, z, qw,
+// qx, qy, qz of the model in that body, or in the world. A removed model has no name.
 export interface ModelDescription {
   name: string;
   first_link: number;
@@ -44,14 +44,14 @@ export interface Description {
   background: number[];
   low: number[];
   high: number[];
-  ceiling: number | null; // above it things hide what is below; null: the world lies open
+  ceiling: number | null; // things above this height hide what is below; null for an open world
   meshes: [vertices: number, indices: number][];
   textures: boolean[];
   batches: [mesh: number, first: number, count: number, texture: number, flags: number][];
   kinds: Part[][];
   lights: LightDescription[];
   models: ModelDescription[];
-  wheels: number[][]; // link, robot, place among its wheels, a point on the axis, the axis
+  wheels: number[][]; // link, robot, index among its wheels, a point on the axis, the axis
   bases: { robot: string; body: number; pose: number[]; start: number[] }[];
 }
 export const enum Flag {
@@ -72,7 +72,7 @@ export interface LinkData {
   pose: Float32Array;
 }
 
-// textureUrl: where the picture of that number is.
+// textureUrl: the URL of that texture.
 export interface SceneFiles {
   description: Description;
   meshes: MeshData[];
@@ -80,14 +80,14 @@ export interface SceneFiles {
   textureUrl(index: number): string;
 }
 
-// A page that has its run in itself has the scene's files, too.
+// A page with an embedded log has the scene's files in it, too.
 export interface FileStore {
   file(path: string): Uint8Array<ArrayBuffer> | null;
-  url(path: string): string; // where the page finds it
+  url(path: string): string; // the URL of a file
 }
 
-// Null when there is no world to show. base: where its files are. store: null for the program that
-// serves this page.
+// Null if there is no world to show. base: the folder of its files. store: the files in the page;
+// null: they come from the server.
 export async function loadScene(
   store: FileStore | null,
   base = "/scene",

@@ -1,7 +1,7 @@
 // Numbers in messages, by the path that leads to them: "vel[0]", "points[2].depth".
 import { kTypes, type Field } from "../../generated/messages";
 
-const kMostElements = 12; // of an array, that are listed
+const kMostElements = 12; // listed of one array
 const kNumbers = new Set([
   "double",
   "float",
@@ -13,7 +13,7 @@ const kNumbers = new Set([
   "boolean",
 ]);
 
-// The fields of a type that can be plotted. Of arrays whose length varies the first few elements.
+// The fields of a type that can be plotted; of arrays of variable length, the first few elements.
 export function fieldsOf(type: string, depth = 0): string[] {
   if (depth > 3) return [];
   return (kTypes[type] ?? []).flatMap((field) => {
@@ -34,7 +34,7 @@ function places({ sizes }: Field): string[] {
   return Array.from({ length: Math.min(count, kMostElements) }, (_, i) => `[${i}]`);
 }
 
-// The number at a path; NaN where there is none.
+// The number at a path; NaN if there is none.
 export function valueAt(message: unknown, path: string): number {
   let value: unknown = message;
   for (const step of path.split(/[.[\]]+/).filter(Boolean)) {
@@ -50,10 +50,10 @@ export interface Statistics {
   min: number;
   max: number;
   mean: number;
-  deviation: number; // of the values, not of their mean
+  deviation: number; // standard deviation of the values, not of their mean
 }
 
-// Of the finite ones; null where there are none.
+// Statistics of the finite values; null if there are none.
 export function statisticsOf(values: Iterable<number>): Statistics | null {
   let count = 0,
     min = Infinity,
@@ -72,8 +72,8 @@ export function statisticsOf(values: Iterable<number>): Statistics | null {
   return count === 0 ? null : { count, min, max, mean, deviation: Math.sqrt(squares / count) };
 }
 
-// Rows of times and columns of values, as a spreadsheet reads them. Where a column has no value at
-// a time, its place is empty.
+// CSV: a row for each time and a column for each series. A cell is empty if its series has no value
+// at that time.
 export function csvOf(names: string[], columns: [times: number[], values: number[]][]): string {
   const rows = new Map<number, (number | undefined)[]>();
   columns.forEach(([times, values], column) => {

@@ -1,14 +1,14 @@
-// Whether a server that is connected still answers. A connection outlives a server that was stopped
-// and a network that broke, and then nothing says that what is shown is old.
-const kQuiet_ms = 3000; // without a word, and it is asked
+// Whether a connected server still answers. A connection outlives a server that was stopped and a
+// network that broke; without this the page would show old data as if it were current.
+const kQuiet_ms = 3000; // without a message; then the server is asked
 
 export class Heartbeat {
   private heard_ms = 0;
   private asking = false;
   private silent = false;
 
-  // ask: resolves when the server has answered, rejects when it did not within some seconds.
-  // told: that it is silent now, or answers again.
+  // ask: resolves when the server has answered, rejects if it has not within some seconds. told:
+  // called with true when the server falls silent and with false when it answers again.
   constructor(
     private readonly ask: () => Promise<unknown>,
     private readonly told: (silent: boolean) => void,
@@ -20,13 +20,13 @@ export class Heartbeat {
     this.turn(false);
   }
 
-  // The connection is another one: nothing is known of it.
+  // A new connection was made; nothing is known about it yet.
   restart(at_ms: number): void {
     this.heard_ms = at_ms;
     this.silent = false;
   }
 
-  // To be called now and then while it is connected.
+  // To be called every second or so while connected.
   async look(at_ms: number): Promise<void> {
     if (this.asking || at_ms - this.heard_ms < kQuiet_ms) return;
     const before = this.heard_ms;

@@ -1,5 +1,5 @@
-// Reads and writes LCM messages of any type from the description that was made of proto/*.lcm.
-// Arrays of several dimensions are one array, row by row.
+// Encodes and decodes LCM messages of any type, by the description generated from proto/*.lcm.
+// Arrays of several dimensions are flat, row by row.
 import { kTypes, type Field, type Messages } from "../../generated/messages";
 
 export type TypeName = keyof Messages & string;
@@ -13,8 +13,8 @@ function stirText(hash: bigint, text: string): bigint {
   return result;
 }
 
-// LCM's hash of a type: of its members' names, primitive types and dimensions, and of the types
-// inside.
+// LCM's hash of a type: of the names, primitive types and dimensions of its members, and of the
+// types they contain.
 function computeFingerprint(name: string, parents: string[] = []): bigint {
   if (parents.includes(name)) return 0n;
   let hash = 0x12345678n;
@@ -38,8 +38,7 @@ export function fingerprint(name: string): bigint {
   return value;
 }
 
-// Types that the program knows beside those of this page, before a message of theirs is read.
-// Ruedo's own stay as they are.
+// Adds types that the server knows and this page does not. Ruedo's own types are not replaced.
 export function addTypes(types: Record<string, Field[]>): void {
   for (const [name, fields] of Object.entries(types)) kTypes[name] ??= fields;
   fingerprints.clear();
@@ -148,7 +147,7 @@ function countOf(field: Field, message: Record<string, Value>): number {
   );
 }
 
-// Throws RangeError for bytes that are not such a message.
+// Throws RangeError if the bytes are not such a message.
 export function decode<T extends TypeName>(type: T, bytes: Uint8Array): Messages[T] {
   const reader = new Reader(bytes);
   if (reader.one("int64_t") !== fingerprint(type)) throw new RangeError(`this is no ${type}`);

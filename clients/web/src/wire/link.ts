@@ -1,5 +1,5 @@
-// The WebSocket to the program: texts, frames of messages, and what this page asks for. Comes back
-// by itself when the connection is lost.
+// The WebSocket to the server: texts, frames of messages, and requests of this page. Reconnects by
+// itself.
 
 import { valueAt } from "./fields";
 import { Heartbeat } from "./heartbeat";
@@ -14,7 +14,7 @@ import type {
   RunLink,
 } from "./protocol";
 
-// Of messages with their times.
+// From messages with their times.
 export function historyOf(
   entries: { time: number; messages: Uint8Array[] }[],
   path: string,
@@ -49,7 +49,7 @@ const enum Frame {
 }
 
 const kLook_ms = 1000; // between two looks whether the server answers
-const kAnswer_ms = 5000; // it has to answer
+const kAnswer_ms = 5000; // until the server counts as silent
 
 export class Link implements RunLink {
   private handler!: LinkHandler;
@@ -87,7 +87,7 @@ export class Link implements RunLink {
       this.retry_ms = 300;
       this.over = false;
       this.heartbeat.restart(performance.now());
-      this.wanted.clear(); // what is wanted of whom comes with the greeting
+      this.wanted.clear(); // the greeting decides which channels are wanted
       this.handler.state("open", "");
       if (this.wantsTraffic) this.send([Operation.traffic, 1]);
     };
@@ -118,7 +118,7 @@ export class Link implements RunLink {
     this.send([Operation.traffic, on ? 1 : 0]);
   }
 
-  // A message onto a channel, as any client's. False when there is no connection.
+  // Publishes a message on a channel, as any client would. False if there is no connection.
   command(channel: string, message: Uint8Array): boolean {
     const name = new TextEncoder().encode(channel);
     return this.send([Operation.command, name.length, ...name], message);
@@ -214,7 +214,8 @@ export class Link implements RunLink {
         this.handler.message(channel, new Uint8Array(buffer, at + 8, size));
       at += 8 + size;
     }
-    // Answered when the page has drawn: who is slow gets fewer frames, not a queue of them.
+    // Acknowledged once the page has drawn, so that a slow page gets fewer frames instead of a
+    // growing queue.
     requestAnimationFrame(() => this.send([Operation.seen]));
   }
 }

@@ -1,4 +1,4 @@
-// A recorded run that is in the page itself: it answers as the program would, from the bytes behind
+// A recorded run that is embedded in the page: it answers as the server would, from the bytes in
 // the page.
 import { historyOf } from "./link";
 import type { Hello, History, LinkHandler, Playback, RunEvent, RunLink } from "./protocol";
@@ -24,12 +24,13 @@ interface Entry {
 
 const kTick_ms = 33;
 const kTraffic_ms = 500;
-// Between two looks at the clock; after a longer one the log does not jump
+// The longest interval between two looks at the clock that the log follows; after a longer one it
+// does not jump
 const kLongestPause_s = 0.5;
 
 const bytesOf = (base64: string) => Uint8Array.from(atob(base64), (c) => c.charCodeAt(0));
 
-// The newest entry at that time; -1: none yet.
+// The newest entry at that time; -1 if there is none yet.
 export function newestAt(entries: { time: number }[], time: number): number {
   let low = 0,
     high = entries.length;
@@ -49,11 +50,11 @@ export class LogFile implements RunLink {
   private traffic = false;
   private scene = 0;
   private last_ms = 0;
-  private traffic_ms = -Infinity; // when it was told
+  private traffic_ms = -Infinity; // when it was last reported
   private handler: LinkHandler | undefined;
-  private readonly urls = new Map<number, string>(); // of files, by where they lie
+  private readonly urls = new Map<number, string>(); // of files, by their offset
 
-  // Null where the page has none.
+  // Null if the page has no log in it.
   static inPage(): LogFile | null {
     const head = document.getElementById("log"),
       bytes = document.getElementById("bytes");
@@ -103,7 +104,7 @@ export class LogFile implements RunLink {
       .join(" ");
   }
 
-  // A file of the scene of this moment.
+  // A file of the current scene.
   file(path: string): Uint8Array<ArrayBuffer> | null {
     const place = this.head.scenes[this.scene]?.files[path];
     return place
@@ -111,7 +112,7 @@ export class LogFile implements RunLink {
       : null;
   }
 
-  // Where the page finds it, the same address for the same bytes; "" where there is none.
+  // The URL of a file, the same one for the same bytes; "" if there is no such file.
   url(path: string): string {
     const place = this.head.scenes[this.scene]?.files[path],
       bytes = this.file(path);
@@ -177,7 +178,7 @@ export class LogFile implements RunLink {
     this.show();
   }
 
-  // From one message to the next where the log has no states.
+  // By messages if the log has no states.
   step(ahead: boolean): void {
     const stateful = this.entries.find((entries) => {
         const bytes = entries[0]?.messages[0];

@@ -1,6 +1,6 @@
-// What the program tells a page and takes from it, whether by a socket or out of the page itself.
+// What the server and a page tell each other, through a socket or from a log in the page itself.
 
-// save: the file that SAVE writes; compared: the log beside this one; "" for none.
+// save: the file that SAVE writes; compared: the other log; "" if there is none.
 export interface Hello {
   mode: "live" | "log";
   title: string;
@@ -20,20 +20,20 @@ export interface Playback {
 }
 // Something that happened in a run.
 export interface RunEvent {
-  t: number; // s, the time line's
+  t: number; // s, on the time line
   kind: string;
   robot: string; // "" for the whole run
   text: string;
 }
-// silent: it is connected, but the server does not answer.
+// silent: connected, but the server does not answer.
 export type LinkState = "connecting" | "open" | "silent" | "lost" | "ended";
 
-// Where another log first differs from the one that is shown.
+// The first difference between the shown log and the other one.
 export interface Difference {
-  t: number; // s, the time line's
+  t: number; // s, on the time line
   channel: string;
-  field: string; // "" where a message is in one log only
-  shown: string; // its value in the log that is shown, and in the other one
+  field: string; // "" if only one log has the message
+  shown: string; // its value in the shown log, and in the other one
   other: string;
 }
 
@@ -41,28 +41,29 @@ export interface Comparison {
   other: string; // its file's name
   same?: boolean; // no message differs
   first?: Difference;
-  channels?: string[]; // that differ
-  robots: { name: string; distance: number; t: number }[]; // of both: how far apart at most, when
-  missing: string[]; // robots of the other log alone
-  extra: string[]; // and of the one that is shown
-  fault: string; // why messages were not compared
+  channels?: string[]; // those that differ
+  // in both logs: the largest distance, and when
+  robots: { name: string; distance: number; t: number }[];
+  missing: string[]; // robots of the other log only
+  extra: string[]; // robots of the shown log only
+  fault: string; // why the messages could not be compared; "" if they were
 }
 
 export interface LinkHandler {
   state(state: LinkState, words: string): void;
   hello(hello: Hello): void;
-  scene(number: number): void; // another one is to be shown; of a log its number
+  scene(number: number): void; // another scene is to be shown; for a log, its number
   playback(playback: Playback): void;
-  // What happened, from the event of that number on; from 0 on: earlier ones hold no more.
+  // Events from that index on. From 0 on: earlier ones are no longer valid.
   events(first: number, events: RunEvent[]): void;
-  // What differs from the other log.
+  // The result of the comparison with the other log.
   comparison(comparison: Comparison): void;
   message(channel: string, bytes: Uint8Array): void;
   traffic(channels: string[], messages: Uint32Array, sizes: Uint32Array): void;
   refused(channel: string): void;
 }
 
-// What a page has of a run: the socket's end, or a log in the page itself.
+// What a page can ask of a run, be it through a socket or of a log in the page itself.
 export interface RunLink {
   connect(handler: LinkHandler): void;
   want(channels: Iterable<string>): void;
@@ -70,15 +71,15 @@ export interface RunLink {
   command(channel: string, message: Uint8Array): boolean;
   play(on: boolean, speed: number): void;
   seek(time_s: number): void;
-  // To the next state of the bodies, or the one before.
+  // To the next state of the bodies, or the previous one.
   step(ahead: boolean): void;
-  // What is known of a field so far.
+  // The values of a field so far.
   history(channel: string, path: string): Promise<History>;
 }
 
-// A field over time, which only goes ahead: the time line's.
+// A field over the time of the time line, ascending.
 export interface History {
-  every: number; // so many messages: 1 for all of them
+  every: number; // every n-th message was taken; 1 for all
   times: number[];
   values: number[];
 }

@@ -1,6 +1,5 @@
-// The last minutes of a live run as this page has seen them: a link that keeps what passes, so that
-// an earlier moment can be shown while the run goes on. What the page steers acts on the run,
-// whatever is shown.
+// The last minutes of a live run as this page has seen them: a link that records what passes, so
+// that an earlier moment can be shown while the run goes on. Commands always act on the live run.
 
 import { kTypes } from "../../generated/messages";
 import { historyOf } from "./link";
@@ -14,8 +13,8 @@ const kTick_ms = 33;
 
 interface Entry {
   time: number;
-  messages: Uint8Array[]; // parts of one message stand together
-  size?: number; // of what clients draw, bytes of the one that came
+  messages: Uint8Array[]; // all parts of one message
+  size?: number; // bytes of the message itself, where the markers of other layers are kept with it
 }
 export interface Past {
   begin: number;
@@ -25,7 +24,7 @@ export interface Past {
   speed: number;
 }
 
-// The offset of a message's int16 `part`, after its utime; -1: it has none.
+// The offset of a message's int16 `part`, after its utime; -1 if it has none.
 function partOffset(type: string): number {
   let at = 8;
   for (const { name, type: of, sizes } of kTypes[type] ?? []) {
@@ -51,31 +50,33 @@ function partOffset(type: string): number {
 const kMostLayers = 64; // of markers
 const utf8 = new TextDecoder();
 
-// The layer of a markers_t: behind fingerprint and utime stand its length with a zero, and its
-// name.
+// The layer of a markers_t: after fingerprint and utime come its length, with the terminating zero,
+// and its name.
 function layerOf(bytes: Uint8Array): string {
   const size = bytes.length >= 20 ? new DataView(bytes.buffer, bytes.byteOffset).getInt32(16) : 0;
   return utf8.decode(bytes.subarray(20, 19 + Math.max(1, size)));
 }
 
-// What is drawn when that is, too: the newest message of each layer.
+// All that is drawn at that time: the newest message of each layer.
 function withLayer(before: Uint8Array[], message: Uint8Array): Uint8Array[] {
   const layer = layerOf(message);
   return [...before.filter((each) => layerOf(each) !== layer), message].slice(-kMostLayers);
 }
 
-const kNow = new Set(["reply_t", "world_info_t"]); // go to the page whatever is shown
+// passed to the page even while the past is shown
+const kNow = new Set(["reply_t", "world_info_t"]);
 const offsets = new Map<string, number>();
 
 export class Rewind implements RunLink {
   private handler!: LinkHandler;
   private readonly entries = new Map<string, Entry[]>();
-  private readonly order: { channel: string; size: number; time: number }[] = []; // of all entries, the oldest first from `first` on
+  // of all entries, oldest first, starting at `first`
+  private readonly order: { channel: string; size: number; time: number }[] = [];
   private first = 0;
   private bytes = 0;
   private newest_s = 0;
   private epoch = -1;
-  private drawn: { channel: string; messages: Uint8Array[] } | null = null; // by clients, now
+  private drawn: { channel: string; messages: Uint8Array[] } | null = null; // what clients draw now
   private states = ""; // the channel of the bodies' states
   private isLive = true;
   private past: { now: number; playing: boolean; speed: number } | null = null; // null: the present is shown
@@ -129,7 +130,7 @@ export class Rewind implements RunLink {
     this.inner.seek(time_s);
   }
 
-  // Of a live run the past stands still then.
+  // For a live run this pauses the past.
   step(ahead: boolean): void {
     if (!this.isLive) return this.inner.step(ahead);
     const states = this.entries.get(this.states) ?? [],
@@ -140,7 +141,7 @@ export class Rewind implements RunLink {
     if (to) this.show(to.time);
   }
 
-  // Shows that moment of sim time, as far as it is kept.
+  // Shows that sim time, if it is kept.
   show(time_s: number): void {
     const { begin, end } = this.range,
       now = Math.max(begin, Math.min(end, time_s));
@@ -151,7 +152,7 @@ export class Rewind implements RunLink {
     this.bring();
   }
 
-  // Back to what runs.
+  // Back to the present.
   live(): void {
     if (!this.past) return;
     this.past = null;
@@ -160,17 +161,17 @@ export class Rewind implements RunLink {
       for (const message of entries.at(-1)?.messages ?? []) this.handler.message(channel, message);
   }
 
-  // Nothing of it holds any more.
+  // Drops everything: it is of another run.
   clear(): void {
     this.entries.clear();
     this.order.length = this.first = this.bytes = this.newest_s = 0;
-    // Its programs have not drawn it anew.
+    // Its clients have not drawn it again.
     if (this.drawn) this.draw(this.drawn.channel, 0, this.drawn.messages);
     this.live();
     this.tell();
   }
 
-  // Of a live run what is kept.
+  // For a live run: what is kept.
   history(channel: string, path: string): Promise<History> {
     if (!this.isLive) return this.inner.history(channel, path);
     return Promise.resolve(historyOf(this.entries.get(channel) ?? [], path));
@@ -186,7 +187,7 @@ export class Rewind implements RunLink {
     if (!this.past) this.handler.message(channel, bytes);
   }
 
-  // A world that was reset has no past.
+  // A reset world has no past.
   private heed(type: string, bytes: Uint8Array): void {
     const view = new DataView(bytes.buffer, bytes.byteOffset, bytes.byteLength),
       at = type === "world_state_t" ? 16 : epochOffset();
@@ -199,7 +200,7 @@ export class Rewind implements RunLink {
 
   private keep(channel: string, type: string, bytes: Uint8Array): void {
     const view = new DataView(bytes.buffer, bytes.byteOffset, bytes.byteLength),
-      drawn = type === "markers_t", // its time is its client's
+      drawn = type === "markers_t", // stamped by the client's own clock
       hasTime = !drawn && kTypes[type]?.[0]?.name === "utime" && bytes.length >= 16;
     const time = hasTime ? Number(view.getBigInt64(8)) * 1e-6 : this.newest_s;
     this.newest_s = Math.max(this.newest_s, time);
@@ -209,7 +210,8 @@ export class Rewind implements RunLink {
     if (!entries) this.entries.set(channel, (entries = []));
     const last = entries.at(-1),
       later = offset >= 0 && bytes.length >= offset + 2 && view.getInt16(offset) !== 0;
-    const copy = bytes.slice(); // of its own: a frame is not held by its smallest message
+    // a copy, so that a small message does not keep its whole frame alive
+    const copy = bytes.slice();
     this.bytes += bytes.length;
     if (drawn) {
       this.draw(channel, time, withLayer(this.drawn?.messages ?? [], copy), bytes.length);
@@ -217,7 +219,7 @@ export class Rewind implements RunLink {
     }
     if (later && last) last.messages.push(copy);
     else if (last && last.time >= time)
-      last.messages = [copy]; // of the same moment, the newer one
+      last.messages = [copy]; // the same moment: the newer message wins
     else {
       entries.push({ time, messages: [copy] });
       this.order.push({ channel, size: 0, time });
@@ -233,7 +235,7 @@ export class Rewind implements RunLink {
     entries.push({ time, messages, size });
   }
 
-  // What was drawn before the oldest moment is seen in it still: the newest of that is kept.
+  // What was drawn before the oldest kept moment is still visible then: its newest version is kept.
   private forgetDrawn(): void {
     const entries = this.drawn ? this.entries.get(this.drawn.channel)! : [];
     while (entries.length > 1 && entries[1]!.time <= this.range.begin)

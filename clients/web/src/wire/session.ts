@@ -1,5 +1,5 @@
-// Requests to the simulation, as every client makes them: JOIN, then each request with a sequence,
-// repeated until it is answered.
+// Requests to the simulation, made as any client makes them: JOIN, then each request with a
+// sequence number, repeated until it is answered.
 import { reply_t, request_t, type state_reply_t } from "../../generated/messages";
 import { decode, encode } from "./lcm";
 
@@ -26,7 +26,7 @@ export class Session {
 
   constructor(private readonly publish: (channel: string, message: Uint8Array) => boolean) {}
 
-  // Another run has other sessions.
+  // A new run knows none of the old sessions.
   begin(runId: bigint, requestChannel: string): void {
     if (runId === this.runId && requestChannel === this.requestChannel) return;
     this.runId = runId;
@@ -34,7 +34,7 @@ export class Session {
     this.session = this.sequence = 0n;
   }
 
-  // Resolves with the reply's text "" when it was done. Rejects with words.
+  // Resolves with the reply if the request succeeded; rejects with the reason if it did not.
   ask(kind: number, body: Uint8Array = kNothing): Promise<reply_t> {
     return new Promise((resolve, reject) => {
       this.queue.push({ kind, body, resolve, reject });
@@ -85,7 +85,7 @@ export class Session {
       try {
         let reply = await this.once(asked);
         if (reply.code === reply_t.UNKNOWN_SESSION) {
-          // forgotten after a long silence: join again
+          // the server has forgotten this session: join again
           this.session = 0n;
           reply = await this.once(asked);
         }
