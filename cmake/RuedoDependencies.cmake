@@ -80,13 +80,18 @@ if(NOT lcm_DIR)
   list(GET found 0 found)
   set(lcm_DIR ${found})
 endif()
-find_package(lcm 1.5.3 QUIET)
-if(NOT lcm_FOUND)
+# Its files are used, not its package: that defines targets with general names, `lcm` and `lcm-gen`, which a project that
+# contains Ruedo may have itself.
+get_filename_component(lcm_wheel "${lcm_DIR}/../../.." ABSOLUTE)
+set(PACKAGE_VERSION 0)
+include(${lcm_DIR}/lcmConfigVersion.cmake OPTIONAL)
+set(lcm_library ${lcm_wheel}/lib/liblcm.so.${PACKAGE_VERSION})
+if("${PACKAGE_VERSION}" VERSION_LESS 1.5.3 OR NOT EXISTS ${lcm_library})
   message(FATAL_ERROR "LCM 1.5.3 was not found: pip install lcm==1.5.3 into a virtual environment, and give the folder of its lcmConfig.cmake "
     "as -Dlcm_DIR=VENV/lib/python3.X/site-packages/lib/lcm/cmake")
 endif()
-# LCM's package defines targets with general names, `lcm` and `lcm-gen`, in this folder only; users of Ruedo see this one.
 add_library(ruedo::lcm SHARED IMPORTED GLOBAL)
-get_target_property(location lcm LOCATION)
-get_target_property(headers lcm INTERFACE_INCLUDE_DIRECTORIES)
-set_target_properties(ruedo::lcm PROPERTIES IMPORTED_LOCATION ${location} IMPORTED_SONAME liblcm.so.1 INTERFACE_INCLUDE_DIRECTORIES "${headers}")
+set_target_properties(ruedo::lcm PROPERTIES IMPORTED_LOCATION ${lcm_library} IMPORTED_SONAME liblcm.so.1
+  INTERFACE_INCLUDE_DIRECTORIES ${lcm_wheel}/include)
+add_executable(ruedo::lcm-gen IMPORTED GLOBAL)
+set_target_properties(ruedo::lcm-gen PROPERTIES IMPORTED_LOCATION ${lcm_wheel}/bin/lcm-gen)

@@ -10,7 +10,6 @@ install(FILES ${PROJECT_SOURCE_DIR}/src/model/xacro/expand.py DESTINATION ${CMAK
 install(DIRECTORY ${PROJECT_SOURCE_DIR}/proto DESTINATION ${CMAKE_INSTALL_DATADIR}/ruedo FILES_MATCHING PATTERN "*.lcm")
 
 # LCM, which comes from a wheel and may be missing where the tree is moved to; libraries that call our elementary functions.
-get_target_property(lcm_library ruedo::lcm LOCATION)
 install(FILES ${lcm_library} DESTINATION ${CMAKE_INSTALL_LIBDIR}/ruedo RENAME liblcm.so.1)
 get_property(copies GLOBAL PROPERTY RUEDO_OWN_MATH_COPIES)
 install(FILES ${copies} DESTINATION ${CMAKE_INSTALL_LIBDIR}/ruedo)
@@ -75,7 +74,6 @@ install(FILES ${copyright} DESTINATION ${CMAKE_INSTALL_DOCDIR})
 
 # The types of all messages as C++, for programs that speak LCM themselves; with LCM's headers in a folder of their own, for systems without LCM.
 install(DIRECTORY ${PROJECT_BINARY_DIR}/proto/ruedo DESTINATION ${CMAKE_INSTALL_INCLUDEDIR} FILES_MATCHING PATTERN "*.hpp")
-get_filename_component(lcm_wheel ${lcm_DIR}/../../.. ABSOLUTE)
 install(DIRECTORY ${lcm_wheel}/include/lcm DESTINATION lib/ruedo/include FILES_MATCHING PATTERN "*.h" PATTERN "*.hpp")
 # LCM's Python module, which the Python client is built on: of the Python that builds this.
 install(DIRECTORY ${lcm_wheel}/lcm DESTINATION ${python} PATTERN __pycache__ EXCLUDE)

@@ -23,10 +23,11 @@ def cached(name):
     return re.search(rf"^{name}:\w+=(.*)$", text, re.MULTILINE)
 
 
-def use(how, folder, *options):
+def use(how, folder, *options, generator="Ninja", standard=17):
     """Configures and builds the project; gives what its program says."""
     options = [
         f"-DHOW={how}",
+        f"-DSTANDARD={standard}",
         "-DCMAKE_BUILD_TYPE=Release",
         f"-DCMAKE_CXX_FLAGS_RELEASE={FLAGS}",
         *options,
@@ -34,8 +35,8 @@ def use(how, folder, *options):
     for name in ("CMAKE_CXX_COMPILER_LAUNCHER", "CMAKE_CXX_COMPILER"):
         if found := cached(name):
             options.append(f"-D{name}={found.group(1)}")
-    run(CMAKE, "-G", "Ninja", "-S", PROJECT, "-B", folder, f"-DFLAGS={FLAGS}", *options)
-    run(CMAKE, "--build", folder)
+    run(CMAKE, "-G", generator, "-S", PROJECT, "-B", folder, f"-DFLAGS={FLAGS}", *options)
+    run(CMAKE, "--build", folder, "--parallel", "2")
     return run(folder / "program").splitlines()
 
 
@@ -77,7 +78,17 @@ def test_find_package(tmp_path):
 
 
 def test_add_subdirectory(tmp_path):
-    program, error = use("subdirectory", tmp_path / "build", f"-DRUEDO_SOURCE={SOURCE}")
+    """By another generator and standard, beside shared libraries and targets `lcm`, `lcm-gen` and
+    `core` of the project's own.
+    """
+    program, error = use(
+        "subdirectory",
+        tmp_path / "build",
+        f"-DRUEDO_SOURCE={SOURCE}",
+        "-DBUILD_SHARED_LIBS=ON",
+        generator="Unix Makefiles",
+        standard=23,
+    )
     assert program == str(tmp_path / "build/ruedo/bin/ruedo")
     assert "/nowhere" in error
 
