@@ -271,6 +271,7 @@ void PhysicsWorld::Impl::choose_simulated() {
       update_box(i);
     }
   }
+  bool any = false;
   for (const BodyIndex i : motions_.indices()) {
     BodyMotion& motion = motions_[i];
     motion.simulated = false;
@@ -280,8 +281,12 @@ void PhysicsWorld::Impl::choose_simulated() {
         motion.tied || !alone_now ||
         (motion.kind != BodyMotion::Kind::guided && !sleeping(i) && !rigid_.bodies[i].info.moved);
     if (motion.simulated) start(i);
+    any |= motion.simulated;
   }
-  choose_pace();
+  if (any)
+    choose_pace();
+  else
+    for (auto& bodies : simulated_) bodies.clear();
 }
 
 BodyIndex PhysicsWorld::Impl::root(BodyIndex body) {
