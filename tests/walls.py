@@ -135,6 +135,26 @@ def bare_conversions(root):
     return problems
 
 
+INPUT = "src/core/input_file.cpp"
+OPENED = re.compile(
+    r"\bstd::ifstream\b(?!\s+\w+\(\"/proc/)|\bf(?:re)?open\([^;]*\"r|::open\((?:[^;](?!O_DIRECTORY))*O_RDONLY\b(?![^;]*O_DIRECTORY)"
+)
+OF_THE_KERNEL = {"src/bus/datagram_loss.cpp", "src/bus/lcm_url.cpp"}  # what they read is in /proc
+
+
+def bare_reads(root):
+    """Files that are opened to be read elsewhere than in core/input_file.h: a FIFO would stall
+    them, a device feed them for ever.
+    """
+    return [
+        f"{path.relative_to(root)}:{text.count(chr(10), 0, match.start()) + 1}: use {INPUT}"
+        for path in sorted((root / "src").rglob("*.cpp"))
+        if path.relative_to(root).as_posix() not in {INPUT, *OF_THE_KERNEL}
+        for text in [re.sub(r"//[^\n]*", "", path.read_text(encoding="utf-8"))]
+        for match in OPENED.finditer(text)
+    ]
+
+
 PYTHON_CLIENT = "clients/python/ruedo"
 OTHERS_PRIVATE = {
     "_get_packed_fingerprint"
@@ -321,6 +341,7 @@ def broken_web_walls(root):
     [
         broken_walls,
         bare_conversions,
+        bare_reads,
         dangling_ranges,
         foreign_members,
         states_left_behind,
@@ -521,6 +542,22 @@ def test_bare_conversions_are_seen(tmp_path, text, good):
         )
         == []
     ) == good
+
+
+@pytest.mark.parametrize(
+    "text, good",
+    [
+        ("std::ifstream file(path);", False),
+        ('std::FILE* file = std::fopen(path.c_str(), "rb");', False),
+        ("const int file = ::open(path.c_str(), O_RDONLY | O_CLOEXEC);", False),
+        ('std::ifstream file("/proc/net/tcp");', True),
+        ('std::FILE* file = std::fopen(path.c_str(), "wb");', True),
+        ("const int folder = ::open(path.c_str(), O_RDONLY | O_DIRECTORY);", True),
+        ("const int file = ::open(path.c_str(), O_WRONLY | O_CREAT, 0666);", True),
+    ],
+)
+def test_bare_reads_are_seen(tmp_path, text, good):
+    assert (bare_reads(tree(tmp_path, {"src/core/a.cpp": text + "\n"})) == []) == good
 
 
 @pytest.mark.parametrize(

@@ -47,6 +47,7 @@ struct Schema {
   std::string name;         // "planar_lidar_t"
   int64_t fingerprint = 0;  // LCM's hash of the type, the first eight bytes of a message
   std::vector<Field> fields;
+  size_t least_bytes = 0;  // that its values take on the wire
 };
 
 // The type of that name, or with that fingerprint; null when Ruedo has none.

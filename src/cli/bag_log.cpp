@@ -14,6 +14,7 @@
 
 #include "cli/mcap_reader.h"
 #include "cli/rosbag.h"
+#include "core/input_file.h"
 #include "core/utf8.h"
 #include "log/reader.h"
 #include "log/writer.h"
@@ -47,15 +48,17 @@ std::string file_of_bag(const std::string& folder) {
 
 void copy_part(const std::string& from, uint64_t offset, uint64_t size, const fs::path& to) {
   fs::create_directories(to.parent_path());
-  std::ifstream in(from, std::ios::binary);
+  const InputFile in = open_input(from);
   std::ofstream out(to, std::ios::binary);
-  in.seekg(static_cast<std::streamoff>(offset));
+  if (::fseeko(in.file.get(), static_cast<off_t>(offset), SEEK_SET) != 0)
+    throw InputError({from}, "cannot be read: " + std::string(std::strerror(errno)));
   std::vector<char> part(size_t{1} << 20);
   for (uint64_t left = size; left > 0;) {
-    const auto count = static_cast<std::streamsize>(std::min<uint64_t>(left, part.size()));
-    if (!in.read(part.data(), count)) throw InputError({from}, "became shorter while it was read");
-    out.write(part.data(), count);
-    left -= static_cast<uint64_t>(count);
+    const size_t count = std::min<uint64_t>(left, part.size());
+    if (std::fread(part.data(), 1, count, in.file.get()) != count)
+      throw InputError({from}, "became shorter while it was read");
+    out.write(part.data(), static_cast<std::streamsize>(count));
+    left -= count;
   }
   out.close();
   if (!out) throw EnvironmentError(to.string() + " cannot be written: " + std::strerror(errno));

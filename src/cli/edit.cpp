@@ -6,6 +6,7 @@
 #include <unistd.h>
 
 #include "cli/run_command.h"
+#include "core/input_file.h"
 #include "model/document.h"
 #include "model/world_name.h"
 #include "ruedo/errors.h"
@@ -39,7 +40,7 @@ bool is_new(const EditArguments& arguments) {
 // Whether what is loaded has a <world> of its own that can be written back.
 bool has_world(const std::string& path) {
   constexpr size_t kMost = 64u << 20;
-  return model::parse_document(model::read_text_file(path, kMost), path)->has("world");
+  return model::parse_document(read_input(path, kMost), path)->has("world");
 }
 
 std::string target(const EditArguments& arguments) {

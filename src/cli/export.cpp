@@ -78,9 +78,6 @@ void export_bag(const ExportArguments& arguments, const log::Index& index,
 
 void export_foxglove(const ExportArguments& arguments, const log::Index& index,
                      const run::LogWorlds& worlds) {
-  std::error_code error;
-  if (std::filesystem::equivalent(arguments.log, arguments.out, error))
-    throw InputError({}, "OUT is the log itself: " + arguments.out);
   McapWriter out(arguments.out);
   FoxgloveFile file(out);
   FoxgloveExport foxglove(file);

@@ -1,16 +1,24 @@
 // ruedo: reads the command line, runs one command, and turns what went wrong into one line and an
 // exit code.
+#include <fcntl.h>
 #include <sys/resource.h>
+#include <unistd.h>
 
+#include <cerrno>
+#include <csignal>
 #include <cstdio>
+#include <cstring>
 #include <exception>
 #include <filesystem>
+#include <iostream>
 #include <new>
+#include <system_error>
 
 #include <fmt/format.h>
 #include <spdlog/sinks/stdout_color_sinks.h>
 #include <spdlog/spdlog.h>
 
+#include "cli/argument_rules.h"
 #include "cli/commands.h"
 #include "cli/progress_line.h"
 #include "core/installation.h"
@@ -57,6 +65,22 @@ std::string suggestion(const CLI::App& app, int argc, char** argv) {
       return fmt::format("; there is no '{}', there are {}", word, fmt::join(known, ", "));
   }
   return "";
+}
+
+// In place of a standard stream that is closed, /dev/null: the next file that is opened would take
+// its number, and a log get what is printed.
+void open_standard_streams() {
+  for (int stream = STDIN_FILENO; stream <= STDERR_FILENO; ++stream) {
+    if (::fcntl(stream, F_GETFD) < 0) ::open("/dev/null", O_RDWR);  // the lowest that is free
+  }
+}
+
+// What is still to be printed may meet a full disk. A reader that has gone, as `| head` does, has
+// what it wanted.
+void flush_output() {
+  if (std::fflush(stdout) != 0 && errno != EPIPE)
+    throw ruedo::EnvironmentError(std::string("standard output cannot be written: ") +
+                                  std::strerror(errno));
 }
 
 // Checks what threads and libraries cannot do without, and would hang or crash for want of, where
@@ -120,24 +144,36 @@ int run(int argc, char** argv) {
   Action action;
   for (const RegisterCommand::Add add : registered_commands()) add(app, action);
   add_quiet(app);
+  refuse_empty_values(app);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
-    if (error.get_exit_code() == 0) return app.exit(error);  // --help, --version
+    if (error.get_exit_code() == 0) {  // --help, --version
+      app.exit(error);
+      std::cout.flush();
+      flush_output();
+      return kGood;
+    }
     say(std::string(error.what()) + suggestion(app, argc, argv));
     fmt::print(stderr, "Run `ruedo --help`, or `ruedo COMMAND --help`.\n");
     return kWrongUsage;
   }
   check_limits();
   const CLI::App* command = app.get_subcommands().front();
+  check_outputs(*command);
   const CLI::Option* quiet = command->get_option_no_throw("--quiet");
   if (quiet == nullptr ? !command->get_prefix_command() : quiet->empty()) begin_progress_line();
-  return action();
+  const int code = action();
+  flush_output();
+  return code;
 }
 
 }  // namespace
 
 int main(int argc, char** argv) {
+  open_standard_streams();
+  // A write beyond `ulimit -f` then fails as on a full disk. Not SIG_IGN, which children inherit.
+  std::signal(SIGXFSZ, [](int) {});
   ruedo::scene::draw_the_same_everywhere();
   spdlog::set_default_logger(spdlog::stderr_color_mt("ruedo"));
   spdlog::set_pattern("%^ruedo: %l:%$ %v");
@@ -154,6 +190,11 @@ int main(int argc, char** argv) {
     return kEnvironment;
   } catch (const std::bad_alloc&) {
     say("there is not enough memory");
+    return kEnvironment;
+  } catch (const std::system_error& error) {
+    say(error.code() == std::errc::resource_unavailable_try_again
+            ? "no thread can be started: raise ulimit -u or ulimit -v"
+            : error.what());
     return kEnvironment;
   } catch (const std::exception& error) {
     say(error.what());

@@ -3,12 +3,12 @@
 
 #include <cstdio>
 #include <cstring>
-#include <filesystem>
-#include <memory>
+#include <utility>
 #include <vector>
 
 #include <fmt/format.h>
 
+#include "core/input_file.h"
 #include "ruedo/errors.h"
 #include "run/tick.h"
 
@@ -70,10 +70,10 @@ class Fields {
 
 class McapFile {
  public:
-  McapFile(const std::string& path, const McapHandler& handler)
-      : path_(path), handler_(handler), file_(std::fopen(path.c_str(), "rb")) {
-    if (!file_) throw InputError({path}, std::string("cannot be read: ") + std::strerror(errno));
-    size_ = std::filesystem::file_size(path);
+  McapFile(const std::string& path, const McapHandler& handler) : path_(path), handler_(handler) {
+    InputFile input = open_input(path);
+    file_ = std::move(input.file);
+    size_ = static_cast<uint64_t>(input.size);
   }
 
   void read() {
@@ -171,12 +171,9 @@ class McapFile {
     if (!fields.good()) damaged("has a damaged record");
   }
 
-  struct Close {
-    void operator()(std::FILE* file) const { std::fclose(file); }
-  };
   const std::string& path_;
   const McapHandler& handler_;
-  std::unique_ptr<std::FILE, Close> file_;
+  std::unique_ptr<std::FILE, InputFile::Close> file_;
   uint64_t size_ = 0, offset_ = 0, begin_ = 0;  // begin_: of the record
   std::map<uint16_t, std::string> schemas_;
   std::map<uint16_t, McapChannel> channels_;
@@ -190,14 +187,12 @@ void read_mcap(const std::string& path, const McapHandler& handler) {
 
 bool is_mcap(const std::string& path) {
   char begin[kMagicSize] = {};
-  std::error_code error;
-  if (!std::filesystem::is_regular_file(path, error)) return false;
-  std::FILE* file = std::fopen(path.c_str(), "rb");
-  if (!file) return false;
-  const bool is = std::fread(begin, 1, kMagicSize, file) == kMagicSize &&
-                  std::memcmp(begin, kMagic, kMagicSize) == 0;
-  std::fclose(file);
-  return is;
+  try {
+    return std::fread(begin, 1, kMagicSize, open_input(path).file.get()) == kMagicSize &&
+           std::memcmp(begin, kMagic, kMagicSize) == 0;
+  } catch (const InputError&) {
+    return false;
+  }
 }
 
 }  // namespace ruedo::cli

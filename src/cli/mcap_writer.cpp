@@ -7,6 +7,7 @@
 #include <cstring>
 #include <filesystem>
 
+#include "core/input_file.h"
 #include "core/version.h"
 #include "ruedo/errors.h"
 #include "run/tick.h"
@@ -170,10 +171,8 @@ void McapWriter::end_chunk() {
 void McapWriter::add_attachment(const std::string& name, const std::string& media_type,
                                 const std::string& path) {
   end_chunk();
-  std::error_code error;
-  const uint64_t size = std::filesystem::file_size(path, error);
-  const std::unique_ptr<std::FILE, Close> file(error ? nullptr : std::fopen(path.c_str(), "rb"));
-  if (!file) throw EnvironmentError(path + " cannot be read: " + std::strerror(errno));
+  const InputFile input = open_input(path);
+  const auto size = static_cast<uint64_t>(input.size);
   std::string fields;
   put(fields, uint64_t{0});  // logged: from the beginning on
   put(fields, uint64_t{0});  // a bag's bytes must not depend on when it was made
@@ -189,7 +188,7 @@ void McapWriter::add_attachment(const std::string& name, const std::string& medi
   std::vector<char> part(kChunkSize);
   for (uint64_t left = size; left > 0;) {
     const size_t count =
-        std::fread(part.data(), 1, std::min<uint64_t>(left, part.size()), file.get());
+        std::fread(part.data(), 1, std::min<uint64_t>(left, part.size()), input.file.get());
     if (count == 0) throw EnvironmentError(path + " became shorter while it was read");
     write({part.data(), count});
     crc = crc_of({part.data(), count}, crc);

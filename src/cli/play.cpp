@@ -28,6 +28,13 @@ constexpr auto kLongestSleep = std::chrono::milliseconds(100);  // Ctrl-C is see
 
 volatile std::sig_atomic_t interrupted = 0;
 
+// Without SA_RESTART, so that what waits, as for the reader of a FIFO, ends.
+void heed(int signal) {
+  struct sigaction action{};
+  action.sa_handler = [](int) { interrupted = 1; };
+  ::sigaction(signal, &action, nullptr);
+}
+
 struct PlayArguments {
   std::string log, speed = "1", lcm, view, html, other;
   double html_size = 20.0;
@@ -65,8 +72,8 @@ int play(const PlayArguments& arguments) {
   read_given_types();
   if (arguments.sandboxed) enter_sandbox(arguments.log, {arguments.html}, arguments.other);
   const double speed = parse_rate(arguments.speed, "--speed");
-  std::signal(SIGINT, [](int) { interrupted = 1; });
-  std::signal(SIGTERM, [](int) { interrupted = 1; });
+  heed(SIGINT);
+  heed(SIGTERM);
   const BagLog first(arguments.log), second(arguments.other);  // as logs, where they are bags
   if (!arguments.html.empty())
     return write_page(first.path(), arguments.html, arguments.html_size), kGood;

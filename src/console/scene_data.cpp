@@ -3,15 +3,13 @@
 
 #include <array>
 #include <cstring>
-#include <filesystem>
-#include <fstream>
-#include <iterator>
 #include <limits>
 #include <map>
 #include <memory>
 
 #include <opencv2/imgproc.hpp>
 
+#include "core/input_file.h"
 #include "core/json.h"
 #include "model/body_layout.h"
 #include "model/codecs.h"
@@ -59,11 +57,12 @@ class Blob {
 // any screen, are converted to PNG.
 Picture picture(const model::Texture& texture) {
   std::vector<uint8_t> bytes = texture.embedded;
-  std::error_code error;
-  if (!texture.path.empty() && std::filesystem::is_regular_file(texture.path, error) &&
-      std::filesystem::file_size(texture.path, error) <= kMostPictureBytes) {
-    std::ifstream file(texture.path, std::ios::binary);
-    bytes.assign(std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>());
+  if (!texture.path.empty()) {
+    try {
+      const std::string file = read_input(texture.path, kMostPictureBytes);
+      bytes.assign(file.begin(), file.end());
+    } catch (const InputError&) {  // larger, or gone: decoded below, or left out
+    }
   }
   const auto begins = [&](const char* magic, size_t size) {
     return bytes.size() > size && std::memcmp(bytes.data(), magic, size) == 0;

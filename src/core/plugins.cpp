@@ -7,8 +7,6 @@
 #include <cstdlib>
 #include <exception>
 #include <filesystem>
-#include <fstream>
-#include <iterator>
 #include <map>
 #include <mutex>
 #include <set>
@@ -16,6 +14,7 @@
 
 #include <dlfcn.h>
 
+#include "core/input_file.h"
 #include "core/sha256.h"
 #include "ruedo/errors.h"
 #include "ruedo/plugin.h"
@@ -31,7 +30,7 @@ constexpr std::string_view kElf =
     "ELF";
 constexpr std::string_view kMark = RUEDO_PLUGIN_MARK;
 constexpr const char* kAbi = RUEDO_PLUGIN_ABI;
-constexpr uintmax_t kLargest = 1'000'000'000;  // bytes
+constexpr size_t kLargest = 1'000'000'000;  // bytes
 
 std::mutex& mutex() {
   static std::mutex one;
@@ -41,19 +40,6 @@ std::mutex& mutex() {
 std::vector<Plugin>& plugins() {
   static std::vector<Plugin> list;
   return list;
-}
-
-std::string read(const fs::path& path) {
-  std::error_code error;
-  if (!fs::is_regular_file(path, error))
-    throw InputError({path.string()},
-                     error || !fs::exists(path) ? "there is no such plugin" : "is no file");
-  if (fs::file_size(path, error) > kLargest || error)
-    throw InputError({path.string()}, "is too large for a plugin");
-  std::ifstream file(path, std::ios::binary);
-  std::string bytes{std::istreambuf_iterator<char>(file), {}};
-  if (!file) throw InputError({path.string()}, "cannot be read");
-  return bytes;
 }
 
 // What the plugin was built for, by its bytes.
@@ -174,7 +160,7 @@ Plugin load_plugin(const std::string& given) {
   for (const Plugin& plugin : plugins()) {
     if (plugin.path == path) return plugin;
   }
-  const std::string bytes = read(resolved);
+  const std::string bytes = read_input(path, kLargest);
   check_abi(built_for(bytes, path), path);
   Plugin plugin{fs::path(given).filename().string(), path,
                 sha256(reinterpret_cast<const uint8_t*>(bytes.data()), bytes.size())};

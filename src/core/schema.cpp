@@ -11,12 +11,12 @@
 #include <charconv>
 #include <deque>
 #include <filesystem>
-#include <fstream>
-#include <iterator>
 #include <map>
 #include <memory>
 
+#include "core/input_file.h"
 #include "core/type_files.h"
+#include "core/wire_size.h"
 #include "ruedo/errors.h"
 
 namespace fs = std::filesystem;
@@ -155,6 +155,9 @@ bool parse_member(Tokens& tokens, std::string_view type, Parsed& parsed) {
     parsed.hash = mix(mix(parsed.hash, static_cast<uint8_t>(fixed ? 0 : 1)), size);
     field.dimensions.push_back(dimension);
   }
+  if (parsed.schema.fields.size() == kMostTypeFields)
+    tokens.fail("'" + parsed.schema.name + "' has more than " + std::to_string(kMostTypeFields) +
+                " fields");
   parsed.schema.fields.push_back(std::move(field));
   parsed.type_names.emplace_back(type);
   return token == ",";
@@ -162,6 +165,7 @@ bool parse_member(Tokens& tokens, std::string_view type, Parsed& parsed) {
 
 void parse_file(std::string_view text, const std::string& file, std::deque<Parsed>& all) {
   Tokens tokens(text, file);
+  const size_t before = all.size();
   for (std::string_view token = tokens.next(); !token.empty(); token = tokens.next()) {
     if (token != "struct") continue;
     Parsed parsed;
@@ -178,6 +182,22 @@ void parse_file(std::string_view text, const std::string& file, std::deque<Parse
     }
     all.push_back(std::move(parsed));
   }
+  if (all.size() == before) throw InputError({file}, "holds no message type: no struct of LCM's");
+}
+
+constexpr size_t kCountless = size_t{1} << 62;
+
+size_t saturating_sum(size_t a, size_t b) { return a < kCountless - b ? a + b : kCountless; }
+size_t saturating_product(size_t a, size_t b) {
+  return b == 0 || a < kCountless / b ? a * b : kCountless;
+}
+
+// The fewest bytes that a field takes on the wire, with all of its elements.
+size_t least_bytes(const Field& field) {
+  size_t bytes = least_size(field);
+  for (const Dimension& d : field.dimensions)
+    bytes = saturating_product(bytes, d.counted_by < 0 ? static_cast<size_t>(d.size) : 0);
+  return bytes;
 }
 
 // Ruedo's types, or a user's, which may hold some of Ruedo's.
@@ -203,9 +223,10 @@ class Registry {
                                                    "', which is in no .lcm file that was read");
       }
     }
-    for (size_t i = 0; i < schemas_.size(); ++i) {
-      schemas_[i].fingerprint = static_cast<int64_t>(fingerprint(schemas_[i], parsed, 0));
-      by_fingerprint_.emplace(schemas_[i].fingerprint, &schemas_[i]);
+    std::vector<Extent> extents(schemas_.size());
+    for (Schema& schema : schemas_) {
+      measure(schema, parsed, extents, 0);
+      by_fingerprint_.emplace(schema.fingerprint, &schema);
     }
   }
 
@@ -226,17 +247,58 @@ class Registry {
     return type.substr(type.rfind('.') + 1);
   }
 
-  // LCM's hash of a type of this registry, or, as it stands there, of another one.
-  uint64_t fingerprint(const Schema& schema, const std::deque<Parsed>& parsed, size_t depth) const {
-    if (&schema < schemas_.data() || &schema >= schemas_.data() + schemas_.size())
-      return static_cast<uint64_t>(schema.fingerprint);
-    if (depth > schemas_.size())
+  // How large a type is with all that it holds.
+  struct Extent {
+    enum { unknown, under_way, known } state = unknown;
+    size_t fields = 0;
+    int height = 0;  // of structs in structs
+  };
+
+  // Fills in the fingerprint, LCM's hash of a type, and what its values take at least; those of
+  // another registry's types are known. Each type is measured once, however many hold it.
+  Extent measure(Schema& schema, const std::deque<Parsed>& parsed, std::vector<Extent>& extents,
+                 int depth) {
+    const auto at = static_cast<size_t>(&schema - schemas_.data());
+    Extent& extent = extents[at];
+    if (extent.state == Extent::known) return extent;
+    if (extent.state == Extent::under_way)
       throw InputError({schema.name}, "holds itself, which cannot be read");
-    uint64_t hash = parsed[static_cast<size_t>(&schema - schemas_.data())].hash;
+    if (depth > kMostTypeDepth) too_deep(schema);
+    extent.state = Extent::under_way;
+    uint64_t hash = parsed[at].hash;
     for (const Field& field : schema.fields) {
-      if (field.type != nullptr) hash += fingerprint(*field.type, parsed, depth + 1);
+      if (field.type != nullptr) {
+        if (Schema* own = own_of(field.type)) {
+          const Extent held = measure(*own, parsed, extents, depth + 1);
+          extent.fields += held.fields;
+          extent.height = std::max(extent.height, held.height + 1);
+          if (extent.height > kMostTypeDepth) too_deep(schema);
+        }
+        if (field.type->least_bytes == 0)
+          throw InputError({schema.name}, "'" + field.name + "' is of the type '" +
+                                              field.type->name +
+                                              "', which holds nothing, and cannot be read");
+        hash += static_cast<uint64_t>(field.type->fingerprint);
+      }
+      if (++extent.fields > kMostTypeFields)
+        throw InputError({schema.name}, "has, with the types that it holds, more than " +
+                                            std::to_string(kMostTypeFields) + " fields");
+      schema.least_bytes = saturating_sum(schema.least_bytes, least_bytes(field));
     }
-    return (hash << 1) + (hash >> 63);
+    schema.fingerprint = static_cast<int64_t>((hash << 1) + (hash >> 63));
+    extent.state = Extent::known;
+    return extent;
+  }
+
+  [[noreturn]] static void too_deep(const Schema& schema) {
+    throw InputError({schema.name}, "holds structs in structs more than " +
+                                        std::to_string(kMostTypeDepth) + " deep");
+  }
+
+  // null: another registry's.
+  Schema* own_of(const Schema* schema) {
+    const bool own = schema >= schemas_.data() && schema < schemas_.data() + schemas_.size();
+    return own ? schemas_.data() + (schema - schemas_.data()) : nullptr;
   }
 
   std::vector<Schema> schemas_;  // by name
@@ -258,13 +320,6 @@ const Registry& registry() {
 std::unique_ptr<const Registry>& own_registry() {
   static std::unique_ptr<const Registry> own;
   return own;
-}
-
-std::string text_of(const fs::path& path) {
-  std::ifstream file(path, std::ios::binary);
-  std::string text{std::istreambuf_iterator<char>(file), {}};
-  if (!file) throw InputError({path.string()}, "cannot be read");
-  return text;
 }
 
 }  // namespace
@@ -290,7 +345,8 @@ void read_types(const std::vector<std::string>& places) {
     } else {
       files.emplace_back(place);
     }
-    for (const fs::path& file : files) texts.emplace_back(file.string(), text_of(file));
+    for (const fs::path& file : files)
+      texts.emplace_back(file.string(), read_input(file.string(), kMostTypeBytes));
   }
   if (!texts.empty()) own_registry() = std::make_unique<const Registry>(texts, &registry());
 }

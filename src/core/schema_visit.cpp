@@ -3,14 +3,12 @@
 #include <bit>
 #include <charconv>
 
+#include "core/type_files.h"
 #include "core/wire_size.h"
 #include "ruedo/schema.h"
 
 namespace ruedo {
 namespace {
-
-// Structs in structs; ours go three deep.
-constexpr int kMaxDepth = 16;
 
 // What is always there of a value: of a string its length, which the text follows.
 size_t fixed_size(Primitive primitive) {
@@ -23,22 +21,6 @@ uint64_t big_endian(const uint8_t* bytes, size_t size) {
   return value;
 }
 
-// The fewest bytes that a value of this type takes on the wire; bounds the count of elements of
-// hostile arrays.
-size_t least_size(const Field& field, int depth) {
-  if (field.primitive == Primitive::string) return 5;
-  if (field.primitive != Primitive::none) return fixed_size(field.primitive);
-  if (field.type == nullptr || depth > kMaxDepth) return 0;
-  size_t sum = 0;
-  for (const Field& member : field.type->fields) {
-    size_t count = 1;
-    for (const Dimension& d : member.dimensions)
-      count *= d.counted_by < 0 ? static_cast<size_t>(d.size) : 0;
-    sum += count * least_size(member, depth + 1);
-  }
-  return sum;
-}
-
 using Visitor = std::function<bool(const FieldPath&, const FieldValue&)>;
 
 class Walk {
@@ -46,7 +28,7 @@ class Walk {
   Walk(std::span<const uint8_t> bytes, const Visitor* visitor) : bytes_(bytes), visitor_(visitor) {}
 
   bool fields(const Schema& schema, int depth) {
-    if (depth > kMaxDepth) return false;
+    if (depth > kMostTypeDepth) return false;
     std::vector<int64_t> counts(schema.fields.size(), 0);
     for (size_t i = 0; i < schema.fields.size(); ++i) {
       const Field& field = schema.fields[i];
@@ -73,7 +55,7 @@ class Walk {
     const Dimension& d = field.dimensions[dimension];
     const int64_t count = d.counted_by < 0 ? d.size : counts[static_cast<size_t>(d.counted_by)];
     if (count < 0) return false;
-    const size_t least = least_size(field, depth);
+    const size_t least = least_size(field);
     if (least > 0 && static_cast<uint64_t>(count) > (bytes_.size() - at_) / least) return false;
     // Without a visitor, numbers need no look at each.
     if (visitor_ == nullptr && dimension + 1 == field.dimensions.size() &&

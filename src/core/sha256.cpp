@@ -1,15 +1,15 @@
 // OpenSSL's EVP digests.
 #include "core/sha256.h"
 
-#include <fcntl.h>
-#include <sys/stat.h>
-
 #include <array>
 #include <cstdio>
 #include <memory>
 #include <vector>
 
 #include <openssl/evp.h>
+
+#include "core/input_file.h"
+#include "ruedo/errors.h"
 
 namespace ruedo {
 namespace {
@@ -50,22 +50,18 @@ std::string sha256(const uint8_t* data, size_t size) {
 }
 
 std::string sha256_of_file(const std::string& path) {
-  struct Close {
-    void operator()(std::FILE* file) const { std::fclose(file); }
-  };
-  // Not blocking: to open a FIFO would wait for its writer. What is looked at is what was opened.
-  const int descriptor = ::open(path.c_str(), O_RDONLY | O_NONBLOCK | O_CLOEXEC);
-  if (descriptor < 0) return "";
-  const std::unique_ptr<std::FILE, Close> file(::fdopen(descriptor, "rb"));
-  struct stat info{};
-  if (!file || ::fstat(descriptor, &info) != 0 || !S_ISREG(info.st_mode) ||
-      info.st_size > kMostBytes)
+  InputFile input;
+  try {
+    input = open_input(path);
+  } catch (const InputError&) {
     return "";
+  }
+  if (input.size > kMostBytes) return "";
   Digest digest;
   std::vector<uint8_t> piece(1 << 16);
-  while (const size_t got = std::fread(piece.data(), 1, piece.size(), file.get()))
+  while (const size_t got = std::fread(piece.data(), 1, piece.size(), input.file.get()))
     digest.add(piece.data(), got);
-  return std::ferror(file.get()) ? "" : digest.hex();
+  return std::ferror(input.file.get()) ? "" : digest.hex();
 }
 
 }  // namespace ruedo

@@ -2,6 +2,7 @@
 // then knows them, too.
 #pragma once
 
+#include <cstddef>
 #include <span>
 #include <string>
 #include <vector>
@@ -10,9 +11,15 @@
 
 namespace ruedo {
 
+// The largest type that is read, so that no small file makes a large one: .lcm files of 1 MiB,
+// structs in structs (ours go three deep), and fields of a struct with those of all that it holds.
+constexpr size_t kMostTypeBytes = size_t{1} << 20;
+constexpr int kMostTypeDepth = 16;
+constexpr size_t kMostTypeFields = 10'000;
+
 // Reads .lcm files, and those of folders; find_schema(fingerprint) finds their types from then on.
 // They may hold types of Ruedo's. Once, before any thread asks. Throws InputError with file and
-// line.
+// line, or with the type.
 void read_types(const std::vector<std::string>& places);
 
 // Those that were read; empty before.

@@ -24,4 +24,11 @@ constexpr size_t wire_size(Primitive primitive) {
   return 0;
 }
 
+// The fewest bytes that one value of a field takes; bounds the count of elements of hostile arrays.
+inline size_t least_size(const Field& field) {
+  if (field.primitive == Primitive::string) return 5;  // its length, and the zero at its end
+  if (field.primitive != Primitive::none) return wire_size(field.primitive);
+  return field.type == nullptr ? 0 : field.type->least_bytes;
+}
+
 }  // namespace ruedo

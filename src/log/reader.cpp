@@ -5,8 +5,7 @@
 #include <sys/stat.h>
 
 #include <array>
-#include <cerrno>
-#include <cstring>
+#include <utility>
 
 #include "ruedo/errors.h"
 
@@ -44,14 +43,10 @@ bool is_bag_folder(const std::string& path) {
 }  // namespace
 
 Reader::Reader(const std::string& path) : path_(path) {
-  struct stat status{};
-  if (stat(path.c_str(), &status) != 0)
-    throw InputError({path}, std::string("cannot be read: ") + std::strerror(errno));
-  if (S_ISDIR(status.st_mode) && is_bag_folder(path)) refuse_bag(path);
-  if (!S_ISREG(status.st_mode)) throw InputError({path}, "is not a file; an LCM log is expected");
-  size_ = status.st_size;
-  file_.reset(std::fopen(path.c_str(), "rb"));
-  if (!file_) throw InputError({path}, std::string("cannot be read: ") + std::strerror(errno));
+  if (is_bag_folder(path)) refuse_bag(path);
+  InputFile input = open_input(path);
+  file_ = std::move(input.file);
+  size_ = input.size;
   std::array<uint8_t, 4> sync{};
   if (size_ > 0 && (!read(sync.data(), sync.size()) || read32(sync.data()) != kSync)) {
     if (read32(sync.data()) == kMcap) refuse_bag(path);

@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "core/input_file.h"
 #include "core/progress.h"
 #include "ruedo/sim_time.h"
 
@@ -45,11 +46,8 @@ class Reader {
   bool read(void* into, size_t size);
   bool skip(size_t size);
 
-  struct Close {
-    void operator()(std::FILE* file) const { std::fclose(file); }
-  };
   std::string path_;
-  std::unique_ptr<std::FILE, Close> file_;
+  std::unique_ptr<std::FILE, InputFile::Close> file_;
   int64_t size_ = 0;
   int64_t offset_ = 0;
   std::string fault_;

@@ -97,12 +97,15 @@ void Ring::write(int64_t timestamp_us, const std::string& channel, const uint8_t
 
 // Headers, and the requests that changed the world, as the console and `export` follow them.
 void Ring::keep_for_later(const std::string& channel, const uint8_t* data, size_t size) {
-  if (preamble_.size() >= 2 * Index::kMostEdits) return;
   applied_t applied;
-  if (channel == kHeaderChannel ||
-      (channel == kAppliedChannel && decode_checked(data, size, applied) == DecodeFault::none &&
-       changes_world(applied.kind)))
-    preamble_.push_back({channel, {data, data + size}});
+  if (!follows_ ||
+      (channel != kHeaderChannel &&
+       (channel != kAppliedChannel || decode_checked(data, size, applied) != DecodeFault::none ||
+        !changes_world(applied.kind))))
+    return;
+  if (!preamble_.empty()) preamble_bytes_ += static_cast<int64_t>(size);  // but the first header
+  follows_ = preamble_.size() < 2 * Index::kMostEdits && preamble_bytes_ <= limit_ / kPreambleShare;
+  if (follows_) preamble_.push_back({channel, {data, data + size}});
 }
 
 void Ring::flush() {

@@ -21,6 +21,8 @@ class Ring {
  public:
   static constexpr int64_t kLeastLimit = int64_t{16} << 20;  // bytes
   static constexpr int kFiles = 8;                           // about so many beside run.lcm
+  // Each numbered file begins with what had changed the world by then: half of it at most.
+  static constexpr int64_t kPreambleShare = 2 * kFiles;
 
   // Removes the numbered files of an earlier run. Throws EnvironmentError when a file cannot be
   // created.
@@ -36,6 +38,8 @@ class Ring {
   const std::string& error() const { return error_; }
   // False: the record of what acted fills half of the limit, and is no longer kept.
   bool repeats() const { return repeats_; }
+  // False: so much has changed the world that numbered files no longer begin with all of it.
+  bool follows() const { return follows_; }
 
  private:
   struct File {
@@ -60,6 +64,8 @@ class Ring {
   int64_t full_bytes_ = 0;
   int64_t number_ = 0;  // of file_
   std::vector<Event> preamble_;
+  int64_t preamble_bytes_ = 0;
+  bool follows_ = true;
   bool repeats_ = true;
   std::string error_;
 };

@@ -10,6 +10,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include "core/input_file.h"
 #include "ruedo/errors.h"
 
 namespace ruedo::log {
@@ -97,10 +98,12 @@ std::string Writer::append(const Writer& other) {
 std::string Writer::append(const std::string& path, int64_t begin, int64_t end, int64_t events) {
   flush();
   if (!error_.empty()) return error_;
-  const int file = ::open(path.c_str(), O_RDONLY | O_CLOEXEC);
-  if (file < 0) return path + ": " + std::strerror(errno);
-  const std::string fault = copy(file, path, begin, end);
-  ::close(file);
+  std::string fault;
+  try {
+    fault = copy(::fileno(open_input(path).file.get()), path, begin, end);
+  } catch (const InputError& error) {
+    fault = error.what();
+  }
   if (fault.empty()) events_ += events;
   return fault;
 }

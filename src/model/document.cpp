@@ -1,17 +1,13 @@
 // Reads files into element trees, with tinyxml2.
 #include "model/document.h"
 
-#include <fcntl.h>
-#include <sys/stat.h>
-
 #include <algorithm>
-#include <cerrno>
-#include <cstdio>
-#include <cstring>
 #include <set>
 #include <string_view>
 
 #include <tinyxml2.h>
+
+#include "core/input_file.h"
 
 namespace ruedo::model {
 namespace {
@@ -197,37 +193,10 @@ std::unique_ptr<Element> parse_document(const std::string& text, const std::stri
   return Converter{file}.convert(*root);
 }
 
-std::string read_text_file(const std::string& path, size_t max_bytes) {
-  // Opened once, without blocking on a FIFO: the file that is checked is the file that is read.
-  const int descriptor = ::open(path.c_str(), O_RDONLY | O_NONBLOCK | O_CLOEXEC);
-  if (descriptor < 0)
-    throw InputError({path, 0}, errno == ENOENT
-                                    ? "no such file"
-                                    : std::string("cannot be read: ") + std::strerror(errno));
-  struct Close {
-    void operator()(std::FILE* file) const { std::fclose(file); }
-  };
-  const std::unique_ptr<std::FILE, Close> file(::fdopen(descriptor, "rb"));
-  struct stat info{};
-  if (!file || ::fstat(descriptor, &info) != 0)
-    throw InputError({path, 0}, std::string("cannot be read: ") + std::strerror(errno));
-  if (S_ISDIR(info.st_mode)) throw InputError({path, 0}, "is a folder; a file is needed");
-  if (!S_ISREG(info.st_mode)) throw InputError({path, 0}, "is not a regular file");
-  if (static_cast<size_t>(info.st_size) > max_bytes) {
-    throw InputError({path, 0}, "has " + std::to_string(info.st_size) + " bytes; allowed are " +
-                                    std::to_string(max_bytes));
-  }
-  std::string text(static_cast<size_t>(info.st_size), '\0');
-  text.resize(std::fread(text.data(), 1, text.size(), file.get()));
-  if (std::ferror(file.get()))
-    throw InputError({path, 0}, std::string("cannot be read: ") + std::strerror(errno));
-  return text;
-}
-
 std::shared_ptr<const Element> DocumentStore::read(const std::string& path) {
   auto& document = documents_[path];
   if (!document) {
-    document = parse_document(read_text_file(path, kMaxFileBytes), path);
+    document = parse_document(read_input(path, kMaxFileBytes), path);
     files_.push_back(path);
   }
   return document;

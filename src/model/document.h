@@ -17,10 +17,6 @@ namespace ruedo::model {
 // Entities other than XML's own five are not expanded: a file cannot grow while it is read.
 std::unique_ptr<Element> parse_document(const std::string& text, const std::string& file);
 
-// The bytes of a file of at most max_bytes. Throws InputError that names the file and what is wrong
-// with it.
-std::string read_text_file(const std::string& path, size_t max_bytes);
-
 // The documents of one load, each read once. Paths are absolute.
 class DocumentStore {
  public:

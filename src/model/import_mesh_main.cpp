@@ -20,6 +20,7 @@
 #include <assimp/scene.h>
 #include <assimp/Importer.hpp>
 
+#include "core/input_file.h"
 #include "core/sandbox.h"
 #include "model/document.h"
 #include "model/mesh_format.h"
@@ -65,7 +66,7 @@ class NotingFiles : public Assimp::DefaultIOSystem {
   // assimp does not recognise a colour with a space before its first number (" 0.3 0.3 0.3 1"), and
   // refuses the file.
   Assimp::IOStream* without_leading_blanks() const {
-    const std::string text = read_text_file(mesh_.string(), MeshLimits::kFileBytes);
+    const std::string text = ruedo::read_input(mesh_.string(), MeshLimits::kFileBytes);
     auto* kept = new uint8_t[text.size() + 1];  // the stream owns it
     size_t size = 0;
     for (size_t i = 0; i < text.size();) {
@@ -87,7 +88,7 @@ class NotingFiles : public Assimp::DefaultIOSystem {
     if (folder_ / inside == mesh_ || seen_.count(inside) || seen_.size() >= 1000) return;
     uint64_t hash = 0;
     if (there)
-      hash = content_hash(read_text_file((folder_ / inside).string(), MeshLimits::kFileBytes));
+      hash = content_hash(ruedo::read_input((folder_ / inside).string(), MeshLimits::kFileBytes));
     seen_[inside] = hash;
   }
   fs::path mesh_, folder_;

@@ -3,6 +3,7 @@
 #include <cmath>
 #include <stdexcept>
 
+#include "core/input_file.h"
 #include "model/codecs.h"
 #include "model/geometry.h"
 #include "model/mesh_format.h"
@@ -174,7 +175,7 @@ Mesh extruded(const std::vector<Polygon>& written, double height) {
 }
 
 Mesh heightmap(const std::string& picture, const Vec3& size) {
-  const std::string bytes = read_text_file(picture, 64 << 20);
+  const std::string bytes = read_input(picture, 64 << 20);
   constexpr int kMost = 1025;
   if (const std::string fault = picture_fault(bytes, kMost); !fault.empty())
     throw std::runtime_error(fault);

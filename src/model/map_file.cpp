@@ -7,6 +7,7 @@
 #include <map>
 #include <sstream>
 
+#include "core/input_file.h"
 #include "core/progress.h"
 #include "model/codecs.h"
 #include "model/document.h"
@@ -29,7 +30,7 @@ struct Line {
 };
 
 std::vector<Line> lines_of(const std::string& path, size_t most_bytes) {
-  std::istringstream in(read_text_file(path, most_bytes));
+  std::istringstream in(read_input(path, most_bytes));
   std::vector<Line> lines;
   std::string text;
   for (int number = 1; std::getline(in, text); ++number) {
@@ -112,7 +113,7 @@ class FlatYaml {
 
 // A picture in 8-bit grey, with its first row at the top.
 cv::Mat read_picture(const std::string& path) {
-  const std::string bytes = read_text_file(path, 256u << 20);
+  const std::string bytes = read_input(path, 256u << 20);
   if (bytes.empty()) throw InputError({path, 0}, "the file is empty");
   if (const std::string fault = picture_fault(bytes, kMostPixels); !fault.empty())
     throw InputError({path, 0}, fault);

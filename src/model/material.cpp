@@ -6,6 +6,8 @@
 #include <filesystem>
 #include <sstream>
 
+#include "core/input_file.h"
+
 namespace fs = std::filesystem;
 
 namespace ruedo::model {
@@ -168,7 +170,7 @@ std::optional<Material> scripted_material(const Element& script, const std::stri
   for (const auto& file : files) {
     std::optional<OgreMaterial> found;
     try {
-      found = read_ogre_script(read_text_file(file, 4 << 20), name);
+      found = read_ogre_script(read_input(file, 4 << 20), name);
       context.documents.note(file);
     } catch (const InputError&) {
       continue;

@@ -9,11 +9,11 @@
 #include <cstdlib>
 #include <cstring>
 #include <filesystem>
-#include <fstream>
 #include <stdexcept>
 
 #include <Eigen/Geometry>
 
+#include "core/input_file.h"
 #include "core/installation.h"
 #include "core/progress.h"
 #include "model/child_process.h"
@@ -32,10 +32,13 @@ std::string default_importer() {
 }
 
 std::string first_line(const std::string& file) {
-  std::ifstream in(file);
-  std::string line;
-  std::getline(in, line);
-  if (line.size() > 300) line.resize(300);
+  std::string line(300, '\0');
+  try {
+    line.resize(std::fread(line.data(), 1, line.size(), open_input(file).file.get()));
+  } catch (const InputError&) {  // the child did not come so far
+    return "";
+  }
+  line.resize(std::min(line.find('\n'), line.size()));
   for (char& c : line) {
     if (static_cast<unsigned char>(c) < 0x20 || static_cast<unsigned char>(c) >= 0x7f)
       c = '?';  // may be bytes of the file
@@ -91,7 +94,7 @@ void run_importer(const MeshImport& import, const std::string& input, const std:
 
 std::string bytes_of(const std::string& path, size_t most) {
   try {
-    return read_text_file(path, most);
+    return read_input(path, most);
   } catch (const InputError& error) {
     throw std::runtime_error(error.message());
   }
@@ -109,7 +112,7 @@ bool dependencies_hold(const MeshPackage& package, const fs::path& folder) {
         const fs::path path = folder / each.path;
         if (!fs::is_regular_file(path, error)) return each.hash == 0;
         try {
-          return content_hash(read_text_file(path.string(), MeshLimits::kFileBytes)) == each.hash;
+          return content_hash(read_input(path.string(), MeshLimits::kFileBytes)) == each.hash;
         } catch (const InputError&) {
           return false;
         }

@@ -7,6 +7,7 @@
 #include <cstdlib>
 #include <filesystem>
 
+#include "core/input_file.h"
 #include "core/installation.h"
 #include "model/document.h"
 #include "model/sdf_version.h"
@@ -112,7 +113,7 @@ std::string package_name(const fs::path& folder) {
   const fs::path manifest = folder / "package.xml";
   if (!is_there(manifest)) return "";
   try {
-    return parse_document(read_text_file(manifest.string(), 1 << 20), manifest.string())
+    return parse_document(read_input(manifest.string(), 1 << 20), manifest.string())
         ->string("name", "");
   } catch (const InputError&) {
     return "";
@@ -404,7 +405,7 @@ std::optional<std::string> ResourceFinder::model_file(const std::string& path) {
   const fs::path folder = path;
   const fs::path config = folder / "model.config";
   if (is_there(config)) {
-    const auto root = parse_document(read_text_file(config.string(), 1 << 20), config.string());
+    const auto root = parse_document(read_input(config.string(), 1 << 20), config.string());
     // The newest version that Ruedo reads; a version that cannot be parsed counts as the oldest.
     std::string best;
     SdfVersion best_version{0, 0};

@@ -8,6 +8,7 @@
 #include <cmath>
 #include <filesystem>
 
+#include "core/input_file.h"
 #include "model/plugins.h"
 #include "model/yaml.h"
 
@@ -200,7 +201,7 @@ std::vector<std::string> named_files(const std::vector<const Element*>& plugins,
 std::unique_ptr<Element> read_controllers(const std::string& path, bool named,
                                           const std::string& where, ReadContext& context) {
   try {
-    const std::string text = read_text_file(path, kLargestFile);
+    const std::string text = read_input(path, kLargestFile);
     if (text.find("ontroller") == std::string::npos) return nullptr;
     return parse_yaml(text, path);
   } catch (const InputError& error) {  // a neighbouring file may be anything

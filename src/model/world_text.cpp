@@ -9,6 +9,7 @@
 
 #include <fmt/format.h>
 
+#include "core/input_file.h"
 #include "model/document.h"
 #include "model/read_context.h"
 #include "model/resources.h"
@@ -344,7 +345,7 @@ WorldText::Written WorldText::with(const std::vector<ModelNow>& models) const {
 
 std::string world_text_of(const WorldModel& world) {
   constexpr size_t kMost = 64u << 20;
-  const std::string text = read_text_file(world.file, kMost);
+  const std::string text = read_input(world.file, kMost);
   const auto root = parse_document(text, world.file);
   if (root->name == "sdf" && root->has("world")) return text;
   std::string models;

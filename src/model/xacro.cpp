@@ -10,6 +10,7 @@
 #include <sstream>
 #include <vector>
 
+#include "core/input_file.h"
 #include "model/child_process.h"
 
 namespace fs = std::filesystem;
@@ -37,7 +38,7 @@ int run(std::vector<std::string> words, const std::string& log) {
 
 std::string text_or_nothing(const std::string& path) {
   try {
-    return read_text_file(path, kLargest_bytes);
+    return read_input(path, kLargest_bytes);
   } catch (const InputError&) {
     return "";
   }
@@ -104,7 +105,7 @@ std::shared_ptr<const Element> expand(const std::string& path, ReadContext& cont
                            "the include '" + line.substr(std::min(tab, line.size() - 1) + 1) +
                                "' is not found; it is passed over");
   }
-  std::unique_ptr<Element> root = parse_document(read_text_file(out, kLargest_bytes), path);
+  std::unique_ptr<Element> root = parse_document(read_input(out, kLargest_bytes), path);
   take_lines(*root, {path, 1});
   return root;
 }

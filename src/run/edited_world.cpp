@@ -9,8 +9,8 @@
 #include <cstdlib>
 #include <cstring>
 #include <filesystem>
-#include <fstream>
 
+#include "core/input_file.h"
 #include "model/document.h"
 #include "ruedo/errors.h"
 
@@ -19,11 +19,15 @@ namespace fs = std::filesystem;
 namespace ruedo::run {
 namespace {
 
+constexpr size_t kLargest = 64u << 20;  // bytes; that is all that is ever loaded
+
 // The bytes of a file; none where it cannot be read.
 std::optional<std::string> bytes_of(const std::string& path) {
-  std::ifstream file(path, std::ios::binary);
-  if (!file) return std::nullopt;
-  return std::string{std::istreambuf_iterator<char>(file), {}};
+  try {
+    return read_input(path, kLargest);
+  } catch (const InputError&) {
+    return std::nullopt;
+  }
 }
 
 mode_t mode_for(const std::string& path) {

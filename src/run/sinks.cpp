@@ -57,6 +57,11 @@ void LogSink::File::flush() {
         "what acted on the run takes half of --record-limit: {} repeats it up to here, and no "
         "further",
         path_);
+  if (ring_ && !ring_->follows() && !std::exchange(told_unfollowed_, true))
+    spdlog::warn(
+        "what changed the world takes more than a sixteenth of --record-limit: the numbered files "
+        "beside {} begin without what came after it",
+        path_);
   if (error.empty()) return;
   const std::lock_guard lock(mutex_);
   error_ = error;

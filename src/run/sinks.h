@@ -74,7 +74,7 @@ class LogSink : public Sink {
    private:
     std::unique_ptr<log::Writer> writer_;  // one of the two
     std::unique_ptr<log::Ring> ring_;
-    bool step_begins_ = false, told_ = false;
+    bool step_begins_ = false, told_ = false, told_unfollowed_ = false;
     const std::string path_;
     mutable std::mutex mutex_;
     std::string error_;

@@ -1,23 +1,23 @@
 #include "scene/render_texture.h"
 
 #include <algorithm>
-#include <filesystem>
-#include <fstream>
-#include <iterator>
 #include <string_view>
 #include <vector>
 
 #include <opencv2/imgproc.hpp>
 
+#include "core/input_file.h"
 #include "model/codecs.h"
 #include "model/picture.h"
+#include "ruedo/errors.h"
 
 namespace ruedo::scene {
 namespace {
 
 // Larger pictures are downscaled: they are finer than any camera can see, and slow to sample.
 constexpr int kMaxSide = 2048;
-constexpr int kMostPixels = 16384;  // width and height; larger pictures are not decoded
+constexpr int kMostPixels = 16384;         // width and height; larger pictures are not decoded
+constexpr size_t kMostBytes = 256u << 20;  // and of larger files nothing is read
 
 cv::Mat to_rgba(cv::Mat image) {
   if (image.depth() == CV_16U) image.convertTo(image, CV_8U, 1.0 / 257.0);
@@ -34,8 +34,8 @@ cv::Mat to_rgba(cv::Mat image) {
 }
 
 std::vector<uint8_t> read_bytes(const std::string& path) {
-  std::ifstream file(path, std::ios::binary);
-  return {std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
+  const std::string bytes = read_input(path, kMostBytes);
+  return {bytes.begin(), bytes.end()};
 }
 
 // Removes colour profiles, which are not used here: libpng complains on stderr about those of many
@@ -66,8 +66,6 @@ void remove_png_profile(std::vector<uint8_t>& bytes) {
 
 TexturePixels decode_texture(const model::Texture& texture) {
   TexturePixels out;
-  std::error_code error;
-  if (!texture.path.empty() && !std::filesystem::is_regular_file(texture.path, error)) return out;
   try {
     std::vector<uint8_t> bytes = texture.path.empty() ? texture.embedded : read_bytes(texture.path);
     remove_png_profile(bytes);
@@ -89,6 +87,7 @@ TexturePixels decode_texture(const model::Texture& texture) {
     out.height = rgba.rows;
     out.rgba.assign(rgba.datastart, rgba.dataend);
     for (size_t i = 3; i < out.rgba.size() && !out.holes; i += 4) out.holes = out.rgba[i] < 128;
+  } catch (const InputError&) {
   } catch (const cv::Exception&) {
     out = {};
   } catch (const std::bad_alloc&) {

@@ -341,8 +341,8 @@ def test_what_cannot_be_done_is_said(exported, tmp_path):
     (tmp_path / "no.lcm").write_bytes(b"hello")
     for arguments, code, words in (
         ([tmp_path / "no.lcm", tmp_path / "out.mcap"], 3, "is not an LCM log"),
-        ([tmp_path / "none.lcm", tmp_path / "out.mcap"], 3, "cannot be read"),
-        ([log, log], 2, "is the log itself"),
+        ([tmp_path / "none.lcm", tmp_path / "out.mcap"], 3, "no such file"),
+        ([log, log], 2, "OUT is the same file as LOG"),
         ([log, tmp_path / "no" / "out.mcap"], 4, "cannot be written"),
         ([log, "/dev/full"], 4, "cannot be written"),
     ):

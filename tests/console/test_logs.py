@@ -293,7 +293,7 @@ def test_strange_logs_do_not_hurt(log, tmp_path):
 @pytest.mark.parametrize(
     "content, words",
     [
-        (None, "cannot be read"),
+        (None, "no such file"),
         (b"", "holds no message"),
         (b"hello, world" * 100, "is not an LCM log"),
         (b"\xed\xa1\xda\x01" + b"\xff" * 40, "holds no message: damaged at byte 0"),

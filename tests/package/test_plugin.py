@@ -343,7 +343,7 @@ def bad(prefix, project):
         ("libother.so", 3, "was built for another Ruedo"),
         ("libtext.so", 3, "is no shared library"),
         ("libnone.so", 3, "there is no such plugin"),
-        (".", 3, "is no file"),
+        (".", 3, "is a folder; a file is needed"),
     ],
 )
 def test_a_bad_plugin_is_one_line(project, ruedo, bad, tmp_path, name, code, words):

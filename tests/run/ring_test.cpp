@@ -127,6 +127,32 @@ TEST_F(RingTest, StopsKeepingWhatActedAtHalfOfTheLimit) {
   EXPECT_LE(bytes(), kLimit + 1100);
 }
 
+TEST_F(RingTest, WhatChangedTheWorldMayBeAnything) {
+  Ring ring(path("run.lcm"), kLimit);
+  const std::vector<uint8_t> header(20'000), half(1000);
+  ring.write(0, kHeaderChannel, header.data(), header.size(), true);
+  applied_t large{};
+  large.kind = request_t::SPAWN;
+  large.channel = "ruedo/request";
+  large.data.resize(3000);
+  large.size = 3000;
+  const std::vector<uint8_t> spawn = engine::encoded(large);
+  for (int step = 0; step < 300; ++step) {
+    ring.begin_step(step);
+    ring.write(step, kAppliedChannel, spawn.data(), spawn.size(), true);
+    write_steps(ring, step, 1);
+    ASSERT_LE(bytes(), 2 * kLimit) << "at step " << step;
+  }
+  EXPECT_FALSE(ring.follows());
+  EXPECT_FALSE(ring.repeats());
+  const std::vector<std::string> files = numbered();
+  ASSERT_GE(files.size(), 3u);  // files do not consist of their beginnings alone
+  const std::vector<Event> events = events_of(path(files.front()));
+  EXPECT_EQ(events[0].data, header);
+  EXPECT_EQ(events[1].data, spawn);
+  EXPECT_THAT(events, testing::Contains(testing::Field(&Event::channel, "r/scan")));
+}
+
 TEST_F(RingTest, ReplacesTheFilesOfAnEarlierRunAndNoOthers) {
   for (const char* name : {"run.000007.lcm", "run.1.lcm", "run.000007.txt", "runs.000001.lcm"})
     std::ofstream(path(name)) << "old";

@@ -1,0 +1,64 @@
+#include "cli/argument_rules.h"
+
+#include <algorithm>
+#include <array>
+#include <filesystem>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "ruedo/errors.h"
+
+namespace fs = std::filesystem;
+
+namespace ruedo::cli {
+namespace {
+
+constexpr std::array<std::string_view, 8> kOutputs{"record", "html",  "junit", "json",
+                                                   "output", "video", "out",   "OUT"};
+
+bool is_output(const CLI::Option& option) {
+  const auto is = [&](const std::string& name) {
+    return std::find(kOutputs.begin(), kOutputs.end(), name) != kOutputs.end();
+  };
+  return option.get_items_expected_max() > 0 &&
+         (is(option.get_single_name()) ||
+          std::any_of(option.get_lnames().begin(), option.get_lnames().end(), is));
+}
+
+bool same_file(const std::string& a, const std::string& b) {
+  std::error_code error;
+  return fs::is_regular_file(a, error) ? fs::equivalent(a, b, error)
+                                       : !fs::exists(a, error) && a == b;
+}
+
+}  // namespace
+
+void refuse_empty_values(CLI::App& app) {
+  for (CLI::App* command : app.get_subcommands([](const CLI::App*) { return true; })) {
+    for (CLI::Option* option : command->get_options()) {
+      if (option->get_items_expected_min() == 0) continue;  // a flag, or a value may be left out
+      option->check([](const std::string& value) {
+        return value.empty() ? std::string("an empty value is not allowed") : std::string();
+      });
+    }
+  }
+}
+
+void check_outputs(const CLI::App& command) {
+  const std::vector<const CLI::Option*> options =
+      command.get_options([](const CLI::Option* option) { return option->count() > 0; });
+  for (const CLI::Option* output : options) {
+    if (!is_output(*output)) continue;
+    for (const CLI::Option* other : options) {
+      if (other == output) continue;
+      for (const std::string& file : other->results()) {
+        if (!same_file(output->results().front(), file)) continue;
+        throw InputError({}, output->get_name() + " is the same file as " + other->get_name() +
+                                 ", which would be lost: " + file);
+      }
+    }
+  }
+}
+
+}  // namespace ruedo::cli

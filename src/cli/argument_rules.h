@@ -1,0 +1,16 @@
+// What holds for the arguments of every command.
+#pragma once
+
+#include <CLI/CLI.hpp>
+
+namespace ruedo::cli {
+
+// An argument that takes a value takes no empty one: `--record "$LOG"` without a LOG must not mean
+// that nothing is recorded. Of all commands below app, before it parses.
+void refuse_empty_values(CLI::App& app);
+
+// What a command writes must be none of what it reads, nor another file that it writes. Throws
+// InputError. Of a command that was parsed.
+void check_outputs(const CLI::App& command);
+
+}  // namespace ruedo::cli

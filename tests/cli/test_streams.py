@@ -1,0 +1,174 @@
+"""What a shell gives the program: closed streams, full devices, empty variables, files that are
+both read and written.
+"""
+
+import os
+import resource
+import signal
+import struct
+import subprocess
+import time
+
+import pytest
+from recorded import RUEDO, events, program
+
+WORLD = """<sdf version='1.9'><world name='w'><include><uri>model://ground_plane</uri></include>
+<include><uri>model://p3at</uri></include></world></sdf>"""
+RUN = ["--disable", "p3at/camera", "--rate", "max", "--duration", "0.5", "--lcm", "memq://"]
+
+
+@pytest.fixture
+def world(tmp_path):
+    path = tmp_path / "w.sdf"
+    path.write_text(WORLD)
+    return path
+
+
+@pytest.fixture
+def log(world):
+    path = world.with_name("run.lcm")
+    assert program("run", world, "--quiet", *RUN, "--record", path).returncode == 0
+    return path
+
+
+def shell(line, *arguments):
+    return subprocess.run(
+        ["sh", "-c", f'"$0" "$@" {line}', RUEDO, *map(str, arguments)], capture_output=True
+    )
+
+
+@pytest.mark.parametrize("closed", ["<&-", ">&-", "2>&-", "<&- >&- 2>&-"])
+def test_a_closed_stream_is_no_file_of_ours(world, log, tmp_path, closed):
+    """The next file that is opened would take its number, and what is printed would go there."""
+    other = tmp_path / "other.lcm"
+    assert shell(closed, "run", world, *RUN, "--record", other).returncode == 0
+    assert events(other) == events(log)
+    picture = tmp_path / "p.png"
+    assert shell(closed, "render", world, "--size", "64x64", "-o", picture).returncode == 0
+    content = picture.read_bytes()
+    assert content.startswith(b"\x89PNG") and content.endswith(b"IEND\xae\x42\x60\x82")
+    assert shell(closed, "import", tmp_path / "none.yaml").returncode == 3
+
+
+@pytest.mark.parametrize("command", ["check", "info"])
+@pytest.mark.parametrize("options", [[], ["--json"]])
+def test_what_cannot_be_printed_is_said(world, command, options):
+    result = shell("> /dev/full", command, world, *options)
+    assert result.returncode == 4 and result.stderr.count(b"\n") == 1, result
+    assert b"No space left" in result.stderr
+
+
+def test_a_file_size_limit_is_a_full_disk(world, tmp_path):
+    limit = 4096
+
+    def limited():
+        resource.setrlimit(resource.RLIMIT_FSIZE, (limit, limit))
+
+    path = tmp_path / "large.lcm"
+    result = program("run", world, "--quiet", *RUN, "--record", path, preexec_fn=limited)
+    assert result.returncode == 4 and "File too large" in result.stderr, result
+
+
+@pytest.mark.parametrize("option", ["--record", "--restore", "--snapshots", "--lcm", "--types"])
+def test_an_empty_variable_is_no_value(world, option):
+    result = program("run", world, "--quiet", *RUN[:-2], option, "")
+    assert result.returncode == 2 and option in result.stderr, result
+    assert "an empty value is not allowed" in result.stderr
+
+
+def test_nothing_is_written_over_what_is_read(world, log, tmp_path):
+    map_file = tmp_path / "map.yaml"
+    assert program("map", world, "-o", map_file).returncode == 0
+    linked = tmp_path / "linked.lcm"
+    linked.symlink_to(log)
+    for path, command in (
+        (world, ["run", world, *RUN, "--record", world]),
+        (world, ["render", world, "-o", world]),
+        (world, ["map", world, "-o", world]),
+        (map_file, ["import", map_file, "-o", map_file]),
+        (log, ["export", log, log]),
+        (log, ["export", log, linked]),
+        (log, ["play", log, "--html", log]),
+        (log, ["render", log, "--video", log]),
+        (log, ["diff", log, log, "--junit", log]),
+        (log, ["regress", world, "--golden", log, "--record", log, "--duration", "1"]),
+    ):
+        before = path.read_bytes()
+        result = program(*command)
+        assert result.returncode == 2 and "which would be lost" in result.stderr, result
+        assert path.read_bytes() == before
+    two = ["--junit", tmp_path / "new", "--html", tmp_path / "new"]
+    assert "is the same file as" in program("diff", log, log, *two).stderr
+
+
+def test_a_page_for_a_fifo_can_be_given_up(log, tmp_path):
+    fifo = tmp_path / "fifo"
+    os.mkfifo(fifo)
+    with subprocess.Popen(
+        [RUEDO, "play", log, "--html", fifo], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
+    ) as process:
+        time.sleep(2)  # no test of how fast: it may end before it waits
+        process.send_signal(signal.SIGTERM)
+        assert process.wait(400) != 0
+
+
+# Files in place of .lcm files, and what is said of them.
+NO_TYPES = {
+    "text": ("hello, world\n", "holds no message type"),
+    "fifo": (os.mkfifo, "is not a regular file"),
+    "device": (lambda path: os.symlink("/dev/zero", path), "is not a regular file"),
+    "large": (lambda path: os.truncate(os.open(path, os.O_CREAT | os.O_RDWR), 20 << 30), "bytes"),
+    "deep": (
+        "struct a0 { int8_t x; }"
+        + "".join(f"struct a{i} {{ a{i - 1} x; }}" for i in range(1, 20_000)),
+        "structs in structs more than 16 deep",
+    ),
+    "many": (
+        "struct a0 { int8_t x; }"
+        + "".join(f"struct a{i} {{ a{i - 1} x, y; }}" for i in range(1, 16)),
+        "more than 10000 fields",
+    ),
+    "wide": (
+        "struct a { " + "".join(f"int8_t x{i}; " for i in range(20_000)) + "}",
+        "more than 10000 fields",
+    ),
+    "nothing": ("struct e { } struct a { e x[2000000000]; }", "which holds nothing"),
+}
+
+
+@pytest.mark.parametrize("kind", NO_TYPES)
+def test_hostile_types_are_refused_at_once(log, tmp_path, kind):
+    content, says = NO_TYPES[kind]
+    path = tmp_path / "types.lcm"
+    path.write_text(content) if isinstance(content, str) else content(path)
+
+    def limited():
+        resource.setrlimit(resource.RLIMIT_CPU, (20, 21))
+        resource.setrlimit(resource.RLIMIT_AS, (3 << 30, 3 << 30))
+
+    command = ["play", log, "--types", path, "--lcm", "memq://", "--speed", "max"]
+    result = program(*command, preexec_fn=limited)
+    assert result.returncode == 3 and says in result.stderr, result
+    assert result.stderr.count("\n") == 1
+
+
+def test_a_picture_of_gigabytes_is_not_read(tmp_path):
+    head = struct.pack(">I4sIIBBBBB", 13, b"IHDR", 64, 64, 8, 2, 0, 0, 0)
+    with open(tmp_path / "huge.png", "wb") as file:
+        file.write(b"\x89PNG\r\n\x1a\n" + head)
+        file.truncate(20 << 30)
+    (tmp_path / "t.sdf").write_text(
+        "<sdf version='1.9'><world name='w'><model name='m'><static>1</static><link name='l'>"
+        "<visual name='v'><geometry><box><size>1 1 1</size></box></geometry><material><pbr><metal>"
+        "<albedo_map>huge.png</albedo_map></metal></pbr></material></visual></link></model></world></sdf>"
+    )
+
+    def limited():
+        resource.setrlimit(resource.RLIMIT_AS, (4 << 30, 4 << 30))
+        resource.setrlimit(resource.RLIMIT_CPU, (30, 31))
+
+    result = program(
+        *("render", tmp_path / "t.sdf", "--size", "64x64", "-o", tmp_path / "p.png"),
+        preexec_fn=limited,
+    )
+    assert result.returncode in (0, 3), result  # drawn without it, or refused
