@@ -123,7 +123,7 @@ std::string Journal::save(const std::string& name,
   if (!incomplete.empty()) return "the journal is incomplete: " + incomplete;
   try {
     log::Writer snapshot(part.path());
-    const std::string fault = fill(snapshot);
+    std::string fault = fill(snapshot);
     if (!fault.empty()) return fault;
     snapshot.flush();
     return snapshot.error().empty() ? part.keep_as(path) : snapshot.error();
