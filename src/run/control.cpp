@@ -10,11 +10,6 @@
 #include "run/request_table.h"
 
 namespace ruedo::run {
-namespace {
-
-constexpr std::chrono::seconds kHeldUp{1};
-
-}  // namespace
 
 bool Control::receive(const uint8_t* data, size_t size) {
   request_t request;
@@ -40,9 +35,7 @@ std::string fit_text(const std::string& text) {
 }  // namespace
 
 void Control::serve() {
-  const auto now = std::chrono::steady_clock::now();
-  if (now - last_served_ > kHeldUp) sessions_.forgive(now - last_served_);
-  last_served_ = now;
+  sessions_.listen(std::chrono::steady_clock::now());
   if (!held_.empty() && !host_.state_comes()) {
     for (const request_t& request : std::exchange(held_, {})) serve(request);
   }
@@ -85,7 +78,7 @@ void Control::serve(const request_t& request) {
   }
   Session* session = sessions_.find(request.session);
   if (!session) return answer_with(reply_t::UNKNOWN_SESSION, "no such session: join first");
-  session->last_heard = std::chrono::steady_clock::now();
+  sessions_.hear(*session);
   session->spoke = true;
   if (request.kind ==
       request_t::RESEND) {  // changes nothing: it may come any number of times, in any order
@@ -184,8 +177,7 @@ void Control::join(const request_t& request, reply_t& reply) {
     reply.text =
         "JOIN wants a join_t with a name of 1 to 63 bytes of UTF-8 without control characters, and "
         "a sequence above 0";
-  } else if (const Session* session = sessions_.join(
-                 body.client, request.sequence, std::chrono::steady_clock::now(), host_.keeps)) {
+  } else if (const Session* session = sessions_.join(body.client, request.sequence, host_.keeps)) {
     reply.session = session->id;
   } else {
     reply.code = reply_t::REFUSED;

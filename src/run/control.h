@@ -105,7 +105,6 @@ class Control {
   size_t inbox_bytes_ = 0;
   std::vector<request_t> taken_;
   std::atomic<uint64_t> refused_{0};
-  std::chrono::steady_clock::time_point last_served_ = std::chrono::steady_clock::now();
 };
 
 }  // namespace ruedo::run

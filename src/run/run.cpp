@@ -230,7 +230,8 @@ Run::Clock::time_point Run::attend() {
   Mode::Attended attended;
   {
     const std::lock_guard lock(simulation_mutex_);
-    attended = mode().attend(control_.sessions().list(), publisher_.step(), now);
+    const Sessions& sessions = control_.sessions();
+    attended = mode().attend(sessions.list(), publisher_.step(), sessions.listened());
   }
   for (const int64_t session : attended.dropped) control_.drop(session);
   if (pacer_->rests()) stall_watch_.moved(now);
@@ -277,7 +278,7 @@ void Run::tell_watchdog(size_t index) {
 // Clients may still fetch what they have lost.
 void Run::finish() {
   mode().end();
-  while (!stop_ && !mode().finished(control_.sessions().list(), Clock::now())) {
+  while (!stop_ && !mode().finished(control_.sessions().list(), control_.sessions().listened())) {
     publisher_.flush();
     wakeup_.wait_until(Clock::now() + kDrainPeriod);
     control_.serve();

@@ -4,8 +4,14 @@
 #include <algorithm>
 #include <random>
 #include <tuple>
+#include <utility>
 
 namespace ruedo::run {
+namespace {
+
+constexpr std::chrono::seconds kHeldUp{1};  // requests are taken in more often than that
+
+}  // namespace
 
 int64_t random_id() {
   std::random_device device;
@@ -19,7 +25,7 @@ Session* Sessions::find(int64_t id) {
   return found == sessions_.end() ? nullptr : &*found;
 }
 
-Session* Sessions::join(const std::string& client, int64_t sequence, Time now,
+Session* Sessions::join(const std::string& client, int64_t sequence,
                         const std::function<bool(int64_t)>& keeps) {
   for (Session& session : sessions_) {
     if (session.join_sequence == sequence && session.client == client) return &session;
@@ -27,7 +33,7 @@ Session* Sessions::join(const std::string& client, int64_t sequence, Time now,
   if (sessions_.size() == kMostSessions) {
     auto place = sessions_.end();
     for (auto session = sessions_.begin(); session != sessions_.end(); ++session) {
-      if (now - session->last_heard < kMaySilence || (keeps && keeps(session->id))) continue;
+      if (listened_ - session->last_heard < kMaySilence || (keeps && keeps(session->id))) continue;
       if (place == sessions_.end() ||
           std::tie(session->spoke, session->last_heard) < std::tie(place->spoke, place->last_heard))
         place = session;
@@ -39,7 +45,7 @@ Session* Sessions::join(const std::string& client, int64_t sequence, Time now,
   session.id = random_id();
   session.client = client;
   session.join_sequence = sequence;
-  session.last_heard = now;
+  hear(session);
   return &session;
 }
 
@@ -47,7 +53,9 @@ void Sessions::leave(int64_t id) {
   std::erase_if(sessions_, [&](const Session& session) { return session.id == id; });
 }
 
-void Sessions::forgive(Time::duration deaf) {
+void Sessions::listen(Time now) {
+  const Time::duration deaf = now - std::exchange(listened_, now);
+  if (deaf <= kHeldUp) return;
   for (Session& session : sessions_) session.last_heard += deaf;
 }
 

@@ -41,11 +41,17 @@ class Sessions {
   // The session of a client that joins, the same one for a repeated JOIN. Where all places are
   // taken, the most silent session gives way, first of those that only ever joined; but none that
   // `keeps`, if there is such a function, holds on to. Null when there is no place.
-  Session* join(const std::string& client, int64_t sequence, Time now,
+  Session* join(const std::string& client, int64_t sequence,
                 const std::function<bool(int64_t)>& keeps = {});
+  // The session was heard, with a request that was taken in at `listened`.
+  void hear(Session& session) const { session.last_heard = listened_; }
   void leave(int64_t id);
-  // The process could not listen for that long: no client is blamed for its silence.
-  void forgive(Time::duration deaf);
+  // Requests are taken in now. If that is long after the last time, the process could not listen
+  // (stopped by a signal, busy with a request, without a processor), which is nobody's silence.
+  void listen(Time now);
+  // When requests were last taken in. A client's silence ends here, not at the clock's time: the
+  // process may have been stopped since.
+  Time listened() const { return listened_; }
 
   // answer_again: `reply` is the one to send.
   Verdict judge(const Session& session, int64_t sequence, const reply_t*& reply) const;
@@ -56,6 +62,7 @@ class Sessions {
 
  private:
   std::vector<Session> sessions_;
+  Time listened_ = std::chrono::steady_clock::now();
 };
 
 // A random number in [1, 2^63), from the operating system.

@@ -85,33 +85,54 @@ TEST(Texts, OfRepliesAreShort) {
             "there is no model or MODEL/LINK called '?[2J'");
 }
 
-// The clock is the test's own.
+// Seconds go by, of the test's own clock, while the server listens.
+void pass(Sessions& sessions, int seconds) {
+  for (int i = 0; i < seconds; ++i)
+    sessions.listen(sessions.listened() + std::chrono::seconds(1));
+}
+
 TEST(Places, GoToNewcomersWithinSeconds) {
   Sessions sessions;
-  const Sessions::Time begin{};
+  const Sessions::Time begin = sessions.listened();
   std::vector<int64_t> ids;
   for (size_t i = 0; i < Sessions::kMostSessions; ++i)
-    ids.push_back(sessions.join("crashed", static_cast<int64_t>(i) + 1, begin)->id);
-  EXPECT_EQ(sessions.join("new", 1000, begin + std::chrono::seconds(2)), nullptr);
+    ids.push_back(sessions.join("crashed", static_cast<int64_t>(i) + 1)->id);
+  pass(sessions, 2);
+  EXPECT_EQ(sessions.join("new", 1000), nullptr);
   for (size_t i = 0; i < 10;
        ++i) {  // they ask for something now and then; the others only ever joined
     Session* session = sessions.find(ids[i]);
     session->spoke = true;
     session->last_heard = begin + std::chrono::seconds(i == 3 ? 0 : 1);
   }
-  const auto later = begin + std::chrono::seconds(4);
+  pass(sessions, 2);
   const int64_t kept = ids.back();
   const auto keeps = [&](int64_t id) { return id == kept; };
   for (size_t i = 0; i < Sessions::kMostSessions - 11; ++i)
-    ASSERT_NE(sessions.join("new", 1000 + static_cast<int64_t>(i), later, keeps), nullptr) << i;
+    ASSERT_NE(sessions.join("new", 1000 + static_cast<int64_t>(i), keeps), nullptr) << i;
   for (size_t i = 0; i < 10; ++i)
     EXPECT_NE(sessions.find(ids[i]), nullptr) << i;  // who only joined gives way first
-  ASSERT_NE(sessions.join("new", 2000, later, keeps), nullptr);
+  ASSERT_NE(sessions.join("new", 2000, keeps), nullptr);
   EXPECT_EQ(sessions.find(ids[3]), nullptr);  // then the most silent
   for (int64_t i = 1; i < 10; ++i)
-    ASSERT_NE(sessions.join("new", 2000 + i, later, keeps), nullptr) << i;
-  EXPECT_EQ(sessions.join("new", 3000, later, keeps), nullptr);
+    ASSERT_NE(sessions.join("new", 2000 + i, keeps), nullptr) << i;
+  EXPECT_EQ(sessions.join("new", 3000, keeps), nullptr);
   EXPECT_NE(sessions.find(kept), nullptr);
+}
+
+// A process that is stopped hears nobody, wherever the stop falls between two looks at the clock.
+TEST(Silence, IsNobodysWhileTheProcessCouldNotListen) {
+  Sessions sessions;
+  Session* session = sessions.join("patient", 1);
+  const auto silence = [&] { return sessions.listened() - session->last_heard; };
+  pass(sessions, 1);
+  EXPECT_EQ(silence(), std::chrono::seconds(1));
+  sessions.listen(sessions.listened() + std::chrono::seconds(60));  // stopped for a minute
+  EXPECT_EQ(silence(), std::chrono::seconds(1));
+  pass(sessions, 1);
+  EXPECT_EQ(silence(), std::chrono::seconds(2));
+  sessions.hear(*session);
+  EXPECT_EQ(silence(), std::chrono::seconds(0));
 }
 
 RunOptions in_lockstep() {

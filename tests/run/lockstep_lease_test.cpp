@@ -130,6 +130,20 @@ TEST_F(LockstepTest, DropsASilentClient) {
   EXPECT_EQ(a.seen().at(12).state_hash, b.seen().at(12).state_hash);
 }
 
+// The server is held up while it answers, for longer than the lease: after it heard the client and
+// before it looks at the leases.
+TEST_F(LockstepTest, BlamesNobodyWhileItIsHeldUpItself) {
+  begin(1, Policy::fail, 1.1);
+  LockstepClient a = client("a");
+  a.take_part();
+  a.step(2);
+  bus_.hold_next(std::chrono::milliseconds(1500));
+  EXPECT_EQ(newest(a, 2), 2);
+  a.step(2);
+  EXPECT_EQ(a.have(), 4);
+  EXPECT_FALSE(over_) << why_;
+}
+
 TEST_F(LockstepTest, FailsTheRun) {
   begin(1, Policy::fail, 0.3);
   LockstepClient a = client("a");

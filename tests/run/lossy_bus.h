@@ -2,6 +2,7 @@
 // listener, by a seeded generator.
 #pragma once
 
+#include <atomic>
 #include <chrono>
 #include <condition_variable>
 #include <deque>
@@ -11,6 +12,7 @@
 #include <optional>
 #include <random>
 #include <string>
+#include <thread>
 #include <vector>
 
 #include "running.h"
@@ -82,6 +84,7 @@ class LossyBus : public Bus {
   }
 
   void publish(const std::string& channel, const uint8_t* data, size_t size) override {
+    if (channel == "ruedo/reply") std::this_thread::sleep_for(hold_.exchange({}));
     const Message message{channel, {data, data + size}};
     std::lock_guard lock(mutex_);
     for (const auto& listener : listeners_) {
@@ -110,6 +113,8 @@ class LossyBus : public Bus {
     std::lock_guard lock(sending_);
     handler_ = nullptr;
   }
+  // The next reply is held up, and the server with it.
+  void hold_next(std::chrono::milliseconds time) { hold_ = time; }
   size_t lost_to_server() {
     std::lock_guard lock(sending_);
     return to_server_.lost();
@@ -117,6 +122,7 @@ class LossyBus : public Bus {
 
  private:
   Faults faults_;
+  std::atomic<std::chrono::milliseconds> hold_{};
   std::mutex sending_;
   LossyLink to_server_;
   Handler handler_;
