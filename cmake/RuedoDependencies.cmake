@@ -95,3 +95,5 @@ set_target_properties(ruedo::lcm PROPERTIES IMPORTED_LOCATION ${lcm_library} IMP
   INTERFACE_INCLUDE_DIRECTORIES ${lcm_wheel}/include)
 add_executable(ruedo::lcm-gen IMPORTED GLOBAL)
 set_target_properties(ruedo::lcm-gen PROPERTIES IMPORTED_LOCATION ${lcm_wheel}/bin/lcm-gen)
+include(${lcm_DIR}/lcmUtilities.cmake)    # lcm_wrap_types
+set(LCM_NAMESPACE ruedo::)                 # of the target lcm-gen that it calls
