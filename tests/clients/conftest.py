@@ -44,7 +44,7 @@ _taken: list[socket.socket] = []
 
 
 def heed_ctrl_c() -> None:
-    """For a child process: a shell that starts the tests in the background makes it ignore Ctrl-C."""
+    """For a child process: a shell that starts tests in the background makes it ignore Ctrl-C."""
     signal.signal(signal.SIGINT, signal.SIG_DFL)
 
 

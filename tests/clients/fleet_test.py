@@ -58,7 +58,7 @@ def decisions(url):
 
 
 def test_256_robots_over_every_transport(fleet, tmp_path):
-    """Also when every tenth datagram is lost: a step then misses more than one RESEND may ask for."""
+    """Also when every tenth datagram is lost: a step then misses more than one RESEND may want."""
     lockstep = ("--lockstep", "1", "--lease", str(PATIENCE), "--quiet")  # a list of 3 000 channels
     servers = {
         "unix": lambda: ruedo_run(*lockstep, world=fleet, url=f"unix://{tmp_path}/bus"),

@@ -1,4 +1,4 @@
-"""The local socket: its owner, and that the three libraries see the same over it as over multicast."""
+"""The local socket: its owner, and that all three libraries see the same as over multicast."""
 
 import os
 import stat

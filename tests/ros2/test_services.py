@@ -1,4 +1,4 @@
-"""simulation_interfaces over DDS, as rmw_cyclonedds maps services, called by an independent peer."""
+"""simulation_interfaces over DDS, as rmw_cyclonedds maps services, called by another peer."""
 
 from __future__ import annotations
 
