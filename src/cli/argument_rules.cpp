@@ -7,6 +7,9 @@
 #include <string_view>
 #include <vector>
 
+#include <fmt/format.h>
+
+#include "core/utf8.h"
 #include "ruedo/errors.h"
 
 namespace fs = std::filesystem;
@@ -26,6 +29,23 @@ bool is_output(const CLI::Option& option) {
           std::any_of(option.get_lnames().begin(), option.get_lnames().end(), is));
 }
 
+// Names of files need not be UTF-8, so that only bytes below 0x80 are looked at, and C1 controls.
+bool is_control(std::string_view text, size_t i) {
+  const auto byte = static_cast<unsigned char>(text[i]);
+  const auto before = static_cast<unsigned char>(i > 0 ? text[i - 1] : 0);
+  return byte < 0x20 || byte == 0x7f || (before == 0xc2 && byte >= 0x80 && byte <= 0x9f);
+}
+
+std::string what_is_odd(const std::string& value) {
+  if (value.empty()) return "an empty value is not allowed";
+  for (size_t i = 0; i < value.size(); ++i) {
+    if (is_control(value, i))
+      return fmt::format("the control character {:#04x} is not allowed, in \"{}\"",
+                         static_cast<unsigned char>(value[i]), for_terminal(value));
+  }
+  return "";
+}
+
 bool same_file(const std::string& a, const std::string& b) {
   std::error_code error;
   return fs::is_regular_file(a, error) ? fs::equivalent(a, b, error)
@@ -34,13 +54,11 @@ bool same_file(const std::string& a, const std::string& b) {
 
 }  // namespace
 
-void refuse_empty_values(CLI::App& app) {
+void refuse_odd_values(CLI::App& app) {
   for (CLI::App* command : app.get_subcommands([](const CLI::App*) { return true; })) {
     for (CLI::Option* option : command->get_options()) {
       if (option->get_items_expected_min() == 0) continue;  // a flag, or a value may be left out
-      option->check([](const std::string& value) {
-        return value.empty() ? std::string("an empty value is not allowed") : std::string();
-      });
+      option->check(what_is_odd);
     }
   }
 }

@@ -6,8 +6,9 @@
 namespace ruedo::cli {
 
 // An argument that takes a value takes no empty one: `--record "$LOG"` without a LOG must not mean
-// that nothing is recorded. Of all commands below app, before it parses.
-void refuse_empty_values(CLI::App& app);
+// that nothing is recorded. Nor one with control characters, since values are printed, and names of
+// files may come from a stranger's archive. Of all commands below app, before it parses.
+void refuse_odd_values(CLI::App& app);
 
 // What a command writes must be none of what it reads, nor another file that it writes. Throws
 // InputError. Of a command that was parsed.

@@ -144,7 +144,7 @@ int run(int argc, char** argv) {
   Action action;
   for (const RegisterCommand::Add add : registered_commands()) add(app, action);
   add_quiet(app);
-  refuse_empty_values(app);
+  refuse_odd_values(app);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {

@@ -185,6 +185,15 @@ void parse_file(std::string_view text, const std::string& file, std::deque<Parse
   if (all.size() == before) throw InputError({file}, "holds no message type: no struct of LCM's");
 }
 
+// Logs have the same ending as types, and lie in the same folders.
+bool is_log(const std::string& path) {
+  constexpr std::string_view kSyncWord = "\xED\xA1\xDA\x01";
+  const InputFile input = open_input(path);
+  std::array<char, kSyncWord.size()> begin{};
+  return std::fread(begin.data(), 1, begin.size(), input.file.get()) == begin.size() &&
+         std::string_view(begin.data(), begin.size()) == kSyncWord;
+}
+
 constexpr size_t kCountless = size_t{1} << 62;
 
 size_t saturating_sum(size_t a, size_t b) { return a < kCountless - b ? a + b : kCountless; }
@@ -338,9 +347,11 @@ void read_types(const std::vector<std::string>& places) {
     std::error_code error;
     if (fs::is_directory(place, error)) {
       for (const auto& entry : fs::directory_iterator(place, error)) {
-        if (entry.path().extension() == ".lcm") files.push_back(entry.path());
+        if (entry.path().extension() == ".lcm" && !is_log(entry.path().string()))
+          files.push_back(entry.path());
       }
-      if (error || files.empty()) throw InputError({place}, "the folder has no .lcm file");
+      if (error || files.empty())
+        throw InputError({place}, "the folder has no .lcm file of message types");
       std::sort(files.begin(), files.end());
     } else {
       files.emplace_back(place);

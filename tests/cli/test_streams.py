@@ -4,6 +4,7 @@ both read and written.
 
 import os
 import resource
+import shutil
 import signal
 import struct
 import subprocess
@@ -74,6 +75,25 @@ def test_an_empty_variable_is_no_value(world, option):
     result = program("run", world, "--quiet", *RUN[:-2], option, "")
     assert result.returncode == 2 and option in result.stderr, result
     assert "an empty value is not allowed" in result.stderr
+
+
+@pytest.mark.parametrize("odd", ["\033[2J", "\r", "\x7f", "\x9b"])
+def test_a_name_cannot_speak_to_the_terminal(world, log, tmp_path, odd):
+    for file, command in (
+        (world, ["check"]),
+        (world, ["run", "--duration", "1"]),
+        (log, ["export"]),
+        (log, ["play", "--html"]),
+        (log, ["verify"]),
+    ):
+        name = tmp_path / f"a{odd}b{file.suffix}"
+        name.write_bytes(file.read_bytes())
+        result = program(*command, name)
+        assert result.returncode == 2 and "the control character 0x" in result.stderr, result
+        assert odd not in result.stdout + result.stderr.rstrip("\n"), result
+    latin = os.fsencode(tmp_path) + b"/caf\xe9" + os.fsencode(world.suffix)
+    shutil.copy(world, latin)
+    assert program("check", os.fsdecode(latin), errors="replace").returncode == 0
 
 
 def test_nothing_is_written_over_what_is_read(world, log, tmp_path):
@@ -150,6 +170,14 @@ def test_hostile_types_are_refused_at_once(log, tmp_path, kind):
     result = program(*command, preexec_fn=limited)
     assert result.returncode == 3 and says in result.stderr, result
     assert result.stderr.count("\n") == 1
+
+
+def test_a_folder_of_types_may_hold_logs(log, tmp_path):
+    command = ["play", log, "--types", tmp_path, "--lcm", "memq://", "--speed", "max"]
+    result = program(*command)
+    assert result.returncode == 3 and "no .lcm file of message types" in result.stderr, result
+    (tmp_path / "own.lcm").write_text("struct own_t { double x; }")
+    assert program(*command).returncode == 0
 
 
 def test_a_picture_of_gigabytes_is_not_read(tmp_path):
