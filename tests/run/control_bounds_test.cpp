@@ -87,8 +87,7 @@ TEST(Texts, OfRepliesAreShort) {
 
 // Seconds go by, of the test's own clock, while the server listens.
 void pass(Sessions& sessions, int seconds) {
-  for (int i = 0; i < seconds; ++i)
-    sessions.listen(sessions.listened() + std::chrono::seconds(1));
+  for (int i = 0; i < seconds; ++i) sessions.listen(sessions.listened() + std::chrono::seconds(1));
 }
 
 TEST(Places, GoToNewcomersWithinSeconds) {
@@ -114,8 +113,7 @@ TEST(Places, GoToNewcomersWithinSeconds) {
     EXPECT_NE(sessions.find(ids[i]), nullptr) << i;  // who only joined gives way first
   ASSERT_NE(sessions.join("new", 2000, keeps), nullptr);
   EXPECT_EQ(sessions.find(ids[3]), nullptr);  // then the most silent
-  for (int64_t i = 1; i < 10; ++i)
-    ASSERT_NE(sessions.join("new", 2000 + i, keeps), nullptr) << i;
+  for (int64_t i = 1; i < 10; ++i) ASSERT_NE(sessions.join("new", 2000 + i, keeps), nullptr) << i;
   EXPECT_EQ(sessions.join("new", 3000, keeps), nullptr);
   EXPECT_NE(sessions.find(kept), nullptr);
 }
