@@ -301,8 +301,8 @@ class Conversation {
       inbox_.clear();  // as if they had acted
       const std::vector<uint8_t> sample(step % 4 == 0 ? 5000 : 300);
       lockstep_.sink()->begin_step({step, step * kStep_us, 0});
-      lockstep_.sink()->message({Kind::sample, step * kStep_us, step * kStep_us, channel_, 0, step,
-                                 sample.data(), sample.size()});
+      lockstep_.sink()->message({Kind::sample, step * kStep_us, step * kStep_us, channel_,
+                                 engine::ChannelIndex(0), step, sample.data(), sample.size()});
       TickWriter tick;
       tick.begin(step * kStep_us, kRunId, 0, step);
       lockstep_.add_applied(tick, step, control_.sessions().list());
