@@ -10,6 +10,8 @@ from conftest import BUILD, HALL, PATIENCE, free_url, ruedo_run
 
 CLASSES = os.environ.get("RUEDO_PROBE_JAVA")
 COMMAND = ["java", "-cp", f"{BUILD}/java/ruedo.jar:{CLASSES}", "Lifetimes"]
+CLOSED = "this simulation was closed"
+ANOTHER_RUN = "ruedo: another run has begun at URL: commands are not repeated into it\n"
 pytestmark = pytest.mark.skipif(not CLASSES, reason="there is no JDK")
 
 
@@ -32,15 +34,47 @@ def test_callbacks_and_closing():
     assert done.returncode == 0
 
 
-def test_a_server_that_was_started_anew_is_noticed():
+def test_two_simulations_in_a_process_end_in_either_order():
+    with (
+        ruedo_run("--disable", "p3at/camera", world=HALL) as first,
+        ruedo_run("--disable", "p3at/camera", world=HALL) as second,
+    ):
+        done = subprocess.run(
+            [*COMMAND, first.url, "two", second.url],
+            capture_output=True,
+            text=True,
+            timeout=PATIENCE,
+        )
+    assert done.stdout.splitlines() == 2 * [
+        f"other {CLOSED}, true",
+        "goes on true",
+        f"ended {CLOSED}, {CLOSED}",
+    ], done.stderr
+    assert (done.returncode, done.stderr) == (0, "")
+
+
+def with_a_restarted_server(mode: str) -> tuple[str, str]:
+    """What the client in that mode prints, and its errors."""
     url = free_url()
     with ruedo_run("--disable", "p3at/camera", world=HALL, url=url) as first:
         client = subprocess.Popen(
-            [*COMMAND, url, "new_run"], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+            [*COMMAND, url, mode], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
         )
         assert client.stdout.readline() == "ready\n"
         first.end()
     with ruedo_run("--disable", "p3at/camera", world=HALL, url=url):
         said, errors = client.communicate(timeout=PATIENCE)
+    assert client.returncode == 0, errors
+    return said, errors.replace(url, "URL")
+
+
+def test_a_restarted_server_is_noticed():
+    said, errors = with_a_restarted_server("new_run")
     assert said.splitlines() == ["ended ended new run", "turned true"], errors
-    assert errors == f"ruedo: another run has begun at {url}: commands are not repeated into it\n"
+    assert errors == ANOTHER_RUN
+
+
+def test_a_callback_of_a_new_run_may_close_the_simulation():
+    said, errors = with_a_restarted_server("closed_by_new_run")
+    assert said == f"{CLOSED}, {CLOSED}\n", errors
+    assert errors == ANOTHER_RUN

@@ -7,6 +7,7 @@ import math
 import os
 import resource
 import sys
+import threading
 import time
 import warnings
 import zlib
@@ -313,6 +314,52 @@ def test_a_server_that_was_started_anew_is_noticed():
             robot.pose.next(PATIENCE)
         assert events == [sim] and (motion.state, motion.reason) == ("ended", "new run")
         assert robot.rotate(0.1).wait(PATIENCE).done
+
+
+@pytest.mark.parametrize("first_ends_first", [True, False])
+def test_two_simulations_in_a_process_end_in_either_order(first_ends_first):
+    with ruedo.launch(HALL, **QUICK) as first, ruedo.launch(HALL, **QUICK) as second:
+        odometry, other = first.robot("p3at").odometry, second.robot("p3at").odometry
+        other.latest(PATIENCE)
+        done = threading.Event()
+
+        def close_the_second(sample: ruedo.Odometry) -> None:
+            second.close()
+            done.set()
+
+        with odometry.on_sample(close_the_second) as closing:
+            assert done.wait(PATIENCE) and not closing.closed
+        with pytest.raises(ruedo.NoServer, match="^this simulation was closed$"):
+            other.next()
+        before = odometry.latest(PATIENCE)
+        assert odometry.next(PATIENCE).utime > before.utime  # the first goes on
+        for sim in (first, second) if first_ends_first else (second, first):
+            sim.close()
+        for stream in (odometry, other):
+            with pytest.raises(ruedo.NoServer, match="^this simulation was closed$"):
+                stream.next()
+
+
+def test_a_callback_of_a_new_run_may_close_the_simulation(caplog):
+    url = free_url()
+    done = threading.Event()
+
+    def close(sim: ruedo.Simulation) -> None:
+        sim.close()
+        done.set()
+
+    with ruedo_run("--disable", "p3at/camera", world=HALL, url=url) as first:
+        sim = ruedo.connect(url, timeout=PATIENCE)
+        sim.on_new_run(close)
+        first.end()
+    with ruedo_run("--disable", "p3at/camera", world=HALL, url=url):
+        assert done.wait(PATIENCE)
+        for call in (sim.robot("p3at").odometry.next, sim.pause):
+            with pytest.raises(ruedo.NoServer, match="^this simulation was closed$"):
+                call()
+    assert [record.getMessage() for record in caplog.records] == [
+        f"another run has begun at {url}: commands are not repeated into it"
+    ]
 
 
 def test_the_child_of_a_fork_is_told():

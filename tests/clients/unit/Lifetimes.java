@@ -14,8 +14,8 @@ import java.util.concurrent.CountDownLatch;
 import java.util.concurrent.atomic.AtomicInteger;
 
 /**
- * Callbacks that are cancelled or throw, readers, close(), and a restarted server;
- * lifetimes_test.py defines the expected results.
+ * Callbacks that are cancelled or throw, readers, close(), two simulations in one process, and a
+ * restarted server; lifetimes_test.py defines the expected results.
  */
 public final class Lifetimes {
     private static final double PATIENCE = 300.0; // s
@@ -91,13 +91,69 @@ public final class Lifetimes {
         System.out.println("turned " + sim.robot("p3at").rotate(0.1).await(PATIENCE).done());
     }
 
+    private static String errorOf(Runnable call) {
+        try {
+            call.run();
+            return "none";
+        } catch (RuedoException.NoServer error) {
+            return error.getMessage();
+        }
+    }
+
+    private static void two(String firstUrl, String secondUrl) throws InterruptedException {
+        for (boolean firstEndsFirst : new boolean[] {true, false}) {
+            Simulation first = Ruedo.connect(firstUrl, "first", PATIENCE);
+            Simulation second = Ruedo.connect(secondUrl, "second", PATIENCE);
+            Stream<Odometry> odometry = first.robot("p3at").odometry();
+            Stream<Odometry> other = second.robot("p3at").odometry();
+            other.latest(PATIENCE);
+            CountDownLatch done = new CountDownLatch(1);
+            try (Subscription closing =
+                    odometry.onSample(
+                            sample -> {
+                                second.close();
+                                done.countDown();
+                            })) {
+                done.await();
+                System.out.println("other " + errorOf(other::next) + ", " + !closing.closed());
+            }
+            long before = odometry.latest(PATIENCE).utime;
+            System.out.println("goes on " + (odometry.next(PATIENCE).utime > before));
+            (firstEndsFirst ? first : second).close();
+            (firstEndsFirst ? second : first).close();
+            System.out.println("ended " + errorOf(odometry::next) + ", " + errorOf(other::next));
+        }
+    }
+
+    private static void closedByNewRun(Simulation sim) throws InterruptedException {
+        Stream<Odometry> odometry = sim.robot("p3at").odometry();
+        CountDownLatch done = new CountDownLatch(1);
+        sim.onNewRun(
+                () -> {
+                    sim.close();
+                    done.countDown();
+                });
+        System.out.println("ready");
+        done.await();
+        System.out.println(errorOf(odometry::next) + ", " + errorOf(sim::pause));
+    }
+
     public static void main(String[] args) throws InterruptedException {
+        if (args[1].equals("two")) {
+            two(args[0], args[2]);
+            return;
+        }
         try (Simulation sim = Ruedo.connect(args[0], "lifetimes", PATIENCE)) {
-            if (args[1].equals("new_run")) {
-                newRun(sim);
-            } else {
-                callbacks(sim);
-                closed(sim);
+            switch (args[1]) {
+                case "new_run":
+                    newRun(sim);
+                    break;
+                case "closed_by_new_run":
+                    closedByNewRun(sim);
+                    break;
+                default:
+                    callbacks(sim);
+                    closed(sim);
             }
         }
     }
