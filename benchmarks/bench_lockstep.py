@@ -1,4 +1,4 @@
-"""Lockstep over the wire: steps a second, one step to a round trip, from Python.
+"""Lockstep over the wire: steps a second, one step per round trip, from Python.
 
 bench_lockstep.py WORLD [STEPS] [ROUNDS]
 

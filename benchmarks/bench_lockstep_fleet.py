@@ -1,4 +1,4 @@
-"""Lockstep from Python with many robots of 24 beams: robot-decisions a second at 10 Hz, over each
+"""Lockstep from Python with many robots of 24 beams: robot decisions a second at 10 Hz, over each
 transport in turn. A decision reads the robot's scan, and commands a velocity.
 
 bench_lockstep_fleet.py [DECISIONS] [ROUNDS] [ROBOTS,...]

@@ -1,12 +1,12 @@
 #!/usr/bin/env python3
-"""Makes worlds for those who have none: a corridor with rooms, a maze, a warehouse, a hill, a
+"""Makes example worlds: a corridor with rooms, a maze, a warehouse, a hill, a
 football field, a crossing.
 
     worlds/make_worlds.py [FOLDER]
 
 Writes NAME.sdf (and terrain/hill.png) into FOLDER, this one where none is given. All is made of
-boxes, cylinders, spheres and one height map; places that look drawn by chance come from a generator
-with a fixed seed. Measures are ours.
+boxes, cylinders, spheres and one height map; random places come from a generator
+with a fixed seed. Dimensions are our own.
 """
 
 import math
@@ -97,7 +97,7 @@ def world(name, about, content, ground=True):
 
 
 def wall(name, x0, y0, x1, y1, gaps=(), height=1.2, thickness=0.12, rgb=WALL):
-    """Along x or y; gaps are (distance of the middle from the beginning, width)."""
+    """Along x or y; gaps are (distance of the centre from the start, width)."""
     length = math.hypot(x1 - x0, y1 - y0)
     ux, uy = (x1 - x0) / length, (y1 - y0) / length
     text, begin = "", 0.0
@@ -280,7 +280,7 @@ def warehouse():
         turned = sorted(turned)
         turned = turned + [(56, *turned[0][1:])] if turned[0][0] == 0 else turned
         before, way = None, []
-        for time, x, y, yaw in turned:  # the heading goes on, and does not jump back by a turn
+        for time, x, y, yaw in turned:  # the heading is continuous, and does not jump by a turn
             while before is not None and yaw < before - 1e-9:
                 yaw += 2 * 3.14159265
             before = yaw
@@ -290,7 +290,7 @@ def warehouse():
 
 
 def png(path, rows):
-    """16 bits of grey."""
+    """A 16-bit greyscale PNG."""
     height, width = len(rows), len(rows[0])
     raw = b"".join(b"\0" + b"".join(struct.pack(">H", value) for value in row) for row in rows)
     chunks = (
@@ -320,7 +320,7 @@ TERRAIN_SIZE, TERRAIN_HEIGHT, TERRAIN_PIXELS = 40.0, 3.0, 129
 
 
 def height_at(x, y):
-    """m. Hills of Gauss's shape, and flat round the origin, where the robot starts."""
+    """m. Gaussian hills, and flat around the origin, where the robot starts."""
     hills = sum(
         top * math.exp(-((x - hx) ** 2 + (y - hy) ** 2) / (2 * (width / 2) ** 2))
         for hx, hy, width, top in HILLS

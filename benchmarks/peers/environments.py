@@ -1,4 +1,4 @@
-"""What the environments' benchmarks have in common: options, timing, the row that is printed."""
+"""What the benchmarks of environments share: options, timing, the row that is printed."""
 
 from __future__ import annotations
 
@@ -31,7 +31,8 @@ def angles(beams: int) -> list[float]:
 
 
 def rate(step: Callable[[], int], seconds: float) -> float:
-    """Environment steps a second; step() makes one of each environment and returns how many."""
+    """Environment steps a second; step() advances each environment by one and returns how many
+    there are."""
     step()
     done, begin = 0, time.perf_counter()
     while time.perf_counter() - begin < seconds:
@@ -52,7 +53,7 @@ def show(simulator: str, envs: int, beams: int, steps_per_s: float) -> None:
 def in_processes(
     make: Callable[[bench.Rooms, int, int], Callable[[], int]], given: argparse.Namespace
 ) -> float:
-    """The sum over one process a core, each with its part of the environments."""
+    """The sum over one process per core, each with its share of the environments."""
     parts = [given.envs // CORES + (i < given.envs % CORES) for i in range(CORES)]
     parts = [part for part in parts if part]
     with multiprocessing.Pool(len(parts)) as pool:

@@ -1,5 +1,5 @@
-"""IR-SIM's environments: its differential robot with its 2-D lidar, in steps of 0.1 s; a process a
-core.
+"""IR-SIM's environments: its differential robot with its 2-D lidar, in steps of 0.1 s; one process
+per core.
 """
 
 import tempfile

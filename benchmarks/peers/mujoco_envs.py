@@ -1,5 +1,5 @@
 """MuJoCo's environments: a planar body whose velocity is imposed, in threads: mj_step and
-mj_multiRay let go of the GIL.
+mj_multiRay release the GIL.
 """
 
 from concurrent.futures import ThreadPoolExecutor
@@ -43,7 +43,7 @@ def main() -> None:
         origin = np.zeros(3)
         for i in range(first, given.envs, common.CORES):
             data = datas[i]
-            turned = data.qpos[2]  # of the body's own frame, which stands at the start's yaw
+            turned = data.qpos[2]  # in the body's own frame, which has the start's yaw
             data.qvel[:] = (
                 bench.SPEED_M_S * np.cos(turned),
                 bench.SPEED_M_S * np.sin(turned),

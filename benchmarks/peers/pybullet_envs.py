@@ -1,5 +1,5 @@
-"""PyBullet's environments: a box whose velocity is imposed, 24 steps of 1/240 s, rayTestBatch; a
-process a core.
+"""PyBullet's environments: a box whose velocity is imposed, 24 steps of 1/240 s, rayTestBatch; one
+process per core.
 """
 
 import math

@@ -67,7 +67,7 @@ def ray_angles() -> list[float]:
 
 
 def main(simulator: str, step_s: float, run) -> None:
-    """Times `run(rooms, sim_seconds)`, which returns a function that advances by that long, and
+    """Times the function that `run(rooms, sim_seconds)` returns, which advances by that long, and
     prints a JSON row.
     """
     parser = argparse.ArgumentParser(description=f"{simulator} on Ruedo's benchmark map")

@@ -15,7 +15,7 @@ def engine_steps(given: argparse.Namespace):
     first = ruedo.Engine(given.world)
     name = first.robots[0]
     first.close()
-    # Each in a room of its own, of the 16 that there are, as the first one stands in its.
+    # Each in one of the 16 rooms, placed as the first one is in its room.
     spawn = [
         f"p3at:more{i - 1}@{4 + 6 * (i % 4)},{3 + 6 * (i // 4)},1.5708"
         for i in range(1, given.robots)

@@ -15,7 +15,7 @@ STEP_S, SECONDS, REPEATS = (
     0.005,
     1.5,
     5,
-)  # shorter than the 2 s after which Ruedo lets what rests sleep
+)  # shorter than the 2 s after which Ruedo puts resting bodies to sleep
 
 
 class InProcess(Simulator):
@@ -71,8 +71,8 @@ def falling() -> Scene:
 
 
 def cost(make, scene: Scene, rate: float | None) -> float:
-    """ms of CPU time for a second of sim time: the least of several runs, from the same
-    beginning. rate: of all joints, rad/s.
+    """ms of CPU time for a second of sim time: the least of several runs from the same
+    start. rate: of all joints, rad/s.
     """
     best = float("inf")
     for _ in range(REPEATS):

@@ -33,7 +33,7 @@ PLOTS = {  # row: what its y axis shows
 
 
 def measure(row: rows.Row, simulator, step_ms: float) -> tuple[float, rows.Series]:
-    """NaN: it has no such thing, or the number is none."""
+    """NaN: the simulator lacks the feature, or has no finite result."""
     series: rows.Series = []
     try:
         return float(row.measure(simulator, step_ms * 1e-3, series)), series
@@ -63,7 +63,7 @@ def run(chosen: list[rows.Row], steps_ms, peers: bool) -> list[dict]:
 
 
 def number(value: float, digits: int) -> str:
-    """digits: after the point, of what is of the size of 1."""
+    """digits: after the point, for numbers of about 1."""
     if math.isnan(value):
         return "-"
     if abs(value) < 1e-9:  # rounding
@@ -111,7 +111,7 @@ def table(results: list[dict]) -> str:
 
 
 def plot(folder: Path, results: list[dict], key: str, label: str) -> str | None:
-    """At the step of 5 ms, or the first one there is."""
+    """At the step of 5 ms, else at the first one."""
     of_key = [r for r in results if r["row"].key == key]
     if not of_key or not importlib.util.find_spec("matplotlib"):
         return None
@@ -209,7 +209,7 @@ def main() -> int:
         (arguments.out / "physics").mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryDirectory(
             prefix="ruedo-physics-"
-        ) as elsewhere:  # MuJoCo writes its log where it is
+        ) as elsewhere:  # MuJoCo writes its log into the working directory
             arguments.out = arguments.out.resolve()
             os.chdir(elsewhere)
             results = run(chosen, arguments.steps, not arguments.no_peers)

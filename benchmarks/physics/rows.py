@@ -1,5 +1,5 @@
-"""The tests: each sets a scene up, measures one number in any simulator, and knows what it should
-be.
+"""The tests: each sets up a scene, measures one number in any simulator, and knows its expected
+value.
 """
 
 from __future__ import annotations
@@ -37,11 +37,9 @@ class Row:
     unit: str
     reference: float
     source: str  # of the reference
-    measure: Callable[
-        [Make, float, Series], float
-    ]  # the series may be filled with what is worth a plot
+    measure: Callable[[Make, float, Series], float]  # the series may be filled with values to plot
     digits: int = 4
-    long: bool = False  # takes more than some seconds
+    long: bool = False  # takes more than a few seconds
 
 
 def steps(seconds: float, step_s: float) -> int:
@@ -183,8 +181,8 @@ def arm_creep(make: Make, step_s: float, series: Series) -> float:
 
 
 def arm_error(make: Make, step_s: float, series: Series) -> float:
-    """Told 0.2 rad everywhere, from stretched out: where its last joint is 4 s later, against the
-    product of its rotations.
+    """With all joints commanded to 0.2 rad from the stretched pose: the position of its last joint
+    4 s later, against the product of the rotations.
     """
     at, turned = np.array([0.0, 0.0, 1.0]), np.eye(3)
     c, s = math.cos(0.2), math.sin(0.2)
@@ -222,7 +220,7 @@ def sliding(angle: float) -> Callable[[Make, float, Series], float]:
 
 
 def slope(angle: float, body: Body) -> Scene:
-    """A body that touches a slope down along x."""
+    """A body that touches a slope descending along x."""
     height = body.shapes[0].size[0] / (2 if body.shapes[0].kind == "box" else 1)
     at = (height * math.sin(angle), 0.0, height * math.cos(angle))
     hill = Body(
@@ -355,8 +353,8 @@ def rolling(
 
 
 def skidding(left: float, right: float) -> Callable[[Make, float, Series], float]:
-    """How much wider its wheels' rates would have the track than it is, for the turn that the robot
-    makes.
+    """By what factor the track that follows from its wheels' rates and its turn exceeds the true
+    one.
     """
 
     def measure(make: Make, step_s: float, series: Series) -> float:

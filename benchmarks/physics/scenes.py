@@ -1,5 +1,5 @@
-"""What a test is made of, said once for all simulators: free bodies, things that never move, and
-mechanisms as URDF.
+"""The scenes of the tests, described once for all simulators: free bodies, things that never move,
+and mechanisms as URDF.
 
 Lengths in m, angles in rad, kg, s. Every mechanism is one URDF text, which all three simulators
 read themselves.
@@ -26,7 +26,7 @@ class Shape:
     at: tuple[float, float, float] = (0.0, 0.0, 0.0)
     friction: float = 1.0
     restitution: float = 0.0
-    torsion_m: float = 0.0  # moment about the normal for a newton of load
+    torsion_m: float = 0.0  # torsional friction: moment about the normal per newton of load
 
 
 @dataclass(frozen=True)
@@ -59,7 +59,7 @@ class Scene:
     bodies: tuple[Body, ...] = ()
     urdf: str = ""  # a mechanism "robot" whose first link is called "world" and never moves
     gravity: float = GRAVITY
-    commands: bool = False  # joints are told something
+    commands: bool = False  # joints are commanded
     wheels: tuple[tuple[str, ...], tuple[str, ...]] = (
         (),
         (),

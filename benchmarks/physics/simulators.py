@@ -1,4 +1,4 @@
-"""Ruedo, MuJoCo and PyBullet behind one small interface. Each has its defaults, but for what its
+"""Ruedo, MuJoCo and PyBullet behind one small interface. Each keeps its defaults, except as its
 class comment says.
 """
 
@@ -61,8 +61,8 @@ def matrix(q: Sequence[float]) -> Vec:
 
 
 class Ruedo(Simulator):
-    """A server of its own, stepped while it is paused, or in lockstep where joints are told
-    something.
+    """A server of its own, stepped while it is paused, or in lockstep where joints are
+    commanded.
     """
 
     name = "Ruedo"
@@ -121,8 +121,8 @@ class Ruedo(Simulator):
 
 
 class MuJoCo(Simulator):
-    """implicitfast, its recommended integrator, and elliptic cones; the rest as it comes. Meshes
-    are a height field, since it takes a mesh for its convex hull. It has no coefficient of
+    """implicitfast, its recommended integrator, and elliptic cones; the rest by default. Meshes
+    are a height field, since it replaces a mesh by its convex hull. It has no coefficient of
     restitution."""
 
     name = "MuJoCo"
@@ -173,7 +173,7 @@ class MuJoCo(Simulator):
                 self._data.actuator(f"{joint}_velocity").ctrl[0] = rate
 
     def _servos(self, spec, joint: str) -> None:
-        """Proportional, as stiff as they stay stable at all three steps."""
+        """Proportional, as stiff as is stable at all three steps."""
         for kind, gain, bias in (
             ("position", 2e3, [0, -2e3, -4e2]),
             ("velocity", 1e4, [0, 0, -1e4]),
@@ -222,7 +222,7 @@ class MuJoCo(Simulator):
                 )
             geom.friction = [shape.friction, max(shape.torsion_m, 1e-9), 1e-9]
             geom.condim = 4 if shape.torsion_m else 3
-            geom.priority = int(body.mass > 0.0)  # the moving body's coefficients hold
+            geom.priority = int(body.mass > 0.0)  # the moving body's coefficients count
 
     def step(self, n: int = 1) -> None:
         for _ in range(n):
@@ -259,8 +259,8 @@ class MuJoCo(Simulator):
 
 
 class PyBullet(Simulator):
-    """Bodies are multibodies, 50 iterations, as createMultiBody and loadURDF make them; damping of
-    0.04 that it gives every body is taken away, and sleep stays off as it is."""
+    """Bodies are multibodies, 50 iterations, as createMultiBody and loadURDF make them; its default
+    damping of 0.04 is removed, and sleeping stays off."""
 
     name = "PyBullet"
 
@@ -451,7 +451,7 @@ def available(peers: bool) -> list[type[Simulator]]:
 
 
 def with_friction(scene: Scene) -> str:
-    """The URDF with what Gazebo's users write for the friction of wheels."""
+    """The URDF with the tags by which Gazebo's users set the friction of wheels."""
     wheels = [joint.removeprefix("to_") for side in scene.wheels for joint in side]
     blocks = "".join(
         f'<gazebo reference="{wheel}"><mu1>{scene.friction}</mu1><mu2>{scene.friction}</mu2></gazebo>'

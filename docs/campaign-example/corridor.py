@@ -21,7 +21,7 @@ def hall(width=4.0, heading=0.0):
 
 
 class Corridor:
-    """Turns towards the goal and drives there, slower near things, round what is in the way."""
+    """Turns towards the goal and drives there, slower near obstacles, and around them."""
 
     def __init__(self, planted=""):
         self.planted = planted  # "far", "pi" or "frozen": which fault it has
@@ -35,7 +35,7 @@ class Corridor:
         if math.hypot(GOAL[0] - x, GOAL[1] - y) < 0.3:
             return "done"
         if self.planted == "far" and ranges[0] > 8.0:
-            self.lost = True  # takes the reading for a fault of the sensor, and never forgets it
+            self.lost = True  # treats the reading as a sensor fault, and never recovers from it
         if self.lost:
             return 0.0, 0.0
         heading = math.atan2(2 * w * z, 1 - 2 * z * z)
@@ -43,13 +43,13 @@ class Corridor:
         if not (self.planted == "pi" and abs(error) == math.pi):
             error = math.atan2(math.sin(error), math.cos(error))
         else:
-            error = 0.0  # the way of one who wraps with a < where <= belongs
+            error = 0.0  # wraps with < where <= belongs
         if self.blind(ranges):
             return 0.0, 0.0
         return self.drive(error, np.minimum(ranges, 8.0))
 
     def blind(self, ranges):
-        """A scan that is the same to the last bit is no scan: there is always noise."""
+        """A scan that is identical to the last one is a dead sensor: there is always noise."""
         if self.planted == "frozen":
             return False
         self.same = (

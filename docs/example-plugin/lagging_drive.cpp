@@ -1,8 +1,8 @@
-// A drive whose wheels come to the speed that they are told with a delay of first order:
+// A drive whose wheels follow the commanded speed with a first-order lag:
 // <ruedo:drive type="lagging">.
 //
-// Model: v' = (asked - v) / T, solved exactly over a step in which `asked` is constant; what it
-// gives is the mean over the step.
+// Model: v' = (asked - v) / T, solved exactly over a step in which `asked` is constant; the
+// result is the mean over the step.
 #include <ruedo/drive.h>
 #include <ruedo/math.h>
 
@@ -35,7 +35,7 @@ class LaggingDrive : public DriveModel {
 
   double time_constant_;  // s
   double kept_,
-      mean_;  // parts of what is missing at the beginning of a step: at its end, and in its mean
+      mean_;        // fractions of the speed error at the start of a step: at its end, and its mean
   BaseVelocity v_;  // at the end of the last step
 };
 

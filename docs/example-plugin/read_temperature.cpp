@@ -1,4 +1,4 @@
-// Prints what the thermometer says: as a stream of messages of its own type, in lockstep, and as
+// Prints the thermometer's messages: as a stream of its own type, in lockstep, and as
 // bytes.
 #include <cstdio>
 

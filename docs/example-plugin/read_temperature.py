@@ -1,4 +1,4 @@
-"""Prints what the thermometer says: messages of its own type, live and in lockstep, and bytes.
+"""Prints the thermometer's messages: of its own type, live and in lockstep, and as bytes.
 
 The type is made by `lcm-gen -p thermometer_t.lcm`.
 """

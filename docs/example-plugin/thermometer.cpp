@@ -1,4 +1,4 @@
-// A thermometer: a heater in a room warms what it shines on, on ROBOT/SENSOR.
+// A thermometer on ROBOT/SENSOR: a heater in the room warms what it shines on.
 //
 // Model: ambient + power / (1 + d^2) for a device d metres from the heater that it can see, ambient
 // else; SDF's <noise> on it.
@@ -54,7 +54,7 @@ class Thermometer : public SensorOf<Thermometer> {
   double ambient_, power_;  // degrees Celsius; degrees Celsius m^2
   Vec3 heater_;             // m, world
   Noise noise_;
-  BodyIndex body_;  // none: does not move
+  BodyIndex body_;  // none: it does not move
   Pose X_BS_;       // the device in its body
 };
 

@@ -1,4 +1,4 @@
-"""A judge of one's own: the robot must not have reversed. The log is a standard LCM log."""
+"""A custom judge: the robot must not have reversed. The log is a standard LCM log."""
 
 import os
 import sys

@@ -1,4 +1,4 @@
-// Drives a P3-AT through a gate, towards the middle of what its laser range finder sees to both
+// Drives a P3-AT through a gate, towards the middle of what its laser range finder sees on both
 // sides, and stops 4 m ahead. In lockstep: 20 steps of 5 ms, then the next command.
 #include <ruedo/client.h>
 

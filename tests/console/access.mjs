@@ -1,6 +1,6 @@
-// For everybody: axe-core finds nothing, in both themes and on a phone; keys for tabs, camera and a
-// robot among many; forced colours; no motion for who wants none; and without WebGL all but the
-// view works.
+// Accessibility: axe-core finds nothing, in both themes and on a phone; keys for tabs, camera and a
+// robot among many; forced colours; no motion where the system asks for none; and without WebGL all
+// but the view works.
 import { readFileSync } from "node:fs";
 
 export default async function access({ page, until, check, ready, picture, expect }) {
@@ -144,7 +144,7 @@ export default async function access({ page, until, check, ready, picture, expec
     JSON.stringify([a, b]),
   );
 
-  // ---- one of many robots
+  // ---- one among many robots
   await page.evaluate(() => {
     const {
       page: { now, set },
@@ -170,7 +170,7 @@ export default async function access({ page, until, check, ready, picture, expec
   );
   await page.evaluate(() => window.ruedo.page.set({ world: window.was, robot: 0 }));
 
-  // ---- as finely as can be when nothing moves
+  // ---- full detail when nothing moves
   await page.locator("#canvas").focus();
   await page.keyboard.down("a");
   await until("while all moves it draws less, and says so", () => {
@@ -192,7 +192,7 @@ export default async function access({ page, until, check, ready, picture, expec
 
   // ---- colours and motion that the system asks for
   await page.emulateMedia({ forcedColors: "active", reducedMotion: "reduce" });
-  // The page hears of it with its next frame.
+  // The page notices with its next frame.
   await until(
     "no motion for who wants none",
     () => !window.ruedo.stage.view.controls.enableDamping,
@@ -209,7 +209,7 @@ export default async function access({ page, until, check, ready, picture, expec
   await picture("forced");
   await page.emulateMedia({ forcedColors: "none", reducedMotion: "no-preference" });
 
-  // ---- what is drawn no more is given back
+  // ---- what is no longer drawn is freed
   const memory = () =>
     page.evaluate(() => {
       const { geometries, textures } = window.ruedo.stage.renderer.info.memory;
@@ -229,8 +229,8 @@ export default async function access({ page, until, check, ready, picture, expec
   const first = await reload();
   for (let i = 0; i < 7; ++i) await reload();
   const last = await reload();
-  // Pictures and shadows come a little later than their scene; what stayed of each of the eight
-  // would be eight more at least.
+  // Pictures and shadows come a little later than their scene; a leak of one object for each of the
+  // eight would add eight at least.
   check(
     "a new scene takes the place of the old one in the graphics memory",
     last.geometries < first.geometries + 8 && last.textures < first.textures + 8,

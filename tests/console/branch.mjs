@@ -1,4 +1,4 @@
-// A moment of the past of a run is saved, to go on from there. Says which moment, and the command.
+// A past moment of a run is saved, to go on from there. Prints the moment, and the command.
 export default async function branch({ page, seen, until, check, ready, picture }) {
   await page.setViewportSize({ width: 1000, height: 460 }); // software draws every pixel
   await ready();
@@ -8,7 +8,7 @@ export default async function branch({ page, seen, until, check, ready, picture 
   await page.keyboard.down("KeyA");
   await until("(and turns)", () => Math.abs(window.ruedo.poses.to[1]) > 0.3);
   check("the present has no branch", !(await page.locator("#branch").isVisible()));
-  // A state that is past, while the run goes on, driven.
+  // A past state, while the run goes on with its robot driving.
   await page.evaluate(() => {
     const { rewind } = window.ruedo;
     rewind.show(rewind.range.end - 0.8);

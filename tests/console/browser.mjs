@@ -1,6 +1,6 @@
 // The console in a headless browser: node browser.mjs URL FOLDER SCENARIO [JSON], in a folder with
-// playwright-core. The scenario is a file beside this one. Prints a line for each thing that was
-// seen, and "error: ..." for what went wrong.
+// playwright-core. The scenario is a file beside this one. Prints a line for each observation, and
+// "error: ..." for each failure.
 import { createRequire } from "node:module";
 import { mkdtempSync, rmSync } from "node:fs";
 import { tmpdir } from "node:os";
@@ -22,7 +22,7 @@ const { encode } = await import(
 );
 const kAnyBody = [...encode("name_request_t", { name: "" })];
 const [url, folder, scenario, given] = process.argv.slice(2);
-// Software draws every pixel, on a machine that does other things, too
+// Pixels are drawn in software, on a busy machine.
 const kPatience_ms = Number(process.env.RUEDO_PATIENCE_S ?? 180) * 1000;
 const profile = mkdtempSync(join(tmpdir(), "ruedo-browser-"));
 const context = await chromium.launchPersistentContext(profile, {
@@ -54,8 +54,8 @@ page.on("console", (message) => {
   if (message.type() === "error") wrong(message.text());
 });
 page.on("pageerror", (error) => wrong(String(error)));
-// A picture that the next one replaces while it is read is no error, nor a server that does not
-// answer in time when the page asks whether it is there.
+// No errors: a picture that is replaced while it is being read, and a server that does not answer
+// the page's heartbeat in time.
 page.on("requestfailed", (request) => {
   if (!request.url().startsWith("blob:") && !request.url().endsWith("/icon.svg"))
     wrong(`${request.url()}: ${request.failure()?.errorText}`);
@@ -69,7 +69,7 @@ page.on("request", (request) => {
     errors.push(`asked ${request.url()}`);
 });
 page.setDefaultTimeout(kPatience_ms);
-// All notes that the page has shown: they go away by themselves, maybe before a busy machine looks.
+// All notes that the page has shown: they disappear by themselves, maybe before they are checked.
 await page.addInitScript(() => {
   window.notes = [];
   addEventListener("DOMContentLoaded", () =>
@@ -80,7 +80,7 @@ await page.addInitScript(() => {
   );
 });
 
-// RUEDO_PAGE=sources: the page as its sources are now, though the program was built with another.
+// RUEDO_PAGE=sources: the page of the current sources, though the program was built with another.
 async function serveSources() {
   const { outputFiles } = await require("esbuild").build({
     entryPoints: { main: "src/main.ts" },
@@ -136,8 +136,8 @@ const tools = {
   },
   // Waits for a line from who started this.
   told: async () => (await lines.next()).value,
-  // Waits until a test in the page holds. No limit is meant to be reached by a page that works,
-  // however slow the machine.
+  // Waits until a condition in the page holds. A working page reaches no limit, however slow the
+  // machine.
   until: (what, test, argument) =>
     page.waitForFunction(test, argument, { timeout: kPatience_ms, polling: 100 }).then(
       () => {
@@ -171,7 +171,7 @@ const tools = {
         answered_ms: performance.now(),
       };
     }, kAnyBody),
-  // Until nothing moves on the canvas: the camera has come to rest.
+  // Until nothing moves on the canvas: the camera is at rest.
   still: () =>
     tools.until("(the camera is at rest)", () => {
       window.ruedo.stage.view.camera.updateMatrixWorld(); // else it is of the last frame

@@ -1,9 +1,9 @@
 // A log beside another one: ghosts, plots of how far apart the robots are, and the first
-// difference. Given: of both logs, as an independent reader found them, where the robot is at a
-// moment, what differs first, and how far apart it is at most.
+// difference. Given, from an independent reader of both logs: where the robot is at a moment,
+// the first difference, and the largest distance between the robots.
 export default async function compare({ page, given, seen, until, check, picture }) {
-  // Not by frames alone: an empty view is drawn before the page is connected, and what is asked of
-  // the log then is lost.
+  // Frames alone do not tell: an empty view is drawn before the page is connected, and requests to
+  // the log are lost until then.
   await until(
     "the world is shown",
     () => window.ruedo?.page.now.playback && window.ruedo.stage.frames > 1,

@@ -1,6 +1,5 @@
 // Everything by which the page steers: driving by keys, stick and gamepad, motion primitives,
-// layers, placing, rate, reset. What came of it is in the run's log, too, which test_browser.py
-// reads.
+// layers, placing, rate, reset. test_browser.py checks the effects in the run's log, too.
 const kLayers = {
   // layer: what it switches, in the overlay of a robot
   rays: (o) => [...o.scans.values()].map((s) => s.lines.object),
@@ -44,13 +43,13 @@ export default async function controls(tools) {
   );
   await page.locator("#canvas").focus();
 
-  // From the start, whatever the last drive came to while a busy machine looked away.
+  // Starts anew, whatever the last drive did while a busy machine was not looking.
   const again = async () => {
     await stands("(it stands)");
     const epoch = await page.evaluate(() => window.ruedo.clock.epoch);
     await page.locator("#canvas").focus();
     await page.keyboard.press("r");
-    await page.keyboard.press("Enter"); // it asks
+    await page.keyboard.press("Enter"); // confirms
     await until("(a reset)", (e) => window.ruedo.clock.epoch > e && window.stands, epoch);
     await page.evaluate(() => window.mark());
   };
@@ -158,14 +157,14 @@ export default async function controls(tools) {
   await page.locator("#pause").click();
   await until("(it is paused)", () => document.getElementById("state").textContent === "paused");
   await page.evaluate(() => {
-    // from where the points on the wall can be seen
+    // from here the points on the wall can be seen
     const { stage } = window.ruedo;
     stage.view.controls.target.set(0, -1, 0);
     stage.view.camera.position.set(-2, 5, 6);
     stage.setAutomatic(false);
   });
   await still();
-  // Whether the page draws after a click, and something else than before.
+  // Whether the page redraws after a click, and differently.
   const draw = () =>
     page.evaluate(() => {
       const { stage } = window.ruedo;
@@ -188,7 +187,7 @@ export default async function controls(tools) {
       await page.locator(`[data-layer="${which}"]`).click();
       await until(`(${which} are drawn again)`, (n) => window.ruedo.stage.frames > n, frames);
     };
-    const isCovered = layer === "trail"; // the odometry's lies over it
+    const isCovered = layer === "trail"; // by that of the odometry
     if (isCovered) await click("odometry");
     const was = await visible(),
       drawn = await draw();
@@ -213,7 +212,7 @@ export default async function controls(tools) {
   await page.getByRole("tab", { name: "World" }).click();
   await page.keyboard.press("3");
   await still();
-  // Clicks on the ground there, and returns where exactly, by the page's own camera.
+  // Clicks on the ground there, and returns the exact place, by the page's own camera.
   const click = async (at) => {
     const [px, py, gx, gy] = await page.evaluate(([gx, gy]) => {
       const { stage } = window.ruedo,
@@ -266,7 +265,7 @@ export default async function controls(tools) {
     },
     clicked,
   );
-  // ---- going to where one clicks
+  // ---- going to a clicked point
   await page.locator("#canvas").focus();
   await page.keyboard.press("g");
   const near = await click([0.8, -1]);
@@ -279,7 +278,7 @@ export default async function controls(tools) {
     (await page.evaluate(() => window.ruedo.trip.points().length)) === 2,
     "other points",
   );
-  // In one go, so that nothing else moves between both pictures.
+  // At once, so that nothing else moves between the two pictures.
   const way = await page.evaluate(() => {
     const { stage, way } = window.ruedo,
       picture = () => {
@@ -355,7 +354,7 @@ export default async function controls(tools) {
   const epoch = await page.evaluate(() => window.ruedo.clock.epoch);
   await page.locator("#canvas").focus();
   await page.keyboard.press("r");
-  await page.keyboard.press("Enter"); // it asks
+  await page.keyboard.press("Enter"); // confirms
   await until("a reset sets the clock back", (e) => window.ruedo.clock.epoch > e, epoch);
   await until(
     "a reset takes away what was placed",

@@ -1,5 +1,5 @@
-// A recorded run that is one file, opened from the disk: nothing is asked for, and it shows what
-// the log has.
+// A recorded run as one file, opened from the disk: it requests nothing, and shows what the log
+// has.
 import { readdirSync } from "node:fs";
 
 export default async function disk({ page, given, until, check, picture }) {

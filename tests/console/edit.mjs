@@ -1,4 +1,4 @@
-// A world is edited as a user does it: drawn, placed, moved by handles and numbers, cut, undone,
+// A world is edited as by a user: drawn, placed, moved by handles and numbers, cut, undone,
 // settled, saved.
 export default async function edit({ page, seen, until, check, picture, still, given }) {
   await page.setViewportSize({ width: 1100, height: 640 });
@@ -129,7 +129,7 @@ export default async function edit({ page, seen, until, check, picture, still, g
   await page.locator("#find-model").fill("");
   await page.locator("#canvas").focus();
 
-  // ---- what stands fast, too; copies, and what goes
+  // ---- fixed models; copies, and removal
   await page.locator('[data-model="wall"]').click();
   await page.locator('[data-number="y"]').fill("1.5");
   await page.locator('[data-number="y"]').press("Enter");

@@ -1,5 +1,5 @@
-// What happened, below the time line: of a log, or of a run that goes on. Given, of a log: the
-// events that there must be, in their order, and the times of states that follow each other.
+// The events below the time line, of a log or of a live run. Given, of a log: the expected events,
+// in order, and the times of consecutive states.
 export default async function events({ page, until, check, seen, ready, given, picture }) {
   await page.setViewportSize({ width: 1100, height: 480 });
   await ready();

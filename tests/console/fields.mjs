@@ -23,7 +23,7 @@ export default async function fields({ page, until, check, ready, picture }) {
     () => window.ruedo.page.now.tab === "Plots" && document.querySelectorAll(".pane").length === 1,
   );
   await open("p3at/odometry");
-  // By hand: the page that it is dropped on opens on the way, which Playwright's dragTo waits for.
+  // By hand: the target page opens during the drag, and Playwright's dragTo would wait for it.
   await page.evaluate(() => {
     const data = new DataTransfer(),
       event = (type) =>

@@ -1,4 +1,4 @@
-// A field of a log: all of the run at once, and a click in the plot is a moment of it.
+// A field of a log: the plot shows the whole run, and a click in it seeks to that moment.
 export default async function fieldsOfLog({ page, until, check, ready, given, picture }) {
   await page.setViewportSize({ width: 1000, height: 620 });
   await ready();

@@ -1,12 +1,12 @@
 // Many robots, all of them in motion: frames a second, what a frame costs this page's own thread
-// (states taken, matrices made, draw calls given), and the processor time of the browser's
+// (states received, matrices made, draw calls issued), and the processor time of the browser's
 // processes for a frame. Given: {"robots": how many there must be, "seconds": of each measurement,
 // "views": of which, or all}.
 import { readFileSync, readdirSync } from "node:fs";
 
 const kTicks_per_s = 100; // of /proc
 
-// Processor time (s) so far, by kind of process, of all that this one has started.
+// Processor time (s) so far, by kind of process, of all child processes.
 function cpuTimes() {
   const processes = readdirSync("/proc")
     .filter((name) => /^\d+$/.test(name))
@@ -43,7 +43,7 @@ export default async function fleet({ page, given, until, check, picture }) {
     "the world is drawn",
     () => window.ruedo.stage.bodies.description && window.ruedo.stage.frames > 2,
   );
-  // The log's beginning again and again: it always moves on.
+  // Loops over the beginning of the log, so that time always advances.
   await page.evaluate(() =>
     setInterval(() => {
       window.ruedo.link.seek(0);
@@ -56,7 +56,7 @@ export default async function fleet({ page, given, until, check, picture }) {
       add = poses.add.bind(poses);
     let adding = 0;
     window.costs = [];
-    // Robots of the log stand. Here each goes round in a circle of 0.2 m at 0.4 m/s.
+    // The robots of the log stand still. Here each drives a circle of 0.2 m at 0.4 m/s.
     poses.add = (state, at) => {
       const angle = Number(state.utime) / 500_000;
       for (let i = 0; i < state.index.length; ++i) {
@@ -72,7 +72,7 @@ export default async function fleet({ page, given, until, check, picture }) {
       const begun = performance.now(),
         moving = !poses.settled;
       frame(at, overlays);
-      if (!moving) return; // what is drawn again without motion is cheaper
+      if (!moving) return; // a redraw without motion is cheaper
       window.costs.push(adding + performance.now() - begun);
       adding = 0;
     };
@@ -90,7 +90,7 @@ export default async function fleet({ page, given, until, check, picture }) {
     );
     const before = await page.evaluate(() => window.ruedo.stage.frames);
     await until("(it is drawn so)", (n) => window.ruedo.stage.frames > n + 5, before);
-    // Until it has come to its level
+    // Until its level of detail has settled
     if (automatic) await page.waitForTimeout(given.seconds * 1000);
     const cpuBefore = cpuTimes();
     const { frames, wall, costs, states, level } = await page.evaluate(
@@ -101,7 +101,7 @@ export default async function fleet({ page, given, until, check, picture }) {
           window.costs = [];
           window.states = 0;
           const look = () => {
-            // for so long, and so many frames
+            // for that long, and that many frames
             if (performance.now() - from.at < s * 1000 || window.costs.length < 4)
               return void setTimeout(look, 50);
             done({

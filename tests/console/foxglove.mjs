@@ -1,6 +1,6 @@
-// A viewer by Foxglove's own client library: foxglove.mjs URL SECONDS TOPIC... Subscribes to what
-// is advertised of these topics, publishes a Twist on /cmd_vel four times a second, and prints a
-// line of JSON for all that it hears.
+// A viewer by Foxglove's own client library: foxglove.mjs URL SECONDS TOPIC... Subscribes to those
+// of the topics that are advertised, publishes a Twist on /cmd_vel four times a second, and prints
+// a line of JSON for each message.
 import { createRequire } from "node:module";
 
 const require = createRequire(`${process.cwd()}/`); // the build's folder, where the packages are

@@ -1,5 +1,5 @@
-// What is open is kept for each world by itself. Who started this has another world served on the
-// same address when it is told so.
+// The open panels are stored for each world separately. The caller serves another world on the same
+// address when told to.
 export default async function layout({ page, seen, told, until, expect, ready, picture }) {
   expect(/WebSocket|ERR_CONNECTION|Failed to load|socket/);
   const world = () => page.evaluate(() => window.ruedo.page.now.world.name);

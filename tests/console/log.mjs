@@ -12,7 +12,7 @@ export default async function log({ page, given, seen, until, check, picture }) 
     "it plays by itself",
     () => window.ruedo.page.now.playback.now > window.ruedo.page.now.playback.begin,
   );
-  // At a fiftieth of its speed the log does not end before the page is asked.
+  // At a fiftieth of its speed the log does not end before the page is checked.
   const first = (await playback()).begin;
   await page.evaluate((t) => {
     window.ruedo.link.seek(t);
@@ -34,7 +34,7 @@ export default async function log({ page, given, seen, until, check, picture }) 
       document.getElementById("state").textContent === "log, paused",
   );
 
-  // As a hand does it: to a place on the line.
+  // As by hand: to a place on the line.
   const line = await page.locator("#scrub").boundingBox();
   await page.mouse.click(line.x + 0.8 * line.width, line.y + line.height / 2);
   await until("a click on the time line goes there", () => {

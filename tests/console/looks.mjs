@@ -1,5 +1,5 @@
-// What the view tells and gives: coordinates, ways, edges, pictures, videos, and links that lead
-// back.
+// What the view measures and exports: coordinates, distances, edges, pictures, videos, and links
+// back to it.
 import { readFileSync } from "node:fs";
 
 export default async function looks({ page, until, check, ready, still }) {

@@ -2,7 +2,7 @@
 // what is drawn then, or null for a live run.
 export default async function markers({ page, given, seen, until, check, ready, picture }) {
   await ready();
-  // What is drawn: of each layer how many objects it shows, and where its first one is.
+  // For each layer, how many objects it shows, and where its first one is.
   const drawn = () =>
     Object.fromEntries(
       [...window.ruedo.markers.layers].map(([name, { group }]) => [
@@ -71,7 +71,7 @@ export default async function markers({ page, given, seen, until, check, ready, 
   await page.locator('.chip[data-layer="markers"]').click();
   seen("empty the layer");
   await until("an empty layer is gone", () => !window.ruedo.markers.layers.has("plan"));
-  // The past has it again.
+  // Seeking back shows it again.
   await page.evaluate(() => {
     const { rewind } = window.ruedo;
     rewind.show((rewind.range.begin + rewind.range.end) / 2);

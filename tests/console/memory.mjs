@@ -1,5 +1,5 @@
-// What a page that stays open holds, once a minute after a collection of garbage: the heap, what
-// lies outside of it (messages that are kept), nodes, listeners, objects of the graphics. Given:
+// The memory of a page that stays open, once a minute after a garbage collection: the heap, buffers
+// outside of it (kept messages), nodes, listeners, graphics objects. Given:
 // {"minutes": how long}.
 export default async function memory({ page, context, given, ready }) {
   await page.setViewportSize({ width: 480, height: 320 });

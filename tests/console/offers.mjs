@@ -1,4 +1,4 @@
-// What the page shows is what can be done and seen here. Given: {"is": "bare" (no robot), "log",
+// The page offers only what can be done and seen here. Given: {"is": "bare" (no robot), "log",
 // "watched" (--control off) or "hall" (with a roof)}.
 export default async function offers({ page, given, until, check, picture }) {
   await page.setViewportSize({ width: 1100, height: 640 });

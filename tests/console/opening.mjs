@@ -1,4 +1,5 @@
-// How long the page of a log takes to be drawn, and then to show another moment, in seconds. Given:
+// How long the page of a log takes to be drawn first, and then to seek to another moment, in
+// seconds. Given:
 // {"time": the other moment}.
 export default async function opening({ page, given, ready }) {
   await ready();

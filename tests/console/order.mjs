@@ -1,6 +1,6 @@
-// The page comes together in one order, whatever comes late: each part in turn is held back until
-// all the others are there. The robot rests at (1, 2) m: with a start that is not known yet its
-// odometry would seem 2.236 m off.
+// The page loads in one order, whatever comes late: each part in turn is held back until all the
+// others are there. The robot rests at (1, 2) m: while its start is unknown, its odometry would
+// seem 2.236 m off.
 export default async function order({ page, seen, until, expect }) {
   await page.setViewportSize({ width: 700, height: 400 });
   let held = null,
@@ -26,7 +26,7 @@ export default async function order({ page, seen, until, expect }) {
       ),
     );
   });
-  expect(/ERR_ABORTED|aborted/); // what was held when the page was left
+  expect(/ERR_ABORTED|aborted/); // requests that were held back when the page was left
   const kOthersAreThere = {
     greeting: () => window.ruedo?.page.now.link === "open",
     messages: () =>
@@ -43,7 +43,7 @@ export default async function order({ page, seen, until, expect }) {
     await page.reload();
     await until(`(all but ${part})`, kOthersAreThere[part]);
     if (part.startsWith("/")) {
-      // it can be steered before it is seen
+      // it can be controlled before it is drawn
       await page.keyboard.press(" ");
       await until("(it is paused)", () => window.ruedo.page.now.paused);
       await page.keyboard.press(" ");

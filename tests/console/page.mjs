@@ -1,5 +1,5 @@
-// The page itself: how fast it is there, on small screens, dark and light, and what it says when
-// the server is gone. Channels of a colour such as rgb(1, 2, 3).
+// The page itself: how fast it loads, on small screens, dark and light, and what it says when the
+// server is gone.
 const channels = (colour) =>
   colour
     .match(/[\d.]+/g)
@@ -18,9 +18,8 @@ function contrast(a, b) {
 
 export default async function looks(tools) {
   const { page, url, seen, told, until, check, ready, picture, expect } = tools;
-  // ---- from the address to the first drawn frame, best of three. It is said and not judged: this
-  // machine draws by software, and does other things, too. Judged is what makes a page slow
-  // anywhere.
+  // ---- from the address to the first drawn frame, best of three: printed and not checked, since
+  // this machine is busy and draws in software. Checked is what makes a page slow anywhere.
   await page.setViewportSize({ width: 640, height: 400 });
   const loads = [];
   for (let i = 0; i < 3; ++i) {
@@ -143,7 +142,7 @@ export default async function looks(tools) {
   );
   await page.keyboard.press("?");
   check("the keys are shown", /arrow keys/.test(await page.locator("#help").innerText()));
-  // ---- dialogs: keys are theirs alone
+  // ---- dialogs capture all keys
   const open = () => page.evaluate(() => document.querySelectorAll("dialog[open]").length);
   const { step } = await tools.server();
   await page.keyboard.down("KeyW");

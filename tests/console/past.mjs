@@ -1,5 +1,5 @@
-// The last minutes of a run are looked at while it goes on: by the time line, with what came and
-// went meanwhile.
+// The last minutes of a run are viewed while it goes on: by the time line, with models that came
+// and went meanwhile.
 export default async function past({ page, seen, until, check, ready, server, picture, fact }) {
   await page.setViewportSize({ width: 1000, height: 460 }); // software draws every pixel
   await ready();

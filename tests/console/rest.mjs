@@ -1,4 +1,5 @@
-// A run whose robot stands and senses: nothing moves, so all pixels are drawn, without a GPU, too.
+// A run whose robot stands still and senses: nothing moves, so the view has full resolution, even
+// without a GPU.
 export default async function rest({ page, until, check, ready, seen }) {
   await page.setViewportSize({ width: 900, height: 520 });
   await ready();

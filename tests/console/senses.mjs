@@ -1,10 +1,10 @@
-// What robots sense in space, and what is known of them: clouds, names, frames, joints, an IMU, a
-// camera in the view, and the shapes that physics knows.
+// Overlays of robots in the view: point clouds, names, frames, joints, an IMU, a camera's frustum,
+// and collision shapes.
 export default async function senses({ page, until, check, seen, ready, picture }) {
   await page.setViewportSize({ width: 1000, height: 560 });
   await ready();
   await page.getByRole("tab", { name: "Robot" }).click();
-  // The wall stands 3 m ahead of the robot: all that is seen above the ground lies in its face.
+  // The wall stands 3 m ahead of the robot: all points above the ground lie on its face.
   for (const device of ["LIDAR", "EYE"])
     await until(
       `the cloud of ${device} lies on the wall`,
@@ -84,7 +84,7 @@ export default async function senses({ page, until, check, seen, ready, picture 
   await until("(it is drawn)", (n) => window.ruedo.stage.frames > n, 3);
   const looks = await page.evaluate(triangles);
   await layer("shapes");
-  // A box of 12 triangles in place of a ball of some hundred.
+  // A box of 12 triangles instead of a ball of some hundred.
   await until(
     "shapes of physics take the place of looks",
     (n) => window.ruedo.stage.renderer.info.render.triangles < n - 100,

@@ -1,5 +1,5 @@
-// A server that is connected but does not answer, as it is stopped from outside. Says when it is to
-// be stopped, and when to go on.
+// A server that is connected but does not answer, because its process is stopped. Prints when the
+// caller is to stop it, and when to continue it.
 export default async function silent({ page, seen, until, check, ready, told, picture }) {
   await page.setViewportSize({ width: 683, height: 384 }); // a laptop's window at 200 %
   await ready();

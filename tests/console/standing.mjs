@@ -1,5 +1,5 @@
-// A world that is there already, and stands: all of it is seen, and what is done with models whose
-// names are any text is taken back as if nothing had been. Given: {"model": its name, "pose": as
+// An existing world, at rest: all of it is visible, and edits of models whose names are any text
+// are undone without a trace. Given: {"model": its name, "pose": as
 // the page has it in numbers}.
 export default async function standing({ page, given, until, check }) {
   await page.waitForFunction(() => window.ruedo?.stage.bodies.description);

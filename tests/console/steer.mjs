@@ -1,4 +1,4 @@
-// What everybody does first, in short: pause, step, drive, place, rate, reset. For each transport;
+// The basic controls in short: pause, step, drive, place, rate, reset. For each transport;
 // controls.mjs has the details.
 export default async function steer({ page, seen, until, ready, server, check }) {
   await page.setViewportSize({ width: 900, height: 300 }); // software draws every pixel
@@ -40,7 +40,7 @@ export default async function steer({ page, seen, until, ready, server, check })
   );
   await page.locator("#canvas").focus();
   await page.keyboard.press("r");
-  await page.keyboard.press("Enter"); // it asks
+  await page.keyboard.press("Enter"); // confirms
   await until(
     "reset takes it away",
     () => !window.ruedo.page.now.world.bodies.some((b) => b.name === "box/link"),

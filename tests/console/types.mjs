@@ -1,5 +1,5 @@
 // Messages of types that this page was not built with: their fields are shown. Given: {"channel",
-// "shows": what stands there}.
+// "shows": the expected text}.
 export const expected = /404/; // the log has no world
 
 export default async function types({ page, given, until }) {

@@ -42,11 +42,6 @@ class Clock(IdlStruct, typename="rosgraph_msgs::msg::dds_::Clock_"):
 
 
 @dataclass
-class Bool(IdlStruct, typename="std_msgs::msg::dds_::Bool_"):
-    data: bool
-
-
-@dataclass
 class String(IdlStruct, typename="std_msgs::msg::dds_::String_"):
     data: str
 

@@ -88,7 +88,7 @@ class TcpHarm(threading.Thread):
 
 
 @pytest.mark.parametrize("scheme", ["udpm", "tcpq"])
-def test_nothing_stops_and_nothing_grows(scheme, record_property):
+def test_nothing_stops_and_nothing_grows(scheme):
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
         port = probe.getsockname()[1]

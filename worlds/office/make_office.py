@@ -99,7 +99,7 @@ def furniture():
     return things
 
 
-# Posters on walls: (x, y of the picture's middle, the direction it looks, picture).
+# Posters on walls: (x, y of the picture's centre, the direction it faces, picture).
 POSTERS = [
     (-11, -1.90, 90, 1),
     (-4, 1.90, -90, 2),
@@ -128,7 +128,7 @@ def wall_boxes():
             size = (along, THICK, z1 - z0) if ux else (THICK, along, z1 - z0)
             boxes.append(((x0 + ux * middle, y0 + uy * middle, (z0 + z1) / 2), size))
 
-        # Outer walls run on over the corners; inner ones end at the middle of the wall they meet.
+        # Outer walls extend over the corners; inner ones end at the middle of the wall they meet.
         start, end = -THICK / 2, length + THICK / 2
         for door in doors:
             piece(start, door - DOOR / 2, 0, HEIGHT)
@@ -166,7 +166,7 @@ class TexturedMesh:
 
 
 def floor_mesh():
-    """4 mm above the ground plane, so that a depth buffer tells them apart."""
+    """4 mm above the ground plane, so that a depth buffer separates them."""
     mesh = TexturedMesh()
     for x0, y0, x1, y1, texture, repeat in FLOORS:
         corners = [(x0, y0), (x1, y0), (x1, y1), (x0, y1)]

@@ -1,12 +1,12 @@
 #!/usr/bin/env python3
-"""Makes the robots that show each way to steer: a car, a tricycle, a mecanum, an omni, a holonomic
+"""Makes a robot for each kind of drive: a car, a tricycle, a mecanum, an omni, a holonomic
 and a tracked base; a small one for lessons, and one with an arm.
 
     worlds/robots/make_bases.py [FOLDER]
 
 Writes NAME/model.sdf and NAME/model.config below FOLDER (this one, where none is given). Bodies are
 boxes and cylinders, so that no mesh is needed; every robot has a laser range finder and an IMU.
-Measures and masses are ours.
+Dimensions and masses are our own.
 """
 
 import math
@@ -93,7 +93,7 @@ def sensors(height, ahead=0.0):
 
 
 def wheel(name, x, y, radius, width, axis=0.0, mass=1.0):
-    """A wheel on the ground at (x, y); axis: the heading of what it rolls towards, rad."""
+    """A wheel on the ground at (x, y); axis: the heading that it rolls towards, rad."""
     tube = mass * (3 * radius * radius + width * width) / 12
     link = (
         f'    <link name="{name}"><pose>{numbers((x, y, radius, 0, 0, axis))}</pose>\n      <inertial><mass>{number(mass)}</mass><inertia><ixx>{number(tube)}</ixx>'
@@ -119,7 +119,7 @@ def joint(name, parent, child, axis="0 1 0", kind="continuous", limit=None):
 
 
 def knuckle(name, x, y, z, limit):
-    """What a steered wheel hangs on, and its joint."""
+    """The part that carries a steered wheel, and its joint."""
     link = f'    <link name="{name}"><pose>{numbers((x, y, z, 0, 0, 0))}</pose><inertial><mass>0.3</mass><inertia>{inertia(0.3, 0.05, 0.05, 0.05)}</inertia></inertial></link>\n'
     return link + joint(f"{name}_joint", "base_link", name, "0 0 1", "revolute", limit)
 
@@ -180,7 +180,7 @@ def car():
 
 
 def tricycle():
-    """One wheel ahead that is driven and steered, two that roll."""
+    """One driven and steered wheel ahead, two free ones."""
     radius, base, track = 0.1, 0.55, 0.44
     text = body(20, (0.3, 0.36, 0.2), 0.1, GREEN, sensors(0.4))
     for side, y in (("left", track / 2), ("right", -track / 2)):
@@ -250,7 +250,7 @@ def omni():
 
 
 def puck():
-    """Holonomic: no wheel of it turns, as of Gazebo's planar move."""
+    """Holonomic: its wheels do not turn, as with Gazebo's planar move."""
     text = (
         '    <link name="base_link">\n      <inertial><pose>0 0 0.07 0 0 0</pose><mass>6</mass><inertia>'
         + inertia(6, 0.3, 0.3, 0.14)
@@ -269,7 +269,7 @@ def puck():
 
 
 def round_base(mass, shell, ground, high, radius, track, more=""):
-    """Two wheels in the middle, a ball before and one behind, on which it slides."""
+    """Two wheels in the middle, and a ball in front and one behind, on which it slides."""
     middle = ground + high / 2
     text = (
         f'    <link name="base_link">\n      <inertial><pose>0 0 {number(middle)} 0 0 0</pose><mass>{number(mass)}</mass>'

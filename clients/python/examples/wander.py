@@ -10,7 +10,7 @@ import math
 
 import ruedo
 
-CLEARANCE = 0.7  # m, from here on it turns away
+CLEARANCE = 0.7  # m; nearer than this, it turns away
 SPEED = 0.35  # m/s
 TURN_RATE = 0.6  # rad/s
 
@@ -47,7 +47,7 @@ def wander(robot: ruedo.Robot, duration: float) -> None:
 def moved(
     start: tuple[float, float, float], end: tuple[float, float, float]
 ) -> tuple[float, float, float]:
-    """From one x, y, heading (m, rad) to another, seen from the first."""
+    """The second x, y, heading (m, rad) in the frame of the first."""
     x, y, turned = (b - a for a, b in zip(start, end))
     cos, sin = math.cos(start[2]), math.sin(start[2])
     return cos * x + sin * y, cos * y - sin * x, math.remainder(turned, math.tau)

@@ -18,7 +18,7 @@ from .address import is_claimed
 from .bus import Bus
 from .callbacks import Callbacks, Subscription
 from .clock import Clock
-from .control import Session
+from .control import REQUEST_CHANNEL, Session
 from .errors import NoServer, RuedoError, UnknownName
 from .lockstep import Stepper
 from .motion import Drivers
@@ -202,7 +202,7 @@ class Connection:
         self._asked = time.monotonic()
         request = lcmtypes.request_t()
         request.epoch, request.kind = -1, lcmtypes.request_t.INFO
-        self.bus.publish("ruedo/request", request.encode())
+        self.bus.publish(REQUEST_CHANNEL, request.encode())
 
     # The receiving thread.
 

@@ -17,6 +17,7 @@ from .samples import Value, floats
 if TYPE_CHECKING:
     from .connection import Connection
 
+REQUEST_CHANNEL = "ruedo/request"
 _REPEAT_SECONDS = 0.1
 
 
@@ -165,7 +166,7 @@ class Session:
             kind,
             len(body),
         )
-        self._connection.bus.publish("ruedo/request", head + body)
+        self._connection.bus.publish(REQUEST_CHANNEL, head + body)
 
     @staticmethod
     def _checked(reply: Any) -> Any:

@@ -16,6 +16,12 @@ EVENT = b"\xed\xa1\xda\x01"  # that LCM's logs begin each message with
 _HEAD = struct.Struct(
     ">4sqqii"
 )  # EVENT, number, timestamp, sizes of the channel's name and the data
+# of the records, by which a run can be repeated
+HEADER_CHANNEL, APPLIED_CHANNEL, STATE_HASH_CHANNEL = (
+    "ruedo/header",
+    "ruedo/applied",
+    "ruedo/state_hash",
+)
 LONGEST_CHANNEL, LARGEST = 1000, 1 << 30  # bytes; as `ruedo` itself reads them
 log = logging.getLogger("ruedo")
 

@@ -243,6 +243,3 @@ class Streams:
             streams = list(self._all.values())
         for stream in streams:
             stream._forget()
-
-
-AnyStream = Stream[Any]

@@ -1,4 +1,4 @@
-// Steps that are taken back, and SDF as text: what is drawn, scaled, and cut.
+// Undo and redo, and SDF as text: shapes that are drawn, scaled, and cut.
 import { describe, expect, it } from "vitest";
 import type { world_state_t } from "../generated/messages";
 import { History } from "../src/edit/history";
@@ -35,7 +35,7 @@ describe("history", () => {
     await history.undo();
     await history.redo();
     await history.do(step("c"));
-    expect(await history.redo()).toBe(false); // what was undone is gone
+    expect(await history.redo()).toBe(false); // a new step clears what was undone
     expect(said).toEqual(["+a", "+b", "-b", "-a", "+a", "+c"]);
     expect(states.at(-1)).toEqual({ undo: "c", redo: null, changes: 6 });
   });

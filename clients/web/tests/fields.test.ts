@@ -1,4 +1,4 @@
-// Fields of messages by their paths, what is said of their values, and tables of them.
+// Fields of messages by their paths, statistics of their values, and tables of them.
 import { describe, expect, it } from "vitest";
 import { csvOf, fieldsOf, statisticsOf, valueAt } from "../src/wire/fields";
 
@@ -21,7 +21,7 @@ describe("fields", () => {
   });
 
   it("have statistics of what is finite", () => {
-    // Mean 5, squares of what is away from it 32 / 8 = 4.
+    // Mean 5, variance 32 / 8 = 4.
     expect(statisticsOf([2, 4, 4, 4, NaN, 5, 5, 7, 9, Infinity])).toEqual({
       count: 8,
       min: 2,

@@ -1,4 +1,4 @@
-// How surfaces are drawn: what the plain finish keeps, and that both go.
+// The finish of surfaces: what the plain one keeps, and that both are disposed.
 import * as THREE from "three";
 import { describe, expect, it } from "vitest";
 import { arrived, finishesOf, setFinish } from "../src/scene/finish";

@@ -1,4 +1,4 @@
-// Points that a robot is sent to: what it is told, whatever comes of it.
+// Points that a robot is sent to: the commands that it gets, whatever it makes of them.
 import { describe, expect, it } from "vitest";
 import { motion_status_t, move_command_t } from "../generated/messages";
 import { GoTo, type PlanarPose } from "../src/state/go_to";
@@ -6,7 +6,7 @@ import { GoTo, type PlanarPose } from "../src/state/go_to";
 const kRotate = move_command_t.ROTATE,
   kAdvance = move_command_t.ADVANCE;
 
-// A robot at the origin that does what it is told, but for a share of each way.
+// A robot at the origin that executes its commands, but falls short by a fraction of each.
 function robot(short = 0) {
   const pose: PlanarPose = { x: 0, y: 0, heading: 0 },
     told: [number, number][] = [],
@@ -42,7 +42,7 @@ function robot(short = 0) {
 describe("a robot that is sent to a point", () => {
   it("turns the short way and goes there", () => {
     const { goTo, told, work, pose } = robot();
-    pose.heading = 3; // -2 - 3 rad is a longer way than what is left of the circle
+    pose.heading = 3; // the shorter turn is the other way round than -2 - 3 rad
     goTo.go({ x: Math.cos(-2), y: Math.sin(-2) }, false);
     work();
     expect(told.map(([kind]) => kind)).toEqual([kRotate, kAdvance]);

@@ -2,7 +2,7 @@
 import { expect, it } from "vitest";
 import { Heartbeat } from "../src/wire/heartbeat";
 
-// A server that answers or does not, how often it was asked, and what was told.
+// A server that answers or does not, how often it was asked, and what was reported.
 function server() {
   const is = { there: true, asked: 0, told: [] as boolean[] };
   const heart = new Heartbeat(

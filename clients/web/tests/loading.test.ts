@@ -1,4 +1,4 @@
-// The order of loading: every order in which the parts can arrive leads to the same.
+// Loading: every order in which the parts can arrive has the same result.
 import { describe, expect, it } from "vitest";
 import type { world_info_t } from "../generated/messages";
 import { Loading } from "../src/state/loading";
@@ -35,7 +35,7 @@ function info(robots: string[], more: Partial<world_info_t> = {}): world_info_t 
   } as unknown as world_info_t;
 }
 
-// A page with a scene on the server, whose answers come when they are let go.
+// A page with a scene on a server whose answers the test releases.
 function page() {
   const told: string[] = [],
     waiting: { answer: () => void; fail: () => void }[] = [];
@@ -133,7 +133,7 @@ describe("the order of loading", () => {
     expect(loading.complete).toBe(false);
     waiting[1]!.answer();
     await settle();
-    expect(loading.complete).toBe(false); // the world of before may be another
+    expect(loading.complete).toBe(false); // the known world may be the previous one
     loading.onInfo(info(["c"], { run_id: 2n }));
     expect(last()).toBe("c in scene");
   });

@@ -1,4 +1,4 @@
-// A log in the page: at each moment the newest message of every channel that is wanted.
+// A log in the page: at each moment the newest message of every wanted channel.
 import { describe, expect, it, vi } from "vitest";
 import { encode } from "../src/wire/lcm";
 import { historyOf } from "../src/wire/link";
@@ -94,7 +94,7 @@ describe("a log in the page", () => {
     log.play(false, 1);
     log.want(["a", "i"]);
     await Promise.resolve();
-    expect(told).toEqual(["i99"]); // what runs is known from the beginning
+    expect(told).toEqual(["i99"]); // ruedo/info is known from the beginning
     log.seek(2.5);
     log.seek(2.6);
     expect(told.slice(1)).toEqual(["a20", "a21"]);

@@ -1,4 +1,4 @@
-// Interpolation between states, odometry in the world, and how finely is drawn.
+// Interpolation between states, odometry in the world, and levels of detail.
 import { describe, expect, it } from "vitest";
 import type { world_state_t } from "../generated/messages";
 import { Poses } from "../src/state/poses";
@@ -26,7 +26,7 @@ const yawOf = (poses: Poses, body: number) =>
   2 * Math.atan2(poses.now[7 * body + 6]!, poses.now[7 * body + 3]!);
 
 describe("poses between two states", () => {
-  // 100 ms between states, often enough that this is the interval.
+  // 100 ms between states, often enough to establish the interval.
   function moving(): Poses {
     const poses = new Poses();
     for (let i = 0; i <= 100; ++i) {
@@ -59,7 +59,7 @@ describe("poses between two states", () => {
         const frame = 2 * i * frame_ms;
         poses.advance(frame);
         seen.push(poses.now[0] ?? 0);
-        // It comes after this frame was timed, maybe before it is drawn
+        // It arrives after this frame was timed, maybe before it is drawn
         poses.add(stateAt(i * 33_333, [[0, i / 30, 0]]), frame + late_ms);
         poses.advance(frame + frame_ms);
         seen.push(poses.now[0]!);
@@ -142,7 +142,7 @@ it("odometry that begins turned and aside is turned and moved", () => {
 });
 
 describe("quality", () => {
-  // Frames in a row, each so many ms after the last; how often the level changed.
+  // Consecutive frames at that interval in ms; how often the level changed.
   function draw(quality: Quality, from_ms: number, interval_ms: number, frames: number): number {
     let changes = 0;
     for (let i = 1; i <= frames; ++i) if (quality.drawn(from_ms + i * interval_ms)) ++changes;
@@ -212,7 +212,7 @@ describe("quality", () => {
     }
   });
 
-  // What a change at that moment leads to: whether it is drawn, at another level, reduced.
+  // The result of a change at that moment: whether it is drawn, at another level, reduced.
   const next = (quality: Quality, at_ms: number, change: Change) => {
     const { draw, other } = quality.next(at_ms, change);
     return [draw, other, quality.reduced];

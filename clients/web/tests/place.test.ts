@@ -1,4 +1,4 @@
-// Places as the end of an address, and back.
+// Places as the fragment of a URL, and back.
 import { describe, expect, it } from "vitest";
 import { hashOf, placeOf } from "../src/state/place";
 

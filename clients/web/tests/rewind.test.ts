@@ -1,10 +1,10 @@
-// The past of a live run: what is kept, what is shown of it, and what goes on meanwhile.
+// The past of a live run: what is kept, what is shown of it, and what continues meanwhile.
 import { beforeEach, describe, expect, it, vi } from "vitest";
 import { decode, encode } from "../src/wire/lcm";
 import type { Hello, LinkHandler, RunLink } from "../src/wire/protocol";
 import { kMostSeconds, Rewind, type Past } from "../src/wire/rewind";
 
-// A link whose end is in the test's hands.
+// A link whose other end the test controls.
 class Hand implements RunLink {
   handler!: LinkHandler;
   sent: string[] = [];
@@ -167,7 +167,7 @@ describe("the past", () => {
     expect(shown(7)).toEqual({ plan: 3, goals: 2 });
     for (let t = 11; t <= 2 * kMostSeconds; ++t) come(t);
     expect(shown(kMostSeconds + 1)).toEqual({ plan: 3, goals: 2 });
-    hand.handler.message("ruedo/world", state(0, 0, 1)); // begins anew: programs have not
+    hand.handler.message("ruedo/world", state(0, 0, 1)); // a reset, which keeps what programs drew
     expect(shown(0)).toEqual({ plan: 3, goals: 2 });
   });
 

@@ -1,4 +1,4 @@
-// Messages on their way to those who show them.
+// Messages are passed to the views that show them.
 import { describe, expect, it, vi } from "vitest";
 import { kTypes } from "../generated/messages";
 import { Store } from "../src/state/store";

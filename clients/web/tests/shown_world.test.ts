@@ -1,4 +1,4 @@
-// Which world is shown while a run goes on and somebody looks back; what the link is asked for.
+// Which world is shown while a run goes on and the user looks back, and the requests to the link.
 import { beforeEach, describe, expect, it, vi } from "vitest";
 import type { Model } from "../src/app/model";
 import type { SceneView } from "../src/app/scene_view";
@@ -48,7 +48,7 @@ describe("the world that is shown", () => {
         show: (files: SceneFiles | null) => shown.push(files?.description.version ?? null),
       } as unknown as SceneView,
     );
-    // The run has come that far, and something else is there from then on.
+    // From that time of the run on, the world is another one.
     const comes = (end: number, run: World, files: SceneFiles | null) => {
       range.end = end;
       world.take(run, files);

@@ -1,4 +1,4 @@
-// The store, the clock, which channels are wanted, and what is said of the run.
+// The store, the clock, which channels are wanted, and the text about the run.
 import { beforeEach, describe, expect, it, vi } from "vitest";
 import { Clock, clockText } from "../src/state/clock";
 import { shownRobots, stateWords, type PageState } from "../src/state/page";
@@ -124,7 +124,7 @@ describe("the clock", () => {
     clock.tell(3, 0, true);
     clock.tell(2.9, 0); // came late
     expect(page.now.time_s).toBe(3);
-    clock.tell(0, 1); // no state: of which epoch this is, is not known yet
+    clock.tell(0, 1); // no state: its epoch is not known yet
     expect(page.now.time_s).toBe(3);
     clock.tell(2.6, 0, true); // a state that came late
     expect([page.now.time_s, forgotten]).toEqual([3, 1]);

@@ -1,4 +1,4 @@
-// The time line: events around a moment, and what is played again.
+// The time line: events around a moment, and replay.
 import { describe, expect, it } from "vitest";
 import { eventAfter, eventBefore, loopedTo, shownOf } from "../src/state/time";
 

@@ -1,4 +1,4 @@
-// What of the scene is seen: from where, in which detail, and in whose light.
+// The view of the scene: camera, level of detail, and lights.
 import * as THREE from "three";
 import { describe, expect, it } from "vitest";
 import { Crowd } from "../src/scene/crowd";

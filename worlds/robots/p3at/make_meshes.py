@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Makes the P3-AT's meshes (meshes/*.obj) from the robot's measures: run it again after changing
+"""Makes the P3-AT's meshes (meshes/*.obj) from the robot's dimensions: run it again after changing
 one.
 """
 
@@ -33,7 +33,7 @@ SONARS = [
 ]
 SONAR_HEIGHT = {True: 0.250, False: 0.247}  # front, rear
 DECK_TOP = 0.2775
-WHEELS_X, AXLE_Y, AXLE_Z = (0.135, -0.134), 0.156, 0.111
+WHEELS_X, AXLE_Z = (0.135, -0.134), 0.111
 
 
 def body():

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Makes the P3-DX's meshes (meshes/*.obj) from the robot's measures: run it again after changing
+"""Makes the P3-DX's meshes (meshes/*.obj) from the robot's dimensions: run it again after changing
 one.
 """
 

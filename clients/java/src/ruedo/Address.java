@@ -126,7 +126,7 @@ final class Address {
     }
 
     private void probe() throws IOException {
-        Link.to(this).close();
+        StreamSocket.connect(this).close();
     }
 
     /** False for a tcpq or unix address where nobody listens. */

@@ -17,6 +17,7 @@ import java.util.Map;
  * once.
  */
 final class Session {
+    static final String REQUEST_CHANNEL = "ruedo/request";
     private static final long REPEAT_MILLIS = 100;
     private static final Map<Integer, String> KINDS = kinds();
 
@@ -155,7 +156,7 @@ final class Session {
         request.kind = kind;
         request.size = body.length;
         request.body = body;
-        sim.bus.publish("ruedo/request", request);
+        sim.bus.publish(REQUEST_CHANNEL, request);
     }
 
     private static String name(int kind) {

@@ -642,7 +642,7 @@ public final class Simulation implements AutoCloseable {
         request.epoch = -1;
         request.kind = request_t.INFO;
         request.body = new byte[0];
-        bus.publish("ruedo/request", request);
+        bus.publish(Session.REQUEST_CHANNEL, request);
     }
 
     void refreshInfo() {

@@ -27,7 +27,7 @@ final class TcpqTransport implements Transport {
     private final Address address;
     private final Set<String> subscriptions =
             new LinkedHashSet<>(); // these under this object's monitor
-    private Link link; // null: not connected
+    private StreamSocket socket; // null: not connected
     private volatile boolean closed;
 
     TcpqTransport(Address address) {
@@ -86,9 +86,9 @@ final class TcpqTransport implements Transport {
     }
 
     private synchronized void send(ByteBuffer bytes) {
-        if (link == null) return;
+        if (socket == null) return;
         try {
-            link.write(bytes.array(), bytes.position());
+            socket.write(bytes.array(), bytes.position());
         } catch (IOException error) {
             drop();
         }
@@ -96,15 +96,15 @@ final class TcpqTransport implements Transport {
 
     private synchronized void drop() {
         try {
-            if (link != null) link.close(); // a read under way ends
+            if (socket != null) socket.close(); // a read under way ends
         } catch (IOException error) {
             // it is gone
         }
-        link = null;
+        socket = null;
     }
 
     private synchronized void connect() throws IOException {
-        Link made = Link.to(address);
+        StreamSocket made = StreamSocket.connect(address);
         try {
             made.setTimeout(2000);
             made.write(ByteBuffer.allocate(8).putInt(CLIENT).putInt(VERSION).array(), 8);
@@ -116,13 +116,13 @@ final class TcpqTransport implements Transport {
             made.close();
             throw error;
         }
-        link = made;
+        socket = made;
         for (String channel : subscriptions) send(named(SUBSCRIBE, pattern(channel), 0));
     }
 
     /** The connection, reopened if necessary; null if none is possible now, or after close(). */
     private synchronized DataInputStream input() throws IOException {
-        if (link == null && !closed) {
+        if (socket == null && !closed) {
             try {
                 connect();
             } catch (IOException error) {
@@ -133,9 +133,9 @@ final class TcpqTransport implements Transport {
                 }
             }
         }
-        return link == null
+        return socket == null
                 ? null
-                : new DataInputStream(new BufferedInputStream(link.input(), 1 << 16));
+                : new DataInputStream(new BufferedInputStream(socket.input(), 1 << 16));
     }
 
     private void run(Receiver receiver) {

@@ -26,7 +26,7 @@ class Grid:
         return np.floor((points + HALF) / CELL).astype(int)
 
     def add(self, origin: np.ndarray, points: np.ndarray) -> None:
-        """A scan: from where its rays went, and where they ended, (n, 2) m in the world."""
+        """Adds a scan: where its rays began, and where they ended, (n, 2) m in the world."""
         ways = np.linalg.norm(points - origin, axis=1)
         free = []
         for point, way in zip(points, ways):
@@ -42,7 +42,7 @@ class Grid:
 
 
 def explore(seconds: float = 60.0, seed: int = 1) -> Grid:
-    """Drives about in the arena, away from what is near, and maps what it sees."""
+    """Drives around the arena, away from near obstacles, and maps what it sees."""
     grid = Grid()
     with ruedo.launch("arena", lockstep=1, seed=seed, disable=["p3at/camera"]) as sim:
         robot = sim.robot("p3at")

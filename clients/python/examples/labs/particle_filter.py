@@ -1,5 +1,5 @@
 """Lab 6: Monte Carlo localisation (Thrun, Burgard, Fox, Probabilistic Robotics, chapter 8): where
-the robot is, from a map of the walls, its odometry and its scans, without knowing where it began.
+the robot is, from a map of the walls, its odometry and its scans, with an unknown start.
 """
 
 from __future__ import annotations
@@ -19,10 +19,8 @@ WALLS = [
     ((2.0, -1.5), (4.0, -1.5)),
 ]
 BEAMS = slice(5, 181, 17)  # of the scan's 181
-SIGMA = (
-    0.4  # m: of a beam; far more than its noise, since particles are never quite where the robot is
-)
-FEW = 1000  # particles are enough when they are near each other
+SIGMA = 0.4  # m, of a beam; far above its noise, since no particle is exactly where the robot is
+FEW = 1000  # so many particles are enough once they are close together
 START = (-2.5, 1.0, 0.4)
 THICKNESS = 0.1  # m
 
@@ -57,7 +55,8 @@ class Filter:
         )
 
     def move(self, way: float, side: float, turn: float) -> None:
-        """By the odometry's motion, in the robot's frame, with noise (m, m, rad)."""
+        """Moves the particles by the odometry's motion (m, m, rad), in the robot's frame, with
+        noise."""
         count = len(self.poses)
         spread = 0.01 + 0.1 * math.hypot(way, side)
         way_of = way + self._draw.normal(0, spread, count)
@@ -68,8 +67,8 @@ class Filter:
         self.poses[:, 2] += turn + self._draw.normal(0, 0.01 + 0.1 * abs(turn), count)
 
     def see(self, measured: np.ndarray, angles: np.ndarray, ahead: float) -> None:
-        """Weighs the particles by a scan, and draws new ones. ahead: of the device before the
-        robot's centre, m.
+        """Weights the particles by a scan, and resamples. ahead: of the device, from the robot's
+        centre, m.
         """
         device = self.poses.copy()
         device[:, 0] += ahead * np.cos(self.poses[:, 2])
@@ -91,7 +90,7 @@ class Filter:
 
 
 def localise(seconds: float = 40.0, particles: int = 10_000, seed: int = 1) -> list[float]:
-    """How far the estimate is from the truth, ten times a second (m)."""
+    """The error of the estimate, ten times a second (m)."""
     world = ruedo.World()
     for a, b in WALLS:
         world.wall(*a, *b, thickness=THICKNESS)

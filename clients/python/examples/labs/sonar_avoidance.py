@@ -11,7 +11,7 @@ SEES = 1.2  # m
 
 
 def avoid(seconds: float = 60.0, seed: int = 1) -> tuple[float, float]:
-    """How far it went (m), and the least true clearance that the range finder measured (m)."""
+    """The distance driven (m), and the least clearance that the range finder measured (m)."""
     way, clearance, before = 0.0, np.inf, None
     with ruedo.launch("arena", lockstep=1, seed=seed, disable=["p3at/camera"]) as sim:
         robot = sim.robot("p3at")

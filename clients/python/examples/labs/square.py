@@ -16,7 +16,7 @@ def finish(sim: ruedo.Simulation, robot: ruedo.Robot, move: ruedo.Command) -> ru
 
 
 def square(side: float = 2.0, track_error: float = 0.0) -> tuple[ruedo.Odometry, ruedo.Pose]:
-    """Drives it once. track_error: how wrong the robot knows its track, relative."""
+    """Drives it once. track_error: the relative error of the track that the robot assumes."""
     with ruedo.launch(
         ruedo.World().robot("p3at"),
         lockstep=1,

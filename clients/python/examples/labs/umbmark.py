@@ -2,10 +2,10 @@
 squares each way, from whose ends the errors of the odometry's track and of its wheels' diameters
 follow.
 
-Where the robot believes that it turned 90 degrees, it turned by another angle: alpha (error of the
-track) is an error of every corner, beta (wheels of different diameters) of every side. Of the
-centres of gravity of the ends, with the side L: alpha = (x_cw + x_ccw) / (-4 L), beta = (x_cw -
-x_ccw) / (-4 L).
+When the odometry shows a turn of 90 degrees, the robot has turned by another angle: alpha (from the
+error of the track) is an error at every corner, beta (from wheels of different diameters) along
+every side. From the centres of gravity of the ends, with the side L: alpha = (x_cw + x_ccw) /
+(-4 L), beta = (x_cw - x_ccw) / (-4 L).
 """
 
 from __future__ import annotations
@@ -45,7 +45,7 @@ def once(sim: ruedo.Simulation, sign: float) -> list[float]:
 def ends(sign: float, track_error: float, radius_error: float, runs: int) -> np.ndarray:
     """Of several squares, (runs, 2) m. sign: 1 counter-clockwise, -1 clockwise.
 
-    A program drives by the odometry, and so the true robot goes astray.
+    The program drives by the odometry, so the true path deviates.
     """
     off = []
     for run in range(runs):
@@ -67,15 +67,14 @@ def ends(sign: float, track_error: float, radius_error: float, runs: int) -> np.
 def umbmark(
     track_error: float = 0.02, radius_error: float = 0.0, runs: int = 5
 ) -> tuple[float, float, float]:
-    """What it measures: the error of the track, that of the wheels' radii (relative), and
+    """The relative errors of the track and of the wheels' radii, and
     E_max,syst (m).
     """
     with ruedo.launch(ruedo.World().robot("p3at"), disable=["p3at/camera"]) as sim:
         track = sim.robot("p3at").track
     ccw = ends(1.0, track_error, radius_error, runs).mean(axis=0)
     cw = ends(-1.0, track_error, radius_error, runs).mean(axis=0)
-    # A robot that takes its track for wider than it is believes that it turned less, and turns too
-    # far.
+    # A robot that overestimates its track believes that it has turned less, and turns too far.
     alpha = (cw[0] + ccw[0]) / (-4.0 * SIDE)
     beta = (cw[0] - ccw[0]) / (-4.0 * SIDE)
     wrong_track = -alpha / (math.pi / 2)

@@ -13,8 +13,8 @@ SPEED = 0.3  # m/s
 
 
 def wall_at(scan: ruedo.Scan) -> tuple[float, float]:
-    """Distance of the wall on the right (m), and its direction against the robot's (rad): a line
-    through what the rays to the right hit.
+    """Distance of the wall on the right (m), and its direction relative to the robot's (rad): a
+    line through the hits of the rays to the right.
     """
     right = (scan.angles > -1.6) & (scan.angles < -0.8) & np.isfinite(scan.ranges)
     x, y = (
@@ -28,7 +28,7 @@ def wall_at(scan: ruedo.Scan) -> tuple[float, float]:
 
 
 def follow(distance: float = 0.8, seconds: float = 40.0) -> list[float]:
-    """The distances from the wall as they were measured, ten a second."""
+    """The measured distances from the wall, ten a second."""
     world = ruedo.World()
     for a, b in (
         ((-4, -3), (4, -3)),

@@ -3,9 +3,9 @@ LCM, as it would drive a robot.
 
     python drive.py [--rooms 20] [--first 0] [--record FOLDER] [--url URL]
 
-Each room is a server in lockstep of its own, with noise; what is said is whether the robot reached
-its goal without touching anything, and at the end how often. A bumper around its body feels that,
-which its wheels are no part of. --record keeps the runs as FOLDER/room-NUMBER.lcm, which `ruedo
+Each room is a server in lockstep of its own, with noise; it is printed whether the robot reached
+its goal without touching anything, and at the end how often. Touches are those of a bumper around
+its body, without the wheels. --record keeps the runs as FOLDER/room-NUMBER.lcm, which `ruedo
 verify` repeats. Neither torch nor Gymnasium is needed.
 """
 
@@ -45,7 +45,7 @@ def observation(
 def drive(policy: Policy, room: Room, seed: int, record: Path | None, url: str | None) -> str:
     """ "success", "collision" or "too late"."""
     text = room.sdf.replace("<name>robot</name>", f"<name>robot</name>{BUMPER}")
-    if record:  # a log names its world's file
+    if record:  # the log refers to its world's file
         world = record.with_suffix(".sdf")
         world.write_text(text, encoding="utf-8")
     with ruedo.launch(

@@ -6,8 +6,8 @@ numbers.
     policy.npz] [--curve curve.csv]
 
 The policy sees rooms for training alone. Every row of the curve is a stretch of training: steps,
-seconds of wall time, and the parts of the episodes since the row before that reached the goal and
-that touched something. What is written can be driven without torch (policy.py).
+seconds of wall time, and the fractions of the episodes since the previous row that reached the goal
+and that touched something. The written policy can be driven without torch (policy.py).
 """
 
 from __future__ import annotations

@@ -9,6 +9,8 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
+from ..logs import HEADER_CHANNEL
+
 Bundle = dict[str, bytes]
 
 
@@ -78,7 +80,7 @@ def log_moved(log: bytes, folder: str, to: str) -> bytes:
         written = lcm.EventLog(new, "w", overwrite=True)
         for event in lcm.EventLog(old, "r"):
             data = event.data
-            if event.channel == "ruedo/header":
+            if event.channel == HEADER_CHANNEL:
                 header = log_header_t.decode(data)
                 header.world_file = _moved_path(header.world_file, folder, to)
                 for file in header.files:

@@ -20,6 +20,7 @@ from typing import Any
 
 from ..engine import Engine
 from ..launch import find_ruedo
+from ..logs import APPLIED_CHANNEL, HEADER_CHANNEL, STATE_HASH_CHANNEL
 from .controller import DONE, NothingYet, View, make_controller
 from .functions import Function
 from .processes import die_with_parent, end_descendants, ends_within, limit_memory
@@ -366,8 +367,8 @@ def thinned(log: str) -> tuple[bytes, str]:
     last = _copy_channels(
         log,
         kept,
-        {"ruedo/header", "ruedo/applied", "ruedo/state_hash"}.__contains__,
-        "ruedo/state_hash",
+        {HEADER_CHANNEL, APPLIED_CHANNEL, STATE_HASH_CHANNEL}.__contains__,
+        STATE_HASH_CHANNEL,
     )
     content = Path(kept).read_bytes()
     os.unlink(kept)

@@ -18,7 +18,7 @@ import numpy as np
 from ..campaign.case import Runner, fault_text
 from ..campaign.errors import CampaignError, SpecError
 from ..engine import Engine
-from ..logs import Event, events
+from ..logs import APPLIED_CHANNEL, HEADER_CHANNEL, STATE_HASH_CHANNEL, Event, events
 
 # What somebody could have done from a moment on: m/s, rad/s.
 MANOEUVRES = {
@@ -62,16 +62,16 @@ class Recorded:
         commands: list[tuple[int, str, bytes]] = []
         steps = utime = 0
         for event in events(path):
-            if event.channel == "ruedo/header" and header is None:
+            if event.channel == HEADER_CHANNEL and header is None:
                 header = decoded(log_header_t, event)
-            elif event.channel == "ruedo/applied":
+            elif event.channel == APPLIED_CHANNEL:
                 applied = decoded(applied_t, event)
                 if applied.channel.startswith("ruedo/"):
                     raise SpecError(
                         f"{path}: a request acted on the run (at {applied.utime * 1e-6:g} s); runs with commands alone can be branched"
                     )
                 commands.append((applied.step, applied.channel, bytes(applied.data)))
-            elif event.channel == "ruedo/state_hash":
+            elif event.channel == STATE_HASH_CHANNEL:
                 state = decoded(state_hash_t, event)
                 step_us = header.step_us if header else 0
                 latest = utime + max(_HASHES_US, step_us)

@@ -52,7 +52,7 @@ export class Arrivals {
       ...(other ? { world: null, scene: null, robot: -1 } : {}),
     });
     if (hello.fault) this.notice.show(hello.fault);
-    if (hello.mode === "live") session.askForInfo("ruedo/request");
+    if (hello.mode === "live") session.askForInfo();
   }
 
   private running(world: World): void {

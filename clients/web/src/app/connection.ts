@@ -5,6 +5,7 @@ import type { Notice } from "../ui/notice";
 import { toast } from "../widgets/elements";
 import { addTypes } from "../wire/lcm";
 import type { Hello, LinkHandler, Playback } from "../wire/protocol";
+import { kRequestChannel } from "../wire/session";
 import type { Model } from "./model";
 import type { Router } from "./router";
 import type { ShownWorld } from "./shown_world";
@@ -70,7 +71,7 @@ export class Connection implements LinkHandler {
   // knows.
   refused(channel: string): void {
     const { hello, world } = this.model.page.now,
-      isRequest = channel === "ruedo/request";
+      isRequest = channel === kRequestChannel;
     if (isRequest && hello?.mode === "live" && !world) return;
     toast(
       hello?.mode === "log"

@@ -60,10 +60,6 @@ export class InfoAssembler {
   }
 }
 
-export const channelOf = (world: World, robot: string, device: string, type?: string) =>
-  world.channels.find(
-    (c) => c.robot === robot && c.device === device && !c.input && (!type || c.type === type),
-  )?.name;
 export const channelOfType = (world: World, type: string, robot = "") =>
   world.channels.find((c) => c.type === type && c.robot === robot)?.name;
 export const inputOf = (world: World, robot: string, type: string) =>

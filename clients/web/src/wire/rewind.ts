@@ -24,23 +24,24 @@ export interface Past {
   speed: number;
 }
 
-// The offset of a message's int16 `part`, after its utime; -1 if it has none.
-function partOffset(type: string): number {
-  let at = 8;
+const kSizes: Record<string, number> = {
+  int64_t: 8,
+  double: 8,
+  int32_t: 4,
+  float: 4,
+  int16_t: 2,
+  int8_t: 1,
+  byte: 1,
+  boolean: 1,
+};
+
+// The offset of a field in messages of a type; -1 if it has none of that name and type, or if
+// arrays, texts or structures come before it.
+function offsetOf(field: string, fieldType: string, type: string): number {
+  let at = 8; // the fingerprint
   for (const { name, type: of, sizes } of kTypes[type] ?? []) {
-    if (name === "part" && of === "int16_t") return at;
-    const size = (
-      {
-        int64_t: 8,
-        double: 8,
-        int32_t: 4,
-        float: 4,
-        int16_t: 2,
-        int8_t: 1,
-        byte: 1,
-        boolean: 1,
-      } as Record<string, number>
-    )[of];
+    if (name === field && of === fieldType) return at;
+    const size = kSizes[of];
     if (size === undefined || sizes.length > 0) return -1;
     at += size;
   }
@@ -65,7 +66,7 @@ function withLayer(before: Uint8Array[], message: Uint8Array): Uint8Array[] {
 
 // passed to the page even while the past is shown
 const kNow = new Set(["reply_t", "world_info_t"]);
-const offsets = new Map<string, number>();
+const partOffsets = new Map<string, number>();
 
 export class Rewind implements RunLink {
   private handler!: LinkHandler;
@@ -190,7 +191,7 @@ export class Rewind implements RunLink {
   // A reset world has no past.
   private heed(type: string, bytes: Uint8Array): void {
     const view = new DataView(bytes.buffer, bytes.byteOffset, bytes.byteLength),
-      at = type === "world_state_t" ? 16 : epochOffset();
+      at = offsetOf("epoch", "int32_t", type);
     if (bytes.length < at + 4) return;
     const epoch = view.getInt32(at);
     if (epoch === this.epoch) return;
@@ -204,8 +205,8 @@ export class Rewind implements RunLink {
       hasTime = !drawn && kTypes[type]?.[0]?.name === "utime" && bytes.length >= 16;
     const time = hasTime ? Number(view.getBigInt64(8)) * 1e-6 : this.newest_s;
     this.newest_s = Math.max(this.newest_s, time);
-    let offset = offsets.get(type);
-    if (offset === undefined) offsets.set(type, (offset = partOffset(type)));
+    let offset = partOffsets.get(type);
+    if (offset === undefined) partOffsets.set(type, (offset = offsetOf("part", "int16_t", type)));
     let entries = this.entries.get(channel);
     if (!entries) this.entries.set(channel, (entries = []));
     const last = entries.at(-1),
@@ -287,15 +288,4 @@ export class Rewind implements RunLink {
   private tell(): void {
     this.onPast(this.past && { ...this.range, ...this.past }, this.range);
   }
-}
-
-let tickEpoch = -1;
-function epochOffset(): number {
-  if (tickEpoch >= 0) return tickEpoch;
-  let at = 8;
-  for (const { name, type } of kTypes.tick_t!) {
-    if (name === "epoch") break;
-    at += type === "int64_t" || type === "double" ? 8 : 4;
-  }
-  return (tickEpoch = at);
 }

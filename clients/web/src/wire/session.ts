@@ -3,6 +3,7 @@
 import { reply_t, request_t, type state_reply_t } from "../../generated/messages";
 import { decode, encode } from "./lcm";
 
+export const kRequestChannel = "ruedo/request"; // before the world has told it
 const kRepeat_ms = 200;
 const kPatience_ms = 8000;
 const kNothing = new Uint8Array();
@@ -47,8 +48,8 @@ export class Session {
   }
 
   // Asks for ruedo/info; needs no session.
-  askForInfo(channel: string): void {
-    this.publish(channel, this.request(request_t.INFO, 1n, kNothing, 0n, 0n));
+  askForInfo(): void {
+    this.publish(kRequestChannel, this.request(request_t.INFO, 1n, kNothing, 0n, 0n));
   }
 
   onReply(bytes: Uint8Array): void {

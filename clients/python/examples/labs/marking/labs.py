@@ -1,8 +1,8 @@
-"""The labs as they are marked: the world of each, what a program hands in, and when it has passed.
+"""How the labs are marked: the world of each, what a program must deliver, and when it passes.
 
 A student's file has a class for each lab, derived from the one here. Its program() is a generator:
-it yields (m/s, rad/s) ten times a second, and looks at self.view in between; what the lab asks for
-besides it leaves in the attributes that the class names. A lab that is not handed in has failed.
+it yields (m/s, rad/s) ten times a second, and reads self.view in between; any further results that
+the lab asks for go into the attributes that the class names. A missing lab has failed.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ ROOM = [
 ]
 INSIDE = [((-1.0, -3.0), (-1.0, -0.5)), ((1.5, 3.0), (1.5, 1.0)), ((2.0, -1.5), (4.0, -1.5))]
 THICKNESS = 0.1  # m, of walls
-TRACK_ERROR = 0.02  # labs.yaml has it, too
+TRACK_ERROR = 0.02  # as in labs.yaml
 
 
 def world(lab: str) -> ruedo.World:
@@ -39,7 +39,7 @@ def world(lab: str) -> ruedo.World:
 
 
 class Failed(Exception):
-    """Why a lab is not passed."""
+    """Why a lab has not passed."""
 
 
 class Lab:
@@ -54,7 +54,7 @@ class Lab:
         raise Failed("nothing was handed in")
 
     def judge(self, way: np.ndarray) -> None:
-        """Raises Failed. way: where the robot truly was, (n, 2) m, ten a second."""
+        """Raises Failed. way: the robot's true positions, (n, 2) m, ten a second."""
 
     def __call__(self, view: Any) -> Command | str:
         self.view = view
@@ -67,18 +67,18 @@ class Lab:
         return "done"
 
     def odometry(self) -> np.ndarray:
-        """x, y, angle turned (m, m, rad), as the wheels have it."""
+        """x, y, angle turned (m, m, rad), by the wheels."""
         return np.array([float(self.view[f"odometry.{name}"]) for name in ("x", "y", "theta")])
 
     def true_pose(self) -> np.ndarray:
-        """x, y, heading (m, m, rad), as a camera at the ceiling would see it."""
+        """x, y, heading (m, m, rad), as a camera on the ceiling would see it."""
         x, y = self.view["pose.pos"][:2]
         w, _, _, z = self.view["pose.orientation"]
         return np.array([x, y, 2.0 * math.atan2(z, w)])
 
 
 class Square(Lab):
-    """A square of 2 m to the left, back to where it began."""
+    """A square of 2 m, turning left, back to its start."""
 
     seconds = 70.0
 
@@ -106,7 +106,7 @@ class WallFollowing(Lab):
 
 
 class SonarAvoidance(Lab):
-    """About in a room, by sonars alone, touching nothing (labs.yaml expects that of all labs)."""
+    """Around a room, by sonars alone, touching nothing (labs.yaml expects that of all labs)."""
 
     def judge(self, way: np.ndarray) -> None:
         if length(way) < 5.0:
@@ -114,7 +114,7 @@ class SonarAvoidance(Lab):
 
 
 class UmbMark(Lab):
-    """Leaves in track_error by how much the odometry takes the robot's track for too wide."""
+    """Stores in track_error by how much the odometry overestimates the robot's track."""
 
     seconds = 120.0
     track_error = math.nan
@@ -125,7 +125,7 @@ class UmbMark(Lab):
 
 
 class Mapping(Lab):
-    """Leaves in points the places of the world that are taken, (n, 2) m."""
+    """Stores in points the occupied places of the world, (n, 2) m."""
 
     points = np.zeros((0, 2))
 
@@ -141,7 +141,7 @@ class Mapping(Lab):
 
 
 class ParticleFilter(Lab):
-    """Leaves in estimate where the robot is (x, y, heading), by a map, odometry and scans alone."""
+    """Stores in estimate where the robot is (x, y, heading), by a map, odometry and scans alone."""
 
     estimate = np.full(3, math.nan)
 

@@ -1,4 +1,4 @@
-"""All labs as they are meant; a student's file looks like this, without the labs' own answers."""
+"""A model solution of all labs; a student's file has the same form."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from mapping import CELL, HALF, Grid
 from particle_filter import BEAMS, Filter
 
 ANGLES = np.radians(np.arange(-90, 91))  # of the range finder's rays
-AHEAD = 0.16  # m: the range finder before the robot's centre
+AHEAD = 0.16  # m, from the robot's centre to the range finder
 
 
 def wander(lab: labs.Lab) -> Iterator[Command]:
@@ -81,8 +81,8 @@ class SonarAvoidance(labs.SonarAvoidance):
 
 class UmbMark(labs.UmbMark):
     def program(self) -> Iterator[Command]:
-        """One square each way: where it ends beside where the odometry has it, in the frame of its
-        beginning.
+        """One square each way: its true end beside the odometry's, in the frame of its
+        start.
         """
         ends = []
         for sign in (1.0, -1.0):

@@ -9,24 +9,21 @@ import java.net.SocketAddress;
 import java.nio.ByteBuffer;
 import java.nio.channels.SocketChannel;
 
-/**
- * A connection to a server: over TCP, or a Unix-domain socket. One thread reads while another
- * writes.
- */
-abstract class Link implements Closeable {
+/** A stream socket to a server: TCP or Unix-domain. One thread may read while another writes. */
+abstract class StreamSocket implements Closeable {
     abstract InputStream input() throws IOException;
 
     abstract void write(byte[] bytes, int size) throws IOException;
 
-    /** Until input() gives up, milliseconds; 0: never. */
+    /** Milliseconds until a read gives up; 0: never. */
     abstract void setTimeout(int millis) throws IOException;
 
     /** Throws IOException when nobody serves there. */
-    static Link to(Address address) throws IOException {
+    static StreamSocket connect(Address address) throws IOException {
         return address.path != null ? new Local(address.path) : new Tcp(address);
     }
 
-    private static final class Tcp extends Link {
+    private static final class Tcp extends StreamSocket {
         private final Socket socket = new Socket();
 
         Tcp(Address address) throws IOException {
@@ -61,7 +58,7 @@ abstract class Link implements Closeable {
     }
 
     /** Java 16 has these sockets; this library is for 11. */
-    private static final class Local extends Link {
+    private static final class Local extends StreamSocket {
         private final SocketChannel channel;
 
         Local(String path) throws IOException {
