@@ -100,6 +100,8 @@ using BodyIndex = Index<struct BodyKind>;              // into BodyLayout::bodie
 using WheelIndex = Index<struct WheelKind>;            // into BodyLayout::wheels
 using JointIndex = Index<struct JointKind>;            // into BodyLayout::joints
 using RobotIndex = Index<struct RobotKind>;            // into BodyLayout::robots
+using ContactIndex = Index<struct ContactKind>;        // into Snapshot::contacts
+using ShapeIndex = Index<struct ShapeKind>;            // into a link's collisions or visuals
 using ModelLinkIndex = Index<struct ModelLinkKind>;    // into Model::links
 using ModelJointIndex = Index<struct ModelJointKind>;  // into Model::joints
 

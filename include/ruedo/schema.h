@@ -13,6 +13,8 @@
 #include <variant>
 #include <vector>
 
+#include "ruedo/index.h"
+
 namespace ruedo {
 
 enum class Primitive : uint8_t {
@@ -29,11 +31,12 @@ enum class Primitive : uint8_t {
 };
 
 struct Schema;
+using FieldIndex = Index<struct FieldKind>;  // into Schema::fields
 
 // A dimension of an array: a fixed size, or the integer field before it that counts the elements.
 struct Dimension {
   int64_t size = 0;
-  int counted_by = -1;  // index into Schema::fields; -1: fixed
+  FieldIndex counted_by;  // none: fixed
 };
 
 struct Field {
@@ -46,7 +49,7 @@ struct Field {
 struct Schema {
   std::string name;         // "planar_lidar_t"
   int64_t fingerprint = 0;  // LCM's hash of the type, the first eight bytes of a message
-  std::vector<Field> fields;
+  IndexedVector<FieldIndex, Field> fields;
   size_t least_bytes = 0;  // that its values take on the wire
 };
 

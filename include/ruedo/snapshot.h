@@ -18,20 +18,20 @@ namespace ruedo {
 // Two shapes that touched during the step that led to this state.
 struct Contact {
   LinkIndex link_a, link_b;
-  BodyIndex body_a, body_b;        // none: static
-  Vec3 position = Vec3::Zero();    // m, world
-  Vec3 normal = Vec3::UnitZ();     // unit, world, from b towards a
-  double force = 0.0;              // N along the normal, mean over the step
-  Vec3 friction = Vec3::Zero();    // N on a, world, mean over the step
-  double depth = 0.0;              // m, positive inside
-  int shape_a = -1, shape_b = -1;  // indices into the links' collisions; -1: not known
+  BodyIndex body_a, body_b;      // none: static
+  Vec3 position = Vec3::Zero();  // m, world
+  Vec3 normal = Vec3::UnitZ();   // unit, world, from b towards a
+  double force = 0.0;            // N along the normal, mean over the step
+  Vec3 friction = Vec3::Zero();  // N on a, world, mean over the step
+  double depth = 0.0;            // m, positive inside
+  ShapeIndex shape_a, shape_b;   // among the links' collisions; none: not known
 };
 
 // A contact of a robot with what it runs into: with something that is no part of it, that does not
 // carry it and does not lie on it.
 struct Collision {
   RobotIndex robot;
-  int contact = -1;  // index into Snapshot::contacts
+  ContactIndex contact;
   bool as_a = true;  // the robot's is link_a
 };
 

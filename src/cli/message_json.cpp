@@ -89,7 +89,7 @@ class Walk {
              JsonWriter& json, int64_t& integer) {
     if (dimension == field.dimensions.size()) return one(field, json, integer);
     const Dimension& of = field.dimensions[dimension];
-    const auto count = static_cast<size_t>(of.counted_by < 0 ? of.size : counts[of.counted_by]);
+    const auto count = static_cast<size_t>(of.counted_by.valid() ? counts[of.counted_by] : of.size);
     if (field.primitive == Primitive::byte && dimension + 1 == field.dimensions.size()) {
       json.value(base64(bytes_.subspan(at_, count)));
       at_ += count;

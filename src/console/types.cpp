@@ -32,10 +32,10 @@ std::string types_json() {
       json.member("type", field.type ? field.type->name : std::string(name_of(field.primitive)));
       json.name("sizes").open('[');
       for (const Dimension& dimension : field.dimensions) {
-        if (dimension.counted_by < 0)
-          json.value(dimension.size);
+        if (dimension.counted_by.valid())
+          json.value(schema.fields[dimension.counted_by].name);
         else
-          json.value(schema.fields[static_cast<size_t>(dimension.counted_by)].name);
+          json.value(dimension.size);
       }
       json.close(']').close('}');
     }

@@ -150,7 +150,7 @@ bool parse_member(Tokens& tokens, std::string_view type, Parsed& parsed) {
       if (counter == fields.end())
         tokens.fail("the length '" + std::string(size) + "' of '" + field.name +
                     "' is no field before it");
-      dimension.counted_by = static_cast<int>(counter - fields.begin());
+      dimension.counted_by = FieldIndex(counter - fields.begin());
     }
     parsed.hash = mix(mix(parsed.hash, static_cast<uint8_t>(fixed ? 0 : 1)), size);
     field.dimensions.push_back(dimension);
@@ -205,7 +205,7 @@ size_t saturating_product(size_t a, size_t b) {
 size_t least_bytes(const Field& field) {
   size_t bytes = least_size(field);
   for (const Dimension& d : field.dimensions)
-    bytes = saturating_product(bytes, d.counted_by < 0 ? static_cast<size_t>(d.size) : 0);
+    bytes = saturating_product(bytes, d.counted_by.valid() ? 0 : static_cast<size_t>(d.size));
   return bytes;
 }
 

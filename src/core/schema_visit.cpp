@@ -53,7 +53,7 @@ class Walk {
                 int depth) {
     if (dimension == field.dimensions.size()) return value(field, depth);
     const Dimension& d = field.dimensions[dimension];
-    const int64_t count = d.counted_by < 0 ? d.size : counts[static_cast<size_t>(d.counted_by)];
+    const int64_t count = d.counted_by.valid() ? counts[d.counted_by] : d.size;
     if (count < 0) return false;
     const size_t least = least_size(field);
     if (least > 0 && static_cast<uint64_t>(count) > (bytes_.size() - at_) / least) return false;

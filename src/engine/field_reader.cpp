@@ -71,7 +71,7 @@ size_t FieldReader::value_size() const { return wire_size(type_); }
 int64_t FieldReader::length(const Field& field, const std::vector<int64_t>& counts) {
   int64_t length = 1;
   for (const Dimension& dimension : field.dimensions) {
-    length *= dimension.counted_by < 0 ? dimension.size : counts[dimension.counted_by];
+    length *= dimension.counted_by.valid() ? counts[dimension.counted_by] : dimension.size;
   }
   return length;
 }
@@ -99,7 +99,7 @@ std::vector<int64_t> FieldReader::shape(std::span<const uint8_t> message) const 
   const std::vector<int64_t>& counts = counts_of_thread();
   std::vector<int64_t> shape;
   for (const Dimension& dimension : schema_->fields[target_].dimensions) {
-    shape.push_back(dimension.counted_by < 0 ? dimension.size : counts[dimension.counted_by]);
+    shape.push_back(dimension.counted_by.valid() ? counts[dimension.counted_by] : dimension.size);
   }
   return shape;
 }

@@ -99,7 +99,7 @@ void cover_with_texture(const Element& element, const Vec3& size, Mesh& mesh,
   ground.ambient = ground.diffuse = {1.0f, 1.0f, 1.0f, 1.0f};
   ground.texture = std::make_shared<Texture>(Texture{*path, {}});
   mesh.materials.push_back(std::move(ground));
-  for (Mesh::Part& part : mesh.parts) part.material = 0;
+  for (Mesh::Part& part : mesh.parts) part.material = MaterialIndex(0);
   const Eigen::Vector2f tiles = (size.head<2>() / tile_m).cast<float>();
   for (Eigen::Vector2f& uv : mesh.uvs) uv = uv.cwiseProduct(tiles);
 }

@@ -180,7 +180,7 @@ void append(const aiScene& scene, const aiNode& node, const aiMatrix4x4& parent,
       mesh.triangles.push_back(t);
     }
     part.triangle_count = static_cast<uint32_t>(mesh.triangles.size()) - part.first_triangle;
-    part.material = static_cast<int>(from.mMaterialIndex);
+    part.material = MaterialIndex(from.mMaterialIndex);
     if (part.triangle_count) mesh.parts.push_back(part);
   }
   for (unsigned c = 0; c < node.mNumChildren; ++c)

@@ -169,7 +169,7 @@ Mesh extruded(const std::vector<Polygon>& written, double height) {
       mesh.triangles.push_back({low_a, high_b, high_a});
     }
   }
-  mesh.parts.push_back({"polyline", 0, static_cast<uint32_t>(mesh.triangles.size()), -1});
+  mesh.parts.push_back({"polyline", 0, static_cast<uint32_t>(mesh.triangles.size()), {}});
   mesh.closed = is_closed(mesh);
   return mesh;
 }
@@ -216,7 +216,7 @@ Mesh heightmap(const std::string& picture, const Vec3& size) {
       mesh.triangles.push_back({b, c, d});
     }
   }
-  mesh.parts.push_back({"heightmap", 0, static_cast<uint32_t>(mesh.triangles.size()), -1});
+  mesh.parts.push_back({"heightmap", 0, static_cast<uint32_t>(mesh.triangles.size()), {}});
   return mesh;
 }
 

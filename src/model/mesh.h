@@ -9,6 +9,8 @@
 
 #include <Eigen/Core>
 
+#include "ruedo/index.h"
+
 namespace ruedo::model {
 
 using Rgba = std::array<float, 4>;
@@ -30,6 +32,8 @@ struct Material {
   bool double_sided = false;
 };
 
+using MaterialIndex = Index<struct MaterialKind>;  // into Mesh::materials
+
 // Immutable once loaded, and shared by all users of the file. Metres, z up, x forward: the mesh
 // file's unit and up axis have been applied, SDF's <scale> has not.
 struct Mesh {
@@ -37,7 +41,7 @@ struct Mesh {
     std::string name;
     uint32_t first_triangle = 0;
     uint32_t triangle_count = 0;
-    int material = -1;  // index into materials; -1: none
+    MaterialIndex material;  // none: plain
   };
 
   std::string name;  // the file, for messages
@@ -46,7 +50,7 @@ struct Mesh {
   std::vector<Eigen::Vector2f> uvs;                // one per position, or empty; v counts up
   std::vector<std::array<uint32_t, 3>> triangles;  // counter-clockwise seen from outside
   std::vector<Part> parts;
-  std::vector<Material> materials;
+  IndexedVector<MaterialIndex, Material> materials;
   bool closed = false;  // every edge belongs to two triangles, so that the mesh has an inside
 };
 

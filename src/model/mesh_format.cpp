@@ -184,7 +184,7 @@ MeshPackage unpack_mesh(std::string_view bytes) {
     part.name = in.string();
     part.first_triangle = in.value<uint32_t>();
     part.triangle_count = in.value<uint32_t>();
-    part.material = in.value<int32_t>();
+    part.material = MaterialIndex(in.value<int32_t>());
   }
   mesh.materials.resize(in.count(MeshLimits::kParts, "materials"));
   for (auto& m : mesh.materials) {
@@ -235,7 +235,7 @@ std::string mesh_fault(const Mesh& mesh) {
         part.triangle_count > mesh.triangles.size() - part.first_triangle) {
       return "a part names triangles that are not there";
     }
-    if (part.material < -1 || part.material >= static_cast<int>(mesh.materials.size())) {
+    if (part.material != MaterialIndex() && !mesh.materials.has(part.material)) {
       return "a part names a material that is not there";
     }
   }

@@ -262,9 +262,9 @@ struct Lift {
   std::string name;  // name of the cabin's joint
   ModelJointIndex cabin;
   std::vector<Floor> floors;
-  int initial_floor = -1;           // -1: stays where it is
-  std::optional<int64_t> wait_us;   // none: the doors stay open until the next call
-  std::optional<Trapezoid> motion;  // none: the controller of its joint moves it
+  std::optional<int> initial_floor;  // none: stays where it is
+  std::optional<int64_t> wait_us;    // none: the doors stay open until the next call
+  std::optional<Trapezoid> motion;   // none: the controller of its joint moves it
   Source source;
 };
 

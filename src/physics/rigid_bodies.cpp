@@ -194,7 +194,7 @@ void RigidBodies::make_statics(const model::WorldModel& world, const model::Body
     object->info.instance = placement.instance;
     object->info.plane = collision.geometry.shape == model::Shape::plane;
     object->info.shapes.push_back(  // Bullet's frame is the collision's
-        {index, static_cast<int>(c), surface_of(collision.surface, Quat::Identity())});
+        {index, ShapeIndex(c), surface_of(collision.surface, Quat::Identity())});
     bullet.setUserPointer(&object->info);
     statics.push_back(std::move(object));
   }
@@ -271,7 +271,7 @@ void RigidBodies::make_compound(const model::WorldModel& world, const model::Bod
         if ((imposed && link_placement.wheel.valid()) ||
             is_belt(*instance.model, link_placement.link))
           surface.friction = surface.friction2 = 0.0;
-        body.info.shapes.push_back({link_index, static_cast<int>(c), surface});
+        body.info.shapes.push_back({link_index, ShapeIndex(c), surface});
       }
     }
   }

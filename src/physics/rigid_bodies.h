@@ -23,7 +23,7 @@ struct ObjectInfo {
   bool gone = false;      // its model was removed
   struct Shape {
     LinkIndex link;
-    int collision = -1;  // in its link
+    ShapeIndex collision;  // in its link
     ShapeSurface surface;
   };
   std::vector<Shape> shapes;      // for each child shape; one entry for a single shape

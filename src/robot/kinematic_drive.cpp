@@ -202,8 +202,8 @@ void KinematicDrive::for_each_contact(Visit visit) const {
 }
 
 double KinematicDrive::friction(const Contact& contact) const {
-  const auto of = [this](LinkIndex link, int shape) {
-    if (!link.valid() || shape < 0) return 1.0;
+  const auto of = [this](LinkIndex link, ShapeIndex shape) {
+    if (!link.valid() || !shape.valid()) return 1.0;
     const auto& placed = layout_->links[link];
     const auto& collisions = world_->models[placed.instance].model->links[placed.link].collisions;
     return static_cast<size_t>(shape) < collisions.size() ? collisions[shape].surface.friction

@@ -59,8 +59,8 @@ void Lifts::add_lift(InstanceIndex instance, const model::Lift& description) {
   lift.instance = instance;
   lift.description = &description;
   lift.way = {joint, physics_->joint_position(joint)};
-  if (description.initial_floor >= 0) {
-    lift.calls = {description.initial_floor};
+  if (description.initial_floor) {
+    lift.calls = {*description.initial_floor};
     lift.opens = false;
     lift.doing = Doing::closing;
   }

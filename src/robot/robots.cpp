@@ -209,7 +209,7 @@ void Robots::Impl::read_collisions(Snapshot& snapshot) const {
       if (!robot.valid()) return;
       const Vec3 up = snapshot.robots[robot].X_WBase.rotation * Vec3::UnitZ();
       if (std::abs(contact.normal.dot(up)) < kSupportNormal)
-        snapshot.collisions.push_back({robot, static_cast<int>(i), as_a});
+        snapshot.collisions.push_back({robot, ContactIndex(i), as_a});
     };
     add(a, true);
     add(b, false);

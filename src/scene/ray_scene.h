@@ -24,9 +24,8 @@ struct Ray {
 struct Hit {
   // m; +inf: no hit; 0: the origin is inside a closed shape
   double range = std::numeric_limits<double>::infinity();
-  LinkIndex link;  // none: nothing
-  int shape =
-      -1;  // index of the shape hit: a collision of that link (or a visual, see StaticRayScene)
+  LinkIndex link;              // none: nothing
+  ShapeIndex shape;            // of the link: a collision (or a visual, see StaticRayScene)
   Vec3 normal = Vec3::Zero();  // unit, world, towards the ray's origin
   bool hit() const { return link.valid(); }
 };

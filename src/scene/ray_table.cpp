@@ -88,11 +88,11 @@ RayTable::RayTable(const model::WorldModel& world, const model::BodyLayout& layo
     if (visuals) {
       for (size_t v = 0; v < link.visuals.size(); ++v)
         if (link.visuals[v].transparency < 1.0)
-          add(placement, link_index, static_cast<int>(v), link.visuals[v].X_LV,
-              link.visuals[v].geometry, layout, true, device);
+          add(placement, link_index, ShapeIndex(v), link.visuals[v].X_LV, link.visuals[v].geometry,
+              layout, true, device);
     } else {
       for (size_t c = 0; c < link.collisions.size(); ++c)
-        add(placement, link_index, static_cast<int>(c), link.collisions[c].X_LC,
+        add(placement, link_index, ShapeIndex(c), link.collisions[c].X_LC,
             link.collisions[c].geometry, layout, false, device);
     }
   }
@@ -132,7 +132,7 @@ void RayTable::add_turning(RayShape& shape, const Pose& X_LS, const model::LinkP
   shape.box_F.add(on_axis + Vec3::Constant(shape.radius));
 }
 
-void RayTable::add(const model::LinkPlacement& link, LinkIndex link_index, int shape_index,
+void RayTable::add(const model::LinkPlacement& link, LinkIndex link_index, ShapeIndex shape_index,
                    const Pose& X_LShape, const model::Geometry& geometry,
                    const model::BodyLayout& layout, bool visuals, RTCDevice device) {
   const bool is_mesh = geometry.shape == Shape::mesh;

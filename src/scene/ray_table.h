@@ -34,7 +34,7 @@ using TurningIndex = Index<struct TurningKind>;  // into RayTable::turning
 struct RayShape {
   model::Shape kind = model::Shape::box;
   LinkIndex link;               // as in Hit
-  int shape = -1;               // likewise
+  ShapeIndex shape;             // likewise
   BodyIndex body;               // none: static
   TurningIndex turning;         // its pose depends on a wheel's angle; none: it does not
   IntoShape into;               // at wheel angle 0
@@ -72,7 +72,7 @@ struct RayTable {
            RTCDevice device);
 
  private:
-  void add(const model::LinkPlacement& link, LinkIndex link_index, int shape_index,
+  void add(const model::LinkPlacement& link, LinkIndex link_index, ShapeIndex shape_index,
            const Pose& X_LS, const model::Geometry& geometry, const model::BodyLayout& layout,
            bool visuals, RTCDevice device);
   // With X_FS: its own mesh in frame F, without a tree; otherwise a shared one.

@@ -152,11 +152,8 @@ class Builder {
     }
   }
 
-  static model::Material own_material(const model::Geometry& g, int index) {
-    if (g.mesh && index >= 0 && static_cast<size_t>(index) < g.mesh->materials.size()) {
-      return g.mesh->materials[index];
-    }
-    return {};
+  static model::Material own_material(const model::Geometry& g, model::MaterialIndex index) {
+    return g.mesh && g.mesh->materials.has(index) ? g.mesh->materials[index] : model::Material();
   }
 
   static void shade(const model::Material& material, const model::Visual& visual,

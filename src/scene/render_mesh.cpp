@@ -214,7 +214,7 @@ RenderMesh file_mesh(const model::Mesh& mesh) {
     }
   }
   std::vector<model::Mesh::Part> parts = mesh.parts;
-  if (parts.empty()) parts.push_back({"", 0, static_cast<uint32_t>(mesh.triangles.size()), -1});
+  if (parts.empty()) parts.push_back({"", 0, static_cast<uint32_t>(mesh.triangles.size()), {}});
   for (const model::Mesh::Part& part : parts) {
     std::vector<Triangle> triangles;
     const size_t end =

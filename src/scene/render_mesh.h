@@ -20,8 +20,8 @@ struct RenderMesh {
   // A run of triangles of one material, small enough to be culled by its bounding sphere.
   struct Piece {
     uint32_t first_index = 0, index_count = 0;
-    int material = -1;           // index into the model::Mesh's materials; -1: none
-    Vec3 centre = Vec3::Zero();  // of the bounding sphere
+    model::MaterialIndex material;  // of the model::Mesh
+    Vec3 centre = Vec3::Zero();     // of the bounding sphere
     double radius = 0.0;
     Vec3 low = Vec3::Zero(), high = Vec3::Zero();  // bounding box
   };

@@ -59,7 +59,7 @@ class Collisions : public SensorOf<Collisions> {
   // Records what is touched. True if some of it was not in the last message.
   bool gather(const Snapshot& now) {
     const auto own =
-        std::equal_range(now.collisions.begin(), now.collisions.end(), Collision{robot_, 0, true},
+        std::equal_range(now.collisions.begin(), now.collisions.end(), Collision{robot_, {}, true},
                          [](const Collision& a, const Collision& b) { return a.robot < b.robot; });
     bool news = false;
     for (auto each = own.first; each != own.second; ++each) {

@@ -37,7 +37,7 @@ class ContactSensor : public SensorOf<ContactSensor> {
           std::find_if(shapes.begin(), shapes.end(),
                        [&](const model::Collision& shape) { return shape.name == name; });
       if (found != shapes.end()) {
-        shapes_.push_back(static_cast<int>(found - shapes.begin()));
+        shapes_.push_back(ShapeIndex(found - shapes.begin()));
       } else if (name != "__default__" && setup.findings) {
         setup.findings->unsupported(
             named->source, "sensor " + setup.device + "/contact/collision",
@@ -71,8 +71,8 @@ class ContactSensor : public SensorOf<ContactSensor> {
   }
 
  private:
-  bool counts(int shape) const {
-    return shapes_.empty() || shape < 0 ||
+  bool counts(ShapeIndex shape) const {
+    return shapes_.empty() || !shape.valid() ||
            std::find(shapes_.begin(), shapes_.end(), shape) != shapes_.end();
   }
   bool is_a(const Contact& contact) const {
@@ -86,7 +86,7 @@ class ContactSensor : public SensorOf<ContactSensor> {
   Bound<const model::BodyLayout> layout_;
   LinkIndex link_;
   int channel_;
-  std::vector<int> shapes_;  // indices into the link's collisions; empty: all
+  std::vector<ShapeIndex> shapes_;  // collisions of the link; empty: all
   bool pressed_ = false;
   contact_t message_;
 };

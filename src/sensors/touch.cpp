@@ -74,7 +74,7 @@ class Touch : public SensorOf<Touch> {
                           : std::any_of(named.begin(), named.end(), [&](const Element* each) {
                               return ends_with(name, each->text) || ends_with(each->text, name);
                             });
-        if (chosen) shapes_.emplace_back(layout_->link_of(own_, link), static_cast<int>(i));
+        if (chosen) shapes_.emplace_back(layout_->link_of(own_, link), ShapeIndex(i));
       }
     }
     if (!shapes_.empty() || !setup.findings) return;
@@ -97,15 +97,15 @@ class Touch : public SensorOf<Touch> {
                        });
   }
 
-  bool feels(LinkIndex link, int shape) const {
+  bool feels(LinkIndex link, ShapeIndex shape) const {
     if (layout_->links[link].instance != own_) return false;
     return shapes_.empty() || std::any_of(shapes_.begin(), shapes_.end(), [&](const auto& each) {
-             return each.first == link && (shape < 0 || each.second == shape);
+             return each.first == link && (!shape.valid() || each.second == shape);
            });
   }
 
   // In both notations used by Gazebo: model/M/link/L/collision/C, and M::L::C.
-  bool is_target(LinkIndex index, int shape) const {
+  bool is_target(LinkIndex index, ShapeIndex shape) const {
     const model::LinkPlacement& placed = layout_->links[index];
     const model::ModelInstance& instance = world_->models[placed.instance];
     const model::Link& link = instance.model->links[placed.link];
@@ -121,7 +121,7 @@ class Touch : public SensorOf<Touch> {
       return (path + "collision/" + name).find(target_) != std::string::npos ||
              (classic + name).find(target_) != std::string::npos;
     };
-    if (shape >= 0) return is_it(link.collisions[static_cast<size_t>(shape)].name);
+    if (shape.valid()) return is_it(link.collisions[shape].name);
     return std::any_of(link.collisions.begin(), link.collisions.end(),
                        [&](const model::Collision& each) { return is_it(each.name); });
   }
@@ -154,8 +154,8 @@ class Touch : public SensorOf<Touch> {
   int channel_;
   std::string target_;
   SimTime time_us_ = 0;
-  std::vector<std::pair<LinkIndex, int>> shapes_;  // sensitive ones; empty: all
-  std::optional<SimTime> since_;                   // start of the uninterrupted contact
+  std::vector<std::pair<LinkIndex, ShapeIndex>> shapes_;  // sensitive ones; empty: all
+  std::optional<SimTime> since_;                          // start of the uninterrupted contact
   bool pressed_ = false;
   int64_t shown_step_ = -1;
   contact_t message_;

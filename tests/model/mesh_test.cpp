@@ -376,7 +376,7 @@ TEST(MeshFormat, RefusesWhatDoesNotFit) {
   MeshPackage package;
   package.mesh.positions = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}};
   package.mesh.triangles = {{0, 1, 2}};
-  package.mesh.parts.push_back({"p", 0, 1, -1});
+  package.mesh.parts.push_back({"p", 0, 1, {}});
   EXPECT_NO_THROW(unpack_mesh(pack_mesh(package)));
   const auto fault = [&](auto change) {
     MeshPackage bad = package;
@@ -395,7 +395,7 @@ TEST(MeshFormat, RefusesWhatDoesNotFit) {
   EXPECT_EQ(fault([](Mesh& m) { m.normals.resize(2); }), "it has not one normal per vertex");
   EXPECT_EQ(fault([](Mesh& m) { m.parts[0].triangle_count = 2; }),
             "a part names triangles that are not there");
-  EXPECT_EQ(fault([](Mesh& m) { m.parts[0].material = 0; }),
+  EXPECT_EQ(fault([](Mesh& m) { m.parts[0].material = model::MaterialIndex(0); }),
             "a part names a material that is not there");
   EXPECT_EQ(fault([](Mesh& m) {
               m.triangles.clear();

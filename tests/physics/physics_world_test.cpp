@@ -464,10 +464,10 @@ TEST(Physics, ContactsNameTheShapesThatTouch) {
   w.run(0.5);
   int left = 0, right = 0;
   for (const Contact& contact : w.physics.contacts(w.body("above/l"))) {
-    const int expected = contact.position.x() < 0 ? 0 : 1;
+    const ShapeIndex expected(contact.position.x() < 0 ? 0 : 1);
     EXPECT_EQ(contact.shape_a, expected);
     EXPECT_EQ(contact.shape_b, expected);
-    ++(expected == 0 ? left : right);
+    ++(expected == ShapeIndex(0) ? left : right);
   }
   EXPECT_GT(left, 0);
   EXPECT_GT(right, 0);

@@ -46,8 +46,8 @@ Contact touch(LinkIndex link_a, LinkIndex link_b, int shape_a = 0, int shape_b =
   };
   c.body_a = body(link_a);
   c.body_b = body(link_b);
-  c.shape_a = shape_a;
-  c.shape_b = shape_b;
+  c.shape_a = ShapeIndex(shape_a);
+  c.shape_b = ShapeIndex(shape_b);
   c.position = {1, 2, 3};
   c.normal = {-1, 0, 0};
   c.force = 12.5;

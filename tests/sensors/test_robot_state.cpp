@@ -170,7 +170,7 @@ class CollisionsOf : public ::testing::Test {
       contact.position = Vec3(1.0, 2.0, 3.0);
       contact.force = force;
       contact.depth = 0.25;
-      now_.collisions.push_back({RobotIndex(0), static_cast<int>(now_.contacts.size()), true});
+      now_.collisions.push_back({RobotIndex(0), ContactIndex(now_.contacts.size()), true});
       now_.contacts.push_back(contact);
     }
     test::step(device_, now_, out_, due ? 1 : -1);
@@ -237,7 +237,7 @@ TEST_F(CollisionsOf, SeenFromTheOtherSideTheNormalStillPointsToTheRobot) {
   step({"two/base"});
   Device other = bench_.make("two", "collisions");
   Outbox out;
-  now_.collisions[0] = {RobotIndex(1), 0, false};
+  now_.collisions[0] = {RobotIndex(1), ContactIndex(0), false};
   test::step(other, now_, out, 0);
   const collisions_t m = Device::decode<collisions_t>(out).at(0);
   ASSERT_EQ(m.n, 1);

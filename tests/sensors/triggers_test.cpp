@@ -58,7 +58,7 @@ Contact touch(LinkIndex a, LinkIndex b) {
   c.link_b = b;
   c.body_a = BodyIndex(static_cast<int>(a));
   c.body_b = BodyIndex(static_cast<int>(b));
-  c.shape_a = c.shape_b = 0;
+  c.shape_a = c.shape_b = ShapeIndex(0);
   return c;
 }
 
