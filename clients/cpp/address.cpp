@@ -3,13 +3,11 @@
 
 #include <netdb.h>
 #include <sys/socket.h>
-#include <unistd.h>
 
-#include <cerrno>
 #include <cstdlib>
-#include <cstring>
 #include <fstream>
 
+#include "bus/stream_socket.h"
 #include "bus/unix_socket.h"
 #include "ruedo/client.h"
 #include "ruedo/errors.h"
@@ -17,18 +15,13 @@
 namespace ruedo::client {
 namespace {
 
-bool can_connect(const std::string& host, const std::string& port, int type, std::string& why) {
+bool has_route(const std::string& group, const std::string& port) {
   addrinfo hints{}, *found = nullptr;
   hints.ai_family = AF_INET;
-  hints.ai_socktype = type;
-  if (const int error = getaddrinfo(host.c_str(), port.c_str(), &hints, &found)) {
-    why = gai_strerror(error);
-    return false;
-  }
-  const int fd = socket(found->ai_family, found->ai_socktype | SOCK_CLOEXEC, 0);
-  const bool connected = fd >= 0 && connect(fd, found->ai_addr, found->ai_addrlen) == 0;
-  if (!connected) why = std::strerror(errno);
-  if (fd >= 0) ::close(fd);
+  hints.ai_socktype = SOCK_DGRAM;
+  if (getaddrinfo(group.c_str(), port.c_str(), &hints, &found) != 0) return false;
+  const bus::FileHandle socket(::socket(found->ai_family, found->ai_socktype | SOCK_CLOEXEC, 0));
+  const bool connected = socket && ::connect(socket.get(), found->ai_addr, found->ai_addrlen) == 0;
   freeaddrinfo(found);
   return connected;
 }
@@ -73,16 +66,14 @@ std::string resolve_url(const std::string& url) {
   return has_multicast_route() ? "udpm://239.255.76.67:7667?ttl=0" : "tcpq://127.0.0.1:7700";
 }
 
-bool has_multicast_route(const std::string& group) {
-  std::string why;
-  return can_connect(group, "7667", SOCK_DGRAM, why);
-}
+bool has_multicast_route(const std::string& group) { return has_route(group, "7667"); }
 
 bool is_served(const std::string& url) {
   const Address address = split(url);
   if (address.scheme == "unix") return is_unix_served(address.host);
   std::string why;
-  return address.scheme != "tcpq" || can_connect(address.host, address.port, SOCK_STREAM, why);
+  return address.scheme != "tcpq" ||
+         static_cast<bool>(bus::connect_tcp(address.host, address.port, why));
 }
 
 bool is_claimed(const std::string& url) {
@@ -109,7 +100,7 @@ void check_reachable(const std::string& url) {
                    "`ruedo doctor` tells more");
   }
   if (address.scheme == "tcpq") {
-    if (can_connect(address.host, address.port, SOCK_STREAM, why)) return;
+    if (bus::connect_tcp(address.host, address.port, why)) return;
     throw NoServer("no Ruedo server at " + url + " (" + why +
                    "). Is `ruedo run` started with this --lcm? `ruedo doctor` "
                    "looks for what is wrong");

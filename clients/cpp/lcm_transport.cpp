@@ -11,7 +11,7 @@
 
 #include "address.h"
 #include "ruedo/client.h"
-#include "unix_transport.h"
+#include "stream_transport.h"
 
 namespace ruedo::client {
 namespace {
@@ -32,8 +32,9 @@ std::string escaped(const std::string& channel) {
 
 std::unique_ptr<Transport> open_transport(const std::string& url) {
   check_reachable(url);
-  if (const Address address = split(url); address.scheme == "unix")
-    return std::make_unique<UnixTransport>(address.host);
+  const Address address = split(url);
+  if (address.scheme == "unix" || address.scheme == "tcpq")
+    return std::make_unique<StreamTransport>(address);
   return std::make_unique<LcmTransport>(url);
 }
 
@@ -114,11 +115,7 @@ bool LcmTransport::wait(std::chrono::milliseconds timeout) {
     const std::lock_guard lock(mutex_);
     waiting.fd = lcm_get_fileno(receiver_);
   }
-  if (waiting.fd >= 0) return ::poll(&waiting, 1, static_cast<int>(timeout.count())) > 0;
-  // TCP without a server: publish() tries to connect, and those who wait find out by their
-  // timeouts.
-  std::this_thread::sleep_for(std::min(timeout, std::chrono::milliseconds(100)));
-  return false;
+  return ::poll(&waiting, 1, static_cast<int>(timeout.count())) > 0;
 }
 
 bool LcmTransport::take(std::chrono::milliseconds timeout, const Receiver& receiver) {

@@ -1,9 +1,8 @@
 // LCM as a transport.
 //
-// LCM's calls are not safe beside each other, so one lock is around them: over TCP publish,
-// subscribe and handle share a socket without a lock, and lcm_unsubscribe() changes the list that a
-// dispatch in another thread walks through. Messages are handed over after the lock was released,
-// and waiting is done without it.
+// LCM's calls are not safe beside each other, so one lock is around them: lcm_unsubscribe() changes
+// the list that a dispatch in another thread walks through. Messages are handed over after the lock
+// was released, and waiting is done without it.
 #pragma once
 
 #include <lcm/lcm.h>

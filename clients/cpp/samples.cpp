@@ -249,7 +249,7 @@ std::shared_ptr<const Sample> decode_contact(WireReader& in) {
 std::shared_ptr<const Sample> decode_collisions(WireReader& in) {
   auto s = std::make_shared<Collisions>();
   s->utime = in.int64();
-  s->blocked_by = in.string();
+  s->blocked_by = in.text();
   s->points = contact_points(in);
   return s;
 }

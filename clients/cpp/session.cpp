@@ -121,7 +121,7 @@ void Session::receive(const uint8_t* bytes, size_t size) {
     reply.sequence = in.int64();
     reply.kind = in.int32();
     reply.code = in.int32();
-    reply.text = in.string();
+    reply.text = in.text();
     reply.body = in.bytes(in.count(1));
   } catch (const WireError&) {
     return;

@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "core.h"
+#include "ruedo/grant_reply_t.hpp"
 #include "ruedo/grant_request_t.hpp"
 #include "ruedo/reply_t.hpp"
 #include "ruedo/request_t.hpp"
@@ -80,7 +81,7 @@ void Stepper::take_part(Duration timeout) {
   std::lock_guard lock(mutex_);
   try {
     WireReader in(reply.body.data(), reply.body.size());
-    in.int64();  // fingerprint
+    if (in.int64() != grant_reply_t::getHash()) throw WireError("another version of the type");
     granted_ = in.int64();
     have_ = in.int64();
     newest_ = in.int64();

@@ -22,6 +22,7 @@
 namespace ruedo::client {
 
 class Core;
+class WireReader;
 struct WorldInfo;
 
 class Stepper {
@@ -76,6 +77,7 @@ class Stepper {
   void on_message(int32_t channel, const uint8_t* bytes, size_t size);
   bool fill(Step& step, int32_t channel, size_t size, uint32_t crc, std::vector<uint8_t>& bytes);
   void take_tick(const uint8_t* bytes, size_t size);
+  Entry read_entry(WireReader& in);
   void progress();
   void take_pieces(const std::vector<uint8_t>& body);
   std::exception_ptr fault_of(const Reply& reply) const;

@@ -7,6 +7,7 @@
 #include "core.h"
 #include "ruedo/reply_t.hpp"
 #include "ruedo/request_t.hpp"
+#include "ruedo/resend_reply_t.hpp"
 #include "ruedo/tick_t.hpp"
 #include "stepper.h"
 #include "wire_reader.h"
@@ -15,8 +16,9 @@
 namespace ruedo::client {
 namespace {
 
-constexpr size_t kMostEarly = 512;  // messages of one channel that wait for their ticks
-constexpr int32_t kMostChannels = 1 << 20;
+constexpr size_t kMostEarly = 512;          // messages of one channel that wait for their ticks
+constexpr int32_t kMostChannels = 1 << 16;  // more cannot be subscribed
+constexpr int kMostParts = 1024;
 constexpr int64_t kMostAhead = 1024;  // steps beyond what is here: no server is that far
 
 }  // namespace
@@ -93,7 +95,7 @@ void Stepper::take_tick(const uint8_t* bytes, size_t size) {
   const int32_t epoch = in.int32();
   const int64_t number = in.int64(), state_hash = in.int64();
   const int part = in.int16(), nparts = in.int16();
-  if (run_id != run_id_ || part < 0 || part >= nparts) return;
+  if (run_id != run_id_ || part < 0 || part >= nparts || nparts > kMostParts) return;
   if (epoch != epoch_) {
     if (epoch > epoch_ && !fault_)
       fault_ = std::make_exception_ptr(
@@ -121,30 +123,37 @@ void Stepper::take_tick(const uint8_t* bytes, size_t size) {
   std::vector<Entry> entries;
   size_t missing = 0;
   for (size_t n = in.count(20); n > 0; --n) {
-    Entry& entry = entries.emplace_back();
-    entry.channel = in.int32();
-    entry.sequence = in.int64();
-    entry.size = static_cast<size_t>(in.int32());
-    entry.crc = static_cast<uint32_t>(in.int32());
-    if (entry.channel < 0 || entry.channel >= kMostChannels) throw WireError("a channel's index");
-    if (static_cast<size_t>(entry.channel) >= early_.size())
-      early_.resize(static_cast<size_t>(entry.channel) + 1);  // of a model that came
-    std::deque<Early>& early = early_[static_cast<size_t>(entry.channel)];
-    const auto found = std::find_if(early.begin(), early.end(), [&](const Early& one) {
-      return one.size == entry.size && one.crc == entry.crc;
-    });
-    if (found == early.end()) {
-      ++missing;
-    } else {
-      entry.bytes = std::move(found->bytes);
-      early.erase(found);
-    }
+    entries.push_back(read_entry(in));
+    missing += entries.back().here() ? 0 : 1;
   }
   step.parts[static_cast<size_t>(part)] = std::move(entries);
   step.missing += missing;
   step.part_here[static_cast<size_t>(part)] = true;
   ++step.parts_here;
   progress();
+}
+
+// A message of a step; it may have come before the tick that names it.
+Stepper::Entry Stepper::read_entry(WireReader& in) {
+  Entry entry;
+  entry.channel = in.int32();
+  entry.sequence = in.int64();
+  const int32_t size = in.int32();
+  entry.crc = static_cast<uint32_t>(in.int32());
+  if (entry.channel < 0 || entry.channel >= kMostChannels || size < 0)
+    throw WireError("no message");
+  entry.size = static_cast<size_t>(size);
+  const auto channel = static_cast<size_t>(entry.channel);
+  if (channel >= early_.size()) early_.resize(channel + 1);  // of a model that came
+  std::deque<Early>& early = early_[channel];
+  const auto found = std::find_if(early.begin(), early.end(), [&](const Early& one) {
+    return one.size == entry.size && one.crc == entry.crc;
+  });
+  if (found != early.end()) {
+    entry.bytes = std::move(found->bytes);
+    early.erase(found);
+  }
+  return entry;
 }
 
 // With the mutex held, after something came.
@@ -191,9 +200,9 @@ std::exception_ptr Stepper::fault_of(const Reply& reply) const {
 
 void Stepper::take_pieces(const std::vector<uint8_t>& body) {
   WireReader in(body.data(), body.size());
-  in.int64();  // fingerprint
+  if (in.int64() != resend_reply_t::getHash()) throw WireError("another version of the type");
   newest_ = std::max(newest_, in.int64());
-  waits_for_ = in.string();
+  waits_for_ = in.text();
   std::vector<std::vector<uint8_t>> ticks;
   const size_t count = in.count(32);
   const bool any = count > 0;

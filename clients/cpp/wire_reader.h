@@ -39,6 +39,21 @@ class WireReader {
     return {reinterpret_cast<const char*>(bytes), length - 1};
   }
 
+  // What is printed: a terminal obeys control characters, so a name has none, and in a longer text
+  // '?' stands for each but line ends and tabs.
+  std::string name() {
+    std::string text = string();
+    for (size_t i = 0; i < text.size(); ++i)
+      if (is_control(text, i)) throw WireError("a name with control characters");
+    return text;
+  }
+  std::string text() {
+    std::string text = string();
+    for (size_t i = 0; i < text.size(); ++i)
+      if (is_control(text, i) && text[i] != '\n' && text[i] != '\t') text[i] = '?';
+    return text;
+  }
+
   // An int32_t that counts elements of at least `element_size` bytes each, which must still fit.
   size_t count(size_t element_size) { return fits(int32(), element_size); }
   size_t fits(int64_t n, size_t element_size) const {
@@ -82,6 +97,12 @@ class WireReader {
     std::vector<Value> values(n);
     for (size_t i = 0; i < n; ++i) values[i] = read();
     return values;
+  }
+  static bool is_control(const std::string& text, size_t i) {  // those of UTF-8, too
+    const auto byte = static_cast<unsigned char>(text[i]);
+    return byte < 0x20 || byte == 0x7f ||
+           (byte >= 0x80 && byte < 0xa0 && i > 0 &&
+            static_cast<unsigned char>(text[i - 1]) == 0xc2);
   }
   static uint64_t big_endian(const uint8_t* bytes, int n) {
     uint64_t value = 0;

@@ -2,6 +2,9 @@
 #include "world_info.h"
 
 #include <cstdio>
+#include <map>
+#include <string_view>
+#include <utility>
 
 #include "ruedo/world_info_t.hpp"
 #include "wire_reader.h"
@@ -11,9 +14,9 @@ namespace {
 
 RobotInfo read_robot(WireReader& in) {
   RobotInfo robot;
-  robot.name = in.string();
-  robot.model = in.string();
-  robot.drive = in.string();
+  robot.name = in.name();
+  robot.model = in.name();
+  robot.drive = in.name();
   in.int32();  // body
   for (double* value : {&robot.wheel_radius, &robot.track, &robot.max_speed, &robot.max_turn_rate,
                         &robot.acceleration, &robot.deceleration, &robot.turn_acceleration}) {
@@ -21,16 +24,17 @@ RobotInfo read_robot(WireReader& in) {
   }
   robot.watchdog = static_cast<double>(in.int64()) * 1e-6;
   const size_t n = in.count(5 + 1);
-  robot.wheels = in.strings(n);
+  robot.wheels.resize(n);
+  for (std::string& wheel : robot.wheels) wheel = in.name();
   in.booleans(n);  // which are on the left
   return robot;
 }
 
 DeviceInfo read_device(WireReader& in) {
   DeviceInfo device;
-  device.robot = in.string();
-  device.name = in.string();
-  device.kind = in.string();
+  device.robot = in.name();
+  device.name = in.name();
+  device.kind = in.name();
   device.rate = in.float64();
   device.position = in.array<3>();
   device.orientation = in.array<4>();
@@ -47,10 +51,10 @@ DeviceInfo read_device(WireReader& in) {
 
 ChannelInfo read_channel(WireReader& in) {
   ChannelInfo channel;
-  channel.name = in.string();
-  channel.robot = in.string();
-  channel.device = in.string();
-  channel.type = in.string();
+  channel.name = in.name();
+  channel.robot = in.name();
+  channel.device = in.name();
+  channel.type = in.name();
   channel.fingerprint = in.int64();
   channel.rate = in.float64();
   channel.input = in.boolean();
@@ -60,7 +64,7 @@ ChannelInfo read_channel(WireReader& in) {
 BodyInfo read_body(WireReader& in) {
   BodyInfo body;
   in.int32();  // its place in ruedo/world
-  body.name = in.string();
+  body.name = in.name();
   body.is_static = in.boolean();
   body.mass = in.float64();
   return body;
@@ -73,8 +77,8 @@ void read_part(WireReader& in, WorldInfo& info) {
   info.epoch = in.int32();
   in.int16();  // part
   in.int16();  // nparts
-  info.version = in.string();
-  info.world = in.string();
+  info.version = in.name();
+  info.world = in.name();
   info.seed = in.int64();
   info.step_us = in.int64();
   info.features = in.int64();
@@ -150,14 +154,18 @@ std::shared_ptr<const WorldInfo> WorldInfoAssembler::add(const uint8_t* bytes, s
   }
   for (size_t i = 0; i < info->robots.size(); ++i)
     info->robot_index.emplace(info->robots[i].name, i);
-  // A device's channel is the one that carries its samples.
+  // A device's channel is the first that carries its samples.
+  std::map<std::pair<std::string_view, std::string_view>, const ChannelInfo*> of_device;
+  for (const auto& [robot, channels] : info->channels) {
+    for (const ChannelInfo& channel : channels)
+      if (!channel.input) of_device.try_emplace({robot, channel.device}, &channel);
+  }
   for (auto& [robot, devices] : info->devices) {
     for (DeviceInfo& device : devices) {
-      for (const ChannelInfo& channel : info->channels[robot]) {
-        if (channel.device != device.name || channel.input || !device.channel.empty()) continue;
-        device.channel = channel.name;
-        device.type = channel.type;
-      }
+      const auto found = of_device.find({robot, device.name});
+      if (found == of_device.end()) continue;
+      device.channel = found->second->name;
+      device.type = found->second->type;
     }
   }
   last_ = std::move(parts_);

@@ -16,6 +16,8 @@
 
 #include <spdlog/spdlog.h>
 
+#include "bus/stream_socket.h"
+#include "bus/unix_socket.h"
 #include "ruedo/errors.h"
 
 namespace ruedo::bus {
@@ -23,16 +25,21 @@ namespace ruedo::bus {
 namespace {
 
 constexpr std::chrono::milliseconds kBetweenLooks{1000}, kBetweenWarnings{60000};
-constexpr int kConnectMs = 2000;
 constexpr int kTakenTogether = 64;  // messages between two checks whether the bus is closing
 constexpr const char* kSelfTest = "LCM_SELF_TEST";
 constexpr auto kSelfTestTime = std::chrono::milliseconds(50);
 constexpr std::chrono::milliseconds kFirstPause{50},
     kLongestPause{1000};  // between connections to a server that is gone
 
-bool is_at_end(int file) {
-  char byte;
-  return file < 0 || ::recv(file, &byte, 1, MSG_PEEK | MSG_DONTWAIT) == 0;
+FileHandle connected_to(const LcmUrl& url) {
+  if (url.scheme == "unix") return connect_unix(url.host);
+  std::string why;
+  FileHandle socket = connect_tcp(url.host, std::to_string(url.port), why);
+  if (!socket) {
+    throw EnvironmentError("nothing listens at " + url.str() + " (" + why +
+                           "): start `ruedo run` with that --lcm first");
+  }
+  return socket;
 }
 
 }  // namespace
@@ -58,12 +65,8 @@ std::vector<std::string> channel_patterns(const std::vector<std::string>& names)
 
 LcmBus::LcmBus(const std::string& url) : url_(parse_url(url)) {
   check_route(url_);
-  if (url_.scheme == "tcpq" && !is_served(url_, kConnectMs)) {
-    throw EnvironmentError("nothing listens at " + url_.str() +
-                           ": start `ruedo run` with that --lcm first");
-  }
-  if (url_.scheme == "unix") {
-    unix_ = std::make_unique<UnixConnection>(url_.host);
+  if (url_.scheme == "unix" || url_.scheme == "tcpq") {
+    stream_ = std::make_shared<StreamConnection>(connected_to(url_));
     receive_buffer_ = SIZE_MAX;
     return;
   }
@@ -93,8 +96,9 @@ void LcmBus::publish(const std::string& channel, const uint8_t* data, size_t siz
         "recv_buf_size=2097152 in the URL",
         size, channel, receive_buffer_);
   }
-  const bool sent = unix_ ? unix_->publish(channel, data, size)
-                          : out_->publish(channel, data, static_cast<unsigned>(size)) == 0;
+  const auto stream = this->stream();
+  const bool sent = stream ? stream->publish(channel, data, size)
+                           : out_->publish(channel, data, static_cast<unsigned>(size)) == 0;
   if (!sent) ++failed_;
 }
 
@@ -123,7 +127,7 @@ void LcmBus::take_up() {
   std::lock_guard lock(mutex_);
   if (!waits_) return;
   know(wanted_);
-  if (in_ || unix_) subscribe_missing();
+  subscribe_missing();
   waits_ = false;
   taken_up_.notify_all();
 }
@@ -133,7 +137,7 @@ void LcmBus::know(const std::vector<std::string>& channels) {
 }
 
 void LcmBus::open() {
-  if (unix_) return subscribe_missing();
+  if (stream_) return subscribe_missing();
   if (url_.scheme == "udpm") {
     try {
       multicast_ = std::make_unique<MulticastReceiver>(
@@ -145,14 +149,7 @@ void LcmBus::open() {
     loss_.emplace(static_cast<uint16_t>(url_.port), multicast_->file());
     return ignore_own();
   }
-  if (url_.scheme == "memq") {
-    in_ = std::shared_ptr<lcm::LCM>(out_.get(),
-                                    [](lcm::LCM*) {});  // messages stay inside of one instance
-  } else {
-    in_ = std::make_shared<lcm::LCM>(url_.str());
-    if (!in_->good())
-      throw EnvironmentError("LCM cannot open '" + url_.str() + "': run `ruedo doctor`");
-  }
+  in_ = out_.get();  // messages stay inside of one instance
   subscribe_missing();
   // LCM's subscribe succeeds even where nothing can be received.
   if (in_->getFileno() < 0)
@@ -180,12 +177,13 @@ void LcmBus::ignore_own() {
 }
 
 void LcmBus::subscribe_missing() {
-  if (unix_) {
+  if (stream_) {
     for (const std::string& channel : channels_) {
-      if (subscribed_.insert(channel).second) unix_->subscribe(channel);
+      if (subscribed_.insert(channel).second) stream_->subscribe(channel);
     }
     return;
   }
+  if (!in_) return;
   // Our handler only checks and stores, so it never blocks; the queue holds a burst from every
   // robot.
   const int queue_size = static_cast<int>(std::clamp<size_t>(4 * channels_.size(), 64, 65536));
@@ -201,9 +199,7 @@ void LcmBus::read() {
   bool lost = false;  // tcpq: the server
   auto pause = kFirstPause;
   for (;;) {
-    const int file = unix_        ? unix_->file()
-                     : multicast_ ? multicast_->file()
-                                  : in_->getFileno();  // another one for each connection
+    const int file = stream_ ? stream_->file() : multicast_ ? multicast_->file() : in_->getFileno();
     pollfd waiting[2] = {{lost ? -1 : file, POLLIN, 0}, {stop_event_, POLLIN, 0}};
     const int longest = lost    ? static_cast<int>(pause.count())
                         : loss_ ? static_cast<int>(kBetweenLooks.count())
@@ -225,7 +221,7 @@ void LcmBus::read() {
       pause = std::min(2 * pause, kLongestPause);
     else
       spdlog::warn("{}: the server has closed the connection{}", url_.str(),
-                   unix_ ? "" : "; it is looked for again");
+                   url_.scheme == "unix" ? "" : "; it is looked for again");
   }
 }
 
@@ -244,20 +240,44 @@ void LcmBus::look_for_loss() {
       lost_, url_.str(), cure_of_datagram_loss());
 }
 
-// False when the connection was lost: LCM connects again when it is next asked for a message. A
-// unix one is not reopened: what was lost meanwhile would not be known.
-bool LcmBus::handle() {
-  if (unix_) {
-    unix_->take(0, [this](std::string_view channel, const uint8_t* data, size_t size) {
-      deliver(channel, data, size);
-    });
-    return !unix_->is_over();
+std::shared_ptr<StreamConnection> LcmBus::stream() const {
+  const std::lock_guard lock(connecting_);
+  return stream_;
+}
+
+// False when the connection is lost; the next call connects again. A unix one is not reopened: what
+// was lost meanwhile would not be known.
+bool LcmBus::take_from_stream() {
+  const auto take = [this](std::string_view channel, const uint8_t* data, size_t size) {
+    deliver(channel, data, size);
+  };
+  if (!stream_->is_over()) {
+    stream_->take(0, take);
+    return !stream_->is_over();
   }
-  if (!multicast_) {
-    const bool at_end = is_at_end(in_->getFileno());
-    if (in_->handle() == 0) return !at_end;
-    ++failed_;
+  if (url_.scheme == "unix") return false;
+  try {
+    auto made = std::make_shared<StreamConnection>(connected_to(url_));
+    const std::lock_guard lock(connecting_);
+    stream_ = std::move(made);
+  } catch (const EnvironmentError&) {
     return false;
+  }
+  subscribed_.clear();
+  subscribe_missing();
+  const auto until = std::chrono::steady_clock::now() + kFirstPause;  // some close at once
+  while (!stream_->is_over() && std::chrono::steady_clock::now() < until) {
+    if (stream_->take(static_cast<int>(kFirstPause.count()), take)) break;
+  }
+  return !stream_->is_over();
+}
+
+// False when the connection was lost.
+bool LcmBus::handle() {
+  if (stream_) return take_from_stream();
+  if (!multicast_) {
+    if (in_->handle() != 0) ++failed_;
+    return true;
   }
   const auto take = [this](std::string_view channel, const uint8_t* data, size_t size) {
     deliver(channel, data, size);

@@ -2,8 +2,8 @@
 //
 // An LCM instance that only sends (it never subscribes, so LCM gives it no thread), and for
 // multicast a receiver of our own: a message takes one thread from the network to the handler, not
-// two, and what we send ourselves wakes no one. With tcpq another LCM instance listens, with memq
-// the same one. A unix address is a connection of our own.
+// two, and what we send ourselves wakes no one. With memq the same instance listens. A tcpq or unix
+// address is a connection of our own.
 #pragma once
 
 #include <atomic>
@@ -23,7 +23,7 @@
 #include "bus/datagram_loss.h"
 #include "bus/lcm_url.h"
 #include "bus/multicast_receiver.h"
-#include "bus/unix_connection.h"
+#include "bus/stream_connection.h"
 #include "ruedo/bus.h"
 
 namespace ruedo::bus {
@@ -54,6 +54,8 @@ class LcmBus : public Bus {
   void open();
   void ignore_own();
   void subscribe_missing();
+  std::shared_ptr<StreamConnection> stream() const;  // null: the address is of another kind
+  bool take_from_stream();
   void take_up();  // what listen_to() left
   void read();
   void look_for_loss();
@@ -63,9 +65,10 @@ class LcmBus : public Bus {
 
   LcmUrl url_;
   std::unique_ptr<lcm::LCM> out_;
-  std::shared_ptr<lcm::LCM> in_;  // with memq and tcpq
+  lcm::LCM* in_ = nullptr;  // with memq: out_
   std::unique_ptr<MulticastReceiver> multicast_;
-  std::unique_ptr<UnixConnection> unix_;
+  std::shared_ptr<StreamConnection> stream_;  // with tcpq and unix; under connecting_
+  mutable std::mutex connecting_;
   std::optional<DatagramLossWatch> loss_;  // with multicast: of those who listen to us
   std::chrono::steady_clock::time_point next_look_, next_warning_;
   int64_t lost_ = 0, told_lost_ = 0;     // datagrams

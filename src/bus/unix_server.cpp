@@ -46,7 +46,7 @@ std::string_view UnixServer::Frame::channel(const std::vector<uint8_t>& frames) 
 }
 
 UnixServer::UnixServer(const LcmUrl& url)
-    : url_(url), listener_(listen_unix(url.host)), inode_(inode_of(url.host)) {
+    : url_(url), listener_(listen_unix(url.host)), leftover_(url.host), inode_(inode_of(url.host)) {
   poll_ = FileHandle(::epoll_create1(EPOLL_CLOEXEC));
   wake_ = FileHandle(::eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK));
   add_to(poll_.get(), listener_.get(), &listener_);

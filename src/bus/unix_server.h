@@ -20,6 +20,7 @@
 #include "bus/file_handle.h"
 #include "bus/lcm_url.h"
 #include "bus/tcpq_wire.h"
+#include "core/leftovers.h"
 #include "ruedo/bus.h"
 
 namespace ruedo::bus {
@@ -87,6 +88,7 @@ class UnixServer : public Bus {
 
   const LcmUrl url_;
   FileHandle listener_, poll_, wake_;
+  Leftover leftover_;
   uint64_t inode_ = 0;
   Handler handler_;
   std::atomic<bool> stop_{false};

@@ -8,6 +8,7 @@
 #include <sys/un.h>
 #include <unistd.h>
 
+#include "bus/stream_socket.h"
 #include "ruedo/errors.h"
 
 namespace ruedo::bus {
@@ -26,7 +27,7 @@ sockaddr_un address_of(const std::string& path) {
 }
 
 FileHandle connected(const sockaddr_un& address) {
-  FileHandle socket(::socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0));
+  FileHandle socket = stream_socket(AF_UNIX);
   return ::connect(socket.get(), reinterpret_cast<const sockaddr*>(&address), sizeof address) == 0
              ? std::move(socket)
              : FileHandle();

@@ -26,6 +26,7 @@
 #include "cli/run_command.h"
 #include "cli/sandboxed.h"
 #include "cli/view.h"
+#include "core/leftovers.h"
 #include "core/utf8.h"
 #include "engine/thread_limit.h"
 #include "log/ring.h"
@@ -64,8 +65,10 @@ class SignalThread {
     for (int signal = 0; sigwait(&signals_, &signal) == 0;) {
       if (done_) return;
       run::Run* server = server_;
-      if (!server || asked_)
-        std::_Exit(128 + signal);  // there is no run to end cleanly, or it does not end
+      if (!server || asked_) {  // there is no run to end cleanly, or it does not end
+        remove_leftovers();
+        std::_Exit(128 + signal);
+      }
       asked_ = true;
       server->stop();
     }

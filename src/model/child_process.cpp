@@ -10,6 +10,7 @@
 #include <fcntl.h>
 #include <poll.h>
 #include <signal.h>
+#include <sys/prctl.h>
 #include <sys/syscall.h>
 #include <sys/wait.h>
 #include <unistd.h>
@@ -29,8 +30,11 @@ void set_limit(decltype(RLIMIT_AS) which, rlim_t value) {
 }
 
 // Runs in the child, between fork and exec: system calls only. posix_spawn cannot set limits.
-[[noreturn]] void become(char* const* arguments, const char* log, const ProcessLimits& limits) {
+[[noreturn]] void become(char* const* arguments, const char* log, const ProcessLimits& limits,
+                         pid_t parent) {
   ::setpgid(0, 0);
+  ::prctl(PR_SET_PDEATHSIG, SIGKILL);  // the thread that waits for it is gone
+  if (::getppid() != parent) ::_exit(127);
   set_limit(RLIMIT_CORE, 0);
   set_limit(RLIMIT_CPU, limits.cpu_s);
   set_limit(RLIMIT_FSIZE, limits.file_bytes);
@@ -74,6 +78,7 @@ void kill_group(pid_t process) {
 TemporaryFolder::TemporaryFolder(const std::string& purpose) {
   path_ = (fs::temp_directory_path() / ("ruedo-" + purpose + "-XXXXXX")).string();
   if (!::mkdtemp(path_.data())) fail("no temporary folder");
+  leftover_.emplace(path_);
 }
 
 TemporaryFolder::~TemporaryFolder() {
@@ -86,9 +91,10 @@ std::optional<int> run_limited(std::vector<std::string> words, const std::string
   std::vector<char*> arguments;
   for (std::string& word : words) arguments.push_back(word.data());
   arguments.push_back(nullptr);
+  const pid_t parent = ::getpid();
   const pid_t child = ::fork();  // posix_spawn sets no limits
   if (child < 0) fail("no process can be started");
-  if (child == 0) become(arguments.data(), log.c_str(), limits);
+  if (child == 0) become(arguments.data(), log.c_str(), limits, parent);
 
   const ProcessHandle handle(child);
   const auto deadline = std::chrono::steady_clock::now() + std::chrono::seconds(limits.wall_s);

@@ -9,6 +9,8 @@
 
 #include <sys/resource.h>
 
+#include "core/leftovers.h"
+
 namespace ruedo::model {
 
 // A new folder in the system's temporary folder; removed with its contents.
@@ -23,6 +25,7 @@ class TemporaryFolder {
 
  private:
   std::string path_;
+  std::optional<Leftover> leftover_;
 };
 
 struct ProcessLimits {

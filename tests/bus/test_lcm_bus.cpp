@@ -81,7 +81,6 @@ TEST(LcmBus, LooksForALostServerWithPauses) {
   ::getsockname(listener.get(), reinterpret_cast<sockaddr*>(&address), &size);
   std::atomic<int> connections{0};
   std::thread serving([&] {
-    // LCM waits for the hello before its constructor returns.
     const std::vector<uint8_t> hello = tcpq::server_hello();
     std::vector<FileHandle> ended;  // no reset, which would take back what was sent
     for (;;) {

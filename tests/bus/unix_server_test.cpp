@@ -16,7 +16,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
-#include "bus/unix_connection.h"
+#include "bus/stream_connection.h"
 #include "bus/unix_socket.h"
 #include "ruedo/errors.h"
 
@@ -61,11 +61,11 @@ struct Served {
 };
 
 struct Client {
-  UnixConnection connection;
+  StreamConnection connection;
   std::vector<std::pair<std::string, std::string>> came;
   // Returns when the server has received what follows the subscription, and thus the subscription.
   Client(Served& served, const std::vector<std::string>& channels)
-      : connection(served.folder.url().host) {
+      : connection(connect_unix(served.folder.url().host)) {
     size_t before = 0;
     {
       const std::lock_guard lock(served.mutex);
@@ -123,7 +123,7 @@ TEST(UnixServer, KnowsWhatIsHeard) {
   EXPECT_FALSE(bus.is_heard("a"));
   uint64_t audience = bus.audience();
   {
-    UnixConnection connection(folder.url().host);
+    StreamConnection connection(connect_unix(folder.url().host));
     connection.subscribe("a");
     audience = wait_for_change(audience);
     EXPECT_TRUE(bus.is_heard("a"));
@@ -219,7 +219,7 @@ TEST(UnixServer, PathsAreClaimedAndCleared) {
   EXPECT_TRUE(fs::exists(folder.url("file").host));
   EXPECT_THROW(UnixServer{folder.url("no/folder")}, EnvironmentError);
   EXPECT_THROW(UnixServer(folder.url(std::string(200, 'x'))), EnvironmentError);
-  EXPECT_THROW(UnixConnection{folder.url("nobody").host}, EnvironmentError);
+  EXPECT_THROW(connect_unix(folder.url("nobody").host), EnvironmentError);
 }
 
 TEST(UnixServer, GarbageEndsItsConnectionAlone) {

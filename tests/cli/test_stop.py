@@ -121,3 +121,45 @@ def test_an_empty_log_is_called_empty(tmp_path):
     log.write_bytes(b"")
     told = subprocess.run([RUEDO, "verify", log], capture_output=True, text=True)
     assert told.returncode != 0 and "is empty: nothing was recorded" in told.stderr
+
+
+def processes_that_name(path):
+    found = []
+    for each in Path("/proc").glob("[0-9]*/cmdline"):
+        try:
+            if str(path).encode() in each.read_bytes():
+                found.append(each.parent.name)
+        except OSError:
+            pass
+    return found
+
+
+@pytest.mark.parametrize("told", [signal.SIGTERM, signal.SIGINT])
+def test_while_a_mesh_is_imported_nothing_is_left(told, tmp_path):
+    """Neither the importer's process nor its folder, nor the socket's name."""
+    temporary = tmp_path / "tmp"
+    temporary.mkdir()
+    with (tmp_path / "large.obj").open("w") as mesh:
+        mesh.writelines(f"v {i % 700} {i // 700} {i % 13}\n" for i in range(490_000))
+        mesh.writelines(f"f {i} {i + 1} {i + 700}\n" for i in range(1, 489_000))
+    world = tmp_path / "w.sdf"
+    world.write_text("""<sdf version='1.9'><world name='w'><model name='m'><static>true</static><link name='l'>
+<collision name='c'><geometry><mesh><uri>large.obj</uri></mesh></geometry></collision></link></model></world></sdf>""")
+    server = subprocess.Popen(
+        [RUEDO, "run", world, "--lcm", f"unix://{tmp_path}/bus"],
+        env={**os.environ, "TMPDIR": str(temporary), "XDG_CACHE_HOME": str(tmp_path / "cache")},
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+    )
+    try:
+        until(lambda: len(processes_that_name(temporary)) > 0, server)
+        server.send_signal(told)
+        assert server.wait(PATIENCE) == 128 + told
+    finally:
+        server.kill()
+        server.wait()
+    deadline = time.monotonic() + PATIENCE
+    while processes_that_name(temporary):
+        assert time.monotonic() < deadline
+        time.sleep(0.05)
+    assert not list(temporary.iterdir()) and not (tmp_path / "bus").exists()

@@ -1,10 +1,18 @@
 """Servers that lie or do not exist: each fault is reported clearly, and nothing breaks."""
 
+import os
+import signal
+import subprocess
 import sys
 import time
 
 import pytest
-from conftest import HERE, Server, free_url, probe
+from conftest import HERE, PROBES, Server, free_url, probe
+
+# isort: split
+from fake_server import info
+from lying_stream import HELLO, LyingStream, frame, grants_and_huge_ticks
+from ruedo import lcmtypes
 
 
 def fake(*options):
@@ -85,3 +93,110 @@ def test_a_request_that_the_server_does_not_have(language):
     with fake() as server:
         said = probe(language, server.url, "quit").one("failed")
     assert said.startswith("NotSupported: this server (Ruedo 9.9.9) has no QUIT request")
+
+
+INFO = frame("ruedo/info", info([]).encode())
+STUCK = {
+    "in a head": HELLO + INFO + b"\0\0",
+    "in a name": HELLO + INFO + frame("ruedo/tick", b"")[:11],
+    "in a message": HELLO + INFO + frame("ruedo/info", bytes(100), size=5000),
+}
+
+
+@pytest.fixture(params=["tcpq", "unix"])
+def stream_url(request, tmp_path):
+    if request.param == "unix":
+        return f"unix://{tmp_path}/liar"
+    return free_url().replace("udpm://239.255.76.67", "tcpq://127.0.0.2").replace("?ttl=0", "")
+
+
+@pytest.mark.parametrize("sent", STUCK.values(), ids=STUCK.keys())
+def test_a_message_that_never_ends_holds_nobody_up(language, stream_url, sent):
+    with LyingStream(stream_url, sent):
+        said = probe(language, stream_url, "streams", "p3at", "0.3")
+    assert said.one("lrf").startswith("Timeout: ") and said.one("odometry").startswith("Timeout: ")
+
+
+def test_a_length_that_lies_is_not_waited_for(language, stream_url):
+    with LyingStream(stream_url, HELLO + INFO + frame("x", bytes(100), size=(1 << 32) - 1)):
+        probe(language, stream_url, "connect")
+
+
+@pytest.mark.parametrize("sent", [b"", HELLO[:5], bytes(8) + INFO])
+def test_who_says_no_hello_is_no_server(language, stream_url, sent):
+    with LyingStream(stream_url, sent):
+        said = probe(language, stream_url, "connect").one("failed")
+    assert said.startswith("NoServer: ") and stream_url in said
+
+
+def test_a_server_that_reads_nothing_is_left(stream_url):
+    """What it does not take within seconds is lost, as it is where there is no server."""
+    from ruedo.transport import open_transport
+
+    with LyingStream(stream_url, HELLO + INFO):
+        transport = open_transport(stream_url)
+        for _ in range(16):
+            transport.publish("x", bytes(1 << 20))
+        transport.close()
+
+
+def test_a_tick_of_many_parts_takes_no_memory(language, stream_url):
+    driven = info([])
+    driven.features = (1 << 40) - 1
+    for name, type_name in (
+        ("pose", "pose_t"),
+        ("velocity", "velocity_command_t"),
+        ("tick", "tick_t"),
+    ):
+        channel = lcmtypes.channel_info_t()
+        channel.name, channel.robot, channel.type = f"p3at/{name}", "p3at", type_name
+        channel.input = name == "velocity"
+        driven.channels.append(channel)
+    driven.nchannels = len(driven.channels)
+    with LyingStream(
+        stream_url, HELLO + frame("ruedo/info", driven.encode()), grants_and_huge_ticks
+    ):
+        process = subprocess.Popen(
+            [*PROBES[language], stream_url, "lockstep", "name", "p3at", "5", "1", "0.1"],
+            stdout=subprocess.PIPE,
+            text=True,
+        )
+        time.sleep(3.0)
+        os.kill(process.pid, signal.SIGKILL)
+        _, _, used = os.wait4(process.pid, 0)
+    assert used.ru_maxrss < 200_000, process.stdout.read()  # KiB
+
+
+def test_a_name_reaches_no_terminal(language, stream_url):
+    """Of its control characters nothing comes out."""
+    lies = info([])
+    lies.robots[0].name = "\x1b]0;owned\x07"
+    with LyingStream(stream_url, HELLO + frame("ruedo/info", lies.encode())):
+        said = probe(language, stream_url, "connect").one("failed")
+    assert "\x1b" not in said and "a name with control characters" in said
+
+
+def test_a_refusal_reaches_no_terminal(language, stream_url):
+    def refuse(request):
+        reply = lcmtypes.reply_t()
+        reply.run_id, reply.sequence, reply.kind = 7, request.sequence, request.kind
+        reply.code, reply.text = reply.REFUSED, "\x1b]0;owned\x07"
+        return frame("ruedo/reply", reply.encode())
+
+    knows_all = info([])
+    knows_all.features = (1 << 40) - 1
+    with LyingStream(stream_url, HELLO + frame("ruedo/info", knows_all.encode()), refuse):
+        said = probe(language, stream_url, "quit").one("failed")
+    assert said.endswith("JOIN: ?]0;owned?")
+
+
+def test_a_hundred_thousand_devices(language, stream_url):
+    """Of which each is listed, in a time that grows as their number does."""
+    many = info([])
+    devices, channels = many.devices[:1], many.channels[:1]
+    channels[0].device = "another"  # of the first device there is none
+    many.devices, many.channels = 100_000 * devices, 100_000 * channels
+    many.ndevices = many.nchannels = 100_000
+    with LyingStream(stream_url, HELLO + frame("ruedo/info", many.encode())):
+        said = probe(language, stream_url, "list", timeout=120.0)
+    assert said.one("robot").startswith("p3at")

@@ -11,7 +11,7 @@ namespace nb = nanobind;
 
 namespace {
 
-constexpr size_t kLongestChannel = 63, kLargestMessage = size_t{1} << 26;  // as unix_transport.py
+constexpr size_t kLongestChannel = 63, kLargestMessage = size_t{1} << 26;  // as arrivals.py
 constexpr size_t kMostNames = 65536;
 constexpr size_t kManifestEntry = 20;  // channel, sequence, size, crc
 

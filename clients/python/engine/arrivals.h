@@ -1,5 +1,5 @@
 // What the Python client does for every single message of a run in lockstep, in C++: hundreds come
-// with each step. bus.py, unix_transport.py and lockstep.py have the same in Python, for
+// with each step. bus.py, stream_transport.py and lockstep.py have the same in Python, for
 // installations without the engine; tests hold the one against the other.
 #pragma once
 

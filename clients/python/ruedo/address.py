@@ -10,7 +10,7 @@ import os
 import socket
 from urllib.parse import urlsplit
 
-from . import unix_transport
+from . import stream_transport
 from .errors import NoServer
 
 DEFAULT_URL = "udpm://239.255.76.67:7667?ttl=0"
@@ -41,7 +41,7 @@ def check_reachable(url: str) -> None:
     """Raises NoServer, with the cure, when nothing can come from that URL."""
     parts = urlsplit(url)
     try:
-        host, port = parts.hostname, parts.port
+        host, _ = parts.hostname, parts.port
     except ValueError:
         raise NoServer(f"{url}: the port is not a number from 0 to 65535") from None
     if parts.scheme == "udpm":
@@ -52,7 +52,7 @@ def check_reachable(url: str) -> None:
             )
     elif parts.scheme == "tcpq":
         try:
-            socket.create_connection((host or "127.0.0.1", port or 7700), 2.0).close()
+            stream_transport.connect(parts).close()
         except OSError as error:
             raise NoServer(
                 f"no Ruedo server at {url} ({error.strerror or error}). Is `ruedo run` started with this "
@@ -60,7 +60,7 @@ def check_reachable(url: str) -> None:
             ) from None
     elif parts.scheme == "unix":
         try:
-            unix_transport.connect(parts.path).close()
+            stream_transport.connect(parts).close()
         except OSError as error:
             raise NoServer(
                 f"no Ruedo server at {url} ({error.strerror or error}). Is `ruedo run` started with this --lcm, "
@@ -76,7 +76,7 @@ def is_claimed(url: str) -> bool:
     """Whether a server on this machine has the address: its claim goes with its process."""
     parts = urlsplit(url)
     if parts.scheme == "unix":
-        return unix_transport.is_served(parts.path)
+        return stream_transport.is_served(parts)
     host, port = (
         (parts.hostname, parts.port)
         if parts.hostname

@@ -12,7 +12,6 @@ from functools import partial
 from . import arrivals
 from .callbacks import Callbacks, Subscription
 from .transport import Transport
-from .unix_transport import UnixTransport
 
 Handler = Callable[[bytes], None]
 _LEND_SECONDS = 0.02
@@ -23,7 +22,7 @@ class Bus:
 
     def __init__(self, transport: Transport):
         self._transport = transport
-        self.loses_nothing = isinstance(transport, UnixTransport)
+        self.loses_nothing = transport.loses_nothing
         self._closed = threading.Event()
         self._handlers: dict[str, Callbacks] = {}
         self._collectors: dict[str, Callable[[tuple[str, bytes]], object]] = {}

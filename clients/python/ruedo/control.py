@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from . import lcmtypes
-from .errors import NotSupported, RequestError, Timeout, TypeMismatch
+from .errors import NotSupported, RequestError, Timeout, TypeMismatch, for_terminal
 from .geometry import Floats
 from .samples import Value, floats
 
@@ -123,6 +123,7 @@ class Session:
             reply = lcmtypes.reply_t.decode(data)
         except Exception:
             return
+        reply.text = for_terminal(reply.text)
         with self._news:
             ours = reply.session == self._session or reply.kind == lcmtypes.request_t.JOIN
             if self._awaited == (reply.kind, reply.sequence) and ours:

@@ -6,6 +6,18 @@ ValueErrors.
 
 from __future__ import annotations
 
+import re
+
+CONTROL = re.compile(r"[\x00-\x1f\x7f-\x9f]")
+_CONTROL_IN_TEXT = re.compile(r"[\x00-\x08\x0b-\x1f\x7f-\x9f]")
+
+
+def for_terminal(text: str) -> str:
+    """A server's text as it may be printed: a terminal obeys control characters, so '?' stands for
+    each but line ends and tabs.
+    """
+    return _CONTROL_IN_TEXT.sub("?", text)
+
 
 class RuedoError(Exception):
     """Base of all errors of this package."""

@@ -25,7 +25,7 @@ from . import arguments
 from .address import has_multicast_route
 from .errors import LaunchError, NoServer
 from .simulation import Simulation
-from .unix_transport import is_served
+from .stream_transport import is_served
 from .world import World
 
 
@@ -290,18 +290,9 @@ class _Server:
         if parts.scheme not in ("tcpq", "unix"):
             return
         while time.monotonic() < until and self._process.poll() is None:
-            if parts.scheme == "unix":
-                if is_served(parts.path):
-                    return
-                time.sleep(0.005)
-                continue
-            try:
-                socket.create_connection(
-                    (parts.hostname or "127.0.0.1", parts.port or 7700), 1.0
-                ).close()
+            if is_served(parts):
                 return
-            except OSError:
-                time.sleep(0.02)
+            time.sleep(0.005)
         ended = self.ended()
         if ended:
             raise NoServer(ended)

@@ -21,7 +21,15 @@ import numpy as np
 
 from . import arrivals, lcmtypes
 from .control import State
-from .errors import LeaseLost, NoServer, RequestError, RuedoError, Timeout, TypeMismatch
+from .errors import (
+    LeaseLost,
+    NoServer,
+    RequestError,
+    RuedoError,
+    Timeout,
+    TypeMismatch,
+    for_terminal,
+)
 from .stream import Stream, sample_of
 
 if TYPE_CHECKING:
@@ -573,7 +581,7 @@ class Stepper:
             self._taken = self._ask_now = True  # it was repeated: its ticks may be lost
 
     def _take_pieces(self, reply: Any) -> None:
-        self._newest, self._waits_for = max(self._newest, reply.step), reply.waits_for
+        self._newest, self._waits_for = max(self._newest, reply.step), for_terminal(reply.waits_for)
         ticks = []
         for piece in reply.parts:
             step = self._steps.get(piece.step)

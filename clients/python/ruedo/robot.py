@@ -480,14 +480,14 @@ class Robot:
         raise NotSupported(f"{self.name} takes no {type}")
 
     def _device(self, info: Any) -> Device[Any] | None:
-        for channel in self._channels:
-            if channel.device == info.name and not channel.input:
-                make = Camera if channel.type == "image_t" else Device
-                stream = self._connection.streams.get(
-                    channel, partial(make, self._connection, self.name, info, channel)
-                )
-                return stream if isinstance(stream, Device) else None
-        return None
+        channel = self._connection.info.device_channels.get((self.name, info.name))
+        if channel is None:
+            return None
+        make = Camera if channel.type == "image_t" else Device
+        stream = self._connection.streams.get(
+            channel, partial(make, self._connection, self.name, info, channel)
+        )
+        return stream if isinstance(stream, Device) else None
 
     def _first(self, type: str, what: str) -> Any:
         devices = self.devices

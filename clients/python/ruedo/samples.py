@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from . import lcmtypes, notebook
-from .errors import NotSupported
+from .errors import NotSupported, for_terminal
 from .geometry import Floats, Placed, transformed
 
 _PIXEL_FORMATS = {
@@ -621,7 +621,7 @@ def _contact(m: Any) -> Contact:
 
 
 def _collisions(m: Any) -> Collisions:
-    return Collisions(m.utime, m.blocked_by, _points(m))
+    return Collisions(m.utime, for_terminal(m.blocked_by), _points(m))
 
 
 def _joints(m: Any) -> Joints:

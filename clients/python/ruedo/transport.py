@@ -13,13 +13,15 @@ from urllib.parse import urlsplit
 import lcm
 
 from .address import check_reachable
-from .unix_transport import Receiver, UnixTransport
+from .stream_transport import Receiver, StreamTransport
 
 
 class Transport(Protocol):
     """receive() is called by one thread at a time, the rest by any, also while receive() waits or
     its receiver runs.
     """
+
+    loses_nothing: bool
 
     def subscribe(self, channel: str) -> None:
         """From the return on, every message of that channel is received."""
@@ -39,7 +41,7 @@ def open_transport(url: str) -> Transport:
     """Raises NoServer, with the cure, when nothing can come from that URL."""
     check_reachable(url)
     parts = urlsplit(url)
-    return UnixTransport(parts.path) if parts.scheme == "unix" else LcmTransport(url)
+    return StreamTransport(parts) if parts.scheme in ("tcpq", "unix") else LcmTransport(url)
 
 
 class LcmTransport:
@@ -49,15 +51,14 @@ class LcmTransport:
       subscription. Beside that, subscribe() has a subscription called before its fields are set,
       and unsubscribe() frees it: both crash.
     - lcm_unsubscribe() changes the list that a dispatch in another thread walks through.
-    - Over TCP publish(), subscribe() and handle() use one socket without a lock: they mix their
-      bytes, and one closes what another writes to.
-
     - A subscription and its LCM hold each other, out of sight of the garbage collector: an LCM with
       a subscription is never freed, nor is its thread, which goes on receiving.
 
     So one lock is around every call; what comes is handed over after it was released, waiting is
     done outside, and close() takes every subscription back.
     """
+
+    loses_nothing = False
 
     def __init__(self, url: str):
         self._lcm: lcm.LCM | None = lcm.LCM(url)  # None: closed
@@ -67,8 +68,7 @@ class LcmTransport:
         )  # multicast has a lock of its own
         self._subscriptions: dict[str, Any] = {}
         self._arrived: list[tuple[str, bytes]] = []
-        self._poll = select.poll()
-        self._polled = -1
+        self._poll: select.poll | None = None
 
     def subscribe(self, channel: str) -> None:
         escaped = "".join(
@@ -96,7 +96,7 @@ class LcmTransport:
             if self._wait(open_lcm, seconds):
                 with self._lock:
                     open_lcm.handle_timeout(0)
-        except OSError:  # TCP: the server is gone; those who wait find out by their timeouts
+        except OSError:  # those who wait find out by their timeouts
             time.sleep(min(seconds, 0.1))
         arrived, self._arrived = self._arrived, []
         if arrived:
@@ -115,13 +115,7 @@ class LcmTransport:
         self._arrived.append((channel, data))
 
     def _wait(self, open_lcm: lcm.LCM, seconds: float) -> bool:
-        file = open_lcm.fileno()
-        if file != self._polled:  # TCP: connected again
-            if self._polled >= 0:
-                self._poll.unregister(self._polled)
-            if file >= 0:
-                self._poll.register(file, select.POLLIN)
-            self._polled = file
-        if file < 0:  # TCP without a server: publish() tries to connect
-            raise OSError
+        if self._poll is None:  # not before the first subscription, which makes the socket
+            self._poll = select.poll()
+            self._poll.register(open_lcm.fileno(), select.POLLIN)
         return bool(self._poll.poll(math.ceil(seconds * 1e3)))

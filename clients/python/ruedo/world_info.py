@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from . import lcmtypes
-from .errors import TypeMismatch
+from .errors import CONTROL, TypeMismatch
 
 _HEAD = struct.Struct(">qqqihh")  # fingerprint, utime, run_id, epoch, part, nparts
 
@@ -38,6 +38,7 @@ class WorldInfo:
         self.robots: dict[str, Any] = {r.name: r for p in parts for r in p.robots}
         self.devices: dict[str, list[Any]] = defaultdict(list)  # by robot
         self.channels: dict[str, list[Any]] = defaultdict(list)  # by robot
+        self.device_channels: dict[tuple[str, str], Any] = {}  # the first output of each
         self.channel_list: list[Any] = [
             c for p in parts for c in p.channels
         ]  # as ruedo/tick counts them
@@ -53,6 +54,22 @@ class WorldInfo:
                 self.devices[device.robot].append(device)
             for channel in part.channels:
                 self.channels[channel.robot].append(channel)
+                if not channel.input:
+                    self.device_channels.setdefault((channel.robot, channel.device), channel)
+
+
+def _refuse_control_characters(part: Any) -> None:
+    """Names are printed, and a terminal obeys control characters."""
+    names = [part.version, part.world]
+    for robot in part.robots:
+        names += [robot.name, robot.model, robot.drive, *robot.wheels]
+    for device in part.devices:
+        names += [device.robot, device.name, device.kind]
+    for channel in part.channels:
+        names += [channel.name, channel.robot, channel.device, channel.type]
+    names += [body.name for body in part.bodies]
+    if CONTROL.search("".join(names)):
+        raise ValueError("a name with control characters")
 
 
 class WorldInfoAssembler:
@@ -94,7 +111,10 @@ class WorldInfoAssembler:
         if content == self._last:
             return None
         try:
-            info = WorldInfo([lcmtypes.world_info_t.decode(p) for p in parts])
+            decoded = [lcmtypes.world_info_t.decode(p) for p in parts]
+            for part_info in decoded:
+                _refuse_control_characters(part_info)
+            info = WorldInfo(decoded)
         except Exception as error:
             raise TypeMismatch(
                 f"a message on ruedo/info is no valid world_info_t ({error})"

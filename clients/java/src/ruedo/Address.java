@@ -126,7 +126,7 @@ final class Address {
     }
 
     private void probe() throws IOException {
-        StreamSocket.connect(this).close();
+        new StreamSocket(this).close();
     }
 
     /** False for a tcpq or unix address where nobody listens. */

@@ -337,7 +337,7 @@ final class Conversions {
     }
 
     private static Sample collisions(WireReader in) throws IOException {
-        return new Collisions(in.int64(), in.string(), contactPoints(in));
+        return new Collisions(in.int64(), in.text(), contactPoints(in));
     }
 
     private static Sample joints(WireReader in) throws IOException {

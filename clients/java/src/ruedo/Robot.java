@@ -82,11 +82,8 @@ public final class Robot {
         WorldInfo known = sim.info();
         List<Device<?>> found = new ArrayList<>();
         for (device_info_t device : known.devices(name)) {
-            for (channel_info_t channel : known.channels(name)) {
-                if (channel.input || !channel.device.equals(device.name)) continue;
-                found.add(device(device, channel));
-                break;
-            }
+            channel_info_t channel = known.channelOf(name, device.name);
+            if (channel != null) found.add(device(device, channel));
         }
         return found;
     }

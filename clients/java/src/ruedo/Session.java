@@ -77,7 +77,7 @@ final class Session {
             received.sequence = in.int64();
             received.kind = in.int32();
             received.code = in.int32();
-            received.text = in.string();
+            received.text = in.text();
             received.body = in.bytes(in.count(1));
         } catch (IOException error) {
             return;

@@ -2,9 +2,11 @@ package ruedo;
 
 import ruedo.lcmtypes.channel_info_t;
 import ruedo.lcmtypes.grant_command_t;
+import ruedo.lcmtypes.grant_reply_t;
 import ruedo.lcmtypes.grant_request_t;
 import ruedo.lcmtypes.reply_t;
 import ruedo.lcmtypes.request_t;
+import ruedo.lcmtypes.resend_reply_t;
 import ruedo.lcmtypes.resend_request_t;
 import ruedo.lcmtypes.resend_wanted_t;
 import ruedo.lcmtypes.tick_t;
@@ -28,6 +30,8 @@ final class Stepper {
     private static final long ACKNOWLEDGED_TOGETHER = 32; // steps
     private static final int MOST_WANTED = 256; // messages asked for at once
     private static final int MOST_EARLY = 512; // messages of one channel that wait for their ticks
+    private static final int MOST_CHANNELS = 1 << 16; // more cannot be subscribed
+    private static final int MOST_PARTS = 1024; // of a tick
     private static final long MOST_AHEAD = 1024; // steps beyond what is here: no server is that far
 
     /** Of a manifest. */
@@ -160,7 +164,8 @@ final class Stepper {
         synchronized (this) {
             try {
                 WireReader in = new WireReader(reply.body);
-                in.int64(); // fingerprint
+                if (in.int64() != grant_reply_t.LCM_FINGERPRINT)
+                    throw new IOException("another version of the type");
                 granted = in.int64();
                 have = in.int64();
                 newest = in.int64();
@@ -408,7 +413,7 @@ final class Stepper {
         long hash = in.int64();
         int index = in.int16();
         int nparts = in.int16();
-        if (run != runId || index < 0 || index >= nparts) return;
+        if (run != runId || index < 0 || index >= nparts || nparts > MOST_PARTS) return;
         if (tickEpoch != epoch) {
             onOtherEpoch(tickEpoch);
             return;
@@ -455,8 +460,8 @@ final class Stepper {
         entry.sequence = in.int64();
         entry.size = in.int32();
         entry.crc = in.int32();
-        if (entry.channel < 0 || entry.channel >= 1 << 20)
-            throw new IOException("a channel's index");
+        if (entry.channel < 0 || entry.channel >= MOST_CHANNELS || entry.size < 0)
+            throw new IOException("no message");
         while (entry.channel >= early.size())
             early.add(new ArrayDeque<>()); // of a model that came since
         Iterator<Early> all = early.get(entry.channel).iterator();
@@ -508,9 +513,10 @@ final class Stepper {
     }
 
     private void takePieces(WireReader in) throws IOException {
-        in.int64(); // fingerprint
+        if (in.int64() != resend_reply_t.LCM_FINGERPRINT)
+            throw new IOException("another version of the type");
         newest = Math.max(newest, in.int64());
-        waitsFor = in.string();
+        waitsFor = in.text();
         int count = in.count(32);
         List<byte[]> ticks = new ArrayList<>();
         for (int n = count; n > 0; n--) {

@@ -3,106 +3,141 @@ package ruedo;
 import java.io.Closeable;
 import java.io.IOException;
 import java.io.InputStream;
+import java.io.InterruptedIOException;
+import java.lang.reflect.Method;
+import java.net.InetAddress;
 import java.net.InetSocketAddress;
-import java.net.Socket;
+import java.net.ProtocolFamily;
 import java.net.SocketAddress;
+import java.net.StandardProtocolFamily;
+import java.net.StandardSocketOptions;
 import java.nio.ByteBuffer;
+import java.nio.channels.ClosedSelectorException;
+import java.nio.channels.SelectionKey;
+import java.nio.channels.Selector;
 import java.nio.channels.SocketChannel;
 
-/** A stream socket to a server: TCP or Unix-domain. One thread may read while another writes. */
-abstract class StreamSocket implements Closeable {
-    abstract InputStream input() throws IOException;
+/**
+ * A connection to a server: over TCP, or a Unix-domain socket. One thread reads while another
+ * writes. What the server does not take within seconds is an IOException.
+ */
+final class StreamSocket implements Closeable {
+    private static final long SENDING_MILLIS = 5000;
 
-    abstract void write(byte[] bytes, int size) throws IOException;
-
-    /** Milliseconds until a read gives up; 0: never. */
-    abstract void setTimeout(int millis) throws IOException;
+    private final SocketChannel channel;
+    private final Selector reads = Selector.open();
+    private final Selector writes = Selector.open();
+    private volatile long readMillis; // 0: without end
 
     /** Throws IOException when nobody serves there. */
-    static StreamSocket connect(Address address) throws IOException {
-        return address.path != null ? new Local(address.path) : new Tcp(address);
+    StreamSocket(Address address) throws IOException {
+        channel = address.path != null ? local() : SocketChannel.open();
+        try {
+            channel.configureBlocking(false);
+            channel.register(reads, SelectionKey.OP_READ);
+            if (address.path == null) channel.setOption(StandardSocketOptions.TCP_NODELAY, true);
+            connect(
+                    address.path != null
+                            ? pathOf(address.path)
+                            : new InetSocketAddress(
+                                    InetAddress.getByName(address.host), address.port));
+        } catch (IOException error) {
+            close();
+            throw error;
+        }
     }
 
-    private static final class Tcp extends StreamSocket {
-        private final Socket socket = new Socket();
+    private void connect(SocketAddress to) throws IOException {
+        if (!channel.connect(to)) {
+            SelectionKey key = channel.register(writes, SelectionKey.OP_CONNECT);
+            await(writes, new Deadline(SENDING_MILLIS * 1e-3));
+            if (!channel.finishConnect()) throw new IOException("nobody answers");
+            key.interestOps(SelectionKey.OP_WRITE);
+        } else {
+            channel.register(writes, SelectionKey.OP_WRITE);
+        }
+    }
 
-        Tcp(Address address) throws IOException {
-            try {
-                socket.connect(new InetSocketAddress(address.host, address.port), 2000);
-                socket.setTcpNoDelay(true);
-            } catch (IOException error) {
-                socket.close();
-                throw error;
+    InputStream input() {
+        return new InputStream() {
+            @Override
+            public int read() throws IOException {
+                byte[] one = new byte[1];
+                return read(one, 0, 1) < 0 ? -1 : one[0] & 0xff;
             }
-        }
 
-        @Override
-        InputStream input() throws IOException {
-            return socket.getInputStream();
-        }
+            @Override
+            public int read(byte[] into, int at, int most) throws IOException {
+                if (most == 0) return 0;
+                ByteBuffer room = ByteBuffer.wrap(into, at, most);
+                Deadline deadline =
+                        new Deadline(
+                                readMillis == 0 ? Double.POSITIVE_INFINITY : readMillis * 1e-3);
+                for (; ; ) {
+                    int got = channel.read(room);
+                    if (got != 0) return got;
+                    await(reads, deadline);
+                }
+            }
+        };
+    }
 
-        @Override
-        void write(byte[] bytes, int size) throws IOException {
-            socket.getOutputStream().write(bytes, 0, size);
+    void write(byte[] bytes, int size) throws IOException {
+        ByteBuffer left = ByteBuffer.wrap(bytes, 0, size);
+        Deadline deadline = new Deadline(SENDING_MILLIS * 1e-3);
+        while (left.hasRemaining()) {
+            if (channel.write(left) == 0) await(writes, deadline);
         }
+    }
 
-        @Override
-        void setTimeout(int millis) throws IOException {
-            socket.setSoTimeout(millis);
-        }
+    /** Until input() gives up, milliseconds; 0: never. */
+    void setTimeout(int millis) {
+        readMillis = millis;
+    }
 
-        @Override
-        public void close() throws IOException {
-            socket.close();
+    /** A reader or writer in another thread ends with an IOException. */
+    @Override
+    public void close() throws IOException {
+        channel.close();
+        reads.close();
+        writes.close();
+    }
+
+    /** Until something may be done; an interrupt is put off. */
+    private static void await(Selector selector, Deadline deadline) throws IOException {
+        boolean interrupted = Thread.interrupted();
+        try {
+            do {
+                if (deadline.passed()) throw new InterruptedIOException("it takes too long");
+                selector.select(1000);
+                interrupted |= Thread.interrupted();
+            } while (selector.selectedKeys().isEmpty());
+            selector.selectedKeys().clear();
+        } catch (ClosedSelectorException error) {
+            throw new IOException("it was closed", error);
+        } finally {
+            if (interrupted) Thread.currentThread().interrupt();
         }
     }
 
     /** Java 16 has these sockets; this library is for 11. */
-    private static final class Local extends StreamSocket {
-        private final SocketChannel channel;
-
-        Local(String path) throws IOException {
-            Object address;
-            try {
-                address =
-                        Class.forName("java.net.UnixDomainSocketAddress")
-                                .getMethod("of", String.class)
-                                .invoke(null, path);
-            } catch (ReflectiveOperationException error) {
-                throw new IOException("unix:// addresses need Java 16 or later", error);
-            }
-            channel = SocketChannel.open((SocketAddress) address);
+    private static SocketChannel local() throws IOException {
+        try {
+            Method open = SocketChannel.class.getMethod("open", ProtocolFamily.class);
+            return (SocketChannel) open.invoke(null, StandardProtocolFamily.valueOf("UNIX"));
+        } catch (ReflectiveOperationException | IllegalArgumentException error) {
+            throw new IOException("unix:// addresses need Java 16 or later", error);
         }
+    }
 
-        // The streams of java.nio.channels.Channels would make a writer wait for the reader.
-        @Override
-        InputStream input() {
-            return new InputStream() {
-                @Override
-                public int read() throws IOException {
-                    byte[] one = new byte[1];
-                    return read(one, 0, 1) < 0 ? -1 : one[0] & 0xff;
-                }
-
-                @Override
-                public int read(byte[] into, int at, int most) throws IOException {
-                    return most == 0 ? 0 : channel.read(ByteBuffer.wrap(into, at, most));
-                }
-            };
-        }
-
-        @Override
-        void write(byte[] bytes, int size) throws IOException {
-            ByteBuffer left = ByteBuffer.wrap(bytes, 0, size);
-            while (left.hasRemaining()) channel.write(left);
-        }
-
-        @Override
-        void setTimeout(int millis) {} // a server on this machine answers
-
-        @Override
-        public void close() throws IOException {
-            channel.close();
+    private static SocketAddress pathOf(String path) throws IOException {
+        try {
+            return (SocketAddress)
+                    Class.forName("java.net.UnixDomainSocketAddress")
+                            .getMethod("of", String.class)
+                            .invoke(null, path);
+        } catch (ReflectiveOperationException error) {
+            throw new IOException(path + " is no path of a socket", error);
         }
     }
 }

@@ -17,7 +17,7 @@ interface Transport {
     /** Throws NoServer, with the cure, when nothing can come from there. */
     static Transport open(Address address) {
         address.checkReachable();
-        return address.multicast ? new UdpmTransport(address) : new TcpqTransport(address);
+        return address.multicast ? new UdpmTransport(address) : new StreamTransport(address);
     }
 
     /** Begins to receive. */

@@ -86,6 +86,19 @@ final class WireReader {
         return new String(text, 0, length - 1, StandardCharsets.UTF_8);
     }
 
+    /** A string that is printed: a terminal obeys control characters, so a name has none. */
+    String name() throws IOException {
+        String text = string();
+        if (text.chars().anyMatch(Character::isISOControl))
+            throw new IOException("a name with control characters");
+        return text;
+    }
+
+    /** A string that is printed; '?' stands for each control character but line ends and tabs. */
+    String text() throws IOException {
+        return string().replaceAll("[\\p{Cc}&&[^\n\t]]", "?");
+    }
+
     byte[] bytes(int n) throws IOException {
         byte[] values = new byte[fits(n, 1)];
         bytes.get(values);
@@ -120,6 +133,13 @@ final class WireReader {
         fits(n, 5);
         List<String> values = new ArrayList<>();
         for (int i = 0; i < n; i++) values.add(string());
+        return values;
+    }
+
+    List<String> names(int n) throws IOException {
+        fits(n, 5);
+        List<String> values = new ArrayList<>();
+        for (int i = 0; i < n; i++) values.add(name());
         return values;
     }
 }

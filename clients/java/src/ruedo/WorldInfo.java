@@ -24,6 +24,7 @@ final class WorldInfo {
     final int tickChannel; // in that list; -1: there is none
     private final Map<String, List<device_info_t>> devices = new HashMap<>();
     private final Map<String, List<channel_info_t>> channels = new HashMap<>();
+    private final Map<String, Map<String, channel_info_t>> deviceChannels = new HashMap<>();
 
     private WorldInfo(List<world_info_t> parts) {
         head = parts.get(0);
@@ -39,6 +40,11 @@ final class WorldInfo {
             }
             for (channel_info_t channel : part.channels) {
                 channels.computeIfAbsent(channel.robot, key -> new ArrayList<>()).add(channel);
+                if (!channel.input) {
+                    deviceChannels
+                            .computeIfAbsent(channel.robot, key -> new HashMap<>())
+                            .putIfAbsent(channel.device, channel);
+                }
                 if (channel.type.equals("tick_t")) tick = channelList.size();
                 channelList.add(channel);
             }
@@ -55,6 +61,11 @@ final class WorldInfo {
         return channels.getOrDefault(robot, List.of());
     }
 
+    /** The first that carries a device's samples; null: none does. */
+    channel_info_t channelOf(String robot, String device) {
+        return deviceChannels.getOrDefault(robot, Map.of()).get(device);
+    }
+
     boolean supports(int kind) {
         return (head.features >> kind & 1) != 0;
     }
@@ -67,8 +78,8 @@ final class WorldInfo {
         part.epoch = in.int32();
         part.part = in.int16();
         part.nparts = in.int16();
-        part.version = in.string();
-        part.world = in.string();
+        part.version = in.name();
+        part.world = in.name();
         part.seed = in.int64();
         part.step_us = in.int64();
         part.features = in.int64();
@@ -86,9 +97,9 @@ final class WorldInfo {
 
     private static robot_info_t readRobot(WireReader in) throws IOException {
         robot_info_t robot = new robot_info_t();
-        robot.name = in.string();
-        robot.model = in.string();
-        robot.drive = in.string();
+        robot.name = in.name();
+        robot.model = in.name();
+        robot.drive = in.name();
         robot.body = in.int32();
         robot.wheel_radius = in.float64();
         robot.track = in.float64();
@@ -99,16 +110,16 @@ final class WorldInfo {
         robot.turn_acceleration = in.float64();
         robot.watchdog_us = in.int64();
         int n = in.count(5 + 1);
-        robot.wheels = in.strings(n).toArray(new String[0]);
+        robot.wheels = in.names(n).toArray(new String[0]);
         robot.left = in.bools(n);
         return robot;
     }
 
     private static device_info_t readDevice(WireReader in) throws IOException {
         device_info_t device = new device_info_t();
-        device.robot = in.string();
-        device.name = in.string();
-        device.kind = in.string();
+        device.robot = in.name();
+        device.name = in.name();
+        device.kind = in.name();
         device.rate = in.float64();
         device.position = in.doubles(3);
         device.orientation = in.doubles(4);
@@ -126,7 +137,7 @@ final class WorldInfo {
     private static body_info_t readBody(WireReader in) throws IOException {
         body_info_t body = new body_info_t();
         body.index = in.int32();
-        body.name = in.string();
+        body.name = in.name();
         body.is_static = in.bool();
         body.mass = in.float64();
         return body;
@@ -134,10 +145,10 @@ final class WorldInfo {
 
     private static channel_info_t readChannel(WireReader in) throws IOException {
         channel_info_t channel = new channel_info_t();
-        channel.name = in.string();
-        channel.robot = in.string();
-        channel.device = in.string();
-        channel.type = in.string();
+        channel.name = in.name();
+        channel.robot = in.name();
+        channel.device = in.name();
+        channel.type = in.name();
         channel.fingerprint = in.int64();
         channel.rate = in.float64();
         channel.input = in.bool();

@@ -1,8 +1,10 @@
-#include "unix_transport.h"
+#include "stream_transport.h"
 
 #include <algorithm>
 #include <thread>
 
+#include "bus/stream_socket.h"
+#include "bus/unix_socket.h"
 #include "ruedo/client.h"
 #include "ruedo/errors.h"
 
@@ -12,9 +14,19 @@ namespace {
 constexpr std::chrono::milliseconds kAgain(100);
 constexpr std::chrono::microseconds kLookTime(50);
 
+bus::FileHandle socket_to(const Address& address) {
+  if (address.scheme == "unix") return bus::connect_unix(address.host);
+  std::string why;
+  bus::FileHandle socket = bus::connect_tcp(address.host, address.port, why);
+  if (!socket)
+    throw EnvironmentError("nothing listens at tcpq://" + address.host + ":" + address.port + " (" +
+                           why + ")");
+  return socket;
+}
+
 }  // namespace
 
-UnixTransport::UnixTransport(const std::string& path) : path_(path) {
+StreamTransport::StreamTransport(const Address& address) : address_(address) {
   try {
     connect();
   } catch (const EnvironmentError& error) {
@@ -22,42 +34,41 @@ UnixTransport::UnixTransport(const std::string& path) : path_(path) {
   }
 }
 
-void UnixTransport::connect() {
-  auto made = std::make_shared<bus::UnixConnection>(path_);
+void StreamTransport::connect() {
+  auto made = std::make_shared<bus::StreamConnection>(socket_to(address_));
+  const std::lock_guard lock(mutex_);
   for (const std::string& channel : channels_) made->subscribe(channel);
   connection_ = std::move(made);
 }
 
-std::shared_ptr<bus::UnixConnection> UnixTransport::connection() {
+std::shared_ptr<bus::StreamConnection> StreamTransport::connection() {
   const std::lock_guard lock(mutex_);
   return connection_;
 }
 
-void UnixTransport::subscribe(const std::string& channel) {
+void StreamTransport::subscribe(const std::string& channel) {
   const std::lock_guard lock(mutex_);
   channels_.insert(channel);
   if (connection_) connection_->subscribe(channel);
 }
 
-void UnixTransport::unsubscribe(const std::string& channel) {
+void StreamTransport::unsubscribe(const std::string& channel) {
   const std::lock_guard lock(mutex_);
   channels_.erase(channel);
   if (connection_) connection_->unsubscribe(channel);
 }
 
-void UnixTransport::publish(const std::string& channel, const uint8_t* bytes, size_t size) {
+void StreamTransport::publish(const std::string& channel, const uint8_t* bytes, size_t size) {
   if (const auto open = connection()) open->publish(channel, bytes, size);
 }
 
-bool UnixTransport::receive(std::chrono::milliseconds timeout, const Receiver& receiver) {
+bool StreamTransport::receive(std::chrono::milliseconds timeout, const Receiver& receiver) {
   const auto open = connection();
   if (!open) {  // those who wait find out by their timeouts
     std::this_thread::sleep_for(std::min(timeout, kAgain));
-    const std::lock_guard lock(mutex_);
     try {
       connect();
     } catch (const EnvironmentError&) {
-      return false;
     }
     return false;
   }

@@ -13,7 +13,7 @@ import java.util.Set;
  * back. LCM's own class for it is not used: it walks through its subscriptions while others add to
  * them, and its thread ends by that, or by an Error in a callback.
  */
-final class TcpqTransport implements Transport {
+final class StreamTransport implements Transport {
     private static final int CLIENT = 0x287617fb;
     private static final int SERVER = 0x287617fa;
     private static final int VERSION = 0x0100;
@@ -21,7 +21,7 @@ final class TcpqTransport implements Transport {
     private static final int SUBSCRIBE = 2;
     private static final int UNSUBSCRIBE = 3;
     private static final int LONGEST_CHANNEL = 1 << 10; // bytes
-    private static final int LONGEST = 256 << 20;
+    private static final int LONGEST = 64 << 20;
     private static final long AGAIN_MILLIS = 500;
 
     private final Address address;
@@ -30,7 +30,7 @@ final class TcpqTransport implements Transport {
     private StreamSocket socket; // null: not connected
     private volatile boolean closed;
 
-    TcpqTransport(Address address) {
+    StreamTransport(Address address) {
         this.address = address;
         try {
             connect();
@@ -104,7 +104,7 @@ final class TcpqTransport implements Transport {
     }
 
     private synchronized void connect() throws IOException {
-        StreamSocket made = StreamSocket.connect(address);
+        StreamSocket made = new StreamSocket(address);
         try {
             made.setTimeout(2000);
             made.write(ByteBuffer.allocate(8).putInt(CLIENT).putInt(VERSION).array(), 8);

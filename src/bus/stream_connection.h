@@ -1,5 +1,5 @@
-// A client's end of a Unix-domain socket: connects, sends, and parses what was received (see
-// unix_server.h).
+// A client's end of a stream of tcpq's frames, over TCP or a Unix-domain socket: sends, and parses
+// what was received (see tcpq_wire.h).
 //
 // Safe to publish and subscribe from any thread; take() from one at a time.
 #pragma once
@@ -7,7 +7,6 @@
 #include <cstdint>
 #include <functional>
 #include <mutex>
-#include <string>
 #include <string_view>
 #include <vector>
 
@@ -15,14 +14,14 @@
 
 namespace ruedo::bus {
 
-class UnixConnection {
+class StreamConnection {
  public:
   using Handler = std::function<void(std::string_view channel, const uint8_t* data, size_t size)>;
 
-  // Throws EnvironmentError when no server listens there.
-  explicit UnixConnection(const std::string& path);
+  // socket: connected, made by stream_socket().
+  explicit StreamConnection(FileHandle socket);
 
-  // False when the server is gone, for good.
+  // False when the server is gone or takes nothing: the connection is over.
   bool publish(std::string_view channel, const uint8_t* data, size_t size);
   bool subscribe(std::string_view name);  // a channel's, no pattern
   bool unsubscribe(std::string_view name);

@@ -1,13 +1,13 @@
-#include "bus/unix_connection.h"
+#include "bus/stream_connection.h"
 
 #include <cerrno>
 #include <cstring>
+#include <utility>
 
 #include <poll.h>
 #include <sys/socket.h>
 
 #include "bus/tcpq_wire.h"
-#include "bus/unix_socket.h"
 
 namespace ruedo::bus {
 namespace {
@@ -21,43 +21,46 @@ uint32_t number(const uint8_t* b) {
 
 }  // namespace
 
-UnixConnection::UnixConnection(const std::string& path) : socket_(connect_unix(path)) {
+StreamConnection::StreamConnection(FileHandle socket) : socket_(std::move(socket)) {
   send(tcpq::client_hello());
   buffer_.resize(kRoom);
 }
 
-bool UnixConnection::send(const std::vector<uint8_t>& bytes) {
+bool StreamConnection::send(const std::vector<uint8_t>& bytes) {
   for (size_t sent = 0; sent < bytes.size();) {
     const ssize_t count = ::send(socket_.get(), &bytes[sent], bytes.size() - sent, MSG_NOSIGNAL);
     if (count < 0 && errno == EINTR) continue;
-    if (count < 0) return false;
+    if (count < 0) {  // part of a frame may be there: nothing sensible can follow
+      ::shutdown(socket_.get(), SHUT_RDWR);
+      return false;
+    }
     sent += static_cast<size_t>(count);
   }
   return true;
 }
 
-bool UnixConnection::publish(std::string_view channel, const uint8_t* data, size_t size) {
+bool StreamConnection::publish(std::string_view channel, const uint8_t* data, size_t size) {
   const std::lock_guard lock(sending_);
   frame_.clear();
   tcpq::append_publish(frame_, channel, {data, size});
   return send(frame_);
 }
 
-bool UnixConnection::subscribe(std::string_view name) {
+bool StreamConnection::subscribe(std::string_view name) {
   const std::lock_guard lock(sending_);
   frame_.clear();
   tcpq::append_subscribe(frame_, name);
   return send(frame_);
 }
 
-bool UnixConnection::unsubscribe(std::string_view name) {
+bool StreamConnection::unsubscribe(std::string_view name) {
   const std::lock_guard lock(sending_);
   frame_.clear();
   tcpq::append_unsubscribe(frame_, name);
   return send(frame_);
 }
 
-bool UnixConnection::take(int timeout_ms, const Handler& handler) {
+bool StreamConnection::take(int timeout_ms, const Handler& handler) {
   if (over_) return false;
   pollfd waiting{socket_.get(), POLLIN, 0};
   if (timeout_ms != 0 && ::poll(&waiting, 1, timeout_ms) <= 0) return false;
@@ -73,7 +76,10 @@ bool UnixConnection::take(int timeout_ms, const Handler& handler) {
   if (over_) return false;
   end_ += static_cast<size_t>(count);
   bool any = false;
-  if (!greeted_ && end_ >= 8) greeted_ = true, begin_ = 8;
+  if (!greeted_ && end_ >= 8) {
+    if (number(buffer_.data()) != tcpq::kServerMagic) return over_ = true, false;
+    greeted_ = true, begin_ = 8;
+  }
   while (greeted_ && end_ - begin_ >= 12) {
     const uint8_t* frame = &buffer_[begin_];
     const size_t name = number(frame + 4);

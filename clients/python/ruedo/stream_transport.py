@@ -1,56 +1,73 @@
-"""A Unix-domain socket to a server on this machine: no other user reads it, nothing is lost, and it
-is faster.
+"""tcpq's frames, over TCP or over a Unix-domain socket to a server on this machine: no other user
+reads that, nothing is lost, and it is faster.
 
-The frames are those of LCM's tcpq. All that a server publishes at once comes in one piece, and is
-taken apart here.
+All that a server publishes at once comes in one piece, and is taken apart here. LCM's own TCP is
+not used: it waits for the rest of a message without end, and takes memory for whatever length a
+server names.
 """
 
 from __future__ import annotations
 
 import contextlib
+import errno
 import math
+import os
 import select
 import socket
 import struct
 import threading
 import time
 from collections.abc import Callable
+from urllib.parse import SplitResult
 
 from . import arrivals
 
 Receiver = Callable[[arrivals.Arrived], None]
 
 _HELLO = struct.pack(">II", 0x287617FB, 0x0100)
+_SERVER = struct.pack(">I", 0x287617FA)  # its hello begins with that
+_PATIENCE = struct.pack("ll", 5, 0)  # s, us: of connecting and sending, as a timeval
 _HEAD = struct.Struct(">II")  # kind, length of the channel's name
 _SIZE = struct.Struct(">I")
 _PUBLISH, _SUBSCRIBE, _UNSUBSCRIBE = 1, 2, 3
 _CHUNK = 1 << 18  # bytes received at a time
 
 
-def connect(path: str) -> socket.socket:
-    """Raises OSError when nobody serves there."""
-    end = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
+def connect(url: SplitResult) -> socket.socket:
+    """To a tcpq or unix URL. Raises OSError when nobody serves there."""
+    local = url.scheme == "unix"
+    end = socket.socket(socket.AF_UNIX if local else socket.AF_INET, socket.SOCK_STREAM)
     try:
-        end.connect(path)
+        # A server that takes nothing holds nobody up for longer.
+        end.setsockopt(socket.SOL_SOCKET, socket.SO_SNDTIMEO, _PATIENCE)
+        if local:
+            end.connect(url.path)
+        else:
+            end.connect((url.hostname or "127.0.0.1", url.port or 7700))
+            end.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+    except BlockingIOError as error:
+        end.close()
+        raise TimeoutError(errno.ETIMEDOUT, os.strerror(errno.ETIMEDOUT)) from error
     except OSError:
         end.close()
         raise
     return end
 
 
-def is_served(path: str) -> bool:
+def is_served(url: SplitResult) -> bool:
     try:
-        connect(path).close()
+        connect(url).close()
     except OSError:
         return False
     return True
 
 
-class UnixTransport:
+class StreamTransport:
     """Connects again when the server comes back."""
 
-    def __init__(self, path: str):
-        self._path = path
+    def __init__(self, url: SplitResult):
+        self.loses_nothing = url.scheme == "unix"
+        self._url = url
         self._lock = threading.Lock()  # of what is sent, and of the connection
         self._channels: set[str] = set()
         self._names: dict[bytes, str] = {}  # of channels that came
@@ -78,10 +95,9 @@ class UnixTransport:
         connection = self._socket
         if connection is None:  # those who wait find out by their timeouts
             time.sleep(min(seconds, 0.1))
-            with self._lock:
-                if not self._closed:
-                    with contextlib.suppress(OSError):
-                        self._connect()
+            if not self._closed:
+                with contextlib.suppress(OSError):
+                    self._connect()
             return False
         try:
             if not self._poll.poll(math.ceil(seconds * 1e3)):
@@ -108,21 +124,29 @@ class UnixTransport:
             connection.close()
 
     def _connect(self) -> None:
-        self._socket = connect(self._path)
-        self._poll = select.poll()
-        self._poll.register(self._socket, select.POLLIN)
-        self._rest, self._greeted = b"", False
-        self._send(
-            _HELLO + b"".join(_named(_SUBSCRIBE, _pattern(channel)) for channel in self._channels)
-        )
+        made = connect(self._url)
+        with self._lock:
+            if self._closed:
+                made.close()
+                return
+            self._socket = made
+            self._poll = select.poll()
+            self._poll.register(made, select.POLLIN)
+            self._rest, self._greeted = b"", False
+            self._send(
+                _HELLO
+                + b"".join(_named(_SUBSCRIBE, _pattern(channel)) for channel in self._channels)
+            )
 
     def _send(self, frames: bytes) -> None:
         connection = self._socket  # close() in another thread takes it away
+        if connection is None:
+            return
         try:
-            if connection is not None:
-                connection.sendall(frames)
-        except OSError:
-            pass  # receive() notices
+            connection.sendall(frames)
+        except OSError:  # part of a frame may be there: nothing sensible can follow
+            with contextlib.suppress(OSError):
+                connection.shutdown(socket.SHUT_RDWR)  # receive() notices
 
     def _taken_apart(self, came: bytes) -> arrivals.Arrived | None:
         """The whole messages; None for what no server of Ruedo's sends."""
@@ -132,6 +156,8 @@ class UnixTransport:
             if len(data) < 8:
                 self._rest = data
                 return []
+            if not data.startswith(_SERVER):
+                return None
             self._greeted, at = True, 8
         taken = arrivals.take_apart(data, at, self._names)
         if taken is None:

@@ -1,0 +1,39 @@
+// tcpq's frames, over TCP or over a Unix-domain socket to a server on this machine: no other user
+// reads that, nothing is lost, and it is faster.
+//
+// LCM's own TCP is not used: it waits for the rest of a message without end, and takes memory for
+// whatever length a server names.
+#pragma once
+
+#include <memory>
+#include <mutex>
+#include <set>
+#include <string>
+
+#include "address.h"
+#include "bus/stream_connection.h"
+#include "transport.h"
+
+namespace ruedo::client {
+
+// Connects again when the server comes back.
+class StreamTransport : public Transport {
+ public:
+  explicit StreamTransport(const Address& address);  // throws NoServer
+
+  void subscribe(const std::string& channel) override;
+  void unsubscribe(const std::string& channel) override;
+  void publish(const std::string& channel, const uint8_t* bytes, size_t size) override;
+  bool receive(std::chrono::milliseconds timeout, const Receiver& receiver) override;
+
+ private:
+  std::shared_ptr<bus::StreamConnection> connection();
+  void connect();  // throws EnvironmentError
+
+  const Address address_;
+  std::mutex mutex_;
+  std::shared_ptr<bus::StreamConnection> connection_;  // null: there is no server
+  std::set<std::string> channels_;
+};
+
+}  // namespace ruedo::client

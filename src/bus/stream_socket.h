@@ -1,0 +1,17 @@
+// Sockets to a server: over TCP, or on this machine.
+#pragma once
+
+#include <string>
+
+#include "bus/file_handle.h"
+
+namespace ruedo::bus {
+
+// A stream socket whose connect() and send() give up after some seconds: a server that takes
+// nothing holds nobody up for longer.
+FileHandle stream_socket(int family);
+
+// Connects to a TCP server; empty when nobody answers, and `why` says what is wrong.
+FileHandle connect_tcp(const std::string& host, const std::string& port, std::string& why);
+
+}  // namespace ruedo::bus

@@ -1,0 +1,114 @@
+"""A server of tcpq frames that lies, over TCP or a Unix-domain socket, in a thread of a test."""
+
+from __future__ import annotations
+
+import contextlib
+import socket
+import struct
+import threading
+from collections.abc import Callable
+
+from ruedo import lcmtypes
+
+HELLO = struct.pack(">II", 0x287617FA, 0x0100)
+_MOST_STEPS = 1024
+
+
+def frame(channel: str, data: bytes, size: int | None = None) -> bytes:
+    """size: what the frame says of its length."""
+    name = channel.encode()
+    return (
+        struct.pack(">II", 1, len(name))
+        + name
+        + struct.pack(">I", len(data) if size is None else size)
+        + data
+    )
+
+
+def _tick(step: int, nparts: int) -> bytes:
+    tick = lcmtypes.tick_t()
+    tick.utime, tick.run_id, tick.step, tick.nparts = 50000 + step, 7, step, nparts
+    return tick.encode()
+
+
+def grants_and_huge_ticks(request) -> bytes:
+    """Answers JOIN and GRANT, then sends a part of each of a thousand ticks of 32767 parts."""
+    reply = lcmtypes.reply_t()
+    reply.run_id, reply.session, reply.sequence = 7, 5, request.sequence
+    reply.epoch, reply.kind, reply.code = 0, request.kind, reply.OK
+    if request.kind == request.GRANT:
+        body = lcmtypes.grant_reply_t()
+        body.granted = body.step = 0
+        reply.body = body.encode()
+        reply.size = len(reply.body)
+    answer = frame("ruedo/reply", reply.encode())
+    if request.kind == request.GRANT:
+        answer += b"".join(
+            frame("ruedo/tick", _tick(step, 32767)) for step in range(1, _MOST_STEPS)
+        )
+    return answer
+
+
+class LyingStream:
+    """Sends `sent` to everybody who connects, and what `answer` makes of each request; reads
+    nothing where that is None, and never closes.
+    """
+
+    def __init__(
+        self, url: str, sent: bytes, answer: Callable[[lcmtypes.request_t], bytes] | None = None
+    ):
+        self.url, self._sent, self._answer = url, sent, answer
+        scheme, _, where = url.partition("://")
+        if scheme == "unix":
+            self._listening = socket.socket(socket.AF_UNIX)
+            self._listening.bind(where)
+        else:
+            host, port = where.split(":")
+            self._listening = socket.create_server((host, int(port)))
+        self._listening.listen(100)
+        self._open: list[socket.socket] = []
+        threading.Thread(target=self._accept, daemon=True).start()
+
+    def __enter__(self) -> LyingStream:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        for one in [self._listening, *self._open]:
+            with contextlib.suppress(OSError):
+                one.shutdown(socket.SHUT_RDWR)
+            one.close()
+
+    def _accept(self) -> None:
+        with contextlib.suppress(OSError):
+            while True:
+                client = self._listening.accept()[0]
+                self._open.append(client)
+                threading.Thread(target=self._serve, args=(client,), daemon=True).start()
+
+    def _serve(self, client: socket.socket) -> None:
+        with contextlib.suppress(OSError):
+            client.sendall(self._sent)
+            if self._answer is None:
+                return
+            data = b""
+            while came := client.recv(1 << 16):
+                data = self._taken(client, data + came)
+
+    def _taken(self, client: socket.socket, data: bytes) -> bytes:
+        """Answers the requests; returns what is not whole yet."""
+        if data[:4] == struct.pack(">I", 0x287617FB):
+            data = data[8:]
+        while len(data) >= 12:
+            kind, length = struct.unpack_from(">II", data)
+            end = 8 + length
+            if kind == 1:
+                if len(data) < end + 4:
+                    break
+                end += 4 + struct.unpack_from(">I", data, end)[0]
+            if len(data) < end:
+                break
+            if kind == 1 and data[8 : 8 + length] == b"ruedo/request":
+                request = lcmtypes.request_t.decode(data[12 + length : end])
+                client.sendall(self._answer(request))
+            data = data[end:]
+        return data
