@@ -5,6 +5,7 @@
 #include <cfenv>
 #include <cstdio>
 #include <cstdlib>
+#include <cstring>
 #include <exception>
 #include <filesystem>
 #include <map>
@@ -13,9 +14,12 @@
 #include <string_view>
 
 #include <dlfcn.h>
+#include <elf.h>
+#include <link.h>
 
 #include "core/input_file.h"
 #include "core/sha256.h"
+#include "core/utf8.h"
 #include "ruedo/errors.h"
 #include "ruedo/plugin.h"
 #include "ruedo/plugin_abi.h"
@@ -42,11 +46,34 @@ std::vector<Plugin>& plugins() {
   return list;
 }
 
+// A file whose end is missing, such as a copy that was broken off, would end the process with
+// SIGBUS as the dynamic linker reads it.
+void check_whole(const std::string& bytes, const std::string& path) {
+  const auto read = [&](auto& head, size_t at) {
+    if (at > bytes.size() || bytes.size() - at < sizeof head) return false;
+    std::memcpy(&head, &bytes[at], sizeof head);
+    return true;
+  };
+  ElfW(Ehdr) file{};
+  bool whole = read(file, 0);
+  if (whole && file.e_ident[EI_CLASS] != (sizeof(void*) == 8 ? ELFCLASS64 : ELFCLASS32))
+    return;  // the linker refuses it
+  for (size_t i = 0; whole && i < file.e_phnum; ++i) {
+    ElfW(Phdr) part{};
+    whole = read(part, file.e_phoff + i * sizeof part) &&
+            (part.p_type != PT_LOAD ||
+             (part.p_offset <= bytes.size() && part.p_filesz <= bytes.size() - part.p_offset));
+  }
+  if (!whole)
+    throw InputError({path}, "is a shared library whose end is missing, as in a broken off copy");
+}
+
 // What the plugin was built for, by its bytes.
 std::string built_for(const std::string& bytes, const std::string& path) {
   if (!std::string_view(bytes).starts_with(kElf))
     throw InputError({path},
                      "is no shared library; a plugin is built by CMake's target ruedo::plugin");
+  check_whole(bytes, path);
   const size_t at = bytes.find(kMark);
   const size_t begin = at + kMark.size();
   if (at == std::string::npos || begin >= bytes.size() || bytes[begin] == '\0')
@@ -57,8 +84,8 @@ std::string built_for(const std::string& bytes, const std::string& path) {
 
 void check_abi(const std::string& theirs, const std::string& path) {
   if (theirs == kAbi) return;
-  throw InputError({path}, "was built for another Ruedo (" + theirs + "; this is " + kAbi +
-                               "): build it again against this installation");
+  throw InputError({path}, "was built for another Ruedo (" + for_terminal(theirs) + "; this is " +
+                               kAbi + "): build it again against this installation");
 }
 
 // Code of a plugin that is built with -ffast-math switches this thread to flushing small numbers to
@@ -89,10 +116,12 @@ class EndsWithItsError {
   [[noreturn]] static void end() {
     constexpr int kBadInput = 3;
     try {
-      std::rethrow_exception(std::current_exception());
+      if (const std::exception_ptr thrown = std::current_exception())
+        std::rethrow_exception(thrown);
+      std::fprintf(stderr, "ruedo: %s: the plugin ended the process while it was loaded\n", path_);
     } catch (const std::exception& error) {
       std::fprintf(stderr, "ruedo: %s: the plugin threw while it was loaded: %s\n", path_,
-                   error.what());
+                   for_terminal(error.what()).c_str());
     } catch (...) {
       std::fprintf(stderr, "ruedo: %s: the plugin threw while it was loaded\n", path_);
     }
@@ -114,7 +143,7 @@ const PluginEntry& open(const std::string& path) {
     throw InputError({path}, "the plugin cannot be loaded: " + text);
   }
   const auto* entry = static_cast<const PluginEntry*>(dlsym(library, "ruedo_plugin_entry"));
-  if (entry == nullptr)
+  if (entry == nullptr || !entry->abi || !entry->sensors || !entry->drives)
     throw InputError({path}, "is no plugin of Ruedo: it has no ruedo_plugin_entry");
   check_abi(entry->abi, path);
   return *entry;

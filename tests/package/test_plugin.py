@@ -328,6 +328,7 @@ def bad(prefix, project):
     other = good.replace(built_for, built_for[:-2] + b"9.")
     (folder / "build/libother.so").write_bytes(other)
     (folder / "build/libtext.so").write_text("not a library")
+    (folder / "build/libcut.so").write_bytes(good[: len(good) // 2])
     return folder / "build"
 
 
@@ -342,6 +343,7 @@ def bad(prefix, project):
         ),
         ("libother.so", 3, "was built for another Ruedo"),
         ("libtext.so", 3, "is no shared library"),
+        ("libcut.so", 3, "is a shared library whose end is missing"),
         ("libnone.so", 3, "there is no such plugin"),
         (".", 3, "is a folder; a file is needed"),
     ],
