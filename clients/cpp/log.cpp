@@ -49,9 +49,11 @@ class LogFile {
   std::string fault_;
 };
 
-LogFile::LogFile(std::string path) : path_(std::move(path)), file_(path_, std::ios::binary) {
+LogFile::LogFile(std::string path) : path_(std::move(path)) {
   std::error_code error;
-  if (!std::filesystem::is_regular_file(path_, error) || !file_) {
+  const bool regular = std::filesystem::is_regular_file(path_, error);
+  if (regular) file_.open(path_, std::ios::binary);  // opening a FIFO would wait for its writer
+  if (!regular || !file_) {
     const bool there = std::filesystem::exists(path_, error);
     throw Error(path_ + (there ? ": it is no file that can be read" : ": no such file"));
   }

@@ -1,5 +1,6 @@
 """Recorded runs, read by the client libraries."""
 
+import os
 import subprocess
 
 import pytest
@@ -74,6 +75,17 @@ def test_what_is_no_log_is_said(language, tmp_path):
         assert str(path) in result.stdout + result.stderr
         if language != "python":
             assert "failed " in result.stdout, result
+
+
+def test_a_fifo_is_no_log_and_not_waited_for(language, tmp_path):
+    os.mkfifo(tmp_path / "fifo")
+    done = subprocess.run(
+        [*PROBES[language], "-", "log", str(tmp_path / "fifo")],
+        capture_output=True,
+        text=True,
+        timeout=60,
+    )
+    assert "fifo" in done.stdout + done.stderr
 
 
 def test_read_log_says_what_is_no_log(tmp_path):
