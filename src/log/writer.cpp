@@ -7,6 +7,7 @@
 #include <cstring>
 
 #include <fcntl.h>
+#include <sys/file.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
@@ -26,13 +27,25 @@ void put(std::vector<uint8_t>& buffer, Integer value) {
   }
 }
 
+// An empty file that no other process writes: two would write over each other.
+int open_empty(const std::string& path) {
+  const int file = ::open(path.c_str(), O_WRONLY | O_CREAT | O_CLOEXEC, 0666);
+  const auto fail = [&](const std::string& why) {
+    if (file >= 0) ::close(file);
+    throw EnvironmentError("--record: cannot write '" + path + "': " + why);
+  };
+  struct stat status{};
+  if (file < 0 || ::fstat(file, &status) != 0) fail(std::strerror(errno));
+  if (!S_ISREG(status.st_mode)) return file;
+  if (::flock(file, LOCK_EX | LOCK_NB) != 0 && errno == EWOULDBLOCK)  // else: it knows no locks
+    fail("another run records into it; end that one, or record elsewhere");
+  if (::ftruncate(file, 0) != 0) fail(std::strerror(errno));
+  return file;
+}
+
 }  // namespace
 
-Writer::Writer(const std::string& path)
-    : Writer(::open(path.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666), path) {
-  if (file_ < 0)
-    throw EnvironmentError("--record: cannot write '" + path + "': " + std::strerror(errno));
-}
+Writer::Writer(const std::string& path) : Writer(open_empty(path), path) {}
 
 Writer::Writer(int file, std::string name) : path_(std::move(name)), file_(file) {
   buffer_.reserve(2 * kFlushSize);

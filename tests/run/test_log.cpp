@@ -58,6 +58,21 @@ TEST(Writer, LcmReadsItsEvents) {
   EXPECT_EQ(log.readNextEvent(), nullptr);
 }
 
+TEST(Writer, TwoDoNotWriteIntoOneFile) {
+  const TemporaryFile file("two.lcmlog");
+  {
+    log::Writer first(file.path());
+    const uint8_t byte = 1;
+    first.write(0, "first", &byte, 1);
+    EXPECT_THROW(log::Writer{file.path()}, EnvironmentError);
+  }
+  log::Reader reader(file.path());
+  log::Event event;
+  ASSERT_TRUE(reader.next(event));
+  EXPECT_EQ(event.channel, "first");
+  EXPECT_NO_THROW(log::Writer{file.path()});  // whose writer has ended
+}
+
 TEST(Writer, AFullDiskIsSaid) {
   log::Writer log("/dev/full");
   const uint8_t bytes[1000] = {};
