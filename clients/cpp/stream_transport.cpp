@@ -69,6 +69,7 @@ bool StreamTransport::receive(std::chrono::milliseconds timeout, const Receiver&
     try {
       connect();
     } catch (const EnvironmentError&) {
+      return false;  // it is tried again with the next call
     }
     return false;
   }
