@@ -333,7 +333,7 @@ void Core::ask_info() {
   request_t request{};
   request.epoch = -1;
   request.kind = request_t::INFO;
-  bus_.publish("ruedo/request", request);
+  bus_.publish(kRequestChannel, request);
 }
 
 }  // namespace ruedo::client

@@ -1,7 +1,5 @@
-// Reading logs: where each message lies is found once, and the messages are read when asked for.
-//
-// An event of LCM's log is, big endian: sync word, number, time, lengths of channel and data,
-// channel, data.
+// Reading logs (core/lcm_log.h): where each message lies is found once, and the messages are read
+// when asked for.
 #include <array>
 #include <cerrno>
 #include <cstring>
@@ -10,18 +8,15 @@
 #include <map>
 #include <mutex>
 
+#include "core/big_endian.h"
+#include "core/lcm_log.h"
 #include "sample_types.h"
 
 namespace ruedo::client {
 namespace {
 
-constexpr int64_t kSync = 0xEDA1DA01;
-constexpr int64_t kHeadSize = 28;
+constexpr auto kHeadSize = static_cast<int64_t>(kLogHeadSize);
 constexpr int64_t kLongestChannel = 1000, kLargest = int64_t{1} << 30;
-
-int64_t number(const uint8_t* bytes) {
-  return int64_t{bytes[0]} << 24 | bytes[1] << 16 | bytes[2] << 8 | bytes[3];
-}
 
 }  // namespace
 
@@ -75,9 +70,10 @@ bool LogFile::add_event(int64_t begin, int64_t& next) {
   file_.seekg(begin);
   file_.read(reinterpret_cast<char*>(head.data()), kHeadSize);
   if (file_.gcount() < 4) return wrong(kCutOff);
-  if (number(head.data()) != kSync) return wrong("it is damaged at byte ");
+  if (read_big_endian<uint32_t>(head.data()) != kLogSync) return wrong("it is damaged at byte ");
   if (file_.gcount() < kHeadSize) return wrong(kCutOff);
-  const int64_t name_size = number(&head[20]), size = number(&head[24]);
+  const int64_t name_size = read_big_endian<uint32_t>(&head[20]),
+                size = read_big_endian<uint32_t>(&head[24]);
   if (name_size > kLongestChannel || size > kLargest) return wrong("it is damaged at byte ");
   // A false length must not exhaust the memory.
   if (begin + kHeadSize + name_size + size > size_) return wrong(kCutOff);

@@ -106,7 +106,7 @@ void Session::publish(int32_t kind, int64_t session, int64_t sequence,
   request.kind = kind;
   request.size = static_cast<int32_t>(body.size());
   request.body = body;
-  core_.bus().publish("ruedo/request", request);
+  core_.bus().publish(kRequestChannel, request);
 }
 
 void Session::receive(const uint8_t* bytes, size_t size) {

@@ -20,6 +20,8 @@ namespace ruedo::client {
 
 class Core;
 
+inline constexpr const char* kRequestChannel = "ruedo/request";
+
 struct Reply {
   int32_t epoch = 0;
   int64_t session = 0, sequence = 0;

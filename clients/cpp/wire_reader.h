@@ -10,6 +10,8 @@
 #include <string>
 #include <vector>
 
+#include "core/big_endian.h"
+
 namespace ruedo::client {
 
 // The bytes are not what their type says.
@@ -26,11 +28,11 @@ class WireReader {
 
   int8_t int8() { return static_cast<int8_t>(take(1)[0]); }
   bool boolean() { return int8() != 0; }
-  int16_t int16() { return static_cast<int16_t>(big_endian(take(2), 2)); }
-  int32_t int32() { return static_cast<int32_t>(big_endian(take(4), 4)); }
-  int64_t int64() { return static_cast<int64_t>(big_endian(take(8), 8)); }
-  float float32() { return std::bit_cast<float>(static_cast<uint32_t>(big_endian(take(4), 4))); }
-  double float64() { return std::bit_cast<double>(big_endian(take(8), 8)); }
+  int16_t int16() { return read_big_endian<int16_t>(take(2)); }
+  int32_t int32() { return read_big_endian<int32_t>(take(4)); }
+  int64_t int64() { return read_big_endian<int64_t>(take(8)); }
+  float float32() { return std::bit_cast<float>(read_big_endian<uint32_t>(take(4))); }
+  double float64() { return std::bit_cast<double>(read_big_endian<uint64_t>(take(8))); }
 
   std::string string() {
     const size_t length = count(1);  // with its closing zero
@@ -103,11 +105,6 @@ class WireReader {
     return byte < 0x20 || byte == 0x7f ||
            (byte >= 0x80 && byte < 0xa0 && i > 0 &&
             static_cast<unsigned char>(text[i - 1]) == 0xc2);
-  }
-  static uint64_t big_endian(const uint8_t* bytes, int n) {
-    uint64_t value = 0;
-    for (int i = 0; i < n; ++i) value = value << 8 | bytes[i];
-    return value;
   }
   const uint8_t* take(size_t n) {
     if (n > static_cast<size_t>(end_ - at_)) throw WireError("it is too short");

@@ -17,16 +17,13 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
+#include "core/big_endian.h"
+
 namespace ruedo::bus {
 namespace {
 
 constexpr uint32_t kShort = 0x4c433032, kFragment = 0x4c433033;
 constexpr size_t kShortHead = 8, kFragmentHead = 20, kLargestDatagram = 65536;
-
-uint32_t number32(const uint8_t* at) {
-  return uint32_t{at[0]} << 24 | uint32_t{at[1]} << 16 | uint32_t{at[2]} << 8 | at[3];
-}
-uint32_t number16(const uint8_t* at) { return uint32_t{at[0]} << 8 | at[1]; }
 
 // The channel's name at the beginning of `bytes`; size() + 1 of them are its. Empty: there is none.
 std::string_view channel_at(const uint8_t* bytes, size_t size) {
@@ -82,7 +79,7 @@ void MulticastReceiver::read(const uint8_t* bytes, size_t size, Sender sender,
                              const Handler& handler) {
   sender_ = sender;
   if (size <= kShortHead) return;
-  const uint32_t magic = number32(bytes);
+  const uint32_t magic = read_big_endian<uint32_t>(bytes);
   if (magic == kFragment) return take_fragment(bytes, size, handler);
   if (magic != kShort) return;
   const std::string_view channel = channel_at(bytes + kShortHead, size - kShortHead);
@@ -92,8 +89,8 @@ void MulticastReceiver::read(const uint8_t* bytes, size_t size, Sender sender,
 
 void MulticastReceiver::take_fragment(const uint8_t* bytes, size_t size, const Handler& handler) {
   if (size <= kFragmentHead) return;
-  const size_t total = number32(bytes + 8), offset = number32(bytes + 12),
-               number = number16(bytes + 16), of = number16(bytes + 18);
+  const size_t total = read_big_endian<uint32_t>(bytes + 8), offset = read_big_endian<uint32_t>(bytes + 12),
+               number = read_big_endian<uint16_t>(bytes + 16), of = read_big_endian<uint16_t>(bytes + 18);
   const uint8_t* data = bytes + kFragmentHead;
   size_t length = size - kFragmentHead;
   std::string_view channel;
@@ -104,7 +101,7 @@ void MulticastReceiver::take_fragment(const uint8_t* bytes, size_t size, const H
     length -= channel.size() + 1;
   }
   if (number >= of || total > kMostPartial || offset > total || length > total - offset) return;
-  Partial* partial = partial_of(number32(bytes + 4), total, of);
+  Partial* partial = partial_of(read_big_endian<uint32_t>(bytes + 4), total, of);
   if (!partial || partial->here[number]) return;
   partial->here[number] = true;
   --partial->missing;

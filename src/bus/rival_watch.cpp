@@ -4,26 +4,24 @@
 #include <algorithm>
 #include <optional>
 
+#include "core/big_endian.h"
+#include "core/channel_names.h"
 #include "ruedo/decode.h"
 #include "ruedo/world_info_t.hpp"
 
 namespace ruedo::bus {
 namespace {
 
-constexpr const char* kInfo = "ruedo/info";
 constexpr size_t kMostRivals = 8;  // are named
 
 std::vector<std::string> with_info(std::vector<std::string> channels) {
-  channels.push_back(kInfo);
+  channels.push_back(kInfoChannel);
   return channels;
 }
 
 // Behind the fingerprint and utime.
 int64_t run_id_of(const uint8_t* data, size_t size) {
-  if (size < 24) return 0;
-  uint64_t id = 0;
-  for (size_t i = 16; i < 24; ++i) id = id << 8 | data[i];
-  return static_cast<int64_t>(id);
+  return size < 24 ? 0 : read_big_endian<int64_t>(data + 16);
 }
 
 }  // namespace
@@ -32,7 +30,7 @@ RivalWatch::RivalWatch(std::unique_ptr<Bus> bus, std::function<void(const std::s
     : bus_(std::move(bus)), say_(std::move(say)) {}
 
 void RivalWatch::publish(const std::string& channel, const uint8_t* data, size_t size) {
-  if (run_id_ == 0 && channel == kInfo) run_id_ = run_id_of(data, size);
+  if (run_id_ == 0 && channel == kInfoChannel) run_id_ = run_id_of(data, size);
   bus_->publish(channel, data, size);
 }
 
@@ -42,7 +40,7 @@ void RivalWatch::listen(const std::vector<std::string>& channels, Handler handle
       with_info(channels),
       [this, handler = std::move(handler)](const std::string& channel, const uint8_t* data,
                                            size_t size) {
-        if (channel == kInfo) {
+        if (channel == kInfoChannel) {
           heard(data, size);
         } else {
           handler(channel, data, size);

@@ -8,16 +8,13 @@
 #include <sys/socket.h>
 
 #include "bus/tcpq_wire.h"
+#include "core/big_endian.h"
 
 namespace ruedo::bus {
 namespace {
 
 constexpr size_t kRoom = size_t{256} << 10;    // bytes received at a time
 constexpr size_t kLargest = size_t{64} << 20;  // a frame: the server is trusted no further
-
-uint32_t number(const uint8_t* b) {
-  return uint32_t{b[0]} << 24 | uint32_t{b[1]} << 16 | uint32_t{b[2]} << 8 | b[3];
-}
 
 }  // namespace
 
@@ -77,15 +74,15 @@ bool StreamConnection::take(int timeout_ms, const Handler& handler) {
   end_ += static_cast<size_t>(count);
   bool any = false;
   if (!greeted_ && end_ >= 8) {
-    if (number(buffer_.data()) != tcpq::kServerMagic) return over_ = true, false;
+    if (read_big_endian<uint32_t>(buffer_.data()) != tcpq::kServerMagic) return over_ = true, false;
     greeted_ = true, begin_ = 8;
   }
   while (greeted_ && end_ - begin_ >= 12) {
     const uint8_t* frame = &buffer_[begin_];
-    const size_t name = number(frame + 4);
+    const size_t name = read_big_endian<uint32_t>(frame + 4);
     if (name > tcpq::kLongestChannel) return over_ = true, false;
     if (end_ - begin_ < 12 + name) break;
-    const size_t size = number(frame + 8 + name);
+    const size_t size = read_big_endian<uint32_t>(frame + 8 + name);
     if (size > kLargest) return over_ = true, false;
     if (end_ - begin_ < 12 + name + size) break;
     begin_ += 12 + name + size;

@@ -4,29 +4,27 @@
 #include <algorithm>
 #include <cctype>
 
+#include "core/big_endian.h"
+
 namespace ruedo::bus::tcpq {
 namespace {
 
 constexpr uint32_t kPublish = 1, kSubscribe = 2, kUnsubscribe = 3;
 constexpr size_t kKept = 256 * 1024;  // bytes of memory that an idle client's buffer may keep
 
-void append_number(std::vector<uint8_t>& out, uint32_t number) {
-  for (int shift = 24; shift >= 0; shift -= 8) out.push_back(static_cast<uint8_t>(number >> shift));
-}
-
 }  // namespace
 
 std::vector<uint8_t> server_hello() {
   std::vector<uint8_t> bytes;
-  append_number(bytes, kServerMagic);
-  append_number(bytes, kVersion);
+  append_big_endian(bytes, kServerMagic);
+  append_big_endian(bytes, kVersion);
   return bytes;
 }
 
 std::vector<uint8_t> client_hello() {
   std::vector<uint8_t> bytes;
-  append_number(bytes, kClientMagic);
-  append_number(bytes, kVersion);
+  append_big_endian(bytes, kClientMagic);
+  append_big_endian(bytes, kVersion);
   return bytes;
 }
 
@@ -39,8 +37,8 @@ void append_pattern(std::vector<uint8_t>& out, uint32_t kind, std::string_view n
     if (std::string_view(".^$*+?{}[]\\|()").find(c) != std::string_view::npos) pattern += '\\';
     pattern += c;
   }
-  append_number(out, kind);
-  append_number(out, static_cast<uint32_t>(pattern.size()));
+  append_big_endian(out, kind);
+  append_big_endian(out, static_cast<uint32_t>(pattern.size()));
   for (const char c : pattern) out.push_back(static_cast<uint8_t>(c));
 }
 
@@ -55,16 +53,15 @@ void append_unsubscribe(std::vector<uint8_t>& out, std::string_view name) {
 
 void append_publish(std::vector<uint8_t>& out, std::string_view channel,
                     std::span<const uint8_t> data) {
-  append_number(out, kPublish);
-  append_number(out, static_cast<uint32_t>(channel.size()));
+  append_big_endian(out, kPublish);
+  append_big_endian(out, static_cast<uint32_t>(channel.size()));
   out.insert(out.end(), channel.begin(), channel.end());
-  append_number(out, static_cast<uint32_t>(data.size()));
+  append_big_endian(out, static_cast<uint32_t>(data.size()));
   out.insert(out.end(), data.begin(), data.end());
 }
 
 uint32_t Reader::number(size_t at) const {
-  const uint8_t* b = &buffer_[read_ + at];
-  return uint32_t{b[0]} << 24 | uint32_t{b[1]} << 16 | uint32_t{b[2]} << 8 | b[3];
+  return read_big_endian<uint32_t>(&buffer_[read_ + at]);
 }
 
 Reader::Result Reader::next(Frame& frame) {

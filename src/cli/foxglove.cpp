@@ -10,6 +10,7 @@
 
 #include "cli/foxglove_json.h"
 #include "cli/message_json.h"
+#include "core/channel_names.h"
 #include "core/json.h"
 #include "core/utf8.h"
 #include "engine/markers.h"
@@ -357,7 +358,7 @@ bool FoxgloveExport::add_drawn(uint64_t time_ns, std::span<const uint8_t> messag
   const auto markers = engine::markers_in(message);
   if (!markers) return false;
   const foxglove::Type& type = foxglove::scene_update();
-  out_.add_message(channel(kMarkers, type.name, type.schema), time_ns,
+  out_.add_message(channel(kMarkersChannel, type.name, type.schema), time_ns,
                    markers_json(*markers, time_ns), markers->layer);
   return true;
 }

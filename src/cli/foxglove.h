@@ -63,8 +63,6 @@ class FoxgloveExport {
  public:
   // Topics whose last message holds until another scene begins.
   static constexpr const char *kFrames = "ruedo/frames", *kScene = "ruedo/scene";
-  // Of what clients draw, layer by layer.
-  static constexpr const char* kMarkers = "ruedo/markers";
 
   explicit FoxgloveExport(FoxgloveOutput& out) : out_(out) {}
 

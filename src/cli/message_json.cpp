@@ -9,6 +9,7 @@
 #include <fmt/format.h>
 #include <openssl/evp.h>
 
+#include "core/big_endian.h"
 #include "core/json.h"
 #include "core/utf8.h"
 
@@ -80,9 +81,8 @@ class Walk {
 
  private:
   uint64_t take(size_t size) {
-    uint64_t value = 0;
-    for (size_t i = 0; i < size; ++i) value = value << 8 | bytes_[at_++];
-    return value;
+    at_ += size;
+    return read_big_endian(&bytes_[at_ - size], size);
   }
 
   void array(const Field& field, size_t dimension, const std::vector<int64_t>& counts,

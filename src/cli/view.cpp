@@ -3,6 +3,7 @@
 
 #include <fmt/format.h>
 
+#include "core/channel_names.h"
 #include "ruedo/errors.h"
 
 #ifdef RUEDO_CONSOLE
@@ -53,7 +54,7 @@ std::shared_ptr<void> RunView::open(run::Run& run, const std::string& title,
   run.add(tap);
   std::string info;
   for (const engine::Channel& channel : run.channels().list()) {
-    if (channel.name == "ruedo/info") info = channel.bus_name;
+    if (channel.name == kInfoChannel) info = channel.bus_name;
   }
   console::LiveHost host{
       .world = [&run] { return run.world(); },

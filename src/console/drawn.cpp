@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "core/big_endian.h"
 #include "engine/markers.h"
 #include "ruedo/applied_t.hpp"
 #include "ruedo/decode.h"
@@ -14,8 +15,7 @@ namespace ruedo::console {
 std::string layer_of(std::span<const uint8_t> message) {
   constexpr size_t kAt = 16, kName = kAt + 4;
   if (message.size() < kName || fingerprint_of(message) != markers_t::getHash()) return "";
-  uint32_t size = 0;
-  for (size_t i = 0; i < 4; ++i) size = size << 8 | message[kAt + i];
+  const auto size = read_big_endian<uint32_t>(&message[kAt]);
   if (size < 1 || size > message.size() - kName) return "";
   const auto name = message.subspan(kName, size - 1);
   return {name.begin(), name.end()};

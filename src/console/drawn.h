@@ -11,8 +11,6 @@
 
 namespace ruedo::console {
 
-constexpr const char* kMarkersChannel = "ruedo/markers";
-
 // The layer of an encoded markers_t; "" for other bytes.
 std::string layer_of(std::span<const uint8_t> message);
 // Whether a run would accept it.

@@ -8,6 +8,7 @@
 
 #include <fmt/format.h>
 
+#include "core/big_endian.h"
 #include "core/utf8.h"
 #include "log/header.h"
 #include "ruedo/applied_t.hpp"
@@ -179,9 +180,7 @@ void Events::hear(double time_s, const std::string& channel, std::span<const uin
   } else if (type == world_state_t::getHash() || type == tick_t::getHash() ||
              type == motion_status_t::getHash()) {
     if (message.size() < 16) return;
-    uint64_t utime = 0;
-    for (size_t i = 8; i < 16; ++i) utime = utime << 8 | message[i];
-    now_s_ = static_cast<double>(static_cast<int64_t>(utime)) * 1e-6;
+    now_s_ = static_cast<double>(read_big_endian<int64_t>(&message[8])) * 1e-6;
   }
   come_due();
   if (!tells(type)) return;

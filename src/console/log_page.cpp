@@ -20,6 +20,7 @@
 #include "console/events.h"
 #include "console/scene_data.h"
 #include "console/types.h"
+#include "core/channel_names.h"
 #include "core/json.h"
 #include "core/utf8.h"
 #include "log/index.h"
@@ -221,7 +222,7 @@ class Writer {
         add_entry(static_cast<uint32_t>(c), channel.entries[i].time_us, whole(channel, i));
     }
     if (!info_.empty()) return;
-    info_ = "ruedo/info";
+    info_ = kInfoChannel;
     names_.push_back(info_);
     for (const run::LogWorlds::Scene* scene : scenes_)
       add_entry(static_cast<uint32_t>(names_.size() - 1), scene->from_us, scene->info);

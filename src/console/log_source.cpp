@@ -6,6 +6,7 @@
 #include <cmath>
 #include <optional>
 
+#include "core/channel_names.h"
 #include "core/utf8.h"
 #include "core/whole.h"
 #include "ruedo/markers_t.hpp"
@@ -56,7 +57,7 @@ LogSource::LogSource(const std::string& path, const run::LoadRun& load, double s
     if (channel.fingerprint == world_info_t::getHash()) info_channel_ = printable(channel.name);
   }
   makes_info_ = info_channel_.empty();
-  if (makes_info_) info_channel_ = "ruedo/info";
+  if (makes_info_) info_channel_ = kInfoChannel;
   if (!other.empty())
     comparison_ = std::make_unique<Comparison>(path, index_, worlds_, other, load_other);
 }

@@ -6,6 +6,7 @@
 
 #include "console/board.h"
 #include "console/drawn.h"
+#include "core/channel_names.h"
 
 namespace ruedo::console {
 
@@ -13,7 +14,7 @@ void Tap::announce(const std::shared_ptr<const run::Announcement>& announcement)
   const auto& channels = announcement->channels.list();
   by_index_.assign(channels.size(), nullptr);
   const auto world = std::find_if(channels.begin(), channels.end(), [](const engine::Channel& c) {
-    return c.name == "ruedo/world" && !c.gone;
+    return c.name == kWorldChannel && !c.gone;
   });
   state_index_ = world == channels.end() ? engine::ChannelIndex()
                                          : engine::ChannelIndex(world - channels.begin());

@@ -14,7 +14,9 @@
 #include <map>
 #include <memory>
 
+#include "core/big_endian.h"
 #include "core/input_file.h"
+#include "core/lcm_log.h"
 #include "core/type_files.h"
 #include "core/wire_size.h"
 #include "ruedo/errors.h"
@@ -187,11 +189,10 @@ void parse_file(std::string_view text, const std::string& file, std::deque<Parse
 
 // Logs have the same ending as types, and lie in the same folders.
 bool is_log(const std::string& path) {
-  constexpr std::string_view kSyncWord = "\xED\xA1\xDA\x01";
   const InputFile input = open_input(path);
-  std::array<char, kSyncWord.size()> begin{};
+  std::array<uint8_t, sizeof kLogSync> begin{};
   return std::fread(begin.data(), 1, begin.size(), input.file.get()) == begin.size() &&
-         std::string_view(begin.data(), begin.size()) == kSyncWord;
+         read_big_endian<uint32_t>(begin.data()) == kLogSync;
 }
 
 constexpr size_t kCountless = size_t{1} << 62;

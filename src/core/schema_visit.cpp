@@ -3,6 +3,7 @@
 #include <bit>
 #include <charconv>
 
+#include "core/big_endian.h"
 #include "core/type_files.h"
 #include "core/wire_size.h"
 #include "ruedo/schema.h"
@@ -13,12 +14,6 @@ namespace {
 // What is always there of a value: of a string its length, which the text follows.
 size_t fixed_size(Primitive primitive) {
   return primitive == Primitive::string ? 4 : wire_size(primitive);
-}
-
-uint64_t big_endian(const uint8_t* bytes, size_t size) {
-  uint64_t value = 0;
-  for (size_t i = 0; i < size; ++i) value = value << 8 | bytes[i];
-  return value;
 }
 
 using Visitor = std::function<bool(const FieldPath&, const FieldValue&)>;
@@ -75,7 +70,7 @@ class Walk {
       return field.type != nullptr && fields(*field.type, depth + 1);
     const size_t size = fixed_size(field.primitive);
     if (bytes_.size() - at_ < size) return false;
-    const uint64_t raw = big_endian(bytes_.data() + at_, size);
+    const uint64_t raw = read_big_endian(bytes_.data() + at_, size);
     at_ += size;
     switch (field.primitive) {
       case Primitive::boolean: return give(raw != 0);
@@ -134,7 +129,7 @@ std::string number_text(Number value) {
 }  // namespace
 
 int64_t fingerprint_of(std::span<const uint8_t> message) {
-  return message.size() < 8 ? 0 : static_cast<int64_t>(big_endian(message.data(), 8));
+  return message.size() < 8 ? 0 : read_big_endian<int64_t>(message.data());
 }
 
 bool visit_message(const Schema& schema, std::span<const uint8_t> message, const Visitor& visitor) {

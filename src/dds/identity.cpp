@@ -7,6 +7,7 @@
 
 #include <dds/ddsi/ddsi_tran.h>
 
+#include "core/big_endian.h"
 #include "dds/sockets.h"
 #include "ros2/cdr.h"
 
@@ -63,7 +64,7 @@ void copy_turned(std::span<const uint8_t> words, uint8_t* out) {
   for (size_t i = 0; i < words.size(); i += 4) {
     uint32_t word;
     std::memcpy(&word, words.data() + i, sizeof word);
-    for (const int shift : {24, 16, 8, 0}) *out++ = static_cast<uint8_t>(word >> shift);
+    write_big_endian(out + i, word);
   }
 }
 

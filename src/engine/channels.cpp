@@ -3,6 +3,7 @@
 
 #include <algorithm>
 
+#include "core/channel_names.h"
 #include "ruedo/element.h"
 #include "ruedo/errors.h"
 #include "ruedo/reply_t.hpp"
@@ -68,11 +69,11 @@ void Channels::check_remaps() const {
 
 SimulationChannels add_simulation_channels(Channels& channels, bool control) {
   SimulationChannels indices;
-  indices.tick = channels.add<tick_t>("ruedo/tick", "", "", kTickRate);
-  indices.info = channels.add<world_info_t>("ruedo/info", "", "", kInfoRate);
+  indices.tick = channels.add<tick_t>(kTickChannel, "", "", kTickRate);
+  indices.info = channels.add<world_info_t>(kInfoChannel, "", "", kInfoRate);
   if (control) {
-    indices.request = channels.add<request_t>("ruedo/request", "", "", Rate{}, true);
-    indices.reply = channels.add<reply_t>("ruedo/reply", "", "", Rate{});
+    indices.request = channels.add<request_t>(kRequestChannel, "", "", Rate{}, true);
+    indices.reply = channels.add<reply_t>(kReplyChannel, "", "", Rate{});
   }
   return indices;
 }

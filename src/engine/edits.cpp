@@ -183,7 +183,7 @@ Pose pose_of(const set_pose_request_t& request) {
   return pose_of(request.position, request.orientation);
 }
 
-bool stands_fast(const model::WorldModel& world, const std::string& name) {
+bool is_fixed(const model::WorldModel& world, const std::string& name) {
   const InstanceIndex instance = find_model(world, name);
   if (!instance.valid()) return false;
   const model::Model& model = *world.models[instance].model;
@@ -201,7 +201,7 @@ Outcome set_pose(const set_pose_request_t& request, int64_t step, Simulation& si
   const InstanceIndex instance = find_model(simulation.world(), request.name);
   if (!instance.valid()) return unknown(request.name);
   const Pose X_WM = pose_of(request);
-  if (stands_fast(simulation.world(), request.name)) {
+  if (is_fixed(simulation.world(), request.name)) {
     const auto model = simulation.world().models[instance].model;
     Findings findings;
     simulation.remove_model(instance, channels);

@@ -60,7 +60,7 @@ Outcome set_pose(const set_pose_request_t& request, int64_t step, Simulation& si
                  Channels& channels);
 Pose pose_of(const set_pose_request_t& request);
 // Whether the model of that name is fixed; false if there is none.
-bool stands_fast(const model::WorldModel& world, const std::string& name);
+bool is_fixed(const model::WorldModel& world, const std::string& name);
 Outcome set_twist(const set_twist_request_t& request, Simulation& simulation);
 // Returns all models to where they started or were spawned, at rest.
 void reset_poses(Simulation& simulation);

@@ -8,6 +8,7 @@
 #include <span>
 #include <thread>
 
+#include "core/channel_names.h"
 #include "core/whole.h"
 #include "engine/world_state.h"
 #include "model/read_context.h"
@@ -278,7 +279,7 @@ class FleetMaker {
   }
 
   void add_markers() {
-    const ChannelIndex channel = channels_.add<markers_t>("ruedo/markers", "", "", Rate{}, true);
+    const ChannelIndex channel = channels_.add<markers_t>(kMarkersChannel, "", "", Rate{}, true);
     fleet_.inputs.push_back({channels_[channel].bus_name, RobotIndex(), Input::Kind::markers});
   }
 

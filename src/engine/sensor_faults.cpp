@@ -6,6 +6,7 @@
 #include <cstring>
 #include <span>
 
+#include "core/big_endian.h"
 #include "core/whole.h"
 #include "ruedo/decode.h"
 #include "ruedo/imu_t.hpp"
@@ -17,20 +18,14 @@
 namespace ruedo::engine {
 namespace {
 
-constexpr size_t
-    kTimeAt = 8,
-    kTimeSize = 8;  // every type begins with its fingerprint and int64_t utime, high byte first
+constexpr size_t kTimeAt = 8;  // every type begins with its fingerprint and int64_t utime
 
 int64_t time_of(const std::vector<uint8_t>& bytes) {
-  uint64_t time = 0;
-  for (size_t i = kTimeAt; i < kTimeAt + kTimeSize; ++i) time = time << 8 | bytes[i];
-  return static_cast<int64_t>(time);
+  return read_big_endian<int64_t>(&bytes[kTimeAt]);
 }
 
 void set_time(std::vector<uint8_t>& bytes, int64_t time) {
-  auto rest = static_cast<uint64_t>(time);
-  for (size_t i = kTimeAt + kTimeSize; i-- > kTimeAt; rest >>= 8)
-    bytes[i] = static_cast<uint8_t>(rest);
+  write_big_endian(&bytes[kTimeAt], time);
 }
 
 // As expected by Outbox.

@@ -167,7 +167,7 @@ bool Simulation::go() {
   return true;
 }
 
-void Simulation::read_only(ReadChannels read) {
+void Simulation::set_read_channels(ReadChannels read) {
   auto changed = std::make_shared<const ReadChannels>(std::move(read));
   const std::lock_guard lock(read_mutex_);
   read_ = std::move(changed);

@@ -50,7 +50,7 @@ class Simulation {
   void start(Pace& pace);
 
   // From the next batch on, only these channels are read (Batch::read). Any thread.
-  void read_only(ReadChannels read);
+  void set_read_channels(ReadChannels read);
 
   // Computes the next steps in the caller's thread, the publisher's, if they are few, may be
   // computed now, and the simulation thread is waiting for them: waking it and waiting for it takes

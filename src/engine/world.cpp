@@ -1,6 +1,7 @@
 // Creates a world, and steps it.
 #include "engine/world.h"
 
+#include "core/channel_names.h"
 #include "physics/state_check.h"
 #include "ruedo/errors.h"
 
@@ -49,7 +50,7 @@ World::World(std::shared_ptr<Plan> plan, const FleetOptions& options, Channels& 
   for (ModuleSetup& setup : fleet_.modules)
     modules_.push_back(std::make_unique<Module>(std::move(setup)));
   for (size_t i = 0; i < channels.list().size(); ++i) {
-    if (channels.list()[i].name == "ruedo/world") world_channel_ = ChannelIndex(i);
+    if (channels.list()[i].name == kWorldChannel) world_channel_ = ChannelIndex(i);
   }
 }
 

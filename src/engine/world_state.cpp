@@ -5,6 +5,8 @@
 #include <bit>
 #include <limits>
 
+#include "core/channel_names.h"
+
 namespace ruedo::engine {
 namespace {
 
@@ -105,7 +107,7 @@ std::vector<world_state_t> world_states(const model::WorldModel& world,
 
 ModuleSetup world_state_module(const model::WorldModel& world, const model::BodyLayout& layout,
                                int epoch, Channels& channels) {
-  const ChannelIndex channel = channels.add<world_state_t>("ruedo/world", "", "", kWorldRate);
+  const ChannelIndex channel = channels.add<world_state_t>(kWorldChannel, "", "", kWorldRate);
   ModuleSetup module;
   module.name = "world";
   module.step_us = world.step_us;

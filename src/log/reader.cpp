@@ -1,5 +1,4 @@
-// The format of an event, big endian: sync word, event number, timestamp, lengths of channel and
-// data, channel, data.
+// Events by the format in core/lcm_log.h. A file is not trusted: every size is checked first.
 #include "log/reader.h"
 
 #include <sys/stat.h>
@@ -7,22 +6,15 @@
 #include <array>
 #include <utility>
 
+#include "core/big_endian.h"
+#include "core/lcm_log.h"
 #include "ruedo/errors.h"
 
 namespace ruedo::log {
 namespace {
 
-constexpr uint32_t kSync = 0xEDA1DA01;
-constexpr size_t kHeadSize = 28;
 constexpr uint32_t kMaxChannel = 1000;
 constexpr uint32_t kMaxData = 1u << 30;
-
-uint32_t read32(const uint8_t* bytes) {
-  return uint32_t{bytes[0]} << 24 | uint32_t{bytes[1]} << 16 | uint32_t{bytes[2]} << 8 | bytes[3];
-}
-int64_t read64(const uint8_t* bytes) {
-  return static_cast<int64_t>(uint64_t{read32(bytes)} << 32 | read32(bytes + 4));
-}
 
 // What others play: a bag's folder, and a file of MCAP, which begins with this.
 constexpr uint32_t kMcap = 0x894D4341;
@@ -48,8 +40,8 @@ Reader::Reader(const std::string& path) : path_(path) {
   file_ = std::move(input.file);
   size_ = input.size;
   std::array<uint8_t, 4> sync{};
-  if (size_ > 0 && (!read(sync.data(), sync.size()) || read32(sync.data()) != kSync)) {
-    if (read32(sync.data()) == kMcap) refuse_bag(path);
+  if (size_ > 0 && (!read(sync.data(), sync.size()) || read_big_endian<uint32_t>(sync.data()) != kLogSync)) {
+    if (read_big_endian<uint32_t>(sync.data()) == kMcap) refuse_bag(path);
     throw InputError({path}, "is not an LCM log: it does not begin with the sync word EDA1DA01");
   }
   std::rewind(file_.get());
@@ -90,22 +82,22 @@ bool Reader::next(Event& event, const std::function<bool(const std::string&)>& w
 bool Reader::read_event(Event& event, const std::function<bool(const std::string&)>& wanted) {
   if (!fault_.empty()) return false;
   const int64_t begin = offset_;
-  std::array<uint8_t, kHeadSize> head{};
+  std::array<uint8_t, kLogHeadSize> head{};
   const auto cut_off = [&] {
     fault_ = "cut off in the event that begins at byte " + std::to_string(begin);
     return false;
   };
   if (!read(head.data(), head.size())) return offset_ == begin ? false : cut_off();
-  const uint32_t channel_size = read32(head.data() + 20);
-  const uint32_t data_size = read32(head.data() + 24);
-  if (read32(head.data()) != kSync || channel_size > kMaxChannel || data_size > kMaxData) {
+  const uint32_t channel_size = read_big_endian<uint32_t>(head.data() + 20);
+  const uint32_t data_size = read_big_endian<uint32_t>(head.data() + 24);
+  if (read_big_endian<uint32_t>(head.data()) != kLogSync || channel_size > kMaxChannel || data_size > kMaxData) {
     fault_ = "damaged at byte " + std::to_string(begin);
     return false;
   }
   // A length that lies must not make memory run out: no event is longer than what is left.
   if (int64_t{channel_size} + data_size > size_ - offset_) return cut_off();
-  event.number = read64(head.data() + 4);
-  event.timestamp_us = read64(head.data() + 12);
+  event.number = read_big_endian<int64_t>(head.data() + 4);
+  event.timestamp_us = read_big_endian<int64_t>(head.data() + 12);
   event.channel.resize(channel_size);
   if (!read(event.channel.data(), channel_size)) return cut_off();
   if (wanted && !wanted(event.channel)) {

@@ -1,5 +1,4 @@
-// The LCM log format: each event is sync word, number, timestamp, two lengths, channel and data,
-// big-endian.
+// Events by the format in core/lcm_log.h, handed to the system in large pieces.
 #include "log/writer.h"
 
 #include <algorithm>
@@ -11,21 +10,15 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include "core/big_endian.h"
 #include "core/input_file.h"
+#include "core/lcm_log.h"
 #include "ruedo/errors.h"
 
 namespace ruedo::log {
 namespace {
 
-constexpr uint32_t kSync = 0xEDA1DA01;
 constexpr size_t kFlushSize = 1 << 20;  // bytes
-
-template <class Integer>
-void put(std::vector<uint8_t>& buffer, Integer value) {
-  for (int shift = static_cast<int>(sizeof value) * 8 - 8; shift >= 0; shift -= 8) {
-    buffer.push_back(static_cast<uint8_t>(value >> shift));
-  }
-}
 
 // An empty file that no other process writes: two would write over each other.
 int open_empty(const std::string& path) {
@@ -63,11 +56,11 @@ Writer::~Writer() {
 void Writer::write(int64_t timestamp_us, const std::string& channel, const uint8_t* data,
                    size_t size) {
   if (!error_.empty()) return;
-  put(buffer_, kSync);
-  put(buffer_, static_cast<uint64_t>(events_++));
-  put(buffer_, static_cast<uint64_t>(timestamp_us));
-  put(buffer_, static_cast<uint32_t>(channel.size()));
-  put(buffer_, static_cast<uint32_t>(size));
+  append_big_endian(buffer_, kLogSync);
+  append_big_endian(buffer_, static_cast<uint64_t>(events_++));
+  append_big_endian(buffer_, static_cast<uint64_t>(timestamp_us));
+  append_big_endian(buffer_, static_cast<uint32_t>(channel.size()));
+  append_big_endian(buffer_, static_cast<uint32_t>(size));
   buffer_.insert(buffer_.end(), channel.begin(), channel.end());
   buffer_.insert(buffer_.end(), data, data + size);
   ends_.push_back(buffer_.size());

@@ -5,6 +5,7 @@
 #include <spdlog/spdlog.h>
 
 #include "engine/edits.h"
+#include "core/channel_names.h"
 #include "engine/world_state.h"
 #include "log/header.h"
 #include "ruedo/applied_t.hpp"
@@ -67,7 +68,7 @@ Run::Outcome Run::change(const request_t& request, bool models,
 void Run::show_change() {
   if (!options_.edited || repeating_ || !pacer_->paused() || !publisher_.latest()) return;
   for (const engine::ChannelIndex channel : channels_.list().indices()) {
-    if (channels_[channel].name != "ruedo/world") continue;
+    if (channels_[channel].name != kWorldChannel) continue;
     for (const world_state_t& state :
          engine::world_states(*world_, simulation_->layout(), epoch_, changed_))
       publisher_.service(channel, state, state.part);
@@ -80,7 +81,7 @@ void Run::note(const request_t& request) {
   applied.step = publisher_.step();
   applied.epoch = epoch_;
   applied.sequence = request.sequence;
-  applied.channel = "ruedo/request";
+  applied.channel = kRequestChannel;
   applied.kind = request.kind;
   applied.size = request.size;
   applied.data = request.body;
@@ -202,8 +203,8 @@ Run::Outcome Run::remove(const request_t& request, const name_request_t& body) {
 }
 
 Run::Outcome Run::set_pose(const request_t& request, const set_pose_request_t& body) {
-  const bool fast = engine::stands_fast(*world_, body.name);
-  const Outcome outcome = change(request, fast, [&] {
+  const bool fixed = engine::is_fixed(*world_, body.name);
+  const Outcome outcome = change(request, fixed, [&] {
     return engine::set_pose(body, publisher_.step() + 1, *simulation_, channels_);
   });
   if (outcome.code == reply_t::OK && edited_) edited_->put(body.name);

@@ -6,6 +6,7 @@
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
 
+#include "core/channel_names.h"
 #include "ruedo/decode.h"
 #include "ruedo/grant_reply_t.hpp"
 
@@ -359,7 +360,7 @@ void Lockstep::note(int32_t kind, const Member& member) {
   applied.step = kind == request_t::JOIN ? member.granted : std::max<int64_t>(limit_, 0);
   applied.client = member.name;
   applied.sequence = 0;
-  applied.channel = "ruedo/request";
+  applied.channel = kRequestChannel;
   applied.kind = kind;
   applied.size = 0;
   record_(applied);

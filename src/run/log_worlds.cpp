@@ -52,7 +52,7 @@ std::shared_ptr<const WorldModel> edited(const applied_t& applied,
     }
     case request_t::SET_POSE: {
       set_pose_request_t body;
-      if (!read_body(applied, body) || !engine::stands_fast(*before, body.name)) return nullptr;
+      if (!read_body(applied, body) || !engine::is_fixed(*before, body.name)) return nullptr;
       auto world = std::make_shared<WorldModel>(*before);
       engine::WorldEditor editor(*world);
       const InstanceIndex instance = engine::find_model(*before, body.name);

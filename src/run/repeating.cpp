@@ -1,6 +1,7 @@
 // Commands of the log go to the inbox, its requests to the run.
 #include "run/repeating.h"
 
+#include "core/channel_names.h"
 #include "log/header.h"
 #include "ruedo/decode.h"
 #include "ruedo/errors.h"
@@ -63,7 +64,7 @@ bool Repeating::early(const request_t&, const Session&) const {
 }
 
 engine::InputIndex Repeating::input_of(const applied_t& applied) const {
-  const bool is_request = applied.channel == "ruedo/request";
+  const bool is_request = applied.channel == kRequestChannel;
   if (is_request && applied.kind != request_t::RESET_ODOMETRY) return {};
   name_request_t body;
   if (is_request) decode_checked(applied.data.data(), applied.data.size(), body);

@@ -5,6 +5,7 @@
 
 #include <spdlog/spdlog.h>
 
+#include "core/channel_names.h"
 #include "log/header.h"
 #include "physics/state_check.h"
 #include "ruedo/applied_t.hpp"
@@ -194,7 +195,7 @@ void Run::record_applied(const engine::Batch& batch, int64_t step) {
     applied.epoch = epoch_;
     applied.sequence = 0;
     const bool request = input.kind == engine::Input::Kind::reset_odometry;
-    applied.channel = request ? "ruedo/request" : input.channel;
+    applied.channel = request ? kRequestChannel : input.channel;
     applied.kind = request ? request_t::RESET_ODOMETRY : 0;
     applied.size = static_cast<int32_t>(command.bytes.size());
     applied.data = command.bytes;
@@ -206,7 +207,7 @@ void Run::tell_readers() {
   const uint64_t audience = publisher_.audience();
   if (audience == audience_) return;
   audience_ = audience;
-  simulation_->read_only(publisher_.read());
+  simulation_->set_read_channels(publisher_.read());
 }
 
 bool Run::compute_here() {

@@ -6,6 +6,7 @@
 #include <optional>
 #include <set>
 
+#include "core/channel_names.h"
 #include "core/progress.h"
 #include "log/header.h"
 #include "log/reader.h"
@@ -104,7 +105,7 @@ class Verifier::Impl {
     log::Event event;
     bool hashed = false;
     while (reader.next(event, [](const std::string&) { return false; })) {
-      if (event.channel == "ruedo/world") return kept_.clear();
+      if (event.channel == kWorldChannel) return kept_.clear();
       kept_.insert(event.channel);
       hashed |= event.channel == kStateHashChannel;
     }

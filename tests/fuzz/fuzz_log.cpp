@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "budget.h"
+#include "core/lcm_log.h"
 #include "log/header.h"
 #include "log/index.h"
 #include "log/reader.h"
@@ -23,7 +24,7 @@ void append(std::vector<uint8_t>& out, uint64_t value, int bytes) {
 std::vector<uint8_t> as_header(const uint8_t* data, size_t size) {
   const std::string channel = "ruedo/header";
   std::vector<uint8_t> event;
-  append(event, 0xEDA1DA01, 4);
+  append(event, ruedo::kLogSync, 4);
   append(event, 0, 8);
   append(event, 0, 8);
   append(event, channel.size(), 4);

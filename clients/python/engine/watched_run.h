@@ -11,6 +11,7 @@
 #include "engine/command_inbox.h"
 #include "engine/world_state.h"
 #include "judge/judge.h"
+#include "log/header.h"
 #include "log/writer.h"
 #include "model/world_model.h"
 #include "ruedo/applied_t.hpp"
@@ -28,7 +29,7 @@ class WatchedRun {
         judge_(world, std::move(expected)) {
     if (log.empty()) return;
     log_ = std::make_unique<ruedo::log::Writer>(log);
-    record("ruedo/header", header);
+    record(ruedo::log::kHeaderChannel, header);
   }
 
   ruedo::judge::Judge& judge() { return judge_; }
@@ -61,7 +62,7 @@ class WatchedRun {
     if (!log_) return;
     record_hash();
     hash_.last = true;
-    record("ruedo/state_hash", hash_);
+    record(ruedo::log::kStateHashChannel, hash_);
     log_->flush();
     if (!log_->error().empty()) throw ruedo::EnvironmentError(log_->path() + ": " + log_->error());
   }
@@ -69,7 +70,7 @@ class WatchedRun {
  private:
   // The server's order: a state's messages, then its hash.
   void record_hash() {
-    if (hash_due_) record("ruedo/state_hash", hash_);
+    if (hash_due_) record(ruedo::log::kStateHashChannel, hash_);
     hash_due_ = false;
   }
 
@@ -83,7 +84,7 @@ class WatchedRun {
     applied.kind = 0;
     applied.size = static_cast<int32_t>(command.bytes.size());
     applied.data = command.bytes;
-    record("ruedo/applied", applied);
+    record(ruedo::log::kAppliedChannel, applied);
   }
 
   template <class Message>
