@@ -9,6 +9,7 @@
 
 #include "bus/stream_socket.h"
 #include "bus/unix_socket.h"
+#include "core/file_handle.h"
 #include "ruedo/client.h"
 #include "ruedo/errors.h"
 
@@ -20,7 +21,7 @@ bool has_route(const std::string& group, const std::string& port) {
   hints.ai_family = AF_INET;
   hints.ai_socktype = SOCK_DGRAM;
   if (getaddrinfo(group.c_str(), port.c_str(), &hints, &found) != 0) return false;
-  const bus::FileHandle socket(::socket(found->ai_family, found->ai_socktype | SOCK_CLOEXEC, 0));
+  const FileHandle socket(::socket(found->ai_family, found->ai_socktype | SOCK_CLOEXEC, 0));
   const bool connected = socket && ::connect(socket.get(), found->ai_addr, found->ai_addrlen) == 0;
   freeaddrinfo(found);
   return connected;

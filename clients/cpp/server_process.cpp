@@ -19,7 +19,6 @@
 #include <fstream>
 #include <sstream>
 #include <thread>
-#include <utility>
 
 #include "address.h"
 #include "core.h"
@@ -88,34 +87,34 @@ std::string find_ruedo(const std::string& installed) {
       "(`scripts/run` builds it)");
 }
 
-int bound_socket(int type, const char* host, uint16_t port) {
-  const int fd = socket(AF_INET, type | SOCK_CLOEXEC, 0);
+FileHandle bound_socket(int type, const char* host, uint16_t port) {
+  FileHandle bound(socket(AF_INET, type | SOCK_CLOEXEC, 0));
   sockaddr_in address{};
   address.sin_family = AF_INET;
   address.sin_port = htons(port);
   inet_pton(AF_INET, host, &address.sin_addr);
-  if (fd >= 0 && bind(fd, reinterpret_cast<const sockaddr*>(&address), sizeof address) == 0)
-    return fd;
-  if (fd >= 0) close(fd);
-  return -1;
+  if (bound &&
+      bind(bound.get(), reinterpret_cast<const sockaddr*>(&address), sizeof address) == 0)
+    return bound;
+  return FileHandle();
 }
 
-uint16_t port_of(int fd) {
+uint16_t port_of(const FileHandle& socket) {
   sockaddr_in address{};
   socklen_t size = sizeof address;
-  getsockname(fd, reinterpret_cast<sockaddr*>(&address), &size);
+  getsockname(socket.get(), reinterpret_cast<sockaddr*>(&address), &size);
   return ntohs(address.sin_port);
 }
 
 // A URL that nothing else uses. The TCP socket on the same port, kept open as `token`, keeps
 // launches of any process, in any language, apart from each other.
-std::string free_url(int& token) {
+std::string free_url(FileHandle& token) {
   for (int i = 0; i < 100; ++i) {
     token = bound_socket(SOCK_STREAM, "127.0.0.1", 0);
-    if (token < 0) break;
+    if (!token) break;
     const uint16_t port = port_of(token);
     if (!has_multicast_route()) {
-      close(std::exchange(token, -1));  // the server itself will listen on it
+      token = FileHandle();  // the server itself will listen on it
       static std::once_flag said;
       std::call_once(said, [&] {
         std::fprintf(stderr,
@@ -125,13 +124,9 @@ std::string free_url(int& token) {
       });
       return "tcpq://127.0.0.1:" + std::to_string(port);
     }
-    const int probe =
-        bound_socket(SOCK_DGRAM, "0.0.0.0", port);  // fails when any LCM program uses the port
-    if (probe >= 0) {
-      close(probe);
+    if (bound_socket(SOCK_DGRAM, "0.0.0.0", port))  // else an LCM program uses the port
       return "udpm://239.255.76.67:" + std::to_string(port) + "?ttl=0";
-    }
-    close(std::exchange(token, -1));
+    token = FileHandle();
   }
   throw LaunchError("no free UDP port was found in 100 tries");
 }
@@ -212,19 +207,20 @@ void ServerProcess::start(const std::vector<std::string>& command, bool verbose)
   int ends[2];
   if (pipe2(ends, O_CLOEXEC) != 0)
     throw LaunchError(std::string("no pipe for the server: ") + std::strerror(errno));
-  stdin_ = ends[1];
+  const FileHandle its_end(ends[0]);
+  stdin_ = FileHandle(ends[1]);
   if (!verbose) {
     const char* folder = std::getenv("TMPDIR");
     std::string name = std::string(folder && *folder ? folder : "/tmp") + "/ruedo-XXXXXX";
-    output_ = mkostemp(name.data(), O_CLOEXEC);
-    if (output_ >= 0) unlink(name.c_str());
+    output_ = FileHandle(mkostemp(name.data(), O_CLOEXEC));
+    if (output_) unlink(name.c_str());
   }
   posix_spawn_file_actions_t actions;
   posix_spawn_file_actions_init(&actions);
-  posix_spawn_file_actions_adddup2(&actions, ends[0], 0);
-  if (output_ >= 0) {
-    posix_spawn_file_actions_adddup2(&actions, output_, 1);
-    posix_spawn_file_actions_adddup2(&actions, output_, 2);
+  posix_spawn_file_actions_adddup2(&actions, its_end.get(), 0);
+  if (output_) {
+    posix_spawn_file_actions_adddup2(&actions, output_.get(), 1);
+    posix_spawn_file_actions_adddup2(&actions, output_.get(), 2);
   }
   // A session of its own: Ctrl-C in a terminal reaches this process alone, which may still use the
   // server.
@@ -238,7 +234,6 @@ void ServerProcess::start(const std::vector<std::string>& command, bool verbose)
       posix_spawn(&pid_, command[0].c_str(), &actions, &attributes, arguments.data(), environ);
   posix_spawn_file_actions_destroy(&actions);
   posix_spawnattr_destroy(&attributes);
-  close(ends[0]);
   if (error != 0) {
     pid_ = -1;
     throw LaunchError(command[0] + " cannot be started: " + std::strerror(error));
@@ -272,7 +267,7 @@ std::optional<std::string> ServerProcess::ended() {
 
 void ServerProcess::end() {
   std::lock_guard lock(mutex_);
-  if (stdin_ >= 0) close(std::exchange(stdin_, -1));
+  stdin_ = FileHandle();
   const auto deadline = std::chrono::steady_clock::now() + std::chrono::seconds(5);
   while (!poll()) {
     if (std::chrono::steady_clock::now() >= deadline) {
@@ -282,18 +277,18 @@ void ServerProcess::end() {
     }
     std::this_thread::sleep_for(std::chrono::milliseconds(5));
   }
-  if (output_ >= 0) close(std::exchange(output_, -1));
-  if (token_ >= 0) close(std::exchange(token_, -1));
+  output_ = FileHandle();
+  token_ = FileHandle();
   std::error_code gone_already;
   if (!folder_.empty()) fs::remove_all(folder_, gone_already);
 }
 
 std::string ServerProcess::last_lines() const {
-  if (output_ < 0) return "";
-  const off_t end = lseek(output_, 0, SEEK_END);
+  if (!output_) return "";
+  const off_t end = lseek(output_.get(), 0, SEEK_END);
   const off_t begin = std::max<off_t>(0, end - 4000);
   std::string text(static_cast<size_t>(end - begin), '\0');
-  const ssize_t read = pread(output_, text.data(), text.size(), begin);
+  const ssize_t read = pread(output_.get(), text.data(), text.size(), begin);
   text.resize(read > 0 ? static_cast<size_t>(read) : 0);
   while (!text.empty() && std::isspace(static_cast<unsigned char>(text.back()))) text.pop_back();
   size_t from = text.size();

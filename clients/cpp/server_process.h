@@ -13,6 +13,7 @@
 #include <string>
 #include <vector>
 
+#include "core/file_handle.h"
 #include "ruedo/client.h"
 
 namespace ruedo::client {
@@ -42,7 +43,7 @@ class ServerProcess {
   pid_t pid_ = -1;
   int status_ = 0;
   bool ended_ = false;
-  int stdin_ = -1, output_ = -1, token_ = -1;  // file descriptors
+  FileHandle stdin_, output_, token_;  // token_: keeps the port (free_url)
 };
 
 }  // namespace ruedo::client

@@ -14,10 +14,10 @@ namespace {
 constexpr std::chrono::milliseconds kAgain(100);
 constexpr std::chrono::microseconds kLookTime(50);
 
-bus::FileHandle socket_to(const Address& address) {
+FileHandle socket_to(const Address& address) {
   if (address.scheme == "unix") return bus::connect_unix(address.host);
   std::string why;
-  bus::FileHandle socket = bus::connect_tcp(address.host, address.port, why);
+  FileHandle socket = bus::connect_tcp(address.host, address.port, why);
   if (!socket)
     throw EnvironmentError("nothing listens at tcpq://" + address.host + ":" + address.port + " (" +
                            why + ")");

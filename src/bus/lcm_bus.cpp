@@ -82,9 +82,8 @@ void LcmBus::stop() {
   if (!thread_.joinable()) return;
   stopping_ = true;
   const uint64_t one = 1;
-  [[maybe_unused]] const ssize_t written = ::write(stop_event_, &one, sizeof one);
+  [[maybe_unused]] const ssize_t written = ::write(stop_event_.get(), &one, sizeof one);
   thread_.join();
-  ::close(stop_event_);
 }
 
 void LcmBus::publish(const std::string& channel, const uint8_t* data, size_t size) {
@@ -107,7 +106,7 @@ void LcmBus::listen(const std::vector<std::string>& channels, Handler handler,
   handler_ = std::move(handler);
   know(channels);
   open();
-  stop_event_ = ::eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK);
+  stop_event_ = FileHandle(::eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK));
   thread_ = std::thread([this] { read(); });
 }
 
@@ -117,7 +116,7 @@ void LcmBus::listen_to(const std::vector<std::string>& channels, const std::vect
   wanted_ = channels;
   waits_ = true;
   const uint64_t one = 1;
-  [[maybe_unused]] const ssize_t written = ::write(stop_event_, &one, sizeof one);
+  [[maybe_unused]] const ssize_t written = ::write(stop_event_.get(), &one, sizeof one);
   taken_up_.wait(lock, [this] { return !waits_; });
 }
 
@@ -200,7 +199,7 @@ void LcmBus::read() {
   auto pause = kFirstPause;
   for (;;) {
     const int file = stream_ ? stream_->file() : multicast_ ? multicast_->file() : in_->getFileno();
-    pollfd waiting[2] = {{lost ? -1 : file, POLLIN, 0}, {stop_event_, POLLIN, 0}};
+    pollfd waiting[2] = {{lost ? -1 : file, POLLIN, 0}, {stop_event_.get(), POLLIN, 0}};
     const int longest = lost    ? static_cast<int>(pause.count())
                         : loss_ ? static_cast<int>(kBetweenLooks.count())
                                 : -1;
@@ -209,7 +208,7 @@ void LcmBus::read() {
     if (waiting[1].revents != 0) {
       if (stopping_) return;
       uint64_t count;
-      [[maybe_unused]] const ssize_t got = ::read(stop_event_, &count, sizeof count);
+      [[maybe_unused]] const ssize_t got = ::read(stop_event_.get(), &count, sizeof count);
       take_up();
     }
     if (!lost && waiting[0].revents == 0) continue;

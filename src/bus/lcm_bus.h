@@ -24,6 +24,7 @@
 #include "bus/lcm_url.h"
 #include "bus/multicast_receiver.h"
 #include "bus/stream_connection.h"
+#include "core/file_handle.h"
 #include "ruedo/bus.h"
 
 namespace ruedo::bus {
@@ -77,7 +78,7 @@ class LcmBus : public Bus {
   Handler handler_;
   std::set<std::string, std::less<>> channels_;
   std::set<std::string> subscribed_;  // patterns, by in_
-  int stop_event_ = -1;               // to end, or to take up
+  FileHandle stop_event_;             // to end, or to take up
   std::atomic<bool> stopping_{false};
   std::mutex mutex_;
   std::condition_variable taken_up_;

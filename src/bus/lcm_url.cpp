@@ -14,8 +14,8 @@
 #include <poll.h>
 #include <sys/socket.h>
 
-#include "bus/file_handle.h"
 #include "bus/unix_socket.h"
+#include "core/file_handle.h"
 #include "ruedo/errors.h"
 
 namespace ruedo::bus {

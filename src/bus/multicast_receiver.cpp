@@ -15,7 +15,6 @@
 #include <linux/filter.h>
 #include <netinet/in.h>
 #include <sys/socket.h>
-#include <unistd.h>
 
 #include "core/big_endian.h"
 
@@ -38,36 +37,31 @@ std::string_view channel_at(const uint8_t* bytes, size_t size) {
 
 MulticastReceiver::MulticastReceiver(const std::string& group, uint16_t port, int buffer)
     : socket_(::socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0)), datagram_(kLargestDatagram) {
-  const auto check = [this](bool good, const char* what) {
-    if (good) return;
-    const int error = errno;
-    if (socket_ >= 0) ::close(socket_);
-    throw std::system_error(error, std::generic_category(), what);
+  const auto check = [](bool good, const char* what) {
+    if (!good) throw std::system_error(errno, std::generic_category(), what);
   };
-  check(socket_ >= 0, "socket");
+  check(static_cast<bool>(socket_), "socket");
   sockaddr_in address{};
   address.sin_family = AF_INET;
   address.sin_port = htons(port);
   check(::inet_pton(AF_INET, group.c_str(), &address.sin_addr) == 1, "inet_pton");
   const int on = 1;
-  check(::setsockopt(socket_, SOL_SOCKET, SO_REUSEADDR, &on, sizeof on) == 0, "SO_REUSEADDR");
-  check(::setsockopt(socket_, SOL_SOCKET, SO_REUSEPORT, &on, sizeof on) == 0, "SO_REUSEPORT");
+  check(::setsockopt(socket_.get(), SOL_SOCKET, SO_REUSEADDR, &on, sizeof on) == 0, "SO_REUSEADDR");
+  check(::setsockopt(socket_.get(), SOL_SOCKET, SO_REUSEPORT, &on, sizeof on) == 0, "SO_REUSEPORT");
   if (buffer > 0)
-    ::setsockopt(socket_, SOL_SOCKET, SO_RCVBUF, &buffer, sizeof buffer);  // as much as may be
-  check(::bind(socket_, reinterpret_cast<sockaddr*>(&address), sizeof address) == 0, "bind");
+    ::setsockopt(socket_.get(), SOL_SOCKET, SO_RCVBUF, &buffer, sizeof buffer);  // as much as may be
+  check(::bind(socket_.get(), reinterpret_cast<sockaddr*>(&address), sizeof address) == 0, "bind");
   ip_mreq membership{};
   membership.imr_multiaddr = address.sin_addr;
   membership.imr_interface.s_addr = htonl(INADDR_ANY);
-  check(::setsockopt(socket_, IPPROTO_IP, IP_ADD_MEMBERSHIP, &membership, sizeof membership) == 0,
+  check(::setsockopt(socket_.get(), IPPROTO_IP, IP_ADD_MEMBERSHIP, &membership, sizeof membership) == 0,
         "IP_ADD_MEMBERSHIP");
 }
-
-MulticastReceiver::~MulticastReceiver() { ::close(socket_); }
 
 bool MulticastReceiver::take(const Handler& handler) {
   sockaddr_in from{};
   socklen_t from_size = sizeof from;
-  const ssize_t got = ::recvfrom(socket_, datagram_.data(), datagram_.size(), MSG_DONTWAIT,
+  const ssize_t got = ::recvfrom(socket_.get(), datagram_.data(), datagram_.size(), MSG_DONTWAIT,
                                  reinterpret_cast<sockaddr*>(&from), &from_size);
   if (got < 0) return false;
   read(datagram_.data(), static_cast<size_t>(got),
@@ -150,7 +144,7 @@ bool MulticastReceiver::ignore(Sender sender) {
       {BPF_RET | BPF_K, 0, 0, 0xffffffff},
   };
   const sock_fprog program{static_cast<unsigned short>(std::size(code)), code};
-  return ::setsockopt(socket_, SOL_SOCKET, SO_ATTACH_FILTER, &program, sizeof program) == 0;
+  return ::setsockopt(socket_.get(), SOL_SOCKET, SO_ATTACH_FILTER, &program, sizeof program) == 0;
 }
 
 }  // namespace ruedo::bus

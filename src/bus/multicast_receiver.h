@@ -12,6 +12,8 @@
 #include <string_view>
 #include <vector>
 
+#include "core/file_handle.h"
+
 namespace ruedo::bus {
 
 // Not thread safe.
@@ -26,11 +28,8 @@ class MulticastReceiver {
   // Joins the group. buffer: bytes of the socket's buffer, 0: the system's. Throws
   // std::system_error.
   MulticastReceiver(const std::string& group, uint16_t port, int buffer);
-  ~MulticastReceiver();
-  MulticastReceiver(const MulticastReceiver&) = delete;
-  MulticastReceiver& operator=(const MulticastReceiver&) = delete;
 
-  int file() const { return socket_; }  // readable when take() has something
+  int file() const { return socket_.get(); }  // readable when take() has something
 
   struct Sender {
     uint32_t address = 0;  // IPv4 and port, in the host's byte order
@@ -61,7 +60,7 @@ class MulticastReceiver {
   void take_fragment(const uint8_t* bytes, size_t size, const Handler& handler);
   Partial* partial_of(uint32_t sequence, size_t size, size_t fragments);
 
-  int socket_;
+  FileHandle socket_;
   Sender sender_;
   std::vector<uint8_t> datagram_;
   std::list<Partial> partials_;  // the newest last

@@ -10,7 +10,7 @@
 #include <string_view>
 #include <vector>
 
-#include "bus/file_handle.h"
+#include "core/file_handle.h"
 
 namespace ruedo::bus {
 

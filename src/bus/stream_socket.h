@@ -3,7 +3,7 @@
 
 #include <string>
 
-#include "bus/file_handle.h"
+#include "core/file_handle.h"
 
 namespace ruedo::bus {
 

@@ -20,10 +20,10 @@
 #include <unordered_set>
 #include <vector>
 
-#include "bus/file_handle.h"
 #include "bus/lcm_url.h"
 #include "bus/message_ring.h"
 #include "bus/tcpq_wire.h"
+#include "core/file_handle.h"
 #include "ruedo/bus.h"
 
 namespace ruedo::bus {

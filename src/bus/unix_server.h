@@ -17,9 +17,9 @@
 #include <unordered_set>
 #include <vector>
 
-#include "bus/file_handle.h"
 #include "bus/lcm_url.h"
 #include "bus/tcpq_wire.h"
+#include "core/file_handle.h"
 #include "core/leftovers.h"
 #include "ruedo/bus.h"
 

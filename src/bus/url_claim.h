@@ -8,8 +8,8 @@
 #include <string>
 #include <thread>
 
-#include "bus/file_handle.h"
 #include "bus/lcm_url.h"
+#include "core/file_handle.h"
 
 namespace ruedo::bus {
 

@@ -80,29 +80,21 @@ BagLog::BagLog(const std::string& path) : log_(path) {
   const bool is_folder = !path.empty() && fs::is_directory(path, error);
   if (!is_folder && !is_mcap(path)) return;
   const std::string file = is_folder ? file_of_bag(path) : path;
-  std::string pattern = (fs::temp_directory_path() / "ruedo-bag-XXXXXX").string();
-  if (!mkdtemp(pattern.data()))
-    throw EnvironmentError(pattern + " cannot be made: " + std::strerror(errno));
-  folder_ = pattern;
+  try {
+    folder_.emplace("bag");
+  } catch (const std::runtime_error& failure) {
+    throw EnvironmentError(failure.what());
+  }
   try {
     restore(file, fs::path(is_folder ? fs::canonical(path) : fs::path(path)).stem().string());
   } catch (const fs::filesystem_error& failure) {
-    fs::remove_all(folder_, error);
     throw EnvironmentError(failure.what());
-  } catch (...) {
-    fs::remove_all(folder_, error);
-    throw;
   }
 }
 
-BagLog::~BagLog() {
-  std::error_code error;
-  if (!folder_.empty()) fs::remove_all(folder_, error);
-}
-
 void BagLog::restore(const std::string& file, const std::string& name) {
-  const fs::path run = fs::path(folder_) / "run";  // the log, and the world's files beside it
-  const std::string rest = (fs::path(folder_) / Rosbag::kRest).string();
+  const fs::path run = *folder_ / "run";  // the log, and the world's files beside it
+  const std::string rest = *folder_ / Rosbag::kRest;
   bool has_rest = false;
   read_mcap(file, {{}, [&](const std::string& name, uint64_t offset, uint64_t size) {
                      const bool is_rest = name == Rosbag::kRest;

@@ -4,7 +4,10 @@
 // (Rosbag).
 #pragma once
 
+#include <optional>
 #include <string>
+
+#include "model/child_process.h"
 
 namespace ruedo::cli {
 
@@ -14,9 +17,6 @@ class BagLog {
   // anything else ("" too) path() is that path. Throws InputError for a bag that is damaged, or
   // that has no scene; EnvironmentError where nothing can be written.
   explicit BagLog(const std::string& path);
-  ~BagLog();  // removes the folder
-  BagLog(const BagLog&) = delete;
-  BagLog& operator=(const BagLog&) = delete;
 
   const std::string& path() const { return log_; }
 
@@ -24,7 +24,8 @@ class BagLog {
   void restore(const std::string& file, const std::string& name);
   void join(const std::string& rest, const std::string& file);
 
-  std::string log_, folder_;
+  std::string log_;
+  std::optional<model::TemporaryFolder> folder_;
 };
 
 }  // namespace ruedo::cli

@@ -16,18 +16,16 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include "core/file_handle.h"
+
 namespace ruedo::cli {
 namespace {
 
 constexpr const char* kMark = "RUEDO_ISOLATED";
 
 bool write_to(const char* file, const std::string& text) {
-  const int descriptor = ::open(file, O_WRONLY | O_CLOEXEC);
-  if (descriptor < 0) return false;
-  const bool good =
-      ::write(descriptor, text.data(), text.size()) == static_cast<ssize_t>(text.size());
-  ::close(descriptor);
-  return good;
+  const FileHandle to(::open(file, O_WRONLY | O_CLOEXEC));
+  return to && write_all(to.get(), text.data(), text.size()) == text.size();
 }
 
 // This user is root in the new user namespace, as by `unshare -r`.
@@ -49,8 +47,7 @@ sockaddr address(const char* text) {
 
 // `ip link set lo up` and `ip route add 224.0.0.0/4 dev lo`.
 bool open_loopback() {
-  const int socket = ::socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0);
-  if (socket < 0) return false;
+  const FileHandle socket(::socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0));
   char name[] = "lo";
   ifreq link{};
   std::memcpy(link.ifr_name, name, sizeof name);
@@ -60,10 +57,8 @@ bool open_loopback() {
   route.rt_genmask = address("240.0.0.0");
   route.rt_flags = RTF_UP;
   route.rt_dev = name;
-  const bool good =
-      ::ioctl(socket, SIOCSIFFLAGS, &link) == 0 && ::ioctl(socket, SIOCADDRT, &route) == 0;
-  ::close(socket);
-  return good;
+  return ::ioctl(socket.get(), SIOCSIFFLAGS, &link) == 0 &&
+         ::ioctl(socket.get(), SIOCADDRT, &route) == 0;
 }
 
 bool enter() { return (::unshare(CLONE_NEWNET) == 0 || enter_as_root()) && open_loopback(); }

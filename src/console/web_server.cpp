@@ -18,6 +18,7 @@
 #include <libwebsockets.h>
 #include <spdlog/spdlog.h>
 
+#include "core/file_handle.h"
 #include "ruedo/errors.h"
 
 namespace ruedo::console {
@@ -34,19 +35,18 @@ constexpr lws_retry_bo_t kIdlePolicy = {nullptr, 0,  0,
 // failed.
 int checked_port(const WebPlace& place) {
   const Address& address = place.address;
-  const int probe = ::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
+  const FileHandle probe(::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0));
   const int one = 1;
-  ::setsockopt(probe, SOL_SOCKET, SO_REUSEADDR, &one, sizeof one);
+  ::setsockopt(probe.get(), SOL_SOCKET, SO_REUSEADDR, &one, sizeof one);
   sockaddr_in wanted{};
   wanted.sin_family = AF_INET;
   wanted.sin_port = htons(static_cast<uint16_t>(address.port));
   inet_pton(AF_INET, address.host.c_str(), &wanted.sin_addr);
-  const bool bound = ::bind(probe, reinterpret_cast<sockaddr*>(&wanted), sizeof wanted) == 0 &&
-                     ::listen(probe, 1) == 0;
+  const bool bound = ::bind(probe.get(), reinterpret_cast<sockaddr*>(&wanted), sizeof wanted) == 0 &&
+                     ::listen(probe.get(), 1) == 0;
   const int error = errno;
   socklen_t size = sizeof wanted;
-  if (bound) ::getsockname(probe, reinterpret_cast<sockaddr*>(&wanted), &size);
-  ::close(probe);
+  if (bound) ::getsockname(probe.get(), reinterpret_cast<sockaddr*>(&wanted), &size);
   if (!bound) {
     throw EnvironmentError(place.option + ": " + address.host + ":" + std::to_string(address.port) +
                            " cannot be served: " + std::strerror(error) +

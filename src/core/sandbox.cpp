@@ -12,6 +12,7 @@
 #include <sys/syscall.h>
 #include <unistd.h>
 
+#include "core/file_handle.h"
 #include "core/installation.h"
 #include "ruedo/errors.h"
 
@@ -48,24 +49,10 @@ uint64_t rights_over_files(int version) {
                          std::strerror(errno));
 }
 
-class File {
- public:
-  explicit File(int descriptor) : descriptor_(descriptor) {}
-  ~File() {
-    if (descriptor_ >= 0) ::close(descriptor_);
-  }
-  File(const File&) = delete;
-  File& operator=(const File&) = delete;
-  int get() const { return descriptor_; }
-
- private:
-  int descriptor_;
-};
-
-void allow(const File& ruleset, const std::string& path, uint64_t rights) {
-  const File file(::open(path.c_str(), O_PATH | O_CLOEXEC));
+void allow(const FileHandle& ruleset, const std::string& path, uint64_t rights) {
+  const FileHandle file(::open(path.c_str(), O_PATH | O_CLOEXEC));
   struct stat status{};
-  if (file.get() < 0 || ::fstat(file.get(), &status) != 0) return;  // not there
+  if (!file || ::fstat(file.get(), &status) != 0) return;  // not there
   landlock_path_beneath_attr beneath{};
   beneath.allowed_access = S_ISDIR(status.st_mode) ? rights : rights & kOfFiles;
   beneath.parent_fd = file.get();
@@ -118,8 +105,9 @@ void bound_files(const Sandbox& sandbox, int version) {
   const size_t size = version >= 6   ? sizeof attributes
                       : version >= 4 ? 2 * sizeof(uint64_t)
                                      : sizeof(uint64_t);
-  const File ruleset(static_cast<int>(syscall(SYS_landlock_create_ruleset, &attributes, size, 0)));
-  if (ruleset.get() < 0) fail("Landlock");
+  const FileHandle ruleset(
+      static_cast<int>(syscall(SYS_landlock_create_ruleset, &attributes, size, 0)));
+  if (!ruleset) fail("Landlock");
   if (!sandbox.alone) {
     for (const char* path : kSystem) allow(ruleset, path, reading);
     for (const char* path : kDevices) allow(ruleset, path, all);

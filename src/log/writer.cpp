@@ -48,9 +48,8 @@ Writer::Writer(int file, std::string name) : path_(std::move(name)), file_(file)
 Writer::~Writer() {
   flush();
   struct stat status{};
-  if (::fstat(file_, &status) == 0 && status.st_nlink > 0)
-    ::fdatasync(file_);  // what was closed must survive a power cut
-  ::close(file_);
+  if (::fstat(file_.get(), &status) == 0 && status.st_nlink > 0)
+    ::fdatasync(file_.get());  // what was closed must survive a power cut
 }
 
 void Writer::write(int64_t timestamp_us, const std::string& channel, const uint8_t* data,
@@ -68,21 +67,14 @@ void Writer::write(int64_t timestamp_us, const std::string& channel, const uint8
 }
 
 void Writer::flush() {
-  size_t done = 0;
-  while (done < buffer_.size() && error_.empty()) {
-    const ssize_t count = ::write(file_, buffer_.data() + done, buffer_.size() - done);
-    if (count < 0 && errno == EINTR) continue;
-    if (count <= 0) {
-      const int error_number = count < 0 ? errno : ENOSPC;
-      size_t whole = 0;
-      for (size_t end : ends_) whole = end <= done ? end : whole;
-      written_ += static_cast<int64_t>(whole);
-      fail(error_number);
-      break;
-    }
-    done += static_cast<size_t>(count);
+  if (error_.empty()) {
+    const size_t done = write_all(file_.get(), buffer_.data(), buffer_.size());
+    const int error_number = errno;
+    size_t whole = 0;  // bytes of whole events
+    for (size_t end : ends_) whole = end <= done ? end : whole;
+    written_ += static_cast<int64_t>(whole);
+    if (done < buffer_.size()) fail(error_number);
   }
-  if (error_.empty()) written_ += static_cast<int64_t>(buffer_.size());
   buffer_.clear();
   ends_.clear();
 }
@@ -92,11 +84,12 @@ void Writer::truncate() {
   ends_.clear();
   written_ = events_ = 0;
   error_.clear();
-  if (::ftruncate(file_, 0) != 0 || ::lseek(file_, 0, SEEK_SET) != 0) error_ = std::strerror(errno);
+  if (::ftruncate(file_.get(), 0) != 0 || ::lseek(file_.get(), 0, SEEK_SET) != 0)
+    error_ = std::strerror(errno);
 }
 
 std::string Writer::append(const Writer& other) {
-  const std::string fault = copy(other.file_, other.path_, 0, other.written_);
+  const std::string fault = copy(other.file_.get(), other.path_, 0, other.written_);
   if (fault.empty()) events_ = other.events_;
   return fault;
 }
@@ -119,12 +112,10 @@ std::string Writer::copy(int file, const std::string& path, int64_t begin, int64
   for (int64_t done = begin; done < end;) {
     const size_t wanted = std::min(piece.size(), static_cast<size_t>(end - done));
     const ssize_t got = ::pread(file, piece.data(), wanted, done);
+    if (got < 0 && errno == EINTR) continue;
     if (got <= 0) return got < 0 ? std::strerror(errno) : path + " is shorter than it was";
-    for (ssize_t put = 0; put < got;) {
-      const ssize_t count = ::write(file_, piece.data() + put, static_cast<size_t>(got - put));
-      if (count <= 0) return std::strerror(count < 0 ? errno : ENOSPC);
-      put += count;
-    }
+    if (write_all(file_.get(), piece.data(), static_cast<size_t>(got)) < static_cast<size_t>(got))
+      return std::strerror(errno);
     done += got;
   }
   written_ += end - begin;
@@ -133,7 +124,7 @@ std::string Writer::copy(int file, const std::string& path, int64_t begin, int64
 
 void Writer::fail(int error_number) {
   error_ = std::strerror(error_number);
-  if (::ftruncate(file_, written_) != 0) error_ += "; its last event is cut off";
+  if (::ftruncate(file_.get(), written_) != 0) error_ += "; its last event is cut off";
 }
 
 }  // namespace ruedo::log

@@ -8,6 +8,8 @@
 #include <string>
 #include <vector>
 
+#include "core/file_handle.h"
+
 namespace ruedo::log {
 
 class Writer {
@@ -48,7 +50,7 @@ class Writer {
   void fail(int error_number);
 
   std::string path_;
-  int file_ = -1;
+  FileHandle file_;
   std::vector<uint8_t> buffer_;
   std::vector<size_t> ends_;  // where the events in the buffer end
   int64_t written_ = 0;       // bytes of whole events in the file

@@ -15,6 +15,8 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include "core/file_handle.h"
+
 namespace ruedo::model {
 namespace {
 
@@ -52,19 +54,14 @@ void set_limit(decltype(RLIMIT_AS) which, rlim_t value) {
 class ProcessHandle {
  public:
   explicit ProcessHandle(pid_t process)
-      : fd_(static_cast<int>(::syscall(SYS_pidfd_open, process, 0))) {}
-  ~ProcessHandle() {
-    if (fd_ >= 0) ::close(fd_);
-  }
-  ProcessHandle(const ProcessHandle&) = delete;
-  ProcessHandle& operator=(const ProcessHandle&) = delete;
+      : handle_(static_cast<int>(::syscall(SYS_pidfd_open, process, 0))) {}
   void wait(int timeout_ms) const {
-    pollfd ended{fd_, POLLIN, 0};
+    pollfd ended{handle_.get(), POLLIN, 0};
     ::poll(&ended, 1, timeout_ms);  // ignores a negative descriptor
   }
 
  private:
-  int fd_;
+  FileHandle handle_;
 };
 
 void kill_group(pid_t process) {

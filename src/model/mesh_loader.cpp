@@ -13,6 +13,7 @@
 
 #include <Eigen/Geometry>
 
+#include "core/file_handle.h"
 #include "core/input_file.h"
 #include "core/installation.h"
 #include "core/progress.h"
@@ -125,16 +126,9 @@ void store(const std::string& folder, const std::string& name, const std::string
   std::error_code error;
   fs::create_directories(folder, error);
   std::string temporary = folder + "/new-XXXXXX";
-  const int file = ::mkstemp(temporary.data());
-  if (file < 0) return;
-  size_t written = 0;
-  while (written < bytes.size()) {
-    const ssize_t n = ::write(file, bytes.data() + written, bytes.size() - written);
-    if (n <= 0) break;
-    written += static_cast<size_t>(n);
-  }
-  ::close(file);
-  if (written == bytes.size())
+  const FileHandle file(::mkstemp(temporary.data()));
+  if (!file) return;
+  if (write_all(file.get(), bytes.data(), bytes.size()) == bytes.size())
     fs::rename(temporary, folder + "/" + name, error);
   else
     error = std::make_error_code(std::errc::io_error);

@@ -10,6 +10,15 @@
 #include "run/request_table.h"
 
 namespace ruedo::run {
+namespace {
+
+// It may contain names that a client made up: clients show them, and replies are kept.
+std::string fit_text(const std::string& text) {
+  if (text.size() <= Control::kLongestText) return for_terminal(text);
+  return for_terminal(text.substr(0, Control::kLongestText)) + "...";
+}
+
+}  // namespace
 
 bool Control::receive(const uint8_t* data, size_t size) {
   request_t request;
@@ -23,16 +32,6 @@ bool Control::receive(const uint8_t* data, size_t size) {
   inbox_.push_back(std::move(request));
   return true;
 }
-
-namespace {
-
-// It may contain names that a client made up: clients show them, and replies are kept.
-std::string fit_text(const std::string& text) {
-  if (text.size() <= Control::kLongestText) return for_terminal(text);
-  return for_terminal(text.substr(0, Control::kLongestText)) + "...";
-}
-
-}  // namespace
 
 void Control::serve() {
   sessions_.listen(std::chrono::steady_clock::now());

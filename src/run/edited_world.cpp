@@ -10,6 +10,7 @@
 #include <cstring>
 #include <filesystem>
 
+#include "core/file_handle.h"
 #include "core/input_file.h"
 #include "model/document.h"
 #include "ruedo/errors.h"
@@ -36,25 +37,15 @@ mode_t mode_for(const std::string& path) {
   return 0644;
 }
 
-bool write_all(int file, const std::string& bytes) {
-  for (size_t done = 0; done < bytes.size();) {
-    const ssize_t count = ::write(file, bytes.data() + done, bytes.size() - done);
-    if (count < 0 && errno == EINTR) continue;
-    if (count <= 0) return false;
-    done += static_cast<size_t>(count);
-  }
-  return true;
-}
-
 // What went wrong, or "". The old file stays intact until the new one is complete.
 std::string write_file(const std::string& path, const std::string& bytes) {
   const fs::path folder = fs::path(path).parent_path();
   std::string part = (folder / ("." + fs::path(path).filename().string() + ".XXXXXX")).string();
-  const int file = ::mkostemp(part.data(), O_CLOEXEC);
-  if (file < 0) return std::strerror(errno);
-  bool good = write_all(file, bytes) && ::fchmod(file, mode_for(path)) == 0 && ::fsync(file) == 0;
+  const FileHandle file(::mkostemp(part.data(), O_CLOEXEC));
+  if (!file) return std::strerror(errno);
+  bool good = write_all(file.get(), bytes.data(), bytes.size()) == bytes.size() &&
+              ::fchmod(file.get(), mode_for(path)) == 0 && ::fsync(file.get()) == 0;
   std::string fault = good ? "" : std::strerror(errno);
-  ::close(file);
   if (good && ::rename(part.c_str(), path.c_str()) != 0) {
     fault = std::strerror(errno);
     good = false;
@@ -63,10 +54,8 @@ std::string write_file(const std::string& path, const std::string& bytes) {
     ::unlink(part.c_str());
     return fault;
   }
-  if (const int opened = ::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC); opened >= 0) {
-    ::fsync(opened);
-    ::close(opened);
-  }
+  if (const FileHandle opened(::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC)); opened)
+    ::fsync(opened.get());
   return "";
 }
 

@@ -9,6 +9,7 @@
 #include <fcntl.h>
 #include <unistd.h>
 
+#include "core/file_handle.h"
 #include "log/reader.h"
 #include "ruedo/applied_t.hpp"
 #include "ruedo/decode.h"
@@ -55,11 +56,8 @@ class PartOfFile {
 
  private:
   static std::string synced(const std::string& path, int flags) {
-    const int file = ::open(path.c_str(), flags | O_CLOEXEC);
-    const bool good = file >= 0 && ::fsync(file) == 0;
-    const std::string fault = good ? "" : std::strerror(errno);
-    if (file >= 0) ::close(file);
-    return fault;
+    const FileHandle file(::open(path.c_str(), flags | O_CLOEXEC));
+    return file && ::fsync(file.get()) == 0 ? "" : std::strerror(errno);
   }
 
   std::string path_;

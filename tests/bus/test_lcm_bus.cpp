@@ -16,8 +16,8 @@
 
 #include <gtest/gtest.h>
 
-#include "bus/file_handle.h"
 #include "bus/tcpq_wire.h"
+#include "core/file_handle.h"
 #include "ruedo/errors.h"
 
 namespace ruedo::bus {

@@ -1,11 +1,12 @@
-// A file descriptor that closes itself.
+// A file descriptor that closes itself, and writing to one.
 #pragma once
 
+#include <cstddef>
 #include <utility>
 
 #include <unistd.h>
 
-namespace ruedo::bus {
+namespace ruedo {
 
 class FileHandle {
  public:
@@ -25,4 +26,8 @@ class FileHandle {
   int file_;
 };
 
-}  // namespace ruedo::bus
+// Writes all of the bytes, also where signals interrupt it. Returns how many were written: fewer
+// than `size` when writing failed, and errno says why.
+size_t write_all(int file, const void* data, size_t size);
+
+}  // namespace ruedo
