@@ -17,7 +17,6 @@
 namespace ruedo::bus::tcpq {
 
 inline constexpr uint32_t kServerMagic = 0x287617fa, kClientMagic = 0x287617fb, kVersion = 0x0100;
-inline constexpr uint16_t kDefaultPort = 7700;
 inline constexpr size_t kLongestChannel = 63;  // LCM's
 inline constexpr size_t kLongestPattern = 64 * 1024;
 inline constexpr size_t kLargestMessage = 4 * 1024 * 1024;  // from a client

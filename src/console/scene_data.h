@@ -23,14 +23,12 @@ struct Picture {
 model::WorldModel collision_shapes(const model::WorldModel& world);
 
 struct SceneData {
-  // For each link: int32 kind, int32 body (-1: static), float32 x, y, z, qw, qx, qy, qz of the link
-  // in its body, or in the world; little endian.
-  static constexpr size_t kLinkSize = 36;
-
   std::string json;
   // for each mesh its vertices (float32 x, y, z, nx, ny, nz, u, v), then its indices (uint32);
   // little endian
   Bytes meshes;
+  // for each link: int32 kind, int32 body (-1: static), float32 x, y, z, qw, qx, qy, qz of the link
+  // in its body, or in the world; little endian
   Bytes links;
   std::vector<Picture> pictures;  // in the order of the JSON's textures; empty if there is none
 

@@ -18,7 +18,6 @@ namespace ruedo::physics {
 
 namespace {
 
-constexpr double kUnbounded = 1e17;  // Bullet's "infinity" is 1e18 or more
 // relative to the diagonal: loops of joints contain redundant rows
 constexpr double kRegular = 1e-10;
 constexpr double kIndependent = 1e-6;  // part of a row's response that is independent of the others

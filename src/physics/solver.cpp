@@ -309,7 +309,6 @@ void Solver::sweep_until_still() {
   bool after_newton = false, shared = false;
   for (int i = 0; i < settings_.iterations; ++i) {
     const double worst = sweep(i);
-    ++sweeps_;
     if (i + 1 == settings_.iterations || (contact_count_ == 0 && blocks_.exact())) break;
     const bool still = worst <= settings_.tolerance_m_s;
     if (still && shared) break;
@@ -522,7 +521,6 @@ void Solver::write_back(double substep_s) {
 void Solver::solve(const std::vector<btRigidBody*>& bodies,
                    const std::vector<btPersistentManifold*>& manifolds,
                    const std::vector<btTypedConstraint*>& joints, double substep_s) {
-  sweeps_ = 0;
   newton_known_ = false;
   contact_count_ = 0;
   bodies_.clear();

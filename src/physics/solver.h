@@ -68,8 +68,6 @@ class Solver {
              const std::vector<btPersistentManifold*>& manifolds,
              const std::vector<btTypedConstraint*>& joints, double substep_s);
 
-  int sweeps() const { return sweeps_; }  // in the last call
-
  private:
   struct ContactRows {
     btManifoldPoint* point = nullptr;
@@ -114,7 +112,6 @@ class Solver {
 
   const ContactSurfaces& surfaces_;
   const SolverSettings settings_;
-  int sweeps_ = 0;
   SolverBodies bodies_;
   std::vector<ContactRows> contacts_;
   size_t contact_count_ = 0;

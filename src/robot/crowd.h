@@ -46,7 +46,6 @@ class Crowd {
   struct Group;  // a <ruedo:crowd>
   struct Person;
   struct Other;  // a moving body other than a crowd's person
-  struct Push;   // the forces of a tick
 
   void gather(const model::BodyLayout& layout);
   void add_other(const model::BodyLayout& layout, BodyIndex body);

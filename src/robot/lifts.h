@@ -83,7 +83,6 @@ class Lifts {
   bool is_there(const Way& way, double near) const;
   bool is_at(const Door& door, bool open) const;
   void move_door(Door& door);
-  void move_lift(Lift& lift);
   void next(Lift& lift);
   void set_target(Way& way, double target);
   void move(Way& way, const std::optional<model::Trapezoid>& motion);

@@ -170,24 +170,6 @@ const std::vector<Field>& fields_of(std::string_view type, Distro distro) {
   return found->second;
 }
 
-std::vector<std::string> message_types() {
-  std::vector<std::string> names;
-  for (const Definition& each : definitions()) {
-    if (std::string_view(each.name).find("/msg/") != std::string_view::npos)
-      names.push_back(each.name);
-  }
-  return names;
-}
-
-std::vector<std::string> service_types() {
-  std::vector<std::string> names;
-  for (const Definition& each : definitions()) {
-    if (std::string_view(each.name).find("/srv/") != std::string_view::npos)
-      names.push_back(each.name);
-  }
-  return names;
-}
-
 std::string full_text(std::string_view type, Distro distro) {
   const Library& known = library(distro);
   std::string text = known.texts.find(type)->second;

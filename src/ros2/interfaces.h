@@ -28,10 +28,6 @@ struct Field {
 // "pkg/srv/Name_Response". The name must be known.
 const std::vector<Field>& fields_of(std::string_view type, Distro distro);
 
-// Every message, and every service as "pkg/srv/Name".
-std::vector<std::string> message_types();
-std::vector<std::string> service_types();
-
 // The definition followed by those that it uses, as in a bag ("ros2msg").
 std::string full_text(std::string_view type, Distro distro);
 

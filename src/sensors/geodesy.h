@@ -30,7 +30,6 @@ class Globe {
   Vec3 east_north_up_at(const Geodetic& place, const Vec3& v_W) const;
   // The inverse, in the world's axes.
   Vec3 in_world(const Vec3& v_ecef) const { return R_EW_.transpose() * v_ecef; }
-  Vec3 in_ecef(const Vec3& v_W) const { return R_EW_ * v_W; }
   Vec3 to_ecef(const Vec3& p_W) const { return origin_ + R_EW_ * p_W; }
 
  private:
