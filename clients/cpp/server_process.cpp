@@ -93,8 +93,7 @@ FileHandle bound_socket(int type, const char* host, uint16_t port) {
   address.sin_family = AF_INET;
   address.sin_port = htons(port);
   inet_pton(AF_INET, host, &address.sin_addr);
-  if (bound &&
-      bind(bound.get(), reinterpret_cast<const sockaddr*>(&address), sizeof address) == 0)
+  if (bound && bind(bound.get(), reinterpret_cast<const sockaddr*>(&address), sizeof address) == 0)
     return bound;
   return FileHandle();
 }

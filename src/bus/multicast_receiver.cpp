@@ -48,13 +48,14 @@ MulticastReceiver::MulticastReceiver(const std::string& group, uint16_t port, in
   const int on = 1;
   check(::setsockopt(socket_.get(), SOL_SOCKET, SO_REUSEADDR, &on, sizeof on) == 0, "SO_REUSEADDR");
   check(::setsockopt(socket_.get(), SOL_SOCKET, SO_REUSEPORT, &on, sizeof on) == 0, "SO_REUSEPORT");
-  if (buffer > 0)
-    ::setsockopt(socket_.get(), SOL_SOCKET, SO_RCVBUF, &buffer, sizeof buffer);  // as much as may be
+  // The system gives at most its own limit.
+  if (buffer > 0) ::setsockopt(socket_.get(), SOL_SOCKET, SO_RCVBUF, &buffer, sizeof buffer);
   check(::bind(socket_.get(), reinterpret_cast<sockaddr*>(&address), sizeof address) == 0, "bind");
   ip_mreq membership{};
   membership.imr_multiaddr = address.sin_addr;
   membership.imr_interface.s_addr = htonl(INADDR_ANY);
-  check(::setsockopt(socket_.get(), IPPROTO_IP, IP_ADD_MEMBERSHIP, &membership, sizeof membership) == 0,
+  check(::setsockopt(socket_.get(), IPPROTO_IP, IP_ADD_MEMBERSHIP, &membership,
+                     sizeof membership) == 0,
         "IP_ADD_MEMBERSHIP");
 }
 
@@ -83,8 +84,10 @@ void MulticastReceiver::read(const uint8_t* bytes, size_t size, Sender sender,
 
 void MulticastReceiver::take_fragment(const uint8_t* bytes, size_t size, const Handler& handler) {
   if (size <= kFragmentHead) return;
-  const size_t total = read_big_endian<uint32_t>(bytes + 8), offset = read_big_endian<uint32_t>(bytes + 12),
-               number = read_big_endian<uint16_t>(bytes + 16), of = read_big_endian<uint16_t>(bytes + 18);
+  const size_t total = read_big_endian<uint32_t>(bytes + 8),
+               offset = read_big_endian<uint32_t>(bytes + 12),
+               number = read_big_endian<uint16_t>(bytes + 16),
+               of = read_big_endian<uint16_t>(bytes + 18);
   const uint8_t* data = bytes + kFragmentHead;
   size_t length = size - kFragmentHead;
   std::string_view channel;

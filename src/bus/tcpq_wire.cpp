@@ -60,9 +60,7 @@ void append_publish(std::vector<uint8_t>& out, std::string_view channel,
   out.insert(out.end(), data.begin(), data.end());
 }
 
-uint32_t Reader::number(size_t at) const {
-  return read_big_endian<uint32_t>(&buffer_[read_ + at]);
-}
+uint32_t Reader::number(size_t at) const { return read_big_endian<uint32_t>(&buffer_[read_ + at]); }
 
 Reader::Result Reader::next(Frame& frame) {
   if (!greeted_) {

@@ -42,8 +42,9 @@ int checked_port(const WebPlace& place) {
   wanted.sin_family = AF_INET;
   wanted.sin_port = htons(static_cast<uint16_t>(address.port));
   inet_pton(AF_INET, address.host.c_str(), &wanted.sin_addr);
-  const bool bound = ::bind(probe.get(), reinterpret_cast<sockaddr*>(&wanted), sizeof wanted) == 0 &&
-                     ::listen(probe.get(), 1) == 0;
+  const bool bound =
+      ::bind(probe.get(), reinterpret_cast<sockaddr*>(&wanted), sizeof wanted) == 0 &&
+      ::listen(probe.get(), 1) == 0;
   const int error = errno;
   socklen_t size = sizeof wanted;
   if (bound) ::getsockname(probe.get(), reinterpret_cast<sockaddr*>(&wanted), &size);

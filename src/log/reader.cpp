@@ -40,7 +40,8 @@ Reader::Reader(const std::string& path) : path_(path) {
   file_ = std::move(input.file);
   size_ = input.size;
   std::array<uint8_t, 4> sync{};
-  if (size_ > 0 && (!read(sync.data(), sync.size()) || read_big_endian<uint32_t>(sync.data()) != kLogSync)) {
+  if (size_ > 0 &&
+      (!read(sync.data(), sync.size()) || read_big_endian<uint32_t>(sync.data()) != kLogSync)) {
     if (read_big_endian<uint32_t>(sync.data()) == kMcap) refuse_bag(path);
     throw InputError({path}, "is not an LCM log: it does not begin with the sync word EDA1DA01");
   }
@@ -90,7 +91,8 @@ bool Reader::read_event(Event& event, const std::function<bool(const std::string
   if (!read(head.data(), head.size())) return offset_ == begin ? false : cut_off();
   const uint32_t channel_size = read_big_endian<uint32_t>(head.data() + 20);
   const uint32_t data_size = read_big_endian<uint32_t>(head.data() + 24);
-  if (read_big_endian<uint32_t>(head.data()) != kLogSync || channel_size > kMaxChannel || data_size > kMaxData) {
+  if (read_big_endian<uint32_t>(head.data()) != kLogSync || channel_size > kMaxChannel ||
+      data_size > kMaxData) {
     fault_ = "damaged at byte " + std::to_string(begin);
     return false;
   }

@@ -4,8 +4,8 @@
 // waits in the pacer, the modules at their queues. So the change needs no lock against any of them.
 #include <spdlog/spdlog.h>
 
-#include "engine/edits.h"
 #include "core/channel_names.h"
+#include "engine/edits.h"
 #include "engine/world_state.h"
 #include "log/header.h"
 #include "ruedo/applied_t.hpp"
