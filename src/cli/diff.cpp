@@ -26,11 +26,7 @@ void write_file(const std::string& path, const std::string& text) {
 
 int diff(const DiffArguments& arguments) {
   read_given_types();
-  std::vector<log::DiffRule> rules;
-  for (const std::string& text : arguments.tolerances)
-    rules.push_back(log::DiffRule::parse(text, false));
-  for (const std::string& text : arguments.ignored)
-    rules.push_back(log::DiffRule::parse(text, true));
+  const auto rules = log::DiffRule::all(arguments.tolerances, arguments.ignored);
   const log::Diff result = log::diff_logs(arguments.golden, arguments.other, rules);
   fmt::print("{}", for_terminal(log::diff_text(result)));
   if (!arguments.junit.empty()) write_file(arguments.junit, log::diff_junit(result));

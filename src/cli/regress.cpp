@@ -128,11 +128,7 @@ void write_file(const std::string& path, const std::string& text) {
 std::string compare(const RegressArguments& arguments, const std::string& kept) {
   if (!fs::exists(arguments.golden))
     return "there is no golden log " + arguments.golden + " yet: run this once with RUEDO_RENEW=1";
-  std::vector<log::DiffRule> rules;
-  for (const std::string& text : arguments.tolerances)
-    rules.push_back(log::DiffRule::parse(text, false));
-  for (const std::string& text : arguments.ignored)
-    rules.push_back(log::DiffRule::parse(text, true));
+  const auto rules = log::DiffRule::all(arguments.tolerances, arguments.ignored);
   const log::Diff result = log::diff_logs(arguments.golden, kept, rules);
   if (!arguments.junit.empty()) write_file(arguments.junit, log::diff_junit(result));
   if (!arguments.html.empty())

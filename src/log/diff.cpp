@@ -178,19 +178,28 @@ class Stamps {
   bool more_;
 };
 
+// Of the fields that "CHANNEL" or "CHANNEL:FIELD" names.
+DiffRule rule_for(std::string_view place) {
+  DiffRule rule;
+  const size_t colon = place.find(':');
+  rule.channel = place.substr(0, colon);
+  if (colon != std::string_view::npos) rule.field = place.substr(colon + 1);
+  if (rule.channel.empty() || rule.field.empty())
+    throw InputError({}, "\"" + std::string(place) + "\" does not name CHANNEL or CHANNEL:FIELD");
+  return rule;
+}
+
 }  // namespace
 
-DiffRule DiffRule::parse(std::string_view text, bool ignore) {
-  DiffRule rule;
-  rule.ignore = ignore;
-  const size_t equals = ignore ? std::string_view::npos : text.find('=');
-  const std::string_view where = text.substr(0, equals);
-  const size_t colon = where.find(':');
-  rule.channel = where.substr(0, colon);
-  if (colon != std::string_view::npos) rule.field = where.substr(colon + 1);
-  if (rule.channel.empty() || rule.field.empty())
-    throw InputError({}, "\"" + std::string(text) + "\" does not name CHANNEL or CHANNEL:FIELD");
-  if (ignore) return rule;
+DiffRule DiffRule::ignoring(std::string_view text) {
+  DiffRule rule = rule_for(text);
+  rule.ignore = true;
+  return rule;
+}
+
+DiffRule DiffRule::tolerance(std::string_view text) {
+  const size_t equals = text.find('=');
+  DiffRule rule = rule_for(text.substr(0, equals));
   if (equals == std::string_view::npos) {
     throw InputError({}, "tolerance \"" + std::string(text) +
                              "\" is not of the form CHANNEL:FIELD=abs:1e-3,rel:0.01,angle:0.02");
@@ -215,6 +224,14 @@ DiffRule DiffRule::parse(std::string_view text, bool ignore) {
                                "\" is none of abs, rel, angle");
   }
   return rule;
+}
+
+std::vector<DiffRule> DiffRule::all(const std::vector<std::string>& tolerances,
+                                    const std::vector<std::string>& ignored) {
+  std::vector<DiffRule> rules;
+  for (const std::string& text : tolerances) rules.push_back(tolerance(text));
+  for (const std::string& text : ignored) rules.push_back(ignoring(text));
+  return rules;
 }
 
 bool Diff::same() const {

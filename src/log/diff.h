@@ -24,9 +24,13 @@ struct DiffRule {
   double relative = 0.0;  // of the golden value
   double angle = -1.0;    // rad, of the difference wrapped into (-pi, pi]; below 0: not an angle
 
-  // Reads "CHANNEL:FIELD=abs:1e-3,rel:0.01,angle:0.02" and, with ignore, "CHANNEL" or
-  // "CHANNEL:FIELD". Throws InputError.
-  static DiffRule parse(std::string_view text, bool ignore);
+  // Reads "CHANNEL:FIELD=abs:1e-3,rel:0.01,angle:0.02". Throws InputError.
+  static DiffRule tolerance(std::string_view text);
+  // Reads "CHANNEL" or "CHANNEL:FIELD". Throws InputError.
+  static DiffRule ignoring(std::string_view text);
+  // The rules of a command line. Throws InputError.
+  static std::vector<DiffRule> all(const std::vector<std::string>& tolerances,
+                                   const std::vector<std::string>& ignored);
 };
 
 struct FieldDifference {

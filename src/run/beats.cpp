@@ -41,20 +41,26 @@ void InfoBeat::say() {
   last_ = std::chrono::steady_clock::now();
 }
 
-state_hash_t HashBeat::now(bool last) const {
+state_hash_t HashBeat::now() const {
   state_hash_t hash;
   hash.utime = publisher_.time_us();
   hash.step = publisher_.step();
   hash.epoch = publisher_.epoch();
   hash.state_hash = publisher_.latest() ? engine::state_hash(*publisher_.latest())
                                         : 0;  // a run may end before its first state
-  hash.last = last;
+  hash.last = false;
+  return hash;
+}
+
+state_hash_t HashBeat::at_end() const {
+  state_hash_t hash = now();
+  hash.last = true;
   return hash;
 }
 
 void HashBeat::end_step(const Step& step) {
   if (beat_.due(step.step) && publisher_.has_recorders())
-    publisher_.record(kStateHashChannel, now(false));
+    publisher_.record(kStateHashChannel, now());
 }
 
 void WatchdogWarnings::end_step(const Step& step) {

@@ -92,8 +92,9 @@ class HashBeat : public Sink {
  public:
   HashBeat(Publisher& publisher, int64_t step_us) : publisher_(publisher), beat_({1, 1}, step_us) {}
 
-  // Of the state as it is now. last: the run ends with it.
-  state_hash_t now(bool last) const;
+  // Of the state as it is now.
+  state_hash_t now() const;
+  state_hash_t at_end() const;  // the same, as a run or a snapshot ends with it
 
   Hears hears() const override { return {.samples = false, .repeated = true}; }
   void message(const Published&) override {}

@@ -35,12 +35,13 @@ void Run::let_go() {
   wakeup_.set();  // for requests that came meanwhile
 }
 
-Run::Outcome Run::change(const request_t& request, bool models,
+Run::Outcome Run::change(const request_t& request, Changes what,
                          const std::function<Outcome()>& apply) {
   if (!mode().has_room())
     return Outcome::refuse(reply_t::REFUSED,
                            "not all clients have the messages of the last steps: ask again");
   if (!stand_still()) return Outcome::refuse(reply_t::REFUSED, "the run is over");
+  const bool models = what == Changes::models;
   Outcome outcome;
   {
     const std::lock_guard lock(simulation_mutex_);
@@ -56,7 +57,7 @@ Run::Outcome Run::change(const request_t& request, bool models,
     changed_.time = publisher_.time_us();
     publisher_.change_latest(changed_);
     if (models) announce();
-    if (models && !repeating_) info_beat_.say();
+    if (models && !repeating_) beats_.info.say();
     show_change();
   }
   let_go();
@@ -125,8 +126,8 @@ Run::Outcome Run::reset_all(const request_t& request, int64_t seed) {
 }
 
 Run::Outcome Run::reset_poses(const request_t& request) {
-  const Outcome outcome =
-      change(request, false, [&] { return engine::reset_poses(*simulation_), Outcome{}; });
+  const Outcome outcome = change(request, Changes::states,
+                                 [&] { return engine::reset_poses(*simulation_), Outcome{}; });
   return outcome.code == reply_t::OK ? Outcome::with(engine::encoded(state())) : outcome;
 }
 
@@ -179,7 +180,7 @@ void Run::spawn_ready() {
 Run::Outcome Run::put_in(const request_t& request, const spawn_request_t& body,
                          const model::LoadedModel& loaded) {
   std::string name;
-  const Outcome outcome = change(request, true, [&] {
+  const Outcome outcome = change(request, Changes::models, [&] {
     return engine::spawn(body, loaded, publisher_.step() + 1, *simulation_, channels_, name);
   });
   if (outcome.code == reply_t::OK) note_files(loaded.files_read);
@@ -196,15 +197,16 @@ Run::Outcome Run::put_in(const request_t& request, const spawn_request_t& body,
 }
 
 Run::Outcome Run::remove(const request_t& request, const name_request_t& body) {
-  const Outcome outcome =
-      change(request, true, [&] { return engine::remove(body.name, *simulation_, channels_); });
+  const Outcome outcome = change(
+      request, Changes::models, [&] { return engine::remove(body.name, *simulation_, channels_); });
   if (outcome.code == reply_t::OK && edited_) edited_->removed(body.name);
   return outcome;
 }
 
 Run::Outcome Run::set_pose(const request_t& request, const set_pose_request_t& body) {
-  const bool fixed = engine::is_fixed(*world_, body.name);
-  const Outcome outcome = change(request, fixed, [&] {
+  // A fixed model is removed and added again.
+  const Changes what = engine::is_fixed(*world_, body.name) ? Changes::models : Changes::states;
+  const Outcome outcome = change(request, what, [&] {
     return engine::set_pose(body, publisher_.step() + 1, *simulation_, channels_);
   });
   if (outcome.code == reply_t::OK && edited_) edited_->put(body.name);
@@ -233,7 +235,7 @@ std::string Run::model_text(const std::string& name) const {
 }
 
 Run::Outcome Run::set_twist(const request_t& request, const set_twist_request_t& body) {
-  return change(request, false, [&] { return engine::set_twist(body, *simulation_); });
+  return change(request, Changes::states, [&] { return engine::set_twist(body, *simulation_); });
 }
 
 }  // namespace ruedo::run

@@ -182,7 +182,7 @@ Outcome Run::set_rate(const request_t&, const rate_request_t& body) {
 }
 
 Outcome Run::say_info(const request_t&) {
-  info_beat_.say();
+  beats_.info.say();
   return {};
 }
 

@@ -45,14 +45,15 @@ Run::Run(std::shared_ptr<const model::WorldModel> world, RunOptions options, Bus
                       })),
       wanted_{options_.rate, options_.paused},
       bus_sink_(bus),
-      hashes_(publisher_, world_->step_us),
-      watchdogs_(publisher_, world_->step_us, [this](size_t robot) { tell_watchdog(robot); }),
-      ticks_(publisher_, run_id_, mode_->takes_grants() ? Rate{} : engine::kTickRate,
-             world_->step_us,
-             [this](TickWriter& tick, int64_t step) {
-               mode().add_applied(tick, step, control_.sessions().list());
-             }),
-      info_beat_(publisher_, world_->step_us, [this] { return pacer_->paused(); }),
+      beats_{.hashes = {publisher_, world_->step_us},
+             .watchdogs = {publisher_, world_->step_us,
+                           [this](size_t robot) { tell_watchdog(robot); }},
+             .ticks = {publisher_, run_id_, mode_->takes_grants() ? Rate{} : engine::kTickRate,
+                       world_->step_us,
+                       [this](TickWriter& tick, int64_t step) {
+                         mode().add_applied(tick, step, control_.sessions().list());
+                       }},
+             .info = {publisher_, world_->step_us, [this] { return pacer_->paused(); }}},
       on_stall_(
           [](const std::string& reason) { spdlog::warn("the run does not go on: {}", reason); }),
       worker_(models_, wakeup_, options_.before_model),
@@ -93,10 +94,10 @@ void Run::add_sinks() {
   if (journal_) publisher_.add(*journal_);
   if (watcher_) publisher_.add(*watcher_);
   if (Sink* sink = mode_->sink()) publisher_.add(*sink);
-  publisher_.add(hashes_);
-  publisher_.add(watchdogs_);
-  publisher_.add(ticks_);
-  publisher_.add(info_beat_);
+  publisher_.add(beats_.hashes);
+  publisher_.add(beats_.watchdogs);
+  publisher_.add(beats_.ticks);
+  publisher_.add(beats_.info);
 }
 
 Control::Host Run::control_host() {
@@ -226,8 +227,8 @@ Run::Clock::time_point Run::attend() {
   const Clock::time_point now = Clock::now();
   // A sign of life each second, also while the run stands still, a step takes long, or a snapshot
   // is restored.
-  const auto last_sign = [this] { return std::max(info_beat_.last(), ticks_.last()); };
-  if (now >= last_sign() + kPausedInfoPeriod) info_beat_.say();
+  const auto last_sign = [this] { return std::max(beats_.info.last(), beats_.ticks.last()); };
+  if (now >= last_sign() + kPausedInfoPeriod) beats_.info.say();
   Mode::Attended attended;
   {
     const std::lock_guard lock(simulation_mutex_);
@@ -285,7 +286,7 @@ void Run::finish() {
     control_.serve();
   }
   control_.cancel("the run has ended");
-  publisher_.record(kStateHashChannel, hashes_.now(true));
+  publisher_.record(kStateHashChannel, beats_.hashes.at_end());
   publisher_.flush();
   if (log_) {
     log_->drain();

@@ -193,8 +193,9 @@ class Run {
   // Requests that change the world between two steps; in edit_requests.cpp.
   bool stand_still();  // false: the run is over
   void let_go();
-  // Applies a change to the world that stands still, and notes it. models: some come or go.
-  Outcome change(const request_t& request, bool models, const std::function<Outcome()>& apply);
+  enum class Changes { states, models };  // models: some come or go
+  // Applies a change to the world that stands still, and notes it.
+  Outcome change(const request_t& request, Changes what, const std::function<Outcome()>& apply);
   void show_change();
   Outcome reset(const request_t& request, const reset_request_t& body);
   Outcome reset_all(const request_t& request, int64_t seed);
@@ -211,6 +212,15 @@ class Run {
   Outcome set_twist(const request_t& request, const set_twist_request_t& body);
   Outcome save(const request_t&);
 
+  // What is published at fixed rates of sim time.
+  struct Beats {
+    HashBeat hashes;
+    WatchdogWarnings watchdogs;
+    Ticks ticks;
+    InfoBeat info;
+  };
+
+  // The world that runs, and what clients know of it.
   const std::shared_ptr<const model::WorldModel> first_world_;  // as it was loaded
   std::shared_ptr<const model::WorldModel> world_;
   RunOptions options_;
@@ -218,7 +228,6 @@ class Run {
   const int64_t run_id_;
   int32_t epoch_ = 0;
   bool as_made_ = true;  // no model came or went in this epoch, and sim time was not reset
-  uint64_t audience_ = UINT64_MAX;  // of the publisher, when the simulation was told what is read
   engine::Channels channels_;
   engine::SimulationChannels own_;
   std::string request_channel_;  // as it is called on the bus; "": none
@@ -226,6 +235,7 @@ class Run {
   engine::Wakeup wakeup_;  // a batch is finished, a request has come, or the end
   std::atomic<bool> stop_{false};
 
+  // How it goes on.
   std::mutex
       simulation_mutex_;  // of the world and the mode: commands reach them from other threads
   std::unique_ptr<Pacer> pacer_;
@@ -234,25 +244,29 @@ class Run {
   std::unique_ptr<Repeating> repeating_;  // before that mode goes on; null: nothing is repeated
   Pace wanted_;                           // by the clients, once nothing is repeated
 
+  // What it publishes, and to whom.
   Publisher publisher_;
+  uint64_t audience_ = UINT64_MAX;  // of the publisher, when the simulation was told what is read
   BusSink bus_sink_;
   std::unique_ptr<LogSink> log_;  // null: none, as the next two
   std::unique_ptr<WatcherSink> watcher_;
   std::unique_ptr<Journal> journal_;
-  SavedStates saved_states_;
-  std::shared_ptr<engine::Plan> plan_of_saved_;  // of their worlds
-  HashBeat hashes_;
-  WatchdogWarnings watchdogs_;
-  Ticks ticks_;
-  InfoBeat info_beat_;
+  Beats beats_;
   log_header_t header_;       // of this epoch
   bool header_made_ = false;  // those who only look on (ROS 2, Foxglove) come later, and need none
-  Snapshot changed_;          // the last state, after requests
+
+  // What SNAPSHOT keeps beside its files.
+  SavedStates saved_states_;
+  std::shared_ptr<engine::Plan> plan_of_saved_;  // of their worlds
+
+  // Who is told in this process.
   std::function<void(const Status&)> on_status_;
   std::function<void(const std::string&)> on_stall_;
   std::function<void(const Snapshot&)> on_state_;
   Clock::time_point next_status_;
 
+  // What requests change.
+  Snapshot changed_;                     // the last state, after requests
   std::unique_ptr<EditedWorld> edited_;  // null: it is not edited
   engine::ModelStore models_{first_world_->file};
   ModelWorker worker_;                     // of SPAWNs

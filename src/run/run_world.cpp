@@ -122,7 +122,7 @@ void Run::end_repeat(bool paused) {
     publisher_.mute(false);
     mode_->begin(stage(), publisher_.step());
   }
-  info_beat_.say();
+  beats_.info.say();
 }
 
 }  // namespace ruedo::run

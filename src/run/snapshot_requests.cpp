@@ -58,8 +58,8 @@ Outcome Run::snapshot(const request_t& request) {
   saved_states_.forget(journal_->snapshot_path(name));
   if (is_past) return snapshot_of(past);
   const bool stands = keeps_states() && stand_still();
-  const std::string fault =
-      journal_->save_snapshot(name, hashes_.now(true), publisher_.base_us() + publisher_.time_us());
+  const std::string fault = journal_->save_snapshot(name, beats_.hashes.at_end(),
+                                                    publisher_.base_us() + publisher_.time_us());
   if (stands && fault.empty()) keep_state(journal_->snapshot_path(name));
   const Outcome outcome =
       fault.empty() ? Outcome::with(engine::encoded(state()))
@@ -122,7 +122,7 @@ Outcome Run::put_back(const SavedState& saved, const std::string& path) {
   }
   announce();
   journal_->begin_with(header_, publisher_.base_us(), path, saved.journal);
-  info_beat_.say();
+  beats_.info.say();
   Outcome outcome = Outcome::with(engine::encoded(state()));
   anew ? simulation_->start(*pacer_) : let_go();
   return outcome;

@@ -56,10 +56,7 @@ class LogDiffTest : public testing::Test {
 
   log::Diff diff(const std::vector<std::string>& tolerances = {},
                  const std::vector<std::string>& ignored = {}) {
-    std::vector<log::DiffRule> rules;
-    for (const auto& text : tolerances) rules.push_back(log::DiffRule::parse(text, false));
-    for (const auto& text : ignored) rules.push_back(log::DiffRule::parse(text, true));
-    return log::diff_logs(golden_, other_, rules);
+    return log::diff_logs(golden_, other_, log::DiffRule::all(tolerances, ignored));
   }
 
   std::filesystem::path folder_;
@@ -180,9 +177,9 @@ TEST_F(LogDiffTest, ALengthThatLiesDoesNotTakeMemory) {
 TEST(DiffRule, RefusesWhatItCannotRead) {
   for (const char* text : {"", "a", "a:b", "a:b=x", "a:b=abs:-1", "a:b=abs:nan", "a:b=abs:1e-3x",
                            "a:b=size:1", ":b=1", "a:=1"}) {
-    EXPECT_THROW(log::DiffRule::parse(text, false), InputError) << text;
+    EXPECT_THROW(log::DiffRule::tolerance(text), InputError) << text;
   }
-  EXPECT_THROW(log::DiffRule::parse("", true), InputError);
+  EXPECT_THROW(log::DiffRule::ignoring(""), InputError);
 }
 
 TEST_F(LogDiffTest, ReportsEscapeWhatComesFromFiles) {
