@@ -460,6 +460,14 @@ def drive_commands(actions: NDArray[Any]) -> NDArray[np.float64]:
     return commands
 
 
+def drive_rewards(
+    progress: NDArray[np.float64], success: NDArray[np.bool_], collision: NDArray[np.bool_]
+) -> NDArray[np.float64]:
+    """Of a step towards a goal: progress in m, + 5 for success, - 5 for a collision, - 0.01."""
+    rewards: NDArray[np.float64] = progress + 5.0 * success - 5.0 * collision - 0.01
+    return rewards
+
+
 def seen(ranges: NDArray[np.float32]) -> NDArray[np.float32]:
     """A scan as a network likes it: divided by 8 m and cut at 1; what is nearer than the device can
     measure is 0.

@@ -20,7 +20,7 @@ from gymnasium.vector import AutoresetMode
 from numpy.typing import NDArray
 
 from ..rooms import Room, make_landmark_room
-from .base import DRIVE, Outcome, TaskEnv, TaskVectorEnv, drive_commands
+from .base import DRIVE, Outcome, TaskEnv, TaskVectorEnv, drive_commands, drive_rewards
 
 PIXELS = 64
 PILLAR_M = 0.8
@@ -78,7 +78,8 @@ class CameraVectorEnv(TaskVectorEnv):
         before, self._distance = self._distance, self._distances()
         success = self._distance < PILLAR_M
         collision = (self._touching > 0) & ~success
-        return before - self._distance + 5.0 * success - 5.0 * collision - 0.01, success, collision
+        rewards = drive_rewards(before - self._distance, success, collision)
+        return rewards, success, collision
 
     def _distances(self) -> NDArray[np.float64]:
         distances: NDArray[np.float64] = np.linalg.norm(

@@ -31,6 +31,7 @@ from .base import (
     checked_beams,
     clipped,
     drive_commands,
+    drive_rewards,
     seen,
 )
 
@@ -93,7 +94,7 @@ class CorridorVectorEnv(TaskVectorEnv):
         before, self._way = self._way, self._ways()
         success = self._way > self._lengths().sum(axis=1) - END_M
         collision = (self._touching > 0) & ~success
-        return self._way - before + 5.0 * success - 5.0 * collision - 0.01, success, collision
+        return drive_rewards(self._way - before, success, collision), success, collision
 
     def _lengths(self) -> NDArray[np.float64]:
         lengths: NDArray[np.float64] = np.linalg.norm(np.diff(self._middles, axis=1), axis=2)

@@ -29,6 +29,7 @@ from .base import (
     checked_actions,
     checked_beams,
     drive_commands,
+    drive_rewards,
 )
 from .navigate import GOAL_M, LIMITS, observation
 
@@ -139,7 +140,7 @@ class FleetEnv(MadeAnew, ParallelEnv):  # type: ignore[misc]    # PettingZoo's g
         before, self._distance = self._distance, self._distances()
         success = self._distance < GOAL_M
         collision = (self._touching > 0) & ~success
-        rewards = before - self._distance + 5.0 * success - 5.0 * collision - 0.01
+        rewards = drive_rewards(before - self._distance, success, collision)
         over = success | collision
         late = np.full(len(over), self._actions >= self.most_actions) & ~over
         infos = {

@@ -36,6 +36,7 @@ from .base import (
     checked_beams,
     clipped,
     drive_commands,
+    drive_rewards,
     seen,
 )
 
@@ -98,7 +99,8 @@ class NavigateVectorEnv(TaskVectorEnv):
         before, self._distance = self._distance, self._distances()
         success = self._distance < GOAL_M
         collision = (self._touching > 0) & ~success
-        return before - self._distance + 5.0 * success - 5.0 * collision - 0.01, success, collision
+        rewards = drive_rewards(before - self._distance, success, collision)
+        return rewards, success, collision
 
     def _distances(self) -> NDArray[np.float64]:
         ahead = self._goals - self._places[:, 0, :2]
