@@ -58,8 +58,8 @@ class Control {
   // Any thread. False for what is not a request.
   bool receive(const uint8_t* data, size_t size);
 
-  // The publisher's, often: executes what waits. Where it was not called for seconds (a long
-  // request, a stopped process), no client is blamed for its silence.
+  // Executes the waiting requests; called often, by the publisher's thread. After seconds without a
+  // call (a long request, a stopped process), no client is blamed for its silence.
   void serve();
   // Answers those that waited for a state up to `step`.
   void published(int64_t step);

@@ -41,7 +41,7 @@ class ModelWorker {
   ModelWorker(engine::ModelStore& store, engine::Wakeup& ready, std::function<void()> before);
   ~ModelWorker();  // abandons what is left
 
-  // The publisher's, as take(). The outcome is pending, or a refusal.
+  // For the publisher's thread, as is take(). The outcome is pending, or a refusal.
   engine::Outcome add(Order order);
   std::optional<Made> take();
 

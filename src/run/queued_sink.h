@@ -87,7 +87,7 @@ class QueuedSink : public Sink {
   Sink& sink_;
   const Options options_;
 
-  // The publisher's.
+  // For the publisher's thread alone.
   Page page_;
   std::chrono::steady_clock::time_point page_begin_;
   bool in_step_ = false, misses_step_ = false;

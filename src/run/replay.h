@@ -2,7 +2,8 @@
 // on the same steps.
 //
 // Commands go to the inbox ahead of time; the pacer lets the run go as far as is known what acts on
-// it, and to the step of a request, which the server then executes. The publisher's, all of it.
+// it, and to the step of a request, which the run then executes. Used by the publisher's thread
+// alone.
 #pragma once
 
 #include <cstdint>

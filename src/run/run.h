@@ -188,7 +188,7 @@ class Run {
   Outcome restore(const request_t& request, const name_request_t& body);
   bool keeps_states() const;  // SNAPSHOT does, beside its files
   void keep_state(const std::string& path);
-  Outcome put_back(const SavedState& saved, const std::string& path);
+  Outcome restore_kept(const SavedState& saved, const std::string& path);
 
   // Requests that change the world between two steps; in edit_requests.cpp.
   bool stand_still();  // false: the run is over

@@ -1,7 +1,7 @@
 // The last states that this process saved, beside their files: RESTORE puts one back as it is, in
 // microseconds, and runs no past again.
 //
-// The publisher's, all of it.
+// Used by the publisher's thread alone.
 #pragma once
 
 #include <cstdint>

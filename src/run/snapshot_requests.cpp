@@ -99,7 +99,7 @@ void Run::keep_state(const std::string& path) {
 }
 
 // The state that is put back is the one that was published when it was saved.
-Outcome Run::put_back(const SavedState& saved, const std::string& path) {
+Outcome Run::restore_kept(const SavedState& saved, const std::string& path) {
   const bool anew = !as_made_ || options_.simulation.fleet.seed != saved.seed;
   if (!stand_still()) return Outcome::refuse(reply_t::REFUSED, "the run is over");
   control_.cancel("a snapshot is restored");
@@ -153,7 +153,7 @@ Outcome Run::restore(const request_t& request, const name_request_t& body) {
   if (path.empty() || !std::filesystem::exists(path)) {
     return Outcome::refuse(reply_t::UNKNOWN_NAME, "there is no snapshot '" + body.name + "'");
   }
-  if (const SavedState* saved = saved_states_.find(path)) return put_back(*saved, path);
+  if (const SavedState* saved = saved_states_.find(path)) return restore_kept(*saved, path);
   try {
     reset_request_t reset;
     reset.what = reset_request_t::ALL;

@@ -35,7 +35,7 @@ class StallWatch {
   explicit StallWatch(Host host);
   ~StallWatch();
 
-  // ---- The publisher's.
+  // ---- For the publisher's thread
 
   // It begins with the next thing.
   void beat(At at) {
@@ -58,7 +58,7 @@ class StallWatch {
   std::atomic<At> at_{At::rest};
   std::atomic<uint64_t> beats_{0};
 
-  Clock::time_point moved_ = Clock::now();  // the publisher's, and the next
+  Clock::time_point moved_ = Clock::now();  // this and the next: the publisher's thread
   bool told_ = false;
 
   std::mutex mutex_;  // of what follows
