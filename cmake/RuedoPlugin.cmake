@@ -4,7 +4,7 @@
 # program, or Python module, that loads it. What both must agree on is the layout of the types in these headers.
 set(RUEDO_PLUGIN_HEADERS include/ruedo/decode.h include/ruedo/drive.h include/ruedo/element.h include/ruedo/errors.h include/ruedo/index.h
   include/ruedo/math.h include/ruedo/plugin.h include/ruedo/pose.h include/ruedo/quantity.h include/ruedo/random.h include/ruedo/schema.h include/ruedo/sensor.h
-  include/ruedo/sim_time.h include/ruedo/snapshot.h)
+  include/ruedo/sim_time.h include/ruedo/snapshot.h include/ruedo/state_archive.h)
 # Headers of the lower layers, under the names by which sources in this tree include them.
 set(RUEDO_PLUGIN_LAYER_HEADERS model/body_layout.h model/fault.h model/mesh.h model/world_model.h scene/ray_scene.h scene/render_scene.h sensors/noise.h)
 

@@ -47,6 +47,9 @@ class Thermometer : public SensorOf<Thermometer> {
     out.publish(channel_, message);
   }
 
+  // For snapshots in files.
+  void exchange(StateArchive& archive) { archive(noise_); }
+
  private:
   RandomSource random_;
   int channel_;

@@ -18,6 +18,7 @@
 #include "ruedo/random.h"
 #include "ruedo/sim_time.h"
 #include "ruedo/snapshot.h"
+#include "ruedo/state_archive.h"
 
 /// The engine in the process, and what sensors and drives of one's own are written against.
 namespace ruedo {
@@ -149,6 +150,11 @@ class Sensor {
   /// @param other the same device's in another copy of the world
   /// @return false: it cannot; then a world with this device has no snapshots
   virtual bool take(const Sensor& other) { return static_cast<void>(other), false; }
+  /// For snapshots in files: writes what samples to come depend on, or reads it. SensorOf does it
+  /// for a class with a function `void exchange(StateArchive&)`. Not asked of pictures, either.
+  /// @param archive that writes or reads
+  /// @return false: it cannot; then a snapshot's file leads to the state by running there again
+  virtual bool exchange_state(StateArchive& archive) { return static_cast<void>(archive), false; }
   /// Fills in what ruedo/info says of the device.
   /// @param info with robot, name, kind, rate and pose already
   virtual void describe(device_info_t& info) const { static_cast<void>(info); }
@@ -162,6 +168,11 @@ class SensorOf : public Sensor {
   bool take(const Sensor& other) final {
     static_cast<Self&>(*this) = static_cast<const Self&>(other);
     return true;
+  }
+  bool exchange_state(StateArchive& archive) final {
+    constexpr bool can = requires(Self& self) { self.exchange(archive); };
+    if constexpr (can) static_cast<Self&>(*this).exchange(archive);
+    return can;
   }
 };
 

@@ -74,6 +74,8 @@ class CommandInbox {
   void reset_time();  // steps count from 0: scheduled commands are dropped
   // Takes the waiting commands of another copy of the world, while nothing is received or applied.
   void take(const CommandInbox& other) { waits_ = other.waits_; }
+  // What waits is not part of a written state.
+  void exchange(StateArchive& archive) { archive(waits_.next_step); }
 
   uint64_t refused() const { return refused_; }      // faulty messages
   uint64_t displaced() const { return displaced_; }  // commands displaced by newer ones

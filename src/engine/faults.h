@@ -56,6 +56,11 @@ class Faults {
   // For the modules; null if there are none.
   const std::shared_ptr<const std::vector<Reseeding>>& reseedings() const { return reseedings_; }
 
+  // Whether nothing has ever gone wrong, and no seed changed: then there is no state.
+  bool none() const {
+    return !of_sensors_ && !reseedings_ && of_robots_.empty() && late_.empty() && !wheels_ever_;
+  }
+
   void remove(RobotIndex robot);
   void reset_time();  // steps count from 0: current faults end
 

@@ -115,6 +115,22 @@ const Device* Module::take(const Module& other) {
   return nullptr;
 }
 
+const Device* Module::exchange(StateArchive& archive) {
+  for (size_t k = 0; k < slots_.size(); ++k) {
+    Slot& slot = slots_[k];
+    const Device& device = setup_.devices[k];
+    const bool keeps_nothing = setup_.wants_renderer && !slot.observes;
+    if (!keeps_nothing && !device.sensor->exchange_state(archive)) return &device;
+    bool passed = slot.passed_over != nullptr;
+    archive(slot.sample, slot.step, slot.passed_sample, slot.passed_seed, passed);
+    if (!passed) continue;
+    if (!slot.passed_over) slot.passed_over = std::make_unique<Snapshot>();
+    archive(*slot.passed_over);
+  }
+  if (archive.reads()) count_due();
+  return nullptr;
+}
+
 void Module::make_scenes(const SceneMakers& makers) {
   if (setup_.wants_rays) rays_ = makers.rays();
   if (setup_.wants_visual_rays) visual_rays_ = makers.visual_rays();

@@ -133,6 +133,8 @@ class Module {
   // Between two batches: takes the devices, clocks and faults of another copy of the world. Returns
   // a device whose sensor does not support it, or null.
   const Device* take(const Module& other);
+  // The same, in bytes, where no device was ever faulty. Returns likewise.
+  const Device* exchange(StateArchive& archive);
 
   // Index of the device that started to work last; -1: none. Any thread.
   int at_work() const { return at_work_.load(std::memory_order_relaxed); }

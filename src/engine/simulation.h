@@ -99,6 +99,8 @@ class Simulation {
   // Makes another copy of the world what this one is, but for commands that nobody applied yet.
   // Throws as World::take.
   void save(World& copy) const;
+  // Writes it likewise. Throws as World::exchange.
+  void write(StateArchive& archive) { world_.exchange(archive); }
   // Becomes what save() made, in a new epoch.
   void restore(const World& copy, int epoch);
 

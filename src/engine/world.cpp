@@ -92,6 +92,15 @@ void World::take(const World& other) {
   }
 }
 
+void World::exchange(StateArchive& archive) {
+  if (!faults_.none()) StateArchive::refuse("something is or was faulty");
+  archive(inbox_, *physics_, *robots_);
+  for (const auto& module : modules_) {
+    const Device* without = module->exchange(archive);
+    if (without) StateArchive::refuse("the device '" + without->name + "' says not what it keeps");
+  }
+}
+
 // Modules switch on their own: with the batch that contains the step.
 void World::reseed(int64_t step) {
   const std::optional<uint64_t> seed = faults_.new_seed(step);

@@ -70,6 +70,10 @@ class World {
   // model came or went. Throws InputError for a plugin's device or drive that cannot be copied; it
   // may be half done then.
   void take(const World& other);
+  // Writes that state, or reads it into another copy; commands that wait are not in it. Throws
+  // ArchiveError where it cannot be written: a device or drive is a plugin's, or something is or
+  // was faulty.
+  void exchange(StateArchive& archive);
   // From now on ruedo/world carries that epoch.
   void set_epoch(int epoch);
 

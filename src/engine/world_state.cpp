@@ -37,6 +37,8 @@ class WorldState : public SensorOf<WorldState> {
     for (const world_state_t& message : shown(input.snapshot)) out.publish(channel_, message);
   }
 
+  void exchange(StateArchive&) {}
+
   const std::vector<world_state_t>& shown(const Snapshot& state) {
     for (world_state_t& message : parts_) {
       message.utime = state.time;

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "model/body_layout.h"
+#include "ruedo/state_archive.h"
 
 namespace ruedo::model {
 
@@ -24,6 +25,8 @@ class BaseOdometry {
   // order: the distance each travelled (m), and its angle after the step (rad).
   Vec3 moved(const std::vector<double>& ways, const std::vector<double>& angles);
   Vec3 moved(const Pose& before, const Pose& after) const;
+
+  void exchange(StateArchive& archive) { archive(curvature_before_, started_); }
 
  private:
   struct Wheel {

@@ -162,6 +162,46 @@ void Broadphase::take(const Broadphase& other, btDispatcher* dispatcher) {
   }
 }
 
+void Broadphase::exchange(StateArchive& archive, btDispatcher* dispatcher) {
+  for (auto& [id, proxy] : proxies_) {
+    while (archive.reads() && !proxy.partners.empty())
+      remove_pair(proxy, *proxy.partners.back(), dispatcher);
+    archive.raw(proxy.m_aabbMin);
+    archive.raw(proxy.m_aabbMax);
+    if (!proxy.moves) continue;
+    btDbvtVolume volume = proxy.leaf->volume;
+    archive.raw(volume);
+    if (archive.reads()) moving_.update(proxy.leaf, volume);
+  }
+  exchange_pairs(archive);
+  for (auto& [id, proxy] : proxies_) exchange_partners(archive, proxy);
+}
+
+void Broadphase::exchange_pairs(StateArchive& archive) {
+  const btBroadphasePairArray& pairs = pairs_.getOverlappingPairArray();
+  std::vector<std::pair<int, int>> ids;
+  for (int i = 0; i < pairs.size(); ++i)
+    ids.emplace_back(pairs[i].m_pProxy0->m_uniqueId, pairs[i].m_pProxy1->m_uniqueId);
+  archive(ids);
+  if (!archive.reads()) return;
+  for (const auto& [a, b] : ids) pairs_.addOverlappingPair(&numbered(a), &numbered(b));
+  if (static_cast<size_t>(pairs.size()) != ids.size()) archive.refuse("a pair is there twice");
+}
+
+void Broadphase::exchange_partners(StateArchive& archive, Proxy& proxy) {
+  std::vector<int> ids;
+  for (const Proxy* partner : proxy.partners) ids.push_back(partner->m_uniqueId);
+  archive(ids);
+  if (!archive.reads()) return;
+  for (const int id : ids) proxy.partners.push_back(&numbered(id));
+}
+
+Broadphase::Proxy& Broadphase::numbered(int id) {
+  const auto found = proxies_.find(id);
+  if (found == proxies_.end()) StateArchive::refuse("there is no such object");
+  return found->second;
+}
+
 void Broadphase::getAabb(btBroadphaseProxy* proxy, btVector3& low, btVector3& high) const {
   low = proxy->m_aabbMin;
   high = proxy->m_aabbMax;

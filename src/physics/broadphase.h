@@ -13,6 +13,7 @@
 #include <BulletCollision/BroadphaseCollision/btDbvt.h>
 
 #include "physics/bullet.h"
+#include "ruedo/state_archive.h"
 
 namespace ruedo::physics {
 
@@ -46,6 +47,8 @@ class Broadphase final : public btBroadphaseInterface {
   // Takes the state of the broadphase of another copy of the world, whose filter gives the same
   // answers. The pairs get the other one's order, and are new to the dispatcher.
   void take(const Broadphase& other, btDispatcher* dispatcher);
+  // Writes that state, or reads it into a broadphase with the same objects.
+  void exchange(StateArchive& archive, btDispatcher* dispatcher);
 
   // The btBroadphaseInterface. Objects of the static filter group never move; the boxes of others
   // are enlarged by kSlack_m, so that few of their moves update the trees.
@@ -77,6 +80,9 @@ class Broadphase final : public btBroadphaseInterface {
   void find_pairs(Proxy& proxy, btDispatcher* dispatcher);
   void add_pair(Proxy& a, Proxy& b);
   void remove_pair(Proxy& a, Proxy& b, btDispatcher* dispatcher);
+  void exchange_pairs(StateArchive& archive);
+  void exchange_partners(StateArchive& archive, Proxy& proxy);
+  Proxy& numbered(int id);
 
   const PairFilter& filter_;
   btDbvt fixed_, moving_;

@@ -7,6 +7,7 @@
 
 #include "physics/bullet.h"
 #include "ruedo/snapshot.h"
+#include "ruedo/state_archive.h"
 
 namespace ruedo::physics {
 
@@ -27,6 +28,10 @@ class ContactBook {
   // Ends the step.
   void finish();
 
+  void exchange(StateArchive& archive) {
+    archive(step_s_, several_, contacts_, near_only_, touching_, near_);
+  }
+
   const std::vector<Contact>& all() const { return contacts_; }  // contacts with a force
   std::span<const Contact> touching(BodyIndex body) const { return touching_.of(body); }
   std::span<const Contact> near(BodyIndex body) const { return near_.of(body); }
@@ -40,6 +45,10 @@ class ContactBook {
     void reserve(size_t contacts) { entries_.reserve(contacts); }
     void clear();
     void fill(const std::vector<Contact>& contacts);
+    void exchange(StateArchive& archive) {
+      archive(entries_);
+      archive.each(ranges_);
+    }
     std::span<const Contact> of(BodyIndex body) const {
       const auto& range = ranges_[body];
       return {entries_.data() + range.first, range.second};

@@ -93,23 +93,90 @@ class Copier {
     from.getAllContactManifolds(here_);
     if (here_.size() == 0) return;
     if (here_.size() > 1) refuse("two shapes with several manifolds");
-    if (!manifold_of(to)) {  // created by adding points, which are then replaced
-      btManifoldResult result(&a, &b);
-      to.processCollision(&a, &b, info_, &result);
-    }
-    btPersistentManifold* there = manifold_of(to);
-    if (!there) refuse("two shapes without a manifold");
-    there->clearManifold();
+    btPersistentManifold& there = emptied_manifold(to, a, b);
     for (int i = 0; i < here_[0]->getNumContacts(); ++i)
-      there->addManifoldPoint(here_[0]->getContactPoint(i));
+      there.addManifoldPoint(here_[0]->getContactPoint(i));
+  }
+
+  // ---- The same, in bytes.
+
+  void exchange_compounds(StateArchive& archive, btCompoundCompoundCollisionAlgorithm& both,
+                          const Wrapper& a, const Wrapper& b) {
+    std::vector<std::pair<int, int>> numbers;
+    const btSimplePairArray& children = children_of(both).getOverlappingPairArray();
+    for (int i = 0; i < children.size(); ++i)
+      numbers.emplace_back(children[i].m_indexA, children[i].m_indexB);
+    archive(numbers);
+    for (size_t i = 0; i < numbers.size(); ++i) {
+      const auto [in_a, in_b] = numbers[i];
+      on_child(a, in_a, [&](const Wrapper& child_a) {
+        on_child(b, in_b, [&](const Wrapper& child_b) {
+          if (archive.reads())
+            children_of(both).addOverlappingPair(in_a, in_b)->m_userPointer =
+                made(child_a, child_b);
+          void* algorithm = children[static_cast<int>(i)].m_userPointer;
+          exchange_points(archive, *static_cast<btCollisionAlgorithm*>(algorithm), child_a,
+                          child_b);
+        });
+      });
+    }
+  }
+
+  void exchange_compound(StateArchive& archive, btCompoundCollisionAlgorithm& one, const Wrapper& a,
+                         const Wrapper& b) {
+    const bool swapped = OpenCompound::swapped(one);
+    const Wrapper &compound = swapped ? b : a, &other = swapped ? a : b;
+    auto& children = OpenCompound::children(one);
+    for (int i = 0; i < children.size(); ++i) {
+      bool there = children[i];
+      archive(there);
+      if (!there) continue;
+      on_child(compound, i, [&](const Wrapper& child) {
+        if (!children[i]) children[i] = made(child, other);
+        exchange_points(archive, *children[i], child, other);
+      });
+    }
+  }
+
+  void exchange_points(StateArchive& archive, btCollisionAlgorithm& algorithm, const Wrapper& a,
+                       const Wrapper& b) {
+    here_.resizeNoInitialize(0);
+    algorithm.getAllContactManifolds(here_);
+    if (!archive.reads() && here_.size() > 1) archive.refuse("two shapes with several manifolds");
+    int count = here_.size() == 1 && !archive.reads() ? here_[0]->getNumContacts() : -1;
+    archive(count);
+    if (count < 0) return;
+    if (count > MANIFOLD_CACHE_SIZE) archive.refuse("too many points of a contact");
+    btPersistentManifold& manifold =
+        archive.reads() ? emptied_manifold(algorithm, a, b) : *here_[0];
+    for (int i = 0; i < count; ++i) {
+      btManifoldPoint point;
+      if (!archive.reads()) point = manifold.getContactPoint(i);
+      point.m_userPersistentData = nullptr;
+      archive.raw(point);
+      if (archive.reads()) manifold.addManifoldPoint(point);
+    }
   }
 
  private:
   template <class Do>
   static void on_child(const Wrapper& of, int index, Do&& act) {
     const auto& compound = static_cast<const btCompoundShape&>(*of.getCollisionShape());
+    if (index < 0 || index >= compound.getNumChildShapes()) refuse("there is no such shape");
     const btTransform X_WC = of.getWorldTransform() * compound.getChildTransform(index);
     act(Wrapper(&of, compound.getChildShape(index), of.getCollisionObject(), X_WC, -1, index));
+  }
+  // Created by adding points, which are then removed.
+  btPersistentManifold& emptied_manifold(btCollisionAlgorithm& of, const Wrapper& a,
+                                         const Wrapper& b) {
+    if (!manifold_of(of)) {
+      btManifoldResult result(&a, &b);
+      of.processCollision(&a, &b, info_, &result);
+    }
+    btPersistentManifold* manifold = manifold_of(of);
+    if (!manifold) refuse("two shapes without a manifold");
+    manifold->clearManifold();
+    return *manifold;
   }
   btPersistentManifold* manifold_of(btCollisionAlgorithm& algorithm) {
     there_.resizeNoInitialize(0);
@@ -139,6 +206,24 @@ void copy_contacts(const btBroadphasePair& from, btBroadphasePair& to, btDispatc
     copier.copy_compound(*one, dynamic_cast<btCompoundCollisionAlgorithm&>(*to.m_algorithm), a, b);
   else
     copier.copy_points(*from.m_algorithm, *to.m_algorithm, a, b);
+}
+
+void exchange_contacts(StateArchive& archive, btBroadphasePair& pair, btDispatcher& dispatcher,
+                       const btDispatcherInfo& info) {
+  bool has = pair.m_algorithm;
+  archive(has);
+  if (!has) return;
+  auto& object_a = *static_cast<btCollisionObject*>(pair.m_pProxy0->m_clientObject);
+  auto& object_b = *static_cast<btCollisionObject*>(pair.m_pProxy1->m_clientObject);
+  const Wrapper a = whole(object_a), b = whole(object_b);
+  Copier copier(dispatcher, info);
+  if (archive.reads()) pair.m_algorithm = copier.made(a, b);
+  if (auto* both = dynamic_cast<btCompoundCompoundCollisionAlgorithm*>(pair.m_algorithm))
+    copier.exchange_compounds(archive, *both, a, b);
+  if (auto* one = dynamic_cast<btCompoundCollisionAlgorithm*>(pair.m_algorithm))
+    copier.exchange_compound(archive, *one, a, b);
+  else
+    copier.exchange_points(archive, *pair.m_algorithm, a, b);
 }
 
 }  // namespace ruedo::physics

@@ -2,6 +2,7 @@
 #pragma once
 
 #include "physics/bullet.h"
+#include "ruedo/state_archive.h"
 
 namespace ruedo::physics {
 
@@ -9,5 +10,9 @@ namespace ruedo::physics {
 // those of `from`. Throws std::logic_error if Bullet's state cannot be copied.
 void copy_contacts(const btBroadphasePair& from, btBroadphasePair& to, btDispatcher& dispatcher,
                    const btDispatcherInfo& info);
+
+// Writes that of a pair, or reads it into one that is new, as above. Throws ArchiveError likewise.
+void exchange_contacts(StateArchive& archive, btBroadphasePair& pair, btDispatcher& dispatcher,
+                       const btDispatcherInfo& info);
 
 }  // namespace ruedo::physics

@@ -149,6 +149,23 @@ void Dynamics::take(const Dynamics& other,
     m_constraints[i] = joint_here(other.m_constraints[i]);
 }
 
+void Dynamics::exchange(StateArchive& archive, const std::vector<btTypedConstraint*>& joints) {
+  auto& pairs = getPairCache()->getOverlappingPairArray();
+  for (int i = 0; i < pairs.size(); ++i)
+    exchange_contacts(archive, pairs[i], *getDispatcher(), getDispatchInfo());
+  std::vector<size_t> order;
+  for (int i = 0; i < m_constraints.size(); ++i) {
+    const auto found = std::find(joints.begin(), joints.end(), m_constraints[i]);
+    order.push_back(static_cast<size_t>(found - joints.begin()));
+  }
+  archive.each(order);
+  for (int i = 0; i < m_constraints.size(); ++i) {
+    const size_t number = order[static_cast<size_t>(i)];
+    if (number >= joints.size()) archive.refuse("there is no such joint");
+    m_constraints[i] = joints[number];
+  }
+}
+
 bool Dynamics::awake() const {
   return std::any_of(bodies_.begin(), bodies_.end(),
                      [](const btRigidBody* body) { return body->isActive(); });

@@ -11,6 +11,7 @@
 
 #include "physics/bullet.h"
 #include "physics/solver.h"
+#include "ruedo/state_archive.h"
 
 namespace ruedo::physics {
 
@@ -34,6 +35,9 @@ class Dynamics final : public btDiscreteDynamicsWorld {
   // those of this one.
   void take(const Dynamics& other,
             const std::function<btTypedConstraint*(btTypedConstraint*)>& joint_here);
+  // Writes that state, or reads it, likewise. joints: all of the world's, in an order that copies
+  // share.
+  void exchange(StateArchive& archive, const std::vector<btTypedConstraint*>& joints);
 
   // One substep: forces and gravity, contacts, velocities, poses.
   void substep(double substep_s);

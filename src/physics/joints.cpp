@@ -178,6 +178,20 @@ void JointConstraint::take(const JointConstraint& other) {
   if (constraint_) constraint_->setEnabled(other.constraint_->isEnabled());
 }
 
+void JointConstraint::exchange(StateArchive& archive) {
+  JointState::exchange(archive);
+  for (JointMotor* motor : {&motors_->first, &motors_->second}) {
+    bool refers = motor->reference;
+    archive(motor->on, motor->linear, motor->axis, motor->anchor, motor->advance,
+            motor->parent_axis, refers, motor->rate, motor->lower, motor->upper, motor->softness,
+            motor->impulse);
+    motor->reference = refers ? reference_ : nullptr;
+  }
+  bool enabled = constraint_ && constraint_->isEnabled();
+  archive(enabled);
+  if (constraint_) constraint_->setEnabled(enabled);
+}
+
 Vec3 JointConstraint::axis_in_world() const {
   return from_bt(parent_.getWorldTransform().getRotation()) * (X_PJ_.rotation * limits_.axis_in_J);
 }

@@ -12,6 +12,7 @@
 #include "physics/physics_world.h"
 #include "physics/rigid_bodies.h"
 #include "physics/rows.h"
+#include "ruedo/state_archive.h"
 
 namespace ruedo::physics {
 
@@ -32,6 +33,12 @@ struct JointState {
   Mode mode_ = Mode::passive;
   double command_ = 0.0, lowest_effort_ = 0.0, highest_effort_ = 0.0, gain_ = 0.0;
   double position_ = 0.0, effort_ = 0.0;
+
+  void exchange(StateArchive& archive) {
+    archive(follows_, follow_rate_, parent_position_, limits_.effort, limits_.velocity,
+            limits_.rate_gain, told_, servo_, woken_at_, mode_, command_, lowest_effort_,
+            highest_effort_, gain_, position_, effort_);
+  }
 };
 
 class JointConstraint : private JointState {
@@ -87,6 +94,7 @@ class JointConstraint : private JointState {
 
   // Takes the state of the same joint in another copy of the world.
   void take(const JointConstraint& other);
+  void exchange(StateArchive& archive);  // likewise
 
   // For the coming substep: follows another joint, with at most its maximum effort. The leader does
   // not feel it.

@@ -13,6 +13,7 @@ PhysicsWorld::~PhysicsWorld() = default;
 
 void PhysicsWorld::step() { impl_->step(); }
 void PhysicsWorld::take(const PhysicsWorld& other) { impl_->take(*other.impl_); }
+void PhysicsWorld::exchange(StateArchive& archive) { impl_->exchange(archive); }
 const Pose& PhysicsWorld::pose(BodyIndex body) const { return impl_->poses_[body]; }
 const Twist& PhysicsWorld::twist(BodyIndex body) const { return impl_->twists_[body]; }
 void PhysicsWorld::set_pose(BodyIndex body, const Pose& X_WB) { impl_->set_pose(body, X_WB); }

@@ -12,6 +12,7 @@
 
 #include "model/body_layout.h"
 #include "ruedo/snapshot.h"
+#include "ruedo/state_archive.h"
 
 namespace ruedo::physics {
 
@@ -114,6 +115,8 @@ class PhysicsWorld {
   // and BodyLayout; what follows is equal bit for bit. Neither may have had an instance added or
   // removed. Throws std::logic_error if Bullet's state cannot be copied.
   void take(const PhysicsWorld& other);
+  // The same, in bytes. Throws ArchiveError if Bullet's state cannot be written, or read.
+  void exchange(StateArchive& archive);
 
   // Between two steps. `instance` is new at the end of the world and the layout, or was removed and
   // placed again: its bodies are at the layout's poses, at rest.

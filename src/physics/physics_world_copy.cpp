@@ -1,4 +1,4 @@
-// Gives one copy of a world the state of another.
+// Gives one copy of a world the state of another: in memory, or in bytes.
 //
 // Copies what bodies, joints, pairs and contacts keep between steps; everything else, the trees of
 // boxes, the islands and the solver's data, follows from that in each step.
@@ -75,6 +75,94 @@ void PhysicsWorld::Impl::take_body(BodyIndex body, const Impl& other) {
   here.applyCentralForce(there.getTotalForce());
   here.applyTorque(there.getTotalTorque());
   here.forceActivationState(ACTIVE_TAG);
+}
+
+// ---- The same, in bytes: in the same order.
+
+void PhysicsWorld::Impl::exchange(StateArchive& archive) {
+  exchange_ties(archive);
+  archive.each(poses_);
+  archive.each(twists_);
+  archive.each(last_twists_);
+  archive.each(motions_);
+  archive(contacts_, tied_, wind_);
+  archive.each(joints_);
+  archive.each(wheels_);
+  for (const BodyIndex i : motions_.indices()) exchange_body(archive, i);
+  broadphase_.exchange(archive, &dispatcher_);
+
+  IndexedVector<BodyIndex, std::pair<int, btScalar>> rests;  // what bodies say of their sleep
+  for (const BodyIndex i : motions_.indices()) {
+    rests.emplace_back(bullet(i).getActivationState(), bullet(i).getDeactivationTime());
+    if (archive.reads()) bullet(i).forceActivationState(ACTIVE_TAG);
+  }
+  dynamics_.exchange(archive, numbered_constraints());
+  archive.each(rests);
+  for (const BodyIndex i : motions_.indices()) {
+    bullet(i).forceActivationState(rests[i].first);
+    bullet(i).setDeactivationTime(rests[i].second);
+  }
+}
+
+std::vector<btTypedConstraint*> PhysicsWorld::Impl::numbered_constraints() {
+  std::vector<btTypedConstraint*> all;
+  for (JointConstraint& joint : joints_) all.push_back(joint.constraint());
+  for (JointConstraint& joint : wheels_) all.push_back(joint.constraint());
+  for (Tie& tie : ties_) all.push_back(tie.constraint.get());
+  std::erase(all, nullptr);
+  return all;
+}
+
+void PhysicsWorld::Impl::exchange_ties(StateArchive& archive) {
+  std::vector<std::pair<BodyIndex, BodyIndex>> bodies;
+  for (const Tie& tie : ties_) bodies.emplace_back(tie.body, tie.other);
+  archive(bodies);
+  for (size_t i = ties_.size(); i < bodies.size(); ++i) {
+    const auto [body, other] = bodies[i];
+    if (!poses_.has(body) || (other.valid() && !poses_.has(other)))
+      StateArchive::refuse("there is no such body");
+    make_tie(body, other);
+  }
+  for (Tie& tie : ties_) {
+    btTransform frames[2] = {tie.constraint->getFrameOffsetA(), tie.constraint->getFrameOffsetB()};
+    archive(tie.closed, tie.hung_before);
+    archive.raw(frames);
+    if (!archive.reads()) continue;
+    tie.constraint->setFrames(frames[0], frames[1]);
+    tie.constraint->setEnabled(tie.closed);
+  }
+}
+
+void PhysicsWorld::Impl::exchange_body(StateArchive& archive, BodyIndex body) {
+  ObjectInfo& info = rigid_.bodies[body].info;
+  archive(info.on_plane, info.moved, info.gone, info.joined);
+  btRigidBody& here = bullet(body);
+  btTransform places[2] = {here.getWorldTransform(), here.getInterpolationWorldTransform()};
+  btVector3 values[] = {here.getInterpolationLinearVelocity(),
+                        here.getInterpolationAngularVelocity(),
+                        here.getLinearVelocity(),
+                        here.getAngularVelocity(),
+                        here.getLinearFactor(),
+                        here.getAngularFactor(),
+                        here.getGravity(),
+                        here.getTotalForce(),
+                        here.getTotalTorque()};
+  archive.raw(places);
+  archive.raw(values);
+  if (!archive.reads()) return;
+  here.setWorldTransform(places[0]);
+  here.updateInertiaTensor();
+  here.setInterpolationWorldTransform(places[1]);
+  here.setInterpolationLinearVelocity(values[0]);
+  here.setInterpolationAngularVelocity(values[1]);
+  here.setLinearVelocity(values[2]);
+  here.setAngularVelocity(values[3]);
+  here.setLinearFactor(values[4]);
+  here.setAngularFactor(values[5]);
+  here.setGravity(values[6]);
+  here.clearForces();
+  here.applyCentralForce(values[7]);
+  here.applyTorque(values[8]);
 }
 
 }  // namespace ruedo::physics

@@ -39,6 +39,9 @@ struct BodyMotion {
   bool fresh = true;       // placed since the last step, so that its acceleration is not known
   Twist mean;
   Pose end;
+  void exchange(StateArchive& archive) {
+    archive(kind, dirty, tied, hung, simulated, fine, awake, led, still, fresh, mean, end);
+  }
 };
 
 // What may hold two bodies together temporarily; without a second one, the body and the world.
@@ -59,6 +62,7 @@ class PhysicsWorld::Impl {
   void step();
   void read(Snapshot& snapshot);
   void take(const Impl& other);
+  void exchange(StateArchive& archive);
 
   void set_pose(BodyIndex body, const Pose& pose) {
     poses_[body] = pose;
@@ -124,6 +128,9 @@ class PhysicsWorld::Impl {
   void advance(btRigidBody& mover, double substep_s);
   void take_ties(const Impl& other);
   void take_body(BodyIndex body, const Impl& other);
+  void exchange_ties(StateArchive& archive);
+  void exchange_body(StateArchive& archive, BodyIndex body);
+  std::vector<btTypedConstraint*> numbered_constraints();
   void tie(BodyIndex body, BodyIndex other);
   void untie(BodyIndex body, BodyIndex other);
   void push_to_bullet(BodyIndex body);  // transfers our pose and twist

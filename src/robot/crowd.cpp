@@ -228,6 +228,16 @@ void Crowd::take(const Crowd& other) {
   others_ = other.others_;
 }
 
+// Goals and draws follow from the seed.
+void Crowd::exchange(StateArchive& archive) {
+  archive(thought_);
+  for (Person& person : people_) {
+    archive(person.p, person.before, person.v, person.next, person.heading, person.heading_before,
+            person.speed, person.goal, person.arrived, person.gone, person.jumped, person.ticks);
+  }
+  for (Other& other : others_) archive(other.at, other.v, other.c, other.s, other.low, other.high);
+}
+
 void Crowd::reseed(uint64_t seed) {
   for (const auto& group : groups_) group->random.reseed(seed);
 }

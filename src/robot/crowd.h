@@ -20,6 +20,7 @@
 #include "physics/physics_world.h"
 #include "ruedo/bound.h"
 #include "ruedo/random.h"
+#include "ruedo/state_archive.h"
 
 namespace ruedo::robot {
 
@@ -37,7 +38,8 @@ class Crowd {
   void add(InstanceIndex instance, const model::BodyLayout& layout);
   void remove(InstanceIndex instance);
   void take(const Crowd& other);  // takes the state of another copy of the world
-  void reseed(uint64_t seed);     // for people's choices from now on
+  void exchange(StateArchive& archive);
+  void reseed(uint64_t seed);  // for people's choices from now on
   void reset(InstanceIndex instance, SimTime now);
   void shift_time(SimTime us) { thought_ -= us; }  // sim time was set back by that much
 

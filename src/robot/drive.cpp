@@ -101,6 +101,11 @@ void read_motion(const MotionLog& log, RobotIndex robot, Snapshot& snapshot) {
   for (const MotionState& end : log.ends()) snapshot.motion_ends.push_back({robot, end});
 }
 
+void Drive::exchange(StateArchive& archive) {
+  archive(planner_, X_WBase_, twist_, velocity_, acceleration_, odom_heading_, believed_heading_,
+          resets_, wheel_v_, wheel_omega_);
+}
+
 void Drive::read(Snapshot& snapshot) const {
   RobotState& state = snapshot.robots[robot_];
   state.X_WBase = X_WBase_;

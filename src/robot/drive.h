@@ -10,6 +10,7 @@
 #include "robot/wheel_kinematics.h"
 #include "ruedo/bound.h"
 #include "ruedo/snapshot.h"
+#include "ruedo/state_archive.h"
 
 namespace ruedo::robot {
 
@@ -30,6 +31,8 @@ class Drive {
   // Takes the state of the drive of the same robot in another copy of the world. Throws InputError
   // if a plugin's drive does not support that.
   virtual void take(const Drive& other) = 0;
+  // Writes what changes, or reads it. Throws ArchiveError for a plugin's drive.
+  virtual void exchange(StateArchive& archive);
 
   // Before and after physics.step(), which advances from sim time `now` by one step.
   virtual void before_step(SimTime now) = 0;

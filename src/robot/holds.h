@@ -10,6 +10,7 @@
 #include "model/body_layout.h"
 #include "physics/physics_world.h"
 #include "ruedo/bound.h"
+#include "ruedo/state_archive.h"
 
 namespace ruedo::robot {
 
@@ -30,6 +31,9 @@ class Holds {
   void moved(InstanceIndex instance);   // others keep holding it, where it is now
   // The instances that it holds, directly or indirectly.
   std::vector<InstanceIndex> carried_by(InstanceIndex instance) const;
+  void exchange(StateArchive& archive) {
+    for (Held& held : held_) archive(held.wanted, held.other, held.tie);
+  }
 
  private:
   struct Held {

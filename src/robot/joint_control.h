@@ -16,6 +16,7 @@
 #include "robot/lifts.h"
 #include "robot/robots.h"
 #include "ruedo/bound.h"
+#include "ruedo/state_archive.h"
 
 namespace ruedo::robot {
 
@@ -32,6 +33,7 @@ class JointControl {
   void forget(InstanceIndex instance);
   void start(InstanceIndex instance);  // its joints return to what they do before any command
   Holds& holds() { return holds_; }
+  void exchange(StateArchive& archive) { archive(targets_, gains_, holds_, lifts_); }
 
  private:
   struct Target {

@@ -94,6 +94,14 @@ void KinematicDrive::take(const Drive& other) {
   *this = from;
 }
 
+void KinematicDrive::exchange(StateArchive& archive) {
+  if (model_) StateArchive::refuse("the drive of robot '" + robot_name() + "' is a plugin's");
+  Drive::exchange(archive);
+  archive(on_plane_, asleep_, touched_, held_, behind_, sent_, supported_, grip_, carrier_,
+          carriers_, plane_friction_, way_, planned_, made_, lag_, heading_, wheel_angles_,
+          still_us_, next_);
+}
+
 const std::string& KinematicDrive::robot_name() const {
   return world_->models[layout_->robots[robot_].instance].name;
 }

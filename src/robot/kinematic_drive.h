@@ -35,6 +35,7 @@ class KinematicDrive final : public Drive {
   void read_wheels(Snapshot& snapshot) const override;
   void wake() override;
   void take(const Drive& other) override;
+  void exchange(StateArchive& archive) override;
   void ground_changed() override;
 
  private:

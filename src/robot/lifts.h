@@ -11,6 +11,7 @@
 #include "model/body_layout.h"
 #include "physics/physics_world.h"
 #include "ruedo/bound.h"
+#include "ruedo/state_archive.h"
 
 namespace ruedo::robot {
 
@@ -37,6 +38,11 @@ class Lifts {
   // Changes between two steps.
   void start(InstanceIndex instance);  // doors closed, no calls
   void forget(InstanceIndex instance);
+  void exchange(StateArchive& archive) {
+    for (Door& door : doors_) archive(door.ways, door.wanted_open, door.held_us);
+    for (Lift& lift : lifts_)
+      archive(lift.way, lift.doing, lift.calls, lift.floor, lift.opens, lift.waited_us);
+  }
 
  private:
   struct Leaf {

@@ -111,6 +111,13 @@ void MotionPlanner::replace_running() {
   primitive_ = {};
 }
 
+void MotionPlanner::exchange(StateArchive& archive) {
+  archive(v_, omega_, side_, steering_, steady_, resting_, deadline_, start_, plan_v_, plan_omega_,
+          plan_side_, plan_steering_, target_v_, target_omega_, target_side_, target_steering_,
+          by_wheels_, holding_, primitive_, window_start_, window_done_, window_fastest_,
+          window_turned_, window_fastest_turn_, window_touched_, window_work_, log_);
+}
+
 void MotionPlanner::command(const VelocityCommand& command, SimTime now) {
   if (!all_finite({command.vx, command.vy, command.omega}))
     return refuse(0, Status::KIND_VELOCITY, Status::REASON_NOT_FINITE);

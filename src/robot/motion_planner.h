@@ -17,6 +17,7 @@
 #include "robot/wheel_kinematics.h"
 #include "ruedo/bound.h"
 #include "ruedo/math.h"
+#include "ruedo/state_archive.h"
 
 namespace ruedo::robot {
 
@@ -64,6 +65,7 @@ class MotionPlanner {
   bool resting() const { return resting_; }  // at rest, and nothing happens until the next command
   const MotionLog& log() const { return log_; }
   void show_step() { log_.advance(); }
+  void exchange(StateArchive& archive);
 
  private:
   enum class Axis { none, way, angle, arc };

@@ -6,6 +6,7 @@
 #include "model/body_layout.h"
 #include "physics/physics_world.h"
 #include "ruedo/bound.h"
+#include "ruedo/state_archive.h"
 
 namespace ruedo::robot {
 
@@ -31,6 +32,7 @@ class Mover {
 
   // Moves its bodies to their poses one step later.
   void before_step(SimTime now);
+  void exchange(StateArchive& archive) { archive(offset_); }
 
   struct Waypoint {
     SimTime time;

@@ -32,6 +32,7 @@ class Robots::Impl {
   void reset(InstanceIndex instance);
   SimTime set_time_to_zero();
   void take(const Impl& other);
+  void exchange(StateArchive& archive);
   void reseed(uint64_t seed) {
     crowd_.reseed(seed);
     wind_.reseed(seed);
@@ -163,6 +164,15 @@ void Robots::Impl::take(const Impl& other) {
   surroundings_ = other.surroundings_;
   joints_ = other.joints_;
   wind_ = other.wind_;
+}
+
+void Robots::Impl::exchange(StateArchive& archive) {
+  archive(step_);
+  for (auto& drive : drives_)
+    if (drive) archive(*drive);
+  archive.each(driveless_);
+  for (auto& mover : movers_) archive(*mover);
+  archive(crowd_, surroundings_, joints_);
 }
 
 void Robots::Impl::read(Snapshot& snapshot) const {
@@ -363,6 +373,7 @@ void Robots::apply(const Command& command) { impl_->apply(command); }
 void Robots::step() { impl_->step(); }
 void Robots::read(Snapshot& snapshot) const { impl_->read(snapshot); }
 void Robots::take(const Robots& other) { impl_->take(*other.impl_); }
+void Robots::exchange(StateArchive& archive) { impl_->exchange(archive); }
 int64_t Robots::current_step() const { return impl_->step_; }
 void Robots::add(InstanceIndex instance) { impl_->add(instance); }
 void Robots::remove(InstanceIndex instance) { impl_->remove(instance); }

@@ -11,6 +11,7 @@
 #include "model/body_layout.h"
 #include "physics/physics_world.h"
 #include "ruedo/snapshot.h"
+#include "ruedo/state_archive.h"
 
 namespace ruedo::robot {
 
@@ -65,6 +66,8 @@ class Robots {
   // Between two steps: takes the state of another copy of the same world, after the physics has
   // done so. Throws InputError for a plugin's drive that cannot be copied.
   void take(const Robots& other);
+  // Writes that state, or reads it, likewise. Throws ArchiveError for a plugin's drive.
+  void exchange(StateArchive& archive);
 
   // From the next step on, people and wind draw from that seed.
   void reseed(uint64_t seed);

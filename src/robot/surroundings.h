@@ -7,6 +7,7 @@
 #include "model/body_layout.h"
 #include "physics/physics_world.h"
 #include "ruedo/bound.h"
+#include "ruedo/state_archive.h"
 
 namespace ruedo::robot {
 
@@ -25,6 +26,9 @@ class Surroundings {
   void remove(InstanceIndex instance);
   void reset(InstanceIndex instance);
   void shift_time(SimTime us);  // sim time was set back by that much
+  void exchange(StateArchive& archive) {
+    for (Door& door : doors_) archive(door.open, door.wanted);
+  }
 
  private:
   struct Part {

@@ -7,6 +7,7 @@
 #include "model/body_layout.h"
 #include "robot/unicycle.h"
 #include "ruedo/snapshot.h"
+#include "ruedo/state_archive.h"
 
 namespace ruedo::robot {
 
@@ -16,6 +17,10 @@ class WheelAngles {
               const model::DriveDescription& drive);
 
   void advance(const Displacement& way);
+  void exchange(StateArchive& archive) {
+    for (Wheel& wheel : wheels_) archive(wheel.rolled);
+    archive(way_, side_, angle_);
+  }
   // twist: m/s forward, m/s to the left, rad/s. curvature: 1/m, of the path that the steering sets.
   void read(Snapshot& snapshot, const Vec3& twist, double curvature) const;
 

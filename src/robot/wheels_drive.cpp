@@ -104,6 +104,13 @@ void WheelsDrive::wake() {
   for (const BodyIndex body : bodies_) physics_->wake(body);
 }
 
+void WheelsDrive::exchange(StateArchive& archive) {
+  Drive::exchange(archive);
+  archive(servos_, last_angles_, believed_rate_, way_, way_missing_, angle_missing_, yaw_integral_,
+          still_us_, asleep_);
+  if (base_) archive(*base_);
+}
+
 void WheelsDrive::before_step(SimTime now) {
   if (asleep_) {
     if (physics_->sleeping(body_)) return;

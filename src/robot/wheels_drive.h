@@ -30,6 +30,7 @@ class WheelsDrive final : public Drive {
   void read_wheels(Snapshot& snapshot) const override;
   void wake() override;
   void take(const Drive& other) override { *this = static_cast<const WheelsDrive&>(other); }
+  void exchange(StateArchive& archive) override;
 
  private:
   WheelsDrive& operator=(const WheelsDrive&) = default;

@@ -131,9 +131,11 @@ std::string Journal::save(const std::string& name,
 }
 
 std::string Journal::save_snapshot(const std::string& name, const state_hash_t& state,
-                                   SimTime stamp_us) {
+                                   SimTime stamp_us, const std::vector<uint8_t>& bytes) {
   return save(name, [&](log::Writer& snapshot) {
     const std::string fault = snapshot.append(writer_);
+    if (fault.empty() && !bytes.empty())
+      snapshot.write(stamp_us - base_us_, kStateChannel, bytes.data(), bytes.size());
     if (fault.empty()) write(snapshot, stamp_us - base_us_, kStateHashChannel, state);
     return fault;
   });

@@ -18,6 +18,7 @@
 namespace ruedo::run {
 
 using log::kAppliedChannel, log::kHeaderChannel, log::kStateHashChannel;
+inline const std::string kStateChannel = "ruedo/state";  // in snapshots alone
 
 class Journal : public Sink {
  public:
@@ -43,8 +44,11 @@ class Journal : public Sink {
   void message(const Published& message) override;
 
   // Writes the journal and the state that it leads to into a file of the folder, which then is
-  // whole or not there. stamp_us: of the state. The error, or "".
-  std::string save_snapshot(const std::string& name, const state_hash_t& state, SimTime stamp_us);
+  // whole or not there. stamp_us: of the state. bytes: of the state, too; empty: none. The error,
+  // or
+  // "".
+  std::string save_snapshot(const std::string& name, const state_hash_t& state, SimTime stamp_us,
+                            const std::vector<uint8_t>& bytes = {});
   // The same for a past state. Its hash is not in the journal, so it will not be checked. time_us:
   // of that state.
   std::string save_past(const std::string& name, int64_t step, SimTime time_us, int32_t epoch,

@@ -135,6 +135,7 @@ void Run::run() {
     receive(channel, data, size);
   });
   tell_readers();
+  begin_with_state();
   simulation_->start(*pacer_);
   take_turns();
   next_status_ = Clock::now() + kStatusPeriod;

@@ -162,7 +162,7 @@ class Run {
   const Mode& mode() const { return repeating_ ? static_cast<const Mode&>(*repeating_) : *mode_; }
   void begin_repeat(const std::string& path);  // throws InputError
   void take_turn();                            // what the mode wants done at this state
-  void take_turns();
+  std::string take_turns();                    // why what is repeated broke off; "": it did not
   void end_repeat(bool paused);
 
   // Requests; in requests.cpp, and those of snapshots in snapshot_requests.cpp. Those of clients go
@@ -188,7 +188,15 @@ class Run {
   Outcome restore(const request_t& request, const name_request_t& body);
   bool keeps_states() const;  // SNAPSHOT does, beside its files
   void keep_state(const std::string& path);
+  bool stands_here();  // at the state that was published last
   Outcome restore_kept(const SavedState& saved, const std::string& path);
+
+  // The state in a snapshot's file; in written_states.cpp.
+  std::unique_ptr<engine::World> copy_of_world(uint64_t seed);
+  std::vector<uint8_t>
+  written_state();  // while the world stands still; empty: it cannot be written
+  std::optional<SavedState> read_state(const std::string& path);  // none: run there again
+  void begin_with_state();  // --restore, where the file has one
 
   // Requests that change the world between two steps; in edit_requests.cpp.
   bool stand_still();  // false: the run is over

@@ -85,15 +85,17 @@ void Run::begin_repeat(const std::string& path) {
   publisher_.mute(true);
 }
 
-void Run::take_turns() {
+std::string Run::take_turns() {
   try {
     take_turn();
+    return "";
   } catch (const InputError& error) {
     if (!options_.repeat.empty()) throw;
     // The client that asked is told, and the world stays where it is.
     control_.cancel(error.what());
     spdlog::error("{}. The run is paused", error.what());
     end_repeat(true);
+    return error.what();
   }
 }
 

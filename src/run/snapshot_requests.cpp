@@ -1,5 +1,5 @@
-// SNAPSHOT and RESTORE. A state that this process saved is put back as it is; another one by
-// running there again.
+// SNAPSHOT and RESTORE. A state that this process saved, or that the file has, is put back as it
+// is; another one by running there again.
 #include <algorithm>
 #include <cctype>
 #include <filesystem>
@@ -57,10 +57,12 @@ Outcome Run::snapshot(const request_t& request) {
   }
   saved_states_.forget(journal_->snapshot_path(name));
   if (is_past) return snapshot_of(past);
-  const bool stands = keeps_states() && stand_still();
-  const std::string fault = journal_->save_snapshot(name, beats_.hashes.at_end(),
-                                                    publisher_.base_us() + publisher_.time_us());
-  if (stands && fault.empty()) keep_state(journal_->snapshot_path(name));
+  const bool stands =
+      as_made_ && publisher_.latest() && (mode_->takes_grants() ? stands_here() : stand_still());
+  const std::string fault = journal_->save_snapshot(
+      name, beats_.hashes.at_end(), publisher_.base_us() + publisher_.time_us(),
+      stands ? written_state() : std::vector<uint8_t>{});
+  if (stands && fault.empty() && keeps_states()) keep_state(journal_->snapshot_path(name));
   const Outcome outcome =
       fault.empty() ? Outcome::with(engine::encoded(state()))
                     : Outcome::refuse(reply_t::REFUSED, "the snapshot was not saved: " + fault);
@@ -74,14 +76,16 @@ bool Run::keeps_states() const {
   return as_made_ && !log_ && !watcher_ && !mode_->takes_grants() && publisher_.latest();
 }
 
+// In lockstep no state is published that the clients did not wait for.
+bool Run::stands_here() {
+  if (pacer_->hold() == publisher_.step()) return pacer_->wait_until_held();
+  let_go();
+  return false;
+}
+
 void Run::keep_state(const std::string& path) {
-  if (!plan_of_saved_) plan_of_saved_ = std::make_shared<engine::Plan>(*first_world_);
-  engine::Channels channels(options_.remaps);
-  engine::add_simulation_channels(channels, options_.control);
-  Findings findings;
   SavedState saved;
-  saved.world = std::make_unique<engine::World>(plan_of_saved_, options_.simulation.fleet, channels,
-                                                findings);
+  saved.world = copy_of_world(options_.simulation.fleet.seed);
   try {
     simulation_->save(*saved.world);
   } catch (const std::exception&) {  // a plugin's device: there remains the way through the past
@@ -155,6 +159,7 @@ Outcome Run::restore(const request_t& request, const name_request_t& body) {
   }
   if (const SavedState* saved = saved_states_.find(path)) return restore_kept(*saved, path);
   try {
+    if (const std::optional<SavedState> saved = read_state(path)) return restore_kept(*saved, path);
     reset_request_t reset;
     reset.what = reset_request_t::ALL;
     const log_header_t header = read_header(path);
@@ -171,8 +176,8 @@ Outcome Run::restore(const request_t& request, const name_request_t& body) {
     return Outcome::refuse(reply_t::REFUSED, error.what());
   }
   begin_epoch();
-  take_turns();
-  return Outcome::after(0);
+  const std::string fault = take_turns();
+  return fault.empty() ? Outcome::after(0) : Outcome::refuse(reply_t::REFUSED, fault);
 }
 
 }  // namespace ruedo::run

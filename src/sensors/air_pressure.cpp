@@ -34,6 +34,8 @@ class AirPressure : public SensorOf<AirPressure> {
 
   void shift_time(SimTime us) override { noises_.shift_time(us); }
 
+  void exchange(StateArchive& archive) { archive(noises_); }
+
  private:
   Bound<const model::Environment> environment_;
   Mount mount_;

@@ -44,6 +44,8 @@ class AirSpeed : public SensorOf<AirSpeed> {
 
   void shift_time(SimTime us) override { noises_.shift_time(us); }
 
+  void exchange(StateArchive& archive) { archive(noises_); }
+
  private:
   Bound<const model::Environment> environment_;
   Mount mount_;

@@ -32,6 +32,8 @@ class Altimeter : public SensorOf<Altimeter> {
 
   void shift_time(SimTime us) override { noises_.shift_time(us); }
 
+  void exchange(StateArchive& archive) { archive(noises_); }
+
  private:
   Mount mount_;
   double start_m_;  // the world's z of the device at the start

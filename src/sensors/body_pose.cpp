@@ -70,6 +70,8 @@ class BodyPose : public SensorOf<BodyPose> {
     time_ -= us;
   }
 
+  void exchange(StateArchive& archive) { archive(noises_, time_, velocity_, acceleration_); }
+
  private:
   Mount mount_;
   Noises<6> noises_;  // linear velocity, then angular velocity

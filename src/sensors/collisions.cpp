@@ -42,6 +42,10 @@ class Collisions : public SensorOf<Collisions> {
     if (input.snapshot.step != shown_step_) show(input.snapshot, out);
   }
 
+  void exchange(StateArchive& archive) {
+    archive(blocked_by_, touched_, points_, told_, shown_step_);
+  }
+
  private:
   // Capacity for links touched between two messages, with four points each.
   static constexpr size_t kUsual = 8;
@@ -54,6 +58,7 @@ class Collisions : public SensorOf<Collisions> {
     LinkIndex link;
     Contact contact;
     bool as_a;
+    void exchange(StateArchive& archive) { archive(link, contact, as_a); }
   };
 
   // Records what is touched. True if some of it was not in the last message.

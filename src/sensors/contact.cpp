@@ -70,6 +70,8 @@ class ContactSensor : public SensorOf<ContactSensor> {
     out.publish(channel_, message_);
   }
 
+  void exchange(StateArchive& archive) { archive(pressed_); }
+
  private:
   bool counts(ShapeIndex shape) const {
     return shapes_.empty() || !shape.valid() ||

@@ -111,6 +111,8 @@ class ForceTorque : public SensorOf<ForceTorque> {
     time_ -= us;
   }
 
+  void exchange(StateArchive& archive) { archive(noises_, omega_, alpha_, time_); }
+
  private:
   void find_joint(const SensorSetup& setup) {
     for (const model::SensorDescription& sensor : model_->sensors) {

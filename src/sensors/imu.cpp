@@ -98,6 +98,11 @@ class Imu : public SensorOf<Imu> {
     out.publish(channel_, message);
   }
 
+  void exchange(StateArchive& archive) {
+    archive(gyroscope_, accelerometer_, time_, sample_time_, sampled_, omega_before_, alpha_,
+            omega_of_body_before_, alpha_of_body_);
+  }
+
  private:
   // rad/s, world: the wheel's rotation relative to the body.
   Vec3 of_wheel(const Snapshot& now) const {

@@ -33,6 +33,8 @@ class Joints : public SensorOf<Joints> {
     out.publish(channel_, message_);
   }
 
+  void exchange(StateArchive&) {}
+
  private:
   int channel_;
   std::vector<JointIndex> joints_;

@@ -58,6 +58,8 @@ class LogicalCamera : public SensorOf<LogicalCamera> {
     info.fov_vertical = 2 * math::atan(half_height_);
   }
 
+  void exchange(StateArchive&) {}
+
  private:
   bool sees(const Vec3& p) const {
     return p.x() >= near_m_ && p.x() <= far_m_ && std::abs(p.y()) <= half_width_ * p.x() &&

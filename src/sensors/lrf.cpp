@@ -149,6 +149,8 @@ class Lrf : public SensorOf<Lrf> {
     info.height = static_cast<int32_t>(layers_.count);
   }
 
+  void exchange(StateArchive& archive) { archive(noise_, track_, sample_time_, sampled_); }
+
  private:
   struct Return {
     double range = std::numeric_limits<double>::infinity();  // m, along the ray's path
@@ -157,6 +159,7 @@ class Lrf : public SensorOf<Lrf> {
   struct Place {
     SimTime time;
     Pose X_WS;
+    void exchange(StateArchive& archive) { archive(time, X_WS); }
   };
 
   // Scratch memory of a sample, not read afterwards. It belongs to the thread, not the device:

@@ -49,6 +49,8 @@ class Magnetometer : public SensorOf<Magnetometer> {
 
   void shift_time(SimTime us) override { noises_.shift_time(us); }
 
+  void exchange(StateArchive& archive) { archive(noises_); }
+
  private:
   Vec3 field_at(const Vec3& p_W) const {  // T, in the world's axes
     if (environment_.magnetic_field) return *environment_.magnetic_field;

@@ -34,6 +34,8 @@ class MotionStatus : public SensorOf<MotionStatus> {
     if (input.snapshot.step != shown_step_) show(input.snapshot, out);
   }
 
+  void exchange(StateArchive& archive) { archive(changes_, shown_step_); }
+
  private:
   void show(const Snapshot& now, Outbox& out) {
     shown_step_ = now.step;

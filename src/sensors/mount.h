@@ -6,6 +6,7 @@
 
 #include "ruedo/bound.h"
 #include "ruedo/sensor.h"
+#include "ruedo/state_archive.h"
 #include "sensors/noise.h"
 
 namespace ruedo {
@@ -57,6 +58,7 @@ class Noises {
   }
 
   void shift_time(SimTime us) { time_ -= us; }
+  void exchange(StateArchive& archive) { archive(noises_, time_, sampled_); }
   const Noise& operator[](size_t i) const { return noises_[i]; }
 
  private:

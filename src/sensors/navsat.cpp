@@ -96,6 +96,8 @@ class NavSat : public SensorOf<NavSat> {
 
   void shift_time(SimTime us) override { noises_.shift_time(us); }
 
+  void exchange(StateArchive& archive) { archive(noises_); }
+
  private:
   Mount mount_;
   model::Environment place_;

@@ -14,6 +14,7 @@
 
 #include "ruedo/element.h"
 #include "ruedo/random.h"
+#include "ruedo/state_archive.h"
 
 namespace ruedo {
 
@@ -48,6 +49,9 @@ class Noise {
   // Draws one Gaussian, and a second one if the bias drifts; if none(), draws nothing and returns
   // `ideal` unchanged.
   double apply(double ideal, double dt_s, RandomStream& stream);
+
+  // The walk; the rest is drawn from the seed.
+  void exchange(StateArchive& archive) { archive(walk_, known_dt_s_, decay_, drive_); }
 
   // The same with a given draw, for noise without drift.
   double apply_draw(double ideal, double gaussian) const {

@@ -156,6 +156,13 @@ class Odometry : public SensorOf<Odometry> {
     out.publish(channel_, message_);
   }
 
+  void exchange(StateArchive& archive) {
+    archive.each(wheels_);
+    if (base_) archive(*base_);
+    archive(X_WBase_, rate_, ways_, angles_, time_, sample_time_, x_, y_, theta_, speed_before_,
+            resets_);
+  }
+
  private:
   struct Wheel {
     WheelIndex index;

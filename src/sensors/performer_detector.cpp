@@ -44,6 +44,11 @@ class PerformerDetector : public SensorOf<PerformerDetector> {
 
   void shift_time(SimTime) override { shown_step_ = -1; }
 
+  void exchange(StateArchive& archive) {
+    for (Performer& each : performers_) archive(each.instance, each.inside);
+    archive(shown_step_);
+  }
+
  private:
   struct Performer {
     std::string model;

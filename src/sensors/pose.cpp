@@ -28,6 +28,8 @@ class TruePose : public SensorOf<TruePose> {
     out.publish(channel_, message);
   }
 
+  void exchange(StateArchive&) {}
+
  private:
   RobotIndex robot_;
   int channel_;

@@ -137,6 +137,11 @@ class Sonar : public SensorOf<Sonar> {
     }
   }
 
+  void exchange(StateArchive& archive) {
+    for (Transducer& transducer : transducers_) archive(transducer.noise);
+    archive(message_.range, message_.fired_utime, last_fired_);
+  }
+
  private:
   struct Transducer {
     Pose X_ST;  // x is the cone's axis

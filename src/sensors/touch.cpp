@@ -60,6 +60,8 @@ class Touch : public SensorOf<Touch> {
     shown_step_ = -1;
   }
 
+  void exchange(StateArchive& archive) { archive(since_, pressed_, shown_step_); }
+
  private:
   const model::Model& model() const { return *world_->models[own_].model; }
 

@@ -1,5 +1,5 @@
-"""RESTORE of a state that the server itself saved: what follows is what followed, whatever is in
-the world. The worlds and commands are those of test_snapshots.py.
+"""RESTORE of a state, and a server that begins with one: what follows is what followed, whatever is
+in the world. The worlds and commands are those of test_snapshots.py.
 """
 
 import os
@@ -56,49 +56,83 @@ def decide(simulation, commands, decisions, steps):
         simulation.step(steps)
 
 
+class Server:
+    """Of a world in a folder; the user's key is in that of `user`."""
+
+    def __init__(self, folder, options, user="me"):
+        self.url = f"unix://{folder}/bus"
+        (folder / "bus").unlink(missing_ok=True)
+        self.said = folder / f"{user}.txt"
+        with self.said.open("w") as said:
+            self.process = subprocess.Popen(
+                [RUEDO, "run", folder / "w.sdf", "--paused", "--rate=max", "--snapshots", folder]
+                + ["--lcm", self.url, *options],
+                env={**os.environ, "XDG_STATE_HOME": str(folder / user)},
+                stdout=said,
+                stderr=subprocess.STDOUT,
+            )
+        while not (folder / "bus").exists():
+            assert self.process.poll() is None, self.said.read_text()
+            time.sleep(0.02)
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *error):
+        self.process.kill()
+        self.process.wait()
+
+    @property
+    def ran_again(self):
+        return "runs there again" in self.said.read_text()
+
+
 @pytest.mark.parametrize("seed", [1, 2, 3, 7, 9, 12])
 def test_random_worlds_go_on_as_they_went_on(seed, tmp_path):
     world = RandomWorld(seed, pictures=seed % 4 == 1)
-    file = tmp_path / "w.sdf"
-    file.write_text(world.text)
+    (tmp_path / "w.sdf").write_text(world.text)
     with ruedo.Engine(
         "w.sdf", text=world.text, spawn=world.spawn, fault=world.fault, record=True
     ) as engine:
         joints = joint_names(engine)
         before, then = (Commands(10 * seed + i, engine, joints) for i in range(2))
     options = [f"--spawn={one}" for one in world.spawn] + [f"--fault={one}" for one in world.fault]
-    url = f"unix://{tmp_path}/bus"
-    server = subprocess.Popen(
-        [RUEDO, "run", file, "--paused", "--rate=max", "--quiet", "--snapshots", tmp_path]
-        + ["--lcm", url, *options]
-    )
-    try:
-        while not (tmp_path / "bus").exists():
-            assert server.poll() is None
-            time.sleep(0.02)
-        with ruedo.connect(url, timeout=PATIENCE) as simulation:
-            listener = Listener(url)
 
-            def go_on():
-                begin = len(listener.since(0))
-                decide(simulation, then, range(6), 25)
-                return listener.since(begin)
+    def go_on(simulation, listener):
+        begin = len(listener.since(0))
+        decide(simulation, then, range(6), 25)
+        return listener.since(begin)
 
+    with Server(tmp_path, options) as server:
+        with ruedo.connect(server.url, timeout=PATIENCE) as simulation:
+            listener = Listener(server.url)
             decide(simulation, before, range(8), 40)
             saved = simulation.snapshot("here")
-            followed = go_on()
+            followed = go_on(simulation, listener)
             assert len(followed) > 100
-            for where in ("the same world", "another seed's", "there again"):
+            for where in ("the same world", "another seed's", "from the file"):
                 if where == "another seed's":
                     simulation.reset(seed=77)
                     simulation.step(30)
-                if where == "there again":
-                    os.utime(tmp_path / "here.snapshot")  # so that it is read
+                if where == "from the file":
+                    os.utime(tmp_path / "here.snapshot")
                 back = simulation.restore("here")
                 assert (back.step, back.state_hash) == (saved.step, saved.state_hash)
-                assert go_on() == followed, where
-            simulation.quit()
-        server.wait(PATIENCE)
-    finally:
-        server.kill()
-        server.wait()
+                assert go_on(simulation, listener) == followed, where
+            twice = simulation.snapshot("twice")
+            later = go_on(simulation, listener)
+    for user, name, state, then_followed in (
+        ("me", "here", saved, followed),
+        ("me", "twice", twice, later),
+        ("somebody", "twice", twice, later),
+    ):
+        snapshot = tmp_path / f"{name}.snapshot"
+        with Server(tmp_path, [*options, "--restore", snapshot], user) as server:
+            with ruedo.connect(server.url, timeout=PATIENCE) as simulation:
+                listener = Listener(server.url)
+                back = simulation.state()
+                while back.step < state.step:  # it runs there again
+                    back = simulation.state()
+                assert (back.step, back.state_hash) == (state.step, state.state_hash)
+                assert go_on(simulation, listener) == then_followed, (user, name)
+            assert server.ran_again == (user != "me" or bool(world.fault)), (user, name)

@@ -1,6 +1,6 @@
-// RESTORE of a state that the same process saved: the state is put back as it was, and what follows
-// is the same as after running there again. tests/engine/test_restore.py has other worlds and
-// devices.
+// RESTORE, and a run that begins with a snapshot: the state is put back as it was, from memory or
+// from the file, and what follows is the same as after running there again.
+// tests/engine/test_restore.py has other worlds and devices.
 #include <atomic>
 #include <filesystem>
 #include <fstream>
@@ -8,6 +8,7 @@
 #include <gtest/gtest.h>
 
 #include "control_client.h"
+#include "core/input_file.h"
 #include "ruedo/rate_request_t.hpp"
 #include "ruedo/tick_t.hpp"
 #include "ruedo/velocity_command_t.hpp"
@@ -29,18 +30,40 @@ class RestoreTest : public testing::Test, protected Controlled {
   RestoreTest() {
     std::string made = (fs::temp_directory_path() / "ruedo-restore-XXXXXX").string();
     folder_ = ::mkdtemp(made.data());
+    use_key("mine");
   }
   ~RestoreTest() override {
     end();
     fs::remove_all(folder_);
   }
-  void start_paused(RunOptions options = paused_server()) {
+  // The user's, from now on: files are sealed with it.
+  void use_key(const std::string& whose) const {
+    ::setenv("XDG_STATE_HOME", (folder_ + "/" + whose).c_str(), 1);
+  }
+  RunOptions with_snapshots(RunOptions options) {
     options.snapshots = folder_;
     options.simulation.fleet.disabled = {"r/camera"};
     options.simulation.before_batch = [this](const std::string& module) {
       batches_ += module == "kinematics";
     };
+    return options;
+  }
+  // In a server that begins with it, whose log gets `record`; whether that ran the past again.
+  bool begin_with(const std::string& name, const std::string& record = "") {
+    end();
+    batches_ = 0;
+    RunOptions options = with_snapshots(paused_server());
+    options.repeat = file(name);
+    options.record = record;
     begin(std::move(options), kRobot);
+    state_reply_t back = state();
+    for (int i = 0; i < 10'000 && back.step < saved_.step; ++i) back = state();  // on its way
+    EXPECT_EQ(back.step, saved_.step);
+    EXPECT_EQ(back.state_hash, saved_.state_hash);
+    return batches_ > 5;
+  }
+  void start_paused(RunOptions options = paused_server()) {
+    begin(with_snapshots(std::move(options)), kRobot);
     velocity_command_t command{};
     command.vx = 0.6;
     command.omega = 0.1;
@@ -88,6 +111,7 @@ class RestoreTest : public testing::Test, protected Controlled {
       } else if (all[i].channel == "ruedo/tick") {
         auto tick = decoded_as<tick_t>(all[i].bytes);  // with the number of each message
         tick.epoch = 0;
+        tick.run_id = 0;
         for (auto& manifest : tick.manifest)
           if (server().channels().list()[manifest.channel_index].name == "ruedo/world")
             manifest.crc = 0;
@@ -129,8 +153,73 @@ TEST_F(RestoreTest, WhatFollowsIsWhatFollowed) {
   EXPECT_FALSE(restore("here")) << "after a reset of the time";
   EXPECT_EQ(go_on(), followed);
   fs::last_write_time(file("here"), fs::file_time_type::clock::now());
-  EXPECT_TRUE(restore("here")) << "a file that was touched";
+  EXPECT_FALSE(restore("here")) << "from the file, which was touched";
   EXPECT_EQ(go_on(), followed);
+  use_key("another");
+  fs::last_write_time(file("here"), fs::file_time_type::clock::now());
+  EXPECT_TRUE(restore("here")) << "somebody else's file";
+  EXPECT_EQ(go_on(), followed);
+}
+
+TEST_F(RestoreTest, AnotherServerBeginsWithTheState) {
+  start_paused();
+  step(400);
+  saved_ = save("here");
+  const auto followed = go_on();
+  EXPECT_FALSE(begin_with("here"));
+  EXPECT_EQ(go_on(), followed);
+  EXPECT_FALSE(restore("here"));
+  EXPECT_EQ(go_on(), followed);
+  saved_ = save("later");
+  const auto later = go_on();
+  EXPECT_FALSE(begin_with("later")) << "of a run that began with a snapshot";
+  EXPECT_EQ(go_on(), later);
+  use_key("another");
+  EXPECT_TRUE(begin_with("later")) << "somebody else's file: by what acted on both runs";
+  EXPECT_EQ(go_on(), later);
+}
+
+TEST_F(RestoreTest, ALogOfARunThatBeganWithASnapshotHasThePastToo) {
+  start_paused();
+  step(400);
+  saved_ = save("here");
+  const auto followed = go_on();
+  TemporaryFile log("restored.lcm");
+  EXPECT_TRUE(begin_with("here", log.path()));
+  EXPECT_EQ(go_on(), followed);
+  saved_ = save("logged");
+  const auto later = go_on();
+  EXPECT_FALSE(begin_with("logged")) << "a run with a log writes states, too";
+  EXPECT_EQ(go_on(), later);
+}
+
+// Sealed, a state is nobody else's; without its seal it is not read.
+TEST_F(RestoreTest, AFileWithAByteChangedLeadsThereOrIsRefused) {
+  start_paused();
+  step(100);
+  saved_ = save("here");
+  const std::string whole = read_input(file("here"), size_t{1} << 30);
+  const auto write = [&](const std::string& bytes) {
+    std::ofstream(file("here"), std::ios::binary) << bytes;
+  };
+  const auto comes_back = [&] {
+    const reply_t reply = named(request_t::RESTORE, "here");
+    if (reply.code != reply_t::OK) return false;
+    EXPECT_EQ(decoded_as<state_reply_t>(reply.body).state_hash, saved_.state_hash);
+    return true;
+  };
+  int back = 0;
+  for (size_t at = 0; at < whole.size(); at += whole.size() / 97) {
+    std::string changed = whole;
+    changed[at] = static_cast<char>(changed[at] ^ 0x41);
+    write(changed);
+    back += comes_back();
+    write(whole.substr(0, at));
+    EXPECT_FALSE(comes_back()) << "cut off at " << at;
+  }
+  EXPECT_GT(back, 80) << "most of the file is the state: without it the run gets there again";
+  write(whole);
+  EXPECT_FALSE(restore("here"));
 }
 
 TEST_F(RestoreTest, TheFileOfAStateThatWasPutBackLeadsThere) {
@@ -143,6 +232,7 @@ TEST_F(RestoreTest, TheFileOfAStateThatWasPutBackLeadsThere) {
   step(100);
   saved_ = save("second");
   const auto followed = go_on();
+  use_key("another");
   fs::last_write_time(file("second"), fs::file_time_type::clock::now());
   EXPECT_TRUE(restore("second"));
   EXPECT_EQ(go_on(), followed);
@@ -157,9 +247,13 @@ TEST_F(RestoreTest, WhatWasNotAppliedYetIsNotSaved) {
   saved_ = save("here");
   step(50);
   fs::last_write_time(file("here"), fs::file_time_type::clock::now());
-  EXPECT_TRUE(restore("here"));
+  EXPECT_FALSE(restore("here"));
   const auto followed = go_on();
+  use_key("another");
   EXPECT_TRUE(restore("here"));
+  EXPECT_EQ(go_on(), followed);
+  EXPECT_TRUE(restore("here"));
+  use_key("mine");
   saved_ = save("here");  // now in memory
   bus.send("r/velocity", engine::encoded(command));
   EXPECT_FALSE(restore("here"));
@@ -195,8 +289,10 @@ TEST_F(RestoreTest, OfManyTheNewestAreKept) {
   saved_ = save("0");
   for (size_t i = 1; i < SavedStates::kMost; ++i) save(std::to_string(i));
   EXPECT_FALSE(restore("0"));
+  use_key("another");
+  EXPECT_FALSE(restore("0"));
   save("another");
-  EXPECT_TRUE(restore("0"));
+  EXPECT_TRUE(restore("0")) << "it is in the file alone, which another's key has sealed";
   EXPECT_FALSE(restore("1"));
 }
 

@@ -61,6 +61,12 @@ class MemoryBus : public Bus {
     handler(channel, bytes.data(), bytes.size());
   }
 
+  // A server that ends: the next one will listen.
+  void stop() override {
+    std::lock_guard lock(mutex_);
+    handler_ = nullptr;
+  }
+
   // The first message at or after index `from` on a channel that `good` accepts; waits for it. The
   // test fails by its own time limit when there is none.
   Message wait_for(const std::string& channel, size_t& from,
