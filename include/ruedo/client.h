@@ -610,9 +610,10 @@ class [[nodiscard]] Simulation {
   /// @param name of the snapshot
   /// @return the state
   State snapshot(const std::string& name) const;
-  /// Puts the world back to a snapshot; what follows equals what followed it. A new epoch. One of
-  /// the last that this server saved takes milliseconds; to another one it runs from the beginning
-  /// of the snapshot's run, in silence, which takes as long as that part takes at rate max.
+  /// Puts the world back to a snapshot; what follows equals what followed it. A new epoch. A
+  /// snapshot that the same user's server saved takes milliseconds. In the cases that
+  /// docs/determinism.md names the server repeats the snapshot's run from its beginning, without
+  /// publishing, at rate max.
   /// @param name of the snapshot
   /// @return the state
   State restore(const std::string& name) const;

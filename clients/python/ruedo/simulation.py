@@ -293,7 +293,7 @@ class Simulation:
 
     def snapshot(self, name: str) -> State:
         """Saves the state under a name, in the folder that the server was started with
-        (`--snapshots FOLDER`), and returns it. The file holds what acted on the world so far."""
+        (`--snapshots FOLDER`), and returns it."""
         return control.state_of(
             self._session.request(lcmtypes.request_t.SNAPSHOT, _name_body(name), 60.0)
         )
@@ -301,9 +301,9 @@ class Simulation:
     def restore(self, name: str) -> State:
         """Puts the world back to a snapshot; what follows equals what followed it. A new epoch.
 
-        One of the last that this server saved takes milliseconds. To another one the server runs
-        from the beginning of the snapshot's run, in silence: as long as that part takes at rate
-        max. docs/determinism.md says which is which.
+        A snapshot that the same user's server saved takes milliseconds. In the cases that
+        docs/determinism.md names the server repeats the snapshot's run from its beginning, without
+        publishing, at rate max.
         """
         state = control.state_of(
             self._session.request(lcmtypes.request_t.RESTORE, _name_body(name), 3600.0)

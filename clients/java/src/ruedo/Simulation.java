@@ -367,9 +367,10 @@ public final class Simulation implements AutoCloseable {
     }
 
     /**
-     * Restores a snapshot; what follows equals what followed the snapshot. Begins a new epoch. One
-     * of the last snapshots that this server saved takes milliseconds. For another one the server
-     * repeats the snapshot's run from its beginning, without publishing, at rate max.
+     * Restores a snapshot; what follows equals what followed the snapshot. Begins a new epoch. A
+     * snapshot that the same user's server saved takes milliseconds. In the cases that
+     * docs/determinism.md names the server repeats the snapshot's run from its beginning, without
+     * publishing, at rate max.
      */
     public State restore(String name) {
         State state = State.of(session.request(request_t.RESTORE, nameBody(name), RESTORE_SECONDS));
