@@ -108,13 +108,13 @@ class Copier {
       numbers.emplace_back(children[i].m_indexA, children[i].m_indexB);
     archive(numbers);
     for (size_t i = 0; i < numbers.size(); ++i) {
-      const auto [in_a, in_b] = numbers[i];
+      const int in_a = numbers[i].first, in_b = numbers[i].second;
       on_child(a, in_a, [&](const Wrapper& child_a) {
         on_child(b, in_b, [&](const Wrapper& child_b) {
+          void* algorithm = archive.reads() ? made(child_a, child_b)
+                                            : children[static_cast<int>(i)].m_userPointer;
           if (archive.reads())
-            children_of(both).addOverlappingPair(in_a, in_b)->m_userPointer =
-                made(child_a, child_b);
-          void* algorithm = children[static_cast<int>(i)].m_userPointer;
+            children_of(both).addOverlappingPair(in_a, in_b)->m_userPointer = algorithm;
           exchange_points(archive, *static_cast<btCollisionAlgorithm*>(algorithm), child_a,
                           child_b);
         });
@@ -218,6 +218,7 @@ void exchange_contacts(StateArchive& archive, btBroadphasePair& pair, btDispatch
   const Wrapper a = whole(object_a), b = whole(object_b);
   Copier copier(dispatcher, info);
   if (archive.reads()) pair.m_algorithm = copier.made(a, b);
+  if (!pair.m_algorithm) refuse("two shapes that nothing brings together");
   if (auto* both = dynamic_cast<btCompoundCompoundCollisionAlgorithm*>(pair.m_algorithm))
     copier.exchange_compounds(archive, *both, a, b);
   if (auto* one = dynamic_cast<btCompoundCollisionAlgorithm*>(pair.m_algorithm))
