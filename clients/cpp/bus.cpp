@@ -68,9 +68,9 @@ void Bus::publish(const std::string& channel, const uint8_t* bytes, size_t size)
   if (!state_->closed) state_->transport->publish(channel, bytes, size);
 }
 
-void Bus::receive_directly() {
+void Bus::receive_eagerly() {
   const Turn turn(*this);
-  state_->transport->receive_directly();
+  state_->transport->receive_eagerly();
 }
 
 void Bus::close() {

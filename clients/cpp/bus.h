@@ -26,12 +26,11 @@ class Bus {
   explicit Bus(std::unique_ptr<Transport> transport);
   ~Bus();
 
-  void
-  start();  // begins to receive; at least one subscription comes first: LCM's socket is made by it
+  void start();  // begins to receive; at least one subscription comes first: memq needs it
   [[nodiscard]] Subscription subscribe(const std::string& channel, Handler handler);
   void publish(const std::string& channel, const uint8_t* bytes, size_t size);
-  void receive_directly();  // as Transport's
-  void close();             // in a handler, too: the thread ends when that returns
+  void receive_eagerly();  // as Transport's
+  void close();            // in a handler, too: the thread ends when that returns
 
   // Lets the caller receive in its own thread: handing each message from thread to thread takes as
   // long as receiving it. While one of these lives, and a moment longer, the receiving thread

@@ -72,7 +72,7 @@ void Stepper::forget() {
 }
 
 void Stepper::take_part(Duration timeout) {
-  core_.bus().receive_directly();
+  core_.bus().receive_eagerly();
   subscribe();
   grant_request_t body{};
   body.granted = -1;

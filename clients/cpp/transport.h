@@ -24,9 +24,9 @@ class Transport {
   virtual void publish(const std::string& channel, const uint8_t* bytes, size_t size) = 0;
   // Hands over what has come, or waits for it at most so long and returns false.
   virtual bool receive(std::chrono::milliseconds timeout, const Receiver& receiver) = 0;
-  // From now on as fast as possible, at the price of losing some of many messages at once: for
-  // lockstep, which fetches lost messages again. Not while another thread receives.
-  virtual void receive_directly() {}
+  // From now on without sleeping between messages that follow each other closely, as in lockstep.
+  // Not while another thread receives.
+  virtual void receive_eagerly() {}
 };
 
 // Throws NoServer, with the cure, when nothing can come from that URL.

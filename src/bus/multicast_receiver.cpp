@@ -23,6 +23,7 @@ namespace {
 
 constexpr uint32_t kShort = 0x4c433032, kFragment = 0x4c433033;
 constexpr size_t kShortHead = 8, kFragmentHead = 20, kLargestDatagram = 65536;
+constexpr size_t kFragmentMemory = 128;  // beside its data
 
 // The channel's name at the beginning of `bytes`; size() + 1 of them are its. Empty: there is none.
 std::string_view channel_at(const uint8_t* bytes, size_t size) {
@@ -97,43 +98,60 @@ void MulticastReceiver::take_fragment(const uint8_t* bytes, size_t size, const H
     data += channel.size() + 1;
     length -= channel.size() + 1;
   }
-  if (number >= of || total > kMostPartial || offset > total || length > total - offset) return;
-  Partial* partial = partial_of(read_big_endian<uint32_t>(bytes + 4), total, of);
-  if (!partial || partial->here[number]) return;
-  partial->here[number] = true;
-  --partial->missing;
-  std::memcpy(partial->data.data() + offset, data, length);
+  if (number >= of || total > kLongestMessage || offset > total || length > total - offset) return;
+  const auto partial = partial_of(read_big_endian<uint32_t>(bytes + 4), total, of);
+  if (partial == partials_.end()) return;
+  const auto [fragment, is_new] = partial->fragments.try_emplace(number);
+  if (!is_new) return;
+  fragment->second = {offset, {data, data + length}};
+  partial->memory += length + kFragmentMemory;
+  partial_memory_ += length + kFragmentMemory;
   if (number == 0) partial->channel = channel;
-  if (partial->missing > 0) return;
-  handler(partial->channel, partial->data.data(), partial->data.size());
-  partial_bytes_ -= total;
-  partials_.remove_if([&](const Partial& one) { return &one == partial; });
+  if (partial->fragments.size() == of) {
+    const Partial complete = std::move(*partial);
+    partial_memory_ -= complete.memory;
+    partials_.erase(partial);
+    if (const auto message = joined(complete.fragments, total))
+      handler(complete.channel, message->data(), message->size());
+  }
+  while (partial_memory_ > kMostPartial) forget(partials_.begin());
 }
 
-// Null when a fragment contradicts those before it.
-MulticastReceiver::Partial* MulticastReceiver::partial_of(uint32_t sequence, size_t size,
-                                                          size_t fragments) {
+// end(): a fragment contradicts those before it.
+MulticastReceiver::Partials::iterator MulticastReceiver::partial_of(uint32_t sequence, size_t size,
+                                                                    size_t count) {
   const auto known = std::find_if(partials_.begin(), partials_.end(),
                                   [&](const Partial& one) { return one.sender == sender_; });
   if (known != partials_.end()) {
     if (known->sequence == sequence)
-      return known->data.size() == size && known->here.size() == fragments ? &*known : nullptr;
-    partial_bytes_ -= known->data.size();
-    partials_.erase(known);
+      return known->size == size && known->count == count ? known : partials_.end();
+    forget(known);
   }
-  while (!partials_.empty() &&
-         (partials_.size() >= kMostSenders || partial_bytes_ + size > kMostPartial)) {
-    partial_bytes_ -= partials_.front().data.size();
-    partials_.pop_front();
-  }
+  if (partials_.size() >= kMostSenders) forget(partials_.begin());
   Partial& made = partials_.emplace_back();
   made.sender = sender_;
   made.sequence = sequence;
-  made.data.resize(size);
-  made.here.resize(fragments);
-  made.missing = fragments;
-  partial_bytes_ += size;
-  return &made;
+  made.size = size;
+  made.count = count;
+  return std::prev(partials_.end());
+}
+
+void MulticastReceiver::forget(Partials::iterator partial) {
+  partial_memory_ -= partial->memory;
+  partials_.erase(partial);
+}
+
+// Empty unless they follow each other without a gap.
+std::optional<std::vector<uint8_t>> MulticastReceiver::joined(
+    const std::map<size_t, Fragment>& fragments, size_t size) {
+  std::vector<uint8_t> message;
+  message.reserve(size);
+  for (const auto& [number, fragment] : fragments) {
+    if (fragment.offset != message.size()) return std::nullopt;
+    message.insert(message.end(), fragment.data.begin(), fragment.data.end());
+  }
+  if (message.size() != size) return std::nullopt;
+  return message;
 }
 
 // A filter in the kernel (BPF), which sees the datagram from its UDP header on.

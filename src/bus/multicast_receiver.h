@@ -8,6 +8,8 @@
 #include <cstdint>
 #include <functional>
 #include <list>
+#include <map>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -21,8 +23,9 @@ class MulticastReceiver {
  public:
   using Handler = std::function<void(std::string_view channel, const uint8_t* data, size_t size)>;
 
-  static constexpr size_t kLongestChannel = 63;      // LCM's
-  static constexpr size_t kMostPartial = 32u << 20;  // bytes of messages that are not whole yet
+  static constexpr size_t kLongestChannel = 63;  // LCM's
+  static constexpr size_t kLongestMessage = 64u << 20;
+  static constexpr size_t kMostPartial = 80u << 20;  // memory of messages that are not whole yet
   static constexpr size_t kMostSenders = 32;         // of such messages
 
   // Joins the group. buffer: bytes of the socket's buffer, 0: the system's. Throws
@@ -48,23 +51,33 @@ class MulticastReceiver {
   bool ignore(Sender sender);
 
  private:
-  struct Partial {  // of each sender the newest message
+  struct Fragment {
+    size_t offset = 0;
+    std::vector<uint8_t> data;
+  };
+  // Of each sender the newest message. It takes the memory of what has come, not of what its sender
+  // says is to come.
+  struct Partial {
     Sender sender;
     uint32_t sequence = 0;
+    size_t size = 0, count = 0;  // bytes and fragments of the whole
     std::string channel;
-    std::vector<uint8_t> data;
-    std::vector<bool> here;
-    size_t missing = 0;
+    std::map<size_t, Fragment> fragments;  // by number
+    size_t memory = 0;
   };
+  using Partials = std::list<Partial>;
 
   void take_fragment(const uint8_t* bytes, size_t size, const Handler& handler);
-  Partial* partial_of(uint32_t sequence, size_t size, size_t fragments);
+  Partials::iterator partial_of(uint32_t sequence, size_t size, size_t count);
+  void forget(Partials::iterator partial);
+  static std::optional<std::vector<uint8_t>> joined(const std::map<size_t, Fragment>& fragments,
+                                                    size_t size);
 
   FileHandle socket_;
   Sender sender_;
   std::vector<uint8_t> datagram_;
-  std::list<Partial> partials_;  // the newest last
-  size_t partial_bytes_ = 0;
+  Partials partials_;  // the newest last
+  size_t partial_memory_ = 0;
 };
 
 }  // namespace ruedo::bus

@@ -8,6 +8,7 @@
 #include <random>
 
 #include <gtest/gtest.h>
+#include <sys/resource.h>
 
 namespace ruedo::bus {
 namespace {
@@ -111,6 +112,49 @@ TEST_F(Multicast, SendersApartAndTheNewestMessageOfEach) {
   read(b[0], {1, 2});
   ASSERT_EQ(heard_.size(), 1u);
   EXPECT_EQ(heard_[0], (std::pair<std::string, Bytes>("b", other)));
+}
+
+// Of which each sender says that 30 MB are to come: they cost what came, and none of the time and
+// memory that was announced.
+TEST_F(Multicast, AnnouncedSizesCostNothing) {
+  const auto pages = [] {
+    rusage used{};
+    ::getrusage(RUSAGE_SELF, &used);
+    return used.ru_minflt;
+  };
+  Bytes first = fragments("c", Bytes(100, 3), 1, 50)[0];
+  const uint32_t size = 30u << 20;
+  for (size_t i = 0; i < 4; ++i) first[8 + i] = static_cast<uint8_t>(size >> (24 - 8 * i));
+  const auto before = pages();
+  for (uint32_t i = 0; i < 1000; ++i) {
+    first[6] = static_cast<uint8_t>(i >> 8);
+    first[7] = static_cast<uint8_t>(i);
+    read(first, {1, static_cast<uint16_t>(i % 64)});
+  }
+  EXPECT_LT(pages() - before, 2000);  // of 4 KiB; 30 MB have 7680
+  EXPECT_TRUE(heard_.empty());
+}
+
+// What no fragment brought is not made up: no memory of ours goes out in a message.
+TEST_F(Multicast, MessagesWithGapsAreNone) {
+  std::vector<Bytes> parts = fragments("c", Bytes(300, 3), 1, 100);
+  parts[1][15] = 50;  // its offset: over the first, with a gap behind
+  for (const Bytes& part : parts) read(part);
+  parts = fragments("c", Bytes(300, 3), 2, 100);
+  parts[1].resize(parts[1].size() - 1);
+  for (const Bytes& part : parts) read(part);
+  EXPECT_TRUE(heard_.empty());
+  for (const Bytes& part : fragments("c", Bytes(300, 3), 3, 100)) read(part);
+  EXPECT_EQ(heard_.size(), 1u);
+}
+
+// 80 MB of them at most, and the newest go on.
+TEST_F(Multicast, WhatDoesNotEndIsForgotten) {
+  const std::vector<Bytes> parts = fragments("c", Bytes(200'000, 3), 1, 65'000);
+  for (uint16_t sender = 0; sender < 200; ++sender)
+    for (size_t i = 0; i + 1 < parts.size(); ++i) read(parts[i], {1, sender});
+  for (const Bytes& part : parts) read(part, {2, 1});
+  EXPECT_EQ(heard_.size(), 1u);
 }
 
 TEST_F(Multicast, WhatIsNotLcmIsPassedOver) {

@@ -11,6 +11,7 @@ from conftest import HERE, PROBES, Server, free_url, probe
 
 # isort: split
 from fake_server import info
+from lying_datagrams import LyingDatagrams, cut, fragment
 from lying_stream import HELLO, LyingStream, frame, grants_and_huge_ticks
 from ruedo import lcmtypes
 
@@ -200,3 +201,27 @@ def test_a_hundred_thousand_devices(language, stream_url):
     with LyingStream(stream_url, HELLO + frame("ruedo/info", many.encode())):
         said = probe(language, stream_url, "list", timeout=120.0)
     assert said.one("robot").startswith("p3at")
+
+
+def test_datagrams_that_are_cut_off_are_passed_over(language):
+    """One of them was enough: LCM's receiver reads behind its end."""
+    url = free_url()
+    with LyingDatagrams(url, lambda turn: cut()):
+        assert probe(language, url, "streams", "p3at", "2").one("lrf") == "none"
+
+
+def test_fragments_that_never_make_a_message_take_no_memory(language):
+    """64 senders announce 60 MB each, again and again."""
+
+    def lies(turn):
+        return [fragment(turn, 60 << 20, 0, 0, 1000, b"p3at/LRF\0" + bytes(100))]
+
+    url = free_url()
+    with LyingDatagrams(url, lies, 64):
+        process = subprocess.Popen(
+            [*PROBES[language], url, "streams", "p3at", "2"], stdout=subprocess.PIPE, text=True
+        )
+        said = process.stdout.read()
+        _, status, used = os.wait4(process.pid, 0)
+    assert status == 0 and "lrf none" in said, said
+    assert used.ru_maxrss < 200_000  # KiB

@@ -34,7 +34,7 @@ class Bus:
         self._thread = threading.Thread(target=self._receive, name="ruedo-receive", daemon=True)
 
     def start(self) -> None:
-        """Begins to receive. At least one subscription comes first: LCM's socket is made by it."""
+        """Begins to receive. At least one subscription comes first: memq needs it."""
         self._thread.start()
 
     def subscribe(self, channel: str, handler: Handler) -> Subscription:

@@ -6,13 +6,13 @@ import math
 import select
 import threading
 import time
-from contextlib import AbstractContextManager, nullcontext
 from typing import Any, Protocol
 from urllib.parse import urlsplit
 
 import lcm
 
 from .address import check_reachable
+from .multicast_transport import MulticastTransport
 from .stream_transport import Receiver, StreamTransport
 
 
@@ -41,11 +41,13 @@ def open_transport(url: str) -> Transport:
     """Raises NoServer, with the cure, when nothing can come from that URL."""
     check_reachable(url)
     parts = urlsplit(url)
-    return StreamTransport(parts) if parts.scheme in ("tcpq", "unix") else LcmTransport(url)
+    if parts.scheme in ("tcpq", "unix"):
+        return StreamTransport(parts)
+    return MulticastTransport(url) if parts.scheme == "udpm" else LcmTransport(url)
 
 
 class LcmTransport:
-    """LCM, which forbids most of what Transport promises:
+    """What only LCM itself can carry, memq and logs. It forbids most of what Transport promises:
 
     - Its module runs callbacks from handle() without the interpreter's lock until it has read its
       subscription. Beside that, subscribe() has a subscription called before its fields are set,
@@ -63,9 +65,6 @@ class LcmTransport:
     def __init__(self, url: str):
         self._lcm: lcm.LCM | None = lcm.LCM(url)  # None: closed
         self._lock = threading.Lock()
-        self._sending: AbstractContextManager[Any] = (
-            nullcontext() if url.startswith("udpm:") else self._lock
-        )  # multicast has a lock of its own
         self._subscriptions: dict[str, Any] = {}
         self._arrived: list[tuple[str, bytes]] = []
         self._poll: select.poll | None = None
@@ -84,9 +83,9 @@ class LcmTransport:
                 self._lcm.unsubscribe(self._subscriptions.pop(channel))
 
     def publish(self, channel: str, data: bytes) -> None:
-        with self._sending:
-            if open_lcm := self._lcm:
-                open_lcm.publish(channel, data)
+        with self._lock:
+            if self._lcm:
+                self._lcm.publish(channel, data)
 
     def receive(self, seconds: float, receiver: Receiver) -> bool:
         open_lcm = self._lcm

@@ -11,9 +11,9 @@ import java.nio.ByteBuffer;
 import java.nio.channels.DatagramChannel;
 import java.nio.charset.StandardCharsets;
 import java.util.Arrays;
-import java.util.BitSet;
 import java.util.LinkedHashMap;
 import java.util.Map;
+import java.util.TreeMap;
 
 /**
  * LCM over multicast: short messages in one datagram, long ones in fragments. LCM's own class for
@@ -25,20 +25,50 @@ final class UdpmTransport implements Transport {
     private static final int LONG = 0x4c433033; // "LC03"
     private static final int MOST_IN_A_DATAGRAM = 64000; // bytes of channel and message
     private static final int LONGEST = 64 << 20; // bytes of a message that is put together
+    private static final int MOST_PARTIAL = 80 << 20; // bytes: memory of those not whole yet
+    private static final int FRAGMENT_MEMORY = 128; // bytes, beside its data
     private static final int MOST_SENDERS = 32; // of messages that are not whole yet
 
-    /** Of each sender the newest message that is not whole yet. */
+    /**
+     * Of each sender the newest message that is not whole yet. It takes the memory of what has
+     * come, not of what its sender says is to come.
+     */
     private static final class Partial {
         final int sequence;
-        final byte[] data;
-        final BitSet here = new BitSet();
+        final int size;
+        final int count;
+        final Map<Integer, Fragment> fragments = new TreeMap<>(); // by number
         String channel;
-        int missing;
+        long memory;
 
-        Partial(int sequence, int size, int fragments) {
+        Partial(int sequence, int size, int count) {
             this.sequence = sequence;
-            data = new byte[size];
-            missing = fragments;
+            this.size = size;
+            this.count = count;
+        }
+
+        /** Null unless the fragments follow each other without a gap. */
+        byte[] joined() {
+            int at = 0;
+            for (Fragment fragment : fragments.values()) {
+                if (fragment.offset != at) return null;
+                at += fragment.data.length;
+            }
+            if (at != size) return null;
+            byte[] message = new byte[size];
+            for (Fragment fragment : fragments.values())
+                System.arraycopy(fragment.data, 0, message, fragment.offset, fragment.data.length);
+            return message;
+        }
+    }
+
+    private static final class Fragment {
+        final int offset;
+        final byte[] data;
+
+        Fragment(int offset, byte[] data) {
+            this.offset = offset;
+            this.data = data;
         }
     }
 
@@ -46,15 +76,9 @@ final class UdpmTransport implements Transport {
     private final DatagramChannel socket;
     private int sequence; // under this object's monitor
     private volatile boolean closed;
-    private final Map<SocketAddress, Partial> partials =
-            new LinkedHashMap<>() { // the receiving thread's
-                private static final long serialVersionUID = 1L;
-
-                @Override
-                protected boolean removeEldestEntry(Map.Entry<SocketAddress, Partial> eldest) {
-                    return size() > MOST_SENDERS;
-                }
-            };
+    // The newest last; the receiving thread's.
+    private final Map<SocketAddress, Partial> partials = new LinkedHashMap<>();
+    private long partialMemory;
 
     UdpmTransport(Address address) {
         try {
@@ -216,19 +240,41 @@ final class UdpmTransport implements Transport {
         String channel = fragment == 0 ? channel(in) : null;
         if (fragment == 0 && (channel == null || !receiver.wants(channel))) return;
         if (offset < 0 || offset > size - in.remaining()) return;
-        Partial partial = partials.get(sender);
-        if (partial == null || partial.sequence != number || partial.data.length != size) {
-            partials.remove(sender);
-            partial = new Partial(number, size, fragments);
-            partials.put(sender, partial);
-        }
-        if (partial.here.get(fragment)) return;
-        partial.here.set(fragment);
+        Partial partial = partialOf(sender, number, size, fragments);
+        if (partial == null || partial.fragments.containsKey(fragment)) return;
+        byte[] data = new byte[in.remaining()];
+        in.get(data);
+        partial.fragments.put(fragment, new Fragment(offset, data));
+        partial.memory += data.length + FRAGMENT_MEMORY;
+        partialMemory += data.length + FRAGMENT_MEMORY;
         if (channel != null) partial.channel = channel;
-        in.get(partial.data, offset, in.remaining());
-        if (--partial.missing > 0) return;
-        partials.remove(sender);
-        if (partial.channel != null) receiver.receive(partial.channel, partial.data);
+        if (partial.fragments.size() == fragments) {
+            forget(sender);
+            byte[] message = partial.channel != null ? partial.joined() : null;
+            if (message != null) receiver.receive(partial.channel, message);
+        }
+        while (partialMemory > MOST_PARTIAL) forgetOldest();
+    }
+
+    /** Null when a fragment contradicts those before it. */
+    private Partial partialOf(SocketAddress sender, int sequence, int size, int count) {
+        Partial known = partials.get(sender);
+        if (known != null && known.sequence == sequence)
+            return known.size == size && known.count == count ? known : null;
+        forget(sender);
+        if (partials.size() >= MOST_SENDERS) forgetOldest();
+        Partial made = new Partial(sequence, size, count);
+        partials.put(sender, made);
+        return made;
+    }
+
+    private void forget(SocketAddress sender) {
+        Partial partial = partials.remove(sender);
+        if (partial != null) partialMemory -= partial.memory;
+    }
+
+    private void forgetOldest() {
+        forget(partials.keySet().iterator().next());
     }
 
     /** The name in front of a message; null where it has no end. */

@@ -1,0 +1,54 @@
+// LCM's multicast as a transport.
+#include "multicast_transport.h"
+
+#include <poll.h>
+
+#include <algorithm>
+#include <cstdlib>
+#include <system_error>
+#include <thread>
+
+#include "address.h"
+#include "ruedo/client.h"
+
+namespace ruedo::client {
+namespace {
+
+constexpr std::chrono::microseconds kLookTime(50);
+constexpr int kReceiveBuffer = 2 << 20;  // bytes; the system gives at most its own limit
+
+}  // namespace
+
+MulticastTransport::MulticastTransport(const std::string& url) : lcm_(lcm_create(url.c_str())) {
+  const Address address = split(url);
+  const size_t option = address.options.find("recv_buf_size=");
+  const int buffer =
+      option == std::string::npos ? 0 : std::atoi(address.options.c_str() + option + 14);
+  try {
+    if (!lcm_) throw std::system_error(std::make_error_code(std::errc::invalid_argument));
+    receiver_ = std::make_unique<bus::MulticastReceiver>(
+        address.host, static_cast<uint16_t>(std::atoi(address.port.c_str())),
+        std::max(buffer, kReceiveBuffer));
+  } catch (const std::system_error&) {
+    throw NoServer(url + ": LCM cannot use it; `ruedo doctor` looks for what is wrong");
+  }
+}
+
+void MulticastTransport::publish(const std::string& channel, const uint8_t* bytes, size_t size) {
+  lcm_publish(lcm_.get(), channel.c_str(), bytes, static_cast<unsigned int>(size));
+}
+
+bool MulticastTransport::receive(std::chrono::milliseconds timeout, const Receiver& receiver) {
+  // Waking a thread takes as long as a step of a small world: poll before sleeping.
+  static const bool may_look_again = std::thread::hardware_concurrency() > 1;
+  const auto sleep_at = std::chrono::steady_clock::now() + kLookTime;
+  do {
+    if (receiver_->take(receiver)) return true;
+  } while (looks_again_ && may_look_again && timeout.count() > 0 &&
+           std::chrono::steady_clock::now() < sleep_at);
+  pollfd waiting{receiver_->file(), POLLIN, 0};
+  ::poll(&waiting, 1, static_cast<int>(timeout.count()));
+  return false;
+}
+
+}  // namespace ruedo::client

@@ -1,0 +1,36 @@
+// LCM's multicast as a transport. LCM only sends: its receiver reads outside of a datagram that is
+// shorter than its head says, and ends the program.
+//
+// All channels come; what waits is in the socket's buffer alone, for all channels together.
+#pragma once
+
+#include <lcm/lcm.h>
+
+#include <memory>
+#include <string>
+
+#include "bus/multicast_receiver.h"
+#include "transport.h"
+
+namespace ruedo::client {
+
+class MulticastTransport : public Transport {
+ public:
+  explicit MulticastTransport(const std::string& url);  // throws NoServer
+
+  void subscribe(const std::string&) override {}
+  void unsubscribe(const std::string&) override {}
+  void publish(const std::string& channel, const uint8_t* bytes, size_t size) override;
+  bool receive(std::chrono::milliseconds timeout, const Receiver& receiver) override;
+  void receive_eagerly() override { looks_again_ = true; }
+
+ private:
+  struct Destroy {
+    void operator()(lcm_t* lcm) const { lcm_destroy(lcm); }
+  };
+  std::unique_ptr<lcm_t, Destroy> lcm_;  // sends; from any thread
+  std::unique_ptr<bus::MulticastReceiver> receiver_;
+  bool looks_again_ = false;
+};
+
+}  // namespace ruedo::client

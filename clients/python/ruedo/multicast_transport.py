@@ -1,0 +1,183 @@
+"""LCM's multicast as a transport. LCM itself only sends: its receiver reads outside of a datagram
+that is shorter than its head says and ends the program, and it keeps every channel's name that ever
+came.
+
+    short:    "LC02", sequence, channel and a 0, data
+    fragment: "LC03", sequence, size of the message, offset, number, of how many; number 0 has the
+              channel and a 0 before its data
+"""
+
+from __future__ import annotations
+
+import contextlib
+import math
+import select
+import socket
+import struct
+import time
+from dataclasses import dataclass, field
+from urllib.parse import parse_qs, urlsplit
+
+import lcm
+
+from . import arrivals
+from .errors import NoServer
+from .stream_transport import Receiver
+
+_SHORT, _FRAGMENT = b"LC02", b"LC03"
+_SHORT_HEAD = 8
+_HEAD = struct.Struct(">4sIIIHH")
+_LONGEST_CHANNEL, _LONGEST_DATAGRAM = 63, 65536
+_LONGEST_MESSAGE = 64 << 20  # bytes
+_MOST_PARTIAL = 80 << 20  # bytes: memory of messages that are not whole yet
+_FRAGMENT_MEMORY = 256  # bytes, beside its data
+_MOST_SENDERS = 32  # of such messages
+_RECEIVE_BUFFER = 2 << 20  # bytes; the system gives at most its own limit
+_MOST_AT_ONCE = 100  # datagrams
+
+_Sender = tuple[str, int]
+
+
+@dataclass
+class _Partial:
+    """Of each sender the newest message that is not whole yet. It takes the memory of what has
+    come, not of what its sender says is to come."""
+
+    sequence: int
+    size: int
+    count: int
+    fragments: dict[int, tuple[int, bytes]] = field(default_factory=dict)  # offset and data
+    channel: str | None = None  # None: nobody listens to it, or its fragment has not come
+    memory: int = 0
+
+    def joined(self) -> bytes | None:
+        """None unless the fragments follow each other without a gap."""
+        at, pieces = 0, []
+        for number in range(self.count):
+            offset, data = self.fragments[number]
+            if offset != at:
+                return None
+            at += len(data)
+            pieces.append(data)
+        return b"".join(pieces) if at == self.size else None
+
+
+class MulticastTransport:
+    """What waits is in the socket's buffer alone, for all channels together."""
+
+    loses_nothing = False
+
+    def __init__(self, url: str):
+        try:
+            self._lcm: lcm.LCM | None = lcm.LCM(url)  # sends, from any thread; None: closed
+            self._socket = _joined_socket(url)
+        except (OSError, RuntimeError) as error:
+            raise NoServer(
+                f"{url}: it cannot be used ({error}); `ruedo doctor` looks for what is wrong"
+            ) from None
+        self._poll = select.poll()
+        self._poll.register(self._socket, select.POLLIN)
+        self._buffer = bytearray(_LONGEST_DATAGRAM)
+        self._view = memoryview(self._buffer)
+        self._channels: dict[bytes, str] = {}  # that are listened to
+        self._partials: dict[_Sender, _Partial] = {}  # the newest last
+        self._partial_memory = 0
+
+    def subscribe(self, channel: str) -> None:
+        self._channels[channel.encode()] = channel
+
+    def unsubscribe(self, channel: str) -> None:
+        self._channels.pop(channel.encode(), None)
+
+    def publish(self, channel: str, data: bytes) -> None:
+        if open_lcm := self._lcm:
+            open_lcm.publish(channel, data)
+
+    def receive(self, seconds: float, receiver: Receiver) -> bool:
+        arrived: arrivals.Arrived = []
+        deadline = time.monotonic() + seconds
+        # What nobody listens to, such as what was sent here, is no end of the waiting.
+        while not arrived and self._lcm:
+            left = max(0.0, deadline - time.monotonic())
+            if not self._poll.poll(math.ceil(left * 1e3)):
+                break
+            with contextlib.suppress(OSError):  # there is no more, or it was closed
+                for _ in range(_MOST_AT_ONCE):
+                    self._take(*self._socket.recvfrom_into(self._buffer), arrived)
+            if left == 0.0:
+                break
+        if arrived:
+            receiver(arrived)
+        return bool(arrived)
+
+    def close(self) -> None:
+        self._lcm = None
+        self._socket.close()
+
+    def _take(self, size: int, sender: _Sender, arrived: arrivals.Arrived) -> None:
+        """A datagram, which is at the beginning of the buffer."""
+        if size >= _HEAD.size and self._buffer.startswith(_FRAGMENT):
+            self._take_fragment(size, sender, arrived)
+        elif size > _SHORT_HEAD and self._buffer.startswith(_SHORT):
+            end = self._buffer.find(0, _SHORT_HEAD, size)
+            channel = self._channels.get(bytes(self._view[_SHORT_HEAD:end])) if end >= 0 else None
+            if channel is not None:
+                arrived.append((channel, bytes(self._view[end + 1 : size])))
+
+    def _take_fragment(
+        self, datagram_size: int, sender: _Sender, arrived: arrivals.Arrived
+    ) -> None:
+        _, sequence, size, offset, number, count = _HEAD.unpack_from(self._buffer)
+        name, data = b"", bytes(self._view[_HEAD.size : datagram_size])
+        if number == 0:
+            name, end, data = data.partition(b"\0")
+            if not end or len(name) > _LONGEST_CHANNEL:
+                return
+        if number >= count or size > _LONGEST_MESSAGE or offset + len(data) > size:
+            return
+        partial = self._partials.get(sender)
+        if partial is None or partial.sequence != sequence:
+            self._drop_partial(sender)
+            if len(self._partials) >= _MOST_SENDERS:
+                self._drop_partial(next(iter(self._partials)))
+            partial = self._partials[sender] = _Partial(sequence, size, count)
+        if (size, count) != (partial.size, partial.count) or number in partial.fragments:
+            return
+        partial.fragments[number] = (offset, data)
+        partial.memory += len(data) + _FRAGMENT_MEMORY
+        self._partial_memory += len(data) + _FRAGMENT_MEMORY
+        if number == 0:
+            partial.channel = self._channels.get(name)
+        if len(partial.fragments) == count:
+            self._drop_partial(sender)
+            message = partial.joined() if partial.channel is not None else None
+            if partial.channel is not None and message is not None:
+                arrived.append((partial.channel, message))
+        while self._partial_memory > _MOST_PARTIAL:
+            self._drop_partial(next(iter(self._partials)))
+
+    def _drop_partial(self, sender: _Sender) -> None:
+        partial = self._partials.pop(sender, None)
+        if partial is not None:
+            self._partial_memory -= partial.memory
+
+
+def _joined_socket(url: str) -> socket.socket:
+    """Raises OSError."""
+    parts = urlsplit(url)
+    group = socket.gethostbyname(parts.hostname or "239.255.76.67")
+    wanted = parse_qs(parts.query).get("recv_buf_size", ["0"])[0]
+    end = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+    try:
+        end.setblocking(False)
+        for option in (socket.SO_REUSEADDR, socket.SO_REUSEPORT):
+            end.setsockopt(socket.SOL_SOCKET, option, 1)
+        buffer = min(max(int(wanted) if wanted.isdecimal() else 0, _RECEIVE_BUFFER), 1 << 30)
+        end.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, buffer)
+        end.bind((group, parts.port or 7667))
+        membership = socket.inet_aton(group) + socket.inet_aton("0.0.0.0")
+        end.setsockopt(socket.IPPROTO_IP, socket.IP_ADD_MEMBERSHIP, membership)
+    except OSError:
+        end.close()
+        raise
+    return end
