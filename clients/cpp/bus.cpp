@@ -6,11 +6,24 @@
 #include <map>
 #include <mutex>
 #include <string_view>
+#include <utility>
+
+#include "bus/tcpq_wire.h"
 
 namespace ruedo::client {
 namespace {
 
 constexpr std::chrono::milliseconds kLendTime(20);
+
+thread_local const void* received_from = nullptr;  // the bus's state that this thread receives for
+
+struct Receiving {
+  explicit Receiving(const void* state) : before(std::exchange(received_from, state)) {}
+  ~Receiving() { received_from = before; }
+  Receiving(const Receiving&) = delete;
+  Receiving& operator=(const Receiving&) = delete;
+  const void* const before;
+};
 
 }  // namespace
 
@@ -64,7 +77,15 @@ void Bus::State::leave(const std::string& channel) {
   transport->unsubscribe(channel);
 }
 
+void Bus::check_size(const std::string& channel, size_t size) {
+  if (size > bus::tcpq::kLargestMessage)
+    throw Error("a message of " + std::to_string(size) + " bytes on " + channel +
+                ": a server takes " + std::to_string(bus::tcpq::kLargestMessage) +
+                " bytes at most");
+}
+
 void Bus::publish(const std::string& channel, const uint8_t* bytes, size_t size) {
+  check_size(channel, size);
   if (!state_->closed) state_->transport->publish(channel, bytes, size);
 }
 
@@ -76,14 +97,17 @@ void Bus::receive_eagerly() {
 void Bus::close() {
   state_->closed = true;
   if (!thread_.joinable()) return;
-  if (thread_.get_id() == std::this_thread::get_id()) {
+  if (received_from) {
     thread_.detach();
   } else {
     thread_.join();
   }
 }
 
+bool Bus::handling() const { return received_from == state_.get(); }
+
 void Bus::State::handle(std::chrono::milliseconds timeout) {
+  const Receiving receiving(this);
   transport->receive(timeout, [this](std::string_view channel, const uint8_t* bytes, size_t size) {
     std::shared_ptr<Handlers> called;
     {

@@ -28,9 +28,15 @@ class Bus {
 
   void start();  // begins to receive; at least one subscription comes first: memq needs it
   [[nodiscard]] Subscription subscribe(const std::string& channel, Handler handler);
+  // Throws Error for a message that is larger than what a server takes from a client.
   void publish(const std::string& channel, const uint8_t* bytes, size_t size);
-  void receive_eagerly();  // as Transport's
-  void close();            // in a handler, too: the thread ends when that returns
+  static void check_size(const std::string& channel, size_t size);  // throws likewise
+  void receive_eagerly();                                           // as Transport's
+  // In a handler, too, of this bus or another: its thread then ends by itself. Two handlers that
+  // close each other's bus do not wait for each other.
+  void close();
+  // This thread is in a handler of it: while that lasts, nothing is received.
+  bool handling() const;
 
   // Lets the caller receive in its own thread: handing each message from thread to thread takes as
   // long as receiving it. While one of these lives, and a moment longer, the receiving thread

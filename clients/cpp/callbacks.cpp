@@ -6,6 +6,7 @@
 namespace ruedo::client {
 
 void CallbackCore::close() {
+  if (forked_) return;
   std::function<void()> leave;
   {
     const std::lock_guard lock(running_);

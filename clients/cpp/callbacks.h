@@ -7,10 +7,12 @@
 #include <functional>
 #include <memory>
 #include <mutex>
+#include <stdexcept>
 #include <string>
 #include <utility>
 #include <vector>
 
+#include "forked.h"
 #include "ruedo/client.h"
 
 namespace ruedo::client {
@@ -22,7 +24,7 @@ class CallbackCore {
   virtual ~CallbackCore() = default;
 
   // After it returns, the callback is not called any more: it waits for a call in another thread.
-  // May be called from the callback itself.
+  // May be called from the callback itself. In a fork's child it has nothing to end.
   void close();
   bool closed() const { return closed_; }
   // Called once it was cancelled.
@@ -32,6 +34,7 @@ class CallbackCore {
   void say_failed(const char* why);
 
   const std::string what_;  // it is called on, for the log
+  const Forked forked_;
   std::recursive_mutex running_;
   std::atomic<bool> closed_{false};
 
@@ -71,7 +74,9 @@ class CallbackList : public std::enable_shared_from_this<CallbackList<Arguments.
  public:
   using One = Callback<Arguments...>;
 
+  // Throws std::invalid_argument for an empty function.
   std::shared_ptr<One> add(std::string what, typename One::Function function) {
+    if (!function) throw std::invalid_argument(what + ": the callback is an empty function");
     auto one = std::make_shared<One>(std::move(what), std::move(function));
     one->at_close([list = this->weak_from_this(), raw = one.get()] {
       if (const auto here = list.lock()) here->remove(raw);

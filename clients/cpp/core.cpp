@@ -1,6 +1,7 @@
 // The connection: info, time, repetition, and the signs of life of the server.
 #include "core.h"
 
+#include <algorithm>
 #include <cstdio>
 #include <utility>
 
@@ -21,7 +22,7 @@ constexpr double kSilence =
 
 Clock::time_point deadline_after(Duration time) {
   if (!(time.count() < 1e9)) return Clock::time_point::max();
-  return Clock::now() + std::chrono::duration_cast<Clock::duration>(time);
+  return Clock::now() + std::chrono::duration_cast<Clock::duration>(std::max(time, Duration(0.0)));
 }
 
 std::string text_of(Duration time) {
@@ -80,6 +81,7 @@ void Core::join(Duration timeout) {
 }
 
 void Core::close() {
+  if (forked_) return;
   {
     const std::lock_guard lock(mutex_);
     if (closed_.exchange(true)) return;
@@ -93,10 +95,20 @@ void Core::close() {
 }
 
 void Core::check_open() const {
+  if (forked_) throw NoServer(kForked);
   if (closed_) throw NoServer(kClosed);
 }
 
+void Core::check_may_wait() const {
+  check_open();
+  if (bus_.handling())
+    throw Error(
+        "a callback cannot wait for the server, since nothing is received until it returns: make "
+        "this call in another thread");
+}
+
 std::shared_ptr<const WorldInfo> Core::info() const {
+  if (forked_) throw NoServer(kForked);
   std::lock_guard lock(mutex_);
   return known_;
 }
@@ -217,7 +229,7 @@ void Core::note_time(int64_t utime) {
 }
 
 void Core::sleep_until(int64_t utime) {
-  check_open();
+  check_may_wait();
   std::unique_lock lock(mutex_);
   while (utime_ < utime) {
     news_.wait_for(lock, std::chrono::milliseconds(500));

@@ -17,6 +17,7 @@
 #include "bus.h"
 #include "callbacks.h"
 #include "driver.h"
+#include "forked.h"
 #include "ruedo/client.h"
 #include "session.h"
 #include "stepper.h"
@@ -31,6 +32,8 @@ using Clock = std::chrono::steady_clock;
 Clock::time_point deadline_after(Duration time);  // kForever: never
 std::string text_of(Duration time);               // seconds as a user wrote them: 5, not 5.000000
 inline constexpr const char* kClosed = "this simulation was closed";
+inline constexpr const char* kForked =
+    "this simulation is the parent process's: connect() again after a fork";
 
 class Core : public std::enable_shared_from_this<Core> {
  public:
@@ -42,6 +45,10 @@ class Core : public std::enable_shared_from_this<Core> {
   void join(Duration timeout);  // begins to receive, and waits for ruedo/info; throws NoServer
   void close();                 // in a callback, too
   void check_open() const;      // throws NoServer
+  // Before waiting for what the server sends. Throws NoServer; Error in a callback, which is what
+  // would receive it.
+  void check_may_wait() const;
+  bool forked() const { return static_cast<bool>(forked_); }
 
   Bus& bus() { return bus_; }
   Session& session() { return session_; }
@@ -77,6 +84,7 @@ class Core : public std::enable_shared_from_this<Core> {
   void repeat();
   double silence() const;  // s
 
+  const Forked forked_;
   const std::string url_;
   std::unique_ptr<ServerProcess> server_;
   mutable std::mutex mutex_;

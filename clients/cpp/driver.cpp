@@ -203,9 +203,10 @@ const Motion& Motion::wait(Duration timeout) const {
       throw Timeout(motion.robot + ": " + motion.kind + " was not done within " + text_of(timeout) +
                     " s (" + remaining_text() + ")");
     }
-    motion.news.wait_until(lock, std::min(deadline, Clock::now() + std::chrono::milliseconds(500)));
     const auto connection = motion.connection.lock();
     if (!connection) throw NoServer(kClosed);
+    connection->check_may_wait();
+    motion.news.wait_until(lock, std::min(deadline, Clock::now() + std::chrono::milliseconds(500)));
     connection->check_server();
   }
   if (motion.state != MotionState::done) {

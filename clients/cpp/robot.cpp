@@ -231,6 +231,7 @@ Stream<Collisions> Robot::collisions() const {
   return first_stream<Collisions>(*core_, name_, "collisions");
 }
 Subscription Robot::on_collision(std::function<void(const Collisions&)> callback) const {
+  if (!callback) return collisions().on_sample({});
   return collisions().on_sample([callback = std::move(callback), touched = std::set<std::string>()](
                                     const Collisions& sample) mutable {
     std::set<std::string> now;

@@ -35,6 +35,7 @@ Reply checked(Reply reply) {
 }  // namespace
 
 Reply Session::request(int32_t kind, const std::vector<uint8_t>& body, Duration timeout) {
+  core_.check_may_wait();
   const auto turn = this->turn();
   return request_in_turn(kind, body, timeout);
 }
@@ -52,6 +53,11 @@ Reply Session::request_in_turn(int32_t kind, const std::vector<uint8_t>& body, D
     if (reply.code != reply_t::UNKNOWN_SESSION || attempt == 2) return checked(std::move(reply));
     session_ = 0;  // its place went to another: join again
   }
+}
+
+void Session::check_size(const std::vector<uint8_t>& body) {
+  static const auto head = static_cast<size_t>(request_t{}.getEncodedSize());
+  Bus::check_size(kRequestChannel, head + body.size());
 }
 
 void Session::leave() {

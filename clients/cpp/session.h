@@ -41,6 +41,8 @@ class Session {
   // lives.
   std::unique_lock<std::mutex> turn() { return std::unique_lock(one_at_a_time_); }
   Reply request_in_turn(int32_t kind, const std::vector<uint8_t>& body, Duration timeout);
+  // Throws Error for a request that no server would take.
+  static void check_size(const std::vector<uint8_t>& body);
   int64_t next_sequence() { return ++sequence_; }
   int64_t id() const { return session_; }
   const std::string& name() const { return name_; }

@@ -1,7 +1,9 @@
 // connect(), launch(), and the requests of simulation control.
 #include <unistd.h>
 
+#include <algorithm>
 #include <cmath>
+#include <stdexcept>
 
 #include "address.h"
 #include "core.h"
@@ -77,13 +79,23 @@ Simulation launch(const std::string& world, const LaunchOptions& options) {
   }
 }
 
-Simulation::~Simulation() {
-  if (core_) core_->close();
+namespace {
+
+// In a fork's child the parent's connection is kept as it is: it can be neither used nor ended.
+void end(std::shared_ptr<Core> core) {
+  if (!core) return;
+  core->close();
+  static auto* const parents = new std::vector<std::shared_ptr<Core>>;
+  if (core->forked()) parents->push_back(std::move(core));
 }
+
+}  // namespace
+
+Simulation::~Simulation() { end(std::move(core_)); }
 
 Simulation& Simulation::operator=(Simulation&& other) noexcept {
   if (this != &other) {
-    if (core_) core_->close();
+    end(std::move(core_));
     core_ = std::move(other.core_);
   }
   return *this;
@@ -97,7 +109,7 @@ std::shared_ptr<Core> Simulation::core() const {
 }
 
 void Simulation::close() {
-  if (core_) core_->close();
+  if (const auto core = core_) core->close();
 }
 
 std::string Simulation::url() const { return core()->url(); }
@@ -123,8 +135,11 @@ Robot Simulation::robot(const std::string& name) const {
 }
 
 void Simulation::sleep(Duration time) const {
+  constexpr double kLongest = 1e12;  // s
+  if (std::isnan(time.count())) throw std::invalid_argument("a time of nan s");
   const auto core = this->core();
-  core->sleep_until(core->utime() + std::llround(time.count() * 1e6));
+  const double seconds = std::clamp(time.count(), -kLongest, kLongest);
+  core->sleep_until(core->utime() + std::llround(seconds * 1e6));
 }
 
 Subscription Simulation::on_new_run(std::function<void()> callback) const {

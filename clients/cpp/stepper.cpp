@@ -29,6 +29,7 @@ Observations Stepper::step(int64_t n, const std::vector<Command>& commands, Dura
                                 " steps on; of " + std::to_string(n) + " steps 0 to " +
                                 std::to_string(n - 1) + " is allowed");
   }
+  core_.check_may_wait();
   std::lock_guard one_at_a_time(one_at_a_time_);
   const auto turn = core_.session().turn();
   core_.check_open();
@@ -46,7 +47,9 @@ Observations Stepper::step(int64_t n, const std::vector<Command>& commands, Dura
   wait(lock, have_, timeout);  // returns at once, unless the previous call gave up
   const int64_t until = n > INT64_MAX - granted_ ? INT64_MAX : granted_ + n;
   if (n > 0) {
-    grant_ = {core_.session().next_sequence(), granted_, grant_body(until, commands), false};
+    std::vector<uint8_t> body = grant_body(until, commands);
+    Session::check_size(body);  // before anything is granted
+    grant_ = {core_.session().next_sequence(), granted_, std::move(body), false};
     granted_ = until;
     acknowledged_ = have_;  // the grant says so
     grant_again();
@@ -177,9 +180,9 @@ void Stepper::wait(std::unique_lock<std::mutex>& lock, int64_t until, Duration t
     }
     if (done()) return;
     const bool silence = !news && have_ == had;
-    if (!grant_.taken) {
-      if (silence) grant_again();
-    } else if (silence || ask_now_) {
+    if (!grant_.taken && silence) {
+      grant_again();
+    } else if (grant_.taken && (silence || ask_now_)) {
       ask_for_lost(until);
     } else if (have_ - acknowledged_ >= kAcknowledgedTogether) {
       ask_for_lost(have_);  // asks for nothing, but says what is here

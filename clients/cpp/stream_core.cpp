@@ -113,6 +113,7 @@ std::shared_ptr<const Sample> StreamCore::read(std::atomic<int64_t>& seen, bool 
   std::unique_lock lock(mutex_);
   while (!sample_ || (new_one && count_ == seen)) {
     if (fault_) std::rethrow_exception(std::exchange(fault_, nullptr));
+    core->check_may_wait();
     if (Clock::now() >= deadline) {
       throw Timeout("no sample on " + channel_ + " within " + text_of(timeout) + " s (" +
                     core->what_is_known(rate_) + ")");
@@ -145,6 +146,7 @@ SampleType Stream<SampleType>::next(Duration timeout) const {
 
 template <class SampleType>
 Subscription Stream<SampleType>::on_sample(std::function<void(const SampleType&)> callback) const {
+  if (!callback) return core_->on_sample({});
   return core_->on_sample([callback = std::move(callback)](const Sample& sample) {
     callback(static_cast<const SampleType&>(sample));
   });

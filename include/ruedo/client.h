@@ -6,7 +6,7 @@
 ///
 /// Handles (Robot, Stream, Device, Motion) may outlive their Simulation. Once it was closed,
 /// destroyed or moved from, whatever needs the server throws NoServer ("this simulation was
-/// closed").
+/// closed"). So it does in the child of a fork, which connects for itself.
 //
 //     auto sim = ruedo::client::connect();
 //     auto robot = sim.robot("p3at");
@@ -164,10 +164,10 @@ class Stream {
   /// @throws Timeout, TypeMismatch, NoServer
   SampleType next(Duration timeout = 5.0) const;
   /// Calls back in the receiving thread for every sample from now on. The callback must be quick,
-  /// and must not wait for other samples or replies.
+  /// and cannot wait for other samples or replies: such a call throws Error.
   /// @param callback what it throws is reported once on the terminal
   /// @return ends the calls when it goes
-  /// @throws TypeMismatch, NoServer
+  /// @throws TypeMismatch, NoServer; std::invalid_argument for an empty function
   Subscription on_sample(std::function<void(const SampleType&)> callback) const;
 
  private:
@@ -207,6 +207,7 @@ class MessageStream {
   /// @return ends the calls when it goes
   /// @throws NoServer
   Subscription on_sample(std::function<void(const Message&)> callback) const {
+    if (!callback) return raw_.on_sample({});
     return raw_.on_sample([callback = std::move(callback), name = channel()](const RawSample& raw) {
       callback(decoded(name, raw.bytes));
     });

@@ -11,6 +11,7 @@
 #include <cstdint>
 #include <functional>
 #include <memory>
+#include <stdexcept>
 #include <string>
 #include <vector>
 
@@ -48,12 +49,16 @@ class Outbox {
 
   /// Encodes an LCM message.
   /// @param channel index that SensorSetup::add_channel gave
-  /// @param message of the channel's type
+  /// @param message of the channel's type; its counts are those of its arrays
+  /// @throws std::length_error for a message that has no encoding
   template <class Message>
   void publish(int channel, const Message& message) {
     const int size = message.getEncodedSize();
+    if (size < 8)
+      throw std::length_error("a message with a negative count of elements, or of 2 GiB and more");
     uint8_t* bytes = append(channel, static_cast<size_t>(size));
-    message.encode(bytes, 0, size);
+    if (message.encode(bytes, 0, size) != size)
+      throw std::length_error("a message whose counts of elements are not those of its arrays");
   }
 
   /// Forgets all messages, and keeps the room.

@@ -126,7 +126,7 @@ void write_file(const std::string& path, const std::string& text) {
 
 // What differs from the golden log, or "".
 std::string compare(const RegressArguments& arguments, const std::string& kept) {
-  if (!fs::exists(arguments.golden))
+  if (std::error_code unreadable; !fs::exists(arguments.golden, unreadable))
     return "there is no golden log " + arguments.golden + " yet: run this once with RUEDO_RENEW=1";
   const auto rules = log::DiffRule::all(arguments.tolerances, arguments.ignored);
   const log::Diff result = log::diff_logs(arguments.golden, kept, rules);

@@ -18,6 +18,7 @@
 #include <link.h>
 
 #include "core/input_file.h"
+#include "core/plugin_guard.h"
 #include "core/sha256.h"
 #include "core/utf8.h"
 #include "ruedo/errors.h"
@@ -149,6 +150,13 @@ const PluginEntry& open(const std::string& path) {
   return *entry;
 }
 
+void check_name(const std::string& name, const char* what, const std::string& path) {
+  const auto printable = [](unsigned char c) { return c > ' ' && c < 0x7f; };
+  if (!name.empty() && std::all_of(name.begin(), name.end(), printable)) return;
+  throw InputError({path}, "has '" + for_terminal(name) + "' as the name of " + what +
+                               "; one or more printable ASCII characters are allowed, no spaces");
+}
+
 // Two of a name would hide each other; a module has one place in the schedule.
 void check_new(const PluginEntry& entry, const std::string& path) {
   std::set<std::string> types, drives{"kinematic", "wheels"};
@@ -159,6 +167,12 @@ void check_new(const PluginEntry& entry, const std::string& path) {
   }
   for (const DriveKind& kind : drive_kinds()) drives.insert(kind.type);
   for (const SensorKind& kind : entry.sensors()) {
+    check_name(kind.module, "a module", path);
+    check_name(kind.name(), "a kind of sensor", path);
+    for (const std::string& type : kind.types) check_name(type, "a type of sensor", path);
+    if (!kind.make)
+      throw InputError({path},
+                       "has a sensor '" + kind.name() + "' without a function that makes it");
     if (const int order = orders.emplace(kind.module, kind.order).first->second;
         order != kind.order) {
       throw InputError({path}, "has a sensor of the module '" + kind.module + "' with the order " +
@@ -171,8 +185,11 @@ void check_new(const PluginEntry& entry, const std::string& path) {
     }
   }
   for (const DriveKind& kind : entry.drives()) {
+    check_name(kind.type, "a type of drive", path);
     if (!drives.insert(kind.type).second)
       throw InputError({path}, "has a drive of type '" + kind.type + "', which there is already");
+    if (!kind.make)
+      throw InputError({path}, "has a drive '" + kind.type + "' without a function that makes it");
   }
   if (entry.sensors().empty() && entry.drives().empty())
     throw InputError({path}, "registers no sensor and no drive");
@@ -195,8 +212,9 @@ Plugin load_plugin(const std::string& given) {
                 sha256(reinterpret_cast<const uint8_t*>(bytes.data()), bytes.size())};
   const PluginEntry& entry = open(path);
   check_new(entry, path);
-  for (const SensorKind& kind : entry.sensors()) RegisterSensor{kind};
-  for (const DriveKind& kind : entry.drives()) RegisterDrive{kind};
+  watch_plugin_calls();
+  for (const SensorKind& kind : entry.sensors()) RegisterSensor{guarded(kind, plugin.name)};
+  for (const DriveKind& kind : entry.drives()) RegisterDrive{guarded(kind, plugin.name)};
   const auto place =
       std::upper_bound(plugins().begin(), plugins().end(), plugin,
                        [](const Plugin& a, const Plugin& b) { return a.name < b.name; });

@@ -20,20 +20,27 @@ namespace {
 
 constexpr size_t kTimeAt = 8;  // every type begins with its fingerprint and int64_t utime
 
+// A plugin's message may have no time.
+bool has_time(const std::vector<uint8_t>& bytes) {
+  return bytes.size() >= kTimeAt + sizeof(int64_t);
+}
+
 int64_t time_of(const std::vector<uint8_t>& bytes) {
+  if (!has_time(bytes)) return 0;
   return read_big_endian<int64_t>(&bytes[kTimeAt]);
 }
 
 void set_time(std::vector<uint8_t>& bytes, int64_t time) {
-  write_big_endian(&bytes[kTimeAt], time);
+  if (has_time(bytes)) write_big_endian(&bytes[kTimeAt], time);
 }
 
 // As expected by Outbox.
 struct Encoded {
   const std::vector<uint8_t>& bytes;
   int getEncodedSize() const { return static_cast<int>(bytes.size()); }
-  void encode(void* to, int offset, int size) const {
+  int encode(void* to, int offset, int size) const {
     std::memcpy(static_cast<uint8_t*>(to) + offset, bytes.data(), static_cast<size_t>(size));
+    return size;
   }
 };
 

@@ -154,7 +154,8 @@ Outcome Run::snapshot_of(const snapshot_request_t& past) {
 // without another file.
 Outcome Run::restore(const request_t& request, const name_request_t& body) {
   const std::string path = journal_->snapshot_path(body.name);
-  if (path.empty() || !std::filesystem::exists(path)) {
+  std::error_code unreadable;  // a link to itself, say
+  if (path.empty() || !std::filesystem::exists(path, unreadable)) {
     return Outcome::refuse(reply_t::UNKNOWN_NAME, "there is no snapshot '" + body.name + "'");
   }
   if (const SavedState* saved = saved_states_.find(path)) return restore_kept(*saved, path);

@@ -34,6 +34,23 @@ def test_callbacks_and_closing():
     assert done.returncode == 0
 
 
+def test_misuse_is_told_at_once():
+    with ruedo_run("--disable", "p3at/camera", world=HALL) as server:
+        done = subprocess.run(
+            [*COMMAND, server.url, "misused"], capture_output=True, text=True, timeout=PATIENCE
+        )
+    assert done.stdout.splitlines() == [
+        "waits 7 of 7",
+        "a message of 5243017 bytes on ruedo/request: a server takes 4194304 bytes at most",
+        "SET_POSE: an argument is null, or an array has too few numbers",
+        "REMOVE: an argument is null, or an array has too few numbers",
+        "p3at/odometry: the callback is null",
+        "a new run: the callback is null",
+        "a\0b: no such file",
+    ], done.stderr
+    assert (done.returncode, done.stderr) == (0, "")
+
+
 def test_two_simulations_in_a_process_end_in_either_order():
     with (
         ruedo_run("--disable", "p3at/camera", world=HALL) as first,

@@ -113,6 +113,14 @@ def test_commands_beside_the_steps_are_refused(language):
     )
 
 
+def test_a_step_that_was_given_up_holds_up_no_other(language):
+    """More than a client acknowledges together are under way when the next step is asked for."""
+    with ruedo_run("--lockstep", "1", "--disable", "p3at/camera", world=HALL) as server:
+        said = probe(language, server.url, "given_up", "one")
+    assert said.one("given_up") == "Timeout"
+    assert said.words("then") == ["2001", "2002"]
+
+
 def test_without_lockstep_there_are_no_commands():
     import ruedo
 

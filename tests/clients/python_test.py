@@ -362,6 +362,58 @@ def test_a_callback_of_a_new_run_may_close_the_simulation(caplog):
     ]
 
 
+def test_a_callback_that_waits_is_told_so_at_once():
+    with ruedo.launch(HALL, **QUICK) as sim:
+        robot, said, done = sim.robot("p3at"), [], threading.Event()
+        motion = robot.advance(0.1, speed=0.001)
+        waits = [
+            lambda: [robot.odometry.next(PATIENCE) for _ in range(2)],  # one is there
+            lambda: sim.sleep(1.0),
+            sim.pause,
+            sim.state,
+            lambda: sim.step(1),
+            lambda: sim.restore("s"),
+            motion.wait,
+        ]
+
+        def hear(_sample):
+            if done.is_set():
+                return
+            for wait in waits:
+                try:
+                    wait()
+                    said.append("none")
+                except ruedo.RuedoError as error:
+                    said.append(str(error))
+            done.set()
+
+        with robot.odometry.on_sample(hear):
+            assert done.wait(PATIENCE)
+        assert len(said) == len(waits)
+        assert all(text.startswith("a callback cannot wait for the server") for text in said), said
+        with pytest.raises(ruedo.RuedoError, match="a server takes 4194304 bytes at most"):
+            sim.spawn("t", 0.0, 0.0, text="<sdf>" + "x" * (5 << 20))
+        assert sim.state().step >= 0
+
+
+def test_two_callbacks_may_close_each_others_simulation():
+    with ruedo.launch(HALL, **QUICK) as first, ruedo.launch(HALL, **QUICK) as second:
+        both, done = threading.Barrier(2), [threading.Event(), threading.Event()]
+
+        def closes(other, end):
+            def hear(_sample):
+                if not end.is_set():
+                    both.wait(PATIENCE)
+                    other.close()
+                    end.set()
+
+            return hear
+
+        first.robot("p3at").odometry.on_sample(closes(second, done[0]))
+        second.robot("p3at").odometry.on_sample(closes(first, done[1]))
+        assert all(end.wait(PATIENCE) for end in done)
+
+
 def test_the_child_of_a_fork_is_told():
     with ruedo.launch(HALL, **QUICK) as sim:
         reader, writer = os.pipe()

@@ -307,6 +307,99 @@ BAD = {
 }
 
 
+# What a sensor's function does, in "sample"; the drive's and the making of both go through the same
+# code.
+AT_WORK = """#include <cfenv>
+#include <cstdlib>
+#include <stdexcept>
+#include <ruedo/sensor.h>
+#include "thermometer_t.hpp"
+namespace {
+struct Bad : ruedo::SensorOf<Bad> {
+  explicit Bad(const ruedo::SensorSetup& setup)
+      : channel(setup.channel<example::thermometer_t>()), add(setup.add_channel) {}
+  void sample(const ruedo::SampleInput& input, ruedo::Outbox& out) override {
+    example::thermometer_t message;
+    message.utime = input.snapshot.time;
+    message.temperature = 1.0 / 3.0 + 0.1 * static_cast<double>(input.sample);
+    message.warmed = false;
+    const std::string mode = std::getenv("MODE");
+    if (mode == "throw") throw std::runtime_error("no \\x1b[31moven\\nthere");
+    if (mode == "int") throw 42;
+    if (mode == "exit") std::exit(0);
+    if (mode == "terminate") std::terminate();
+    if (mode == "crash") std::abort();
+    if (mode == "round") std::fesetround(FE_UPWARD);
+    if (mode == "channel") out.publish(9999, message);
+    if (mode == "step") out.begin_step(7777);
+    if (mode == "late") add("late", "late_t", 7);
+    out.publish(channel, message);
+  }
+  int channel;
+  std::function<int(const std::string&, const std::string&, int64_t)> add;
+};
+const ruedo::RegisterSensor kOne{{.module = "thermometer", .order = 100, .types = {"thermometer"},
+  .attach_to = "", .device_name = "", .default_rate = {10, 1},
+  .make = [](const ruedo::SensorSetup& setup) -> std::unique_ptr<ruedo::Sensor> {
+    const std::string mode = std::getenv("MODE");
+    if (mode == "null") return nullptr;
+    if (mode == "name") setup.add_channel("a b", "t", 5);
+    return std::make_unique<Bad>(setup);
+  }}};
+}
+"""
+
+
+@pytest.fixture(scope="module")
+def at_work(prefix, project):
+    folder = project / "at_work"
+    folder.mkdir()
+    (folder / "bad.cpp").write_text(AT_WORK)
+    text = "cmake_minimum_required(VERSION 3.25)\nproject(bad CXX)\nfind_package(ruedo REQUIRED COMPONENTS plugin)\n"
+    text += f"add_library(bad MODULE bad.cpp)\ntarget_include_directories(bad PRIVATE {project}/build/types/example)\n"
+    text += "target_link_libraries(bad PRIVATE ruedo::plugin)\n"
+    (folder / "CMakeLists.txt").write_text(text)
+    run(CMAKE, "-G", "Ninja", "-S", folder, "-B", folder / "build", f"-DCMAKE_PREFIX_PATH={prefix}")
+    run(CMAKE, "--build", folder / "build")
+    world = (project / "room.sdf").read_text()
+    world = re.sub(r"<plugin.*/>|<time_constant>.*</time_constant>", "", world)
+    world = re.sub(r"<thermometer>.*</thermometer>", "", world)
+    (folder / "room.sdf").write_text(world.replace('type="lagging"', 'type="kinematic"'))
+    return folder
+
+
+def at_work_run(ruedo, at_work, mode, *options, code):
+    words = ["run", at_work / "room.sdf", "--plugin", at_work / "build/libbad.so"]
+    words += ["--duration", "1", "--rate", "max", "--quiet", *options]
+    return ruedo(*words, code=code, more={"MODE": mode})
+
+
+@pytest.mark.parametrize(
+    "mode, code, words",
+    [
+        ("throw", 4, "no ?[31moven there"),
+        ("int", 4, "threw what is no std::exception"),
+        ("exit", 4, "ended the process"),
+        ("terminate", 4, "ended the process by std::terminate()"),
+        ("crash", -6, "crashed: SIGABRT"),
+        ("channel", 4, "published on the channel 9999, which it did not announce"),
+        ("step", 4, "published for step 7777 in step 0"),
+        ("late", 4, "channels are announced while the sensor is made, not later"),
+        ("null", 4, "its kind made no sensor"),
+        ("name", 4, "'a b' is no name of a channel or a type: printable ASCII"),
+    ],
+)
+def test_what_a_plugin_does_wrong_at_work_is_one_line(ruedo, at_work, mode, code, words):
+    said = at_work_run(ruedo, at_work, mode, code=code)
+    assert said.count("\n") == 1 and f"the plugin libbad.so, rover/temp: {words}" in said, said
+
+
+def test_the_rounding_that_a_plugin_sets_is_its_own(ruedo, at_work, tmp_path):
+    for mode in ("none", "round"):
+        at_work_run(ruedo, at_work, mode, "--record", tmp_path / mode, code=0)
+    assert (tmp_path / "none").read_bytes() == (tmp_path / "round").read_bytes()
+
+
 @pytest.fixture(scope="module")
 def bad(prefix, project):
     """Plugins that are wrong, each in a way of its own."""

@@ -11,10 +11,13 @@ from functools import partial
 
 from . import arrivals
 from .callbacks import Callbacks, Subscription
+from .errors import RuedoError
 from .transport import Transport
 
 Handler = Callable[[bytes], None]
 _LEND_SECONDS = 0.02
+_LARGEST = 4 << 20  # bytes of a message: what a server takes from a client
+_receives_for = threading.local()  # .bus: the one that this thread receives for, or None
 
 
 class Bus:
@@ -62,14 +65,29 @@ class Bus:
             if self._collectors.pop(channel, None) and channel not in self._handlers:
                 self._transport.unsubscribe(channel)
 
+    @property
+    def handling(self) -> bool:
+        """Whether this thread is in a handler of it: while that lasts, nothing is received."""
+        return getattr(_receives_for, "bus", None) is self
+
+    @staticmethod
+    def check_size(channel: str, size: int) -> None:
+        """Raises RuedoError for a message that no server would take."""
+        if size > _LARGEST:
+            raise RuedoError(
+                f"a message of {size} bytes on {channel}: a server takes {_LARGEST} bytes at most"
+            )
+
     def publish(self, channel: str, data: bytes) -> None:
+        self.check_size(channel, len(data))
         if not self._closed.is_set():
             self._transport.publish(channel, data)
 
     def close(self) -> None:
         self._closed.set()
         self._transport.close()
-        if self._thread.is_alive() and self._thread is not threading.current_thread():
+        in_a_handler = getattr(_receives_for, "bus", None) is not None
+        if self._thread.is_alive() and not in_a_handler:  # two that close each other would wait
             self._thread.join()
 
     def _left(self, channel: str) -> None:
@@ -97,7 +115,12 @@ class Bus:
                 self._lent_until = time.monotonic() + _LEND_SECONDS
 
     def _handle(self, seconds: float) -> bool:
-        return self._transport.receive(seconds, self._dispatch)
+        before = getattr(_receives_for, "bus", None)
+        _receives_for.bus = self
+        try:
+            return self._transport.receive(seconds, self._dispatch)
+        finally:
+            _receives_for.bus = before
 
     def _receive(self) -> None:
         while not self._closed.is_set():

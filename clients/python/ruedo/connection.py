@@ -110,6 +110,17 @@ class Connection:
         if self.closed:
             raise NoServer(self.closed)
 
+    def check_may_wait(self) -> None:
+        """Before waiting for what the server sends. Raises NoServer; RuedoError in a callback,
+        which is what would receive it.
+        """
+        self.check_open()
+        if self.bus.handling:
+            raise RuedoError(
+                "a callback cannot wait for the server, since nothing is received until it returns: "
+                "make this call in another thread"
+            )
+
     def check_server(self) -> None:
         """Raises NoServer when the private server ended, or nothing was heard for long; a server
         gives a sign of life each second. One of this machine that is stopped, or in a debugger, is

@@ -77,6 +77,7 @@ class Session:
         """The reply. Raises NotSupported, RequestError, Timeout (after timeout seconds of real
         time).
         """
+        self._connection.check_may_wait()
         with self._one_at_a_time:
             return self.request_in_turn(kind, body, timeout)
 
@@ -107,6 +108,10 @@ class Session:
     @property
     def id(self) -> int:
         return self._session
+
+    def check_size(self, body: bytes) -> None:
+        """Raises RuedoError for a request that no server would take."""
+        self._connection.bus.check_size(REQUEST_CHANNEL, _REQUEST.size + len(body))
 
     def leave(self) -> None:
         """Gives the session back, without waiting for an answer."""

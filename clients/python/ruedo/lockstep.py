@@ -236,6 +236,7 @@ class Stepper:
                 raise ValueError(
                     f"a command is for {command.after} steps on; of {n} steps 0 to {n - 1} is allowed"
                 )
+        self._connection.check_may_wait()
         session = self._connection.session
         with session.turn():
             self._connection.check_open()
@@ -249,11 +250,9 @@ class Stepper:
             until = min(self._granted + n, _LONGEST)
             self._wait(self._have, timeout)  # returns at once, unless the previous call gave up
             if n > 0:
-                self._grant = (
-                    session.next_sequence(),
-                    self._granted,
-                    self._grant_body(until, commands),
-                )
+                body = self._grant_body(until, commands)
+                session.check_size(body)  # before anything is granted
+                self._grant = (session.next_sequence(), self._granted, body)
                 self._granted, self._taken, self._acknowledged = (
                     until,
                     False,
@@ -357,10 +356,9 @@ class Stepper:
                     fault, self._fault, self._part = self._fault, None, False
                     raise fault
                 silence = not heard and self._have == had
-                if not self._taken:
-                    if silence:
-                        self._grant_again()
-                elif silence or self._ask_now:
+                if not self._taken and silence:
+                    self._grant_again()
+                elif self._taken and (silence or self._ask_now):
                     self._ask_for_lost(until)
                 elif self._have - self._acknowledged >= _ACKNOWLEDGED_TOGETHER:
                     self._ask_for_lost(self._have)  # asks for nothing, but says what is here

@@ -61,6 +61,7 @@ class Motion:
                         f"{self._robot}: {self.kind} was not done within {timeout:g} s "
                         f"({self.remaining:.3f} remain)"
                     )
+                self._connection.check_may_wait()
                 left = 0.5 if deadline is None else max(0.0, min(0.5, deadline - time.monotonic()))
                 self._news.wait(left)
                 self._connection.check_server()

@@ -121,7 +121,7 @@ class Simulation:
 
     def sleep(self, seconds: float) -> None:
         """Waits until so much sim time has passed."""
-        self._connection.check_open()
+        self._connection.check_may_wait()
         clock = self._connection.clock
         clock.sleep_until(clock.utime + round(seconds * 1e6), self._connection.check_server)
 

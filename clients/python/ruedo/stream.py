@@ -96,8 +96,8 @@ class Stream(Reader[T]):
 
     def on_sample(self, callback: Callable[[T], None]) -> Subscription:
         """Calls callback(sample) in the receiving thread for every sample from now on, until
-        close() of what it returns (or of the simulation). It must be quick, and must not wait for
-        other samples or replies."""
+        close() of what it returns (or of the simulation). It must be quick, and cannot wait for
+        other samples or replies: such a call raises RuedoError."""
         self._subscribe()
         return self._callbacks.add(callback)
 
@@ -194,6 +194,7 @@ class Stream(Reader[T]):
                 if self._fault:
                     fault, self._fault = self._fault, None
                     raise fault
+                self._connection.check_may_wait()
                 left = deadline - time.monotonic()
                 if left <= 0.0:
                     raise Timeout(

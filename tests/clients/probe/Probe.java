@@ -376,6 +376,18 @@ public final class Probe {
         attempt("past", () -> sim.step(1, List.of(robot.velocityCommand(0.1, 0.0).at(1))));
     }
 
+    private static void givenUp(Simulation sim) {
+        sim.step(0);
+        try {
+            sim.step(2000, List.of(), 0.0);
+            say("given_up", "no");
+        } catch (RuedoException.Timeout error) {
+            say("given_up", "Timeout");
+        }
+        long first = sim.step(1).step;
+        say("then", first, sim.step(1).step);
+    }
+
     private static void visited(Simulation sim, String[] a) {
         Robot robot = sim.robot(a[1]);
         CRC32 digest = new CRC32();
@@ -473,6 +485,9 @@ public final class Probe {
             switch (command) {
                 case "lockstep":
                     lockstep(sim, a);
+                    break;
+                case "given_up":
+                    givenUp(sim);
                     break;
                 case "visited":
                     visited(sim, a);

@@ -353,6 +353,18 @@ void lockstep(const rc::Simulation& sim, const std::vector<std::string>& a) {
   report("past", [&] { sim.step(1, {robot.velocity_command(0.1, 0.0).at(1)}); });
 }
 
+void given_up(const rc::Simulation& sim) {
+  sim.step(0);
+  try {
+    sim.step(2000, {}, 0.0);
+    say("given_up", "no");
+  } catch (const rc::Timeout&) {
+    say("given_up", "Timeout");
+  }
+  const int64_t first = sim.step(1).step;
+  say("then", first, sim.step(1).step);
+}
+
 void visited(const rc::Simulation& sim, const std::vector<std::string>& a) {
   const rc::Robot robot = sim.robot(a[1]);
   uint32_t digest = 0;
@@ -439,6 +451,7 @@ void act(const std::string& url, const std::string& command, const std::vector<s
                         .timeout = command == "connect" ? 2.0 : 60.0});
   if (command == "lockstep") lockstep(sim, a);
   if (command == "visited") visited(sim, a);
+  if (command == "given_up") given_up(sim);
   if (command == "connect") say("connected", sim.world());
   if (command == "list") list_all(sim);
   if (command == "read") read(sim, a[0]);

@@ -292,6 +292,17 @@ def lockstep(sim, name, steps, chunk, speed):
     attempt("past", lambda: sim.step(1, [robot.velocity_command(0.1, 0.0).at(1)]))
 
 
+def given_up(sim):
+    sim.step(0)
+    try:
+        sim.step(2000, timeout=0.0)
+        say("given_up", "no")
+    except ruedo.Timeout:
+        say("given_up", "Timeout")
+    first = sim.step(1).step
+    say("then", first, sim.step(1).step)
+
+
 def visited(sim, name):
     """Lockstep in which a robot comes, drives and goes."""
     robot, digest, messages, of_guest, guest, last = sim.robot(name), 0, 0, 0, "", None
@@ -364,6 +375,7 @@ def main():
         ) as sim:
             actions = {
                 "lockstep": lambda: lockstep(sim, *rest[1:]),
+                "given_up": lambda: given_up(sim),
                 "visited": lambda: visited(sim, *rest[1:]),
                 "connect": lambda: say("connected", sim.world),
                 "list": lambda: list_all(sim),

@@ -81,6 +81,58 @@ public final class Lifetimes {
         System.out.println("closed " + right + " of " + calls.size() + " " + sim.world());
     }
 
+    private static String refusal(Runnable call) {
+        try {
+            call.run();
+            return "none";
+        } catch (RuedoException | IllegalArgumentException error) {
+            return error.getMessage();
+        }
+    }
+
+    private static void misused(Simulation sim) throws InterruptedException {
+        Robot robot = sim.robot("p3at");
+        Stream<Odometry> odometry = robot.odometry();
+        Motion motion = robot.advance(0.1, new ruedo.Limits(0.001, 0.0, 0.0));
+        List<Runnable> waits =
+                List.of(
+                        () -> {
+                            odometry.next(PATIENCE); // the sample that is there
+                            odometry.next(PATIENCE);
+                        },
+                        () -> sim.sleep(1.0),
+                        sim::pause,
+                        sim::state,
+                        () -> sim.step(1),
+                        () -> sim.restore("s"),
+                        motion::await);
+        List<String> said = new ArrayList<>();
+        CountDownLatch done = new CountDownLatch(1);
+        try (Subscription waiting =
+                odometry.onSample(
+                        sample -> {
+                            if (done.getCount() == 0) return;
+                            for (Runnable wait : waits) said.add(refusal(wait));
+                            done.countDown();
+                        })) {
+            done.await();
+        }
+        System.out.println(
+                "waits "
+                        + said.stream().filter(s -> s.startsWith("a callback cannot wait")).count()
+                        + " of "
+                        + waits.size());
+        String text = "<sdf>" + "x".repeat(5 << 20);
+        double[] origin = new double[3];
+        double[] upright = {1.0, 0.0, 0.0, 0.0};
+        System.out.println(refusal(() -> sim.spawn("", text, "", origin, upright, true)));
+        System.out.println(refusal(() -> sim.setPose("p3at", origin, new double[3])));
+        System.out.println(refusal(() -> sim.remove(null)));
+        System.out.println(refusal(() -> odometry.onSample(null)));
+        System.out.println(refusal(() -> sim.onNewRun(null)));
+        System.out.println(refusal(() -> Ruedo.readLog("a\0b")));
+    }
+
     private static void newRun(Simulation sim) throws InterruptedException {
         CountDownLatch event = new CountDownLatch(1);
         sim.onNewRun(event::countDown);
@@ -147,6 +199,9 @@ public final class Lifetimes {
             switch (args[1]) {
                 case "new_run":
                     newRun(sim);
+                    break;
+                case "misused":
+                    misused(sim);
                     break;
                 case "closed_by_new_run":
                     closedByNewRun(sim);

@@ -1,9 +1,13 @@
 // Handles and callbacks that outlive their owner, or are destroyed before it. Under the sanitizers:
 // no memory is used after it was freed.
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sys/wait.h>
+#include <unistd.h>
 
 #include <atomic>
 #include <chrono>
+#include <cmath>
 #include <future>
 #include <memory>
 #include <optional>
@@ -202,6 +206,108 @@ TEST_F(Lifetimes, TwoSimulationsInAProcessEndInEitherOrder) {
     EXPECT_EQ(error_of([&] { odometry.next(); }), "this simulation was closed");
     EXPECT_EQ(error_of([&] { other.next(); }), "this simulation was closed");
   }
+}
+
+TEST_F(Lifetimes, TwoCallbacksMayCloseEachOthersSimulation) {
+  for (int round = 0; round < 20; ++round) {
+    const auto first_server = std::make_shared<FakeServer>(),
+               second_server = std::make_shared<FakeServer>();
+    std::optional<Simulation> first(simulation(first_server)), second(simulation(second_server));
+    std::promise<void> here[2], done[2];
+    const auto meet = [&](int me, Simulation& other) {
+      here[me].set_value();
+      here[1 - me].get_future().wait();
+      other.close();
+      done[me].set_value();
+    };
+    first->robot("p3at").odometry().on_sample([&](const Odometry&) { meet(0, *second); }).keep();
+    second->robot("p3at").odometry().on_sample([&](const Odometry&) { meet(1, *first); }).keep();
+    first_server->send_odometry("p3at", 1000, 1.0);
+    second_server->send_odometry("p3at", 1000, 1.0);
+    for (std::promise<void>& one : done) one.get_future().wait();
+  }
+}
+
+TEST_F(Lifetimes, ACallbackThatWaitsIsToldSoAtOnce) {
+  const Simulation sim = simulation(server);
+  const Robot robot = sim.robot("p3at");
+  const auto odometry = robot.odometry();
+  const auto motion = robot.advance(1.0);
+  const std::vector<std::function<void()>> waits = {
+      [&] { odometry.next(kPatience); },
+      [&] { sim.pause(); },
+      [&] { sim.sleep(1.0); },
+      [&] { motion.wait(); },
+      [&] { sim.step(1); },
+      [&] { (void)sim.state(); },
+      [&] { sim.restore("s"); },
+      [&] { sim.remove("x"); },
+      [&] { sim.spawn("p3at", 0, 0); },
+  };
+  std::promise<std::vector<std::string>> said;
+  const Subscription waiting = odometry.on_sample([&](const Odometry&) {
+    std::vector<std::string> errors;
+    (void)odometry.latest();  // it is there: nothing is waited for
+    for (const auto& wait : waits) {
+      try {
+        wait();
+        errors.emplace_back("none");
+      } catch (const Error& error) {
+        errors.emplace_back(error.what());
+      }
+    }
+    said.set_value(errors);
+  });
+  server->send_odometry("p3at", 1000, 1.0);
+  EXPECT_THAT(said.get_future().get(),
+              testing::AllOf(testing::SizeIs(waits.size()),
+                             testing::Each(testing::StartsWith("a callback cannot wait"))));
+}
+
+TEST_F(Lifetimes, TheChildOfAForkIsToldAndEndsNothing) {
+  auto sim = std::make_unique<Simulation>(simulation(server));
+  const Robot robot = sim->robot("p3at");
+  const auto odometry = robot.odometry();
+  auto hearing = std::make_unique<Subscription>(odometry.on_sample([](const Odometry&) {}));
+  robot.set_velocity(0.1, 0.0);  // there is a thread that repeats it
+  const pid_t child = fork();
+  if (child == 0) {
+    alarm(60);
+    const std::string forked =
+        "this simulation is the parent process's: connect() again after a fork";
+    const bool told = error_of([&] { sim->pause(); }) == forked &&
+                      error_of([&] { (void)odometry.latest(); }) == forked &&
+                      error_of([&] { robot.set_velocity(0.2, 0.0); }) == forked &&
+                      error_of([&] { (void)sim->robots(); }) == forked;
+    hearing.reset();
+    sim.reset();
+    _exit(told ? 0 : 1);
+  }
+  int status = -1;
+  waitpid(child, &status, 0);
+  EXPECT_EQ(status, 0);
+  server->send_odometry("p3at", 2000, 2.0);
+  server->await_delivery();
+  EXPECT_EQ(odometry.latest(kPatience).x, 2.0);  // the parent's goes on
+}
+
+TEST_F(Lifetimes, WhatNoServerTakesIsRefusedAtOnce) {
+  const Simulation sim = simulation(server);
+  SpawnOptions options;
+  options.text = "<sdf>" + std::string(size_t{5} << 20, 'x');
+  EXPECT_THROW(sim.spawn("", 0.0, 0.0, options), Error);
+  EXPECT_THROW((void)sim.robot("p3at").odometry().on_sample({}), std::invalid_argument);
+  EXPECT_THROW((void)sim.on_new_run({}), std::invalid_argument);
+  EXPECT_THROW(sim.sleep(std::nan("")), std::invalid_argument);
+}
+
+TEST_F(Lifetimes, ATimeThatNoNumberHoldsIsLong) {
+  Simulation sim = simulation(server);
+  auto sleeping =
+      std::async(std::launch::async, [&] { return error_of([&] { sim.sleep(1e300); }); });
+  EXPECT_EQ(sleeping.wait_for(100ms), std::future_status::timeout);
+  sim.close();
+  EXPECT_EQ(sleeping.get(), "this simulation was closed");
 }
 
 TEST_F(Lifetimes, ACallbackOfANewRunMayDestroyTheSimulation) {

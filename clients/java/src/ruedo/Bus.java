@@ -19,7 +19,9 @@ final class Bus implements Transport.Receiver {
     private final Transport transport;
     private final Map<String, List<Subscription>> handlers =
             new ConcurrentHashMap<>(); // lists are never changed
+    private static final int LARGEST = 4 << 20; // bytes: what a server takes from a client
     private volatile boolean closed;
+    private volatile Thread handling; // the one that is in a handler
 
     Bus(Transport transport) {
         this.transport = transport;
@@ -56,9 +58,32 @@ final class Bus implements Transport.Receiver {
 
     @Override
     public void receive(String channel, byte[] message) {
-        for (Subscription subscription : handlers.getOrDefault(channel, List.of())) {
-            if (!closed) subscription.call(message);
+        handling = Thread.currentThread();
+        try {
+            for (Subscription subscription : handlers.getOrDefault(channel, List.of())) {
+                if (!closed) subscription.call(message);
+            }
+        } finally {
+            handling = null;
         }
+    }
+
+    /** Whether this thread is in a handler: while that lasts, nothing is received. */
+    boolean handling() {
+        return handling == Thread.currentThread();
+    }
+
+    /** Throws RuedoException for a message that no server would take. */
+    static void checkSize(String channel, int size) {
+        if (size <= LARGEST) return;
+        throw new RuedoException(
+                "a message of "
+                        + size
+                        + " bytes on "
+                        + channel
+                        + ": a server takes "
+                        + LARGEST
+                        + " bytes at most");
     }
 
     void publish(String channel, Message message) {
@@ -66,6 +91,7 @@ final class Bus implements Transport.Receiver {
     }
 
     void publish(String channel, byte[] bytes) {
+        checkSize(channel, bytes.length);
         if (!closed) transport.publish(channel, bytes);
     }
 

@@ -1,11 +1,10 @@
 package ruedo;
 
+import java.io.File;
 import java.io.IOException;
 import java.io.RandomAccessFile;
 import java.nio.ByteBuffer;
 import java.nio.charset.StandardCharsets;
-import java.nio.file.Files;
-import java.nio.file.Path;
 import java.util.ArrayList;
 import java.util.List;
 import java.util.Map;
@@ -40,8 +39,8 @@ public final class Log {
 
     Log(String path) {
         this.path = path;
-        if (!Files.isRegularFile(Path.of(path))) {
-            boolean there = Files.exists(Path.of(path));
+        if (!new File(path).isFile()) {
+            boolean there = new File(path).exists();
             throw new RuedoException(
                     path + (there ? ": it is no file that can be read" : ": no such file"));
         }

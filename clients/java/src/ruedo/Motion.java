@@ -78,6 +78,7 @@ public final class Motion {
     public synchronized Motion await(double timeout) {
         Deadline deadline = new Deadline(timeout);
         while (!done()) {
+            sim.checkMayWait();
             if (deadline.passed()) {
                 throw new RuedoException.Timeout(
                         String.format(

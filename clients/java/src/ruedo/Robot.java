@@ -150,6 +150,7 @@ public final class Robot {
      * did not touch a moment before.
      */
     public Subscription onCollision(Consumer<? super Collisions> callback) {
+        if (callback == null) throw new IllegalArgumentException("the callback is null");
         Set<String> touched = new HashSet<>();
         return collisions()
                 .onSample(

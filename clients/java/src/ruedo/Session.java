@@ -19,6 +19,7 @@ import java.util.Map;
 final class Session {
     static final String REQUEST_CHANNEL = "ruedo/request";
     private static final long REPEAT_MILLIS = 100;
+    private static final int HEAD = 52; // bytes of a request_t without a body
     private static final Map<Integer, String> KINDS = kinds();
 
     private final Simulation sim;
@@ -37,7 +38,12 @@ final class Session {
     }
 
     /** Joins on the first request. body: null for none. timeout: s of real time. */
-    synchronized reply_t request(int kind, Message body, double timeout) {
+    reply_t request(int kind, Message body, double timeout) {
+        sim.checkMayWait();
+        return requestInTurn(kind, body, timeout);
+    }
+
+    private synchronized reply_t requestInTurn(int kind, Message body, double timeout) {
         sim.checkOpen();
         WorldInfo info = sim.info();
         if (!info.supports(kind)) {
@@ -48,13 +54,27 @@ final class Session {
                             + name(kind)
                             + " request");
         }
-        byte[] encoded = body == null ? new byte[0] : Bus.encode(body);
+        byte[] encoded = encoded(kind, body);
         for (int attempt = 1; ; attempt++) {
             if (session == 0 || runId != info.head.run_id) join(info.head.run_id, timeout);
             reply_t answer = exchange(kind, session, ++sequence, encoded, timeout);
             if (answer.code != reply_t.UNKNOWN_SESSION || attempt == 2) return checked(answer);
             session = 0; // its place went to another: join again
         }
+    }
+
+    private static byte[] encoded(int kind, Message body) {
+        try {
+            return body == null ? new byte[0] : Bus.encode(body);
+        } catch (NullPointerException | ArrayIndexOutOfBoundsException error) {
+            throw new IllegalArgumentException(
+                    name(kind) + ": an argument is null, or an array has too few numbers", error);
+        }
+    }
+
+    /** Throws RuedoException for a request that no server would take. */
+    static void checkSize(byte[] body) {
+        Bus.checkSize(REQUEST_CHANNEL, HEAD + body.length);
     }
 
     /** Leaves the session, without waiting for an answer. */

@@ -161,7 +161,7 @@ public final class Simulation implements AutoCloseable {
 
     /** Waits until so many seconds of sim time have passed. */
     public synchronized void sleep(double seconds) {
-        checkOpen();
+        checkMayWait();
         long until = utime + Math.round(seconds * 1e6);
         Deadline never = new Deadline(Double.POSITIVE_INFINITY);
         while (utime < until) {
@@ -345,6 +345,7 @@ public final class Simulation implements AutoCloseable {
      * @throws IllegalArgumentException for more than a message holds
      */
     public void markers(String layer, List<Marker> markers, String frame) {
+        checkOpen();
         for (channel_info_t channel : info().channels("")) {
             if (!channel.input || !channel.type.equals("markers_t")) continue;
             bus.publish(channel.name, Marker.message(layer, markers, frame));
@@ -443,6 +444,19 @@ public final class Simulation implements AutoCloseable {
 
     void checkOpen() {
         if (closed) throw new RuedoException.NoServer("this simulation was closed");
+    }
+
+    /**
+     * Before waiting for what the server sends. Throws NoServer; RuedoException in a callback,
+     * which is what would receive it.
+     */
+    void checkMayWait() {
+        checkOpen();
+        if (bus.handling()) {
+            throw new RuedoException(
+                    "a callback cannot wait for the server, since nothing is received until it"
+                            + " returns: make this call in another thread");
+        }
     }
 
     void checkServer() {

@@ -114,6 +114,7 @@ final class Stepper {
                             + (n - 1)
                             + " is allowed");
         }
+        sim.checkMayWait();
         synchronized (session) { // its turn: other requests wait
             sim.checkOpen();
             if (!takesPart()) takePart(timeout);
@@ -121,7 +122,9 @@ final class Stepper {
                 await(have, timeout); // for nothing, unless the call before gave up
                 long until = n > Long.MAX_VALUE - granted ? Long.MAX_VALUE : granted + n;
                 if (n > 0) {
-                    grantBody = body(until, commands);
+                    byte[] body = body(until, commands);
+                    Session.checkSize(body); // before anything is granted
+                    grantBody = body;
                     grantSequence = session.nextSequence();
                     grantFrom = granted;
                     granted = until;
@@ -271,9 +274,9 @@ final class Stepper {
             }
             if (have >= until && taken) return;
             boolean silence = left <= 0 && have == had;
-            if (!taken) {
-                if (silence) grantAgain();
-            } else if (silence || askNow) {
+            if (!taken && silence) {
+                grantAgain();
+            } else if (taken && (silence || askNow)) {
                 askForLost(until);
             } else if (have - acknowledged >= ACKNOWLEDGED_TOGETHER) {
                 askForLost(have); // for nothing: it says what is here

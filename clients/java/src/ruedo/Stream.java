@@ -53,8 +53,8 @@ public class Stream<T extends Sample> extends Reader<T> {
 
     /**
      * Calls back in the receiving thread for every sample from now on, until what it returns is
-     * closed (or the simulation). The callback must be quick, and must not wait for other samples
-     * or replies.
+     * closed (or the simulation). The callback must be quick, and cannot wait for other samples or
+     * replies: such a call throws RuedoException.
      */
     public Subscription onSample(Consumer<? super T> callback) {
         Subscription subscription = Subscription.of(channel, callback, callbacks::remove);
@@ -160,6 +160,7 @@ public class Stream<T extends Sample> extends Reader<T> {
                     fault = null;
                     throw thrown;
                 }
+                sim.checkMayWait();
                 if (deadline.passed()) {
                     throw new RuedoException.Timeout(
                             String.format(

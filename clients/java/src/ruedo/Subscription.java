@@ -16,6 +16,8 @@ public final class Subscription implements AutoCloseable {
 
     private Subscription(
             String what, Runnable callback, Consumer<Object> taker, Consumer<Subscription> leave) {
+        if (callback == null && taker == null)
+            throw new IllegalArgumentException(what + ": the callback is null");
         this.what = what;
         this.callback = callback;
         this.taker = taker;
