@@ -80,11 +80,7 @@ BagLog::BagLog(const std::string& path) : log_(path) {
   const bool is_folder = !path.empty() && fs::is_directory(path, error);
   if (!is_folder && !is_mcap(path)) return;
   const std::string file = is_folder ? file_of_bag(path) : path;
-  try {
-    folder_.emplace("bag");
-  } catch (const std::runtime_error& failure) {
-    throw EnvironmentError(failure.what());
-  }
+  folder_.emplace("bag");
   try {
     restore(file, fs::path(is_folder ? fs::canonical(path) : fs::path(path)).stem().string());
   } catch (const fs::filesystem_error& failure) {

@@ -7,7 +7,7 @@
 #include <optional>
 #include <string>
 
-#include "model/child_process.h"
+#include "core/temporary_folder.h"
 
 namespace ruedo::cli {
 
@@ -25,7 +25,7 @@ class BagLog {
   void join(const std::string& rest, const std::string& file);
 
   std::string log_;
-  std::optional<model::TemporaryFolder> folder_;
+  std::optional<TemporaryFolder> folder_;
 };
 
 }  // namespace ruedo::cli

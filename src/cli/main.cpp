@@ -174,7 +174,7 @@ int main(int argc, char** argv) {
   open_standard_streams();
   // A write beyond `ulimit -f` then fails as on a full disk. Not SIG_IGN, which children inherit.
   std::signal(SIGXFSZ, [](int) {});
-  ruedo::scene::draw_the_same_everywhere();
+  ruedo::scene::set_up_mesa();
   spdlog::set_default_logger(spdlog::stderr_color_mt("ruedo"));
   spdlog::set_pattern("%^ruedo: %l:%$ %v");
   try {

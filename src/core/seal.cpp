@@ -14,6 +14,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include "core/file_handle.h"
 #include "core/input_file.h"
 #include "ruedo/errors.h"
 
@@ -53,11 +54,10 @@ void make_key(const fs::path& path) {
   Key key{};
   if (::getrandom(key.data(), key.size(), 0) != static_cast<ssize_t>(key.size())) return;
   std::string part = path.string() + "-XXXXXX";
-  const int file = ::mkstemp(part.data());  // 0600
-  if (file < 0) return;
-  const bool whole = ::write(file, key.data(), key.size()) == static_cast<ssize_t>(key.size()) &&
-                     ::fsync(file) == 0;
-  ::close(file);
+  const FileHandle file(::mkstemp(part.data()));  // 0600
+  if (!file) return;
+  const bool whole =
+      write_all(file.get(), key.data(), key.size()) == key.size() && ::fsync(file.get()) == 0;
   if (whole) static_cast<void>(::link(part.c_str(), path.c_str()));  // unless there is one by now
   ::unlink(part.c_str());
 }

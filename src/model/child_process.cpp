@@ -1,30 +1,57 @@
 #include "model/child_process.h"
 
+#include <algorithm>
 #include <cerrno>
 #include <chrono>
-#include <cstdlib>
 #include <cstring>
-#include <filesystem>
-#include <stdexcept>
 
 #include <fcntl.h>
 #include <poll.h>
 #include <signal.h>
+#include <sys/mman.h>
 #include <sys/prctl.h>
 #include <sys/syscall.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
 #include "core/file_handle.h"
+#include "ruedo/errors.h"
 
 namespace ruedo::model {
 namespace {
 
-namespace fs = std::filesystem;
+constexpr size_t kMessages_bytes = size_t{64} << 10;
 
 [[noreturn]] void fail(const char* what) {
-  throw std::runtime_error(std::string(what) + ": " + std::strerror(errno));
+  throw EnvironmentError(std::string(what) + ": " + std::strerror(errno));
 }
+
+// A file without a name, in memory.
+class MemoryFile {
+ public:
+  explicit MemoryFile(const char* name) : file_(::memfd_create(name, MFD_CLOEXEC)) {
+    if (!file_) fail("no memory for what another program writes");
+  }
+  int get() const { return file_.get(); }
+
+  // The last bytes of it, `most` at most.
+  std::string end(size_t most) const {
+    const off_t size = std::max<off_t>(::lseek(get(), 0, SEEK_END), 0);
+    std::string bytes(std::min(most, static_cast<size_t>(size)), '\0');
+    off_t at = size - static_cast<off_t>(bytes.size());
+    for (size_t done = 0; done < bytes.size();) {
+      const ssize_t count = ::pread(get(), bytes.data() + done, bytes.size() - done, at);
+      if (count < 0 && errno == EINTR) continue;
+      if (count <= 0) fail("what another program wrote cannot be read");
+      done += static_cast<size_t>(count);
+      at += count;
+    }
+    return bytes;
+  }
+
+ private:
+  FileHandle file_;
+};
 
 void set_limit(decltype(RLIMIT_AS) which, rlim_t value) {
   const rlimit limit{value, value};
@@ -32,19 +59,18 @@ void set_limit(decltype(RLIMIT_AS) which, rlim_t value) {
 }
 
 // Runs in the child, between fork and exec: system calls only. posix_spawn cannot set limits.
-[[noreturn]] void become(char* const* arguments, const char* log, const ProcessLimits& limits,
-                         pid_t parent) {
+[[noreturn]] void become(char* const* arguments, int output, int messages,
+                         const ProcessLimits& limits, pid_t parent) {
   ::setpgid(0, 0);
   ::prctl(PR_SET_PDEATHSIG, SIGKILL);  // the thread that waits for it is gone
   if (::getppid() != parent) ::_exit(127);
   set_limit(RLIMIT_CORE, 0);
   set_limit(RLIMIT_CPU, limits.cpu_s);
-  set_limit(RLIMIT_FSIZE, limits.file_bytes);
+  set_limit(RLIMIT_FSIZE, limits.output_bytes);
   if (limits.memory_bytes > 0) set_limit(RLIMIT_AS, limits.memory_bytes);
-  const int nothing = ::open("/dev/null", O_RDWR);
-  const int messages = ::open(log, O_WRONLY | O_CREAT | O_TRUNC, 0600);
+  const int nothing = ::open("/dev/null", O_RDWR | O_CLOEXEC);
   ::dup2(nothing, 0);
-  ::dup2(nothing, 1);
+  ::dup2(output, 1);
   ::dup2(messages, 2);
   ::execvp(arguments[0], arguments);
   ::_exit(127);
@@ -70,31 +96,10 @@ void kill_group(pid_t process) {
   ::waitpid(process, nullptr, 0);
 }
 
-}  // namespace
-
-TemporaryFolder::TemporaryFolder(const std::string& purpose) {
-  path_ = (fs::temp_directory_path() / ("ruedo-" + purpose + "-XXXXXX")).string();
-  if (!::mkdtemp(path_.data())) fail("no temporary folder");
-  leftover_.emplace(path_);
-}
-
-TemporaryFolder::~TemporaryFolder() {
-  std::error_code error;
-  fs::remove_all(path_, error);
-}
-
-std::optional<int> run_limited(std::vector<std::string> words, const std::string& log,
-                               const ProcessLimits& limits, const std::function<bool()>& give_up) {
-  std::vector<char*> arguments;
-  for (std::string& word : words) arguments.push_back(word.data());
-  arguments.push_back(nullptr);
-  const pid_t parent = ::getpid();
-  const pid_t child = ::fork();  // posix_spawn sets no limits
-  if (child < 0) fail("no process can be started");
-  if (child == 0) become(arguments.data(), log.c_str(), limits, parent);
-
+// The status, as in ProcessResult.
+std::optional<int> wait_for(pid_t child, int wall_s, const std::function<bool()>& give_up) {
   const ProcessHandle handle(child);
-  const auto deadline = std::chrono::steady_clock::now() + std::chrono::seconds(limits.wall_s);
+  const auto deadline = std::chrono::steady_clock::now() + std::chrono::seconds(wall_s);
   for (;;) {
     int status = 0;
     const pid_t ended = ::waitpid(child, &status, WNOHANG);
@@ -106,6 +111,25 @@ std::optional<int> run_limited(std::vector<std::string> words, const std::string
     }
     handle.wait(20);
   }
+}
+
+}  // namespace
+
+ProcessResult run_limited(std::vector<std::string> words, const ProcessLimits& limits,
+                          const std::function<bool()>& give_up) {
+  std::vector<char*> arguments;
+  for (std::string& word : words) arguments.push_back(word.data());
+  arguments.push_back(nullptr);
+  const MemoryFile output("output"), messages("messages");
+  const pid_t parent = ::getpid();
+  const pid_t child = ::fork();  // posix_spawn sets no limits
+  if (child < 0) fail("no process can be started");
+  if (child == 0) become(arguments.data(), output.get(), messages.get(), limits, parent);
+  ProcessResult result{wait_for(child, limits.wall_s, give_up), {}, {}};
+  if (!result.status) return result;
+  result.output = output.end(limits.output_bytes);
+  result.messages = messages.end(kMessages_bytes);
+  return result;
 }
 
 }  // namespace ruedo::model

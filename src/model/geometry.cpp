@@ -35,6 +35,8 @@ std::optional<Geometry> read_mesh(const Element& mesh, const std::string& where,
     } else {
       geometry.mesh = context.meshes.load(*path);
     }
+  } catch (const EnvironmentError&) {
+    throw;
   } catch (const std::runtime_error& error) {
     context.findings.error(
         mesh.source, where,

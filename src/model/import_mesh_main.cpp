@@ -1,13 +1,13 @@
-// ruedo-import-mesh INPUT OUTPUT: converts a mesh file to Ruedo's binary form, with assimp.
+// ruedo-import-mesh INPUT: converts a mesh file to Ruedo's binary form, with assimp, on stdout.
 //
 // Runs as a child of the server, under the server's limits on memory and time and in a sandbox of
 // its own: some malformed files make assimp abort or hang, and others may do worse. Exit code 0:
-// OUTPUT is complete; otherwise the first line on stderr says why.
+// the output is complete; otherwise the first line on stderr says why.
+#include <cerrno>
 #include <cmath>
 #include <cstdio>
 #include <cstring>
 #include <filesystem>
-#include <fstream>
 #include <map>
 #include <stdexcept>
 
@@ -20,6 +20,9 @@
 #include <assimp/scene.h>
 #include <assimp/Importer.hpp>
 
+#include <unistd.h>
+
+#include "core/file_handle.h"
 #include "core/input_file.h"
 #include "core/sandbox.h"
 #include "model/document.h"
@@ -231,7 +234,7 @@ aiMatrix4x4 to_z_up(const aiScene& scene, const std::string& extension) {
   return {};
 }
 
-void import(const fs::path& input, const fs::path& output) {
+void import(const fs::path& input, int output) {
   std::string extension = input.extension().string();
   for (char& c : extension) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
   if (!extension.empty()) extension.erase(0, 1);
@@ -275,27 +278,26 @@ void import(const fs::path& input, const fs::path& output) {
   package.dependencies = files->dependencies();
 
   const std::string bytes = pack_mesh(package);
-  std::ofstream out(output, std::ios::binary);
-  out.write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
-  out.close();
-  if (!out) throw std::runtime_error("the result cannot be written");
+  if (ruedo::write_all(output, bytes.data(), bytes.size()) != bytes.size())
+    throw std::runtime_error(std::string("the result cannot be written: ") + std::strerror(errno));
 }
 
 }  // namespace
 
 int main(int argc, char** argv) {
-  if (argc != 3) {
-    std::fprintf(stderr, "usage: ruedo-import-mesh INPUT OUTPUT\n");
+  if (argc != 2) {
+    std::fprintf(stderr, "usage: ruedo-import-mesh INPUT > OUTPUT\n");
     return 2;
   }
   try {
-    const fs::path mesh = fs::weakly_canonical(argv[1]), output = fs::absolute(argv[2]);
+    const fs::path mesh = fs::weakly_canonical(argv[1]);
+    const ruedo::FileHandle output(::dup(STDOUT_FILENO));
+    ::dup2(STDERR_FILENO, STDOUT_FILENO);  // what a library prints is no part of the mesh
     ruedo::Sandbox sandbox;
     sandbox.readable = {mesh.parent_path().string()};
-    sandbox.writable = {output.parent_path().string()};
     sandbox.alone = true;
     ruedo::enter(sandbox);
-    import(mesh, output);
+    import(mesh, output.get());
     return 0;
   } catch (const std::bad_alloc&) {
     std::fprintf(stderr, "it needs more memory than is allowed\n");

@@ -26,20 +26,16 @@ namespace fs = std::filesystem;
 namespace ruedo::model {
 namespace {
 
+constexpr size_t kMostBytes = size_t{1} << 30;  // of a mesh, packed
+
 std::string default_importer() {
   if (const std::string installed = find_installed("bin/ruedo-import-mesh"); !installed.empty())
     return installed;
   return std::string(RUEDO_BIN_DIR) + "/ruedo-import-mesh";
 }
 
-std::string first_line(const std::string& file) {
-  std::string line(300, '\0');
-  try {
-    line.resize(std::fread(line.data(), 1, line.size(), open_input(file).file.get()));
-  } catch (const InputError&) {  // the child did not come so far
-    return "";
-  }
-  line.resize(std::min(line.find('\n'), line.size()));
+std::string first_line(const std::string& text) {
+  std::string line = text.substr(0, std::min<size_t>(text.find('\n'), 300));
   for (char& c : line) {
     if (static_cast<unsigned char>(c) < 0x20 || static_cast<unsigned char>(c) >= 0x7f)
       c = '?';  // may be bytes of the file
@@ -58,27 +54,27 @@ constexpr bool kLimitAddressSpace = false;  // sanitizers reserve terabytes of a
 constexpr bool kLimitAddressSpace = true;
 #endif
 
-// Runs the importer; throws if it fails.
-void run_importer(const MeshImport& import, const std::string& input, const std::string& output,
-                  const std::string& log) {
+// The mesh, packed. Throws std::runtime_error for a mesh that cannot be imported, EnvironmentError
+// where no mesh could be.
+std::string imported(const MeshImport& import, const std::string& input) {
   ProcessLimits limits;
   limits.cpu_s = static_cast<rlim_t>(import.cpu_limit_s);
-  limits.file_bytes = rlim_t{1} << 30;
+  limits.output_bytes = kMostBytes;
   limits.memory_bytes = kLimitAddressSpace ? import.memory_limit_bytes : 0;
   limits.wall_s = import.wall_limit_s;
   bool out_of_budget = false;
-  const std::optional<int> ended = run_limited({import.importer, input, output}, log, limits, [&] {
+  ProcessResult result = run_limited({import.importer, input}, limits, [&] {
     return out_of_budget = import.budget && import.budget->is_over();
   });
-  if (!ended) {
+  if (!result.status) {
     if (out_of_budget) import.budget->take_time();
     throw std::runtime_error("the importer took longer than " +
                              std::to_string(import.wall_limit_s) + " s");
   }
-  const int status = *ended;
-  if (WIFEXITED(status) && WEXITSTATUS(status) == 0) return;
+  const int status = *result.status;
+  if (WIFEXITED(status) && WEXITSTATUS(status) == 0) return std::move(result.output);
   if (WIFEXITED(status) && WEXITSTATUS(status) == 127) {
-    throw std::runtime_error("the importer " + import.importer + " cannot be run");
+    throw EnvironmentError("the importer of meshes, " + import.importer + ", cannot be run");
   }
   if (WIFSIGNALED(status)) {
     const int signal = WTERMSIG(status);
@@ -89,7 +85,7 @@ void run_importer(const MeshImport& import, const std::string& input, const std:
     throw std::runtime_error("the importer died of signal " + std::to_string(signal) +
                              "; the file is malformed");
   }
-  const std::string message = first_line(log);
+  const std::string message = first_line(result.messages);
   throw std::runtime_error(message.empty() ? "the importer failed" : message);
 }
 
@@ -179,7 +175,6 @@ Mesh MeshLoader::import_or_cached(const std::string& path) {
   files_.push_back(path);
   const std::string name = content_key(content) + extension.substr(1) + "-" +
                            std::to_string(kMeshFormatVersion) + ".mesh";
-  constexpr size_t kMostBytes = size_t{1} << 30;
   if (import_.cache) {
     const std::string entry = import_.cache_folder + "/" + name;
     std::error_code error;
@@ -193,9 +188,7 @@ Mesh MeshLoader::import_or_cached(const std::string& path) {
     }
   }
   const Progress progress("importing " + path);
-  const TemporaryFolder folder("mesh");
-  run_importer(import_, path, folder / "mesh", folder / "log");
-  const std::string bytes = bytes_of(folder / "mesh", kMostBytes);
+  const std::string bytes = imported(import_, path);
   MeshPackage package = unpack_mesh(bytes);
   if (import_.cache) store(import_.cache_folder, name, bytes);
   return taken(std::move(package), path);
@@ -217,6 +210,9 @@ std::shared_ptr<const Mesh> MeshLoader::load(const std::string& path) {
         material.texture = found ? std::make_shared<Texture>(Texture{*found, {}}) : nullptr;
       }
       entry.mesh = std::move(mesh);
+    } catch (const EnvironmentError&) {
+      meshes_.erase(at);
+      throw;
     } catch (const std::runtime_error& error) {
       entry.fault = error.what();
     }

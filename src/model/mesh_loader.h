@@ -35,7 +35,8 @@ class MeshLoader {
  public:
   explicit MeshLoader(const ResourceFinder& resources, MeshImport import = {});
 
-  // The mesh in a file, by absolute path. Throws std::runtime_error saying what is wrong with it.
+  // The mesh in a file, by absolute path. Throws std::runtime_error saying what is wrong with it,
+  // and EnvironmentError where no mesh at all can be imported.
   std::shared_ptr<const Mesh> load(const std::string& path);
 
   // One submesh by name; if `center`, moved so that its bounding box is centred at the origin.

@@ -5,12 +5,10 @@
 
 #include <algorithm>
 #include <cstdlib>
-#include <cstring>
 #include <filesystem>
 #include <sstream>
 #include <vector>
 
-#include "core/input_file.h"
 #include "model/child_process.h"
 
 namespace fs = std::filesystem;
@@ -18,30 +16,14 @@ namespace fs = std::filesystem;
 namespace ruedo::model {
 namespace {
 
-constexpr rlim_t kCpu_s = 20, kMemory_bytes = rlim_t{2} << 30, kFile_bytes = rlim_t{64} << 20;
-constexpr int kWall_s = 60;
-constexpr size_t kLargest_bytes = size_t{64} << 20;
+constexpr ProcessLimits kLimits{
+    .cpu_s = 20, .output_bytes = 64 << 20, .memory_bytes = rlim_t{2} << 30, .wall_s = 60};
 
 std::string script() {
   std::error_code error;
   const fs::path program = fs::read_symlink("/proc/self/exe", error);
   const fs::path installed = program.parent_path().parent_path() / "share/ruedo/xacro/expand.py";
   return !error && fs::exists(installed, error) ? installed.string() : RUEDO_XACRO_DIR "/expand.py";
-}
-
-// Exit code, or -1 for a child that was killed.
-int run(std::vector<std::string> words, const std::string& log) {
-  const std::optional<int> status =
-      run_limited(std::move(words), log, {kCpu_s, kFile_bytes, kMemory_bytes, kWall_s});
-  return status && WIFEXITED(*status) ? WEXITSTATUS(*status) : -1;
-}
-
-std::string text_or_nothing(const std::string& path) {
-  try {
-    return read_input(path, kLargest_bytes);
-  } catch (const InputError&) {
-    return "";
-  }
 }
 
 // "FILE:LINE", added to each element by expand.py.
@@ -78,48 +60,57 @@ bool is_xacro(const std::string& path, const Element* root) {
 
 namespace {
 
-std::shared_ptr<const Element> expand(const std::string& path, ReadContext& context) {
-  const TemporaryFolder folder("xacro");
-  const std::string out = folder / "robot.urdf", log = folder / "messages";
-  std::vector<std::string> words{xacro_python(), script(), path, out};
+std::string last_line(std::string text) {
+  text.erase(text.find_last_not_of('\n') + 1);
+  text.erase(0, text.rfind('\n') + 1);
+  return text;
+}
+
+// What expand.py prints.
+std::string output_of(const std::string& path, const ReadContext& context) {
+  std::vector<std::string> words{xacro_python(), script(), path};
+  const std::string python = words[0];
   for (const std::string& root : context.resources.folders())
     words.insert(words.end(), {"--folder", root});
   for (const std::string& argument : context.xacro_arguments)
     words.insert(words.end(), {"--argument", argument});
-  const int code = run(words, log);
-  if (code != 0) {
-    std::string why = text_or_nothing(log);
-    why.erase(why.find_last_not_of('\n') + 1);
-    why.erase(0, why.rfind('\n') + 1);  // xacro's warnings come before
-    if (code == 127) why = "Python is missing (" + words[0] + "); xacro needs it";
-    if (code == -1) why = "it needs more than " + std::to_string(kCpu_s) + " s, or more than 2 GB";
-    throw InputError({path, 0}, "the xacro file cannot be expanded: " +
-                                    (why.empty() ? "it does not say why" : why));
-  }
-  std::string line;
-  for (std::istringstream files(text_or_nothing(out + ".files")); std::getline(files, line);)
-    context.documents.note(line);
-  for (std::istringstream lines(text_or_nothing(out + ".missing")); std::getline(lines, line);) {
-    const size_t tab = line.find('\t');
-    context.findings.error({line.substr(0, tab), 0}, "xacro",
-                           "the include '" + line.substr(std::min(tab, line.size() - 1) + 1) +
-                               "' is not found; it is passed over");
-  }
-  std::unique_ptr<Element> root = parse_document(read_input(out, kLargest_bytes), path);
-  take_lines(*root, {path, 1});
-  return root;
+  ProcessResult result = run_limited(std::move(words), kLimits);
+  const bool ended = result.status && WIFEXITED(*result.status);
+  const int code = ended ? WEXITSTATUS(*result.status) : -1;
+  if (code == 0) return std::move(result.output);
+  std::string why = last_line(result.messages);  // xacro's warnings come before
+  if (code == 127) why = "Python is missing (" + python + "); xacro needs it";
+  if (!ended) why = "it needs more than " + std::to_string(kLimits.cpu_s) + " s, or more than 2 GB";
+  throw InputError({path, 0}, "the xacro file cannot be expanded: " +
+                                  (why.empty() ? "it does not say why" : why));
+}
+
+// A line of what expand.py prints before the robot.
+void take_note(const std::string& line, ReadContext& context) {
+  std::istringstream words(line);
+  std::string kind, file, include;
+  std::getline(std::getline(std::getline(words, kind, '\t'), file, '\t'), include);
+  if (kind == "read") context.documents.note(file);
+  if (kind == "missing")
+    context.findings.error({file, 0}, "xacro",
+                           "the include '" + include + "' is not found; it is passed over");
 }
 
 }  // namespace
 
 std::shared_ptr<const Element> expand_xacro(const std::string& path, ReadContext& context) {
-  try {
-    return expand(path, context);
-  } catch (const InputError&) {
-    throw;
-  } catch (const std::runtime_error& error) {  // from the folder or the process
-    throw InputError({path, 0}, std::string("the xacro file cannot be expanded: ") + error.what());
+  const std::string output = output_of(path, context);
+  size_t at = 0;
+  for (;;) {
+    const size_t end = std::min(output.find('\n', at), output.size());
+    const std::string line = output.substr(at, end - at);
+    at = std::min(end + 1, output.size());
+    if (line.empty()) break;
+    take_note(line, context);
   }
+  std::unique_ptr<Element> root = parse_document(output.substr(at), path);
+  take_lines(*root, {path, 1});
+  return root;
 }
 
 }  // namespace ruedo::model

@@ -13,7 +13,8 @@ bool set_by_us = false;
 
 }  // namespace
 
-void draw_the_same_everywhere() {
+void set_up_mesa() {
+  ::setenv("MESA_DISK_CACHE_DATABASE", "true", 0);
 #ifdef __x86_64__
   if (std::getenv(kMesasCpu) != nullptr || !__builtin_cpu_supports("sse4.1")) return;
   set_by_us = ::setenv(kMesasCpu, "sse4.1", 0) == 0;

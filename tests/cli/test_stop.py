@@ -136,12 +136,13 @@ def processes_that_name(path):
 
 @pytest.mark.parametrize("told", [signal.SIGTERM, signal.SIGINT])
 def test_while_a_mesh_is_imported_nothing_is_left(told, tmp_path):
-    """Neither the importer's process nor its folder, nor the socket's name."""
+    """Neither the importer's process nor a file, nor the socket's name."""
+    mesh = tmp_path / "large.obj"
     temporary = tmp_path / "tmp"
     temporary.mkdir()
-    with (tmp_path / "large.obj").open("w") as mesh:
-        mesh.writelines(f"v {i % 700} {i // 700} {i % 13}\n" for i in range(490_000))
-        mesh.writelines(f"f {i} {i + 1} {i + 700}\n" for i in range(1, 489_000))
+    with mesh.open("w") as file:
+        file.writelines(f"v {i % 700} {i // 700} {i % 13}\n" for i in range(490_000))
+        file.writelines(f"f {i} {i + 1} {i + 700}\n" for i in range(1, 489_000))
     world = tmp_path / "w.sdf"
     world.write_text("""<sdf version='1.9'><world name='w'><model name='m'><static>true</static><link name='l'>
 <collision name='c'><geometry><mesh><uri>large.obj</uri></mesh></geometry></collision></link></model></world></sdf>""")
@@ -152,14 +153,14 @@ def test_while_a_mesh_is_imported_nothing_is_left(told, tmp_path):
         stderr=subprocess.DEVNULL,
     )
     try:
-        until(lambda: len(processes_that_name(temporary)) > 0, server)
+        until(lambda: len(processes_that_name(mesh)) > 0, server)
         server.send_signal(told)
         assert server.wait(PATIENCE) == 128 + told
     finally:
         server.kill()
         server.wait()
     deadline = time.monotonic() + PATIENCE
-    while processes_that_name(temporary):
+    while processes_that_name(mesh):
         assert time.monotonic() < deadline
         time.sleep(0.05)
     assert not list(temporary.iterdir()) and not (tmp_path / "bus").exists()

@@ -59,6 +59,25 @@ def test_what_cannot_be_printed_is_said(world, command, options):
     assert b"No space left" in result.stderr
 
 
+@pytest.mark.parametrize(
+    "arguments", [["check", "arena"], ["render", "arena", "--size", "64x64", "-o", "PICTURE"]]
+)
+def test_a_full_disk_costs_no_mesh_and_no_picture(tmp_path, arguments):
+    """Of the temporary folder and of the caches, Mesa's too."""
+    disk, picture = tmp_path / "disk", tmp_path / "picture.png"
+    disk.mkdir()
+    full = "mount -t tmpfs -o size=64k tmpfs $0 && ! cat /dev/zero > $0/fill && exec \"$@\""
+    result = subprocess.run(
+        ["unshare", "-rm", "sh", "-c", full, disk, RUEDO]
+        + [str(picture) if each == "PICTURE" else each for each in arguments],
+        env={**os.environ, "TMPDIR": str(disk), "XDG_CACHE_HOME": str(disk)},
+        capture_output=True,
+        text=True,
+    )
+    assert result.returncode == 0, result
+    assert "importer" not in result.stdout + result.stderr
+
+
 def test_a_file_size_limit_is_a_full_disk(world, tmp_path):
     limit = 4096
 

@@ -125,7 +125,7 @@ std::string run(const Run& run, int threads) {
 }  // namespace ruedo
 
 int main(int argc, char** argv) {
-  ruedo::scene::draw_the_same_everywhere();
+  ruedo::scene::set_up_mesa();
   int threads = 1;
   std::vector<std::string> wanted;
   for (int i = 1; i < argc; ++i) {

@@ -90,7 +90,7 @@ struct Engine::Impl {
 };
 
 Engine::Engine(const std::string& world, const EngineOptions& options) {
-  scene::draw_the_same_everywhere();
+  scene::set_up_mesa();
   impl_ = std::make_unique<Impl>(world, options);
 }
 

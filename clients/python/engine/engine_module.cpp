@@ -312,7 +312,7 @@ class PyEngine {
 }  // namespace
 
 NB_MODULE(_engine, module) {
-  ruedo::scene::draw_the_same_everywhere();  // an import has the interpreter to itself
+  ruedo::scene::set_up_mesa();  // an import has the interpreter to itself
   module.attr("version") = ruedo::version();
   module.attr("build") = ruedo::log::own_version();
   nb::exception<ruedo::InputError>(module, "InputError", PyExc_ValueError);

@@ -1,11 +1,12 @@
 """Expands a xacro file for Ruedo, by the Python package xacro, without ROS around it.
 
-    expand.py FILE OUT [--folder FOLDER]... [--argument NAME:=VALUE]...
+    expand.py FILE [--folder FOLDER]... [--argument NAME:=VALUE]...
 
-OUT gets the robot, each element with the attribute ruedo_at="FILE:LINE" that says where it was
-written; OUT.files the files that were read, a line each; OUT.missing "FILE\tWHAT" for includes that
-are not there and were passed over. $(find PKG) is the folder whose package.xml has that name: above
-the file, beside its package, or in the folders given; else a folder of that name above the file.
+Prints a line "read\tFILE" for each file that was read, and "missing\tFILE\tWHAT" for each
+include that is not there and was passed over; after an empty line the robot, each element with the
+attribute ruedo_at="FILE:LINE" that says where it was written. $(find PKG) is the folder whose
+package.xml has that name: above the file, beside its package, or in the folders given; else a
+folder of that name above the file.
 Errors go to stderr, in one line; the exit code is 1, or 2 where the package xacro is missing.
 """
 
@@ -159,18 +160,14 @@ class Notes:
         return f"{where}: {text}" + (f"; not found: {lost}" if lost else "")
 
 
-def write_lines(path, lines):
-    with open(path, "w", encoding="utf-8") as out:
-        out.writelines(f"{line}\n" for line in lines)
-
-
 def main():
     parser = argparse.ArgumentParser()
     parser.add_argument("file")
-    parser.add_argument("out")
     parser.add_argument("--folder", action="append", default=[])
     parser.add_argument("--argument", action="append", default=[])
     arguments = parser.parse_args()
+    output = os.fdopen(os.dup(1), "w", encoding="utf-8", errors="surrogateescape")
+    os.dup2(2, 1)  # what xacro prints is no part of the robot
     try:
         import xacro
     except ImportError:
@@ -190,16 +187,13 @@ def main():
     except Exception as error:
         print(notes.fault(error), file=sys.stderr)
         return 1
-    with open(arguments.out, "w", encoding="utf-8") as out:
-        # What is not found is named as other files have it.
-        out.write(
-            document.toxml()
-            .replace("file://" + MISSING, MISSING)
-            .replace(MISSING + "/", "package://")
-        )
-    write_lines(arguments.out + ".files", dict.fromkeys(notes.read))
-    missing = dict.fromkeys(notes.missing)
-    write_lines(arguments.out + ".missing", (f"{where}\t{name}" for where, name in missing))
+    for name in dict.fromkeys(notes.read):
+        print(f"read\t{name}", file=output)
+    for where, name in dict.fromkeys(notes.missing):
+        print(f"missing\t{where}\t{name}", file=output)
+    # What is not found is named as other files have it.
+    robot = document.toxml().replace("file://" + MISSING, MISSING)
+    print(f"\n{robot.replace(MISSING + '/', 'package://')}", file=output, flush=True)
     return 0
 
 
