@@ -3,7 +3,6 @@
 // commands and the pacing of the loop; rays. docs/performance.md says what the figures mean.
 #include <algorithm>
 #include <cstdio>
-#include <fstream>
 #include <memory>
 
 #include <fmt/format.h>
@@ -12,6 +11,7 @@
 #include "cli/bench_world.h"
 #include "cli/commands.h"
 #include "cli/range.h"
+#include "core/output_file.h"
 #include "core/program_output.h"
 #include "core/progress.h"
 #include "ruedo/errors.h"
@@ -153,9 +153,8 @@ int run_one(const BenchArguments& arguments) {
 
 int run_bench(const BenchArguments& arguments) {
   if (!arguments.write_world.empty()) {
-    std::ofstream file(arguments.write_world);
-    file << bench_world(arguments.robots.empty() ? 1 : arguments.robots.front());
-    if (!file.flush()) throw EnvironmentError(arguments.write_world + " cannot be written");
+    write_file(arguments.write_world,
+               bench_world(arguments.robots.empty() ? 1 : arguments.robots.front()));
     return kGood;
   }
   return arguments.one ? run_one(arguments) : run_all(arguments);

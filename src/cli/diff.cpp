@@ -1,11 +1,11 @@
 // ruedo diff: compares a log with a golden one, field by field.
-#include <fstream>
 #include <memory>
 
 #include <fmt/format.h>
 
 #include "cli/commands.h"
 #include "cli/extensions.h"
+#include "core/output_file.h"
 #include "core/utf8.h"
 #include "log/diff.h"
 #include "ruedo/errors.h"
@@ -17,12 +17,6 @@ struct DiffArguments {
   std::string golden, other, junit, html;
   std::vector<std::string> tolerances, ignored;
 };
-
-void write_file(const std::string& path, const std::string& text) {
-  std::ofstream file(path);
-  file << text;
-  if (!file.flush()) throw EnvironmentError(path + " cannot be written");
-}
 
 int diff(const DiffArguments& arguments) {
   read_given_types();

@@ -4,11 +4,11 @@
 
 #include <cmath>
 #include <cstdio>
-#include <fstream>
 
 #include <fmt/format.h>
 
 #include "cli/commands.h"
+#include "core/output_file.h"
 #include "ruedo/errors.h"
 
 namespace ruedo::cli {
@@ -21,15 +21,6 @@ std::string shown(const Outcome& outcome) {
                              : std::abs(v) < 1    ? fmt::format("{:.4f}", v)
                                                   : fmt::format("{:.2f}", v);
   return outcome.unit.empty() ? number : number + " " + outcome.unit;
-}
-
-void write_file(const std::filesystem::path& path, const std::string& text) {
-  std::ofstream file(path, std::ios::binary);
-  file << text;
-  file.close();
-  if (!file)
-    throw EnvironmentError("cannot write " + path.string() +
-                           ": choose another folder with --out, or make room");
 }
 
 std::string table(const std::vector<Outcome>& outcomes, const std::string& experiment) {

@@ -2,13 +2,13 @@
 #include <algorithm>
 #include <cctype>
 #include <filesystem>
-#include <fstream>
 #include <stdexcept>
 
 #include <fmt/format.h>
 
 #include "cli/commands.h"
 #include "cli/range.h"
+#include "core/output_file.h"
 #include "model/occupancy.h"
 #include "ruedo/errors.h"
 
@@ -59,10 +59,7 @@ int import_map(const ImportArguments& arguments) {
     fmt::print("{}", sdf);
     return kGood;
   }
-  std::ofstream out(arguments.out, std::ios::binary);
-  out << sdf;
-  out.close();
-  if (!out) throw EnvironmentError(arguments.out + " cannot be written");
+  write_file(arguments.out, sdf);
   fmt::print("{}: {} walls{}\n", arguments.out, walls.size(),
              left_out.empty() ? "" : "; left out: " + left_out);
   return kGood;

@@ -16,6 +16,7 @@
 #include "cli/isolation.h"
 #include "cli/view.h"
 #include "core/json.h"
+#include "core/output_file.h"
 #include "core/progress.h"
 #include "judge/judge.h"
 #include "log/diff.h"
@@ -115,13 +116,6 @@ void keep_channels(const std::string& from, const std::string& to,
   if (count == 0)
     throw InputError(
         {}, fmt::format("--keep {}: no message is on such a channel", fmt::join(patterns, " ")));
-}
-
-void write_file(const std::string& path, const std::string& text) {
-  std::FILE* file = std::fopen(path.c_str(), "w");
-  if (!file || std::fwrite(text.data(), 1, text.size(), file) != text.size() ||
-      std::fclose(file) != 0)
-    throw EnvironmentError(path + " cannot be written");
 }
 
 // What differs from the golden log, or "".

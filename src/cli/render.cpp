@@ -2,7 +2,6 @@
 // it.
 #include <algorithm>
 #include <filesystem>
-#include <fstream>
 
 #include <fmt/format.h>
 #include <opencv2/imgproc.hpp>
@@ -12,6 +11,7 @@
 #include "cli/render_devices.h"
 #include "cli/render_log.h"
 #include "cli/render_view.h"
+#include "core/output_file.h"
 #include "core/progress.h"
 #include "model/codecs.h"
 #include "model/settings.h"
@@ -184,11 +184,7 @@ int render(const RenderArguments& arguments) {
                                                : picture_of_camera(arguments, *world, layout);
   std::vector<uint8_t> bytes;
   model::encode_picture(extension, bgr, bytes);
-  std::ofstream out(arguments.output, std::ios::binary);
-  out.write(reinterpret_cast<const char*>(bytes.data()),
-            static_cast<std::streamsize>(bytes.size()));
-  out.close();
-  if (!out) throw EnvironmentError("cannot write " + arguments.output);
+  write_file(arguments.output, {reinterpret_cast<const char*>(bytes.data()), bytes.size()});
   fmt::print("{}: {} x {} pixels\n", arguments.output, bgr.cols, bgr.rows);
   return kGood;
 }

@@ -2,13 +2,13 @@
 #include "cli/rosbag.h"
 
 #include <algorithm>
-#include <cerrno>
 #include <cstring>
 #include <filesystem>
 #include <fstream>
 
 #include <fmt/format.h>
 
+#include "core/output_file.h"
 #include "core/sha256.h"
 #include "engine/markers.h"
 #include "log/header.h"
@@ -208,11 +208,7 @@ void Rosbag::finish(const std::optional<log_header_t>& header, const std::string
   fs::remove(rest_file_, error);
   if (header) attach_files(*header, log);
   out_->finish();
-  const fs::path path = fs::path(folder_) / "metadata.yaml";
-  std::ofstream file(path);
-  file << metadata();
-  file.close();
-  if (!file) throw EnvironmentError(path.string() + " cannot be written: " + std::strerror(errno));
+  write_file((fs::path(folder_) / "metadata.yaml").string(), metadata());
   finished_ = true;
 }
 

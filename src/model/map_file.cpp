@@ -3,11 +3,11 @@
 #include <charconv>
 #include <cmath>
 #include <filesystem>
-#include <fstream>
 #include <map>
 #include <sstream>
 
 #include "core/input_file.h"
+#include "core/output_file.h"
 #include "core/progress.h"
 #include "model/codecs.h"
 #include "model/document.h"
@@ -196,26 +196,20 @@ OccupancyGrid read_bitmap(const std::string& path, double resolution) {
 
 void write_map(const OccupancyGrid& grid, const std::string& path) {
   const fs::path picture = fs::path(path).replace_extension(".pgm");
-  std::ofstream image(picture, std::ios::binary);
-  image << "P5\n" << grid.width << " " << grid.height << "\n255\n";
-  std::string row(static_cast<size_t>(grid.width), '\0');
+  std::string image =
+      "P5\n" + std::to_string(grid.width) + " " + std::to_string(grid.height) + "\n255\n";
   for (int r = grid.height - 1; r >= 0; --r) {
     for (int c = 0; c < grid.width; ++c) {
       const Cell cell = grid.at(c, r);
-      row[c] = static_cast<char>(cell == Cell::occupied ? 0 : cell == Cell::free ? 254 : 205);
+      image += static_cast<char>(cell == Cell::occupied ? 0 : cell == Cell::free ? 254 : 205);
     }
-    image.write(row.data(), static_cast<std::streamsize>(row.size()));
   }
-  image.close();
-  if (!image) throw EnvironmentError(picture.string() + " cannot be written");
+  write_file(picture.string(), image);
   const auto rounded = [](double v) { return shown(std::round(v * 1e9) / 1e9 + 0.0); };
-  std::ofstream yaml(path);
-  yaml << "image: " << picture.filename().string()
-       << "\nmode: trinary\nresolution: " << rounded(grid.resolution) << "\norigin: ["
-       << rounded(grid.x) << ", " << rounded(grid.y) << ", " << rounded(grid.yaw)
-       << "]\nnegate: 0\noccupied_thresh: 0.65\nfree_thresh: 0.196\n";
-  yaml.close();
-  if (!yaml) throw EnvironmentError(path + " cannot be written");
+  write_file(path, "image: " + picture.filename().string() +
+                       "\nmode: trinary\nresolution: " + rounded(grid.resolution) + "\norigin: [" +
+                       rounded(grid.x) + ", " + rounded(grid.y) + ", " + rounded(grid.yaw) +
+                       "]\nnegate: 0\noccupied_thresh: 0.65\nfree_thresh: 0.196\n");
 }
 
 std::vector<WallPiece> read_armap(const std::string& path, double thickness,

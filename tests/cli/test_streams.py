@@ -219,3 +219,40 @@ def test_a_picture_of_gigabytes_is_not_read(tmp_path):
         preexec_fn=limited,
     )
     assert result.returncode in (0, 3), result  # drawn without it, or refused
+
+
+@pytest.mark.parametrize(
+    ("name", "arguments"),
+    [
+        ("p.png", ["render", "WORLD", "--size", "64x64", "-o"]),
+        ("w.sdf", ["bench", "--write-world"]),
+        ("d.html", ["diff", "LOG", "LOG", "--html"]),
+    ],
+)
+def test_what_is_there_outlives_a_full_disk(world, log, tmp_path, name, arguments):
+    places = {"WORLD": str(world), "LOG": str(log)}
+    arguments = [places.get(each, each) for each in arguments]
+    disk = tmp_path / "disk"
+    disk.mkdir()
+    full = (
+        "mount -t tmpfs -o size=64k tmpfs $0 && echo kept > $0/$1 && ! cat /dev/zero > $0/fill "
+        '&& at=$0 && name=$1 && shift && "$@" $at/$name; echo $?; cat $at/$name; ls $at'
+    )
+    result = subprocess.run(
+        ["unshare", "-rm", "sh", "-c", full, disk, name, RUEDO, *arguments],
+        capture_output=True,
+        text=True,
+    )
+    assert result.stdout.split()[-4:] == ["4", "kept", *sorted([name, "fill"])], result
+    assert f"{name} cannot be written: No space left on device" in result.stderr
+
+
+def test_what_is_written_anew_keeps_its_link_and_its_mode(world, tmp_path):
+    target, link = tmp_path / "p.png", tmp_path / "link.png"
+    target.write_bytes(b"old")
+    target.chmod(0o640)
+    link.symlink_to(target)
+    assert program("render", world, "--size", "64x64", "-o", link).returncode == 0
+    assert link.is_symlink() and target.read_bytes().startswith(b"\x89PNG")
+    assert target.stat().st_mode & 0o777 == 0o640
+    assert sorted(p.name for p in tmp_path.glob("p.png*")) == ["p.png"]
