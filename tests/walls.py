@@ -155,6 +155,25 @@ def bare_reads(root):
     ]
 
 
+OUTPUT = "src/core/output_file.h"
+WRITTEN = re.compile(r"\bstd::ofstream\b|\bfopen\([^;]*\"[wa]")
+# Files that grow piece by piece.
+STREAMED = {"src/cli/bag_log.cpp", "src/cli/mcap_writer.cpp", "src/console/log_page.cpp"}
+
+
+def bare_writes(root):
+    """Files that are written elsewhere than in core/output_file.h: a full disk would leave half of
+    one in place of the old one.
+    """
+    return [
+        f"{path.relative_to(root)}:{text.count(chr(10), 0, match.start()) + 1}: use {OUTPUT}"
+        for path in sorted((root / "src").rglob("*.cpp"))
+        if path.relative_to(root).as_posix() not in STREAMED
+        for text in [re.sub(r"//[^\n]*", "", path.read_text(encoding="utf-8"))]
+        for match in WRITTEN.finditer(text)
+    ]
+
+
 PYTHON_CLIENT = "clients/python/ruedo"
 OTHERS_PRIVATE = {
     "_get_packed_fingerprint"
@@ -342,6 +361,7 @@ def broken_web_walls(root):
         broken_walls,
         bare_conversions,
         bare_reads,
+        bare_writes,
         dangling_ranges,
         foreign_members,
         states_left_behind,

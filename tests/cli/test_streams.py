@@ -236,6 +236,7 @@ def test_what_is_there_outlives_a_full_disk(world, log, tmp_path, name, argument
     disk.mkdir()
     full = (
         "mount -t tmpfs -o size=64k tmpfs $0 && echo kept > $0/$1 && ! cat /dev/zero > $0/fill "
+        "&& ! cat /dev/zero >> $0/fill "
         '&& at=$0 && name=$1 && shift && "$@" $at/$name; echo $?; cat $at/$name; ls $at'
     )
     result = subprocess.run(
