@@ -108,15 +108,15 @@ public final class Lifetimes {
                         motion::await);
         List<String> said = new ArrayList<>();
         CountDownLatch done = new CountDownLatch(1);
-        try (Subscription waiting =
+        Subscription waiting =
                 odometry.onSample(
                         sample -> {
                             if (done.getCount() == 0) return;
                             for (Runnable wait : waits) said.add(refusal(wait));
                             done.countDown();
-                        })) {
-            done.await();
-        }
+                        });
+        done.await();
+        waiting.close();
         System.out.println(
                 "waits "
                         + said.stream().filter(s -> s.startsWith("a callback cannot wait")).count()
