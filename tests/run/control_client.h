@@ -46,6 +46,7 @@ class ControlledOn {
     joining.session = 0;
     joining.sequence = 4711;
     const reply_t reply = ask(joining);
+    if (reply.session != session_) sequence_ = 0;
     session_ = reply.session;
     return reply;
   }
