@@ -92,6 +92,9 @@ def test_a_stopped_server_ends_no_lease() -> None:
     assert server.process.returncode == 0
 
 
+LAST_US = 200 * 5000  # sim time of the steps below
+
+
 def jumping_clock(tmp_path: Path, offset: str) -> dict[str, str]:
     found = subprocess.run(
         ["find", "/usr/lib", "-name", "libfaketimeMT.so.1"], capture_output=True, text=True
@@ -128,9 +131,12 @@ def test_a_clock_that_jumps_changes_nothing(
                     sim.step(50)
             server.end()
         assert server.process.returncode == 0
-    assert [(e.channel, e.timestamp, e.data) for e in lcm.EventLog(str(logs[0]))] == [
-        (e.channel, e.timestamp, e.data) for e in lcm.EventLog(str(logs[1]))
-    ]
+    # Without the last step: whether the client's LEAVE or the signal comes first is open.
+    quiet, jumped = (
+        [(e.channel, e.timestamp, e.data) for e in lcm.EventLog(str(log)) if e.timestamp < LAST_US]
+        for log in logs
+    )
+    assert quiet == jumped and quiet[-1][1] > 0.9 * LAST_US
     (tmp_path / "clock").write_text("+0")
     with ruedo_run(*NO_CAMERA, world=HALL) as server:
         with ruedo.connect(server.url, timeout=PATIENCE) as sim:
