@@ -182,8 +182,7 @@ Mesh MeshLoader::import_or_cached(const std::string& path) {
       try {
         MeshPackage package = unpack_mesh(bytes_of(entry, kMostBytes));
         if (dependencies_hold(package, file.parent_path())) return taken(std::move(package), path);
-      } catch (const std::runtime_error&) {
-        // A broken entry is imported again and replaced.
+      } catch (const std::runtime_error&) {  // NOLINT(bugprone-empty-catch): imported anew, below
       }
     }
   }
