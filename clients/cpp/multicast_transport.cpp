@@ -19,8 +19,11 @@ constexpr int kReceiveBuffer = 2 << 20;  // bytes; the system gives at most its 
 
 }  // namespace
 
-MulticastTransport::MulticastTransport(const std::string& url) : lcm_(lcm_create(url.c_str())) {
+MulticastTransport::MulticastTransport(const std::string& url) {
   const Address address = split(url);
+  // Without a port LCM would send to port 0.
+  const std::string whole = "udpm://" + address.host + ":" + address.port + address.options;
+  lcm_.reset(lcm_create(whole.c_str()));
   const size_t option = address.options.find("recv_buf_size=");
   const int buffer =
       option == std::string::npos ? 0 : std::atoi(address.options.c_str() + option + 14);

@@ -257,3 +257,18 @@ def test_what_is_written_anew_keeps_its_link_and_its_mode(world, tmp_path):
     assert link.is_symlink() and target.read_bytes().startswith(b"\x89PNG")
     assert target.stat().st_mode & 0o777 == 0o640
     assert sorted(p.name for p in tmp_path.glob("p.png*")) == ["p.png"]
+
+
+def test_a_file_in_a_folder_that_takes_no_others_is_written(world, tmp_path):
+    """Here: one that is mounted by itself, as into a container."""
+    source, target = tmp_path / "source.sdf", tmp_path / "w2.sdf"
+    source.write_text("old")
+    target.touch()
+    result = subprocess.run(
+        ["unshare", "-rm", "sh", "-c", 'mount --bind $1 $2 && "$0" bench --write-world $2']
+        + [RUEDO, source, target],
+        capture_output=True,
+    )
+    assert result.returncode == 0, result
+    assert "<sdf" in source.read_text()
+    assert sorted(p.name for p in tmp_path.glob("*.part*")) == []

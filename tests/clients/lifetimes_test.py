@@ -15,11 +15,15 @@ ANOTHER_RUN = "ruedo: another run has begun at URL: commands are not repeated in
 pytestmark = pytest.mark.skipif(not CLASSES, reason="there is no JDK")
 
 
-def test_callbacks_and_closing():
+def lifetimes(what):
     with ruedo_run("--disable", "p3at/camera", world=HALL) as server:
-        done = subprocess.run(
-            [*COMMAND, server.url, "all"], capture_output=True, text=True, timeout=PATIENCE
+        return subprocess.run(
+            [*COMMAND, server.url, what], capture_output=True, text=True, timeout=PATIENCE
         )
+
+
+def test_callbacks_and_closing():
+    done = lifetimes("all")
     assert done.stdout.splitlines() == [
         "open true true",
         "newer true",
@@ -35,10 +39,7 @@ def test_callbacks_and_closing():
 
 
 def test_misuse_is_told_at_once():
-    with ruedo_run("--disable", "p3at/camera", world=HALL) as server:
-        done = subprocess.run(
-            [*COMMAND, server.url, "misused"], capture_output=True, text=True, timeout=PATIENCE
-        )
+    done = lifetimes("misused")
     assert done.stdout.splitlines() == [
         "waits 7 of 7",
         "a message of 5243017 bytes on ruedo/request: a server takes 4194304 bytes at most",

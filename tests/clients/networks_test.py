@@ -38,6 +38,13 @@ def test_the_libraries_work_over_tcp(language):
         assert abs(said.numbers("stopped")[0]) < 1e-6
 
 
+@pytest.mark.parametrize("url", ["udpm://239.255.76.67", "udpm://:7667", "udpm://"])
+def test_what_an_address_leaves_out_is_lcms_own(language, url):
+    with ruedo_run("--disable", "p3at/camera", world=HALL, url="udpm://239.255.76.67:7667?ttl=0"):
+        said = probe(language, url, "velocity", "p3at", "0.3", "0.2", "2")
+    assert said.numbers("moved")[2] > 1.5  # s that it drove
+
+
 def test_bare_python_over_tcp(tmp_path):
     page = blocks("protocol.md")
     (tmp_path / "client.py").write_text(

@@ -350,17 +350,23 @@ const ruedo::RegisterSensor kOne{{.module = "thermometer", .order = 100, .types 
 """
 
 
+def build(folder, prefix, targets):
+    (folder / "CMakeLists.txt").write_text(
+        "cmake_minimum_required(VERSION 3.25)\nproject(bad CXX)\n"
+        f"find_package(ruedo REQUIRED COMPONENTS plugin)\n{targets}"
+    )
+    run(CMAKE, "-G", "Ninja", "-S", folder, "-B", folder / "build", f"-DCMAKE_PREFIX_PATH={prefix}")
+    run(CMAKE, "--build", folder / "build")
+
+
 @pytest.fixture(scope="module")
 def at_work(prefix, project):
     folder = project / "at_work"
     folder.mkdir()
     (folder / "bad.cpp").write_text(AT_WORK)
-    text = "cmake_minimum_required(VERSION 3.25)\nproject(bad CXX)\nfind_package(ruedo REQUIRED COMPONENTS plugin)\n"
-    text += f"add_library(bad MODULE bad.cpp)\ntarget_include_directories(bad PRIVATE {project}/build/types/example)\n"
+    text = f"add_library(bad MODULE bad.cpp)\ntarget_include_directories(bad PRIVATE {project}/build/types/example)\n"
     text += "target_link_libraries(bad PRIVATE ruedo::plugin)\n"
-    (folder / "CMakeLists.txt").write_text(text)
-    run(CMAKE, "-G", "Ninja", "-S", folder, "-B", folder / "build", f"-DCMAKE_PREFIX_PATH={prefix}")
-    run(CMAKE, "--build", folder / "build")
+    build(folder, prefix, text)
     world = (project / "room.sdf").read_text()
     world = re.sub(r"<plugin.*/>|<time_constant>.*</time_constant>", "", world)
     world = re.sub(r"<thermometer>.*</thermometer>", "", world)
@@ -405,7 +411,7 @@ def bad(prefix, project):
     """Plugins that are wrong, each in a way of its own."""
     folder = project / "bad"
     folder.mkdir()
-    text = "cmake_minimum_required(VERSION 3.25)\nproject(bad CXX)\nfind_package(ruedo REQUIRED COMPONENTS plugin)\n"
+    text = ""
     for name, (code, _) in BAD.items():
         (folder / name).write_text(code)
         stem = name.split(".")[0]
@@ -413,9 +419,7 @@ def bad(prefix, project):
     text += "add_library(plain MODULE empty.cpp)\n"
     text += f"target_include_directories(plain PRIVATE {prefix}/include /usr/include/eigen3)\n"
     text += "set_target_properties(plain PROPERTIES CXX_STANDARD 20)\n"
-    (folder / "CMakeLists.txt").write_text(text)
-    run(CMAKE, "-G", "Ninja", "-S", folder, "-B", folder / "build", f"-DCMAKE_PREFIX_PATH={prefix}")
-    run(CMAKE, "--build", folder / "build")
+    build(folder, prefix, text)
     good = (project / "build/libexample.so").read_bytes()
     built_for = re.search(rb"ruedo_plugin_built_for=\d+\.\d+\.", good).group(0)
     other = good.replace(built_for, built_for[:-2] + b"9.")

@@ -193,6 +193,16 @@ TEST_F(RestoreTest, ALogOfARunThatBeganWithASnapshotHasThePastToo) {
   EXPECT_EQ(go_on(), later);
 }
 
+TEST_F(RestoreTest, ALinkToItselfIsNoSnapshot) {
+  start_paused();
+  step(10);
+  saved_ = save("here");
+  fs::remove(file("here"));
+  fs::create_symlink(file("here"), file("here"));
+  EXPECT_EQ(named(request_t::RESTORE, "here").code, reply_t::UNKNOWN_NAME);
+  EXPECT_EQ(step(1).step, 11) << "the run goes on";
+}
+
 // Sealed, a state is nobody else's; without its seal it is not read.
 TEST_F(RestoreTest, AFileWithAByteChangedLeadsThereOrIsRefused) {
   start_paused();

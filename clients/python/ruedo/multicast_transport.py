@@ -24,6 +24,7 @@ from . import arrivals
 from .errors import NoServer
 from .stream_transport import Receiver
 
+_GROUP, _PORT = "239.255.76.67", 7667  # LCM's own
 _SHORT, _FRAGMENT = b"LC02", b"LC03"
 _SHORT_HEAD = 8
 _HEAD = struct.Struct(">4sIIIHH")
@@ -69,8 +70,11 @@ class MulticastTransport:
 
     def __init__(self, url: str):
         try:
-            self._lcm: lcm.LCM | None = lcm.LCM(url)  # sends, from any thread; None: closed
-            self._socket = _joined_socket(url)
+            parts = urlsplit(url)
+            group, port = parts.hostname or _GROUP, parts.port or _PORT
+            # Sends, from any thread; None: closed. Without a port LCM would send to port 0.
+            self._lcm: lcm.LCM | None = lcm.LCM(f"udpm://{group}:{port}?{parts.query}")
+            self._socket = _joined_socket(group, port, parts.query)
         except (OSError, RuntimeError) as error:
             raise NoServer(
                 f"{url}: it cannot be used ({error}); `ruedo doctor` looks for what is wrong"
@@ -162,11 +166,9 @@ class MulticastTransport:
             self._partial_memory -= partial.memory
 
 
-def _joined_socket(url: str) -> socket.socket:
+def _joined_socket(group: str, port: int, options: str) -> socket.socket:
     """Raises OSError."""
-    parts = urlsplit(url)
-    group = socket.gethostbyname(parts.hostname or "239.255.76.67")
-    wanted = parse_qs(parts.query).get("recv_buf_size", ["0"])[0]
+    wanted = parse_qs(options).get("recv_buf_size", ["0"])[0]
     end = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
     try:
         end.setblocking(False)
@@ -174,7 +176,7 @@ def _joined_socket(url: str) -> socket.socket:
             end.setsockopt(socket.SOL_SOCKET, option, 1)
         buffer = min(max(int(wanted) if wanted.isdecimal() else 0, _RECEIVE_BUFFER), 1 << 30)
         end.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, buffer)
-        end.bind((group, parts.port or 7667))
+        end.bind((group, port))
         membership = socket.inet_aton(group) + socket.inet_aton("0.0.0.0")
         end.setsockopt(socket.IPPROTO_IP, socket.IP_ADD_MEMBERSHIP, membership)
     except OSError:

@@ -16,7 +16,8 @@ import java.nio.file.Path;
  * is none of LCM's.
  */
 final class Address {
-    static final String DEFAULT_URL = "udpm://239.255.76.67:7667?ttl=0";
+    private static final String GROUP = "239.255.76.67"; // LCM's own
+    static final String DEFAULT_URL = "udpm://" + GROUP + ":7667?ttl=0";
 
     /** What `ruedo run` serves where there is no multicast route. */
     static final String FALLBACK_URL = "tcpq://127.0.0.1:7700";
@@ -33,7 +34,11 @@ final class Address {
         this.url = url;
         URI uri;
         try {
-            uri = new URI(url);
+            // URI wants a host.
+            uri =
+                    new URI(
+                            url.replaceFirst("^udpm://(?=$|[:?])", "udpm://" + GROUP)
+                                    .replaceFirst("^tcpq://(?=$|[:?])", "tcpq://127.0.0.1"));
         } catch (URISyntaxException error) {
             throw notOne();
         }
@@ -46,10 +51,9 @@ final class Address {
             return;
         }
         path = null;
-        boolean bare = uri.getAuthority() == null || uri.getAuthority().isEmpty();
-        if ((!multicast && !"tcpq".equals(uri.getScheme())) || (!bare && uri.getHost() == null))
+        if ((!multicast && !"tcpq".equals(uri.getScheme())) || uri.getHost() == null)
             throw notOne();
-        host = bare ? multicast ? "239.255.76.67" : "127.0.0.1" : uri.getHost();
+        host = uri.getHost();
         port = uri.getPort() < 0 ? multicast ? 7667 : 7700 : uri.getPort();
         if (port > 65535) throw notOne();
         options = uri.getQuery() == null ? "" : uri.getQuery();
