@@ -14,6 +14,7 @@
 
 #include "bus/lcm_bus.h"
 #include "cli/bench_rows.h"
+#include "core/end_with_parent.h"
 #include "core/whole.h"
 #include "model/load.h"
 #include "ruedo/errors.h"
@@ -173,8 +174,11 @@ std::vector<std::string> measure_latency(const BenchTask& task) {
       std::max(10, whole<int>((task.duration_s > 0.0 ? task.duration_s : 15.0) / 0.05));
   int ends[2];
   if (pipe(ends) != 0) throw EnvironmentError("no pipe could be made");
-  const pid_t client = fork();
-  if (client == 0) _exit(run_client(task.lcm, commands, ends[1]));
+  const pid_t parent = getpid(), client = fork();
+  if (client == 0) {
+    end_with_parent(parent);
+    _exit(run_client(task.lcm, commands, ends[1]));
+  }
   close(ends[1]);
   if (client < 0) throw EnvironmentError("the benchmark's client could not be started");
 

@@ -1,4 +1,5 @@
-// fork and exec of a shell (posix_spawn knows no PR_SET_PDEATHSIG), and a thread that waits for it.
+// fork and exec of a shell (posix_spawn cannot have it end with this program), and a thread that
+// waits for it.
 #include "cli/client_process.h"
 
 #include <cerrno>
@@ -7,10 +8,10 @@
 #include <cstdlib>
 #include <cstring>
 
-#include <sys/prctl.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include "core/end_with_parent.h"
 #include "ruedo/errors.h"
 
 namespace ruedo::cli {
@@ -42,8 +43,7 @@ ClientProcess::ClientProcess(const std::string& command, const std::vector<std::
     sigemptyset(&none);
     ::sigprocmask(SIG_SETMASK, &none, nullptr);
     ::setpgid(0, 0);
-    ::prctl(PR_SET_PDEATHSIG, SIGKILL);
-    if (::getppid() != parent) ::_exit(127);
+    end_with_parent(parent);
     ::execle("/bin/sh", "sh", "-c", command.c_str(), nullptr, pointers.data());
     ::_exit(127);
   }

@@ -28,6 +28,7 @@ constexpr lws_usec_t kTick_us = 16'000;
 constexpr lws_usec_t kIdleTick_us = 250'000;
 constexpr lws_usec_t kFarewell_us = 300'000;  // for the last messages to viewers
 constexpr size_t kChunk = 64 * 1024;
+constexpr int kMostStarts = 5;
 constexpr lws_retry_bo_t kIdlePolicy = {nullptr, 0,  0,
                                         20,      60, 0};  // seconds: ping after 20, gone after 60
 
@@ -273,13 +274,11 @@ WebServer::WebServer(WebPlace place, WebHandler handler) : impl_(std::make_uniqu
   for (const std::string& name : impl_->place.protocols)
     impl_->protocols.push_back({name.c_str(), &Impl::callback, 0, 16384, 0, nullptr, 0});
   impl_->protocols.push_back({nullptr, nullptr, 0, 0, 0, nullptr, 0});
-  Address& address = impl_->place.address;
-  address.port = checked_port(impl_->place);
   impl_->handler = std::move(handler);
   impl_->timer.owner = impl_.get();
   lws_set_log_level(0, nullptr);
   lws_context_creation_info info{};
-  info.port = address.port;
+  Address& address = impl_->place.address;
   info.iface = address.host == "0.0.0.0" ? nullptr : address.host.c_str();
   info.protocols = impl_->protocols.data();
   info.gid = static_cast<gid_t>(-1);
@@ -293,13 +292,17 @@ WebServer::WebServer(WebPlace place, WebHandler handler) : impl_(std::make_uniqu
   info.keepalive_timeout = 15;
   info.retry_and_idle_policy = &kIdlePolicy;
   info.options = LWS_SERVER_OPTION_DISABLE_IPV6 | LWS_SERVER_OPTION_EXPLICIT_VHOSTS;
-  impl_->context = lws_create_context(&info);
-  impl_->vhost = impl_->context ? lws_create_vhost(impl_->context, &info) : nullptr;
-  if (!impl_->vhost) {
+  const WebPlace wanted = impl_->place;
+  for (int start = 0; start < kMostStarts; ++start) {
+    // Another program may take the port after this look: the next one finds another, or says so.
+    info.port = address.port = checked_port(wanted);
+    impl_->context = lws_create_context(&info);
+    impl_->vhost = impl_->context ? lws_create_vhost(impl_->context, &info) : nullptr;
+    if (impl_->vhost) return;
     if (impl_->context) lws_context_destroy(impl_->context);
-    throw EnvironmentError(impl_->place.option + ": libwebsockets cannot serve " + address.host +
-                           ":" + std::to_string(address.port));
   }
+  throw EnvironmentError(wanted.option + ": libwebsockets cannot serve " + address.host + ":" +
+                         std::to_string(address.port));
 }
 
 WebServer::~WebServer() { lws_context_destroy(impl_->context); }

@@ -9,11 +9,11 @@
 #include <poll.h>
 #include <signal.h>
 #include <sys/mman.h>
-#include <sys/prctl.h>
 #include <sys/syscall.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include "core/end_with_parent.h"
 #include "core/file_handle.h"
 #include "ruedo/errors.h"
 
@@ -62,8 +62,7 @@ void set_limit(decltype(RLIMIT_AS) which, rlim_t value) {
 [[noreturn]] void become(char* const* arguments, int output, int messages,
                          const ProcessLimits& limits, pid_t parent) {
   ::setpgid(0, 0);
-  ::prctl(PR_SET_PDEATHSIG, SIGKILL);  // the thread that waits for it is gone
-  if (::getppid() != parent) ::_exit(127);
+  end_with_parent(parent);
   set_limit(RLIMIT_CORE, 0);
   set_limit(RLIMIT_CPU, limits.cpu_s);
   set_limit(RLIMIT_FSIZE, limits.output_bytes);

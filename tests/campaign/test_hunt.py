@@ -4,6 +4,7 @@
 
 import json
 import re
+import shlex
 import subprocess
 import sys
 
@@ -14,6 +15,7 @@ import yaml
 from conftest import PATIENCE, SOURCE, ruedo
 from ruedo import Engine, World
 from ruedo.hunt import Hunt
+from ruedo.hunt.regression import moved
 from ruedo.lcmtypes import move_command_t, state_hash_t
 
 EXAMPLE = SOURCE / "docs/campaign-example"
@@ -224,6 +226,21 @@ def test_why_names_what_is_broken_in_a_log(tmp_path, harm):
     said = ruedo("why", bad, folder=tmp_path, code=3).stderr
     assert "bad.lcm: " in said and "at 1 s" in said
     assert said.count("\n") == 1
+
+
+def test_a_kept_program_runs_in_its_folder_and_is_run_anew_when_it_changes(tmp_path):
+    """Regressions: a folder's name was not quoted, and its files were looked for elsewhere, so that
+    an old result stood for a mended program."""
+    home = tmp_path / "lab's 1"
+    home.mkdir()
+    (home / "drive.py").write_text("")
+    command = "python3 drive.py --gain 0.5"
+    kept = moved({"name": "mine", "command": command, "files": ["*.toml"]}, home, home / "kept/a b")
+    assert shlex.split(kept["command"]) == ["cd", "../..", "&&", *command.split()]
+    assert kept["files"] == ["../../*.toml", "../../drive.py"]
+    aside = moved({"name": "mine", "command": command}, home, tmp_path / "kept")
+    assert shlex.split(aside["command"]) == ["cd", "../lab's 1", "&&", *command.split()]
+    assert aside["files"] == ["../lab's 1/drive.py"]
 
 
 def test_a_sound_controller_is_told_to_be_one(example):

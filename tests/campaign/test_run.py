@@ -9,8 +9,10 @@ import pty
 import re
 import shutil
 import signal
+import sqlite3
 import struct
 import subprocess
+import sys
 import termios
 import xml.etree.ElementTree as ElementTree
 
@@ -361,6 +363,126 @@ def test_the_labs_of_a_class_are_marked_in_one_command(tmp_path):
         ("stands", "Mapping", "has no Mapping"),
     ):
         assert text in reasons[student, lab], reasons[student, lab]
+
+
+@pytest.fixture
+def results(whole):
+    """A campaign whose results in `other` may be damaged, and a function that runs SQL on them."""
+    folder, _ = whole
+    shutil.rmtree(folder / "other", ignore_errors=True)
+    shutil.copytree(folder / "c.campaign", folder / "other")
+    file = folder / "other/results.sqlite"
+
+    def run(statements):
+        with contextlib.closing(sqlite3.connect(file)) as db:
+            db.executescript("PRAGMA journal_mode=DELETE;" + statements)
+            db.commit()
+
+    return folder, file, run
+
+
+ENDLESS = "WITH RECURSIVE n(i) AS (SELECT 1 UNION ALL SELECT i + 1 FROM n) SELECT i FROM n"
+DAMAGE = {
+    "status": "UPDATE results SET status = '<script>'",
+    "metrics": "UPDATE results SET metrics = '[1]'",
+    "metric": "UPDATE results SET metrics = '{\"x\": \"y\"}'",
+    "deep": "UPDATE results SET metrics = '" + "[" * 100_000 + "'",
+    "track": "UPDATE results SET track = '[[1, 2]]'",
+    "place": "UPDATE results SET track = '[[1, 2, NaN]]'",
+    "id": "UPDATE results SET id = '../../' || substr(id, 7)",
+    "bytes": "UPDATE results SET reason = x'ff'",
+    "cases": "UPDATE about SET value = '[{}]' WHERE key = 'cases'",
+    "text": "UPDATE about SET value = '[' WHERE key = 'cases'",
+    "format": "UPDATE about SET value = 2 WHERE key = 'format'",
+    "view": f"DROP TABLE results; CREATE VIEW results AS {ENDLESS}",
+    "trigger": "CREATE TRIGGER t AFTER INSERT ON about BEGIN DELETE FROM results; END",
+    "table": "CREATE TABLE more (x)",
+}
+
+
+@pytest.mark.parametrize("damage", DAMAGE)
+def test_damaged_results_are_named_in_one_line(results, damage):
+    folder, _, run = results
+    run(DAMAGE[damage])
+    join, status = ("join", "--out", "joined", "other"), ("status", "--out", "other")
+    commands = {
+        "id": [join],  # the campaign asks for its own alone
+        "cases": [("compare", "other")],
+        "text": [("compare", "other")],
+    }.get(damage, [join, status])
+    shutil.rmtree(folder / "joined", ignore_errors=True)
+    for kind, *words in commands:
+        said = ruedo("campaign", kind, "c.yaml", *words, folder=folder, code=3).stderr
+        assert said.count("\n") == 1 and "other" in said, said
+        assert "damaged" in said or "is of format" in said, said
+
+
+def test_a_file_of_results_that_is_none_is_named(results):
+    folder, file, _ = results
+    content = file.read_bytes()
+    for wrong in (b"SQLite format 3\0" + bytes(200), content[:5000], b"x" * 5000):
+        file.write_bytes(wrong)
+        done = ruedo(
+            "campaign", "join", "c.yaml", "--out", "joined", "other", folder=folder, code=3
+        )
+        assert done.stderr.count("\n") == 1 and "other/results.sqlite is damaged" in done.stderr
+    file.unlink()
+    os.mkfifo(file)
+    done = ruedo("campaign", "status", "c.yaml", "--out", "other", folder=folder, code=4)
+    assert "not a regular file" in done.stderr
+
+
+def test_a_log_of_somebody_elses_that_is_none_is_not_waited_for(results):
+    folder, _, _ = results
+    log = next((folder / "other/logs").iterdir())
+    log.unlink()
+    os.mkfifo(log)
+    shutil.rmtree(folder / "joined", ignore_errors=True)
+    done = ruedo("campaign", "join", "c.yaml", "--out", "joined", "other", folder=folder, code=3)
+    assert f"logs/{log.name}" in done.stderr and "not a regular file" in done.stderr
+
+
+ODD = '''
+class Odd(Exception):
+    pass
+
+
+def drive(view):
+    raise Odd('two\\nlines, \x1b[31mred, """ and "quotes"')
+
+
+def measure(log):
+    return float("nan")
+'''
+
+
+def test_what_a_controller_says_stays_one_line_everywhere(tmp_path):
+    """Also in the test that a hunt keeps, which was no Python and no YAML any more."""
+    folder = tmp_path / "with a space"
+    folder.mkdir()
+    (folder / "odd.py").write_text(ODD)
+    text = CAMPAIGN.replace("controller.py:ahead", "odd.py:drive").replace("seeds: 2", "seeds: 1")
+    text = text.replace(
+        '{name: walls, generator: "world.py:walls", parameters: {distance: "{distance}"}}', "arena"
+    )
+    text += 'metrics: [{name: odd, python: "odd.py:measure"}]\n'
+    (folder / "c.yaml").write_text(text)
+    said = ruedo("campaign", "run", "c.yaml", "--quiet", folder=folder, code=1).stdout
+    assert said.count("\n") == 5 and "\x1b" not in said and "Odd: two lines, ?[31mred" in said
+    ruedo("campaign", "report", "c.yaml", "--pages", "0", folder=folder)
+    ruedo(
+        "hunt", "c.yaml", "--cases", "1", "--shrink", "0", "--keep", "kept", folder=folder, code=1
+    )
+    command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", "kept"]
+    failed = subprocess.run(command, cwd=folder, capture_output=True, text=True, timeout=PATIENCE)
+    assert failed.returncode == 1 and "Odd: two lines" in failed.stdout, failed.stdout
+
+
+@pytest.mark.parametrize("words", [("export", "-o"), ("report", "--pages", "0", "-o")])
+def test_a_file_that_cannot_be_written_is_named(whole, words):
+    folder, _ = whole
+    done = ruedo("campaign", words[0], "c.yaml", *words[1:], "nowhere/t.csv", folder=folder, code=4)
+    assert done.stderr == "ruedo: nowhere/t.csv: No such file or directory\n"
 
 
 def test_slurm(whole):

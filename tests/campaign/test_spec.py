@@ -32,7 +32,65 @@ WRONG = [  # what is replaced, by what, line, what the message says
         "seeds: is 'two'; allowed is a whole number or a list or members with names",
     ),
     ("seeds: 2", "seeds: 0", 10, "seeds: is 0; allowed is 1 or more"),
-    ("seeds: 2", "seeds: [1, -2]", 10, "seeds: has -2"),
+    ("seeds: 2", "seeds: [1, -2]", 10, r"seeds\[1\]: is -2; allowed is 0 or more"),
+    ("seeds: 2", "seeds: 2.0", 10, "seeds: is 2.0; allowed is a whole number"),
+    ("seeds: 2", "seeds: {first: 18446744073709551615, count: 2}", 10, "seeds: go beyond"),
+    ("seeds: 2", "seeds: 1000000", 2, "4000000 cases .*; allowed are 1000000: make several"),
+    (
+        "distance: [1.2, 3.0]",
+        "distance: {grid: {from: 1, to: 2, steps: 2000000}}",
+        2,
+        "8000000 cases",
+    ),
+    (
+        "distance: [1.2, 3.0]\n  bold: [false, true]\nseeds: 2",
+        "distance: {uniform: [1, 2]}\nsampling: {samples: 1000001}",
+        2,
+        "1000001 cases",
+    ),
+    ("distance: [1.2, 3.0]", "distance: [1.2, 1" + "0" * 400 + "]", 8, "a number of 401 digits"),
+    ("distance: [1.2, 3.0]", "distance: {uniform: [-1.7e+308, 1.7e+308]}", 8, "too far from each"),
+    ("distance: [1.2, 3.0]", "distance: {log_uniform: [1.0e-300, 1.0e+300]}", 8, "too far"),
+    (
+        "distance: [1.2, 3.0]",
+        "on: [1.2, 3.0]",
+        7,
+        "parameters: has True for a name; put it in quotes",
+    ),
+    ("distance: [1.2, 3.0]", "distance: [2020-01-01]", 8, "is a date; put it in quotes"),
+    (
+        "limits: {duration: 3}",
+        "limits: {duration: 3, wall: 1.0e+300}",
+        13,
+        "wall: is 1e[+]300; all",
+    ),
+    ("limits: {duration: 3}", "limits: {duration: 3, memory_mb: 9e99}", 13, "memory_mb: is"),
+    (
+        "no_contact: true",
+        "clearance: '{distance} m'",
+        12,
+        "clearance: is '1.2 m'; allowed is a num",
+    ),
+    ("no_contact: true", "goal: {x: '{bold}', y: 0, radius: 1}", 12, "x: is False; allowed is a"),
+    ("seeds: 2", "faults: [{kind: lag, at: soon}]", 10, "at: is 'soon'; allowed is a number"),
+    (
+        'python: "controller.py:ahead"',
+        'python: "controller.py:ahead", hz: 1.0e-310',
+        6,
+        "hz: is 1e-310; allowed is 0.001 or more",
+    ),
+    (
+        'python: "controller.py:ahead"',
+        'python: "controller.py:ahead", files: ["/etc/*"]',
+        6,
+        "files.0.: is '/etc/[*]', and no file is called so",
+    ),
+    (
+        "limits: {duration: 3}",
+        "limits: {duration: 3}\nhunt: {obstacles: {most: 1, area: [2, 0, 1, 1]}}",
+        14,
+        "area: is .2, 0, 1, 1.; allowed is .x1, y1, x2, y2., the least values first",
+    ),
     (
         "distance: [1.2, 3.0]",
         "distance: {gird: {from: 1, to: 2, steps: 3}}",
@@ -142,7 +200,32 @@ def test_a_python_without_what_it_takes_is_told_in_one_line(folder):
     assert "'/nowhere' cannot be started (No such file or directory)" in done.stderr
 
 
+def test_a_generator_that_ends_the_program_is_told(folder):
+    (folder / "world.py").write_text("import sys\nsys.exit()\n")
+    assert (
+        "walls(distance=1.2) raised SystemExit"
+        in ruedo("campaign", "run", "c.yaml", folder=folder, code=3).stderr
+    )
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ("run", "c.yaml", "--workers", "0"),
+        ("run", "c.yaml", "--workers", "9" * 30),
+        ("report", "c.yaml", "--pages", "-1"),
+        ("slurm", "c.yaml", "--tasks", "0"),
+        ("slurm", "c.yaml", "--time", "1\nrm"),
+    ],
+)
+def test_wrong_options_are_told_with_what_is_allowed(folder, words):
+    said = ruedo("campaign", *words, folder=folder, code=2).stderr
+    assert "allowed is" in said or "it looks like" in said
+
+
 def test_the_same_is_checked_of_a_dict():
+    with pytest.raises(SpecError, match="^campaign: it holds what no file can: "):
+        Campaign({"worlds": {object()}})
     with pytest.raises(SpecError, match="^campaign: limits.duration: is 'x'; allowed is a number$"):
         Campaign(
             {

@@ -4,12 +4,17 @@ of speed is judged.
 
 import json
 import os
+import select
 import shutil
+import signal
 import subprocess
+import time
+from pathlib import Path
 
 import pytest
 
 RUEDO = os.environ["RUEDO"]
+PATIENCE = 200  # s
 
 
 def bench(*arguments):
@@ -118,3 +123,29 @@ def test_without_the_program_that_measures(tmp_path):
     shutil.copy(RUEDO, alone)
     result = subprocess.run([alone, "bench"], capture_output=True, text=True, timeout=200)
     assert result.returncode == 4 and "ruedo-measure" in result.stderr
+
+
+def children_of(process: int) -> list[int]:
+    words = Path(f"/proc/{process}/task/{process}/children").read_text().split()
+    return [int(word) for word in words]
+
+
+@pytest.mark.parametrize("told", [signal.SIGTERM, signal.SIGKILL])
+def test_nothing_goes_on_when_it_is_ended(told):
+    """One process measures, and with latency that has a client in another."""
+    with subprocess.Popen(
+        [RUEDO, "bench", "--only", "latency", "--duration", "1e4", "--lcm", "memq://"],
+        stdout=subprocess.DEVNULL,
+    ) as process:
+        started = time.monotonic()
+        while not (measures := children_of(process.pid)) or not (
+            clients := children_of(measures[0])
+        ):
+            assert process.poll() is None and time.monotonic() < started + PATIENCE
+            time.sleep(0.01)
+        handles = [os.pidfd_open(pid) for pid in measures + clients]
+        process.send_signal(told)
+        process.wait(PATIENCE)
+    for handle in handles:
+        assert select.select([handle], [], [], PATIENCE)[0]  # by itself it would go on for hours
+        os.close(handle)

@@ -5,6 +5,9 @@
 
 #include <array>
 #include <atomic>
+#include <barrier>
+#include <memory>
+#include <mutex>
 #include <thread>
 
 #include <fmt/format.h>
@@ -16,6 +19,7 @@
 #include "console/offer_ring.h"
 #include "console/tap.h"
 #include "console/viewer.h"
+#include "console/web_server.h"
 #include "ruedo/applied_t.hpp"
 #include "ruedo/collisions_t.hpp"
 #include "ruedo/contact_t.hpp"
@@ -87,6 +91,48 @@ TEST(Guard, SocketsOnlyForItsOwnPages) {
                    here, ""),
             "");
   EXPECT_NE(refuse({.host = "localhost:8080", .origin = "null", .socket = true}, here, ""), "");
+}
+
+std::unique_ptr<WebServer> server_at(int port) {
+  WebPlace place;
+  place.address.port = port;
+  return std::make_unique<WebServer>(place, WebHandler{});
+}
+
+// What is wrong when so many start in the same moment.
+std::vector<std::string> started_at_once(int servers, int port) {
+  std::vector<std::string> faults;
+  std::mutex mutex;
+  std::barrier begin(servers), end(servers);  // nobody gives its port back before all have tried
+  std::vector<std::jthread> threads;
+  for (int i = 0; i < servers; ++i) {
+    threads.emplace_back([&] {
+      begin.arrive_and_wait();
+      std::unique_ptr<WebServer> server;
+      try {
+        server = server_at(port);
+      } catch (const EnvironmentError& error) {
+        const std::lock_guard lock(mutex);
+        faults.emplace_back(error.what());
+      }
+      end.arrive_and_wait();
+    });
+  }
+  threads.clear();
+  return faults;
+}
+
+TEST(WebServer, TwoThatWantOnePortAtOnceAreToldWhatIsWrong) {
+  const int port = server_at(0)->port();
+  for (int round = 0; round < 50; ++round) {
+    for (const std::string& fault : started_at_once(2, port))
+      EXPECT_THAT(fault,
+                  testing::HasSubstr("cannot be served: Address already in use. Another port"));
+  }
+}
+
+TEST(WebServer, ThoseThatTakeAnyPortAllHaveOne) {
+  for (int round = 0; round < 20; ++round) EXPECT_THAT(started_at_once(4, 0), testing::IsEmpty());
 }
 
 TEST(OfferRing, KeepsOrderAcrossItsEndAndDropsWhatHasNoRoom) {

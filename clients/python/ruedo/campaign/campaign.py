@@ -14,7 +14,7 @@ from ..files import MOST_YAML_BYTES, read_bytes
 from .cluster import run_on_ray
 from .errors import CampaignError, SpecError
 from .local import Done, cores, run_local
-from .plan import Case, Planner, check_values, shard_of
+from .plan import Case, Planner, check_values, files_called, shard_of
 from .schema import Source, check, read_yaml
 from .store import Results, Store
 from .worlds import WorldFiles
@@ -40,10 +40,14 @@ class Campaign:
         out: str | os.PathLike[str] | None = None,
     ) -> None:
         if isinstance(spec, dict):
-            self._content, self._source = json.loads(json.dumps(spec)), Source("campaign")
+            self._source = Source("campaign")
+            try:
+                self._content = json.loads(json.dumps(spec))
+            except (TypeError, ValueError, RecursionError) as error:
+                raise SpecError(f"campaign: it holds what no file can: {error}") from None
             self.folder = Path(folder).resolve()
             self.file: Path | None = None
-            stem = str(spec.get("name", "campaign"))
+            stem = spec["name"] if isinstance(spec.get("name"), str) else "campaign"
         else:
             file = Path(spec)
             try:
@@ -172,13 +176,9 @@ class Campaign:
             if "each" not in one:
                 yield one
                 continue
-            files = sorted(file for file in self.folder.glob(one["each"]) if file.is_file())
-            if not files:
-                raise self._source.error(
-                    ("controllers", i, "each"),
-                    f"is {one['each']!r}, and no file is called so in {self.folder}",
-                )
-            for file in files:
+            for file in files_called(
+                one["each"], self.folder, ("controllers", i, "each"), self._source
+            ):
                 path = str(file.relative_to(self.folder))
                 made = {
                     key: value.replace("{file}", path) if isinstance(value, str) else value

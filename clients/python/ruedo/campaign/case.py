@@ -51,7 +51,7 @@ class Outcome:
     def fail(self, status: str, what: str, reason: str) -> None:
         """The first thing that went wrong is what stays."""
         if self.status == "passed":
-            self.status, self.what, self.reason = status, what, reason
+            self.status, self.what, self.reason = status, what, " ".join(reason.split())[:500]
 
     def as_dict(self) -> dict[str, Any]:
         return asdict(self)
@@ -87,7 +87,7 @@ class Runner:
                 else:
                     self._run_command(what, log, scratch, outcome)
                 self._measure(what, log, outcome)
-            except (ValueError, OSError) as error:
+            except Exception as error:
                 outcome.fail("invalid", "case", _line(error))
             if os.path.exists(log):
                 outcome.log, outcome.state_hash = thinned(log)
@@ -265,7 +265,7 @@ class Runner:
                 outcome.metrics[metric["name"]] = float(
                     Function(metric["python"], self._folder).load()(log)
                 )
-            except Exception as error:
+            except (Exception, SystemExit) as error:
                 outcome.fail(
                     "invalid",
                     "metric",

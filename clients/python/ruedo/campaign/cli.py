@@ -6,28 +6,36 @@ from __future__ import annotations
 
 import argparse
 import importlib
+import io
 import json
 import os
+import re
 import shlex
 import sys
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import Any, TextIO
 
+from ..errors import for_terminal
+
+MOST_WORKERS = 100_000
 GOOD, FAILED, USAGE, BAD_INPUT, ENVIRONMENT = range(5)
 
 
 def main(words: list[str]) -> int:
     try:
-        from .errors import CampaignError, for_terminal
+        from .errors import CampaignError
     except ImportError as error:
         print(f"ruedo: {error}; pip install 'ruedo[campaign]'", file=sys.stderr)
         return ENVIRONMENT
+    for stream in (sys.stdout, sys.stderr):  # a file's name may be no text
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="backslashreplace")
     try:
         arguments = _parser().parse_args(words)
         return int(arguments.action(arguments))
     except CampaignError as error:
-        print(f"ruedo: {for_terminal(str(error))}", file=sys.stderr)
+        say(f"ruedo: {error}", sys.stderr)
         return error.exit_code
     except ImportError as error:
         print(f"ruedo: {error}; pip install 'ruedo[campaign]'", file=sys.stderr)
@@ -41,6 +49,10 @@ def main(words: list[str]) -> int:
     except BrokenPipeError:
         os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
         return GOOD
+    except OSError as error:  # a file that cannot be written, a full disk
+        said = f"{error.filename}: {error.strerror}" if error.filename else str(error)
+        say(f"ruedo: {said}", sys.stderr)
+        return ENVIRONMENT
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -58,11 +70,29 @@ def _parser() -> argparse.ArgumentParser:
     return top
 
 
+def say(text: str, file: TextIO | None = None) -> None:
+    """A line, on standard output unless it is told; names and reasons may be a stranger's."""
+    print(for_terminal(text), file=file)
+
+
+def number(low: int, high: int) -> Callable[[str], int]:
+    """The type of an option: a whole number in these bounds."""
+
+    def read(text: str) -> int:
+        if not re.fullmatch("-?[0-9]{1,20}", text) or not low <= int(text) <= high:
+            raise argparse.ArgumentTypeError(
+                f"{text!r}: allowed is a whole number from {low} to {high}"
+            )
+        return int(text)
+
+    return read
+
+
 def _add_execution(one: argparse.ArgumentParser) -> None:
     """How the cases are run, and what is said of it."""
     one.add_argument(
         "--workers",
-        type=int,
+        type=number(1, MOST_WORKERS),
         metavar="N",
         help="processes on this machine (default: one a core)",
     )
@@ -71,13 +101,6 @@ def _add_execution(one: argparse.ArgumentParser) -> None:
     one.add_argument("--quiet", action="store_true", help="no progress; the sum at the end")
     one.add_argument("--json", action="store_true", help="the sum at the end as JSON")
     one.add_argument("--junit", metavar="FILE", help="write the results for CI")
-
-
-def _count(text: str) -> int:
-    number = int(text) if text.isascii() and text.isdigit() else -1
-    if not 0 <= number <= 1000:
-        raise argparse.ArgumentTypeError(f"{text!r}: allowed is a whole number from 0 to 1000")
-    return number
 
 
 def _add_campaign(parser: argparse.ArgumentParser) -> None:
@@ -112,7 +135,7 @@ def _add_campaign(parser: argparse.ArgumentParser) -> None:
     )
     one.add_argument(
         "--pages",
-        type=_count,
+        type=number(0, 1000),
         default=3,
         metavar="N",
         help="failed runs, the worst, that are repeated and put beside the report as pages of the "
@@ -125,9 +148,11 @@ def _add_campaign(parser: argparse.ArgumentParser) -> None:
     one.add_argument("CASE", help="its number, or the beginning of its id")
     one.add_argument("-o", "--output", metavar="LOG", help="default: ID.lcm here")
     one = add("slurm", _slurm, "print a job array for Slurm; each task is a shard")
-    one.add_argument("--tasks", type=int, default=10, metavar="N")
-    one.add_argument("--cores", type=int, default=8, metavar="N", help="of each task")
-    one.add_argument("--time", default="04:00:00", metavar="H:M:S")
+    one.add_argument("--tasks", type=number(1, 1_000_000), default=10, metavar="N")
+    one.add_argument(
+        "--cores", type=number(1, MOST_WORKERS), default=8, metavar="N", help="of each task"
+    )
+    one.add_argument("--time", type=_duration, default="04:00:00", metavar="H:M:S")
     add("join", _join, "take over the results of shards").add_argument("FOLDERS", nargs="+")
     one = add("export", _export, "write the table of results")
     one.add_argument(
@@ -139,6 +164,12 @@ def _add_campaign(parser: argparse.ArgumentParser) -> None:
         help="folder of the other campaign's results, or a controller of this one after a colon (:NAME)",
     )
     one.add_argument("--json", action="store_true")
+
+
+def _duration(text: str) -> str:
+    if not re.fullmatch(r"([0-9]+-)?[0-9]+(:[0-9]+){0,2}", text):
+        raise argparse.ArgumentTypeError(f"{text!r}: it looks like H:M:S, or D-H:M:S")
+    return text
 
 
 def _campaign(arguments: argparse.Namespace) -> Any:
@@ -158,7 +189,7 @@ def _run(arguments: argparse.Namespace) -> int:
     if arguments.junit:
         Path(arguments.junit).write_text(results.junit(campaign.name), encoding="utf-8")
     if arguments.json:
-        print(json.dumps(_summary(campaign, results)))
+        say(json.dumps(_summary(campaign, results)))
     else:
         _print_summary(campaign, results)
     return FAILED if results.failed else GOOD
@@ -181,20 +212,20 @@ def _summary(campaign: Any, results: Any) -> dict[str, Any]:
 def _print_summary(campaign: Any, results: Any) -> None:
     summary = _summary(campaign, results)
     kinds = ", ".join(f"{count} {status}" for status, count in summary["status"].items()) or "none"
-    print(
+    say(
         f"{campaign.name}: {summary['done']} of {summary['cases']} cases: {kinds}; in {campaign.out}"
     )
     for case, row in results.failed[:10]:
-        print(f"  {case.number} {case.id} {row['status']}: {row['reason']}")
+        say(f"  {case.number} {case.id} {row['status']}: {row['reason']}")
     if len(results.failed) > 10:
-        print(f"  ... and {len(results.failed) - 10} more: `ruedo campaign report`")
+        say(f"  ... and {len(results.failed) - 10} more: `ruedo campaign report`")
 
 
 def _status(arguments: argparse.Namespace) -> int:
     campaign = _campaign(arguments)
     results = campaign.results()
     if arguments.json:
-        print(json.dumps(_summary(campaign, results)))
+        say(json.dumps(_summary(campaign, results)))
     else:
         _print_summary(campaign, results)
     return GOOD
@@ -206,7 +237,7 @@ def _report(arguments: argparse.Namespace) -> int:
     campaign = _campaign(arguments)
     file = Path(arguments.output or campaign.out / "report.html")
     write_report(campaign, file, arguments.baseline, arguments.pages)
-    print(file)
+    say(str(file))
     return GOOD
 
 
@@ -215,25 +246,25 @@ def _show(arguments: argparse.Namespace) -> int:
     case = campaign.case(arguments.CASE)
     results = campaign.results()
     row = results.row(case)
-    print(
+    say(
         f"case {case.number}, id {case.id}: world {case.world}, {case.robot or 'its robot'}, controller {case.controller}, seed {case.seed}"
     )
     for name, value in case.parameters.items():
-        print(f"  {name} = {value}")
+        say(f"  {name} = {value}")
     if row is None:
-        print("not run yet")
+        say("not run yet")
         return GOOD
-    print(f"{row['status']}{': ' + row['reason'] if row['reason'] else ''}")
+    say(f"{row['status']}{': ' + row['reason'] if row['reason'] else ''}")
     for name, value in row["metrics"].items():
-        print(f"  {name} {value:.6g}")
+        say(f"  {name} {value:.6g}")
     log = results.log(case)
     if log:
-        print(f"log of what acted: {log} (ruedo verify {log})")
-    print(
+        say(f"log of what acted: {log} (ruedo verify {log})")
+    say(
         f"again, with all messages: ruedo campaign repeat {shlex.quote(arguments.FILE)} {case.number}"
     )
     if row["output"]:
-        print("---- the end of the controller's output\n" + row["output"].rstrip())
+        say("---- the end of the controller's output\n" + row["output"].rstrip())
     return GOOD
 
 
@@ -245,8 +276,8 @@ def _repeat(arguments: argparse.Namespace) -> int:
     log = Path(arguments.output or f"{case.id}.lcm").resolve()
     outcome = Runner(str(campaign.folder)).run(case.what, full_log=str(log))
     row = campaign.results().row(case)
-    print(f"{outcome.status}{': ' + outcome.reason if outcome.reason else ''}")
-    print(f"{log}: ruedo play {log} --view, ruedo verify {log}")
+    say(f"{outcome.status}{': ' + outcome.reason if outcome.reason else ''}")
+    say(f"{log}: ruedo play {log} --view, ruedo verify {log}")
     if row is None:
         return GOOD
     same = (outcome.status, outcome.reason, outcome.state_hash) == (
@@ -254,7 +285,7 @@ def _repeat(arguments: argparse.Namespace) -> int:
         row["reason"],
         row["state_hash"],
     )
-    print(
+    say(
         "as in the campaign, to the last bit of the state"
         if same
         else f"in the campaign it was another run: {row['status']}{': ' + row['reason'] if row['reason'] else ''}; a controller that is not "
@@ -268,7 +299,7 @@ def _slurm(arguments: argparse.Namespace) -> int:
     file = shlex.quote(str(Path(arguments.FILE).resolve()))
     out = str(campaign.out.resolve())
     count = arguments.tasks
-    print(f"""#!/bin/bash
+    say(f"""#!/bin/bash
 #SBATCH --job-name={campaign.name}
 #SBATCH --array=1-{count}
 #SBATCH --cpus-per-task={arguments.cores}
@@ -286,7 +317,7 @@ ruedo campaign run {file} --quiet --workers "$SLURM_CPUS_PER_TASK" \\
 def _join(arguments: argparse.Namespace) -> int:
     campaign = _campaign(arguments)
     taken = campaign.join(arguments.FOLDERS)
-    print(f"took over {taken} results")
+    say(f"took over {taken} results")
     _print_summary(campaign, campaign.results())
     return GOOD
 
@@ -305,7 +336,7 @@ def _export(arguments: argparse.Namespace) -> int:
         file.write_text(results.junit(campaign.name), encoding="utf-8")
     else:
         raise SpecError(f"{file}: its name ends with .csv, .parquet or .xml")
-    print(f"{file}: {len(results.done)} of {len(results.cases)} cases")
+    say(f"{file}: {len(results.done)} of {len(results.cases)} cases")
     return GOOD
 
 
@@ -313,7 +344,7 @@ def _compare(arguments: argparse.Namespace) -> int:
     from .compare import compare_with
 
     comparison = compare_with(_campaign(arguments), arguments.BASELINE)
-    print(json.dumps(comparison.as_dict()) if arguments.json else comparison.text())
+    say(json.dumps(comparison.as_dict()) if arguments.json else comparison.text())
     return (
         FAILED
         if comparison.worse

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from .errors import CampaignError
+from .errors import CampaignError, ResultsError
 from .plan import Case
 from .stats import mcnemar, paired_difference
 from .store import Results, Store
@@ -131,5 +131,19 @@ def results_of(folder: Path) -> Results:
     text = store.about("cases")
     if text is None:
         raise CampaignError(f"{folder} holds no results of a campaign")
-    cases = [Case(what={}, **one) for one in json.loads(text)]
+    try:
+        cases = [_remembered(one) for one in json.loads(text)]
+    except (TypeError, ValueError, KeyError, RecursionError):
+        raise ResultsError(f"{folder}: the list of its cases is damaged") from None
     return Results(cases, store.rows(case.id for case in cases), store)
+
+
+def _remembered(one: dict[str, Any]) -> Case:
+    """Raises what a wrong one leads to."""
+    case = Case(what={}, **one)
+    texts = (case.id, case.world, case.robot, case.controller)
+    if not all(isinstance(text, str) for text in texts) or not isinstance(case.parameters, dict):
+        raise TypeError
+    if not isinstance(case.number, int) or not isinstance(case.seed, int):
+        raise TypeError
+    return case

@@ -11,6 +11,12 @@ class CampaignError(RuedoError):
     exit_code = 4
 
 
+class ResultsError(CampaignError, ValueError):
+    """A folder of results is damaged, or holds something else."""
+
+    exit_code = 3
+
+
 class SpecError(CampaignError, ValueError):
     """The campaign's file is wrong: file, line, member, value and what is allowed."""
 
@@ -20,8 +26,3 @@ class SpecError(CampaignError, ValueError):
 def missing(package: str, extra: str) -> CampaignError:
     """A package that an extra of pip's brings is not there."""
     return CampaignError(f"this needs {package}: pip install 'ruedo[{extra}]'")
-
-
-def for_terminal(text: str) -> str:
-    """Control characters of names and files become '?': nothing moves a cursor or sets a colour."""
-    return "".join(c if c in "\t\n" or c.isprintable() else "?" for c in text)

@@ -16,6 +16,7 @@ from pathlib import Path
 from statistics import NormalDist
 from typing import Any
 
+from ..arguments import MOST_SEED
 from ..files import sha256_of
 from .errors import SpecError
 from .functions import Function
@@ -23,6 +24,10 @@ from .schema import Source
 from .worlds import WorldFiles
 
 DEFAULT_MEMORY_MB = 4096
+MOST_CASES = 1_000_000
+_MOST_INTEGER = 2**63 - 1
+_TEXTS_OF_EXPECT = ("robot", "no_contact", "golden", "tolerances", "ignore")
+_TEXTS_OF_FAULT = ("robot", "kind", "target")
 _HOLE = re.compile(r"(?<![${])\{([A-Za-z_]\w*)\}")
 
 
@@ -143,6 +148,10 @@ def check_values(content: dict[str, Any], source: Source) -> None:
     for path, value in _leaves(content, ()):
         if isinstance(value, float) and not math.isfinite(value):
             raise source.error(path, f"is {value}; allowed is a finite number")
+        if isinstance(value, int) and not -_MOST_INTEGER <= value <= MOST_SEED:
+            raise source.error(
+                path, f"is a number of {len(str(abs(value)))} digits; allowed are 19"
+            )
     for name, given in content.get("parameters", {}).items():
         if not name.isidentifier() or name in (
             "seed",
@@ -166,6 +175,11 @@ def check_values(content: dict[str, Any], source: Source) -> None:
                     f"is {given[kind]}; allowed is [low, high]"
                     + (", both above 0" if kind == "log_uniform" else ""),
                 )
+            if not math.isfinite(high / low if kind == "log_uniform" else high - low):
+                raise source.error(
+                    ("parameters", name, kind),
+                    f"is {given[kind]}; they are too far from each other",
+                )
         if kind == "normal" and given[kind][1] < 0:
             raise source.error(
                 ("parameters", name, kind),
@@ -184,15 +198,58 @@ def check_values(content: dict[str, Any], source: Source) -> None:
                 )
             names |= {one["name"]} if "name" in one else set()
     seeds = content.get("seeds", 1)
-    low = (
-        min(seeds)
-        if isinstance(seeds, list)
-        else seeds.get("first", 1)
+    if isinstance(seeds, dict) and seeds.get("first", 1) + seeds.get("count", 1) - 1 > MOST_SEED:
+        raise source.error(("seeds",), f"go beyond {MOST_SEED}, which is the last")
+    if obstacles := content.get("hunt", {}).get("obstacles"):
+        x1, y1, x2, y2 = obstacles["area"]
+        if not (x1 <= x2 and y1 <= y2):
+            raise source.error(
+                ("hunt", "obstacles", "area"),
+                f"is {obstacles['area']}; allowed is [x1, y1, x2, y2], the least values first",
+            )
+        if "size" in obstacles and not 0 < obstacles["size"][0] <= obstacles["size"][1]:
+            raise source.error(
+                ("hunt", "obstacles", "size"),
+                f"is {obstacles['size']}; allowed is [from, to], both above 0",
+            )
+    _check_count(content, source)
+
+
+def _check_count(content: dict[str, Any], source: Source) -> None:
+    """Before any of them is made: a short file may ask for more than any machine holds."""
+    drawn, count = False, 1
+    values: Any
+    for given in content.get("parameters", {}).values():
+        kind, values = ("list", given) if isinstance(given, list) else next(iter(given.items()))
+        drawn |= kind not in ("list", "grid")
+        count *= len(values) if kind == "list" else values["steps"] if kind == "grid" else 1
+    seeds = content.get("seeds", 1)
+    count *= content.get("sampling", {}).get("samples", 10) if drawn else 1
+    count *= len(content["worlds"]) * len(content.get("robots", [""])) * len(content["controllers"])
+    count *= (
+        seeds
+        if isinstance(seeds, int)
+        else seeds.get("count", 1)
         if isinstance(seeds, dict)
-        else 1
+        else len(seeds)
     )
-    if low < 0:
-        raise source.error(("seeds",), f"has {low}; allowed are whole numbers from 0 on")
+    if count > MOST_CASES:
+        raise source.error(
+            (),
+            f"{count} cases (worlds, robots, controllers, parameters and seeds, multiplied); "
+            f"allowed are {MOST_CASES}: make several campaigns of it",
+        )
+
+
+def _check_numbers(
+    value: Any, texts: tuple[str, ...], path: tuple[Any, ...], source: Source
+) -> None:
+    """What a file gives as a number or as the name of a parameter, once that stands there."""
+    for at, one in _leaves(value, path):
+        if any(name in texts for name in at):
+            continue
+        if isinstance(one, bool) or not isinstance(one, (int, float)):
+            raise source.error(at, f"is {one!r}; allowed is a number")
 
 
 def _leaves(value: Any, path: tuple[Any, ...]) -> Iterator[tuple[tuple[Any, ...], Any]]:
@@ -287,8 +344,11 @@ class Planner:
 
         content = self._content
         expect = fill(("expect",), content.get("expect", {}))
+        _check_numbers(expect, _TEXTS_OF_EXPECT, ("expect",), self._source)
         if isinstance(expect.get("goal"), dict):
             expect["goal"] = [expect["goal"]]
+        faults = fill(("faults",), content.get("faults", []))
+        _check_numbers(faults, _TEXTS_OF_FAULT, ("faults",), self._source)
         limits = content["limits"]
         what: dict[str, Any] = {
             "world": self._world(w, world, robot, fill, at, seed),
@@ -299,7 +359,7 @@ class Planner:
             "parameters": at,
             "controller": self._controller(c, asked, fill),
             "expect": expect,
-            "faults": fill(("faults",), content.get("faults", [])),
+            "faults": faults,
             "metrics": [
                 {**one, "sha256": self._function(("metrics", i, "python"), one["python"]).sha256}
                 for i, one in enumerate(content.get("metrics", []))
@@ -361,12 +421,7 @@ class Planner:
         }
         files: dict[str, str] = {}
         for i, pattern in enumerate(asked.get("files", [])):
-            found = sorted(one for one in self._folder.glob(pattern) if one.is_file())
-            if not found:
-                raise self._source.error(
-                    (*path, "files", i),
-                    f"is {pattern!r}, and no file is called so in {self._folder}",
-                )
+            found = files_called(pattern, self._folder, (*path, "files", i), self._source)
             files |= {
                 str(one.relative_to(self._folder)): self._sha256((*path, "files", i), str(one))
                 for one in found
@@ -397,6 +452,17 @@ class Planner:
                     path, f"{name} cannot be read: {error.strerror or error}"
                 ) from None
         return self._hashes[name]
+
+
+def files_called(pattern: str, folder: Path, path: tuple[Any, ...], source: Source) -> list[Path]:
+    """Those in the folder that a member of the campaign means, at least one."""
+    try:
+        found = sorted(file for file in folder.glob(pattern) if file.is_file())
+    except (ValueError, NotImplementedError):  # "", "/etc/*"
+        found = []
+    if not found:
+        raise source.error(path, f"is {pattern!r}, and no file is called so in {folder}")
+    return found
 
 
 def canonical(value: Any) -> bytes:

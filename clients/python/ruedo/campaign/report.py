@@ -6,8 +6,9 @@ from __future__ import annotations
 
 import html
 import io
+import math
 import shlex
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 from typing import Any
 from urllib.parse import quote
@@ -187,16 +188,8 @@ def _distributions(results: Results) -> Iterable[str]:
     names = sorted({name for _, row in results.done for name in row["metrics"]})
     plots = []
     for name in names:
-        good = [
-            row["metrics"][name]
-            for _, row in results.done
-            if name in row["metrics"] and row["status"] == "passed"
-        ]
-        bad = [
-            row["metrics"][name]
-            for _, row in results.done
-            if name in row["metrics"] and row["status"] != "passed"
-        ]
+        good = [value for value, row in _finite(name, results) if row["status"] == "passed"]
+        bad = [value for value, row in _finite(name, results) if row["status"] != "passed"]
         if len(set(good + bad)) < 2:
             continue
         figure = new_figure()
@@ -214,6 +207,13 @@ def _distributions(results: Results) -> Iterable[str]:
         plots.append(f"<figure>{_svg(figure)}</figure>")
     if plots:
         yield f"<h2>Distributions</h2><div class='plots'>{''.join(plots)}</div>"
+
+
+def _finite(name: str, results: Results) -> Iterator[tuple[float, dict[str, Any]]]:
+    """A metric of the user's may be nan."""
+    for _, row in results.done:
+        if math.isfinite(row["metrics"].get(name, math.nan)):
+            yield row["metrics"][name], row
 
 
 def _heat_map(results: Results) -> Iterable[str]:

@@ -7,12 +7,14 @@ from __future__ import annotations
 import difflib
 from typing import Any
 
+from ..arguments import MOST_SEED
 from ..files import parse_yaml
 from .errors import SpecError, missing
 
 _NAME = {"type": "string", "pattern": "^[A-Za-z0-9][A-Za-z0-9_.-]{0,62}$"}
 _NUMBER = {"type": "number"}
-_POSITIVE = {"type": "number", "exclusiveMinimum": 0}
+_SEED = {"type": "integer", "minimum": 0, "maximum": MOST_SEED}
+_COUNT = {"type": "integer", "minimum": 1, "maximum": 10**9}
 _TEXTS = {"type": "array", "items": {"type": "string"}}
 _VALUE = {"type": ["string", "number", "boolean"]}
 _NUMBER_OR_NAME = {"type": ["number", "string"]}
@@ -32,10 +34,7 @@ _GOAL = _object(
     {"x": _NUMBER_OR_NAME, "y": _NUMBER_OR_NAME, "radius": _NUMBER_OR_NAME, "by": _NUMBER_OR_NAME},
     ("x", "y", "radius"),
 )
-_GRID = _object(
-    {"from": _NUMBER, "to": _NUMBER, "steps": {"type": "integer", "minimum": 1}},
-    ("from", "to", "steps"),
-)
+_GRID = _object({"from": _NUMBER, "to": _NUMBER, "steps": _COUNT}, ("from", "to", "steps"))
 _PARAMETER = {
     "type": ["array", "object"],
     "items": _VALUE,
@@ -72,7 +71,7 @@ _CONTROLLER = _object(
         "lockstep": {"type": "integer", "minimum": 1, "maximum": 64},
         "wait_for": _TEXTS,
         "remap": _TEXTS,
-        "hz": _POSITIVE,
+        "hz": {"type": "number", "minimum": 1e-3, "maximum": 1e6},
         "environment": {"type": "object", "additionalProperties": _VALUE},
     },
     ("name",),
@@ -104,7 +103,7 @@ _HUNT = _object(
             ("most", "area"),
         ),
         "faults": {"type": "array", "items": _FAULT, "minItems": 1},
-        "seeds": {"type": "integer", "minimum": 1},
+        "seeds": _COUNT,
     }
 )
 _EXPECT = _object(
@@ -131,19 +130,16 @@ SCHEMA: dict[str, Any] = _object(
         "sampling": _object(
             {
                 "method": {"enum": ["latin", "random"]},
-                "samples": {"type": "integer", "minimum": 1},
+                "samples": _COUNT,
                 "seed": {"type": "integer"},
             }
         ),
         "seeds": {
             "type": ["integer", "array", "object"],
-            "minimum": 1,
-            "items": {"type": "integer"},
+            **{key: _COUNT[key] for key in ("minimum", "maximum")},
+            "items": _SEED,
             "minItems": 1,
-            "properties": {
-                "first": {"type": "integer"},
-                "count": {"type": "integer", "minimum": 1},
-            },
+            "properties": {"first": _SEED, "count": _COUNT},
             "additionalProperties": False,
         },
         "set": {"type": "object", "additionalProperties": _VALUE},
@@ -158,8 +154,8 @@ SCHEMA: dict[str, Any] = _object(
         "limits": _object(
             {
                 "duration": {"type": "number", "exclusiveMinimum": 0, "maximum": 1e6},
-                "wall": _POSITIVE,
-                "memory_mb": {"type": "integer", "minimum": 16},
+                "wall": {"type": "number", "exclusiveMinimum": 0, "maximum": 1e6},
+                "memory_mb": {"type": "integer", "minimum": 16, "maximum": 1 << 30},
             },
             ("duration",),
         ),
@@ -234,12 +230,33 @@ def check(content: Any, source: Source) -> None:
         import jsonschema
     except ImportError:
         raise missing("jsonschema", "campaign") from None
+    _check_plain(content, source, ())
+    whole = jsonschema.Draft202012Validator.TYPE_CHECKER.redefine(
+        "integer", lambda _, value: isinstance(value, int) and not isinstance(value, bool)
+    )  # 2.0 is none
+    validator = jsonschema.validators.extend(jsonschema.Draft202012Validator, type_checker=whole)
     errors = sorted(
-        jsonschema.Draft202012Validator(SCHEMA).iter_errors(content),
+        validator(SCHEMA).iter_errors(content),
         key=lambda error: [str(one) for one in error.absolute_path],
     )
     if errors:
         _raise(errors[0], source)
+
+
+def _check_plain(value: Any, source: Source, path: tuple[Any, ...]) -> None:
+    """YAML has more than JSON: dates, sets, bytes, and names that are no texts."""
+    if isinstance(value, dict):
+        for key, one in value.items():
+            if not isinstance(key, str):
+                raise source.error(
+                    path, f"has {key!r} for a name; put it in quotes to make it a text"
+                )
+            _check_plain(one, source, (*path, key))
+    elif isinstance(value, list):
+        for i, one in enumerate(value):
+            _check_plain(one, source, (*path, i))
+    elif value is not None and not isinstance(value, (str, int, float)):
+        raise source.error(path, f"is a {type(value).__name__}; put it in quotes to make it a text")
 
 
 def _raise(error: Any, source: Source) -> None:

@@ -5,20 +5,23 @@ from __future__ import annotations
 import csv
 import io
 import json
+import math
+import re
 import sqlite3
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any
 
-from .errors import CampaignError, missing
+from ..files import open_regular, read_bytes
+from .errors import CampaignError, ResultsError, missing
 from .plan import Case
 
-_SCHEMA = """
-CREATE TABLE IF NOT EXISTS about (key TEXT PRIMARY KEY, value TEXT NOT NULL);
-CREATE TABLE IF NOT EXISTS results (
+_TABLES = {
+    "about": "(key TEXT PRIMARY KEY, value TEXT NOT NULL)",
+    "results": """(
   id TEXT PRIMARY KEY, status TEXT NOT NULL, what TEXT NOT NULL, reason TEXT NOT NULL, time_s REAL NOT NULL,
-  state_hash TEXT NOT NULL, metrics TEXT NOT NULL, track TEXT NOT NULL, output TEXT NOT NULL, wall_s REAL NOT NULL);
-"""
+  state_hash TEXT NOT NULL, metrics TEXT NOT NULL, track TEXT NOT NULL, output TEXT NOT NULL, wall_s REAL NOT NULL)""",
+}
 _COLUMNS = (
     "id",
     "status",
@@ -31,42 +34,77 @@ _COLUMNS = (
     "output",
     "wall_s",
 )
+_TEXTS = ("what", "reason", "state_hash", "output")
 _FORMAT = "1"
+_STATUSES = ("passed", "failed", "crashed", "timeout", "memory", "invalid")
+_MOST_LOG_BYTES = 1 << 30
 
 
 class Store:
-    """The folder of a campaign's results: results.sqlite, logs/, worlds/. One writer at a time."""
+    """The folder of a campaign's results: results.sqlite, logs/, worlds/. One writer at a time.
+
+    write=False: somebody else's, of which nothing is believed. Raises CampaignError for what cannot
+    be opened, and ResultsError, here and later, for what is damaged.
+    """
 
     def __init__(self, folder: Path, write: bool = True) -> None:
         self.folder = folder
-        file = folder / "results.sqlite"
-        if not write and not file.is_file():
+        self._file = folder / "results.sqlite"
+        if not write and not self._file.is_file():
             raise CampaignError(f"{folder} holds no results of a campaign (no results.sqlite)")
         try:
             folder.mkdir(parents=True, exist_ok=True)
-            self._db = sqlite3.connect(file, timeout=10, isolation_level=None)
-            self._db.executescript("PRAGMA journal_mode=WAL; PRAGMA synchronous=NORMAL;" + _SCHEMA)
-        except (sqlite3.Error, OSError) as error:
-            raise CampaignError(f"{file}: {error}") from None
+            if self._file.exists():
+                open_regular(self._file).close()
+            self._db = sqlite3.connect(self._file, timeout=10, isolation_level=None)
+            self._check_tables()
+            self._db.executescript("PRAGMA journal_mode=WAL; PRAGMA synchronous=NORMAL;")
+            for name, columns in _TABLES.items():
+                self._db.execute(f"CREATE TABLE IF NOT EXISTS {name} {columns}")
+        except OSError as error:
+            raise CampaignError(f"{self._file}: {error}") from None
+        except sqlite3.Error as error:
+            raise self._fault(error) from None
         found = self.about("format")
         if found is None:
             self.set_about("format", _FORMAT)
         elif found != _FORMAT:
-            raise CampaignError(f"{file} is of format {found}; this Ruedo reads {_FORMAT}")
+            raise ResultsError(f"{self._file} is of format {found!r}; this Ruedo reads {_FORMAT}")
 
     def close(self) -> None:
         self._db.close()
 
+    def _damaged(self, what: str) -> ResultsError:
+        return ResultsError(f"{self._file} is damaged, or no campaign's: {what}")
+
+    def _fault(self, error: sqlite3.Error) -> CampaignError:
+        if isinstance(error, sqlite3.OperationalError):  # no room, no permission
+            return CampaignError(f"{self._file}: {error}")
+        return self._damaged(str(error))
+
+    def _check_tables(self) -> None:
+        """A view, a trigger or a computed column would run what its maker wrote."""
+        for name, sql in self._select("SELECT name, sql FROM sqlite_master WHERE sql NOTNULL"):
+            if sql != f"CREATE TABLE {name} {_TABLES.get(name)}":
+                raise self._damaged(f"it has a {name!r} of another kind")
+
+    def _select(self, statement: str, values: tuple[Any, ...] = ()) -> Iterator[tuple[Any, ...]]:
+        try:
+            yield from self._db.execute(statement, values)
+        except sqlite3.Error as error:
+            raise self._fault(error) from None
+
     def about(self, key: str) -> str | None:
-        row = self._db.execute("SELECT value FROM about WHERE key = ?", (key,)).fetchone()
-        return None if row is None else str(row[0])
+        for (value,) in self._select("SELECT value FROM about WHERE key = ?", (key,)):
+            return str(value)
+        return None
 
     def set_about(self, key: str, value: str) -> None:
         self._write("INSERT OR REPLACE INTO about VALUES (?, ?)", (key, value))
 
     def known(self) -> set[str]:
         """The ids of all cases that have a result."""
-        return {row[0] for row in self._db.execute("SELECT id FROM results")}
+        return {row[0] for row in self._select("SELECT id FROM results")}
 
     def add(self, id: str, outcome: dict[str, Any], wall_s: float, keep_log: bool) -> None:
         """On the disk when this returns. Raises CampaignError for a full one; nothing that was
@@ -94,25 +132,54 @@ class Store:
         """Of those cases, those that have a result."""
         wanted = set(ids)
         found = {}
-        for row in self._db.execute(f"SELECT {', '.join(_COLUMNS)} FROM results"):
-            if row[0] not in wanted:
-                continue
-            one = dict(zip(_COLUMNS, row))
-            one["metrics"], one["track"] = json.loads(one["metrics"]), json.loads(one["track"])
-            found[one["id"]] = one
+        for row in self._rows():
+            if row[0] in wanted:
+                found[row[0]] = self._checked(row)
         return found
+
+    def _rows(self) -> Iterator[tuple[Any, ...]]:
+        return self._select(f"SELECT {', '.join(_COLUMNS)} FROM results")
+
+    def _checked(self, row: tuple[Any, ...]) -> dict[str, Any]:
+        """A row's columns, of the kinds that were written."""
+        one = dict(zip(_COLUMNS, row))
+        try:
+            one["metrics"], one["track"] = json.loads(one["metrics"]), json.loads(one["track"])
+            good = (
+                re.fullmatch("[0-9a-f]{16}", one["id"]) is not None
+                and one["status"] in _STATUSES
+                and all(isinstance(one[name], str) for name in _TEXTS)
+                and all(isinstance(one[name], (int, float)) for name in ("time_s", "wall_s"))
+                and isinstance(one["metrics"], dict)
+                and all(isinstance(value, (int, float)) for value in one["metrics"].values())
+                and all(
+                    len(place) == 3
+                    and all(isinstance(x, (int, float)) and math.isfinite(x) for x in place)
+                    for place in one["track"]
+                )
+            )
+        except (TypeError, ValueError, RecursionError):
+            good = False
+        if not good:
+            raise self._damaged(f"the result {row[0]!r:.40} is none")
+        return one
 
     def take(self, other: Store) -> int:
         """The results and logs of another folder that are not here yet; how many."""
         known = self.known()
         taken = 0
-        for row in other._db.execute(f"SELECT {', '.join(_COLUMNS)} FROM results"):
+        for row in other._rows():
             if row[0] in known:
                 continue
+            other._checked(row)  # its id becomes a file's name
             self._write(f"INSERT INTO results VALUES ({', '.join('?' * len(_COLUMNS))})", row)
             log = other.log(row[0])
             if log.exists():
-                self._keep_log(row[0], log.read_bytes())
+                try:
+                    content = read_bytes(log, _MOST_LOG_BYTES)
+                except OSError as error:
+                    raise ResultsError(f"{log}: {error}") from None
+                self._keep_log(row[0], content)
             taken += 1
         return taken
 

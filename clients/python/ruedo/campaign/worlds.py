@@ -39,7 +39,7 @@ class WorldFiles:
         if key not in self._made:
             try:
                 text = str(generator.load()(**parameters))
-            except Exception as error:
+            except (Exception, SystemExit) as error:
                 raise ValueError(
                     f"{generator.name}({_arguments(parameters)}) raised {type(error).__name__}: {error}"
                 ) from None

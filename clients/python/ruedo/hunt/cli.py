@@ -7,6 +7,9 @@ import json
 import sys
 from typing import TYPE_CHECKING, Any
 
+from ..campaign.cli import MOST_WORKERS, number, say
+from ..campaign.plan import MOST_CASES
+
 if TYPE_CHECKING:
     from .hunt import Found
 
@@ -21,14 +24,22 @@ def add_hunt(commands: Any) -> None:
     one.set_defaults(action=_hunt)
     one.add_argument("FILE", help="a campaign's YAML file with ranges, and `hunt`")
     one.add_argument(
-        "--cases", type=int, default=200, metavar="N", help="most cases to search (default 200)"
+        "--cases",
+        type=number(1, MOST_CASES),
+        default=200,
+        metavar="N",
+        help="most cases to search (default 200)",
     )
     one.add_argument(
-        "--shrink", type=int, default=100, metavar="N", help="most cases to shrink (default 100)"
+        "--shrink",
+        type=number(0, MOST_CASES),
+        default=100,
+        metavar="N",
+        help="most cases to shrink (default 100)",
     )
-    one.add_argument("--seed", type=int, default=1, metavar="N")
+    one.add_argument("--seed", type=number(0, 2**32 - 1), default=1, metavar="N")
     one.add_argument("--by", choices=("optuna", "hypothesis", "random"), default="optuna")
-    one.add_argument("--workers", type=int, metavar="N")
+    one.add_argument("--workers", type=number(1, MOST_WORKERS), metavar="N")
     one.add_argument("--out", metavar="FOLDER", help="of the made worlds")
     one.add_argument(
         "--keep", metavar="FOLDER", help="keep what is found there, as a regression test"
@@ -47,9 +58,9 @@ def _hunt(arguments: argparse.Namespace) -> int:
         nonlocal best
         if score < best:
             best = score
-            print(
+            say(
                 f"{count}: score {score:.3f} {outcome['status']} {outcome['reason']}",
-                file=sys.stderr,
+                sys.stderr,
             )
 
     found = hunt.run(
@@ -61,7 +72,7 @@ def _hunt(arguments: argparse.Namespace) -> int:
         progress=None if arguments.quiet or arguments.json else progress,
     )
     if found is None:
-        print(
+        say(
             json.dumps({"found": False, "cases": arguments.cases})
             if arguments.json
             else f"{hunt.name}: nothing was found in {arguments.cases} cases"
@@ -69,7 +80,7 @@ def _hunt(arguments: argparse.Namespace) -> int:
         return 0
     if arguments.keep:
         found.keep(arguments.keep)
-    print(
+    say(
         _as_json(found, arguments.keep)
         if arguments.json
         else _as_text(found, hunt.name, arguments.keep)

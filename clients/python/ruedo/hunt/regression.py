@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import os
 import re
+import shlex
 import shutil
 from pathlib import Path
 from typing import Any
 
-_PYTEST = '''"""Found by `ruedo hunt`: {reason}"""
+_PYTEST = '''# Found by `ruedo hunt`: {reason}
 
 from pathlib import Path
 
@@ -39,14 +40,13 @@ def keep(found: Any, folder: Path) -> Path:
     if Path(world["file"]).is_file():
         shutil.copyfile(world["file"], folder / "world.sdf")
         content["worlds"] = [{"name": world["name"], "file": "world.sdf"}]
-    home = os.path.relpath(found.folder, folder)
-    content["controllers"] = [_moved(one, home) for one in content["controllers"]]
+    content["controllers"] = [moved(one, found.folder, folder) for one in content["controllers"]]
     text = yaml.safe_dump(content, sort_keys=False, allow_unicode=True)
     (folder / "regression.yaml").write_text(
         f"# Found by `ruedo hunt`: {found.reason}\n{text}", encoding="utf-8"
     )
     (folder / f"test_{name}.py").write_text(
-        _PYTEST.format(name=name, reason=found.reason.replace('"""', "'''").replace("\\", "/")),
+        _PYTEST.format(name=name, reason=found.reason),
         encoding="utf-8",
     )
     (folder / "CMakeLists.txt").write_text(
@@ -56,18 +56,17 @@ def keep(found: Any, folder: Path) -> Path:
     return folder
 
 
-def _moved(controller: dict[str, Any], home: str) -> dict[str, Any]:
-    """Its files stay where they are."""
-    moved = dict(controller)
-    if ".py:" in moved.get("python", ""):
-        moved["python"] = os.path.join(home, moved["python"])
-    if "command" in moved:
-        moved["files"] = [*moved.get("files", []), *re.findall(r"[\w./-]+\.\w+", moved["command"])]
-        moved["files"] = [
-            one
-            for one in dict.fromkeys(moved["files"])
-            if (Path(home) / one).exists() or "*" in one
-        ]
-        moved["command"] = f"cd {home} && {moved['command']}"
-    moved["files"] = [os.path.join(home, one) for one in moved.get("files", [])]
-    return {key: value for key, value in moved.items() if value != []}
+def moved(controller: dict[str, Any], home: Path, folder: Path) -> dict[str, Any]:
+    """A controller for a campaign in that folder; its own files stay where they are: in `home`."""
+    made = dict(controller)
+    way = os.path.relpath(home, folder)
+    files = made.pop("files", [])
+    if ".py:" in made.get("python", ""):
+        made["python"] = os.path.join(way, made["python"])
+    if "command" in made:
+        words = re.findall(r"[\w./-]+\.\w+", made["command"])
+        files = [*files, *(word for word in words if (home / word).is_file())]
+        made["command"] = f"cd {shlex.quote(way)} && {made['command']}"
+    if files:
+        made["files"] = [os.path.join(way, one) for one in dict.fromkeys(files)]
+    return made

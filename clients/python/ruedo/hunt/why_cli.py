@@ -6,7 +6,7 @@ import argparse
 import json
 from typing import Any
 
-_MOST_SEEDS = 1000
+from ..campaign.cli import number, say
 
 
 def add_why(commands: Any) -> None:
@@ -20,15 +20,13 @@ def add_why(commands: Any) -> None:
     one.add_argument("LOG")
     one.add_argument("-o", "--output", metavar="FILE", help="a plot: .svg, .png or .pdf")
     one.add_argument(
-        "--seeds", type=_count, default=5, metavar="N", help="other seeds to try (default 5)"
+        "--seeds",
+        type=number(0, 1000),
+        default=5,
+        metavar="N",
+        help="other seeds to try (default 5)",
     )
     one.add_argument("--json", action="store_true")
-
-
-def _count(text: str) -> int:
-    if not text.isdigit() or int(text) > _MOST_SEEDS:
-        raise argparse.ArgumentTypeError(f"'{text}' is not allowed; allowed are 0 to {_MOST_SEEDS}")
-    return int(text)
 
 
 def _why(arguments: argparse.Namespace) -> int:
@@ -37,5 +35,5 @@ def _why(arguments: argparse.Namespace) -> int:
     answer = why(arguments.LOG, arguments.seeds)
     if arguments.output and (answer.rescues or answer.seeds):
         plot(answer, arguments.output)
-    print(json.dumps(answer.as_dict()) if arguments.json else answer.text())
+    say(json.dumps(answer.as_dict()) if arguments.json else answer.text())
     return 0
