@@ -124,8 +124,8 @@ std::vector<std::string> started_at_once(int servers, int port) {
 
 TEST(WebServer, TwoThatWantOnePortAtOnceAreToldWhatIsWrong) {
   const int port = server_at(0)->port();
-  for (int round = 0; round < 50; ++round) {
-    for (const std::string& fault : started_at_once(2, port))
+  for (int round = 0; round < 200; ++round) {
+    for (const std::string& fault : started_at_once(8, port))
       EXPECT_THAT(fault,
                   testing::HasSubstr("cannot be served: Address already in use. Another port"));
   }

@@ -231,16 +231,20 @@ def check(content: Any, source: Source) -> None:
     except ImportError:
         raise missing("jsonschema", "campaign") from None
     _check_plain(content, source, ())
-    whole = jsonschema.Draft202012Validator.TYPE_CHECKER.redefine(
-        "integer", lambda _, value: isinstance(value, int) and not isinstance(value, bool)
-    )  # 2.0 is none
-    validator = jsonschema.validators.extend(jsonschema.Draft202012Validator, type_checker=whole)
+    types = jsonschema.Draft202012Validator.TYPE_CHECKER.redefine("integer", _is_whole)
+    validators: Any = jsonschema.validators
+    validator = validators.extend(jsonschema.Draft202012Validator, type_checker=types)
     errors = sorted(
         validator(SCHEMA).iter_errors(content),
         key=lambda error: [str(one) for one in error.absolute_path],
     )
     if errors:
         _raise(errors[0], source)
+
+
+def _is_whole(_: Any, value: Any) -> bool:
+    """As Python counts: for JSON's schemas 2.0 is a whole number, too."""
+    return isinstance(value, int) and not isinstance(value, bool)
 
 
 def _check_plain(value: Any, source: Source, path: tuple[Any, ...]) -> None:
