@@ -22,6 +22,7 @@
 #include <sys/socket.h>
 
 #include "dds/identity.h"
+#include "dds/incoming.h"
 #include "dds/raw_type.h"
 #include "dds/reply_ends.h"
 #include "ros2/fair_queue.h"
@@ -153,7 +154,8 @@ std::string configuration(const CycloneOptions& options) {
   }
   // Pictures need few datagrams; a writer's cache is limited by its depth only. Data that arrives
   // while others have the CPU waits in the socket buffer, as far as the system allows
-  // (net.core.rmem_max).
+  // (net.core.rmem_max). Of each writer few samples are kept that are not whole, or whose turn has
+  // not come; how large they may be says dds/incoming.h.
   return "<CycloneDDS><Domain Id=\"any\"><General>" + general +
          "<MaxMessageSize>65500B</MaxMessageSize><FragmentSize>60000B</FragmentSize></General>"
          "<Discovery>" +
@@ -162,7 +164,12 @@ std::string configuration(const CycloneOptions& options) {
                           "MaxAutoParticipantIndex><Peers>" +
                               peers + "</Peers>") +
          "</Discovery><Internal><SocketReceiveBufferSize "
-         "max=\"8MiB\"/><Watermarks><WhcHigh>1GB</WhcHigh></Watermarks></Internal>"
+         "max=\"8MiB\"/><MaxSampleSize>1GiB</MaxSampleSize>"
+         "<DefragUnreliableMaxSamples>4</DefragUnreliableMaxSamples>"
+         "<DefragReliableMaxSamples>4</DefragReliableMaxSamples>"
+         "<PrimaryReorderMaxSamples>32</PrimaryReorderMaxSamples>"
+         "<SecondaryReorderMaxSamples>32</SecondaryReorderMaxSamples><Watermarks><WhcHigh>1GB</"
+         "WhcHigh></Watermarks></Internal>"
          "<Tracing><Verbosity>none</Verbosity></Tracing></Domain></CycloneDDS>";
 }
 
@@ -176,7 +183,13 @@ void tell(void*, const dds_log_data_t* data) {
   const int64_t now = std::chrono::steady_clock::now().time_since_epoch().count();
   int64_t next = next_ns;
   if (now < next || !next_ns.compare_exchange_strong(next, now + kPeriod_ns)) return;
-  spdlog::warn("ROS 2: Cyclone DDS: {}", text.substr(0, text.find_last_not_of('\n') + 1));
+  const std::string_view line = text.substr(0, text.find_last_not_of('\n') + 1);
+  if (const size_t sample = line.find("sample"); line.starts_with("dropping oversize"))
+    spdlog::warn(
+        "ROS 2: left out, for it has more than {} MB or fragments of less than {} bytes: {}",
+        kLargestIncoming >> 20, kSmallestFragment, line.substr(std::min(sample, line.size())));
+  else
+    spdlog::warn("ROS 2: Cyclone DDS: {}", line);
 }
 
 class CycloneWriter : public ros2::Writer {
@@ -229,6 +242,7 @@ class CycloneReader : public ros2::Reader {
                      "topic " + name);
     reader_ = checked(dds_create_reader(participant, topic_, qos_of(endpoint).get(), nullptr),
                       "reader of " + name);
+    bound_incoming(*type);
     checked(dds_set_status_mask(reader_,
                                 DDS_DATA_AVAILABLE_STATUS | DDS_REQUESTED_INCOMPATIBLE_QOS_STATUS),
             "reader of " + name);

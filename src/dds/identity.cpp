@@ -204,7 +204,7 @@ std::vector<uint8_t> with_inline_identities(std::span<const uint8_t> message) {
 }
 
 void tell_identities(const ddsi_sertype& type) {
-  ruedo_visit_sockets(ddsrt_atomic_ldvoidp(&type.gv), [](ddsi_tran_conn* socket) {
+  ruedo_visit_senders(ddsrt_atomic_ldvoidp(&type.gv), [](ddsi_tran_conn* socket) {
     if (socket->m_write_fn == write_with_identities) return;
     ddsi_tran_write_fn_t none = nullptr;
     if (plain_write.compare_exchange_strong(none, socket->m_write_fn) || none == socket->m_write_fn)

@@ -1,5 +1,4 @@
-// The sockets that a domain of Cyclone DDS sends by. In C: the header that knows them is none of
-// C++.
+// The sockets of a domain of Cyclone DDS. In C: the header that knows them is none of C++.
 #pragma once
 
 #ifdef __cplusplus
@@ -8,8 +7,10 @@ extern "C" {
 
 struct ddsi_tran_conn;
 
-// domain: a ddsi_domaingv.
-void ruedo_visit_sockets(void* domain, void (*visit)(struct ddsi_tran_conn* socket));
+// Those that it sends by. domain: a ddsi_domaingv.
+void ruedo_visit_senders(void* domain, void (*visit)(struct ddsi_tran_conn* socket));
+// Those that it receives by; one of them may be visited more than once.
+void ruedo_visit_receivers(void* domain, void (*visit)(struct ddsi_tran_conn* socket));
 
 #ifdef __cplusplus
 }

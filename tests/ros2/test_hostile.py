@@ -1,12 +1,17 @@
 """Input from strangers: counted, harmless, and reported once a second at most."""
 
+import contextlib
 import itertools
 import math
 import os
 import random
+import socket
+import struct
 import subprocess
 import sys
 import threading
+import time
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -214,6 +219,63 @@ def test_a_message_of_64_mb_is_not_looked_at():
         liar = peer.writer("/cmd_vel", NotATwist)
         wait_for(lambda: len(liar.get_matched_subscriptions()) > 0, "a reader")
         liar.write(NotATwist(bytes(64 << 20)))
+        liar.write(NotATwist(b"1"))  # what comes after it is
+        honest = Peer(run.domain)
+        drives(honest, honest.writer("/cmd_vel", Twist), honest.reader("/odom", Odometry))
+        output = run.end()
+    assert run.process.returncode == 0
+    assert "left out, for it has more than 4 MB" in output
+    assert "1 messages that came were faulty" in output
+
+
+def fragments(writer: bytes, kind: str) -> Iterator[bytes]:
+    """RTPS messages (2.5, 9.4.5.5) in a writer's name, of samples that never become whole."""
+    small, large = b"x" * 600, b"x" * 60_000
+    beside = struct.pack("<BBH", 0x80, 1, 59_000) + bytes(59_000)  # a submessage of no meaning
+    payload, whole, rest = {
+        "of a huge sample": (large, 2**31 - 1, b""),
+        "of one byte": (b"x" * 4, 2**31 - 1, b""),
+        "with much beside them": (small, 4 << 20, beside),
+    }[kind]
+    size = 1 if kind == "of one byte" else len(payload)
+    repeated = 100 if kind == "of one byte" else 1
+    for number in itertools.count(2, 2 * repeated):
+        message = b"RTPS\x02\x01\x01\x10" + writer[:12]
+        sample, start = 1 + number // 6000, 2 + number % 6000
+        for i in range(repeated):
+            body = struct.pack("<HHI", 0, 28, 0) + writer[12:]
+            body += struct.pack("<iIIHHI", 0, sample, start + 2 * i, 1, size, whole) + payload
+            message += struct.pack("<BBH", 0x16, 1, len(body)) + body
+        yield message + rest
+
+
+def resident_mb(process) -> int:
+    status = Path(f"/proc/{process.pid}/status").read_text()
+    return int(next(line for line in status.splitlines() if "VmRSS" in line).split()[1]) >> 10
+
+
+@pytest.mark.parametrize(
+    "kind",
+    ["of a huge sample", "of one byte", "with much beside them"],
+    ids=["huge", "tiny", "hollow"],
+)
+def test_fragments_that_never_make_a_sample_take_no_memory(kind):
+    """Regression: 3.7 GB in five seconds, which stayed."""
+    with Run("--no-noise") as run, socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as stranger:
+        peer = Peer(run.domain)
+        writer = peer.writer("/cmd_vel", Twist)
+        wait_for(writer.get_matched_subscriptions, "a reader")
+        before = resident_mb(run.process)
+        sent = 0
+        for message in itertools.islice(fragments(writer.guid.bytes, kind), 25_000):
+            for participant in (0, 1):  # whichever was first
+                to = ("127.0.0.1", 7400 + 250 * run.domain + 11 + 2 * participant)
+                with contextlib.suppress(ConnectionRefusedError):
+                    sent += stranger.sendto(message, to)
+            if sent > 1_000_000:
+                time.sleep(0.005)  # the run reads as fast as it can
+                sent = 0
+        assert resident_mb(run.process) - before < 400
         honest = Peer(run.domain)
         drives(honest, honest.writer("/cmd_vel", Twist), honest.reader("/odom", Odometry))
         run.end()
