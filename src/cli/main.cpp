@@ -193,7 +193,7 @@ int main(int argc, char** argv) {
     return kEnvironment;
   } catch (const std::system_error& error) {
     say(error.code() == std::errc::resource_unavailable_try_again
-            ? "no thread can be started: raise ulimit -u or ulimit -v"
+            ? "no thread can be started: raise ulimit -u, ulimit -v or a container's pids.max"
             : error.what());
     return kEnvironment;
   } catch (const std::exception& error) {

@@ -21,6 +21,7 @@
 #include <spdlog/spdlog.h>
 #include <sys/socket.h>
 
+#include "core/enough_threads.h"
 #include "dds/identity.h"
 #include "dds/incoming.h"
 #include "dds/raw_type.h"
@@ -37,8 +38,9 @@ using ros2::Gid;
 using ros2::Role;
 
 constexpr uint32_t kLastDomain = 232;  // higher domains have no valid ports
-constexpr int kMostTaken = 64;         // samples taken at once
-constexpr auto kLook = DDS_MSECS(2);   // interval for requests that have to wait
+constexpr int kCyclonesThreads = 12;
+constexpr int kMostTaken = 64;        // samples taken at once
+constexpr auto kLook = DDS_MSECS(2);  // interval for requests that have to wait
 
 struct QosDeleter {
   void operator()(dds_qos_t* qos) const { dds_delete_qos(qos); }
@@ -335,6 +337,7 @@ class CycloneReader : public ros2::Reader {
 class CycloneTransport : public ros2::Transport {
  public:
   explicit CycloneTransport(const CycloneOptions& options) : options_(options) {
+    require_threads(kCyclonesThreads);  // without one of them it aborts
     dds_set_log_sink(tell, nullptr);
     domain_ =
         checked(dds_create_domain(options.domain, (configuration(options) + options.more).c_str()),

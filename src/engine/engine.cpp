@@ -14,6 +14,7 @@
 #include <tbb/enumerable_thread_specific.h>
 #include <tbb/task_arena.h>
 
+#include "core/enough_threads.h"
 #include "engine/markers.h"
 #include "engine/outcome.h"
 #include "engine/parallel.h"
@@ -124,6 +125,7 @@ Engine::Engine(std::shared_ptr<const model::WorldModel> world, EngineOptions opt
     : world_(std::move(world)), options_(std::move(options)), arena_(std::make_unique<Arena>()) {
   if (options_.worlds < 1)
     throw InputError({}, "an engine has 1 world or more, not " + std::to_string(options_.worlds));
+  require_threads_for_cores(0);  // TBB's: see simulation.cpp
   arena_->tasks.initialize(options_.threads > 0 ? options_.threads : tbb::task_arena::automatic);
   const DefaultFloatingPoint floating_point;
   copies_.resize(static_cast<size_t>(options_.worlds));

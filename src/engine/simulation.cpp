@@ -10,6 +10,7 @@
 #include <pthread.h>
 #include <sys/prctl.h>
 
+#include "core/enough_threads.h"
 #include "physics/state_check.h"
 
 namespace ruedo::engine {
@@ -18,6 +19,7 @@ namespace {
 constexpr size_t kMaxSnapshotMemory = 64u << 20;  // bytes of all batches together
 constexpr int kMaxBatchSteps = 32;
 constexpr int kFewSteps = 4;
+constexpr int kModuleThreads = 12;  // and those of the run
 constexpr int64_t kQuickNs =
     1'000'000;  // for which the publisher may wait for a step: it also sends the signs of life
 
@@ -31,12 +33,19 @@ int batch_steps(const model::BodyLayout& layout) {
       std::clamp<size_t>(kMaxSnapshotMemory / snapshot / Simulation::kBatches, 1, kMaxBatchSteps));
 }
 
+// TBB, with which Embree works too, waits for ever for a thread that could not be started. So those
+// of TBB and of the modules have to be possible before the first of them is needed.
+std::shared_ptr<Plan> plan_of(const model::WorldModel& world) {
+  require_threads_for_cores(kModuleThreads);
+  return std::make_shared<Plan>(world);
+}
+
 }  // namespace
 
 Simulation::Simulation(std::shared_ptr<const model::WorldModel> world,
                        const SimulationOptions& options, Channels& channels, Findings& findings,
                        Wakeup& finished)
-    : world_(std::make_shared<Plan>(*world), options.fleet, channels, findings),
+    : world_(plan_of(*world), options.fleet, channels, findings),
       before_batch_(options.before_batch),
       finished_(finished),
       batches_(kBatches) {

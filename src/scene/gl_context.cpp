@@ -2,6 +2,7 @@
 
 #include <cstdlib>
 
+#include "core/enough_threads.h"
 #include "core/late_library.h"
 #include "ruedo/errors.h"
 
@@ -9,6 +10,7 @@ namespace ruedo::scene {
 namespace {
 
 constexpr const char* kMesasCpu = "GALLIUM_OVERRIDE_CPU_CAPS";
+constexpr int kMesasOwnThreads = 4;  // for its caches
 bool set_by_us = false;
 
 }  // namespace
@@ -43,6 +45,8 @@ std::unique_ptr<GlContext> make_gl_context() {
   if (choice != "" && choice != "auto" && choice != "osmesa" && choice != "egl") {
     throw EnvironmentError("RUEDO_RENDERER=" + choice + ": allowed are osmesa, egl and auto");
   }
+  // Mesa has one for each core, and waits for ever for those that could not be started.
+  require_threads_for_cores(kMesasOwnThreads);
   std::string why_not_osmesa = "not tried", why_not_egl = "not tried";
   if (choice != "egl") {
     if (auto context = make_osmesa_context(why_not_osmesa)) return context;

@@ -6,9 +6,10 @@ import hashlib
 import os
 import resource
 import struct
+import subprocess
 
 import pytest
-from recorded import events, program, url, write
+from recorded import ARENA, events, program, url, write
 from ruedo.lcmtypes import log_file_t, log_header_t
 
 WORLD = "<sdf version='1.9'><world name='w'><model name='m'><link name='l'><sensor name='imu' type='imu'/></link></model></world></sdf>"
@@ -222,3 +223,77 @@ def test_what_costs_much_is_refused(name, tmp_path):
         *[a.format(tmp_path / file) for a in arguments], preexec_fn=three_gigabytes
     )  # what is refused is never made
     assert result.returncode == 3 and words in result.stdout + result.stderr, result
+
+
+# As where a container or `ulimit -u` allows so many at a time.
+FEW_THREADS = r"""
+#define _GNU_SOURCE
+#include <dlfcn.h>
+#include <errno.h>
+#include <pthread.h>
+#include <stdatomic.h>
+#include <stdlib.h>
+
+static atomic_int left;
+__attribute__((constructor)) static void begin(void) { left = atoi(getenv("THREADS")); }
+
+struct work {
+  void* (*what)(void*);
+  void* with;
+};
+
+static void* run(void* given) {
+  struct work work = *(struct work*)given;
+  free(given);
+  void* result = work.what(work.with);
+  atomic_fetch_add(&left, 1);
+  return result;
+}
+
+int pthread_create(pthread_t* thread, const pthread_attr_t* how, void* (*what)(void*), void* with) {
+  if (atomic_fetch_sub(&left, 1) <= 0) {
+    atomic_fetch_add(&left, 1);
+    return EAGAIN;
+  }
+  int (*make)(pthread_t*, const pthread_attr_t*, void* (*)(void*), void*);
+  *(void**)&make = dlsym(RTLD_NEXT, "pthread_create");
+  struct work* work = malloc(sizeof *work);
+  *work = (struct work){what, with};
+  return make(thread, how, run, work);
+}
+"""
+
+
+@pytest.fixture(scope="module")
+def few_threads(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("threads")
+    (folder / "few.c").write_text(FEW_THREADS)
+    command = ["cc", "-shared", "-fPIC", "-o", folder / "few.so", folder / "few.c", "-ldl"]
+    subprocess.run(command, check=True)
+    return folder / "few.so"
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ("run", ARENA, "--lcm", "memq://", "--rate", "max", "--duration", "0.2", "--quiet"),
+        ("run", ARENA, "--lcm", "memq://", "--rate", "max", "--duration", "0.2", "--ros2"),
+        ("render", ARENA, "-o", "picture.png"),
+    ],
+    ids=["run", "ros2", "render"],
+)
+def test_too_few_threads_end_with_one_line(few_threads, tmp_path, words):
+    """Regressions: Mesa waited for ever for those it has not, Cyclone DDS aborted."""
+    codes = set()
+    for count in range(40):
+        done = program(
+            *words,
+            cwd=tmp_path,
+            env={**os.environ, "LD_PRELOAD": str(few_threads), "THREADS": str(count)},
+        )
+        codes.add(done.returncode)
+        if done.returncode == 4:
+            assert "no thread can be started" in done.stderr, (count, done.stderr)
+        else:
+            assert done.returncode == 0, (count, done.returncode, done.stderr)
+    assert 4 in codes
