@@ -149,9 +149,7 @@ def _add_campaign(parser: argparse.ArgumentParser) -> None:
     one.add_argument("-o", "--output", metavar="LOG", help="default: ID.lcm here")
     one = add("slurm", _slurm, "print a job array for Slurm; each task is a shard")
     one.add_argument("--tasks", type=number(1, 1_000_000), default=10, metavar="N")
-    one.add_argument(
-        "--cores", type=number(1, MOST_WORKERS), default=8, metavar="N", help="of each task"
-    )
+    one.add_argument("--cores", type=number(1, MOST_WORKERS), default=8, help="of each task")
     one.add_argument("--time", type=_duration, default="04:00:00", metavar="H:M:S")
     add("join", _join, "take over the results of shards").add_argument("FOLDERS", nargs="+")
     one = add("export", _export, "write the table of results")

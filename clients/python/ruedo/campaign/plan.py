@@ -153,38 +153,7 @@ def check_values(content: dict[str, Any], source: Source) -> None:
                 path, f"is a number of {len(str(abs(value)))} digits; allowed are 19"
             )
     for name, given in content.get("parameters", {}).items():
-        if not name.isidentifier() or name in (
-            "seed",
-            "case",
-            "world",
-            "robot",
-            "controller",
-            "folder",
-        ):
-            raise source.error(
-                ("parameters", name),
-                "is no name of a parameter: letters, digits and '_', and "
-                "not seed, case, world, robot, controller or folder",
-            )
-        kind = None if isinstance(given, list) else next(iter(given))
-        if kind in ("uniform", "log_uniform", "integers"):
-            low, high = given[kind]
-            if low > high or (kind == "log_uniform" and low <= 0):
-                raise source.error(
-                    ("parameters", name, kind),
-                    f"is {given[kind]}; allowed is [low, high]"
-                    + (", both above 0" if kind == "log_uniform" else ""),
-                )
-            if not math.isfinite(high / low if kind == "log_uniform" else high - low):
-                raise source.error(
-                    ("parameters", name, kind),
-                    f"is {given[kind]}; they are too far from each other",
-                )
-        if kind == "normal" and given[kind][1] < 0:
-            raise source.error(
-                ("parameters", name, kind),
-                f"is {given[kind]}; allowed is [mean, sigma], sigma 0 or more",
-            )
+        _check_parameter(name, given, source)
     for member, ways in (("worlds", ("file", "generator")), ("controllers", ("command", "python"))):
         names: set[str] = set()
         for i, one in enumerate(content[member]):
@@ -213,6 +182,41 @@ def check_values(content: dict[str, Any], source: Source) -> None:
                 f"is {obstacles['size']}; allowed is [from, to], both above 0",
             )
     _check_count(content, source)
+
+
+def _check_parameter(name: str, given: Any, source: Source) -> None:
+    if not name.isidentifier() or name in (
+        "seed",
+        "case",
+        "world",
+        "robot",
+        "controller",
+        "folder",
+    ):
+        raise source.error(
+            ("parameters", name),
+            "is no name of a parameter: letters, digits and '_', and "
+            "not seed, case, world, robot, controller or folder",
+        )
+    kind = None if isinstance(given, list) else next(iter(given))
+    if kind in ("uniform", "log_uniform", "integers"):
+        low, high = given[kind]
+        if low > high or (kind == "log_uniform" and low <= 0):
+            raise source.error(
+                ("parameters", name, kind),
+                f"is {given[kind]}; allowed is [low, high]"
+                + (", both above 0" if kind == "log_uniform" else ""),
+            )
+        if not math.isfinite(high / low if kind == "log_uniform" else high - low):
+            raise source.error(
+                ("parameters", name, kind),
+                f"is {given[kind]}; they are too far from each other",
+            )
+    if kind == "normal" and given[kind][1] < 0:
+        raise source.error(
+            ("parameters", name, kind),
+            f"is {given[kind]}; allowed is [mean, sigma], sigma 0 or more",
+        )
 
 
 def _check_count(content: dict[str, Any], source: Source) -> None:
