@@ -31,7 +31,7 @@ constexpr size_t kMostBytes = size_t{1} << 30;  // of a mesh, packed
 std::string default_importer() {
   if (const std::string installed = find_installed("bin/ruedo-import-mesh"); !installed.empty())
     return installed;
-  return std::string(RUEDO_BIN_DIR) + "/ruedo-import-mesh";
+  return RUEDO_IMPORTER;
 }
 
 std::string first_line(const std::string& text) {

@@ -4,6 +4,7 @@
 
 #include "model/mesh_format.h"
 #include "model/mesh_loader.h"
+#include "ruedo/errors.h"
 #include "scratch_file.h"
 
 extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
@@ -16,7 +17,6 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
           folder.write(std::string("mesh.") + kKinds[data[0]], data + 1, size - 1);
       const ruedo::model::ResourceFinder finder(path, false);
       ruedo::model::MeshImport import;
-      import.importer = RUEDO_IMPORTER;
       import.cache = false;
       import.wall_limit_s = 5;
       import.cpu_limit_s = 2;
@@ -24,6 +24,8 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
     } else {
       ruedo::model::unpack_mesh({reinterpret_cast<const char*>(data + 1), size - 1});
     }
+  } catch (const ruedo::EnvironmentError&) {
+    throw;  // without an importer nothing is tried
   } catch (const std::runtime_error&) {
   }
   return 0;

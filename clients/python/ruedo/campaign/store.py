@@ -36,6 +36,7 @@ _COLUMNS = (
 )
 _TEXTS = ("what", "reason", "state_hash", "output")
 _FORMAT = "1"
+_ALL = f"SELECT {', '.join(_COLUMNS)} FROM results"
 _STATUSES = ("passed", "failed", "crashed", "timeout", "memory", "invalid")
 _MOST_LOG_BYTES = 1 << 30
 
@@ -132,13 +133,16 @@ class Store:
         """Of those cases, those that have a result."""
         wanted = set(ids)
         found = {}
-        for row in self._rows():
+        for row in self._select(_ALL):
             if row[0] in wanted:
                 found[row[0]] = self._checked(row)
         return found
 
-    def _rows(self) -> Iterator[tuple[Any, ...]]:
-        return self._select(f"SELECT {', '.join(_COLUMNS)} FROM results")
+    def each(self) -> Iterator[tuple[Any, ...]]:
+        """All results as they stand there, each found good; the id comes first."""
+        for row in self._select(_ALL):
+            self._checked(row)
+            yield row
 
     def _checked(self, row: tuple[Any, ...]) -> dict[str, Any]:
         """A row's columns, of the kinds that were written."""
@@ -168,10 +172,9 @@ class Store:
         """The results and logs of another folder that are not here yet; how many."""
         known = self.known()
         taken = 0
-        for row in other._rows():
+        for row in other.each():
             if row[0] in known:
                 continue
-            other._checked(row)  # its id becomes a file's name
             self._write(f"INSERT INTO results VALUES ({', '.join('?' * len(_COLUMNS))})", row)
             log = other.log(row[0])
             if log.exists():
