@@ -173,7 +173,7 @@ controllers:
 parameters: {speed: [0.3]}
 disable: [p3at/camera]
 expect: {goal: {x: 0.1, y: 0, radius: 0.15, by: 2}, no_contact: true}
-limits: {duration: 2, wall: 60, memory_mb: 2000}
+limits: {duration: 2, wall: 25, memory_mb: 2000}
 '''
 
 
