@@ -14,29 +14,44 @@
 namespace ruedo::bus {
 namespace {
 
+constexpr size_t kLongestPath = sizeof(sockaddr_un::sun_path) - 2;  // a zero and "~" behind it
+
 sockaddr_un address_of(const std::string& path) {
   sockaddr_un address{};
   address.sun_family = AF_UNIX;
-  if (path.empty() || path[0] != '/' || path.size() >= sizeof address.sun_path) {
-    throw EnvironmentError("unix://" + path + ": a socket has an absolute path of at most " +
-                           std::to_string(sizeof address.sun_path - 1) +
-                           " bytes, such as unix:///tmp/ruedo.sock");
-  }
   std::memcpy(address.sun_path, path.data(), path.size());
   return address;
 }
 
-FileHandle connected(const sockaddr_un& address) {
+void check_path(const std::string& path) {
+  if (path.empty() || path[0] != '/' || path.size() > kLongestPath) {
+    throw EnvironmentError("unix://" + path + ": a socket has an absolute path of at most " +
+                           std::to_string(kLongestPath) + " bytes, such as unix:///tmp/ruedo.sock");
+  }
+}
+
+FileHandle connected(const std::string& path) {
+  check_path(path);
+  const sockaddr_un address = address_of(path);
   FileHandle socket = stream_socket(AF_UNIX);
   return ::connect(socket.get(), reinterpret_cast<const sockaddr*>(&address), sizeof address) == 0
              ? std::move(socket)
              : FileHandle();
 }
 
+// Of what a server left behind that was killed.
+void clear(const std::string& path) {
+  struct stat status{};
+  if (::lstat(path.c_str(), &status) != 0) return;
+  if (!S_ISSOCK(status.st_mode))
+    throw EnvironmentError("unix://" + path + " is a file that is no socket: take another path");
+  ::unlink(path.c_str());
+}
+
 }  // namespace
 
 FileHandle connect_unix(const std::string& path) {
-  FileHandle socket = connected(address_of(path));
+  FileHandle socket = connected(path);
   if (!socket) {
     throw EnvironmentError("nothing listens at unix://" + path + " (" + std::strerror(errno) +
                            "): start `ruedo run` with that --lcm first");
@@ -46,25 +61,22 @@ FileHandle connect_unix(const std::string& path) {
   return socket;
 }
 
-bool is_unix_served(const std::string& path) {
-  return static_cast<bool>(connected(address_of(path)));
-}
+bool is_unix_served(const std::string& path) { return static_cast<bool>(connected(path)); }
 
 FileHandle listen_unix(const std::string& path) {
-  const sockaddr_un address = address_of(path);
   if (is_unix_served(path))
     throw EnvironmentError("unix://" + path +
                            " is taken by another server: end that one, or take another path");
-  struct stat status{};
-  if (::lstat(path.c_str(), &status) == 0) {
-    if (!S_ISSOCK(status.st_mode))
-      throw EnvironmentError("unix://" + path + " is a file that is no socket: take another path");
-    ::unlink(path.c_str());
-  }
+  // It gets its name when it listens: who waits for the file may connect at once.
+  const std::string unnamed = path + "~";
+  clear(unnamed);
+  clear(path);
+  const sockaddr_un address = address_of(unnamed);
   FileHandle socket(::socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0));
   ::fchmod(socket.get(), 0600);  // before it has a name
   if (::bind(socket.get(), reinterpret_cast<const sockaddr*>(&address), sizeof address) != 0 ||
-      ::chmod(path.c_str(), 0600) != 0 || ::listen(socket.get(), 128) != 0) {
+      ::chmod(unnamed.c_str(), 0600) != 0 || ::listen(socket.get(), 128) != 0 ||
+      ::rename(unnamed.c_str(), path.c_str()) != 0) {
     throw EnvironmentError("cannot serve unix://" + path + " (" + std::strerror(errno) +
                            "): the folder must be there, and this user's to write");
   }

@@ -14,8 +14,8 @@ FileHandle connect_unix(const std::string& path);
 // True when a server listens there.
 bool is_unix_served(const std::string& path);
 
-// Binds a socket of mode 0600 and listens; what a server left behind is replaced. Throws
-// EnvironmentError.
+// Listens at a socket of mode 0600, which is there when it can be connected to; what a server left
+// behind is replaced. Throws EnvironmentError.
 FileHandle listen_unix(const std::string& path);
 
 // Whether the other end is a process of this user, or of root.

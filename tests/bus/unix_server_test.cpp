@@ -1,6 +1,8 @@
 // The Unix domain socket: its owner, that nothing is lost, and malicious clients.
 #include "bus/unix_server.h"
 
+#include <atomic>
+#include <cerrno>
 #include <condition_variable>
 #include <filesystem>
 #include <fstream>
@@ -217,9 +219,40 @@ TEST(UnixServer, PathsAreClaimedAndCleared) {
   std::ofstream(folder.url("file").host) << "not a socket";
   EXPECT_THROW(UnixServer{folder.url("file")}, EnvironmentError);
   EXPECT_TRUE(fs::exists(folder.url("file").host));
+  std::ofstream(folder.url("kept~").host) << "somebody's";
+  EXPECT_THROW(UnixServer{folder.url("kept")}, EnvironmentError);
+  EXPECT_TRUE(fs::exists(folder.url("kept~").host));
   EXPECT_THROW(UnixServer{folder.url("no/folder")}, EnvironmentError);
   EXPECT_THROW(UnixServer(folder.url(std::string(200, 'x'))), EnvironmentError);
   EXPECT_THROW(connect_unix(folder.url("nobody").host), EnvironmentError);
+}
+
+// Scripts wait for the file, and then start what connects.
+TEST(UnixServer, WhoSeesTheSocketMayConnect) {
+  const Folder folder;
+  const std::string path = folder.url().host;
+  std::atomic<bool> over = false;
+  int refused = 0;
+  std::thread waiting([&] {
+    sockaddr_un address{};
+    address.sun_family = AF_UNIX;
+    path.copy(address.sun_path, sizeof address.sun_path - 1);
+    while (!over) {
+      const FileHandle socket(::socket(AF_UNIX, SOCK_STREAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0));
+      const bool connects =
+          ::connect(socket.get(), reinterpret_cast<const sockaddr*>(&address), sizeof address) == 0;
+      refused += !connects && errno == ECONNREFUSED;
+    }
+  });
+  std::vector<FileHandle> listeners;
+  for (int i = 0; i < 500; ++i) {
+    listeners.push_back(listen_unix(path));  // stays open: a closed one would refuse, rightly
+    fs::remove(path);
+  }
+  over = true;
+  waiting.join();
+  EXPECT_EQ(refused, 0);
+  EXPECT_FALSE(fs::exists(path + "~"));
 }
 
 TEST(UnixServer, GarbageEndsItsConnectionAlone) {
