@@ -151,7 +151,7 @@ void add_options(const LaunchOptions& options, std::vector<std::string>& command
 // A folder for the socket, which no other user may enter.
 fs::path make_folder() {
   const char* runtime = std::getenv("XDG_RUNTIME_DIR");
-  constexpr size_t kLongest = 60;  // a socket's path has 106 bytes at most
+  constexpr size_t kLongest = 60;  // a socket's path has 99 bytes at most
   const bool usable =
       runtime && *runtime && std::strlen(runtime) < kLongest && access(runtime, W_OK | X_OK) == 0;
   std::string name = std::string(usable ? runtime : "/tmp") + "/ruedo-XXXXXX";

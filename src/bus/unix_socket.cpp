@@ -14,7 +14,8 @@
 namespace ruedo::bus {
 namespace {
 
-constexpr size_t kLongestPath = sizeof(sockaddr_un::sun_path) - 2;  // a zero and "~" behind it
+// A zero follows it, or what makes it a name of the thread's own: "~" and at most seven digits.
+constexpr size_t kLongestPath = sizeof(sockaddr_un::sun_path) - 9;
 
 sockaddr_un address_of(const std::string& path) {
   sockaddr_un address{};
@@ -39,13 +40,29 @@ FileHandle connected(const std::string& path) {
              : FileHandle();
 }
 
-// Of what a server left behind that was killed.
+[[noreturn]] void cannot_serve(const std::string& path) {
+  throw EnvironmentError("cannot serve unix://" + path + " (" + std::strerror(errno) +
+                         "): the folder must be there, and this user's to write");
+}
+
+// Removes what a server left behind that was killed.
 void clear(const std::string& path) {
   struct stat status{};
   if (::lstat(path.c_str(), &status) != 0) return;
   if (!S_ISSOCK(status.st_mode))
     throw EnvironmentError("unix://" + path + " is a file that is no socket: take another path");
-  ::unlink(path.c_str());
+  if (::unlink(path.c_str()) != 0 && errno != ENOENT) cannot_serve(path);
+}
+
+// Gives what listens its name, unless another server has that.
+void name(const std::string& listening, const std::string& path) {
+  while (::link(listening.c_str(), path.c_str()) != 0) {
+    if (errno != EEXIST) cannot_serve(path);
+    if (is_unix_served(path))
+      throw EnvironmentError("unix://" + path +
+                             " is taken by another server: end that one, or take another path");
+    clear(path);
+  }
 }
 
 }  // namespace
@@ -64,22 +81,21 @@ FileHandle connect_unix(const std::string& path) {
 bool is_unix_served(const std::string& path) { return static_cast<bool>(connected(path)); }
 
 FileHandle listen_unix(const std::string& path) {
-  if (is_unix_served(path))
-    throw EnvironmentError("unix://" + path +
-                           " is taken by another server: end that one, or take another path");
+  check_path(path);
   // It gets its name when it listens: who waits for the file may connect at once.
-  const std::string unnamed = path + "~";
-  clear(unnamed);
-  clear(path);
-  const sockaddr_un address = address_of(unnamed);
+  const std::string own = path + "~" + std::to_string(::gettid());
+  clear(own);
+  struct Unnamed {
+    const std::string& path;
+    ~Unnamed() { ::unlink(path.c_str()); }
+  } const unnamed{own};
+  const sockaddr_un address = address_of(own);
   FileHandle socket(::socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0));
-  ::fchmod(socket.get(), 0600);  // before it has a name
+  ::fchmod(socket.get(), 0600);  // before it can be seen
   if (::bind(socket.get(), reinterpret_cast<const sockaddr*>(&address), sizeof address) != 0 ||
-      ::chmod(unnamed.c_str(), 0600) != 0 || ::listen(socket.get(), 128) != 0 ||
-      ::rename(unnamed.c_str(), path.c_str()) != 0) {
-    throw EnvironmentError("cannot serve unix://" + path + " (" + std::strerror(errno) +
-                           "): the folder must be there, and this user's to write");
-  }
+      ::chmod(own.c_str(), 0600) != 0 || ::listen(socket.get(), 128) != 0)
+    cannot_serve(path);
+  name(own, path);
   return socket;
 }
 

@@ -204,7 +204,7 @@ class _Folder:
         runtime = os.environ.get("XDG_RUNTIME_DIR", "")
         usable = 0 < len(runtime) < 60 and os.access(
             runtime, os.W_OK | os.X_OK
-        )  # a socket's path has 106 bytes at most
+        )  # a socket's path has 99 bytes at most
         self.path = tempfile.mkdtemp(prefix="ruedo-", dir=runtime if usable else "/tmp")
 
     def close(self) -> None:

@@ -215,7 +215,7 @@ final class ServerProcess {
     private String privateUrl() {
         if (Runtime.version().feature() < 16) return freeUrl();
         String runtime = System.getenv("XDG_RUNTIME_DIR");
-        boolean usable = // a socket's path has 106 bytes at most
+        boolean usable = // a socket's path has 99 bytes at most
                 runtime != null
                         && !runtime.isEmpty()
                         && runtime.length() < 60
