@@ -15,6 +15,7 @@
 #include "cli/mcap_reader.h"
 #include "cli/rosbag.h"
 #include "core/input_file.h"
+#include "core/lcm_log.h"
 #include "core/utf8.h"
 #include "log/reader.h"
 #include "log/writer.h"
@@ -129,6 +130,10 @@ void BagLog::join(const std::string& rest, const std::string& file) {
     const auto says_all_of = channel.metadata.find(Rosbag::kChannel);
     if (says_all_of == channel.metadata.end()) return;
     const auto time_us = static_cast<SimTime>(time_ns / 1000);
+    if (time_us > kLatestLogTime_us) {
+      ++damaged;
+      return;
+    }
     write_rest_until(time_us);
     const std::string& name = says_all_of->second;
     if (written_us == time_us && written.contains(name))

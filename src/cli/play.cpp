@@ -1,5 +1,6 @@
 // ruedo play: publishes a log's messages again, with the times between them; or shows them in the
 // web console.
+#include <algorithm>
 #include <atomic>
 #include <chrono>
 #include <cmath>
@@ -47,6 +48,16 @@ bool in_logs_only(const std::string& channel) {
          channel == log::kStateHashChannel;
 }
 
+// When a message is due that comes so much later than the first one. At a low speed that may be
+// more than a clock can say, which stands for a century.
+Clock::time_point due(Clock::time_point begin, SimTime after_us, double speed) {
+  constexpr double kCentury_s = 3.2e9;
+  const double after_s =
+      std::clamp(static_cast<double>(after_us) * 1e-6 / speed, -kCentury_s, kCentury_s);
+  return begin +
+         std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(after_s));
+}
+
 bool sleep_until(Clock::time_point time) {
   while (!interrupted) {
     const auto now = Clock::now();
@@ -87,12 +98,8 @@ int play(const PlayArguments& arguments) {
   while (!interrupted && log.next(event)) {
     if (in_logs_only(event.channel)) continue;
     if (messages == 0) first_us = event.timestamp_us, begin = Clock::now();
-    if (std::isfinite(speed)) {
-      const double after_s = static_cast<double>(event.timestamp_us - first_us) * 1e-6 / speed;
-      if (!sleep_until(begin + std::chrono::duration_cast<Clock::duration>(
-                                   std::chrono::duration<double>(after_s))))
-        break;
-    }
+    if (std::isfinite(speed) && !sleep_until(due(begin, event.timestamp_us - first_us, speed)))
+      break;
     bus.publish(event.channel, event.data.data(), event.data.size());
     ++messages;
   }

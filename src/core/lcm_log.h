@@ -11,4 +11,8 @@ namespace ruedo {
 inline constexpr uint32_t kLogSync = 0xEDA1DA01;
 inline constexpr size_t kLogHeadSize = 28;
 
+// Times are up to this, the year 2255, on either side of 0: their differences, and nanoseconds of
+// them, fit 64 bits.
+inline constexpr int64_t kLatestLogTime_us = 9'000'000'000'000'000;
+
 }  // namespace ruedo

@@ -91,15 +91,16 @@ bool Reader::read_event(Event& event, const std::function<bool(const std::string
   if (!read(head.data(), head.size())) return offset_ == begin ? false : cut_off();
   const uint32_t channel_size = read_big_endian<uint32_t>(head.data() + 20);
   const uint32_t data_size = read_big_endian<uint32_t>(head.data() + 24);
+  event.number = read_big_endian<int64_t>(head.data() + 4);
+  event.timestamp_us = read_big_endian<int64_t>(head.data() + 12);
   if (read_big_endian<uint32_t>(head.data()) != kLogSync || channel_size > kMaxChannel ||
-      data_size > kMaxData) {
+      data_size > kMaxData || event.timestamp_us < -kLatestLogTime_us ||
+      event.timestamp_us > kLatestLogTime_us) {
     fault_ = "damaged at byte " + std::to_string(begin);
     return false;
   }
   // A length that lies must not make memory run out: no event is longer than what is left.
   if (int64_t{channel_size} + data_size > size_ - offset_) return cut_off();
-  event.number = read_big_endian<int64_t>(head.data() + 4);
-  event.timestamp_us = read_big_endian<int64_t>(head.data() + 12);
   event.channel.resize(channel_size);
   if (!read(event.channel.data(), channel_size)) return cut_off();
   if (wanted && !wanted(event.channel)) {

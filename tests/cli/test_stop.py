@@ -6,6 +6,7 @@ import subprocess
 import time
 from pathlib import Path
 
+import lcm
 import pytest
 
 RUEDO = os.environ["RUEDO"]
@@ -114,6 +115,24 @@ def test_a_pipe_that_nobody_reads_leaves_a_whole_log(tmp_path):
     os.close(write)
     assert server.wait(PATIENCE) == 0
     verified(log, world)
+
+
+def test_what_is_due_in_centuries_is_waited_for(tmp_path):
+    """A time that no clock can say is not the past: nothing is played at once instead."""
+    log = tmp_path / "two.lcm"
+    events = lcm.EventLog(str(log), "w")
+    for time_us in (0, 9 * 10**15):
+        events.write_event(time_us, "a/pose", b"")
+    events.close()
+    process = subprocess.Popen(
+        [RUEDO, "play", log, "--lcm", "memq://", "--speed", "1e-4"],
+        stdout=subprocess.PIPE,
+        text=True,
+    )
+    with pytest.raises(subprocess.TimeoutExpired):
+        process.wait(timeout=2)
+    process.send_signal(signal.SIGINT)
+    assert "1 messages" in process.communicate(timeout=20)[0]
 
 
 def test_an_empty_log_is_called_empty(tmp_path):
