@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cstdio>
+#include <optional>
 #include <utility>
 
 #include "address.h"
@@ -14,7 +15,8 @@
 namespace ruedo::client {
 namespace {
 
-constexpr auto kAskAgain = std::chrono::milliseconds(100);
+constexpr auto kAskAgain = std::chrono::milliseconds(500), kFaultTime = std::chrono::milliseconds(1000);
+constexpr int64_t kMostAhead = 1'000'000;  // us: ticks come ten times a second
 constexpr double kSilence =
     5.0;  // s of real time without any message: a server gives a sign of life each second
 
@@ -35,6 +37,7 @@ Core::Core(const std::string& url, const std::string& name, std::unique_ptr<Serv
            std::unique_ptr<Transport> transport)
     : url_(url),
       server_(std::move(server)),
+      watch_([this](int64_t run_id) { tell_another_server(run_id); }),
       last_sign_(Clock::now().time_since_epoch().count()),
       session_(*this, name),
       stepper_(*this),
@@ -66,11 +69,14 @@ void Core::join(Duration timeout) {
   const Clock::time_point deadline = deadline_after(timeout);
   std::unique_lock lock(mutex_);
   while (!known_) {
-    if (fault_) std::rethrow_exception(fault_);
+    const Clock::time_point now = Clock::now();
+    // Beside what cannot be read there may be what can.
+    if (fault_ && now >= std::min(deadline, fault_at_ + kFaultTime))
+      std::rethrow_exception(fault_);
     if (server_) {
       if (const auto ended = server_->ended()) throw NoServer(*ended);
     }
-    if (Clock::now() >= deadline) {
+    if (now >= deadline) {
       throw NoServer("no Ruedo server answered at " + url_ + " within " + text_of(timeout) +
                      " s. Is `ruedo run` started, with the same "
                      "--lcm or LCM_DEFAULT_URL? `ruedo doctor` looks for what is wrong");
@@ -158,7 +164,7 @@ void Core::repeat() {  // feeds the watchdogs in real time
     lock.unlock();
     period = 0.1;
     for (const auto& driver : drivers) {
-      if (!another_run_) driver->repeat(bus_);
+      if (!watch_.another()) driver->repeat(bus_);
       period = std::min(period, driver->period());
     }
     lock.lock();
@@ -204,6 +210,7 @@ void Core::forget_removed(const WorldInfo& info) {
 
 // The server was restarted, or another has taken its place.
 void Core::begin_run() {
+  watch_.begin();
   std::vector<std::shared_ptr<Driver>> drivers;
   std::vector<std::shared_ptr<StreamCore>> streams;
   {
@@ -228,14 +235,26 @@ void Core::note_time(int64_t utime) {
   news_.notify_all();
 }
 
-void Core::sleep_until(int64_t utime) {
+// What another message said of a time long after a tick's was false.
+void Core::note_tick(int64_t utime) {
+  {
+    const std::lock_guard lock(mutex_);
+    if (utime < utime_ - kMostAhead) utime_ = std::max<int64_t>(utime, 0);
+  }
+  note_time(utime);
+}
+
+void Core::sleep(int64_t duration) {
   check_may_wait();
   std::unique_lock lock(mutex_);
-  while (utime_ < utime) {
+  for (int64_t before = utime_; duration > 0;) {
     news_.wait_for(lock, std::chrono::milliseconds(500));
     lock.unlock();
     check_server();
     lock.lock();
+    const int64_t now = utime_;
+    duration -= std::max<int64_t>(now - before, 0);  // time may be set back
+    before = now;
   }
 }
 
@@ -284,6 +303,8 @@ double Core::silence() const {
 }
 
 void Core::on_info(const uint8_t* bytes, size_t size) {
+  const std::optional<int64_t> run_id = run_id_of(bytes, size);
+  if (run_id && this->info() && !is_of_our_run(*run_id, true)) return;
   std::shared_ptr<const WorldInfo> info;
   std::exception_ptr fault;
   try {
@@ -295,12 +316,12 @@ void Core::on_info(const uint8_t* bytes, size_t size) {
   {
     const std::lock_guard lock(mutex_);
     before = known_;
-    fault_ = fault;
+    if (fault && !fault_) fault_at_ = Clock::now();
+    if (fault) fault_ = fault;
     if (!fault) last_sign_ = Clock::now().time_since_epoch().count();
     if (info) {
       if (before && info->epoch != before->epoch) utime_ = 0;
       known_ = info;
-      another_run_ = false;
     }
   }
   news_.notify_all();
@@ -322,14 +343,8 @@ void Core::on_tick(const uint8_t* bytes, size_t size) {
   WireReader in(bytes, size);
   if (in.int64() != tick_t::getHash()) return;
   const int64_t utime = in.int64();
-  const auto known = info();
-  if (!known) return;
-  another_run_ = in.int64() != known->run_id;
-  if (another_run_) {  // it may be the same server's next run
-    if (Clock::now().time_since_epoch() - Clock::duration(asked_.load()) > kAskAgain) ask_info();
-    return;
-  }
-  note_time(utime);
+  if (!is_of_our_run(in.int64())) return;
+  note_tick(utime);
   stepper_.on_tick(bytes, size);
   // Sim time may run a hundred times faster than real time: the watchdog is fed by its beat, too.
   std::vector<std::shared_ptr<Driver>> drivers;
@@ -338,6 +353,29 @@ void Core::on_tick(const uint8_t* bytes, size_t size) {
     drivers.assign(repeating_.begin(), repeating_.end());
   }
   for (const auto& driver : drivers) driver->repeat(bus_);
+}
+
+bool Core::is_of_our_run(int64_t run_id, bool may_take_over) {
+  const auto known = info();
+  if (!known) return false;
+  if (run_id == known->run_id) {
+    watch_.hear_own();
+    return true;
+  }
+  const bool is_over = watch_.hear_another(run_id);
+  // Which of the two is there?
+  if (Clock::now().time_since_epoch() - Clock::duration(asked_.load()) > kAskAgain) ask_info();
+  return is_over && may_take_over;
+}
+
+void Core::tell_another_server(int64_t run_id) const {
+  const auto known = info();
+  std::fprintf(stderr,
+               "ruedo: another server is at %s, too, with run %lld; this client is in run %lld, "
+               "world %s. Samples of both mix, and commands go to both: give one of them another "
+               "--lcm port (this is said once)\n",
+               url_.c_str(), static_cast<long long>(run_id), static_cast<long long>(known->run_id),
+               known->world.c_str());
 }
 
 void Core::ask_info() {

@@ -19,6 +19,7 @@
 #include "driver.h"
 #include "forked.h"
 #include "ruedo/client.h"
+#include "run_watch.h"
 #include "session.h"
 #include "stepper.h"
 #include "stream_core.h"
@@ -55,6 +56,11 @@ class Core : public std::enable_shared_from_this<Core> {
   Stepper& stepper() { return stepper_; }
   const std::string& url() const { return url_; }
   std::shared_ptr<const WorldInfo> info() const;
+  // Whether a message is of this client's run, or, where it may take over, of the one that has
+  // taken its place. The receiving thread's.
+  bool is_of_our_run(int64_t run_id, bool may_take_over = false);
+  // What comes may be of the next run, of which there is no info yet. The receiving thread's.
+  bool in_doubt() const { return watch_.in_doubt(); }
   RobotInfo robot_info(const std::string& name) const;  // throws UnknownName
   int64_t utime() const { return utime_; }
   int64_t next_id() { return ++ids_; }
@@ -66,7 +72,8 @@ class Core : public std::enable_shared_from_this<Core> {
   void keep_repeating(const std::shared_ptr<Driver>& driver);
   void note_time(int64_t utime);
   void reset_time() { utime_ = 0; }
-  void sleep_until(int64_t utime);
+  void note_tick(int64_t utime);
+  void sleep(int64_t duration);  // us
   // After the set of models changed; before: the info from before that, null: the one that is known
   // now.
   void refresh_info(std::shared_ptr<const WorldInfo> before = nullptr);
@@ -79,6 +86,7 @@ class Core : public std::enable_shared_from_this<Core> {
   void on_tick(const uint8_t* bytes, size_t size);
   void forget_removed(const WorldInfo& info);
   void begin_run();
+  void tell_another_server(int64_t run_id) const;
   void end_drivers(const std::vector<std::shared_ptr<Driver>>& drivers, MotionReason reason);
   void ask_info();
   void repeat();
@@ -91,14 +99,15 @@ class Core : public std::enable_shared_from_this<Core> {
   std::condition_variable news_;
   WorldInfoAssembler assembler_;  // the receiving thread's
   std::shared_ptr<const WorldInfo> known_;
-  std::exception_ptr fault_;
+  std::exception_ptr fault_;         // of an info that cannot be read
+  Clock::time_point fault_at_;       // the first
+  RunWatch watch_;
   std::map<std::pair<std::string, bool>, std::shared_ptr<StreamCore>> streams_;  // channel, raw
   std::map<std::string, std::shared_ptr<Driver>> drivers_;
   std::set<std::shared_ptr<Driver>> repeating_;
   std::atomic<int64_t> utime_{0}, ids_{0};
   std::atomic<Clock::time_point::rep> last_sign_;
   std::atomic<Clock::time_point::rep> asked_{0};  // for info
-  std::atomic<bool> another_run_{false};          // the last tick was of another run
   std::atomic<bool> closed_{false};
   const std::shared_ptr<CallbackList<>> new_run_ = std::make_shared<CallbackList<>>();
   std::thread repeater_;

@@ -48,7 +48,10 @@ Reply Session::request_in_turn(int32_t kind, const std::vector<uint8_t>& body, D
                        " request");
   }
   for (int attempt = 1;; ++attempt) {
-    if (session_ == 0 || run_id_ != info->run_id) join(info->run_id, timeout);
+    if (session_ == 0 || run_id_ != info->run_id) {
+      run_id_ = info->run_id;
+      join(timeout);
+    }
     Reply reply = exchange(kind, session_, ++sequence_, body, timeout);
     if (reply.code != reply_t::UNKNOWN_SESSION || attempt == 2) return checked(std::move(reply));
     session_ = 0;  // its place went to another: join again
@@ -68,7 +71,7 @@ void Session::leave() {
   session_ = 0;
 }
 
-void Session::join(int64_t run_id, Duration timeout) {
+void Session::join(Duration timeout) {
   join_t body;
   body.client = name_;
   std::random_device random;
@@ -76,7 +79,6 @@ void Session::join(int64_t run_id, Duration timeout) {
       static_cast<int64_t>((static_cast<uint64_t>(random()) << 32 | random()) >> 2) + 1;
   const Reply reply = checked(exchange(request_t::JOIN, 0, number, encoded(body), timeout));
   session_ = reply.session;
-  run_id_ = run_id;
   sequence_ = 0;
 }
 
@@ -88,6 +90,11 @@ Reply Session::exchange(int32_t kind, int64_t session, int64_t sequence,
   awaited_sequence_ = sequence;
   reply_.reset();
   while (!reply_) {
+    if (core_.info()->run_id != run_id_) {
+      awaited_kind_ = 0;
+      throw RequestError(kind_name(kind) + ": another run has begun meanwhile",
+                         ReplyCode::wrong_run);
+    }
     if (Clock::now() >= deadline) {
       awaited_kind_ = 0;
       throw Timeout("no reply to " + kind_name(kind) + " on ruedo/reply within " +
@@ -105,7 +112,7 @@ void Session::publish(int32_t kind, int64_t session, int64_t sequence,
                       const std::vector<uint8_t>& body, int32_t epoch) {
   request_t request;
   request.utime = core_.utime();
-  request.run_id = core_.info()->run_id;
+  request.run_id = run_id_;
   request.epoch = epoch;
   request.session = session;
   request.sequence = sequence;
@@ -121,7 +128,7 @@ void Session::receive(const uint8_t* bytes, size_t size) {
     WireReader in(bytes, size);
     if (in.int64() != reply_t::getHash()) return;
     in.int64();  // utime
-    in.int64();  // run
+    if (!core_.is_of_our_run(in.int64())) return;  // another server's, which was not asked
     reply.epoch = in.int32();
     reply.session = in.int64();
     reply.sequence = in.int64();

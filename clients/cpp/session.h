@@ -53,7 +53,7 @@ class Session {
   void receive(const uint8_t* bytes, size_t size);  // a message of ruedo/reply
 
  private:
-  void join(int64_t run_id, Duration timeout);
+  void join(Duration timeout);
   Reply exchange(int32_t kind, int64_t session, int64_t sequence, const std::vector<uint8_t>& body,
                  Duration timeout);
 

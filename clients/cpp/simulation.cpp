@@ -139,7 +139,7 @@ void Simulation::sleep(Duration time) const {
   if (std::isnan(time.count())) throw std::invalid_argument("a time of nan s");
   const auto core = this->core();
   const double seconds = std::clamp(time.count(), -kLongest, kLongest);
-  core->sleep_until(core->utime() + std::llround(seconds * 1e6));
+  core->sleep(std::llround(seconds * 1e6));
 }
 
 Subscription Simulation::on_new_run(std::function<void()> callback) const {

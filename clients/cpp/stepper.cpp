@@ -17,7 +17,9 @@ namespace {
 
 constexpr auto kFirstRepeat = std::chrono::milliseconds(5),
                kLastRepeat = std::chrono::milliseconds(100);
+constexpr int kDoubtedAfter = 20;    // silences in a row: 1.7 s and more
 constexpr size_t kMostWanted = 256;  // messages asked for at once
+constexpr int64_t kFurthest = INT64_MAX / 2;  // steps
 
 }  // namespace
 
@@ -34,12 +36,9 @@ Observations Stepper::step(int64_t n, const std::vector<Command>& commands, Dura
   const auto turn = core_.session().turn();
   core_.check_open();
   std::unique_lock lock(mutex_);
-  if (part_ && core_.info()->run_id != run_id_) {
-    part_ = false;
-    throw NoServer("the run that this client took part in has ended; another is at " + core_.url() +
-                   " now");
-  }
-  if (!part_) {
+  if (part_) {
+    check_run();
+  } else {
     lock.unlock();
     take_part(timeout);
     lock.lock();
@@ -74,6 +73,13 @@ void Stepper::forget() {
   part_ = false;
 }
 
+void Stepper::check_run() {
+  if (core_.info()->run_id == run_id_) return;
+  part_ = false;
+  throw NoServer("the run that this client took part in has ended; another is at " + core_.url() +
+                 " now");
+}
+
 void Stepper::take_part(Duration timeout) {
   core_.bus().receive_eagerly();
   subscribe();
@@ -88,6 +94,8 @@ void Stepper::take_part(Duration timeout) {
     granted_ = in.int64();
     have_ = in.int64();
     newest_ = in.int64();
+    if (granted_ < 0 || granted_ > kFurthest || have_ < -1 || have_ > granted_)
+      throw WireError("nobody stands there");
   } catch (const WireError& error) {
     throw TypeMismatch(
         std::string("the reply to GRANT is no grant_reply_t of this client's version: ") +
@@ -98,6 +106,7 @@ void Stepper::take_part(Duration timeout) {
   collected_ = acknowledged_ = have_;
   grant_ = {};
   steps_.clear();
+  listed_ = 0;
   waits_for_.clear();
   fault_ = nullptr;
   part_ = true;
@@ -154,6 +163,7 @@ std::vector<uint8_t> Stepper::grant_body(int64_t until,
 // the request for what is missing, goes out again, sooner at first.
 void Stepper::wait(std::unique_lock<std::mutex>& lock, int64_t until, Duration timeout) {
   Clock::duration repeat = kFirstRepeat;
+  int silences = 0;
   Clock::time_point deadline = deadline_after(timeout);
   const auto done = [&] { return have_ >= until && grant_.taken; };
   if (done()) return;
@@ -180,6 +190,11 @@ void Stepper::wait(std::unique_lock<std::mutex>& lock, int64_t until, Duration t
     }
     if (done()) return;
     const bool silence = !news && have_ == had;
+    silences = silence ? silences + 1 : 0;
+    if (silences == kDoubtedAfter) {
+      silences = 0;
+      doubt();
+    }
     if (!grant_.taken && silence) {
       grant_again();
     } else if (grant_.taken && (silence || ask_now_)) {
@@ -195,10 +210,25 @@ void Stepper::wait(std::unique_lock<std::mutex>& lock, int64_t until, Duration t
     lock.unlock();
     core_.check_server();
     lock.lock();
+    check_run();
     if (Clock::now() < deadline) continue;
     throw Timeout("step " + std::to_string(have_ + 1) + " did not come within " + text_of(timeout) +
                   " s" + (waits_for_.empty() ? "" : ": the run waits for " + waits_for_));
   }
+}
+
+// Those that are not here; they are asked for.
+void Stepper::forget_steps() {
+  steps_.erase(steps_.upper_bound(have_), steps_.end());
+  listed_ = 0;
+}
+
+// Of what stands between this client and the next step some may not be the server's: all of it is
+// asked for anew.
+void Stepper::doubt() {
+  forget_steps();
+  newest_ = have_;
+  grant_.taken = grant_.body.empty();
 }
 
 void Stepper::grant_again() {

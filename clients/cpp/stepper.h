@@ -67,14 +67,18 @@ class Stepper {
     bool taken = true;
   };
 
+  void check_run();
   void take_part(Duration timeout);
   void subscribe();
   std::vector<uint8_t> grant_body(int64_t until, const std::vector<Command>& commands) const;
   void wait(std::unique_lock<std::mutex>& lock, int64_t until, Duration timeout);
+  void forget_steps();
+  void doubt();
   void grant_again();
   void ask_for_lost(int64_t until);
   void collect(Observations& observations);
   void on_message(int32_t channel, const uint8_t* bytes, size_t size);
+  void forget_first(std::deque<Early>& early);
   bool fill(Step& step, int32_t channel, size_t size, uint32_t crc, std::vector<uint8_t>& bytes);
   void take_tick(const uint8_t* bytes, size_t size);
   Entry read_entry(WireReader& in);
@@ -97,7 +101,9 @@ class Stepper {
   Grant grant_;
   int64_t resend_sequence_ = 0;
   std::map<int64_t, Step> steps_;         // those not collected yet
+  size_t listed_ = 0;                     // messages in the manifests of those not here
   std::vector<std::deque<Early>> early_;  // of each channel
+  size_t early_bytes_ = 0;                // of all
   std::string waits_for_;
   std::exception_ptr fault_;
   bool ask_now_ = false;                    // without waiting for a silence

@@ -17,8 +17,10 @@ namespace ruedo::client {
 namespace {
 
 constexpr size_t kMostEarly = 512;          // messages of one channel that wait for their ticks
+constexpr size_t kMostEarlyBytes = 256 << 20;  // of all: no server goes on with so much unheard
 constexpr int32_t kMostChannels = 1 << 16;  // more cannot be subscribed
 constexpr int kMostParts = 1024;
+constexpr size_t kMostListed = 1 << 20;  // messages: 160 steps of a fleet
 constexpr int64_t kMostAhead = 1024;  // steps beyond what is here: no server is that far
 
 }  // namespace
@@ -61,8 +63,17 @@ void Stepper::on_message(int32_t channel, const uint8_t* bytes, size_t size) {
       return progress();
   }
   std::deque<Early>& early = early_[static_cast<size_t>(channel)];
-  if (early.size() == kMostEarly) early.pop_front();
+  if (early.size() == kMostEarly) forget_first(early);
   early.push_back({size, crc, utime, std::move(copy)});
+  early_bytes_ += size;
+  if (early_bytes_ <= kMostEarlyBytes) return;
+  for (std::deque<Early>& all : early_) all.clear();  // what is missed is asked for
+  early_bytes_ = 0;
+}
+
+void Stepper::forget_first(std::deque<Early>& early) {
+  early_bytes_ -= early.front().size;
+  early.pop_front();
 }
 
 bool Stepper::fill(Step& step, int32_t channel, size_t size, uint32_t crc,
@@ -109,7 +120,7 @@ void Stepper::take_tick(const uint8_t* bytes, size_t size) {
     if (in.int64() >= grant_.sequence && number > grant_.from && client == core_.session().name())
       grant_.taken = true;
   }
-  if (number <= have_ || number - have_ > kMostAhead) return;
+  if (number <= have_ || number > have_ + kMostAhead) return;
   Step& step = steps_[number];
   if (step.nparts == 0) {
     step.nparts = static_cast<size_t>(nparts);
@@ -130,6 +141,8 @@ void Stepper::take_tick(const uint8_t* bytes, size_t size) {
   step.missing += missing;
   step.part_here[static_cast<size_t>(part)] = true;
   ++step.parts_here;
+  listed_ += step.parts[static_cast<size_t>(part)].size();
+  if (listed_ > kMostListed) forget_steps();
   progress();
 }
 
@@ -151,6 +164,7 @@ Stepper::Entry Stepper::read_entry(WireReader& in) {
   });
   if (found != early.end()) {
     entry.bytes = std::move(found->bytes);
+    early_bytes_ -= found->size;
     early.erase(found);
   }
   return entry;
@@ -162,9 +176,10 @@ void Stepper::progress() {
        step != steps_.end() && step->first == have_ + 1 && step->second.complete(); ++step) {
     ++have_;
     for (const std::vector<Entry>& part : step->second.parts) {
+      listed_ -= part.size();
       for (const Entry& entry : part) {  // what is left from earlier times came twice
         std::deque<Early>& early = early_[static_cast<size_t>(entry.channel)];
-        while (!early.empty() && early.front().utime <= step->second.utime) early.pop_front();
+        while (!early.empty() && early.front().utime <= step->second.utime) forget_first(early);
       }
     }
   }

@@ -12,6 +12,8 @@
 namespace ruedo::client {
 namespace {
 
+constexpr size_t kHead = 8 + 8 + 8 + 4 + 2 + 2;  // bytes
+
 RobotInfo read_robot(WireReader& in) {
   RobotInfo robot;
   robot.name = in.name();
@@ -114,8 +116,15 @@ const RobotInfo* WorldInfo::robot(const std::string& name) const {
   return found == robot_index.end() ? nullptr : &robots[found->second];
 }
 
+std::optional<int64_t> run_id_of(const uint8_t* bytes, size_t size) {
+  if (size < kHead) return std::nullopt;
+  WireReader head(bytes, size);
+  if (head.int64() != world_info_t::getHash()) return std::nullopt;
+  head.int64();  // utime
+  return head.int64();
+}
+
 std::shared_ptr<const WorldInfo> WorldInfoAssembler::add(const uint8_t* bytes, size_t size) {
-  constexpr size_t kHead = 8 + 8 + 8 + 4 + 2 + 2;
   if (size < kHead) return nullptr;
   WireReader head(bytes, size);
   const int64_t fingerprint = head.int64();

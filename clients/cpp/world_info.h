@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <map>
 #include <memory>
+#include <optional>
 #include <string>
 #include <tuple>
 #include <vector>
@@ -36,6 +37,9 @@ struct WorldInfo {
 
   const RobotInfo* robot(const std::string& name) const;
 };
+
+// Of a world_info_t; nothing where it is none that this client reads.
+std::optional<int64_t> run_id_of(const uint8_t* bytes, size_t size);
 
 // Takes messages of ruedo/info as they come. The parts of one info share run, epoch and utime. An
 // info with the same content as the last one, which is the rule, is recognised by its bytes and not

@@ -23,7 +23,9 @@ namespace {
 using Clock = std::chrono::steady_clock;
 
 constexpr int kShownElements = 8;      // of an array
-constexpr size_t kMostWaiting = 1000;  // messages; more are dropped and counted
+// What waits to be shown; more is dropped and counted.
+constexpr size_t kMostWaiting = 1000;  // messages
+constexpr size_t kMostWaitingBytes = 64 << 20;
 
 struct Message {
   std::string channel;
@@ -36,10 +38,11 @@ class Mailbox {
  public:
   void put(const std::string& channel, const uint8_t* data, size_t size) {
     const std::lock_guard lock(mutex_);
-    if (waiting_.size() >= kMostWaiting) {
+    if (waiting_.size() >= kMostWaiting || waiting_bytes_ + size > kMostWaitingBytes) {
       ++dropped_;
       return;
     }
+    waiting_bytes_ += size;
     waiting_.push_back({channel, {data, data + size}, Clock::now()});
     ready_.notify_one();
   }
@@ -50,6 +53,7 @@ class Mailbox {
     if (!ready_.wait_until(lock, until, [this] { return !waiting_.empty(); })) return false;
     message = std::move(waiting_.front());
     waiting_.pop_front();
+    waiting_bytes_ -= message.bytes.size();
     return true;
   }
 
@@ -62,6 +66,7 @@ class Mailbox {
   std::mutex mutex_;
   std::condition_variable ready_;
   std::deque<Message> waiting_;
+  size_t waiting_bytes_ = 0;
   uint64_t dropped_ = 0;
 };
 

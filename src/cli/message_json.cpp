@@ -12,6 +12,7 @@
 #include "core/big_endian.h"
 #include "core/json.h"
 #include "core/utf8.h"
+#include "core/wire_size.h"
 
 namespace ruedo::cli {
 namespace {
@@ -88,8 +89,11 @@ class Walk {
   void array(const Field& field, size_t dimension, const std::vector<int64_t>& counts,
              JsonWriter& json, int64_t& integer) {
     if (dimension == field.dimensions.size()) return one(field, json, integer);
-    const Dimension& of = field.dimensions[dimension];
-    const auto count = static_cast<size_t>(of.counted_by.valid() ? counts[of.counted_by] : of.size);
+    if (dimension == 0 && field.dimensions.size() > 1 && is_empty(field, counts)) {
+      json.open('[').close(']');
+      return;
+    }
+    const auto count = static_cast<size_t>(count_of(field.dimensions[dimension], counts));
     if (field.primitive == Primitive::byte && dimension + 1 == field.dimensions.size()) {
       json.value(base64(bytes_.subspan(at_, count)));
       at_ += count;

@@ -1,5 +1,6 @@
 // Walks through the bytes of a message by its schema. The bytes are hostile: every length is
 // checked against what is there before it is believed.
+#include <algorithm>
 #include <bit>
 #include <charconv>
 
@@ -29,7 +30,8 @@ class Walk {
       const Field& field = schema.fields[i];
       if (visitor_ != nullptr)
         path_.parts.push_back({&field, std::vector<int64_t>(field.dimensions.size(), 0)});
-      if (!elements(field, counts, 0, depth)) return false;
+      if (!has_room(field, counts)) return false;
+      if (!is_empty(field, counts) && !elements(field, counts, 0, depth)) return false;
       if (visitor_ != nullptr) path_.parts.pop_back();
       counts[i] = last_integer_;
     }
@@ -44,12 +46,21 @@ class Walk {
   }
 
  private:
+  // Whether each of its dimensions alone is one that the bytes that are left may have.
+  bool has_room(const Field& field, const std::vector<int64_t>& counts) const {
+    const size_t least = least_size(field);
+    const size_t most = least > 0 ? (bytes_.size() - at_) / least : SIZE_MAX;
+    return std::all_of(
+        field.dimensions.begin(), field.dimensions.end(), [&](const Dimension& dimension) {
+          const int64_t count = count_of(dimension, counts);
+          return count >= 0 && static_cast<uint64_t>(count) <= most;
+        });
+  }
+
   bool elements(const Field& field, const std::vector<int64_t>& counts, size_t dimension,
                 int depth) {
     if (dimension == field.dimensions.size()) return value(field, depth);
-    const Dimension& d = field.dimensions[dimension];
-    const int64_t count = d.counted_by.valid() ? counts[d.counted_by] : d.size;
-    if (count < 0) return false;
+    const int64_t count = count_of(field.dimensions[dimension], counts);
     const size_t least = least_size(field);
     if (least > 0 && static_cast<uint64_t>(count) > (bytes_.size() - at_) / least) return false;
     // Without a visitor, numbers need no look at each.

@@ -210,16 +210,18 @@ def test_datagrams_that_are_cut_off_are_passed_over(language):
         assert probe(language, url, "streams", "p3at", "2").one("lrf") == "none"
 
 
-def test_fragments_that_never_make_a_message_take_no_memory(language):
-    """64 senders announce 60 MB each, again and again."""
+@pytest.mark.parametrize("size", [100, 60_000])
+def test_fragments_that_never_make_a_message_take_no_memory(language, size):
+    """64 senders announce 60 MB each, again and again. In Java each datagram left garbage, which
+    was collected late."""
 
     def lies(turn):
-        return [fragment(turn, 60 << 20, 0, 0, 1000, b"p3at/LRF\0" + bytes(100))]
+        return [fragment(turn, 60 << 20, 0, 0, 1000, b"p3at/LRF\0" + bytes(size))]
 
     url = free_url()
     with LyingDatagrams(url, lies, 64):
         process = subprocess.Popen(
-            [*PROBES[language], url, "streams", "p3at", "2"], stdout=subprocess.PIPE, text=True
+            [*PROBES[language], url, "streams", "p3at", "8"], stdout=subprocess.PIPE, text=True
         )
         said = process.stdout.read()
         _, status, used = os.wait4(process.pid, 0)

@@ -28,12 +28,33 @@ def cut() -> list[bytes]:
     return [*pieces, b"LC02" + bytes(4) + b"A" * 60000, fragment(2, 1000, 0, 0, 3, b"A" * 60000)]
 
 
+def _address(url: str) -> tuple[str, int]:
+    group, port = url.removeprefix("udpm://").split("?")[0].split(":")
+    return group, int(port)
+
+
+class Datagrams:
+    """Sends messages as any program on the bus may."""
+
+    def __init__(self, url: str):
+        self._to = _address(url)
+        self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+
+    def __enter__(self) -> Datagrams:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._socket.close()
+
+    def send(self, channel: str, data: bytes) -> None:
+        self._socket.sendto(short(channel, data), self._to)
+
+
 class LyingDatagrams:
     """Sends good messages 20 times a second, and `lies` again and again from as many senders."""
 
     def __init__(self, url: str, lies: Callable[[int], list[bytes]], senders: int = 1):
-        group, port = url.removeprefix("udpm://").split("?")[0].split(":")
-        self._to = (group, int(port))
+        self._to = _address(url)
         self._lies = lies
         self._sockets = [socket.socket(socket.AF_INET, socket.SOCK_DGRAM) for _ in range(senders)]
         self._stopping = threading.Event()

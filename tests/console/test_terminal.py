@@ -6,6 +6,8 @@ import os
 import pty
 import re
 import select
+import socket
+import struct
 import subprocess
 import sys
 import threading
@@ -86,6 +88,26 @@ def test_echo_of_strangers_and_of_half_a_message():
     assert said.startswith("half (velocity_command_t, 20 bytes)\n  utime = 0\n") and said.endswith(
         "  ... and then bytes that are not a velocity_command_t\n"
     )
+
+
+def test_echo_holds_no_more_than_it_may():
+    """Of large messages that come faster than it can show them."""
+    from ruedo.lcmtypes import planar_lidar_t
+
+    count = 4 << 20
+    data = planar_lidar_t().encode()
+    data = data[:16] + struct.pack(">i", count) + bytes(4 * count) + data[20:]
+    frame = struct.pack(">II5sI", 1, 5, b"large", len(data)) + data
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        url = f"tcpq://127.0.0.1:{server.getsockname()[1]}"
+        echo = subprocess.Popen([RUEDO, "echo", "large", "--lcm", url], stdout=subprocess.PIPE)
+        with server.accept()[0] as client:
+            client.sendall(struct.pack(">II", 0x287617FA, 0x0100))
+            for _ in range(40):
+                client.sendall(frame)
+    echo.kill()
+    _, _, used = os.wait4(echo.pid, 0)
+    assert used.ru_maxrss < 300_000  # KiB, of 640 MB
 
 
 def test_echo_of_silence_ends_when_asked_to():

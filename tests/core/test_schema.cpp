@@ -1,8 +1,12 @@
 // The schemas against what lcm-gen makes of the same files, and against malformed bytes.
 #include <gtest/gtest.h>
 
+#include <filesystem>
+#include <fstream>
 #include <map>
 
+#include "core/big_endian.h"
+#include "core/type_files.h"
 #include "ruedo/camera_info_t.hpp"
 #include "ruedo/contact_t.hpp"
 #include "ruedo/image_t.hpp"
@@ -16,6 +20,8 @@
 #include "ruedo/tick_t.hpp"
 #include "ruedo/world_info_t.hpp"
 #include "ruedo/world_state_t.hpp"
+
+namespace fs = std::filesystem;
 
 namespace ruedo {
 namespace {
@@ -141,6 +147,28 @@ TEST(Schema, SurvivesEveryByteChange) {
       EXPECT_EQ(visited, well_formed(schema, bytes)) << at;
     }
   }
+}
+
+// However many rows of nothing there are, they are not counted one by one: these would take hours.
+TEST(Schema, RowsOfNothingTakeNoTime) {
+  const fs::path file = fs::path(testing::TempDir()) / "rows_t.lcm";
+  std::ofstream(file) << "struct rows_t { int32_t a; int32_t b; int32_t c; double value[a][b][c];"
+                         " int8_t last; byte room[16000000]; }";
+  read_types({file});
+  ASSERT_EQ(read_schemas().size(), 1u);
+  const Schema& schema = read_schemas()[0];
+  std::vector<uint8_t> bytes(8 + 3 * 4 + 1 + 16'000'000);
+  write_big_endian(bytes.data(), schema.fingerprint);
+  for (const int at : {8, 12}) write_big_endian(bytes.data() + at, int32_t{1'000'000});
+  bytes[20] = 42;
+  EXPECT_TRUE(well_formed(schema, bytes));
+  size_t values = 0;
+  EXPECT_TRUE(visit_message(schema, bytes, [&](const FieldPath& path, const FieldValue& value) {
+    EXPECT_EQ(path.pattern(), std::vector<std::string>({"a", "b", "c", "last", "room"})[values]);
+    EXPECT_TRUE(values != 3 || to_string(value) == "42");
+    return ++values < 5;
+  }));
+  EXPECT_EQ(values, 5u);
 }
 
 }  // namespace

@@ -20,6 +20,10 @@ _LARGEST = 4 << 20  # bytes of a message: what a server takes from a client
 _receives_for = threading.local()  # .bus: the one that this thread receives for, or None
 
 
+def _nothing(arrived: arrivals.Arrived) -> None:
+    pass
+
+
 class Bus:
     """Safe to use from any thread. Handlers run in the receiving thread, one at a time."""
 
@@ -29,6 +33,8 @@ class Bus:
         self._closed = threading.Event()
         self._handlers: dict[str, Callbacks] = {}
         self._collectors: dict[str, Callable[[tuple[str, bytes]], object]] = {}
+        # Told first of what came at once; for a client that collects.
+        self.on_arrived: Callable[[arrivals.Arrived], object] = _nothing
         self._lock = threading.Lock()
         self._turn = threading.Lock()  # to receive
         self._lent_until = (
@@ -101,6 +107,7 @@ class Bus:
                 self._transport.unsubscribe(channel)
 
     def _dispatch(self, arrived: arrivals.Arrived) -> None:
+        self.on_arrived(arrived)
         arrivals.dispatch(arrived, self._collectors, self._handlers, Callbacks.call)
 
     @contextmanager

@@ -6,6 +6,8 @@ import threading
 import time
 from collections.abc import Callable
 
+_MOST_AHEAD = 1_000_000  # us: ticks come ten times a second
+
 
 class Clock:
     """Sim time, and how long the server has been silent. Safe to use from any thread."""
@@ -25,6 +27,12 @@ class Clock:
             with self._news:
                 self._news.notify_all()
 
+    def note_tick(self, utime: int) -> None:
+        """A tick of that time came: what another message said of a time long after it was false."""
+        if utime < self.utime - _MOST_AHEAD:
+            self.utime = max(utime, 0)
+        self.note(utime)
+
     def note_sign(self) -> None:
         """Something came that has no time."""
         self._last_sign = time.monotonic()
@@ -36,13 +44,18 @@ class Clock:
         """s of real time since the last sign of life."""
         return time.monotonic() - self._last_sign
 
-    def sleep_until(self, utime: int, check: Callable[[], None]) -> None:
-        """check: called meanwhile, every 0.5 s at least; what it raises ends the waiting."""
+    def sleep(self, duration: int, check: Callable[[], None]) -> None:
+        """duration: us. check: called meanwhile, every 0.5 s at least; what it raises ends the
+        waiting."""
         with self._news:
             self._sleepers += 1
+            before = self.utime
             try:
-                while self.utime < utime:
+                while duration > 0:
                     self._news.wait(0.5)
                     check()
+                    now = self.utime
+                    duration -= max(0, now - before)  # time may be set back
+                    before = now
             finally:
                 self._sleepers -= 1

@@ -22,11 +22,14 @@ from .control import REQUEST_CHANNEL, Session
 from .errors import NoServer, RuedoError, UnknownName
 from .lockstep import Stepper
 from .motion import Drivers
+from .run_watch import RunWatch
 from .stream import Streams
 from .transport import Transport, open_transport
-from .world_info import WorldInfo, WorldInfoAssembler
+from .world_info import WorldInfo, WorldInfoAssembler, run_id_of
 
 _SILENCE_SECONDS = 5.0
+_ASK_AGAIN_SECONDS = 0.5
+_FAULT_SECONDS = 1.0
 _CLOSED = "this simulation was closed"
 _FORKED = "this simulation is the parent process's: connect() again after a fork"
 _TICK = struct.Struct(">8sqq")  # fingerprint, utime, run_id
@@ -63,7 +66,6 @@ class Connection:
     ):
         self.url = url
         self.closed = ""  # why: what every call says
-        self.another_run = False  # the last tick was of another run
         self.clock = Clock()
         self.session = Session(self, name)
         self.stepper = Stepper(self)
@@ -73,7 +75,9 @@ class Connection:
         self._news = threading.Condition()
         self._assembler = WorldInfoAssembler()
         self._known: WorldInfo | None = None
+        self._watch = RunWatch(self._tell_another_server)
         self._fault: RuedoError | None = None
+        self._fault_at = 0.0  # s of time.monotonic(), of the first
         self._asked = 0.0  # for info, s of time.monotonic()
         self._ids = _name_hash(name) << 20  # two clients number their primitives apart
         self._new_run = Callbacks("a new run")
@@ -150,6 +154,16 @@ class Connection:
             else "it sends when something happens"
         )
 
+    @property
+    def another_run(self) -> bool:
+        """Whether the last sign of a run was of another one than this client's."""
+        return self._watch.another
+
+    @property
+    def in_doubt(self) -> bool:
+        """Whether what comes may be of the next run, of which there is no info yet."""
+        return self._watch.in_doubt
+
     # What the server says of itself.
 
     @property
@@ -198,10 +212,12 @@ class Connection:
         deadline = time.monotonic() + timeout
         with self._news:
             while self._known is None:
-                if self._fault:
+                now = time.monotonic()
+                # Beside what cannot be read there may be what can.
+                if self._fault and now >= min(deadline, self._fault_at + _FAULT_SECONDS):
                     raise self._fault
                 self._check_private_server()
-                if time.monotonic() >= deadline:
+                if now >= deadline:
                     raise NoServer(
                         f"no Ruedo server answered at {self.url} within {timeout:g} s. Is `ruedo run` started, "
                         "with the same --lcm or LCM_DEFAULT_URL? `ruedo doctor` looks for what is wrong"
@@ -218,10 +234,14 @@ class Connection:
     # The receiving thread.
 
     def _on_info(self, data: bytes) -> None:
+        run_id = run_id_of(data)
+        if run_id is not None and self._known and not self.is_of_our_run(run_id, may_take_over=True):
+            return
         try:
             info = self._assembler.add(data)
         except RuedoError as error:
             with self._news:
+                self._fault_at = self._fault_at if self._fault else time.monotonic()
                 self._fault = error
                 self._news.notify_all()
             return
@@ -231,7 +251,6 @@ class Connection:
             new_epoch = bool(before and info and info.epoch != before.epoch)
             if info:
                 self._known = info
-                self.another_run = False
                 if new_epoch:
                     self.clock.reset()
             self._news.notify_all()
@@ -245,8 +264,32 @@ class Connection:
         if before and info.run_id != before.run_id:
             self._begin_run()
 
+    def is_of_our_run(self, run_id: int, may_take_over: bool = False) -> bool:
+        """Of a message that came. may_take_over: or of the run that has taken its place."""
+        known = self._known
+        if known is None:
+            return False
+        if run_id == known.run_id:
+            self._watch.hear_own()
+            return True
+        is_over = self._watch.hear_another(run_id)
+        if time.monotonic() - self._asked > _ASK_AGAIN_SECONDS:  # which of the two is there
+            self._ask_info()
+        return is_over and may_take_over
+
+    def _tell_another_server(self, run_id: int) -> None:
+        log.warning(
+            "another server is at %s, too, with run %d; this client is in run %d, world %s. Samples of "
+            "both mix, and commands go to both: give one of them another --lcm port (this is said once)",
+            self.url,
+            run_id,
+            self.info.run_id,
+            self.info.world,
+        )
+
     def _begin_run(self) -> None:
         """The server was restarted, or another has taken its place."""
+        self._watch.begin()
         self.clock.reset()
         self.drivers.end_all("new run")
         self.streams.forget()
@@ -260,12 +303,9 @@ class Connection:
         known = self._known
         if fingerprint != _TICK_FINGERPRINT or known is None:
             return
-        self.another_run = run_id != known.run_id
-        if self.another_run:  # it may be the same server's next run
-            if time.monotonic() - self._asked > 0.1:
-                self._ask_info()
+        if not self.is_of_our_run(run_id):
             return
-        self.clock.note(utime)
+        self.clock.note_tick(utime)
         self.stepper.on_tick(data)
         # Sim time may run a hundred times faster than real time: the watchdog is fed by its beat,
         # too.

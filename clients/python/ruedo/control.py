@@ -88,7 +88,8 @@ class Session:
             raise NotSupported(f"this server (Ruedo {info.version}) has no {_KINDS[kind]} request")
         for attempt in (1, 2):
             if not self._session or self._run_id != info.run_id:
-                self._join(info.run_id, timeout)
+                self._run_id = info.run_id
+                self._join(timeout)
             reply = self._exchange(kind, self._session, self.next_sequence(), body, timeout)
             if reply.code != lcmtypes.reply_t.UNKNOWN_SESSION or attempt == 2:
                 break
@@ -128,6 +129,8 @@ class Session:
             reply = lcmtypes.reply_t.decode(data)
         except Exception:
             return
+        if not self._connection.is_of_our_run(reply.run_id):
+            return  # another server's, which was not asked
         reply.text = for_terminal(reply.text)
         with self._news:
             ours = reply.session == self._session or reply.kind == lcmtypes.request_t.JOIN
@@ -138,13 +141,13 @@ class Session:
         if ours and reply.kind in (lcmtypes.request_t.GRANT, lcmtypes.request_t.RESEND):
             self._connection.stepper.on_reply(reply)
 
-    def _join(self, run_id: int, timeout: float) -> None:
+    def _join(self, timeout: float) -> None:
         join = lcmtypes.join_t()
         join.client = self._name
         reply = self._checked(
             self._exchange(lcmtypes.request_t.JOIN, 0, random.getrandbits(62) + 1, join, timeout)
         )
-        self._session, self._run_id, self._sequence = reply.session, run_id, 0
+        self._session, self._sequence = reply.session, 0
 
     def _exchange(self, kind: int, session: int, sequence: int, body: Any, timeout: float) -> Any:
         deadline = time.monotonic() + timeout
@@ -152,6 +155,11 @@ class Session:
         with self._news:
             self._awaited, self._reply = (kind, sequence), None
             while self._reply is None:
+                if self._connection.info.run_id != self._run_id:
+                    self._awaited = None
+                    raise RequestError(
+                        f"{_KINDS[kind]}: another run has begun meanwhile", "WRONG_RUN"
+                    )
                 if time.monotonic() >= deadline:
                     self._awaited = None
                     raise Timeout(f"no reply to {_KINDS[kind]} on ruedo/reply within {timeout:g} s")
@@ -165,7 +173,7 @@ class Session:
         head = _REQUEST.pack(
             _REQUEST_FINGERPRINT,
             self._connection.clock.utime,
-            self._connection.info.run_id,
+            self._run_id,
             epoch,
             session,
             sequence,

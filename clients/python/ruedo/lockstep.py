@@ -42,7 +42,12 @@ _ACKNOWLEDGED_TOGETHER = 32  # steps
 _MOST_WANTED = 256  # messages asked for at once
 _MOST_EARLY = 512  # messages of one channel that wait for their ticks
 _MOST_FRESH = 16384  # messages of all channels since the last tick
+_MOST_BYTES = 256 << 20  # of either: no server goes on with so much unheard
+_MOST_CHANNELS = 1 << 16  # more cannot be subscribed
+_MOST_PARTS = 1024  # of a tick
+_MOST_LISTED = 1 << 20  # messages in the manifests of steps that are not here: 160 steps of a fleet
 _MOST_AHEAD = 1024  # steps beyond what is here: no server is that far
+_DOUBTED_AFTER = 20  # silences in a row: 1.7 s and more
 _LONGEST = 2**63 - 1
 
 _TICK = struct.Struct(
@@ -203,12 +208,14 @@ class Stepper:
         # into its place.
         self._fresh: deque[tuple[str, bytes]] = deque(maxlen=_MOST_FRESH)  # since the last tick
         self._steps: dict[int, _Step] = {}  # those of which something is missing, and later ones
+        self._listed = 0  # messages in their manifests
         self._names: list[str] = []  # of the channels
         # Utime, number, hash and messages of the steps up to _have that were not collected yet.
         self._whole: list[tuple[int, int, int, arrivals.Arrived | _Step]] = []
         self._early: dict[
             int, deque[tuple[int, int, int, bytes]]
         ] = {}  # of each channel: crc, size, utime, message
+        self._fresh_bytes = self._early_bytes = 0  # at most
         self._waits_for = ""
         self._fault: RuedoError | None = None
         self._ask_now = False  # without waiting for a silence
@@ -240,12 +247,9 @@ class Stepper:
         session = self._connection.session
         with session.turn():
             self._connection.check_open()
-            if self._part and self._connection.info.run_id != self._run_id:
-                self._part = False
-                raise NoServer(
-                    f"the run that this client took part in has ended; another is at {self._connection.url} now"
-                )
-            if not self._part:
+            if self._part:
+                self._check_run()
+            else:
                 self._take_part(timeout)
             until = min(self._granted + n, _LONGEST)
             self._wait(self._have, timeout)  # returns at once, unless the previous call gave up
@@ -273,14 +277,25 @@ class Stepper:
         """The client has reset the world: the next step takes part anew."""
         self._part = False
 
+    def _check_run(self) -> None:
+        if self._connection.info.run_id == self._run_id:
+            return
+        self._part = False
+        raise NoServer(
+            f"the run that this client took part in has ended; another is at {self._connection.url} now"
+        )
+
     def _take_part(self, timeout: float) -> None:
         arrivals.compiled()
+        self._connection.bus.on_arrived = self.note_arrived
         self._subscribe()
         body = lcmtypes.grant_request_t()
         body.granted = body.received = -1
         reply = self._connection.session.request_in_turn(lcmtypes.request_t.GRANT, body, timeout)
         try:
             stands = lcmtypes.grant_reply_t.decode(reply.body)
+            if not -1 <= stands.received <= stands.granted or stands.granted < 0:
+                raise ValueError("where nobody stands")
         except Exception:
             raise TypeMismatch(
                 "the reply to GRANT is no grant_reply_t of this client's version"
@@ -288,7 +303,8 @@ class Stepper:
         self._run_id, self._epoch = self._connection.info.run_id, reply.epoch
         self._granted, self._have, self._newest = stands.granted, stands.received, stands.step
         self._acknowledged = self._have
-        self._steps.clear()
+        self._grant = (0, -1, b"")
+        self._forget_steps()
         self._fresh.clear()
         self._whole.clear()
         self._taken, self._fault, self._waits_for = True, None, ""
@@ -336,7 +352,7 @@ class Stepper:
         if self._taken and self._have >= until:
             return
         first = _LAST_REPEAT if self._connection.bus.loses_nothing else _FIRST_REPEAT
-        repeat, deadline = first, time.monotonic() + timeout
+        repeat, deadline, silences = first, time.monotonic() + timeout, 0
         with self._connection.bus.receiving() as receive:
             while True:
                 had, quiet_at = self._have, time.monotonic() + repeat
@@ -352,10 +368,16 @@ class Stepper:
                     heard = receive(max(0.0, quiet_at - time.monotonic()))
                     if self._steps:
                         self._sort()
+                    if time.monotonic() >= quiet_at + _LAST_REPEAT:  # others may never be quiet
+                        heard = False
                 if self._fault:
                     fault, self._fault, self._part = self._fault, None, False
                     raise fault
                 silence = not heard and self._have == had
+                silences = silences + 1 if silence else 0
+                if silences == _DOUBTED_AFTER:
+                    silences = 0
+                    self._doubt()
                 if not self._taken and silence:
                     self._grant_again()
                 elif self._taken and (silence or self._ask_now):
@@ -368,11 +390,24 @@ class Stepper:
                     deadline = time.monotonic() + timeout
                 elif silence:
                     self._connection.check_server()
+                    self._check_run()
                     if time.monotonic() >= deadline:
                         waits = f": the run waits for {self._waits_for}" if self._waits_for else ""
                         raise Timeout(
                             f"step {self._have + 1} did not come within {timeout:g} s{waits}"
                         )
+
+    def _forget_steps(self) -> None:
+        """Those that are not here; they are asked for."""
+        self._steps.clear()
+        self._listed = 0
+
+    def _doubt(self) -> None:
+        """Of what stands between this client and the next step some may not be the server's: all of
+        it is asked for anew."""
+        self._forget_steps()
+        self._newest = self._have
+        self._taken = not self._grant[2]
 
     def _grant_again(self) -> None:
         session = self._connection.session
@@ -427,6 +462,7 @@ class Stepper:
             name, data = self._fresh.popleft()
             if (channel := self._indices.get(name)) is not None:
                 self._place(channel, data)
+        self._fresh_bytes = 0
 
     def _place(self, channel: int, data: bytes) -> None:
         if len(data) < 16:
@@ -439,6 +475,20 @@ class Stepper:
         self._early[channel].append(
             (crc, size, int.from_bytes(data[8:16], "big", signed=True), data)
         )
+        self._early_bytes += size
+        if self._early_bytes > _MOST_BYTES:
+            self._early_bytes = sum(one[1] for early in self._early.values() for one in early)
+        if self._early_bytes > _MOST_BYTES:
+            for early in self._early.values():  # what is missed is asked for
+                early.clear()
+            self._early_bytes = 0
+
+    def note_arrived(self, arrived: arrivals.Arrived) -> None:
+        """What came at once, of all channels."""
+        self._fresh_bytes += sum([len(data) for _, data in arrived])
+        if self._fresh_bytes > _MOST_BYTES:
+            self._fresh.clear()
+            self._fresh_bytes = 0
 
     @staticmethod
     def _fill(step: _Step, channel: int, crc: int, data: bytes) -> bool:
@@ -458,12 +508,15 @@ class Stepper:
     def on_tick(self, data: bytes) -> None:
         if not self._part:
             self._fresh.clear()
+            self._fresh_bytes = 0
         if not self._part or len(data) < _TICK.size:
             return
         fingerprint, utime, run_id, epoch, number, state_hash, part, nparts = _TICK.unpack_from(
             data
         )
-        if fingerprint != _TICK_FINGERPRINT or run_id != self._run_id or not 0 <= part < nparts:
+        if fingerprint != _TICK_FINGERPRINT or run_id != self._run_id:
+            return
+        if not 0 <= part < nparts <= _MOST_PARTS:
             return
         if epoch != self._epoch:
             if epoch > self._epoch and not self._fault:
@@ -493,6 +546,9 @@ class Stepper:
             return
         step.parts[part] = entries
         step.missing += missing
+        self._listed += len(entries)
+        if self._listed > _MOST_LISTED:
+            self._forget_steps()
         self._progress()
 
     def _applied(self, data: bytes, number: int) -> int:
@@ -525,6 +581,7 @@ class Stepper:
             return None
         came = list(fresh)
         fresh.clear()
+        self._fresh_bytes = 0
         return came
 
     def _manifest(self, data: bytes, at: int) -> tuple[list[_Entry], int]:
@@ -535,6 +592,8 @@ class Stepper:
         entries, missing = [], 0
         for channel, sequence, size, crc in _ENTRY.iter_unpack(data[at:]):
             early = self._early.get(channel)
+            if not 0 <= channel < _MOST_CHANNELS or size < 0:
+                raise ValueError("no message")
             if early is None:  # of a model that came since
                 early = self._early[channel] = deque(maxlen=_MOST_EARLY)
             found = None
@@ -557,6 +616,7 @@ class Stepper:
                     while early and early[0][2] <= step.utime:
                         early.popleft()
             self._whole.append((step.utime, self._have, step.state_hash, step))
+            self._listed -= sum(map(len, step.parts.values()))
             del self._steps[self._have]
             step = self._steps.get(self._have + 1)
 

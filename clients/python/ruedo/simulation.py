@@ -122,8 +122,7 @@ class Simulation:
     def sleep(self, seconds: float) -> None:
         """Waits until so much sim time has passed."""
         self._connection.check_may_wait()
-        clock = self._connection.clock
-        clock.sleep_until(clock.utime + round(seconds * 1e6), self._connection.check_server)
+        self._connection.clock.sleep(round(seconds * 1e6), self._connection.check_server)
 
     # Control. Every call raises NotSupported where the server has no such request, RequestError
     # when it refuses.

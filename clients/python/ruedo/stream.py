@@ -165,6 +165,8 @@ class Stream(Reader[T]):
         )
 
     def _receive(self, data: bytes) -> None:
+        if self._connection.in_doubt:
+            return
         try:
             sample = self._sample_of(data)
         except RuedoError as error:  # whatever came, the receiving thread lives

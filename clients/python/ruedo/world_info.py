@@ -72,6 +72,14 @@ def _refuse_control_characters(part: Any) -> None:
         raise ValueError("a name with control characters")
 
 
+def run_id_of(message: bytes) -> int | None:
+    """Of a world_info_t; None where it is none that this client reads."""
+    if len(message) < _HEAD.size or message[:8] != lcmtypes.world_info_t._get_packed_fingerprint():
+        return None
+    run_id: int = _HEAD.unpack_from(message)[2]
+    return run_id
+
+
 class WorldInfoAssembler:
     """Takes messages of ruedo/info as they come. Used by the receiving thread alone.
 

@@ -2,6 +2,7 @@
 // and records what it receives.
 #pragma once
 
+#include <atomic>
 #include <chrono>
 #include <condition_variable>
 #include <deque>
@@ -32,7 +33,7 @@ class FakeServer {
  public:
   using Bytes = std::vector<uint8_t>;
 
-  int64_t run_id = 7;
+  std::atomic<int64_t> run_id{7};
   std::vector<std::string> robots{"p3at"};
 
   template <class Message>

@@ -423,6 +423,30 @@ TEST_F(Lifetimes, ANewRunIsNoticedAndNotDriven) {
   sim.pause();  // it joins anew
 }
 
+TEST_F(Lifetimes, AnotherServersSignsEndNothing) {
+  const Simulation sim = simulation(server);
+  int events = 0;
+  const Subscription event = sim.on_new_run([&] { ++events; });
+  const Motion motion = sim.robot("p3at").advance(1.0);
+  server->send_motion("p3at", 1000, motion.id(), ruedo::motion_status_t::STATE_RUNNING);
+  testing::internal::CaptureStderr();
+  for (int i = 1; i <= 10; ++i) {
+    server->run_id = 8;
+    server->send_tick(9'000'000 + i);
+    server->send_info();
+    server->run_id = 7;
+    server->send_tick(1000 + i);
+  }
+  server->await_delivery();
+  EXPECT_EQ(testing::internal::GetCapturedStderr(),
+            "ruedo: another server is at memq://, too, with run 8; this client is in run 7, world "
+            "memory. Samples of both mix, and commands go to both: give one of them another --lcm "
+            "port (this is said once)\n");
+  EXPECT_EQ(motion.state(), MotionState::running);
+  EXPECT_EQ(events, 0);
+  EXPECT_LT(sim.time(), 1.0);
+}
+
 TEST_F(Lifetimes, WhatALaterServerSaysOfAMotionIsUnknown) {
   const Simulation sim = simulation(server);
   const auto motion = sim.robot("p3at").motion();

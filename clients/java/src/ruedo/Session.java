@@ -56,7 +56,10 @@ final class Session {
         }
         byte[] encoded = encoded(kind, body);
         for (int attempt = 1; ; attempt++) {
-            if (session == 0 || runId != info.head.run_id) join(info.head.run_id, timeout);
+            if (session == 0 || runId != info.head.run_id) {
+                runId = info.head.run_id;
+                join(timeout);
+            }
             reply_t answer = exchange(kind, session, ++sequence, encoded, timeout);
             if (answer.code != reply_t.UNKNOWN_SESSION || attempt == 2) return checked(answer);
             session = 0; // its place went to another: join again
@@ -91,7 +94,7 @@ final class Session {
             WireReader in = new WireReader(message);
             if (in.int64() != reply_t.LCM_FINGERPRINT) return;
             in.int64(); // utime
-            in.int64(); // run
+            if (!sim.isOfOurRun(in.int64(), false)) return; // another server's, which was not asked
             received.epoch = in.int32();
             received.session = in.int64();
             received.sequence = in.int64();
@@ -115,12 +118,11 @@ final class Session {
             sim.stepper().onReply(received);
     }
 
-    private void join(long run, double timeout) {
+    private void join(double timeout) {
         join_t body = new join_t();
         body.client = name;
         long number = (new SecureRandom().nextLong() >>> 2) + 1;
         session = checked(exchange(request_t.JOIN, 0, number, Bus.encode(body), timeout)).session;
-        runId = run;
         sequence = 0;
     }
 
@@ -131,6 +133,11 @@ final class Session {
             awaitedSequence = number;
             reply = null;
             while (reply == null) {
+                if (sim.info().head.run_id != runId) {
+                    awaitedKind = 0;
+                    throw new RuedoException.RequestError(
+                            name(kind) + ": another run has begun meanwhile", reply_t.WRONG_RUN);
+                }
                 if (deadline.passed()) {
                     awaitedKind = 0;
                     throw new RuedoException.Timeout(
@@ -169,7 +176,7 @@ final class Session {
     void publish(int kind, long toSession, long number, byte[] body, int epoch) {
         request_t request = new request_t();
         request.utime = sim.utime();
-        request.run_id = sim.info().head.run_id;
+        request.run_id = runId;
         request.epoch = epoch;
         request.session = toSession;
         request.sequence = number;

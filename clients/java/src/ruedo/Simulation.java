@@ -33,7 +33,9 @@ public final class Simulation implements AutoCloseable {
     private static final double SILENCE_SECONDS =
             5.0; // without any message: a server gives a sign of life each second
     private static final double REPLY_SECONDS = 5.0;
-    private static final long ASK_AGAIN_NANOS = 100_000_000;
+    private static final long ASK_AGAIN_NANOS = 500_000_000;
+    private static final long MOST_AHEAD_MICROS = 1_000_000; // ticks come ten times a second
+    private static final long FAULT_NANOS = 1_000_000_000;
     private static final double SLOW_REPLY_SECONDS = 60.0;
     private static final double RESTORE_SECONDS = 3600.0;
 
@@ -54,12 +56,13 @@ public final class Simulation implements AutoCloseable {
     private final Set<Subscription> newRun = ConcurrentHashMap.newKeySet();
     private final AtomicLong ids;
     private WorldInfo known; // these under this object's monitor
-    private RuedoException fault;
+    private RuedoException fault; // of an info that cannot be read
+    private long faultAt; // the first
     private Thread repeater;
     private volatile long utime;
     private volatile long lastSign = System.nanoTime();
     private volatile long asked = System.nanoTime(); // for info
-    private volatile boolean anotherRun; // is what the last tick was of
+    private final RunWatch watch = new RunWatch(this::tellAnotherServer);
     private volatile boolean closed;
 
     Simulation(String url, String name, double timeout, ServerProcess server) {
@@ -162,11 +165,14 @@ public final class Simulation implements AutoCloseable {
     /** Waits until so many seconds of sim time have passed. */
     public synchronized void sleep(double seconds) {
         checkMayWait();
-        long until = utime + Math.round(seconds * 1e6);
         Deadline never = new Deadline(Double.POSITIVE_INFINITY);
-        while (utime < until) {
+        long left = Math.round(seconds * 1e6);
+        for (long before = utime; left > 0; ) {
             never.waitOn(this, 500);
             checkServer();
+            long now = utime;
+            left -= Math.max(0, now - before); // time may be set back
+            before = now;
         }
     }
 
@@ -442,6 +448,12 @@ public final class Simulation implements AutoCloseable {
         notifyAll();
     }
 
+    /** What another message said of a time long after a tick's was false. */
+    private synchronized void noteTick(long now) {
+        if (now < utime - MOST_AHEAD_MICROS) utime = Math.max(now, 0);
+        noteTime(now);
+    }
+
     void checkOpen() {
         if (closed) throw new RuedoException.NoServer("this simulation was closed");
     }
@@ -498,7 +510,7 @@ public final class Simulation implements AutoCloseable {
         while (!closed) {
             long period = 100;
             for (Driver driver : repeating) {
-                if (!anotherRun) driver.repeat();
+                if (!watch.another()) driver.repeat();
                 period = Math.min(period, driver.periodMillis());
             }
             try {
@@ -564,6 +576,7 @@ public final class Simulation implements AutoCloseable {
     private void beginRun() {
         List<Driver> all;
         List<Stream<?>> known;
+        watch.begin();
         utime = 0;
         synchronized (robots) {
             all = new ArrayList<>(drivers.values());
@@ -578,6 +591,8 @@ public final class Simulation implements AutoCloseable {
     }
 
     private void onInfo(byte[] message) {
+        Long runId = WorldInfo.runIdOf(message);
+        if (runId != null && info() != null && !isOfOurRun(runId, true)) return;
         WorldInfo info = null;
         RuedoException wrong = null;
         try {
@@ -588,12 +603,12 @@ public final class Simulation implements AutoCloseable {
         WorldInfo before;
         synchronized (this) {
             before = known;
-            fault = wrong;
+            if (wrong != null && fault == null) faultAt = System.nanoTime();
+            if (wrong != null) fault = wrong;
             if (wrong == null) lastSign = System.nanoTime();
             if (info != null) {
                 if (before != null && before.head.epoch != info.head.epoch) utime = 0;
                 known = info;
-                anotherRun = false;
             }
             notifyAll();
         }
@@ -614,14 +629,8 @@ public final class Simulation implements AutoCloseable {
             WireReader in = new WireReader(message);
             if (in.int64() != tick_t.LCM_FINGERPRINT) return;
             long now = in.int64();
-            WorldInfo known = info();
-            if (known == null) return;
-            anotherRun = in.int64() != known.head.run_id;
-            if (anotherRun) { // it may be the server's next one
-                if (System.nanoTime() - asked > ASK_AGAIN_NANOS) askInfo();
-                return;
-            }
-            noteTime(now);
+            if (!isOfOurRun(in.int64(), false)) return;
+            noteTick(now);
             stepper.onTick(message);
         } catch (IOException error) {
             return;
@@ -631,10 +640,48 @@ public final class Simulation implements AutoCloseable {
         for (Driver driver : repeating) driver.repeat();
     }
 
+    /**
+     * Whether a message is of this client's run, or, where it may take over, of the one that has
+     * taken its place. The receiving thread's.
+     */
+    boolean isOfOurRun(long runId, boolean mayTakeOver) {
+        WorldInfo now = info();
+        if (now == null) return false;
+        if (runId == now.head.run_id) {
+            watch.hearOwn();
+            return true;
+        }
+        boolean isOver = watch.hearAnother(runId);
+        if (System.nanoTime() - asked > ASK_AGAIN_NANOS) askInfo(); // which of the two is there
+        return isOver && mayTakeOver;
+    }
+
+    /** What comes may be of the next run, of which there is no info yet. The receiving thread's. */
+    boolean inDoubt() {
+        return watch.inDoubt();
+    }
+
+    private void tellAnotherServer(long runId) {
+        System.err.println(
+                "ruedo: another server is at "
+                        + url
+                        + ", too, with run "
+                        + runId
+                        + "; this client is in run "
+                        + info().head.run_id
+                        + ", world "
+                        + info().head.world
+                        + ". Samples of both mix, and commands go to both: give one of them another"
+                        + " --lcm port (this is said once)");
+    }
+
     private synchronized void awaitInfo(double timeout) {
         Deadline deadline = new Deadline(timeout);
         while (known == null) {
-            if (fault != null) throw fault;
+            // Beside what cannot be read there may be what can.
+            if (fault != null
+                    && (deadline.passed() || System.nanoTime() - faultAt >= FAULT_NANOS))
+                throw fault;
             String ended = server == null ? null : server.ended();
             if (ended != null) throw new RuedoException.NoServer(ended);
             if (deadline.passed()) {

@@ -30,9 +30,14 @@ final class Stepper {
     private static final long ACKNOWLEDGED_TOGETHER = 32; // steps
     private static final int MOST_WANTED = 256; // messages asked for at once
     private static final int MOST_EARLY = 512; // messages of one channel that wait for their ticks
+    private static final long MOST_EARLY_BYTES = // no server goes on with so much unheard
+            Math.min(256 << 20, Runtime.getRuntime().maxMemory() / 4);
     private static final int MOST_CHANNELS = 1 << 16; // more cannot be subscribed
     private static final int MOST_PARTS = 1024; // of a tick
+    private static final long MOST_LISTED = 1 << 20; // messages: 160 steps of a fleet
     private static final long MOST_AHEAD = 1024; // steps beyond what is here: no server is that far
+    private static final long FURTHEST = Long.MAX_VALUE / 2; // steps
+    private static final int DOUBTED_AFTER = 20; // silences in a row: 1.7 s and more
 
     /** Of a manifest. */
     private static final class Entry {
@@ -91,7 +96,9 @@ final class Stepper {
     private boolean taken = true;
     private long resends;
     private final TreeMap<Long, Step> steps = new TreeMap<>(); // those not collected yet
+    private long listed; // messages in the manifests of those not here
     private final List<ArrayDeque<Early>> early = new ArrayList<>(); // of each channel
+    private long earlyBytes; // of all
     private String waitsFor = "";
     private RuedoException fault;
     private boolean askNow; // without waiting for a silence
@@ -149,7 +156,12 @@ final class Stepper {
     }
 
     private synchronized boolean takesPart() {
-        if (!part || sim.info().head.run_id == runId) return part;
+        if (part) checkRun();
+        return part;
+    }
+
+    private void checkRun() {
+        if (sim.info().head.run_id == runId) return;
         part = false;
         throw new RuedoException.NoServer(
                 "the run that this client took part in has ended; another is at "
@@ -172,6 +184,8 @@ final class Stepper {
                 granted = in.int64();
                 have = in.int64();
                 newest = in.int64();
+                if (granted < 0 || granted > FURTHEST || have < -1 || have > granted)
+                    throw new IOException("nobody stands there");
             } catch (IOException error) {
                 throw new RuedoException.TypeMismatch(
                         "the reply to GRANT is no grant_reply_t of this client's version");
@@ -180,6 +194,9 @@ final class Stepper {
             epoch = reply.epoch;
             acknowledged = have;
             steps.clear();
+            listed = 0;
+            grantBody = new byte[0];
+            grantFrom = -1;
             taken = true;
             fault = null;
             waitsFor = "";
@@ -250,6 +267,7 @@ final class Stepper {
      */
     private void await(long until, double timeout) {
         long repeat = FIRST_REPEAT_MILLIS;
+        int silences = 0;
         Deadline deadline = new Deadline(timeout);
         wantedUntil = until;
         while (have < until || !taken) {
@@ -274,6 +292,11 @@ final class Stepper {
             }
             if (have >= until && taken) return;
             boolean silence = left <= 0 && have == had;
+            silences = silence ? silences + 1 : 0;
+            if (silences == DOUBTED_AFTER) {
+                silences = 0;
+                doubt();
+            }
             if (!taken && silence) {
                 grantAgain();
             } else if (taken && (silence || askNow)) {
@@ -287,6 +310,7 @@ final class Stepper {
                 deadline = new Deadline(timeout);
             } else if (silence) {
                 sim.checkServer();
+                checkRun();
                 if (!deadline.passed()) continue;
                 throw new RuedoException.Timeout(
                         "step "
@@ -297,6 +321,22 @@ final class Stepper {
                                 + (waitsFor.isEmpty() ? "" : ": the run waits for " + waitsFor));
             }
         }
+    }
+
+    /**
+     * Of what stands between this client and the next step some may not be the server's: all of it
+     * is asked for anew.
+     */
+    private void doubt() {
+        forgetSteps();
+        newest = have;
+        taken = grantBody.length == 0;
+    }
+
+    /** Those that are not here; they are asked for. */
+    private void forgetSteps() {
+        steps.tailMap(have, false).clear();
+        listed = 0;
     }
 
     private void grantAgain() {
@@ -394,8 +434,16 @@ final class Stepper {
             }
         }
         ArrayDeque<Early> queue = early.get(channel);
-        if (queue.size() == MOST_EARLY) queue.removeFirst();
+        if (queue.size() == MOST_EARLY) forgetFirst(queue);
         queue.addLast(new Early(java.nio.ByteBuffer.wrap(data).getLong(8), crc, data));
+        earlyBytes += data.length;
+        if (earlyBytes <= MOST_EARLY_BYTES) return;
+        for (ArrayDeque<Early> all : early) all.clear(); // what is missed is asked for
+        earlyBytes = 0;
+    }
+
+    private void forgetFirst(ArrayDeque<Early> queue) {
+        earlyBytes -= queue.removeFirst().data.length;
     }
 
     synchronized void onTick(byte[] message) {
@@ -428,12 +476,14 @@ final class Stepper {
             boolean mine = in.string().equals(session.name());
             if (in.int64() >= grantSequence && mine && number > grantFrom) taken = true;
         }
-        if (number <= have || number - have > MOST_AHEAD) return;
+        if (number <= have || number > have + MOST_AHEAD) return;
         Step step = steps.computeIfAbsent(number, key -> new Step());
-        while (step.parts.size() < nparts) step.parts.add(null);
-        step.utime = utime;
-        step.stateHash = hash;
-        if (step.parts.get(index) != null) return;
+        if (step.parts.isEmpty()) {
+            step.parts.addAll(java.util.Collections.nCopies(nparts, null));
+            step.utime = utime;
+            step.stateHash = hash;
+        }
+        if (step.parts.size() != nparts || step.parts.get(index) != null) return;
         List<Entry> entries = new ArrayList<>();
         int missing = 0;
         for (int n = in.count(20); n > 0; n--) {
@@ -444,6 +494,8 @@ final class Stepper {
         step.parts.set(index, entries);
         step.missing += missing;
         step.partsHere++;
+        listed += entries.size();
+        if (listed > MOST_LISTED) forgetSteps();
         progress();
     }
 
@@ -473,6 +525,7 @@ final class Stepper {
             if (one.crc != entry.crc || one.data.length != entry.size) continue;
             entry.data = one.data;
             entry.here = true;
+            earlyBytes -= one.data.length;
             all.remove();
         }
         return entry;
@@ -484,10 +537,11 @@ final class Stepper {
                 step = steps.get(have + 1)) {
             have++;
             for (List<Entry> entries : step.parts) {
+                listed -= entries.size();
                 for (Entry entry : entries) { // what is left of the time before came twice
                     ArrayDeque<Early> queue = early.get(entry.channel);
                     while (!queue.isEmpty() && queue.peekFirst().utime <= step.utime)
-                        queue.removeFirst();
+                        forgetFirst(queue);
                 }
             }
         }

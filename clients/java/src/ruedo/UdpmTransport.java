@@ -25,8 +25,8 @@ final class UdpmTransport implements Transport {
     private static final int LONG = 0x4c433033; // "LC03"
     private static final int MOST_IN_A_DATAGRAM = 64000; // bytes of channel and message
     private static final int LONGEST = 64 << 20; // bytes of a message that is put together
-    private static final int MOST_PARTIAL = 80 << 20; // bytes: memory of those not whole yet
-    private static final int FRAGMENT_MEMORY = 128; // bytes, beside its data
+    private static final long MOST_PARTIAL = // bytes: memory of those not whole yet
+            Math.min(80 << 20, Runtime.getRuntime().maxMemory() / 4);
     private static final int MOST_SENDERS = 32; // of messages that are not whole yet
 
     /**
@@ -39,7 +39,6 @@ final class UdpmTransport implements Transport {
         final int count;
         final Map<Integer, Fragment> fragments = new TreeMap<>(); // by number
         String channel;
-        long memory;
 
         Partial(int sequence, int size, int count) {
             this.sequence = sequence;
@@ -52,22 +51,24 @@ final class UdpmTransport implements Transport {
             int at = 0;
             for (Fragment fragment : fragments.values()) {
                 if (fragment.offset != at) return null;
-                at += fragment.data.length;
+                at += fragment.size;
             }
             if (at != size) return null;
             byte[] message = new byte[size];
             for (Fragment fragment : fragments.values())
-                System.arraycopy(fragment.data, 0, message, fragment.offset, fragment.data.length);
+                System.arraycopy(fragment.data, 0, message, fragment.offset, fragment.size);
             return message;
         }
     }
 
     private static final class Fragment {
         final int offset;
-        final byte[] data;
+        final int size;
+        final byte[] data; // as many bytes, or some more
 
-        Fragment(int offset, byte[] data) {
+        Fragment(int offset, int size, byte[] data) {
             this.offset = offset;
+            this.size = size;
             this.data = data;
         }
     }
@@ -78,7 +79,7 @@ final class UdpmTransport implements Transport {
     private volatile boolean closed;
     // The newest last; the receiving thread's.
     private final Map<SocketAddress, Partial> partials = new LinkedHashMap<>();
-    private long partialMemory;
+    private final FragmentPool pool = new FragmentPool();
 
     UdpmTransport(Address address) {
         try {
@@ -242,18 +243,20 @@ final class UdpmTransport implements Transport {
         if (offset < 0 || offset > size - in.remaining()) return;
         Partial partial = partialOf(sender, number, size, fragments);
         if (partial == null || partial.fragments.containsKey(fragment)) return;
-        byte[] data = new byte[in.remaining()];
-        in.get(data);
-        partial.fragments.put(fragment, new Fragment(offset, data));
-        partial.memory += data.length + FRAGMENT_MEMORY;
-        partialMemory += data.length + FRAGMENT_MEMORY;
+        int length = in.remaining();
+        byte[] data = pool.take(length);
+        in.get(data, 0, length);
+        partial.fragments.put(fragment, new Fragment(offset, length, data));
         if (channel != null) partial.channel = channel;
+        byte[] message = null;
         if (partial.fragments.size() == fragments) {
+            if (partial.channel != null) message = partial.joined();
             forget(sender);
-            byte[] message = partial.channel != null ? partial.joined() : null;
-            if (message != null) receiver.receive(partial.channel, message);
         }
-        while (partialMemory > MOST_PARTIAL) forgetOldest();
+        while (pool.held() > MOST_PARTIAL) {
+            if (!pool.shrink()) forgetOldest();
+        }
+        if (message != null) receiver.receive(partial.channel, message);
     }
 
     /** Null when a fragment contradicts those before it. */
@@ -270,7 +273,8 @@ final class UdpmTransport implements Transport {
 
     private void forget(SocketAddress sender) {
         Partial partial = partials.remove(sender);
-        if (partial != null) partialMemory -= partial.memory;
+        if (partial == null) return;
+        for (Fragment fragment : partial.fragments.values()) pool.giveBack(fragment.data);
     }
 
     private void forgetOldest() {

@@ -66,6 +66,13 @@ final class WorldInfo {
         return deviceChannels.getOrDefault(robot, Map.of()).get(device);
     }
 
+    /** Of a world_info_t; null where it is none that this client reads. */
+    static Long runIdOf(byte[] message) {
+        if (message.length < Assembler.HEAD) return null;
+        ByteBuffer head = ByteBuffer.wrap(message);
+        return head.getLong(0) == world_info_t.LCM_FINGERPRINT ? head.getLong(16) : null;
+    }
+
     boolean supports(int kind) {
         return (head.features >> kind & 1) != 0;
     }

@@ -1,0 +1,158 @@
+"""Two servers on one bus, and a stranger that says what a server would: no client takes the one for
+the other, waits without end, or is of no use afterwards.
+
+Of one machine the second server is refused (networks_test.py): here a relay carries each one's
+messages to the other's port, as a network does between two machines.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import subprocess
+import sys
+import threading
+from collections.abc import Callable, Iterator
+from urllib.parse import urlsplit
+
+import pytest
+import ruedo
+from conftest import HALL, HERE, PATIENCE, PROBES, Server, probe, ruedo_run
+from lying_datagrams import Datagrams
+from ruedo import lcmtypes
+
+QUICK = ("--disable", "p3at/camera")
+BESIDE = "another server is at "
+BEGUN = "another run has begun"
+
+
+@contextlib.contextmanager
+def one_bus(first: Server, second: Server) -> Iterator[None]:
+    """What one of them hears and says, the other one does, too."""
+    ports = [str(urlsplit(one.url).port) for one in (first, second)]
+    relay = subprocess.Popen(
+        [sys.executable, str(HERE / "lossy_relay.py"), *ports, "0", "0", "0", "1"],
+        stdout=subprocess.PIPE,
+        text=True,
+    )
+    try:
+        assert relay.stdout.readline() == "ready\n"
+        yield
+    finally:
+        relay.kill()
+        relay.wait()
+
+
+def heard_beside(sim: ruedo.Simulation, enough: int = 5) -> None:
+    """Waits for ticks of another run than the client's."""
+    came = threading.Semaphore(0)
+
+    def hear(data: bytes) -> None:
+        if lcmtypes.tick_t.decode(data).run_id != sim._info.run_id:
+            came.release()
+
+    with sim._connection.bus.subscribe("ruedo/tick", hear):
+        for _ in range(enough):
+            assert came.acquire(timeout=PATIENCE)
+
+
+def started(language: str, url: str, *command: str) -> subprocess.Popen[str]:
+    return subprocess.Popen(
+        [*PROBES[language], url, *command],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+
+
+def ended(client: subprocess.Popen[str]) -> tuple[list[str], str]:
+    said, errors = client.communicate(timeout=PATIENCE)
+    assert client.returncode == 0, said + errors
+    return said.splitlines(), errors
+
+
+def test_each_answers_its_own_clients_alone(language):
+    """The other one's "this is another run" is no answer."""
+    with (
+        ruedo_run(*QUICK, world=HALL) as first,
+        ruedo_run(*QUICK, world=HALL) as second,
+        one_bus(first, second),
+    ):
+        said = probe(language, first.url, "control", "p3at")
+        output = first.end()
+    assert said.words("paused")[1:] == said.words("paused")[:1] and said.one("step") == "7"
+    assert said.one("unknown").startswith("RequestError: ") and "nobody" in said.one("unknown")
+    assert "another server is on this channel" in output
+
+
+def test_motions_go_on_beside_another_server(language):
+    """Before, each of its signs was the beginning of a new run, which ended them."""
+    with (
+        ruedo_run(*QUICK, world=HALL) as first,
+        ruedo_run("--paused", *QUICK, world=HALL) as second,  # its robot says nothing
+        one_bus(first, second),
+    ):
+        said, errors = ended(started(language, first.url, "primitives", "p3at"))
+    for what in ("advance", "rotate", "turn_to", "arc"):
+        [line] = [line.split() for line in said if line.split()[0] == what]
+        assert line[1:5] == ["False", "True", "done", "-"], said
+    assert errors.count(BESIDE) == 1 and BEGUN not in errors
+
+
+def in_lockstep(
+    language: str, beside: Callable[[Server, ruedo.Simulation], contextlib.AbstractContextManager]
+) -> tuple[list[str], str]:
+    """What a client in lockstep says at its end, and its errors. From its first steps on `beside`
+    goes on.
+    """
+    with (
+        ruedo_run("--lockstep", "2", "--lease", str(PATIENCE), *QUICK, world=HALL) as server,
+        ruedo.connect(server.url, name="pace", timeout=PATIENCE) as pace,
+    ):
+        client = started(language, server.url, "lockstep", "client", "p3at", "100", "10", "0.2")
+        pace.step(0, timeout=PATIENCE)
+        assert client.stdout.readline().startswith("begin")
+        with beside(server, pace):
+            for _ in range(10):
+                pace.step(10, timeout=PATIENCE)
+            return ended(client)
+
+
+@contextlib.contextmanager
+def nothing(server: Server, pace: ruedo.Simulation) -> Iterator[None]:
+    yield
+
+
+@contextlib.contextmanager
+def another_server(server: Server, pace: ruedo.Simulation) -> Iterator[None]:
+    with ruedo_run(*QUICK, world=HALL) as second, one_bus(server, second):
+        heard_beside(pace)
+        yield
+
+
+def false_tick(run_id: int, step: int, nparts: int = 1) -> bytes:
+    """It names a message that never was, and says that all grants were executed."""
+    tick = lcmtypes.tick_t()
+    tick.utime, tick.run_id, tick.step, tick.nparts = 5000 * (step % 1000), run_id, step, nparts
+    applied, message = lcmtypes.tick_applied_t(), lcmtypes.tick_message_t()
+    applied.client, applied.sequence = "client", 1 << 40
+    message.channel_index, message.sequence, message.size, message.crc = 1, 1 << 40, 1000, 99
+    tick.applied, tick.napplied = [applied], 1
+    tick.manifest, tick.nmanifest = [message], 1
+    return tick.encode()
+
+
+@contextlib.contextmanager
+def false_ticks(server: Server, pace: ruedo.Simulation) -> Iterator[None]:
+    """Of all steps to come, before the true ones."""
+    with Datagrams(server.url) as stranger:
+        for step in [*range(1, 101), 2**63 - 1, -(2**63)]:
+            stranger.send("ruedo/tick", false_tick(pace._info.run_id, step))
+            stranger.send("ruedo/tick", false_tick(pace._info.run_id, step, 32767))
+        yield
+
+
+@pytest.mark.parametrize("beside", [another_server, false_ticks])
+def test_lockstep_sees_its_own_run_alone(language, beside):
+    said, errors = in_lockstep(language, beside)
+    assert (said, BEGUN in errors) == (in_lockstep(language, nothing)[0], False), errors
+    assert errors.count(BESIDE) == (beside is another_server)
