@@ -35,6 +35,12 @@ class Incoming {
     if (const auto participant = known_.left()) return write_left(*participant, out);
     return 0;
   }
+  void serve(const ros2::Gid& participant) {
+    const std::lock_guard lock(mutex_);
+    Prefix prefix{};
+    std::copy_n(participant.begin(), prefix.size(), prefix.begin());
+    known_.serve(prefix);
+  }
   // The samples in the message that are left.
   std::vector<Samples> bound(std::span<uint8_t> message, const ddsi_locator_t& from) {
     const std::lock_guard lock(mutex_);
@@ -120,7 +126,8 @@ void bound_fragments(std::span<uint8_t> message) {
   }
 }
 
-void bound_incoming(const ddsi_sertype& type) {
+void bound_incoming(const ddsi_sertype& type, const ros2::Gid& participant) {
+  incoming.serve(participant);
   ruedo_visit_receivers(ddsrt_atomic_ldvoidp(&type.gv), [](ddsi_tran_conn* socket) {
     if (socket->m_read_fn == read_bounded) return;
     ddsi_tran_read_fn_t none = nullptr;

@@ -1,103 +1,17 @@
-// RTPS 2.5, 8.5.3 (SPDP), 8.5.4 (SEDP), 9.4.2.11 (parameter lists), 9.6 (what they contain).
+// Who may tell of participants and endpoints, and what it costs (RTPS 2.5, 8.5).
 #include "dds/known_participants.h"
 
 #include <algorithm>
-#include <utility>
+#include <initializer_list>
 #include <vector>
-
-#include "dds/rtps_message.h"
 
 namespace ruedo::dds {
 namespace {
 
-using Bytes = std::span<uint8_t>;
-
-constexpr Entity kParticipant{0, 0, 1, 0xc1}, kAnnouncer{0, 1, 0, 0xc2},
-    kSecureAnnouncer{0xff, 1, 1, 0xc2}, kOfWriters{0, 0, 3, 0xc2}, kOfReaders{0, 0, 4, 0xc2};
 // Products of a vendor that tell of other participants.
 constexpr std::array<uint8_t, 2> kTellsOfOthers{1, 0x20};
-
-constexpr Entity kFragments{};      // stands for all endpoints that are told of in fragments
+constexpr size_t kFragmentsTopic = 0;
 constexpr size_t kEndpoint = 2048;  // bytes that Cyclone needs for an endpoint
-
-constexpr uint8_t kHasInlineQos = 2, kHasPayload = 4, kHasKey = 8;  // flags of a DATA
-constexpr uint8_t kBigEndianList = 2, kLittleEndianList = 3;        // encodings of a payload
-
-enum Parameter : uint16_t {
-  kPad = 0,
-  kSentinel = 1,
-  kParticipantGuid = 0x50,
-  kEndpointGuid = 0x5a,
-  kKeyHash = 0x70,
-  kStatus = 0x71,
-  kServes = 0x8007,  // Cyclone's: among others, whether it tells of other participants
-};
-
-uint32_t number_at(Bytes bytes, size_t at, size_t size, bool little) {
-  uint32_t value = 0;
-  for (size_t i = 0; i < size; ++i)
-    value |= uint32_t{bytes[at + i]} << 8 * (little ? i : size - 1 - i);
-  return value;
-}
-
-// Calls what(parameter with its head, id, value). Where the list ends; none: it does not.
-template <class Do>
-std::optional<size_t> for_each_parameter(Bytes list, bool little, Do what) {
-  for (size_t at = 0; at + 4 <= list.size();) {
-    const uint32_t id = number_at(list, at, 2, little), size = number_at(list, at + 2, 2, little);
-    if (id == kSentinel) return at + 4;
-    if (at + 4 + size > list.size()) return std::nullopt;
-    what(list.subspan(at, 4 + size), id, list.subspan(at + 4, size));
-    at += 4 + size;
-  }
-  return std::nullopt;
-}
-
-// What a DATA of discovery tells.
-struct Told {
-  Prefix who;  // tells it
-  bool of_own = false, of_others = false, leaves = false;
-  Entity endpoint{};
-
-  void take_guid(Bytes value) {
-    if (value.size() < kPrefix + endpoint.size()) return;
-    (std::equal(who.begin(), who.end(), value.begin()) ? of_own : of_others) = true;
-    std::copy_n(value.begin() + kPrefix, endpoint.size(), endpoint.begin());
-  }
-  bool take_inline_qos(const Submessage& part, Bytes& rest) {
-    const auto end =
-        for_each_parameter(rest, part.is_little_endian(), [&](Bytes, uint32_t id, Bytes value) {
-          if (id == kKeyHash) take_guid(value);
-          if (id == kStatus && value.size() >= 4) leaves = (value[3] & 3) != 0;
-        });
-    rest = rest.subspan(end.value_or(0));
-    return end.has_value();
-  }
-  bool take_payload(Bytes payload, uint32_t guid) {
-    if (payload.size() < 4 || payload[0] != 0) return false;
-    const bool little = payload[1] == kLittleEndianList;
-    if (!little && payload[1] != kBigEndianList) return false;
-    const auto take = [&](Bytes parameter, uint32_t id, Bytes value) {
-      if (id == guid) take_guid(value);
-      if (id == kServes) std::fill_n(parameter.begin(), 2, static_cast<uint8_t>(kPad));
-    };
-    return for_each_parameter(payload.subspan(4), little, take).has_value();
-  }
-};
-
-// guid: the parameter that says of whom it is told. None: it cannot be read, is too much, or is
-// told of another.
-std::optional<Told> told_in(const Submessage& part, const Prefix& who, uint32_t guid) {
-  constexpr size_t kOffset = 6;  // of what follows it
-  const size_t begin = kOffset + 2 + part.number(kOffset, 2);
-  if (begin > part.bytes.size() || part.bytes.size() > kMostTold) return std::nullopt;
-  Bytes rest = part.bytes.subspan(begin);
-  const uint8_t flags = part.bytes[1];
-  Told told{who};
-  const bool is_whole = (!(flags & kHasInlineQos) || told.take_inline_qos(part, rest)) &&
-                        (!(flags & (kHasPayload | kHasKey)) || told.take_payload(rest, guid));
-  return is_whole && told.of_own && !told.of_others ? std::optional(told) : std::nullopt;
-}
 
 }  // namespace
 
@@ -108,69 +22,44 @@ void KnownParticipants::bound(std::span<uint8_t> message, const Address& from,
   std::copy_n(message.begin() + 8, who.size(), who.begin());
   if (const auto known = known_.find(who); known != known_.end()) known->second.heard = now;
   bool of_others = std::equal(kTellsOfOthers.begin(), kTellsOfOthers.end(), message.begin() + 6);
+  bool to_others = false;
   for_each_submessage(message, [&](const Submessage& part) {
     of_others = of_others || part.kind() == Submessage::kInfoSource;
     if (of_others) return part.erase();
+    if (part.kind() == Submessage::kInfoDestination) to_others = !is_addressed(part);
     if (!part.is_data() && !part.is_fragment()) return;
     Entity writer{};
     std::copy_n(part.bytes.begin() + Submessage::kWriter, writer.size(), writer.begin());
-    if (writer == kSecureAnnouncer || (writer == kAnnouncer && part.is_fragment()))
-      part.erase();
-    else if (writer == kAnnouncer)
-      announce(part, who, from, now);
-    else if (writer == kOfWriters || writer == kOfReaders)
-      part.is_data() ? tell_endpoint(part, who) : tell_fragment(part, who);
+    const bool announces = writer == kAnnouncer || writer == kSecureAnnouncer,
+               tells = writer == kOfWriters || writer == kOfReaders;
+    if (!announces && !tells) return;
+    if (to_others || (announces && (part.is_fragment() || writer == kSecureAnnouncer)))
+      return part.erase();
+    if (announces) return announce(part, who, from, now);
+    const auto known = known_.find(who);
+    if (known == known_.end()) return;
+    part.is_data() ? tell_endpoint(part, writer, known) : tell_fragment(part, writer, known);
   });
+}
+
+// Whether what follows is for this program, or for all.
+bool KnownParticipants::is_addressed(const Submessage& part) const {
+  Prefix to{};
+  if (part.bytes.size() < kSubmessageHeader + to.size()) return false;
+  std::copy_n(part.bytes.begin() + kSubmessageHeader, to.size(), to.begin());
+  return to == Prefix{} || own_.contains(to);
 }
 
 void KnownParticipants::announce(const Submessage& part, const Prefix& who, const Address& from,
                                  Clock::time_point now) {
-  const std::optional<Told> told = told_in(part, who, kParticipantGuid);
+  const auto told = discovery_data(part, who, kParticipantGuid);
   if (!told) return part.erase();
   if (!told->leaves) {
-    if (!may_announce(who, from, now)) part.erase();
+    if (!may_announce(who, from, now)) return part.erase();
+    bound_locators(*told, known_.at(who).from);
   } else if (const auto known = known_.find(who); known != known_.end()) {
     forget(known);
   }
-}
-
-void KnownParticipants::tell_endpoint(const Submessage& part, const Prefix& who) {
-  const std::optional<Told> told = told_in(part, who, kEndpointGuid);
-  if (!told) return part.erase();
-  count(who, told->endpoint, told->leaves ? 0 : kEndpoint + part.bytes.size());
-}
-
-// It is not whole, so that who tells of an endpoint again is taken to tell of another.
-void KnownParticipants::tell_fragment(const Submessage& part, const Prefix& who) {
-  const size_t size = part.number(Submessage::kSampleSize, 4);
-  if (size > kMostTold) return part.leave_out();
-  if (part.number(Submessage::kFirstFragment, 4) != 1) return;
-  if (const auto known = known_.find(who); known != known_.end())
-    count(who, kFragments, known->second.endpoints[kFragments] + kEndpoint + size);
-}
-
-void KnownParticipants::count(const Prefix& who, const Entity& endpoint, size_t bytes) {
-  const auto known = known_.find(who);
-  if (known == known_.end()) return;
-  size_t& before = known->second.endpoints[endpoint];
-  known->second.bytes += bytes - before;
-  bytes_ += bytes - before;
-  before = bytes;
-  if (bytes == 0) known->second.endpoints.erase(endpoint);
-  if (bytes_ <= kMostOfAll) return;
-  put_out(std::max_element(known_.begin(), known_.end(), [](const auto& a, const auto& b) {
-    return a.second.bytes < b.second.bytes;
-  }));
-}
-
-void KnownParticipants::forget(Place known) {
-  bytes_ -= known->second.bytes;
-  known_.erase(known);
-}
-
-void KnownParticipants::put_out(Place known) {
-  left_.push_back(known->first);
-  forget(known);
 }
 
 bool KnownParticipants::may_announce(const Prefix& who, const Address& from,
@@ -181,24 +70,106 @@ bool KnownParticipants::may_announce(const Prefix& who, const Address& from,
     return true;
   }
   if (!make_room(from, now)) return false;
-  known_[who] = {from, now, now, {}, 0};
+  known_[who] = {from, now, now, {}, {}, 0};
+  ++sockets_[from].participants;
   return true;
 }
 
 bool KnownParticipants::make_room(const Address& from, Clock::time_point now) {
-  const auto of_socket = [&](const auto& each) { return each.second.from == from; };
-  const bool has_share = static_cast<size_t>(std::count_if(known_.begin(), known_.end(),
-                                                           of_socket)) >= kMostOfOneSocket;
+  const auto socket = sockets_.find(from);
+  const bool has_share =
+      socket != sockets_.end() && socket->second.participants >= kMostOfOneSocket;
   if (!has_share && known_.size() < kMostParticipants) return true;
   if (now < next_turn_) return false;
   next_turn_ = now + kTurn;
-  const auto silent =
-      std::min_element(known_.begin(), known_.end(), [&](const auto& a, const auto& b) {
-        if (has_share && of_socket(a) != of_socket(b)) return of_socket(a);
-        return a.second.heard < b.second.heard;
-      });
-  put_out(silent);
+  put_out(std::min_element(known_.begin(), known_.end(), [&](const auto& a, const auto& b) {
+    const bool of_socket = a.second.from == from;
+    if (has_share && of_socket != (b.second.from == from)) return of_socket;
+    return a.second.heard < b.second.heard;
+  }));
   return true;
+}
+
+void KnownParticipants::tell_endpoint(const Submessage& part, const Entity& writer, Place known) {
+  const auto told = discovery_data(part, known->first, kEndpointGuid);
+  if (!told) return part.erase();
+  const EndpointKey key{told->entity, 0};
+  const int64_t sequence = part.sequence(Submessage::kSequence);
+  int64_t& last = known->second.last[writer];
+  const bool is_new = sequence > last;  // Cyclone passes over what it has had
+  last = std::max(last, sequence);
+  if (told->leaves) {
+    if (is_new) remove(known, key);
+    return;
+  }
+  if (!add(known, key, {told->topic, kEndpoint + part.bytes.size()})) return part.erase();
+  bound_locators(*told, known->second.from);
+  make_room_for_endpoints();
+}
+
+void KnownParticipants::tell_fragment(const Submessage& part, const Entity& writer, Place known) {
+  const size_t size = part.number(Submessage::kSampleSize, 4);
+  const EndpointKey key{writer, part.sequence(Submessage::kSequence)};
+  if (size > kMostTold || !add(known, key, {kFragmentsTopic, kEndpoint + size}))
+    return part.leave_out();
+  make_room_for_endpoints();
+}
+
+// False: the socket has its share of the topic. An endpoint stays in its topic.
+bool KnownParticipants::add(Place known, const EndpointKey& key, const Endpoint& endpoint) {
+  auto before = known->second.endpoints.find(key);
+  if (before == known->second.endpoints.end()) {
+    size_t& count = sockets_[known->second.from].endpoints[endpoint.topic];
+    if (count >= kMostOfOneTopic) return false;
+    ++count;
+    before = known->second.endpoints.try_emplace(key, Endpoint{endpoint.topic, 0}).first;
+  }
+  if (const size_t more = std::max(before->second.bytes, endpoint.bytes) - before->second.bytes) {
+    before->second.bytes += more;
+    known->second.bytes += more;
+    bytes_ += more;
+  }
+  return true;
+}
+
+void KnownParticipants::remove(Place known, const EndpointKey& key) {
+  const auto endpoint = known->second.endpoints.find(key);
+  if (endpoint == known->second.endpoints.end()) return;
+  auto& endpoints = sockets_[known->second.from].endpoints;
+  if (const auto topic = endpoints.find(endpoint->second.topic); --topic->second == 0)
+    endpoints.erase(topic);
+  known->second.bytes -= endpoint->second.bytes;
+  bytes_ -= endpoint->second.bytes;
+  known->second.endpoints.erase(endpoint);
+}
+
+void KnownParticipants::bound_locators(const DiscoveryData& told, const Address& from) {
+  std::set<Locator>& known = sockets_[from].locators;
+  for (const ToldLocator& each : told.locators) {
+    if (known.size() < kMostLocators)
+      known.insert(each.locator);
+    else if (!known.contains(each.locator))
+      each.erase();
+  }
+}
+
+void KnownParticipants::make_room_for_endpoints() {
+  if (bytes_ <= kMostOfEndpoints) return;
+  put_out(std::max_element(known_.begin(), known_.end(), [](const auto& a, const auto& b) {
+    return a.second.bytes < b.second.bytes;
+  }));
+}
+
+void KnownParticipants::forget(Place known) {
+  while (!known->second.endpoints.empty()) remove(known, known->second.endpoints.begin()->first);
+  const auto socket = sockets_.find(known->second.from);
+  if (--socket->second.participants == 0) sockets_.erase(socket);
+  known_.erase(known);
+}
+
+void KnownParticipants::put_out(Place known) {
+  left_.push_back(known->first);
+  forget(known);
 }
 
 std::optional<Prefix> KnownParticipants::left() {
@@ -209,6 +180,7 @@ std::optional<Prefix> KnownParticipants::left() {
 }
 
 size_t write_left(const Prefix& participant, std::span<uint8_t> out) {
+  constexpr uint8_t kLittleEndianList = 3;
   std::vector<uint8_t> message{'R', 'T', 'P', 'S', 2, 1, 1, 16};
   const auto add = [&](std::initializer_list<uint8_t> bytes) {
     message.insert(message.end(), bytes);

@@ -20,6 +20,7 @@ struct Submessage {
     kGap = 0x08,
     kInfoTimestamp = 0x09,
     kInfoSource = 0x0c,
+    kInfoDestination = 0x0e,
     kData = 0x15,
     kDataFrag = 0x16,
     kNothing = 0xff,  // a vendor's own, which nobody knows

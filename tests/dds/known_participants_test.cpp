@@ -65,9 +65,17 @@ Bytes leaving(const Prefix& whose) {
   return data(kAnnouncer, 1, rest, 2 | 8);
 }
 
-Bytes endpoint(const Prefix& whose, uint32_t entity, size_t size = 100) {
-  return data(kOfWriters, 1,
-              list({parameter(kEndpointGuid, guid(whose, entity)), parameter(0x2c, Bytes(size))}));
+Bytes endpoint(const Prefix& whose, uint32_t entity, size_t size = 100, uint8_t topic = 'a',
+               uint64_t sequence = 1) {
+  return data(kOfWriters, sequence,
+              list({parameter(kEndpointGuid, guid(whose, entity)), parameter(0x2c, Bytes(size)),
+                    parameter(5, {2, 0, 0, 0, topic, topic, topic, 0})}));
+}
+
+Bytes goes(const Prefix& whose, uint32_t entity, uint64_t sequence) {
+  Bytes rest = message({parameter(0x71, {0, 0, 0, 3}), parameter(1, {})});
+  append(rest, list({parameter(kEndpointGuid, guid(whose, entity))}));
+  return data(kOfWriters, sequence, rest, 2 | 8);
 }
 
 Bytes from(const Prefix& who, std::initializer_list<Bytes> parts, uint8_t vendor = 16) {
@@ -157,6 +165,21 @@ TEST_F(KnownParticipantsTest, NobodyTellsOfOthers) {
   EXPECT_EQ(turned[20 + 24], 0xff);
 }
 
+TEST_F(KnownParticipantsTest, WhatIsToldToOthersMeansNothing) {
+  const Prefix own = prefix(1);
+  known_.serve(prefix(9));
+  const auto leaves_to = [&](const Prefix& whom) {
+    Bytes bytes = from(own, {submessage(0x0e, 0, Bytes(whom.begin(), whom.end())), leaving(own)});
+    known_.bound(bytes, socket(1), now_);
+    return bytes[36] == 0x15 && known_.size() == 0;
+  };
+  EXPECT_TRUE(comes(1, 1));
+  EXPECT_FALSE(leaves_to(prefix(8)));
+  EXPECT_TRUE(leaves_to(prefix(9)));
+  EXPECT_TRUE(comes(1, 1));
+  EXPECT_TRUE(leaves_to(Prefix{}));
+}
+
 TEST_F(KnownParticipantsTest, ToHaveLeftIsSaidBesideTheDataOnly) {
   // In the data, that parameter means nothing.
   const Prefix own = prefix(1);
@@ -176,30 +199,95 @@ TEST_F(KnownParticipantsTest, WhatCannotBeReadIsNotLetIn) {
     EXPECT_FALSE(passes(from(own, {cut}))) << size;
   }
   EXPECT_FALSE(passes(from(own, {data(kAnnouncer, 1, list({}))})));
-  EXPECT_FALSE(passes(from(own, {endpoint(own, 0x0103, kMostTold)})));
   EXPECT_EQ(known_.size(), 0u);
+  EXPECT_TRUE(passes(from(own, {good})));
+  EXPECT_FALSE(passes(from(own, {endpoint(own, 0x0103, kMostTold)})));
 }
 
 TEST_F(KnownParticipantsTest, WhoHasTheMostEndpointsGivesWay) {
   EXPECT_TRUE(comes(1, 1) && comes(2, 2));
   uint32_t entity = 0;
+  uint64_t sequence = 0;
   const auto tell = [&](uint32_t who) {
-    EXPECT_TRUE(passes(from(prefix(who), {endpoint(prefix(who), ++entity << 8 | 3, 12'000)})));
+    ++entity;
+    const auto topic = static_cast<uint8_t>(entity % 200);
+    EXPECT_TRUE(
+        passes(from(prefix(who), {endpoint(prefix(who), entity, 12'000, topic, ++sequence)})));
   };
   for (int i = 0; i < 1000; ++i) tell(2);
-  // One endpoint, told of again, and one that comes and goes, take no room.
+  // One that is told of again, or that comes and goes, takes no room.
   for (int i = 0; i < 12'000; ++i) {
-    EXPECT_TRUE(passes(from(prefix(2), {endpoint(prefix(2), 3, 12'000)})));
-    Bytes rest = message({parameter(0x71, {0, 0, 0, 3}), parameter(1, {})});
-    append(rest, list({parameter(kEndpointGuid, guid(prefix(2), 3))}));
-    EXPECT_TRUE(passes(from(prefix(2), {data(kOfWriters, 1, rest, 2 | 8)})));
+    EXPECT_TRUE(passes(from(prefix(2), {endpoint(prefix(2), 0, 12'000, 'a', ++sequence)})));
+    if (i % 2 == 1) {
+      EXPECT_TRUE(passes(from(prefix(2), {goes(prefix(2), 0, ++sequence)})));
+    }
   }
   EXPECT_TRUE(left().empty());
-  int told = 0;
+  uint32_t told = 1000;
   for (; known_.size() == 2; ++told) tell(1);
   EXPECT_EQ(left(), std::vector{prefix(1)});
-  // Each is 24 bytes of head, 4 + 20 + 12'004 + 4 of the list, and 2 kB that Cyclone needs.
-  EXPECT_EQ(1000 + told, 134'217'728 / 14'104 + 1);
+  // Each is 24 bytes of head, 4 + 20 + 12'004 + 12 + 4 of the list, and 2 kB that Cyclone needs.
+  EXPECT_EQ(told, 134'217'728 / 14'116 + 1);
+}
+
+TEST_F(KnownParticipantsTest, OneSocketHasItsShareOfATopic) {
+  EXPECT_TRUE(comes(1, 1) && comes(2, 1) && comes(3, 3));
+  const auto tells = [&](uint32_t who, uint32_t entity, uint8_t topic, uint64_t sequence = 1) {
+    return passes(from(prefix(who), {endpoint(prefix(who), entity, 8, topic, sequence)}));
+  };
+  for (uint32_t i = 0; i < kMostOfOneTopic; ++i) EXPECT_TRUE(tells(1 + i % 2, i, 'a', i + 1));
+  EXPECT_FALSE(tells(1, 1000, 'a'));
+  EXPECT_FALSE(tells(2, 1000, 'a'));
+  EXPECT_TRUE(tells(2, 1000, 'b'));
+  EXPECT_TRUE(tells(3, 1000, 'a'));
+  EXPECT_TRUE(tells(1, 0, 'a'));  // is known already
+  EXPECT_TRUE(tells(1, 0, 'c'));  // stays where it was
+  EXPECT_FALSE(tells(1, 1000, 'a'));
+  EXPECT_TRUE(passes(from(prefix(1), {goes(prefix(1), 0, 1)})));  // was told before: means nothing
+  EXPECT_FALSE(tells(1, 1000, 'a'));
+  EXPECT_TRUE(passes(from(prefix(1), {goes(prefix(1), 0, 1000)})));
+  EXPECT_TRUE(tells(1, 1000, 'a'));
+  EXPECT_TRUE(passes(from(prefix(2), {leaving(prefix(2))})));
+  for (uint32_t i = 0; i < kMostOfOneTopic / 2; ++i) EXPECT_TRUE(tells(1, 2000 + i, 'a')) << i;
+  EXPECT_FALSE(tells(1, 3000, 'a'));
+}
+
+TEST_F(KnownParticipantsTest, OneSocketHasItsShareOfAddresses) {
+  EXPECT_TRUE(comes(1, 1) && comes(2, 2));
+  // Which of two is left.
+  const auto left_of = [&](uint32_t who, uint8_t first, uint8_t second) {
+    const auto locator = [](uint8_t number) { return parameter(0x2f, Bytes(24, number)); };
+    Bytes bytes = from(prefix(who), {data(kOfReaders, 1,
+                                          list({parameter(kEndpointGuid, guid(prefix(who), first)),
+                                                locator(first), locator(second)}))});
+    known_.bound(bytes, socket(9), now_);
+    // Behind two headers, 20 bytes of DATA, the list's 4 and the GUID's 20.
+    EXPECT_EQ(bytes[20], 0x15);
+    return std::pair(bytes[68] == 0x2f, bytes[96] == 0x2f);
+  };
+  for (uint8_t i = 0; i < kMostLocators; i += 2)
+    EXPECT_EQ(left_of(1, i, i + 1), std::pair(true, true));
+  EXPECT_EQ(left_of(1, 100, 3), std::pair(false, true));
+  EXPECT_EQ(left_of(2, 100, 3), std::pair(true, true));
+}
+
+TEST_F(KnownParticipantsTest, FragmentsThatTellAreBounded) {
+  EXPECT_TRUE(comes(1, 1));
+  const auto fragment_of = [&](uint64_t sequence, uint32_t size) {
+    Bytes rest;
+    put(rest, 1, 4), put(rest, 1, 2), put(rest, 1344, 2), put(rest, size, 4);
+    rest.resize(rest.size() + 1344);
+    Bytes part = data(kOfWriters, sequence, rest, 0);
+    part[0] = 0x16;
+    Bytes bytes = from(prefix(1), {part});
+    known_.bound(bytes, socket(1), now_);
+    EXPECT_EQ(bytes[20], 0x16);
+    return bytes[20 + 32 + 3] != 0xff;  // of the sample's size, which is left out with the largest
+  };
+  EXPECT_FALSE(fragment_of(1, kMostTold + 1));
+  for (uint64_t i = 1; i <= kMostOfOneTopic; ++i) EXPECT_TRUE(fragment_of(i, 4000));
+  EXPECT_FALSE(fragment_of(1000, 4000));
+  EXPECT_TRUE(fragment_of(1, 4000));  // is sent again
 }
 
 TEST_F(KnownParticipantsTest, ToLeaveIsSaidAsParticipantsDo) {
