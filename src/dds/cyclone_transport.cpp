@@ -39,6 +39,7 @@ using ros2::Role;
 
 constexpr uint32_t kLastDomain = 232;  // higher domains have no valid ports
 constexpr int kCyclonesThreads = 12;
+constexpr auto kLinger = "250ms";     // for readers that have not acknowledged all, at the end
 constexpr int kMostTaken = 64;        // samples taken at once
 constexpr auto kLook = DDS_MSECS(2);  // interval for requests that have to wait
 
@@ -170,7 +171,9 @@ std::string configuration(const CycloneOptions& options) {
          "<DefragUnreliableMaxSamples>4</DefragUnreliableMaxSamples>"
          "<DefragReliableMaxSamples>4</DefragReliableMaxSamples>"
          "<PrimaryReorderMaxSamples>32</PrimaryReorderMaxSamples>"
-         "<SecondaryReorderMaxSamples>32</SecondaryReorderMaxSamples><Watermarks><WhcHigh>1GB</"
+         "<SecondaryReorderMaxSamples>32</SecondaryReorderMaxSamples><WriterLingerDuration>" +
+         std::string(kLinger) +
+         "</WriterLingerDuration><Watermarks><WhcHigh>1GB</"
          "WhcHigh></Watermarks></Internal>"
          "<Tracing><Verbosity>none</Verbosity></Tracing></Domain></CycloneDDS>";
 }
@@ -244,7 +247,7 @@ class CycloneReader : public ros2::Reader {
                      "topic " + name);
     reader_ = checked(dds_create_reader(participant, topic_, qos_of(endpoint).get(), nullptr),
                       "reader of " + name);
-    bound_incoming(*type);
+    bound_incoming(*type, gid_of(participant));
     checked(dds_set_status_mask(reader_,
                                 DDS_DATA_AVAILABLE_STATUS | DDS_REQUESTED_INCOMPATIBLE_QOS_STATUS),
             "reader of " + name);

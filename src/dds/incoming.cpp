@@ -3,59 +3,105 @@
 
 #include <algorithm>
 #include <atomic>
+#include <cstdint>
+#include <cstring>
+#include <iterator>
 #include <limits>
-#include <optional>
+#include <mutex>
 #include <vector>
 
 #include <dds/ddsi/ddsi_tran.h>
 
+#include "dds/held_samples.h"
+#include "dds/known_participants.h"
+#include "dds/rtps_message.h"
 #include "dds/sockets.h"
 
 namespace ruedo::dds {
 namespace {
 
-constexpr size_t kMessageHeader = 20, kSubmessageHeader = 4;
-constexpr uint8_t kDataFrag = 0x16, kNothing = 0xff;  // a vendor's own, which nobody knows
-constexpr uint8_t kLittleEndian = 1;
-// Of a DataFrag: flags, offset of the inline QoS, reader, writer, sequence number, then these.
-constexpr size_t kFragmentSize = kSubmessageHeader + 26, kSampleSize = kSubmessageHeader + 28,
-                 kFragmentHead = kSubmessageHeader + 32;
-
-struct Submessage {
-  std::span<uint8_t> bytes;
-
-  bool is_fragment() const { return bytes[0] == kDataFrag && bytes.size() >= kFragmentHead; }
-  uint32_t number(size_t at, size_t size) const {
-    uint32_t value = 0;
-    for (size_t i = 0; i < size; ++i) {
-      const size_t shift = bytes[1] & kLittleEndian ? i : size - 1 - i;
-      value |= uint32_t{bytes[at + i]} << 8 * shift;
-    }
-    return value;
+// What all of Cyclone's threads that receive have let in.
+class Incoming {
+ public:
+  // A datagram has taken so many bytes that Cyclone may hold.
+  void hold(size_t bytes, std::span<const Samples> samples) {
+    const std::lock_guard lock(mutex_);
+    held_.add(bytes, samples);
   }
+  // A message that nobody sent: what has to give way. 0: nothing has.
+  size_t write_notice(std::span<uint8_t> out) {
+    const std::lock_guard lock(mutex_);
+    if (const auto samples = held_.overdue()) return write_dropped(*samples, out);
+    if (const auto participant = known_.left()) return write_left(*participant, out);
+    return 0;
+  }
+  void serve(const ros2::Gid& participant) {
+    const std::lock_guard lock(mutex_);
+    Prefix prefix{};
+    std::copy_n(participant.begin(), prefix.size(), prefix.begin());
+    known_.serve(prefix);
+  }
+  // The samples in the message that are left.
+  std::vector<Samples> bound(std::span<uint8_t> message, const ddsi_locator_t& from) {
+    const std::lock_guard lock(mutex_);
+    known_.bound(message, address_of(from), KnownParticipants::Clock::now());
+    bound_fragments(message);
+    return samples_in(message);
+  }
+
+ private:
+  static Address address_of(const ddsi_locator_t& from) {
+    Address address{};
+    std::copy(std::begin(from.address), std::end(from.address), address.begin());
+    std::memcpy(address.data() + sizeof from.address, &from.port, sizeof from.port);
+    return address;
+  }
+
+  std::mutex mutex_;
+  HeldSamples held_;
+  KnownParticipants known_;
 };
 
-// None: nothing whole begins there.
-std::optional<Submessage> submessage_at(std::span<uint8_t> message, size_t begin) {
-  if (begin + kSubmessageHeader > message.size()) return std::nullopt;
-  const Submessage head{message.subspan(begin)};
-  const size_t size = head.number(2, 2);
-  // The last may leave its size to the datagram's.
-  if (size == 0)
-    return begin + kFragmentHead <= message.size() && head.is_fragment()
-               ? head
-               : Submessage{message.subspan(begin, kSubmessageHeader)};
-  if (begin + kSubmessageHeader + size > message.size()) return std::nullopt;
-  return Submessage{message.subspan(begin, kSubmessageHeader + size)};
-}
+Incoming incoming;
+
+// The datagram that a thread received before. Cyclone puts the next one into the same place, unless
+// it holds some of it.
+struct Received {
+  const uint8_t* place = nullptr;
+  size_t size = 0;
+  std::vector<Samples> samples;
+  ddsi_locator_t from{};
+
+  void settle(const uint8_t* next) {
+    const auto begin = reinterpret_cast<uintptr_t>(place), end = reinterpret_cast<uintptr_t>(next);
+    if (begin != end && !samples.empty()) {
+      const bool is_behind = end > begin && end - begin < 2 * std::numeric_limits<uint16_t>::max();
+      incoming.hold(is_behind ? end - begin : size, samples);
+    }
+    samples.clear();
+  }
+};
 
 // The function that all of Cyclone's UDP sockets have.
 std::atomic<ddsi_tran_read_fn_t> plain_read{nullptr};
 
 ssize_t read_bounded(ddsi_tran_conn_t conn, unsigned char* into, size_t size, bool allow_spurious,
                      ddsi_locator_t* from) {
-  const ssize_t got = plain_read.load()(conn, into, size, allow_spurious, from);
-  if (got > 0) bound_fragments({into, static_cast<size_t>(got)});
+  thread_local Received last;
+  last.settle(into);
+  last.place = into;
+  // In place of the datagram, which waits in the socket.
+  if (const size_t notice = incoming.write_notice({into, size})) {
+    if (from) *from = last.from;
+    return static_cast<ssize_t>(notice);
+  }
+  ddsi_locator_t sender{};
+  const ssize_t got = plain_read.load()(conn, into, size, allow_spurious, &sender);
+  if (from) *from = sender;
+  if (got <= 0) return got;
+  last.size = static_cast<size_t>(got);
+  last.from = sender;
+  last.samples = incoming.bound({into, last.size}, sender);
   return got;
 }
 
@@ -64,24 +110,24 @@ ssize_t read_bounded(ddsi_tran_conn_t conn, unsigned char* into, size_t size, bo
 void bound_fragments(std::span<uint8_t> message) {
   std::vector<Submessage> fragments;
   size_t payload = 0;
-  for (size_t at = kMessageHeader; const auto each = submessage_at(message, at);) {
-    at += each->bytes.size();
-    if (!each->is_fragment()) continue;
-    fragments.push_back(*each);
-    payload += each->bytes.size() - kFragmentHead;
-  }
+  for_each_submessage(message, [&](const Submessage& each) {
+    if (!each.is_fragment()) return;
+    fragments.push_back(each);
+    payload += each.bytes.size() - Submessage::kFragmentHead;
+  });
   const bool is_hollow = message.size() > payload + kMostBesideFragments;
   for (const Submessage& fragment : fragments) {
     if (is_hollow) {
-      fragment.bytes[0] = kNothing;
-    } else if (fragment.number(kSampleSize, 4) > kLargestIncoming ||
-               fragment.number(kFragmentSize, 2) < kSmallestFragment) {
-      std::fill_n(fragment.bytes.begin() + kSampleSize, 4, std::numeric_limits<uint8_t>::max());
+      fragment.erase();
+    } else if (fragment.number(Submessage::kSampleSize, 4) > kLargestIncoming ||
+               fragment.number(Submessage::kFragmentSize, 2) < kSmallestFragment) {
+      fragment.leave_out();
     }
   }
 }
 
-void bound_incoming(const ddsi_sertype& type) {
+void bound_incoming(const ddsi_sertype& type, const ros2::Gid& participant) {
+  incoming.serve(participant);
   ruedo_visit_receivers(ddsrt_atomic_ldvoidp(&type.gv), [](ddsi_tran_conn* socket) {
     if (socket->m_read_fn == read_bounded) return;
     ddsi_tran_read_fn_t none = nullptr;

@@ -1,4 +1,5 @@
-// Bounds on what a stranger's fragments cost, before Cyclone DDS sees them.
+// Bounds on what strangers' datagrams cost, before Cyclone DDS sees them: here those on fragments,
+// with those of dds/held_samples.h and dds/known_participants.h.
 //
 // Cyclone keeps the datagrams of a sample until it is whole. Its limit on a sample's size holds for
 // both directions, so that it has to let pictures pass, and it has none on a fragment's: fragments
@@ -9,6 +10,8 @@
 #include <span>
 
 #include <dds/ddsi/ddsi_sertype.h>
+
+#include "ros2/transport.h"
 
 namespace ruedo::dds {
 
@@ -25,7 +28,8 @@ constexpr size_t kMostBesideFragments = 16u << 10;
 // again.
 void bound_fragments(std::span<uint8_t> message);
 
-// From now on, all sockets of that type's domain receive messages in this way.
-void bound_incoming(const ddsi_sertype& type);
+// From now on, all sockets of that type's domain receive messages in this way. participant: of this
+// program, in that domain.
+void bound_incoming(const ddsi_sertype& type, const ros2::Gid& participant);
 
 }  // namespace ruedo::dds

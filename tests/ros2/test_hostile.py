@@ -21,7 +21,8 @@ from cyclonedds.builtin import BuiltinDataReader, BuiltinTopicDcpsSubscription
 from cyclonedds.core import Policy
 from cyclonedds.idl import IdlStruct, make_idl_struct
 from cyclonedds.idl.types import float64, sequence, uint8
-from ros_types import LaserScan, Odometry, Twist, Vector3
+from ros_types import Clock, LaserScan, Odometry, Twist, Vector3
+from rtps import participant, prefix, reader
 from simulation_types import SERVICES
 from test_services import Client, filters
 
@@ -236,17 +237,25 @@ def fragments(writer: bytes, kind: str) -> Iterator[bytes]:
         "of a huge sample": (large, 2**31 - 1, b""),
         "of one byte": (b"x" * 4, 2**31 - 1, b""),
         "with much beside them": (small, 4 << 20, beside),
+        "large": (large, 4 << 20, b""),
     }[kind]
     size = 1 if kind == "of one byte" else len(payload)
     repeated = 100 if kind == "of one byte" else 1
+    # The first and every second are left out.
+    numbers = 2 * min(3000, whole // size // 2 - 1)
     for number in itertools.count(2, 2 * repeated):
         message = b"RTPS\x02\x01\x01\x10" + writer[:12]
-        sample, start = 1 + number // 6000, 2 + number % 6000
+        sample, start = 1 + number // numbers, 2 + number % numbers
         for i in range(repeated):
             body = struct.pack("<HHI", 0, 28, 0) + writer[12:]
             body += struct.pack("<iIIHHI", 0, sample, start + 2 * i, 1, size, whole) + payload
             message += struct.pack("<BBH", 0x16, 1, len(body)) + body
         yield message + rest
+
+
+def ports(domain: int, kind: int) -> list[tuple[str, int]]:
+    """Where the first two participants of this machine listen: 10 to discovery, 11 to data."""
+    return [("127.0.0.1", 7400 + 250 * domain + kind + 2 * index) for index in (0, 1)]
 
 
 def resident_mb(process) -> int:
@@ -268,8 +277,7 @@ def test_fragments_that_never_make_a_sample_take_no_memory(kind):
         before = resident_mb(run.process)
         sent = 0
         for message in itertools.islice(fragments(writer.guid.bytes, kind), 25_000):
-            for participant in (0, 1):  # whichever was first
-                to = ("127.0.0.1", 7400 + 250 * run.domain + 11 + 2 * participant)
+            for to in ports(run.domain, 11):
                 with contextlib.suppress(ConnectionRefusedError):
                     sent += stranger.sendto(message, to)
             if sent > 1_000_000:
@@ -278,6 +286,73 @@ def test_fragments_that_never_make_a_sample_take_no_memory(kind):
         assert resident_mb(run.process) - before < 400
         honest = Peer(run.domain)
         drives(honest, honest.writer("/cmd_vel", Twist), honest.reader("/odom", Odometry))
+        run.end()
+    assert run.process.returncode == 0
+
+
+def test_fragments_of_many_writers_take_little_memory():
+    """Regression: each writer had 16 MB and more of its own."""
+    with Run("--no-noise") as run, socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as stranger:
+        peer = Peer(run.domain)
+        writers = [peer.writer("/cmd_vel", Twist) for _ in range(70)]
+        for writer in writers:
+            wait_for(writer.get_matched_subscriptions, "a reader")
+        before = resident_mb(run.process)
+        kinds = [fragments(writer.guid.bytes, "large") for writer in writers]
+        for number, kind in enumerate(itertools.islice(itertools.cycle(kinds), 12_000)):
+            for to in ports(run.domain, 11):
+                with contextlib.suppress(ConnectionRefusedError):
+                    stranger.sendto(next(kind), to)
+            if number % 8 == 0:
+                time.sleep(0.005)  # the run reads as fast as it can
+        assert resident_mb(run.process) - before < 250
+        honest = Peer(run.domain)
+        drives(honest, honest.writer("/cmd_vel", Twist), honest.reader("/odom", Odometry))
+        run.end()
+    assert run.process.returncode == 0
+
+
+def test_one_socket_has_its_share_of_participants():
+    """Regression: beside 900 that do not exist, a new client waited for 20 s."""
+    with contextlib.ExitStack() as stack:
+        run = stack.enter_context(Run("--no-noise"))
+        stranger, *false_ones = [
+            stack.enter_context(socket.socket(socket.AF_INET, socket.SOCK_DGRAM)) for _ in range(61)
+        ]
+        for each in false_ones:
+            each.bind(("127.0.0.1", 0))
+            each.setblocking(False)
+        clock = Peer(run.domain).reader("/clock", Clock)
+        take(clock)
+
+        def tell(number: int):
+            for message in (
+                participant(prefix(number), false_ones[number].getsockname()[1]),
+                reader(prefix(number), "rt/clock", "rosgraph_msgs::msg::dds_::Clock_"),
+            ):
+                for to in ports(run.domain, 10):
+                    with contextlib.suppress(ConnectionRefusedError):
+                        stranger.sendto(message, to)
+
+        def served() -> set[int]:
+            """Those that the run sends to now."""
+            found = set()
+            for keep in (False, True):
+                for number, each in enumerate(false_ones):
+                    with contextlib.suppress(BlockingIOError):
+                        while each.recv(65536):
+                            found |= {number} if keep else set()
+                if not keep:
+                    take(clock, 100)
+            return found
+
+        for number in range(len(false_ones)):
+            tell(number)
+            time.sleep(0.01)
+        last = len(false_ones) - 1
+        wait_for(lambda: tell(last) or last in served(), "the last")
+        wait_for(lambda: len(served()) <= 32, "at most 32")
+        assert Client(run.domain).call("get_simulation_state").state == 1
         run.end()
     assert run.process.returncode == 0
 
