@@ -198,6 +198,7 @@ def test_what_never_fits_takes_no_memory(language, flood):
                     stranger.send(*message)
                     if number % 5 == 0:
                         time.sleep(0.002)  # as fast as they are taken in
+        assert client.poll() is None, client.stderr.read()
     client.kill()
     errors = client.stderr.read().decode()
     _, _, used = os.wait4(client.pid, 0)
