@@ -164,7 +164,10 @@ def test_lockstep_sees_its_own_run_alone(language, beside):
 def flood_of_samples(sim: ruedo.Simulation) -> Iterator[tuple[str, bytes]]:
     channels = [one.name for one in sim._info.channel_list if one.robot and not one.input]
     for i in range(9000):
-        yield channels[i % len(channels)], struct.pack(">8sqq", b"no type", 1 << 50, i) + bytes(59000)
+        yield (
+            channels[i % len(channels)],
+            struct.pack(">8sqq", b"no type", 1 << 50, i) + bytes(59000),
+        )
 
 
 def flood_of_ticks(sim: ruedo.Simulation) -> Iterator[tuple[str, bytes]]:

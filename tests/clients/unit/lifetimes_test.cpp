@@ -452,8 +452,7 @@ TEST_F(Lifetimes, AFalseTimeOutlastsNoTick) {
   const Subscription told = sim.robot("p3at").odometry().on_sample([](const Odometry&) {});
   server->send_odometry("p3at", int64_t{1} << 60, 0.0);
   server->await_delivery();
-  auto sleeping =
-      std::async(std::launch::async, [&] { return error_of([&] { sim.sleep(0.5); }); });
+  auto sleeping = std::async(std::launch::async, [&] { return error_of([&] { sim.sleep(0.5); }); });
   int64_t utime = 0;
   while (sleeping.wait_for(1ms) != std::future_status::ready && utime < 60'000'000)
     server->send_tick(utime += 10'000);
