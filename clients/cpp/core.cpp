@@ -15,7 +15,8 @@
 namespace ruedo::client {
 namespace {
 
-constexpr auto kAskAgain = std::chrono::milliseconds(500), kFaultTime = std::chrono::milliseconds(1000);
+constexpr auto kAskAgain = std::chrono::milliseconds(500),
+               kFaultTime = std::chrono::milliseconds(1000);
 constexpr int64_t kMostAhead = 1'000'000;  // us: ticks come ten times a second
 constexpr double kSilence =
     5.0;  // s of real time without any message: a server gives a sign of life each second
@@ -71,8 +72,7 @@ void Core::join(Duration timeout) {
   while (!known_) {
     const Clock::time_point now = Clock::now();
     // Beside what cannot be read there may be what can.
-    if (fault_ && now >= std::min(deadline, fault_at_ + kFaultTime))
-      std::rethrow_exception(fault_);
+    if (fault_ && now >= std::min(deadline, fault_at_ + kFaultTime)) std::rethrow_exception(fault_);
     if (server_) {
       if (const auto ended = server_->ended()) throw NoServer(*ended);
     }

@@ -99,8 +99,8 @@ class Core : public std::enable_shared_from_this<Core> {
   std::condition_variable news_;
   WorldInfoAssembler assembler_;  // the receiving thread's
   std::shared_ptr<const WorldInfo> known_;
-  std::exception_ptr fault_;         // of an info that cannot be read
-  Clock::time_point fault_at_;       // the first
+  std::exception_ptr fault_;    // of an info that cannot be read
+  Clock::time_point fault_at_;  // the first
   RunWatch watch_;
   std::map<std::pair<std::string, bool>, std::shared_ptr<StreamCore>> streams_;  // channel, raw
   std::map<std::string, std::shared_ptr<Driver>> drivers_;

@@ -11,8 +11,8 @@ namespace ruedo::client {
 
 // A client stays with its run for as long as that is heard: what else is heard meanwhile is another
 // server, at the same address. Only when nothing more comes of its own run has the other one taken
-// its place. Until it shows which, samples may be of either run. For the receiving thread alone, but
-// for another().
+// its place. Until it shows which, samples may be of either run. For the receiving thread alone,
+// but for another().
 class RunWatch {
  public:
   // `say` is called once for each run of the client's, with the id of a run that goes on beside it.
@@ -49,7 +49,7 @@ class RunWatch {
 
  private:
   static constexpr std::chrono::milliseconds kGone{1500};  // a server gives a sign each second
-  static constexpr int kReturns = 3;  // one may be a datagram that was late
+  static constexpr int kReturns = 3;                       // one may be a datagram that was late
 
   const std::function<void(int64_t)> say_;
   std::atomic<bool> another_{false};

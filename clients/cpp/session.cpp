@@ -65,8 +65,7 @@ void Session::check_size(const std::vector<uint8_t>& body) {
 
 void Session::leave() {
   std::lock_guard lock(one_at_a_time_);
-  if (session_ == 0 || !(static_cast<uint64_t>(core_.info()->features) >> request_t::LEAVE & 1))
-    return;
+  if (session_ == 0) return;
   publish(request_t::LEAVE, session_, ++sequence_, {});
   session_ = 0;
 }
@@ -127,7 +126,7 @@ void Session::receive(const uint8_t* bytes, size_t size) {
   try {
     WireReader in(bytes, size);
     if (in.int64() != reply_t::getHash()) return;
-    in.int64();  // utime
+    in.int64();                                    // utime
     if (!core_.is_of_our_run(in.int64())) return;  // another server's, which was not asked
     reply.epoch = in.int32();
     reply.session = in.int64();

@@ -17,8 +17,8 @@ namespace {
 
 constexpr auto kFirstRepeat = std::chrono::milliseconds(5),
                kLastRepeat = std::chrono::milliseconds(100);
-constexpr int kDoubtedAfter = 20;    // silences in a row: 1.7 s and more
-constexpr size_t kMostWanted = 256;  // messages asked for at once
+constexpr int kDoubtedAfter = 20;             // silences in a row: 1.7 s and more
+constexpr size_t kMostWanted = 256;           // messages asked for at once
 constexpr int64_t kFurthest = INT64_MAX / 2;  // steps
 
 }  // namespace

@@ -16,12 +16,12 @@
 namespace ruedo::client {
 namespace {
 
-constexpr size_t kMostEarly = 512;          // messages of one channel that wait for their ticks
+constexpr size_t kMostEarly = 512;             // messages of one channel that wait for their ticks
 constexpr size_t kMostEarlyBytes = 256 << 20;  // of all: no server goes on with so much unheard
-constexpr int32_t kMostChannels = 1 << 16;  // more cannot be subscribed
+constexpr int32_t kMostChannels = 1 << 16;     // more cannot be subscribed
 constexpr int kMostParts = 1024;
 constexpr size_t kMostListed = 1 << 20;  // messages: 160 steps of a fleet
-constexpr int64_t kMostAhead = 1024;  // steps beyond what is here: no server is that far
+constexpr int64_t kMostAhead = 1024;     // steps beyond what is here: no server is that far
 
 }  // namespace
 

@@ -22,7 +22,7 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-constexpr int kShownElements = 8;      // of an array
+constexpr int kShownElements = 8;  // of an array
 // What waits to be shown; more is dropped and counted.
 constexpr size_t kMostWaiting = 1000;  // messages
 constexpr size_t kMostWaitingBytes = 64 << 20;

@@ -11,6 +11,7 @@
 #include <fmt/format.h>
 
 #include "bus/lcm_bus.h"
+#include "bus/url_claim.h"
 #include "cli/bag_log.h"
 #include "cli/commands.h"
 #include "cli/extensions.h"
@@ -91,6 +92,12 @@ int play(const PlayArguments& arguments) {
   if (arguments.viewed) return view(arguments, first.path(), second.path(), speed);
   log::Reader log(first.path());
   bus::LcmBus bus(arguments.lcm);
+  if (const std::string server = bus::claimed_by(bus.url());
+      !server.empty() && bus.url().scheme == "udpm")  // the others need one that carries it
+    fmt::print(stderr,
+               "ruedo: a server is at {}, too: {}. The log's messages mix with its own: take "
+               "another port\n",
+               bus.url().str(), server);
   log::Event event;
   int64_t messages = 0;
   SimTime first_us = 0;

@@ -50,11 +50,11 @@ class Walk {
   bool has_room(const Field& field, const std::vector<int64_t>& counts) const {
     const size_t least = least_size(field);
     const size_t most = least > 0 ? (bytes_.size() - at_) / least : SIZE_MAX;
-    return std::all_of(
-        field.dimensions.begin(), field.dimensions.end(), [&](const Dimension& dimension) {
-          const int64_t count = count_of(dimension, counts);
-          return count >= 0 && static_cast<uint64_t>(count) <= most;
-        });
+    return std::all_of(field.dimensions.begin(), field.dimensions.end(),
+                       [&](const Dimension& dimension) {
+                         const int64_t count = count_of(dimension, counts);
+                         return count >= 0 && static_cast<uint64_t>(count) <= most;
+                       });
   }
 
   bool elements(const Field& field, const std::vector<int64_t>& counts, size_t dimension,

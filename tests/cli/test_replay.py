@@ -147,6 +147,19 @@ def test_plays_again(tmp_path, exchange, stock):
         listener.end()
 
 
+def test_play_beside_a_server_says_so(tmp_path):
+    """Clients would not know whose messages they see."""
+    record(tmp_path / "a.lcm", seconds=1)
+    world = tmp_path / "empty.sdf"
+    world.write_text("<sdf version='1.9'><world name='empty'/></sdf>")
+    place = url(7843)
+    run = [RUEDO, "run", world, "--quiet", "--paused", "--lcm", place]
+    STARTED.append(subprocess.Popen(run, stdout=subprocess.DEVNULL))
+    said = f"ruedo: a server is at {place}, too: pid {STARTED[-1].pid}, world empty"
+    play = ("play", tmp_path / "a.lcm", "--speed", "max", "--lcm", place)
+    until(lambda: program(*play).stderr.startswith(said))
+
+
 def test_play_is_interrupted_cleanly(tmp_path):
     record(tmp_path / "a.lcm", seconds=2)
     listener = Listener(url(7827))

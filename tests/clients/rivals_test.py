@@ -8,9 +8,12 @@ messages to the other's port, as a network does between two machines.
 from __future__ import annotations
 
 import contextlib
+import os
+import struct
 import subprocess
 import sys
 import threading
+import time
 from collections.abc import Callable, Iterator
 from urllib.parse import urlsplit
 
@@ -156,3 +159,51 @@ def test_lockstep_sees_its_own_run_alone(language, beside):
     said, errors = in_lockstep(language, beside)
     assert (said, BEGUN in errors) == (in_lockstep(language, nothing)[0], False), errors
     assert errors.count(BESIDE) == (beside is another_server)
+
+
+def flood_of_samples(sim: ruedo.Simulation) -> Iterator[tuple[str, bytes]]:
+    channels = [one.name for one in sim._info.channel_list if one.robot and not one.input]
+    for i in range(9000):
+        yield (
+            channels[i % len(channels)],
+            struct.pack(">8sqq", b"no type", 1 << 50, i) + bytes(59000),
+        )
+
+
+def flood_of_ticks(sim: ruedo.Simulation) -> Iterator[tuple[str, bytes]]:
+    """Each a part of a step to come, which names 2 900 messages that never were."""
+    manifest = b"".join(struct.pack(">iqiI", 1, i, 1000, 7) for i in range(2900))
+    for i in range(9000):
+        tick = lcmtypes.tick_t()
+        tick.run_id, tick.step, tick.part, tick.nparts = sim._info.run_id, 1 + i % 900, i // 900, 20
+        yield "ruedo/tick", tick.encode()[:-4] + struct.pack(">i", 2900) + manifest
+
+
+@pytest.mark.parametrize("flood", [flood_of_samples, flood_of_ticks])
+def test_what_never_fits_takes_no_memory(language, flood):
+    """In lockstep, where messages wait for their ticks, and ticks for their messages."""
+    command = PROBES[language]
+    if language == "java":
+        command = [command[0], "-Xmx160m", *command[1:]]
+    with ruedo_run("--lockstep", "2", *QUICK, world=HALL) as server:
+        with ruedo.connect(server.url, timeout=PATIENCE) as sim:
+            client = subprocess.Popen(
+                [*command, server.url, "lockstep", "client", "p3at", "10", "10", "0.2"],
+                stdout=subprocess.DEVNULL,
+                stderr=subprocess.PIPE,
+            )
+            requests = threading.Semaphore(0)
+            with sim._connection.bus.subscribe("ruedo/request", lambda data: requests.release()):
+                for _ in range(10):  # it takes part, and waits for the second one
+                    assert requests.acquire(timeout=PATIENCE)
+            with Datagrams(server.url) as stranger:
+                for number, message in enumerate(flood(sim)):
+                    stranger.send(*message)
+                    if number % 5 == 0:
+                        time.sleep(0.002)  # as fast as they are taken in
+        assert client.poll() is None, client.stderr.read()
+    client.kill()
+    errors = client.stderr.read().decode()
+    _, _, used = os.wait4(client.pid, 0)
+    assert used.ru_maxrss < 400_000, errors  # KiB
+    assert "OutOfMemory" not in errors

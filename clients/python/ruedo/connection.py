@@ -235,7 +235,11 @@ class Connection:
 
     def _on_info(self, data: bytes) -> None:
         run_id = run_id_of(data)
-        if run_id is not None and self._known and not self.is_of_our_run(run_id, may_take_over=True):
+        if (
+            run_id is not None
+            and self._known
+            and not self.is_of_our_run(run_id, may_take_over=True)
+        ):
             return
         try:
             info = self._assembler.add(data)

@@ -116,7 +116,7 @@ class Session:
 
     def leave(self) -> None:
         """Gives the session back, without waiting for an answer."""
-        if self._session and self._connection.info.features >> lcmtypes.request_t.LEAVE & 1:
+        if self._session:
             self._sequence += 1
             self.publish(lcmtypes.request_t.LEAVE, self._session, self._sequence, b"")
             self._session = 0

@@ -49,6 +49,7 @@ _MOST_LISTED = 1 << 20  # messages in the manifests of steps that are not here: 
 _MOST_AHEAD = 1024  # steps beyond what is here: no server is that far
 _DOUBTED_AFTER = 20  # silences in a row: 1.7 s and more
 _LONGEST = 2**63 - 1
+_FURTHEST = _LONGEST // 2  # steps
 
 _TICK = struct.Struct(
     ">8sqqiqqhh"
@@ -294,7 +295,7 @@ class Stepper:
         reply = self._connection.session.request_in_turn(lcmtypes.request_t.GRANT, body, timeout)
         try:
             stands = lcmtypes.grant_reply_t.decode(reply.body)
-            if not -1 <= stands.received <= stands.granted or stands.granted < 0:
+            if not -1 <= stands.received <= stands.granted or not 0 <= stands.granted <= _FURTHEST:
                 raise ValueError("where nobody stands")
         except Exception:
             raise TypeMismatch(

@@ -447,6 +447,21 @@ TEST_F(Lifetimes, AnotherServersSignsEndNothing) {
   EXPECT_LT(sim.time(), 1.0);
 }
 
+TEST_F(Lifetimes, AFalseTimeOutlastsNoTick) {
+  Simulation sim = simulation(server);
+  const Subscription told = sim.robot("p3at").odometry().on_sample([](const Odometry&) {});
+  server->send_odometry("p3at", int64_t{1} << 60, 0.0);
+  server->await_delivery();
+  auto sleeping = std::async(std::launch::async, [&] { return error_of([&] { sim.sleep(0.5); }); });
+  int64_t utime = 0;
+  while (sleeping.wait_for(1ms) != std::future_status::ready && utime < 60'000'000)
+    server->send_tick(utime += 10'000);
+  EXPECT_GE(utime, 500'000);
+  EXPECT_LT(utime, 60'000'000);
+  sim.close();
+  EXPECT_EQ(sleeping.get(), "");
+}
+
 TEST_F(Lifetimes, WhatALaterServerSaysOfAMotionIsUnknown) {
   const Simulation sim = simulation(server);
   const auto motion = sim.robot("p3at").motion();

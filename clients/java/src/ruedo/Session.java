@@ -82,7 +82,7 @@ final class Session {
 
     /** Leaves the session, without waiting for an answer. */
     synchronized void leave() {
-        if (session == 0 || !sim.info().supports(request_t.LEAVE)) return;
+        if (session == 0) return;
         publish(request_t.LEAVE, session, ++sequence, new byte[0]);
         session = 0;
     }

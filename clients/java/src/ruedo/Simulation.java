@@ -679,8 +679,7 @@ public final class Simulation implements AutoCloseable {
         Deadline deadline = new Deadline(timeout);
         while (known == null) {
             // Beside what cannot be read there may be what can.
-            if (fault != null
-                    && (deadline.passed() || System.nanoTime() - faultAt >= FAULT_NANOS))
+            if (fault != null && (deadline.passed() || System.nanoTime() - faultAt >= FAULT_NANOS))
                 throw fault;
             String ended = server == null ? null : server.ended();
             if (ended != null) throw new RuedoException.NoServer(ended);
