@@ -16,6 +16,7 @@
 #include <optional>
 #include <set>
 #include <span>
+#include <string_view>
 #include <utility>
 
 #include "dds/discovery_data.h"
@@ -84,6 +85,7 @@ class KnownParticipants {
   void make_room_for_endpoints();
   void forget(Place known);
   void put_out(Place known);
+  void warn_once(std::string_view what);
 
   std::set<Prefix> own_;
   std::map<Prefix, Known> known_;
@@ -91,6 +93,7 @@ class KnownParticipants {
   std::deque<Prefix> left_;
   size_t bytes_ = 0;  // of all endpoints
   Clock::time_point next_turn_;
+  std::set<std::string_view> warned_;
 };
 
 // The RTPS message by which a participant says that it leaves. Returns its size.
