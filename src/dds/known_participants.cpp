@@ -60,7 +60,9 @@ void KnownParticipants::announce(const Submessage& part, const Prefix& who, cons
     if (!may_announce(who, from, now)) return part.erase();
     bound_locators(*told, known_.at(who).from);
   } else if (const auto known = known_.find(who); known != known_.end()) {
-    forget(known);
+    // Cyclone may have missed it, so that it keeps its place until another needs it.
+    remove_all(known);
+    known->second.heard = known->second.announced = {};
   }
 }
 
@@ -82,8 +84,9 @@ bool KnownParticipants::make_room(const Address& from, Clock::time_point now) {
   const bool has_share =
       socket != sockets_.end() && socket->second.participants >= kMostOfOneSocket;
   if (!has_share && known_.size() < kMostParticipants) return true;
-  if (now < next_turn_) return false;
-  next_turn_ = now + kTurn;
+  Clock::time_point& next_turn = has_share ? socket->second.next_turn : next_turn_;
+  if (now < next_turn) return false;
+  next_turn = now + kTurn;
   warn_once(has_share ? "more than 32 participants come from one socket: the most silent give way"
                       : "there are more than 256 participants: the most silent give way");
   put_out(std::min_element(known_.begin(), known_.end(), [&](const auto& a, const auto& b) {
@@ -151,6 +154,10 @@ void KnownParticipants::remove(Place known, const EndpointKey& key) {
   known->second.endpoints.erase(endpoint);
 }
 
+void KnownParticipants::remove_all(Place known) {
+  while (!known->second.endpoints.empty()) remove(known, known->second.endpoints.begin()->first);
+}
+
 void KnownParticipants::bound_locators(const DiscoveryData& told, const Address& from) {
   std::set<Locator>& known = sockets_[from].locators;
   for (const ToldLocator& each : told.locators) {
@@ -171,16 +178,12 @@ void KnownParticipants::make_room_for_endpoints() {
   }));
 }
 
-void KnownParticipants::forget(Place known) {
-  while (!known->second.endpoints.empty()) remove(known, known->second.endpoints.begin()->first);
+void KnownParticipants::put_out(Place known) {
+  left_.push_back(known->first);
+  remove_all(known);
   const auto socket = sockets_.find(known->second.from);
   if (--socket->second.participants == 0) sockets_.erase(socket);
   known_.erase(known);
-}
-
-void KnownParticipants::put_out(Place known) {
-  left_.push_back(known->first);
-  forget(known);
 }
 
 void KnownParticipants::warn_once(std::string_view what) {
