@@ -5,6 +5,8 @@
 #include <initializer_list>
 #include <vector>
 
+#include <spdlog/spdlog.h>
+
 namespace ruedo::dds {
 namespace {
 
@@ -58,7 +60,9 @@ void KnownParticipants::announce(const Submessage& part, const Prefix& who, cons
     if (!may_announce(who, from, now)) return part.erase();
     bound_locators(*told, known_.at(who).from);
   } else if (const auto known = known_.find(who); known != known_.end()) {
-    forget(known);
+    // Cyclone may have missed it, so that it keeps its place until another needs it.
+    remove_all(known);
+    known->second.heard = known->second.announced = {};
   }
 }
 
@@ -80,8 +84,11 @@ bool KnownParticipants::make_room(const Address& from, Clock::time_point now) {
   const bool has_share =
       socket != sockets_.end() && socket->second.participants >= kMostOfOneSocket;
   if (!has_share && known_.size() < kMostParticipants) return true;
-  if (now < next_turn_) return false;
-  next_turn_ = now + kTurn;
+  Clock::time_point& next_turn = has_share ? socket->second.next_turn : next_turn_;
+  if (now < next_turn) return false;
+  next_turn = now + kTurn;
+  warn_once(has_share ? "more than 32 participants come from one socket: the most silent give way"
+                      : "there are more than 256 participants: the most silent give way");
   put_out(std::min_element(known_.begin(), known_.end(), [&](const auto& a, const auto& b) {
     const bool of_socket = a.second.from == from;
     if (has_share && of_socket != (b.second.from == from)) return of_socket;
@@ -120,7 +127,11 @@ bool KnownParticipants::add(Place known, const EndpointKey& key, const Endpoint&
   auto before = known->second.endpoints.find(key);
   if (before == known->second.endpoints.end()) {
     size_t& count = sockets_[known->second.from].endpoints[endpoint.topic];
-    if (count >= kMostOfOneTopic) return false;
+    if (count >= kMostOfOneTopic) {
+      warn_once(
+          "more than 128 readers or writers of a topic are at one socket: not all are served");
+      return false;
+    }
     ++count;
     before = known->second.endpoints.try_emplace(key, Endpoint{endpoint.topic, 0}).first;
   }
@@ -143,33 +154,40 @@ void KnownParticipants::remove(Place known, const EndpointKey& key) {
   known->second.endpoints.erase(endpoint);
 }
 
+void KnownParticipants::remove_all(Place known) {
+  while (!known->second.endpoints.empty()) remove(known, known->second.endpoints.begin()->first);
+}
+
 void KnownParticipants::bound_locators(const DiscoveryData& told, const Address& from) {
   std::set<Locator>& known = sockets_[from].locators;
   for (const ToldLocator& each : told.locators) {
-    if (known.size() < kMostLocators)
+    if (known.size() < kMostLocators) {
       known.insert(each.locator);
-    else if (!known.contains(each.locator))
+    } else if (!known.contains(each.locator)) {
       each.erase();
+      warn_once("a socket tells of more than 64 addresses: the others are not used");
+    }
   }
 }
 
 void KnownParticipants::make_room_for_endpoints() {
   if (bytes_ <= kMostOfEndpoints) return;
+  warn_once("endpoints need more than 128 MB: the participant with the most gives way");
   put_out(std::max_element(known_.begin(), known_.end(), [](const auto& a, const auto& b) {
     return a.second.bytes < b.second.bytes;
   }));
 }
 
-void KnownParticipants::forget(Place known) {
-  while (!known->second.endpoints.empty()) remove(known, known->second.endpoints.begin()->first);
+void KnownParticipants::put_out(Place known) {
+  left_.push_back(known->first);
+  remove_all(known);
   const auto socket = sockets_.find(known->second.from);
   if (--socket->second.participants == 0) sockets_.erase(socket);
   known_.erase(known);
 }
 
-void KnownParticipants::put_out(Place known) {
-  left_.push_back(known->first);
-  forget(known);
+void KnownParticipants::warn_once(std::string_view what) {
+  if (warned_.insert(what).second) spdlog::warn("ROS 2: {}", what);
 }
 
 std::optional<Prefix> KnownParticipants::left() {

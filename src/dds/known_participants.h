@@ -16,6 +16,7 @@
 #include <optional>
 #include <set>
 #include <span>
+#include <string_view>
 #include <utility>
 
 #include "dds/discovery_data.h"
@@ -36,7 +37,7 @@ class KnownParticipants {
 
   // What a participant announces again before that is passed over.
   static constexpr std::chrono::milliseconds kRepeat{100};
-  // One of those known gives way so often at most.
+  // One of those known, and one of a socket's, gives way so often at most.
   static constexpr std::chrono::milliseconds kTurn{20};
 
   // This program's own, to whom messages may be addressed.
@@ -56,6 +57,7 @@ class KnownParticipants {
     size_t participants = 0;
     std::map<size_t, size_t> endpoints;  // of each topic
     std::set<Locator> locators;
+    Clock::time_point next_turn;
   };
   struct Endpoint {
     size_t topic, bytes;
@@ -80,10 +82,11 @@ class KnownParticipants {
   void tell_fragment(const Submessage& part, const Entity& writer, Place known);
   bool add(Place known, const EndpointKey& key, const Endpoint& endpoint);
   void remove(Place known, const EndpointKey& key);
+  void remove_all(Place known);
   void bound_locators(const DiscoveryData& told, const Address& from);
   void make_room_for_endpoints();
-  void forget(Place known);
   void put_out(Place known);
+  void warn_once(std::string_view what);
 
   std::set<Prefix> own_;
   std::map<Prefix, Known> known_;
@@ -91,6 +94,7 @@ class KnownParticipants {
   std::deque<Prefix> left_;
   size_t bytes_ = 0;  // of all endpoints
   Clock::time_point next_turn_;
+  std::set<std::string_view> warned_;
 };
 
 // The RTPS message by which a participant says that it leaves. Returns its size.

@@ -353,8 +353,9 @@ def test_one_socket_has_its_share_of_participants():
         wait_for(lambda: tell(last) or last in served(), "the last")
         wait_for(lambda: len(served()) <= 32, "at most 32")
         assert Client(run.domain).call("get_simulation_state").state == 1
-        run.end()
+        output = run.end()
     assert run.process.returncode == 0
+    assert output.count("more than 32 participants come from one socket") == 1
 
 
 @pytest.mark.parametrize("speed", [math.nan, math.inf, -math.inf])
