@@ -4,6 +4,7 @@
 #include <atomic>
 #include <cerrno>
 #include <condition_variable>
+#include <ctime>
 #include <filesystem>
 #include <fstream>
 #include <memory>
@@ -20,6 +21,7 @@
 
 #include "bus/stream_connection.h"
 #include "bus/unix_socket.h"
+#include "no_files.h"
 #include "ruedo/errors.h"
 
 namespace fs = std::filesystem;
@@ -160,6 +162,23 @@ TEST(UnixServer, IsTheUsersOwn) {
   ::waitpid(stranger, &ended, 0);
   EXPECT_EQ(WEXITSTATUS(ended), 1);
   EXPECT_EQ(served.server.refused(), 1u);
+}
+
+TEST(UnixServer, WithoutFileDescriptorsNewcomersWaitAndCostNothing) {
+  Served served;
+  const FileHandle newcomer(::socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0));
+  sockaddr_un address{};
+  address.sun_family = AF_UNIX;
+  served.folder.url().host.copy(address.sun_path, sizeof address.sun_path - 1);
+  {
+    const NoFiles none;
+    ASSERT_EQ(
+        ::connect(newcomer.get(), reinterpret_cast<const sockaddr*>(&address), sizeof address), 0);
+    const std::clock_t before = std::clock();
+    std::this_thread::sleep_for(std::chrono::seconds(2));
+    EXPECT_LT(std::clock() - before, CLOCKS_PER_SEC / 5);  // of the processor's time
+  }
+  while (served.server.connections() == 0) std::this_thread::yield();
 }
 
 TEST(UnixServer, NothingIsLostThatASlowClientTakesLater) {
