@@ -7,6 +7,7 @@
 #include <ctime>
 #include <filesystem>
 #include <fstream>
+#include <list>
 #include <memory>
 #include <mutex>
 #include <thread>
@@ -209,6 +210,37 @@ TEST(UnixServer, WhoTakesNothingHasABound) {
   served.server.flush();
   quick.take_until(1);
   EXPECT_EQ(quick.came.size(), 1u);
+}
+
+TEST(UnixServer, AllWhoTakeNothingHaveABoundTogether) {
+  Served served;
+  std::list<Client> clients;
+  for (int i = 0; i < 5; ++i) clients.emplace_back(served, std::vector<std::string>{"bulk"});
+  const std::string block(1 << 20, 'x');
+  for (int i = 0; i < 60; ++i) {  // less than each alone may be behind
+    served.publish("bulk", block);
+    served.server.flush();
+  }
+  EXPECT_GT(served.server.failed(), 0u);
+}
+
+TEST(UnixServer, OneTooManyIsSentAway) {
+  Served served;
+  std::list<StreamConnection> connections;
+  for (size_t i = 0; i < UnixServer::kMostClients; ++i)
+    connections.emplace_back(connect_unix(served.folder.url().host));
+  const FileHandle newcomer = connect_unix(served.folder.url().host);
+  char byte;
+  EXPECT_EQ(::recv(newcomer.get(), &byte, 1, 0), 0);
+  EXPECT_EQ(served.server.refused(), 1u);
+}
+
+TEST(UnixServer, WhoDoesNotGreetIsSentAway) {
+  Served served;
+  const FileHandle silent = connect_unix(served.folder.url().host);
+  char byte;
+  EXPECT_EQ(::recv(silent.get(), &byte, 1, 0), 0);
+  EXPECT_EQ(served.server.refused(), 1u);
 }
 
 TEST(UnixServer, WhatWasPublishedLastComes) {
