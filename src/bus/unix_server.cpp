@@ -247,7 +247,9 @@ void UnixServer::accept_all() {
     FileHandle socket(::accept4(listener_.get(), nullptr, nullptr, SOCK_CLOEXEC | SOCK_NONBLOCK));
     if (!socket) {
       if (errno == EINTR || errno == ECONNABORTED) continue;
-      return;  // tried again in the next round, in case file descriptors ran out
+      // Where file descriptors ran out, newcomers wait for another round.
+      watch_newcomers(errno == EAGAIN);
+      return;
     }
     ++connections_;
     if (!is_own_peer(socket.get()) || clients_.size() >= kMostClients) {
@@ -259,6 +261,15 @@ void UnixServer::accept_all() {
     client.since = Clock::now();
     add_to(poll_.get(), client.socket.get(), &client);
   }
+}
+
+void UnixServer::watch_newcomers(bool wanted) {
+  if (newcomers_watched_ == wanted) return;
+  newcomers_watched_ = wanted;
+  if (wanted)
+    add_to(poll_.get(), listener_.get(), &listener_);
+  else
+    ::epoll_ctl(poll_.get(), EPOLL_CTL_DEL, listener_.get(), nullptr);
 }
 
 void UnixServer::receive(Client& client) {

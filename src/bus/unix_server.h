@@ -75,6 +75,7 @@ class UnixServer : public Bus {
 
   void serve();
   void accept_all();
+  void watch_newcomers(bool wanted);
   void receive(Client& client);
   void take(Client& client, const tcpq::Frame& frame);
   void add(std::string_view channel, std::span<const uint8_t> data);
@@ -99,6 +100,7 @@ class UnixServer : public Bus {
   std::vector<uint8_t> frames_;               // published since flush()
   std::vector<Frame> index_;
   std::list<Client> clients_;
+  bool newcomers_watched_ = true;
   size_t held_ = 0;  // bytes in rest of all clients
   std::vector<std::pair<std::string, std::vector<uint8_t>>>
       heard_;  // for the handler; the thread's

@@ -134,11 +134,12 @@ void check_renderer(Report& report) {
 void check_sandbox(Report& report) {
   const std::string missing = missing_for_sandbox();
   if (missing.empty())
-    return report.good("sandbox",
-                       "Landlock and seccomp: --sandbox works, and meshes are imported in one");
-  report.hint(
-      "sandbox",
-      missing + ": no --sandbox, and meshes are imported with limits of time and memory only");
+    return report.good(
+        "sandbox", "Landlock and seccomp: --sandbox works, meshes and xacro files are read in one");
+  report.hint("sandbox",
+              missing +
+                  ": no --sandbox; meshes and xacro files are read with limits of time and memory "
+                  "only, and a xacro file may run any program");
 }
 
 int doctor(const std::string& url) {

@@ -7,14 +7,18 @@
 #include <cerrno>
 #include <csignal>
 #include <cstdio>
+#include <cstdlib>
 #include <cstring>
 #include <exception>
 #include <filesystem>
 #include <iostream>
+#include <memory>
 #include <new>
+#include <string_view>
 #include <system_error>
 
 #include <fmt/format.h>
+#include <spdlog/pattern_formatter.h>
 #include <spdlog/sinks/stdout_color_sinks.h>
 #include <spdlog/spdlog.h>
 
@@ -22,6 +26,7 @@
 #include "cli/commands.h"
 #include "cli/progress_line.h"
 #include "core/installation.h"
+#include "core/leftovers.h"
 #include "core/utf8.h"
 #include "core/version.h"
 #include "physics/state_check.h"
@@ -32,6 +37,26 @@
 namespace {
 
 using namespace ruedo::cli;
+
+// What is logged: it may hold words of others, from the bus.
+class LoggedText : public spdlog::custom_flag_formatter {
+ public:
+  void format(const spdlog::details::log_msg& message, const std::tm&,
+              spdlog::memory_buf_t& line) override {
+    const std::string text = ruedo::for_terminal({message.payload.data(), message.payload.size()});
+    line.append(text.data(), text.data() + text.size());
+  }
+  std::unique_ptr<spdlog::custom_flag_formatter> clone() const override {
+    return std::make_unique<LoggedText>();
+  }
+};
+
+void set_up_logging() {
+  spdlog::set_default_logger(spdlog::stderr_color_mt("ruedo"));
+  auto formatter = std::make_unique<spdlog::pattern_formatter>();
+  formatter->add_flag<LoggedText>('*').set_pattern("%^ruedo: %l:%$ %*");
+  spdlog::set_formatter(std::move(formatter));
+}
 
 void say(const std::string& text) {
   const Style style = style_of(stderr);
@@ -86,7 +111,7 @@ void flush_output() {
 // Checks what threads and libraries cannot do without, and would hang or crash for want of, where
 // an error can still be reported.
 void check_limits() {
-  constexpr rlim_t kFiles = 64, kMemory = rlim_t{1024} << 20;
+  constexpr rlim_t kFiles = 64, kMemory = rlim_t{1024} << 20, kStack = rlim_t{1} << 20;
   rlimit limit{};
   if (getrlimit(RLIMIT_NOFILE, &limit) == 0 && limit.rlim_cur < kFiles) {
     throw ruedo::EnvironmentError(
@@ -97,6 +122,11 @@ void check_limits() {
     throw ruedo::EnvironmentError(
         fmt::format("{} MB of address space are allowed here, and {} are needed: ulimit -v {}",
                     limit.rlim_cur >> 20, kMemory >> 20, kMemory >> 10));
+  }
+  if (getrlimit(RLIMIT_STACK, &limit) == 0 && limit.rlim_cur < kStack) {  // of every thread, too
+    throw ruedo::EnvironmentError(
+        fmt::format("{} kB of stack are allowed here, and {} are needed: ulimit -s {}",
+                    limit.rlim_cur >> 10, kStack >> 10, kStack >> 10));
   }
 }
 
@@ -168,6 +198,42 @@ int run(int argc, char** argv) {
   return code;
 }
 
+// Says what the std::exception is that is being handled, and returns the exit code.
+int tell_error() {
+  try {
+    throw;
+  } catch (const ruedo::InputError& error) {
+    say(error.what());
+    return error.source().file.empty() ? kWrongUsage : kBadInput;
+  } catch (const ruedo::physics::StateError& error) {
+    say(error.what());
+    return kBrokenState;
+  } catch (const std::bad_alloc&) {
+    say("there is not enough memory");
+  } catch (const std::system_error& error) {
+    say(error.code() == std::errc::resource_unavailable_try_again
+            ? "no thread can be started: raise ulimit -u, ulimit -v or a container's pids.max"
+            : error.what());
+  } catch (const std::exception& error) {
+    say(error.what());
+  }
+  return kEnvironment;
+}
+
+// Where nobody handles it: in a thread that runs out of memory.
+[[noreturn]] void end_with_error() {
+  if (!std::current_exception()) std::abort();
+  int code = kEnvironment;
+  try {
+    ruedo::remove_leftovers();
+    code = tell_error();
+  } catch (const std::bad_alloc&) {  // not even for these
+    constexpr std::string_view kText = "ruedo: there is not enough memory\n";
+    [[maybe_unused]] const ssize_t written = ::write(STDERR_FILENO, kText.data(), kText.size());
+  }
+  std::_Exit(code);
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -175,29 +241,11 @@ int main(int argc, char** argv) {
   // A write beyond `ulimit -f` then fails as on a full disk. Not SIG_IGN, which children inherit.
   std::signal(SIGXFSZ, [](int) {});
   ruedo::scene::set_up_mesa();
-  spdlog::set_default_logger(spdlog::stderr_color_mt("ruedo"));
-  spdlog::set_pattern("%^ruedo: %l:%$ %v");
+  set_up_logging();
+  std::set_terminate(end_with_error);
   try {
     return run(argc, argv);
-  } catch (const ruedo::InputError& error) {
-    say(error.what());
-    return error.source().file.empty() ? kWrongUsage : kBadInput;
-  } catch (const ruedo::physics::StateError& error) {
-    say(error.what());
-    return kBrokenState;
-  } catch (const ruedo::EnvironmentError& error) {
-    say(error.what());
-    return kEnvironment;
-  } catch (const std::bad_alloc&) {
-    say("there is not enough memory");
-    return kEnvironment;
-  } catch (const std::system_error& error) {
-    say(error.code() == std::errc::resource_unavailable_try_again
-            ? "no thread can be started: raise ulimit -u, ulimit -v or a container's pids.max"
-            : error.what());
-    return kEnvironment;
-  } catch (const std::exception& error) {
-    say(error.what());
-    return kEnvironment;
+  } catch (const std::exception&) {
+    return tell_error();
   }
 }

@@ -76,13 +76,14 @@ class Line {
     });
   }
 
-  void end() {
-    if (!thread_.joinable()) return;
+  bool end() {
+    if (!thread_.joinable()) return false;
     thread_.request_stop();
     thread_.join();
     Progress::watch({});
     const std::lock_guard lock(mutex_);
     erase();
+    return true;
   }
 
  private:
@@ -120,6 +121,6 @@ void begin_progress_line() {
   if (isatty(STDERR_FILENO) != 0) line().begin();
 }
 
-void end_progress_line() { line().end(); }
+bool end_progress_line() { return line().end(); }
 
 }  // namespace ruedo::cli

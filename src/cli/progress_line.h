@@ -5,9 +5,9 @@
 
 namespace ruedo::cli {
 
-// From now on, until end() or the end of the program: once, in main().
+// From now on, in a thread, until end() or the end of the program.
 void begin_progress_line();
-// For a command that draws a line of its own from now on.
-void end_progress_line();
+// For a command that draws a line of its own from now on. Returns whether there was one.
+bool end_progress_line();
 
 }  // namespace ruedo::cli

@@ -5,6 +5,7 @@
 
 #include <CLI/CLI.hpp>
 
+#include "cli/progress_line.h"
 #include "core/late_library.h"
 #include "core/plugins.h"
 #include "core/sandbox.h"
@@ -64,7 +65,9 @@ void enter_sandbox(const std::string& file, const std::vector<std::string>& writ
         fs::exists(path, error) && !fs::is_regular_file(path, error);  // a folder, a device
     sandbox.writable.push_back(itself ? path : fs::absolute(path).parent_path().string());
   }
+  const bool is_drawn = end_progress_line();  // its thread would stay outside
   enter(sandbox);
+  if (is_drawn) begin_progress_line();
 }
 
 }  // namespace ruedo::cli

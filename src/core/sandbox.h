@@ -8,16 +8,22 @@
 #include <string>
 #include <vector>
 
+#include <linux/filter.h>
+
+#include "core/file_handle.h"
+
 namespace ruedo {
 
 struct Sandbox {
   // Files, and folders with all below them. What is not there is passed over.
-  std::vector<std::string> readable;  // beside what every program reads: the system's libraries,
-                                      // and what comes with Ruedo
-  std::vector<std::string> runnable;  // and readable: programs beside the system's and Ruedo's own
-  std::vector<std::string> writable;  // and readable
-  bool alone =
-      false;  // no network, no other program, no signal to others, nothing but the lists above
+  std::vector<std::string> readable{};
+  std::vector<std::string> runnable{};  // and readable: programs
+  std::vector<std::string> writable{};  // and readable
+  // What every program reads and may run: the system's libraries, what comes with Ruedo. Without
+  // it, no program is run either.
+  bool system = true;
+  // No network, no further process, no signal to others, no other owner, mode or time of a file.
+  bool alone = false;
 };
 
 // What this kernel lacks of it: "" is nothing.
@@ -28,5 +34,17 @@ std::string missing_for_sandbox();
 // hold; ask missing_for_sandbox() first where that will not do. Throws EnvironmentError when the
 // kernel refuses what it says to have.
 void enter(const Sandbox& sandbox);
+
+// A sandbox that a child enters between fork and exec.
+class ReadySandbox {
+ public:
+  explicit ReadySandbox(const Sandbox& sandbox);  // throws as enter()
+  // System calls only. False where the kernel refuses it: errno says why.
+  bool enter() const;
+
+ private:
+  FileHandle ruleset_;               // of Landlock; none where the kernel has none
+  std::vector<sock_filter> filter_;  // of seccomp; likewise
+};
 
 }  // namespace ruedo

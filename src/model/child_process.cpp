@@ -60,7 +60,7 @@ void set_limit(decltype(RLIMIT_AS) which, rlim_t value) {
 
 // Runs in the child, between fork and exec: system calls only. posix_spawn cannot set limits.
 [[noreturn]] void become(char* const* arguments, int output, int messages,
-                         const ProcessLimits& limits, pid_t parent) {
+                         const ProcessLimits& limits, const ReadySandbox* sandbox, pid_t parent) {
   ::setpgid(0, 0);
   end_with_parent(parent);
   set_limit(RLIMIT_CORE, 0);
@@ -71,6 +71,8 @@ void set_limit(decltype(RLIMIT_AS) which, rlim_t value) {
   ::dup2(nothing, 0);
   ::dup2(output, 1);
   ::dup2(messages, 2);
+  if (sandbox && !sandbox->enter()) ::_exit(126);
+  ::syscall(SYS_close_range, 3u, ~0u, 0u);  // what a shell left open for us is not for it
   ::execvp(arguments[0], arguments);
   ::_exit(127);
 }
@@ -119,11 +121,16 @@ ProcessResult run_limited(std::vector<std::string> words, const ProcessLimits& l
   std::vector<char*> arguments;
   for (std::string& word : words) arguments.push_back(word.data());
   arguments.push_back(nullptr);
+  std::optional<ReadySandbox> sandbox;
+  if (limits.sandbox) sandbox.emplace(*limits.sandbox);
   const MemoryFile output("output"), messages("messages");
   const pid_t parent = ::getpid();
   const pid_t child = ::fork();  // posix_spawn sets no limits
   if (child < 0) fail("no process can be started");
-  if (child == 0) become(arguments.data(), output.get(), messages.get(), limits, parent);
+  if (child == 0) {
+    become(arguments.data(), output.get(), messages.get(), limits, sandbox ? &*sandbox : nullptr,
+           parent);
+  }
   ProcessResult result{wait_for(child, limits.wall_s, give_up), {}, {}};
   if (!result.status) return result;
   result.output = output.end(limits.output_bytes);

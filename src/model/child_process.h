@@ -8,6 +8,8 @@
 
 #include <sys/resource.h>
 
+#include "core/sandbox.h"
+
 namespace ruedo::model {
 
 struct ProcessLimits {
@@ -15,11 +17,12 @@ struct ProcessLimits {
   rlim_t output_bytes = 0;  // of stdout and of stderr
   rlim_t memory_bytes = 0;  // address space; 0: no limit
   int wall_s = 0;
+  std::optional<Sandbox> sandbox{};
 };
 
 struct ProcessResult {
-  // As waitpid() gives it, with exit code 127 if there is no such program; nullopt if the process
-  // was killed because of its wall time or of `give_up`.
+  // As waitpid() gives it, with exit code 127 if there is no such program, 126 if its sandbox
+  // cannot be entered; nullopt if the process was killed because of its wall time or of `give_up`.
   std::optional<int> status;
   std::string output;    // stdout
   std::string messages;  // the end of stderr, 64 KiB at most

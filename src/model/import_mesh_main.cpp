@@ -295,6 +295,7 @@ int main(int argc, char** argv) {
     ::dup2(STDERR_FILENO, STDOUT_FILENO);  // what a library prints is no part of the mesh
     ruedo::Sandbox sandbox;
     sandbox.readable = {mesh.parent_path().string()};
+    sandbox.system = false;
     sandbox.alone = true;
     ruedo::enter(sandbox);
     import(mesh, output.get());

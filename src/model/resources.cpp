@@ -17,6 +17,8 @@ namespace fs = std::filesystem;
 namespace ruedo::model {
 namespace {
 
+constexpr int kFoldersAbove = 2;  // of a description that was copied without its package.xml
+
 bool is_there(const fs::path& path) {
   std::error_code error;
   return fs::exists(path, error);
@@ -120,12 +122,15 @@ std::string package_name(const fs::path& folder) {
   }
 }
 
-// The folder above a package's folder, where its own files lie; the user's home may hold more than
-// packages.
-bool may_be_package(const fs::path& folder) {
+// The user's home, or above it: it may hold more than models.
+bool holds_home(const fs::path& folder) {
   const char* home = std::getenv("HOME");
-  return folder.parent_path().has_relative_path() &&
-         (!home || !starts_with(full_path(home) + "/", (folder.string() + "/").c_str()));
+  return home && starts_with(full_path(home) + "/", (folder.string() + "/").c_str());
+}
+
+// The folder above a package's folder, where its own files lie.
+bool may_be_package(const fs::path& folder) {
+  return folder.parent_path().has_relative_path() && !holds_home(folder);
 }
 
 // The workspace folder that holds the packages beside the file's own; "": the file is in none.
@@ -184,6 +189,31 @@ std::vector<std::string> ResourceFinder::folders() const {
   std::vector<std::string> all = near_;
   all.insert(all.end(), far_.begin(), far_.end());
   return all;
+}
+
+std::vector<std::string> ResourceFinder::folders_of(const std::string& xacro) const {
+  if (allow_absolute_) return {"/"};
+  std::vector<std::string> found = roots_for(xacro);
+  if (for_strangers_) return found;
+  const fs::path own = fs::path(xacro).parent_path();
+  std::erase_if(found, [&](const std::string& folder) {
+    return folder != own && holds_home(folder) &&
+           std::find(far_.begin(), far_.end(), folder) == far_.end();
+  });
+  int above = 0;
+  for (fs::path folder = own.parent_path(); folder.has_relative_path();
+       folder = folder.parent_path()) {
+    if (++above <= kFoldersAbove && may_be_package(folder)) add_folder(found, folder);
+  }
+  for (fs::path folder = own; folder.has_relative_path(); folder = folder.parent_path()) {
+    if (!is_there(folder / "package.xml")) continue;
+    add_folder(found, folder);
+    std::error_code error;
+    for (const auto& beside : fs::directory_iterator(folder.parent_path(), error)) {
+      if (is_there(beside.path() / "package.xml")) add_folder(found, beside.path());
+    }
+  }
+  return found;
 }
 
 ResourceFinder ResourceFinder::for_strangers(const std::string& world_file) {

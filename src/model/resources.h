@@ -46,6 +46,10 @@ class ResourceFinder {
   // The folders that are searched for any file.
   std::vector<std::string> folders() const;
 
+  // The folders that a xacro file may read: those that are searched for it, but not the user's home
+  // because it lies above; the packages above it and beside those, and two folders above its own.
+  std::vector<std::string> folders_of(const std::string& xacro) const;
+
   // A texture, named in `from`: like find(), then by its file name in the usual folders nearby.
   std::optional<std::string> find_texture(const std::string& name, const std::string& from) const;
 

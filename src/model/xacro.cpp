@@ -6,9 +6,12 @@
 #include <algorithm>
 #include <cstdlib>
 #include <filesystem>
+#include <map>
+#include <mutex>
 #include <sstream>
 #include <vector>
 
+#include "core/installation.h"
 #include "model/child_process.h"
 
 namespace fs = std::filesystem;
@@ -16,14 +19,15 @@ namespace fs = std::filesystem;
 namespace ruedo::model {
 namespace {
 
-constexpr ProcessLimits kLimits{
-    .cpu_s = 20, .output_bytes = 64 << 20, .memory_bytes = rlim_t{2} << 30, .wall_s = 60};
+constexpr int kCpu_s = 20;
+
+ProcessLimits limits() {
+  return {.cpu_s = kCpu_s, .output_bytes = 64 << 20, .memory_bytes = rlim_t{2} << 30, .wall_s = 60};
+}
 
 std::string script() {
-  std::error_code error;
-  const fs::path program = fs::read_symlink("/proc/self/exe", error);
-  const fs::path installed = program.parent_path().parent_path() / "share/ruedo/xacro/expand.py";
-  return !error && fs::exists(installed, error) ? installed.string() : RUEDO_XACRO_DIR "/expand.py";
+  const std::string installed = find_installed("share/ruedo/xacro/expand.py");
+  return installed.empty() ? RUEDO_XACRO_DIR "/expand.py" : installed;
 }
 
 // "FILE:LINE", added to each element by expand.py.
@@ -66,31 +70,55 @@ std::string last_line(std::string text) {
   return text;
 }
 
-// What expand.py prints.
-std::string output_of(const std::string& path, const ReadContext& context) {
-  std::vector<std::string> words{xacro_python(), script(), path};
-  const std::string python = words[0];
-  for (const std::string& root : context.resources.folders())
-    words.insert(words.end(), {"--folder", root});
-  for (const std::string& argument : context.xacro_arguments)
-    words.insert(words.end(), {"--argument", argument});
-  ProcessResult result = run_limited(std::move(words), kLimits);
-  const bool ended = result.status && WIFEXITED(*result.status);
-  const int code = ended ? WEXITSTATUS(*result.status) : -1;
-  if (code == 0) return std::move(result.output);
-  std::string why = last_line(result.messages);  // xacro's warnings come before
-  if (code == 127) why = "Python is missing (" + python + "); xacro needs it";
-  if (!ended) why = "it needs more than " + std::to_string(kLimits.cpu_s) + " s, or more than 2 GB";
+[[noreturn]] void fail(const std::string& path, const std::string& why) {
   throw InputError({path, 0}, "the xacro file cannot be expanded: " +
                                   (why.empty() ? "it does not say why" : why));
 }
 
+// What expand.py prints.
+std::string output_of(const std::string& path, std::vector<std::string> words,
+                      const ProcessLimits& limits) {
+  const std::string python = words[0];
+  ProcessResult result = run_limited(std::move(words), limits);
+  const bool ended = result.status && WIFEXITED(*result.status);
+  const int code = ended ? WEXITSTATUS(*result.status) : -1;
+  if (code == 0) return std::move(result.output);
+  if (code == 126) fail(path, "its sandbox cannot be entered");
+  if (code == 127) fail(path, "Python is missing (" + python + "); xacro needs it");
+  if (!ended) fail(path, "it needs more than " + std::to_string(kCpu_s) + " s, or more than 2 GB");
+  fail(path, last_line(result.messages));  // xacro's warnings come before
+}
+
+// The interpreter, and what it reads of its own. It says so itself, once: it may be a script that
+// looks for the interpreter, and may lie anywhere.
+std::vector<std::string> interpreter_for(const std::string& path) {
+  static std::mutex mutex;
+  static std::map<std::string, std::vector<std::string>> known;
+  const std::lock_guard lock(mutex);
+  std::vector<std::string>& parts = known[xacro_python()];
+  if (parts.empty()) {
+    std::istringstream lines(output_of(path, {xacro_python(), script(), "--parts"}, limits()));
+    for (std::string line; std::getline(lines, line);) parts.push_back(line);
+    if (parts.empty()) fail(path, xacro_python() + " is no Python");
+  }
+  return parts;
+}
+
+bool lies_in(const std::string& path, const std::vector<std::string>& folders) {
+  std::error_code error;
+  const std::string full = fs::weakly_canonical(path, error).string();
+  return std::any_of(folders.begin(), folders.end(), [&](const std::string& folder) {
+    return full.starts_with(folder == "/" ? folder : folder + "/");
+  });
+}
+
 // A line of what expand.py prints before the robot.
-void take_note(const std::string& line, ReadContext& context) {
+void take_note(const std::string& line, const std::vector<std::string>& readable,
+               ReadContext& context) {
   std::istringstream words(line);
   std::string kind, file, include;
   std::getline(std::getline(std::getline(words, kind, '\t'), file, '\t'), include);
-  if (kind == "read") context.documents.note(file);
+  if (kind == "read" && lies_in(file, readable)) context.documents.note(file);
   if (kind == "missing")
     context.findings.error({file, 0}, "xacro",
                            "the include '" + include + "' is not found; it is passed over");
@@ -99,14 +127,27 @@ void take_note(const std::string& line, ReadContext& context) {
 }  // namespace
 
 std::shared_ptr<const Element> expand_xacro(const std::string& path, ReadContext& context) {
-  const std::string output = output_of(path, context);
+  const std::vector<std::string> parts = interpreter_for(path);
+  const std::vector<std::string> folders = context.resources.folders_of(path);
+  ProcessLimits confined = limits();
+  confined.sandbox = {.readable = folders, .alone = true};
+  std::vector<std::string>& readable = confined.sandbox->readable;
+  readable.insert(readable.end(), parts.begin() + 1, parts.end());
+  readable.push_back(fs::path(script()).parent_path());
+  confined.sandbox->runnable = {parts.front()};
+  std::vector<std::string> words{parts.front(), script(), path};
+  for (const std::string& root : context.resources.folders())
+    words.insert(words.end(), {"--folder", root});
+  for (const std::string& argument : context.xacro_arguments)
+    words.insert(words.end(), {"--argument", argument});
+  const std::string output = output_of(path, std::move(words), confined);
   size_t at = 0;
   for (;;) {
     const size_t end = std::min(output.find('\n', at), output.size());
     const std::string line = output.substr(at, end - at);
     at = std::min(end + 1, output.size());
     if (line.empty()) break;
-    take_note(line, context);
+    take_note(line, folders, context);
   }
   std::unique_ptr<Element> root = parse_document(output.substr(at), path);
   take_lines(*root, {path, 1});

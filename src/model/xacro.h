@@ -1,6 +1,6 @@
 // xacro: robots as macros, expanded by the Python package of that name in a child process with
 // limits (xacro/expand.py). xacro evaluates Python, so a reader of our own could support only a
-// part of it; ROS is not needed.
+// part of it, and any Python: the child has a sandbox of its own. ROS is not needed.
 #pragma once
 
 #include <memory>

@@ -74,11 +74,18 @@ void QueuedSink::flush() {
   hand_over();
 }
 
+template <class Condition>
+void QueuedSink::wait(std::unique_lock<std::mutex>& lock, Condition condition) {
+  waited_for_ = true;
+  changed_.wait(lock, condition);
+  waited_for_ = false;
+}
+
 void QueuedSink::hand_over() {
   {
     std::unique_lock lock(mutex_);
     if (options_.when_full == WhenFull::wait)
-      changed_.wait(lock, [this] { return bytes_ == 0 || bytes_ < options_.most_bytes; });
+      wait(lock, [this] { return bytes_ == 0 || bytes_ < options_.most_bytes; });
     bytes_ += page_.cost();
     full_ = bytes_ >= options_.most_bytes;
     pages_.push_back(std::move(page_));
@@ -95,7 +102,7 @@ void QueuedSink::hand_over() {
 void QueuedSink::drain() {
   if (!page_.entries.empty()) hand_over();
   std::unique_lock lock(mutex_);
-  changed_.wait(lock, [this] { return bytes_ == 0; });
+  wait(lock, [this] { return bytes_ == 0; });
 }
 
 void QueuedSink::work() {

@@ -49,8 +49,8 @@ class QueuedSink : public Sink {
   // Returns when the sink has received and flushed everything so far.
   void drain();
 
-  // Whether the run waits for the sink, or it misses steps. Any thread, as the next.
-  bool is_full() const { return full_; }
+  // Whether the run waits for the sink at this moment. Any thread, as the next.
+  bool is_waited_for() const { return waited_for_; }
   // Messages that found no room.
   uint64_t missed() const { return missed_; }
 
@@ -81,6 +81,8 @@ class QueuedSink : public Sink {
   bool has_room();
   Entry& add(What what);
   void hand_over();
+  template <class Condition>
+  void wait(std::unique_lock<std::mutex>& lock, Condition condition);
   void work();
   void deliver(const Page& page);
 
@@ -100,7 +102,7 @@ class QueuedSink : public Sink {
   std::vector<Page> spare_;
   size_t bytes_ = 0;  // of the pages, and of the one that is being delivered
   bool over_ = false;
-  std::atomic<bool> full_{false};
+  std::atomic<bool> full_{false}, waited_for_{false};
   std::atomic<uint64_t> missed_{0};
   std::thread thread_;
 };

@@ -54,7 +54,7 @@ class LogSink : public Sink {
   void flush() override { queue_.flush(); }
 
   // Whether the run waits for the disk. Any thread.
-  bool waits() const { return queue_.is_full(); }
+  bool waits() const { return queue_.is_waited_for(); }
   // Returns when all that came so far was handed to the operating system.
   void drain() { queue_.drain(); }
   // Throws EnvironmentError when the log cannot be written any more. now: sim time.

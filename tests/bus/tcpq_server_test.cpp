@@ -2,6 +2,7 @@
 #include "bus/tcpq_server.h"
 
 #include <chrono>
+#include <ctime>
 #include <functional>
 #include <thread>
 
@@ -14,6 +15,8 @@
 #include <unistd.h>
 #include <lcm/lcm-cpp.hpp>
 
+#include "core/file_handle.h"
+#include "no_files.h"
 #include "ruedo/errors.h"
 
 namespace ruedo::bus {
@@ -219,6 +222,24 @@ TEST(TcpqServer, ASlowClientLosesMessagesAndHoldsNobodyUp) {
   ASSERT_TRUE(
       soon([&] { return slow.closed(100) || served.server.skipped() > 0; }));  // it reads again
   EXPECT_FALSE(slow.closed(1));
+}
+
+TEST(TcpqServer, WithoutFileDescriptorsNewcomersWaitAndCostNothing) {
+  Served served;
+  const FileHandle newcomer(::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0));
+  sockaddr_in address{};
+  address.sin_family = AF_INET;
+  address.sin_port = htons(served.server.port());
+  address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+  {
+    const NoFiles none;
+    ASSERT_EQ(
+        ::connect(newcomer.get(), reinterpret_cast<const sockaddr*>(&address), sizeof address), 0);
+    const std::clock_t before = std::clock();
+    std::this_thread::sleep_for(std::chrono::seconds(2));
+    EXPECT_LT(std::clock() - before, CLOCKS_PER_SEC / 5);  // of the processor's time
+  }
+  EXPECT_TRUE(soon([&] { return served.server.connections() == 1; }));
 }
 
 TEST(TcpqServer, StopDeliversWhatWasPublishedLast) {

@@ -4,8 +4,10 @@
 #include <atomic>
 #include <cerrno>
 #include <condition_variable>
+#include <ctime>
 #include <filesystem>
 #include <fstream>
+#include <list>
 #include <memory>
 #include <mutex>
 #include <thread>
@@ -20,6 +22,7 @@
 
 #include "bus/stream_connection.h"
 #include "bus/unix_socket.h"
+#include "no_files.h"
 #include "ruedo/errors.h"
 
 namespace fs = std::filesystem;
@@ -162,6 +165,23 @@ TEST(UnixServer, IsTheUsersOwn) {
   EXPECT_EQ(served.server.refused(), 1u);
 }
 
+TEST(UnixServer, WithoutFileDescriptorsNewcomersWaitAndCostNothing) {
+  Served served;
+  const FileHandle newcomer(::socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0));
+  sockaddr_un address{};
+  address.sun_family = AF_UNIX;
+  served.folder.url().host.copy(address.sun_path, sizeof address.sun_path - 1);
+  {
+    const NoFiles none;
+    ASSERT_EQ(
+        ::connect(newcomer.get(), reinterpret_cast<const sockaddr*>(&address), sizeof address), 0);
+    const std::clock_t before = std::clock();
+    std::this_thread::sleep_for(std::chrono::seconds(2));
+    EXPECT_LT(std::clock() - before, CLOCKS_PER_SEC / 5);  // of the processor's time
+  }
+  while (served.server.connections() == 0) std::this_thread::yield();
+}
+
 TEST(UnixServer, NothingIsLostThatASlowClientTakesLater) {
   Served served;
   Client slow(served, {"bulk"});
@@ -190,6 +210,37 @@ TEST(UnixServer, WhoTakesNothingHasABound) {
   served.server.flush();
   quick.take_until(1);
   EXPECT_EQ(quick.came.size(), 1u);
+}
+
+TEST(UnixServer, AllWhoTakeNothingHaveABoundTogether) {
+  Served served;
+  std::list<Client> clients;
+  for (int i = 0; i < 5; ++i) clients.emplace_back(served, std::vector<std::string>{"bulk"});
+  const std::string block(1 << 20, 'x');
+  for (int i = 0; i < 60; ++i) {  // less than each alone may be behind
+    served.publish("bulk", block);
+    served.server.flush();
+  }
+  EXPECT_GT(served.server.failed(), 0u);
+}
+
+TEST(UnixServer, OneTooManyIsSentAway) {
+  Served served;
+  std::list<StreamConnection> connections;
+  for (size_t i = 0; i < UnixServer::kMostClients; ++i)
+    connections.emplace_back(connect_unix(served.folder.url().host));
+  const FileHandle newcomer = connect_unix(served.folder.url().host);
+  char byte;
+  EXPECT_EQ(::recv(newcomer.get(), &byte, 1, 0), 0);
+  EXPECT_EQ(served.server.refused(), 1u);
+}
+
+TEST(UnixServer, WhoDoesNotGreetIsSentAway) {
+  Served served;
+  const FileHandle silent = connect_unix(served.folder.url().host);
+  char byte;
+  EXPECT_EQ(::recv(silent.get(), &byte, 1, 0), 0);
+  EXPECT_EQ(served.server.refused(), 1u);
 }
 
 TEST(UnixServer, WhatWasPublishedLastComes) {

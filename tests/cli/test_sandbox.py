@@ -6,6 +6,7 @@ import os
 import shutil
 import socket
 import subprocess
+import time
 from pathlib import Path
 
 import pytest
@@ -113,6 +114,64 @@ def test_it_draws_and_views(place):
         f"127.0.0.1:{port}",
     )
     assert done.returncode == 0 and "renderer" not in done.stderr, done
+
+
+def statuses(process):
+    """Of all its threads."""
+    return [task.read_text() for task in Path(f"/proc/{process}/task").glob("*/status")]
+
+
+def is_confined(status):
+    return "NoNewPrivs:\t1\n" in status and "Seccomp:\t2\n" in status
+
+
+def until(condition):
+    deadline = time.monotonic() + 400
+    while not condition():
+        assert time.monotonic() < deadline
+        time.sleep(0.01)
+
+
+def threads_of_the_importer(process, mesh):
+    children = Path(f"/proc/{process}/task/{process}/children").read_text().split()
+    for child in children:
+        try:
+            words = Path(f"/proc/{child}/cmdline").read_bytes().split(b"\0")
+            if words[0].endswith(b"ruedo-import-mesh") and os.fsencode(mesh) in words:
+                return statuses(child)
+        except OSError:  # it has ended
+            pass
+    return []
+
+
+@pytest.mark.parametrize("options", [[], ["--sandbox"]])
+def test_all_threads_are_within(place, options):
+    """Of the program, which shows on a terminal how far it is from the very start, and of the
+    importer: always. The mesh is large, so that they can be looked at meanwhile.
+    """
+    mesh = place / "world/models/cube/cube.obj"
+    with mesh.open("w") as file:
+        file.writelines(f"v {i % 700} {i // 700} {i % 13}\n" for i in range(490_000))
+        file.writelines(f"f {i} {i + 1} {i + 700}\n" for i in range(1, 489_000))
+    command = [RUEDO, "check", place / "world/good.sdf", *options]
+    environment = {**os.environ, "XDG_CACHE_HOME": str(place / "cache")}
+    terminal, end = os.openpty()
+    with subprocess.Popen(
+        command, stdout=subprocess.DEVNULL, stderr=end, env=environment
+    ) as process:
+        try:
+            until(
+                lambda: (
+                    (threads := threads_of_the_importer(process.pid, mesh))
+                    and all(map(is_confined, threads))
+                )
+            )
+            own = statuses(process.pid)
+            assert len(own) > 1 and all(is_confined(one) == bool(options) for one in own), own
+        finally:
+            process.kill()
+            os.close(terminal)
+            os.close(end)
 
 
 def test_the_doctor_tells(place):

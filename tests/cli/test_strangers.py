@@ -9,7 +9,8 @@ import struct
 import subprocess
 
 import pytest
-from recorded import ARENA, events, program, url, write
+import ruedo
+from recorded import ARENA, RUEDO, events, program, until, url, write
 from ruedo.lcmtypes import log_file_t, log_header_t
 
 WORLD = "<sdf version='1.9'><world name='w'><model name='m'><link name='l'><sensor name='imu' type='imu'/></link></model></world></sdf>"
@@ -119,6 +120,22 @@ def test_escapes_of_a_log_stay_out_of_the_terminal(recorded, tmp_path):
     ), result
 
 
+def test_escapes_of_a_request_stay_out_of_the_terminal(tmp_path):
+    world, bus, said = (tmp_path / name for name in ("w.sdf", "bus", "said"))
+    world.write_text(WORLD)
+    command = [RUEDO, "run", world, "--quiet", "--lcm", f"unix://{bus}"]
+    with said.open("w") as out, subprocess.Popen(command, stderr=out) as server:
+        try:
+            until(bus.exists)
+            with ruedo.connect(f"unix://{bus}") as sim:
+                box = "<sdf version='1.9'><model name='b'><link name='l'><collision name='c'><geometry><mesh><uri>nowhere\x1b[2J\x9b</uri></mesh></geometry></collision></link></model></sdf>"
+                sim.spawn(text=box, name="b", x=2, y=2)
+            until(lambda: "nowhere" in said.read_text())
+        finally:
+            server.terminate()
+    assert "\x1b" not in said.read_text() and "\x9b" not in said.read_text()
+
+
 def tiff(width, height):
     entries = [
         (256, 4, 1, width),
@@ -203,6 +220,7 @@ def three_gigabytes():
         (resource.RLIMIT_NOFILE, 5, "ulimit -n"),
         (resource.RLIMIT_NOFILE, 12, "ulimit -n"),
         (resource.RLIMIT_AS, 600_000_000, "ulimit -v"),
+        (resource.RLIMIT_STACK, 64 << 10, "ulimit -s"),
     ],
 )
 @pytest.mark.parametrize("command", ["run", "check"])
@@ -297,3 +315,34 @@ def test_too_few_threads_end_with_one_line(few_threads, tmp_path, words):
         else:
             assert done.returncode == 0, (count, done.returncode, done.stderr)
     assert 4 in codes
+
+
+# As under `ulimit -v`, for one thread.
+NO_MEMORY = r"""
+#include <cstdlib>
+#include <cstring>
+#include <new>
+#include <pthread.h>
+
+void* operator new(std::size_t size) {
+  char name[16] = "";
+  pthread_getname_np(pthread_self(), name, sizeof name);
+  if (std::strcmp(name, std::getenv("WITHOUT_MEMORY")) == 0) throw std::bad_alloc();
+  return std::malloc(size);
+}
+void operator delete(void* block) noexcept { std::free(block); }
+void operator delete(void* block, std::size_t) noexcept { std::free(block); }
+"""
+
+
+def test_a_thread_without_memory_ends_with_one_line(recorded, tmp_path):
+    (tmp_path / "none.cpp").write_text(NO_MEMORY)
+    command = ["c++", "-shared", "-fPIC", "-o", tmp_path / "none.so", tmp_path / "none.cpp"]
+    subprocess.run(command, check=True)
+    result = program(
+        *("run", recorded[0] / "w.sdf", "--quiet", "--lcm", "memq://"),
+        *("--foxglove", "127.0.0.1:0", "--rate", "max", "--duration", "10"),
+        env={**os.environ, "LD_PRELOAD": str(tmp_path / "none.so"), "WITHOUT_MEMORY": "foxglove"},
+    )
+    assert result.returncode == 4, result
+    assert result.stderr == "ruedo: there is not enough memory\n"

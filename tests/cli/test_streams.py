@@ -11,7 +11,7 @@ import subprocess
 import time
 
 import pytest
-from recorded import RUEDO, events, program
+from recorded import RUEDO, events, program, until
 
 WORLD = """<sdf version='1.9'><world name='w'><include><uri>model://ground_plane</uri></include>
 <include><uri>model://p3at</uri></include></world></sdf>"""
@@ -138,6 +138,20 @@ def test_nothing_is_written_over_what_is_read(world, log, tmp_path):
         assert path.read_bytes() == before
     two = ["--junit", tmp_path / "new", "--html", tmp_path / "new"]
     assert "is the same file as" in program("diff", log, log, *two).stderr
+
+
+def test_two_runs_do_not_record_into_one_file(world, tmp_path):
+    log = tmp_path / "both.lcm"
+    command = ["run", str(world), "--quiet", "--lcm", "memq://", "--paused", "--record", str(log)]
+    with subprocess.Popen([RUEDO, *command]) as first:
+        try:
+            until(log.exists)
+            until(lambda: log.stat().st_size > 0)  # its header
+            second = program(*command, "--duration", "0")
+            assert second.returncode == 4, second
+            assert "another run records into it" in second.stderr
+        finally:
+            first.terminate()
 
 
 def test_a_page_for_a_fifo_can_be_given_up(log, tmp_path):

@@ -1,12 +1,17 @@
 """The local socket: its owner, and that all three libraries see the same as over multicast."""
 
 import os
+import shutil
+import signal
+import socket
 import stat
 import subprocess
+import tempfile
 import time
 from pathlib import Path
 from urllib.parse import urlsplit
 
+import pytest
 from conftest import HERE, PATIENCE, RUEDO, probe, ruedo_run
 
 HALL = str(HERE / "hall.sdf")
@@ -30,6 +35,44 @@ def test_lockstep_is_the_same_as_over_multicast(language, tmp_path):
 def test_nobody_at_the_path_is_said(language, tmp_path):
     said = probe(language, f"unix://{tmp_path}/nobody", "connect").one("failed")
     assert said.startswith(f"NoServer: no Ruedo server at unix://{tmp_path}/nobody")
+
+
+@pytest.fixture
+def anothers_socket():
+    """At which another user listens, in a folder where all may write."""
+    if os.geteuid() != 0:
+        pytest.skip("only root can be somebody else")
+    folder = tempfile.mkdtemp()
+    os.chmod(folder, 0o777)
+    path, (ready, tell) = f"{folder}/bus", os.pipe()
+    stranger = os.fork()
+    if stranger == 0:
+        try:
+            os.setgid(65534)
+            os.setuid(65534)
+            with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as listener:
+                listener.bind(path)
+                os.chmod(path, 0o777)
+                listener.listen()
+                os.write(tell, b"ready")
+                signal.pause()
+        finally:
+            os._exit(1)
+    os.close(tell)
+    try:
+        if os.read(ready, 5) != b"ready":
+            pytest.skip("this namespace has no other user")
+        yield path
+    finally:
+        os.close(ready)
+        os.kill(stranger, signal.SIGKILL)
+        os.waitpid(stranger, 0)
+        shutil.rmtree(folder)
+
+
+def test_nobody_talks_to_another_users_server(language, anothers_socket):
+    said = probe(language, f"unix://{anothers_socket}", "connect").one("failed")
+    assert said.startswith("NoServer") and "served by another user" in said
 
 
 def test_launch_takes_a_socket_of_its_own():

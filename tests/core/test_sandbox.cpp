@@ -5,10 +5,15 @@
 #include <cstdlib>
 #include <fstream>
 #include <functional>
+#include <thread>
 
 #include <fcntl.h>
 #include <gtest/gtest.h>
+#include <signal.h>
+#include <sys/ioctl.h>
 #include <sys/socket.h>
+#include <sys/stat.h>
+#include <sys/syscall.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -95,15 +100,47 @@ TEST_F(SandboxTest, LinksLeadNowhere) {
             EACCES);
 }
 
+int executed(const char* program) {
+  return execl(program, program, static_cast<char*>(nullptr)), errno;
+}
+
+int result(long returned) { return returned < 0 ? errno : 0; }
+
 TEST_F(SandboxTest, AloneItReachesNobody) {
+  const auto chmod_it = [&] { return result(chmod(read_.c_str(), 0600)); };
   EXPECT_EQ(within(sandbox_, connected), 0);
   EXPECT_EQ(within(sandbox_, [] { return ran("/bin/true"); }), 0);
+  EXPECT_EQ(within(sandbox_, chmod_it), 0);
   sandbox_.alone = true;
   EXPECT_EQ(within(sandbox_, connected), EPERM);
+  EXPECT_EQ(within(sandbox_, [] { return ran("/bin/true"); }), EPERM) << "no process beside it";
+  EXPECT_EQ(within(sandbox_, [] { return executed("/bin/true"); }), 0) << "but instead of it";
   EXPECT_EQ(within(sandbox_,
-                   [] { return execl("/bin/true", "true", static_cast<char*>(nullptr)), errno; }),
-            EPERM);
-  EXPECT_EQ(within(sandbox_, [] { return kill(getppid(), 0) == 0 ? 0 : errno; }), EPERM);
+                   [] {
+                     std::thread([] {}).join();
+                     return 0;
+                   }),
+            0);
+  EXPECT_EQ(within(sandbox_, [] { return result(kill(getppid(), 0)); }), EPERM);
+  EXPECT_EQ(within(sandbox_, [] { return result(tgkill(getppid(), getppid(), 0)); }), EPERM);
+  EXPECT_EQ(within(sandbox_, chmod_it), EPERM);
+  EXPECT_EQ(
+      within(sandbox_, [&] { return result(syscall(452, AT_FDCWD, read_.c_str(), 0600, 0)); }),
+      EPERM)
+      << "fchmodat2";
+  EXPECT_EQ(
+      within(sandbox_, [&] { return result(utimensat(AT_FDCWD, read_.c_str(), nullptr, 0)); }),
+      EPERM);
+  sandbox_.system = false;
+  EXPECT_EQ(within(sandbox_, [] { return executed("/bin/true"); }), EPERM);
+}
+
+// Its shell would execute that.
+TEST_F(SandboxTest, NobodyTypesIntoTheTerminal) {
+  for (const bool alone : {false, true}) {
+    sandbox_.alone = alone;
+    EXPECT_EQ(within(sandbox_, [] { return result(ioctl(STDIN_FILENO, TIOCSTI, "x")); }), EPERM);
+  }
 }
 
 }  // namespace

@@ -1,11 +1,17 @@
 // A run that does not progress says why: the client, sensor, request or sink that it waits for.
+#include <atomic>
 #include <condition_variable>
 #include <mutex>
+#include <thread>
 
+#include <fcntl.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sys/stat.h>
 
+#include "../model/temporary_folder.h"
 #include "control_client.h"
+#include "core/file_handle.h"
 #include "run/stall_watch.h"
 
 namespace ruedo::run {
@@ -55,8 +61,11 @@ class Told {
     changed_.wait(lock, [this] { return !reason_.empty(); });
     return reason_;
   }
+  void close() { open_ = false; }
+  bool is_open() const { return open_; }
 
  private:
+  std::atomic<bool> open_{true};
   std::mutex mutex_;
   std::condition_variable changed_;
   std::string reason_;
@@ -119,6 +128,42 @@ TEST(StallWatch, NamesTheBus) {
     if (channel == "r/odometry") told.wait();
   };
   EXPECT_EQ(reason_of(fast(1), "", bus, told), "the bus takes no messages");
+}
+
+// A disk that takes no more than a pipe does, until the run has said why it stands.
+std::string reason_with_a_full_pipe(int samples, double seconds) {
+  const TemporaryFolder folder;
+  const std::string pipe = folder / "run.lcm";
+  EXPECT_EQ(::mkfifo(pipe.c_str(), 0600), 0);
+  const FileHandle end(::open(pipe.c_str(), O_RDWR | O_CLOEXEC));
+  MemoryBus bus;
+  Told told;
+  RunOptions options = fast(seconds);
+  options.record = pipe;
+  const std::string lrf =
+      "<sensor name='front' type='gpu_ray'><update_rate>100</update_rate><ray><scan><horizontal>"
+      "<samples>" +
+      std::to_string(samples) +
+      "</samples><min_angle>-1</min_angle>"
+      "<max_angle>1</max_angle></horizontal></scan><range><min>0.1</min><max>8</max></range></ray>"
+      "</sensor>";
+  std::thread reader([&] {
+    told.wait();
+    ::fcntl(end.get(), F_SETFL, O_NONBLOCK);
+    for (std::vector<char> bytes(1 << 20); told.is_open();) {
+      if (::read(end.get(), bytes.data(), bytes.size()) < 0) std::this_thread::yield();
+    }
+  });
+  const std::string reason = reason_of(options, lrf, bus, told);
+  told.close();
+  reader.join();
+  return reason;
+}
+
+TEST(StallWatch, NamesTheDisk) {
+  const auto names_it = HasSubstr("the disk of --record does not take the log");
+  EXPECT_THAT(reason_with_a_full_pipe(10'000, 60), names_it) << "the queue is full";
+  EXPECT_THAT(reason_with_a_full_pipe(1000, 1), names_it) << "the run has ended";
 }
 
 TEST(StallWatch, APausedOrSlowRunIsNotHeldUp) {

@@ -29,6 +29,7 @@ _SERVER = struct.pack(">I", 0x287617FA)  # its hello begins with that
 _PATIENCE = struct.pack("ll", 5, 0)  # s, us: of connecting and sending, as a timeval
 _HEAD = struct.Struct(">II")  # kind, length of the channel's name
 _SIZE = struct.Struct(">I")
+_CREDENTIALS = struct.Struct("3i")  # process, user, group
 _PUBLISH, _SUBSCRIBE, _UNSUBSCRIBE = 1, 2, 3
 _CHUNK = 1 << 18  # bytes received at a time
 
@@ -42,6 +43,7 @@ def connect(url: SplitResult) -> socket.socket:
         end.setsockopt(socket.SOL_SOCKET, socket.SO_SNDTIMEO, _PATIENCE)
         if local:
             end.connect(url.path)
+            _check_peer(end)
         else:
             end.connect((url.hostname or "127.0.0.1", url.port or 7700))
             end.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
@@ -52,6 +54,15 @@ def connect(url: SplitResult) -> socket.socket:
         end.close()
         raise
     return end
+
+
+def _check_peer(end: socket.socket) -> None:
+    """The server is this user's or root's: whoever may write in a folder may serve there."""
+    _, user, _ = _CREDENTIALS.unpack(
+        end.getsockopt(socket.SOL_SOCKET, socket.SO_PEERCRED, _CREDENTIALS.size)
+    )
+    if user not in (os.geteuid(), 0):
+        raise PermissionError(errno.EPERM, "it is served by another user")
 
 
 def is_served(url: SplitResult) -> bool:

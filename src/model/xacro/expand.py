@@ -1,6 +1,7 @@
 """Expands a xacro file for Ruedo, by the Python package xacro, without ROS around it.
 
     expand.py FILE [--folder FOLDER]... [--argument NAME:=VALUE]...
+    expand.py --parts
 
 Prints a line "read\tFILE" for each file that was read, and "missing\tFILE\tWHAT" for each
 include that is not there and was passed over; after an empty line the robot, each element with the
@@ -8,6 +9,9 @@ attribute ruedo_at="FILE:LINE" that says where it was written. $(find PKG) is th
 package.xml has that name: above the file, beside its package, or in the folders given; else a
 folder of that name above the file.
 Errors go to stderr, in one line; the exit code is 1, or 2 where the package xacro is missing.
+
+A xacro file is a program: xacro lets any Python through. Run this in a sandbox. --parts prints the
+interpreter and what it reads of its own, a path a line, for that.
 """
 
 import argparse
@@ -19,6 +23,18 @@ import types
 import xml.dom.expatbuilder
 
 MOST_FOLDERS = 2000  # that are looked at for packages
+
+
+def print_parts():
+    print(sys.executable)
+    for prefix in {sys.prefix, sys.exec_prefix, sys.base_prefix, sys.base_exec_prefix}:
+        for part in ("lib", "lib64", "pyvenv.cfg"):
+            print(os.path.join(prefix, part))
+    for name in ("sitecustomize", "usercustomize"):
+        if getattr(sys.modules.get(name), "__file__", None):
+            print(sys.modules[name].__file__)
+    print(*filter(None, sys.path), sep="\n")
+    return 0
 
 
 def package_name(folder):
@@ -156,11 +172,18 @@ class Notes:
         stack = reversed(self._xacro.filestack or [])
         where = next((os.path.abspath(each) for each in stack if each), self._file)
         text = as_written(" ".join(str(error).split())) or type(error).__name__
+        while getattr(error, "exc", None):  # XacroException's reason
+            error = error.exc
+        if isinstance(error, PermissionError) and error.filename:
+            folder = os.path.dirname(os.path.realpath(error.filename))
+            text += f" (a xacro file reads what lies near it; RUEDO_PATH={folder} lets others in)"
         lost = ", ".join(sorted({name for _, name in self.missing}))
         return f"{where}: {text}" + (f"; not found: {lost}" if lost else "")
 
 
 def main():
+    if sys.argv[1:] == ["--parts"]:
+        return print_parts()
     parser = argparse.ArgumentParser()
     parser.add_argument("file")
     parser.add_argument("--folder", action="append", default=[])

@@ -9,6 +9,7 @@ import java.net.InetAddress;
 import java.net.InetSocketAddress;
 import java.net.ProtocolFamily;
 import java.net.SocketAddress;
+import java.net.SocketOption;
 import java.net.StandardProtocolFamily;
 import java.net.StandardSocketOptions;
 import java.nio.ByteBuffer;
@@ -16,6 +17,9 @@ import java.nio.channels.ClosedSelectorException;
 import java.nio.channels.SelectionKey;
 import java.nio.channels.Selector;
 import java.nio.channels.SocketChannel;
+import java.nio.file.Files;
+import java.nio.file.Paths;
+import java.security.Principal;
 
 /**
  * A connection to a server: over TCP, or a Unix-domain socket. One thread reads while another
@@ -41,6 +45,7 @@ final class StreamSocket implements Closeable {
                             ? pathOf(address.path)
                             : new InetSocketAddress(
                                     InetAddress.getByName(address.host), address.port));
+            if (address.path != null) checkPeer(channel);
         } catch (IOException error) {
             close();
             throw error;
@@ -128,6 +133,22 @@ final class StreamSocket implements Closeable {
         } catch (ReflectiveOperationException | IllegalArgumentException error) {
             throw new IOException("unix:// addresses need Java 16 or later", error);
         }
+    }
+
+    /** The server is this user's or root's: whoever may write in a folder may serve there. */
+    private static void checkPeer(SocketChannel channel) throws IOException {
+        String user;
+        try {
+            Object option =
+                    Class.forName("jdk.net.ExtendedSocketOptions").getField("SO_PEERCRED").get(null);
+            Object peer = channel.getOption((SocketOption<?>) option);
+            Object principal = peer.getClass().getMethod("user").invoke(peer);
+            user = ((Principal) principal).getName();
+        } catch (ReflectiveOperationException error) {
+            throw new IOException("unix:// addresses need the module jdk.net", error);
+        }
+        if (!user.equals("root") && !user.equals(Files.getOwner(Paths.get("/proc/self")).getName()))
+            throw new IOException("it is served by another user");
     }
 
     private static SocketAddress pathOf(String path) throws IOException {
