@@ -200,6 +200,18 @@ std::string element_of(const ModelNow& model, bool in_model) {
   return changed.substr(whole->begin, whole->end - whole->begin);
 }
 
+// With those elements at the end of the world.
+std::string with_last(const std::string& text, const std::string& elements) {
+  const TextElement root = places_in(text);
+  const TextElement& world = *root.child("world");
+  TextPatch patch;
+  if (world.closed())
+    patch.replace(world.end - 2, world.end, ">" + elements + "\n  </world>");
+  else
+    patch.insert(text.find_last_not_of(" \t\r\n", world.past - 1) + 1, elements);
+  return patch.applied_to(text);
+}
+
 // "box_2" may be called "box" in the file.
 bool may_be_called(const std::string& name, const std::string& in_file) {
   const auto plain = [](std::string text) {
@@ -366,14 +378,8 @@ WorldText::Written WorldText::with(const std::vector<ModelNow>& models) const {
     if (!said.contains(model.name))
       added += "\n    " + element_of(model, has_axes_in_model(*root_));
   }
-  if (!added.empty()) {
-    const size_t end = text_.find_last_not_of(" \t\r\n", world_place_->past - 1) + 1;
-    if (world_place_->closed())
-      patch.replace(world_place_->end - 2, world_place_->end, ">" + added + "\n  </world>");
-    else
-      patch.insert(end, added);
-  }
   result.text = patch.applied_to(text_);
+  if (!added.empty()) result.text = with_last(result.text, added);
   return result;
 }
 

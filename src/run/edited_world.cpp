@@ -152,8 +152,9 @@ EditedWorld::Saved EditedWorld::save(const model::WorldModel& now,
     if (now.models[i].removed) continue;
     const std::string& name = now.models[i].name;
     const auto spawned = spawned_.find(name);
+    const Pose X = now.models[i].model->path ? now.models[i].X_WM : X_WM(i);  // it goes from there
     models.push_back(
-        {name, X_WM(i), spawned == spawned_.end() ? "" : spawned->second, put_.contains(name)});
+        {name, X, spawned == spawned_.end() ? "" : spawned->second, put_.contains(name)});
   }
   try {
     model::WorldText::Written written = text().with(models);

@@ -152,6 +152,20 @@ TEST(WorldTextTest, ANewModelStandsAtTheEndUnderItsName) {
   expect_near(world.put("guest"), Pose::from_xyz_rpy({0, 2, 0}, {0, 0, 1}));
 }
 
+TEST(WorldTextTest, ANewModelTakesThePlaceOfTheLastOne) {
+  Text world(box("a", "") + box("b", "") + box("c", ""));
+  for (const char* name : {"c", "b"}) {
+    std::erase_if(world.models, [&](const ModelNow& model) { return model.name == name; });
+    std::vector<ModelNow> with_new = world.models;
+    const std::string text = "<sdf version='1.9'>" + box("x", "") + "</sdf>";
+    with_new.push_back({"d", Pose::from_xyz_rpy({1, 0, 0}, {0, 0, 0}), text, true});
+    const std::string saved = world.places().with(with_new).text;
+    const auto again = load_world_text(saved, kWorlds + "w.sdf");
+    ASSERT_EQ(again->models.size(), with_new.size()) << saved;
+    EXPECT_EQ(again->models.back().name, "d");
+  }
+}
+
 // In quotes of both kinds, and in an <include>.
 TEST(WorldTextTest, ANameThatASpawnMayHaveReadsBack) {
   for (const std::string name :
