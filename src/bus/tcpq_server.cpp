@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cerrno>
 #include <cstring>
-#include <map>
+#include <iterator>
 
 #include <arpa/inet.h>
 #include <netinet/in.h>
@@ -17,7 +17,7 @@
 
 #include <spdlog/spdlog.h>
 
-#include "bus/peer_owners.h"
+#include "core/peer_owners.h"
 #include "ruedo/errors.h"
 
 namespace ruedo::bus {
@@ -228,18 +228,12 @@ bool TcpqServer::make_place(const FileHandle& newcomer) {
 }
 
 TcpqServer::Client* TcpqServer::of_largest_share(const FileHandle& newcomer) {
-  const PeerOwners owners(port());
-  std::map<std::string, std::pair<size_t, Client*>> shares;  // how many, and the newest
-  for (Client& client : clients_) {
-    auto& [count, newest] = shares[owners.owner_of(client.socket.get())];
-    ++count;
-    newest = &client;
-  }
-  const size_t own = shares[owners.owner_of(newcomer.get())].first + 1;
-  const auto largest = std::max_element(
-      shares.begin(), shares.end(),
-      [](const auto& a, const auto& b) { return a.second.first < b.second.first; });
-  return largest->second.first > own ? largest->second.second : nullptr;
+  std::vector<int> sockets;
+  for (const Client& client : clients_) sockets.push_back(client.socket.get());
+  sockets.push_back(newcomer.get());
+  const size_t which = who_give_way(sockets, clients_.size(), port()).front();
+  const auto client = std::next(clients_.begin(), static_cast<std::ptrdiff_t>(which));
+  return client == clients_.end() ? nullptr : &*client;
 }
 
 void TcpqServer::receive(Client& client) {

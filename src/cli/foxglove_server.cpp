@@ -9,7 +9,9 @@
 
 #ifdef RUEDO_CONSOLE
 
+#include <algorithm>
 #include <array>
+#include <atomic>
 #include <cmath>
 #include <cstring>
 #include <deque>
@@ -45,13 +47,14 @@ constexpr size_t kMostWaiting = size_t{32} << 20;  // bytes that wait for one vi
 constexpr size_t kMostViewers = 16;
 constexpr size_t kMostLayers = 64;  // of what clients draw, for who comes later
 constexpr size_t kMostChannels = 65'000;
-constexpr size_t kMostSubscriptions = 100'000, kMostPublished = 100;  // of one viewer
+constexpr size_t kMostOfChannel = 8, kMostPublished = 100;  // subscriptions, topics of one viewer
 constexpr SimTime kClockPeriod_us = 20'000;
 // Web pages that may connect. Programs have no origin and may; any other web page could be spying.
 const std::vector<std::string> kOrigins = {"https://app.foxglove.dev",
                                            "https://studio.foxglove.dev"};
 
 enum Opcode : uint8_t { kMessageData = 1, kTime = 2 };  // kMessageData: of both sides
+constexpr size_t kDataHead = 5;                         // a viewer's: opcode, channel
 
 template <class Integer>
 void put(std::string& bytes, Integer value) {
@@ -105,6 +108,7 @@ struct Hub {
   std::map<std::string, std::string> inputs;  // names that publish velocities to: the bus's
   uint64_t dropped = 0;
   bool news = false;
+  std::atomic<uint64_t> audience{0};  // grows with each change of who subscribes to what
 
   std::function<void(const std::string& channel, const std::vector<uint8_t>&)> inject;
 
@@ -137,6 +141,7 @@ class Viewer : public console::Connection {
   ~Viewer() override {
     const std::lock_guard lock(hub_.mutex);
     hub_.viewers.erase(this);
+    ++hub_.audience;
   }
 
   void say(std::string text) { push({std::make_shared<const std::string>(std::move(text)), {}}); }
@@ -156,12 +161,18 @@ class Viewer : public console::Connection {
   }
   bool wants(size_t channel) const { return subscribed_.contains(channel); }
 
+  // Others wait for the lock: texts are read without it.
   bool receive(std::span<const uint8_t> message) override {
     const std::string_view text(reinterpret_cast<const char*>(message.data()), message.size());
-    const std::lock_guard lock(hub_.mutex);
     if (text.empty()) return true;
-    if (text[0] == kMessageData) return publish(text.substr(1)), true;
-    const json asked = json::parse(text, nullptr, false);
+    const bool data = text[0] == kMessageData;
+    const std::vector<uint8_t> command = data && text.size() >= kDataHead
+                                             ? velocity_of(text.substr(kDataHead))
+                                             : std::vector<uint8_t>();
+    const json asked = data ? json() : json::parse(text, nullptr, false);
+    const std::lock_guard lock(hub_.mutex);
+    complained_ = false;
+    if (data) return publish(text, command), true;
     try {
       return obey(asked);
     } catch (const BadMessage& bad) {
@@ -197,7 +208,7 @@ class Viewer : public console::Connection {
       if (!std::exchange(told_, true)) {
         waiting_.clear();  // it is too far behind: what waits is dropped
         bytes_ = 0;
-        complain("messages were dropped: this connection is slower than the run");
+        warn("messages were dropped: this connection is slower than the run");
       }
       return;
     }
@@ -207,8 +218,12 @@ class Viewer : public console::Connection {
     hub_.news = true;
   }
 
-  void complain(const std::string& words) {
+  void warn(const std::string& words) {
     say(json{{"op", "status"}, {"level", 1}, {"message", words}}.dump());
+  }
+  // Once for each message, which may hold many things that are wrong.
+  void complain(const std::string& words) {
+    if (!std::exchange(complained_, true)) warn(words);
   }
 
   bool obey(const json& asked) {
@@ -217,10 +232,7 @@ class Viewer : public console::Connection {
       for (const json& one : asked.at("subscriptions"))
         subscribe(id_of(one.at("id")), id_of(one.at("channelId")));
     } else if (op == "unsubscribe") {
-      for (const json& one : asked.at("subscriptionIds")) {
-        const auto id = id_of(one);
-        std::erase_if(subscribed_, [id](const auto& each) { return each.second == id; });
-      }
+      for (const json& one : asked.at("subscriptionIds")) unsubscribe(id_of(one));
     } else if (op == "advertise") {
       for (const json& one : asked.at("channels")) advertise(one);
     } else if (op == "unadvertise") {
@@ -231,11 +243,12 @@ class Viewer : public console::Connection {
 
   void subscribe(uint32_t id, size_t channel) {
     if (channel >= hub_.channels.size()) return complain(fmt::format("no channel {}", channel));
-    if (subscribed_.size() >= kMostSubscriptions) return complain("too many subscriptions");
-    for (const auto& each : subscribed_) {
-      if (each.second == id) return complain(fmt::format("subscription {} is there already", id));
-    }
+    if (subscribed_.count(channel) >= kMostOfChannel)
+      return complain(fmt::format("too many subscriptions to channel {}", channel));
+    if (!channels_.emplace(id, channel).second)
+      return complain(fmt::format("subscription {} is there already", id));
     subscribed_.emplace(channel, id);
+    ++hub_.audience;
     for (const Channel::Kept& kept : hub_.channels[channel].kept) {
       std::string head(1, kMessageData);
       put(head, id);
@@ -244,11 +257,21 @@ class Viewer : public console::Connection {
     }
   }
 
+  void unsubscribe(uint32_t id) {
+    const auto known = channels_.find(id);
+    if (known == channels_.end()) return;
+    const auto [begin, end] = subscribed_.equal_range(known->second);
+    subscribed_.erase(std::find(begin, end, std::pair<const size_t, uint32_t>(known->second, id)));
+    channels_.erase(known);
+    ++hub_.audience;
+  }
+
   void advertise(const json& channel) {
     std::string topic = channel.at("topic");
     if (topic.starts_with('/')) topic.erase(0, 1);
     const auto input = hub_.inputs.find(topic);
     if (channel.at("encoding") != "json" || input == hub_.inputs.end()) {
+      if (complained_) return;
       std::string names;
       for (const auto& [name, bus] : hub_.inputs) names += (names.empty() ? "" : ", ") + name;
       return complain("publishing is for velocities (geometry_msgs/Twist as json) on: " + names);
@@ -256,13 +279,12 @@ class Viewer : public console::Connection {
     if (published_.size() < kMostPublished) published_[id_of(channel.at("id"))] = input->second;
   }
 
-  void publish(std::string_view message) {
-    if (message.size() < 4) return complain("a message without a channel");
+  void publish(std::string_view message, const std::vector<uint8_t>& command) {
+    if (message.size() < kDataHead) return complain("a message without a channel");
     uint32_t id = 0;
-    for (int i = 3; i >= 0; --i) id = id << 8 | static_cast<uint8_t>(message[i]);
+    for (size_t i = kDataHead - 1; i > 0; --i) id = id << 8 | static_cast<uint8_t>(message[i]);
     const auto known = published_.find(id);
     if (known == published_.end()) return complain(fmt::format("no channel {} was advertised", id));
-    const std::vector<uint8_t> command = velocity_of(message.substr(4));
     if (command.empty()) return complain("a Twist wants finite numbers in linear and angular");
     hub_.inject(known->second, command);
   }
@@ -270,8 +292,9 @@ class Viewer : public console::Connection {
   Hub& hub_;
   std::deque<Waiting> waiting_;
   size_t bytes_ = 0;
-  bool told_ = false;
+  bool told_ = false, complained_ = false;
   std::multimap<size_t, uint32_t> subscribed_;  // ids, by channel
+  std::map<uint32_t, size_t> channels_;         // by id
   std::map<uint32_t, std::string> published_;   // the bus's channels
 };
 
@@ -297,13 +320,7 @@ class LiveFoxglove : public FoxgloveServer, public run::Sink, private FoxgloveOu
       response.body = std::make_shared<const std::vector<uint8_t>>(words.begin(), words.end());
       return response;
     };
-    handler.open = [this, text = greeting.dump()]() -> std::unique_ptr<console::Connection> {
-      {
-        const std::lock_guard lock(hub_.mutex);
-        if (hub_.viewers.size() >= kMostViewers) return nullptr;
-      }
-      return std::make_unique<Viewer>(hub_, text);
-    };
+    handler.open = [this, text = greeting.dump()] { return std::make_unique<Viewer>(hub_, text); };
     handler.end = [] {};
     handler.tick = [this] {
       const std::lock_guard lock(hub_.mutex);
@@ -317,7 +334,8 @@ class LiveFoxglove : public FoxgloveServer, public run::Sink, private FoxgloveOu
                           .option = "--foxglove",
                           .socket = "/",
                           .protocols = {"foxglove.websocket.v1", "foxglove.sdk.v1"},
-                          .origins = kOrigins},
+                          .origins = kOrigins,
+                          .most_sockets = kMostViewers},
         std::move(handler));
     rest_ = fmt::format(":{}/{}", web_->port(), token.empty() ? "" : "?token=" + token);
     thread_ = std::thread([this] {
@@ -345,6 +363,7 @@ class LiveFoxglove : public FoxgloveServer, public run::Sink, private FoxgloveOu
 
   // Of records what clients draw.
   Hears hears() const override { return {.samples = true, .records = true}; }
+  uint64_t audience() const override { return hub_.audience; }
   void announce(const std::shared_ptr<const run::Announcement>& announcement) override {
     run::LogWorlds::Scene scene;
     scene.world = server_.world();
@@ -421,7 +440,7 @@ class LiveFoxglove : public FoxgloveServer, public run::Sink, private FoxgloveOu
     }
     kept.push_back(std::move(message));
   }
-  // The first message of a topic says which channels there are.
+  // For the run and the export. The first message of a topic says which channels there are.
   bool wants(const std::string& topic) const override {
     const std::lock_guard lock(hub_.mutex);
     const auto known = by_topic_.find(topic), values = by_topic_.find(topic + "/values");

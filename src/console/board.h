@@ -9,11 +9,16 @@
 #include <optional>
 #include <span>
 #include <string>
+#include <string_view>
 #include <vector>
 
 namespace ruedo::console {
 
 using Bytes = std::shared_ptr<const std::vector<uint8_t>>;
+
+inline Bytes bytes_of(std::string_view text) {
+  return std::make_shared<const std::vector<uint8_t>>(text.begin(), text.end());
+}
 
 class Board {
  public:

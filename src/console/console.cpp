@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <charconv>
 #include <deque>
+#include <map>
 #include <mutex>
 #include <optional>
 #include <thread>
@@ -25,10 +26,6 @@ namespace ruedo::console {
 namespace {
 
 constexpr size_t kKeptScenes = 4;  // of a log: those requested last
-
-Bytes bytes_of(std::string_view text) {
-  return std::make_shared<const std::vector<uint8_t>>(text.begin(), text.end());
-}
 
 HttpResponse not_found() {
   HttpResponse response;
@@ -63,6 +60,8 @@ struct Console::Impl {
   std::shared_ptr<const model::WorldModel> world;  // the running one, or the log's first
   std::deque<Scene> scenes;                        // newest first
   std::unique_ptr<Library> library;                // null: not requested yet
+  std::map<size_t, Bytes> assets;                  // those that were requested
+  Bytes types;                                     // null: not requested yet
   std::unique_ptr<WebServer> web;
   std::thread thread;
   std::mutex words_mutex;
@@ -103,15 +102,19 @@ HttpResponse Console::Impl::get(std::string_view path) {
   for (size_t i = 0; i < kAssetCount; ++i) {
     const Asset& asset = kAssets[i];
     if (path != asset.path) continue;
-    HttpResponse response =
-        blob(std::make_shared<const std::vector<uint8_t>>(asset.data, asset.data + asset.size),
-             asset.type);
+    Bytes& body = assets[i];
+    if (!body)
+      body = std::make_shared<const std::vector<uint8_t>>(asset.data, asset.data + asset.size);
+    HttpResponse response = blob(body, asset.type);
     response.gzip = true;
     return response;
   }
   constexpr std::string_view kHistory = "/history/";
   if (path.starts_with(kHistory)) return history(path.substr(kHistory.size()));
-  if (path == "/types.json") return blob(bytes_of(types_json()), "application/json");
+  if (path == "/types.json") {
+    if (!types) types = bytes_of(types_json());
+    return blob(types, "application/json");
+  }
   if (path.starts_with("/library"))
     return library_file(path.substr(std::string_view("/library").size()));
   if (const auto model = number_after("/scene/models/", path)) return model_text(*model);
@@ -151,7 +154,7 @@ HttpResponse Console::Impl::scene_file(std::string_view path, bool shapes) {
 
 // ".json", "/meshes", "/links", "/textures/NUMBER".
 HttpResponse Console::Impl::file_of(const SceneData& data, std::string_view path) {
-  if (path == ".json") return blob(bytes_of(data.json), "application/json");
+  if (path == ".json") return blob(data.json, "application/json");
   if (path == "/meshes") return blob(data.meshes, "application/octet-stream");
   if (path == "/links") return blob(data.links, "application/octet-stream");
   const auto picture = number_after("/textures/", path);
@@ -221,12 +224,10 @@ Console::Console(const Address& address, std::unique_ptr<Source> source, const s
     ended.open('{').member("ended", impl.words).close('}');
     impl.stage.farewell = ended.text();
   };
-  handler.open = [&impl]() -> std::unique_ptr<Connection> {
-    if (impl.stage.viewers.size() >= kMostViewers) return nullptr;
-    return std::make_unique<Viewer>(impl.stage);
-  };
+  handler.open = [&impl] { return std::make_unique<Viewer>(impl.stage); };
   impl.web = std::make_unique<WebServer>(
-      WebPlace{.address = address, .token = token, .origins = {}}, std::move(handler));
+      WebPlace{.address = address, .token = token, .origins = {}, .most_sockets = kMostViewers},
+      std::move(handler));
   for (const std::string& host : reachable_hosts(address)) {
     urls_.push_back("http://" + host + ":" + std::to_string(impl.web->port()) + "/" +
                     (token.empty() ? "" : "?token=" + token));

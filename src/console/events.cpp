@@ -88,22 +88,25 @@ std::string words_of(const std::string& fault, const std::string& target, double
   return text;
 }
 
+// Names may come from messages that are refused: of any length.
+std::string shortened(const std::string& text) { return text.substr(0, Events::kLongestText); }
+
 // The name in a request's body; "" if there is none.
 std::string name_in(int32_t kind, std::span<const uint8_t> body) {
   if (kind == request_t::SPAWN) {
     const auto spawn = decoded<spawn_request_t>(body);
-    return !spawn ? "" : spawn->name.empty() ? spawn->model : spawn->name;
+    return !spawn ? "" : shortened(spawn->name.empty() ? spawn->model : spawn->name);
   }
   if (kind == request_t::SET_POSE) {
     const auto pose = decoded<set_pose_request_t>(body);
-    return pose ? pose->name : "";
+    return pose ? shortened(pose->name) : "";
   }
   if (kind == request_t::SET_TWIST) {
     const auto twist = decoded<set_twist_request_t>(body);
-    return twist ? twist->name : "";
+    return twist ? shortened(twist->name) : "";
   }
   const auto name = decoded<name_request_t>(body);
-  return name ? name->name : "";
+  return name ? shortened(name->name) : "";
 }
 
 // The effect of a request; "" if it changes nothing.
@@ -137,7 +140,8 @@ bool Events::tells(int64_t fingerprint) {
 }
 
 void Events::add(const std::string& kind, const std::string& robot, const std::string& text) {
-  if (list_.size() < kMost) list_.push_back({now_s_, kind, printable(robot), printable(text)});
+  if (list_.size() < kMost)
+    list_.push_back({now_s_, kind, printable(shortened(robot)), printable(shortened(text))});
 }
 
 void Events::reset() {
@@ -190,12 +194,13 @@ void Events::hear(double time_s, const std::string& channel, std::span<const uin
     const auto applied = decoded<applied_t>(message);
     if (applied && applied->kind == 0 && layer_of(applied->data).empty())
       command(applied->channel, applied->data);
-    if (applied && applied->kind != 0) done(applied->kind, applied->data);
+    if (applied && applied->kind != 0) done(applied->kind, name_in(applied->kind, applied->data));
   } else if (type == request_t::getHash()) {
     const auto request = decoded<request_t>(message);
     if (!request || *verb_of(request->kind) == 0) return;
     if (asked_.size() >= kMostAsked) asked_.erase(asked_.begin());
-    asked_[{request->session, request->sequence}] = *request;
+    asked_[{request->session, request->sequence}] = {request->kind,
+                                                     name_in(request->kind, request->body)};
   } else if (type == reply_t::getHash()) {
     replied(message);
   } else if (tells_touches(*find_schema(type))) {
@@ -275,13 +280,13 @@ void Events::command(const std::string& channel, std::span<const uint8_t> messag
   }
 }
 
-void Events::done(int32_t kind, std::span<const uint8_t> body) {
+void Events::done(int32_t kind, const std::string& name) {
   const std::string verb = verb_of(kind);
   if (verb.empty()) return;
   const bool resets = kind == request_t::RESET || kind == request_t::RESTORE;
   if (resets && live_) reset();
-  const std::string name = resets ? "" : name_in(kind, body);
-  add(resets ? "reset" : "request", "", name.empty() ? verb : verb + " " + name);
+  const bool named = !resets && !name.empty();
+  add(resets ? "reset" : "request", "", named ? verb + " " + name : verb);
 }
 
 // A request that succeeded. Repeating it gives the same answer again.
@@ -290,10 +295,10 @@ void Events::replied(std::span<const uint8_t> message) {
   if (!reply) return;
   const auto at = asked_.find({reply->session, reply->sequence});
   if (at == asked_.end()) return;
-  const request_t request = std::move(at->second);
+  const Asked asked = std::move(at->second);
   asked_.erase(at);
   if (live_) now_s_ = static_cast<double>(reply->utime) * 1e-6;
-  if (reply->code == reply_t::OK && reply->kind == request.kind) done(request.kind, request.body);
+  if (reply->code == reply_t::OK && reply->kind == asked.kind) done(asked.kind, asked.name);
 }
 
 EventScan::EventScan(const log::Index& index, const model::WorldModel* world) {

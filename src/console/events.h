@@ -31,7 +31,8 @@ struct Event {
 
 class Events {
  public:
-  static constexpr size_t kMost = 20'000;  // later ones are dropped
+  static constexpr size_t kMost = 20'000;      // later ones are dropped
+  static constexpr size_t kLongestText = 300;  // bytes; the rest is left out
 
   // live: times are those of the messages, and a reset clears the list.
   explicit Events(bool live) : live_(live) {}
@@ -58,7 +59,7 @@ class Events {
   void touches(const std::string& channel, std::span<const uint8_t> message);
   void motion(const std::string& channel, const motion_status_t& now);
   void command(const std::string& channel, std::span<const uint8_t> message);
-  void done(int32_t kind, std::span<const uint8_t> body);
+  void done(int32_t kind, const std::string& name);
   void replied(std::span<const uint8_t> message);
   void reset();
   void come_due();
@@ -72,9 +73,13 @@ class Events {
   std::map<std::string, motion_status_t> motions_;  // by channel, the newest
   std::map<std::string, std::string> blocked_by_;   // by robot: the channel that reports its blocks
   std::map<std::string, double> commanded_;         // by channel: time of the last command
-  std::map<std::pair<int64_t, int64_t>, request_t> asked_;  // by session and sequence; unanswered
-  std::vector<model::Fault> planned_;                       // sorted by time
-  size_t due_ = 0;                                          // number of those that have started
+  struct Asked {
+    int32_t kind = 0;
+    std::string name;  // of what it is about
+  };
+  std::map<std::pair<int64_t, int64_t>, Asked> asked_;  // by session and sequence; unanswered
+  std::vector<model::Fault> planned_;                   // sorted by time
+  size_t due_ = 0;                                      // number of those that have started
   uint64_t lost_ = 0;
 };
 

@@ -154,7 +154,7 @@ class Writer {
       add_file(json, "/types.json", {types.begin(), types.end()});
       if (scene.world) {
         const SceneData data(*scene.world, static_cast<int>(scenes_.size()));
-        add_file(json, "/scene.json", {data.json.begin(), data.json.end()});
+        add_file(json, "/scene.json", *data.json);
         add_file(json, "/scene/meshes", *data.meshes);
         add_file(json, "/scene/links", *data.links);
         for (size_t i = 0; i < data.pictures.size(); ++i) {

@@ -278,7 +278,7 @@ SceneData::SceneData(const model::WorldModel& world, int version) {
   write_wheels(out, layout);
   write_bases(out, world, layout);
   out.close('}');
-  json = out.text();
+  json = bytes_of(out.text());
   links = link_bytes(world, layout, content);
 }
 

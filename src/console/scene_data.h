@@ -23,7 +23,7 @@ struct Picture {
 model::WorldModel collision_shapes(const model::WorldModel& world);
 
 struct SceneData {
-  std::string json;
+  Bytes json;
   // for each mesh its vertices (float32 x, y, z, nx, ny, nz, u, v), then its indices (uint32);
   // little endian
   Bytes meshes;

@@ -4,6 +4,7 @@
 
 #include <arpa/inet.h>
 #include <netinet/in.h>
+#include <strings.h>
 #include <sys/socket.h>
 #include <unistd.h>
 
@@ -11,14 +12,16 @@
 #include <array>
 #include <atomic>
 #include <cerrno>
+#include <chrono>
 #include <cstring>
-#include <deque>
+#include <functional>
 #include <map>
 
 #include <libwebsockets.h>
 #include <spdlog/spdlog.h>
 
 #include "core/file_handle.h"
+#include "core/peer_owners.h"
 #include "ruedo/errors.h"
 
 namespace ruedo::console {
@@ -26,7 +29,9 @@ namespace {
 
 constexpr lws_usec_t kTick_us = 16'000;
 constexpr lws_usec_t kIdleTick_us = 250'000;
-constexpr lws_usec_t kFarewell_us = 300'000;  // for the last messages to viewers
+constexpr lws_usec_t kFarewell_us = 300'000;                 // for the last messages to viewers
+constexpr auto kLookPause = std::chrono::milliseconds(100);  // a look takes a few milliseconds
+constexpr size_t kMostOver = 32;  // that a limit is exceeded by, until the next look
 constexpr size_t kChunk = 64 * 1024;
 constexpr int kMostStarts = 5;
 constexpr lws_retry_bo_t kIdlePolicy = {nullptr, 0,  0,
@@ -61,13 +66,14 @@ int checked_port(const WebPlace& place) {
 }  // namespace
 
 struct WebServer::Impl {
-  struct Transfer {  // state of a response's body
-    Bytes body;
-    size_t sent = 0;
-  };
-  struct Socket {
-    std::unique_ptr<Connection> connection;
-    std::vector<uint8_t> incoming;
+  struct Peer {                              // a connection
+    uint64_t number = 0;                     // in the order in which they came
+    bool silent = true;                      // it has not sent a request yet
+    Bytes body;                              // of the response that is being sent; null: none
+    size_t sent = 0;                         // of it
+    bool ends = false;                       // the connection, with it
+    std::unique_ptr<Connection> connection;  // null: it is no WebSocket
+    std::vector<uint8_t> incoming;           // what has come of its next message
   };
   struct Timer {
     lws_sorted_usec_list_t entry{};  // must be the first member: libwebsockets returns its address
@@ -80,10 +86,9 @@ struct WebServer::Impl {
   lws_context* context = nullptr;
   lws_vhost* vhost = nullptr;
   Timer timer;
-  std::map<lws*, Transfer> transfers;  // looked up only
-  std::map<lws*, Socket> sockets;
-  size_t open = 0;          // connections of any kind
-  std::deque<lws*> silent;  // those that have not sent a request yet, oldest first
+  std::map<lws*, Peer> peers;
+  uint64_t number = 0;                              // of the newest
+  std::chrono::steady_clock::time_point next_look;  // at who has most
   std::vector<uint8_t> message;
   std::atomic<bool> stopping{false};
   bool over = false;
@@ -107,11 +112,23 @@ struct WebServer::Impl {
       visit.origin.clear();
     return refuse(visit, place.address, place.token);
   }
-  int respond(lws* wsi, HttpResponse response);
-  int request(lws* wsi, std::string_view path);
-  int send_chunk(lws* wsi);
-  int receive(lws* wsi, const uint8_t* data, size_t size);
-  int write(lws* wsi);
+  std::vector<lws*> oldest_first(const std::function<bool(const Peer&)>& which) const;
+  size_t sockets() const {
+    return static_cast<size_t>(std::count_if(peers.begin(), peers.end(), [](const auto& each) {
+      return each.second.connection != nullptr;
+    }));
+  }
+  void welcome(lws* wsi);
+  void keep_to_limits();
+  void dismiss(lws* wsi);
+  int establish(lws* wsi, Peer& peer);
+  void ask_to_write();
+  int respond(lws* wsi, Peer& peer, HttpResponse response);
+  static int completed(lws* wsi, Peer& peer);
+  int request(lws* wsi, Peer& peer, std::string_view path);
+  int send_chunk(lws* wsi, Peer& peer);
+  static int receive(lws* wsi, Peer& peer, const uint8_t* data, size_t size);
+  int write(lws* wsi, Peer& peer);
 };
 
 int WebServer::Impl::callback(lws* wsi, lws_callback_reasons reason, void*, void* in,
@@ -123,44 +140,87 @@ int WebServer::Impl::callback(lws* wsi, lws_callback_reasons reason, void*, void
 
 int WebServer::Impl::dispatch(lws* wsi, lws_callback_reasons reason, void* in, size_t length) {
   switch (reason) {
-    case LWS_CALLBACK_FILTER_NETWORK_CONNECTION: return open >= kMostConnections ? 1 : 0;
-    case LWS_CALLBACK_WSI_CREATE: ++open; return 0;
-    case LWS_CALLBACK_SERVER_NEW_CLIENT_INSTANTIATED:
-      silent.push_back(wsi);
-      if (silent.size() > kMostSilent) {
-        lws_set_timeout(silent.front(), PENDING_TIMEOUT_USER_OK, LWS_TO_KILL_ASYNC);
-        silent.pop_front();
-      }
-      return 0;
-    case LWS_CALLBACK_WSI_DESTROY:
-      --open;
-      std::erase(silent, wsi);
-      transfers.erase(wsi);
-      sockets.erase(wsi);
-      return 0;
+    case LWS_CALLBACK_SERVER_NEW_CLIENT_INSTANTIATED: welcome(wsi); return 0;
+    case LWS_CALLBACK_WSI_DESTROY: peers.erase(wsi); return 0;
+    case LWS_CALLBACK_HTTP_CONFIRM_UPGRADE:  // not to HTTP/2: a connection would become many
+      return ::strcasecmp(static_cast<const char*>(in), "websocket") == 0 ? 0 : -1;
     case LWS_CALLBACK_HTTP:
-      std::erase(silent, wsi);
-      return request(wsi, {static_cast<const char*>(in), length});
-    case LWS_CALLBACK_HTTP_WRITEABLE: return send_chunk(wsi);
+    case LWS_CALLBACK_HTTP_WRITEABLE:
     case LWS_CALLBACK_FILTER_PROTOCOL_CONNECTION:
-      std::erase(silent, wsi);
-      if (header(wsi, WSI_TOKEN_GET_URI) != place.socket || !refusal(wsi, true).empty()) {
-        lws_return_http_status(wsi, HTTP_STATUS_FORBIDDEN, nullptr);
-        return 1;
-      }
-      return 0;
-    case LWS_CALLBACK_ESTABLISHED: {
-      Socket socket{handler.open(), {}};
-      if (!socket.connection) return -1;
-      sockets.emplace(wsi, std::move(socket));
-      lws_callback_on_writable(wsi);
-      lws_sul_schedule(context, 0, &timer.entry, &on_timer, kTick_us);
-      return 0;
-    }
-    case LWS_CALLBACK_RECEIVE: return receive(wsi, static_cast<const uint8_t*>(in), length);
-    case LWS_CALLBACK_SERVER_WRITEABLE: return write(wsi);
-    case LWS_CALLBACK_CLOSED: sockets.erase(wsi); return 0;
+    case LWS_CALLBACK_ESTABLISHED:
+    case LWS_CALLBACK_RECEIVE:
+    case LWS_CALLBACK_SERVER_WRITEABLE: break;
     default: return 0;
+  }
+  const auto found = peers.find(wsi);
+  if (found == peers.end()) return -1;  // it had to give way
+  if (stopping && reason == LWS_CALLBACK_HTTP) return -1;
+  Peer& peer = found->second;
+  peer.silent = false;
+  switch (reason) {
+    case LWS_CALLBACK_HTTP: return request(wsi, peer, {static_cast<const char*>(in), length});
+    case LWS_CALLBACK_HTTP_WRITEABLE: return send_chunk(wsi, peer);
+    case LWS_CALLBACK_FILTER_PROTOCOL_CONNECTION:
+      if (header(wsi, WSI_TOKEN_GET_URI) == place.socket && refusal(wsi, true).empty()) return 0;
+      lws_return_http_status(wsi, HTTP_STATUS_FORBIDDEN, nullptr);
+      return 1;
+    case LWS_CALLBACK_ESTABLISHED: return establish(wsi, peer);
+    case LWS_CALLBACK_RECEIVE: return receive(wsi, peer, static_cast<const uint8_t*>(in), length);
+    default: return write(wsi, peer);
+  }
+}
+
+std::vector<lws*> WebServer::Impl::oldest_first(
+    const std::function<bool(const Peer&)>& which) const {
+  std::vector<lws*> found;
+  for (const auto& [wsi, peer] : peers) {
+    if (which(peer)) found.push_back(wsi);
+  }
+  std::sort(found.begin(), found.end(),
+            [this](lws* a, lws* b) { return peers.at(a).number < peers.at(b).number; });
+  return found;
+}
+
+void WebServer::Impl::welcome(lws* wsi) {
+  peers[wsi].number = ++number;
+  const std::vector<lws*> silent = oldest_first([](const Peer& peer) { return peer.silent; });
+  if (silent.size() > kMostSilent) dismiss(silent.front());
+}
+
+// Where there are too many, those who have most give way.
+void WebServer::Impl::keep_to_limits() {
+  const auto now = std::chrono::steady_clock::now();
+  if (now < next_look) return;
+  const auto keep = [&](const std::vector<lws*>& which, size_t most) {
+    if (which.size() <= most) return;
+    next_look = now + kLookPause;
+    std::vector<int> files;
+    for (lws* each : which) files.push_back(lws_get_socket_fd(each));
+    for (const size_t one : who_give_way(files, most, static_cast<uint16_t>(place.address.port)))
+      dismiss(which[one]);
+  };
+  keep(oldest_first([](const Peer& peer) { return peer.connection != nullptr; }),
+       place.most_sockets);
+  keep(oldest_first([](const Peer&) { return true; }), kMostConnections);
+}
+
+// libwebsockets may put this off, but serves it no more.
+void WebServer::Impl::dismiss(lws* wsi) {
+  peers.erase(wsi);
+  lws_set_timeout(wsi, PENDING_TIMEOUT_USER_OK, LWS_TO_KILL_ASYNC);
+}
+
+int WebServer::Impl::establish(lws* wsi, Peer& peer) {
+  if (sockets() >= place.most_sockets + kMostOver) return -1;
+  peer.connection = handler.open();
+  lws_callback_on_writable(wsi);
+  lws_sul_schedule(context, 0, &timer.entry, &on_timer, kTick_us);
+  return 0;
+}
+
+void WebServer::Impl::ask_to_write() {
+  for (const auto& [wsi, peer] : peers) {
+    if (peer.connection) lws_callback_on_writable(wsi);
   }
 }
 
@@ -172,14 +232,16 @@ void WebServer::Impl::on_timer(lws_sorted_usec_list_t* entry) {
         impl.context);  // wakes lws_service, which would go on waiting in this very call
     return;
   }
-  if (impl.handler.tick()) {
-    for (auto& [wsi, socket] : impl.sockets) lws_callback_on_writable(wsi);
-  }
-  lws_sul_schedule(impl.context, 0, entry, &on_timer,
-                   impl.sockets.empty() ? kIdleTick_us : kTick_us);
+  impl.keep_to_limits();
+  if (impl.handler.tick()) impl.ask_to_write();
+  lws_sul_schedule(impl.context, 0, entry, &on_timer, impl.sockets() > 0 ? kTick_us : kIdleTick_us);
 }
 
-int WebServer::Impl::request(lws* wsi, std::string_view path) {
+int WebServer::Impl::request(lws* wsi, Peer& peer, std::string_view path) {
+  // What follows a body, or what is no GET, is not read as the next request.
+  peer.ends = lws_hdr_total_length(wsi, WSI_TOKEN_GET_URI) <= 0 ||
+              lws_hdr_total_length(wsi, WSI_TOKEN_HTTP_CONTENT_LENGTH) > 0 ||
+              lws_hdr_total_length(wsi, WSI_TOKEN_HTTP_TRANSFER_ENCODING) > 0;
   const auto text = [](int status, const std::string& words) {
     HttpResponse response;
     response.status = status;
@@ -187,13 +249,13 @@ int WebServer::Impl::request(lws* wsi, std::string_view path) {
     return response;
   };
   if (lws_hdr_total_length(wsi, WSI_TOKEN_GET_URI) <= 0)
-    return respond(wsi, text(405, "Only GET is served here.\n"));
+    return respond(wsi, peer, text(405, "Only GET is served here.\n"));
   if (const std::string why = refusal(wsi, false); !why.empty())
-    return respond(wsi, text(403, why + "\n"));
-  return respond(wsi, handler.get(path));
+    return respond(wsi, peer, text(403, why + "\n"));
+  return respond(wsi, peer, handler.get(path));
 }
 
-int WebServer::Impl::respond(lws* wsi, HttpResponse response) {
+int WebServer::Impl::respond(lws* wsi, Peer& peer, HttpResponse response) {
   std::array<uint8_t, LWS_PRE + 2048> buffer{};
   uint8_t *at = buffer.data() + LWS_PRE, *const start = at,
           *const end = buffer.data() + buffer.size() - 1;
@@ -211,57 +273,56 @@ int WebServer::Impl::respond(lws* wsi, HttpResponse response) {
       "frame-ancestors 'none'; base-uri 'none'; form-action 'none'");
   add("x-content-type-options:", "nosniff");
   add("referrer-policy:", "no-referrer");
+  if (peer.ends) add("connection:", "close");
   add("cache-control:", response.lasting ? "private, max-age=86400" : "no-store");
   if (response.gzip) add("content-encoding:", "gzip");
   if (!place.token.empty() && response.status == 200)
     add("set-cookie:", "ruedo_token=" + place.token + "; HttpOnly; SameSite=Strict; Path=/");
   if (!fits || lws_finalize_write_http_header(wsi, start, &at, end) != 0) return 1;
-  if (size == 0) return lws_http_transaction_completed(wsi) != 0 ? -1 : 0;
-  transfers[wsi] = {std::move(response.body), 0};
+  if (size == 0) return completed(wsi, peer);
+  peer.body = std::move(response.body);
+  peer.sent = 0;
   lws_callback_on_writable(wsi);
   return 0;
 }
 
-int WebServer::Impl::send_chunk(lws* wsi) {
-  const auto at = transfers.find(wsi);
-  if (at == transfers.end()) return 0;
-  Transfer& transfer = at->second;
-  const size_t size = std::min(kChunk, transfer.body->size() - transfer.sent);
-  const bool last = transfer.sent + size == transfer.body->size();
+int WebServer::Impl::completed(lws* wsi, Peer& peer) {
+  peer.body.reset();
+  return peer.ends || lws_http_transaction_completed(wsi) != 0 ? -1 : 0;
+}
+
+int WebServer::Impl::send_chunk(lws* wsi, Peer& peer) {
+  if (!peer.body) return 0;
+  const size_t size = std::min(kChunk, peer.body->size() - peer.sent);
+  const bool last = peer.sent + size == peer.body->size();
   message.resize(LWS_PRE + size);
-  std::memcpy(message.data() + LWS_PRE, transfer.body->data() + transfer.sent, size);
+  std::memcpy(message.data() + LWS_PRE, peer.body->data() + peer.sent, size);
   if (lws_write(wsi, message.data() + LWS_PRE, size, last ? LWS_WRITE_HTTP_FINAL : LWS_WRITE_HTTP) <
       0)
     return -1;
-  transfer.sent += size;
-  if (!last) {
-    lws_callback_on_writable(wsi);
-    return 0;
-  }
-  transfers.erase(at);
-  return lws_http_transaction_completed(wsi) != 0 ? -1 : 0;
-}
-
-int WebServer::Impl::receive(lws* wsi, const uint8_t* data, size_t size) {
-  const auto at = sockets.find(wsi);
-  if (at == sockets.end()) return -1;
-  Socket& socket = at->second;
-  if (lws_is_first_fragment(wsi) != 0) socket.incoming.clear();
-  if (socket.incoming.size() + size > kMostMessage) return -1;
-  socket.incoming.insert(socket.incoming.end(), data, data + size);
-  if (lws_is_final_fragment(wsi) == 0 || lws_remaining_packet_payload(wsi) > 0) return 0;
-  if (!socket.connection->receive(socket.incoming)) return -1;
-  socket.incoming.clear();
+  peer.sent += size;
+  if (last) return completed(wsi, peer);
   lws_callback_on_writable(wsi);
   return 0;
 }
 
-int WebServer::Impl::write(lws* wsi) {
-  const auto at = sockets.find(wsi);
-  if (at == sockets.end()) return -1;
+int WebServer::Impl::receive(lws* wsi, Peer& peer, const uint8_t* data, size_t size) {
+  if (!peer.connection) return -1;
+  if (lws_is_first_fragment(wsi) != 0) peer.incoming.clear();
+  if (peer.incoming.size() + size > kMostMessage) return -1;
+  peer.incoming.insert(peer.incoming.end(), data, data + size);
+  if (lws_is_final_fragment(wsi) == 0 || lws_remaining_packet_payload(wsi) > 0) return 0;
+  if (!peer.connection->receive(peer.incoming)) return -1;
+  peer.incoming.clear();
+  lws_callback_on_writable(wsi);
+  return 0;
+}
+
+int WebServer::Impl::write(lws* wsi, Peer& peer) {
+  if (!peer.connection) return -1;
   message.assign(LWS_PRE, 0);
   bool text = false;
-  if (!at->second.connection->next(message, text)) return 0;
+  if (!peer.connection->next(message, text)) return 0;
   if (lws_write(wsi, message.data() + LWS_PRE, message.size() - LWS_PRE,
                 text ? LWS_WRITE_TEXT : LWS_WRITE_BINARY) < 0)
     return -1;
@@ -285,7 +346,7 @@ WebServer::WebServer(WebPlace place, WebHandler handler) : impl_(std::make_uniqu
   info.uid = static_cast<uid_t>(-1);
   info.user = impl_.get();
   info.server_string = "ruedo";
-  info.fd_limit_per_thread = kMostConnections + 32;
+  info.fd_limit_per_thread = kMostConnections + kMostOver;
   info.max_http_header_data = kMostHeaders;
   info.max_http_header_pool = kMostConnections;
   info.timeout_secs = 10;
@@ -316,9 +377,9 @@ void WebServer::run() {
     if (!impl_->stopping || farewell) continue;
     farewell = true;
     impl_->handler.end();
-    for (auto& [wsi, socket] : impl_->sockets) lws_callback_on_writable(wsi);
+    impl_->ask_to_write();
     lws_sul_schedule(impl_->context, 0, &impl_->timer.entry, &Impl::on_timer,
-                     impl_->sockets.empty() ? 1 : kFarewell_us);
+                     impl_->sockets() > 0 ? kFarewell_us : 1);
   }
   lws_sul_cancel(&impl_->timer.entry);
 }

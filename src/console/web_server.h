@@ -42,12 +42,13 @@ struct WebPlace {
   std::string socket = "/socket";  // the WebSocket's path
   std::vector<std::string> protocols = {"ruedo"};  // WebSocket subprotocols
   std::vector<std::string> origins;  // other origins whose pages may open the WebSocket
+  size_t most_sockets = 128;         // at once
 };
 
 struct WebHandler {
   std::function<HttpResponse(std::string_view path)> get;
-  std::function<std::unique_ptr<Connection>()> open;  // null: there are too many
-  std::function<void()> end;                          // called before the last messages are sent
+  std::function<std::unique_ptr<Connection>()> open;
+  std::function<void()> end;  // called before the last messages are sent
   // called every few milliseconds while there are connections; true: they may have something to
   // send
   std::function<bool()> tick;
@@ -55,7 +56,9 @@ struct WebHandler {
 
 class WebServer {
  public:
-  static constexpr size_t kMostConnections = 320;  // HTTP and WebSocket together
+  // HTTP and WebSocket together. Where there are more, of either, those give way whose process, or
+  // machine, has most.
+  static constexpr size_t kMostConnections = 320;
   static constexpr size_t kMostSilent =
       64;  // of those that have sent no request yet; beyond, the oldest is closed
   static constexpr size_t kMostMessage = size_t{1}

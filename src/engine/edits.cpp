@@ -13,6 +13,7 @@
 #include "engine/world_editor.h"
 #include "model/placement.h"
 #include "model/read_context.h"
+#include "model/reserved_names.h"
 
 namespace ruedo::engine {
 namespace {
@@ -65,7 +66,11 @@ std::string fault_of_name(const std::string& name) {
   const bool is_line =
       std::none_of(name.begin(), name.end(), [](unsigned char c) { return c < 0x20 || c == 0x7f; });
   if (!is_line || for_terminal(name) != name) return "is no UTF-8 text without control characters";
-  if (name == "ruedo" || name == "world") return "is kept for Ruedo itself; choose another";
+  if (name == "ruedo" || model::is_reserved_name(name))
+    return "is kept for Ruedo itself; choose another";
+  if (name.starts_with(' ') || name.ends_with(' ')) return "begins or ends with a blank";
+  if (name.find("::") != std::string::npos)
+    return "has '::', which separates names from each other";
   return "";
 }
 

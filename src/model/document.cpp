@@ -8,6 +8,7 @@
 #include <tinyxml2.h>
 
 #include "core/input_file.h"
+#include "model/xml_pieces.h"
 
 namespace ruedo::model {
 namespace {
@@ -41,66 +42,42 @@ bool is_utf8(const std::string& text) {
   return true;
 }
 
-// Scans a text as a parser would, counts, and refuses what exceeds a limit. Text that is not XML is
-// left for the parser to report.
+// Refuses what exceeds a limit. Text that is not XML is left for the parser to report.
 class Counter {
  public:
   Counter(std::string_view text, const std::string& file) : text_(text), file_(file) {}
 
   void count() {
-    for (size_t at = 0; at < text_.size();) {
-      if (text_[at] != '<') {
-        const size_t end = std::min(text_.find('<', at), text_.size());
-        if (end - at > kMaxTextBytes)
-          refuse(at, "a text of " + std::to_string(end - at) + " bytes", kMaxTextBytes);
-        at = end;
-      } else if (starts(at, "<!--")) {
-        at = after(at, "-->");
-      } else if (starts(at, "<![CDATA[")) {
-        const size_t end = after(at, "]]>");
-        if (end - at > kMaxTextBytes)
-          refuse(at, "a text of " + std::to_string(end - at) + " bytes", kMaxTextBytes);
-        at = end;
-      } else if (starts(at, "<?") || starts(at, "<!")) {
-        at = after(at, ">");
-      } else if (starts(at, "</")) {
-        if (depth_ > 0) --depth_;
-        at = after(at, ">");
-      } else {
-        at = element(at);
+    XmlPieces pieces(text_, kMaxAttributes);
+    for (XmlPiece piece; pieces.next(piece);) {
+      const size_t size = piece.end - piece.begin;
+      if (piece.is_tag()) {
+        count(piece);
+      } else if (piece.kind != XmlPiece::Kind::aside && size > kMaxTextBytes) {
+        refuse(piece.begin, "a text of " + std::to_string(size) + " bytes", kMaxTextBytes);
       }
     }
   }
 
  private:
-  bool starts(size_t at, std::string_view with) const {
-    return text_.substr(at, with.size()) == with;
-  }
-  size_t after(size_t at, std::string_view what) const {
-    const size_t found = text_.find(what, at);
-    return found == std::string_view::npos ? text_.size() : found + what.size();
-  }
-
-  size_t element(size_t begin) {
-    if (++elements_ > kMaxElements)
-      refuse(begin, "more than " + std::to_string(kMaxElements) + " elements", kMaxElements);
-    if (++depth_ > kMaxDepth)
-      refuse(begin, "elements are nested too deep: " + std::to_string(depth_) + " levels",
-             kMaxDepth);
-    size_t attributes = 0, at = begin + 1;
-    for (; at < text_.size() && text_[at] != '>' && text_[at] != '<'; ++at) {
-      if (text_[at] == '=' && ++attributes > kMaxAttributes) {
-        refuse(begin, "an element of more than " + std::to_string(kMaxAttributes) + " attributes",
-               kMaxAttributes);
-      }
-      if (text_[at] != '"' && text_[at] != '\'') continue;
-      const size_t end = std::min(text_.find(text_[at], at + 1), text_.size());
-      if (end - at > kMaxAttributeBytes)
-        refuse(begin, "an attribute of " + std::to_string(end - at) + " bytes", kMaxAttributeBytes);
-      at = end;
+  void count(const XmlPiece& tag) {
+    if (tag.attributes.size() > kMaxAttributes)
+      refuse(tag.begin, "an element of more than " + std::to_string(kMaxAttributes) + " attributes",
+             kMaxAttributes);
+    for (const XmlPiece::Attribute& each : tag.attributes) {
+      if (const size_t size = each.past - each.value; size > kMaxAttributeBytes)
+        refuse(tag.begin, "an attribute of " + std::to_string(size) + " bytes", kMaxAttributeBytes);
     }
-    if (at < text_.size() && text_[at] == '>' && text_[at - 1] == '/') --depth_;
-    return std::min(at + 1, text_.size());
+    if (tag.kind == XmlPiece::Kind::closing) {
+      if (depth_ > 0) --depth_;
+      return;
+    }
+    if (++elements_ > kMaxElements)
+      refuse(tag.begin, "more than " + std::to_string(kMaxElements) + " elements", kMaxElements);
+    if (++depth_ > kMaxDepth)
+      refuse(tag.begin, "elements are nested too deep: " + std::to_string(depth_) + " levels",
+             kMaxDepth);
+    if (tag.kind == XmlPiece::Kind::closed) --depth_;
   }
 
   [[noreturn]] void refuse(size_t at, const std::string& what, size_t allowed) const {

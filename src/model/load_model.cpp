@@ -40,7 +40,8 @@ LoadedModel read(const std::string& path, const std::string& world_file,
   if (!included.model || !included.model->model)
     throw InputError({path, 0}, "holds no <model>, or one without a link");
   for (const std::string& file : meshes.files_read()) documents.note(file);
-  LoadedModel loaded{included.model->model, included.name, findings.list(), documents.files_read()};
+  LoadedModel loaded{included.model->model, dotted(included.name), findings.list(),
+                     documents.files_read()};
   if (ModelInstance{loaded.name, {}, loaded.model}.is_robot())
     loaded.name = made_fit_for_channel(loaded.name);
   if (loaded.model->links.size() > kMostLinksOfSpawned) {

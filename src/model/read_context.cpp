@@ -4,16 +4,15 @@
 #include <algorithm>
 #include <charconv>
 
+#include "model/reserved_names.h"
+
 namespace ruedo::model {
 
 std::string required_name(const Element& element) {
   const std::string* name = element.attribute("name");
   if (!name) element.fail("has no name; the attribute name is required");
   if (name->empty()) element.fail("has an empty name");
-  const bool reserved =
-      name->size() >= 4 && name->substr(0, 2) == "__" && name->substr(name->size() - 2) == "__";
-  if (reserved || *name == "world")
-    element.fail("'" + *name + "' is a reserved name; choose another");
+  if (is_reserved_name(*name)) element.fail("'" + *name + "' is a reserved name; choose another");
   return *name;
 }
 

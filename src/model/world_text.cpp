@@ -13,6 +13,7 @@
 #include "model/document.h"
 #include "model/read_context.h"
 #include "model/resources.h"
+#include "model/sdf_version.h"
 #include "model/urdf.h"
 #include "ruedo/math.h"
 
@@ -140,11 +141,41 @@ std::string written(const Element& element, const std::string& indent) {
   return text + "\n" + indent + "</" + element.name + ">";
 }
 
-// The element of a spawned model, as written in a world file.
-std::string element_of(const ModelNow& model) {
+// Before SDF 1.5 axes were in the model's frame, since then in the joint's. What was meant is said
+// by each axis, so that the text means the same in a file of the other kind.
+void say_frames_of_axes(const std::string& text, const Element& element, const TextElement& place,
+                        bool in_model, TextPatch& patch) {
+  for (size_t i = 0; i < element.children.size(); ++i) {
+    const Element& child = *element.children[i];
+    say_frames_of_axes(text, child, place.children[i], in_model, patch);
+    if (element.name != "joint" || (child.name != "axis" && child.name != "axis2")) continue;
+    const Element* xyz = child.child("xyz");
+    const std::string* joint = element.attribute("name");
+    if (!joint || (xyz && xyz->attribute("expressed_in"))) continue;
+    const bool of_model = in_model || child.boolean("use_parent_model_frame", false);
+    const std::string said = " expressed_in=\"" + (of_model ? "__model__" : escaped(*joint)) + "\"";
+    const TextElement& axis = place.children[i];
+    const TextElement* written = axis.child("xyz");
+    if (written)
+      patch.insert(text.find(written->name, written->begin) + written->name.size(), said);
+    else if (axis.closed())
+      patch.replace(axis.end - 2, axis.end, "><xyz" + said + ">0 0 1</xyz></" + axis.name + ">");
+    else
+      patch.insert(axis.inside, "<xyz" + said + ">0 0 1</xyz>");
+  }
+}
+
+bool has_axes_in_model(const Element& root) {
+  const std::string* version = root.attribute("version");
+  return version && SdfVersion::parse(*version).value_or(SdfVersion{}) < SdfVersion{1, 5};
+}
+
+// The element of a spawned model, as written in a world file. in_model: the file's axes are.
+std::string element_of(const ModelNow& model, bool in_model) {
   const std::string what = "the model '" + model.name + "'";
   std::string text = model.spawned;
   const auto document = parse_document(text, what);
+  const bool own_in_model = has_axes_in_model(*document);
   if (document->name == "robot") {
     Findings findings;
     text =
@@ -156,9 +187,10 @@ std::string element_of(const ModelNow& model) {
   if (!element) throw InputError({what, 0}, "its text holds no <model> that a file could have");
   TextPatch patch;
   call(text, *element, model.name, patch);
-  const Element* written_pose = nullptr;
   const auto parsed = parse_document(text, what);
-  if (const Element* own = parsed->child(element->name)) written_pose = own->child("pose");
+  const Element* own = parsed->child(element->name);
+  const Element* written_pose = own->child("pose");
+  if (own_in_model != in_model) say_frames_of_axes(text, *own, *element, own_in_model, patch);
   const bool framed = written_pose && !written_pose->attributes.empty();
   if (!written_pose || framed || !same_place(written_pose->as_pose(), model.X_WM, true))
     put(text, *element, model.X_WM, patch);
@@ -166,6 +198,18 @@ std::string element_of(const ModelNow& model) {
   const TextElement again = places_in(changed);
   const TextElement* whole = again.child(element->name);
   return changed.substr(whole->begin, whole->end - whole->begin);
+}
+
+// With those elements at the end of the world.
+std::string with_last(const std::string& text, const std::string& elements) {
+  const TextElement root = places_in(text);
+  const TextElement& world = *root.child("world");
+  TextPatch patch;
+  if (world.closed())
+    patch.replace(world.end - 2, world.end, ">" + elements + "\n  </world>");
+  else
+    patch.insert(text.find_last_not_of(" \t\r\n", world.past - 1) + 1, elements);
+  return patch.applied_to(text);
 }
 
 // "box_2" may be called "box" in the file.
@@ -316,7 +360,8 @@ WorldText::Written WorldText::with(const std::vector<ModelNow>& models) const {
     if (at == now.end())
       drop(*entry.place, patch);
     else if (!own(*at->second))
-      patch.replace(entry.place->begin, entry.place->end, element_of(*at->second));
+      patch.replace(entry.place->begin, entry.place->end,
+                    element_of(*at->second, has_axes_in_model(*root_)));
     else if (changed.contains(entry.name) || moved.contains(frame_of(*entry.element)))
       put(text_, *entry.place, at->second->X_WM, patch);
   }
@@ -330,16 +375,11 @@ WorldText::Written WorldText::with(const std::vector<ModelNow>& models) const {
   drop_states(changed, patch);
   std::string added;
   for (const ModelNow& model : models) {
-    if (!said.contains(model.name)) added += "\n    " + element_of(model);
-  }
-  if (!added.empty()) {
-    const size_t end = text_.find_last_not_of(" \t\r\n", world_place_->past - 1) + 1;
-    if (world_place_->closed())
-      patch.replace(world_place_->end - 2, world_place_->end, ">" + added + "\n  </world>");
-    else
-      patch.insert(end, added);
+    if (!said.contains(model.name))
+      added += "\n    " + element_of(model, has_axes_in_model(*root_));
   }
   result.text = patch.applied_to(text_);
+  if (!added.empty()) result.text = with_last(result.text, added);
   return result;
 }
 
@@ -374,18 +414,20 @@ std::string moved_to(const std::string& text, const std::string& from_folder,
   const fs::path to = fs::weakly_canonical(to_folder, error);
   if (from == to) return text;
   TextPatch patch;
-  const auto visit = [&](const auto& self, const TextElement& element) -> void {
-    for (const TextElement& child : element.children) self(self, child);
-    if (!element.children.empty() || element.closed()) return;
+  const auto visit = [&](const auto& self, const Element& element,
+                         const TextElement& place) -> void {
+    for (size_t i = 0; i < element.children.size(); ++i)
+      self(self, *element.children[i], place.children[i]);
+    if (!element.children.empty() || place.closed()) return;
     if (element.name != "uri" && element.name != "albedo_map" && element.name != "normal_map")
       return;
-    const std::string path = text.substr(element.inside, element.past - element.inside);
+    const std::string& path = element.text;
     if (path.empty() || path.find("://") != std::string::npos || fs::path(path).is_absolute() ||
         !fs::exists(from / path, error))
       return;
-    patch.replace(element.inside, element.past, (from / path).lexically_relative(to).string());
+    patch.replace(place.inside, place.past, escaped((from / path).lexically_relative(to).string()));
   };
-  visit(visit, places_in(text));
+  visit(visit, *parse_document(text, to_folder), places_in(text));
   return patch.applied_to(text);
 }
 

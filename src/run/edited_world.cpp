@@ -6,7 +6,6 @@
 #include <unistd.h>
 
 #include <cerrno>
-#include <cstdlib>
 #include <cstring>
 #include <filesystem>
 
@@ -31,20 +30,25 @@ std::optional<std::string> bytes_of(const std::string& path) {
   }
 }
 
-mode_t mode_for(const std::string& path) {
+// Whatever it is, a link that leads nowhere too.
+bool is_there(const std::string& path) {
   struct stat info{};
-  if (::stat(path.c_str(), &info) == 0) return info.st_mode & 07777;
-  return 0644;
+  return ::lstat(path.c_str(), &info) == 0 || errno != ENOENT;
 }
 
 // What went wrong, or "". The old file stays intact until the new one is complete.
 std::string write_file(const std::string& path, const std::string& bytes) {
   const fs::path folder = fs::path(path).parent_path();
-  std::string part = (folder / ("." + fs::path(path).filename().string() + ".XXXXXX")).string();
-  const FileHandle file(::mkostemp(part.data(), O_CLOEXEC));
+  const std::string part =
+      (folder / ("." + fs::path(path).filename().string() + "." + std::to_string(::getpid())))
+          .string();
+  ::unlink(part.c_str());  // of a process of that number that was killed
+  const FileHandle file(::open(part.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666));
   if (!file) return std::strerror(errno);
+  struct stat old{};
   bool good = write_all(file.get(), bytes.data(), bytes.size()) == bytes.size() &&
-              ::fchmod(file.get(), mode_for(path)) == 0 && ::fsync(file.get()) == 0;
+              (::stat(path.c_str(), &old) != 0 || ::fchmod(file.get(), old.st_mode & 07777) == 0) &&
+              ::fsync(file.get()) == 0;
   std::string fault = good ? "" : std::strerror(errno);
   if (good && ::rename(part.c_str(), path.c_str()) != 0) {
     fault = std::strerror(errno);
@@ -132,7 +136,7 @@ std::string EditedWorld::model_text(const std::string& name) const {
 
 // "" or why what is on the disk must not be lost.
 std::string EditedWorld::overwritten() const {
-  if (bytes_of(file_) == known_) return "";
+  if (known_ ? bytes_of(file_) == known_ : !is_there(file_)) return "";
   return known_ ? file_ +
                       " was changed, or removed, by another program since: keep that, and save "
                       "this world by another name (ruedo edit --save-as FILE)"
@@ -148,8 +152,9 @@ EditedWorld::Saved EditedWorld::save(const model::WorldModel& now,
     if (now.models[i].removed) continue;
     const std::string& name = now.models[i].name;
     const auto spawned = spawned_.find(name);
+    const Pose X = now.models[i].model->path ? now.models[i].X_WM : X_WM(i);  // it goes from there
     models.push_back(
-        {name, X_WM(i), spawned == spawned_.end() ? "" : spawned->second, put_.contains(name)});
+        {name, X, spawned == spawned_.end() ? "" : spawned->second, put_.contains(name)});
   }
   try {
     model::WorldText::Written written = text().with(models);

@@ -387,6 +387,18 @@ TEST_F(EventsTest, ALiveRunTellsWhatWasAnsweredOnceAndBeginsAnewWithAReset) {
   EXPECT_NE(events.generation(), before);
 }
 
+// Of 1 MB for each request, and of any length in a world's file.
+TEST_F(EventsTest, NamesOfAnyLengthAreShortened) {
+  const std::string name(1 << 20, 'x');
+  spawn_request_t spawn{};
+  spawn.model = name;
+  apply(1, request_t::SPAWN, encoded(spawn), "ruedo/request");
+  touch(1, {});
+  touch(2, {name});
+  ASSERT_EQ(events.list().size(), 2u);
+  for (const Event& event : events.list()) EXPECT_LE(event.text.size(), Events::kLongestText);
+}
+
 TEST_F(EventsTest, FaultsOfTheRunItselfComeWhenTheirTimeDoes) {
   model::Fault late, early;
   early.robot = late.robot = "r";

@@ -6,6 +6,7 @@ import re
 import socket
 import struct
 import subprocess
+import sys
 
 import pytest
 from harness import (
@@ -165,6 +166,105 @@ def test_half_open_connections_give_way(server):
         one.close()
 
 
+ASK = """
+import socket, sys
+port = int(sys.argv[1])
+for text in sys.argv[2:]:
+    one = socket.create_connection(("127.0.0.1", port), timeout=20)
+    one.sendall(text.encode().decode("unicode_escape").encode())
+    print(one.recv(12).decode())
+"""
+
+
+def asked_by_another(port, *requests):
+    """How the answers to another process begin."""
+    given = [request.replace("\r\n", "\\r\\n") for request in requests]
+    done = subprocess.run(
+        [sys.executable, "-c", ASK, str(port), *given],
+        capture_output=True,
+        text=True,
+        timeout=60,
+        check=False,
+    )
+    return done.stdout.split("\n")[:-1]
+
+
+def page(port, *headers, path="/"):
+    return "\r\n".join([f"GET {path} HTTP/1.1", f"Host: localhost:{port}", *headers, "", ""])
+
+
+UPGRADE = (
+    "Connection: Upgrade",
+    "Upgrade: websocket",
+    "Sec-WebSocket-Version: 13",
+    "Sec-WebSocket-Key: AAAAAAAAAAAAAAAAAAAAAA==",
+)
+
+
+def taken(port, *headers, path="/", count=400):
+    """That many connections of this process, each with an answer as long as there are places."""
+    held = []
+    for _ in range(count):
+        one = socket.create_connection(("127.0.0.1", port), timeout=20)
+        with contextlib.suppress(OSError):  # it had to give way
+            one.sendall(page(port, *headers, path=path).encode())
+            one.recv(1)
+        held.append(one)
+    return held
+
+
+def test_one_process_cannot_take_all_places():
+    """It asks on each connection, so that none is silent, and answers each ping: nothing but their
+    number is wrong.
+    """
+    with running("--lcm", "auto", "--disable", "p3at/camera") as process:
+        port = process.port
+        held = taken(port)
+        assert asked_by_another(port, page(port)) == ["HTTP/1.1 200"]
+        held += taken(port, *UPGRADE, path="/socket")
+        upgrade = page(port, *UPGRADE, path="/socket")
+        answers = asked_by_another(port, page(port), upgrade, page(port, path="/scene.json"))
+        assert answers == ["HTTP/1.1 200", "HTTP/1.1 101", "HTTP/1.1 200"]
+        for one in held:
+            one.close()
+
+
+def test_no_connection_becomes_many():
+    """HTTP/2 has its own in each, which were never counted off: a few hundred locked all out."""
+    with running("--lcm", "auto", "--disable", "p3at/camera") as process:
+        port = process.port
+        up = page(
+            port,
+            "Connection: Upgrade, HTTP2-Settings",
+            "Upgrade: h2c",
+            "HTTP2-Settings: AAMAAABkAARAAAAAAAIAAAAA",
+        ).encode()
+        with socket.create_connection(("127.0.0.1", port), timeout=20) as one:
+            one.sendall(up)
+            assert b"101" not in one.recv(100)
+        assert get(port, "/")[0] == 200
+
+
+@pytest.mark.parametrize(
+    "first",
+    [
+        "GET / HTTP/1.1\r\nHost: localhost\r\nTransfer-Encoding: chunked\r\n\r\n",
+        "OPTIONS / HTTP/1.1\r\nHost: localhost\r\n\r\n",
+        "POST / HTTP/1.1\r\nHost: localhost\r\nContent-Length: 0x5\r\n\r\n",
+        "DELETE / HTTP/1.1\r\nHost: evil.example\r\nTransfer-Encoding: chunked\r\n\r\n",
+    ],
+)
+def test_a_body_is_no_request(server, first):
+    """What another site's page may send is not taken for a request of the console's own page."""
+    with socket.create_connection(("127.0.0.1", server.port), timeout=20) as one:
+        one.sendall((first + page(server.port, *UPGRADE, path="/socket")).encode())
+        answer = b""
+        with contextlib.suppress(OSError):
+            while more := one.recv(4096):
+                answer += more
+    assert answer.startswith(b"HTTP/1.1") and b" 101 " not in answer
+
+
 def test_viewers_change_no_byte(tmp_path):
     """The log of a run without the console, and of one with viewers that watch everything, one of
     them slow.
@@ -222,8 +322,6 @@ def test_types_decode_in_typescript_as_in_python(tmp_path):
     """The description made of proto/*.lcm gives the fingerprints that lcm-gen's code has, for every
     type.
     """
-    import sys
-
     sys.path.insert(0, str(BUILD / "python"))
     import ruedo.lcmtypes as types
 

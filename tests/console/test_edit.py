@@ -3,6 +3,7 @@ and what is refused."""
 
 import json
 import math
+import os
 import re
 import struct
 import subprocess
@@ -248,6 +249,36 @@ def test_the_named_file_is_written_and_no_other(tmp_path):
         reply = client.ask("SAVE")
         assert reply.code == 3 and "changed" in reply.text
         assert world.read_text() == "<mine/>"
+
+
+def test_what_came_in_its_place_is_not_lost(tmp_path):
+    """A new world's file is there by now, as whatever: what cannot be read is kept, too."""
+    world = tmp_path / "new.sdf"
+    with editing("new.sdf", folder=tmp_path) as process:
+        client = Client(process.port)
+        for make in (
+            lambda: os.mkfifo(world),
+            lambda: world.symlink_to("nowhere"),
+            world.mkdir,
+            lambda: (world.touch(), os.truncate(world, 65 << 20)),
+        ):
+            make()
+            before = world.lstat()
+            reply = client.ask("SAVE")
+            assert reply.code == 3 and "exists by now" in reply.text
+            assert world.lstat().st_ino == before.st_ino
+            world.rmdir() if world.is_dir() else world.unlink()
+        assert client.ask("SAVE").code == 0
+
+
+def test_a_new_world_is_as_private_as_its_user_wants(tmp_path):
+    before = os.umask(0o077)
+    try:
+        with editing("new.sdf", folder=tmp_path) as process:
+            assert Client(process.port).ask("SAVE").code == 0
+    finally:
+        os.umask(before)
+    assert (tmp_path / "new.sdf").stat().st_mode & 0o777 == 0o600
 
 
 def test_only_a_server_that_edits_saves(tmp_path):

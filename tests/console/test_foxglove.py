@@ -11,12 +11,12 @@ import re
 import socket
 import struct
 import subprocess
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
-from harness import ARENA, BUILD, NODE, RUEDO, SOURCE
+from harness import ARENA, BUILD, NODE, RUEDO, SOURCE, Socket
 from mcap.reader import make_reader
 
 TOPICS = ["p3at/lrf", "p3at/odometry", "ruedo/world", "ruedo/frames", "ruedo/scene"]
@@ -201,6 +201,55 @@ def test_what_a_viewer_should_not_send_harms_nothing() -> None:
         lines = seen(url, 2, "p3at/lrf")
         assert [line for line in lines if line.get("topic") == "p3at/lrf"]
         assert process.poll() is None
+
+
+def test_a_message_of_many_wishes_costs_little() -> None:
+    """A channel has few subscriptions of one viewer, and a message gets one complaint."""
+    wishes = [{"id": i, "channelId": 0} for i in range(1000)]
+    topics = [{"id": i, "topic": "x", "encoding": "json"} for i in range(99)]
+    with serving("--disable", "p3at/camera") as (_, url):
+        port = int(url.removesuffix("/").split(":")[-1])
+        viewer = Socket(port, path="/", **{"Sec-WebSocket-Protocol": "foxglove.sdk.v1"})
+
+        def until(wanted: Callable[[dict], bool]) -> list[dict]:
+            texts: list[dict] = []
+            while not texts or not wanted(texts[-1]):
+                opcode, data = viewer.receive()
+                if opcode == 1:
+                    texts.append(json.loads(data))
+            return texts
+
+        until(lambda text: any(one["id"] == 1 for one in text.get("channels", [])))
+        for asked in (
+            {"op": "subscribe", "subscriptions": wishes},
+            {"op": "unsubscribe", "subscriptionIds": list(range(1000))},
+            {"op": "subscribe", "subscriptions": wishes[:8]},
+            {"op": "subscribe", "subscriptions": [{"id": 0, "channelId": 1}]},
+            {"op": "advertise", "channels": topics},
+            {"op": "subscribe", "subscriptions": [{"id": 9, "channelId": 1 << 30}]},
+        ):
+            viewer.send(json.dumps(asked).encode(), opcode=1)
+        last = f"no channel {1 << 30}"
+        said = [text.get("message") for text in until(lambda text: text.get("message") == last)]
+        viewer.close()
+    assert [words for words in said if words] == [
+        "too many subscriptions to channel 0",
+        "subscription 0 is there already",
+        "publishing is for velocities (geometry_msgs/Twist as json) on: "
+        "cmd_vel, p3at/cmd_vel, p3at/velocity",
+        last,
+    ]
+
+
+def test_pictures_are_drawn_for_who_comes_after_a_change(tmp_path: Path) -> None:
+    """Whether anybody wants them was asked only when models or clients of the bus came or went."""
+    import ruedo
+
+    bus = f"unix://{tmp_path / 'bus'}"
+    with serving("--lcm", bus) as (_, url), ruedo.connect(bus, timeout=60) as sim:
+        sim.spawn("desk", x=5, y=5)
+        lines = seen(url, 3, "p3at/camera")
+    assert [line for line in lines if line.get("topic") == "p3at/camera"]
 
 
 def test_only_foxgloves_own_pages_and_programs_come_in() -> None:

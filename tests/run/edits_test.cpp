@@ -173,6 +173,19 @@ TEST_F(EditsTest, RefusesToPutItIntoSomething) {
   EXPECT_EQ(info().nrobots, 3);
 }
 
+// The world that SAVE writes has the names, and a world may not have all.
+TEST_F(EditsTest, ANameIsOneThatAWorldMayHave) {
+  begin(paused_server(), robot_sdf("r", 0, 0));
+  const std::string box = as_file(box_sdf("x", "0.2 0.2 0.2", true));
+  double x = 2;
+  for (const char* name : {"a::b", "__model__", "world", " lead", "trail ", " "})
+    EXPECT_EQ(spawn(box, x++, 0, name).code, reply_t::BAD_REQUEST) << name;
+  for (const char* name : {"a:b", "__x", "it's", "in between", "<&>\""})
+    EXPECT_EQ(spawn(box, x++, 0, name).code, reply_t::OK) << name;
+  ASSERT_EQ(spawn(as_file(box_sdf("a::b", "0.2 0.2 0.2", true)), x, 0).code, reply_t::OK);
+  EXPECT_NEAR(state("a.b").position[0], x, 1e-12);  // as in a world's file
+}
+
 TEST_F(EditsTest, PutsThingsElsewhereAtRest) {
   begin(paused_server(), robot_sdf("r", 0, 0) + box_sdf("box", "0.2 0.2 0.2", false, 5, 0, 0.1));
   drive("r", 0.5);

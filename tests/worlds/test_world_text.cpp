@@ -152,6 +152,81 @@ TEST(WorldTextTest, ANewModelStandsAtTheEndUnderItsName) {
   expect_near(world.put("guest"), Pose::from_xyz_rpy({0, 2, 0}, {0, 0, 1}));
 }
 
+TEST(WorldTextTest, ANewModelTakesThePlaceOfTheLastOne) {
+  Text world(box("a", "") + box("b", "") + box("c", ""));
+  for (const char* name : {"c", "b"}) {
+    std::erase_if(world.models, [&](const ModelNow& model) { return model.name == name; });
+    std::vector<ModelNow> with_new = world.models;
+    const std::string text = "<sdf version='1.9'>" + box("x", "") + "</sdf>";
+    with_new.push_back({"d", Pose::from_xyz_rpy({1, 0, 0}, {0, 0, 0}), text, true});
+    const std::string saved = world.places().with(with_new).text;
+    const auto again = load_world_text(saved, kWorlds + "w.sdf");
+    ASSERT_EQ(again->models.size(), with_new.size()) << saved;
+    EXPECT_EQ(again->models.back().name, "d");
+  }
+}
+
+// In quotes of both kinds, and in an <include>.
+TEST(WorldTextTest, ANameThatASpawnMayHaveReadsBack) {
+  for (const std::string name :
+       {"it's", "a' static='x", "'><static>0</static><x y='", "\"", "]]>"}) {
+    for (const std::string model :
+         {"<model name='m'><link name='l'/></model>", "<model name=\"m\"><link name='l'/></model>",
+          "<include><uri>model://desk</uri></include>"}) {
+      Text world(box("a", ""));
+      const Pose X = Pose::from_xyz_rpy({1, 0, 0}, {0, 0, 0});
+      world.models.push_back({name, X, "<sdf version='1.9'>" + model + "</sdf>", true});
+      expect_near(world.put(name), X);
+    }
+  }
+}
+
+// What stands in a declaration or a comment is no model, whatever it looks like.
+TEST(WorldTextTest, TheModelIsTheOneThatTheParserSees) {
+  for (const std::string before : {"<?xml version='1.0' x='><sdf><model name=\"i\"/></sdf>' ?>",
+                                   "<!--><sdf><model name='i'/></sdf><!-- -->"}) {
+    Text world(box("a", ""));
+    world.models.push_back({"b", Pose::from_xyz_rpy({1, 0, 0}, {0, 0, 0}),
+                            before + "<sdf version='1.9'>" + box("x", "") + "</sdf>", true});
+    expect_near(world.put("b"), Pose::from_xyz_rpy({1, 0, 0}, {0, 0, 0}));
+  }
+}
+
+// Before SDF 1.5 an axis was in the model's frame. By hand: the joint's frame is turned by a
+// quarter about x, so that the model's y is the joint's -z, and its z the joint's y.
+TEST(WorldTextTest, AxesMeanTheSameInAFileOfAnotherVersion) {
+  const auto arm = [](const std::string& version, const std::string& axis) {
+    return "<sdf version='" + version +
+           "'><model name='m'><static>0</static><link name='a'/><link name='b'>"
+           "<pose>0 0 1 1.5707963267948966 0 0</pose></link><joint name='j' type='revolute'>"
+           "<parent>a</parent><child>b</child>" +
+           axis + "</joint></model></sdf>";
+  };
+  struct Case {
+    std::string file, text, axis;
+    Vec3 in_joint;
+  };
+  for (const Case& each : std::vector<Case>{
+           {"1.9", "1.4", "<axis><xyz>0 1 0</xyz></axis>", {0, 0, -1}},
+           {"1.9", "1.4", "<axis><limit><lower>0</lower></limit></axis>", {0, 1, 0}},
+           {"1.9", "1.4", "<axis/>", {0, 1, 0}},
+           {"1.9", "1.6", "<axis><xyz>0 1 0</xyz></axis>", {0, 1, 0}},
+           {"1.4", "1.9", "<axis><xyz>0 1 0</xyz></axis>", {0, 1, 0}},
+           {"1.4",
+            "1.6",
+            "<axis><xyz>0 1 0</xyz><use_parent_model_frame>1</use_parent_model_frame></axis>",
+            {0, 0, -1}},
+           {"1.4", "1.4", "<axis><xyz>0 1 0</xyz></axis>", {0, 0, -1}}}) {
+    Text world(box("a", ""), each.file);
+    world.models.push_back({"arm", Pose(), arm(each.text, each.axis), true});
+    const auto again = load_world_text(world.saved(), kWorlds + "w.sdf");
+    const Model& model = *again->models.back().model;
+    ASSERT_EQ(model.joints.size(), 1u);
+    EXPECT_LT((model.joints[ModelJointIndex(0)].axis.axis_in_J - each.in_joint).norm(), 1e-9)
+        << each.file << " " << each.text << " " << each.axis;
+  }
+}
+
 TEST(WorldTextTest, AUrdfThatWasSpawnedIsWrittenAsSdf) {
   Text world(box("a", ""));
   world.models.push_back({"u", Pose::from_xyz_rpy({4, 0, 0}, {0, 0, 0}),
@@ -216,6 +291,14 @@ TEST(WorldTextTest, PathsLeadToTheSameFilesFromAnotherFolder) {
       std::filesystem::path(folder) / moved.substr(begin, moved.find('<', begin) - begin),
       kWorlds + "robots/p3dx/model.sdf"));
   EXPECT_EQ(moved_to(text, kWorlds, kWorlds + "../worlds"), text);
+}
+
+TEST(WorldTextTest, PathsMayHoldWhatXmlEscapes) {
+  const std::filesystem::path folder = std::filesystem::path(testing::TempDir()) / "a & <b>";
+  std::filesystem::create_directories(folder);
+  std::ofstream(folder / "c & d.dae") << "x";
+  EXPECT_EQ(moved_to("<sdf><uri> c &amp; d.dae\n</uri></sdf>", folder, folder.parent_path()),
+            "<sdf><uri>a &amp; &lt;b&gt;/c &amp; d.dae</uri></sdf>");
 }
 
 TEST(WorldTextTest, ARobotStandsOnAFloorThatReadsBack) {

@@ -1,11 +1,14 @@
 // From /proc: /proc/net/tcp has each connection's inode and user, /proc/PID/fd the inodes that a
 // process holds.
-#include "bus/peer_owners.h"
+#include "core/peer_owners.h"
 
+#include <algorithm>
 #include <cctype>
 #include <filesystem>
 #include <fstream>
+#include <map>
 #include <sstream>
+#include <tuple>
 
 #include <arpa/inet.h>
 #include <netinet/in.h>
@@ -13,7 +16,7 @@
 
 namespace fs = std::filesystem;
 
-namespace ruedo::bus {
+namespace ruedo {
 namespace {
 
 // "0100007F:1E14": the address as the machine keeps it, the port.
@@ -66,4 +69,22 @@ std::string PeerOwners::owner_of(int socket) const {
   return found == by_port_.end() ? std::string("address ") + address : found->second;
 }
 
-}  // namespace ruedo::bus
+std::vector<size_t> who_give_way(std::span<const int> sockets, size_t most, uint16_t server_port) {
+  const PeerOwners owners(server_port);
+  std::map<std::string, std::vector<size_t>> shares;
+  for (size_t i = 0; i < sockets.size(); ++i) shares[owners.owner_of(sockets[i])].push_back(i);
+  std::vector<size_t> giving;
+  while (sockets.size() - giving.size() > most) {
+    std::vector<size_t>& largest =
+        std::max_element(shares.begin(), shares.end(), [](const auto& a, const auto& b) {
+          return std::tuple(a.second.size(), a.second.back()) <
+                 std::tuple(b.second.size(), b.second.back());
+        })->second;
+    giving.push_back(largest.back());
+    largest.pop_back();
+    std::erase_if(shares, [](const auto& share) { return share.second.empty(); });
+  }
+  return giving;
+}
+
+}  // namespace ruedo

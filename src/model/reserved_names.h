@@ -1,0 +1,12 @@
+// Names that SDF keeps for itself.
+#pragma once
+
+#include <string_view>
+
+namespace ruedo::model {
+
+inline bool is_reserved_name(std::string_view name) {
+  return name == "world" || (name.size() >= 4 && name.starts_with("__") && name.ends_with("__"));
+}
+
+}  // namespace ruedo::model
