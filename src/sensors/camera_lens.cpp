@@ -5,13 +5,13 @@
 
 #include <opencv2/imgproc.hpp>
 
+#include "core/message_size.h"
 #include "core/whole.h"
 #include "ruedo/math.h"
 
 namespace ruedo {
 namespace {
 
-constexpr double kMaxPixels = 8192;  // width and height
 // The width of a pinhole's picture goes to infinity towards 180 degrees.
 constexpr double kMaxHfov = 3.0;
 // Maximum size of the ideal picture relative to the lens's.
@@ -20,9 +20,9 @@ constexpr double kMaxGrowth = 2.5;
 }  // namespace
 
 Lens::Lens(const Element& camera) {
-  width = static_cast<int>(camera.integer("image/width", width, Allowed::between(1, kMaxPixels)));
+  width = static_cast<int>(camera.integer("image/width", width, Allowed::between(1, kMostPixels)));
   height =
-      static_cast<int>(camera.integer("image/height", height, Allowed::between(1, kMaxPixels)));
+      static_cast<int>(camera.integer("image/height", height, Allowed::between(1, kMostPixels)));
   hfov = camera.number("horizontal_fov", hfov,
                        Allowed{.min = 0.0, .max = kMaxHfov, .min_excluded = true});
   near_m = camera.number("clip/near", near_m, Allowed::positive(quantity::kRange));
