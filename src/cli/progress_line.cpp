@@ -122,4 +122,9 @@ void begin_progress_line() {
 
 void end_progress_line() { line().end(); }
 
+std::string progress_text() {
+  const auto state = Progress::latest();
+  return state ? text_of(*state, columns()) : "";
+}
+
 }  // namespace ruedo::cli
