@@ -17,7 +17,7 @@ namespace ruedo::model {
 namespace {
 
 constexpr ProcessLimits kLimits{
-    .cpu_s = 20, .output_bytes = 64 << 20, .memory_bytes = rlim_t{2} << 30, .wall_s = 60};
+    .cpu_s = 10, .output_bytes = 64 << 20, .memory_bytes = rlim_t{1} << 30, .wall_s = 60};
 
 std::string script() {
   std::error_code error;
@@ -72,6 +72,7 @@ std::string output_of(const std::string& path, const ReadContext& context) {
   const std::string python = words[0];
   for (const std::string& root : context.resources.folders())
     words.insert(words.end(), {"--folder", root});
+  if (context.resources.find("/", path)) words.push_back("--anywhere");
   for (const std::string& argument : context.xacro_arguments)
     words.insert(words.end(), {"--argument", argument});
   ProcessResult result = run_limited(std::move(words), kLimits);
@@ -80,7 +81,7 @@ std::string output_of(const std::string& path, const ReadContext& context) {
   if (code == 0) return std::move(result.output);
   std::string why = last_line(result.messages);  // xacro's warnings come before
   if (code == 127) why = "Python is missing (" + python + "); xacro needs it";
-  if (!ended) why = "it needs more than " + std::to_string(kLimits.cpu_s) + " s, or more than 2 GB";
+  if (!ended) why = "it needs more than " + std::to_string(kLimits.cpu_s) + " s, or more than 1 GB";
   throw InputError({path, 0}, "the xacro file cannot be expanded: " +
                                   (why.empty() ? "it does not say why" : why));
 }

@@ -124,6 +124,36 @@ TEST(Xacro, WhatIsWrongIsSaidInOneLine) {
               HasSubstr("a file of xacro macros alone is for others to include"));
 }
 
+// A stranger's robot would have names made of what it reads, which everybody sees.
+TEST(Xacro, ReadsNothingElsewhere) {
+  const Packages packages;
+  const std::string elsewhere = packages.folder.write("elsewhere/a.yaml", "secret");
+  const std::string macros = packages.folder.write("elsewhere/a.xacro", kPart);
+  const std::string head = "<robot name='b' xmlns:xacro='x'>";
+  for (const std::string& file : {elsewhere, std::string("../../elsewhere/a.yaml")}) {
+    const std::string path =
+        packages.folder.write("bot/urdf/a.xacro", head +
+                                                      "<xacro:property name='y' value=\"${xacro."
+                                                      "load_yaml('" +
+                                                      file + "')}\"/><link name='${y}'/></robot>");
+    try {
+      load_world(path);
+      FAIL() << file;
+    } catch (const InputError& error) {
+      EXPECT_THAT(error.what(),
+                  testing::AllOf(HasSubstr("bot/urdf/a.xacro: "),
+                                 HasSubstr("leads out of the folders"), HasSubstr(elsewhere)));
+    }
+    LoadOptions options;
+    options.allow_absolute = true;
+    EXPECT_EQ(load_world(path, options)->models.back().model->links.at(0).name, "secret");
+  }
+  const std::string path =
+      packages.folder.write("bot/urdf/a.xacro", head + "<xacro:include filename='" + macros +
+                                                    "'/><link name='base'/></robot>");
+  EXPECT_THROW(load_world(path), InputError);
+}
+
 // Text that comes with a request is never executed; only files on the disk are.
 TEST(Xacro, OfATextIsRefused) {
   const Packages packages;

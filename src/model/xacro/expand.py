@@ -1,17 +1,19 @@
 """Expands a xacro file for Ruedo, by the Python package xacro, without ROS around it.
 
-    expand.py FILE [--folder FOLDER]... [--argument NAME:=VALUE]...
+    expand.py FILE [--folder FOLDER]... [--argument NAME:=VALUE]... [--anywhere]
 
 Prints a line "read\tFILE" for each file that was read, and "missing\tFILE\tWHAT" for each
 include that is not there and was passed over; after an empty line the robot, each element with the
 attribute ruedo_at="FILE:LINE" that says where it was written. $(find PKG) is the folder whose
 package.xml has that name: above the file, beside its package, or in the folders given; else a
-folder of that name above the file.
+folder of that name above the file. Without --anywhere nothing is read but what lies in these
+folders, in that of the file and in the one above it.
 Errors go to stderr, in one line; the exit code is 1, or 2 where the package xacro is missing.
 """
 
 import argparse
 import contextlib
+import errno
 import os
 import re
 import sys
@@ -102,16 +104,43 @@ def folder_above(file, name):
     return None
 
 
-def serve_packages(known, file):
-    """Has xacro's $(find PKG) look there; ROS is not asked."""
+def serve_packages(known, file, allowed):
+    """Has xacro's $(find PKG) look there; ROS is not asked. What it finds may be read."""
 
     def get_package_share_directory(name):
-        return known.get(name) or folder_above(file, name) or os.path.join(MISSING, name)
+        found = known.get(name) or folder_above(file, name) or os.path.join(MISSING, name)
+        allowed.append(found)
+        return found
 
     index = types.ModuleType("ament_index_python")
     index.packages = types.ModuleType("ament_index_python.packages")
     index.packages.get_package_share_directory = get_package_share_directory
     sys.modules.update({index.__name__: index, index.packages.__name__: index.packages})
+
+
+class Outside(PermissionError):
+    def __str__(self):
+        return f"{self.strerror}: {self.filename}"
+
+
+def keep_within(allowed):
+    """From now on no file is opened elsewhere: no include, and nothing that load_yaml() names.
+    Python's own are read when they are first needed.
+    """
+    libraries = [os.path.abspath(each) for each in (*sys.path, sys.prefix, sys.base_prefix) if each]
+
+    def check(event, arguments):
+        if event != "open" or not isinstance(arguments[0], (str, bytes)):
+            return
+        path = os.path.abspath(os.fsdecode(arguments[0]))
+        if not any(
+            f"{path}/".startswith(f"{folder.rstrip('/')}/") for folder in (*allowed, *libraries)
+        ):
+            raise Outside(
+                errno.EACCES, "leads out of the folders that it may read (--allow-absolute)", path
+            )
+
+    sys.addaudithook(check)
 
 
 class Notes:
@@ -165,6 +194,7 @@ def main():
     parser.add_argument("file")
     parser.add_argument("--folder", action="append", default=[])
     parser.add_argument("--argument", action="append", default=[])
+    parser.add_argument("--anywhere", action="store_true")
     arguments = parser.parse_args()
     output = os.fdopen(os.dup(1), "w", encoding="utf-8", errors="surrogateescape")
     os.dup2(2, 1)  # what xacro prints is no part of the robot
@@ -178,8 +208,13 @@ def main():
         return 2
 
     file = os.path.abspath(arguments.file)
-    serve_packages(packages(roots_of(file, arguments.folder)), file)
+    folder = os.path.dirname(file)
+    known = packages(roots_of(file, arguments.folder))
+    allowed = [folder, os.path.dirname(folder), *arguments.folder, *known.values()]
+    serve_packages(known, file, allowed)
     notes = Notes(xacro, file)
+    if not arguments.anywhere:
+        keep_within(allowed)
     try:
         document = xacro.process_file(
             file, mappings=dict(each.split(":=", 1) for each in arguments.argument)
