@@ -240,6 +240,24 @@ def test_what_costs_much_is_refused(name, tmp_path):
     assert result.returncode == 3 and words in result.stdout + result.stderr, result
 
 
+def test_a_large_picture_is_not_distorted(tmp_path):
+    """Where each pixel lies is found by iteration: a minute for 8192 x 8192."""
+    image = "<image><width>8192</width><height>{}</height></image>"
+    camera = "<camera>{}<distortion><k1>0.1</k1></distortion></camera>"
+    sensor = "<sensor name='s' type='camera'>{}</sensor>"
+    for height, code, words in (
+        (1465, 1, "8192 x 1465 pixels is not distorted; at most 12000000 pixels are"),
+        (8, 0, "good"),
+    ):
+        (tmp_path / "w.sdf").write_text(
+            "<sdf version='1.9'><world name='w'><model name='m'><link name='l'>"
+            + sensor.format(camera.format(image.format(height)))
+            + "</link></model></world></sdf>"
+        )
+        result = program("check", tmp_path / "w.sdf")
+        assert result.returncode == code and words in result.stdout, result
+
+
 def test_people_may_walk_a_million_metres(tmp_path):
     """Their floor is divided into blocks, whose number was that of its square metres."""
     (tmp_path / "w.sdf").write_text(

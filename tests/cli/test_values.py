@@ -200,3 +200,29 @@ def test_a_robot_that_stands_in_a_wall_is_named(x, stuck, tmp_path):
     assert checked.returncode == stuck
     spawned = ruedo("check", str(Path(os.environ["RUEDO_SOURCE_DIR"]) / "worlds/arena.sdf"))
     assert spawned.returncode == 0, spawned
+
+
+@pytest.mark.parametrize("value", ["nan", "-nan", "inf", "1e300", "1e10000"])
+@pytest.mark.parametrize(
+    "words",
+    [
+        "map w.sdf -o m.yaml --resolution",
+        "map w.sdf -o m.yaml --height",
+        "play a.lcm --html a.html --html-size",
+        "regress w.sdf --record a.lcm --clearance",
+        "regress w.sdf --record a.lcm --odometry-error",
+        "regress w.sdf --record a.lcm --clearance-reach",
+        "echo --timeout",
+        "run w.sdf --lease",
+        "run w.sdf --duration",
+        "run w.sdf --rate",
+    ],
+)
+def test_what_is_no_number_is_named(words, value, tmp_path):
+    """A NaN lies in no range: an expectation with it would hold, a map be cut nowhere."""
+    done = subprocess.run(
+        [RUEDO, *words.split(), value], capture_output=True, text=True, cwd=tmp_path, timeout=60
+    )
+    option = words.split()[-1]
+    assert done.returncode in (2, 3), done
+    assert option in done.stderr and value in done.stderr, done
