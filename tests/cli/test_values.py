@@ -124,6 +124,15 @@ BAD = {
     "times of an actor out of order": (trajectory(1, 0), None),
     **{f"time of an actor {v}": (trajectory(0, v), "time") for v in HUGE},
     "mass of nothing": (link("<inertial><mass>1e-300</mass></inertial>"), None),
+    "three hundred faults that multiply": (
+        world(
+            "<include><uri>model://p3at</uri></include>"
+            + "<ruedo:fault><ruedo:robot>p3at</ruedo:robot><ruedo:target>left</ruedo:target>"
+            "<ruedo:kind>wheel_slip</ruedo:kind><ruedo:at>0</ruedo:at><ruedo:value>0.95</ruedo:value>"
+            "</ruedo:fault>" * 300
+        ),
+        None,
+    ),
     "axis of a heavy world": (joint(mass="1e9"), None),
     **{
         name: (text, None)
