@@ -10,13 +10,14 @@
 
 #include "core/big_endian.h"
 #include "core/lcm_log.h"
+#include "core/message_size.h"
 #include "sample_types.h"
 
 namespace ruedo::client {
 namespace {
 
 constexpr auto kHeadSize = static_cast<int64_t>(kLogHeadSize);
-constexpr int64_t kLongestChannel = 1000, kLargest = int64_t{1} << 30;
+constexpr int64_t kLongestChannel = 1000;
 
 }  // namespace
 
@@ -74,7 +75,8 @@ bool LogFile::add_event(int64_t begin, int64_t& next) {
   if (file_.gcount() < kHeadSize) return wrong(kCutOff);
   const int64_t name_size = read_big_endian<uint32_t>(&head[20]),
                 size = read_big_endian<uint32_t>(&head[24]);
-  if (name_size > kLongestChannel || size > kLargest) return wrong("it is damaged at byte ");
+  if (name_size > kLongestChannel || size > int64_t{kLargestMessage})
+    return wrong("it is damaged at byte ");
   // A false length must not exhaust the memory.
   if (begin + kHeadSize + name_size + size > size_) return wrong(kCutOff);
   std::string name(static_cast<size_t>(name_size), '\0');

@@ -14,6 +14,7 @@
 #include "bus/lcm_bus.h"
 #include "cli/commands.h"
 #include "cli/extensions.h"
+#include "cli/range.h"
 #include "core/utf8.h"
 #include "ruedo/schema.h"
 
@@ -215,7 +216,7 @@ void add(CLI::App& app, Action& chosen, const char* name, const char* help, cons
     command
         ->add_option("--timeout", arguments->timeout_s, "end with 1 when nothing came for so long")
         ->type_name("S")
-        ->check(CLI::PositiveNumber);
+        ->check(within(1e-3, 1e9));
   }
   command->callback([arguments, action, &chosen] {
     chosen = [arguments, action] { return action(*arguments); };

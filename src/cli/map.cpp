@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include "cli/commands.h"
+#include "cli/range.h"
 #include "model/occupancy.h"
 #include "ruedo/errors.h"
 
@@ -39,10 +40,10 @@ void add_map(CLI::App& app, Action& chosen) {
       ->required();
   command->add_option("--resolution", arguments->resolution, "side of a cell, m")
       ->capture_default_str()
-      ->check(CLI::Range(0.001, 100.0));
+      ->check(within(0.001, 100.0));
   command->add_option("--height", arguments->height, "where the world is cut: z, m")
       ->capture_default_str()
-      ->check(CLI::Range(-1e5, 1e5));
+      ->check(within(-1e5, 1e5));
   command->callback([arguments, &chosen] { chosen = [arguments] { return map(*arguments); }; });
 }
 

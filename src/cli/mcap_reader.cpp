@@ -9,6 +9,7 @@
 #include <fmt/format.h>
 
 #include "core/input_file.h"
+#include "core/message_size.h"
 #include "ruedo/errors.h"
 #include "run/tick.h"
 
@@ -25,7 +26,9 @@ enum Op : uint8_t {
 };
 constexpr char kMagic[] = "\x89MCAP0\r\n";
 constexpr size_t kMagicSize = sizeof kMagic - 1, kRecordHead = 9;
-constexpr uint64_t kMostAttachmentHead = 65536;  // bytes of its name and the like
+constexpr uint64_t kMostAttachmentHead = 65536;        // bytes of its name and the like
+constexpr uint64_t kMostRecord = 2 * kLargestMessage;  // bytes: of a chunk, whose last may be one
+constexpr uint64_t kMostNames = 64u << 20;             // bytes, of all schemas and channels
 
 // The fields of a record; after a fault everything is empty.
 class Fields {
@@ -90,9 +93,9 @@ class McapFile {
       if (op == kAttachment) {
         read_attachment(size);
       } else if (op == kChunk) {
-        read_chunk(bytes(size));
+        read_chunk(record(size));
       } else if (op == kSchema || op == kChannel || op == kMessage) {
-        read_record(op, bytes(size));
+        read_record(op, record(size));
       }
       offset_ = end;
       if (fseeko(file_.get(), static_cast<off_t>(end), SEEK_SET) != 0) damaged("cannot be read");
@@ -102,6 +105,13 @@ class McapFile {
  private:
   [[noreturn]] void damaged(const std::string& what) const {
     throw InputError({path_}, fmt::format("{} at byte {}", what, begin_));
+  }
+
+  // A sparse file has room for a length that lies, and takes none on the disk.
+  std::vector<uint8_t> record(uint64_t size) {
+    if (size > kMostRecord)
+      damaged(fmt::format("has a record of {} bytes (at most {} are allowed)", size, kMostRecord));
+    return bytes(size);
   }
 
   std::vector<uint8_t> bytes(uint64_t count) {
@@ -150,6 +160,7 @@ class McapFile {
   void read_record(uint8_t op, std::span<const uint8_t> record) {
     Fields fields(record);
     const auto id = fields.number<uint16_t>();
+    if (op == kSchema || op == kChannel) note_names(op, id, record.size());
     if (op == kSchema) {
       schemas_[id] = fields.text();
     } else if (op == kChannel) {
@@ -171,10 +182,20 @@ class McapFile {
     if (!fields.good()) damaged("has a damaged record");
   }
 
+  // What is kept: others write a schema again with each chunk.
+  void note_names(uint8_t op, uint16_t id, uint64_t size) {
+    uint64_t& kept = names_[{op, id}];
+    all_names_ += size - std::exchange(kept, size);
+    if (all_names_ > kMostNames)
+      damaged(fmt::format("has more than {} bytes of schemas and channels", kMostNames));
+  }
+
   const std::string& path_;
   const McapHandler& handler_;
   std::unique_ptr<std::FILE, InputFile::Close> file_;
-  uint64_t size_ = 0, offset_ = 0, begin_ = 0;  // begin_: of the record
+  uint64_t size_ = 0, offset_ = 0, begin_ = 0;              // begin_: of the record
+  std::map<std::pair<uint8_t, uint16_t>, uint64_t> names_;  // bytes, by operation and id
+  uint64_t all_names_ = 0;
   std::map<uint16_t, std::string> schemas_;
   std::map<uint16_t, McapChannel> channels_;
 };

@@ -15,6 +15,7 @@
 #include "cli/bag_log.h"
 #include "cli/commands.h"
 #include "cli/extensions.h"
+#include "cli/range.h"
 #include "cli/sandboxed.h"
 #include "cli/view.h"
 #include "log/header.h"
@@ -142,7 +143,7 @@ void add_play(CLI::App& app, Action& chosen) {
                    "at most so large: messages are thinned to fit")
       ->type_name("MB")
       ->capture_default_str()
-      ->check(CLI::Range(1.0, 1000.0))
+      ->check(within(1.0, 1000.0))
       ->needs("--html");
   command
       ->add_option("--lcm", arguments->lcm,

@@ -123,4 +123,9 @@ void begin_progress_line() {
 
 bool end_progress_line() { return line().end(); }
 
+std::string progress_text() {
+  const auto state = Progress::latest();
+  return state ? text_of(*state, columns()) : "";
+}
+
 }  // namespace ruedo::cli

@@ -14,6 +14,7 @@
 #include "cli/commands.h"
 #include "cli/extensions.h"
 #include "cli/isolation.h"
+#include "cli/range.h"
 #include "cli/view.h"
 #include "core/json.h"
 #include "core/output_file.h"
@@ -285,17 +286,17 @@ void add_expectations(CLI::App& command, RegressArguments& a) {
                    "the robot touches nothing but the ground");
   command.add_option("--clearance", a.clearance, "at least so far from everything (m)")
       ->type_name("M")
-      ->check(CLI::Range(0.0, 100.0));
+      ->check(within(0.0, 100.0));
   command
       .add_option("--odometry-error", a.odometry_error,
                   "odometry at most so far from the truth (m)")
       ->type_name("M")
-      ->check(CLI::Range(0.0, 1e6));
+      ->check(within(0.0, 1e6));
   command
       .add_option("--clearance-reach", a.clearance_reach,
                   "measure the smallest clearance below this (m), for --json")
       ->type_name("M")
-      ->check(CLI::Range(0.0, 100.0));
+      ->check(within(0.0, 100.0));
   command
       .add_option("--script", a.script,
                   "command line that judges too, by its exit code; RUEDO_LOG is the run's log")

@@ -120,11 +120,15 @@ class StatusLine {
     last_ = status;
     last_time_ = now;
     if (!shown_) return;
+    std::string line = status.repeating ? progress_text() : "";
+    if (line.empty()) {
+      line = fmt::format(
+          "{:.2f} s   {}   {:.0f} messages/s", static_cast<double>(status.time_us) * 1e-6,
+          status.paused ? std::string("paused") : fmt::format("x {:.3g} real time", factor),
+          messages);
+    }
     shown_ = drawn_ = is_printed([&] {
-      fmt::print(stderr, "\r\033[K{:.2f} s   {}   {:.0f} messages/s",
-                 static_cast<double>(status.time_us) * 1e-6,
-                 status.paused ? std::string("paused") : fmt::format("x {:.3g} real time", factor),
-                 messages);
+      fmt::print(stderr, "\r\033[K{}", line);
       std::fflush(stderr);
     });
   }

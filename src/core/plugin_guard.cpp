@@ -16,15 +16,15 @@
 #include <cxxabi.h>
 #include <unistd.h>
 
+#include "core/message_size.h"
 #include "core/utf8.h"
 #include "ruedo/errors.h"
 
 namespace ruedo {
 namespace {
 
-constexpr int kFailed = 4;                           // exit code
-constexpr size_t kLargestMessage = size_t{1} << 30;  // bytes: a log has none that is larger
-constexpr size_t kLongestText = 500;                 // characters of what a plugin says
+constexpr int kFailed = 4;            // exit code
+constexpr size_t kLongestText = 500;  // characters of what a plugin says
 
 thread_local const char* at_work = nullptr;  // whose code this thread is in; null: nobody's
 

@@ -1,6 +1,5 @@
 // Walks through the bytes of a message by its schema. The bytes are hostile: every length is
 // checked against what is there before it is believed.
-#include <algorithm>
 #include <bit>
 #include <charconv>
 
@@ -46,15 +45,17 @@ class Walk {
   }
 
  private:
-  // Whether each of its dimensions alone is one that the bytes that are left may have.
+  // Whether each of its dimensions, up to one of nothing, is one that the bytes that are left may
+  // have.
   bool has_room(const Field& field, const std::vector<int64_t>& counts) const {
     const size_t least = least_size(field);
     const size_t most = least > 0 ? (bytes_.size() - at_) / least : SIZE_MAX;
-    return std::all_of(field.dimensions.begin(), field.dimensions.end(),
-                       [&](const Dimension& dimension) {
-                         const int64_t count = count_of(dimension, counts);
-                         return count >= 0 && static_cast<uint64_t>(count) <= most;
-                       });
+    for (const Dimension& dimension : field.dimensions) {
+      const int64_t count = count_of(dimension, counts);
+      if (count < 0 || static_cast<uint64_t>(count) > most) return false;
+      if (count == 0) break;
+    }
+    return true;
   }
 
   bool elements(const Field& field, const std::vector<int64_t>& counts, size_t dimension,

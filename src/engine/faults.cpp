@@ -17,6 +17,7 @@ namespace {
 
 constexpr size_t kMostFaults = 1000;  // of each kind at once; more are refused
 constexpr size_t kMostLate = 65536;   // commands
+constexpr double kMostSlip = 1e6;     // turns for one that moves anything, by many faults at once
 
 bool same_name(const std::string& a, const std::string& b) {
   return std::equal(a.begin(), a.end(), b.begin(), b.end(), [](unsigned char x, unsigned char y) {
@@ -282,7 +283,8 @@ void Faults::show_wheels(Snapshot& snapshot) {
           wheel.steers)
         continue;
       if (fault.kind == Kind::encoder_stuck) factor = 0.0;
-      if (fault.kind == Kind::wheel_slip) factor /= 1.0 - fault.value;
+      if (fault.kind == Kind::wheel_slip)
+        factor = std::min(factor / (1.0 - fault.value), kMostSlip);
     }
     shown_angles_[i] += factor * (snapshot.wheel_angles[i] - true_angles_[i]);
     true_angles_[i] = snapshot.wheel_angles[i];

@@ -18,7 +18,8 @@
 namespace ruedo::engine {
 namespace {
 
-constexpr size_t kTimeAt = 8;  // every type begins with its fingerprint and int64_t utime
+constexpr double kFarthest = 1e30;  // of what is measured, by many faults at once
+constexpr size_t kTimeAt = 8;       // every type begins with its fingerprint and int64_t utime
 
 // A plugin's message may have no time.
 bool has_time(const std::vector<uint8_t>& bytes) {
@@ -48,8 +49,9 @@ struct Encoded {
 template <class Number>
 Number wrong(const SensorFault& fault, Number value) {
   if (!std::isfinite(value)) return value;
-  return static_cast<Number>(fault.kind == SensorFault::Kind::bias ? value + fault.value
-                                                                   : value * fault.value);
+  const double changed =
+      fault.kind == SensorFault::Kind::bias ? value + fault.value : value * fault.value;
+  return static_cast<Number>(std::clamp(changed, -kFarthest, kFarthest));
 }
 
 template <class Number>

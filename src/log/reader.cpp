@@ -8,13 +8,13 @@
 
 #include "core/big_endian.h"
 #include "core/lcm_log.h"
+#include "core/message_size.h"
 #include "ruedo/errors.h"
 
 namespace ruedo::log {
 namespace {
 
 constexpr uint32_t kMaxChannel = 1000;
-constexpr uint32_t kMaxData = 1u << 30;
 
 // What others play: a bag's folder, and a file of MCAP, which begins with this.
 constexpr uint32_t kMcap = 0x894D4341;
@@ -94,7 +94,7 @@ bool Reader::read_event(Event& event, const std::function<bool(const std::string
   event.number = read_big_endian<int64_t>(head.data() + 4);
   event.timestamp_us = read_big_endian<int64_t>(head.data() + 12);
   if (read_big_endian<uint32_t>(head.data()) != kLogSync || channel_size > kMaxChannel ||
-      data_size > kMaxData || event.timestamp_us < -kLatestLogTime_us ||
+      data_size > kLargestMessage || event.timestamp_us < -kLatestLogTime_us ||
       event.timestamp_us > kLatestLogTime_us) {
     fault_ = "damaged at byte " + std::to_string(begin);
     return false;

@@ -13,6 +13,7 @@
 #include "core/big_endian.h"
 #include "core/input_file.h"
 #include "core/lcm_log.h"
+#include "core/message_size.h"
 #include "ruedo/errors.h"
 
 namespace ruedo::log {
@@ -55,6 +56,12 @@ Writer::~Writer() {
 void Writer::write(int64_t timestamp_us, const std::string& channel, const uint8_t* data,
                    size_t size) {
   if (!error_.empty()) return;
+  if (size > kLargestMessage) {  // readers take it for damage
+    flush();
+    error_ = "a message of " + std::to_string(size) + " bytes on " + channel + "; at most " +
+             std::to_string(kLargestMessage) + " are allowed";
+    return;
+  }
   append_big_endian(buffer_, kLogSync);
   append_big_endian(buffer_, static_cast<uint64_t>(events_++));
   append_big_endian(buffer_, static_cast<uint64_t>(timestamp_us));

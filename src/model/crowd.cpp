@@ -3,8 +3,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <unordered_map>
 #include <unordered_set>
 
+#include "core/whole.h"
 #include "model/placement.h"
 #include "model/read_context.h"
 #include "model/sdf_reader.h"
@@ -29,6 +31,57 @@ Rect rect_of(const Element& element, bool point_allowed) {
   const Vec2 a(v[0], v[1]), b(v[2], v[3]);
   return {a.cwiseMin(b), a.cwiseMax(b)};
 }
+
+// Circles in the plane, by the cells that they lie in.
+class Circles {
+ public:
+  void add(const Circle& circle) {
+    const Cells covered(circle);
+    if (covered.count() > kMostCells) return large_.push_back(circle);
+    covered.any([&](uint64_t cell) { return cells_[cell].push_back(circle), false; });
+  }
+  bool meet(const Circle& circle) const {
+    const auto meets = [&](const Circle& other) {
+      return (other.at - circle.at).norm() < other.radius + circle.radius;
+    };
+    return std::any_of(large_.begin(), large_.end(), meets) ||
+           Cells(circle).any([&](uint64_t cell) {
+             const auto there = cells_.find(cell);
+             return there != cells_.end() &&
+                    std::any_of(there->second.begin(), there->second.end(), meets);
+           });
+  }
+
+ private:
+  static constexpr double kSide_m = 1.0, kMostCells = 64;
+
+  // Those that a circle's square covers.
+  struct Cells {
+    explicit Cells(const Circle& c)
+        : x0(cell_of(c.at.x() - c.radius)),
+          x1(cell_of(c.at.x() + c.radius)),
+          y0(cell_of(c.at.y() - c.radius)),
+          y1(cell_of(c.at.y() + c.radius)) {}
+    static int64_t cell_of(double at) { return rounded_down(std::clamp(at / kSide_m, -1e8, 1e8)); }
+    double count() const {
+      return static_cast<double>(x1 - x0 + 1) * static_cast<double>(y1 - y0 + 1);
+    }
+    template <class Visit>
+    bool any(Visit visit) const {
+      for (int64_t y = y0; y <= y1; ++y) {
+        for (int64_t x = x0; x <= x1; ++x) {
+          if (visit(static_cast<uint64_t>(x) << 32 ^ (static_cast<uint64_t>(y) & 0xffffffffu)))
+            return true;
+        }
+      }
+      return false;
+    }
+    int64_t x0, x1, y0, y1;
+  };
+
+  std::unordered_map<uint64_t, std::vector<Circle>> cells_;  // looked up only
+  std::vector<Circle> large_;
+};
 
 }  // namespace
 
@@ -110,7 +163,9 @@ FloorPlan walls_for(const WorldModel& world, const CrowdDescription& crowd, doub
 }
 
 std::vector<Vec2> places_of(const CrowdDescription& crowd, const FloorPlan& walls,
-                            std::vector<Circle> taken, uint64_t seed) {
+                            const std::vector<Circle>& taken, uint64_t seed) {
+  Circles circles;
+  for (const Circle& circle : taken) circles.add(circle);
   const RandomSource source(seed, crowd.name, "places");
   std::vector<Vec2> places;
   for (int i = 0; i < crowd.count; ++i) {
@@ -121,13 +176,10 @@ std::vector<Vec2> places_of(const CrowdDescription& crowd, const FloorPlan& wall
       const double x = stream.uniform(), y = stream.uniform();
       const Vec2 at = crowd.area.low + Vec2(x, y).cwiseProduct(crowd.area.high - crowd.area.low);
       FloorPlan::Near near[2];
-      found = walls.nearest(at, crowd.radius, near) == 0 &&
-              std::none_of(taken.begin(), taken.end(), [&](const Circle& other) {
-                return (other.at - at).norm() < other.radius + crowd.radius;
-              });
+      found = walls.nearest(at, crowd.radius, near) == 0 && !circles.meet({at, crowd.radius});
       if (found) {
         places.push_back(at);
-        taken.push_back({at, crowd.radius});
+        circles.add({at, crowd.radius});
       }
     }
     if (!found)
@@ -170,7 +222,7 @@ void add_crowd(const Element& element, WorldModel& world, size_t most_models) {
   }
   constexpr uint64_t kBeforeARun = 1;  // a run's own seed draws them again
   const std::vector<Vec2> places =
-      places_of(crowd, walls_for(world, crowd, floor), std::move(taken), kBeforeARun);
+      places_of(crowd, walls_for(world, crowd, floor), taken, kBeforeARun);
   std::unordered_set<std::string> names;
   for (const ModelInstance& instance : world.models) names.insert(instance.name);
   for (size_t i = 0; i < places.size(); ++i) {

@@ -45,6 +45,6 @@ struct Circle {
   double radius;
 };
 std::vector<Eigen::Vector2d> places_of(const CrowdDescription& crowd, const FloorPlan& walls,
-                                       std::vector<Circle> taken, uint64_t seed);
+                                       const std::vector<Circle>& taken, uint64_t seed);
 
 }  // namespace ruedo::model

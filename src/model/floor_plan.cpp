@@ -13,6 +13,7 @@ namespace ruedo::model {
 namespace {
 
 constexpr double kBlock_m = 2.0;
+constexpr double kMostBlocks = 1e6;     // of one floor; on larger ones a block is larger
 constexpr double kMostCells = 100'000;  // cells of one floor, for path planning
 constexpr int kLookAhead = 40;  // cells of the path among which the next waypoint is looked for
 constexpr int kAtLeast = 3;     // ... and at least so many, even beside a wall that hides the rest
@@ -20,8 +21,8 @@ constexpr double kSqueezes = 0.9;    // of a person's radius: the closest they c
 constexpr double kBesideWall = 3.0;  // cost factor of paths closer to walls than people like
 constexpr float kNoWay = std::numeric_limits<float>::infinity();
 
-int block_of(double at, double from, int most) {
-  return std::clamp(rounded_down<int>(std::clamp((at - from) / kBlock_m, -1.0, 1e6)), 0, most - 1);
+int block_of(double at, double from, double block_m, int most) {
+  return std::clamp(rounded_down<int>(std::clamp((at - from) / block_m, -1.0, 1e6)), 0, most - 1);
 }
 
 // The point on a rectangle's edge that is nearest to a point inside it.
@@ -59,15 +60,16 @@ FloorPlan::FloorPlan(std::vector<Rect> walls, const Rect& within)
   cell_m_ = std::max(cell_m_, std::sqrt(size.x() * size.y() / kMostCells));
   columns_ = std::max(1, rounded_up<int>(size.x() / cell_m_));
   rows_ = std::max(1, rounded_up<int>(size.y() / cell_m_));
-  blocks_x_ = std::max(1, rounded_up<int>(size.x() / kBlock_m));
-  blocks_y_ = std::max(1, rounded_up<int>(size.y() / kBlock_m));
+  block_m_ = std::max(kBlock_m, std::sqrt(size.x() * size.y() / kMostBlocks));
+  blocks_x_ = std::max(1, rounded_up<int>(size.x() / block_m_));
+  blocks_y_ = std::max(1, rounded_up<int>(size.y() / block_m_));
   of_block_.resize(static_cast<size_t>(blocks_x_) * static_cast<size_t>(blocks_y_));
   for (size_t wall = 0; wall < walls_.size(); ++wall) {
     const Rect& r = walls_[wall];
-    const int x1 = block_of(r.high.x(), within.low.x(), blocks_x_),
-              y1 = block_of(r.high.y(), within.low.y(), blocks_y_);
-    for (int y = block_of(r.low.y(), within.low.y(), blocks_y_); y <= y1; ++y) {
-      for (int x = block_of(r.low.x(), within.low.x(), blocks_x_); x <= x1; ++x)
+    const int x1 = block_of(r.high.x(), within.low.x(), block_m_, blocks_x_),
+              y1 = block_of(r.high.y(), within.low.y(), block_m_, blocks_y_);
+    for (int y = block_of(r.low.y(), within.low.y(), block_m_, blocks_y_); y <= y1; ++y) {
+      for (int x = block_of(r.low.x(), within.low.x(), block_m_, blocks_x_); x <= x1; ++x)
         of_block_[y * blocks_x_ + x].push_back(static_cast<int>(wall));
     }
   }
@@ -77,10 +79,10 @@ FloorPlan::FloorPlan(std::vector<Rect> walls, const Rect& within)
 template <class Visit>
 void FloorPlan::for_each_near(const Vec2& low, const Vec2& high, Visit visit) const {
   if (walls_.empty()) return;
-  const int x1 = block_of(high.x(), within_.low.x(), blocks_x_),
-            y1 = block_of(high.y(), within_.low.y(), blocks_y_);
-  for (int y = block_of(low.y(), within_.low.y(), blocks_y_); y <= y1; ++y) {
-    for (int x = block_of(low.x(), within_.low.x(), blocks_x_); x <= x1; ++x) {
+  const int x1 = block_of(high.x(), within_.low.x(), block_m_, blocks_x_),
+            y1 = block_of(high.y(), within_.low.y(), block_m_, blocks_y_);
+  for (int y = block_of(low.y(), within_.low.y(), block_m_, blocks_y_); y <= y1; ++y) {
+    for (int x = block_of(low.x(), within_.low.x(), block_m_, blocks_x_); x <= x1; ++x) {
       for (const int wall : of_block_[y * blocks_x_ + x]) visit(walls_[wall]);
     }
   }

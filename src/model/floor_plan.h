@@ -51,7 +51,7 @@ class FloorPlan {
   std::vector<Rect> walls_;
   Rect within_;
   int columns_ = 0, rows_ = 0;
-  double cell_m_ = 0.15;
+  double cell_m_ = 0.15, block_m_ = 0.0;
   std::vector<std::vector<int>> of_block_;  // the walls near each block of cells
   int blocks_x_ = 0, blocks_y_ = 0;
 };

@@ -19,10 +19,10 @@ namespace fs = std::filesystem;
 namespace ruedo::model {
 namespace {
 
-constexpr int kCpu_s = 20;
+constexpr int kCpu_s = 10;
 
 ProcessLimits limits() {
-  return {.cpu_s = kCpu_s, .output_bytes = 64 << 20, .memory_bytes = rlim_t{2} << 30, .wall_s = 60};
+  return {.cpu_s = kCpu_s, .output_bytes = 64 << 20, .memory_bytes = rlim_t{1} << 30, .wall_s = 60};
 }
 
 std::string script() {
@@ -85,7 +85,7 @@ std::string output_of(const std::string& path, std::vector<std::string> words,
   if (code == 0) return std::move(result.output);
   if (code == 126) fail(path, "its sandbox cannot be entered");
   if (code == 127) fail(path, "Python is missing (" + python + "); xacro needs it");
-  if (!ended) fail(path, "it needs more than " + std::to_string(kCpu_s) + " s, or more than 2 GB");
+  if (!ended) fail(path, "it needs more than " + std::to_string(kCpu_s) + " s, or more than 1 GB");
   fail(path, last_line(result.messages));  // xacro's warnings come before
 }
 

@@ -25,9 +25,44 @@ enum Pace { kCoarse, kFine };
 // without touching.
 constexpr double kContactReach_m = 0.02;
 
-// Limit of nearby pairs at the start: their number grows with the square of the bodies in one
-// place.
+// Limit of nearby pairs at the start, of bodies and of their shapes: their number grows with the
+// square of those in one place.
 constexpr int kMostPairs = 200'000;
+
+// How many shapes of `b` are near that box.
+int shapes_near(const btCollisionObject& b, const btVector3& low_W, const btVector3& high_W) {
+  const btCollisionShape* shape = b.getCollisionShape();
+  btVector3 low, high;
+  if (!shape->isCompound()) {
+    shape->getAabb(b.getWorldTransform(), low, high);
+    return TestAabbAgainstAabb2(low, high, low_W, high_W) ? 1 : 0;
+  }
+  struct Count : btDbvt::ICollide {
+    void Process(const btDbvtNode*) override { ++found; }
+    int found = 0;
+  } count;
+  const btDbvt& tree = *static_cast<const btCompoundShape&>(*shape).getDynamicAabbTree();
+  btTransformAabb(low_W, high_W, 0.0, b.getWorldTransform().inverse(), low, high);
+  tree.collideTV(tree.m_root, btDbvtVolume::FromMM(low, high), count);
+  return count.found;
+}
+
+// How many shapes of the two are near each other; once it is above kMostPairs, at least that.
+int near_shapes(const btCollisionObject& a, const btCollisionObject& b) {
+  if (!a.getCollisionShape()->isCompound()) {
+    if (b.getCollisionShape()->isCompound()) return near_shapes(b, a);
+    return 1;
+  }
+  const auto& shapes = static_cast<const btCompoundShape&>(*a.getCollisionShape());
+  int near = 0;
+  for (int i = 0; i < shapes.getNumChildShapes() && near <= kMostPairs; ++i) {
+    btVector3 low, high;
+    shapes.getChildShape(i)->getAabb(a.getWorldTransform() * shapes.getChildTransform(i), low,
+                                     high);
+    near += shapes_near(b, low, high);
+  }
+  return near;
+}
 
 }  // namespace
 
@@ -75,18 +110,34 @@ PhysicsWorld::Impl::Impl(const model::WorldModel& world, const model::BodyLayout
     dynamics_.addRigidBody(rigid_.bodies[i].bullet.get(), btBroadphaseProxy::DefaultFilter,
                            btBroadphaseProxy::AllFilter);
     update_box(i);
-    if (broadphase_.getOverlappingPairCache()->getNumOverlappingPairs() > kMostPairs) {
-      throw InputError({world.file, 0}, "more than " + std::to_string(kMostPairs) +
-                                            " pairs of things touch each other at the start: '" +
-                                            layout.bodies[i].name +
-                                            "' stands among too many; move them apart");
-    }
+    if (broadphase_.getOverlappingPairCache()->getNumOverlappingPairs() > kMostPairs)
+      refuse_crowded(i);
   }
+  count_near_shapes();
   for (JointConstraint& joint : joints_)
     if (joint.constraint()) dynamics_.addConstraint(joint.constraint(), true);
   for (JointConstraint& joint : wheels_)
     if (joint.constraint()) dynamics_.addConstraint(joint.constraint(), true);
   last_twists_ = twists_;
+}
+
+void PhysicsWorld::Impl::refuse_crowded(BodyIndex body) const {
+  throw InputError({world_.file, 0}, "more than " + std::to_string(kMostPairs) +
+                                         " pairs of things touch each other at the start: '" +
+                                         layout_.bodies[body].name +
+                                         "' stands among too many; move them apart");
+}
+
+void PhysicsWorld::Impl::count_near_shapes() {
+  const btBroadphasePairArray& pairs =
+      broadphase_.getOverlappingPairCache()->getOverlappingPairArray();
+  int64_t near = 0;
+  for (int i = 0; i < pairs.size(); ++i) {
+    const auto& a = *static_cast<const btCollisionObject*>(pairs[i].m_pProxy0->m_clientObject);
+    const auto& b = *static_cast<const btCollisionObject*>(pairs[i].m_pProxy1->m_clientObject);
+    near += near_shapes(a, b);
+    if (near > kMostPairs) refuse_crowded(info_of(info_of(a).body.valid() ? a : b).body);
+  }
 }
 
 int PhysicsWorld::Impl::substeps_for(int64_t longest_us) const {

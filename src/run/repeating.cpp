@@ -11,6 +11,10 @@ namespace ruedo::run {
 
 Repeating::Repeating(const std::string& path, const Mode* after) : replay_(path), after_(after) {
   log::check_files_of_spawned(path);
+  if (!after_) return;
+  length_ = length_of(path);
+  if (!length_.fault.empty()) throw InputError({path}, "is no snapshot: " + length_.fault);
+  progress_.emplace("restoring " + path, length_.steps);
 }
 
 void Repeating::begin(const Stage& stage, int64_t) {
@@ -20,6 +24,9 @@ void Repeating::begin(const Stage& stage, int64_t) {
 }
 
 Mode::Turn Repeating::turn(int64_t step) {
+  if (step < last_) before_ += last_;
+  last_ = step;
+  if (progress_) progress_->to(before_ + step);
   const Replay::Target target{*stage_.inbox, *stage_.gate,
                               [this](const applied_t& applied) { return input_of(applied); },
                               stage_.base_us - begin_us_};
@@ -46,7 +53,6 @@ void Repeating::executed(const engine::Outcome& outcome) {
 }
 
 void Repeating::check_end(int64_t state_hash) const {
-  if (!replay_.complete()) throw InputError({path()}, "is no snapshot: " + replay_.fault());
   const int64_t saved = replay_.end().state_hash;
   if (saved != 0 && state_hash != saved) {  // 0: saved when that state was past
     throw InputError({path()},

@@ -6,8 +6,10 @@
 // Meanwhile commands are ignored, and requests that change something refused.
 #pragma once
 
+#include <optional>
 #include <string>
 
+#include "core/progress.h"
 #include "run/mode.h"
 #include "run/replay.h"
 
@@ -16,12 +18,14 @@ namespace ruedo::run {
 class Repeating : public Mode {
  public:
   // after: the mode in which the run goes on; null: the run ends with the log. Throws InputError
-  // for what is no log.
+  // for what is no log, and for one that breaks off where the run is to go on.
   Repeating(const std::string& path, const Mode* after);
 
+  // How many steps that takes; known where the run goes on afterwards.
+  int64_t steps() const { return length_.steps; }
   const log_header_t& header() const { return replay_.header(); }
   const std::string& path() const { return replay_.path(); }
-  // Throws InputError when the log does not say that it ends in that state.
+  // Throws InputError when the log says that it ends in another state.
   void check_end(int64_t state_hash) const;
 
   void begin(const Stage& stage, int64_t step) override;
@@ -37,6 +41,9 @@ class Repeating : public Mode {
 
   Replay replay_;
   const Mode* after_;
+  Length length_;                     // where the run goes on afterwards
+  std::optional<Progress> progress_;  // as length_
+  int64_t before_ = 0, last_ = -1;    // steps before sim time was reset, and the last one since
   Stage stage_;
   SimTime begin_us_ = -1;  // the stamp at which the first epoch began; -1: it has not
 };

@@ -2,10 +2,12 @@
 #include "run/replay.h"
 
 #include <algorithm>
+#include <limits>
 
 #include "log/header.h"
 #include "ruedo/decode.h"
 #include "ruedo/errors.h"
+#include "ruedo/reset_request_t.hpp"
 #include "run/journal.h"
 #include "run/request_table.h"
 
@@ -27,6 +29,18 @@ log_header_t first_event(log::Reader& reader, log::Event& event) {
   return header;
 }
 
+bool is_replayed(const std::string& channel) {
+  return channel == kAppliedChannel || channel == kStateHashChannel;
+}
+
+// Sim time is 0 again.
+bool begins_anew(const applied_t& applied) {
+  reset_request_t reset;
+  return applied.kind == request_t::RESET &&
+         decode_checked(applied.data.data(), applied.data.size(), reset) == DecodeFault::none &&
+         reset.what != reset_request_t::POSES;
+}
+
 // Joining and leaving does not affect the world.
 bool acts(int32_t kind) {
   const RequestKind* known = find_request_kind(kind);
@@ -34,6 +48,37 @@ bool acts(int32_t kind) {
 }
 
 }  // namespace
+
+Length length_of(const std::string& path) {
+  log::Reader reader(path);
+  log::Event event;
+  first_event(reader, event);
+  Length length;
+  applied_t applied;
+  state_hash_t hash;
+  int64_t last = 0;  // step of the sim time that was begun last
+  bool ended = false;
+  const auto add_last = [&] {
+    const int64_t room = std::numeric_limits<int64_t>::max() - length.steps;
+    length.steps += std::clamp<int64_t>(last, 0, room);
+    last = 0;
+  };
+  while (reader.next(event, is_replayed)) {
+    const bool acted = event.channel == kAppliedChannel;
+    const DecodeFault fault = acted ? decode_checked(event.data.data(), event.data.size(), applied)
+                                    : decode_checked(event.data.data(), event.data.size(), hash);
+    if (fault != DecodeFault::none) continue;  // Replay refuses it when it comes to it
+    last = std::max(last, acted ? applied.step : hash.step);
+    ended = !acted && hash.last;
+    if (acted && begins_anew(applied)) add_last();
+  }
+  add_last();
+  if (!ended) {
+    length.fault =
+        reader.fault().empty() ? "cut off: the end of the run is not in it" : reader.fault();
+  }
+  return length;
+}
 
 log_header_t read_header(const std::string& path) {
   log::Reader reader(path);
@@ -88,10 +133,7 @@ void Replay::executed() {
 }
 
 void Replay::read(const Target& target) {
-  const bool more = reader_.next(event_, [](const std::string& channel) {
-    return channel == kAppliedChannel || channel == kStateHashChannel;
-  });
-  if (!more) {
+  if (!reader_.next(event_, is_replayed)) {
     ended_ = true;
     end_step_ = end_.last ? end_.step : known_;
     return;
@@ -108,11 +150,6 @@ void Replay::read(const Target& target) {
     if (decode_checked(event_.data.data(), event_.data.size(), end_) != DecodeFault::none)
       damaged("a ruedo/state_hash in it is damaged");
   }
-}
-
-std::string Replay::fault() const {
-  if (complete()) return "";
-  return reader_.fault().empty() ? "cut off: the end of the run is not in it" : reader_.fault();
 }
 
 }  // namespace ruedo::run

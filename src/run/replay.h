@@ -47,10 +47,8 @@ class Replay {
 
   // After advance() returned null: whether that was all.
   bool at_end(int64_t step) const { return ended_ && !waits_ && step >= end_step_; }
-  // Then: whether the log says how the run ended. If so, in what state; if not, why it breaks off.
-  bool complete() const { return end_.last; }
+  // Then: in what state the run ended, where the log says so.
   const state_hash_t& end() const { return end_; }
-  std::string fault() const;
 
  private:
   static constexpr int64_t kAhead = 1024;  // steps that are read ahead of what runs
@@ -68,6 +66,14 @@ class Replay {
   int64_t end_step_ = -1;
   state_hash_t end_{};
 };
+
+// How far a log or a snapshot goes, by what its records say. Nothing of it is run.
+struct Length {
+  int64_t steps = 0;  // of all its sim times, for each reset begins another; INT64_MAX: or more
+  std::string fault;  // why it breaks off; "": the end of the run is in it
+};
+// Throws InputError as Replay does.
+Length length_of(const std::string& path);
 
 // The header of a log. Throws InputError as Replay does.
 log_header_t read_header(const std::string& path);

@@ -119,9 +119,15 @@ Outcome Run::ask(const request_t& request, const Session& session) {
   const RequestKind* kind = find_request_kind(request.kind);
   if (kind && serves(*kind)) {
     std::string refusal = mode().refusal(request.kind, kind->effect == RequestKind::looks);
-    if (!refusal.empty()) return Outcome::refuse(reply_t::REFUSED, std::move(refusal));
+    if (!refusal.empty() && !ends_restore(*kind))
+      return Outcome::refuse(reply_t::REFUSED, std::move(refusal));
   }
   return execute(request, session);
+}
+
+// What a client began a client may end; --restore is the command's own.
+bool Run::ends_restore(const RequestKind& kind) const {
+  return repeating_ && options_.repeat.empty() && kind.kind == request_t::PAUSE;
 }
 
 Outcome Run::execute(const request_t& request, const Session& session) {
@@ -146,6 +152,10 @@ Outcome Run::execute(const request_t& request, const Session& session) {
 }
 
 Outcome Run::pause(const request_t&) {
+  if (repeating_) {
+    control_.cancel(fmt::format("a PAUSE ended it at step {}", publisher_.step()));
+    break_repeat_off();
+  }
   const int64_t last = pacer_->pause();
   control_.cancel_after(last, "a PAUSE ended it at step " + std::to_string(last));
   return Outcome::after(last);

@@ -67,7 +67,8 @@ Run::Run(std::shared_ptr<const model::WorldModel> world, RunOptions options, Bus
     edited_ = std::make_unique<EditedWorld>(*first_world_, options_.save);
   if (options_.watcher) watcher_ = std::make_unique<WatcherSink>(options_.watcher);
   if (!options_.repeat.empty()) {
-    begin_repeat(options_.repeat);
+    begin_repeat(std::make_unique<Repeating>(options_.repeat,
+                                             options_.end_with_repeat ? nullptr : mode_.get()));
     epoch_ = repeating_->header().epoch;
   }
   make_world();
@@ -243,7 +244,8 @@ Run::Clock::time_point Run::attend() {
 }
 
 Status Run::status() const {
-  return {publisher_.step(), publisher_.time_us(), publisher_.messages(), pacer_->paused()};
+  return {publisher_.step(), publisher_.time_us(), publisher_.messages(), pacer_->paused(),
+          repeating_ != nullptr};
 }
 
 void Run::tell_status() {

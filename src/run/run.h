@@ -73,6 +73,7 @@ struct Status {
   SimTime time_us = 0;
   uint64_t messages = 0;
   bool paused = false;
+  bool repeating = false;  // on the way to a snapshot: core/progress.h says how far
 };
 
 class Run {
@@ -160,16 +161,18 @@ class Run {
   Mode::Stage stage();
   Mode& mode() { return repeating_ ? static_cast<Mode&>(*repeating_) : *mode_; }
   const Mode& mode() const { return repeating_ ? static_cast<const Mode&>(*repeating_) : *mode_; }
-  void begin_repeat(const std::string& path);  // throws InputError
-  void take_turn();                            // what the mode wants done at this state
-  std::string take_turns();                    // why what is repeated broke off; "": it did not
+  void begin_repeat(std::unique_ptr<Repeating> repeating);
+  void take_turn();          // what the mode wants done at this state
+  std::string take_turns();  // why what is repeated broke off; "": it did not
   void end_repeat(bool paused);
+  void break_repeat_off();  // the world stays where it is, paused
 
   // Requests; in requests.cpp, and those of snapshots in snapshot_requests.cpp. Those of clients go
   // through ask(), those of a log are executed.
   Outcome ask(const request_t& request, const Session& session);
   Outcome execute(const request_t& request, const Session& session);
   bool serves(const RequestKind& kind) const;
+  bool ends_restore(const RequestKind& kind) const;
   int64_t features() const;
   void note(const request_t& request);  // in the log: it changed the state
   void note_files(const std::vector<std::string>&

@@ -75,9 +75,7 @@ Mode::Stage Run::stage() {
           }};
 }
 
-void Run::begin_repeat(const std::string& path) {
-  auto repeating =
-      std::make_unique<Repeating>(path, options_.end_with_repeat ? nullptr : mode_.get());
+void Run::begin_repeat(std::unique_ptr<Repeating> repeating) {
   if (pacer_) wanted_ = {pacer_->rate(), pacer_->paused()};
   options_.simulation.fleet.seed = static_cast<uint64_t>(repeating->header().seed);
   const std::lock_guard lock(simulation_mutex_);
@@ -91,16 +89,15 @@ std::string Run::take_turns() {
     return "";
   } catch (const InputError& error) {
     if (!options_.repeat.empty()) throw;
-    // The client that asked is told, and the world stays where it is.
-    control_.cancel(error.what());
+    control_.cancel(error.what());  // the client that asked is told
     spdlog::error("{}. The run is paused", error.what());
-    end_repeat(true);
+    break_repeat_off();
     return error.what();
   }
 }
 
 void Run::take_turn() {
-  for (;;) {
+  while (!stop_) {
     const Mode::Turn turn = mode().turn(publisher_.step());
     switch (turn.what) {
       case Mode::Turn::What::nothing: return;
@@ -113,6 +110,12 @@ void Run::take_turn() {
         break;
     }
   }
+}
+
+// What was read ahead of it does not act any more.
+void Run::break_repeat_off() {
+  simulation_->inbox().clear();
+  end_repeat(true);
 }
 
 void Run::end_repeat(bool paused) {

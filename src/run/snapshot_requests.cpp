@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <string_view>
 
+#include <fmt/format.h>
 #include <spdlog/spdlog.h>
 
 #include "engine/world_state.h"
@@ -161,10 +162,21 @@ Outcome Run::restore(const request_t& request, const name_request_t& body) {
   if (const SavedState* saved = saved_states_.find(path)) return restore_kept(*saved, path);
   try {
     if (const std::optional<SavedState> saved = read_state(path)) return restore_kept(*saved, path);
+    auto repeating = std::make_unique<Repeating>(path, mode_.get());
+    const log_header_t& header = repeating->header();
+    log::check_same_run(header, header_, path);
+    if (repeating->steps() > kMostSteps) {
+      return Outcome::refuse(reply_t::REFUSED,
+                             fmt::format("{} is {} steps from its beginning; RESTORE goes {} at "
+                                         "most, and `ruedo run --restore` as many as it takes",
+                                         path, repeating->steps(), kMostSteps));
+    }
+    spdlog::info(
+        "{} has no state that can be taken over as it is: the world runs there again, {} "
+        "steps; PAUSE ends it",
+        path, repeating->steps());
     reset_request_t reset;
     reset.what = reset_request_t::ALL;
-    const log_header_t header = read_header(path);
-    log::check_same_run(header, header_, path);
     reset.seed = header.seed == header_.seed ? -1 : header.seed;
     control_.cancel("a snapshot is restored");
     request_t noted = request;
@@ -172,7 +184,7 @@ Outcome Run::restore(const request_t& request, const name_request_t& body) {
     noted.body = engine::encoded(reset);
     noted.size = static_cast<int32_t>(noted.body.size());
     note(noted);
-    begin_repeat(path);
+    begin_repeat(std::move(repeating));
   } catch (const InputError& error) {
     return Outcome::refuse(reply_t::REFUSED, error.what());
   }

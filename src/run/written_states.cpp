@@ -8,6 +8,7 @@
 
 #include <spdlog/spdlog.h>
 
+#include "core/message_size.h"
 #include "core/seal.h"
 #include "engine/world_state.h"
 #include "log/reader.h"
@@ -84,7 +85,7 @@ std::vector<uint8_t> Run::written_state() {
     const std::optional<Seal> seal = seal_of(bytes);
     if (!seal) return {};
     bytes.insert(bytes.end(), seal->begin(), seal->end());
-    return bytes;
+    return bytes.size() > kLargestMessage ? std::vector<uint8_t>{} : bytes;
   } catch (const ArchiveError& error) {
     spdlog::debug("the snapshot has no state in it: {}", error.what());
     return {};
@@ -126,8 +127,9 @@ void Run::begin_with_state() {
   const std::optional<SavedState> saved = read_state(path);
   if (!saved || saved->seed != options_.simulation.fleet.seed ||
       saved->sequences.size() != publisher_.sequences().size()) {
-    spdlog::info("{} has no state that can be taken over as it is: the world runs there again",
-                 path);
+    spdlog::info(
+        "{} has no state that can be taken over as it is: the world runs there again, {} steps",
+        path, repeating_->steps());
     return;
   }
   {

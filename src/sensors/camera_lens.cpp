@@ -5,24 +5,25 @@
 
 #include <opencv2/imgproc.hpp>
 
+#include "core/message_size.h"
 #include "core/whole.h"
 #include "ruedo/math.h"
 
 namespace ruedo {
 namespace {
 
-constexpr double kMaxPixels = 8192;  // width and height
 // The width of a pinhole's picture goes to infinity towards 180 degrees.
 constexpr double kMaxHfov = 3.0;
 // Maximum size of the ideal picture relative to the lens's.
 constexpr double kMaxGrowth = 2.5;
+constexpr int64_t kMostDistorted = 12'000'000;  // pixels: each is found by iteration, in about 1 us
 
 }  // namespace
 
 Lens::Lens(const Element& camera) {
-  width = static_cast<int>(camera.integer("image/width", width, Allowed::between(1, kMaxPixels)));
+  width = static_cast<int>(camera.integer("image/width", width, Allowed::between(1, kMostPixels)));
   height =
-      static_cast<int>(camera.integer("image/height", height, Allowed::between(1, kMaxPixels)));
+      static_cast<int>(camera.integer("image/height", height, Allowed::between(1, kMostPixels)));
   hfov = camera.number("horizontal_fov", hfov,
                        Allowed{.min = 0.0, .max = kMaxHfov, .min_excluded = true});
   near_m = camera.number("clip/near", near_m, Allowed::positive(quantity::kRange));
@@ -46,6 +47,10 @@ Lens::Lens(const Element& camera) {
     const Allowed range = Allowed::between(-10.0, 10.0);
     distortion = {d->number("k1", 0, range), d->number("k2", 0, range), d->number("p1", 0, range),
                   d->number("p2", 0, range), d->number("k3", 0, range)};
+    if (int64_t{width} * height > kMostDistorted)
+      d->fail("a picture of " + std::to_string(width) + " x " + std::to_string(height) +
+              " pixels is not distorted; at most " + std::to_string(kMostDistorted) +
+              " pixels are");
   }
 }
 

@@ -12,6 +12,7 @@
 
 #include <opencv2/imgproc.hpp>
 
+#include "core/message_size.h"
 #include "ruedo/image_t.hpp"
 #include "ruedo/math.h"
 #include "sensors/camera_view.h"
@@ -156,9 +157,9 @@ class WideAngleCamera : public Sensor {
 
  private:
   void read_picture(const Element& camera, const SensorSetup& setup) {
-    constexpr double kMost = 8192;
-    width_ = static_cast<int>(camera.integer("image/width", 320, Allowed::between(1, kMost)));
-    height_ = static_cast<int>(camera.integer("image/height", 240, Allowed::between(1, kMost)));
+    width_ = static_cast<int>(camera.integer("image/width", 320, Allowed::between(1, kMostPixels)));
+    height_ =
+        static_cast<int>(camera.integer("image/height", 240, Allowed::between(1, kMostPixels)));
     hfov_ = camera.number("horizontal_fov", 1.047,
                           Allowed{.min = 0, .max = 2 * M_PI, .min_excluded = true});
     view_.near_m = camera.number("clip/near", 0.1, Allowed::positive(quantity::kRange));

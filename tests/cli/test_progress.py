@@ -7,6 +7,8 @@ import os
 import pty
 import re
 import shutil
+import signal
+import struct
 import subprocess
 
 import pytest
@@ -16,8 +18,10 @@ QUICK = ("--disable", "p3at/camera")
 PLAIN = {k: v for k, v in os.environ.items() if not k.startswith("RUEDO_PROGRESS")}
 
 
-def on_terminal(*words, after="0"):
-    """(exit code, what a terminal was sent) of the program."""
+def on_terminal(*words, after="0", until=None):
+    """(exit code, what a terminal was sent) of the program. It is asked to end when it said
+    `until`.
+    """
     here, there = pty.openpty()
     environment = {**PLAIN, "TERM": "xterm", "NO_COLOR": "1"}
     if after is not None:
@@ -39,6 +43,9 @@ def on_terminal(*words, after="0"):
         if not chunk:
             break
         said += chunk
+        if until and re.search(until, said.decode(errors="ignore")):
+            child.send_signal(signal.SIGTERM)
+            until = None
     os.close(here)
     return child.wait(60), said.decode()
 
@@ -136,3 +143,19 @@ def test_a_run_has_its_own_line():
     code, said = on_terminal(*words, "--quiet")
     assert code == 0 and "\x1b" not in said, said
     assert program(*words, "--quiet").stderr == ""
+
+
+def test_the_way_to_a_snapshot_says_how_far_it_is(log, tmp_path):
+    """A stranger's may be hours away: what is left is told, and a signal ends it."""
+    data = bytearray(log.read_bytes())
+    end = data.rindex(b"ruedo/state_hash") + len("ruedo/state_hash")
+    # A state_hash_t: fingerprint, utime and step.
+    data[end + 16 : end + 24] = struct.pack(">q", 10**9)
+    far = tmp_path / "far.snapshot"
+    far.write_bytes(data)
+    code, said = on_terminal(
+        *("run", ARENA, *QUICK, "--restore", far, "--lcm", "memq://"),
+        until=r"far.snapshot: 0 %, \d+:\d\d h left",
+    )
+    assert code == 0, said
+    assert "the world runs there again, 1000000000 steps" in said

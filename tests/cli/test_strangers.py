@@ -157,6 +157,14 @@ def tiff(width, height):
     )
 
 
+def many_shapes():
+    """Two bodies of 700 boxes each, all in one place."""
+    box = "<collision name='c{}'><geometry><box><size>1 1 1</size></box></geometry></collision>"
+    link = "<link name='l'>" + "".join(box.format(i) for i in range(700)) + "</link>"
+    models = "".join(f"<model name='m{i}'>{link}</model>" for i in range(2))
+    return f"<sdf version='1.9'><world name='w'>{models}</world></sdf>".encode()
+
+
 COSTLY = {
     "a large TIFF as a map": (
         "map.tiff",
@@ -191,6 +199,13 @@ COSTLY = {
             + "</world></sdf>"
         ).encode(),
         ["check", "{0}"],
+        "200000 pairs",
+    ),
+    "shapes in one another": ("w.sdf", many_shapes(), ["check", "{0}"], "200000 pairs"),
+    "shapes in one another, at work": (
+        "w.sdf",
+        many_shapes(),
+        ["run", "{0}", "--duration", "0.1", "--lcm", "memq://"],
         "200000 pairs",
     ),
     "depth": (
@@ -241,6 +256,35 @@ def test_what_costs_much_is_refused(name, tmp_path):
         *[a.format(tmp_path / file) for a in arguments], preexec_fn=three_gigabytes
     )  # what is refused is never made
     assert result.returncode == 3 and words in result.stdout + result.stderr, result
+
+
+def test_a_large_picture_is_not_distorted(tmp_path):
+    """Where each pixel lies is found by iteration: a minute for 8192 x 8192."""
+    image = "<image><width>8192</width><height>{}</height></image>"
+    camera = "<camera>{}<distortion><k1>0.1</k1></distortion></camera>"
+    sensor = "<sensor name='s' type='camera'>{}</sensor>"
+    for height, code, words in (
+        (1465, 1, "8192 x 1465 pixels is not distorted; at most 12000000 pixels are"),
+        (8, 0, "good"),
+    ):
+        (tmp_path / "w.sdf").write_text(
+            "<sdf version='1.9'><world name='w'><model name='m'><link name='l'>"
+            + sensor.format(camera.format(image.format(height)))
+            + "</link></model></world></sdf>"
+        )
+        result = program("check", tmp_path / "w.sdf")
+        assert result.returncode == code and words in result.stdout, result
+
+
+def test_people_may_walk_a_million_metres(tmp_path):
+    """Their floor is divided into blocks, whose number was that of its square metres."""
+    (tmp_path / "w.sdf").write_text(
+        "<sdf version='1.9' xmlns:ruedo='ruedo'><world name='w'><ruedo:crowd name='p'>"
+        "<ruedo:count>10</ruedo:count><ruedo:area>-1e6 -1e6 1e6 1e6</ruedo:area>"
+        "</ruedo:crowd></world></sdf>"
+    )
+    result = program("check", tmp_path / "w.sdf", preexec_fn=three_gigabytes)
+    assert result.returncode == 0, result
 
 
 # As where a container or `ulimit -u` allows so many at a time.

@@ -124,6 +124,15 @@ BAD = {
     "times of an actor out of order": (trajectory(1, 0), None),
     **{f"time of an actor {v}": (trajectory(0, v), "time") for v in HUGE},
     "mass of nothing": (link("<inertial><mass>1e-300</mass></inertial>"), None),
+    "three hundred faults that multiply": (
+        world(
+            "<include><uri>model://p3at</uri></include>"
+            + "<ruedo:fault><ruedo:robot>p3at</ruedo:robot><ruedo:target>left</ruedo:target>"
+            "<ruedo:kind>wheel_slip</ruedo:kind><ruedo:at>0</ruedo:at><ruedo:value>0.95</ruedo:value>"
+            "</ruedo:fault>" * 300
+        ),
+        None,
+    ),
     "axis of a heavy world": (joint(mass="1e9"), None),
     **{
         name: (text, None)
@@ -200,3 +209,29 @@ def test_a_robot_that_stands_in_a_wall_is_named(x, stuck, tmp_path):
     assert checked.returncode == stuck
     spawned = ruedo("check", str(Path(os.environ["RUEDO_SOURCE_DIR"]) / "worlds/arena.sdf"))
     assert spawned.returncode == 0, spawned
+
+
+@pytest.mark.parametrize("value", ["nan", "-nan", "inf", "1e300", "1e10000"])
+@pytest.mark.parametrize(
+    "words",
+    [
+        "map w.sdf -o m.yaml --resolution",
+        "map w.sdf -o m.yaml --height",
+        "play a.lcm --html a.html --html-size",
+        "regress w.sdf --record a.lcm --clearance",
+        "regress w.sdf --record a.lcm --odometry-error",
+        "regress w.sdf --record a.lcm --clearance-reach",
+        "echo --timeout",
+        "run w.sdf --lease",
+        "run w.sdf --duration",
+        "run w.sdf --rate",
+    ],
+)
+def test_what_is_no_number_is_named(words, value, tmp_path):
+    """A NaN lies in no range: an expectation with it would hold, a map be cut nowhere."""
+    done = subprocess.run(
+        [RUEDO, *words.split(), value], capture_output=True, text=True, cwd=tmp_path, timeout=60
+    )
+    option = words.split()[-1]
+    assert done.returncode in (2, 3), done
+    assert option in done.stderr and value in done.stderr, done

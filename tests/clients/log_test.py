@@ -57,10 +57,27 @@ def test_a_log_that_was_cut_off_is_read_up_to_there(language, log, tmp_path):
     before = events(data)[-2]
     cut.write_bytes(data[:last] + b"\x00" * 40)
     assert probe(language, "-", "log", str(cut)).one("fault") == f"it is damaged at byte {last}"
-    lying = data[:last] + data[before : before + 24] + b"\x3f\xff\xff\xff" + b"\x00" * 40
+    lying = data[:last] + data[before : before + 24] + b"\x0f\xff\xff\xff" + b"\x00" * 40
     cut.write_bytes(lying)
     said = probe(language, "-", "log", str(cut))
     assert said.one("fault") == f"it was cut off in the event that begins at byte {last}"
+
+
+LARGEST = 8192 * 8192 * 4 + 65536  # the largest picture, and what describes it
+
+
+def test_a_message_that_no_run_sends_is_damage(language, log, tmp_path):
+    """Each byte of it is there, and takes no room on the disk: read, it would take memory."""
+    if language == "python":  # see test_read_log_warns_where_a_log_is_damaged
+        return
+    data = log.read_bytes()
+    path = tmp_path / "sparse.lcm"
+    for size in (LARGEST + 1, 1 << 30):
+        head = data[:20] + (6).to_bytes(4, "big") + size.to_bytes(4, "big") + b"sparse"
+        path.write_bytes(data + head)
+        os.truncate(path, len(data) + len(head) + size)
+        said = probe(language, "-", "log", str(path))
+        assert said.one("fault") == f"it is damaged at byte {len(data)}"
 
 
 def test_what_is_no_log_is_said(language, tmp_path):
@@ -110,12 +127,16 @@ def test_read_log_warns_where_a_log_is_damaged(tmp_path, log, caplog):
     middle = places[len(places) // 2]
     damaged = bytearray(data)
     damaged[middle + 1] ^= 1
+    too_large = (LARGEST + 1).to_bytes(4, "big")
     for bad, why in (
         (damaged, f"it is damaged at byte {middle}"),
         (data[: middle + 30], f"it was cut off in the event that begins at byte {middle}"),
+        (data[: middle + 24] + too_large, f"it is damaged at byte {middle}"),
     ):
         path = tmp_path / "bad.lcm"
         path.write_bytes(bad)
+        if bad[middle + 24 :] == too_large:
+            os.truncate(path, middle + 2 * LARGEST)
         caplog.clear()
         frames = ruedo.read_log(path)
         assert caplog.messages == [f"{path}: {why}"]

@@ -348,6 +348,9 @@ def test_a_compressed_one_says_how_it_is_read(tmp_path):
     assert "is compressed (zstd)" in refused(tmp_path / "run.mcap")
 
 
+MAGIC = b"\x89MCAP0\r\n"
+
+
 def test_damaged_bags_end_in_one_line(logged, tmp_path):
     """Cut off at any byte, and with any byte another one: said, or shown as far as it goes."""
     whole = (logged / "run/run_0.mcap").read_bytes()
@@ -366,6 +369,32 @@ def test_damaged_bags_end_in_one_line(logged, tmp_path):
         )
         assert done.returncode in (0, 3) and len(done.stderr.splitlines()) <= 1, place
         assert done.stderr == "" or str(bad) in done.stderr or "ruedo-bag-" in done.stderr
+
+
+@pytest.mark.parametrize("operation", [3, 4, 5, 6])  # schema, channel, message, chunk
+def test_a_record_that_no_bag_has_takes_no_memory(operation, tmp_path):
+    """Sparse: on the disk it takes no room either. A chunk ends with a message, the largest of
+    which is a picture of 8192 x 8192 pixels."""
+    most = 2 * (8192 * 8192 * 4 + 65536)
+    bad = tmp_path / "bad.mcap"
+    bad.write_bytes(MAGIC + bytes([operation]) + (most + 1).to_bytes(8, "little"))
+    os.truncate(bad, 17 + most + 1)
+    line = refused(bad)
+    assert f"has a record of {most + 1} bytes (at most {most} are allowed) at byte 8" in line
+
+
+def test_names_take_no_more_memory_than_names_need(tmp_path):
+    bad = tmp_path / "bad.mcap"
+    size = 40 << 20
+    with bad.open("wb") as file:
+        file.write(MAGIC)
+        for number in (1, 1, 2):  # the same one again takes no more
+            at = file.tell()
+            file.write(b"\x03" + size.to_bytes(8, "little") + number.to_bytes(2, "little"))
+            file.truncate(at + 9 + size)
+            file.seek(at + 9 + size)
+    line = refused(bad)
+    assert f"has more than {64 << 20} bytes of schemas and channels at byte {at}" in line
 
 
 def test_what_lies_beside_the_topics_is_read_and_written_by_others(logged, tmp_path):

@@ -263,6 +263,31 @@ TEST_F(RepeatingTest, GoesFromRequestToRequestAndEnds) {
   EXPECT_THROW(repeating.check_end(4712), InputError);
 }
 
+// How long it takes is known before it begins: each reset of the time begins another count.
+TEST_F(RepeatingTest, KnowsItsLength) {
+  const Live after({}, kStep_us);
+  const Repeating repeating(file_.path(), &after);
+  EXPECT_EQ(repeating.steps(), 20 + 30);
+  const auto progress = Progress::latest();
+  ASSERT_TRUE(progress);
+  EXPECT_EQ(progress->what, "restoring " + file_.path());
+  EXPECT_EQ(progress->whole, 50);
+}
+
+TEST_F(RepeatingTest, SaysHowFarItIs) {
+  const Live after({}, kStep_us);
+  Repeating repeating(file_.path(), &after);
+  repeating.begin(world_.stage(), -1);
+  repeating.turn(-1);
+  repeating.turn(20);
+  EXPECT_EQ(Progress::latest()->done, 20);
+  repeating.begin(world_.stage(20 * kStep_us), -1);
+  repeating.executed({});
+  repeating.turn(-1);
+  repeating.turn(7);
+  EXPECT_EQ(Progress::latest()->done, 20 + 7);
+}
+
 TEST_F(RepeatingTest, IsNotDisturbed) {
   const Live after({}, kStep_us);
   Repeating repeating(file_.path(), &after);

@@ -4,15 +4,21 @@
 #include <atomic>
 #include <filesystem>
 #include <fstream>
+#include <limits>
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include "control_client.h"
 #include "core/input_file.h"
+#include "log/reader.h"
+#include "log/writer.h"
 #include "ruedo/rate_request_t.hpp"
+#include "ruedo/state_hash_t.hpp"
 #include "ruedo/tick_t.hpp"
 #include "ruedo/velocity_command_t.hpp"
 #include "ruedo/world_state_t.hpp"
+#include "run/replay.h"
 #include "run/saved_states.h"
 
 namespace ruedo::run {
@@ -122,6 +128,26 @@ class RestoreTest : public testing::Test, protected Controlled {
     }
     EXPECT_GT(sent.size(), 300u);
     return sent;
+  }
+  // Makes the file a stranger's, of a run that ended at that step.
+  void lead_to(const std::string& name, int64_t step) const {
+    std::vector<log::Event> events;
+    {
+      log::Reader reader(file(name));
+      for (log::Event event; reader.next(event);)
+        if (event.channel != kStateChannel) events.push_back(event);
+    }
+    auto end = decoded_as<state_hash_t>(events.back().data);
+    end.step = step;
+    events.back().data = engine::encoded(end);
+    log::Writer writer(file(name));
+    for (const log::Event& event : events)
+      writer.write(event.timestamp_us, event.channel, event.data.data(), event.data.size());
+  }
+  request_t restoring(const std::string& name) {
+    name_request_t body;
+    body.name = name;
+    return request(request_t::RESTORE, engine::encoded(body));
   }
   std::string file(const std::string& name) const { return folder_ + "/" + name + ".snapshot"; }
 
@@ -323,6 +349,59 @@ TEST_F(RestoreTest, ARunThatDoesNotStandStillIsSavedAndPutBack) {
   }
   ask(request_t::PAUSE);
   EXPECT_FALSE(restore("here"));
+}
+
+// Hours away. The command that was read ahead does not act on what is there then.
+TEST_F(RestoreTest, APauseEndsTheWayToAStateThatIsFarAway) {
+  start_paused();
+  step(100);
+  saved_ = save("far");
+  lead_to("far", kMostSteps);
+  const request_t restore = restoring("far");
+  send(restore);
+  for (int i = 0; i < 10'000 && (state().step < 10 || info().epoch == 0); ++i) {
+  }
+  rate_request_t rate;
+  rate.rate = 2;
+  const reply_t refused = ask(request_t::RATE, engine::encoded(rate));
+  EXPECT_EQ(refused.code, reply_t::REFUSED) << "by others, who are told why";
+  EXPECT_THAT(refused.text, testing::HasSubstr("is being restored"));
+  const request_t pause = request(request_t::PAUSE);
+  send(pause);
+  const reply_t ended = answer(restore);
+  EXPECT_EQ(ended.code, reply_t::REFUSED);
+  EXPECT_THAT(ended.text, testing::HasSubstr("a PAUSE ended it at step "));
+  const reply_t paused = answer(pause);
+  EXPECT_EQ(paused.code, reply_t::OK) << paused.text;
+  const auto there = decoded_as<state_reply_t>(paused.body);
+  EXPECT_TRUE(there.paused);
+  EXPECT_LT(there.step, kMostSteps);
+  EXPECT_EQ(step(3).step, there.step + 3) << "the run goes on from there";
+}
+
+TEST_F(RestoreTest, WhatIsTooFarOrBreaksOffIsRefusedBeforeAnythingChanges) {
+  TemporaryFile log("refused.lcm");
+  RunOptions options = paused_server();
+  options.record = log.path();
+  start_paused(options);
+  step(100);
+  saved_ = save("far");
+  const auto refused = [&](const std::string& why) {
+    const reply_t reply = named(request_t::RESTORE, "far");
+    EXPECT_EQ(reply.code, reply_t::REFUSED);
+    EXPECT_THAT(reply.text, testing::HasSubstr(why));
+    EXPECT_EQ(info().epoch, 0);
+    EXPECT_EQ(state().state_hash, saved_.state_hash);
+  };
+  for (const int64_t steps : {kMostSteps + 1, std::numeric_limits<int64_t>::max()}) {
+    lead_to("far", steps);
+    refused("far.snapshot is " + std::to_string(steps) +
+            " steps from its beginning; RESTORE goes 1000000000 at most");
+  }
+  fs::resize_file(file("far"), fs::file_size(file("far")) - 1);
+  refused("far.snapshot: is no snapshot: cut off in the event that begins at byte ");
+  end();
+  EXPECT_EQ(length_of(log.path()).steps, 100) << "the log has no reset that was none";
 }
 
 }  // namespace

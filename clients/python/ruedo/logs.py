@@ -22,7 +22,8 @@ HEADER_CHANNEL, APPLIED_CHANNEL, STATE_HASH_CHANNEL = (
     "ruedo/applied",
     "ruedo/state_hash",
 )
-LONGEST_CHANNEL, LARGEST = 1000, 1 << 30  # bytes; as `ruedo` itself reads them
+# Bytes, as `ruedo` itself reads them: the largest message is a picture of 8192 x 8192 pixels.
+LONGEST_CHANNEL, LARGEST = 1000, 8192 * 8192 * 4 + 65536
 log = logging.getLogger("ruedo")
 
 
