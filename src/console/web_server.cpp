@@ -16,6 +16,7 @@
 #include <cstring>
 #include <functional>
 #include <map>
+#include <utility>
 
 #include <libwebsockets.h>
 #include <spdlog/spdlog.h>
@@ -32,6 +33,7 @@ constexpr lws_usec_t kIdleTick_us = 250'000;
 constexpr lws_usec_t kFarewell_us = 300'000;                 // for the last messages to viewers
 constexpr auto kLookPause = std::chrono::milliseconds(100);  // a look takes a few milliseconds
 constexpr size_t kMostOver = 32;  // that a limit is exceeded by, until the next look
+constexpr auto kMostStuck = std::chrono::seconds(5);
 constexpr size_t kChunk = 64 * 1024;
 constexpr int kMostStarts = 5;
 constexpr lws_retry_bo_t kIdlePolicy = {nullptr, 0,  0,
@@ -66,6 +68,7 @@ int checked_port(const WebPlace& place) {
 }  // namespace
 
 struct WebServer::Impl {
+  using Time = std::chrono::steady_clock::time_point;
   struct Peer {                              // a connection
     uint64_t number = 0;                     // in the order in which they came
     bool silent = true;                      // it has not sent a request yet
@@ -74,6 +77,13 @@ struct WebServer::Impl {
     bool ends = false;                       // the connection, with it
     std::unique_ptr<Connection> connection;  // null: it is no WebSocket
     std::vector<uint8_t> incoming;           // what has come of its next message
+    size_t held = 0;  // bytes that were made for it alone, and are not known to be sent
+    Time held_since;
+
+    void hold(size_t bytes) {
+      held = bytes;
+      held_since = std::chrono::steady_clock::now();
+    }
   };
   struct Timer {
     lws_sorted_usec_list_t entry{};  // must be the first member: libwebsockets returns its address
@@ -87,8 +97,9 @@ struct WebServer::Impl {
   lws_vhost* vhost = nullptr;
   Timer timer;
   std::map<lws*, Peer> peers;
-  uint64_t number = 0;                              // of the newest
-  std::chrono::steady_clock::time_point next_look;  // at who has most
+  uint64_t number = 0;     // of the newest
+  Time next_look;          // at who has most
+  bool postponed = false;  // somebody's message, until there is room
   std::vector<uint8_t> message;
   std::atomic<bool> stopping{false};
   bool over = false;
@@ -120,6 +131,8 @@ struct WebServer::Impl {
   }
   void welcome(lws* wsi);
   void keep_to_limits();
+  size_t held() const;
+  void make_room();
   void dismiss(lws* wsi);
   int establish(lws* wsi, Peer& peer);
   void ask_to_write();
@@ -185,6 +198,7 @@ void WebServer::Impl::welcome(lws* wsi) {
   peers[wsi].number = ++number;
   const std::vector<lws*> silent = oldest_first([](const Peer& peer) { return peer.silent; });
   if (silent.size() > kMostSilent) dismiss(silent.front());
+  keep_to_limits();
 }
 
 // Where there are too many, those who have most give way.
@@ -202,6 +216,22 @@ void WebServer::Impl::keep_to_limits() {
   keep(oldest_first([](const Peer& peer) { return peer.connection != nullptr; }),
        place.most_sockets);
   keep(oldest_first([](const Peer&) { return true; }), kMostConnections);
+}
+
+size_t WebServer::Impl::held() const {
+  size_t bytes = 0;
+  for (const auto& [wsi, peer] : peers) bytes += peer.held;
+  return bytes;
+}
+
+// Who takes nothing while there is no room for others gives way.
+void WebServer::Impl::make_room() {
+  const Time latest = std::chrono::steady_clock::now() - kMostStuck;
+  const auto is_stuck = [&](const Peer& peer) { return peer.held > 0 && peer.held_since < latest; };
+  for (lws* each : oldest_first(is_stuck)) {
+    if (held() > kMostHeld) dismiss(each);
+  }
+  if (std::exchange(postponed, false)) ask_to_write();
 }
 
 // libwebsockets may put this off, but serves it no more.
@@ -233,6 +263,7 @@ void WebServer::Impl::on_timer(lws_sorted_usec_list_t* entry) {
     return;
   }
   impl.keep_to_limits();
+  impl.make_room();
   if (impl.handler.tick()) impl.ask_to_write();
   lws_sul_schedule(impl.context, 0, entry, &on_timer, impl.sockets() > 0 ? kTick_us : kIdleTick_us);
 }
@@ -252,7 +283,13 @@ int WebServer::Impl::request(lws* wsi, Peer& peer, std::string_view path) {
     return respond(wsi, peer, text(405, "Only GET is served here.\n"));
   if (const std::string why = refusal(wsi, false); !why.empty())
     return respond(wsi, peer, text(403, why + "\n"));
-  return respond(wsi, peer, handler.get(path));
+  HttpResponse response = handler.get(path);
+  if (response.body.use_count() == 1) {
+    if (held() > kMostHeld)
+      return respond(wsi, peer, text(503, "Too much is sent now: ask again.\n"));
+    peer.hold(response.body->size());
+  }
+  return respond(wsi, peer, std::move(response));
 }
 
 int WebServer::Impl::respond(lws* wsi, Peer& peer, HttpResponse response) {
@@ -288,6 +325,7 @@ int WebServer::Impl::respond(lws* wsi, Peer& peer, HttpResponse response) {
 
 int WebServer::Impl::completed(lws* wsi, Peer& peer) {
   peer.body.reset();
+  peer.held = 0;
   return peer.ends || lws_http_transaction_completed(wsi) != 0 ? -1 : 0;
 }
 
@@ -320,9 +358,15 @@ int WebServer::Impl::receive(lws* wsi, Peer& peer, const uint8_t* data, size_t s
 
 int WebServer::Impl::write(lws* wsi, Peer& peer) {
   if (!peer.connection) return -1;
+  peer.held = 0;  // libwebsockets asks for more when all before is sent
+  if (held() > kMostHeld) {
+    postponed = true;
+    return 0;
+  }
   message.assign(LWS_PRE, 0);
   bool text = false;
   if (!peer.connection->next(message, text)) return 0;
+  peer.hold(message.size());
   if (lws_write(wsi, message.data() + LWS_PRE, message.size() - LWS_PRE,
                 text ? LWS_WRITE_TEXT : LWS_WRITE_BINARY) < 0)
     return -1;

@@ -63,7 +63,10 @@ class WebServer {
       64;  // of those that have sent no request yet; beyond, the oldest is closed
   static constexpr size_t kMostMessage = size_t{1}
                                          << 20;  // bytes that a browser may send as one message
-  static constexpr size_t kMostHeaders = 4096;   // bytes of a request's headers
+  // Made for single ones and not sent yet. Where there is more, the others wait, and who takes
+  // nothing gives way.
+  static constexpr size_t kMostHeld = size_t{128} << 20;
+  static constexpr size_t kMostHeaders = 4096;  // bytes of a request's headers
 
   // Binds the port. Throws EnvironmentError, with the remedy, if it is not available.
   WebServer(WebPlace place, WebHandler handler);

@@ -3,12 +3,17 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <array>
 #include <atomic>
 #include <barrier>
 #include <memory>
 #include <mutex>
 #include <thread>
+#include <utility>
+
+#include <netinet/in.h>
+#include <sys/socket.h>
 
 #include <fmt/format.h>
 
@@ -20,6 +25,7 @@
 #include "console/tap.h"
 #include "console/viewer.h"
 #include "console/web_server.h"
+#include "core/file_handle.h"
 #include "ruedo/applied_t.hpp"
 #include "ruedo/collisions_t.hpp"
 #include "ruedo/contact_t.hpp"
@@ -133,6 +139,69 @@ TEST(WebServer, TwoThatWantOnePortAtOnceAreToldWhatIsWrong) {
 
 TEST(WebServer, ThoseThatTakeAnyPortAllHaveOne) {
   for (int round = 0; round < 20; ++round) EXPECT_THAT(started_at_once(4, 0), testing::IsEmpty());
+}
+
+// Of those who have been given something and are still there.
+struct Given {
+  std::atomic<int> now{0}, most{0};
+};
+
+// Has always more to say.
+class Talker : public Connection {
+ public:
+  static constexpr size_t kSize = size_t{8} << 20;
+
+  explicit Talker(Given& given) : given_(given) {}
+  ~Talker() override { given_.now -= has_; }
+  bool receive(std::span<const uint8_t>) override { return true; }
+  bool next(std::vector<uint8_t>& message, bool&) override {
+    message.resize(message.size() + kSize);
+    given_.now += !std::exchange(has_, true);
+    given_.most = std::max(given_.most.load(), given_.now.load());
+    return true;
+  }
+
+ private:
+  Given& given_;
+  bool has_ = false;
+};
+
+FileHandle viewer_of(int port) {
+  FileHandle one(::socket(AF_INET, SOCK_STREAM, 0));
+  sockaddr_in place{};
+  place.sin_family = AF_INET;
+  place.sin_port = htons(static_cast<uint16_t>(port));
+  place.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+  EXPECT_EQ(::connect(one.get(), reinterpret_cast<sockaddr*>(&place), sizeof place), 0);
+  const std::string upgrade = fmt::format(
+      "GET /socket HTTP/1.1\r\nHost: 127.0.0.1:{}\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n"
+      "Sec-WebSocket-Version: 13\r\nSec-WebSocket-Key: AAAAAAAAAAAAAAAAAAAAAA==\r\n\r\n",
+      port);
+  EXPECT_EQ(write_all(one.get(), upgrade.data(), upgrade.size()), upgrade.size());
+  return one;
+}
+
+// 40 of 8 MB each.
+TEST(WebServer, ThoseWhoReadNothingTakeLittleMemoryAndGiveWay) {
+  Given given;
+  WebPlace place;
+  place.address.port = 0;
+  WebHandler handler;
+  handler.open = [&] { return std::make_unique<Talker>(given); };
+  handler.end = [] {};
+  handler.tick = [] { return false; };
+  WebServer server(place, std::move(handler));
+  std::jthread thread([&] { server.run(); });
+  std::vector<FileHandle> deaf;
+  for (int i = 0; i < 40; ++i) deaf.push_back(viewer_of(server.port()));
+  const FileHandle reader = viewer_of(server.port());
+  std::vector<uint8_t> bytes(1 << 20);
+  size_t read = 0;
+  for (ssize_t more = 1; more > 0 && read < 3 * Talker::kSize; read += static_cast<size_t>(more))
+    more = std::max<ssize_t>(0, ::recv(reader.get(), bytes.data(), bytes.size(), 0));
+  EXPECT_GE(read, 3 * Talker::kSize);
+  EXPECT_LE(given.most, 2 + static_cast<int>(WebServer::kMostHeld / Talker::kSize));
+  server.stop();
 }
 
 TEST(OfferRing, KeepsOrderAcrossItsEndAndDropsWhatHasNoRoom) {
