@@ -54,9 +54,7 @@ void enter_sandbox(const std::string& file, const std::vector<std::string>& writ
     sandbox.readable.push_back(fs::absolute(other).parent_path().string());
   }
   for (std::string& folder : plugin_folders()) sandbox.readable.push_back(std::move(folder));
-  const fs::path python = model::xacro_python();
-  if (python.has_parent_path())
-    sandbox.runnable.push_back(python.parent_path().parent_path().string());
+  sandbox.runnable = model::xacro_parts();
   sandbox.writable.push_back(own_folder());
   std::error_code error;
   for (const std::string& path : written) {

@@ -126,6 +126,14 @@ void take_note(const std::string& line, const std::vector<std::string>& readable
 
 }  // namespace
 
+std::vector<std::string> xacro_parts() {
+  try {
+    return interpreter_for("");
+  } catch (const InputError&) {
+    return {};
+  }
+}
+
 std::shared_ptr<const Element> expand_xacro(const std::string& path, ReadContext& context) {
   const std::vector<std::string> parts = interpreter_for(path);
   const std::vector<std::string> folders = context.resources.folders_of(path);

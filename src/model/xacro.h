@@ -5,6 +5,7 @@
 
 #include <memory>
 #include <string>
+#include <vector>
 
 #include "model/read_context.h"
 
@@ -15,6 +16,9 @@ bool is_xacro(const std::string& path, const Element* root);
 
 // The Python interpreter that expands it: a path, or a name to be found in PATH.
 std::string xacro_python();
+
+// The interpreter itself, then what it reads of its own; empty where there is none.
+std::vector<std::string> xacro_parts();
 
 // The expanded <robot>; its elements keep the original files and lines. $(find PKG) finds packages
 // by their package.xml. Missing includes are reported. Throws InputError.

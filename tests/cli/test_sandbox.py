@@ -116,6 +116,14 @@ def test_it_draws_and_views(place):
     assert done.returncode == 0 and "renderer" not in done.stderr, done
 
 
+def test_a_xacro_file_is_expanded_within(place):
+    """The interpreter may lie in the home."""
+    robot = place / "world/r.urdf.xacro"
+    robot.write_text("<robot name='r' xmlns:xacro='x'><link name='l${1 + 1}'/></robot>")
+    checked = ruedo(place, "check", robot, "--sandbox")
+    assert checked.returncode == 0, checked
+
+
 def statuses(process):
     """Of all its threads."""
     return [task.read_text() for task in Path(f"/proc/{process}/task").glob("*/status")]
