@@ -49,7 +49,6 @@ class WorldText {
   std::set<std::string> moved_with(std::set<std::string> changed) const;
   void drop(const TextElement& element, TextPatch& patch) const;
   void drop_states(const std::set<std::string>& names, TextPatch& patch) const;
-  std::string tail(const std::string& elements) const;
 
   std::string text_;
   std::unique_ptr<const Element> root_;
