@@ -166,7 +166,7 @@ TEST_F(LogDiffTest, ALengthThatLiesDoesNotTakeMemory) {
   {
     std::fstream file(other_, std::ios::in | std::ios::out | std::ios::binary);
     file.seekp(24);
-    file.write("\x3f\xff\xff\xff", 4);
+    file.write("\x0f\xff\xff\xff", 4);
   }
   log::Reader reader(other_);
   log::Event event;
