@@ -21,9 +21,9 @@ public final class Log {
     private static final int SYNC = 0xEDA1DA01;
     private static final int HEAD = 28;
     private static final int LONGEST_CHANNEL = 1000;
+
     /** Of a message, in bytes: a picture of 8192 x 8192 pixels. */
     private static final int LARGEST = 8192 * 8192 * 4 + 65536;
-
 
     private static final class Place {
         final long offset; // of the data

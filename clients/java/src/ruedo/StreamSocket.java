@@ -140,7 +140,9 @@ final class StreamSocket implements Closeable {
         String user;
         try {
             Object option =
-                    Class.forName("jdk.net.ExtendedSocketOptions").getField("SO_PEERCRED").get(null);
+                    Class.forName("jdk.net.ExtendedSocketOptions")
+                            .getField("SO_PEERCRED")
+                            .get(null);
             Object peer = channel.getOption((SocketOption<?>) option);
             Object principal = peer.getClass().getMethod("user").invoke(peer);
             user = ((Principal) principal).getName();
