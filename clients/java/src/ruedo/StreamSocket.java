@@ -18,6 +18,7 @@ import java.nio.channels.SelectionKey;
 import java.nio.channels.Selector;
 import java.nio.channels.SocketChannel;
 import java.nio.file.Files;
+import java.nio.file.LinkOption;
 import java.nio.file.Paths;
 import java.security.Principal;
 
@@ -45,7 +46,7 @@ final class StreamSocket implements Closeable {
                             ? pathOf(address.path)
                             : new InetSocketAddress(
                                     InetAddress.getByName(address.host), address.port));
-            if (address.path != null) checkPeer(channel);
+            if (address.path != null) checkPeer(channel, address.path);
         } catch (IOException error) {
             close();
             throw error;
@@ -136,21 +137,24 @@ final class StreamSocket implements Closeable {
     }
 
     /** The server is this user's or root's: whoever may write in a folder may serve there. */
-    private static void checkPeer(SocketChannel channel) throws IOException {
-        String user;
+    private static void checkPeer(SocketChannel channel, String path) throws IOException {
+        String user = peerOf(channel, path);
+        if (!user.equals("root") && !user.equals(Files.getOwner(Paths.get("/proc/self")).getName()))
+            throw new IOException("it is served by another user");
+    }
+
+    /** The user that the kernel names; in a runtime without the module jdk.net the file's owner. */
+    private static String peerOf(SocketChannel channel, String path) throws IOException {
         try {
             Object option =
                     Class.forName("jdk.net.ExtendedSocketOptions")
                             .getField("SO_PEERCRED")
                             .get(null);
             Object peer = channel.getOption((SocketOption<?>) option);
-            Object principal = peer.getClass().getMethod("user").invoke(peer);
-            user = ((Principal) principal).getName();
+            return ((Principal) peer.getClass().getMethod("user").invoke(peer)).getName();
         } catch (ReflectiveOperationException error) {
-            throw new IOException("unix:// addresses need the module jdk.net", error);
+            return Files.getOwner(Paths.get(path), LinkOption.NOFOLLOW_LINKS).getName();
         }
-        if (!user.equals("root") && !user.equals(Files.getOwner(Paths.get("/proc/self")).getName()))
-            throw new IOException("it is served by another user");
     }
 
     private static SocketAddress pathOf(String path) throws IOException {
