@@ -167,7 +167,6 @@ int WebServer::Impl::dispatch(lws* wsi, lws_callback_reasons reason, void* in, s
   }
   const auto found = peers.find(wsi);
   if (found == peers.end()) return -1;  // it had to give way
-  if (stopping && reason == LWS_CALLBACK_HTTP) return -1;
   Peer& peer = found->second;
   peer.silent = false;
   switch (reason) {
@@ -283,6 +282,7 @@ int WebServer::Impl::request(lws* wsi, Peer& peer, std::string_view path) {
     return respond(wsi, peer, text(405, "Only GET is served here.\n"));
   if (const std::string why = refusal(wsi, false); !why.empty())
     return respond(wsi, peer, text(403, why + "\n"));
+  if (stopping) return respond(wsi, peer, text(503, "The server is ending.\n"));
   HttpResponse response = handler.get(path);
   if (response.body.use_count() == 1) {
     if (held() > kMostHeld)
