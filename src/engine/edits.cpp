@@ -14,6 +14,7 @@
 #include "model/placement.h"
 #include "model/read_context.h"
 #include "model/reserved_names.h"
+#include "model/triangle_count.h"
 
 namespace ruedo::engine {
 namespace {
@@ -152,6 +153,9 @@ Outcome spawn(const spawn_request_t& request, const model::LoadedModel& loaded, 
   }
   if (!request.name.empty() && find_model(world, request.name).valid())
     return refused("the name '" + request.name + "' is taken");
+  if (const std::string fault = model::placed_triangles_fault(world, loaded.model.get());
+      !fault.empty())
+    return refused("with this model, " + fault);
   name = request.name.empty() ? unused_name(world, loaded.name) : request.name;
   if (const std::string fault = fault_of_name(name); !fault.empty())
     return bad("the model's name '" + name + "' " + fault);

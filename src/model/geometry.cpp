@@ -99,7 +99,8 @@ void cover_with_texture(const Element& element, const Vec3& size, Mesh& mesh,
   context.documents.note(*path);
   Material ground;
   ground.ambient = ground.diffuse = {1.0f, 1.0f, 1.0f, 1.0f};
-  ground.texture = std::make_shared<Texture>(Texture{*path, {}});
+  ground.texture = context.textures.take(*path);
+  if (!ground.texture) return;
   mesh.materials.push_back(std::move(ground));
   for (Mesh::Part& part : mesh.parts) part.material = MaterialIndex(0);
   const Eigen::Vector2f tiles = (size.head<2>() / tile_m).cast<float>();
@@ -274,8 +275,10 @@ std::optional<Geometry> read_geometry(const Element& element, const std::string&
                                       ReadContext& context) {
   const Element* shape = shape_of(element);
   if (!shape) return std::nullopt;
-  const auto unless_too_large = [&](std::optional<Geometry> g) {
-    return g && is_too_large(*g, *shape, where, context) ? std::nullopt : g;
+  const auto unless_too_large = [&](std::optional<Geometry> g) -> std::optional<Geometry> {
+    if (!g || is_too_large(*g, *shape, where, context)) return std::nullopt;
+    context.triangles.add(g->mesh, g->scale, *shape);
+    return g;
   };
   const std::string& kind = shape->name;
   SizedShape sized(*shape, where, context.findings);
@@ -287,7 +290,7 @@ std::optional<Geometry> read_geometry(const Element& element, const std::string&
   if (kind == "ellipsoid") return sized.ellipsoid();
   if (kind == "plane") return sized.plane();
   if (kind == "mesh") return unless_too_large(read_mesh(*shape, where, context));
-  if (kind == "polyline") return read_polyline(element, *shape, where, context);
+  if (kind == "polyline") return unless_too_large(read_polyline(element, *shape, where, context));
   if (kind == "heightmap") return unless_too_large(read_heightmap(*shape, where, context));
   const std::string near =
       nearest_word(kind, {"box", "sphere", "cylinder", "capsule", "cone", "ellipsoid", "plane",

@@ -30,14 +30,16 @@ class Loader {
  public:
   Loader(const std::string& path, const LoadOptions& options)
       : resources_(path, options.allow_absolute),
-        meshes_(resources_),
-        context_{findings_, resources_, documents_, meshes_, options.xacro_arguments},
+        textures_(findings_),
+        meshes_(resources_, textures_),
+        context_{findings_, resources_, documents_, meshes_, textures_, options.xacro_arguments},
         reader_(context_),
         path_(path) {}
 
   std::shared_ptr<const WorldModel> load(const Element& written, const LoadOptions& options) {
     const LoadsPlugins loads_plugins;
     findings_ = {};
+    context_.triangles = {};
     world_ = {};
     world_.file = path_;
     const std::shared_ptr<const Element> expanded =
@@ -61,6 +63,8 @@ class Loader {
     name_stuck_robots(world_, findings_);
     check_holds(world_, findings_);
     check_lifts(world_, findings_);
+    if (const std::string fault = placed_triangles_fault(world_); !fault.empty())
+      throw InputError({path_, 0}, fault);
     world_.findings = findings_.list();
     std::erase_if(world_.findings, [&](const Finding& finding) { return is_settled(finding); });
     for (const std::string& file : meshes_.files_read()) documents_.note(file);
@@ -232,6 +236,7 @@ class Loader {
   Findings findings_;
   ResourceFinder resources_;
   DocumentStore documents_;
+  TextureStore textures_;
   MeshLoader meshes_;
   ReadContext context_;
   SdfReader reader_;

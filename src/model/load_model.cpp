@@ -23,8 +23,9 @@ LoadedModel read(const std::string& path, const std::string& world_file,
   DocumentStore documents;
   MeshImport import;
   import.budget = budget;
-  MeshLoader meshes(resources, import);
-  ReadContext context{findings, resources, documents, meshes};
+  TextureStore textures(findings);
+  MeshLoader meshes(resources, textures, import);
+  ReadContext context{findings, resources, documents, meshes, textures};
   SdfReader reader(context);
   if (document) documents.add(path, std::move(document));
   Element asker;

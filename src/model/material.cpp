@@ -179,14 +179,14 @@ std::optional<Material> scripted_material(const Element& script, const std::stri
     if (!found->texture.empty()) {
       std::optional<std::string> texture = context.resources.find_texture(found->texture, file);
       for (const auto& folder : texture_folders) {
-        const fs::path candidate = fs::path(folder) / fs::path(found->texture).filename();
-        std::error_code error;
-        if (!texture && fs::is_regular_file(candidate, error)) texture = candidate.string();
+        if (texture) break;
+        texture = context.resources.find_texture(fs::path(found->texture).filename().string(),
+                                                 (fs::path(folder) / "script").string());
       }
       if (!texture) texture = context.resources.find_texture(found->texture, script.source.file);
       if (texture) {
         context.documents.note(*texture);
-        found->material.texture = std::make_shared<Texture>(Texture{*texture, {}});
+        found->material.texture = context.textures.take(*texture);
       }
     }
     return found->material;
@@ -276,7 +276,7 @@ std::optional<Material> read_material(const Element& element, const std::string&
     const auto path = context.resources.find_texture(map->text, map->source.file);
     if (path) {
       context.documents.note(*path);
-      material.texture = std::make_shared<Texture>(Texture{*path, {}});
+      material.texture = context.textures.take(*path);
       said = true;
     } else {
       context.findings.unsupported(

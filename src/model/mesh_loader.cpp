@@ -141,8 +141,8 @@ std::string mesh_cache_folder() {
   return "";
 }
 
-MeshLoader::MeshLoader(const ResourceFinder& resources, MeshImport import)
-    : resources_(resources), import_(std::move(import)) {
+MeshLoader::MeshLoader(const ResourceFinder& resources, TextureStore& textures, MeshImport import)
+    : resources_(resources), textures_(textures), import_(std::move(import)) {
   if (import_.importer.empty()) import_.importer = default_importer();
   if (import_.cache_folder.empty()) import_.cache_folder = mesh_cache_folder();
   if (import_.cache_folder.empty()) import_.cache = false;
@@ -203,10 +203,14 @@ std::shared_ptr<const Mesh> MeshLoader::load(const std::string& path) {
       if (import_.budget) import_.budget->take_mesh(bytes_of(*mesh));
       mesh->name = path;
       for (auto& material : mesh->materials) {
-        if (!material.texture || !material.texture->embedded.empty()) continue;
+        if (!material.texture) continue;
+        if (!material.texture->embedded.empty()) {
+          material.texture = textures_.take(material.texture, path);
+          continue;
+        }
         const auto found = resources_.find_texture(material.texture->path, path);
         if (found) files_.push_back(*found);
-        material.texture = found ? std::make_shared<Texture>(Texture{*found, {}}) : nullptr;
+        material.texture = found ? textures_.take(*found) : nullptr;
       }
       entry.mesh = std::move(mesh);
     } catch (const EnvironmentError&) {

@@ -13,6 +13,7 @@
 #include "model/load_budget.h"
 #include "model/mesh.h"
 #include "model/resources.h"
+#include "model/texture_store.h"
 
 namespace ruedo::model {
 
@@ -33,7 +34,7 @@ std::string mesh_cache_folder();
 
 class MeshLoader {
  public:
-  explicit MeshLoader(const ResourceFinder& resources, MeshImport import = {});
+  MeshLoader(const ResourceFinder& resources, TextureStore& textures, MeshImport import = {});
 
   // The mesh in a file, by absolute path. Throws std::runtime_error saying what is wrong with it,
   // and EnvironmentError where no mesh at all can be imported.
@@ -55,6 +56,7 @@ class MeshLoader {
   Mesh taken(MeshPackage package, const std::string& path);
 
   const ResourceFinder& resources_;
+  TextureStore& textures_;
   MeshImport import_;
   std::map<std::string, Entry> meshes_;
   std::vector<std::string> files_;

@@ -100,15 +100,23 @@ Size size_of(const Bytes& bytes) {
   return {};
 }
 
+// Of what has a size; without overflow.
+bool is_too_large(const Size& size) { return size.width > kMostPixelsInAll / size.height; }
+
 }  // namespace
+
+int64_t picture_pixels(std::span<const uint8_t> span) {
+  const Size size = size_of(Bytes(span));
+  if (size.width <= 0 || size.height <= 0 || is_too_large(size)) return 0;
+  return size.width * size.height;
+}
 
 std::string picture_fault(std::span<const uint8_t> span, int64_t most) {
   const Size size = size_of(Bytes(span));
   // For another kind, only its decoder could tell how much memory it needs.
   if (size.width <= 0 || size.height <= 0)
     return "it is no picture that can be read (pgm, png, jpeg, bmp, tiff)";
-  if (size.width <= most && size.height <= most && size.width * size.height <= kMostPixelsInAll)
-    return "";
+  if (size.width <= most && size.height <= most && !is_too_large(size)) return "";
   if (size.width <= most && size.height <= most) {
     return "it has " + std::to_string(size.width) + " x " + std::to_string(size.height) +
            " pixels; allowed are " + std::to_string(kMostPixelsInAll) + " in all";

@@ -13,6 +13,13 @@ namespace ruedo::model {
 // picture.
 std::string picture_fault(std::span<const uint8_t> bytes, int64_t most);
 
+// Width times height; 0 for what is no picture, or one with more than kMostPixelsInAll, which
+// nobody decodes.
+int64_t picture_pixels(std::span<const uint8_t> bytes);
+
+inline int64_t picture_pixels(const std::string& bytes) {
+  return picture_pixels({reinterpret_cast<const uint8_t*>(bytes.data()), bytes.size()});
+}
 inline std::string picture_fault(const std::string& bytes, int64_t most) {
   return picture_fault({reinterpret_cast<const uint8_t*>(bytes.data()), bytes.size()}, most);
 }

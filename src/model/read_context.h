@@ -7,6 +7,8 @@
 #include "model/document.h"
 #include "model/mesh_loader.h"
 #include "model/resources.h"
+#include "model/texture_store.h"
+#include "model/triangle_count.h"
 #include "ruedo/element.h"
 
 namespace ruedo::model {
@@ -16,7 +18,9 @@ struct ReadContext {
   const ResourceFinder& resources;
   DocumentStore& documents;
   MeshLoader& meshes;
+  TextureStore& textures;
   std::vector<std::string> xacro_arguments = {};  // "NAME:=VALUE"
+  TriangleCount triangles = {};
 };
 
 // The name attribute. Throws InputError if it is missing, empty or reserved by SDF ("world",

@@ -114,11 +114,12 @@ void Broadphase::find_pairs(Proxy& proxy, btDispatcher* dispatcher) {
   for (Proxy* plane : planes_) {
     if (overlap(proxy, *plane)) found_.push_back(plane);
   }
+  looked_at_ += static_cast<int64_t>(found_.size());
+  proxy.mark = ++searches_;
+  for (Proxy* partner : proxy.partners) partner->mark = searches_;
   const auto& object = *static_cast<btCollisionObject*>(proxy.m_clientObject);
   for (Proxy* other : found_) {
-    if (other == &proxy ||
-        std::find(proxy.partners.begin(), proxy.partners.end(), other) != proxy.partners.end())
-      continue;
+    if (other->mark == searches_) continue;
     if (filter_.may_touch(object, *static_cast<btCollisionObject*>(other->m_clientObject)))
       add_pair(proxy, *other);
   }

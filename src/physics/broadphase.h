@@ -7,6 +7,7 @@
 // detection nor the solver.
 #pragma once
 
+#include <cstdint>
 #include <map>
 #include <vector>
 
@@ -39,6 +40,9 @@ class Broadphase final : public btBroadphaseInterface {
   bool alone(const btBroadphaseProxy* proxy) const {
     return static_cast<const Proxy*>(proxy)->partners.empty();
   }
+  // How many objects were near one that was looked at, whether they may touch or not: what has been
+  // done so far.
+  int64_t looked_at() const { return looked_at_; }
   // Recomputes the pairs of a body after the filter's answer about it, or the static set, has
   // changed. Before an object's proxy is destroyed, the filter must refuse it and its neighbours
   // must be refiltered.
@@ -74,6 +78,7 @@ class Broadphase final : public btBroadphaseInterface {
     btDbvtNode* leaf = nullptr;  // null: a plane, which is in no tree
     bool moves = false;
     std::vector<Proxy*> partners;  // from the pairs it is in
+    int64_t mark = 0;              // of the last search that knows it already
   };
 
   bool overlap(const Proxy& a, const Proxy& b) const;
@@ -90,6 +95,7 @@ class Broadphase final : public btBroadphaseInterface {
   std::vector<Proxy*> planes_;
   std::vector<Proxy*> found_;  // scratch
   int made_ = 0;
+  int64_t searches_ = 0, looked_at_ = 0;
   btHashedOverlappingPairCache pairs_;
 };
 

@@ -17,6 +17,9 @@ constexpr double kSameDirection = 0.7;
 // height counts as none.
 constexpr double kInLine = 1e-3;
 constexpr size_t kUsually = 16;  // contacts of a group
+// More are not shared out: the work grows with the third power of their number, and rigid bodies
+// are content with any distribution.
+constexpr size_t kMost = 256;
 
 }  // namespace
 
@@ -74,7 +77,7 @@ bool LoadShares::spread(SolverBodies& bodies, JointBlocks& blocks, double tolera
   for (size_t i = 0; i + 2 < bearings_.size(); ++i) {
     if (bearings_[i].taken) continue;
     gather(i);
-    if (!has_more_than_it_needs()) continue;
+    if (!has_more_than_it_needs() || group_.size() > kMost) continue;
     blocks.tell_responses(rows_, responses_);
     weigh();
     any |= share(bodies, tolerance);

@@ -28,6 +28,8 @@ constexpr double kContactReach_m = 0.02;
 // Limit of nearby pairs at the start, of bodies and of their shapes: their number grows with the
 // square of those in one place.
 constexpr int kMostPairs = 200'000;
+// The same for those that may not touch, as links of one model, and only cost a look.
+constexpr int64_t kMostNear = 10'000'000;
 
 // How many shapes of `b` are near that box.
 int shapes_near(const btCollisionObject& b, const btVector3& low_W, const btVector3& high_W) {
@@ -111,7 +113,8 @@ PhysicsWorld::Impl::Impl(const model::WorldModel& world, const model::BodyLayout
                            btBroadphaseProxy::AllFilter);
     update_box(i);
     if (broadphase_.getOverlappingPairCache()->getNumOverlappingPairs() > kMostPairs)
-      refuse_crowded(i);
+      refuse_crowded(i, kMostPairs, "touch");
+    if (broadphase_.looked_at() > kMostNear) refuse_crowded(i, kMostNear, "are near");
   }
   count_near_shapes();
   for (JointConstraint& joint : joints_)
@@ -121,9 +124,9 @@ PhysicsWorld::Impl::Impl(const model::WorldModel& world, const model::BodyLayout
   last_twists_ = twists_;
 }
 
-void PhysicsWorld::Impl::refuse_crowded(BodyIndex body) const {
-  throw InputError({world_.file, 0}, "more than " + std::to_string(kMostPairs) +
-                                         " pairs of things touch each other at the start: '" +
+void PhysicsWorld::Impl::refuse_crowded(BodyIndex body, int64_t most, const char* how) const {
+  throw InputError({world_.file, 0}, "more than " + std::to_string(most) + " pairs of things " +
+                                         how + " each other at the start: '" +
                                          layout_.bodies[body].name +
                                          "' stands among too many; move them apart");
 }
@@ -136,7 +139,8 @@ void PhysicsWorld::Impl::count_near_shapes() {
     const auto& a = *static_cast<const btCollisionObject*>(pairs[i].m_pProxy0->m_clientObject);
     const auto& b = *static_cast<const btCollisionObject*>(pairs[i].m_pProxy1->m_clientObject);
     near += near_shapes(a, b);
-    if (near > kMostPairs) refuse_crowded(info_of(info_of(a).body.valid() ? a : b).body);
+    if (near > kMostPairs)
+      refuse_crowded(info_of(info_of(a).body.valid() ? a : b).body, kMostPairs, "touch");
   }
 }
 

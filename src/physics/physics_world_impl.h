@@ -118,7 +118,7 @@ class PhysicsWorld::Impl {
   void add_static(StaticObject& object);
   void reset_body(BodyIndex body);
   void refilter_all();
-  [[noreturn]] void refuse_crowded(BodyIndex body) const;
+  [[noreturn]] void refuse_crowded(BodyIndex body, int64_t most, const char* how) const;
   void count_near_shapes();  // throws InputError for too many
   int substeps_for(int64_t longest_us) const;
   void choose_pace();

@@ -9,6 +9,7 @@
 #include "core/input_file.h"
 #include "model/codecs.h"
 #include "model/picture.h"
+#include "model/texture_store.h"
 #include "ruedo/errors.h"
 
 namespace ruedo::scene {
@@ -16,8 +17,7 @@ namespace {
 
 // Larger pictures are downscaled: they are finer than any camera can see, and slow to sample.
 constexpr int kMaxSide = 2048;
-constexpr int kMostPixels = 16384;         // width and height; larger pictures are not decoded
-constexpr size_t kMostBytes = 256u << 20;  // and of larger files nothing is read
+constexpr int kMostPixels = 16384;  // width and height; larger pictures are not decoded
 
 cv::Mat to_rgba(cv::Mat image) {
   if (image.depth() == CV_16U) image.convertTo(image, CV_8U, 1.0 / 257.0);
@@ -34,7 +34,7 @@ cv::Mat to_rgba(cv::Mat image) {
 }
 
 std::vector<uint8_t> read_bytes(const std::string& path) {
-  const std::string bytes = read_input(path, kMostBytes);
+  const std::string bytes = read_input(path, model::kMostTextureBytes);
   return {bytes.begin(), bytes.end()};
 }
 

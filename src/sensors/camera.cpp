@@ -62,7 +62,7 @@ class Camera : public Sensor {
     picture_.want_depth = depth;
     picture_.want_labels = labels;
 
-    if (lens_.distorts()) map_.emplace(lens_);
+    if (lens_.distorts()) map_ = LensMap::of(lens_, camera);
     if (map_) {
       view_ = map_->ideal();
     } else {
@@ -214,7 +214,7 @@ class Camera : public Sensor {
   Encoding encoding_ = Encoding::jpeg;
   bool grey_ = false;
   int quality_ = 85;
-  std::optional<LensMap> map_;
+  std::shared_ptr<const LensMap> map_;
   scene::View view_;
 
   // Kept between samples to avoid allocations.

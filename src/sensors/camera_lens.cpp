@@ -2,6 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
+#include <mutex>
+#include <string>
+#include <tuple>
 
 #include <opencv2/imgproc.hpp>
 
@@ -16,7 +20,11 @@ namespace {
 constexpr double kMaxHfov = 3.0;
 // Maximum size of the ideal picture relative to the lens's.
 constexpr double kMaxGrowth = 2.5;
-constexpr int64_t kMostDistorted = 12'000'000;  // pixels: each is found by iteration, in about 1 us
+// Pixels of one distorted picture, and of all with lenses of their own: each is found by iteration,
+// in about 1 us.
+constexpr int64_t kMostDistorted = 12'000'000, kMostDistortedInAll = 2 * kMostDistorted;
+
+int64_t pixels_of(const Lens& lens) { return int64_t{lens.width} * lens.height; }
 
 }  // namespace
 
@@ -47,7 +55,7 @@ Lens::Lens(const Element& camera) {
     const Allowed range = Allowed::between(-10.0, 10.0);
     distortion = {d->number("k1", 0, range), d->number("k2", 0, range), d->number("p1", 0, range),
                   d->number("p2", 0, range), d->number("k3", 0, range)};
-    if (int64_t{width} * height > kMostDistorted)
+    if (pixels_of(*this) > kMostDistorted)
       d->fail("a picture of " + std::to_string(width) + " x " + std::to_string(height) +
               " pixels is not distorted; at most " + std::to_string(kMostDistorted) +
               " pixels are");
@@ -88,6 +96,35 @@ bool Lens::undistort(const Eigen::Vector2d& distorted, Eigen::Vector2d& p) const
     if (!converged) return false;
   }
   return true;
+}
+
+std::shared_ptr<const LensMap> LensMap::of(const Lens& lens, const Element& camera) {
+  using Key = std::tuple<int, int, std::array<double, 6>, std::array<double, 5>>;
+  struct Shared {
+    int64_t pixels = 0;
+    std::weak_ptr<const LensMap> map;
+  };
+  static std::mutex mutex;
+  static std::map<Key, Shared> all;
+  const std::lock_guard lock(mutex);
+  std::erase_if(all, [](const auto& entry) { return entry.second.map.expired(); });
+  const Key key{lens.width,
+                lens.height,
+                {lens.fx, lens.fy, lens.cx, lens.cy, lens.near_m, lens.far_m},
+                lens.distortion};
+  if (const auto known = all.find(key); known != all.end()) {
+    if (auto map = known->second.map.lock()) return map;
+  }
+  int64_t pixels = pixels_of(lens);
+  for (const auto& [other, shared] : all) pixels += shared.pixels;
+  if (pixels > kMostDistortedInAll)
+    camera.child("distortion")
+        ->fail("the pictures of all lenses with distortion have " + std::to_string(pixels) +
+               " pixels with this one; at most " + std::to_string(kMostDistortedInAll) +
+               " are distorted, those of equal lenses counted once");
+  auto map = std::make_shared<const LensMap>(lens);
+  all[key] = {pixels_of(lens), map};
+  return map;
 }
 
 LensMap::LensMap(const Lens& lens) {

@@ -7,6 +7,7 @@
 #pragma once
 
 #include <array>
+#include <memory>
 
 #include <opencv2/core/mat.hpp>
 
@@ -33,10 +34,15 @@ struct Lens {
   bool undistort(const Eigen::Vector2d& distorted, Eigen::Vector2d& p) const;
 };
 
-// Draws a larger ideal picture and resamples it to the lens's picture.
+// Draws a larger ideal picture and resamples it to the lens's picture. Immutable.
 class LensMap {
  public:
-  explicit LensMap(const Lens& lens);  // only for lenses with distortion
+  // For a lens with distortion: the cameras of a fleet, and of the copies of a world, share their
+  // lens's. Throws InputError, which names the <distortion>, if all that there are have too many
+  // pixels in all with this one.
+  static std::shared_ptr<const LensMap> of(const Lens& lens, const Element& camera);
+
+  explicit LensMap(const Lens& lens);
 
   const scene::View& ideal() const { return ideal_; }  // what to draw; the caller sets its pose
   // Interpolates colour and grey; takes the nearest pixel for depth and labels. Outside the lens's

@@ -1,7 +1,7 @@
 // Common to cameras that show labels rather than light: optics, pose, and camera_info_t.
 #pragma once
 
-#include <optional>
+#include <memory>
 
 #include "ruedo/camera_info_t.hpp"
 #include "ruedo/device_info_t.hpp"
@@ -43,7 +43,7 @@ class CameraView {
  private:
   Lens lens_;
   Mount mount_;
-  std::optional<LensMap> map_;
+  std::shared_ptr<const LensMap> map_;
   scene::View view_;
   int info_channel_;
   camera_info_t info_;

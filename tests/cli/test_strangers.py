@@ -165,6 +165,15 @@ def many_shapes():
     return f"<sdf version='1.9'><world name='w'>{models}</world></sdf>".encode()
 
 
+def links_in_one_place():
+    """One model, whose links may not touch each other, but are looked at."""
+    box = "<link name='l{}'><collision name='c'><geometry><box><size>1 1 1</size></box></geometry></collision></link>"
+    links = "".join(box.format(i) for i in range(5000))
+    return (
+        f"<sdf version='1.9'><world name='w'><model name='m'>{links}</model></world></sdf>".encode()
+    )
+
+
 COSTLY = {
     "a large TIFF as a map": (
         "map.tiff",
@@ -208,6 +217,7 @@ COSTLY = {
         ["run", "{0}", "--duration", "0.1", "--lcm", "memq://"],
         "200000 pairs",
     ),
+    "links in one place": ("w.sdf", links_in_one_place(), ["check", "{0}"], "10000000 pairs"),
     "depth": (
         "w.sdf",
         b"<sdf version='1.9'>" + b"<a>" * 300 + b"</a>" * 300 + b"</sdf>",
@@ -274,6 +284,19 @@ def test_a_large_picture_is_not_distorted(tmp_path):
         )
         result = program("check", tmp_path / "w.sdf")
         assert result.returncode == code and words in result.stdout, result
+
+
+def test_a_thing_may_stand_on_many_feet(tmp_path):
+    """How its contacts share the load was a matrix of their number squared: 51 GB."""
+    foot = "<collision name='c{}'><pose>{} {} 0.05 0 0 0</pose><geometry><box><size>.1 .1 .1</size></box></geometry></collision>"
+    feet = "".join(foot.format(i, i % 150, i // 150) for i in range(20000))
+    ground = "<model name='ground'><static>true</static><link name='l'><collision name='c'><geometry><plane/></geometry></collision></link></model>"
+    (tmp_path / "w.sdf").write_text(
+        f"<sdf version='1.9'><world name='w'>{ground}<model name='m'><link name='l'>{feet}</link></model></world></sdf>"
+    )
+    options = ["--duration", "0.01", "--rate", "max", "--lcm", "memq://"]
+    result = program("run", tmp_path / "w.sdf", *options, preexec_fn=three_gigabytes)
+    assert result.returncode == 0, result
 
 
 def test_people_may_walk_a_million_metres(tmp_path):

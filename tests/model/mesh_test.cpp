@@ -206,7 +206,7 @@ class Meshes : public testing::Test {
   }
   std::string fault_of(const std::string& path, const MeshImport& settings) const {
     const ResourceFinder finder(path, true);
-    MeshLoader loader(finder, settings);
+    MeshLoader loader(finder, textures, settings);
     try {
       loader.load(path);
     } catch (const std::runtime_error& error) {
@@ -215,6 +215,8 @@ class Meshes : public testing::Test {
     return "";
   }
   TemporaryFolder folder;
+  mutable Findings findings;
+  mutable TextureStore textures{findings};
 };
 
 TEST_F(Meshes, EveryFormatGivesTheSameBox) {
@@ -229,7 +231,7 @@ TEST_F(Meshes, EveryFormatGivesTheSameBox) {
   for (const auto& [name, content] : files) {
     const std::string path = folder.write(name, content);
     const ResourceFinder finder(path, true);
-    MeshLoader loader(finder, import());
+    MeshLoader loader(finder, textures, import());
     SCOPED_TRACE(name);
     std::shared_ptr<const Mesh> mesh;
     ASSERT_NO_THROW(mesh = loader.load(path));
@@ -248,7 +250,7 @@ TEST_F(Meshes, ColladaUnitsAndNodes) {
   for (const char* up : {"Z_UP", "Y_UP"}) {
     const std::string path = folder.write(std::string(up) + ".dae", dae("0.0254", up, 1 / 0.0254f));
     const ResourceFinder finder(path, true);
-    MeshLoader loader(finder, import());
+    MeshLoader loader(finder, textures, import());
     const auto mesh = loader.load(path);
     EXPECT_LT((box_of(*mesh).max() - Eigen::Vector3f(11, 2, 3)).norm(), 1e-4f)
         << up << " " << box_of(*mesh).max().transpose();
@@ -272,7 +274,7 @@ TEST_F(Meshes, MaterialsAndTheirFile) {
   folder.write("textures/paint.png", "not decoded here");
   const std::string path = folder.write("box.obj", obj());
   const ResourceFinder finder(path, true);
-  MeshLoader loader(finder, import());
+  MeshLoader loader(finder, textures, import());
   const auto mesh = loader.load(path);
   ASSERT_EQ(mesh->parts.size(), 1u);
   const Material& material = mesh->materials.at(static_cast<size_t>(mesh->parts[0].material));
@@ -281,7 +283,7 @@ TEST_F(Meshes, MaterialsAndTheirFile) {
   EXPECT_EQ(material.texture->path, folder / "textures/paint.png");
   // The cache knows that the mesh depends on its material file.
   folder.write("box.mtl", "newmtl red\nKd 0.3 0.1 0.2\n");
-  MeshLoader again(finder, import());
+  MeshLoader again(finder, textures, import());
   const auto changed = again.load(path);
   EXPECT_FLOAT_EQ(changed->materials.at(static_cast<size_t>(changed->parts[0].material)).diffuse[0],
                   0.3f);

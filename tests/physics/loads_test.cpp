@@ -71,6 +71,25 @@ TEST(Loads, OfATableAreThoseOfEqualSprings) {
   }
 }
 
+// So many contacts share nothing out, and cost no more than they have to.
+TEST(Loads, OfAThousandFeet) {
+  std::string feet;
+  for (size_t i = 0; i < 1000; ++i) {
+    feet += "<collision name='foot" + std::to_string(i) + "'><pose>" +
+            number(0.1 * static_cast<double>(i % 40)) + " " +
+            number(0.1 * static_cast<double>(i / 40)) +
+            " 0.02 0 0 0</pose><geometry><box><size>0.04 0.04 0.04</size></box></geometry>"
+            "</collision>";
+  }
+  World world(kPlane + "<model name='table'><link name='l'>" + inertial(20, 2.0, 1.2, 0.4) + feet +
+              "</link></model>");
+  world.run(0.1);
+  double sum = 0.0;
+  for (const Contact& contact : world.physics.contacts(world.body("table/l"))) sum += contact.force;
+  EXPECT_NEAR(sum, 200.0, 2.0);
+  EXPECT_NEAR(world.position("table/l").z(), 0.0, 1e-3);
+}
+
 // Two bodies that no joint connects each share their load among their own contacts: a table on top
 // of another.
 TEST(Loads, OfATableOnATable) {

@@ -16,6 +16,7 @@
 #endif
 #endif
 
+#include "model/document.h"
 #include "ruedo/camera_info_t.hpp"
 #include "ruedo/device_info_t.hpp"
 #include "ruedo/image_t.hpp"
@@ -431,6 +432,42 @@ TEST(CameraLens, NothingIsSeenBeyondAFold) {
   EXPECT_NEAR(p.x() * (1 - 0.5 * p.x() * p.x()), 0.54, 1e-9);
   EXPECT_LT(p.x(), 0.8165);
   EXPECT_FALSE(lens.undistort({0.55, 0.0}, p));
+}
+
+// A <camera> with a lens that folds at once, so that its map is made quickly.
+std::shared_ptr<const Element> folding_camera(int width, const std::string& k1) {
+  return model::parse_document("<camera><horizontal_fov>2.9</horizontal_fov><image><width>" +
+                                   std::to_string(width) +
+                                   "</width><height>3000</height></image><distortion><k1>" + k1 +
+                                   "</k1></distortion></camera>",
+                               "camera.sdf");
+}
+std::shared_ptr<const LensMap> map_of(const Element& camera) {
+  return LensMap::of(Lens(camera), camera);
+}
+
+TEST(CameraLens, EqualOnesShareTheirMap) {
+  const auto map = map_of(*folding_camera(100, "-10"));
+  EXPECT_EQ(map_of(*folding_camera(100, "-10")), map);
+  EXPECT_NE(map_of(*folding_camera(100, "-9")), map);
+}
+
+TEST(CameraLens, PixelsOfAllThatDifferAreBounded) {
+  const auto first = map_of(*folding_camera(4000, "-10"));
+  const auto third = folding_camera(100, "-8");
+  {
+    const auto second = map_of(*folding_camera(4000, "-9"));
+    try {
+      map_of(*third);
+      FAIL();
+    } catch (const InputError& error) {
+      EXPECT_EQ(error.message(),
+                "<distortion>: the pictures of all lenses with distortion have 24300000 pixels "
+                "with this one; at most 24000000 are distorted, those of equal lenses counted "
+                "once");
+    }
+  }
+  EXPECT_NO_THROW(map_of(*third)) << "one of those before it is gone";
 }
 
 TEST(Camera, ThingsAreSeenWhereTheLensBendsThem) {
