@@ -145,7 +145,9 @@ bool is_controlled(const Element& model_element, const std::vector<const Element
          });
 }
 
-std::vector<std::string> files_beside(const std::string& from) {
+namespace {
+
+std::vector<std::string> parameter_files_beside(const std::string& from) {
   std::vector<std::string> files;
   fs::path package = fs::path(from).parent_path();
   std::error_code error;
@@ -169,6 +171,14 @@ std::vector<std::string> files_beside(const std::string& from) {
   }
   std::sort(beside.begin(), beside.end());
   for (const fs::path& folder : beside) add_parameter_files(folder, files);
+  return files;
+}
+
+}  // namespace
+
+std::vector<std::string> files_beside(const std::string& from, const ResourceFinder& resources) {
+  std::vector<std::string> files = parameter_files_beside(from);
+  std::erase_if(files, [&](const std::string& file) { return !resources.allows(file); });
   return files;
 }
 

@@ -34,8 +34,8 @@ std::vector<Controller> controllers_in(const std::vector<std::unique_ptr<Element
 // Whether controller files can concern a model.
 bool is_controlled(const Element& model_element, const std::vector<const Element*>& plugins);
 // The files in the parameter folders of the package that contains `from`, then of neighbouring
-// packages, sorted by name.
-std::vector<std::string> files_beside(const std::string& from);
+// packages, sorted by name; those that may be read.
+std::vector<std::string> files_beside(const std::string& from, const ResourceFinder& resources);
 // Those named by ros_control's plugins; a missing one is reported.
 std::vector<std::string> named_files(const std::vector<const Element*>& plugins,
                                      const std::vector<std::string>& beside,

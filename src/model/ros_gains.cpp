@@ -192,7 +192,8 @@ void read_ros_gains(const Element& model_element, const std::vector<const Elemen
   if (!is_controlled(model_element, plugins)) return;
   Reader reader{model, {}};
   const Interfaces interfaces{model_element};
-  const std::vector<std::string> beside = files_beside(model_element.source.file),
+  const std::vector<std::string> beside =
+                                     files_beside(model_element.source.file, context.resources),
                                  named = named_files(plugins, beside, where, context);
   const auto look_in = [&](const std::vector<std::string>& paths, bool is_named) {
     std::vector<std::unique_ptr<Element>> files;

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include "model/load.h"
+#include "model/load_model.h"
 #include "model/yaml.h"
 #include "temporary_folder.h"
 #include "text_world.h"
@@ -164,6 +165,31 @@ base:
   EXPECT_TRUE(std::isinf(drive.acceleration));
   EXPECT_EQ(drive.max_turn_rate, 1.5);
   EXPECT_EQ(drive.watchdog_us, 500'000);  // diff_drive_controller's own
+}
+
+// The package lies around the world's folder, and what a SPAWN's text may read does not.
+TEST(RosControl, ASpawnedRobotReadsNoFileOutsideOfTheWorldsFolder) {
+  const std::string robot =
+      four_wheels(transmission("front_left") + transmission("front_right") +
+                  "<gazebo><plugin name='c' filename='libgazebo_ros_control.so'/></gazebo>");
+  const std::string controllers = R"(base:
+  type: diff_drive_controller/DiffDriveController
+  left_wheel: front_left
+  right_wheel: front_right
+  wheel_separation: 0.61
+)";
+  for (const bool inside : {true, false}) {
+    TemporaryFolder folder;
+    folder.write("bot/package.xml", package("bot"));
+    folder.write(inside ? "bot/worlds/config/c.yaml" : "bot/config/c.yaml", controllers);
+    if (inside) folder.write("bot/worlds/package.xml", package("worlds"));
+    const LoadedModel loaded = load_model_text(robot, folder / "bot/worlds/w.sdf");
+    const bool read = std::any_of(
+        loaded.findings.begin(), loaded.findings.end(),
+        [](const Finding& finding) { return finding.text.find("'base'") != std::string::npos; });
+    EXPECT_EQ(read, inside);
+    EXPECT_EQ(loaded.model->drive && !loaded.model->drive->guessed, inside);
+  }
 }
 
 TEST(RosControl, MecanumAndSteeringControllers) {

@@ -68,5 +68,35 @@ TEST(Strangers, ReachTheWorldsFolderAndModelsOnly) {
   }
 }
 
+TEST(Strangers, FollowNoLinksOutOfAFolderOfMaterials) {
+  const TemporaryFolder folder;
+  const std::string scripts = "home/worlds/models/paint/materials/scripts/";
+  const std::string world = folder.write("home/worlds/w.sdf", "");
+  folder.write(scripts + "own.material",
+               "material Own\n{\npass\n{\ndiffuse 1 0 0 1\ntexture out.png\n}\n}\n");
+  const std::string secret = "material Theirs\n{\npass\n{\ndiffuse 0 1 0 1\n}\n}\n";
+  fs::create_symlink(folder.write("home/other/theirs.material", secret),
+                     folder / (scripts + "theirs.material"));
+  fs::create_symlink(folder.write("home/other/out.png", "a picture"),
+                     folder / (scripts + "out.png"));
+  const auto material = [&](const std::string& name) {
+    return load_model_text(
+               "<sdf version='1.9'><model name='m'><link name='l'><visual name='v'>"
+               "<geometry><box/></geometry><material><script><uri>"
+               "model://paint/materials/scripts</uri><name>" +
+                   name + "</name></script></material></visual></link></model></sdf>",
+               world)
+        .model->links[0]
+        .visuals[0]
+        .material;
+  };
+  const auto own = material("Own");
+  ASSERT_TRUE(own);
+  EXPECT_EQ(own->diffuse, (Rgba{1, 0, 0, 1}));
+  EXPECT_FALSE(own->texture) << own->texture->path;
+  const auto theirs = material("Theirs");
+  EXPECT_FALSE(theirs && theirs->diffuse == (Rgba{0, 1, 0, 1}));
+}
+
 }  // namespace
 }  // namespace ruedo::model
