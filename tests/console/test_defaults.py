@@ -49,10 +49,21 @@ def said(*command, **more):
     return done.stdout
 
 
+def rate_of(channel):
+    """What hz says of the first second in which there was something: a busy machine skips some."""
+    while True:
+        hz = subprocess.run(
+            [RUEDO, "hz", channel, "-n", "1"], env=ENVIRONMENT, capture_output=True, text=True
+        )
+        if hz.returncode != 1:
+            assert hz.returncode == 0, hz.stderr
+            return hz.stdout
+
+
 def test_hz_and_echo_hear_the_run_and_teleop_drives_it(tmp_path):
     log = tmp_path / "run.lcm"
     with arena("--record", log):
-        assert "p3at/pose: " in said(RUEDO, "hz", "p3at/pose", "-n", "1")
+        assert re.search(r"^p3at/pose: +\d", rate_of("p3at/pose"))
         parent, child = pty.openpty()
         teleop = subprocess.Popen(
             [RUEDO, "teleop", "p3at"], env=ENVIRONMENT, stdin=child, stdout=subprocess.DEVNULL
