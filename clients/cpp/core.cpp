@@ -235,6 +235,8 @@ void Core::note_time(int64_t utime) {
   news_.notify_all();
 }
 
+bool Core::is_far_ahead(int64_t utime) const { return utime - kMostAhead > utime_; }
+
 // What another message said of a time long after a tick's was false.
 void Core::note_tick(int64_t utime) {
   {

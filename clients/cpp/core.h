@@ -63,6 +63,7 @@ class Core : public std::enable_shared_from_this<Core> {
   bool in_doubt() const { return watch_.in_doubt(); }
   RobotInfo robot_info(const std::string& name) const;  // throws UnknownName
   int64_t utime() const { return utime_; }
+  bool is_far_ahead(int64_t utime) const;  // no message of this run is so far yet: it was false
   int64_t next_id() { return ++ids_; }
 
   // The stream of a channel, made on first use. raw: of its messages as they come.

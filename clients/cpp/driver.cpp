@@ -21,7 +21,8 @@ constexpr auto kUnseenTime = std::chrono::seconds(1);
 
 void MotionCore::update(const MotionStatus& status, const std::string& blocker) {
   const std::lock_guard lock(mutex);
-  if (done() || status.utime < utime) return;
+  const auto core = connection.lock();
+  if (done() || !core || (status.utime < utime && !core->is_far_ahead(utime))) return;
   utime = status.utime;
   if (status.id == id) {
     progress = status.progress;

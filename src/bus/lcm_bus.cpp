@@ -110,6 +110,10 @@ void LcmBus::listen(const std::vector<std::string>& channels, Handler handler,
   thread_ = std::thread([this] { read(); });
 }
 
+void LcmBus::keep_connected() {
+  if (stream_) listen({}, {});
+}
+
 void LcmBus::listen_to(const std::vector<std::string>& channels, const std::vector<std::string>&) {
   if (!thread_.joinable() || stopping_) return;
   std::unique_lock lock(mutex_);
@@ -219,8 +223,7 @@ void LcmBus::read() {
     else if (was_lost)
       pause = std::min(2 * pause, kLongestPause);
     else
-      spdlog::warn("{}: the server has closed the connection{}", url_.str(),
-                   url_.scheme == "unix" ? "" : "; it is looked for again");
+      spdlog::warn("{}: the server has closed the connection; it is looked for again", url_.str());
   }
 }
 
@@ -244,8 +247,7 @@ std::shared_ptr<StreamConnection> LcmBus::stream() const {
   return stream_;
 }
 
-// False when the connection is lost; the next call connects again. A unix one is not reopened: what
-// was lost meanwhile would not be known.
+// False when the connection is lost; the next call connects again.
 bool LcmBus::take_from_stream() {
   const auto take = [this](std::string_view channel, const uint8_t* data, size_t size) {
     deliver(channel, data, size);
@@ -254,7 +256,6 @@ bool LcmBus::take_from_stream() {
     stream_->take(0, take);
     return !stream_->is_over();
   }
-  if (url_.scheme == "unix") return false;
   try {
     auto made = std::make_shared<StreamConnection>(connected_to(url_));
     const std::lock_guard lock(connecting_);

@@ -43,6 +43,8 @@ class LcmBus : public Bus {
               const std::vector<std::string>& own = {}) override;
   void listen_to(const std::vector<std::string>& channels,
                  const std::vector<std::string>& own = {}) override;
+  // For who only publishes: a server's end is noticed, and it is looked for, as while listening.
+  void keep_connected();
   void stop() override;
   // With memq there is only this process.
   bool is_heard(const std::string&) const override { return url_.scheme != "memq"; }

@@ -36,6 +36,13 @@ bool StreamConnection::send(const std::vector<uint8_t>& bytes) {
   return true;
 }
 
+// Those who still publish are told, too.
+bool StreamConnection::end() {
+  over_ = true;
+  ::shutdown(socket_.get(), SHUT_RDWR);
+  return false;
+}
+
 bool StreamConnection::publish(std::string_view channel, const uint8_t* data, size_t size) {
   const std::lock_guard lock(sending_);
   frame_.clear();
@@ -69,21 +76,20 @@ bool StreamConnection::take(int timeout_ms, const Handler& handler) {
   if (buffer_.size() - end_ < kRoom / 2) buffer_.resize(2 * buffer_.size());
   const ssize_t count = ::recv(socket_.get(), &buffer_[end_], buffer_.size() - end_, MSG_DONTWAIT);
   if (count < 0 && (errno == EAGAIN || errno == EINTR)) return false;
-  over_ = count <= 0;
-  if (over_) return false;
+  if (count <= 0) return end();
   end_ += static_cast<size_t>(count);
   bool any = false;
   if (!greeted_ && end_ >= 8) {
-    if (read_big_endian<uint32_t>(buffer_.data()) != tcpq::kServerMagic) return over_ = true, false;
+    if (read_big_endian<uint32_t>(buffer_.data()) != tcpq::kServerMagic) return end();
     greeted_ = true, begin_ = 8;
   }
   while (greeted_ && end_ - begin_ >= 12) {
     const uint8_t* frame = &buffer_[begin_];
     const size_t name = read_big_endian<uint32_t>(frame + 4);
-    if (name > tcpq::kLongestChannel) return over_ = true, false;
+    if (name > tcpq::kLongestChannel) return end();
     if (end_ - begin_ < 12 + name) break;
     const size_t size = read_big_endian<uint32_t>(frame + 8 + name);
-    if (size > kLargest) return over_ = true, false;
+    if (size > kLargest) return end();
     if (end_ - begin_ < 12 + name + size) break;
     begin_ += 12 + name + size;
     handler({reinterpret_cast<const char*>(frame + 8), name}, frame + 12 + name, size);

@@ -34,6 +34,7 @@ class StreamConnection {
 
  private:
   bool send(const std::vector<uint8_t>& bytes);
+  bool end();  // false
 
   FileHandle socket_;
   std::mutex sending_;

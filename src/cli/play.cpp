@@ -93,6 +93,7 @@ int play(const PlayArguments& arguments) {
   if (arguments.viewed) return view(arguments, first.path(), second.path(), speed);
   log::Reader log(first.path());
   bus::LcmBus bus(arguments.lcm);
+  bus.keep_connected();
   if (const std::string server = bus::claimed_by(bus.url());
       !server.empty() && bus.url().scheme == "udpm")  // the others need one that carries it
     fmt::print(stderr,
@@ -114,8 +115,9 @@ int play(const PlayArguments& arguments) {
   if (!log.fault().empty()) fmt::print(stderr, "ruedo: {}: {}\n", arguments.log, log.fault());
   const double seconds =
       messages == 0 ? 0.0 : static_cast<double>(event.timestamp_us - first_us) * 1e-6;
-  fmt::print("{}: {} messages, {:g} s, on {}{}\n", arguments.log, messages, seconds,
-             bus.url().str(), interrupted ? "; interrupted" : "");
+  fmt::print("{}: {} messages, {:g} s, on {}{}{}\n", arguments.log, messages, seconds,
+             bus.url().str(), interrupted ? "; interrupted" : "",
+             bus.failed() == 0 ? "" : fmt::format("; {} not sent", bus.failed()));
   return kGood;
 }
 

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <condition_variable>
+#include <csignal>
 #include <cstdio>
 #include <cstdlib>
 #include <mutex>
@@ -67,6 +68,10 @@ class Line {
       const std::lock_guard lock(mutex_);
       show();
     });
+    // Signals are other threads' to handle, some of which block them to wait for them.
+    sigset_t all, before;
+    sigfillset(&all);
+    pthread_sigmask(SIG_SETMASK, &all, &before);
     thread_ = std::jthread([this](const std::stop_token& stop) {
       std::unique_lock lock(mutex_);
       while (!stop.stop_requested()) {
@@ -74,6 +79,7 @@ class Line {
         if (!stop.stop_requested()) show();
       }
     });
+    pthread_sigmask(SIG_SETMASK, &before, nullptr);
   }
 
   bool end() {

@@ -1,16 +1,20 @@
 // ruedo teleop: drives a robot with the keyboard of a terminal.
 #include <poll.h>
+#include <sys/signalfd.h>
 #include <termios.h>
 #include <unistd.h>
 
-#include <chrono>
 #include <cmath>
+#include <csignal>
 #include <memory>
+#include <string>
+#include <utility>
 
 #include <fmt/format.h>
 
 #include "bus/lcm_bus.h"
 #include "cli/commands.h"
+#include "core/file_handle.h"
 #include "ruedo/errors.h"
 #include "ruedo/velocity_command_t.hpp"
 
@@ -18,8 +22,46 @@ namespace ruedo::cli {
 namespace {
 
 constexpr int kRepeat_ms = 100;  // well within a robot's watchdog
-constexpr int kCtrlC = 3;
 constexpr double kStep_m_s = 0.1, kStep_rad_s = 0.2;
+// What comes in place of a key.
+constexpr int kNone = 0, kEnd = -1, kSuspend = -2, kContinue = -3;
+
+// Signals, to be read beside the keys: the robot is stopped first, and the terminal left as it was.
+// Make it before any thread, so that all inherit the blocked signals.
+class Signals {
+ public:
+  Signals() {
+    std::signal(SIGPIPE, SIG_IGN);  // printing then throws
+    sigemptyset(&signals_);
+    for (const int signal : {SIGINT, SIGQUIT, SIGTERM, SIGHUP, SIGTSTP, SIGCONT}) {
+      struct sigaction now{};
+      if (sigaction(signal, nullptr, &now) == 0 && now.sa_handler != SIG_IGN)
+        sigaddset(&signals_, signal);
+    }
+    pthread_sigmask(SIG_BLOCK, &signals_, nullptr);
+    file_ = FileHandle(signalfd(-1, &signals_, SFD_CLOEXEC | SFD_NONBLOCK));
+  }
+  int file() const { return file_.get(); }
+  int take() {
+    signalfd_siginfo signal{};
+    if (read(file_.get(), &signal, sizeof signal) != sizeof signal) return kNone;
+    const auto number = static_cast<int>(signal.ssi_signo);
+    return number == SIGTSTP ? kSuspend : number == SIGCONT ? kContinue : kEnd;
+  }
+  // As if SIGTSTP were not blocked; returns when the process goes on.
+  void suspend() {
+    raise(SIGTSTP);
+    sigset_t suspending;
+    sigemptyset(&suspending);
+    sigaddset(&suspending, SIGTSTP);
+    pthread_sigmask(SIG_UNBLOCK, &suspending, nullptr);
+    pthread_sigmask(SIG_BLOCK, &suspending, nullptr);
+  }
+
+ private:
+  sigset_t signals_{};
+  FileHandle file_;
+};
 
 // Keys at once and unseen, for as long as it lives.
 class RawTerminal {
@@ -28,71 +70,129 @@ class RawTerminal {
     if (isatty(STDIN_FILENO) == 0)
       throw EnvironmentError("teleop needs a terminal to read keys from");
     tcgetattr(STDIN_FILENO, &before_);
+    enter();
+  }
+  ~RawTerminal() { leave(); }
+
+  void enter() {
     termios raw = before_;
-    raw.c_lflag &= ~static_cast<tcflag_t>(ICANON | ECHO |
-                                          ISIG);  // Ctrl-C is a key too: the robot is stopped first
+    raw.c_lflag &= ~static_cast<tcflag_t>(ICANON | ECHO);
     tcsetattr(STDIN_FILENO, TCSANOW, &raw);
   }
-  ~RawTerminal() { tcsetattr(STDIN_FILENO, TCSANOW, &before_); }
+  void leave() { tcsetattr(STDIN_FILENO, TCSANOW, &before_); }
 
  private:
   termios before_{};
 };
 
-// The next key, or 0 when none came in that time; -1 at the end of the input. An arrow key is its
-// letter's.
-int next_key(int timeout_ms) {
-  pollfd input{STDIN_FILENO, POLLIN, 0};
-  if (poll(&input, 1, timeout_ms) <= 0) return 0;
-  char bytes[8];
-  const ssize_t count = read(STDIN_FILENO, bytes, sizeof bytes);
-  if (count <= 0) return -1;
-  if (count >= 3 && bytes[0] == '\033' && bytes[1] == '[') {
-    switch (bytes[2]) {
+// Keys out of what a terminal sends, in whatever pieces that comes. An arrow key is its letter's.
+class Keys {
+ public:
+  explicit Keys(Signals& signals) : signals_(signals) {}
+
+  // What comes within that time: a key, kNone, or what else there is.
+  int next(int timeout_ms) {
+    if (taken_ == came_) {
+      pollfd waiting[2] = {{STDIN_FILENO, POLLIN, 0}, {signals_.file(), POLLIN, 0}};
+      if (poll(waiting, 2, timeout_ms) <= 0) return kNone;
+      if (waiting[1].revents != 0) return signals_.take();
+      came_ = read(STDIN_FILENO, bytes_, sizeof bytes_);
+      taken_ = 0;
+      if (came_ <= 0) return kEnd;
+    }
+    return key_of(bytes_[taken_++]);
+  }
+
+ private:
+  int key_of(char byte) {
+    const Place place = std::exchange(place_, Place::between);
+    if (byte == '\033') return place_ = Place::escape, kNone;
+    if (place == Place::between) return byte;
+    if (place == Place::escape) {
+      if (byte != '[' && byte != 'O') return byte;
+      return place_ = Place::sequence, kNone;
+    }
+    if (byte >= '0' && byte <= '?') return place_ = Place::sequence, kNone;  // its parameters
+    switch (byte) {
       case 'A': return 'w';
       case 'B': return 's';
       case 'C': return 'd';
       case 'D': return 'a';
-      default: return 0;
+      case ' ': return ' ';  // in none: it stops, whatever came before
+      default: return kNone;
     }
   }
-  return bytes[0];
-}
+
+  enum class Place { between, escape, sequence };
+  Signals& signals_;
+  char bytes_[64] = {};
+  ssize_t came_ = 0, taken_ = 0;
+  Place place_ = Place::between;
+};
+
+// One robot's speed; at the end, whatever the reason, it stands.
+class Driver {
+ public:
+  Driver(const std::string& robot, bus::LcmBus& bus)
+      : robot_(robot), channel_(robot + "/velocity"), bus_(bus) {}
+  ~Driver() { stop(); }
+
+  void stop() {
+    command_.vx = command_.omega = 0.0;
+    send();
+  }
+  void press(int key) {
+    switch (key) {
+      case 'w': command_.vx += kStep_m_s; break;
+      case 's': command_.vx -= kStep_m_s; break;
+      case 'a': command_.omega += kStep_rad_s; break;
+      case 'd': command_.omega -= kStep_rad_s; break;
+      case ' ': command_.vx = command_.omega = 0.0; break;
+      default: break;
+    }
+    // Steps of a decimal fraction must come back to zero.
+    command_.vx = std::round(command_.vx / kStep_m_s) * kStep_m_s;
+    command_.omega = std::round(command_.omega / kStep_rad_s) * kStep_rad_s;
+    const uint64_t failed = bus_.failed();
+    send();
+    fmt::print("\r\033[K{}: {:+.1f} m/s, {:+.1f} rad/s{}", robot_, command_.vx, command_.omega,
+               bus_.failed() == failed ? "" : " (not sent)");
+    std::fflush(stdout);
+  }
+
+ private:
+  void send() {
+    uint8_t bytes[64];
+    const int size = command_.encode(bytes, 0, sizeof bytes);
+    bus_.publish(channel_, bytes, static_cast<size_t>(size));
+  }
+
+  std::string robot_, channel_;
+  bus::LcmBus& bus_;
+  velocity_command_t command_{};
+};
 
 struct TeleopArguments {
   std::string robot, lcm;
 };
 
 int teleop(const TeleopArguments& arguments) {
+  Signals signals;
   bus::LcmBus bus(arguments.lcm);
-  const RawTerminal terminal;
+  bus.keep_connected();
+  RawTerminal terminal;
   fmt::print("w s or up down: speed   a d or left right: turn   space: stop   q: quit\n");
-  const std::string channel = arguments.robot + "/velocity";
-  velocity_command_t command{};
-  const auto send = [&] {
-    uint8_t bytes[64];
-    const int size = command.encode(bytes, 0, sizeof bytes);
-    bus.publish(channel, bytes, static_cast<size_t>(size));
-  };
-  for (int key = 0; key != 'q' && key != kCtrlC && key != -1; key = next_key(kRepeat_ms)) {
-    switch (key) {
-      case 'w': command.vx += kStep_m_s; break;
-      case 's': command.vx -= kStep_m_s; break;
-      case 'a': command.omega += kStep_rad_s; break;
-      case 'd': command.omega -= kStep_rad_s; break;
-      case ' ': command.vx = command.omega = 0.0; break;
-      default: break;
+  Keys keys(signals);
+  Driver driver(arguments.robot, bus);
+  for (int key = kNone; key != 'q' && key != kEnd; key = keys.next(kRepeat_ms)) {
+    if (key == kSuspend) {
+      driver.stop();
+      terminal.leave();
+      signals.suspend();
     }
-    // Steps of a decimal fraction must come back to zero.
-    command.vx = std::round(command.vx / kStep_m_s) * kStep_m_s;
-    command.omega = std::round(command.omega / kStep_rad_s) * kStep_rad_s;
-    send();
-    fmt::print("\r\033[K{}: {:+.1f} m/s, {:+.1f} rad/s", arguments.robot, command.vx,
-               command.omega);
-    std::fflush(stdout);
+    if (key == kSuspend || key == kContinue) terminal.enter();
+    driver.press(key);
   }
-  command.vx = command.omega = 0.0;
-  send();
   fmt::print("\n");
   return kGood;
 }

@@ -103,7 +103,20 @@ struct WebServer::Impl {
   std::vector<uint8_t> message;
   std::atomic<bool> stopping{false};
   bool over = false;
+  bool told = false;  // that something went wrong
 
+  // Nothing may be thrown through libwebsockets, which is C: false when that was tried.
+  template <class Serve>
+  bool guarded(Serve serve) {
+    try {
+      serve();
+      return true;
+    } catch (const std::exception& error) {
+      if (!std::exchange(told, true))
+        spdlog::error("{}: a connection is closed: {}", place.option, error.what());
+      return false;
+    }
+  }
   static int callback(lws* wsi, lws_callback_reasons reason, void* user, void* in, size_t length);
   int dispatch(lws* wsi, lws_callback_reasons reason, void* in, size_t length);
   static void on_timer(lws_sorted_usec_list_t* entry);
@@ -148,7 +161,10 @@ int WebServer::Impl::callback(lws* wsi, lws_callback_reasons reason, void*, void
                               size_t length) {
   const lws_context* of = wsi ? lws_get_context(wsi) : nullptr;
   auto* impl = of ? static_cast<Impl*>(lws_context_user(const_cast<lws_context*>(of))) : nullptr;
-  return impl ? impl->dispatch(wsi, reason, in, length) : 0;
+  int result = 0;
+  const bool done =
+      !impl || impl->guarded([&] { result = impl->dispatch(wsi, reason, in, length); });
+  return done ? result : -1;
 }
 
 int WebServer::Impl::dispatch(lws* wsi, lws_callback_reasons reason, void* in, size_t length) {
@@ -261,9 +277,11 @@ void WebServer::Impl::on_timer(lws_sorted_usec_list_t* entry) {
         impl.context);  // wakes lws_service, which would go on waiting in this very call
     return;
   }
-  impl.keep_to_limits();
-  impl.make_room();
-  if (impl.handler.tick()) impl.ask_to_write();
+  impl.guarded([&impl] {
+    impl.keep_to_limits();
+    impl.make_room();
+    if (impl.handler.tick()) impl.ask_to_write();
+  });
   lws_sul_schedule(impl.context, 0, entry, &on_timer, impl.sockets() > 0 ? kTick_us : kIdleTick_us);
 }
 

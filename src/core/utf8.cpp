@@ -57,4 +57,8 @@ std::string printable(std::string_view text) { return cleaned(text, false); }
 
 std::string for_terminal(std::string_view text) { return cleaned(text, true); }
 
+bool is_one_line(std::string_view text) {
+  return text.find_first_of("\n\t") == std::string_view::npos && for_terminal(text) == text;
+}
+
 }  // namespace ruedo

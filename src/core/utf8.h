@@ -14,4 +14,7 @@ std::string printable(std::string_view text);
 // sets a colour.
 std::string for_terminal(std::string_view text);
 
+// Whether it is UTF-8 without any control character, as a name should be.
+bool is_one_line(std::string_view text);
+
 }  // namespace ruedo

@@ -64,9 +64,7 @@ Pose pose_of(const double (&position)[3], const double (&orientation)[4]) {
 std::string fault_of_name(const std::string& name) {
   if (name.empty() || name.size() > kLongestName)
     return fmt::format("has {} bytes; allowed are 1 to {}", name.size(), kLongestName);
-  const bool is_line =
-      std::none_of(name.begin(), name.end(), [](unsigned char c) { return c < 0x20 || c == 0x7f; });
-  if (!is_line || for_terminal(name) != name) return "is no UTF-8 text without control characters";
+  if (!is_one_line(name)) return "is no UTF-8 text without control characters";
   if (name == "ruedo" || model::is_reserved_name(name))
     return "is kept for Ruedo itself; choose another";
   if (name.starts_with(' ') || name.ends_with(' ')) return "begins or ends with a blank";

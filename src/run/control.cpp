@@ -170,7 +170,7 @@ bool Control::has_too_many(const request_t& request) const {
 void Control::join(const request_t& request, reply_t& reply) {
   join_t body;
   if (decode_checked(request.body.data(), request.body.size(), body) != DecodeFault::none ||
-      body.client.empty() || body.client.size() > 63 || for_terminal(body.client) != body.client ||
+      body.client.empty() || body.client.size() > 63 || !is_one_line(body.client) ||
       request.sequence <= 0) {
     reply.code = reply_t::BAD_REQUEST;
     reply.text =

@@ -1,6 +1,7 @@
 """A run ends soon after it is told to, however much work its modules have before them."""
 
 import os
+import pty
 import signal
 import subprocess
 import time
@@ -161,8 +162,9 @@ def processes_that_name(path):
     return found
 
 
+@pytest.mark.parametrize("shown", ["nothing", "progress"])
 @pytest.mark.parametrize("told", [signal.SIGTERM, signal.SIGINT])
-def test_while_a_mesh_is_imported_nothing_is_left(told, tmp_path):
+def test_while_a_mesh_is_imported_nothing_is_left(told, shown, tmp_path):
     """Neither the importer's process nor a file, nor the socket's name."""
     mesh = tmp_path / "large.obj"
     temporary = tmp_path / "tmp"
@@ -173,11 +175,12 @@ def test_while_a_mesh_is_imported_nothing_is_left(told, tmp_path):
     world = tmp_path / "w.sdf"
     world.write_text("""<sdf version='1.9'><world name='w'><model name='m'><static>true</static><link name='l'>
 <collision name='c'><geometry><mesh><uri>large.obj</uri></mesh></geometry></collision></link></model></world></sdf>""")
+    terminal, shell = pty.openpty()
     server = subprocess.Popen(
         [RUEDO, "run", world, "--lcm", f"unix://{tmp_path}/bus"],
         env={**os.environ, "TMPDIR": str(temporary), "XDG_CACHE_HOME": str(tmp_path / "cache")},
         stdout=subprocess.DEVNULL,
-        stderr=subprocess.DEVNULL,
+        stderr=shell if shown == "progress" else subprocess.DEVNULL,
     )
     try:
         until(lambda: len(processes_that_name(mesh)) > 0, server)
@@ -186,6 +189,8 @@ def test_while_a_mesh_is_imported_nothing_is_left(told, tmp_path):
     finally:
         server.kill()
         server.wait()
+        os.close(terminal)
+        os.close(shell)
     deadline = time.monotonic() + PATIENCE
     while processes_that_name(mesh):
         assert time.monotonic() < deadline

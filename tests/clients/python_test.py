@@ -6,6 +6,7 @@ import gc
 import math
 import os
 import resource
+import struct
 import sys
 import threading
 import time
@@ -18,6 +19,7 @@ import pytest
 import ruedo
 from conftest import HALL, PATIENCE, free_url, ruedo_run, tcp_server
 from ruedo import samples
+from ruedo.decoding import decode
 from ruedo.launch import _options
 
 QUICK = {"disable": ["p3at/camera"], "timeout": PATIENCE}
@@ -52,6 +54,33 @@ def test_samples_are_values():
     assert samples.Imu(1, np.zeros(4), np.zeros(3), np.ones(3)) != samples.Imu(
         1, np.zeros(4), np.zeros(3), np.zeros(3)
     )
+
+
+def filled(message_type):
+    """With something of all that has a length."""
+    message = message_type()
+    for name, of, sizes in zip(
+        message.__slots__, message.__typenames__, message.__dimensions__, strict=True
+    ):
+        kinds = {"string": "word", "byte": b"ab", "boolean": True, "float": 1.5, "double": 1.5}
+        own = getattr(ruedo.lcmtypes, of.rpartition(".")[2], None)
+        one = filled(own) if own else kinds.get(of, 2)
+        for size in reversed(sizes or []):  # those with names are 2, as all numbers are
+            one = b"ab" if of == "byte" else [one] * (2 if isinstance(size, str) else size)
+        setattr(message, name, one)
+    return message
+
+
+@pytest.mark.parametrize("name", [name for name in dir(ruedo.lcmtypes) if name.endswith("_t")])
+def test_a_message_that_is_cut_off_is_none(name):
+    message_type = getattr(ruedo.lcmtypes, name)
+    data = filled(message_type).encode()
+    assert decode(message_type, data).encode() == data
+    for size in range(len(data)):
+        with pytest.raises((ValueError, struct.error)):
+            decode(message_type, data[:size])
+    with pytest.raises(ValueError, match="1 bytes too many"):
+        decode(message_type, data + b"\0")
 
 
 def test_samples_cannot_be_written_into():

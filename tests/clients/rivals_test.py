@@ -101,6 +101,24 @@ def test_motions_go_on_beside_another_server(language):
     assert errors.count(BESIDE) == 1 and BEGUN not in errors
 
 
+def test_motions_end_beside_a_status_of_a_false_time(language):
+    """Before, the true ones were from then on those of the past."""
+    false = lcmtypes.motion_status_t()
+    false.utime, false.id, false.state = 1 << 60, 1 << 62, false.STATE_REFUSED
+    with (
+        ruedo_run(*QUICK, world=HALL) as server,
+        ruedo.connect(server.url, timeout=PATIENCE) as sim,
+        Datagrams(server.url) as stranger,
+        sim._connection.bus.subscribe(
+            "p3at/move", lambda data: stranger.send("p3at/motion", false.encode())
+        ),
+    ):
+        said, _ = ended(started(language, server.url, "primitives", "p3at"))
+    for what in ("advance", "rotate", "turn_to", "arc"):
+        [line] = [line.split() for line in said if line.split()[0] == what]
+        assert line[1:5] == ["False", "True", "done", "-"], said
+
+
 def in_lockstep(
     language: str, beside: Callable[[Server, ruedo.Simulation], contextlib.AbstractContextManager]
 ) -> tuple[list[str], str]:

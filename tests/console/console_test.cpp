@@ -166,19 +166,88 @@ class Talker : public Connection {
   bool has_ = false;
 };
 
-FileHandle viewer_of(int port) {
+FileHandle connected_to(int port) {
   FileHandle one(::socket(AF_INET, SOCK_STREAM, 0));
   sockaddr_in place{};
   place.sin_family = AF_INET;
   place.sin_port = htons(static_cast<uint16_t>(port));
   place.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
   EXPECT_EQ(::connect(one.get(), reinterpret_cast<sockaddr*>(&place), sizeof place), 0);
-  const std::string upgrade = fmt::format(
-      "GET /socket HTTP/1.1\r\nHost: 127.0.0.1:{}\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n"
-      "Sec-WebSocket-Version: 13\r\nSec-WebSocket-Key: AAAAAAAAAAAAAAAAAAAAAA==\r\n\r\n",
-      port);
-  EXPECT_EQ(write_all(one.get(), upgrade.data(), upgrade.size()), upgrade.size());
   return one;
+}
+
+void say(const FileHandle& to, const std::string& words) {
+  EXPECT_EQ(write_all(to.get(), words.data(), words.size()), words.size());
+}
+
+FileHandle viewer_of(int port) {
+  FileHandle one = connected_to(port);
+  say(one, fmt::format(
+               "GET /socket HTTP/1.1\r\nHost: 127.0.0.1:{}\r\nUpgrade: websocket\r\nConnection: "
+               "Upgrade\r\n"
+               "Sec-WebSocket-Version: 13\r\nSec-WebSocket-Key: AAAAAAAAAAAAAAAAAAAAAA==\r\n\r\n",
+               port));
+  return one;
+}
+
+// What comes until that is in it, or until the end.
+std::string heard_of(const FileHandle& from, const std::string& enough) {
+  std::string heard;
+  char bytes[4096];
+  for (ssize_t more = 1; more > 0 && heard.find(enough) == std::string::npos;) {
+    more = ::recv(from.get(), bytes, sizeof bytes, 0);
+    heard.append(bytes, more > 0 ? static_cast<size_t>(more) : 0);
+  }
+  return heard;
+}
+
+// Throws where it can.
+class Thrower : public Connection {
+ public:
+  bool receive(std::span<const uint8_t>) override { throw std::bad_alloc(); }
+  bool next(std::vector<uint8_t>&, bool&) override {
+    if (std::exchange(greeted_, true)) throw std::bad_alloc();
+    return false;
+  }
+
+ private:
+  bool greeted_ = false;
+};
+
+TEST(WebServer, WhatIsThrownEndsOneConnectionAlone) {
+  WebPlace place;
+  place.address.port = 0;
+  int opened = 0, ticks = 0;
+  WebHandler handler;
+  handler.get = [](std::string_view path) -> HttpResponse {
+    if (path == "/bad") throw std::bad_alloc();
+    return {.body = std::make_shared<std::vector<uint8_t>>(4, 'g')};
+  };
+  handler.open = [&]() -> std::unique_ptr<Connection> {
+    if (++opened == 1) throw std::runtime_error("no room");
+    return std::make_unique<Thrower>();
+  };
+  handler.end = [] {};
+  handler.tick = [&]() -> bool {
+    if (++ticks % 2 == 1) throw std::bad_alloc();
+    return ticks > 2;  // they may have something to send
+  };
+  WebServer server(place, std::move(handler));
+  std::jthread thread([&] { server.run(); });
+  const auto asked = [&](const char* path) {
+    const FileHandle one = connected_to(server.port());
+    say(one, fmt::format("GET {} HTTP/1.1\r\nHost: 127.0.0.1:{}\r\n\r\n", path, server.port()));
+    return heard_of(one, "gggg");
+  };
+  EXPECT_THAT(asked("/good"), testing::EndsWith("gggg"));
+  EXPECT_EQ(asked("/bad"), "");
+  for (int i = 0; i < 3; ++i) heard_of(viewer_of(server.port()), "never");  // until it is closed
+  const FileHandle talker = viewer_of(server.port());
+  heard_of(talker, "\r\n\r\n");
+  say(talker, std::string("\x81\x80\0\0\0\0", 6));  // a text without a letter
+  heard_of(talker, "never");
+  EXPECT_THAT(asked("/good"), testing::EndsWith("gggg"));
+  server.stop();
 }
 
 // 40 of 8 MB each.

@@ -1,4 +1,4 @@
-"""ruedo echo, hz and teleop, on a bus of their own (isolated.py): what they say is what was
+"""ruedo echo, hz, teleop and play, on a bus of their own (isolated.py): what they say is what was
 published.
 """
 
@@ -6,10 +6,12 @@ import os
 import pty
 import re
 import select
+import signal
 import socket
 import struct
 import subprocess
 import sys
+import termios
 import threading
 from contextlib import contextmanager
 from pathlib import Path
@@ -23,6 +25,29 @@ RUEDO = BUILD / "bin" / "ruedo"
 URL = "udpm://239.255.76.67:7731?ttl=0"
 PATIENCE = 400  # s, for what comes sooner or later, on a machine that does much else too
 sys.path.insert(0, str(BUILD / "python"))
+
+
+HELLO = struct.pack(">II", 0x287617FA, 0x0100)  # a server's
+
+
+def frame(channel, data):
+    return struct.pack(f">II{len(channel)}sI", 1, len(channel), channel.encode(), len(data)) + data
+
+
+@contextmanager
+def listening(kind, folder, url=""):
+    """A server's socket and its URL, at that URL's place if one is given."""
+    if kind == "tcpq":
+        port = int(url.rpartition(":")[2] or 0)
+        with socket.create_server(("127.0.0.1", port)) as server:
+            yield server, f"tcpq://127.0.0.1:{server.getsockname()[1]}"
+        return
+    path = folder / "bus"
+    with socket.socket(socket.AF_UNIX) as server:
+        server.bind(str(path))
+        server.listen()
+        yield server, f"unix://{path}"
+    path.unlink()
 
 
 @contextmanager
@@ -97,17 +122,35 @@ def test_echo_holds_no_more_than_it_may():
     count = 4 << 20
     data = planar_lidar_t().encode()
     data = data[:16] + struct.pack(">i", count) + bytes(4 * count) + data[20:]
-    frame = struct.pack(">II5sI", 1, 5, b"large", len(data)) + data
-    with socket.create_server(("127.0.0.1", 0)) as server:
-        url = f"tcpq://127.0.0.1:{server.getsockname()[1]}"
+    with listening("tcpq", None) as (server, url):
         echo = subprocess.Popen([RUEDO, "echo", "large", "--lcm", url], stdout=subprocess.PIPE)
         with server.accept()[0] as client:
-            client.sendall(struct.pack(">II", 0x287617FA, 0x0100))
+            client.sendall(HELLO)
             for _ in range(40):
-                client.sendall(frame)
+                client.sendall(frame("large", data))
     echo.kill()
     _, _, used = os.wait4(echo.pid, 0)
     assert used.ru_maxrss < 300_000  # KiB, of 640 MB
+
+
+@pytest.mark.parametrize("kind", ["tcpq", "unix"])
+def test_echo_goes_on_with_the_next_server(kind, tmp_path):
+    url = ""
+    for number in range(3):
+        with listening(kind, tmp_path, url) as (server, url):
+            if number == 0:
+                echo = subprocess.Popen(
+                    [RUEDO, "echo", "a", "-n", "3", "--lcm", url],
+                    stdout=subprocess.PIPE,
+                    stderr=subprocess.PIPE,
+                    text=True,
+                )
+            with server.accept()[0] as client:
+                client.sendall(HELLO + frame("a", bytes(8 + number)))
+                assert echo.stdout.readline().startswith(f"a: {8 + number} bytes")
+    out, said = echo.communicate(timeout=PATIENCE)
+    assert echo.returncode == 0 and out == ""
+    assert said.count("the server has closed the connection; it is looked for again") >= 2
 
 
 def test_echo_of_silence_ends_when_asked_to():
@@ -139,51 +182,183 @@ def test_hz_counts_what_comes():
     assert ruedo("hz", "silent", "-n", "1").returncode == 1
 
 
+def test_play_says_what_nobody_took(tmp_path):
+    log = lcm.EventLog(str(tmp_path / "log"), "w")
+    for time_us in (0, 1_000_000):
+        log.write_event(time_us, "a", b"word")
+    log.close()
+    with listening("unix", tmp_path) as (server, url):
+        play = subprocess.Popen(
+            [RUEDO, "play", tmp_path / "log", "--lcm", url], stdout=subprocess.PIPE, text=True
+        )
+        with server.accept()[0] as client:
+            came = b""
+            while not came.endswith(frame("a", b"word")):
+                came += client.recv(4096)
+    said = play.communicate(timeout=PATIENCE)[0]
+    assert play.returncode == 0 and said.endswith(f"2 messages, 1 s, on {url}; 1 not sent\n")
+
+
+class Teleop:
+    """Started in a terminal of its own, with the commands that it publishes."""
+
+    def __init__(self, url=URL):
+        self.terminal, self.child = pty.openpty()
+        self.before = termios.tcgetattr(self.child)
+        self.process = subprocess.Popen(
+            [RUEDO, "teleop", "p3at", "--lcm", url],
+            stdin=self.child,
+            stdout=self.child,
+            stderr=self.child,
+            process_group=0,  # with a parent outside it, as under a shell: it can be suspended
+        )
+        self.said = ""
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        self.process.kill()
+        self.process.wait()
+        os.close(self.terminal)
+        os.close(self.child)
+
+    def press(self, keys):
+        while not self.is_raw():
+            self.read()
+        os.write(self.terminal, keys)
+
+    def read(self):
+        if select.select([self.terminal], [], [], 0.05)[0]:
+            self.said += os.read(self.terminal, 4096).decode()
+
+    def is_raw(self):
+        return not termios.tcgetattr(self.child)[3] & (termios.ICANON | termios.ECHO)
+
+    def is_as_before(self):
+        return termios.tcgetattr(self.child) == self.before
+
+
+class Commands:
+    """What is published on p3at/velocity."""
+
+    def __init__(self):
+        from ruedo.lcmtypes import velocity_command_t
+
+        self.bus, self.found = lcm.LCM(URL), []
+        self.bus.subscribe(
+            "p3at/velocity",
+            lambda channel, data: self.found.append(
+                (c := velocity_command_t.decode(data), round(c.vx, 6), round(c.omega, 6))[1:]
+            ),
+        )
+
+    def until(self, teleop, command):
+        while not self.found or self.found[-1] != command:
+            teleop.read()
+            assert self.bus.handle_timeout(1000 * PATIENCE) > 0
+
+
 def test_teleop_drives_as_keys_are_pressed():
-    """In a terminal: w and a twice each, an arrow, the space that stops, q; what is published then,
-    and that it stands at the end.
-    """
+    """w and a twice each, an arrow, the space that stops, q; what is published then, and that it
+    stands at the end."""
+    commands = Commands()
+    with Teleop() as teleop:
+        commands.until(teleop, (0, 0))
+        for key, command in (
+            (b"w", (0.1, 0)),
+            (b"w", (0.2, 0)),
+            (b"a", (0.2, 0.2)),
+            (b"\033[C", (0.2, 0)),
+            (b"\033[B", (0.1, 0)),
+            (b" ", (0, 0)),
+            (b"s", (-0.1, 0)),
+        ):
+            teleop.press(key)
+            commands.until(teleop, command)
+        repeated = len(commands.found)
+        while len(commands.found) < repeated + 5:  # without a key, too: the watchdog is content
+            assert commands.bus.handle_timeout(1000 * PATIENCE) > 0
+        assert commands.found[-1] == (-0.1, 0)
+        teleop.press(b"q")
+        commands.until(teleop, (0, 0))
+        assert teleop.process.wait(PATIENCE) == 0 and teleop.is_as_before()
+
+
+def test_teleop_takes_keys_in_whatever_pieces_they_come():
+    commands = Commands()
+    with Teleop() as teleop:
+        commands.until(teleop, (0, 0))
+        for keys, command in (
+            (b"wwa", (0.2, 0.2)),
+            (b"w\033[A\033OD", (0.4, 0.4)),  # both kinds of arrows
+            (b"ww ", (0, 0)),
+            (b"s\033[1;5A\033[3~w", (0.1, 0)),  # up with Ctrl, and delete
+            (b"\033", None),
+            (b"[", None),
+            (b"B", (0, 0)),
+            (b"w\033", (0.1, 0)),
+            (b" ", (0, 0)),
+            (b"w\033[", (0.1, 0)),
+            (b" ", (0, 0)),
+        ):
+            teleop.press(keys)
+            if command is not None:
+                commands.until(teleop, command)
+            else:
+                teleop.read()
+
+
+@pytest.mark.parametrize("told", ["TERM", "HUP", "INT", "QUIT"])
+def test_teleop_leaves_a_robot_that_stands_and_the_terminal_as_it_was(told):
+    commands = Commands()
+    with Teleop() as teleop:
+        teleop.press(b"w")
+        commands.until(teleop, (0.1, 0))
+        teleop.process.send_signal(getattr(signal, f"SIG{told}"))
+        commands.until(teleop, (0, 0))
+        assert teleop.process.wait(PATIENCE) == 0 and teleop.is_as_before()
+
+
+def test_teleop_is_suspended():
+    commands = Commands()
+    with Teleop() as teleop:
+        teleop.press(b"w")
+        commands.until(teleop, (0.1, 0))
+        teleop.process.send_signal(signal.SIGTSTP)
+        commands.until(teleop, (0, 0))
+        os.waitid(os.P_PID, teleop.process.pid, os.WSTOPPED)
+        assert teleop.is_as_before()
+        for suspended in (signal.SIGTSTP, signal.SIGSTOP):
+            teleop.process.send_signal(signal.SIGCONT)
+            teleop.press(b"w")
+            commands.until(teleop, (0.1, 0))
+            teleop.press(b" ")
+            commands.until(teleop, (0, 0))
+            teleop.process.send_signal(suspended)
+            os.waitid(os.P_PID, teleop.process.pid, os.WSTOPPED)
+            termios.tcsetattr(teleop.child, termios.TCSANOW, teleop.before)  # as a shell does
+
+
+@pytest.mark.parametrize("kind", ["tcpq", "unix"])
+def test_teleop_goes_on_with_the_next_server(kind, tmp_path):
     from ruedo.lcmtypes import velocity_command_t
 
-    bus, found = lcm.LCM(URL), []
-    bus.subscribe(
-        "p3at/velocity",
-        lambda channel, data: found.append(
-            (c := velocity_command_t.decode(data), round(c.vx, 6), round(c.omega, 6))[1:]
-        ),
-    )
-    parent, child = pty.openpty()
-    process = subprocess.Popen(
-        [RUEDO, "teleop", "p3at", "--lcm", URL], stdin=child, stdout=child, stderr=child
-    )
-    os.close(child)
-
-    def until(command):
-        while not found or found[-1] != command:
-            if select.select([parent], [], [], 0)[0]:
-                os.read(parent, 4096)
-            assert bus.handle_timeout(1000 * PATIENCE) > 0
-
-    until((0, 0))
-    for key, command in (
-        (b"w", (0.1, 0)),
-        (b"w", (0.2, 0)),
-        (b"a", (0.2, 0.2)),
-        (b"\033[C", (0.2, 0)),
-        (b"\033[B", (0.1, 0)),
-        (b" ", (0, 0)),
-        (b"s", (-0.1, 0)),
-    ):
-        os.write(parent, key)
-        until(command)
-    repeated = len(found)
-    while len(found) < repeated + 5:  # without a key, too: the watchdog is content
-        assert bus.handle_timeout(1000 * PATIENCE) > 0
-    assert found[-1] == (-0.1, 0)
-    os.write(parent, b"q")
-    until((0, 0))
-    assert process.wait(PATIENCE) == 0
-    os.close(parent)
+    with listening(kind, tmp_path) as (server, url):
+        teleop = Teleop(url)
+        server.accept()[0].close()
+    with teleop:
+        for words in ("(not sent)", f"{url}: the server has closed the connection"):
+            while words not in teleop.said:
+                teleop.read()
+        with listening(kind, tmp_path, url) as (server, _), server.accept()[0] as client:
+            client.sendall(HELLO)
+            teleop.press(b"w")
+            command, came = velocity_command_t(), b""
+            command.vx = 0.1
+            while frame("p3at/velocity", command.encode()) not in came:
+                teleop.read()
+                came += client.recv(4096)
 
 
 def test_teleop_needs_a_terminal():

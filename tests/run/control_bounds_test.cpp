@@ -5,6 +5,7 @@
 #include "control_client.h"
 #include "ruedo/grant_reply_t.hpp"
 #include "ruedo/grant_request_t.hpp"
+#include "ruedo/join_t.hpp"
 #include "ruedo/rate_request_t.hpp"
 #include "ruedo/resend_reply_t.hpp"
 #include "ruedo/resend_request_t.hpp"
@@ -83,6 +84,17 @@ TEST(Texts, OfRepliesAreShort) {
   body.name = "\033[2J";
   EXPECT_EQ(client.ask(request_t::GET_STATE, engine::encoded(body)).text,
             "there is no model or MODEL/LINK called '?[2J'");
+}
+
+TEST(Texts, NamesOfClientsReachNoTerminal) {
+  Controlled client;
+  client.begin(paused_server(), kRobot);
+  join_t joining;
+  for (const char* name : {"", "a\033[2J", "a\nb", "a\xff"}) {
+    joining.client = name;
+    EXPECT_EQ(client.ask(request_t::JOIN, engine::encoded(joining)).code, reply_t::BAD_REQUEST)
+        << name;
+  }
 }
 
 // Seconds go by, of the test's own clock, while the server listens.

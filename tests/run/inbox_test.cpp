@@ -7,6 +7,7 @@
 
 #include "engine/command_inbox.h"
 #include "ruedo/velocity_command_t.hpp"
+#include "ruedo/wheel_command_t.hpp"
 #include "run/control.h"
 #include "running.h"
 
@@ -98,6 +99,26 @@ TEST_F(InboxTest, IsBounded) {
   EXPECT_EQ(apply(0).size(), engine::CommandInbox::kMostScheduled / 2);
   EXPECT_EQ(schedule(1, 0.2), Scheduled::kept);  // there is room again
   EXPECT_EQ(apply(1).back(), 0.2);
+}
+
+TEST_F(InboxTest, TakesNothingLarge) {
+  engine::CommandInbox wheels({{"r/wheels", RobotIndex(0), engine::Input::Kind::wheels}}, 1);
+  wheel_command_t command{};
+  command.n = 8000;
+  for (const uint64_t refused : {0, 1}) {
+    command.rate.resize(static_cast<size_t>(command.n));
+    const auto bytes = engine::encoded(command);
+    wheels.receive("r/wheels", bytes.data(), bytes.size());
+    EXPECT_EQ(wheels.refused(), refused) << bytes.size();
+    command.n = 8200;  // more than 64 kB
+  }
+}
+
+TEST_F(InboxTest, WhatWaitsForARobotGoesWithIt) {
+  EXPECT_EQ(schedule(3, 0.3), Scheduled::kept);
+  receive(0.1);
+  inbox_.remove(RobotIndex(0));
+  for (int64_t step = 0; step < 5; ++step) EXPECT_THAT(apply(step), ElementsAre()) << step;
 }
 
 // However threads are scheduled, each kept command acts once, on its step.

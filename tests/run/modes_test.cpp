@@ -104,7 +104,7 @@ class LockstepModeTest : public testing::Test {
       sessions_.push_back(session);
     }
   }
-  engine::Outcome grant(int client, int64_t from, int64_t until, int64_t received = -1) {
+  static request_t granting(int64_t from, int64_t until, int64_t received = -1) {
     grant_request_t body{};
     body.granted = from;
     body.step_until = until;
@@ -112,7 +112,10 @@ class LockstepModeTest : public testing::Test {
     request_t request{};
     request.kind = request_t::GRANT;
     request.body = engine::encoded(body);
-    return lockstep_->grant(request, sessions_[client]);
+    return request;
+  }
+  engine::Outcome grant(int client, int64_t from, int64_t until, int64_t received = -1) {
+    return lockstep_->grant(granting(from, until, received), sessions_[client]);
   }
   void join_all() {
     for (size_t i = 0; i < sessions_.size(); ++i)
@@ -159,6 +162,57 @@ TEST_F(LockstepModeTest, BeginsAgainWithAWorldMadeAnew) {
   lockstep_->begin(world_.stage(), -1);
   EXPECT_EQ(world_.gate.limit, 0);
   EXPECT_EQ(grant(0, 0, 3).code, reply_t::OK);  // grants stand at 0 again
+}
+
+TEST_F(LockstepModeTest, ANameIsTakenUntilItsClientIsSilent) {
+  begin(1);
+  join_all();
+  publish(0);
+  Session second = sessions_[0];
+  second.id = 9;
+  sessions_.push_back(second);
+  EXPECT_EQ(grant(1, -1, -1).code, reply_t::REFUSED);
+  lockstep_->attend(sessions_, 0, kStart + seconds(11));
+  EXPECT_EQ(grant(1, -1, -1).code, reply_t::OK);
+}
+
+TEST_F(LockstepModeTest, EachClientSendsItsShareAheadAndNoMore) {
+  const int clients = 64;
+  const size_t share = Lockstep::kMostHeld / clients;
+  begin(clients);
+  join_all();
+  publish(0);
+  grant_request_t body{};
+  body.step_until = 2000;
+  grant_command_t command;
+  command.channel = "r/velocity";
+  command.step = 1000;
+  command.data = forward();
+  command.size = static_cast<int32_t>(command.data.size());
+  request_t request{};
+  request.kind = request_t::GRANT;
+  const auto granted = [&](int client, size_t commands) {
+    body.commands.assign(commands, command);
+    body.ncommands = static_cast<int32_t>(commands);
+    request.body = engine::encoded(body);
+    return lockstep_->grant(request, sessions_[client]).code;
+  };
+  EXPECT_EQ(granted(0, share + 1), reply_t::REFUSED);
+  EXPECT_EQ(granted(0, share), reply_t::OK);
+  EXPECT_EQ(granted(1, share), reply_t::OK);
+}
+
+TEST_F(LockstepModeTest, FewGrantsOfAClientWaitForTheOthers) {
+  begin(2);
+  join_all();
+  publish(0);
+  const auto most = static_cast<int64_t>(Lockstep::kMostGrants);
+  for (int64_t step = 0; step < most; ++step) {
+    EXPECT_FALSE(lockstep_->early(granting(step, step + 1), sessions_[0])) << step;
+    grant(0, step, step + 1);
+  }
+  EXPECT_TRUE(lockstep_->early(granting(most, most + 1), sessions_[0]));
+  EXPECT_FALSE(lockstep_->early(granting(0, 1), sessions_[1]));
 }
 
 TEST_F(LockstepModeTest, HasNoRoomBeforeTheMessagesAreReceived) {

@@ -304,6 +304,37 @@ TEST_F(ControlTest, ControlOff) {
   for (const Message& message : bus_.messages()) EXPECT_NE(message.channel, "ruedo/reply");
 }
 
+// What comes faster than it is served.
+TEST(Control, FewRequestsWait) {
+  size_t executed = 0;
+  Control control(7, {.execute =
+                          [&](const request_t&, const Session&) {
+                            ++executed;
+                            return engine::Outcome{};
+                          },
+                      .publish = [](const reply_t&) {},
+                      .epoch = [] { return 1; },
+                      .state_comes = [] { return false; }});
+  request_t asked{};
+  asked.kind = request_t::INFO;
+  const auto served = [&](size_t body, size_t times) {
+    asked.body.assign(body, 0);
+    asked.size = static_cast<int32_t>(body);
+    const std::vector<uint8_t> bytes = engine::encoded(asked);
+    for (size_t i = 0; i < times; ++i) EXPECT_TRUE(control.receive(bytes.data(), bytes.size()));
+    control.serve();
+    return std::exchange(executed, 0);
+  };
+  EXPECT_EQ(served(0, Control::kMostWaiting + 1), Control::kMostWaiting);
+  const size_t large = Control::kMaxRequestSize - 1000;
+  EXPECT_EQ(served(large, 20), Control::kMostWaitingBytes / (large + 1000));
+  EXPECT_EQ(served(0, 1), 1U);  // there is room again
+  asked.body.assign(Control::kMaxRequestSize, 0);
+  asked.size = static_cast<int32_t>(asked.body.size());
+  const std::vector<uint8_t> larger = engine::encoded(asked);
+  EXPECT_FALSE(control.receive(larger.data(), larger.size()));
+}
+
 // Without a server: the world's first state is late, and requests wait for it in order.
 TEST(Control, WaitsForTheFirstState) {
   bool state_comes = true;
@@ -347,6 +378,13 @@ TEST(Control, WaitsForTheFirstState) {
   EXPECT_EQ(executed,
             (std::vector<int32_t>{request_t::GET_STATE, request_t::QUIT, request_t::SPAWN}));
   EXPECT_EQ(replies.size(), 4U);
+  state_comes = true;  // it was reset; few requests wait, and the others have to be repeated
+  executed.clear();
+  for (size_t i = 0; i < Control::kMostHeld + 3; ++i) ask(request_t::GET_STATE);
+  control.serve();
+  state_comes = false;
+  control.serve();
+  EXPECT_EQ(executed.size(), Control::kMostHeld);
 }
 
 }  // namespace

@@ -27,6 +27,10 @@ class Clock:
             with self._news:
                 self._news.notify_all()
 
+    def is_far_ahead(self, utime: int) -> bool:
+        """Of a time that no message of this run has yet: it was false."""
+        return utime > self.utime + _MOST_AHEAD
+
     def note_tick(self, utime: int) -> None:
         """A tick of that time came: what another message said of a time long after it was false."""
         if utime < self.utime - _MOST_AHEAD:

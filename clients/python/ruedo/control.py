@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from . import lcmtypes
+from .decoding import decode
 from .errors import NotSupported, RequestError, Timeout, TypeMismatch, for_terminal
 from .geometry import Floats
 from .samples import Value, floats
@@ -126,7 +127,7 @@ class Session:
         if data[:8] != lcmtypes.reply_t._get_packed_fingerprint():
             return
         try:
-            reply = lcmtypes.reply_t.decode(data)
+            reply = decode(lcmtypes.reply_t, data)
         except Exception:
             return
         if not self._connection.is_of_our_run(reply.run_id):
@@ -197,7 +198,7 @@ class Session:
 
 def state_of(reply: Any) -> State:
     try:
-        m = lcmtypes.state_reply_t.decode(reply.body)
+        m = decode(lcmtypes.state_reply_t, reply.body)
     except Exception:
         raise TypeMismatch(
             "the reply's body is no state_reply_t of this client's version"

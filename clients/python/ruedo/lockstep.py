@@ -21,6 +21,7 @@ import numpy as np
 
 from . import arrivals, lcmtypes
 from .control import State
+from .decoding import decode
 from .errors import (
     LeaseLost,
     NoServer,
@@ -294,7 +295,7 @@ class Stepper:
         body.granted = body.received = -1
         reply = self._connection.session.request_in_turn(lcmtypes.request_t.GRANT, body, timeout)
         try:
-            stands = lcmtypes.grant_reply_t.decode(reply.body)
+            stands = decode(lcmtypes.grant_reply_t, reply.body)
             if not -1 <= stands.received <= stands.granted or not 0 <= stands.granted <= _FURTHEST:
                 raise ValueError("where nobody stands")
         except Exception:
@@ -633,7 +634,7 @@ class Stepper:
                 self._fault = self._fault or _fault_of(reply)
         elif not granting:
             try:
-                self._take_pieces(lcmtypes.resend_reply_t.decode(reply.body))
+                self._take_pieces(decode(lcmtypes.resend_reply_t, reply.body))
             except Exception:
                 return  # damaged: it is asked for again
         elif reply.sequence == self._grant[0] and not self._taken:

@@ -9,6 +9,7 @@ from collections.abc import Iterator
 from typing import Any, NamedTuple
 
 from . import lcmtypes
+from .decoding import decode
 from .errors import NotSupported
 from .files import open_regular
 
@@ -96,7 +97,7 @@ def read_log(path: str | os.PathLike[str], channels: list[str] | None = None) ->
         if message_type is None or (channels is not None and event.channel not in channels):
             continue
         try:
-            message = message_type.decode(event.data)
+            message = decode(message_type, event.data)
         except Exception:
             continue
         rows.setdefault(event.channel, []).append(

@@ -78,7 +78,7 @@ class Motion:
 
     def _update(self, status: MotionStatus, blocked_by: str = "") -> None:
         with self._news:
-            if status.utime < self._utime:
+            if status.utime < self._utime and not self._connection.clock.is_far_ahead(self._utime):
                 return
             self._utime = status.utime
             if status.id == self.id:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, Generic, NamedTuple, TypeVar
 
 from . import samples
 from .callbacks import Callbacks, Subscription
+from .decoding import decode
 from .errors import RuedoError, Timeout, TypeMismatch
 
 if TYPE_CHECKING:
@@ -33,12 +34,11 @@ def form_of(message: Any) -> Form:
     """Of a class that lcm-gen made: its objects, as they are."""
     try:
         fingerprint = message._get_packed_fingerprint()
-        decode = message.decode
     except AttributeError:
         raise TypeError(
             f"type is {message!r}: it must be a class that lcm-gen made of an .lcm file"
         ) from None
-    return Form(fingerprint, decode, message)
+    return Form(fingerprint, lambda data: decode(message, data), message)
 
 
 class Reader(Generic[T]):
@@ -121,7 +121,7 @@ class Stream(Reader[T]):
                     f'robot.stream("{name}", raw=True) gives the bytes'
                 )
             message, convert = samples.CONVERSIONS[self.type]
-            make = samples.DECODERS.get(self.type, lambda data: convert(message.decode(data)))
+            make = samples.DECODERS.get(self.type, lambda data: convert(decode(message, data)))
             self._given = Form(message._get_packed_fingerprint(), make, None)
         return self._given
 

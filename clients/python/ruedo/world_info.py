@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from . import lcmtypes
+from .decoding import decode
 from .errors import CONTROL, TypeMismatch
 
 _HEAD = struct.Struct(">qqqihh")  # fingerprint, utime, run_id, epoch, part, nparts
@@ -119,7 +120,7 @@ class WorldInfoAssembler:
         if content == self._last:
             return None
         try:
-            decoded = [lcmtypes.world_info_t.decode(p) for p in parts]
+            decoded = [decode(lcmtypes.world_info_t, p) for p in parts]
             for part_info in decoded:
                 _refuse_control_characters(part_info)
             info = WorldInfo(decoded)

@@ -46,8 +46,9 @@ public final class MessageSample<M> extends Sample {
 
     private static <M> Sample decode(Constructor<M> constructor, byte[] bytes) throws IOException {
         try {
-            M message =
-                    constructor.newInstance(new DataInputStream(new ByteArrayInputStream(bytes)));
+            ByteArrayInputStream in = new ByteArrayInputStream(bytes);
+            M message = constructor.newInstance(new DataInputStream(in));
+            if (in.available() > 0) throw new IOException(in.available() + " bytes too many");
             return new MessageSample<>(utimeOf(message), message, bytes);
         } catch (InvocationTargetException error) { // lcm-gen's decoders believe every length
             throw new IOException(String.valueOf(error.getCause()));

@@ -115,7 +115,7 @@ public final class Motion {
     }
 
     synchronized void update(MotionStatus status, String blocker) {
-        if (done() || status.utime < utime) return;
+        if (done() || status.utime < utime && !sim.isFarAhead(utime)) return;
         utime = status.utime;
         if (status.id == id) {
             progress = status.progress;

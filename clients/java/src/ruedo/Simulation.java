@@ -448,6 +448,11 @@ public final class Simulation implements AutoCloseable {
         notifyAll();
     }
 
+    /** No message of this run is so far yet: it was false. */
+    boolean isFarAhead(long time) {
+        return time - MOST_AHEAD_MICROS > utime;
+    }
+
     /** What another message said of a time long after a tick's was false. */
     private synchronized void noteTick(long now) {
         if (now < utime - MOST_AHEAD_MICROS) utime = Math.max(now, 0);

@@ -9,6 +9,7 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
+from ..decoding import decode
 from ..logs import HEADER_CHANNEL
 
 Bundle = dict[str, bytes]
@@ -81,7 +82,7 @@ def log_moved(log: bytes, folder: str, to: str) -> bytes:
         for event in lcm.EventLog(old, "r"):
             data = event.data
             if event.channel == HEADER_CHANNEL:
-                header = log_header_t.decode(data)
+                header = decode(log_header_t, data)
                 header.world_file = _moved_path(header.world_file, folder, to)
                 for file in header.files:
                     file.path = _moved_path(file.path, folder, to)

@@ -18,6 +18,7 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
+from ..decoding import decode
 from ..engine import Engine
 from ..launch import find_ruedo
 from ..logs import APPLIED_CHANNEL, HEADER_CHANNEL, STATE_HASH_CHANNEL
@@ -372,7 +373,7 @@ def thinned(log: str) -> tuple[bytes, str]:
     )
     content = Path(kept).read_bytes()
     os.unlink(kept)
-    return content, f"{state_hash_t.decode(last).state_hash & (2**64 - 1):016x}" if last else ""
+    return content, f"{decode(state_hash_t, last).state_hash & (2**64 - 1):016x}" if last else ""
 
 
 def _copy_channels(log: str, to: str, kept: Any, last_of: str = "") -> bytes:

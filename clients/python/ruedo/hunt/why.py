@@ -17,6 +17,7 @@ import numpy as np
 
 from ..campaign.case import Runner, fault_text
 from ..campaign.errors import CampaignError, SpecError
+from ..decoding import decode
 from ..engine import Engine
 from ..logs import APPLIED_CHANNEL, HEADER_CHANNEL, STATE_HASH_CHANNEL, Event, events
 
@@ -50,7 +51,7 @@ class Recorded:
 
         def decoded(message_type: Any, event: Event) -> Any:
             try:
-                return message_type.decode(event.data)
+                return decode(message_type, event.data)
             except Exception:
                 raise SpecError(
                     f"{path}: a message of {event.channel}, at {event.timestamp * 1e-6:g} s, is broken"
