@@ -2,9 +2,11 @@
 
 import math
 import os
+import subprocess
+import sys
 
 import pytest
-from conftest import CAMPAIGN, ruedo
+from conftest import CAMPAIGN, PATIENCE, ruedo
 from ruedo.campaign import Campaign, SpecError
 from ruedo.campaign.plan import points, substitute
 from ruedo.campaign.stats import mcnemar, paired_difference, wilson
@@ -206,6 +208,20 @@ def test_a_generator_that_ends_the_program_is_told(folder):
         "walls(distance=1.2) raised SystemExit"
         in ruedo("campaign", "run", "c.yaml", folder=folder, code=3).stderr
     )
+
+
+def test_a_worlds_text_costs_time_by_its_length(tmp_path):
+    """Looking for what it refers to must not try each way to divide the blanks."""
+    text = "<sdf version='1.9'><world name='w'/></sdf><!--<uri>" + " " * 100_000 + "-->"
+    (tmp_path / "w.sdf").write_text(text)
+    program = """import sys
+from pathlib import Path
+from ruedo.campaign.worlds import WorldFiles
+print(WorldFiles(Path(), Path("made")).sha256("w.sdf", ""))"""
+    done = subprocess.run(
+        [sys.executable, "-c", program], cwd=tmp_path, capture_output=True, timeout=PATIENCE
+    )
+    assert done.returncode == 0 and len(done.stdout.strip()) == 64
 
 
 @pytest.mark.parametrize(
