@@ -25,6 +25,8 @@ WRONG = [  # what is replaced, by what, line, what the message says
         13,
         "limits.duration: is nan; allowed is a finite number",
     ),
+    ("seeds: 2", 'seeds: 2\nrobots: ["\\uD800"]', 11, r"robots\[0\]: is '.*', which holds"),
+    ("seeds: 2", 'seeds: 2\nset: {"\\uDFFF": 1}', 11, "set: is '.*', which holds half of a char"),
     ("limits: {duration: 3}", "limits: {}", 13, "limits: needs 'duration'"),
     ("limits: {duration: 3}", "", 2, "needs 'limits'"),
     (
