@@ -32,7 +32,7 @@ class WorldFiles:
     def find(self, name: str) -> str:
         """A file beside the campaign's, or the name of a world that comes with Ruedo."""
         beside = self._folder / name
-        return str(beside) if beside.is_file() else name
+        return str(beside) if os.path.isfile(beside) else name
 
     def generate(self, generator: Function, parameters: dict[str, Any]) -> str:
         """The file of the world that generator(**parameters) makes: SDF as text, or a
