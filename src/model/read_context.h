@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "model/controller_files.h"
 #include "model/document.h"
 #include "model/mesh_loader.h"
 #include "model/resources.h"
@@ -17,6 +18,7 @@ struct ReadContext {
   DocumentStore& documents;
   MeshLoader& meshes;
   std::vector<std::string> xacro_arguments = {};  // "NAME:=VALUE"
+  ControllerFiles controllers{resources};
 };
 
 // The name attribute. Throws InputError if it is missing, empty or reserved by SDF ("world",
