@@ -94,7 +94,9 @@ Bytes LogSource::history(const std::string& name, const std::string& field) {
       [&](const log::Index::Channel& channel) { return printable(channel.name) == name; });
   if (found == channels.end()) return nullptr;
   const std::vector<log::Index::Entry>& entries = found->entries;
-  const size_t every = 1 + entries.size() / kMostHistory;
+  size_t all = 0;
+  for (const log::Index::Entry& entry : entries) all += entry.size;
+  const size_t every = 1 + std::max(entries.size() / kMostHistory, all / kMostForPlot);
   std::vector<double> numbers{static_cast<double>(every)};
   log::Event event;
   for (size_t i = 0; i < entries.size();
@@ -122,6 +124,7 @@ LogLook::LogLook(LogSource& source)
   playback_.now_s = playback_.begin_s;
   playback_.speed = source.speed_;
   playback_.playing = true;
+  ++source_.looks_;
 }
 
 SimTime LogLook::now_us() const {
@@ -151,7 +154,10 @@ void LogLook::pump(Board& board) {
 void LogLook::show(Board& board) {
   const SimTime time_us = now_us();
   const auto& channels = source_.index_.channels();
-  for (size_t i = 0; i < channels.size(); ++i) {
+  const size_t begin = next_;
+  size_t bytes = 0;
+  for (size_t n = 0; n < channels.size(); ++n) {
+    const size_t i = (begin + n) % channels.size();
     if (channels[i].fingerprint == markers_t::getHash()) continue;  // see show_drawn
     if (board.channels()[i].watchers == 0) {
       shown_[i] = kNothing;  // read again on demand
@@ -160,8 +166,12 @@ void LogLook::show(Board& board) {
     size_t count = channels[i].count_until(time_us);
     if (count == 0 && channels[i].fingerprint == world_info_t::getHash()) count = 1;
     if (count == shown_[i]) continue;
+    if (bytes > LogSource::kMostAtATime / source_.looks_) {  // the others are shown next time
+      next_ = i;
+      break;
+    }
     shown_[i] = count;
-    if (count > 0) load(board, i, count);
+    if (count > 0) bytes += load(board, i, count);
   }
   const run::LogWorlds::Scene& scene = source_.worlds_.at(time_us);
   if (source_.makes_info_ && told_ != &scene) {
@@ -191,16 +201,19 @@ void LogLook::show_drawn(Board& board) {
 }
 
 // The newest of that many messages; for one in parts, including the previous parts.
-void LogLook::load(Board& board, size_t channel, size_t count) {
+size_t LogLook::load(Board& board, size_t channel, size_t count) {
   const auto& entries = source_.index_.channels()[channel].entries;
   std::vector<std::vector<uint8_t>> parts;
+  size_t bytes = 0;
   for (size_t entry = count; entry > 0 && parts.size() < Board::kMostParts; --entry) {
     if (!read(reader_, entries[entry - 1], event_)) break;
     parts.push_back(event_.data);
+    bytes += event_.data.size();
     if (!board.is_later_part(parts.back())) break;
   }
   for (auto part = parts.rbegin(); part != parts.rend(); ++part)
     board.put(channel, std::move(*part));
+  return bytes;
 }
 
 Count LogLook::traffic(size_t channel) const {
@@ -221,14 +234,14 @@ void LogLook::play(bool on, double speed) {
   playback_.playing = on;
 }
 
-void LogLook::seek(Board& board, double time_s) {
+// It is shown by the next pump(): a thousand of these at a time cost one look.
+void LogLook::seek(double time_s) {
   playback_.now_s = std::clamp(time_s, playback_.begin_s, playback_.end_s);
   ++playback_.jumps;
-  show(board);
 }
 
 // From state to state; if the log has none, from message to message.
-void LogLook::step(Board& board, int states) {
+void LogLook::step(int states) {
   const auto& channels = source_.index_.channels();
   const auto found = std::find_if(channels.begin(), channels.end(), [](const auto& channel) {
     return channel.fingerprint == world_state_t::getHash();
@@ -242,10 +255,10 @@ void LogLook::step(Board& board, int states) {
   };
   playback_.playing = false;
   auto at = after(states > 0 ? now : now - 1);
-  if (states > 0 && at == entries.end()) return seek(board, playback_.end_s);
-  if (states < 0 && at == entries.begin()) return seek(board, playback_.begin_s);
+  if (states > 0 && at == entries.end()) return seek(playback_.end_s);
+  if (states < 0 && at == entries.begin()) return seek(playback_.begin_s);
   if (states < 0) --at;
-  seek(board, static_cast<double>(at->time_us) * 1e-6);
+  seek(static_cast<double>(at->time_us) * 1e-6);
 }
 
 }  // namespace ruedo::console

@@ -19,6 +19,9 @@ class LogSource : public Source {
   static constexpr size_t kMostHistory = 100'000;      // messages of a channel read for a plot
   static constexpr size_t kScanned = 2'000;            // messages scanned for events at a time
   static constexpr uint32_t kMostMessage = 64u << 20;  // bytes; larger ones are not shown
+  // Bytes that are read for a plot, and for all viewers at a time: what one of them asks for holds
+  // nobody up for longer.
+  static constexpr size_t kMostForPlot = 256u << 20, kMostAtATime = 64u << 20;
 
   // Throws InputError for a file that is not a log. speed: log time per wall time. other: a log to
   // compare with, loaded by load_other; "" for none.
@@ -49,6 +52,7 @@ class LogSource : public Source {
   run::LogWorlds worlds_;
   EventScan scan_;
   bool scanned_ = false;
+  size_t looks_ = 0;
   log::Reader reader_;
   std::string info_channel_;
   bool makes_info_ = false;  // the log has none: its channel follows those of the log
@@ -60,14 +64,17 @@ class LogLook : public Look {
  public:
   // The source must outlive it.
   explicit LogLook(LogSource& source);
+  ~LogLook() override { --source_.looks_; }
+  LogLook(const LogLook&) = delete;
+  LogLook& operator=(const LogLook&) = delete;
 
   void pump(Board& board) override;
   Count traffic(size_t channel) const override;
   size_t scene() const override { return source_.worlds_.number(now_us()); }
   const Playback& playback() const override { return playback_; }
   void play(bool on, double speed) override;
-  void seek(Board& board, double time_s) override;
-  void step(Board& board, int states) override;
+  void seek(double time_s) override;
+  void step(int states) override;
 
  private:
   static constexpr size_t kNothing = static_cast<size_t>(-1);
@@ -75,7 +82,7 @@ class LogLook : public Look {
   SimTime now_us() const;
   void show(Board& board);
   void show_drawn(Board& board);
-  void load(Board& board, size_t channel, size_t count);
+  size_t load(Board& board, size_t channel, size_t count);  // bytes
 
   LogSource& source_;
   log::Reader reader_;
@@ -83,6 +90,7 @@ class LogLook : public Look {
   const run::LogWorlds::Scene* told_ = nullptr;  // whose info is on the board
   // For each channel, the number of messages up to the one put on the board.
   std::vector<size_t> shown_;
+  size_t next_ = 0;                           // the channel to begin with
   std::vector<size_t> shown_layers_;          // for each layer, like shown_
   std::optional<Comparison::Ghosts> ghosts_;  // none: no comparison
   Playback playback_;

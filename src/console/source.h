@@ -39,9 +39,9 @@ class Look {
   virtual size_t scene() const = 0;
   virtual const Playback& playback() const = 0;
   virtual void play(bool on, double speed) = 0;
-  virtual void seek(Board& board, double time_s) = 0;
+  virtual void seek(double time_s) = 0;
   // Moves by that many states, forward or back.
-  virtual void step(Board& board, int states) = 0;
+  virtual void step(int states) = 0;
 };
 
 class Source {

@@ -75,11 +75,11 @@ bool Viewer::receive(std::span<const uint8_t> message) {
     case Operation::seek:
       if (rest.size() != 8) return false;
       if (const double time_s = read_double(rest); look_ && std::isfinite(time_s))
-        look_->seek(own_board_, time_s);
+        look_->seek(time_s);
       return true;
     case Operation::step:
       if (rest.size() != 1) return false;
-      if (look_) look_->step(own_board_, rest[0] != 0 ? 1 : -1);
+      if (look_) look_->step(rest[0] != 0 ? 1 : -1);
       return true;
   }
   return false;

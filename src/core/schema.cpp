@@ -54,10 +54,12 @@ class Tokens {
     return token;
   }
 
-  [[noreturn]] void fail(const std::string& what) const {
+  [[noreturn]] void fail(const std::string& what) const { throw InputError(here(), what); }
+
+  Source here() const {
     const auto line =
         1 + std::count(text_.begin(), text_.begin() + static_cast<ptrdiff_t>(at_), '\n');
-    throw InputError({file_, static_cast<int>(line)}, what);
+    return {file_, static_cast<int>(line)};
   }
 
   // The next token, empty at the end.
@@ -98,6 +100,7 @@ class Tokens {
 // A schema before the types of its members are looked up.
 struct Parsed {
   Schema schema;
+  Source source;
   std::vector<std::string> type_names;  // of each field
   uint64_t hash = 0x12345678;
 };
@@ -118,6 +121,13 @@ Primitive primitive_of(std::string_view type) {
   return Primitive::none;
 }
 
+// Whether the field may be the length of others.
+bool counts(const Field& field) {
+  return field.dimensions.empty() &&
+         (field.primitive == Primitive::int8 || field.primitive == Primitive::int16 ||
+          field.primitive == Primitive::int32 || field.primitive == Primitive::int64);
+}
+
 // Reads `name[size][count];` after a type; true when another name follows a comma.
 bool parse_member(Tokens& tokens, std::string_view type, Parsed& parsed) {
   Field field;
@@ -129,6 +139,9 @@ bool parse_member(Tokens& tokens, std::string_view type, Parsed& parsed) {
   std::vector<std::string_view> sizes;
   std::string_view token = tokens.want();
   for (; token == "["; token = tokens.want()) {
+    if (sizes.size() == kMostTypeDimensions)
+      tokens.fail("'" + field.name + "' has more than " + std::to_string(kMostTypeDimensions) +
+                  " dimensions");
     sizes.push_back(tokens.want());
     if (tokens.want() != "]") tokens.fail("the dimension of '" + field.name + "' has no ]");
   }
@@ -149,9 +162,9 @@ bool parse_member(Tokens& tokens, std::string_view type, Parsed& parsed) {
       const auto& fields = parsed.schema.fields;
       const auto counter = std::find_if(fields.begin(), fields.end(),
                                         [&](const Field& f) { return f.name == size; });
-      if (counter == fields.end())
+      if (counter == fields.end() || !counts(*counter))
         tokens.fail("the length '" + std::string(size) + "' of '" + field.name +
-                    "' is no field before it");
+                    "' is no field before it that is one int8_t, int16_t, int32_t or int64_t");
       dimension.counted_by = FieldIndex(counter - fields.begin());
     }
     parsed.hash = mix(mix(parsed.hash, static_cast<uint8_t>(fixed ? 0 : 1)), size);
@@ -166,11 +179,14 @@ bool parse_member(Tokens& tokens, std::string_view type, Parsed& parsed) {
 }
 
 void parse_file(std::string_view text, const std::string& file, std::deque<Parsed>& all) {
+  if (text.find('\0') != std::string_view::npos)
+    throw InputError({file}, "contains a zero byte: it is no text");
   Tokens tokens(text, file);
   const size_t before = all.size();
   for (std::string_view token = tokens.next(); !token.empty(); token = tokens.next()) {
     if (token != "struct") continue;
     Parsed parsed;
+    parsed.source = tokens.here();
     parsed.schema.name = tokens.want();
     if (tokens.want() != "{") tokens.fail("'" + parsed.schema.name + "' has no {");
     for (token = tokens.want(); token != "}"; token = tokens.want()) {
@@ -228,9 +244,8 @@ class Registry {
         field.type = find(type);
         if (field.type == nullptr && others != nullptr) field.type = others->find(type);
         if (field.type == nullptr)
-          throw InputError({schemas_[i].name}, "'" + field.name + "' is of the type '" +
-                                                   parsed[i].type_names[f] +
-                                                   "', which is in no .lcm file that was read");
+          wrong(parsed[i], "'" + field.name + "' is of the type '" + parsed[i].type_names[f] +
+                               "', which is in no .lcm file that was read");
       }
     }
     std::vector<Extent> extents(schemas_.size());
@@ -272,8 +287,8 @@ class Registry {
     Extent& extent = extents[at];
     if (extent.state == Extent::known) return extent;
     if (extent.state == Extent::under_way)
-      throw InputError({schema.name}, "holds itself, which cannot be read");
-    if (depth > kMostTypeDepth) too_deep(schema);
+      wrong(parsed[at], "it holds itself, which cannot be read");
+    if (depth > kMostTypeDepth) too_deep(parsed[at]);
     extent.state = Extent::under_way;
     uint64_t hash = parsed[at].hash;
     for (const Field& field : schema.fields) {
@@ -282,17 +297,16 @@ class Registry {
           const Extent held = measure(*own, parsed, extents, depth + 1);
           extent.fields += held.fields;
           extent.height = std::max(extent.height, held.height + 1);
-          if (extent.height > kMostTypeDepth) too_deep(schema);
+          if (extent.height > kMostTypeDepth) too_deep(parsed[at]);
         }
         if (field.type->least_bytes == 0)
-          throw InputError({schema.name}, "'" + field.name + "' is of the type '" +
-                                              field.type->name +
-                                              "', which holds nothing, and cannot be read");
+          wrong(parsed[at], "'" + field.name + "' is of the type '" + field.type->name +
+                                "', which holds nothing, and cannot be read");
         hash += static_cast<uint64_t>(field.type->fingerprint);
       }
       if (++extent.fields > kMostTypeFields)
-        throw InputError({schema.name}, "has, with the types that it holds, more than " +
-                                            std::to_string(kMostTypeFields) + " fields");
+        wrong(parsed[at], "it has, with the types that it holds, more than " +
+                              std::to_string(kMostTypeFields) + " fields");
       schema.least_bytes = saturating_sum(schema.least_bytes, least_bytes(field));
     }
     schema.fingerprint = static_cast<int64_t>((hash << 1) + (hash >> 63));
@@ -300,9 +314,12 @@ class Registry {
     return extent;
   }
 
-  [[noreturn]] static void too_deep(const Schema& schema) {
-    throw InputError({schema.name}, "holds structs in structs more than " +
-                                        std::to_string(kMostTypeDepth) + " deep");
+  [[noreturn]] static void wrong(const Parsed& type, const std::string& what) {
+    throw InputError(type.source, "the type '" + type.schema.name + "': " + what);
+  }
+  [[noreturn]] static void too_deep(const Parsed& type) {
+    wrong(type,
+          "it holds structs in structs more than " + std::to_string(kMostTypeDepth) + " deep");
   }
 
   // null: another registry's.

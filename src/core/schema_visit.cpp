@@ -20,12 +20,16 @@ using Visitor = std::function<bool(const FieldPath&, const FieldValue&)>;
 
 class Walk {
  public:
-  Walk(std::span<const uint8_t> bytes, const Visitor* visitor) : bytes_(bytes), visitor_(visitor) {}
+  Walk(std::span<const uint8_t> bytes, const Visitor* visitor)
+      : bytes_(bytes),
+        visitor_(visitor),
+        fields_left_(kMostTypeFields + kMostFieldsOfByte * bytes.size()) {}
 
   bool fields(const Schema& schema, int depth) {
     if (depth > kMostTypeDepth) return false;
     std::vector<int64_t> counts(schema.fields.size(), 0);
     for (size_t i = 0; i < schema.fields.size(); ++i) {
+      if (fields_left_-- == 0) return false;
       const Field& field = schema.fields[i];
       if (visitor_ != nullptr)
         path_.parts.push_back({&field, std::vector<int64_t>(field.dimensions.size(), 0)});
@@ -120,6 +124,7 @@ class Walk {
   std::span<const uint8_t> bytes_;
   const Visitor* visitor_;
   size_t at_ = 0;
+  size_t fields_left_;
   int64_t last_integer_ = 0;
   bool ended_ = false;
   FieldPath path_;

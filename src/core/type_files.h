@@ -12,10 +12,16 @@
 namespace ruedo {
 
 // The largest type that is read, so that no small file makes a large one: .lcm files of 1 MiB,
-// structs in structs (ours go three deep), and fields of a struct with those of all that it holds.
+// structs in structs (ours go three deep), dimensions of an array, and fields of a struct with
+// those of all that it holds.
 constexpr size_t kMostTypeBytes = size_t{1} << 20;
 constexpr int kMostTypeDepth = 16;
+constexpr size_t kMostTypeDimensions = 16;
 constexpr size_t kMostTypeFields = 10'000;
+
+// A message of more fields than that, the empty arrays of structs in arrays for the most part, is
+// none of its type.
+constexpr size_t kMostFieldsOfByte = 16;
 
 // Reads .lcm files, and those of folders; find_schema(fingerprint) finds their types from then on.
 // They may hold types of Ruedo's. Once, before any thread asks. Throws InputError with file and

@@ -4,6 +4,7 @@
 // batches. Batches are recycled: after the first round nothing here allocates.
 #pragma once
 
+#include <algorithm>
 #include <atomic>
 #include <cstdint>
 #include <memory>
@@ -16,6 +17,8 @@
 #include "ruedo/snapshot.h"
 
 namespace ruedo::engine {
+
+inline constexpr int kMaxBatchSteps = 32;
 
 using InputIndex = Index<struct InputKind>;  // into CommandInbox::inputs()
 
@@ -34,6 +37,13 @@ struct Reseeding {
   uint64_t seed;
 };
 
+// Of a list by step: the one by which that step draws; null: none yet.
+inline const Reseeding* reseeding_at(const std::vector<Reseeding>& all, int64_t step) {
+  const auto later =
+      std::find_if(all.begin(), all.end(), [=](const Reseeding& one) { return one.step > step; });
+  return later == all.begin() ? nullptr : &*std::prev(later);
+}
+
 // By channel: whether anybody reads its messages. Channels beyond its end are read.
 using ReadChannels = std::vector<bool>;
 
@@ -47,10 +57,10 @@ struct Batch {
   std::vector<AppliedCommand> applied;  // the first `applied_count` are valid
   int applied_count = 0;
 
-  // Of all devices, while any is or was faulty; null: none. Includes those of the batch's steps.
+  // Of all devices, once any was faulty; null: none. Includes those that act on the batch's steps.
   std::shared_ptr<const std::vector<SensorFault>> sensor_faults;
 
-  // By step; null: none. Includes those of the batch's steps.
+  // By step; null: none. Includes those that the batch's steps draw by.
   std::shared_ptr<const std::vector<Reseeding>> reseedings;
 
   // Null: everything is read. Pictures that nobody reads are not drawn.

@@ -304,7 +304,7 @@ void CommandInbox::apply(robot::Robots& robots, Faults& faults, int64_t step, Ba
       if (check_fault_message(taken_[i].bytes.data(), taken_[i].bytes.size(), fault).empty())
         faults.begin(fault, taken_[i].command.robot, step);
     } else if (kind != Input::Kind::markers) {
-      faults.command(taken_[i].command, step, robots);
+      faults.command(taken_[i].command, taken_[i].bytes.size(), step, robots);
     }
     if (static_cast<size_t>(batch.applied_count) == batch.applied.size())
       batch.applied.emplace_back();

@@ -25,7 +25,6 @@
 namespace ruedo::engine {
 namespace {
 
-constexpr int64_t kBatchSteps = 32;
 const std::atomic<bool> kNeverLeftOff{false};
 
 // Sets rounding and denormal modes as in every computing thread, whatever the caller's program
@@ -64,7 +63,7 @@ class Engine::Borrowed {
   Borrowed(Arena& arena, const World& world) : spare_(arena.spare.local()) {
     if (spare_.empty()) {
       batch_ = std::make_unique<Batch>();
-      batch_->snapshots.resize(kBatchSteps);
+      batch_->snapshots.resize(kMaxBatchSteps);
     } else {
       batch_ = std::move(spare_.back());
       spare_.pop_back();
@@ -221,7 +220,7 @@ void Engine::compute(size_t index, int64_t steps) {
   for (std::vector<LinkIndex>& met : copy.met) met.clear();
   for (int64_t left = steps; left > 0; left -= batch.count) {
     batch.first_step = copy.step + 1;
-    batch.count = static_cast<int>(std::min(left, kBatchSteps));
+    batch.count = static_cast<int>(std::min<int64_t>(left, kMaxBatchSteps));
     batch.applied_count = 0;
     for (int i = 0; i < batch.count; ++i)
       world.advance(batch.first_step + i, batch.snapshots[i], batch);

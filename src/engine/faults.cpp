@@ -15,9 +15,10 @@
 namespace ruedo::engine {
 namespace {
 
-constexpr size_t kMostFaults = 1000;  // of each kind at once; more are refused
-constexpr size_t kMostLate = 65536;   // commands
-constexpr double kMostSlip = 1e6;     // turns for one that moves anything, by many faults at once
+constexpr size_t kMostFaults = 1000;          // at once; more are refused
+constexpr size_t kMostLate = 65536;           // commands; more are lost
+constexpr size_t kMostLateBytes = 32u << 20;  // likewise
+constexpr double kMostSlip = 1e6;  // turns for one that moves anything, by many faults at once
 
 bool same_name(const std::string& a, const std::string& b) {
   return std::equal(a.begin(), a.end(), b.begin(), b.end(), [](unsigned char x, unsigned char y) {
@@ -113,6 +114,7 @@ std::string Faults::check(const model::Fault& fault, RobotIndex robot) const {
 }
 
 void Faults::begin(const model::Fault& fault, RobotIndex robot, int64_t step) {
+  forget_ended(step);
   if (const std::string why = check(fault, robot); !why.empty()) {
     spdlog::warn("{}/fault was ignored: {}", name_of(robot), why);
     return;
@@ -120,7 +122,26 @@ void Faults::begin(const model::Fault& fault, RobotIndex robot, int64_t step) {
   begin_at(fault, robot, step, true);
 }
 
+// A batch has one list for all of its steps, so that some that have ended are still needed.
+void Faults::forget_ended(int64_t step) {
+  const int64_t before = step - kMaxBatchSteps;  // no batch that is still computed begins there
+  std::erase_if(of_robots_,
+                [=](const RobotFault& fault) { return fault.done || fault.end <= step; });
+  const auto is_over = [=](const SensorFault& fault) { return fault.end <= before; };
+  if (of_sensors_ && std::any_of(of_sensors_->begin(), of_sensors_->end(), is_over)) {
+    auto rest = std::make_shared<std::vector<SensorFault>>(*of_sensors_);
+    std::erase_if(*rest, is_over);
+    of_sensors_ = std::move(rest);
+  }
+  const Reseeding* first = reseedings_ ? reseeding_at(*reseedings_, before) : nullptr;
+  if (first && first != reseedings_->data()) {
+    const Reseeding* end = reseedings_->data() + reseedings_->size();
+    reseedings_ = std::make_shared<const std::vector<Reseeding>>(first, end);
+  }
+}
+
 void Faults::begin_at(const model::Fault& fault, RobotIndex robot, int64_t begin, bool message) {
+  ever_ = true;
   const int64_t end = fault.duration_s > 0.0 ? begin + steps(fault.duration_s) : INT64_MAX;
   const model::FaultKind& kind = *model::find_fault_kind(fault.kind);
   if (kind.of == model::FaultKind::Of::device) {
@@ -142,7 +163,7 @@ void Faults::begin_at(const model::Fault& fault, RobotIndex robot, int64_t begin
   }
 }
 
-// Faults that have acted keep their place: a message acts after all of them.
+// A message acts after those of the same step.
 void Faults::begin_reseeding(uint64_t seed, int64_t begin) {
   auto all = reseedings_ ? std::make_shared<std::vector<Reseeding>>(*reseedings_)
                          : std::make_shared<std::vector<Reseeding>>();
@@ -154,12 +175,9 @@ void Faults::begin_reseeding(uint64_t seed, int64_t begin) {
 }
 
 std::optional<uint64_t> Faults::new_seed(int64_t step) {
-  std::optional<uint64_t> seed;
-  for (; reseedings_ && reseeded_ < reseedings_->size() && (*reseedings_)[reseeded_].step <= step;
-       ++reseeded_)
-    seed = (*reseedings_)[reseeded_].seed;
-  if (seed) seed_ = *seed;
-  return seed;
+  const Reseeding* now = reseedings_ ? reseeding_at(*reseedings_, step) : nullptr;
+  if (!now || now->seed == seed_) return std::nullopt;
+  return seed_ = now->seed;
 }
 
 void Faults::begin_of_device(const model::Fault& fault, RobotIndex robot, int64_t begin,
@@ -184,8 +202,9 @@ void Faults::begin_of_device(const model::Fault& fault, RobotIndex robot, int64_
 }
 
 void Faults::before_commands(int64_t step, robot::Robots& robots) {
-  while (!late_.empty() && late_.front().first <= step) {
-    robots.apply(weakened(late_.front().second, step));
+  while (!late_.empty() && late_.front().step <= step) {
+    robots.apply(weakened(late_.front().command, step));
+    late_bytes_ -= late_.front().bytes;
     late_.pop_front();
   }
   for (RobotFault& fault : of_robots_) {
@@ -212,16 +231,18 @@ bool Faults::is_lost(RobotIndex robot, int64_t step) {
   return lost;
 }
 
-void Faults::command(const robot::Command& command, int64_t step, robot::Robots& robots) {
+void Faults::command(const robot::Command& command, size_t bytes, int64_t step,
+                     robot::Robots& robots) {
   if (of_robots_.empty() || std::holds_alternative<robot::ResetOdometry>(command.what))
     return robots.apply(command);
   if (is_lost(command.robot, step)) return;
   int64_t delay = 0;
   const auto later = [&](int64_t steps) {
-    if (late_.size() >= kMostLate) return;
+    if (late_.size() >= kMostLate || late_bytes_ + bytes > kMostLateBytes) return;
     const auto after = std::upper_bound(late_.begin(), late_.end(), step + steps,
-                                        [](int64_t at, const auto& one) { return at < one.first; });
-    late_.insert(after, {step + steps, command});
+                                        [](int64_t at, const Late& one) { return at < one.step; });
+    late_.insert(after, {step + steps, command, bytes});
+    late_bytes_ += bytes;
   };
   for (const RobotFault& fault : of_robots_) {
     if (!fault.acts(command.robot, step)) continue;
@@ -295,7 +316,11 @@ void Faults::show_wheels(Snapshot& snapshot) {
 
 void Faults::remove(RobotIndex robot) {
   std::erase_if(of_robots_, [&](const RobotFault& fault) { return fault.robot == robot; });
-  std::erase_if(late_, [&](const auto& one) { return one.second.robot == robot; });
+  std::erase_if(late_, [&](const Late& one) {
+    if (one.command.robot != robot) return false;
+    late_bytes_ -= one.bytes;
+    return true;
+  });
   if (!of_sensors_) return;
   auto rest = std::make_shared<std::vector<SensorFault>>(*of_sensors_);
   std::erase_if(*rest, [&](const SensorFault& fault) { return fault.robot == robot; });
@@ -305,11 +330,11 @@ void Faults::remove(RobotIndex robot) {
 void Faults::reset_time() {
   of_robots_.clear();
   late_.clear();
+  late_bytes_ = 0;
   of_sensors_.reset();
   if (!reseedings_) return;
   // The seed is kept, also for modules that have not reached it yet.
   reseedings_ = std::make_shared<const std::vector<Reseeding>>(1, Reseeding{0, seed_});
-  reseeded_ = 1;
 }
 
 }  // namespace ruedo::engine

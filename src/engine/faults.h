@@ -6,6 +6,7 @@
 // on the wheel angles that encoders see.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <deque>
 #include <memory>
@@ -44,8 +45,8 @@ class Faults {
 
   // Before the commands on the state `step`: delayed commands act, kidnapped robots are moved.
   void before_commands(int64_t step, robot::Robots& robots);
-  // A command on the state `step`, as changed by faults.
-  void command(const robot::Command& command, int64_t step, robot::Robots& robots);
+  // A command on the state `step`, as changed by faults. bytes: the size of its message.
+  void command(const robot::Command& command, size_t bytes, int64_t step, robot::Robots& robots);
   // The wheel angles of a new state as encoders see them.
   void show_wheels(Snapshot& snapshot);
   // For the modules; null if there are none.
@@ -57,9 +58,7 @@ class Faults {
   const std::shared_ptr<const std::vector<Reseeding>>& reseedings() const { return reseedings_; }
 
   // Whether nothing has ever gone wrong, and no seed changed: then there is no state.
-  bool none() const {
-    return !of_sensors_ && !reseedings_ && of_robots_.empty() && late_.empty() && !wheels_ever_;
-  }
+  bool none() const { return !ever_; }
 
   void remove(RobotIndex robot);
   void reset_time();  // steps count from 0: current faults end
@@ -88,8 +87,15 @@ class Faults {
     }
   };
 
+  struct Late {
+    int64_t step;  // on which it acts
+    robot::Command command;
+    size_t bytes;
+  };
+
   int64_t steps(double seconds) const;
   void begin_at(const model::Fault& fault, RobotIndex robot, int64_t begin, bool message);
+  void forget_ended(int64_t step);  // they make room for others
   void begin_reseeding(uint64_t seed, int64_t begin);
   void begin_of_device(const model::Fault& fault, RobotIndex robot, int64_t begin, int64_t end);
   const device_info_t* find_device(RobotIndex robot, const std::string& name) const;
@@ -102,15 +108,15 @@ class Faults {
   Bound<const model::WorldModel> world_;
   Bound<const model::BodyLayout> layout_;
   Bound<const std::vector<device_info_t>> devices_;
-  uint64_t seed_;        // currently in use
-  size_t reseeded_ = 0;  // number of seed changes that have happened
+  uint64_t seed_;  // currently in use
   std::shared_ptr<const std::vector<Reseeding>> reseedings_;
   std::shared_ptr<const std::vector<SensorFault>> of_sensors_;
   int64_t sensor_faults_ = 0;
   std::vector<RobotFault> of_robots_;
-  std::deque<std::pair<int64_t, robot::Command>> late_;  // sorted by the step on which they act
-  std::vector<uint64_t> draws_;                          // for each robot
-  bool wheels_ever_ = false;
+  std::deque<Late> late_;  // by step
+  size_t late_bytes_ = 0;
+  std::vector<uint64_t> draws_;                     // for each robot
+  bool ever_ = false, wheels_ever_ = false;         // whether anything was faulty, and any wheel
   std::vector<double> true_angles_, shown_angles_;  // for each wheel, while encoders may be wrong
 };
 

@@ -210,7 +210,7 @@ void Module::sample_with_faults(const Batch& batch, const Snapshot& snapshot, si
   Outbox& out = faulty ? own : outbox;
   if (slot.observes) device.sensor->observe(snapshot, out);
   if (slot.step == snapshot.step) take_sample(batch, snapshot, k, out);
-  if (!faulty) return;
+  if (!faulty) return slot.faults.reset();
   if (!slot.faults) slot.faults = std::make_unique<FaultFilter>(setup_.step_us);
   slot.faults->pass(own, *batch.sensor_faults, device.robot, device.name, snapshot.step, outbox);
 }
@@ -275,10 +275,9 @@ bool Module::needs_scenes(const ReadChannels* read, const std::vector<SensorFaul
 }
 
 void Module::reseed(size_t k, const std::vector<Reseeding>& reseedings, int64_t step) {
-  size_t& done = slots_[k].reseeded;
-  for (; done < reseedings.size() && reseedings[done].step <= step; ++done) {
-    if (auto& random = setup_.devices[k].random) random->reseed(reseedings[done].seed);
-  }
+  auto& random = setup_.devices[k].random;
+  const Reseeding* now = reseeding_at(reseedings, step);
+  if (random && now && now->seed != random->seed()) random->reseed(now->seed);
 }
 
 void Module::pass_over(size_t k, const Snapshot& snapshot) {

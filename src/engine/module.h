@@ -157,11 +157,10 @@ class Module {
     SampleClock clock;
     int64_t sample, step;
     bool observes, visual_rays;
-    Owned<FaultFilter> faults = {};    // created when the device is first faulty
+    Owned<FaultFilter> faults = {};    // while the device is faulty
     Owned<Snapshot> passed_over = {};  // what the skipped sample would have shown
     int64_t passed_sample = -1;        // its number; -1: none was skipped
     uint64_t passed_seed = 0;          // the seed that it would have used
-    size_t reseeded = 0;               // number of seed changes in batches that have happened
   };
 
   Slot slot_of(const Device& device) const;

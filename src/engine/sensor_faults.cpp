@@ -6,6 +6,8 @@
 #include <cstring>
 #include <span>
 
+#include <spdlog/spdlog.h>
+
 #include "core/big_endian.h"
 #include "core/whole.h"
 #include "ruedo/decode.h"
@@ -18,8 +20,9 @@
 namespace ruedo::engine {
 namespace {
 
-constexpr double kFarthest = 1e30;  // of what is measured, by many faults at once
-constexpr size_t kTimeAt = 8;       // every type begins with its fingerprint and int64_t utime
+constexpr double kFarthest = 1e30;    // of what is measured, by many faults at once
+constexpr size_t kBesideBytes = 128;  // of memory, for a message that is kept
+constexpr size_t kTimeAt = 8;         // every type begins with its fingerprint and int64_t utime
 
 // A plugin's message may have no time.
 bool has_time(const std::vector<uint8_t>& bytes) {
@@ -86,12 +89,11 @@ void change(const SensorFault& fault, odometry_t& message) {  // a bias applies 
 }
 // a bias applies to the rate about its z axis
 void change(const SensorFault& fault, imu_t& message) {
-  if (fault.kind == SensorFault::Kind::bias) {
-    message.angular_velocity[2] += fault.value;
-    return;
-  }
-  for (double& value : message.angular_velocity) value *= fault.value;
-  for (double& value : message.linear_acceleration) value *= fault.value;
+  message.angular_velocity[2] = wrong(fault, message.angular_velocity[2]);
+  if (fault.kind == SensorFault::Kind::bias) return;
+  for (double* value : {&message.angular_velocity[0], &message.angular_velocity[1]})
+    *value = wrong(fault, *value);
+  for (double& value : message.linear_acceleration) value = wrong(fault, value);
 }
 
 template <class Type>
@@ -111,6 +113,23 @@ void change_values(const SensorFault& fault, std::vector<uint8_t>& bytes) {
                     change_as<imu_t>(fault, bytes));
 }
 
+bool keeps(const SensorFault& fault) {
+  return fault.kind == SensorFault::Kind::freeze || fault.kind == SensorFault::Kind::lag;
+}
+
+size_t keepers(const std::vector<SensorFault>& faults, int64_t step) {
+  return static_cast<size_t>(
+      std::count_if(faults.begin(), faults.end(), [=](const SensorFault& fault) {
+        return keeps(fault) && step >= fault.begin && step < fault.end;
+      }));
+}
+
+void tell_lost(const SensorFault& fault, bool& told) {
+  if (!std::exchange(told, true))
+    spdlog::warn("{}: messages are lost, since a fault keeps more than there is room for",
+                 fault.device);
+}
+
 }  // namespace
 
 bool applies_to(SensorFault::Kind fault, const std::string& device_kind) {
@@ -121,6 +140,14 @@ bool applies_to(SensorFault::Kind fault, const std::string& device_kind) {
   return true;
 }
 
+size_t FaultFilter::cost(const Message& message) { return message.bytes.size() + kBesideBytes; }
+
+size_t FaultFilter::kept() const {
+  size_t bytes = 0;
+  for (const auto& [fault, kept] : kept_) bytes += kept.bytes;
+  return bytes;
+}
+
 void FaultFilter::pass(const Outbox& published, const std::vector<SensorFault>& faults,
                        RobotIndex robot, const std::string& device, int64_t step, Outbox& out) {
   std::vector<Message> messages;
@@ -128,12 +155,16 @@ void FaultFilter::pass(const Outbox& published, const std::vector<SensorFault>& 
     const uint8_t* bytes = published.data(entry);
     messages.push_back({entry.channel, {bytes, bytes + entry.size}});
   }
+  const size_t room = most_kept_ / std::max<size_t>(1, keepers(faults, step));
+  std::map<int64_t, Kept> before;  // what is not taken from here is of faults that have ended
+  before.swap(kept_);
   for (const SensorFault& fault : faults) {
     if (!fault.acts_on(robot, device, step)) continue;
+    if (keeps(fault)) kept_[fault.id] = std::move(before[fault.id]);
     switch (fault.kind) {
       case SensorFault::Kind::dropout: messages.clear(); break;
-      case SensorFault::Kind::freeze: freeze(fault, messages); break;
-      case SensorFault::Kind::lag: lag(fault, step, messages); break;
+      case SensorFault::Kind::freeze: freeze(fault, kept_[fault.id], room, messages); break;
+      case SensorFault::Kind::lag: lag(fault, step, kept_[fault.id], room, messages); break;
       case SensorFault::Kind::clock_drift:
         for (Message& message : messages) {
           set_time(message.bytes,
@@ -150,24 +181,42 @@ void FaultFilter::pass(const Outbox& published, const std::vector<SensorFault>& 
 
 // The first message under the fault is repeated with current times: a hanging driver puts new
 // stamps on old data.
-void FaultFilter::freeze(const SensorFault& fault, std::vector<Message>& messages) {
-  for (Message& message : messages) {
-    const auto [kept, first] = frozen_.try_emplace({fault.id, message.channel}, message.bytes);
-    if (first) continue;
-    const int64_t now = time_of(message.bytes);
-    message.bytes = kept->second;
-    set_time(message.bytes, now);
+void FaultFilter::freeze(const SensorFault& fault, Kept& kept, size_t room,
+                         std::vector<Message>& messages) {
+  if (kept.bytes > room) {
+    kept.frozen.clear();
+    kept.bytes = 0;
   }
+  std::erase_if(messages, [&](Message& message) {
+    auto first = kept.frozen.find(message.channel);
+    if (first == kept.frozen.end()) {
+      if (kept.bytes + cost(message) > room) return tell_lost(fault, kept.told), true;
+      kept.bytes += cost(message);
+      first = kept.frozen.emplace(message.channel, message.bytes).first;
+    }
+    const int64_t now = time_of(message.bytes);
+    message.bytes = first->second;
+    set_time(message.bytes, now);
+    return false;
+  });
 }
 
 // Old messages keep their time. Those still delayed when the fault ends are lost.
-void FaultFilter::lag(const SensorFault& fault, int64_t step, std::vector<Message>& messages) {
-  auto& under_way = under_way_[fault.id];
-  for (Message& message : messages) under_way.emplace_back(step, std::move(message));
+void FaultFilter::lag(const SensorFault& fault, int64_t step, Kept& kept, size_t room,
+                      std::vector<Message>& messages) {
+  for (Message& message : messages) {
+    kept.bytes += cost(message);
+    kept.under_way.emplace_back(step, std::move(message));
+  }
   messages.clear();
-  while (!under_way.empty() && under_way.front().first + fault.lag_steps <= step) {
-    messages.push_back(std::move(under_way.front().second));
-    under_way.pop_front();
+  while (!kept.under_way.empty() && kept.under_way.front().first + fault.lag_steps <= step) {
+    messages.push_back(std::move(kept.under_way.front().second));
+    kept.under_way.pop_front();
+    kept.bytes -= cost(messages.back());
+  }
+  for (; kept.bytes > room; tell_lost(fault, kept.told)) {
+    kept.bytes -= cost(kept.under_way.back().second);
+    kept.under_way.pop_back();
   }
 }
 

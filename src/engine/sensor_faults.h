@@ -1,6 +1,7 @@
 // Sensor faults: change what a device publishes on its way out.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <deque>
 #include <map>
@@ -34,24 +35,38 @@ bool applies_to(SensorFault::Kind fault, const std::string& device_kind);
 // The current faults of one device. Owned by its module.
 class FaultFilter {
  public:
-  explicit FaultFilter(int64_t step_us) : step_us_(step_us) {}
+  // Bytes of the messages that the faults of a world keep at a time, those that lag and those that
+  // are frozen, in equal shares: what a device keeps depends on no other thread.
+  static constexpr size_t kMostKept = 512u << 20;
+
+  explicit FaultFilter(int64_t step_us, size_t most_kept = kMostKept)
+      : step_us_(step_us), most_kept_(most_kept) {}
 
   // Applies the faults, in order, to what the device published at a step.
   void pass(const Outbox& published, const std::vector<SensorFault>& faults, RobotIndex robot,
             const std::string& device, int64_t step, Outbox& out);
+
+  size_t kept() const;  // bytes
 
  private:
   struct Message {
     int channel;
     std::vector<uint8_t> bytes;
   };
-  void freeze(const SensorFault& fault, std::vector<Message>& messages);
-  void lag(const SensorFault& fault, int64_t step, std::vector<Message>& messages);
+  struct Kept {
+    std::map<int, std::vector<uint8_t>> frozen;         // by channel
+    std::deque<std::pair<int64_t, Message>> under_way;  // with their steps
+    size_t bytes = 0;
+    bool told = false;  // that there is no room for more
+  };
+  static size_t cost(const Message& message);
+  void freeze(const SensorFault& fault, Kept& kept, size_t room, std::vector<Message>& messages);
+  void lag(const SensorFault& fault, int64_t step, Kept& kept, size_t room,
+           std::vector<Message>& messages);
 
   int64_t step_us_;
-  std::map<std::pair<int64_t, int>, std::vector<uint8_t>> frozen_;  // by fault and channel
-  std::map<int64_t, std::deque<std::pair<int64_t, Message>>>
-      under_way_;  // by fault: step and message
+  size_t most_kept_;
+  std::map<int64_t, Kept> kept_;  // by fault
 };
 
 }  // namespace ruedo::engine

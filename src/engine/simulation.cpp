@@ -17,7 +17,6 @@ namespace ruedo::engine {
 namespace {
 
 constexpr size_t kMaxSnapshotMemory = 64u << 20;  // bytes of all batches together
-constexpr int kMaxBatchSteps = 32;
 constexpr int kFewSteps = 4;
 constexpr int kModuleThreads = 12;  // and those of the run
 constexpr int64_t kQuickNs =

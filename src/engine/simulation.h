@@ -30,7 +30,7 @@ struct SceneLost : std::runtime_error {
 
 struct SimulationOptions {
   FleetOptions fleet;
-  int batch_steps = 0;  // maximum steps in a batch; 0: by the size of the world
+  int batch_steps = 0;  // at most so many, up to kMaxBatchSteps; 0: by the size of the world
   // For tests: called in a module's thread ("kinematics" too) before each batch.
   std::function<void(const std::string& module)> before_batch;
 };

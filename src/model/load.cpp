@@ -40,6 +40,7 @@ class Loader {
     const LoadsPlugins loads_plugins;
     findings_ = {};
     context_.triangles = {};
+    context_.controllers.begin();
     world_ = {};
     world_.file = path_;
     const std::shared_ptr<const Element> expanded =

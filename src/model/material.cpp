@@ -149,7 +149,7 @@ std::optional<Material> scripted_material(const Element& script, const std::stri
     std::error_code error;
     std::vector<std::string> found;
     for (const auto& entry : fs::directory_iterator(folder, error)) {
-      if (entry.path().extension() == ".material" && context.resources.allows(entry.path()))
+      if (entry.path().extension() == ".material" && context.resources.may_read(entry.path()))
         found.push_back(entry.path().string());
     }
     std::sort(found.begin(), found.end());

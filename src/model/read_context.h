@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "model/controller_files.h"
 #include "model/document.h"
 #include "model/mesh_loader.h"
 #include "model/resources.h"
@@ -21,6 +22,7 @@ struct ReadContext {
   TextureStore& textures;
   std::vector<std::string> xacro_arguments = {};  // "NAME:=VALUE"
   TriangleCount triangles = {};
+  ControllerFiles controllers{resources};
 };
 
 // The name attribute. Throws InputError if it is missing, empty or reserved by SDF ("world",

@@ -471,7 +471,7 @@ std::optional<std::string> ResourceFinder::find_texture(const std::string& name,
   for (const char* place : {".", "textures", "materials/textures", "../textures",
                             "../materials/textures", "../../materials/textures"}) {
     const fs::path candidate = folder / place / file;
-    if (!allows(candidate)) continue;
+    if (!may_read(candidate)) continue;
     if (is_there(candidate) && !is_folder(candidate)) return full_path(candidate);
   }
   return std::nullopt;

@@ -28,8 +28,8 @@ class ResourceFinder {
   // Whether a file lies in the search folders after following links, and not below a folder whose
   // name begins with a dot.
   bool reaches(const std::string& path) const;
-  // Whether a file that was found in a folder, and not by its name, may be read.
-  bool allows(const std::string& path) const { return !for_strangers_ || reaches(path); }
+  // Whether a file that nobody names, but that lies where one is looked for, may be read.
+  bool may_read(const std::string& path) const { return !for_strangers_ || reaches(path); }
 
   // The absolute path of the file or folder that `uri`, written in the file `from`, names.
   std::optional<std::string> find(const std::string& uri, const std::string& from) const;

@@ -319,12 +319,11 @@ ControllersDrive drive_from_controllers(const Element& model_element,
                                         const Model& model, const std::string& where,
                                         ReadContext& context) {
   if (!is_controlled(model_element, plugins)) return {};
-  const std::vector<std::string> beside =
-      files_beside(model_element.source.file, context.resources);
+  const std::vector<std::string>& beside = context.controllers.beside(model_element.source.file);
   const std::vector<std::string> named = named_files(plugins, beside, where, context);
   const auto look_in = [&](const std::vector<std::string>& paths, bool is_named) {
     ControllersDrive result;
-    std::vector<std::unique_ptr<Element>> files;
+    std::vector<std::shared_ptr<const Element>> files;
     for (const std::string& path : paths) {
       if (auto file = read_controllers(path, is_named, where, context))
         files.push_back(std::move(file));

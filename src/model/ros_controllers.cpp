@@ -8,17 +8,15 @@
 #include <cmath>
 #include <filesystem>
 
-#include "core/input_file.h"
 #include "model/plugins.h"
-#include "model/yaml.h"
 
 namespace fs = std::filesystem;
 
 namespace ruedo::model {
 namespace {
 
-constexpr size_t kLargestFile = 1 << 18, kMostFiles = 300,
-                 kMostFolders = 200;  // limit of parameter folders searched for one robot
+// Of a robot, of a controller's name, and of a list; the others have no effect.
+constexpr size_t kMostControllers = 100, kMostParameterMaps = 100, kMostNames = 1000;
 
 // Looks up "a.b.c" in a tree whose keys may contain dots themselves.
 const Element* below(const Element& map, const std::string& path) {
@@ -34,6 +32,7 @@ const Element* below(const Element& map, const std::string& path) {
 
 void collect_types(const Element& map, std::vector<Controller>& into) {
   for (const auto& child : map.children) {
+    if (into.size() >= kMostControllers) return;
     if (const Element* type = child->child("type");
         type && type->text.find("ontroller") != std::string::npos) {
       const bool own = child->name == "ros__parameters";  // the type is one of the parameters
@@ -46,6 +45,7 @@ void collect_types(const Element& map, std::vector<Controller>& into) {
 // NAME: ros__parameters: ..., with or without a namespace before the name.
 void collect_parameters(const Element& map, Controller& controller) {
   for (const auto& child : map.children) {
+    if (controller.parameters.size() >= kMostParameterMaps) return;
     const std::string own = child->name.substr(child->name.rfind('/') + 1);
     const Element* parameters = child->child("ros__parameters");
     if (parameters && own == controller.name) {
@@ -60,33 +60,6 @@ void collect_parameters(const Element& map, Controller& controller) {
 std::string trimmed_package_path(const std::string& path) {
   const size_t share = path.rfind("/share/");
   return share == std::string::npos ? "" : "package://" + path.substr(share + 7);
-}
-
-bool is_yaml(const fs::path& path) {
-  return path.extension() == ".yaml" || path.extension() == ".yml";
-}
-
-// The folders of a package that may hold parameters.
-void add_parameter_files(const fs::path& package, std::vector<std::string>& files) {
-  std::vector<fs::path> found;
-  for (const char* name :
-       {"config", "configs", "params", "param", "control", "controllers", "yaml"}) {
-    std::error_code error;
-    size_t looked = 0;
-    for (auto at = fs::recursive_directory_iterator(
-             package / name, fs::directory_options::skip_permission_denied, error);
-         !error && at != fs::recursive_directory_iterator() && ++looked < kMostFiles;
-         at.increment(error)) {
-      if (at.depth() > 2) at.disable_recursion_pending();
-      std::error_code none;
-      if (is_yaml(at->path()) && at->is_regular_file(none) && at->file_size(none) <= kLargestFile)
-        found.push_back(at->path());
-    }
-  }
-  std::sort(found.begin(), found.end());
-  for (const fs::path& path : found) {
-    if (files.size() < kMostFiles) files.push_back(path.string());
-  }
 }
 
 }  // namespace
@@ -104,7 +77,9 @@ std::vector<std::string> names_in(const Element* list) {
   std::vector<std::string> names;
   if (!list) return names;
   if (!list->text.empty()) names.push_back(list->text);
-  for (const Element* item : list->all("item")) names.push_back(item->text);
+  for (const Element* item : list->all("item")) {
+    if (names.size() < kMostNames) names.push_back(item->text);
+  }
   return names;
 }
 
@@ -129,7 +104,7 @@ std::optional<double> positive(const Element* written) {
   return value > 0 ? std::optional(value) : std::nullopt;
 }
 
-std::vector<Controller> controllers_in(const std::vector<std::unique_ptr<Element>>& files) {
+std::vector<Controller> controllers_in(const std::vector<std::shared_ptr<const Element>>& files) {
   std::vector<Controller> all;
   for (const auto& file : files) collect_types(*file, all);
   for (Controller& each : all) {
@@ -143,43 +118,6 @@ bool is_controlled(const Element& model_element, const std::vector<const Element
          std::any_of(plugins.begin(), plugins.end(), [](const Element* each) {
            return kind_of(*each).does == PluginKind::Does::control;
          });
-}
-
-namespace {
-
-std::vector<std::string> parameter_files_beside(const std::string& from) {
-  std::vector<std::string> files;
-  fs::path package = fs::path(from).parent_path();
-  std::error_code error;
-  constexpr int kHighest = 5;
-  for (int up = 0;
-       up < kHighest && package.has_relative_path() && !fs::exists(package / "package.xml", error);
-       ++up)
-    package = package.parent_path();
-  if (!fs::exists(package / "package.xml", error)) {
-    add_parameter_files(fs::path(from).parent_path(), files);
-    add_parameter_files(fs::path(from).parent_path().parent_path(), files);
-    return files;
-  }
-  add_parameter_files(package, files);
-  std::vector<fs::path> beside;
-  for (const auto& entry : fs::directory_iterator(
-           package.parent_path(), fs::directory_options::skip_permission_denied, error)) {
-    if (beside.size() >= kMostFolders) break;
-    if (entry.path() != package && fs::exists(entry.path() / "package.xml", error))
-      beside.push_back(entry.path());
-  }
-  std::sort(beside.begin(), beside.end());
-  for (const fs::path& folder : beside) add_parameter_files(folder, files);
-  return files;
-}
-
-}  // namespace
-
-std::vector<std::string> files_beside(const std::string& from, const ResourceFinder& resources) {
-  std::vector<std::string> files = parameter_files_beside(from);
-  std::erase_if(files, [&](const std::string& file) { return !resources.allows(file); });
-  return files;
 }
 
 std::vector<std::string> named_files(const std::vector<const Element*>& plugins,
@@ -197,6 +135,7 @@ std::vector<std::string> named_files(const std::vector<const Element*>& plugins,
       };
       const auto match = std::find_if(beside.begin(), beside.end(), same_name);
       if (!path && match != beside.end()) path = *match;
+      if (path && std::find(files.begin(), files.end(), *path) != files.end()) continue;
       if (path)
         files.push_back(*path);
       else
@@ -208,12 +147,10 @@ std::vector<std::string> named_files(const std::vector<const Element*>& plugins,
   return files;
 }
 
-std::unique_ptr<Element> read_controllers(const std::string& path, bool named,
-                                          const std::string& where, ReadContext& context) {
+std::shared_ptr<const Element> read_controllers(const std::string& path, bool named,
+                                                const std::string& where, ReadContext& context) {
   try {
-    const std::string text = read_input(path, kLargestFile);
-    if (text.find("ontroller") == std::string::npos) return nullptr;
-    return parse_yaml(text, path);
+    return context.controllers.read(path);
   } catch (const InputError& error) {  // a neighbouring file may be anything
     if (named) context.findings.error(error.source(), where, error.message());
     return nullptr;

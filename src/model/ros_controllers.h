@@ -29,19 +29,16 @@ bool has_word(std::string_view words, std::string_view word);  // words separate
 std::optional<double> positive(const Element* written);
 
 // One file may give the types, and another the parameters.
-std::vector<Controller> controllers_in(const std::vector<std::unique_ptr<Element>>& files);
+std::vector<Controller> controllers_in(const std::vector<std::shared_ptr<const Element>>& files);
 
 // Whether controller files can concern a model.
 bool is_controlled(const Element& model_element, const std::vector<const Element*>& plugins);
-// The files in the parameter folders of the package that contains `from`, then of neighbouring
-// packages, sorted by name; those that may be read.
-std::vector<std::string> files_beside(const std::string& from, const ResourceFinder& resources);
 // Those named by ros_control's plugins; a missing one is reported.
 std::vector<std::string> named_files(const std::vector<const Element*>& plugins,
                                      const std::vector<std::string>& beside,
                                      const std::string& where, ReadContext& context);
 // Null: it holds no controllers, or is not YAML, which is reported if a plugin names the file.
-std::unique_ptr<Element> read_controllers(const std::string& path, bool named,
-                                          const std::string& where, ReadContext& context);
+std::shared_ptr<const Element> read_controllers(const std::string& path, bool named,
+                                                const std::string& where, ReadContext& context);
 
 }  // namespace ruedo::model

@@ -192,11 +192,10 @@ void read_ros_gains(const Element& model_element, const std::vector<const Elemen
   if (!is_controlled(model_element, plugins)) return;
   Reader reader{model, {}};
   const Interfaces interfaces{model_element};
-  const std::vector<std::string> beside =
-                                     files_beside(model_element.source.file, context.resources),
-                                 named = named_files(plugins, beside, where, context);
+  const std::vector<std::string>& beside = context.controllers.beside(model_element.source.file);
+  const std::vector<std::string> named = named_files(plugins, beside, where, context);
   const auto look_in = [&](const std::vector<std::string>& paths, bool is_named) {
-    std::vector<std::unique_ptr<Element>> files;
+    std::vector<std::shared_ptr<const Element>> files;
     for (const std::string& path : paths) {
       if (auto file = read_controllers(path, is_named, where, context))
         files.push_back(std::move(file));

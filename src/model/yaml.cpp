@@ -7,11 +7,12 @@ namespace ruedo::model {
 namespace {
 
 constexpr int kDeepest = 32;
-constexpr size_t kMostNodes = 100'000;  // aliases can refer to the same node many times
+// Aliases can refer to the same node many times, and its text.
+constexpr size_t kMostNodes = 20'000, kMostBytes = 1 << 20;
 
 struct Converter {
   const std::string& file;
-  size_t nodes = 0;
+  size_t nodes = 0, bytes = 0;
 
   void convert(const YAML::Node& node, Element& into, int depth) {
     into.source = {file, node.Mark().line + 1};
@@ -21,14 +22,22 @@ struct Converter {
     if (++nodes > kMostNodes)
       throw InputError(into.source, "YAML of more than " + std::to_string(kMostNodes) + " entries");
     if (node.IsScalar()) {
-      into.text = node.Scalar();
+      into.text = counted(node.Scalar(), into);
     } else if (node.IsSequence()) {
       for (const YAML::Node& item : node) convert(item, child(into, "item"), depth + 1);
     } else if (node.IsMap()) {
       for (const auto& entry : node)
-        convert(entry.second, child(into, entry.first.IsScalar() ? entry.first.Scalar() : ""),
+        convert(entry.second,
+                child(into, entry.first.IsScalar() ? counted(entry.first.Scalar(), into) : ""),
                 depth + 1);
     }
+  }
+
+  const std::string& counted(const std::string& text, const Element& of) {
+    if ((bytes += text.size()) > kMostBytes)
+      throw InputError(of.source, "YAML of more than " + std::to_string(kMostBytes >> 20) +
+                                      " MiB, with each alias counted as what it stands for");
+    return text;
   }
 
   static Element& child(Element& parent, const std::string& name) {

@@ -67,7 +67,7 @@ void Control::serve(const request_t& request) {
   if (request.kind == request_t::JOIN) return join(request, reply);
   if (request.kind == request_t::LEAVE) {  // may be repeated at will
     if (host_.left) host_.left(request.session);
-    sessions_.leave(request.session);
+    drop(request.session);
     return publish(reply);
   }
   if (request.kind == request_t::INFO &&
@@ -178,6 +178,7 @@ void Control::join(const request_t& request, reply_t& reply) {
         "a sequence above 0";
   } else if (const Session* session = sessions_.join(body.client, request.sequence, host_.keeps)) {
     reply.session = session->id;
+    forget_left();  // one may have given way
   } else {
     reply.code = reply_t::REFUSED;
     reply.text = std::to_string(Sessions::kMostSessions) +
@@ -186,6 +187,18 @@ void Control::join(const request_t& request, reply_t& reply) {
                  " s or takes part in lockstep: try again";
   }
   publish(reply);
+}
+
+void Control::drop(int64_t session) {
+  sessions_.leave(session);
+  forget_left();
+}
+
+// Each session has its share of what waits, and whoever leaves may join again.
+void Control::forget_left() {
+  const auto left = [&](int64_t session) { return sessions_.find(session) == nullptr; };
+  std::erase_if(held_, [&](const request_t& held) { return left(held.session); });
+  std::erase_if(waiting_, [&](const Waiting& waiting) { return left(waiting.reply.session); });
 }
 
 void Control::publish(reply_t& reply) {

@@ -72,7 +72,7 @@ class Control {
   void finish(int64_t session, int64_t sequence, engine::Outcome outcome);
 
   const Sessions& sessions() const { return sessions_; }
-  void drop(int64_t session) { sessions_.leave(session); }
+  void drop(int64_t session);  // it leaves, and what it asked for is forgotten
   uint64_t refused() const { return refused_; }
 
  private:
@@ -91,6 +91,7 @@ class Control {
   bool has_too_many(const request_t& request) const;
   template <class Condition>
   void refuse_waiting(const std::string& why, Condition condition);
+  void forget_left();
   void join(const request_t& request, reply_t& reply);
   void answer(reply_t& reply, bool quiet = false);
   void publish(reply_t& reply);

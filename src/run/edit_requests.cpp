@@ -161,6 +161,10 @@ Run::Outcome Run::spawn(const request_t& request, const spawn_request_t& body) {
 
 // Granted steps are computed first, so that the client knows at which step the request acts.
 void Run::spawn_ready() {
+  const auto pending = [this](const request_t& request) {
+    return control_.is_pending(request.session, request.sequence);
+  };
+  worker_.keep(pending);
   for (;; made_.reset()) {
     if (!made_) {
       made_ = worker_.take();
@@ -168,8 +172,7 @@ void Run::spawn_ready() {
       enters_at_ = mode().granted();
     }
     const request_t& request = made_->request;
-    if (!control_.is_pending(request.session, request.sequence))
-      continue;  // the world was reset meanwhile
+    if (!pending(request)) continue;  // the world was reset meanwhile, or its client left
     if (publisher_.step() < enters_at_ && !pacer_->paused()) return;
     control_.finish(request.session, request.sequence,
                     made_->fault.empty() ? put_in(request, made_->body, made_->loaded)

@@ -2,6 +2,7 @@
 #include "run/model_worker.h"
 
 #include <algorithm>
+#include <utility>
 
 #include <pthread.h>
 
@@ -44,10 +45,16 @@ engine::Outcome ModelWorker::add(Order order) {
 
 std::optional<ModelWorker::Made> ModelWorker::take() {
   const std::lock_guard lock(mutex_);
-  if (made_.empty()) return std::nullopt;
-  Made made = std::move(made_.front());
-  made_.pop_front();
-  return made;
+  if (made_) changed_.notify_all();
+  return std::exchange(made_, std::nullopt);
+}
+
+void ModelWorker::keep(const std::function<bool(const request_t&)>& wanted) {
+  const std::lock_guard lock(mutex_);
+  auto next = waiting_.begin();
+  if (budget_ && !wanted(next++->request)) budget_->leave_off();
+  const auto unwanted = [&](const Order& order) { return !wanted(order.request); };
+  waiting_.erase(std::remove_if(next, waiting_.end(), unwanted), waiting_.end());
 }
 
 void ModelWorker::work() {
@@ -56,7 +63,7 @@ void ModelWorker::work() {
     Order order;
     {
       std::unique_lock lock(mutex_);
-      changed_.wait(lock, [this] { return over_ || !waiting_.empty(); });
+      changed_.wait(lock, [this] { return over_ || (!waiting_.empty() && !made_); });
       if (over_) return;
       order = waiting_.front();
       budget_ = std::make_shared<model::LoadBudget>(kTime, kMeshBytes);
@@ -65,7 +72,8 @@ void ModelWorker::work() {
     {
       const std::lock_guard lock(mutex_);
       waiting_.pop_front();
-      made_.push_back(std::move(made));
+      budget_.reset();
+      made_ = std::move(made);
     }
     ready_.set();
   }

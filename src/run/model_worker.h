@@ -1,8 +1,9 @@
 // Where the models of SPAWN requests are made ready: read, checked, their meshes imported, in a
 // thread beside the run.
 //
-// One after the other, in the order of the requests, each under a budget of time and memory. What
-// is ready is put in by the publisher, between two steps.
+// One after the other, in the order of the requests, each under a budget of time and memory, and
+// none before the one before it was taken. What is ready is put in by the publisher, between two
+// steps.
 #pragma once
 
 #include <condition_variable>
@@ -44,6 +45,8 @@ class ModelWorker {
   // For the publisher's thread, as is take(). The outcome is pending, or a refusal.
   engine::Outcome add(Order order);
   std::optional<Made> take();
+  // Makes no model of an order for which that is false.
+  void keep(const std::function<bool(const request_t&)>& wanted);
 
  private:
   void work();
@@ -54,9 +57,9 @@ class ModelWorker {
   const std::function<void()> before_;
   std::mutex mutex_;  // of all that follows
   std::condition_variable changed_;
-  std::deque<Order> waiting_;  // the first is being made
-  std::deque<Made> made_;
-  std::shared_ptr<model::LoadBudget> budget_;
+  std::deque<Order> waiting_;
+  std::shared_ptr<model::LoadBudget> budget_;  // while the first is being made
+  std::optional<Made> made_;
   bool over_ = false;
   std::thread thread_;  // started with the first order
 };

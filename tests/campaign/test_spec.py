@@ -2,9 +2,11 @@
 
 import math
 import os
+import subprocess
+import sys
 
 import pytest
-from conftest import CAMPAIGN, ruedo
+from conftest import CAMPAIGN, PATIENCE, ruedo
 from ruedo.campaign import Campaign, SpecError
 from ruedo.campaign.plan import points, substitute
 from ruedo.campaign.stats import mcnemar, paired_difference, wilson
@@ -23,6 +25,21 @@ WRONG = [  # what is replaced, by what, line, what the message says
         13,
         "limits.duration: is nan; allowed is a finite number",
     ),
+    ("seeds: 2", 'seeds: 2\nrobots: ["\\uD800"]', 11, r"robots\[0\]: is '.*', which holds"),
+    (
+        'name: walls, generator: "world.py:walls", parameters: {distance: "{distance}"}',
+        "file: '{distance}'",
+        4,
+        r"worlds\[0\]: 1.2: no such file",
+    ),
+    ("seeds: 2", "seeds: 2\nrobots: ['{distance}']", 4, "--spawn '1.2': it looks like MODEL"),
+    (
+        "world.py:walls",
+        "x" * 5000 + ".py:walls",
+        4,
+        "and there is no file",
+    ),
+    ("seeds: 2", 'seeds: 2\nset: {"\\uDFFF": 1}', 11, "set: is '.*', which holds half of a char"),
     ("limits: {duration: 3}", "limits: {}", 13, "limits: needs 'duration'"),
     ("limits: {duration: 3}", "", 2, "needs 'limits'"),
     (
@@ -206,6 +223,27 @@ def test_a_generator_that_ends_the_program_is_told(folder):
         "walls(distance=1.2) raised SystemExit"
         in ruedo("campaign", "run", "c.yaml", folder=folder, code=3).stderr
     )
+
+
+def test_a_word_of_a_command_may_be_too_long_for_a_file(folder):
+    command = CAMPAIGN.replace('python: "controller.py:ahead"', "command: run " + "x" * 5000)
+    assert command != CAMPAIGN
+    (folder / "c.yaml").write_text(command)
+    assert len(Campaign(folder / "c.yaml").cases) == 8
+
+
+def test_a_worlds_text_costs_time_by_its_length(tmp_path):
+    """Looking for what it refers to must not try each way to divide the blanks."""
+    text = "<sdf version='1.9'><world name='w'/></sdf><!--<uri>" + " " * 100_000 + "-->"
+    (tmp_path / "w.sdf").write_text(text)
+    program = """import sys
+from pathlib import Path
+from ruedo.campaign.worlds import WorldFiles
+print(WorldFiles(Path(), Path("made")).sha256("w.sdf", ""))"""
+    done = subprocess.run(
+        [sys.executable, "-c", program], cwd=tmp_path, capture_output=True, timeout=PATIENCE
+    )
+    assert done.returncode == 0 and len(done.stdout.strip()) == 64
 
 
 @pytest.mark.parametrize(

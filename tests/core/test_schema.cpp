@@ -1,6 +1,7 @@
 // The schemas against what lcm-gen makes of the same files, and against malformed bytes.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <filesystem>
 #include <fstream>
 #include <map>
@@ -9,6 +10,7 @@
 #include "core/type_files.h"
 #include "ruedo/camera_info_t.hpp"
 #include "ruedo/contact_t.hpp"
+#include "ruedo/errors.h"
 #include "ruedo/image_t.hpp"
 #include "ruedo/joint_state_t.hpp"
 #include "ruedo/move_command_t.hpp"
@@ -169,6 +171,60 @@ TEST(Schema, RowsOfNothingTakeNoTime) {
     return ++values < 5;
   }));
   EXPECT_EQ(values, 5u);
+}
+
+// Those that hold much for few bytes, for which each reader would have to look far.
+TEST(Schema, AMessageHasFewFieldsForItsBytes) {
+  std::string text = "struct hollow_t { int32_t n;";
+  for (int i = 0; i < 1000; ++i) text += " int8_t a" + std::to_string(i) + "[n];";
+  const fs::path file = fs::path(testing::TempDir()) / "hollow_t.lcm";
+  std::ofstream(file) << text + " }\nstruct hollows_t { int32_t m; hollow_t each[m]; }";
+  read_types({file});
+  const auto schema = std::find_if(read_schemas().begin(), read_schemas().end(),
+                                   [](const Schema& each) { return each.name == "hollows_t"; });
+  const auto message = [&](int32_t count) {
+    std::vector<uint8_t> bytes(8 + 4 + static_cast<size_t>(count) * 4);
+    write_big_endian(bytes.data(), schema->fingerprint);
+    write_big_endian(bytes.data() + 8, count);
+    return bytes;
+  };
+  // 2 + 1001 n fields, of which 10 000 + 16 (12 + 4 n) are allowed
+  const auto all = [](const FieldPath&, const FieldValue&) { return true; };
+  EXPECT_TRUE(well_formed(*schema, message(10)));
+  EXPECT_TRUE(visit_message(*schema, message(10), all));
+  EXPECT_FALSE(well_formed(*schema, message(11)));
+  EXPECT_FALSE(visit_message(*schema, message(11), all));
+}
+
+// One clear error, with the place.
+TEST(Schema, RefusesTypesThatNoReaderReadsAlike) {
+  const fs::path file = fs::path(testing::TempDir()) / "bad_t.lcm";
+  const std::string no_counter =
+      " is no field before it that is one int8_t, int16_t, int32_t or int64_t";
+  std::string dimensions = "struct a_t {\n int8_t x";
+  for (int i = 0; i < 17; ++i) dimensions += "[1]";
+  using namespace std::string_literals;
+  const std::pair<std::string, std::string> cases[] = {
+      {"struct a_t {\n int64_t k[2];\n byte x[k]; }", ":3: the length 'k' of 'x'" + no_counter},
+      {"struct a_t {\n double k;\n byte x[k]; }", ":3: the length 'k' of 'x'" + no_counter},
+      {"struct a_t {\n string k;\n byte x[k]; }", ":3: the length 'k' of 'x'" + no_counter},
+      {"struct a_t {\n boolean k;\n byte x[k]; }", ":3: the length 'k' of 'x'" + no_counter},
+      {"struct a_t {\n a_t k;\n byte x[k]; }", ":3: the length 'k' of 'x'" + no_counter},
+      {dimensions + "; }", ":2: 'x' has more than 16 dimensions"},
+      {"\nstruct a_t { b_t x; }",
+       ":2: the type 'a_t': 'x' is of the type 'b_t', which is in no .lcm file that was read"},
+      {"\nstruct a_t { int32_t n; a_t x[n]; }",
+       ":2: the type 'a_t': it holds itself, which cannot be read"},
+      {"struct a_t { int8_t x\0; }"s, ": contains a zero byte: it is no text"}};
+  for (const auto& [text, why] : cases) {
+    std::ofstream(file, std::ios::binary) << text;
+    try {
+      read_types({file});
+      ADD_FAILURE() << text;
+    } catch (const InputError& error) {
+      EXPECT_EQ(error.what(), file.string() + why) << text;
+    }
+  }
 }
 
 }  // namespace

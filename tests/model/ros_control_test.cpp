@@ -3,8 +3,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "model/controller_files.h"
 #include "model/load.h"
-#include "model/load_model.h"
 #include "model/yaml.h"
 #include "temporary_folder.h"
 #include "text_world.h"
@@ -167,31 +167,6 @@ base:
   EXPECT_EQ(drive.watchdog_us, 500'000);  // diff_drive_controller's own
 }
 
-// The package lies around the world's folder, and what a SPAWN's text may read does not.
-TEST(RosControl, ASpawnedRobotReadsNoFileOutsideOfTheWorldsFolder) {
-  const std::string robot =
-      four_wheels(transmission("front_left") + transmission("front_right") +
-                  "<gazebo><plugin name='c' filename='libgazebo_ros_control.so'/></gazebo>");
-  const std::string controllers = R"(base:
-  type: diff_drive_controller/DiffDriveController
-  left_wheel: front_left
-  right_wheel: front_right
-  wheel_separation: 0.61
-)";
-  for (const bool inside : {true, false}) {
-    TemporaryFolder folder;
-    folder.write("bot/package.xml", package("bot"));
-    folder.write(inside ? "bot/worlds/config/c.yaml" : "bot/config/c.yaml", controllers);
-    if (inside) folder.write("bot/worlds/package.xml", package("worlds"));
-    const LoadedModel loaded = load_model_text(robot, folder / "bot/worlds/w.sdf");
-    const bool read = std::any_of(
-        loaded.findings.begin(), loaded.findings.end(),
-        [](const Finding& finding) { return finding.text.find("'base'") != std::string::npos; });
-    EXPECT_EQ(read, inside);
-    EXPECT_EQ(loaded.model->drive && !loaded.model->drive->guessed, inside);
-  }
-}
-
 TEST(RosControl, MecanumAndSteeringControllers) {
   TemporaryFolder folder;
   folder.write("package.xml", package("bot"));
@@ -292,7 +267,69 @@ TEST(Yaml, IsBounded) {
     bomb += "x]\n";
   }
   EXPECT_THROW(parse_yaml(bomb, "f"), InputError);
+  const std::string text = "a: &a " + std::string(200'000, 'x') + "\nb: ";
+  EXPECT_NO_THROW(parse_yaml(text + "[*a, *a]", "f"));
+  EXPECT_THROW(parse_yaml(text + "[*a, *a, *a, *a, *a]", "f"), InputError);
+  EXPECT_THROW(parse_yaml(text + "{*a : {*a : {*a : {*a : {*a : 1}}}}}", "f"), InputError);
   EXPECT_EQ(parse_yaml("a:\n  b: [1, 2]\n", "f")->child("a/b/item")->source.line, 2);
+}
+
+// A file costs once, however many robots ask for it, and all files together are bounded.
+TEST(ControllerFiles, AreReadOnceAndAreBounded) {
+  TemporaryFolder folder;
+  const ResourceFinder resources(folder / "w.sdf", false);
+  const std::string remark = "\n#" + std::string(250'000, 'x');
+  const auto text = [&](const std::string& entries) { return "a_controller: [" + entries + "]"; };
+  ControllerFiles files(resources);
+  const std::string one = folder.write("one.yaml", text("1") + remark);
+  const auto read = files.read(one);
+  std::filesystem::remove(one);
+  EXPECT_EQ(files.read(one), read);
+  for (int i = 1; i < 16; ++i)
+    EXPECT_NO_THROW(files.read(folder.write(std::to_string(i) + ".yaml", text("1") + remark))) << i;
+  const std::string last = folder.write("last.yaml", text("1") + remark + remark.substr(0, 10'000));
+  for (int i = 0; i < 2; ++i) {
+    try {
+      files.read(last);
+      FAIL();
+    } catch (const InputError& error) {
+      EXPECT_EQ(error.message(), "the controllers' files of a world hold no more than 4 MiB");
+    }
+  }
+
+  ControllerFiles many(resources);
+  std::string entries = "1";  // with the list and the map that hold them 10 002
+  for (int i = 1; i < 10'000; ++i) entries += ",1";
+  const std::string large = folder.write("large.yaml", text(entries));
+  for (int i = 0; i < 99; ++i) EXPECT_NO_THROW(many.read(large)) << i;
+  EXPECT_THROW(many.read(large), InputError);
+}
+
+TEST(ControllerFiles, ThatARobotNamesOftenAreOne) {
+  TemporaryFolder folder;
+  folder.write("bot/package.xml", package("bot"));
+  folder.write("bot/config/c.yaml", "controllers: [");
+  std::string named;
+  for (int i = 0; i < 1000; ++i) named += "<parameters>package://bot/config/c.yaml</parameters>";
+  const auto world = load_world(
+      folder.write("bot/urdf/bot.urdf",
+                   four_wheels("<gazebo><plugin name='c' filename='libgazebo_ros2_control.so'>" +
+                               named + "</plugin></gazebo>")));
+  EXPECT_THAT(texts(*world), testing::Contains(HasSubstr("is no YAML")).Times(1));
+}
+
+// Of a robot only so many are looked at: each looks in the parameters of all with its name.
+TEST(ControllerFiles, HoldManyControllersInVain) {
+  TemporaryFolder folder;
+  folder.write("bot/package.xml", package("bot"));
+  std::string text = "all:\n";
+  for (int i = 0; i < 100; ++i) text += "  c: {type: some/Controller}\n";
+  folder.write("bot/config/c.yaml", text +
+                                        "  last: {type: diff_drive_controller/DiffDriveController, "
+                                        "left_wheel: front_left, right_wheel: front_right}\n");
+  const auto world =
+      load_world(folder.write("bot/urdf/bot.urdf", four_wheels(transmission("front_left"))));
+  EXPECT_THAT(texts(*world), testing::Not(testing::Contains(HasSubstr("'last'"))));
 }
 
 // ---- Guesses.

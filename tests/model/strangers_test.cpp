@@ -98,5 +98,30 @@ TEST(Strangers, FollowNoLinksOutOfAFolderOfMaterials) {
   EXPECT_FALSE(theirs && theirs->diffuse == (Rgba{0, 1, 0, 1}));
 }
 
+// What a world's robots find beside them without a name, a SPAWN's find in the world's folder only.
+TEST(Strangers, HaveNoControllersFromElsewhere) {
+  const TemporaryFolder folder;
+  const std::string gains =
+      "/gazebo_ros_control: {pid_gains: {arm: {p: 77.0}}}  # of a controller\n";
+  const std::string robot =
+      "<robot name='r'><link name='a'/><link name='b'/><joint name='arm' type='continuous'><parent "
+      "link='a'/><child link='b'/></joint><transmission name='t'><joint name='arm'>"
+      "<hardwareInterface>hardware_interface/PositionJointInterface</hardwareInterface></joint>"
+      "</transmission></robot>";
+  folder.write("home/config/above.yaml", gains);
+  const std::string world = folder.write("home/worlds/w.sdf", "");
+  const auto held = [&] {
+    const LoadedModel loaded = load_model_text(robot, world);
+    return loaded.model->joints[0].axis.position_pid.has_value();
+  };
+  EXPECT_FALSE(held());
+  const std::string outside = folder.write("home/other/c.yaml", gains);
+  fs::create_directories(folder / "home/worlds/config");
+  fs::create_symlink(outside, folder / "home/worlds/config/link.yaml");
+  EXPECT_FALSE(held());
+  folder.write("home/worlds/config/near.yaml", gains);
+  EXPECT_TRUE(held());
+}
+
 }  // namespace
 }  // namespace ruedo::model

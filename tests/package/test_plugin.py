@@ -232,7 +232,7 @@ def test_echo_reads_lcm_files(prefix, project, ruedo):
         ("struct a_t { double x", "a.lcm:1: it ends within a type"),
         ("struct a_t\n{ double x[n]; }", "a.lcm:2: the length 'n' of 'x' is no field before it"),
         ("struct a_t { b_t x; }", "'x' is of the type 'b_t', which is in no .lcm file"),
-        ("struct a_t { a_t x; }", "a_t: holds itself"),
+        ("struct a_t { a_t x; }", "the type 'a_t': it holds itself"),
     ],
 )
 def test_wrong_types_are_named(ruedo, tmp_path, text, words):

@@ -54,6 +54,72 @@ TEST(Steps, FewOfAClientWait) {
   EXPECT_EQ(client.ask(client.stepping(1)).code, reply_t::OK);  // there is room again
 }
 
+// A control without a run: STEPs are answered at step 1 000, which the test publishes.
+struct Alone {
+  bool state_comes = false;
+  std::vector<reply_t> replies;
+  Control control{
+      7,
+      {.execute = [](const request_t&, const Session&) { return engine::Outcome::after(1000); },
+       .state = [] { return std::vector<uint8_t>{}; },
+       .publish = [this](const reply_t& reply) { replies.push_back(reply); },
+       .utime = [] { return 0; },
+       .epoch = [] { return 0; },
+       .state_comes = [this] { return state_comes; }}};
+  void ask(int32_t kind, int64_t session, int64_t sequence, const std::vector<uint8_t>& body = {}) {
+    request_t request{};
+    request.epoch = -1;
+    request.session = session;
+    request.sequence = sequence;
+    request.kind = kind;
+    request.body = body;
+    request.size = static_cast<int32_t>(body.size());
+    const std::vector<uint8_t> bytes = engine::encoded(request);
+    control.receive(bytes.data(), bytes.size());
+    control.serve();
+  }
+  // Clients that join, ask for as much as one may, and leave.
+  void come_and_go(int clients) {
+    join_t body;
+    body.client = "hasty";
+    for (int i = 1; i <= clients; ++i) {
+      ask(request_t::JOIN, 0, i, engine::encoded(body));
+      const int64_t session = replies.back().session;
+      for (int step = 1; step <= 8; ++step) ask(request_t::STEP, session, step);
+      ask(request_t::LEAVE, session, 9);
+    }
+    replies.clear();
+  }
+};
+
+TEST(WhoLeaves, LeavesNothingThatWaitsForAStep) {
+  Alone alone;
+  alone.come_and_go(100);
+  alone.control.published(1000);
+  EXPECT_EQ(alone.replies.size(), 0u);
+}
+
+TEST(WhoLeaves, LeavesNothingThatWaitsForTheFirstState) {
+  Alone alone;
+  alone.state_comes = true;
+  alone.come_and_go(100);
+  alone.state_comes = false;
+  alone.control.serve();
+  EXPECT_EQ(alone.replies.size(), 0u);
+}
+
+TEST(WhoLeaves, IsAlsoWhoIsDropped) {
+  Alone alone;
+  join_t body;
+  body.client = "crashed";
+  alone.ask(request_t::JOIN, 0, 1, engine::encoded(body));
+  alone.ask(request_t::STEP, alone.replies.back().session, 1);
+  alone.control.drop(alone.control.sessions().list()[0].id);  // as lockstep does
+  alone.replies.clear();
+  alone.control.published(1000);
+  EXPECT_EQ(alone.replies.size(), 0u);
+}
+
 TEST(Sequences, JumpLittle) {
   Controlled client;
   client.begin(paused_server(), kRobot);

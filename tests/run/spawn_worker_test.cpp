@@ -1,4 +1,5 @@
 // SPAWN: its model is prepared beside the run, and enters at a step that the log records.
+#include <atomic>
 #include <future>
 
 #include <gtest/gtest.h>
@@ -86,6 +87,61 @@ TEST(SpawnWorker, AResetEndsWhatIsNotReady) {
   name_request_t name;
   name.name = "box";
   EXPECT_EQ(client.ask(request_t::GET_STATE, engine::encoded(name)).code, reply_t::UNKNOWN_NAME);
+}
+
+// Models may be large: one is ready, and the next one is begun when it was taken.
+TEST(SpawnWorker, OneIsReadyAtATime) {
+  engine::ModelStore store("test.sdf");
+  engine::Wakeup ready;
+  std::atomic<int> taken{0};
+  std::vector<int> taken_before;
+  {
+    ModelWorker worker(store, ready, [&] { taken_before.push_back(taken); });
+    for (int i = 0; i < 3; ++i) {
+      request_t request;
+      request.session = i + 1;
+      ASSERT_TRUE(worker.add({request, Controlled::spawning(kBox, 2, i)}).pending);
+    }
+    while (taken < 3) {
+      ready.wait();
+      std::this_thread::sleep_for(std::chrono::milliseconds(50));  // the next one could begin
+      ++taken;
+      ASSERT_TRUE(worker.take());
+    }
+  }
+  EXPECT_EQ(taken_before, (std::vector<int>{0, 1, 2}));
+}
+
+TEST(SpawnWorker, WhoLeavesGetsNoModel) {
+  Gate gate;
+  int made = 0;
+  Controlled client;
+  RunOptions options = paused_server();
+  options.before_model = [&, wait = gate.wait()] {
+    ++made;
+    wait();
+  };
+  client.begin(options, kRobot);
+  const auto spawning = [&](const std::string& name) {
+    return client.request(request_t::SPAWN,
+                          engine::encoded(Controlled::spawning(kBox, 2, 0, name)));
+  };
+  client.send(spawning("begun"));
+  client.send(spawning("waiting"));
+  gate.reached.get_future().wait();
+  ASSERT_EQ(client.ask(request_t::LEAVE).code, reply_t::OK);
+  client.join();
+  const request_t another = spawning("another");
+  client.send(another);
+  client.state();  // what was sent before is taken in
+  gate.open.set_value();
+  ASSERT_EQ(client.answer(another).code, reply_t::OK);
+  EXPECT_EQ(made, 2);
+  for (const char* name : {"begun", "waiting"}) {
+    name_request_t body;
+    body.name = name;
+    EXPECT_EQ(client.ask(request_t::GET_STATE, engine::encoded(body)).code, reply_t::UNKNOWN_NAME);
+  }
 }
 
 TEST(SpawnWorker, FewWait) {

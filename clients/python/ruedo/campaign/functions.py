@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import importlib
 import importlib.util
+import os
 import sys
 from pathlib import Path
 from typing import Any
@@ -22,7 +23,7 @@ class Function:
         if not colon or not module or not attribute.isidentifier():
             raise ValueError(f"is {name!r}; it looks like FILE.py:NAME or MODULE:NAME")
         self.file = folder / module if module.endswith(".py") else _file_of(module, folder)
-        if not self.file.is_file():
+        if not os.path.isfile(self.file):
             raise ValueError(f"is {name!r}, and there is no file {self.file}")
         self._attribute = attribute
         self.sha256 = hashlib.sha256(self.file.read_bytes()).hexdigest()

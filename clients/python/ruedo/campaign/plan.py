@@ -8,6 +8,7 @@ import hashlib
 import itertools
 import json
 import math
+import os
 import random
 import re
 from collections.abc import Callable, Iterator
@@ -399,10 +400,10 @@ class Planner:
     ) -> dict[str, Any]:
         asked = {"file": world} if isinstance(world, str) else world
         path = ("worlds", w)
-        spawn = fill(("robots",), robot)
+        spawn = _text(fill(("robots",), robot))
         try:
             if "file" in asked:
-                file = self._worlds.find(fill(path, asked["file"]))
+                file = self._worlds.find(_text(fill(path, asked["file"])))
                 name = asked.get("name", Path(file).stem)
             else:
                 generator = self._function((*path, "generator"), asked["generator"])
@@ -432,7 +433,7 @@ class Planner:
             }
         if "command" in made:
             for word in re.split(r"[\s'\"=]+", made["command"]):
-                if word and (self._folder / word).is_file():
+                if word and os.path.isfile(self._folder / word):  # or too long for a name
                     files[word] = self._sha256((*path, "command"), word)
         else:
             function = self._function((*path, "python"), made["python"])

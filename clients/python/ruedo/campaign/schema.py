@@ -5,12 +5,14 @@ allowed.
 from __future__ import annotations
 
 import difflib
+import re
 from typing import Any
 
 from ..arguments import MOST_SEED
 from ..files import parse_yaml
 from .errors import SpecError, missing
 
+_HALF = re.compile(r"[\ud800-\udfff]")  # what stands for what no file can hold
 _NAME = {"type": "string", "pattern": "^[A-Za-z0-9][A-Za-z0-9_.-]{0,62}$"}
 _NUMBER = {"type": "number"}
 _SEED = {"type": "integer", "minimum": 0, "maximum": MOST_SEED}
@@ -248,13 +250,18 @@ def _is_whole(_: Any, value: Any) -> bool:
 
 
 def _check_plain(value: Any, source: Source, path: tuple[Any, ...]) -> None:
-    """YAML has more than JSON: dates, sets, bytes, and names that are no texts."""
+    """YAML has more than files: dates, sets, bytes, halves of characters, names that are no
+    texts.
+    """
+    if isinstance(value, str) and _HALF.search(value):
+        raise source.error(path, f"is {_short(value)}, which holds half of a character")
     if isinstance(value, dict):
         for key, one in value.items():
             if not isinstance(key, str):
                 raise source.error(
                     path, f"has {key!r} for a name; put it in quotes to make it a text"
                 )
+            _check_plain(key, source, path)
             _check_plain(one, source, (*path, key))
     elif isinstance(value, list):
         for i, one in enumerate(value):

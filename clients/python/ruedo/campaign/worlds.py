@@ -11,9 +11,12 @@ from pathlib import Path
 from typing import Any
 
 from ..engine import Engine
+from ..files import read_bytes, sha256_of
 from .functions import Function
 
-_URI = re.compile(r"<uri>\s*([^<]+?)\s*</uri>|filename=[\"']([^\"']+)[\"']")
+# In time that grows with the text alone, whatever it is.
+_URI = re.compile(r"<uri>([^<]+)</uri>|filename=[\"']([^\"']+)[\"']")
+_MOST_BYTES = 64 << 20  # of a world's file
 
 
 class WorldFiles:
@@ -29,7 +32,7 @@ class WorldFiles:
     def find(self, name: str) -> str:
         """A file beside the campaign's, or the name of a world that comes with Ruedo."""
         beside = self._folder / name
-        return str(beside) if beside.is_file() else name
+        return str(beside) if os.path.isfile(beside) else name
 
     def generate(self, generator: Function, parameters: dict[str, Any]) -> str:
         """The file of the world that generator(**parameters) makes: SDF as text, or a
@@ -61,9 +64,10 @@ class WorldFiles:
             return known
         own = ""
         if os.path.isfile(world):
-            text = Path(world).read_bytes()
+            text = read_bytes(world, _MOST_BYTES)
             own = hashlib.sha256(text).hexdigest()
-            uris = tuple(sorted({a or b for a, b in _URI.findall(text.decode(errors="replace"))}))
+            named = _URI.findall(text.decode(errors="replace"))
+            uris = tuple(sorted({a.strip() or b for a, b in named}))
             key: tuple[Any, ...] = (os.path.dirname(os.path.abspath(world)), uris, model)
         else:
             key = (world, model)
@@ -72,7 +76,7 @@ class WorldFiles:
                 rest = [file for file in engine.files_read if not _same(file, world)]
             digest = hashlib.sha256()
             for file in rest:
-                digest.update(hashlib.sha256(Path(file).read_bytes()).digest())
+                digest.update(bytes.fromhex(sha256_of(file)))
             self._read[key] = digest.hexdigest()
             self.files.update(rest)
         if own:

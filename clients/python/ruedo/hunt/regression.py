@@ -37,7 +37,7 @@ def keep(found: Any, folder: Path) -> Path:
     name = re.sub(r"\W", "_", folder.name)
     content = dict(found.content)
     world = found.case.what["world"]
-    if Path(world["file"]).is_file():
+    if os.path.isfile(world["file"]):
         shutil.copyfile(world["file"], folder / "world.sdf")
         content["worlds"] = [{"name": world["name"], "file": "world.sdf"}]
     content["controllers"] = [moved(one, found.folder, folder) for one in content["controllers"]]
@@ -65,7 +65,7 @@ def moved(controller: dict[str, Any], home: Path, folder: Path) -> dict[str, Any
         made["python"] = os.path.join(way, made["python"])
     if "command" in made:
         words = re.findall(r"[\w./-]+\.\w+", made["command"])
-        files = [*files, *(word for word in words if (home / word).is_file())]
+        files = [*files, *(word for word in words if os.path.isfile(home / word))]
         made["command"] = f"cd {shlex.quote(way)} && {made['command']}"
     if files:
         made["files"] = [os.path.join(way, one) for one in dict.fromkeys(files)]
