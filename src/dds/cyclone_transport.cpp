@@ -47,6 +47,10 @@ struct QosDeleter {
   void operator()(dds_qos_t* qos) const { dds_delete_qos(qos); }
 };
 using QosPointer = std::unique_ptr<dds_qos_t, QosDeleter>;
+struct ListenerDeleter {
+  void operator()(dds_listener_t* listener) const { dds_delete_listener(listener); }
+};
+using ListenerPointer = std::unique_ptr<dds_listener_t, ListenerDeleter>;
 
 dds_entity_t checked(dds_entity_t result, const std::string& what) {
   if (result < 0)
@@ -197,15 +201,29 @@ void tell(void*, const dds_log_data_t* data) {
     spdlog::warn("ROS 2: Cyclone DDS: {}", line);
 }
 
+// What ROS calls the policy for which a reader and a writer do not meet.
+const char* policy_name(uint32_t id) {
+  switch (id) {
+    case DDS_DURABILITY_QOS_POLICY_ID: return "durability";
+    case DDS_DEADLINE_QOS_POLICY_ID: return "deadline";
+    case DDS_LIVELINESS_QOS_POLICY_ID: return "liveliness";
+    case DDS_RELIABILITY_QOS_POLICY_ID: return "reliability";
+    default: return "another policy";
+  }
+}
+
 class CycloneWriter : public ros2::Writer {
  public:
-  CycloneWriter(dds_entity_t participant, const Endpoint& endpoint) {
+  CycloneWriter(dds_entity_t participant, const Endpoint& endpoint) : name_(endpoint.topic.name) {
     const std::string name = dds_topic(endpoint);
     topic_ = checked(create_raw_topic(participant, name.c_str(),
                                       ros2::dds_type(endpoint.topic.type).c_str(), &type_),
                      "topic " + name);
-    writer_ = checked(dds_create_writer(participant, topic_, qos_of(endpoint).get(), nullptr),
-                      "writer of " + name);
+    const ListenerPointer listener(dds_create_listener(this));
+    dds_lset_offered_incompatible_qos(listener.get(), tell_incompatible);
+    writer_ =
+        checked(dds_create_writer(participant, topic_, qos_of(endpoint).get(), listener.get()),
+                "writer of " + name);
     if (endpoint.role == Role::reply) tell_identities(*type_);
   }
   ~CycloneWriter() override {
@@ -231,6 +249,16 @@ class CycloneWriter : public ros2::Writer {
   dds_entity_t entity() const { return writer_; }
 
  private:
+  static void tell_incompatible(dds_entity_t, const dds_offered_incompatible_qos_status_t status,
+                                void* writer) noexcept {
+    CycloneWriter& self = *static_cast<CycloneWriter*>(writer);
+    if (std::exchange(self.told_, true)) return;
+    spdlog::warn("ROS 2: somebody reads {} with a QoS that is not offered ({}): it gets nothing",
+                 self.name_, policy_name(status.last_policy_id));
+  }
+
+  std::string name_;
+  bool told_ = false;
   dds_entity_t topic_ = 0, writer_ = 0;
   const ddsi_sertype* type_ = nullptr;
 };
@@ -324,10 +352,12 @@ class CycloneReader : public ros2::Reader {
   }
   void tell_incompatible() {
     if (std::exchange(told_, true)) return;
+    dds_requested_incompatible_qos_status_t status{};
+    dds_get_requested_incompatible_qos_status(reader_, &status);
     spdlog::warn(
-        "ROS 2: somebody publishes on {} with a QoS that a reliable reader does not get (best "
-        "effort): it is not heard",
-        name_);
+        "ROS 2: somebody publishes on {} with a QoS that a reliable reader does not get ({}): it "
+        "is not heard",
+        name_, policy_name(status.last_policy_id));
   }
 
   dds_entity_t waitset_, topic_ = 0, reader_ = 0;

@@ -23,7 +23,8 @@ TEST(Utf8, TerminalsGetNoControlCharacters) {
 }
 
 TEST(Utf8, ANameIsOneLine) {
-  for (const char* good : {"", "p3at", "two words", "\u00e9"}) EXPECT_TRUE(is_one_line(good)) << good;
+  for (const char* good : {"", "p3at", "two words", "\u00e9"})
+    EXPECT_TRUE(is_one_line(good)) << good;
   for (const char* bad : {"a\nb", "a\tb", "a\rb", "\x1b[m", "\x7f", "\u009b", "\xe9"})
     EXPECT_FALSE(is_one_line(bad)) << bad;
 }

@@ -13,7 +13,11 @@ from cyclonedds.builtin import (
     BuiltinTopicDcpsPublication,
     BuiltinTopicDcpsSubscription,
 )
-from cyclonedds.core import Policy
+from cyclonedds.core import Policy, Qos
+from cyclonedds.pub import DataWriter
+from cyclonedds.sub import DataReader
+from cyclonedds.topic import Topic
+from cyclonedds.util import duration
 from ros_types import (
     CameraInfo,
     Clock,
@@ -51,6 +55,35 @@ def test_scan_is_of_the_wall_ahead(standing):
     assert scan.scan_time == pytest.approx(0.1)
     assert (scan.range_min, scan.range_max) == (pytest.approx(0.02), pytest.approx(8.0))
     assert all(r > 0.02 for r in scan.ranges)
+
+
+def test_qos_that_does_not_match_is_named():
+    with Run("--disable", "p3at/camera") as run:
+        peer = Peer(run.domain)
+        peer.reader("/scan", LaserScan, latched=True)
+        deadline = Qos(
+            Policy.Deadline(duration(milliseconds=10)),
+            Policy.Reliability.Reliable(duration(seconds=1)),
+        )
+        odometry = DataReader(
+            peer.participant, Topic(peer.participant, "rt/odom", Odometry), qos=deadline
+        )
+        speed = DataWriter(
+            peer.participant,
+            Topic(peer.participant, "rt/cmd_vel", Twist),
+            qos=Qos(Policy.Reliability.BestEffort),
+        )
+        wanted = {
+            "somebody reads /scan with a QoS that is not offered (durability): it gets nothing",
+            "somebody reads /odom with a QoS that is not offered (deadline): it gets nothing",
+            "somebody publishes on /cmd_vel with a QoS that a reliable reader does not get "
+            "(reliability): it is not heard",
+        }
+        for line in run.process.stdout:
+            wanted -= {words for words in wanted if words in line}
+            if not wanted:
+                break
+        assert not wanted and odometry and speed
 
 
 def test_best_effort_readers_are_served(standing):
