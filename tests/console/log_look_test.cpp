@@ -52,10 +52,9 @@ void watch_all(Board& board) {
 
 // How many of the log's channels show something; the world's info is made beside them.
 int shown(const Board& board) {
-  return static_cast<int>(
-      std::count_if(board.channels().begin(), board.channels().end(), [](const auto& channel) {
-        return channel.name.size() == 1 && channel.last_number != 0;
-      }));
+  return static_cast<int>(std::count_if(
+      board.channels().begin(), board.channels().end(),
+      [](const auto& channel) { return channel.name.size() == 1 && channel.last_number != 0; }));
 }
 
 // Of messages of 40 MB two pass the bound, of two viewers one each; the rest comes by and by.

@@ -308,14 +308,16 @@ TEST(ControllerFiles, AreReadOnceAndAreBounded) {
 TEST(ControllerFiles, ThatARobotNamesOftenAreOne) {
   TemporaryFolder folder;
   folder.write("bot/package.xml", package("bot"));
-  folder.write("bot/config/c.yaml", "controllers: [");
+  std::string entries = "1";
+  for (int i = 1; i < 2000; ++i) entries += ",1";
+  folder.write("bot/config/c.yaml", "a_controller: [" + entries + "]");
   std::string named;
   for (int i = 0; i < 1000; ++i) named += "<parameters>package://bot/config/c.yaml</parameters>";
   const auto world = load_world(
       folder.write("bot/urdf/bot.urdf",
                    four_wheels("<gazebo><plugin name='c' filename='libgazebo_ros2_control.so'>" +
                                named + "</plugin></gazebo>")));
-  EXPECT_THAT(texts(*world), testing::Contains(HasSubstr("is no YAML")).Times(1));
+  EXPECT_THAT(texts(*world), testing::Not(testing::Contains(HasSubstr("look at no more than"))));
 }
 
 // Of a robot only so many are looked at: each looks in the parameters of all with its name.
