@@ -26,7 +26,7 @@
 namespace ruedo::engine {
 model::Fault fault_of(const fault_t&) { return {}; }
 void Faults::begin(const model::Fault&, RobotIndex, int64_t) { std::abort(); }
-void Faults::command(const robot::Command&, int64_t, robot::Robots&) { std::abort(); }
+void Faults::command(const robot::Command&, size_t, int64_t, robot::Robots&) { std::abort(); }
 }  // namespace ruedo::engine
 
 namespace ruedo::run {
