@@ -23,7 +23,7 @@ std::shared_ptr<const Texture> TextureStore::take(const std::string& path) {
   return at->second;
 }
 
-std::shared_ptr<const Texture> TextureStore::take(std::shared_ptr<const Texture> embedded,
+std::shared_ptr<const Texture> TextureStore::take(const std::shared_ptr<const Texture>& embedded,
                                                   const std::string& owner) {
   return has_room(picture_pixels(embedded->embedded), owner) ? embedded : nullptr;
 }

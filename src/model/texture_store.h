@@ -24,7 +24,7 @@ class TextureStore {
   // A file that is no picture costs nothing, and whoever draws finds out.
   std::shared_ptr<const Texture> take(const std::string& path);
   // The same for a picture that is embedded in the mesh file `owner`.
-  std::shared_ptr<const Texture> take(std::shared_ptr<const Texture> embedded,
+  std::shared_ptr<const Texture> take(const std::shared_ptr<const Texture>& embedded,
                                       const std::string& owner);
 
  private:
