@@ -13,6 +13,7 @@ namespace ruedo::client {
 namespace {
 
 constexpr auto kRepeatTime = std::chrono::milliseconds(100);
+constexpr auto kPartingTime = std::chrono::milliseconds(500);  // for the answer to a LEAVE
 
 std::string kind_name(int32_t kind) {
   static const char* const names[] = {
@@ -64,9 +65,20 @@ void Session::check_size(const std::vector<uint8_t>& body) {
 }
 
 void Session::leave() {
-  std::lock_guard lock(one_at_a_time_);
+  const auto turn = this->turn();
   if (session_ == 0) return;
-  publish(request_t::LEAVE, session_, ++sequence_, {});
+  Clock::time_point deadline = Clock::now();
+  if (!core_.bus().handling()) deadline += kPartingTime;
+  std::unique_lock lock(mutex_);
+  awaited_kind_ = request_t::LEAVE;
+  awaited_sequence_ = ++sequence_;
+  reply_.reset();
+  while (!reply_) {
+    publish(request_t::LEAVE, session_, sequence_, {});
+    if (Clock::now() >= deadline) break;
+    news_.wait_for(lock, kRepeatTime, [this] { return reply_.has_value(); });
+  }
+  awaited_kind_ = 0;
   session_ = 0;
 }
 

@@ -49,7 +49,9 @@ class Session {
   void publish(int32_t kind, int64_t session, int64_t sequence, const std::vector<uint8_t>& body,
                int32_t epoch = -1);
 
-  void leave();                                     // without waiting for an answer
+  // Gives the session back. Others would wait for a client in lockstep whose LEAVE was lost: it is
+  // repeated until it is answered, for a moment, since the server may be gone.
+  void leave();
   void receive(const uint8_t* bytes, size_t size);  // a message of ruedo/reply
 
  private:

@@ -8,17 +8,21 @@ from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from urllib.parse import urlsplit
 
+import lcm
 import pytest
 from conftest import HERE, PATIENCE, PROBES, SOURCE, free_url, probe, ruedo_run
 from docs_code import blocks
+from ruedo.lcmtypes import applied_t, request_t
 
 HALL = str(HERE / "hall.sdf")
 STEPS = 300  # of 5 ms
 
 
 @contextmanager
-def bad_network(server_url, clients, loss):
-    """URLs, one for each client, from which the server is reached with losses."""
+def bad_network(server_url, clients, loss, first_of=None):
+    """URLs, one for each client, from which the server is reached with losses. first_of: each
+    client's first request of this kind is lost.
+    """
     urls = [free_url() for _ in range(clients)]
     ports = ",".join(str(urlsplit(url).port) for url in urls)
     relay = subprocess.Popen(
@@ -31,6 +35,7 @@ def bad_network(server_url, clients, loss):
             "0.1",
             "0.1",
             "4",
+            *([str(first_of)] if first_of is not None else []),
         ],
         stdout=subprocess.PIPE,
         text=True,
@@ -102,6 +107,24 @@ def test_a_guest_comes_and_goes_whatever_is_lost():
     assert all(end == ends[0] for end in ends), ends
     step, _, _, of_guest, _ = ends[0]
     assert step == "90" and int(of_guest) > 20
+
+
+def test_who_leaves_is_not_waited_for_whatever_is_lost(language, tmp_path):
+    """The LEAVE is lost, once. The lease is longer than the test."""
+    log = str(tmp_path / "run.lcm")
+    with ruedo_run(
+        *("--lockstep", "1", "--lease", str(PATIENCE), "--disable", "p3at/camera"),
+        *("--record", log),
+        world=HALL,
+    ) as server:
+        with bad_network(server.url, 1, 0.0, request_t.LEAVE) as [url]:
+            probe(language, url, "visited", "client", "p3at")
+        server.end()
+    applied = [applied_t.decode(e.data) for e in lcm.EventLog(log) if e.channel == "ruedo/applied"]
+    assert [one.kind for one in applied if one.kind in (request_t.JOIN, request_t.LEAVE)] == [
+        request_t.JOIN,
+        request_t.LEAVE,
+    ]
 
 
 def test_commands_beside_the_steps_are_refused(language):

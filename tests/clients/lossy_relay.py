@@ -1,10 +1,10 @@
 """A bad network: passes datagrams between a server's port and one port for each client, and loses,
 doubles and reorders.
 
-    lossy_relay.py SERVER_PORT CLIENT_PORT,... LOSS TWICE LATE SEED
+    lossy_relay.py SERVER_PORT CLIENT_PORT,... LOSS TWICE LATE SEED [KIND]
 
 Probabilities from 0 to 1, for each datagram, each way and each client apart; a late one comes after
-the next.
+the next. KIND: the first request of this kind (a number of request_t) is lost in any case.
 """
 
 import random
@@ -14,6 +14,8 @@ import struct
 import sys
 
 GROUP = "239.255.76.67"
+REQUEST = b"ruedo/request\0"
+KIND_AT = 44  # where a request's kind is
 MOST = 65536  # bytes of a datagram
 
 
@@ -31,11 +33,19 @@ def listening(port):
     return here
 
 
+def kind_of(data):
+    """The kind of the request in a datagram of LCM; None: it is none."""
+    begin = data.find(REQUEST)
+    if begin < 0:
+        return None
+    return int.from_bytes(data[begin + len(REQUEST) + KIND_AT :][:4], "big")
+
+
 class Link:
     """One way to one port."""
 
-    def __init__(self, sender, port, faults, seed):
-        self.sender, self.to = sender, (GROUP, port)
+    def __init__(self, sender, port, faults, seed, first_of=None):
+        self.sender, self.to, self.first_of = sender, (GROUP, port), first_of
         self.loss, self.twice, self.late = faults
         self.random = random.Random(seed)
         self.held = None
@@ -43,7 +53,10 @@ class Link:
 
     def pass_on(self, data):
         held, self.held = self.held, None
-        if self.random.random() < self.loss:
+        if self.first_of is not None and kind_of(data) == self.first_of:
+            self.first_of = None
+            self.lost += 1
+        elif self.random.random() < self.loss:
             self.lost += 1
         elif self.random.random() < self.late:
             self.held = data
@@ -60,6 +73,7 @@ def main():
     clients = [int(port) for port in sys.argv[2].split(",")]
     faults = tuple(map(float, sys.argv[3:6]))
     seed = int(sys.argv[6])
+    first_of = int(sys.argv[7]) if len(sys.argv) > 7 else None
     sender = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
     sender.setsockopt(socket.IPPROTO_IP, socket.IP_MULTICAST_TTL, 0)
     sender.bind(("", 0))
@@ -69,7 +83,7 @@ def main():
     selector.register(listening(server), selectors.EVENT_READ, down)
     up = []
     for i, port in enumerate(clients):
-        up.append(Link(sender, server, faults, seed + 1000 + i))
+        up.append(Link(sender, server, faults, seed + 1000 + i, first_of))
         selector.register(listening(port), selectors.EVENT_READ, [up[-1]])
     print("ready", flush=True)
     while True:

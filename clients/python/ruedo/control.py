@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 
 REQUEST_CHANNEL = "ruedo/request"
 _REPEAT_SECONDS = 0.1
+_PARTING_SECONDS = 0.5  # for the answer to a LEAVE
 
 
 def _names(of: Any) -> dict[int, str]:
@@ -116,11 +117,25 @@ class Session:
         self._connection.bus.check_size(REQUEST_CHANNEL, _REQUEST.size + len(body))
 
     def leave(self) -> None:
-        """Gives the session back, without waiting for an answer."""
-        if self._session:
-            self._sequence += 1
-            self.publish(lcmtypes.request_t.LEAVE, self._session, self._sequence, b"")
-            self._session = 0
+        """Gives the session back. Others would wait for a client in lockstep whose LEAVE was lost:
+        it is repeated until it is answered, for a moment, since the server may be gone.
+        """
+        if not self._session:
+            return
+        its_turn = self._one_at_a_time.acquire(timeout=_PARTING_SECONDS)
+        hears = its_turn and not self._connection.bus.handling
+        deadline = time.monotonic() + (_PARTING_SECONDS if hears else 0.0)
+        with self._news:
+            sequence = self.next_sequence()
+            self._awaited, self._reply = (lcmtypes.request_t.LEAVE, sequence), None
+            while self._reply is None:
+                self.publish(lcmtypes.request_t.LEAVE, self._session, sequence, b"")
+                if time.monotonic() >= deadline:
+                    break
+                self._news.wait(_REPEAT_SECONDS)
+            self._awaited, self._session = None, 0
+        if its_turn:
+            self._one_at_a_time.release()
 
     def receive(self, data: bytes) -> None:
         """A message of ruedo/reply."""

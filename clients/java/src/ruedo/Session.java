@@ -19,6 +19,7 @@ import java.util.Map;
 final class Session {
     static final String REQUEST_CHANNEL = "ruedo/request";
     private static final long REPEAT_MILLIS = 100;
+    private static final double PARTING_SECONDS = 0.5; // for the answer to a LEAVE
     private static final int HEAD = 52; // bytes of a request_t without a body
     private static final Map<Integer, String> KINDS = kinds();
 
@@ -80,10 +81,28 @@ final class Session {
         Bus.checkSize(REQUEST_CHANNEL, HEAD + body.length);
     }
 
-    /** Leaves the session, without waiting for an answer. */
+    /**
+     * Gives the session back. Others would wait for a client in lockstep whose LEAVE was lost: it
+     * is repeated until it is answered, for a moment, since the server may be gone.
+     */
     synchronized void leave() {
         if (session == 0) return;
-        publish(request_t.LEAVE, session, ++sequence, new byte[0]);
+        Deadline deadline = new Deadline(sim.bus.handling() ? 0.0 : PARTING_SECONDS);
+        synchronized (news) {
+            awaitedKind = request_t.LEAVE;
+            awaitedSequence = ++sequence;
+            reply = null;
+            while (reply == null) {
+                publish(request_t.LEAVE, session, sequence, new byte[0]);
+                if (deadline.passed()) break;
+                try {
+                    deadline.waitOn(news, REPEAT_MILLIS);
+                } catch (RuedoException.Interrupted error) {
+                    break; // what remains to be closed is closed
+                }
+            }
+            awaitedKind = 0;
+        }
         session = 0;
     }
 
