@@ -62,7 +62,7 @@ class Camera : public Sensor {
     picture_.want_depth = depth;
     picture_.want_labels = labels;
 
-    if (lens_.distorts()) map_ = LensMap::of(lens_, camera);
+    if (lens_.distorts()) map_ = LensMap::of(lens_, camera, setup.world);
     if (map_) {
       view_ = map_->ideal();
     } else {

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <map>
 #include <mutex>
+#include <set>
 #include <string>
 #include <tuple>
 
@@ -20,8 +21,8 @@ namespace {
 constexpr double kMaxHfov = 3.0;
 // Maximum size of the ideal picture relative to the lens's.
 constexpr double kMaxGrowth = 2.5;
-// Pixels of one distorted picture, and of all with lenses of their own: each is found by iteration,
-// in about 1 us.
+// Pixels of one distorted picture, and of all with lenses of their own in a world: each is found by
+// iteration, in about 1 us.
 constexpr int64_t kMostDistorted = 12'000'000, kMostDistortedInAll = 2 * kMostDistorted;
 
 int64_t pixels_of(const Lens& lens) { return int64_t{lens.width} * lens.height; }
@@ -98,11 +99,13 @@ bool Lens::undistort(const Eigen::Vector2d& distorted, Eigen::Vector2d& p) const
   return true;
 }
 
-std::shared_ptr<const LensMap> LensMap::of(const Lens& lens, const Element& camera) {
+std::shared_ptr<const LensMap> LensMap::of(const Lens& lens, const Element& camera,
+                                           const model::WorldModel& world) {
   using Key = std::tuple<int, int, std::array<double, 6>, std::array<double, 5>>;
   struct Shared {
-    int64_t pixels = 0;
     std::weak_ptr<const LensMap> map;
+    int64_t pixels = 0;
+    std::set<const model::WorldModel*> worlds;  // whose cameras have had it; only compared
   };
   static std::mutex mutex;
   static std::map<Key, Shared> all;
@@ -112,18 +115,21 @@ std::shared_ptr<const LensMap> LensMap::of(const Lens& lens, const Element& came
                 lens.height,
                 {lens.fx, lens.fy, lens.cx, lens.cy, lens.near_m, lens.far_m},
                 lens.distortion};
-  if (const auto known = all.find(key); known != all.end()) {
-    if (auto map = known->second.map.lock()) return map;
-  }
   int64_t pixels = pixels_of(lens);
-  for (const auto& [other, shared] : all) pixels += shared.pixels;
+  for (const auto& [other, shared] : all) {
+    if (other != key && shared.worlds.contains(&world)) pixels += shared.pixels;
+  }
   if (pixels > kMostDistortedInAll)
     camera.child("distortion")
         ->fail("the pictures of all lenses with distortion have " + std::to_string(pixels) +
                " pixels with this one; at most " + std::to_string(kMostDistortedInAll) +
-               " are distorted, those of equal lenses counted once");
-  auto map = std::make_shared<const LensMap>(lens);
-  all[key] = {pixels_of(lens), map};
+               " are distorted in a world, those of equal lenses counted once");
+  Shared& shared = all[key];
+  std::shared_ptr<const LensMap> map = shared.map.lock();
+  if (!map) map = std::make_shared<const LensMap>(lens);
+  shared.map = map;
+  shared.pixels = pixels_of(lens);
+  shared.worlds.insert(&world);
   return map;
 }
 

@@ -16,6 +16,10 @@
 
 namespace ruedo {
 
+namespace model {
+struct WorldModel;
+}
+
 struct Lens {
   int width = 320, height = 240;          // pixels
   double fx = 0, fy = 0, cx = 0, cy = 0;  // pixels; integers are pixel centres
@@ -38,9 +42,10 @@ struct Lens {
 class LensMap {
  public:
   // For a lens with distortion: the cameras of a fleet, and of the copies of a world, share their
-  // lens's. Throws InputError, which names the <distortion>, if all that there are have too many
-  // pixels in all with this one.
-  static std::shared_ptr<const LensMap> of(const Lens& lens, const Element& camera);
+  // lens's. Throws InputError, which names the <distortion>, if all of the world have too many
+  // pixels with this one.
+  static std::shared_ptr<const LensMap> of(const Lens& lens, const Element& camera,
+                                           const model::WorldModel& world);
 
   explicit LensMap(const Lens& lens);
 

@@ -59,7 +59,7 @@ CameraView::CameraView(const SensorSetup& setup, const std::vector<std::string>&
   std::vector<std::string> read = own;
   read.push_back("distortion");
   name_rest_of_camera(setup, read);
-  if (lens_.distorts()) map_ = LensMap::of(lens_, camera_of(setup));
+  if (lens_.distorts()) map_ = LensMap::of(lens_, camera_of(setup), setup.world);
   view_ =
       map_ ? map_->ideal() : scene::View{{},       lens_.width, lens_.height, lens_.fx,   lens_.fy,
                                          lens_.cx, lens_.cy,    lens_.near_m, lens_.far_m};

@@ -442,32 +442,36 @@ std::shared_ptr<const Element> folding_camera(int width, const std::string& k1) 
                                    "</k1></distortion></camera>",
                                "camera.sdf");
 }
-std::shared_ptr<const LensMap> map_of(const Element& camera) {
-  return LensMap::of(Lens(camera), camera);
+std::shared_ptr<const LensMap> map_of(const Element& camera, const model::WorldModel& world) {
+  return LensMap::of(Lens(camera), camera, world);
 }
 
 TEST(CameraLens, EqualOnesShareTheirMap) {
-  const auto map = map_of(*folding_camera(100, "-10"));
-  EXPECT_EQ(map_of(*folding_camera(100, "-10")), map);
-  EXPECT_NE(map_of(*folding_camera(100, "-9")), map);
+  const model::WorldModel world, other;
+  const auto map = map_of(*folding_camera(100, "-10"), world);
+  EXPECT_EQ(map_of(*folding_camera(100, "-10"), world), map);
+  EXPECT_EQ(map_of(*folding_camera(100, "-10"), other), map);
+  EXPECT_NE(map_of(*folding_camera(100, "-9"), world), map);
 }
 
 TEST(CameraLens, PixelsOfAllThatDifferAreBounded) {
-  const auto first = map_of(*folding_camera(4000, "-10"));
+  const model::WorldModel world, other;
+  const auto first = map_of(*folding_camera(4000, "-10"), world);
   const auto third = folding_camera(100, "-8");
   {
-    const auto second = map_of(*folding_camera(4000, "-9"));
+    const auto second = map_of(*folding_camera(4000, "-9"), world);
+    EXPECT_NO_THROW(map_of(*third, other)) << "each world has its own bound";
     try {
-      map_of(*third);
+      map_of(*third, world);
       FAIL();
     } catch (const InputError& error) {
       EXPECT_EQ(error.message(),
                 "<distortion>: the pictures of all lenses with distortion have 24300000 pixels "
-                "with this one; at most 24000000 are distorted, those of equal lenses counted "
-                "once");
+                "with this one; at most 24000000 are distorted in a world, those of equal lenses "
+                "counted once");
     }
   }
-  EXPECT_NO_THROW(map_of(*third)) << "one of those before it is gone";
+  EXPECT_NO_THROW(map_of(*third, world)) << "one of those before it is gone";
 }
 
 TEST(Camera, ThingsAreSeenWhereTheLensBendsThem) {
