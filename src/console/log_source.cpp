@@ -117,6 +117,7 @@ LogLook::LogLook(LogSource& source)
     : source_(source),
       reader_(source.path_),
       shown_(source.index_.channels().size(), kNothing),
+      held_(shown_.size(), 0),
       last_(std::chrono::steady_clock::now()) {
   if (source_.comparison_) ghosts_.emplace(*source_.comparison_);
   playback_.begin_s = static_cast<double>(source.index_.begin_us()) * 1e-6;
@@ -125,6 +126,11 @@ LogLook::LogLook(LogSource& source)
   playback_.speed = source.speed_;
   playback_.playing = true;
   ++source_.looks_;
+}
+
+LogLook::~LogLook() {
+  --source_.looks_;
+  for (const size_t bytes : held_) source_.held_ -= bytes;
 }
 
 SimTime LogLook::now_us() const {
@@ -161,6 +167,7 @@ void LogLook::show(Board& board) {
     if (channels[i].fingerprint == markers_t::getHash()) continue;  // see show_drawn
     if (board.channels()[i].watchers == 0) {
       shown_[i] = kNothing;  // read again on demand
+      forget(board, i);
       continue;
     }
     size_t count = channels[i].count_until(time_us);
@@ -206,14 +213,28 @@ size_t LogLook::load(Board& board, size_t channel, size_t count) {
   std::vector<std::vector<uint8_t>> parts;
   size_t bytes = 0;
   for (size_t entry = count; entry > 0 && parts.size() < Board::kMostParts; --entry) {
+    if (bytes > LogSource::kMostHeld) break;
     if (!read(reader_, entries[entry - 1], event_)) break;
     parts.push_back(event_.data);
     bytes += event_.data.size();
     if (!board.is_later_part(parts.back())) break;
   }
+  if (source_.held_ + bytes > LogSource::kMostHeld) forget(board, channel);
+  if (source_.held_ + bytes > LogSource::kMostHeld) return bytes;
   for (auto part = parts.rbegin(); part != parts.rend(); ++part)
     board.put(channel, std::move(*part));
+  source_.held_ -= held_[channel];
+  held_[channel] = 0;
+  for (const Board::Message& message : board.channels()[channel].newest)
+    held_[channel] += message.bytes->size();
+  source_.held_ += held_[channel];
   return bytes;
+}
+
+void LogLook::forget(Board& board, size_t channel) {
+  board.channels()[channel].newest.clear();
+  source_.held_ -= held_[channel];
+  held_[channel] = 0;
 }
 
 Count LogLook::traffic(size_t channel) const {

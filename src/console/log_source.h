@@ -22,6 +22,8 @@ class LogSource : public Source {
   // Bytes that are read for a plot, and for all viewers at a time: what one of them asks for holds
   // nobody up for longer.
   static constexpr size_t kMostForPlot = 256u << 20, kMostAtATime = 64u << 20;
+  // Bytes of the messages that all viewers' boards hold; what has no room is not shown.
+  static constexpr size_t kMostHeld = 256u << 20;
 
   // Throws InputError for a file that is not a log. speed: log time per wall time. other: a log to
   // compare with, loaded by load_other; "" for none.
@@ -53,6 +55,7 @@ class LogSource : public Source {
   EventScan scan_;
   bool scanned_ = false;
   size_t looks_ = 0;
+  size_t held_ = 0;  // bytes, by all boards
   log::Reader reader_;
   std::string info_channel_;
   bool makes_info_ = false;  // the log has none: its channel follows those of the log
@@ -64,7 +67,7 @@ class LogLook : public Look {
  public:
   // The source must outlive it.
   explicit LogLook(LogSource& source);
-  ~LogLook() override { --source_.looks_; }
+  ~LogLook() override;
   LogLook(const LogLook&) = delete;
   LogLook& operator=(const LogLook&) = delete;
 
@@ -83,6 +86,7 @@ class LogLook : public Look {
   void show(Board& board);
   void show_drawn(Board& board);
   size_t load(Board& board, size_t channel, size_t count);  // bytes
+  void forget(Board& board, size_t channel);
 
   LogSource& source_;
   log::Reader reader_;
@@ -90,6 +94,7 @@ class LogLook : public Look {
   const run::LogWorlds::Scene* told_ = nullptr;  // whose info is on the board
   // For each channel, the number of messages up to the one put on the board.
   std::vector<size_t> shown_;
+  std::vector<size_t> held_;                  // for each channel, bytes on the board
   size_t next_ = 0;                           // the channel to begin with
   std::vector<size_t> shown_layers_;          // for each layer, like shown_
   std::optional<Comparison::Ghosts> ghosts_;  // none: no comparison

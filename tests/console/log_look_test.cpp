@@ -79,6 +79,34 @@ TEST(LogLook, ReadsSoMuchAtATime) {
   EXPECT_EQ(shown(beside), 1);
 }
 
+// Of two viewers, 256 MB: six messages of 40 MB. Where nobody looks any more, there is room again.
+TEST(LogLook, HoldsSoMuchForAllViewers) {
+  const SparseLog log(4, 2, kLarge);
+  LogSource source(log.path(), {}, 1.0);
+  Board board, beside;
+  const auto first = source.look();
+  const auto hold_all = [](Look& look, Board& on) {
+    look.play(false, 1.0);
+    look.pump(on);
+    watch_all(on);
+    for (int i = 0; i < 4; ++i) look.pump(on);
+  };
+  hold_all(*first, board);
+  EXPECT_EQ(shown(board), 4);
+  auto second = source.look();
+  hold_all(*second, beside);
+  EXPECT_EQ(shown(beside), 2);
+  first->seek(1.0);  // in the place of those before
+  for (int i = 0; i < 4; ++i) first->pump(board);
+  EXPECT_EQ(board.newest(), 8u + 1u) << "four and four messages, and the world's info";
+
+  for (Board::Channel& channel : board.channels()) channel.watchers = 0;
+  first->pump(board);
+  second->seek(1.0);
+  for (int i = 0; i < 4; ++i) second->pump(beside);
+  EXPECT_EQ(shown(beside), 4);
+}
+
 TEST(LogLook, ShowsWhereItWasPutLast) {
   const SparseLog log(1, 3, 100);
   LogSource source(log.path(), {}, 1.0);
