@@ -4,6 +4,7 @@
 // spellings.
 #include <algorithm>
 #include <cmath>
+#include <string_view>
 
 #include "model/drive.h"
 #include "model/plugins.h"
@@ -54,6 +55,9 @@ constexpr Parameter kParameters[] = {
     {"torque", "ruedo:max_wheel_torque"},
     {"MaxForce", "ruedo:max_wheel_torque"},
 };
+
+// A limit below 0 is none; one of these would turn the robot's motion round.
+constexpr std::string_view kLengths[] = {"ruedo:wheel_radius", "ruedo:track", "ruedo:wheelbase"};
 
 struct Joints {
   const char* ours;
@@ -219,7 +223,10 @@ std::unique_ptr<Element> drive_from_plugin(const Element& plugin, const Model& m
   for (const Parameter& each : kParameters) {
     const Element* given = plugin.child(each.theirs);
     if (!given || drive->has(each.ours)) continue;
-    double value = given->as_number(Allowed::any(quantity::kEffort));
+    const bool length =
+        std::find(std::begin(kLengths), std::end(kLengths), each.ours) != std::end(kLengths);
+    double value = given->as_number(length ? Allowed::not_negative(quantity::kEffort)
+                                           : Allowed::any(quantity::kEffort));
     if (each.unit == Unit::half) value /= 2;
     if (each.unit == Unit::magnitude) value = std::abs(value);
     if (value > 0)

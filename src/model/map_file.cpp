@@ -30,7 +30,9 @@ struct Line {
 };
 
 std::vector<Line> lines_of(const std::string& path, size_t most_bytes) {
-  std::istringstream in(read_input(path, most_bytes));
+  std::string all = read_input(path, most_bytes);
+  if (all.starts_with("\xEF\xBB\xBF")) all.erase(0, 3);  // the UTF-8 byte order mark
+  std::istringstream in(std::move(all));
   std::vector<Line> lines;
   std::string text;
   for (int number = 1; std::getline(in, text); ++number) {
@@ -81,7 +83,9 @@ class FlatYaml {
       if (value.size() >= 2 && (value.front() == '"' || value.front() == '\'') &&
           value.back() == value.front())
         value = value.substr(1, value.size() - 2);
-      values_[key] = {line, value};
+      if (const auto [other, added] = values_.try_emplace(key, line, value); !added)
+        throw InputError({path, line}, "a second '" + key + "'; the first is in line " +
+                                           std::to_string(other->second.first));
     }
   }
 
@@ -94,7 +98,23 @@ class FlatYaml {
       throw InputError({path_, 0}, "has no '" + key + "'");
     return values_.at(key).second;
   }
+  [[noreturn]] void refuse(const std::string& key, const std::string& allowed) const {
+    throw InputError(source(key), key + ": '" + text(key) + "' is not allowed; allowed " + allowed);
+  }
   double real(const std::string& key) const { return number(text(key), source(key), key); }
+  // From 0 to 1.
+  double part(const std::string& key, double fallback) const {
+    if (!has(key)) return fallback;
+    const double value = real(key);
+    if (value < 0 || value > 1) refuse(key, "is 0 to 1");
+    return value;
+  }
+  bool boolean(const std::string& key) const {
+    const std::string value = has(key) ? text(key) : "0";
+    if (value != "0" && value != "1" && value != "false" && value != "true")
+      refuse(key, "are 0, 1, false and true");
+    return value == "1" || value == "true";
+  }
   std::vector<double> list(const std::string& key) const {
     std::string text = this->text(key);
     for (char& c : text) {
@@ -151,26 +171,18 @@ OccupancyGrid read_map(const std::string& path) {
   const FlatYaml yaml(path);
   const double resolution = yaml.real("resolution");
   if (!(resolution >= 0.0001 && resolution <= 1000))
-    throw InputError(yaml.source("resolution"),
-                     "resolution: '" + yaml.text("resolution") +
-                         "' is not allowed; allowed is 0.0001 to 1000 m");
+    yaml.refuse("resolution", "is 0.0001 to 1000 m");
   const std::vector<double> origin = yaml.list("origin");
   const auto is_far = [](double number) { return std::abs(number) > quantity::kLength.most; };
   if (std::any_of(origin.begin(), origin.end(), is_far))
-    throw InputError(
-        yaml.source("origin"),
-        "origin: '" + yaml.text("origin") + "' is not allowed; allowed is up to 1000000 m and rad");
-  if (origin.size() != 3 && origin.size() != 2)
-    throw InputError(yaml.source("origin"), "origin: '" + yaml.text("origin") +
-                                                "' is not allowed; allowed is [x, y, yaw]");
-  const double occupied = yaml.has("occupied_thresh") ? yaml.real("occupied_thresh") : 0.65;
-  const double free = yaml.has("free_thresh") ? yaml.real("free_thresh") : 0.25;
-  const std::string negate = yaml.has("negate") ? yaml.text("negate") : "0";
-  const bool negated = negate == "1" || negate == "true";
+    yaml.refuse("origin", "is up to 1000000 m and rad");
+  if (origin.size() != 3 && origin.size() != 2) yaml.refuse("origin", "is [x, y, yaw]");
+  const double occupied = yaml.part("occupied_thresh", 0.65);
+  const double free = yaml.part("free_thresh", 0.25);
+  const bool negated = yaml.boolean("negate");
   const std::string mode = yaml.has("mode") ? yaml.text("mode") : "trinary";
   if (mode != "trinary" && mode != "scale" && mode != "raw")
-    throw InputError(yaml.source("mode"),
-                     "mode: '" + mode + "' is not allowed; allowed are trinary, scale and raw");
+    yaml.refuse("mode", "are trinary, scale and raw");
   const fs::path named = yaml.text("image");
   const std::string picture =
       (named.is_absolute() ? named : fs::path(path).parent_path() / named).string();

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <charconv>
 #include <map>
+#include <set>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -147,6 +148,60 @@ constexpr std::string_view kSensorTypes[] = {"air_pressure",
                                              "wireless_receiver",
                                              "wireless_transmitter"};
 
+// What may stand in an element more than once. Of everything else the readers take the first.
+constexpr std::string_view kSeveral[] = {"actor",
+                                         "angle",
+                                         "animation",
+                                         "audio_sink",
+                                         "audio_source",
+                                         "battery",
+                                         "blend",
+                                         "camera",
+                                         "collision",
+                                         "frame",
+                                         "gripper",
+                                         "gripper_link",
+                                         "include",
+                                         "joint",
+                                         "joint_state",
+                                         "light",
+                                         "light_state",
+                                         "link",
+                                         "link_state",
+                                         "model",
+                                         "model_state",
+                                         "name",
+                                         "particle_emitter",
+                                         "performer",
+                                         "physics",
+                                         "plugin",
+                                         "point",
+                                         "polyline",
+                                         "population",
+                                         "projector",
+                                         "road",
+                                         "sensor",
+                                         "state",
+                                         "texture",
+                                         "trajectory",
+                                         "uri",
+                                         "visual",
+                                         "waypoint",
+                                         "world",
+                                         "ruedo:collision",
+                                         "ruedo:crowd",
+                                         "ruedo:drive",
+                                         "ruedo:fault",
+                                         "ruedo:fleet",
+                                         "ruedo:goal",
+                                         "ruedo:left_joint",
+                                         "ruedo:performer",
+                                         "ruedo:right_joint",
+                                         "ruedo:steer_joint",
+                                         "ruedo:transducer",
+                                         "ruedo:waypoint",
+                                         "ruedo:wheel_joint"};
+
 std::vector<std::string> words_of(std::string_view list) {
   std::vector<std::string> words;
   while (!list.empty()) {
@@ -191,10 +246,19 @@ class Walk {
   explicit Walk(Findings& to) : findings_(to) {}
 
   void below(const Element& element, const std::string& path, const std::string& where) {
+    std::set<std::string_view> seen;
     for (const auto& child : element.children) {
-      if (child->name.find(':') != std::string::npos || is_of_others(child->name)) continue;
+      const bool ours = child->name.starts_with("ruedo:");
+      const bool prefixed = child->name.find(':') != std::string::npos;
+      if ((prefixed && !ours) || is_of_others(child->name)) continue;
+      if (!seen.insert(child->name).second && is_once(element, child->name)) {
+        findings_.unsupported(child->source, where,
+                              "a second <" + child->name + "> in <" + element.name +
+                                  "> is left out; the first one counts");
+        continue;
+      }
       const std::string here = path + "/" + child->name;
-      if (!name_element(element, *child, here, where)) continue;
+      if (!ours && !name_element(element, *child, here, where)) continue;
       std::string inside = where;
       for (const auto& [name, value] : child->attributes) {
         if (name == "name") inside += (where.empty() ? "" : "/") + child->name + " " + value;
@@ -235,6 +299,16 @@ class Walk {
                             path.substr(path.rfind('@') + 1) + "=\"" + value + "\" of <" +
                                 element.name + "> is not supported: " + each.text);
     }
+  }
+
+  // What neither SDF nor Ruedo has may be a plugin's own.
+  static bool is_once(const Element& element, const std::string& child) {
+    const std::vector<std::string> known = words_in(element);
+    if (!child.starts_with("ruedo:") && std::find(known.begin(), known.end(), child) == known.end())
+      return false;
+    const bool address = element.name == "include" && (child == "uri" || child == "name");
+    return address ||
+           std::find(std::begin(kSeveral), std::end(kSeveral), child) == std::end(kSeveral);
   }
 
   // Not a format of ours: readers report it as a whole, or take it as it is.

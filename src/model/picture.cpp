@@ -13,6 +13,7 @@ constexpr int64_t kMostPixelsInAll = 100'000'000;
 
 struct Size {
   int64_t width = 0, height = 0;  // 0: not found
+  int64_t white = 255;            // of a portable map, as decoded
 };
 
 class Bytes {
@@ -50,9 +51,10 @@ Size jpeg_size(const Bytes& bytes) {
   return {};
 }
 
-// Two numbers after "P1" to "P6", with optional comments.
+// Numbers after "P1" to "P6", with optional comments: width and height; of grey and colours, what
+// is white. The decoder scales texts ("P2", "P3") of up to 255.
 Size portable_size(const Bytes& bytes) {
-  int64_t numbers[2] = {0, 0};
+  int64_t numbers[3] = {0, 0, 0};
   size_t i = 2;
   for (int64_t& number : numbers) {
     while (i < bytes.size() && (bytes.at(i) == '#' || bytes.at(i) <= ' ')) {
@@ -65,7 +67,10 @@ Size portable_size(const Bytes& bytes) {
     for (; i < bytes.size() && bytes.at(i) >= '0' && bytes.at(i) <= '9'; ++i)
       number = std::min<int64_t>(number * 10 + bytes.at(i) - '0', int64_t{1} << 40);
   }
-  return {numbers[0], numbers[1]};
+  const int64_t kind = bytes.at(1) - '0', white = numbers[2];
+  const bool has_none = kind == 1 || kind == 4;
+  const bool scaled = (kind == 2 || kind == 3) && white > 0 && white < 255;
+  return {numbers[0], numbers[1], has_none || scaled ? 255 : white};
 }
 
 // The width and height of the first directory: tags 256 and 257, as 16 or 32 bits.
@@ -116,6 +121,9 @@ std::string picture_fault(std::span<const uint8_t> span, int64_t most) {
   // For another kind, only its decoder could tell how much memory it needs.
   if (size.width <= 0 || size.height <= 0)
     return "it is no picture that can be read (pgm, png, jpeg, bmp, tiff)";
+  if (size.white != 255 && size.white != 65535)
+    return "its white is " + std::to_string(size.white) +
+           "; allowed are 255 and 65535: save it with one of these";
   if (size.width <= most && size.height <= most && !is_too_large(size)) return "";
   if (size.width <= most && size.height <= most) {
     return "it has " + std::to_string(size.width) + " x " + std::to_string(size.height) +

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <map>
+#include <set>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -14,6 +15,10 @@ using Words = std::vector<std::string>;
 struct Format {
   Words children, attributes;
 };
+
+// What a robot or a link may have more than once. Of everything else urdfdom takes the first.
+constexpr std::string_view kSeveral[] = {"link",         "joint",        "material", "gazebo",
+                                         "transmission", "ros2_control", "visual",   "collision"};
 
 // Including parts that no simulator reads: <safety_controller>, <calibration>, <verbose>.
 const std::map<std::string_view, Format>& formats() {
@@ -76,7 +81,17 @@ void look(const Element& element, const std::string& where, Findings& findings) 
                              "> is not supported and left out" +
                              suggestion(name, attributes, "", ""));
   }
+  std::set<std::string_view> seen;
   for (const auto& child : element.children) {
+    const std::string_view own = child->name;
+    const std::string_view kind = element.name == "geometry" ? "shape" : own;
+    if (!seen.insert(kind).second && child->name.find(':') == std::string::npos &&
+        std::find(std::begin(kSeveral), std::end(kSeveral), child->name) == std::end(kSeveral)) {
+      findings.unsupported(child->source, where,
+                           "a second <" + child->name + "> in <" + element.name +
+                               "> is left out; the first one counts");
+      continue;
+    }
     if (!holds(children, child->name)) {
       findings.unsupported(child->source, where,
                            "<" + child->name + "> in <" + element.name +

@@ -192,15 +192,18 @@ TEST(DrivePlugins, OfEveryKindAreTranslated) {
 
 // A value that is not a number leaves out the drive, not the model.
 TEST(DrivePlugins, WithAnOddNumberLeaveTheModel) {
-  const auto world =
-      world_of("<model name='m'><link name='base'/>" + wheel("l", "0 0.2 0.1 0 0 0") +
-               wheel("r", "0 -0.2 0.1 0 0 0") +
-               "<plugin name='p' filename='libgazebo_ros_diff_drive.so'><leftJoint>j_l</leftJoint>"
-               "<rightJoint>j_r</rightJoint><wheelSeparation>wide</wheelSeparation></plugin>"
-               "</model>");
-  ASSERT_EQ(world->models.size(), 1u);
-  EXPECT_THAT(texts(*world), testing::Contains(testing::HasSubstr(
-                                 "the drive plugin cannot be used: <wheelSeparation>: ")));
+  for (const char* odd : {"wide", "-0.4"}) {
+    const auto world = world_of(
+        "<model name='m'><link name='base'/>" + wheel("l", "0 0.2 0.1 0 0 0") +
+        wheel("r", "0 -0.2 0.1 0 0 0") +
+        "<plugin name='p' filename='libgazebo_ros_diff_drive.so'><leftJoint>j_l</leftJoint>"
+        "<rightJoint>j_r</rightJoint><wheelSeparation>" +
+        odd + "</wheelSeparation></plugin></model>");
+    ASSERT_EQ(world->models.size(), 1u);
+    EXPECT_THAT(texts(*world), testing::Contains(testing::HasSubstr(
+                                   "the drive plugin cannot be used: <wheelSeparation>: '" +
+                                   std::string(odd) + "'")));
+  }
 }
 
 // RMF's robots: the plugin's own numbers, its wheels where the model has them, and its defaults.

@@ -191,6 +191,16 @@ TEST(Map, WrongFilesSayWhatIsWrong) {
             "none.pgm: no such file");
   EXPECT_EQ(error("a.yaml", "image: no.png\nresolution: 1\norigin: [0, 0, 0]\n"),
             "no.png: it is no picture that can be read (pgm, png, jpeg, bmp, tiff)");
+  const std::string good = "image: ok.pgm\nresolution: 1\norigin: [0, 0, 0]\n";
+  EXPECT_EQ(error("a.yaml", "\xEF\xBB\xBF" + good), "");  // as editors of Windows begin a text
+  EXPECT_EQ(error("a.yaml", good + "resolution: 2\n"),
+            "a.yaml:4: a second 'resolution'; the first is in line 2");
+  EXPECT_EQ(error("a.yaml", good + "negate: 2\n"),
+            "a.yaml:4: negate: '2' is not allowed; allowed are 0, 1, false and true");
+  EXPECT_EQ(error("a.yaml", good + "occupied_thresh: 65\n"),
+            "a.yaml:4: occupied_thresh: '65' is not allowed; allowed is 0 to 1");
+  EXPECT_EQ(error("a.yaml", good + "free_thresh: -1\n"),
+            "a.yaml:4: free_thresh: '-1' is not allowed; allowed is 0 to 1");
   EXPECT_EQ(error("a.yaml", "hello\n"), "a.yaml:1: 'hello' is no 'key: value'");
   EXPECT_EQ(error("a.map", "hello\n"),
             "a.map:1: is no map of MobileSim and ARIA: it does not begin with '2D-Map'");

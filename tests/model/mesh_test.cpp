@@ -481,5 +481,17 @@ TEST(Pictures, TooLargeByTheirHeads) {
             "it is no picture that can be read (pgm, png, jpeg, bmp, tiff)");
 }
 
+// A decoder takes the bytes of a portable map as they are: white would be grey.
+TEST(Pictures, OfAnotherWhiteAreRefused) {
+  const std::string wanted = "; allowed are 255 and 65535: save it with one of these";
+  const auto fault = [](const std::string& head) { return picture_fault(head + " ", 1000); };
+  EXPECT_EQ(fault("P5 4 4 100"), "its white is 100" + wanted);
+  EXPECT_EQ(fault("P6\n4 4\n# twelve bits\n4095"), "its white is 4095" + wanted);
+  EXPECT_EQ(fault("P2 4 4 1000"), "its white is 1000" + wanted);
+  for (const char* good : {"P5 4 4 255", "P5 4 4 65535", "P6 4 4 255", "P4 4 4", "P1 4 4",
+                           "P2 4 4 15", "P3 4 4 65535"})  // texts of up to 255 are scaled
+    EXPECT_EQ(fault(good), "");
+}
+
 }  // namespace
 }  // namespace ruedo::model

@@ -153,6 +153,41 @@ TEST(OddElements, WhatSdfDoesNotHaveIsNamed) {
                   "model's name"));
 }
 
+// Whatever a name holds: what follows a line end would look like another finding.
+TEST(OddElements, AFindingIsOneLine) {
+  const auto world = world_of("<model name='m&#10;error: no'><colision/><link name='l'/></model>");
+  ASSERT_EQ(world->findings.size(), 1u);
+  EXPECT_EQ(world->findings[0].element, "model m error: no");
+}
+
+// Readers take the first. In Ruedo's own elements, too.
+TEST(OddElements, ASecondOfWhatThereIsOnceIsNamed) {
+  const auto named = [](const std::string& inside) { return texts(*world_of(inside)); };
+  const auto left_out = [](const std::string& what, const std::string& in) {
+    return "a second <" + what + "> in <" + in + "> is left out; the first one counts";
+  };
+  EXPECT_THAT(named("<model name='m'><pose>1 0 0 0 0 0</pose><pose>2 0 0 0 0 0</pose>"
+                    "<link name='l'><inertial><mass>1</mass><mass>2</mass></inertial></link>"
+                    "</model>"),
+              ElementsAre(left_out("pose", "model"), left_out("mass", "inertial")));
+  EXPECT_THAT(named("<ruedo:crowd name='c'><ruedo:area>0 0 1 1</ruedo:area><ruedo:count>1"
+                    "</ruedo:count><ruedo:goal>0 0</ruedo:goal><ruedo:goal>1 1</ruedo:goal>"
+                    "<ruedo:count>2</ruedo:count></ruedo:crowd>"),
+              ElementsAre(left_out("ruedo:count", "ruedo:crowd")));
+  // What may stand several times, and what a plugin's sensor may have
+  EXPECT_THAT(named("<model name='m'><link name='l'><sensor name='s' type='thermometer'><zone/>"
+                    "<zone/></sensor></link><link name='k'/><frame name='f'/><frame name='g'/>"
+                    "</model>"),
+              IsEmpty());
+  const auto robot = load_world_text(
+      "<robot name='r'><link name='a'><visual><geometry><box size='1 1 1'/><sphere radius='1'/>"
+      "</geometry></visual></link><link name='b'/><joint name='j' type='fixed'><parent "
+      "link='a'/><child link='b'/><origin xyz='1 0 0'/><origin xyz='2 0 0'/></joint></robot>",
+      "/nowhere/r.urdf");
+  EXPECT_THAT(texts(*robot),
+              ElementsAre(left_out("sphere", "geometry"), left_out("origin", "joint")));
+}
+
 TEST(OddElements, WhatUrdfDoesNotHaveIsNamed) {
   const auto world = load_world_text(
       "<robot name='r'><link name='a'><collisoin/><visual><geometry><box size='1 1 "
