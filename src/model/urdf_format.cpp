@@ -83,20 +83,20 @@ void look(const Element& element, const std::string& where, Findings& findings) 
   }
   std::set<std::string_view> seen;
   for (const auto& child : element.children) {
-    const std::string_view own = child->name;
-    const std::string_view kind = element.name == "geometry" ? "shape" : own;
-    if (!seen.insert(kind).second && child->name.find(':') == std::string::npos &&
-        std::find(std::begin(kSeveral), std::end(kSeveral), child->name) == std::end(kSeveral)) {
-      findings.unsupported(child->source, where,
-                           "a second <" + child->name + "> in <" + element.name +
-                               "> is left out; the first one counts");
-      continue;
-    }
     if (!holds(children, child->name)) {
       findings.unsupported(child->source, where,
                            "<" + child->name + "> in <" + element.name +
                                "> is not supported and left out" +
                                suggestion(child->name, children, "<", ">"));
+      continue;
+    }
+    const std::string_view kind =
+        element.name == "geometry" ? std::string_view("shape") : child->name;
+    if (!seen.insert(kind).second && child->name.find(':') == std::string::npos &&
+        std::find(std::begin(kSeveral), std::end(kSeveral), child->name) == std::end(kSeveral)) {
+      findings.unsupported(child->source, where,
+                           "a second <" + child->name + "> in <" + element.name +
+                               "> is left out; the first one counts");
       continue;
     }
     const std::string* name = child->attribute("name");
