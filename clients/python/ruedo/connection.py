@@ -5,10 +5,10 @@ from __future__ import annotations
 
 import atexit
 import contextlib
+import inspect
 import logging
 import os
 import struct
-import sys
 import threading
 import time
 import weakref
@@ -106,11 +106,11 @@ class Connection:
             return
         self.closed = _CLOSED
         if self.bus.handling or _is_in_another_call():
-            threading.Thread(target=self._end, name="ruedo-close", args=(False,)).start()
+            threading.Thread(target=self._end_all, name="ruedo-close", args=(False,)).start()
         else:
-            self._end(True)
+            self._end_all(True)
 
-    def _end(self, awaits_callbacks: bool) -> None:
+    def _end_all(self, awaits_callbacks: bool) -> None:
         with contextlib.ExitStack() as ends:  # all of it, whatever interrupts one
             ends.callback(atexit.unregister, self.close)
             if self._server:
@@ -350,13 +350,13 @@ if hasattr(os, "register_at_fork"):
 def _is_in_another_call() -> bool:
     """Whether a call of this package, outside of the one that asks, goes on in this thread: it was
     interrupted, or it calls back."""
-    outside, frame = False, sys._getframe(1)
+    outside, frame = False, inspect.currentframe()
     while frame is not None:
         if frame.f_globals.get("__name__", "").partition(".")[0] != __package__:
             outside = True
         elif outside:
             return True
-        frame = frame.f_back  # type: ignore[assignment]
+        frame = frame.f_back
     return False
 
 
