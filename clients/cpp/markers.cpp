@@ -124,6 +124,7 @@ void Simulation::markers(const std::string& layer, const std::vector<Marker>& ma
   require(!layer.empty() && layer.size() <= kMostName, "a layer is a name of 1 to 63 bytes");
   require(markers.size() <= kMostMarkers, "a layer has at most 1000 markers");
   const std::shared_ptr<Core> core = this->core();
+  core->check_open();
   markers_t message{};
   message.utime = core->utime();
   message.layer = layer;

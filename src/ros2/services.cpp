@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cstring>
 #include <map>
 #include <set>
 
@@ -36,6 +37,7 @@ constexpr uint8_t kAlreadyThere = 101;
 // EntityCategory
 constexpr uint8_t kRobot = 2, kDynamic = 4, kStatic = 5;
 constexpr size_t kLongestFilter = 200;
+constexpr size_t kLongestWrittenOut = 500;  // what is repeated so often
 
 std::vector<uint8_t> name_body(const std::string& name) {
   name_request_t body;
@@ -96,14 +98,33 @@ Placed read_pose_stamped(CdrReader& in) {
 
 bool is_world(const std::string& frame) { return frame.empty() || frame == "world"; }
 
+// How many copies the C library makes of a part of an expression, at most: + after a group or a
+// repeat doubles what it repeats, and {9} makes nine of it.
+size_t copies(const std::string& expression) {
+  size_t times = 1;
+  for (size_t i = 1; i < expression.size() && times <= kLongestWrittenOut; ++i) {
+    if (expression[i] == '+' && std::strchr(")+*?}", expression[i - 1])) times *= 2;
+    if (expression[i] != '{') continue;
+    size_t number = 0, largest = 1;
+    for (size_t at = i + 1; at < expression.size() && largest <= kLongestWrittenOut; ++at) {
+      const char c = expression[at];
+      number = c >= '0' && c <= '9' ? 10 * number + static_cast<size_t>(c - '0') : 0;
+      largest = std::max(largest, number);
+      if (c == '}') break;
+    }
+    times *= largest;
+  }
+  return times;
+}
+
 // Whether a name matches a POSIX extended regular expression as a whole or in part; null where the
 // expression cannot be taken.
 class Filter {
  public:
   explicit Filter(const std::string& text) : empty_(text.empty()) {
     // Repeats of repeats, and references backwards, take time and memory without end.
-    const bool dear = std::count(text.begin(), text.end(), '{') > 1 ||
-                      text.find('\\') != std::string::npos || text.size() > kLongestFilter;
+    const bool dear = text.find('\\') != std::string::npos || text.size() > kLongestFilter ||
+                      text.size() * copies(text) > kLongestWrittenOut;
     good_ = empty_ || (!dear && text.find('\0') == std::string::npos &&
                        regcomp(&expression_, text.c_str(), REG_EXTENDED | REG_NOSUB) == 0);
   }

@@ -318,6 +318,8 @@ def test_callbacks_are_taken_back_and_readers_do_not_meet(caplog):
             lambda: sim.robot("p3at").rotate(1.0),
             lambda: odometry.on_sample(print),
             lambda: sim.on_new_run(print),
+            lambda: sim.markers("layer"),
+            lambda: sim.robot("p3at").inject("freeze", "lrf"),
             sim.quit,
         ):
             with pytest.raises(ruedo.NoServer, match="^this simulation was closed$"):
@@ -441,6 +443,58 @@ def test_two_callbacks_may_close_each_others_simulation():
         first.robot("p3at").odometry.on_sample(closes(second, done[0]))
         second.robot("p3at").odometry.on_sample(closes(first, done[1]))
         assert all(end.wait(PATIENCE) for end in done)
+
+
+class _Interrupted:
+    """A socket while whose sending a signal comes in, or a finalizer runs."""
+
+    def __init__(self, end, handler):
+        self._end, self._handler = end, handler
+
+    def __getattr__(self, name):
+        return getattr(self._end, name)
+
+    def sendall(self, data):
+        handler, self._handler = self._handler, None
+        if handler:
+            handler()
+        self._end.sendall(data)
+
+
+def test_what_interrupts_a_call_may_close_the_simulation():
+    """The call holds locks then, that of the socket among them."""
+    with ruedo.launch(HALL, **QUICK) as sim:
+        sim.state()
+        transport = sim._connection.bus._transport
+        transport._socket = _Interrupted(transport._socket, sim.close)
+        said = []
+
+        def asks():
+            try:
+                sim.state()
+            except ruedo.NoServer as error:
+                said.append(str(error))
+
+        caller = threading.Thread(target=asks, daemon=True)
+        caller.start()
+        caller.join(PATIENCE)
+        assert said == ["this simulation was closed"]
+        for thread in threading.enumerate():
+            if thread.name == "ruedo-close":
+                thread.join(PATIENCE)
+        assert sim._connection._server.ended()
+
+
+def test_a_close_that_is_interrupted_leaves_nothing_open(monkeypatch):
+    def leave():
+        raise KeyboardInterrupt
+
+    sim = ruedo.launch(HALL, **QUICK)
+    monkeypatch.setattr(sim._session, "leave", leave)
+    with pytest.raises(KeyboardInterrupt):
+        sim.close()
+    assert sim._connection._server.ended()
+    assert not sim._connection.bus._thread.is_alive()
 
 
 def test_the_child_of_a_fork_is_told():

@@ -123,7 +123,9 @@ def test_entities_are_listed_and_filtered(client):
     assert client.call("get_entities", filters(categories=[2])).entities == ["p3at"]
     assert "p3at" not in client.call("get_entities", filters(categories=[5])).entities
     assert client.call("get_entities", filters(tags=["x"])).entities == []
-    for bad in ("(", "(a{9}){9}", "a" * 1000):
+    assert client.call("get_entities", filters("^(p[0-9]{1,2})+(at|dx)+$")).entities == ["p3at"]
+    nested = "(" * 20 + ".?" + ")+" * 20  # as long as 2^20 groups in one another
+    for bad in ("(", "(a{9}){9}", f"({'a' * 190}){{9999}}", "a" + "+" * 30, nested, "a" * 1000):
         assert client.call("get_entities", filters(bad)).result.result == UNSUPPORTED
     assert (
         client.call("get_entities", filters(points=[Vector3(), Vector3()])).result.result

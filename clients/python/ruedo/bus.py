@@ -89,11 +89,11 @@ class Bus:
         if not self._closed.is_set():
             self._transport.publish(channel, data)
 
-    def close(self) -> None:
+    def close(self, awaits_handlers: bool) -> None:
+        """awaits_handlers: until the one that runs has returned."""
         self._closed.set()
         self._transport.close()
-        in_a_handler = getattr(_receives_for, "bus", None) is not None
-        if self._thread.is_alive() and not in_a_handler:  # two that close each other would wait
+        if awaits_handlers and self._thread.is_alive():
             self._thread.join()
 
     def _left(self, channel: str) -> None:

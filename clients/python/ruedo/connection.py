@@ -4,6 +4,8 @@ time."""
 from __future__ import annotations
 
 import atexit
+import contextlib
+import inspect
 import logging
 import os
 import struct
@@ -95,20 +97,28 @@ class Connection:
         self._await_info(timeout)
 
     def close(self) -> None:
-        """Repeated commands end, and so does a private server."""
-        if self.closed:  # in a fork's child the lock may be held for ever
+        """Repeated commands end, and so does a private server.
+
+        In a callback, a signal handler or a finalizer, what waits is left to a thread: this one may
+        hold what the receiving thread waits for.
+        """
+        if self.closed or not self._closing.acquire(blocking=False):  # the first one closes
             return
-        with self._closing:
-            if self.closed:
-                return
-            self.closed = _CLOSED
-        self.drivers.wake()
-        if self._known:
-            self.session.leave()
-        self.bus.close()
-        if self._server:
-            self._server.end()
-        atexit.unregister(self.close)
+        self.closed = _CLOSED
+        if self.bus.handling or _is_in_another_call():
+            threading.Thread(target=self._end_all, name="ruedo-close", args=(False,)).start()
+        else:
+            self._end_all(True)
+
+    def _end_all(self, awaits_callbacks: bool) -> None:
+        with contextlib.ExitStack() as ends:  # all of it, whatever interrupts one
+            ends.callback(atexit.unregister, self.close)
+            if self._server:
+                ends.callback(self._server.end)
+            ends.callback(self.bus.close, awaits_callbacks)
+            self.drivers.wake()
+            if self._known:
+                self.session.leave()
 
     def check_open(self) -> None:
         if self.closed:
@@ -335,6 +345,19 @@ def _after_fork() -> None:
 
 if hasattr(os, "register_at_fork"):
     os.register_at_fork(after_in_child=_after_fork)
+
+
+def _is_in_another_call() -> bool:
+    """Whether a call of this package, outside of the one that asks, goes on in this thread: it was
+    interrupted, or it calls back."""
+    outside, frame = False, inspect.currentframe()
+    while frame is not None:
+        if frame.f_globals.get("__name__", "").partition(".")[0] != __package__:
+            outside = True
+        elif outside:
+            return True
+        frame = frame.f_back
+    return False
 
 
 def _name_hash(name: str) -> int:

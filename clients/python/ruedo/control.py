@@ -123,19 +123,20 @@ class Session:
         if not self._session:
             return
         its_turn = self._one_at_a_time.acquire(timeout=_PARTING_SECONDS)
-        hears = its_turn and not self._connection.bus.handling
-        deadline = time.monotonic() + (_PARTING_SECONDS if hears else 0.0)
-        with self._news:
-            sequence = self.next_sequence()
-            self._awaited, self._reply = (lcmtypes.request_t.LEAVE, sequence), None
-            while self._reply is None:
-                self.publish(lcmtypes.request_t.LEAVE, self._session, sequence, b"")
-                if time.monotonic() >= deadline:
-                    break
-                self._news.wait(_REPEAT_SECONDS)
-            self._awaited, self._session = None, 0
-        if its_turn:
-            self._one_at_a_time.release()
+        deadline = time.monotonic() + (_PARTING_SECONDS if its_turn else 0.0)
+        try:
+            with self._news:
+                sequence = self.next_sequence()
+                self._awaited, self._reply = (lcmtypes.request_t.LEAVE, sequence), None
+                while self._reply is None:
+                    self.publish(lcmtypes.request_t.LEAVE, self._session, sequence, b"")
+                    if time.monotonic() >= deadline:
+                        break
+                    self._news.wait(_REPEAT_SECONDS)
+                self._awaited, self._session = None, 0
+        finally:
+            if its_turn:
+                self._one_at_a_time.release()
 
     def receive(self, data: bytes) -> None:
         """A message of ruedo/reply."""

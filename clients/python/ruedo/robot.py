@@ -323,6 +323,7 @@ class Robot:
         """Something goes wrong from now on; what it takes is fault_command()'s. The server's log
         says what acted; a wrong one is ignored.
         """
+        self._connection.check_open()
         command = self.fault_command(kind, target, **how)
         self._connection.bus.publish(command.channel, command.data)
 

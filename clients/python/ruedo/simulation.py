@@ -284,6 +284,7 @@ class Simulation:
         layer: a name of your own; what is drawn takes the place of all that was in it, and nothing
         empties it. frame: a robot, with whose base_link it moves; "": the world.
         """
+        self._connection.check_open()
         message = made_markers(layer, markers, frame, self._connection.clock.utime)
         channel = next((c for c in self._info.channel_list if c.type == "markers_t"), None)
         if channel is None:
@@ -317,7 +318,8 @@ class Simulation:
 
     def close(self) -> None:
         """Leaves the simulation: repeated commands end, and so does a server that launch()
-        started.
+        started. Returns when no callback runs any more; at once in a callback, a signal handler or
+        a finalizer (__del__), where the end follows by itself.
         """
         self._connection.close()
 

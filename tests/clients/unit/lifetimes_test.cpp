@@ -84,6 +84,7 @@ TEST_F(Lifetimes, AfterCloseEveryRequestSaysSo) {
                                                     [&] { sim.snapshot("s"); },
                                                     [&] { sim.restore("s"); },
                                                     [&] { sim.quit(); },
+                                                    [&] { sim.markers("layer", {}); },
                                                     [&] { sim.sleep(1.0); },
                                                     [&] { (void)sim.on_new_run([] {}); }};
   for (size_t i = 0; i < calls.size(); ++i)
