@@ -83,6 +83,8 @@ std::string check_fault(const Fault& fault) {
     return fmt::format("value {} of {} is not allowed; allowed are {:g} to {:g} ({})", fault.value,
                        kind->name, kind->least, kind->most, kind->meaning);
   }
+  if (kind->least == kind->most && fault.value != 0.0)
+    return fmt::format("value {} of {} is not allowed; it takes none", fault.value, kind->name);
   if (kind->of == FaultKind::Of::device && fault.target.empty())
     return kind->name + " needs a device";
   if (kind->of == FaultKind::Of::wheels && fault.target != "" && fault.target != "left" &&

@@ -3,6 +3,7 @@
 #include "engine/faults.h"
 
 #include <algorithm>
+#include <cmath>
 #include <string>
 #include <vector>
 
@@ -221,6 +222,32 @@ TEST_F(FaultsTest, ThoseThatActAtOnceAreBounded) {
   EXPECT_EQ(faults_.check(weak, RobotIndex(0)), "there are 1000 faults already");
   begin(weak, 100);
   EXPECT_EQ(faults_.check(weak, RobotIndex(0)), "there are 1000 faults already");
+}
+
+// Whatever number a message of the bus has where: it is taken or ignored, and the run goes on.
+TEST_F(FaultsTest, NoNumberOfAMessageEndsTheRun) {
+  const double odd[] = {1e300, -1e300, 1e15, -1.0, std::nan(""), HUGE_VAL, -HUGE_VAL, 5e-324};
+  double model::Fault::* const fields[] = {
+      &model::Fault::duration_s, &model::Fault::value, &model::Fault::from,   &model::Fault::to,
+      &model::Fault::x,          &model::Fault::y,     &model::Fault::heading};
+  for (const model::FaultKind& kind : model::fault_kinds()) {
+    const bool of_device = kind.of == model::FaultKind::Of::device;
+    for (double model::Fault::* const field : fields) {
+      for (const double number : odd) {
+        model::Fault fault = made(kind.name.c_str(), of_device ? "odometry" : "", 0.0, kind.most);
+        fault.*field = number;
+        EXPECT_NO_THROW(begin(fault, 0)) << kind.name << " " << number;
+      }
+    }
+  }
+  faults_.before_commands(1, robots_);
+  EXPECT_NO_THROW(robots_.step());
+}
+
+TEST_F(FaultsTest, WhatTakesNoValueGetsNone) {
+  EXPECT_TRUE(takes(made("freeze", "odometry", 0.0, 0.0)));
+  EXPECT_EQ(faults_.check(made("freeze", "odometry", 0.0, 2.5), RobotIndex(0)),
+            "value 2.5 of freeze is not allowed; it takes none");
 }
 
 // 32 MB of commands wait: of messages of 1 MB the first 32 act, and the last of these counts.
