@@ -5,6 +5,7 @@ for wrong types, forks, logs.
 import gc
 import math
 import os
+import re
 import resource
 import struct
 import sys
@@ -744,3 +745,56 @@ def test_a_closed_simulation_leaves_nothing_running(scheme, tmp_path):
             with pytest.raises(ruedo.NoServer):
                 ruedo.connect(server.url, timeout=0.2)
         assert settles_at_most_at(before), (held(), before)
+
+
+# What no message of ours says, but the interpreter or NumPy of something inside.
+INNER = (
+    "unsupported operand|not supported between|object is not|has no attribute|codec can't|"
+    "too large to convert|cannot convert|only length-1|ambiguous|to unpack|could not convert"
+)
+WRONG = [
+    *(None, True, "\ud800", "x" * 1_000_000, b"x", math.inf, math.nan, 10**400, -1, 0.5, 1j),
+    *([], [None] * 3, {}, (1,), object(), float, np.array([1.0, 2.0]), np.array([])),
+]
+
+
+def test_what_is_wrong_is_told_in_a_line_of_our_own():
+    """Each call with each wrong argument: it is taken, or one line names what is wrong."""
+    with ruedo.launch(HALL, **QUICK) as sim:
+        robot, inner = sim.robot("p3at"), []
+
+        def short(x):
+            return x[:100] if isinstance(x, str) else x
+
+        calls = [
+            sim.robot,
+            sim.set_rate,
+            lambda x: sim.remove(short(x)),  # the server repeats it
+            robot.device,
+            robot.advance,
+            robot.inject,
+            lambda x: robot.arc(0.1, x),
+            lambda x: robot.set_velocity(x, 0.0),
+            lambda x: robot.inject("dropout", x),
+            lambda x: robot.inject("dropout", "lrf", view=x, duration=0.1),
+            lambda x: robot.inject("kidnapped", place=x),
+            lambda x: sim.markers(x, []),
+            lambda x: sim.markers("a", x),
+            lambda x: sim.markers("a", [], frame=x),
+            lambda x: sim.set_pose("nobody", x=x, y=0.0),
+            lambda x: ruedo.World().wall(0, 0, 1, x),
+            lambda x: ruedo.World().box(x, 0, size=(1, 1, 1)),
+            lambda x: ruedo.connect("no url" if x is None else short(x), timeout=0.05),
+            lambda x: ruedo.connect(sim.url, name=x).close(),
+        ]
+        for call in calls:
+            for wrong in WRONG:
+                with warnings.catch_warnings():
+                    warnings.simplefilter("ignore")
+                    try:
+                        call(wrong)
+                    except (TypeError, ValueError, ruedo.RuedoError) as error:
+                        said = str(error)
+                        if len(said) > 1000 or "\n" in said or re.search(INNER, said):
+                            inner.append((said[:200], repr(wrong)[:50]))
+    assert not inner

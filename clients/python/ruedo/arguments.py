@@ -2,12 +2,20 @@
 
 from __future__ import annotations
 
+import math
 import operator
 from collections.abc import Iterable, Mapping
 from typing import Any
 
 MOST_WHOLE = 2**63 - 1
 MOST_SEED = 2**64 - 1
+_MOST_SHOWN = 100  # characters
+
+
+def shown(value: Any) -> str:
+    """For messages: how the value would be written, the beginning of it."""
+    written = repr(value)
+    return written if len(written) <= _MOST_SHOWN else f"{written[:_MOST_SHOWN]}..."
 
 
 def whole(what: str, value: Any, low: int = 0, high: int = MOST_WHOLE) -> int:
@@ -15,7 +23,7 @@ def whole(what: str, value: Any, low: int = 0, high: int = MOST_WHOLE) -> int:
     try:
         number = operator.index(value)
     except TypeError:
-        raise TypeError(f"{what} is a whole number, not {value!r}") from None
+        raise TypeError(f"{what} is a whole number, not {shown(value)}") from None
     if not low <= number <= high:
         raise ValueError(f"{what} is {number}; allowed are {low} to {high}")
     return number
@@ -24,13 +32,13 @@ def whole(what: str, value: Any, low: int = 0, high: int = MOST_WHOLE) -> int:
 def texts(what: str, value: Any) -> list[str]:
     """A list of texts. Raises TypeError."""
     if isinstance(value, str):
-        raise TypeError(f"{what} is a list of texts, not one: {what}=[{value!r}]")
+        raise TypeError(f"{what} is a list of texts, not one: {what}=[{shown(value)}]")
     if not isinstance(value, Iterable) or isinstance(value, Mapping):
-        raise TypeError(f"{what} is a list of texts, not {value!r}")
+        raise TypeError(f"{what} is a list of texts, not {shown(value)}")
     given = list(value)
     for one in given:
         if not isinstance(one, str):
-            raise TypeError(f"{what} is a list of texts; {one!r} is none")
+            raise TypeError(f"{what} is a list of texts; {shown(one)} is none")
     return given
 
 
@@ -39,35 +47,52 @@ def named(what: str, value: Any, example: str) -> dict[str, Any]:
     if value is None:
         return {}
     if not isinstance(value, Mapping):
-        raise TypeError(f"{what} is a dict, {example}, not {value!r}")
+        raise TypeError(f"{what} is a dict, {example}, not {shown(value)}")
     return dict(value)
 
 
 def switch(what: str, value: Any) -> bool:
     """True or False. Raises TypeError."""
     if isinstance(value, (str, bytes)) or value is None:
-        raise TypeError(f"{what} is True or False, not {value!r}")
+        raise TypeError(f"{what} is True or False, not {shown(value)}")
     return bool(value)
 
 
 def text(what: str, value: Any) -> str:
-    """A text. Raises TypeError."""
+    """A text that UTF-8 can hold. Raises TypeError and ValueError."""
     if not isinstance(value, str):
-        raise TypeError(f"{what} is a text, not {value!r}")
+        raise TypeError(f"{what} is a text, not {shown(value)}")
+    try:
+        value.encode()
+    except UnicodeEncodeError:
+        raise ValueError(f"{what} is {shown(value)}, with half a character in it") from None
     return value
 
 
 def number(what: str, value: Any) -> float:
-    """A number. Raises TypeError."""
+    """A number. Raises TypeError and ValueError."""
     if isinstance(value, (str, bytes)) or not hasattr(value, "__float__"):
-        raise TypeError(f"{what} is a number, not {value!r}")
-    return float(value)
+        raise TypeError(f"{what} is a number, not {shown(value)}")
+    try:
+        return float(value)
+    except OverflowError:
+        raise ValueError(f"{what} is {shown(value)}: it must be a finite number") from None
+    except (TypeError, ValueError):  # an array of several
+        raise TypeError(f"{what} is a number, not {shown(value)}") from None
+
+
+def finite(what: str, value: Any) -> float:
+    """A finite number. Raises TypeError and ValueError."""
+    given = number(what, value)
+    if not math.isfinite(given):
+        raise ValueError(f"{what} is {value}: it must be a finite number")
+    return given
 
 
 def numbers(what: str, values: Any, count: int) -> list[float]:
     """So many of them. Raises TypeError and ValueError."""
     if isinstance(values, (str, bytes)) or not isinstance(values, Iterable):
-        raise TypeError(f"{what} is {count} numbers, not {values!r}")
+        raise TypeError(f"{what} is {count} numbers, not {shown(values)}")
     given = [number(what, one) for one in values]
     if len(given) != count:
         raise ValueError(f"{what} is {count} numbers, not {len(given)}")

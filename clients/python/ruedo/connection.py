@@ -17,6 +17,7 @@ from typing import Any, Protocol
 
 from . import lcmtypes
 from .address import is_claimed
+from .arguments import shown
 from .bus import Bus
 from .callbacks import Callbacks, Subscription
 from .clock import Clock
@@ -190,7 +191,9 @@ class Connection:
         """Raises UnknownName."""
         robots = self.info.robots
         if name not in robots:
-            raise UnknownName(f"there is no robot {name!r}; there is {', '.join(robots) or 'none'}")
+            raise UnknownName(
+                f"there is no robot {shown(name)}; there is {', '.join(robots) or 'none'}"
+            )
         return robots[name]
 
     def refresh_info(self, before: WorldInfo | None = None) -> None:

@@ -128,7 +128,9 @@ def _world_file(
         text = str(world)
     elif world is not None:
         if not isinstance(world, (str, os.PathLike)):
-            raise TypeError(f"world is a file, the name of a world or a World, not {world!r}")
+            raise TypeError(
+                f"world is a file, the name of a world or a World, not {arguments.shown(world)}"
+            )
         return os.fspath(world), None
     text = arguments.text("text", text)
     folder = tempfile.TemporaryDirectory(prefix="ruedo-")
@@ -170,15 +172,17 @@ def _options(
     for name, several in (("args", args), ("spawn", spawn), ("disable", disable)):
         if isinstance(several, (str, bytes)):
             raise TypeError(
-                f"{name} is {several!r}: it must be a list, {name}={str(several).split()!r}"
+                f"{name} is {arguments.shown(several)}: it must be a list, {name}={str(several).split()!r}"
             )
         if not isinstance(several, Iterable):
-            raise TypeError(f"{name} is a list of texts, not {several!r}")
+            raise TypeError(f"{name} is a list of texts, not {arguments.shown(several)}")
         for one in several:
             if not isinstance(one, (str, os.PathLike)):
-                raise TypeError(f"{name} is a list of texts; {one!r} is none")
+                raise TypeError(f"{name} is a list of texts; {arguments.shown(one)} is none")
     if set is not None and not isinstance(set, Mapping):
-        raise TypeError(f"set is {set!r}: it must be a dict, such as {{'p3at/lrf.rate': 20}}")
+        raise TypeError(
+            f"set is {arguments.shown(set)}: it must be a dict, such as {{'p3at/lrf.rate': 20}}"
+        )
     options = []
     if seed is not None:
         options += ["--seed", str(arguments.whole("seed", seed, 0, arguments.MOST_SEED))]

@@ -20,6 +20,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 import numpy as np
 
 from . import arrivals, lcmtypes
+from .arguments import shown
 from .control import State
 from .decoding import decode
 from .errors import (
@@ -123,7 +124,7 @@ class Observations(State):
         """Sorted once: a fleet asks for each of its robots."""
         if not hasattr(stream, "channel"):
             raise TypeError(
-                f"a device or stream is wanted, such as sim.robot('p3at').lrf, not {stream!r}"
+                f"a device or stream is wanted, such as sim.robot('p3at').lrf, not {shown(stream)}"
             )
         by_channel: dict[str, list[bytes]] | None = self.__dict__.get("_by_channel")
         if by_channel is None:
@@ -225,21 +226,21 @@ class Stepper:
     def step(self, n: int, commands: Sequence[Command], timeout: float) -> Observations:
         if isinstance(n, bool) or not isinstance(n, (int, np.integer)):
             raise TypeError(
-                f"n is {n!r}: it must be a whole number of steps; {self._connection.info.step_us * 1e-6:g} s is one"
+                f"n is {shown(n)}: it must be a whole number of steps; {self._connection.info.step_us * 1e-6:g} s is one"
             )
         if isinstance(commands, Command):
             raise TypeError("commands is one Command: put it into a list, [command]")
         if not isinstance(commands, Iterable):
             raise TypeError(
                 "commands is a list of what robot.velocity_command() and the like make, "
-                f"not {commands!r}"
+                f"not {shown(commands)}"
             )
         if n < 0:
             raise ValueError(f"n is {n}: it must be at least 0")
         for command in commands:
             if not isinstance(command, Command):
                 raise TypeError(
-                    f"commands are made by robot.velocity_command() and the like; {command!r} is none"
+                    f"commands are made by robot.velocity_command() and the like; {shown(command)} is none"
                 )
             if not 0 <= command.after < n:
                 raise ValueError(

@@ -13,7 +13,7 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 from numpy.typing import ArrayLike
 
-from . import lcmtypes
+from . import arguments, lcmtypes
 
 _MOST_BYTES = 65536
 Color = Sequence[float]
@@ -83,11 +83,16 @@ def message(
     layer: str, markers: Iterable[lcmtypes.marker_t], frame: str, utime: int
 ) -> lcmtypes.markers_t:
     """What Simulation.markers() sends."""
-    if not 1 <= len(layer.encode()) <= 63:
-        raise ValueError(f"layer {layer!r}: it must be a name of 1 to 63 bytes")
+    if not 1 <= len(arguments.text("layer", layer).encode()) <= 63:
+        raise ValueError(f"layer {arguments.shown(layer)}: it must be a name of 1 to 63 bytes")
     result = lcmtypes.markers_t()
-    result.utime, result.layer, result.frame = utime, layer, frame
+    result.utime, result.layer, result.frame = utime, layer, arguments.text("frame", frame)
+    if not isinstance(markers, Iterable):
+        raise TypeError(f"markers are a list, not {arguments.shown(markers)}")
     result.markers = list(markers)
+    for one in result.markers:
+        if not isinstance(one, lcmtypes.marker_t):
+            raise TypeError(f"markers are what ruedo.markers makes; {arguments.shown(one)} is none")
     result.n = len(result.markers)
     if result.n > 1000:
         raise ValueError(f"a layer has at most 1000 markers, not {result.n}")

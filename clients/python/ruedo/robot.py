@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, Literal, TypeVar
 import numpy as np
 
 from . import lcmtypes
-from .arguments import number
+from .arguments import finite, number, numbers, shown, text
 from .errors import NotSupported, UnknownName
 from .geometry import Floats
 from .lockstep import Command
@@ -164,11 +164,12 @@ class Robot:
     def device(self, name: str) -> Device[Any]:
         """The device of that name; UnknownName lists those that exist."""
         devices = self.devices
+        text("name", name)
         for device in devices:
             if device.name == name:
                 return device
         raise UnknownName(
-            f"{self.name} has no device {name!r}; it has {', '.join(d.name for d in devices) or 'none'}"
+            f"{self.name} has no device {shown(name)}; it has {', '.join(d.name for d in devices) or 'none'}"
         )
 
     @property
@@ -216,7 +217,7 @@ class Robot:
         that it did not touch a moment before.
         """
         if not callable(callback):
-            raise TypeError(f"a callback is a function of one sample, not {callback!r}")
+            raise TypeError(f"a callback is a function of one sample, not {shown(callback)}")
         touched: list[str] = []
 
         def see(sample: Collisions) -> None:
@@ -263,9 +264,9 @@ class Robot:
         data = _VELOCITY.pack(
             _VELOCITY_FINGERPRINT,
             self._connection.clock.utime,
-            _finite("v", v),
-            _finite("vy", vy),
-            _finite("omega", omega),
+            finite("v", v),
+            finite("vy", vy),
+            finite("omega", omega),
         )
         return Command(self._input("velocity_command_t"), data)
 
@@ -273,7 +274,7 @@ class Robot:
         """What set_wheels() sends, once, for Simulation.step()."""
         command = lcmtypes.wheel_command_t()
         command.utime, command.n = self._connection.clock.utime, 2
-        command.rate = [_finite("left", left), _finite("right", right)]
+        command.rate = [finite("left", left), finite("right", right)]
         return Command(self._input("wheel_command_t"), command.encode())
 
     def move_command(
@@ -292,7 +293,9 @@ class Robot:
             for name in ("advance", "rotate", "heading", "arc", "stop")
         }
         if kind not in kinds:
-            raise ValueError(f"kind is {kind!r}: it must be one of {', '.join(map(repr, kinds))}")
+            raise ValueError(
+                f"kind is {shown(kind)}: it must be one of {', '.join(map(repr, kinds))}"
+            )
         command = self._move_message(kinds[kind], value, radius, speed, acceleration, deceleration)
         return Command(self._input("move_command_t"), command.encode())
 
@@ -313,10 +316,13 @@ class Robot:
         place: of "kidnapped", m, m, rad.
         """
         fault = lcmtypes.fault_t()
-        fault.utime, fault.kind, fault.target = self._connection.clock.utime, kind, target
-        fault.duration, fault.value = _finite("duration", duration), _finite("value", value)
-        fault.view_begin, fault.view_end = (_finite("view", one) for one in view)
-        fault.x, fault.y, fault.heading = (_finite("place", one) for one in place)
+        fault.utime = self._connection.clock.utime
+        fault.kind, fault.target = text("kind", kind), text("target", target)
+        fault.duration, fault.value = finite("duration", duration), finite("value", value)
+        fault.view_begin, fault.view_end = (finite("view", one) for one in numbers("view", view, 2))
+        fault.x, fault.y, fault.heading = (
+            finite("place", one) for one in numbers("place", place, 3)
+        )
         return Command(self._input("fault_t"), fault.encode())
 
     def inject(self, kind: str, target: str = "", **how: Any) -> None:
@@ -392,7 +398,7 @@ class Robot:
     ) -> Motion:
         """Drives ahead along a circle of a radius (m, > 0) until it has turned by an angle (rad;
         positive: to the left). Limits in m/s and m/s^2."""
-        if not radius > 0.0:
+        if not number("radius", radius) > 0.0:
             raise ValueError(
                 f"radius is {radius}: it must be > 0 m; the sign of the angle says left or right"
             )
@@ -429,7 +435,7 @@ class Robot:
             self._connection.next_id(),
             kind,
         )
-        command.value, command.radius = _finite("value", value), _finite("radius", radius)
+        command.value, command.radius = finite("value", value), finite("radius", radius)
         command.speed = _limit("speed", speed)
         command.acceleration = _limit("acceleration", acceleration)
         command.deceleration = _limit("deceleration", deceleration)
@@ -453,7 +459,9 @@ class Robot:
                     return next(d for d in self.devices if d.name == channel.device)
                 return self._plain(channel, form)
         there = ", ".join(sorted({c.device or c.name for c in outputs}))
-        raise UnknownName(f"{self.name} publishes no {name!r}; it publishes {there or 'nothing'}")
+        raise UnknownName(
+            f"{self.name} publishes no {shown(name)}; it publishes {there or 'nothing'}"
+        )
 
     # Channels, by what info says of them: names on the bus may be remapped.
 
@@ -545,13 +553,6 @@ def _radians(call: str, angle: float, usual: float) -> None:
             f"{call}({angle:g}) is {abs(angle) / (2.0 * math.pi):.1f} turns: angles are in radians, {call}(math.radians({angle:g}))",
             stacklevel=3,
         )
-
-
-def _finite(name: str, value: float) -> float:
-    finite = number(name, value)
-    if not math.isfinite(finite):
-        raise ValueError(f"{name} is {value}: it must be a finite number")
-    return finite
 
 
 def _limit(name: str, value: float) -> float:

@@ -32,7 +32,9 @@ def connect(url: str | None = None, *, name: str | None = None, timeout: float =
     name: of this client, default "client-PID"; numbers of motion primitives derive from it.
     timeout: s of real time to wait for a server. Raises NoServer.
     """
-    return Simulation(resolve_url(url), name or f"client-{os.getpid()}", timeout)
+    at = resolve_url(None if url is None else arguments.text("url", url))
+    own = "" if name is None else arguments.text("name", name)
+    return Simulation(at, own or f"client-{os.getpid()}", arguments.number("timeout", timeout))
 
 
 class Simulation:
@@ -106,7 +108,7 @@ class Simulation:
     def robot(self, name: str) -> Robot:
         """The robot of that name; UnknownName lists those that exist."""
         info = self._info
-        self._connection.robot_info(name)
+        self._connection.robot_info(arguments.text("name", name))
         with self._lock:
             if self._robots_of is not info:  # some may be gone
                 self._robots = {n: r for n, r in self._robots.items() if n in info.robots}
@@ -122,7 +124,8 @@ class Simulation:
     def sleep(self, seconds: float) -> None:
         """Waits until so much sim time has passed."""
         self._connection.check_may_wait()
-        self._connection.clock.sleep(round(seconds * 1e6), self._connection.check_server)
+        microseconds = round(arguments.finite("seconds", seconds) * 1e6)
+        self._connection.clock.sleep(microseconds, self._connection.check_server)
 
     # Control. Every call raises NotSupported where the server has no such request, RequestError
     # when it refuses.
@@ -154,7 +157,7 @@ class Simulation:
             )
         if isinstance(n, bool) or not isinstance(n, (int, np.integer)):
             raise TypeError(
-                f"n is {n!r}: it must be a whole number of steps; {self.step_size:g} s is one"
+                f"n is {arguments.shown(n)}: it must be a whole number of steps; {self.step_size:g} s is one"
             )
         body = lcmtypes.step_request_t()
         body.steps = int(n)
@@ -193,7 +196,9 @@ class Simulation:
         body = lcmtypes.reset_request_t()
         kinds = {"all": body.ALL, "time": body.TIME, "poses": body.POSES}
         if what not in kinds:
-            raise ValueError(f"what is {what!r}: it must be one of {', '.join(map(repr, kinds))}")
+            raise ValueError(
+                f"what is {arguments.shown(what)}: it must be one of {', '.join(map(repr, kinds))}"
+            )
         body.what = kinds[what]
         body.seed = -1 if seed is None else arguments.whole("seed", seed)
         self._session.request(lcmtypes.request_t.RESET, body, 60.0)

@@ -8,6 +8,7 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, Generic, NamedTuple, TypeVar
 
 from . import samples
+from .arguments import shown
 from .callbacks import Callbacks, Subscription
 from .decoding import decode
 from .errors import RuedoError, Timeout, TypeMismatch
@@ -36,7 +37,7 @@ def form_of(message: Any) -> Form:
         fingerprint = message._get_packed_fingerprint()
     except AttributeError:
         raise TypeError(
-            f"type is {message!r}: it must be a class that lcm-gen made of an .lcm file"
+            f"type is {shown(message)}: it must be a class that lcm-gen made of an .lcm file"
         ) from None
     return Form(fingerprint, lambda data: decode(message, data), message)
 
@@ -186,7 +187,7 @@ class Stream(Reader[T]):
     def _sample_for(self, reader: Reader[T], a_new_one: bool, timeout: float) -> T:
         if isinstance(timeout, bool) or not isinstance(timeout, (int, float)):
             raise TypeError(
-                f"timeout is {timeout!r}: it must be a number of seconds of real time; of lockstep's observations "
+                f"timeout is {shown(timeout)}: it must be a number of seconds of real time; of lockstep's observations "
                 "latest(device) and all(device) are the samples"
             )
         self._subscribe()

@@ -78,10 +78,9 @@ class World:
         name: str = "wall",
     ) -> World:
         """From one point to another, which are the middle of its ends."""
-        length = _positive(
-            "the length of a wall",
-            math.hypot(_finite("x2 - x1", x2 - x1), _finite("y2 - y1", y2 - y1)),
-        )
+        for what, end in (("x1", x1), ("y1", y1), ("x2", x2), ("y2", y2)):
+            _finite(what, end)
+        length = _positive("the length of a wall", math.hypot(x2 - x1, y2 - y1))
         return self.box(
             (x1 + x2) / 2.0,
             (y1 + y2) / 2.0,
@@ -166,12 +165,12 @@ class World:
 
 
 def _finite(what: str, value: float) -> float:
-    if isinstance(value, bool) or not isinstance(value, (int, float)) or not math.isfinite(value):
-        raise ValueError(f"{what} is {value!r}: it must be a finite number")
-    return float(value)
+    if isinstance(value, bool) or not isinstance(value, (int, float)):
+        raise ValueError(f"{what} is {arguments.shown(value)}: it must be a finite number")
+    return arguments.finite(what, value)
 
 
 def _positive(what: str, value: float) -> float:
     if not _finite(what, value) > 0.0:
-        raise ValueError(f"{what} is {value!r}: it must be > 0")
+        raise ValueError(f"{what} is {arguments.shown(value)}: it must be > 0")
     return float(value)
