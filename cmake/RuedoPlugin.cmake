@@ -23,7 +23,7 @@ set_source_files_properties(src/core/plugins.cpp PROPERTIES INCLUDE_DIRECTORIES 
 target_link_libraries(ruedo_core PUBLIC ${CMAKE_DL_LIBS})
 
 add_library(ruedo_plugin STATIC src/core/element.cpp src/core/errors.cpp src/core/kinds.cpp src/core/math/atan2.cpp src/core/math/c_names.cpp
-  src/core/nearest_word.cpp src/core/quantity.cpp src/core/random.cpp src/core/sim_time.cpp src/model/link_in_body.cpp src/sensors/noise.cpp
+  src/core/nearest_word.cpp src/core/quantity.cpp src/core/random.cpp src/core/sim_time.cpp src/core/utf8.cpp src/model/link_in_body.cpp src/sensors/noise.cpp
   ${RUEDO_MATH_OBJECT} ${RUEDO_PLUGIN_ABI})
 add_library(ruedo::plugin ALIAS ruedo_plugin)
 set_target_properties(ruedo_plugin PROPERTIES EXPORT_NAME plugin CXX_VISIBILITY_PRESET hidden)

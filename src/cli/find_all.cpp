@@ -3,6 +3,7 @@
 #include <set>
 
 #include "core/progress.h"
+#include "core/utf8.h"
 #include "engine/world.h"
 #include "scene/render_texture.h"
 
@@ -59,7 +60,7 @@ std::vector<Finding> find_all(const WorldArguments& arguments, bool& loaded) {
     findings.insert(findings.end(), of_run.list().begin(), of_run.list().end());
   } catch (const InputError& error) {
     if (error.source().file.empty()) throw;  // wrong usage
-    findings.push_back({Finding::Kind::error, error.source(), "", error.message()});
+    findings.push_back({Finding::Kind::error, error.source(), "", in_one_line(error.message())});
   }
   return findings;
 }

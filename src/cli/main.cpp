@@ -203,7 +203,7 @@ int tell_error() {
   try {
     throw;
   } catch (const ruedo::InputError& error) {
-    say(error.what());
+    say(ruedo::in_one_line(error.what()));
     return error.source().file.empty() ? kWrongUsage : kBadInput;
   } catch (const ruedo::physics::StateError& error) {
     say(error.what());

@@ -1,16 +1,15 @@
 // Findings: what a loader noticed and went on from, each told once for each place.
 #include "ruedo/errors.h"
 
-#include <algorithm>
+#include <utility>
+
+#include "core/utf8.h"
 
 namespace ruedo {
 
 void Findings::add(Finding finding) {
-  // Names may hold line ends, and what follows one would look like another finding.
-  for (std::string* part : {&finding.element, &finding.text})
-    std::replace_if(
-        part->begin(), part->end(), [](char c) { return c == '\n' || c == '\r' || c == '\t'; },
-        ' ');
+  finding.element = in_one_line(std::move(finding.element));
+  finding.text = in_one_line(std::move(finding.text));
   std::string key = std::to_string(static_cast<int>(finding.kind));
   for (const std::string* part : {&finding.source.file, &finding.element, &finding.text}) {
     key += '\0';

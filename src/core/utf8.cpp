@@ -57,6 +57,12 @@ std::string printable(std::string_view text) { return cleaned(text, false); }
 
 std::string for_terminal(std::string_view text) { return cleaned(text, true); }
 
+std::string in_one_line(std::string text) {
+  std::replace_if(
+      text.begin(), text.end(), [](char c) { return c == '\n' || c == '\r' || c == '\t'; }, ' ');
+  return text;
+}
+
 bool is_one_line(std::string_view text) {
   return text.find_first_of("\n\t") == std::string_view::npos && for_terminal(text) == text;
 }

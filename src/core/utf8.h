@@ -14,6 +14,9 @@ std::string printable(std::string_view text);
 // sets a colour.
 std::string for_terminal(std::string_view text);
 
+// Line ends and tabs become blanks: what follows one in a name would look like a line of ours.
+std::string in_one_line(std::string text);
+
 // Whether it is UTF-8 without any control character, as a name should be.
 bool is_one_line(std::string_view text);
 

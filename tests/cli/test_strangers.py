@@ -120,6 +120,18 @@ def test_escapes_of_a_log_stay_out_of_the_terminal(recorded, tmp_path):
     ), result
 
 
+@pytest.mark.parametrize("command", [["check"], ["run", "--duration", "1"], ["info"]])
+def test_a_value_with_line_ends_writes_no_line_of_ours(command, tmp_path):
+    world = tmp_path / "w.sdf"
+    world.write_text(
+        "<sdf version='1.9' xmlns:ruedo='r'><world name='w'><model name='m'><link name='l'/>"
+        "<ruedo:drive type='x&#10;ruedo: error: forged'/></model></world></sdf>"
+    )
+    result = program(*command, world)
+    lines = [line for line in (result.stdout + result.stderr).splitlines() if "forged" in line]
+    assert result.returncode == 3 and len(lines) == 1 and "'x ruedo: error" in lines[0], result
+
+
 def test_escapes_of_a_request_stay_out_of_the_terminal(tmp_path):
     world, bus, said = (tmp_path / name for name in ("w.sdf", "bus", "said"))
     world.write_text(WORLD)
