@@ -89,7 +89,7 @@ class Bus:
         if not self._closed.is_set():
             self._transport.publish(channel, data)
 
-    def close(self, awaits_handlers: bool) -> None:
+    def close(self, awaits_handlers: bool = True) -> None:
         """awaits_handlers: until the one that runs has returned."""
         self._closed.set()
         self._transport.close()
