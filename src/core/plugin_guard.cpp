@@ -48,8 +48,8 @@ class Call {
 
 // One line of bounded length.
 std::string line(const char* said) {
-  std::string text = for_terminal(std::string_view(said).substr(0, kLongestText));
-  std::replace(text.begin(), text.end(), '\n', ' ');
+  const std::string text =
+      in_one_line(for_terminal(std::string_view(said).substr(0, kLongestText)));
   return text.empty() ? "threw an error without a text" : text;
 }
 

@@ -142,10 +142,13 @@ def test_escapes_of_a_request_stay_out_of_the_terminal(tmp_path):
             with ruedo.connect(f"unix://{bus}") as sim:
                 box = "<sdf version='1.9'><model name='b'><link name='l'><collision name='c'><geometry><mesh><uri>nowhere\x1b[2J\x9b</uri></mesh></geometry></collision></link></model></sdf>"
                 sim.spawn(text=box, name="b", x=2, y=2)
-            until(lambda: "nowhere" in said.read_text())
+                driver = sim.robot(sim.spawn("p3at", x=5, y=5))
+                driver.inject("x\nruedo: error: forged")
+            until(lambda: "nowhere" in said.read_text() and "forged" in said.read_text())
         finally:
             server.terminate()
     assert "\x1b" not in said.read_text() and "\x9b" not in said.read_text()
+    assert "\nruedo: error: forged" not in said.read_text()
 
 
 def tiff(width, height):
