@@ -41,16 +41,22 @@ def whole(tmp_path_factory):
     return folder, table(folder)
 
 
+def new_node(cluster, **options):
+    """Ray gives a node 30 s to start: too few on a machine that does much else."""
+    for _ in range(5):
+        try:
+            return cluster.add_node(num_cpus=1, object_store_memory=100 << 20, **options)
+        except Exception as error:
+            if "timed out during startup" not in str(error):
+                raise
+            said = error
+    raise said
+
+
 @pytest.fixture
 def cluster():
-    made = Cluster(
-        initialize_head=True,
-        head_node_args={
-            "num_cpus": 1,
-            "object_store_memory": 100 << 20,
-            "include_dashboard": False,
-        },
-    )
+    made = Cluster()
+    new_node(made, include_dashboard=False)
     yield made
     ray.shutdown()
     made.shutdown()
@@ -79,7 +85,7 @@ def test_one_node_gives_the_same_bytes(whole, cluster):
 
 def test_three_nodes_of_which_one_is_killed_give_the_same_bytes(whole, cluster):
     folder, expected = whole
-    nodes = [cluster.add_node(num_cpus=1, object_store_memory=100 << 20) for _ in range(2)]
+    nodes = [new_node(cluster) for _ in range(2)]
     cluster.wait_for_nodes()
     ray.init(address=cluster.address, log_to_driver=False)
     killed = []

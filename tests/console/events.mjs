@@ -55,8 +55,9 @@ export default async function events({ page, until, check, seen, ready, given, p
   );
   await picture("events");
   await page.getByLabel("events", { exact: true }).selectOption("");
-  const lane = await page.locator("#events").boundingBox();
-  await page.mouse.click(lane.x + 8 + 0.5 * (lane.width - 16) + 1.5, lane.y + 7);
+  const lane = page.locator("#events");
+  const { width } = await lane.boundingBox();
+  await lane.click({ position: { x: 8 + 0.5 * (width - 16) + 1.5, y: 7 } });
   await until(
     "a click on the lane goes there",
     ({ begin, end }) =>

@@ -27,8 +27,7 @@ export default async function fieldsOfLog({ page, until, check, ready, given, pi
     String(Number(least.toPrecision(5))),
   );
   await page.locator(".pane").scrollIntoViewIfNeeded();
-  const box = await page.locator(".pane .u-over").boundingBox();
-  await page.mouse.click(box.x + box.width / 2, box.y + box.height / 2);
+  await page.locator(".pane .u-over").click();
   await until(
     "a click in a plot seeks",
     ({ begin, end }) =>

@@ -35,8 +35,9 @@ export default async function log({ page, given, seen, until, check, picture }) 
   );
 
   // As by hand: to a place on the line.
-  const line = await page.locator("#scrub").boundingBox();
-  await page.mouse.click(line.x + 0.8 * line.width, line.y + line.height / 2);
+  const line = page.locator("#scrub");
+  const { width, height } = await line.boundingBox();
+  await line.click({ position: { x: 0.8 * width, y: height / 2 } });
   await until("a click on the time line goes there", () => {
     const { begin, end, now } = window.ruedo.page.now.playback;
     return Math.abs((now - begin) / (end - begin) - 0.8) < 0.03;

@@ -52,7 +52,8 @@ class Client:
         question, answer = self.services[service]
         if service not in self.ends:
             writer = self.peer.writer(f"/{service}Request", question, prefix="rq")
-            reader = self.peer.reader(f"/{service}Reply", answer, prefix="rr")
+            # Others' replies come here, too: 2000 a second, while this process waits for its turn.
+            reader = self.peer.reader(f"/{service}Reply", answer, prefix="rr", depth=100_000)
             wait_for(
                 lambda: writer.get_matched_subscriptions() and reader.get_matched_publications(),
                 service,
@@ -62,7 +63,7 @@ class Client:
         sequence = next(self.sequence)
         writer.write(question(self.mark, sequence, *arguments))
 
-        def mine():  # others' replies come here, too
+        def mine():
             replies = [r for r in reader.take(N=1000) if hasattr(r, "__idl__")]
             return [r for r in replies if (r.client, r.sequence_number) == (self.mark, sequence)]
 
