@@ -26,7 +26,7 @@ class Bus {
   explicit Bus(std::unique_ptr<Transport> transport);
   ~Bus();
 
-  void start();  // begins to receive; at least one subscription comes first: memq needs it
+  void start();  // begins to receive
   [[nodiscard]] Subscription subscribe(const std::string& channel, Handler handler);
   // Throws Error for a message that is larger than what a server takes from a client.
   void publish(const std::string& channel, const uint8_t* bytes, size_t size);

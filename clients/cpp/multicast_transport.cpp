@@ -8,7 +8,6 @@
 #include <system_error>
 #include <thread>
 
-#include "address.h"
 #include "ruedo/client.h"
 
 namespace ruedo::client {
@@ -19,19 +18,14 @@ constexpr int kReceiveBuffer = 2 << 20;  // bytes; the system gives at most its 
 
 }  // namespace
 
-MulticastTransport::MulticastTransport(const std::string& url) {
-  const Address address = split(url);
-  // Without a port LCM would send to port 0.
-  const std::string whole = "udpm://" + address.host + ":" + address.port + address.options;
-  lcm_.reset(lcm_create(whole.c_str()));
-  const size_t option = address.options.find("recv_buf_size=");
-  const int buffer =
-      option == std::string::npos ? 0 : std::atoi(address.options.c_str() + option + 14);
+MulticastTransport::MulticastTransport(const bus::LcmUrl& address) {
+  const std::string url = address.str();  // whole: without a port LCM would send to port 0
+  lcm_.reset(lcm_create(url.c_str()));
   try {
     if (!lcm_) throw std::system_error(std::make_error_code(std::errc::invalid_argument));
     receiver_ = std::make_unique<bus::MulticastReceiver>(
-        address.host, static_cast<uint16_t>(std::atoi(address.port.c_str())),
-        std::max(buffer, kReceiveBuffer));
+        address.host, address.port,
+        std::max(std::atoi(address.option("recv_buf_size", "0").c_str()), kReceiveBuffer));
   } catch (const std::system_error&) {
     throw NoServer(url + ": LCM cannot use it; `ruedo doctor` looks for what is wrong");
   }

@@ -9,6 +9,7 @@
 #include <memory>
 #include <string>
 
+#include "bus/lcm_url.h"
 #include "bus/multicast_receiver.h"
 #include "transport.h"
 
@@ -16,7 +17,7 @@ namespace ruedo::client {
 
 class MulticastTransport : public Transport {
  public:
-  explicit MulticastTransport(const std::string& url);  // throws NoServer
+  explicit MulticastTransport(const bus::LcmUrl& address);  // throws NoServer
 
   void subscribe(const std::string&) override {}
   void unsubscribe(const std::string&) override {}

@@ -14,19 +14,17 @@ namespace {
 constexpr std::chrono::milliseconds kAgain(100);
 constexpr std::chrono::microseconds kLookTime(50);
 
-FileHandle socket_to(const Address& address) {
+FileHandle socket_to(const bus::LcmUrl& address) {
   if (address.scheme == "unix") return bus::connect_unix(address.host);
   std::string why;
-  FileHandle socket = bus::connect_tcp(address.host, address.port, why);
-  if (!socket)
-    throw EnvironmentError("nothing listens at tcpq://" + address.host + ":" + address.port + " (" +
-                           why + ")");
+  FileHandle socket = bus::connect_tcp(address.host, std::to_string(address.port), why);
+  if (!socket) throw EnvironmentError("nothing listens at " + address.str() + " (" + why + ")");
   return socket;
 }
 
 }  // namespace
 
-StreamTransport::StreamTransport(const Address& address) : address_(address) {
+StreamTransport::StreamTransport(const bus::LcmUrl& address) : address_(address) {
   try {
     connect();
   } catch (const EnvironmentError& error) {

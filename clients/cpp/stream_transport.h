@@ -10,7 +10,7 @@
 #include <set>
 #include <string>
 
-#include "address.h"
+#include "bus/lcm_url.h"
 #include "bus/stream_connection.h"
 #include "transport.h"
 
@@ -19,7 +19,7 @@ namespace ruedo::client {
 // Connects again when the server comes back.
 class StreamTransport : public Transport {
  public:
-  explicit StreamTransport(const Address& address);  // throws NoServer
+  explicit StreamTransport(const bus::LcmUrl& address);  // throws NoServer
 
   void subscribe(const std::string& channel) override;
   void unsubscribe(const std::string& channel) override;
@@ -30,7 +30,7 @@ class StreamTransport : public Transport {
   std::shared_ptr<bus::StreamConnection> connection();
   void connect();  // throws EnvironmentError
 
-  const Address address_;
+  const bus::LcmUrl address_;
   std::mutex mutex_;
   std::shared_ptr<bus::StreamConnection> connection_;  // null: there is no server
   std::set<std::string> channels_;

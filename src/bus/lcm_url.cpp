@@ -4,9 +4,11 @@
 #include <algorithm>
 #include <cerrno>
 #include <charconv>
+#include <climits>
 #include <cstdlib>
 #include <cstring>
 #include <fstream>
+#include <set>
 
 #include <arpa/inet.h>
 #include <netdb.h>
@@ -44,9 +46,37 @@ std::string resolved(const std::string& host) {
   return text;
 }
 
-[[noreturn]] void refuse(const std::string& text, const std::string& why) {
-  throw InputError({}, "--lcm '" + text + "': " + why + "; an address looks like " + kDefaultUrl +
+// `given` names the text and who gave it.
+[[noreturn]] void refuse(const std::string& given, const std::string& why) {
+  throw InputError({}, given + ": " + why + "; an address looks like " + kDefaultUrl +
                            ", tcpq://127.0.0.1:7700 or unix:///tmp/ruedo.sock");
+}
+
+// A whole number from `least` to `most`.
+bool is_number(const std::string& digits, int64_t least, int64_t most) {
+  int64_t value = 0;
+  const char* const end = digits.data() + digits.size();
+  const auto [read, error] = std::from_chars(digits.data(), end, value);
+  return error == std::errc() && read == end && value >= least && value <= most;
+}
+
+// LCM takes any option, and any number for the ttl, with a line of its own at most.
+void check_options(const std::string& given, const std::string& options) {
+  std::set<std::string> seen;
+  for (size_t at = 0; at < options.size();) {
+    const size_t end = std::min(options.find('&', at), options.size());
+    const std::string pair = options.substr(at, end - at);
+    const size_t equals = std::min(pair.find('='), pair.size());
+    const std::string key = pair.substr(0, equals),
+                      value = pair.substr(std::min(equals + 1, pair.size()));
+    const bool good = (key == "ttl" && is_number(value, 0, 255)) ||
+                      (key == "recv_buf_size" && is_number(value, 1, INT_MAX));
+    if (!good || !seen.insert(key).second)
+      refuse(given, "the option '" + pair +
+                        "' is not allowed: ttl, 0 to 255, and recv_buf_size, 1 to 2147483647 "
+                        "bytes, are, each once");
+    at = end + 1;
+  }
 }
 
 }  // namespace
@@ -68,22 +98,23 @@ std::string LcmUrl::option(const std::string& key, const std::string& fallback) 
   return fallback;
 }
 
-LcmUrl parse_url(const std::string& text) {
+LcmUrl parse_url(const std::string& text, const std::string& given_by) {
   if (text.empty()) {
     const char* environment = std::getenv("LCM_DEFAULT_URL");
-    return parse_url(environment && *environment ? environment : kDefaultUrl);
+    return parse_url(environment && *environment ? environment : kDefaultUrl, "LCM_DEFAULT_URL");
   }
+  const std::string given = given_by + " '" + text + "'";
   LcmUrl url;
   const size_t scheme_end = text.find("://");
-  if (scheme_end == std::string::npos) refuse(text, "it has no scheme");
+  if (scheme_end == std::string::npos) refuse(given, "it has no scheme");
   url.scheme = text.substr(0, scheme_end);
   if (url.scheme != "udpm" && url.scheme != "tcpq" && url.scheme != "memq" &&
       url.scheme != "unix") {
-    refuse(text, "the schemes udpm, tcpq, unix and memq are supported");
+    refuse(given, "the schemes udpm, tcpq, unix and memq are supported");
   }
   std::string rest = text.substr(scheme_end + 3);
   if (url.scheme == "unix") {
-    if (rest.empty() || rest[0] != '/') refuse(text, "'" + rest + "' is no absolute path");
+    if (rest.empty() || rest[0] != '/') refuse(given, "'" + rest + "' is no absolute path");
     url.host = rest;
     return url;
   }
@@ -91,27 +122,27 @@ LcmUrl parse_url(const std::string& text) {
     url.options = rest.substr(question + 1);
     rest.resize(question);
   }
+  if (url.scheme != "udpm" && !url.options.empty()) refuse(given, url.scheme + " has no options");
   if (url.scheme == "memq") return url;
   if (const size_t colon = rest.find(':'); colon != std::string::npos) {
     const std::string digits = rest.substr(colon + 1);
-    const auto [end, error] =
-        std::from_chars(digits.data(), digits.data() + digits.size(), url.port);
-    if (error != std::errc() || end != digits.data() + digits.size() || url.port == 0)
-      refuse(text, "'" + digits + "' is no port");
+    if (!is_number(digits, 1, UINT16_MAX)) refuse(given, "'" + digits + "' is no port");
+    url.port = static_cast<uint16_t>(std::stoi(digits));
     rest.resize(colon);
   }
   if (url.scheme == "tcpq") {
     if (url.port == 0) url.port = kDefaultTcpPort;
     url.host = rest.empty() ? "127.0.0.1" : resolved(rest);
-    if (url.host.empty()) refuse(text, "'" + rest + "' is no host that this machine knows");
+    if (url.host.empty()) refuse(given, "'" + rest + "' is no host that this machine knows");
     return url;
   }
   url.host = rest.empty() ? "239.255.76.67" : rest;
   if (url.port == 0) url.port = 7667;
   in_addr group{};
   if (::inet_pton(AF_INET, url.host.c_str(), &group) != 1 || !IN_MULTICAST(ntohl(group.s_addr))) {
-    refuse(text, "'" + url.host + "' is no multicast group (224.0.0.0 to 239.255.255.255)");
+    refuse(given, "'" + url.host + "' is no multicast group (224.0.0.0 to 239.255.255.255)");
   }
+  check_options(given, url.options);
   if (url.option("ttl", "").empty()) url.options += (url.options.empty() ? "ttl=0" : "&ttl=0");
   return url;
 }

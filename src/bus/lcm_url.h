@@ -24,8 +24,8 @@ struct LcmUrl {
 
 // Reads an address; "" is $LCM_DEFAULT_URL, or kDefaultUrl. A udpm address without a ttl gets ttl
 // 0, so that nothing leaves the machine by default; a tcpq address without host and port gets
-// LCM's, 127.0.0.1:7700. Throws InputError for anything else.
-LcmUrl parse_url(const std::string& text);
+// LCM's, 127.0.0.1:7700. Throws InputError for anything else, which names who gave the text.
+LcmUrl parse_url(const std::string& text, const std::string& given_by = "--lcm");
 
 // True when this machine has a way to a udpm address's group. Takes microseconds, as the next.
 bool has_route(const LcmUrl& url);

@@ -42,7 +42,10 @@ TEST(LcmUrl, RefusesWithAnExample) {
   for (const char* text :
        {"foo", "http://x", "udpm://1.2.3.4:7667", "udpm://239.255.76.67:0",
         "udpm://239.255.76.67:99999", "udpm://239.255.76.67:7667x", "udpm://host:7667",
-        "tcpq://no.such.host.invalid:1", "tcpq://127.0.0.1:x"}) {
+        "tcpq://no.such.host.invalid:1", "tcpq://127.0.0.1:x", "tcpq://127.0.0.1:7700?ttl=0",
+        "udpm://239.255.76.67:7667?ttl=256", "udpm://239.255.76.67:7667?ttl=-1",
+        "udpm://239.255.76.67:7667?ttl", "udpm://239.255.76.67:7667?ttl=0&ttl=1",
+        "udpm://239.255.76.67:7667?recv_buf_size=0", "udpm://239.255.76.67:7667?name=1"}) {
     try {
       parse_url(text);
       ADD_FAILURE() << text;

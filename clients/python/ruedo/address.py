@@ -1,20 +1,108 @@
-"""LCM URLs: which one is meant, and whether anything can come from it.
-
-The route is checked before LCM sees the URL, because its own self-test blocks for ten seconds where
-multicast has no route.
-"""
+"""LCM URLs: which one is meant, and what it says."""
 
 from __future__ import annotations
 
 import os
 import socket
-from urllib.parse import urlsplit
+from dataclasses import dataclass
 
-from . import stream_transport
 from .errors import NoServer
 
 DEFAULT_URL = "udpm://239.255.76.67:7667?ttl=0"
 FALLBACK_URL = "tcpq://127.0.0.1:7700"  # what `ruedo run` serves where there is no multicast route
+
+_DEFAULTS = {"udpm": ("239.255.76.67", 7667), "tcpq": ("127.0.0.1", 7700)}  # LCM's own
+
+
+@dataclass(frozen=True)
+class Address:
+    scheme: str  # udpm, tcpq or unix
+    host: str = ""  # an IPv4 address; of udpm the multicast group
+    port: int = 0
+    path: str = ""  # of a unix socket
+    ttl: int = 0  # of udpm: networks that datagrams cross
+    receive_buffer: int = 0  # of udpm, in bytes; 0: not named
+
+    def __str__(self) -> str:
+        if self.scheme == "unix":
+            return f"unix://{self.path}"
+        return f"{self.scheme}://{self.host}:{self.port}" + (
+            f"?ttl={self.ttl}" if self.scheme == "udpm" else ""
+        )
+
+
+def read_address(url: str) -> Address:
+    """As the server reads it. Raises NoServer for a text that is no address of a client's."""
+    try:
+        return _address(url)
+    except ValueError as error:
+        raise NoServer(
+            f"url '{url}': {error}; an address looks like {DEFAULT_URL}, {FALLBACK_URL} or "
+            "unix:///tmp/ruedo.sock"
+        ) from None
+
+
+def _address(url: str) -> Address:
+    scheme, found, rest = url.partition("://")
+    if not found:
+        raise ValueError("it has no scheme")
+    if scheme == "unix":
+        if not rest.startswith("/"):
+            raise ValueError(f"'{rest}' is no absolute path")
+        return Address(scheme, path=rest)
+    if scheme not in _DEFAULTS:
+        raise ValueError("the schemes udpm, tcpq and unix are supported")
+    place, _, options = rest.partition("?")
+    if options and scheme != "udpm":
+        raise ValueError(f"{scheme} has no options")
+    host, colon, digits = place.partition(":")
+    default_host, default_port = _DEFAULTS[scheme]
+    port = _number(digits, 1, 65535) if colon else default_port
+    if port is None:
+        raise ValueError(f"'{digits}' is no port")
+    if scheme == "tcpq":
+        return Address(scheme, _resolved(host or default_host), port)
+    group = host or default_host
+    if not _is_group(group):
+        raise ValueError(f"'{group}' is no multicast group (224.0.0.0 to 239.255.255.255)")
+    return Address(scheme, group, port, **_options(options))
+
+
+def _number(digits: str, least: int, most: int) -> int | None:
+    if not (digits.isascii() and digits.isdecimal() and len(digits) <= 10):
+        return None
+    value = int(digits)
+    return value if least <= value <= most else None
+
+
+def _resolved(host: str) -> str:
+    try:
+        return socket.gethostbyname(host)
+    except (OSError, UnicodeError):
+        raise ValueError(f"'{host}' is no host that this machine knows") from None
+
+
+def _is_group(text: str) -> bool:
+    try:
+        return 224 <= socket.inet_pton(socket.AF_INET, text)[0] < 240
+    except (OSError, ValueError):
+        return False
+
+
+def _options(text: str) -> dict[str, int]:
+    bounds = {"ttl": ("ttl", 0, 255), "recv_buf_size": ("receive_buffer", 1, 2**31 - 1)}
+    found: dict[str, int] = {}
+    for pair in text.removesuffix("&").split("&") if text else []:
+        key, _, digits = pair.partition("=")
+        name, least, most = bounds.get(key, ("", 0, 0))
+        value = _number(digits, least, most) if name else None
+        if value is None or name in found:
+            raise ValueError(
+                f"the option '{pair}' is not allowed: ttl, 0 to 255, and recv_buf_size, "
+                "1 to 2147483647 bytes, are, each once"
+            )
+        found[name] = value
+    return found
 
 
 def resolve_url(url: str | None) -> str:
@@ -35,60 +123,3 @@ def has_multicast_route(group: str = "239.255.76.67") -> bool:
         except OSError:
             return False
     return True
-
-
-def check_reachable(url: str) -> None:
-    """Raises NoServer, with the cure, when nothing can come from that URL."""
-    parts = urlsplit(url)
-    try:
-        host, _ = parts.hostname, parts.port
-    except ValueError:
-        raise NoServer(f"{url}: the port is not a number from 0 to 65535") from None
-    if parts.scheme == "udpm":
-        if not has_multicast_route(host or "239.255.76.67"):
-            raise NoServer(
-                f"{url}: this machine has no route for multicast. On Linux: "
-                "sudo ip route add 224.0.0.0/4 dev lo; `ruedo doctor` tells more"
-            )
-    elif parts.scheme == "tcpq":
-        try:
-            stream_transport.connect(parts).close()
-        except OSError as error:
-            raise NoServer(
-                f"no Ruedo server at {url} ({error.strerror or error}). Is `ruedo run` started with this "
-                "--lcm? `ruedo doctor` looks for what is wrong"
-            ) from None
-    elif parts.scheme == "unix":
-        try:
-            stream_transport.connect(parts).close()
-        except OSError as error:
-            raise NoServer(
-                f"no Ruedo server at {url} ({error.strerror or error}). Is `ruedo run` started with this --lcm, "
-                "by the same user?"
-            ) from None
-    elif parts.scheme not in ("memq", "file"):
-        raise NoServer(
-            f"{url}: not an LCM URL; udpm://GROUP:PORT?ttl=0, tcpq://HOST:PORT or unix:///PATH is"
-        )
-
-
-def is_claimed(url: str) -> bool:
-    """Whether a server on this machine has the address: its claim goes with its process."""
-    parts = urlsplit(url)
-    if parts.scheme == "unix":
-        return stream_transport.is_served(parts)
-    host, port = (
-        (parts.hostname, parts.port)
-        if parts.hostname
-        else ("239.255.76.67", 7667)
-        if parts.scheme == "udpm"
-        else ("127.0.0.1", 7700)
-    )
-    try:
-        with open("/proc/net/unix", encoding="ascii", errors="replace") as sockets:
-            return any(
-                line.rstrip("\n").endswith(f" @ruedo/{parts.scheme}/{host}:{port}")
-                for line in sockets
-            )
-    except OSError:
-        return False

@@ -43,7 +43,7 @@ class Bus:
         self._thread = threading.Thread(target=self._receive, name="ruedo-receive", daemon=True)
 
     def start(self) -> None:
-        """Begins to receive. At least one subscription comes first: memq needs it."""
+        """Begins to receive."""
         self._thread.start()
 
     def subscribe(self, channel: str, handler: Handler) -> Subscription:

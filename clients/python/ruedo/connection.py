@@ -16,7 +16,6 @@ from collections.abc import Callable
 from typing import Any, Protocol
 
 from . import lcmtypes
-from .address import is_claimed
 from .arguments import shown
 from .bus import Bus
 from .callbacks import Callbacks, Subscription
@@ -27,7 +26,7 @@ from .lockstep import Stepper
 from .motion import Drivers
 from .run_watch import RunWatch
 from .stream import Streams
-from .transport import Transport, open_transport
+from .transport import Transport, is_claimed, open_transport
 from .world_info import WorldInfo, WorldInfoAssembler, run_id_of
 
 _SILENCE_SECONDS = 5.0

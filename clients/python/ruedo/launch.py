@@ -19,10 +19,9 @@ import time
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import IO, Any, Literal
-from urllib.parse import urlsplit
 
 from . import arguments
-from .address import has_multicast_route
+from .address import has_multicast_route, read_address
 from .errors import LaunchError, NoServer
 from .simulation import Simulation
 from .stream_transport import is_served
@@ -290,11 +289,11 @@ class _Server:
         """Waits for a tcpq or unix server to listen. If it does not in time, connecting reports
         that.
         """
-        parts = urlsplit(url)
-        if parts.scheme not in ("tcpq", "unix"):
+        address = read_address(url)
+        if address.scheme == "udpm":
             return
         while time.monotonic() < until and self._process.poll() is None:
-            if is_served(parts):
+            if is_served(address):
                 return
             time.sleep(0.005)
         ended = self.ended()

@@ -16,15 +16,14 @@ import socket
 import struct
 import time
 from dataclasses import dataclass, field
-from urllib.parse import parse_qs, urlsplit
 
 import lcm
 
 from . import arrivals
+from .address import Address
 from .errors import NoServer
 from .stream_transport import Receiver
 
-_GROUP, _PORT = "239.255.76.67", 7667  # LCM's own
 _SHORT, _FRAGMENT = b"LC02", b"LC03"
 _SHORT_HEAD = 8
 _HEAD = struct.Struct(">4sIIIHH")
@@ -68,16 +67,14 @@ class MulticastTransport:
 
     loses_nothing = False
 
-    def __init__(self, url: str):
+    def __init__(self, address: Address):
         try:
-            parts = urlsplit(url)
-            group, port = parts.hostname or _GROUP, parts.port or _PORT
-            # Sends, from any thread; None: closed. Without a port LCM would send to port 0.
-            self._lcm: lcm.LCM | None = lcm.LCM(f"udpm://{group}:{port}?{parts.query}")
-            self._socket = _joined_socket(group, port, parts.query)
+            # Sends, from any thread; None: closed.
+            self._lcm: lcm.LCM | None = lcm.LCM(str(address))
+            self._socket = _joined_socket(address)
         except (OSError, RuntimeError) as error:
             raise NoServer(
-                f"{url}: it cannot be used ({error}); `ruedo doctor` looks for what is wrong"
+                f"{address}: it cannot be used ({error}); `ruedo doctor` looks for what is wrong"
             ) from None
         self._poll = select.poll()
         self._poll.register(self._socket, select.POLLIN)
@@ -166,18 +163,17 @@ class MulticastTransport:
             self._partial_memory -= partial.memory
 
 
-def _joined_socket(group: str, port: int, options: str) -> socket.socket:
+def _joined_socket(address: Address) -> socket.socket:
     """Raises OSError."""
-    wanted = parse_qs(options).get("recv_buf_size", ["0"])[0]
     end = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
     try:
         end.setblocking(False)
         for option in (socket.SO_REUSEADDR, socket.SO_REUSEPORT):
             end.setsockopt(socket.SOL_SOCKET, option, 1)
-        buffer = min(max(int(wanted) if wanted.isdecimal() else 0, _RECEIVE_BUFFER), 1 << 30)
+        buffer = min(max(address.receive_buffer, _RECEIVE_BUFFER), 1 << 30)
         end.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, buffer)
-        end.bind((group, port))
-        membership = socket.inet_aton(group) + socket.inet_aton("0.0.0.0")
+        end.bind((address.host, address.port))
+        membership = socket.inet_aton(address.host) + socket.inet_aton("0.0.0.0")
         end.setsockopt(socket.IPPROTO_IP, socket.IP_ADD_MEMBERSHIP, membership)
     except OSError:
         end.close()

@@ -18,9 +18,9 @@ import struct
 import threading
 import time
 from collections.abc import Callable
-from urllib.parse import SplitResult
 
 from . import arrivals
+from .address import Address
 
 Receiver = Callable[[arrivals.Arrived], None]
 
@@ -34,18 +34,18 @@ _PUBLISH, _SUBSCRIBE, _UNSUBSCRIBE = 1, 2, 3
 _CHUNK = 1 << 18  # bytes received at a time
 
 
-def connect(url: SplitResult) -> socket.socket:
-    """To a tcpq or unix URL. Raises OSError when nobody serves there."""
-    local = url.scheme == "unix"
+def connect(address: Address) -> socket.socket:
+    """To a tcpq or unix address. Raises OSError when nobody serves there."""
+    local = address.scheme == "unix"
     end = socket.socket(socket.AF_UNIX if local else socket.AF_INET, socket.SOCK_STREAM)
     try:
         # A server that takes nothing holds nobody up for longer.
         end.setsockopt(socket.SOL_SOCKET, socket.SO_SNDTIMEO, _PATIENCE)
         if local:
-            end.connect(url.path)
+            end.connect(address.path)
             _check_peer(end)
         else:
-            end.connect((url.hostname or "127.0.0.1", url.port or 7700))
+            end.connect((address.host, address.port))
             end.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
     except BlockingIOError as error:
         end.close()
@@ -65,9 +65,9 @@ def _check_peer(end: socket.socket) -> None:
         raise PermissionError(errno.EPERM, "it is served by another user")
 
 
-def is_served(url: SplitResult) -> bool:
+def is_served(address: Address) -> bool:
     try:
-        connect(url).close()
+        connect(address).close()
     except OSError:
         return False
     return True
@@ -76,9 +76,10 @@ def is_served(url: SplitResult) -> bool:
 class StreamTransport:
     """Connects again when the server comes back."""
 
-    def __init__(self, url: SplitResult):
-        self.loses_nothing = url.scheme == "unix"
-        self._url = url
+    def __init__(self, address: Address):
+        """Raises OSError when nobody serves there."""
+        self.loses_nothing = address.scheme == "unix"
+        self._address = address
         self._lock = threading.Lock()  # of what is sent, and of the connection
         self._channels: set[str] = set()
         self._names: dict[bytes, str] = {}  # of channels that came
@@ -135,7 +136,7 @@ class StreamTransport:
             connection.close()
 
     def _connect(self) -> None:
-        made = connect(self._url)
+        made = connect(self._address)
         with self._lock:
             if self._closed:
                 made.close()

@@ -1,15 +1,17 @@
 package ruedo;
 
 import java.io.IOException;
+import java.net.Inet4Address;
 import java.net.InetAddress;
 import java.net.InetSocketAddress;
 import java.net.StandardProtocolFamily;
-import java.net.URI;
-import java.net.URISyntaxException;
+import java.net.UnknownHostException;
 import java.nio.channels.DatagramChannel;
 import java.nio.charset.StandardCharsets;
 import java.nio.file.Files;
 import java.nio.file.Path;
+import java.util.HashMap;
+import java.util.Map;
 
 /**
  * An LCM URL: udpm://GROUP:PORT?ttl=0 or tcpq://HOST:PORT; or unix:///PATH, a local socket, which
@@ -27,56 +29,104 @@ final class Address {
     final String host;
     final int port;
     final String path; // of a local socket; else null
-    private final String options;
+    final int ttl; // of multicast: networks that datagrams cross
+    final int receiveBuffer; // of multicast, in bytes; 0: not named
 
-    /** Throws NoServer for a text that is no such URL. */
+    /** As the server reads it. Throws NoServer for a text that is no address of a client's. */
     Address(String url) {
         this.url = url;
-        URI uri;
-        try {
-            // URI wants a host.
-            uri =
-                    new URI(
-                            url.replaceFirst("^udpm://(?=$|[:?])", "udpm://" + GROUP)
-                                    .replaceFirst("^tcpq://(?=$|[:?])", "tcpq://127.0.0.1"));
-        } catch (URISyntaxException error) {
-            throw notOne();
-        }
-        multicast = "udpm".equals(uri.getScheme());
-        if ("unix".equals(uri.getScheme())) {
-            path = url.substring("unix://".length());
-            if (!path.startsWith("/")) throw notOne();
-            host = options = "";
-            port = 0;
+        int at = url.indexOf("://");
+        if (at < 0) throw refused("it has no scheme");
+        String scheme = url.substring(0, at);
+        String rest = url.substring(at + 3);
+        if (scheme.equals("unix")) {
+            if (!rest.startsWith("/")) throw refused("'" + rest + "' is no absolute path");
+            path = rest;
+            multicast = false;
+            host = "";
+            port = ttl = receiveBuffer = 0;
             return;
         }
         path = null;
-        if ((!multicast && !"tcpq".equals(uri.getScheme())) || uri.getHost() == null)
-            throw notOne();
-        host = uri.getHost();
-        port = uri.getPort() < 0 ? multicast ? 7667 : 7700 : uri.getPort();
-        if (port > 65535) throw notOne();
-        options = uri.getQuery() == null ? "" : uri.getQuery();
+        multicast = scheme.equals("udpm");
+        if (!multicast && !scheme.equals("tcpq"))
+            throw refused("the schemes udpm, tcpq and unix are supported");
+        String[] parts = rest.split("\\?", 2);
+        Map<String, Integer> options = options(parts.length > 1 ? parts[1] : "");
+        if (!multicast && !options.isEmpty()) throw refused("tcpq has no options");
+        String[] place = parts[0].split(":", 2);
+        port = place.length > 1 ? port(place[1]) : multicast ? 7667 : 7700;
+        host =
+                place[0].isEmpty()
+                        ? multicast ? GROUP : "127.0.0.1"
+                        : multicast ? group(place[0]) : resolved(place[0]);
+        ttl = options.getOrDefault("ttl", 0);
+        receiveBuffer = options.getOrDefault("recv_buf_size", 0);
     }
 
-    private RuedoException.NoServer notOne() {
+    private RuedoException.NoServer refused(String why) {
         return new RuedoException.NoServer(
-                url
-                        + ": not an LCM URL; udpm://GROUP:PORT?ttl=0, tcpq://HOST:PORT or"
-                        + " unix:///PATH is");
+                "url '"
+                        + url
+                        + "': "
+                        + why
+                        + "; an address looks like "
+                        + DEFAULT_URL
+                        + ", "
+                        + FALLBACK_URL
+                        + " or unix:///tmp/ruedo.sock");
     }
 
-    /** The number that the URL gives as an option. */
-    int option(String name, int otherwise) {
-        for (String option : options.split("&")) {
-            if (!option.startsWith(name + "=")) continue;
-            try {
-                return Integer.parseInt(option.substring(name.length() + 1));
-            } catch (NumberFormatException error) {
-                throw new RuedoException.NoServer(url + ": " + option + " is no number");
-            }
+    private int port(String digits) {
+        int port = number(digits, 1, 65535);
+        if (port < 0) throw refused("'" + digits + "' is no port");
+        return port;
+    }
+
+    private String group(String text) {
+        String[] bytes = text.split("\\.", -1);
+        boolean good = bytes.length == 4 && number(bytes[0], 224, 239) >= 0;
+        for (String value : bytes) good = good && number(value, 0, 255) >= 0;
+        if (good) return text;
+        throw refused("'" + text + "' is no multicast group (224.0.0.0 to 239.255.255.255)");
+    }
+
+    private String resolved(String name) {
+        try {
+            for (InetAddress address : InetAddress.getAllByName(name))
+                if (address instanceof Inet4Address) return address.getHostAddress();
+        } catch (UnknownHostException error) {
+            // said below
         }
-        return otherwise;
+        throw refused("'" + name + "' is no host that this machine knows");
+    }
+
+    private Map<String, Integer> options(String text) {
+        Map<String, Integer> found = new HashMap<>();
+        for (String pair : text.isEmpty() ? new String[0] : text.split("&")) {
+            String key = pair.replaceFirst("=.*", "");
+            String digits = pair.substring(Math.min(key.length() + 1, pair.length()));
+            int value =
+                    key.equals("ttl")
+                            ? number(digits, 0, 255)
+                            : key.equals("recv_buf_size")
+                                    ? number(digits, 1, Integer.MAX_VALUE)
+                                    : -1;
+            if (value < 0 || found.put(key, value) != null)
+                throw refused(
+                        "the option '"
+                                + pair
+                                + "' is not allowed: ttl, 0 to 255, and recv_buf_size, 1 to"
+                                + " 2147483647 bytes, are, each once");
+        }
+        return found;
+    }
+
+    /** From least to most; -1 for what is no such number. */
+    private static int number(String digits, int least, int most) {
+        if (!digits.matches("[0-9]{1,10}")) return -1;
+        long value = Long.parseLong(digits);
+        return value >= least && value <= most ? (int) value : -1;
     }
 
     static String resolve(String url) {

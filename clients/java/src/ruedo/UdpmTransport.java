@@ -90,12 +90,10 @@ final class UdpmTransport implements Transport {
             socket = DatagramChannel.open(StandardProtocolFamily.INET);
             socket.setOption(StandardSocketOptions.SO_REUSEADDR, true);
             socket.bind(new InetSocketAddress(address.port));
-            int buffer = address.option("recv_buf_size", 0);
-            if (buffer > 0) socket.setOption(StandardSocketOptions.SO_RCVBUF, buffer);
+            if (address.receiveBuffer > 0)
+                socket.setOption(StandardSocketOptions.SO_RCVBUF, address.receiveBuffer);
             socket.setOption(StandardSocketOptions.IP_MULTICAST_LOOP, true);
-            socket.setOption(
-                    StandardSocketOptions.IP_MULTICAST_TTL,
-                    Math.max(0, Math.min(255, address.option("ttl", 0))));
+            socket.setOption(StandardSocketOptions.IP_MULTICAST_TTL, address.ttl);
             socket.join(group.getAddress(), routeTo(group));
         } catch (IOException | RuntimeException error) {
             throw new RuedoException.NoServer(
