@@ -206,7 +206,7 @@ def test_who_waits_in_lockstep_is_told_that_steps_are_wanted():
             robot.lrf.next(timeout=0.2)
 
 
-@pytest.mark.parametrize("options", [{"lockstep": 1}, {"rate": "max", "url": "auto"}])
+@pytest.mark.parametrize("options", [{"lockstep": 1}, {"url": "auto"}])
 def test_a_closed_simulation_leaves_nothing_open(options):
     """No file and no socket is left to the garbage collector, which pytest and `python -X dev`
     would report; the errors of a server that ended are still told.
