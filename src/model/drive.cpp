@@ -12,6 +12,7 @@
 #include "model/holds.h"
 #include "model/joint_plugins.h"
 #include "model/lifts.h"
+#include "model/odd_drive.h"
 #include "model/own_plugins.h"
 #include "model/plugin_parameters.h"
 #include "model/plugins.h"
@@ -637,12 +638,13 @@ void find_drive(const Element& model_element, const std::vector<const Element*>&
 void take_drive(const Element& plugin, const std::shared_ptr<const Element>& odometry,
                 const std::string& where, Findings& findings, Model& model) {
   try {
-    auto translated = drive_from_plugin(plugin, model);
+    auto translated = drive_from_plugin(plugin, model, where, findings);
     if (!translated) return;
     if (model.drive)
       return findings.unsupported(plugin.source, where, "a second drive; the first one is used");
-    model.drive = read_drive(std::move(translated),
-                             odometry ? odometry : odometry_from_plugin(plugin), model);
+    std::shared_ptr<const Element> of_plugin = odometry_from_plugin(plugin, where, findings);
+    model.drive =
+        read_drive(std::move(translated), odometry ? odometry : std::move(of_plugin), model);
     model.drive->belts = belts_from_plugin(plugin, model);
   } catch (const InputError& error) {
     findings.error(error.source(), where, "the drive plugin cannot be used: " + error.message());
@@ -674,12 +676,13 @@ void read_drive_of(const Element& model_element, const std::string& where, ReadC
   }
   name_lone_tracks(plugins, model, where, context.findings);
   if (!model.drive) find_drive(model_element, plugins, odometry, where, context, model);
+  name_odd_drive(model_element, model, where, context.findings);
   if (!model.is_static) {
     read_holds(plugins, where, context.findings, model);
     read_joint_plugins(plugins, where, context.findings, model);
     read_lifts(plugins, where, context.findings, model);
     read_ros_gains(model_element, plugins, where, context, model);
-    read_joint_interfaces(model_element, model);
+    read_joint_interfaces(model_element, where, context.findings, model);
   }
   if (odometry && !model.drive)
     model_element.child("ruedo:odometry")->fail("needs a drive: the model has no <ruedo:drive>");

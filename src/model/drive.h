@@ -20,14 +20,17 @@ DriveDescription read_drive(std::shared_ptr<const Element> drive,
                             std::shared_ptr<const Element> odometry, const Model& model);
 
 // Translates a Gazebo drive plugin, or an unknown plugin that names wheels of the model in the same
-// way, to <ruedo:drive>. Null: it is not a drive plugin.
-std::unique_ptr<Element> drive_from_plugin(const Element& plugin, const Model& model);
+// way, to <ruedo:drive>; reports parameters that cannot mean what they say. Null: it is not a drive
+// plugin.
+std::unique_ptr<Element> drive_from_plugin(const Element& plugin, const Model& model,
+                                           const std::string& where, Findings& findings);
 
 // The links of a tracked vehicle whose surface is a belt, including those of flippers.
 std::vector<ModelLinkIndex> belts_from_plugin(const Element& plugin, const Model& model);
 
 // Its odometry rate, as <ruedo:odometry>; null: it gives none.
-std::unique_ptr<Element> odometry_from_plugin(const Element& plugin);
+std::unique_ptr<Element> odometry_from_plugin(const Element& plugin, const std::string& where,
+                                              Findings& findings);
 
 // Whether it has elements as drive plugins do, naming joints of the model on the left and right.
 bool names_wheels(const Element& plugin, const Model& model);

@@ -56,8 +56,15 @@ constexpr Parameter kParameters[] = {
     {"MaxForce", "ruedo:max_wheel_torque"},
 };
 
-// A limit below 0 is none; one of these would turn the robot's motion round.
-constexpr std::string_view kLengths[] = {"ruedo:wheel_radius", "ruedo:track", "ruedo:wheelbase"};
+// Below 0, one of these would turn the robot's motion round.
+bool is_length(std::string_view ours) {
+  return ours == "ruedo:wheel_radius" || ours == "ruedo:track" || ours == "ruedo:wheelbase";
+}
+
+std::string not_allowed(const Element& given, const Element& plugin, const char* allowed) {
+  return "<" + given.name + "> of the plugin " + kind_of(plugin).name + ": '" + given.text +
+         "' is not allowed; allowed is " + allowed;
+}
 
 struct Joints {
   const char* ours;
@@ -175,12 +182,16 @@ bool names_wheels(const Element& plugin, const Model& model) {
   return names(kJoints[0]) && names(kJoints[1]);
 }
 
-std::unique_ptr<Element> odometry_from_plugin(const Element& plugin) {
+std::unique_ptr<Element> odometry_from_plugin(const Element& plugin, const std::string& where,
+                                              Findings& findings) {
   for (const char* name : {"odom_publish_frequency", "update_rate", "odometryRate", "updateRate"}) {
     const Element* rate = plugin.child(name);
     // Gazebo's limit; higher rates than the step rate have no effect
     constexpr double kMost_hz = 1000.0;
     const double hz = rate ? rate->as_number(Allowed::any(quantity::kRange)) : 0.0;
+    if (hz < 0.0 || hz > kMost_hz)
+      findings.error(rate->source, where,
+                     not_allowed(*rate, plugin, "0 to 1000; the usual rate is taken"));
     if (!(hz > 0.0) || hz > kMost_hz) continue;
     auto odometry = std::make_unique<Element>();
     odometry->name = "ruedo:odometry";
@@ -191,7 +202,56 @@ std::unique_ptr<Element> odometry_from_plugin(const Element& plugin) {
   return nullptr;
 }
 
-std::unique_ptr<Element> drive_from_plugin(const Element& plugin, const Model& model) {
+namespace {
+
+// In our unit; 0 means "no limit" in a plugin, and a limit below 0 nothing.
+double value_of(const Element& given, const Parameter& parameter, const Element& plugin,
+                const std::string& where, Findings& findings) {
+  if (is_length(parameter.ours)) {
+    const double length = given.as_number(Allowed::not_negative(quantity::kEffort));
+    if (length == 0)
+      findings.error(given.source, where,
+                     not_allowed(given, plugin, "a number above 0; it is measured instead"));
+    return parameter.unit == Unit::half ? length / 2 : length;
+  }
+  const double value = given.as_number(Allowed::any(quantity::kEffort));
+  if (parameter.unit == Unit::magnitude) {
+    if (value > 0)
+      findings.repaired(given.source, where,
+                        not_allowed(given, plugin, "a number of at most 0; its magnitude counts"));
+    return std::abs(value);
+  }
+  if (value < 0)
+    findings.error(given.source, where,
+                   not_allowed(given, plugin, "a number of at least 0; there is no limit"));
+  return value;
+}
+
+void add_parameters(const Element& plugin, const std::string& where, Findings& findings,
+                    Element& drive) {
+  for (const Parameter& each : kParameters) {
+    const Element* given = plugin.child(each.theirs);
+    if (!given) continue;
+    for (const Element* other : plugin.all(each.theirs)) {
+      if (other->text != given->text)  // plugins with several pairs of wheels repeat them
+        findings.unsupported(other->source, where,
+                             "a second <" + given->name + "> of the plugin " +
+                                 kind_of(plugin).name + " is left out; the first one counts");
+    }
+    const double value = value_of(*given, each, plugin, where, findings);
+    const Element* before = drive.child(each.ours);
+    if (before && is_length(each.ours) && before->text != shown(value))
+      findings.unsupported(given->source, where,
+                           "<" + given->name + "> of the plugin " + kind_of(plugin).name +
+                               " is left out: another parameter says something else");
+    if (!before && value > 0) add(drive, each.ours, shown(value), given->source);
+  }
+}
+
+}  // namespace
+
+std::unique_ptr<Element> drive_from_plugin(const Element& plugin, const Model& model,
+                                           const std::string& where, Findings& findings) {
   const PluginKind kind = kind_of(plugin);
   const bool alike = kind.does == PluginKind::Does::unknown && names_wheels(plugin, model);
   if (kind.does != PluginKind::Does::drive && !alike) return nullptr;
@@ -220,18 +280,7 @@ std::unique_ptr<Element> drive_from_plugin(const Element& plugin, const Model& m
     if (mecanum || drive->has("ruedo:steer_joint"))
       drive->attributes.emplace_back("steering", mecanum ? "mecanum" : "ackermann");
   }
-  for (const Parameter& each : kParameters) {
-    const Element* given = plugin.child(each.theirs);
-    if (!given || drive->has(each.ours)) continue;
-    const bool length =
-        std::find(std::begin(kLengths), std::end(kLengths), each.ours) != std::end(kLengths);
-    double value = given->as_number(length ? Allowed::not_negative(quantity::kEffort)
-                                           : Allowed::any(quantity::kEffort));
-    if (each.unit == Unit::half) value /= 2;
-    if (each.unit == Unit::magnitude) value = std::abs(value);
-    if (value > 0)
-      add(*drive, each.ours, shown(value), given->source);  // 0 means "no limit" in the plugin
-  }
+  add_parameters(plugin, where, findings, *drive);
   return drive;
 }
 

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 
+#include "model/body_layout.h"
 #include "model/plugins.h"
 
 namespace ruedo::model {
@@ -64,22 +65,45 @@ void read_holds(const std::vector<const Element*>& plugins, const std::string& w
   }
 }
 
+namespace {
+
+// What is wrong with a hold, in words; "": nothing.
+std::string fault_of(const Hold& hold, InstanceIndex holder, const WorldModel& world,
+                     const BodyLayout& layout) {
+  const auto other = std::find_if(world.models.begin(), world.models.end(), [&](const auto& each) {
+    return each.name == (hold.other_model.empty() ? world.models[holder].name : hold.other_model);
+  });
+  if (other == world.models.end())
+    return "the world has no model '" + hold.other_model + "'; it is held when it comes";
+  const auto& links = other->model->links;
+  const auto link = std::find_if(links.begin(), links.end(),
+                                 [&](const Link& each) { return each.name == hold.other_link; });
+  if (link == links.end())
+    return "the model '" + other->name + "' has no link '" + hold.other_link + "'; nothing is held";
+  const auto body_of = [&](InstanceIndex instance, ModelLinkIndex of) {
+    return layout.links[layout.link_of(instance, of)].body;
+  };
+  const BodyIndex body = body_of(holder, hold.link);
+  if (body !=
+      body_of(InstanceIndex(other - world.models.begin()), ModelLinkIndex(link - links.begin())))
+    return "";
+  const std::string both =
+      "'" + world.models[holder].model->links[hold.link].name + "' and '" + hold.other_link + "' ";
+  return both + (body.valid() ? "are one body" : "do not move") + "; nothing is held";
+}
+
+}  // namespace
+
 void check_holds(const WorldModel& world, Findings& findings) {
-  for (const ModelInstance& instance : world.models) {
-    for (const Hold& hold : instance.model->holds) {
-      const auto other =
-          std::find_if(world.models.begin(), world.models.end(), [&](const ModelInstance& each) {
-            return each.name == (hold.other_model.empty() ? instance.name : hold.other_model);
-          });
-      const std::string where = "model " + instance.name;
-      if (other == world.models.end())
-        findings.error(hold.source, where,
-                       "DetachableJoint: the world has no model '" + hold.other_model +
-                           "'; it is held when it comes");
-      else if (!has_link(*other->model, hold.other_link))
-        findings.error(hold.source, where,
-                       "DetachableJoint: the model '" + other->name + "' has no link '" +
-                           hold.other_link + "'; nothing is held");
+  if (std::all_of(world.models.begin(), world.models.end(),
+                  [](const ModelInstance& each) { return each.model->holds.empty(); }))
+    return;
+  const BodyLayout layout(world);
+  for (const InstanceIndex i : world.models.indices()) {
+    for (const Hold& hold : world.models[i].model->holds) {
+      const std::string fault = fault_of(hold, i, world, layout);
+      if (!fault.empty())
+        findings.error(hold.source, "model " + world.models[i].name, "DetachableJoint: " + fault);
     }
   }
 }

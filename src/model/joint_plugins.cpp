@@ -83,13 +83,36 @@ struct Reader {
     return written ? written->as_number(Allowed::any(quantity::kLength)) : 0.0;
   }
 
+  // Of controllers of one joint, whose parameters stand once.
+  void name_seconds() const {
+    for (const auto& child : plugin.children) {
+      if (child->name != "joint_name" && plugin.child(child->name)->text != child->text)
+        findings.unsupported(child->source, where,
+                             "a second <" + child->name + "> of the plugin " + name +
+                                 " is left out; the first one counts");
+    }
+    if (!plugin.has("joint_name"))
+      findings.error(plugin.source, where,
+                     "the plugin " + name + " has no <joint_name>; it holds nothing");
+  }
+
+  // They move nothing here that has to be told.
+  void names() const {
+    for (const Element* written : plugin.all("joint_name")) joint(*written);
+  }
+
   void position() const {
+    name_seconds();
     const Pid pid = read_pid(plugin, "", 0, {1.0, 0.1, 0.01, -1.0, 1.0, -1000.0, 1000.0});
     const bool exact = plugin.boolean("use_velocity_commands", false);
     name_axis();
     for (const Element* written : plugin.all("joint_name")) {
       Joint* held = joint(*written);
       if (!held) continue;
+      if (exact && pid.most < 0.0)
+        findings.error(plugin.source, where,
+                       "<cmd_max> of the plugin " + name + ": '" + shown(pid.most) +
+                           "' is not allowed; allowed is a number of at least 0; it stands still");
       if (exact)
         held->axis.velocity = std::min(held->axis.velocity, std::max(pid.most, 0.0));
       else
@@ -99,6 +122,7 @@ struct Reader {
   }
 
   void velocity() const {
+    name_seconds();
     const Pid pid = read_pid(plugin, "", 0, {1.0, 0.0, 0.0, -1.0, 1.0, -1000.0, 1000.0});
     const bool by_force = plugin.boolean("use_force_commands", false);
     if (by_force && pid.d > 0.0)
@@ -149,6 +173,8 @@ constexpr Kind kKinds[] = {
     {"JointPositionController", &Reader::position},
     {"JointController", &Reader::velocity},
     {"JointTrajectoryController", &Reader::trajectory},
+    {"JointStatePublisher", &Reader::names},
+    {"ApplyJointForce", &Reader::names},
 };
 
 }  // namespace
@@ -165,31 +191,35 @@ void read_joint_plugins(const std::vector<const Element*>& plugins, const std::s
   }
 }
 
-void read_joint_interfaces(const Element& model_element, Model& model) {
-  const auto stays = [&](const Element& named) {
+void read_joint_interfaces(const Element& model_element, const std::string& where,
+                           Findings& findings, Model& model) {
+  const auto read = [&](const Element& named, bool stays) {
     const std::string* name = named.attribute("name");
-    for (Joint& joint : model.joints) {
-      if (name && joint.name == dotted(*name) && joint.axis.start.mode == JointStart::Mode::free)
-        joint.axis.start.mode = JointStart::Mode::stay;
-    }
+    const auto joint =
+        std::find_if(model.joints.begin(), model.joints.end(),
+                     [&](const auto& each) { return name && each.name == dotted(*name); });
+    if (joint == model.joints.end())
+      findings.error(named.source, where,
+                     "<" + named.name + "> names the joint '" + (name ? *name : "") +
+                         "', which the model does not have");
+    else if (stays && joint->axis.start.mode == JointStart::Mode::free)
+      joint->axis.start.mode = JointStart::Mode::stay;
   };
   const auto holds = [](const std::string& interface) {
     return interface.find("osition") != std::string::npos ||
            interface.find("elocity") != std::string::npos;
   };
   for (const Element* transmission : model_element.all("transmission")) {
-    for (const Element* joint : transmission->all("joint")) {
-      if (holds(joint->string("hardwareInterface", ""))) stays(*joint);
-    }
+    for (const Element* joint : transmission->all("joint"))
+      read(*joint, holds(joint->string("hardwareInterface", "")));
   }
   for (const Element* system : model_element.all("ros2_control")) {
     for (const Element* joint : system->all("joint")) {
       const auto interfaces = joint->all("command_interface");
-      if (std::any_of(interfaces.begin(), interfaces.end(), [&](const Element* each) {
-            const std::string* name = each->attribute("name");
-            return name && holds(*name);
-          }))
-        stays(*joint);
+      read(*joint, std::any_of(interfaces.begin(), interfaces.end(), [&](const Element* each) {
+        const std::string* name = each->attribute("name");
+        return name && holds(*name);
+      }));
     }
   }
 }

@@ -15,7 +15,8 @@ void read_joint_plugins(const std::vector<const Element*>& plugins, const std::s
                         Findings& findings, Model& model);
 
 // Applies the command interfaces in <transmission> and <ros2_control>: joints commanded by position
-// or velocity hold their position before the first command.
-void read_joint_interfaces(const Element& model_element, Model& model);
+// or velocity hold their position before the first command. Reports joints that are not there.
+void read_joint_interfaces(const Element& model_element, const std::string& where,
+                           Findings& findings, Model& model);
 
 }  // namespace ruedo::model

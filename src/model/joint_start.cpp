@@ -86,10 +86,32 @@ void count_from(double position, size_t j, Model& model) {
 
 }  // namespace
 
+namespace {
+
+// A joint cannot be beyond its limits: it would be thrown back at the first step.
+void keep_in_limits(const std::string& where, const Model& model, JointPositions& positions,
+                    Findings& findings) {
+  constexpr double kExact = 1e-6;  // rad, m: files have few digits
+  for (const ModelJointIndex j : model.joints.indices()) {
+    const Joint& joint = model.joints[j];
+    if (positions[j] == 0.0) continue;
+    const double within = std::clamp(positions[j], joint.axis.lower, joint.axis.upper);
+    if (std::abs(within - positions[j]) <= kExact) continue;
+    findings.error(joint.source, where + "/joint " + joint.name,
+                   "it begins at " + shown(positions[j]) + " of its file, beyond its limits of " +
+                       shown(joint.axis.lower) + " to " + shown(joint.axis.upper) + "; it is " +
+                       shown(within) + " instead");
+    positions[j] = within;
+  }
+}
+
+}  // namespace
+
 void begin_at(const JointPositions& positions, const std::string& where, Model& model,
               Findings& findings) {
   JointPositions all = positions;
   all.resize(model.joints.size(), 0.0);
+  keep_in_limits(where, model, all, findings);
   if (std::all_of(all.begin(), all.end(), [](double each) { return each == 0.0; })) return;
   const IndexedVector<ModelLinkIndex, Pose> moves = moves_of_links(model, all);
   for (const ModelLinkIndex i : model.links.indices())

@@ -219,7 +219,7 @@ std::optional<Material> gazebo_material(const std::string& full_name) {
   return std::nullopt;
 }
 
-Rgba read_colour(const Element& element) {
+Rgba read_colour(const Element& element, const std::string& where, Findings& findings) {
   const std::vector<double> v = element.as_numbers(Allowed::any(quantity::kBrightness));
   if (v.size() != 3 && v.size() != 4) {
     element.fail("'" + element.text + "' has " + std::to_string(v.size()) +
@@ -227,6 +227,11 @@ Rgba read_colour(const Element& element) {
   }
   Rgba colour{0, 0, 0, 1};
   for (size_t i = 0; i < v.size(); ++i) colour[i] = static_cast<float>(std::clamp(v[i], 0.0, 1.0));
+  if (std::any_of(v.begin(), v.end(), [](double each) { return each < 0.0 || each > 1.0; }))
+    findings.repaired(element.source, where,
+                      "<" + element.name + ">: '" + element.text +
+                          "' is not allowed; allowed are numbers from 0 to 1; the nearest of these "
+                          "are taken");
   return colour;
 }
 
@@ -254,19 +259,19 @@ std::optional<Material> read_material(const Element& element, const std::string&
     }
   }
   if (const Element* e = element.child("diffuse")) {
-    material.diffuse = read_colour(*e);
+    material.diffuse = read_colour(*e, where, context.findings);
     if (!element.child("ambient") && !said) material.ambient = material.diffuse;
     said = true;
   }
   if (const Element* e = element.child("ambient")) {
-    material.ambient = read_colour(*e);
+    material.ambient = read_colour(*e, where, context.findings);
     if (!said) material.diffuse = material.ambient;
     said = true;
   }
   if (const Element* e = element.child("specular"))
-    material.specular = read_colour(*e), said = true;
+    material.specular = read_colour(*e, where, context.findings), said = true;
   if (const Element* e = element.child("emissive"))
-    material.emissive = read_colour(*e), said = true;
+    material.emissive = read_colour(*e, where, context.findings), said = true;
   if (const Element* e = element.child("shininess"))
     material.shininess =
         static_cast<float>(e->as_number(Allowed::not_negative(quantity::kBrightness)));

@@ -18,6 +18,6 @@ std::optional<Material> read_material(const Element& material, const std::string
 std::optional<Material> gazebo_material(const std::string& name);
 
 // "r g b" or "r g b a"; values are clamped to [0, 1].
-Rgba read_colour(const Element& element);
+Rgba read_colour(const Element& element, const std::string& where, Findings& findings);
 
 }  // namespace ruedo::model

@@ -75,8 +75,9 @@ SavedState::SavedState(const Element& world, Findings& findings) {
     for (const Element* light : states_of(*state, "light")) {
       const std::string* name = light->attribute("name");
       if (!name || !light->has("pose")) continue;
-      read_or_leave_out("state/light " + *name, "it is where it was", findings,
-                        [&] { lights_.insert_or_assign(*name, light->pose("pose")); });
+      read_or_leave_out("state/light " + *name, "it is where it was", findings, [&] {
+        lights_.insert_or_assign(*name, SavedLight{light->pose("pose"), light->source});
+      });
     }
     for (const Element* joint : states_of(*state, "joint")) {
       findings.unsupported(joint->source, "state",
@@ -156,9 +157,19 @@ void SavedState::apply(const std::string& name, ModelInstance& instance, Finding
   }
   begin_at(starts, "state/model " + name, *model, findings);
   instance.model = model;
+  std::set<std::string_view> joints;
+  for (const Joint& joint : model->joints) joints.insert(joint.name);
+  for (const auto& [joint, position] : saved.joints) {
+    if (!joints.contains(joint))
+      findings.error(saved.source, "state/model " + name,
+                     "the model has no joint '" + joint + "'; its position is left out");
+  }
   for (const Link& link : saved.links) {
     const auto own = std::find_if(model->links.begin(), model->links.end(),
                                   [&](const auto& one) { return one.name == link.name; });
+    if (own == model->links.end())
+      findings.error(saved.source, "state/model " + name,
+                     "the model has no link '" + link.name + "'; its pose is left out");
     if (own == model->links.end() ||
         (link.X_WL.translation - (instance.X_WM * own->X_ML).translation).norm() < kAside_m)
       continue;
@@ -172,7 +183,21 @@ void SavedState::apply(const std::string& name, ModelInstance& instance, Finding
 
 void SavedState::apply(Light& light) const {
   if (const auto found = lights_.find(light.name); found != lights_.end())
-    light.pose = found->second;
+    light.pose = found->second.pose;
+}
+
+void SavedState::name_strangers(const std::set<std::string>& models,
+                                const std::set<std::string>& lights, Findings& findings) const {
+  const auto name_others = [&](const char* kind, const auto& saved, const auto& known) {
+    for (const auto& [name, each] : saved) {
+      if (!known.contains(name))
+        findings.error(
+            each.source, "state/" + std::string(kind) + " " + name,
+            "the world has no " + std::string(kind) + " '" + name + "'; its state is left out");
+    }
+  };
+  name_others("model", models_, models);
+  name_others("light", lights_, lights);
 }
 
 }  // namespace ruedo::model

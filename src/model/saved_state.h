@@ -3,6 +3,7 @@
 #pragma once
 
 #include <map>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -19,6 +20,9 @@ class SavedState {
   // Applies a model's pose and joint positions; what cannot be applied is reported.
   void apply(const std::string& name, ModelInstance& instance, Findings& findings) const;
   void apply(Light& light) const;
+  // Reports the states of models and lights that the world does not have.
+  void name_strangers(const std::set<std::string>& models, const std::set<std::string>& lights,
+                      Findings& findings) const;
 
  private:
   struct Link {
@@ -36,7 +40,11 @@ class SavedState {
                   Findings& findings) const;
 
   std::map<std::string, SavedModel> models_;
-  std::map<std::string, Pose> lights_;
+  struct SavedLight {
+    Pose pose;
+    Source source;
+  };
+  std::map<std::string, SavedLight> lights_;
 };
 
 }  // namespace ruedo::model

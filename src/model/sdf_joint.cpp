@@ -9,6 +9,51 @@ namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
+void read_limits(const Element& element, const Joint& joint, const std::string& where,
+                 Findings& findings, JointAxis& axis) {
+  const auto limit = [&](const char* path, double fallback) {
+    const double value = element.number(path, fallback, {.infinite = true});
+    return std::abs(value) >= 1e16 ? std::copysign(kInfinity, value) : value;
+  };
+  axis.lower = limit("limit/lower", -kInfinity);
+  axis.upper = limit("limit/upper", kInfinity);
+  if (joint.type == JointType::continuous) {
+    if (axis.lower < axis.upper && (std::isfinite(axis.lower) || std::isfinite(axis.upper)))
+      findings.unsupported(element.child("limit")->source, where,
+                           "a continuous joint has no limits: those of " + shown(axis.lower) +
+                               " to " + shown(axis.upper) + " are left out");
+    axis.lower = -kInfinity, axis.upper = kInfinity;
+  }
+  if (axis.lower > axis.upper) {
+    findings.repaired(element.child("limit")->source, where,
+                      "the lower limit " + shown(axis.lower) + " is above the upper limit " +
+                          shown(axis.upper) + "; they are taken the other way round");
+    std::swap(axis.lower, axis.upper);
+  }
+  // Negative: no limit.
+  const double effort = limit("limit/effort", kInfinity),
+               velocity = limit("limit/velocity", kInfinity);
+  axis.effort = effort < 0 ? kInfinity : effort;
+  axis.velocity = velocity < 0 ? kInfinity : velocity;
+}
+
+void read_dynamics(const Element& element, const std::string& where, Findings& findings,
+                   JointAxis& axis) {
+  axis.damping = element.number("dynamics/damping", 0, Allowed::not_negative(quantity::kDamping));
+  axis.friction = element.number("dynamics/friction", 0, Allowed::not_negative(quantity::kDamping));
+  axis.spring_stiffness =
+      element.number("dynamics/spring_stiffness", 0, Allowed::any(quantity::kDamping));
+  if (axis.spring_stiffness < 0.0) {
+    const Element& written = *element.child("dynamics/spring_stiffness");
+    findings.error(written.source, where,
+                   "<spring_stiffness>: '" + written.text +
+                       "' is not allowed; allowed is a number of at least 0; there is no spring");
+    axis.spring_stiffness = 0.0;
+  }
+  axis.spring_reference =
+      element.number("dynamics/spring_reference", 0, Allowed::any(quantity::kAngle));
+}
+
 JointAxis read_axis(const Element& element, SdfVersion version, const Pose& X_MJ,
                     FrameGraph& frames, const Joint& joint, const std::string& where,
                     ReadContext& context) {
@@ -33,31 +78,8 @@ JointAxis read_axis(const Element& element, SdfVersion version, const Pose& X_MJ
     xyz = X_MJ.rotation.conjugate() * xyz;
   }
   axis.axis_in_J = xyz;
-  const auto limit = [&](const char* path, double fallback) {
-    const double value = element.number(path, fallback, {.infinite = true});
-    return std::abs(value) >= 1e16 ? std::copysign(kInfinity, value) : value;
-  };
-  axis.lower = limit("limit/lower", -kInfinity);
-  axis.upper = limit("limit/upper", kInfinity);
-  if (joint.type == JointType::continuous) axis.lower = -kInfinity, axis.upper = kInfinity;
-  if (axis.lower > axis.upper) {
-    context.findings.repaired(element.child("limit")->source, where,
-                              "the lower limit " + shown(axis.lower) +
-                                  " is above the upper limit " + shown(axis.upper) +
-                                  "; they are taken the other way round");
-    std::swap(axis.lower, axis.upper);
-  }
-  // Negative: no limit.
-  const double effort = limit("limit/effort", kInfinity),
-               velocity = limit("limit/velocity", kInfinity);
-  axis.effort = effort < 0 ? kInfinity : effort;
-  axis.velocity = velocity < 0 ? kInfinity : velocity;
-  axis.damping = element.number("dynamics/damping", 0, Allowed::not_negative(quantity::kDamping));
-  axis.friction = element.number("dynamics/friction", 0, Allowed::not_negative(quantity::kDamping));
-  axis.spring_stiffness = std::max(
-      0.0, element.number("dynamics/spring_stiffness", 0, Allowed::any(quantity::kDamping)));
-  axis.spring_reference =
-      element.number("dynamics/spring_reference", 0, Allowed::any(quantity::kAngle));
+  read_limits(element, joint, where, context.findings, axis);
+  read_dynamics(element, where, context.findings, axis);
   axis.position_gain = element.number("ruedo:position_gain", axis.position_gain,
                                       Allowed::positive(quantity::kFactor));
   axis.rate_gain = element.number("ruedo:rate_gain", axis.rate_gain,

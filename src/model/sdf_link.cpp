@@ -303,8 +303,10 @@ Light read_light(const Element& element, const Pose& pose, const std::string& wh
         ->fail("'" + element.child("direction")->text +
                "' is not allowed; a direction is not zero");
   light.direction.normalize();
-  if (const Element* colour = element.child("diffuse")) light.diffuse = read_colour(*colour);
-  if (const Element* colour = element.child("specular")) light.specular = read_colour(*colour);
+  if (const Element* colour = element.child("diffuse"))
+    light.diffuse = read_colour(*colour, where, context.findings);
+  if (const Element* colour = element.child("specular"))
+    light.specular = read_colour(*colour, where, context.findings);
   const Allowed brightness = Allowed::not_negative(quantity::kBrightness),
                 angle = Allowed::not_negative(quantity::kAngle);
   light.range =
@@ -315,6 +317,14 @@ Light read_light(const Element& element, const Pose& pose, const std::string& wh
   light.inner_angle = element.number("spot/inner_angle", 0, angle);
   light.outer_angle = element.number("spot/outer_angle", 0, angle);
   light.falloff = element.number("spot/falloff", 0, brightness);
+  if (light.type == Light::Type::spot && light.inner_angle > light.outer_angle &&
+      element.has("spot/outer_angle")) {
+    context.findings.repaired(element.child("spot")->source, where,
+                              "the <inner_angle> " + shown(light.inner_angle) +
+                                  " is above the <outer_angle> " + shown(light.outer_angle) +
+                                  "; they are taken the other way round");
+    std::swap(light.inner_angle, light.outer_angle);
+  }
   light.intensity =
       element.boolean("light_on", true) ? element.number("intensity", 1, brightness) : 0.0;
   light.cast_shadows = element.boolean("cast_shadows", false);

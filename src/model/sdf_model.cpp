@@ -574,9 +574,13 @@ void SdfReader::ModelReader::read_initial_values(const Element& system) {
       if (!what || *what != "position") continue;
       for (const Element* param : state->all("param")) {
         const std::string* key = param->attribute("name");
-        if (key && *key == "initial_value")
-          starts_[ModelJointIndex(own - model_->joints.begin())] =
-              param->as_number(Allowed::any(quantity::kLength));
+        if (!key || *key != "initial_value") continue;
+        double& start = starts_[ModelJointIndex(own - model_->joints.begin())];
+        const double value = param->as_number(Allowed::any(quantity::kLength));
+        if (start != 0.0 && start != value)
+          findings_.unsupported(param->source, where_ + "/joint " + *name,
+                                "a second initial_value of its position; this one counts");
+        start = value;
       }
     }
   }

@@ -143,10 +143,13 @@ void name_what_has_no_effect(const Element& world, const std::string& where, Fin
 }
 
 void read_scene(const Element& scene, Sky& sky, Findings& findings) {
+  const std::string where = "world/scene";
   report_other_children(scene, {"ambient", "background", "sky", "shadows"},
-                        {"grid", "origin_visual", "fog"}, "world/scene", findings);
-  if (const Element* colour = scene.child("ambient")) sky.ambient = read_colour(*colour);
-  if (const Element* colour = scene.child("background")) sky.background = read_colour(*colour);
+                        {"grid", "origin_visual", "fog"}, where, findings);
+  if (const Element* colour = scene.child("ambient"))
+    sky.ambient = read_colour(*colour, where, findings);
+  if (const Element* colour = scene.child("background"))
+    sky.background = read_colour(*colour, where, findings);
   sky.sky = scene.has("sky");
   sky.shadows = scene.boolean("shadows", true);
   if (const Element* fog = scene.child("fog"); fog && fog->string("type", "none") != "none") {
@@ -342,6 +345,7 @@ class SdfReader::WorldReader {
     read_children();
     const SavedState saved(element_, findings_);
     for (const Placed& each : placed_) add_model(each, saved);
+    name_lost_frames();
     name_wind_without_plugin(element_, world_, findings_);
     check_performers(world_, reader_.performers_, findings_);
     stand_actors(actors_, world_);
@@ -357,6 +361,7 @@ class SdfReader::WorldReader {
         saved.apply(world_.lights.back());
       });
     }
+    name_strangers_of(saved);
   }
 
  private:
@@ -365,6 +370,23 @@ class SdfReader::WorldReader {
     const Element* element;
     std::shared_ptr<const ScopedModel> scope;
   };
+
+  // Those that something is placed by were named there.
+  void name_lost_frames() {
+    for (const Element* frame : element_.all("frame")) {
+      const std::string* name = frame->attribute("name");
+      if (name && frames_.has(*name))
+        read_or_leave_out(in_world_, "nothing is there", findings_,
+                          [&] { frames_.pose(*name, *frame); });
+    }
+  }
+
+  void name_strangers_of(const SavedState& saved) {
+    std::set<std::string> models, lights;
+    for (const Placed& each : placed_) models.insert(each.name);
+    for (const Light& each : world_.lights) lights.insert(each.name);
+    saved.name_strangers(models, lights, findings_);
+  }
 
   void read_settings() {
     const std::string* name = element_.attribute("name");  // any name is allowed for a world

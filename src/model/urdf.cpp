@@ -119,7 +119,7 @@ struct GazeboLink {
   std::vector<const Element*> as_written;  // elements of an SDF link, inserted as in Gazebo
   const Element* colour = nullptr;         // <visual><material>
   const Element* fdir1 = nullptr;
-  std::string material;
+  const Element* material = nullptr;
   const Element* mu1 = nullptr;
   const Element* mu2 = nullptr;
   const Element* kp = nullptr;
@@ -194,15 +194,23 @@ struct Converter {
             "<gazebo reference=\"" + *reference + "\">: there is no link or joint of that name");
         continue;
       }
+      const std::string inside = " in <gazebo reference=\"" + *reference + "\">";
       for (const auto& child : block->children) {
         if (is_one_of(kOfSolvers, child->name)) continue;
-        if (!(of_link ? read_of_link(*child, gazebo[*reference])
+        if (!(of_link ? read_of_link(*child, gazebo[*reference], inside)
                       : read_of_joint(*child, *reference)))
           findings.unsupported(child->source, "robot " + urdf.getName(),
-                               "<" + child->name + "> in <gazebo reference=\"" + *reference +
-                                   "\"> is not supported and left out");
+                               "<" + child->name + ">" + inside + " is not supported and left out");
       }
     }
+  }
+
+  // As in Gazebo, of several the last one counts, in whichever block it is.
+  void take(const Element& child, const std::string& inside, const Element*& place) {
+    if (place && value_of(*place) != value_of(child))
+      findings.unsupported(child.source, "robot " + urdf.getName(),
+                           "a second <" + child.name + ">" + inside + "; the last one counts");
+    place = &child;
   }
 
   void read_of_robot(const Element& child) {
@@ -226,20 +234,23 @@ struct Converter {
     return true;
   }
 
-  bool read_of_link(const Element& child, GazeboLink& link) {
+  bool read_of_link(const Element& child, GazeboLink& link, const std::string& inside) {
     const std::string& name = child.name;
     const std::pair<std::string_view, const Element**> single[] = {
-        {"mu1", &link.mu1}, {"mu2", &link.mu2},     {"kp", &link.kp},
-        {"kd", &link.kd},   {"fdir1", &link.fdir1}, {"turnGravityOff", &link.gravity_off}};
+        {"mu1", &link.mu1},
+        {"mu2", &link.mu2},
+        {"kp", &link.kp},
+        {"kd", &link.kd},
+        {"fdir1", &link.fdir1},
+        {"turnGravityOff", &link.gravity_off},
+        {"material", &link.material}};
     for (const auto& [known, place] : single) {
       if (name != known) continue;
-      *place = &child;
+      take(child, inside, *place);
       return true;
     }
     if (name == "sensor")
       link.sensors.push_back(&child);
-    else if (name == "material")
-      link.material = value_of(child);
     else if (name == "visual" && child.has("material"))
       link.colour = child.child("material");
     else if (name == "plugin")
@@ -256,6 +267,11 @@ struct Converter {
     // engine.
     constexpr double kFrameMass_kg = 1e-3, kFrameInertia = 1e-6;
     Element& inertial = add(link, "inertial", source);
+    if (from.inertial && from.inertial->mass < 0)
+      findings.error(source, "link " + from.name,
+                     "<mass>: '" + shown(from.inertial->mass) +
+                         "' is not allowed; allowed is a number of at least 0; it is taken for a "
+                         "frame without mass");
     double mass = kFrameMass_kg;
     double ixx = kFrameInertia, iyy = kFrameInertia, izz = kFrameInertia, ixy = 0, ixz = 0, iyz = 0;
     if (from.inertial && from.inertial->mass > 0) {
@@ -271,10 +287,33 @@ struct Converter {
     for (const auto& [name, value] : moments) add(inertia, name, source, shown(value));
   }
 
+  // urdfdom takes the first colour of a name, wherever it is in the file.
+  void name_colour(const Element& written, const urdf::Visual& from, const std::string& link) {
+    const Element* material = written.child("material");
+    if (!material || from.material_name.empty()) return;
+    const std::string name = "the material '" + from.material_name + "' ";
+    if (!from.material)
+      return findings.error(material->source, "link " + link,
+                            name + "is not defined; the colour is grey instead");
+    const Element* own = material->child("color");
+    const std::string* rgba = own ? own->attribute("rgba") : nullptr;
+    if (!rgba) return;
+    Element written_there = Element();
+    written_there.text = *rgba;
+    const std::vector<double> v = written_there.as_numbers(Allowed::any(quantity::kBrightness));
+    const urdf::Color& c = from.material->color;
+    const auto counts = numbers({c.r, c.g, c.b, c.a});
+    if (v.size() == 4 && numbers({static_cast<float>(v[0]), static_cast<float>(v[1]),
+                                  static_cast<float>(v[2]), static_cast<float>(v[3])}) != counts)
+      findings.unsupported(own->source, "link " + link,
+                           name + "has another colour already, " + counts + ", which counts");
+  }
+
   void add_material(Element& visual, const urdf::Visual& from, const GazeboLink& block,
                     const Source& source) {
-    if (!block.material.empty()) {
-      add(add(add(visual, "material", source), "script", source), "name", source, block.material);
+    if (block.material && !value_of(*block.material).empty()) {
+      add(add(add(visual, "material", source), "script", source), "name", source,
+          value_of(*block.material));
       return;
     }
     if (!from.material) return;
@@ -360,6 +399,9 @@ struct Converter {
     }
     for (size_t i = 0; i < from->visual_array.size(); ++i) {
       const Source source = lines("visual", i);
+      const auto seen = written.all("visual");
+      if (!block.colour && !block.material && i < seen.size())
+        name_colour(*seen[i], *from->visual_array[i], from->name);
       Element& visual = add(link, "visual", source);
       visual.attributes.emplace_back("name", i == 0 ? "visual" : "visual_" + std::to_string(i));
       add_pose(visual, from->visual_array[i]->origin, source);
@@ -395,7 +437,7 @@ struct Converter {
     add(axis, "xyz", source, numbers({from->axis.x, from->axis.y, from->axis.z}));
     if (from->limits) {
       Element& limit = add(axis, "limit", source);
-      if (from->type != urdf::Joint::CONTINUOUS) {
+      if (from->type != urdf::Joint::CONTINUOUS || from->limits->lower < from->limits->upper) {
         add(limit, "lower", source, shown(from->limits->lower));
         add(limit, "upper", source, shown(from->limits->upper));
       }
@@ -405,8 +447,8 @@ struct Converter {
     }
     if (from->dynamics) {
       Element& dynamics = add(axis, "dynamics", source);
-      add(dynamics, "damping", source, shown(std::max(from->dynamics->damping, 0.0)));
-      add(dynamics, "friction", source, shown(std::max(from->dynamics->friction, 0.0)));
+      add(dynamics, "damping", source, shown(from->dynamics->damping));
+      add(dynamics, "friction", source, shown(from->dynamics->friction));
     }
     for (const Element* spring : springs[from->name]) {
       Element* dynamics = axis.child("dynamics");

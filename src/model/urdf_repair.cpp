@@ -3,21 +3,30 @@
 #include <algorithm>
 #include <locale>
 #include <map>
+#include <optional>
 #include <set>
 #include <sstream>
 #include <vector>
 
+#include "model/read_context.h"
+
 namespace ruedo::model {
 namespace {
 
-// The numbers separated by blanks, as urdfdom parses them; -1: the text holds something else.
-int count_of_numbers(const std::string& text) {
+// The numbers separated by blanks, as urdfdom parses them; nullopt: the text holds something else.
+std::optional<std::vector<double>> numbers_in(const std::string& text) {
   std::istringstream in(text);
   in.imbue(std::locale::classic());
-  double value = 0.0;
-  int count = 0;
-  while (in >> value) ++count;
-  return in.eof() ? count : -1;
+  std::vector<double> values;
+  for (double value = 0.0; in >> value;) values.push_back(value);
+  if (!in.eof()) return std::nullopt;
+  return values;
+}
+
+// -1: the text holds something else.
+int count_of_numbers(const std::string& text) {
+  const auto values = numbers_in(text);
+  return values ? static_cast<int>(values->size()) : -1;
 }
 
 std::string name_of(const Element& element) {
@@ -38,11 +47,13 @@ class Repair {
 
   void run() {
     leave_out_namesakes();
+    colours(robot_, "robot " + name_of(robot_));
     for (const auto& child : robot_.children) {
       if (child->name != "joint") continue;
       places(*child, "");
       numbers(*child);
       type(*child);
+      below_zero(*child);
     }
     leave_out_joints();
     leave_out_loose_links();
@@ -113,6 +124,59 @@ class Repair {
                       "<" + child->name + ">: " + reason + "; it is left out");
       return true;
     });
+  }
+
+  // urdfdom takes these as they are.
+  void below_zero(Element& joint) {
+    struct Quantity {
+      const char *element, *attribute, *instead, *text;
+    };
+    constexpr Quantity kAll[] = {{"dynamics", "damping", "0", "there is none"},
+                                 {"dynamics", "friction", "0", "there is none"},
+                                 {"limit", "effort", "0", "there is no limit"},
+                                 {"limit", "velocity", "0", "there is no limit"}};
+    for (const Quantity& each : kAll) {
+      Element* of = joint.child(each.element);
+      if (!of) continue;
+      for (auto& [attribute, value] : of->attributes) {
+        const auto number = attribute == each.attribute ? numbers_in(value) : std::nullopt;
+        if (!number || number->size() != 1 || !(number->front() < 0.0)) continue;
+        findings_.error(of->source, "joint " + name_of(joint),
+                        attribute + "=\"" + value + "\" of <" + of->name +
+                            "> is not allowed; allowed is a number of at least 0; " + each.text);
+        value = each.instead;
+      }
+    }
+  }
+
+  // Four numbers from 0 to 1. Of others urdfdom makes no colour, and says nothing.
+  void colours(Element& element, const std::string& where) {
+    for (const auto& child : element.children) {
+      const std::string* name = child->attribute("name");
+      if (child->name != "gazebo")
+        colours(*child, child->name == "link" && name ? "link " + *name : where);
+    }
+    if (element.name != "color") return;
+    for (auto& [attribute, value] : element.attributes) {
+      if (attribute != "rgba") continue;
+      const std::string written =
+          "rgba=\"" + value + "\" of <color> is not four numbers from 0 to 1";
+      std::vector<double> v = numbers_in(value).value_or(std::vector<double>());
+      if (v.size() == 3) {
+        findings_.repaired(element.source, where, written + "; it is opaque");
+        v.push_back(1.0);
+      } else if (v.size() != 4) {
+        findings_.error(element.source, where, written + "; it is grey instead");
+        v = {0.7, 0.7, 0.7, 1.0};
+      }
+      value.clear();
+      for (const double each : v) {
+        const double inside = std::clamp(each, 0.0, 1.0);
+        if (inside != each)
+          findings_.error(element.source, where, written + "; each counts as the nearest of these");
+        value += (value.empty() ? "" : " ") + shown(inside);
+      }
+    }
   }
 
   void type(Element& joint) {

@@ -42,8 +42,8 @@ struct Sweep {
   // limit_rad: for the angles; whole_rad: for their span.
   Sweep(const Element& e, int64_t samples_if_absent, double limit_rad, double whole_rad) {
     const int64_t samples =
-        e.integer("samples", samples_if_absent, Allowed::between(0, static_cast<double>(kMaxRays)));
-    const double resolution = e.number("resolution", 1.0, Allowed::not_negative(quantity::kFactor));
+        e.integer("samples", samples_if_absent, Allowed::between(1, static_cast<double>(kMaxRays)));
+    const double resolution = e.number("resolution", 1.0, Allowed::positive(quantity::kFactor));
     // Many planar lidars have one layer with a resolution of 0.01: at least one ray, as in Gazebo.
     const double rays = std::max(1.0, std::round(static_cast<double>(samples) * resolution));
     if (rays > static_cast<double>(kMaxRays)) {

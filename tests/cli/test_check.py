@@ -75,6 +75,19 @@ FILES = {
         1,
         ("error", 4, "m/s", "; the sensor is left out"),
     ),
+    "a lidar without rays": (
+        in_link(
+            "<sensor name='s' type='lidar'><lidar><scan><horizontal><samples>0</samples></horizontal></scan><range><max>3</max></range></lidar></sensor>"
+        ),
+        {},
+        1,
+        (
+            "error",
+            4,
+            "m/s",
+            "<horizontal/samples>: '0' is not allowed; allowed is a whole number from 1",
+        ),
+    ),
     "a sensor whose own element is wrong": (
         in_link("<sensor name='s' type='imu'><ruedo:phase>x</ruedo:phase></sensor>"),
         {},

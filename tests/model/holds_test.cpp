@@ -55,5 +55,15 @@ TEST(Holds, WhatIsNotThereIsNamed) {
                           "DetachableJoint: the model 'box' has no link 'k'; nothing is held"));
 }
 
+TEST(Holds, OfWhatCannotBeHeldIsNamed) {
+  const auto world = world_of(
+      "<model name='m'><link name='a'/><link name='b'/><link name='c'/><joint name='j' "
+      "type='fixed'><parent>a</parent><child>b</child></joint>" +
+      hold("a", "m", "a") + hold("a", "m", "b") + hold("a", "m", "c") + "</model>");
+  EXPECT_THAT(texts(*world),
+              ElementsAre("DetachableJoint: 'a' and 'a' are one body; nothing is held",
+                          "DetachableJoint: 'a' and 'b' are one body; nothing is held"));
+}
+
 }  // namespace
 }  // namespace ruedo::model

@@ -104,7 +104,9 @@ TEST(Scene, ASavedStateMovesItsModels) {
   EXPECT_EQ(world->models[0].X_WM.translation, Vec3(7, 8, 9));
   EXPECT_NEAR(heading(world->models[0].X_WM.rotation), 1.0, 1e-12);
   EXPECT_EQ(world->models[1].X_WM.translation, Vec3(4, 5, 6));
-  EXPECT_THAT(texts(*world), testing::ElementsAre(testing::HasSubstr("'nan' is not finite")));
+  EXPECT_THAT(texts(*world),
+              testing::ElementsAre(testing::HasSubstr("'nan' is not finite"),
+                                   "the world has no model 'gone'; its state is left out"));
   const auto door = world_of(
       "<model name='door'><link name='frame'/><link name='leaf'><pose>1 0 0 0 0 "
       "0</pose></link></model><state><model name='door'>"

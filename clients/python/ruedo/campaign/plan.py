@@ -26,6 +26,11 @@ from .worlds import WorldFiles
 
 DEFAULT_MEMORY_MB = 4096
 MOST_CASES = 1_000_000
+# Of the table of results, before and after those of parameters.
+COLUMNS = (
+    *("number", "id", "world", "robot", "controller", "seed"),
+    *("status", "passed", "what", "reason", "state_hash"),
+)
 _MOST_INTEGER = 2**63 - 1
 _TEXTS_OF_EXPECT = ("robot", "no_contact", "golden", "tolerances", "ignore")
 _TEXTS_OF_FAULT = ("robot", "kind", "target")
@@ -182,7 +187,26 @@ def check_values(content: dict[str, Any], source: Source) -> None:
                 ("hunt", "obstacles", "size"),
                 f"is {obstacles['size']}; allowed is [from, to], both above 0",
             )
+    _check_columns(content, source)
     _check_count(content, source)
+
+
+def _check_columns(content: dict[str, Any], source: Source) -> None:
+    """Parameters and metrics are columns of the table of results, beside its own."""
+    taken = {*COLUMNS}
+    for name in content.get("parameters", {}):
+        if name in taken:
+            raise source.error(
+                ("parameters", name), f"is a column of the results: {', '.join(COLUMNS)}"
+            )
+    taken |= set(content.get("parameters", {}))
+    for i, metric in enumerate(content.get("metrics", [])):
+        if metric["name"] in taken:
+            raise source.error(
+                ("metrics", i, "name"),
+                f"is {metric['name']!r}, which another column of the results is called",
+            )
+        taken.add(metric["name"])
 
 
 def _check_parameter(name: str, given: Any, source: Source) -> None:
@@ -255,6 +279,16 @@ def _check_numbers(
             continue
         if isinstance(one, bool) or not isinstance(one, (int, float)):
             raise source.error(at, f"is {one!r}; allowed is a number")
+
+
+def _check_expectations(expect: dict[str, Any], source: Source) -> None:
+    """The ranges of `ruedo regress`: beyond them an expectation always holds, or never."""
+    for at, one in _leaves(expect, ("expect",)):
+        if at[-1] in ("radius", "by") and not one > 0:
+            raise source.error(at, f"is {one}; allowed is more than 0")
+        for name, most in (("clearance", 100.0), ("odometry_error", 1e6)):
+            if at[-1] == name and not 0 <= one <= most:
+                raise source.error(at, f"is {one}; allowed is 0 to {most:g}")
 
 
 def _leaves(value: Any, path: tuple[Any, ...]) -> Iterator[tuple[tuple[Any, ...], Any]]:
@@ -350,6 +384,7 @@ class Planner:
         content = self._content
         expect = fill(("expect",), content.get("expect", {}))
         _check_numbers(expect, _TEXTS_OF_EXPECT, ("expect",), self._source)
+        _check_expectations(expect, self._source)
         if isinstance(expect.get("goal"), dict):
             expect["goal"] = [expect["goal"]]
         faults = fill(("faults",), content.get("faults", []))

@@ -111,7 +111,7 @@ _HUNT = _object(
 _EXPECT = _object(
     {
         "robot": {"type": "string"},
-        "goal": {**_GOAL, "type": ["object", "array"], "items": _GOAL},
+        "goal": {**_GOAL, "type": ["object", "array"], "items": _GOAL, "minItems": 1},
         "no_contact": {"type": "boolean"},
         "clearance": _NUMBER_OR_NAME,
         "odometry_error": _NUMBER_OR_NAME,

@@ -1,0 +1,14 @@
+// Drives that are complete, and cannot mean what they say.
+#pragma once
+
+#include "model/read_context.h"
+#include "model/world_model.h"
+
+namespace ruedo::model {
+
+// Reports a drive of a model that stands still or goes its own way, wheels that cannot roll, or
+// that follow something else, too, and elements of a <ruedo:drive> that its steering does not have.
+void name_odd_drive(const Element& model_element, const Model& model, const std::string& where,
+                    Findings& findings);
+
+}  // namespace ruedo::model
