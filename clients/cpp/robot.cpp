@@ -88,7 +88,7 @@ std::string input_channel(Core& core, const std::string& robot, const std::strin
 
 double finite(const char* name, double value) {
   if (!std::isfinite(value)) {
-    throw std::invalid_argument(std::string(name) + " is " + std::to_string(value) +
+    throw std::invalid_argument(std::string(name) + " is " + text_of(value) +
                                 ": it must be a finite number");
   }
   return value;
@@ -96,7 +96,7 @@ double finite(const char* name, double value) {
 
 double limit(const char* name, double value) {
   if (!std::isfinite(value) || value < 0.0) {
-    throw std::invalid_argument(std::string(name) + " is " + std::to_string(value) +
+    throw std::invalid_argument(std::string(name) + " is " + text_of(value) +
                                 ": it must be a finite number >= 0; 0 is the robot's own limit");
   }
   return value;
@@ -296,7 +296,7 @@ Motion Robot::turn_to(double heading, Limits limits) const {
 }
 Motion Robot::arc(double angle, double radius, Limits limits) const {
   if (!(radius > 0.0)) {
-    throw std::invalid_argument("radius is " + std::to_string(radius) +
+    throw std::invalid_argument("radius is " + text_of(radius) +
                                 ": it must be > 0 m; the sign of the angle says left or right");
   }
   return move(*core_, name_, "arc", move_command_t::ARC, angle, radius, limits);

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "core/big_endian.h"
+#include "core/utf8.h"
 
 namespace ruedo::client {
 
@@ -45,16 +46,10 @@ class WireReader {
   // '?' stands for each but line ends and tabs.
   std::string name() {
     std::string text = string();
-    for (size_t i = 0; i < text.size(); ++i)
-      if (is_control(text, i)) throw WireError("a name with control characters");
+    if (!is_one_line(text)) throw WireError("a name with control characters");
     return text;
   }
-  std::string text() {
-    std::string text = string();
-    for (size_t i = 0; i < text.size(); ++i)
-      if (is_control(text, i) && text[i] != '\n' && text[i] != '\t') text[i] = '?';
-    return text;
-  }
+  std::string text() { return for_terminal(string()); }
 
   // An int32_t that counts elements of at least `element_size` bytes each, which must still fit.
   size_t count(size_t element_size) { return fits(int32(), element_size); }
@@ -99,12 +94,6 @@ class WireReader {
     std::vector<Value> values(n);
     for (size_t i = 0; i < n; ++i) values[i] = read();
     return values;
-  }
-  static bool is_control(const std::string& text, size_t i) {  // those of UTF-8, too
-    const auto byte = static_cast<unsigned char>(text[i]);
-    return byte < 0x20 || byte == 0x7f ||
-           (byte >= 0x80 && byte < 0xa0 && i > 0 &&
-            static_cast<unsigned char>(text[i - 1]) == 0xc2);
   }
   const uint8_t* take(size_t n) {
     if (n > static_cast<size_t>(end_ - at_)) throw WireError("it is too short");

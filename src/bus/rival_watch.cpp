@@ -6,6 +6,7 @@
 
 #include "core/big_endian.h"
 #include "core/channel_names.h"
+#include "core/utf8.h"
 #include "ruedo/decode.h"
 #include "ruedo/world_info_t.hpp"
 
@@ -63,10 +64,9 @@ void RivalWatch::heard(const uint8_t* data, size_t size) {
   world_info_t info;
   if (decode_checked(data, size, info) != DecodeFault::none) return;
   rivals_.push_back(id);
-  std::string world = info.world.substr(0, 100);
-  std::replace_if(world.begin(), world.end(), [](unsigned char c) { return c < ' '; }, '?');
-  say_("another server is on this channel: run " + std::to_string(id) + ", world " + world +
-       "; this one is run " + std::to_string(run_id_) +
+  say_("another server is on this channel: run " + std::to_string(id) + ", world " +
+       in_one_line(for_terminal(shortened(info.world, 100))) + "; this one is run " +
+       std::to_string(run_id_) +
        ". Their messages mix: give one of them another --lcm port (this is said once)");
 }
 

@@ -47,6 +47,8 @@ ClientProcess::ClientProcess(const std::string& command, const std::vector<std::
     ::execle("/bin/sh", "sh", "-c", command.c_str(), nullptr, pointers.data());
     ::_exit(127);
   }
+  ::setpgid(pid_, pid_);  // whoever of the two comes first
+  leftover_.emplace(pid_);
   waiter_ = std::thread([this, ended = std::move(ended)] {
     siginfo_t info;
     while (::waitid(P_PID, static_cast<id_t>(pid_), &info, WEXITED | WNOWAIT) != 0 &&
@@ -70,6 +72,7 @@ bool ClientProcess::end() {
          SIGKILL);  // and the processes that it left behind; its own id is not reused before it is
                     // waited for
   waiter_.join();
+  leftover_.reset();
   ::waitpid(pid_, &status_, 0);
   pid_ = -1;
   return by_itself;

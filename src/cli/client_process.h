@@ -11,6 +11,8 @@
 
 #include <sys/types.h>
 
+#include "core/leftovers.h"
+
 namespace ruedo::cli {
 
 class ClientProcess {
@@ -37,6 +39,7 @@ class ClientProcess {
   pid_t pid_ = -1;
   std::atomic<bool> over_{false};
   int status_ = 0;
+  std::optional<LeftoverGroup> leftover_;
   std::thread waiter_;
 };
 

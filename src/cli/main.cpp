@@ -38,13 +38,13 @@ namespace {
 
 using namespace ruedo::cli;
 
-// What is logged, on one line: it may hold words of others, from the bus.
+// What is logged, on one line of bounded length: it may hold words of others, from the bus.
 class LoggedText : public spdlog::custom_flag_formatter {
  public:
   void format(const spdlog::details::log_msg& message, const std::tm&,
               spdlog::memory_buf_t& line) override {
-    const std::string text =
-        ruedo::in_one_line(ruedo::for_terminal({message.payload.data(), message.payload.size()}));
+    const std::string text = ruedo::in_one_line(ruedo::for_terminal(
+        ruedo::shortened({message.payload.data(), message.payload.size()}, ruedo::kLongestSaid)));
     line.append(text.data(), text.data() + text.size());
   }
   std::unique_ptr<spdlog::custom_flag_formatter> clone() const override {

@@ -15,6 +15,7 @@
 #include "cli/extensions.h"
 #include "cli/isolation.h"
 #include "cli/range.h"
+#include "cli/signal_thread.h"
 #include "cli/view.h"
 #include "core/json.h"
 #include "core/output_file.h"
@@ -68,7 +69,7 @@ run::RunOptions server_options(const RegressArguments& arguments) {
 // The run. What went wrong besides expectations, or "".
 std::string run(const RegressArguments& arguments,
                 const std::shared_ptr<const model::WorldModel>& world, bool isolated,
-                judge::Judge& judge) {
+                judge::Judge& judge, SignalThread& signals) {
   const bus::ServerBus place =
       bus::open_server_bus(isolated ? "auto" : "auto-tcp", world->name,
                            [](const std::string& line) { spdlog::warn(line); });
@@ -85,6 +86,7 @@ std::string run(const RegressArguments& arguments,
         [&server] { server.stop(); });
   }
   std::string fault;
+  const SignalThread::Serving serving(signals, server);
   try {
     server.run();
   } catch (const run::LeaseEnded& ended) {
@@ -194,6 +196,7 @@ void write_verdict(const std::string& path, const std::vector<std::string>& faul
 
 int regress(RegressArguments arguments) {
   const bool isolated = !arguments.shared_network && isolate();
+  SignalThread signals;  // after isolate(), which wants to be alone
   judge::Expectations& expected = arguments.expected;
   for (const std::string& text : arguments.goals) expected.goals.push_back(judge::parse_goal(text));
   if (arguments.clearance >= 0.0) expected.clearance = arguments.clearance;
@@ -207,8 +210,13 @@ int regress(RegressArguments arguments) {
   print_findings(world->findings);
   judge::Judge judge(*world, expected);
   std::vector<std::string> failures;
-  if (std::string fault = run(arguments, world, isolated, judge); !fault.empty())
+  if (std::string fault = run(arguments, world, isolated, judge, signals); !fault.empty())
     failures.push_back(fault);
+  if (const int signal = signals.told()) {
+    fmt::print(stderr, "ruedo: the run was ended by a signal; its log up to there is {}\n",
+               arguments.record);
+    return 128 + signal;
+  }
   const size_t begin_of_judged = failures.size();
   for (const judge::Failure& failure : judged(judge, arguments.record))
     failures.push_back(judge::to_line(failure));

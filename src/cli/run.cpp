@@ -25,8 +25,8 @@
 #include "cli/range.h"
 #include "cli/run_command.h"
 #include "cli/sandboxed.h"
+#include "cli/signal_thread.h"
 #include "cli/view.h"
-#include "core/leftovers.h"
 #include "core/utf8.h"
 #include "engine/thread_limit.h"
 #include "log/ring.h"
@@ -36,50 +36,6 @@
 
 namespace ruedo::cli {
 namespace {
-
-// Handles SIGINT, SIGTERM, and SIGHUP unless it is ignored (nohup), in a thread of its own: a
-// signal handler may do next to nothing. Make it before any other thread, so that all inherit the
-// blocked signals. A closed pipe is reported by write(), not by a signal.
-class SignalThread {
- public:
-  SignalThread() {
-    sigemptyset(&signals_);
-    sigaddset(&signals_, SIGINT);
-    sigaddset(&signals_, SIGTERM);
-    struct sigaction hang_up{};
-    if (sigaction(SIGHUP, nullptr, &hang_up) == 0 && hang_up.sa_handler != SIG_IGN)
-      sigaddset(&signals_, SIGHUP);
-    std::signal(SIGPIPE, SIG_IGN);
-    pthread_sigmask(SIG_BLOCK, &signals_, nullptr);
-    thread_ = std::thread([this] { wait(); });
-  }
-  ~SignalThread() {
-    done_ = true;
-    pthread_kill(thread_.native_handle(), SIGTERM);
-    thread_.join();
-  }
-  void serve(run::Run* server) { server_ = server; }
-
- private:
-  void wait() {
-    for (int signal = 0; sigwait(&signals_, &signal) == 0;) {
-      if (done_) return;
-      run::Run* server = server_;
-      if (!server || asked_) {  // there is no run to end cleanly, or it does not end
-        remove_leftovers();
-        std::_Exit(128 + signal);
-      }
-      asked_ = true;
-      server->stop();
-    }
-  }
-
-  sigset_t signals_;
-  std::atomic<bool> done_{false};
-  std::atomic<run::Run*> server_{nullptr};
-  bool asked_ = false;
-  std::thread thread_;
-};
 
 // Ends the run, as SIGTERM would, when standard input ends: the client that started this server
 // holds the other end of the pipe, and the kernel closes it however that client ends. The thread
@@ -238,6 +194,7 @@ int run_world(const RunArguments& arguments) {
     enter_sandbox(model::world_file(arguments.world.world),
                   {arguments.record, arguments.snapshots, socket_of(arguments.lcm)});
   SignalThread signals;
+  std::signal(SIGPIPE, SIG_IGN);  // a closed pipe is reported by write()
   if (arguments.watch_stdin) watch_stdin();
   const engine::ThreadLimit limit(arguments.threads);
   if (arguments.strict) {
@@ -278,16 +235,14 @@ int run_world(const RunArguments& arguments) {
   end_progress_line();
   StatusLine status(arguments.quiet);
   server.on_status([&](const run::Status& now) { status.draw(now); });
-  signals.serve(&server);
+  const SignalThread::Serving serving(signals, server);
   if (node) node->wait_for_peers();
   try {
     server.run();
   } catch (const run::LeaseEnded& ended) {
     fmt::print(stderr, "ruedo: {}\n", ended.what());
-    signals.serve(nullptr);
     return kCheckFailed;
   }
-  signals.serve(nullptr);
   return kGood;
 }
 

@@ -69,20 +69,31 @@ class RawTerminal {
   RawTerminal() {
     if (isatty(STDIN_FILENO) == 0)
       throw EnvironmentError("teleop needs a terminal to read keys from");
-    tcgetattr(STDIN_FILENO, &before_);
-    enter();
   }
   ~RawTerminal() { leave(); }
 
+  // Whether this process is in the foreground. In the background the terminal is another's, and the
+  // kernel stops whoever changes it.
+  static bool is_ours() {
+    const pid_t group = tcgetpgrp(STDIN_FILENO);
+    return group < 0 || group == getpgrp();  // < 0: it is no controlling terminal
+  }
+  // Again, too, where somebody else has changed it meanwhile, as a shell does.
   void enter() {
+    if (!is_ours()) return;
+    if (!std::exchange(entered_, true)) tcgetattr(STDIN_FILENO, &before_);
     termios raw = before_;
     raw.c_lflag &= ~static_cast<tcflag_t>(ICANON | ECHO);
     tcsetattr(STDIN_FILENO, TCSANOW, &raw);
   }
-  void leave() { tcsetattr(STDIN_FILENO, TCSANOW, &before_); }
+  void leave() {
+    if (std::exchange(entered_, false) && is_ours()) tcsetattr(STDIN_FILENO, TCSANOW, &before_);
+  }
+  bool entered() const { return entered_; }
 
  private:
   termios before_{};
+  bool entered_ = false;
 };
 
 // Keys out of what a terminal sends, in whatever pieces that comes. An arrow key is its letter's.
@@ -184,13 +195,16 @@ int teleop(const TeleopArguments& arguments) {
   fmt::print("w s or up down: speed   a d or left right: turn   space: stop   q: quit\n");
   Keys keys(signals);
   Driver driver(arguments.robot, bus);
-  for (int key = kNone; key != 'q' && key != kEnd; key = keys.next(kRepeat_ms)) {
-    if (key == kSuspend) {
+  const auto nobody_reads = [] { return std::ferror(stdout) != 0; };
+  for (int key = kContinue; key != 'q' && key != kEnd && !nobody_reads();
+       key = keys.next(kRepeat_ms)) {
+    if (key == kSuspend || (key == kContinue && !RawTerminal::is_ours())) {
       driver.stop();
       terminal.leave();
       signals.suspend();
+      continue;  // with the signal that ended it: it goes on, or is to end
     }
-    if (key == kSuspend || key == kContinue) terminal.enter();
+    if (key == kContinue || !terminal.entered()) terminal.enter();
     driver.press(key);
   }
   fmt::print("\n");

@@ -89,24 +89,24 @@ std::string words_of(const std::string& fault, const std::string& target, double
 }
 
 // Names may come from messages that are refused: of any length.
-std::string shortened(const std::string& text) { return text.substr(0, Events::kLongestText); }
+std::string fit(const std::string& text) { return shortened(text, Events::kLongestText); }
 
 // The name in a request's body; "" if there is none.
 std::string name_in(int32_t kind, std::span<const uint8_t> body) {
   if (kind == request_t::SPAWN) {
     const auto spawn = decoded<spawn_request_t>(body);
-    return !spawn ? "" : shortened(spawn->name.empty() ? spawn->model : spawn->name);
+    return !spawn ? "" : fit(spawn->name.empty() ? spawn->model : spawn->name);
   }
   if (kind == request_t::SET_POSE) {
     const auto pose = decoded<set_pose_request_t>(body);
-    return pose ? shortened(pose->name) : "";
+    return pose ? fit(pose->name) : "";
   }
   if (kind == request_t::SET_TWIST) {
     const auto twist = decoded<set_twist_request_t>(body);
-    return twist ? shortened(twist->name) : "";
+    return twist ? fit(twist->name) : "";
   }
   const auto name = decoded<name_request_t>(body);
-  return name ? shortened(name->name) : "";
+  return name ? fit(name->name) : "";
 }
 
 // The effect of a request; "" if it changes nothing.
@@ -141,7 +141,7 @@ bool Events::tells(int64_t fingerprint) {
 
 void Events::add(const std::string& kind, const std::string& robot, const std::string& text) {
   if (list_.size() < kMost)
-    list_.push_back({now_s_, kind, printable(shortened(robot)), printable(shortened(text))});
+    list_.push_back({now_s_, kind, printable(fit(robot)), printable(fit(text))});
 }
 
 void Events::reset() {

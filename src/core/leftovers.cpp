@@ -1,5 +1,6 @@
 #include "core/leftovers.h"
 
+#include <csignal>
 #include <filesystem>
 #include <mutex>
 #include <set>
@@ -15,6 +16,11 @@ std::multiset<std::string>& marked() {
   return *paths;
 }
 
+std::set<pid_t>& groups() {
+  static auto* const ids = new std::set<pid_t>;
+  return *ids;
+}
+
 }  // namespace
 
 Leftover::Leftover(std::string path) : path_(std::move(path)) {
@@ -27,8 +33,19 @@ Leftover::~Leftover() {
   marked().erase(marked().find(path_));
 }
 
+LeftoverGroup::LeftoverGroup(pid_t group) : group_(group) {
+  const std::lock_guard lock(mutex);
+  groups().insert(group_);
+}
+
+LeftoverGroup::~LeftoverGroup() {
+  const std::lock_guard lock(mutex);
+  groups().erase(group_);
+}
+
 void remove_leftovers() {
   const std::lock_guard lock(mutex);
+  for (const pid_t group : groups()) ::kill(-group, SIGKILL);
   std::error_code error;
   for (const std::string& path : marked()) std::filesystem::remove_all(path, error);
 }

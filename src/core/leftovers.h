@@ -1,8 +1,10 @@
-// Files that a process must not leave behind, however it is ended: a socket's name, the folder of a
-// child process.
+// What a process must not leave behind, however it is ended: a socket's name, the folder of a child
+// process, the processes that a shell has started.
 #pragma once
 
 #include <string>
+
+#include <sys/types.h>
 
 namespace ruedo {
 
@@ -16,6 +18,18 @@ class Leftover {
 
  private:
   const std::string path_;
+};
+
+// Likewise for a group of processes, which are killed.
+class LeftoverGroup {
+ public:
+  explicit LeftoverGroup(pid_t group);
+  ~LeftoverGroup();
+  LeftoverGroup(const LeftoverGroup&) = delete;
+  LeftoverGroup& operator=(const LeftoverGroup&) = delete;
+
+ private:
+  const pid_t group_;
 };
 
 // Removes what is marked, before the process ends at once. Not in a signal handler.

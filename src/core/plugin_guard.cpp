@@ -48,8 +48,7 @@ class Call {
 
 // One line of bounded length.
 std::string line(const char* said) {
-  const std::string text =
-      in_one_line(for_terminal(std::string_view(said).substr(0, kLongestText)));
+  const std::string text = in_one_line(for_terminal(shortened(said, kLongestText)));
   return text.empty() ? "threw an error without a text" : text;
 }
 

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cstdint>
+#include <iterator>
 
 namespace ruedo {
 namespace {
@@ -27,13 +28,28 @@ size_t character_size(std::string_view text) {
   return fits && follows(2) && follows(3) ? 4 : 0;
 }
 
-// Whether the character is one of the codes U+0000 to U+001F or U+007F to U+009F, but no line end
-// or tab.
+// Codes from first to last that a terminal obeys: Unicode's control characters, its line ends, and
+// the marks that change the order of what is beside them.
+struct Codes {
+  uint32_t first, last;
+};
+constexpr Codes kObeyed[] = {{0x0000, 0x001f}, {0x007f, 0x009f}, {0x061c, 0x061c},
+                             {0x200e, 0x200f}, {0x2028, 0x202e}, {0x2066, 0x2069}};
+
+// Of a well-formed character.
+uint32_t code_of(std::string_view character) {
+  const auto first = static_cast<uint8_t>(character[0]);
+  uint32_t code = character.size() == 1 ? first : first & (0x7fu >> character.size());
+  for (const char c : character.substr(1)) code = code << 6 | (static_cast<uint8_t>(c) & 0x3fu);
+  return code;
+}
+
+// But for line ends and tabs.
 bool is_control(std::string_view character) {
-  const auto byte = [&](size_t i) { return static_cast<uint8_t>(character[i]); };
-  if (character.size() == 2) return byte(0) == 0xc2 && byte(1) < 0xa0;
-  return character.size() == 1 && (byte(0) < 0x20 || byte(0) == 0x7f) && byte(0) != '\n' &&
-         byte(0) != '\t';
+  const uint32_t code = code_of(character);
+  return code != '\n' && code != '\t' &&
+         std::any_of(std::begin(kObeyed), std::end(kObeyed),
+                     [=](const Codes& codes) { return codes.first <= code && code <= codes.last; });
 }
 
 std::string cleaned(std::string_view text, bool of_controls) {
@@ -61,6 +77,13 @@ std::string in_one_line(std::string text) {
   std::replace_if(
       text.begin(), text.end(), [](char c) { return c == '\n' || c == '\r' || c == '\t'; }, ' ');
   return text;
+}
+
+std::string shortened(std::string_view text, size_t longest) {
+  if (text.size() <= longest) return std::string(text);
+  size_t end = longest;
+  while (end > 0 && (static_cast<uint8_t>(text[end]) & 0xc0) == 0x80) --end;
+  return std::string(text.substr(0, end)) + "...";
 }
 
 bool is_one_line(std::string_view text) {

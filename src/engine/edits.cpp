@@ -139,7 +139,7 @@ Outcome check_spawn(const spawn_request_t& request) {
     return bad(fault);
   if (request.name.empty()) return {};
   const std::string fault = fault_of_name(request.name);
-  return fault.empty() ? Outcome{} : bad("the name '" + request.name.substr(0, 80) + "' " + fault);
+  return fault.empty() ? Outcome{} : bad("the name '" + shortened(request.name, 80) + "' " + fault);
 }
 
 Outcome spawn(const spawn_request_t& request, const model::LoadedModel& loaded, int64_t step,

@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include <fmt/format.h>
+
 #include "core/whole.h"
 #include "robot/surroundings.h"
 
@@ -44,7 +46,7 @@ Mover::Path Mover::read(const Element& path) {
   result.loop = path.boolean(ours ? "ruedo:loop" : "loop", true);
   const auto add = [&waypoints](const Element& element, double time_s, const Pose& pose) {
     if (time_s < 0.0 || time_s > quantity::kTime.most)
-      element.fail("the time " + std::to_string(time_s) + " is not within 0 and 1e9 s");
+      element.fail(fmt::format("the time {} is not within 0 and 1e9 s", time_s));
     const auto time = microseconds(time_s);
     if (!waypoints.empty() && time <= waypoints.back().time)
       element.fail("its time is not after the one before");

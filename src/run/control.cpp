@@ -14,8 +14,7 @@ namespace {
 
 // It may contain names that a client made up: clients show them, and replies are kept.
 std::string fit_text(const std::string& text) {
-  if (text.size() <= Control::kLongestText) return for_terminal(text);
-  return for_terminal(text.substr(0, Control::kLongestText)) + "...";
+  return for_terminal(shortened(text, kLongestSaid));
 }
 
 }  // namespace

@@ -32,8 +32,7 @@ class Control {
   static constexpr size_t kMostHeld = 8;  // requests of one session that wait for the first state
   static constexpr size_t kMostSteppings = 16;  // STEPs of one session that are not answered yet
   static constexpr size_t kMostUnanswered =
-      32;                                       // requests of one session that are not answered yet
-  static constexpr size_t kLongestText = 1000;  // bytes of a reply's text
+      32;  // requests of one session that are not answered yet
 
   // The run that it serves.
   struct Host {

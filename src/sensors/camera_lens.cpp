@@ -10,6 +10,8 @@
 
 #include <opencv2/imgproc.hpp>
 
+#include <fmt/format.h>
+
 #include "core/message_size.h"
 #include "core/whole.h"
 #include "ruedo/math.h"
@@ -40,8 +42,7 @@ Lens::Lens(const Element& camera) {
   if (far_m <= near_m) {
     const Element* clip = camera.child("clip");
     (clip ? clip : &camera)
-        ->fail("far (" + std::to_string(far_m) + " m) has to be beyond near (" +
-               std::to_string(near_m) + " m)");
+        ->fail(fmt::format("far ({} m) has to be beyond near ({} m)", far_m, near_m));
   }
   const scene::View pinhole = scene::View::pinhole({}, width, height, hfov);
   const Allowed focal = Allowed::positive(quantity::kPixels);

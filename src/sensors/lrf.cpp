@@ -14,6 +14,8 @@
 #include <tuple>
 #include <vector>
 
+#include <fmt/format.h>
+
 #include "core/sincos.h"
 #include "core/whole.h"
 #include "ruedo/device_info_t.hpp"
@@ -47,15 +49,13 @@ struct Sweep {
     // Many planar lidars have one layer with a resolution of 0.01: at least one ray, as in Gazebo.
     const double rays = std::max(1.0, std::round(static_cast<double>(samples) * resolution));
     if (rays > static_cast<double>(kMaxRays)) {
-      e.fail("<samples> times <resolution> is " + std::to_string(rays) + " rays; allowed: 1 to " +
-             std::to_string(kMaxRays));
+      e.fail(
+          fmt::format("<samples> times <resolution> is {} rays; allowed: 1 to {}", rays, kMaxRays));
     }
     count = whole(rays);
     const double low = e.number("min_angle", 0.0, Allowed::between(-limit_rad, limit_rad));
     const double high = e.number("max_angle", 0.0, Allowed::between(-limit_rad, limit_rad));
-    if (high < low)
-      e.fail("<max_angle> " + std::to_string(high) + " is below <min_angle> " +
-             std::to_string(low));
+    if (high < low) e.fail(fmt::format("<max_angle> {} is below <min_angle> {}", high, low));
     constexpr double kOverlap_rad = 0.1;  // -3.15 to 3.15 still counts as a full turn
     if (high - low > whole_rad + kOverlap_rad)
       e.fail("from <min_angle> to <max_angle> is more than a full turn");
@@ -198,8 +198,7 @@ class Lrf : public SensorOf<Lrf> {
       laser.fail("needs <range> with <max>, the largest range in m");
     min_ = range->number("min", 0.0, Allowed::not_negative(quantity::kRange));
     max_ = range->number("max", 0.0, Allowed::positive(quantity::kRange));
-    if (max_ <= min_)
-      range->fail("<max> " + std::to_string(max_) + " must be above <min> " + std::to_string(min_));
+    if (max_ <= min_) range->fail(fmt::format("<max> {} must be above <min> {}", max_, min_));
     resolution_ = range->number("resolution", 0.0, Allowed::not_negative(quantity::kRange));
   }
 

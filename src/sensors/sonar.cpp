@@ -13,6 +13,8 @@
 #include <string>
 #include <vector>
 
+#include <fmt/format.h>
+
 #include "core/whole.h"
 #include "ruedo/device_info_t.hpp"
 #include "ruedo/math.h"
@@ -88,8 +90,7 @@ class Sonar : public SensorOf<Sonar> {
     if (!sonar->has("max")) sonar->fail("needs <max>, the largest range in m");
     min_ = sonar->number("min", 0.0, Allowed::not_negative(quantity::kRange));
     max_ = sonar->number("max", 1.0, Allowed::positive(quantity::kRange));
-    if (max_ <= min_)
-      sonar->fail("<max> " + std::to_string(max_) + " must be above <min> " + std::to_string(min_));
+    if (max_ <= min_) sonar->fail(fmt::format("<max> {} must be above <min> {}", max_, min_));
     if (sonar->choice("geometry", "cone", {"cone", "sphere"}) == "sphere" && setup.findings) {
       setup.findings->unsupported(sonar->source, "sensor " + setup.device + "/sonar/geometry",
                                   "a sphere is not supported; a cone instead");

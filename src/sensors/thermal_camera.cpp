@@ -7,6 +7,8 @@
 // <max_temp>, rounded; the camera's <noise> is in K.
 #include <algorithm>
 
+#include <fmt/format.h>
+
 #include "core/whole.h"
 #include "model/plugins.h"
 #include "ruedo/image_t.hpp"
@@ -88,8 +90,10 @@ class ThermalCamera : public Sensor {
     highest_ =
         std::min(plugin->number("max_temp", most, Allowed::positive(quantity::kRange)), most);
     if (highest_ <= lowest_)
-      plugin->fail("max_temp has to be above min_temp, and min_temp below " + std::to_string(most) +
-                   " K, which is the most that the format holds");
+      plugin->fail(
+          fmt::format("max_temp has to be above min_temp, and min_temp below {} K, which is "
+                      "the most that the format holds",
+                      most));
   }
 
   int counts(double kelvin) const {

@@ -12,6 +12,8 @@
 
 #include <opencv2/imgproc.hpp>
 
+#include <fmt/format.h>
+
 #include "core/message_size.h"
 #include "ruedo/image_t.hpp"
 #include "ruedo/math.h"
@@ -51,8 +53,10 @@ class Projection {
     const bool scaled = camera.boolean("lens/scale_to_hfov", true);
     const double edge = hfov / 2;
     if (!grows_to(std::min(cutoff_, std::max(edge, 1e-3))))
-      camera.fail("the projection of its <lens> does not grow up to " + std::to_string(edge) +
-                  " rad from the axis: <horizontal_fov> is too wide for it");
+      camera.fail(
+          fmt::format("the projection of its <lens> does not grow up to {} rad from the "
+                      "axis: <horizontal_fov> is too wide for it",
+                      edge));
     while (!grows_to(cutoff_)) cutoff_ -= 1e-3;
     if (scaled) f_ = 1.0 / (radius(edge) / f_);  // half the width is 1
   }

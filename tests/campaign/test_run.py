@@ -133,6 +133,31 @@ def test_a_second_driver_is_refused(whole):
         )
 
 
+@pytest.mark.parametrize("told", ["INT", "TERM", "HUP"])
+def test_who_ends_a_campaign_leaves_nothing_behind(told, folder):
+    """Neither processes, of its controllers' either, nor folders; what was run is kept."""
+    temporary = folder / "temporary"
+    temporary.mkdir()
+    command = '{name: ahead, command: "sleep 1000 & echo $! > child.$$; wait"}'
+    (folder / "c.yaml").write_text(
+        CAMPAIGN.replace('{name: ahead, python: "controller.py:ahead"}', command)
+    )
+    driver = subprocess.Popen(
+        [RUEDO, "campaign", "run", "c.yaml", "--workers", "2"],
+        cwd=folder,
+        stderr=subprocess.PIPE,
+        text=True,
+        env={**os.environ, "TMPDIR": str(temporary)},
+    )
+    wait_for(lambda: sum(f.stat().st_size > 0 for f in folder.glob("child.*")) == 2)
+    begun = [int(file.read_text()) for file in folder.glob("child.*")] + children(driver.pid)
+    driver.send_signal(getattr(signal, f"SIG{told}"))
+    said = driver.communicate(timeout=PATIENCE)[1]
+    assert driver.returncode == 4 and "ruedo: interrupted; what was run is kept" in said
+    assert not [path.name for path in temporary.iterdir()]
+    assert not [process for process in begun if os.path.exists(f"/proc/{process}")]
+
+
 def test_a_full_disk_is_one_line_and_loses_nothing(whole):
     folder, expected = whole
     (folder / "full").mkdir()

@@ -89,6 +89,31 @@ def test_a_closed_terminal_leaves_a_whole_log(tmp_path):
     verified(log, world)
 
 
+@pytest.mark.parametrize("told", ["INT", "TERM", "HUP"])
+def test_a_regression_that_is_ended_leaves_a_whole_log_and_no_process(told, tmp_path):
+    """What the client's shell has started is ended, too."""
+    log, child, said = (tmp_path / name for name in ("run.lcm", "child", "said"))
+    client = f"sleep 1000 & echo $! > {child}; wait"
+    with (
+        said.open("w") as errors,
+        subprocess.Popen(
+            [RUEDO, "regress", "arena", "--disable", "p3at/camera", "--client", client]
+            + ["--duration", "100000", "--rate", "1", "--record", log],
+            stderr=errors,
+        ) as regress,
+    ):
+        until(lambda: child.exists() and child.read_text().endswith("\n"), regress)
+        until(lambda: log.exists() and log.stat().st_size > 0, regress)
+        regress.send_signal(getattr(signal, f"SIG{told}"))
+        regress.wait(PATIENCE)
+    number = getattr(signal, f"SIG{told}")
+    assert regress.returncode == 128 + number and "ended by a signal" in said.read_text()
+    state = Path(f"/proc/{child.read_text().strip()}/stat")  # at most a zombie
+    assert not state.exists() or state.read_text().rpartition(")")[2].split()[0] == "Z"
+    verified = subprocess.run([RUEDO, "verify", log], capture_output=True, text=True)
+    assert verified.returncode == 0 and "the end of the run is not in it" not in verified.stdout
+
+
 def test_nohup_outlives_its_terminal(tmp_path):
     world, said = tmp_path / "w.sdf", tmp_path / "said"
     world.write_text(EMPTY)

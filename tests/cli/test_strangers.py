@@ -132,7 +132,7 @@ def test_a_value_with_line_ends_writes_no_line_of_ours(command, tmp_path):
     assert result.returncode == 3 and len(lines) == 1 and "'x ruedo: error" in lines[0], result
 
 
-def test_escapes_of_a_request_stay_out_of_the_terminal(tmp_path):
+def test_escapes_and_megabytes_of_a_request_stay_out_of_the_terminal(tmp_path):
     world, bus, said = (tmp_path / name for name in ("w.sdf", "bus", "said"))
     world.write_text(WORLD)
     command = [RUEDO, "run", world, "--quiet", "--lcm", f"unix://{bus}"]
@@ -140,15 +140,17 @@ def test_escapes_of_a_request_stay_out_of_the_terminal(tmp_path):
         try:
             until(bus.exists)
             with ruedo.connect(f"unix://{bus}") as sim:
-                box = "<sdf version='1.9'><model name='b'><link name='l'><collision name='c'><geometry><mesh><uri>nowhere\x1b[2J\x9b</uri></mesh></geometry></collision></link></model></sdf>"
+                box = "<sdf version='1.9'><model name='b'><link name='l'><collision name='c'><geometry><mesh><uri>nowhere\x1b[2J\x9b\u202e</uri></mesh></geometry></collision></link></model></sdf>"
                 sim.spawn(text=box, name="b", x=2, y=2)
                 driver = sim.robot(sim.spawn("p3at", x=5, y=5))
-                driver.inject("x\nruedo: error: forged")
+                driver.inject("x\nruedo: error: forged" + 50_000 * "x")
             until(lambda: "nowhere" in said.read_text() and "forged" in said.read_text())
         finally:
             server.terminate()
-    assert "\x1b" not in said.read_text() and "\x9b" not in said.read_text()
-    assert "\nruedo: error: forged" not in said.read_text()
+    text = said.read_text()
+    assert not any(obeyed in text for obeyed in ("\x1b", "\x9b", "\u202e"))
+    assert "\nruedo: error: forged" not in text
+    assert max(map(len, text.splitlines())) < 1100
 
 
 def tiff(width, height):

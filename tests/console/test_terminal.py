@@ -2,6 +2,7 @@
 published.
 """
 
+import fcntl
 import os
 import pty
 import re
@@ -13,6 +14,7 @@ import subprocess
 import sys
 import termios
 import threading
+import time
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -200,15 +202,16 @@ def test_play_says_what_nobody_took(tmp_path):
 
 
 class Teleop:
-    """Started in a terminal of its own, with the commands that it publishes."""
+    """Started in a terminal of its own, by a shell's script where one is given."""
 
-    def __init__(self, url=URL):
+    def __init__(self, url=URL, script=None, stdout=None):
         self.terminal, self.child = pty.openpty()
         self.before = termios.tcgetattr(self.child)
+        shell = ["setsid", "--ctty", "--wait", "bash", "-c", script] if script else []
         self.process = subprocess.Popen(
-            [RUEDO, "teleop", "p3at", "--lcm", url],
+            [*shell, RUEDO, "teleop", "p3at", "--lcm", url],
             stdin=self.child,
-            stdout=self.child,
+            stdout=stdout or self.child,
             stderr=self.child,
             process_group=0,  # with a parent outside it, as under a shell: it can be suspended
         )
@@ -231,6 +234,23 @@ class Teleop:
     def read(self):
         if select.select([self.terminal], [], [], 0.05)[0]:
             self.said += os.read(self.terminal, 4096).decode()
+
+    def until(self, words):
+        deadline = time.monotonic() + PATIENCE
+        while words not in self.said:
+            assert time.monotonic() < deadline, self.said
+            self.read()
+
+    def until_job(self, process, state):
+        """state: as /proc names it."""
+        deadline, now = time.monotonic() + PATIENCE, ""
+        while now != state:
+            assert time.monotonic() < deadline, now
+            self.read()
+            try:
+                now = Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()[0]
+            except OSError:
+                now = "ended"
 
     def is_raw(self):
         return not termios.tcgetattr(self.child)[3] & (termios.ICANON | termios.ECHO)
@@ -338,6 +358,54 @@ def test_teleop_is_suspended():
             teleop.process.send_signal(suspended)
             os.waitid(os.P_PID, teleop.process.pid, os.WSTOPPED)
             termios.tcsetattr(teleop.child, termios.TCSANOW, teleop.before)  # as a shell does
+
+
+def test_teleop_is_suspended_by_its_key_and_goes_on_in_a_window_of_another_size():
+    script = 'set -m; "$0" "$@"; echo suspended; read; fg; echo "ended $?"'
+    commands = Commands()
+    with Teleop(script=script) as teleop:
+        teleop.press(b"w")
+        commands.until(teleop, (0.1, 0))
+        teleop.press(b"\x1a")
+        teleop.until("suspended")
+        commands.until(teleop, (0, 0))
+        assert teleop.is_as_before()
+        os.write(teleop.terminal, b"\n")
+        teleop.press(b"w")
+        commands.until(teleop, (0.1, 0))
+        fcntl.ioctl(teleop.terminal, termios.TIOCSWINSZ, struct.pack("4H", 40, 100, 0, 0))
+        teleop.press(b"w")
+        commands.until(teleop, (0.2, 0))
+        teleop.press(b"q")
+        teleop.until("ended 0")
+        assert teleop.process.wait(PATIENCE) == 0 and teleop.is_as_before()
+
+
+@pytest.mark.parametrize("begin", ['"$0" "$@" &', '"$0" "$@";', '"$0" "$@"; bg;'])
+def test_teleop_in_the_background_leaves_the_terminal_alone_and_ends_when_it_is_told(begin):
+    """As `kill %1` tells it: TERM and then CONT."""
+    script = f"set -m; {begin} job=$(jobs -p); echo job $job.; read; wait $job; echo ended $?"
+    with Teleop(script=script) as teleop:
+        if not begin.endswith("&"):
+            teleop.press(b"w\x1a")
+        teleop.until(".\r\n")
+        job = int(re.search(r"job (\d+)", teleop.said)[1])
+        teleop.until_job(job, "T")
+        assert teleop.is_as_before()
+        for told in (signal.SIGTERM, signal.SIGCONT):
+            os.kill(job, told)
+        teleop.until_job(job, "ended")
+        os.write(teleop.terminal, b"\n")
+        teleop.until("ended 0")
+        assert teleop.process.wait(PATIENCE) == 0 and teleop.is_as_before()
+
+
+def test_teleop_ends_when_nobody_reads_what_it_says():
+    reads, writes = os.pipe()
+    os.close(reads)
+    with Teleop(stdout=writes) as teleop:
+        assert teleop.process.wait(PATIENCE) == 0 and teleop.is_as_before()
+    os.close(writes)
 
 
 @pytest.mark.parametrize("kind", ["tcpq", "unix"])

@@ -5,6 +5,8 @@ tests/run/engine_test.cpp's.
 import copy
 import math
 import pickle
+import subprocess
+import sys
 
 import numpy as np
 import pytest
@@ -239,12 +241,28 @@ def test_messages_are_those_of_the_channels():
             "no robot takes commands on 'r0/scan'",
         ),
         (lambda e: (e.close(), e.step()), RuntimeError, "closed"),
+        (lambda e: (e.close(), e.messages()), RuntimeError, "closed"),
+        (lambda e: (e.close(), e.end_run()), RuntimeError, "closed"),
     ],
 )
 def test_errors_say_what_is_wrong(call, error, text):
     with engine(worlds=2) as e, pytest.raises(error) as caught:
         call(e)
     assert text in str(caught.value)
+
+
+def test_a_daemon_thread_may_be_at_work_when_the_program_ends():
+    """Python unwinds such a thread as it comes back."""
+    program = (
+        "import threading, time, ruedo\n"
+        f"e = ruedo.Engine('w.sdf', text={world()!r})\n"
+        "def work():\n  while True: e.step(n=1)\n"
+        "threading.Thread(target=work, daemon=True).start()\n"
+        "time.sleep(0.2)\n"
+    )
+    for _ in range(5):
+        done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True)
+        assert (done.returncode, done.stderr) == (0, "")
 
 
 def test_what_is_refused_changes_nothing():

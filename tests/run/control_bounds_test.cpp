@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "control_client.h"
+#include "core/utf8.h"
 #include "ruedo/grant_reply_t.hpp"
 #include "ruedo/grant_request_t.hpp"
 #include "ruedo/join_t.hpp"
@@ -146,7 +147,7 @@ TEST(Texts, OfRepliesAreShort) {
   body.name = std::string(1'000'000, 'x') + "\033[2J";
   const reply_t reply = client.ask(request_t::GET_STATE, engine::encoded(body));
   EXPECT_EQ(reply.code, reply_t::UNKNOWN_NAME);
-  EXPECT_LE(reply.text.size(), Control::kLongestText + 3);
+  EXPECT_LE(reply.text.size(), kLongestSaid + 3);
   body.name = "\033[2J";
   EXPECT_EQ(client.ask(request_t::GET_STATE, engine::encoded(body)).text,
             "there is no model or MODEL/LINK called '?[2J'");

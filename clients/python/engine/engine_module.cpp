@@ -1,5 +1,7 @@
 // The module ruedo._engine: the engine in the process of a Python program. ruedo/engine.py is what
 // people call.
+#include <unistd.h>
+
 #include <algorithm>
 #include <memory>
 #include <optional>
@@ -61,6 +63,26 @@ nb::object view_of(std::shared_ptr<const FieldArray> array) {
                                                  owner, nullptr, dtype_of((*held)->type)));
 }
 
+// Lets other Python threads run for as long as it lives.
+class Unlocked {
+ public:
+  Unlocked() : state_(PyEval_SaveThread()) {}
+  ~Unlocked() {
+    // Once the program ends, Python (before 3.14) ends each daemon thread that comes back: it
+    // unwinds it, which frames that let no exception out do not survive. It waits for the end here.
+    try {
+      PyEval_RestoreThread(state_);
+    } catch (...) {
+      for (;;) pause();
+    }
+  }
+  Unlocked(const Unlocked&) = delete;
+  Unlocked& operator=(const Unlocked&) = delete;
+
+ private:
+  PyThreadState* const state_;
+};
+
 struct Recorded {
   int world;
   int64_t step;
@@ -96,7 +118,7 @@ class PyEngine {
     engine.fleet.disabled = disabled;
     for (const std::string& one : draws) engine.draws.push_back(ruedo::model::parse_draw(one));
     randomized_ = !draws.empty();
-    const nb::gil_scoped_release release;
+    const Unlocked unlocked;
     texts_ = std::make_unique<ruedo::model::TextLoader>(world, options);
     const auto model = text ? read(*text) : ruedo::model::load_world(world, options);
     engine_ = std::make_unique<Engine>(model, engine);
@@ -217,6 +239,7 @@ class PyEngine {
 
   // What came of it; the log is whole then.
   nb::dict end_run() {
+    Engine& engine = this->engine();
     if (!run_) throw std::runtime_error("no run was begun");
     run_->end();
     nb::dict verdict, metrics;
@@ -236,8 +259,8 @@ class PyEngine {
     verdict["metrics"] = metrics;
     verdict["track"] = track;
     run_.reset();
-    engine().on_state({});
-    engine().on_message({});
+    engine.on_state({});
+    engine.on_message({});
     return verdict;
   }
 
@@ -252,6 +275,7 @@ class PyEngine {
   }
 
   nb::list messages() const {
+    engine();  // throws
     nb::list list;
     for (const Recorded& one : recorded_)
       list.append(nb::make_tuple(one.world, one.step, one.channel,
@@ -281,7 +305,7 @@ class PyEngine {
       bool& at_work;
     };
     Mark mark_;
-    nb::gil_scoped_release release_;  // taken again first
+    Unlocked unlocked_;  // locked again first
   };
   void refuse_others() const {
     if (at_work_)
@@ -312,6 +336,7 @@ class PyEngine {
 }  // namespace
 
 NB_MODULE(_engine, module) {
+  nb::set_leak_warnings(false);  // a daemon thread may hold an engine when the program ends
   ruedo::scene::set_up_mesa();  // an import has the interpreter to itself
   module.attr("version") = ruedo::version();
   module.attr("build") = ruedo::log::own_version();

@@ -1,15 +1,19 @@
 """What can go wrong, in words that say what to do next.
 
-Every error of this package is a RuedoError. Bad arguments (NaN, a radius of 0) are plain
+Every error of this package is a RuedoError, and can be pickled: a pool of processes hands it on. Bad arguments (NaN, a radius of 0) are plain
 ValueErrors.
 """
 
 from __future__ import annotations
 
 import re
+from typing import Any
 
-CONTROL = re.compile(r"[\x00-\x1f\x7f-\x9f]")
-_CONTROL_IN_TEXT = re.compile(r"[\x00-\x08\x0b-\x1f\x7f-\x9f]")
+# Control characters, Unicode's line ends, and the marks that change the order of what is beside
+# them.
+_OBEYED = r"\x7f-\x9f\u061c\u200e\u200f\u2028-\u202e\u2066-\u2069"
+CONTROL = re.compile(rf"[\x00-\x1f{_OBEYED}]")
+_CONTROL_IN_TEXT = re.compile(rf"[\x00-\x08\x0b-\x1f{_OBEYED}]")
 
 
 def for_terminal(text: str) -> str:
@@ -54,6 +58,9 @@ class MotionError(RuedoError):
         super().__init__(text)
         self.reason = reason
 
+    def __reduce__(self) -> Any:
+        return type(self), (str(self), self.reason), vars(self)
+
 
 class RequestError(RuedoError):
     """The server refused a request; `code` is one of reply_t's names, such as "UNKNOWN_NAME"."""
@@ -61,6 +68,9 @@ class RequestError(RuedoError):
     def __init__(self, text: str, code: str):
         super().__init__(text)
         self.code = code
+
+    def __reduce__(self) -> Any:
+        return type(self), (str(self), self.code), vars(self)
 
 
 class LeaseLost(RequestError):

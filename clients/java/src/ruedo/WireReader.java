@@ -6,6 +6,7 @@ import java.nio.ByteBuffer;
 import java.nio.charset.StandardCharsets;
 import java.util.ArrayList;
 import java.util.List;
+import java.util.regex.Pattern;
 
 /**
  * Reads an LCM message field by field: what a length promises must be there before memory is taken
@@ -13,6 +14,13 @@ import java.util.List;
  * IOException for bytes that are too few.
  */
 final class WireReader {
+    /** Control characters, Unicode's line ends, and the marks that change the order of text. */
+    private static final String OBEYED =
+            "\\p{Cc}\\u061c\\u200e\\u200f\\u2028-\\u202e\\u2066-\\u2069";
+
+    private static final Pattern IN_NAMES = Pattern.compile("[" + OBEYED + "]");
+    private static final Pattern IN_TEXTS = Pattern.compile("[" + OBEYED + "&&[^\n\t]]");
+
     private final ByteBuffer bytes; // big endian, as LCM writes
 
     WireReader(byte[] message) {
@@ -89,14 +97,21 @@ final class WireReader {
     /** A string that is printed: a terminal obeys control characters, so a name has none. */
     String name() throws IOException {
         String text = string();
-        if (text.chars().anyMatch(Character::isISOControl))
-            throw new IOException("a name with control characters");
+        if (hasControl(text)) throw new IOException("a name with control characters");
         return text;
     }
 
     /** A string that is printed; '?' stands for each control character but line ends and tabs. */
     String text() throws IOException {
-        return string().replaceAll("[\\p{Cc}&&[^\n\t]]", "?");
+        return printed(string());
+    }
+
+    static boolean hasControl(String name) {
+        return IN_NAMES.matcher(name).find();
+    }
+
+    static String printed(String text) {
+        return IN_TEXTS.matcher(text).replaceAll("?");
     }
 
     byte[] bytes(int n) throws IOException {

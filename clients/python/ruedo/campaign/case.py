@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import json
 import os
+import shutil
 import signal
 import subprocess
 import tempfile
@@ -78,7 +79,7 @@ class Runner:
         outcome = Outcome()
         everything = bool(full_log or what["metrics"] or "golden" in what["expect"])
         with tempfile.TemporaryDirectory(
-            prefix="ruedo-case-", dir=_scratch(everything, what)
+            prefix=_scratch_name(os.getpid()), dir=_scratch(everything, what)
         ) as scratch:
             log = full_log or os.path.join(scratch, "run.lcm")
             try:
@@ -403,6 +404,17 @@ def _scratch(everything: bool, what: dict[str, Any]) -> str | None:
     """
     small = not everything and "python" in what["controller"]
     return "/dev/shm" if small and os.access("/dev/shm", os.W_OK | os.X_OK) else None
+
+
+def _scratch_name(process: int) -> str:
+    return f"ruedo-case-{process}-"
+
+
+def remove_scratch(process: int) -> None:
+    """What a process that was killed could not remove."""
+    for place in {"/dev/shm", tempfile.gettempdir()}:
+        for folder in Path(place).glob(_scratch_name(process) + "*"):
+            shutil.rmtree(folder, ignore_errors=True)
 
 
 def too_slow(wall: float) -> str:

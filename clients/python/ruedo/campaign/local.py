@@ -14,11 +14,12 @@ from multiprocessing.connection import Connection, wait
 from pathlib import Path
 from typing import Any
 
-from .case import Outcome, too_slow
+from .case import Outcome, remove_scratch, too_slow
 from .errors import CampaignError
 from .plan import Case
 
 _GRACE = 5.0  # s beyond a case's own limit, before its worker is killed
+_PARTING = 2.0  # s that a worker has to end what it has started
 _TRIES = 2  # of a case whose worker was killed
 
 Done = tuple[Case, dict[str, Any], float]  # the case, its outcome, and how long it took (s)
@@ -66,11 +67,20 @@ class Worker:
             return None
         return answer
 
+    def tell_to_end(self) -> None:
+        if self._process.poll() is None:
+            self._process.terminate()
+
     def end(self) -> int:
-        """Its exit code."""
-        self._process.kill() if self._process.poll() is None else None
-        code = self._process.wait()
+        """Its exit code. It ends what it has started; where it hangs, it is killed."""
+        self.tell_to_end()
+        try:
+            code = self._process.wait(_PARTING)
+        except subprocess.TimeoutExpired:
+            self._process.kill()
+            code = self._process.wait()
         self.pipe.close()
+        remove_scratch(self._process.pid)
         return code
 
 
@@ -93,7 +103,10 @@ def run_local(
                     one.give(*waiting.popleft())
             yield from _collect(crew, waiting, folder)
     finally:
-        for one in crew if kept is None else ():
+        ending = crew if kept is None else []
+        for one in ending:
+            one.tell_to_end()
+        for one in ending:
             one.end()
 
 

@@ -7,6 +7,7 @@ from __future__ import annotations
 import signal
 import sys
 import time
+from contextlib import suppress
 from multiprocessing.connection import Connection
 
 from .case import Runner
@@ -15,7 +16,9 @@ from .processes import adopt_orphans, die_with_parent
 
 def work(pipe: Connection, folder: str) -> None:
     die_with_parent()
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is the driver's
+    for to_driver in (signal.SIGINT, signal.SIGHUP):  # of the terminal
+        signal.signal(to_driver, signal.SIG_IGN)
+    signal.signal(signal.SIGTERM, _end)
     adopt_orphans()
     runner = Runner(folder)
     while True:
@@ -28,5 +31,11 @@ def work(pipe: Connection, folder: str) -> None:
         pipe.send((outcome.as_dict(), time.monotonic() - begin))
 
 
+def _end(*_: object) -> None:
+    signal.signal(signal.SIGTERM, signal.SIG_IGN)  # nothing interrupts what is cleaned up then
+    raise KeyboardInterrupt
+
+
 if __name__ == "__main__":
-    work(Connection(int(sys.argv[1])), sys.argv[2])
+    with suppress(KeyboardInterrupt):  # told to end
+        work(Connection(int(sys.argv[1])), sys.argv[2])
