@@ -5,9 +5,7 @@ users call them.
 import json
 import os
 import re
-import struct
 import subprocess
-import zlib
 from pathlib import Path
 
 import pytest
@@ -148,27 +146,3 @@ def test_a_thousand_robots_load_at_once(tmp_path):
     assert process.returncode == 0
     assert used.ru_utime + used.ru_stime < 3.0  # s
     assert used.ru_maxrss < 1_000_000  # kB
-
-
-def cut_off(kind):
-    """A picture of 100 x 100 pixels, of which the first are there."""
-    if kind == "png":
-        chunk = b"IHDR" + struct.pack(">IIBBBBB", 100, 100, 8, 0, 0, 0, 0)
-        head = struct.pack(">I", 13) + chunk + struct.pack(">I", zlib.crc32(chunk))
-        return b"\x89PNG\r\n\x1a\n" + head + struct.pack(">I", 5000) + b"IDAT" + zlib.compress(b"x")
-    if kind == "bmp":
-        sizes = struct.pack("<IiiHHIIiiII", 40, 100, 100, 1, 24, 0, 0, 0, 0, 0, 0)
-        return b"BM" + struct.pack("<IHHI", 30054, 0, 0, 54) + sizes + bytes(20)
-    return b"P5\n100 100\n255\n" + bytes(50)
-
-
-# What reads pictures tells the terminal of its own what is wrong with them.
-@pytest.mark.parametrize("kind", ["pgm", "png", "bmp"])
-def test_a_picture_that_is_cut_off_is_one_line(kind, tmp_path):
-    (tmp_path / f"m.{kind}").write_bytes(cut_off(kind))
-    (tmp_path / "m.yaml").write_text(
-        f"image: m.{kind}\nresolution: 0.05\norigin: [0, 0, 0]\nnegate: 0\noccupied_thresh: 0.65\nfree_thresh: 0.2\n"
-    )
-    done = ruedo("import", tmp_path / "m.yaml", "-o", tmp_path / "out.sdf")
-    assert done.returncode == 3
-    assert re.fullmatch(f"ruedo: .*m.{kind}: is no picture that can be read .*\n", done.stderr)
