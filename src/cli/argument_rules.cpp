@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <array>
+#include <charconv>
+#include <cstdint>
 #include <filesystem>
 #include <string>
 #include <string_view>
@@ -61,6 +63,13 @@ void refuse_odd_values(CLI::App& app) {
       option->check(what_is_odd);
     }
   }
+}
+
+std::string is_seed(const std::string& text) {
+  uint64_t seed = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), seed);
+  if (error == std::errc() && end == text.data() + text.size()) return "";
+  return "'" + text + "' is not allowed; a seed is a whole number from 0 to 18446744073709551615";
 }
 
 void check_outputs(const CLI::App& command) {

@@ -1,6 +1,8 @@
 // What holds for the arguments of every command.
 #pragma once
 
+#include <string>
+
 #include <CLI/CLI.hpp>
 
 namespace ruedo::cli {
@@ -9,6 +11,9 @@ namespace ruedo::cli {
 // that nothing is recorded. Nor one with control characters, since values are printed, and names of
 // files may come from a stranger's archive. Of all commands below app, before it parses.
 void refuse_odd_values(CLI::App& app);
+
+// Of `--seed`: what is wrong with it, or "".
+std::string is_seed(const std::string& text);
 
 // What a command writes must be none of what it reads, nor another file that it writes. Throws
 // InputError. Of a command that was parsed.

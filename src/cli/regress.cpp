@@ -10,6 +10,7 @@
 #include <spdlog/spdlog.h>
 
 #include "bus/server_bus.h"
+#include "cli/argument_rules.h"
 #include "cli/client_process.h"
 #include "cli/commands.h"
 #include "cli/extensions.h"
@@ -261,7 +262,10 @@ void add_course(CLI::App& command, RegressArguments& a) {
       .add_option("--client", a.client,
                   "command line of the client, for a shell; LCM_DEFAULT_URL says where the run is")
       ->type_name("COMMAND");
-  command.add_option("--seed", a.seed, "of all noise")->type_name("N")->capture_default_str();
+  command.add_option("--seed", a.seed, "of all noise")
+      ->type_name("N")
+      ->capture_default_str()
+      ->check(is_seed);
   command
       .add_option("--duration", a.duration,
                   "end after this many seconds of sim time, or when the client ends")
@@ -330,6 +334,9 @@ void add_reports(CLI::App& command, RegressArguments& a) {
       ->type_name("FILE");
   command.add_option("--html", a.html, "write it as a page with plots")->type_name("FILE");
   command.add_flag("--no-page", a.no_page, "no page beside the log of a failed run");
+  // Without it they would do nothing.
+  for (const char* each : {"--keep", "--tolerance", "--ignore", "--renew", "--junit", "--html"})
+    command.get_option(each)->needs(command.get_option("--golden"));
 }
 
 void add_regress(CLI::App& app, Action& chosen) {

@@ -1,7 +1,6 @@
 // ruedo run: loads a world and serves it until the end, Ctrl-C, or a client's QUIT.
 #include <atomic>
 #include <cerrno>
-#include <charconv>
 #include <chrono>
 #include <csignal>
 #include <cstdio>
@@ -16,6 +15,7 @@
 #include <unistd.h>
 
 #include "bus/server_bus.h"
+#include "cli/argument_rules.h"
 #include "cli/commands.h"
 #include "cli/extensions.h"
 #include "cli/find_all.h"
@@ -258,13 +258,6 @@ std::string to_bytes(std::string& text) {
   } catch (const CLI::Error&) {
     return refusal;
   }
-}
-
-std::string is_seed(const std::string& text) {
-  uint64_t seed = 0;
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), seed);
-  if (error == std::errc() && end == text.data() + text.size()) return "";
-  return "'" + text + "' is not allowed; a seed is a whole number from 0 to 18446744073709551615";
 }
 
 void add_pace(CLI::App& command, RunArguments& arguments) {

@@ -112,10 +112,18 @@ std::string Journal::save(const std::string& name,
   PartOfFile part(folder_ + "/." + name + ".part");
   std::error_code error;
   size_t files = 0;
-  for (const fs::directory_entry& entry : fs::directory_iterator(folder_, error))
-    files += entry.path().extension() == kSuffix;
+  auto bytes = static_cast<uintmax_t>(writer_.size());
+  for (const fs::directory_entry& entry : fs::directory_iterator(folder_, error)) {
+    if (entry.path().extension() != kSuffix) continue;
+    const uintmax_t size = entry.file_size(error);
+    ++files;
+    if (!error) bytes += size;
+  }
   if (files >= kMostSnapshots && !fs::exists(path, error))
     return "the folder holds " + std::to_string(files) + " snapshots already";
+  if (bytes > kMostBytes)
+    return "with this one the folder's snapshots would hold " + std::to_string(bytes) +
+           " bytes; allowed are " + std::to_string(kMostBytes);
   writer_.flush();
   const std::string& incomplete = writer_.error().empty() ? fault_ : writer_.error();
   if (!incomplete.empty()) return "the journal is incomplete: " + incomplete;

@@ -22,7 +22,9 @@ inline const std::string kStateChannel = "ruedo/state";  // in snapshots alone
 
 class Journal : public Sink {
  public:
-  static constexpr size_t kMostSnapshots = 1000;  // files in the folder; more are refused
+  // Of the files in the folder; more are refused.
+  static constexpr size_t kMostSnapshots = 1000;
+  static constexpr uintmax_t kMostBytes = 10'000'000'000;
 
   // Throws EnvironmentError when nothing can be written in the folder.
   explicit Journal(const std::string& folder);

@@ -94,6 +94,7 @@ WRONG = [  # what is replaced, by what, line, what the message says
     ("no_contact: true", "goal: []", 12, "goal: is ..; allowed is 1 members or more"),
     ("no_contact: true", "clearance: -1", 12, "clearance: is -1; allowed is 0 to 100"),
     ("no_contact: true", "odometry_error: -0.1", 12, "is -0.1; allowed is 0 to 1e.06"),
+    ("no_contact: true", "ignore: ['*']", 12, "ignore: needs expect.golden, the log to compare"),
     ("distance: [1.2, 3.0]", "passed: [1.2, 3.0]", 8, "passed: is a column of the results"),
     (
         "seeds: 2",

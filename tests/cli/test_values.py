@@ -235,3 +235,32 @@ def test_what_is_no_number_is_named(words, value, tmp_path):
     option = words.split()[-1]
     assert done.returncode in (2, 3), done
     assert option in done.stderr and value in done.stderr, done
+
+
+@pytest.mark.parametrize(
+    "options, text",
+    [
+        ("--seed -1", "--seed: '-1' is not allowed; a seed is a whole number from 0 to"),
+        *(
+            (option, f"{option.split()[0]} requires --golden")
+            for option in (
+                "--tolerance x",
+                "--ignore x",
+                "--keep x",
+                "--renew",
+                "--junit a.xml",
+                "--html a.html",
+            )
+        ),
+    ],
+)
+def test_regress_takes_nothing_that_does_nothing(options, text, tmp_path):
+    (tmp_path / "w.sdf").write_text(in_link("<sensor name='s' type='imu'/>"))
+    done = subprocess.run(
+        [RUEDO, "regress", "w.sdf", "--record", "a.lcm", "--duration", "0.1", *options.split()],
+        capture_output=True,
+        text=True,
+        cwd=tmp_path,
+        timeout=60,
+    )
+    assert done.returncode == 2 and text in done.stderr, done.stderr

@@ -283,6 +283,9 @@ def _check_numbers(
 
 def _check_expectations(expect: dict[str, Any], source: Source) -> None:
     """The ranges of `ruedo regress`: beyond them an expectation always holds, or never."""
+    for name in ("tolerances", "ignore"):
+        if name in expect and "golden" not in expect:
+            raise source.error(("expect", name), "needs expect.golden, the log to compare with")
     for at, one in _leaves(expect, ("expect",)):
         if at[-1] in ("radius", "by") and not one > 0:
             raise source.error(at, f"is {one}; allowed is more than 0")
