@@ -23,6 +23,10 @@ class Transport(Protocol):
 
     loses_nothing: bool
 
+    @property
+    def is_connected(self) -> bool:
+        """False: nothing can be sent, since there is no server."""
+
     def subscribe(self, channel: str) -> None:
         """From the return on, every message of that channel is received."""
 
@@ -61,6 +65,7 @@ class LcmTransport:
     """
 
     loses_nothing = False
+    is_connected = True
 
     def __init__(self, url: str):
         self._lcm: lcm.LCM | None = lcm.LCM(url)  # None: closed
