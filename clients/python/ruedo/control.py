@@ -133,10 +133,7 @@ class Session:
                     self.publish(lcmtypes.request_t.LEAVE, self._session, sequence, b"")
                     if time.monotonic() >= deadline:
                         break
-                    if (
-                        not self._news.wait(_REPEAT_SECONDS)
-                        and self._connection.server_has_ended()
-                    ):
+                    if not self._news.wait(_REPEAT_SECONDS) and self._connection.server_has_ended():
                         break
                 self._awaited, self._session = None, 0
         finally:
