@@ -89,6 +89,8 @@ void Bus::publish(const std::string& channel, const uint8_t* bytes, size_t size)
   if (!state_->closed) state_->transport->publish(channel, bytes, size);
 }
 
+bool Bus::is_connected() const { return state_->transport->is_connected(); }
+
 void Bus::receive_eagerly() {
   const Turn turn(*this);
   state_->transport->receive_eagerly();
@@ -97,7 +99,7 @@ void Bus::receive_eagerly() {
 void Bus::close() {
   state_->closed = true;
   if (!thread_.joinable()) return;
-  if (received_from) {
+  if (in_any_handler()) {
     thread_.detach();
   } else {
     thread_.join();
@@ -105,6 +107,8 @@ void Bus::close() {
 }
 
 bool Bus::handling() const { return received_from == state_.get(); }
+
+bool Bus::in_any_handler() { return received_from != nullptr; }
 
 void Bus::State::handle(std::chrono::milliseconds timeout) {
   const Receiving receiving(this);

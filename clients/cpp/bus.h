@@ -31,12 +31,14 @@ class Bus {
   // Throws Error for a message that is larger than what a server takes from a client.
   void publish(const std::string& channel, const uint8_t* bytes, size_t size);
   static void check_size(const std::string& channel, size_t size);  // throws likewise
-  void receive_eagerly();                                           // as Transport's
+  bool is_connected() const;  // false: what is published now reaches nobody
+  void receive_eagerly();     // as Transport's
   // In a handler, too, of this bus or another: its thread then ends by itself. Two handlers that
   // close each other's bus do not wait for each other.
   void close();
   // This thread is in a handler of it: while that lasts, nothing is received.
   bool handling() const;
+  static bool in_any_handler();
 
   // Lets the caller receive in its own thread: handing each message from thread to thread takes as
   // long as receiving it. While one of these lives, and a moment longer, the receiving thread

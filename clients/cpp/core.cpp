@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cstdio>
 #include <optional>
+#include <system_error>
 #include <utility>
 
 #include "address.h"
@@ -28,11 +29,13 @@ Clock::time_point deadline_after(Duration time) {
   return Clock::now() + std::chrono::duration_cast<Clock::duration>(std::max(time, Duration(0.0)));
 }
 
-std::string text_of(Duration time) {
+std::string text_of(double number) {
   char text[32];
-  std::snprintf(text, sizeof text, "%g", time.count());
+  std::snprintf(text, sizeof text, "%g", number);
   return text;
 }
+
+std::string text_of(Duration time) { return text_of(time.count()); }
 
 Core::Core(const std::string& url, const std::string& name, std::unique_ptr<ServerProcess> server,
            std::unique_ptr<Transport> transport)
@@ -88,16 +91,34 @@ void Core::join(Duration timeout) {
 
 void Core::close() {
   if (forked_) return;
+  bool first = false;
   {
     const std::lock_guard lock(mutex_);
-    if (closed_.exchange(true)) return;
+    first = !closed_.exchange(true);
     wake_.notify_all();
     news_.notify_all();
   }
+  if (!first) {
+    if (!Bus::in_any_handler()) ended_.wait();
+    return;
+  }
+  // In a callback, this thread is what receives the answer to a LEAVE: another one waits for it.
+  if (const auto self = weak_from_this().lock(); self && bus_.handling()) {
+    try {
+      std::thread([self] { self->end(); }).detach();
+      return;
+    } catch (const std::system_error&) {  // there are too many threads
+    }
+  }
+  end();
+}
+
+void Core::end() {
   if (repeater_.joinable()) repeater_.join();
   if (info()) session_.leave();
   bus_.close();
   if (server_) server_->end();
+  end_.set_value();
 }
 
 void Core::check_open() const {
@@ -223,7 +244,7 @@ void Core::begin_run() {
   for (const auto& stream : streams) stream->forget();
   std::fprintf(stderr, "ruedo: another run has begun at %s: commands are not repeated into it\n",
                url_.c_str());
-  new_run_->call();
+  if (!closed_) new_run_->call();
 }
 
 void Core::note_time(int64_t utime) {
@@ -271,6 +292,8 @@ void Core::refresh_info(std::shared_ptr<const WorldInfo> before) {
     news_.wait_for(lock, std::chrono::milliseconds(100));
   }
 }
+
+bool Core::server_has_ended() { return (server_ && server_->ended()) || !bus_.is_connected(); }
 
 void Core::check_server() {
   check_open();

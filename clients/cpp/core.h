@@ -6,6 +6,7 @@
 #include <chrono>
 #include <condition_variable>
 #include <functional>
+#include <future>
 #include <map>
 #include <memory>
 #include <mutex>
@@ -31,7 +32,8 @@ class ServerProcess;
 
 using Clock = std::chrono::steady_clock;
 Clock::time_point deadline_after(Duration time);  // kForever: never
-std::string text_of(Duration time);               // seconds as a user wrote them: 5, not 5.000000
+std::string text_of(double number);               // as a user wrote it: 5, not 5.000000
+std::string text_of(Duration time);               // its seconds
 inline constexpr const char* kClosed = "this simulation was closed";
 inline constexpr const char* kForked =
     "this simulation is the parent process's: connect() again after a fork";
@@ -44,8 +46,9 @@ class Core : public std::enable_shared_from_this<Core> {
   ~Core();
 
   void join(Duration timeout);  // begins to receive, and waits for ruedo/info; throws NoServer
-  void close();                 // in a callback, too
-  void check_open() const;      // throws NoServer
+  void close();                 // in a callback, too: the end follows by itself there
+  bool closed() const { return closed_; }
+  void check_open() const;  // throws NoServer
   // Before waiting for what the server sends. Throws NoServer; Error in a callback, which is what
   // would receive it.
   void check_may_wait() const;
@@ -78,11 +81,13 @@ class Core : public std::enable_shared_from_this<Core> {
   // After the set of models changed; before: the info from before that, null: the one that is known
   // now.
   void refresh_info(std::shared_ptr<const WorldInfo> before = nullptr);
-  void check_server();  // throws NoServer when it is gone, or this was closed
+  bool server_has_ended();  // for certain; one that is looked for in vain just now has, too
+  void check_server();      // throws NoServer when it is gone, or this was closed
   Subscription on_new_run(std::function<void()> callback);
   std::string what_is_known(double rate) const;  // for timeouts
 
  private:
+  void end();
   void on_info(const uint8_t* bytes, size_t size);
   void on_tick(const uint8_t* bytes, size_t size);
   void forget_removed(const WorldInfo& info);
@@ -110,6 +115,8 @@ class Core : public std::enable_shared_from_this<Core> {
   std::atomic<Clock::time_point::rep> last_sign_;
   std::atomic<Clock::time_point::rep> asked_{0};  // for info
   std::atomic<bool> closed_{false};
+  std::promise<void> end_;  // of all that close() ends
+  const std::shared_future<void> ended_ = end_.get_future().share();
   const std::shared_ptr<CallbackList<>> new_run_ = std::make_shared<CallbackList<>>();
   std::thread repeater_;
   std::condition_variable wake_;

@@ -2,8 +2,10 @@
 #include "session.h"
 
 #include <random>
+#include <stdexcept>
 
 #include "core.h"
+#include "core/utf8.h"
 #include "ruedo/join_t.hpp"
 #include "ruedo/reply_t.hpp"
 #include "ruedo/request_t.hpp"
@@ -34,6 +36,14 @@ Reply checked(Reply reply) {
 }
 
 }  // namespace
+
+Session::Session(Core& core, std::string name) : core_(core), name_(std::move(name)) {
+  constexpr size_t kMost = 63;
+  if (name_.empty() || name_.size() > kMost || !is_one_line(name_))
+    throw std::invalid_argument("the name '" + for_terminal(shortened(name_, kMost)) +
+                                "': a client's has 1 to 63 bytes of UTF-8, without control "
+                                "characters");
+}
 
 Reply Session::request(int32_t kind, const std::vector<uint8_t>& body, Duration timeout) {
   core_.check_may_wait();
@@ -67,8 +77,7 @@ void Session::check_size(const std::vector<uint8_t>& body) {
 void Session::leave() {
   const auto turn = this->turn();
   if (session_ == 0) return;
-  Clock::time_point deadline = Clock::now();
-  if (!core_.bus().handling()) deadline += kPartingTime;
+  const Clock::time_point deadline = Clock::now() + kPartingTime;
   std::unique_lock lock(mutex_);
   awaited_kind_ = request_t::LEAVE;
   awaited_sequence_ = ++sequence_;
@@ -76,7 +85,8 @@ void Session::leave() {
   while (!reply_) {
     publish(request_t::LEAVE, session_, sequence_, {});
     if (Clock::now() >= deadline) break;
-    news_.wait_for(lock, kRepeatTime, [this] { return reply_.has_value(); });
+    const bool answered = news_.wait_for(lock, kRepeatTime, [this] { return reply_.has_value(); });
+    if (!answered && core_.server_has_ended()) break;
   }
   awaited_kind_ = 0;
   session_ = 0;

@@ -32,7 +32,8 @@ struct Reply {
 
 class Session {
  public:
-  Session(Core& core, std::string name) : core_(core), name_(std::move(name)) {}
+  // Throws std::invalid_argument for a name that no server takes.
+  Session(Core& core, std::string name);
 
   // Joins on the first request. Throws NotSupported, RequestError, Timeout (after `timeout` of real
   // time).
@@ -50,7 +51,8 @@ class Session {
                int32_t epoch = -1);
 
   // Gives the session back. Others would wait for a client in lockstep whose LEAVE was lost: it is
-  // repeated until it is answered, for a moment, since the server may be gone.
+  // repeated until it is answered, for a moment, since the server may be gone: in that case no
+  // longer than that is unknown.
   void leave();
   void receive(const uint8_t* bytes, size_t size);  // a message of ruedo/reply
 

@@ -77,7 +77,7 @@ void StreamCore::end() {
 }
 
 void StreamCore::receive(const uint8_t* bytes, size_t size) {
-  if (const auto core = core_.lock(); core && core->in_doubt()) return;
+  if (const auto core = core_.lock(); core && (core->closed() || core->in_doubt())) return;
   std::shared_ptr<const Sample> sample;
   std::exception_ptr fault;
   try {

@@ -25,6 +25,7 @@ class StreamTransport : public Transport {
   void unsubscribe(const std::string& channel) override;
   void publish(const std::string& channel, const uint8_t* bytes, size_t size) override;
   bool receive(std::chrono::milliseconds timeout, const Receiver& receiver) override;
+  bool is_connected() override { return connection() != nullptr; }
 
  private:
   std::shared_ptr<bus::StreamConnection> connection();

@@ -629,8 +629,10 @@ class [[nodiscard]] Simulation {
   void markers(const std::string& layer, const std::vector<Marker>& markers = {},
                const std::string& frame = "") const;
 
-  void
-  close();  ///< Ends repeated commands, and a server that launch() started; a second time nothing.
+  /// Ends repeated commands, and a server that launch() started; a second time nothing. In a
+  /// callback it returns at once, and the end follows by itself; a second call, or the destructor,
+  /// waits for it.
+  void close();
 
  private:
   std::shared_ptr<Core> core() const;  ///< throws NoServer once it was moved from

@@ -109,8 +109,9 @@ def test_a_guest_comes_and_goes_whatever_is_lost():
     assert step == "90" and int(of_guest) > 20
 
 
-def test_who_leaves_is_not_waited_for_whatever_is_lost(language, tmp_path):
-    """The LEAVE is lost, once. The lease is longer than the test."""
+@pytest.mark.parametrize("visit", ["visited", "leaves"])
+def test_who_leaves_is_not_waited_for_whatever_is_lost(visit, language, tmp_path):
+    """The LEAVE is lost, once, at the end or in a callback. The lease is longer than the test."""
     log = str(tmp_path / "run.lcm")
     with ruedo_run(
         *("--lockstep", "1", "--lease", str(PATIENCE), "--disable", "p3at/camera"),
@@ -118,7 +119,7 @@ def test_who_leaves_is_not_waited_for_whatever_is_lost(language, tmp_path):
         world=HALL,
     ) as server:
         with bad_network(server.url, 1, 0.0, request_t.LEAVE) as [url]:
-            probe(language, url, "visited", "client", "p3at")
+            probe(language, url, visit, "client", "p3at")
         server.end()
     applied = [applied_t.decode(e.data) for e in lcm.EventLog(log) if e.channel == "ruedo/applied"]
     assert [one.kind for one in applied if one.kind in (request_t.JOIN, request_t.LEAVE)] == [

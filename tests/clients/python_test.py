@@ -2,9 +2,11 @@
 for wrong types, forks, logs.
 """
 
+import copy
 import gc
 import math
 import os
+import pickle
 import re
 import resource
 import struct
@@ -515,6 +517,51 @@ def test_the_child_of_a_fork_is_told():
             == "this simulation is the parent process's: connect() again after a fork"
         )
         assert sim.state().step >= 0  # and the parent's goes on
+
+
+def test_errors_cross_processes_and_simulations_do_not():
+    """What cannot be unpickled hangs a pool of processes."""
+    for error in (
+        ruedo.RequestError("no such model", "UNKNOWN_NAME"),
+        ruedo.LeaseLost("silent", "REFUSED"),
+        ruedo.MotionError("blocked", "blocked"),
+        ruedo.NoServer("gone"),
+    ):
+        same = pickle.loads(pickle.dumps(error))
+        assert (type(same), str(same), vars(same)) == (type(error), str(error), vars(error))
+    with ruedo.launch(HALL, **QUICK) as sim:
+        for what in (sim, sim.robot("p3at"), sim.robot("p3at").odometry):
+            for out in (pickle.dumps, copy.deepcopy):
+                with pytest.raises(TypeError, match=f"hand on its url, '{sim.url}', and connect"):
+                    out(what)
+
+
+@pytest.mark.parametrize(
+    "name", ["x" * 64, "é" * 32, "a\nb", "a\x1bb", "a\u202eb", "x" * 10_000_000]
+)
+def test_a_name_that_no_server_takes_is_refused_at_once(name):
+    for call in (ruedo.connect, ruedo.launch):
+        with pytest.raises(ValueError, match="a client's name has 1 to 63 bytes of UTF-8"):
+            call("unix:///nowhere", name=name)
+
+
+@pytest.mark.parametrize("kind", ["launched", "unix", "tcpq"])
+def test_a_server_that_has_ended_is_not_waited_for(kind, monkeypatch, tmp_path):
+    """Its answer to a LEAVE is awaited for much longer than the test may take."""
+    monkeypatch.setattr("ruedo.control._PARTING_SECONDS", 10.0 * PATIENCE)
+    if kind == "launched":
+        sim = ruedo.launch(HALL, **QUICK)
+        sim.pause()
+        sim._connection._server._process.kill()
+        sim.close()
+        return
+    local = {"world": HALL, "url": f"unix://{tmp_path}/bus"}
+    with ruedo_run(**local) if kind == "unix" else tcp_server() as server:
+        sim = ruedo.connect(server.url, timeout=PATIENCE)
+        sim.pause()
+        server.process.kill()
+        server.process.wait()
+    sim.close()
 
 
 def test_a_log_as_pandas_has_it(tmp_path):

@@ -291,7 +291,9 @@ TEST(Sonar, RefusesWhatCannotBe) {
   const Refused table[] = {
       {"no sonar", "<sensor name='SONAR' type='sonar'/>", "needs a <sonar>"},
       {"no maximum", array("", "<min>0.1</min>"), "needs <max>"},
-      {"range swapped", array("", "<min>5</min><max>1</max>"), "must be above <min>"},
+      {"range swapped", array("", "<min>5</min><max>1</max>"), "<max> 1 must be above <min> 5"},
+      {"tiny", array("", "<min>2e-8</min><max>1e-8</max>"),
+       "<max> 1e-08 must be above <min> 2e-08"},
       {"negative minimum", array("", "<min>-1</min><max>1</max>"), "min"},
       {"other geometry", array("", good + "<geometry>cube</geometry>"), "sphere"},
       {"no rays", array("<ruedo:rays>0</ruedo:rays>"), "rays"},

@@ -337,7 +337,7 @@ class PyEngine {
 
 NB_MODULE(_engine, module) {
   nb::set_leak_warnings(false);  // a daemon thread may hold an engine when the program ends
-  ruedo::scene::set_up_mesa();  // an import has the interpreter to itself
+  ruedo::scene::set_up_mesa();   // an import has the interpreter to itself
   module.attr("version") = ruedo::version();
   module.attr("build") = ruedo::log::own_version();
   nb::exception<ruedo::InputError>(module, "InputError", PyExc_ValueError);

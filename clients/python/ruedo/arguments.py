@@ -7,8 +7,11 @@ import operator
 from collections.abc import Iterable, Mapping
 from typing import Any
 
+from .errors import CONTROL
+
 MOST_WHOLE = 2**63 - 1
 MOST_SEED = 2**64 - 1
+MOST_NAME = 63  # bytes of UTF-8: of a client
 _MOST_SHOWN = 100  # characters
 
 
@@ -67,6 +70,17 @@ def text(what: str, value: Any) -> str:
     except UnicodeEncodeError:
         raise ValueError(f"{what} is {shown(value)}, with half a character in it") from None
     return value
+
+
+def client_name(value: Any) -> str:
+    """What a server takes as a client's name. Raises TypeError and ValueError."""
+    name = text("name", value)
+    if len(name) > MOST_NAME or not 1 <= len(name.encode()) <= MOST_NAME or CONTROL.search(name):
+        raise ValueError(
+            f"name is {shown(name[: MOST_NAME + 1])}: a client's name has 1 to {MOST_NAME} bytes of "
+            "UTF-8, without control characters"
+        )
+    return name
 
 
 def number(what: str, value: Any) -> float:

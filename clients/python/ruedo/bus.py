@@ -76,6 +76,11 @@ class Bus:
         """Whether this thread is in a handler of it: while that lasts, nothing is received."""
         return getattr(_receives_for, "bus", None) is self
 
+    @property
+    def is_connected(self) -> bool:
+        """False: what is published now reaches nobody."""
+        return self._transport.is_connected
+
     @staticmethod
     def check_size(channel: str, size: int) -> None:
         """Raises RuedoError for a message that no server would take."""

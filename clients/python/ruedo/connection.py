@@ -106,9 +106,21 @@ class Connection:
             return
         self.closed = _CLOSED
         if self.bus.handling or _is_in_another_call():
-            threading.Thread(target=self._end_all, name="ruedo-close", args=(False,)).start()
+            threading.Thread(  # that the program's end waits for, whatever thread this one is
+                target=self._end_all, name="ruedo-close", args=(False,), daemon=False
+            ).start()
         else:
             self._end_all(True)
+
+    def __reduce__(self) -> Any:
+        raise TypeError(
+            "a simulation belongs to its process, and can be neither copied nor pickled: hand on its "
+            f"url, {shown(self.url)}, and connect() there"
+        )
+
+    def server_has_ended(self) -> bool:
+        """Whether that is certain. One that is looked for in vain just now has ended, too."""
+        return bool(self._server and self._server.ended()) or not self.bus.is_connected
 
     def _end_all(self, awaits_callbacks: bool) -> None:
         with contextlib.ExitStack() as ends:  # all of it, whatever interrupts one
@@ -310,7 +322,8 @@ class Connection:
         self.drivers.end_all("new run")
         self.streams.forget()
         log.warning("another run has begun at %s: commands are not repeated into it", self.url)
-        self._new_run.call()
+        if not self.closed:
+            self._new_run.call()
 
     def _on_tick(self, data: bytes) -> None:
         if len(data) < _TICK.size:

@@ -118,7 +118,8 @@ class Session:
 
     def leave(self) -> None:
         """Gives the session back. Others would wait for a client in lockstep whose LEAVE was lost:
-        it is repeated until it is answered, for a moment, since the server may be gone.
+        it is repeated until it is answered, for a moment, since the server may be gone: in that
+        case no longer than that is unknown.
         """
         if not self._session:
             return
@@ -132,7 +133,8 @@ class Session:
                     self.publish(lcmtypes.request_t.LEAVE, self._session, sequence, b"")
                     if time.monotonic() >= deadline:
                         break
-                    self._news.wait(_REPEAT_SECONDS)
+                    if not self._news.wait(_REPEAT_SECONDS) and self._connection.server_has_ended():
+                        break
                 self._awaited, self._session = None, 0
         finally:
             if its_turn:

@@ -1,7 +1,7 @@
 """What can go wrong, in words that say what to do next.
 
-Every error of this package is a RuedoError, and can be pickled: a pool of processes hands it on. Bad arguments (NaN, a radius of 0) are plain
-ValueErrors.
+Every error of this package is a RuedoError, and can be pickled: a pool of processes hands it on.
+Bad arguments (NaN, a radius of 0) are plain ValueErrors.
 """
 
 from __future__ import annotations

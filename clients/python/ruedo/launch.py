@@ -89,6 +89,7 @@ def launch(
     simulation opens. Raises LaunchError with what the server said.
     """
     timeout = arguments.number("timeout", timeout)
+    name = arguments.client_name(name)
     options = _options(seed, rate, args, lockstep, spawn, disable, set, noise)
     port = _free_port() if view else 0
     if port:

@@ -364,6 +364,7 @@ class Stepper:
                     heard
                     and not self._fault
                     and not self._ask_now
+                    and not self._connection.closed
                     and self._have - self._acknowledged < _ACKNOWLEDGED_TOGETHER
                 ):
                     if self._taken and self._have >= until:
@@ -373,6 +374,7 @@ class Stepper:
                         self._sort()
                     if time.monotonic() >= quiet_at + _LAST_REPEAT:  # others may never be quiet
                         heard = False
+                self._connection.check_open()  # a callback may have closed it
                 if self._fault:
                     fault, self._fault, self._part = self._fault, None, False
                     raise fault

@@ -66,6 +66,7 @@ class MulticastTransport:
     """What waits is in the socket's buffer alone, for all channels together."""
 
     loses_nothing = False
+    is_connected = True
 
     def __init__(self, address: Address):
         try:

@@ -34,7 +34,8 @@ def connect(url: str | None = None, *, name: str | None = None, timeout: float =
     """
     at = resolve_url(None if url is None else arguments.text("url", url))
     own = "" if name is None else arguments.text("name", name)
-    return Simulation(at, own or f"client-{os.getpid()}", arguments.number("timeout", timeout))
+    own = arguments.client_name(own or f"client-{os.getpid()}")
+    return Simulation(at, own, arguments.number("timeout", timeout))
 
 
 class Simulation:

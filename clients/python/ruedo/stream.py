@@ -166,7 +166,7 @@ class Stream(Reader[T]):
         )
 
     def _receive(self, data: bytes) -> None:
-        if self._connection.in_doubt:
+        if self._connection.closed or self._connection.in_doubt:
             return
         try:
             sample = self._sample_of(data)

@@ -88,6 +88,10 @@ class StreamTransport:
         self._closed = False
         self._connect()
 
+    @property
+    def is_connected(self) -> bool:
+        return self._socket is not None
+
     def subscribe(self, channel: str) -> None:
         with self._lock:
             self._channels.add(channel)

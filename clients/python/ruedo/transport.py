@@ -17,6 +17,10 @@ class Transport(Protocol):
 
     loses_nothing: bool
 
+    @property
+    def is_connected(self) -> bool:
+        """False: nothing can be sent, since there is no server."""
+
     def subscribe(self, channel: str) -> None:
         """From the return on, every message of that channel is received."""
 

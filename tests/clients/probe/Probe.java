@@ -415,6 +415,16 @@ public final class Probe {
         say("end", last.step, last.stateHash, messages, ofGuest, digest.getValue());
     }
 
+    /** In a callback, while the step that calls it goes on. */
+    private static void leaves(Simulation sim, String[] a) {
+        sim.robot(a[1]).odometry().onSample(sample -> sim.close());
+        try {
+            sim.step(1000);
+        } catch (RuedoException.NoServer error) {
+            say("left");
+        }
+    }
+
     private static void launched(String[] a) throws InterruptedException {
         LaunchOptions options =
                 new LaunchOptions().seed(3).args(Arrays.copyOfRange(a, 1, a.length));
@@ -477,7 +487,7 @@ public final class Probe {
             readLog(a);
             return;
         }
-        boolean named = command.equals("lockstep") || command.equals("visited");
+        boolean named = List.of("lockstep", "visited", "leaves").contains(command);
         try (Simulation sim =
                 command.equals("connect")
                         ? Ruedo.connect(url)
@@ -491,6 +501,9 @@ public final class Probe {
                     break;
                 case "visited":
                     visited(sim, a);
+                    break;
+                case "leaves":
+                    leaves(sim, a);
                     break;
                 case "connect":
                     say("connected", sim.world());

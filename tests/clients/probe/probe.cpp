@@ -442,13 +442,25 @@ void read_log(const std::vector<std::string>& a) {
   report("mismatch", [&] { static_cast<void>(log.samples<rc::Scan>("p3at/pose")); });
 }
 
+// In a callback, while the step that calls it goes on.
+void leaves(rc::Simulation& sim, const std::vector<std::string>& a) {
+  const rc::Subscription calls =
+      sim.robot(a[1]).odometry().on_sample([&](const rc::Odometry&) { sim.close(); });
+  try {
+    static_cast<void>(sim.step(1000));
+  } catch (const rc::NoServer&) {
+    say("left");
+  }
+}
+
 void act(const std::string& url, const std::string& command, const std::vector<std::string>& a) {
   if (command == "launch") launched(a);
   if (command == "launch_with") return launched_with(a[0], a.size() > 1 ? a[1] : "");
   if (command == "log") return read_log(a);
-  const rc::Simulation sim =
-      rc::connect(url, {.name = command == "lockstep" || command == "visited" ? a[0] : "",
-                        .timeout = command == "connect" ? 2.0 : 60.0});
+  const bool named = command == "lockstep" || command == "visited" || command == "leaves";
+  rc::Simulation sim =
+      rc::connect(url, {.name = named ? a[0] : "", .timeout = command == "connect" ? 2.0 : 60.0});
+  if (command == "leaves") leaves(sim, a);
   if (command == "lockstep") lockstep(sim, a);
   if (command == "visited") visited(sim, a);
   if (command == "given_up") given_up(sim);

@@ -323,6 +323,15 @@ def visited(sim, name):
     say("end", last.step, last.state_hash, messages, of_guest, digest)
 
 
+def leaves(sim, name):
+    """In a callback, while the step that calls it goes on."""
+    sim.robot(name).odometry.on_sample(lambda _: sim.close())
+    try:
+        sim.step(1000)
+    except ruedo.NoServer:
+        say("left")
+
+
 def launched(sim):
     say("url", sim.url)
     say("ready", sim.robots[0].odometry.latest().time >= 0.0)
@@ -370,13 +379,14 @@ def main():
             launched(ruedo.launch(rest[0], seed=3, args=rest[1:]))
         with ruedo.connect(
             url,
-            name=rest[0] if command in ("lockstep", "visited") else None,
+            name=rest[0] if command in ("lockstep", "visited", "leaves") else None,
             timeout=2.0 if command == "connect" else 60.0,
         ) as sim:
             actions = {
                 "lockstep": lambda: lockstep(sim, *rest[1:]),
                 "given_up": lambda: given_up(sim),
                 "visited": lambda: visited(sim, *rest[1:]),
+                "leaves": lambda: leaves(sim, *rest[1:]),
                 "connect": lambda: say("connected", sim.world),
                 "list": lambda: list_all(sim),
                 "read": lambda: read(sim, *rest),

@@ -34,6 +34,8 @@ class FakeServer {
   using Bytes = std::vector<uint8_t>;
 
   std::atomic<int64_t> run_id{7};
+  std::atomic<bool> gone{false};  // nothing is answered, and the client's transport knows
+  std::atomic<int> lost_leaves{0}, leaves{0};
   std::vector<std::string> robots{"p3at"};
 
   template <class Message>
@@ -140,6 +142,8 @@ class FakeServer {
     if (channel != "ruedo/request") return;
     request_t request;
     if (request.decode(bytes, 0, static_cast<int>(size)) < 0) return;
+    if (request.kind == request_t::LEAVE && ++leaves <= lost_leaves) return;
+    if (gone) return;
     if (request.kind == request_t::INFO) return send_info();
     reply_t reply{};
     reply.run_id = run_id;
@@ -171,6 +175,7 @@ class FakeTransport : public Transport {
   void publish(const std::string& channel, const uint8_t* bytes, size_t size) override {
     server_->hear(channel, bytes, size);
   }
+  bool is_connected() override { return !server_->gone; }
   bool receive(std::chrono::milliseconds timeout, const Receiver& receiver) override {
     std::unique_lock lock(server_->mutex_);
     if (!server_->news_.wait_for(lock, timeout, [&] { return !server_->to_client_.empty(); }))

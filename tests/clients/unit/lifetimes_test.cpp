@@ -184,6 +184,34 @@ TEST_F(Lifetimes, ACallbackMayDestroyTheSimulation) {
   EXPECT_FALSE(sim);
 }
 
+TEST_F(Lifetimes, WhoLeavesInACallbackSaysSoUntilItIsAnswered) {
+  server->lost_leaves = 2;
+  Simulation sim = simulation(server);
+  sim.pause();
+  int count = 0;
+  sim.robot("p3at")
+      .odometry()
+      .on_sample([&](const Odometry&) {
+        ++count;
+        sim.close();
+        server->send_odometry("p3at", 2000, 0.0);
+      })
+      .keep();
+  server->send_odometry("p3at", 1000, 0.0);
+  server->await([&] { return server->leaves > 0; });
+  sim.close();  // which waits for the end
+  EXPECT_EQ(server->leaves, 3);
+  EXPECT_EQ(count, 1);
+}
+
+TEST_F(Lifetimes, AServerThatHasEndedIsNotWaitedFor) {
+  Simulation sim = simulation(server);
+  sim.pause();
+  server->gone = true;
+  sim.close();
+  EXPECT_EQ(server->leaves, 1);
+}
+
 TEST_F(Lifetimes, TwoSimulationsInAProcessEndInEitherOrder) {
   for (const bool first_ends_first : {true, false}) {
     const auto first_server = std::make_shared<FakeServer>(),
@@ -300,6 +328,9 @@ TEST_F(Lifetimes, WhatNoServerTakesIsRefusedAtOnce) {
   EXPECT_THROW((void)sim.robot("p3at").odometry().on_sample({}), std::invalid_argument);
   EXPECT_THROW((void)sim.on_new_run({}), std::invalid_argument);
   EXPECT_THROW(sim.sleep(std::nan("")), std::invalid_argument);
+  for (const std::string& name : {std::string(64, 'x'), std::string(10'000'000, 'x'),
+                                  std::string("a\nb"), std::string("\xe9"), std::string("\u202e")})
+    EXPECT_THROW((void)connect("memq://", {.name = name}), std::invalid_argument);
 }
 
 TEST_F(Lifetimes, ATimeThatNoNumberHoldsIsLong) {

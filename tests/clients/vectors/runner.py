@@ -111,6 +111,7 @@ class PipeTransport:
     """Frames on standard input and output: the lengths of channel and message, and both."""
 
     loses_nothing = False
+    is_connected = True
 
     def __init__(self):
         self._in, self._out = sys.stdin.buffer, sys.stdout.buffer

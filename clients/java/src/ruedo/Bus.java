@@ -21,7 +21,9 @@ final class Bus implements Transport.Receiver {
             new ConcurrentHashMap<>(); // lists are never changed
     private static final int LARGEST = 4 << 20; // bytes: what a server takes from a client
     private volatile boolean closed;
-    private volatile Thread handling; // the one that is in a handler
+
+    /** The one that this thread is in a handler of. */
+    private static final ThreadLocal<Bus> HANDLING = new ThreadLocal<>();
 
     Bus(Transport transport) {
         this.transport = transport;
@@ -58,19 +60,28 @@ final class Bus implements Transport.Receiver {
 
     @Override
     public void receive(String channel, byte[] message) {
-        handling = Thread.currentThread();
+        HANDLING.set(this);
         try {
             for (Subscription subscription : handlers.getOrDefault(channel, List.of())) {
                 if (!closed) subscription.call(message);
             }
         } finally {
-            handling = null;
+            HANDLING.remove();
         }
+    }
+
+    /** False: what is published now reaches nobody. */
+    boolean isConnected() {
+        return transport.isConnected();
     }
 
     /** Whether this thread is in a handler: while that lasts, nothing is received. */
     boolean handling() {
-        return handling == Thread.currentThread();
+        return HANDLING.get() == this;
+    }
+
+    static boolean inAnyHandler() {
+        return HANDLING.get() != null;
     }
 
     /** Throws RuedoException for a message that no server would take. */

@@ -1,5 +1,7 @@
 package ruedo;
 
+import static java.nio.charset.StandardCharsets.UTF_8;
+
 import ruedo.lcmtypes.Message;
 import ruedo.lcmtypes.join_t;
 import ruedo.lcmtypes.reply_t;
@@ -20,6 +22,7 @@ final class Session {
     static final String REQUEST_CHANNEL = "ruedo/request";
     private static final long REPEAT_MILLIS = 100;
     private static final double PARTING_SECONDS = 0.5; // for the answer to a LEAVE
+    private static final int MOST_NAME = 63; // bytes of UTF-8
     private static final int HEAD = 52; // bytes of a request_t without a body
     private static final Map<Integer, String> KINDS = kinds();
 
@@ -34,6 +37,13 @@ final class Session {
     private reply_t reply;
 
     Session(Simulation sim, String name) {
+        int size = name.length() > MOST_NAME ? MOST_NAME + 1 : name.getBytes(UTF_8).length;
+        if (size == 0 || size > MOST_NAME || WireReader.hasControl(name))
+            throw new IllegalArgumentException(
+                    "the name '"
+                            + WireReader.printed(name.substring(0, Math.min(size, MOST_NAME)))
+                            + "': a client's has 1 to 63 bytes of UTF-8, without control"
+                            + " characters");
         this.sim = sim;
         this.name = name;
     }
@@ -83,11 +93,12 @@ final class Session {
 
     /**
      * Gives the session back. Others would wait for a client in lockstep whose LEAVE was lost: it
-     * is repeated until it is answered, for a moment, since the server may be gone.
+     * is repeated until it is answered, for a moment, since the server may be gone: in that case no
+     * longer than that is unknown.
      */
     synchronized void leave() {
         if (session == 0) return;
-        Deadline deadline = new Deadline(sim.bus.handling() ? 0.0 : PARTING_SECONDS);
+        Deadline deadline = new Deadline(PARTING_SECONDS);
         synchronized (news) {
             awaitedKind = request_t.LEAVE;
             awaitedSequence = ++sequence;
@@ -97,6 +108,7 @@ final class Session {
                 if (deadline.passed()) break;
                 try {
                     deadline.waitOn(news, REPEAT_MILLIS);
+                    if (reply == null && sim.serverHasEnded()) break;
                 } catch (RuedoException.Interrupted error) {
                     break; // what remains to be closed is closed
                 }

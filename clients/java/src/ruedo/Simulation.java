@@ -21,6 +21,7 @@ import java.util.List;
 import java.util.Map;
 import java.util.Set;
 import java.util.concurrent.ConcurrentHashMap;
+import java.util.concurrent.CountDownLatch;
 import java.util.concurrent.atomic.AtomicLong;
 import java.util.function.Supplier;
 
@@ -64,6 +65,7 @@ public final class Simulation implements AutoCloseable {
     private volatile long asked = System.nanoTime(); // for info
     private final RunWatch watch = new RunWatch(this::tellAnotherServer);
     private volatile boolean closed;
+    private final CountDownLatch ended = new CountDownLatch(1); // all that close() ends
 
     Simulation(String url, String name, double timeout, ServerProcess server) {
         this(new Address(url), name, timeout, server, null);
@@ -394,18 +396,45 @@ public final class Simulation implements AutoCloseable {
     /**
      * Ends repeated commands, and a server that launch() started. A program that ends without it
      * leaves nothing behind either: the watchdog stops its robots, and its server ends with the
-     * pipe to it.
+     * pipe to it. In a callback it returns at once, and the end follows by itself; a second call
+     * waits for it.
      */
     @Override
     public void close() {
+        boolean first;
         synchronized (this) {
-            if (closed) return;
+            first = !closed;
             closed = true;
             notifyAll();
         }
+        if (!first) {
+            if (!Bus.inAnyHandler()) awaitEnd();
+            return;
+        }
+        // In a callback, this thread is what receives the answer to a LEAVE: another one waits for
+        // it.
+        if (bus.handling()) new Thread(this::end, "ruedo-close").start();
+        else end();
+    }
+
+    private void end() {
         session.leave();
         bus.close();
         if (server != null) server.end();
+        ended.countDown();
+    }
+
+    private void awaitEnd() {
+        try {
+            ended.await();
+        } catch (InterruptedException error) {
+            Thread.currentThread().interrupt();
+        }
+    }
+
+    /** For certain; one that is looked for in vain just now has, too. */
+    boolean serverHasEnded() {
+        return (server != null && server.ended() != null) || !bus.isConnected();
     }
 
     @Override
@@ -457,6 +486,10 @@ public final class Simulation implements AutoCloseable {
     private synchronized void noteTick(long now) {
         if (now < utime - MOST_AHEAD_MICROS) utime = Math.max(now, 0);
         noteTime(now);
+    }
+
+    boolean isClosed() {
+        return closed;
     }
 
     void checkOpen() {
@@ -592,6 +625,7 @@ public final class Simulation implements AutoCloseable {
         for (Stream<?> stream : known) stream.forget();
         System.err.println(
                 "ruedo: another run has begun at " + url + ": commands are not repeated into it");
+        if (closed) return;
         for (Subscription callback : newRun) callback.call(null);
     }
 

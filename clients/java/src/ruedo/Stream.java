@@ -117,7 +117,7 @@ public class Stream<T extends Sample> extends Reader<T> {
 
     @SuppressWarnings("unchecked")
     private void receive(byte[] message) {
-        if (sim.inDoubt()) return;
+        if (sim.isClosed() || sim.inDoubt()) return;
         T received = null;
         RuedoException wrong = null;
         try {

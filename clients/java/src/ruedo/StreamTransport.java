@@ -66,6 +66,11 @@ final class StreamTransport implements Transport {
     }
 
     @Override
+    public synchronized boolean isConnected() {
+        return socket != null;
+    }
+
+    @Override
     public synchronized void close() {
         closed = true;
         drop();

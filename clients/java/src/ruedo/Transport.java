@@ -31,5 +31,10 @@ interface Transport {
     /** What cannot be sent is lost, as any datagram may be; unanswered requests are repeated. */
     void publish(String channel, byte[] message);
 
+    /** False: nothing can be sent, since there is no server. */
+    default boolean isConnected() {
+        return true;
+    }
+
     void close();
 }
