@@ -133,9 +133,13 @@ def test_a_second_driver_is_refused(whole):
         )
 
 
-@pytest.mark.parametrize("told", ["INT", "TERM", "HUP"])
-def test_who_ends_a_campaign_leaves_nothing_behind(told, folder):
-    """Neither processes, of its controllers' either, nor folders; what was run is kept."""
+@pytest.mark.parametrize(
+    ("told", "hang"), [("INT", False), ("TERM", False), ("HUP", False), ("INT", True)]
+)
+def test_who_ends_a_campaign_leaves_nothing_behind(told, hang, folder):
+    """Neither processes, of its controllers' either, nor folders, whether or not the workers hang;
+    what was run is kept.
+    """
     temporary = folder / "temporary"
     temporary.mkdir()
     command = '{name: ahead, command: "sleep 1000 & echo $! > child.$$; wait"}'
@@ -151,11 +155,13 @@ def test_who_ends_a_campaign_leaves_nothing_behind(told, folder):
     )
     wait_for(lambda: sum(f.stat().st_size > 0 for f in folder.glob("child.*")) == 2)
     begun = [int(file.read_text()) for file in folder.glob("child.*")] + children(driver.pid)
+    for worker in children(driver.pid) if hang else []:
+        os.kill(worker, signal.SIGSTOP)
     driver.send_signal(getattr(signal, f"SIG{told}"))
     said = driver.communicate(timeout=PATIENCE)[1]
     assert driver.returncode == 4 and "ruedo: interrupted; what was run is kept" in said
     assert not [path.name for path in temporary.iterdir()]
-    assert not [process for process in begun if os.path.exists(f"/proc/{process}")]
+    wait_for(lambda: not any(os.path.exists(f"/proc/{process}") for process in begun))
 
 
 def test_a_full_disk_is_one_line_and_loses_nothing(whole):

@@ -62,5 +62,17 @@ TEST(FairQueue, TheNextClientIsNextHoweverManyWait) {
   EXPECT_THAT(all_that_may(queue, kStart + milliseconds(1), kAnybody), ElementsAre(-1));
 }
 
+TEST(FairQueue, CrowdsAreAnsweredMoreSlowly) {
+  Queue queue({.per_second = 1e6, .at_once = 1e6}, {.per_second = 100.0, .at_once = 2.0});
+  for (int i = 0; i < 60; ++i) queue.push(1, i);
+  for (int i = 0; i < 3; ++i) queue.push(2, -i);
+  EXPECT_THAT(all_that_may(queue, kStart, kAnybody), ElementsAre(0, 0, 1, -1, -2));
+  EXPECT_THAT(all_that_may(queue, kStart + milliseconds(10), kAnybody), ElementsAre(2));
+  EXPECT_THAT(all_that_may(queue, kStart + milliseconds(30), kAnybody), ElementsAre(3, 4));
+  // What is left is no crowd any more.
+  for (int ms = 50; ms <= 150; ms += 20) all_that_may(queue, kStart + milliseconds(ms), kAnybody);
+  EXPECT_TRUE(queue.empty());
+}
+
 }  // namespace
 }  // namespace ruedo::ros2

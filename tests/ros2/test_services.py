@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import itertools
+import math
 import random
+import time
 
 import pytest
 from conftest import Peer, Run, take, wait_for
@@ -48,7 +50,10 @@ class Client:
         self.sequence = itertools.count(1)
         self.ends = {}
 
-    def call(self, service: str, *arguments):
+    def call(self, service: str, *arguments, again: bool = False):
+        """The reply. again: calls again every 30 s, for beside a flood more is not promised while
+        the run gets no processor (docs/ros2.md).
+        """
         question, answer = self.services[service]
         if service not in self.ends:
             writer = self.peer.writer(f"/{service}Request", question, prefix="rq")
@@ -61,9 +66,13 @@ class Client:
             self.ends[service] = writer, reader
         writer, reader = self.ends[service]
         sequence = next(self.sequence)
-        writer.write(question(self.mark, sequence, *arguments))
+        asked = -math.inf
 
         def mine():
+            nonlocal asked
+            if asked == -math.inf or (again and time.monotonic() > asked + 30.0):
+                asked = time.monotonic()
+                writer.write(question(self.mark, sequence, *arguments))
             replies = [r for r in reader.take(N=1000) if hasattr(r, "__idl__")]
             return [r for r in replies if (r.client, r.sequence_number) == (self.mark, sequence)]
 

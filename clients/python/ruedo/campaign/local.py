@@ -17,6 +17,7 @@ from typing import Any
 from .case import Outcome, remove_scratch, too_slow
 from .errors import CampaignError
 from .plan import Case
+from .processes import kill_with_descendants
 
 _GRACE = 5.0  # s beyond a case's own limit, before its worker is killed
 _PARTING = 2.0  # s that a worker has to end what it has started
@@ -77,7 +78,7 @@ class Worker:
         try:
             code = self._process.wait(_PARTING)
         except subprocess.TimeoutExpired:
-            self._process.kill()
+            kill_with_descendants(self._process.pid)
             code = self._process.wait()
         self.pipe.close()
         remove_scratch(self._process.pid)

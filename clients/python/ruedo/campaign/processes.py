@@ -47,14 +47,22 @@ def ends_within(pid: int, seconds: float) -> bool:
         os.close(descriptor)
 
 
-def _children() -> list[int]:
+def kill_with_descendants(pid: int) -> None:
+    """Kills a process and all that it has started, itself first."""
+    family = [pid]
+    for one in family:
+        family += _children(one)
+    for one in family:
+        with suppress(ProcessLookupError):
+            os.kill(one, signal.SIGKILL)
+
+
+def _children(pid: int | str = "self") -> list[int]:
     found: list[int] = []
-    for task in os.listdir("/proc/self/task"):
-        try:
-            with open(f"/proc/self/task/{task}/children") as stream:
+    with suppress(OSError):  # it has ended
+        for task in os.listdir(f"/proc/{pid}/task"):
+            with suppress(OSError), open(f"/proc/{pid}/task/{task}/children") as stream:
                 found += [int(one) for one in stream.read().split()]
-        except OSError:
-            pass
     return found
 
 
