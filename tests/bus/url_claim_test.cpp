@@ -90,7 +90,7 @@ TEST(RivalWatch, NamesEachRivalOnceAndNeverItself) {
   }
   fake.handler("p3at/velocity", rival.data(), 1);
   ASSERT_EQ(said.size(), 1u);
-  EXPECT_NE(said[0].find("run 22, world hall?2; this one is run 11"), std::string::npos) << said[0];
+  EXPECT_NE(said[0].find("run 22, world hall 2; this one is run 11"), std::string::npos) << said[0];
   EXPECT_EQ(heard, std::vector<std::string>{"p3at/velocity"});
   // Messages that only look like an info, and a large number of servers.
   fake.handler("ruedo/info", rival.data(), 20);

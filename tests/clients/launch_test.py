@@ -19,7 +19,7 @@ def servers_of(url):
     found, network = [], os.readlink("/proc/self/ns/net")
     for folder in Path("/proc").glob("[0-9]*"):
         try:
-            words = (folder / "cmdline").read_bytes().decode().split("\0")
+            words = (folder / "cmdline").read_bytes().decode(errors="replace").split("\0")
             if url in words and os.readlink(folder / "ns/net") != network:
                 continue
             state = (folder / "stat").read_text().rsplit(")", 1)[1].split()[0]

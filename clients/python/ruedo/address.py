@@ -65,7 +65,8 @@ def _address(url: str) -> Address:
     group = host or default_host
     if not _is_group(group):
         raise ValueError(f"'{group}' is no multicast group (224.0.0.0 to 239.255.255.255)")
-    return Address(scheme, group, port, **_options(options))
+    ttl, receive_buffer = _options(options)
+    return Address(scheme, group, port, ttl=ttl, receive_buffer=receive_buffer)
 
 
 def _number(digits: str, least: int, most: int) -> int | None:
@@ -89,20 +90,20 @@ def _is_group(text: str) -> bool:
         return False
 
 
-def _options(text: str) -> dict[str, int]:
-    bounds = {"ttl": ("ttl", 0, 255), "recv_buf_size": ("receive_buffer", 1, 2**31 - 1)}
+def _options(text: str) -> tuple[int, int]:
+    """ttl and receive_buffer of an Address."""
+    bounds = {"ttl": (0, 255), "recv_buf_size": (1, 2**31 - 1)}
     found: dict[str, int] = {}
     for pair in text.removesuffix("&").split("&") if text else []:
         key, _, digits = pair.partition("=")
-        name, least, most = bounds.get(key, ("", 0, 0))
-        value = _number(digits, least, most) if name else None
-        if value is None or name in found:
+        value = _number(digits, *bounds[key]) if key in bounds else None
+        if value is None or key in found:
             raise ValueError(
                 f"the option '{pair}' is not allowed: ttl, 0 to 255, and recv_buf_size, "
                 "1 to 2147483647 bytes, are, each once"
             )
-        found[name] = value
-    return found
+        found[key] = value
+    return found.get("ttl", 0), found.get("recv_buf_size", 0)
 
 
 def resolve_url(url: str | None) -> str:
