@@ -23,6 +23,7 @@ SignalThread::SignalThread() {
 
 SignalThread::~SignalThread() {
   done_ = true;
+  // It is blocked, and only wakes the thread. NOLINTNEXTLINE(bugprone-bad-signal-to-kill-thread)
   pthread_kill(thread_.native_handle(), SIGTERM);
   thread_.join();
 }
