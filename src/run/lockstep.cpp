@@ -119,9 +119,14 @@ std::string Lockstep::fault_of(const grant_request_t& grant, const Member& membe
     return fmt::format("step_until is {}, and granted {}: at most {} steps at once are allowed",
                        grant.step_until, grant.granted, kMostSteps);
   }
-  if (grant.received > published_)
-    return fmt::format("received is {}, but the newest state is {}", grant.received, published_);
-  return "";
+  return fault_of(grant.received, member);
+}
+
+// Who joined on the way stands where the others' grants do, which may be ahead of what is
+// published.
+std::string Lockstep::fault_of(int64_t received, const Member& member) const {
+  if (received <= std::max(published_, member.received)) return "";
+  return fmt::format("received is {}, but the newest state is {}", received, published_);
 }
 
 std::string Lockstep::take_commands(const grant_request_t& grant, std::vector<Held>& held) const {

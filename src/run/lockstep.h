@@ -106,7 +106,8 @@ class Lockstep : public Mode {
   engine::Outcome take_part(const Session& session);
   engine::Outcome stands(const Member& member) const;
   std::string fault_of(const grant_request_t& grant,
-                       const Member& member) const;  // "": none; as the next
+                       const Member& member) const;  // "": none; as the next two
+  std::string fault_of(int64_t received, const Member& member) const;
   std::string take_commands(const grant_request_t& grant,
                             std::vector<Held>& held) const;  // what is wrong; "": nothing
   bool has_room(const Member& member, size_t count, size_t bytes) const;

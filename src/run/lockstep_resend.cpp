@@ -28,14 +28,11 @@ engine::Outcome Lockstep::resend(const request_t& request, const Session& sessio
   if (!member)
     return engine::Outcome::refuse(reply_t::UNKNOWN_SESSION,
                                    "this client does not take part in lockstep (any more)");
-  if (body.received > published_) {
-    return engine::Outcome::refuse(
-        reply_t::BAD_REQUEST,
-        fmt::format("received is {}, but the newest state is {}", body.received, published_));
-  }
+  if (std::string wrong = fault_of(body.received, *member); !wrong.empty())
+    return engine::Outcome::refuse(reply_t::BAD_REQUEST, std::move(wrong));
   member->received = std::max(member->received, body.received);
   forget();
-  if (over_ && member->received == published_) {
+  if (over_ && member->received >= published_) {
     return engine::Outcome::refuse(reply_t::REFUSED,
                                    fmt::format("the run has ended at step {}", published_));
   }

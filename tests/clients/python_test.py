@@ -2,6 +2,7 @@
 for wrong types, forks, logs.
 """
 
+import contextlib
 import copy
 import gc
 import math
@@ -545,10 +546,23 @@ def test_a_name_that_no_server_takes_is_refused_at_once(name):
             call("unix:///nowhere", name=name)
 
 
+@pytest.mark.parametrize("in_turn", [True, False])
+def test_a_leave_is_repeated_a_few_times(in_turn, monkeypatch):
+    """All of them are lost. Also by who does not get its turn."""
+    with ruedo_run(*("--lockstep", "1", "--disable", "p3at/camera"), world=HALL) as server:
+        sim = ruedo.connect(server.url, name="first", timeout=PATIENCE)
+        sim.step(1, timeout=PATIENCE)
+        session, leaves = sim._connection.session, []
+        monkeypatch.setattr(session, "publish", lambda *request: leaves.append(request))
+        with contextlib.nullcontext() if in_turn else session.turn():
+            sim.close()
+        assert len(leaves) == 5 and len(set(leaves)) == 1
+
+
 @pytest.mark.parametrize("kind", ["launched", "unix", "tcpq"])
 def test_a_server_that_has_ended_is_not_waited_for(kind, monkeypatch, tmp_path):
     """Its answer to a LEAVE is awaited for much longer than the test may take."""
-    monkeypatch.setattr("ruedo.control._PARTING_SECONDS", 10.0 * PATIENCE)
+    monkeypatch.setattr("ruedo.control._MOST_LEAVES", int(100.0 * PATIENCE))
     if kind == "launched":
         sim = ruedo.launch(HALL, **QUICK)
         sim.pause()

@@ -117,6 +117,14 @@ class LockstepModeTest : public testing::Test {
   engine::Outcome grant(int client, int64_t from, int64_t until, int64_t received = -1) {
     return lockstep_->grant(granting(from, until, received), sessions_[client]);
   }
+  engine::Outcome having(int client, int64_t received) {
+    resend_request_t body{};
+    body.received = received;
+    request_t request{};
+    request.kind = request_t::RESEND;
+    request.body = engine::encoded(body);
+    return lockstep_->grant(request, sessions_[client]);
+  }
   void join_all() {
     for (size_t i = 0; i < sessions_.size(); ++i)
       EXPECT_EQ(grant(static_cast<int>(i), -1, -1).code, reply_t::OK);
@@ -152,6 +160,28 @@ TEST_F(LockstepModeTest, GoesToTheSmallestGrant) {
   EXPECT_EQ(lockstep_->granted(), 4);
   grant(1, 4, 20);
   EXPECT_EQ(world_.gate.limit, 10);
+}
+
+TEST_F(LockstepModeTest, WhoJoinsStandsWhereTheRunIsAllowedToGo) {
+  begin(1);
+  join_all();
+  sessions_.push_back({});
+  sessions_[1].id = 2;
+  sessions_[1].client = "b";
+  publish(0);
+  grant(0, 0, 100);
+  const engine::Outcome joined = grant(1, -1, -1);
+  grant_reply_t stands{};
+  ASSERT_GT(stands.decode(joined.body.data(), 0, static_cast<int>(joined.body.size())), 0);
+  EXPECT_EQ(stands.granted, 100);
+  EXPECT_EQ(stands.received, 100);
+  EXPECT_EQ(stands.step, 0);
+  // What it was told it may repeat, though state 1 is not there yet; no more.
+  EXPECT_EQ(having(1, 100).code, reply_t::OK);
+  EXPECT_EQ(having(1, 101).code, reply_t::BAD_REQUEST);
+  EXPECT_EQ(grant(1, 100, 101, 101).code, reply_t::BAD_REQUEST);
+  EXPECT_EQ(grant(1, 100, 101, 100).code, reply_t::OK);
+  EXPECT_EQ(grant(0, 100, 101, 1).code, reply_t::BAD_REQUEST);  // the other one cannot have it
 }
 
 TEST_F(LockstepModeTest, BeginsAgainWithAWorldMadeAnew) {

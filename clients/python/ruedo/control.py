@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 REQUEST_CHANNEL = "ruedo/request"
 _REPEAT_SECONDS = 0.1
-_PARTING_SECONDS = 0.5  # for the answer to a LEAVE
+_MOST_LEAVES = 5  # that are sent: for half a second in all
 
 
 def _names(of: Any) -> dict[int, str]:
@@ -118,22 +118,22 @@ class Session:
 
     def leave(self) -> None:
         """Gives the session back. Others would wait for a client in lockstep whose LEAVE was lost:
-        it is repeated until it is answered, for a moment, since the server may be gone: in that
-        case no longer than that is unknown.
+        it is repeated until it is answered, but a few times only, since the server may be gone.
+        Times are counted, not seconds: in a second without a processor one alone would go out.
         """
         if not self._session:
             return
-        its_turn = self._one_at_a_time.acquire(timeout=_PARTING_SECONDS)
-        deadline = time.monotonic() + (_PARTING_SECONDS if its_turn else 0.0)
+        # Whoever has the turn notices soon that this client is closed, unless it is a daemon thread
+        # and the program has ended.
+        its_turn = self._one_at_a_time.acquire(timeout=_REPEAT_SECONDS * _MOST_LEAVES)
         try:
             with self._news:
                 sequence = self.next_sequence()
                 self._awaited, self._reply = (lcmtypes.request_t.LEAVE, sequence), None
-                while self._reply is None:
+                for _ in range(_MOST_LEAVES):
                     self.publish(lcmtypes.request_t.LEAVE, self._session, sequence, b"")
-                    if time.monotonic() >= deadline:
-                        break
-                    if not self._news.wait(_REPEAT_SECONDS) and self._connection.server_has_ended():
+                    self._news.wait(_REPEAT_SECONDS)
+                    if self._reply is not None or self._connection.server_has_ended():
                         break
                 self._awaited, self._session = None, 0
         finally:

@@ -204,6 +204,14 @@ TEST_F(Lifetimes, WhoLeavesInACallbackSaysSoUntilItIsAnswered) {
   EXPECT_EQ(count, 1);
 }
 
+TEST_F(Lifetimes, ALeaveIsRepeatedAFewTimes) {
+  server->lost_leaves = 1000;
+  Simulation sim = simulation(server);
+  sim.pause();
+  sim.close();
+  EXPECT_EQ(server->leaves, 5);
+}
+
 TEST_F(Lifetimes, AServerThatHasEndedIsNotWaitedFor) {
   Simulation sim = simulation(server);
   sim.pause();

@@ -21,7 +21,7 @@ import java.util.Map;
 final class Session {
     static final String REQUEST_CHANNEL = "ruedo/request";
     private static final long REPEAT_MILLIS = 100;
-    private static final double PARTING_SECONDS = 0.5; // for the answer to a LEAVE
+    private static final int MOST_LEAVES = 5; // that are sent: for half a second in all
     private static final int MOST_NAME = 63; // bytes of UTF-8
     private static final int HEAD = 52; // bytes of a request_t without a body
     private static final Map<Integer, String> KINDS = kinds();
@@ -93,22 +93,20 @@ final class Session {
 
     /**
      * Gives the session back. Others would wait for a client in lockstep whose LEAVE was lost: it
-     * is repeated until it is answered, for a moment, since the server may be gone: in that case no
-     * longer than that is unknown.
+     * is repeated until it is answered, but a few times only, since the server may be gone. Times
+     * are counted, not seconds: in a second without a processor one alone would go out.
      */
     synchronized void leave() {
         if (session == 0) return;
-        Deadline deadline = new Deadline(PARTING_SECONDS);
         synchronized (news) {
             awaitedKind = request_t.LEAVE;
             awaitedSequence = ++sequence;
             reply = null;
-            while (reply == null) {
+            for (int sent = 0; sent < MOST_LEAVES; ++sent) {
                 publish(request_t.LEAVE, session, sequence, new byte[0]);
-                if (deadline.passed()) break;
                 try {
-                    deadline.waitOn(news, REPEAT_MILLIS);
-                    if (reply == null && sim.serverHasEnded()) break;
+                    new Deadline(Double.POSITIVE_INFINITY).waitOn(news, REPEAT_MILLIS);
+                    if (reply != null || sim.serverHasEnded()) break;
                 } catch (RuedoException.Interrupted error) {
                     break; // what remains to be closed is closed
                 }
