@@ -123,10 +123,10 @@ void keep_channels(const std::string& from, const std::string& to,
 }
 
 // What differs from the golden log, or "".
-std::string compare(const RegressArguments& arguments, const std::string& kept) {
+std::string compare(const RegressArguments& arguments, const std::string& kept,
+                    const std::vector<log::DiffRule>& rules) {
   if (std::error_code unreadable; !fs::exists(arguments.golden, unreadable))
     return "there is no golden log " + arguments.golden + " yet: run this once with RUEDO_RENEW=1";
-  const auto rules = log::DiffRule::all(arguments.tolerances, arguments.ignored);
   const log::Diff result = log::diff_logs(arguments.golden, kept, rules);
   if (!arguments.junit.empty()) write_file(arguments.junit, log::diff_junit(result));
   if (!arguments.html.empty())
@@ -204,6 +204,7 @@ int regress(RegressArguments arguments) {
   if (arguments.odometry_error >= 0.0) expected.odometry_error = arguments.odometry_error;
   expected.clearance_reach = arguments.clearance_reach;
   if (arguments.keep.empty()) arguments.keep = {"*/pose"};
+  const auto rules = log::DiffRule::all(arguments.tolerances, arguments.ignored);
   const char* environment = std::getenv("RUEDO_RENEW");
   const bool renew =
       arguments.renew || (environment && *environment && std::string(environment) != "0");
@@ -233,7 +234,7 @@ int regress(RegressArguments arguments) {
                   arguments.keep);
     if (renew && failures.empty()) {
       fmt::print("renewed {}\n", arguments.golden);
-    } else if (std::string difference = compare(arguments, kept); !difference.empty()) {
+    } else if (std::string difference = compare(arguments, kept, rules); !difference.empty()) {
       failures.push_back(difference);
     }
   }

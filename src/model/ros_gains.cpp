@@ -10,24 +10,23 @@
 namespace ruedo::model {
 namespace {
 
-const Allowed kGain = Allowed::any(quantity::kDamping);
+const Allowed kGain = Allowed::not_negative(quantity::kDamping);
+const Allowed kClamp = Allowed::any(quantity::kDamping);
 
-double number(const Element& map, std::initializer_list<const char*> names, double fallback) {
-  for (const char* name : names) {
-    if (const Element* written = map.child(name)) return written->as_number(kGain);
-  }
-  return fallback;
+double number(const Element& map, const char* name, const Allowed& allowed, double fallback = 0.0) {
+  const Element* written = map.child(name);
+  return written ? written->as_number(allowed) : fallback;
 }
 
 // As in control_toolbox: without a clamp, the integral part has no effect.
 Pid pid_of(const Element& gains) {
   Pid pid;
-  pid.p = std::max(0.0, number(gains, {"p"}, 0.0));
-  pid.i = std::max(0.0, number(gains, {"i"}, 0.0));
-  pid.d = std::max(0.0, number(gains, {"d"}, 0.0));
-  const double clamp = std::abs(number(gains, {"i_clamp"}, 0.0));
-  pid.i_max = std::max(0.0, number(gains, {"i_clamp_max"}, clamp));
-  pid.i_min = std::min(0.0, number(gains, {"i_clamp_min"}, -clamp));
+  pid.p = number(gains, "p", kGain);
+  pid.i = number(gains, "i", kGain);
+  pid.d = number(gains, "d", kGain);
+  const double clamp = std::abs(number(gains, "i_clamp", kClamp));
+  pid.i_max = std::max(0.0, number(gains, "i_clamp_max", kClamp, clamp));
+  pid.i_min = std::min(0.0, number(gains, "i_clamp_min", kClamp, -clamp));
   return pid;
 }
 
@@ -165,7 +164,7 @@ void read_parameters(const Element& model_element, Reader& reader) {
       const auto value = [&](const std::string& wanted) {
         for (const Element* param : joint->all("param")) {
           const std::string* key = param->attribute("name");
-          if (key && *key == wanted) return std::max(0.0, param->as_number(kGain));
+          if (key && *key == wanted) return param->as_number(kGain);
         }
         return 0.0;
       };

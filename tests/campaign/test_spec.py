@@ -108,6 +108,17 @@ WRONG = [  # what is replaced, by what, line, what the message says
         11,
         r"metrics.1..name: is 'm', which another",
     ),
+    ("distance: [1.2, 3.0]", "x_m: [1.2, 3.0]", 8, "x_m: is a column of the results"),
+    (
+        "seeds: 2",
+        "seeds: 2\nmetrics: [{name: clearance_m, python: 'world.py:walls'}]",
+        11,
+        "name: is 'clearance_m', which another column of the results is called",
+    ),
+    ("seeds: 2", "seeds: 010", 10, "010 is not the number that it looks like"),
+    ("seeds: 2", "seeds: [1, -0_7]", 10, "-0_7 is not the number that it looks like"),
+    ("limits: {duration: 3}", "limits: {duration: 1:30}", 13, "1:30 is not the number that it"),
+    ("limits: {duration: 3}", "limits: {duration: 1:30.5}", 13, "1:30.5 is not the number that"),
     ("seeds: 2", "faults: [{kind: lag, at: soon}]", 10, "at: is 'soon'; allowed is a number"),
     (
         'python: "controller.py:ahead"',

@@ -241,6 +241,7 @@ def test_what_is_no_number_is_named(words, value, tmp_path):
     "options, text",
     [
         ("--seed -1", "--seed: '-1' is not allowed; a seed is a whole number from 0 to"),
+        ("--golden g.lcm --tolerance pose=abs:x", "pose=abs:x"),
         *(
             (option, f"{option.split()[0]} requires --golden")
             for option in (
@@ -264,3 +265,4 @@ def test_regress_takes_nothing_that_does_nothing(options, text, tmp_path):
         timeout=60,
     )
     assert done.returncode == 2 and text in done.stderr, done.stderr
+    assert not (tmp_path / "a.lcm").exists()  # told before the run, which may take hours

@@ -11,6 +11,7 @@ import pickle
 import re
 import resource
 import struct
+import subprocess
 import sys
 import threading
 import time
@@ -859,3 +860,35 @@ def test_what_is_wrong_is_told_in_a_line_of_our_own():
                         if len(said) > 1000 or "\n" in said or re.search(INNER, said):
                             inner.append((said[:200], repr(wrong)[:50]))
     assert not inner
+
+
+_CLOSES_IN_A_CALLBACK = """
+import sys, threading, time, ruedo
+start = threading.Thread.start
+def late(thread):
+    if thread.name == "ruedo-close":
+        threading.Event().wait(0.5)  # without a processor
+    start(thread)
+threading.Thread.start = late
+sim = ruedo.connect(sys.argv[1], name="leaver")
+sim.robot("p3at").odometry.on_sample(lambda _: sim.close())
+threading.Thread(target=sim.step, args=(1000,), daemon=True).start()
+while not sim._connection.closed:
+    time.sleep(0.001)
+"""
+
+
+def test_a_program_does_not_end_before_what_a_callback_closes():
+    """The callback is in a daemon thread, which ends with the program wherever it stands."""
+    with ruedo_run(
+        *("--lockstep", "1", "--lease", str(10.0 * PATIENCE), "--disable", "p3at/camera"),
+        world=HALL,
+    ) as server:
+        for _ in range(3):
+            subprocess.run(
+                [sys.executable, "-c", _CLOSES_IN_A_CALLBACK, server.url],
+                check=True,
+                timeout=PATIENCE,
+            )
+        with ruedo.connect(server.url, name="next", timeout=PATIENCE) as sim:
+            sim.step(1, timeout=PATIENCE)

@@ -185,6 +185,18 @@ TEST(RosGains, OfGazeboRosControl) {
   EXPECT_FALSE(axis(*world, 0).rate_pid);
 }
 
+TEST(RosGains, BelowNothingAreNamed) {
+  TemporaryFolder folder;
+  folder.write("bot/package.xml", "<package><name>bot</name></package>");
+  folder.write("bot/config/control.yaml",
+               "controllers: none\n/gazebo_ros_control:\n  pid_gains:\n    one: {p: -100.0, i: "
+               "1.0, d: 10.0}\n");
+  const auto world =
+      load_world(folder.write("bot/urdf/bot.urdf", bot(transmission("one", "Position"))));
+  EXPECT_THAT(texts(*world), Contains(HasSubstr("-100")));
+  EXPECT_FALSE(axis(*world, 0).position_pid);
+}
+
 TEST(RosGains, OfControllersOfEffortAndVelocity) {
   TemporaryFolder folder;
   folder.write("bot/package.xml", "<package><name>bot</name></package>");

@@ -31,6 +31,7 @@ from .world_info import WorldInfo, WorldInfoAssembler, run_id_of
 
 _SILENCE_SECONDS = 5.0
 _ASK_AGAIN_SECONDS = 0.5
+_END_SECONDS = 10.0  # for another thread that closes
 _FAULT_SECONDS = 1.0
 _CLOSED = "this simulation was closed"
 _FORKED = "this simulation is the parent process's: connect() again after a fork"
@@ -83,7 +84,8 @@ class Connection:
         self._asked = 0.0  # for info, s of time.monotonic()
         self._ids = _name_hash(name) << 20  # two clients number their primitives apart
         self._new_run = Callbacks("a new run")
-        self._closing = threading.Lock()
+        self._closing = threading.Lock()  # whoever has it closes
+        self._ended = threading.Event()  # all that close() ends
         self.bus = Bus(transport or open_transport(url))
         atexit.register(self.close)
         _all.add(self)
@@ -97,20 +99,29 @@ class Connection:
         self._await_info(timeout)
 
     def close(self) -> None:
-        """Repeated commands end, and so does a private server.
+        """Repeated commands end, and so does a private server. A second call waits for that, and so
+        does the program's end.
 
         In a callback, a signal handler or a finalizer, what waits is left to a thread: this one may
         hold what the receiving thread waits for.
         """
-        if self.closed or not self._closing.acquire(blocking=False):  # the first one closes
+        if self.closed == _FORKED:
+            return
+        may_wait = not (self.bus.handling or _is_in_another_call())
+        if not self._closing.acquire(blocking=False):
+            if may_wait:
+                self._ended.wait(_END_SECONDS)
             return
         self.closed = _CLOSED
-        if self.bus.handling or _is_in_another_call():
-            threading.Thread(  # that the program's end waits for, whatever thread this one is
-                target=self._end_all, name="ruedo-close", args=(False,), daemon=False
-            ).start()
-        else:
+        if may_wait:
             self._end_all(True)
+            return
+        closing = threading.Thread(target=self._end_all, name="ruedo-close", args=(False,))
+        closing.daemon = False  # whatever this one is: the program's end waits for it
+        try:
+            closing.start()
+        except RuntimeError:  # there are too many threads, or the program is at its end
+            self._end_all(False)
 
     def __reduce__(self) -> Any:
         raise TypeError(
@@ -124,6 +135,7 @@ class Connection:
 
     def _end_all(self, awaits_callbacks: bool) -> None:
         with contextlib.ExitStack() as ends:  # all of it, whatever interrupts one
+            ends.callback(self._ended.set)
             ends.callback(atexit.unregister, self.close)
             if self._server:
                 ends.callback(self._server.end)

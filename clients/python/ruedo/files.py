@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import hashlib
 import os
+import re
 import stat
 from typing import Any, BinaryIO
 
@@ -44,8 +45,8 @@ def sha256_of(path: str | os.PathLike[str]) -> str:
 
 
 def parse_yaml(text: str) -> tuple[Any, Any]:
-    """PyYAML's node, and the content. Raises yaml.YAMLError, also for what is nested too deep or
-    stands for more than MOST_YAML_VALUES values.
+    """PyYAML's node, and the content. Raises yaml.YAMLError, also for what is nested too deep,
+    stands for more than MOST_YAML_VALUES values, or is a number for YAML only.
     """
     import yaml
 
@@ -67,9 +68,25 @@ def _values(node: Any, known: dict[int, int]) -> int:
     if id(node) not in known:
         known[id(node)] = MOST_YAML_VALUES + 1  # one that holds itself stands for endless values
         inner: list[Any] = []
-        if isinstance(node, yaml.MappingNode):
+        if isinstance(node, yaml.ScalarNode):
+            _check_number(node)
+        elif isinstance(node, yaml.MappingNode):
             inner = [part for pair in node.value for part in pair]
         elif isinstance(node, yaml.SequenceNode):
             inner = node.value
         known[id(node)] = 1 + sum(_values(part, known) for part in inner)
     return known[id(node)]
+
+
+def _check_number(node: Any) -> None:
+    """YAML 1.1 reads 010 as 8, and 1:30 as 90."""
+    import yaml
+
+    if node.tag in ("tag:yaml.org,2002:int", "tag:yaml.org,2002:float") and (
+        ":" in node.value or re.fullmatch(r"[-+]?0[0-9_]+", node.value)
+    ):
+        raise yaml.MarkedYAMLError(
+            problem=f"{node.value} is not the number that it looks like: write it in the decimal "
+            "system, without a 0 before it, or in quotes as a text",
+            problem_mark=node.start_mark,
+        )

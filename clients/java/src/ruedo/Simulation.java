@@ -22,6 +22,7 @@ import java.util.Map;
 import java.util.Set;
 import java.util.concurrent.ConcurrentHashMap;
 import java.util.concurrent.CountDownLatch;
+import java.util.concurrent.atomic.AtomicBoolean;
 import java.util.concurrent.atomic.AtomicLong;
 import java.util.function.Supplier;
 
@@ -64,6 +65,7 @@ public final class Simulation implements AutoCloseable {
     private volatile long lastSign = System.nanoTime();
     private volatile long asked = System.nanoTime(); // for info
     private final RunWatch watch = new RunWatch(this::tellAnotherServer);
+    private final AtomicBoolean closing = new AtomicBoolean();
     private volatile boolean closed;
     private final CountDownLatch ended = new CountDownLatch(1); // all that close() ends
 
@@ -401,23 +403,29 @@ public final class Simulation implements AutoCloseable {
      */
     @Override
     public void close() {
-        boolean first;
-        synchronized (this) {
-            first = !closed;
-            closed = true;
-            notifyAll();
-        }
-        if (!first) {
+        if (!closing.compareAndSet(false, true)) {
             if (!Bus.inAnyHandler()) awaitEnd();
             return;
         }
+        if (!bus.handling()) {
+            end();
+            return;
+        }
         // In a callback, this thread is what receives the answer to a LEAVE: another one waits for
-        // it.
-        if (bus.handling()) new Thread(this::end, "ruedo-close").start();
-        else end();
+        // it, for which the program's end waits. It starts before anyone sees that this is closed.
+        Thread ending = new Thread(this::end, "ruedo-close");
+        ending.setDaemon(false);
+        ending.start();
+        sayClosed();
+    }
+
+    private synchronized void sayClosed() {
+        closed = true;
+        notifyAll();
     }
 
     private void end() {
+        sayClosed();
         session.leave();
         bus.close();
         if (server != null) server.end();

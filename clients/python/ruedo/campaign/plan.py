@@ -31,6 +31,11 @@ COLUMNS = (
     *("number", "id", "world", "robot", "controller", "seed"),
     *("status", "passed", "what", "reason", "state_hash"),
 )
+# Of `ruedo regress --json`.
+METRICS = (
+    *("time_s", "x_m", "y_m", "path_m", "goal_distance_m", "goal_time_s"),
+    *("contact_time_s", "clearance_m", "odometry_error_m"),
+)
 _MOST_INTEGER = 2**63 - 1
 _TEXTS_OF_EXPECT = ("robot", "no_contact", "golden", "tolerances", "ignore")
 _TEXTS_OF_FAULT = ("robot", "kind", "target")
@@ -193,11 +198,12 @@ def check_values(content: dict[str, Any], source: Source) -> None:
 
 def _check_columns(content: dict[str, Any], source: Source) -> None:
     """Parameters and metrics are columns of the table of results, beside its own."""
-    taken = {*COLUMNS}
+    taken = {*COLUMNS, *METRICS}
     for name in content.get("parameters", {}):
         if name in taken:
             raise source.error(
-                ("parameters", name), f"is a column of the results: {', '.join(COLUMNS)}"
+                ("parameters", name),
+                f"is a column of the results: {', '.join((*COLUMNS, *METRICS))}",
             )
     taken |= set(content.get("parameters", {}))
     for i, metric in enumerate(content.get("metrics", [])):
