@@ -16,8 +16,9 @@ class ReplyEnds {
  public:
   using Clock = std::chrono::steady_clock;
 
-  // A client without a reply reader is waited for this long, and not again.
-  static constexpr auto kLongest = std::chrono::milliseconds(500);
+  // A client without a reply reader is waited for this long, and not again. Discovery takes
+  // milliseconds, and seconds on a machine that does much else.
+  static constexpr auto kLongest = std::chrono::seconds(5);
 
   // For a reader of requests and the writer of their replies.
   ReplyEnds(dds_entity_t requests, dds_entity_t replies) : requests_(requests), replies_(replies) {}

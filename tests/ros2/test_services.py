@@ -52,10 +52,12 @@ class Client:
 
     def call(self, service: str, *arguments, again: bool = False):
         """The reply. again: calls again every 30 s, for beside a flood more is not promised while
-        the run gets no processor (docs/ros2.md).
+        the run gets no processor. So does the first call of a service, which may come before the
+        run knows that client (docs/ros2.md, too).
         """
         question, answer = self.services[service]
         if service not in self.ends:
+            again = True
             writer = self.peer.writer(f"/{service}Request", question, prefix="rq")
             # Others' replies come here, too: 2000 a second, while this process waits for its turn.
             reader = self.peer.reader(f"/{service}Reply", answer, prefix="rr", depth=100_000)
