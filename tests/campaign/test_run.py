@@ -133,12 +133,22 @@ def test_a_second_driver_is_refused(whole):
         )
 
 
+KEPT = "; what was run is kept, `ruedo campaign resume` does the rest"
+
+
 @pytest.mark.parametrize(
-    ("told", "hang"), [("INT", False), ("TERM", False), ("HUP", False), ("INT", True)]
+    ("words", "told", "hang", "kept"),
+    [
+        ("campaign run", "INT", False, KEPT),
+        ("campaign run", "TERM", False, KEPT),
+        ("campaign run", "HUP", False, KEPT),
+        ("campaign run", "INT", True, KEPT),
+        ("hunt", "TERM", False, ""),
+    ],
 )
-def test_who_ends_a_campaign_leaves_nothing_behind(told, hang, folder):
+def test_who_ends_a_campaign_leaves_nothing_behind(words, told, hang, kept, folder):
     """Neither processes, of its controllers' either, nor folders, whether or not the workers hang;
-    what was run is kept.
+    what was run is kept. Or a hunt, which keeps nothing.
     """
     temporary = folder / "temporary"
     temporary.mkdir()
@@ -147,7 +157,7 @@ def test_who_ends_a_campaign_leaves_nothing_behind(told, hang, folder):
         CAMPAIGN.replace('{name: ahead, python: "controller.py:ahead"}', command)
     )
     driver = subprocess.Popen(
-        [RUEDO, "campaign", "run", "c.yaml", "--workers", "2"],
+        [RUEDO, *words.split(), "c.yaml", "--workers", "2"],
         cwd=folder,
         stderr=subprocess.PIPE,
         text=True,
@@ -159,7 +169,7 @@ def test_who_ends_a_campaign_leaves_nothing_behind(told, hang, folder):
         os.kill(worker, signal.SIGSTOP)
     driver.send_signal(getattr(signal, f"SIG{told}"))
     said = driver.communicate(timeout=PATIENCE)[1]
-    assert driver.returncode == 4 and "ruedo: interrupted; what was run is kept" in said
+    assert driver.returncode == 4 and said.endswith(f"ruedo: interrupted{kept}\n")
     assert not [path.name for path in temporary.iterdir()]
     wait_for(lambda: not any(os.path.exists(f"/proc/{process}") for process in begun))
 

@@ -35,6 +35,7 @@ def main(words: list[str]) -> int:
     for end in (signal.SIGTERM, signal.SIGHUP):
         if signal.getsignal(end) == signal.SIG_DFL:  # not ignored, as by nohup
             signal.signal(end, signal.default_int_handler)  # as Ctrl-C
+    arguments = argparse.Namespace()
     try:
         arguments = _parser().parse_args(words)
         return int(arguments.action(arguments))
@@ -45,10 +46,7 @@ def main(words: list[str]) -> int:
         print(f"ruedo: {error}; pip install 'ruedo[campaign]'", file=sys.stderr)
         return ENVIRONMENT
     except KeyboardInterrupt:
-        print(
-            "ruedo: interrupted; what was run is kept, `ruedo campaign resume` does the rest",
-            file=sys.stderr,
-        )
+        print(f"ruedo: interrupted{getattr(arguments, 'kept', '')}", file=sys.stderr)
         return ENVIRONMENT
     except BrokenPipeError:
         os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
@@ -126,7 +124,9 @@ def _add_campaign(parser: argparse.ArgumentParser) -> None:
         return one
 
     for name in ("run", "resume"):
-        _add_execution(add(name, _run, "run all cases that have no result yet"))
+        one = add(name, _run, "run all cases that have no result yet")
+        one.set_defaults(kept="; what was run is kept, `ruedo campaign resume` does the rest")
+        _add_execution(one)
     add("status", _status, "how far it is, and how it goes").add_argument(
         "--json", action="store_true"
     )
