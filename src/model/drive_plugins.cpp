@@ -204,7 +204,11 @@ std::unique_ptr<Element> odometry_from_plugin(const Element& plugin, const std::
 
 namespace {
 
-// In our unit; 0 means "no limit" in a plugin, and a limit below 0 nothing.
+bool is_speed(std::string_view ours) {
+  return ours == "ruedo:max_speed" || ours == "ruedo:max_turn_rate";
+}
+
+// In our unit; 0 means "no limit" in most plugins, and a limit below 0 nothing.
 double value_of(const Element& given, const Parameter& parameter, const Element& plugin,
                 const std::string& where, Findings& findings) {
   if (is_length(parameter.ours)) {
@@ -224,6 +228,10 @@ double value_of(const Element& given, const Parameter& parameter, const Element&
   if (value < 0)
     findings.error(given.source, where,
                    not_allowed(given, plugin, "a number of at least 0; there is no limit"));
+  // gz-sim would keep such a robot where it is.
+  if (value == 0 && is_speed(parameter.ours))
+    findings.repaired(given.source, where,
+                      not_allowed(given, plugin, "a number above 0; there is no limit"));
   return value;
 }
 

@@ -92,6 +92,12 @@ TEST(OddDrives, WithParametersOfAPluginThatLimitNothing) {
     EXPECT_THAT(with("<" + name + ">-1</" + name + ">"),
                 ElementsAre(refused(name, "-1", "a number of at least 0; there is no limit")));
   }
+  for (const char* each : {"max_velocity", "max_linear_velocity", "max_angular_velocity"}) {
+    const std::string name = each;
+    EXPECT_THAT(with("<" + name + ">0</" + name + ">"),
+                ElementsAre(refused(name, "0", "a number above 0; there is no limit")));
+  }
+  EXPECT_THAT(with("<max_linear_acceleration>0</max_linear_acceleration>"), IsEmpty());
   EXPECT_THAT(with("<min_linear_acceleration>0.5</min_linear_acceleration>"),
               ElementsAre(refused("min_linear_acceleration", "0.5",
                                   "a number of at most 0; its magnitude counts")));
