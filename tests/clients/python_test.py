@@ -892,3 +892,31 @@ def test_a_program_does_not_end_before_what_a_callback_closes():
             )
         with ruedo.connect(server.url, name="next", timeout=PATIENCE) as sim:
             sim.step(1, timeout=PATIENCE)
+
+
+_ENDS_BESIDE_A_CALLBACK = """
+import sys, threading, time, ruedo
+begun = threading.Event()
+def busy(_):
+    sim.close()
+    begun.set()
+    while True:
+        time.sleep(0.0001)
+sim = ruedo.connect(sys.argv[1])
+sim.robot("p3at").odometry.on_sample(busy)
+threading.Thread(target=sim.step, args=(1000,), daemon=True).start()
+begun.wait()
+"""
+
+
+def test_a_program_may_end_beside_a_callback_in_a_daemon_thread():
+    """Python unwinds that thread, through the compiled function that calls back, too."""
+    for _ in range(3):
+        with ruedo_run("--lockstep", "1", "--disable", "p3at/camera", world=HALL) as server:
+            done = subprocess.run(
+                [sys.executable, "-c", _ENDS_BESIDE_A_CALLBACK, server.url],
+                capture_output=True,
+                text=True,
+                timeout=PATIENCE,
+            )
+        assert done.returncode == 0, done.stderr

@@ -7,6 +7,8 @@
 
 #include <zlib.h>
 
+#include "program_end.h"
+
 namespace nb = nanobind;
 
 namespace {
@@ -62,11 +64,11 @@ void dispatch(const nb::list& arrived, const nb::dict& collectors, const nb::dic
     if (channel == nullptr) throw nb::python_error();
     if (PyObject* found = PyDict_GetItemWithError(collectors.ptr(), channel)) {
       const nb::object collector = nb::borrow(found);
-      collector(one);
+      call_python([&] { collector(one); });
     }
     if (PyObject* found = PyDict_GetItemWithError(handlers.ptr(), channel)) {
       const nb::object listening = nb::borrow(found);
-      hand_over(listening, nb::handle(PyTuple_GetItem(one.ptr(), 1)));
+      call_python([&] { hand_over(listening, nb::handle(PyTuple_GetItem(one.ptr(), 1))); });
     }
   }
 }

@@ -1,7 +1,5 @@
 // The module ruedo._engine: the engine in the process of a Python program. ruedo/engine.py is what
 // people call.
-#include <unistd.h>
-
 #include <algorithm>
 #include <memory>
 #include <optional>
@@ -25,6 +23,7 @@
 #include "log/header.h"
 #include "model/load.h"
 #include "model/randomization.h"
+#include "program_end.h"
 #include "ruedo/errors.h"
 #include "ruedo/math.h"
 #include "scene/gl_context.h"
@@ -68,13 +67,7 @@ class Unlocked {
  public:
   Unlocked() : state_(PyEval_SaveThread()) {}
   ~Unlocked() {
-    // Once the program ends, Python (before 3.14) ends each daemon thread that comes back: it
-    // unwinds it, which frames that let no exception out do not survive. It waits for the end here.
-    try {
-      PyEval_RestoreThread(state_);
-    } catch (...) {
-      for (;;) pause();
-    }
+    call_python([this] { PyEval_RestoreThread(state_); });
   }
   Unlocked(const Unlocked&) = delete;
   Unlocked& operator=(const Unlocked&) = delete;
