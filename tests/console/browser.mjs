@@ -173,9 +173,13 @@ const tools = {
     }, kAnyBody),
   // Until nothing moves on the canvas: the camera is at rest.
   still: () =>
-    tools.until("(the camera is at rest)", () => {
-      window.ruedo.stage.view.camera.updateMatrixWorld(); // else it is of the last frame
-      const is = [...window.ruedo.stage.view.camera.matrixWorld.elements]
+    tools.until("(the camera and the layout are at rest)", () => {
+      const { camera } = window.ruedo.stage.view,
+        box = document.getElementById("canvas").getBoundingClientRect();
+      camera.updateMatrixWorld(); // else it is of the last frame
+      const is = [camera.matrixWorld.elements, camera.projectionMatrix.elements]
+          .flatMap((elements) => [...elements])
+          .concat(box.left, box.top, box.width, box.height)
           .map((v) => v.toFixed(3))
           .join(),
         was = window.camera;

@@ -31,6 +31,7 @@ export default async function looks({ page, until, check, ready, still }) {
     return Math.abs(x + 1) < 0.05 && Math.abs(y - 0.5) < 0.05;
   });
   await page.locator("#measure").click();
+  await still();
   await page.mouse.click(...(await at(-1, 0.5)));
   await page.mouse.click(...(await at(-1, -2.5)));
   await until(
