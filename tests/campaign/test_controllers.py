@@ -8,6 +8,7 @@ import sys
 import pytest
 from conftest import ruedo
 from ruedo.campaign import Campaign
+from ruedo.campaign.plan import METRICS
 
 BAD = '''
 import ctypes, os, sys, time
@@ -222,6 +223,8 @@ def test_each_bad_program_is_one_failed_case(tmp_path):
     )
     assert "127" in found["missing"]["reason"] and "no_such_program" in found["missing"]["output"]
     assert found["good"]["metrics"]["goal_distance_m"] < 0.15
+    # A name that is not listed there could be taken by a parameter.
+    assert set(found["good"]["metrics"]) <= set(METRICS)
     left = (tmp_path / "child").read_text().strip()
     assert left and not os.path.exists(f"/proc/{left}")
     log = results.log(next(case for case in results.cases if case.controller == "crash"))
