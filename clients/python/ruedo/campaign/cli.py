@@ -105,6 +105,35 @@ def _add_execution(one: argparse.ArgumentParser) -> None:
     one.add_argument("--junit", metavar="FILE", help="write the results for CI")
 
 
+def _add_report(one: argparse.ArgumentParser) -> None:
+    one.add_argument(
+        "-o", "--output", metavar="FILE", help="default: report.html in the results' folder"
+    )
+    one.add_argument(
+        "--baseline", metavar="FOLDER", help="results of another campaign, to compare with"
+    )
+    one.add_argument(
+        "--pages",
+        type=number(0, 1000),
+        default=3,
+        metavar="N",
+        help="failed runs, the worst, that are repeated and put beside the report as pages of the "
+        "web console (default: 3)",
+    )
+
+
+def _add_slurm(one: argparse.ArgumentParser) -> None:
+    one.add_argument("--tasks", type=number(1, 1_000_000), default=10, metavar="N")
+    one.add_argument("--cores", type=number(1, MOST_WORKERS), default=8, help="of each task")
+    one.add_argument("--time", type=_duration, default="04:00:00", metavar="H:M:S")
+
+
+def _add_export(one: argparse.ArgumentParser) -> None:
+    one.add_argument(
+        "-o", "--output", required=True, metavar="FILE", help="*.csv, *.parquet or *.xml (JUnit)"
+    )
+
+
 def _add_campaign(parser: argparse.ArgumentParser) -> None:
     kinds = parser.add_subparsers(
         required=True, metavar="run|resume|status|report|show|repeat|slurm|join|export|compare"
@@ -130,36 +159,16 @@ def _add_campaign(parser: argparse.ArgumentParser) -> None:
     add("status", _status, "how far it is, and how it goes").add_argument(
         "--json", action="store_true"
     )
-    one = add("report", _report, "write one HTML page that needs no network")
-    one.add_argument(
-        "-o", "--output", metavar="FILE", help="default: report.html in the results' folder"
-    )
-    one.add_argument(
-        "--baseline", metavar="FOLDER", help="results of another campaign, to compare with"
-    )
-    one.add_argument(
-        "--pages",
-        type=number(0, 1000),
-        default=3,
-        metavar="N",
-        help="failed runs, the worst, that are repeated and put beside the report as pages of the "
-        "web console (default: 3)",
-    )
+    _add_report(add("report", _report, "write one HTML page that needs no network"))
     add("show", _show, "all there is of a case").add_argument(
         "CASE", help="its number, or the beginning of its id"
     )
     one = add("repeat", _repeat, "run a case again, with a log of all its messages")
     one.add_argument("CASE", help="its number, or the beginning of its id")
     one.add_argument("-o", "--output", metavar="LOG", help="default: ID.lcm here")
-    one = add("slurm", _slurm, "print a job array for Slurm; each task is a shard")
-    one.add_argument("--tasks", type=number(1, 1_000_000), default=10, metavar="N")
-    one.add_argument("--cores", type=number(1, MOST_WORKERS), default=8, help="of each task")
-    one.add_argument("--time", type=_duration, default="04:00:00", metavar="H:M:S")
+    _add_slurm(add("slurm", _slurm, "print a job array for Slurm; each task is a shard"))
     add("join", _join, "take over the results of shards").add_argument("FOLDERS", nargs="+")
-    one = add("export", _export, "write the table of results")
-    one.add_argument(
-        "-o", "--output", required=True, metavar="FILE", help="*.csv, *.parquet or *.xml (JUnit)"
-    )
+    _add_export(add("export", _export, "write the table of results"))
     one = add("compare", _compare, "which cases became worse, with an exact test")
     one.add_argument(
         "BASELINE",
