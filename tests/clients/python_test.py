@@ -894,6 +894,39 @@ def test_a_program_does_not_end_before_what_a_callback_closes():
             sim.step(1, timeout=PATIENCE)
 
 
+_NEVER_RETURNS = """
+import sys, threading, time, ruedo
+begun, end = threading.Event(), threading.Event()
+def stuck(_):
+    begun.set()
+    end.wait()  # line 6
+sim = ruedo.connect(sys.argv[1])
+sim.robot("p3at").odometry.on_sample(stuck)
+begun.wait()
+if sys.argv[2:]:
+    threading.Timer(7.0, end.set).start()
+    sim.close()
+"""
+
+
+@pytest.mark.parametrize(
+    ("how", "what"), [([], "the program ends without it"), (["close"], "close() waits for it")]
+)
+def test_a_callback_that_does_not_return_is_named(tmp_path, how, what):
+    """The program ends, although its end waits for callbacks; close() does for ever."""
+    program = tmp_path / "program.py"
+    program.write_text(_NEVER_RETURNS)
+    with ruedo_run("--disable", "p3at/camera", world=HALL) as server:
+        done = subprocess.run(
+            [sys.executable, program, server.url, *how],
+            capture_output=True,
+            text=True,
+            timeout=PATIENCE,
+        )
+    assert done.returncode == 0
+    assert done.stderr == f"a callback has not returned for 5 s, at {program}:6: {what}\n"
+
+
 _ENDS_BESIDE_A_CALLBACK = """
 import sys, threading, time, ruedo
 begun = threading.Event()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import math
 import threading
 import time
@@ -12,12 +13,15 @@ from functools import partial
 from . import arrivals
 from .callbacks import Callbacks, Subscription
 from .errors import RuedoError
+from .stack import place_in_callback
 from .transport import Transport
 
 Handler = Callable[[bytes], None]
 _LEND_SECONDS = 0.02
+_LONG_SECONDS = 5.0  # for a handler that is waited for
 _LARGEST = 4 << 20  # bytes of a message: what a server takes from a client
 _receives_for = threading.local()  # .bus: the one that this thread receives for, or None
+log = logging.getLogger("ruedo")
 
 
 def _nothing(arrived: arrivals.Arrived) -> None:
@@ -94,11 +98,23 @@ class Bus:
         if not self._closed.is_set():
             self._transport.publish(channel, data)
 
-    def close(self, awaits_handlers: bool = True) -> None:
-        """awaits_handlers: until the one that runs has returned."""
+    def close(self, patience: float | None = None) -> None:
+        """patience: s of real time for the handler that runs to return; None for ever. One that
+        takes long is named."""
         self._closed.set()
         self._transport.close()
-        if awaits_handlers and self._thread.is_alive():
+        if patience == 0.0 or not self._thread.is_alive():
+            return
+        self._thread.join(_LONG_SECONDS if patience is None else patience)
+        place = place_in_callback(self._thread) if self._thread.is_alive() else ""
+        if place:
+            log.warning(
+                "a callback has not returned for %g s, at %s: %s",
+                _LONG_SECONDS if patience is None else patience,
+                place,
+                "close() waits for it" if patience is None else "the program ends without it",
+            )
+        if patience is None:
             self._thread.join()
 
     def _left(self, channel: str) -> None:

@@ -5,7 +5,6 @@ from __future__ import annotations
 
 import atexit
 import contextlib
-import inspect
 import logging
 import os
 import struct
@@ -25,6 +24,7 @@ from .errors import NoServer, RuedoError, UnknownName
 from .lockstep import Stepper
 from .motion import Drivers
 from .run_watch import RunWatch
+from .stack import is_in_another_call
 from .stream import Streams
 from .transport import Transport, is_claimed, open_transport
 from .world_info import WorldInfo, WorldInfoAssembler, run_id_of
@@ -32,6 +32,7 @@ from .world_info import WorldInfo, WorldInfoAssembler, run_id_of
 _SILENCE_SECONDS = 5.0
 _ASK_AGAIN_SECONDS = 0.5
 _END_SECONDS = 10.0  # for another thread that closes
+_CALLBACK_SECONDS = 5.0  # for a callback, at the program's end
 _FAULT_SECONDS = 1.0
 _CLOSED = "this simulation was closed"
 _FORKED = "this simulation is the parent process's: connect() again after a fork"
@@ -87,7 +88,7 @@ class Connection:
         self._closing = threading.Lock()  # whoever has it closes
         self._ended = threading.Event()  # all that close() ends
         self.bus = Bus(transport or open_transport(url))
-        atexit.register(self.close)
+        atexit.register(self._close_at_end)
         _all.add(self)
 
     def join(self, timeout: float) -> None:
@@ -105,23 +106,31 @@ class Connection:
         In a callback, a signal handler or a finalizer, what waits is left to a thread: this one may
         hold what the receiving thread waits for.
         """
+        self._close(None)
+
+    def _close_at_end(self) -> None:
+        """Of the program, which ends beside a callback that does not return."""
+        self._close(_CALLBACK_SECONDS)
+
+    def _close(self, patience: float | None) -> None:
+        """patience: s of real time for the callback that runs; None for ever."""
         if self.closed == _FORKED:
             return
-        may_wait = not (self.bus.handling or _is_in_another_call())
+        may_wait = not (self.bus.handling or is_in_another_call())
         if not self._closing.acquire(blocking=False):
             if may_wait:
                 self._ended.wait(_END_SECONDS)
             return
         self.closed = _CLOSED
         if may_wait:
-            self._end_all(True)
+            self._end_all(patience)
             return
-        closing = threading.Thread(target=self._end_all, name="ruedo-close", args=(False,))
+        closing = threading.Thread(target=self._end_all, name="ruedo-close", args=(0.0,))
         closing.daemon = False  # whatever this one is: the program's end waits for it
         try:
             closing.start()
         except RuntimeError:  # there are too many threads, or the program is at its end
-            self._end_all(False)
+            self._end_all(0.0)
 
     def __reduce__(self) -> Any:
         raise TypeError(
@@ -133,13 +142,13 @@ class Connection:
         """Whether that is certain. One that is looked for in vain just now has ended, too."""
         return bool(self._server and self._server.ended()) or not self.bus.is_connected
 
-    def _end_all(self, awaits_callbacks: bool) -> None:
+    def _end_all(self, patience: float | None) -> None:
         with contextlib.ExitStack() as ends:  # all of it, whatever interrupts one
             ends.callback(self._ended.set)
-            ends.callback(atexit.unregister, self.close)
+            ends.callback(atexit.unregister, self._close_at_end)
             if self._server:
                 ends.callback(self._server.end)
-            ends.callback(self.bus.close, awaits_callbacks)
+            ends.callback(self.bus.close, patience)
             self.drivers.wake()
             if self._known:
                 self.session.leave()
@@ -372,19 +381,6 @@ def _after_fork() -> None:
 
 if hasattr(os, "register_at_fork"):
     os.register_at_fork(after_in_child=_after_fork)
-
-
-def _is_in_another_call() -> bool:
-    """Whether a call of this package, outside of the one that asks, goes on in this thread: it was
-    interrupted, or it calls back."""
-    outside, frame = False, inspect.currentframe()
-    while frame is not None:
-        if frame.f_globals.get("__name__", "").partition(".")[0] != __package__:
-            outside = True
-        elif outside:
-            return True
-        frame = frame.f_back
-    return False
 
 
 def _name_hash(name: str) -> int:
