@@ -114,7 +114,7 @@ void SavedState::read_parts(const Element& element, const std::string& prefix, S
   for (const Element* link : states_of(element, "link")) {
     const std::string* own = link->attribute("name");
     if (own && link->has("pose"))
-      saved.links.push_back({prefix + dotted(*own), link->pose("pose")});
+      saved.links.try_emplace(prefix + dotted(*own), link->pose("pose"));
     name_motion(*link, where, findings);
   }
   for (const Element* joint : states_of(element, "joint")) {
@@ -137,10 +137,8 @@ void SavedState::apply(const std::string& name, ModelInstance& instance, Finding
   const Pose X_MW = saved.X_WM.inverse();
   const auto pose_of = [&](ModelLinkIndex link) -> const Pose* {
     if (!link.valid()) return nullptr;
-    const std::string& own = instance.model->links[link].name;
-    const auto at = std::find_if(saved.links.begin(), saved.links.end(),
-                                 [&](const Link& each) { return each.name == own; });
-    return at == saved.links.end() ? nullptr : &at->X_WL;
+    const auto at = saved.links.find(instance.model->links[link].name);
+    return at == saved.links.end() ? nullptr : &at->second;
   };
   auto model = std::make_shared<Model>(*instance.model);
   IndexedVector<ModelJointIndex, double> starts(model->joints.size(), 0.0);
@@ -164,17 +162,19 @@ void SavedState::apply(const std::string& name, ModelInstance& instance, Finding
       findings.error(saved.source, "state/model " + name,
                      "the model has no joint '" + joint + "'; its position is left out");
   }
-  for (const Link& link : saved.links) {
-    const auto own = std::find_if(model->links.begin(), model->links.end(),
-                                  [&](const auto& one) { return one.name == link.name; });
-    if (own == model->links.end())
+  std::map<std::string_view, const Link*> links;
+  for (const Link& link : model->links) links.emplace(link.name, &link);
+  for (const auto& [link, X_WL] : saved.links) {
+    const auto own = links.find(link);
+    if (own == links.end()) {
       findings.error(saved.source, "state/model " + name,
-                     "the model has no link '" + link.name + "'; its pose is left out");
-    if (own == model->links.end() ||
-        (link.X_WL.translation - (instance.X_WM * own->X_ML).translation).norm() < kAside_m)
+                     "the model has no link '" + link + "'; its pose is left out");
       continue;
+    }
+    const Vec3 aside = X_WL.translation - (instance.X_WM * own->second->X_ML).translation;
+    if (aside.norm() < kAside_m) continue;
     findings.unsupported(saved.source, "state/model " + name,
-                         "its link '" + link.name +
+                         "its link '" + link +
                              "' was elsewhere than any position of its joints puts it; it stands "
                              "where the model has it");
     break;

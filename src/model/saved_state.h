@@ -5,7 +5,6 @@
 #include <map>
 #include <set>
 #include <string>
-#include <vector>
 
 #include "model/world_model.h"
 #include "ruedo/element.h"
@@ -25,14 +24,10 @@ class SavedState {
                       Findings& findings) const;
 
  private:
-  struct Link {
-    std::string name;
-    Pose X_WL;
-  };
   struct SavedModel {
     Pose X_WM;
     Source source;
-    std::vector<Link> links;
+    std::map<std::string, Pose> links;     // X_WL
     std::map<std::string, double> joints;  // rad or m, for the joints that are given
   };
   void read_model(const Element& element, Findings& findings);
