@@ -15,11 +15,15 @@ const kCopyAside_m = 0.1; // between a model and its copy
 const kRest_m = 2e-4; // smaller motions between two looks count as rest
 const kLook_ms = 250; // between two looks while settling
 const kLongestSettling_s = 10; // of sim time
+const kLookForPose_ms = 20;
+const kLongestWait_ms = 10_000; // for a new model's pose
 
 export class Editor {
   readonly history: History;
   // names of placed models that may not be in the scene yet
   private readonly given = new Set<string>();
+  // those of removed models that are still in the scene
+  private readonly gone = new Set<string>();
 
   // box: around a model's visible shapes; empty if it has none.
   constructor(
@@ -30,6 +34,7 @@ export class Editor {
   ) {
     this.history = new History((edits) => page.set({ edits }));
     page.watch(["scene"], ({ scene, selected }) => {
+      this.gone.clear();
       if (selected && scene && !this.given.has(selected) && !this.find(selected))
         page.set({ selected: "" });
     });
@@ -44,7 +49,7 @@ export class Editor {
   }
   pose(name: string): Pose7 | null {
     const model = this.find(name);
-    return model ? poseNow(model, this.poses) : null;
+    return model && !this.gone.has(name) ? poseNow(model, this.poses) : null;
   }
 
   // ---- changes
@@ -71,7 +76,7 @@ export class Editor {
   }
 
   async remove(name: string): Promise<boolean> {
-    const from = this.pose(name),
+    const from = await this.knownPose(name),
       text = await this.text(name);
     if (!from || text === null) return false;
     return this.history.do({
@@ -82,7 +87,7 @@ export class Editor {
   }
 
   async duplicate(name: string): Promise<boolean> {
-    const from = this.pose(name),
+    const from = await this.knownPose(name),
       text = await this.text(name);
     if (!from || text === null) return false;
     const copy = this.unusedName(name),
@@ -104,9 +109,9 @@ export class Editor {
   }
 
   // What stands on the ground stays on the ground.
-  scale(name: string, factor: Size): Promise<boolean> {
-    const model = this.find(name),
-      pose = this.pose(name),
+  async scale(name: string, factor: Size): Promise<boolean> {
+    const pose = await this.knownPose(name),
+      model = this.find(name),
       low = model ? this.box(model).min.z : 0;
     const raise = pose && Number.isFinite(low) ? (pose[2]! - low) * (factor[2] - 1) : 0;
     return this.rewrite(name, `scale ${name}`, (text) => scaled(text, factor), raise);
@@ -124,9 +129,11 @@ export class Editor {
       name: "settle",
       apply: async () => {
         before = new Map();
-        for (const model of this.models) {
-          const pose = poseNow(model, this.poses);
-          if (pose && !model.fast && !model.path) before.set(model.name, pose);
+        for (const { name, fast, path } of this.models) {
+          if (fast || path) continue;
+          const pose = await this.knownPose(name);
+          if (!pose) return false;
+          before.set(name, pose);
         }
         if (!(await this.control.request(request_t.RESUME))) return false;
         await this.rest();
@@ -135,7 +142,7 @@ export class Editor {
       revert: async () => {
         let good = true;
         for (const [name, pose] of before) {
-          const now = this.pose(name);
+          const now = await this.knownPose(name);
           if (now && !samePose(now, pose, 1e-4)) good = (await this.setPose(name, pose)) && good;
         }
         return good;
@@ -175,7 +182,33 @@ export class Editor {
 
   private take(name: string): Promise<boolean> {
     this.given.delete(name);
-    return this.control.request(request_t.REMOVE, encode("name_request_t", { name }));
+    return this.withdraw(name);
+  }
+
+  private async withdraw(name: string): Promise<boolean> {
+    const body = this.find(name)?.body ?? -1,
+      good = await this.control.request(request_t.REMOVE, encode("name_request_t", { name }));
+    if (good) {
+      this.gone.add(name);
+      this.poses.forget(body); // which the next model may have
+    }
+    return good;
+  }
+
+  // Once it is known: a new model's comes with the next state. Null: there is no such model, or it
+  // does not come.
+  private async knownPose(name: string): Promise<Pose7 | null> {
+    const end = performance.now() + kLongestWait_ms;
+    for (;;) {
+      const pose = this.pose(name),
+        comes = this.given.has(name) || this.find(name);
+      if (pose || !comes || this.page.now.link !== "open") return pose;
+      if (performance.now() > end) {
+        toast(`${name}: where it is was not heard.`, "error");
+        return null;
+      }
+      await new Promise((resolve) => setTimeout(resolve, kLookForPose_ms));
+    }
   }
 
   // Replaces a model by another text, raised by that much. If the new one cannot stand there, the
@@ -186,9 +219,8 @@ export class Editor {
     change: (text: string) => string,
     raise = 0,
   ): Promise<boolean> {
-    const from = this.pose(name),
-      old = await this.text(name);
-    if (!from || old === null) return false;
+    const old = await this.text(name);
+    if (old === null) return false;
     let fresh: string;
     try {
       fresh = change(old);
@@ -197,11 +229,11 @@ export class Editor {
       return false;
     }
     const exchange = async (text: string, back: string, up: number) => {
-      const pose = this.pose(name) ?? from,
-        raised = [pose[0]!, pose[1]!, pose[2]! + up, ...pose.slice(3)];
+      const pose = await this.knownPose(name);
+      if (!pose) return false;
+      const raised = [pose[0]!, pose[1]!, pose[2]! + up, ...pose.slice(3)];
       this.given.add(name); // it is missing for a moment
-      if (!(await this.control.request(request_t.REMOVE, encode("name_request_t", { name }))))
-        return false;
+      if (!(await this.withdraw(name))) return false;
       if (await this.spawn(name, { model: "", text }, raised, false)) return true;
       await this.spawn(name, { model: "", text: back }, pose, false);
       return false;

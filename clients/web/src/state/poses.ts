@@ -33,6 +33,11 @@ export class Poses {
     this.seen.fill(Infinity);
   }
 
+  // A body that is gone. Another may come in its place.
+  forget(body: number): void {
+    if (body >= 0 && body < this.size) this.known[body] = 0;
+  }
+
   private grow(size: number): void {
     if (size <= this.size) return;
     const larger = (old: Float32Array) => {
