@@ -16,9 +16,8 @@ namespace ruedo::dds {
 // Bytes of what is told of one participant or endpoint.
 inline constexpr size_t kMostTold = size_t{16} << 10;
 
-using Prefix = std::array<uint8_t, kPrefix>;  // of the GUIDs of a participant and of all it has
-using Entity = std::array<uint8_t, 4>;        // the rest of a GUID
-using Locator = std::array<uint8_t, 24>;      // a kind of address, a port, and the address
+using Entity = std::array<uint8_t, 4>;    // a GUID without its prefix
+using Locator = std::array<uint8_t, 24>;  // a kind of address, a port, and the address
 
 inline constexpr Entity kParticipant{0, 0, 1, 0xc1}, kAnnouncer{0, 1, 0, 0xc2},
     kSecureAnnouncer{0xff, 1, 1, 0xc2}, kOfWriters{0, 0, 3, 0xc2}, kOfReaders{0, 0, 4, 0xc2};

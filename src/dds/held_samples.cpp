@@ -29,11 +29,14 @@ std::optional<std::pair<size_t, size_t>> place_of_samples(const Submessage& part
 
 std::vector<Samples> samples_in(std::span<uint8_t> message) {
   std::vector<Samples> found;
+  if (message.size() < kMessageHeader) return found;
+  Sender sender = sender_at(message, kSenderInHead);
   for_each_submessage(message, [&](const Submessage& part) {
+    if (part.is_source()) sender = sender_at(part.bytes, Submessage::kSender);
     const auto place = place_of_samples(part);
     if (!place) return;
     ros2::Gid writer{};
-    std::copy_n(message.begin() + 8, kPrefix, writer.begin());
+    std::copy_n(sender.prefix.begin(), kPrefix, writer.begin());
     std::copy_n(part.bytes.begin() + static_cast<std::ptrdiff_t>(place->first), 4,
                 writer.begin() + kPrefix);
     const int64_t sequence = part.sequence(place->second);

@@ -20,7 +20,8 @@ constexpr size_t kMessageHeader = 20, kSubmessageHeader = 4, kPrefix = 12;
 constexpr size_t kIdentity = 24;         // a GUID and a sequence number
 constexpr size_t kToInlineQos = 16;      // from behind its own field: two entities and a number
 constexpr size_t kMostReplied = 55'000;  // bytes, of a reply with its identity
-constexpr uint8_t kData = 0x15, kDataFrag = 0x16;
+constexpr size_t kInfoSourceSize = 24;
+constexpr uint8_t kInfoSource = 0x0c, kData = 0x15, kDataFrag = 0x16;
 constexpr uint8_t kLittleEndian = 1, kHasInlineQos = 2;
 constexpr uint16_t kSentinel = 0x0001;
 constexpr uint16_t kRelated = 0x0083;      // DDS-RPC's
@@ -147,6 +148,23 @@ ssize_t write_with_identities(ddsi_tran_conn_t conn, const ddsi_locator_t* to, s
   return sent < 0 ? sent : static_cast<ssize_t>(message.size());
 }
 
+// Who sends the submessage at that offset: by the message's head, or by the last InfoSource before
+// it, of which Cyclone has turned the size alone.
+void find_sender(std::span<const uint8_t> message, size_t submessage, DataIdentity& found) {
+  uint8_t* prefix = found.sample.writer.data();
+  std::copy_n(message.begin() + 6, found.vendor.size(), found.vendor.begin());
+  copy_turned(message.subspan(8, kPrefix), prefix);
+  for (size_t at = kMessageHeader; at + kInfoSourceSize <= submessage;) {
+    const size_t size = kSubmessageHeader + u16_at(message, at + 2);
+    if (message[at] == kInfoSource && size >= kInfoSourceSize) {
+      const auto sender = message.subspan(at + 10, found.vendor.size() + kPrefix);
+      std::copy_n(sender.begin(), found.vendor.size(), found.vendor.begin());
+      std::copy_n(sender.begin() + found.vendor.size(), kPrefix, prefix);
+    }
+    at += size;
+  }
+}
+
 }  // namespace
 
 DataIdentity identity_in(std::span<const uint8_t> message, size_t submessage) {
@@ -155,8 +173,7 @@ DataIdentity identity_in(std::span<const uint8_t> message, size_t submessage) {
   if (message.size() < kMessageHeader || numbers + kToInlineQos > message.size()) return found;
   const uint8_t kind = message[submessage], flags = message[submessage + 1];
   if (kind != kData && kind != kDataFrag) return found;
-  std::copy_n(message.begin() + 6, found.vendor.size(), found.vendor.begin());
-  copy_turned(message.subspan(8, kPrefix), found.sample.writer.data());
+  find_sender(message, submessage, found);
   copy_turned(message.subspan(numbers + 4, 4), found.sample.writer.data() + kPrefix);
   found.sample.sequence = sequence_at(message.data() + numbers + 8);
   if (!(flags & kHasInlineQos) || !(flags & kLittleEndian)) return found;

@@ -20,14 +20,17 @@ constexpr size_t kEndpoint = 2048;  // bytes that Cyclone needs for an endpoint
 void KnownParticipants::bound(std::span<uint8_t> message, const Address& from,
                               Clock::time_point now) {
   if (message.size() < kMessageHeader) return;
-  Prefix who{};
-  std::copy_n(message.begin() + 8, who.size(), who.begin());
-  if (const auto known = known_.find(who); known != known_.end()) known->second.heard = now;
-  bool of_others = std::equal(kTellsOfOthers.begin(), kTellsOfOthers.end(), message.begin() + 6);
+  Sender sender;
+  const auto turn_to = [&](const Sender& next) {
+    sender = next;
+    if (const auto known = known_.find(next.prefix); known != known_.end())
+      known->second.heard = now;
+  };
+  turn_to(sender_at(message, kSenderInHead));
   bool to_others = false;
   for_each_submessage(message, [&](const Submessage& part) {
-    of_others = of_others || part.kind() == Submessage::kInfoSource;
-    if (of_others) return part.erase();
+    if (part.is_source()) return turn_to(sender_at(part.bytes, Submessage::kSender));
+    if (sender.vendor == kTellsOfOthers) return part.erase();
     if (part.kind() == Submessage::kInfoDestination) to_others = !is_addressed(part);
     if (!part.is_data() && !part.is_fragment()) return;
     Entity writer{};
@@ -37,8 +40,8 @@ void KnownParticipants::bound(std::span<uint8_t> message, const Address& from,
     if (!announces && !tells) return;
     if (to_others || (announces && (part.is_fragment() || writer == kSecureAnnouncer)))
       return part.erase();
-    if (announces) return announce(part, who, from, now);
-    const auto known = known_.find(who);
+    if (announces) return announce(part, sender.prefix, from, now);
+    const auto known = known_.find(sender.prefix);
     if (known == known_.end()) return;
     part.is_data() ? tell_endpoint(part, writer, known) : tell_fragment(part, writer, known);
   });

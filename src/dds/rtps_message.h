@@ -2,6 +2,7 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <optional>
@@ -12,6 +13,25 @@
 namespace ruedo::dds {
 
 inline constexpr size_t kMessageHeader = 20, kSubmessageHeader = 4, kPrefix = 12;
+
+using Prefix = std::array<uint8_t, kPrefix>;  // of the GUIDs of a participant and of all it has
+
+// Who sends: by a message's head, and from an InfoSource on by that. Participants of one process
+// may share a message.
+struct Sender {
+  std::array<uint8_t, 2> vendor{};
+  Prefix prefix{};
+};
+
+inline Sender sender_at(std::span<const uint8_t> bytes, size_t place) {
+  Sender sender;
+  const auto from = bytes.begin() + static_cast<std::ptrdiff_t>(place);
+  std::copy_n(from, sender.vendor.size(), sender.vendor.begin());
+  std::copy_n(from + sender.vendor.size(), kPrefix, sender.prefix.begin());
+  return sender;
+}
+
+inline constexpr size_t kSenderInHead = 6;
 
 struct Submessage {
   enum Kind : uint8_t {
@@ -32,12 +52,15 @@ struct Submessage {
   static constexpr size_t kFirstFragment = 24, kFragmentSize = 30, kSampleSize = 32,
                           kFragmentHead = 36;
 
+  static constexpr size_t kSender = 10, kSourceSize = 24;  // of an InfoSource
+
   std::span<uint8_t> bytes;
 
   uint8_t kind() const { return bytes[0]; }
   bool is_little_endian() const { return bytes[1] & kLittleEndian; }
   bool is_data() const { return kind() == kData && bytes.size() >= kDataHead; }
   bool is_fragment() const { return kind() == kDataFrag && bytes.size() >= kFragmentHead; }
+  bool is_source() const { return kind() == kInfoSource && bytes.size() >= kSourceSize; }
   void erase() const { bytes[0] = kNothing; }
   // Of a fragment: gets the largest sample size of all, for which Cyclone leaves out the sample,
   // and goes on with the next.

@@ -71,6 +71,15 @@ TEST(HeldSamples, OfAMessageAreThoseOfItsDataFragmentsAndGaps) {
   EXPECT_THAT(found_in(message({header(), acknowledgement})), IsEmpty());
 }
 
+TEST(HeldSamples, OfParticipantsThatShareAMessageAreTheirOwn) {
+  Bytes body{0, 0, 0, 0, 2, 1, 1, 16};
+  body.resize(20, 8);
+  EXPECT_THAT(found_in(message({header(), data(kWriter, 5, Bytes(8)), submessage(0x0c, 0, body),
+                                data(kWriter, 9, Bytes(8))})),
+              ElementsAre(std::pair(gid(7, kWriter), 5), std::pair(gid(8, kWriter), 9)));
+  EXPECT_THAT(found_in(Bytes(19)), IsEmpty());
+}
+
 TEST(HeldSamples, WithImpossibleNumbersOrOfTooManyWritersBecomeNothing) {
   Bytes bytes =
       message({header(), data(kWriter, 0, Bytes(8)), data(kWriter, ~uint64_t{0}, Bytes(8)),

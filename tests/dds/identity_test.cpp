@@ -93,6 +93,25 @@ TEST(Identity, OfARequestIsItsWritersNumberOrTheReaderThatWaits) {
   }
 }
 
+// What several participants of a process tell at once, as Cyclone leaves it: sizes are turned, the
+// prefix in an INFO_SRC is not.
+TEST(Identity, OfARequestInASharedMessageIsItsOwnParticipants) {
+  const Bytes source{0x0c, 1,   20,  0,   0,   0,   0,   0,   2,   1,   1,   15,
+                     200,  201, 202, 203, 204, 205, 206, 207, 208, 209, 210, 211};
+  const Bytes empty_time{9, 3, 0, 0};
+  Bytes message = joined({kHeader, kTime, data(5, {}), source, empty_time, data(5, {})});
+  const size_t first = kHeader.size() + kTime.size(), second = message.size() - data(5, {}).size();
+  for (const size_t word : {first + 12, second + 12}) {
+    const auto at = message.begin() + static_cast<std::ptrdiff_t>(word);
+    std::reverse(at, at + 4);
+  }
+  EXPECT_EQ(identity_in(message, first).vendor[1], 16);
+  const DataIdentity found = identity_in(message, second);
+  EXPECT_THAT(found.sample.writer, ElementsAreArray({200, 201, 202, 203, 204, 205, 206, 207, 208,
+                                                     209, 210, 211, 0, 0, 21, 3}));
+  EXPECT_THAT(found.vendor, ElementsAreArray({1, 15}));
+}
+
 // Every truncated message, and every message with one changed byte, is read without a fault.
 TEST(Identity, OfDamagedMessagesIsNone) {
   const Bytes message = joined({kHeader, data(7, joined({kRelated, kSentinel}))});

@@ -78,6 +78,13 @@ Bytes goes(const Prefix& whose, uint32_t entity, uint64_t sequence) {
   return data(kOfWriters, sequence, rest, 2 | 8);
 }
 
+// Who sends what follows.
+Bytes source(const Prefix& who, uint8_t vendor = 16, bool little = true) {
+  Bytes body{0, 0, 0, 0, 2, 1, 1, vendor};
+  body.insert(body.end(), who.begin(), who.end());
+  return submessage(0x0c, 0, body, little);
+}
+
 Bytes from(const Prefix& who, std::initializer_list<Bytes> parts, uint8_t vendor = 16) {
   Bytes bytes{'R', 'T', 'P', 'S', 2, 1, 1, vendor};
   bytes.insert(bytes.end(), who.begin(), who.end());
@@ -94,6 +101,13 @@ class KnownParticipantsTest : public testing::Test {
   bool passes(Bytes bytes, uint16_t from_socket = 1) {
     known_.bound(bytes, socket(from_socket), now_);
     return bytes[20] != 0xff;
+  }
+  // Whether the last submessage is.
+  bool last_passes(Bytes bytes) {
+    known_.bound(bytes, socket(1), now_);
+    bool passed = false;
+    for_each_submessage(bytes, [&](const Submessage& each) { passed = each.kind() != 0xff; });
+    return passed;
   }
   std::vector<Prefix> left() {
     std::vector<Prefix> all;
@@ -160,12 +174,25 @@ TEST_F(KnownParticipantsTest, NobodyTellsOfOthers) {
   EXPECT_FALSE(passes(from(own, {leaving(other)})));
   EXPECT_FALSE(passes(from(own, {endpoint(other, 0x0103)})));
   EXPECT_TRUE(passes(from(own, {endpoint(own, 0x0103)})));
-  // A vendor of those who do, and a message that turns to another's name.
+  // A vendor of those who do, by the message's head and within it.
   EXPECT_FALSE(passes(from(own, {endpoint(own, 0x0103)}, 0x20)));
-  Bytes turned = from(own, {submessage(0x0c, 0, Bytes(20)), endpoint(other, 0x0103)});
-  known_.bound(turned, socket(1), now_);
-  EXPECT_EQ(turned[20], 0xff);
-  EXPECT_EQ(turned[20 + 24], 0xff);
+  EXPECT_FALSE(last_passes(from(own, {source(own, 0x20), endpoint(own, 0x0103)})));
+}
+
+// As Cyclone DDS sends what several participants of a process tell at once.
+TEST_F(KnownParticipantsTest, ParticipantsShareAMessage) {
+  const Prefix first = prefix(1), second = prefix(2);
+  for (const bool little : {true, false}) {
+    EXPECT_TRUE(last_passes(
+        from(first, {announcement(first), source(second, 16, little), announcement(second)})));
+    EXPECT_EQ(known_.size(), 2u);
+    now_ += KnownParticipants::kRepeat;
+  }
+  EXPECT_TRUE(last_passes(from(first, {source(second), endpoint(second, 0x0103)})));
+  EXPECT_FALSE(last_passes(from(first, {source(second), endpoint(first, 0x0203)})));
+  EXPECT_TRUE(last_passes(from(second, {source(first), endpoint(first, 0x0203)})));
+  // One that is cut off names nobody.
+  EXPECT_TRUE(last_passes(from(first, {submessage(0x0c, 0, Bytes(19)), endpoint(first, 0x0303)})));
 }
 
 TEST_F(KnownParticipantsTest, WhatIsToldToOthersMeansNothing) {

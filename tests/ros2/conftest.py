@@ -31,6 +31,7 @@ class Peer:
     """A participant; `topic` is ROS's name."""
 
     def __init__(self, domain: int):
+        self.domain = domain
         self.participant = DomainParticipant(domain)
         self.entities: list[object] = []
 

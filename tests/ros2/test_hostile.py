@@ -16,15 +16,16 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
-from conftest import Peer, Run, take, wait_for
+from conftest import PATIENCE, Peer, Run, take, wait_for
 from cyclonedds.builtin import BuiltinDataReader, BuiltinTopicDcpsSubscription
 from cyclonedds.core import Policy
 from cyclonedds.idl import IdlStruct, make_idl_struct
 from cyclonedds.idl.types import float64, sequence, uint8
+from cyclonedds.util import duration
 from ros_types import Clock, LaserScan, Odometry, Twist, Vector3
 from rtps import participant, prefix, reader
 from simulation_types import SERVICES
-from test_services import Client, filters
+from test_services import Client, await_discovery, filters
 
 RIG = str(Path(__file__).resolve().parent / "sensors.sdf")
 
@@ -39,6 +40,11 @@ class NotATwist(IdlStruct, typename="geometry_msgs::msg::dds_::Twist_"):
 @dataclass
 class ShortTwist(IdlStruct, typename="geometry_msgs::msg::dds_::Twist_"):
     x: float64
+
+
+def await_delivery(*writers):
+    for writer in writers:
+        assert writer.wait_for_acks(duration(seconds=PATIENCE))
 
 
 def drives(peer, cmd_vel, odometry):
@@ -67,9 +73,10 @@ def test_bytes_that_are_no_message_are_counted(kind, samples):
     with Run("--no-noise") as run:
         peer = Peer(run.domain)
         liar = peer.writer("/cmd_vel", kind)
-        wait_for(lambda: len(liar.get_matched_subscriptions()) > 0, "a reader")
+        await_discovery(peer)
         for sample in samples:
             liar.write(sample)
+        await_delivery(liar)
         honest = Peer(run.domain)
         drives(honest, honest.writer("/cmd_vel", Twist), honest.reader("/odom", Odometry))
         output = run.end()
@@ -107,12 +114,15 @@ def test_noise_on_all_that_is_read_is_harmless():
         read = inputs(peer)
         # Each kind of joint command, cmd_vel's absence aside; the pose; ten services; the action.
         assert len(read) == 4 + 1 + 10 + 3
-        for topic, kind in sorted(read):
-            liar = peer.writer(topic, make_idl_struct("Noise", kind, {"data": sequence[uint8]}), "")
-            wait_for(liar.get_matched_subscriptions, f"a reader of {topic}")
-            for seed in range(40):
-                liar.write(liar.topic.data_type(noise(seed)))
-        # It comes after all of that, and reads its answers, as none of those did.
+        liars = [
+            peer.writer(topic, make_idl_struct("Noise", kind, {"data": sequence[uint8]}), "")
+            for topic, kind in sorted(read)
+        ]
+        await_discovery(peer)
+        for liar, seed in itertools.product(liars, range(40)):
+            liar.write(liar.topic.data_type(noise(seed)))
+        await_delivery(*liars)
+        # It reads its answers, as none of those did.
         client = Client(run.domain)
         assert client.call("get_simulation_state").result.result == 1
         assert client.call("get_simulator_features").spawn_formats == ["sdf", "urdf"]
@@ -120,7 +130,7 @@ def test_noise_on_all_that_is_read_is_harmless():
         assert client.call("get_entity_state", "rig").result.result == 1
         output = run.end()
     assert run.process.returncode == 0
-    assert "messages that came were faulty" in output
+    assert "messages that came were faulty" in output, output
 
 
 @pytest.mark.parametrize("hears", [False, True], ids=["deaf", "hears"])
@@ -219,9 +229,10 @@ def test_a_message_of_64_mb_is_not_looked_at():
     with Run("--no-noise") as run:
         peer = Peer(run.domain)
         liar = peer.writer("/cmd_vel", NotATwist)
-        wait_for(lambda: len(liar.get_matched_subscriptions()) > 0, "a reader")
+        await_discovery(peer)
         liar.write(NotATwist(bytes(64 << 20)))
         liar.write(NotATwist(b"1"))  # what comes after it is
+        await_delivery(liar)
         honest = Peer(run.domain)
         drives(honest, honest.writer("/cmd_vel", Twist), honest.reader("/odom", Odometry))
         output = run.end()
@@ -274,7 +285,7 @@ def test_fragments_that_never_make_a_sample_take_no_memory(kind):
     with Run("--no-noise") as run, socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as stranger:
         peer = Peer(run.domain)
         writer = peer.writer("/cmd_vel", Twist)
-        wait_for(writer.get_matched_subscriptions, "a reader")
+        await_discovery(peer)
         before = resident_mb(run.process)
         sent = 0
         for message in itertools.islice(fragments(writer.guid.bytes, kind), 25_000):
@@ -298,8 +309,7 @@ def test_fragments_of_many_writers_take_little_memory():
     with Run("--no-noise") as run, socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as stranger:
         peer = Peer(run.domain)
         writers = [peer.writer("/cmd_vel", Twist) for _ in range(70)]
-        for writer in writers:
-            wait_for(writer.get_matched_subscriptions, "a reader")
+        await_discovery(peer)
         before = resident_mb(run.process)
         kinds = [fragments(writer.guid.bytes, "large") for writer in writers]
         for number, kind in enumerate(itertools.islice(itertools.cycle(kinds), 12_000)):
@@ -367,6 +377,7 @@ def test_no_number_moves_nothing(speed):
         peer = Peer(run.domain)
         cmd_vel, odometry = peer.writer("/cmd_vel", Twist), peer.reader("/odom", Odometry)
         take(odometry)
+        await_discovery(peer)
         cmd_vel.write(Twist(Vector3(x=speed), Vector3()))
         assert all(o.pose.pose.position.x == 0.0 for o in take(odometry, 50))
     assert run.process.returncode == 0

@@ -24,6 +24,7 @@ from ros_types import (
     Twist,
     Vector3,
 )
+from test_services import await_discovery
 
 WORLD = str(Path(__file__).resolve().parent / "sensors.sdf")
 
@@ -184,7 +185,7 @@ def test_commands_that_do_not_fit_the_joints_are_counted(topic, kind, message):
     with Run(world=WORLD) as run:
         peer = Peer(run.domain)
         commands = peer.writer(topic, kind)
-        wait_for(commands.get_matched_subscriptions, "a reader")
+        await_discovery(peer)
         commands.write(message)
         wait_for(lambda: "ignored (1 such" in (run.process.stdout.readline() or ""), "the warning")
         assert "1 messages that came were faulty" in run.end()
