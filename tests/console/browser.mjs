@@ -171,21 +171,47 @@ const tools = {
         answered_ms: performance.now(),
       };
     }, kAnyBody),
-  // Until nothing moves on the canvas: the camera is at rest.
+  // Until the camera and the layout are at rest. They move with the page's frames, of which there
+  // are few on a slow machine.
   still: () =>
-    tools.until("(the camera and the layout are at rest)", () => {
+    page.evaluate(async (patience_ms) => {
       const { camera } = window.ruedo.stage.view,
-        box = document.getElementById("canvas").getBoundingClientRect();
-      camera.updateMatrixWorld(); // else it is of the last frame
-      const is = [camera.matrixWorld.elements, camera.projectionMatrix.elements]
+        canvas = document.getElementById("canvas"),
+        end = performance.now() + patience_ms;
+      const look = () => {
+        const { left, top, width, height } = canvas.getBoundingClientRect();
+        camera.updateMatrixWorld(); // else it is of the last frame
+        return [camera.matrixWorld.elements, camera.projectionMatrix.elements]
           .flatMap((elements) => [...elements])
-          .concat(box.left, box.top, box.width, box.height)
+          .concat(left, top, width, height)
           .map((v) => v.toFixed(3))
-          .join(),
-        was = window.camera;
-      window.camera = is;
-      return is === was;
-    }),
+          .join();
+      };
+      for (let was = "", is = look(); is !== was;) {
+        if (performance.now() > end) throw new Error("the camera did not come to rest");
+        for (let i = 0; i < 3; ++i) await new Promise((next) => requestAnimationFrame(next));
+        [was, is] = [is, look()];
+      }
+    }, kPatience_ms),
+  // Where those metres are on the screen, by the page's own camera, once that is at rest.
+  onScreen: async (x, y, z = 0) => {
+    await tools.still();
+    return page.evaluate(
+      (place) => {
+        const { camera } = window.ruedo.stage.view,
+          { left, top, width, height } = document.getElementById("canvas").getBoundingClientRect(),
+          at = camera.position
+            .clone()
+            .set(...place)
+            .project(camera);
+        return [
+          Math.round(left + ((at.x + 1) / 2) * width),
+          Math.round(top + ((1 - at.y) / 2) * height),
+        ];
+      },
+      [x, y, z],
+    );
+  },
   ready: () =>
     tools.until(
       "(the world is drawn)",

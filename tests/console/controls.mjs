@@ -12,7 +12,7 @@ const kLayers = {
 };
 
 export default async function controls(tools) {
-  const { page, seen, until, check, ready, still, server, picture } = tools;
+  const { page, seen, until, check, ready, still, onScreen, server, picture } = tools;
   await ready();
   // Greatest and least speed ahead and turn rate since the last mark: a slow page sees few of them.
   await page.evaluate(() => {
@@ -211,20 +211,15 @@ export default async function controls(tools) {
   // ---- placing, by a click on the ground
   await page.getByRole("tab", { name: "World" }).click();
   await page.keyboard.press("3");
-  await still();
   // Clicks on the ground there, and returns the exact place, by the page's own camera.
   const click = async (at) => {
-    const [px, py, gx, gy] = await page.evaluate(([gx, gy]) => {
-      const { stage } = window.ruedo,
-        box = document.getElementById("canvas").getBoundingClientRect();
-      const p = stage.view.camera.position.clone().set(gx, gy, 0).project(stage.view.camera);
-      const sx = Math.round(box.left + ((p.x + 1) / 2) * box.width),
-        sy = Math.round(box.top + ((1 - p.y) / 2) * box.height);
-      const { ground } = stage.picker.pick(sx, sy);
-      return [sx, sy, ground.x, ground.y];
-    }, at);
-    await page.mouse.click(px, py);
-    return [gx, gy];
+    const place = await onScreen(...at);
+    const exact = await page.evaluate((pixel) => {
+      const { ground } = window.ruedo.stage.picker.pick(...pixel);
+      return [ground.x, ground.y];
+    }, place);
+    await page.mouse.click(...place);
+    return exact;
   };
   const put = async (thing, at) => {
     await page.getByLabel("what to place").selectOption({ label: thing });

@@ -1,6 +1,6 @@
 // A world is edited as by a user: drawn, placed, moved by handles and numbers, cut, undone,
 // settled, saved.
-export default async function edit({ page, seen, until, check, picture, still, given }) {
+export default async function edit({ page, seen, until, check, picture, still, onScreen, given }) {
   await page.setViewportSize({ width: 1100, height: 640 });
   await until(
     "(the world is drawn)",
@@ -19,32 +19,17 @@ export default async function edit({ page, seen, until, check, picture, still, g
     await page.locator("#save").innerText(),
   );
   await page.keyboard.press("3");
-  await still();
   const has = (name) =>
     until(`(${name} is there)`, (wanted) => window.ruedo.editor.find(wanted) !== undefined, name);
   const gone = (name) =>
     until(`(${name} is gone)`, (wanted) => window.ruedo.editor.find(wanted) === undefined, name);
-  // Where those metres are on the screen, by the page's own camera.
-  const at = (x, y, z = 0) =>
-    page.evaluate(
-      ([x, y, z]) => {
-        const { stage } = window.ruedo,
-          box = document.getElementById("canvas").getBoundingClientRect(),
-          p = stage.view.camera.position.clone().set(x, y, z).project(stage.view.camera);
-        return [
-          Math.round(box.left + ((p.x + 1) / 2) * box.width),
-          Math.round(box.top + ((1 - p.y) / 2) * box.height),
-        ];
-      },
-      [x, y, z],
-    );
   const drag = async (from, to) => {
-    await page.mouse.move(...(await at(...from)));
+    await page.mouse.move(...(await onScreen(...from)));
     await page.mouse.down();
-    await page.mouse.move(...(await at((from[0] + to[0]) / 2, (from[1] + to[1]) / 2)), {
+    await page.mouse.move(...(await onScreen((from[0] + to[0]) / 2, (from[1] + to[1]) / 2)), {
       steps: 3,
     });
-    await page.mouse.move(...(await at(...to)), { steps: 3 });
+    await page.mouse.move(...(await onScreen(...to)), { steps: 3 });
     await page.mouse.up();
   };
   const pose = (name) => page.evaluate((wanted) => window.ruedo.editor.pose(wanted), name);
@@ -69,7 +54,7 @@ export default async function edit({ page, seen, until, check, picture, still, g
     JSON.stringify(await pose("room")),
   );
   await tool("door");
-  await page.mouse.click(...(await at(-0.5, 1, 1.2)));
+  await page.mouse.click(...(await onScreen(-0.5, 1, 1.2)));
   await until("a door is cut", () => window.ruedo.page.now.edits.undo === "door in wall");
   await has("wall");
 
@@ -77,7 +62,7 @@ export default async function edit({ page, seen, until, check, picture, still, g
   await tool("select");
   await page.getByLabel("what to place").selectOption({ label: "a box" });
   await page.locator("#place").click();
-  await page.mouse.click(...(await at(1.7, 0.5)));
+  await page.mouse.click(...(await onScreen(1.7, 0.5)));
   await has("box");
   await until(
     "pictures of the library are there",
@@ -86,13 +71,13 @@ export default async function edit({ page, seen, until, check, picture, still, g
       [...document.querySelectorAll("#library img")].every((image) => image.naturalWidth > 0),
   );
   await page.locator('[data-library="p3dx"]').click();
-  await page.mouse.click(...(await at(-0.5, -1)));
+  await page.mouse.click(...(await onScreen(-0.5, -1)));
   await has("p3dx");
   seen("a robot from the library stands there");
   await picture("edit");
 
   // ---- selected, moved
-  await page.mouse.click(...(await at(1.7, 0.5, 0.4)));
+  await page.mouse.click(...(await onScreen(1.7, 0.5, 0.4)));
   await until("a click selects", () => window.ruedo.page.now.selected === "box");
   await page.locator('[data-number="x"]').fill("2.25");
   await page.locator('[data-number="x"]').press("Enter");
@@ -109,7 +94,7 @@ export default async function edit({ page, seen, until, check, picture, still, g
       ) < 1e-6,
   );
   const before = await pose("box"),
-    [hx, hy] = await at(before[0], before[1], before[2]);
+    [hx, hy] = await onScreen(before[0], before[1], before[2]);
   await page.mouse.move(hx + 60, hy); // the handle along x, seen from above
   await until("(the pointer is on a handle)", () => window.ruedo.gizmo.seized);
   await page.mouse.down();

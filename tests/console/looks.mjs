@@ -2,7 +2,7 @@
 // back to it.
 import { readFileSync } from "node:fs";
 
-export default async function looks({ page, until, check, ready, still }) {
+export default async function looks({ page, until, check, ready, still, onScreen }) {
   await page.setViewportSize({ width: 1000, height: 520 });
   await ready();
   await page.locator("#canvas").focus();
@@ -10,30 +10,15 @@ export default async function looks({ page, until, check, ready, still }) {
   await until("(paused)", () => document.getElementById("state").textContent === "paused");
   await page.getByRole("tab", { name: "World" }).click();
   await page.keyboard.press("3");
-  await still();
-  const at = (x, y, z = 0) =>
-    page.evaluate(
-      (place) => {
-        const { stage } = window.ruedo,
-          box = document.getElementById("canvas").getBoundingClientRect(),
-          p = stage.view.camera.position
-            .clone()
-            .set(...place)
-            .project(stage.view.camera);
-        return [box.left + ((p.x + 1) / 2) * box.width, box.top + ((1 - p.y) / 2) * box.height];
-      },
-      [x, y, z],
-    );
   const words = () => document.getElementById("coordinates").textContent;
-  await page.mouse.move(...(await at(-1, 0.5)));
+  await page.mouse.move(...(await onScreen(-1, 0.5)));
   await until("coordinates are those under the pointer", () => {
     const [x, y] = document.getElementById("coordinates").textContent.split(",").map(parseFloat);
     return Math.abs(x + 1) < 0.05 && Math.abs(y - 0.5) < 0.05;
   });
   await page.locator("#measure").click();
-  await still();
-  await page.mouse.click(...(await at(-1, 0.5)));
-  await page.mouse.click(...(await at(-1, -2.5)));
+  await page.mouse.click(...(await onScreen(-1, 0.5)));
+  await page.mouse.click(...(await onScreen(-1, -2.5)));
   await until(
     "a way is measured",
     () =>

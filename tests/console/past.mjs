@@ -1,6 +1,16 @@
 // The last minutes of a run are viewed while it goes on: by the time line, with models that came
 // and went meanwhile.
-export default async function past({ page, seen, until, check, ready, server, picture, fact }) {
+export default async function past({
+  page,
+  seen,
+  until,
+  check,
+  ready,
+  server,
+  picture,
+  fact,
+  onScreen,
+}) {
   await page.setViewportSize({ width: 1000, height: 460 }); // software draws every pixel
   await ready();
   await page.getByRole("tab", { name: "Robot" }).click();
@@ -28,13 +38,7 @@ export default async function past({ page, seen, until, check, ready, server, pi
   );
   await page.locator("#live").click();
   await page.keyboard.press("b");
-  const place = await page.evaluate(() => {
-    const { stage } = window.ruedo,
-      box = document.getElementById("canvas").getBoundingClientRect(),
-      p = stage.view.camera.position.clone().set(-1.5, 0.4, 0).project(stage.view.camera); // nothing is there
-    return [box.left + ((p.x + 1) / 2) * box.width, box.top + ((1 - p.y) / 2) * box.height];
-  });
-  await page.mouse.click(...place);
+  await page.mouse.click(...(await onScreen(-1.5, 0.4))); // nothing is there
   const box = () => window.ruedo.page.now.scene.models.some(({ name }) => name === "box");
   await until("(a box is placed)", box);
   const scrub = async (time_s) => {
