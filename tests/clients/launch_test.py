@@ -63,6 +63,17 @@ def test_the_server_ends_with_its_client(language, end):
         client.wait()
 
 
+def test_the_terminals_signals_are_not_the_servers(language):
+    """A client may still need it when Ctrl-C ends the client."""
+    client, url = start(language)
+    try:
+        [server] = servers_of(url)
+        assert os.getsid(server) == server != os.getsid(client.pid)
+    finally:
+        client.kill()
+        client.wait()
+
+
 def test_two_launches_do_not_meet(language):
     first, url = start(language)
     second, other = start(language)

@@ -1,25 +1,41 @@
-"""The Java client's callbacks, readers, and ends (unit/Lifetimes.java); those of C++ are
-unit/lifetimes_test.cpp, of Python python_test.py.
+"""The Java client's callbacks, readers, and ends (unit/Lifetimes.java), and what no real server
+shows (unit/Internals.java); those of C++ are unit/lifetimes_test.cpp, of Python python_test.py.
 """
 
 import os
+import re
+import shutil
+import socket
 import subprocess
+import tempfile
+from pathlib import Path
 
 import pytest
-from conftest import BUILD, HALL, PATIENCE, free_url, ruedo_run
+from conftest import BUILD, HALL, PATIENCE, free_url, ruedo_run, tcp_server
 
 CLASSES = os.environ.get("RUEDO_PROBE_JAVA")
-COMMAND = ["java", "-cp", f"{BUILD}/java/ruedo.jar:{CLASSES}", "Lifetimes"]
+JAVA = ["java", "-cp", f"{BUILD}/java/ruedo.jar:{CLASSES}"]
+COMMAND = [*JAVA, "Lifetimes"]
 CLOSED = "this simulation was closed"
 ANOTHER_RUN = "ruedo: another run has begun at URL: commands are not repeated into it\n"
 pytestmark = pytest.mark.skipif(not CLASSES, reason="there is no JDK")
 
 
+def run(command, **options):
+    return subprocess.run(
+        command, capture_output=True, text=True, timeout=PATIENCE, check=False, **options
+    )
+
+
 def lifetimes(what):
     with ruedo_run("--disable", "p3at/camera", world=HALL) as server:
-        return subprocess.run(
-            [*COMMAND, server.url, what], capture_output=True, text=True, timeout=PATIENCE
-        )
+        return run([*COMMAND, server.url, what])
+
+
+def internals(*words):
+    done = run([*JAVA, "ruedo.Internals", *words])
+    assert (done.returncode, done.stderr) == (0, "")
+    return done.stdout.splitlines()
 
 
 def test_callbacks_and_closing():
@@ -96,3 +112,120 @@ def test_a_callback_of_a_new_run_may_close_the_simulation():
     said, errors = with_a_restarted_server("closed_by_new_run")
     assert said == f"{CLOSED}, {CLOSED}\n", errors
     assert errors == ANOTHER_RUN
+
+
+@pytest.mark.parametrize("server", [ruedo_run, tcp_server])
+def test_what_cannot_be_described_ends_nothing(server):
+    """The thread that receives lives, over each of LCM's networks."""
+    with server("--disable", "p3at/camera", world=HALL) as running:
+        done = run([*COMMAND, running.url, "unspeakable"])
+    assert done.stdout == "goes on\n", done.stderr
+    assert done.stderr == (
+        "ruedo: a callback on p3at/odometry failed: Lifetimes$Unspeakable; it is called on, "
+        "and this is said once\n"
+    )
+
+
+LONG = r"ruedo: a callback has not returned for 5 s, at Lifetimes\.java:\d+: "
+
+
+def test_close_waits_for_a_callback():
+    done = lifetimes("closed_beside_a_callback")
+    assert done.stdout == "returned true\n", done.stderr
+    assert re.fullmatch(LONG + r"close\(\) waits for it\n", done.stderr)
+
+
+def test_a_callback_may_end_the_program():
+    """Which waits for close(), which waits for the callback."""
+    done = lifetimes("ended_in_a_callback")
+    assert done.returncode == 5
+    assert re.fullmatch(LONG + "the program ends without it\n", done.stderr)
+
+
+@pytest.fixture
+def runtime():
+    """A folder for a server's socket, whose path is short, and for temporary files; and the
+    environment that says so.
+    """
+    folder = tempfile.mkdtemp(prefix="java-")
+    options = f"-Djava.io.tmpdir={folder}"
+    yield Path(folder), {**os.environ, "XDG_RUNTIME_DIR": folder, "JAVA_TOOL_OPTIONS": options}
+    shutil.rmtree(folder)
+
+
+def test_an_interrupted_launch_says_so_and_leaves_nothing(runtime):
+    folder, environment = runtime
+    text = Path(HALL).read_text()
+    done = run([*COMMAND, HALL, "interrupted_launch", text], env=environment)
+    assert done.stdout.splitlines() == 2 * ["Interrupted true"], done.stderr
+    assert list(folder.iterdir()) == []
+
+
+def test_an_interrupted_thread_closes_as_any_other(runtime):
+    folder, environment = runtime
+    done = run([*COMMAND, HALL, "interrupted_close"], env=environment)
+    assert done.stdout == "closed true\n", done.stderr
+    assert list(folder.iterdir()) == []
+
+
+def test_a_client_that_is_killed_leaves_no_output_of_its_server(runtime):
+    folder, environment = runtime
+    client = subprocess.Popen(
+        [*COMMAND, HALL, "killed"], env=environment, stdout=subprocess.PIPE, text=True
+    )
+    assert client.stdout.readline() == "ready\n"
+    client.kill()
+    client.wait()
+    assert list(folder.glob("*.log")) == []
+
+
+def test_interrupts_leave_the_socket_open():
+    """Those of threads that send, over multicast, and one that a callback leaves behind."""
+    assert internals("interrupts", free_url()) == 3 * ["heard true"]
+
+
+def test_the_newest_info_holds():
+    """Of a device's numbers, of the devices that there are, and of a channel's type."""
+    assert internals("infos") == [
+        "lrf 10.0 20.0 3.0",
+        "device true",
+        "other TypeMismatch",
+        "none yet Timeout",
+        "pose 4.0",
+        "once Timeout",
+    ]
+
+
+def test_monitors_that_a_user_holds_hold_nothing_up():
+    assert internals("monitors") == ["received true true true"]
+
+
+def test_an_info_has_no_more_parts_than_memory():
+    assert internals("parts") == [
+        "null",
+        "TypeMismatch",
+        "64: ruedo/info has 1024 parts of 68157440 bytes so far: a client takes 1024 parts of "
+        "67108864 bytes together at most",
+        "null",
+    ]
+
+
+def test_a_server_whose_queue_is_full_is_there(tmp_path):
+    """One that is stopped accepts no connection, not even those that look for it."""
+    with socket.socket(socket.AF_UNIX) as listening:
+        listening.bind(f"{tmp_path}/bus")
+        listening.listen(0)
+        waiting = []
+        while True:
+            client = socket.socket(socket.AF_UNIX)
+            client.setblocking(False)
+            waiting.append(client)
+            try:
+                client.connect(f"{tmp_path}/bus")
+            except BlockingIOError:
+                break
+        assert internals("served", f"unix://{tmp_path}/bus") == ["served true"]
+        for client in waiting:
+            client.close()
+    assert internals("served", f"unix://{tmp_path}/bus") == ["served false"]
+    assert internals("served", f"unix://{tmp_path}/nobody") == ["served false"]

@@ -1,3 +1,4 @@
+import ruedo.LaunchOptions;
 import ruedo.Motion;
 import ruedo.Odometry;
 import ruedo.Reader;
@@ -8,9 +9,12 @@ import ruedo.Simulation;
 import ruedo.Stream;
 import ruedo.Subscription;
 
+import java.io.PrintStream;
 import java.util.ArrayList;
 import java.util.List;
 import java.util.concurrent.CountDownLatch;
+import java.util.concurrent.TimeUnit;
+import java.util.concurrent.atomic.AtomicBoolean;
 import java.util.concurrent.atomic.AtomicInteger;
 
 /**
@@ -190,11 +194,119 @@ public final class Lifetimes {
         System.out.println(errorOf(odometry::next) + ", " + errorOf(sim::pause));
     }
 
-    public static void main(String[] args) throws InterruptedException {
-        if (args[1].equals("two")) {
-            two(args[0], args[2]);
-            return;
+    private static final class Unspeakable extends RuntimeException {
+        private static final long serialVersionUID = 1L;
+
+        @Override
+        public String getMessage() {
+            throw this;
         }
+    }
+
+    /** What cannot be described ends nothing either. */
+    private static void unspeakable(Simulation sim) {
+        Stream<Odometry> odometry = sim.robot("p3at").odometry();
+        AtomicInteger failed = new AtomicInteger();
+        odometry.onSample(
+                sample -> {
+                    failed.incrementAndGet();
+                    throw new Unspeakable();
+                });
+        while (failed.get() < 3) odometry.next(PATIENCE);
+        System.out.println("goes on");
+    }
+
+    /** A callback that returns once it was said on stderr that it does not. */
+    private static CountDownLatch stuck(Simulation sim, AtomicBoolean returned) {
+        CountDownLatch begun = new CountDownLatch(1);
+        CountDownLatch said = new CountDownLatch(1);
+        System.setErr(
+                new PrintStream(System.err, true) {
+                    @Override
+                    public void println(String line) {
+                        super.println(line);
+                        said.countDown();
+                    }
+                });
+        sim.robot("p3at")
+                .odometry()
+                .onSample(
+                        sample -> {
+                            begun.countDown();
+                            try {
+                                said.await((long) PATIENCE, TimeUnit.SECONDS);
+                            } catch (InterruptedException error) {
+                                throw new AssertionError(error);
+                            }
+                            returned.set(true);
+                        });
+        return begun;
+    }
+
+    private static void closedBesideACallback(Simulation sim) throws InterruptedException {
+        AtomicBoolean returned = new AtomicBoolean();
+        stuck(sim, returned).await();
+        sim.close();
+        System.out.println("returned " + returned);
+    }
+
+    /** The program's end waits for its hook, and the callback for the program's end. */
+    private static void endedInACallback(Simulation sim) {
+        Runtime.getRuntime().addShutdownHook(new Thread(sim::close));
+        sim.robot("p3at").odometry().onSample(sample -> System.exit(5));
+        errorOf(() -> sim.sleep(PATIENCE));
+    }
+
+    private static String launched(LaunchOptions options, String world) {
+        try (Simulation sim = Ruedo.launch(world, options)) {
+            return "launched " + sim.world();
+        } catch (RuedoException error) {
+            return error.getClass().getSimpleName();
+        }
+    }
+
+    private static void interruptedLaunch(String world, String text) {
+        Thread.currentThread().interrupt();
+        System.out.println(launched(new LaunchOptions(), world) + " " + Thread.interrupted());
+        Thread.currentThread().interrupt();
+        System.out.println(
+                launched(new LaunchOptions().text(text), "") + " " + Thread.interrupted());
+    }
+
+    private static void interruptedClose(String world) {
+        Simulation sim = Ruedo.launch(world, new LaunchOptions().timeout(PATIENCE));
+        Thread.currentThread().interrupt();
+        sim.close();
+        System.out.println("closed " + Thread.interrupted());
+    }
+
+    private static void launchedAndKilled(String world) {
+        try (Simulation sim = Ruedo.launch(world, new LaunchOptions().timeout(PATIENCE))) {
+            System.out.println("ready");
+            sim.sleep(PATIENCE);
+        }
+    }
+
+    public static void main(String[] args) throws InterruptedException {
+        switch (args[1]) {
+            case "two":
+                two(args[0], args[2]);
+                return;
+            case "interrupted_launch":
+                interruptedLaunch(args[0], args[2]);
+                return;
+            case "interrupted_close":
+                interruptedClose(args[0]);
+                return;
+            case "killed":
+                launchedAndKilled(args[0]);
+                return;
+            default:
+                connected(args);
+        }
+    }
+
+    private static void connected(String[] args) throws InterruptedException {
         try (Simulation sim = Ruedo.connect(args[0], "lifetimes", PATIENCE)) {
             switch (args[1]) {
                 case "new_run":
@@ -202,6 +314,15 @@ public final class Lifetimes {
                     break;
                 case "misused":
                     misused(sim);
+                    break;
+                case "unspeakable":
+                    unspeakable(sim);
+                    break;
+                case "closed_beside_a_callback":
+                    closedBesideACallback(sim);
+                    break;
+                case "ended_in_a_callback":
+                    endedInACallback(sim);
                     break;
                 case "closed_by_new_run":
                     closedByNewRun(sim);

@@ -1,15 +1,19 @@
 package ruedo;
 
+import java.io.BufferedReader;
+import java.io.File;
+import java.io.FileReader;
 import java.io.IOException;
+import java.io.UncheckedIOException;
+import java.net.ConnectException;
 import java.net.Inet4Address;
 import java.net.InetAddress;
 import java.net.InetSocketAddress;
+import java.net.SocketException;
 import java.net.StandardProtocolFamily;
 import java.net.UnknownHostException;
 import java.nio.channels.DatagramChannel;
 import java.nio.charset.StandardCharsets;
-import java.nio.file.Files;
-import java.nio.file.Path;
 import java.util.HashMap;
 import java.util.Map;
 
@@ -149,10 +153,11 @@ final class Address {
     boolean isClaimed() {
         if (path != null) return isServed();
         String claim = " @ruedo/" + (multicast ? "udpm" : "tcpq") + "/" + host + ":" + port;
-        try (java.util.stream.Stream<String> sockets =
-                Files.lines(Path.of("/proc/net/unix"), StandardCharsets.ISO_8859_1)) {
-            return sockets.anyMatch(line -> line.endsWith(claim));
-        } catch (IOException | java.io.UncheckedIOException error) {
+        // A channel of Files' would be closed by an interrupt.
+        try (BufferedReader sockets =
+                new BufferedReader(new FileReader("/proc/net/unix", StandardCharsets.ISO_8859_1))) {
+            return sockets.lines().anyMatch(line -> line.endsWith(claim));
+        } catch (IOException | UncheckedIOException error) {
             return false;
         }
     }
@@ -190,7 +195,11 @@ final class Address {
             probe();
             return true;
         } catch (IOException error) {
-            return false;
+            // The queue of one that is stopped is full, which is none of Java's own exceptions.
+            return path != null
+                    && error instanceof SocketException
+                    && !(error instanceof ConnectException)
+                    && new File(path).exists();
         }
     }
 }

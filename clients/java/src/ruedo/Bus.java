@@ -1,5 +1,7 @@
 package ruedo;
 
+import static java.util.concurrent.TimeUnit.SECONDS;
+
 import ruedo.lcmtypes.Message;
 
 import java.io.ByteArrayOutputStream;
@@ -9,6 +11,7 @@ import java.util.ArrayList;
 import java.util.List;
 import java.util.Map;
 import java.util.concurrent.ConcurrentHashMap;
+import java.util.concurrent.locks.ReentrantLock;
 import java.util.function.Consumer;
 
 /**
@@ -20,6 +23,9 @@ final class Bus implements Transport.Receiver {
     private final Map<String, List<Subscription>> handlers =
             new ConcurrentHashMap<>(); // lists are never changed
     private static final int LARGEST = 4 << 20; // bytes: what a server takes from a client
+    private static final long LONG_SECONDS = 5; // for a callback
+    private final ReentrantLock delivering = new ReentrantLock(); // while handlers are called
+    private volatile Thread receiving; // the one that calls them; null: nothing came yet
     private volatile boolean closed;
 
     /** The one that this thread is in a handler of. */
@@ -60,12 +66,15 @@ final class Bus implements Transport.Receiver {
 
     @Override
     public void receive(String channel, byte[] message) {
+        receiving = Thread.currentThread();
         HANDLING.set(this);
+        delivering.lock();
         try {
             for (Subscription subscription : handlers.getOrDefault(channel, List.of())) {
                 if (!closed) subscription.call(message);
             }
         } finally {
+            delivering.unlock();
             HANDLING.remove();
         }
     }
@@ -116,9 +125,52 @@ final class Bus implements Transport.Receiver {
         }
     }
 
-    /** From now on no handler is called. */
+    /**
+     * From now on no handler is called. Waits for one that is running, which is named when it takes
+     * long. At the program's end it is not waited for any longer: it may be what ended the program.
+     */
     void close() {
         closed = true;
         transport.close();
+        if (returned()) return;
+        System.err.println(
+                "ruedo: a callback has not returned for "
+                        + LONG_SECONDS
+                        + " s, at "
+                        + placeInCallback()
+                        + (programEnds()
+                                ? ": the program ends without it"
+                                : ": close() waits for it"));
+        while (!programEnds() && !returned()) {} // which waits
+    }
+
+    /** Whether no handler runs; waits for that. */
+    private boolean returned() {
+        if (!Uninterrupted.get(() -> delivering.tryLock(LONG_SECONDS, SECONDS))) return false;
+        delivering.unlock();
+        return true;
+    }
+
+    private static boolean programEnds() {
+        Thread hook = new Thread(() -> {});
+        try {
+            Runtime.getRuntime().addShutdownHook(hook);
+            Runtime.getRuntime().removeShutdownHook(hook);
+            return false;
+        } catch (IllegalStateException error) { // it is too late for one
+            return true;
+        }
+    }
+
+    /** The innermost line of the user's, in the thread that calls the handlers. */
+    private String placeInCallback() {
+        for (StackTraceElement frame : receiving.getStackTrace()) {
+            String module = frame.getModuleName();
+            boolean ofJava =
+                    module != null && (module.startsWith("java.") || module.startsWith("jdk."));
+            if (!ofJava && !frame.getClassName().startsWith("ruedo."))
+                return frame.getFileName() + ":" + frame.getLineNumber();
+        }
+        return "a place that is not known";
     }
 }

@@ -8,22 +8,22 @@ import ruedo.lcmtypes.device_info_t;
  * it does not.
  */
 public final class Camera extends Device<Image> {
-    Camera(Simulation sim, device_info_t info, channel_info_t channel) {
-        super(sim, info, channel);
+    Camera(StreamCore<Image> core, device_info_t info, channel_info_t channel) {
+        super(core, info, channel);
     }
 
     /** Depth pictures: "float32", m along the optical axis. */
     public Stream<Image> depth() {
-        return sim.robot(robot).cameraPart(name, "depth", "image_t");
+        return core.sim.robot(robot).cameraPart(name, "depth", "image_t");
     }
 
     /** Label pictures: "gray16", body index + 1. */
     public Stream<Image> labels() {
-        return sim.robot(robot).cameraPart(name, "labels", "image_t");
+        return core.sim.robot(robot).cameraPart(name, "labels", "image_t");
     }
 
     /** The intrinsics. */
     public Stream<CameraInfo> intrinsics() {
-        return sim.robot(robot).cameraPart(name, "info", "camera_info_t");
+        return core.sim.robot(robot).cameraPart(name, "info", "camera_info_t");
     }
 }

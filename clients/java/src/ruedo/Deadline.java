@@ -1,5 +1,10 @@
 package ruedo;
 
+import java.io.IOException;
+import java.io.InterruptedIOException;
+import java.nio.channels.ClosedSelectorException;
+import java.nio.channels.Selector;
+
 /** A point in real time until which something is waited for. */
 final class Deadline {
     private final long start = System.nanoTime();
@@ -29,6 +34,23 @@ final class Deadline {
         } catch (InterruptedException error) {
             Thread.currentThread().interrupt();
             throw new RuedoException.Interrupted();
+        }
+    }
+
+    /** Until something may be done with a channel, at most until here; an interrupt is put off. */
+    void select(Selector selector) throws IOException {
+        boolean interrupted = Thread.interrupted();
+        try {
+            do {
+                if (passed()) throw new InterruptedIOException("it takes too long");
+                selector.select(1000);
+                interrupted |= Thread.interrupted();
+            } while (selector.selectedKeys().isEmpty());
+            selector.selectedKeys().clear();
+        } catch (ClosedSelectorException error) {
+            throw new IOException("it was closed", error);
+        } finally {
+            if (interrupted) Thread.currentThread().interrupt();
         }
     }
 

@@ -45,8 +45,8 @@ public class Device<T extends Sample> extends Stream<T> {
     /** A sonar's transducers: x, y, z (m), roll, pitch, yaw (rad) in the device's frame. */
     public final double[][] elements;
 
-    Device(Simulation sim, device_info_t info, channel_info_t channel) {
-        super(sim, channel);
+    Device(StreamCore<T> core, device_info_t info, channel_info_t channel) {
+        super(core, channel);
         robot = info.robot;
         name = info.name;
         kind = info.kind;

@@ -14,7 +14,8 @@ public final class Motion {
     private final String robot;
     private final String kind;
     private final Deadline unseenUntil = new Deadline(UNSEEN_SECONDS);
-    private String state = "sent";
+    private final Object lock = new Object(); // a user may hold the monitor of this object itself
+    private String state = "sent"; // these under lock
     private String reason = "";
     private String blockedBy = "";
     private double progress;
@@ -32,36 +33,48 @@ public final class Motion {
     }
 
     /** True when the robot is not executing it any more, for whatever reason. */
-    public synchronized boolean done() {
-        return state.equals("done") || state.equals("ended") || state.equals("refused");
+    public boolean done() {
+        synchronized (lock) {
+            return state.equals("done") || state.equals("ended") || state.equals("refused");
+        }
     }
 
     /** "sent", then as in {@link MotionStatus#state}. */
-    public synchronized String state() {
-        return state;
+    public String state() {
+        synchronized (lock) {
+            return state;
+        }
     }
 
     /**
      * Why it ended early or was refused, as in {@link MotionStatus#reason}; "removed", "new run":
      * its robot, its run is gone.
      */
-    public synchronized String reason() {
-        return reason;
+    public String reason() {
+        synchronized (lock) {
+            return reason;
+        }
     }
 
     /** The body that blocked it; "": none did. */
-    public synchronized String blockedBy() {
-        return blockedBy;
+    public String blockedBy() {
+        synchronized (lock) {
+            return blockedBy;
+        }
     }
 
     /** m or rad done. */
-    public synchronized double progress() {
-        return progress;
+    public double progress() {
+        synchronized (lock) {
+            return progress;
+        }
     }
 
     /** m or rad. */
-    public synchronized double remaining() {
-        return remaining;
+    public double remaining() {
+        synchronized (lock) {
+            return remaining;
+        }
     }
 
     /** {@link #await(double)}, however long it takes. Java's Object has the name wait. */
@@ -75,60 +88,69 @@ public final class Motion {
      * @throws RuedoException.MotionError when it ended early or was refused
      * @throws RuedoException.Timeout when it still runs; the robot goes on then
      */
-    public synchronized Motion await(double timeout) {
-        Deadline deadline = new Deadline(timeout);
-        while (!done()) {
-            sim.checkMayWait();
-            if (deadline.passed()) {
-                throw new RuedoException.Timeout(
-                        String.format(
-                                "%s: %s was not done within %s s (%.3f remain)",
-                                robot, kind, Deadline.text(timeout), remaining));
+    public Motion await(double timeout) {
+        synchronized (lock) {
+            Deadline deadline = new Deadline(timeout);
+            while (!done()) {
+                sim.checkMayWait();
+                if (deadline.passed()) {
+                    throw new RuedoException.Timeout(
+                            String.format(
+                                    "%s: %s was not done within %s s (%.3f remain)",
+                                    robot, kind, Deadline.text(timeout), remaining));
+                }
+                deadline.waitOn(lock, 500);
+                sim.checkServer();
             }
-            deadline.waitOn(this, 500);
-            sim.checkServer();
+            if (!state.equals("done")) {
+                throw new RuedoException.MotionError(
+                        String.format(
+                                "%s: %s %s: %s, %.3f remain",
+                                robot,
+                                kind,
+                                state.equals("refused") ? "was refused" : "ended",
+                                blockedBy.isEmpty() ? reason : reason + " by " + blockedBy,
+                                remaining),
+                        reason);
+            }
+            return this;
         }
-        if (!state.equals("done")) {
-            throw new RuedoException.MotionError(
-                    String.format(
-                            "%s: %s %s: %s, %.3f remain",
-                            robot,
-                            kind,
-                            state.equals("refused") ? "was refused" : "ended",
-                            blockedBy.isEmpty() ? reason : reason + " by " + blockedBy,
-                            remaining),
-                    reason);
-        }
-        return this;
     }
 
     /** Sim time was reset. */
-    synchronized void beginEpoch() {
-        utime = -1;
-    }
-
-    synchronized void end(String why) {
-        if (done()) return;
-        state = "ended";
-        reason = why;
-        notifyAll();
-    }
-
-    synchronized void update(MotionStatus status, String blocker) {
-        if (done() || status.utime < utime && !sim.isFarAhead(utime)) return;
-        utime = status.utime;
-        if (status.id == id) {
-            progress = status.progress;
-            remaining = status.remaining;
-            state = status.state;
-            reason = status.reason;
-            blockedBy = reason.equals("blocked") ? blocker : "";
-        } else if (status.state.equals("refused")) {
-            return; // another command, which changed nothing
-        } else if (!state.equals("sent") || (++unseen >= UNSEEN_STATUSES && unseenUntil.passed())) {
-            state = "ended"; // its own end fell between two statuses
-            reason = "replaced";
+    void beginEpoch() {
+        synchronized (lock) {
+            utime = -1;
         }
-        notifyAll();
+    }
+
+    void end(String why) {
+        synchronized (lock) {
+            if (done()) return;
+            state = "ended";
+            reason = why;
+            lock.notifyAll();
+        }
+    }
+
+    void update(MotionStatus status, String blocker) {
+        synchronized (lock) {
+            if (done() || status.utime < utime && !sim.isFarAhead(utime)) return;
+            utime = status.utime;
+            if (status.id == id) {
+                progress = status.progress;
+                remaining = status.remaining;
+                state = status.state;
+                reason = status.reason;
+                blockedBy = reason.equals("blocked") ? blocker : "";
+            } else if (status.state.equals("refused")) {
+                return; // another command, which changed nothing
+            } else if (!state.equals("sent")
+                    || (++unseen >= UNSEEN_STATUSES && unseenUntil.passed())) {
+                state = "ended"; // its own end fell between two statuses
+                reason = "replaced";
+            }
+            lock.notifyAll();
+        }
     }
 }

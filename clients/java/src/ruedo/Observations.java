@@ -31,7 +31,8 @@ public final class Observations extends State {
      */
     public final List<Message> messages;
 
-    private Map<String, List<Message>> byChannel; // null: nobody asked yet
+    private final Object lock = new Object();
+    private Map<String, List<Message>> byChannel; // under lock; null: nobody asked yet
 
     Observations(State state, List<Message> messages) {
         super(
@@ -80,18 +81,22 @@ public final class Observations extends State {
     }
 
     /** Sorted once: a fleet asks for each of its robots. */
-    private synchronized List<Message> on(String channel) {
-        if (byChannel == null) {
-            byChannel = new HashMap<>();
-            for (Message message : messages)
-                byChannel.computeIfAbsent(message.channel, key -> new ArrayList<>()).add(message);
+    private List<Message> on(String channel) {
+        synchronized (lock) {
+            if (byChannel == null) {
+                byChannel = new HashMap<>();
+                for (Message message : messages)
+                    byChannel
+                            .computeIfAbsent(message.channel, key -> new ArrayList<>())
+                            .add(message);
+            }
+            return byChannel.getOrDefault(channel, List.of());
         }
-        return byChannel.getOrDefault(channel, List.of());
     }
 
     @SuppressWarnings("unchecked")
     private static <T extends Sample> T sample(Message message, Stream<T> stream) {
-        Conversions.Conversion conversion = stream.conversion;
+        Conversions.Conversion conversion = stream.core.conversion;
         try {
             WireReader in = new WireReader(message.data);
             if (conversion != null && conversion.reads(in.int64()))

@@ -9,14 +9,12 @@ package ruedo;
 public class Reader<T extends Sample> {
     static final double DEFAULT_TIMEOUT = 5.0; // s
 
-    private final Stream<T> stream;
-    // Of the samples received, the newest that a call has returned; under the stream's monitor.
-    long seen;
+    private final StreamCore<T> samples;
+    private final StreamCore.Place place;
 
-    /** stream: null for a stream, which is a reader of itself. */
-    @SuppressWarnings("unchecked")
-    Reader(Stream<T> stream) {
-        this.stream = stream == null ? (Stream<T>) this : stream;
+    Reader(StreamCore<T> samples, StreamCore.Place place) {
+        this.samples = samples;
+        this.place = place;
     }
 
     /** {@link #latest(double)}, at most 5 s. */
@@ -26,7 +24,7 @@ public class Reader<T extends Sample> {
 
     /** The newest sample. Before the first one it waits, at most timeout seconds of real time. */
     public T latest(double timeout) {
-        return stream.read(this, false, timeout);
+        return samples.read(place, false, timeout);
     }
 
     /** {@link #next(double)}, at most 5 s. */
@@ -40,6 +38,6 @@ public class Reader<T extends Sample> {
      * none.
      */
     public T next(double timeout) {
-        return stream.read(this, true, timeout);
+        return samples.read(place, true, timeout);
     }
 }

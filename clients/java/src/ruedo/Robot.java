@@ -374,8 +374,7 @@ public final class Robot {
             if (device.equals(channel.device)
                     || device.equals(channel.name)
                     || channel.name.equals(name + "/" + device)) {
-                return sim.stream(
-                        channel, conversion.key, () -> new Stream<>(sim, channel, conversion));
+                return new Stream<>(sim.core(channel, conversion), channel);
             }
             there.add(channel.device.isEmpty() ? channel.name : channel.device);
         }
@@ -417,17 +416,14 @@ public final class Robot {
     }
 
     private Stream<?> stream(channel_info_t channel) {
-        return sim.stream(channel, () -> new Stream<>(sim, channel));
+        return new Stream<>(sim.core(channel, Conversions.of(channel.type)), channel);
     }
 
     private Device<?> device(device_info_t info, channel_info_t channel) {
-        return (Device<?>)
-                sim.stream(
-                        channel,
-                        () ->
-                                channel.type.equals("image_t")
-                                        ? new Camera(sim, info, channel)
-                                        : new Device<>(sim, info, channel));
+        Conversions.Conversion conversion = Conversions.of(channel.type);
+        return channel.type.equals("image_t")
+                ? new Camera(sim.core(channel, conversion), info, channel)
+                : new Device<>(sim.core(channel, conversion), info, channel);
     }
 
     private static String names(List<Device<?>> devices) {

@@ -1,7 +1,11 @@
 package ruedo;
 
 import java.io.File;
+import java.io.FileOutputStream;
 import java.io.IOException;
+import java.io.OutputStream;
+import java.io.RandomAccessFile;
+import java.lang.ProcessBuilder.Redirect;
 import java.net.InetAddress;
 import java.net.InetSocketAddress;
 import java.net.ServerSocket;
@@ -23,10 +27,15 @@ import java.util.concurrent.atomic.AtomicBoolean;
  * for a process that was killed, too.
  */
 final class ServerProcess {
+    /** Starts a program in a session of its own: a terminal's Ctrl-C is for this process alone. */
+    private static final File SETSID = new File("/usr/bin/setsid");
+
+    private static final int MOST_SAID = 1 << 16; // bytes of its last lines
+
     final String url;
     private final List<String> command;
     private final Process process;
-    private final Path output; // null when verbose
+    private RandomAccessFile output; // what it prints; null when verbose
     private ServerSocket token; // see freeUrl()
     private Path folder; // of the socket; null: not made
     private Path file; // of a world's text; null: the world is somebody's own
@@ -35,25 +44,37 @@ final class ServerProcess {
         if (world.isEmpty() == options.text.isEmpty())
             throw new RuedoException.LaunchError("launch() needs either a world or its text");
         String program = findRuedo();
-        if (options.url.isEmpty()) url = privateUrl();
-        else url = options.url.equals("auto") ? freeUrl() : options.url;
-        String file = options.text.isEmpty() ? world : written(options.text);
-        command = new ArrayList<>(List.of(program, "run", file, "--lcm", url, "--watch-stdin"));
-        command.addAll(optionsOf(options));
+        boolean started = false;
         try {
-            output = options.verbose ? null : Files.createTempFile("ruedo-", ".log");
-            if (output != null) output.toFile().deleteOnExit();
-            ProcessBuilder builder = new ProcessBuilder(command);
-            if (output == null) {
-                builder.redirectOutput(ProcessBuilder.Redirect.INHERIT)
-                        .redirectError(ProcessBuilder.Redirect.INHERIT);
-            } else {
-                builder.redirectErrorStream(true).redirectOutput(output.toFile());
+            if (options.url.isEmpty()) url = privateUrl();
+            else url = options.url.equals("auto") ? freeUrl() : options.url;
+            String file = options.text.isEmpty() ? world : written(options.text);
+            command = new ArrayList<>(List.of(program, "run", file, "--lcm", url, "--watch-stdin"));
+            command.addAll(optionsOf(options));
+            process = started(options.verbose);
+            started = true;
+        } finally {
+            if (!started) cleanUp();
+        }
+    }
+
+    private Process started(boolean verbose) {
+        List<String> words = new ArrayList<>();
+        if (isProgram(SETSID)) words.add(SETSID.getPath());
+        words.addAll(command);
+        ProcessBuilder builder = new ProcessBuilder(words);
+        try {
+            if (verbose) return builder.inheritIO().redirectInput(Redirect.PIPE).start();
+            Path log = Files.createTempFile("ruedo-", ".log");
+            try {
+                output = new RandomAccessFile(log.toFile(), "r");
+                return builder.redirectErrorStream(true).redirectOutput(log.toFile()).start();
+            } finally { // it lives on without a name, for as long as it is open
+                Files.delete(log);
             }
-            process = builder.start();
         } catch (IOException error) {
             throw new RuedoException.LaunchError(
-                    program + " cannot be started: " + error.getMessage());
+                    command.get(0) + " cannot be started: " + error.getMessage());
         }
     }
 
@@ -79,7 +100,11 @@ final class ServerProcess {
         try {
             file = Files.createTempFile("ruedo-", urdf ? ".urdf" : ".sdf");
             file.toFile().deleteOnExit();
-            return Files.writeString(file, text).toString();
+            // A channel of Files' would be closed by an interrupt.
+            try (OutputStream out = new FileOutputStream(file.toFile())) {
+                out.write(text.getBytes(StandardCharsets.UTF_8));
+            }
+            return file.toString();
         } catch (IOException error) {
             throw new RuedoException.LaunchError(
                     "the world's text cannot be written: " + error.getMessage());
@@ -97,7 +122,7 @@ final class ServerProcess {
                 Thread.sleep(20);
             } catch (InterruptedException error) {
                 Thread.currentThread().interrupt();
-                return;
+                throw new RuedoException.Interrupted();
             }
         }
     }
@@ -125,29 +150,38 @@ final class ServerProcess {
     synchronized void end() {
         try {
             process.getOutputStream().close();
-            if (!process.waitFor(5, TimeUnit.SECONDS)) process.destroyForcibly().waitFor();
+        } catch (IOException error) {
+            // it is closed, then
+        }
+        try {
+            if (!Uninterrupted.get(() -> process.waitFor(5, TimeUnit.SECONDS)))
+                Uninterrupted.get(() -> process.destroyForcibly().waitFor());
+        } finally {
+            cleanUp();
+        }
+    }
+
+    private void cleanUp() {
+        try {
             if (token != null) token.close();
+            if (output != null) output.close();
+            if (file != null) Files.deleteIfExists(file);
             if (folder != null) {
                 Files.deleteIfExists(folder.resolve("bus"));
                 Files.deleteIfExists(folder);
             }
-            if (output != null) Files.deleteIfExists(output);
-            if (file != null) Files.deleteIfExists(file);
         } catch (IOException error) {
             // it is gone already
-        } catch (InterruptedException error) {
-            process.destroyForcibly();
-            Thread.currentThread().interrupt();
         }
     }
 
     private String lastLines() {
         try {
-            if (output == null || !Files.exists(output)) return "";
-            String[] lines =
-                    new String(Files.readAllBytes(output), StandardCharsets.UTF_8)
-                            .trim()
-                            .split("\n");
+            if (output == null) return "";
+            byte[] said = new byte[(int) Math.min(output.length(), MOST_SAID)];
+            output.seek(output.length() - said.length);
+            output.readFully(said);
+            String[] lines = new String(said, StandardCharsets.UTF_8).trim().split("\n");
             return String.join(
                     "\n", Arrays.copyOfRange(lines, Math.max(0, lines.length - 12), lines.length));
         } catch (IOException error) {

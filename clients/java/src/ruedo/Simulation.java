@@ -16,7 +16,6 @@ import ruedo.lcmtypes.tick_t;
 import java.io.IOException;
 import java.util.ArrayList;
 import java.util.HashMap;
-import java.util.HashSet;
 import java.util.List;
 import java.util.Map;
 import java.util.Set;
@@ -24,7 +23,6 @@ import java.util.concurrent.ConcurrentHashMap;
 import java.util.concurrent.CountDownLatch;
 import java.util.concurrent.atomic.AtomicBoolean;
 import java.util.concurrent.atomic.AtomicLong;
-import java.util.function.Supplier;
 
 /**
  * A running simulation. Made by {@link Ruedo#connect} or {@link Ruedo#launch}; thread safe. close()
@@ -34,6 +32,7 @@ import java.util.function.Supplier;
 public final class Simulation implements AutoCloseable {
     private static final double SILENCE_SECONDS =
             5.0; // without any message: a server gives a sign of life each second
+    private static final long SEEK_NANOS = 1_000_000_000;
     private static final double REPLY_SECONDS = 5.0;
     private static final long ASK_AGAIN_NANOS = 500_000_000;
     private static final long MOST_AHEAD_MICROS = 1_000_000; // ticks come ten times a second
@@ -50,20 +49,22 @@ public final class Simulation implements AutoCloseable {
     private final Session session;
     private final Stepper stepper;
     private final WorldInfo.Assembler assembler = new WorldInfo.Assembler();
-    private final Map<String, Robot> robots = new HashMap<>();
-    private final Map<String, Stream<?>> streams =
-            new HashMap<>(); // by channel; robots, streams, drivers under robots' monitor
+    private final Map<String, Robot> robots = new HashMap<>(); // these three under its monitor
+    private final Map<String, StreamCore<?>> streams = new HashMap<>(); // by channel, type, form
     private final Map<String, Driver> drivers = new HashMap<>(); // by robot
     private final Set<Driver> repeating = ConcurrentHashMap.newKeySet();
     private final Set<Subscription> newRun = ConcurrentHashMap.newKeySet();
     private final AtomicLong ids;
-    private WorldInfo known; // these under this object's monitor
+    private final Object news = new Object(); // a user may hold the monitor of this object itself
+    private WorldInfo known; // these under news
     private RuedoException fault; // of an info that cannot be read
     private long faultAt; // the first
     private Thread repeater;
     private volatile long utime;
     private volatile long lastSign = System.nanoTime();
     private volatile long asked = System.nanoTime(); // for info
+    private volatile long soughtAt = System.nanoTime() - SEEK_NANOS; // the server, in its silence
+    private volatile boolean there;
     private final RunWatch watch = new RunWatch(this::tellAnotherServer);
     private final AtomicBoolean closing = new AtomicBoolean();
     private volatile boolean closed;
@@ -167,16 +168,18 @@ public final class Simulation implements AutoCloseable {
     }
 
     /** Waits until so many seconds of sim time have passed. */
-    public synchronized void sleep(double seconds) {
+    public void sleep(double seconds) {
         checkMayWait();
         Deadline never = new Deadline(Double.POSITIVE_INFINITY);
         long left = Math.round(seconds * 1e6);
-        for (long before = utime; left > 0; ) {
-            never.waitOn(this, 500);
-            checkServer();
-            long now = utime;
-            left -= Math.max(0, now - before); // time may be set back
-            before = now;
+        synchronized (news) {
+            for (long before = utime; left > 0; ) {
+                never.waitOn(news, 500);
+                checkServer();
+                long now = utime;
+                left -= Math.max(0, now - before); // time may be set back
+                before = now;
+            }
         }
     }
 
@@ -403,41 +406,39 @@ public final class Simulation implements AutoCloseable {
      */
     @Override
     public void close() {
-        if (!closing.compareAndSet(false, true)) {
-            if (!Bus.inAnyHandler()) awaitEnd();
-            return;
+        if (closing.compareAndSet(false, true)) {
+            // A callback's thread is what receives the answer to a LEAVE, and any other may be
+            // interrupted: one of its own waits, and the program's end for that. It starts before
+            // anyone sees that this is closed.
+            Thread ending = new Thread(this::end, "ruedo-close");
+            ending.setDaemon(false);
+            ending.start();
+            sayClosed();
         }
-        if (!bus.handling()) {
-            end();
-            return;
-        }
-        // In a callback, this thread is what receives the answer to a LEAVE: another one waits for
-        // it, for which the program's end waits. It starts before anyone sees that this is closed.
-        Thread ending = new Thread(this::end, "ruedo-close");
-        ending.setDaemon(false);
-        ending.start();
-        sayClosed();
+        if (!Bus.inAnyHandler()) Uninterrupted.get(this::awaitEnd);
     }
 
-    private synchronized void sayClosed() {
-        closed = true;
-        notifyAll();
+    private void sayClosed() {
+        synchronized (news) {
+            closed = true;
+            news.notifyAll();
+        }
     }
 
     private void end() {
         sayClosed();
-        session.leave();
-        bus.close();
-        if (server != null) server.end();
-        ended.countDown();
+        try {
+            session.leave();
+            bus.close();
+        } finally {
+            if (server != null) server.end();
+            ended.countDown();
+        }
     }
 
-    private void awaitEnd() {
-        try {
-            ended.await();
-        } catch (InterruptedException error) {
-            Thread.currentThread().interrupt();
-        }
+    private boolean awaitEnd() throws InterruptedException {
+        ended.await();
+        return true;
     }
 
     /** For certain; one that is looked for in vain just now has, too. */
@@ -452,8 +453,10 @@ public final class Simulation implements AutoCloseable {
 
     // For the package's other classes.
 
-    synchronized WorldInfo info() {
-        return known;
+    WorldInfo info() {
+        synchronized (news) {
+            return known;
+        }
     }
 
     robot_info_t robotInfo(String name) {
@@ -479,10 +482,12 @@ public final class Simulation implements AutoCloseable {
         return ids.incrementAndGet();
     }
 
-    synchronized void noteTime(long now) {
-        utime = Math.max(utime, now);
-        lastSign = System.nanoTime();
-        notifyAll();
+    void noteTime(long now) {
+        synchronized (news) {
+            utime = Math.max(utime, now);
+            lastSign = System.nanoTime();
+            news.notifyAll();
+        }
     }
 
     /** No message of this run is so far yet: it was false. */
@@ -491,9 +496,11 @@ public final class Simulation implements AutoCloseable {
     }
 
     /** What another message said of a time long after a tick's was false. */
-    private synchronized void noteTick(long now) {
-        if (now < utime - MOST_AHEAD_MICROS) utime = Math.max(now, 0);
-        noteTime(now);
+    private void noteTick(long now) {
+        synchronized (news) {
+            if (now < utime - MOST_AHEAD_MICROS) utime = Math.max(now, 0);
+            noteTime(now);
+        }
     }
 
     boolean isClosed() {
@@ -521,11 +528,23 @@ public final class Simulation implements AutoCloseable {
         checkOpen();
         String ended = server == null ? null : server.ended();
         if (ended != null) throw new RuedoException.NoServer(ended);
-        if (silence() > SILENCE_SECONDS
-                && !address.isClaimed()) { // one that is stopped, or in a debugger, is waited for
+        if (silence() > SILENCE_SECONDS && !isThere()) {
             throw new RuedoException.NoServer(
                     "nothing was heard from the server at " + url + " for 5 s");
         }
+    }
+
+    /**
+     * One that is stopped, or in a debugger, is waited for. It is looked for seldom: a local socket
+     * is connected to for it, and one that is stopped keeps all those connections.
+     */
+    private boolean isThere() {
+        long now = System.nanoTime();
+        if (now - soughtAt >= SEEK_NANOS) {
+            there = address.isClaimed();
+            soughtAt = now;
+        }
+        return there;
     }
 
     String whatIsKnown(double rate) {
@@ -539,12 +558,13 @@ public final class Simulation implements AutoCloseable {
                 : "it sends when something happens";
     }
 
-    synchronized void keepRepeating(Driver driver) {
+    void keepRepeating(Driver driver) {
         repeating.add(driver);
-        if (repeater != null) return;
-        repeater = new Thread(this::repeat, "ruedo-repeat");
-        repeater.setDaemon(true);
-        repeater.start();
+        synchronized (news) {
+            if (repeater != null) return;
+            repeater = new LastingThread("ruedo-repeat", () -> closed, this::repeat);
+            repeater.start();
+        }
     }
 
     private double silence() {
@@ -552,37 +572,25 @@ public final class Simulation implements AutoCloseable {
     }
 
     /** Feeds the watchdogs in real time. */
-    private void repeat() {
-        while (!closed) {
-            long period = 100;
-            for (Driver driver : repeating) {
-                if (!watch.another()) driver.repeat();
-                period = Math.min(period, driver.periodMillis());
-            }
-            try {
-                Thread.sleep(period);
-            } catch (InterruptedException error) {
-                return;
-            }
+    private void repeat() throws InterruptedException {
+        long period = 100;
+        for (Driver driver : repeating) {
+            if (!watch.another()) driver.repeat();
+            period = Math.min(period, driver.periodMillis());
         }
+        Thread.sleep(period);
     }
 
-    /** The stream of a channel, made on first use. */
-    Stream<?> stream(channel_info_t channel, Supplier<Stream<?>> make) {
-        return stream(channel, "", make);
-    }
-
-    /** form: the key of its conversion. */
-    Stream<?> stream(channel_info_t channel, String form, Supplier<Stream<?>> make) {
-        String key = channel.name + "\0" + form;
+    /** The samples of a channel; made on first use. conversion: null where there is none. */
+    @SuppressWarnings("unchecked")
+    <T extends Sample> StreamCore<T> core(
+            channel_info_t channel, Conversions.Conversion conversion) {
+        String form = conversion == null ? "" : conversion.key;
+        String key = String.join("\0", channel.name, channel.type, form);
         synchronized (robots) {
-            Stream<?> known = streams.get(key);
-            if (known == null
-                    || !known.type.equals(channel.type)) { // the next run's may be another
-                known = make.get();
-                streams.put(key, known);
-            }
-            return known;
+            return (StreamCore<T>)
+                    streams.computeIfAbsent(
+                            key, made -> new StreamCore<T>(this, channel, conversion));
         }
     }
 
@@ -595,10 +603,8 @@ public final class Simulation implements AutoCloseable {
 
     /** No command is repeated to a robot that is gone, nor to the next one of its name. */
     private void forgetRemoved(WorldInfo info) {
-        Set<String> channels = new HashSet<>();
-        for (channel_info_t channel : info.channelList) channels.add(channel.name);
         List<Driver> gone = new ArrayList<>();
-        List<Stream<?>> ended = new ArrayList<>();
+        List<StreamCore<?>> ended = new ArrayList<>();
         synchronized (robots) {
             robots.keySet().retainAll(info.robots.keySet());
             drivers.forEach(
@@ -607,10 +613,10 @@ public final class Simulation implements AutoCloseable {
                     });
             drivers.keySet().retainAll(info.robots.keySet());
             streams.values()
-                    .removeIf(stream -> !channels.contains(stream.channel) && ended.add(stream));
+                    .removeIf(stream -> info.output(stream.channel) == null && ended.add(stream));
         }
         endDrivers(gone, "removed");
-        for (Stream<?> stream : ended) stream.end();
+        for (StreamCore<?> stream : ended) stream.end();
     }
 
     private void endDrivers(List<Driver> gone, String reason) {
@@ -621,7 +627,7 @@ public final class Simulation implements AutoCloseable {
     /** The server was restarted, or another has taken its place. */
     private void beginRun() {
         List<Driver> all;
-        List<Stream<?>> known;
+        List<StreamCore<?>> known;
         watch.begin();
         utime = 0;
         synchronized (robots) {
@@ -630,7 +636,7 @@ public final class Simulation implements AutoCloseable {
             drivers.clear();
         }
         endDrivers(all, "new run");
-        for (Stream<?> stream : known) stream.forget();
+        for (StreamCore<?> stream : known) stream.forget();
         System.err.println(
                 "ruedo: another run has begun at " + url + ": commands are not repeated into it");
         if (closed) return;
@@ -648,7 +654,7 @@ public final class Simulation implements AutoCloseable {
             wrong = error;
         }
         WorldInfo before;
-        synchronized (this) {
+        synchronized (news) {
             before = known;
             if (wrong != null && fault == null) faultAt = System.nanoTime();
             if (wrong != null) fault = wrong;
@@ -657,7 +663,7 @@ public final class Simulation implements AutoCloseable {
                 if (before != null && before.head.epoch != info.head.epoch) utime = 0;
                 known = info;
             }
-            notifyAll();
+            news.notifyAll();
         }
         if (info == null) return;
         if (before != null && before.head.epoch != info.head.epoch) {
@@ -722,26 +728,30 @@ public final class Simulation implements AutoCloseable {
                         + " --lcm port (this is said once)");
     }
 
-    private synchronized void awaitInfo(double timeout) {
+    private void awaitInfo(double timeout) {
         Deadline deadline = new Deadline(timeout);
-        while (known == null) {
-            // Beside what cannot be read there may be what can.
-            if (fault != null && (deadline.passed() || System.nanoTime() - faultAt >= FAULT_NANOS))
-                throw fault;
-            String ended = server == null ? null : server.ended();
-            if (ended != null) throw new RuedoException.NoServer(ended);
-            if (deadline.passed()) {
-                throw new RuedoException.NoServer(
-                        "no Ruedo server answered at "
-                                + url
-                                + " within "
-                                + Deadline.text(timeout)
-                                + " s. Is `ruedo run` started, with the same --lcm or"
-                                + " LCM_DEFAULT_URL? `ruedo doctor` looks for what is wrong");
-            }
-            askInfo();
-            deadline.waitOn(this, 100);
+        synchronized (news) {
+            while (known == null) awaitSign(deadline, timeout);
         }
+    }
+
+    private void awaitSign(Deadline deadline, double timeout) {
+        // Beside what cannot be read there may be what can.
+        if (fault != null && (deadline.passed() || System.nanoTime() - faultAt >= FAULT_NANOS))
+            throw fault;
+        String ended = server == null ? null : server.ended();
+        if (ended != null) throw new RuedoException.NoServer(ended);
+        if (deadline.passed()) {
+            throw new RuedoException.NoServer(
+                    "no Ruedo server answered at "
+                            + url
+                            + " within "
+                            + Deadline.text(timeout)
+                            + " s. Is `ruedo run` started, with the same --lcm or"
+                            + " LCM_DEFAULT_URL? `ruedo doctor` looks for what is wrong");
+        }
+        askInfo();
+        deadline.waitOn(news, 100);
     }
 
     private void askInfo() {
@@ -758,11 +768,13 @@ public final class Simulation implements AutoCloseable {
     }
 
     /** Waits for an info other than that one, which may have arrived already. */
-    synchronized void refreshInfo(WorldInfo before) {
+    void refreshInfo(WorldInfo before) {
         Deadline deadline = new Deadline(10.0);
-        while (known == before && !deadline.passed()) {
-            askInfo();
-            deadline.waitOn(this, 100);
+        synchronized (news) {
+            while (known == before && !deadline.passed()) {
+                askInfo();
+                deadline.waitOn(news, 100);
+            }
         }
     }
 

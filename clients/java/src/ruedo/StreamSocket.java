@@ -3,17 +3,16 @@ package ruedo;
 import java.io.Closeable;
 import java.io.IOException;
 import java.io.InputStream;
-import java.io.InterruptedIOException;
 import java.lang.reflect.Method;
 import java.net.InetAddress;
 import java.net.InetSocketAddress;
 import java.net.ProtocolFamily;
 import java.net.SocketAddress;
+import java.net.SocketException;
 import java.net.SocketOption;
 import java.net.StandardProtocolFamily;
 import java.net.StandardSocketOptions;
 import java.nio.ByteBuffer;
-import java.nio.channels.ClosedSelectorException;
 import java.nio.channels.SelectionKey;
 import java.nio.channels.Selector;
 import java.nio.channels.SocketChannel;
@@ -41,11 +40,7 @@ final class StreamSocket implements Closeable {
             channel.configureBlocking(false);
             channel.register(reads, SelectionKey.OP_READ);
             if (address.path == null) channel.setOption(StandardSocketOptions.TCP_NODELAY, true);
-            connect(
-                    address.path != null
-                            ? pathOf(address.path)
-                            : new InetSocketAddress(
-                                    InetAddress.getByName(address.host), address.port));
+            connect(address);
             if (address.path != null) checkPeer(channel, address.path);
         } catch (IOException error) {
             close();
@@ -53,10 +48,12 @@ final class StreamSocket implements Closeable {
         }
     }
 
-    private void connect(SocketAddress to) throws IOException {
-        if (!channel.connect(to)) {
+    private void connect(Address address) throws IOException {
+        if (!channel.connect(addressOf(address))) {
+            if (address.path != null) // such a socket connects at once
+            throw new SocketException("its queue of connections is full");
             SelectionKey key = channel.register(writes, SelectionKey.OP_CONNECT);
-            await(writes, new Deadline(SENDING_MILLIS * 1e-3));
+            new Deadline(SENDING_MILLIS * 1e-3).select(writes);
             if (!channel.finishConnect()) throw new IOException("nobody answers");
             key.interestOps(SelectionKey.OP_WRITE);
         } else {
@@ -82,7 +79,7 @@ final class StreamSocket implements Closeable {
                 for (; ; ) {
                     int got = channel.read(room);
                     if (got != 0) return got;
-                    await(reads, deadline);
+                    deadline.select(reads);
                 }
             }
         };
@@ -92,7 +89,7 @@ final class StreamSocket implements Closeable {
         ByteBuffer left = ByteBuffer.wrap(bytes, 0, size);
         Deadline deadline = new Deadline(SENDING_MILLIS * 1e-3);
         while (left.hasRemaining()) {
-            if (channel.write(left) == 0) await(writes, deadline);
+            if (channel.write(left) == 0) deadline.select(writes);
         }
     }
 
@@ -107,23 +104,6 @@ final class StreamSocket implements Closeable {
         channel.close();
         reads.close();
         writes.close();
-    }
-
-    /** Until something may be done; an interrupt is put off. */
-    private static void await(Selector selector, Deadline deadline) throws IOException {
-        boolean interrupted = Thread.interrupted();
-        try {
-            do {
-                if (deadline.passed()) throw new InterruptedIOException("it takes too long");
-                selector.select(1000);
-                interrupted |= Thread.interrupted();
-            } while (selector.selectedKeys().isEmpty());
-            selector.selectedKeys().clear();
-        } catch (ClosedSelectorException error) {
-            throw new IOException("it was closed", error);
-        } finally {
-            if (interrupted) Thread.currentThread().interrupt();
-        }
     }
 
     /** Java 16 has these sockets; this library is for 11. */
@@ -157,7 +137,10 @@ final class StreamSocket implements Closeable {
         }
     }
 
-    private static SocketAddress pathOf(String path) throws IOException {
+    private static SocketAddress addressOf(Address address) throws IOException {
+        String path = address.path;
+        if (path == null)
+            return new InetSocketAddress(InetAddress.getByName(address.host), address.port);
         try {
             return (SocketAddress)
                     Class.forName("java.net.UnixDomainSocketAddress")

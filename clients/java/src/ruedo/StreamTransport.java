@@ -45,9 +45,7 @@ final class StreamTransport implements Transport {
 
     @Override
     public void start(Receiver receiver) {
-        Thread thread = new Thread(() -> run(receiver), "ruedo-receive");
-        thread.setDaemon(true);
-        thread.start();
+        new LastingThread("ruedo-receive", () -> closed, () -> receive(receiver)).start();
     }
 
     @Override
@@ -126,16 +124,12 @@ final class StreamTransport implements Transport {
     }
 
     /** The connection, reopened if necessary; null if none is possible now, or after close(). */
-    private synchronized DataInputStream input() throws IOException {
+    private synchronized DataInputStream input() throws InterruptedException {
         if (socket == null && !closed) {
             try {
                 connect();
             } catch (IOException error) {
-                try {
-                    wait(AGAIN_MILLIS);
-                } catch (InterruptedException interrupted) {
-                    Thread.currentThread().interrupt();
-                }
+                wait(AGAIN_MILLIS);
             }
         }
         return socket == null
@@ -143,14 +137,12 @@ final class StreamTransport implements Transport {
                 : new DataInputStream(new BufferedInputStream(socket.input(), 1 << 16));
     }
 
-    private void run(Receiver receiver) {
-        while (!closed) {
-            try {
-                DataInputStream in = input();
-                while (in != null && !closed) takeOne(in, receiver);
-            } catch (IOException | OutOfMemoryError error) {
-                drop();
-            }
+    private void receive(Receiver receiver) throws InterruptedException {
+        DataInputStream in = input();
+        try {
+            while (in != null && !closed) takeOne(in, receiver);
+        } catch (IOException | OutOfMemoryError error) { // it may have ended within a message
+            drop();
         }
     }
 
@@ -163,7 +155,7 @@ final class StreamTransport implements Transport {
         try {
             if (receiver.wants(channel)) receiver.receive(channel, message);
         } catch (Throwable error) { // whatever came, the receiving thread lives
-            System.err.println("ruedo: a message was passed over: " + error);
+            Faults.tell("a message was passed over: ", error, "");
         }
     }
 

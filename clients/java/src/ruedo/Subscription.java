@@ -1,5 +1,6 @@
 package ruedo;
 
+import java.util.concurrent.atomic.AtomicBoolean;
 import java.util.function.Consumer;
 
 /**
@@ -11,7 +12,7 @@ public final class Subscription implements AutoCloseable {
     private final Consumer<Object> taker;
     private final String what;
     private final Consumer<Subscription> leave;
-    private volatile boolean closed;
+    private final AtomicBoolean closed = new AtomicBoolean();
     private boolean failed;
 
     private Subscription(
@@ -38,37 +39,33 @@ public final class Subscription implements AutoCloseable {
     /** After it returns no new call begins; a call in another thread may still be running. */
     @Override
     public void close() {
-        synchronized (this) {
-            if (closed) return;
-            closed = true;
-        }
-        leave.accept(this);
+        if (closed.compareAndSet(false, true)) leave.accept(this);
     }
 
     /** Whether it was closed. */
     public boolean closed() {
-        return closed;
+        return closed.get();
     }
 
     void call(Object argument) {
-        if (closed) return;
+        if (closed.get()) return;
         try {
             if (taker != null) taker.accept(argument);
             else callback.run();
         } catch (Throwable error) { // an Error, too, leaves the receiving thread alive
             if (failed) return;
             failed = true;
-            System.err.println(
-                    "ruedo: a callback on "
-                            + what
-                            + " failed: "
-                            + error
-                            + "; it is called on, and this is said once");
+            Faults.tell(
+                    "a callback on " + what + " failed: ",
+                    error,
+                    "; it is called on, and this is said once");
+        } finally {
+            Thread.interrupted(); // it was for the callback, not for the thread that receives
         }
     }
 
     @Override
     public String toString() {
-        return "subscription to " + what + (closed ? ", closed" : "");
+        return "subscription to " + what + (closed() ? ", closed" : "");
     }
 }

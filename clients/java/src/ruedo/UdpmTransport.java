@@ -9,6 +9,8 @@ import java.net.StandardProtocolFamily;
 import java.net.StandardSocketOptions;
 import java.nio.ByteBuffer;
 import java.nio.channels.DatagramChannel;
+import java.nio.channels.SelectionKey;
+import java.nio.channels.Selector;
 import java.nio.charset.StandardCharsets;
 import java.util.Arrays;
 import java.util.LinkedHashMap;
@@ -18,7 +20,8 @@ import java.util.TreeMap;
 /**
  * LCM over multicast: short messages in one datagram, long ones in fragments. LCM's own class for
  * it is not used: its reader thread ends at the first broken datagram, and at an Error in a
- * callback; it holds a lock while callbacks run; it cannot be closed in silence.
+ * callback; it holds a lock while callbacks run; it cannot be closed in silence. The channel does
+ * not block: an interrupt of a thread that sends would close one that does.
  */
 final class UdpmTransport implements Transport {
     private static final int SHORT = 0x4c433032; // "LC02"
@@ -27,6 +30,7 @@ final class UdpmTransport implements Transport {
     private static final int LONGEST = 64 << 20; // bytes of a message that is put together
     private static final long MOST_PARTIAL = // bytes: memory of those not whole yet
             Math.min(80 << 20, Runtime.getRuntime().maxMemory() / 4);
+    private static final double SENDING_SECONDS = 5.0; // what is not taken until then is lost
     private static final int MOST_SENDERS = 32; // of messages that are not whole yet
 
     /**
@@ -75,6 +79,8 @@ final class UdpmTransport implements Transport {
 
     private final InetSocketAddress group;
     private final DatagramChannel socket;
+    private final Selector reads;
+    private final Selector writes;
     private int sequence; // under this object's monitor
     private volatile boolean closed;
     // The newest last; the receiving thread's.
@@ -95,6 +101,11 @@ final class UdpmTransport implements Transport {
             socket.setOption(StandardSocketOptions.IP_MULTICAST_LOOP, true);
             socket.setOption(StandardSocketOptions.IP_MULTICAST_TTL, address.ttl);
             socket.join(group.getAddress(), routeTo(group));
+            socket.configureBlocking(false);
+            reads = Selector.open();
+            writes = Selector.open();
+            socket.register(reads, SelectionKey.OP_READ);
+            socket.register(writes, SelectionKey.OP_WRITE);
         } catch (IOException | RuntimeException error) {
             throw new RuedoException.NoServer(
                     address.url
@@ -120,9 +131,8 @@ final class UdpmTransport implements Transport {
 
     @Override
     public void start(Receiver receiver) {
-        Thread thread = new Thread(() -> run(receiver), "ruedo-receive");
-        thread.setDaemon(true);
-        thread.start();
+        ByteBuffer packet = ByteBuffer.allocate(65536);
+        new LastingThread("ruedo-receive", () -> closed, () -> receive(packet, receiver)).start();
     }
 
     @Override
@@ -136,6 +146,8 @@ final class UdpmTransport implements Transport {
         closed = true;
         try {
             socket.close();
+            reads.close();
+            writes.close();
         } catch (IOException error) {
             // it is of no use any more
         }
@@ -144,7 +156,6 @@ final class UdpmTransport implements Transport {
     @Override
     public void publish(String channel, byte[] message) {
         byte[] name = (channel + "\0").getBytes(StandardCharsets.US_ASCII);
-        boolean interrupted = Thread.interrupted(); // sending with that set would close the channel
         try {
             synchronized (this) {
                 sequence++;
@@ -161,8 +172,6 @@ final class UdpmTransport implements Transport {
             }
         } catch (IOException error) {
             // lost
-        } finally {
-            if (interrupted) Thread.currentThread().interrupt();
         }
     }
 
@@ -187,31 +196,19 @@ final class UdpmTransport implements Transport {
 
     private void send(ByteBuffer bytes) throws IOException {
         bytes.flip();
-        socket.send(bytes, group);
+        Deadline deadline = new Deadline(SENDING_SECONDS);
+        while (socket.send(bytes, group) == 0) deadline.select(writes);
     }
 
-    private void run(Receiver receiver) {
-        ByteBuffer packet = ByteBuffer.allocate(65536);
-        while (!closed) {
-            try {
-                packet.clear();
-                SocketAddress sender = socket.receive(packet);
-                packet.flip();
-                take(packet, sender, receiver);
-            } catch (IOException error) {
-                if (!closed) pause();
-            } catch (Throwable error) { // whatever came, the receiving thread lives
-                System.err.println("ruedo: a message was passed over: " + error);
-            }
+    private void receive(ByteBuffer packet, Receiver receiver) throws IOException {
+        packet.clear();
+        SocketAddress sender = socket.receive(packet);
+        if (sender == null) {
+            new Deadline(Double.POSITIVE_INFINITY).select(reads);
+            return;
         }
-    }
-
-    private static void pause() {
-        try {
-            Thread.sleep(10);
-        } catch (InterruptedException error) {
-            Thread.currentThread().interrupt();
-        }
+        packet.flip();
+        take(packet, sender, receiver);
     }
 
     private void take(ByteBuffer in, SocketAddress sender, Receiver receiver) {

@@ -25,6 +25,7 @@ final class WorldInfo {
     private final Map<String, List<device_info_t>> devices = new HashMap<>();
     private final Map<String, List<channel_info_t>> channels = new HashMap<>();
     private final Map<String, Map<String, channel_info_t>> deviceChannels = new HashMap<>();
+    private final Map<String, channel_info_t> outputs = new HashMap<>(); // by name
 
     private WorldInfo(List<world_info_t> parts) {
         head = parts.get(0);
@@ -41,6 +42,7 @@ final class WorldInfo {
             for (channel_info_t channel : part.channels) {
                 channels.computeIfAbsent(channel.robot, key -> new ArrayList<>()).add(channel);
                 if (!channel.input) {
+                    outputs.put(channel.name, channel);
                     deviceChannels
                             .computeIfAbsent(channel.robot, key -> new HashMap<>())
                             .putIfAbsent(channel.device, channel);
@@ -59,6 +61,11 @@ final class WorldInfo {
 
     List<channel_info_t> channels(String robot) {
         return channels.getOrDefault(robot, List.of());
+    }
+
+    /** What the server sends by that name; null: nothing. */
+    channel_info_t output(String name) {
+        return outputs.get(name);
     }
 
     /** The first that carries a device's samples; null: none does. */
@@ -170,6 +177,8 @@ final class WorldInfo {
     static final class Assembler {
         private static final int HEAD =
                 8 + 8 + 8 + 4 + 2 + 2; // bytes: fingerprint, utime, run, epoch, part, nparts
+        private static final int MOST_PARTS = 1024; // of an info
+        private static final int MOST_BYTES = 64 << 20; // of all of them
         private byte[] key = {};
         private Map<Integer, byte[]> parts = new HashMap<>();
         private List<byte[]> last = List.of();
@@ -197,6 +206,7 @@ final class WorldInfo {
             if (!Arrays.equals(found, key)) parts = new HashMap<>();
             key = found;
             parts.put(part, bytes);
+            checkSize(nparts);
             if (parts.size() < nparts) return null;
             List<byte[]> whole = new ArrayList<>();
             List<byte[]> content = new ArrayList<>();
@@ -220,6 +230,24 @@ final class WorldInfo {
             }
             last = content;
             return new WorldInfo(decoded);
+        }
+
+        /** What is not whole yet waits in memory. */
+        private void checkSize(int nparts) {
+            long size = 0;
+            for (byte[] part : parts.values()) size += part.length;
+            if (nparts <= MOST_PARTS && size <= MOST_BYTES) return;
+            parts = new HashMap<>();
+            throw new RuedoException.TypeMismatch(
+                    "ruedo/info has "
+                            + nparts
+                            + " parts of "
+                            + size
+                            + " bytes so far: a client takes "
+                            + MOST_PARTS
+                            + " parts of "
+                            + MOST_BYTES
+                            + " bytes together at most");
         }
 
         private static boolean same(List<byte[]> a, List<byte[]> b) {

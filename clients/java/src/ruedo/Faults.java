@@ -1,0 +1,26 @@
+package ruedo;
+
+/** Tells people of what was thrown in a thread that has to live. */
+final class Faults {
+    private Faults() {}
+
+    /**
+     * Throws nothing: neither for want of memory, nor what the description of an exception throws
+     * in its turn.
+     */
+    static void tell(String before, Throwable error, String after) {
+        try {
+            System.err.println("ruedo: " + before + described(error) + after);
+        } catch (Throwable again) {
+            // there is no memory even for that
+        }
+    }
+
+    private static String described(Throwable error) {
+        try {
+            return error.toString();
+        } catch (Throwable again) {
+            return error.getClass().getName();
+        }
+    }
+}

@@ -1,0 +1,287 @@
+package ruedo;
+
+import ruedo.lcmtypes.body_info_t;
+import ruedo.lcmtypes.channel_info_t;
+import ruedo.lcmtypes.device_info_t;
+import ruedo.lcmtypes.motion_status_t;
+import ruedo.lcmtypes.odometry_t;
+import ruedo.lcmtypes.pose_t;
+import ruedo.lcmtypes.robot_info_t;
+import ruedo.lcmtypes.tick_t;
+import ruedo.lcmtypes.world_info_t;
+
+import java.nio.ByteBuffer;
+import java.util.concurrent.CountDownLatch;
+import java.util.concurrent.Semaphore;
+import java.util.concurrent.TimeUnit;
+import java.util.function.Supplier;
+
+/**
+ * What no real server shows at will, by a server in memory or by the transport alone;
+ * lifetimes_test.py defines the expected results.
+ */
+public final class Internals {
+    private static final double PATIENCE = 300.0; // s
+
+    private Internals() {}
+
+    /** Calls the client in the thread that calls it, and answers requests for ruedo/info. */
+    private static final class Server implements Transport {
+        final world_info_t info = new world_info_t();
+        private Receiver client;
+
+        Server() {
+            info.run_id = 7;
+            info.nparts = 1;
+            info.version = "1";
+            info.world = "memory";
+            info.step_us = 5000;
+            info.bodies = new body_info_t[0];
+            robot_info_t robot = new robot_info_t();
+            robot.name = "p3at";
+            robot.model = "p3at";
+            robot.drive = "kinematic";
+            robot.wheels = new String[0];
+            robot.left = new boolean[0];
+            info.robots = new robot_info_t[] {robot};
+            info.devices =
+                    new device_info_t[] {
+                        device("lrf"), device("odometry"), device("pose"), device("motion")
+                    };
+            info.channels =
+                    new channel_info_t[] {
+                        channel("lrf", "planar_lidar_t", false),
+                        channel("odometry", "odometry_t", false),
+                        channel("pose", "pose_t", false),
+                        channel("motion", "motion_status_t", false),
+                        channel("move", "move_command_t", true)
+                    };
+        }
+
+        private static device_info_t device(String name) {
+            device_info_t device = new device_info_t();
+            device.robot = "p3at";
+            device.name = device.kind = name;
+            device.rate = 10.0;
+            device.position = new double[3];
+            device.orientation = new double[] {1.0, 0.0, 0.0, 0.0};
+            device.element_pose = new double[0][];
+            return device;
+        }
+
+        private static channel_info_t channel(String device, String type, boolean input) {
+            channel_info_t channel = new channel_info_t();
+            channel.name = "p3at/" + device;
+            channel.robot = "p3at";
+            channel.device = device;
+            channel.type = type;
+            channel.rate = 10.0;
+            channel.input = input;
+            if (!input) channel.fingerprint = Conversions.of(type).fingerprint;
+            return channel;
+        }
+
+        Simulation connect() {
+            return new Simulation(
+                    new Address("udpm://239.255.76.67:7667"), "client", PATIENCE, null, this);
+        }
+
+        void send(String channel, ruedo.lcmtypes.Message message) {
+            client.receive(channel, Bus.encode(message));
+        }
+
+        void sendInfo(device_info_t[] devices, channel_info_t... channels) {
+            info.utime++;
+            info.devices = devices;
+            info.ndevices = devices.length;
+            info.channels = channels;
+            info.nchannels = channels.length;
+            info.nrobots = info.robots.length;
+            send("ruedo/info", info);
+        }
+
+        @Override
+        public void start(Receiver receiver) {
+            client = receiver;
+        }
+
+        @Override
+        public void subscribe(String channel) {}
+
+        @Override
+        public void unsubscribe(String channel) {}
+
+        @Override
+        public void publish(String channel, byte[] message) {
+            if (channel.equals("ruedo/request")) sendInfo(info.devices, info.channels);
+        }
+
+        @Override
+        public void close() {}
+    }
+
+    private static String said(Supplier<Object> call) {
+        try {
+            return String.valueOf(call.get());
+        } catch (RuntimeException error) {
+            return error.getClass().getSimpleName();
+        }
+    }
+
+    /** What ruedo/info says of a device holds from then on, whatever it said before. */
+    private static void infos() {
+        Server server = new Server();
+        Simulation sim = server.connect();
+        Robot robot = sim.robot("p3at");
+        device_info_t[] devices = server.info.devices;
+        channel_info_t[] channels = server.info.channels;
+        Device<Scan> before = robot.lrf();
+        devices[0].range_max = 3.0;
+        channels[0].rate = 20.0;
+        server.sendInfo(devices, channels);
+        System.out.println(
+                "lrf " + before.rate + " " + robot.lrf().rate + " " + robot.lrf().rangeMax);
+
+        server.sendInfo(new device_info_t[0]);
+        server.sendInfo(new device_info_t[0], channels);
+        robot.pose();
+        server.sendInfo(devices, channels);
+        System.out.println("device " + said(() -> robot.pose() instanceof Device));
+
+        long right = channels[2].fingerprint;
+        server.sendInfo(new device_info_t[0]);
+        channels[2].fingerprint = right + 1;
+        server.sendInfo(devices, channels);
+        System.out.println("other " + said(() -> robot.pose().latest(0.001)));
+        channels[2].fingerprint = right;
+        server.sendInfo(devices, channels);
+        System.out.println("none yet " + said(() -> robot.pose().latest(0.001)));
+        pose_t pose = new pose_t();
+        pose.pos[0] = 4.0;
+        server.send("p3at/pose", pose);
+        System.out.println("pose " + said(() -> robot.pose().latest(0.001).position[0]));
+        System.out.println("once " + said(() -> robot.pose().next(0.001).position[0]));
+    }
+
+    /** All is received while somebody else holds the monitors of what a user sees. */
+    private static void monitors() throws InterruptedException {
+        Server server = new Server();
+        Simulation sim = server.connect();
+        Robot robot = sim.robot("p3at");
+        Stream<Odometry> odometry = robot.odometry();
+        Motion motion = robot.advance(1.0);
+        Semaphore heard = new Semaphore(0);
+        Subscription subscription = odometry.onSample(sample -> heard.release());
+        motion_status_t status = new motion_status_t();
+        status.id = motion.id;
+        status.state = motion_status_t.STATE_DONE;
+        odometry_t sample = new odometry_t();
+        tick_t tick = new tick_t();
+        tick.run_id = server.info.run_id;
+        tick.nparts = 1;
+        Thread receiving =
+                new Thread(
+                        () -> {
+                            server.send("ruedo/tick", tick);
+                            server.send("p3at/odometry", sample);
+                            server.send("p3at/motion", status);
+                        });
+        receiving.setDaemon(true);
+        synchronized (sim) {
+            synchronized (robot) {
+                synchronized (odometry) {
+                    synchronized (motion) {
+                        synchronized (subscription) {
+                            receiving.start();
+                            receiving.join((long) (PATIENCE * 1e3));
+                        }
+                    }
+                }
+            }
+        }
+        System.out.println(
+                "received "
+                        + !receiving.isAlive()
+                        + " "
+                        + heard.tryAcquire()
+                        + " "
+                        + motion.done());
+    }
+
+    private static byte[] part(int number, int count, int size) {
+        return ByteBuffer.allocate(size)
+                .putLong(0, world_info_t.LCM_FINGERPRINT)
+                .putShort(28, (short) number)
+                .putShort(30, (short) count)
+                .array();
+    }
+
+    /** Parts of ruedo/info wait for the others, but not without end. */
+    private static void parts() {
+        WorldInfo.Assembler many = new WorldInfo.Assembler();
+        System.out.println(said(() -> many.add(part(0, 1024, 100))));
+        System.out.println(said(() -> many.add(part(0, 1025, 100))));
+        WorldInfo.Assembler large = new WorldInfo.Assembler();
+        int taken = 0;
+        try {
+            for (; taken < 100; taken++) large.add(part(taken, 1024, 1 << 20));
+        } catch (RuedoException error) {
+            System.out.println(taken + ": " + error.getMessage());
+        }
+        System.out.println(said(() -> large.add(part(0, 1024, 1 << 20))));
+    }
+
+    /** Interrupts, of threads that send and in callbacks, leave the socket open. */
+    private static void interrupts(String url) throws InterruptedException {
+        Bus bus = new Bus(Transport.open(new Address(url)));
+        bus.start();
+        Semaphore heard = new Semaphore(0);
+        bus.subscribe(
+                "heard",
+                (byte[] message) -> {
+                    heard.release();
+                    Thread.currentThread().interrupt();
+                });
+        for (int i = 0; i < 2; i++) {
+            bus.publish("heard", new byte[8]);
+            System.out.println("heard " + heard.tryAcquire((long) PATIENCE, TimeUnit.SECONDS));
+        }
+        for (int i = 0; i < 100; i++) {
+            CountDownLatch sending = new CountDownLatch(3);
+            Thread sender =
+                    new Thread(
+                            () -> {
+                                while (!Thread.currentThread().isInterrupted()) {
+                                    bus.publish("large", new byte[1 << 20]);
+                                    sending.countDown();
+                                }
+                            });
+            sender.start();
+            sending.await();
+            sender.interrupt();
+            sender.join();
+        }
+        bus.publish("heard", new byte[8]);
+        System.out.println("heard " + heard.tryAcquire((long) PATIENCE, TimeUnit.SECONDS));
+        bus.close();
+    }
+
+    public static void main(String[] args) throws InterruptedException {
+        switch (args[0]) {
+            case "infos":
+                infos();
+                break;
+            case "monitors":
+                monitors();
+                break;
+            case "parts":
+                parts();
+                break;
+            case "interrupts":
+                interrupts(args[1]);
+                break;
+            default:
+                System.out.println("served " + new Address(args[1]).isServed());
+        }
+    }
+}
