@@ -184,6 +184,11 @@ def test_interrupts_leave_the_socket_open():
     assert internals("interrupts", free_url()) == 3 * ["heard true"]
 
 
+def test_a_thread_outlives_a_time_without_memory():
+    lines = run([*JAVA, "-Xmx24m", "ruedo.Internals", "memory"]).stdout.splitlines()
+    assert lines[-1] == "lives true"
+
+
 def test_the_newest_info_holds():
     """Of a device's numbers, of the devices that there are, and of a channel's type."""
     assert internals("infos") == [

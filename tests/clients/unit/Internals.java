@@ -266,6 +266,40 @@ public final class Internals {
         bus.close();
     }
 
+    private static volatile Object[] memory;
+
+    /** As much as there is, in a chain; what goes on now finds none. */
+    private static void takeMemory() {
+        for (int size = 1 << 20; size > 0; ) {
+            try {
+                Object[] more = new Object[size];
+                more[0] = memory;
+                memory = more;
+            } catch (OutOfMemoryError error) {
+                size /= 2;
+            }
+        }
+    }
+
+    /** A thread lives on when memory runs out, although nothing can be said of it then. */
+    private static void memory() throws InterruptedException {
+        Error error = new OutOfMemoryError();
+        Semaphore runs = new Semaphore(0);
+        LastingThread thread =
+                new LastingThread(
+                        "receives",
+                        () -> false,
+                        () -> {
+                            if (memory == null) takeMemory();
+                            runs.release();
+                            throw error;
+                        });
+        thread.start();
+        while (thread.isAlive() && runs.availablePermits() < 3) Thread.sleep(10);
+        memory = null;
+        System.out.println("lives " + thread.isAlive());
+    }
+
     public static void main(String[] args) throws InterruptedException {
         switch (args[0]) {
             case "infos":
@@ -276,6 +310,9 @@ public final class Internals {
                 break;
             case "parts":
                 parts();
+                break;
+            case "memory":
+                memory();
                 break;
             case "interrupts":
                 interrupts(args[1]);

@@ -26,21 +26,23 @@ final class LastingThread extends Thread {
     public void run() {
         while (!over.getAsBoolean()) {
             try {
-                work.run();
-            } catch (IOException | InterruptedException error) {
-                pause();
+                runOnce();
             } catch (Throwable error) {
-                Faults.tell("a message was passed over: ", error, "");
-                pause();
+                // an interrupt, which ends nothing here; or there is no memory even for what
+                // follows
             }
         }
     }
 
-    private static void pause() {
+    private void runOnce() throws InterruptedException {
         try {
-            Thread.sleep(PAUSE_MILLIS);
-        } catch (InterruptedException error) {
-            // nobody ends this thread that way
+            work.run();
+            return;
+        } catch (IOException error) {
+            // lost
+        } catch (RuntimeException | Error error) {
+            Faults.tell("a message was passed over: ", error, "");
         }
+        Thread.sleep(PAUSE_MILLIS);
     }
 }
