@@ -2,6 +2,7 @@
 shows (unit/Internals.java); those of C++ are unit/lifetimes_test.cpp, of Python python_test.py.
 """
 
+import contextlib
 import os
 import re
 import shutil
@@ -213,6 +214,21 @@ def test_an_info_has_no_more_parts_than_memory():
         "67108864 bytes together at most",
         "null",
     ]
+
+
+def test_a_silent_server_is_looked_for_seldom(tmp_path):
+    """Each time takes a place in the queue of connections of one that is stopped."""
+    with socket.socket(socket.AF_UNIX) as listening:
+        listening.bind(f"{tmp_path}/bus")
+        listening.listen(1000)
+        listening.setblocking(False)
+        [seconds] = internals("silence", f"unix://{tmp_path}/bus")
+        came = 0
+        with contextlib.suppress(BlockingIOError):
+            while True:
+                listening.accept()[0].close()
+                came += 1
+    assert 1 <= came <= 2 + int(seconds)
 
 
 def test_a_server_whose_queue_is_full_is_there(tmp_path):

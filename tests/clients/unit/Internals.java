@@ -82,8 +82,11 @@ public final class Internals {
         }
 
         Simulation connect() {
-            return new Simulation(
-                    new Address("udpm://239.255.76.67:7667"), "client", PATIENCE, null, this);
+            return connect("udpm://239.255.76.67:7667");
+        }
+
+        Simulation connect(String url) {
+            return new Simulation(new Address(url), "client", PATIENCE, null, this);
         }
 
         void send(String channel, ruedo.lcmtypes.Message message) {
@@ -266,6 +269,15 @@ public final class Internals {
         bus.close();
     }
 
+    /** A server that is stopped is looked for again and again, by all that waits for it. */
+    private static void silence(String url) throws InterruptedException {
+        Simulation sim = new Server().connect(url);
+        Thread.sleep(5100); // so long it may be silent
+        long before = System.nanoTime();
+        for (int i = 0; i < 1000; i++) sim.checkServer();
+        System.out.println((System.nanoTime() - before) / 1_000_000_000);
+    }
+
     private static volatile Object[] memory;
 
     /** As much as there is, in a chain; what goes on now finds none. */
@@ -310,6 +322,9 @@ public final class Internals {
                 break;
             case "parts":
                 parts();
+                break;
+            case "silence":
+                silence(args[1]);
                 break;
             case "memory":
                 memory();
