@@ -143,6 +143,11 @@ def test_a_callback_may_end_the_program():
     assert re.fullmatch(LONG + "the program ends without it\n", done.stderr)
 
 
+def test_a_program_ends_beside_a_callback_that_closes_and_stays():
+    done = lifetimes("stays")
+    assert (done.returncode, done.stdout, done.stderr) == (0, "ends\n", "")
+
+
 @pytest.fixture
 def runtime():
     """A folder for a server's socket, whose path is short, and for temporary files; and the

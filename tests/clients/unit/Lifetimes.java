@@ -16,6 +16,7 @@ import java.util.concurrent.CountDownLatch;
 import java.util.concurrent.TimeUnit;
 import java.util.concurrent.atomic.AtomicBoolean;
 import java.util.concurrent.atomic.AtomicInteger;
+import java.util.concurrent.locks.LockSupport;
 
 /**
  * Callbacks that are cancelled or throw, readers, close(), two simulations in one process, and a
@@ -257,6 +258,21 @@ public final class Lifetimes {
         errorOf(() -> sim.sleep(PATIENCE));
     }
 
+    /** The program ends all the same. */
+    private static void closedByACallbackThatStays(Simulation sim) throws InterruptedException {
+        CountDownLatch closed = new CountDownLatch(1);
+        sim.robot("p3at")
+                .odometry()
+                .onSample(
+                        sample -> {
+                            sim.close();
+                            closed.countDown();
+                            while (true) LockSupport.park();
+                        });
+        closed.await();
+        System.out.println("ends");
+    }
+
     private static String launched(LaunchOptions options, String world) {
         try (Simulation sim = Ruedo.launch(world, options)) {
             return "launched " + sim.world();
@@ -297,6 +313,9 @@ public final class Lifetimes {
                 return;
             case "interrupted_close":
                 interruptedClose(args[0]);
+                return;
+            case "stays":
+                closedByACallbackThatStays(Ruedo.connect(args[0], "lifetimes", PATIENCE));
                 return;
             case "killed":
                 launchedAndKilled(args[0]);

@@ -26,6 +26,7 @@ final class Bus implements Transport.Receiver {
     private static final long LONG_SECONDS = 5; // for a callback
     private final ReentrantLock delivering = new ReentrantLock(); // while handlers are called
     private volatile Thread receiving; // the one that calls them; null: nothing came yet
+    private boolean told; // of a handler that is waited for; under this object's monitor
     private volatile boolean closed;
 
     /** The one that this thread is in a handler of. */
@@ -125,14 +126,26 @@ final class Bus implements Transport.Receiver {
         }
     }
 
-    /**
-     * From now on no handler is called. Waits for one that is running, which is named when it takes
-     * long. At the program's end it is not waited for any longer: it may be what ended the program.
-     */
+    /** From now on no handler is called; one that is running goes on. */
     void close() {
         closed = true;
         transport.close();
+    }
+
+    /**
+     * Waits for a handler that is running, which is named when it takes long. At the program's end
+     * it is not waited for any longer: it may be what ended the program.
+     */
+    void awaitHandler() {
         if (returned()) return;
+        tellOfHandler();
+        while (!programEnds() && !returned()) {} // which waits
+    }
+
+    /** Once; who waits with others goes on after it was said. */
+    private synchronized void tellOfHandler() {
+        if (told) return;
+        told = true;
         System.err.println(
                 "ruedo: a callback has not returned for "
                         + LONG_SECONDS
@@ -141,7 +154,6 @@ final class Bus implements Transport.Receiver {
                         + (programEnds()
                                 ? ": the program ends without it"
                                 : ": close() waits for it"));
-        while (!programEnds() && !returned()) {} // which waits
     }
 
     /** Whether no handler runs; waits for that. */

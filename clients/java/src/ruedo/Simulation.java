@@ -401,8 +401,8 @@ public final class Simulation implements AutoCloseable {
     /**
      * Ends repeated commands, and a server that launch() started. A program that ends without it
      * leaves nothing behind either: the watchdog stops its robots, and its server ends with the
-     * pipe to it. In a callback it returns at once, and the end follows by itself; a second call
-     * waits for it.
+     * pipe to it. Waits for a callback that is running. In a callback it returns at once, and the
+     * end follows by itself; a second call waits for it.
      */
     @Override
     public void close() {
@@ -415,7 +415,9 @@ public final class Simulation implements AutoCloseable {
             ending.start();
             sayClosed();
         }
-        if (!Bus.inAnyHandler()) Uninterrupted.get(this::awaitEnd);
+        if (Bus.inAnyHandler()) return;
+        Uninterrupted.get(this::awaitEnd);
+        bus.awaitHandler();
     }
 
     private void sayClosed() {
