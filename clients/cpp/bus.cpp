@@ -96,8 +96,10 @@ void Bus::receive_eagerly() {
   state_->transport->receive_eagerly();
 }
 
+void Bus::stop() { state_->closed = true; }
+
 void Bus::close() {
-  state_->closed = true;
+  stop();
   if (!thread_.joinable()) return;
   if (in_any_handler()) {
     thread_.detach();

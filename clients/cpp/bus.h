@@ -33,8 +33,9 @@ class Bus {
   static void check_size(const std::string& channel, size_t size);  // throws likewise
   bool is_connected() const;  // false: what is published now reaches nobody
   void receive_eagerly();     // as Transport's
-  // In a handler, too, of this bus or another: its thread then ends by itself. Two handlers that
-  // close each other's bus do not wait for each other.
+  void stop();  // nothing is received or published any more, but for the handler that runs
+  // Waits for that handler, too. In a handler, of this bus or another, its thread ends by itself:
+  // two handlers that close each other's bus do not wait for each other.
   void close();
   // This thread is in a handler of it: while that lasts, nothing is received.
   bool handling() const;

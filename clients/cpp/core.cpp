@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "address.h"
+#include "ends.h"
 #include "ruedo/request_t.hpp"
 #include "ruedo/tick_t.hpp"
 #include "server_process.h"
@@ -105,19 +106,29 @@ void Core::close() {
   // In a callback, this thread is what receives the answer to a LEAVE: another one waits for it.
   if (const auto self = weak_from_this().lock(); self && bus_.handling()) {
     try {
-      std::thread([self] { self->end(); }).detach();
+      auto under_way = std::make_unique<EndUnderWay>();
+      std::thread([self, under_way = std::move(under_way)]() mutable {
+        self->end();
+        under_way = nullptr;  // the callback may be what ends the program
+        self->await_callback();
+      }).detach();
       return;
     } catch (const std::system_error&) {  // there are too many threads
     }
   }
   end();
+  await_callback();
 }
 
 void Core::end() {
   if (repeater_.joinable()) repeater_.join();
   if (info()) session_.leave();
-  bus_.close();
+  bus_.stop();
   if (server_) server_->end();
+}
+
+void Core::await_callback() {
+  bus_.close();
   end_.set_value();
 }
 

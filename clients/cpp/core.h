@@ -87,7 +87,8 @@ class Core : public std::enable_shared_from_this<Core> {
   std::string what_is_known(double rate) const;  // for timeouts
 
  private:
-  void end();
+  void end();  // all but a callback that has not returned
+  void await_callback();
   void on_info(const uint8_t* bytes, size_t size);
   void on_tick(const uint8_t* bytes, size_t size);
   void forget_removed(const WorldInfo& info);

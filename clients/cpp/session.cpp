@@ -75,20 +75,15 @@ void Session::check_size(const std::vector<uint8_t>& body) {
 }
 
 void Session::leave() {
-  const auto turn = this->turn();
   if (session_ == 0) return;
+  const int64_t sequence = ++sequence_;
   std::unique_lock lock(mutex_);
-  awaited_kind_ = request_t::LEAVE;
-  awaited_sequence_ = ++sequence_;
-  reply_.reset();
   // Counted, since in a second without a processor one alone would go out.
   for (int sent = 0; sent < kMostLeaves; ++sent) {
-    publish(request_t::LEAVE, session_, sequence_, {});
-    const bool answered = news_.wait_for(lock, kRepeatTime, [this] { return reply_.has_value(); });
-    if (answered || core_.server_has_ended()) break;
+    publish(request_t::LEAVE, session_, sequence, {});
+    const bool answered = news_.wait_for(lock, kRepeatTime, [this] { return left_; });
+    if (answered || core_.server_has_ended()) return;
   }
-  awaited_kind_ = 0;
-  session_ = 0;
 }
 
 void Session::join(Duration timeout) {
@@ -97,8 +92,7 @@ void Session::join(Duration timeout) {
   std::random_device random;
   const int64_t number =
       static_cast<int64_t>((static_cast<uint64_t>(random()) << 32 | random()) >> 2) + 1;
-  const Reply reply = checked(exchange(request_t::JOIN, 0, number, encoded(body), timeout));
-  session_ = reply.session;
+  checked(exchange(request_t::JOIN, 0, number, encoded(body), timeout));
   sequence_ = 0;
 }
 
@@ -161,7 +155,12 @@ void Session::receive(const uint8_t* bytes, size_t size) {
   }
   if (reply.kind != request_t::JOIN && reply.session != session_) return;
   std::unique_lock lock(mutex_);
-  if (reply.kind == awaited_kind_ && reply.sequence == awaited_sequence_) {
+  if (reply.kind == request_t::LEAVE) {
+    left_ = true;
+    news_.notify_all();
+  } else if (reply.kind == awaited_kind_ && reply.sequence == awaited_sequence_) {
+    // At once: leave() in another thread is to know of it.
+    if (reply.kind == request_t::JOIN && reply.code == reply_t::OK) session_ = reply.session;
     reply_ = std::move(reply);
     news_.notify_all();
   } else if (reply.kind == request_t::GRANT || reply.kind == request_t::RESEND) {

@@ -50,9 +50,10 @@ class Session {
   void publish(int32_t kind, int64_t session, int64_t sequence, const std::vector<uint8_t>& body,
                int32_t epoch = -1);
 
-  // Gives the session back. Others would wait for a client in lockstep whose LEAVE was lost: it is
-  // repeated until it is answered, for a moment, since the server may be gone: in that case no
-  // longer than that is unknown.
+  // Gives the session back, once. Others would wait for a client in lockstep whose LEAVE was lost:
+  // it is repeated until it is answered, for a moment, since the server may be gone: in that case
+  // no longer than that is unknown. It takes no turn: who has that may be a callback in step() that
+  // ends the program.
   void leave();
   void receive(const uint8_t* bytes, size_t size);  // a message of ruedo/reply
 
@@ -64,7 +65,7 @@ class Session {
   Core& core_;
   const std::string name_;
   std::mutex one_at_a_time_;
-  int64_t run_id_ = 0, sequence_ = 0;  // under one_at_a_time_
+  std::atomic<int64_t> run_id_ = 0, sequence_ = 0;  // changed under one_at_a_time_, or by leave()
 
   std::mutex mutex_;
   std::condition_variable news_;
@@ -72,6 +73,7 @@ class Session {
   int32_t awaited_kind_ = 0;  // 0: none
   int64_t awaited_sequence_ = 0;
   std::optional<Reply> reply_;
+  bool left_ = false;  // a LEAVE was answered
 };
 
 template <class Message>

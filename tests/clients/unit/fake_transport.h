@@ -5,6 +5,7 @@
 #include <atomic>
 #include <chrono>
 #include <condition_variable>
+#include <cstdio>
 #include <deque>
 #include <functional>
 #include <map>
@@ -16,6 +17,7 @@
 
 #include "core.h"
 #include "ruedo/channel_info_t.hpp"
+#include "ruedo/grant_reply_t.hpp"
 #include "ruedo/motion_status_t.hpp"
 #include "ruedo/odometry_t.hpp"
 #include "ruedo/reply_t.hpp"
@@ -150,6 +152,11 @@ class FakeServer {
     reply.session = request.kind == request_t::JOIN ? 5 : request.session;
     reply.sequence = request.sequence;
     reply.kind = request.kind;
+    if (request.kind == request_t::GRANT) {
+      reply.body = encoded(grant_reply_t{});
+      reply.size = static_cast<int32_t>(reply.body.size());
+    }
+    if (request.kind == request_t::LEAVE) std::fputs("a client has left\n", stderr);
     send("ruedo/reply", reply);
   }
 

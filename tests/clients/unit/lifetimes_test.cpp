@@ -204,6 +204,42 @@ TEST_F(Lifetimes, WhoLeavesInACallbackSaysSoUntilItIsAnswered) {
   EXPECT_EQ(count, 1);
 }
 
+// A program with one simulation, whose callback is called once the simulation has a session.
+[[noreturn]] void run_until(const std::shared_ptr<FakeServer>& server, bool steps,
+                            const std::function<void(std::optional<Simulation>&)>& callback) {
+  static std::optional<Simulation> sim;
+  auto& done = *new std::promise<void>;  // which outlives the end that a callback begins
+  alarm(static_cast<unsigned>(kPatience.count()));
+  sim.emplace(simulation(server));
+  sim->pause();
+  sim->robot("p3at")
+      .odometry()
+      .on_sample([callback, &done](const Odometry&) {
+        callback(sim);
+        done.set_value();
+      })
+      .keep();
+  server->send_odometry("p3at", 1000, 0.0);
+  if (steps) sim->step(1);
+  done.get_future().wait();
+  std::exit(5);  // as a return from main()
+}
+
+TEST_F(Lifetimes, ACallbackThatEndsTheProgramLeaves) {
+  GTEST_FLAG_SET(death_test_style, "threadsafe");
+  const auto exits = [](std::optional<Simulation>&) { std::exit(5); };
+  server->lost_leaves = 2;
+  EXPECT_EXIT(run_until(server, false, exits), testing::ExitedWithCode(5), "a client has left");
+  EXPECT_EXIT(run_until(server, true, exits), testing::ExitedWithCode(5), "a client has left");
+}
+
+TEST_F(Lifetimes, AProgramThatReturnsAfterItsCallbackHasClosedLeaves) {
+  GTEST_FLAG_SET(death_test_style, "threadsafe");
+  server->lost_leaves = 2;
+  EXPECT_EXIT(run_until(server, false, [](auto& sim) { sim.reset(); }), testing::ExitedWithCode(5),
+              "a client has left");
+}
+
 TEST_F(Lifetimes, ALeaveIsRepeatedAFewTimes) {
   server->lost_leaves = 1000;
   Simulation sim = simulation(server);
