@@ -19,7 +19,8 @@ namespace {
 
 constexpr auto kAskAgain = std::chrono::milliseconds(500),
                kFaultTime = std::chrono::milliseconds(1000);
-constexpr int64_t kMostAhead = 1'000'000;  // us: ticks come ten times a second
+constexpr std::chrono::seconds kLookTime(1);  // a stopped server keeps the connection of each look
+constexpr int64_t kMostAhead = 1'000'000;     // us: ticks come ten times a second
 constexpr double kSilence =
     5.0;  // s of real time without any message: a server gives a sign of life each second
 
@@ -312,8 +313,17 @@ void Core::check_server() {
     if (const auto ended = server_->ended()) throw NoServer(*ended);
   }
   // A server on this machine that is stopped, or in a debugger, is waited for.
-  if (silence() > kSilence && !is_claimed(url_))
+  if (silence() > kSilence && !is_there())
     throw NoServer("nothing was heard from the server at " + url_ + " for 5 s");
+}
+
+bool Core::is_there() {
+  const std::lock_guard lock(looking_);
+  if (const auto now = Clock::now(); now >= look_at_) {
+    there_ = is_claimed(url_);
+    look_at_ = now + kLookTime;
+  }
+  return there_;
 }
 
 std::string Core::what_is_known(double rate) const {

@@ -96,6 +96,7 @@ class Core : public std::enable_shared_from_this<Core> {
   void tell_another_server(int64_t run_id) const;
   void end_drivers(const std::vector<std::shared_ptr<Driver>>& drivers, MotionReason reason);
   void ask_info();
+  bool is_there();  // a server on this machine, as of about a second ago
   void repeat();
   double silence() const;  // s
 
@@ -115,6 +116,9 @@ class Core : public std::enable_shared_from_this<Core> {
   std::atomic<int64_t> utime_{0}, ids_{0};
   std::atomic<Clock::time_point::rep> last_sign_;
   std::atomic<Clock::time_point::rep> asked_{0};  // for info
+  std::mutex looking_;
+  Clock::time_point look_at_;  // for the server, again
+  bool there_ = false;         // as it was then
   std::atomic<bool> closed_{false};
   std::promise<void> end_;  // of all that close() ends
   const std::shared_future<void> ended_ = end_.get_future().share();

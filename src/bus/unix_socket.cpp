@@ -31,13 +31,11 @@ void check_path(const std::string& path) {
   }
 }
 
-FileHandle connected(const std::string& path) {
+// False: errno says why.
+bool connect(const FileHandle& socket, const std::string& path) {
   check_path(path);
   const sockaddr_un address = address_of(path);
-  FileHandle socket = stream_socket(AF_UNIX);
-  return ::connect(socket.get(), reinterpret_cast<const sockaddr*>(&address), sizeof address) == 0
-             ? std::move(socket)
-             : FileHandle();
+  return ::connect(socket.get(), reinterpret_cast<const sockaddr*>(&address), sizeof address) == 0;
 }
 
 [[noreturn]] void cannot_serve(const std::string& path) {
@@ -68,8 +66,8 @@ void name(const std::string& listening, const std::string& path) {
 }  // namespace
 
 FileHandle connect_unix(const std::string& path) {
-  FileHandle socket = connected(path);
-  if (!socket) {
+  FileHandle socket = stream_socket(AF_UNIX);
+  if (!connect(socket, path)) {
     throw EnvironmentError("nothing listens at unix://" + path + " (" + std::strerror(errno) +
                            "): start `ruedo run` with that --lcm first");
   }
@@ -78,7 +76,10 @@ FileHandle connect_unix(const std::string& path) {
   return socket;
 }
 
-bool is_unix_served(const std::string& path) { return static_cast<bool>(connected(path)); }
+bool is_unix_served(const std::string& path) {
+  const FileHandle socket(::socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0));
+  return connect(socket, path) || errno == EAGAIN;  // which is one that accepts nobody just now
+}
 
 FileHandle listen_unix(const std::string& path) {
   check_path(path);

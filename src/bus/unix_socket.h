@@ -11,7 +11,7 @@ namespace ruedo::bus {
 // cure.
 FileHandle connect_unix(const std::string& path);
 
-// True when a server listens there.
+// True when a server listens there, also when it is stopped.
 bool is_unix_served(const std::string& path);
 
 // Listens at a socket of mode 0600, which is there when it can be connected to; what a server left

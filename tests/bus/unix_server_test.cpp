@@ -320,6 +320,14 @@ TEST(UnixServer, OfTwoThatBeginAtOnceOneServes) {
   EXPECT_TRUE(fs::is_empty(folder.path));
 }
 
+TEST(UnixServer, OneThatAcceptsNobodyIsThere) {
+  const Folder folder;
+  const std::string path = folder.url().host;
+  const FileHandle listener = listen_unix(path);
+  for (int i = 0; i < 1000; ++i) ASSERT_TRUE(is_unix_served(path)) << i;  // its queue is full
+  EXPECT_THROW(listen_unix(path), EnvironmentError);
+}
+
 TEST(UnixServer, GarbageEndsItsConnectionAlone) {
   Served served;
   Client client(served, {"out"});

@@ -7,12 +7,17 @@ import socket
 import stat
 import subprocess
 import tempfile
+import threading
 import time
 from pathlib import Path
 from urllib.parse import urlsplit
 
 import pytest
 from conftest import HERE, PATIENCE, RUEDO, probe, ruedo_run
+
+# isort: split
+from fake_server import info
+from lying_stream import HELLO, frame
 
 HALL = str(HERE / "hall.sdf")
 STEPS = 300
@@ -73,6 +78,32 @@ def anothers_socket():
 def test_nobody_talks_to_another_users_server(language, anothers_socket):
     said = probe(language, f"unix://{anothers_socket}", "connect").one("failed")
     assert said.startswith("NoServer") and "served by another user" in said
+
+
+@pytest.fixture
+def stopped_server(tmp_path):
+    """Where: it greets one client, then stops, with room for one connection that waits."""
+    greeted = []
+
+    def greet(listener):
+        while not greeted:
+            client = listener.accept()[0]
+            if client.recv(1):  # who says nothing looked whether somebody is here
+                client.sendall(HELLO + frame("ruedo/info", info([]).encode()))
+                greeted.append(client)
+
+    with socket.socket(socket.AF_UNIX) as listener:
+        listener.bind(f"{tmp_path}/bus")
+        listener.listen(0)
+        threading.Thread(target=greet, args=(listener,), daemon=True).start()
+        yield f"unix://{tmp_path}/bus"
+
+
+def test_a_stopped_server_is_waited_for(language, stopped_server):
+    """However many looks at whether it is there its queue keeps."""
+    said = probe(language, stopped_server, "streams", "p3at", "7")
+    assert said.one("lrf").startswith("Timeout: "), said.text
+    assert said.one("odometry").startswith("Timeout: "), said.text
 
 
 def test_launch_takes_a_socket_of_its_own():

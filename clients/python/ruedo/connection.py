@@ -31,6 +31,7 @@ from .world_info import WorldInfo, WorldInfoAssembler, run_id_of
 
 _SILENCE_SECONDS = 5.0
 _ASK_AGAIN_SECONDS = 0.5
+_LOOK_SECONDS = 1.0  # a stopped server keeps the connection of each look
 _END_SECONDS = 10.0  # for another thread that closes
 _CALLBACK_SECONDS = 5.0  # for a callback, at the program's end
 _FAULT_SECONDS = 1.0
@@ -83,6 +84,9 @@ class Connection:
         self._fault: RuedoError | None = None
         self._fault_at = 0.0  # s of time.monotonic(), of the first
         self._asked = 0.0  # for info, s of time.monotonic()
+        self._looking = threading.Lock()
+        self._look_at = 0.0  # for the server, again, s of time.monotonic()
+        self._there = False  # as it was then
         self._ids = _name_hash(name) << 20  # two clients number their primitives apart
         self._new_run = Callbacks("a new run")
         self._closing = threading.Lock()  # whoever has it closes
@@ -174,10 +178,18 @@ class Connection:
         waited for."""
         self.check_open()
         self._check_private_server()
-        if self.clock.silence() > _SILENCE_SECONDS and not is_claimed(self.url):
+        if self.clock.silence() > _SILENCE_SECONDS and not self._is_there():
             raise NoServer(
                 f"nothing was heard from the server at {self.url} for {_SILENCE_SECONDS:g} s"
             )
+
+    def _is_there(self) -> bool:
+        """Whether a server on this machine is, as of about a second ago."""
+        with self._looking:
+            if time.monotonic() >= self._look_at:
+                self._there = is_claimed(self.url)
+                self._look_at = time.monotonic() + _LOOK_SECONDS
+            return self._there
 
     def what_is_known(self, rate: float) -> str:
         """Why a stream of that rate (Hz) may be silent."""

@@ -66,8 +66,17 @@ def _check_peer(end: socket.socket) -> None:
 
 
 def is_served(address: Address) -> bool:
+    """Also by a server that is stopped."""
     try:
-        connect(address).close()
+        if address.scheme != "unix":
+            connect(address).close()
+            return True
+        with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as end:
+            end.setblocking(False)
+            end.connect(address.path)
+            _check_peer(end)
+    except BlockingIOError:  # it accepts nobody just now
+        return True
     except OSError:
         return False
     return True
