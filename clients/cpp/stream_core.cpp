@@ -21,6 +21,7 @@ StreamCore::StreamCore(std::weak_ptr<Core> core, const ChannelInfo& channel,
                        const SampleDecoder* decoder)
     : core_(std::move(core)),
       channel_(channel.name),
+      robot_(channel.robot),
       type_(channel.type),
       fingerprint_(channel.fingerprint),
       rate_(channel.rate),
@@ -55,11 +56,23 @@ void StreamCore::subscribe(Core& core) {
     throw TypeMismatch(channel_ + " carries " + type_ +
                        ", of which this client has no samples: robot.stream<" + type_ +
                        ">() takes the class that lcm-gen made of its .lcm file");
-  if (!is_raw() && fingerprint_ != decoder_->fingerprint) throw mismatch(fingerprint_);
+  if (const int64_t fingerprint = announced(core);
+      !is_raw() && fingerprint != decoder_->fingerprint)
+    throw mismatch(fingerprint);
   source_ =
       core.bus().subscribe(channel_, [self = weak_from_this()](const uint8_t* bytes, size_t size) {
         if (const auto stream = self.lock()) stream->receive(bytes, size);
       });
+}
+
+// The fingerprint by the newest info: one before may have been false, or of another server.
+int64_t StreamCore::announced(const Core& core) const {
+  const auto info = core.info();
+  if (const auto found = info->channels.find(robot_); found != info->channels.end()) {
+    for (const ChannelInfo& channel : found->second)
+      if (channel.name == channel_) return channel.fingerprint;
+  }
+  return fingerprint_;
 }
 
 void StreamCore::forget() {

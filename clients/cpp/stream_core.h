@@ -42,10 +42,11 @@ class StreamCore : public std::enable_shared_from_this<StreamCore> {
   void subscribe(Core& core);
   void receive(const uint8_t* bytes, size_t size);
   TypeMismatch mismatch(int64_t fingerprint) const;
+  int64_t announced(const Core& core) const;
 
   const std::weak_ptr<Core> core_;
-  const std::string channel_, type_;
-  const int64_t fingerprint_;  // as ruedo/info says
+  const std::string channel_, robot_, type_;
+  const int64_t fingerprint_;  // as ruedo/info said first
   const double rate_;
   const SampleDecoder* decoder_;
   const std::shared_ptr<Callbacks> callbacks_ = std::make_shared<Callbacks>();

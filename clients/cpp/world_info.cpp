@@ -13,6 +13,8 @@ namespace ruedo::client {
 namespace {
 
 constexpr size_t kHead = 8 + 8 + 8 + 4 + 2 + 2;  // bytes
+constexpr int kMostParts = 1024;
+constexpr size_t kMostBytes = 64 << 20;  // of all parts
 
 RobotInfo read_robot(WireReader& in) {
   RobotInfo robot;
@@ -143,6 +145,7 @@ std::shared_ptr<const WorldInfo> WorldInfoAssembler::add(const uint8_t* bytes, s
   if (key != key_) parts_.clear();
   key_ = key;
   parts_[part].assign(bytes + 16, bytes + size);
+  check_size(nparts);
   if (parts_.size() < static_cast<size_t>(nparts)) return nullptr;
   if (parts_ == last_) {
     parts_.clear();
@@ -180,6 +183,18 @@ std::shared_ptr<const WorldInfo> WorldInfoAssembler::add(const uint8_t* bytes, s
   last_ = std::move(parts_);
   parts_.clear();
   return info;
+}
+
+// What is not whole yet waits in memory.
+void WorldInfoAssembler::check_size(int nparts) {
+  size_t size = 0;
+  for (const auto& [part, content] : parts_) size += content.size();
+  if (nparts <= kMostParts && size <= kMostBytes) return;
+  parts_.clear();
+  throw TypeMismatch("ruedo/info has " + std::to_string(nparts) + " parts of " +
+                     std::to_string(size) + " bytes so far: a client takes " +
+                     std::to_string(kMostParts) + " parts of " + std::to_string(kMostBytes) +
+                     " bytes together at most");
 }
 
 }  // namespace ruedo::client

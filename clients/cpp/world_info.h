@@ -47,10 +47,11 @@ std::optional<int64_t> run_id_of(const uint8_t* bytes, size_t size);
 class WorldInfoAssembler {
  public:
   // The info, when this message completed a new one. Throws TypeMismatch for another version of the
-  // type.
+  // type, and for more than a server sends.
   std::shared_ptr<const WorldInfo> add(const uint8_t* bytes, size_t size);
 
  private:
+  void check_size(int nparts);
   using Key = std::tuple<int64_t, int64_t, int32_t, int>;  // utime, run, epoch, nparts
   Key key_{};
   std::map<int, std::vector<uint8_t>> parts_;

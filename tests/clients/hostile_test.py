@@ -1,5 +1,6 @@
 """Servers that lie or do not exist: each fault is reported clearly, and nothing breaks."""
 
+import contextlib
 import os
 import signal
 import subprocess
@@ -7,10 +8,10 @@ import sys
 import time
 
 import pytest
-from conftest import HERE, PROBES, Server, free_url, probe
+from conftest import HERE, PATIENCE, PROBES, Server, free_url, probe
 
 # isort: split
-from fake_server import info
+from fake_server import info, scan
 from lying_datagrams import LyingDatagrams, cut, fragment
 from lying_stream import HELLO, LyingStream, frame, grants_and_huge_ticks
 from ruedo import lcmtypes
@@ -190,6 +191,44 @@ def test_a_refusal_reaches_no_terminal(language, stream_url):
     with LyingStream(stream_url, HELLO + frame("ruedo/info", knows_all.encode()), refuse):
         said = probe(language, stream_url, "quit").one("failed")
     assert said.endswith("JOIN: ?]0;?owned?")
+
+
+def test_a_false_type_outlasts_no_info(stream_url):
+    import ruedo
+
+    false, true = (
+        frame("ruedo/info", info(options).encode()) for options in (["--wrong-type"], [])
+    )
+    with (
+        LyingStream(stream_url, HELLO + false) as server,
+        ruedo.connect(stream_url, timeout=PATIENCE) as sim,
+    ):
+        lrf = sim.robot("p3at").lrf
+        with pytest.raises(ruedo.TypeMismatch, match="another version of planar_lidar_t"):
+            lrf.latest()
+        deadline, scans = time.monotonic() + PATIENCE, []
+        while not scans and time.monotonic() < deadline:
+            server.send(true + frame("p3at/LRF", scan(1)))
+            with contextlib.suppress(ruedo.TypeMismatch, ruedo.Timeout):
+                scans.append(lrf.latest(0.1))
+        assert scans and len(sim.robot("p3at").lrf.latest().ranges) == 3
+
+
+def test_parts_of_an_info_that_are_kept_have_bounds():
+    from ruedo.errors import TypeMismatch
+    from ruedo.world_info import WorldInfoAssembler
+
+    def add(nparts, size):
+        assembler, part = WorldInfoAssembler(), info([])
+        part.nparts = nparts
+        for part.part in range(nparts - 1):
+            assembler.add(part.encode() + bytes(size))
+
+    add(1024, 50_000)
+    with pytest.raises(TypeMismatch, match="ruedo/info has 32767 parts of"):
+        add(32767, 100)
+    with pytest.raises(TypeMismatch, match="1024 parts of 67108864 bytes together at most"):
+        add(100, 1 << 20)
 
 
 def test_a_hundred_thousand_devices(language, stream_url):

@@ -78,6 +78,12 @@ class LyingStream:
                 one.shutdown(socket.SHUT_RDWR)
             one.close()
 
+    def send(self, data: bytes) -> None:
+        """To everybody who is connected."""
+        for one in self._open:
+            with contextlib.suppress(OSError):
+                one.sendall(data)
+
     def _accept(self) -> None:
         with contextlib.suppress(OSError):
             while True:

@@ -83,7 +83,7 @@ class Stream(Reader[T]):
         self._given = form
         self.channel, self.type, self.rate = channel, type, rate
         self._connection = connection
-        self._fingerprint = fingerprint & 0xFFFFFFFFFFFFFFFF
+        self._fingerprint = fingerprint  # as ruedo/info said first
         self._news = threading.Condition()
         self._source: Subscription | None = None
         self._sample: T | None = None
@@ -108,9 +108,15 @@ class Stream(Reader[T]):
             if self._source:
                 return
             form = self._form()
-            if form.fingerprint and self._fingerprint != int.from_bytes(form.fingerprint, "big"):
-                raise self._mismatch(self._fingerprint, form.fingerprint)
+            if form.fingerprint and self._announced() != int.from_bytes(form.fingerprint, "big"):
+                raise self._mismatch(self._announced(), form.fingerprint)
             self._source = self._connection.bus.subscribe(self.channel, self._receive)
+
+    def _announced(self) -> int:
+        """The fingerprint by the newest info: one before may have been false, or of another
+        server."""
+        fingerprints = self._connection.info.fingerprints
+        return fingerprints.get(self.channel, self._fingerprint) & 0xFFFFFFFFFFFFFFFF
 
     def _form(self) -> Form:
         if self._given is None:

@@ -12,6 +12,7 @@ from .decoding import decode
 from .errors import CONTROL, TypeMismatch
 
 _HEAD = struct.Struct(">qqqihh")  # fingerprint, utime, run_id, epoch, part, nparts
+_MOST_PARTS, _MOST_BYTES = 1024, 64 << 20  # of an info
 
 
 @dataclass(frozen=True)
@@ -43,6 +44,7 @@ class WorldInfo:
         self.channel_list: list[Any] = [
             c for p in parts for c in p.channels
         ]  # as ruedo/tick counts them
+        self.fingerprints: dict[str, int] = {c.name: c.fingerprint for c in self.channel_list}
         self.tick_channel = next(
             (i for i, c in enumerate(self.channel_list) if c.type == "tick_t"), -1
         )
@@ -96,7 +98,7 @@ class WorldInfoAssembler:
 
     def add(self, data: bytes) -> WorldInfo | None:
         """The info, when this message completed a new one. Raises TypeMismatch for another version
-        of the type.
+        of the type, and for more than a server sends.
         """
         expected = lcmtypes.world_info_t._get_packed_fingerprint()
         if data[:8] != expected:
@@ -112,6 +114,7 @@ class WorldInfoAssembler:
         if self._group != (run_id, epoch, utime, nparts):
             self._group, self._parts = (run_id, epoch, utime, nparts), {}
         self._parts[part] = data
+        self._check_size(nparts)
         if len(self._parts) < nparts:
             return None
         parts = [self._parts[i] for i in range(nparts)]
@@ -130,3 +133,14 @@ class WorldInfoAssembler:
             ) from None
         self._last = content
         return info
+
+    def _check_size(self, nparts: int) -> None:
+        """What is not whole yet waits in memory."""
+        size = sum(map(len, self._parts.values()))
+        if nparts <= _MOST_PARTS and size <= _MOST_BYTES:
+            return
+        self._group, self._parts = None, {}
+        raise TypeMismatch(
+            f"ruedo/info has {nparts} parts of {size} bytes so far: a client takes {_MOST_PARTS} parts of "
+            f"{_MOST_BYTES} bytes together at most"
+        )

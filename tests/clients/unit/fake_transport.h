@@ -38,6 +38,7 @@ class FakeServer {
   std::atomic<int64_t> run_id{7};
   std::atomic<bool> gone{false};  // nothing is answered, and the client's transport knows
   std::atomic<int> lost_leaves{0}, leaves{0};
+  std::atomic<int64_t> falsehood{0};  // what it says of odometry_t
   std::vector<std::string> robots{"p3at"};
 
   template <class Message>
@@ -66,7 +67,7 @@ class FakeServer {
       robot.drive = "kinematic";
       robot.watchdog_us = 40'000;
       info.robots.push_back(robot);
-      add(info, name, "odometry", "odometry_t", odometry_t::getHash(), false);
+      add(info, name, "odometry", "odometry_t", odometry_t::getHash() + falsehood, false);
       add(info, name, "motion", "motion_status_t", motion_status_t::getHash(), false);
       add(info, name, "velocity", "velocity_command_t", velocity_command_t::getHash(), true);
       add(info, name, "move", "move_command_t", 0, true);
