@@ -2,6 +2,7 @@
 #include "bus.h"
 
 #include <algorithm>
+#include <future>
 #include <limits>
 #include <map>
 #include <mutex>
@@ -39,6 +40,8 @@ struct Bus::State : std::enable_shared_from_this<Bus::State> {
   const std::unique_ptr<Transport> transport;
   std::mutex mutex;
   std::map<std::string, std::shared_ptr<Handlers>, std::less<>> handlers;
+  std::string handled;  // the channel of the handler that runs; "": none
+  std::promise<void> ended;
   std::atomic<bool> closed{false};
   std::mutex receiving;
   std::atomic<std::chrono::steady_clock::rep> lent_until{0};
@@ -104,6 +107,10 @@ void Bus::close() {
   if (in_any_handler()) {
     thread_.detach();
   } else {
+    if (state_->ended.get_future().wait_for(kLongTime) == std::future_status::timeout) {
+      const std::lock_guard lock(state_->mutex);
+      if (!state_->handled.empty()) say_awaited(state_->handled);
+    }
     thread_.join();
   }
 }
@@ -120,9 +127,12 @@ void Bus::State::handle(std::chrono::milliseconds timeout) {
       const std::lock_guard lock(mutex);
       if (const auto found = handlers.find(channel); found != handlers.end())
         called = found->second;
+      handled = channel;
     }
     if (called && !closed) called->call(bytes, size);
   });
+  const std::lock_guard lock(mutex);
+  handled.clear();
 }
 
 void Bus::State::receive() {
@@ -137,6 +147,7 @@ void Bus::State::receive() {
       handle(std::chrono::milliseconds(100));
     }
   }
+  ended.set_value();
 }
 
 Bus::Turn::Turn(Bus& bus) : state_(bus.state_) {

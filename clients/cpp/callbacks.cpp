@@ -2,18 +2,59 @@
 #include "callbacks.h"
 
 #include <cstdio>
+#include <map>
 
 namespace ruedo::client {
 
+namespace {
+
+struct Waits {
+  std::mutex mutex;
+  std::map<std::thread::id, const CallbackCore*> all;  // which callback a thread waits for
+};
+
+}  // namespace
+
 void CallbackCore::close() {
   if (forked_) return;
-  std::function<void()> leave;
+  const bool first = !closed_.exchange(true);
+  await_call();
+  if (first && leave_) std::exchange(leave_, nullptr)();
+}
+
+void CallbackCore::await_call() {
+  auto& waits = of_this_process<Waits>();
+  const std::thread::id me = std::this_thread::get_id();
   {
-    const std::lock_guard lock(running_);
-    if (closed_.exchange(true)) return;
-    leave = std::move(leave_);
+    const std::lock_guard lock(waits.mutex);
+    if (waits_for_this_thread()) return;
+    waits.all[me] = this;
   }
-  if (leave) leave();
+  if (!running_.try_lock_for(kLongTime)) {
+    say_awaited(what_);
+    running_.lock();
+  }
+  running_.unlock();
+  const std::lock_guard lock(waits.mutex);
+  waits.all.erase(me);
+}
+
+// Whether whoever calls it is this thread, or waits for one that this thread calls.
+bool CallbackCore::waits_for_this_thread() const {
+  const auto& all = of_this_process<Waits>().all;
+  const CallbackCore* one = this;
+  while (one->runner_.load() != std::this_thread::get_id()) {
+    const auto found = all.find(one->runner_);
+    if (found == all.end()) return false;
+    one = found->second;
+  }
+  return true;
+}
+
+void say_awaited(const std::string& what) {
+  std::fprintf(stderr,
+               "ruedo: a callback on %s has not returned for %lld s: close() waits for it\n",
+               what.c_str(), static_cast<long long>(kLongTime.count()));
 }
 
 void CallbackCore::say_failed(const char* why) {

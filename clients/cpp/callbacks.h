@@ -3,12 +3,14 @@
 
 #include <algorithm>
 #include <atomic>
+#include <chrono>
 #include <exception>
 #include <functional>
 #include <memory>
 #include <mutex>
 #include <stdexcept>
 #include <string>
+#include <thread>
 #include <utility>
 #include <vector>
 
@@ -17,6 +19,10 @@
 
 namespace ruedo::client {
 
+// For a callback that close() waits for, before it says so.
+inline constexpr std::chrono::seconds kLongTime(5);
+void say_awaited(const std::string& what);
+
 // What a Subscription holds.
 class CallbackCore {
  public:
@@ -24,21 +30,42 @@ class CallbackCore {
   virtual ~CallbackCore() = default;
 
   // After it returns, the callback is not called any more: it waits for a call in another thread.
-  // May be called from the callback itself. In a fork's child it has nothing to end.
+  // May be called from the callback itself. Where callbacks close each other, the last of them does
+  // not wait. In a fork's child it has nothing to end.
   void close();
   bool closed() const { return closed_; }
   // Called once it was cancelled.
   void at_close(std::function<void()> leave) { leave_ = std::move(leave); }
 
  protected:
+  // A call of it by this thread.
+  class Call {
+   public:
+    explicit Call(CallbackCore& core)
+        : core_(core), lock_(core.running_), before_(core.runner_.exchange(this_thread())) {}
+    ~Call() { core_.runner_ = before_; }
+    Call(const Call&) = delete;
+    Call& operator=(const Call&) = delete;
+
+   private:
+    static std::thread::id this_thread() { return std::this_thread::get_id(); }
+    CallbackCore& core_;
+    const std::lock_guard<std::recursive_timed_mutex> lock_;
+    const std::thread::id before_;
+  };
+
   void say_failed(const char* why);
 
   const std::string what_;  // it is called on, for the log
   const Forked forked_;
-  std::recursive_mutex running_;
+  std::recursive_timed_mutex running_;
+  std::atomic<std::thread::id> runner_;  // who calls it
   std::atomic<bool> closed_{false};
 
  private:
+  void await_call();
+  bool waits_for_this_thread() const;
+
   bool failed_ = false;
   std::function<void()> leave_;
 };
@@ -52,7 +79,7 @@ class Callback : public CallbackCore {
 
   // What the callback throws is reported once, and harms no other callback.
   void call(Arguments... arguments) {
-    const std::lock_guard lock(running_);
+    const Call call(*this);
     if (closed_) return;
     try {
       function_(arguments...);

@@ -1,11 +1,11 @@
 // The count of ends under way.
 #include "ends.h"
 
-#include <pthread.h>
-
 #include <chrono>
 #include <condition_variable>
 #include <mutex>
+
+#include "forked.h"
 
 namespace ruedo::client {
 namespace {
@@ -18,16 +18,9 @@ struct Ends {
   int under_way = 0;
 };
 
-// Outlives every static object of the program's. A fork's child has its own.
-Ends*& ends() {
-  static auto* all = new Ends;
-  static const int registered = pthread_atfork(nullptr, nullptr, [] { ends() = new Ends; });
-  return static_cast<void>(registered), all;
-}
-
 // After the destructors of static objects, whichever were made first: those may end simulations.
 [[gnu::destructor]] void await_ends() {
-  Ends& all = *ends();
+  auto& all = of_this_process<Ends>();
   std::unique_lock lock(all.mutex);
   all.news.wait_for(lock, kPatience, [&] { return all.under_way == 0; });
 }
@@ -35,14 +28,16 @@ Ends*& ends() {
 }  // namespace
 
 EndUnderWay::EndUnderWay() {
-  const std::lock_guard lock(ends()->mutex);
-  ++ends()->under_way;
+  auto& all = of_this_process<Ends>();
+  const std::lock_guard lock(all.mutex);
+  ++all.under_way;
 }
 
 EndUnderWay::~EndUnderWay() {
-  const std::lock_guard lock(ends()->mutex);
-  --ends()->under_way;
-  ends()->news.notify_all();
+  auto& all = of_this_process<Ends>();
+  const std::lock_guard lock(all.mutex);
+  --all.under_way;
+  all.news.notify_all();
 }
 
 }  // namespace ruedo::client

@@ -2,6 +2,10 @@
 // be held for ever, and its server is not the child's to end.
 #pragma once
 
+#include <pthread.h>
+
+#include "core/file_handle.h"
+
 namespace ruedo::client {
 
 // Grows in the child of each fork.
@@ -14,6 +18,31 @@ class Forked {
 
  private:
   const int made_at_ = fork_count();
+};
+
+// One for all of this process. A fork's child begins with a new one: in the parent's a lock may be
+// held, by a thread that is not there. It outlives every static object, which may still use it.
+template <class State>
+State& of_this_process() {
+  static State* state = new State;
+  static const int registered = pthread_atfork(nullptr, nullptr, [] { state = new State; });
+  return static_cast<void>(registered), *state;
+}
+
+// A pipe's end for writing, which no child of a fork keeps open: who reads is to know when this
+// process closes it, or ends.
+class ParentsPipe {
+ public:
+  ParentsPipe() = default;
+  ~ParentsPipe() { close(); }
+  ParentsPipe(const ParentsPipe&) = delete;
+  ParentsPipe& operator=(const ParentsPipe&) = delete;
+
+  FileHandle open();  // the end for reading; none: errno says why
+  void close();
+
+ private:
+  FileHandle end_;
 };
 
 }  // namespace ruedo::client

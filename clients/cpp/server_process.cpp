@@ -4,6 +4,7 @@
 #include <arpa/inet.h>
 #include <fcntl.h>
 #include <link.h>
+#include <signal.h>
 #include <spawn.h>
 #include <sys/socket.h>
 #include <sys/wait.h>
@@ -203,11 +204,8 @@ std::string ServerProcess::written(const std::string& text) {
 ServerProcess::~ServerProcess() { end(); }
 
 void ServerProcess::start(const std::vector<std::string>& command, bool verbose) {
-  int ends[2];
-  if (pipe2(ends, O_CLOEXEC) != 0)
-    throw LaunchError(std::string("no pipe for the server: ") + std::strerror(errno));
-  const FileHandle its_end(ends[0]);
-  stdin_ = FileHandle(ends[1]);
+  const FileHandle its_end = stdin_.open();
+  if (!its_end) throw LaunchError(std::string("no pipe for the server: ") + std::strerror(errno));
   if (!verbose) {
     const char* folder = std::getenv("TMPDIR");
     std::string name = std::string(folder && *folder ? folder : "/tmp") + "/ruedo-XXXXXX";
@@ -222,10 +220,14 @@ void ServerProcess::start(const std::vector<std::string>& command, bool verbose)
     posix_spawn_file_actions_adddup2(&actions, output_.get(), 2);
   }
   // A session of its own: Ctrl-C in a terminal reaches this process alone, which may still use the
-  // server.
+  // server. It awaits processes of its own, whatever this one does with those.
   posix_spawnattr_t attributes;
   posix_spawnattr_init(&attributes);
-  posix_spawnattr_setflags(&attributes, POSIX_SPAWN_SETSID);
+  posix_spawnattr_setflags(&attributes, POSIX_SPAWN_SETSID | POSIX_SPAWN_SETSIGDEF);
+  sigset_t usual;
+  sigemptyset(&usual);
+  sigaddset(&usual, SIGCHLD);
+  posix_spawnattr_setsigdefault(&attributes, &usual);
   std::vector<char*> arguments;
   for (const std::string& word : command) arguments.push_back(const_cast<char*>(word.c_str()));
   arguments.push_back(nullptr);
@@ -250,28 +252,38 @@ void ServerProcess::await_port(Duration timeout) {
 }
 
 bool ServerProcess::poll() {
-  if (!ended_ && pid_ > 0 && waitpid(pid_, &status_, WNOHANG) == pid_) ended_ = true;
-  return ended_ || pid_ <= 0;
+  if (ended_ || pid_ <= 0) return true;
+  int status = 0;
+  const pid_t found = waitpid(pid_, &status, WNOHANG);
+  if (found == pid_) status_ = status;
+  // Where SIGCHLD is ignored, or the program awaits whichever of its processes ends, it is gone.
+  ended_ = found == pid_ || (found < 0 && errno == ECHILD);
+  return ended_;
+}
+
+std::string ServerProcess::how() const {
+  if (!status_) return "exit code unknown";
+  return WIFEXITED(*status_) ? "exit code " + std::to_string(WEXITSTATUS(*status_))
+                             : "signal " + std::to_string(WTERMSIG(*status_));
 }
 
 std::optional<std::string> ServerProcess::ended() {
   std::lock_guard lock(mutex_);
   if (!poll()) return std::nullopt;
-  const std::string how = WIFEXITED(status_) ? "exit code " + std::to_string(WEXITSTATUS(status_))
-                                             : "signal " + std::to_string(WTERMSIG(status_));
   const std::string said = last_lines();
-  return "the server ended (" + how + "): " + (said.empty() ? "it said nothing" : said) + "\n(`" +
+  return "the server ended (" + how() + "): " + (said.empty() ? "it said nothing" : said) + "\n(`" +
          command_ + "`)";
 }
 
 void ServerProcess::end() {
   std::lock_guard lock(mutex_);
-  stdin_ = FileHandle();
+  stdin_.close();
   const auto deadline = std::chrono::steady_clock::now() + std::chrono::seconds(5);
   while (!poll()) {
     if (std::chrono::steady_clock::now() >= deadline) {
-      kill(pid_, SIGKILL);
-      waitpid(pid_, &status_, 0);
+      kill(pid_, SIGKILL);  // it has just been found running: the number is still its own
+      int status = 0;
+      if (waitpid(pid_, &status, 0) == pid_) status_ = status;
       ended_ = true;
     }
     std::this_thread::sleep_for(std::chrono::milliseconds(5));

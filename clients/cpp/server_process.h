@@ -14,6 +14,7 @@
 #include <vector>
 
 #include "core/file_handle.h"
+#include "forked.h"
 #include "ruedo/client.h"
 
 namespace ruedo::client {
@@ -35,15 +36,17 @@ class ServerProcess {
   void start(const std::vector<std::string>& command, bool verbose);
   void await_port(Duration timeout);
   bool poll();  // true when it has ended; with the mutex held
+  std::string how() const;
   std::string last_lines() const;
 
   std::string url_, command_;
   std::filesystem::path folder_;  // of the socket, and of a world's text; empty: not made
   std::mutex mutex_;
   pid_t pid_ = -1;
-  int status_ = 0;
+  std::optional<int> status_;  // nothing: it is not known
   bool ended_ = false;
-  FileHandle stdin_, output_, token_;  // token_: keeps the port (free_url)
+  ParentsPipe stdin_;
+  FileHandle output_, token_;  // token_: keeps the port (free_url)
 };
 
 }  // namespace ruedo::client

@@ -133,9 +133,10 @@ void Stepper::subscribe() {
     const std::string channel = wanted(i);
     if (channel.empty() || sources_.count(i)) continue;
     const auto index = static_cast<int32_t>(i);
-    sources_[i] = {channel,
-                   core_.bus().subscribe(channel, [this, index](const uint8_t* bytes, size_t size) {
-                     on_message(index, bytes, size);
+    sources_[i] = {channel, core_.bus().subscribe(channel, [self = core_.weak_from_this(), index](
+                                                               const uint8_t* bytes, size_t size) {
+                     if (const auto core = self.lock())
+                       core->stepper().on_message(index, bytes, size);
                    })};
   }
   std::lock_guard lock(mutex_);

@@ -110,8 +110,9 @@ struct MotionCore;
 /// Move-only.
 ///
 /// Once close() has returned, or the destructor, the callback is not called any more, and no call
-/// of it is under way (but for the one that closes it itself): what it refers to may go. What a
-/// callback throws is reported once on the terminal, and harms no other callback.
+/// of it is under way (but for the one that closes it itself): what it refers to may go. Where
+/// callbacks in several threads close each other, the last of them does not wait for the others.
+/// What a callback throws is reported once on the terminal, and harms no other callback.
 class [[nodiscard]] Subscription {
  public:
   Subscription() = default;  ///< Of nothing.

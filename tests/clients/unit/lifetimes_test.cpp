@@ -301,6 +301,64 @@ TEST_F(Lifetimes, TwoCallbacksMayCloseEachOthersSimulation) {
   }
 }
 
+TEST_F(Lifetimes, TwoCallbacksMayCloseEachOther) {
+  for (int round = 0; round < 20; ++round) {
+    const std::shared_ptr<FakeServer> servers[] = {std::make_shared<FakeServer>(),
+                                                   std::make_shared<FakeServer>()};
+    const Simulation sims[] = {simulation(servers[0]), simulation(servers[1])};
+    Subscription subscriptions[2];
+    std::promise<void> here[2], done[2];
+    for (const size_t me : {size_t{0}, size_t{1}}) {
+      subscriptions[me] = sims[me].robot("p3at").odometry().on_sample([&, me](const Odometry&) {
+        here[me].set_value();
+        here[1 - me].get_future().wait();
+        subscriptions[1 - me].close();
+        done[me].set_value();
+      });
+    }
+    for (const auto& one : servers) one->send_odometry("p3at", 1000, 1.0);
+    for (std::promise<void>& one : done) one.get_future().wait();
+  }
+}
+
+// The first line that anybody writes to it meanwhile.
+std::string first_line_of_stderr(const std::function<void()>& meanwhile) {
+  int ends[2];
+  const int before = dup(STDERR_FILENO);
+  EXPECT_EQ(pipe(ends), 0);
+  dup2(ends[1], STDERR_FILENO);
+  close(ends[1]);
+  meanwhile();
+  std::string line;
+  for (char c = 0; c != '\n' && read(ends[0], &c, 1) == 1;) line += c;
+  dup2(before, STDERR_FILENO);
+  close(before);
+  close(ends[0]);
+  return line;
+}
+
+TEST_F(Lifetimes, ACallbackThatDoesNotReturnIsNamed) {
+  for (const bool by_subscription : {true, false}) {
+    Simulation sim = simulation(server);
+    std::promise<void> here, go_on;
+    Subscription told = sim.robot("p3at").odometry().on_sample([&](const Odometry&) {
+      here.set_value();
+      go_on.get_future().wait();
+    });
+    server->send_odometry("p3at", 1000, 1.0);
+    here.get_future().wait();
+    std::future<void> closing;
+    EXPECT_EQ(first_line_of_stderr([&] {
+                closing = std::async(std::launch::async,
+                                     [&] { by_subscription ? told.close() : sim.close(); });
+              }),
+              "ruedo: a callback on p3at/odometry has not returned for 5 s: close() waits for "
+              "it\n");
+    go_on.set_value();
+    closing.get();
+  }
+}
+
 TEST_F(Lifetimes, ACallbackThatWaitsIsToldSoAtOnce) {
   const Simulation sim = simulation(server);
   const Robot robot = sim.robot("p3at");
@@ -536,6 +594,20 @@ TEST_F(Lifetimes, AFalseTimeOutlastsNoTick) {
   EXPECT_LT(utime, 60'000'000);
   sim.close();
   EXPECT_EQ(sleeping.get(), "");
+}
+
+TEST_F(Lifetimes, AFalseTypeOutlastsNoInfo) {
+  server->falsehood = 1;
+  const Simulation sim = simulation(server);
+  const auto odometry = sim.robot("p3at").odometry();
+  EXPECT_THROW((void)odometry.latest(kPatience), TypeMismatch);
+  server->falsehood = 0;
+  server->send_info();
+  server->await_delivery();
+  const Subscription told = odometry.on_sample([](const Odometry&) {});
+  server->send_odometry("p3at", 1000, 1.0);
+  EXPECT_EQ(odometry.latest(kPatience).x, 1.0);
+  EXPECT_EQ(sim.robot("p3at").odometry().latest(kPatience).x, 1.0);
 }
 
 TEST_F(Lifetimes, WhatALaterServerSaysOfAMotionIsUnknown) {
