@@ -3,6 +3,7 @@
 
 #include <chrono>
 #include <condition_variable>
+#include <cstdlib>
 #include <mutex>
 
 #include "forked.h"
@@ -31,6 +32,8 @@ EndUnderWay::EndUnderWay() {
   auto& all = of_this_process<Ends>();
   const std::lock_guard lock(all.mutex);
   ++all.under_way;
+  // Beside an exit() that waits, another thread may return from main(): each takes one of the two.
+  std::atexit(await_ends);
 }
 
 EndUnderWay::~EndUnderWay() {

@@ -204,8 +204,11 @@ TEST_F(Lifetimes, WhoLeavesInACallbackSaysSoUntilItIsAnswered) {
   EXPECT_EQ(count, 1);
 }
 
-// A program with one simulation, whose callback is called once the simulation has a session.
-[[noreturn]] void run_until(const std::shared_ptr<FakeServer>& server, bool steps,
+enum class Meanwhile { waits, sleeps, steps };
+
+// A program with one simulation that has a session, whose callback is called once; in the thread
+// that steps, where one does.
+[[noreturn]] void run_until(const std::shared_ptr<FakeServer>& server, Meanwhile meanwhile,
                             const std::function<void(std::optional<Simulation>&)>& callback) {
   static std::optional<Simulation> sim;
   auto& done = *new std::promise<void>;  // which outlives the end that a callback begins
@@ -214,14 +217,21 @@ TEST_F(Lifetimes, WhoLeavesInACallbackSaysSoUntilItIsAnswered) {
   sim->pause();
   sim->robot("p3at")
       .odometry()
-      .on_sample([callback, &done](const Odometry&) {
+      .on_sample([=, &done, me = std::this_thread::get_id()](const Odometry&) {
+        if (meanwhile == Meanwhile::steps && std::this_thread::get_id() != me) return;
         callback(sim);
         done.set_value();
       })
       .keep();
-  server->send_odometry("p3at", 1000, 0.0);
-  if (steps) sim->step(1);
-  done.get_future().wait();
+  std::thread([server] {
+    for (;; std::this_thread::sleep_for(1ms)) server->send_odometry("p3at", 1000, 0.0);
+  }).detach();
+  if (meanwhile == Meanwhile::steps) sim->step(1);
+  if (meanwhile == Meanwhile::sleeps) {
+    EXPECT_THROW(sim->sleep(kPatience), NoServer);
+  } else {
+    done.get_future().wait();
+  }
   std::exit(5);  // as a return from main()
 }
 
@@ -229,15 +239,17 @@ TEST_F(Lifetimes, ACallbackThatEndsTheProgramLeaves) {
   GTEST_FLAG_SET(death_test_style, "threadsafe");
   const auto exits = [](std::optional<Simulation>&) { std::exit(5); };
   server->lost_leaves = 2;
-  EXPECT_EXIT(run_until(server, false, exits), testing::ExitedWithCode(5), "a client has left");
-  EXPECT_EXIT(run_until(server, true, exits), testing::ExitedWithCode(5), "a client has left");
+  const testing::ExitedWithCode ended(5);
+  EXPECT_EXIT(run_until(server, Meanwhile::waits, exits), ended, "a client has left");
+  EXPECT_EXIT(run_until(server, Meanwhile::steps, exits), ended, "a client has left");
+  EXPECT_EXIT(run_until(server, Meanwhile::sleeps, exits), ended, "a client has left");
 }
 
 TEST_F(Lifetimes, AProgramThatReturnsAfterItsCallbackHasClosedLeaves) {
   GTEST_FLAG_SET(death_test_style, "threadsafe");
   server->lost_leaves = 2;
-  EXPECT_EXIT(run_until(server, false, [](auto& sim) { sim.reset(); }), testing::ExitedWithCode(5),
-              "a client has left");
+  EXPECT_EXIT(run_until(server, Meanwhile::waits, [](auto& sim) { sim.reset(); }),
+              testing::ExitedWithCode(5), "a client has left");
 }
 
 TEST_F(Lifetimes, ALeaveIsRepeatedAFewTimes) {
