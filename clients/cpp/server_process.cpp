@@ -178,6 +178,8 @@ ServerProcess::ServerProcess(const std::string& world, const LaunchOptions& opti
   std::vector<std::string> command{
       program, "run", options.text.empty() ? world : written(options.text),
       "--lcm", url_,  "--watch-stdin"};
+  // It goes with the server, even where this process is killed.
+  if (!folder_.empty()) command.insert(command.end(), {"--temporary", folder_});
   add_options(options, command);
   for (const std::string& word : command) command_ += (command_.empty() ? "" : " ") + word;
   try {

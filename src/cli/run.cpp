@@ -5,7 +5,9 @@
 #include <csignal>
 #include <cstdio>
 #include <cstdlib>
+#include <filesystem>
 #include <functional>
+#include <list>
 #include <system_error>
 #include <thread>
 
@@ -27,6 +29,7 @@
 #include "cli/sandboxed.h"
 #include "cli/signal_thread.h"
 #include "cli/view.h"
+#include "core/leftovers.h"
 #include "core/utf8.h"
 #include "engine/thread_limit.h"
 #include "log/ring.h"
@@ -50,6 +53,22 @@ void watch_stdin() {
     kill(getpid(), SIGTERM);
   }).detach();
 }
+
+// What was made for this run alone: who made it may have been killed by then.
+class Temporary {
+ public:
+  explicit Temporary(const std::string& path) : path_(path), leftover_(path) {}
+  ~Temporary() {
+    std::error_code gone_already;
+    std::filesystem::remove_all(path_, gone_already);
+  }
+  Temporary(const Temporary&) = delete;
+  Temporary& operator=(const Temporary&) = delete;
+
+ private:
+  const std::string path_;
+  const Leftover leftover_;
+};
 
 // False when it has no reader: a closed pipe, a terminal that is gone.
 bool is_printed(const std::function<void()>& print) {
@@ -187,6 +206,8 @@ int strict_check(const WorldArguments& world) {
 }  // namespace
 
 int run_world(const RunArguments& arguments) {
+  std::list<Temporary> temporary;
+  for (const std::string& path : arguments.temporary) temporary.emplace_back(path);
   run::RunOptions options = server_options(arguments);
   load_given_plugins();
   read_given_types();
@@ -388,6 +409,11 @@ void add_run(CLI::App& app, Action& chosen) {
                     "refuse to run if `ruedo check --strict` finds anything");
   command->add_flag("--watch-stdin", arguments->watch_stdin,
                     "end when standard input is closed: for programs that start a server");
+  command
+      ->add_option("--temporary", arguments->temporary,
+                   "remove this file or folder at the end: for programs that start a server")
+      ->type_name("PATH")
+      ->allow_extra_args(false);
   command->add_flag("--quiet", arguments->quiet,
                     "neither list the channels nor show progress on a terminal");
   add_sandbox_argument(*command, arguments->sandboxed);

@@ -22,6 +22,7 @@ struct RunArguments {
   std::vector<std::string> remaps, wait_for;
   std::string view;
   bool viewed = false;
+  std::vector<std::string> temporary;  // paths
   bool paused = false, quiet = false, strict = false, watch_stdin = false, sandboxed = false;
   int threads = 0;
   Ros2Arguments ros2;

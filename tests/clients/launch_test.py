@@ -3,6 +3,8 @@
 import os
 import signal
 import subprocess
+import sys
+import tempfile
 import time
 from pathlib import Path
 
@@ -58,6 +60,8 @@ def test_the_server_ends_with_its_client(language, end):
         client.send_signal(end)
         client.wait(PATIENCE)
         assert gone(url)
+        if language != "java":
+            assert not Path(url.removeprefix("unix://")).parent.exists()
     finally:
         client.kill()
         client.wait()
@@ -72,6 +76,23 @@ def test_the_terminals_signals_are_not_the_servers(language):
     finally:
         client.kill()
         client.wait()
+
+
+@pytest.mark.parametrize("end", ["", "os.kill(os.getpid(), 9)"])
+def test_a_worlds_text_goes_with_its_server(end):
+    program = (
+        f"import os, ruedo; print(ruedo.launch(text=open({HALL!r}).read()).url, flush=True); {end}"
+    )
+    with tempfile.TemporaryDirectory() as folder:  # of a short path, as sockets need it
+        done = subprocess.run(
+            [sys.executable, "-c", program],
+            env={**os.environ, "XDG_RUNTIME_DIR": folder, "TMPDIR": folder},
+            stdout=subprocess.PIPE,
+            text=True,
+            timeout=PATIENCE,
+        )
+        assert done.stdout.startswith(f"unix://{folder}/ruedo-")
+        assert gone(done.stdout.strip()) and not os.listdir(folder)
 
 
 def test_two_launches_do_not_meet(language):

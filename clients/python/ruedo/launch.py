@@ -97,6 +97,10 @@ def launch(
     program = find_ruedo()
     file, folder = _world_file(world, text)
     url, token = _address(url)
+    if folder:  # it goes with the server, even where this process is killed
+        options += ["--temporary", folder.name]
+    if isinstance(token, _Folder):
+        options += ["--temporary", token.path]
     server = _Server(
         [program, "run", file, "--lcm", url, "--watch-stdin", *options], token, verbose, folder
     )
