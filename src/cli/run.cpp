@@ -206,8 +206,7 @@ int strict_check(const WorldArguments& world) {
 }  // namespace
 
 int run_world(const RunArguments& arguments) {
-  std::list<Temporary> temporary;
-  for (const std::string& path : arguments.temporary) temporary.emplace_back(path);
+  const std::list<Temporary> temporary(arguments.temporary.begin(), arguments.temporary.end());
   run::RunOptions options = server_options(arguments);
   load_given_plugins();
   read_given_types();

@@ -97,10 +97,7 @@ def launch(
     program = find_ruedo()
     file, folder = _world_file(world, text)
     url, token = _address(url)
-    if folder:  # it goes with the server, even where this process is killed
-        options += ["--temporary", folder.name]
-    if isinstance(token, _Folder):
-        options += ["--temporary", token.path]
+    options += _temporary(folder, token)
     server = _Server(
         [program, "run", file, "--lcm", url, "--watch-stdin", *options], token, verbose, folder
     )
@@ -153,6 +150,15 @@ def _address(url: str | None) -> tuple[str, socket.socket | _Folder | None]:
         return url, None
     folder = _Folder()
     return f"unix://{folder.path}/bus", folder
+
+
+def _temporary(
+    folder: tempfile.TemporaryDirectory[str] | None, token: socket.socket | _Folder | None
+) -> list[str]:
+    """Options: what goes with the server, even where this process is killed."""
+    folders = [folder.name] if folder else []
+    folders += [token.path] if isinstance(token, _Folder) else []
+    return [word for path in folders for word in ("--temporary", path)]
 
 
 def _free_port() -> int:
