@@ -410,8 +410,13 @@ void add_run(CLI::App& app, Action& chosen) {
                     "end when standard input is closed: for programs that start a server");
   command
       ->add_option("--temporary", arguments->temporary,
-                   "remove this file or folder at the end: for programs that start a server")
+                   "remove this file or folder, ruedo-*, at the end: for programs that start a "
+                   "server")
       ->type_name("PATH")
+      ->check([](const std::string& path) {
+        const bool is_ours = std::filesystem::path(path).filename().string().starts_with("ruedo-");
+        return is_ours ? "" : "its name begins with ruedo-";
+      })
       ->allow_extra_args(false);
   command->add_flag("--quiet", arguments->quiet,
                     "neither list the channels nor show progress on a terminal");

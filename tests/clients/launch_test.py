@@ -60,8 +60,7 @@ def test_the_server_ends_with_its_client(language, end):
         client.send_signal(end)
         client.wait(PATIENCE)
         assert gone(url)
-        if language != "java":
-            assert not Path(url.removeprefix("unix://")).parent.exists()
+        assert not Path(url.removeprefix("unix://")).parent.exists()
     finally:
         client.kill()
         client.wait()

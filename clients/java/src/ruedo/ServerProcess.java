@@ -48,14 +48,22 @@ final class ServerProcess {
         try {
             if (options.url.isEmpty()) url = privateUrl();
             else url = options.url.equals("auto") ? freeUrl() : options.url;
-            String file = options.text.isEmpty() ? world : written(options.text);
-            command = new ArrayList<>(List.of(program, "run", file, "--lcm", url, "--watch-stdin"));
+            String shown = options.text.isEmpty() ? world : written(options.text);
+            command =
+                    new ArrayList<>(List.of(program, "run", shown, "--lcm", url, "--watch-stdin"));
             command.addAll(optionsOf(options));
+            addTemporary(folder);
+            addTemporary(file);
             process = started(options.verbose);
             started = true;
         } finally {
             if (!started) cleanUp();
         }
+    }
+
+    /** It goes with the server, even where this process is killed. */
+    private void addTemporary(Path path) {
+        if (path != null) command.addAll(List.of("--temporary", path.toString()));
     }
 
     private Process started(boolean verbose) {
