@@ -7,6 +7,7 @@ by how it is written.
 
 from __future__ import annotations
 
+import errno
 import hashlib
 import os
 import re
@@ -24,6 +25,15 @@ def open_regular(path: str | os.PathLike[str]) -> BinaryIO:
         return open(file, "rb")
     os.close(file)
     raise OSError(f"{os.fspath(path)}: it is not a regular file")
+
+
+def open_lock(path: str | os.PathLike[str]) -> int:
+    """The descriptor of a regular file to be locked, made where there is none. Raises OSError."""
+    file = os.open(path, os.O_RDWR | os.O_CREAT | os.O_NONBLOCK | os.O_CLOEXEC, 0o666)
+    if stat.S_ISREG(os.fstat(file).st_mode):
+        return file
+    os.close(file)
+    raise OSError(errno.EINVAL, "it is not a regular file", os.fspath(path))
 
 
 def read_bytes(path: str | os.PathLike[str], most: int) -> bytes:

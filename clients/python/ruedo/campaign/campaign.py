@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from .. import _engine
-from ..files import MOST_YAML_BYTES, read_bytes
+from ..files import MOST_YAML_BYTES, open_lock, read_bytes, sha256_of
 from .cluster import run_on_ray
 from .errors import CampaignError, SpecError
 from .local import Done, cores, run_local
@@ -64,7 +64,7 @@ class Campaign:
         self.version = str(_engine.build)
         self._cases: list[Case] | None = None
         self.worlds = WorldFiles(self.folder, self.out / "worlds")
-        self._files: set[str] = set()  # that the cases are made from
+        self._files: dict[str, str] = {}  # that the cases are made from, with their hashes
 
     @property
     def content(self) -> dict[str, Any]:
@@ -125,7 +125,9 @@ class Campaign:
             known = store.known()
             missing = [case for case in cases if case.id not in known]
             sample = self._sampled()
+            files = Unchanged(self._files)
             for case, outcome, wall_s in self._outcomes(missing, workers, ray):
+                files.check()
                 keep = (
                     outcome["status"] != "passed"
                     if self._content.get("keep", {}).get("failures", True)
@@ -203,6 +205,34 @@ class Campaign:
         return run_local(cases, str(self.folder), count)
 
 
+class Unchanged:
+    """Whether files are what they were when the cases were made of them. What is in them is looked
+    at where somebody has touched them.
+    """
+
+    def __init__(self, files: dict[str, str]) -> None:
+        self._files = files
+        self._touched: dict[str, tuple[int, ...]] = {}
+
+    def check(self) -> None:
+        """Raises CampaignError: what was run since may be of either content."""
+        for file, sha256 in self._files.items():
+            try:
+                found = os.stat(file)
+                touched = (found.st_mtime_ns, found.st_ctime_ns, found.st_size, found.st_ino)
+                if touched == self._touched.get(file):
+                    continue
+                changed = sha256_of(file) != sha256
+            except OSError:
+                changed = True
+            if changed:
+                raise CampaignError(
+                    f"{file} was changed while its cases ran; what was run before is kept, "
+                    "`ruedo campaign resume` does the rest with what it is now"
+                )
+            self._touched[file] = touched
+
+
 class _lock:
     """One driver at a time; the kernel lets go of it when its holder ends, however that ends."""
 
@@ -210,14 +240,17 @@ class _lock:
         self._folder = folder
 
     def __enter__(self) -> None:
-        self._file = open(self._folder / "lock", "w")
+        try:
+            self._file = open_lock(self._folder / "lock")
+        except OSError as error:
+            raise CampaignError(f"{self._folder / 'lock'}: {error.strerror or error}") from None
         try:
             fcntl.flock(self._file, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except OSError:
-            self._file.close()
+            os.close(self._file)
             raise CampaignError(
                 f"{self._folder} is in use by another `ruedo campaign run`"
             ) from None
 
     def __exit__(self, *_: object) -> None:
-        self._file.close()
+        os.close(self._file)

@@ -13,7 +13,7 @@ import subprocess
 import tempfile
 import traceback
 from collections import OrderedDict
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
@@ -23,11 +23,13 @@ from ..decoding import decode
 from ..engine import Engine
 from ..launch import find_ruedo
 from ..logs import APPLIED_CHANNEL, HEADER_CHANNEL, STATE_HASH_CHANNEL
-from .controller import DONE, NothingYet, View, make_controller
-from .functions import Function
-from .processes import die_with_parent, end_descendants, ends_within, limit_memory
+from .controller import DONE, NothingYet, View, make_controller, velocity_of
+from .errors import CampaignError
+from .functions import Function, own_state
+from .output import Output, captured
+from .processes import die_with_parent, end_descendants, ends_within, forks_end, limit_memory
 
-_TAIL = 4000  # characters of a controller's output that are kept
+_ROOM = 64 << 10  # bytes that a disk must have left
 _ENGINES = 4  # that a worker keeps
 
 
@@ -75,26 +77,48 @@ class Runner:
         self._engines: OrderedDict[str, Engine] = OrderedDict()
 
     def run(self, what: dict[str, Any], full_log: str = "") -> Outcome:
-        """full_log: a file for all messages of the run; "": what acted on it is in the outcome."""
+        """full_log: a file for all messages of the run; "": what acted on it is in the outcome.
+        Raises CampaignError where the machine is at fault: a full disk.
+        """
         outcome = Outcome()
         everything = bool(full_log or what["metrics"] or "golden" in what["expect"])
-        with tempfile.TemporaryDirectory(
-            prefix=_scratch_name(os.getpid()), dir=_scratch(everything, what)
-        ) as scratch:
-            log = full_log or os.path.join(scratch, "run.lcm")
-            try:
-                if "python" in what["controller"]:
-                    with _captured(os.path.join(scratch, "output"), outcome):
-                        self._run_in_engine(what, log, everything, outcome)
-                else:
-                    self._run_command(what, log, scratch, outcome)
-                self._measure(what, log, outcome)
-            except Exception as error:
-                outcome.fail("invalid", "case", _line(error))
-            if os.path.exists(log):
-                outcome.log, outcome.state_hash = thinned(log)
+        try:
+            with tempfile.TemporaryDirectory(
+                prefix=_scratch_name(os.getpid()),
+                dir=_scratch(everything, what),
+                ignore_cleanup_errors=True,
+            ) as scratch:
+                log = full_log or os.path.join(scratch, "run.lcm")
+                self._run(what, log, everything, scratch, outcome)
+                if outcome.status != "passed":
+                    _check_room({scratch, os.path.dirname(log)})
+                if os.path.exists(log):
+                    outcome.log, outcome.state_hash = thinned(log)
+        except OSError as error:
+            raise CampaignError(
+                f"{error.filename or _scratch(everything, what) or tempfile.gettempdir()}: "
+                f"{error.strerror}; what was run so far is kept: make room, and resume"
+            ) from None
         outcome.time_s = outcome.metrics.get("time_s", 0.0)
         return outcome
+
+    def _run(
+        self, what: dict[str, Any], log: str, everything: bool, scratch: str, outcome: Outcome
+    ) -> None:
+        output = Output(os.path.join(scratch, "output"))
+        try:
+            with own_state(), captured(output):
+                if "python" in what["controller"]:
+                    self._run_in_engine(what, log, everything, outcome)
+                else:
+                    self._run_command(what, log, scratch, output, outcome)
+                self._measure(what, log, outcome)
+        except Exception as error:
+            outcome.fail("invalid", "case", _line(error))
+        finally:
+            end_descendants()
+            outcome.output = output.text()
+            output.close()
 
     # ---- In the engine.
 
@@ -129,12 +153,10 @@ class Runner:
                 outcome.fail(
                     "crashed", "controller", f"the controller ended with SystemExit: {error.code}"
                 )
-        except Exception as error:
-            outcome.fail(
-                "crashed",
-                "controller",
-                f"the controller raised {type(error).__name__}: {error}"[:300],
-            )
+        except KeyboardInterrupt:  # the worker is told to end
+            raise
+        except BaseException as error:
+            outcome.fail("crashed", "controller", f"the controller raised {named(error)}"[:300])
             traceback.print_exc()
         finally:
             verdict = engine.end_run()
@@ -144,23 +166,23 @@ class Runner:
         made = what["controller"]
         steps = max(1, round(1.0 / (made.get("hz", 10.0) * engine.dt)))
         last = round(what["limits"]["duration"] / engine.dt)
-        controller = make_controller(
-            Function(made["python"], self._folder).load(), what["parameters"]
-        )
+        with forks_end():
+            thing = Function(made["python"], self._folder).load()
+            controller = make_controller(thing, what["parameters"])
         view = View(engine, robot, what["parameters"], what["seed"])
         index = engine.robots.index(robot) if robot in engine.robots else -1
         commands = _no_commands(len(engine.robots))
         while engine.steps() < last:
             try:
-                answer = controller(view)
+                with forks_end():
+                    answer = controller(view)
             except NothingYet:
                 answer = None
             if isinstance(answer, str) and answer == DONE:
                 return
             commands[:] = float("nan")
             if answer is not None:
-                v, *sideways, omega = answer
-                commands[0, index] = v, sideways[0] if sideways else 0.0, omega
+                commands[0, index] = velocity_of(answer)
             try:
                 engine.step(commands if index >= 0 else None, min(steps, last - engine.steps()))
             except RuntimeError as error:
@@ -187,37 +209,35 @@ class Runner:
 
     # ---- With a server and a program.
 
-    def _run_command(self, what: dict[str, Any], log: str, scratch: str, outcome: Outcome) -> None:
+    def _run_command(
+        self, what: dict[str, Any], log: str, scratch: str, output: Output, outcome: Outcome
+    ) -> None:
         limits, made = what["limits"], what["controller"]
-        verdict_file, output_file = (
-            os.path.join(scratch, "verdict.json"),
-            os.path.join(scratch, "output"),
-        )
+        verdict_file = os.path.join(scratch, "verdict.json")
         environment = {
             **os.environ,
             "RUEDO_PARAMETERS": json.dumps(what["parameters"], sort_keys=True),
             "RUEDO_SEED": str(what["seed"]),
             **{k: str(v) for k, v in made.get("environment", {}).items()},
         }
-        with open(output_file, "wb") as output:
-            process = subprocess.Popen(
-                regress_command(what, log, verdict_file),
-                cwd=self._folder,
-                stdin=subprocess.DEVNULL,
-                stdout=output,
-                stderr=subprocess.STDOUT,
-                env=environment,
-                start_new_session=True,
-                preexec_fn=die_with_parent,
-            )
-            try:
-                code = process.wait() if ends_within(process.pid, limits["wall"]) else None
-            finally:
-                if process.poll() is None:
-                    os.killpg(process.pid, signal.SIGKILL)
-                    process.wait()
-                end_descendants()
-        outcome.output = _tail(output_file)
+        process = subprocess.Popen(
+            regress_command(what, log, verdict_file),
+            cwd=self._folder,
+            stdin=subprocess.DEVNULL,
+            stdout=output.descriptor,
+            stderr=subprocess.STDOUT,
+            env=environment,
+            start_new_session=True,
+            preexec_fn=die_with_parent,
+        )
+        try:
+            code = process.wait() if ends_within(process.pid, limits["wall"]) else None
+        finally:
+            if process.poll() is None:
+                os.killpg(process.pid, signal.SIGKILL)
+                process.wait()
+            end_descendants()
+        outcome.output = output.text()
         if os.path.exists(verdict_file):
             verdict = json.loads(Path(verdict_file).read_text())
             for fault in verdict["faults"]:
@@ -264,15 +284,14 @@ class Runner:
             self._compare_with_golden(what["expect"], log, outcome)
         for metric in what["metrics"]:
             try:
-                outcome.metrics[metric["name"]] = float(
-                    Function(metric["python"], self._folder).load()(log)
-                )
-            except (Exception, SystemExit) as error:
-                outcome.fail(
-                    "invalid",
-                    "metric",
-                    f"{metric['python']} raised {type(error).__name__}: {error}"[:300],
-                )
+                with forks_end():
+                    value = float(Function(metric["python"], self._folder).load()(log))
+                outcome.metrics[metric["name"]] = value
+            except KeyboardInterrupt:
+                raise
+            except BaseException as error:
+                said = f"{metric['python']} raised {named(error)}"
+                outcome.fail("invalid", "metric", said[:300])
 
     def _compare_with_golden(self, expect: dict[str, Any], log: str, outcome: Outcome) -> None:
         kept = log + ".kept"
@@ -431,14 +450,23 @@ def _no_commands(robots: int) -> Any:
     return np.full((1, robots, 3), np.nan)
 
 
+def named(error: BaseException) -> str:
+    """Its kind and what it says, if it can say anything."""
+    try:
+        return f"{type(error).__name__}: {error}"
+    except Exception:
+        return type(error).__name__
+
+
 def _line(error: BaseException) -> str:
     return (str(error).splitlines() or [type(error).__name__])[0][:300]
 
 
-def _tail(file: str) -> str:
-    with open(file, "rb") as stream:
-        stream.seek(max(0, os.path.getsize(file) - _TAIL))
-        return stream.read().decode(errors="replace")
+def _check_room(folders: Iterable[str]) -> None:
+    """Whatever went wrong with a case on a full disk is no fault of the case. Raises OSError."""
+    for folder in folders:
+        with tempfile.TemporaryFile(dir=folder) as file:
+            os.posix_fallocate(file.fileno(), 0, _ROOM)
 
 
 @contextmanager
@@ -453,22 +481,3 @@ def _time_limit(seconds: float) -> Iterator[None]:
     finally:
         signal.setitimer(signal.ITIMER_REAL, 0)
         signal.signal(signal.SIGALRM, before)
-
-
-@contextmanager
-def _captured(file: str, outcome: Outcome) -> Iterator[None]:
-    """What is printed, by Python or by a library, goes into the outcome."""
-    import sys
-
-    with open(file, "wb") as output:
-        sys.stdout.flush(), sys.stderr.flush()
-        kept = os.dup(1), os.dup(2)
-        os.dup2(output.fileno(), 1), os.dup2(output.fileno(), 2)
-        try:
-            yield
-        finally:
-            sys.stdout.flush(), sys.stderr.flush()
-            for number, copy in enumerate(kept, 1):
-                os.dup2(copy, number)
-                os.close(copy)
-    outcome.output = _tail(file)

@@ -280,12 +280,13 @@ def _show(arguments: argparse.Namespace) -> int:
 
 
 def _repeat(arguments: argparse.Namespace) -> int:
-    from .case import Runner
+    from .local import Apart
 
     campaign = _campaign(arguments)
     case = campaign.case(arguments.CASE)
     log = Path(arguments.output or f"{case.id}.lcm").resolve()
-    outcome = Runner(str(campaign.folder)).run(case.what, full_log=str(log))
+    with Apart(str(campaign.folder)) as apart:
+        outcome = apart.run(case.what, full_log=str(log))
     row = campaign.results().row(case)
     say(f"{outcome.status}{': ' + outcome.reason if outcome.reason else ''}")
     say(f"{log}: ruedo play {log} --view, ruedo verify {log}")

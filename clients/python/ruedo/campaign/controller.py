@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import inspect
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ..arguments import finite, shown
 from ..engine import Engine
 
 DONE = "done"
@@ -74,6 +75,17 @@ def _rows(engine: Engine, robot: str) -> dict[str, int]:
                 rows.setdefault(name, seen.get(name, 0))
             seen[name] = seen.get(name, 0) + 1
     return rows
+
+
+def velocity_of(answer: Any) -> tuple[float, float, float]:
+    """m/s ahead and to the left, rad/s. Raises what a wrong answer leads to."""
+    allowed = f"a controller answers (m/s, rad/s), (m/s, m/s to the left, rad/s), None or {DONE!r}"
+    if isinstance(answer, (str, bytes)) or not isinstance(answer, Iterable):
+        raise TypeError(f"{shown(answer)}: {allowed}")
+    given = [finite("a controller's velocity", one) for one in answer]
+    if not 2 <= len(given) <= 3:
+        raise ValueError(f"{shown(answer)}: {allowed}")
+    return given[0], given[1] if len(given) == 3 else 0.0, given[-1]
 
 
 def make_controller(thing: Any, parameters: dict[str, Any]) -> Callable[[View], Any]:

@@ -10,14 +10,16 @@ import sys
 import time
 from collections import deque
 from collections.abc import Iterable, Iterator
+from contextlib import suppress
 from multiprocessing.connection import Connection, wait
 from pathlib import Path
+from pickle import UnpicklingError
 from typing import Any
 
 from .case import Outcome, remove_scratch, too_slow
 from .errors import CampaignError
 from .plan import Case
-from .processes import kill_with_descendants
+from .processes import ends_within, kill_with_descendants
 
 _GRACE = 5.0  # s beyond a case's own limit, before its worker is killed
 _PARTING = 2.0  # s that a worker has to end what it has started
@@ -38,6 +40,7 @@ class Worker:
                 [sys.executable, "-m", "ruedo.campaign.worker", str(theirs.fileno()), folder],
                 pass_fds=[theirs.fileno()],
                 stdin=subprocess.DEVNULL,
+                start_new_session=True,  # what it leaves behind can be ended
                 env={**os.environ, "PYTHONPATH": path},
             )
         except OSError as error:
@@ -48,11 +51,11 @@ class Worker:
         self.tries = 0
         self._until = 0.0
 
-    def give(self, case: Case, tries: int = 1) -> None:
+    def give(self, case: Case, tries: int = 1, full_log: str = "") -> None:
         self.case, self.tries = case, tries
         self._until = time.monotonic() + case.what["limits"]["wall"] + _GRACE
         try:
-            self.pipe.send(case.what)
+            self.pipe.send((case.id, case.what, full_log))
         except OSError:
             pass  # it was killed while idle: its pipe is at its end
 
@@ -61,37 +64,71 @@ class Worker:
         return max(0.0, self._until - time.monotonic())
 
     def take(self) -> tuple[dict[str, Any], float] | None:
-        """The outcome, and how long it took; None: it is gone."""
+        """The outcome, and how long it took; None: it is gone, or not itself any more. Raises
+        CampaignError where its machine cannot run the case.
+        """
+        assert self.case is not None
         try:
-            answer: tuple[dict[str, Any], float] = self.pipe.recv()
-        except (EOFError, OSError):
+            case, outcome, wall_s = self.pipe.recv()
+        except (EOFError, OSError, UnpicklingError):
             return None
-        return answer
+        if isinstance(outcome, CampaignError):
+            self.case = None
+            raise outcome
+        return (outcome, wall_s) if case == self.case.id else None
 
     def tell_to_end(self) -> None:
-        if self._process.poll() is None:
-            self._process.terminate()
+        if self._process.returncode is None:
+            os.kill(self._process.pid, signal.SIGTERM)
 
     def end(self) -> int:
         """Its exit code. It ends what it has started; where it hangs, it is killed."""
         self.tell_to_end()
-        try:
-            code = self._process.wait(_PARTING)
-        except subprocess.TimeoutExpired:
-            kill_with_descendants(self._process.pid)
-            code = self._process.wait()
+        if self._process.returncode is None:
+            if not ends_within(self._process.pid, _PARTING):
+                kill_with_descendants(self._process.pid)
+            with suppress(ProcessLookupError):  # what a worker that died could not end
+                os.killpg(self._process.pid, signal.SIGKILL)
+        code = self._process.wait()
         self.pipe.close()
         remove_scratch(self._process.pid)
         return code
 
 
+class Apart:
+    """Runs one case after the other in a process of its own, as a campaign does: what a controller
+    does to its process, or that it hangs, ends its case alone.
+    """
+
+    def __init__(self, folder: str) -> None:
+        self._folder = folder
+        self._crew: list[Worker] = []
+
+    def __enter__(self) -> Apart:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        for one in self._crew:
+            one.end()
+
+    def run(self, what: dict[str, Any], full_log: str = "") -> Outcome:
+        """full_log: as of Runner.run()."""
+        case = Case(0, "apart", "", "", "", what["seed"], {}, what)
+        ((_, outcome, _),) = run_local([case], self._folder, 1, self._crew, full_log)
+        return Outcome(**outcome)
+
+
 def run_local(
-    cases: Iterable[Case], folder: str, workers: int, kept: list[Worker] | None = None
+    cases: Iterable[Case],
+    folder: str,
+    workers: int,
+    kept: list[Worker] | None = None,
+    full_log: str = "",
 ) -> Iterator[Done]:
     """Outcomes as they come. A case whose worker is killed is run once more, then it has failed.
 
     kept: workers that are there already, and stay; new ones that take their place stand in it
-    afterwards.
+    afterwards. full_log: of a single case, as of Runner.run().
     """
     waiting = deque((case, 1) for case in cases)
     crew: list[Worker] = [] if kept is None else kept
@@ -101,7 +138,7 @@ def run_local(
         while waiting or any(one.case for one in crew):
             for one in crew:
                 if one.case is None and waiting:
-                    one.give(*waiting.popleft())
+                    one.give(*waiting.popleft(), full_log)
             yield from _collect(crew, waiting, folder)
     finally:
         ending = crew if kept is None else []

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from ..launch import find_ruedo
-from .case import Runner
+from .local import Apart
 from .plan import Case
 
 _MOST_MB = 5  # of a page
@@ -37,7 +37,8 @@ def _make_page(campaign: Any, case: Case, row: dict[str, Any], page: Path) -> st
     """ "" or why there is none."""
     with tempfile.TemporaryDirectory(prefix="ruedo-page-") as scratch:
         log = Path(scratch) / "run.lcm"
-        outcome = Runner(str(campaign.folder)).run(case.what, full_log=str(log))
+        with Apart(str(campaign.folder)) as apart:
+            outcome = apart.run(case.what, full_log=str(log))
         if not log.exists():
             return outcome.reason or "it left no log"
         if outcome.status != row["status"]:

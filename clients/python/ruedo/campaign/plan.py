@@ -366,12 +366,12 @@ class Planner:
         return made
 
     @property
-    def files(self) -> set[str]:
-        """All that the cases are made from."""
+    def files(self) -> dict[str, str]:
+        """All that the cases are made from, with their hashes."""
         return (
             self._worlds.files
-            | {str(self._folder / name) for name in self._hashes}
-            | {str(function.file) for function in self._functions.values()}
+            | {str(self._folder / name): sha256 for name, sha256 in self._hashes.items()}
+            | {str(function.file): function.sha256 for function in self._functions.values()}
         )
 
     def _case(

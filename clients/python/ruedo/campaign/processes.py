@@ -38,6 +38,17 @@ def end_descendants() -> None:
                 os.waitpid(child, 0)
 
 
+@contextmanager
+def forks_end() -> Iterator[None]:
+    """A child that is forked within ends with what is called there, not with what follows."""
+    process = os.getpid()
+    try:
+        yield
+    finally:
+        if os.getpid() != process:
+            os._exit(0)
+
+
 def ends_within(pid: int, seconds: float) -> bool:
     """Waits for a child. Popen.wait() with a timeout looks in intervals of up to 50 ms."""
     descriptor = os.pidfd_open(pid)

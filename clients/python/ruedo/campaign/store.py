@@ -194,6 +194,7 @@ class Store:
         try:
             self.log(id).parent.mkdir(exist_ok=True)
             part = self.log(id).with_suffix(".part")
+            part.unlink(missing_ok=True)  # whatever it is
             part.write_bytes(content)
             part.rename(self.log(id))
         except OSError as error:

@@ -1,5 +1,5 @@
 """A worker's process: python -m ruedo.campaign.worker FD FOLDER. Cases come in by the pipe,
-outcomes go out.
+outcomes go out, or what is wrong with the machine.
 """
 
 from __future__ import annotations
@@ -9,8 +9,10 @@ import sys
 import time
 from contextlib import suppress
 from multiprocessing.connection import Connection
+from typing import Any
 
 from .case import Runner
+from .errors import CampaignError
 from .processes import adopt_orphans, die_with_parent
 
 
@@ -23,12 +25,15 @@ def work(pipe: Connection, folder: str) -> None:
     runner = Runner(folder)
     while True:
         try:
-            what = pipe.recv()
+            case, what, full_log = pipe.recv()
         except (EOFError, OSError):
             return
         begin = time.monotonic()
-        outcome = runner.run(what)
-        pipe.send((outcome.as_dict(), time.monotonic() - begin))
+        try:
+            outcome: dict[str, Any] | CampaignError = runner.run(what, full_log).as_dict()
+        except CampaignError as error:
+            outcome = error
+        pipe.send((case, outcome, time.monotonic() - begin))
 
 
 def _end(*_: object) -> None:

@@ -12,7 +12,8 @@ from typing import Any
 
 from ..engine import Engine
 from ..files import read_bytes, sha256_of
-from .functions import Function
+from .functions import Function, own_state
+from .processes import forks_end
 
 # In time that grows with the text alone, whatever it is.
 _URI = re.compile(r"<uri>([^<]+)</uri>|filename=[\"']([^\"']+)[\"']")
@@ -27,7 +28,7 @@ class WorldFiles:
         self._made: dict[str, str] = {}
         self._hashed: dict[tuple[str, str], str] = {}
         self._read: dict[tuple[Any, ...], str] = {}
-        self.files: set[str] = set()  # all that were read
+        self.files: dict[str, str] = {}  # all that were read, with their hashes
 
     def find(self, name: str) -> str:
         """A file beside the campaign's, or the name of a world that comes with Ruedo."""
@@ -41,7 +42,8 @@ class WorldFiles:
         key = f"{generator.sha256}{generator.name}{sorted(parameters.items())!r}"
         if key not in self._made:
             try:
-                text = str(generator.load()(**parameters))
+                with own_state(), forks_end():
+                    text = str(generator.load()(**parameters))
             except (Exception, SystemExit) as error:
                 raise ValueError(
                     f"{generator.name}({_arguments(parameters)}) raised {type(error).__name__}: {error}"
@@ -76,11 +78,11 @@ class WorldFiles:
                 rest = [file for file in engine.files_read if not _same(file, world)]
             digest = hashlib.sha256()
             for file in rest:
-                digest.update(bytes.fromhex(sha256_of(file)))
+                self.files[file] = sha256_of(file)
+                digest.update(bytes.fromhex(self.files[file]))
             self._read[key] = digest.hexdigest()
-            self.files.update(rest)
         if own:
-            self.files.add(os.path.abspath(world))
+            self.files[os.path.abspath(world)] = own
         self._hashed[(world, model)] = hashlib.sha256((own + self._read[key]).encode()).hexdigest()
         return self._hashed[(world, model)]
 

@@ -15,8 +15,11 @@ from typing import Any
 
 import numpy as np
 
-from ..campaign.case import Runner, fault_text
+from ..campaign import Campaign, Case
+from ..campaign.case import fault_text, goals
 from ..campaign.errors import CampaignError, SpecError
+from ..campaign.local import Apart
+from ..campaign.store import Store
 from ..decoding import decode
 from ..engine import Engine
 from ..logs import APPLIED_CHANNEL, HEADER_CHANNEL, STATE_HASH_CHANNEL, Event, events
@@ -32,6 +35,7 @@ _PERIOD_S = 0.25  # between moments that are tried
 _AFTER_S = 3.0  # how long a branch goes on after the run failed
 _MOST = 80  # moments
 _HASHES_US = 1_000_000  # sim time between the states whose hash is in a log
+_Again = tuple[Apart, dict[str, Any]]  # what runs a campaign's case again, and its `what`
 
 
 @dataclass
@@ -192,17 +196,16 @@ def why(path: str, seeds: int = 5) -> Answer:
     if "touched" in answer.reason:
         answer.rescues = _rescues(recorded, answer.failed_s)
     others = [seed for seed in range(1, seeds + 2) if seed != recorded.seed][:seeds]
-    if others:
-        answer.seeds = _branches(recorded, case, answer.failed_s, others)
-    answer.changes = list(_changes(recorded, case, answer.failed_s, others))
+    with Apart(str(case[0].folder) if case else ".") as apart:
+        again = (apart, case[1].what) if case else None
+        if others:
+            answer.seeds = _branches(recorded, again, answer.failed_s, others)
+        answer.changes = list(_changes(recorded, again, answer.failed_s, others))
     return answer
 
 
-def _case_of(path: str) -> tuple[Any, Any] | None:
+def _case_of(path: str) -> tuple[Campaign, Case] | None:
     """The campaign and case of a log in a campaign's folder."""
-    from ..campaign import Campaign
-    from ..campaign.store import Store
-
     folder = Path(path).resolve().parent.parent
     if not (folder / "results.sqlite").is_file():
         return None
@@ -219,9 +222,7 @@ def _case_of(path: str) -> tuple[Any, Any] | None:
     return campaign, found[0]
 
 
-def _as_it_was(recorded: Recorded, case: tuple[Any, Any] | None) -> Answer:
-    from ..campaign.case import goals
-
+def _as_it_was(recorded: Recorded, case: tuple[Campaign, Case] | None) -> Answer:
     expect: dict[str, Any] = case[1].what["expect"] if case else {"no_contact": True}
     with recorded.engine() as engine:
         engine.begin_run(
@@ -273,7 +274,7 @@ def _rescues(recorded: Recorded, failed_s: float) -> dict[str, list[tuple[float,
 
 
 def _branches(
-    recorded: Recorded, case: tuple[Any, Any] | None, failed_s: float, seeds: list[int]
+    recorded: Recorded, case: _Again | None, failed_s: float, seeds: list[int]
 ) -> list[Branches]:
     """From moments on that lie 1, 2, 4, ... periods further back, until all seeds avoid it or the
     run is at its beginning; then between the last moment that one of them avoids it from and the
@@ -301,13 +302,12 @@ def _branches(
     return [found[period] for period in sorted(found, reverse=True)]
 
 
-def _controlled(case: tuple[Any, Any]) -> Callable[[dict[str, Any]], bool]:
+def _controlled(case: _Again) -> Callable[[dict[str, Any]], bool]:
     """Whether the case, its controller answering, passes with another fault."""
-    campaign, one = case
-    runner = Runner(str(campaign.folder))
+    apart, what = case
 
     def avoids(fault: dict[str, Any]) -> bool:
-        return runner.run({**one.what, "faults": [*one.what["faults"], fault]}).status == "passed"
+        return apart.run({**what, "faults": [*what["faults"], fault]}).status == "passed"
 
     return avoids
 
@@ -321,7 +321,7 @@ def _recorded_commands(recorded: Recorded) -> Callable[[dict[str, Any]], bool]:
 
 
 def _changes(
-    recorded: Recorded, case: tuple[Any, Any] | None, failed_s: float, seeds: list[int]
+    recorded: Recorded, case: _Again | None, failed_s: float, seeds: list[int]
 ) -> Iterator[tuple[str, bool, str]]:
     """Each alone; of a fault also the latest moment at which its end is soon enough. Of a
     campaign's case the controller answers to the change; of another log the commands stay as they
@@ -335,14 +335,13 @@ def _changes(
                 fault=[one for one in recorded.options["fault"] if one != fault],
             )
         return
-    campaign, one = case
-    runner = Runner(str(campaign.folder))
+    apart, what = case
 
     def tried(text: str, **changed: Any) -> tuple[str, bool, str]:
-        outcome = runner.run({**one.what, **changed})
+        outcome = apart.run({**what, **changed})
         return text, outcome.status == "passed", outcome.reason
 
-    faults = one.what["faults"]
+    faults = what["faults"]
     for i, fault in enumerate(faults):
         without = tried(f"without the fault {fault['kind']}", faults=faults[:i] + faults[i + 1 :])
         yield without
@@ -362,7 +361,7 @@ def _changes(
                 break
     for seed in seeds:
         yield tried(f"seed {seed}", seed=seed)
-    if one.what["noise"]:
+    if what["noise"]:
         yield tried("without noise", noise=False)
 
 

@@ -1,0 +1,73 @@
+"""What a case prints: a file that does not grow beyond all bounds, of which the end is kept."""
+
+from __future__ import annotations
+
+import os
+import sys
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+
+_TAIL = 4000  # bytes that are kept
+_MOST_BYTES = 1 << 20  # of the file, about
+_LOOK_S = 0.02  # between looks at its size
+_LEFT_OUT = f"(it printed more than {_MOST_BYTES >> 20} MB; this is the end)\n"
+
+
+class Output:
+    """Of a case. The file begins anew whenever it has become too large."""
+
+    def __init__(self, path: str) -> None:
+        flags = os.O_RDWR | os.O_CREAT | os.O_APPEND | os.O_CLOEXEC
+        self.descriptor = os.open(path, flags, 0o600)
+        self._before = b""  # the end of what was dropped
+        self._over = threading.Event()
+        self._watch = threading.Thread(target=self._bound, daemon=True)
+        self._watch.start()
+
+    def text(self) -> str:
+        """The end of what was printed so far."""
+        end = (self._before + self._end())[-_TAIL:].decode(errors="replace")
+        return (_LEFT_OUT if self._before else "") + end
+
+    def close(self) -> None:
+        self._over.set()
+        self._watch.join()
+        os.close(self.descriptor)
+
+    def _bound(self) -> None:
+        while not self._over.wait(_LOOK_S):
+            with suppress(MemoryError):  # of the controller's limit
+                if os.fstat(self.descriptor).st_size > _MOST_BYTES:
+                    self._before = self._end()
+                    os.ftruncate(self.descriptor, 0)
+
+    def _end(self) -> bytes:
+        size = os.fstat(self.descriptor).st_size
+        return os.pread(self.descriptor, _TAIL, max(0, size - _TAIL))
+
+
+@contextmanager
+def captured(output: Output) -> Iterator[None]:
+    """What is printed, by Python or by a library, goes there, whatever is done to the streams."""
+    streams = sys.stdout, sys.stderr
+    _flush(*streams)
+    kept = os.dup(1), os.dup(2)
+    for number in (1, 2):
+        os.dup2(output.descriptor, number)
+    ours = tuple(open(n, "w", errors="backslashreplace", closefd=False) for n in (1, 2))
+    sys.stdout, sys.stderr = ours
+    try:
+        yield
+    finally:
+        _flush(sys.stdout, sys.stderr, *ours)
+        sys.stdout, sys.stderr = streams
+        for number, copy in enumerate(kept, 1):
+            os.dup2(copy, number)
+            os.close(copy)
+
+
+def _flush(*streams: object) -> None:
+    for stream in streams:
+        with suppress(AttributeError, OSError, ValueError):  # None, full, closed
+            stream.flush()  # type: ignore[attr-defined]

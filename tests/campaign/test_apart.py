@@ -1,0 +1,315 @@
+"""Cases know nothing of each other: what one leaves in its process, on the disk or behind it is no
+part of the next one, nor of the campaign.
+"""
+
+import os
+import subprocess
+import sys
+
+import pytest
+from conftest import PATIENCE, RUEDO, results_in, ruedo, wait_for
+from ruedo.campaign import Campaign
+
+HEAD = "worlds: [arena]\ndisable: [p3at/camera, p3at/sonar_front, p3at/sonar_rear]\n"
+
+
+def campaign(folder, controllers, *more, limits="{duration: 1, wall: 300}", **files):
+    """c.yaml with these controllers, and FILE.py for each of `files`."""
+    for name, text in files.items():
+        (folder / f"{name}.py").write_text(text)
+    lines = "".join(f"  - {{name: {name}, {rest}}}\n" for name, rest in controllers.items())
+    text = f"{HEAD}controllers:\n{lines}" + "".join(f"{one}\n" for one in more)
+    (folder / "c.yaml").write_text(f"{text}limits: {limits}\n")
+    return Campaign(folder / "c.yaml")
+
+
+def rows(results):
+    return {case.controller: row for case, row in results.done}
+
+
+COUNTS = """
+import os
+count = 0
+def drive(view):
+    global count
+    count += 1
+    os.environ["COUNT"] = str(count)
+    os.chdir("/")
+    return 0.03 * count, 0.0
+"""
+
+
+def test_a_case_sees_nothing_of_the_one_before(tmp_path):
+    """Regression: the table depended on the number of workers."""
+    made = campaign(tmp_path, {"counts": 'python: "counts.py:drive"'}, "seeds: 3", counts=COUNTS)
+    ways = {row["metrics"]["path_m"] for _, row in made.run(workers=1).done}
+    assert len(ways) == 1 and ways.pop() > 0.0
+
+
+def test_controllers_of_two_folders_have_modules_of_the_same_names(tmp_path):
+    """Regression: each got those of whoever came first; and so did worlds' generators."""
+    for name, speed in (("old", 0.1), ("new", 0.4)):
+        (tmp_path / name).mkdir()
+        (tmp_path / name / "planner.py").write_text(f"SPEED = {speed}\n")
+        (tmp_path / name / "drive.py").write_text(
+            "import planner\n\ndef drive(view):\n    return planner.SPEED, 0.0\n"
+        )
+    python = {name: f'python: "{name}/drive.py:drive"' for name in ("old", "new")}
+    found = rows(campaign(tmp_path, python).run(workers=1))
+    # 1 s at v after a from rest: v - v^2 / (2 a) m, where a is 0.3 m/s^2; 0.4 is not reached.
+    assert found["old"]["metrics"]["path_m"] == pytest.approx(0.0833, abs=0.002)
+    assert found["new"]["metrics"]["path_m"] == pytest.approx(0.15, abs=0.002)
+
+
+FORKS = """
+import os, time
+def forks(view):
+    if os.fork() == 0:
+        raise RuntimeError("a child of another case's")
+    os.wait()
+    return "done"
+def stays(view):
+    if os.fork() == 0:
+        open("child", "w").write(str(os.getpid()))
+        while True:
+            time.sleep(1)
+    return "done"
+def stand(view):
+    return 0.0, 0.0
+"""
+
+
+def test_a_child_of_a_controller_has_no_part_in_the_campaign(tmp_path):
+    """Regressions: what became of it was stored for another case, and it outlived the campaign."""
+    names = {name: f'python: "forks.py:{name}"' for name in ("forks", "stays", "stand")}
+    found = rows(campaign(tmp_path, names, forks=FORKS).run(workers=1))
+    assert {name: row["status"] for name, row in found.items()} == dict.fromkeys(names, "passed")
+    assert found["stand"]["metrics"]["time_s"] == 1.0
+
+
+LEAVES = """
+import os, subprocess
+def leave(name):
+    child = subprocess.Popen(["sleep", "1000"], start_new_session=name != "dies")
+    open(name, "w").write(str(child.pid))
+def ends(view):
+    leave("ends")
+    return "done"
+def dies(view):
+    leave("dies")
+    os._exit(0)
+def measure(log):
+    leave("measure")
+    return 1.0
+"""
+
+
+def test_no_process_stays(tmp_path):
+    """Regression: those that Python controllers and metrics had started did."""
+    names = {name: f'python: "leaves.py:{name}"' for name in ("ends", "dies")}
+    made = campaign(tmp_path, names, leaves=LEAVES)
+    os.chdir(tmp_path)
+    found = rows(made.run(workers=1))
+    assert found["ends"]["status"] == "passed" and found["dies"]["status"] == "crashed"
+    metric = 'metrics: [{name: m, python: "leaves.py:measure"}]'
+    campaign(tmp_path, {"ends": names["ends"]}, metric).run(workers=1)
+    for name in ("ends", "dies", "measure"):
+        process = (tmp_path / name).read_text()
+        wait_for(lambda process=process: not os.path.exists(f"/proc/{process}"))
+
+
+def test_what_a_repeated_program_leaves_behind_is_ended(tmp_path):
+    """Regression: it was in a campaign alone."""
+    command = "echo $$ > child; exec sleep 1000"
+    (tmp_path / "leave.sh").write_text(command)
+    campaign(tmp_path, {"c": 'command: "setsid sh leave.sh & while ! test -s child; do :; done"'})
+    ruedo("campaign", "repeat", "c.yaml", "0", folder=tmp_path)
+    assert not os.path.exists(f"/proc/{(tmp_path / 'child').read_text().strip()}")
+
+
+EDITS = """
+import os
+def drive(view):
+    with open(FILE, "a") as file:
+        file.write("\\n")
+    return "done"
+"""
+
+
+@pytest.mark.parametrize("which", ["controller.py", "lib.py", "w.sdf"])
+def test_what_runs_while_its_file_is_edited_is_no_result(folder, which):
+    """Regression: it was stored as one of the file that had been there before."""
+    from ruedo import World
+
+    (folder / "w.sdf").write_text(str(World("w").robot("p3at")))
+    (folder / "lib.py").write_text("")
+    edits = EDITS.replace("FILE", repr(str(folder / which)))
+    (folder / "controller.py").write_text(edits)
+    campaign(folder, {"edits": 'python: "controller.py:drive", files: [lib.py]'}, "seeds: 2")
+    text = (folder / "c.yaml").read_text().replace("[arena]", "[{name: w, file: w.sdf}]")
+    (folder / "c.yaml").write_text(text)
+    said = ruedo("campaign", "run", "c.yaml", "--workers", "1", folder=folder, code=4).stderr
+    assert f"{which} was changed while its cases ran" in said and said.count("\n") == 1
+    assert results_in(folder / "c.campaign") == 0
+    (folder / "controller.py").write_text("def drive(view):\n    return 'done'\n")
+    ruedo("campaign", "resume", "c.yaml", folder=folder)
+
+
+STREAMS = """
+import os, sys
+def closes(view):
+    sys.stdout.close()
+    return "done"
+def none(view):
+    sys.stdout = sys.stderr = None
+    return "done"
+def closes_both(view):
+    os.close(1)
+    os.close(2)
+    return "done"
+def speaks(view):
+    print("here I am")
+    raise RuntimeError("and that was it")
+"""
+
+
+def test_streams_are_whole_for_the_next_case(tmp_path):
+    """Regression: all later cases of the worker were invalid, for good."""
+    names = [name for one in ("closes", "none", "closes_both") for name in (one, f"after_{one}")]
+    controllers = {
+        name: f'python: "streams.py:{"speaks" if "after" in name else name}", hz: {10 + i}'
+        for i, name in enumerate(names)
+    }
+    found = rows(campaign(tmp_path, controllers, streams=STREAMS).run(workers=1))
+    for name in names:
+        assert found[name]["status"] == ("crashed" if "after" in name else "passed"), found[name]
+        assert ("here I am" in found[name]["output"]) == ("after" in name)
+
+
+PRINTS = """
+def prints(view):
+    for _ in range(20_000):
+        print("x" * 1000)
+    print("the end")
+    raise RuntimeError
+"""
+
+
+@pytest.mark.parametrize("way", ["python", "command"])
+def test_output_is_bounded(tmp_path, way):
+    """Regression: half a GB a case, in memory."""
+    ways = {
+        "python": 'python: "prints.py:prints"',
+        "command": 'command: "head -c 20000000 /dev/zero; sleep 0.1; echo the end; exit 1", lockstep: 1',
+    }
+    made = campaign(tmp_path, {"prints": ways[way]}, prints=PRINTS)
+    (row,) = rows(made.run(workers=1)).values()
+    assert row["status"] == "crashed" and "the end" in row["output"]
+    assert "it printed more than 1 MB" in row["output"] and len(row["output"]) < 5000
+
+
+HOSTILE = """
+import os, time
+def exits(view):
+    os._exit(0)
+def stubborn(view):
+    while True:
+        try:
+            time.sleep(0.01)
+        except BaseException:
+            pass
+"""
+
+
+@pytest.mark.parametrize("name, status", [("exits", "crashed"), ("stubborn", "timeout")])
+def test_reports_and_repetitions_outlive_a_controller(tmp_path, name, status):
+    """Regressions: the program ended with it, silently and well; or hung for ever."""
+    campaign(
+        tmp_path,
+        {name: f'python: "hostile.py:{name}"'},
+        limits="{duration: 1, wall: 1}",
+        hostile=HOSTILE,
+    )
+    assert f"1 {status}" in ruedo("campaign", "run", "c.yaml", folder=tmp_path, code=1).stdout
+    done = ruedo("campaign", "report", "c.yaml", "-o", "r.html", folder=tmp_path)
+    assert done.stdout == "r.html\n" and "no page of case 0" in done.stderr
+    assert ruedo("campaign", "repeat", "c.yaml", "0", folder=tmp_path).stdout.startswith(status)
+
+
+@pytest.mark.parametrize("line", ["raise SystemExit(0)", "1 / 0"])
+def test_a_package_is_found_without_being_imported(tmp_path, line):
+    """Regression: `status` ended with it, silently and well."""
+    (tmp_path / "package").mkdir()
+    (tmp_path / "package/__init__.py").write_text(line + "\n")
+    (tmp_path / "package/sub.py").write_text("def drive(view):\n    return 'done'\n")
+    campaign(tmp_path, {"c": 'python: "package.sub:drive"'})
+    assert "0 of 1 cases" in ruedo("campaign", "status", "c.yaml", folder=tmp_path).stdout
+    assert "1 passed" in ruedo("campaign", "run", "c.yaml", folder=tmp_path).stdout
+
+
+def test_a_lock_that_is_no_file_is_not_waited_for(folder):
+    (folder / "out").mkdir()
+    os.mkfifo(folder / "out/lock")
+    said = ruedo("campaign", "run", "c.yaml", "--out", "out", folder=folder, code=4).stderr
+    assert said.endswith("out/lock: it is not a regular file\n")
+
+
+WRITES = """
+def drive(view):
+    return 0.3, 0.2
+def measure(log):
+    return 1.0
+"""
+
+
+@pytest.mark.parametrize("way", ["python", "command"])
+def test_a_full_temporary_folder_is_no_fault_of_the_controllers(tmp_path, way):
+    """Regression: it was stored as a crash, and never repeated."""
+    program = f"{sys.executable} -c 'import ruedo; ruedo.connect().step(1000)'"
+    ways = {
+        "python": 'python: "writes.py:drive"',
+        "command": f'command: "{program}", lockstep: 1',
+    }
+    metric = 'metrics: [{name: m, python: "writes.py:measure"}]'
+    limits = "{duration: 5, wall: 300}"
+    campaign(tmp_path, {"c": ways[way]}, metric, limits=limits, writes=WRITES)
+    (tmp_path / "full").mkdir()
+    namespace = ["unshare", "-m" if os.getuid() == 0 else "-rm", "sh", "-c"]
+    script = 'mount -t tmpfs -o size=100k none full && exec "$@"'
+    done = subprocess.run(
+        [*namespace, script, "sh", RUEDO, "campaign", "run", "c.yaml", "--workers", "1"],
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        timeout=PATIENCE,
+        env={**os.environ, "TMPDIR": str(tmp_path / "full")},
+    )
+    assert done.returncode == 4 and done.stderr.count("\n") == 1, (done.stdout, done.stderr)
+    assert done.stderr.endswith(
+        "No space left on device; what was run so far is kept: make room, and resume\n"
+    )
+    assert "1 of 1 cases: 1 passed" in ruedo("campaign", "resume", "c.yaml", folder=tmp_path).stdout
+
+
+ANSWERS = """
+def nan(view): return float("nan"), 0.0
+def inf(view): return float("inf"), 0.0
+def four(view): return 0.1, 0.2, 0.3, 0.4
+def one(view): return (0.1,)
+def text(view): return "12"
+def texts(view): return "1", "2"
+def three(view): return 0.1, 0.0, 0.2
+def nothing(view): return None
+"""
+
+
+def test_a_wrong_answer_is_the_controllers_failure(tmp_path):
+    """Regression: four numbers, texts and what is not finite passed."""
+    good = {"three", "nothing"}
+    names = good | {"nan", "inf", "four", "one", "text", "texts"}
+    controllers = {name: f'python: "answers.py:{name}"' for name in sorted(names)}
+    found = rows(campaign(tmp_path, controllers, answers=ANSWERS).run(workers=1))
+    for name, row in found.items():
+        assert row["status"] == ("passed" if name in good else "crashed"), row
+    assert "(0.1, 0.2, 0.3, 0.4): a controller answers (m/s, rad/s)" in found["four"]["reason"]
+    assert "velocity is inf: it must be a finite number" in found["inf"]["reason"]
