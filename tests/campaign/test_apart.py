@@ -70,7 +70,7 @@ def forks(view):
     return "done"
 def stays(view):
     if os.fork() == 0:
-        open("child", "w").write(str(os.getpid()))
+        open(__file__ + ".child", "w").write(str(os.getpid()))
         while True:
             time.sleep(1)
     return "done"
@@ -85,13 +85,17 @@ def test_a_child_of_a_controller_has_no_part_in_the_campaign(tmp_path):
     found = rows(campaign(tmp_path, names, forks=FORKS).run(workers=1))
     assert {name: row["status"] for name, row in found.items()} == dict.fromkeys(names, "passed")
     assert found["stand"]["metrics"]["time_s"] == 1.0
+    if (tmp_path / "forks.py.child").exists():  # it may be ended before it has begun
+        process = (tmp_path / "forks.py.child").read_text()
+        assert not process or not os.path.exists(f"/proc/{process}")
 
 
 LEAVES = """
 import os, subprocess
+from pathlib import Path
 def leave(name):
     child = subprocess.Popen(["sleep", "1000"], start_new_session=name != "dies")
-    open(name, "w").write(str(child.pid))
+    Path(__file__).with_name(name).write_text(str(child.pid))
 def ends(view):
     leave("ends")
     return "done"
@@ -108,7 +112,6 @@ def test_no_process_stays(tmp_path):
     """Regression: those that Python controllers and metrics had started did."""
     names = {name: f'python: "leaves.py:{name}"' for name in ("ends", "dies")}
     made = campaign(tmp_path, names, leaves=LEAVES)
-    os.chdir(tmp_path)
     found = rows(made.run(workers=1))
     assert found["ends"]["status"] == "passed" and found["dies"]["status"] == "crashed"
     metric = 'metrics: [{name: m, python: "leaves.py:measure"}]'

@@ -5,8 +5,10 @@
 import json
 import re
 import shlex
+import shutil
 import subprocess
 import sys
+from pathlib import Path
 
 import lcm
 import numpy as np
@@ -15,6 +17,7 @@ import yaml
 from conftest import PATIENCE, SOURCE, ruedo
 from ruedo import Engine, World
 from ruedo.hunt import Hunt
+from ruedo.hunt.obstacles import with_boxes
 from ruedo.hunt.regression import moved
 from ruedo.lcmtypes import move_command_t, state_hash_t
 
@@ -241,6 +244,11 @@ def test_a_kept_program_runs_in_its_folder_and_is_run_anew_when_it_changes(tmp_p
     aside = moved({"name": "mine", "command": command}, home, tmp_path / "kept")
     assert shlex.split(aside["command"]) == ["cd", "../lab's 1", "&&", *command.split()]
     assert aside["files"] == ["../lab's 1/drive.py"]
+    for python in ("drive.py:run", "drive:run"):
+        made = moved({"name": "mine", "python": python}, home, tmp_path / "kept")
+        assert made["python"] == "../lab's 1/drive.py:run"
+    made = moved({"name": "mine", "python": "json:dumps"}, home, tmp_path / "kept")
+    assert made["python"] == "json:dumps"
 
 
 def test_a_sound_controller_is_told_to_be_one(example):
@@ -281,3 +289,137 @@ def test_obstacles_are_few_in_the_end(example):
         sum(found.choices[f"obstacle{i}"] for i in range(3)) == 1
         and found.content["limits"]["duration"] < 6
     )
+
+
+BLIND = """
+def ahead(view):
+    return 0.5, 0.0
+def always(view):
+    raise RuntimeError("always")
+def careless(view):
+    if view.parameters["fault_rate"] > 0.5:
+        raise RuntimeError("too fast")
+    return 0.1, 0.0
+"""
+BOX = """<sdf version='1.9'><model name='box'><static>true</static><link name='link'>
+<collision name='c'><geometry><box><size>1 1 1</size></box></geometry></collision></link></model></sdf>"""
+INCLUDES = """<?xml version='1.0' encoding='ISO-8859-1'?>
+<sdf version='1.9'><world name='w'><!-- caf\xe9 </world> -->
+<include><uri>inc/box.sdf</uri><pose>2 0 0.5 0 0 0</pose></include>
+<include><uri>ground_plane</uri></include><include><uri>p3at</uri></include></world></sdf>
+<!-- was: </world> -->
+"""
+AWAY = {"most": 1, "area": [-6, -6, -5, -5]}  # where it never comes
+
+
+def blind(folder, name="ahead", text="", **hunt):
+    """hunt.yaml: in a world that includes a box ahead of the robot; `text` says what is other."""
+    (folder / "inc").mkdir(exist_ok=True)
+    (folder / "inc/box.sdf").write_text(BOX)
+    (folder / "w.sdf").write_bytes(INCLUDES.encode("latin-1"))
+    (folder / "blind.py").write_text(BLIND)
+    content = {
+        "worlds": ["w.sdf"],
+        "controllers": [{"name": "blind", "python": f"blind.py:{name}"}],
+        "disable": DISABLED,
+        "expect": {"no_contact": True},
+        "limits": {"duration": 8},
+        "hunt": hunt,
+        **yaml.safe_load(text or "{}"),
+    }
+    (folder / "hunt.yaml").write_text(yaml.safe_dump(content))
+    return folder
+
+
+@pytest.mark.parametrize("obstacles", [{}, {"obstacles": AWAY}], ids=["plain", "obstacles"])
+def test_what_a_world_includes_goes_with_it(tmp_path, obstacles):
+    """Regressions: a world with obstacles, and one that was kept, was without it: the kept test
+    passed at once.
+    """
+    folder = blind(tmp_path, **obstacles)
+    found = hunt(folder, "--cases", "4", "--shrink", "0", "--keep", "kept/box")
+    assert "touched box/link" in found["reason"] and found["kept"] == "kept/box"
+    assert (folder / "kept/box/inc/box.sdf").read_text() == BOX
+    shutil.rmtree(folder / "inc")
+    said = ruedo("campaign", "run", "kept/box/regression.yaml", folder=folder, code=1).stdout
+    assert "touched box/link" in said
+
+
+def test_what_is_kept_and_does_not_fail_again_is_told(tmp_path):
+    """And the find is not lost."""
+    folder = blind(tmp_path, "once")
+    (folder / "blind.py").write_text(
+        "from pathlib import Path\n\ndef once(view):\n    mark = Path(__file__ + '.ran')\n"
+        "    if not mark.exists():\n        mark.touch()\n        raise RuntimeError('once')\n"
+        "    return 'done'\n"
+    )
+    options = ("--cases", "1", "--shrink", "0", "--keep", "kept", "--workers", "1")
+    done = ruedo("hunt", "hunt.yaml", *options, folder=folder, code=4)
+    assert "kept: what was kept there does not fail as it did" in done.stderr
+    assert "RuntimeError: once" in done.stdout
+
+
+def test_obstacles_go_into_the_world_and_not_into_a_comment():
+    """Regression: into the last thing that looked like its end."""
+    text = with_boxes(INCLUDES.encode("latin-1"), [(1.0, 2.0, 0.5)])
+    assert text.replace(b"</world>", b"", 1).index(b"hunted_0") < text.index(b"</world></sdf>")
+    assert text.count(b"hunted_0") == 1 and text.endswith(
+        b"</model></world></sdf>\n<!-- was: </world> -->\n"
+    )
+    for wrong in (b"<sdf version='1.9'/>", b"<sdf><world/></sdf>", b"<sdf><world></sdf>"):
+        with pytest.raises(ValueError, match="obstacles"):
+            with_boxes(wrong, [])
+
+
+WRONG = [  # more of the file, its `hunt`, what the message says
+    ("worlds: [arena, empty]", {}, "worlds: has 2 members; a hunt has one"),
+    ("robots: ['p3at@1,2', 'p3at@2,2']", {}, "robots: has 2 members; a hunt has one"),
+    (
+        "controllers: [{name: a, python: 'blind.py:ahead'}, {name: b, python: 'blind.py:always'}]",
+        {},
+        "controllers: has 2 members; a hunt has one",
+    ),
+    ("parameters: {duration: {uniform: [1, 2]}}", {}, "parameters.duration: is what a hunt itself"),
+    ("parameters: {fault: [a, b]}", {}, "parameters.fault: is what a hunt itself chooses"),
+    ("parameters: {obstacle0_x: [1, 2]}", {}, "parameters.obstacle0_x: is what a hunt itself"),
+    ("", {"faults": [{"kind": "freze", "target": "lrf"}]}, r"faults\[0\]: .*did you mean 'freeze'"),
+    ("", {"faults": [{"kind": "freeze", "target": "lrff"}]}, r"faults\[0\]: .*no device 'lrff'"),
+    (
+        "",
+        {"faults": [{"kind": "freeze", "target": "lrf"}, {"kind": "freeze", "target": "{nope}"}]},
+        r"faults\[1\]: .*{nope} is no parameter",
+    ),
+    ("", {"obstacles": {"most": 1, "area": [-1e308, 0, 1e308, 0]}}, "area: is .*of at most 1e.06"),
+]
+
+
+@pytest.mark.parametrize("text, members, said", WRONG)
+def test_a_wrong_hunt_is_told_with_file_and_line(tmp_path, text, members, said):
+    """Regressions: tracebacks, hunts without end for what cannot be found, and parameters that
+    took the place of what the hunt chose.
+    """
+    folder = blind(tmp_path, text=text, **members)
+    done = ruedo("hunt", "hunt.yaml", "--cases", "2", folder=folder, code=3).stderr
+    assert done.count("\n") == 1 and re.search(rf"hunt.yaml:\d+: .*{said}", done), done
+
+
+def test_a_parameter_may_be_called_as_what_belongs_to_a_fault(tmp_path):
+    """Regression: its ends were left out, and it was not told."""
+    folder = blind(tmp_path, "careless", text="parameters: {fault_rate: {uniform: [0, 1]}}")
+    assert hunt(folder, "--cases", "4", "--shrink", "0")["choices"]["fault_rate"] == 1.0
+
+
+def test_by_hypothesis_the_last_case_may_be_the_find(tmp_path):
+    """Regression: it was asked again whether that fails, without a case left, and it was lost."""
+    folder = blind(tmp_path, "always")
+    found = hunt(folder, "--cases", "1", "--shrink", "0", "--by", "hypothesis")
+    assert found["found"] and "RuntimeError: always" in found["reason"]
+
+
+def test_obstacles_stand_in_a_world_of_ruedos_own(tmp_path):
+    """Regression: its name was taken for a file's."""
+    obstacles = {"most": 1, "area": [1, 0, 1, 0]}
+    made = Hunt(blind(tmp_path, text="worlds: [arena]", obstacles=obstacles) / "hunt.yaml")
+    case = made.case({**made.space.neutral(), "obstacle0": True})
+    text = Path(case.what["world"]["file"]).read_text()
+    assert "hunted_0" in text and "parcel" in text

@@ -429,6 +429,9 @@ DAMAGE = {
     "metric": "UPDATE results SET metrics = '{\"x\": \"y\"}'",
     "deep": "UPDATE results SET metrics = '" + "[" * 100_000 + "'",
     "track": "UPDATE results SET track = '[[1, 2]]'",
+    "name": r"""UPDATE results SET metrics = '{"\ud800": 1}'""",
+    "digits": "UPDATE results SET metrics = '{\"x\": 1" + "0" * 400 + "}'",
+    "far": "UPDATE results SET track = '[[1, 2, 1" + "0" * 400 + "]]'",
     "place": "UPDATE results SET track = '[[1, 2, NaN]]'",
     "id": "UPDATE results SET id = '../../' || substr(id, 7)",
     "bytes": "UPDATE results SET reason = x'ff'",
@@ -439,6 +442,20 @@ DAMAGE = {
     "trigger": "CREATE TRIGGER t AFTER INSERT ON about BEGIN DELETE FROM results; END",
     "table": "CREATE TABLE more (x)",
 }
+
+
+def test_numbers_at_the_end_of_all_numbers_are_reported(results):
+    """Regression: values that differ in their last bits, or by more than a number can say, had no
+    scale.
+    """
+    folder, _, run = results
+    run("""UPDATE results SET metrics = '{"a": 1.7e308, "b": 0.1}', track = '[[0, -1e308, 1e308]]';
+        UPDATE results SET metrics = '{"a": -1.7e308, "b": 0.10000000000000002}'
+        WHERE status = 'passed'""")
+    options = ("--out", "other", "--pages", "0", "-o", "far.html")
+    ruedo("campaign", "report", "c.yaml", *options, folder=folder)
+    assert "The worst runs" in (folder / "far.html").read_text()
+    assert Campaign(folder / "c.yaml", out=folder / "other").results().csv().count("1.7e+308") == 8
 
 
 @pytest.mark.parametrize("damage", DAMAGE)
@@ -540,3 +557,17 @@ def test_slurm(whole):
         env={**os.environ, "SLURM_ARRAY_TASK_ID": "2", "SLURM_CPUS_PER_TASK": "1"},
     )
     assert done.returncode == 0 and results_in(folder / "c.campaign.shard2") == 2
+
+
+def test_what_compares_with_no_results_is_told(whole):
+    folder, _ = whole
+    (folder / "empty").mkdir(exist_ok=True)
+    done = ruedo("campaign", "compare", "c.yaml", "empty", folder=folder, code=3)
+    assert done.stderr == "ruedo: empty holds no results of a campaign (no results.sqlite)\n"
+
+
+def test_a_control_character_in_a_parameter_is_no_part_of_xml(folder):
+    text = CAMPAIGN.replace("bold: [false, true]", 'bold: ["\\a"]')
+    (folder / "c.yaml").write_text(text)
+    ruedo("campaign", "run", "c.yaml", "--quiet", "--junit", "r.xml", folder=folder, code=1)
+    assert len(ElementTree.parse(folder / "r.xml").getroot()) == 4

@@ -1,5 +1,6 @@
 """What a campaign file may contain, how it is expanded, and how errors in it are reported."""
 
+import json
 import math
 import os
 import subprocess
@@ -166,6 +167,31 @@ WRONG = [  # what is replaced, by what, line, what the message says
     ("controller.py:ahead", "controller", 6, "it looks like FILE.py:NAME"),
     ("world.py:walls", "world.py:wall", 4, "world.py has no wall"),
     ("disable: [p3at/camera", "disable: [p3at/camera]]", 11, "no YAML"),
+    ("seeds: 2", "noise: !!bool foo", 10, "'foo' is no bool"),
+    ("seeds: 2", "seeds: !!int ''", 10, "'' is no int"),
+    ("seeds: 2", "seeds: !!int '-'", 10, "'-' is no int"),
+    ("seeds: 2", "seeds: !!float ''", 10, "'' is no float"),
+    ("seeds: 2", "seeds: !!timestamp foo", 10, "'foo' is no timestamp"),
+    ("seeds: 2", "seeds: 0x" + "F" * 5000, 10, "a number of thousands of digits"),
+    ("name: walls\nworlds", "name: 0x" + "F" * 5000 + "\nworlds", 2, "a number of thousands"),
+    (
+        "name: walls\nworlds",
+        'name: "ab\\n"\nworlds',
+        2,
+        "name: is 'ab.*; allowed is 1 to 63 letters",
+    ),
+    ("seeds: 2", "seeds: 2\nname: \x1b", 11, r"no YAML: it holds .*1b"),
+    ("name: ahead", "name: ahead, each: '.'", 6, "each: is '.', and no file is called so"),
+    ("name: ahead", f"name: ahead, each: {'a' * 5000}", 6, "and no file is called so"),
+    ("no_contact: true", 'golden: "\\0"', 12, "golden: is .*, which holds the character 0"),
+    (
+        "distance: [1.2, 3.0]",
+        "distance: {grid: {from: -1.0e+308, to: 1.0e+308, steps: 2}}",
+        8,
+        "too far from each",
+    ),
+    ("distance: [1.2, 3.0]", "distance: {normal: [1.0e+308, 1.0e+308]}", 8, "that is too large"),
+    ("limits: {duration: 3}", "limits: {duration: 1.0e-9}", 13, "is 1e-09; allowed is 0.001 or"),
     ("seeds: 2", "seeds: 2\nseeds: 3", 11, "'seeds' is there twice"),
     (
         "python: \"controller.py:ahead\"",
@@ -357,3 +383,65 @@ def test_intervals_and_tests_of_counts():
     assert change == pytest.approx(8 / 60) and low < change < high
     other, low2, high2 = paired_difference(40, 10, 2, 8)
     assert (other, low2, high2) == pytest.approx((-change, -high, -low))
+
+
+@pytest.mark.parametrize("shard", ["9" * 5000 + "/" + "9" * 5000, "0/2", "3/2", "1/2/3"], ids=len)
+def test_a_wrong_shard_is_told(folder, shard):
+    said = ruedo("campaign", "run", "c.yaml", "--shard", shard, folder=folder, code=3).stderr
+    assert said.count("\n") == 1 and "it looks like I/N" in said
+
+
+def test_a_file_whose_name_is_no_text_is_told(folder):
+    """Regression: it came to light when the results were written, and they were not."""
+    (folder / os.fsdecode(b"stud\xffent.py")).write_text("def ahead(view):\n    return 'done'\n")
+    text = CAMPAIGN.replace("name: ahead", "name: ahead, each: 'stud*.py'")
+    (folder / "c.yaml").write_text(text.replace("controller.py:ahead", "{file}:ahead"))
+    said = ruedo("campaign", "run", "c.yaml", folder=folder, code=3).stderr
+    assert said.count("\n") == 1 and "c.yaml:6: " in said and "no UTF-8: rename it" in said
+
+
+@pytest.mark.parametrize(
+    "command, name",
+    [
+        ("python3 '{file}'", "Maria Lopez.py"),
+        ("cd students && python3 \"$(basename '{file}')\"", "a.py"),
+        ("(python3 students/a.py)", "a.py"),
+        ("python3 students/a.py; true", "a.py"),
+    ],
+)
+def test_a_program_is_run_again_when_it_changes(folder, command, name):
+    """Regression: where its name was not a plain word of the command, it was not."""
+    (folder / "students").mkdir()
+    program = folder / "students" / name
+    program.write_text("")
+    one = f"name: s, each: 'students/*.py', command: {json.dumps(command)}"
+    if "{file}" not in command:
+        one = f"name: s, command: {json.dumps(command)}"
+    text = CAMPAIGN.replace('name: ahead, python: "controller.py:ahead"', one)
+    (folder / "c.yaml").write_text(text)
+    before = {case.id for case in Campaign(folder / "c.yaml").cases}
+    program.write_text("pass\n")
+    assert not before & {case.id for case in Campaign(folder / "c.yaml").cases}
+
+
+def test_a_command_that_names_no_file_is_told(folder):
+    text = CAMPAIGN.replace('python: "controller.py:ahead"', 'command: "true", lockstep: 1')
+    (folder / "c.yaml").write_text(text)
+    said = ruedo("campaign", "run", "c.yaml", folder=folder).stderr
+    assert said.count("\n") == 1 and "controller ahead: no file of" in said and "`files`" in said
+
+
+def test_a_parameter_may_be_a_name_though_it_is_a_number(folder):
+    """Regression: a file, a program or a device called so was a traceback."""
+    (folder / "5").write_text("")
+    text = CAMPAIGN.replace("bold: [false, true]", "bold: [false]\n  g: [5]")
+    text = text.replace('python: "controller.py:ahead"', 'command: "{g}"')
+    text = text.replace("no_contact: true", "golden: '{g}'")
+    text = text.replace("disable: [p3at/camera,", "disable: ['p3at/{g}',")
+    (folder / "c.yaml").write_text(text)
+    what = Campaign(folder / "c.yaml").cases[0].what
+    assert (what["controller"]["command"], what["expect"]["golden"]) == ("5", "5")
+    assert what["disable"][0] == "p3at/5"
+    (folder / "c.yaml").write_text(text.replace('command: "{g}"', 'python: "{g}"'))
+    with pytest.raises(SpecError, match="c.yaml:6: .*is '5'; it looks like FILE.py:NAME"):
+        _ = Campaign(folder / "c.yaml").cases

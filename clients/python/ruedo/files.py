@@ -15,6 +15,7 @@ import stat
 from typing import Any, BinaryIO
 
 MOST_YAML_BYTES = 1 << 20
+_MOST_BITS = 14_000  # of a number, which Python can print
 MOST_YAML_VALUES = 100_000  # with each alias counted as what it stands for
 
 
@@ -80,6 +81,7 @@ def _values(node: Any, known: dict[int, int]) -> int:
         inner: list[Any] = []
         if isinstance(node, yaml.ScalarNode):
             _check_number(node)
+            _check_value(node)
         elif isinstance(node, yaml.MappingNode):
             inner = [part for pair in node.value for part in pair]
         elif isinstance(node, yaml.SequenceNode):
@@ -99,4 +101,23 @@ def _check_number(node: Any) -> None:
             problem=f"{node.value} is not the number that it looks like: write it in the decimal "
             "system, without a 0 before it, or in quotes as a text",
             problem_mark=node.start_mark,
+        )
+
+
+def _check_value(node: Any) -> None:
+    """A tag may stand before what it cannot be: `!!bool maybe`."""
+    import yaml
+
+    try:
+        value = yaml.constructor.SafeConstructor().construct_object(node)
+    except yaml.YAMLError:  # a tag that there is not, which is told when all is read
+        return
+    except Exception:  # whatever a constructor stumbles over
+        kind = node.tag.rpartition(":")[2]
+        raise yaml.MarkedYAMLError(
+            problem=f"{node.value[:40]!r} is no {kind}", problem_mark=node.start_mark
+        ) from None
+    if isinstance(value, int) and value.bit_length() > _MOST_BITS:
+        raise yaml.MarkedYAMLError(
+            problem="a number of thousands of digits", problem_mark=node.start_mark
         )

@@ -24,9 +24,11 @@ from typing import Any
 
 import pytest
 
+from .arguments import finite, numbers, texts
 from .errors import RuedoError
 from .launch import find_ruedo
 
+_PARTING_S = 10.0  # that a run has to end its client
 _PathLike = str | os.PathLike[str]
 
 
@@ -55,24 +57,39 @@ def _line(words: Sequence[_PathLike] | str | None) -> str | None:
 
 def _output_of(command: list[str], folder: _PathLike | None, timeout: float) -> str:
     __tracebackhide__ = True
+    process = subprocess.Popen(
+        command,
+        cwd=folder,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+        errors="replace",
+    )
     try:
-        done = subprocess.run(
-            command,
-            cwd=folder,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.STDOUT,
-            text=True,
-            timeout=timeout,
-        )
-    except subprocess.TimeoutExpired as error:
+        output, _ = process.communicate(timeout=timeout)
+    except subprocess.TimeoutExpired:
         raise RegressionFailed(
-            f"the regression took more than {timeout:g} s of real time; {shlex.join(command)}\n{error.output or ''}"
+            f"the regression took more than {timeout:g} s of real time; {shlex.join(command)}\n"
+            f"{_end(process)}"
         ) from None
-    if done.returncode != 0:
+    except BaseException:
+        _end(process)
+        raise
+    if process.returncode != 0:
         raise RegressionFailed(
-            f"{done.stdout}\n(exit code {done.returncode} of {shlex.join(command)})"
+            f"{output}\n(exit code {process.returncode} of {shlex.join(command)})"
         )
-    return done.stdout
+    return output
+
+
+def _end(process: subprocess.Popen[str]) -> str:
+    """Lets it end its client, too; what it has printed."""
+    process.terminate()
+    try:
+        return process.communicate(timeout=_PARTING_S)[0]
+    except subprocess.TimeoutExpired:
+        process.kill()
+        return process.communicate()[0]
 
 
 def run_regression(
@@ -110,6 +127,7 @@ def run_regression(
     __tracebackhide__ = True
     if goal is not None and (radius is None or by is None):
         raise ValueError("a goal needs its radius (m) and by (s)")
+    place = [] if goal is None else [*numbers("goal", goal, 2), radius, by]
     command = [
         find_ruedo(),
         "regress",
@@ -117,7 +135,7 @@ def run_regression(
         *_option("duration", duration),
         *_option("seed", seed),
         *_option("record", os.path.abspath(record)),
-        *(_option("goal", f"{goal[0]!r},{goal[1]!r},{radius!r},{by!r}") if goal else ()),
+        *(["--goal=" + ",".join(repr(finite("goal", one)) for one in place)] if place else ()),
         *_option("client", _line(client)),
         *_option("script", _line(script)),
         *_option("robot", robot),
@@ -125,12 +143,12 @@ def run_regression(
         *_option("odometry-error", odometry_error),
         *_option("lockstep", lockstep or None),
         *_option("golden", None if golden is None else os.path.abspath(golden)),
-        *_option("keep", *keep),
-        *_option("tolerance", *tolerances),
-        *_option("ignore", *ignore),
-        *_option("wait-for", *wait_for),
+        *_option("keep", *texts("keep", keep)),
+        *_option("tolerance", *texts("tolerances", tolerances)),
+        *_option("ignore", *texts("ignore", ignore)),
+        *_option("wait-for", *texts("wait_for", wait_for)),
         *(["--no-contact"] if no_contact else ()),
-        *options,
+        *texts("options", options),
     ]
     return Regression(Path(record).absolute(), _output_of(command, folder, timeout))
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import fcntl
+import glob
 import json
 import os
 from collections.abc import Callable, Iterable, Iterator
@@ -15,7 +16,7 @@ from .cluster import run_on_ray
 from .errors import CampaignError, SpecError
 from .local import Done, cores, run_local
 from .plan import Case, Planner, check_values, files_called, shard_of
-from .schema import Source, check, read_yaml
+from .schema import HALF, Source, check, read_yaml
 from .store import Results, Store
 from .worlds import WorldFiles
 
@@ -40,7 +41,7 @@ class Campaign:
         out: str | os.PathLike[str] | None = None,
     ) -> None:
         if isinstance(spec, dict):
-            self._source = Source("campaign")
+            self.source = Source("campaign")
             try:
                 self._content = json.loads(json.dumps(spec))
             except (TypeError, ValueError, RecursionError) as error:
@@ -54,11 +55,11 @@ class Campaign:
                 text = read_bytes(file, MOST_YAML_BYTES).decode()
             except (OSError, UnicodeDecodeError) as error:
                 raise SpecError(f"{file}: cannot be read: {error}") from None
-            self._content, self._source = read_yaml(str(file), text)
+            self._content, self.source = read_yaml(str(file), text)
             self.file, self.folder, stem = file.resolve(), file.resolve().parent, file.stem
-        check(self._content, self._source)
+        check(self._content, self.source)
         self._content["controllers"] = list(self._each_controller())
-        check_values(self._content, self._source)
+        check_values(self._content, self.source)
         self.name = str(self._content.get("name", stem))
         self.out = Path(out) if out else self.folder / f"{stem}.campaign"
         self.version = str(_engine.build)
@@ -79,7 +80,7 @@ class Campaign:
         if self._cases is None:
             planner = Planner(
                 self._content,
-                self._source,
+                self.source,
                 self.folder,
                 self.out / "worlds",
                 self.version,
@@ -179,14 +180,21 @@ class Campaign:
                 yield one
                 continue
             for file in files_called(
-                one["each"], self.folder, ("controllers", i, "each"), self._source
+                one["each"], self.folder, ("controllers", i, "each"), self.source
             ):
                 path = str(file.relative_to(self.folder))
+                if HALF.search(path):
+                    raise self.source.error(
+                        ("controllers", i, "each"),
+                        f"is {one['each']!r}, and the name of {path!r} is no UTF-8: rename it",
+                    )
                 made = {
                     key: value.replace("{file}", path) if isinstance(value, str) else value
                     for key, value in one.items()
                     if key != "each"
                 }
+                if "command" in made:  # however the command names it
+                    made["files"] = [*made.get("files", []), glob.escape(path)]
                 yield {**made, "name": file.stem}
 
     def _sampled(self) -> set[str]:

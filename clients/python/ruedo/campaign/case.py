@@ -165,7 +165,7 @@ class Runner:
     def _drive(self, engine: Engine, robot: str, what: dict[str, Any]) -> None:
         made = what["controller"]
         steps = max(1, round(1.0 / (made.get("hz", 10.0) * engine.dt)))
-        last = round(what["limits"]["duration"] / engine.dt)
+        last = max(1, round(what["limits"]["duration"] / engine.dt))
         with forks_end():
             thing = Function(made["python"], self._folder).load()
             controller = make_controller(thing, what["parameters"])

@@ -193,6 +193,8 @@ def _run(arguments: argparse.Namespace) -> int:
     from .progress import shown
 
     campaign = _campaign(arguments)
+    if not arguments.quiet:
+        _name_unknown_programs(campaign)
     with shown(campaign, arguments.shard, arguments.quiet or arguments.json) as progress:
         results = campaign.run(
             workers=arguments.workers, ray=arguments.ray, shard=arguments.shard, progress=progress
@@ -204,6 +206,18 @@ def _run(arguments: argparse.Namespace) -> int:
     else:
         _print_summary(campaign, results)
     return FAILED if results.failed else GOOD
+
+
+def _name_unknown_programs(campaign: Any) -> None:
+    """Nothing is run again when they change."""
+    made = {case.controller: case.what["controller"] for case in campaign.cases}
+    for name, one in made.items():
+        if "command" in one and not one["files"]:
+            say(
+                f"ruedo: controller {name}: no file of {campaign.folder} is found in its command, so "
+                "that it is not run again when its program changes: name that in `files`",
+                sys.stderr,
+            )
 
 
 def _summary(campaign: Any, results: Any) -> dict[str, Any]:

@@ -130,7 +130,7 @@ def results_of(folder: Path) -> Results:
     store = Store(folder, write=False)
     text = store.about("cases")
     if text is None:
-        raise CampaignError(f"{folder} holds no results of a campaign")
+        raise ResultsError(f"{folder} holds no results of a campaign")
     try:
         cases = [_remembered(one) for one in json.loads(text)]
     except (TypeError, ValueError, KeyError, RecursionError):

@@ -11,7 +11,9 @@ import math
 import os
 import random
 import re
+import shlex
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from statistics import NormalDist
@@ -36,6 +38,7 @@ METRICS = (
     *("time_s", "x_m", "y_m", "path_m", "goal_distance_m", "goal_time_s"),
     *("contact_time_s", "clearance_m", "odometry_error_m"),
 )
+_FARTHEST_M = 1e6  # of an obstacle
 _MOST_INTEGER = 2**63 - 1
 _TEXTS_OF_EXPECT = ("robot", "no_contact", "golden", "tolerances", "ignore")
 _TEXTS_OF_FAULT = ("robot", "kind", "target")
@@ -91,6 +94,11 @@ def substitute(value: Any, names: dict[str, Any], wrong: Callable[[str], Excepti
 
 def _text(value: Any) -> str:
     return str(value).lower() if isinstance(value, bool) else str(value)
+
+
+def _with_texts(members: dict[str, Any], names: tuple[str, ...]) -> dict[str, Any]:
+    """Those are texts, also where nothing but a parameter stands there, which may be a number."""
+    return {key: _text(value) if key in names else value for key, value in members.items()}
 
 
 def points(parameters: dict[str, Any], sampling: dict[str, Any]) -> list[dict[str, Any]]:
@@ -182,10 +190,11 @@ def check_values(content: dict[str, Any], source: Source) -> None:
         raise source.error(("seeds",), f"go beyond {MOST_SEED}, which is the last")
     if obstacles := content.get("hunt", {}).get("obstacles"):
         x1, y1, x2, y2 = obstacles["area"]
-        if not (x1 <= x2 and y1 <= y2):
+        if not (x1 <= x2 and y1 <= y2 and max(map(abs, obstacles["area"])) <= _FARTHEST_M):
             raise source.error(
                 ("hunt", "obstacles", "area"),
-                f"is {obstacles['area']}; allowed is [x1, y1, x2, y2], the least values first",
+                f"is {obstacles['area']}; allowed is [x1, y1, x2, y2], the least values first, "
+                f"of at most {_FARTHEST_M:g} m",
             )
         if "size" in obstacles and not 0 < obstacles["size"][0] <= obstacles["size"][1]:
             raise source.error(
@@ -243,6 +252,15 @@ def _check_parameter(name: str, given: Any, source: Source) -> None:
                 ("parameters", name, kind),
                 f"is {given[kind]}; they are too far from each other",
             )
+    if kind == "grid":
+        low, high, steps = (given[kind][key] for key in ("from", "to", "steps"))
+        if not math.isfinite((high - low) * max(steps - 1, 1)):
+            raise source.error(
+                ("parameters", name, kind),
+                f"goes from {low} to {high}; they are too far from each other",
+            )
+    if kind == "normal" and not math.isfinite(abs(given[kind][0]) + 10 * abs(given[kind][1])):
+        raise source.error(("parameters", name, kind), f"is {given[kind]}; that is too large")
     if kind == "normal" and given[kind][1] < 0:
         raise source.error(
             ("parameters", name, kind),
@@ -391,24 +409,20 @@ class Planner:
             return substitute(value, names, lambda text: self._source.error(path, text))
 
         content = self._content
-        expect = fill(("expect",), content.get("expect", {}))
-        _check_numbers(expect, _TEXTS_OF_EXPECT, ("expect",), self._source)
-        _check_expectations(expect, self._source)
-        if isinstance(expect.get("goal"), dict):
-            expect["goal"] = [expect["goal"]]
+        expect = self._expect(fill)
         faults = fill(("faults",), content.get("faults", []))
         _check_numbers(faults, _TEXTS_OF_FAULT, ("faults",), self._source)
         limits = content["limits"]
         what: dict[str, Any] = {
             "world": self._world(w, world, robot, fill, at, seed),
             "settings": fill(("set",), content.get("set", {})),
-            "disable": content.get("disable", []),
+            "disable": [_text(one) for one in fill(("disable",), content.get("disable", []))],
             "noise": content.get("noise", True),
             "seed": seed,
             "parameters": at,
             "controller": self._controller(c, asked, fill),
             "expect": expect,
-            "faults": faults,
+            "faults": [_with_texts(one, _TEXTS_OF_FAULT) for one in faults],
             "metrics": [
                 {**one, "sha256": self._function(("metrics", i, "python"), one["python"]).sha256}
                 for i, one in enumerate(content.get("metrics", []))
@@ -419,8 +433,6 @@ class Planner:
                 "memory_mb": limits.get("memory_mb", DEFAULT_MEMORY_MB),
             },
         }
-        if "golden" in expect:
-            expect["golden_sha256"] = self._sha256(("expect", "golden"), expect["golden"])
         digest = hashlib.sha256(canonical([self._version, _acting(what)])).hexdigest()[:16]
         return Case(
             number,
@@ -432,6 +444,17 @@ class Planner:
             at,
             what,
         )
+
+    def _expect(self, fill: Callable[..., Any]) -> dict[str, Any]:
+        expect = fill(("expect",), self._content.get("expect", {}))
+        _check_numbers(expect, _TEXTS_OF_EXPECT, ("expect",), self._source)
+        _check_expectations(expect, self._source)
+        if isinstance(expect.get("goal"), dict):
+            expect["goal"] = [expect["goal"]]
+        made = _with_texts(expect, ("robot", "golden"))
+        if "golden" in made:
+            made["golden_sha256"] = self._sha256(("expect", "golden"), made["golden"])
+        return made
 
     def _world(
         self,
@@ -468,6 +491,7 @@ class Planner:
             for key, value in asked.items()
             if key not in ("name", "files")
         }
+        made = _with_texts(made, ("command", "python"))
         files: dict[str, str] = {}
         for i, pattern in enumerate(asked.get("files", [])):
             found = files_called(pattern, self._folder, (*path, "files", i), self._source)
@@ -476,7 +500,7 @@ class Planner:
                 for one in found
             }
         if "command" in made:
-            for word in re.split(r"[\s'\"=]+", made["command"]):
+            for word in words_of(made["command"]):
                 if word and os.path.isfile(self._folder / word):  # or too long for a name
                     files[word] = self._sha256((*path, "command"), word)
         else:
@@ -503,11 +527,21 @@ class Planner:
         return self._hashes[name]
 
 
+def words_of(command: str) -> set[str]:
+    """Of a shell's line, as it stands there and with its quotes read."""
+    words = set(re.split(r"[\s'\"=]+", command))
+    reader = shlex.shlex(command, posix=True, punctuation_chars=True)
+    reader.whitespace_split, reader.commenters = True, ""
+    with suppress(ValueError):  # of a quote that does not end, the shell's matter
+        words.update(reader)
+    return words
+
+
 def files_called(pattern: str, folder: Path, path: tuple[Any, ...], source: Source) -> list[Path]:
     """Those in the folder that a member of the campaign means, at least one."""
     try:
         found = sorted(file for file in folder.glob(pattern) if file.is_file())
-    except (ValueError, NotImplementedError):  # "", "/etc/*"
+    except (ValueError, NotImplementedError, IndexError, OSError):  # "", "/etc/*", ".", "aaa..."
         found = []
     if not found:
         raise source.error(path, f"is {pattern!r}, and no file is called so in {folder}")
@@ -528,7 +562,7 @@ def _acting(what: dict[str, Any]) -> dict[str, Any]:
 
 def shard_of(cases: list[Case], shard: str) -> list[Case]:
     """I/N: every N-th case, from the I-th on (1 is the first)."""
-    match = re.fullmatch(r"(\d+)/(\d+)", shard)
+    match = re.fullmatch(r"([0-9]{1,9})/([0-9]{1,9})", shard)
     if not match or not 1 <= int(match.group(1)) <= int(match.group(2)):
         raise SpecError(f"--shard {shard}: it looks like I/N with I from 1 to N, for example 2/4")
     return cases[int(match.group(1)) - 1 :: int(match.group(2))]

@@ -13,6 +13,8 @@ from pathlib import Path
 from typing import Any
 from urllib.parse import quote
 
+import numpy as np
+
 from .compare import compare_with
 from .errors import missing
 from .pages import make_pages
@@ -22,6 +24,7 @@ from .store import Results
 
 _BINS = 8  # of a parameter with more values than that
 _WORST = 12  # runs that are drawn
+_FARTHEST_M = 1e9  # from the origin, of what is drawn
 _STYLE = """
 body { font: 15px/1.45 system-ui, sans-serif; color: #1d2330; background: #fff; max-width: 1080px; margin: 2em auto; padding: 0 1em }
 h1 { font-size: 1.5em } h2 { font-size: 1.15em; margin-top: 2.2em; border-bottom: 1px solid #d6dae3; padding-bottom: .2em }
@@ -97,7 +100,7 @@ def _by_parameter(results: Results) -> Iterable[str]:
 
 def _binned(name: str, values: list[Any]) -> Any:
     numbers = [one for one in values if isinstance(one, (int, float)) and not isinstance(one, bool)]
-    if len(set(numbers)) <= _BINS or len(numbers) < len(values):
+    if len(set(numbers)) <= _BINS or len(numbers) < len(values) or not _differ(numbers):
         return lambda case: case.parameters.get(name)
     low, high = min(numbers), max(numbers)
     width = (high - low) / _BINS
@@ -190,7 +193,7 @@ def _distributions(results: Results) -> Iterable[str]:
     for name in names:
         good = [value for value, row in _finite(name, results) if row["status"] == "passed"]
         bad = [value for value, row in _finite(name, results) if row["status"] != "passed"]
-        if len(set(good + bad)) < 2:
+        if not _differ(good + bad):
             continue
         figure = new_figure()
         axes = figure.add_subplot()
@@ -209,6 +212,12 @@ def _distributions(results: Results) -> Iterable[str]:
         yield f"<h2>Distributions</h2><div class='plots'>{''.join(plots)}</div>"
 
 
+def _differ(values: list[float]) -> bool:
+    """By more than their last bits, and by less than numbers can say: a scale can show it."""
+    low, high = min(values, default=0.0), max(values, default=0.0)
+    return math.isfinite(high - low) and high - low > 1e-9 * max(abs(low), abs(high))
+
+
 def _finite(name: str, results: Results) -> Iterator[tuple[float, dict[str, Any]]]:
     """A metric of the user's may be nan."""
     for _, row in results.done:
@@ -220,7 +229,7 @@ def _heat_map(results: Results) -> Iterable[str]:
     plots = []
     for world in dict.fromkeys(case.world for case in results.cases):
         places = [place_of_failure(row) for case, row in results.failed if case.world == world]
-        known = [one for one in places if one]
+        known = [one for one in places if one and max(map(abs, one)) < _FARTHEST_M]
         if not known:
             continue
         figure = new_figure(5.2, 3.6)
@@ -252,6 +261,7 @@ def _extent(results: Results, world: str) -> tuple[float, float, float, float]:
         for case, row in results.done
         if case.world == world
         for place in row["track"] or ()
+        if max(map(abs, place)) < _FARTHEST_M
     ]
     x, y = zip(*places)
     return min(x) - margin_m, max(x) + margin_m, min(y) - margin_m, max(y) + margin_m
@@ -309,11 +319,11 @@ def _path(case: Case, row: dict[str, Any]) -> str:
     figure = new_figure()
     axes = figure.add_subplot()
     if row["track"]:
-        _, x, y = zip(*row["track"])
+        _, x, y = np.clip(row["track"], -_FARTHEST_M, _FARTHEST_M).T
         axes.plot(x, y, color="#2c5f9e", linewidth=1.2)
         axes.plot(x[0], y[0], "o", color="#2c5f9e", markersize=4)
         place = place_of_failure(row)
-        if place:
+        if place and max(map(abs, place)) < _FARTHEST_M:
             axes.plot(*place, "x", color="#c23b22", markersize=7)
     for goal in case.what.get("expect", {}).get("goal", []):
         from matplotlib.patches import Circle

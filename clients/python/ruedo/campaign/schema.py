@@ -12,8 +12,8 @@ from ..arguments import MOST_SEED
 from ..files import parse_yaml
 from .errors import SpecError, missing
 
-_HALF = re.compile(r"[\ud800-\udfff]")  # what stands for what no file can hold
-_NAME = {"type": "string", "pattern": "^[A-Za-z0-9][A-Za-z0-9_.-]{0,62}$"}
+HALF = re.compile(r"[\ud800-\udfff]")  # what stands for what no file can hold
+_NAME = {"type": "string", "pattern": r"^[A-Za-z0-9][A-Za-z0-9_.-]{0,62}\Z"}
 _NUMBER = {"type": "number"}
 _SEED = {"type": "integer", "minimum": 0, "maximum": MOST_SEED}
 _COUNT = {"type": "integer", "minimum": 1, "maximum": 10**9}
@@ -155,7 +155,12 @@ SCHEMA: dict[str, Any] = _object(
         },
         "limits": _object(
             {
-                "duration": {"type": "number", "exclusiveMinimum": 0, "maximum": 1e6},
+                "duration": {
+                    "type": "number",
+                    "exclusiveMinimum": 0,
+                    "minimum": 1e-3,
+                    "maximum": 1e6,
+                },
                 "wall": {"type": "number", "exclusiveMinimum": 0, "maximum": 1e6},
                 "memory_mb": {"type": "integer", "minimum": 16, "maximum": 1 << 30},
             },
@@ -201,6 +206,10 @@ def read_yaml(path: str, text: str) -> tuple[Any, Source]:
     except yaml.MarkedYAMLError as error:
         line = f":{error.problem_mark.line + 1}" if error.problem_mark else ""
         raise SpecError(f"{path}{line}: no YAML: {error.problem or error.context}") from None
+    except yaml.reader.ReaderError as error:
+        at = text.count("\n", 0, error.position) + 1
+        wrong = text[error.position : error.position + 1]
+        raise SpecError(f"{path}:{at}: no YAML: it holds {wrong!r}") from None
     except yaml.YAMLError as error:
         raise SpecError(f"{path}: no YAML: {error}") from None
     lines: dict[tuple[Any, ...], int] = {}
@@ -253,8 +262,10 @@ def _check_plain(value: Any, source: Source, path: tuple[Any, ...]) -> None:
     """YAML has more than files: dates, sets, bytes, halves of characters, names that are no
     texts.
     """
-    if isinstance(value, str) and _HALF.search(value):
+    if isinstance(value, str) and HALF.search(value):
         raise source.error(path, f"is {_short(value)}, which holds half of a character")
+    if isinstance(value, str) and "\0" in value:
+        raise source.error(path, f"is {_short(value)}, which holds the character 0")
     if isinstance(value, dict):
         for key, one in value.items():
             if not isinstance(key, str):

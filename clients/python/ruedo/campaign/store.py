@@ -52,7 +52,7 @@ class Store:
         self.folder = folder
         self._file = folder / "results.sqlite"
         if not write and not self._file.is_file():
-            raise CampaignError(f"{folder} holds no results of a campaign (no results.sqlite)")
+            raise ResultsError(f"{folder} holds no results of a campaign (no results.sqlite)")
         try:
             folder.mkdir(parents=True, exist_ok=True)
             if self._file.exists():
@@ -155,14 +155,17 @@ class Store:
                 and all(isinstance(one[name], str) for name in _TEXTS)
                 and all(isinstance(one[name], (int, float)) for name in ("time_s", "wall_s"))
                 and isinstance(one["metrics"], dict)
-                and all(isinstance(value, (int, float)) for value in one["metrics"].values())
+                and all(
+                    name.encode() and isinstance(value, (int, float)) and _fits(value)
+                    for name, value in one["metrics"].items()
+                )
                 and all(
                     len(place) == 3
                     and all(isinstance(x, (int, float)) and math.isfinite(x) for x in place)
                     for place in one["track"]
                 )
             )
-        except (TypeError, ValueError, RecursionError):
+        except (TypeError, ValueError, OverflowError, RecursionError):
             good = False
         if not good:
             raise self._damaged(f"the result {row[0]!r:.40} is none")
@@ -299,15 +302,15 @@ class Results:
             test = ElementTree.SubElement(
                 suite,
                 "testcase",
-                classname=f"{case.world}.{case.controller}",
-                name=f"{case.number} seed={case.seed} {title}".strip(),
+                classname=_printable(f"{case.world}.{case.controller}"),
+                name=_printable(f"{case.number} seed={case.seed} {title}".strip()),
                 time=f"{row['wall_s']:.3f}",
             )
             if row["status"] != "passed":
                 failure = ElementTree.SubElement(
                     test,
                     "failure",
-                    type=f"{row['status']}: {row['what']}",
+                    type=_printable(f"{row['status']}: {row['what']}"),
                     message=_printable(row["reason"]),
                 )
                 failure.text = _printable(row["output"])
@@ -316,6 +319,11 @@ class Results:
             + ElementTree.tostring(suite, encoding="unicode")
             + "\n"
         )
+
+
+def _fits(value: float) -> bool:
+    """Raises OverflowError for a whole number beyond all others."""
+    return float(value) == value or value != value
 
 
 def _printable(text: str) -> str:

@@ -7,6 +7,7 @@ from __future__ import annotations
 import hashlib
 import os
 import re
+import shutil
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +18,7 @@ from .processes import forks_end
 
 # In time that grows with the text alone, whatever it is.
 _URI = re.compile(r"<uri>([^<]+)</uri>|filename=[\"']([^\"']+)[\"']")
-_MOST_BYTES = 64 << 20  # of a world's file
+MOST_WORLD_BYTES = 64 << 20  # of a world's file
 
 
 class WorldFiles:
@@ -28,6 +29,8 @@ class WorldFiles:
         self._made: dict[str, str] = {}
         self._hashed: dict[tuple[str, str], str] = {}
         self._read: dict[tuple[Any, ...], str] = {}
+        self._rest: dict[str, list[str]] = {}
+        self._read_with: dict[tuple[str, str], list[str]] = {}
         self.files: dict[str, str] = {}  # all that were read, with their hashes
 
     def find(self, name: str) -> str:
@@ -60,13 +63,13 @@ class WorldFiles:
 
         Worlds that refer to the same files are read once: what is not in the text does not change.
         """
-        model = spawn.rpartition("@")[0].partition(":")[0]
+        model = _model_of(spawn)
         known = self._hashed.get((world, model))
         if known:
             return known
         own = ""
         if os.path.isfile(world):
-            text = read_bytes(world, _MOST_BYTES)
+            text = read_bytes(world, MOST_WORLD_BYTES)
             own = hashlib.sha256(text).hexdigest()
             named = _URI.findall(text.decode(errors="replace"))
             uris = tuple(sorted({a.strip() or b for a, b in named}))
@@ -75,28 +78,71 @@ class WorldFiles:
             key = (world, model)
         if key not in self._read:
             with Engine(world, spawn=[spawn] if spawn else [], disable=()) as engine:
-                rest = [file for file in engine.files_read if not _same(file, world)]
+                read = engine.files_read
+            rest = [file for file in read if not _same(file, world)]
             digest = hashlib.sha256()
             for file in rest:
                 self.files[file] = sha256_of(file)
                 digest.update(bytes.fromhex(self.files[file]))
             self._read[key] = digest.hexdigest()
+            self._rest[self._read[key]] = rest
         if own:
             self.files[os.path.abspath(world)] = own
         self._hashed[(world, model)] = hashlib.sha256((own + self._read[key]).encode()).hexdigest()
+        self._read_with[(world, model)] = self._rest[self._read[key]]
         return self._hashed[(world, model)]
 
+    def read_with(self, world: str, spawn: str) -> list[str]:
+        """The other files that it was read from, and where Ruedo's own is only named, that one
+        first.
+        """
+        self.sha256(world, spawn)
+        return self._read_with[(world, _model_of(spawn))]
 
-def keep_text(text: str, store: Path) -> Path:
+
+def beside(world: str, files: list[str], folder: Path) -> tuple[Path, dict[str, Path]]:
+    """Of the files that a world refers to, those that have to go with it to another place: where
+    each of them is then, seen from there, and where the world's own folder is. Others, such as
+    Ruedo's own, are found from everywhere.
+    """
+    home = Path(os.path.realpath(world)).parent
+    roots = (home, Path(os.path.realpath(folder)))
+    real = {file: Path(os.path.realpath(file)) for file in files}
+    own = {
+        file: path
+        for file, path in real.items()
+        if os.path.isfile(world) and any(path.is_relative_to(root) for root in roots)
+    }
+    base = Path(os.path.commonpath([home, *(path.parent for path in own.values())]))
+    return home.relative_to(base), {file: path.relative_to(base) for file, path in own.items()}
+
+
+def copy_beside(places: dict[str, Path], folder: Path) -> None:
+    for file, place in places.items():
+        to = folder / place
+        if not to.exists():
+            to.parent.mkdir(parents=True, exist_ok=True)
+            part = to.with_name(f".{to.name}.{os.getpid()}")
+            shutil.copyfile(file, part)
+            part.rename(to)
+
+
+def keep_text(text: str | bytes, store: Path) -> Path:
     """A file of that text in the folder, named by its content; whole or not there."""
-    name = hashlib.sha256(text.encode()).hexdigest()[:16] + (".sdf" if "<sdf" in text else ".urdf")
+    content = text.encode() if isinstance(text, str) else text
+    ending = ".sdf" if b"<sdf" in content else ".urdf"
+    name = hashlib.sha256(content).hexdigest()[:16] + ending
     file = store / name
     if not file.exists():
         store.mkdir(parents=True, exist_ok=True)
         part = store / f".{name}.{os.getpid()}"
-        part.write_text(text, encoding="utf-8")
+        part.write_bytes(content)
         part.rename(file)
     return file.resolve()
+
+
+def _model_of(spawn: str) -> str:
+    return spawn.rpartition("@")[0].partition(":")[0]
 
 
 def _same(a: str, b: str) -> bool:

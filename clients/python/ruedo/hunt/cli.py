@@ -8,6 +8,7 @@ import sys
 from typing import TYPE_CHECKING, Any
 
 from ..campaign.cli import MOST_WORKERS, number, say
+from ..campaign.errors import CampaignError
 from ..campaign.plan import MOST_CASES
 
 if TYPE_CHECKING:
@@ -78,13 +79,15 @@ def _hunt(arguments: argparse.Namespace) -> int:
             else f"{hunt.name}: nothing was found in {arguments.cases} cases"
         )
         return 0
-    if arguments.keep:
-        found.keep(arguments.keep)
-    say(
-        _as_json(found, arguments.keep)
-        if arguments.json
-        else _as_text(found, hunt.name, arguments.keep)
-    )
+    kept, wrong = arguments.keep, None
+    if kept:
+        try:
+            found.keep(kept)
+        except CampaignError as error:  # the find itself is not lost
+            kept, wrong = None, error
+    say(_as_json(found, kept) if arguments.json else _as_text(found, hunt.name, kept))
+    if wrong:
+        raise wrong
     return 1
 
 

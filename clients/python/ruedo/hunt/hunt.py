@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -10,10 +11,14 @@ from typing import Any
 
 from ..campaign import Campaign
 from ..campaign.case import Outcome as OutcomeOfCase
+from ..campaign.case import fault_text
 from ..campaign.errors import CampaignError, SpecError
 from ..campaign.local import Worker, cores, run_local
 from ..campaign.plan import Case
-from ..campaign.worlds import keep_text
+from ..campaign.worlds import MOST_WORLD_BYTES, beside, copy_beside, keep_text
+from ..engine import Engine
+from ..files import read_bytes
+from .obstacles import Box, with_boxes
 from .regression import keep
 from .search import SEARCHES, breaks
 from .shrink import shrink
@@ -38,6 +43,7 @@ class Found:
     shrink_cases: int
     content: dict[str, Any]
     folder: Path
+    files: list[str]  # that its world refers to
 
     @property
     def status(self) -> str:
@@ -64,7 +70,8 @@ class Hunt:
         self.name = self._campaign.name
         self.content: dict[str, Any] = self._campaign.content
         self.folder = self._campaign.folder
-        self.space = Space(self.content)
+        self._check_members()
+        self.space = Space(self.content, self._campaign.source)
         self._store = self._campaign.out / "worlds"
 
     def run(
@@ -83,6 +90,8 @@ class Hunt:
         by: "optuna" (TPE, after the corners), "hypothesis" (its own draws, steered by target()), or
         "random" (uniform draws).
         """
+        self.case(self.space.neutral())  # raises SpecError
+        self._check_faults()
         count = invalid = found_after = 0
         first_invalid = ""
         with _Crew(str(self.folder), workers or cores()) as crew:
@@ -111,15 +120,35 @@ class Hunt:
             choices, outcome = hit
             searched = count
             choices, outcome = shrink(self.space, choices, outcome, evaluate, shrink_cases)
+            case = self.case(choices)
+            world = case.what["world"]
             return Found(
                 self.space.used(choices),
                 outcome,
-                self.case(choices),
+                case,
                 found_after,
                 count - searched,
                 self.content_of(choices),
                 self.folder,
+                self._campaign.worlds.read_with(world["file"], world["spawn"]),
             )
+
+    def _check_members(self) -> None:
+        for name in ("worlds", "controllers", "robots"):
+            count = len(self.content.get(name, [""]))
+            if count != 1:
+                raise self._campaign.source.error((name,), f"has {count} members; a hunt has one")
+
+    def _check_faults(self) -> None:
+        """Each that may be chosen is one of its robot; else the hunt would never find it."""
+        for i in range(len(self.space.faults)):
+            try:
+                what = self.case({**self.space.neutral(), "fault": str(i)}).what
+                world, spawn = what["world"]["file"], what["world"]["spawn"]
+                faults = [fault_text(one) for one in what["faults"]]
+                Engine(world, spawn=[spawn] if spawn else [], fault=faults).close()
+            except (SpecError, ValueError) as error:
+                raise self._campaign.source.error(("hunt", "faults", i), str(error)) from None
 
     def score(self, outcome: Outcome) -> float:
         """How well it went: below 0 it failed; else the smaller of the clearance (of 3 m) and what
@@ -159,7 +188,7 @@ class Hunt:
             content["worlds"] = [
                 {
                     "name": made.cases[0].world,
-                    "file": str(self._with_boxes(made.cases[0].what["world"]["file"], boxes)),
+                    "file": str(self._with_boxes(made.cases[0], boxes)),
                 }
             ]
             made = self._campaign_of(content)
@@ -178,18 +207,22 @@ class Hunt:
     def _campaign_of(self, content: dict[str, Any]) -> Campaign:
         made = Campaign(content, folder=self.folder, out=self._campaign.out)
         made.worlds = self._campaign.worlds  # what was read once is known
+        made.source = self._campaign.source
         return made
 
-    def _with_boxes(self, world: str, boxes: list[tuple[float, float, float]]) -> Path:
-        text = Path(world).read_text(encoding="utf-8")
-        models = "".join(
-            f"<model name='hunted_{i}'><static>true</static><pose>{x!r} {y!r} 0.5 0 0 0</pose><link name='link'>"
-            f"<collision name='c'><geometry><box><size>{side!r} {side!r} 1</size></box></geometry></collision>"
-            f"<visual name='v'><geometry><box><size>{side!r} {side!r} 1</size></box></geometry></visual></link></model>"
-            for i, (x, y, side) in enumerate(boxes)
-        )
-        before, end, after = text.rpartition("</world>")
-        return keep_text(before + models + end + after, self._store)
+    def _with_boxes(self, case: Case, boxes: list[Box]) -> Path:
+        """The world with them, beside copies of what it refers to."""
+        world = case.what["world"]
+        files = self._campaign.worlds.read_with(world["file"], world["spawn"])
+        file = world["file"] if os.path.isfile(world["file"]) else files[0]
+        home, places = beside(world["file"], files, self.folder)
+        store = self._store / world["sha256"][:16] if places else self._store
+        copy_beside(places, store)
+        try:
+            text = with_boxes(read_bytes(file, MOST_WORLD_BYTES), boxes)
+        except (ValueError, OSError) as error:
+            raise SpecError(f"{file}: {error}") from None
+        return keep_text(text, store / home)
 
 
 class _Crew:

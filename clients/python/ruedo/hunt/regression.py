@@ -6,8 +6,14 @@ import os
 import re
 import shlex
 import shutil
+import tempfile
 from pathlib import Path
 from typing import Any
+
+from ..campaign import Campaign
+from ..campaign.errors import CampaignError
+from ..campaign.worlds import beside, copy_beside
+from ..errors import for_terminal
 
 _PYTEST = '''# Found by `ruedo hunt`: {reason}
 
@@ -35,34 +41,68 @@ def keep(found: Any, folder: Path) -> Path:
 
     folder.mkdir(parents=True, exist_ok=True)
     name = re.sub(r"\W", "_", folder.name)
+    reason = for_terminal(found.reason)  # a stranger's words, in comments
     content = dict(found.content)
     world = found.case.what["world"]
     if os.path.isfile(world["file"]):
-        shutil.copyfile(world["file"], folder / "world.sdf")
-        content["worlds"] = [{"name": world["name"], "file": "world.sdf"}]
+        home, places = beside(world["file"], found.files, found.folder)
+        copy_beside(places, folder)
+        file = home / _new_name("world.sdf", {str(one) for one in places.values()}, home)
+        (folder / file.parent).mkdir(parents=True, exist_ok=True)
+        shutil.copyfile(world["file"], folder / file)
+        content["worlds"] = [{"name": world["name"], "file": str(file)}]
     content["controllers"] = [moved(one, found.folder, folder) for one in content["controllers"]]
+    if "metrics" in content:
+        content["metrics"] = [moved(one, found.folder, folder) for one in content["metrics"]]
+    if "golden" in content["expect"]:
+        golden = os.path.join(os.path.relpath(found.folder, folder), content["expect"]["golden"])
+        content["expect"] = {**content["expect"], "golden": golden}
     text = yaml.safe_dump(content, sort_keys=False, allow_unicode=True)
     (folder / "regression.yaml").write_text(
-        f"# Found by `ruedo hunt`: {found.reason}\n{text}", encoding="utf-8"
+        f"# Found by `ruedo hunt`: {reason}\n{text}", encoding="utf-8"
     )
     (folder / f"test_{name}.py").write_text(
-        _PYTEST.format(name=name, reason=found.reason),
+        _PYTEST.format(name=name, reason=reason),
         encoding="utf-8",
     )
     (folder / "CMakeLists.txt").write_text(
-        _CMAKE.format(name=name, folder=folder.name), encoding="utf-8"
+        _CMAKE.format(name=name, folder=for_terminal(folder.name)), encoding="utf-8"
     )
     (folder / "run.lcm").write_bytes(found.outcome["log"])
+    _check_that_it_fails(found, folder)
     return folder
 
 
+def _new_name(name: str, taken: set[str], home: Path) -> str:
+    while str(home / name) in taken:
+        name = f"hunted_{name}"
+    return name
+
+
+def _check_that_it_fails(found: Any, folder: Path) -> None:
+    """A test that passes at once would stand for a mended controller."""
+    with tempfile.TemporaryDirectory(prefix="ruedo-kept-") as out:
+        results = Campaign(folder / "regression.yaml", out=out).run(workers=1)
+    ((_, row),) = results.done
+    if (row["status"], row["what"]) != (found.outcome["status"], found.outcome["what"]):
+        raise CampaignError(
+            f"{folder}: what was kept there does not fail as it did ({found.reason}): "
+            f"it {row['status']} {row['reason']}".rstrip()
+        )
+
+
 def moved(controller: dict[str, Any], home: Path, folder: Path) -> dict[str, Any]:
-    """A controller for a campaign in that folder; its own files stay where they are: in `home`."""
+    """A controller or metric for a campaign in that folder; its own files stay where they are: in
+    `home`.
+    """
     made = dict(controller)
     way = os.path.relpath(home, folder)
     files = made.pop("files", [])
-    if ".py:" in made.get("python", ""):
-        made["python"] = os.path.join(way, made["python"])
+    module, _, name = made.get("python", "").partition(":")
+    if module and os.path.isfile(home / f"{module}.py"):
+        module += ".py"
+    if module.endswith(".py"):
+        made["python"] = os.path.join(way, f"{module}:{name}")
     if "command" in made:
         words = re.findall(r"[\w./-]+\.\w+", made["command"])
         files = [*files, *(word for word in words if os.path.isfile(home / word))]

@@ -7,7 +7,7 @@ import math
 from collections.abc import Callable, Iterator
 from typing import Any
 
-from .space import Choices, Dimension, Space
+from .space import Choices, Dimension, Space, is_idle
 
 Evaluate = Callable[[list[Choices]], list[tuple[dict[str, Any], float]]]
 
@@ -49,7 +49,7 @@ def shrink(
 def _simpler(one: Dimension, choices: Choices) -> Iterator[Any]:
     """Values that are simpler than what there is, the simplest first."""
     value = choices[one.name]
-    if value == one.simple or _is_idle(one, choices):
+    if value == one.simple or is_idle(one, choices):
         return
     yield one.simple
     if one.options or one.whole:
@@ -60,12 +60,6 @@ def _simpler(one: Dimension, choices: Choices) -> Iterator[Any]:
             yield rounded
         elif rounded == value:
             return
-
-
-def _is_idle(one: Dimension, choices: Choices) -> bool:
-    """Of an obstacle or fault that is not there."""
-    owner, part, _ = one.name.partition("_")
-    return bool(part) and owner in choices and not choices[owner]
 
 
 def _failed_at(outcome: dict[str, Any]) -> float | None:

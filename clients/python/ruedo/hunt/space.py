@@ -5,10 +5,11 @@ the seed.
 from __future__ import annotations
 
 import math
+import re
 from dataclasses import dataclass
 from typing import Any
 
-from ..campaign.errors import SpecError
+from ..campaign.schema import Source
 
 Choices = dict[str, Any]  # a value for each dimension
 
@@ -26,6 +27,8 @@ class Dimension:
     whole: bool = False
     log: bool = False
     options: tuple[Any, ...] = ()
+    owner: str = ""  # the obstacle or fault that it belongs to
+    alone: bool = True  # whether a case at its corner alone says anything
 
     def corners(self) -> list[Any]:
         """Where programs break: the ends, the simple value, nought."""
@@ -44,6 +47,9 @@ class Dimension:
             return self.low * (self.high / self.low) ** p
         return self.low + p * (self.high - self.low)
 
+
+# Names of a hunt's own choices, which no parameter may have.
+_TAKEN = re.compile(r"duration|fault(_at|_for|_value)?|obstacle\d+(_x|_y|_size)?")
 
 # Of the faults whose value a hunt chooses: from, to.
 _VALUES = {
@@ -67,12 +73,19 @@ _FIRST_MESSAGES_S = 1.0
 class Space:
     """content: of a checked campaign's file with its `hunt`."""
 
-    def __init__(self, content: dict[str, Any]) -> None:
+    def __init__(self, content: dict[str, Any], source: Source) -> None:
         asked = content.get("hunt", {})
         self.dimensions: list[Dimension] = []
         self.parameters = list(content.get("parameters", {}))
         for name, given in content.get("parameters", {}).items():
-            self.dimensions.append(_of_parameter(name, given))
+            if _TAKEN.fullmatch(name):
+                raise source.error(
+                    ("parameters", name), "is what a hunt itself chooses; give it another name"
+                )
+            try:
+                self.dimensions.append(_of_parameter(name, given))
+            except ValueError as error:
+                raise source.error(("parameters", name), str(error)) from None
         obstacles = asked.get("obstacles", {})
         self.obstacles: int = obstacles.get("most", 0)
         self.faults: list[dict[str, Any]] = asked.get("faults", [])
@@ -81,7 +94,8 @@ class Space:
             self._add_obstacles(obstacles)
         if self.faults:
             self._add_fault()
-        self.dimensions.append(Dimension("seed", 1, 1, asked.get("seeds", 1000), whole=True))
+        seeds = asked.get("seeds", 1000)
+        self.dimensions.append(Dimension("seed", 1, 1, seeds, whole=True, alone=False))
 
     def neutral(self) -> Choices:
         """The simplest case: no obstacle, no fault."""
@@ -91,19 +105,22 @@ class Space:
         x1, y1, x2, y2 = obstacles["area"]
         small, large = obstacles.get("size", [0.2, 0.6])
         for i in range(self.obstacles):
+            name = f"obstacle{i}"
+            part: dict[str, Any] = {"owner": name, "alone": False}
             self.dimensions += [
-                Dimension(f"obstacle{i}", False, options=(False, True)),
-                Dimension(f"obstacle{i}_x", (x1 + x2) / 2, x1, x2),
-                Dimension(f"obstacle{i}_y", (y1 + y2) / 2, y1, y2),
-                Dimension(f"obstacle{i}_size", small, small, large),
+                Dimension(name, False, options=(False, True), alone=False),
+                Dimension(f"{name}_x", (x1 + x2) / 2, x1, x2, **part),
+                Dimension(f"{name}_y", (y1 + y2) / 2, y1, y2, **part),
+                Dimension(f"{name}_size", small, small, large, **part),
             ]
 
     def _add_fault(self) -> None:
+        part: dict[str, Any] = {"owner": "fault", "alone": False}
         self.dimensions += [
             Dimension("fault", "", options=("", *map(str, range(len(self.faults))))),
-            Dimension("fault_at", 0.0, 0.0, self._duration),
-            Dimension("fault_for", self._duration, 0.1, self._duration),
-            Dimension("fault_value", 0.5, 0.0, 1.0),
+            Dimension("fault_at", 0.0, 0.0, self._duration, **part),
+            Dimension("fault_for", self._duration, 0.1, self._duration, **part),
+            Dimension("fault_value", 0.5, 0.0, 1.0, **part),
         ]
 
     def fault(self, choices: Choices) -> list[dict[str, Any]]:
@@ -134,13 +151,13 @@ class Space:
 
     def used(self, choices: Choices) -> Choices:
         """Without what belongs to an obstacle or fault that is not there."""
-        absent = [f"obstacle{i}_" for i in range(self.obstacles) if not choices[f"obstacle{i}"]]
-        absent += [] if choices.get("fault") else ["fault_"]
-        return {
-            name: value
-            for name, value in choices.items()
-            if not name.startswith(tuple(absent or ["\0"]))
-        }
+        absent = {one.name for one in self.dimensions if is_idle(one, choices)}
+        return {name: value for name, value in choices.items() if name not in absent}
+
+
+def is_idle(one: Dimension, choices: Choices) -> bool:
+    """Of an obstacle or fault that is not there."""
+    return bool(one.owner) and not choices[one.owner]
 
 
 def _of_parameter(name: str, given: Any) -> Dimension:
@@ -159,7 +176,7 @@ def _of_parameter(name: str, given: Any) -> Dimension:
         values if kind != "normal" else (values[0] - 3 * values[1], values[0] + 3 * values[1])
     )
     if not (math.isfinite(low) and math.isfinite(high)):
-        raise SpecError(f"parameters.{name}: a hunt needs its ends")
+        raise ValueError("has no ends, which a hunt needs")
     middle = math.sqrt(low * high) if kind == "log_uniform" else (low + high) / 2
     simple = 0.0 if low <= 0.0 <= high else min(max(_rounded(middle), low), high)
     if kind == "integers":
