@@ -178,6 +178,7 @@ PYTHON_CLIENT = "clients/python/ruedo"
 OTHERS_PRIVATE = {
     "_get_packed_fingerprint",  # of the classes that lcm-gen makes: it has no other name
     "_current_frames",  # of sys, documented under this name alone
+    "_exit",  # of os, likewise
 }
 
 

@@ -125,7 +125,8 @@ def test_what_a_repeated_program_leaves_behind_is_ended(tmp_path):
     """Regression: it was in a campaign alone."""
     command = "echo $$ > child; exec sleep 1000"
     (tmp_path / "leave.sh").write_text(command)
-    campaign(tmp_path, {"c": 'command: "setsid sh leave.sh & while ! test -s child; do :; done"'})
+    command = "setsid sh leave.sh & while ! test -s child; do :; done"
+    campaign(tmp_path, {"c": f'command: "{command}", lockstep: 1'})
     ruedo("campaign", "repeat", "c.yaml", "0", folder=tmp_path)
     assert not os.path.exists(f"/proc/{(tmp_path / 'child').read_text().strip()}")
 

@@ -70,10 +70,10 @@ def _output_of(command: list[str], folder: _PathLike | None, timeout: float) -> 
     except subprocess.TimeoutExpired:
         raise RegressionFailed(
             f"the regression took more than {timeout:g} s of real time; {shlex.join(command)}\n"
-            f"{_end(process)}"
+            f"{_stopped(process)}"
         ) from None
     except BaseException:
-        _end(process)
+        _stopped(process)
         raise
     if process.returncode != 0:
         raise RegressionFailed(
@@ -82,7 +82,7 @@ def _output_of(command: list[str], folder: _PathLike | None, timeout: float) -> 
     return output
 
 
-def _end(process: subprocess.Popen[str]) -> str:
+def _stopped(process: subprocess.Popen[str]) -> str:
     """Lets it end its client, too; what it has printed."""
     process.terminate()
     try:

@@ -27,7 +27,7 @@ class Output:
 
     def text(self) -> str:
         """The end of what was printed so far."""
-        end = (self._before + self._end())[-_TAIL:].decode(errors="replace")
+        end = (self._before + self._last())[-_TAIL:].decode(errors="replace")
         return (_LEFT_OUT if self._before else "") + end
 
     def close(self) -> None:
@@ -39,10 +39,10 @@ class Output:
         while not self._over.wait(_LOOK_S):
             with suppress(MemoryError):  # of the controller's limit
                 if os.fstat(self.descriptor).st_size > _MOST_BYTES:
-                    self._before = self._end()
+                    self._before = self._last()
                     os.ftruncate(self.descriptor, 0)
 
-    def _end(self) -> bytes:
+    def _last(self) -> bytes:
         size = os.fstat(self.descriptor).st_size
         return os.pread(self.descriptor, _TAIL, max(0, size - _TAIL))
 
