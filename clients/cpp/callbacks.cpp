@@ -15,6 +15,21 @@ struct Waits {
 
 }  // namespace
 
+CallbackCore::Call::Call(CallbackCore& core) : core_(core) {
+  const std::thread::id me = std::this_thread::get_id();
+  std::unique_lock lock(core.mutex_);
+  core.returned_.wait(lock, [&] { return core.calls_ == 0 || core.runner_.load() == me; });
+  core.runner_ = me;
+  ++core.calls_;
+}
+
+CallbackCore::Call::~Call() {
+  const std::lock_guard lock(core_.mutex_);
+  if (--core_.calls_ > 0) return;
+  core_.runner_ = std::thread::id();
+  core_.returned_.notify_all();
+}
+
 void CallbackCore::close() {
   if (forked_) return;
   const bool first = !closed_.exchange(true);
@@ -30,11 +45,14 @@ void CallbackCore::await_call() {
     if (waits_for_this_thread()) return;
     waits.all[me] = this;
   }
-  if (!running_.try_lock_for(kLongTime)) {
-    say_awaited(what_);
-    running_.lock();
+  {
+    std::unique_lock lock(mutex_);
+    const auto has_returned = [this] { return calls_ == 0; };
+    if (!returned_.wait_for(lock, kLongTime, has_returned)) {
+      say_awaited(what_);
+      returned_.wait(lock, has_returned);
+    }
   }
-  running_.unlock();
   const std::lock_guard lock(waits.mutex);
   waits.all.erase(me);
 }

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <atomic>
 #include <chrono>
+#include <condition_variable>
 #include <exception>
 #include <functional>
 #include <memory>
@@ -38,34 +39,32 @@ class CallbackCore {
   void at_close(std::function<void()> leave) { leave_ = std::move(leave); }
 
  protected:
-  // A call of it by this thread.
+  // A call of it by this thread, perhaps within another one of it; those of other threads wait.
   class Call {
    public:
-    explicit Call(CallbackCore& core)
-        : core_(core), lock_(core.running_), before_(core.runner_.exchange(this_thread())) {}
-    ~Call() { core_.runner_ = before_; }
+    explicit Call(CallbackCore& core);
+    ~Call();
     Call(const Call&) = delete;
     Call& operator=(const Call&) = delete;
 
    private:
-    static std::thread::id this_thread() { return std::this_thread::get_id(); }
     CallbackCore& core_;
-    const std::lock_guard<std::recursive_timed_mutex> lock_;
-    const std::thread::id before_;
   };
 
   void say_failed(const char* why);
 
   const std::string what_;  // it is called on, for the log
   const Forked forked_;
-  std::recursive_timed_mutex running_;
-  std::atomic<std::thread::id> runner_;  // who calls it
   std::atomic<bool> closed_{false};
 
  private:
   void await_call();
   bool waits_for_this_thread() const;
 
+  std::mutex mutex_;
+  std::condition_variable returned_;
+  int calls_ = 0;                        // under way, one in another
+  std::atomic<std::thread::id> runner_;  // whose they are
   bool failed_ = false;
   std::function<void()> leave_;
 };
