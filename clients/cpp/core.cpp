@@ -105,20 +105,24 @@ void Core::close() {
     return;
   }
   // In a callback, this thread is what receives the answer to a LEAVE: another one waits for it.
-  if (const auto self = weak_from_this().lock(); self && bus_.handling()) {
-    try {
-      auto under_way = std::make_unique<EndUnderWay>();
-      std::thread([self, under_way = std::move(under_way)]() mutable {
-        self->end();
-        under_way = nullptr;  // the callback may be what ends the program
-        self->await_callback();
-      }).detach();
-      return;
-    } catch (const std::system_error&) {  // there are too many threads
-    }
-  }
+  if (const auto self = weak_from_this().lock(); self && bus_.handling() && ends_apart(self))
+    return;
   end();
   await_callback();
+}
+
+bool Core::ends_apart(const std::shared_ptr<Core>& self) {
+  try {
+    auto under_way = std::make_unique<EndUnderWay>();
+    std::thread([self, under_way = std::move(under_way)]() mutable {
+      self->end();
+      under_way = nullptr;  // the callback may be what ends the program
+      self->await_callback();
+    }).detach();
+    return true;
+  } catch (const std::system_error&) {
+    return false;
+  }
 }
 
 void Core::end() {

@@ -87,6 +87,8 @@ class Core : public std::enable_shared_from_this<Core> {
   std::string what_is_known(double rate) const;  // for timeouts
 
  private:
+  // In a thread of its own. False: there are too many threads.
+  static bool ends_apart(const std::shared_ptr<Core>& self);
   void end();  // all but a callback that has not returned
   void await_callback();
   void on_info(const uint8_t* bytes, size_t size);

@@ -270,7 +270,7 @@ namespace {
 
 // "2GB" becomes a number of bytes; what is wrong with it, or "".
 std::string to_bytes(std::string& text) {
-  const std::string refusal = "'" + text + "' is not allowed; 16MB and more is, such as 2GB";
+  std::string refusal = "'" + text + "' is not allowed; 16MB and more is, such as 2GB";
   const bool negative = text[0] == '-';
   try {
     if (!CLI::AsSizeValue(false)(text).empty() || text.size() > 18 || negative) return refusal;
