@@ -700,7 +700,7 @@ MERGE_BOMB = "a0: &a0 {x: 1}\n" + "".join(
         (MERGE_BOMB, "it stands for more than 100000 values"),
         ("&a [*a]", "it stands for more than 100000 values"),
         ("[" * 100_000, "it is nested too deep"),
-        ("2000-99-99", "month must be in 1..12"),
+        ("2000-99-99", "'2000-99-99' is no timestamp"),
         ("x" * (1 << 20) + "y", "it has 1048577 bytes; allowed are 1048576"),
         (os.mkfifo, "it is not a regular file"),
         (lambda path: os.symlink("/dev/zero", path), "it is not a regular file"),
