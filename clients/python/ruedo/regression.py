@@ -18,6 +18,7 @@ import shlex
 import subprocess
 import sys
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -83,13 +84,12 @@ def _output_of(command: list[str], folder: _PathLike | None, timeout: float) -> 
 
 
 def _stopped(process: subprocess.Popen[str]) -> str:
-    """Lets it end its client, too; what it has printed."""
-    process.terminate()
-    try:
-        return process.communicate(timeout=_PARTING_S)[0]
-    except subprocess.TimeoutExpired:
-        process.kill()
-        return process.communicate()[0]
+    """Lets it end its client, too; what it has printed, if nobody else keeps its output open."""
+    for end in (process.terminate, process.kill):
+        end()
+        with suppress(subprocess.TimeoutExpired):
+            return process.communicate(timeout=_PARTING_S)[0]
+    return ""
 
 
 def run_regression(
