@@ -1,12 +1,12 @@
 // Undo and redo, and SDF as text: shapes that are drawn, scaled, and cut.
 import { describe, expect, it } from "vitest";
-import type { world_state_t } from "../generated/messages";
 import { History } from "../src/edit/history";
 import type { HistoryState } from "../src/state/page";
 import { numbersOf, poseFrom, poseNow } from "../src/edit/pose";
 import type { ModelDescription } from "../src/wire/description";
 import { Poses } from "../src/state/poses";
 import { boxModel, places, roomModel, scaled, wallModel, withDoor } from "../src/edit/sdf";
+import { stateOf } from "./told";
 
 describe("history", () => {
   function recorded() {
@@ -63,20 +63,7 @@ describe("poses", () => {
     const poses = new Poses(),
       model = { name: "box", body: 1, pose: [0, 0, 0.5, 1, 0, 0, 0] } as ModelDescription;
     expect(poseNow(model, poses)).toBeNull();
-    const told = (body: number) =>
-      poses.add(
-        {
-          utime: 0n,
-          epoch: 0,
-          part: 0,
-          nparts: 1,
-          n: 1,
-          index: new Int32Array([body]),
-          position: new Float64Array([3, 4, 1]),
-          orientation: new Float64Array([1, 0, 0, 0]),
-        } as unknown as world_state_t,
-        0,
-      );
+    const told = (body: number) => poses.add(stateOf(body, [3, 4, 1]), 0);
     told(2); // another one, of a higher number
     expect(poseNow(model, poses)).toBeNull();
     told(1);

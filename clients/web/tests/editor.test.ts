@@ -1,7 +1,7 @@
 // The editor beside a server that is slow to tell where the bodies are.
 import { Box3, Vector3 } from "three";
 import { afterEach, beforeEach, describe, expect, it, vi } from "vitest";
-import { request_t, type world_state_t } from "../generated/messages";
+import { request_t } from "../generated/messages";
 import type { Control } from "../src/control";
 import { Editor } from "../src/edit/editor";
 import { boxModel } from "../src/edit/sdf";
@@ -10,6 +10,7 @@ import { Poses } from "../src/state/poses";
 import { Store } from "../src/state/store";
 import type { Description, ModelDescription } from "../src/wire/description";
 import { decode } from "../src/wire/lcm";
+import { stateOf } from "./told";
 
 // A box of 1 m, whose frame is in its middle, and a server that tells of states and scenes when it
 // is asked to.
@@ -24,20 +25,7 @@ function standing() {
         models: [{ name: "box", body, pose: [0, 0, 0, 1, 0, 0, 0], fast: false, path: false }],
       } as unknown as Description,
     });
-  const tell = (z: number) =>
-    poses.add(
-      {
-        utime: 0n,
-        epoch: 0,
-        part: 0,
-        nparts: 1,
-        n: 1,
-        index: new Int32Array([body]),
-        position: new Float64Array([0, 0, z]),
-        orientation: new Float64Array([1, 0, 0, 0]),
-      } as unknown as world_state_t,
-      0,
-    );
+  const tell = (z: number) => poses.add(stateOf(body, [0, 0, z]), 0);
   const control = {
     request: (kind: number, data?: Uint8Array) => {
       const type = kind === request_t.SPAWN ? "spawn_request_t" : "set_pose_request_t",
