@@ -174,6 +174,21 @@ def bare_writes(root):
     ]
 
 
+ERRORS = "src/cli/to_stderr.h"
+
+
+def bare_errors(root):
+    """Messages that are printed elsewhere than in cli/to_stderr.h: fmt throws where standard error
+    is a file on a full disk, and a command that had its result ends otherwise.
+    """
+    return [
+        f"{path.relative_to(root)}:{text.count(chr(10), 0, match.start()) + 1}: use {ERRORS}"
+        for path in sorted((root / "src").rglob("*.cpp"))
+        for text in [re.sub(r"//[^\n]*", "", path.read_text(encoding="utf-8"))]
+        for match in re.finditer(r"\bfmt::print(?:ln)?\(\s*stderr\b", text)
+    ]
+
+
 PYTHON_CLIENT = "clients/python/ruedo"
 OTHERS_PRIVATE = {
     "_get_packed_fingerprint",  # of the classes that lcm-gen makes: it has no other name
@@ -364,6 +379,7 @@ def broken_web_walls(root):
         bare_conversions,
         bare_reads,
         bare_writes,
+        bare_errors,
         dangling_ranges,
         foreign_members,
         states_left_behind,
@@ -580,6 +596,19 @@ def test_bare_conversions_are_seen(tmp_path, text, good):
 )
 def test_bare_reads_are_seen(tmp_path, text, good):
     assert (bare_reads(tree(tmp_path, {"src/core/a.cpp": text + "\n"})) == []) == good
+
+
+@pytest.mark.parametrize(
+    "text, good",
+    [
+        ('fmt::print(stderr, "{}", a);', False),
+        ('fmt::print(\n    stderr, "a");', False),
+        ('fmt::print("{}", stderr_text);', True),
+        ('to_stderr("{}", a);', True),
+    ],
+)
+def test_bare_errors_are_seen(tmp_path, text, good):
+    assert (bare_errors(tree(tmp_path, {"src/cli/a.cpp": text + "\n"})) == []) == good
 
 
 @pytest.mark.parametrize(

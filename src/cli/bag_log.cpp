@@ -14,6 +14,7 @@
 
 #include "cli/mcap_reader.h"
 #include "cli/rosbag.h"
+#include "cli/to_stderr.h"
 #include "core/input_file.h"
 #include "core/lcm_log.h"
 #include "core/utf8.h"
@@ -151,8 +152,7 @@ void BagLog::join(const std::string& rest, const std::string& file) {
   if (!in.fault().empty())
     throw InputError({file}, "its " + std::string(Rosbag::kRest) + ": " + in.fault());
   if (damaged > 0)
-    fmt::print(stderr, "ruedo: {}: {} messages are damaged, and left out\n", for_terminal(file),
-               damaged);
+    to_stderr("ruedo: {}: {} messages are damaged, and left out\n", for_terminal(file), damaged);
 }
 
 }  // namespace ruedo::cli

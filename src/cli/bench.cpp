@@ -11,6 +11,7 @@
 #include "cli/bench_world.h"
 #include "cli/commands.h"
 #include "cli/range.h"
+#include "cli/to_stderr.h"
 #include "core/output_file.h"
 #include "core/program_output.h"
 #include "core/progress.h"
@@ -132,7 +133,7 @@ int run_all(const BenchArguments& arguments) {
       if (i > 0) fmt::print("\n");
       print_head(table);
     }
-    if (!fault.empty()) fmt::print(stderr, "{}\n", fault);
+    if (!fault.empty()) to_stderr("{}\n", fault);
     for (const std::string& row : rows) {
       if (arguments.json)
         fmt::print("{}\n", row);

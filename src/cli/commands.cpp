@@ -12,6 +12,7 @@
 #include <unistd.h>
 
 #include "cli/extensions.h"
+#include "cli/to_stderr.h"
 #include "core/option_text.h"
 #include "core/utf8.h"
 #include "core/whole.h"
@@ -196,9 +197,9 @@ void print_findings(const std::vector<Finding>& findings) {
             ? fmt::format(" (and {} more places; see ruedo check)", group.places.size() - 1)
             : "";
     const char* colour = group.kind == Finding::Kind::error ? style.red : style.yellow;
-    fmt::print(stderr, "{}{}{}: {}: {}: {}{}{}{}\n", colour, kind_name(group.kind), style.off,
-               for_terminal(first.source.str()), for_terminal(first.element),
-               for_terminal(group.text), style.dim, more, style.off);
+    to_stderr("{}{}{}: {}: {}: {}{}{}{}\n", colour, kind_name(group.kind), style.off,
+              for_terminal(first.source.str()), for_terminal(first.element),
+              for_terminal(group.text), style.dim, more, style.off);
   }
 }
 

@@ -15,6 +15,7 @@
 #include "cli/commands.h"
 #include "cli/extensions.h"
 #include "cli/range.h"
+#include "cli/to_stderr.h"
 #include "core/utf8.h"
 #include "ruedo/schema.h"
 
@@ -138,8 +139,8 @@ int echo(const EchoArguments& arguments) {
   for (int seen = 0; arguments.count == 0 || seen < arguments.count; ++seen) {
     if (!mailbox.take(message,
                       Clock::now() + std::chrono::duration_cast<Clock::duration>(patience))) {
-      fmt::print(stderr, "ruedo: nothing on {} for {:g} s, on {}\n",
-                 fmt::join(arguments.channels, ", "), arguments.timeout_s, bus.url().str());
+      to_stderr("ruedo: nothing on {} for {:g} s, on {}\n", fmt::join(arguments.channels, ", "),
+                arguments.timeout_s, bus.url().str());
       return kCheckFailed;
     }
     print(message);

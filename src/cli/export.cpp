@@ -11,6 +11,7 @@
 #include "cli/logged_run.h"
 #include "cli/rosbag.h"
 #include "cli/sandboxed.h"
+#include "cli/to_stderr.h"
 #include "core/utf8.h"
 #include "log/reader.h"
 #include "ruedo/errors.h"
@@ -50,8 +51,7 @@ uint64_t read_log(const std::string& path, const log::Index& index, const run::L
     ++read;
   }
   for (const std::string& fault : {worlds.fault(), log.fault()}) {
-    if (!fault.empty())
-      fmt::print(stderr, "ruedo: {}: {}\n", for_terminal(path), for_terminal(fault));
+    if (!fault.empty()) to_stderr("ruedo: {}: {}\n", for_terminal(path), for_terminal(fault));
   }
   return read;
 }

@@ -25,8 +25,10 @@
 #include "cli/argument_rules.h"
 #include "cli/commands.h"
 #include "cli/progress_line.h"
+#include "cli/to_stderr.h"
 #include "core/installation.h"
 #include "core/leftovers.h"
+#include "core/option_text.h"
 #include "core/utf8.h"
 #include "core/version.h"
 #include "physics/state_check.h"
@@ -61,8 +63,8 @@ void set_up_logging() {
 
 void say(const std::string& text) {
   const Style style = style_of(stderr);
-  fmt::print(stderr, "{}{}ruedo: {}{}{}\n", style.bold, style.red, style.off,
-             ruedo::for_terminal(text), style.off);
+  to_stderr("{}{}ruedo: {}{}{}\n", style.bold, style.red, style.off, ruedo::for_terminal(text),
+            style.off);
 }
 
 // A hint for an unknown argument: the nearest command or option.
@@ -186,7 +188,7 @@ int run(int argc, char** argv) {
       return kGood;
     }
     say(std::string(error.what()) + suggestion(app, argc, argv));
-    fmt::print(stderr, "Run `ruedo --help`, or `ruedo COMMAND --help`.\n");
+    to_stderr("Run `ruedo --help`, or `ruedo COMMAND --help`.\n");
     return kWrongUsage;
   }
   check_limits();
@@ -205,7 +207,8 @@ int tell_error() {
     throw;
   } catch (const ruedo::InputError& error) {
     say(ruedo::in_one_line(error.what()));
-    return error.source().file.empty() ? kWrongUsage : kBadInput;
+    const ruedo::Source& source = error.source();
+    return source.file.empty() || is_option(source) ? kWrongUsage : kBadInput;
   } catch (const ruedo::physics::StateError& error) {
     say(error.what());
     return kBrokenState;

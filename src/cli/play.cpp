@@ -17,6 +17,7 @@
 #include "cli/extensions.h"
 #include "cli/range.h"
 #include "cli/sandboxed.h"
+#include "cli/to_stderr.h"
 #include "cli/view.h"
 #include "log/header.h"
 #include "log/reader.h"
@@ -96,10 +97,10 @@ int play(const PlayArguments& arguments) {
   bus.keep_connected();
   if (const std::string server = bus::claimed_by(bus.url());
       !server.empty() && bus.url().scheme == "udpm")  // the others need one that carries it
-    fmt::print(stderr,
-               "ruedo: a server is at {}, too: {}. The log's messages mix with its own: take "
-               "another port\n",
-               bus.url().str(), server);
+    to_stderr(
+        "ruedo: a server is at {}, too: {}. The log's messages mix with its own: take "
+        "another port\n",
+        bus.url().str(), server);
   log::Event event;
   int64_t messages = 0;
   SimTime first_us = 0;
@@ -112,7 +113,7 @@ int play(const PlayArguments& arguments) {
     bus.publish(event.channel, event.data.data(), event.data.size());
     ++messages;
   }
-  if (!log.fault().empty()) fmt::print(stderr, "ruedo: {}: {}\n", arguments.log, log.fault());
+  if (!log.fault().empty()) to_stderr("ruedo: {}: {}\n", arguments.log, log.fault());
   const double seconds =
       messages == 0 ? 0.0 : static_cast<double>(event.timestamp_us - first_us) * 1e-6;
   fmt::print("{}: {} messages, {:g} s, on {}{}{}\n", arguments.log, messages, seconds,

@@ -12,6 +12,7 @@
 #include <sys/ioctl.h>
 #include <unistd.h>
 
+#include "cli/to_stderr.h"
 #include "core/progress.h"
 #include "core/utf8.h"
 #include "core/whole.h"
@@ -97,15 +98,13 @@ class Line {
     const auto state = Progress::latest();
     if (!state) return erase();
     if (Clock::now() < due_) return;
-    fmt::print(stderr, "\r\033[K{}", text_of(*state, columns()));
-    std::fflush(stderr);
+    to_stderr("\r\033[K{}", text_of(*state, columns()));
     drawn_ = true;
   }
 
   void erase() {
     if (!drawn_) return;
-    std::fputs("\r\033[K", stderr);
-    std::fflush(stderr);
+    to_stderr("\r\033[K");
     drawn_ = false;
   }
 

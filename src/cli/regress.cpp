@@ -17,6 +17,7 @@
 #include "cli/isolation.h"
 #include "cli/range.h"
 #include "cli/signal_thread.h"
+#include "cli/to_stderr.h"
 #include "cli/view.h"
 #include "core/json.h"
 #include "core/output_file.h"
@@ -153,7 +154,7 @@ void attach_page(const std::string& log) {
   try {
     write_page(log, log + ".html", kPageSize_MB);
   } catch (const std::exception& error) {
-    fmt::print(stderr, "ruedo: no page of this run: {}\n", error.what());
+    to_stderr("ruedo: no page of this run: {}\n", error.what());
   }
 #else
   static_cast<void>(log);
@@ -215,8 +216,8 @@ int regress(RegressArguments arguments) {
   if (std::string fault = run(arguments, world, isolated, judge, signals); !fault.empty())
     failures.push_back(fault);
   if (const int signal = signals.told()) {
-    fmt::print(stderr, "ruedo: the run was ended by a signal; its log up to there is {}\n",
-               arguments.record);
+    to_stderr("ruedo: the run was ended by a signal; its log up to there is {}\n",
+              arguments.record);
     return 128 + signal;
   }
   const size_t begin_of_judged = failures.size();
@@ -247,7 +248,7 @@ int regress(RegressArguments arguments) {
                  faults.begin() + static_cast<std::ptrdiff_t>(end_of_judged));
     write_verdict(arguments.json, faults, judge);
   }
-  for (const std::string& line : failures) fmt::print(stderr, "FAILED: {}\n", line);
+  for (const std::string& line : failures) to_stderr("FAILED: {}\n", line);
   if (!failures.empty() && !arguments.no_page) attach_page(arguments.record);
   if (failures.empty()) fmt::print("passed; the run is in {}\n", arguments.record);
   return failures.empty() ? kGood : kCheckFailed;

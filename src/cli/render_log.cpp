@@ -13,6 +13,7 @@
 #include "cli/logged_run.h"
 #include "cli/render_devices.h"
 #include "cli/render_view.h"
+#include "cli/to_stderr.h"
 #include "cli/video.h"
 #include "core/progress.h"
 #include "core/whole.h"
@@ -257,7 +258,7 @@ int render_video(const VideoArguments& arguments) {
       index, [&](const log_header_t& header) { return load_run(header, arguments.log); });
   if (!worlds.at(from).world)
     throw InputError({arguments.log}, "its world is not known: " + worlds.fault());
-  if (!worlds.fault().empty()) fmt::print(stderr, "ruedo: {}: {}\n", arguments.log, worlds.fault());
+  if (!worlds.fault().empty()) to_stderr("ruedo: {}: {}\n", arguments.log, worlds.fault());
   States states(index, arguments.log);
   DrawnMarkers drawn(index, arguments.log);
   const run::LogWorlds::Scene* shown = nullptr;

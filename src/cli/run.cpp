@@ -28,6 +28,7 @@
 #include "cli/run_command.h"
 #include "cli/sandboxed.h"
 #include "cli/signal_thread.h"
+#include "cli/to_stderr.h"
 #include "cli/view.h"
 #include "core/leftovers.h"
 #include "core/utf8.h"
@@ -84,7 +85,7 @@ class StatusLine {
  public:
   explicit StatusLine(bool quiet) : shown_(!quiet && isatty(STDERR_FILENO) != 0) {}
   ~StatusLine() {
-    if (drawn_) is_printed([] { fmt::print(stderr, "\n"); });
+    if (drawn_) to_stderr("\n");
   }
 
   void draw(const run::Status& status) {
@@ -102,10 +103,7 @@ class StatusLine {
           status.paused ? std::string("paused") : fmt::format("x {:.3g} real time", factor),
           messages);
     }
-    shown_ = drawn_ = is_printed([&] {
-      fmt::print(stderr, "\r\033[K{}", line);
-      std::fflush(stderr);
-    });
+    shown_ = drawn_ = to_stderr("\r\033[K{}", line);
   }
 
  private:
@@ -198,8 +196,8 @@ int strict_check(const WorldArguments& world) {
   const std::vector<Finding> findings = find_all(world, loaded);
   if (findings.empty()) return kGood;
   print_findings(findings);
-  fmt::print(stderr, "ruedo: {} is not run: --strict refuses what has findings\n",
-             for_terminal(world.world));
+  to_stderr("ruedo: {} is not run: --strict refuses what has findings\n",
+            for_terminal(world.world));
   return loaded ? kCheckFailed : kBadInput;
 }
 
@@ -260,7 +258,7 @@ int run_world(const RunArguments& arguments) {
   try {
     server.run();
   } catch (const run::LeaseEnded& ended) {
-    fmt::print(stderr, "ruedo: {}\n", ended.what());
+    to_stderr("ruedo: {}\n", ended.what());
     return kCheckFailed;
   }
   return kGood;

@@ -11,6 +11,7 @@
 #include <filesystem>
 
 #include "cli/logged_run.h"
+#include "cli/to_stderr.h"
 #include "console/console.h"
 #include "console/live_source.h"
 #include "console/log_page.h"
@@ -82,7 +83,7 @@ std::shared_ptr<void> view_log(const std::string& log, const std::string& addres
   auto serving = std::make_shared<console::Console>(where, std::move(source), "log",
                                                     std::filesystem::path(log).filename().string());
   serving->end("ruedo play has ended.");
-  if (!fault.empty()) fmt::print(stderr, "ruedo: {}: {}\n", log, fault);
+  if (!fault.empty()) to_stderr("ruedo: {}: {}\n", log, fault);
   print_urls(*serving);
   return serving;
 }
@@ -97,7 +98,7 @@ void write_page(const std::string& log, const std::string& path, double most_meg
   if (page.pictures_s != 0)
     thinned += page.pictures_s < 0 ? ", without pictures"
                                    : fmt::format(", pictures {:g} s apart", page.pictures_s);
-  if (!page.fault.empty()) fmt::print(stderr, "ruedo: {}: {}\n", log, page.fault);
+  if (!page.fault.empty()) to_stderr("ruedo: {}: {}\n", log, page.fault);
   fmt::print("{}: {:.1f} MB{}\n", path, static_cast<double>(page.bytes) * 1e-6, thinned);
 }
 

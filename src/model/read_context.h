@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "core/option_text.h"
 #include "model/controller_files.h"
 #include "model/document.h"
 #include "model/mesh_loader.h"
@@ -43,7 +44,8 @@ class TooLarge : public InputError {
 };
 
 // Runs read(). An error in a standard element is reported, `what` ("the shape") is left out, and
-// the result is false. An error in one of Ruedo's own elements is thrown on.
+// the result is false. An error in one of Ruedo's own elements is thrown on, and so is that of an
+// option: who wrote it is there to mend it.
 template <class Read>
 bool read_or_leave_out(const std::string& where, const std::string& what, Findings& findings,
                        Read read) {
@@ -54,7 +56,7 @@ bool read_or_leave_out(const std::string& where, const std::string& what, Findin
     throw;
   } catch (const InputError& error) {
     const std::string element = error.message().substr(0, error.message().find('>'));
-    if (element.find("ruedo:") != std::string::npos) throw;
+    if (element.find("ruedo:") != std::string::npos || is_option(error.source())) throw;
     findings.error(error.source(), where, error.message() + "; " + what);
     return false;
   }

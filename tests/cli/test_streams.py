@@ -60,6 +60,26 @@ def test_what_cannot_be_printed_is_said(world, command, options):
 
 
 @pytest.mark.parametrize(
+    ("code", "arguments"),
+    [
+        (0, ["check", "WORLD"]),
+        (0, ["run", "WORLD", *RUN, "--quiet"]),
+        (1, ["regress", "WORLD", "--goal", "9,9,0.1,0.2", "--duration", "0.3", "--record", "LOG"]),
+        (2, ["check", "WORLD", "--no-such-option"]),
+        (3, ["check", "BAD"]),
+        (4, ["run", "WORLD", *RUN, "--quiet", "--record", "/proc/no.lcm"]),
+    ],
+)
+def test_errors_that_cannot_be_printed_change_no_result(world, tmp_path, code, arguments):
+    """The world has findings, which are printed there, too."""
+    world.write_text(WORLD.replace("</world>", "<audio device='x'/></world>"))
+    (tmp_path / "bad.sdf").write_text("<sdf>")
+    places = {"WORLD": world, "LOG": tmp_path / "r.lcm", "BAD": tmp_path / "bad.sdf"}
+    result = shell("2> /dev/full", *(places.get(each, each) for each in arguments))
+    assert result.returncode == code, result
+
+
+@pytest.mark.parametrize(
     "arguments", [["check", "arena"], ["render", "arena", "--size", "64x64", "-o", "PICTURE"]]
 )
 def test_a_full_disk_costs_no_mesh_and_no_picture(tmp_path, arguments):
