@@ -41,7 +41,7 @@ class InboxTest : public testing::Test {
     for (int i = 0; i < batch_.applied_count; ++i) {
       const engine::AppliedCommand& applied = batch_.applied[i];
       EXPECT_EQ(applied.step, step);
-      velocity_command_t command;
+      velocity_command_t command{};
       EXPECT_GT(command.decode(applied.bytes.data(), 0, static_cast<int>(applied.bytes.size())), 0);
       speeds.push_back(command.vx);
     }

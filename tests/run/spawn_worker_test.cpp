@@ -98,7 +98,7 @@ TEST(SpawnWorker, OneIsReadyAtATime) {
   {
     ModelWorker worker(store, ready, [&] { taken_before.push_back(taken); });
     for (int i = 0; i < 3; ++i) {
-      request_t request;
+      request_t request{};
       request.session = i + 1;
       ASSERT_TRUE(worker.add({request, Controlled::spawning(kBox, 2, i)}).pending);
     }

@@ -312,7 +312,9 @@ TEST(Control, FewRequestsWait) {
                             ++executed;
                             return engine::Outcome{};
                           },
+                      .state = [] { return std::vector<uint8_t>(); },
                       .publish = [](const reply_t&) {},
+                      .utime = [] { return int64_t{0}; },
                       .epoch = [] { return 1; },
                       .state_comes = [] { return false; }});
   request_t asked{};
