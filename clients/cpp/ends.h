@@ -1,10 +1,27 @@
-// Ends of simulations that go on in threads of their own: the program's end waits for them.
+// What the end of the program does and waits for: exit(), and the return of main().
 #pragma once
+
+#include <functional>
 
 namespace ruedo::client {
 
-// While one of these lives, exit() and the return of main() wait, for a moment, since others would
-// wait for a client in lockstep that does not say that it leaves.
+// The program's end calls it, after the destructors of static objects, while this lives: others
+// would wait for a client in lockstep that does not say that it leaves, and an exit() destroys
+// nothing of what is on stacks.
+class AtProgramEnd {
+ public:
+  explicit AtProgramEnd(std::function<void()> call);
+  ~AtProgramEnd();
+  AtProgramEnd(const AtProgramEnd&) = delete;
+  AtProgramEnd& operator=(const AtProgramEnd&) = delete;
+
+ private:
+  friend void call_at_program_end();
+  const std::function<void()> call_;
+};
+
+// The end of a simulation that goes on in a thread of its own: while one of these lives, the
+// program's end waits, for a moment.
 class EndUnderWay {
  public:
   EndUnderWay();

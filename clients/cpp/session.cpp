@@ -76,11 +76,21 @@ void Session::check_size(const std::vector<uint8_t>& body) {
 
 void Session::leave() {
   if (session_ == 0) return;
-  const int64_t sequence = ++sequence_;
   std::unique_lock lock(mutex_);
+  if (leaving_.exchange(true)) {
+    news_.wait(lock, [this] { return gone_; });
+    return;
+  }
+  repeat_leave(lock);
+  gone_ = true;
+  news_.notify_all();
+}
+
+void Session::repeat_leave(std::unique_lock<std::mutex>& lock) {
+  const int64_t sequence = ++sequence_;
   // Counted, since in a second without a processor one alone would go out.
   for (int sent = 0; sent < kMostLeaves; ++sent) {
-    publish(request_t::LEAVE, session_, sequence, {});
+    send(request_t::LEAVE, session_, sequence, {}, -1);
     const bool answered = news_.wait_for(lock, kRepeatTime, [this] { return left_; });
     if (answered || core_.server_has_ended()) return;
   }
@@ -124,6 +134,11 @@ Reply Session::exchange(int32_t kind, int64_t session, int64_t sequence,
 
 void Session::publish(int32_t kind, int64_t session, int64_t sequence,
                       const std::vector<uint8_t>& body, int32_t epoch) {
+  if (!leaving_) send(kind, session, sequence, body, epoch);
+}
+
+void Session::send(int32_t kind, int64_t session, int64_t sequence,
+                   const std::vector<uint8_t>& body, int32_t epoch) {
   request_t request;
   request.utime = core_.utime();
   request.run_id = run_id_;

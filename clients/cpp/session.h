@@ -10,6 +10,7 @@
 #include <string>
 #include <vector>
 
+#include "ends.h"
 #include "ruedo/client.h"
 
 namespace ruedo {
@@ -47,18 +48,22 @@ class Session {
   int64_t next_sequence() { return ++sequence_; }
   int64_t id() const { return session_; }
   const std::string& name() const { return name_; }
+  // Nothing any more, once this leaves: its answer would be an error.
   void publish(int32_t kind, int64_t session, int64_t sequence, const std::vector<uint8_t>& body,
                int32_t epoch = -1);
 
-  // Gives the session back, once. Others would wait for a client in lockstep whose LEAVE was lost:
-  // it is repeated until it is answered, for a moment, since the server may be gone: in that case
-  // no longer than that is unknown. It takes no turn: who has that may be a callback in step() that
-  // ends the program.
+  // Gives the session back, once; at the program's end, too. Others would wait for a client in
+  // lockstep whose LEAVE was lost: it is repeated until it is answered, for a moment, since the
+  // server may be gone: in that case no longer than that is unknown. It takes no turn: who has that
+  // may be a callback in step() that ends the program.
   void leave();
   void receive(const uint8_t* bytes, size_t size);  // a message of ruedo/reply
 
  private:
   void join(Duration timeout);
+  void repeat_leave(std::unique_lock<std::mutex>& lock);
+  void send(int32_t kind, int64_t session, int64_t sequence, const std::vector<uint8_t>& body,
+            int32_t epoch);
   Reply exchange(int32_t kind, int64_t session, int64_t sequence, const std::vector<uint8_t>& body,
                  Duration timeout);
 
@@ -73,7 +78,10 @@ class Session {
   int32_t awaited_kind_ = 0;  // 0: none
   int64_t awaited_sequence_ = 0;
   std::optional<Reply> reply_;
+  std::atomic<bool> leaving_ = false;
   bool left_ = false;  // a LEAVE was answered
+  bool gone_ = false;  // leave() has returned
+  const AtProgramEnd at_program_end_{[this] { leave(); }};
 };
 
 template <class Message>

@@ -190,6 +190,11 @@ def test_interrupts_leave_the_socket_open():
     assert internals("interrupts", free_url()) == 3 * ["heard true"]
 
 
+def test_a_program_that_ends_right_after_close_in_a_callback_leaves():
+    done = run([*JAVA, "ruedo.Internals", "exits"])
+    assert (done.returncode, done.stdout, done.stderr) == (5, "left\n", "")
+
+
 def test_a_thread_outlives_a_time_without_memory():
     lines = run([*JAVA, "-Xmx24m", "ruedo.Internals", "memory"]).stdout.splitlines()
     assert lines[-1] == "lives true"

@@ -6,10 +6,13 @@ import ruedo.lcmtypes.device_info_t;
 import ruedo.lcmtypes.motion_status_t;
 import ruedo.lcmtypes.odometry_t;
 import ruedo.lcmtypes.pose_t;
+import ruedo.lcmtypes.reply_t;
+import ruedo.lcmtypes.request_t;
 import ruedo.lcmtypes.robot_info_t;
 import ruedo.lcmtypes.tick_t;
 import ruedo.lcmtypes.world_info_t;
 
+import java.io.IOException;
 import java.nio.ByteBuffer;
 import java.util.concurrent.CountDownLatch;
 import java.util.concurrent.Semaphore;
@@ -26,7 +29,7 @@ public final class Internals {
     private Internals() {}
 
     /** Calls the client in the thread that calls it, and answers requests for ruedo/info. */
-    private static final class Server implements Transport {
+    private static class Server implements Transport {
         final world_info_t info = new world_info_t();
         private Receiver client;
 
@@ -312,6 +315,61 @@ public final class Internals {
         System.out.println("lives " + thread.isAlive());
     }
 
+    /**
+     * Grants all requests but those of LEAVE, of which two are lost; who sends them waits for no
+     * answer, which would be received in this thread.
+     */
+    private static final class LosingServer extends Server {
+        private int leaves;
+
+        LosingServer() {
+            info.features = -1;
+        }
+
+        @Override
+        public void publish(String channel, byte[] message) {
+            reply_t reply = new reply_t();
+            try {
+                WireReader in = new WireReader(message);
+                in.int64(); // hash
+                in.int64(); // utime
+                reply.run_id = in.int64();
+                reply.epoch = in.int32();
+                reply.session = in.int64();
+                reply.sequence = in.int64();
+                reply.kind = in.int32();
+            } catch (IOException error) {
+                throw new AssertionError(error);
+            }
+            if (reply.kind == request_t.LEAVE) {
+                if (++leaves == 3) System.out.println("left");
+                return;
+            }
+            super.publish(channel, message);
+            if (reply.kind == request_t.JOIN) reply.session = 5;
+            reply.text = "";
+            reply.body = new byte[0];
+            send("ruedo/reply", reply);
+        }
+    }
+
+    /** The program's end waits for that of the simulation, which its callback has begun. */
+    private static void exits() {
+        LosingServer server = new LosingServer();
+        Simulation sim = server.connect();
+        sim.pause();
+        sim.robot("p3at")
+                .odometry()
+                .onSample(
+                        sample -> {
+                            sim.close();
+                            System.exit(5);
+                        });
+        odometry_t odometry = new odometry_t();
+        odometry.utime = 1000;
+        server.send("p3at/odometry", odometry);
+    }
+
     public static void main(String[] args) throws InterruptedException {
         switch (args[0]) {
             case "infos":
@@ -331,6 +389,9 @@ public final class Internals {
                 break;
             case "interrupts":
                 interrupts(args[1]);
+                break;
+            case "exits":
+                exits();
                 break;
             default:
                 System.out.println("served " + new Address(args[1]).isServed());

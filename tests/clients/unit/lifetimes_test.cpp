@@ -252,6 +252,28 @@ TEST_F(Lifetimes, AProgramThatReturnsAfterItsCallbackHasClosedLeaves) {
               testing::ExitedWithCode(5), "a client has left");
 }
 
+TEST_F(Lifetimes, AProgramThatExitsLeaves) {
+  GTEST_FLAG_SET(death_test_style, "threadsafe");
+  server->lost_leaves = 2;
+  const auto exits = [this](bool beside_a_step) {
+    Simulation sim = simulation(server);
+    sim.pause();
+    std::promise<void> steps;
+    std::thread stepping;
+    if (beside_a_step) {
+      stepping = std::thread([&] {
+        steps.set_value();
+        sim.step(1);
+      });
+      steps.get_future().wait();
+    }
+    std::exit(5);
+  };
+  const testing::ExitedWithCode ended(5);
+  EXPECT_EXIT(exits(false), ended, "a client has left");
+  EXPECT_EXIT(exits(true), ended, "a client has left");
+}
+
 TEST_F(Lifetimes, ALeaveIsRepeatedAFewTimes) {
   server->lost_leaves = 1000;
   Simulation sim = simulation(server);

@@ -139,7 +139,7 @@ final class Bus implements Transport.Receiver {
     void awaitHandler() {
         if (returned()) return;
         tellOfHandler();
-        while (!programEnds() && !returned()) {} // which waits
+        while (!ProgramEnd.hasBegun() && !returned()) {} // which waits
     }
 
     /** Once; who waits with others goes on after it was said. */
@@ -151,7 +151,7 @@ final class Bus implements Transport.Receiver {
                         + LONG_SECONDS
                         + " s, at "
                         + placeInCallback()
-                        + (programEnds()
+                        + (ProgramEnd.hasBegun()
                                 ? ": the program ends without it"
                                 : ": close() waits for it"));
     }
@@ -161,17 +161,6 @@ final class Bus implements Transport.Receiver {
         if (!Uninterrupted.get(() -> delivering.tryLock(LONG_SECONDS, SECONDS))) return false;
         delivering.unlock();
         return true;
-    }
-
-    private static boolean programEnds() {
-        Thread hook = new Thread(() -> {});
-        try {
-            Runtime.getRuntime().addShutdownHook(hook);
-            Runtime.getRuntime().removeShutdownHook(hook);
-            return false;
-        } catch (IllegalStateException error) { // it is too late for one
-            return true;
-        }
     }
 
     /** The innermost line of the user's, in the thread that calls the handlers. */

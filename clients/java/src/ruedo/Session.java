@@ -13,6 +13,9 @@ import java.lang.reflect.Modifier;
 import java.security.SecureRandom;
 import java.util.HashMap;
 import java.util.Map;
+import java.util.concurrent.CountDownLatch;
+import java.util.concurrent.atomic.AtomicBoolean;
+import java.util.concurrent.atomic.AtomicLong;
 
 /**
  * A client's session with the server: requests are repeated until they are answered, and executed
@@ -29,12 +32,16 @@ final class Session {
     private final Simulation sim;
     private final String name;
     private final Object news = new Object();
-    private long runId; // these two under this object's monitor
-    private long sequence;
+    private volatile long runId; // changed under this object's monitor
+    private final AtomicLong sequence = new AtomicLong(); // likewise, or by leave()
     private volatile long session;
     private int awaitedKind; // these under news; 0: none
     private long awaitedSequence;
     private reply_t reply;
+    private boolean left; // a LEAVE was answered
+    private Thread atExit; // since the first JOIN
+    private final AtomicBoolean leaving = new AtomicBoolean();
+    private final CountDownLatch gone = new CountDownLatch(1);
 
     Session(Simulation sim, String name) {
         int size = name.length() > MOST_NAME ? MOST_NAME + 1 : name.getBytes(UTF_8).length;
@@ -71,7 +78,7 @@ final class Session {
                 runId = info.head.run_id;
                 join(timeout);
             }
-            reply_t answer = exchange(kind, session, ++sequence, encoded, timeout);
+            reply_t answer = exchange(kind, session, sequence.incrementAndGet(), encoded, timeout);
             if (answer.code != reply_t.UNKNOWN_SESSION || attempt == 2) return checked(answer);
             session = 0; // its place went to another: join again
         }
@@ -92,24 +99,41 @@ final class Session {
     }
 
     /**
-     * Gives the session back. Others would wait for a client in lockstep whose LEAVE was lost: it
-     * is repeated until it is answered, but a few times only, since the server may be gone. Times
-     * are counted, not seconds: in a second without a processor one alone would go out.
+     * Gives the session back; at the program's end, too. Others would wait for a client in lockstep
+     * whose LEAVE was lost: it is repeated until it is answered, but a few times only, since the
+     * server may be gone. Times are counted, not seconds: in a second without a processor one alone
+     * would go out. This object's monitor is not waited for: who has it may be what ends the
+     * program, or wait for a server for ever.
      */
-    synchronized void leave() {
+    void leave() {
         if (session == 0) return;
-        synchronized (news) {
-            awaitedKind = request_t.LEAVE;
-            awaitedSequence = ++sequence;
-            reply = null;
-            for (int sent = 0; sent < MOST_LEAVES; ++sent) {
-                publish(request_t.LEAVE, session, sequence, new byte[0]);
-                new Deadline(Double.POSITIVE_INFINITY).waitOn(news, REPEAT_MILLIS);
-                if (reply != null || sim.serverHasEnded()) break;
-            }
-            awaitedKind = 0;
+        if (leaving.getAndSet(true)) {
+            Uninterrupted.get(this::awaitGone);
+            return;
         }
-        session = 0;
+        try {
+            repeatLeave();
+        } finally {
+            session = 0;
+            gone.countDown();
+            ProgramEnd.waitsNoMoreFor(atExit);
+        }
+    }
+
+    private void repeatLeave() {
+        long number = sequence.incrementAndGet();
+        synchronized (news) {
+            for (int sent = 0; sent < MOST_LEAVES; ++sent) {
+                send(request_t.LEAVE, session, number, new byte[0], -1);
+                new Deadline(Double.POSITIVE_INFINITY).waitOn(news, REPEAT_MILLIS);
+                if (left || sim.serverHasEnded()) return;
+            }
+        }
+    }
+
+    private boolean awaitGone() throws InterruptedException {
+        gone.await();
+        return true;
     }
 
     /** A message of ruedo/reply. */
@@ -133,6 +157,11 @@ final class Session {
         synchronized (news) {
             boolean ours = received.kind == request_t.JOIN || received.session == session;
             if (!ours) return;
+            if (received.kind == request_t.LEAVE) {
+                left = true;
+                news.notifyAll();
+                return;
+            }
             if (received.kind == awaitedKind && received.sequence == awaitedSequence) {
                 reply = received;
                 news.notifyAll();
@@ -147,8 +176,14 @@ final class Session {
         join_t body = new join_t();
         body.client = name;
         long number = (new SecureRandom().nextLong() >>> 2) + 1;
-        session = checked(exchange(request_t.JOIN, 0, number, Bus.encode(body), timeout)).session;
-        sequence = 0;
+        reply_t answer =
+                checked(exchange(request_t.JOIN, 0, number, Bus.encode(body), timeout));
+        if (atExit == null) {
+            atExit = new Thread(this::leave);
+            ProgramEnd.waitsFor(atExit);
+        }
+        sequence.set(0);
+        session = answer.session;
     }
 
     private reply_t exchange(int kind, long toSession, long number, byte[] body, double timeout) {
@@ -183,7 +218,7 @@ final class Session {
 
     /** For grants, which are not answered by replies. Under this object's monitor. */
     long nextSequence() {
-        return ++sequence;
+        return sequence.incrementAndGet();
     }
 
     String name() {
@@ -198,7 +233,12 @@ final class Session {
         publish(kind, toSession, number, body, -1);
     }
 
+    /** Nothing any more, once this leaves: its answer would be an error. */
     void publish(int kind, long toSession, long number, byte[] body, int epoch) {
+        if (!leaving.get()) send(kind, toSession, number, body, epoch);
+    }
+
+    private void send(int kind, long toSession, long number, byte[] body, int epoch) {
         request_t request = new request_t();
         request.utime = sim.utime();
         request.run_id = runId;
