@@ -5,6 +5,7 @@ part of the next one, nor of the campaign.
 import os
 import subprocess
 import sys
+import time
 
 import pytest
 from conftest import PATIENCE, RUEDO, results_in, ruedo, wait_for
@@ -59,6 +60,62 @@ def test_controllers_of_two_folders_have_modules_of_the_same_names(tmp_path):
     # 1 s at v after a from rest: v - v^2 / (2 a) m, where a is 0.3 m/s^2; 0.4 is not reached.
     assert found["old"]["metrics"]["path_m"] == pytest.approx(0.0833, abs=0.002)
     assert found["new"]["metrics"]["path_m"] == pytest.approx(0.15, abs=0.002)
+
+
+THREADS = """
+import threading, time
+from pathlib import Path
+def leaves(view):
+    def beat():
+        while True:
+            Path(__file__).with_name("beat").touch()
+            time.sleep(0.001)
+    threading.Thread(target=beat).start()
+    return "done"
+def waits(view):
+    time.sleep(0.5)
+    return "done"
+"""
+
+
+def test_a_thread_ends_with_its_case(tmp_path):
+    """Regression: it ran on beside the next ones, and kept the worker from its end."""
+    names = {name: f'python: "threads.py:{name}"' for name in ("leaves", "waits")}
+    made = campaign(tmp_path, names, threads=THREADS)
+    begun = time.time()
+    found = rows(made.run(workers=1))
+    assert {row["status"] for row in found.values()} == {"passed"}
+    assert begun - 0.1 < os.stat(tmp_path / "beat").st_mtime < time.time() - 0.5
+
+
+MEASURES = """
+import time
+def stand(view):
+    return 0.0, 0.0
+def hangs(log):
+    while True:
+        time.sleep(1)
+def greedy(log):
+    return len(bytearray(1 << 40))
+def good(log):
+    return 2.0
+"""
+
+
+@pytest.mark.parametrize(
+    "name, says",
+    [
+        ("hangs", "measures.py:hangs: the metrics took more than 3 s"),
+        ("greedy", "measures.py:greedy wanted more than 4096 MB of memory"),
+    ],
+)
+def test_a_metric_that_hangs_is_not_the_controllers_fault(tmp_path, name, says):
+    metrics = f"metrics: [{{name: m, python: 'measures.py:{name}'}}]"
+    python = {"stand": 'python: "measures.py:stand"'}
+    made = campaign(tmp_path, python, metrics, limits="{duration: 1, wall: 3}", measures=MEASURES)
+    row = rows(made.run(workers=1))["stand"]
+    assert (row["status"], row["what"], row["reason"]) == ("invalid", "metric", says)
+    assert row["metrics"]["time_s"] == 1.0
 
 
 FORKS = """

@@ -345,6 +345,23 @@ def test_what_a_world_includes_goes_with_it(tmp_path, obstacles):
     assert "touched box/link" in said
 
 
+@pytest.mark.parametrize("world", ["w.sdf", "empty"])
+def test_the_robots_file_goes_with_what_is_kept(tmp_path, world):
+    """Regression: what was kept named a robot that is elsewhere."""
+    sensor = "<sensor name='imu' type='imu'/></link>"  # which makes it a robot
+    robot = BOX.replace("<static>true</static>", "").replace("</link>", sensor)
+    folder = blind(
+        tmp_path, "always", text=f"worlds: [{world}]\nrobots: ['own/cart.sdf@-3,0']\ndisable: []"
+    )
+    (folder / "own").mkdir()
+    (folder / "own/cart.sdf").write_text(robot)
+    found = hunt(folder, "--cases", "1", "--shrink", "0", "--keep", "kept/box")
+    assert "always" in found["reason"]
+    kept = yaml.safe_load((folder / "kept/box/regression.yaml").read_text())
+    assert kept["robots"] == ["own/cart.sdf@-3,0"]
+    assert (folder / "kept/box/own/cart.sdf").read_text() == robot
+
+
 def test_what_is_kept_and_does_not_fail_again_is_told(tmp_path):
     """And the find is not lost."""
     folder = blind(tmp_path, "once")

@@ -123,6 +123,49 @@ def test_nothing_is_run_twice_and_a_changed_controller_is_run_anew(folder):
     assert len(ran) == 16
 
 
+ROBOT = """<sdf version='1.9'><model name='cart'><link name='base_link'><pose>0 0 0.1 0 0 0</pose>
+<collision name='c'><geometry><box><size>0.4 0.4 0.2</size></box></geometry></collision>
+<sensor name='imu' type='imu'><update_rate>10</update_rate></sensor></link>
+</model></sdf>"""
+
+
+def test_a_robot_of_the_users_own_is_looked_for_beside_the_file(tmp_path):
+    """Regression: it was, where the command was called from there."""
+    (tmp_path / "robots").mkdir()
+    (tmp_path / "robots/cart.sdf").write_text(ROBOT)
+    (tmp_path / "stand.py").write_text("def stand(view):\n    return None\n")
+    (tmp_path / "c.yaml").write_text(
+        "worlds: [empty]\nrobots: ['robots/cart.sdf:guest@1,2']\n"
+        "controllers: [{name: stand, python: 'stand.py:stand'}]\n"
+        "expect: {robot: guest}\nlimits: {duration: 1}\n"
+    )
+    ruedo("campaign", "run", tmp_path / "c.yaml", folder="/")
+    [row] = Campaign(tmp_path / "c.yaml").results().table()
+    assert (row["status"], row["robot"]) == ("passed", "robots/cart.sdf:guest@1,2")
+    assert (row["x_m"], row["y_m"]) == (pytest.approx(1.0, abs=1e-3), pytest.approx(2.0, abs=1e-3))
+    copy = tmp_path / "copy"
+    shutil.copytree(tmp_path, copy, ignore=shutil.ignore_patterns("copy", "c.campaign"))
+    assert Campaign(copy / "c.yaml").cases[0].id == row["id"]
+
+
+def test_results_are_read_where_nothing_can_be_written(whole, tmp_path):
+    folder, shown = whole
+    shutil.copytree(folder, tmp_path / "there")
+    command = (
+        'mount --bind "$1" "$1" && mount -o remount,ro,bind "$1" && cd "$1" && '
+        '"$2" campaign export c.yaml -o "$3" && "$2" campaign report c.yaml -o "$4" --pages 0'
+    )
+    done = subprocess.run(
+        ["unshare", "-rm", "sh", "-c", command, "sh", tmp_path / "there", RUEDO]
+        + [tmp_path / "table.csv", tmp_path / "report.html"],
+        capture_output=True,
+        text=True,
+    )
+    assert done.returncode == 0, done
+    assert (tmp_path / "table.csv").read_text() == shown
+    assert (tmp_path / "report.html").stat().st_size > 1000
+
+
 def test_a_second_driver_is_refused(whole):
     folder, _ = whole
     with open(folder / "c.campaign/lock", "w") as file:

@@ -217,6 +217,30 @@ def test_a_wrong_file_is_told_with_line_and_what_is_allowed(folder, old, new, li
     assert str(caught.value).startswith(f"{folder / 'c.yaml'}:{line}: ")
 
 
+NAMES = [  # what only a loaded world knows: a line of the file, what is said
+    ("set: {p3at/lrf.updaterate: 5}", r"set.p3at/lrf.updaterate: .*p3at/lrf.updaterate"),
+    ("set: {p3at/lfr.update_rate: 5}", r"set.p3at/lfr.update_rate: .*lfr"),
+    ("set: {p3at/lrf.update_rate: fast}", r"set.p3at/lrf.update_rate: .*fast"),
+    ("faults: [{kind: freeze, target: lrf}, {kind: freeze, target: lfr}]", r"faults.1.: .*lfr"),
+    ("faults: [{kind: frezee, target: lrf}]", r"faults.0.: .*frezee"),
+    ("expect: {robot: p3tx}", r"expect.robot: --robot 'p3tx': .*p3at"),
+    ("expect: {golden: world.py}", r"expect.golden: .*world.py"),
+    ("expect: {golden: g.lcm, tolerances: ['*/pose:pos=most:1']}", r"expect.tolerances: .*most"),
+]
+
+
+@pytest.mark.parametrize("line, says", NAMES, ids=[line for line, _ in NAMES])
+def test_what_a_world_does_not_have_is_told_before_the_first_run(folder, line, says):
+    """Regression: each case was invalid, and none said where."""
+    golden = folder / "g.lcm"
+    ruedo(*("run", "arena", "--rate", "max", "--duration", 1, "--record", golden), folder=folder)
+    text = CAMPAIGN.replace("expect: {no_contact: true}", line)
+    (folder / "c.yaml").write_text(text)
+    at = next(i for i, one in enumerate(text.splitlines(), 1) if one == line)
+    with pytest.raises(SpecError, match=f"c.yaml:{at}: {says}"):
+        Campaign(folder / "c.yaml").run(workers=1)
+
+
 def test_the_command_line_says_it_in_one_line_with_exit_code_3(folder):
     (folder / "c.yaml").write_text(CAMPAIGN.replace("seeds: 2", "seeds: x"))
     done = ruedo("campaign", "run", "c.yaml", folder=folder, code=3)
@@ -422,6 +446,20 @@ def test_a_program_is_run_again_when_it_changes(folder, command, name):
     before = {case.id for case in Campaign(folder / "c.yaml").cases}
     program.write_text("pass\n")
     assert not before & {case.id for case in Campaign(folder / "c.yaml").cases}
+
+
+@pytest.mark.parametrize("name", ["my robot", "müller", "_v2.1 (final)"])
+def test_a_controller_may_be_called_as_its_file(tmp_path, name):
+    """Regression: its campaign could not be read again, as `ruedo why` does."""
+    (tmp_path / f"{name}.py").write_text("def drive(view):\n    return 'done'\n")
+    (tmp_path / "c.yaml").write_text(
+        "worlds: [empty]\nlimits: {duration: 1}\n"
+        "controllers: [{name: one, each: '*.py', python: '{file}:drive'}]\n"
+    )
+    made = Campaign(tmp_path / "c.yaml")
+    [case] = made.cases
+    assert case.controller == name
+    assert [one.id for one in Campaign(made.content, folder=tmp_path).cases] == [case.id]
 
 
 def test_a_command_that_names_no_file_is_told(folder):

@@ -3,10 +3,9 @@ its own, and fails with the first thing that is not as expected. It is there onc
 `ruedo` is installed.
 
     def test_drives_to_the_door(ruedo_regression):
-        ruedo_regression("office.sdf", client=["python3", "drive.py"], duration=60, goal=(3.0, 2.0),
-        radius=0.3, by=50.0,
-                         no_contact=True, golden="goldens/door.lcm",
-                         tolerances=["*/pose:pos=abs:1e-3"])
+        ruedo_regression("office.sdf", client=["python3", "drive.py"], duration=60,
+                         goal=(3.0, 2.0), radius=0.3, by=50.0, no_contact=True,
+                         golden="goldens/door.lcm", tolerances=["*/pose:pos=abs:1e-3"])
 
 RUEDO_RENEW=1 in the environment writes the golden logs anew.
 """

@@ -11,6 +11,7 @@ from typing import Any
 
 from ..decoding import decode
 from ..logs import HEADER_CHANNEL
+from .worlds import model_of
 
 Bundle = dict[str, bytes]
 
@@ -55,13 +56,12 @@ def unpack(bundle: Bundle, name: str) -> str:
 
 
 def moved(what: dict[str, Any], folder: str, to: str) -> dict[str, Any]:
-    """A case whose world lies in another folder now."""
-    file = what["world"]["file"]
-    if not _is_inside(file, Path(folder)):
-        return what
+    """A case whose world and robot lie in another folder now."""
+    world, model = what["world"], model_of(what["world"]["spawn"])
+    spawn = _moved_file(model, folder, to) + world["spawn"][len(model) :]
     return {
         **what,
-        "world": {**what["world"], "file": os.path.join(to, os.path.relpath(file, folder))},
+        "world": {**world, "file": _moved_file(world["file"], folder, to), "spawn": spawn},
     }
 
 
@@ -86,10 +86,23 @@ def log_moved(log: bytes, folder: str, to: str) -> bytes:
                 header.world_file = _moved_path(header.world_file, folder, to)
                 for file in header.files:
                     file.path = _moved_path(file.path, folder, to)
+                spawn = "--spawn="
+                header.options = [
+                    spawn + _moved_path(option.removeprefix(spawn), folder, to)
+                    if option.startswith(spawn)
+                    else option
+                    for option in header.options
+                ]
                 data = header.encode()
             written.write_event(event.timestamp, event.channel, data)
         written.close()
         return Path(new).read_bytes()
+
+
+def _moved_file(file: str, folder: str, to: str) -> str:
+    if not _is_inside(file, Path(folder)):
+        return file
+    return os.path.join(to, os.path.relpath(file, folder))
 
 
 def _moved_path(path: str, folder: str, to: str) -> str:

@@ -6,6 +6,7 @@ import fcntl
 import glob
 import json
 import os
+import re
 from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 from typing import Any
@@ -15,8 +16,9 @@ from ..files import MOST_YAML_BYTES, open_lock, read_bytes, sha256_of
 from .cluster import run_on_ray
 from .errors import CampaignError, SpecError
 from .local import Done, cores, run_local
+from .names import check_names
 from .plan import Case, Planner, check_values, files_called, shard_of
-from .schema import HALF, Source, check, read_yaml
+from .schema import CONTROLLER_NAME, HALF, NAME_RULES, Source, check, read_yaml
 from .store import Results, Store
 from .worlds import WorldFiles
 
@@ -125,6 +127,7 @@ class Campaign:
             )
             known = store.known()
             missing = [case for case in cases if case.id not in known]
+            check_names(missing, self.source, self.folder)
             sample = self._sampled()
             files = Unchanged(self._files)
             for case, outcome, wall_s in self._outcomes(missing, workers, ray):
@@ -144,7 +147,8 @@ class Campaign:
     def results(self, shard: str | None = None) -> Results:
         """What there is."""
         cases = shard_of(self.cases, shard) if shard else self.cases
-        store = Store(self.out)
+        anything = (self.out / "results.sqlite").is_file()
+        store = Store(self.out, write=not anything)
         return Results(cases, store.rows(case.id for case in cases), store)
 
     def join(self, folders: Iterable[str | os.PathLike[str]]) -> int:
@@ -187,6 +191,12 @@ class Campaign:
                     raise self.source.error(
                         ("controllers", i, "each"),
                         f"is {one['each']!r}, and the name of {path!r} is no UTF-8: rename it",
+                    )
+                if not re.search(CONTROLLER_NAME, file.stem):
+                    raise self.source.error(
+                        ("controllers", i, "each"),
+                        f"is {one['each']!r}, and {path!r} cannot name a controller, which has "
+                        f"{NAME_RULES[CONTROLLER_NAME]}: rename it",
                     )
                 made = {
                     key: value.replace("{file}", path) if isinstance(value, str) else value

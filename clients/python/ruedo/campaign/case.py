@@ -11,6 +11,7 @@ import shutil
 import signal
 import subprocess
 import tempfile
+import time
 import traceback
 from collections import OrderedDict
 from collections.abc import Iterable, Iterator
@@ -282,32 +283,56 @@ class Runner:
     def _measure(self, what: dict[str, Any], log: str, outcome: Outcome) -> None:
         if "golden" in what["expect"] and "python" in what["controller"]:
             self._compare_with_golden(what["expect"], log, outcome)
+        until = time.monotonic() + what["limits"]["wall"]
         for metric in what["metrics"]:
-            try:
-                with forks_end():
-                    value = float(Function(metric["python"], self._folder).load()(log))
-                outcome.metrics[metric["name"]] = value
-            except KeyboardInterrupt:
-                raise
-            except BaseException as error:
-                said = f"{metric['python']} raised {named(error)}"
-                outcome.fail("invalid", "metric", said[:300])
+            self._measure_one(metric, log, what["limits"], until, outcome)
+
+    def _measure_one(
+        self,
+        metric: dict[str, Any],
+        log: str,
+        limits: dict[str, Any],
+        until: float,
+        outcome: Outcome,
+    ) -> None:
+        """All metrics of a case together have as long as its run."""
+        said = ""
+        try:
+            left = max(until - time.monotonic(), 1e-3)
+            with _time_limit(left), limit_memory(limits["memory_mb"]), forks_end():
+                value = float(Function(metric["python"], self._folder).load()(log))
+            outcome.metrics[metric["name"]] = value
+        except KeyboardInterrupt:
+            raise
+        except TimeIsUp:
+            said = f"{metric['python']}: the metrics took more than {limits['wall']:g} s"
+        except MemoryError:
+            said = f"{metric['python']} wanted more than {limits['memory_mb']} MB of memory"
+        except BaseException as error:
+            said = f"{metric['python']} raised {named(error)}"[:300]
+        if said:
+            outcome.fail("invalid", "metric", said)
 
     def _compare_with_golden(self, expect: dict[str, Any], log: str, outcome: Outcome) -> None:
         kept = log + ".kept"
         _copy_channels(log, kept, lambda channel: channel.endswith("/pose"))
-        command = [find_ruedo(), "diff", str(self._folder / expect["golden"]), kept]
-        for option in ("tolerance", "ignore"):
-            for rule in expect.get("tolerances" if option == "tolerance" else option, []):
-                command += [f"--{option}", rule]
+        command = diff_command(expect, str(self._folder / expect["golden"]), kept)
         done = subprocess.run(command, capture_output=True, text=True)
-        if done.returncode != 0:
-            first = (done.stdout or done.stderr).strip().splitlines()
-            outcome.fail(
-                "failed",
-                "golden",
-                f"the run differs from {expect['golden']}: {first[0] if first else ''}",
-            )
+        first = next(iter((done.stdout or done.stderr).strip().splitlines()), "")
+        if done.returncode == 1:
+            reason = f"the run differs from {expect['golden']}: {first}"
+            outcome.fail("failed", "golden", reason)
+        elif done.returncode != 0:
+            outcome.fail("invalid", "golden", first.removeprefix("ruedo: "))
+
+
+def diff_command(expect: dict[str, Any], golden: str, log: str) -> list[str]:
+    """Exit code 0: they do not differ, 1: they do; else something is wrong with a log or a rule."""
+    return [
+        *(find_ruedo(), "diff", golden, log),
+        *(f"--tolerance={rule}" for rule in expect.get("tolerances", [])),
+        *(f"--ignore={rule}" for rule in expect.get("ignore", [])),
+    ]
 
 
 def regress_command(what: dict[str, Any], log: str, verdict: str = "") -> list[str]:

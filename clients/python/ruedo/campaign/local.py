@@ -53,7 +53,8 @@ class Worker:
 
     def give(self, case: Case, tries: int = 1, full_log: str = "") -> None:
         self.case, self.tries = case, tries
-        self._until = time.monotonic() + case.what["limits"]["wall"] + _GRACE
+        turns = 2 if case.what["metrics"] else 1  # they have as long as the run
+        self._until = time.monotonic() + turns * case.what["limits"]["wall"] + _GRACE
         try:
             self.pipe.send((case.id, case.what, full_log))
         except OSError:

@@ -438,7 +438,7 @@ class Planner:
             number,
             digest,
             what["world"]["name"],
-            what["world"]["spawn"] or "",
+            what["world"]["robot"],
             asked["name"],
             seed,
             at,
@@ -477,10 +477,11 @@ class Planner:
                 given = fill((*path, "parameters"), asked.get("parameters", {}))
                 file = self._worlds.generate(generator, given)
                 name = asked.get("name", asked["generator"].rpartition(":")[2])
-            hashed = self._worlds.sha256(file, spawn)
+            spawned = self._worlds.find_robot(spawn)
+            hashed = self._worlds.sha256(file, spawned)
         except (ValueError, OSError) as error:
             raise self._source.error(path, str(error)) from None
-        return {"name": name, "file": file, "spawn": spawn, "sha256": hashed}
+        return {"name": name, "file": file, "robot": spawn, "spawn": spawned, "sha256": hashed}
 
     def _controller(
         self, c: int, asked: dict[str, Any], fill: Callable[..., Any]
@@ -555,7 +556,7 @@ def canonical(value: Any) -> bytes:
 
 def _acting(what: dict[str, Any]) -> dict[str, Any]:
     """What acts, without the names of folders: the same on every machine."""
-    world = {key: what["world"][key] for key in ("spawn", "sha256")}
+    world = {key: what["world"][key] for key in ("robot", "sha256")}
     expect = {key: value for key, value in what["expect"].items() if key != "golden"}
     return {**what, "world": world, "expect": expect}
 

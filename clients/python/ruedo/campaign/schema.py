@@ -13,7 +13,14 @@ from ..files import parse_yaml
 from .errors import SpecError, missing
 
 HALF = re.compile(r"[\ud800-\udfff]")  # what stands for what no file can hold
-_NAME = {"type": "string", "pattern": r"^[A-Za-z0-9][A-Za-z0-9_.-]{0,62}\Z"}
+# A controller may be named after a file, whatever that is called.
+CONTROLLER_NAME = r"^[^\x00-\x1f\x7f-\x9f\u2028\u2029]{1,255}\Z"
+_PLAIN_NAME = r"^[A-Za-z0-9][A-Za-z0-9_.-]{0,62}\Z"
+NAME_RULES = {
+    CONTROLLER_NAME: "1 to 255 characters of one line",
+    _PLAIN_NAME: "1 to 63 letters, digits, '_', '-' and '.', first a letter or digit",
+}
+_NAME = {"type": "string", "pattern": _PLAIN_NAME}
 _NUMBER = {"type": "number"}
 _SEED = {"type": "integer", "minimum": 0, "maximum": MOST_SEED}
 _COUNT = {"type": "integer", "minimum": 1, "maximum": 10**9}
@@ -65,7 +72,7 @@ _WORLD = {
 }
 _CONTROLLER = _object(
     {
-        "name": _NAME,
+        "name": {"type": "string", "pattern": CONTROLLER_NAME},
         "each": {"type": "string"},
         "command": {"type": "string"},
         "python": {"type": "string"},
@@ -310,7 +317,7 @@ def _raise(error: Any, source: Source) -> None:
         "maxItems": "{} members or fewer",
         "minProperties": "one of list, grid, uniform, log_uniform, normal, integers",
         "maxProperties": "one of list, grid, uniform, log_uniform, normal, integers, not several",
-        "pattern": "1 to 63 letters, digits, '_', '-' and '.', first a letter or digit",
+        "pattern": NAME_RULES[wanted] if kind == "pattern" else "",
     }
     raise source.error(
         path, f"is {_short(value)}; allowed is {allowed.get(kind, error.message).format(wanted)}"

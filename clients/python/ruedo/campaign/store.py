@@ -6,8 +6,11 @@ import csv
 import io
 import json
 import math
+import os
 import re
+import shutil
 import sqlite3
+import tempfile
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any
@@ -44,8 +47,8 @@ _MOST_LOG_BYTES = 1 << 30
 class Store:
     """The folder of a campaign's results: results.sqlite, logs/, worlds/. One writer at a time.
 
-    write=False: somebody else's, of which nothing is believed. Raises CampaignError for what cannot
-    be opened, and ResultsError, here and later, for what is damaged.
+    write=False: only read, and maybe somebody else's, of which nothing is believed. Raises
+    CampaignError for what cannot be opened, and ResultsError, here and later, for what is damaged.
     """
 
     def __init__(self, folder: Path, write: bool = True) -> None:
@@ -57,7 +60,9 @@ class Store:
             folder.mkdir(parents=True, exist_ok=True)
             if self._file.exists():
                 open_regular(self._file).close()
-            self._db = sqlite3.connect(self._file, timeout=10, isolation_level=None)
+            self._copy = None if write or os.access(folder, os.W_OK) else _copy_of(self._file)
+            file = Path(self._copy.name) / self._file.name if self._copy else self._file
+            self._db = sqlite3.connect(file, timeout=10, isolation_level=None)
             self._check_tables()
             self._db.executescript("PRAGMA journal_mode=WAL; PRAGMA synchronous=NORMAL;")
             for name, columns in _TABLES.items():
@@ -74,6 +79,8 @@ class Store:
 
     def close(self) -> None:
         self._db.close()
+        if self._copy:
+            self._copy.cleanup()
 
     def _damaged(self, what: str) -> ResultsError:
         return ResultsError(f"{self._file} is damaged, or no campaign's: {what}")
@@ -319,6 +326,18 @@ class Results:
             + ElementTree.tostring(suite, encoding="unicode")
             + "\n"
         )
+
+
+def _copy_of(file: Path) -> tempfile.TemporaryDirectory[str]:
+    """For reading where nothing can be written: SQLite makes files beside what it reads. Raises
+    OSError.
+    """
+    folder = tempfile.TemporaryDirectory(prefix="ruedo-results-")
+    for one in (file, file.with_name(file.name + "-wal")):
+        if one.exists():
+            with open_regular(one) as source, open(Path(folder.name) / one.name, "wb") as target:
+                shutil.copyfileobj(source, target)
+    return folder
 
 
 def _fits(value: float) -> bool:

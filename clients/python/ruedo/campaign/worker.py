@@ -4,8 +4,10 @@ outcomes go out, or what is wrong with the machine.
 
 from __future__ import annotations
 
+import os
 import signal
 import sys
+import threading
 import time
 from contextlib import suppress
 from multiprocessing.connection import Connection
@@ -23,6 +25,7 @@ def work(pipe: Connection, folder: str) -> None:
     signal.signal(signal.SIGTERM, _end)
     adopt_orphans()
     runner = Runner(folder)
+    own = set(threading.enumerate())
     while True:
         try:
             case, what, full_log = pipe.recv()
@@ -34,6 +37,15 @@ def work(pipe: Connection, folder: str) -> None:
         except CampaignError as error:
             outcome = error
         pipe.send((case, outcome, time.monotonic() - begin))
+        if set(threading.enumerate()) - own:
+            _begin_anew()
+
+
+def _begin_anew() -> None:
+    """What a case leaves running in threads, which nothing else can end, ends here: the process
+    stays, and so does its pipe.
+    """
+    os.execv(sys.executable, [sys.executable, "-m", "ruedo.campaign.worker", *sys.argv[1:]])
 
 
 def _end(*_: object) -> None:

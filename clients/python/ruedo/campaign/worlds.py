@@ -38,6 +38,12 @@ class WorldFiles:
         beside = self._folder / name
         return str(beside) if os.path.isfile(beside) else name
 
+    def find_robot(self, spawn: str) -> str:
+        """Likewise of a robot, MODEL[:NAME]@X,Y."""
+        model = model_of(spawn)
+        beside = self._folder / model
+        return str(beside) + spawn[len(model) :] if os.path.isfile(beside) else spawn
+
     def generate(self, generator: Function, parameters: dict[str, Any]) -> str:
         """The file of the world that generator(**parameters) makes: SDF as text, or a
         ruedo.World.
@@ -63,7 +69,7 @@ class WorldFiles:
 
         Worlds that refer to the same files are read once: what is not in the text does not change.
         """
-        model = _model_of(spawn)
+        model = model_of(spawn)
         known = self._hashed.get((world, model))
         if known:
             return known
@@ -97,21 +103,28 @@ class WorldFiles:
         first.
         """
         self.sha256(world, spawn)
-        return self._read_with[(world, _model_of(spawn))]
+        return self._read_with[(world, model_of(spawn))]
+
+
+def model_of(spawn: str) -> str:
+    """As --spawn has it: `model://robot` has a colon, too."""
+    model = spawn.rpartition("@")[0]
+    before, colon, name = model.rpartition(":")
+    return before if colon and "/" not in name else model
 
 
 def beside(world: str, files: list[str], folder: Path) -> tuple[Path, dict[str, Path]]:
-    """Of the files that a world refers to, those that have to go with it to another place: where
-    each of them is then, seen from there, and where the world's own folder is. Others, such as
-    Ruedo's own, are found from everywhere.
+    """Of the files that a world and its robot refer to, those that have to go with them to another
+    place: where each of them is then, seen from there, and where the world's own folder is. Others,
+    such as Ruedo's own, are found from everywhere.
     """
-    home = Path(os.path.realpath(world)).parent
-    roots = (home, Path(os.path.realpath(folder)))
+    root = Path(os.path.realpath(folder))
+    home = Path(os.path.realpath(world)).parent if os.path.isfile(world) else root
     real = {file: Path(os.path.realpath(file)) for file in files}
     own = {
         file: path
         for file, path in real.items()
-        if os.path.isfile(world) and any(path.is_relative_to(root) for root in roots)
+        if path.is_relative_to(home) or path.is_relative_to(root)
     }
     base = Path(os.path.commonpath([home, *(path.parent for path in own.values())]))
     return home.relative_to(base), {file: path.relative_to(base) for file, path in own.items()}
@@ -139,10 +152,6 @@ def keep_text(text: str | bytes, store: Path) -> Path:
         part.write_bytes(content)
         part.rename(file)
     return file.resolve()
-
-
-def _model_of(spawn: str) -> str:
-    return spawn.rpartition("@")[0].partition(":")[0]
 
 
 def _same(a: str, b: str) -> bool:

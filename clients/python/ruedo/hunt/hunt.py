@@ -14,6 +14,7 @@ from ..campaign.case import Outcome as OutcomeOfCase
 from ..campaign.case import fault_text
 from ..campaign.errors import CampaignError, SpecError
 from ..campaign.local import Worker, cores, run_local
+from ..campaign.names import check_names
 from ..campaign.plan import Case
 from ..campaign.worlds import MOST_WORLD_BYTES, beside, copy_beside, keep_text
 from ..engine import Engine
@@ -90,7 +91,7 @@ class Hunt:
         by: "optuna" (TPE, after the corners), "hypothesis" (its own draws, steered by target()), or
         "random" (uniform draws).
         """
-        self.case(self.space.neutral())  # raises SpecError
+        check_names([self.case(self.space.neutral())], self._campaign.source, self.folder)
         self._check_faults()
         count = invalid = found_after = 0
         first_invalid = ""

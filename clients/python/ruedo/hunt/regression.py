@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import glob
 import os
 import re
 import shlex
@@ -12,7 +13,8 @@ from typing import Any
 
 from ..campaign import Campaign
 from ..campaign.errors import CampaignError
-from ..campaign.worlds import beside, copy_beside
+from ..campaign.plan import words_of
+from ..campaign.worlds import beside, copy_beside, model_of
 from ..errors import for_terminal
 
 _PYTEST = '''# Found by `ruedo hunt`: {reason}
@@ -44,9 +46,12 @@ def keep(found: Any, folder: Path) -> Path:
     reason = for_terminal(found.reason)  # a stranger's words, in comments
     content = dict(found.content)
     world = found.case.what["world"]
+    home, places = beside(world["file"], found.files, found.folder)
+    copy_beside(places, folder)
+    model = model_of(world["spawn"])
+    if model in places:
+        content["robots"] = [f"{places[model]}{world['spawn'][len(model) :]}"]
     if os.path.isfile(world["file"]):
-        home, places = beside(world["file"], found.files, found.folder)
-        copy_beside(places, folder)
         file = home / _new_name("world.sdf", {str(one) for one in places.values()}, home)
         (folder / file.parent).mkdir(parents=True, exist_ok=True)
         shutil.copyfile(world["file"], folder / file)
@@ -97,16 +102,16 @@ def moved(controller: dict[str, Any], home: Path, folder: Path) -> dict[str, Any
     """
     made = dict(controller)
     way = os.path.relpath(home, folder)
-    files = made.pop("files", [])
+    files = list(made.pop("files", []))
     module, _, name = made.get("python", "").partition(":")
     if module and os.path.isfile(home / f"{module}.py"):
         module += ".py"
     if module.endswith(".py"):
         made["python"] = os.path.join(way, f"{module}:{name}")
     if "command" in made:
-        words = re.findall(r"[\w./-]+\.\w+", made["command"])
-        files = [*files, *(word for word in words if os.path.isfile(home / word))]
+        words = sorted(words_of(made["command"]) - {""})
+        files += [glob.escape(word) for word in words if os.path.isfile(home / word)]
         made["command"] = f"cd {shlex.quote(way)} && {made['command']}"
     if files:
-        made["files"] = [os.path.join(way, one) for one in dict.fromkeys(files)]
+        made["files"] = [os.path.join(glob.escape(way), one) for one in dict.fromkeys(files)]
     return made
