@@ -176,8 +176,7 @@ final class Session {
         join_t body = new join_t();
         body.client = name;
         long number = (new SecureRandom().nextLong() >>> 2) + 1;
-        reply_t answer =
-                checked(exchange(request_t.JOIN, 0, number, Bus.encode(body), timeout));
+        reply_t answer = checked(exchange(request_t.JOIN, 0, number, Bus.encode(body), timeout));
         if (atExit == null) {
             atExit = new Thread(this::leave);
             ProgramEnd.waitsFor(atExit);
