@@ -13,15 +13,16 @@ from ..engine import Engine
 from .case import diff_command, fault_text
 from .plan import Case
 from .schema import Source
+from .worlds import model_of
 
 
 def check_names(cases: Iterable[Case], source: Source, folder: Path) -> None:
-    """Of each world with each robot the first case, since parameters change values, as a rule, and
-    no names. Raises SpecError.
+    """Of each world with each model of a robot the first case, since parameters change values, as a
+    rule, and no names. Raises SpecError.
     """
     first: dict[tuple[str, str], dict[str, Any]] = {}
     for case in cases:
-        first.setdefault((case.world, case.robot), case.what)
+        first.setdefault((case.world, model_of(case.robot)), case.what)
     for what in first.values():
         _check_world(what, source)
     for what in list(first.values())[:1]:
@@ -29,24 +30,33 @@ def check_names(cases: Iterable[Case], source: Source, folder: Path) -> None:
 
 
 def _check_world(what: dict[str, Any], source: Source) -> None:
+    robot = what["expect"].get("robot", "")
+    faults = [fault_text(one) for one in what["faults"]]
+    parts: list[tuple[tuple[Any, ...], dict[str, Any]]] = [
+        *((("set", name), {"set": {name: value}}) for name, value in what["settings"].items()),
+        *((("disable", i), {"disable": [one]}) for i, one in enumerate(what["disable"])),
+        *((("faults", i), {"fault": [one]}) for i, one in enumerate(faults)),
+        *([(("expect", "robot"), {"robot": robot})] if robot else []),
+    ]
+    if not parts:
+        return
+    try:
+        _load(what, robot, set=what["settings"], disable=what["disable"], fault=faults)
+    except ValueError as error:
+        for path, options in parts:
+            try:
+                _load(what, **options)
+            except ValueError as of_this:
+                raise source.error(path, str(of_this)) from None
+        raise source.error((), str(error)) from None
+
+
+def _load(what: dict[str, Any], robot: str = "", **options: Any) -> None:
+    """Raises ValueError."""
     spawn = what["world"]["spawn"]
-
-    def load(path: tuple[Any, ...], robot: str = "", **options: Any) -> None:
-        try:
-            with Engine(what["world"]["file"], spawn=[spawn] if spawn else [], **options) as engine:
-                if robot:
-                    engine.begin_run(what["seed"], robot=robot)
-        except ValueError as error:
-            raise source.error(path, str(error)) from None
-
-    for name, value in what["settings"].items():
-        load(("set", name), set={name: value})
-    for i, one in enumerate(what["disable"]):
-        load(("disable", i), disable=[one])
-    for i, fault in enumerate(what["faults"]):
-        load(("faults", i), fault=[fault_text(fault)])
-    if "robot" in what["expect"]:
-        load(("expect", "robot"), robot=what["expect"]["robot"])
+    with Engine(what["world"]["file"], spawn=[spawn] if spawn else [], **options) as engine:
+        if robot:
+            engine.begin_run(what["seed"], robot=robot)
 
 
 def _check_golden(expect: dict[str, Any], source: Source, folder: Path) -> None:
