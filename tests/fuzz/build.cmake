@@ -7,6 +7,7 @@ function(call)
   endif()
 endfunction()
 
+set(ENV{CCACHE_SLOPPINESS} pch_defines,time_macros)    # else it keeps nothing of what uses precompiled headers
 call(${CMAKE_COMMAND} -S ${SOURCE} -B ${BUILD} -G Ninja -DCMAKE_BUILD_TYPE=None -DCMAKE_CXX_COMPILER=${CLANG} -DCMAKE_C_COMPILER=${CLANG_C}
   -DCMAKE_CXX_COMPILER_LAUNCHER=${LAUNCHER} -DRUEDO_SANITIZE=fuzzer-no-link,address,undefined,float-cast-overflow -DRUEDO_FUZZ=ON -DRUEDO_TESTS=OFF -DRUEDO_BENCHMARKS=OFF -DRUEDO_CONSOLE=OFF
   -DCMAKE_CXX_FLAGS=-fno-sanitize-recover=all -DRUEDO_IMPORTER=${IMPORTER})

@@ -305,7 +305,7 @@ public final class Internals {
                         "receives",
                         () -> false,
                         () -> {
-                            if (memory == null) takeMemory();
+                            if (runs.availablePermits() == 0) takeMemory(); // once
                             runs.release();
                             throw error;
                         });
