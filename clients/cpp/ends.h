@@ -5,9 +5,9 @@
 
 namespace ruedo::client {
 
-// The program's end calls it, after the destructors of static objects, while this lives: others
-// would wait for a client in lockstep that does not say that it leaves, and an exit() destroys
-// nothing of what is on stacks.
+// The program's end calls it while this lives, after the destructors of static objects, in another
+// thread, and waits for a moment: others would wait for a client in lockstep that does not say that
+// it leaves, and an exit() destroys nothing of what is on stacks.
 class AtProgramEnd {
  public:
   explicit AtProgramEnd(std::function<void()> call);

@@ -6,6 +6,7 @@
 #include <chrono>
 #include <condition_variable>
 #include <cstdio>
+#include <cstdlib>
 #include <deque>
 #include <functional>
 #include <map>
@@ -38,7 +39,8 @@ class FakeServer {
   std::atomic<int64_t> run_id{7};
   std::atomic<bool> gone{false};  // nothing is answered, and the client's transport knows
   std::atomic<int> lost_leaves{0}, leaves{0};
-  std::atomic<int64_t> falsehood{0};  // what it says of odometry_t
+  std::atomic<bool> exits_on_pause{false};  // the program, as if a signal's handler did it
+  std::atomic<int64_t> falsehood{0};        // what it says of odometry_t
   std::vector<std::string> robots{"p3at"};
 
   template <class Message>
@@ -146,6 +148,7 @@ class FakeServer {
     request_t request;
     if (request.decode(bytes, 0, static_cast<int>(size)) < 0) return;
     if (request.kind == request_t::LEAVE && ++leaves <= lost_leaves) return;
+    if (request.kind == request_t::PAUSE && exits_on_pause) std::exit(5);
     if (gone) return;
     if (request.kind == request_t::INFO) return send_info();
     reply_t reply{};

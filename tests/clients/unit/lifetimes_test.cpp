@@ -274,6 +274,17 @@ TEST_F(Lifetimes, AProgramThatExitsLeaves) {
   EXPECT_EXIT(exits(true), ended, "a client has left");
 }
 
+TEST_F(Lifetimes, AnExitInASignalsHandlerWaitsForNoLock) {
+  GTEST_FLAG_SET(death_test_style, "threadsafe");
+  server->exits_on_pause = true;
+  const auto exits = [this] {
+    alarm(static_cast<unsigned>(kPatience.count()));
+    const Simulation sim = simulation(server);
+    sim.pause();
+  };
+  EXPECT_EXIT(exits(), testing::ExitedWithCode(5), "");
+}
+
 TEST_F(Lifetimes, ALeaveIsRepeatedAFewTimes) {
   server->lost_leaves = 1000;
   Simulation sim = simulation(server);

@@ -25,6 +25,7 @@ final class Session {
     static final String REQUEST_CHANNEL = "ruedo/request";
     private static final long REPEAT_MILLIS = 100;
     private static final int MOST_LEAVES = 5; // that are sent: for half a second in all
+    private static final long AT_EXIT_MILLIS = 3000; // that the program's end waits for LEAVE
     private static final int MOST_NAME = 63; // bytes of UTF-8
     private static final int HEAD = 52; // bytes of a request_t without a body
     private static final Map<Integer, String> KINDS = kinds();
@@ -120,6 +121,18 @@ final class Session {
         }
     }
 
+    /** For a moment: to a server that is stopped, a send may take for ever. */
+    private void leaveAtExit() {
+        Thread thread = new Thread(this::leave, "ruedo-leave");
+        thread.setDaemon(true);
+        thread.start();
+        Uninterrupted.get(
+                () -> {
+                    thread.join(AT_EXIT_MILLIS);
+                    return true;
+                });
+    }
+
     private void repeatLeave() {
         long number = sequence.incrementAndGet();
         synchronized (news) {
@@ -178,7 +191,7 @@ final class Session {
         long number = (new SecureRandom().nextLong() >>> 2) + 1;
         reply_t answer = checked(exchange(request_t.JOIN, 0, number, Bus.encode(body), timeout));
         if (atExit == null) {
-            atExit = new Thread(this::leave);
+            atExit = new Thread(this::leaveAtExit);
             ProgramEnd.waitsFor(atExit);
         }
         sequence.set(0);
