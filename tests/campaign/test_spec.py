@@ -254,6 +254,16 @@ ALIASES = "a0: &a0 [x, x, x, x, x, x, x, x, x, x]\n" + "".join(
 
 
 @pytest.mark.parametrize(
+    ("code", "line"),
+    [(3, "campaign run no.yaml 2> /dev/full"), (4, "campaign status c.yaml > /dev/full")],
+)
+def test_a_stream_that_cannot_be_written_changes_no_exit_code(folder, code, line):
+    done = subprocess.run(["sh", "-c", f'"$RUEDO" {line}'], cwd=folder, capture_output=True)
+    assert done.returncode == code
+    assert done.stderr in (b"", b"ruedo: standard output: No space left on device\n")
+
+
+@pytest.mark.parametrize(
     "content, text",
     [
         (ALIASES, "stands for more than 100000 values"),

@@ -8,16 +8,15 @@ import argparse
 import importlib
 import io
 import json
-import os
 import re
 import shlex
 import signal
 import sys
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any, TextIO
+from typing import Any
 
-from ..errors import for_terminal
+from .terminal import drop, flush, say, tell
 
 MOST_WORKERS = 100_000
 GOOD, FAILED, USAGE, BAD_INPUT, ENVIRONMENT = range(5)
@@ -27,7 +26,7 @@ def main(words: list[str]) -> int:
     try:
         from .errors import CampaignError
     except ImportError as error:
-        print(f"ruedo: {error}; pip install 'ruedo[campaign]'", file=sys.stderr)
+        tell(f"ruedo: {error}; pip install 'ruedo[campaign]'")
         return ENVIRONMENT
     for stream in (sys.stdout, sys.stderr):  # a file's name may be no text
         if isinstance(stream, io.TextIOWrapper):
@@ -38,22 +37,24 @@ def main(words: list[str]) -> int:
     arguments = argparse.Namespace()
     try:
         arguments = _parser().parse_args(words)
-        return int(arguments.action(arguments))
+        code = int(arguments.action(arguments))
+        flush()
+        return code
     except CampaignError as error:
-        say(f"ruedo: {error}", sys.stderr)
+        tell(f"ruedo: {error}")
         return error.exit_code
     except ImportError as error:
-        print(f"ruedo: {error}; pip install 'ruedo[campaign]'", file=sys.stderr)
+        tell(f"ruedo: {error}; pip install 'ruedo[campaign]'")
         return ENVIRONMENT
     except KeyboardInterrupt:
-        print(f"ruedo: interrupted{getattr(arguments, 'kept', '')}", file=sys.stderr)
+        tell(f"ruedo: interrupted{getattr(arguments, 'kept', '')}")
         return ENVIRONMENT
     except BrokenPipeError:
-        os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
+        drop(1)
         return GOOD
     except OSError as error:  # a file that cannot be written, a full disk
         said = f"{error.filename}: {error.strerror}" if error.filename else str(error)
-        say(f"ruedo: {said}", sys.stderr)
+        tell(f"ruedo: {said}")
         return ENVIRONMENT
 
 
@@ -70,11 +71,6 @@ def _parser() -> argparse.ArgumentParser:
             if not (error.name or "").startswith("ruedo.hunt"):
                 raise
     return top
-
-
-def say(text: str, file: TextIO | None = None) -> None:
-    """A line, on standard output unless it is told; names and reasons may be a stranger's."""
-    print(for_terminal(text), file=file)
 
 
 def number(low: int, high: int) -> Callable[[str], int]:
@@ -213,10 +209,9 @@ def _name_unknown_programs(campaign: Any) -> None:
     made = {case.controller: case.what["controller"] for case in campaign.cases}
     for name, one in made.items():
         if "command" in one and not one["files"]:
-            say(
+            tell(
                 f"ruedo: controller {name}: no file of {campaign.folder} is found in its command, so "
-                "that it is not run again when its program changes: name that in `files`",
-                sys.stderr,
+                "that it is not run again when its program changes: name that in `files`"
             )
 
 

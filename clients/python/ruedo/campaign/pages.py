@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import subprocess
-import sys
 import tempfile
 from collections.abc import Iterable
 from pathlib import Path
@@ -12,6 +11,7 @@ from typing import Any
 from ..launch import find_ruedo
 from .local import Apart
 from .plan import Case
+from .terminal import tell
 
 _MOST_MB = 5  # of a page
 
@@ -27,7 +27,7 @@ def make_pages(
         page = folder / f"{case.id}.html"
         fault = "" if page.exists() else _make_page(campaign, case, row, page)
         if fault:
-            print(f"ruedo: no page of case {case.number}: {fault}", file=sys.stderr)
+            tell(f"ruedo: no page of case {case.number}: {fault}")
         else:
             pages[case.id] = page
     return pages

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import argparse
 import json
-import sys
 from typing import TYPE_CHECKING, Any
 
-from ..campaign.cli import MOST_WORKERS, number, say
+from ..campaign.cli import MOST_WORKERS, number
 from ..campaign.errors import CampaignError
 from ..campaign.plan import MOST_CASES
+from ..campaign.terminal import say, tell
 
 if TYPE_CHECKING:
     from .hunt import Found
@@ -59,10 +59,7 @@ def _hunt(arguments: argparse.Namespace) -> int:
         nonlocal best
         if score < best:
             best = score
-            say(
-                f"{count}: score {score:.3f} {outcome['status']} {outcome['reason']}",
-                sys.stderr,
-            )
+            tell(f"{count}: score {score:.3f} {outcome['status']} {outcome['reason']}")
 
     found = hunt.run(
         cases=arguments.cases,

@@ -6,7 +6,8 @@ import argparse
 import json
 from typing import Any
 
-from ..campaign.cli import number, say
+from ..campaign.cli import number
+from ..campaign.terminal import say
 
 
 def add_why(commands: Any) -> None:
