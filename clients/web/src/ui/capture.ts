@@ -2,6 +2,7 @@
 import type { Stage } from "../scene/stage";
 import { download } from "../widgets/download";
 import { h, say, toast } from "../widgets/elements";
+import { Recording } from "./recording";
 
 const kFrames_hz = 30;
 const kTypes = ["video/webm;codecs=vp9", "video/webm;codecs=vp8", "video/webm", "video/mp4"];
@@ -13,7 +14,7 @@ export class Capture {
     { id: "record", click: () => this.toggle() },
     "Record video",
   );
-  private recorder: MediaRecorder | null = null;
+  private recording: Recording | null = null;
 
   constructor(
     private readonly stage: Stage,
@@ -32,25 +33,21 @@ export class Capture {
   }
 
   private toggle(): void {
-    if (this.recorder) return this.recorder.stop();
+    if (this.recording) return void this.recording.stop(() => this.stage.redraw());
     const mimeType = kTypes.find((type) => globalThis.MediaRecorder?.isTypeSupported(type));
     if (!mimeType) return toast("This browser records no videos.", "error");
-    const parts: Blob[] = [],
-      recorder = new MediaRecorder(this.canvas.captureStream(kFrames_hz), { mimeType });
-    recorder.ondataavailable = ({ data }) => parts.push(data);
-    recorder.onstop = () => {
-      this.recorder = null;
+    const recorder = new MediaRecorder(this.canvas.captureStream(kFrames_hz), { mimeType });
+    this.recording = new Recording(recorder, (video) => {
+      this.recording = null;
       this.show();
-      const kind = mimeType.startsWith("video/mp4") ? "mp4" : "webm";
-      download(new Blob(parts, { type: mimeType }), `ruedo.${kind}`);
-    };
-    recorder.start(1000);
-    this.recorder = recorder;
+      if (video.size === 0) return toast("The browser has recorded no picture.", "error");
+      download(video, `ruedo.${mimeType.startsWith("video/mp4") ? "mp4" : "webm"}`);
+    });
     this.show();
   }
 
   private show(): void {
-    say(this.record, this.recorder ? "Stop recording" : "Record video");
-    this.record.classList.toggle("on", this.recorder !== null);
+    say(this.record, this.recording ? "Stop recording" : "Record video");
+    this.record.classList.toggle("on", this.recording !== null);
   }
 }
