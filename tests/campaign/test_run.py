@@ -95,7 +95,8 @@ def test_kills_of_the_driver_and_of_workers_cost_the_runs_under_way_alone(whole)
     folder, expected = whole
     out = folder / "killed"
     command = [RUEDO, "campaign", "run", "c.yaml", "--workers", "1", "--out", str(out)]
-    driver = subprocess.Popen(command, cwd=folder, stdout=subprocess.DEVNULL)
+    slow = {**os.environ, "PAUSE": "0.03"}
+    driver = subprocess.Popen(command, cwd=folder, stdout=subprocess.DEVNULL, env=slow)
     wait_for(lambda: results_in(out) >= 2)
     os.kill(driver.pid, signal.SIGKILL)
     driver.wait()
@@ -195,7 +196,8 @@ def test_who_ends_a_campaign_leaves_nothing_behind(words, told, hang, kept, fold
     """
     temporary = folder / "temporary"
     temporary.mkdir()
-    command = '{name: ahead, command: "sleep 1000 & echo $! > child.$$; wait"}'
+    # In lockstep with a client that never joins: no case ends by itself.
+    command = '{name: ahead, command: "sleep 1000 & echo $! > child.$$; wait", lockstep: 1}'
     (folder / "c.yaml").write_text(
         CAMPAIGN.replace('{name: ahead, python: "controller.py:ahead"}', command)
     )

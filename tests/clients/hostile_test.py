@@ -61,7 +61,7 @@ def test_a_server_of_another_version_is_named(language):
 
 def test_a_channel_of_another_version_and_a_silent_one(language):
     with fake("--wrong-type") as server:
-        said = probe(language, server.url, "streams", "p3at", "0.6")
+        said = probe(language, server.url, "streams", "p3at", "60", "0.6")
     lrf, odometry = said.one("lrf"), said.one("odometry")
     assert (
         lrf.startswith("TypeMismatch: p3at/LRF carries another version of planar_lidar_t")
@@ -76,17 +76,19 @@ def test_a_channel_of_another_version_and_a_silent_one(language):
 
 def test_good_samples_come_through(language):
     with fake() as server:
-        assert probe(language, server.url, "streams", "p3at", "1").one("lrf") == "none"
+        assert probe(language, server.url, "streams", "p3at", "60", "0").one("lrf") == "none"
 
 
 def test_a_pause_is_named_as_the_reason_of_silence(language):
     with fake("--paused") as server:
-        assert "paused" in probe(language, server.url, "streams", "p3at", "0.3").one("odometry")
+        assert "paused" in probe(language, server.url, "streams", "p3at", "60", "0.3").one(
+            "odometry"
+        )
 
 
 def test_broken_messages_are_errors_and_no_crash(language):
     with fake("--garbage") as server:
-        said = probe(language, server.url, "streams", "p3at", "2")
+        said = probe(language, server.url, "streams", "p3at", "60", "2")
     assert said.one("lrf").startswith("TypeMismatch: p3at/LRF")
     assert said.one("odometry").startswith("Timeout: ")
 
@@ -115,7 +117,7 @@ def stream_url(request, tmp_path):
 @pytest.mark.parametrize("sent", STUCK.values(), ids=STUCK.keys())
 def test_a_message_that_never_ends_holds_nobody_up(language, stream_url, sent):
     with LyingStream(stream_url, sent):
-        said = probe(language, stream_url, "streams", "p3at", "0.3")
+        said = probe(language, stream_url, "streams", "p3at", "0.3", "0.3")
     assert said.one("lrf").startswith("Timeout: ") and said.one("odometry").startswith("Timeout: ")
 
 
@@ -247,7 +249,7 @@ def test_datagrams_that_are_cut_off_are_passed_over(language):
     """One of them was enough: LCM's receiver reads behind its end."""
     url = free_url()
     with LyingDatagrams(url, lambda turn: cut()):
-        assert probe(language, url, "streams", "p3at", "2").one("lrf") == "none"
+        assert probe(language, url, "streams", "p3at", "60", "2").one("lrf") == "none"
 
 
 @pytest.mark.parametrize("size", [100, 60_000])
@@ -261,7 +263,9 @@ def test_fragments_that_never_make_a_message_take_no_memory(language, size):
     url = free_url()
     with LyingDatagrams(url, lies, 64):
         process = subprocess.Popen(
-            [*PROBES[language], url, "streams", "p3at", "8"], stdout=subprocess.PIPE, text=True
+            [*PROBES[language], url, "streams", "p3at", "60", "8"],
+            stdout=subprocess.PIPE,
+            text=True,
         )
         said = process.stdout.read()
         _, status, used = os.wait4(process.pid, 0)

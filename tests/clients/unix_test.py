@@ -101,7 +101,7 @@ def stopped_server(tmp_path):
 
 def test_a_stopped_server_is_waited_for(language, stopped_server):
     """However many looks at whether it is there its queue keeps."""
-    said = probe(language, stopped_server, "streams", "p3at", "7")
+    said = probe(language, stopped_server, "streams", "p3at", "7", "7")
     assert said.one("lrf").startswith("Timeout: "), said.text
     assert said.one("odometry").startswith("Timeout: "), said.text
 

@@ -276,10 +276,10 @@ public final class Probe {
         sim.sleep(0.2);
     }
 
-    private static void streams(Simulation sim, String name, double timeout) {
+    private static void streams(Simulation sim, String name, double lrf, double odometry) {
         Robot robot = sim.robot(name);
-        attempt("lrf", () -> robot.lrf().latest(timeout));
-        attempt("odometry", () -> robot.odometry().latest(timeout));
+        attempt("lrf", () -> robot.lrf().latest(lrf));
+        attempt("odometry", () -> robot.odometry().latest(odometry));
     }
 
     private static void control(Simulation sim, String name) throws InterruptedException {
@@ -533,7 +533,7 @@ public final class Probe {
                     markers(sim, a[0]);
                     break;
                 case "streams":
-                    streams(sim, a[0], Double.parseDouble(a[1]));
+                    streams(sim, a[0], Double.parseDouble(a[1]), Double.parseDouble(a[2]));
                     break;
                 case "control":
                     control(sim, a[0]);

@@ -246,10 +246,10 @@ void markers(const rc::Simulation& sim, const std::string& name) {
   sim.sleep(0.2);
 }
 
-void streams(const rc::Simulation& sim, const std::string& name, double timeout) {
+void streams(const rc::Simulation& sim, const std::string& name, double lrf, double odometry) {
   const rc::Robot robot = sim.robot(name);
-  report("lrf", [&] { (void)robot.lrf().latest(timeout); });
-  report("odometry", [&] { (void)robot.odometry().latest(timeout); });
+  report("lrf", [&] { (void)robot.lrf().latest(lrf); });
+  report("odometry", [&] { (void)robot.odometry().latest(odometry); });
 }
 
 void control(const rc::Simulation& sim, const std::string& name) {
@@ -473,7 +473,7 @@ void act(const std::string& url, const std::string& command, const std::vector<s
   if (command == "collisions") collisions(sim, a[0]);
   if (command == "errors") errors(sim, a[0]);
   if (command == "markers") markers(sim, a[0]);
-  if (command == "streams") streams(sim, a[0], std::stod(a[1]));
+  if (command == "streams") streams(sim, a[0], std::stod(a[1]), std::stod(a[2]));
   if (command == "control") control(sim, a[0]);
   if (command == "world") world(sim, a[0]);
   if (command == "snapshots") snapshots(sim);

@@ -198,10 +198,10 @@ def markers(sim, name):
     sim.sleep(0.2)
 
 
-def streams(sim, name, timeout):
+def streams(sim, name, lrf, odometry):
     robot = sim.robot(name)
-    attempt("lrf", lambda: robot.lrf.latest(float(timeout)))
-    attempt("odometry", lambda: robot.odometry.latest(float(timeout)))
+    attempt("lrf", lambda: robot.lrf.latest(float(lrf)))
+    attempt("odometry", lambda: robot.odometry.latest(float(odometry)))
 
 
 def control(sim, name):

@@ -15,7 +15,7 @@ from .. import _engine
 from ..files import MOST_YAML_BYTES, open_lock, read_bytes, sha256_of
 from .cluster import run_on_ray
 from .errors import CampaignError, SpecError
-from .local import Done, cores, run_local
+from .local import Crew, Done, cores
 from .names import check_names
 from .plan import Case, Planner, check_values, files_called, shard_of
 from .schema import CONTROLLER_NAME, HALF, NAME_RULES, Source, check, read_yaml
@@ -220,7 +220,12 @@ class Campaign:
         count = cores() if workers is None else workers
         if count < 1:
             raise CampaignError(f"{count} workers: 1 or more are needed")
-        return run_local(cases, str(self.folder), count)
+        return _on_this_machine(cases, str(self.folder), count)
+
+
+def _on_this_machine(cases: list[Case], folder: str, workers: int) -> Iterator[Done]:
+    with Crew(folder, workers) as crew:
+        yield from crew.run(cases)
 
 
 class Unchanged:

@@ -289,13 +289,13 @@ def _show(arguments: argparse.Namespace) -> int:
 
 
 def _repeat(arguments: argparse.Namespace) -> int:
-    from .local import Apart
+    from .local import Crew
 
     campaign = _campaign(arguments)
     case = campaign.case(arguments.CASE)
     log = Path(arguments.output or f"{case.id}.lcm").resolve()
-    with Apart(str(campaign.folder)) as apart:
-        outcome = apart.run(case.what, full_log=str(log))
+    with Crew(str(campaign.folder)) as crew:
+        outcome = crew.run_one(case.what, full_log=str(log))
     row = campaign.results().row(case)
     say(f"{outcome.status}{': ' + outcome.reason if outcome.reason else ''}")
     say(f"{log}: ruedo play {log} --view, ruedo verify {log}")

@@ -16,14 +16,14 @@ from typing import Any
 
 from .bundle import Bundle, log_moved, moved, name_of, pack, unpack
 from .errors import CampaignError, missing
-from .local import Done, Worker, failed, run_local
+from .local import Crew, Done, failed
 from .plan import DEFAULT_MEMORY_MB, Case
 
 _AHEAD = 4  # cases that wait at the cluster for each core
 _RETRIES = 5  # of a case whose node was lost
 _LOOK_S = 1.0  # between looks at the head node while no case ends
 _PATIENCE_S = 10.0  # that it may be away; Ray ends the whole program after 60
-_worker: tuple[str, Worker] | None = None  # of a process of Ray's: stays from case to case
+_crew: tuple[str, Crew] | None = None  # of a process of Ray's, in a folder; stays from case to case
 
 
 def run_on_ray(
@@ -200,11 +200,11 @@ def _remote(
             "install one build on all of them"
         )
     there = unpack(ray.get(packed[0]), name)
-    global _worker
-    if _worker and _worker[0] != there:
-        _worker[1].end()
-        _worker = None
-    crew = [_worker[1]] if _worker else []
+    global _crew
+    if _crew and _crew[0] != there:
+        _crew[1].end()
+        _crew = None
+    _crew = _crew or (there, Crew(there))
     case = Case(
         case.number,
         case.id,
@@ -215,6 +215,5 @@ def _remote(
         case.parameters,
         moved(case.what, folder, there),
     )
-    ((_, outcome, wall_s),) = run_local([case], there, 1, crew)
-    _worker = (there, crew[0])
+    ((_, outcome, wall_s),) = _crew[1].run([case])
     return outcome, wall_s, there

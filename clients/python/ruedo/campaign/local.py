@@ -96,94 +96,74 @@ class Worker:
         return code
 
 
-class Apart:
-    """Runs one case after the other in a process of its own, as a campaign does: what a controller
-    does to its process, or that it hangs, ends its case alone.
+class Crew:
+    """Workers that stay from one batch of cases to the next. What a controller does to its process,
+    or that it hangs, ends its case alone.
     """
 
-    def __init__(self, folder: str) -> None:
-        self._folder = folder
-        self._crew: list[Worker] = []
+    def __init__(self, folder: str, workers: int = 1) -> None:
+        self._folder, self._most = folder, workers
+        self._workers: list[Worker] = []
 
-    def __enter__(self) -> Apart:
+    def __enter__(self) -> Crew:
         return self
 
     def __exit__(self, *_: object) -> None:
-        for one in self._crew:
+        self.end()
+
+    def end(self) -> None:
+        for one in self._workers:
+            one.tell_to_end()
+        for one in self._workers:
             one.end()
+        self._workers = []
 
-    def run(self, what: dict[str, Any], full_log: str = "") -> Outcome:
-        """full_log: as of Runner.run()."""
-        case = Case(0, "apart", "", "", "", what["seed"], {}, what)
-        ((_, outcome, _),) = run_local([case], self._folder, 1, self._crew, full_log)
-        return Outcome(**outcome)
+    def run(self, cases: Iterable[Case], full_log: str = "") -> Iterator[Done]:
+        """Outcomes as they come. A case whose worker is killed has a second try, no third one.
 
-
-def run_local(
-    cases: Iterable[Case],
-    folder: str,
-    workers: int,
-    kept: list[Worker] | None = None,
-    full_log: str = "",
-) -> Iterator[Done]:
-    """Outcomes as they come. A case whose worker is killed is run once more, then it has failed.
-
-    kept: workers that are there already, and stay; new ones that take their place stand in it
-    afterwards. full_log: of a single case, as of Runner.run().
-    """
-    waiting = deque((case, 1) for case in cases)
-    crew: list[Worker] = [] if kept is None else kept
-    try:
-        while len(crew) < min(workers, len(waiting)):
-            crew.append(Worker(folder))
-        while waiting or any(one.case for one in crew):
-            for one in crew:
+        full_log: of a single case, as of Runner.run().
+        """
+        waiting = deque((case, 1) for case in cases)
+        while len(self._workers) < min(self._most, len(waiting)):
+            self._workers.append(Worker(self._folder))
+        while waiting or any(one.case for one in self._workers):
+            for one in self._workers:
                 if one.case is None and waiting:
                     one.give(*waiting.popleft(), full_log)
-            yield from _collect(crew, waiting, folder)
-    finally:
-        ending = crew if kept is None else []
-        for one in ending:
-            one.tell_to_end()
-        for one in ending:
-            one.end()
+            yield from self._collect(waiting)
 
+    def run_one(self, what: dict[str, Any], full_log: str = "") -> Outcome:
+        """Of what need not be a campaign's case, such as one with other faults."""
+        case = Case(0, "one", "", "", "", what["seed"], {}, what)
+        ((_, outcome, _),) = self.run([case], full_log)
+        return Outcome(**outcome)
 
-def _collect(crew: list[Worker], waiting: deque[tuple[Case, int]], folder: str) -> Iterator[Done]:
-    busy = [one for one in crew if one.case]
-    ready = wait([one.pipe for one in busy], min(one.left_s() for one in busy))
-    for one in busy:
-        assert one.case is not None
-        case, tries = one.case, one.tries
-        answer = one.take() if one.pipe in ready else None
-        if answer:
-            one.case = None
-            if waiting:
-                one.give(*waiting.popleft())  # before the result is dealt with: no core waits
-            yield case, *answer
-            continue
-        late = one.left_s() == 0.0
-        if one.pipe not in ready and not late:
-            continue
-        code = one.end()
-        crew[crew.index(one)] = Worker(folder)
-        if one.pipe not in ready:
-            yield (
-                case,
-                failed("timeout", too_slow(case.what["limits"]["wall"])),
-                case.what["limits"]["wall"],
-            )
-        elif tries < _TRIES:
-            waiting.appendleft((case, tries + 1))
-        else:
-            yield (
-                case,
-                failed(
-                    "crashed",
-                    f"the controller took its process with it ({how(code)}), {_TRIES} times",
-                ),
-                0.0,
-            )
+    def _collect(self, waiting: deque[tuple[Case, int]]) -> Iterator[Done]:
+        busy = [one for one in self._workers if one.case]
+        ready = wait([one.pipe for one in busy], min(one.left_s() for one in busy))
+        for one in busy:
+            assert one.case is not None
+            case, tries = one.case, one.tries
+            answer = one.take() if one.pipe in ready else None
+            if answer:
+                one.case = None
+                if waiting:
+                    one.give(*waiting.popleft())  # before the result is dealt with: no core waits
+                yield case, *answer
+                continue
+            late = one.left_s() == 0.0
+            if one.pipe not in ready and not late:
+                continue
+            code = one.end()
+            self._workers[self._workers.index(one)] = Worker(self._folder)
+            if one.pipe not in ready:
+                limit = case.what["limits"]["wall"]
+                yield case, failed("timeout", too_slow(limit)), limit
+            elif tries < _TRIES:
+                waiting.appendleft((case, tries + 1))
+            else:
+                reason = f"the controller took its process with it ({how(code)}), {_TRIES} times"
+                yield case, failed("crashed", reason), 0.0
 
 
 def failed(status: str, reason: str) -> dict[str, Any]:

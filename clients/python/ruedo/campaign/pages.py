@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from ..launch import find_ruedo
-from .local import Apart
+from .local import Crew
 from .plan import Case
 from .terminal import tell
 
@@ -37,8 +37,8 @@ def _make_page(campaign: Any, case: Case, row: dict[str, Any], page: Path) -> st
     """ "" or why there is none."""
     with tempfile.TemporaryDirectory(prefix="ruedo-page-") as scratch:
         log = Path(scratch) / "run.lcm"
-        with Apart(str(campaign.folder)) as apart:
-            outcome = apart.run(case.what, full_log=str(log))
+        with Crew(str(campaign.folder)) as crew:
+            outcome = crew.run_one(case.what, full_log=str(log))
         if not log.exists():
             return outcome.reason or "it left no log"
         if outcome.status != row["status"]:

@@ -13,7 +13,7 @@ from ..campaign import Campaign
 from ..campaign.case import Outcome as OutcomeOfCase
 from ..campaign.case import fault_text
 from ..campaign.errors import CampaignError, SpecError
-from ..campaign.local import Worker, cores, run_local
+from ..campaign.local import Crew, cores
 from ..campaign.names import check_names
 from ..campaign.plan import Case
 from ..campaign.worlds import MOST_WORLD_BYTES, beside, copy_beside, keep_text
@@ -95,11 +95,11 @@ class Hunt:
         self._check_faults()
         count = invalid = found_after = 0
         first_invalid = ""
-        with _Crew(str(self.folder), workers or cores()) as crew:
+        with Crew(str(self.folder), workers or cores()) as crew:
 
             def evaluate(several: list[Choices]) -> list[tuple[Outcome, float]]:
                 nonlocal count, invalid, found_after, first_invalid
-                outcomes = crew.run([self._case_or_why_not(one) for one in several])
+                outcomes = _run(crew, [self._case_or_why_not(one) for one in several])
                 for outcome in outcomes:
                     count += 1
                     if breaks(outcome):
@@ -226,24 +226,8 @@ class Hunt:
         return keep_text(text, store / home)
 
 
-class _Crew:
-    """Workers that stay from one batch to the next."""
-
-    def __init__(self, folder: str, workers: int) -> None:
-        self._folder, self._workers = folder, workers
-        self._crew: list[Worker] = []
-
-    def __enter__(self) -> _Crew:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        for one in self._crew:
-            one.end()
-
-    def run(self, cases: list[Case | Outcome]) -> list[Outcome]:
-        """In the order of the cases; what has its outcome already keeps it."""
-        found: dict[str, Outcome] = {}
-        wanted = list({case.id: case for case in cases if isinstance(case, Case)}.values())
-        for case, outcome, _ in run_local(wanted, self._folder, self._workers, self._crew):
-            found[case.id] = outcome
-        return [found[case.id] if isinstance(case, Case) else case for case in cases]
+def _run(crew: Crew, cases: list[Case | Outcome]) -> list[Outcome]:
+    """In the order of the cases; what has its outcome already keeps it."""
+    wanted = list({case.id: case for case in cases if isinstance(case, Case)}.values())
+    found = {case.id: outcome for case, outcome, _ in crew.run(wanted)}
+    return [found[case.id] if isinstance(case, Case) else case for case in cases]

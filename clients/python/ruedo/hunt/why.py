@@ -18,7 +18,7 @@ import numpy as np
 from ..campaign import Campaign, Case
 from ..campaign.case import fault_text, goals
 from ..campaign.errors import CampaignError, SpecError
-from ..campaign.local import Apart
+from ..campaign.local import Crew
 from ..campaign.store import Store
 from ..decoding import decode
 from ..engine import Engine
@@ -35,7 +35,7 @@ _PERIOD_S = 0.25  # between moments that are tried
 _AFTER_S = 3.0  # how long a branch goes on after the run failed
 _MOST = 80  # moments
 _HASHES_US = 1_000_000  # sim time between the states whose hash is in a log
-_Again = tuple[Apart, dict[str, Any]]  # what runs a campaign's case again, and its `what`
+_Again = tuple[Crew, dict[str, Any]]  # what runs a campaign's case again, and its `what`
 
 
 @dataclass
@@ -196,8 +196,8 @@ def why(path: str, seeds: int = 5) -> Answer:
     if "touched" in answer.reason:
         answer.rescues = _rescues(recorded, answer.failed_s)
     others = [seed for seed in range(1, seeds + 2) if seed != recorded.seed][:seeds]
-    with Apart(str(case[0].folder) if case else ".") as apart:
-        again = (apart, case[1].what) if case else None
+    with Crew(str(case[0].folder) if case else ".") as crew:
+        again = (crew, case[1].what) if case else None
         if others:
             answer.seeds = _branches(recorded, again, answer.failed_s, others)
         answer.changes = list(_changes(recorded, again, answer.failed_s, others))
@@ -304,10 +304,10 @@ def _branches(
 
 def _controlled(case: _Again) -> Callable[[dict[str, Any]], bool]:
     """Whether the case, its controller answering, passes with another fault."""
-    apart, what = case
+    crew, what = case
 
     def avoids(fault: dict[str, Any]) -> bool:
-        return apart.run({**what, "faults": [*what["faults"], fault]}).status == "passed"
+        return crew.run_one({**what, "faults": [*what["faults"], fault]}).status == "passed"
 
     return avoids
 
@@ -335,10 +335,10 @@ def _changes(
                 fault=[one for one in recorded.options["fault"] if one != fault],
             )
         return
-    apart, what = case
+    crew, what = case
 
     def tried(text: str, **changed: Any) -> tuple[str, bool, str]:
-        outcome = apart.run({**what, **changed})
+        outcome = crew.run_one({**what, **changed})
         return text, outcome.status == "passed", outcome.reason
 
     faults = what["faults"]
