@@ -1,7 +1,7 @@
 // The open panels are stored for each world separately. The caller serves another world on the same
 // address when told to.
 export default async function layout({ page, seen, told, until, expect, ready, picture }) {
-  expect(/WebSocket|ERR_CONNECTION|Failed to load|socket/);
+  expect(/WebSocket|net::ERR_|Failed to load|socket/); // its end cuts off what is under way
   const world = () => page.evaluate(() => window.ruedo.page.now.world.name);
   const open = () => {
     const { tab, layers } = window.ruedo.page.now;
