@@ -12,6 +12,7 @@
 #include <utility>
 
 #include <tbb/enumerable_thread_specific.h>
+#include <tbb/info.h>
 #include <tbb/task_arena.h>
 
 #include "core/enough_threads.h"
@@ -26,6 +27,7 @@ namespace ruedo::engine {
 namespace {
 
 const std::atomic<bool> kNeverLeftOff{false};
+constexpr int64_t kStepsAtOnce = 200;  // between looks at whether step() goes on
 
 // Sets rounding and denormal modes as in every computing thread, whatever the caller's program
 // uses; restores them at the end.
@@ -124,8 +126,9 @@ Engine::Engine(std::shared_ptr<const model::WorldModel> world, EngineOptions opt
     : world_(std::move(world)), options_(std::move(options)), arena_(std::make_unique<Arena>()) {
   if (options_.worlds < 1)
     throw InputError({}, "an engine has 1 world or more, not " + std::to_string(options_.worlds));
-  require_threads_for_cores(0);  // TBB's: see simulation.cpp
-  arena_->tasks.initialize(options_.threads > 0 ? options_.threads : tbb::task_arena::automatic);
+  require_threads_for_cores(0);                        // TBB's: see simulation.cpp
+  const int cores = tbb::info::default_concurrency();  // for more, TBB prints a warning
+  arena_->tasks.initialize(options_.threads > 0 ? std::min(options_.threads, cores) : cores);
   const DefaultFloatingPoint floating_point;
   copies_.resize(static_cast<size_t>(options_.worlds));
   copies_[0] = make_copy(
@@ -146,7 +149,10 @@ Engine::Engine(std::shared_ptr<const model::WorldModel> world, EngineOptions opt
   touching_->type = Primitive::int32;
   touching_->shape = {options_.worlds, static_cast<int64_t>(driven_.size())};
   touching_->values.resize(copies_.size() * driven_.size() * sizeof(int32_t));
-  for_each(copies_.size(), [this](size_t i) { compute(i, 1); });
+  for_each(copies_.size(), [this](size_t i) {
+    forget_touching(i);
+    compute(i, 1);
+  });
 }
 
 Engine::~Engine() = default;
@@ -206,6 +212,14 @@ void Engine::for_each(size_t count, const std::function<void(size_t)>& body) {
   });
 }
 
+void Engine::forget_touching(size_t index) {
+  std::fill_n(reinterpret_cast<int32_t*>(touching_->values.data()) + index * driven_.size(),
+              driven_.size(), 0);
+  std::vector<std::vector<LinkIndex>>& met = copies_[index]->met;
+  met.resize(driven_.size());
+  for (std::vector<LinkIndex>& one : met) one.clear();
+}
+
 void Engine::compute(size_t index, int64_t steps) {
   Copy& copy = *copies_[index];
   World& world = *copy.world;
@@ -215,9 +229,6 @@ void Engine::compute(size_t index, int64_t steps) {
   batch.read = handler_ ? nullptr : read_;
   auto* const touching =
       reinterpret_cast<int32_t*>(touching_->values.data()) + index * driven_.size();
-  std::fill_n(touching, driven_.size(), 0);
-  copy.met.resize(driven_.size());
-  for (std::vector<LinkIndex>& met : copy.met) met.clear();
   for (int64_t left = steps; left > 0; left -= batch.count) {
     batch.first_step = copy.step + 1;
     batch.count = static_cast<int>(std::min<int64_t>(left, kMaxBatchSteps));
@@ -353,15 +364,21 @@ void Engine::update(Observer& observer, size_t world) {
   }
 }
 
-void Engine::step(int64_t steps, std::span<const uint8_t> which) {
+void Engine::step(int64_t steps, std::span<const uint8_t> which,
+                  const std::function<bool()>& go_on) {
   if (steps < 1) throw InputError({}, "step() takes 1 step or more, not " + std::to_string(steps));
   if (!which.empty() && which.size() != copies_.size())
     throw InputError({}, "which worlds to step: " + std::to_string(copies_.size()) +
                              " values, one for each, not " + std::to_string(which.size()));
   const DefaultFloatingPoint floating_point;
-  for_each(copies_.size(), [&](size_t i) {
-    if (which.empty() || which[i] != 0) compute(i, steps);
-  });
+  for (int64_t done = 0; done < steps; done += kStepsAtOnce) {
+    if (done > 0 && go_on && !go_on()) return;
+    for_each(copies_.size(), [&](size_t i) {
+      if (!which.empty() && which[i] == 0) return;
+      if (done == 0) forget_touching(i);
+      compute(i, std::min(steps - done, kStepsAtOnce));
+    });
+  }
 }
 
 void Engine::drive(std::span<const double> velocities) {
@@ -452,6 +469,7 @@ void Engine::reset_one(const Reset& reset) {
     }
   }
   copies_[index] = std::move(copy);
+  forget_touching(index);
   compute(index, 1);
 }
 

@@ -63,9 +63,11 @@ class Engine {
   const std::vector<std::string>& driven() const { return driven_; }
   const Findings& findings() const { return findings_; }
 
-  // Computes that many states, at least 1: of every copy, or of those with a 1 in `which`. Throws
-  // std::runtime_error if a module failed.
-  void step(int64_t steps, std::span<const uint8_t> which = {});
+  // Computes that many states, at least 1: of every copy, or of those with a 1 in `which`. Between
+  // some of them, in which all copies have computed as many, `go_on` may say that it is enough.
+  // Throws std::runtime_error if a module failed.
+  void step(int64_t steps, std::span<const uint8_t> which = {},
+            const std::function<bool()>& go_on = {});
 
   // A velocity for every driven robot of every copy, acting on the current states: copies x driven
   // robots x (m/s forward, m/s left, rad/s), row-major. A row with a NaN gives no command: the
@@ -117,8 +119,8 @@ class Engine {
 
   uint64_t state_hash(int world) const;
 
-  // Called in step() and reset() with each message, in the order of copies and messages; nothing is
-  // computed in parallel then.
+  // Called in step() and reset() with each message, in the order of copies and messages (of a long
+  // step(), for each of its pieces); nothing is computed in parallel then.
   void on_message(MessageHandler handler) { handler_ = std::move(handler); }
   // The same for each state, before its messages.
   void on_state(StateHandler handler) { state_handler_ = std::move(handler); }
@@ -140,6 +142,7 @@ class Engine {
   void count_touching(Copy& copy, const Batch& batch, int32_t* counts) const;
   void take_velocities(size_t world);
   void compute(size_t world, int64_t steps);
+  void forget_touching(size_t world);
   void tell(size_t world, const Batch& batch);
   void update(Observer& observer, size_t world);
   void read(const std::vector<int>& channels);

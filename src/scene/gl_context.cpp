@@ -1,6 +1,11 @@
 #include "scene/gl_context.h"
 
+#include <unistd.h>
+
+#include <atomic>
+#include <cstdio>
 #include <cstdlib>
+#include <utility>
 
 #include "core/enough_threads.h"
 #include "core/late_library.h"
@@ -12,6 +17,55 @@ namespace {
 constexpr const char* kMesasCpu = "GALLIUM_OVERRIDE_CPU_CAPS";
 constexpr int kMesasOwnThreads = 4;  // for its caches
 bool set_by_us = false;
+
+std::atomic<pid_t> process_of_mesa{0};  // that of the first context
+
+bool has_mesas_threads() {
+  const pid_t here = ::getpid();
+  pid_t first = 0;
+  return process_of_mesa.compare_exchange_strong(first, here) || first == here;
+}
+
+void require_mesas_threads() {
+  if (has_mesas_threads()) return;
+  throw EnvironmentError(
+      "a process that was forked from one with pictures can draw none: start it by \"spawn\", as "
+      "with multiprocessing.get_context(\"spawn\"), or make_vec(..., vector_kwargs={\"context\": "
+      "\"spawn\"}) of Gymnasium");
+}
+
+// At a program's end Mesa waits for its threads. Registered behind Mesa, this comes before it.
+void end_without_mesas_threads(int code, void* /*unused*/) {
+  if (has_mesas_threads()) return;
+  std::fflush(nullptr);
+  ::_exit(code);
+}
+
+// Mesa draws with threads of its own, which a fork does not inherit: it would wait for them for
+// ever, to draw as to let go of a context.
+class ContextOfProcess : public GlContext {
+ public:
+  explicit ContextOfProcess(std::unique_ptr<GlContext> context) : context_(std::move(context)) {
+    static const int registered = ::on_exit(end_without_mesas_threads, nullptr);
+    (void)registered;
+  }
+  ~ContextOfProcess() override {
+    if (!has_mesas_threads()) (void)context_.release();
+  }
+  ContextOfProcess(const ContextOfProcess&) = delete;
+  ContextOfProcess& operator=(const ContextOfProcess&) = delete;
+
+  void make_current() override {
+    require_mesas_threads();
+    context_->make_current();
+  }
+  void release() override { context_->release(); }
+  Function function(const char* name) const override { return context_->function(name); }
+  std::string backend() const override { return context_->backend(); }
+
+ private:
+  std::unique_ptr<GlContext> context_;
+};
 
 }  // namespace
 
@@ -45,14 +99,17 @@ std::unique_ptr<GlContext> make_gl_context() {
   if (choice != "" && choice != "auto" && choice != "osmesa" && choice != "egl") {
     throw EnvironmentError("RUEDO_RENDERER=" + choice + ": allowed are osmesa, egl and auto");
   }
+  require_mesas_threads();
   // Mesa has one for each core, and waits for ever for those that could not be started.
   require_threads_for_cores(kMesasOwnThreads);
   std::string why_not_osmesa = "not tried", why_not_egl = "not tried";
   if (choice != "egl") {
-    if (auto context = make_osmesa_context(why_not_osmesa)) return context;
+    if (auto context = make_osmesa_context(why_not_osmesa))
+      return std::make_unique<ContextOfProcess>(std::move(context));
   }
   if (choice != "osmesa") {
-    if (auto context = make_egl_context(why_not_egl)) return context;
+    if (auto context = make_egl_context(why_not_egl))
+      return std::make_unique<ContextOfProcess>(std::move(context));
   }
   throw EnvironmentError("no renderer for cameras. OSMesa: " + why_not_osmesa + "; EGL: " +
                          why_not_egl + ". Install libosmesa6, or libegl1 with libgl1-mesa-dri");

@@ -19,7 +19,7 @@ from ruedo import Engine, World
 from ruedo.hunt import Hunt
 from ruedo.hunt.obstacles import with_boxes
 from ruedo.hunt.regression import moved
-from ruedo.lcmtypes import move_command_t, state_hash_t
+from ruedo.lcmtypes import log_header_t, move_command_t, state_hash_t
 
 EXAMPLE = SOURCE / "docs/campaign-example"
 
@@ -209,9 +209,17 @@ def test_why_branches_a_log_of_no_campaign_with_the_same_commands(tmp_path):
     assert "0 of 5 other seeds from 2.25 s on avoid it\n" in text
 
 
-@pytest.mark.parametrize("harm", ["no message", "a far step"])
+BROKEN = {  # and what is said of it
+    "no message": "at 1 s",
+    "a far step": "at 1 s",
+    "a wrong option": r"bad\.lcm: --set p3at/lrf\.update_rate: .*'\?\[31m' is not a rate",
+    "a seed above 2^63": "this run did not fail: nothing was touched",
+}
+
+
+@pytest.mark.parametrize("harm", BROKEN)
 def test_why_names_what_is_broken_in_a_log(tmp_path, harm):
-    """Regressions: the first gave a traceback, the second ran for ever."""
+    """Regressions: but for the second, which ran for ever, they gave a traceback."""
     log, bad = tmp_path / "run.lcm", tmp_path / "bad.lcm"
     options = ["--rate", "max", "--duration", "2", "--lcm", "memq://", "--record", str(log)]
     world = tmp_path / "wall.sdf"
@@ -223,11 +231,22 @@ def test_why_names_what_is_broken_in_a_log(tmp_path, harm):
         if event.channel == "ruedo/state_hash" and event.timestamp == 1_000_000:
             state = state_hash_t.decode(data)
             state.step = 2**40
-            data = state.encode() if harm == "a far step" else data[:8] + b"\x01" + data[9:-20]
+            if harm == "a far step":
+                data = state.encode()
+            elif harm == "no message":
+                data = data[:8] + b"\x01" + data[9:-20]
+        if event.channel == "ruedo/header":
+            header = log_header_t.decode(data)
+            if harm == "a wrong option":
+                header.options.append("--set=p3at/lrf.update_rate=\x1b[31m")
+                header.noptions += 1
+            elif harm == "a seed above 2^63":
+                header.seed = -1  # as it is written
+            data = header.encode()
         written.write_event(event.timestamp, event.channel, data)
     written.close()
     said = ruedo("why", bad, folder=tmp_path, code=3).stderr
-    assert "bad.lcm: " in said and "at 1 s" in said
+    assert "bad.lcm: " in said and re.search(BROKEN[harm], said), said
     assert said.count("\n") == 1
 
 

@@ -5,6 +5,7 @@ tests/run/engine_test.cpp's.
 import copy
 import math
 import pickle
+import signal
 import subprocess
 import sys
 
@@ -194,6 +195,20 @@ def test_messages_are_those_of_the_channels():
         np.testing.assert_allclose(e["pose.pos"][:, 0, 0], [0.1, 0.0], atol=1e-9)
 
 
+class Wrong:
+    """What looks like a message: encodes as that text, or as the type with a wrong field."""
+
+    def __init__(self, what):
+        self._what = what
+
+    def encode(self):
+        if isinstance(self._what, str):
+            return self._what
+        message = self._what()
+        message.utime = "now"
+        return message.encode()
+
+
 @pytest.mark.parametrize(
     "call, error, text",
     [
@@ -240,6 +255,36 @@ def test_messages_are_those_of_the_channels():
             ValueError,
             "no robot takes commands on 'r0/scan'",
         ),
+        (lambda e: e.step([math.inf, 0]), ValueError, "finite numbers, or NaN for none"),
+        (lambda e: e.step([10**400, 0]), TypeError, "commands are numbers, (m/s, rad/s)"),
+        (lambda e: e.step([1j, 0]), TypeError, "commands are numbers, (m/s, rad/s)"),
+        (lambda e: e.step(np.array([1, 2], "m8[s]")), TypeError, "commands are numbers"),
+        (lambda e: e.step(np.ma.masked_array([1.0, 2.0], [0, 1])), TypeError, "are numbers"),
+        (lambda e: e.observe("scan.\ud800"), ValueError, "with half a character in it"),
+        (lambda e: e.observe("scan.ran\0ges"), ValueError, "with a 0 character in it"),
+        (lambda e: e.observe("x" * 100_000 + ".y"), ValueError, "xxx... is no DEVICE.FIELD"),
+        (lambda e: e.command(0, "r0/velocity\0", b""), ValueError, "with a 0 character in it"),
+        (lambda e: e.command(0, "r0/velocity", Wrong("text")), TypeError, "one of ruedo.lcmtypes"),
+        (
+            lambda e: e.command(0, "r0/velocity", Wrong(lcmtypes.velocity_command_t)),
+            TypeError,
+            "a field of this Wrong is not what its type says: ",
+        ),
+        (lambda e: e.reset(0, seed=b"abc"), TypeError, "seed is a whole number, not b'abc'"),
+        (lambda e: e.reset(0, text="\0"), ValueError, "with a 0 character in it"),
+        (lambda e: e.begin_run(1, goals="1,1,1,1"), TypeError, "goals is a list of texts"),
+        (lambda e: e.begin_run(1, goals=[5]), TypeError, "goals is a list of texts; 5 is none"),
+        (lambda e: e.begin_run(1, no_contact="no"), TypeError, "no_contact is True or False"),
+        (lambda e: e.begin_run(1, clearance=math.nan), ValueError, "a finite number, 0 or more"),
+        (lambda e: e.begin_run(1, clearance="x"), TypeError, "clearance is a number, not 'x'"),
+        (lambda e: e.begin_run(1, odometry_error=-1), ValueError, "odometry_error is -1: it must"),
+        (lambda e: e.begin_run(1, clearance_reach=math.nan), ValueError, "clearance_reach is nan"),
+        (lambda e: e.begin_run(1, robot=None), TypeError, "robot is a text, not None"),
+        (
+            lambda e: (e.begin_run(1), e.reset(0)),
+            ValueError,
+            "a run that is judged goes ahead alone: end_run() comes first",
+        ),
         (lambda e: (e.close(), e.step()), RuntimeError, "closed"),
         (lambda e: (e.close(), e.messages()), RuntimeError, "closed"),
         (lambda e: (e.close(), e.end_run()), RuntimeError, "closed"),
@@ -263,6 +308,67 @@ def test_a_daemon_thread_may_be_at_work_when_the_program_ends():
     for _ in range(5):
         done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True)
         assert (done.returncode, done.stderr) == (0, "")
+
+
+def test_more_threads_than_cores_are_nothing_to_talk_about():
+    """Regression: TBB wrote a warning to the program's standard error."""
+    program = f"import ruedo\nruedo.Engine('w.sdf', text={world()!r}, threads=4096).step(n=9)"
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True)
+    assert (done.returncode, done.stdout + done.stderr) == (0, "")
+
+
+def test_a_signal_ends_a_step_that_is_long():
+    """After as many steps in all copies, and the engine goes on from there."""
+
+    class Enough(Exception):
+        pass
+
+    def enough(*_):
+        raise Enough
+
+    before = signal.signal(signal.SIGALRM, enough)
+    try:
+        with engine(worlds=3) as e, engine(worlds=3) as straight:
+            signal.setitimer(signal.ITIMER_REAL, 0.2)
+            with pytest.raises(Enough):
+                e.step([0.1, 0.0], 2**62)
+            steps = e.steps()
+            assert steps > 0 and {e.steps(i) for i in range(3)} == {steps}
+            e.step(n=7)
+            straight.step([0.1, 0.0], steps + 7)
+            assert [e.state_hash(i) for i in range(3)] == [straight.state_hash(i) for i in range(3)]
+    finally:
+        signal.signal(signal.SIGALRM, before)
+
+
+def test_a_long_step_counts_touches_as_short_ones_do():
+    with engine(noise=False) as e, engine(noise=False) as pieces:
+        e.step([1.0, 0.0], 1000)  # the wall is 1.75 m ahead
+        sums = np.zeros_like(e.touching())
+        for _ in range(20):
+            pieces.step([1.0, 0.0], 50)
+            sums += pieces.touching()
+        assert 100 < e.touching()[0, 0] == sums[0, 0]
+        assert e.collisions() == {"r0": ["wall/l"]}
+
+
+def test_messages_are_recorded_in_a_judged_run_too():
+    with engine(record=True) as e:
+        e.begin_run(1)
+        first = e.messages()
+        e.step(n=40)
+        during = e.messages()
+        e.end_run()
+        e.step(n=40)
+        assert {name for *_, name, _ in first} and {step for _, step, *_ in during} >= {20, 40}
+        assert {step for _, step, *_ in e.messages()} >= {60, 80}
+
+
+def test_a_seed_may_be_an_array_of_one_number():
+    with engine(worlds=2) as e:
+        e.reset(1, seed=np.array(5))
+        with engine(worlds=2, seed=4) as other:
+            assert e.state_hash(1) == other.state_hash(1)
 
 
 def test_what_is_refused_changes_nothing():
@@ -298,6 +404,15 @@ def test_what_is_refused_changes_nothing():
         ({"text": 5}, TypeError, "text is a world's SDF as text, not 5"),
         ({"world": "arena", "disable": "p3at/camera"}, TypeError, "disable is a list of texts"),
         ({"world": "arena", "spawn": ["p3at"]}, ValueError, "MODEL[:NAME]@X,Y[,YAW]"),
+        ({"world": ""}, ValueError, "world is '': it is a file or the name of a world"),
+        ({"world": "arena\0"}, ValueError, "world is 'arena\\x00', with a 0 character in it"),
+        ({"world": "\ud800"}, ValueError, "with half a character in it"),
+        ({"text": "\ud800"}, ValueError, "with half a character in it"),
+        ({"world": "arena", "spawn": ["p3at@1,2\0"]}, ValueError, "with a 0 character in it"),
+        ({"world": "arena", "set": {"\0": 1}}, ValueError, "with a 0 character in it"),
+        ({"world": "arena", "noise": np.ones(2, bool)}, TypeError, "noise is True or False"),
+        ({"world": "arena", "plugin": [1]}, TypeError, "plugin is a list of texts; 1 is none"),
+        ({"world": "arena", "plugin": None}, TypeError, "plugin is a list of texts, not None"),
         ({"world": "arena", "set": {"p3at/LRF.update_rate": "fast"}}, ValueError, "update_rate"),
     ],
 )

@@ -4,7 +4,10 @@ says.
 
 import copy
 import math
+import os
 import pickle
+import subprocess
+import sys
 import urllib.request
 import xml.etree.ElementTree as ET
 
@@ -170,6 +173,9 @@ def test_seeds_and_masks_of_many():
         ({"options": {"reset_mask": [True]}}, "True or False for each of 2 environments"),
         ({"options": {"reset_mask": [1, 0]}}, "True or False for each of 2 environments"),
         ({"options": {"reset_mask": None}}, "True or False for each of 2 environments"),
+        ({"options": {"reset_maks": [True, False]}}, "'reset_maks'; there is reset_mask"),
+        ({"options": 1}, "options is a dict, not 1"),
+        ({"seed": b"ab"}, "seed is a whole number, not b'ab'"),
     ],
 )
 def test_a_reset_that_is_refused_changes_nothing(wrong, text):
@@ -575,11 +581,101 @@ def test_a_fleet_sees_its_goals():
         ({"beams": 2.5}, "beams is a whole number, not 2.5"),
         ({"obstacles": -1}, "obstacles is -1; allowed are 0 to 100"),
         ({"randomize": ["p3at.x"]}, "randomize is a dict"),
+        ({"autoreset_mode": "x"}, "autoreset_mode is 'x'; allowed are 'NextStep', 'SameStep'"),
     ],
 )
 def test_wrong_options_are_refused(options, text):
     with pytest.raises((ValueError, TypeError), match=text):
         ruedo.gym.NavigateVectorEnv(2, **options)
+
+
+@pytest.mark.parametrize("option", ["num_envs", "autoreset_mode"])
+def test_options_of_many_are_for_many(option):
+    with pytest.raises(TypeError, match=f"{option} is for gymnasium.make_vec"):
+        gymnasium.make("ruedo/Push-v0", disable_env_checker=True, **{option: 3})
+
+
+@pytest.mark.parametrize("mode", ["Disabled", "SameStep"])
+def test_what_was_never_reset_gives_no_rewards(mode):
+    envs = ruedo.gym.NavigateVectorEnv(3, beams=2, autoreset_mode=mode)
+    first = {"reset_mask": np.array([True, False, False])}
+    envs.reset(seed=1, options=first)
+    with pytest.raises(gymnasium.error.ResetNeeded, match="for environment 1 before the first"):
+        envs.step(np.zeros((3, 2)))
+    with pytest.raises(gymnasium.error.ResetNeeded, match="for environment 2 before save"):
+        envs.save([0, 2])
+    envs.restore(envs.save(0), [1, 2])
+    rewards = envs.step(np.zeros((3, 2)))[1]
+    assert rewards[0] == rewards[1] == rewards[2]
+    envs.close()
+
+
+def test_a_mask_names_what_is_saved():
+    """Regression: it was taken for the indices 1, 0 and 1."""
+    envs = ruedo.gym.NavigateVectorEnv(3, beams=2)
+    envs.reset(seed=1)
+    saved = envs.save(np.array([True, False, True]))
+    assert [one.world.world for one in saved._episodes] == [0, 2]
+    envs.restore(saved, [False, True, True])
+    assert envs.scenes[1] is envs.scenes[0]
+    with pytest.raises(ValueError, match="a mask is True or False for each of 3 environments"):
+        envs.save([True, False])
+    envs.close()
+
+
+ASYNC = """
+import gymnasium, numpy as np, ruedo.gym
+options = {"render_mode": "rgb_array"} if "Camera" not in TASK else {}
+envs = gymnasium.make_vec(TASK, num_envs=2, vectorization_mode="async", **options)
+first, _ = envs.reset(seed=1)
+after = envs.step(np.zeros((2, 2), np.float32))[0]
+frames = envs.render() if options else first
+assert np.ptp(frames[1]) > 0
+envs.close()
+one = ruedo.gym.CameraVectorEnv(2, autoreset_mode="Disabled")
+if not options:
+    assert (one.reset(seed=1)[0] == first).all() and (one.step(np.zeros((2, 2)))[0] == after).all()
+print("well")
+"""
+
+
+@pytest.mark.parametrize("task", ["Navigate", "Camera"])
+def test_environments_with_pictures_run_in_gymnasiums_processes(task):
+    """Which are forked. Regression: Mesa's threads were not, and were waited for without end."""
+    program = ASYNC.replace("TASK", f"'ruedo/{task}-v0'")
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True)
+    assert (done.returncode, done.stdout) == (0, "well\n"), done.stderr
+
+
+FORKED = """
+import os, sys, ruedo.gym
+env = ruedo.gym.CameraEnv()
+env.reset(seed=1)
+child = os.fork()
+if child:
+    sys.exit(os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]))
+for call in (lambda: env.step([0, 0]), lambda: ruedo.gym.CameraEnv().reset()):
+    try:
+        call()
+        sys.exit(1)
+    except OSError as error:
+        assert "forked from one with pictures can draw none" in str(error), error
+env.close()
+ruedo.gym.PushEnv().reset(seed=1)
+sys.exit(7)
+"""
+
+
+@pytest.mark.parametrize("renderer", ["osmesa", "egl"])
+def test_a_fork_of_who_has_drawn_draws_nothing(renderer):
+    """It says so, closes what it has of the other's, and ends as any process does."""
+    done = subprocess.run(
+        [sys.executable, "-c", FORKED],
+        capture_output=True,
+        text=True,
+        env={**os.environ, "RUEDO_RENDERER": renderer},
+    )
+    assert done.returncode == 7, done.stderr
 
 
 def test_wrong_actions_are_refused():
@@ -592,6 +688,8 @@ def test_wrong_actions_are_refused():
         (good[:1], r"the shape \(2, 2\), not \(1, 2\)"),
         (good * math.nan, "finite numbers"),
         ("ahead", "actions are numbers of shape"),
+        (good * 1j, "actions are numbers of shape"),
+        ([[10**400, 0]] * 2, "actions are numbers of shape"),
     ):
         with pytest.raises((ValueError, TypeError), match=text):
             envs.step(actions)

@@ -7,6 +7,7 @@ import sys
 from pathlib import Path
 
 import numpy as np
+import pytest
 import ruedo.gym
 
 EXAMPLE = Path(__file__).resolve().parents[2] / "clients/python/examples/navigate"
@@ -34,6 +35,28 @@ def test_it_reaches_its_goals_in_rooms_that_it_has_never_seen():
 
 def test_it_is_a_few_kb():
     assert (EXAMPLE / "policy.npz").stat().st_size < 10_000
+
+
+WRONG = {
+    "a text": lambda file: file.write_text("root:x:0"),
+    "nothing": lambda file: file.write_text(""),
+    "one array": lambda file: np.save(file.open("wb"), np.ones(3)),
+    "no such names": lambda file: np.savez(file, a=np.ones(3), b=np.ones(3)),
+    "no numbers": lambda file: np.savez(
+        file, weights0=np.full((7, 2), np.nan), offsets0=np.ones(2)
+    ),
+    "three outputs": lambda file: np.savez(file, weights0=np.ones((7, 3)), offsets0=np.ones(3)),
+    "no beams": lambda file: np.savez(file, weights0=np.ones((5, 2)), offsets0=np.ones(2)),
+    "other offsets": lambda file: np.savez(file, weights0=np.ones((7, 2)), offsets0=np.ones(1)),
+}
+
+
+@pytest.mark.parametrize("what", WRONG)
+def test_what_is_no_policy_is_refused(tmp_path, what):
+    file = tmp_path / "policy.npz"
+    WRONG[what](file)
+    with pytest.raises(ValueError, match="policy.npz: is no policy that save"):
+        Policy.load(file)
 
 
 def test_it_drives_a_server_over_lcm_and_its_run_verifies(tmp_path):

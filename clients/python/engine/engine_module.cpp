@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <memory>
 #include <optional>
+#include <span>
 #include <stdexcept>
 #include <string>
 #include <unordered_map>
@@ -76,6 +77,16 @@ class Unlocked {
   PyThreadState* const state_;
 };
 
+// Whether a signal has come, and its handler raised an exception. Called without Python's lock.
+bool interrupts() {
+  bool raised = false;
+  call_python([&raised] {
+    const nb::gil_scoped_acquire locked;
+    raised = PyErr_CheckSignals() != 0;
+  });
+  return raised;
+}
+
 struct Recorded {
   int world;
   int64_t step;
@@ -126,15 +137,8 @@ class PyEngine {
     if (!noise) result_options_.push_back("--no-noise");
     for (const ruedo::Plugin& each : ruedo::loaded_plugins())
       result_options_.push_back("--plugin=" + each.name + "@" + each.sha256);
-    if (record) {
-      engine_->on_message([this](int copy, int64_t step, const ruedo::engine::Channel& channel,
-                                 std::span<const uint8_t> bytes) {
-        recorded_.push_back({copy,
-                             step,
-                             channel.bus_name,
-                             {reinterpret_cast<const char*>(bytes.data()), bytes.size()}});
-      });
-    }
+    records_ = record;
+    watch(false);
   }
 
   Engine& engine() const {
@@ -152,8 +156,17 @@ class PyEngine {
             const std::optional<nb::ndarray<const uint8_t, nb::c_contig, nb::device::cpu>>& which) {
     Engine& engine = this->engine();
     recorded_.clear();
-    const AtWork at_work(*this);
-    which ? engine.step(steps, {which->data(), which->size()}) : engine.step(steps);
+    bool interrupted = false;
+    {
+      const AtWork at_work(*this);
+      engine.step(steps,
+                  which ? std::span(which->data(), which->size()) : std::span<const uint8_t>(),
+                  [&interrupted] {
+                    interrupted = interrupts();
+                    return !interrupted;
+                  });
+    }
+    if (interrupted) throw nb::python_error();  // what a signal's handler raised
   }
 
   void drive(const nb::ndarray<const double, nb::c_contig, nb::device::cpu>& velocities) {
@@ -168,6 +181,7 @@ class PyEngine {
   void reset(const std::vector<int>& worlds, const std::vector<uint64_t>& seeds,
              const std::vector<std::string>& texts) {
     Engine& engine = this->engine();
+    refuse_in_a_run(worlds);
     recorded_.clear();
     const AtWork at_work(*this);
     std::vector<Engine::Reset> resets;
@@ -184,8 +198,7 @@ class PyEngine {
 
   void restore(const Saved& saved, const std::vector<int>& worlds) {
     Engine& engine = this->engine();
-    if (run_ && std::find(worlds.begin(), worlds.end(), 0) != worlds.end())
-      throw ruedo::InputError({}, "a run that is judged goes ahead alone: end_run() comes first");
+    refuse_in_a_run(worlds);
     recorded_.clear();
     const AtWork at_work(*this);
     engine.restore(*saved.world, worlds);
@@ -221,12 +234,8 @@ class PyEngine {
         [this](int copy, const ruedo::Snapshot& snapshot, const ruedo::engine::Batch& batch) {
           if (copy == 0 && run_) run_->see(snapshot, batch, engine_->inputs(0));
         });
-    engine.on_message([this, everything](int copy, int64_t, const ruedo::engine::Channel& channel,
-                                         std::span<const uint8_t> bytes) {
-      if (copy != 0 || !run_) return;
-      run_->judge().see(channel.name, bytes);
-      if (everything) run_->record_message(channel.bus_name, bytes);
-    });
+    watch(everything);
+    recorded_.clear();
     engine.reset(0, seed);
   }
 
@@ -253,7 +262,7 @@ class PyEngine {
     verdict["track"] = track;
     run_.reset();
     engine.on_state({});
-    engine.on_message({});
+    watch(false);
     return verdict;
   }
 
@@ -306,6 +315,28 @@ class PyEngine {
           "the engine is at work in another thread: it is for one at a time; make one for each");
   }
 
+  // Messages are kept, judged and logged as they are wanted. everything: the log has all of them.
+  void watch(bool everything) {
+    if (!records_ && !run_) return engine_->on_message({});
+    engine_->on_message([this, everything](int copy, int64_t step,
+                                           const ruedo::engine::Channel& channel,
+                                           std::span<const uint8_t> bytes) {
+      if (records_)
+        recorded_.push_back({copy,
+                             step,
+                             channel.bus_name,
+                             {reinterpret_cast<const char*>(bytes.data()), bytes.size()}});
+      if (copy != 0 || !run_) return;
+      run_->judge().see(channel.name, bytes);
+      if (everything) run_->record_message(channel.bus_name, bytes);
+    });
+  }
+
+  void refuse_in_a_run(const std::vector<int>& worlds) const {
+    if (run_ && std::find(worlds.begin(), worlds.end(), 0) != worlds.end())
+      throw ruedo::InputError({}, "a run that is judged goes ahead alone: end_run() comes first");
+  }
+
   // Texts that come again are read once.
   std::shared_ptr<const ruedo::model::WorldModel> read(const std::string& text) {
     constexpr size_t kMostKept = 256;
@@ -318,7 +349,7 @@ class PyEngine {
   std::unique_ptr<ruedo::model::TextLoader> texts_;
   std::unordered_map<std::string, std::shared_ptr<const ruedo::model::WorldModel>> read_;
   std::unique_ptr<Engine> engine_;
-  bool randomized_ = false, at_work_ = false;
+  bool randomized_ = false, records_ = false, at_work_ = false;
   std::shared_ptr<const ruedo::model::WorldModel> world_;
   std::vector<std::string> findings_, result_options_;
   std::optional<ruedo::log_header_t> header_;

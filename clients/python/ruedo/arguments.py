@@ -7,6 +7,9 @@ import operator
 from collections.abc import Iterable, Mapping
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from .errors import CONTROL
 
 MOST_WHOLE = 2**63 - 1
@@ -33,7 +36,7 @@ def whole(what: str, value: Any, low: int = 0, high: int = MOST_WHOLE) -> int:
 
 
 def texts(what: str, value: Any) -> list[str]:
-    """A list of texts. Raises TypeError."""
+    """A list of texts. Raises TypeError and ValueError."""
     if isinstance(value, str):
         raise TypeError(f"{what} is a list of texts, not one: {what}=[{shown(value)}]")
     if not isinstance(value, Iterable) or isinstance(value, Mapping):
@@ -42,6 +45,7 @@ def texts(what: str, value: Any) -> list[str]:
     for one in given:
         if not isinstance(one, str):
             raise TypeError(f"{what} is a list of texts; {shown(one)} is none")
+        text(what, one)
     return given
 
 
@@ -58,17 +62,24 @@ def switch(what: str, value: Any) -> bool:
     """True or False. Raises TypeError."""
     if isinstance(value, (str, bytes)) or value is None:
         raise TypeError(f"{what} is True or False, not {shown(value)}")
-    return bool(value)
+    try:
+        return bool(value)
+    except ValueError:  # an array of several
+        raise TypeError(f"{what} is True or False, not {shown(value)}") from None
 
 
 def text(what: str, value: Any) -> str:
-    """A text that UTF-8 can hold. Raises TypeError and ValueError."""
+    """A text that UTF-8 can hold, without a 0 character, at which C ends it. Raises TypeError and
+    ValueError.
+    """
     if not isinstance(value, str):
         raise TypeError(f"{what} is a text, not {shown(value)}")
     try:
         value.encode()
     except UnicodeEncodeError:
         raise ValueError(f"{what} is {shown(value)}, with half a character in it") from None
+    if "\0" in value:
+        raise ValueError(f"{what} is {shown(value)}, with a 0 character in it")
     return value
 
 
@@ -95,12 +106,26 @@ def number(what: str, value: Any) -> float:
         raise TypeError(f"{what} is a number, not {shown(value)}") from None
 
 
-def finite(what: str, value: Any) -> float:
-    """A finite number. Raises TypeError and ValueError."""
+def finite(what: str, value: Any, low: float = -math.inf) -> float:
+    """A finite number, low or more. Raises TypeError and ValueError."""
     given = number(what, value)
-    if not math.isfinite(given):
-        raise ValueError(f"{what} is {value}: it must be a finite number")
+    if not math.isfinite(given) or given < low:
+        allowed = "" if low == -math.inf else f", {low:g} or more"
+        raise ValueError(f"{what} is {value}: it must be a finite number{allowed}")
     return given
+
+
+def array(what: str, value: Any) -> NDArray[np.float64]:
+    """Real numbers of any shape. What is no number, and what an array of them would lose of its
+    values (imaginary parts, masks, units of time), is refused. Raises TypeError.
+    """
+    try:
+        given = np.asarray(value)
+        if given.dtype.kind in "biufO" and not isinstance(value, np.ma.MaskedArray):
+            return given.astype(np.float64, copy=False)
+    except (TypeError, ValueError, OverflowError):
+        pass
+    raise TypeError(f"{what}, not {shown(value)}") from None
 
 
 def numbers(what: str, values: Any, count: int) -> list[float]:

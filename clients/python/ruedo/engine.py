@@ -13,6 +13,7 @@ the same steps. There is no network and no clock.
 from __future__ import annotations
 
 import os
+import struct
 from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
@@ -20,7 +21,18 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from . import _engine
-from .arguments import MOST_SEED, MOST_WHOLE, named, switch, texts, whole
+from .arguments import (
+    MOST_SEED,
+    MOST_WHOLE,
+    array,
+    finite,
+    named,
+    shown,
+    switch,
+    texts,
+    whole,
+)
+from .arguments import text as checked_text
 
 if TYPE_CHECKING:
     from typing_extensions import Self
@@ -28,6 +40,7 @@ if TYPE_CHECKING:
 __all__ = ["Engine", "SavedWorld"]
 
 MOST_WORLDS = 2**31 - 1
+_MOST_FIELD = 1000  # characters of DEVICE.FIELD
 
 
 class Saved:
@@ -81,7 +94,8 @@ class Engine:
 
     Raises ValueError for what is wrong in the file or an argument, with file, line, value and what
     is allowed; OSError for what the machine lacks. Not for several threads at once; ``step`` lets
-    other Python threads run.
+    other Python threads run. A process that was forked may use engines, but draws no pictures where
+    the one before had drawn some: OSError.
     """
 
     def __init__(
@@ -103,11 +117,15 @@ class Engine:
         record: bool = False,
     ) -> None:
         if not isinstance(world, (str, os.PathLike)):
-            raise TypeError(f"world is a file or the name of a world, not {world!r}")
+            raise TypeError(f"world is a file or the name of a world, not {shown(world)}")
+        if not checked_text("world", os.fspath(world)):
+            raise ValueError("world is '': it is a file or the name of a world")
         if not isinstance(text, (str, type(None))):
-            raise TypeError(f"text is a world's SDF as text, not {text!r}")
-        if isinstance(plugin, str):
-            raise TypeError(f"plugin is a list of texts, not one: plugin=[{plugin!r}]")
+            raise TypeError(f"text is a world's SDF as text, not {shown(text)}")
+        if text is not None:
+            checked_text("text", text)
+        if isinstance(plugin, Iterable) and not isinstance(plugin, str):
+            plugin = [os.fspath(one) if isinstance(one, os.PathLike) else one for one in plugin]
         worlds = whole("worlds", worlds, 1, MOST_WORLDS)
         seed = whole("seed", seed, 0, MOST_SEED - worlds + 1)
         settings = named("set", set, '{"p3at/lrf.update_rate": 10}')
@@ -121,11 +139,11 @@ class Engine:
             threads=whole("threads", threads, 0, 4096),
             spawn=texts("spawn", spawn),
             drive=texts("drive", drive),
-            set=[f"{key}={value}" for key, value in settings.items()],
+            set=texts("set", [f"{key}={value}" for key, value in settings.items()]),
             disable=texts("disable", disable),
             fault=texts("fault", fault),
-            randomize=[f"{target}={drawn}" for target, drawn in draws.items()],
-            plugin=[os.fspath(one) for one in plugin],
+            randomize=texts("randomize", [f"{one}={drawn}" for one, drawn in draws.items()]),
+            plugin=texts("plugin", plugin),
             record=switch("record", record),
         )
         self._worlds = self._core.worlds()
@@ -182,19 +200,21 @@ class Engine:
 
         goals: "X,Y,RADIUS,BY". clearance_reach: m, smaller clearances are measured. log: a file
         that ``ruedo verify`` repeats; with everything: all messages, else only what acted on the
-        run and hashes of its state.
+        run and hashes of its state. Until :meth:`end_run`, copy 0 is neither reset nor restored.
         """
         seed = whole("seed", seed, 0, MOST_SEED)
         self._core.begin_run(
             seed,
-            goals=list(goals),
-            no_contact=no_contact,
-            clearance=clearance,
-            odometry_error=odometry_error,
-            clearance_reach=float(clearance_reach),
-            robot=robot,
-            log=log,
-            everything=everything,
+            goals=texts("goals", goals),
+            no_contact=switch("no_contact", no_contact),
+            clearance=None if clearance is None else finite("clearance", clearance, 0.0),
+            odometry_error=(
+                None if odometry_error is None else finite("odometry_error", odometry_error, 0.0)
+            ),
+            clearance_reach=finite("clearance_reach", clearance_reach, 0.0),
+            robot=checked_text("robot", robot),
+            log=checked_text("log", log),
+            everything=switch("everything", everything),
         )
         self._seeds[0] = seed
 
@@ -227,12 +247,12 @@ class Engine:
         what you keep. Robots are those that have the device, in the order of the world file.
         """
         if not isinstance(name, str):
-            raise TypeError(f"a field is named by a text, DEVICE.FIELD, not by {name!r}")
-        device, dot, field = name.rpartition(".")
-        if not dot or not device or not field:
-            raise ValueError(f"{name!r} is no DEVICE.FIELD; for example 'lrf.ranges'")
-        array: NDArray[Any] = self._core.observe(device, field)
-        return array
+            raise TypeError(f"a field is named by a text, DEVICE.FIELD, not by {shown(name)}")
+        device, dot, field = checked_text("a field", name).rpartition(".")
+        if not dot or not device or not field or len(name) > _MOST_FIELD:
+            raise ValueError(f"{shown(name)} is no DEVICE.FIELD; for example 'lrf.ranges'")
+        values: NDArray[Any] = self._core.observe(device, field)
+        return values
 
     def __getitem__(self, name: str) -> NDArray[Any]:
         return self.observe(name)
@@ -250,16 +270,21 @@ class Engine:
         ahead, rad/s) or (worlds, robots, 3) as (m/s ahead, m/s left, rad/s); a row with NaN is no
         command. What was commanded before holds, until the robot's watchdog (600 ms of sim time by
         default).
+
+        Every 200 steps signals are looked at: what their handlers raise (Ctrl-C) ends it there.
+        All copies have computed as many steps then; :meth:`steps` says where they are.
         """
         if not hasattr(n, "__index__"):
-            raise TypeError(f"n is a whole number of steps, not {n!r}; a step is {self.dt:g} s")
+            raise TypeError(
+                f"n is a whole number of steps, not {shown(n)}; a step is {self.dt:g} s"
+            )
         count = whole("n", n, 1)
         which = None
         if worlds is not None:
             mask = np.asarray(worlds)
             if mask.dtype != bool or mask.shape != (self._worlds,):
                 raise ValueError(
-                    f"worlds is a mask, True or False for each of {self._worlds} worlds, not {worlds!r}"
+                    f"worlds is a mask, True or False for each of {self._worlds} worlds, not {shown(worlds)}"
                 )
             which = np.ascontiguousarray(mask).view(np.uint8)
         if commands is not None:
@@ -276,14 +301,11 @@ class Engine:
         message: one of ``ruedo.lcmtypes``, or its bytes.
         """
         if not isinstance(channel, str):
-            raise TypeError(f"a channel is named by a text, ROBOT/velocity, not by {channel!r}")
-        if not isinstance(message, bytes):
-            if isinstance(message, str) or not hasattr(message, "encode"):
-                raise TypeError(
-                    f"a message is one of ruedo.lcmtypes, or its bytes, not {message!r}"
-                )
-            message = message.encode()
-        self._core.command(self._checked(world), channel, message)
+            raise TypeError(
+                f"a channel is named by a text, ROBOT/velocity, not by {shown(channel)}"
+            )
+        checked_text("a channel", channel)
+        self._core.command(self._checked(world), channel, _bytes_of(message))
 
     def touching(self) -> NDArray[np.int32]:
         """(worlds, driven robots): in how many of the states of the last ``step`` a robot ran into
@@ -291,8 +313,8 @@ class Engine:
 
         Like what ``observe`` gives, it is a view. ``collisions`` names what was touched.
         """
-        array: NDArray[np.int32] = self._core.touching()
-        return array
+        counts: NDArray[np.int32] = self._core.touching()
+        return counts
 
     def collisions(self, world: int = 0) -> dict[str, list[str]]:
         """The robots of a copy that ran into something in the states of the last ``step``, each
@@ -318,7 +340,7 @@ class Engine:
         count = len(indices)
         if seed is None:
             seeds = [self._seeds[index] for index in indices]
-        elif isinstance(seed, (Sequence, np.ndarray)) and not isinstance(seed, str):
+        elif isinstance(seed, (list, tuple, range, np.ndarray)) and np.ndim(seed) > 0:
             seeds = [whole("seed", one, 0, MOST_SEED) for one in seed]
             if len(seeds) != count:
                 raise ValueError(f"{len(seeds)} seeds for {count} worlds")
@@ -328,7 +350,7 @@ class Engine:
         if text is None:
             worlds_of = []
         else:
-            worlds_of = [text] * count if isinstance(text, str) else texts("text", text)
+            worlds_of = texts("text", [text] * count if isinstance(text, str) else text)
             if len(worlds_of) != count:
                 raise ValueError(f"{len(worlds_of)} texts for {count} worlds")
         self._core.reset(indices, seeds, worlds_of)
@@ -357,7 +379,7 @@ class Engine:
         have its seed, too.
         """
         if not isinstance(saved, SavedWorld):
-            raise TypeError(f"restore() takes what save() gave, not {saved!r}")
+            raise TypeError(f"restore() takes what save() gave, not {shown(saved)}")
         indices = [saved.world] if worlds is None else self._indices(worlds)
         self._core.restore(saved._saved_core, indices)
         for index in indices:
@@ -401,12 +423,9 @@ class Engine:
         return f"<ruedo.Engine: {self._worlds} worlds, robots {', '.join(self._robots) or 'none'}, steps of {self.dt * 1e3:g} ms>"
 
     def _velocities(self, commands: ArrayLike) -> NDArray[np.float64]:
-        try:
-            given = np.asarray(commands, dtype=np.float64)
-        except (TypeError, ValueError):
-            raise TypeError(
-                f"commands are numbers, (m/s, rad/s) for each robot of each world, not {commands!r}"
-            ) from None
+        given = array("commands are numbers, (m/s, rad/s) for each robot of each world", commands)
+        if np.isinf(given).any():
+            raise ValueError("commands are finite numbers, or NaN for none; one is infinite")
         if given.ndim == 0 or given.shape[-1] not in (2, 3):
             raise ValueError(
                 f"commands have 2 values for a robot (m/s, rad/s) or 3 (m/s ahead, m/s left, rad/s) in their last axis; "
@@ -443,3 +462,19 @@ class Engine:
                 )
             return [int(i) for i in np.flatnonzero(given)]
         return [self._checked(i) for i in np.atleast_1d(given)]
+
+
+def _bytes_of(message: Any) -> bytes:
+    """Of one of ruedo.lcmtypes, or as they are."""
+    if isinstance(message, bytes):
+        return message
+    if isinstance(message, str) or not hasattr(message, "encode"):
+        raise TypeError(f"a message is one of ruedo.lcmtypes, or its bytes, not {shown(message)}")
+    try:
+        encoded = message.encode()
+    except (struct.error, TypeError, ValueError, AttributeError, IndexError) as error:
+        name = type(message).__name__
+        raise TypeError(f"a field of this {name} is not what its type says: {error}") from None
+    if not isinstance(encoded, bytes):
+        raise TypeError(f"a message is one of ruedo.lcmtypes, or its bytes, not {shown(message)}")
+    return encoded

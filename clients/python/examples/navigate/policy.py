@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
 from pathlib import Path
+from zipfile import BadZipFile
 
 import numpy as np
 from numpy.typing import NDArray
+
+VALUES, ACTION = 5, 2  # observed behind the beams; commanded
 
 
 class Policy:
@@ -27,7 +31,7 @@ class Policy:
     @property
     def beams(self) -> int:
         """How many beams of the scan it was trained with; five other values follow them."""
-        return len(self.layers[0][0]) - 5
+        return len(self.layers[0][0]) - VALUES
 
     def save(self, file: str | Path) -> None:
         arrays = {}
@@ -40,14 +44,27 @@ class Policy:
 
     @classmethod
     def load(cls, file: str | Path | None = None) -> Policy:
-        """From a file that save() wrote; None: the one beside this program."""
-        with np.load(file or Path(__file__).resolve().parent / "policy.npz") as arrays:
-            return cls(
-                [
-                    (
-                        arrays[f"weights{i}"].astype(np.float32),
-                        arrays[f"offsets{i}"].astype(np.float32),
-                    )
-                    for i in range(len(arrays.files) // 2)
-                ]
-            )
+        """From a file that save() wrote; None: the one beside this program. Raises ValueError."""
+        file = file or Path(__file__).resolve().parent / "policy.npz"
+        try:
+            with np.load(file) as arrays:
+                names = [(f"weights{i}", f"offsets{i}") for i in range(len(arrays.files) // 2)]
+                layers = [tuple(arrays[one].astype(np.float32) for one in two) for two in names]
+        except (ValueError, KeyError, TypeError, AttributeError, EOFError, BadZipFile):
+            layers = []
+        if not _fit(layers):
+            raise ValueError(f"{file}: is no policy that save() wrote")
+        return cls(layers)
+
+
+def _fit(layers: list[tuple[NDArray[np.float32], ...]]) -> bool:
+    """Whether each takes what the one before gives, and the last gives an action."""
+    if not layers or any(weights.ndim != 2 for weights, _ in layers):
+        return False
+    return (
+        len(layers[0][0]) > VALUES
+        and layers[-1][0].shape[1] == ACTION
+        and all(one.shape[1] == len(next_one) for (one, _), (next_one, _) in pairwise(layers))
+        and all(offsets.shape == weights.shape[1:] for weights, offsets in layers)
+        and all(np.isfinite(values).all() for layer in layers for values in layer)
+    )

@@ -55,8 +55,10 @@ class Campaign:
             file = Path(spec)
             try:
                 text = read_bytes(file, MOST_YAML_BYTES).decode()
-            except (OSError, UnicodeDecodeError) as error:
-                raise SpecError(f"{file}: cannot be read: {error}") from None
+            except OSError as error:
+                raise SpecError(f"{file}: cannot be read: {error.strerror or error}") from None
+            except UnicodeDecodeError as error:
+                raise SpecError(f"{file}: is no UTF-8: byte {error.start} is none") from None
             self._content, self.source = read_yaml(str(file), text)
             self.file, self.folder, stem = file.resolve(), file.resolve().parent, file.stem
         check(self._content, self.source)

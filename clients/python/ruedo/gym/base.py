@@ -5,7 +5,7 @@ autoreset, pictures of the scene.
 from __future__ import annotations
 
 import copy
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING, Any, Literal
 
 import gymnasium
@@ -15,7 +15,7 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
-from ..arguments import whole
+from ..arguments import array, shown, whole
 from ..engine import MOST_WORLDS, Engine, Saved, SavedWorld
 from ..rooms import TEST_ROOMS, Scene
 
@@ -113,15 +113,15 @@ class TaskVectorEnv(MadeAnew, VectorEnv):
     ) -> None:
         num_envs = whole("num_envs", num_envs, 1, MOST_WORLDS)
         if split not in ("train", "test"):
-            raise ValueError(f"split is {split!r}; allowed are 'train' and 'test'")
+            raise ValueError(f"split is {shown(split)}; allowed are 'train' and 'test'")
         if render_mode not in MODES:
             raise ValueError(
-                f"render_mode is {render_mode!r}; allowed are None, 'rgb_array' and 'human'"
+                f"render_mode is {shown(render_mode)}; allowed are None, 'rgb_array' and 'human'"
             )
         if render_mode == "human" and num_envs != 1:
             raise ValueError("render_mode 'human' is for one environment: the console shows one")
         self.num_envs = num_envs
-        self.autoreset_mode = AutoresetMode(autoreset_mode)
+        self.autoreset_mode = checked_mode(autoreset_mode)
         self.metadata = {**self.metadata, "autoreset_mode": self.autoreset_mode}
         self.render_mode = render_mode
         self.single_observation_space = observations
@@ -147,11 +147,11 @@ class TaskVectorEnv(MadeAnew, VectorEnv):
         self._console: Console | None = None
         self._places = self._engine.observe("pose.pos")
         self._turned = self._engine.observe("pose.orientation")
-        self._frames = (
-            self._engine.observe("overview.data")[:, 0] if render_mode == "rgb_array" else None
-        )
+        # Pictures are observed when they are first wanted: Gymnasium makes an environment to look
+        # at its spaces before it forks, and after a picture none can be drawn in a fork.
         self._actions = np.zeros(num_envs, int)
         self._over = np.ones(num_envs, bool)  # wait for a reset
+        self._unbegun = np.ones(num_envs, bool)  # have waited since they were made
 
     # ---- What a task says.
 
@@ -202,7 +202,9 @@ class TaskVectorEnv(MadeAnew, VectorEnv):
     def _act(
         self, actions: NDArray[np.float64]
     ) -> tuple[NDArray[Any], NDArray[np.float64], NDArray[np.bool_], NDArray[np.bool_], Info]:
-        if not hasattr(self, "_generators"):
+        if self.autoreset_mode is not AutoresetMode.NEXT_STEP:
+            self._check_begun(range(self.num_envs), "the first step()")
+        elif not hasattr(self, "_generators"):
             raise gymnasium.error.ResetNeeded("call reset() before the first step()")
         begun = None  # these show their beginning: their first action is the next one
         if self.autoreset_mode is AutoresetMode.NEXT_STEP and self._over.any():
@@ -237,13 +239,14 @@ class TaskVectorEnv(MadeAnew, VectorEnv):
         self._begin(np.flatnonzero(self._over))
         return self._observe()
 
-    def save(self, indices: int | Sequence[int] | None = None) -> SavedEpisodes:
-        """The episodes of these environments (None: of all) as they stand, with all that decides
-        what follows: the world, goals, how many actions there were, and the seeds of the episodes
-        to come. It costs some 0.1 ms each, however long they have run.
+    def save(self, indices: int | Sequence[int] | NDArray[Any] | None = None) -> SavedEpisodes:
+        """The episodes of these environments (an index, several, a mask, or None for all) as they
+        stand, with all that decides what follows: the world, goals, how many actions there were,
+        and the seeds of the episodes to come. It costs some 0.1 ms each, however long they have
+        run.
         """
-        if not hasattr(self, "_generators"):
-            raise gymnasium.error.ResetNeeded("call reset() before save()")
+        these = self._indices(indices)
+        self._check_begun(these, "save()")
         return SavedEpisodes(
             [
                 _SavedEpisode(
@@ -252,21 +255,21 @@ class TaskVectorEnv(MadeAnew, VectorEnv):
                     copy.deepcopy(self._generators[i]),
                     {name: rows[i].copy() for name, rows in self._rows().items()},
                 )
-                for i in self._indices(indices)
+                for i in these
             ]
         )
 
     def restore(
-        self, saved: SavedEpisodes, indices: int | Sequence[int] | None = None
+        self, saved: SavedEpisodes, indices: int | Sequence[int] | NDArray[Any] | None = None
     ) -> tuple[NDArray[Any], Info]:
         """Makes episodes what they were: for the same actions, what follows is what followed, byte
         for byte. Returns the observations of all environments, as `reset` does.
 
-        indices: which environments; as many as were saved, or any number where it was one. None:
-        those that were saved.
+        indices: which environments (a mask, too); as many as were saved, or any number where it was
+        one. None: those that were saved.
         """
         if not isinstance(saved, SavedEpisodes):
-            raise TypeError(f"restore() takes what save() gave, not {saved!r}")
+            raise TypeError(f"restore() takes what save() gave, not {shown(saved)}")
         if self.render_mode == "human":
             raise ValueError(
                 "render_mode 'human' repeats an episode from its beginning, and cannot go back"
@@ -300,9 +303,10 @@ class TaskVectorEnv(MadeAnew, VectorEnv):
         """Seen from above: a picture of (256, 256, 3) for each environment; None where the console
         shows it.
         """
-        if self._frames is None:
+        if self.render_mode != "rgb_array":
             return None
-        return tuple(self._frames.reshape(self.num_envs, PICTURE, PICTURE, 3).copy())
+        frames = self._engine.observe("overview.data")[:, 0]
+        return tuple(frames.reshape(self.num_envs, PICTURE, PICTURE, 3).copy())
 
     def close_extras(self, **_: object) -> None:
         if self._console:
@@ -327,7 +331,7 @@ class TaskVectorEnv(MadeAnew, VectorEnv):
     def _seeds(self, seed: int | Sequence[int | None] | None) -> list[int | None]:
         if seed is None:
             return [None] * self.num_envs
-        if not isinstance(seed, (list, tuple, np.ndarray)):
+        if not isinstance(seed, (list, tuple, range, np.ndarray)) or np.ndim(seed) == 0:
             first = whole("seed", seed, 0, MOST_SEED - self.num_envs + 1)
             return [first + i for i in range(self.num_envs)]
         if len(seed) != self.num_envs:
@@ -335,21 +339,34 @@ class TaskVectorEnv(MadeAnew, VectorEnv):
         return [None if one is None else whole("seed", one, 0, MOST_SEED) for one in seed]
 
     def _masked(self, options: Info | None) -> NDArray[np.intp]:
-        if not options or "reset_mask" not in options:
+        check_options(options)
+        if not options:
             return np.arange(self.num_envs)
-        mask = np.asarray(options["reset_mask"])
+        if others := options.keys() - {"reset_mask"}:  # misspelt: all would be reset
+            raise ValueError(f"options has {shown(others.pop())}; there is reset_mask")
+        return self._of_mask("reset_mask", np.asarray(options["reset_mask"]))
+
+    def _of_mask(self, what: str, mask: NDArray[Any]) -> NDArray[np.intp]:
         if mask.dtype != bool or mask.shape != (self.num_envs,):
             raise ValueError(
-                f"reset_mask is True or False for each of {self.num_envs} environments, "
-                f"not {options['reset_mask']!r}"
+                f"{what} is True or False for each of {self.num_envs} environments, not {shown(mask)}"
             )
         return np.flatnonzero(mask)
 
-    def _indices(self, indices: int | Sequence[int] | None) -> list[int]:
+    def _indices(self, indices: int | Sequence[int] | NDArray[Any] | None) -> list[int]:
         if indices is None:
             return list(range(self.num_envs))
-        given = [indices] if np.ndim(indices) == 0 else list(indices)  # type: ignore[arg-type]
-        return [whole("an environment's index", i, 0, self.num_envs - 1) for i in given]
+        given = np.asarray(indices)
+        if given.dtype == bool:
+            given = self._of_mask("a mask", given)
+        return [
+            whole("an environment's index", i, 0, self.num_envs - 1) for i in np.atleast_1d(given)
+        ]
+
+    def _check_begun(self, indices: Iterable[int], call: str) -> None:
+        if waiting := [i for i in indices if self._unbegun[i]]:
+            which = "" if len(waiting) == self.num_envs else f" for environment {waiting[0]}"
+            raise gymnasium.error.ResetNeeded(f"call reset(){which} before {call}")
 
     def _restore_worlds(self, episodes: list[_SavedEpisode], into: list[int]) -> None:
         """Of one world into many in one call: that takes all cores."""
@@ -369,6 +386,7 @@ class TaskVectorEnv(MadeAnew, VectorEnv):
         self._engine.reset(indices, seed=seeds, text=texts)
         self._actions[indices] = 0
         self._over[indices] = False
+        self._unbegun[indices] = False
         self._begun(indices)
         if self.render_mode == "human":
             self._show(texts[0], seeds[0])
@@ -398,6 +416,8 @@ class TaskEnv(MadeAnew, gymnasium.Env):
     def __init__(
         self, render_mode: Literal["rgb_array", "human"] | None = None, **options: Any
     ) -> None:
+        if several := {"num_envs", "autoreset_mode"} & options.keys():
+            raise TypeError(f"{min(several)} is for gymnasium.make_vec(): this is one environment")
         self._one = self.task(
             num_envs=1, autoreset_mode=AutoresetMode.DISABLED, render_mode=render_mode, **options
         )
@@ -408,6 +428,7 @@ class TaskEnv(MadeAnew, gymnasium.Env):
     def reset(
         self, *, seed: int | None = None, options: Info | None = None
     ) -> tuple[NDArray[Any], Info]:
+        check_options(options)
         if seed is not None:
             seed = whole("seed", seed, 0, MOST_SEED)
         super().reset(seed=seed)
@@ -487,15 +508,26 @@ def checked_beams(beams: int) -> int:
 
 def checked_actions(actions: Any, space: spaces.Space[Any]) -> NDArray[np.float64]:
     """Finite numbers in the space's shape. Raises TypeError and ValueError."""
-    try:
-        given = np.asarray(actions, np.float64)
-    except (TypeError, ValueError):
-        raise TypeError(f"actions are numbers of shape {space.shape}, not {actions!r}") from None
+    given = array(f"actions are numbers of shape {space.shape}", actions)
     if given.shape != space.shape:
         raise ValueError(f"actions have the shape {space.shape}, not {given.shape}")
     if not np.isfinite(given).all():
-        raise ValueError(f"actions are finite numbers, not {actions!r}")
+        raise ValueError(f"actions are finite numbers, not {shown(actions)}")
     return given
+
+
+def checked_mode(mode: Any) -> AutoresetMode:
+    try:
+        return AutoresetMode(mode)
+    except ValueError:
+        allowed = ", ".join(repr(one.value) for one in AutoresetMode)
+        raise ValueError(f"autoreset_mode is {shown(mode)}; allowed are {allowed}") from None
+
+
+def check_options(options: Any) -> None:
+    """Of a reset. Raises TypeError."""
+    if not isinstance(options, (dict, type(None))):
+        raise TypeError(f"options is a dict, not {shown(options)}")
 
 
 DRIVE = spaces.Box(-1.0, 1.0, (2,), np.float32)

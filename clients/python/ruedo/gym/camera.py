@@ -58,7 +58,6 @@ class CameraVectorEnv(TaskVectorEnv):
             disabled=("robot/lrf", "robot/sonar_front", "robot/sonar_rear"),
             randomize=randomize,
         )
-        self._pictures = self._engine.observe("camera.data")[:, 0]
         self._touching = self._engine.touching()[:, 0]
         self._goals = np.zeros((num_envs, 2))
         self._distance = np.zeros(num_envs)
@@ -88,10 +87,8 @@ class CameraVectorEnv(TaskVectorEnv):
         return distances
 
     def _observe(self) -> NDArray[np.uint8]:
-        pictures: NDArray[np.uint8] = self._pictures.reshape(
-            self.num_envs, PIXELS, PIXELS, 3
-        ).copy()
-        return pictures
+        pictures = self._engine.observe("camera.data")[:, 0]
+        return pictures.reshape(self.num_envs, PIXELS, PIXELS, 3).copy()
 
 
 class CameraEnv(TaskEnv):

@@ -26,6 +26,7 @@ from .base import (
     PICTURE,
     STEPS,
     MadeAnew,
+    check_options,
     checked_actions,
     checked_beams,
     drive_commands,
@@ -111,6 +112,7 @@ class FleetEnv(MadeAnew, ParallelEnv):  # type: ignore[misc]    # PettingZoo's g
         return self._drives[agent]
 
     def reset(self, seed: int | None = None, options: Each | None = None) -> tuple[Each, Each]:
+        check_options(options)
         if seed is not None:
             self._generator = np.random.default_rng(whole("seed", seed, 0, MOST_SEED))
         number = int(self._generator.integers(TEST_ROOMS))

@@ -9,6 +9,7 @@ from __future__ import annotations
 import json
 import os
 from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
@@ -88,12 +89,13 @@ class Recorded:
                 steps, utime = state.step, state.utime
         if header is None:
             raise SpecError(f"{path}: is no log of a run")
-        return Recorded(
-            path, header.world_file, header.seed, _options(header.options, path), commands, steps
-        )
+        seed = header.seed % 2**64  # a message has no unsigned numbers
+        options = _options(header.options, path)
+        return Recorded(path, header.world_file, seed, options, commands, steps)
 
     def engine(self, worlds: int = 1, **changed: Any) -> Engine:
-        return Engine(self.world, worlds=worlds, seed=self.seed, **{**self.options, **changed})
+        with self._blamed():
+            return Engine(self.world, worlds=worlds, seed=self.seed, **{**self.options, **changed})
 
     def replay(self, engine: Engine, until: int, from_step: int = 0) -> None:
         """The commands act again, on every copy, up to the state of that step."""
@@ -102,10 +104,19 @@ class Recorded:
                 continue
             if step > engine.steps():
                 engine.step(None, step - engine.steps())
-            for copy in range(engine.worlds):
-                engine.command(copy, channel, message)
+            with self._blamed():
+                for copy in range(engine.worlds):
+                    engine.command(copy, channel, message)
         if until > engine.steps():
             engine.step(None, until - engine.steps())
+
+    @contextmanager
+    def _blamed(self) -> Iterator[None]:
+        """What is wrong is so in the log."""
+        try:
+            yield
+        except ValueError as error:
+            raise SpecError(f"{self.path}: {error}") from None
 
 
 def _options(texts: list[str], path: str) -> dict[str, Any]:
@@ -235,7 +246,7 @@ def _as_it_was(recorded: Recorded, case: tuple[Campaign, Case] | None) -> Answer
         recorded.replay(engine, recorded.steps)
         failures = engine.end_run()["failures"]
     if not failures:
-        raise CampaignError(
+        raise SpecError(
             f"{recorded.path}: this run did not fail: {'its controller did' if case else 'nothing was touched'}"
         )
     return Answer(failures[0]["time_s"], f"{failures[0]['time_s']:.3f} s: {failures[0]['text']}")
