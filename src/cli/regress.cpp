@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstdlib>
 #include <filesystem>
+#include <limits>
 
 #include <fmt/format.h>
 #include <fnmatch.h>
@@ -19,6 +20,7 @@
 #include "cli/signal_thread.h"
 #include "cli/to_stderr.h"
 #include "cli/view.h"
+#include "core/input_file.h"
 #include "core/json.h"
 #include "core/output_file.h"
 #include "core/progress.h"
@@ -99,35 +101,38 @@ std::string run(const RegressArguments& arguments,
   return fault;
 }
 
+bool fits_any(const std::string& channel, const std::vector<std::string>& patterns) {
+  return std::any_of(patterns.begin(), patterns.end(), [&](const std::string& pattern) {
+    return fnmatch(pattern.c_str(), channel.c_str(), 0) == 0;
+  });
+}
+
+bool holds_any(const std::string& path, const std::vector<std::string>& patterns) {
+  log::Reader log(path);
+  log::Event event;
+  while (log.next(event)) {
+    if (fits_any(event.channel, patterns)) return true;
+  }
+  return false;
+}
+
 // A log's events on the channels that are kept.
 void keep_channels(const std::string& from, const std::string& to,
                    const std::vector<std::string>& patterns) {
-  const auto kept = [&](const std::string& channel) {
-    return std::any_of(patterns.begin(), patterns.end(), [&](const std::string& pattern) {
-      return fnmatch(pattern.c_str(), channel.c_str(), 0) == 0;
-    });
-  };
   log::Reader log(from);
   log::Writer writer(to);
   log::Event event;
-  int64_t count = 0;
   while (log.next(event)) {
-    if (!kept(event.channel)) continue;
-    writer.write(event.timestamp_us, event.channel, event.data.data(), event.data.size());
-    ++count;
+    if (fits_any(event.channel, patterns))
+      writer.write(event.timestamp_us, event.channel, event.data.data(), event.data.size());
   }
   writer.flush();
   if (!writer.error().empty()) throw EnvironmentError(to + ": " + writer.error());
-  if (count == 0)
-    throw InputError(
-        {}, fmt::format("--keep {}: no message is on such a channel", fmt::join(patterns, " ")));
 }
 
 // What differs from the golden log, or "".
 std::string compare(const RegressArguments& arguments, const std::string& kept,
                     const std::vector<log::DiffRule>& rules) {
-  if (std::error_code unreadable; !fs::exists(arguments.golden, unreadable))
-    return "there is no golden log " + arguments.golden + " yet: run this once with RUEDO_RENEW=1";
   const log::Diff result = log::diff_logs(arguments.golden, kept, rules);
   if (!arguments.junit.empty()) write_file(arguments.junit, log::diff_junit(result));
   if (!arguments.html.empty())
@@ -135,6 +140,29 @@ std::string compare(const RegressArguments& arguments, const std::string& kept,
   return result.same()
              ? ""
              : "the run differs from " + arguments.golden + ":\n" + log::diff_text(result);
+}
+
+// Holds the run against its golden log, or writes that one anew. What is wrong, or "".
+std::string hold_to_golden(const RegressArguments& arguments,
+                           const std::vector<log::DiffRule>& rules, bool renew) {
+  const std::string &golden = arguments.golden, kept = arguments.record + ".kept";
+  if (std::error_code unreadable; !renew && !fs::exists(golden, unreadable))
+    return "there is no golden log " + golden + " yet: run this once with RUEDO_RENEW=1";
+  // A run that lacks what the golden log holds differs; --keep is wrong where neither has it.
+  if (!holds_any(arguments.record, arguments.keep) &&
+      (renew || !holds_any(golden, arguments.keep))) {
+    throw InputError({}, fmt::format("--keep {}: no message of the run is on such a channel",
+                                     fmt::join(arguments.keep, " ")));
+  }
+  keep_channels(arguments.record, kept, arguments.keep);
+  if (!renew) return compare(arguments, kept, rules);
+  if (const fs::path folder = fs::path(golden).parent_path(); !folder.empty()) {
+    std::error_code error;  // writing the log reports what is wrong
+    fs::create_directories(folder, error);
+  }
+  write_file(golden, read_input(kept, std::numeric_limits<size_t>::max()));
+  fmt::print("renewed {}\n", golden);
+  return "";
 }
 
 std::string run_script(const RegressArguments& arguments) {
@@ -225,30 +253,25 @@ int regress(RegressArguments arguments) {
     failures.push_back(judge::to_line(failure));
   const size_t end_of_judged = failures.size();
   if (!arguments.golden.empty()) {
-    const std::string kept = arguments.record + ".kept";
-    if (const fs::path folder = fs::path(arguments.golden).parent_path();
-        renew && !folder.empty()) {
-      std::error_code error;  // opening the log reports what is wrong
-      fs::create_directories(folder, error);
+    std::string fault;
+    try {
+      fault = hold_to_golden(arguments, rules, renew && failures.empty());
+    } catch (const std::exception& error) {  // must not hide what has failed before
+      if (failures.empty()) throw;
+      fault = error.what();
     }
-    keep_channels(arguments.record, renew && failures.empty() ? arguments.golden : kept,
-                  arguments.keep);
-    if (renew && failures.empty()) {
-      fmt::print("renewed {}\n", arguments.golden);
-    } else if (std::string difference = compare(arguments, kept, rules); !difference.empty()) {
-      failures.push_back(difference);
-    }
+    if (!fault.empty()) failures.push_back(fault);
   }
   if (!arguments.script.empty()) {
     if (std::string fault = run_script(arguments); !fault.empty()) failures.push_back(fault);
   }
+  for (const std::string& line : failures) to_stderr("FAILED: {}\n", line);
   if (!arguments.json.empty()) {
     std::vector<std::string> faults = failures;
     faults.erase(faults.begin() + static_cast<std::ptrdiff_t>(begin_of_judged),
                  faults.begin() + static_cast<std::ptrdiff_t>(end_of_judged));
     write_verdict(arguments.json, faults, judge);
   }
-  for (const std::string& line : failures) to_stderr("FAILED: {}\n", line);
   if (!failures.empty() && !arguments.no_page) attach_page(arguments.record);
   if (failures.empty()) fmt::print("passed; the run is in {}\n", arguments.record);
   return failures.empty() ? kGood : kCheckFailed;

@@ -185,7 +185,12 @@ def test_another_way_is_the_first_difference(prefix, tmp_path):
         (["--script", "test -s $RUEDO_LOG && exit 7"], 1, r"the script ended with exit code 7"),
         (["--robot", "nobody"], 2, r"--robot 'nobody': the world has p3at"),
         (["--goal", "4,0,0.3"], 2, r"X,Y,RADIUS,BY"),
-        (["--keep", "nothing/*", "--golden", "never.lcm"], 2, r"no message is on such a channel"),
+        (["--golden", "never.lcm"], 1, r"there is no golden log never.lcm yet"),
+        (
+            ["--golden", "never.lcm", "--renew", "--keep", "nothing/*"],
+            2,
+            r"--keep nothing/\*: no message",
+        ),
     ],
 )
 def test_what_does_not_hold_is_said(prefix, options, code, words, tmp_path):

@@ -1,0 +1,87 @@
+"""ruedo regress and its golden logs: what is written, what is told, and the exit codes."""
+
+import json
+import subprocess
+
+import pytest
+from recorded import RUEDO, events, program
+
+WORLD = """<sdf version='1.9'><world name='w'><include><uri>model://ground_plane</uri></include>
+<include><uri>model://p3at</uri></include></world></sdf>"""
+RUN = ["--duration", "0.5", "--disable", "p3at/camera", "--no-page", "--record"]
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    """A world, and the golden log of its run."""
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "w.sdf").write_text(WORLD)
+    done = regress("--renew")
+    assert done.returncode == 0 and "renewed g.lcm" in done.stdout, done
+    return tmp_path
+
+
+def regress(*options, golden="g.lcm"):
+    return program("regress", "w.sdf", *RUN, "run.lcm", "--golden", golden, *options)
+
+
+def test_a_run_equals_its_golden_log(folder):
+    assert {channel for _, channel, _ in events("g.lcm")} == {"p3at/pose"}
+    done = regress()
+    assert done.returncode == 0 and "passed" in done.stdout and not done.stderr, done
+    done = regress("--spawn", "p3at:other@3,0")
+    assert done.returncode == 1 and "FAILED: the run differs from g.lcm" in done.stderr, done
+
+
+@pytest.mark.parametrize(
+    "options", [["--keep", "nosuch"], ["--client", "true", "--lockstep", "1"]], ids=" ".join
+)
+def test_a_run_with_nothing_to_keep_costs_no_golden_log(folder, options):
+    """Regression: the golden log was emptied before it was known what would be written."""
+    before = (folder / "g.lcm").read_bytes()
+    done = regress("--renew", *options)
+    assert done.returncode == 2 and "no message of the run is on such a channel" in done.stderr, (
+        done
+    )
+    assert (folder / "g.lcm").read_bytes() == before
+
+
+def test_a_golden_log_outlives_a_full_disk(folder):
+    """Regression: it was cut off."""
+    (folder / "disk").mkdir()
+    full = (
+        "mount -t tmpfs -o size=64k tmpfs disk && echo kept > disk/g.lcm; cat /dev/zero > disk/fill"
+        '; cat /dev/zero >> disk/fill; "$@"; echo $?; cat disk/g.lcm; ls disk'
+    )
+    command = [RUEDO, "regress", "w.sdf", *RUN, "run.lcm", "--golden", "disk/g.lcm", "--renew"]
+    done = subprocess.run(
+        ["unshare", "-rm", "sh", "-c", full, "sh", *command],
+        capture_output=True,
+        text=True,
+        errors="replace",
+    )
+    assert done.stdout.split()[-4:] == ["4", "kept", "fill", "g.lcm"], done
+    assert "disk/g.lcm cannot be written: No space left on device" in done.stderr
+
+
+@pytest.mark.parametrize("keep", [[], ["--keep", "nosuch"]], ids=str)
+def test_what_failed_is_told_whatever_the_golden_log_says(folder, keep):
+    """Regression: `--keep */pose: no message is on such a channel` was all that was said of a
+    client that had failed at once.
+    """
+    done = regress("--client", "false", "--lockstep", "1", "--json", "verdict.json", *keep)
+    assert done.returncode == 1, done
+    fault = "the client ended with exit code 1"
+    assert f"FAILED: {fault}" in done.stderr
+    assert json.loads((folder / "verdict.json").read_text())["faults"][0] == fault
+
+
+def test_a_run_without_what_the_golden_log_holds_differs(folder):
+    done = regress("--client", "true", "--lockstep", "1")
+    assert done.returncode == 1 and "messages of p3at/pose are missing" in done.stderr, done
+
+
+def test_a_golden_log_that_is_missing_is_named(folder):
+    done = regress("--client", "true", "--lockstep", "1", golden="none.lcm")
+    assert done.returncode == 1, done
+    assert "FAILED: there is no golden log none.lcm yet" in done.stderr
