@@ -2,6 +2,7 @@
 #include <memory>
 
 #include <fmt/format.h>
+#include <spdlog/spdlog.h>
 
 #include "cli/commands.h"
 #include "cli/extensions.h"
@@ -22,6 +23,7 @@ int diff(const DiffArguments& arguments) {
   read_given_types();
   const auto rules = log::DiffRule::all(arguments.tolerances, arguments.ignored);
   const log::Diff result = log::diff_logs(arguments.golden, arguments.other, rules);
+  for (const std::string& line : result.idle_rules) spdlog::warn(line);
   fmt::print("{}", for_terminal(log::diff_text(result)));
   if (!arguments.junit.empty()) write_file(arguments.junit, log::diff_junit(result));
   if (!arguments.html.empty())

@@ -134,6 +134,7 @@ void keep_channels(const std::string& from, const std::string& to,
 std::string compare(const RegressArguments& arguments, const std::string& kept,
                     const std::vector<log::DiffRule>& rules) {
   const log::Diff result = log::diff_logs(arguments.golden, kept, rules);
+  for (const std::string& line : result.idle_rules) spdlog::warn(line);
   if (!arguments.junit.empty()) write_file(arguments.junit, log::diff_junit(result));
   if (!arguments.html.empty())
     write_file(arguments.html, log::diff_html(result, arguments.golden, kept));

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
+#include <set>
 
 #include "log/header.h"
 #include "log/reader.h"
@@ -60,6 +61,9 @@ class Comparison {
  public:
   Comparison(Diff& diff, const std::vector<DiffRule>& rules) : diff_(diff), rules_(rules) {}
 
+  // Every channel of the logs, also one that is ignored.
+  void meet(const std::string& channel) { met_.insert(channel); }
+
   void both(const Event& golden, const Event& other) {
     ChannelDifference& channel = diff_.channels[golden.channel];
     ++channel.compared;
@@ -87,6 +91,19 @@ class Comparison {
   bool ignored(const std::string& channel) const {
     const DiffRule* rule = rule_of(channel, "");
     return rule != nullptr && rule->ignore;
+  }
+
+  // Throws InputError when nothing was left to compare.
+  void end() {
+    if (diff_.channels.empty() && !met_.empty())
+      throw InputError({},
+                       "--ignore leaves nothing to compare: it fits every channel of both logs");
+    for (const DiffRule& rule : rules_) {
+      const auto fitting = [&](const std::string& channel) { return fits(rule.channel, channel); };
+      if (!fitting(kHeaderChannel) && std::none_of(met_.begin(), met_.end(), fitting))
+        diff_.idle_rules.push_back(std::string(rule.ignore ? "--ignore " : "--tolerance ") +
+                                   rule.channel + ": neither log has such a channel");
+    }
   }
 
  private:
@@ -153,6 +170,7 @@ class Comparison {
 
   Diff& diff_;
   const std::vector<DiffRule>& rules_;
+  std::set<std::string> met_;
 };
 
 // Hands out the events of one timestamp after the other.
@@ -261,6 +279,7 @@ Diff diff_logs(const std::string& golden_path, const std::string& other_path,
       other_events.erase(at);
     }
     for (const auto& [channel, events] : golden_events) {
+      comparison.meet(channel);
       if (comparison.ignored(channel)) continue;
       const std::vector<Event>& counterparts = other_events[channel];
       for (size_t i = 0; i < events.size(); ++i) {
@@ -271,6 +290,7 @@ Diff diff_logs(const std::string& golden_path, const std::string& other_path,
       }
     }
     for (const auto& [channel, events] : other_events) {
+      comparison.meet(channel);
       const auto counterparts = golden_events.find(channel);
       for (size_t i = counterparts == golden_events.end() ? 0 : counterparts->second.size();
            i < events.size(); ++i) {
@@ -278,6 +298,7 @@ Diff diff_logs(const std::string& golden_path, const std::string& other_path,
       }
     }
   }
+  comparison.end();
   if (!golden.fault().empty()) diff.notes.push_back(golden_path + ": " + golden.fault());
   if (!other.fault().empty()) diff.notes.push_back(other_path + ": " + other.fault());
   if (golden_header != other_header) {

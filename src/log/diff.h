@@ -59,11 +59,14 @@ struct ChannelDifference {
 struct Diff {
   std::map<std::string, ChannelDifference> channels;
   std::vector<std::string> notes;  // cut-off logs, other machines
+  // A line for each rule that fits no channel of either log: a name that is spelt wrongly, or a
+  // rule that is for other logs as well.
+  std::vector<std::string> idle_rules;
   bool same() const;
 };
 
-// Throws InputError when one of them is not a log. goes_on: asked now and then; when it returns
-// false, the result so far is returned.
+// Throws InputError when one of them is not a log, and when the rules ignore every channel of both.
+// goes_on: asked now and then; when it returns false, the result so far is returned.
 Diff diff_logs(const std::string& golden, const std::string& other,
                const std::vector<DiffRule>& rules, const std::function<bool()>& goes_on = {});
 

@@ -226,6 +226,7 @@ NAMES = [  # what only a loaded world knows: a line of the file, what is said
     ("expect: {robot: p3tx}", r"expect.robot: --robot 'p3tx': .*p3at"),
     ("expect: {golden: world.py}", r"expect.golden: .*world.py"),
     ("expect: {golden: g.lcm, tolerances: ['*/pose:pos=most:1']}", r"expect.tolerances: .*most"),
+    ("expect: {golden: g.lcm, ignore: ['*']}", r"expect.ignore: .*leaves nothing to compare"),
 ]
 
 

@@ -67,6 +67,25 @@ def test_tolerances_decide(logs, options, code):
     assert done.returncode == code, done.stdout + done.stderr
 
 
+def test_rules_that_fit_no_channel_are_pointed_out(logs):
+    """They may be meant for other logs as well, so that the result is the same."""
+    done = diff(
+        logs[0], logs[0], "--ignore", "r/pse", "--ignore", "ruedo/header", "--ignore", "*:x"
+    )
+    assert done.returncode == 0, done
+    assert done.stderr == "ruedo: warning: --ignore r/pse: neither log has such a channel\n"
+    done = diff(*logs, "--tolerance", "r/pse:pos=abs:1", "--tolerance", "r/p*:pos=abs:1e-6")
+    assert done.returncode == 1, done
+    assert done.stderr == "ruedo: warning: --tolerance r/pse: neither log has such a channel\n"
+
+
+@pytest.mark.parametrize("pattern", ["*", "r/pose", "r/*:*"])
+def test_nothing_left_to_compare_is_no_pass(logs, pattern):
+    done = diff(*logs, "--ignore", pattern)
+    assert done.returncode == 2 and "--ignore leaves nothing to compare" in done.stderr, done
+    assert "same" not in done.stdout
+
+
 def test_what_cannot_be_read_is_said(logs, tmp_path):
     done = diff(*logs, "--tolerance", "r/pose=abs:much")
     assert done.returncode == 2 and "much" in done.stderr

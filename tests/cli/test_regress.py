@@ -85,3 +85,18 @@ def test_a_golden_log_that_is_missing_is_named(folder):
     done = regress("--client", "true", "--lockstep", "1", golden="none.lcm")
     assert done.returncode == 1, done
     assert "FAILED: there is no golden log none.lcm yet" in done.stderr
+
+
+def test_a_rule_for_no_channel_is_pointed_out(folder):
+    done = regress("--ignore", "nosuch", "--tolerance", "p3at/pse:pos=abs:1")
+    assert done.returncode == 0, done
+    assert done.stderr.splitlines() == [
+        "ruedo: warning: --tolerance p3at/pse: neither log has such a channel",
+        "ruedo: warning: --ignore nosuch: neither log has such a channel",
+    ]
+
+
+@pytest.mark.parametrize("pattern", ["*", "p3at/pose"])
+def test_nothing_left_to_compare_is_no_pass(folder, pattern):
+    done = regress("--ignore", pattern)
+    assert done.returncode == 2 and "--ignore leaves nothing to compare" in done.stderr, done

@@ -95,8 +95,22 @@ TEST_F(LogDiffTest, Tolerances) {
   // At x = 0 a relative tolerance allows nothing; from 0.1 on, 0.01 is at most 10 %.
   EXPECT_EQ(diff({"*:x=rel:0.101"}).channels.at("p3at/odometry").fields.at("x").count, 1);
   EXPECT_TRUE(diff({}, {"p3at/odometry:x"}).same());
-  EXPECT_TRUE(diff({}, {"p3at/*"}).same());
   EXPECT_FALSE(diff({"*:x=abs:1", "*:x=abs:0.001"}).same()) << "the last rule counts";
+}
+
+TEST_F(LogDiffTest, IgnoredChannels) {
+  for (const std::string& path : {golden_, other_}) {
+    log::Writer log(path);
+    write(log, "p3at/odometry", odometry(0, path == golden_ ? 1 : 2, 0));
+    write(log, "other/odometry", odometry(0, 1, 0));
+  }
+  const log::Diff result = diff({"p3tx/*:x=1"}, {"p3at/*", "ruedo/header"});
+  EXPECT_TRUE(result.same());
+  EXPECT_EQ(result.channels.size(), 1U);
+  EXPECT_THAT(result.idle_rules,
+              testing::ElementsAre("--tolerance p3tx/*: neither log has such a channel"));
+  EXPECT_FALSE(diff({}, {"other/*"}).same());
+  EXPECT_THROW(diff({}, {"*"}), InputError) << "nothing is left that could differ";
 }
 
 TEST_F(LogDiffTest, AnglesAreComparedOnTheCircle) {

@@ -66,6 +66,7 @@ def _check_golden(expect: dict[str, Any], source: Source, folder: Path) -> None:
     golden = str(folder / expect["golden"])
     done = subprocess.run(diff_command(expect, golden, golden), capture_output=True, text=True)
     if done.returncode != 0:
-        said = (done.stderr or done.stdout).strip().splitlines()
-        at = "golden" if expect["golden"] in (said or [""])[0] else "tolerances"
-        raise source.error(("expect", at), (said or ["it is no log"])[0].removeprefix("ruedo: "))
+        said = (done.stderr or done.stdout).strip().splitlines() or ["it is no log"]
+        at = "ignore" if "--ignore" in said[0] else "tolerances"
+        at = "golden" if expect["golden"] in said[0] else at
+        raise source.error(("expect", at), said[0].removeprefix("ruedo: "))
