@@ -1,12 +1,15 @@
 """run_regression(): what it is given is checked, and nothing of it stays."""
 
 import contextlib
+import math
 import os
 import re
 import signal
 
 import pytest
-from ruedo.regression import RegressionFailed, run_regression
+from ruedo.regression import RegressionFailed, ruedo_regression, run_regression
+
+__all__ = ["ruedo_regression"]  # a fixture, for pytest to find
 
 WRONG = [  # what is given, what the error says
     ({"ignore": "*/camera"}, r"ignore is a list of texts, not one: ignore=\['\*/camera'\]"),
@@ -17,16 +20,92 @@ WRONG = [  # what is given, what the error says
     ({"goal": (0.0, 0.0, 9.0), "radius": 1, "by": 1}, "goal is 2 numbers, not 3"),
     ({"goal": (0.0,), "radius": 1, "by": 1}, "goal is 2 numbers, not 1"),
     ({"goal": (0.0, float("nan")), "radius": 1, "by": 1}, "goal is nan: it must be a finite"),
-    ({"goal": (0.0, 0.0), "radius": "1,1", "by": 1}, "goal is a number, not '1,1'"),
+    ({"goal": (0.0, 0.0), "radius": "1,1", "by": 1}, "radius is a number, not '1,1'"),
+    ({"goal": (0.0, 0.0), "radius": 1, "by": "x"}, "by is a number, not 'x'"),
     ({"goal": (0.0, 0.0)}, "a goal needs its radius"),
+    ({"radius": 1}, "radius and by belong to a goal"),
+    ({"by": 3.0}, "radius and by belong to a goal"),
+    ({"no_contact": "no"}, "no_contact is True or False, not 'no'"),
+    ({"robot": ""}, "an empty text is no robot"),
+    ({"keep": [""]}, "an empty text is no keep"),
+    ({"keep": ["\0"]}, "keep is .*, which holds the character 0"),
+    ({"client": []}, r"client is \[\], which names no program"),
+    ({"client": ""}, "client is '', which names no program"),
+    ({"script": []}, r"script is \[\], which names no program"),
+    ({"client": 5}, "client is a list of words or a line for a shell, not 5"),
+    ({"client": b"true"}, "client is a list of words or a line for a shell, not b'true'"),
+    ({"client": ["true", 1]}, "a word of client is a text or a path, not 1"),
+    ({"client": [b"true"]}, "a word of client is a text or a path, not b'true'"),
+    ({"client": "\0"}, "client is .*, which holds the character 0"),
+    ({"client": "\ud800"}, "client is .*, with half a character in it"),
+    ({"script": ["\0"]}, "a word of script is .*, which holds the character 0"),
+    ({"timeout": "x"}, "timeout is a number, not 'x'"),
+    ({"timeout": float("nan")}, "timeout is nan: it must be above 0 s"),
+    ({"timeout": 0}, "timeout is 0.0: it must be above 0 s"),
+    ({"golden": 5}, "golden is a text or a path, not 5"),
+    ({"golden": ""}, "golden is an empty text: it must be a path"),
+    ({"record": 5}, "record is a text or a path, not 5"),
+    ({"folder": 5}, "folder is a text or a path, not 5"),
+    ({"options": ["\0"]}, "options is .*, which holds the character 0"),
+    ({"world": 5}, "world is a text or a path, not 5"),
+    ({"world": "\0"}, "world is .*, which holds the character 0"),
 ]
 
 
-@pytest.mark.parametrize("given, text", WRONG, ids=str)
+def plain(given):
+    return ascii(given).replace("\\", "/")
+
+
+@pytest.mark.parametrize("given, text", WRONG, ids=plain)
 def test_a_wrong_argument_is_told(tmp_path, given, text):
-    """Regression: a text counted as its letters, of which `*` ignored everything."""
-    with pytest.raises((TypeError, ValueError), match=text):
-        run_regression("arena", duration=1, record=tmp_path / "run.lcm", **given)
+    """Regression: a text counted as its letters, of which `*` ignored everything, and what was
+    expected without a goal was left out.
+    """
+    rest = {"world": "arena", "record": tmp_path / "run.lcm", "folder": tmp_path, **given}
+    with pytest.raises((TypeError, ValueError), match=text) as caught:
+        run_regression(duration=1, **rest)
+    assert "\n" not in str(caught.value) and not os.listdir(tmp_path)
+
+
+@pytest.mark.parametrize("given", [{"world": 5}, {"golden": 5}], ids=str)
+def test_the_fixture_tells_it_too(ruedo_regression, given):
+    with pytest.raises(TypeError, match="is a text or a path, not 5"):
+        ruedo_regression(**{"world": "arena", "duration": 1, **given})
+
+
+def test_a_worlds_name_may_begin_as_an_option_does(tmp_path):
+    """Regression: `--help` was an option, and the help a run that had passed."""
+    with pytest.raises(RegressionFailed, match="--help: no such file"):
+        run_regression("--help", duration=1, record=tmp_path / "run.lcm")
+    world = "<sdf version='1.9'><world name='w'><include><uri>model://p3at</uri></include>"
+    (tmp_path / "-w.sdf").write_text(f"{world}</world></sdf>")
+    run = run_regression("-w.sdf", duration=0.1, record=tmp_path / "run.lcm", folder=tmp_path)
+    assert run.log.exists() and "passed" in run.output
+
+
+@pytest.mark.parametrize("options", [["--help"], ["-h"]], ids=" ".join)
+def test_where_nothing_ran_nothing_passed(tmp_path, options):
+    with pytest.raises(RegressionFailed, match="there was no run"):
+        run_regression("arena", duration=1, record=tmp_path / "run.lcm", options=options)
+
+
+def test_an_option_without_its_value_is_named(tmp_path):
+    with pytest.raises(RegressionFailed, match="--json"):
+        run_regression("arena", duration=1, record=tmp_path / "run.lcm", options=["--json"])
+
+
+def test_words_are_no_shells(tmp_path):
+    """Also empty ones, and names of files that are no UTF-8."""
+    (tmp_path / "caf\udce9").write_text("no UTF-8")
+    (tmp_path / "w.sdf").write_text(
+        "<sdf version='1.9'><world name='w'><include><uri>model://p3at</uri></include></world></sdf>"
+    )
+    words = ["sh", "-c", 'test -z "$1" && test -f "$2"', "sh", "", tmp_path / "caf\udce9"]
+    record = tmp_path / "run.lcm"
+    run_regression(tmp_path / "w.sdf", duration=0.1, script=words, record=record, timeout=math.inf)
+    words[5] = "caf"
+    with pytest.raises(RegressionFailed, match="the script ended with exit code 1"):
+        run_regression(tmp_path / "w.sdf", duration=0.1, script=words, record=record)
 
 
 def test_a_client_that_hangs_is_ended_with_its_run(tmp_path):

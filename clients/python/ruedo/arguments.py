@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import operator
+import os
 from collections.abc import Iterable, Mapping
 from typing import Any
 
@@ -81,6 +82,28 @@ def text(what: str, value: Any) -> str:
     if "\0" in value:
         raise ValueError(f"{what} is {shown(value)}, with a 0 character in it")
     return value
+
+
+def word(what: str, value: Any) -> str:
+    """A text or a path, as a program can be passed it. Raises TypeError and ValueError."""
+    given = os.fspath(value) if isinstance(value, (str, os.PathLike)) else None
+    if not isinstance(given, str):
+        raise TypeError(f"{what} is a text or a path, not {shown(value)}")
+    try:
+        os.fsencode(given)  # file names that are no UTF-8 pass
+    except UnicodeEncodeError:
+        raise ValueError(f"{what} is {shown(value)}, with half a character in it") from None
+    if "\0" in given:
+        raise ValueError(f"{what} is {shown(value)}, which holds the character 0")
+    return given
+
+
+def path(what: str, value: Any) -> str:
+    """Of a file or folder. Raises TypeError and ValueError."""
+    given = word(what, value)
+    if not given:
+        raise ValueError(f"{what} is an empty text: it must be a path")
+    return given
 
 
 def client_name(value: Any) -> str:

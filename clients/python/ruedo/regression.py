@@ -16,7 +16,7 @@ import os
 import shlex
 import subprocess
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -24,11 +24,13 @@ from typing import Any
 
 import pytest
 
-from .arguments import finite, numbers, texts
+from .arguments import finite, number, numbers, path, shown, switch, texts, word
 from .errors import RuedoError
 from .launch import find_ruedo
 
 _PARTING_S = 10.0  # that a run has to end its client
+_LONGEST_S = 1e6  # the system cannot wait for ever at once
+_PASSED = "passed; the run is in "  # what `ruedo regress` prints in the end
 _PathLike = str | os.PathLike[str]
 
 
@@ -45,14 +47,43 @@ class Regression:
 
 
 def _option(name: str, *values: object) -> list[str]:
-    return [f"--{name}={value}" for value in values if value is not None]
+    given = [word(name, str(value)) for value in values if value is not None]
+    if "" in given:  # the next option would count as its value
+        raise ValueError(f"an empty text is no {name}")
+    return [f"--{name}={value}" for value in given]
 
 
-def _line(words: Sequence[_PathLike] | str | None) -> str | None:
+def _line(what: str, words: Sequence[_PathLike] | str | None) -> str | None:
     """For a shell."""
-    if words is None or isinstance(words, str):
-        return words
-    return shlex.join(os.fspath(word) for word in words)
+    if words is None:
+        return None
+    if isinstance(words, str):
+        line = words
+    elif isinstance(words, Iterable) and not isinstance(words, (bytes, Mapping)):
+        line = shlex.join(word(f"a word of {what}", one) for one in words)
+    else:
+        raise TypeError(f"{what} is a list of words or a line for a shell, not {shown(words)}")
+    if not line.strip():
+        raise ValueError(f"{what} is {shown(words)}, which names no program")
+    return line
+
+
+def _goal(goal: tuple[float, float] | None, radius: float | None, by: float | None) -> list[str]:
+    if goal is None:
+        if radius is not None or by is not None:
+            raise ValueError("radius and by belong to a goal, and there is none")
+        return []
+    if radius is None or by is None:
+        raise ValueError("a goal needs its radius (m) and by (s)")
+    x, y = (finite("goal", one) for one in numbers("goal", goal, 2))
+    return [f"--goal={x!r},{y!r},{finite('radius', radius)!r},{finite('by', by)!r}"]
+
+
+def _patience(timeout: float) -> float:
+    seconds = number("timeout", timeout)
+    if not seconds > 0.0:
+        raise ValueError(f"timeout is {seconds}: it must be above 0 s")
+    return min(seconds, _LONGEST_S)
 
 
 def _output_of(command: list[str], folder: _PathLike | None, timeout: float) -> str:
@@ -79,6 +110,8 @@ def _output_of(command: list[str], folder: _PathLike | None, timeout: float) -> 
         raise RegressionFailed(
             f"{output}\n(exit code {process.returncode} of {shlex.join(command)})"
         )
+    if _PASSED not in output:  # as after an option that prints something in place of a run
+        raise RegressionFailed(f"{output}\n(there was no run by {shlex.join(command)})")
     return output
 
 
@@ -124,32 +157,33 @@ def run_regression(
     ["--spawn", "p3at@1,2"]. folder: where client and script run. timeout: s of real time.
     """
     __tracebackhide__ = True
-    if goal is not None and (radius is None or by is None):
-        raise ValueError("a goal needs its radius (m) and by (s)")
-    place = [] if goal is None else [*numbers("goal", goal, 2), radius, by]
+    timeout = _patience(timeout)
+    record = os.path.abspath(path("record", record))
     command = [
         find_ruedo(),
         "regress",
-        os.fspath(world),
-        *_option("duration", duration),
         *_option("seed", seed),
-        *_option("record", os.path.abspath(record)),
-        *(["--goal=" + ",".join(repr(finite("goal", one)) for one in place)] if place else ()),
-        *_option("client", _line(client)),
-        *_option("script", _line(script)),
+        *_option("record", record),
+        *_goal(goal, radius, by),
+        *_option("client", _line("client", client)),
+        *_option("script", _line("script", script)),
         *_option("robot", robot),
         *_option("clearance", clearance),
         *_option("odometry-error", odometry_error),
         *_option("lockstep", lockstep or None),
-        *_option("golden", None if golden is None else os.path.abspath(golden)),
+        *_option("golden", None if golden is None else os.path.abspath(path("golden", golden))),
         *_option("keep", *texts("keep", keep)),
         *_option("tolerance", *texts("tolerances", tolerances)),
         *_option("ignore", *texts("ignore", ignore)),
         *_option("wait-for", *texts("wait_for", wait_for)),
-        *(["--no-contact"] if no_contact else ()),
-        *texts("options", options),
+        *(["--no-contact"] if switch("no_contact", no_contact) else ()),
+        *(word("options", one) for one in texts("options", options)),
+        *_option("duration", duration),  # no value of the last of the options, as "--" would be
+        "--",  # a world's name may begin as an option does
+        path("world", world),
     ]
-    return Regression(Path(record).absolute(), _output_of(command, folder, timeout))
+    folder = None if folder is None else path("folder", folder)
+    return Regression(Path(record), _output_of(command, folder, timeout))
 
 
 @pytest.fixture
@@ -163,8 +197,8 @@ def ruedo_regression(request: pytest.FixtureRequest, tmp_path: Path) -> Callable
         options.setdefault("record", tmp_path / "run.lcm")
         options.setdefault("folder", here)
         if options.get("golden") is not None:
-            options["golden"] = here / str(options["golden"])
-        beside = here / world
+            options["golden"] = here / path("golden", options["golden"])
+        beside = here / path("world", world)
         result = run_regression(beside if beside.exists() else world, **options)
         print(result.output, file=sys.stderr)
         return result
