@@ -80,7 +80,7 @@ def text(what: str, value: Any) -> str:
     except UnicodeEncodeError:
         raise ValueError(f"{what} is {shown(value)}, with half a character in it") from None
     if "\0" in value:
-        raise ValueError(f"{what} is {shown(value)}, with a 0 character in it")
+        raise ValueError(f"{what} is {shown(value)}, which holds the character 0")
     return value
 
 
