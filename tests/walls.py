@@ -189,6 +189,22 @@ def bare_errors(root):
     ]
 
 
+def raw_errors(root):
+    """Texts of others that to_stderr() prints as they are, escape codes and line ends included,
+    because they come as a `const char*`: a std::string becomes one harmless line.
+    """
+    harmless = re.compile(r"std::string\((?:[^()]|\(\))*\)|for_terminal\([^()]*\)\.c_str\(\)")
+    return [
+        f"{path.relative_to(root)}:{text.count(chr(10), 0, match.start()) + 1}: pass a std::string"
+        for path in sorted((root / "src").rglob("*.cpp"))
+        for text in [re.sub(r"//[^\n]*", "", path.read_text(encoding="utf-8"))]
+        for match in re.finditer(r"\bto_stderr\(", text)
+        if re.search(
+            r"(?:\.|->)(?:what|c_str|data)\(\)", harmless.sub("", argument(text, match.end() - 1))
+        )
+    ]
+
+
 PYTHON_CLIENT = "clients/python/ruedo"
 OTHERS_PRIVATE = {
     "_get_packed_fingerprint",  # of the classes that lcm-gen makes: it has no other name
@@ -380,6 +396,7 @@ def broken_web_walls(root):
         bare_reads,
         bare_writes,
         bare_errors,
+        raw_errors,
         dangling_ranges,
         foreign_members,
         states_left_behind,
@@ -609,6 +626,20 @@ def test_bare_reads_are_seen(tmp_path, text, good):
 )
 def test_bare_errors_are_seen(tmp_path, text, good):
     assert (bare_errors(tree(tmp_path, {"src/cli/a.cpp": text + "\n"})) == []) == good
+
+
+@pytest.mark.parametrize(
+    "text, good",
+    [
+        ('to_stderr("{}\\n", error.what());', False),
+        ('to_stderr("{}: {}\\n",\n  a, name.c_str());', False),
+        ('to_stderr("{}\\n", std::string(error.what()));', True),
+        ('to_stderr("{}\\n", for_terminal(lines).c_str());', True),
+        ('to_stderr("{}{}\\n", style.red, error.message());', True),
+    ],
+)
+def test_raw_errors_are_seen(tmp_path, text, good):
+    assert (raw_errors(tree(tmp_path, {"src/cli/a.cpp": text + "\n"})) == []) == good
 
 
 @pytest.mark.parametrize(

@@ -14,7 +14,6 @@
 #include "cli/extensions.h"
 #include "cli/to_stderr.h"
 #include "core/option_text.h"
-#include "core/utf8.h"
 #include "core/whole.h"
 #include "ruedo/errors.h"
 #include "ruedo/sim_time.h"
@@ -198,8 +197,7 @@ void print_findings(const std::vector<Finding>& findings) {
             : "";
     const char* colour = group.kind == Finding::Kind::error ? style.red : style.yellow;
     to_stderr("{}{}{}: {}: {}: {}{}{}{}\n", colour, kind_name(group.kind), style.off,
-              for_terminal(first.source.str()), for_terminal(first.element),
-              for_terminal(group.text), style.dim, more, style.off);
+              first.source.str(), first.element, group.text, style.dim, more, style.off);
   }
 }
 

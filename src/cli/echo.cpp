@@ -139,8 +139,9 @@ int echo(const EchoArguments& arguments) {
   for (int seen = 0; arguments.count == 0 || seen < arguments.count; ++seen) {
     if (!mailbox.take(message,
                       Clock::now() + std::chrono::duration_cast<Clock::duration>(patience))) {
-      to_stderr("ruedo: nothing on {} for {:g} s, on {}\n", fmt::join(arguments.channels, ", "),
-                arguments.timeout_s, bus.url().str());
+      to_stderr("ruedo: nothing on {} for {:g} s, on {}\n",
+                fmt::format("{}", fmt::join(arguments.channels, ", ")), arguments.timeout_s,
+                bus.url().str());
       return kCheckFailed;
     }
     print(message);

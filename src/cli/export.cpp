@@ -12,7 +12,6 @@
 #include "cli/rosbag.h"
 #include "cli/sandboxed.h"
 #include "cli/to_stderr.h"
-#include "core/utf8.h"
 #include "log/reader.h"
 #include "ruedo/errors.h"
 #include "run/log_worlds.h"
@@ -51,7 +50,7 @@ uint64_t read_log(const std::string& path, const log::Index& index, const run::L
     ++read;
   }
   for (const std::string& fault : {worlds.fault(), log.fault()}) {
-    if (!fault.empty()) to_stderr("ruedo: {}: {}\n", for_terminal(path), for_terminal(fault));
+    if (!fault.empty()) to_stderr("ruedo: {}: {}\n", path, fault);
   }
   return read;
 }

@@ -45,8 +45,8 @@ class LoggedText : public spdlog::custom_flag_formatter {
  public:
   void format(const spdlog::details::log_msg& message, const std::tm&,
               spdlog::memory_buf_t& line) override {
-    const std::string text = ruedo::in_one_line(ruedo::for_terminal(
-        ruedo::shortened({message.payload.data(), message.payload.size()}, ruedo::kLongestSaid)));
+    const std::string text = one_line(
+        ruedo::shortened({message.payload.data(), message.payload.size()}, ruedo::kLongestSaid));
     line.append(text.data(), text.data() + text.size());
   }
   std::unique_ptr<spdlog::custom_flag_formatter> clone() const override {
@@ -63,8 +63,7 @@ void set_up_logging() {
 
 void say(const std::string& text) {
   const Style style = style_of(stderr);
-  to_stderr("{}{}ruedo: {}{}{}\n", style.bold, style.red, style.off, ruedo::for_terminal(text),
-            style.off);
+  to_stderr("{}{}ruedo: {}{}{}\n", style.bold, style.red, style.off, text, style.off);
 }
 
 // A hint for an unknown argument: the nearest command or option.
@@ -206,7 +205,7 @@ int tell_error() {
   try {
     throw;
   } catch (const ruedo::InputError& error) {
-    say(ruedo::in_one_line(error.what()));
+    say(error.what());
     const ruedo::Source& source = error.source();
     return source.file.empty() || is_option(source) ? kWrongUsage : kBadInput;
   } catch (const ruedo::physics::StateError& error) {

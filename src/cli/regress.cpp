@@ -24,6 +24,7 @@
 #include "core/json.h"
 #include "core/output_file.h"
 #include "core/progress.h"
+#include "core/utf8.h"
 #include "judge/judge.h"
 #include "log/diff.h"
 #include "log/reader.h"
@@ -183,7 +184,7 @@ void attach_page(const std::string& log) {
   try {
     write_page(log, log + ".html", kPageSize_MB);
   } catch (const std::exception& error) {
-    to_stderr("ruedo: no page of this run: {}\n", error.what());
+    to_stderr("ruedo: no page of this run: {}\n", std::string(error.what()));
   }
 #else
   static_cast<void>(log);
@@ -266,7 +267,8 @@ int regress(RegressArguments arguments) {
   if (!arguments.script.empty()) {
     if (std::string fault = run_script(arguments); !fault.empty()) failures.push_back(fault);
   }
-  for (const std::string& line : failures) to_stderr("FAILED: {}\n", line);
+  for (const std::string& line : failures)
+    to_stderr("FAILED: {}\n", for_terminal(line).c_str());  // a difference has lines of ours
   if (!arguments.json.empty()) {
     std::vector<std::string> faults = failures;
     faults.erase(faults.begin() + static_cast<std::ptrdiff_t>(begin_of_judged),

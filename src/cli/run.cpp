@@ -196,8 +196,7 @@ int strict_check(const WorldArguments& world) {
   const std::vector<Finding> findings = find_all(world, loaded);
   if (findings.empty()) return kGood;
   print_findings(findings);
-  to_stderr("ruedo: {} is not run: --strict refuses what has findings\n",
-            for_terminal(world.world));
+  to_stderr("ruedo: {} is not run: --strict refuses what has findings\n", world.world);
   return loaded ? kCheckFailed : kBadInput;
 }
 
@@ -258,7 +257,7 @@ int run_world(const RunArguments& arguments) {
   try {
     server.run();
   } catch (const run::LeaseEnded& ended) {
-    to_stderr("ruedo: {}\n", ended.what());
+    to_stderr("ruedo: {}\n", std::string(ended.what()));
     return kCheckFailed;
   }
   return kGood;

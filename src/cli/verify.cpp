@@ -8,7 +8,7 @@
 #include "cli/extensions.h"
 #include "cli/logged_run.h"
 #include "cli/sandboxed.h"
-#include "core/utf8.h"
+#include "cli/to_stderr.h"
 #include "engine/thread_limit.h"
 #include "log/header.h"
 #include "run/verify.h"
@@ -46,7 +46,7 @@ int repeat(const VerifyArguments& arguments, const log_header_t& header) {
   run::Verifier verifier(arguments.log, load(logged.world), std::move(options));
   const bool same_machine = verifier.machine_differences().empty();
   for (const std::string& line : verifier.machine_differences())
-    fmt::print("not as in the log: {}\n", for_terminal(line));
+    fmt::print("not as in the log: {}\n", one_line(line));
   std::fflush(stdout);
   verifier.check_same_run();
   const run::Verification result = verifier.run();
@@ -54,19 +54,19 @@ int repeat(const VerifyArguments& arguments, const log_header_t& header) {
       "{} messages, {} bytes, {:g} s of {}, seed {}", result.messages, result.bytes,
       static_cast<double>(result.time_us) * 1e-6, header.world, static_cast<uint64_t>(header.seed));
   if (result.difference) {
-    fmt::print("{}: {}\nBefore it, {} were repeated byte for byte.\n", arguments.log,
-               for_terminal(describe(*result.difference)), for_terminal(so_far));
+    fmt::print("{}: {}\nBefore it, {} were repeated byte for byte.\n", one_line(arguments.log),
+               one_line(describe(*result.difference)), one_line(so_far));
     if (same_machine) return kCheckFailed;
     fmt::print(
         "What is not as in the log may be why: bytes hold for one version with its libraries. The "
         "log needs Ruedo {0}: `pip install ruedo=={0}` in a virtual environment of its own, and "
         "`ruedo verify` there.\n",
-        for_terminal(header.version.substr(0, header.version.find(' '))));
+        one_line(header.version.substr(0, header.version.find(' '))));
     return kEnvironment;
   }
-  fmt::print("{}: repeated byte for byte: {}\n", arguments.log, for_terminal(so_far));
+  fmt::print("{}: repeated byte for byte: {}\n", one_line(arguments.log), one_line(so_far));
   if (!result.fault.empty())
-    fmt::print("{}: {}; verified up to there\n", arguments.log, for_terminal(result.fault));
+    fmt::print("{}: {}; verified up to there\n", one_line(arguments.log), one_line(result.fault));
   return kGood;
 }
 
