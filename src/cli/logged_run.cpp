@@ -9,6 +9,8 @@ namespace ruedo::cli {
 
 LoggedOptions read_options(const log_header_t& header, const std::string& log) {
   if (header.files.empty()) throw InputError({log}, "names no file that its world was made from");
+  if (const std::string fault = log::fault_of_names(header); !fault.empty())
+    throw InputError({log}, fault);
   LoggedOptions options;
   WorldArguments& world = options.world;
   world.world = header.files.front().path;

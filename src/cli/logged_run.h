@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "cli/commands.h"
+#include "core/option_text.h"
 #include "ruedo/errors.h"
 #include "ruedo/log_header_t.hpp"
 #include "run/log_worlds.h"
@@ -28,8 +29,8 @@ auto with_options_of(const std::string& log, Repeat repeat) {
   try {
     return repeat();
   } catch (const InputError& error) {
-    if (!error.source().file.empty()) throw;
-    throw InputError({log}, "its run had " + error.message());
+    if (!error.source().file.empty() && !is_option(error.source())) throw;
+    throw InputError({log}, std::string("its run had ") + error.what());
   }
 }
 

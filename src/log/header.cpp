@@ -2,6 +2,7 @@
 #include "log/header.h"
 
 #include <algorithm>
+#include <climits>
 #include <cstdio>
 #include <filesystem>
 #include <iterator>
@@ -167,19 +168,34 @@ namespace {
 
 namespace fs = std::filesystem;
 
+constexpr size_t kMostFiles = 10'000, kLongestName = PATH_MAX - 1;  // of a log's header
+constexpr size_t kMostParts = 64;  // of a path's end that is looked for
+
+// The ends of a path that stay below a folder, the longest first: of a/b/c these are a/b/c, b/c
+// and c.
+std::vector<std::string> ends_of(const std::string& path) {
+  const std::string tidied = fs::path(path).lexically_normal().string();
+  std::vector<std::string> ends;
+  for (size_t at = tidied.size(); at-- > 0 && ends.size() < kMostParts;) {
+    if (tidied[at] == '/' || (at > 0 && tidied[at - 1] != '/')) continue;
+    ends.push_back(tidied.substr(at));
+    if (ends.back() == ".." || ends.back().starts_with("../"))
+      return {ends.rbegin() + 1, ends.rend()};
+  }
+  return {ends.rbegin(), ends.rend()};
+}
+
 // A file of that content in those folders whose path ends as the given one's does; "" where there
-// is none.
-std::string found_again(const log_file_t& file, const std::vector<fs::path>& folders) {
+// is none. A link may lead out of a folder: the finder says how far a log reaches.
+std::string found_again(const log_file_t& file, const std::vector<fs::path>& folders,
+                        const model::ResourceFinder& finder, Digests& digests) {
   std::error_code error;
-  const fs::path was = fs::path(file.path).lexically_normal();
-  for (auto begin = was.begin(); begin != was.end(); ++begin) {
-    fs::path end;
-    for (auto part = begin; part != was.end(); ++part) end /= *part;
-    if (end.is_absolute()) continue;
+  for (const std::string& end : ends_of(file.path)) {
     for (const fs::path& folder : folders) {
-      const fs::path here = folder / end;
-      if (fs::is_regular_file(here, error) && sha256_of_file(here.string()) == file.sha256)
-        return here.string();
+      const std::string here = (folder / end).string();
+      if (fs::is_regular_file(here, error) && finder.reaches(here) &&
+          digests.of(here) == file.sha256)
+        return here;
     }
   }
   return "";
@@ -187,11 +203,36 @@ std::string found_again(const log_file_t& file, const std::vector<fs::path>& fol
 
 }  // namespace
 
-void find_files_again(log_header_t& header, const std::string& log) {
+const std::string& Digests::of(const std::string& path) {
+  std::error_code error;
+  const std::string file = fs::canonical(path, error).string();
+  const auto [at, is_new] = known_.try_emplace(error ? path : file);
+  if (is_new) at->second = sha256_of_file(path);
+  return at->second;
+}
+
+std::string fault_of_names(const log_header_t& header) {
+  if (header.files.size() > kMostFiles)
+    return "was made from " + std::to_string(header.files.size()) + " files; allowed are " +
+           std::to_string(kMostFiles);
+  const auto is_long = [](const std::string& name) { return name.size() > kLongestName; };
+  if (is_long(header.world_file) ||
+      std::any_of(header.files.begin(), header.files.end(),
+                  [&](const log_file_t& file) { return is_long(file.path); }))
+    return "names a file by a path of more than " + std::to_string(kLongestName) +
+           " bytes, which no file has";
+  return "";
+}
+
+namespace {
+
+void find_files_again(log_header_t& header, const std::string& log, Digests& digests) {
+  if (!fault_of_names(header).empty()) return;
   std::error_code error;
   const fs::path beside = fs::absolute(log, error).parent_path(), shipped = model::shipped_worlds();
+  const model::ResourceFinder near(log, false);
   const auto move = [&](log_file_t& file, const std::vector<fs::path>& folders) {
-    const std::string found = found_again(file, folders);
+    const std::string found = found_again(file, folders, near, digests);
     if (found.empty()) return;
     if (header.world_file == file.path) header.world_file = found;
     file.path = found;
@@ -206,22 +247,11 @@ void find_files_again(log_header_t& header, const std::string& log) {
   }
 }
 
-void check_files_of_spawned(const std::string& log) {
-  Reader reader(log);
-  Event event;
-  bool first = true;
-  while (reader.next(event, [](const std::string& channel) { return channel == kHeaderChannel; })) {
-    log_header_t header;
-    if (event.channel != kHeaderChannel || std::exchange(first, false)) continue;
-    if (decode_checked(event.data.data(), event.data.size(), header) != DecodeFault::none) continue;
-    find_files_again(header, log);
-    check_files(header, log);
-  }
-}
-
 // The log may be a stranger's: it must not reveal which files are on this machine, not even by a
 // hash.
-void check_files(const log_header_t& header, const std::string& log) {
+void check_files(const log_header_t& header, const std::string& log, Digests& digests) {
+  if (const std::string fault = fault_of_names(header); !fault.empty())
+    throw InputError({log}, fault);
   const model::ResourceFinder finder(header.world_file, false);
   for (const log_file_t& file : header.files) {
     if (!finder.reaches(file.path)) {
@@ -229,7 +259,7 @@ void check_files(const log_header_t& header, const std::string& log) {
                                   ", which is neither near its world nor in a model folder "
                                   "(RUEDO_PATH); such files are not looked at");
     }
-    if (sha256_of_file(file.path) == file.sha256) continue;
+    if (digests.of(file.path) == file.sha256) continue;
     std::error_code error;
     throw InputError({file.path}, std::filesystem::is_regular_file(file.path, error)
                                       ? "was changed since " + log +
@@ -237,6 +267,32 @@ void check_files(const log_header_t& header, const std::string& log) {
                                       : "cannot be read; " + log +
                                             " was made from it, and it lies neither beside the log "
                                             "nor among Ruedo's own worlds");
+  }
+}
+
+}  // namespace
+
+void find_files_again(log_header_t& header, const std::string& log) {
+  Digests digests;
+  find_files_again(header, log, digests);
+}
+
+void check_files(const log_header_t& header, const std::string& log) {
+  Digests digests;
+  check_files(header, log, digests);
+}
+
+void check_files_of_spawned(const std::string& log) {
+  Digests digests;
+  Reader reader(log);
+  Event event;
+  bool first = true;
+  while (reader.next(event, [](const std::string& channel) { return channel == kHeaderChannel; })) {
+    log_header_t header;
+    if (event.channel != kHeaderChannel || std::exchange(first, false)) continue;
+    if (decode_checked(event.data.data(), event.data.size(), header) != DecodeFault::none) continue;
+    find_files_again(header, log, digests);
+    check_files(header, log, digests);
   }
 }
 

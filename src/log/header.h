@@ -1,6 +1,7 @@
 // The header of a log: what the run was made from, and the machine's part in its bytes.
 #pragma once
 
+#include <map>
 #include <string>
 #include <vector>
 
@@ -35,6 +36,19 @@ std::vector<log_file_t> hashed_files(const std::vector<std::string>& paths);
 // may not be read for a stranger's log (another installation's) is looked for among Ruedo's own
 // worlds. The header then names what was found.
 void find_files_again(log_header_t& header, const std::string& log);
+
+// "", or what is wrong with the names of its files: too many, or longer than any file's. None of
+// them is looked for then.
+std::string fault_of_names(const log_header_t& header);
+
+// SHA-256 of files, each read once however often and by whatever names a log has it.
+class Digests {
+ public:
+  const std::string& of(const std::string& path);  // as sha256_of_file()
+
+ private:
+  std::map<std::string, std::string> known_;  // by where links lead
+};
 
 // Throws InputError when a file that the log was made from is gone or was changed: names the first.
 void check_files(const log_header_t& header, const std::string& log);

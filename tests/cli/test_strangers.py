@@ -110,14 +110,69 @@ def test_a_log_allows_nothing_by_itself(recorded, tmp_path):
     )  # without the model from elsewhere the run is the one that was recorded
 
 
-def test_escapes_of_a_log_stay_out_of_the_terminal(recorded, tmp_path):
-    def change(header):
-        header.files[0].path = "/nowhere/\x1b[31mred\x1b]0;title\x07"
+def ten_seconds():
+    resource.setrlimit(resource.RLIMIT_CPU, (10, 10))
 
-    result = program("export", with_header(recorded, "escapes.log", change), tmp_path / "out.mcap")
-    assert (
-        "\x1b" not in result.stdout + result.stderr and "\x07" not in result.stdout + result.stderr
-    ), result
+
+@pytest.mark.parametrize("kind", ["outside", "deep", "deep and many", "long", "many"])
+def test_what_a_log_names_costs_little(recorded, kind, tmp_path):
+    """A file of 3 GB outside the folders that a log reaches, by a path that leads out or by a link,
+    is not hashed; nor is one name looked for at each of thousands of places."""
+    folder, _ = recorded
+    large = tmp_path / "large"
+    large.touch()
+    os.truncate(large, 3 << 30)
+    link = folder / "link"
+    link.unlink(missing_ok=True)
+    link.symlink_to(large)
+    wanted = {
+        "outside": [os.path.relpath(large, folder), "gone/link"] * 20,
+        "deep": ["a/" * 2000 + "x"],
+        "deep and many": ["a/" * 1000 + "x"] * 50,
+        "long": ["a/" * 20000 + "x"],
+        "many": ["x"] * 20000,
+    }[kind]
+
+    def change(header):
+        for path in wanted:
+            names(path)(header)
+
+    log = with_header(recorded, f"{kind}.log", change)
+    for command in (["verify", log], ["export", log, tmp_path / "out.mcap"]):
+        result = program(*command, preexec_fn=ten_seconds)
+        assert result.returncode == (3 if command[0] == "verify" else 0), result
+        assert str(log) in result.stderr and result.stderr.count("\n") == 1, result
+        assert len(result.stderr) < 8000
+    link.unlink()
+
+
+@pytest.mark.parametrize("command", ["export", "html", "video", "verify"])
+def test_escapes_of_a_log_stay_out_of_the_terminal(recorded, command, tmp_path):
+    """What a log names is part of one line."""
+
+    def change(header):
+        names("/nowhere/\x1b[31mred\x1b]0;title\x07\nruedo: forged")(header)
+
+    log = with_header(recorded, "escapes.log", change)
+    result = program(
+        *{
+            "export": ["export", log, tmp_path / "out.mcap"],
+            "html": ["play", log, "--html", tmp_path / "out.html"],
+            "video": ["render", log, "--video", tmp_path / "out.webm", "--size", "64x64"],
+            "verify": ["verify", log],
+        }[command]
+    )
+    said = result.stdout + result.stderr
+    assert "?[31mred" in said and "\x1b" not in said and "\x07" not in said, result
+    assert "\nruedo: forged" not in said and "ruedo: forged" in said, result
+
+
+@pytest.mark.parametrize("option", ["--set=m/imu.update_rate=\x1b[31m", "--set=nobody/x.y=1"])
+def test_an_option_that_is_wrong_in_a_log_is_the_logs_fault(recorded, option):
+    log = with_header(recorded, "option.log", lambda header: header.options.append(option))
+    result = program("verify", log)
+    assert result.returncode == 3 and result.stderr.startswith(f"ruedo: {log}: its run had --set")
+    assert result.stderr.count("\n") == 1 and "\x1b" not in result.stderr
 
 
 @pytest.mark.parametrize("command", [["check"], ["run", "--duration", "1"], ["info"]])
