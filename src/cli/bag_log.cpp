@@ -3,10 +3,12 @@
 
 #include <algorithm>
 #include <cerrno>
+#include <climits>
 #include <cstdlib>
 #include <cstring>
 #include <filesystem>
 #include <fstream>
+#include <iterator>
 #include <set>
 #include <vector>
 
@@ -48,8 +50,17 @@ std::string file_of_bag(const std::string& folder) {
                                          is_bag ? " with a metadata.yaml" : "", files.size()));
 }
 
+constexpr size_t kMostParts = 64;  // of an attachment's name: folders, and the file
+
+// Where the bag's attachments cannot all be files, each of its name.
+[[noreturn]] void refuse_name(const std::string& bag, const std::string& name) {
+  throw InputError({bag}, fmt::format("has an attachment '{}'; allowed are names of files, of at "
+                                      "most {} parts of 255 bytes each, and none that is another's "
+                                      "folder",
+                                      shortened(name, 100), kMostParts));
+}
+
 void copy_part(const std::string& from, uint64_t offset, uint64_t size, const fs::path& to) {
-  fs::create_directories(to.parent_path());
   const InputFile in = open_input(from);
   std::ofstream out(to, std::ios::binary);
   if (::fseeko(in.file.get(), static_cast<off_t>(offset), SEEK_SET) != 0)
@@ -59,21 +70,55 @@ void copy_part(const std::string& from, uint64_t offset, uint64_t size, const fs
     const size_t count = std::min<uint64_t>(left, part.size());
     if (std::fread(part.data(), 1, count, in.file.get()) != count)
       throw InputError({from}, "became shorter while it was read");
-    out.write(part.data(), static_cast<std::streamsize>(count));
+    if (!out.write(part.data(), static_cast<std::streamsize>(count))) break;
     left -= count;
   }
   out.close();
   if (!out) throw EnvironmentError(to.string() + " cannot be written: " + std::strerror(errno));
 }
 
-// Below a folder, wherever it was; "" for a name that leads out of it.
-fs::path place_below(const fs::path& folder, const std::string& name) {
+// Below a folder, wherever it was; "" for a name that leads out of it. Makes the folders between.
+fs::path place_below(const fs::path& folder, const std::string& name, const std::string& bag) {
+  if (name.size() >= PATH_MAX) refuse_name(bag, name);
   const fs::path relative = fs::path(name).lexically_normal().relative_path();
   const bool leads_out = std::any_of(relative.begin(), relative.end(),
                                      [](const fs::path& part) { return part == ".."; });
-  return relative.empty() || leads_out || name.find('\0') != std::string::npos ? fs::path()
-                                                                               : folder / relative;
+  if (relative.empty() || leads_out || name.find('\0') != std::string::npos) return {};
+  const fs::path place = folder / relative;
+  const bool fits =
+      relative.has_filename() && relative != "." && place.native().size() < PATH_MAX &&
+      static_cast<size_t>(std::distance(relative.begin(), relative.end())) <= kMostParts &&
+      std::all_of(
+          relative.begin(), relative.end(),
+          [](const fs::path& part) { return part.native().size() <= NAME_MAX; });
+  std::error_code error;
+  if (!fits || fs::is_directory(place, error)) refuse_name(bag, name);
+  fs::create_directories(place.parent_path(), error);
+  if (error == std::errc::not_a_directory || error == std::errc::file_exists ||
+      error == std::errc::filename_too_long)
+    refuse_name(bag, name);
+  if (error)
+    throw EnvironmentError(place.parent_path().string() + " cannot be made: " + error.message());
+  return place;
 }
+
+// What the disk is to hold of a bag: its length may lie, and takes no room in a sparse file.
+class Room {
+ public:
+  void take(const std::string& bag, uint64_t size) {
+    if (size > Rosbag::kMostAttachedBytes - bytes_)
+      throw InputError({bag}, fmt::format("has attachments of more than {} bytes in all",
+                                          Rosbag::kMostAttachedBytes));
+    bytes_ += size;
+    if (++count_ > Rosbag::kMostAttachments)
+      throw InputError({bag},
+                       fmt::format("has more than {} attachments", Rosbag::kMostAttachments));
+  }
+
+ private:
+  uint64_t bytes_ = 0;
+  size_t count_ = 0;
+};
 
 }  // namespace
 
@@ -86,18 +131,23 @@ BagLog::BagLog(const std::string& path) : log_(path) {
   try {
     restore(file, fs::path(is_folder ? fs::canonical(path) : fs::path(path)).stem().string());
   } catch (const fs::filesystem_error& failure) {
-    throw EnvironmentError(failure.what());
+    throw EnvironmentError(failure.path1().string() + ": " + failure.code().message());
   }
 }
 
 void BagLog::restore(const std::string& file, const std::string& name) {
   const fs::path run = *folder_ / "run";  // the log, and the world's files beside it
   const std::string rest = *folder_ / Rosbag::kRest;
+  fs::create_directories(run);
+  log_ = (run / (name + ".lcm")).string();
+  const std::ofstream taken(log_);  // its name: an attachment could be a folder of it
   bool has_rest = false;
+  Room room;
   read_mcap(file, {{}, [&](const std::string& name, uint64_t offset, uint64_t size) {
+                     room.take(file, size);
                      const bool is_rest = name == Rosbag::kRest;
                      has_rest |= is_rest;
-                     const fs::path to = is_rest ? fs::path(rest) : place_below(run, name);
+                     const fs::path to = is_rest ? fs::path(rest) : place_below(run, name, file);
                      if (!to.empty()) copy_part(file, offset, size, to);
                    }});
   if (!has_rest)
@@ -105,8 +155,6 @@ void BagLog::restore(const std::string& file, const std::string& name) {
                      "holds no run of Ruedo's: its scene is not known. Bags are shown that "
                      "`ruedo export --ros2` made of a log, and that no other program wrote "
                      "anew");
-  fs::create_directories(run);
-  log_ = (run / (name + ".lcm")).string();
   join(rest, file);
 }
 
@@ -151,8 +199,7 @@ void BagLog::join(const std::string& rest, const std::string& file) {
   if (!out.error().empty()) throw EnvironmentError(log_ + " cannot be written: " + out.error());
   if (!in.fault().empty())
     throw InputError({file}, "its " + std::string(Rosbag::kRest) + ": " + in.fault());
-  if (damaged > 0)
-    to_stderr("ruedo: {}: {} messages are damaged, and left out\n", for_terminal(file), damaged);
+  if (damaged > 0) to_stderr("ruedo: {}: {} messages are damaged, and left out\n", file, damaged);
 }
 
 }  // namespace ruedo::cli

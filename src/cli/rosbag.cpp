@@ -4,12 +4,11 @@
 #include <algorithm>
 #include <cstring>
 #include <filesystem>
-#include <fstream>
+#include <set>
 
 #include <fmt/format.h>
 
 #include "core/output_file.h"
-#include "core/sha256.h"
 #include "engine/markers.h"
 #include "log/header.h"
 #include "model/resources.h"
@@ -154,14 +153,24 @@ bool Rosbag::write(const ros2::Topic& topic, uint64_t time_ns, std::span<const u
 
 // A log may be a stranger's: only files of its world with the expected content are read.
 void Rosbag::attach_files(log_header_t header, const std::string& log) {
+  if (!log::fault_of_names(header).empty()) return;
   std::vector<std::string> names;
   for (const log_file_t& file : header.files) names.push_back(file.path);
   log::find_files_again(header, log);
   const model::ResourceFinder finder(header.world_file, false);
+  log::Digests digests;
+  std::set<std::string> attached;
+  uint64_t bytes = 0;
   for (size_t i = 0; i < names.size(); ++i) {
     const log_file_t& file = header.files[i];
-    if (finder.reaches(file.path) && sha256_of_file(file.path) == file.sha256)
-      out_->add_attachment(names[i], "application/octet-stream", file.path);
+    if (!finder.reaches(file.path) || digests.of(file.path) != file.sha256 ||
+        !attached.insert(names[i]).second)
+      continue;
+    if ((bytes += fs::file_size(file.path)) > kMostAttachedBytes)
+      throw InputError({log}, fmt::format("was made from files of more than {} bytes in all: a bag "
+                                          "has no room for them",
+                                          kMostAttachedBytes));
+    out_->add_attachment(names[i], "application/octet-stream", file.path);
   }
 }
 

@@ -42,6 +42,9 @@ class Rosbag {
   // Of the attachment, and of a topic's metadata: the bus's channel whose messages it says in full.
   static constexpr const char* kRest = "run.lcm";
   static constexpr const char* kChannel = "ruedo_channel";
+  // Of a bag's attachments: each is a file again while the bag is shown.
+  static constexpr uint64_t kMostAttachedBytes = uint64_t{16} << 30;
+  static constexpr size_t kMostAttachments = 10'001;  // the files of a log's header, and kRest
 
   uint64_t messages() const { return out_->messages(); }
   uint64_t left_out() const { return left_out_; }

@@ -10,6 +10,7 @@ import random
 import shutil
 import subprocess
 import tempfile
+import time
 from pathlib import Path
 
 import lcm
@@ -381,6 +382,63 @@ def test_a_record_that_no_bag_has_takes_no_memory(operation, tmp_path):
     os.truncate(bad, 17 + most + 1)
     line = refused(bad)
     assert f"has a record of {most + 1} bytes (at most {most} are allowed) at byte 8" in line
+
+
+def attachments(bag, *parts):
+    """A bag of attachments alone: (name, their first bytes, how many more, of which the disk has
+    none)."""
+    with bag.open("wb") as file:
+        file.write(MAGIC)
+        for name, data, more in parts:
+            size = len(data) + more
+            head = bytes(16) + len(name).to_bytes(4, "little") + name.encode() + bytes(4)
+            head += size.to_bytes(8, "little")
+            file.write(b"\x09" + (len(head) + size + 4).to_bytes(8, "little") + head + data)
+            file.truncate(file.tell() + more + 4)
+            file.seek(0, os.SEEK_END)
+        file.write(b"\x0f" + bytes(8))
+
+
+def test_attachments_take_no_more_of_the_disk_than_a_bag_may(tmp_path):
+    """Sparse: in the bag they take no room. What cannot be written is not written on."""
+    bad = tmp_path / "bad.mcap"
+    attachments(bad, ("one", b"", (16 << 30) + 1))
+    assert f"has attachments of more than {16 << 30} bytes in all" in refused(bad)
+    attachments(bad, ("one", b"1", 0), ("two", b"", 16 << 30))
+    assert f"has attachments of more than {16 << 30} bytes in all" in refused(bad)
+    attachments(bad, *((f"{number}", b"", 0) for number in range(10_002)))
+    assert "has more than 10001 attachments" in refused(bad)
+    attachments(bad, ("one", b"", 15 << 30))
+    started = time.monotonic()
+    full = subprocess.run(
+        ["bash", "-c", 'ulimit -f 100 && exec "$0" play "$1" --html "$2"', RUEDO, bad, "no.html"],
+        capture_output=True,
+        text=True,
+        timeout=600,
+        cwd=tmp_path,
+    )
+    assert full.returncode == 4 and "cannot be written: File too large" in full.stderr, full
+    assert len(full.stderr.splitlines()) == 1 and time.monotonic() - started < 5
+
+
+@pytest.mark.parametrize(
+    "names",
+    [
+        ["aa", "aa/b"],
+        ["aa/b", "aa"],
+        ["a/.."],
+        ["a/b/"],
+        ["a" * 300],
+        ["d/" * 65 + "x"],
+        ["d/" * 3000 + "x"],
+        ["bad.lcm/x"],  # where the log will be
+    ],
+)
+def test_attachments_of_a_name_that_no_file_has(names, tmp_path):
+    bad = tmp_path / "bad.mcap"
+    attachments(bad, *((name, b"1", 0) for name in names))
+    line = refused(bad)
+    assert "has an attachment '" in line and "allowed are names of files" in line
 
 
 def test_names_take_no_more_memory_than_names_need(tmp_path):
