@@ -9,6 +9,7 @@
 #include "core/input_file.h"
 #include "core/output_file.h"
 #include "core/progress.h"
+#include "core/utf8.h"
 #include "model/codecs.h"
 #include "model/document.h"
 #include "model/occupancy.h"
@@ -24,22 +25,21 @@ namespace {
 
 constexpr int kMostPixels = 20'000;  // width and height
 
-struct Line {
-  int number;
-  std::string text;
-};
+constexpr size_t kMostMapBytes = 64u << 20;         // of an ArMap
+constexpr size_t kMostWords = 4, kMostKinds = 100;  // of its lines, and of what it holds else
+constexpr size_t kLongestShown = 100;               // of a wrong text, in an error
 
-std::vector<Line> lines_of(const std::string& path, size_t most_bytes) {
+// Calls visit(number from 1, text) for each line of a file.
+template <class Visit>
+void for_each_line(const std::string& path, size_t most_bytes, Visit visit) {
   std::string all = read_input(path, most_bytes);
   if (all.starts_with("\xEF\xBB\xBF")) all.erase(0, 3);  // the UTF-8 byte order mark
   std::istringstream in(std::move(all));
-  std::vector<Line> lines;
   std::string text;
   for (int number = 1; std::getline(in, text); ++number) {
     if (!text.empty() && text.back() == '\r') text.pop_back();
-    lines.push_back({number, text});
+    visit(number, text);
   }
-  return lines;
 }
 
 std::string trimmed(const std::string& text) {
@@ -50,9 +50,10 @@ std::string trimmed(const std::string& text) {
 
 double number(const std::string& text, const Source& source, const std::string& what) {
   double value = 0;
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+  const size_t plus = text.starts_with('+') && !text.starts_with("+-") ? 1 : 0;
+  const auto [end, error] = std::from_chars(text.data() + plus, text.data() + text.size(), value);
   if (error != std::errc() || end != text.data() + text.size() || !std::isfinite(value)) {
-    throw InputError(source, what + ": '" + text + "' is not a number");
+    throw InputError(source, what + ": '" + shortened(text, kLongestShown) + "' is not a number");
   }
   return value;
 }
@@ -63,17 +64,16 @@ class FlatYaml {
  public:
   explicit FlatYaml(const std::string& path) : path_(path) {
     std::string key;
-    for (const auto& [line, raw] : lines_of(path, 1 << 20)) {
-      std::string text = raw;
+    for_each_line(path, 1 << 20, [&](int line, std::string text) {
       if (const size_t hash = text.find('#');
           hash == 0 ||
           (hash != std::string::npos && (text[hash - 1] == ' ' || text[hash - 1] == '\t')))
         text.resize(hash);
       text = trimmed(text);
-      if (text.empty() || text == "---" || text == "...") continue;
+      if (text.empty() || text == "---" || text == "...") return;
       if (text[0] == '-' && !key.empty() && text.size() > 1 && text[1] == ' ') {
         values_[key].second += " " + trimmed(text.substr(1));
-        continue;
+        return;
       }
       const size_t colon = text.find(':');
       if (colon == std::string::npos)
@@ -86,6 +86,19 @@ class FlatYaml {
       if (const auto [other, added] = values_.try_emplace(key, line, value); !added)
         throw InputError({path, line}, "a second '" + key + "'; the first is in line " +
                                            std::to_string(other->second.first));
+    });
+  }
+
+  // Those that are none of map_server's.
+  void check_keys(Findings& findings) const {
+    const std::vector<std::string> known{"image", "resolution",      "origin",     "negate",
+                                         "mode",  "occupied_thresh", "free_thresh"};
+    for (const auto& [key, value] : values_) {
+      if (std::find(known.begin(), known.end(), key) != known.end()) continue;
+      const std::string near = nearest_word(key, known);
+      findings.unsupported({path_, value.first}, shortened(key, kLongestShown),
+                           "is no key of map_server's, and ignored" +
+                               (near.empty() ? "" : "; did you mean " + near + "?"));
     }
   }
 
@@ -110,10 +123,15 @@ class FlatYaml {
     return value;
   }
   bool boolean(const std::string& key) const {
-    const std::string value = has(key) ? text(key) : "0";
-    if (value != "0" && value != "1" && value != "false" && value != "true")
-      refuse(key, "are 0, 1, false and true");
-    return value == "1" || value == "true";
+    if (!has(key)) return false;
+    const std::string value = text(key);
+    for (const char* yes : {"1", "true", "True", "TRUE", "yes", "Yes", "YES", "on", "On", "ON"}) {
+      if (value == yes) return true;
+    }
+    for (const char* no : {"0", "false", "False", "FALSE", "no", "No", "NO", "off", "Off", "OFF"}) {
+      if (value == no) return false;
+    }
+    refuse(key, "are 0, 1, false and true");
   }
   std::vector<double> list(const std::string& key) const {
     std::string text = this->text(key);
@@ -149,6 +167,34 @@ cv::Mat read_picture(const std::string& path) {
   return grey;
 }
 
+bool is_cell(double side) { return side >= kSmallestCell_m && side <= kLargestCell_m; }
+
+// A world takes no walls that are larger or farther away. source: for errors.
+void check_extent(const OccupancyGrid& grid, const Source& source) {
+  const double width = grid.width * grid.resolution, height = grid.height * grid.resolution;
+  const double reach = math::hypot(grid.x, grid.y) + math::hypot(width, height);
+  if (std::max({width, height, reach}) <= quantity::kLength.most) return;
+  throw InputError(source, "with cells of " + shown(grid.resolution) + " m the map is " +
+                               shown(width) + " x " + shown(height) + " m large and begins at " +
+                               shown(grid.x) + ", " + shown(grid.y) +
+                               "; allowed are walls within 1000000 m of the origin");
+}
+
+// A map may be a stranger's: it reaches the pictures in its own folder and below.
+std::string picture_of(const FlatYaml& yaml, const std::string& path, bool allow_absolute) {
+  const std::string named = yaml.text("image");
+  const fs::path folder = fs::absolute(path).parent_path().lexically_normal();
+  const fs::path picture = (folder / named).lexically_normal();  // named alone, where absolute
+  const bool is_below = *picture.lexically_relative(folder).begin() != "..";
+  if (!is_below && !allow_absolute)
+    throw InputError(yaml.source("image"),
+                     "image: '" + named +
+                         "' lies outside the map's folder: put the picture beside "
+                         "the map, and name it without folders (--allow-absolute lets it in)");
+  const fs::path own = fs::path(path).parent_path();
+  return (own / (is_below ? picture.lexically_relative(folder) : fs::path(named))).string();
+}
+
 template <class CellOf>
 OccupancyGrid grid_of(const cv::Mat& grey, double resolution, CellOf cell_of) {
   OccupancyGrid grid;
@@ -167,25 +213,24 @@ OccupancyGrid grid_of(const cv::Mat& grey, double resolution, CellOf cell_of) {
 
 // Thresholds as in map_server's "trinary" mode, also applied to "scale" maps; "raw" maps hold
 // percentages.
-OccupancyGrid read_map(const std::string& path) {
+OccupancyGrid read_map(const std::string& path, Findings& findings, bool allow_absolute) {
   const FlatYaml yaml(path);
+  yaml.check_keys(findings);
   const double resolution = yaml.real("resolution");
-  if (!(resolution >= 0.0001 && resolution <= 1000))
-    yaml.refuse("resolution", "is 0.0001 to 1000 m");
+  if (!is_cell(resolution)) yaml.refuse("resolution", "is 0.0001 to 1000 m");
   const std::vector<double> origin = yaml.list("origin");
   const auto is_far = [](double number) { return std::abs(number) > quantity::kLength.most; };
   if (std::any_of(origin.begin(), origin.end(), is_far))
     yaml.refuse("origin", "is up to 1000000 m and rad");
   if (origin.size() != 3 && origin.size() != 2) yaml.refuse("origin", "is [x, y, yaw]");
   const double occupied = yaml.part("occupied_thresh", 0.65);
-  const double free = yaml.part("free_thresh", 0.25);
+  const double free = yaml.part("free_thresh", std::min(0.25, occupied));
+  if (free > occupied) yaml.refuse("free_thresh", "is up to occupied_thresh, " + shown(occupied));
   const bool negated = yaml.boolean("negate");
   const std::string mode = yaml.has("mode") ? yaml.text("mode") : "trinary";
   if (mode != "trinary" && mode != "scale" && mode != "raw")
     yaml.refuse("mode", "are trinary, scale and raw");
-  const fs::path named = yaml.text("image");
-  const std::string picture =
-      (named.is_absolute() ? named : fs::path(path).parent_path() / named).string();
+  const std::string picture = picture_of(yaml, path, allow_absolute);
   OccupancyGrid grid = grid_of(read_picture(picture), resolution, [&](uint8_t value) {
     if (mode == "raw" && value > 100) return Cell::unknown;
     const double p = mode == "raw" ? value / 100.0 : (negated ? value : 255 - value) / 255.0;
@@ -194,16 +239,35 @@ OccupancyGrid read_map(const std::string& path) {
   grid.x = origin[0];
   grid.y = origin[1];
   grid.yaw = origin.size() == 3 ? origin[2] : 0;
+  check_extent(grid, yaml.source("resolution"));
   return grid;
 }
 
-OccupancyGrid read_bitmap(const std::string& path, double resolution) {
-  OccupancyGrid grid = grid_of(read_picture(path), resolution, [](uint8_t value) {
-    return value < 128 ? Cell::occupied : Cell::free;
-  });
+namespace {
+
+OccupancyGrid bitmap_of(const std::string& path, const cv::Mat& grey, double resolution) {
+  OccupancyGrid grid = grid_of(
+      grey, resolution, [](uint8_t value) { return value < 128 ? Cell::occupied : Cell::free; });
   grid.x = -grid.width * resolution / 2;
   grid.y = -grid.height * resolution / 2;
+  check_extent(grid, {path, 0});
   return grid;
+}
+
+}  // namespace
+
+OccupancyGrid read_bitmap(const std::string& path, double resolution) {
+  return bitmap_of(path, read_picture(path), resolution);
+}
+
+OccupancyGrid read_bitmap_of_width(const std::string& path, double width) {
+  const cv::Mat grey = read_picture(path);
+  const double resolution = width / grey.cols;
+  if (!is_cell(resolution))
+    throw InputError({path, 0}, "a width of " + shown(width) + " m makes its " +
+                                    std::to_string(grey.cols) + " pixels " + shown(resolution) +
+                                    " m wide; allowed is 0.0001 to 1000 m");
+  return bitmap_of(path, grey, resolution);
 }
 
 void write_map(const OccupancyGrid& grid, const std::string& path) {
@@ -224,56 +288,114 @@ void write_map(const OccupancyGrid& grid, const std::string& path) {
                        "]\nnegate: 0\noccupied_thresh: 0.65\nfree_thresh: 0.196\n");
 }
 
+namespace {
+
+// What an ArMap holds, line by line.
+class ArMap {
+ public:
+  ArMap(const std::string& path, double thickness) : path_(path), thickness_(thickness) {
+    for_each_line(path, kMostMapBytes, [this](int line, const std::string& text) {
+      std::istringstream in(text);
+      std::vector<std::string> words;
+      for (std::string word; words.size() <= kMostWords && in >> word;) words.push_back(word);
+      if (!words.empty()) add(words, {path_, line});
+    });
+    if (!is_map_)
+      throw InputError({path, 1},
+                       "is no map of MobileSim and ARIA: it does not begin with '2D-Map'");
+    if (lines_.empty() && point_count_ == 0)
+      throw InputError({path, 0}, "holds no LINES and no DATA");
+    if (lines_.empty() && point_count_ > points_.size()) refuse_count(0);
+  }
+
+  const std::vector<WallPiece>& walls() const { return lines_.empty() ? points_ : lines_; }
+  std::string left_out() const {
+    std::string text =
+        lines_.empty() || point_count_ == 0 ? "" : std::to_string(point_count_) + " points";
+    for (const auto& [kind, count] : others_)
+      text += (text.empty() ? "" : ", ") + std::to_string(count) + " " + kind;
+    return text;
+  }
+
+ private:
+  enum class Part { head, lines, points };
+
+  void add(const std::vector<std::string>& words, const Source& source) {
+    if (words[0] == "2D-Map" || words[0] == "2D-Map-Ex" || words[0] == "2D-Map-Ex2")
+      is_map_ = true;
+    else if (words[0] == "LINES")
+      part_ = Part::lines;
+    else if (words[0] == "DATA")
+      part_ = Part::points;
+    else if (part_ == Part::head)
+      add_head(words, source);
+    else
+      add_wall(words, source);
+  }
+
+  void add_head(const std::vector<std::string>& words, const Source& source) {
+    if (words.size() < 2) return;
+    if (words[0] == "Cairn:") {
+      const bool is_kept = others_.size() < kMostKinds || others_.contains(words[1]);
+      ++others_[is_kept ? shortened(words[1], kLongestShown) : "of other kinds"];
+    }
+    if (words[0] != "Resolution:") return;
+    point_size_ = number(words[1], source, "Resolution") / 1000;
+    if (!is_cell(point_size_))
+      throw InputError(source, "Resolution: '" + shortened(words[1], kLongestShown) +
+                                   "' is not allowed; allowed is 0.1 to 1000000, in mm");
+  }
+
+  void add_wall(const std::vector<std::string>& words, const Source& source) {
+    const bool is_line = part_ == Part::lines;
+    const size_t wanted = is_line ? 4 : 2;
+    const auto refuse = [&](const std::string& allowed) {
+      std::string all;
+      for (const std::string& word : words) all += (all.empty() ? "" : " ") + word;
+      throw InputError(
+          source, "'" + shortened(all, kLongestShown) + "' is not allowed; allowed are " + allowed);
+    };
+    if (words.size() != wanted) refuse(is_line ? "x1 y1 x2 y2, in mm" : "x y, in mm");
+    double v[4] = {};
+    for (size_t i = 0; i < wanted; ++i) {
+      v[i] = number(words[i], source, is_line ? "LINES" : "DATA") / 1000;
+      if (std::abs(v[i]) > quantity::kLength.most) refuse("coordinates of up to 1000000000 mm");
+    }
+    if (!is_line) {
+      ++point_count_;
+      if (points_.size() < kMostWalls) points_.push_back({v[0], v[1], 0, point_size_, point_size_});
+      return;
+    }
+    const double dx = v[2] - v[0], dy = v[3] - v[1];
+    // Extended by its thickness at both ends: corners close.
+    const double length = math::hypot(dx, dy) + thickness_;
+    if (length > quantity::kLength.most) refuse("lines of up to 1000000000 mm");
+    if (lines_.size() == kMostWalls) refuse_count(source.line);
+    lines_.push_back(
+        {(v[0] + v[2]) / 2, (v[1] + v[3]) / 2, math::atan2(dy, dx), length, thickness_});
+  }
+
+  [[noreturn]] void refuse_count(int line) const {
+    throw InputError({path_, line}, "the map has more than " + std::to_string(kMostWalls) +
+                                        " walls; a coarser one, of LINES, has fewer");
+  }
+
+  const std::string& path_;
+  double thickness_, point_size_ = 0.02;
+  Part part_ = Part::head;
+  bool is_map_ = false;
+  std::vector<WallPiece> lines_, points_;  // points: the first of them
+  size_t point_count_ = 0;
+  std::map<std::string, int> others_;  // other kinds of map objects, with their counts
+};
+
+}  // namespace
+
 std::vector<WallPiece> read_armap(const std::string& path, double thickness,
                                   std::string& left_out) {
-  enum class Part { head, lines, points };
-  Part part = Part::head;
-  std::vector<WallPiece> lines, points;
-  std::map<std::string, int> others;  // other kinds of map objects, with their counts
-  double point_size = 0.02;
-  bool is_map = false;
-  for (const auto& [line, raw] : lines_of(path, 256u << 20)) {
-    const Source source{path, line};
-    std::istringstream in(raw);
-    std::vector<std::string> words;
-    for (std::string word; in >> word;) words.push_back(word);
-    if (words.empty()) continue;
-    if (words[0] == "2D-Map" || words[0] == "2D-Map-Ex" || words[0] == "2D-Map-Ex2")
-      is_map = true;
-    else if (words[0] == "LINES")
-      part = Part::lines;
-    else if (words[0] == "DATA")
-      part = Part::points;
-    else if (part == Part::head) {
-      if (words[0] == "Resolution:" && words.size() > 1)
-        point_size = std::max(number(words[1], source, "Resolution") / 1000, 0.001);
-      if (words[0] == "Cairn:" && words.size() > 1) ++others[words[1]];
-    } else {
-      const size_t wanted = part == Part::lines ? 4 : 2;
-      if (words.size() != wanted) {
-        throw InputError(source, "'" + raw + "' is not allowed; allowed are " +
-                                     (wanted == 4 ? "x1 y1 x2 y2" : "x y") + ", in mm");
-      }
-      double v[4] = {};
-      for (size_t i = 0; i < wanted; ++i)
-        v[i] = number(words[i], source, wanted == 4 ? "LINES" : "DATA") / 1000;
-      if (part == Part::points) {
-        points.push_back({v[0], v[1], 0, point_size, point_size});
-      } else {
-        const double dx = v[2] - v[0], dy = v[3] - v[1];
-        // Extended by its thickness at both ends: corners close.
-        lines.push_back({(v[0] + v[2]) / 2, (v[1] + v[3]) / 2, math::atan2(dy, dx),
-                         math::hypot(dx, dy) + thickness, thickness});
-      }
-    }
-  }
-  if (!is_map)
-    throw InputError({path, 1}, "is no map of MobileSim and ARIA: it does not begin with '2D-Map'");
-  if (lines.empty() && points.empty()) throw InputError({path, 0}, "holds no LINES and no DATA");
-  if (!lines.empty() && !points.empty()) left_out = std::to_string(points.size()) + " points";
-  for (const auto& [kind, count] : others)
-    left_out += (left_out.empty() ? "" : ", ") + std::to_string(count) + " " + kind;
-  return lines.empty() ? points : lines;
+  const ArMap map(path, thickness);
+  left_out = map.left_out();
+  return map.walls();
 }
 
 }  // namespace ruedo::model

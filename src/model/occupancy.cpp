@@ -17,8 +17,6 @@ namespace {
 
 constexpr double kMargin_m = 1;
 constexpr double kMostCells = 1e8;
-constexpr size_t kMostWalls =
-    100'000;  // rectangles of a map; a checkerboard would need one for every other cell
 constexpr double kShrunk = 1e-3;  // of a cell, at each side: touching a cell does not occupy it
 
 using Box = Eigen::AlignedBox3d;

@@ -46,19 +46,28 @@ OccupancyGrid occupancy_of(const WorldModel& world, double resolution, double he
 // EnvironmentError if they cannot be written.
 void write_map(const OccupancyGrid& grid, const std::string& path);
 
-// Reads a map_server YAML and its picture (PNG, PGM, BMP and others). Throws InputError.
-OccupancyGrid read_map(const std::string& yaml);
+// Of a map: a checkerboard would need one for every other cell.
+inline constexpr size_t kMostWalls = 100'000;
+inline constexpr double kSmallestCell_m = 0.0001, kLargestCell_m = 1000;
+
+// Reads a map_server YAML and its picture (PNG, PGM, BMP and others), which lies in the YAML's
+// folder or below, or anywhere with allow_absolute. Findings: keys that map_server does not have.
+// Throws InputError.
+OccupancyGrid read_map(const std::string& yaml, Findings& findings, bool allow_absolute = false);
 
 // Reads a picture alone (Stage's bitmaps): dark is occupied, and its centre is at the origin.
 // Throws InputError.
 OccupancyGrid read_bitmap(const std::string& path, double resolution);
+// The same with cells such that it is so wide (m).
+OccupancyGrid read_bitmap_of_width(const std::string& path, double width);
 
 // A piece of wall on the ground: a box centred at (x, y), `length` along yaw. Metres, rad.
 struct WallPiece {
   double x, y, yaw, length, width;
 };
 
-// The occupied cells as few boxes, without overlap.
+// The occupied cells as few boxes, without overlap. Throws std::runtime_error for more than
+// kMostWalls.
 std::vector<WallPiece> walls_of(const OccupancyGrid& grid);
 
 // The lines of a MobileSim or ARIA map (ArMap, millimetres) as walls of that thickness; its points

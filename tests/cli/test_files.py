@@ -52,6 +52,44 @@ def test_import_says_what_is_left_out(tmp_path):
     (tmp_path / "lab.map").write_text("2D-Map\nCairn: Goal 0 0 0\nLINES\n0 0 1000 0\nDATA\n")
     done = ruedo("import", tmp_path / "lab.map", "-o", tmp_path / "lab.sdf")
     assert done.stdout.endswith("lab.sdf: 1 walls; left out: 1 Goal\n")
+    (tmp_path / "lab.map").write_text("2D-Map\nCairn: \x1b[31mred\nLINES\n0 0 1000 0\nDATA\n")
+    done = ruedo("import", tmp_path / "lab.map", "-o", tmp_path / "lab.sdf")
+    assert done.stdout.endswith("lab.sdf: 1 walls; left out: 1 ?[31mred\n")
+
+
+MAP = "image: m.pgm\nresolution: 0.05\norigin: [0, 0, 0]\n"
+
+
+@pytest.mark.parametrize(
+    "name, content, options, code, words",
+    [
+        ("m.yaml", MAP, ["--resolution", "1"], 2, "--resolution is not for a map's .yaml"),
+        ("m.yaml", MAP, ["--width", "1"], 2, "--width is not for a map's .yaml"),
+        ("m.yaml", MAP, ["--thickness", "1"], 2, "--thickness is not for a map's .yaml"),
+        ("m.map", "2D-Map\nDATA\n1 1\n", ["--width", "1"], 2, "--width is not for a .map"),
+        ("m.pgm", None, ["--thickness", "1", "--width", "1"], 2, "--thickness is not for a pic"),
+        ("m.pgm", None, ["--resolution", "1", "--width", "1"], 2, "excludes"),
+        ("m.pgm", None, ["--width", "100000"], 3, "allowed is 0.0001 to 1000 m"),
+        ("m.pgm", None, ["--width", "0.001"], 0, ""),
+        ("m.yaml", MAP.replace("m.pgm", "../s.pgm"), [], 3, "m.yaml:1: image: '../s.pgm' lies"),
+        ("m.yaml", MAP.replace("m.pgm", "../s.pgm"), ["--allow-absolute"], 0, ""),
+        ("m.yaml", MAP + "ocupied_thresh: 0.3\n", [], 0, "m.yaml:4: ocupied_thresh: is no key"),
+        ("m.map", "2D-Map\nDATA\n" + "1 1\n" * 1_500_000, [], 3, "more than 100000 walls"),
+    ],
+)
+def test_import_takes_what_a_world_takes(name, content, options, code, words, tmp_path):
+    """And what it wrote is a world that has no findings."""
+    folder = tmp_path / "maps"
+    folder.mkdir()
+    for picture in (folder / "m.pgm", tmp_path / "s.pgm"):
+        picture.write_bytes(b"P5\n4 2\n255\n" + bytes([0, 255, 255, 0] * 2))
+    if content:
+        (folder / name).write_text(content)
+    done = ruedo("import", folder / name, "-o", folder / "w.sdf", *options)
+    assert done.returncode == code and words in done.stderr, done
+    assert (folder / "w.sdf").exists() == (code == 0)
+    if code == 0:
+        assert ruedo("check", folder / "w.sdf", "--strict").returncode == 0
 
 
 @pytest.mark.parametrize(

@@ -19,10 +19,11 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
       folder.write(data[0] % 4 == 2 ? "map.yaml" : "map.map", data + 1, size - 1);
   try {
     std::string left_out;
+    ruedo::Findings findings;
     switch (data[0] % 4) {
       case 0: heightmap(path, {1, 1, 1}); break;
       case 1: walls_of(read_bitmap(path, 0.1)); break;
-      case 2: walls_of(read_map(path)); break;
+      case 2: walls_of(read_map(path, findings)); break;
       default: world_of_walls("w", read_armap(path, 0.1, left_out), 1);
     }
   } catch (const std::runtime_error&) {  // InputError is one

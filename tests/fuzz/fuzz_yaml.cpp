@@ -16,7 +16,8 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   const Budget budget;
   const std::string path = folder.write("map.yaml", data, size);
   try {
-    world_of_walls("w", walls_of(read_map(path)), 1);
+    ruedo::Findings findings;
+    world_of_walls("w", walls_of(read_map(path, findings)), 1);
   } catch (const std::runtime_error&) {  // InputError is one
   }
   return 0;

@@ -1,5 +1,6 @@
 // Occupancy maps: a cut through a world computed by hand, the round trip through map_server's
 // files, ArMap, and faulty files.
+#include <filesystem>
 #include <fstream>
 #include <sstream>
 
@@ -90,7 +91,8 @@ TEST(Map, RoundTrip) {
   write_map(
       occupancy_of(*load_world(std::string(RUEDO_SOURCE_DIR) + "/worlds/arena.sdf"), 0.05, 0.2),
       folder / "one.yaml");
-  const OccupancyGrid read = read_map(folder / "one.yaml");
+  Findings findings;
+  const OccupancyGrid read = read_map(folder / "one.yaml", findings);
   const std::vector<WallPiece> walls = walls_of(read);
   EXPECT_GT(walls.size(), 4u);
   EXPECT_LT(
@@ -113,7 +115,8 @@ TEST(Map, MapServerFile) {
                                         "# made by hand\nimage: \"m.pgm\"\nresolution: 0.5  # "
                                         "m\norigin:\n- 10\n- 20\n- 1.5707963267948966\nnegate: 0\n"
                                         "occupied_thresh: 0.65\nfree_thresh: 0.196\n");
-  const OccupancyGrid grid = read_map(path);
+  Findings findings;
+  const OccupancyGrid grid = read_map(path, findings);
   EXPECT_EQ(drawn(grid), "#.?\n#..\n");
   const auto walls = walls_of(grid);
   ASSERT_EQ(walls.size(), 1u);
@@ -124,13 +127,18 @@ TEST(Map, MapServerFile) {
   // A raw map holds the occupancy in per cent, and 255 for unknown.
   folder.write("raw.pgm", std::string("P5\n3 1\n255\n") + "\x64\xff" + std::string(1, '\0'));
   EXPECT_EQ(
-      drawn(read_map(folder.write(
-          "raw.yaml", "image: raw.pgm\nresolution: 1\norigin: [0, 0, 0]\nmode: raw\nnegate: 0\n"))),
+      drawn(read_map(
+          folder.write("raw.yaml",
+                       "image: raw.pgm\nresolution: 1\norigin: [0, 0, 0]\nmode: raw\nnegate: 0\n"),
+          findings)),
       "#?.\n");
-  EXPECT_THROW(read_map(folder.write(
-                   "odd.yaml", "image: raw.pgm\nresolution: 1\norigin: [0, 0, 0]\nmode: row\n")),
-               InputError);
+  EXPECT_THROW(
+      read_map(
+          folder.write("odd.yaml", "image: raw.pgm\nresolution: 1\norigin: [0, 0, 0]\nmode: row\n"),
+          findings),
+      InputError);
   const OccupancyGrid bitmap = read_bitmap(folder / "m.pgm", 2);
+  EXPECT_TRUE(findings.list().empty());
   EXPECT_EQ(drawn(bitmap), "#..\n#..\n");
   EXPECT_EQ(bitmap.x, -3);
   EXPECT_EQ(bitmap.y, -2);
@@ -166,9 +174,10 @@ TEST(Map, WrongFilesSayWhatIsWrong) {
   const auto error = [&](const std::string& name, const std::string& text) {
     const std::string path = folder.write(name, text);
     std::string left_out;
+    Findings findings;
     try {
       if (name.ends_with(".yaml"))
-        read_map(path);
+        read_map(path, findings);
       else
         read_armap(path, 0.1, left_out);
     } catch (const InputError& e) {
@@ -208,6 +217,103 @@ TEST(Map, WrongFilesSayWhatIsWrong) {
             "a.map:3: '1 2 3' is not allowed; allowed are x1 y1 x2 y2, in mm");
   EXPECT_EQ(error("a.map", "2D-Map\nLINES\n1 2 3 x\n"), "a.map:3: LINES: 'x' is not a number");
   EXPECT_EQ(error("a.map", "2D-Map\n"), "a.map: holds no LINES and no DATA");
+  EXPECT_EQ(error("a.yaml", good + "occupied_thresh: 0.1\nfree_thresh: 0.9\n"),
+            "a.yaml:5: free_thresh: '0.9' is not allowed; allowed is up to occupied_thresh, 0.1");
+}
+
+// What `ruedo check` would refuse in the world is refused in the map.
+TEST(Map, WallsAreAsFarAndAsManyAsAWorldTakes) {
+  TemporaryFolder folder;
+  folder.write("m.pgm", std::string("P5\n1001 1\n255\n") + std::string(1001, '\0'));
+  const auto error = [&](const std::string& name, const std::string& text) {
+    const std::string path = folder.write(name, text);
+    std::string left_out;
+    Findings findings;
+    try {
+      if (name.ends_with(".yaml"))
+        read_map(path, findings);
+      else
+        read_armap(path, 0.1, left_out);
+    } catch (const InputError& e) {
+      return std::to_string(e.source().line) + ": " + e.message();
+    }
+    return std::string();
+  };
+  EXPECT_EQ(error("a.yaml", "image: m.pgm\nresolution: 1000\norigin: [0, 0, 0]\n"),
+            "2: with cells of 1000 m the map is 1001000 x 1000 m large and begins at 0, 0; allowed "
+            "are walls within 1000000 m of the origin");
+  EXPECT_NE(error("a.yaml", "image: m.pgm\nresolution: 1\norigin: [1e6, 0, 0]\n"), "");
+  EXPECT_EQ(error("a.yaml", "image: m.pgm\nresolution: 1\norigin: [900000, 0, 0]\n"), "");
+  EXPECT_EQ(error("a.map", "2D-Map\nLINES\n0 0 1e12 0\n"),
+            "3: '0 0 1e12 0' is not allowed; allowed are coordinates of up to 1000000000 mm");
+  EXPECT_EQ(error("a.map", "2D-Map\nLINES\n-9e8 0 9e8 0\n"),
+            "3: '-9e8 0 9e8 0' is not allowed; allowed are lines of up to 1000000000 mm");
+  for (const char* size : {"1e300", "-20", "0"})
+    EXPECT_EQ(error("a.map", std::string("2D-Map\nResolution: ") + size + "\nDATA\n0 0\n"),
+              std::string("2: Resolution: '") + size +
+                  "' is not allowed; allowed is 0.1 to 1000000, in mm");
+  EXPECT_THROW(read_bitmap(folder / "m.pgm", 1000), InputError);
+  EXPECT_THROW(read_bitmap_of_width(folder / "m.pgm", 0.001), InputError);
+  EXPECT_EQ(read_bitmap_of_width(folder / "m.pgm", 1001).resolution, 1);
+
+  std::string lines, points;
+  for (size_t i = 0; i <= kMostWalls; ++i) lines += "0 0 1 1\n", points += "1 1\n";
+  EXPECT_EQ(error("a.map", "2D-Map\nLINES\n" + lines),
+            "100003: the map has more than 100000 walls; a coarser one, of LINES, has fewer");
+  EXPECT_NE(error("a.map", "2D-Map\nDATA\n" + points), "");
+  EXPECT_EQ(error("a.map", "2D-Map\nLINES\n0 0 1 1\nDATA\n" + points), "");  // left out
+}
+
+// A map may be a stranger's: its picture lies in its folder or below.
+TEST(Map, ReachesItsOwnFolder) {
+  TemporaryFolder folder;
+  const std::filesystem::path inside = std::filesystem::path(folder.path()) / "maps" / "pictures";
+  std::filesystem::create_directories(inside);
+  const std::string picture = std::string("P5\n1 1\n255\n\x00", 12);
+  folder.write("secret.pgm", picture);
+  folder.write("maps/m.pgm", picture);
+  folder.write("maps/pictures/m.pgm", picture);
+  const auto reads = [&](const std::string& image, bool allow_absolute) {
+    Findings findings;
+    try {
+      read_map(
+          folder.write("maps/m.yaml", "image: " + image + "\nresolution: 1\norigin: [0, 0, 0]\n"),
+          findings, allow_absolute);
+      return true;
+    } catch (const InputError& error) {
+      EXPECT_NE(error.message().find("outside the map's folder"), std::string::npos);
+      EXPECT_EQ(error.source().line, 1);
+      return false;
+    }
+  };
+  for (const std::string& good : {std::string("m.pgm"), std::string("pictures/m.pgm"),
+                                  std::string("../maps/m.pgm"), folder / "maps/m.pgm"})
+    EXPECT_TRUE(reads(good, false)) << good;
+  for (const std::string& bad : {std::string("../secret.pgm"), folder / "secret.pgm",
+                                 std::string("pictures/../../secret.pgm")}) {
+    EXPECT_FALSE(reads(bad, false)) << bad;
+    EXPECT_TRUE(reads(bad, true)) << bad;
+  }
+  EXPECT_FALSE(reads("/nowhere/none.pgm", false));  // whether it is there is not said
+}
+
+TEST(Map, WhatYamlAllows) {
+  TemporaryFolder folder;
+  folder.write("m.pgm", std::string("P5\n1 1\n255\n\x00", 12));
+  Findings findings;
+  const OccupancyGrid grid =
+      read_map(folder.write("a.yaml",
+                            "image: m.pgm\nresolution: +0.5\norigin: [+1, 2, 0]\nnegate: True\n"
+                            "ocupied_thresh: 0.3\ncolour: red\n"),
+               findings);
+  EXPECT_EQ(grid.resolution, 0.5);
+  EXPECT_EQ(grid.x, 1);
+  EXPECT_EQ(drawn(grid), ".\n");
+  ASSERT_EQ(findings.list().size(), 2u);  // in the order of the keys
+  EXPECT_EQ(findings.list()[0].text, "is no key of map_server's, and ignored");
+  EXPECT_EQ(findings.list()[1].source.line, 5);
+  EXPECT_EQ(findings.list()[1].text,
+            "is no key of map_server's, and ignored; did you mean occupied_thresh?");
 }
 
 }  // namespace
