@@ -157,10 +157,20 @@ struct Traffic {
   double least_s = INFINITY, most_s = 0.0;
 };
 
+// Each once, in the order given.
+std::vector<std::string> different(const std::vector<std::string>& names) {
+  std::vector<std::string> found;
+  for (const std::string& name : names) {
+    if (std::find(found.begin(), found.end(), name) == found.end()) found.push_back(name);
+  }
+  return found;
+}
+
 int hz(const EchoArguments& arguments) {
+  const std::vector<std::string> channels = different(arguments.channels);
   Mailbox mailbox;
   bus::LcmBus bus(arguments.lcm);
-  bus.listen(arguments.channels, [&](const std::string& channel, const uint8_t* data, size_t size) {
+  bus.listen(channels, [&](const std::string& channel, const uint8_t* data, size_t size) {
     mailbox.put(channel, data, size);
   });
   std::map<std::string, Traffic> traffic;
@@ -180,7 +190,7 @@ int hz(const EchoArguments& arguments) {
       if (Clock::now() >= end) break;
     }
     const double seconds = std::chrono::duration<double>(Clock::now() - begin).count();
-    for (const std::string& channel : arguments.channels) {
+    for (const std::string& channel : channels) {
       Traffic& t = traffic[channel];
       anything |= t.messages > 0;
       if (t.messages == 0)

@@ -4,6 +4,7 @@
 #include <termios.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cmath>
 #include <csignal>
 #include <memory>
@@ -23,6 +24,8 @@ namespace {
 
 constexpr int kRepeat_ms = 100;  // well within a robot's watchdog
 constexpr double kStep_m_s = 0.1, kStep_rad_s = 0.2;
+// A text that is pasted presses "w" a thousand times.
+constexpr double kMost_m_s = 20.0, kMost_rad_s = 10.0;
 // What comes in place of a key.
 constexpr int kNone = 0, kEnd = -1, kSuspend = -2, kContinue = -3;
 
@@ -111,11 +114,12 @@ class Keys {
       taken_ = 0;
       if (came_ <= 0) return kEnd;
     }
-    return key_of(bytes_[taken_++]);
+    return key_of(static_cast<unsigned char>(bytes_[taken_++]));
   }
 
  private:
-  int key_of(char byte) {
+  // byte: not negative, as what comes in place of a key is.
+  int key_of(int byte) {
     const Place place = std::exchange(place_, Place::between);
     if (byte == '\033') return place_ = Place::escape, kNone;
     if (place == Place::between) return byte;
@@ -162,8 +166,11 @@ class Driver {
       default: break;
     }
     // Steps of a decimal fraction must come back to zero.
-    command_.vx = std::round(command_.vx / kStep_m_s) * kStep_m_s;
-    command_.omega = std::round(command_.omega / kStep_rad_s) * kStep_rad_s;
+    const auto tidy = [](double speed, double step, double most) {
+      return std::clamp(std::round(speed / step) * step, -most, most);
+    };
+    command_.vx = tidy(command_.vx, kStep_m_s, kMost_m_s);
+    command_.omega = tidy(command_.omega, kStep_rad_s, kMost_rad_s);
     const uint64_t failed = bus_.failed();
     send();
     fmt::print("\r\033[K{}: {:+.1f} m/s, {:+.1f} rad/s{}", robot_, command_.vx, command_.omega,
@@ -192,7 +199,10 @@ int teleop(const TeleopArguments& arguments) {
   bus::LcmBus bus(arguments.lcm);
   bus.keep_connected();
   RawTerminal terminal;
-  fmt::print("w s or up down: speed   a d or left right: turn   space: stop   q: quit\n");
+  fmt::print(
+      "w s or up down: speed   a d or left right: turn   space: stop   q: quit   (at most {:g} "
+      "m/s, {:g} rad/s)\n",
+      kMost_m_s, kMost_rad_s);
   Keys keys(signals);
   Driver driver(arguments.robot, bus);
   const auto nobody_reads = [] { return std::ferror(stdout) != 0; };

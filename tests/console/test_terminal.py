@@ -184,6 +184,13 @@ def test_hz_counts_what_comes():
     assert ruedo("hz", "silent", "-n", "1").returncode == 1
 
 
+def test_hz_counts_a_channel_that_is_named_twice_once():
+    with published("beat", b"\0" * 1000, period_s=0.05):
+        done = ruedo("hz", "beat", "beat", "-n", "2")
+    assert done.returncode == 0 and "nothing" not in done.stdout
+    assert len(done.stdout.splitlines()) == 2, done
+
+
 def test_play_says_what_nobody_took(tmp_path):
     log = lcm.EventLog(str(tmp_path / "log"), "w")
     for time_us in (0, 1_000_000):
@@ -327,6 +334,20 @@ def test_teleop_takes_keys_in_whatever_pieces_they_come():
                 commands.until(teleop, command)
             else:
                 teleop.read()
+
+
+def test_teleop_takes_no_byte_for_an_end_and_no_text_for_any_speed():
+    """0xFF, 0xFE and 0xFD are in no text of UTF-8, but may come; a text that is pasted has many
+    letters."""
+    commands = Commands()
+    with Teleop() as teleop:
+        commands.until(teleop, (0, 0))
+        teleop.press(b"w\xff\xfe\xfdw")
+        commands.until(teleop, (0.2, 0))
+        for letters, command in ((b"w" * 1000, (20, 0)), (b" " + b"a" * 1000, (0, 10))):
+            teleop.press(letters)
+            commands.until(teleop, command)
+        assert "+20.1 m/s" not in teleop.said
 
 
 @pytest.mark.parametrize("told", ["TERM", "HUP", "INT", "QUIT"])
