@@ -10,7 +10,14 @@
 namespace ruedo::model {
 namespace {
 
-const Allowed kAnyGain = Allowed::any(quantity::kDamping);
+const Allowed kGain = Allowed::any(quantity::kDamping);
+// Limits that are not there: nothing is below inf or above -inf.
+const Allowed kLower = {.max = quantity::kDamping.most,
+                        .infinite = true,
+                        .quantity = &quantity::kDamping},
+              kUpper = {.min = -quantity::kDamping.most,
+                        .infinite = true,
+                        .quantity = &quantity::kDamping};
 
 // The plugin's n-th element of that name; if there are fewer and `repeats` is set, the last one.
 const Element* nth(const Element& plugin, const std::string& name, size_t n) {
@@ -24,9 +31,9 @@ struct Defaults {
 
 // In gz-sim's Pid, limits in reverse order mean no limits.
 Pid read_pid(const Element& plugin, const std::string& prefix, size_t n, const Defaults& usual) {
-  const auto number = [&](const char* name, double fallback) {
+  const auto number = [&](const char* name, double fallback, const Allowed& allowed = kGain) {
     const Element* written = nth(plugin, prefix + name, n);
-    return written ? written->as_number(kAnyGain.or_infinite()) : fallback;
+    return written ? written->as_number(allowed) : fallback;
   };
   Pid pid;
   pid.p = number("p_gain", usual.p);
@@ -36,9 +43,11 @@ Pid read_pid(const Element& plugin, const std::string& prefix, size_t n, const D
     if (gain < 0.0)
       plugin.fail("a gain of " + shown(gain) + " is not allowed; allowed are 0 and more");
   }
-  const double i_min = number("i_min", usual.i_min), i_max = number("i_max", usual.i_max);
+  const double i_min = number("i_min", usual.i_min, kLower),
+               i_max = number("i_max", usual.i_max, kUpper);
   if (i_min <= i_max) pid.i_min = i_min, pid.i_max = i_max;
-  const double least = number("cmd_min", usual.least), most = number("cmd_max", usual.most);
+  const double least = number("cmd_min", usual.least, kLower),
+               most = number("cmd_max", usual.most, kUpper);
   if (least <= most) pid.least = least, pid.most = most;
   pid.offset = number("cmd_offset", 0.0);
   return pid;

@@ -94,6 +94,26 @@ TEST(JointPlugins, WhatIsWrongOrNotDoneIsNamed) {
   EXPECT_FALSE(axis(*world, 1).position_pid);
 }
 
+// Only a limit may be infinite, and only on the side where it is none.
+TEST(JointPlugins, GainsAreFinite) {
+  const auto with = [](const std::string& element) {
+    return world_of(
+        arm(plugin("JointPositionController", "<joint_name>one</joint_name>" + element)));
+  };
+  for (const char* name : {"p_gain", "i_gain", "d_gain", "cmd_offset"}) {
+    const std::string is = name;
+    EXPECT_THAT(texts(*with("<" + is + ">inf</" + is + ">")),
+                ElementsAre(HasSubstr("<" + is + ">: 'inf' is not finite")));
+  }
+  for (const char* wrong : {"<i_max>-inf</i_max>", "<i_min>inf</i_min>", "<cmd_max>-inf</cmd_max>",
+                            "<cmd_min>inf</cmd_min>"})
+    EXPECT_THAT(texts(*with(wrong)), ElementsAre(HasSubstr("inf' is not allowed"))) << wrong;
+  const auto unlimited =
+      with("<i_max>inf</i_max><i_min>-inf</i_min><cmd_max>inf</cmd_max><cmd_min>-inf</cmd_min>");
+  EXPECT_THAT(texts(*unlimited), IsEmpty());
+  EXPECT_EQ(axis(*unlimited, 0).position_pid.value().most, Pid::kNone);
+}
+
 struct Named {
   std::string library, name, inside, text;
 };
