@@ -88,12 +88,12 @@ const std::vector<std::string>& ControllerFiles::beside(const std::string& from)
   return at->second;
 }
 
-std::shared_ptr<const Element> ControllerFiles::read(const std::string& path) {
-  const auto [at, is_new] = files_.try_emplace(path);
+std::shared_ptr<const Element> ControllerFiles::read(const std::string& path, bool named) {
+  const auto [at, is_new] = files_.try_emplace({path, named});
   File& file = at->second;
   if (is_new) {
     try {
-      load(path, file);
+      load(path, named, file);
     } catch (const InputError& error) {
       file.error = error;
     }
@@ -106,9 +106,9 @@ std::shared_ptr<const Element> ControllerFiles::read(const std::string& path) {
   return file.root;
 }
 
-void ControllerFiles::load(const std::string& path, File& file) {
+void ControllerFiles::load(const std::string& path, bool named, File& file) {
   const std::string text = read_input(path, kLargestFile);
-  if (text.find("ontroller") == std::string::npos) return;
+  if (!named && text.find("ontroller") == std::string::npos) return;
   bytes_ += text.size();
   if (bytes_ > kMostBytes)
     throw InputError({path, 0}, "the controllers' files of a world hold no more than " +

@@ -7,6 +7,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "model/resources.h"
@@ -32,8 +33,9 @@ class ControllerFiles {
   // The files in the parameter folders of the package that contains `from`, then of neighbouring
   // packages, sorted by name.
   const std::vector<std::string>& beside(const std::string& from);
-  // Null: it names no controller. Throws InputError if it is no YAML, or beyond the bounds.
-  std::shared_ptr<const Element> read(const std::string& path);
+  // Null: it names no controller, and no plugin names it. Throws InputError if it is no YAML, or
+  // beyond the bounds.
+  std::shared_ptr<const Element> read(const std::string& path, bool named = false);
 
  private:
   struct File {
@@ -41,11 +43,11 @@ class ControllerFiles {
     size_t entries = 0;
     std::optional<InputError> error;
   };
-  void load(const std::string& path, File& file);
+  void load(const std::string& path, bool named, File& file);
 
   const ResourceFinder& resources_;
   std::map<std::string, std::vector<std::string>> beside_;  // by folder
-  std::map<std::string, File> files_;
+  std::map<std::pair<std::string, bool>, File> files_;      // by path, and whether it is named
   size_t bytes_ = 0, entries_ = 0;
 };
 

@@ -157,12 +157,12 @@ void read_joints(const Element& e, const Model& model, DriveDescription& drive) 
   all.insert(all.end(), drive.right_joints.begin(), drive.right_joints.end());
   all.insert(all.end(), drive.steer_joints.begin(), drive.steer_joints.end());
   for (size_t i = 0; i < all.size(); ++i) {
-    if (std::find(all.begin(), all.begin() + static_cast<ptrdiff_t>(i), all[i]) ==
-        all.begin() + static_cast<ptrdiff_t>(i))
-      continue;
-    const bool sides = drive.steer_joints.empty() && !drive.right_joints.empty();
+    const auto first = std::find(all.begin(), all.end(), all[i]) - all.begin();
+    if (first == static_cast<ptrdiff_t>(i)) continue;
+    const size_t left = drive.left_joints.size(), sides = left + drive.right_joints.size();
     e.fail("the joint '" + model.joints[all[i]].name +
-           (sides ? "' is left and right" : "' is named twice"));
+           (static_cast<size_t>(first) < left && left <= i && i < sides ? "' is left and right"
+                                                                        : "' is named twice"));
   }
   const auto need = [&](bool there, const char* name) {
     if (!there) e.fail(std::string("has no <") + name + ">");

@@ -16,11 +16,15 @@ namespace fs = std::filesystem;
 namespace ruedo::model {
 namespace {
 
+bool contains(std::string_view text, std::string_view part) {
+  return text.find(part) != std::string_view::npos;
+}
+
 struct Translation {
   const Controller& from;
   const Model& model;
   Element& drive;
-  std::string missing;  // a joint that the model does not have
+  std::vector<const Element*> missing = {};  // of the drive: joints that the model does not have
 
   void add(const char* name, const std::string& text, const Source& source) {
     drive.children.push_back(std::make_unique<Element>());
@@ -37,8 +41,8 @@ struct Translation {
         const bool known =
             std::any_of(model.joints.begin(), model.joints.end(),
                         [&](const Joint& each) { return each.name == dotted(joint); });
-        if (!known) missing = joint;
         add(ours, joint, list->source);
+        if (!known) missing.push_back(drive.children.back().get());
       }
     }
   }
@@ -51,14 +55,22 @@ struct Translation {
     }
   }
 
-  // A limit in ROS: with a switch in early generations, without in later ones.
+  void limit(const char* ours, const char* theirs) {
+    const Element* written = parameter(from, {theirs});
+    if (const auto value = limit_in(written)) add(ours, shown(*value), written->source);
+  }
+
+  // A limit in ROS: with a switch in early generations, without in later ones. Those that brake or
+  // are for driving backwards are below 0.
   void limit(const char* ours, const std::string& axis, const char* kind,
              std::initializer_list<const char*> names) {
     const Element* has = parameter(from, {(axis + ".has_" + kind + "_limits").c_str()});
     if (has && !is_true(has)) return;
     for (const char* name : names) {
       const Element* written = parameter(from, {(axis + "." + name).c_str()});
-      if (const auto value = positive(written)) return add(ours, shown(*value), written->source);
+      const bool below = contains(name, "min_") || contains(name, "deceleration");
+      if (const auto value = limit_in(written, below))
+        return add(ours, shown(*value), written->source);
     }
   }
 
@@ -95,7 +107,7 @@ struct Translation {
     const Element* timeout =
         parameter(from, {"cmd_vel_timeout", "reference_timeout", "command_timeout"});
     if (timeout)
-      add("ruedo:watchdog", shown(positive(timeout).value_or(0.0)), timeout->source);
+      add("ruedo:watchdog", shown(limit_in(timeout).value_or(0.0)), timeout->source);
     else
       add("ruedo:watchdog", "0.5", from.source);  // the controllers' own default
   }
@@ -161,9 +173,9 @@ void car(Translation& t) {
            {"traction_track_width", "rear_wheel_track", "wheel_track", "wheel_separation"});
   t.number("ruedo:wheel_radius", {"traction_wheels_radius", "rear_wheels_radius", "wheel_radius"},
            t.multiplier({"wheel_radius_multiplier"}));
-  t.number("ruedo:max_steering_angle", {"steering.max_position"});
-  t.number("ruedo:max_steering_rate", {"steering.max_velocity"});
-  t.number("ruedo:max_speed", {"traction.max_velocity"}, 1.0);
+  t.limit("ruedo:max_steering_angle", "steering.max_position");
+  t.limit("ruedo:max_steering_rate", "steering.max_velocity");
+  t.limit("ruedo:max_speed", "traction.max_velocity");
 }
 
 struct KnownType {
@@ -203,23 +215,59 @@ const KnownType* known_type(const std::string& type) {
   return found == std::end(kTypes) ? nullptr : found;
 }
 
+// Where findings about files that plugins name go.
+struct Report {
+  const std::string& where;
+  Findings& findings;
+  bool is_named;
+
+  void error(const Source& source, const std::string& text) const {
+    if (is_named) findings.error(source, where, text);
+  }
+};
+
 // The drive that a controller describes; null: it describes none, or one of other joints.
-std::unique_ptr<Element> drive_of(const Controller& controller, const Model& model) {
+std::unique_ptr<Element> drive_of(const Controller& controller, const Model& model,
+                                  const Report& report) {
   const KnownType* type = known_type(controller.type);
   if (!type || !type->read) return nullptr;
   auto drive = std::make_unique<Element>();
   drive->name = "ruedo:drive";
   drive->source = controller.source;
-  Translation translation{controller, model, *drive, ""};
+  Translation translation{controller, model, *drive};
   type->read(translation);
+  for (const Element* joint : translation.missing)
+    report.error(joint->source, unknown_joint(controller, joint->text));
   if (!drive->has("ruedo:left_joint") || !translation.missing.empty()) return nullptr;
   translation.limits();
   return drive;
 }
 
-std::unique_ptr<Element> odometry_of(const Controller& controller) {
+// The nearest rate of a SampleClock: an odd one is no reason to stand still.
+std::optional<double> rate_of(const Element& written, const std::string& where,
+                              Findings& findings) {
+  constexpr double kFastest_hz = 1e6, kParts = 1e9;
+  try {
+    const auto hz = limit_in(&written);
+    if (!hz) return std::nullopt;
+    const double near = std::clamp(std::round(*hz * kParts) / kParts, 1 / kParts, kFastest_hz);
+    if (near != *hz)
+      findings.repaired(
+          written.source, where,
+          "<" + written.name + ">: '" + written.text +
+              "' is not a rate: allowed are at most nine decimals and 1000000 Hz; it is " +
+              shown(near));
+    return near;
+  } catch (const InputError& error) {
+    findings.error(error.source(), where, error.message() + "; odometry has its usual rate");
+    return std::nullopt;
+  }
+}
+
+std::unique_ptr<Element> odometry_of(const Controller& controller, const std::string& where,
+                                     Findings& findings) {
   const Element* rate = parameter(controller, {"publish_rate", "odom_publish_rate"});
-  const auto hz = positive(rate);
+  const auto hz = rate ? rate_of(*rate, where, findings) : std::nullopt;
   if (!hz) return nullptr;
   auto odometry = std::make_unique<Element>();
   odometry->name = "ruedo:odometry";
@@ -263,14 +311,15 @@ constexpr std::string_view kDone =
 void collect_others(const Element& map, const std::string& prefix, int depth,
                     std::vector<std::string>& others) {
   constexpr int kDeepest = 8;
-  static const std::set<std::string> kNothing = {"", "false", "False", "0", "0.0", ".nan", ".NaN"};
+  static const std::set<std::string> kNothing = {"", "false", "False", "0", "0.0"};
   if (depth > kDeepest) return;
   for (const auto& child : map.children) {
     const std::string name = prefix + child->name;
     const bool is_list = child->has("item");
     if (!is_list && !child->children.empty()) {
       collect_others(*child, name + ".", depth + 1, others);
-    } else if (!has_word(kDone, name) && (is_list || !kNothing.contains(child->text)) &&
+    } else if (!has_word(kDone, name) &&
+               (is_list || !(kNothing.contains(child->text) || is_nan(child->text))) &&
                std::find(others.begin(), others.end(), name) == others.end()) {
       others.push_back(name);
     }
@@ -279,7 +328,8 @@ void collect_others(const Element& map, const std::string& prefix, int depth,
 
 void name_others(const Controller& controller, const std::string& where, Findings& findings) {
   std::vector<std::string> others;
-  for (const Element* map : controller.parameters) collect_others(*map, "", 0, others);
+  for (size_t i = 0; i < controller.own; ++i)
+    collect_others(*controller.parameters[i], "", 0, others);
   if (others.empty()) return;
   std::string list;
   for (const std::string& name : others) list += (list.empty() ? "" : ", ") + name;
@@ -299,9 +349,9 @@ void name_what_has_no_effect(const Controller& controller, const std::string& wh
     if (const Element* has = parameter(controller, {(at + ".has_jerk_limits").c_str()});
         is_true(has))
       name(has, "limits of the jerk are not kept");
-    const auto fastest = positive(parameter(controller, {(at + ".max_velocity").c_str()}));
+    const auto fastest = limit_in(parameter(controller, {(at + ".max_velocity").c_str()}));
     const Element* slowest = parameter(controller, {(at + ".min_velocity").c_str()});
-    const auto backwards = positive(slowest);
+    const auto backwards = limit_in(slowest, true);
     if (fastest && backwards && std::abs(*fastest - *backwards) > 1e-9)
       name(slowest, "min_velocity is not kept: it is as fast both ways as max_velocity says");
   }
@@ -323,11 +373,8 @@ ControllersDrive drive_from_controllers(const Element& model_element,
   const std::vector<std::string> named = named_files(plugins, beside, where, context);
   const auto look_in = [&](const std::vector<std::string>& paths, bool is_named) {
     ControllersDrive result;
-    std::vector<std::shared_ptr<const Element>> files;
-    for (const std::string& path : paths) {
-      if (auto file = read_controllers(path, is_named, where, context))
-        files.push_back(std::move(file));
-    }
+    const auto files = read_controllers(paths, is_named, where, context);
+    const Report report{where, context.findings, is_named};
     for (const Controller& each : controllers_in(files)) {
       if (is_named && !known_type(each.type)) {
         context.findings.unsupported(each.source, where,
@@ -336,19 +383,17 @@ ControllersDrive drive_from_controllers(const Element& model_element,
       }
       if (result.drive) continue;
       try {
-        result.drive = drive_of(each, model);
+        result.drive = drive_of(each, model, report);
+        if (result.drive) name_what_has_no_effect(each, where, context.findings);
       } catch (const InputError& error) {
-        if (is_named)
-          context.findings.error(error.source(), where,
-                                 "controller '" + each.name + "': " + error.message());
+        report.error(error.source(), "controller '" + each.name + "': " + error.message());
         result.drive.reset();
       }
       if (!result.drive) continue;
-      result.odometry = odometry_of(each);
+      result.odometry = odometry_of(each, where, context.findings);
       result.controller =
           "'" + each.name + "' of " + fs::path(each.source.file).filename().string();
       result.named = is_named;
-      name_what_has_no_effect(each, where, context.findings);
       name_others(each, where, context.findings);
       for (const std::string& path : paths) context.documents.note(path);
     }

@@ -36,25 +36,42 @@ void collect_types(const Element& map, std::vector<Controller>& into) {
     if (const Element* type = child->child("type");
         type && type->text.find("ontroller") != std::string::npos) {
       const bool own = child->name == "ros__parameters";  // the type is one of the parameters
-      into.push_back({own ? map.name : child->name, type->text, {child.get()}, child->source});
+      into.push_back({own ? map.name : child->name, type->text, {child.get()}, 1, child->source});
     }
     collect_types(*child, into);
   }
 }
 
 // NAME: ros__parameters: ..., with or without a namespace before the name.
-void collect_parameters(const Element& map, Controller& controller) {
+void collect_parameters(const Element& map, const std::string& name, Controller& controller) {
   for (const auto& child : map.children) {
     if (controller.parameters.size() >= kMostParameterMaps) return;
     const std::string own = child->name.substr(child->name.rfind('/') + 1);
     const Element* parameters = child->child("ros__parameters");
-    if (parameters && own == controller.name) {
+    if (parameters && own == name) {
       controller.parameters.push_back(parameters);
-      controller.source = child->source;
+      if (name == controller.name) controller.source = child->source;
     } else {
-      collect_parameters(*child, controller);
+      collect_parameters(*child, name, controller);
     }
   }
+}
+
+// Whether anything below is a controller, or gains of gazebo_ros_control.
+bool holds_controllers(const Element& map) {
+  return std::any_of(map.children.begin(), map.children.end(), [](const auto& child) {
+    const Element* type = child->child("type");
+    return child->name.ends_with("pid_gains") ||
+           (type && (type->text.find("ontroller") != std::string::npos ||
+                     type->text.find("roadcaster") != std::string::npos)) ||
+           holds_controllers(*child);
+  });
+}
+
+bool holds_parameters(const Element& map) {
+  return std::any_of(map.children.begin(), map.children.end(), [](const auto& child) {
+    return child->has("ros__parameters") || holds_parameters(*child);
+  });
 }
 
 std::string trimmed_package_path(const std::string& path) {
@@ -97,18 +114,39 @@ bool has_word(std::string_view words, std::string_view word) {
   return false;
 }
 
+bool is_nan(const std::string& text) { return has_word(".nan .NaN .NAN NaN", text); }
+
+bool is_infinite(const std::string& text) {
+  const bool is_signed = text.starts_with('-') || text.starts_with('+');
+  return has_word(".inf .Inf .INF", text.substr(is_signed ? 1 : 0));
+}
+
 std::optional<double> positive(const Element* written) {
-  if (!written || written->text == ".nan" || written->text == ".NaN" || written->text == "NaN")
-    return std::nullopt;
+  if (!written || is_nan(written->text)) return std::nullopt;
+  const double value = written->as_number(Allowed::between(0.0, 1e9));
+  return value > 0 ? std::optional(value) : std::nullopt;
+}
+
+std::optional<double> limit_in(const Element* written, bool signed_) {
+  if (!written || is_infinite(written->text)) return std::nullopt;
+  if (!signed_ || is_nan(written->text)) return positive(written);
   const double value = std::abs(written->as_number(Allowed::between(-1e9, 1e9)));
   return value > 0 ? std::optional(value) : std::nullopt;
+}
+
+std::string unknown_joint(const Controller& controller, const std::string& joint) {
+  return "controller '" + controller.name + "' names the joint '" + joint +
+         "', which the model does not have";
 }
 
 std::vector<Controller> controllers_in(const std::vector<std::shared_ptr<const Element>>& files) {
   std::vector<Controller> all;
   for (const auto& file : files) collect_types(*file, all);
   for (Controller& each : all) {
-    for (const auto& file : files) collect_parameters(*file, each);
+    for (const auto& file : files) collect_parameters(*file, each.name, each);
+    each.own = each.parameters.size();
+    // ROS 2's wildcards hold what no node of the name has: the first one counts.
+    for (const auto& file : files) collect_parameters(*file, "**", each);
   }
   return all;
 }
@@ -147,14 +185,26 @@ std::vector<std::string> named_files(const std::vector<const Element*>& plugins,
   return files;
 }
 
-std::shared_ptr<const Element> read_controllers(const std::string& path, bool named,
-                                                const std::string& where, ReadContext& context) {
-  try {
-    return context.controllers.read(path);
-  } catch (const InputError& error) {  // a neighbouring file may be anything
-    if (named) context.findings.error(error.source(), where, error.message());
-    return nullptr;
+std::vector<std::shared_ptr<const Element>> read_controllers(const std::vector<std::string>& paths,
+                                                             bool named, const std::string& where,
+                                                             ReadContext& context) {
+  std::vector<std::shared_ptr<const Element>> files;
+  for (const std::string& path : paths) {
+    try {
+      if (auto file = context.controllers.read(path, named)) files.push_back(std::move(file));
+    } catch (const InputError& error) {  // a neighbouring file may be anything
+      if (named) context.findings.error(error.source(), where, error.message());
+    }
   }
+  if (!named) return files;
+  const bool any = std::any_of(files.begin(), files.end(),
+                               [](const auto& file) { return holds_controllers(*file); });
+  for (const auto& file : files) {
+    if (!holds_controllers(*file) && !(any && holds_parameters(*file)))
+      context.findings.error({file->source.file, 0}, where,
+                             "the controllers' file holds no controller with a type");
+  }
+  return files;
 }
 
 }  // namespace ruedo::model

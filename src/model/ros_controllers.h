@@ -15,6 +15,7 @@ namespace ruedo::model {
 struct Controller {
   std::string name, type;                  // "diff_drive_controller/DiffDriveController"
   std::vector<const Element*> parameters;  // the maps that hold them
+  size_t own = 1;  // how many of them are its own; the others are ROS 2's wildcards
   Source source;
 };
 
@@ -24,9 +25,17 @@ const Element* parameter(const Controller& controller, std::initializer_list<con
 std::vector<std::string> names_in(const Element* list);
 bool is_true(const Element* flag);
 bool has_word(std::string_view words, std::string_view word);  // words separated by blanks
-// The absolute value of a number, if it is not 0; 0, NaN or nothing mean "no limit" to the
-// controllers.
+// As YAML and ROS 2's own parser write them.
+bool is_nan(const std::string& text);
+bool is_infinite(const std::string& text);  // of either sign
+// A size, from 0; 0, NaN or nothing mean that the controller has none.
 std::optional<double> positive(const Element* written);
+// A limit, likewise; infinity is none either. `signed_`: of a number that may be below 0, as those
+// backwards are, the absolute value.
+std::optional<double> limit_in(const Element* written, bool signed_ = false);
+
+// The joints that a controller moves and the model does not have, in the words of a finding.
+std::string unknown_joint(const Controller& controller, const std::string& joint);
 
 // One file may give the types, and another the parameters.
 std::vector<Controller> controllers_in(const std::vector<std::shared_ptr<const Element>>& files);
@@ -37,8 +46,9 @@ bool is_controlled(const Element& model_element, const std::vector<const Element
 std::vector<std::string> named_files(const std::vector<const Element*>& plugins,
                                      const std::vector<std::string>& beside,
                                      const std::string& where, ReadContext& context);
-// Null: it holds no controllers, or is not YAML, which is reported if a plugin names the file.
-std::shared_ptr<const Element> read_controllers(const std::string& path, bool named,
-                                                const std::string& where, ReadContext& context);
+// Those that are YAML and may hold controllers. Of files that a plugin names, others are reported.
+std::vector<std::shared_ptr<const Element>> read_controllers(const std::vector<std::string>& paths,
+                                                             bool named, const std::string& where,
+                                                             ReadContext& context);
 
 }  // namespace ruedo::model

@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
+#include <set>
+#include <string_view>
 
 #include "model/ros_controllers.h"
 
@@ -18,16 +20,49 @@ double number(const Element& map, const char* name, const Allowed& allowed, doub
   return written ? written->as_number(allowed) : fallback;
 }
 
+// Infinite: there is none.
+double clamp(const Element& map, const char* name, double fallback) {
+  const Element* written = map.child(name);
+  if (!written || !is_infinite(written->text)) return number(map, name, kClamp, fallback);
+  return written->text.starts_with('-') ? -Pid::kNone : Pid::kNone;
+}
+
 // As in control_toolbox: without a clamp, the integral part has no effect.
 Pid pid_of(const Element& gains) {
   Pid pid;
   pid.p = number(gains, "p", kGain);
   pid.i = number(gains, "i", kGain);
   pid.d = number(gains, "d", kGain);
-  const double clamp = std::abs(number(gains, "i_clamp", kClamp));
-  pid.i_max = std::max(0.0, number(gains, "i_clamp_max", kClamp, clamp));
-  pid.i_min = std::min(0.0, number(gains, "i_clamp_min", kClamp, -clamp));
+  const double both = std::abs(clamp(gains, "i_clamp", 0.0));
+  pid.i_max = std::max(0.0, clamp(gains, "i_clamp_max", both));
+  pid.i_min = std::min(0.0, clamp(gains, "i_clamp_min", -both));
   return pid;
+}
+
+// Gains that say what cannot be, or what is not done.
+void name_odd_gains(const Element& gains, const std::string& joint, const std::string& where,
+                    Findings& findings) {
+  // Those that are done, off, or of no concern for the motion.
+  constexpr std::string_view kDone =
+      "p i d i_clamp i_clamp_min i_clamp_max antiwindup publish_state antiwindup_strategy "
+      "activate_state_publisher save_i_terms use_external_measurement";
+  static const std::set<std::string> kNothing = {"", "false", "False", "0", "0.0"};
+  const std::string of = "gains of the joint '" + joint + "': ";
+  std::string others;
+  for (const auto& child : gains.children) {
+    if (!has_word(kDone, child->name) && !kNothing.contains(child->text) && !is_nan(child->text) &&
+        !is_infinite(child->text))
+      others += (others.empty() ? "" : ", ") + child->name;
+  }
+  if (!others.empty())
+    findings.unsupported(gains.source, where, of + "without effect here: " + others);
+  const auto name = [&](const char* key, double sign, const char* side) {
+    if (const Element* written = gains.child(key); written && sign * clamp(gains, key, 0.0) < 0.0)
+      findings.error(written->source, where,
+                     of + key + " '" + written->text + "' is " + side + " 0; it counts as 0");
+  };
+  name("i_clamp_max", 1.0, "below");
+  name("i_clamp_min", -1.0, "above");
 }
 
 bool is_set(const Pid& pid) { return pid.p > 0.0 || pid.d > 0.0; }
@@ -53,11 +88,24 @@ struct Interfaces {
 
 struct Reader {
   Model& model;
-  std::vector<std::string> held;  // names of joints
+  const std::string& where;
+  Findings& findings;
+  bool is_named = false;               // whether a plugin names the file that is read
+  std::vector<std::string> held = {};  // names of joints
 
   bool has(const std::string& joint) const {
     return std::any_of(model.joints.begin(), model.joints.end(),
                        [&](const Joint& each) { return each.name == dotted(joint); });
+  }
+
+  void error(const Source& source, const std::string& text) const {
+    if (is_named) findings.error(source, where, text);
+  }
+
+  void give(const std::string& name, Gives gives, const Element& gains) {
+    const Pid pid = pid_of(gains);
+    if (has(name) && (is_named || is_set(pid))) name_odd_gains(gains, name, where, findings);
+    give(name, gives, pid);
   }
 
   void give(const std::string& name, Gives gives, const Pid& pid) {
@@ -109,17 +157,34 @@ Gives gives_of(const Controller& controller) {
   return Gives::nothing;
 }
 
+void name_unknown_joints(const Controller& controller, const Reader& reader) {
+  for (const char* key : {"joint", "joints", "dof_names"}) {
+    const Element* list = parameter(controller, {key});
+    for (const std::string& joint : names_in(list)) {
+      if (!reader.has(joint)) reader.error(list->source, unknown_joint(controller, joint));
+    }
+  }
+}
+
 // For one joint in `pid`, for several in `gains`, or each in a map of its own.
 void read_controller(const Controller& controller, Reader& reader) {
   const Gives gives = gives_of(controller);
   if (gives == Gives::nothing) return;
   const Element* pid = parameter(controller, {"pid"});
   if (const Element* joint = parameter(controller, {"joint"}); joint && pid)
-    return reader.give(joint->text, gives, pid_of(*pid));
-  for (const std::string& joint : names_in(parameter(controller, {"joints", "dof_names"}))) {
+    return reader.give(joint->text, gives, *pid);
+  const std::vector<std::string> joints = names_in(parameter(controller, {"joints", "dof_names"}));
+  if (const Element* all = parameter(controller, {"gains"})) {
+    for (const auto& each : all->children) {
+      if (std::find(joints.begin(), joints.end(), each->name) == joints.end())
+        reader.error(each->source, "controller '" + controller.name + "': gains of the joint '" +
+                                       each->name + "', which is none of its joints");
+    }
+  }
+  for (const std::string& joint : joints) {
     const Element* gains = parameter(
         controller, {("gains." + joint).c_str(), (joint + ".pid").c_str(), joint.c_str()});
-    if (gains) reader.give(joint, gives, pid_of(*gains));
+    if (gains) reader.give(joint, gives, *gains);
   }
 }
 
@@ -151,7 +216,11 @@ void read_pid_gains(const Element& map, const Interfaces& interfaces, Reader& re
       const Gives gives = interfaces.has(joint->name, "osition")   ? Gives::effort_for_position
                           : interfaces.has(joint->name, "elocity") ? Gives::effort_for_rate
                                                                    : Gives::nothing;
-      if (reader.has(joint->name)) reader.give(joint->name, gives, pid_of(*joint));
+      if (reader.has(joint->name))
+        reader.give(joint->name, gives, *joint);
+      else
+        reader.error(joint->source,
+                     "gains of the joint '" + joint->name + "', which the model does not have");
     }
   }
 }
@@ -189,17 +258,15 @@ void read_parameters(const Element& model_element, Reader& reader) {
 void read_ros_gains(const Element& model_element, const std::vector<const Element*>& plugins,
                     const std::string& where, ReadContext& context, Model& model) {
   if (!is_controlled(model_element, plugins)) return;
-  Reader reader{model, {}};
+  Reader reader{model, where, context.findings};
   const Interfaces interfaces{model_element};
   const std::vector<std::string>& beside = context.controllers.beside(model_element.source.file);
   const std::vector<std::string> named = named_files(plugins, beside, where, context);
   const auto look_in = [&](const std::vector<std::string>& paths, bool is_named) {
-    std::vector<std::shared_ptr<const Element>> files;
-    for (const std::string& path : paths) {
-      if (auto file = read_controllers(path, is_named, where, context))
-        files.push_back(std::move(file));
-    }
+    const auto files = read_controllers(paths, is_named, where, context);
+    reader.is_named = is_named;
     for (const Controller& each : controllers_in(files)) {
+      name_unknown_joints(each, reader);
       read_controller(each, reader);
       name_constraints(each, reader, where, context.findings);
     }

@@ -1,6 +1,8 @@
 // Converts yaml-cpp's nodes to elements.
 #include "model/yaml.h"
 
+#include <map>
+
 #include <yaml-cpp/yaml.h>
 
 namespace ruedo::model {
@@ -26,10 +28,19 @@ struct Converter {
     } else if (node.IsSequence()) {
       for (const YAML::Node& item : node) convert(item, child(into, "item"), depth + 1);
     } else if (node.IsMap()) {
-      for (const auto& entry : node)
-        convert(entry.second,
-                child(into, entry.first.IsScalar() ? counted(entry.first.Scalar(), into) : ""),
-                depth + 1);
+      std::map<std::string, int> lines;  // by key
+      for (const auto& entry : node) {
+        const YAML::Node &key = entry.first, &value = entry.second;
+        const int line = key.Mark().line + 1;
+        if (key.IsScalar()) {
+          const auto [first, is_new] = lines.try_emplace(counted(key.Scalar(), into), line);
+          if (!is_new)
+            throw InputError({file, line}, "a second '" + key.Scalar() +
+                                               "'; the first is in line " +
+                                               std::to_string(first->second));
+        }
+        convert(value, child(into, key.IsScalar() ? key.Scalar() : ""), depth + 1);
+      }
     }
   }
 

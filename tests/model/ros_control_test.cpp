@@ -256,6 +256,116 @@ TEST(RosControl, ParametersWithoutEffectAreOneFinding) {
                                 "pose_covariance_diagonal, open_loop, linear.x.startup_boost"));
 }
 
+// A robot whose plugin names a file of that text.
+std::shared_ptr<const WorldModel> named_world(const std::string& yaml) {
+  TemporaryFolder folder;
+  folder.write("c.yaml", yaml);
+  return load_world(
+      folder.write("bot.urdf", four_wheels("<gazebo><plugin name='c' "
+                                           "filename='libgazebo_ros2_control.so'><parameters>"
+                                           "c.yaml</parameters></plugin></gazebo>")));
+}
+
+const std::string kManager =
+    "controller_manager:\n  ros__parameters:\n"
+    "    base: {type: diff_drive_controller/DiffDriveController}\n"
+    "    hold: {type: effort_controllers/JointTrajectoryController}\n";
+const std::string kBase =
+    "base:\n  ros__parameters:\n    left_wheel_names: [front_left, rear_left]\n"
+    "    right_wheel_names: [front_right, rear_right]\n    wheel_separation: 0.61\n"
+    "    wheel_radius: 0.11\n    linear.x.max_velocity: 1.0\n    publish_rate: 50.0\n";
+const std::string kHold =
+    "hold:\n  ros__parameters:\n    joints: [front_left]\n"
+    "    gains: {front_left: {p: 10.0, i: 1.0, d: 0.5, i_clamp: 1.0}}\n";
+
+std::string with(std::string text, const std::string& old, const std::string& by) {
+  return text.replace(text.find(old), old.size(), by);
+}
+
+struct Wrong {
+  std::string old, by, text;
+  bool drives = false;  // as the file says
+};
+
+TEST(RosControl, WhatIsWrongInANamedFileIsNamed) {
+  const std::string good = kManager + kBase + kHold;
+  ASSERT_THAT(texts(*named_world(good)), IsEmpty());
+  const Wrong table[] = {
+      {"wheel_radius: 0.11", "wheel_radius: 0.11\n    wheel_radius: 0.3",
+       "a second 'wheel_radius'; the first is in line 10"},
+      {"radius: 0.11", "radius: -0.11", "<wheel_radius>: '-0.11' is not allowed"},
+      {"separation: 0.61", "separation: -0.61", "<wheel_separation>: '-0.61' is not allowed"},
+      {"radius: 0.11", "radius: .inf", "<wheel_radius>: '.inf'"},
+      {"max_velocity: 1.0", "max_velocity: -1.0", "<linear.x.max_velocity>: '-1.0'"},
+      {"right_wheel_names: [front_right", "right_wheel_names: [xx",
+       "controller 'base' names the joint 'xx', which the model does not have"},
+      {"left_wheel_names: [front_left, rear_left]", "left_wheel_names: [rear_left, rear_left]",
+       "the joint 'rear_left' is named twice"},
+      {"publish_rate: 50.0", "publish_rate: -50.0", "<publish_rate>: '-50.0' is not allowed", true},
+      {"publish_rate: 50.0", "publish_rate: fast", "<publish_rate>: 'fast' is not a number", true},
+      {"publish_rate: 50.0", "publish_rate: 33.33333333333333", "it is 33.333333333", true},
+      {"publish_rate: 50.0", "publish_rate: 1e9", "it is 1e+06", true},
+      {"joints: [front_left]", "joints: [nope]",
+       "controller 'hold' names the joint 'nope', which the model does not have", true},
+      {"gains: {front_left", "gains: {other",
+       "controller 'hold': gains of the joint 'other', which is none of its joints", true},
+      {"{p: 10", "{pp: 10", "gains of the joint 'front_left': without effect here: pp", true},
+      {"i_clamp: 1.0", "i_clamp_min: 5, i_clamp_max: -5",
+       "gains of the joint 'front_left': i_clamp_min '5' is above 0; it counts as 0", true},
+      {"i_clamp: 1.0", "i_clamp_min: -5, i_clamp_max: -5",
+       "gains of the joint 'front_left': i_clamp_max '-5' is below 0; it counts as 0", true},
+  };
+  for (const Wrong& each : table) {
+    const auto world = named_world(with(good, each.old, each.by));
+    EXPECT_THAT(texts(*world), testing::Contains(HasSubstr(each.text))) << each.by;
+    EXPECT_EQ(drive_of(*world).guessed, !each.drives) << each.by;
+  }
+}
+
+TEST(RosControl, NamedFilesWithoutControllersAreNamed) {
+  for (const std::string& text : {std::string(), std::string("hello"), std::string("- a\n- b\n"),
+                                  std::string("\1\2"), std::string("a: {b: 1}\n"), kBase})
+    EXPECT_THAT(texts(*named_world(text)),
+                testing::Contains(testing::AnyOf(HasSubstr("holds no controller with a type"),
+                                                 HasSubstr("is no YAML"))))
+        << text;
+  const std::string broadcaster =
+      "m:\n  ros__parameters:\n    b: {type: joint_state_broadcaster/JointStateBroadcaster}\n";
+  EXPECT_THAT(texts(*named_world(broadcaster)),
+              testing::Not(testing::Contains(HasSubstr("holds no controller"))));
+}
+
+// NaN and infinity in all spellings that ROS 2 reads, and its wildcard for the names of nodes,
+// which counts where a node of the name says nothing.
+TEST(RosControl, LimitsThatAreNoneAndWildcards) {
+  for (const char* none : {".nan", ".NaN", ".NAN", ".inf", ".Inf", "+.INF"}) {
+    const auto world = named_world(
+        kManager + with(kBase, "max_velocity: 1.0", "max_velocity: " + std::string(none)));
+    EXPECT_THAT(texts(*world), IsEmpty()) << none;
+    EXPECT_FALSE(drive_of(*world).guessed) << none;
+    EXPECT_TRUE(std::isinf(drive_of(*world).max_speed)) << none;
+  }
+  const auto braked = named_world(
+      kManager + with(kBase, "publish_rate", "linear.x.max_deceleration: -2.0\n    publish_rate"));
+  EXPECT_THAT(texts(*braked), IsEmpty());
+  EXPECT_EQ(drive_of(*braked).deceleration, 2.0);
+  const auto wild = named_world(
+      "/**:\n  ros__parameters:\n    wheel_radius: 0.3\n    max_torque: 7\n    "
+      "cmd_vel_timeout: 0.25\n" +
+      kManager + kBase);
+  EXPECT_THAT(texts(*wild), IsEmpty());
+  EXPECT_EQ(drive_of(*wild).wheel_radius, 0.11);
+  EXPECT_EQ(drive_of(*wild).watchdog_us, 250'000);
+  const auto all_wild = named_world(kManager + with(kBase, "base:", "/**:"));
+  EXPECT_THAT(texts(*all_wild), IsEmpty());
+  EXPECT_EQ(drive_of(*all_wild).track, 0.61);
+}
+
+TEST(Yaml, NamesASecondKey) {
+  EXPECT_THROW(parse_yaml("a: 1\nb: {c: 1, d: 2, c: 3}\n", "f"), InputError);
+  EXPECT_NO_THROW(parse_yaml("a: {c: 1}\nb: {c: 1}\n", "f"));
+}
+
 TEST(Yaml, IsBounded) {
   EXPECT_THROW(parse_yaml("a: [", "f"), InputError);
   EXPECT_THROW(parse_yaml(std::string(2000, '['), "f"), InputError);
@@ -325,7 +435,7 @@ TEST(ControllerFiles, HoldManyControllersInVain) {
   TemporaryFolder folder;
   folder.write("bot/package.xml", package("bot"));
   std::string text = "all:\n";
-  for (int i = 0; i < 100; ++i) text += "  c: {type: some/Controller}\n";
+  for (int i = 0; i < 100; ++i) text += "  c" + std::to_string(i) + ": {type: some/Controller}\n";
   folder.write("bot/config/c.yaml", text +
                                         "  last: {type: diff_drive_controller/DiffDriveController, "
                                         "left_wheel: front_left, right_wheel: front_right}\n");
