@@ -12,6 +12,9 @@
 namespace ruedo::model {
 namespace {
 
+// Elements of sensors that nothing here reads.
+constexpr const char* kWithoutEffect[] = {"always_on", "visualize", "topic", "enable_metrics",
+                                          "plugin"};
 constexpr const char* kDriveDevices[] = {"velocity", "wheels", "odometry",
                                          "pose",     "motion", "move"};
 
@@ -68,7 +71,7 @@ class RobotsByName {
 
 // All keys of a sensor, so that values missing in the file can be set, too.
 std::vector<std::string> known_keys(const std::string& type) {
-  std::vector<std::string> keys = {"update_rate", "always_on", "pose"};
+  std::vector<std::string> keys = {"update_rate", "pose"};
   for (const SensorKind& kind : sensor_kinds()) {
     if (!kind.settings || !contains(kind.types, type)) continue;
     for (std::string& key : kind.settings(type)) keys.push_back(std::move(key));
@@ -80,7 +83,7 @@ std::vector<std::string> known_keys(const std::string& type) {
 void collect_keys(const Element& element, const std::string& prefix,
                   std::vector<std::string>& keys) {
   for (const auto& child : element.children) {
-    if (child->name == "plugin" || child->name == "ruedo:transducer") continue;
+    if (contains(kWithoutEffect, child->name) || child->name == "ruedo:transducer") continue;
     const std::string key = prefix + child->name;
     if (child->children.empty()) {
       if (!contains(keys, key)) keys.push_back(key);

@@ -14,7 +14,7 @@ namespace {
 
 const char* kRobot = R"(<sdf version='1.9'><model name='bot'>
 <link name='base'><pose>0 0 0.3 0 0 0</pose><collision name='c'><geometry><box><size>0.4 0.4 0.2</size></box></geometry></collision>
-<sensor name='LRF' type='lidar'><update_rate>10</update_rate><lidar><scan><horizontal><samples>181</samples></horizontal></scan>
+<sensor name='LRF' type='lidar'><update_rate>10</update_rate><always_on>1</always_on><topic>t</topic><lidar><scan><horizontal><samples>181</samples></horizontal></scan>
 <range><min>0.1</min><max>8</max></range></lidar></sensor></link>
 <link name='l'><pose>0 0.25 0.1 0 0 0</pose><collision name='c'><geometry><sphere><radius>0.1</radius></sphere></geometry></collision></link>
 <link name='r'><pose>0 -0.25 0.1 0 0 0</pose><collision name='c'><geometry><sphere><radius>0.1</radius></sphere></geometry></collision></link>
@@ -195,6 +195,9 @@ TEST_F(Options, SetSaysWhatThereIs) {
           .find(
               "did you mean 'update_rate'?; there are update_rate, lidar.scan.horizontal.samples"),
       std::string::npos);
+  for (const char* key : {"always_on", "visualize", "topic"})
+    EXPECT_NE(error({"bot", "LRF", key, "maybe"}).find("there is no '" + std::string(key) + "'"),
+              std::string::npos);
   EXPECT_EQ(error({"bot", "LRF", "samples", "1"}),
             "--set bot/LRF.samples: 'samples' could be lidar.scan.horizontal.samples, "
             "lidar.scan.vertical.samples");
