@@ -105,7 +105,8 @@ std::string Faults::check(const model::Fault& fault, RobotIndex robot) const {
                          name_of(robot), fmt::join(names, ", "));
     }
     if (!applies_to(sensor_kind(fault.kind), device->kind))
-      return fmt::format("{} is no fault of a {}", fault.kind, device->kind);
+      return fmt::format("{} is no fault of {} {}", fault.kind,
+                         device->kind.find_first_of("aeio") == 0 ? "an" : "a", device->kind);
   } else if (kind.of != model::FaultKind::Of::world &&
              !world_->models[layout_->robots[robot].instance].model->drive) {
     return fmt::format("{} is a fault of robots that drive", fault.kind);

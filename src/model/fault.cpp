@@ -23,6 +23,32 @@ constexpr double kLargestSeed = 1e15;  // every whole number up to it is a doubl
               "p3at/lrf:freeze@3,for=2");
 }
 
+struct Detail {
+  const char* name;
+  double Fault::* value;
+  double usual;
+};
+constexpr Detail kDetails[] = {
+    {"for", &Fault::duration_s, 0.0}, {"value", &Fault::value, 0.0}, {"from", &Fault::from, 0.0},
+    {"to", &Fault::to, 1.0},          {"x", &Fault::x, 0.0},         {"y", &Fault::y, 0.0},
+    {"heading", &Fault::heading, 0.0}};
+
+bool has_detail(const FaultKind& kind, const std::string& name) {
+  const bool is_kidnapped = kind.name == "kidnapped";
+  if (name == "for") return kind.of != FaultKind::Of::world && !is_kidnapped;
+  if (name == "value") return kind.least < kind.most;
+  return name == "from" || name == "to" ? kind.name == "blocked" : is_kidnapped;
+}
+
+// Null: of any kind.
+std::string details_of(const FaultKind* kind) {
+  std::vector<std::string> names;
+  for (const Detail& each : kDetails) {
+    if (!kind || has_detail(*kind, each.name)) names.emplace_back(each.name);
+  }
+  return fmt::format("{}", fmt::join(names, ", "));
+}
+
 double read_number(const std::string& text, const std::string& part) {
   double value = 0.0;
   const auto [end, error] = std::from_chars(part.data(), part.data() + part.size(), value);
@@ -98,9 +124,16 @@ std::string check_fault(const Fault& fault) {
                        kind->name);
   if (kind->of == FaultKind::Of::world && fault.duration_s > 0.0)
     return kind->name + " has no duration: it lasts until the next";
+  if (kind->name == "kidnapped" && fault.duration_s > 0.0)
+    return kind->name + " has no duration: it is done at once";
   if ((kind->of == FaultKind::Of::robot || kind->of == FaultKind::Of::world) &&
       !fault.target.empty())
     return fmt::format("{} has no target, and '{}' is one", kind->name, fault.target);
+  for (const Detail& each : kDetails) {
+    if (fault.*each.value != each.usual && !has_detail(*kind, each.name))
+      return fmt::format("'{}' of {} is not allowed; allowed are {}", each.name, kind->name,
+                         details_of(kind));
+  }
   if (!(fault.from >= 0.0 && fault.from < fault.to && fault.to <= 1.0)) {
     return fmt::format(
         "from {} to {} is not allowed; allowed are parts of the field of view, 0 to 1, the smaller "
@@ -113,6 +146,31 @@ std::string check_fault(const Fault& fault) {
   return "";
 }
 
+namespace {
+
+// "NAME=VALUE,..."
+void read_details(const std::string& text, std::string details, Fault& fault) {
+  const FaultKind* kind = find_fault_kind(fault.kind);
+  std::vector<std::string> given;
+  for (details += ','; !details.empty(); details.erase(0, details.find(',') + 1)) {
+    const std::string part = details.substr(0, details.find(','));
+    const size_t equals = part.find('=');
+    if (equals == std::string::npos) wrong(text, "'" + part + "' is no NAME=VALUE; ");
+    const std::string name = part.substr(0, equals);
+    const auto detail = std::find_if(std::begin(kDetails), std::end(kDetails),
+                                     [&](const Detail& each) { return each.name == name; });
+    if (detail == std::end(kDetails) || (kind && !has_detail(*kind, name)))
+      wrong(text, "'" + name + "'" + (kind ? " of " + kind->name : "") +
+                      " is not allowed; allowed are " + details_of(kind) + "; ");
+    if (std::find(given.begin(), given.end(), name) != given.end())
+      wrong(text, "'" + name + "' is given twice; ");
+    given.push_back(name);
+    fault.*detail->value = read_number(text, part.substr(equals + 1));
+  }
+}
+
+}  // namespace
+
 Fault parse_fault(const std::string& text) {
   const size_t at = text.find('@'), colon = text.rfind(':', at);
   if (at == std::string::npos || colon == std::string::npos || colon > at) wrong(text, "");
@@ -123,35 +181,15 @@ Fault parse_fault(const std::string& text) {
     fault.target = fault.robot.substr(slash + 1);
     fault.robot.resize(slash);
   }
-  size_t end = std::min(text.find(',', at), text.size());
+  const size_t end = std::min(text.find(',', at), text.size());
   fault.at_s = read_number(text, text.substr(at + 1, end - at - 1));
-  while (end < text.size()) {
-    const size_t begin = end + 1, equals = text.find('=', begin);
-    end = std::min(text.find(',', begin), text.size());
-    if (equals == std::string::npos || equals > end)
-      wrong(text, "'" + text.substr(begin, end - begin) + "' is no NAME=VALUE; ");
-    const std::string name = text.substr(begin, equals - begin);
-    const double value = read_number(text, text.substr(equals + 1, end - equals - 1));
-    if (name == "for")
-      fault.duration_s = value;
-    else if (name == "value")
-      fault.value = value;
-    else if (name == "from")
-      fault.from = value;
-    else if (name == "to")
-      fault.to = value;
-    else if (name == "x")
-      fault.x = value;
-    else if (name == "y")
-      fault.y = value;
-    else if (name == "heading")
-      fault.heading = value;
-    else
-      wrong(text,
-            "'" + name + "' is not allowed; allowed are for, value, from, to, x, y and heading; ");
-  }
-  if (const std::string why = check_fault(fault); !why.empty())
-    throw InputError({}, "--fault '" + text + "': " + why);
+  if (end < text.size()) read_details(text, text.substr(end + 1), fault);
+  fault.source = {"--fault '" + text + "'", 0};
+  if (const std::string why = check_fault(fault); !why.empty()) throw InputError(fault.source, why);
+  if (!fault.robot.empty() && find_fault_kind(fault.kind)->of == FaultKind::Of::world)
+    throw InputError(fault.source, fault.kind + " is of the world, not of the robot '" +
+                                       fault.robot + "'; it looks like :" + fault.kind +
+                                       "@SECONDS,value=SEED");
   return fault;
 }
 

@@ -184,6 +184,8 @@ Fault read_fault(const Element& e) {
   fault.heading = e.number("ruedo:heading", 0.0, Allowed::between(-1e6, 1e6));
   fault.source = e.source;
   if (const std::string why = check_fault(fault); !why.empty()) e.fail(why);
+  if (!fault.robot.empty() && find_fault_kind(fault.kind)->of == FaultKind::Of::world)
+    e.fail(fault.kind + " is of the world, and <ruedo:robot> not allowed");
   return fault;
 }
 

@@ -256,7 +256,7 @@ def test_lost_commands_are_others_from_then_on():
     def way(*faults):
         return [m.encode() for _, m in run("p3at:commands_lost@0,value=0.5", *faults)["pose"]]
 
-    same, other = way(), way("p3at:reseeded@1.5,value=7")
+    same, other = way(), way(":reseeded@1.5,value=7")
     moment = same.index(next(a for a, b in zip(same, other) if a != b))
     assert len(same) == len(other) and moment >= len(same) // 2
 
@@ -284,7 +284,7 @@ def test_a_picture_that_is_read_late_is_of_the_seed_of_its_moment():
 
     drawn = {seed: pictures(seed, record=True) for seed in (1, 7)}
     assert drawn[1] != drawn[7]
-    assert pictures(1, "p3at:reseeded@0.35,value=7", record=False) == drawn[1]
+    assert pictures(1, ":reseeded@0.35,value=7", record=False) == drawn[1]
 
 
 def test_a_robot_that_comes_and_time_that_begins_anew_have_the_new_seed(tmp_path):
@@ -320,9 +320,9 @@ def test_another_seed_is_in_the_log_and_repeats(tmp_path):
     (tmp_path / "w.sdf").write_text(WORLD)
     option = (
         "--fault",
-        "p3at:reseeded@1,value=7",
+        ":reseeded@1,value=7",
         "--fault",
-        "p3at:reseeded@2,value=123456789012345",
+        ":reseeded@2,value=123456789012345",
     )
     ruedo(
         "run",
@@ -351,20 +351,29 @@ WRONG = [
     ("p3at/lrf:lag@1", "value 0 of lag is not allowed; allowed are 1e-06 to 60"),
     ("p3at/lrf:freeze", "it looks like ROBOT/DEVICE:KIND@SECONDS"),
     ("p3at/lrf:freeze@x", "'x' is no number"),
-    ("p3at/lrf:freeze@1,four=2", "'four' is not allowed; allowed are for, value"),
+    ("p3at/lrf:freeze@1,four=2", "'four' of freeze is not allowed; allowed are for"),
     ("p3at/laser:freeze@1", "there is no device 'laser' to be faulty; p3at has .*lrf"),
     ("r2d2/lrf:freeze@1", "a fault of robot 'r2d2'; the world has p3at"),
-    ("p3at/odometry:blocked@1,value=1", "blocked is no fault of a odometry"),
+    ("p3at/odometry:blocked@1,value=1", "blocked is no fault of an odometry"),
     (
         "p3at/lrf:weak_motor@1,value=0.5",
         "target 'lrf' of weak_motor is not allowed; allowed are left, right",
     ),
     ("p3at/lrf:blocked@1,from=0.7,to=0.2", "the smaller first"),
     ("p3at:freeze@1", "freeze needs a device"),
-    ("p3at:reseeded@1,value=1.5", "value 1.5 of reseeded is not allowed; a seed is a whole number"),
-    ("p3at:reseeded@1,value=-1", "value -1 of reseeded is not allowed; allowed are 0 to 1e.15"),
-    ("p3at:reseeded@1,for=2", "reseeded has no duration"),
+    (":reseeded@1,value=1.5", "value 1.5 of reseeded is not allowed; a seed is a whole number"),
+    (":reseeded@1,value=-1", "value -1 of reseeded is not allowed; allowed are 0 to 1e.15"),
+    (":reseeded@1,for=2", "'for' of reseeded is not allowed; allowed are value"),
     ("p3at/lrf:reseeded@1", "reseeded has no target, and 'lrf' is one"),
+    ("p3at:reseeded@1,value=7", "reseeded is of the world, not of the robot 'p3at'"),
+    ("p3at/lrf:lag@1,value=0.01,value=0.02", "'value' is given twice"),
+    ("p3at/lrf:freeze@1,for=1,for=2", "'for' is given twice"),
+    (
+        "p3at/left:weak_motor@1,value=0.5,x=3",
+        "'x' of weak_motor is not allowed; allowed are for, value",
+    ),
+    ("p3at:kidnapped@1,x=1,for=1", "'for' of kidnapped is not allowed; allowed are x, y, heading"),
+    ("p3at/odometry:blocked@0,value=1", "^--fault 'p3at/odometry:blocked@0,value=1'"),
 ]
 
 
@@ -378,6 +387,10 @@ def test_wrong_ones_from_a_program_are_told():
     engine = client.Engine("hall", text=HALL, disable=DISABLED)
     with pytest.raises(ValueError, match="p3at/fault: kind 'burn' is not allowed"):
         engine.command(0, "p3at/fault", message("burn"))
+    turned = message("weak_motor", "left", value=0.5)
+    turned.heading = 1.0
+    with pytest.raises(ValueError, match="'heading' of weak_motor is not allowed"):
+        engine.command(0, "p3at/fault", turned)
     with pytest.raises(ValueError, match="value nan of lag"):
         engine.command(0, "p3at/fault", message("lag", "lrf", value=math.nan))
     engine.step(None, 10)
