@@ -157,6 +157,13 @@ Outcome spawn(const spawn_request_t& request, const model::LoadedModel& loaded, 
   name = request.name.empty() ? unused_name(world, loaded.name) : request.name;
   if (const std::string fault = fault_of_name(name); !fault.empty())
     return bad("the model's name '" + name + "' " + fault);
+  const model::ModelInstance asked{name, {}, loaded.model};
+  for (const model::ModelInstance& other : world.models) {
+    const std::string path = other.removed ? "" : shared_path(other, asked);
+    if (!path.empty())
+      return refused("the name '" + name + "' is taken: with it, '" + path +
+                     "' is a link of one model and a part or the name of another");
+  }
   const Pose X_WM = spawn_pose(world, *loaded.model, request);
   const auto now = [&](InstanceIndex instance, ModelLinkIndex link) {
     return link_now(simulation, instance, link);

@@ -73,6 +73,36 @@ void make_sensor_names_unique(Model& model, const std::string& where, Findings& 
   }
 }
 
+std::string shared_path(const ModelInstance& one, const ModelInstance& other) {
+  if (one.name.size() > other.name.size()) return shared_path(other, one);
+  if (!other.name.starts_with(one.name + "/")) return "";
+  const std::string rest = other.name.substr(one.name.size() + 1);
+  for (const Link& link : one.model->links) {
+    if (link.name == rest) return other.name;
+    if (link.name.starts_with(rest + "/") &&
+        std::any_of(other.model->links.begin(), other.model->links.end(),
+                    [&](const Link& its) { return link.name == rest + "/" + its.name; }))
+      return one.name + "/" + link.name;
+  }
+  return "";
+}
+
+void name_shared_paths(const WorldModel& world, Findings& findings) {
+  std::map<std::string, const ModelInstance*> by_name;
+  for (const ModelInstance& each : world.models) by_name.emplace(each.name, &each);
+  for (const ModelInstance& each : world.models) {
+    for (size_t at = each.name.find('/'); at != std::string::npos;
+         at = each.name.find('/', at + 1)) {
+      const auto above = by_name.find(each.name.substr(0, at));
+      if (above == by_name.end()) continue;
+      if (const std::string path = shared_path(*above->second, each); !path.empty())
+        findings.error(each.model->source, "model " + each.name,
+                       "'" + path + "' is a link of the model '" + above->first + "', too; who " +
+                           "asks for it gets one of both");
+    }
+  }
+}
+
 void check_channel_names(const ModelInstance& instance, const Source& source) {
   if (!instance.is_robot()) return;
   const auto refuse = [](const Source& at, const std::string& what) { throw InputError(at, what); };

@@ -10,6 +10,7 @@
 #include "model/drive.h"
 #include "model/holds.h"
 #include "model/lifts.h"
+#include "model/load_model.h"
 #include "model/own_plugins.h"
 #include "model/placement.h"
 #include "model/sdf_link.h"
@@ -64,6 +65,7 @@ class Loader {
     name_stuck_robots(world_, findings_);
     check_holds(world_, findings_);
     check_lifts(world_, findings_);
+    name_shared_paths(world_, findings_);
     if (const std::string fault = placed_triangles_fault(world_); !fault.empty())
       throw InputError({path_, 0}, fault);
     world_.findings = findings_.list();

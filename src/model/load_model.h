@@ -34,6 +34,13 @@ LoadedModel load_model_text(const std::string& text, const std::string& world_fi
 // InputError.
 void check_channel_names(const ModelInstance& instance, const Source& source);
 
+// The path that two models share, one of them as its name or a link's: "x/y" of the model x/y, and
+// of the link y of x. "": none.
+std::string shared_path(const ModelInstance& one, const ModelInstance& other);
+
+// Reports models of a world that share a path: who asks for it cannot tell which is meant.
+void name_shared_paths(const WorldModel& world, Findings& findings);
+
 // The file that load_model() would read. Throws InputError if there is none.
 std::string model_file(const std::string& name, const std::string& world_file);
 

@@ -98,6 +98,34 @@ TEST(Strangers, FollowNoLinksOutOfAFolderOfMaterials) {
   EXPECT_FALSE(theirs && theirs->diffuse == (Rgba{0, 1, 0, 1}));
 }
 
+TEST(Names, ThatTwoModelsShareAreFound) {
+  const auto model = [](std::vector<std::string> links) {
+    auto made = std::make_shared<Model>();
+    for (std::string& name : links) {
+      made->links.emplace_back();
+      made->links.back().name = std::move(name);
+    }
+    return made;
+  };
+  const ModelInstance x{"x", {}, model({"l", "y"})}, xy{"x/y", {}, model({"z"})},
+      xyz{"x/y/z", {}, model({"q"})}, deep{"x", {}, model({"y/z"})}, xl{"xl", {}, model({"y"})};
+  EXPECT_EQ(shared_path(x, xy), "x/y");
+  EXPECT_EQ(shared_path(xy, x), "x/y");
+  EXPECT_EQ(shared_path(xy, xyz), "x/y/z");
+  EXPECT_EQ(shared_path(deep, xy), "x/y/z");
+  EXPECT_EQ(shared_path(x, xyz), "");
+  EXPECT_EQ(shared_path(x, xl), "");
+  WorldModel world;
+  world.models.push_back(xyz);
+  world.models.push_back(xy);
+  world.models.push_back(x);
+  Findings findings;
+  name_shared_paths(world, findings);
+  ASSERT_EQ(findings.list().size(), 2u);
+  EXPECT_EQ(findings.list()[0].text,
+            "'x/y/z' is a link of the model 'x/y', too; who asks for it gets one of both");
+}
+
 // What a world's robots find beside them without a name, a SPAWN's find in the world's folder only.
 TEST(Strangers, HaveNoControllersFromElsewhere) {
   const TemporaryFolder folder;

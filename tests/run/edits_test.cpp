@@ -186,6 +186,17 @@ TEST_F(EditsTest, ANameIsOneThatAWorldMayHave) {
   EXPECT_NEAR(state("a.b").position[0], x, 1e-12);  // as in a world's file
 }
 
+TEST_F(EditsTest, APathIsThatOfOneModel) {
+  begin(paused_server(), box_sdf("x", "0.2 0.2 0.2", true));
+  const std::string box = as_file("<model name='b'><static>true</static><link name='y'/></model>");
+  EXPECT_EQ(spawn(box, 2, 0, "fleet/a").code, reply_t::OK);
+  const reply_t taken = spawn(box, 4, 0, "fleet/a/y");
+  EXPECT_EQ(taken.code, reply_t::REFUSED);
+  EXPECT_NE(taken.text.find("'fleet/a/y' is taken"), std::string::npos) << taken.text;
+  EXPECT_EQ(spawn(box, 4, 0, "fleet/a/b").code, reply_t::OK);
+  EXPECT_EQ(spawn(box, 6, 0, "fleet").code, reply_t::OK);
+}
+
 TEST_F(EditsTest, PutsThingsElsewhereAtRest) {
   begin(paused_server(), robot_sdf("r", 0, 0) + box_sdf("box", "0.2 0.2 0.2", false, 5, 0, 0.1));
   drive("r", 0.5);
