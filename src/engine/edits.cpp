@@ -98,6 +98,14 @@ Pose link_now(const Simulation& simulation, InstanceIndex instance, ModelLinkInd
                                 : placement.X_BL;
 }
 
+// A text has no folder; that of its includes is the world's, which is not the client's to know.
+std::string told(const InputError& error) {
+  const Source& source = error.source();
+  const std::string file = std::filesystem::path(source.file).filename().string();
+  return file == "the text" ? InputError({file, source.line}, error.message()).what()
+                            : error.what();
+}
+
 }  // namespace
 
 model::LoadedModel ModelStore::load(const spawn_request_t& request, model::LoadBudget* budget) {
@@ -179,7 +187,7 @@ Outcome spawn(const spawn_request_t& request, const model::LoadedModel& loaded, 
     model::check_channel_names({name, X_WM, loaded.model}, loaded.model->source);
     simulation.add_model(name, X_WM, loaded.model, step, channels, findings);
   } catch (const InputError& error) {
-    return bad(error.what());
+    return bad(told(error));
   } catch (const EnvironmentError& error) {
     return refused(error.what());
   }

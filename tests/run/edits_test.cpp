@@ -197,6 +197,17 @@ TEST_F(EditsTest, APathIsThatOfOneModel) {
   EXPECT_EQ(spawn(box, 6, 0, "fleet").code, reply_t::OK);
 }
 
+// The folder of the world is not its clients' to know.
+TEST_F(EditsTest, AnErrorInATextIsToldWithoutAFolder) {
+  begin(paused_server(), box_sdf("x", "0.2 0.2 0.2", true));
+  const reply_t reply =
+      spawn(as_file("<model name='b'><link name='y'/><ruedo:path><ruedo:waypoint>0 0 soon 0 0 0 0"
+                    "</ruedo:waypoint></ruedo:path></model>"),
+            2, 0);
+  EXPECT_EQ(reply.code, reply_t::BAD_REQUEST);
+  EXPECT_TRUE(reply.text.starts_with("the text:1: ")) << reply.text;
+}
+
 TEST_F(EditsTest, PutsThingsElsewhereAtRest) {
   begin(paused_server(), robot_sdf("r", 0, 0) + box_sdf("box", "0.2 0.2 0.2", false, 5, 0, 0.1));
   drive("r", 0.5);
