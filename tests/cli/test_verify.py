@@ -93,6 +93,18 @@ def test_state_hash_each_second_and_at_the_end(tmp_path):
     assert len({h.state_hash for h in hashes}) == 4
 
 
+def test_a_seed_that_only_an_unsigned_number_holds(tmp_path):
+    log, seed = tmp_path / "seed.lcm", 2**64 - 1
+    record(log, "--seed", seed, seconds=1)
+    repeated = program("verify", log)
+    assert repeated.returncode == 0, repeated.stderr
+    assert f"seed {seed}" in repeated.stdout
+    record(tmp_path / "other.lcm", "--seed", seed // 2, seconds=1)
+    assert program("diff", log, tmp_path / "other.lcm").returncode == 1
+    page = program("play", log, "--html", tmp_path / "page.html")
+    assert page.returncode == 0, page.stderr
+
+
 def test_names_the_first_channel_step_and_field(tmp_path):
     found = record(tmp_path / "good.lcm")
     at = max(
