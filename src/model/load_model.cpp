@@ -76,6 +76,9 @@ LoadedModel load_model_text(const std::string& text, const std::string& world_fi
     std::shared_ptr<const Element> document = parse_document(text, path);
     LoadedModel loaded = read(path, world_file, std::move(document), budget);
     std::erase(loaded.files_read, path);
+    for (Finding& each : loaded.findings) {
+      if (each.source.file == path) each.source.file = "the text";
+    }
     return loaded;
   } catch (const InputError& error) {
     if (error.source().file != path) throw;

@@ -126,6 +126,15 @@ TEST(Names, ThatTwoModelsShareAreFound) {
             "'x/y/z' is a link of the model 'x/y', too; who asks for it gets one of both");
 }
 
+TEST(Strangers, TextsHaveNoFolder) {
+  const TemporaryFolder folder;
+  const LoadedModel loaded = load_model_text(
+      "<sdf version='1.9'><model name='m'><link name='l'/>\n<nonsense/></model></sdf>",
+      folder.write("w.sdf", ""));
+  ASSERT_EQ(loaded.findings.size(), 1u);
+  EXPECT_EQ(loaded.findings[0].source.str(), "the text:2");
+}
+
 // What a world's robots find beside them without a name, a SPAWN's find in the world's folder only.
 TEST(Strangers, HaveNoControllersFromElsewhere) {
   const TemporaryFolder folder;
