@@ -33,8 +33,7 @@ void name_without_effect(const DriveDescription& drive, const std::string& where
                          Findings& findings) {
   for (const Of& each : kOf) {
     const Element* written = drive.element->child(each.element);
-    if (written && std::find(each.steerings.begin(), each.steerings.end(), drive.steering) ==
-                       each.steerings.end())
+    if (written && !steering_has(drive.steering, each.element))
       findings.unsupported(
           written->source, where,
           "<" + written->name + "> does nothing with steering '" + name_of(drive.steering) + "'");
@@ -99,6 +98,13 @@ class Look {
 };
 
 }  // namespace
+
+bool steering_has(Steering steering, const std::string& element) {
+  return std::none_of(std::begin(kOf), std::end(kOf), [&](const Of& each) {
+    return element == each.element && std::find(each.steerings.begin(), each.steerings.end(),
+                                                steering) == each.steerings.end();
+  });
+}
 
 void name_odd_drive(const Element& model_element, const Model& model, const std::string& where,
                     Findings& findings) {

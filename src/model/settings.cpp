@@ -6,6 +6,7 @@
 #include <map>
 
 #include "model/drive.h"
+#include "model/odd_drive.h"
 #include "model/sdf_reader.h"
 #include "ruedo/sensor.h"
 
@@ -123,6 +124,7 @@ std::string resolved(const std::string& wanted, const std::vector<std::string>& 
                            listed(keys));
 }
 
+// What holds the value is the option's, too: it may be the one to refuse it.
 void set_text(Element& element, const std::string& key, const std::string& value,
               const Source& source) {
   Element* at = &element;
@@ -137,16 +139,19 @@ void set_text(Element& element, const std::string& key, const std::string& value
       next->name = name;
     }
     at = next;
+    at->source = source;
     rest = dot == std::string::npos ? "" : rest.substr(dot + 1);
   }
   at->text = value;
-  at->source = source;
 }
 
 void set_in_drive(Model& model, const Setting& setting, const std::string& option,
                   const Source& source) {
   const bool odometry = setting.device == "odometry";
   std::vector<std::string> keys = odometry ? odometry_elements() : drive_elements();
+  std::erase_if(keys, [&](const std::string& key) {
+    return !odometry && !steering_has(model.drive->steering, key);
+  });
   std::shared_ptr<const Element> original = odometry ? model.drive->odometry : model.drive->element;
   std::unique_ptr<Element> copy;
   if (original)

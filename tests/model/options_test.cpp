@@ -195,6 +195,8 @@ TEST_F(Options, SetSaysWhatThereIs) {
           .find(
               "did you mean 'update_rate'?; there are update_rate, lidar.scan.horizontal.samples"),
       std::string::npos);
+  EXPECT_NE(error({"bot", "velocity", "wheelbase", "maybe"}).find("there is no 'wheelbase'"),
+            std::string::npos);
   for (const char* key : {"always_on", "visualize", "topic"})
     EXPECT_NE(error({"bot", "LRF", key, "maybe"}).find("there is no '" + std::string(key) + "'"),
               std::string::npos);
