@@ -55,7 +55,7 @@ class Harm(threading.Thread):
                     try:
                         guest.spawn(text=text, x=3, y=3)
                         self.accepted.append(text)
-                    except ruedo.RuedoError:
+                    except (ruedo.RuedoError, ValueError):  # the client itself refuses some
                         self.models += 1
         except ruedo.RuedoError:  # there is no place for one more
             pass
