@@ -2,6 +2,7 @@
 // files, ArMap, and faulty files.
 #include <filesystem>
 #include <fstream>
+#include <optional>
 #include <sstream>
 
 #include <gtest/gtest.h>
@@ -167,23 +168,28 @@ TEST(Map, ArMap) {
   EXPECT_DOUBLE_EQ(points[0].length, 0.02);
 }
 
+// What reading a map throws; nothing: it is good.
+std::optional<InputError> error_of(const std::string& path) {
+  std::string left_out;
+  Findings findings;
+  try {
+    if (path.ends_with(".yaml"))
+      read_map(path, findings);
+    else
+      read_armap(path, 0.1, left_out);
+  } catch (const InputError& error) {
+    return error;
+  }
+  return std::nullopt;
+}
+
 TEST(Map, WrongFilesSayWhatIsWrong) {
   TemporaryFolder folder;
   folder.write("ok.pgm", std::string("P5\n1 1\n255\n\x00", 12));
   folder.write("no.png", "hello");
   const auto error = [&](const std::string& name, const std::string& text) {
-    const std::string path = folder.write(name, text);
-    std::string left_out;
-    Findings findings;
-    try {
-      if (name.ends_with(".yaml"))
-        read_map(path, findings);
-      else
-        read_armap(path, 0.1, left_out);
-    } catch (const InputError& e) {
-      return e.source().str().substr(folder.path().size() + 1) + ": " + e.message();
-    }
-    return std::string();
+    const auto e = error_of(folder.write(name, text));
+    return e ? e->source().str().substr(folder.path().size() + 1) + ": " + e->message() : "";
   };
   EXPECT_EQ(error("a.yaml", "image: ok.pgm\nresolution: 0.05\n"), "a.yaml: has no 'origin'");
   EXPECT_EQ(error("a.yaml", "image: ok.pgm\nresolution: fine\norigin: [0,0,0]\n"),
@@ -226,18 +232,8 @@ TEST(Map, WallsAreAsFarAndAsManyAsAWorldTakes) {
   TemporaryFolder folder;
   folder.write("m.pgm", std::string("P5\n1001 1\n255\n") + std::string(1001, '\0'));
   const auto error = [&](const std::string& name, const std::string& text) {
-    const std::string path = folder.write(name, text);
-    std::string left_out;
-    Findings findings;
-    try {
-      if (name.ends_with(".yaml"))
-        read_map(path, findings);
-      else
-        read_armap(path, 0.1, left_out);
-    } catch (const InputError& e) {
-      return std::to_string(e.source().line) + ": " + e.message();
-    }
-    return std::string();
+    const auto e = error_of(folder.write(name, text));
+    return e ? std::to_string(e->source().line) + ": " + e->message() : "";
   };
   EXPECT_EQ(error("a.yaml", "image: m.pgm\nresolution: 1000\norigin: [0, 0, 0]\n"),
             "2: with cells of 1000 m the map is 1001000 x 1000 m large and begins at 0, 0; allowed "

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import operator
 import os
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
 import numpy as np
@@ -75,13 +75,7 @@ def text(what: str, value: Any) -> str:
     """
     if not isinstance(value, str):
         raise TypeError(f"{what} is a text, not {shown(value)}")
-    try:
-        value.encode()
-    except UnicodeEncodeError:
-        raise ValueError(f"{what} is {shown(value)}, with half a character in it") from None
-    if "\0" in value:
-        raise ValueError(f"{what} is {shown(value)}, which holds the character 0")
-    return value
+    return _held(what, value, str.encode)
 
 
 def word(what: str, value: Any) -> str:
@@ -89,13 +83,18 @@ def word(what: str, value: Any) -> str:
     given = os.fspath(value) if isinstance(value, (str, os.PathLike)) else None
     if not isinstance(given, str):
         raise TypeError(f"{what} is a text or a path, not {shown(value)}")
+    return _held(what, given, os.fsencode)  # file names that are no UTF-8 pass
+
+
+def _held(what: str, value: str, encode: Callable[[str], bytes]) -> str:
+    """What C can hold. Raises ValueError."""
     try:
-        os.fsencode(given)  # file names that are no UTF-8 pass
+        encode(value)
     except UnicodeEncodeError:
         raise ValueError(f"{what} is {shown(value)}, with half a character in it") from None
-    if "\0" in given:
+    if "\0" in value:
         raise ValueError(f"{what} is {shown(value)}, which holds the character 0")
-    return given
+    return value
 
 
 def path(what: str, value: Any) -> str:
