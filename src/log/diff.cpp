@@ -8,6 +8,9 @@
 #include <cmath>
 #include <set>
 
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
 #include "log/header.h"
 #include "log/reader.h"
 #include "ruedo/errors.h"
@@ -32,6 +35,17 @@ double parse_tolerance(std::string_view text, std::string_view whole) {
 
 bool fits(const std::string& pattern, const std::string& name) {
   return fnmatch(pattern.c_str(), name.c_str(), 0) == 0;
+}
+
+// The patterns of all that messages of a type can hold, in the order of the message.
+void collect_patterns(const Schema& schema, const std::string& prefix,
+                      std::vector<std::string>& patterns) {
+  for (const Field& field : schema.fields) {
+    if (field.type)
+      collect_patterns(*field.type, prefix + field.name + ".", patterns);
+    else
+      patterns.push_back(prefix + field.name);
+  }
 }
 
 // A scalar of a message, taken out of it.
@@ -61,8 +75,14 @@ class Comparison {
  public:
   Comparison(Diff& diff, const std::vector<DiffRule>& rules) : diff_(diff), rules_(rules) {}
 
-  // Every channel of the logs, also one that is ignored.
-  void meet(const std::string& channel) { met_.insert(channel); }
+  // Every channel of the logs, also one that is ignored, with its messages of one time.
+  void meet(const std::string& channel, const std::vector<Event>& events) {
+    std::set<std::string>& types = met_[channel];
+    for (const Event& event : events) {
+      const Schema* schema = find_schema(fingerprint_of(event.data));
+      types.insert(schema ? schema->name : "");
+    }
+  }
 
   void both(const Event& golden, const Event& other) {
     ChannelDifference& channel = diff_.channels[golden.channel];
@@ -99,14 +119,36 @@ class Comparison {
       throw InputError({},
                        "--ignore leaves nothing to compare: it fits every channel of both logs");
     for (const DiffRule& rule : rules_) {
-      const auto fitting = [&](const std::string& channel) { return fits(rule.channel, channel); };
-      if (!fitting(kHeaderChannel) && std::none_of(met_.begin(), met_.end(), fitting))
-        diff_.idle_rules.push_back(std::string(rule.ignore ? "--ignore " : "--tolerance ") +
-                                   rule.channel + ": neither log has such a channel");
+      const std::string idle = idleness(rule);
+      if (!idle.empty())
+        diff_.idle_rules.push_back((rule.ignore ? "--ignore " : "--tolerance ") + rule.channel +
+                                   idle);
     }
   }
 
  private:
+  // Why a rule fits nothing in either log; "" when it does.
+  std::string idleness(const DiffRule& rule) const {
+    if (fits(rule.channel, std::string(kHeaderChannel))) return "";
+    std::set<std::string> types;
+    for (const auto& [channel, each] : met_) {
+      if (fits(rule.channel, channel)) types.insert(each.begin(), each.end());
+    }
+    if (types.empty()) return ": neither log has such a channel";
+    std::vector<std::string> patterns;
+    for (const std::string& type : types) {
+      if (const Schema* schema = find_schema(type))
+        collect_patterns(*schema, "", patterns);
+      else
+        patterns.emplace_back("(bytes)");
+    }
+    if (std::any_of(patterns.begin(), patterns.end(),
+                    [&](const std::string& pattern) { return fits(rule.field, pattern); }))
+      return "";
+    return ":" + rule.field + ": there is no such field; there are " +
+           fmt::format("{}", fmt::join(patterns, ", "));
+  }
+
   // The last rule for that field; field "": for the channel as a whole.
   const DiffRule* rule_of(const std::string& channel, const std::string& field) const {
     for (auto rule = rules_.rbegin(); rule != rules_.rend(); ++rule) {
@@ -170,7 +212,7 @@ class Comparison {
 
   Diff& diff_;
   const std::vector<DiffRule>& rules_;
-  std::set<std::string> met_;
+  std::map<std::string, std::set<std::string>> met_;  // with the types of its messages; "": unknown
 };
 
 // Hands out the events of one timestamp after the other.
@@ -279,7 +321,7 @@ Diff diff_logs(const std::string& golden_path, const std::string& other_path,
       other_events.erase(at);
     }
     for (const auto& [channel, events] : golden_events) {
-      comparison.meet(channel);
+      comparison.meet(channel, events);
       if (comparison.ignored(channel)) continue;
       const std::vector<Event>& counterparts = other_events[channel];
       for (size_t i = 0; i < events.size(); ++i) {
@@ -290,7 +332,7 @@ Diff diff_logs(const std::string& golden_path, const std::string& other_path,
       }
     }
     for (const auto& [channel, events] : other_events) {
-      comparison.meet(channel);
+      comparison.meet(channel, events);
       const auto counterparts = golden_events.find(channel);
       for (size_t i = counterparts == golden_events.end() ? 0 : counterparts->second.size();
            i < events.size(); ++i) {

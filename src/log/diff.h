@@ -59,8 +59,8 @@ struct ChannelDifference {
 struct Diff {
   std::map<std::string, ChannelDifference> channels;
   std::vector<std::string> notes;  // cut-off logs, other machines
-  // A line for each rule that fits no channel of either log: a name that is spelt wrongly, or a
-  // rule that is for other logs as well.
+  // A line for each rule that fits no channel of either log, or no field there: a name that is
+  // spelt wrongly, or a rule that is for other logs as well.
   std::vector<std::string> idle_rules;
   bool same() const;
 };

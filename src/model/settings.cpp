@@ -124,6 +124,24 @@ std::string resolved(const std::string& wanted, const std::vector<std::string>& 
                            listed(keys));
 }
 
+// A noise of type none reads nothing else, so a deviation set alone would do nothing. To be asked
+// when everything is set, since the type may be set after it.
+void require_noise(const Element& sensor, const std::string& key, const std::string& option) {
+  const std::string end = ".noise.";
+  const size_t at = key.rfind(end);
+  if (at == std::string::npos || key.substr(at + end.size()) == "type") return;
+  const std::string noise_key = key.substr(0, at + end.size() - 1);
+  std::string path = noise_key;
+  std::replace(path.begin(), path.end(), '.', '/');
+  const Element& noise = *sensor.child(path);
+  const std::string* attribute = noise.attribute("type");
+  const Element* type = noise.child("type");
+  if ((attribute ? *attribute : type ? type->text : "none") != "none") return;
+  throw InputError({}, option + ": has no effect, since the noise is of type none" +
+                           (attribute ? " (an attribute of the file)"
+                                      : "; set " + noise_key + ".type=gaussian, too"));
+}
+
 // What holds the value is the option's, too: it may be the one to refuse it.
 void set_text(Element& element, const std::string& key, const std::string& value,
               const Source& source) {
@@ -212,6 +230,11 @@ void apply_drives(const std::vector<DriveOption>& drives, WorldModel& world) {
 
 void apply_settings(const std::vector<Setting>& settings, WorldModel& world) {
   const RobotsByName robots(world);
+  struct SensorSetting {
+    const ModelInstance& robot;
+    std::string device, key, option;
+  };
+  std::vector<SensorSetting> of_sensors;
   for (const Setting& setting : settings) {
     const std::string option = "--set " + setting.robot + "/" + setting.device + "." + setting.key;
     ModelInstance& instance = robots.at(setting.robot, option);
@@ -230,6 +253,7 @@ void apply_settings(const std::vector<Setting>& settings, WorldModel& world) {
       set_text(*copy, key, setting.value, source);
       if (key == "pose") sensor->X_LS = copy->pose("pose");
       sensor->element = std::move(copy);
+      of_sensors.push_back({instance, setting.device, key, option});
     } else if (model->drive && contains(kDriveDevices, setting.device)) {
       set_in_drive(*model, setting, option, source);
     } else {
@@ -240,6 +264,11 @@ void apply_settings(const std::vector<Setting>& settings, WorldModel& world) {
                                "; there are " + listed(devices));
     }
     instance.model = std::move(model);
+  }
+  for (const SensorSetting& each : of_sensors) {
+    for (const auto& sensor : each.robot.model->sensors) {
+      if (sensor.name == each.device) require_noise(*sensor.element, each.key, each.option);
+    }
   }
 }
 

@@ -32,8 +32,9 @@ const RegisterSensor kLidar{{.module = "lidar",
                              .default_rate = {10, 1},
                              .make = {},
                              .settings = [](const std::string&) {
-                               return std::vector<std::string>{"lidar.scan.vertical.samples",
-                                                               "ruedo:sweep_time"};
+                               return std::vector<std::string>{
+                                   "lidar.scan.vertical.samples", "ruedo:sweep_time",
+                                   "lidar.noise.type", "lidar.noise.stddev"};
                              }}};
 
 // Ground at 0; a static ramp of 0.2 m at x 5 (a box), a wall of 2 m at x 10, a roof over all, a
@@ -206,6 +207,23 @@ TEST_F(Options, SetSaysWhatThereIs) {
   EXPECT_EQ(error({"bot", "velocity", "max_speed", "fast"}),
             "--set bot/velocity.max_speed: <ruedo:drive/ruedo:max_speed>: 'fast' is not a number; "
             "allowed is a number above 0, or inf");
+}
+
+TEST_F(Options, NoiseOfTypeNoneIsNotSet) {
+  const Setting deviation{"bot", "LRF", "noise.stddev", "0.01"};
+  LoadOptions options = with_bot();
+  options.settings = {deviation};
+  EXPECT_EQ(error_of(options),
+            "--set bot/LRF.noise.stddev: has no effect, since the noise is of type none; set "
+            "lidar.noise.type=gaussian, too");
+  for (const char* first : {"none", "gaussian"}) {
+    options.settings = {{"bot", "LRF", "noise.type", first},
+                        deviation,
+                        {"bot", "LRF", "lidar.noise.type", "gaussian"}};
+    EXPECT_EQ(error_of(options), "");
+  }
+  options.settings = {{"bot", "LRF", "noise.type", "none"}};
+  EXPECT_EQ(error_of(options), "");
 }
 
 TEST_F(Options, Disable) {

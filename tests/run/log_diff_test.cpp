@@ -113,6 +113,18 @@ TEST_F(LogDiffTest, IgnoredChannels) {
   EXPECT_THROW(diff({}, {"*"}), InputError) << "nothing is left that could differ";
 }
 
+TEST_F(LogDiffTest, ARuleForAFieldThatIsNotThere) {
+  write_log(golden_, 0);
+  write_log(other_, 0);
+  const log::Diff result =
+      diff({"*/odometry:thta=1", "*/odometry:th?ta=1"}, {"p3at/*:position.x", "p3at/*:x"});
+  ASSERT_EQ(result.idle_rules.size(), 2U);
+  EXPECT_THAT(result.idle_rules[0],
+              HasSubstr("--tolerance */odometry:thta: there is no such field; there are utime, "));
+  EXPECT_THAT(result.idle_rules[1],
+              HasSubstr("--ignore p3at/*:position.x: there is no such field"));
+}
+
 TEST_F(LogDiffTest, AnglesAreComparedOnTheCircle) {
   write_log(golden_, 0);
   write_log(other_, 0, 2 * M_PI + 0.001);
