@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <map>
 
+#include <fmt/format.h>
+
 #include "model/drive.h"
 #include "model/odd_drive.h"
 #include "model/sdf_reader.h"
@@ -44,6 +46,15 @@ std::vector<std::string> devices_of(const Model& model) {
   if (model.drive) names.assign(std::begin(kDriveDevices), std::end(kDriveDevices));
   for (const auto& sensor : model.sensors) names.push_back(sensor.name);
   return names;
+}
+
+[[noreturn]] void refuse_device(const Model& model, const std::string& device,
+                                const std::string& option) {
+  const std::vector<std::string> devices = devices_of(model);
+  const std::string near = nearest_word(device, devices);
+  throw InputError(
+      {}, fmt::format("{}: the robot has no device '{}'{}; there are {}", option, device,
+                      near.empty() ? "" : "; did you mean '" + near + "'?", listed(devices)));
 }
 
 // The robots of a world by name.
@@ -257,11 +268,7 @@ void apply_settings(const std::vector<Setting>& settings, WorldModel& world) {
     } else if (model->drive && contains(kDriveDevices, setting.device)) {
       set_in_drive(*model, setting, option, source);
     } else {
-      const std::vector<std::string> devices = devices_of(*model);
-      const std::string near = nearest_word(setting.device, devices);
-      throw InputError({}, option + ": the robot has no device '" + setting.device + "'" +
-                               (near.empty() ? "" : "; did you mean '" + near + "'?") +
-                               "; there are " + listed(devices));
+      refuse_device(*model, setting.device, option);
     }
     instance.model = std::move(model);
   }
@@ -295,11 +302,7 @@ void apply_disabled(const std::vector<std::string>& disabled, WorldModel& world)
     } else if (is_fixed_device(device)) {
       world.disabled.push_back(each);
     } else {
-      const std::vector<std::string> devices = devices_of(*instance.model);
-      const std::string near = nearest_word(device, devices);
-      throw InputError({}, option + ": the robot has no device '" + device + "'" +
-                               (near.empty() ? "" : "; did you mean '" + near + "'?") +
-                               "; there are " + listed(devices));
+      refuse_device(*instance.model, device, option);
     }
   }
 }
