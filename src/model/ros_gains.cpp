@@ -176,7 +176,10 @@ void read_controller(const Controller& controller, Reader& reader) {
   const std::vector<std::string> joints = names_in(parameter(controller, {"joints", "dof_names"}));
   if (const Element* all = parameter(controller, {"gains"})) {
     for (const auto& each : all->children) {
-      if (std::find(joints.begin(), joints.end(), each->name) == joints.end())
+      const auto is_of = [&](const std::string& joint) {
+        return joint == each->name || joint.starts_with(each->name + ".");  // dots become levels
+      };
+      if (std::none_of(joints.begin(), joints.end(), is_of))
         reader.error(each->source, "controller '" + controller.name + "': gains of the joint '" +
                                        each->name + "', which is none of its joints");
     }

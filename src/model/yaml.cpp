@@ -1,6 +1,7 @@
 // Converts yaml-cpp's nodes to elements.
 #include "model/yaml.h"
 
+#include <algorithm>
 #include <map>
 
 #include <yaml-cpp/yaml.h>
@@ -18,11 +19,8 @@ struct Converter {
 
   void convert(const YAML::Node& node, Element& into, int depth) {
     into.source = {file, node.Mark().line + 1};
-    if (depth > kDeepest)
-      throw InputError(into.source,
-                       "YAML that is nested more than " + std::to_string(kDeepest) + " deep");
-    if (++nodes > kMostNodes)
-      throw InputError(into.source, "YAML of more than " + std::to_string(kMostNodes) + " entries");
+    check_depth(into.source, depth);
+    count(into.source);
     if (node.IsScalar()) {
       into.text = counted(node.Scalar(), into);
     } else if (node.IsSequence()) {
@@ -30,21 +28,53 @@ struct Converter {
     } else if (node.IsMap()) {
       std::map<std::string, int> lines;  // by key
       for (const auto& entry : node) {
-        const YAML::Node &key = entry.first, &value = entry.second;
-        const int line = key.Mark().line + 1;
-        if (key.IsScalar()) {
-          const auto [first, is_new] = lines.try_emplace(counted(key.Scalar(), into), line);
-          if (!is_new)
-            throw InputError({file, line}, "a second '" + key.Scalar() +
-                                               "'; the first is in line " +
-                                               std::to_string(first->second));
-        }
-        convert(value, child(into, key.IsScalar() ? key.Scalar() : ""), depth + 1);
+        const YAML::Node& value = entry.second;
+        const Source source{file, entry.first.Mark().line + 1};
+        const std::string key = entry.first.IsScalar() ? counted(entry.first.Scalar(), into) : "";
+        const auto [first, is_new] = lines.try_emplace(key, source.line);
+        if (!is_new && entry.first.IsScalar())
+          throw InputError(source, "a second '" + key + "'; the first is in line " +
+                                       std::to_string(first->second));
+        const int levels = 1 + static_cast<int>(std::count(key.begin(), key.end(), '.'));
+        check_depth(source, depth + levels);
+        convert(value, place_of(key, source, into), depth + levels);
       }
     }
   }
 
-  const std::string& counted(const std::string& text, const Element& of) {
+  // The element of a map's entry. To ROS 2, "gains.arm.p: 1" is the same as {gains: {arm: {p: 1}}}.
+  Element& place_of(const std::string& key, const Source& source, Element& map) {
+    if (map.name != "ros__parameters") return child(map, key);
+    Element* at = &map;
+    size_t begin = 0;
+    for (size_t dot = key.find('.'); dot != std::string::npos; dot = key.find('.', begin)) {
+      const std::string part = key.substr(begin, dot - begin);
+      const auto known = std::find_if(at->children.begin(), at->children.end(),
+                                      [&](const auto& each) { return each->name == part; });
+      if (known == at->children.end()) {
+        at = &child(*at, part);
+        at->source = source;
+        count(source);
+      } else {
+        at = known->get();
+      }
+      begin = dot + 1;
+    }
+    return child(*at, key.substr(begin));
+  }
+
+  static void check_depth(const Source& source, int depth) {
+    if (depth > kDeepest)
+      throw InputError(source,
+                       "YAML that is nested more than " + std::to_string(kDeepest) + " deep");
+  }
+
+  void count(const Source& source) {
+    if (++nodes > kMostNodes)
+      throw InputError(source, "YAML of more than " + std::to_string(kMostNodes) + " entries");
+  }
+
+  std::string counted(const std::string& text, const Element& of) {
     if ((bytes += text.size()) > kMostBytes)
       throw InputError(of.source, "YAML of more than " + std::to_string(kMostBytes >> 20) +
                                       " MiB, with each alias counted as what it stands for");

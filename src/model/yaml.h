@@ -10,8 +10,8 @@
 namespace ruedo::model {
 
 // Keys become names of children, list entries become children named "item", and scalars become
-// texts. Throws InputError for text that is not YAML, nests too deep, or grows too large by
-// aliases.
+// texts. Dots in the names of ROS 2's parameters are levels. Throws InputError for text that is not
+// YAML, nests too deep, or grows too large by aliases.
 std::unique_ptr<Element> parse_yaml(const std::string& text, const std::string& file);
 
 }  // namespace ruedo::model

@@ -245,6 +245,37 @@ turn_controller:
   EXPECT_EQ(axis(*world, 1).position_gain, 7.0);
 }
 
+// To ROS 2, dots in the names of parameters are levels; some files have one line for each value.
+TEST(RosGains, OfNamesWithDots) {
+  TemporaryFolder folder;
+  folder.write("bot/package.xml", "<package><name>bot</name></package>");
+  folder.write("bot/config/control.yaml", R"(controller_manager:
+  ros__parameters:
+    arm_controller.type: joint_trajectory_controller/JointTrajectoryController
+    turn_controller.type: velocity_controllers/JointPositionController
+arm_controller:
+  ros__parameters:
+    joints: [one]
+    command_interfaces: [effort]
+    gains.one.p: 12000.0
+    gains.one.d: 50.0
+    gains.three.p: 1.0
+turn_controller:
+  ros__parameters: {joint: two, pid.p: 7.0}
+)");
+  const auto world = load_world(folder.write(
+      "bot/urdf/bot.urdf",
+      bot("<ros2_control name='s' type='system'><joint name='one'><command_interface "
+          "name='effort'/></joint></ros2_control><gazebo><plugin name='c' "
+          "filename='libgazebo_ros2_control.so'><parameters>package://bot/config/control.yaml"
+          "</parameters></plugin></gazebo>")));
+  EXPECT_EQ(axis(*world, 0).position_pid.value().p, 12000.0);
+  EXPECT_EQ(axis(*world, 0).position_pid.value().d, 50.0);
+  EXPECT_EQ(axis(*world, 1).position_gain, 7.0);
+  EXPECT_THAT(texts(*world), ElementsAre("controller 'arm_controller': gains of the joint 'three', "
+                                         "which is none of its joints"));
+}
+
 TEST(RosGains, OfPidControllersAndConstraintsThatAreNamed) {
   TemporaryFolder folder;
   folder.write("bot/package.xml", "<package><name>bot</name></package>");

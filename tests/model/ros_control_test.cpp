@@ -296,7 +296,7 @@ TEST(RosControl, WhatIsWrongInANamedFileIsNamed) {
       {"radius: 0.11", "radius: -0.11", "<wheel_radius>: '-0.11' is not allowed"},
       {"separation: 0.61", "separation: -0.61", "<wheel_separation>: '-0.61' is not allowed"},
       {"radius: 0.11", "radius: .inf", "<wheel_radius>: '.inf'"},
-      {"max_velocity: 1.0", "max_velocity: -1.0", "<linear.x.max_velocity>: '-1.0'"},
+      {"max_velocity: 1.0", "max_velocity: -1.0", "<max_velocity>: '-1.0'"},
       {"right_wheel_names: [front_right", "right_wheel_names: [xx",
        "controller 'base' names the joint 'xx', which the model does not have"},
       {"left_wheel_names: [front_left, rear_left]", "left_wheel_names: [rear_left, rear_left]",
@@ -382,6 +382,18 @@ TEST(Yaml, IsBounded) {
   EXPECT_THROW(parse_yaml(text + "[*a, *a, *a, *a, *a]", "f"), InputError);
   EXPECT_THROW(parse_yaml(text + "{*a : {*a : {*a : {*a : {*a : 1}}}}}", "f"), InputError);
   EXPECT_EQ(parse_yaml("a:\n  b: [1, 2]\n", "f")->child("a/b/item")->source.line, 2);
+}
+
+TEST(Yaml, DotsOfRos2AreLevels) {
+  const auto root = parse_yaml("ros__parameters:\n  a.b: 1\n  a.c.d: [2, 3]\nv1.2: 4\n", "f");
+  EXPECT_EQ(root->child("ros__parameters/a/b")->text, "1");
+  EXPECT_EQ(root->child("ros__parameters/a/c/d/item")->source.line, 3);
+  EXPECT_EQ(root->child("ros__parameters")->children.size(), 1u);
+  EXPECT_EQ(root->child("v1.2")->text, "4");
+  EXPECT_THROW(parse_yaml("ros__parameters: {" + std::string(40, '.') + ": 1}", "f"), InputError);
+  std::string many = "ros__parameters:\n";
+  for (int i = 0; i < 11'000; ++i) many += "  a" + std::to_string(i) + ".b: 1\n";
+  EXPECT_THROW(parse_yaml(many, "f"), InputError);
 }
 
 // A file costs once, however many robots ask for it, and all files together are bounded.
