@@ -389,7 +389,7 @@ def test_gains_and_limits_by_message_are_repeated(tmp_path):
                 simulation.reset(seed=3)  # the file's gains again
             else:
                 bus.publish("lift/joint_command", order)
-                simulation.state("lift")  # its answer comes later, so no order takes another's place
+                simulation.state("lift")  # answered after it came: none takes another's place
             simulation.sleep(0.4)
         simulation.quit()
     assert server.end()[0] == 0
