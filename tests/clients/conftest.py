@@ -6,6 +6,7 @@ Each server has a URL of its own, so that the tests of one file may run beside e
 
 from __future__ import annotations
 
+import itertools
 import os
 import shutil
 import signal
@@ -41,6 +42,7 @@ if "RUEDO_PROBE_JAVA" in os.environ:
     ]
 
 _taken: list[socket.socket] = []
+_ports = itertools.count(20_000 + os.getpid() % 10_000)
 
 
 def heed_ctrl_c() -> None:
@@ -49,13 +51,16 @@ def heed_ctrl_c() -> None:
 
 
 def free_url() -> str:
-    """A multicast URL on a port of its own, kept from others for the life of the test program."""
+    """A multicast URL on a port of its own, kept from others for the life of the test program. It
+    lies below those that sockets without a port of their own get (32768 on): one that sends from it
+    would keep receivers out.
+    """
     while True:
+        port = next(_ports)
         token = socket.socket()
-        token.bind(("127.0.0.1", 0))
-        port = token.getsockname()[1]
         with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
             try:
+                token.bind(("127.0.0.1", port))
                 probe.bind(("", port))
             except OSError:
                 token.close()
