@@ -588,6 +588,7 @@ def test_what_was_placed_and_reset_is_in_the_log_too(steered, tmp_path):
         with_all[len(with_all) // 2],
         found[-1],
         found[len(found) // 3],
+        found[len(found) // 3 - 2],  # a little back
         with_all[0],
     ]
     given = {

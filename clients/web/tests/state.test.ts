@@ -134,6 +134,22 @@ describe("the clock", () => {
     expect([page.now.time_s, clock.epoch, forgotten]).toEqual([0, 1, 3]);
   });
 
+  it("goes back by as little as is asked for, when the state has come", () => {
+    const page = new Store(state()),
+      clock = clockOf(page);
+    clock.tell(3, 0, true);
+    for (const ask of [() => clock.jump(), () => clock.move()]) {
+      ask();
+      clock.tell(2.9, 0); // no state
+      expect(page.now.time_s).toBe(3);
+      clock.tell(2.99, 0, true);
+      expect(page.now.time_s).toBe(2.99);
+      clock.tell(2.98, 0, true); // came late
+      expect(page.now.time_s).toBe(2.99);
+      clock.tell(3, 0, true);
+    }
+  });
+
   it("measures sim time per real time over a second", () => {
     const page = new Store(state()),
       clock = clockOf(page);

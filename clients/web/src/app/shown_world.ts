@@ -72,12 +72,13 @@ export class ShownWorld {
 
   // Another moment of a live run is shown, or the present again.
   private onPast(past: Past | null, kept: { begin: number; end: number }): void {
-    const { page, poses } = this.model;
+    const { page, poses, clock } = this.model;
     if (page.now.hello?.mode !== "live") return;
     const before = page.now.past;
     if (past === null && before === null && kept.end === page.now.kept.end) return;
     page.set({ past, kept });
     if (past?.now === before?.now) return;
+    clock.move();
     // markers of that time will follow
     if (!past || !before || past.now < before.now) this.scene.markers.clear();
     if (!past || !before || Math.abs(past.now - before.now) > kJump_s) poses.jump();

@@ -6,6 +6,7 @@ const kBack_s = 0.5; // a longer step back is a jump, not a message that came la
 export class Clock {
   epoch = -1;
   private last: { wall_s: number; sim_s: number } | null = null;
+  private moved = false; // to another moment, whose state has not come yet
 
   // forget: called when what was drawn so far is of another moment. reset: because the world was
   // reset.
@@ -21,7 +22,8 @@ export class Clock {
       const reset = epoch !== this.epoch;
       this.epoch = epoch;
       this.jump(reset);
-    } else if (epoch !== this.epoch || time_s < before_s) return;
+    } else if (epoch !== this.epoch || (time_s < before_s && !(isState && this.moved))) return;
+    if (isState) this.moved = false;
     this.page.set({ time_s });
     const wall_s = performance.now() / 1000;
     if (this.last && wall_s - this.last.wall_s < 1) return;
@@ -30,7 +32,14 @@ export class Clock {
     this.last = { wall_s, sim_s: time_s };
   }
 
+  // Another moment is asked for: the next state counts, however little it goes back.
+  move(): void {
+    this.moved = true;
+  }
+
+  // Likewise, and nothing of what was drawn is near it.
   jump(reset = false): void {
+    this.move();
     this.last = null;
     this.forget(reset);
   }
