@@ -9,7 +9,7 @@ import time
 
 import pytest
 from conftest import PATIENCE, RUEDO, results_in, ruedo, wait_for
-from ruedo.campaign import Campaign
+from ruedo.campaign import Campaign, output
 
 HEAD = "worlds: [arena]\ndisable: [p3at/camera, p3at/sonar_front, p3at/sonar_rear]\n"
 
@@ -254,6 +254,16 @@ def prints(view):
     print("the end")
     raise RuntimeError
 """
+
+
+def test_output_that_nobody_has_looked_at_is_told_as_bounded(tmp_path, monkeypatch):
+    """A controller that prints much and ends at once is over before the next look at the file."""
+    monkeypatch.setattr(output, "_LOOK_S", 100.0)
+    said = output.Output(str(tmp_path / "output"))
+    os.write(said.descriptor, b"x" * (2 << 20) + b"the end")
+    assert said.text().startswith("(it printed more than 1 MB;")
+    assert said.text().endswith("xthe end") and len(said.text()) < 5000
+    said.close()
 
 
 @pytest.mark.parametrize("way", ["python", "command"])

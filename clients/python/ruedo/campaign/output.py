@@ -28,7 +28,8 @@ class Output:
     def text(self) -> str:
         """The end of what was printed so far."""
         end = (self._before + self._last())[-_TAIL:].decode(errors="replace")
-        return (_LEFT_OUT if self._before else "") + end
+        # What is printed within a moment is over before anybody has looked.
+        return (_LEFT_OUT if self._before or self._is_too_large() else "") + end
 
     def close(self) -> None:
         self._over.set()
@@ -38,9 +39,12 @@ class Output:
     def _bound(self) -> None:
         while not self._over.wait(_LOOK_S):
             with suppress(MemoryError):  # of the controller's limit
-                if os.fstat(self.descriptor).st_size > _MOST_BYTES:
+                if self._is_too_large():
                     self._before = self._last()
                     os.ftruncate(self.descriptor, 0)
+
+    def _is_too_large(self) -> bool:
+        return os.fstat(self.descriptor).st_size > _MOST_BYTES
 
     def _last(self) -> bytes:
         size = os.fstat(self.descriptor).st_size
