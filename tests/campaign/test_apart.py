@@ -284,11 +284,11 @@ import os, time
 def exits(view):
     os._exit(0)
 def stubborn(view):
-    while True:
-        try:
+    try:
+        while True:
             time.sleep(0.01)
-        except BaseException:
-            pass
+    except BaseException:  # around the loop: what tells it that its time is up may come anywhere
+        stubborn(view)
 """
 
 

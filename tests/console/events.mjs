@@ -57,12 +57,21 @@ export default async function events({ page, until, check, seen, ready, given, p
   await page.getByLabel("events", { exact: true }).selectOption("");
   const lane = page.locator("#events");
   const { width } = await lane.boundingBox();
-  await lane.click({ position: { x: 8 + 0.5 * (width - 16) + 1.5, y: 7 } });
+  // In the middle of the longest time without an event: near one, a click goes to it.
+  const { begin, end } = given;
+  const times = [begin, ...told.map(([t]) => t), end].sort((a, b) => a - b);
+  const [from, to] = times
+    .slice(1)
+    .map((t, i) => [times[i], t])
+    .reduce((most, gap) => (gap[1] - gap[0] > most[1] - most[0] ? gap : most));
+  const middle = (from + to) / 2;
+  await lane.click({
+    position: { x: 8 + ((middle - begin) / (end - begin)) * (width - 16) + 1.5, y: 7 },
+  });
   await until(
     "a click on the lane goes there",
-    ({ begin, end }) =>
-      Math.abs(window.ruedo.page.now.playback.now - (begin + end) / 2) < 0.02 * (end - begin),
-    given,
+    ([t, tolerance]) => Math.abs(window.ruedo.page.now.playback.now - t) < tolerance,
+    [middle, 0.02 * (end - begin)],
   );
   await seek(given.states[1]);
   await page.keyboard.press(".");
