@@ -114,8 +114,9 @@ void Rosbag::add(const std::string& channel, uint64_t time_ns, std::span<const u
   const bool known =
       conversions_ && conversions_->convert(channel, message, [](size_t) { return true; }, emit);
   if (!add_drawn(time_ns, message) && !known) ++left_out_;
-  if (!said)
-    rest_->write(static_cast<int64_t>(time_ns / 1000), channel, message.data(), message.size());
+  if (said) return;
+  rest_->write(static_cast<int64_t>(time_ns / 1000), channel, message.data(), message.size());
+  require_room(static_cast<uint64_t>(rest_->size()));
 }
 
 bool Rosbag::add_drawn(uint64_t time_ns, std::span<const uint8_t> message) {
@@ -151,6 +152,14 @@ bool Rosbag::write(const ros2::Topic& topic, uint64_t time_ns, std::span<const u
   return !says_all_of.empty() && at->second.says_all_of == says_all_of;
 }
 
+// Who shows the bag would refuse it otherwise.
+void Rosbag::require_room(uint64_t attached_bytes) const {
+  if (attached_bytes > kMostAttachedBytes)
+    throw InputError({folder_}, fmt::format("would hold more than {} bytes of messages that no "
+                                            "topic says in full, and of the world's files",
+                                            kMostAttachedBytes));
+}
+
 // A log may be a stranger's: only files of its world with the expected content are read.
 void Rosbag::attach_files(log_header_t header, const std::string& log) {
   if (!log::fault_of_names(header).empty()) return;
@@ -160,16 +169,13 @@ void Rosbag::attach_files(log_header_t header, const std::string& log) {
   const model::ResourceFinder finder(header.world_file, false);
   log::Digests digests;
   std::set<std::string> attached;
-  uint64_t bytes = 0;
+  auto bytes = static_cast<uint64_t>(rest_->size());
   for (size_t i = 0; i < names.size(); ++i) {
     const log_file_t& file = header.files[i];
     if (!finder.reaches(file.path) || digests.of(file.path) != file.sha256 ||
         !attached.insert(names[i]).second)
       continue;
-    if ((bytes += fs::file_size(file.path)) > kMostAttachedBytes)
-      throw InputError({log}, fmt::format("was made from files of more than {} bytes in all: a bag "
-                                          "has no room for them",
-                                          kMostAttachedBytes));
+    require_room(bytes += fs::file_size(file.path));
     out_->add_attachment(names[i], "application/octet-stream", file.path);
   }
 }

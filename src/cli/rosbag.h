@@ -64,6 +64,7 @@ class Rosbag {
   // What a client drew; false for all else.
   bool add_drawn(uint64_t time_ns, std::span<const uint8_t> message);
   void attach_files(log_header_t header, const std::string& log);
+  void require_room(uint64_t attached_bytes) const;
   std::string metadata() const;
 
   std::string folder_, file_, rest_file_;
