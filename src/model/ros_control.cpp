@@ -362,6 +362,15 @@ void name_what_has_no_effect(const Controller& controller, const std::string& wh
          "the right wheels have the radius of the left ones");
 }
 
+void name_untyped(const std::vector<Controller>& controllers, const std::string& where,
+                  Findings& findings) {
+  for (const Controller& each : controllers)
+    findings.unsupported(each.source, where,
+                         "'" + each.name +
+                             "' names wheels or joints as a controller does, but no " +
+                             "type says which: it does nothing");
+}
+
 }  // namespace
 
 ControllersDrive drive_from_controllers(const Element& model_element,
@@ -375,7 +384,9 @@ ControllersDrive drive_from_controllers(const Element& model_element,
     ControllersDrive result;
     const auto files = read_controllers(paths, is_named, where, context);
     const Report report{where, context.findings, is_named};
-    for (const Controller& each : controllers_in(files)) {
+    const std::vector<Controller> controllers = controllers_in(files);
+    if (is_named) name_untyped(untyped_in(files, controllers), where, context.findings);
+    for (const Controller& each : controllers) {
       if (is_named && !known_type(each.type)) {
         context.findings.unsupported(each.source, where,
                                      "controllers of type '" + each.type + "' are not known; '" +

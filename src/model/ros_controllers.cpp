@@ -5,8 +5,10 @@
 #include "model/ros_controllers.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <filesystem>
+#include <set>
 
 #include "model/plugins.h"
 
@@ -66,6 +68,23 @@ bool holds_controllers(const Element& map) {
                      type->text.find("roadcaster") != std::string::npos)) ||
            holds_controllers(*child);
   });
+}
+
+// Maps that name what a controller moves, and that no controller of a known type has.
+void collect_untyped(const Element& map, const std::set<const Element*>& typed,
+                     std::vector<Controller>& into) {
+  constexpr std::array kMoved{"left_wheel",        "right_wheel", "left_wheel_names",
+                              "right_wheel_names", "joints",      "joint"};
+  for (const auto& child : map.children) {
+    if (into.size() >= kMostControllers) return;
+    if (typed.contains(child.get())) continue;
+    const bool own = child->name == "ros__parameters";
+    if (!child->has("type") &&
+        std::any_of(kMoved.begin(), kMoved.end(), [&](auto* key) { return child->has(key); }))
+      into.push_back({own ? map.name : child->name, "", {child.get()}, 1, child->source});
+    else
+      collect_untyped(*child, typed, into);
+  }
 }
 
 bool holds_parameters(const Element& map) {
@@ -148,6 +167,16 @@ std::vector<Controller> controllers_in(const std::vector<std::shared_ptr<const E
     // ROS 2's wildcards hold what no node of the name has: the first one counts.
     for (const auto& file : files) collect_parameters(*file, "**", each);
   }
+  return all;
+}
+
+std::vector<Controller> untyped_in(const std::vector<std::shared_ptr<const Element>>& files,
+                                   const std::vector<Controller>& controllers) {
+  std::set<const Element*> typed;
+  for (const Controller& each : controllers)
+    typed.insert(each.parameters.begin(), each.parameters.end());
+  std::vector<Controller> all;
+  for (const auto& file : files) collect_untyped(*file, typed, all);
   return all;
 }
 

@@ -39,6 +39,10 @@ std::string unknown_joint(const Controller& controller, const std::string& joint
 
 // One file may give the types, and another the parameters.
 std::vector<Controller> controllers_in(const std::vector<std::shared_ptr<const Element>>& files);
+// What names wheels or joints as a controller does, but belongs to none of these: a type is
+// missing.
+std::vector<Controller> untyped_in(const std::vector<std::shared_ptr<const Element>>& files,
+                                   const std::vector<Controller>& controllers);
 
 // Whether controller files can concern a model.
 bool is_controlled(const Element& model_element, const std::vector<const Element*>& plugins);

@@ -335,6 +335,18 @@ TEST(RosControl, NamedFilesWithoutControllersAreNamed) {
               testing::Not(testing::Contains(HasSubstr("holds no controller"))));
 }
 
+// Also beside others that have one, and where ROS 2's manager says nothing of a node.
+TEST(RosControl, ControllersWithoutATypeAreNamed) {
+  const std::string broadcaster = "    b: {type: joint_state_broadcaster/JointStateBroadcaster}\n";
+  const auto ros2 = named_world("controller_manager:\n  ros__parameters:\n" + broadcaster + kBase);
+  EXPECT_THAT(texts(*ros2),
+              testing::Contains("'base' names wheels or joints as a controller does, but no type "
+                                "says which: it does nothing"));
+  const auto ros1 = named_world("bot:\n" + broadcaster + "    arm: {joints: [front_left]}\n");
+  EXPECT_THAT(texts(*ros1), testing::Contains(HasSubstr("'arm' names wheels or joints")));
+  EXPECT_THAT(texts(*named_world(kManager + kBase)), IsEmpty());
+}
+
 // NaN and infinity in all spellings that ROS 2 reads, and its wildcard for the names of nodes,
 // which counts where a node of the name says nothing.
 TEST(RosControl, LimitsThatAreNoneAndWildcards) {
