@@ -66,11 +66,14 @@ THREADS = """
 import threading, time
 from pathlib import Path
 def leaves(view):
+    has_begun = threading.Event()
     def beat():
         while True:
             Path(__file__).with_name("beat").touch()
+            has_begun.set()
             time.sleep(0.001)
     threading.Thread(target=beat).start()
+    has_begun.wait()
     return "done"
 def waits(view):
     time.sleep(0.5)
@@ -292,13 +295,15 @@ def stubborn(view):
 """
 
 
-@pytest.mark.parametrize("name, status", [("exits", "crashed"), ("stubborn", "timeout")])
-def test_reports_and_repetitions_outlive_a_controller(tmp_path, name, status):
+@pytest.mark.parametrize(
+    "name, status, wall", [("exits", "crashed", 300), ("stubborn", "timeout", 1)]
+)
+def test_reports_and_repetitions_outlive_a_controller(tmp_path, name, status, wall):
     """Regressions: the program ended with it, silently and well; or hung for ever."""
     campaign(
         tmp_path,
         {name: f'python: "hostile.py:{name}"'},
-        limits="{duration: 1, wall: 1}",
+        limits=f"{{duration: 1, wall: {wall}}}",
         hostile=HOSTILE,
     )
     assert f"1 {status}" in ruedo("campaign", "run", "c.yaml", folder=tmp_path, code=1).stdout
