@@ -4,10 +4,13 @@ tests/run/engine_test.cpp's.
 
 import copy
 import math
+import os
 import pickle
 import signal
 import subprocess
 import sys
+import threading
+import time
 
 import numpy as np
 import pytest
@@ -317,28 +320,53 @@ def test_more_threads_than_cores_are_nothing_to_talk_about():
     assert (done.returncode, done.stdout + done.stderr) == (0, "")
 
 
-def test_a_signal_ends_a_step_that_is_long():
-    """After as many steps in all copies, and the engine goes on from there."""
+class Enough(Exception):
+    pass
 
-    class Enough(Exception):
-        pass
+
+def step_beside(engine, others, command=None):
+    """A long step that a signal ends as soon as `others` has run beside it, in a second thread."""
+
+    def beside():
+        while not is_refused(engine.steps):  # until the step has begun
+            time.sleep(0)
+        try:
+            others()
+        finally:
+            os.kill(os.getpid(), signal.SIGALRM)
 
     def enough(*_):
         raise Enough
 
     before = signal.signal(signal.SIGALRM, enough)
+    thread = threading.Thread(target=beside)
     try:
-        with engine(worlds=3) as e, engine(worlds=3) as straight:
-            signal.setitimer(signal.ITIMER_REAL, 0.2)
-            with pytest.raises(Enough):
-                e.step([0.1, 0.0], 2**62)
-            steps = e.steps()
-            assert steps > 0 and {e.steps(i) for i in range(3)} == {steps}
-            e.step(n=7)
-            straight.step([0.1, 0.0], steps + 7)
-            assert [e.state_hash(i) for i in range(3)] == [straight.state_hash(i) for i in range(3)]
+        thread.start()
+        with pytest.raises(Enough):
+            engine.step(command, 2**62)
     finally:
+        thread.join()
         signal.signal(signal.SIGALRM, before)
+
+
+def is_refused(use):
+    try:
+        use()
+    except RuntimeError as error:
+        assert "at work in another thread" in str(error)
+        return True
+    return False
+
+
+def test_a_signal_ends_a_step_that_is_long():
+    """After as many steps in all copies, and the engine goes on from there."""
+    with engine(worlds=3) as e, engine(worlds=3) as straight:
+        step_beside(e, lambda: time.sleep(0.1), [0.1, 0.0])
+        steps = e.steps()
+        assert steps > 0 and {e.steps(i) for i in range(3)} == {steps}
+        e.step(n=7)
+        straight.step([0.1, 0.0], steps + 7)
+        assert [e.state_hash(i) for i in range(3)] == [straight.state_hash(i) for i in range(3)]
 
 
 def test_a_long_step_counts_touches_as_short_ones_do():
@@ -438,20 +466,11 @@ def test_worlds_are_found_by_name_from_anywhere(tmp_path, monkeypatch):
 
 
 def test_a_second_thread_is_refused():
-    import threading
-
     with engine(worlds=8) as e:
-        long = threading.Thread(target=e.step, args=(None, 20_000))
-        long.start()
-        said = []
-        while long.is_alive() and not said:
-            for use in (e.step, e.reset, e.steps, e.close):
-                try:
-                    use()
-                except RuntimeError as error:
-                    said.append(str(error))
-        long.join()
-        assert "at work in another thread" in said[0]
+        refused = []
+        uses = (e.step, e.reset, e.steps, e.close)
+        step_beside(e, lambda: refused.extend(is_refused(use) for use in uses))
+        assert refused == [True] * len(uses)
         e.step()
 
 
