@@ -239,7 +239,7 @@ void Engine::compute(size_t index, int64_t steps) {
     copy.make_scenes(batch.read.get(), batch.sensor_faults.get());
     for (size_t m = 0; m < world.modules().size(); ++m) {
       Module& module = *world.modules()[m];
-      batch.outputs[m].woken = module.wants(copy.step);
+      batch.outputs[m].woken = module.wants(batch);
       if (!batch.outputs[m].woken) continue;
       module.pass(copy.step);
       module.process(batch, batch.outputs[m], kNeverLeftOff);

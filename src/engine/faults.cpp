@@ -288,15 +288,18 @@ robot::Command Faults::weakened(robot::Command command, int64_t step) const {
     for (size_t i = 0; i < wheels->rates.size(); ++i)
       wheels->rates[i] *= wheels->rates.size() == 2 ? (i == 0 ? left : right) : least;
   } else if (auto* move = std::get_if<robot::MoveCommand>(&command.what)) {
-    move->speed = least * (move->speed > 0.0 ? move->speed : drive.max_speed);
+    move->share = least;
   }
   return command;
 }
 
 void Faults::show_wheels(Snapshot& snapshot) {
   if (!wheels_ever_) return;
-  if (true_angles_.size() != snapshot.wheel_angles.size())
-    true_angles_ = shown_angles_ = snapshot.wheel_angles;
+  for (std::vector<double>* angles : {&true_angles_, &shown_angles_}) {  // others may have joined
+    const auto known = static_cast<std::ptrdiff_t>(angles->size());
+    angles->insert(angles->end(), snapshot.wheel_angles.begin() + known,
+                   snapshot.wheel_angles.end());
+  }
   for (size_t i = 0; i < snapshot.wheel_angles.size(); ++i) {
     const model::WheelPlacement& wheel = layout_->wheels[i];
     double factor = 1.0;
@@ -322,6 +325,11 @@ void Faults::remove(RobotIndex robot) {
     late_bytes_ -= one.bytes;
     return true;
   });
+  // Another robot in its place begins anew, with wheels that have not turned.
+  draws_.resize(layout_->robots.size());
+  draws_[robot] = 0;
+  for (size_t i = 0; i < shown_angles_.size(); ++i)
+    if (layout_->wheels[i].robot == robot) true_angles_[i] = shown_angles_[i] = 0.0;
   if (!of_sensors_) return;
   auto rest = std::make_shared<std::vector<SensorFault>>(*of_sensors_);
   std::erase_if(*rest, [&](const SensorFault& fault) { return fault.robot == robot; });

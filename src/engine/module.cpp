@@ -165,7 +165,9 @@ void Module::process(const Batch& batch, Batch::Output& output, const std::atomi
     begin = i + 1;
     to_sample_.pass(batch.first_step + i);
   }
-  if (observes_ && begin < batch.count) process_pieces(batch, output, begin, batch.count, left_off);
+  // Between samples devices observe, and what a fault kept is let go.
+  if ((observes_ || batch.sensor_faults) && begin < batch.count)
+    process_pieces(batch, output, begin, batch.count, left_off);
 }
 
 void Module::process_pieces(const Batch& batch, Batch::Output& output, int begin, int end,

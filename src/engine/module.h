@@ -109,9 +109,12 @@ class Module {
   void drop_renderer() { renderer_.reset(); }
   bool has_renderer() const { return renderer_ != nullptr; }
 
-  // For the thread that makes batches: whether a batch up to `last_step` has work for it; and that
-  // it gets that batch.
-  bool wants(int64_t last_step) const { return observes_ || to_hand_over_.next() <= last_step; }
+  // For the thread that makes batches: whether a batch has work for it; and that it gets the one up
+  // to `last_step`. A faulty device may let go at any step what it kept.
+  bool wants(const Batch& batch) const {
+    return observes_ || batch.sensor_faults ||
+           to_hand_over_.next() < batch.first_step + batch.count;
+  }
   void pass(int64_t last_step) { to_hand_over_.pass(last_step); }
 
   // Lets its devices observe and sample the states of a batch, and writes their messages into

@@ -222,7 +222,7 @@ void Simulation::dispatch(Batch& batch, bool here) {
   const int64_t last_step = batch.first_step + batch.count - 1;
   int woken = 0;
   for (size_t m = 0; m < threads_.size(); ++m) {
-    batch.outputs[m].woken = batch.count > 0 && threads_[m]->module().wants(last_step);
+    batch.outputs[m].woken = batch.count > 0 && threads_[m]->module().wants(batch);
     woken += batch.outputs[m].woken;
   }
   // One more than the modules: it is not finished before all have received it.

@@ -275,11 +275,12 @@ int8_t MotionPlanner::aim(const MoveCommand& command, double heading, Primitive&
       break;
     default: return Status::REASON_NONE;  // STOP
   }
-  const Limits& limits = next.limits;
+  Limits& limits = next.limits;
   const bool too_far = std::abs(next.target) > kLargestValue ||
                        std::abs(command.value) > kLargestValue || command.radius > kLargestValue;
   const bool too_slow = limits.speed < kSlowestChange || limits.acceleration < kSlowestChange ||
                         limits.deceleration < kSlowestChange;
+  limits.speed = std::max(command.share * limits.speed, kSlowestChange);
   return too_far || too_slow ? Status::REASON_BAD_VALUE : Status::REASON_NONE;
 }
 

@@ -25,6 +25,7 @@ struct MoveCommand {
   int64_t id;
   int8_t kind;
   double value, radius, speed, acceleration, deceleration;
+  double share = 1.0;  // of the speed that would be used: what weak motors leave
 };
 struct JointCommand {
   std::vector<std::string> names;

@@ -380,6 +380,47 @@ def test_a_long_step_counts_touches_as_short_ones_do():
         assert e.collisions() == {"r0": ["wall/l"]}
 
 
+@pytest.mark.parametrize("lag", [1, 7, 20, 33])
+def test_what_lags_is_so_late_however_many_steps_a_call_takes(lag):
+    """Regression: what a faulty lidar had kept came with the next sample that was due in the same
+    call, or in a later one; in a server that depended on real time.
+    """
+
+    def came(*calls, **options):
+        scans = []
+        with engine(record=True, **options) as e:
+            for n in calls:
+                e.step([0.2, 0.0], n)
+                scans += [(step, data) for _, step, name, data in e.messages() if name == "r0/scan"]
+        return scans
+
+    in_time = came(150)
+    assert [step for step, _ in in_time] == [20, 40, 60, 80, 100, 120, 140]
+    late = [(step + lag if step >= 40 else step, data) for step, data in in_time]
+    for calls in ([150], [1] * 150, [50, 3, 97]):
+        found = came(*calls, fault=[f"r0/scan:lag@0.2,value={0.005 * lag}"])
+        assert found == [each for each in late if each[0] <= 150], calls
+
+
+@pytest.mark.parametrize("value", [0.9, 0.5, 0.0])
+@pytest.mark.parametrize("kind, field", [("ADVANCE", "v"), ("ROTATE", "omega")])
+def test_weak_motors_leave_a_part_of_a_primitives_speed(kind, field, value):
+    """Regression: a motor without force had all of it, and turns had the limit in m/s."""
+
+    def fastest(**options):
+        move = lcmtypes.move_command_t()
+        move.id, move.kind, move.value = 1, getattr(lcmtypes.move_command_t, kind), 2.0
+        with ruedo.Engine("empty", spawn=["p3at:p3at@0,0"], noise=False, **options) as e:
+            e.command(0, "p3at/move", move)
+            e.step(n=400)
+            return e[f"odometry.{field}"].item()
+
+    healthy = fastest()
+    assert healthy > 0.5
+    weak = fastest(fault=[f"p3at:weak_motor@0,value={value}"])
+    assert weak == pytest.approx(value * healthy, rel=1e-3, abs=1e-5)
+
+
 def test_messages_are_recorded_in_a_judged_run_too():
     with engine(record=True) as e:
         e.begin_run(1)

@@ -2,6 +2,7 @@
 #include <cmath>
 
 #include "control_client.h"
+#include "ruedo/fault_t.hpp"
 #include "ruedo/odometry_t.hpp"
 #include "ruedo/planar_lidar_t.hpp"
 #include "ruedo/pose_t.hpp"
@@ -285,15 +286,30 @@ std::vector<std::vector<uint8_t>> bytes_of(MemoryBus& bus, const std::string& pr
   return bytes;
 }
 
+void drive(Controlled& run, const std::string& robot, double v) {
+  velocity_command_t command{};
+  command.vx = v;
+  run.bus.send(robot + "/velocity", engine::encoded(command));
+}
+
+// Encoders that miss 0.5 s of what the wheels turn, from now on.
+void stop_encoders(Controlled& run, const std::string& robot) {
+  fault_t fault{};
+  fault.kind = "encoder_stuck";
+  fault.target = "left";
+  fault.duration = 0.5;
+  fault.view_end = 1.0;
+  run.bus.send(robot + "/fault", engine::encoded(fault));
+}
+
 TEST(Edits, OthersHaveTheSameBytesWithAndWithoutAGuest) {
-  const auto run = [](bool guest) {
+  const auto run = [](bool guest, bool faulty) {
     Controlled run;
     run.begin(paused_server(),
               robot_sdf("r", 0, 0, noisy_ray()) + box_sdf("wall", "0.2 2 1", true, 4, 0, 0.5));
-    velocity_command_t command{};
-    command.vx = 0.2;
-    run.bus.send("r/velocity", engine::encoded(command));
-    run.step(37);
+    drive(run, "r", 0.2);
+    if (faulty) stop_encoders(run, "r");
+    run.step(137);
     if (guest) {
       EXPECT_EQ(run.spawn(as_file(robot_sdf("guest", 0, 0, noisy_ray())), 50, 50).code,
                 reply_t::OK);
@@ -306,9 +322,33 @@ TEST(Edits, OthersHaveTheSameBytesWithAndWithoutAGuest) {
     run.end();
     return bytes_of(run.bus, "r/");
   };
-  const auto without = run(false);
-  EXPECT_GT(without.size(), 200u);
-  EXPECT_EQ(without, run(true));
+  for (const bool faulty : {false, true}) {
+    const auto without = run(false, faulty);
+    EXPECT_GT(without.size(), 200u);
+    EXPECT_EQ(without, run(true, faulty)) << faulty;
+  }
+}
+
+// Regression: it had the errors of the encoders of who was in its place before.
+TEST(Edits, ARobotInThePlaceOfAnotherHasItsOwnFaults) {
+  const std::string robot = as_file(robot_sdf("robot", 0, 0));
+  const auto run = [&](bool faulty) {
+    Controlled run;
+    run.begin(paused_server(), "");
+    EXPECT_EQ(run.spawn(robot, 0, 0, "old").code, reply_t::OK);
+    drive(run, "old", 0.3);
+    if (faulty) stop_encoders(run, "old");
+    run.step(200);
+    EXPECT_EQ(run.remove("old").code, reply_t::OK);
+    EXPECT_EQ(run.spawn(robot, 2, 0, "new").code, reply_t::OK);
+    run.step(100);
+    run.end();
+    EXPECT_EQ(run.on<odometry_t>("new/odometry").back().theta, 0.0);
+    return bytes_of(run.bus, "new/");
+  };
+  const auto good = run(false);
+  EXPECT_GT(good.size(), 20u);
+  EXPECT_EQ(good, run(true));
 }
 
 TEST(Edits, ARunWithAGuestRepeatsWithAnyNumberOfThreads) {
