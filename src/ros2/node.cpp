@@ -20,19 +20,20 @@ constexpr auto kLook = std::chrono::milliseconds(20);  // interval of checks who
 
 std::string key(const Topic& topic) { return topic.name + " " + topic.type; }
 
-// What names and channels depend on: not the time, nor whether the run is paused.
+// What there is: not the time, nor whether the run is paused. After a reset (another epoch) there
+// may be other models of the same names.
 bool is_same(const std::vector<world_info_t>& a, const std::vector<world_info_t>& b) {
-  const auto names = [](const std::vector<world_info_t>& info) {
-    std::vector<std::string> all;
-    for (const world_info_t& part : info) {
-      for (const channel_info_t& channel : part.channels)
-        all.push_back(channel.name + " " + channel.type);
-      for (const device_info_t& device : part.devices)
-        all.push_back(device.robot + "/" + device.name);
+  const auto what_there_is = [](const std::vector<world_info_t>& info) {
+    std::vector<std::vector<uint8_t>> all;
+    for (world_info_t part : info) {
+      part.utime = 0;
+      part.paused = false;
+      all.emplace_back(static_cast<size_t>(part.getEncodedSize()));
+      part.encode(all.back().data(), 0, static_cast<int>(all.back().size()));
     }
     return all;
   };
-  return names(a) == names(b);
+  return what_there_is(a) == what_there_is(b);
 }
 
 std::string channel_of(const std::vector<world_info_t>& info, const std::string& type) {
@@ -193,15 +194,22 @@ void Node::tell_standing() {
   standing_ = std::move(writers);
 }
 
-// The run itself refuses commands to a removed robot.
+// The readers of a removed robot stay, for the next one of its name.
 void Node::add_commands(const std::vector<world_info_t>& info) {
+  std::map<std::string, std::shared_ptr<const Command>> commands;
   for (Command& command : commands_of(info, options_.joints, names_)) {
     const std::string name = key(command.topic);
-    const auto [at, fresh] = commands_.try_emplace(name, std::move(command));
-    if (!fresh) continue;
+    commands.try_emplace(name, std::make_shared<const Command>(std::move(command)));
+  }
+  for (const auto& [name, command] : commands) {
+    if (readers_.contains(name)) continue;
     readers_[name] = transport_->add_reader(
-        endpoint(at->second.topic),
-        [this, added = &at->second](const Sample& sample) { receive(*added, sample.cdr); });
+        endpoint(command->topic),
+        [this, name = name](const Sample& sample) { receive(name, sample.cdr); });
+  }
+  {
+    const std::lock_guard lock(commands_mutex_);
+    commands_ = std::move(commands);
   }
   for (const world_info_t& part : info) {
     for (const robot_info_t& robot : part.robots) {
@@ -238,11 +246,18 @@ void Node::tell_graph() {
   graph_->write(out.bytes());
 }
 
-void Node::receive(const Command& command, std::span<const uint8_t> cdr) {
+// topic: name and type.
+void Node::receive(const std::string& topic, std::span<const uint8_t> cdr) {
   ++received_;
   if (!injecting_) return;
-  if (const auto bytes = command.convert(cdr)) return inject_(command.channel, *bytes);
-  count_faulty(command.topic.name, command.topic.type, cdr.size());
+  std::shared_ptr<const Command> command;
+  {
+    const std::lock_guard lock(commands_mutex_);
+    if (const auto known = commands_.find(topic); known != commands_.end()) command = known->second;
+  }
+  if (!command) return;  // its robot was removed
+  if (const auto bytes = command->convert(cdr)) return inject_(command->channel, *bytes);
+  count_faulty(command->topic.name, command->topic.type, cdr.size());
 }
 
 // The robot is placed where the message says: the map frame is the world.
@@ -289,7 +304,7 @@ bool Node::is_read() const {
 
 bool Node::is_written(const std::string& topic) const {
   return std::any_of(commands_.begin(), commands_.end(), [&](const auto& each) {
-    return each.second.topic.name == topic && readers_.at(each.first)->writers() > 0;
+    return each.second->topic.name == topic && readers_.at(each.first)->writers() > 0;
   });
 }
 
@@ -310,7 +325,7 @@ std::vector<Topic> Node::outputs() const {
 
 std::vector<Topic> Node::inputs() const {
   std::vector<Topic> topics;
-  for (const auto& [name, command] : commands_) topics.push_back(command.topic);
+  for (const auto& [name, command] : commands_) topics.push_back(command->topic);
   for (const auto& [name, topic] : poses_) topics.push_back(topic);
   return topics;
 }

@@ -8,14 +8,18 @@
 
 #include <gtest/gtest.h>
 
+#include "ros2/cdr.h"
 #include "ruedo/camera_info_t.hpp"
+#include "ruedo/decode.h"
 #include "ruedo/image_t.hpp"
+#include "ruedo/joint_command_t.hpp"
 #include "ruedo/planar_lidar_t.hpp"
 
 namespace ruedo::ros2 {
 namespace {
 
-using Readers = std::map<std::string, size_t>;  // of a topic
+using Readers = std::map<std::string, size_t>;               // of a topic
+using Handlers = std::map<std::string, Transport::Handler>;  // likewise
 
 class FakeWriter : public Writer {
  public:
@@ -39,11 +43,14 @@ class FakeReader : public Reader {
 
 class FakeTransport : public Transport {
  public:
-  explicit FakeTransport(std::shared_ptr<Readers> readers) : readers_(std::move(readers)) {}
+  explicit FakeTransport(std::shared_ptr<Readers> readers,
+                         std::shared_ptr<Handlers> handlers = std::make_shared<Handlers>())
+      : readers_(std::move(readers)), handlers_(std::move(handlers)) {}
   std::unique_ptr<Writer> add_writer(const Endpoint& endpoint) override {
     return std::make_unique<FakeWriter>(endpoint.topic.name, readers_);
   }
-  std::unique_ptr<Reader> add_reader(const Endpoint&, Handler) override {
+  std::unique_ptr<Reader> add_reader(const Endpoint& endpoint, Handler handler) override {
+    (*handlers_)[endpoint.topic.name] = std::move(handler);
     return std::make_unique<FakeReader>();
   }
   void start() override {}
@@ -54,6 +61,7 @@ class FakeTransport : public Transport {
 
  private:
   std::shared_ptr<Readers> readers_;
+  std::shared_ptr<Handlers> handlers_;
 };
 
 template <class Message>
@@ -105,6 +113,61 @@ TEST(Node, WantsPicturesThatSomebodyReads) {
     while (node.wants("p3at/camera")) node.flush();
     EXPECT_GT(node.audience(), before + 1);
   }
+}
+
+// A robot whose joints are commanded, or none.
+std::shared_ptr<run::Announcement> announced(bool arm) {
+  world_info_t info{};
+  if (arm) {
+    info.channels = {channel<joint_command_t>("arm/joint_command", "")};
+    info.channels[0].robot = "arm";
+    info.channels[0].input = true;
+  }
+  info.nchannels = static_cast<int32_t>(info.channels.size());
+  auto announcement = std::make_shared<run::Announcement>();
+  announcement->info = {info};
+  return announcement;
+}
+
+std::vector<uint8_t> numbers(const std::vector<double>& values) {
+  CdrWriter out;
+  out.put_length(0).put(uint32_t{0}).put_length(values.size());
+  for (const double value : values) out.put(value);
+  const std::span<const uint8_t> bytes = out.bytes();
+  return {bytes.begin(), bytes.end()};
+}
+
+// Regression: they went to the joints of the first robot of the name.
+TEST(Node, CommandsAreForTheRobotThatIsThere) {
+  const auto handlers = std::make_shared<Handlers>();
+  std::vector<std::string> joints{"a", "b"};
+  NodeOptions options;
+  options.joints = [&](const std::string&) { return joints; };
+  std::vector<joint_command_t> heard;
+  Node node(std::move(options),
+            std::make_unique<FakeTransport>(std::make_shared<Readers>(), handlers),
+            announced(true)->info, [&](const std::string&, std::span<const uint8_t> bytes) {
+              joint_command_t command;
+              ASSERT_EQ(decode_checked(bytes.data(), bytes.size(), command), DecodeFault::none);
+              heard.push_back(std::move(command));
+            });
+  node.start();
+  const auto send = [&](const std::vector<double>& values) {
+    const std::vector<uint8_t> cdr = numbers(values);
+    heard.clear();
+    handlers->at("/arm/forward_position_controller/commands")({.cdr = cdr});
+  };
+  send({1.0, 2.0});
+  ASSERT_EQ(heard.size(), 1u);
+  EXPECT_EQ(heard[0].name, joints);
+  node.announce(announced(false));
+  send({1.0, 2.0});
+  EXPECT_EQ(heard.size(), 0u);
+  joints = {"x", "y", "z"};
+  node.announce(announced(true));
+  send({1.0, 2.0, 3.0});
+  ASSERT_EQ(heard.size(), 1u);
+  EXPECT_EQ(heard[0].name, joints);
 }
 
 }  // namespace

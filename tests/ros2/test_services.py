@@ -220,6 +220,29 @@ def test_robots_come_and_go_with_their_topics(client):
     assert client.call("delete_entity", "p3at_2").result.result == NOT_FOUND
 
 
+BOX = (
+    "<sdf version='1.9'><model name='box'><link name='l'><collision name='c'><geometry><box>"
+    "<size>0.3 0.3 0.3</size></box></geometry></collision></link></model></sdf>"
+)
+
+
+def test_models_that_are_no_robots_come_and_go(client):
+    """Regression: they were not listed, and their names neither found nor freed."""
+
+    def spawn(rename):
+        spawned = client.call("spawn_entity", "box", rename, "", BOX, "", at(9.0, 0.0, 1.0))
+        return spawned.result.result, spawned.entity_name, spawned.result.error_message
+
+    def listed():
+        return set(client.call("get_entities", filters("^box$")).entities)
+
+    for _ in range(2):
+        assert spawn(False) == (OK, "box", "")
+        wait_for(lambda: listed() == {"box"}, "box")
+        assert client.call("delete_entity", "box").result.result == OK
+        wait_for(lambda: listed() == set(), "no box")
+
+
 @pytest.mark.parametrize(
     "scope, code",
     [(0, OK), (255, OK), (1, OK), (2, OK), (3, OK), (7, OK), (4, UNSUPPORTED), (5, UNSUPPORTED)],
