@@ -376,6 +376,7 @@ void Core::on_info(const uint8_t* bytes, size_t size) {
   }
   news_.notify_all();
   if (!info) return;
+  stepper_.on_info(info);
   if (before && info->epoch != before->epoch) {
     std::vector<std::shared_ptr<Driver>> drivers;
     {

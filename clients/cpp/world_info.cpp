@@ -76,7 +76,7 @@ BodyInfo read_body(WireReader& in) {
 
 // The head of every part is the same.
 void read_part(WireReader& in, WorldInfo& info) {
-  in.int64();  // utime
+  in.int64();  // utime: only the message as it came has it
   info.run_id = in.int64();
   info.epoch = in.int32();
   in.int16();  // part
@@ -152,9 +152,10 @@ std::shared_ptr<const WorldInfo> WorldInfoAssembler::add(const uint8_t* bytes, s
     return nullptr;
   }
   auto info = std::make_shared<WorldInfo>();
+  info->utime = utime;
   try {
     for (const auto& [index, content] : parts_) {
-      std::vector<uint8_t> whole(8, 0);  // utime has no meaning here
+      std::vector<uint8_t> whole(8, 0);  // instead of utime
       whole.insert(whole.end(), content.begin(), content.end());
       WireReader in(whole.data(), whole.size());
       read_part(in, *info);

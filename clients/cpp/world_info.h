@@ -22,6 +22,7 @@ struct ChannelInfo {
 
 // One complete ruedo/info.
 struct WorldInfo {
+  int64_t utime = 0;  // of the first message that said this
   int64_t run_id = 0;
   int32_t epoch = 0;
   std::string version, world;

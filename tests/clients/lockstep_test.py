@@ -5,6 +5,7 @@ errors.
 import subprocess
 import sys
 import time
+import zlib
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from urllib.parse import urlsplit
@@ -108,6 +109,39 @@ def test_a_guest_comes_and_goes_whatever_is_lost():
     assert all(end == ends[0] for end in ends), ends
     step, _, _, of_guest, _ = ends[0]
     assert step == "90" and int(of_guest) > 20
+
+
+def test_messages_are_those_of_the_robots_that_were_there(language):
+    """While one client waits for the end of a long step, robots come, go, and take others'
+    places.
+    """
+    import ruedo
+
+    with (
+        ruedo_run("--lockstep", "2", "--disable", "p3at/camera", world=HALL) as server,
+        ThreadPoolExecutor() as pool,
+        ruedo.connect(server.url, name="director", timeout=PATIENCE) as sim,
+    ):
+        waits = pool.submit(probe, language, server.url, "watches", "watcher", "80")
+        sim.step(0, timeout=PATIENCE)
+        seen = []
+        for change in (
+            lambda: sim.spawn("p3at", 3.0, 1.0, name="guest"),
+            lambda: sim.remove("guest"),
+            lambda: sim.spawn("p3at", 3.0, 1.0, name="other"),
+            lambda: sim.remove("p3at"),
+        ):
+            change()
+            seen.append(sim.step(20, timeout=PATIENCE))
+        said = waits.result()
+    robots = [{m.channel.split("/")[0] for m in part.messages} - {"ruedo"} for part in seen]
+    assert robots == [{"p3at", "guest"}, {"p3at"}, {"p3at", "other"}, {"other"}]
+    messages, digest = [m for part in seen for m in part.messages], 0
+    for message in messages:
+        digest = zlib.crc32(message.data, zlib.crc32(message.channel.encode(), digest))
+    assert said.words("end") == [
+        str(word) for word in (80, seen[-1].state_hash, len(messages), digest)
+    ]
 
 
 @pytest.mark.parametrize("visit", ["visited", "leaves"])

@@ -317,6 +317,7 @@ class Connection:
             self._news.notify_all()
         if not info:
             return
+        self.stepper.on_info(info)
         if new_epoch:
             self.drivers.begin_epoch()
         # No command is repeated to a robot that is gone, nor to the next one of its name.

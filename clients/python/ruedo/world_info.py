@@ -29,6 +29,7 @@ class WorldInfo:
 
     def __init__(self, parts: list[Any]):
         head = parts[0]
+        self.utime: int = head.utime  # of the first message that said this
         self.run_id: int = head.run_id
         self.epoch: int = head.epoch
         self.version: str = head.version

@@ -415,6 +415,19 @@ public final class Probe {
         say("end", last.step, last.stateHash, messages, ofGuest, digest.getValue());
     }
 
+    /** Lockstep in which others act. */
+    private static void watches(Simulation sim, String[] a) {
+        Observations seen = sim.step(0);
+        say("begin", seen.step, seen.time(), seen.stateHash);
+        Observations last = sim.step(Integer.parseInt(a[1]));
+        CRC32 digest = new CRC32();
+        for (Observations.Message message : last.messages) {
+            digest.update(message.channel.getBytes(StandardCharsets.UTF_8));
+            digest.update(message.data);
+        }
+        say("end", last.step, last.stateHash, last.messages.size(), digest.getValue());
+    }
+
     /** In a callback, while the step that calls it goes on. */
     private static void leaves(Simulation sim, String[] a) {
         sim.robot(a[1]).odometry().onSample(sample -> sim.close());
@@ -487,7 +500,7 @@ public final class Probe {
             readLog(a);
             return;
         }
-        boolean named = List.of("lockstep", "visited", "leaves").contains(command);
+        boolean named = List.of("lockstep", "visited", "watches", "leaves").contains(command);
         try (Simulation sim =
                 command.equals("connect")
                         ? Ruedo.connect(url)
@@ -501,6 +514,9 @@ public final class Probe {
                     break;
                 case "visited":
                     visited(sim, a);
+                    break;
+                case "watches":
+                    watches(sim, a);
                     break;
                 case "leaves":
                     leaves(sim, a);

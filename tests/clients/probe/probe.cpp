@@ -392,6 +392,20 @@ void visited(const rc::Simulation& sim, const std::vector<std::string>& a) {
   say("end", last.step, last.state_hash, messages, of_guest, digest);
 }
 
+// Lockstep in which others act.
+void watches(const rc::Simulation& sim, const std::vector<std::string>& a) {
+  const rc::Observations seen = sim.step(0);
+  say("begin", seen.step, seen.time(), seen.state_hash);
+  const rc::Observations last = sim.step(std::stoi(a[1]));
+  uint32_t digest = 0;
+  for (const auto& message : last.messages) {
+    digest = crc32(digest, reinterpret_cast<const uint8_t*>(message.channel.data()),
+                   message.channel.size());
+    digest = crc32(digest, message.bytes.data(), message.bytes.size());
+  }
+  say("end", last.step, last.state_hash, last.messages.size(), digest);
+}
+
 [[noreturn]] void launched(const std::vector<std::string>& a) {
   rc::LaunchOptions options;
   options.seed = 3;
@@ -457,12 +471,14 @@ void act(const std::string& url, const std::string& command, const std::vector<s
   if (command == "launch") launched(a);
   if (command == "launch_with") return launched_with(a[0], a.size() > 1 ? a[1] : "");
   if (command == "log") return read_log(a);
-  const bool named = command == "lockstep" || command == "visited" || command == "leaves";
+  const bool named =
+      command == "lockstep" || command == "visited" || command == "watches" || command == "leaves";
   rc::Simulation sim =
       rc::connect(url, {.name = named ? a[0] : "", .timeout = command == "connect" ? 2.0 : 60.0});
   if (command == "leaves") leaves(sim, a);
   if (command == "lockstep") lockstep(sim, a);
   if (command == "visited") visited(sim, a);
+  if (command == "watches") watches(sim, a);
   if (command == "given_up") given_up(sim);
   if (command == "connect") say("connected", sim.world());
   if (command == "list") list_all(sim);

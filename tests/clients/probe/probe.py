@@ -323,6 +323,16 @@ def visited(sim, name):
     say("end", last.step, last.state_hash, messages, of_guest, digest)
 
 
+def watches(sim, steps):
+    """Lockstep in which others act."""
+    seen, digest = sim.step(0), 0
+    say("begin", seen.step, seen.time, seen.state_hash)
+    last = sim.step(int(steps))
+    for message in last.messages:
+        digest = zlib.crc32(message.data, zlib.crc32(message.channel.encode(), digest))
+    say("end", last.step, last.state_hash, len(last.messages), digest)
+
+
 def leaves(sim, name):
     """In a callback, while the step that calls it goes on."""
     sim.robot(name).odometry.on_sample(lambda _: sim.close())
@@ -379,13 +389,14 @@ def main():
             launched(ruedo.launch(rest[0], seed=3, args=rest[1:]))
         with ruedo.connect(
             url,
-            name=rest[0] if command in ("lockstep", "visited", "leaves") else None,
+            name=rest[0] if command in ("lockstep", "visited", "watches", "leaves") else None,
             timeout=2.0 if command == "connect" else 60.0,
         ) as sim:
             actions = {
                 "lockstep": lambda: lockstep(sim, *rest[1:]),
                 "given_up": lambda: given_up(sim),
                 "visited": lambda: visited(sim, *rest[1:]),
+                "watches": lambda: watches(sim, *rest[1:]),
                 "leaves": lambda: leaves(sim, *rest[1:]),
                 "connect": lambda: say("connected", sim.world),
                 "list": lambda: list_all(sim),

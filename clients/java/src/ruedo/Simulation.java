@@ -668,6 +668,7 @@ public final class Simulation implements AutoCloseable {
             news.notifyAll();
         }
         if (info == null) return;
+        stepper.onInfo(info);
         if (before != null && before.head.epoch != info.head.epoch) {
             List<Driver> all;
             synchronized (robots) {

@@ -81,6 +81,9 @@ final class Stepper {
     private WorldInfo info; // whose channels are subscribed
     private final List<String> names =
             new ArrayList<>(); // of what is subscribed, by the channel's index; "": not
+    // Of the states that are not collected yet: each holds for those after its utime, and the first
+    // for all before, too.
+    private final ArrayList<WorldInfo> infos = new ArrayList<>();
     private final List<Subscription> sources = new ArrayList<>();
     private long runId;
     private int epoch;
@@ -199,6 +202,8 @@ final class Stepper {
             grantFrom = -1;
             taken = true;
             fault = null;
+            infos.clear();
+            infos.add(sim.info());
             waitsFor = "";
             part = true;
         }
@@ -383,6 +388,21 @@ final class Stepper {
         return wanted;
     }
 
+    /**
+     * The name that the message's channel had in that state: robots come and go, and others take
+     * their places. Where the info from before was lost, the next one that has a name says it.
+     */
+    private String channelOf(Entry entry, long utime) {
+        int at = 0;
+        while (at + 1 < infos.size() && infos.get(at + 1).head.utime < utime) at++;
+        for (; at < infos.size(); at++) {
+            List<channel_info_t> channels = infos.get(at).channelList;
+            if (entry.channel < channels.size() && !channels.get(entry.channel).name.isEmpty())
+                return channels.get(entry.channel).name;
+        }
+        return "";
+    }
+
     private synchronized Observations collect() {
         List<Observations.Message> messages = new ArrayList<>();
         for (Iterator<java.util.Map.Entry<Long, Step>> all =
@@ -394,14 +414,12 @@ final class Stepper {
             last = new long[] {step.utime, next.getKey(), step.stateHash};
             for (List<Entry> entries : step.parts) {
                 for (Entry entry : entries) {
-                    String name =
-                            entry.channel < info.channelList.size()
-                                    ? info.channelList.get(entry.channel).name
-                                    : "";
+                    String name = channelOf(entry, step.utime);
                     messages.add(new Observations.Message(next.getKey(), name, entry.data));
                 }
             }
         }
+        while (infos.size() > 1 && infos.get(1).head.utime <= last[0]) infos.remove(0);
         return new Observations(last[0], last[1], last[2], messages);
     }
 
@@ -444,6 +462,13 @@ final class Stepper {
 
     private void forgetFirst(ArrayDeque<Early> queue) {
         earlyBytes -= queue.removeFirst().data.length;
+    }
+
+    synchronized void onInfo(WorldInfo info) {
+        if (!part) return;
+        while (infos.size() > 1 && infos.get(infos.size() - 1).head.utime >= info.head.utime)
+            infos.remove(infos.size() - 1); // changed twice between the same two states
+        infos.add(info);
     }
 
     synchronized void onTick(byte[] message) {
