@@ -46,8 +46,11 @@ Run::Outcome Run::change(const request_t& request, Changes what,
   {
     const std::lock_guard lock(simulation_mutex_);
     outcome = apply();
-    if (models) as_made_ = false;
-    if (models) world_ = std::make_shared<const model::WorldModel>(simulation_->world());
+    if (models) {
+      as_made_ = false;
+      world_ = std::make_shared<const model::WorldModel>(simulation_->world());
+      mode().models_changed(stage(), publisher_.step());
+    }
   }
   if (outcome.code == reply_t::OK) {
     note(request);

@@ -48,6 +48,20 @@ void Lockstep::begin(const Stage& stage, int64_t step) {
   gate_->set_limit(limit_);
 }
 
+// The inbox has dropped those that it had.
+void Lockstep::models_changed(const Stage&, int64_t) {
+  const auto is_gone = [this](const Held& command) {
+    return inbox_->inputs()[command.input].channel.empty();
+  };
+  for (Member& member : members_) {
+    const auto next = member.held.begin() + static_cast<std::ptrdiff_t>(member.scheduled);
+    member.scheduled -= static_cast<size_t>(std::count_if(member.held.begin(), next, is_gone));
+    for (const Held& command : member.held)
+      if (is_gone(command)) member.held_bytes -= command.bytes.size();
+    std::erase_if(member.held, is_gone);
+  }
+}
+
 Lockstep::Member* Lockstep::find(int64_t session) {
   const auto found = std::find_if(members_.begin(), members_.end(),
                                   [&](const Member& member) { return member.session == session; });

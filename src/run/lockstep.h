@@ -54,6 +54,8 @@ class Lockstep : public Mode {
 
   // Everyone's grants stand at `step`, or at 0.
   void begin(const Stage& stage, int64_t step) override;
+  // Commands that were sent ahead for a robot go with it.
+  void models_changed(const Stage& stage, int64_t step) override;
   // False when no more messages can be kept for clients that have not received them all.
   bool has_room() const override { return !kept_.full(); }
   bool takes_grants() const override { return true; }

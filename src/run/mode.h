@@ -53,6 +53,10 @@ class Mode {
 
   // The run goes on from the state `step` of that world; -1: from its beginning. Throws InputError.
   virtual void begin(const Stage& stage, int64_t step) = 0;
+  // Models have come or gone at the state `step` of the world that runs.
+  virtual void models_changed(const Stage& stage, int64_t step) {
+    static_cast<void>(stage), static_cast<void>(step);
+  }
   // False while a reader has to catch up with what was published: no batch is taken.
   virtual bool has_room() const { return true; }
   // Clients say how far it goes: every step has its tick, and the publisher computes a few steps

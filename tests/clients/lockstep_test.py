@@ -12,7 +12,7 @@ from urllib.parse import urlsplit
 
 import lcm
 import pytest
-from conftest import HERE, PATIENCE, PROBES, SOURCE, free_url, probe, ruedo_run
+from conftest import HERE, PATIENCE, PROBES, RUEDO, SOURCE, free_url, probe, ruedo_run
 from docs_code import blocks
 from ruedo.lcmtypes import applied_t, request_t
 
@@ -142,6 +142,34 @@ def test_messages_are_those_of_the_robots_that_were_there(language):
     assert said.words("end") == [
         str(word) for word in (80, seen[-1].state_hash, len(messages), digest)
     ]
+
+
+def test_commands_ahead_go_with_their_robot(tmp_path):
+    """They neither drive the next one in its place, nor are in the log, which is repeated."""
+    import ruedo
+
+    log = str(tmp_path / "run.lcm")
+    with (
+        ruedo_run(
+            *("--lockstep", "2", "--disable", "p3at/camera", "--record", log), world=HALL
+        ) as server,
+        ThreadPoolExecutor() as pool,
+        ruedo.connect(server.url, name="driver", timeout=PATIENCE) as driver,
+        ruedo.connect(server.url, name="director", timeout=PATIENCE) as director,
+    ):
+        robot = driver.robot("p3at")
+        ahead = [robot.velocity_command(0.5, 0.0).at(k) for k in range(50, 350, 20)]
+        drives = pool.submit(driver.step, 400, ahead, timeout=PATIENCE)
+        director.step(10, timeout=PATIENCE)
+        director.remove("p3at")
+        director.spawn("p3at", 3.0, 1.0, name="guest")
+        director.step(390, timeout=PATIENCE)
+        drives.result()
+        assert director.state("guest").position[0] == pytest.approx(3.0, abs=0.01)
+        server.end()
+    applied = [applied_t.decode(e.data) for e in lcm.EventLog(log) if e.channel == "ruedo/applied"]
+    assert {one.channel for one in applied} == {"ruedo/request"}
+    assert subprocess.run([RUEDO, "verify", log], timeout=PATIENCE).returncode == 0
 
 
 @pytest.mark.parametrize("visit", ["visited", "leaves"])

@@ -35,18 +35,41 @@ class FakeGate : public Gate {
 
 // A world with a robot that takes velocities.
 struct FakeWorld {
-  FakeWorld() {
-    engine::Channel velocity{
-        "r/velocity", "r/velocity", "r", "", "velocity_command_t", velocity_command_t::getHash(),
-        Rate{},       true};
-    channels.add(velocity);
+  FakeWorld() { add_robot("r"); }
+  void add_robot(const std::string& name) {
+    const std::string channel = name + "/velocity";
+    channels.add<velocity_command_t>(channel, name, "", Rate{}, true);
+    inbox.add({{channel, RobotIndex(0), engine::Input::Kind::velocity},
+               {name + "/fault", RobotIndex(0), engine::Input::Kind::fault}},
+              1);
+  }
+  void remove_robot() {
+    channels.remove("r");
+    inbox.remove(RobotIndex(0));
+  }
+  // The channels of the commands that act on the states up to that one.
+  std::vector<std::string> apply(int64_t step) {
+    engine::Batch batch;
+    inbox.apply(robots_, faults_, step, batch);
+    std::vector<std::string> names;
+    for (int i = 0; i < batch.applied_count; ++i)
+      names.push_back(inbox.inputs()[batch.applied[i].input].channel);
+    return names;
   }
   Mode::Stage stage(SimTime base_us = 0) {
     return {&inbox, &gate, &channels, base_us, [](RobotIndex) { return std::string("r"); }};
   }
   FakeGate gate;
   engine::Channels channels;
-  engine::CommandInbox inbox{{{"r/velocity", RobotIndex(0), engine::Input::Kind::velocity}}, 1};
+  engine::CommandInbox inbox{{{"ruedo/markers", {}, engine::Input::Kind::markers}}, 1};
+
+ private:
+  std::shared_ptr<const model::WorldModel> world_ = load_text(robot_sdf("r", 0, 0));
+  model::BodyLayout layout_{*world_};
+  physics::PhysicsWorld physics_{*world_, layout_};
+  std::vector<device_info_t> devices_;
+  robot::Robots robots_{*world_, layout_, physics_};
+  engine::Faults faults_{*world_, layout_, devices_, 1};
 };
 
 std::vector<uint8_t> forward() {
@@ -104,15 +127,28 @@ class LockstepModeTest : public testing::Test {
       sessions_.push_back(session);
     }
   }
+  static request_t granting(grant_request_t body) {
+    body.ncommands = static_cast<int32_t>(body.commands.size());
+    request_t request{};
+    request.kind = request_t::GRANT;
+    request.body = engine::encoded(body);
+    return request;
+  }
   static request_t granting(int64_t from, int64_t until, int64_t received = -1) {
     grant_request_t body{};
     body.granted = from;
     body.step_until = until;
     body.received = received;
-    request_t request{};
-    request.kind = request_t::GRANT;
-    request.body = engine::encoded(body);
-    return request;
+    return granting(body);
+  }
+  static grant_command_t command(int64_t step, const std::string& channel,
+                                 const std::vector<uint8_t>& data) {
+    grant_command_t command{};
+    command.step = step;
+    command.channel = channel;
+    command.data = data;
+    command.size = static_cast<int32_t>(data.size());
+    return command;
   }
   engine::Outcome grant(int client, int64_t from, int64_t until, int64_t received = -1) {
     return lockstep_->grant(granting(from, until, received), sessions_[client]);
@@ -230,6 +266,26 @@ TEST_F(LockstepModeTest, EachClientSendsItsShareAheadAndNoMore) {
   EXPECT_EQ(granted(0, share + 1), reply_t::REFUSED);
   EXPECT_EQ(granted(0, share), reply_t::OK);
   EXPECT_EQ(granted(1, share), reply_t::OK);
+}
+
+// Those that the inbox has already, and those for later steps.
+TEST_F(LockstepModeTest, CommandsAheadGoWithTheirRobot) {
+  begin(1);
+  join_all();
+  publish(0);
+  grant_request_t body{};
+  body.step_until = 600;
+  body.commands = {command(10, "r/velocity", forward()), command(500, "r/velocity", forward())};
+  ASSERT_EQ(lockstep_->grant(granting(body), sessions_[0]).code, reply_t::OK);
+  world_.remove_robot();
+  lockstep_->models_changed(world_.stage(), 0);
+  world_.add_robot("other");
+  lockstep_->models_changed(world_.stage(), 0);
+  for (int64_t step = 1; step <= 600; ++step) {
+    publish(step);
+    having(0, step);
+  }
+  EXPECT_THAT(world_.apply(600), testing::IsEmpty());
 }
 
 TEST_F(LockstepModeTest, FewGrantsOfAClientWaitForTheOthers) {
