@@ -13,6 +13,10 @@ void Live::begin(const Stage& stage, int64_t step) {
   stage.gate->set_limit(std::numeric_limits<int64_t>::max());
 }
 
+void Live::models_changed(const Stage& stage, int64_t step) {
+  if (wait_for_) wait_for_->models_changed(*stage.channels, step);
+}
+
 bool Live::receive(const std::string& channel, const uint8_t* data, size_t size) {
   return wait_for_ && wait_for_->receive(channel, data, size);
 }

@@ -16,6 +16,7 @@ class Live : public Mode {
   Live(const std::vector<WaitForOption>& wait_for, int64_t step_us);
 
   void begin(const Stage& stage, int64_t step) override;
+  void models_changed(const Stage& stage, int64_t step) override;
   std::string waits_for(int64_t step) const override;
   bool receive(const std::string& channel, const uint8_t* data, size_t size) override;
 

@@ -12,6 +12,21 @@
 #include "ruedo/errors.h"
 
 namespace ruedo::run {
+namespace {
+
+// Where commands on a channel go, by its own name or the one on the bus; none: it is no input now.
+engine::InputIndex find_input(const std::string& name, const engine::Channels& channels,
+                              const engine::CommandInbox& inbox) {
+  for (const engine::Channel& channel : channels.list()) {
+    if (channel.gone || channel.robot.empty()) continue;
+    if (name != channel.name && name != channel.bus_name) continue;
+    for (const engine::InputIndex i : inbox.inputs().indices())
+      if (inbox.inputs()[i].channel == channel.bus_name) return i;
+  }
+  return {};
+}
+
+}  // namespace
 
 WaitFor::WaitFor(std::vector<WaitForOption> options, int64_t step_us) {
   for (WaitForOption& option : options) {
@@ -22,37 +37,50 @@ WaitFor::WaitFor(std::vector<WaitForOption> options, int64_t step_us) {
 
 void WaitFor::attach(const engine::Channels& channels, engine::CommandInbox& inbox, Gate& gate,
                      int64_t step) {
+  if (!inbox_) check(channels, inbox);
   inbox_ = &inbox;
   gate_ = &gate;
+  for (Waited& waited : waited_)
+    begin(waited, find_input(waited.option.channel, channels, inbox), step);
+  limit();
+}
+
+// Later a robot may be gone; at the start the option is wrong.
+void WaitFor::check(const engine::Channels& channels, const engine::CommandInbox& inbox) const {
+  std::vector<std::string> names;
+  for (const engine::Channel& channel : channels.list())
+    if (channel.input && !channel.gone && !channel.robot.empty()) names.push_back(channel.name);
+  for (const Waited& waited : waited_) {
+    if (find_input(waited.option.channel, channels, inbox).valid()) continue;
+    const std::string near = nearest_word(waited.option.channel, names);
+    throw InputError({}, "--wait-for: there is no input channel '" + waited.option.channel + "'" +
+                             (near.empty() ? "" : "; did you mean '" + near + "'?"));
+  }
+}
+
+void WaitFor::models_changed(const engine::Channels& channels, int64_t step) {
   for (Waited& waited : waited_) {
-    std::vector<std::string> names;
-    waited.channel.clear();
-    for (const engine::Channel& channel : channels.list()) {
-      if (!channel.input || channel.robot.empty()) continue;
-      names.push_back(channel.name);
-      if (waited.option.channel == channel.name || waited.option.channel == channel.bus_name)
-        waited.channel = channel.bus_name;
-    }
-    const auto& inputs = inbox.inputs();
-    const auto found = std::find_if(inputs.begin(), inputs.end(), [&](const engine::Input& input) {
-      return input.kind != engine::Input::Kind::reset_odometry && input.channel == waited.channel;
-    });
-    if (waited.channel.empty() || found == inputs.end()) {
-      const std::string near = nearest_word(waited.option.channel, names);
-      throw InputError({}, "--wait-for: there is no input channel '" + waited.option.channel + "'" +
-                               (near.empty() ? "" : "; did you mean '" + near + "'?"));
-    }
-    waited.input = engine::InputIndex(found - inputs.begin());
-    waited.next = waited.clock.samples_before(std::max<int64_t>(step, 0));
+    const engine::InputIndex input = find_input(waited.option.channel, channels, *inbox_);
+    if (input != waited.input) begin(waited, input, step);
   }
   limit();
 }
 
+void WaitFor::begin(Waited& waited, engine::InputIndex input, int64_t step) {
+  if (waited.input.valid() && !input.valid()) {
+    spdlog::info("{}: its robot is gone: nothing is waited for until one of that name comes",
+                 waited.channel);
+  }
+  waited.input = input;
+  if (input.valid()) waited.channel = inbox_->inputs()[input].channel;
+  waited.next = waited.clock.samples_before(std::max<int64_t>(step, 0));
+}
+
 bool WaitFor::receive(const std::string& channel, const uint8_t* data, size_t size) {
-  const auto waited = std::find_if(waited_.begin(), waited_.end(),
-                                   [&](const Waited& w) { return w.channel == channel; });
+  const auto waited = std::find_if(waited_.begin(), waited_.end(), [&](const Waited& w) {
+    return w.input.valid() && w.channel == channel;
+  });
   if (waited == waited_.end()) return false;
-  if (!inbox_) return true;
   if (waited->next - waited->clock.samples_before(inbox_->next_step()) >= kMostAhead) {
     if (!waited->told) {
       spdlog::warn(
@@ -75,14 +103,15 @@ bool WaitFor::receive(const std::string& channel, const uint8_t* data, size_t si
 
 void WaitFor::limit() {
   int64_t last = std::numeric_limits<int64_t>::max();
-  for (const Waited& waited : waited_) last = std::min(last, waited.clock.step_of(waited.next));
+  for (const Waited& waited : waited_)
+    if (waited.input.valid()) last = std::min(last, waited.clock.step_of(waited.next));
   gate_->set_limit(last);
 }
 
 std::string WaitFor::waits_for(int64_t step) const {
   std::string text;
   for (const Waited& waited : waited_) {
-    if (waited.clock.step_of(waited.next) > step) continue;
+    if (!waited.input.valid() || waited.clock.step_of(waited.next) > step) continue;
     text +=
         fmt::format("{}message {} on {}", text.empty() ? "" : ", ", waited.next, waited.channel);
   }

@@ -2,8 +2,8 @@
 // and knows nothing of steps, then drives a run that can be repeated, as fast as it can.
 //
 // Message k of such a channel (from 0) acts on the state of the first step at or after k / rate;
-// the run goes no further than that state before the message is there. Guarded by the server's lock
-// of the simulation.
+// the run goes no further than that state before the message is there. While the channel's robot is
+// not in the world, nothing is waited for. Guarded by the server's lock of the simulation.
 #pragma once
 
 #include <string>
@@ -28,10 +28,13 @@ class WaitFor {
 
   WaitFor(std::vector<WaitForOption> options, int64_t step_us);
 
-  // For a simulation that was rebuilt, or is at `step` for another reason. Throws InputError for
-  // what is no input.
+  // For a simulation that was rebuilt, or is at `step` for another reason. The first time it throws
+  // InputError for what is no input.
   void attach(const engine::Channels& channels, engine::CommandInbox& inbox, Gate& gate,
               int64_t step);
+
+  // Models have come or gone at that step: robots that are waited for, maybe.
+  void models_changed(const engine::Channels& channels, int64_t step);
 
   // False: the channel is none of these.
   bool receive(const std::string& channel, const uint8_t* data, size_t size);
@@ -43,12 +46,14 @@ class WaitFor {
   struct Waited {
     WaitForOption option;
     SampleClock clock;
-    engine::InputIndex input;
-    std::string channel;  // on the bus
-    int64_t next = 0;     // number of the message that comes next
+    engine::InputIndex input;  // none: its robot is not there
+    std::string channel;       // on the bus
+    int64_t next = 0;          // number of the message that comes next
     bool told = false;
   };
 
+  void check(const engine::Channels& channels, const engine::CommandInbox& inbox) const;
+  void begin(Waited& waited, engine::InputIndex input, int64_t step);  // from that state on
   void limit();
 
   std::vector<Waited> waited_;

@@ -176,6 +176,40 @@ TEST_F(EditsResetTest, ARunWithChangesIsRepeatedFromItsLog) {
   EXPECT_GT(verification.messages, 300);
 }
 
+// The robot that is waited for goes and comes back, and the time is reset meanwhile: the run goes
+// on, and no further than the messages allow while the robot is there.
+TEST_F(EditsResetTest, WhatIsWaitedForGoesAndComes) {
+  const TemporaryFile log("waits.lcm");
+  RunOptions options = fast(1e6);
+  options.wait_for = {{"r/velocity", {10, 1}}};  // each 20th step
+  options.record = log.path();
+  begin(options, robot_sdf("r", 0, 0));
+  const auto drive_on = [&](int64_t from) {
+    for (int k = 0; k < 3; ++k) drive("r", 0.5);
+    const int64_t until = (from + 19) / 20 * 20 + 60;
+    while (state().step < until) std::this_thread::yield();
+    EXPECT_EQ(state().step, until);
+  };
+  const auto come_back = [&] {
+    const reply_t reply = spawn(as_file(robot_sdf("r", 0, 0)), 0, 0, "r");
+    EXPECT_EQ(reply.code, reply_t::OK) << reply.text;
+    drive_on(decoded_as<state_reply_t>(reply.body).step);
+    EXPECT_GT(state("r").position[0], 0.05);
+  };
+  drive_on(0);
+  remove("r");
+  while (state().step < 500) std::this_thread::yield();
+  come_back();
+  remove("r");
+  EXPECT_EQ(reset(reset_request_t::TIME).code, reply_t::OK);
+  come_back();
+  end();
+  const Verification verification =
+      Verifier(log.path(), load_text(robot_sdf("r", 0, 0)), RunOptions()).run();
+  EXPECT_EQ(verification.fault, "");
+  EXPECT_FALSE(verification.difference);
+}
+
 // Each is answered with its error; nothing stops, and nothing changes.
 TEST_F(EditsResetTest, HostileRequestsAreAnsweredInWords) {
   begin(paused_server(), robot_sdf("r", 0, 0) + box_sdf("box", "0.2 0.2 0.2", false, 2, 0, 0.1));

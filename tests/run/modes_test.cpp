@@ -106,6 +106,45 @@ TEST(Live, WaitsForTheMessagesOfAChannel) {
   EXPECT_EQ(world.gate.limit, 60);
 }
 
+TEST(Live, WaitsForNoRobotThatIsGone) {
+  FakeWorld world;
+  Live live({{"r/velocity", {10, 1}}}, kStep_us);
+  live.begin(world.stage(), -1);
+  const std::vector<uint8_t> command = forward();
+  live.receive("r/velocity", command.data(), command.size());
+  world.remove_robot();
+  live.models_changed(world.stage(), 13);
+  EXPECT_EQ(world.gate.limit, std::numeric_limits<int64_t>::max());
+  EXPECT_EQ(live.waits_for(40), "");
+  EXPECT_FALSE(live.receive("r/velocity", command.data(), command.size()));
+  world.add_robot("r");
+  live.models_changed(world.stage(), 30);
+  EXPECT_EQ(world.gate.limit, 40);
+  EXPECT_TRUE(live.receive("r/velocity", command.data(), command.size()));
+  EXPECT_EQ(world.gate.limit, 60);
+  EXPECT_THAT(world.apply(60), testing::ElementsAre("r/velocity"));
+}
+
+TEST(Live, CountsOnForARobotThatStays) {
+  FakeWorld world;
+  Live live({{"r/velocity", {10, 1}}}, kStep_us);
+  live.begin(world.stage(), -1);
+  const std::vector<uint8_t> command = forward();
+  for (int k = 0; k < 3; ++k) live.receive("r/velocity", command.data(), command.size());
+  live.models_changed(world.stage(), 0);
+  EXPECT_EQ(world.gate.limit, 60);
+}
+
+// As after a RESET of the time, or a RESTORE.
+TEST(Live, GoesOnInAWorldWithoutTheRobot) {
+  FakeWorld world;
+  Live live({{"r/velocity", {10, 1}}}, kStep_us);
+  live.begin(world.stage(), -1);
+  world.remove_robot();
+  live.begin(world.stage(), -1);
+  EXPECT_EQ(world.gate.limit, std::numeric_limits<int64_t>::max());
+}
+
 TEST(Live, RefusesToWaitForWhatIsNoInput) {
   FakeWorld world;
   Live live({{"r/velocty", {10, 1}}}, kStep_us);
