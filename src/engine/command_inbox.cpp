@@ -39,7 +39,8 @@ std::string check_fault_message(const uint8_t* data, size_t size, model::Fault& 
   return model::check_fault(fault);
 }
 
-// What the type does not guarantee: "" or what is wrong with a decoded message.
+}  // namespace
+
 std::string check_values(Input::Kind kind, const uint8_t* data, size_t size) {
   if (kind == Input::Kind::fault) {
     model::Fault asked;
@@ -50,8 +51,6 @@ std::string check_values(Input::Kind kind, const uint8_t* data, size_t size) {
   if (decode_checked(data, size, markers) != DecodeFault::none) return "it is none";
   return check_markers(markers);
 }
-
-}  // namespace
 
 DecodeFault decode_command(Input::Kind kind, const uint8_t* data, size_t size,
                            robot::Command& command) {

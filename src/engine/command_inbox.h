@@ -123,6 +123,9 @@ class CommandInbox {
   int64_t last_warning_ns_ = 0;  // for the bus's thread
 };
 
+// What is wrong with the values of a fault or of markers that can be decoded; "": nothing.
+std::string check_values(Input::Kind kind, const uint8_t* data, size_t size);
+
 // Whether all of its values are finite.
 bool is_finite(const robot::Command& command);
 

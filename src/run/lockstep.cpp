@@ -165,6 +165,10 @@ std::string Lockstep::take_commands(const grant_request_t& grant, std::vector<He
         engine::decode_command(input->kind, command.data.data(), command.data.size(), decoded);
     if (fault != DecodeFault::none) return which() + ": " + describe(fault);
     if (!engine::is_finite(decoded)) return which() + ": a value is not finite";
+    if (const std::string wrong =
+            engine::check_values(input->kind, command.data.data(), command.data.size());
+        !wrong.empty())
+      return which() + ": " + wrong;
     held.push_back({command.step, engine::InputIndex(input - inputs.begin()), command.data});
   }
   std::stable_sort(held.begin(), held.end(),

@@ -6,7 +6,9 @@
 
 #include "log/writer.h"
 #include "ruedo/errors.h"
+#include "ruedo/fault_t.hpp"
 #include "ruedo/grant_reply_t.hpp"
+#include "ruedo/markers_t.hpp"
 #include "ruedo/resend_request_t.hpp"
 #include "ruedo/reset_request_t.hpp"
 #include "ruedo/velocity_command_t.hpp"
@@ -325,6 +327,34 @@ TEST_F(LockstepModeTest, CommandsAheadGoWithTheirRobot) {
     having(0, step);
   }
   EXPECT_THAT(world_.apply(600), testing::IsEmpty());
+}
+
+// What the inbox would not take refuses the grant.
+TEST_F(LockstepModeTest, BadValuesRefuseTheGrant) {
+  begin(1);
+  join_all();
+  publish(0);
+  fault_t good{};
+  good.kind = "kidnapped";
+  good.view_end = 1.0;
+  fault_t unknown = good, unplaced = good;
+  unknown.kind = "nonsense";
+  unplaced.x = std::numeric_limits<double>::quiet_NaN();
+  grant_request_t body{};
+  body.step_until = 10;
+  const auto refusal = [&](const std::string& channel, const std::vector<uint8_t>& data) {
+    body.commands = {command(3, "r/velocity", forward()), command(5, channel, data)};
+    const engine::Outcome outcome = lockstep_->grant(granting(body), sessions_[0]);
+    EXPECT_EQ(outcome.code == reply_t::OK, outcome.text.empty());
+    return outcome.text;
+  };
+  const std::string which = "command 1 (r/fault): ";
+  EXPECT_THAT(refusal("r/fault", engine::encoded(unknown)),
+              testing::AllOf(testing::StartsWith(which), testing::HasSubstr("nonsense")));
+  EXPECT_THAT(refusal("r/fault", engine::encoded(unplaced)), testing::StartsWith(which));
+  EXPECT_THAT(refusal("ruedo/markers", engine::encoded(markers_t{})),
+              testing::StartsWith("command 1 (ruedo/markers): "));
+  EXPECT_EQ(refusal("r/fault", engine::encoded(good)), "");
 }
 
 TEST_F(LockstepModeTest, FewGrantsOfAClientWaitForTheOthers) {
