@@ -9,6 +9,7 @@
 #include "ruedo/join_t.hpp"
 #include "ruedo/reply_t.hpp"
 #include "ruedo/request_t.hpp"
+#include "ruedo/state_reply_t.hpp"
 #include "wire_reader.h"
 
 namespace ruedo::client {
@@ -181,6 +182,29 @@ void Session::receive(const uint8_t* bytes, size_t size) {
   } else if (reply.kind == request_t::GRANT || reply.kind == request_t::RESEND) {
     lock.unlock();
     core_.stepper().on_reply(reply);
+  }
+}
+
+State state_of(const Reply& reply) {
+  try {
+    WireReader in(reply.body.data(), reply.body.size());
+    if (in.int64() != state_reply_t::getHash()) throw WireError("another version of the type");
+    State state;
+    state.utime = in.int64();
+    state.step = in.int64();
+    state.state_hash = in.int64();
+    state.paused = in.boolean();
+    state.rate = in.float64();
+    state.name = in.string();
+    state.position = in.array<3>();
+    state.orientation = in.array<4>();
+    state.linear = in.array<3>();
+    state.angular = in.array<3>();
+    return state;
+  } catch (const WireError& error) {
+    throw TypeMismatch(
+        std::string("the reply's body is no state_reply_t of this client's version: ") +
+        error.what());
   }
 }
 

@@ -31,6 +31,9 @@ struct Reply {
   std::vector<uint8_t> body;
 };
 
+// The body of a reply that has a state. Throws TypeMismatch.
+State state_of(const Reply& reply);
+
 class Session {
  public:
   // Throws std::invalid_argument for a name that no server takes.

@@ -14,10 +14,8 @@
 #include "ruedo/set_pose_request_t.hpp"
 #include "ruedo/set_twist_request_t.hpp"
 #include "ruedo/spawn_request_t.hpp"
-#include "ruedo/state_reply_t.hpp"
 #include "ruedo/step_request_t.hpp"
 #include "server_process.h"
-#include "wire_reader.h"
 
 namespace ruedo::client {
 namespace {
@@ -32,29 +30,6 @@ std::vector<uint8_t> name_body(const std::string& name) {
   name_request_t body;
   body.name = name;
   return encoded(body);
-}
-
-State state_of(const Reply& reply) {
-  try {
-    WireReader in(reply.body.data(), reply.body.size());
-    if (in.int64() != state_reply_t::getHash()) throw WireError("another version of the type");
-    State state;
-    state.utime = in.int64();
-    state.step = in.int64();
-    state.state_hash = in.int64();
-    state.paused = in.boolean();
-    state.rate = in.float64();
-    state.name = in.string();
-    state.position = in.array<3>();
-    state.orientation = in.array<4>();
-    state.linear = in.array<3>();
-    state.angular = in.array<3>();
-    return state;
-  } catch (const WireError& error) {
-    throw TypeMismatch(
-        std::string("the reply's body is no state_reply_t of this client's version: ") +
-        error.what());
-  }
 }
 
 }  // namespace

@@ -7,6 +7,7 @@
 #include "core.h"
 #include "ruedo/grant_reply_t.hpp"
 #include "ruedo/grant_request_t.hpp"
+#include "ruedo/name_request_t.hpp"
 #include "ruedo/reply_t.hpp"
 #include "ruedo/request_t.hpp"
 #include "ruedo/resend_request_t.hpp"
@@ -41,6 +42,7 @@ Observations Stepper::step(int64_t n, const std::vector<Command>& commands, Dura
   } else {
     lock.unlock();
     take_part(timeout);
+    if (n == 0 && have_ >= 0) look(timeout);
     lock.lock();
   }
   wait(lock, have_, timeout);  // returns at once, unless the previous call gave up
@@ -111,6 +113,16 @@ void Stepper::take_part(Duration timeout) {
   waits_for_.clear();
   fault_ = nullptr;
   part_ = true;
+}
+
+// The state that stands, for who joins later and grants nothing.
+void Stepper::look(Duration timeout) {
+  const State state = state_of(
+      core_.session().request_in_turn(request_t::GET_STATE, encoded(name_request_t{}), timeout));
+  const std::lock_guard lock(mutex_);
+  collected_ = state.step;
+  last_utime_ = state.utime;
+  last_hash_ = state.state_hash;
 }
 
 // Subscribes to everything that the simulation publishes: a manifest may name any of it.

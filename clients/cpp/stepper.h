@@ -70,6 +70,7 @@ class Stepper {
 
   void check_run();
   void take_part(Duration timeout);
+  void look(Duration timeout);
   void subscribe();
   std::vector<uint8_t> grant_body(int64_t until, const std::vector<Command>& commands) const;
   void wait(std::unique_lock<std::mutex>& lock, int64_t until, Duration timeout);

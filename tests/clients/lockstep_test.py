@@ -144,6 +144,30 @@ def test_messages_are_those_of_the_robots_that_were_there(language):
     ]
 
 
+def test_who_comes_later_sees_the_state_that_stands(language, tmp_path):
+    """Joining a run that is under way, and one that begins with a snapshot."""
+    import ruedo
+
+    options = ("--disable", "p3at/camera", "--snapshots", str(tmp_path))
+    with (
+        ruedo_run("--lockstep", "1", *options, world=HALL) as server,
+        ThreadPoolExecutor() as pool,
+        ruedo.connect(server.url, timeout=PATIENCE) as sim,
+    ):
+        states = [sim.step(100, timeout=PATIENCE)]
+        sim.snapshot("here")
+        watches = pool.submit(probe, language, server.url, "watches", "watcher", "2")
+        while not watches.done():
+            states.append(sim.step(1, timeout=PATIENCE))
+    stood = [[str(s.step), f"{s.time:.6f}", str(s.state_hash)] for s in states]
+    assert watches.result().words("begin") in stood
+    with ruedo_run(
+        *("--lockstep", "1", "--restore", str(tmp_path / "here.snapshot"), *options), world=HALL
+    ) as server:
+        said = probe(language, server.url, "watches", "watcher", "2")
+    assert said.words("begin") == stood[0]
+
+
 def test_commands_ahead_go_with_their_robot(tmp_path):
     """They neither drive the next one in its place, nor are in the log, which is repeated."""
     import ruedo

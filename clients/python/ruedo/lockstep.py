@@ -22,7 +22,7 @@ import numpy as np
 
 from . import arrivals, lcmtypes
 from .arguments import shown
-from .control import State
+from .control import State, state_of
 from .decoding import decode
 from .errors import (
     LeaseLost,
@@ -273,6 +273,8 @@ class Stepper:
                 self._check_run()
             else:
                 self._take_part(timeout)
+                if n == 0 and self._have >= 0:
+                    self._look(timeout)
             until = min(self._granted + n, _LONGEST)
             self._wait(self._have, timeout)  # returns at once, unless the previous call gave up
             if n > 0:
@@ -332,6 +334,15 @@ class Stepper:
         self._infos = [self._connection.info]
         self._taken, self._fault, self._waits_for = True, None, ""
         self._part = True
+
+    def _look(self, timeout: float) -> None:
+        """At the state that stands, for who joins later and grants nothing."""
+        state = state_of(
+            self._connection.session.request_in_turn(
+                lcmtypes.request_t.GET_STATE, lcmtypes.name_request_t(), timeout
+            )
+        )
+        self._last = (state.utime, state.step, state.state_hash)
 
     def _subscribe(self) -> None:
         """To everything that the simulation publishes: a manifest may name any of it."""

@@ -4,6 +4,7 @@ import ruedo.lcmtypes.channel_info_t;
 import ruedo.lcmtypes.grant_command_t;
 import ruedo.lcmtypes.grant_reply_t;
 import ruedo.lcmtypes.grant_request_t;
+import ruedo.lcmtypes.name_request_t;
 import ruedo.lcmtypes.reply_t;
 import ruedo.lcmtypes.request_t;
 import ruedo.lcmtypes.resend_reply_t;
@@ -127,7 +128,10 @@ final class Stepper {
         sim.checkMayWait();
         synchronized (session) { // its turn: other requests wait
             sim.checkOpen();
-            if (!takesPart()) takePart(timeout);
+            if (!takesPart()) {
+                takePart(timeout);
+                if (n == 0 && have >= 0) look(timeout);
+            }
             synchronized (this) {
                 await(have, timeout); // for nothing, unless the call before gave up
                 long until = n > Long.MAX_VALUE - granted ? Long.MAX_VALUE : granted + n;
@@ -206,6 +210,16 @@ final class Stepper {
             infos.add(sim.info());
             waitsFor = "";
             part = true;
+        }
+    }
+
+    /** At the state that stands, for who joins later and grants nothing. */
+    private void look(double timeout) {
+        name_request_t body = new name_request_t();
+        body.name = "";
+        State state = State.of(session.request(request_t.GET_STATE, body, timeout));
+        synchronized (this) {
+            last = new long[] {state.utime, state.step, state.stateHash};
         }
     }
 
