@@ -8,6 +8,7 @@
 #include <cstdlib>
 #include <cstring>
 #include <map>
+#include <mutex>
 #include <set>
 #include <string_view>
 #include <thread>
@@ -263,11 +264,20 @@ class CycloneWriter : public ros2::Writer {
   const ddsi_sertype* type_ = nullptr;
 };
 
+class CycloneReader;
+
+// Readers may go while the transport's thread takes samples: it finds them by their numbers.
+struct LiveReaders {
+  std::mutex mutex;  // held while one takes samples
+  std::map<dds_attach_t, CycloneReader*> by_number;
+  dds_attach_t last = 0;  // 0 is none
+};
+
 class CycloneReader : public ros2::Reader {
  public:
   CycloneReader(dds_entity_t participant, dds_entity_t waitset, const Endpoint& endpoint,
-                ros2::Transport::Handler handler)
-      : waitset_(waitset), name_(endpoint.topic.name), handler_(std::move(handler)) {
+                ros2::Transport::Handler handler, LiveReaders& live)
+      : waitset_(waitset), name_(endpoint.topic.name), handler_(std::move(handler)), live_(live) {
     const std::string name = dds_topic(endpoint);
     const ddsi_sertype* type = nullptr;
     topic_ = checked(create_raw_topic(participant, name.c_str(),
@@ -279,12 +289,18 @@ class CycloneReader : public ros2::Reader {
     checked(dds_set_status_mask(reader_,
                                 DDS_DATA_AVAILABLE_STATUS | DDS_REQUESTED_INCOMPATIBLE_QOS_STATUS),
             "reader of " + name);
-    checked(dds_waitset_attach(waitset_, reader_, reinterpret_cast<dds_attach_t>(this)),
-            "reader of " + name);
     if (const auto* replies = static_cast<const CycloneWriter*>(endpoint.replies))
       requests_ = std::make_unique<WaitingRequests>(reader_, replies->entity());
+    const std::lock_guard lock(live_.mutex);
+    number_ = ++live_.last;
+    checked(dds_waitset_attach(waitset_, reader_, number_), "reader of " + name);
+    live_.by_number[number_] = this;
   }
   ~CycloneReader() override {
+    {
+      const std::lock_guard lock(live_.mutex);
+      live_.by_number.erase(number_);
+    }
     requests_.reset();
     dds_waitset_detach(waitset_, reader_);
     dds_delete(reader_);
@@ -363,6 +379,8 @@ class CycloneReader : public ros2::Reader {
   dds_entity_t waitset_, topic_ = 0, reader_ = 0;
   std::string name_;
   ros2::Transport::Handler handler_;
+  LiveReaders& live_;
+  dds_attach_t number_ = 0;
   std::unique_ptr<WaitingRequests> requests_;  // null: a topic
   bool told_ = false;
 };
@@ -397,7 +415,8 @@ class CycloneTransport : public ros2::Transport {
     return std::make_unique<CycloneWriter>(participant_, endpoint);
   }
   std::unique_ptr<ros2::Reader> add_reader(const Endpoint& endpoint, Handler handler) override {
-    return std::make_unique<CycloneReader>(participant_, waitset_, endpoint, std::move(handler));
+    return std::make_unique<CycloneReader>(participant_, waitset_, endpoint, std::move(handler),
+                                           live_);
   }
 
   void start() override {
@@ -423,23 +442,30 @@ class CycloneTransport : public ros2::Transport {
   void receive() {
     using Left = CycloneReader::Left;
     dds_attach_t woken[kMostTaken];
-    std::set<CycloneReader*> readers;  // those with deferred work
+    std::set<dds_attach_t> readers;  // those with deferred work
     dds_duration_t patience = DDS_INFINITY;
     while (!stopping_) {
       const dds_return_t count = dds_waitset_wait(waitset_, woken, kMostTaken, patience);
       for (dds_return_t i = 0; i < std::min(count, kMostTaken); ++i) {
-        if (woken[i] != 0) readers.insert(reinterpret_cast<CycloneReader*>(woken[i]));
+        if (woken[i] != 0) readers.insert(woken[i]);
       }
       patience = DDS_INFINITY;
       for (auto reader = readers.begin(); reader != readers.end() && !stopping_;) {
-        const Left left = (*reader)->take();
+        const Left left = take(*reader);
         if (left != Left::nothing) patience = left == Left::more ? 0 : std::min(patience, kLook);
         reader = left == Left::nothing ? readers.erase(reader) : std::next(reader);
       }
     }
   }
 
+  CycloneReader::Left take(dds_attach_t number) {
+    const std::lock_guard lock(live_.mutex);
+    const auto reader = live_.by_number.find(number);
+    return reader == live_.by_number.end() ? CycloneReader::Left::nothing : reader->second->take();
+  }
+
   CycloneOptions options_;
+  LiveReaders live_;
   dds_entity_t domain_ = 0, participant_ = 0, waitset_ = 0, wake_ = 0;
   std::atomic<bool> stopping_{false};
   std::thread thread_;

@@ -194,34 +194,36 @@ void Node::tell_standing() {
   standing_ = std::move(writers);
 }
 
-// The readers of a removed robot stay, for the next one of its name.
 void Node::add_commands(const std::vector<world_info_t>& info) {
   std::map<std::string, std::shared_ptr<const Command>> commands;
   for (Command& command : commands_of(info, options_.joints, names_)) {
     const std::string name = key(command.topic);
     commands.try_emplace(name, std::make_shared<const Command>(std::move(command)));
   }
-  for (const auto& [name, command] : commands) {
-    if (readers_.contains(name)) continue;
-    readers_[name] = transport_->add_reader(
-        endpoint(command->topic),
-        [this, name = name](const Sample& sample) { receive(name, sample.cdr); });
-  }
-  {
-    const std::lock_guard lock(commands_mutex_);
-    commands_ = std::move(commands);
-  }
+  std::map<std::string, Placing> placings;
   for (const world_info_t& part : info) {
     for (const robot_info_t& robot : part.robots) {
       const Topic topic{names_.topic(robot.name, "initialpose"),
                         "geometry_msgs/msg/PoseWithCovarianceStamped", kCommandQos};
-      if (!poses_.try_emplace(key(topic), topic).second) continue;
-      readers_[key(topic)] = transport_->add_reader(
-          endpoint(topic), [this, name = robot.name, topic](const Sample& sample) {
-            receive_pose(name, topic.name, sample);
-          });
+      placings.try_emplace(key(topic), Placing{topic, robot.name});
     }
   }
+  {
+    const std::lock_guard lock(inputs_mutex_);
+    commands_ = std::move(commands);
+    placings_ = std::move(placings);
+  }
+  std::erase_if(readers_, [this](const auto& each) {
+    return !commands_.contains(each.first) && !placings_.contains(each.first);
+  });
+  const auto read = [this](const std::string& name, const Topic& topic, auto receive) {
+    if (readers_.contains(name)) return;
+    readers_[name] = transport_->add_reader(
+        endpoint(topic),
+        [this, name, receive](const Sample& sample) { (this->*receive)(name, sample); });
+  };
+  for (const auto& [name, command] : commands_) read(name, command->topic, &Node::receive);
+  for (const auto& [name, placing] : placings_) read(name, placing.topic, &Node::receive_pose);
 }
 
 void Node::tell_graph() {
@@ -246,37 +248,42 @@ void Node::tell_graph() {
   graph_->write(out.bytes());
 }
 
-// topic: name and type.
-void Node::receive(const std::string& topic, std::span<const uint8_t> cdr) {
+void Node::receive(const std::string& topic, const Sample& sample) {
   ++received_;
   if (!injecting_) return;
   std::shared_ptr<const Command> command;
   {
-    const std::lock_guard lock(commands_mutex_);
+    const std::lock_guard lock(inputs_mutex_);
     if (const auto known = commands_.find(topic); known != commands_.end()) command = known->second;
   }
   if (!command) return;  // its robot was removed
-  if (const auto bytes = command->convert(cdr)) return inject_(command->channel, *bytes);
-  count_faulty(command->topic.name, command->topic.type, cdr.size());
+  if (const auto bytes = command->convert(sample.cdr)) return inject_(command->channel, *bytes);
+  count_faulty(command->topic.name, command->topic.type, sample.cdr.size());
 }
 
 // The robot is placed where the message says: the map frame is the world.
-void Node::receive_pose(const std::string& robot, const std::string& topic, const Sample& sample) {
+void Node::receive_pose(const std::string& topic, const Sample& sample) {
   ++received_;
   if (!injecting_) return;
+  Placing placing;
+  {
+    const std::lock_guard lock(inputs_mutex_);
+    if (const auto known = placings_.find(topic); known != placings_.end()) placing = known->second;
+  }
+  if (placing.robot.empty()) return;  // it was removed
   CdrReader in(sample.cdr);
   in.skip<uint32_t>(2);
   const std::string frame = in.get_text();
   set_pose_request_t pose;
-  pose.name = robot;
+  pose.name = placing.robot;
   for (double& x : pose.position) x = in.get<double>();
   for (const size_t i : {1, 2, 3, 0}) pose.orientation[i] = in.get<double>();
   if (!in.good() || !(frame.empty() || frame == "map" || frame == "world"))
-    return count_faulty(topic, "pose in the frame map", sample.cdr.size());
+    return count_faulty(placing.topic.name, "pose in the frame map", sample.cdr.size());
   std::vector<uint8_t> body(static_cast<size_t>(pose.getEncodedSize()));
   pose.encode(body.data(), 0, static_cast<int>(body.size()));
   requests_.ask(sample.sender, request_t::SET_POSE, std::move(body),
-                [this, topic](const reply_t& reply) {
+                [this, topic = placing.topic.name](const reply_t& reply) {
                   if (reply.code != reply_t::OK && may_warn())
                     spdlog::warn("ROS 2: {}: {}", topic, reply.text);
                 });
@@ -326,7 +333,7 @@ std::vector<Topic> Node::outputs() const {
 std::vector<Topic> Node::inputs() const {
   std::vector<Topic> topics;
   for (const auto& [name, command] : commands_) topics.push_back(command->topic);
-  for (const auto& [name, topic] : poses_) topics.push_back(topic);
+  for (const auto& [name, placing] : placings_) topics.push_back(placing.topic);
   return topics;
 }
 

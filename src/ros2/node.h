@@ -78,10 +78,10 @@ class Node : public run::Sink {
   void add_commands(const std::vector<world_info_t>& info);
   void tell_standing();
   void tell_graph();  // ros_discovery_info
-  void receive(const std::string& topic, std::span<const uint8_t> cdr);
-  void receive_pose(const std::string& robot, const std::string& topic,
-                    const Sample& sample);  // initialpose
-  bool may_warn();                          // once a second, whatever strangers send
+  // topic: name and type.
+  void receive(const std::string& topic, const Sample& sample);
+  void receive_pose(const std::string& topic, const Sample& sample);  // initialpose
+  bool may_warn();  // once a second, whatever strangers send
   void count_faulty(const std::string& topic, const std::string& type, size_t size);
   void send(Writer& writer, std::span<const uint8_t> cdr);
   Endpoint endpoint(const Topic& topic, Role role = Role::topic) const;
@@ -101,7 +101,6 @@ class Node : public run::Sink {
   int64_t time_us_ = 0;                                      // sim time
   std::map<std::string, std::unique_ptr<Writer>> standing_;  // by name and type
   std::map<std::string, std::unique_ptr<Reader>> readers_;
-  std::map<std::string, Topic> poses_;  // for each robot, by name and type
   Requests requests_;
   std::unique_ptr<Services> services_;
   std::string reply_channel_;
@@ -109,8 +108,13 @@ class Node : public run::Sink {
   int64_t clock_period_us_, next_clock_us_ = 0;
   Requests::Clock::time_point next_look_;
 
-  std::mutex commands_mutex_;
+  struct Placing {
+    Topic topic;
+    std::string robot;
+  };
+  std::mutex inputs_mutex_;  // changed by the thread that calls the sink, which reads without it
   std::map<std::string, std::shared_ptr<const Command>> commands_;  // by name and type
+  std::map<std::string, Placing> placings_;                         // likewise
 
   mutable std::mutex pictures_mutex_;
   std::map<std::string, bool> pictures_;  // channels of pictures, and whether anybody reads them

@@ -155,7 +155,9 @@ TEST(Node, CommandsAreForTheRobotThatIsThere) {
   const auto send = [&](const std::vector<double>& values) {
     const std::vector<uint8_t> cdr = numbers(values);
     heard.clear();
-    handlers->at("/arm/forward_position_controller/commands")({.cdr = cdr});
+    Sample sample;
+    sample.cdr = cdr;
+    handlers->at("/arm/forward_position_controller/commands")(sample);
   };
   send({1.0, 2.0});
   ASSERT_EQ(heard.size(), 1u);
