@@ -341,7 +341,7 @@ def measure(log):
 @pytest.mark.parametrize("way", ["python", "command"])
 def test_a_full_temporary_folder_is_no_fault_of_the_controllers(tmp_path, way):
     """Regression: it was stored as a crash, and never repeated."""
-    program = f"{sys.executable} -c 'import ruedo; ruedo.connect().step(1000)'"
+    program = f"{sys.executable} -c 'import ruedo; ruedo.connect(timeout={PATIENCE}).step(1000)'"
     ways = {
         "python": 'python: "writes.py:drive"',
         "command": f'command: "{program}", lockstep: 1',

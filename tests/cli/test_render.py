@@ -196,8 +196,10 @@ def test_what_clients_drew_is_in_a_video(tmp_path):
             ],
         )
         sim.markers("robot", [made.map([[100, 0]], 1, (1, -0.5), color=(0, 0, 1))], frame="p3at")
+        sim.state()  # answered behind them
         sim.sleep(0.3)
         sim.markers("world")
+        sim.state()
         sim.sleep(0.3)
     size = 320
     seen = ("--view=0,0,12,0,1.5707963267948966,0", "--size", f"{size}x{size}", "--fps", "20")

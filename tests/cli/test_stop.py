@@ -26,10 +26,22 @@ def processor_seconds(process):
     return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
 
 
-def until(condition, process):
+def has_died(process):
+    """It is a zombie at most. Who was killed dies when it gets a processor."""
+    try:
+        return Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()[0] == "Z"
+    except OSError:
+        return True
+
+
+def until(condition, process, ended=False):
+    """ended: the process may have."""
     deadline = time.monotonic() + PATIENCE
-    while not condition():
-        assert process.poll() is None and time.monotonic() < deadline
+    while True:
+        has_ended = process.poll() is not None  # before the look: its last words count
+        if condition():
+            return
+        assert (ended or not has_ended) and time.monotonic() < deadline
         time.sleep(0.05)
 
 
@@ -50,8 +62,8 @@ def test_it_does_not_wait_for_pictures(told, tmp_path):
             )  # the list of channels, which is printed when all is loaded
             loaded = processor_seconds(server)
             until(lambda: processor_seconds(server) > loaded + 4.0, server)  # in the midst of it
-            before = processor_seconds(server)
             server.send_signal(told)
+            before = processor_seconds(server)
             _, status, used = os.wait4(server.pid, 0)
             server.returncode = os.waitstatus_to_exitcode(status)
             # Of the processors' time, whatever else they do.
@@ -108,8 +120,8 @@ def test_a_regression_that_is_ended_leaves_a_whole_log_and_no_process(told, tmp_
         regress.wait(PATIENCE)
     number = getattr(signal, f"SIG{told}")
     assert regress.returncode == 128 + number and "ended by a signal" in said.read_text()
-    state = Path(f"/proc/{child.read_text().strip()}/stat")  # at most a zombie
-    assert not state.exists() or state.read_text().rpartition(")")[2].split()[0] == "Z"
+    process = child.read_text().strip()
+    until(lambda: has_died(process), regress, ended=True)
     verified = subprocess.run([RUEDO, "verify", log], capture_output=True, text=True)
     assert verified.returncode == 0 and "the end of the run is not in it" not in verified.stdout
 

@@ -10,7 +10,7 @@ import subprocess
 
 import pytest
 import ruedo
-from recorded import ARENA, RUEDO, events, program, until, url, write
+from recorded import ARENA, PATIENCE, RUEDO, events, program, until, url, write
 from ruedo.lcmtypes import log_file_t, log_header_t
 
 WORLD = "<sdf version='1.9'><world name='w'><model name='m'><link name='l'><sensor name='imu' type='imu'/></link></model></world></sdf>"
@@ -194,7 +194,7 @@ def test_escapes_and_megabytes_of_a_request_stay_out_of_the_terminal(tmp_path):
     with said.open("w") as out, subprocess.Popen(command, stderr=out) as server:
         try:
             until(bus.exists)
-            with ruedo.connect(f"unix://{bus}") as sim:
+            with ruedo.connect(f"unix://{bus}", timeout=PATIENCE) as sim:
                 box = "<sdf version='1.9'><model name='b'><link name='l'><collision name='c'><geometry><mesh><uri>nowhere\x1b[2J\x9b\u202e</uri></mesh></geometry></collision></link></model></sdf>"
                 sim.spawn(text=box, name="b", x=2, y=2)
                 driver = sim.robot(sim.spawn("p3at", x=5, y=5))

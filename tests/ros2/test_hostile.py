@@ -373,7 +373,7 @@ def test_one_socket_has_its_share_of_participants():
 
 @pytest.mark.parametrize("speed", [math.nan, math.inf, -math.inf])
 def test_no_number_moves_nothing(speed):
-    with Run("--no-noise", "--duration", "3", "--rate", "2") as run:
+    with Run("--no-noise", "--rate", "2") as run:
         peer = Peer(run.domain)
         cmd_vel, odometry = peer.writer("/cmd_vel", Twist), peer.reader("/odom", Odometry)
         take(odometry)
@@ -384,8 +384,11 @@ def test_no_number_moves_nothing(speed):
 
 
 def test_a_reader_that_never_takes_costs_nobody_anything():
-    with Run("--rate", "max", "--duration", "20") as run:
+    with Run("--rate", "max", "--duration", "20", "--paused") as run:
         sleeper, peer = Peer(run.domain), Peer(run.domain)
         sleeper.reader("/scan", LaserScan, depth=1)
-        take(peer.reader("/scan", LaserScan), 5)
+        scans = peer.reader("/scan", LaserScan)
+        await_discovery(peer)
+        Client(run.domain, peer).call("set_simulation_state", 1)  # playing
+        take(scans, 5)
         assert run.process.wait(timeout=300) == 0

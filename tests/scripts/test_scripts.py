@@ -146,8 +146,8 @@ def test_failed_tests_are_told_again_at_the_end(tmp_path):
     (tmp_path / "CTestTestfile.cmake").write_text("""
 add_test(good "true")
 add_test(bad "sh" "-c" "seq 100; printf 'red <&]]>'; exit 3")
-add_test(late "sh" "-c" "echo begun; sleep 9")
-set_tests_properties(late PROPERTIES TIMEOUT 1)
+add_test(late "sh" "-c" "echo begun; sleep 1000")
+set_tests_properties(late PROPERTIES TIMEOUT 300 TIMEOUT_AFTER_MATCH "1;begun")
 """)
     report = tmp_path / "tests.xml"
     assert (
@@ -168,4 +168,4 @@ set_tests_properties(late PROPERTIES TIMEOUT 1)
         and output[:2] == ["42", "43"]
         and output[59] == "red <&]]>"
     )
-    assert output[60].startswith("--- late failed after 1") and output[61:] == ["begun", "---"]
+    assert output[60].startswith("--- late failed after ") and output[61:] == ["begun", "---"]
