@@ -21,20 +21,19 @@ fs::path folder_of(const fs::path& path) {
   return path.has_parent_path() ? path.parent_path() : fs::path(".");
 }
 
-// Only what a ring of that name has written: run.000001.lcm of run.lcm.
+// Only what a ring of that name has written: run.000001.lcm of run.lcm. A million files would be
+// terabytes; longer numbers are others' dates.
 void remove_numbered(const fs::path& path) {
   const std::string stem = path.stem().string(), suffix = path.extension().string();
   std::error_code error;
   std::vector<fs::path> found;
   for (const fs::directory_entry& entry : fs::directory_iterator(folder_of(path), error)) {
     const std::string name = entry.path().filename().string();
-    if (name.size() < stem.size() + suffix.size() + 7 || !name.starts_with(stem + ".") ||
+    if (name.size() != stem.size() + suffix.size() + 7 || !name.starts_with(stem + ".") ||
         !name.ends_with(suffix))
       continue;
-    const std::string number =
-        name.substr(stem.size() + 1, name.size() - stem.size() - suffix.size() - 1);
-    if (number.find_first_not_of("0123456789") == std::string::npos && number.size() >= 6)
-      found.push_back(entry.path());
+    const std::string number = name.substr(stem.size() + 1, 6);
+    if (number.find_first_not_of("0123456789") == std::string::npos) found.push_back(entry.path());
   }
   for (const fs::path& old : found) fs::remove(old, error);
 }

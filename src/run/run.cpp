@@ -60,8 +60,6 @@ Run::Run(std::shared_ptr<const model::WorldModel> world, RunOptions options, Bus
       control_(run_id_, control_host()),
       stall_watch_({.tell = [this](const std::string& reason) { on_stall_(reason); },
                     .takes_none = [this] { return takes_no_messages(); }}) {
-  if (!options_.record.empty())
-    log_ = std::make_unique<LogSink>(options_.record, options_.record_limit);
   if (!options_.snapshots.empty()) journal_ = std::make_unique<Journal>(options_.snapshots);
   if (options_.edited || !options_.save.empty())
     edited_ = std::make_unique<EditedWorld>(*first_world_, options_.save);
@@ -73,6 +71,9 @@ Run::Run(std::shared_ptr<const model::WorldModel> world, RunOptions options, Bus
   }
   make_world();
   channels_.check_remaps();
+  // Last: what is refused leaves the log of an earlier run as it is.
+  if (!options_.record.empty())
+    log_ = std::make_unique<LogSink>(options_.record, options_.record_limit);
   add_sinks();
   if (publisher_.has_recorders() || repeating_) {
     header_ =

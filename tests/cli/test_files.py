@@ -184,3 +184,22 @@ def test_a_thousand_robots_load_at_once(tmp_path):
     assert process.returncode == 0
     assert used.ru_utime + used.ru_stime < 3.0  # s
     assert used.ru_maxrss < 1_000_000  # kB
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        ("--set", "p3at/lrf.update_rate=abc"),
+        ("--remap", "a=b"),
+        ("--wait-for", "nosuch@10"),
+        ("--restore", ARENA),
+    ],
+)
+@pytest.mark.parametrize("ring", [(), ("--record-limit", "16MB")])
+def test_a_run_that_is_refused_leaves_the_log_of_an_earlier_one(wrong, ring, tmp_path):
+    log, numbered = tmp_path / "run.lcm", tmp_path / "run.000007.lcm"
+    for file in (log, numbered):
+        file.write_text("kept")
+    refused = ruedo("run", ARENA, "--lcm", "memq://", "--record", log, *ring, *wrong)
+    assert refused.returncode in (2, 3), refused
+    assert log.read_text() == numbered.read_text() == "kept"

@@ -154,12 +154,13 @@ TEST_F(RingTest, WhatChangedTheWorldMayBeAnything) {
 }
 
 TEST_F(RingTest, ReplacesTheFilesOfAnEarlierRunAndNoOthers) {
-  for (const char* name : {"run.000007.lcm", "run.1.lcm", "run.000007.txt", "runs.000001.lcm"})
+  for (const char* name :
+       {"run.000007.lcm", "run.1.lcm", "run.000007.txt", "runs.000001.lcm", "run.20261127.lcm"})
     std::ofstream(path(name)) << "old";
   Ring ring(path("run.lcm"), kLimit);
   write_steps(ring, 0, 1);
   EXPECT_THAT(numbered(), testing::ElementsAre("run.000001.lcm", "run.000007.txt", "run.1.lcm",
-                                               "runs.000001.lcm"));
+                                               "run.20261127.lcm", "runs.000001.lcm"));
 }
 
 TEST_F(RingTest, TheRunIsRepeatedFromWhatActed) {
