@@ -50,8 +50,10 @@ std::string what_is_odd(const std::string& value) {
 
 bool same_file(const std::string& a, const std::string& b) {
   std::error_code error;
-  return fs::is_regular_file(a, error) ? fs::equivalent(a, b, error)
-                                       : !fs::exists(a, error) && a == b;
+  if (fs::is_regular_file(a, error)) return fs::equivalent(a, b, error);
+  if (fs::exists(a, error)) return false;                 // a device
+  const fs::path to_be = fs::weakly_canonical(a, error);  // however the two are written
+  return !error && to_be == fs::weakly_canonical(b, error);
 }
 
 }  // namespace

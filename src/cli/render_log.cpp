@@ -261,8 +261,8 @@ int render_video(const VideoArguments& arguments) {
   if (!worlds.fault().empty()) to_stderr("ruedo: {}: {}\n", arguments.log, worlds.fault());
   States states(index, arguments.log);
   DrawnMarkers drawn(index, arguments.log);
-  const run::LogWorlds::Scene* shown = nullptr;
-  std::unique_ptr<Scene> scene;
+  const run::LogWorlds::Scene* shown = &worlds.at(from);
+  auto scene = std::make_unique<Scene>(shown->world, arguments, size);
   Video video(arguments.video, {size.width, size.height}, arguments.fps);
   Progress progress("drawing " + arguments.log, frames);
   for (int frame = 0; frame < frames; ++frame) {

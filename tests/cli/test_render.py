@@ -290,6 +290,8 @@ def test_says_what_is_wrong(arguments, code, words):
     ],
 )
 def test_says_what_is_wrong_with_a_video(log, tmp_path, arguments, code, words):
+    earlier = tmp_path / "x.mp4"
+    earlier.write_bytes(b"an earlier video")
     result = subprocess.run(
         [RUEDO, "render", log, "--video", *arguments],
         capture_output=True,
@@ -299,3 +301,4 @@ def test_says_what_is_wrong_with_a_video(log, tmp_path, arguments, code, words):
     )
     assert result.returncode == code, result.stderr
     assert words in result.stderr.splitlines()[0], result.stderr
+    assert earlier.read_bytes() == b"an earlier video"
