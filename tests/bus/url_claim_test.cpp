@@ -1,8 +1,10 @@
 // One server per address: claims, and servers that share an address in spite of them.
 #include "bus/url_claim.h"
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 #include <sys/wait.h>
+#include <unistd.h>
 
 #include "bus/rival_watch.h"
 #include "ruedo/errors.h"
@@ -11,7 +13,10 @@
 namespace ruedo::bus {
 namespace {
 
-const LcmUrl kUrl = parse_url("udpm://239.255.77.1:21907");
+// Tests run beside each other, each in a process: an address for each.
+const std::string kAddress =
+    fmt::format("239.255.{}.{}:21907", getpid() / 256 % 256, getpid() % 256);
+const LcmUrl kUrl = parse_url("udpm://" + kAddress);
 
 TEST(UrlClaim, TheSecondHearsOfTheFirst) {
   EXPECT_EQ(claimed_by(kUrl), "");
@@ -22,7 +27,7 @@ TEST(UrlClaim, TheSecondHearsOfTheFirst) {
     FAIL();
   } catch (const EnvironmentError& error) {
     const std::string text = error.what();
-    for (const char* word : {"239.255.77.1:21907", "pid 1", "hall", "run 77", "--lcm auto"}) {
+    for (const char* word : {kAddress.c_str(), "pid 1", "hall", "run 77", "--lcm auto"}) {
       EXPECT_NE(text.find(word), std::string::npos) << text;
     }
   }
