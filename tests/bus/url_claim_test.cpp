@@ -1,6 +1,8 @@
 // One server per address: claims, and servers that share an address in spite of them.
 #include "bus/url_claim.h"
 
+#include <string>
+
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 #include <sys/wait.h>
