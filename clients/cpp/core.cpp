@@ -24,6 +24,16 @@ constexpr int64_t kMostAhead = 1'000'000;     // us: ticks come ten times a seco
 constexpr double kSilence =
     5.0;  // s of real time without any message: a server gives a sign of life each second
 
+// Where a client that joins at that time begins to number its primitives: apart from others', and
+// from those of its own that an earlier start of the program has left under way. Equal runs in
+// lockstep have equal numbers, since their logs are compared.
+int64_t ids_from(const std::string& name, int64_t utime) {
+  uint32_t hash = 2166136261u;  // FNV-1a
+  for (unsigned char c : name) hash = (hash ^ c) * 16777619u;
+  hash += static_cast<uint32_t>(utime);
+  return static_cast<int64_t>(hash & 0x7fffffffu) << 20;
+}
+
 }  // namespace
 
 Clock::time_point deadline_after(Duration time) {
@@ -47,11 +57,7 @@ Core::Core(const std::string& url, const std::string& name, std::unique_ptr<Serv
       last_sign_(Clock::now().time_since_epoch().count()),
       session_(*this, name),
       stepper_(*this),
-      bus_(transport ? std::move(transport) : open_transport(url)) {
-  uint32_t hash = 2166136261u;  // FNV-1a of the name: two clients number their primitives apart
-  for (unsigned char c : name) hash = (hash ^ c) * 16777619u;
-  ids_ = static_cast<int64_t>(hash & 0x7fffffffu) << 20;
-}
+      bus_(transport ? std::move(transport) : open_transport(url)) {}
 
 Core::~Core() { close(); }
 
@@ -89,6 +95,7 @@ void Core::join(Duration timeout) {
     ask_info();
     news_.wait_for(lock, std::chrono::milliseconds(100));
   }
+  ids_ = ids_from(session_.name(), known_->utime);
 }
 
 void Core::close() {

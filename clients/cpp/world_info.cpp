@@ -74,9 +74,8 @@ BodyInfo read_body(WireReader& in) {
   return body;
 }
 
-// The head of every part is the same.
+// What follows the fingerprint and utime. The head of every part is the same.
 void read_part(WireReader& in, WorldInfo& info) {
-  in.int64();  // utime: only the message as it came has it
   info.run_id = in.int64();
   info.epoch = in.int32();
   in.int16();  // part
@@ -155,9 +154,7 @@ std::shared_ptr<const WorldInfo> WorldInfoAssembler::add(const uint8_t* bytes, s
   info->utime = utime;
   try {
     for (const auto& [index, content] : parts_) {
-      std::vector<uint8_t> whole(8, 0);  // instead of utime
-      whole.insert(whole.end(), content.begin(), content.end());
-      WireReader in(whole.data(), whole.size());
+      WireReader in(content.data(), content.size());
       read_part(in, *info);
     }
   } catch (const WireError& error) {

@@ -115,6 +115,14 @@ def test_primitives(language, server):
     assert said.one("too_long").startswith("Timeout: p3at: advance was not done within 0.3 s (")
 
 
+def test_primitives_of_two_clients_are_told_apart(language, server):
+    """Of two in a process, and of a program that is started again under its name."""
+    said = probe(language, server.url, "apart", "p3at")
+    for who in "unnamed", "driver":
+        assert said.one(who) == "none"
+        assert said.one(f"first_{who}").startswith("MotionError: p3at: advance ended: replaced, ")
+
+
 def test_collisions_need_no_bumper(language):
     """20 m ahead the wall stands in the way, at 6 m: its name is in what is raised."""
     with ruedo_run("--rate", "8", "--disable", "p3at/camera", world=HALL) as server:

@@ -210,6 +210,17 @@ def test_who_waits_in_lockstep_is_told_that_steps_are_wanted():
             robot.lrf.next(timeout=0.2)
 
 
+def test_equal_runs_in_lockstep_number_their_primitives_alike():
+    """Their logs have these numbers."""
+    ids = []
+    for _ in range(2):
+        with ruedo.launch(HALL, lockstep=1, **QUICK) as sim:
+            sim.step(10)
+            with ruedo.connect(sim.url, name="guest") as guest:
+                ids.append((sim.robot("p3at").stop().id, guest.robot("p3at").stop().id))
+    assert ids[0] == ids[1] and ids[0][0] != ids[0][1]
+
+
 @pytest.mark.parametrize("options", [{"lockstep": 1}, {"url": "auto"}])
 def test_a_closed_simulation_leaves_nothing_open(options):
     """No file and no socket is left to the garbage collector, which pytest and `python -X dev`

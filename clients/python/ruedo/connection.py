@@ -87,7 +87,7 @@ class Connection:
         self._looking = threading.Lock()
         self._look_at = 0.0  # for the server, again, s of time.monotonic()
         self._there = False  # as it was then
-        self._ids = _name_hash(name) << 20  # two clients number their primitives apart
+        self._ids = 0  # of the newest primitive
         self._new_run = Callbacks("a new run")
         self._closing = threading.Lock()  # whoever has it closes
         self._ended = threading.Event()  # all that close() ends
@@ -102,6 +102,7 @@ class Connection:
         self.bus.subscribe("ruedo/reply", self.session.receive)
         self.bus.start()
         self._await_info(timeout)
+        self._ids = _ids_from(self.session.name, self.info.utime)
 
     def close(self) -> None:
         """Repeated commands end, and so does a private server. A second call waits for that, and so
@@ -396,9 +397,12 @@ if hasattr(os, "register_at_fork"):
     os.register_at_fork(after_in_child=_after_fork)
 
 
-def _name_hash(name: str) -> int:
-    """31 bits of FNV-1a."""
-    value = 2166136261
-    for byte in name.encode():
+def _ids_from(name: bytes, utime: int) -> int:
+    """Where a client that joins at that time begins to number its primitives: apart from others',
+    and from those of its own that an earlier start of the program has left under way. Equal runs in
+    lockstep have equal numbers, since their logs are compared.
+    """
+    value = 2166136261  # FNV-1a
+    for byte in name:
         value = (value ^ byte) * 16777619 & 0xFFFFFFFF
-    return value & 0x7FFFFFFF
+    return (value + utime & 0x7FFFFFFF) << 20

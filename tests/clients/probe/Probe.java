@@ -490,6 +490,24 @@ public final class Probe {
         attempt("mismatch", () -> log.samples("p3at/pose", Scan.class));
     }
 
+    /** What another client of this process, or of the same name, has under way is not its own. */
+    private static void apart(String url, String name) throws InterruptedException {
+        for (String what : List.of("unnamed", "driver")) {
+            try (Simulation first = joined(url, what)) {
+                Motion running = first.robot(name).advance(5.0, new Limits(0.05, 0.0, 0.0));
+                while (running.progress() == 0.0) Thread.sleep(10);
+                try (Simulation second = joined(url, what)) {
+                    attempt(what, () -> second.robot(name).advance(0.1).await(PATIENCE));
+                    attempt("first_" + what, () -> running.await(PATIENCE));
+                }
+            }
+        }
+    }
+
+    private static Simulation joined(String url, String what) {
+        return what.equals("unnamed") ? Ruedo.connect(url) : Ruedo.connect(url, what, 60.0);
+    }
+
     private static void act(String url, String command, String[] a) throws InterruptedException {
         if (command.equals("launch")) launched(a);
         if (command.equals("launch_with")) {
@@ -498,6 +516,10 @@ public final class Probe {
         }
         if (command.equals("log")) {
             readLog(a);
+            return;
+        }
+        if (command.equals("apart")) {
+            apart(url, a[0]);
             return;
         }
         boolean named = List.of("lockstep", "visited", "watches", "leaves").contains(command);

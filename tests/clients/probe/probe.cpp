@@ -467,10 +467,24 @@ void leaves(rc::Simulation& sim, const std::vector<std::string>& a) {
   }
 }
 
+// What another client of this process, or of the same name, has under way is not its own.
+void apart(const std::string& url, const std::string& name) {
+  for (const std::string own : {"", "driver"}) {
+    const std::string what = own.empty() ? "unnamed" : own;
+    const rc::Simulation first = rc::connect(url, {.name = own});
+    const rc::Motion running = first.robot(name).advance(5.0, {.speed = 0.05});
+    while (running.progress() == 0.0) std::this_thread::sleep_for(std::chrono::milliseconds(10));
+    const rc::Simulation second = rc::connect(url, {.name = own});
+    report(what, [&] { second.robot(name).advance(0.1).wait(kPatience); });
+    report("first_" + what, [&] { running.wait(kPatience); });
+  }
+}
+
 void act(const std::string& url, const std::string& command, const std::vector<std::string>& a) {
   if (command == "launch") launched(a);
   if (command == "launch_with") return launched_with(a[0], a.size() > 1 ? a[1] : "");
   if (command == "log") return read_log(a);
+  if (command == "apart") return apart(url, a[0]);
   const bool named =
       command == "lockstep" || command == "visited" || command == "watches" || command == "leaves";
   rc::Simulation sim =

@@ -379,9 +379,28 @@ def read_log(path):
     say("poses", len(poses), poses["utime"].iloc[-1], poses["pos"].iloc[-1][0])
 
 
+def apart(url, name):
+    """What another client of this process, or of the same name, has under way is not its own."""
+
+    def advance(own, robot):
+        running = robot.advance(5.0, speed=0.05)
+        while running.progress == 0.0:
+            time.sleep(0.01)
+        with ruedo.connect(url, name=own) as second:
+            attempt(own or "unnamed", second.robot(name).advance(0.1).wait)
+        attempt(f"first_{own or 'unnamed'}", running.wait)
+
+    for own in (None, "driver"):
+        with ruedo.connect(url, name=own) as first:
+            advance(own, first.robot(name))
+
+
 def main():
     url, command, *rest = sys.argv[1:]
     try:
+        if command == "apart":
+            apart(url, *rest)
+            return
         if command in ("launch_with", "log"):
             {"launch_with": launched_with, "log": read_log}[command](*rest)
             return

@@ -14,6 +14,7 @@ import ruedo.lcmtypes.step_request_t;
 import ruedo.lcmtypes.tick_t;
 
 import java.io.IOException;
+import java.nio.charset.StandardCharsets;
 import java.util.ArrayList;
 import java.util.HashMap;
 import java.util.List;
@@ -54,7 +55,7 @@ public final class Simulation implements AutoCloseable {
     private final Map<String, Driver> drivers = new HashMap<>(); // by robot
     private final Set<Driver> repeating = ConcurrentHashMap.newKeySet();
     private final Set<Subscription> newRun = ConcurrentHashMap.newKeySet();
-    private final AtomicLong ids;
+    private final AtomicLong ids; // the newest primitive's
     private final Object news = new Object(); // a user may hold the monitor of this object itself
     private WorldInfo known; // these under news
     private RuedoException fault; // of an info that cannot be read
@@ -84,10 +85,6 @@ public final class Simulation implements AutoCloseable {
         this.address = address;
         url = address.url;
         this.server = server;
-        int hash = 0x811c9dc5; // FNV-1a of the name: two clients number their primitives apart
-        for (byte b : name.getBytes(java.nio.charset.StandardCharsets.UTF_8))
-            hash = (hash ^ (b & 255)) * 16777619;
-        ids = new AtomicLong((long) (hash & 0x7fffffff) << 20);
         session = new Session(this, name);
         stepper = new Stepper(this, session);
         bus = new Bus(transport == null ? Transport.open(address) : transport);
@@ -101,6 +98,18 @@ public final class Simulation implements AutoCloseable {
             bus.close();
             throw error;
         }
+        ids = new AtomicLong(idsFrom(name, info().head.utime));
+    }
+
+    /**
+     * Where a client that joins at that time begins to number its primitives: apart from others',
+     * and from those of its own that an earlier start of the program has left under way. Equal runs
+     * in lockstep have equal numbers, since their logs are compared.
+     */
+    private static long idsFrom(String name, long utime) {
+        int hash = 0x811c9dc5; // FNV-1a
+        for (byte b : name.getBytes(StandardCharsets.UTF_8)) hash = (hash ^ (b & 255)) * 16777619;
+        return (hash + utime & 0x7fffffff) << 20;
     }
 
     // What there is.
