@@ -20,22 +20,6 @@ constexpr auto kLook = std::chrono::milliseconds(20);  // interval of checks who
 
 std::string key(const Topic& topic) { return topic.name + " " + topic.type; }
 
-// What there is: not the time, nor whether the run is paused. After a reset (another epoch) there
-// may be other models of the same names.
-bool is_same(const std::vector<world_info_t>& a, const std::vector<world_info_t>& b) {
-  const auto what_there_is = [](const std::vector<world_info_t>& info) {
-    std::vector<std::vector<uint8_t>> all;
-    for (world_info_t part : info) {
-      part.utime = 0;
-      part.paused = false;
-      all.emplace_back(static_cast<size_t>(part.getEncodedSize()));
-      part.encode(all.back().data(), 0, static_cast<int>(all.back().size()));
-    }
-    return all;
-  };
-  return what_there_is(a) == what_there_is(b);
-}
-
 std::string channel_of(const std::vector<world_info_t>& info, const std::string& type) {
   for (const world_info_t& part : info) {
     for (const channel_info_t& channel : part.channels) {
@@ -112,14 +96,16 @@ void Node::look_for_readers() {
   }
 }
 
-// The first pictures are drawn, until the first check.
+// The first pictures of a channel are drawn, until the first check.
 void Node::add_pictures(const std::vector<world_info_t>& info) {
   const std::lock_guard lock(pictures_mutex_);
-  pictures_.clear();
+  const std::map<std::string, bool> before = std::exchange(pictures_, {});
   for (const world_info_t& part : info) {
     for (const channel_info_t& channel : part.channels) {
-      if (channel.type == image_t::getTypeName() || channel.type == camera_info_t::getTypeName())
-        pictures_[channel.name] = true;
+      if (channel.type != image_t::getTypeName() && channel.type != camera_info_t::getTypeName())
+        continue;
+      const auto known = before.find(channel.name);
+      pictures_[channel.name] = known == before.end() || known->second;
     }
   }
   ++audience_;
@@ -127,7 +113,8 @@ void Node::add_pictures(const std::vector<world_info_t>& info) {
 
 void Node::announce(const std::shared_ptr<const run::Announcement>& announcement) {
   next_clock_us_ = 0;  // sim time may have been reset
-  if (!is_same(announcement->info, info_)) take_over(announcement->info);
+  // A robot of the same name and devices may be another one.
+  take_over(announcement->info);
 }
 
 // Before measurements of that time.
@@ -158,7 +145,6 @@ void Node::send(Writer& writer, std::span<const uint8_t> cdr) {
 }
 
 void Node::take_over(const std::vector<world_info_t>& info) {
-  info_ = info;
   requests_.listen(channel_of(info, request_t::getTypeName()));
   reply_channel_ = channel_of(info, reply_t::getTypeName());
   services_->update(info);
@@ -181,49 +167,43 @@ void Node::take_over(const std::vector<world_info_t>& info) {
   tell_graph();
 }
 
-// The description of a removed robot is withdrawn.
+// What changed is written. The description of a removed robot is withdrawn.
 void Node::tell_standing() {
-  std::map<std::string, std::unique_ptr<Writer>> writers;
+  std::map<std::string, Standing> told;
   for (const Conversions::Standing& each : conversions_->standing()) {
-    const auto known = standing_.find(key(each.topic));
-    auto& writer = writers[key(each.topic)];
-    writer = known != standing_.end() ? std::move(known->second)
-                                      : transport_->add_writer(endpoint(each.topic));
-    writer->write(each.cdr);
+    Standing& now = told[key(each.topic)];
+    if (const auto known = standing_.find(key(each.topic)); known != standing_.end())
+      now = std::move(known->second);
+    else
+      now.writer = transport_->add_writer(endpoint(each.topic));
+    if (now.cdr == each.cdr) continue;
+    now.cdr = each.cdr;
+    now.writer->write(now.cdr);
   }
-  standing_ = std::move(writers);
+  standing_ = std::move(told);
 }
 
+// The run itself refuses commands to a removed robot.
 void Node::add_commands(const std::vector<world_info_t>& info) {
-  std::map<std::string, std::shared_ptr<const Command>> commands;
   for (Command& command : commands_of(info, options_.joints, names_)) {
     const std::string name = key(command.topic);
-    commands.try_emplace(name, std::make_shared<const Command>(std::move(command)));
+    const auto [at, fresh] = commands_.try_emplace(name, std::move(command));
+    if (!fresh) continue;
+    readers_[name] = transport_->add_reader(
+        endpoint(at->second.topic),
+        [this, added = &at->second](const Sample& sample) { receive(*added, sample.cdr); });
   }
-  std::map<std::string, Placing> placings;
   for (const world_info_t& part : info) {
     for (const robot_info_t& robot : part.robots) {
       const Topic topic{names_.topic(robot.name, "initialpose"),
                         "geometry_msgs/msg/PoseWithCovarianceStamped", kCommandQos};
-      placings.try_emplace(key(topic), Placing{topic, robot.name});
+      if (!poses_.try_emplace(key(topic), topic).second) continue;
+      readers_[key(topic)] = transport_->add_reader(
+          endpoint(topic), [this, name = robot.name, topic](const Sample& sample) {
+            receive_pose(name, topic.name, sample);
+          });
     }
   }
-  {
-    const std::lock_guard lock(inputs_mutex_);
-    commands_ = std::move(commands);
-    placings_ = std::move(placings);
-  }
-  std::erase_if(readers_, [this](const auto& each) {
-    return !commands_.contains(each.first) && !placings_.contains(each.first);
-  });
-  const auto read = [this](const std::string& name, const Topic& topic, auto receive) {
-    if (readers_.contains(name)) return;
-    readers_[name] = transport_->add_reader(
-        endpoint(topic),
-        [this, name, receive](const Sample& sample) { (this->*receive)(name, sample); });
-  };
-  for (const auto& [name, command] : commands_) read(name, command->topic, &Node::receive);
-  for (const auto& [name, placing] : placings_) read(name, placing.topic, &Node::receive_pose);
 }
 
 void Node::tell_graph() {
@@ -244,46 +224,34 @@ void Node::tell_graph() {
   for (const Writer* writer : services_->writers()) put_gid(writer->gid());
   put_gid(clock_->gid());
   put_gid(drawn_->writer().gid());
-  for (const auto& [name, writer] : standing_) put_gid(writer->gid());
+  for (const auto& [name, standing] : standing_) put_gid(standing.writer->gid());
   graph_->write(out.bytes());
 }
 
-void Node::receive(const std::string& topic, const Sample& sample) {
+void Node::receive(const Command& command, std::span<const uint8_t> cdr) {
   ++received_;
   if (!injecting_) return;
-  std::shared_ptr<const Command> command;
-  {
-    const std::lock_guard lock(inputs_mutex_);
-    if (const auto known = commands_.find(topic); known != commands_.end()) command = known->second;
-  }
-  if (!command) return;  // its robot was removed
-  if (const auto bytes = command->convert(sample.cdr)) return inject_(command->channel, *bytes);
-  count_faulty(command->topic.name, command->topic.type, sample.cdr.size());
+  if (const auto bytes = command.convert(cdr)) return inject_(command.channel, *bytes);
+  count_faulty(command.topic.name, command.topic.type, cdr.size());
 }
 
 // The robot is placed where the message says: the map frame is the world.
-void Node::receive_pose(const std::string& topic, const Sample& sample) {
+void Node::receive_pose(const std::string& robot, const std::string& topic, const Sample& sample) {
   ++received_;
   if (!injecting_) return;
-  Placing placing;
-  {
-    const std::lock_guard lock(inputs_mutex_);
-    if (const auto known = placings_.find(topic); known != placings_.end()) placing = known->second;
-  }
-  if (placing.robot.empty()) return;  // it was removed
   CdrReader in(sample.cdr);
   in.skip<uint32_t>(2);
   const std::string frame = in.get_text();
   set_pose_request_t pose;
-  pose.name = placing.robot;
+  pose.name = robot;
   for (double& x : pose.position) x = in.get<double>();
   for (const size_t i : {1, 2, 3, 0}) pose.orientation[i] = in.get<double>();
   if (!in.good() || !(frame.empty() || frame == "map" || frame == "world"))
-    return count_faulty(placing.topic.name, "pose in the frame map", sample.cdr.size());
+    return count_faulty(topic, "pose in the frame map", sample.cdr.size());
   std::vector<uint8_t> body(static_cast<size_t>(pose.getEncodedSize()));
   pose.encode(body.data(), 0, static_cast<int>(body.size()));
   requests_.ask(sample.sender, request_t::SET_POSE, std::move(body),
-                [this, topic = placing.topic.name](const reply_t& reply) {
+                [this, topic](const reply_t& reply) {
                   if (reply.code != reply_t::OK && may_warn())
                     spdlog::warn("ROS 2: {}: {}", topic, reply.text);
                 });
@@ -311,7 +279,7 @@ bool Node::is_read() const {
 
 bool Node::is_written(const std::string& topic) const {
   return std::any_of(commands_.begin(), commands_.end(), [&](const auto& each) {
-    return each.second->topic.name == topic && readers_.at(each.first)->writers() > 0;
+    return each.second.topic.name == topic && readers_.at(each.first)->writers() > 0;
   });
 }
 
@@ -332,8 +300,8 @@ std::vector<Topic> Node::outputs() const {
 
 std::vector<Topic> Node::inputs() const {
   std::vector<Topic> topics;
-  for (const auto& [name, command] : commands_) topics.push_back(command->topic);
-  for (const auto& [name, placing] : placings_) topics.push_back(placing.topic);
+  for (const auto& [name, command] : commands_) topics.push_back(command.topic);
+  for (const auto& [name, topic] : poses_) topics.push_back(topic);
   return topics;
 }
 

@@ -72,7 +72,7 @@ class Node : public run::Sink {
   std::vector<Topic> services() const { return services_->list(); }
 
  private:
-  void take_over(const std::vector<world_info_t>& info);  // for robots that have joined or left
+  void take_over(const std::vector<world_info_t>& info);  // what there is from now on
   void add_pictures(const std::vector<world_info_t>& info);
   void look_for_readers();  // of pictures
   void add_commands(const std::vector<world_info_t>& info);
@@ -98,13 +98,16 @@ class Node : public run::Sink {
   Topic clock_topic_, drawn_topic_;
   std::unique_ptr<Writer> clock_, graph_;
   std::unique_ptr<DrawnTopic> drawn_;
-  int64_t time_us_ = 0;                                      // sim time
-  std::map<std::string, std::unique_ptr<Writer>> standing_;  // by name and type
+  int64_t time_us_ = 0;  // sim time
+  struct Standing {
+    std::unique_ptr<Writer> writer;
+    std::vector<uint8_t> cdr;  // the newest
+  };
+  std::map<std::string, Standing> standing_;  // by name and type
   std::map<std::string, std::unique_ptr<Reader>> readers_;
   Requests requests_;
   std::unique_ptr<Services> services_;
   std::string reply_channel_;
-  std::vector<world_info_t> info_;
   int64_t clock_period_us_, next_clock_us_ = 0;
   Requests::Clock::time_point next_look_;
 

@@ -357,21 +357,21 @@ void Services::spawn_entity(const CallPointer& call) {
     return refuse(kNameInvalid, "the name is empty, and allow_renaming is false");
   {
     const std::lock_guard lock(mutex_);
-    const auto taken = [&](const std::string& name) {
-      return std::any_of(entities_.begin(), entities_.end(),
-                         [&](const Entity& entity) { return entity.name == name; });
-    };
-    if (taken(body.name) && !renames)
+    if (is_entity(body.name) && !renames)
       return refuse(kNameNotUnique, "there is a '" + body.name + "' already");
-    const std::string wanted = body.name;
-    for (int i = 2; taken(body.name); ++i) body.name = wanted + "_" + std::to_string(i);
+    if (renames && !body.name.empty()) body.name = free_name(body.name);
+    spawning_.insert(body.name);
   }
   body.model = uri;
   body.text = uri.empty() ? text : "";
   body.on_ground = false;
   std::copy(std::begin(placed.position), std::end(placed.position), body.position);
   std::copy(std::begin(placed.orientation), std::end(placed.orientation), body.orientation);
-  requests_.ask(call->client(), request_t::SPAWN, encoded(body), [call](const reply_t& reply) {
+  const auto answer = [this, call, asked = body.name](const reply_t& reply) {
+    {
+      const std::lock_guard lock(mutex_);
+      spawning_.erase(spawning_.find(asked));
+    }
     state_reply_t state{};
     const bool named =
         reply.code == reply_t::OK &&
@@ -380,7 +380,20 @@ void Services::spawn_entity(const CallPointer& call) {
     put_result(out, request_t::SPAWN, reply);
     out.put(named ? state.name : std::string());
     call->send(out);
-  });
+  };
+  requests_.ask(call->client(), request_t::SPAWN, encoded(body), answer);
+}
+
+bool Services::is_entity(const std::string& name) const {
+  return std::any_of(entities_.begin(), entities_.end(),
+                     [&](const Entity& entity) { return entity.name == name; });
+}
+
+std::string Services::free_name(const std::string& wanted) const {
+  std::string name = wanted;
+  for (int i = 2; is_entity(name) || spawning_.contains(name); ++i)
+    name = wanted + "_" + std::to_string(i);
+  return name;
 }
 
 void Services::delete_entity(const CallPointer& call) {

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <memory>
 #include <mutex>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -44,6 +45,9 @@ class Services {
   void get_entity_state(const CallPointer& call);
   void set_entity_state(const CallPointer& call);
 
+  bool is_entity(const std::string& name) const;  // under the mutex
+  std::string free_name(const std::string& wanted) const;
+
   uint8_t state_of(bool paused) const { return !paused ? kPlaying : stopped_ ? kStopped : kPaused; }
 
   static constexpr uint8_t kStopped = 0, kPlaying = 1, kPaused = 2, kQuitting = 3;
@@ -60,6 +64,7 @@ class Services {
   };
   std::mutex mutex_;  // of what follows
   std::vector<Entity> entities_;
+  std::multiset<std::string> spawning_;  // the names that the run was asked for
 };
 
 }  // namespace ruedo::ros2

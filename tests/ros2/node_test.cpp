@@ -3,14 +3,13 @@
 
 #include <map>
 #include <memory>
+#include <set>
 #include <string>
 #include <vector>
 
 #include <gtest/gtest.h>
 
-#include "ros2/cdr.h"
 #include "ruedo/camera_info_t.hpp"
-#include "ruedo/decode.h"
 #include "ruedo/image_t.hpp"
 #include "ruedo/joint_command_t.hpp"
 #include "ruedo/planar_lidar_t.hpp"
@@ -18,40 +17,56 @@
 namespace ruedo::ros2 {
 namespace {
 
-using Readers = std::map<std::string, size_t>;               // of a topic
-using Handlers = std::map<std::string, Transport::Handler>;  // likewise
+// What the test and the transport share.
+struct Middleware {
+  std::map<std::string, size_t> readers;                    // of a topic, elsewhere
+  std::map<std::string, std::vector<std::string>> written;  // by topic
+  std::multimap<std::string, Transport::Handler> read;      // by topic
+  std::multiset<std::string> ends;                          // the topics of the node's own
+};
 
 class FakeWriter : public Writer {
  public:
-  FakeWriter(std::string topic, std::shared_ptr<Readers> readers)
-      : topic_(std::move(topic)), readers_(std::move(readers)) {}
-  bool write(std::span<const uint8_t>) override { return true; }
+  FakeWriter(std::string topic, std::shared_ptr<Middleware> shared)
+      : topic_(std::move(topic)), shared_(std::move(shared)) {
+    shared_->ends.insert(topic_);
+  }
+  ~FakeWriter() override { shared_->ends.erase(shared_->ends.find(topic_)); }
+  bool write(std::span<const uint8_t> cdr) override {
+    shared_->written[topic_].emplace_back(cdr.begin(), cdr.end());
+    return true;
+  }
   bool reply(std::span<const uint8_t>, const SampleIdentity&) override { return true; }
-  size_t readers() const override { return (*readers_)[topic_]; }
+  size_t readers() const override { return shared_->readers[topic_]; }
   Gid gid() const override { return {}; }
 
  private:
   std::string topic_;
-  std::shared_ptr<Readers> readers_;
+  std::shared_ptr<Middleware> shared_;
 };
 
 class FakeReader : public Reader {
  public:
+  FakeReader(const std::string& topic, Transport::Handler handler,
+             std::shared_ptr<Middleware> shared)
+      : shared_(std::move(shared)), at_(shared_->read.emplace(topic, std::move(handler))) {}
+  ~FakeReader() override { shared_->read.erase(at_); }
   size_t writers() const override { return 0; }
   Gid gid() const override { return {}; }
+
+ private:
+  std::shared_ptr<Middleware> shared_;
+  std::multimap<std::string, Transport::Handler>::iterator at_;
 };
 
 class FakeTransport : public Transport {
  public:
-  explicit FakeTransport(std::shared_ptr<Readers> readers,
-                         std::shared_ptr<Handlers> handlers = std::make_shared<Handlers>())
-      : readers_(std::move(readers)), handlers_(std::move(handlers)) {}
+  explicit FakeTransport(std::shared_ptr<Middleware> shared) : shared_(std::move(shared)) {}
   std::unique_ptr<Writer> add_writer(const Endpoint& endpoint) override {
-    return std::make_unique<FakeWriter>(endpoint.topic.name, readers_);
+    return std::make_unique<FakeWriter>(endpoint.topic.name, shared_);
   }
   std::unique_ptr<Reader> add_reader(const Endpoint& endpoint, Handler handler) override {
-    (*handlers_)[endpoint.topic.name] = std::move(handler);
-    return std::make_unique<FakeReader>();
+    return std::make_unique<FakeReader>(endpoint.topic.name, std::move(handler), shared_);
   }
   void start() override {}
   void stop() override {}
@@ -60,8 +75,7 @@ class FakeTransport : public Transport {
   uint64_t refused() const override { return 0; }
 
  private:
-  std::shared_ptr<Readers> readers_;
-  std::shared_ptr<Handlers> handlers_;
+  std::shared_ptr<Middleware> shared_;
 };
 
 template <class Message>
@@ -95,9 +109,26 @@ world_info_t robot_with_a_camera() {
   return info;
 }
 
+world_info_t arm(const std::string& name) {
+  world_info_t info{};
+  info.robots.resize(1);
+  info.robots[0].name = name;
+  info.channels.push_back(channel<joint_command_t>(name + "/joint_command", ""));
+  info.channels[0].robot = name;
+  info.channels[0].input = true;
+  info.nrobots = info.nchannels = 1;
+  return info;
+}
+
+std::shared_ptr<const run::Announcement> announcement(std::vector<world_info_t> info) {
+  auto announcement = std::make_shared<run::Announcement>();
+  announcement->info = std::move(info);
+  return announcement;
+}
+
 TEST(Node, WantsPicturesThatSomebodyReads) {
-  const auto readers = std::make_shared<Readers>();
-  Node node({}, std::make_unique<FakeTransport>(readers), {robot_with_a_camera()},
+  const auto shared = std::make_shared<Middleware>();
+  Node node({}, std::make_unique<FakeTransport>(shared), {robot_with_a_camera()},
             [](const std::string&, std::span<const uint8_t>) {});
   node.flush();
   EXPECT_FALSE(node.wants("p3at/camera"));
@@ -105,71 +136,34 @@ TEST(Node, WantsPicturesThatSomebodyReads) {
   EXPECT_TRUE(node.wants("p3at/lrf"));
   for (const char* topic : {"/p3at/image_raw/compressed", "/p3at/image_raw"}) {
     const uint64_t before = node.audience();
-    (*readers)[topic] = 1;
+    shared->readers[topic] = 1;
     while (!node.wants("p3at/camera")) node.flush();
     EXPECT_GT(node.audience(), before);
     EXPECT_FALSE(node.wants("p3at/camera/info"));
-    (*readers)[topic] = 0;
+    shared->readers[topic] = 0;
     while (node.wants("p3at/camera")) node.flush();
     EXPECT_GT(node.audience(), before + 1);
   }
+  node.announce(announcement({robot_with_a_camera()}));  // after a reset
+  EXPECT_FALSE(node.wants("p3at/camera"));
 }
 
-// A robot whose joints are commanded, or none.
-std::shared_ptr<run::Announcement> announced(bool arm) {
-  world_info_t info{};
-  if (arm) {
-    info.channels = {channel<joint_command_t>("arm/joint_command", "")};
-    info.channels[0].robot = "arm";
-    info.channels[0].input = true;
-  }
-  info.nchannels = static_cast<int32_t>(info.channels.size());
-  auto announcement = std::make_shared<run::Announcement>();
-  announcement->info = {info};
-  return announcement;
-}
-
-std::vector<uint8_t> numbers(const std::vector<double>& values) {
-  CdrWriter out;
-  out.put_length(0).put(uint32_t{0}).put_length(values.size());
-  for (const double value : values) out.put(value);
-  const std::span<const uint8_t> bytes = out.bytes();
-  return {bytes.begin(), bytes.end()};
-}
-
-// Regression: they went to the joints of the first robot of the name.
-TEST(Node, CommandsAreForTheRobotThatIsThere) {
-  const auto handlers = std::make_shared<Handlers>();
-  std::vector<std::string> joints{"a", "b"};
+TEST(Node, TellsWhatAnotherRobotOfTheNameIsLike) {
+  const auto shared = std::make_shared<Middleware>();
+  RobotFrames frames;
+  frames.description = "<robot name='first'/>";
   NodeOptions options;
-  options.joints = [&](const std::string&) { return joints; };
-  std::vector<joint_command_t> heard;
-  Node node(std::move(options),
-            std::make_unique<FakeTransport>(std::make_shared<Readers>(), handlers),
-            announced(true)->info, [&](const std::string&, std::span<const uint8_t> bytes) {
-              joint_command_t command;
-              ASSERT_EQ(decode_checked(bytes.data(), bytes.size(), command), DecodeFault::none);
-              heard.push_back(std::move(command));
-            });
-  node.start();
-  const auto send = [&](const std::vector<double>& values) {
-    const std::vector<uint8_t> cdr = numbers(values);
-    heard.clear();
-    Sample sample;
-    sample.cdr = cdr;
-    handlers->at("/arm/forward_position_controller/commands")(sample);
-  };
-  send({1.0, 2.0});
-  ASSERT_EQ(heard.size(), 1u);
-  EXPECT_EQ(heard[0].name, joints);
-  node.announce(announced(false));
-  send({1.0, 2.0});
-  EXPECT_EQ(heard.size(), 0u);
-  joints = {"x", "y", "z"};
-  node.announce(announced(true));
-  send({1.0, 2.0, 3.0});
-  ASSERT_EQ(heard.size(), 1u);
-  EXPECT_EQ(heard[0].name, joints);
+  options.conversion.robots = [&] { return std::map<std::string, RobotFrames>{{"arm", frames}}; };
+  Node node(options, std::make_unique<FakeTransport>(shared), {arm("arm")},
+            [](const std::string&, std::span<const uint8_t>) {});
+  const std::vector<std::string>& told = shared->written["/arm/robot_description"];
+  ASSERT_EQ(told.size(), 1u);
+  node.announce(announcement({arm("arm")}));
+  EXPECT_EQ(told.size(), 1u);  // it is as it was
+  frames.description = "<robot name='second'/>";
+  node.announce(announcement({arm("arm")}));
+  ASSERT_EQ(told.size(), 2u);
+  EXPECT_NE(told.back().find(frames.description), std::string::npos);
 }
 
 }  // namespace

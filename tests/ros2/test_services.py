@@ -36,7 +36,13 @@ from simulation_types import (
 )
 
 OK, NOT_FOUND, INCORRECT_STATE, FAILED, UNSUPPORTED = 1, 2, 3, 4, 0
+NAME_NOT_UNIQUE = 101
 STOPPED, PLAYING, PAUSED = 0, 1, 2
+
+CRATE = """<sdf version="1.9"><model name="crate"><link name="link">
+  <inertial><mass>2</mass></inertial>
+  <collision name="box"><geometry><box><size>0.3 0.3 0.3</size></box></geometry></collision>
+</link></model></sdf>"""
 
 
 class Client:
@@ -220,27 +226,30 @@ def test_robots_come_and_go_with_their_topics(client):
     assert client.call("delete_entity", "p3at_2").result.result == NOT_FOUND
 
 
-BOX = (
-    "<sdf version='1.9'><model name='box'><link name='l'><collision name='c'><geometry><box>"
-    "<size>0.3 0.3 0.3</size></box></geometry></collision></link></model></sdf>"
-)
-
-
 def test_models_that_are_no_robots_come_and_go(client):
-    """Regression: they were not listed, and their names neither found nor freed."""
+    def entities():
+        return client.call("get_entities", filters("^crate")).entities
 
-    def spawn(rename):
-        spawned = client.call("spawn_entity", "box", rename, "", BOX, "", at(9.0, 0.0, 1.0))
-        return spawned.result.result, spawned.entity_name, spawned.result.error_message
+    def spawn(renames, x):
+        reply = client.call("spawn_entity", "crate", renames, "", CRATE, "", at(x, 3.0, 1.0))
+        return reply.result.result, reply.entity_name
 
-    def listed():
-        return set(client.call("get_entities", filters("^box$")).entities)
+    assert spawn(False, 0.0) == (OK, "crate") and entities() == ["crate"]
+    assert spawn(False, 1.0)[0] == NAME_NOT_UNIQUE
+    assert spawn(True, 1.0) == (OK, "crate_2") and entities() == ["crate", "crate_2"]
+    assert client.call("delete_entity", "crate").result.result == OK and entities() == ["crate_2"]
+    assert spawn(False, 0.0) == (OK, "crate")
 
-    for _ in range(2):
-        assert spawn(False) == (OK, "box", "")
-        wait_for(lambda: listed() == {"box"}, "box")
-        assert client.call("delete_entity", "box").result.result == OK
-        wait_for(lambda: listed() == set(), "no box")
+
+def test_models_that_are_spawned_at_once_have_names_of_their_own(client):
+    client.call("spawn_entity", "crate", True, "", CRATE, "", at(0.0, 3.0, 1.0))
+    question, _ = client.services["spawn_entity"]
+    writer, reader = client.ends["spawn_entity"]
+    for x in (1.0, 2.0):  # the run makes no more ready at once
+        number = next(client.sequence)
+        place = at(x, 3.0, 1.0)
+        writer.write(question(client.mark, number, "crate", True, "", CRATE, "", place))
+    assert {reply.entity_name for reply in take(reader, 2)} == {"crate_2", "crate_3"}
 
 
 @pytest.mark.parametrize(
