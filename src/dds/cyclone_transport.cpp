@@ -5,10 +5,12 @@
 #include <atomic>
 #include <charconv>
 #include <chrono>
+#include <condition_variable>
 #include <cstdlib>
 #include <cstring>
 #include <map>
 #include <mutex>
+#include <optional>
 #include <set>
 #include <string_view>
 #include <thread>
@@ -266,18 +268,44 @@ class CycloneWriter : public ros2::Writer {
 
 class CycloneReader;
 
-// Readers may go while the transport's thread takes samples: it finds them by their numbers.
-struct LiveReaders {
-  std::mutex mutex;  // held while one takes samples
-  std::map<dds_attach_t, CycloneReader*> by_number;
-  dds_attach_t last = 0;  // 0 is none
+// The transport's thread, which takes what comes. Readers may come and go meanwhile.
+class Receiver {
+ public:
+  explicit Receiver(dds_entity_t participant)
+      : waitset_(dds_create_waitset(participant)), wake_(dds_create_guardcondition(participant)) {
+    dds_waitset_attach(waitset_, wake_, 0);
+  }
+  ~Receiver() { stop(); }
+
+  void start();
+  void stop();
+
+  void attach(dds_entity_t entity, CycloneReader* reader, const std::string& name) {
+    checked(dds_waitset_attach(waitset_, entity, reinterpret_cast<dds_attach_t>(reader)),
+            "reader of " + name);
+  }
+  // Returns when the thread is done with it. Not to be called from a handler.
+  void detach(dds_entity_t entity, CycloneReader* reader);
+
+ private:
+  void receive();
+  void let_go();
+
+  dds_entity_t waitset_, wake_;
+  std::set<CycloneReader*> readers_;  // the thread's: those with deferred work
+  std::atomic<bool> stopping_{false};
+  std::thread thread_;
+  std::condition_variable gone_;
+  std::mutex mutex_;  // of what follows
+  std::set<CycloneReader*> leaving_;
+  bool running_ = false;
 };
 
 class CycloneReader : public ros2::Reader {
  public:
-  CycloneReader(dds_entity_t participant, dds_entity_t waitset, const Endpoint& endpoint,
-                ros2::Transport::Handler handler, LiveReaders& live)
-      : waitset_(waitset), name_(endpoint.topic.name), handler_(std::move(handler)), live_(live) {
+  CycloneReader(dds_entity_t participant, Receiver& receiver, const Endpoint& endpoint,
+                ros2::Transport::Handler handler)
+      : receiver_(receiver), name_(endpoint.topic.name), handler_(std::move(handler)) {
     const std::string name = dds_topic(endpoint);
     const ddsi_sertype* type = nullptr;
     topic_ = checked(create_raw_topic(participant, name.c_str(),
@@ -291,18 +319,11 @@ class CycloneReader : public ros2::Reader {
             "reader of " + name);
     if (const auto* replies = static_cast<const CycloneWriter*>(endpoint.replies))
       requests_ = std::make_unique<WaitingRequests>(reader_, replies->entity());
-    const std::lock_guard lock(live_.mutex);
-    number_ = ++live_.last;
-    checked(dds_waitset_attach(waitset_, reader_, number_), "reader of " + name);
-    live_.by_number[number_] = this;
+    receiver_.attach(reader_, this, name);
   }
   ~CycloneReader() override {
-    {
-      const std::lock_guard lock(live_.mutex);
-      live_.by_number.erase(number_);
-    }
+    receiver_.detach(reader_, this);
     requests_.reset();
-    dds_waitset_detach(waitset_, reader_);
     dds_delete(reader_);
     dds_delete(topic_);
   }
@@ -376,14 +397,66 @@ class CycloneReader : public ros2::Reader {
         name_, policy_name(status.last_policy_id));
   }
 
-  dds_entity_t waitset_, topic_ = 0, reader_ = 0;
+  Receiver& receiver_;
+  dds_entity_t topic_ = 0, reader_ = 0;
   std::string name_;
   ros2::Transport::Handler handler_;
-  LiveReaders& live_;
-  dds_attach_t number_ = 0;
   std::unique_ptr<WaitingRequests> requests_;  // null: a topic
   bool told_ = false;
 };
+
+void Receiver::start() {
+  const std::lock_guard lock(mutex_);
+  thread_ = std::thread([this] { receive(); });
+  running_ = true;
+}
+
+void Receiver::stop() {
+  if (!thread_.joinable()) return;
+  stopping_ = true;
+  dds_set_guardcondition(wake_, true);
+  thread_.join();
+}
+
+void Receiver::detach(dds_entity_t entity, CycloneReader* reader) {
+  dds_waitset_detach(waitset_, entity);
+  std::unique_lock lock(mutex_);
+  leaving_.insert(reader);
+  dds_set_guardcondition(wake_, true);
+  gone_.wait(lock, [&] { return !running_ || !leaving_.contains(reader); });
+  leaving_.erase(reader);
+}
+
+void Receiver::let_go() {
+  bool woken = false;
+  dds_take_guardcondition(wake_, &woken);
+  const std::lock_guard lock(mutex_);
+  for (CycloneReader* reader : leaving_) readers_.erase(reader);
+  leaving_.clear();
+  gone_.notify_all();
+}
+
+void Receiver::receive() {
+  using Left = CycloneReader::Left;
+  dds_attach_t woken[kMostTaken];
+  dds_duration_t patience = DDS_INFINITY;
+  while (!stopping_) {
+    const dds_return_t count = dds_waitset_wait(waitset_, woken, kMostTaken, patience);
+    for (dds_return_t i = 0; i < std::min(count, kMostTaken); ++i) {
+      if (woken[i] != 0) readers_.insert(reinterpret_cast<CycloneReader*>(woken[i]));
+    }
+    let_go();
+    patience = DDS_INFINITY;
+    for (auto reader = readers_.begin(); reader != readers_.end() && !stopping_;) {
+      const Left left = (*reader)->take();
+      if (left != Left::nothing) patience = left == Left::more ? 0 : std::min(patience, kLook);
+      reader = left == Left::nothing ? readers_.erase(reader) : std::next(reader);
+    }
+  }
+  const std::lock_guard lock(mutex_);
+  running_ = false;
+  gone_.notify_all();
+}
 
 class CycloneTransport : public ros2::Transport {
  public:
@@ -402,9 +475,7 @@ class CycloneTransport : public ros2::Transport {
       throw EnvironmentError(fmt::format("ROS 2: no participant in domain {}: {}", options.domain,
                                          dds_strretcode(-participant_)));
     }
-    waitset_ = dds_create_waitset(participant_);
-    wake_ = dds_create_guardcondition(participant_);
-    dds_waitset_attach(waitset_, wake_, 0);
+    receiver_.emplace(participant_);
   }
   ~CycloneTransport() override {
     stop();
@@ -415,19 +486,11 @@ class CycloneTransport : public ros2::Transport {
     return std::make_unique<CycloneWriter>(participant_, endpoint);
   }
   std::unique_ptr<ros2::Reader> add_reader(const Endpoint& endpoint, Handler handler) override {
-    return std::make_unique<CycloneReader>(participant_, waitset_, endpoint, std::move(handler),
-                                           live_);
+    return std::make_unique<CycloneReader>(participant_, *receiver_, endpoint, std::move(handler));
   }
 
-  void start() override {
-    thread_ = std::thread([this] { receive(); });
-  }
-  void stop() override {
-    if (!thread_.joinable()) return;
-    stopping_ = true;
-    dds_set_guardcondition(wake_, true);
-    thread_.join();
-  }
+  void start() override { receiver_->start(); }
+  void stop() override { receiver_->stop(); }
 
   Gid gid() const override { return gid_of(participant_); }
   std::string where() const override {
@@ -439,36 +502,9 @@ class CycloneTransport : public ros2::Transport {
   uint64_t refused() const override { return refused_samples(); }
 
  private:
-  void receive() {
-    using Left = CycloneReader::Left;
-    dds_attach_t woken[kMostTaken];
-    std::set<dds_attach_t> readers;  // those with deferred work
-    dds_duration_t patience = DDS_INFINITY;
-    while (!stopping_) {
-      const dds_return_t count = dds_waitset_wait(waitset_, woken, kMostTaken, patience);
-      for (dds_return_t i = 0; i < std::min(count, kMostTaken); ++i) {
-        if (woken[i] != 0) readers.insert(woken[i]);
-      }
-      patience = DDS_INFINITY;
-      for (auto reader = readers.begin(); reader != readers.end() && !stopping_;) {
-        const Left left = take(*reader);
-        if (left != Left::nothing) patience = left == Left::more ? 0 : std::min(patience, kLook);
-        reader = left == Left::nothing ? readers.erase(reader) : std::next(reader);
-      }
-    }
-  }
-
-  CycloneReader::Left take(dds_attach_t number) {
-    const std::lock_guard lock(live_.mutex);
-    const auto reader = live_.by_number.find(number);
-    return reader == live_.by_number.end() ? CycloneReader::Left::nothing : reader->second->take();
-  }
-
   CycloneOptions options_;
-  LiveReaders live_;
-  dds_entity_t domain_ = 0, participant_ = 0, waitset_ = 0, wake_ = 0;
-  std::atomic<bool> stopping_{false};
-  std::thread thread_;
+  dds_entity_t domain_ = 0, participant_ = 0;
+  std::optional<Receiver> receiver_;  // of the participant
 };
 
 std::string environment(const char* name) {

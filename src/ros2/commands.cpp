@@ -120,11 +120,13 @@ std::vector<Command> commands_of(const std::vector<world_info_t>& info, const Jo
     for (const channel_info_t& channel : part.channels) {
       for (const Row& row : kRows) {
         if (!channel.input || channel.robot.empty() || channel.type != row.channel_type) continue;
+        const std::vector<std::string> list = joints(channel.robot);
         commands.push_back({{names.topic(channel.robot, row.topic), row.type, kCommandQos},
-                            channel.robot,
                             channel.name,
-                            [convert = row.convert, list = joints(channel.robot)](
-                                std::span<const uint8_t> cdr) { return convert(cdr, list); }});
+                            list,
+                            [convert = row.convert, list](std::span<const uint8_t> cdr) {
+                              return convert(cdr, list);
+                            }});
       }
     }
   }

@@ -18,8 +18,8 @@ namespace ruedo::ros2 {
 
 struct Command {
   Topic topic;
-  std::string robot;
-  std::string channel;  // on the bus
+  std::string channel;              // on the bus
+  std::vector<std::string> joints;  // that it may command, in this order
   // The encoded command; none for bytes that are not a message of that type.
   std::function<std::optional<std::vector<uint8_t>>(std::span<const uint8_t> cdr)> convert;
 };

@@ -24,7 +24,7 @@ std::string ros_name(const std::string& name) {
 
 std::string Names::topic(const std::string& robot, const std::string& name) {
   const std::string own = (is_plain(robot) ? "" : "/" + ros_name(robot)) + "/" + name;
-  asked_.insert(own);
+  if (asked_) asked_->insert(own);
   const auto remap = std::find_if(remaps_.begin(), remaps_.end(),
                                   [&](const auto& each) { return each.first == own; });
   return remap == remaps_.end() ? own : remap->second;
@@ -34,10 +34,12 @@ std::string Names::frame(const std::string& robot, const std::string& name) cons
   return (is_plain(robot) ? "" : ros_name(robot) + "/") + name;
 }
 
-void Names::check_remaps() const {
+void Names::check_remaps() {
+  const std::set<std::string> asked =
+      std::exchange(asked_, std::nullopt).value_or(std::set<std::string>());
   for (const auto& [from, to] : remaps_) {
-    if (asked_.contains(from)) continue;
-    const std::string near = nearest_word(from, {asked_.begin(), asked_.end()});
+    if (asked.contains(from)) continue;
+    const std::string near = nearest_word(from, {asked.begin(), asked.end()});
     throw InputError({}, "--remap: there is no ROS topic or service '" + from + "'" +
                              (near.empty() ? "" : "; did you mean '" + near + "'?"));
   }

@@ -6,6 +6,7 @@
 #pragma once
 
 #include <map>
+#include <optional>
 #include <set>
 #include <string>
 #include <utility>
@@ -25,15 +26,15 @@ class Names {
   std::string topic(const std::string& robot, const std::string& name);
   std::string frame(const std::string& robot, const std::string& name) const;
 
-  // Throws InputError if a remap names no topic that was asked for.
-  void check_remaps() const;
+  // Throws InputError if a remap names no topic that was asked for until now.
+  void check_remaps();
 
  private:
   bool is_plain(const std::string& robot) const { return robot.empty() || robot == root_; }
 
   std::string root_;
   Remaps remaps_;
-  std::set<std::string> asked_;
+  std::optional<std::set<std::string>> asked_ = std::set<std::string>();  // none: it was checked
 };
 
 // Letters, digits and underscores; no leading digit.

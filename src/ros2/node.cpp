@@ -162,7 +162,7 @@ void Node::take_over(const std::vector<world_info_t>& info) {
   writers_ = std::move(writers);
   writer_of_topic_ = std::move(of_topic);
   add_pictures(info);
-  add_commands(info);
+  listen(info);
   tell_standing();
   tell_graph();
 }
@@ -183,27 +183,38 @@ void Node::tell_standing() {
   standing_ = std::move(told);
 }
 
-// The run itself refuses commands to a removed robot.
-void Node::add_commands(const std::vector<world_info_t>& info) {
-  for (Command& command : commands_of(info, options_.joints, names_)) {
-    const std::string name = key(command.topic);
-    const auto [at, fresh] = commands_.try_emplace(name, std::move(command));
-    if (!fresh) continue;
-    readers_[name] = transport_->add_reader(
-        endpoint(at->second.topic),
-        [this, added = &at->second](const Sample& sample) { receive(*added, sample.cdr); });
+// To commands and initial poses.
+void Node::listen(const std::vector<world_info_t>& info) {
+  std::map<std::string, Input> inputs;
+  for (const Command& command : commands_of(info, options_.joints, names_)) {
+    add_input(inputs, {command.topic, command.channel, command.joints, nullptr},
+              [this, command](const Sample& sample) { receive(command, sample.cdr); });
   }
   for (const world_info_t& part : info) {
     for (const robot_info_t& robot : part.robots) {
       const Topic topic{names_.topic(robot.name, "initialpose"),
                         "geometry_msgs/msg/PoseWithCovarianceStamped", kCommandQos};
-      if (!poses_.try_emplace(key(topic), topic).second) continue;
-      readers_[key(topic)] = transport_->add_reader(
-          endpoint(topic), [this, name = robot.name, topic](const Sample& sample) {
-            receive_pose(name, topic.name, sample);
-          });
+      add_input(inputs, {topic, robot.name, {}, nullptr},
+                [this, name = robot.name, topic](const Sample& sample) {
+                  receive_pose(name, topic.name, sample);
+                });
     }
   }
+  inputs_ = std::move(inputs);
+}
+
+// The reader that there is goes on where it does the same. Else it ends first: no message is to be
+// taken twice.
+void Node::add_input(std::map<std::string, Input>& inputs, Input input,
+                     Transport::Handler handler) {
+  auto known = inputs_.extract(key(input.topic));
+  if (known && known.mapped().target == input.target && known.mapped().joints == input.joints) {
+    inputs.insert(std::move(known));
+    return;
+  }
+  known = {};
+  const auto [at, fresh] = inputs.try_emplace(key(input.topic), std::move(input));
+  if (fresh) at->second.reader = transport_->add_reader(endpoint(at->second.topic), handler);
 }
 
 void Node::tell_graph() {
@@ -216,8 +227,8 @@ void Node::tell_graph() {
   };
   put_gid(transport_->gid());
   out.put_length(1).put("/").put("ruedo");
-  out.put_length(readers_.size() + services_->readers().size());
-  for (const auto& [name, reader] : readers_) put_gid(reader->gid());
+  out.put_length(inputs_.size() + services_->readers().size());
+  for (const auto& [name, input] : inputs_) put_gid(input.reader->gid());
   for (const Reader* reader : services_->readers()) put_gid(reader->gid());
   out.put_length(writers_.size() + standing_.size() + services_->writers().size() + 2);
   for (const auto& [name, writer] : writers_) put_gid(writer->gid());
@@ -278,15 +289,15 @@ bool Node::is_read() const {
 }
 
 bool Node::is_written(const std::string& topic) const {
-  return std::any_of(commands_.begin(), commands_.end(), [&](const auto& each) {
-    return each.second.topic.name == topic && readers_.at(each.first)->writers() > 0;
+  return std::any_of(inputs_.begin(), inputs_.end(), [&](const auto& each) {
+    return each.second.topic.name == topic && each.second.reader->writers() > 0;
   });
 }
 
 size_t Node::peers() const {
   size_t count = 0;
   for (const auto& [name, writer] : writers_) count += writer->readers();
-  for (const auto& [name, reader] : readers_) count += reader->writers();
+  for (const auto& [name, input] : inputs_) count += input.reader->writers();
   return count;
 }
 
@@ -300,8 +311,7 @@ std::vector<Topic> Node::outputs() const {
 
 std::vector<Topic> Node::inputs() const {
   std::vector<Topic> topics;
-  for (const auto& [name, command] : commands_) topics.push_back(command.topic);
-  for (const auto& [name, topic] : poses_) topics.push_back(topic);
+  for (const auto& [name, input] : inputs_) topics.push_back(input.topic);
   return topics;
 }
 

@@ -75,13 +75,15 @@ class Node : public run::Sink {
   void take_over(const std::vector<world_info_t>& info);  // what there is from now on
   void add_pictures(const std::vector<world_info_t>& info);
   void look_for_readers();  // of pictures
-  void add_commands(const std::vector<world_info_t>& info);
+  struct Input;
+  void listen(const std::vector<world_info_t>& info);
+  void add_input(std::map<std::string, Input>& inputs, Input input, Transport::Handler handler);
   void tell_standing();
   void tell_graph();  // ros_discovery_info
-  // topic: name and type.
-  void receive(const std::string& topic, const Sample& sample);
-  void receive_pose(const std::string& topic, const Sample& sample);  // initialpose
-  bool may_warn();  // once a second, whatever strangers send
+  void receive(const Command& command, std::span<const uint8_t> cdr);
+  void receive_pose(const std::string& robot, const std::string& topic,
+                    const Sample& sample);  // initialpose
+  bool may_warn();                          // once a second, whatever strangers send
   void count_faulty(const std::string& topic, const std::string& type, size_t size);
   void send(Writer& writer, std::span<const uint8_t> cdr);
   Endpoint endpoint(const Topic& topic, Role role = Role::topic) const;
@@ -104,20 +106,18 @@ class Node : public run::Sink {
     std::vector<uint8_t> cdr;  // the newest
   };
   std::map<std::string, Standing> standing_;  // by name and type
-  std::map<std::string, std::unique_ptr<Reader>> readers_;
+  struct Input {
+    Topic topic;
+    std::string target;               // a command's channel, a pose's robot
+    std::vector<std::string> joints;  // that it commands
+    std::unique_ptr<Reader> reader;
+  };
+  std::map<std::string, Input> inputs_;  // by name and type
   Requests requests_;
   std::unique_ptr<Services> services_;
   std::string reply_channel_;
   int64_t clock_period_us_, next_clock_us_ = 0;
   Requests::Clock::time_point next_look_;
-
-  struct Placing {
-    Topic topic;
-    std::string robot;
-  };
-  std::mutex inputs_mutex_;  // changed by the thread that calls the sink, which reads without it
-  std::map<std::string, std::shared_ptr<const Command>> commands_;  // by name and type
-  std::map<std::string, Placing> placings_;                         // likewise
 
   mutable std::mutex pictures_mutex_;
   std::map<std::string, bool> pictures_;  // channels of pictures, and whether anybody reads them

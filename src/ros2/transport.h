@@ -69,7 +69,8 @@ class Transport {
 
   using Handler = std::function<void(const Sample& sample)>;
 
-  // Both throw EnvironmentError. The handler is called from the transport's thread.
+  // Both throw EnvironmentError. The handler is called from the transport's thread, and not after
+  // the end of the reader.
   virtual std::unique_ptr<Writer> add_writer(const Endpoint& endpoint) = 0;
   virtual std::unique_ptr<Reader> add_reader(const Endpoint& endpoint, Handler handler) = 0;
 

@@ -166,5 +166,55 @@ TEST(Node, TellsWhatAnotherRobotOfTheNameIsLike) {
   EXPECT_NE(told.back().find(frames.description), std::string::npos);
 }
 
+TEST(Node, CommandsTheJointsOfTheRobotThatIsThere) {
+  const auto shared = std::make_shared<Middleware>();
+  std::vector<std::string> joints{"a", "b"};
+  NodeOptions options;
+  options.joints = [&](const std::string&) { return joints; };
+  std::vector<std::string> commanded;
+  Node node(options, std::make_unique<FakeTransport>(shared), {arm("arm")},
+            [&](const std::string&, std::span<const uint8_t> message) {
+              joint_command_t command;
+              command.decode(message.data(), 0, static_cast<int>(message.size()));
+              commanded = command.name;
+            });
+  node.start();
+  const auto send = [&](const std::vector<double>& positions) {
+    CdrWriter cdr;
+    cdr.put_length(0).put(uint32_t{0}).put_sequence(std::span<const double>(positions));
+    Sample sample;
+    sample.cdr = cdr.bytes();
+    commanded.clear();
+    const auto readers = shared->read.equal_range("/arm/forward_position_controller/commands");
+    for (auto reader = readers.first; reader != readers.second; ++reader) reader->second(sample);
+  };
+  send({0.5, 0.7});
+  EXPECT_EQ(commanded, joints);
+  joints = {"x", "y", "z"};
+  node.announce(announcement({arm("arm")}));
+  send({0.5, 0.7});
+  EXPECT_EQ(commanded, std::vector<std::string>());
+  send({0.5, 0.7, 0.9});
+  EXPECT_EQ(commanded, joints);
+}
+
+TEST(Node, KeepsNothingOfRobotsThatAreGone) {
+  const auto shared = std::make_shared<Middleware>();
+  NodeOptions options;
+  Node node(options, std::make_unique<FakeTransport>(shared), {arm("first")},
+            [](const std::string&, std::span<const uint8_t>) {});
+  const auto read = [&] {
+    std::multiset<std::string> topics;
+    for (const auto& [topic, handler] : shared->read) topics.insert(topic);
+    return topics;
+  };
+  const std::multiset<std::string> ends = shared->ends, topics = read();
+  node.announce(announcement({arm("first"), arm("second")}));
+  EXPECT_GT(read().size(), topics.size());
+  node.announce(announcement({arm("first")}));
+  EXPECT_EQ(shared->ends, ends);
+  EXPECT_EQ(read(), topics);
+}
+
 }  // namespace
 }  // namespace ruedo::ros2
