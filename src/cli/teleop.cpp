@@ -5,6 +5,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 #include <csignal>
 #include <memory>
@@ -15,9 +16,12 @@
 
 #include "bus/lcm_bus.h"
 #include "cli/commands.h"
+#include "core/channel_names.h"
 #include "core/file_handle.h"
+#include "ruedo/decode.h"
 #include "ruedo/errors.h"
 #include "ruedo/velocity_command_t.hpp"
+#include "ruedo/world_info_t.hpp"
 
 namespace ruedo::cli {
 namespace {
@@ -145,11 +149,38 @@ class Keys {
   Place place_ = Place::between;
 };
 
+// Whether the robot is there, as ruedo/info tells; until that has come, it is. Hears in the bus's
+// thread.
+class Presence {
+ public:
+  explicit Presence(std::string robot) : robot_(std::move(robot)) {}
+
+  void hear(const uint8_t* data, size_t size) {
+    world_info_t info;
+    if (decode_checked(data, size, info) != DecodeFault::none) return;
+    if (info.part == 0) next_part_ = 0, found_ = false;
+    if (info.part != next_part_++) return;  // one was lost
+    for (const robot_info_t& robot : info.robots) found_ |= robot.name == robot_;
+    if (next_part_ != info.nparts) return;
+    is_there_ = found_;
+    if (!found_) has_left_ = true;
+  }
+  bool is_there() const { return is_there_; }
+  // Whether it was not there at some time since the last call: what is there now is another one.
+  bool has_left() { return has_left_.exchange(false); }
+
+ private:
+  const std::string robot_;
+  int next_part_ = 0;
+  bool found_ = false;  // in the parts so far
+  std::atomic<bool> is_there_{true}, has_left_{false};
+};
+
 // One robot's speed; at the end, whatever the reason, it stands.
 class Driver {
  public:
-  Driver(const std::string& robot, bus::LcmBus& bus)
-      : robot_(robot), channel_(robot + "/velocity"), bus_(bus) {}
+  Driver(const std::string& robot, bus::LcmBus& bus, Presence& presence)
+      : robot_(robot), channel_(robot + "/velocity"), bus_(bus), presence_(presence) {}
   ~Driver() { stop(); }
 
   void stop() {
@@ -157,6 +188,17 @@ class Driver {
     send();
   }
   void press(int key) {
+    if (presence_.has_left()) command_.vx = command_.omega = 0.0;
+    if (!presence_.is_there()) return say("not there");
+    steer(key);
+    const uint64_t failed = bus_.failed();
+    send();
+    say(fmt::format("{:+.1f} m/s, {:+.1f} rad/s{}", command_.vx, command_.omega,
+                    bus_.failed() == failed ? "" : " (not sent)"));
+  }
+
+ private:
+  void steer(int key) {
     switch (key) {
       case 'w': command_.vx += kStep_m_s; break;
       case 's': command_.vx -= kStep_m_s; break;
@@ -171,14 +213,11 @@ class Driver {
     };
     command_.vx = tidy(command_.vx, kStep_m_s, kMost_m_s);
     command_.omega = tidy(command_.omega, kStep_rad_s, kMost_rad_s);
-    const uint64_t failed = bus_.failed();
-    send();
-    fmt::print("\r\033[K{}: {:+.1f} m/s, {:+.1f} rad/s{}", robot_, command_.vx, command_.omega,
-               bus_.failed() == failed ? "" : " (not sent)");
+  }
+  void say(const std::string& text) const {
+    fmt::print("\r\033[K{}: {}", robot_, text);
     std::fflush(stdout);
   }
-
- private:
   void send() {
     uint8_t bytes[64];
     const int size = command_.encode(bytes, 0, sizeof bytes);
@@ -187,6 +226,7 @@ class Driver {
 
   std::string robot_, channel_;
   bus::LcmBus& bus_;
+  Presence& presence_;
   velocity_command_t command_{};
 };
 
@@ -196,15 +236,18 @@ struct TeleopArguments {
 
 int teleop(const TeleopArguments& arguments) {
   Signals signals;
+  Presence presence(arguments.robot);
   bus::LcmBus bus(arguments.lcm);
-  bus.keep_connected();
+  bus.listen({kInfoChannel}, [&](const std::string&, const uint8_t* data, size_t size) {
+    presence.hear(data, size);
+  });
   RawTerminal terminal;
   fmt::print(
       "w s or up down: speed   a d or left right: turn   space: stop   q: quit   (at most {:g} "
       "m/s, {:g} rad/s)\n",
       kMost_m_s, kMost_rad_s);
   Keys keys(signals);
-  Driver driver(arguments.robot, bus);
+  Driver driver(arguments.robot, bus, presence);
   const auto nobody_reads = [] { return std::ferror(stdout) != 0; };
   for (int key = kContinue; key != 'q' && key != kEnd && !nobody_reads();
        key = keys.next(kRepeat_ms)) {

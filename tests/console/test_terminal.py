@@ -312,6 +312,40 @@ def test_teleop_drives_as_keys_are_pressed():
         assert teleop.process.wait(PATIENCE) == 0 and teleop.is_as_before()
 
 
+def publish_info(*parts):
+    """ruedo/info, each part of it with the robots of these names."""
+    from ruedo.lcmtypes import robot_info_t, world_info_t
+
+    bus = lcm.LCM(URL)
+    for number, names in enumerate(parts):
+        info = world_info_t()
+        info.part, info.nparts, info.nrobots = number, len(parts), len(names)
+        for name in names:
+            info.robots.append(robot_info_t())
+            info.robots[-1].name = name
+        bus.publish("ruedo/info", info.encode())
+
+
+def test_teleop_drives_no_other_robot_of_the_name_before_a_key():
+    commands = Commands()
+    with Teleop() as teleop:
+        teleop.press(b"w")
+        commands.until(teleop, (0.1, 0))
+        publish_info(["alice"], ["p3at"])
+        teleop.press(b"w")
+        commands.until(teleop, (0.2, 0))
+        publish_info(["alice"], [])
+        teleop.until("p3at: not there")
+        teleop.press(b"w")
+        before = len(commands.found)
+        publish_info(["alice"], ["p3at"])
+        commands.until(teleop, (0, 0))
+        teleop.press(b"w")
+        commands.until(teleop, (0.1, 0))
+        late = commands.found[before:]
+        assert set(late[late.index((0, 0)) :]) == {(0, 0), (0.1, 0)}
+
+
 def test_teleop_takes_keys_in_whatever_pieces_they_come():
     commands = Commands()
     with Teleop() as teleop:
