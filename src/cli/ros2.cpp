@@ -31,6 +31,7 @@ std::vector<run::WaitForOption> with_channels(std::vector<run::WaitForOption> op
     if (model.is_robot() && !model.removed) robots.push_back(model.name);
   }
   ros2::Names names(robots.size() == 1 ? robots.front() : "", arguments.topics);
+  names.update({robots.begin(), robots.end()});
   std::vector<std::string> topics;
   for (const std::string& robot : robots) {
     for (const auto& [topic, channel] : ros2::command_topics(robot, names)) {

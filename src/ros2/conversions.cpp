@@ -8,6 +8,7 @@
 #include <limits>
 #include <map>
 #include <optional>
+#include <set>
 
 #include "ros2/pictures.h"
 #include "ruedo/air_pressure_t.hpp"
@@ -686,11 +687,16 @@ Conversions::Conversions(const std::vector<world_info_t>& info, const Conversion
       }
     }
   };
+  std::set<std::string> robots;
   for (const world_info_t& part : info) {
-    for (const robot_info_t& robot : part.robots) plan.robots[robot.name] = &robot;
+    for (const robot_info_t& robot : part.robots) {
+      plan.robots[robot.name] = &robot;
+      robots.insert(robot.name);
+    }
     for (const device_info_t& device : part.devices)
       plan.devices[device.robot + "/" + device.name] = &device;
   }
+  names.update(robots);
   each_channel([&](const channel_info_t& channel) {
     with_type(channel.type, [&]<class Message>() { plan.count<Message>(channel); });
   });

@@ -22,8 +22,29 @@ std::string ros_name(const std::string& name) {
   return text;
 }
 
+// Robots whose own name ROS allows come first.
+void Names::update(const std::set<std::string>& robots) {
+  std::erase_if(given_, [&](const auto& each) { return !robots.contains(each.first); });
+  std::set<std::string> taken;
+  for (const auto& [robot, name] : given_) taken.insert(name);
+  for (const bool changes : {false, true}) {
+    for (const std::string& robot : robots) {
+      std::string name = ros_name(robot);
+      if (is_plain(robot) || given_.contains(robot) || (name != robot) != changes) continue;
+      for (int i = 2; !taken.insert(name).second; ++i)
+        name = ros_name(robot + "_" + std::to_string(i));
+      given_[robot] = name;
+    }
+  }
+}
+
+std::string Names::name_of(const std::string& robot) const {
+  const auto given = given_.find(robot);
+  return given == given_.end() ? ros_name(robot) : given->second;
+}
+
 std::string Names::topic(const std::string& robot, const std::string& name) {
-  const std::string own = (is_plain(robot) ? "" : "/" + ros_name(robot)) + "/" + name;
+  const std::string own = (is_plain(robot) ? "" : "/" + name_of(robot)) + "/" + name;
   if (asked_) asked_->insert(own);
   const auto remap = std::find_if(remaps_.begin(), remaps_.end(),
                                   [&](const auto& each) { return each.first == own; });
@@ -31,7 +52,7 @@ std::string Names::topic(const std::string& robot, const std::string& name) {
 }
 
 std::string Names::frame(const std::string& robot, const std::string& name) const {
-  return (is_plain(robot) ? "" : ros_name(robot) + "/") + name;
+  return (is_plain(robot) ? "" : name_of(robot) + "/") + name;
 }
 
 void Names::check_remaps() {

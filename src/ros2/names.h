@@ -21,6 +21,9 @@ class Names {
   // root: the robot without a namespace; "": none. remaps: full names of topics and services.
   Names(std::string root, Remaps remaps) : root_(std::move(root)), remaps_(std::move(remaps)) {}
 
+  // What robots there are. Each keeps its name in ROS for as long as it is there.
+  void update(const std::set<std::string>& robots);
+
   // "/alice/scan" for ("alice", "scan"); the world's own names have robot "". Throws InputError if
   // two remaps give the same name.
   std::string topic(const std::string& robot, const std::string& name);
@@ -31,9 +34,11 @@ class Names {
 
  private:
   bool is_plain(const std::string& robot) const { return robot.empty() || robot == root_; }
+  std::string name_of(const std::string& robot) const;
 
   std::string root_;
   Remaps remaps_;
+  std::map<std::string, std::string> given_;                              // names in ROS, by robot
   std::optional<std::set<std::string>> asked_ = std::set<std::string>();  // none: it was checked
 };
 

@@ -89,6 +89,20 @@ TEST(Names, OneRobotHasTheRootAndManyHaveNamespaces) {
   EXPECT_NO_THROW(one.check_remaps());
 }
 
+TEST(Names, OfTwoRobotsAreNeverOne) {
+  Names names("", {});
+  names.update({"a-b", "a_b", "a.b"});
+  EXPECT_EQ(names.topic("a_b", "scan"), "/a_b/scan");  // ROS allows its own name
+  EXPECT_EQ(names.topic("a-b", "scan"), "/a_b_2/scan");
+  EXPECT_EQ(names.frame("a.b", "base_link"), "a_b_3/base_link");
+  names.update({"a-b", "a.b", "a_b_2"});
+  EXPECT_EQ(names.topic("a-b", "scan"), "/a_b_2/scan");  // whoever comes or goes
+  EXPECT_EQ(names.topic("a_b_2", "scan"), "/a_b_2_2/scan");
+  names.update({});
+  names.update({"a-b"});
+  EXPECT_EQ(names.topic("a-b", "scan"), "/a_b/scan");
+}
+
 TEST(Names, ARemapOfNothingIsRefused) {
   Names names("p3at", {{"/scam", "/x"}});
   names.topic("p3at", "scan");

@@ -216,5 +216,26 @@ TEST(Node, KeepsNothingOfRobotsThatAreGone) {
   EXPECT_EQ(read(), topics);
 }
 
+TEST(Node, CommandsTheRobotWhoseNameInRosItIs) {
+  const auto shared = std::make_shared<Middleware>();
+  NodeOptions options;
+  options.joints = [](const std::string&) { return std::vector<std::string>{"a"}; };
+  std::vector<std::string> commanded;
+  Node node(
+      options, std::make_unique<FakeTransport>(shared), {arm("a-b"), arm("a_b")},
+      [&](const std::string& channel, std::span<const uint8_t>) { commanded.push_back(channel); });
+  node.start();
+  CdrWriter cdr;
+  cdr.put_length(0).put(uint32_t{0}).put_length(1).put(0.5);
+  Sample sample;
+  sample.cdr = cdr.bytes();
+  for (const char* robot : {"a_b", "a_b_2"}) {
+    const std::string topic = std::string("/") + robot + "/forward_position_controller/commands";
+    ASSERT_EQ(shared->read.count(topic), 1u);
+    shared->read.find(topic)->second(sample);
+  }
+  EXPECT_EQ(commanded, (std::vector<std::string>{"a_b/joint_command", "a-b/joint_command"}));
+}
+
 }  // namespace
 }  // namespace ruedo::ros2
