@@ -109,7 +109,7 @@ void Stepper::take_part(Duration timeout) {
   grant_ = {};
   steps_.clear();
   listed_ = 0;
-  infos_ = {core_.info()};
+  names_.begin(*core_.info());
   waits_for_.clear();
   fault_ = nullptr;
   part_ = true;
@@ -282,37 +282,22 @@ void Stepper::ask_for_lost(int64_t until) {
                           encoded(body), epoch_);
 }
 
-// The name that the message's channel had in that state: robots come and go, and others take their
-// places. Where the info from before was lost, the next one that has a name says it.
-const std::string& Stepper::channel_of(const Entry& entry, int64_t utime) const {
-  static const std::string kUnknown;
-  const auto index = static_cast<size_t>(entry.channel);
-  auto info = std::lower_bound(infos_.begin(), infos_.end(), utime,
-                               [](const auto& one, int64_t time) { return one->utime < time; });
-  if (info != infos_.begin()) --info;
-  for (; info != infos_.end(); ++info) {
-    const std::vector<ChannelInfo>& channels = (*info)->channel_list;
-    if (index < channels.size() && !channels[index].name.empty()) return channels[index].name;
-  }
-  return kUnknown;
-}
-
 void Stepper::collect(Observations& observations) {
   for (auto step = steps_.begin(); step != steps_.end() && step->first <= have_;
        step = steps_.erase(step)) {
     observations.step = collected_ = step->first;
     observations.utime = step->second.utime;
     observations.state_hash = step->second.state_hash;
+    names_.go_to(observations.utime);
     for (std::vector<Entry>& part : step->second.parts) {
       for (Entry& entry : part) {
         observations.messages.push_back(
-            {step->first, channel_of(entry, observations.utime), std::move(entry.bytes)});
+            {step->first, names_.of(static_cast<size_t>(entry.channel)), std::move(entry.bytes)});
       }
     }
     last_utime_ = observations.utime;
     last_hash_ = observations.state_hash;
   }
-  while (infos_.size() > 1 && infos_[1]->utime <= last_utime_) infos_.pop_front();
   observations.step = collected_;  // n = 0: the state of the call before
   observations.utime = last_utime_;
   observations.state_hash = last_hash_;

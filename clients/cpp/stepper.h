@@ -16,6 +16,7 @@
 #include <utility>
 #include <vector>
 
+#include "channel_names.h"
 #include "ruedo/client.h"
 #include "session.h"
 
@@ -78,7 +79,6 @@ class Stepper {
   void doubt();
   void grant_again();
   void ask_for_lost(int64_t until);
-  const std::string& channel_of(const Entry& entry, int64_t utime) const;
   void collect(Observations& observations);
   void on_message(int32_t channel, const uint8_t* bytes, size_t size);
   void forget_first(std::deque<Early>& early);
@@ -97,9 +97,7 @@ class Stepper {
   int64_t run_id_ = 0;
   int32_t epoch_ = 0;
   std::shared_ptr<const WorldInfo> info_;  // whose channels are subscribed
-  // Of the states that are not collected yet: each holds for those after its utime, and the first
-  // for all before, too.
-  std::deque<std::shared_ptr<const WorldInfo>> infos_;
+  ChannelNames names_;                     // in the state that is being collected
   std::map<size_t, std::pair<std::string, Subscription>>
       sources_;                      // by the channel's index; the caller's of step()
   int64_t granted_ = 0, have_ = -1;  // all of the states up to that one are here

@@ -51,10 +51,7 @@ uint32_t crc32(const uint8_t* bytes, size_t size) {
 
 void Stepper::on_info(const std::shared_ptr<const WorldInfo>& info) {
   const std::lock_guard lock(mutex_);
-  if (!part_) return;
-  while (infos_.size() > 1 && infos_.back()->utime >= info->utime)
-    infos_.pop_back();  // changed twice between the same two states
-  infos_.push_back(info);
+  if (part_) names_.change(*info);
 }
 
 void Stepper::on_message(int32_t channel, const uint8_t* bytes, size_t size) {

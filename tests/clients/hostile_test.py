@@ -2,10 +2,11 @@
 
 import contextlib
 import os
-import signal
+import re
 import subprocess
 import sys
 import time
+from pathlib import Path
 
 import pytest
 from conftest import HERE, PATIENCE, PROBES, Server, free_url, probe
@@ -13,7 +14,13 @@ from conftest import HERE, PATIENCE, PROBES, Server, free_url, probe
 # isort: split
 from fake_server import info, scan
 from lying_datagrams import LyingDatagrams, cut, fragment
-from lying_stream import HELLO, LyingStream, frame, grants_and_huge_ticks
+from lying_stream import (
+    HELLO,
+    LyingStream,
+    frame,
+    grants_and_ever_new_infos,
+    grants_and_huge_ticks,
+)
 from ruedo import lcmtypes
 
 
@@ -144,7 +151,8 @@ def test_a_server_that_reads_nothing_is_left(stream_url):
         transport.close()
 
 
-def test_a_tick_of_many_parts_takes_no_memory(language, stream_url):
+@pytest.mark.parametrize("lie", [lambda _: grants_and_huge_ticks, grants_and_ever_new_infos])
+def test_what_a_server_sends_in_lockstep_takes_no_memory(lie, language, stream_url):
     driven = info([])
     driven.features = (1 << 40) - 1
     for name, type_name in (
@@ -157,18 +165,25 @@ def test_a_tick_of_many_parts_takes_no_memory(language, stream_url):
         channel.input = name == "velocity"
         driven.channels.append(channel)
     driven.nchannels = len(driven.channels)
-    with LyingStream(
-        stream_url, HELLO + frame("ruedo/info", driven.encode()), grants_and_huge_ticks
-    ):
+    known = HELLO + frame("ruedo/info", driven.encode())
+    with LyingStream(stream_url, known, lie(driven)) as server:
         process = subprocess.Popen(
             [*PROBES[language], stream_url, "lockstep", "name", "p3at", "5", "1", "0.1"],
             stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
             text=True,
+            env={**os.environ, "JAVA_TOOL_OPTIONS": "-Xmx100m"},  # garbage is not in question
         )
-        time.sleep(3.0)
-        os.kill(process.pid, signal.SIGKILL)
-        _, _, used = os.wait4(process.pid, 0)
-    assert used.ru_maxrss < 200_000, process.stdout.read()  # KiB
+        until = time.monotonic() + PATIENCE
+        while not server.granted.wait(0.1) and process.poll() is None:
+            assert time.monotonic() < until
+        assert process.poll() is None, process.stdout.read()
+        status = Path(f"/proc/{process.pid}/status").read_text()
+        process.kill()
+        said = process.communicate()[0]
+    most = re.search(r"VmHWM:\s+(\d+)", status)  # KiB
+    assert most and int(most[1]) < 200_000, (status, said)
+    assert "OutOfMemory" not in said
 
 
 @pytest.mark.parametrize("name", ["\x1b]0;owned\x07", "\u202edenwo"])

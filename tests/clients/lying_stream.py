@@ -31,21 +31,44 @@ def _tick(step: int, nparts: int) -> bytes:
     return tick.encode()
 
 
-def grants_and_huge_ticks(request) -> bytes:
-    """Answers JOIN and GRANT, then sends a part of each of a thousand ticks of 32767 parts."""
+def _answer(request) -> bytes:
+    """To JOIN, GRANT and GET_STATE."""
     reply = lcmtypes.reply_t()
     reply.run_id, reply.session, reply.sequence = 7, 5, request.sequence
     reply.epoch, reply.kind, reply.code = 0, request.kind, reply.OK
-    if request.kind == request.GRANT:
-        body = lcmtypes.grant_reply_t()
-        body.granted = body.step = 0
-        reply.body = body.encode()
+    bodies = {request.GRANT: lcmtypes.grant_reply_t, request.GET_STATE: lcmtypes.state_reply_t}
+    if request.kind in bodies:
+        reply.body = bodies[request.kind]().encode()
         reply.size = len(reply.body)
-    answer = frame("ruedo/reply", reply.encode())
-    if request.kind == request.GRANT:
-        answer += b"".join(
-            frame("ruedo/tick", _tick(step, 32767)) for step in range(1, _MOST_STEPS)
-        )
+    return frame("ruedo/reply", reply.encode())
+
+
+def grants_and_huge_ticks(request) -> bytes:
+    """Answers JOIN and GRANT, then sends a part of each of a thousand ticks of 32767 parts."""
+    if request.kind != request.GRANT:
+        return _answer(request)
+    ticks = (frame("ruedo/tick", _tick(step, 32767)) for step in range(1, _MOST_STEPS))
+    return _answer(request) + b"".join(ticks)
+
+
+def grants_and_ever_new_infos(info: lcmtypes.world_info_t) -> Callable[..., bytes]:
+    """Answers JOIN and GRANT, then sends 200 MB of infos whose channels have other names each."""
+    changing = [lcmtypes.channel_info_t() for _ in range(100)]
+    known = list(info.channels)
+
+    def of(utime: int) -> bytes:
+        info.utime = utime
+        for number, channel in enumerate(changing):
+            channel.name = f"{utime}/{number}/" + "x" * 1000
+        info.channels = known + changing
+        info.nchannels = len(info.channels)
+        return frame("ruedo/info", info.encode())
+
+    def answer(request) -> bytes:
+        if request.kind != request.GRANT:
+            return _answer(request)
+        return _answer(request) + b"".join(of(100_000 + number) for number in range(1700))
+
     return answer
 
 
@@ -66,6 +89,7 @@ class LyingStream:
             host, port = where.split(":")
             self._listening = socket.create_server((host, int(port)))
         self._listening.listen(100)
+        self.granted = threading.Event()  # and all of the answer was taken
         self._open: list[socket.socket] = []
         threading.Thread(target=self._accept, daemon=True).start()
 
@@ -116,5 +140,7 @@ class LyingStream:
             if kind == 1 and data[8 : 8 + length] == b"ruedo/request":
                 request = lcmtypes.request_t.decode(data[12 + length : end])
                 client.sendall(self._answer(request))
+                if request.kind == request.GRANT:
+                    self.granted.set()
             data = data[end:]
         return data

@@ -7,7 +7,6 @@ thread would take longer than the step.
 
 from __future__ import annotations
 
-import bisect
 import math
 import struct
 import time
@@ -22,6 +21,7 @@ import numpy as np
 
 from . import arrivals, lcmtypes
 from .arguments import shown
+from .channel_names import ChannelNames
 from .control import State, state_of
 from .decoding import decode
 from .errors import (
@@ -184,24 +184,10 @@ class _Step:
     def complete(self) -> bool:
         return not self.missing and len(self.parts) == self.nparts
 
-    def messages(self, infos: list[WorldInfo]) -> arrivals.Arrived:
-        """infos: as Stepper keeps them."""
+    def messages(self, names: ChannelNames) -> arrivals.Arrived:
         entries = (entry for part in range(self.nparts) for entry in self.parts[part])
-        before = bisect.bisect_left(infos, self.utime, key=_utime_of) - 1
-        known = infos[max(before, 0) :]
-        return [(_name_of(known, entry.channel), entry.data) for entry in entries]
-
-
-def _utime_of(info: WorldInfo) -> int:
-    return info.utime
-
-
-def _name_of(infos: list[WorldInfo], channel: int) -> str:
-    """Where the info of that time was lost, the next one that has a name says it."""
-    for info in infos:
-        if channel < len(info.channel_list) and (name := info.channel_list[channel].name):
-            return str(name)
-    return ""
+        names.go_to(self.utime)
+        return [(names.of(entry.channel), entry.data) for entry in entries]
 
 
 class Stepper:
@@ -229,9 +215,7 @@ class Stepper:
         self._fresh: deque[tuple[str, bytes]] = deque(maxlen=_MOST_FRESH)  # since the last tick
         self._steps: dict[int, _Step] = {}  # those of which something is missing, and later ones
         self._listed = 0  # messages in their manifests
-        # Of the steps that were not collected yet: robots come and go, and others take the places
-        # of their channels. Each holds for the steps after its utime, the first for all before.
-        self._infos: list[WorldInfo] = []
+        self._names = ChannelNames()  # in the step that is being collected
         # Utime, number, hash and messages of the steps up to _have that were not collected yet.
         self._whole: list[tuple[int, int, int, arrivals.Arrived | _Step]] = []
         self._early: dict[
@@ -331,7 +315,7 @@ class Stepper:
         self._forget_steps()
         self._fresh.clear()
         self._whole.clear()
-        self._infos = [self._connection.info]
+        self._names.begin(self._connection.info)
         self._taken, self._fault, self._waits_for = True, None, ""
         self._part = True
 
@@ -485,10 +469,9 @@ class Stepper:
         steps = []
         for utime, number, state_hash, came in self._whole:
             self._last = (utime, number, state_hash)
-            steps.append((number, came.messages(self._infos) if isinstance(came, _Step) else came))
+            steps.append((number, came.messages(self._names) if isinstance(came, _Step) else came))
         self._whole = []
-        while len(self._infos) > 1 and self._infos[1].utime <= self._last[0]:
-            del self._infos[0]
+        self._names.go_to(self._last[0])
         return observed(self._last, steps)
 
     # Putting ticks and messages together, as they come: in any order, twice, or not at all.
@@ -543,11 +526,8 @@ class Stepper:
         return False
 
     def on_info(self, info: WorldInfo) -> None:
-        if not self._part:
-            return
-        while len(self._infos) > 1 and self._infos[-1].utime >= info.utime:
-            self._infos.pop()  # changed twice between the same two states
-        self._infos.append(info)
+        if self._part:
+            self._names.change(info)
 
     def on_tick(self, data: bytes) -> None:
         if not self._part:

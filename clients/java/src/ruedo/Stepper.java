@@ -82,9 +82,7 @@ final class Stepper {
     private WorldInfo info; // whose channels are subscribed
     private final List<String> names =
             new ArrayList<>(); // of what is subscribed, by the channel's index; "": not
-    // Of the states that are not collected yet: each holds for those after its utime, and the first
-    // for all before, too.
-    private final ArrayList<WorldInfo> infos = new ArrayList<>();
+    private final ChannelNames channelNames = new ChannelNames(); // of the state being collected
     private final List<Subscription> sources = new ArrayList<>();
     private long runId;
     private int epoch;
@@ -206,8 +204,7 @@ final class Stepper {
             grantFrom = -1;
             taken = true;
             fault = null;
-            infos.clear();
-            infos.add(sim.info());
+            channelNames.begin(sim.info());
             waitsFor = "";
             part = true;
         }
@@ -402,21 +399,6 @@ final class Stepper {
         return wanted;
     }
 
-    /**
-     * The name that the message's channel had in that state: robots come and go, and others take
-     * their places. Where the info from before was lost, the next one that has a name says it.
-     */
-    private String channelOf(Entry entry, long utime) {
-        int at = 0;
-        while (at + 1 < infos.size() && infos.get(at + 1).head.utime < utime) at++;
-        for (; at < infos.size(); at++) {
-            List<channel_info_t> channels = infos.get(at).channelList;
-            if (entry.channel < channels.size() && !channels.get(entry.channel).name.isEmpty())
-                return channels.get(entry.channel).name;
-        }
-        return "";
-    }
-
     private synchronized Observations collect() {
         List<Observations.Message> messages = new ArrayList<>();
         for (Iterator<java.util.Map.Entry<Long, Step>> all =
@@ -426,14 +408,14 @@ final class Stepper {
             java.util.Map.Entry<Long, Step> next = all.next();
             Step step = next.getValue();
             last = new long[] {step.utime, next.getKey(), step.stateHash};
+            channelNames.goTo(step.utime);
             for (List<Entry> entries : step.parts) {
                 for (Entry entry : entries) {
-                    String name = channelOf(entry, step.utime);
+                    String name = channelNames.of(entry.channel);
                     messages.add(new Observations.Message(next.getKey(), name, entry.data));
                 }
             }
         }
-        while (infos.size() > 1 && infos.get(1).head.utime <= last[0]) infos.remove(0);
         return new Observations(last[0], last[1], last[2], messages);
     }
 
@@ -479,10 +461,7 @@ final class Stepper {
     }
 
     synchronized void onInfo(WorldInfo info) {
-        if (!part) return;
-        while (infos.size() > 1 && infos.get(infos.size() - 1).head.utime >= info.head.utime)
-            infos.remove(infos.size() - 1); // changed twice between the same two states
-        infos.add(info);
+        if (part) channelNames.change(info);
     }
 
     synchronized void onTick(byte[] message) {
