@@ -201,7 +201,7 @@ def test_a_refusal_reaches_no_terminal(language, stream_url):
         reply = lcmtypes.reply_t()
         reply.run_id, reply.sequence, reply.kind = 7, request.sequence, request.kind
         reply.code, reply.text = reply.REFUSED, "\x1b]0;\u202eowned\x07"
-        return frame("ruedo/reply", reply.encode())
+        return [frame("ruedo/reply", reply.encode())]
 
     knows_all = info([])
     knows_all.features = (1 << 40) - 1

@@ -6,7 +6,7 @@ import contextlib
 import socket
 import struct
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 
 from ruedo import lcmtypes
 
@@ -43,15 +43,15 @@ def _answer(request) -> bytes:
     return frame("ruedo/reply", reply.encode())
 
 
-def grants_and_huge_ticks(request) -> bytes:
+def grants_and_huge_ticks(request) -> Iterable[bytes]:
     """Answers JOIN and GRANT, then sends a part of each of a thousand ticks of 32767 parts."""
-    if request.kind != request.GRANT:
-        return _answer(request)
-    ticks = (frame("ruedo/tick", _tick(step, 32767)) for step in range(1, _MOST_STEPS))
-    return _answer(request) + b"".join(ticks)
+    yield _answer(request)
+    if request.kind == request.GRANT:
+        for step in range(1, _MOST_STEPS):
+            yield frame("ruedo/tick", _tick(step, 32767))
 
 
-def grants_and_ever_new_infos(info: lcmtypes.world_info_t) -> Callable[..., bytes]:
+def grants_and_ever_new_infos(info: lcmtypes.world_info_t) -> Callable[..., Iterable[bytes]]:
     """Answers JOIN and GRANT, then sends 200 MB of infos whose channels have other names each."""
     changing = [lcmtypes.channel_info_t() for _ in range(100)]
     known = list(info.channels)
@@ -64,10 +64,11 @@ def grants_and_ever_new_infos(info: lcmtypes.world_info_t) -> Callable[..., byte
         info.nchannels = len(info.channels)
         return frame("ruedo/info", info.encode())
 
-    def answer(request) -> bytes:
-        if request.kind != request.GRANT:
-            return _answer(request)
-        return _answer(request) + b"".join(of(100_000 + number) for number in range(1700))
+    def answer(request) -> Iterable[bytes]:
+        yield _answer(request)
+        if request.kind == request.GRANT:
+            for number in range(1700):
+                yield of(100_000 + number)
 
     return answer
 
@@ -78,7 +79,10 @@ class LyingStream:
     """
 
     def __init__(
-        self, url: str, sent: bytes, answer: Callable[[lcmtypes.request_t], bytes] | None = None
+        self,
+        url: str,
+        sent: bytes,
+        answer: Callable[[lcmtypes.request_t], Iterable[bytes]] | None = None,
     ):
         self.url, self._sent, self._answer = url, sent, answer
         scheme, _, where = url.partition("://")
@@ -139,7 +143,8 @@ class LyingStream:
                 break
             if kind == 1 and data[8 : 8 + length] == b"ruedo/request":
                 request = lcmtypes.request_t.decode(data[12 + length : end])
-                client.sendall(self._answer(request))
+                for part in self._answer(request):
+                    client.sendall(part)
                 if request.kind == request.GRANT:
                     self.granted.set()
             data = data[end:]
