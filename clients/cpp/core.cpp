@@ -259,7 +259,7 @@ void Core::begin_run() {
   std::vector<std::shared_ptr<StreamCore>> streams;
   {
     const std::lock_guard lock(mutex_);
-    utime_ = 0;
+    utime_ = known_->utime;
     for (const auto& [name, driver] : std::exchange(drivers_, {})) drivers.push_back(driver);
     for (const auto& [name, stream] : streams_) streams.push_back(stream);
   }
@@ -377,7 +377,7 @@ void Core::on_info(const uint8_t* bytes, size_t size) {
     if (fault) fault_ = fault;
     if (!fault) last_sign_ = Clock::now().time_since_epoch().count();
     if (info) {
-      if (before && info->epoch != before->epoch) utime_ = 0;
+      if (!before || info->epoch != before->epoch) utime_ = info->utime;
       known_ = info;
     }
   }

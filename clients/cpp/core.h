@@ -75,7 +75,7 @@ class Core : public std::enable_shared_from_this<Core> {
 
   void keep_repeating(const std::shared_ptr<Driver>& driver);
   void note_time(int64_t utime);
-  void reset_time() { utime_ = 0; }
+  void reset_time(int64_t utime) { utime_ = utime; }
   void note_tick(int64_t utime);
   void sleep(int64_t duration);  // us
   // After the set of models changed; before: the info from before that, null: the one that is known

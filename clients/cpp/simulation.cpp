@@ -162,7 +162,7 @@ void Simulation::reset(Reset what, int64_t seed) const {
   body.seed = seed;
   core()->session().request(request_t::RESET, encoded(body), kSlowReplyTime);
   if (what == Reset::poses) return;
-  core()->reset_time();
+  core()->reset_time(0);
   core()->stepper().forget();
 }
 
@@ -228,7 +228,7 @@ State Simulation::snapshot(const std::string& name) const {
 State Simulation::restore(const std::string& name) const {
   const State state =
       state_of(core()->session().request(request_t::RESTORE, name_body(name), kRestoreTime));
-  core()->reset_time();
+  core()->reset_time(state.utime);
   core()->stepper().forget();
   return state;
 }

@@ -6,6 +6,7 @@ import math
 
 import lcm
 import pytest
+import ruedo
 from conftest import HERE, PATIENCE, probe, ruedo_run
 from ruedo import lcmtypes
 
@@ -202,6 +203,18 @@ def test_control(language):
 def test_paused_simulation_is_joined(language):
     with ruedo_run("--paused", "--disable", "p3at/camera", world=HALL) as server:
         assert probe(language, server.url, "connect").one("connected") == "hall"
+
+
+def test_who_joins_a_run_or_restores_one_sleeps_as_long_as_asked(language, tmp_path):
+    """The client's clock stood at 0 until the first tick, which then counted as slept."""
+    options = ("--disable", "p3at/camera", "--snapshots", str(tmp_path))
+    with ruedo_run(*options, world=HALL) as server:
+        with ruedo.connect(server.url, timeout=PATIENCE) as sim:
+            sim.sleep(2.0)
+        said = probe(language, server.url, "sleeps", "0.3")
+    for what in "slept", "slept_again":
+        begin, slept = map(float, said.words(what))
+        assert begin > 1.9 and slept >= 0.3, (what, begin, slept)
 
 
 def test_a_slow_simulation_is_joined_as_fast(language):

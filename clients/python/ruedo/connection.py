@@ -313,8 +313,8 @@ class Connection:
             new_epoch = bool(before and info and info.epoch != before.epoch)
             if info:
                 self._known = info
-                if new_epoch:
-                    self.clock.reset()
+                if new_epoch or not before:
+                    self.clock.reset(info.utime)
             self._news.notify_all()
         if not info:
             return
@@ -353,7 +353,7 @@ class Connection:
     def _begin_run(self) -> None:
         """The server was restarted, or another has taken its place."""
         self._watch.begin()
-        self.clock.reset()
+        self.clock.reset(self.info.utime)
         self.drivers.end_all("new run")
         self.streams.forget()
         log.warning("another run has begun at %s: commands are not repeated into it", self.url)

@@ -300,6 +300,16 @@ public final class Probe {
         attempt("steps", () -> sim.step(0));
     }
 
+    private static void sleeps(Simulation sim, double seconds) {
+        double begin = sim.time();
+        sim.sleep(seconds);
+        say("slept", begin, sim.time() - begin);
+        sim.snapshot("here");
+        begin = sim.restore("here").time();
+        sim.sleep(seconds);
+        say("slept_again", begin, sim.time() - begin);
+    }
+
     private static void snapshots(Simulation sim) {
         String first = sim.spawn("p3at", 3.0, 1.0, 0.0, ""),
                 second = sim.spawn("p3at", 3.0, -1.0, 0.0, "");
@@ -581,6 +591,9 @@ public final class Probe {
                     break;
                 case "snapshots":
                     snapshots(sim);
+                    break;
+                case "sleeps":
+                    sleeps(sim, Double.parseDouble(a[0]));
                     break;
                 case "quit":
                     sim.quit();

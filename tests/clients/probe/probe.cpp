@@ -282,6 +282,16 @@ void snapshots(const rc::Simulation& sim) {
   say("steps", saved.step, later.step);
 }
 
+void sleeps(const rc::Simulation& sim, double seconds) {
+  double begin = sim.time();
+  sim.sleep(rc::Duration(seconds));
+  say("slept", begin, sim.time() - begin);
+  sim.snapshot("here");
+  begin = sim.restore("here").time();
+  sim.sleep(rc::Duration(seconds));
+  say("slept_again", begin, sim.time() - begin);
+}
+
 void world(const rc::Simulation& sim, const std::string& text) {
   sim.spawn("p3at", 3.0, 1.0, {.name = "guest"});
   const rc::Robot guest = sim.robot("guest");
@@ -507,6 +517,7 @@ void act(const std::string& url, const std::string& command, const std::vector<s
   if (command == "control") control(sim, a[0]);
   if (command == "world") world(sim, a[0]);
   if (command == "snapshots") snapshots(sim);
+  if (command == "sleeps") sleeps(sim, std::stod(a[0]));
   if (command == "quit") {
     sim.quit();
     say("quit", true);

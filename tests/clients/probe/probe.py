@@ -198,6 +198,16 @@ def markers(sim, name):
     sim.sleep(0.2)
 
 
+def sleeps(sim, seconds):
+    begin = sim.time
+    sim.sleep(float(seconds))
+    say("slept", begin, sim.time - begin)
+    sim.snapshot("here")
+    begin = sim.restore("here").time
+    sim.sleep(float(seconds))
+    say("slept_again", begin, sim.time - begin)
+
+
 def streams(sim, name, lrf, odometry):
     robot = sim.robot(name)
     attempt("lrf", lambda: robot.lrf.latest(float(lrf)))
@@ -427,6 +437,7 @@ def main():
                 "errors": lambda: errors(sim, *rest),
                 "markers": lambda: markers(sim, *rest),
                 "streams": lambda: streams(sim, *rest),
+                "sleeps": lambda: sleeps(sim, *rest),
                 "control": lambda: control(sim, *rest),
                 "world": lambda: world(sim, *rest),
                 "snapshots": lambda: snapshots(sim),

@@ -640,7 +640,7 @@ public final class Simulation implements AutoCloseable {
         List<Driver> all;
         List<StreamCore<?>> known;
         watch.begin();
-        utime = 0;
+        utime = info().head.utime;
         synchronized (robots) {
             all = new ArrayList<>(drivers.values());
             known = new ArrayList<>(streams.values());
@@ -671,7 +671,8 @@ public final class Simulation implements AutoCloseable {
             if (wrong != null) fault = wrong;
             if (wrong == null) lastSign = System.nanoTime();
             if (info != null) {
-                if (before != null && before.head.epoch != info.head.epoch) utime = 0;
+                if (before == null || before.head.epoch != info.head.epoch)
+                    utime = info.head.utime;
                 known = info;
             }
             news.notifyAll();
