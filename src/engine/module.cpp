@@ -139,10 +139,23 @@ void Module::make_scenes(const SceneMakers& makers) {
   renderer_ = makers.renderer();
 }
 
+// Not only where a sample is due: a faulty device may let go at any step what it kept.
+bool Module::looks_at_each_step(const Batch& batch) const {
+  if (observes_ || !batch.sensor_faults) return observes_;
+  return std::any_of(
+      batch.sensor_faults->begin(), batch.sensor_faults->end(), [&](const SensorFault& fault) {
+        return fault.begin < batch.first_step + batch.count && fault.end > batch.first_step &&
+               std::any_of(setup_.devices.begin(), setup_.devices.end(), [&](const Device& device) {
+                 return device.robot == fault.robot && device.name == fault.device;
+               });
+      });
+}
+
 void Module::process(const Batch& batch, Batch::Output& output, const std::atomic<bool>& left_off) {
   for (Outbox& outbox : output.pieces) outbox.clear();
   const int64_t end = batch.first_step + batch.count;
-  if (!rays_ && !visual_rays_ && (observes_ || batch.sensor_faults || pieces() > 1)) {
+  const bool each_step = looks_at_each_step(batch);
+  if (!rays_ && !visual_rays_ && (each_step || pieces() > 1)) {
     process_pieces(batch, output, 0, batch.count, left_off);
     to_sample_.pass(end - 1);
     return;
@@ -165,9 +178,7 @@ void Module::process(const Batch& batch, Batch::Output& output, const std::atomi
     begin = i + 1;
     to_sample_.pass(batch.first_step + i);
   }
-  // Between samples devices observe, and what a fault kept is let go.
-  if ((observes_ || batch.sensor_faults) && begin < batch.count)
-    process_pieces(batch, output, begin, batch.count, left_off);
+  if (each_step && begin < batch.count) process_pieces(batch, output, begin, batch.count, left_off);
 }
 
 void Module::process_pieces(const Batch& batch, Batch::Output& output, int begin, int end,

@@ -110,10 +110,9 @@ class Module {
   bool has_renderer() const { return renderer_ != nullptr; }
 
   // For the thread that makes batches: whether a batch has work for it; and that it gets the one up
-  // to `last_step`. A faulty device may let go at any step what it kept.
+  // to `last_step`.
   bool wants(const Batch& batch) const {
-    return observes_ || batch.sensor_faults ||
-           to_hand_over_.next() < batch.first_step + batch.count;
+    return looks_at_each_step(batch) || to_hand_over_.next() < batch.first_step + batch.count;
   }
   void pass(int64_t last_step) { to_hand_over_.pass(last_step); }
 
@@ -167,6 +166,7 @@ class Module {
   };
 
   Slot slot_of(const Device& device) const;
+  bool looks_at_each_step(const Batch& batch) const;
   bool is_read(size_t k, const ReadChannels* read, const std::vector<SensorFault>* faults) const;
   void reseed(size_t k, const std::vector<Reseeding>& reseedings, int64_t step);
   void pass_over(size_t k, const Snapshot& snapshot);

@@ -145,6 +145,28 @@ TEST(FaultsKeep, NothingInAModule) {
   EXPECT_LT(in_use() - before, kLarge / 2);
 }
 
+TEST(ModuleOfFaultyDevices, LooksAtEachStepWhileItHasOne) {
+  engine::ModuleSetup setup;
+  setup.devices.push_back({std::make_unique<LargeSensor>(), {0, 1}});
+  setup.devices[0].robot = RobotIndex(0);
+  setup.devices[0].name = "eye";
+  setup.devices[0].first_step = 100;  // its first sample
+  const engine::Module module(std::move(setup));
+  engine::Batch batch;
+  const auto wants = [&](const char* device, int64_t first_step) {
+    batch.sensor_faults = std::make_shared<std::vector<SensorFault>>(
+        std::vector<SensorFault>{fault(Kind::lag, 1, 5, 8, device)});
+    batch.first_step = first_step;
+    batch.count = 2;
+    return module.wants(batch);
+  };
+  EXPECT_FALSE(wants("eye", 3));  // steps 3 and 4
+  EXPECT_TRUE(wants("eye", 4));
+  EXPECT_TRUE(wants("eye", 7));
+  EXPECT_FALSE(wants("eye", 8));
+  EXPECT_FALSE(wants("ear", 5));
+}
+
 class FaultsTest : public testing::Test {
  protected:
   static std::vector<device_info_t> one_device() {
