@@ -30,14 +30,16 @@ def walls(distance):
     return World("walls").wall(distance, -2, distance, 2).robot("p3at")
 '''
 
-# PAUSE, in s of real time for each view, is for who wants to meet the campaign half done.
+# HOLD names a file: while there is one, bold cases wait, for who wants to meet the campaign half
+# done. Those are the cases 2, 3, 6 and 7.
 CONTROLLER = '''
 import os
 import time
 
 
 def ahead(view):
-    time.sleep(float(os.environ.get("PAUSE", 0)))
+    while os.path.exists(os.environ.get("HOLD", "")) and view.parameters["bold"]:
+        time.sleep(0.01)
     near = view["lrf.ranges"].min() < 0.6
     return (0.0, 0.0) if near and not view.parameters["bold"] else (0.5, 0.0)
 '''
