@@ -14,13 +14,14 @@ from contextlib import suppress
 from multiprocessing.connection import Connection, wait
 from pathlib import Path
 from pickle import UnpicklingError
-from typing import Any
+from typing import Any, Literal
 
 from .case import Outcome, remove_scratch, too_slow
 from .errors import CampaignError
 from .plan import Case
 from .processes import ends_within, kill_with_descendants
 
+_START = 300.0  # s that a worker has to begin a case; it may have been started for it
 _GRACE = 5.0  # s beyond a case's own limit, before its worker is killed
 _PARTING = 2.0  # s that a worker has to end what it has started
 _TRIES = 2  # of a case whose worker was killed
@@ -49,30 +50,37 @@ class Worker:
         self.pipe = Connection(ours.detach())
         self.case: Case | None = None
         self.tries = 0
+        self._has_begun = False
         self._until = 0.0
 
     def give(self, case: Case, tries: int = 1, full_log: str = "") -> None:
         self.case, self.tries = case, tries
-        turns = 2 if case.what["metrics"] else 1  # they have as long as the run
-        self._until = time.monotonic() + turns * case.what["limits"]["wall"] + _GRACE
+        self._has_begun = False
+        self._until = time.monotonic() + _START
         try:
             self.pipe.send((case.id, case.what, full_log))
         except OSError:
             pass  # it was killed while idle: its pipe is at its end
 
     def left_s(self) -> float:
-        """Until it must have answered."""
+        """Until it must have begun, or answered."""
         return max(0.0, self._until - time.monotonic())
 
-    def take(self) -> tuple[dict[str, Any], float] | None:
+    def take(self) -> tuple[dict[str, Any], float] | Literal["begun"] | None:
         """The outcome, and how long it took; None: it is gone, or not itself any more. Raises
         CampaignError where its machine cannot run the case.
         """
         assert self.case is not None
         try:
-            case, outcome, wall_s = self.pipe.recv()
+            said = self.pipe.recv()
         except (EOFError, OSError, UnpicklingError):
             return None
+        if not self._has_begun and said == self.case.id:
+            self._has_begun = True
+            turns = 2 if self.case.what["metrics"] else 1  # they have as long as the run
+            self._until = time.monotonic() + turns * self.case.what["limits"]["wall"] + _GRACE
+            return "begun"
+        case, outcome, wall_s = said
         if isinstance(outcome, CampaignError):
             self.case = None
             raise outcome
@@ -145,6 +153,8 @@ class Crew:
             assert one.case is not None
             case, tries = one.case, one.tries
             answer = one.take() if one.pipe in ready else None
+            if answer == "begun":
+                continue
             if answer:
                 one.case = None
                 if waiting:

@@ -1,5 +1,5 @@
-"""A worker's process: python -m ruedo.campaign.worker FD FOLDER. Cases come in by the pipe,
-outcomes go out, or what is wrong with the machine.
+"""A worker's process: python -m ruedo.campaign.worker FD FOLDER. Cases come in by the pipe; that
+one has begun goes out, and then its outcome, or what is wrong with the machine.
 """
 
 from __future__ import annotations
@@ -31,6 +31,7 @@ def work(pipe: Connection, folder: str) -> None:
             case, what, full_log = pipe.recv()
         except (EOFError, OSError):
             return
+        pipe.send(case)  # it has begun
         begin = time.monotonic()
         try:
             outcome: dict[str, Any] | CampaignError = runner.run(what, full_log).as_dict()
