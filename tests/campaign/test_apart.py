@@ -269,6 +269,42 @@ def test_output_that_nobody_has_looked_at_is_told_as_bounded(tmp_path, monkeypat
     said.close()
 
 
+def blocks_bytes(descriptor):
+    return os.fstat(descriptor).st_blocks * 512
+
+
+def test_what_is_printed_while_its_file_is_bounded_is_kept(tmp_path, monkeypatch):
+    """Regression: what came between the look at the file and the cut was lost."""
+    free = output._fallocate
+
+    def free_late(descriptor, *rest):
+        os.write(descriptor, b"meanwhile, ")
+        return free(descriptor, *rest)
+
+    monkeypatch.setattr(output, "_fallocate", free_late)
+    said = output.Output(str(tmp_path / "output"))
+    os.write(said.descriptor, b"x" * (2 << 20))
+    wait_for(lambda: blocks_bytes(said.descriptor) < 1 << 20)
+    os.write(said.descriptor, b"the end")
+    assert said.text().startswith("(it printed more than 1 MB;")
+    assert said.text().endswith("xmeanwhile, the end") and len(said.text()) < 5000
+    os.truncate(said.descriptor, 0)  # by who prints
+    os.write(said.descriptor, b"y" * (2 << 20))
+    wait_for(lambda: blocks_bytes(said.descriptor) < 1 << 20)
+    said.close()
+
+
+def test_output_is_bounded_where_no_part_of_a_file_can_be_freed(tmp_path, monkeypatch):
+    monkeypatch.setattr(output, "_fallocate", lambda *_: -1)
+    said = output.Output(str(tmp_path / "output"))
+    os.write(said.descriptor, b"x" * (2 << 20))
+    wait_for(lambda: blocks_bytes(said.descriptor) == 0)
+    os.write(said.descriptor, b"the end")
+    assert said.text().startswith("(it printed more than 1 MB;")
+    assert said.text().endswith("xthe end") and len(said.text()) < 5000
+    said.close()
+
+
 @pytest.mark.parametrize("way", ["python", "command"])
 def test_output_is_bounded(tmp_path, way):
     """Regression: half a GB a case, in memory."""
