@@ -12,9 +12,11 @@ import os
 import struct
 import subprocess
 import sys
+import tempfile
 import threading
 import time
 from collections.abc import Callable, Iterator
+from typing import IO
 from urllib.parse import urlsplit
 
 import pytest
@@ -45,31 +47,17 @@ def one_bus(first: Server, second: Server) -> Iterator[None]:
         relay.wait()
 
 
-def heard_beside(sim: ruedo.Simulation, enough: int = 5) -> None:
-    """Waits for ticks of another run than the client's."""
-    came = threading.Semaphore(0)
-
-    def hear(data: bytes) -> None:
-        if lcmtypes.tick_t.decode(data).run_id != sim._info.run_id:
-            came.release()
-
-    with sim._connection.bus.subscribe("ruedo/tick", hear):
-        for _ in range(enough):
-            assert came.acquire(timeout=PATIENCE)
-
-
-def started(language: str, url: str, *command: str) -> subprocess.Popen[str]:
+def started(
+    language: str, url: str, *command: str, errors: int | IO[str] = subprocess.PIPE
+) -> subprocess.Popen[str]:
     return subprocess.Popen(
-        [*PROBES[language], url, *command],
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
+        [*PROBES[language], url, *command], stdout=subprocess.PIPE, stderr=errors, text=True
     )
 
 
 def ended(client: subprocess.Popen[str]) -> tuple[list[str], str]:
     said, errors = client.communicate(timeout=PATIENCE)
-    assert client.returncode == 0, said + errors
+    assert client.returncode == 0, (said, errors)
     return said.splitlines(), errors
 
 
@@ -119,34 +107,46 @@ def test_motions_end_beside_a_status_of_a_false_time(language):
         assert line[1:5] == ["False", "True", "done", "-"], said
 
 
-def in_lockstep(
-    language: str, beside: Callable[[Server, ruedo.Simulation], contextlib.AbstractContextManager]
-) -> tuple[list[str], str]:
+Beside = Callable[[Server, ruedo.Simulation, Callable[[], str]], contextlib.AbstractContextManager]
+
+
+def in_lockstep(language: str, beside: Beside) -> tuple[list[str], str]:
     """What a client in lockstep says at its end, and its errors. From its first steps on `beside`
     goes on.
     """
     with (
         ruedo_run("--lockstep", "2", "--lease", str(PATIENCE), *QUICK, world=HALL) as server,
         ruedo.connect(server.url, name="pace", timeout=PATIENCE) as pace,
+        tempfile.TemporaryFile("w+") as file,
     ):
-        client = started(language, server.url, "lockstep", "client", "p3at", "100", "10", "0.2")
+
+        def errors() -> str:
+            return os.pread(file.fileno(), 1 << 20, 0).decode()  # the client writes at the offset
+
+        command = ("lockstep", "client", "p3at", "100", "10", "0.2")
+        client = started(language, server.url, *command, errors=file)
         pace.step(0, timeout=PATIENCE)
         assert client.stdout.readline().startswith("begin")
-        with beside(server, pace):
+        with beside(server, pace, errors):
             for _ in range(10):
                 pace.step(10, timeout=PATIENCE)
-            return ended(client)
+            return ended(client)[0], errors()
 
 
 @contextlib.contextmanager
-def nothing(server: Server, pace: ruedo.Simulation) -> Iterator[None]:
+def nothing(server: Server, pace: ruedo.Simulation, errors: Callable[[], str]) -> Iterator[None]:
     yield
 
 
 @contextlib.contextmanager
-def another_server(server: Server, pace: ruedo.Simulation) -> Iterator[None]:
+def another_server(
+    server: Server, pace: ruedo.Simulation, errors: Callable[[], str]
+) -> Iterator[None]:
     with ruedo_run(*QUICK, world=HALL) as second, one_bus(server, second):
-        heard_beside(pace)
+        deadline = time.monotonic() + PATIENCE
+        while BESIDE not in errors():
+            assert time.monotonic() < deadline
+            time.sleep(0.01)
         yield
 
 
@@ -163,7 +163,9 @@ def false_tick(run_id: int, step: int, nparts: int = 1) -> bytes:
 
 
 @contextlib.contextmanager
-def false_ticks(server: Server, pace: ruedo.Simulation) -> Iterator[None]:
+def false_ticks(
+    server: Server, pace: ruedo.Simulation, errors: Callable[[], str]
+) -> Iterator[None]:
     """Of all steps to come, before the true ones."""
     with Datagrams(server.url) as stranger:
         for step in [*range(1, 101), 2**63 - 1, -(2**63)]:
