@@ -260,7 +260,9 @@ export default async function controls(tools) {
     },
     clicked,
   );
-  // ---- going to a clicked point
+  // ---- going to a clicked point: paused, so that the robot is not there before all was looked at
+  await page.locator("#pause").click();
+  await until("(it is paused)", () => document.getElementById("state").textContent === "paused");
   await page.locator("#canvas").focus();
   await page.keyboard.press("g");
   const near = await click([0.8, -1]);
@@ -305,6 +307,7 @@ export default async function controls(tools) {
       isAt(3, last),
     JSON.stringify([way, near, last]),
   );
+  await page.locator("#pause").click();
   await until(
     "the robot goes to where the clicks were",
     ([x, y]) => {

@@ -1,6 +1,6 @@
 // A viewer by Foxglove's own client library: foxglove.mjs URL SECONDS TOPIC... Subscribes to those
 // of the topics that are advertised, publishes a Twist on /cmd_vel four times a second, and prints
-// a line of JSON for each message.
+// a line of JSON for each message. SECONDS: of sim time, from the first that is heard of.
 import { createRequire } from "node:module";
 
 const require = createRequire(`${process.cwd()}/`); // the build's folder, where the packages are
@@ -33,7 +33,12 @@ client.on("advertise", (channels) => {
   }
 });
 client.on("status", (status) => say({ status }));
-client.on("time", ({ timestamp }) => say({ time: String(timestamp) }));
+let first = null; // ns
+client.on("time", ({ timestamp }) => {
+  say({ time: String(timestamp) });
+  first ??= timestamp;
+  if (Number(timestamp - first) >= 1e9 * Number(seconds)) client.close();
+});
 client.on("message", ({ subscriptionId, timestamp, data }) =>
   say({
     topic: topicOf.get(subscriptionId),
@@ -41,4 +46,3 @@ client.on("message", ({ subscriptionId, timestamp, data }) =>
     text: new TextDecoder().decode(data),
   }),
 );
-setTimeout(() => client.close(), 1000 * Number(seconds));

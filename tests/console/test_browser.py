@@ -159,18 +159,15 @@ def test_any_field_is_plotted(tmp_path):
 
 def test_a_log_is_plotted_whole(tmp_path):
     """Its times, least and most are the log's, however many messages there are."""
-    from ruedo.lcmtypes import odometry_t, velocity_command_t
+    import ruedo
+    from ruedo.lcmtypes import odometry_t
 
     log = tmp_path / "run.lcm"
-    options = ("--disable", "p3at/camera", "--rate", "max", "--duration", "99.98")
-    with running(*options, "--record", log) as process:
-        driver = Socket(process.port)
-        command = velocity_command_t()
-        command.vx, command.omega = 0.5, 1.0
-        while process.poll() is None:
-            with contextlib.suppress(OSError):  # when it has just ended
-                driver.command("p3at/velocity", command)
-            time.sleep(0.02)
+    options = ("--disable", "p3at/camera", "--rate", "max", "--duration", "99.98", "--paused")
+    with running(*options, "--record", log) as process, ruedo.connect(timeout=60) as sim:
+        sim.robot("p3at").arc(6.0, 0.5, speed=0.03)  # once round, for 100 s
+        sim.resume()
+        process.wait(300)
     found = [
         (time_us * 1e-6, odometry_t.decode(data).x)
         for channel, time_us, data in events(log)
@@ -208,6 +205,7 @@ def test_what_happened_in_a_log_is_jumped_to(crash, tmp_path):
     """A motion primitive, a collision, the watchdog and a fault: each at the time at which the log
     has it.
     """
+    import ruedo
     from ruedo.lcmtypes import (
         applied_t,
         collisions_t,
@@ -221,14 +219,21 @@ def test_what_happened_in_a_log_is_jumped_to(crash, tmp_path):
     ahead, drive = move_command_t(), velocity_command_t()
     ahead.id, ahead.kind, ahead.value = 1, move_command_t.ADVANCE, 0.1
     drive.vx = 0.5
-    options = ("--record", log, "--duration", "7", "--fault", "p3dx:weak_motor@6.5,value=0.5")
-    with running(*options, world=crash) as process:
-        driver = Socket(process.port)
+    options = ("--record", log, "--fault", "p3dx:weak_motor@6.5,value=0.5")
+    with running(*options, world=crash) as process, ruedo.connect(timeout=60) as sim:
+        driver, robot = Socket(process.port), sim.robot("p3dx")
         driver.command("p3dx/move", ahead)
-        time.sleep(1.5)
-        for _ in range(20):
+        while robot.motion.latest(60).state != "done":
+            time.sleep(0.05)
+        sim.sleep(1.0)
+        drives = 0
+        while drives < 20 or not robot.collisions.latest(60).points:
             driver.command("p3dx/velocity", drive)
+            drives += 1
             time.sleep(0.1)
+        while robot.motion.latest(60).reason != "watchdog" or sim.state().time < 7.0:
+            time.sleep(0.05)
+        sim.quit()
         process.wait(60)
     expected = {("fault", "p3dx", "weak_motor"): 6.5}
     for channel, time_us, data in events(log):
