@@ -52,7 +52,7 @@ def test_a_good_client_beside_them():
 
     with (
         ruedo_run("--disable", "p3at/camera", world=HALL) as server,
-        ruedo.connect(server.url) as sim,
+        ruedo.connect(server.url, timeout=PATIENCE) as sim,
     ):
         hammer("python", server.url)
         assert sim.robot("p3at").rotate(0.2).wait(PATIENCE).done

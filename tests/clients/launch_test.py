@@ -155,7 +155,7 @@ def test_a_server_that_dies_is_said():
         os.kill(servers_of(sim.url)[0], signal.SIGKILL)
         with pytest.raises(ruedo.NoServer, match="the server ended \\(signal SIGKILL\\)"):
             for _ in range(1000):
-                sim.robots[0].lrf.next(2.0)
+                sim.robots[0].lrf.next(PATIENCE)
 
 
 @pytest.mark.parametrize("as_text", [False, True])

@@ -10,7 +10,7 @@ import subprocess
 import sys
 
 import pytest
-from bare_test import bare, c_client, check_scans
+from bare_test import bare, c_client, scans_of
 from conftest import HERE, PATIENCE, PROBES, RUEDO, Server, free_url, probe, ruedo_run, tcp_server
 from docs_code import blocks
 
@@ -51,19 +51,8 @@ def test_bare_python_over_tcp(tmp_path):
         page["bare_python"].replace("from ruedo import", "from ruedo.lcmtypes import")
     )
     with tcp_server("--no-noise", *QUICK) as server:
-        done = subprocess.run(
-            [sys.executable, "client.py"],
-            cwd=tmp_path,
-            env={**os.environ, "LCM_DEFAULT_URL": server.url},
-            capture_output=True,
-            text=True,
-            timeout=PATIENCE,
-        )
-    assert done.returncode == 0, done.stderr
-    lines = check_scans(
-        "\n".join(line for line in done.stdout.splitlines() if not line.startswith("LCM"))
-    )
-    assert float(lines[0][2]) > float(lines[-1][2]) + 0.1
+        environment = {**os.environ, "LCM_DEFAULT_URL": server.url}
+        scans_of([sys.executable, "client.py"], environment, 2, tmp_path)
 
 
 @pytest.mark.parametrize("version", ["1.5.3", "1.3.1"])
@@ -72,18 +61,7 @@ def test_bare_c_over_tcp(tmp_path, version):
 
     c_client(tmp_path, *library_of(version))
     with tcp_server("--no-noise", *QUICK) as server:
-        done = subprocess.run(
-            [str(tmp_path / "client")],
-            env=bare(server),
-            capture_output=True,
-            text=True,
-            timeout=PATIENCE,
-        )
-    assert done.returncode == 0, done.stderr
-    lines = check_scans(
-        "\n".join(line for line in done.stdout.splitlines() if not line.startswith("LCM"))
-    )
-    assert float(lines[0][3]) > float(lines[-1][3]) + 0.1
+        scans_of([str(tmp_path / "client")], bare(server), 3)
 
 
 def test_raw_pictures_over_tcp():

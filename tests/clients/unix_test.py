@@ -136,7 +136,7 @@ def test_a_server_that_comes_back_is_heard_again(tmp_path):
     url = f"unix://{tmp_path}/bus"
     with (
         ruedo_run("--disable", "p3at/camera", world=HALL, url=url) as server,
-        ruedo.connect(url) as sim,
+        ruedo.connect(url, timeout=PATIENCE) as sim,
     ):
         sim.robot("p3at").pose.next()
         server.process.kill()

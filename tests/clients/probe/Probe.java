@@ -94,7 +94,7 @@ public final class Probe {
 
     private static void read(Simulation sim, String name) {
         Robot robot = sim.robot(name);
-        Scan scan = robot.lrf().latest();
+        Scan scan = robot.lrf().latest(PATIENCE);
         say(
                 "scan",
                 scan.ranges.length,
@@ -102,7 +102,7 @@ public final class Probe {
                 scan.angle(scan.ranges.length - 1),
                 scan.nearest(-Math.PI, Math.PI),
                 scan.intensities.length);
-        SonarReading reading = robot.sonar().latest();
+        SonarReading reading = robot.sonar().latest(PATIENCE);
         double largest = 0.0;
         for (float range : reading.ranges) largest = Math.max(largest, range);
         say(
@@ -111,16 +111,16 @@ public final class Probe {
                 largest,
                 reading.firedUtime.length,
                 reading.fresh.length);
-        Odometry odometry = robot.odometry().latest();
+        Odometry odometry = robot.odometry().latest(PATIENCE);
         say("odometry", odometry.x, odometry.y, odometry.theta, odometry.wheelAngles.length);
-        Pose pose = robot.pose().latest();
+        Pose pose = robot.pose().latest(PATIENCE);
         say("pose", pose.x(), pose.y(), pose.heading());
-        long first = robot.lrf().next().utime;
-        long second = robot.lrf().next().utime;
+        long first = robot.lrf().next(PATIENCE).utime;
+        long second = robot.lrf().next(PATIENCE).utime;
         say("next", second - first);
         for (Device<?> device : robot.devices()) {
             if (!device.type.equals("image_t")) continue;
-            Image image = robot.camera().latest();
+            Image image = robot.camera().latest(PATIENCE);
             say("image", image.width, image.height, image.format, image.data.length > 0);
             break;
         }
@@ -167,8 +167,10 @@ public final class Probe {
 
     private static void run(Simulation sim, Robot robot, String what, Supplier<Motion> start) {
         Pose begin = robot.pose().next(PATIENCE);
+        sim.pause(); // else it may be over, for who looks late
         Motion motion = start.get();
         boolean early = motion.done();
+        sim.resume();
         motion.await(PATIENCE);
         double stood = sim.time();
         Pose end = robot.pose().next(PATIENCE);
@@ -333,7 +335,7 @@ public final class Probe {
         say("there", sim.state("guest").position[0], sim.robots().size(), bodiesOfGuest(sim));
         guest.setVelocity(0.3, 0.0);
         while (sim.state("guest").position[0] <= 3.05) sim.sleep(0.1);
-        say("drives", true, guest.lrf().latest().ranges.length);
+        say("drives", true, guest.lrf().latest(PATIENCE).ranges.length);
         guest.stop().await(PATIENCE);
         sim.setPose("guest", 3.0, 2.0, 1.0, 0.0);
         say("put", sim.state("guest").position[1]);
@@ -349,8 +351,10 @@ public final class Probe {
         attempt("driven", () -> sim.setTwist("guest", new double[] {1.0, 0.0, 0.0}, new double[3]));
         sim.reset(Simulation.Reset.POSES, -1);
         say("poses", sim.state("guest").position[1], sim.state().time() > 1.0);
+        sim.pause();
         sim.reset(Simulation.Reset.TIME, -1);
         say("time", sim.state().time() < 1.0, sim.robots().size());
+        sim.resume();
         sim.remove("guest");
         say("gone", sim.robots().size(), bodiesOfGuest(sim));
         attempt("unknown", () -> sim.remove("guest"));
@@ -453,7 +457,7 @@ public final class Probe {
                 new LaunchOptions().seed(3).args(Arrays.copyOfRange(a, 1, a.length));
         Simulation sim = Ruedo.launch(a[0], options);
         say("url", sim.url);
-        say("ready", sim.robots().get(0).odometry().latest().time() >= 0.0);
+        say("ready", sim.robots().get(0).odometry().latest(PATIENCE).time() >= 0.0);
         while (true) Thread.sleep(1000);
     }
 

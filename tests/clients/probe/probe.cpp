@@ -96,23 +96,23 @@ void list_all(const rc::Simulation& sim) {
 
 void read(const rc::Simulation& sim, const std::string& name) {
   const rc::Robot robot = sim.robot(name);
-  const auto scan = robot.lrf().latest();
+  const auto scan = robot.lrf().latest(kPatience);
   say("scan", scan.ranges.size(), scan.angle(0), scan.angle(scan.ranges.size() - 1),
       scan.nearest(-kPi, kPi), scan.intensities.size());
-  const auto reading = robot.sonar().latest();
+  const auto reading = robot.sonar().latest(kPatience);
   say("sonar", reading.ranges.size(),
       static_cast<double>(*std::max_element(reading.ranges.begin(), reading.ranges.end())),
       reading.fired_utime.size(), reading.fresh.size());
-  const auto odometry = robot.odometry().latest();
+  const auto odometry = robot.odometry().latest(kPatience);
   say("odometry", odometry.x, odometry.y, odometry.theta, odometry.wheel_angles.size());
-  const auto pose = robot.pose().latest();
+  const auto pose = robot.pose().latest(kPatience);
   say("pose", pose.x(), pose.y(), pose.heading());
-  const int64_t first = robot.lrf().next().utime;
-  const int64_t second = robot.lrf().next().utime;
+  const int64_t first = robot.lrf().next(kPatience).utime;
+  const int64_t second = robot.lrf().next(kPatience).utime;
   say("next", second - first);
   for (const auto& device : robot.devices()) {
     if (device.type != "image_t") continue;
-    const auto image = robot.camera().latest();
+    const auto image = robot.camera().latest(kPatience);
     say("image", image.width, image.height,
         image.format == rc::Image::Format::jpeg ? "jpeg" : "other", !image.data.empty());
     break;
@@ -157,8 +157,10 @@ void primitives(const rc::Simulation& sim, const std::string& name) {
   robot.stop().wait(kPatience);
   const auto run = [&](const char* what, const std::function<rc::Motion()>& start) {
     const auto begin = robot.pose().next(kPatience);
+    sim.pause();  // else it may be over, for who looks late
     const rc::Motion motion = start();
     const bool early = motion.done();
+    sim.resume();
     motion.wait(kPatience);
     const double stood = sim.time();
     auto end = robot.pose().next(kPatience);
@@ -298,7 +300,7 @@ void world(const rc::Simulation& sim, const std::string& text) {
   say("there", sim.state("guest").position[0], sim.robots().size(), bodies_of_guest(sim));
   guest.set_velocity(0.3, 0.0);
   while (sim.state("guest").position[0] <= 3.05) sim.sleep(0.1);
-  say("drives", true, guest.lrf().latest().ranges.size());
+  say("drives", true, guest.lrf().latest(kPatience).ranges.size());
   guest.stop().wait(kPatience);
   sim.set_pose("guest", 3.0, 2.0, 1.0);
   say("put", sim.state("guest").position[1]);
@@ -312,8 +314,10 @@ void world(const rc::Simulation& sim, const std::string& text) {
   report("driven", [&] { sim.set_twist("guest", {1.0, 0.0, 0.0}); });
   sim.reset(rc::Reset::poses);
   say("poses", sim.state("guest").position[1], sim.state().time() > 1.0);
+  sim.pause();
   sim.reset(rc::Reset::time);
   say("time", sim.state().time() < 1.0, sim.robots().size());
+  sim.resume();
   sim.remove("guest");
   say("gone", sim.robots().size(), bodies_of_guest(sim));
   report("unknown", [&] { sim.remove("guest"); });
@@ -422,7 +426,7 @@ void watches(const rc::Simulation& sim, const std::vector<std::string>& a) {
   options.args.assign(a.begin() + 1, a.end());
   const rc::Simulation sim = rc::launch(a[0], options);
   say("url", sim.url());
-  say("ready", sim.robots().at(0).odometry().latest().time() >= 0.0);
+  say("ready", sim.robots().at(0).odometry().latest(kPatience).time() >= 0.0);
   while (true) std::this_thread::sleep_for(std::chrono::seconds(1));
 }
 

@@ -45,7 +45,7 @@ def list_all(sim):
 
 def read(sim, name):
     robot = sim.robot(name)
-    scan = robot.lrf.latest()
+    scan = robot.lrf.latest(PATIENCE)
     say(
         "scan",
         len(scan.ranges),
@@ -54,7 +54,7 @@ def read(sim, name):
         scan.nearest(-math.pi, math.pi),
         len(scan.intensities),
     )
-    reading = robot.sonar.latest()
+    reading = robot.sonar.latest(PATIENCE)
     say(
         "sonar",
         len(reading.ranges),
@@ -62,15 +62,15 @@ def read(sim, name):
         len(reading.fired_utime),
         len(reading.fresh),
     )
-    odometry = robot.odometry.latest()
+    odometry = robot.odometry.latest(PATIENCE)
     say("odometry", odometry.x, odometry.y, odometry.theta, len(odometry.wheel_angles))
-    pose = robot.pose.latest()
+    pose = robot.pose.latest(PATIENCE)
     say("pose", pose.x, pose.y, pose.heading)
-    first = robot.lrf.next().utime
-    second = robot.lrf.next().utime
+    first = robot.lrf.next(PATIENCE).utime
+    second = robot.lrf.next(PATIENCE).utime
     say("next", second - first)
     if any(d.type == "image_t" for d in robot.devices):
-        image = robot.camera.latest()
+        image = robot.camera.latest(PATIENCE)
         say("image", image.width, image.height, image.format, len(image.data) > 0)
 
 
@@ -116,8 +116,10 @@ def primitives(sim, name):
 
     def run(what, motion):
         begin = robot.pose.next(PATIENCE)
+        sim.pause()  # else it may be over, for who looks late
         motion = motion()
         early = motion.done
+        sim.resume()
         motion.wait(PATIENCE)
         stood, end = sim.time, robot.pose.next(PATIENCE)
         while end.time < stood:  # poses come at 50 Hz, the end of a motion at its step
@@ -263,7 +265,7 @@ def world(sim, text):
     guest.set_velocity(0.3, 0.0)
     while sim.state("guest").position[0] <= 3.05:
         sim.sleep(0.1)
-    say("drives", True, len(guest.lrf.latest().ranges))
+    say("drives", True, len(guest.lrf.latest(PATIENCE).ranges))
     guest.stop().wait(PATIENCE)
     sim.set_pose("guest", 3.0, 2.0, 1.0)
     say("put", sim.state("guest").position[1])
@@ -277,8 +279,10 @@ def world(sim, text):
     attempt("driven", lambda: sim.set_twist("guest", [1.0, 0.0, 0.0]))
     sim.reset("poses")
     say("poses", sim.state("guest").position[1], sim.state().time > 1.0)
+    sim.pause()
     sim.reset("time")
     say("time", sim.state().time < 1.0, len(sim.robots))
+    sim.resume()
     sim.remove("guest")
     say("gone", len(sim.robots), sum(body.name.startswith("guest/") for body in sim.bodies))
     attempt("unknown", lambda: sim.remove("guest"))
@@ -354,7 +358,7 @@ def leaves(sim, name):
 
 def launched(sim):
     say("url", sim.url)
-    say("ready", sim.robots[0].odometry.latest().time >= 0.0)
+    say("ready", sim.robots[0].odometry.latest(PATIENCE).time >= 0.0)
     while True:
         time.sleep(1.0)
 

@@ -199,8 +199,9 @@ TEST_F(Lifetimes, WhoLeavesInACallbackSaysSoUntilItIsAnswered) {
       .keep();
   server->send_odometry("p3at", 1000, 0.0);
   server->await([&] { return server->leaves > 0; });
-  sim.close();  // which waits for the end
-  EXPECT_EQ(server->leaves, 3);
+  sim.close();                   // which waits for the end
+  EXPECT_GE(server->leaves, 3);  // the third is answered; who is late says it again meanwhile
+  EXPECT_LE(server->leaves, 5);
   EXPECT_EQ(count, 1);
 }
 
