@@ -99,8 +99,8 @@ TEST(LcmBus, LooksForALostServerWithPauses) {
   {
     LcmBus bus("tcpq://127.0.0.1:" + std::to_string(ntohs(address.sin_port)));
     bus.listen({"x"}, [](const std::string&, const uint8_t*, size_t) {});
-    const int before = connections;
     const auto begin = std::chrono::steady_clock::now();
+    const int before = connections;
     while (connections < before + 6) std::this_thread::yield();
     EXPECT_GE(std::chrono::steady_clock::now() - begin, std::chrono::milliseconds(50 + 100 + 200));
   }

@@ -2,6 +2,7 @@
 // the client libraries.
 #pragma once
 
+#include <atomic>
 #include <chrono>
 #include <map>
 #include <random>
@@ -30,9 +31,15 @@ class LockstepClient {
         messages;  // of the manifest, in its order
   };
 
-  // channels: the server's, whose indices are those of a manifest.
-  LockstepClient(LossyBus& bus, const engine::Channels& channels, std::string name)
-      : bus_(bus), channels_(channels), listener_(bus.connect()), name_(std::move(name)) {
+  // channels: the server's, whose indices are those of a manifest. over: where there is one, who
+  // waits does so until the run is over, and throws then.
+  LockstepClient(LossyBus& bus, const engine::Channels& channels, std::string name,
+                 const std::atomic<bool>* over = nullptr)
+      : bus_(bus),
+        channels_(channels),
+        listener_(bus.connect()),
+        name_(std::move(name)),
+        over_(over) {
     for (size_t i = 0; i < channels.list().size(); ++i) {
       if (channels.list()[i].type == "tick_t") tick_channel_ = static_cast<int32_t>(i);
       by_name_[channels.list()[i].bus_name] = static_cast<int32_t>(i);
@@ -94,6 +101,7 @@ class LockstepClient {
         taken |= newest_ > from;
       }
       if (Clock::now() >= again) {  // others are heard all the time: not after silence
+        check_run();
         if (!taken) send(request_t::GRANT, sequence, body);
         ask_for_lost();
         again = Clock::now() + kAgain;
@@ -122,6 +130,7 @@ class LockstepClient {
 
   reply_t ask(int32_t kind, int64_t sequence, const std::vector<uint8_t>& body) {
     for (;;) {
+      check_run();
       send(kind, sequence, body);
       for (const Clock::time_point again = Clock::now() + 5 * kAgain; Clock::now() < again;) {
         const std::optional<Message> message = listener_->receive(kAgain);
@@ -149,6 +158,10 @@ class LockstepClient {
     std::map<int, tick_t> parts;
     std::map<std::pair<int32_t, int64_t>, std::vector<uint8_t>> resent;
   };
+
+  void check_run() const {
+    if (over_ && *over_) throw std::runtime_error(name_ + ": the run is over");
+  }
 
   // Whether the message says that the grant was executed.
   bool take(const Message& message, int64_t sequence) {
@@ -266,6 +279,7 @@ class LockstepClient {
   const engine::Channels channels_;
   std::shared_ptr<LossyBus::Listener> listener_;
   std::string name_;
+  const std::atomic<bool>* over_;
   int32_t tick_channel_ = -1;
   std::map<std::string, int32_t> by_name_;
   int64_t session_ = 0, sequence_ = 0, resends_ = 0, granted_ = 0, have_ = -1, acknowledged_ = -1,
