@@ -92,7 +92,9 @@ def a_day(log: Path, url: str, harm: Harm | None) -> list[int]:
                 if second % max(1, SECONDS // 300) == 0:
                     sizes.append(resident_kb(server))
             end_of(harm)
-            sim.close()  # in quiet: what is in the log is answered
+            sim.quit()  # whose answer no signal overtakes, as it may the leave of close()
+            server.wait(PATIENCE)
+            sim.close()
         finally:
             end_of(harm)
             server.terminate()
