@@ -19,6 +19,37 @@ std::vector<const Element*> states_of(const Element& parent, const std::string& 
   return list;
 }
 
+// What is left out without a word there changes nothing: times, accelerations, wrenches. Elements
+// of the newer syntax are looked through by name_what_has_no_effect().
+void name_unknown(const Element& element, Findings& findings, const std::string& where) {
+  const std::string& of = element.name;
+  const auto name = [&](const std::vector<std::string>& known,
+                        const std::vector<std::string>& silent) {
+    report_other_children(element, known, silent, where, findings);
+  };
+  if (of == "state")
+    name({"model", "model_state", "light", "light_state"},
+         {"joint", "joint_state", "insertions", "deletions", "sim_time", "wall_time", "real_time",
+          "iterations"});
+  else if (of == "model")
+    name({"pose", "scale", "link", "link_state", "joint", "joint_state", "model", "model_state"},
+         {"frame"});
+  else if (of == "link")
+    name({"pose", "velocity"}, {"acceleration", "wrench", "collision", "frame"});
+  else if (of == "joint")
+    name({"angle", "axis_state", "axis2_state"}, {});
+  else if (of == "light")
+    name({"pose"}, {"frame"});
+}
+
+// nullptr: it has none, which is reported.
+const std::string* name_of(const Element& element, Findings& findings, const std::string& where) {
+  const std::string* name = element.attribute("name");
+  if (!name || name->empty())
+    findings.error(element.source, where, "<" + element.name + "> has no name; it is left out");
+  return name && !name->empty() ? name : nullptr;
+}
+
 // The position of its first axis; false: not given.
 bool position_in(const Element& joint, double& position) {
   if (const Element* written = joint.child("axis_state/position")) {
@@ -71,14 +102,9 @@ void name_joint(const Element& joint, const std::string& where, Findings& findin
 
 SavedState::SavedState(const Element& world, Findings& findings) {
   for (const Element* state : world.all("state")) {
+    name_unknown(*state, findings, "state");
     for (const Element* model : states_of(*state, "model")) read_model(*model, findings);
-    for (const Element* light : states_of(*state, "light")) {
-      const std::string* name = light->attribute("name");
-      if (!name || !light->has("pose")) continue;
-      read_or_leave_out("state/light " + *name, "it is where it was", findings, [&] {
-        lights_.insert_or_assign(*name, SavedLight{light->pose("pose"), light->source});
-      });
-    }
+    for (const Element* light : states_of(*state, "light")) read_light(*light, findings);
     for (const Element* joint : states_of(*state, "joint")) {
       findings.unsupported(joint->source, "state",
                            "<" + joint->name +
@@ -93,48 +119,85 @@ SavedState::SavedState(const Element& world, Findings& findings) {
   }
 }
 
-void SavedState::read_model(const Element& element, Findings& findings) {
-  const std::string* name = element.attribute("name");
+void SavedState::read_light(const Element& element, Findings& findings) {
+  const std::string* name = name_of(element, findings, "state");
   if (!name) return;
-  // A simulation that diverged saves NaN; the models' own poses are used then.
-  read_or_leave_out("state/model " + *name, "it is where its own pose says", findings, [&] {
-    SavedModel saved{element.pose("pose"), element.source, {}, {}};
-    read_parts(element, "", saved, findings);
-    if (element.has("pose")) models_.insert_or_assign(*name, std::move(saved));
+  const std::string where = "state/light " + *name;
+  name_unknown(element, findings, where);
+  if (lights_.contains(*name))
+    findings.unsupported(element.source, where, "a second state of this light; this one counts");
+  read_or_leave_out(where, "it is where it was", findings, [&] {
+    SavedLight saved{std::nullopt, element.source};
+    if (element.has("pose"))
+      saved.pose = element.pose("pose");
+    else
+      findings.repaired(element.source, where, "it has no <pose>; the light is where it was");
+    lights_.insert_or_assign(*name, saved);
   });
 }
 
-void SavedState::read_parts(const Element& element, const std::string& prefix, SavedModel& saved,
-                            Findings& findings) const {
-  const std::string where = "state/model " + *element.attribute("name");
+void SavedState::read_model(const Element& element, Findings& findings) {
+  const std::string* name = name_of(element, findings, "state");
+  if (!name) return;
+  const std::string where = "state/model " + *name;
+  if (models_.contains(*name))
+    findings.unsupported(element.source, where, "a second state of this model; this one counts");
+  // A simulation that diverged saves NaN; the models' own poses are used then.
+  read_or_leave_out(where, "it is where its own pose says", findings, [&] {
+    SavedModel saved{std::nullopt, element.source, {}, {}};
+    if (element.has("pose"))
+      saved.X_WM = element.pose("pose");
+    else
+      findings.repaired(element.source, where,
+                        "it has no <pose>; the model is where its own pose says");
+    read_parts(element, "", where, saved, findings);
+    models_.insert_or_assign(*name, std::move(saved));
+  });
+}
+
+void SavedState::read_parts(const Element& element, const std::string& prefix,
+                            const std::string& where, SavedModel& saved, Findings& findings) const {
+  name_unknown(element, findings, where);
   const Vec3 scale = element.vector3("scale", Vec3::Ones(), Allowed::any(quantity::kFactor));
   if ((scale - Vec3::Ones()).norm() > 1e-9)
     findings.unsupported(element.child("scale")->source, where,
                          "models are not scaled; it has its own size");
+  const auto name_second = [&](const Element& part, bool is_first) {
+    if (!is_first)
+      findings.unsupported(part.source, where,
+                           "a second state of '" + prefix + dotted(*part.attribute("name")) +
+                               "' is left out; the first one counts");
+  };
   for (const Element* link : states_of(element, "link")) {
-    const std::string* own = link->attribute("name");
+    name_unknown(*link, findings, where);
+    const std::string* own = name_of(*link, findings, where);
     if (own && link->has("pose"))
-      saved.links.try_emplace(prefix + dotted(*own), link->pose("pose"));
+      name_second(*link, saved.links.try_emplace(prefix + dotted(*own), link->pose("pose")).second);
     name_motion(*link, where, findings);
   }
   for (const Element* joint : states_of(element, "joint")) {
-    const std::string* own = joint->attribute("name");
+    name_unknown(*joint, findings, where);
+    const std::string* own = name_of(*joint, findings, where);
     double position = 0.0;
-    if (own && position_in(*joint, position)) saved.joints[prefix + dotted(*own)] = position;
+    if (own && position_in(*joint, position))
+      name_second(*joint, saved.joints.try_emplace(prefix + dotted(*own), position).second);
     name_joint(*joint, where, findings);
   }
   for (const Element* inner : states_of(element, "model")) {
-    if (const std::string* own = inner->attribute("name"))
-      read_parts(*inner, prefix + dotted(*own) + ".", saved, findings);
+    if (const std::string* own = name_of(*inner, findings, where))
+      read_parts(*inner, prefix + dotted(*own) + ".", where, saved, findings);
   }
 }
 
 void SavedState::apply(const std::string& name, ModelInstance& instance, Findings& findings) const {
   const auto found = models_.find(name);
-  if (found == models_.end() || instance.model->path) return;
+  if (found == models_.end()) return;
   const SavedModel& saved = found->second;
-  instance.X_WM = saved.X_WM;
-  const Pose X_MW = saved.X_WM.inverse();
+  if (instance.model->path)
+    return findings.unsupported(saved.source, "state/model " + name,
+                                "the model begins where its own path does");
+  if (saved.X_WM) instance.X_WM = *saved.X_WM;
+  const Pose X_MW = instance.X_WM.inverse();
   const auto pose_of = [&](ModelLinkIndex link) -> const Pose* {
     if (!link.valid()) return nullptr;
     const auto at = saved.links.find(instance.model->links[link].name);
@@ -183,7 +246,7 @@ void SavedState::apply(const std::string& name, ModelInstance& instance, Finding
 
 void SavedState::apply(Light& light) const {
   if (const auto found = lights_.find(light.name); found != lights_.end())
-    light.pose = found->second.pose;
+    light.pose = found->second.pose.value_or(light.pose);
 }
 
 void SavedState::name_strangers(const std::set<std::string>& models,

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <map>
+#include <optional>
 #include <set>
 #include <string>
 
@@ -25,18 +26,19 @@ class SavedState {
 
  private:
   struct SavedModel {
-    Pose X_WM;
+    std::optional<Pose> X_WM;  // without, the model's own
     Source source;
     std::map<std::string, Pose> links;     // X_WL
     std::map<std::string, double> joints;  // rad or m, for the joints that are given
   };
   void read_model(const Element& element, Findings& findings);
-  void read_parts(const Element& element, const std::string& prefix, SavedModel& saved,
-                  Findings& findings) const;
+  void read_light(const Element& element, Findings& findings);
+  void read_parts(const Element& element, const std::string& prefix, const std::string& where,
+                  SavedModel& saved, Findings& findings) const;
 
   std::map<std::string, SavedModel> models_;
   struct SavedLight {
-    Pose pose;
+    std::optional<Pose> pose;
     Source source;
   };
   std::map<std::string, SavedLight> lights_;

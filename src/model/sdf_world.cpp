@@ -351,9 +351,11 @@ class SdfReader::WorldReader {
     name_wind_without_plugin(element_, world_, findings_);
     check_performers(world_, reader_.performers_, findings_);
     stand_actors(actors_, world_);
+    const size_t placed = world_.models.size();
     for (const Element* fleet : element_.all("ruedo:fleet"))
       reader_.read_fleet(*fleet, world_, kMaxModels);
     for (const Element* crowd : element_.all("ruedo:crowd")) add_crowd(*crowd, world_, kMaxModels);
+    restore_added(saved, placed);
     for (const Element* fault : element_.all("ruedo:fault"))
       world_.faults.push_back(read_fault(*fault));
     for (const Element* light : element_.all("light")) {
@@ -383,8 +385,17 @@ class SdfReader::WorldReader {
     }
   }
 
+  // Those of fleets and crowds stand where they were, too.
+  void restore_added(const SavedState& saved, size_t first) {
+    for (size_t i = first; i < world_.models.size(); ++i) {
+      ModelInstance& added = world_.models[InstanceIndex(i)];
+      added_.insert(added.name);
+      saved.apply(added.name, added, findings_);
+    }
+  }
+
   void name_strangers_of(const SavedState& saved) {
-    std::set<std::string> models, lights;
+    std::set<std::string> models = added_, lights;
     for (const Placed& each : placed_) models.insert(each.name);
     for (const Light& each : world_.lights) lights.insert(each.name);
     saved.name_strangers(models, lights, findings_);
@@ -563,6 +574,7 @@ class SdfReader::WorldReader {
   FrameGraph frames_{"the world"};
   std::vector<Placed> placed_;
   std::set<std::string> actors_;
+  std::set<std::string> added_;         // names of those of fleets and crowds
   std::map<std::string, int> numbers_;  // the next number for each name
 };
 

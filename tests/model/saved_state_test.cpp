@@ -2,6 +2,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "temporary_folder.h"
 #include "text_world.h"
 
 namespace ruedo::model {
@@ -97,6 +98,57 @@ TEST(SavedState, NamesWhatItCannotPutBack) {
   EXPECT_THAT(texts(*world),
               ElementsAre("<velocity> is not supported: everything begins at rest",
                           HasSubstr("its link 'upper' was elsewhere than any position")));
+}
+
+// Its joints are put back all the same.
+TEST(SavedState, OfAModelWithoutAPose) {
+  const auto world =
+      world_of(kArm +
+               "<state world_name='w'><model name='arm'><joint name='wrist'><angle axis='0'>0.25"
+               "</angle></joint></model><model name='gone'/></state>");
+  EXPECT_THAT(texts(*world), ElementsAre("it has no <pose>; the model is where its own pose says",
+                                         "it has no <pose>; the model is where its own pose says",
+                                         HasSubstr("it begins at 0.25 m of"),
+                                         "the world has no model 'gone'; its state is left out"));
+  EXPECT_NEAR(link_of(*world->models.at(0).model, "hand").X_ML.translation.z(), 2.25, 1e-9);
+}
+
+TEST(SavedState, NamesWhatItDoesNotRead) {
+  EXPECT_THAT(
+      texts(*world_of(kArm +
+                      "<state world_name='w'><modle name='arm'/><model name='arm'><pose>5 0 0 0 0 0"
+                      "</pose><joint name='wrist'><angel>1</angel></joint></model></state>")),
+      ElementsAre("<modle> is not supported and left out; did you mean <model>?",
+                  "<angel> is not supported and left out; did you mean <angle>?"));
+  EXPECT_THAT(texts(*world_of(kArm + "<state><model><pose>5 0 0 0 0 0</pose></model></state>")),
+              ElementsAre("<model> has no name; it is left out"));
+}
+
+TEST(SavedState, NamesASecondStateOfAModel) {
+  const auto state = [](const std::string& x, const std::string& inside) {
+    return "<model name='arm'><pose>" + x + " 0 0 0 0 0</pose>" + inside + "</model>";
+  };
+  const std::string slide = "<joint name='wrist'><angle>0</angle></joint>";
+  const auto world = world_of(kArm + "<state>" + state("1", slide + slide) + "</state><state>" +
+                              state("2", "") + "</state>");
+  EXPECT_THAT(texts(*world),
+              ElementsAre("a second state of 'wrist' is left out; the first one counts",
+                          "a second state of this model; this one counts"));
+  EXPECT_EQ(world->models.at(0).X_WM.translation.x(), 2.0);
+}
+
+TEST(SavedState, PutsTheModelsOfAFleetBack) {
+  const TemporaryFolder folder;
+  folder.write("arm.sdf", "<sdf version='1.9'>" + kArm + "</sdf>");
+  const auto world = load_world_text(
+      "<sdf version='1.9'><world name='w'><ruedo:fleet name='f'><include><uri>arm.sdf</uri>"
+      "</include><ruedo:count>2</ruedo:count></ruedo:fleet><state><model name='f_2'><pose>7 0 0 0 "
+      "0 0</pose></model></state></world></sdf>",
+      folder / "w.sdf");
+  EXPECT_THAT(texts(*world), ElementsAre());
+  EXPECT_EQ(world->models.at(1).name, "f_2");
+  EXPECT_EQ(world->models.at(1).X_WM.translation.x(), 7.0);
+  EXPECT_NE(world->models.at(0).X_WM.translation.x(), 7.0);
 }
 
 TEST(SavedState, PutsLightsBack) {
