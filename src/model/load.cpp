@@ -118,8 +118,16 @@ class Loader {
     const SdfVersion version = reader_.version_of(root);
     const auto worlds = root.all("world");
     if (!worlds.empty()) {
-      if (worlds.size() > 1)
-        findings_.unsupported(worlds[1]->source, "sdf", "a second world in one file is left out");
+      for (const auto& child : root.children) {
+        if (child.get() == worlds[0]) continue;
+        const bool known = child->name == "world" || child->name == "model" ||
+                           child->name == "light" || child->name == "actor";
+        if (known)
+          findings_.unsupported(child->source, "sdf",
+                                child->name == "world"
+                                    ? "a second world in one file is left out"
+                                    : "<" + child->name + "> beside a <world> is left out");
+      }
       reader_.read_world(*worlds[0], version, world_);
       return;
     }

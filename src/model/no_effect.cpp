@@ -306,7 +306,9 @@ class Walk {
     const std::vector<std::string> known = words_in(element);
     if (!child.starts_with("ruedo:") && std::find(known.begin(), known.end(), child) == known.end())
       return false;
-    const bool address = element.name == "include" && (child == "uri" || child == "name");
+    // Only material scripts are looked for in several places.
+    const bool address = (child == "uri" && element.name != "script") ||
+                         (child == "name" && element.name == "include");
     return address ||
            std::find(std::begin(kSeveral), std::end(kSeveral), child) == std::end(kSeveral);
   }

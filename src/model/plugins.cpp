@@ -247,7 +247,63 @@ std::string system_of(const std::string& library) {
   return name;
 }
 
+// Of those that a part of Ruedo replaces.
+constexpr std::string_view kServedInModels[] = {"DetachableJoint",
+                                                "Elevator",
+                                                "ElevatorPlugin",
+                                                "OdometryPublisher",
+                                                "PerformerDetector",
+                                                "PosePublisher",
+                                                "TouchPlugin",
+                                                "TrackController",
+                                                "door",
+                                                "gazebo_mimic_joint_plugin",
+                                                "gazebo_ros_elevator",
+                                                "lift",
+                                                "roboticsgroup_gazebo_mimic_joint_plugin",
+                                                "roboticsgroup_upatras_gazebo_mimic_joint_plugin"};
+constexpr std::string_view kServedInSensors[] = {"gazebo_ros_ray_sensor",
+                                                 "gazebo_ros_laser",
+                                                 "gazebo_ros_gpu_laser",
+                                                 "gazebo_ros_block_laser",
+                                                 "gazebo_ros_velodyne_laser",
+                                                 "gazebo_ros_velodyne_gpu_laser",
+                                                 "gazebo_ros_range",
+                                                 "hector_gazebo_ros_sonar",
+                                                 "gazebo_ros_imu",
+                                                 "gazebo_ros_imu_sensor",
+                                                 "hector_gazebo_ros_imu",
+                                                 "gazebo_ros_camera",
+                                                 "gazebo_ros_triggered_camera",
+                                                 "gazebo_ros_multicamera",
+                                                 "gazebo_ros_depth_camera",
+                                                 "gazebo_ros_openni_kinect",
+                                                 "gazebo_ros_realsense",
+                                                 "realsense_gazebo_plugin",
+                                                 "gazebo_ros_bumper",
+                                                 "gazebo_ros_p3d",
+                                                 "gazebo_ros_gps_sensor",
+                                                 "hector_gazebo_ros_gps",
+                                                 "hector_gazebo_ros_magnetic",
+                                                 "hector_gazebo_ros_baro",
+                                                 "gazebo_ros_ft_sensor",
+                                                 "RayPlugin",
+                                                 "GpuRayPlugin",
+                                                 "CameraPlugin",
+                                                 "DepthCameraPlugin",
+                                                 "ImuSensorPlugin",
+                                                 "ContactPlugin",
+                                                 "SonarPlugin"};
+
 }  // namespace
+
+bool belongs_in_model(const PluginKind& kind) {
+  const auto in = [&](const auto& names) {
+    return std::find(std::begin(names), std::end(names), kind.name) != std::end(names);
+  };
+  return kind.does == Does::drive || kind.does == Does::joints || kind.does == Does::control ||
+         (kind.does == Does::served && (in(kServedInModels) || in(kServedInSensors)));
+}
 
 PluginKind kind_of(const Element& plugin) {
   const std::string* name = plugin.attribute("name");

@@ -28,4 +28,7 @@ struct PluginKind {
 
 PluginKind kind_of(const Element& plugin);
 
+// Whether it acts on the model, link or sensor that it stands in, and on nothing in a <world>.
+bool belongs_in_model(const PluginKind& kind);
+
 }  // namespace ruedo::model

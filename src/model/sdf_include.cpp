@@ -14,6 +14,25 @@ namespace {
 
 constexpr const char* kParams = "experimental:params";
 
+// Of a file that is included, the first thing counts.
+void name_what_else_is_in(const Element& sdf, Findings& findings) {
+  const Element* first = nullptr;
+  for (const auto& child : sdf.children) {
+    if (child->name != "model" && child->name != "light" && child->name != "actor" &&
+        child->name != "include" && child->name != "world")
+      continue;
+    if (!first) {
+      first = child.get();
+      continue;
+    }
+    const std::string* name = child->attribute("name");
+    findings.unsupported(child->source, "sdf",
+                         "<" + child->name + ">" + (name ? " '" + *name + "'" : "") +
+                             " beside the <" + first->name +
+                             "> of a file that is included is left out: the first one counts");
+  }
+}
+
 }  // namespace
 
 std::string relative_to(const Element& owner) {
@@ -105,6 +124,7 @@ SdfReader::Included SdfReader::read_file(const std::string& path, const Element&
       child->fail("is a world; only models, lights and actors can be included");
   }
   if (result.name.empty()) result.document->fail("holds no <model>, <light> or <actor>");
+  name_what_else_is_in(*result.document, context_.findings);
   leave();
   return cache_[path] = result;
 }

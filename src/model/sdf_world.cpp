@@ -432,6 +432,13 @@ class SdfReader::WorldReader {
       if (has_levels(*plugin)) continue;
       const PluginKind kind = kind_of(*plugin);
       const bool dead = kind.does == PluginKind::Does::dead;
+      if (belongs_in_model(kind)) {
+        if (named.insert(kind.name).second)
+          findings_.unsupported(
+              plugin->source, in_world_,
+              "the plugin " + kind.name + " does nothing in <world>: it belongs into a model");
+        continue;
+      }
       name_parameters(*plugin, in_world_, findings_);
       if (!dead && kind.does != PluginKind::Does::unknown) continue;
       if (!named.insert(kind.name).second) continue;

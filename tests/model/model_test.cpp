@@ -5,6 +5,7 @@
 
 #include <ctime>
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include "model/body_layout.h"
@@ -141,6 +142,27 @@ TEST(Includes, OverridesAndNames) {
 
 // The mast's frame is 1 m ahead of the cart's and turned left by a right angle: its sensor is 1.2 m
 // ahead, looking left.
+// The first one counts, of a file as of an element.
+TEST(Includes, WhatElseIsThereIsNamed) {
+  const TemporaryFolder folder;
+  const std::string link = "<link name='l'/></model>";
+  folder.write("m.sdf", "<sdf version='1.9'><model name='a'>" + link + "<model name='b'>" + link +
+                            "<light name='c'/></sdf>");
+  const auto world = load_world_text(
+      "<sdf version='1.9'><world name='w'><include><uri>m.sdf</uri></include></world><model "
+      "name='d'>" +
+          link + "</sdf>",
+      folder / "w.sdf");
+  EXPECT_THAT(texts(*world),
+              testing::ElementsAre("<model> beside a <world> is left out",
+                                   "<model> 'b' beside the <model> of a file that is included is "
+                                   "left out: the first one counts",
+                                   "<light> 'c' beside the <model> of a file that is included is "
+                                   "left out: the first one counts"));
+  ASSERT_EQ(world->models.size(), 1u);
+  EXPECT_EQ(world->models[0].name, "a");
+}
+
 TEST(Includes, MergedModelsBringTheirSensors) {
   TemporaryFolder folder;
   folder.write("models/mast/model.sdf",

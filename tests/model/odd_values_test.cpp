@@ -149,6 +149,20 @@ TEST(OddValues, OfLights) {
   EXPECT_EQ(world->lights.at(0).outer_angle, 1.0);
 }
 
+TEST(OddValues, PluginsOfModelsInAWorld) {
+  EXPECT_THAT(named(plugin("DiffDrive", "") + plugin("JointPositionController", "") +
+                    plugin("DetachableJoint", "") + plugin("Physics", "") + plugin("Imu", "") +
+                    "<plugin filename='libgazebo_ros_control.so' name='c'/>"
+                    "<plugin filename='libgazebo_ros_factory.so' name='f'/>"),
+              ElementsAre("the plugin DiffDrive does nothing in <world>: it belongs into a model",
+                          "the plugin JointPositionController does nothing in <world>: it belongs "
+                          "into a model",
+                          "the plugin DetachableJoint does nothing in <world>: it belongs into a "
+                          "model",
+                          "the plugin gazebo_ros_control does nothing in <world>: it belongs into "
+                          "a model"));
+}
+
 TEST(OddValues, FramesThatAreNowhere) {
   EXPECT_THAT(
       named("<frame name='a' attached_to='b'/><frame name='b' attached_to='a'/>"),
