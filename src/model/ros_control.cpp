@@ -25,6 +25,7 @@ struct Translation {
   const Model& model;
   Element& drive;
   std::vector<const Element*> missing = {};  // of the drive: joints that the model does not have
+  std::vector<const Element*> zeros = {};    // sizes and factors of 0
 
   void add(const char* name, const std::string& text, const Source& source) {
     drive.children.push_back(std::make_unique<Element>());
@@ -50,9 +51,16 @@ struct Translation {
   void number(const char* ours, std::initializer_list<const char*> theirs, double factor = 1.0) {
     for (const char* name : theirs) {
       const Element* written = parameter(from, {name});
-      if (const auto value = positive(written))
+      if (const auto value = size(written))
         return add(ours, shown(*value * factor), written->source);
     }
+  }
+
+  // Of a length or factor, which no wheel has at 0.
+  std::optional<double> size(const Element* written) {
+    const auto value = positive(written);
+    if (written && !value && !is_nan(written->text)) zeros.push_back(written);
+    return value;
   }
 
   void limit(const char* ours, const char* theirs) {
@@ -75,7 +83,7 @@ struct Translation {
   }
 
   double multiplier(std::initializer_list<const char*> names) {
-    return positive(parameter(from, names)).value_or(1.0);
+    return size(parameter(from, names)).value_or(1.0);
   }
 
   // The distance between the middles of the two sides' wheels, as the ROS 1 controllers measure it
@@ -215,6 +223,22 @@ const KnownType* known_type(const std::string& type) {
   return found == std::end(kTypes) ? nullptr : found;
 }
 
+std::string suggested(const std::string& type) {
+  const std::string near = mistyped(type);
+  return near.empty() ? "" : "; did you mean '" + near + "'?";
+}
+
+void name_type(const Controller& controller, const std::string& where, Findings& findings) {
+  const KnownType* known = known_type(controller.type);
+  if (known && mistyped(controller.type).empty()) return;
+  std::string text =
+      "controllers of type '" + controller.type + "' are not known; '" + controller.name + "' ";
+  text += !known        ? "does nothing"
+          : known->read ? "drives as its name says"
+                        : "is taken as its name says";
+  findings.unsupported(controller.source, where, text + suggested(controller.type));
+}
+
 // Where findings about files that plugins name go.
 struct Report {
   const std::string& where;
@@ -225,6 +249,15 @@ struct Report {
     if (is_named) findings.error(source, where, text);
   }
 };
+
+void name_zeros(const Translation& translation, const Report& report) {
+  for (const Element* zero : translation.zeros)
+    report.findings.error(zero->source, report.where,
+                          "controller '" + translation.from.name + "': " + zero->name + " '" +
+                              zero->text +
+                              "' is not allowed; allowed is a number above 0; it counts as if it "
+                              "was not there");
+}
 
 // The drive that a controller describes; null: it describes none, or one of other joints.
 std::unique_ptr<Element> drive_of(const Controller& controller, const Model& model,
@@ -239,6 +272,7 @@ std::unique_ptr<Element> drive_of(const Controller& controller, const Model& mod
   for (const Element* joint : translation.missing)
     report.error(joint->source, unknown_joint(controller, joint->text));
   if (!drive->has("ruedo:left_joint") || !translation.missing.empty()) return nullptr;
+  name_zeros(translation, report);
   translation.limits();
   return drive;
 }
@@ -362,13 +396,26 @@ void name_what_has_no_effect(const Controller& controller, const std::string& wh
          "the right wheels have the radius of the left ones");
 }
 
+// ROS runs one of them at a time.
+void name_second(const Controller& controller, const std::string& first, const std::string& where,
+                 Findings& findings) {
+  const KnownType* type = known_type(controller.type);
+  if (type && type->read)
+    findings.unsupported(controller.source, where,
+                         "controller '" + controller.name +
+                             "' drives, too, and is left out: " + first + " drives the robot");
+}
+
 void name_untyped(const std::vector<Controller>& controllers, const std::string& where,
                   Findings& findings) {
   for (const Controller& each : controllers)
     findings.unsupported(each.source, where,
-                         "'" + each.name +
-                             "' names wheels or joints as a controller does, but no " +
-                             "type says which: it does nothing");
+                         each.type.empty()
+                             ? "'" + each.name +
+                                   "' names wheels or joints as a controller does, but no type "
+                                   "says which: it does nothing"
+                             : "controllers of type '" + each.type + "' are not known; '" +
+                                   each.name + "' does nothing" + suggested(each.type));
 }
 
 }  // namespace
@@ -387,12 +434,11 @@ ControllersDrive drive_from_controllers(const Element& model_element,
     const std::vector<Controller> controllers = controllers_in(files);
     if (is_named) name_untyped(untyped_in(files, controllers), where, context.findings);
     for (const Controller& each : controllers) {
-      if (is_named && !known_type(each.type)) {
-        context.findings.unsupported(each.source, where,
-                                     "controllers of type '" + each.type + "' are not known; '" +
-                                         each.name + "' does nothing");
+      if (is_named) name_type(each, where, context.findings);
+      if (result.drive) {
+        if (is_named) name_second(each, result.controller, where, context.findings);
+        continue;
       }
-      if (result.drive) continue;
       try {
         result.drive = drive_of(each, model, report);
         if (result.drive) name_what_has_no_effect(each, where, context.findings);

@@ -20,6 +20,51 @@ namespace {
 // Of a robot, of a controller's name, and of a list; the others have no effect.
 constexpr size_t kMostControllers = 100, kMostParameterMaps = 100, kMostNames = 1000;
 
+// Those of ros_controllers and ros2_controllers.
+const std::vector<std::string>& known_types() {
+  static const std::vector<std::string> types = {
+      "ackermann_steering_controller/AckermannSteeringController",
+      "bicycle_steering_controller/BicycleSteeringController",
+      "diff_drive_controller/DiffDriveController",
+      "effort_controllers/GripperActionController",
+      "effort_controllers/JointEffortController",
+      "effort_controllers/JointGroupEffortController",
+      "effort_controllers/JointGroupPositionController",
+      "effort_controllers/JointPositionController",
+      "effort_controllers/JointTrajectoryController",
+      "effort_controllers/JointVelocityController",
+      "forward_command_controller/ForwardCommandController",
+      "forward_command_controller/MultiInterfaceForwardCommandController",
+      "gripper_controllers/GripperActionController",
+      "imu_sensor_broadcaster/IMUSensorBroadcaster",
+      "imu_sensor_controller/ImuSensorController",
+      "joint_state_broadcaster/JointStateBroadcaster",
+      "joint_state_controller/JointStateController",
+      "joint_trajectory_controller/JointTrajectoryController",
+      "mecanum_drive_controller/MecanumDriveController",
+      "omni_wheel_drive_controller/OmniWheelDriveController",
+      "pid_controller/PidController",
+      "position_controllers/GripperActionController",
+      "position_controllers/JointGroupPositionController",
+      "position_controllers/JointPositionController",
+      "position_controllers/JointTrajectoryController",
+      "tricycle_controller/TricycleController",
+      "tricycle_steering_controller/TricycleSteeringController",
+      "velocity_controllers/JointGroupVelocityController",
+      "velocity_controllers/JointPositionController",
+      "velocity_controllers/JointTrajectoryController",
+      "velocity_controllers/JointVelocityController"};
+  return types;
+}
+
+// One letter more, less or another, or two that changed places; or they do not differ.
+bool differ_by_a_letter(std::string_view a, std::string_view b) {
+  constexpr size_t kMost = 2;
+  while (!a.empty() && !b.empty() && a.front() == b.front()) a.remove_prefix(1), b.remove_prefix(1);
+  while (!a.empty() && !b.empty() && a.back() == b.back()) a.remove_suffix(1), b.remove_suffix(1);
+  return a.size() <= kMost && b.size() <= kMost;
+}
+
 // Looks up "a.b.c" in a tree whose keys may contain dots themselves.
 const Element* below(const Element& map, const std::string& path) {
   for (const auto& child : map.children) {
@@ -32,11 +77,14 @@ const Element* below(const Element& map, const std::string& path) {
   return nullptr;
 }
 
+bool is_controllers_type(const std::string& type) {
+  return type.find("ontroller") != std::string::npos || !mistyped(type).empty();
+}
+
 void collect_types(const Element& map, std::vector<Controller>& into) {
   for (const auto& child : map.children) {
     if (into.size() >= kMostControllers) return;
-    if (const Element* type = child->child("type");
-        type && type->text.find("ontroller") != std::string::npos) {
+    if (const Element* type = child->child("type"); type && is_controllers_type(type->text)) {
       const bool own = child->name == "ros__parameters";  // the type is one of the parameters
       into.push_back({own ? map.name : child->name, type->text, {child.get()}, 1, child->source});
     }
@@ -64,13 +112,14 @@ bool holds_controllers(const Element& map) {
   return std::any_of(map.children.begin(), map.children.end(), [](const auto& child) {
     const Element* type = child->child("type");
     return child->name.ends_with("pid_gains") ||
-           (type && (type->text.find("ontroller") != std::string::npos ||
+           (type && (is_controllers_type(type->text) ||
                      type->text.find("roadcaster") != std::string::npos)) ||
            holds_controllers(*child);
   });
 }
 
-// Maps that name what a controller moves, and that no controller of a known type has.
+// Maps that name what a controller moves, and that no controller of a known type has: they have
+// none, or a mistyped one.
 void collect_untyped(const Element& map, const std::set<const Element*>& typed,
                      std::vector<Controller>& into) {
   constexpr std::array kMoved{"left_wheel",        "right_wheel", "left_wheel_names",
@@ -79,9 +128,11 @@ void collect_untyped(const Element& map, const std::set<const Element*>& typed,
     if (into.size() >= kMostControllers) return;
     if (typed.contains(child.get())) continue;
     const bool own = child->name == "ros__parameters";
-    if (!child->has("type") &&
+    const std::string type = child->string("type", "");
+    const bool of_moveit = type == "FollowJointTrajectory" || type == "GripperCommand";
+    if (!of_moveit &&
         std::any_of(kMoved.begin(), kMoved.end(), [&](auto* key) { return child->has(key); }))
-      into.push_back({own ? map.name : child->name, "", {child.get()}, 1, child->source});
+      into.push_back({own ? map.name : child->name, type, {child.get()}, 1, child->source});
     else
       collect_untyped(*child, typed, into);
   }
@@ -99,6 +150,21 @@ std::string trimmed_package_path(const std::string& path) {
 }
 
 }  // namespace
+
+std::string mistyped(const std::string& type) {
+  const auto& known = known_types();
+  const auto is_near = [&](const std::string& each) {
+    const size_t own = type.find('/'), theirs = each.find('/');
+    return own != std::string::npos &&
+           differ_by_a_letter(std::string_view(type).substr(0, own),
+                              std::string_view(each).substr(0, theirs)) &&
+           differ_by_a_letter(std::string_view(type).substr(own),
+                              std::string_view(each).substr(theirs));
+  };
+  if (std::find(known.begin(), known.end(), type) != known.end()) return "";
+  const auto found = std::find_if(known.begin(), known.end(), is_near);
+  return found == known.end() ? "" : *found;
+}
 
 const Element* parameter(const Controller& controller, std::initializer_list<const char*> names) {
   for (const char* name : names) {

@@ -19,6 +19,9 @@ struct Controller {
   Source source;
 };
 
+// The type that one is mistyped for, by some letters; "": none. ROS would not load it.
+std::string mistyped(const std::string& type);
+
 // The first of these parameters that the controller has; "a.b" may also be nested.
 const Element* parameter(const Controller& controller, std::initializer_list<const char*> names);
 // the texts of a list, or of a single value

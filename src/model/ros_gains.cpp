@@ -105,10 +105,12 @@ struct Reader {
   void give(const std::string& name, Gives gives, const Element& gains) {
     const Pid pid = pid_of(gains);
     if (has(name) && (is_named || is_set(pid))) name_odd_gains(gains, name, where, findings);
-    give(name, gives, pid);
+    give(name, gives, pid, &gains);
   }
 
-  void give(const std::string& name, Gives gives, const Pid& pid) {
+  // `written`: where they stand in a controllers' file.
+  void give(const std::string& name, Gives gives, const Pid& pid,
+            const Element* written = nullptr) {
     if (!is_set(pid) || gives == Gives::nothing) return;
     for (Joint& joint : model.joints) {
       if (joint.name != dotted(name)) continue;
@@ -118,7 +120,13 @@ struct Reader {
       } else {
         std::optional<Pid>& of =
             gives == Gives::effort_for_rate ? axis.rate_pid : axis.position_pid;
-        if (of) return;  // set by a plugin or an earlier file
+        if (of) {  // set by a plugin, or by an earlier controller or file
+          if (written && (of->p != pid.p || of->i != pid.i || of->d != pid.d))
+            error(written->source,
+                  "gains of the joint '" + name +
+                      "' are left out: it has those of another controller already");
+          return;
+        }
         of = pid;
       }
       if (axis.start.mode == JointStart::Mode::free) axis.start.mode = JointStart::Mode::stay;

@@ -322,6 +322,46 @@ TEST(RosControl, WhatIsWrongInANamedFileIsNamed) {
   }
 }
 
+TEST(RosControl, SizesOfNothingAreNamed) {
+  const auto world = named_world(kManager + with(kBase, "separation: 0.61", "separation: 0.0"));
+  EXPECT_THAT(texts(*world),
+              ElementsAre("controller 'base': wheel_separation '0.0' is not allowed; allowed is a "
+                          "number above 0; it counts as if it was not there"));
+  EXPECT_FALSE(drive_of(*world).guessed);
+  EXPECT_NEAR(drive_of(*world).track, 0.6, 1e-12);
+}
+
+TEST(RosControl, MistypedTypesAreNamed) {
+  const std::string good = kManager + kBase + kHold, type = "diff_drive_controller/DiffDrive";
+  EXPECT_THAT(texts(*named_world(with(good, type + "Controller", type + "Contoller"))),
+              ElementsAre("controllers of type 'diff_drive_controller/DiffDriveContoller' are not "
+                          "known; 'base' drives as its name says; did you mean "
+                          "'diff_drive_controller/DiffDriveController'?"));
+  EXPECT_THAT(texts(*named_world(
+                  with(good, type + "Controller", "diff_drive_controler/DiffDriveControler"))),
+              testing::Contains("controllers of type 'diff_drive_controler/DiffDriveControler' are "
+                                "not known; 'base' does nothing; did you mean "
+                                "'diff_drive_controller/DiffDriveController'?"));
+  EXPECT_THAT(texts(*named_world(with(good, "effort_controllers", "my_efforts_controllers"))),
+              IsEmpty());  // a maker's own
+}
+
+// ROS would run one of them at a time.
+TEST(RosControl, ASecondOfADriveAndOfGainsIsNamed) {
+  const std::string more =
+      "    base2: {type: diff_drive_controller/DiffDriveController}\n"
+      "    hold2: {type: effort_controllers/JointPositionController}\n";
+  const auto world = named_world(
+      kManager + more + kBase + kHold + with(kBase, "base", "base2") +
+      "hold2:\n  ros__parameters: {joint: front_left, pid: {p: 3.0, i: 0.0, d: 0.0}}\n");
+  EXPECT_THAT(
+      texts(*world),
+      ElementsAre("controller 'base2' drives, too, and is left out: 'base' of c.yaml drives "
+                  "the robot",
+                  "gains of the joint 'front_left' are left out: it has those of another "
+                  "controller already"));
+}
+
 TEST(RosControl, NamedFilesWithoutControllersAreNamed) {
   for (const std::string& text : {std::string(), std::string("hello"), std::string("- a\n- b\n"),
                                   std::string("\1\2"), std::string("a: {b: 1}\n"), kBase})
