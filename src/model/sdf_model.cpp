@@ -181,6 +181,7 @@ class SdfReader::ModelReader {
   bool lacks_an_end(const Element& joint);
   void read_plugin_sensors();
   void read_mimic_plugin(const Element& plugin);
+  void read_mimic_params(const Element& system);
   // Findings about the model as a whole.
   void export_frames();
   ModelLinkIndex canonical_link();
@@ -496,6 +497,7 @@ void SdfReader::ModelReader::read_joints() {
                       [&] { read_mimic(*child, model_->joints, *joint); });
   }
   starts_.resize(model_->joints.size(), 0.0);
+  for (const Element* system : element_.all("ros2_control")) read_mimic_params(*system);
   for (const Element* system : element_.all("ros2_control"))
     read_or_leave_out(where_, "its joints begin at 0", findings_,
                       [&] { read_initial_values(*system); });
@@ -523,6 +525,48 @@ void SdfReader::ModelReader::read_mimic_plugin(const Element& plugin) {
   follower.leader = ModelJointIndex(&leader - model_->joints.data());
   follower.mimic_multiplier = plugin.number("multiplier", 1.0, Allowed::any(quantity::kFactor));
   follower.mimic_offset = plugin.number("offset", 0.0, Allowed::any(quantity::kAngle));
+}
+
+// <ros2_control>: <param name="mimic"> of a joint, with a multiplier and an offset. As in
+// gz_ros2_control, a <mimic> of the joint's own comes first.
+void SdfReader::ModelReader::read_mimic_params(const Element& system) {
+  for (const Element* control : system.all("joint")) {
+    const auto param = [&](const std::string& name) -> const Element* {
+      for (const Element* each : control->all("param")) {
+        if (const std::string* key = each->attribute("name"); key && *key == name) return each;
+      }
+      return nullptr;
+    };
+    const Element* leader = param("mimic");
+    const std::string* name = control->attribute("name");
+    const auto joint =
+        std::find_if(model_->joints.begin(), model_->joints.end(),
+                     [&](const Joint& each) { return name && each.name == dotted(*name); });
+    if (!leader || joint == model_->joints.end()) continue;
+    const std::string where = where_ + "/joint " + *name;
+    if (joint->leader.valid()) {
+      if (model_->joints[joint->leader].name != dotted(leader->text))
+        findings_.unsupported(leader->source, where,
+                              "its param mimic is left out: by its <mimic> it follows '" +
+                                  model_->joints[joint->leader].name + "'");
+      continue;
+    }
+    Element follows;
+    Element& axis = *follows.children.emplace_back(std::make_unique<Element>());
+    axis.name = "axis";
+    Element& mimic = *axis.children.emplace_back(std::make_unique<Element>());
+    mimic.name = "mimic";
+    mimic.source = leader->source;
+    mimic.attributes.emplace_back("joint", leader->text);
+    for (const char* number : {"multiplier", "offset"}) {
+      if (const Element* written = param(number)) {
+        mimic.children.push_back(written->clone());
+        mimic.children.back()->name = number;
+      }
+    }
+    read_or_leave_out(where, "the joint moves on its own", findings_,
+                      [&] { read_mimic(follows, model_->joints, *joint); });
+  }
 }
 
 void SdfReader::ModelReader::read_joint_and_sensors(const Element& child) {

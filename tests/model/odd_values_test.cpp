@@ -272,6 +272,33 @@ TEST(OddValuesOfUrdf, MaterialsAndColours) {
               ElementsAre("rgba=\"red" + none + "it is grey instead"));
 }
 
+// <ros2_control> can say it as well as <mimic>.
+TEST(OddValuesOfUrdf, MimicOfRos2Control) {
+  const auto follows = [](const std::string& leader, const std::string& mimic) {
+    return load_world_text(
+        "<robot name='r'><link name='a'/><link name='b'/><link name='c'/><joint name='j' "
+        "type='continuous'><parent link='a'/><child link='b'/></joint><joint name='k' "
+        "type='continuous'><parent link='a'/><child link='c'/>" +
+            mimic +
+            "</joint><ros2_control name='s' type='system'><joint name='k'><param name='mimic'>" +
+            leader +
+            "</param><param name='multiplier'>-2</param><param name='offset'>0.5</param>"
+            "</joint></ros2_control></robot>",
+        "/nowhere/r.urdf");
+  };
+  const auto world = follows("j", "");
+  EXPECT_THAT(texts(*world), IsEmpty());
+  const Joint& k = world->models.back().model->joints.back();
+  ASSERT_TRUE(k.leader.valid());
+  EXPECT_EQ(k.mimic_multiplier, -2.0);
+  EXPECT_EQ(k.mimic_offset, 0.5);
+  EXPECT_THAT(texts(*follows("x", "")),
+              ElementsAre("<mimic>: joint 'x' is none of the model's joints; the joint moves on "
+                          "its own"));
+  EXPECT_THAT(texts(*follows("x", "<mimic joint='j'/>")),
+              ElementsAre("its param mimic is left out: by its <mimic> it follows 'j'"));
+}
+
 TEST(OddValuesOfUrdf, InterfacesOfJoints) {
   const auto control = [](const std::string& joint, const std::string& state) {
     return "<ros2_control name='s' type='system'><joint name='" + joint +
