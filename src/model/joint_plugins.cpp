@@ -81,6 +81,30 @@ struct Reader {
           "<" + std::string(element) + "> of the plugin " + name + " is not supported: " + text);
   }
 
+  // What moves otherwise than its controller says.
+  void name_moved(const Element& at, const Joint& held) const {
+    const auto& drive = model.drive;
+    const ModelJointIndex index(&held - model.joints.data());
+    const auto is_among = [&](const std::vector<ModelJointIndex>& joints) {
+      return std::find(joints.begin(), joints.end(), index) != joints.end();
+    };
+    std::string why;
+    if (held.type == JointType::fixed)
+      why = "is fixed";
+    else if (held.type == JointType::gearbox)
+      why = "is a gearbox, which takes no commands";
+    else if (held.leader.valid())
+      why = "follows '" + model.joints[held.leader].name + "', and takes no commands";
+    else if (drive && (is_among(drive->left_joints) || is_among(drive->right_joints) ||
+                       is_among(drive->steer_joints)))
+      why = "is turned by the drive";
+    else if (held.axis.start.mode != JointStart::Mode::free)
+      why = "has another controller already; this one counts where they differ";
+    if (!why.empty())
+      findings.unsupported(at.source, where,
+                           "the joint '" + held.name + "' of the plugin " + name + " " + why);
+  }
+
   // Only the first axis turns here.
   void name_axis() const {
     if (plugin.integer("joint_index", 0, Allowed::between(0, 1)) == 1)
@@ -118,6 +142,7 @@ struct Reader {
     for (const Element* written : plugin.all("joint_name")) {
       Joint* held = joint(*written);
       if (!held) continue;
+      name_moved(*written, *held);
       if (exact && pid.most < 0.0)
         findings.error(plugin.source, where,
                        "<cmd_max> of the plugin " + name + ": '" + shown(pid.most) +
@@ -140,6 +165,7 @@ struct Reader {
     for (const Element* written : plugin.all("joint_name")) {
       Joint* held = joint(*written);
       if (!held) continue;
+      name_moved(*written, *held);
       if (by_force) held->axis.rate_pid = pid;
       held->axis.start = {JointStart::Mode::velocity, start("initial_velocity", 0)};
     }
@@ -149,7 +175,10 @@ struct Reader {
   void trajectory() const {
     constexpr Defaults kNothing = {0.0, 0.0, 0.0, 0.0, -1.0, 0.0, -1.0};
     std::vector<Joint*> joints;
-    for (const Element* written : plugin.all("joint_name")) joints.push_back(joint(*written));
+    for (const Element* written : plugin.all("joint_name")) {
+      joints.push_back(joint(*written));
+      if (joints.back()) name_moved(*written, *joints.back());
+    }
     if (!plugin.has("joint_name")) {
       for (Joint& each : model.joints) {
         if (each.type != JointType::fixed) joints.push_back(&each);

@@ -29,6 +29,27 @@ const Of kOf[] = {
     {"ruedo:max_steering_rate", {Steering::ackermann, Steering::tricycle}},
 };
 
+// They say how wheels are turned, which the kinematic drive does not.
+constexpr const char* kOfWheels[] = {
+    "ruedo:max_wheel_torque", "ruedo:servo_rate_gain", "ruedo:servo_angle_gain", "ruedo:gear",
+    "ruedo:stall_torque",     "ruedo:no_load_rate",    "ruedo:yaw_gain",         "ruedo:gyro_bias",
+    "ruedo:gyro_scale_error"};
+
+void name_of_other_type(const DriveDescription& drive, const std::string& where,
+                        Findings& findings) {
+  const bool wheels = drive.kind == DriveDescription::Kind::wheels;
+  const std::string* type = drive.element->attribute("type");
+  if (type && *type != "kinematic" && !wheels) return;  // a plugin's, which may read them
+  const auto name = [&](const char* element) {
+    if (const Element* written = drive.element->child(element))
+      findings.unsupported(written->source, where,
+                           "<" + written->name + "> does nothing with a drive of type '" +
+                               (wheels ? "wheels" : "kinematic") + "'");
+  };
+  if (wheels) return name("ruedo:traction");
+  for (const char* each : kOfWheels) name(each);
+}
+
 void name_without_effect(const DriveDescription& drive, const std::string& where,
                          Findings& findings) {
   for (const Of& each : kOf) {
@@ -49,6 +70,7 @@ class Look {
     for (const auto* side : {&drive_.left_joints, &drive_.right_joints})
       for (const ModelJointIndex joint : *side) wheel(model_.joints[joint]);
     for (const ModelJointIndex joint : drive_.steer_joints) steered(model_.joints[joint]);
+    swapped();
   }
 
  private:
@@ -76,6 +98,20 @@ class Look {
       findings_.unsupported(joint.source, where_,
                             "the drive turns the joint '" + joint.name + "': that it follows '" +
                                 model_.joints[joint.leader].name + "' does nothing");
+  }
+
+  // With them, x would point backwards.
+  void swapped() {
+    const Element* left = drive_.element->child("ruedo:left_joint");
+    if (!left || !has_side_wheels(drive_.steering)) return;
+    const auto is_it = [&](ModelJointIndex joint) {
+      const std::string& name = model_.joints[joint].name;
+      return dotted(left->text) == name || dotted(left->text) == model_.name + "." + name;
+    };
+    if (std::any_of(drive_.right_joints.begin(), drive_.right_joints.end(), is_it))
+      findings_.repaired(left->source, where_,
+                         "the left wheels stand on the right, seen along the model's x: left and "
+                         "right are taken the other way round");
   }
 
   Vec3 axis_in_base(const Joint& joint) const {
@@ -118,7 +154,10 @@ void name_odd_drive(const Element& model_element, const Model& model, const std:
   }
   if (model.is_static)
     return findings.error(source, where, "the model is static: its drive moves nothing");
-  if (model_element.has("ruedo:drive")) name_without_effect(*model.drive, where, findings);
+  if (model_element.has("ruedo:drive")) {
+    name_without_effect(*model.drive, where, findings);
+    name_of_other_type(*model.drive, where, findings);
+  }
   Look(model, where, findings).all();
 }
 

@@ -94,6 +94,28 @@ TEST(JointPlugins, WhatIsWrongOrNotDoneIsNamed) {
   EXPECT_FALSE(axis(*world, 1).position_pid);
 }
 
+TEST(JointPlugins, OfJointsThatMoveOtherwiseAreNamed) {
+  const auto of = [](const std::string& joint, const std::string& more) {
+    return texts(*world_of(
+        arm(plugin("JointPositionController", "<joint_name>" + joint + "</joint_name>") + more)));
+  };
+  const std::string prefix = "the joint '", name = "' of the plugin JointPositionController ";
+  const std::string still =
+      "<link name='s'/><joint name='still' type='fixed'><parent>base</parent><child>s</child>"
+      "</joint>";
+  const std::string led =
+      "<link name='f'/><joint name='led' type='revolute'><parent>base</parent><child>f</child>"
+      "<axis><xyz>0 0 1</xyz><mimic joint='one'/></axis></joint>";
+  EXPECT_THAT(of("still", still), ElementsAre(prefix + "still" + name + "is fixed"));
+  EXPECT_THAT(of("led", led),
+              ElementsAre(prefix + "led" + name + "follows 'one', and takes no commands"));
+  EXPECT_THAT(of("one", plugin("JointPositionController",
+                               "<joint_name>one</joint_name><p_gain>9</p_gain>")),
+              ElementsAre(prefix + "one" + name +
+                          "has another controller already; this one counts where they differ"));
+  EXPECT_THAT(of("two", plugin("JointStatePublisher", "<joint_name>two</joint_name>")), IsEmpty());
+}
+
 // Only a limit may be infinite, and only on the side where it is none.
 TEST(JointPlugins, GainsAreFinite) {
   const auto with = [](const std::string& element) {

@@ -52,6 +52,28 @@ TEST(OddDrives, OfAModelThatTheyDoNotMove) {
               ElementsAre("the model moves by its <ruedo:path>: its drive moves nothing"));
 }
 
+TEST(OddDrives, WhoseSidesAreSwapped) {
+  const std::string other = "<left_joint>jr</left_joint><right_joint>jl</right_joint>";
+  const auto world = world_of(robot(plugin("DiffDrive", other)));
+  EXPECT_THAT(texts(*world),
+              ElementsAre("the left wheels stand on the right, seen along the model's x: left and "
+                          "right are taken the other way round"));
+  const Model& model = *world->models.at(0).model;
+  EXPECT_EQ(model.joints[model.drive->left_joints.at(0)].name, "jl");
+}
+
+// The kinematic drive turns no wheels; that of wheels grips as its wheels do.
+TEST(OddDrives, WithElementsOfAnotherType) {
+  const std::string gear = "<ruedo:gear>3</ruedo:gear>";
+  EXPECT_THAT(named(robot(drive(gear + "<ruedo:servo_rate_gain>1</ruedo:servo_rate_gain>"))),
+              UnorderedElementsAre(
+                  "<ruedo:gear> does nothing with a drive of type 'kinematic'",
+                  "<ruedo:servo_rate_gain> does nothing with a drive of type 'kinematic'"));
+  EXPECT_THAT(named(robot(drive(gear, " type='wheels'"))), IsEmpty());
+  EXPECT_THAT(named(robot(drive("<ruedo:traction>true</ruedo:traction>", " type='wheels'"))),
+              ElementsAre("<ruedo:traction> does nothing with a drive of type 'wheels'"));
+}
+
 TEST(OddDrives, WhoseWheelsCannotRoll) {
   const std::string cannot = "the joint 'jr' cannot roll a wheel: ",
                     anyhow = "; the robot drives as if it could";
