@@ -12,7 +12,8 @@ namespace {
 constexpr double kDegree = M_PI / 180.0;
 
 // SDF's surface models; the moon's radii are those of Gazebo.
-void read_surface(const Element& place, Environment& environment) {
+void read_surface(const Element& place, Environment& environment, Findings& findings) {
+  constexpr const char* kAxes[] = {"surface_axis_equatorial", "surface_axis_polar"};
   const std::string surface =
       place.choice("surface_model", "EARTH_WGS84", {"EARTH_WGS84", "MOON_SCS", "CUSTOM_SURFACE"});
   if (surface == "MOON_SCS") {
@@ -20,19 +21,31 @@ void read_surface(const Element& place, Environment& environment) {
     environment.polar_radius = 1736000.0;
   } else if (surface == "CUSTOM_SURFACE") {
     const Allowed radius = Allowed::between(1e3, 1e9);
-    for (const char* axis : {"surface_axis_equatorial", "surface_axis_polar"}) {
+    for (const char* axis : kAxes) {
       if (!place.has(axis))
         place.fail("a CUSTOM_SURFACE needs <" + std::string(axis) + ">, in metres");
     }
     environment.equatorial_radius = place.number("surface_axis_equatorial", 0.0, radius);
     environment.polar_radius = place.number("surface_axis_polar", 0.0, radius);
+    return;
+  }
+  for (const char* axis : kAxes) {
+    if (const Element* written = place.child(axis))
+      findings.unsupported(written->source, "world/spherical_coordinates",
+                           "<" + written->name + "> does nothing with the surface model " +
+                               surface + "; it is for CUSTOM_SURFACE");
   }
 }
 
-void read_place(const Element& place, Environment& environment) {
+void read_place(const Element& place, Environment& environment, Findings& findings) {
+  report_other_children(
+      place,
+      {"surface_model", "surface_axis_equatorial", "surface_axis_polar", "world_frame_orientation",
+       "latitude_deg", "longitude_deg", "elevation", "heading_deg"},
+      {}, "world/spherical_coordinates", findings);
   Environment read = environment;
   read.placed = true;
-  read_surface(place, read);
+  read_surface(place, read, findings);
   place.choice("world_frame_orientation", "ENU", {"ENU"});
   read.latitude = kDegree * place.number("latitude_deg", 0.0, Allowed::between(-90, 90));
   read.longitude = kDegree * place.number("longitude_deg", 0.0, Allowed::between(-360, 360));
@@ -62,7 +75,7 @@ void read_environment(const Element& world, Environment& environment, Findings& 
       read_or_leave_out("world/" + element->name, instead, findings, [&] { read(*element); });
   };
   part("spherical_coordinates", "the world lies nowhere on Earth",
-       [&](const Element& place) { read_place(place, environment); });
+       [&](const Element& place) { read_place(place, environment, findings); });
   part("atmosphere", "the air is the standard atmosphere",
        [&](const Element& air) { read_air(air, environment); });
   part("wind", "no wind blows", [&](const Element& wind) {

@@ -141,6 +141,12 @@ std::string mesh_cache_folder() {
   return "";
 }
 
+namespace {
+
+constexpr const char* kSubmesh = ", submesh ";  // in the name of a part of a file
+
+}  // namespace
+
 MeshLoader::MeshLoader(const ResourceFinder& resources, TextureStore& textures, MeshImport import)
     : resources_(resources), textures_(textures), import_(std::move(import)) {
   if (import_.importer.empty()) import_.importer = default_importer();
@@ -209,7 +215,10 @@ std::shared_ptr<const Mesh> MeshLoader::load(const std::string& path) {
           continue;
         }
         const auto found = resources_.find_texture(material.texture->path, path);
-        if (found) files_.push_back(*found);
+        if (found)
+          files_.push_back(*found);
+        else
+          entry.textures_not_found.push_back(material.texture->path);
         material.texture = found ? textures_.take(*found) : nullptr;
       }
       entry.mesh = std::move(mesh);
@@ -224,6 +233,15 @@ std::shared_ptr<const Mesh> MeshLoader::load(const std::string& path) {
   return entry.mesh;
 }
 
+void MeshLoader::name_textures_not_found(const Mesh& mesh, Findings& findings) const {
+  const auto file = meshes_.find(mesh.name.substr(0, mesh.name.find(kSubmesh)));
+  if (file == meshes_.end()) return;
+  for (const std::string& picture : file->second.textures_not_found)
+    findings.unsupported(
+        {file->first, 0}, "",
+        "the texture '" + picture + "' is not found; the plain colour is shown instead");
+}
+
 std::shared_ptr<const Mesh> MeshLoader::load_submesh(const std::string& path,
                                                      const std::string& submesh, bool center) {
   const std::string key = path + "\n" + submesh + (center ? "\ncenter" : "");
@@ -231,7 +249,7 @@ std::shared_ptr<const Mesh> MeshLoader::load_submesh(const std::string& path,
     return known->second.mesh;
   const auto whole = load(path);
   auto mesh = std::make_shared<Mesh>();
-  mesh->name = path + ", submesh " + submesh;
+  mesh->name = path + kSubmesh + submesh;
   std::vector<uint32_t> number(whole->positions.size(), UINT32_MAX);
   for (const auto& part : whole->parts) {
     if (part.name != submesh) continue;

@@ -44,6 +44,9 @@ class MeshLoader {
   std::shared_ptr<const Mesh> load_submesh(const std::string& path, const std::string& submesh,
                                            bool center);
 
+  // Reports the pictures that the materials of a mesh's file name, and that are not there.
+  void name_textures_not_found(const Mesh& mesh, Findings& findings) const;
+
   // The files read so far: meshes, files they refer to, and textures. Includes broken mesh files.
   const std::vector<std::string>& files_read() const { return files_; }
 
@@ -51,6 +54,7 @@ class MeshLoader {
   struct Entry {
     std::shared_ptr<const Mesh> mesh;
     std::string fault;  // why there is no mesh
+    std::vector<std::string> textures_not_found = {};
   };
   Mesh import_or_cached(const std::string& path);
   Mesh taken(MeshPackage package, const std::string& path);

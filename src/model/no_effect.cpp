@@ -105,11 +105,12 @@ const std::map<std::string_view, std::string_view>& children_in_sdf() {
   return table;
 }
 constexpr std::string_view kReadersName[] = {
-    "sdf",          "world",   "model",    "link",         "joint",         "axis",
-    "axis2",        "visual",  "surface",  "include",      "light",         "scene",
-    "physics",      "inertia", "material", "mesh",         "inertial",      "collision",
-    "heightmap",    "state",   "geometry", "air_pressure", "air_speed",     "altimeter",
-    "force_torque", "gps",     "navsat",   "magnetometer", "logical_camera"};
+    "sdf",          "world",        "model",     "link",         "joint",
+    "axis",         "axis2",        "visual",    "surface",      "include",
+    "light",        "scene",        "physics",   "inertia",      "material",
+    "mesh",         "inertial",     "collision", "heightmap",    "state",
+    "geometry",     "air_pressure", "air_speed", "altimeter",    "spherical_coordinates",
+    "force_torque", "gps",          "navsat",    "magnetometer", "logical_camera"};
 
 // A sensor of an unknown type belongs to a plugin, and so does its content.
 constexpr std::string_view kSensorTypes[] = {"air_pressure",
@@ -147,6 +148,30 @@ constexpr std::string_view kSensorTypes[] = {"air_pressure",
                                              "wideanglecamera",
                                              "wireless_receiver",
                                              "wireless_transmitter"};
+
+// Of each type of sensor, what of <sensor> describes it.
+struct OfSensor {
+  std::string_view types, elements;
+};
+constexpr OfSensor kOfSensors[] = {
+    {"air_pressure", "air_pressure"},
+    {"air_speed", "air_speed"},
+    {"altimeter", "altimeter"},
+    {"boundingbox boundingbox_camera camera depth depth_camera multicamera rgbd rgbd_camera "
+     "segmentation segmentation_camera thermal thermal_camera wide_angle_camera wideanglecamera",
+     "camera"},
+    {"contact", "contact"},
+    {"force_torque", "force_torque"},
+    {"gps navsat", "gps navsat"},
+    {"gpu_lidar gpu_ray lidar ray", "lidar ray"},
+    {"imu", "imu"},
+    {"logical_camera", "logical_camera"},
+    {"magnetometer", "magnetometer"},
+    {"rfid", "rfid"},
+    {"rfidtag", "rfidtag"},
+    {"sonar", "sonar"},
+    {"wireless_receiver wireless_transmitter", "transceiver"},
+};
 
 // What may stand in an element more than once. Of everything else the readers take the first.
 constexpr std::string_view kSeveral[] = {"actor",
@@ -209,6 +234,11 @@ std::vector<std::string> words_of(std::string_view list) {
     list.remove_prefix(std::min(list.size(), words.back().size() + 1));
   }
   return words;
+}
+
+bool contains_word(std::string_view list, const std::string& word) {
+  const std::vector<std::string> words = words_of(list);
+  return std::find(words.begin(), words.end(), word) != words.end();
 }
 
 bool ends_with_path(std::string_view path, std::string_view end) {
@@ -280,6 +310,13 @@ class Walk {
         findings_.unsupported(child.source, where,
                               "<" + child.name + "> is not supported: " + each.text);
     }
+    if (known && of_another_sensor(parent, child)) {
+      findings_.unsupported(child.source, where,
+                            "<" + child.name + "> in a <sensor> of type '" +
+                                *parent.attribute("type") +
+                                "' is left out: it describes other sensors");
+      return false;
+    }
     if (known) return true;
     const std::string near = nearest_word(child.name, words_in(parent));
     findings_.unsupported(child.source, where,
@@ -299,6 +336,20 @@ class Walk {
                             path.substr(path.rfind('@') + 1) + "=\"" + value + "\" of <" +
                                 element.name + "> is not supported: " + each.text);
     }
+  }
+
+  static bool of_another_sensor(const Element& parent, const Element& child) {
+    const std::string* type = parent.name == "sensor" ? parent.attribute("type") : nullptr;
+    if (!type) return false;
+    bool describes = false, own = false, known = false;
+    for (const OfSensor& each : kOfSensors) {
+      const bool of_type = contains_word(each.types, *type),
+                 is_its = contains_word(each.elements, child.name);
+      known |= of_type;
+      describes |= is_its;
+      own |= of_type && is_its;
+    }
+    return known && describes && !own;
   }
 
   // What neither SDF nor Ruedo has may be a plugin's own.

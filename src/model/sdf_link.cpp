@@ -113,6 +113,8 @@ Visual read_visual(const Element& element, const Pose& X_LV, Geometry geometry,
     read_or_leave_out(where, "the material is left out", context.findings,
                       [&] { v.material = read_material(*material, where, context); });
   }
+  if (v.geometry.mesh && !v.material)
+    context.meshes.name_textures_not_found(*v.geometry.mesh, context.findings);
   v.transparency = element.number("transparency", 0, Allowed::between(0, 1));
   v.cast_shadows = element.boolean("cast_shadows", true);
   return v;

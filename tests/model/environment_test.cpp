@@ -53,6 +53,22 @@ TEST(Environment, OtherGlobes) {
             12000.0);
 }
 
+TEST(Environment, AnotherGlobesAxesAreNamed) {
+  const std::string axes =
+      "<surface_axis_equatorial>12000</surface_axis_equatorial>"
+      "<surface_axis_polar>10000</surface_axis_polar>";
+  const auto of = [&](const std::string& inside) {
+    return texts(*world_of("<spherical_coordinates>" + inside + "</spherical_coordinates>"));
+  };
+  EXPECT_THAT(of("<surface_model>CUSTOM_SURFACE</surface_model>" + axes), IsEmpty());
+  const std::string nothing =
+      " does nothing with the surface model EARTH_WGS84; it is for CUSTOM_SURFACE";
+  EXPECT_THAT(of(axes),
+              ElementsAre("<surface_axis_equatorial>" + nothing, "<surface_axis_polar>" + nothing));
+  EXPECT_THAT(of("<latitude>3</latitude>"),
+              ElementsAre("<latitude> is not supported and left out"));
+}
+
 TEST(Environment, OldFilesHaveTheFieldInTheirPhysics) {
   const auto world =
       world_of("<physics type='ode'><magnetic_field>0 0 1e-5</magnetic_field></physics>");

@@ -289,6 +289,28 @@ TEST_F(Meshes, MaterialsAndTheirFile) {
                   0.3f);
 }
 
+// Once, where a picture would have been seen.
+TEST_F(Meshes, TexturesThatAreNotThereAreNamed) {
+  folder.write("box.mtl", "newmtl red\nKd 0.8 0.1 0.2\nmap_Kd paint.png\n");
+  const std::string path = folder.write("box.obj", obj());
+  const std::string box = "<geometry><mesh><uri>box.obj</uri></mesh></geometry>";
+  const auto named = [&](const std::string& shapes) {
+    const auto world = load_world_text(
+        "<sdf version='1.9'><model name='m'><link name='l'>" + shapes + "</link></model></sdf>",
+        folder / "m.sdf");
+    std::vector<std::string> list;
+    for (const Finding& each : world->findings)
+      list.push_back(each.source.str() + ": " + each.text);
+    return list;
+  };
+  EXPECT_EQ(named("<visual name='a'>" + box + "</visual><visual name='b'>" + box + "</visual>"),
+            std::vector{path + ": the texture 'paint.png' is not found; the plain colour is shown "
+                               "instead"});
+  EXPECT_TRUE(named("<collision name='a'>" + box + "</collision><visual name='b'>" + box +
+                    "<material><diffuse>1 0 0 1</diffuse></material></visual>")
+                  .empty());
+}
+
 TEST_F(Meshes, CacheIsUsedAndABrokenEntryIsNot) {
   const std::string path = folder.write("box.stl", stl());
   EXPECT_EQ(fault_of(path, import()), "");

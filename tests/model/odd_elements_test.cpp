@@ -70,6 +70,23 @@ TEST(OddElements, AFrameNamedLikeSomethingElse) {
   EXPECT_EQ(link_of(*inner->models.at(0).model, "k").X_ML.translation.z(), 2.0);
 }
 
+TEST(OddElements, OfAnotherKindOfSensor) {
+  const auto sensor = [](const std::string& type, const std::string& inside) {
+    return texts(*world_of("<model name='m'><link name='l'><sensor name='s' type='" + type + "'>" +
+                           inside + "</sensor></link></model>"));
+  };
+  const std::string camera = "<camera><horizontal_fov>1</horizontal_fov></camera>", ray = "<ray/>";
+  EXPECT_THAT(sensor("gpu_lidar", ray + camera),
+              ElementsAre("<camera> in a <sensor> of type 'gpu_lidar' is left out: it describes "
+                          "other sensors"));
+  EXPECT_THAT(sensor("camera", camera + "<imu/>"),
+              ElementsAre("<imu> in a <sensor> of type 'camera' is left out: it describes other "
+                          "sensors"));
+  EXPECT_THAT(sensor("depth_camera", camera), IsEmpty());
+  EXPECT_THAT(sensor("gps", "<navsat/>"), IsEmpty());
+  EXPECT_THAT(sensor("makers_own", ray + camera), IsEmpty());
+}
+
 // URDF lets a joint have the name of a link; both stay.
 TEST(OddElements, AJointMayHaveTheNameOfALink) {
   const auto world = world_of(
