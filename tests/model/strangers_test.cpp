@@ -98,6 +98,30 @@ TEST(Strangers, FollowNoLinksOutOfAFolderOfMaterials) {
   EXPECT_FALSE(theirs && theirs->diffuse == (Rgba{0, 1, 0, 1}));
 }
 
+// Nobody reads the server's log for a client.
+TEST(Strangers, GiveFiniteNumbers) {
+  const auto spawned = [](const std::string& gain) {
+    return load_model_text(
+        "<sdf version='1.9'><model name='m'><link name='a'/><link name='b'/><joint name='j' "
+        "type='revolute'><parent>a</parent><child>b</child><axis><xyz>0 0 1</xyz></axis></joint>"
+        "<plugin name='gz::sim::systems::JointPositionController' filename='f'>\n<joint_name>j"
+        "</joint_name><p_gain>" +
+            gain + "</p_gain></plugin></model></sdf>",
+        "/nowhere/w.sdf");
+  };
+  EXPECT_EQ(spawned("3").model->joints[0].axis.position_pid.value().p, 3.0);
+  for (const std::string wrong : {"inf", "nan"}) {
+    try {
+      spawned(wrong);
+      FAIL() << wrong;
+    } catch (const InputError& error) {
+      EXPECT_EQ(std::string(error.what()),
+                "the text:2: <p_gain>: '" + wrong + "' is not finite; allowed is a number");
+    }
+  }
+  EXPECT_NO_THROW(spawned("much"));  // left out, and told in the server's log
+}
+
 TEST(Names, ThatTwoModelsShareAreFound) {
   const auto model = [](std::vector<std::string> links) {
     auto made = std::make_shared<Model>();
