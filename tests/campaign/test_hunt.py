@@ -395,6 +395,40 @@ def test_what_is_kept_and_does_not_fail_again_is_told(tmp_path):
     assert "RuntimeError: once" in done.stdout
 
 
+@pytest.mark.parametrize("there", ["kept/mine.txt", "kept"])
+def test_a_find_gets_a_folder_of_its_own(tmp_path, there):
+    """Before any case is run."""
+    folder = blind(tmp_path, "once")
+    (folder / there).parent.mkdir(exist_ok=True)
+    (folder / there).write_text("mine")
+    done = ruedo("hunt", "hunt.yaml", "--cases", "1", "--keep", "kept", folder=folder, code=2)
+    assert done.stderr == ("ruedo: kept is there already: keep what is found in a new folder\n"), (
+        done
+    )
+    assert (folder / there).read_text() == "mine"
+
+
+def test_the_plot_of_why_is_checked_before_any_work(tmp_path):
+    log = tmp_path / "log.svg"
+    with Engine("arena") as engine:
+        engine.begin_run(1, log=str(log))
+        engine.step(None, 10)
+        engine.end_run()
+    content = log.read_bytes()
+    for file, code, words in (
+        ("out.txt", 2, "-o out.txt: its name ends with .svg, .png or .pdf"),
+        (
+            "log.svg",
+            2,
+            "-o log.svg is one of the files that are read for this, which would be lost",
+        ),
+        ("nowhere/a.svg", 4, "nowhere/a.svg: No such file or directory"),
+    ):
+        done = ruedo("why", "log.svg", "-o", file, "--seeds", "0", folder=tmp_path, code=code)
+        assert done.stderr == f"ruedo: {words}\n", done
+        assert log.read_bytes() == content
+
+
 def test_obstacles_go_into_the_world_and_not_into_a_comment():
     """Regression: into the last thing that looked like its end."""
     text = with_boxes(INCLUDES.encode("latin-1"), [(1.0, 2.0, 0.5)])

@@ -581,11 +581,78 @@ def test_what_a_controller_says_stays_one_line_everywhere(tmp_path):
     assert failed.returncode == 1 and "Odd: two lines" in failed.stdout, failed.stdout
 
 
-@pytest.mark.parametrize("words", [("export", "-o"), ("report", "--pages", "0", "-o")])
+@pytest.mark.parametrize(
+    "words",
+    [("export", "-o"), ("report", "--pages", "0", "-o"), ("repeat", "2", "-o"), ("run", "--junit")],
+)
 def test_a_file_that_cannot_be_written_is_named(whole, words):
     folder, _ = whole
     done = ruedo("campaign", words[0], "c.yaml", *words[1:], "nowhere/t.csv", folder=folder, code=4)
     assert done.stderr == "ruedo: nowhere/t.csv: No such file or directory\n"
+
+
+def test_a_command_never_writes_over_what_it_reads(whole):
+    folder, expected = whole
+    log = next((folder / "c.campaign/logs").iterdir()).relative_to(folder)
+    linked = folder / "linked.csv"
+    os.link(folder / "c.campaign/results.sqlite", linked)
+    read = ["c.yaml", "controller.py", "world.py", "c.campaign/results.sqlite", log, linked]
+    kept = {file: (folder / file).read_bytes() for file in read}
+    commands = (
+        ("run", "c.yaml", "--quiet", "--junit"),
+        ("report", "c.yaml", "--pages", "0", "-o"),
+        ("repeat", "c.yaml", "2", "-o"),
+    )
+    for *command, file in [
+        *((*words, file) for words in commands for file in read),
+        ("export", "c.yaml", "-o", linked),
+        ("report", "c.yaml", "--pages", "0", "--baseline", ".", "-o", "c.campaign/lock"),
+    ]:
+        said = ruedo("campaign", *command, file, folder=folder, code=2).stderr
+        assert said.endswith(
+            f"{command[-1]} {file} is one of the files that are read for this, "
+            "which would be lost\n"
+        ), said
+        assert {file: (folder / file).read_bytes() for file in read} == kept
+    linked.unlink()
+    assert table(folder) == expected
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ("export", "c.yaml", "-o", "full/t.csv"),
+        ("export", "c.yaml", "-o", "full/t.parquet"),
+        ("report", "c.yaml", "--pages", "0", "-o", "full/t.html"),
+        ("run", "c.yaml", "--quiet", "--junit", "full/t.xml"),
+    ],
+)
+def test_what_is_there_outlives_a_full_disk(whole, words):
+    folder, _ = whole
+    (folder / "full").mkdir(exist_ok=True)
+    script = (
+        "mount -t tmpfs -o size=64k none full && echo kept > $0 && ! cat /dev/zero > full/fill && "
+        '! cat /dev/zero >> full/fill && "$@"; echo $?; cat $0; ls full'
+    )
+    full = ["unshare", "-m" if os.getuid() == 0 else "-rm", "sh", "-c", script, words[-1]]
+    done = subprocess.run(
+        [*full, RUEDO, "campaign", *words],
+        cwd=folder,
+        capture_output=True,
+        text=True,
+        timeout=PATIENCE,
+    )
+    name = words[-1].removeprefix("full/")
+    assert done.stdout.split()[-4:] == ["4", "kept", "fill", name], done
+    assert done.stderr.splitlines()[-1] == f"ruedo: {words[-1]}: No space left on device", done
+
+
+def test_an_option_is_given_once(folder):
+    done = ruedo(
+        "campaign", "run", "c.yaml", "--shard", "1/2", "--shard", "2/2", folder=folder, code=2
+    )
+    assert "argument --shard: is given twice" in done.stderr
+    assert not (folder / "c.campaign").exists()
 
 
 def test_slurm(whole):

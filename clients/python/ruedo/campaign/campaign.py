@@ -24,6 +24,8 @@ from .worlds import WorldFiles
 
 _REMEMBERED = ("number", "id", "world", "robot", "controller", "seed", "parameters")
 
+_RESULTS = ("results.sqlite*", "lock", "logs/*", "worlds/*")  # in the folder of the results
+
 Progress = Callable[[Case, dict[str, Any]], None]
 
 
@@ -93,6 +95,13 @@ class Campaign:
             self._cases = planner.cases()
             self._files = planner.files
         return self._cases
+
+    @property
+    def files_read(self) -> list[Path]:
+        """Its file, all that its cases are made from, and its results."""
+        made_from = [Path(file) for file in self._files] if self.cases else []
+        results = [one for kind in _RESULTS for one in self.out.glob(kind)]
+        return [*([self.file] if self.file else []), *made_from, *results]
 
     def run(
         self,

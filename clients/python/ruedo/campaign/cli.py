@@ -58,8 +58,33 @@ def main(words: list[str]) -> int:
         return ENVIRONMENT
 
 
+class _Once(argparse.Action):
+    """An option with a value, of which argparse would take the last one without a word."""
+
+    def __call__(
+        self,
+        parser: argparse.ArgumentParser,
+        namespace: argparse.Namespace,
+        values: Any,
+        option_string: str | None = None,
+    ) -> None:
+        given = vars(namespace).setdefault("_given", set())
+        if option_string and self.dest in given:
+            raise argparse.ArgumentError(self, "is given twice")
+        given.add(self.dest)
+        setattr(namespace, self.dest, values)
+
+
+class _Parser(argparse.ArgumentParser):
+    """Its subparsers are of this class, too."""
+
+    def __init__(self, *arguments: Any, **options: Any) -> None:
+        super().__init__(*arguments, **options)
+        self.register("action", None, _Once)
+
+
 def _parser() -> argparse.ArgumentParser:
-    top = argparse.ArgumentParser(
+    top = _Parser(
         prog="ruedo", formatter_class=argparse.RawDescriptionHelpFormatter
     )
     commands = top.add_subparsers(required=True, metavar="COMMAND")
@@ -185,18 +210,30 @@ def _campaign(arguments: argparse.Namespace) -> Any:
     return Campaign(arguments.FILE, out=arguments.out)
 
 
+def _output(campaign: Any, option: str, file: str, *others: Path) -> Path:
+    """Before any work: a file that the command may write."""
+    from .outputs import check_output
+
+    return check_output(option, file, [*campaign.files_read, *others])
+
+
 def _run(arguments: argparse.Namespace) -> int:
+    from .outputs import write_text
     from .progress import shown
 
     campaign = _campaign(arguments)
+    junit = None
+    if arguments.junit:
+        campaign.out.mkdir(parents=True, exist_ok=True)  # it may be meant to lie there
+        junit = _output(campaign, "--junit", arguments.junit)
     if not arguments.quiet:
         _name_unknown_programs(campaign)
     with shown(campaign, arguments.shard, arguments.quiet or arguments.json) as progress:
         results = campaign.run(
             workers=arguments.workers, ray=arguments.ray, shard=arguments.shard, progress=progress
         )
-    if arguments.junit:
-        Path(arguments.junit).write_text(results.junit(campaign.name), encoding="utf-8")
+    if junit:
+        write_text(junit, results.junit(campaign.name))
     if arguments.json:
         say(json.dumps(_summary(campaign, results)))
     else:
@@ -256,6 +293,9 @@ def _report(arguments: argparse.Namespace) -> int:
 
     campaign = _campaign(arguments)
     file = Path(arguments.output or campaign.out / "report.html")
+    if arguments.output:
+        compared = [Path(arguments.baseline) / "results.sqlite"] if arguments.baseline else []
+        _output(campaign, "-o", arguments.output, *compared)
     write_report(campaign, file, arguments.baseline, arguments.pages)
     say(str(file))
     return GOOD
@@ -293,7 +333,7 @@ def _repeat(arguments: argparse.Namespace) -> int:
 
     campaign = _campaign(arguments)
     case = campaign.case(arguments.CASE)
-    log = Path(arguments.output or f"{case.id}.lcm").resolve()
+    log = _output(campaign, "-o", arguments.output or f"{case.id}.lcm").resolve()
     with Crew(str(campaign.folder)) as crew:
         outcome = crew.run_one(case.what, full_log=str(log))
     row = campaign.results().row(case)
@@ -344,19 +384,20 @@ def _join(arguments: argparse.Namespace) -> int:
 
 
 def _export(arguments: argparse.Namespace) -> int:
-    from .errors import SpecError
+    from .errors import UsageError
+    from .outputs import replacing, write_text
 
+    kind = Path(arguments.output).suffix
+    if kind not in (".csv", ".parquet", ".xml"):
+        raise UsageError(f"-o {arguments.output}: its name ends with .csv, .parquet or .xml")
     campaign = _campaign(arguments)
+    file = _output(campaign, "-o", arguments.output)
     results = campaign.results()
-    file = Path(arguments.output)
-    if file.suffix == ".csv":
-        file.write_text(results.csv(), encoding="utf-8")
-    elif file.suffix == ".parquet":
-        results.parquet(str(file))
-    elif file.suffix == ".xml":
-        file.write_text(results.junit(campaign.name), encoding="utf-8")
+    if kind == ".parquet":
+        with replacing(file) as part:
+            results.parquet(str(part))
     else:
-        raise SpecError(f"{file}: its name ends with .csv, .parquet or .xml")
+        write_text(file, results.csv() if kind == ".csv" else results.junit(campaign.name))
     say(f"{file}: {len(results.done)} of {len(results.cases)} cases")
     return GOOD
 

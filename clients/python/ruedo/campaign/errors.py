@@ -11,6 +11,12 @@ class CampaignError(RuedoError):
     exit_code = 4
 
 
+class UsageError(CampaignError, ValueError):
+    """What was asked for cannot be, whatever is in the files."""
+
+    exit_code = 2
+
+
 class ResultsError(CampaignError, ValueError):
     """A folder of results is damaged, or holds something else."""
 

@@ -17,6 +17,7 @@ import numpy as np
 
 from .compare import compare_with
 from .errors import missing
+from .outputs import write_text
 from .pages import make_pages
 from .plan import Case
 from .stats import wilson
@@ -60,7 +61,7 @@ def write_report(campaign: Any, file: Path, baseline: str | None = None, pages: 
         f"<!DOCTYPE html><html lang='en'><head><meta charset='utf-8'><title>{title}</title><style>{_STYLE}</style></head><body>"
         f"{''.join(parts)}</body></html>\n"
     )
-    file.write_text(page, encoding="utf-8")
+    write_text(file, page)
 
 
 def _head(campaign: Any, results: Results) -> str:

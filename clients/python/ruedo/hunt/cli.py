@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import json
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..campaign.cli import MOST_WORKERS, number
@@ -51,7 +52,10 @@ def add_hunt(commands: Any) -> None:
 
 def _hunt(arguments: argparse.Namespace) -> int:
     from .hunt import Hunt
+    from .regression import check_keep
 
+    if arguments.keep:
+        check_keep(Path(arguments.keep))
     hunt = Hunt(arguments.FILE, out=arguments.out)
     best = 1.0
 

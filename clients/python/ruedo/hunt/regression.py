@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from ..campaign import Campaign
-from ..campaign.errors import CampaignError
+from ..campaign.errors import CampaignError, UsageError
 from ..campaign.plan import words_of
 from ..campaign.worlds import beside, copy_beside, model_of
 from ..errors import for_terminal
@@ -41,6 +41,7 @@ def keep(found: Any, folder: Path) -> Path:
     """
     import yaml
 
+    check_keep(folder)
     folder.mkdir(parents=True, exist_ok=True)
     name = re.sub(r"\W", "_", folder.name)
     reason = for_terminal(found.reason)  # a stranger's words, in comments
@@ -76,6 +77,12 @@ def keep(found: Any, folder: Path) -> Path:
     (folder / "run.lcm").write_bytes(found.outcome["log"])
     _check_that_it_fails(found, folder)
     return folder
+
+
+def check_keep(folder: Path) -> None:
+    """Raises UsageError for a folder that holds anything, which would be mixed with the find."""
+    if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
+        raise UsageError(f"{folder} is there already: keep what is found in a new folder")
 
 
 def _new_name(name: str, taken: set[str], home: Path) -> str:

@@ -18,8 +18,9 @@ import numpy as np
 
 from ..campaign import Campaign, Case
 from ..campaign.case import fault_text, goals
-from ..campaign.errors import CampaignError, SpecError
+from ..campaign.errors import CampaignError, SpecError, UsageError
 from ..campaign.local import Crew
+from ..campaign.outputs import replacing
 from ..campaign.store import Store
 from ..decoding import decode
 from ..engine import Engine
@@ -35,6 +36,7 @@ MANOEUVRES = {
 _PERIOD_S = 0.25  # between moments that are tried
 _AFTER_S = 3.0  # how long a branch goes on after the run failed
 _MOST = 80  # moments
+_PLOTS = (".svg", ".png", ".pdf")
 _HASHES_US = 1_000_000  # sim time between the states whose hash is in a log
 _Again = tuple[Crew, dict[str, Any]]  # what runs a campaign's case again, and its `what`
 
@@ -215,6 +217,12 @@ def why(path: str, seeds: int = 5) -> Answer:
     return answer
 
 
+def files_read(path: str) -> list[Path]:
+    """The log, and where it is one of a campaign, what that was made from."""
+    case = _case_of(path)
+    return [Path(path), *(case[0].files_read if case else [])]
+
+
 def _case_of(path: str) -> tuple[Campaign, Case] | None:
     """The campaign and case of a log in a campaign's folder."""
     folder = Path(path).resolve().parent.parent
@@ -384,6 +392,12 @@ def _open_loop(recorded: Recorded, text: str, **changed: Any) -> tuple[str, bool
     return f"{text}, with the same commands", not failures, failures[0]["text"] if failures else ""
 
 
+def check_plot(file: str) -> None:
+    """Raises UsageError for a name by which it is no picture that can be drawn."""
+    if not file.endswith(_PLOTS):
+        raise UsageError(f"-o {file}: its name ends with {', '.join(_PLOTS[:-1])} or {_PLOTS[-1]}")
+
+
 def plot(answer: Answer, file: str) -> None:
     """The moments that were tried, and what saved the run: SVG, PNG or PDF by the file's name."""
     from ..campaign.report import new_figure
@@ -413,4 +427,6 @@ def plot(answer: Answer, file: str) -> None:
     axes.set_ylim(-0.6, len(rows) - 0.1)
     axes.set_xlabel("from this moment on (s)")
     axes.legend(frameon=False, loc="lower left", ncols=2)
-    drawn.savefig(file, metadata={"Date": None} if file.endswith(".svg") else None)
+    kind = Path(file).suffix[1:]
+    with replacing(file) as part:
+        drawn.savefig(part, format=kind, metadata={"Date": None} if kind == "svg" else None)

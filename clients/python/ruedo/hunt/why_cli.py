@@ -7,6 +7,7 @@ import json
 from typing import Any
 
 from ..campaign.cli import number
+from ..campaign.outputs import check_output
 from ..campaign.terminal import say
 
 
@@ -31,8 +32,11 @@ def add_why(commands: Any) -> None:
 
 
 def _why(arguments: argparse.Namespace) -> int:
-    from .why import plot, why
+    from .why import check_plot, files_read, plot, why
 
+    if arguments.output:
+        check_plot(arguments.output)
+        check_output("-o", arguments.output, files_read(arguments.LOG))
     answer = why(arguments.LOG, arguments.seeds)
     if arguments.output and (answer.rescues or answer.seeds):
         plot(answer, arguments.output)
