@@ -24,8 +24,6 @@ constexpr double kIndependent = 1e-6;  // part of a row's response that is indep
 constexpr size_t kMostRows = 8;        // of one Bullet constraint
 constexpr size_t kRowsOfAHinge = 5;
 constexpr size_t kSkip = 12;  // numbers in a row's Jacobian
-constexpr size_t kMostInBlock =
-    256;  // rows that are solved directly; the remaining rows of a longer mechanism are relaxed
 
 Vec3 vector_at(const btScalar* v) { return {v[0], v[1], v[2]}; }
 
@@ -175,6 +173,7 @@ void JointBlocks::clear() {
   rows_.clear();
   way_of_row_.clear();
   thirds_.clear();
+  third_of_row_.clear();
   joints_.clear();
   block_count_ = 0;
 }
@@ -209,9 +208,8 @@ int JointBlocks::ask(btTypedConstraint& constraint, double reduction, double sub
 }
 
 const JointBlocks::Third* JointBlocks::third_of(size_t row) const {
-  for (const Third& third : thirds_)
-    if (third.row == row) return &third;
-  return nullptr;
+  if (row >= third_of_row_.size() || third_of_row_[row] == kNoThird) return nullptr;
+  return &thirds_[third_of_row_[row]];
 }
 
 double JointBlocks::coupling(size_t i, size_t j) const {
@@ -297,7 +295,7 @@ void JointBlocks::add_rows(Joint& joint, const SolverBodies& bodies, double subs
     // a tree can prescribe one degree of freedom only once
     const bool second = block.is_tree && i > first_motor;
     const bool direct = !is_stop(row) && row.upper > 0.0 && row.lower < 0.0 && !second &&
-                        (block.is_tree || block.free.size() < kMostInBlock);
+                        (block.is_tree || block.free.size() < kMostRowsAtOnce);
     (direct ? block.free : block.bounded).push_back(i);
     if (block.is_tree && i >= first_motor) way_of_row_[i] = joint.way;
   }
@@ -399,6 +397,8 @@ void JointBlocks::add_third(const JointMotor& motor, int reference, const Solver
   third.body = reference;
   third.angular = -motor.axis - motor.parent_axis;
   third.turns = bodies[reference].inverse_inertia * third.angular;
+  third_of_row_.resize(rows_.size(), kNoThird);
+  third_of_row_.back() = thirds_.size();
   thirds_.push_back(third);
   Row& row = rows_.back();
   row.response = coupling(third.row, third.row);

@@ -2,6 +2,8 @@
 // (joint_tree.h), or as rows if joints close a loop or are of other kinds.
 #pragma once
 
+#include <cstddef>
+#include <cstdint>
 #include <optional>
 #include <vector>
 
@@ -10,6 +12,9 @@
 #include "physics/rows.h"
 
 namespace ruedo::physics {
+
+// Of a mechanism with loops; its other rows are relaxed.
+inline constexpr size_t kMostRowsAtOnce = 256;
 
 class JointBlocks {
  public:
@@ -134,6 +139,8 @@ class JointBlocks {
   std::vector<size_t> way_of_row_;  // in its block's tree; kNone: in none
   std::vector<Row> locked_;         // of trees, for Newton's method
   std::vector<Third> thirds_;
+  static constexpr size_t kNoThird = SIZE_MAX;
+  std::vector<size_t> third_of_row_;  // asked for each pair of rows; shorter where none follows
   std::vector<Joint> joints_;
   std::vector<size_t> parents_;  // union-find over bodies
   std::vector<Block> blocks_;

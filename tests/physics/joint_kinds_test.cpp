@@ -210,5 +210,29 @@ TEST(JointKinds, AGearboxNeedsItsReference) {
   EXPECT_EQ(said("<gearbox_reference_body>p</gearbox_reference_body>"), "nothing");
 }
 
+// Hinges on one frame: each is a branch of a tree, until gearboxes close loops between them.
+TEST(JointKinds, MoreLoopsThanAreSolvedAtOnceAreNamed) {
+  const auto gears = [](int hinges, bool meshed) {
+    std::string model = "<model name='m'>" + link("frame", "0 0 1 0 0 0");
+    for (int i = 0; i < hinges; ++i) {
+      const std::string own = std::to_string(i), before = "g" + std::to_string(i - 1);
+      model += link("g" + own, own + " 0 1 0 0 0") +
+               joint("h" + own, "revolute", "frame", "g" + own, "0 0 1");
+      if (i > 0 && meshed)
+        model += joint("b" + own, "gearbox", before, "g" + own, "0 0 1", "",
+                       "<gearbox_ratio>-1</gearbox_ratio><gearbox_reference_body>frame"
+                       "</gearbox_reference_body>");
+    }
+    return World(model + "</model>").physics.findings();
+  };
+  EXPECT_TRUE(gears(60, false).empty());
+  EXPECT_TRUE(gears(42, true).empty());
+  const auto named = gears(44, true);
+  ASSERT_EQ(named.size(), 1u);
+  EXPECT_EQ(named[0].text,
+            "its 87 joints close loops, and hold 263 degrees of freedom; 256 are solved at once, "
+            "and the others bit by bit: less exactly, and slowly");
+}
+
 }  // namespace
 }  // namespace ruedo::physics::testing
