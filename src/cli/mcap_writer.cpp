@@ -3,9 +3,6 @@
 #include "cli/mcap_writer.h"
 
 #include <algorithm>
-#include <cerrno>
-#include <cstring>
-#include <filesystem>
 
 #include "core/input_file.h"
 #include "core/version.h"
@@ -63,8 +60,7 @@ uint32_t crc_of(std::string_view bytes, uint32_t before = 0) {
 }  // namespace
 
 McapWriter::McapWriter(const std::string& path, const std::string& profile)
-    : path_(path), file_(std::fopen(path.c_str(), "wb")) {
-  if (!file_) throw EnvironmentError(path + " cannot be written: " + std::strerror(errno));
+    : path_(path), file_(path) {
   write(kMagic);
   std::string fields;
   put_text(fields, profile);
@@ -72,16 +68,8 @@ McapWriter::McapWriter(const std::string& path, const std::string& profile)
   write(record(Op::header, fields));
 }
 
-McapWriter::~McapWriter() {
-  if (finished_) return;
-  file_.reset();
-  std::error_code error;  // a device must not be removed
-  if (std::filesystem::is_regular_file(path_, error)) std::filesystem::remove(path_, error);
-}
-
 void McapWriter::write(std::string_view bytes) {
-  if (std::fwrite(bytes.data(), 1, bytes.size(), file_.get()) != bytes.size())
-    throw EnvironmentError(path_ + " cannot be written: " + std::strerror(errno));
+  file_.write(bytes);
   offset_ += bytes.size();
   crc_ = crc_of(bytes, crc_);
 }
@@ -278,9 +266,7 @@ void McapWriter::finish() {
   write(record(Op::data_end, data_end));
   write_summary();
   write(kMagic);
-  if (std::fflush(file_.get()) != 0)
-    throw EnvironmentError(path_ + " cannot be written: " + std::strerror(errno));
-  finished_ = true;
+  file_.keep();
 }
 
 }  // namespace ruedo::cli

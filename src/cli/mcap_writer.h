@@ -3,12 +3,12 @@
 #pragma once
 
 #include <cstdint>
-#include <cstdio>
 #include <map>
-#include <memory>
 #include <string>
 #include <string_view>
 #include <vector>
+
+#include "core/output_file.h"
 
 namespace ruedo::cli {
 
@@ -20,12 +20,9 @@ class McapWriter {
 
   using Metadata = std::map<std::string, std::string>;
 
-  // profile: MCAP's word for whose conventions hold, "ros2". Throws EnvironmentError when the file
-  // cannot be written, as all that follows does.
+  // profile: MCAP's word for whose conventions hold, "ros2". Throws as OutputFile, as all that
+  // follows does. What was at the path stays until finish().
   explicit McapWriter(const std::string& path, const std::string& profile = "");
-  ~McapWriter();  // a file that was not finished is removed
-  McapWriter(const McapWriter&) = delete;
-  McapWriter& operator=(const McapWriter&) = delete;
 
   // Both return an id. Throw InputError when there are too many.
   uint16_t add_schema(const std::string& name, const std::string& encoding, std::string_view data);
@@ -60,10 +57,7 @@ class McapWriter {
   std::vector<std::string> attachment_indexes() const;
 
   std::string path_;
-  struct Close {
-    void operator()(std::FILE* file) const { std::fclose(file); }
-  };
-  std::unique_ptr<std::FILE, Close> file_;
+  OutputFile file_;
   uint64_t offset_ = 0;
   uint32_t crc_ = 0;                             // of all that was written
   std::vector<std::string> schemas_, channels_;  // records
@@ -74,7 +68,6 @@ class McapWriter {
   uint64_t chunk_begin_ns_ = 0, chunk_end_ns_ = 0, begin_ns_ = 0, end_ns_ = 0, messages_ = 0;
   std::vector<ChunkIndex> chunks_;
   std::vector<Attachment> attachments_;
-  bool finished_ = false;
 };
 
 }  // namespace ruedo::cli

@@ -240,6 +240,7 @@ int regress(RegressArguments arguments) {
   const bool renew =
       arguments.renew || (environment && *environment && std::string(environment) != "0");
   const std::shared_ptr<const model::WorldModel> world = load(arguments.world);
+  check_output(arguments.record);
   print_findings(world->findings);
   judge::Judge judge(*world, expected);
   std::vector<std::string> failures;

@@ -31,6 +31,7 @@
 #include "cli/to_stderr.h"
 #include "cli/view.h"
 #include "core/leftovers.h"
+#include "core/output_file.h"
 #include "core/utf8.h"
 #include "engine/thread_limit.h"
 #include "log/ring.h"
@@ -218,6 +219,7 @@ int run_world(const RunArguments& arguments) {
     if (const int code = strict_check(arguments.world); code != kGood) return code;
   }
   const std::shared_ptr<const model::WorldModel> world = load(arguments.world);
+  check_output(arguments.record);
   for (std::string& plugin : plugin_options()) options.result_options.push_back(std::move(plugin));
   const bus::ServerBus place = bus::open_server_bus(
       arguments.lcm, world->name, [](const std::string& line) { spdlog::warn(line); });

@@ -21,11 +21,15 @@ namespace {
 // VP8 is what every browser plays of WebM, H.264 with halved colours of MP4.
 std::vector<std::string> codec_of(const std::string& file) {
   if (file.ends_with(".webm"))
-    return {"-c:v", "libvpx", "-crf", "10", "-b:v", "4M", "-deadline", "good", "-cpu-used", "4"};
-  return {"-c:v", "libx264", "-crf", "20", "-pix_fmt", "yuv420p", "-movflags", "+faststart"};
+    return {"-c:v",      "libvpx", "-crf",      "10", "-b:v", "4M",
+            "-deadline", "good",   "-cpu-used", "4",  "-f",   "webm"};
+  return {"-c:v",    "libx264",   "-crf",       "20", "-pix_fmt",
+          "yuv420p", "-movflags", "+faststart", "-f", "mp4"};
 }
 
-std::vector<std::string> words_of(const std::string& file, cv::Size size, double fps) {
+// file: by its name's end it is clear what it is; to: where it is written.
+std::vector<std::string> words_of(const std::string& file, const std::string& to, cv::Size size,
+                                  double fps) {
   std::vector<std::string> words{"ffmpeg", "-nostdin", "-loglevel",     "error", "-y",
                                  "-f",     "rawvideo", "-pixel_format", "bgr24"};
   const auto add = [&](const std::vector<std::string>& more) {
@@ -34,7 +38,7 @@ std::vector<std::string> words_of(const std::string& file, cv::Size size, double
   add({"-video_size", fmt::format("{}x{}", size.width, size.height)});
   add({"-framerate", fmt::format("{}", fps), "-i", "pipe:0"});
   add(codec_of(file));
-  add({"file:" + file});
+  add({"file:" + to});
   return words;
 }
 
@@ -46,8 +50,7 @@ void Video::check_name(const std::string& file) {
 }
 
 Video::Video(const std::string& file, cv::Size size, double fps)
-    : file_(std::filesystem::absolute(file).string()) {
-  check_name(file);
+    : file_(std::filesystem::absolute((check_name(file), file)).string()), out_(file_) {
   std::signal(SIGPIPE, SIG_IGN);  // the exit code tells that the child has ended
   complaints_ = std::tmpfile();
   int ends[2];
@@ -57,7 +60,7 @@ Video::Video(const std::string& file, cv::Size size, double fps)
     throw EnvironmentError(std::string("--video: no pipe: ") + std::strerror(fault));
   }
   pictures_ = ::fdopen(ends[1], "wb");
-  std::vector<std::string> words = words_of(file_, size, fps);
+  std::vector<std::string> words = words_of(file_, out_.part(), size, fps);
   std::vector<char*> arguments;
   for (std::string& word : words) arguments.push_back(word.data());
   arguments.push_back(nullptr);
@@ -93,6 +96,7 @@ void Video::close() {
   const bool written = std::fclose(std::exchange(pictures_, nullptr)) == 0;
   ::waitpid(std::exchange(child_, -1), &status_, 0);
   if (!written || !WIFEXITED(status_) || WEXITSTATUS(status_) != 0) fail();
+  out_.keep();
 }
 
 // With the last line of its error output.

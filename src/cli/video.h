@@ -7,12 +7,14 @@
 
 #include <opencv2/core.hpp>
 
+#include "core/output_file.h"
+
 namespace ruedo::cli {
 
 class Video {
  public:
   // Throws InputError for a name that does not end in .webm or .mp4, EnvironmentError where there
-  // is no ffmpeg.
+  // is no ffmpeg, and as OutputFile. What was there before stays until close().
   Video(const std::string& file, cv::Size size, double fps);
   ~Video();
   Video(const Video&) = delete;
@@ -29,6 +31,7 @@ class Video {
   [[noreturn]] void fail();
 
   std::string file_;
+  OutputFile out_;
   pid_t child_ = -1;
   int status_ = 0;                   // of the child that has ended
   std::FILE* pictures_ = nullptr;    // to it

@@ -3,8 +3,6 @@
 #include "console/log_page.h"
 
 #include <algorithm>
-#include <cerrno>
-#include <cstdio>
 #include <cstring>
 #include <filesystem>
 #include <limits>
@@ -22,6 +20,7 @@
 #include "console/types.h"
 #include "core/channel_names.h"
 #include "core/json.h"
+#include "core/output_file.h"
 #include "core/utf8.h"
 #include "log/index.h"
 #include "log/reader.h"
@@ -268,23 +267,19 @@ class Writer {
   }
 
   size_t save(const std::string& path, const std::string& head) const {
-    const auto close = [](std::FILE* file) { std::fclose(file); };
-    std::unique_ptr<std::FILE, decltype(close)> file(std::fopen(path.c_str(), "wb"), close);
+    OutputFile file(path);
     size_t written = 0;
-    bool good = file != nullptr;
-    const auto put = [&](const void* data, size_t size) {
-      good = good && std::fwrite(data, 1, size, file.get()) == size;
-      written += size;
+    const auto text = [&](std::string_view words) {
+      file.write(words);
+      written += words.size();
     };
-    const auto text = [&](std::string_view words) { put(words.data(), words.size()); };
-    put(kShell, kShellSize);
+    text({reinterpret_cast<const char*>(kShell), kShellSize});
     text("<script type=\"application/json\" id=\"log\">");
     text(head);
     text("</script>\n<script type=\"text/plain\" id=\"bytes\">");
     text(base64());
     text("</script>\n</body>\n</html>\n");
-    if (!good || std::fflush(file.get()) != 0)
-      throw EnvironmentError(path + " cannot be written: " + std::strerror(errno));
+    file.keep();
     return written;
   }
 

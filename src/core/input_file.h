@@ -24,7 +24,17 @@ struct InputFile {
 // it.
 InputFile open_input(const std::string& path);
 
+// Likewise, to see what kind of file it is: nothing is made from it, and it may still be written.
+InputFile open_to_look(const std::string& path);
+
 // The bytes of a regular file. Throws InputError, also for more than max_bytes.
 std::string read_input(const std::string& path, size_t max_bytes);
+
+// That a file is read for what this process makes, also where a part of it, or another program,
+// reads it later. open_input() notes what it opens.
+void note_read(const std::string& path);
+
+// By whatever name.
+bool was_read(const std::string& path);
 
 }  // namespace ruedo

@@ -1,15 +1,15 @@
 #include "core/output_file.h"
 
+#include <array>
 #include <cerrno>
-#include <cstdio>
 #include <cstring>
-#include <filesystem>
 #include <system_error>
 
 #include <fcntl.h>
 #include <unistd.h>
 
 #include "core/file_handle.h"
+#include "core/input_file.h"
 #include "ruedo/errors.h"
 
 namespace fs = std::filesystem;
@@ -17,45 +17,96 @@ namespace fs = std::filesystem;
 namespace ruedo {
 namespace {
 
-[[noreturn]] void fail(const std::string& path, int reason) {
-  throw EnvironmentError(path + " cannot be written: " + std::strerror(reason));
+constexpr size_t kLongestStem = 200;  // of a name, which has 255 bytes at most
+
+// A file in a folder that takes no others, or one that is mounted by itself.
+bool is_for_in_place_alone(int reason) {
+  return reason == EACCES || reason == EPERM || reason == EROFS || reason == EBUSY ||
+         reason == EXDEV;
 }
 
-// 0, or errno.
-int written(const std::string& path, int flags, std::string_view bytes) {
-  const FileHandle file(::open(path.c_str(), O_WRONLY | O_CLOEXEC | flags, 0666));
-  return file && write_all(file.get(), bytes.data(), bytes.size()) == bytes.size() ? 0 : errno;
-}
-
-// By a new file that takes its name. 0, or errno.
-int replaced(const std::string& target, const fs::file_status& status, std::string_view bytes) {
-  std::error_code error;
-  const std::string part = target + ".part" + std::to_string(::getpid());
-  int reason = written(part, O_CREAT | O_EXCL, bytes);
-  if (reason == 0 && fs::exists(status)) fs::permissions(part, status.permissions(), error);
-  if (reason == 0 && ::rename(part.c_str(), target.c_str()) != 0) reason = errno;
-  if (reason != 0 && reason != EEXIST) ::unlink(part.c_str());
-  return reason;
+std::string part_of(const fs::path& file, const fs::path& folder) {
+  const std::string name =
+      file.filename().string().substr(0, kLongestStem) + ".part" + std::to_string(::getpid());
+  return (folder / name).string();
 }
 
 }  // namespace
 
-void write_file(const std::string& path, std::string_view bytes) {
+void check_output(const std::string& path) {
+  if (was_read(path))
+    throw InputError({}, path + " is one of the files that are read for this, which would be lost");
+}
+
+OutputFile::OutputFile(const std::string& path) : path_(path), target_(path), part_(path) {
+  check_output(path);
   std::error_code error;
-  const fs::file_status status = fs::status(path, error);
-  if (fs::exists(status) && !fs::is_regular_file(status)) {
-    if (const int reason = written(path, 0, bytes)) fail(path, reason);
-    return;
+  before_ = fs::status(path, error);
+  if (fs::exists(before_) && ::access(path.c_str(), W_OK) != 0) fail(errno);
+  if (fs::is_regular_file(before_)) target_ = fs::canonical(path).string();
+  open();
+}
+
+void OutputFile::open() {
+  const bool itself = fs::exists(before_) && !fs::is_regular_file(before_);
+  int file = -1;
+  if (itself) {
+    file = ::open(path_.c_str(), O_WRONLY | O_CLOEXEC);
+  } else {
+    constexpr int kNew = O_RDWR | O_CREAT | O_EXCL | O_CLOEXEC;
+    part_ = part_of(target_, fs::path(target_).parent_path());
+    file = ::open(part_.c_str(), kNew, 0666);
+    if (file < 0 && fs::exists(before_) && is_for_in_place_alone(errno)) {
+      part_ = part_of(target_, fs::temp_directory_path());
+      file = ::open(part_.c_str(), kNew, 0600);
+    }
   }
-  if (fs::exists(status) && ::access(path.c_str(), W_OK) != 0) fail(path, errno);
-  // A symbolic link stays one.
-  const std::string target = fs::exists(status) ? fs::canonical(path).string() : path;
-  int reason = replaced(target, status, bytes);
-  // A file in a folder that takes no others, or one that is mounted by itself.
-  const bool in_place_alone =
-      reason == EACCES || reason == EPERM || reason == EROFS || reason == EBUSY;
-  if (in_place_alone && fs::exists(status)) reason = written(target, O_TRUNC, bytes);
-  if (reason != 0) fail(path, reason);
+  if (file < 0) fail(errno);
+  file_.reset(::fdopen(file, itself ? "wb" : "w+b"));
+}
+
+OutputFile::~OutputFile() {
+  if (!kept_ && part_ != path_) ::unlink(part_.c_str());
+}
+
+void OutputFile::write(std::string_view bytes) {
+  if (std::fwrite(bytes.data(), 1, bytes.size(), file_.get()) != bytes.size()) fail(errno);
+}
+
+void OutputFile::keep() {
+  if (std::fflush(file_.get()) != 0) fail(errno);
+  check_output(path_);  // again: more may have been read since
+  if (part_ != path_) {
+    std::error_code error;
+    if (fs::exists(before_)) fs::permissions(part_, before_.permissions(), error);
+    if (::rename(part_.c_str(), target_.c_str()) == 0)
+      kept_ = true;
+    else if (!fs::exists(before_) || !is_for_in_place_alone(errno) || !copy())
+      fail(errno);
+  }
+}
+
+// Into the file that was there. False: errno says why.
+bool OutputFile::copy() const {
+  const FileHandle to(::open(target_.c_str(), O_WRONLY | O_TRUNC | O_CLOEXEC));
+  std::array<char, 1 << 16> piece{};
+  std::rewind(file_.get());
+  while (to) {
+    const size_t count = std::fread(piece.data(), 1, piece.size(), file_.get());
+    if (count == 0) return std::ferror(file_.get()) == 0;
+    if (write_all(to.get(), piece.data(), count) != count) break;
+  }
+  return false;
+}
+
+void OutputFile::fail(int reason) const {
+  throw EnvironmentError(path_ + " cannot be written: " + std::strerror(reason));
+}
+
+void write_file(const std::string& path, std::string_view bytes) {
+  OutputFile file(path);
+  file.write(bytes);
+  file.keep();
 }
 
 }  // namespace ruedo

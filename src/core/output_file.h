@@ -1,14 +1,51 @@
-// The one way to write a file at once: whole, or not at all.
+// The one way to write a file: whole, or not at all, and never over what was read.
 #pragma once
 
+#include <cstdio>
+#include <filesystem>
+#include <memory>
 #include <string>
 #include <string_view>
 
 namespace ruedo {
 
-// The bytes go into a new file beside it that takes its name at the end: when the disk is full,
-// what was there before stays. Devices and FIFOs are written to as they are. Throws
-// EnvironmentError that names the file and the reason.
+// Throws InputError for a file that was read (input_file.h): what is made from it would be all that
+// is left of it.
+void check_output(const std::string& path);
+
+// A file that comes into being beside the one that it replaces, and takes its name at the end: when
+// the disk is full, or the work fails, what was there before stays. Devices and FIFOs are written
+// to as they are. What throws EnvironmentError names the file and the reason.
+class OutputFile {
+ public:
+  explicit OutputFile(const std::string& path);  // throws as check_output(), or EnvironmentError
+  ~OutputFile();                                 // removes what was not kept
+  OutputFile(const OutputFile&) = delete;
+  OutputFile& operator=(const OutputFile&) = delete;
+
+  void write(std::string_view bytes);  // throws EnvironmentError
+  void keep();                         // it is whole; throws as the constructor
+  // Where it is until then, for a program that writes it in our place.
+  const std::string& part() const { return part_; }
+
+ private:
+  struct Close {
+    void operator()(std::FILE* file) const { std::fclose(file); }
+  };
+
+  void open();
+  bool copy() const;
+  [[noreturn]] void fail(int reason) const;
+
+  const std::string path_;
+  std::filesystem::file_status before_;  // of what was there
+  std::string target_;                   // a symbolic link stays one
+  std::string part_;
+  std::unique_ptr<std::FILE, Close> file_;
+  bool kept_ = false;
+};
+
+// At once. Throws as OutputFile.
 void write_file(const std::string& path, std::string_view bytes);
 
 }  // namespace ruedo

@@ -205,7 +205,7 @@ void parse_file(std::string_view text, const std::string& file, std::deque<Parse
 
 // Logs have the same ending as types, and lie in the same folders.
 bool is_log(const std::string& path) {
-  const InputFile input = open_input(path);
+  const InputFile input = open_to_look(path);
   std::array<uint8_t, sizeof kLogSync> begin{};
   return std::fread(begin.data(), 1, begin.size(), input.file.get()) == begin.size() &&
          read_big_endian<uint32_t>(begin.data()) == kLogSync;

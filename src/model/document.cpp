@@ -188,6 +188,12 @@ std::vector<std::string> DocumentStore::files_read() const {
   return files;
 }
 
+void DocumentStore::note(const std::string& path) {
+  if (std::find(files_.begin(), files_.end(), path) != files_.end()) return;
+  files_.push_back(path);
+  note_read(path);
+}
+
 void DocumentStore::add(const std::string& path, std::shared_ptr<const Element> root) {
   documents_[path] = std::move(root);
   note(path);

@@ -4,7 +4,6 @@
 // Bad files give one InputError: too large, too deep, not UTF-8, a folder, no permission, not XML.
 #pragma once
 
-#include <algorithm>
 #include <map>
 #include <memory>
 #include <string>
@@ -23,9 +22,7 @@ class DocumentStore {
   std::shared_ptr<const Element> read(const std::string& path);
   void add(const std::string& path, std::shared_ptr<const Element> root);
   // Other files that the world was read from: pictures, scripts.
-  void note(const std::string& path) {
-    if (std::find(files_.begin(), files_.end(), path) == files_.end()) files_.push_back(path);
-  }
+  void note(const std::string& path);
   // In order of first reading, each once.
   std::vector<std::string> files_read() const;
 

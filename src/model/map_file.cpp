@@ -280,12 +280,14 @@ void write_map(const OccupancyGrid& grid, const std::string& path) {
       image += static_cast<char>(cell == Cell::occupied ? 0 : cell == Cell::free ? 254 : 205);
     }
   }
-  write_file(picture.string(), image);
+  OutputFile image_file(picture.string()), map(path);
+  image_file.write(image);
   const auto rounded = [](double v) { return shown(std::round(v * 1e9) / 1e9 + 0.0); };
-  write_file(path, "image: " + picture.filename().string() +
-                       "\nmode: trinary\nresolution: " + rounded(grid.resolution) + "\norigin: [" +
-                       rounded(grid.x) + ", " + rounded(grid.y) + ", " + rounded(grid.yaw) +
-                       "]\nnegate: 0\noccupied_thresh: 0.65\nfree_thresh: 0.196\n");
+  map.write("image: " + picture.filename().string() + "\nmode: trinary\nresolution: " +
+            rounded(grid.resolution) + "\norigin: [" + rounded(grid.x) + ", " + rounded(grid.y) +
+            ", " + rounded(grid.yaw) + "]\nnegate: 0\noccupied_thresh: 0.65\nfree_thresh: 0.196\n");
+  image_file.keep();
+  map.keep();
 }
 
 namespace {

@@ -285,7 +285,7 @@ def test_says_what_is_wrong(arguments, code, words):
         (["x.mp4", "--from", "1", "--to", "0.5"], 2, "--from: it must be before --to"),
         (["x.mp4", "--rate", "0.001", "--fps", "120"], 3, "240001 frames: a video has 100000"),
         (["x.mp4", "--follow", "boks"], 2, "--follow boks: there is no such robot"),
-        (["/nowhere/x.mp4", "--size", "64x64"], 4, "/nowhere/x.mp4: the video cannot be written"),
+        (["/nowhere/x.mp4", "--size", "64x64"], 4, "/nowhere/x.mp4 cannot be written"),
         (["x.mp4", "--from", "nan"], 3, "--from nan: the log has 0 to 2 s"),
     ],
 )

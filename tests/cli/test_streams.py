@@ -161,6 +161,66 @@ def test_nothing_is_written_over_what_is_read(world, log, tmp_path):
         assert "is the same file as" in program("diff", log, log, *two).stderr
 
 
+@pytest.fixture
+def made_of_files(world):
+    """A world of many files, none of which a command line names."""
+    folder = world.parent
+    (folder / "part.sdf").write_text(
+        "<sdf version='1.9'><model name='part'><static>true</static><link name='l'><visual name='v'>"
+        "<geometry><mesh><uri>t.obj</uri></mesh></geometry><material><pbr><metal><albedo_map>p.png"
+        "</albedo_map></metal></pbr></material></visual><visual name='h'><geometry><heightmap>"
+        "<uri>h.pgm</uri><size>1 1 1</size></heightmap></geometry></visual></link></model></sdf>"
+    )
+    (folder / "t.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
+    (folder / "h.pgm").write_bytes(b"P5\n3 3\n255\n" + bytes(range(9)))
+    made = program("render", world, "--size", "64x64", "-o", folder / "p.png")
+    assert made.returncode == 0, made
+    world.write_text(
+        WORLD.replace("</world>", "<include><uri>part.sdf</uri></include></world>").replace(
+            "'w'", "'many'"
+        )
+    )
+    return world
+
+
+def test_nothing_is_written_over_what_is_read_without_being_named(made_of_files, tmp_path):
+    world, log = made_of_files, tmp_path / "many.lcm"
+    assert program("run", world, "--quiet", *RUN, "--record", log).returncode == 0
+    (tmp_path / "m.yaml").write_text("image: m.pgm\nresolution: 0.05\norigin: [0, 0, 0]\n")
+    (tmp_path / "m.pgm").write_bytes(b"P5\n2 2\n255\n" + bytes(4))
+    (tmp_path / "linked.sdf").symlink_to("part.sdf")
+    kept = {path: path.read_bytes() for path in tmp_path.iterdir()}
+    for command in (
+        ["import", "m.yaml", "-o", "m.pgm"],
+        *(
+            ["run", world, "--quiet", *RUN, "--record", file]
+            for file in ("part.sdf", "linked.sdf", "t.obj", "p.png", "h.pgm")
+        ),
+        ["regress", world, "--duration", "0.1", "--record", "t.obj"],
+        ["render", world, "--size", "64x64", "-o", "p.png"],
+        ["map", world, "-o", "h.yaml"],
+        ["export", log, world],
+        ["export", log, "t.obj"],
+        ["play", log, "--html", world],
+        ["play", log, "--html", "p.png"],
+    ):
+        result = program(*command, cwd=tmp_path)
+        assert result.returncode == 2 and "which would be lost" in result.stderr, (command, result)
+        assert result.stderr.count("\n") == 1
+        assert {path: path.read_bytes() for path in tmp_path.iterdir()} == kept, command
+
+
+def test_a_log_may_lie_beside_message_types(world, tmp_path):
+    """It is looked at, since it is called as they are, and may be written anew."""
+    (tmp_path / "mine.lcm").write_text("struct mine_t { int32_t x; }")
+    log = tmp_path / "run.lcm"
+    for _ in range(2):
+        command = ["run", world, "--quiet", *RUN, "--types", tmp_path, "--record"]
+        assert program(*command, log).returncode == 0
+    result = program(*command, tmp_path / "mine.lcm")
+    assert result.returncode == 2 and "which would be lost" in result.stderr, result
+
+
 def test_two_runs_do_not_record_into_one_file(world, tmp_path):
     log = tmp_path / "both.lcm"
     command = ["run", str(world), "--quiet", "--lcm", "memq://", "--paused", "--record", str(log)]
@@ -262,6 +322,9 @@ def test_a_picture_of_gigabytes_is_not_read(tmp_path):
         ("p.png", ["render", "WORLD", "--size", "64x64", "-o"]),
         ("w.sdf", ["bench", "--write-world"]),
         ("d.html", ["diff", "LOG", "LOG", "--html"]),
+        ("e.mcap", ["export", "LOG"]),
+        ("h.html", ["play", "LOG", "--html"]),
+        ("v.webm", ["render", "LOG", "--size", "64x64", "--video"]),
     ],
 )
 def test_what_is_there_outlives_a_full_disk(world, log, tmp_path, name, arguments):
@@ -280,7 +343,9 @@ def test_what_is_there_outlives_a_full_disk(world, log, tmp_path, name, argument
         text=True,
     )
     assert result.stdout.split()[-4:] == ["4", "kept", *sorted([name, "fill"])], result
-    assert f"{name} cannot be written: No space left on device" in result.stderr
+    written = "the video" if name == "v.webm" else name
+    assert f"{written} cannot be written" in result.stderr
+    assert "No space left on device" in result.stderr
 
 
 def test_what_is_written_anew_keeps_its_link_and_its_mode(world, tmp_path):
