@@ -1,11 +1,15 @@
 // Two writers: one for what acted, one for the file that is being filled.
 #include "log/ring.h"
 
+#include <array>
 #include <filesystem>
 #include <system_error>
 
 #include <fmt/format.h>
 
+#include "core/big_endian.h"
+#include "core/input_file.h"
+#include "core/lcm_log.h"
 #include "log/header.h"
 #include "log/index.h"
 #include "ruedo/applied_t.hpp"
@@ -21,8 +25,26 @@ fs::path folder_of(const fs::path& path) {
   return path.has_parent_path() ? path.parent_path() : fs::path(".");
 }
 
-// Only what a ring of that name has written: run.000001.lcm of run.lcm. A million files would be
-// terabytes; longer numbers are others' dates.
+// The number of the first event of a numbered file. Other logs begin with 0: by this it is known
+// what a ring has written, and what only looks so by its name, as run.091500.lcm does.
+int64_t first_event_of(int64_t number) { return number << 32; }
+
+// A file of that name that a ring has written.
+bool is_of_ring(const fs::path& file, int64_t number) {
+  std::array<uint8_t, kLogHeadSize> head{};
+  std::error_code error;
+  if (number == 0 || !fs::is_regular_file(fs::symlink_status(file, error))) return false;
+  try {
+    const InputFile in = open_to_look(file.string());
+    return std::fread(head.data(), 1, head.size(), in.file.get()) == head.size() &&
+           read_big_endian<uint32_t>(head.data()) == kLogSync &&
+           read_big_endian<int64_t>(head.data() + sizeof kLogSync) == first_event_of(number);
+  } catch (const InputError&) {
+    return false;
+  }
+}
+
+// Only what a ring of that name has written: run.000001.lcm of run.lcm.
 void remove_numbered(const fs::path& path) {
   const std::string stem = path.stem().string(), suffix = path.extension().string();
   std::error_code error;
@@ -33,7 +55,9 @@ void remove_numbered(const fs::path& path) {
         !name.ends_with(suffix))
       continue;
     const std::string number = name.substr(stem.size() + 1, 6);
-    if (number.find_first_not_of("0123456789") == std::string::npos) found.push_back(entry.path());
+    if (number.find_first_not_of("0123456789") == std::string::npos &&
+        is_of_ring(entry.path(), std::stoll(number)))
+      found.push_back(entry.path());
   }
   for (const fs::path& old : found) fs::remove(old, error);
 }
@@ -58,7 +82,12 @@ void Ring::begin_file(int64_t timestamp_us) {
     full_bytes_ += file_->size();
   }
   try {
-    file_ = std::make_unique<Writer>(name_of(++number_));
+    std::error_code error;
+    do {  // what is there by now is others'
+      ++number_;
+    } while (fs::exists(fs::symlink_status(name_of(number_), error)));
+    file_ = std::make_unique<Writer>(name_of(number_));
+    file_->number_from(first_event_of(number_));
   } catch (const EnvironmentError& fault) {
     file_.reset();
     error_ = fault.what();

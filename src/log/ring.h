@@ -24,8 +24,8 @@ class Ring {
   // Each numbered file begins with what had changed the world by then: half of it at most.
   static constexpr int64_t kPreambleShare = 2 * kFiles;
 
-  // Removes the numbered files of an earlier run. Throws EnvironmentError when a file cannot be
-  // created.
+  // Removes the numbered files of an earlier run, and nobody else's. Throws EnvironmentError when a
+  // file cannot be created.
   Ring(const std::string& path, int64_t limit);
 
   void begin_step(int64_t timestamp_us);

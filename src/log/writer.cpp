@@ -63,7 +63,7 @@ void Writer::write(int64_t timestamp_us, const std::string& channel, const uint8
     return;
   }
   append_big_endian(buffer_, kLogSync);
-  append_big_endian(buffer_, static_cast<uint64_t>(events_++));
+  append_big_endian(buffer_, static_cast<uint64_t>(first_number_ + events_++));
   append_big_endian(buffer_, static_cast<uint64_t>(timestamp_us));
   append_big_endian(buffer_, static_cast<uint32_t>(channel.size()));
   append_big_endian(buffer_, static_cast<uint32_t>(size));

@@ -22,6 +22,9 @@ class Writer {
   Writer(const Writer&) = delete;
   Writer& operator=(const Writer&) = delete;
 
+  // The number of the next event; later ones count on from there. Of an empty log.
+  void number_from(int64_t first) { first_number_ = first; }
+
   // Adds an event. After a failure this does nothing: see error().
   void write(int64_t timestamp_us, const std::string& channel, const uint8_t* data, size_t size);
 
@@ -55,6 +58,7 @@ class Writer {
   std::vector<size_t> ends_;  // where the events in the buffer end
   int64_t written_ = 0;       // bytes of whole events in the file
   int64_t events_ = 0;
+  int64_t first_number_ = 0;
   std::string error_;
 };
 

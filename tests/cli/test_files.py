@@ -203,3 +203,20 @@ def test_a_run_that_is_refused_leaves_the_log_of_an_earlier_one(wrong, ring, tmp
     refused = ruedo("run", ARENA, "--lcm", "memq://", "--record", log, *ring, *wrong)
     assert refused.returncode in (2, 3), refused
     assert log.read_text() == numbered.read_text() == "kept"
+
+
+def test_record_limit_removes_what_it_has_written_alone(tmp_path):
+    """And not a log that is called by the time of day."""
+    mine = tmp_path / "run.091500.lcm"
+    run = ["run", ARENA, "--quiet", "--lcm", "memq://", "--rate", "max", "--duration", "0.5"]
+    assert ruedo(*run, "--record", mine).returncode == 0
+    (tmp_path / "run.000001.lcm").write_text("a text")
+    kept = mine.read_bytes()
+    (tmp_path / "run.000000.lcm").write_bytes(kept)
+    for _ in range(2):
+        ring = ruedo(*run, "--record", tmp_path / "run.lcm", "--record-limit", "16MB")
+        assert ring.returncode == 0, ring
+        assert mine.read_bytes() == kept
+        assert (tmp_path / "run.000001.lcm").read_text() == "a text"
+        names = ["run.000000.lcm", "run.000001.lcm", "run.000002.lcm", "run.091500.lcm", "run.lcm"]
+        assert sorted(path.name for path in tmp_path.iterdir()) == names

@@ -157,10 +157,19 @@ TEST_F(RingTest, ReplacesTheFilesOfAnEarlierRunAndNoOthers) {
   for (const char* name :
        {"run.000007.lcm", "run.1.lcm", "run.000007.txt", "runs.000001.lcm", "run.20261127.lcm"})
     std::ofstream(path(name)) << "old";
+  {
+    Writer(path("run.091500.lcm")).write(0, "r/pose", nullptr, 0);
+  }  // another run's
+  {
+    Ring earlier(path("run.lcm"), kLimit);
+    write_steps(earlier, 0, 1000);
+    EXPECT_GT(numbered().size(), 6 + 4u);
+  }
   Ring ring(path("run.lcm"), kLimit);
   write_steps(ring, 0, 1);
-  EXPECT_THAT(numbered(), testing::ElementsAre("run.000001.lcm", "run.000007.txt", "run.1.lcm",
-                                               "run.20261127.lcm", "runs.000001.lcm"));
+  EXPECT_THAT(numbered(), testing::ElementsAre("run.000001.lcm", "run.000007.lcm", "run.000007.txt",
+                                               "run.091500.lcm", "run.1.lcm", "run.20261127.lcm",
+                                               "runs.000001.lcm"));
 }
 
 TEST_F(RingTest, TheRunIsRepeatedFromWhatActed) {
