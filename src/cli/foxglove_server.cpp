@@ -468,6 +468,10 @@ class LiveFoxglove : public FoxgloveServer, public run::Sink, private FoxgloveOu
 
 }  // namespace
 
+void FoxgloveServer::check(const std::string& address) {
+  console::check_port(console::parse_address(address, "--foxglove", kPort), "--foxglove");
+}
+
 std::unique_ptr<FoxgloveServer> FoxgloveServer::open(run::Run& server, const std::string& address) {
   return std::make_unique<LiveFoxglove>(server,
                                         console::parse_address(address, "--foxglove", kPort));
@@ -479,9 +483,14 @@ std::unique_ptr<FoxgloveServer> FoxgloveServer::open(run::Run& server, const std
 
 namespace ruedo::cli {
 
-std::unique_ptr<FoxgloveServer> FoxgloveServer::open(run::Run&, const std::string&) {
+void FoxgloveServer::check(const std::string&) {
   throw EnvironmentError(
       "--foxglove: this build has no web server: it was made without the console");
+}
+
+std::unique_ptr<FoxgloveServer> FoxgloveServer::open(run::Run&, const std::string& address) {
+  check(address);
+  return nullptr;
 }
 
 }  // namespace ruedo::cli

@@ -13,6 +13,8 @@ namespace ruedo::cli {
 
 class FoxgloveServer {
  public:
+  // Before any work. Throws as open().
+  static void check(const std::string& address);
   // From now on it may be connected to; the run's messages come to it as it goes on. address: as
   // of --view. Throws InputError, and EnvironmentError when the port cannot be had.
   static std::unique_ptr<FoxgloveServer> open(run::Run& server, const std::string& address);

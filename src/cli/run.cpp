@@ -225,6 +225,7 @@ int run_world(const RunArguments& arguments) {
       arguments.lcm, world->name, [](const std::string& line) { spdlog::warn(line); });
   Bus& bus = *place.bus;
   RunView viewed(arguments.viewed, arguments.view);
+  if (arguments.foxglove) FoxgloveServer::check(arguments.foxglove_address);
   viewed.follow(options);
   const Ros2Arguments ros2 = ros2_arguments(arguments, options);
   options.wait_for = with_channels(std::move(options.wait_for), *world, ros2);

@@ -17,6 +17,7 @@
 #include "console/log_page.h"
 #include "console/log_source.h"
 #include "console/tap.h"
+#include "console/web_server.h"
 #include "core/whole.h"
 #include "ruedo/world_info_t.hpp"
 #include "run/run.h"
@@ -37,7 +38,9 @@ struct RunView::Impl {
 };
 
 RunView::RunView(bool viewed, const std::string& address) {
-  if (viewed) impl_.reset(new Impl{console::parse_address(address), {}});
+  if (!viewed) return;
+  impl_.reset(new Impl{console::parse_address(address), {}});
+  console::check_port(impl_->address, "--view");
 }
 
 RunView::~RunView() = default;

@@ -41,8 +41,7 @@ constexpr lws_retry_bo_t kIdlePolicy = {nullptr, 0,  0,
 
 // Checks the port in the address, or picks a free one for 0. libwebsockets only reports that it
 // failed.
-int checked_port(const WebPlace& place) {
-  const Address& address = place.address;
+int checked_port(const Address& address, const std::string& option) {
   const FileHandle probe(::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0));
   const int one = 1;
   ::setsockopt(probe.get(), SOL_SOCKET, SO_REUSEADDR, &one, sizeof one);
@@ -57,15 +56,19 @@ int checked_port(const WebPlace& place) {
   socklen_t size = sizeof wanted;
   if (bound) ::getsockname(probe.get(), reinterpret_cast<sockaddr*>(&wanted), &size);
   if (!bound) {
-    throw EnvironmentError(place.option + ": " + address.host + ":" + std::to_string(address.port) +
+    throw EnvironmentError(option + ": " + address.host + ":" + std::to_string(address.port) +
                            " cannot be served: " + std::strerror(error) +
-                           ". Another port is chosen by " + place.option + " " + address.host +
+                           ". Another port is chosen by " + option + " " + address.host +
                            ":PORT, a free one by PORT 0");
   }
   return ntohs(wanted.sin_port);
 }
 
 }  // namespace
+
+void check_port(const Address& address, const std::string& option) {
+  checked_port(address, option);
+}
 
 struct WebServer::Impl {
   using Time = std::chrono::steady_clock::time_point;
@@ -418,7 +421,7 @@ WebServer::WebServer(WebPlace place, WebHandler handler) : impl_(std::make_uniqu
   const WebPlace wanted = impl_->place;
   for (int start = 0; start < kMostStarts; ++start) {
     // Another program may take the port after this look: the next one finds another, or says so.
-    info.port = address.port = checked_port(wanted);
+    info.port = address.port = checked_port(wanted.address, wanted.option);
     impl_->context = lws_create_context(&info);
     impl_->vhost = impl_->context ? lws_create_vhost(impl_->context, &info) : nullptr;
     if (impl_->vhost) return;

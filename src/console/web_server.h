@@ -34,6 +34,9 @@ class Connection {
   virtual bool next(std::vector<uint8_t>& message, bool& text) = 0;
 };
 
+// Whether it could be served now, before any work. Throws EnvironmentError, as WebServer.
+void check_port(const Address& address, const std::string& option);
+
 // What is served, and to whom.
 struct WebPlace {
   Address address;
