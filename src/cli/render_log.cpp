@@ -258,7 +258,9 @@ int render_video(const VideoArguments& arguments) {
       index, [&](const log_header_t& header) { return load_run(header, arguments.log); });
   if (!worlds.at(from).world)
     throw InputError({arguments.log}, "its world is not known: " + worlds.fault());
-  if (!worlds.fault().empty()) to_stderr("ruedo: {}: {}\n", arguments.log, worlds.fault());
+  for (const std::string& fault : {worlds.fault(), index.fault()}) {
+    if (!fault.empty()) to_stderr("ruedo: {}: {}\n", arguments.log, fault);
+  }
   States states(index, arguments.log);
   DrawnMarkers drawn(index, arguments.log);
   const run::LogWorlds::Scene* shown = &worlds.at(from);

@@ -341,6 +341,8 @@ Diff diff_logs(const std::string& golden_path, const std::string& other_path,
     }
   }
   comparison.end();
+  if (diff.channels.empty() && golden_header.empty() && other_header.empty())
+    diff.notes.push_back("both logs are without any message: nothing was compared");
   if (!golden.fault().empty()) diff.notes.push_back(golden_path + ": " + golden.fault());
   if (!other.fault().empty()) diff.notes.push_back(other_path + ": " + other.fault());
   if (golden_header != other_header) {

@@ -86,6 +86,15 @@ def test_nothing_left_to_compare_is_no_pass(logs, pattern):
     assert "same" not in done.stdout
 
 
+def test_two_logs_without_messages_are_called_so(logs, tmp_path):
+    empty = tmp_path / "empty.lcm"
+    empty.touch()
+    done = diff(empty, empty, "--html", tmp_path / "page.html")
+    assert done.returncode == 0 and "both logs are without any message" in done.stdout, done
+    assert "both logs are without any message" in (tmp_path / "page.html").read_text()
+    assert "without any message" not in diff(logs[0], logs[0]).stdout
+
+
 def test_what_cannot_be_read_is_said(logs, tmp_path):
     done = diff(*logs, "--tolerance", "r/pose=abs:much")
     assert done.returncode == 2 and "much" in done.stderr

@@ -302,3 +302,12 @@ def test_says_what_is_wrong_with_a_video(log, tmp_path, arguments, code, words):
     assert result.returncode == code, result.stderr
     assert words in result.stderr.splitlines()[0], result.stderr
     assert earlier.read_bytes() == b"an earlier video"
+
+
+def test_a_damaged_log_is_told(log, tmp_path):
+    damaged = tmp_path / "damaged.lcm"
+    content = Path(log).read_bytes()
+    damaged.write_bytes(content[: len(content) // 2] + bytes(5000))
+    result = render(str(damaged), "--video", str(tmp_path / "x.webm"), "--size", "64x64")
+    assert result.returncode == 0, result
+    assert f"ruedo: {damaged}: " in result.stderr and result.stderr.count("\n") == 1, result
