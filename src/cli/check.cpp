@@ -54,8 +54,8 @@ void print_text(const std::vector<Finding>& findings) {
 int check(const CheckArguments& arguments) {
   load_given_plugins();
   if (arguments.sandboxed) enter_sandbox(model::world_file(arguments.world.world), {});
-  bool loaded = false;
-  const std::vector<Finding> findings = find_all(arguments.world, loaded);
+  ExitCode refusal{};
+  const std::vector<Finding> findings = find_all(arguments.world, refusal);
   int counts[3] = {0, 0, 0};
   for (const Finding& finding : findings) ++counts[static_cast<int>(finding.kind)];
   const int errors = counts[static_cast<int>(Finding::Kind::error)];
@@ -72,7 +72,7 @@ int check(const CheckArguments& arguments) {
                                               counts[static_cast<int>(Finding::Kind::repaired)]),
                style.off);
   }
-  if (!loaded) return kBadInput;
+  if (refusal != kGood) return refusal;
   return errors > 0 || (arguments.strict && !findings.empty()) ? kCheckFailed : kGood;
 }
 

@@ -7,6 +7,7 @@
 #include <cstdlib>
 #include <limits>
 #include <map>
+#include <tuple>
 
 #include <fmt/format.h>
 #include <unistd.h>
@@ -89,6 +90,20 @@ std::pair<std::string, std::string> parse_remap(const std::string& text) {
   return {text.substr(0, equals), text.substr(equals + 1)};
 }
 
+std::vector<std::pair<std::string, std::string>> parse_remaps(
+    const std::vector<std::string>& texts) {
+  std::vector<std::pair<std::string, std::string>> remaps;
+  for (const std::string& text : texts) {
+    auto remap = parse_remap(text);
+    for (const auto& [name, other] : remaps) {
+      if (name == remap.first)
+        refuse_option("--remap", text, name + " has a new name already: " + other);
+    }
+    remaps.push_back(std::move(remap));
+  }
+  return remaps;
+}
+
 run::WaitForOption parse_wait_for(const std::string& text) {
   const char* allowed =
       "it looks like CHANNEL@HZ, for example p3at/velocity@10, with a rate above 0";
@@ -133,8 +148,15 @@ model::LoadOptions load_options(const WorldArguments& arguments) {
   }
   options.xacro_arguments = arguments.xacro_arguments;
   options.allow_absolute = arguments.allow_absolute;
-  for (const std::string& text : arguments.settings)
-    options.settings.push_back(model::parse_setting(text));
+  for (const std::string& text : arguments.settings) {
+    model::Setting setting = model::parse_setting(text);
+    for (const model::Setting& other : options.settings) {
+      if (std::tie(other.robot, other.device, other.key) ==
+          std::tie(setting.robot, setting.device, setting.key))
+        refuse_option("--set", text, "it is set already, to " + other.value);
+    }
+    options.settings.push_back(std::move(setting));
+  }
   for (const std::string& text : arguments.disabled) {
     if (text.find('/') == std::string::npos)
       refuse_option("--disable", text, "it looks like ROBOT/DEVICE, for example p3at/CAMERA");

@@ -57,7 +57,10 @@ std::shared_ptr<const model::WorldModel> load(const WorldArguments& arguments);
 std::vector<std::string> result_options(const WorldArguments& arguments);
 
 std::pair<std::string, std::string> parse_remap(const std::string& text);  // CHANNEL=NAME
-run::WaitForOption parse_wait_for(const std::string& text);                // CHANNEL@HZ
+// Of one command line: none may be renamed twice.
+std::vector<std::pair<std::string, std::string>> parse_remaps(
+    const std::vector<std::string>& texts);
+run::WaitForOption parse_wait_for(const std::string& text);  // CHANNEL@HZ
 // 0.0001 to 1e6, or "max": +inf. option: names it in the error.
 double parse_rate(const std::string& text, const std::string& option = "--rate");
 int64_t parse_duration_us(const std::string& text);  // seconds

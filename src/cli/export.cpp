@@ -20,7 +20,7 @@ namespace ruedo::cli {
 namespace {
 
 struct ExportArguments {
-  bool sandboxed = false;
+  bool sandboxed = false, distro_given = false;
   std::string log, out, bag, distro = "jazzy";
   std::vector<std::string> remaps;
 };
@@ -65,7 +65,7 @@ void export_bag(const ExportArguments& arguments, const log::Index& index,
   ros2::ConversionOptions options;
   options.distro = ros2::parse_distro(arguments.distro);
   options.channels = logged.remaps;
-  for (const std::string& text : arguments.remaps) options.topics.push_back(parse_remap(text));
+  options.topics = parse_remaps(arguments.remaps);
   Rosbag bag(without_slash(arguments.bag), options);
   const uint64_t read = read_log(arguments.log, index, worlds, bag);
   bag.finish(index.header(), arguments.log);
@@ -92,6 +92,8 @@ void export_foxglove(const ExportArguments& arguments, const log::Index& index,
 int export_log(const ExportArguments& arguments) {
   if (arguments.out.empty() == arguments.bag.empty())
     throw InputError({}, "give OUT, or --ros2 FOLDER");
+  if (arguments.bag.empty() && (arguments.distro_given || !arguments.remaps.empty()))
+    throw InputError({}, "--remap and --distro are for a bag: they go with --ros2");
   read_given_types();
   if (arguments.sandboxed)
     enter_sandbox(arguments.log, {arguments.out, without_slash(arguments.bag)});
@@ -114,15 +116,18 @@ void add_export(CLI::App& app, Action& chosen) {
   command->add_option("OUT", arguments->out, "the file to write, such as run.mcap");
   command->add_option("--ros2", arguments->bag, "write a ROS 2 bag into this new folder instead")
       ->type_name("FOLDER");
-  command->add_option("--distro", arguments->distro, "the ROS 2 release that the bag is for")
-      ->capture_default_str();
+  CLI::Option* distro =
+      command->add_option("--distro", arguments->distro, "the ROS 2 release that the bag is for");
+  distro->capture_default_str();
   command->add_option("--remap", arguments->remaps, "give a ROS topic another name: /TOPIC=/NAME")
       ->type_name("REMAP")
       ->allow_extra_args(false);
   add_types_argument(*command);
   add_sandbox_argument(*command, arguments->sandboxed);
-  command->callback(
-      [arguments, &chosen] { chosen = [arguments] { return export_log(*arguments); }; });
+  command->callback([arguments, distro, &chosen] {
+    arguments->distro_given = distro->count() > 0;
+    chosen = [arguments] { return export_log(*arguments); };
+  });
 }
 
 const RegisterCommand kRegister{53, add_export};

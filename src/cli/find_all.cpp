@@ -1,7 +1,9 @@
 #include "cli/find_all.h"
 
+#include <algorithm>
 #include <set>
 
+#include "core/option_text.h"
 #include "core/progress.h"
 #include "core/utf8.h"
 #include "engine/world.h"
@@ -35,10 +37,26 @@ void check_textures(const model::WorldModel& world, std::vector<Finding>& findin
   }
 }
 
+// All that `ruedo run` makes before it starts; but it stops at the first device that it refuses.
+bool is_refused(const WorldArguments& arguments, const model::WorldModel& world,
+                Findings& findings) {
+  engine::Channels channels;
+  engine::FleetOptions options;
+  options.disabled = arguments.disabled;
+  options.keep_going = true;
+  const Progress progress("making " + world.name);
+  return engine::World(std::make_shared<engine::Plan>(world), options, channels, findings)
+      .refused();
+}
+
+bool is_wrong_option(const Finding& finding) {
+  return finding.kind == Finding::Kind::error && is_option(finding.source);
+}
+
 }  // namespace
 
-std::vector<Finding> find_all(const WorldArguments& arguments, bool& loaded) {
-  loaded = false;
+std::vector<Finding> find_all(const WorldArguments& arguments, ExitCode& refusal) {
+  refusal = kBadInput;
   std::vector<Finding> findings;
   try {
     const std::shared_ptr<const model::WorldModel> world = load(arguments);
@@ -47,22 +65,28 @@ std::vector<Finding> find_all(const WorldArguments& arguments, bool& loaded) {
       const Progress progress("reading textures");
       check_textures(*world, findings);
     }
-    // All that `ruedo run` makes before it starts; but it stops at the first device that it
-    // refuses.
-    engine::Channels channels;
     Findings of_run;
-    engine::FleetOptions options;
-    options.disabled = arguments.disabled;
-    options.keep_going = true;
-    const Progress progress("making " + world->name);
-    const engine::World made(std::make_shared<engine::Plan>(*world), options, channels, of_run);
-    loaded = !made.refused();
+    if (!is_refused(arguments, *world, of_run)) refusal = kGood;
     findings.insert(findings.end(), of_run.list().begin(), of_run.list().end());
   } catch (const InputError& error) {
     if (error.source().file.empty()) throw;  // wrong usage
     findings.push_back({Finding::Kind::error, error.source(), "", in_one_line(error.message())});
   }
+  if (refusal != kGood && std::any_of(findings.begin(), findings.end(), is_wrong_option))
+    refusal = kWrongUsage;
   return findings;
+}
+
+void check_options(const WorldArguments& arguments, const model::WorldModel& world) {
+  if (arguments.settings.empty() && arguments.disabled.empty() && arguments.faults.empty()) return;
+  Findings findings;
+  try {
+    is_refused(arguments, world, findings);
+  } catch (const InputError& error) {
+    if (error.source().file.empty() || is_option(error.source())) throw;
+  }
+  const auto wrong = std::find_if(findings.list().begin(), findings.list().end(), is_wrong_option);
+  if (wrong != findings.list().end()) throw InputError(wrong->source, wrong->text);
 }
 
 }  // namespace ruedo::cli

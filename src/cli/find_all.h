@@ -7,8 +7,13 @@
 
 namespace ruedo::cli {
 
-// What the readers, the devices and the physics found, and pictures that cannot be decoded. loaded:
-// `ruedo run` would start. Throws InputError for a wrong command line alone.
-std::vector<Finding> find_all(const WorldArguments& arguments, bool& loaded);
+// What the readers, the devices and the physics found, and pictures that cannot be decoded.
+// refusal: the exit code with which `ruedo run` would refuse it, or kGood. Throws InputError for a
+// wrong command line alone.
+std::vector<Finding> find_all(const WorldArguments& arguments, ExitCode& refusal);
+
+// For commands that make no devices: refuses the options that `ruedo run` would refuse. world: as
+// they were loaded with. Throws InputError.
+void check_options(const WorldArguments& arguments, const model::WorldModel& world);
 
 }  // namespace ruedo::cli

@@ -2,6 +2,7 @@
 #include <fmt/format.h>
 
 #include "cli/commands.h"
+#include "cli/find_all.h"
 #include "cli/listing.h"
 #include "core/json.h"
 #include "core/utf8.h"
@@ -77,6 +78,7 @@ void print_json(const model::WorldModel& world, const std::vector<world_info_t>&
 
 int info(const InfoArguments& arguments) {
   const std::shared_ptr<const model::WorldModel> world = load(arguments.world);
+  check_options(arguments.world, *world);
   const model::BodyLayout layout(*world);
   engine::Channels channels;
   Findings findings;

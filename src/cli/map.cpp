@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include "cli/commands.h"
+#include "cli/find_all.h"
 #include "cli/range.h"
 #include "model/occupancy.h"
 #include "ruedo/errors.h"
@@ -21,6 +22,7 @@ int map(const MapArguments& arguments) {
   if (!arguments.out.ends_with(".yaml") && !arguments.out.ends_with(".yml"))
     throw InputError({}, "-o '" + arguments.out + "': the name ends in .yaml");
   const auto world = load(arguments.world);
+  check_options(arguments.world, *world);
   const model::OccupancyGrid grid =
       model::occupancy_of(*world, arguments.resolution, arguments.height);
   model::write_map(grid, arguments.out);

@@ -59,10 +59,9 @@ run::RunOptions server_options(const RegressArguments& arguments) {
   options.record = arguments.record;
   options.result_options = result_options(arguments.world);
   for (std::string& plugin : plugin_options()) options.result_options.push_back(std::move(plugin));
-  for (const std::string& text : arguments.remaps) {
-    options.remaps.push_back(parse_remap(text));
+  options.remaps = parse_remaps(arguments.remaps);
+  for (const std::string& text : arguments.remaps)
     options.result_options.push_back("--remap=" + text);
-  }
   for (const std::string& text : arguments.wait_for)
     options.wait_for.push_back(parse_wait_for(text));
   options.simulation.fleet.seed = arguments.seed;

@@ -7,6 +7,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "cli/commands.h"
+#include "cli/find_all.h"
 #include "cli/range.h"
 #include "cli/render_devices.h"
 #include "cli/render_log.h"
@@ -27,7 +28,8 @@ struct RenderArguments {
   std::string output, camera, view = "iso", size;
   std::string cut = "auto";
   bool rays = false;
-  VideoArguments video;  // of a log; its name is "" for a picture
+  VideoArguments video;            // of a log; its name is "" for a picture
+  std::vector<std::string> given;  // names of the options that were
 };
 
 // Drawn at twice the size with smooth edges, then reduced, where memory allows.
@@ -142,8 +144,14 @@ std::optional<double> height_to_cut_at(const RenderArguments& arguments,
 }
 
 int video(const RenderArguments& arguments) {
-  if (!arguments.output.empty() || !arguments.camera.empty() || arguments.rays)
-    throw InputError({}, "--video goes with --view, not with -o, --camera or --rays");
+  // A log has the world and its options; the others would do nothing.
+  static const std::vector<std::string> kTaken{"--video", "--follow", "--fps",  "--rate",
+                                               "--from",  "--to",     "--view", "--size",
+                                               "WORLD",   "--plugin", "--quiet"};
+  for (const std::string& name : arguments.given) {
+    if (std::find(kTaken.begin(), kTaken.end(), name) == kTaken.end())
+      throw InputError({}, "--video goes with --view, not with " + name);
+  }
   VideoArguments video = arguments.video;
   video.log = arguments.world.world;
   video.view = arguments.view;
@@ -153,9 +161,11 @@ int video(const RenderArguments& arguments) {
 
 int render(const RenderArguments& arguments) {
   if (!arguments.video.video.empty()) return video(arguments);
-  const VideoArguments& of_video = arguments.video;
-  if (of_video.from_s || of_video.to_s || !of_video.follow.empty())
-    throw InputError({}, "--from, --to and --follow go with --video");
+  for (const std::string& name : arguments.given) {
+    if (name == "--follow" || name == "--fps" || name == "--rate" || name == "--from" ||
+        name == "--to")
+      throw InputError({}, name + " goes with --video");
+  }
   if (arguments.output.empty())
     throw InputError({}, "render: --output FILE or --video FILE is required");
   if (!arguments.camera.empty() && arguments.rays) {
@@ -170,6 +180,7 @@ int render(const RenderArguments& arguments) {
         {}, "-o " + arguments.output + ": allowed are names that end in .png, .jpg or .jpeg");
   }
   auto world = load(arguments);
+  check_options(arguments.world, *world);
   print_findings(world->findings);
   if (const auto height = height_to_cut_at(arguments, *world)) {
     world = scene::without_what_is_above(*world, *height);
@@ -234,7 +245,12 @@ void add_render(CLI::App& app, Action& chosen) {
   command->add_flag("--rays", arguments->rays,
                     "draw the rays of laser scanners and the cones of sonars");
   add_video_arguments(*command, arguments->video);
-  command->callback([arguments, &chosen] { chosen = [arguments] { return render(*arguments); }; });
+  command->callback([arguments, command, &chosen] {
+    for (const CLI::Option* option : command->get_options()) {
+      if (option->count() > 0) arguments->given.push_back(option->get_name());
+    }
+    chosen = [arguments] { return render(*arguments); };
+  });
 }
 
 const RegisterCommand kRegister{40, add_render};

@@ -135,10 +135,10 @@ run::RunOptions server_options(const RunArguments& arguments) {
   options.record = arguments.record;
   options.record_limit = static_cast<int64_t>(arguments.record_limit);
   options.result_options = result_options(arguments.world);
-  for (const std::string& text : arguments.remaps) {
-    if (text.starts_with('/')) continue;  // ROS's names, which do not affect the run
-    options.remaps.push_back(parse_remap(text));
-    options.result_options.push_back("--remap=" + text);
+  for (auto& [name, other] : parse_remaps(arguments.remaps)) {
+    if (name.starts_with('/')) continue;  // ROS's names, which do not affect the run
+    options.result_options.push_back("--remap=" + name + "=" + other);
+    options.remaps.emplace_back(std::move(name), std::move(other));
   }
   for (const std::string& text : arguments.wait_for)
     options.wait_for.push_back(parse_wait_for(text));
@@ -193,12 +193,12 @@ std::string socket_of(const std::string& lcm) {
 
 // --strict: the exit code where the world is not as its files say, with what `ruedo check` finds.
 int strict_check(const WorldArguments& world) {
-  bool loaded = false;
-  const std::vector<Finding> findings = find_all(world, loaded);
+  ExitCode refusal{};
+  const std::vector<Finding> findings = find_all(world, refusal);
   if (findings.empty()) return kGood;
   print_findings(findings);
   to_stderr("ruedo: {} is not run: --strict refuses what has findings\n", world.world);
-  return loaded ? kCheckFailed : kBadInput;
+  return refusal == kGood ? kCheckFailed : refusal;
 }
 
 }  // namespace

@@ -13,6 +13,7 @@
 #include "model/load_model.h"
 #include "model/own_plugins.h"
 #include "model/placement.h"
+#include "model/reserved_names.h"
 #include "model/sdf_link.h"
 #include "model/sdf_reader.h"
 #include "model/settings.h"
@@ -41,6 +42,7 @@ class Loader {
     const LoadsPlugins loads_plugins;
     findings_ = {};
     context_.triangles = {};
+    context_.has_xacro = false;
     context_.controllers.begin();
     world_ = {};
     world_.file = path_;
@@ -57,6 +59,9 @@ class Loader {
       Room room(world_);
       for (const Spawn& spawn : options.spawns) place(spawn, room);
     }
+    if (!options.xacro_arguments.empty() && !context_.has_xacro)
+      throw InputError({}, "--xacro-arg " + options.xacro_arguments.front() +
+                               ": no file of this world is xacro, which alone has arguments");
     apply_drives(options.drives, world_);
     apply_settings(options.settings, world_);
     apply_disabled(options.disabled, world_);
@@ -199,6 +204,8 @@ class Loader {
     };
     if (!spawn.name.empty()) {
       name = spawn.name;
+      if (name == "ruedo" || is_reserved_name(name))
+        throw InputError({}, what + ": the name '" + name + "' is reserved; choose another");
       if (taken(name))
         throw InputError({},
                          what + ": the name '" + name + "' is taken by another model of the world");

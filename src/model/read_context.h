@@ -22,6 +22,7 @@ struct ReadContext {
   MeshLoader& meshes;
   TextureStore& textures;
   std::vector<std::string> xacro_arguments = {};  // "NAME:=VALUE"
+  bool has_xacro = false;                         // a file was expanded
   TriangleCount triangles = {};
   ControllerFiles controllers{resources};
 };

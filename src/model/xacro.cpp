@@ -146,6 +146,7 @@ std::shared_ptr<const Element> expand_xacro(const std::string& path, ReadContext
   std::vector<std::string> words{parts.front(), script(), path};
   for (const std::string& root : context.resources.folders())
     words.insert(words.end(), {"--folder", root});
+  context.has_xacro = true;
   for (const std::string& argument : context.xacro_arguments)
     words.insert(words.end(), {"--argument", argument});
   const std::string output = output_of(path, std::move(words), confined);

@@ -209,6 +209,57 @@ def test_a_run_that_is_refused_leaves_the_log_of_an_earlier_one(wrong, ring, tmp
     assert log.read_text() == numbered.read_text() == "kept"
 
 
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        (["--set", "p3at/lrf.update_rate=abc"], "update_rate"),
+        (["--set", "p3at/nosuch.update_rate=5"], "nosuch"),
+        (["--set", "p3at/lrf.update_rate=5", "--set", "p3at/lrf.update_rate=9"], "already, to 5"),
+        (["--disable", "p3at/nosuch"], "nosuch"),
+        (["--fault", "p3at/nosuch:freeze@1"], "nosuch"),
+        (["--xacro-arg", "a:=b"], "no file of this world is xacro"),
+        (["--spawn", "p3dx:world@-3,3"], "the name 'world' is reserved"),
+        (["--spawn", "p3dx:ruedo@-3,3"], "reserved"),
+        (["--spawn", "p3dx:__x__@-3,3"], "reserved"),
+    ],
+)
+def test_all_commands_that_load_a_world_refuse_the_same_options(options, said, tmp_path):
+    for command in (
+        ["run", "--lcm", "memq://", "--duration", "0"],
+        ["check"],
+        ["info"],
+        ["map", "-o", tmp_path / "m.yaml"],
+        ["render", "-o", tmp_path / "p.png"],
+    ):
+        done = ruedo(command[0], ARENA, *command[1:], *options)
+        assert done.returncode == 2 and said in done.stderr + done.stdout, (command, done)
+    assert not any(tmp_path.iterdir())
+
+
+def test_a_channel_gets_one_name(tmp_path):
+    twice = ["--remap", "p3at/lrf=A", "--remap", "p3at/lrf=B"]
+    log = tmp_path / "run.lcm"
+    for command in (
+        ["run", ARENA, "--lcm", "memq://", "--duration", "0"],
+        ["regress", ARENA, "--duration", "0.1", "--record", log],
+    ):
+        done = ruedo(*command, *twice)
+        assert done.returncode == 2, done
+        assert "'p3at/lrf=B': p3at/lrf has a new name already: A" in done.stderr
+
+
+def test_names_of_ros_are_for_bags(tmp_path):
+    log = tmp_path / "run.lcm"
+    run = ["run", ARENA, "--quiet", "--lcm", "memq://", "--duration", "0.1", "--record", log]
+    assert ruedo(*run).returncode == 0
+    for option in (["--remap", "/scan=/x"], ["--distro", "jazzy"]):
+        done = ruedo("export", log, tmp_path / "x.mcap", *option)
+        assert done.returncode == 2 and "they go with --ros2" in done.stderr, done
+    done = ruedo("export", log, "--ros2", tmp_path / "bag", "--remap", "/nosuch=/x")
+    assert done.returncode == 2 and "no ROS topic or service '/nosuch'" in done.stderr, done
+    assert sorted(tmp_path.iterdir()) == [log]
+
+
 def test_record_limit_removes_what_it_has_written_alone(tmp_path):
     """And not a log that is called by the time of day."""
     mine = tmp_path / "run.091500.lcm"

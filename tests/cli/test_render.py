@@ -262,6 +262,7 @@ def test_picture_of_a_camera(tmp_path):
         (["-o", "x.png", "--camera", "p3at/camera", "--rays"], 2, "--rays"),
         (["-o", "x.png", "--view", "below"], 2, "top, iso"),
         (["-o", "x.png", "--size", "0x9"], 2, "WIDTHxHEIGHT"),
+        (["-o", "x.png", "--fps", "5"], 2, "--fps goes with --video"),
         (["-o", "x.png", "--cut", "low"], 2, "--cut low: allowed are a height in m, auto and none"),
     ],
 )
@@ -275,7 +276,10 @@ def test_says_what_is_wrong(arguments, code, words):
     "arguments, code, words",
     [
         (["x.avi"], 2, "--video x.avi: allowed are names that end in .webm or .mp4"),
-        (["x.mp4", "-o", "x.png"], 2, "--video goes with --view"),
+        (["x.mp4", "-o", "x.png"], 2, "--video goes with --view, not with --output"),
+        (["x.mp4", "--cut", "2.5"], 2, "--video goes with --view, not with --cut"),
+        (["x.mp4", "--set", "p3at/lrf.update_rate=1"], 2, "not with --set"),
+        (["x.mp4", "--no-noise"], 2, "not with --no-noise"),
         (["x.mp4", "--size", "31x20"], 2, "--size 31x20: a video's sides are even"),
         (["x.mp4", "--size", "4000x20"], 2, "3840 pixels at most"),
         (["x.mp4", "--fps", "0"], 2, "--fps"),
