@@ -201,6 +201,14 @@ int strict_check(const WorldArguments& world) {
   return refusal == kGood ? kCheckFailed : refusal;
 }
 
+// And what can be refused then, before the log is begun, which empties that of an earlier run.
+std::shared_ptr<const model::WorldModel> load_to_serve(const RunArguments& arguments) {
+  std::shared_ptr<const model::WorldModel> world = load(arguments.world);
+  check_output(arguments.record);
+  if (arguments.foxglove) FoxgloveServer::check(arguments.foxglove_address);
+  return world;
+}
+
 }  // namespace
 
 int run_world(const RunArguments& arguments) {
@@ -218,14 +226,12 @@ int run_world(const RunArguments& arguments) {
   if (arguments.strict) {
     if (const int code = strict_check(arguments.world); code != kGood) return code;
   }
-  const std::shared_ptr<const model::WorldModel> world = load(arguments.world);
-  check_output(arguments.record);
+  const std::shared_ptr<const model::WorldModel> world = load_to_serve(arguments);
   for (std::string& plugin : plugin_options()) options.result_options.push_back(std::move(plugin));
   const bus::ServerBus place = bus::open_server_bus(
       arguments.lcm, world->name, [](const std::string& line) { spdlog::warn(line); });
   Bus& bus = *place.bus;
   RunView viewed(arguments.viewed, arguments.view);
-  if (arguments.foxglove) FoxgloveServer::check(arguments.foxglove_address);
   viewed.follow(options);
   const Ros2Arguments ros2 = ros2_arguments(arguments, options);
   options.wait_for = with_channels(std::move(options.wait_for), *world, ros2);

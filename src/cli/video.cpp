@@ -30,8 +30,9 @@ std::vector<std::string> codec_of(const std::string& file) {
 // file: by its name's end it is clear what it is; to: where it is written.
 std::vector<std::string> words_of(const std::string& file, const std::string& to, cv::Size size,
                                   double fps) {
-  std::vector<std::string> words{"ffmpeg", "-nostdin", "-loglevel",     "error", "-y",
-                                 "-f",     "rawvideo", "-pixel_format", "bgr24"};
+  // -xerror: without it, ffmpeg ends well where the disk is full as it writes the end.
+  std::vector<std::string> words{"ffmpeg", "-nostdin", "-loglevel", "error",         "-xerror",
+                                 "-y",     "-f",       "rawvideo",  "-pixel_format", "bgr24"};
   const auto add = [&](const std::vector<std::string>& more) {
     words.insert(words.end(), more.begin(), more.end());
   };

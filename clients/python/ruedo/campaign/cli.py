@@ -84,9 +84,7 @@ class _Parser(argparse.ArgumentParser):
 
 
 def _parser() -> argparse.ArgumentParser:
-    top = _Parser(
-        prog="ruedo", formatter_class=argparse.RawDescriptionHelpFormatter
-    )
+    top = _Parser(prog="ruedo", formatter_class=argparse.RawDescriptionHelpFormatter)
     commands = top.add_subparsers(required=True, metavar="COMMAND")
     _add_campaign(commands.add_parser("campaign", help="many runs, judged and reported"))
     for module, function in (("ruedo.hunt.cli", "add_hunt"), ("ruedo.hunt.why_cli", "add_why")):
