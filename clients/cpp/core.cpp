@@ -24,13 +24,22 @@ constexpr int64_t kMostAhead = 1'000'000;     // us: ticks come ten times a seco
 constexpr double kSilence =
     5.0;  // s of real time without any message: a server gives a sign of life each second
 
+// How many clients of this process have joined that run before.
+uint32_t joined_before(int64_t run_id) {
+  static std::mutex mutex;
+  static std::map<int64_t, uint32_t> joined;
+  const std::lock_guard lock(mutex);
+  return joined[run_id]++;
+}
+
 // Where a client that joins at that time begins to number its primitives: apart from others', and
 // from those of its own that an earlier start of the program has left under way. Equal runs in
 // lockstep have equal numbers, since their logs are compared.
-int64_t ids_from(const std::string& name, int64_t utime) {
+int64_t ids_from(const std::string& name, int64_t utime, uint32_t before) {
   uint32_t hash = 2166136261u;  // FNV-1a
   for (unsigned char c : name) hash = (hash ^ c) * 16777619u;
-  hash += static_cast<uint32_t>(utime);
+  hash +=
+      static_cast<uint32_t>(utime) + before * 0x9e3779b1u;  // the golden ratio's bits: far apart
   return static_cast<int64_t>(hash & 0x7fffffffu) << 20;
 }
 
@@ -95,7 +104,7 @@ void Core::join(Duration timeout) {
     ask_info();
     news_.wait_for(lock, std::chrono::milliseconds(100));
   }
-  ids_ = ids_from(session_.name(), known_->utime);
+  ids_ = ids_from(session_.name(), known_->utime, joined_before(known_->run_id));
 }
 
 void Core::close() {

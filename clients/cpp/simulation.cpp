@@ -2,7 +2,6 @@
 #include <unistd.h>
 
 #include <algorithm>
-#include <atomic>
 #include <cmath>
 #include <stdexcept>
 #include <string>
@@ -34,16 +33,11 @@ std::vector<uint8_t> name_body(const std::string& name) {
   return encoded(body);
 }
 
-std::string default_name() {
-  static std::atomic<int> unnamed{0};  // clients of this process
-  const int number = ++unnamed;
-  return "client-" + std::to_string(getpid()) + (number > 1 ? "-" + std::to_string(number) : "");
-}
-
 }  // namespace
 
 Simulation connect(const std::string& url, const ConnectOptions& options) {
-  const std::string name = options.name.empty() ? default_name() : options.name;
+  const std::string name =
+      options.name.empty() ? "client-" + std::to_string(getpid()) : options.name;
   auto core = std::make_shared<Core>(resolve_url(url), name, nullptr);
   core->join(options.timeout);
   return Simulation(std::move(core));

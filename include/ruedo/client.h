@@ -642,7 +642,7 @@ class [[nodiscard]] Simulation {
 
 /// How connect() joins.
 struct ConnectOptions {
-  std::string name;  ///< of this client; "": "client-PID", of a process's second "client-PID-2"
+  std::string name;        ///< of this client; "": "client-PID"
   Duration timeout = 2.0;  ///< of real time to wait for a server
 };
 

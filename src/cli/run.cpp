@@ -137,7 +137,7 @@ run::RunOptions server_options(const RunArguments& arguments) {
   options.result_options = result_options(arguments.world);
   for (auto& [name, other] : parse_remaps(arguments.remaps)) {
     if (name.starts_with('/')) continue;  // ROS's names, which do not affect the run
-    options.result_options.push_back("--remap=" + name + "=" + other);
+    options.result_options.push_back(fmt::format("--remap={}={}", name, other));
     options.remaps.emplace_back(std::move(name), std::move(other));
   }
   for (const std::string& text : arguments.wait_for)

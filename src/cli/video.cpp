@@ -106,7 +106,7 @@ void Video::fail() {
   if (child_ > 0) ::waitpid(std::exchange(child_, -1), &status_, 0);
   std::string why;
   std::array<char, 1024> line{};
-  std::rewind(complaints_);
+  std::fseek(complaints_, 0, SEEK_SET);
   while (std::fgets(line.data(), line.size(), complaints_)) why = line.data();
   while (!why.empty() && why.back() == '\n') why.pop_back();
   throw EnvironmentError(file_ + ": the video cannot be written" +

@@ -90,7 +90,7 @@ void OutputFile::keep() {
 bool OutputFile::copy() const {
   const FileHandle to(::open(target_.c_str(), O_WRONLY | O_TRUNC | O_CLOEXEC));
   std::array<char, 1 << 16> piece{};
-  std::rewind(file_.get());
+  if (std::fseek(file_.get(), 0, SEEK_SET) != 0) return false;
   while (to) {
     const size_t count = std::fread(piece.data(), 1, piece.size(), file_.get());
     if (count == 0) return std::ferror(file_.get()) == 0;

@@ -29,27 +29,6 @@ const Of kOf[] = {
     {"ruedo:max_steering_rate", {Steering::ackermann, Steering::tricycle}},
 };
 
-// They say how wheels are turned, which the kinematic drive does not.
-constexpr const char* kOfWheels[] = {
-    "ruedo:max_wheel_torque", "ruedo:servo_rate_gain", "ruedo:servo_angle_gain", "ruedo:gear",
-    "ruedo:stall_torque",     "ruedo:no_load_rate",    "ruedo:yaw_gain",         "ruedo:gyro_bias",
-    "ruedo:gyro_scale_error"};
-
-void name_of_other_type(const DriveDescription& drive, const std::string& where,
-                        Findings& findings) {
-  const bool wheels = drive.kind == DriveDescription::Kind::wheels;
-  const std::string* type = drive.element->attribute("type");
-  if (type && *type != "kinematic" && !wheels) return;  // a plugin's, which may read them
-  const auto name = [&](const char* element) {
-    if (const Element* written = drive.element->child(element))
-      findings.unsupported(written->source, where,
-                           "<" + written->name + "> does nothing with a drive of type '" +
-                               (wheels ? "wheels" : "kinematic") + "'");
-  };
-  if (wheels) return name("ruedo:traction");
-  for (const char* each : kOfWheels) name(each);
-}
-
 void name_without_effect(const DriveDescription& drive, const std::string& where,
                          Findings& findings) {
   for (const Of& each : kOf) {
@@ -156,7 +135,6 @@ void name_odd_drive(const Element& model_element, const Model& model, const std:
     return findings.error(source, where, "the model is static: its drive moves nothing");
   if (model_element.has("ruedo:drive")) {
     name_without_effect(*model.drive, where, findings);
-    name_of_other_type(*model.drive, where, findings);
   }
   Look(model, where, findings).all();
 }

@@ -216,9 +216,12 @@ def test_equal_runs_in_lockstep_number_their_primitives_alike():
     for _ in range(2):
         with ruedo.launch(HALL, lockstep=1, **QUICK) as sim:
             sim.step(10)
-            with ruedo.connect(sim.url, name="guest") as guest:
-                ids.append((sim.robot("p3at").stop().id, guest.robot("p3at").stop().id))
-    assert ids[0] == ids[1] and ids[0][0] != ids[0][1]
+            with (
+                ruedo.connect(sim.url, name="guest", timeout=PATIENCE) as guest,
+                ruedo.connect(sim.url, name="guest", timeout=PATIENCE) as its_like,
+            ):
+                ids.append([each.robot("p3at").stop().id for each in (sim, guest, its_like)])
+    assert ids[0] == ids[1] and len(set(ids[0])) == 3
 
 
 @pytest.mark.parametrize("options", [{"lockstep": 1}, {"url": "auto"}])

@@ -5,13 +5,14 @@ from __future__ import annotations
 
 import atexit
 import contextlib
+import itertools
 import logging
 import os
 import struct
 import threading
 import time
 import weakref
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import Any, Protocol
 
 from . import lcmtypes
@@ -102,7 +103,7 @@ class Connection:
         self.bus.subscribe("ruedo/reply", self.session.receive)
         self.bus.start()
         self._await_info(timeout)
-        self._ids = _ids_from(self.session.name, self.info.utime)
+        self._ids = _ids_from(self.session.name, self.info)
 
     def close(self) -> None:
         """Repeated commands end, and so does a private server. A second call waits for that, and so
@@ -397,7 +398,10 @@ if hasattr(os, "register_at_fork"):
     os.register_at_fork(after_in_child=_after_fork)
 
 
-def _ids_from(name: bytes, utime: int) -> int:
+_joined: dict[int, Iterator[int]] = {}  # by run: counts the clients of this process that join it
+
+
+def _ids_from(name: bytes, info: WorldInfo) -> int:
     """Where a client that joins at that time begins to number its primitives: apart from others',
     and from those of its own that an earlier start of the program has left under way. Equal runs in
     lockstep have equal numbers, since their logs are compared.
@@ -405,4 +409,5 @@ def _ids_from(name: bytes, utime: int) -> int:
     value = 2166136261  # FNV-1a
     for byte in name:
         value = (value ^ byte) * 16777619 & 0xFFFFFFFF
-    return (value + utime & 0x7FFFFFFF) << 20
+    before = next(_joined.setdefault(info.run_id, itertools.count()))
+    return (value + info.utime + before * 0x9E3779B1 & 0x7FFFFFFF) << 20  # far apart

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 import math
 import os
 import sys
@@ -30,22 +29,14 @@ def connect(url: str | None = None, *, name: str | None = None, timeout: float =
     """Joins the simulation at an LCM URL.
 
     url: default LCM_DEFAULT_URL, else LCM's own default group and port with ttl 0.
-    name: of this client, default "client-PID", of a process's second one "client-PID-2"; numbers of
-    motion primitives derive from it, and from the time in the simulation.
+    name: of this client, default "client-PID"; numbers of motion primitives derive from it, and
+    from the time in the simulation.
     timeout: s of real time to wait for a server. Raises NoServer.
     """
     at = resolve_url(None if url is None else arguments.text("url", url))
     own = "" if name is None else arguments.text("name", name)
-    own = arguments.client_name(own or _default_name())
+    own = arguments.client_name(own or f"client-{os.getpid()}")
     return Simulation(at, own, arguments.number("timeout", timeout))
-
-
-_unnamed = itertools.count(1)  # clients of this process
-
-
-def _default_name() -> str:
-    number = next(_unnamed)
-    return f"client-{os.getpid()}" + (f"-{number}" if number > 1 else "")
 
 
 class Simulation:

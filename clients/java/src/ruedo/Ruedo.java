@@ -1,7 +1,5 @@
 package ruedo;
 
-import java.util.concurrent.atomic.AtomicInteger;
-
 /**
  * Ruedo's client for Java: connect to a robot simulation, read its sensors, drive its robots.
  *
@@ -17,8 +15,6 @@ import java.util.concurrent.atomic.AtomicInteger;
  * Units are SI, angles radians; x ahead, y left, z up.
  */
 public final class Ruedo {
-    private static final AtomicInteger unnamed = new AtomicInteger(); // clients of this process
-
     private Ruedo() {}
 
     /**
@@ -31,12 +27,10 @@ public final class Ruedo {
 
     /**
      * Joins the simulation at an LCM URL; a server that does not answer within 2 s is a NoServer.
-     * Its name is "client-PID", of a process's second one "client-PID-2".
+     * Its name is "client-PID".
      */
     public static Simulation connect(String url) {
-        String name = "client-" + ProcessHandle.current().pid();
-        int number = unnamed.incrementAndGet();
-        return connect(url, number > 1 ? name + "-" + number : name, 2.0);
+        return connect(url, "client-" + ProcessHandle.current().pid(), 2.0);
     }
 
     /** The same with a name of this client, and the seconds of real time to wait for a server. */

@@ -55,6 +55,8 @@ public final class Simulation implements AutoCloseable {
     private final Map<String, Driver> drivers = new HashMap<>(); // by robot
     private final Set<Driver> repeating = ConcurrentHashMap.newKeySet();
     private final Set<Subscription> newRun = ConcurrentHashMap.newKeySet();
+    private static final Map<Long, Integer> joined =
+            new ConcurrentHashMap<>(); // by run: how many clients of this process have joined it
     private final AtomicLong ids; // the newest primitive's
     private final Object news = new Object(); // a user may hold the monitor of this object itself
     private WorldInfo known; // these under news
@@ -98,7 +100,7 @@ public final class Simulation implements AutoCloseable {
             bus.close();
             throw error;
         }
-        ids = new AtomicLong(idsFrom(name, info().head.utime));
+        ids = new AtomicLong(idsFrom(name, info()));
     }
 
     /**
@@ -106,10 +108,11 @@ public final class Simulation implements AutoCloseable {
      * and from those of its own that an earlier start of the program has left under way. Equal runs
      * in lockstep have equal numbers, since their logs are compared.
      */
-    private static long idsFrom(String name, long utime) {
+    private static long idsFrom(String name, WorldInfo info) {
         int hash = 0x811c9dc5; // FNV-1a
         for (byte b : name.getBytes(StandardCharsets.UTF_8)) hash = (hash ^ (b & 255)) * 16777619;
-        return (hash + utime & 0x7fffffff) << 20;
+        long before = joined.merge(info.head.run_id, 1, Integer::sum) - 1;
+        return (hash + info.head.utime + before * 0x9e3779b1L & 0x7fffffff) << 20; // far apart
     }
 
     // What there is.
@@ -671,8 +674,7 @@ public final class Simulation implements AutoCloseable {
             if (wrong != null) fault = wrong;
             if (wrong == null) lastSign = System.nanoTime();
             if (info != null) {
-                if (before == null || before.head.epoch != info.head.epoch)
-                    utime = info.head.utime;
+                if (before == null || before.head.epoch != info.head.epoch) utime = info.head.utime;
                 known = info;
             }
             news.notifyAll();
