@@ -57,7 +57,18 @@ def started(
 
 def ended(client: subprocess.Popen[str]) -> tuple[list[str], str]:
     said, errors = client.communicate(timeout=PATIENCE)
-    assert client.returncode == 0, (said, errors)
+    assert client.returncode == 0, said + errors
+    return said.splitlines(), errors
+
+
+def primitives_of(language: str, url: str) -> tuple[list[str], str]:
+    """A command is sent once: where a server that gets no processor loses it, they begin anew."""
+    for _ in range(5):
+        client = started(language, url, "primitives", "p3at")
+        said, errors = client.communicate(timeout=PATIENCE)
+        if client.returncode == 0:
+            break
+    assert client.returncode == 0, said + errors
     return said.splitlines(), errors
 
 
@@ -82,7 +93,7 @@ def test_motions_go_on_beside_another_server(language):
         ruedo_run("--paused", *QUICK, world=HALL) as second,  # its robot says nothing
         one_bus(first, second),
     ):
-        said, errors = ended(started(language, first.url, "primitives", "p3at"))
+        said, errors = primitives_of(language, first.url)
     for what in ("advance", "rotate", "turn_to", "arc"):
         [line] = [line.split() for line in said if line.split()[0] == what]
         assert line[1:5] == ["False", "True", "done", "-"], said
@@ -101,7 +112,7 @@ def test_motions_end_beside_a_status_of_a_false_time(language):
             "p3at/move", lambda data: stranger.send("p3at/motion", false.encode())
         ),
     ):
-        said, _ = ended(started(language, server.url, "primitives", "p3at"))
+        said, _ = primitives_of(language, server.url)
     for what in ("advance", "rotate", "turn_to", "arc"):
         [line] = [line.split() for line in said if line.split()[0] == what]
         assert line[1:5] == ["False", "True", "done", "-"], said
