@@ -25,6 +25,17 @@ bool is_for_in_place_alone(int reason) {
          reason == EXDEV;
 }
 
+// A file without a name, of which nothing is left when the process is killed; -1 where the file
+// system has none. Its path is good for as long as the process lives.
+int open_unnamed(const fs::path& folder, std::string& path) {
+  const int file = ::open(folder.c_str(), O_TMPFILE | O_RDWR | O_CLOEXEC, 0666);
+  if (file < 0) return -1;
+  path = "/proc/" + std::to_string(::getpid()) + "/fd/" + std::to_string(file);
+  if (::access(path.c_str(), W_OK) == 0) return file;
+  ::close(file);  // without /proc it could never be given a name
+  return -1;
+}
+
 std::string part_of(const fs::path& file, const fs::path& folder) {
   const std::string name =
       file.filename().string().substr(0, kLongestStem) + ".part" + std::to_string(::getpid());
@@ -54,8 +65,13 @@ void OutputFile::open() {
     file = ::open(path_.c_str(), O_WRONLY | O_CLOEXEC);
   } else {
     constexpr int kNew = O_RDWR | O_CREAT | O_EXCL | O_CLOEXEC;
-    part_ = part_of(target_, fs::path(target_).parent_path());
-    file = ::open(part_.c_str(), kNew, 0666);
+    const fs::path folder = fs::absolute(target_).parent_path();
+    file = open_unnamed(folder, part_);
+    is_named_ = file < 0;
+    if (is_named_) {
+      part_ = part_of(target_, folder);
+      file = ::open(part_.c_str(), kNew, 0666);
+    }
     if (file < 0 && fs::exists(before_) && is_for_in_place_alone(errno)) {
       part_ = part_of(target_, fs::temp_directory_path());
       file = ::open(part_.c_str(), kNew, 0600);
@@ -66,7 +82,7 @@ void OutputFile::open() {
 }
 
 OutputFile::~OutputFile() {
-  if (!kept_ && part_ != path_) ::unlink(part_.c_str());
+  if (!kept_ && part_ != path_ && is_named_) ::unlink(part_.c_str());
 }
 
 void OutputFile::write(std::string_view bytes) {
@@ -79,11 +95,21 @@ void OutputFile::keep() {
   if (part_ != path_) {
     std::error_code error;
     if (fs::exists(before_)) fs::permissions(part_, before_.permissions(), error);
+    if (!is_named_) name();
     if (::rename(part_.c_str(), target_.c_str()) == 0)
       kept_ = true;
     else if (!fs::exists(before_) || !is_for_in_place_alone(errno) || !copy())
       fail(errno);
   }
+}
+
+// Gives the part a name, to be renamed: no call puts a file without one in another's place.
+void OutputFile::name() {
+  const std::string named = part_of(target_, fs::absolute(target_).parent_path());
+  if (::linkat(AT_FDCWD, part_.c_str(), AT_FDCWD, named.c_str(), AT_SYMLINK_FOLLOW) != 0)
+    fail(errno);
+  part_ = named;
+  is_named_ = true;
 }
 
 // Into the file that was there. False: errno says why.

@@ -14,8 +14,8 @@ namespace ruedo {
 void check_output(const std::string& path);
 
 // A file that comes into being beside the one that it replaces, and takes its name at the end: when
-// the disk is full, or the work fails, what was there before stays. Devices and FIFOs are written
-// to as they are. What throws EnvironmentError names the file and the reason.
+// the disk is full, or the work fails or is killed, what was there before stays, alone. Devices and
+// FIFOs are written to as they are. What throws EnvironmentError names the file and the reason.
 class OutputFile {
  public:
   explicit OutputFile(const std::string& path);  // throws as check_output(), or EnvironmentError
@@ -34,6 +34,7 @@ class OutputFile {
   };
 
   void open();
+  void name();
   bool copy() const;
   [[noreturn]] void fail(int reason) const;
 
@@ -41,6 +42,7 @@ class OutputFile {
   std::filesystem::file_status before_;  // of what was there
   std::string target_;                   // a symbolic link stays one
   std::string part_;
+  bool is_named_ = true;  // the part is seen in a folder
   std::unique_ptr<std::FILE, Close> file_;
   bool kept_ = false;
 };

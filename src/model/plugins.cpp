@@ -14,7 +14,11 @@ struct Known {
   std::string_view name;
   Does does;
   const char* would = "";
+  bool is_in_model = does == Does::drive || does == Does::joints || does == Does::control;
 };
+
+// One that a part of Ruedo replaces, for the model, link or sensor that it stands in.
+constexpr Known in_model(std::string_view name) { return {name, Does::served, "", true}; }
 
 // gz-sim's systems, by class name.
 constexpr Known kSystems[] = {
@@ -35,10 +39,10 @@ constexpr Known kSystems[] = {
     {"UserCommands", Does::served},
     {"Imu", Does::served},
     {"Contact", Does::served},
-    {"PosePublisher", Does::served},
-    {"OdometryPublisher", Does::served},
+    in_model("PosePublisher"),
+    in_model("OdometryPublisher"),
     {"LogRecord", Does::dead, "it would record; here --record does"},
-    {"TrackController", Does::served},  // of a TrackedVehicle's tracks
+    in_model("TrackController"),  // of a TrackedVehicle's tracks
     {"LogPlayback", Does::irrelevant},
     {"LogVideoRecorder", Does::irrelevant},
     {"CameraVideoRecorder", Does::irrelevant},
@@ -73,10 +77,10 @@ constexpr Known kSystems[] = {
     {"LinearBattery", Does::dead, "its battery would run down"},
     {"Breadcrumbs", Does::dead, "it would drop models"},
     {"TriggeredPublisher", Does::dead, "messages would be answered by messages"},
-    {"PerformerDetector", Does::served},  // sensor_from_plugin()
-    {"TouchPlugin", Does::served},
-    {"DetachableJoint", Does::served},  // read_holds()
-    {"Elevator", Does::served},         // read_lifts()
+    in_model("PerformerDetector"),  // sensor_from_plugin()
+    in_model("TouchPlugin"),
+    in_model("DetachableJoint"),  // read_holds()
+    in_model("Elevator"),         // read_lifts()
     {"ApplyLinkWrench", Does::dead, "forces would be taken from messages"},
     {"FollowActor", Does::dead, "it would follow an actor"},
     {"TrajectoryFollower", Does::dead, "it would follow its waypoints"},
@@ -132,47 +136,47 @@ constexpr Known kLibraries[] = {
     {"gazebo_ros_joint_pose_trajectory", Does::joints},
     {"gazebo_ros_joint_trajectory", Does::joints},
     {"JointTrajectoryPlugin", Does::joints},
-    {"gazebo_ros_ray_sensor", Does::served},
-    {"gazebo_ros_laser", Does::served},
-    {"gazebo_ros_gpu_laser", Does::served},
-    {"gazebo_ros_block_laser", Does::served},
-    {"gazebo_ros_velodyne_laser", Does::served},
-    {"gazebo_ros_velodyne_gpu_laser", Does::served},
-    {"gazebo_ros_range", Does::served},
-    {"hector_gazebo_ros_sonar", Does::served},
-    {"gazebo_ros_imu_sensor", Does::served},
-    {"gazebo_ros_camera", Does::served},
-    {"gazebo_ros_triggered_camera", Does::served},
-    {"gazebo_ros_multicamera", Does::served},
-    {"gazebo_ros_depth_camera", Does::served},
-    {"gazebo_ros_openni_kinect", Does::served},
-    {"gazebo_ros_realsense", Does::served},
-    {"realsense_gazebo_plugin", Does::served},
-    {"gazebo_ros_bumper", Does::served},
-    {"gazebo_ros_p3d", Does::served},  // sensor_from_plugin()
+    in_model("gazebo_ros_ray_sensor"),
+    in_model("gazebo_ros_laser"),
+    in_model("gazebo_ros_gpu_laser"),
+    in_model("gazebo_ros_block_laser"),
+    in_model("gazebo_ros_velodyne_laser"),
+    in_model("gazebo_ros_velodyne_gpu_laser"),
+    in_model("gazebo_ros_range"),
+    in_model("hector_gazebo_ros_sonar"),
+    in_model("gazebo_ros_imu_sensor"),
+    in_model("gazebo_ros_camera"),
+    in_model("gazebo_ros_triggered_camera"),
+    in_model("gazebo_ros_multicamera"),
+    in_model("gazebo_ros_depth_camera"),
+    in_model("gazebo_ros_openni_kinect"),
+    in_model("gazebo_ros_realsense"),
+    in_model("realsense_gazebo_plugin"),
+    in_model("gazebo_ros_bumper"),
+    in_model("gazebo_ros_p3d"),  // sensor_from_plugin()
     {"gazebo_ros_init", Does::served},
     {"gazebo_ros_factory", Does::served},
     {"gazebo_ros_state", Does::served},
     {"gazebo_ros_api_plugin", Does::served},
-    {"RayPlugin", Does::served},
-    {"GpuRayPlugin", Does::served},
-    {"CameraPlugin", Does::served},
-    {"DepthCameraPlugin", Does::served},
-    {"ImuSensorPlugin", Does::served},
-    {"ContactPlugin", Does::served},
-    {"SonarPlugin", Does::served},
+    in_model("RayPlugin"),
+    in_model("GpuRayPlugin"),
+    in_model("CameraPlugin"),
+    in_model("DepthCameraPlugin"),
+    in_model("ImuSensorPlugin"),
+    in_model("ContactPlugin"),
+    in_model("SonarPlugin"),
     {"gazebo_ros_video", Does::irrelevant},
     {"gazebo_ros_paths_plugin", Does::irrelevant},
     {"HeightmapLODPlugin", Does::irrelevant},
     {"StaticMapPlugin", Does::irrelevant},
     {"SystemGUI", Does::irrelevant},
-    {"gazebo_ros_imu", Does::served},  // sensor_from_plugin()
-    {"hector_gazebo_ros_imu", Does::served},
-    {"gazebo_ros_gps_sensor", Does::served},
-    {"hector_gazebo_ros_gps", Does::served},
-    {"hector_gazebo_ros_magnetic", Does::served},
-    {"hector_gazebo_ros_baro", Does::served},
-    {"gazebo_ros_ft_sensor", Does::served},
+    in_model("gazebo_ros_imu"),  // sensor_from_plugin()
+    in_model("hector_gazebo_ros_imu"),
+    in_model("gazebo_ros_gps_sensor"),
+    in_model("hector_gazebo_ros_gps"),
+    in_model("hector_gazebo_ros_magnetic"),
+    in_model("hector_gazebo_ros_baro"),
+    in_model("gazebo_ros_ft_sensor"),
     {"gazebo_ros_f3d", Does::dead, "it would tell the forces on a link"},
     {"gazebo_ros_force", Does::dead, "forces would be taken from messages"},
     {"gazebo_ros_wheel_slip", Does::dead, "wheels would slip as it says"},
@@ -183,20 +187,20 @@ constexpr Known kLibraries[] = {
     {"ActorPlugin", Does::dead, "actors would walk by forces instead of their trajectory"},
     {"ActorCollisionsPlugin", Does::served},
     {"RandomVelocityPlugin", Does::dead, "it would move at random"},
-    {"ElevatorPlugin", Does::served},  // read_lifts()
+    in_model("ElevatorPlugin"),  // read_lifts()
     {"VacuumGripperPlugin", Does::dead, "a gripper would suck"},
     {"gazebo_ros_vacuum_gripper", Does::dead, "a gripper would suck"},
     {"gazebo_grasp_fix", Does::dead, "what is grasped would stick to the gripper"},
-    {"gazebo_mimic_joint_plugin", Does::served},  // read_mimic_plugin()
-    {"roboticsgroup_upatras_gazebo_mimic_joint_plugin", Does::served},
-    {"roboticsgroup_gazebo_mimic_joint_plugin", Does::served},
-    {"gazebo_ros_elevator", Does::served},
+    in_model("gazebo_mimic_joint_plugin"),  // read_mimic_plugin()
+    in_model("roboticsgroup_upatras_gazebo_mimic_joint_plugin"),
+    in_model("roboticsgroup_gazebo_mimic_joint_plugin"),
+    in_model("gazebo_ros_elevator"),
     {"gazebo_ros_projector", Does::dead, "a pattern would be projected"},
     {"gazebo_ros_harness", Does::dead, "a harness would hold it"},
     {"gazebo_ros_light", Does::dead, "lights would go on and off"},
     {"slotcar", Does::drive},
-    {"door", Does::served},  // read_lifts()
-    {"lift", Does::served},
+    in_model("door"),  // read_lifts()
+    in_model("lift"),
     {"register_component", Does::served},
     {"TeleportDispenserPlugin", Does::dead, "things would be handed to robots"},
     {"TeleportIngestorPlugin", Does::dead, "things would be taken from robots"},
@@ -247,63 +251,7 @@ std::string system_of(const std::string& library) {
   return name;
 }
 
-// Of those that a part of Ruedo replaces.
-constexpr std::string_view kServedInModels[] = {"DetachableJoint",
-                                                "Elevator",
-                                                "ElevatorPlugin",
-                                                "OdometryPublisher",
-                                                "PerformerDetector",
-                                                "PosePublisher",
-                                                "TouchPlugin",
-                                                "TrackController",
-                                                "door",
-                                                "gazebo_mimic_joint_plugin",
-                                                "gazebo_ros_elevator",
-                                                "lift",
-                                                "roboticsgroup_gazebo_mimic_joint_plugin",
-                                                "roboticsgroup_upatras_gazebo_mimic_joint_plugin"};
-constexpr std::string_view kServedInSensors[] = {"gazebo_ros_ray_sensor",
-                                                 "gazebo_ros_laser",
-                                                 "gazebo_ros_gpu_laser",
-                                                 "gazebo_ros_block_laser",
-                                                 "gazebo_ros_velodyne_laser",
-                                                 "gazebo_ros_velodyne_gpu_laser",
-                                                 "gazebo_ros_range",
-                                                 "hector_gazebo_ros_sonar",
-                                                 "gazebo_ros_imu",
-                                                 "gazebo_ros_imu_sensor",
-                                                 "hector_gazebo_ros_imu",
-                                                 "gazebo_ros_camera",
-                                                 "gazebo_ros_triggered_camera",
-                                                 "gazebo_ros_multicamera",
-                                                 "gazebo_ros_depth_camera",
-                                                 "gazebo_ros_openni_kinect",
-                                                 "gazebo_ros_realsense",
-                                                 "realsense_gazebo_plugin",
-                                                 "gazebo_ros_bumper",
-                                                 "gazebo_ros_p3d",
-                                                 "gazebo_ros_gps_sensor",
-                                                 "hector_gazebo_ros_gps",
-                                                 "hector_gazebo_ros_magnetic",
-                                                 "hector_gazebo_ros_baro",
-                                                 "gazebo_ros_ft_sensor",
-                                                 "RayPlugin",
-                                                 "GpuRayPlugin",
-                                                 "CameraPlugin",
-                                                 "DepthCameraPlugin",
-                                                 "ImuSensorPlugin",
-                                                 "ContactPlugin",
-                                                 "SonarPlugin"};
-
 }  // namespace
-
-bool belongs_in_model(const PluginKind& kind) {
-  const auto in = [&](const auto& names) {
-    return std::find(std::begin(names), std::end(names), kind.name) != std::end(names);
-  };
-  return kind.does == Does::drive || kind.does == Does::joints || kind.does == Does::control ||
-         (kind.does == Does::served && (in(kServedInModels) || in(kServedInSensors)));
-}
 
 PluginKind kind_of(const Element& plugin) {
   const std::string* name = plugin.attribute("name");
@@ -328,10 +276,11 @@ PluginKind kind_of(const Element& plugin) {
     });
   };
   for (const Known& known : kSystems) {
-    if (same(known.name, system)) return {std::string(known.name), known.does, known.would};
+    if (same(known.name, system))
+      return {std::string(known.name), known.does, known.would, known.is_in_model};
   }
   for (const Known& known : kLibraries) {
-    if (known.name == library) return {library, known.does, known.would};
+    if (known.name == library) return {library, known.does, known.would, known.is_in_model};
   }
   return {filename && !filename->empty() ? *filename : "(without a filename)", Does::unknown, ""};
 }

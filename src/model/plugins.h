@@ -24,11 +24,10 @@ struct PluginKind {
   std::string name;  // "DiffDrive", "gazebo_ros_planar_move"; the filename of an unknown one
   Does does = Does::unknown;
   const char* would = "";  // what it would have done: "the wind would blow"
+  // It acts on the model, link or sensor that it stands in, and on nothing in a <world>.
+  bool is_in_model = false;
 };
 
 PluginKind kind_of(const Element& plugin);
-
-// Whether it acts on the model, link or sensor that it stands in, and on nothing in a <world>.
-bool belongs_in_model(const PluginKind& kind);
 
 }  // namespace ruedo::model

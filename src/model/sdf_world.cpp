@@ -432,7 +432,7 @@ class SdfReader::WorldReader {
       if (has_levels(*plugin)) continue;
       const PluginKind kind = kind_of(*plugin);
       const bool dead = kind.does == PluginKind::Does::dead;
-      if (belongs_in_model(kind)) {
+      if (kind.is_in_model) {
         if (named.insert(kind.name).second)
           findings_.unsupported(
               plugin->source, in_world_,

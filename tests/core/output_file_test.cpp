@@ -1,0 +1,118 @@
+// Files that are written whole or not at all.
+#include "core/output_file.h"
+
+#include <csignal>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <string>
+#include <vector>
+
+#include <fcntl.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <gtest/gtest.h>
+
+#include "core/file_handle.h"
+#include "ruedo/errors.h"
+
+namespace fs = std::filesystem;
+
+namespace ruedo {
+namespace {
+
+class OutputFileTest : public testing::Test {
+ protected:
+  OutputFileTest() {
+    std::string name = (fs::temp_directory_path() / "ruedo_output_XXXXXX").string();
+    folder_ = ::mkdtemp(name.data());
+  }
+  ~OutputFileTest() override { fs::remove_all(folder_); }
+
+  std::string path() const { return folder_ / "file"; }
+  std::vector<std::string> names() const {
+    std::vector<std::string> all;
+    for (const auto& each : fs::directory_iterator(folder_)) all.push_back(each.path().filename());
+    return all;
+  }
+  std::string text() const {
+    std::ifstream file(path());
+    return {std::istreambuf_iterator<char>(file), {}};
+  }
+
+  fs::path folder_;
+};
+
+TEST_F(OutputFileTest, TakesItsNameWhenItIsWhole) {
+  for (const std::string words : {"one", "another"}) {
+    OutputFile file(path());
+    const std::string before = text();
+    file.write(words);
+    EXPECT_EQ(text(), before);
+    file.keep();
+    EXPECT_EQ(text(), words);
+  }
+  EXPECT_EQ(names(), std::vector<std::string>{"file"});
+}
+
+TEST_F(OutputFileTest, IsWrittenByAProgramInOurPlace) {
+  OutputFile file(path());
+  const pid_t child = ::fork();
+  if (child == 0) {
+    std::ofstream(file.part()) << "by a child";
+    ::_exit(0);
+  }
+  ::waitpid(child, nullptr, 0);
+  file.keep();
+  EXPECT_EQ(text(), "by a child");
+}
+
+TEST_F(OutputFileTest, LeavesWhatWasThereWhenItIsNotKept) {
+  write_file(path(), "earlier");
+  {
+    OutputFile(path()).write("half");
+  }
+  EXPECT_EQ(text(), "earlier");
+  EXPECT_EQ(names(), std::vector<std::string>{"file"});
+}
+
+TEST_F(OutputFileTest, LeavesWhatWasThereAloneWhenItsProcessIsKilled) {
+  if (const FileHandle file(::open(folder_.c_str(), O_TMPFILE | O_RDWR | O_CLOEXEC, 0666)); !file)
+    GTEST_SKIP() << "the file system of " << folder_ << " has no files without a name";
+  write_file(path(), "earlier");
+  const pid_t child = ::fork();
+  if (child == 0) {
+    OutputFile file(path());
+    file.write(std::string(1'000'000, '.'));
+    std::raise(SIGKILL);
+  }
+  int status = 0;
+  ::waitpid(child, &status, 0);
+  EXPECT_TRUE(WIFSIGNALED(status));
+  EXPECT_EQ(text(), "earlier");
+  EXPECT_EQ(names(), std::vector<std::string>{"file"});
+}
+
+TEST_F(OutputFileTest, KeepsTheRightsAndTheLinkOfWhatWasThere) {
+  write_file(path(), "earlier");
+  fs::permissions(path(), fs::perms::owner_read | fs::perms::owner_write);
+  fs::create_symlink("file", folder_ / "link");
+  write_file((folder_ / "link").string(), "later");
+  EXPECT_TRUE(fs::is_symlink(folder_ / "link"));
+  EXPECT_EQ(text(), "later");
+  EXPECT_EQ(fs::status(path()).permissions(), fs::perms::owner_read | fs::perms::owner_write);
+}
+
+TEST_F(OutputFileTest, NamesTheFileThatCannotBe) {
+  try {
+    OutputFile((folder_ / "none" / "file").string());
+    FAIL() << "it was opened";
+  } catch (const EnvironmentError& error) {
+    EXPECT_EQ(std::string(error.what()),
+              folder_.string() + "/none/file cannot be written: No such file or directory");
+  }
+}
+
+}  // namespace
+}  // namespace ruedo
