@@ -117,17 +117,30 @@ class Bare:
         self.heard = []
 
     def listen(self, channel, message):
-        self.bus.subscribe(channel, lambda _, data: self.heard.append(message.decode(data)))
+        subscription = self.bus.subscribe(
+            channel, lambda _, data: self.heard.append(message.decode(data))
+        )
+        subscription.set_queue_capacity(0)  # without an end: one that is late misses none
 
-    def until(self, ready, seconds=PATIENCE):
-        deadline = time.monotonic() + seconds
+    def until(self, ready):
+        deadline = time.monotonic() + PATIENCE
         while time.monotonic() < deadline:
             self.bus.handle_timeout(100)
             if any(ready(message) for message in self.heard):
                 return
         pytest.fail(
-            f"it did not happen within {seconds} s; the last message was {self.heard and vars_of(self.heard[-1])}"
+            f"it did not happen; the last message was {self.heard and vars_of(self.heard[-1])}"
         )
+
+    def command(self, channel, command, taken):
+        """Again after some seconds without an effect: a datagram may be lost."""
+        deadline = time.monotonic() + PATIENCE
+        while not any(taken(message) for message in self.heard):
+            assert time.monotonic() < deadline, "it was not taken"
+            self.bus.publish(channel, command.encode())
+            again = time.monotonic() + 5
+            while time.monotonic() < again and not any(taken(message) for message in self.heard):
+                self.bus.handle_timeout(100)
 
 
 def vars_of(message):
@@ -142,8 +155,11 @@ def test_the_watchdog_stops_a_command_that_is_not_repeated():
         bare.listen("p3at/motion", motion_status_t)
         command = velocity_command_t()
         command.vx = 0.2
-        bare.bus.publish("p3at/velocity", command.encode())
-        bare.until(lambda m: m.kind == m.KIND_VELOCITY and m.state == m.STATE_RUNNING)
+        bare.command(
+            "p3at/velocity",
+            command,
+            lambda m: m.kind == m.KIND_VELOCITY and m.state == m.STATE_RUNNING,
+        )
         bare.until(lambda m: m.state == m.STATE_ENDED and m.reason == m.REASON_WATCHDOG)
         end = bare.heard[-1].utime
         bare.until(
@@ -161,7 +177,7 @@ def test_a_primitive_needs_no_repeating():
         bare.listen("p3at/motion", motion_status_t)
         command = move_command_t()
         command.id, command.kind, command.value = 77, move_command_t.ROTATE, 1.0
-        bare.bus.publish("p3at/move", command.encode())
+        bare.command("p3at/move", command, lambda m: m.id == 77)
         bare.until(lambda m: m.id == 77 and m.state == m.STATE_DONE and abs(m.done - 1.0) < 1e-6)
 
 
@@ -177,6 +193,9 @@ def test_a_refused_primitive_says_why():
         ):
             command = move_command_t()
             command.id, command.kind, command.value = id, kind, value
-            bare.bus.publish("p3at/move", command.encode())
             refused = (id, motion_status_t.STATE_REFUSED, reason)
-            bare.until(lambda m, refused=refused: (m.id, m.state, m.reason) == refused)
+            bare.command(
+                "p3at/move",
+                command,
+                lambda m, refused=refused: (m.id, m.state, m.reason) == refused,
+            )

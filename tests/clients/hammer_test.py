@@ -55,4 +55,5 @@ def test_a_good_client_beside_them():
         ruedo.connect(server.url, timeout=PATIENCE) as sim,
     ):
         hammer("python", server.url)
+        sim.state()  # answered, so what came before has been read: nothing is lost any more
         assert sim.robot("p3at").rotate(0.2).wait(PATIENCE).done

@@ -58,7 +58,7 @@ def test_nothing_listens_on_a_tcp_port(language):
 
 def test_a_server_of_another_version_is_named(language):
     with fake("--wrong-info") as server:
-        said = probe(language, server.url, "connect").one("failed")
+        said = probe(language, server.url, "list").one("failed")
     assert said.startswith(
         "TypeMismatch: ruedo/info carries another version of world_info_t (fingerprint 0000000000000000)"
     )
@@ -195,7 +195,7 @@ def test_a_name_reaches_no_terminal(name, language, stream_url):
     lies = info([])
     lies.robots[0].name = name
     with LyingStream(stream_url, HELLO + frame("ruedo/info", lies.encode())):
-        said = probe(language, stream_url, "connect").one("failed")
+        said = probe(language, stream_url, "list").one("failed")
     assert name[0] not in said and "a name with control characters" in said
 
 

@@ -24,7 +24,10 @@ client.on("serverInfo", (info) => {
   });
   const twist = { linear: { x: 0.2, y: 0, z: 0 }, angular: { x: 0, y: 0, z: 0.3 } };
   const bytes = new TextEncoder().encode(JSON.stringify(twist));
-  setInterval(() => client.sendMessage(channel, bytes), 250);
+  setInterval(() => {
+    client.sendMessage(channel, bytes);
+    ++sent;
+  }, 250);
 });
 client.on("advertise", (channels) => {
   for (const channel of channels) {
@@ -34,10 +37,12 @@ client.on("advertise", (channels) => {
 });
 client.on("status", (status) => say({ status }));
 let first = null; // ns
+let sent = 0;
 client.on("time", ({ timestamp }) => {
   say({ time: String(timestamp) });
   first ??= timestamp;
-  if (Number(timestamp - first) >= 1e9 * Number(seconds)) client.close();
+  if (Number(timestamp - first) >= 1e9 * Number(seconds) && sent >= 3 * Number(seconds))
+    client.close();
 });
 client.on("message", ({ subscriptionId, timestamp, data }) =>
   say({

@@ -298,7 +298,7 @@ class Commands:
             lambda channel, data: self.found.append(
                 (c := velocity_command_t.decode(data), round(c.vx, 6), round(c.omega, 6))[1:]
             ),
-        )
+        ).set_queue_capacity(0)  # without an end: the last of many is the one that counts
 
     def until(self, teleop, command):
         while not self.found or self.found[-1] != command:

@@ -18,7 +18,7 @@ import pytest
 ROOT = Path(__file__).resolve().parents[2]
 BINARIES = Path(os.environ.get("RUEDO_BINARY_DIR", ROOT / "build/release")) / "bin"
 DOCUMENTS = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").glob("*.md"))]
-TIMEOUT_S = 120
+TIMEOUT_S = 400
 NETWORK = "ip link set lo up; ip route add 224.0.0.0/4 dev lo; "
 
 
@@ -27,7 +27,7 @@ NETWORK = "ip link set lo up; ip route add 224.0.0.0/4 dev lo; "
 SERVED = """ruedo run worlds/arena.sdf --quiet & server=$!
 trap 'kill $server; wait $server || true' EXIT
 until python -c 'import ruedo; ruedo.connect().close()'; do kill -0 $server; done
-until python block.py > said 2>&1; do grep -q 'no Ruedo server answered' said || { cat said; exit 1; }; done
+until python block.py > said 2>&1; do kill -0 $server; grep -q 'no Ruedo server answered' said || { cat said; exit 1; }; done
 cat said
 """
 

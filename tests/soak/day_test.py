@@ -4,6 +4,7 @@ log, and memory that stays flat."""
 
 from __future__ import annotations
 
+import contextlib
 import os
 import random
 import subprocess
@@ -88,7 +89,8 @@ def a_day(log: Path, url: str, harm: Harm | None) -> list[int]:
                 )
                 sim.step(round(1 / sim.step_size), [command], timeout=PATIENCE)
                 while second == SECONDS // 3 and harm and harm.is_alive() and harm.rounds == 0:
-                    sim.state()  # what is bad comes once, however busy the machine is
+                    with contextlib.suppress(ruedo.Timeout):
+                        sim.state()  # what is bad comes once, however busy the machine is
                 if second % max(1, SECONDS // 300) == 0:
                     sizes.append(resident_kb(server))
             end_of(harm)

@@ -509,7 +509,8 @@ public final class Probe {
         for (String what : List.of("unnamed", "driver")) {
             try (Simulation first = joined(url, what)) {
                 Motion running = first.robot(name).advance(5.0, new Limits(0.05, 0.0, 0.0));
-                while (running.progress() == 0.0) Thread.sleep(10);
+                // Done: lost on the way.
+                while (running.progress() == 0.0 && !running.done()) Thread.sleep(10);
                 try (Simulation second = joined(url, what)) {
                     attempt(what, () -> second.robot(name).advance(0.1).await(PATIENCE));
                     attempt("first_" + what, () -> running.await(PATIENCE));
@@ -519,7 +520,9 @@ public final class Probe {
     }
 
     private static Simulation joined(String url, String what) {
-        return what.equals("unnamed") ? Ruedo.connect(url) : Ruedo.connect(url, what, 60.0);
+        return what.equals("unnamed")
+                ? Ruedo.connect(url, "client-" + ProcessHandle.current().pid(), 60.0)
+                : Ruedo.connect(url, what, 60.0);
     }
 
     private static void act(String url, String command, String[] a) throws InterruptedException {

@@ -485,10 +485,11 @@ void leaves(rc::Simulation& sim, const std::vector<std::string>& a) {
 void apart(const std::string& url, const std::string& name) {
   for (const std::string own : {"", "driver"}) {
     const std::string what = own.empty() ? "unnamed" : own;
-    const rc::Simulation first = rc::connect(url, {.name = own});
+    const rc::Simulation first = rc::connect(url, {.name = own, .timeout = 60.0});
     const rc::Motion running = first.robot(name).advance(5.0, {.speed = 0.05});
-    while (running.progress() == 0.0) std::this_thread::sleep_for(std::chrono::milliseconds(10));
-    const rc::Simulation second = rc::connect(url, {.name = own});
+    while (running.progress() == 0.0 && !running.done())  // done: lost on the way
+      std::this_thread::sleep_for(std::chrono::milliseconds(10));
+    const rc::Simulation second = rc::connect(url, {.name = own, .timeout = 60.0});
     report(what, [&] { second.robot(name).advance(0.1).wait(kPatience); });
     report("first_" + what, [&] { running.wait(kPatience); });
   }

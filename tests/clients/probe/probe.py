@@ -398,14 +398,14 @@ def apart(url, name):
 
     def advance(own, robot):
         running = robot.advance(5.0, speed=0.05)
-        while running.progress == 0.0:
+        while running.progress == 0.0 and not running.done:  # done: lost on the way
             time.sleep(0.01)
-        with ruedo.connect(url, name=own) as second:
+        with ruedo.connect(url, timeout=60.0, name=own) as second:
             attempt(own or "unnamed", second.robot(name).advance(0.1).wait)
         attempt(f"first_{own or 'unnamed'}", running.wait)
 
     for own in (None, "driver"):
-        with ruedo.connect(url, name=own) as first:
+        with ruedo.connect(url, timeout=60.0, name=own) as first:
             advance(own, first.robot(name))
 
 
