@@ -2,6 +2,7 @@
 errors.
 """
 
+import contextlib
 import subprocess
 import sys
 import time
@@ -282,14 +283,13 @@ def test_waiting_says_for_whom():
             assert sim.step(0).step == 3
 
 
-def test_a_lost_lease():
-    """By policy drop; the client takes part anew. And by policy fail, with the exit code."""
+def step_after_a_lost_lease(lease):
+    """Of a client that takes part anew, after 5 and 2 more; None: it lost that lease, too."""
     import ruedo
 
+    policy = ("--lease", str(lease), "--lease-policy", "drop")
     with (
-        ruedo_run(
-            "--lockstep", "1", "--lease", "2", "--lease-policy", "drop", world=HALL
-        ) as server,
+        ruedo_run("--lockstep", "1", *policy, world=HALL) as server,
         ruedo.connect(server.url, timeout=PATIENCE) as sim,
     ):
         sim.step(5)
@@ -297,7 +297,20 @@ def test_a_lost_lease():
             assert server.process.poll() is None
         with pytest.raises(ruedo.LeaseLost):
             sim.step(1)
-        assert sim.step(2).step == 7
+        with contextlib.suppress(ruedo.LeaseLost):
+            return sim.step(2).step
+    return None
+
+
+def test_a_lost_lease():
+    """By policy drop; the client takes part anew. And by policy fail, with the exit code."""
+    import ruedo
+
+    for lease in (2, 20):  # who is held up for longer loses it once more
+        last = step_after_a_lost_lease(lease)
+        if last is not None:
+            break
+    assert last == 7
     server = ruedo_run("--lockstep", "1", "--lease", "2", "--lease-policy", "fail", world=HALL)
     with ruedo.connect(server.url, timeout=PATIENCE) as sim:
         sim.step(5)
