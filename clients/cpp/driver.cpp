@@ -32,10 +32,12 @@ void MotionCore::update(const MotionStatus& status, const std::string& blocker) 
     blocked_by = reason == MotionReason::blocked ? blocker : "";
   } else if (status.state == MotionState::refused) {
     // another command, which changed nothing
-  } else if (state != MotionState::sent ||
-             (++unseen >= kUnseenStatuses && Clock::now() - sent >= kUnseenTime)) {
+  } else if (state != MotionState::sent) {
     state = MotionState::ended;  // its own end fell between two statuses
     reason = MotionReason::replaced;
+  } else if (++unseen >= kUnseenStatuses && Clock::now() - sent >= kUnseenTime) {
+    state = MotionState::ended;
+    reason = MotionReason::lost;
   }
   news.notify_all();
 }

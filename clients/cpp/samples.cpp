@@ -99,7 +99,8 @@ constexpr Word<MotionReason> kReasons[] = {{MotionReason::none, ""},
                                            {MotionReason::no_drive, "no drive"},
                                            {MotionReason::not_possible, "not possible"},
                                            {MotionReason::removed, "removed"},
-                                           {MotionReason::new_run, "new run"}};
+                                           {MotionReason::new_run, "new run"},
+                                           {MotionReason::lost, "lost"}};
 
 const Word<MotionKind>* words(MotionKind) { return std::begin(kKinds); }
 const Word<MotionState>* words(MotionState) { return std::begin(kStates); }

@@ -61,7 +61,8 @@ enum class MotionState : int8_t {
   sent = 64,
   unknown = 127
 };
-/// removed: the robot is gone; new_run: the server was restarted.
+/// removed: the robot is gone; new_run: the server was restarted; lost: no status has shown the
+/// primitive, though others came.
 enum class MotionReason : int8_t {
   none = 0,
   replaced = 1,
@@ -74,6 +75,7 @@ enum class MotionReason : int8_t {
   not_possible = 8,
   removed = 64,
   new_run = 65,
+  lost = 66,
   unknown = 127
 };
 /// How the server answers a request, as in reply_t.

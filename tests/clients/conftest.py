@@ -147,7 +147,7 @@ def probe(language: str, url: str, *command: str, timeout: float = PATIENCE) -> 
     """Begins anew where a server that gets no processor lost a motion, which is commanded once."""
     for _ in range(5):
         said = _probed(language, url, *command, timeout=timeout)
-        if not any("ended: replaced" in line for line in said.all("failed")):
+        if not any("ended: lost" in line for line in said.all("failed")):
             break
     return said
 

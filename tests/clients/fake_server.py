@@ -16,6 +16,11 @@ from ruedo import lcmtypes  # where the system has no GLib, LCM finds the one of
 import lcm
 
 
+def fingerprint(type_name):
+    """As a signed number, which it is in an info."""
+    return (getattr(lcmtypes, type_name)().get_hash() ^ 1 << 63) - (1 << 63)
+
+
 def info(options):
     message = lcmtypes.world_info_t()
     message.run_id, message.nparts, message.version, message.world, message.step_us = (
@@ -44,9 +49,7 @@ def info(options):
             type_name,
             rate,
         )
-        channel.fingerprint = getattr(lcmtypes, type_name)().get_hash()
-        if channel.fingerprint >= 1 << 63:
-            channel.fingerprint -= 1 << 64
+        channel.fingerprint = fingerprint(type_name)
         if name == "LRF" and "--wrong-type" in options:
             channel.fingerprint ^= 1
         message.devices.append(device)

@@ -2,6 +2,7 @@
 
 import contextlib
 import os
+import signal
 import subprocess
 import sys
 import time
@@ -10,7 +11,7 @@ import pytest
 from conftest import HERE, PATIENCE, PROBES, Server, free_url, probe
 
 # isort: split
-from fake_server import info, scan
+from fake_server import fingerprint, info, scan
 from lying_datagrams import LyingDatagrams, cut, fragment
 from lying_stream import (
     HELLO,
@@ -149,20 +150,40 @@ def test_a_server_that_reads_nothing_is_left(stream_url):
         transport.close()
 
 
-@pytest.mark.parametrize("lie", [lambda _: grants_and_huge_ticks, grants_and_ever_new_infos])
-def test_what_a_server_sends_in_lockstep_takes_no_memory(lie, language, stream_url):
+def driven_info(**channels):
+    """With these channels of the robot's more: their types by name."""
     driven = info([])
     driven.features = (1 << 40) - 1
-    for name, type_name in (
-        ("pose", "pose_t"),
-        ("velocity", "velocity_command_t"),
-        ("tick", "tick_t"),
-    ):
+    for name, type_name in channels.items():
         channel = lcmtypes.channel_info_t()
         channel.name, channel.robot, channel.type = f"p3at/{name}", "p3at", type_name
-        channel.input = name == "velocity"
+        channel.input = "_command_" in type_name
+        channel.fingerprint = fingerprint(type_name)
         driven.channels.append(channel)
     driven.nchannels = len(driven.channels)
+    return driven
+
+
+def test_a_primitive_that_no_status_shows_is_lost(language, stream_url):
+    """It is not said to be replaced: nobody may have driven the robot."""
+    known = driven_info(motion="motion_status_t", move="move_command_t")
+    tick, status = lcmtypes.tick_t(), lcmtypes.motion_status_t()
+    tick.run_id = known.run_id
+    with LyingStream(stream_url, HELLO + frame("ruedo/info", known.encode())) as server:
+        process = subprocess.Popen(
+            [*PROBES[language], stream_url, "primitives", "p3at"], stdout=subprocess.PIPE, text=True
+        )
+        while process.poll() is None:
+            tick.utime = status.utime = status.utime + 50000
+            server.send(frame("ruedo/tick", tick.encode()) + frame("p3at/motion", status.encode()))
+            time.sleep(0.05)
+        said = process.stdout.read()
+    assert said.startswith("failed MotionError: p3at: stop ended: lost, "), said
+
+
+@pytest.mark.parametrize("lie", [lambda _: grants_and_huge_ticks, grants_and_ever_new_infos])
+def test_what_a_server_sends_in_lockstep_takes_no_memory(lie, language, stream_url):
+    driven = driven_info(pose="pose_t", velocity="velocity_command_t", tick="tick_t")
     known = HELLO + frame("ruedo/info", driven.encode())
     with LyingStream(stream_url, known, lie(driven)) as server:
         process = subprocess.Popen(
@@ -176,7 +197,7 @@ def test_what_a_server_sends_in_lockstep_takes_no_memory(lie, language, stream_u
         while not server.granted.wait(0.1) and is_alive(process):
             assert time.monotonic() < until
         took_all = server.granted.is_set() and is_alive(process)
-        process.kill()
+        os.kill(process.pid, signal.SIGKILL)  # kill() would wait for it
         said = process.stdout.read()
         _, _, used = os.wait4(process.pid, 0)
     assert took_all or "failed Timeout: " in said, said  # a minute was not enough for all of it

@@ -95,6 +95,7 @@ class LyingStream:
         self._listening.listen(100)
         self.granted = threading.Event()  # and all of the answer was taken
         self._open: list[socket.socket] = []
+        self._greeted: list[socket.socket] = []  # of these: `sent` has been sent
         threading.Thread(target=self._accept, daemon=True).start()
 
     def __enter__(self) -> LyingStream:
@@ -107,8 +108,8 @@ class LyingStream:
             one.close()
 
     def send(self, data: bytes) -> None:
-        """To everybody who is connected."""
-        for one in self._open:
+        """To everybody who is connected, behind `sent`."""
+        for one in self._greeted:
             with contextlib.suppress(OSError):
                 one.sendall(data)
 
@@ -122,6 +123,7 @@ class LyingStream:
     def _serve(self, client: socket.socket) -> None:
         with contextlib.suppress(OSError):
             client.sendall(self._sent)
+            self._greeted.append(client)
             if self._answer is None:
                 return
             data = b""

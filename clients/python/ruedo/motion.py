@@ -35,7 +35,9 @@ class Motion:
         self.state = "sent"
         self.progress = 0.0  # m or rad done
         self.remaining = amount  # m or rad
-        self.reason = ""  # why it ended early or was refused: MotionStatus's, "removed", "new run"
+        # Why it ended early or was refused: MotionStatus's, "removed", "new run"; "lost": no status
+        # has shown it, though others came.
+        self.reason = ""
         self.blocked_by = ""  # the body that blocked it
         self._connection, self._robot = connection, robot
         self._unseen = 0
@@ -98,7 +100,7 @@ class Motion:
                     self._unseen >= _UNSEEN_STATUSES
                     and time.monotonic() - self._sent >= _UNSEEN_SECONDS
                 ):
-                    self.state, self.reason = "ended", "replaced"
+                    self.state, self.reason = "ended", "lost"
             self._news.notify_all()
 
     def _end(self, reason: str) -> None:

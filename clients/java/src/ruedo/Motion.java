@@ -48,7 +48,7 @@ public final class Motion {
 
     /**
      * Why it ended early or was refused, as in {@link MotionStatus#reason}; "removed", "new run":
-     * its robot, its run is gone.
+     * its robot, its run is gone; "lost": no status has shown it, though others came.
      */
     public String reason() {
         synchronized (lock) {
@@ -145,10 +145,12 @@ public final class Motion {
                 blockedBy = reason.equals("blocked") ? blocker : "";
             } else if (status.state.equals("refused")) {
                 return; // another command, which changed nothing
-            } else if (!state.equals("sent")
-                    || (++unseen >= UNSEEN_STATUSES && unseenUntil.passed())) {
+            } else if (!state.equals("sent")) {
                 state = "ended"; // its own end fell between two statuses
                 reason = "replaced";
+            } else if (++unseen >= UNSEEN_STATUSES && unseenUntil.passed()) {
+                state = "ended";
+                reason = "lost";
             }
             lock.notifyAll();
         }
