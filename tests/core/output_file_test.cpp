@@ -106,7 +106,7 @@ TEST_F(OutputFileTest, KeepsTheRightsAndTheLinkOfWhatWasThere) {
 
 TEST_F(OutputFileTest, NamesTheFileThatCannotBe) {
   try {
-    OutputFile((folder_ / "none" / "file").string());
+    const OutputFile file((folder_ / "none" / "file").string());
     FAIL() << "it was opened";
   } catch (const EnvironmentError& error) {
     EXPECT_EQ(std::string(error.what()),
