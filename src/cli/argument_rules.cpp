@@ -48,15 +48,18 @@ std::string what_is_odd(const std::string& value) {
   return "";
 }
 
+}  // namespace
+
 bool same_file(const std::string& a, const std::string& b) {
   std::error_code error;
   if (fs::is_regular_file(a, error)) return fs::equivalent(a, b, error);
-  if (fs::exists(a, error)) return false;                 // a device
-  const fs::path to_be = fs::weakly_canonical(a, error);  // however the two are written
-  return !error && to_be == fs::weakly_canonical(b, error);
+  if (fs::exists(a, error)) return false;            // a device
+  const auto to_be = [&](const std::string& file) {  // however it is written
+    return fs::weakly_canonical(fs::absolute(file), error);
+  };
+  const fs::path one = to_be(a), other = to_be(b);
+  return !error && one == other;
 }
-
-}  // namespace
 
 void refuse_odd_values(CLI::App& app) {
   for (CLI::App* command : app.get_subcommands([](const CLI::App*) { return true; })) {

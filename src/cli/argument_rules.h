@@ -15,6 +15,9 @@ void refuse_odd_values(CLI::App& app);
 // Of `--seed`: what is wrong with it, or "".
 std::string is_seed(const std::string& text);
 
+// Whether two names are of one file, which need not be there yet. A device is another each time.
+bool same_file(const std::string& a, const std::string& b);
+
 // What a command writes must be none of what it reads, nor another file that it writes. Throws
 // InputError. Of a command that was parsed.
 void check_outputs(const CLI::App& command);

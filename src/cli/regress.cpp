@@ -37,6 +37,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
+// What is compared with the golden log, and the page of a run that failed: by the log's name.
+constexpr const char *kKept = ".kept", *kPage = ".html";
 constexpr double kPageSize_MB = 20.0;  // of the page that shows a failed run
 
 struct RegressArguments {
@@ -146,7 +148,7 @@ std::string compare(const RegressArguments& arguments, const std::string& kept,
 // Holds the run against its golden log, or writes that one anew. What is wrong, or "".
 std::string hold_to_golden(const RegressArguments& arguments,
                            const std::vector<log::DiffRule>& rules, bool renew) {
-  const std::string &golden = arguments.golden, kept = arguments.record + ".kept";
+  const std::string &golden = arguments.golden, kept = arguments.record + kKept;
   if (std::error_code unreadable; !renew && !fs::exists(golden, unreadable))
     return "there is no golden log " + golden + " yet: run this once with RUEDO_RENEW=1";
   // A run that lacks what the golden log holds differs; --keep is wrong where neither has it.
@@ -181,7 +183,7 @@ std::string run_script(const RegressArguments& arguments) {
 void attach_page(const std::string& log) {
 #ifdef RUEDO_CONSOLE
   try {
-    write_page(log, log + ".html", kPageSize_MB);
+    write_page(log, log + kPage, kPageSize_MB);
   } catch (const std::exception& error) {
     to_stderr("ruedo: no page of this run: {}\n", std::string(error.what()));
   }
@@ -225,6 +227,22 @@ void write_verdict(const std::string& path, const std::vector<std::string>& faul
   write_file(path, json.text() + "\n");
 }
 
+// A run leaves two more files beside its log.
+void check_files_beside(const RegressArguments& arguments) {
+  const std::pair<const char*, const std::string&> given[] = {{"--golden", arguments.golden},
+                                                              {"--junit", arguments.junit},
+                                                              {"--html", arguments.html},
+                                                              {"--json", arguments.json}};
+  for (const char* end : {kKept, kPage}) {
+    for (const auto& [option, file] : given) {
+      if (!file.empty() && same_file(arguments.record + end, file))
+        throw InputError({}, fmt::format("{} {}: this run writes a file of its own there, beside "
+                                         "its log {}",
+                                         option, file, arguments.record));
+    }
+  }
+}
+
 int regress(RegressArguments arguments) {
   const bool isolated = !arguments.shared_network && isolate();
   SignalThread signals;  // after isolate(), which wants to be alone
@@ -240,6 +258,7 @@ int regress(RegressArguments arguments) {
       arguments.renew || (environment && *environment && std::string(environment) != "0");
   const std::shared_ptr<const model::WorldModel> world = load(arguments.world);
   check_output(arguments.record);
+  check_files_beside(arguments);
   print_findings(world->findings);
   judge::Judge judge(*world, expected);
   std::vector<std::string> failures;

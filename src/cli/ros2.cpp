@@ -95,6 +95,10 @@ ros2::NodeOptions node_options(run::Run& server, const Ros2Arguments& arguments)
   return options;
 }
 
+struct CycloneNetwork : Ros2Network {
+  std::unique_ptr<ros2::Transport> transport = dds::open_cyclone(dds::options_from_environment());
+};
+
 class CycloneNode : public Ros2Node {
  public:
   CycloneNode(run::Run& server, const Ros2Arguments& arguments,
@@ -164,20 +168,31 @@ class CycloneNode : public Ros2Node {
 
 }  // namespace
 
-std::unique_ptr<Ros2Node> Ros2Node::open(run::Run& server, const Ros2Arguments& arguments) {
+std::unique_ptr<Ros2Network> Ros2Network::open(const Ros2Arguments& arguments) {
   if (!arguments.on) return nullptr;
   distro_of(arguments);  // before a network is asked
+  return std::make_unique<CycloneNetwork>();
+}
+
+std::unique_ptr<Ros2Node> Ros2Node::open(run::Run& server, const Ros2Arguments& arguments,
+                                         std::unique_ptr<Ros2Network> network) {
+  if (!network) return nullptr;
   return std::make_unique<CycloneNode>(server, arguments,
-                                       dds::open_cyclone(dds::options_from_environment()));
+                                       std::move(static_cast<CycloneNetwork&>(*network).transport));
 }
 
 #else
 
-std::unique_ptr<Ros2Node> Ros2Node::open(run::Run&, const Ros2Arguments& arguments) {
+std::unique_ptr<Ros2Network> Ros2Network::open(const Ros2Arguments& arguments) {
   if (!arguments.on) return nullptr;
   throw EnvironmentError(
       "this ruedo was built without ROS 2. Install cyclonedds-dev, then configure with "
       "-DRUEDO_ROS2=ON and build again");
+}
+
+std::unique_ptr<Ros2Node> Ros2Node::open(run::Run&, const Ros2Arguments&,
+                                         std::unique_ptr<Ros2Network>) {
+  return nullptr;
 }
 
 #endif

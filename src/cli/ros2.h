@@ -25,12 +25,22 @@ struct Ros2Arguments {
   std::vector<std::string> wait_for;                          // ROS topics on which the run waits
 };
 
+// Where a node takes part.
+class Ros2Network {
+ public:
+  // Null without --ros2. Before a run is made, whose log empties an earlier one. Throws as
+  // Ros2Node::open().
+  static std::unique_ptr<Ros2Network> open(const Ros2Arguments& arguments);
+  virtual ~Ros2Network() = default;
+};
+
 // A node, from its making on; the run's messages come to it once it is attached.
 class Ros2Node {
  public:
-  // Null without --ros2. Throws InputError, and EnvironmentError when this build has no Cyclone DDS
-  // or there is no network for it.
-  static std::unique_ptr<Ros2Node> open(run::Run& server, const Ros2Arguments& arguments);
+  // Null without a network. Throws InputError, and EnvironmentError when this build has no Cyclone
+  // DDS or there is no network for it.
+  static std::unique_ptr<Ros2Node> open(run::Run& server, const Ros2Arguments& arguments,
+                                        std::unique_ptr<Ros2Network> network);
 
   virtual ~Ros2Node() = default;   // after the run, before the server
   virtual void print() const = 0;  // the topics

@@ -235,8 +235,9 @@ int run_world(const RunArguments& arguments) {
   viewed.follow(options);
   const Ros2Arguments ros2 = ros2_arguments(arguments, options);
   options.wait_for = with_channels(std::move(options.wait_for), *world, ros2);
+  std::unique_ptr<Ros2Network> network = Ros2Network::open(ros2);
   run::Run server(world, std::move(options), bus);
-  const std::unique_ptr<Ros2Node> node = Ros2Node::open(server, ros2);
+  const std::unique_ptr<Ros2Node> node = Ros2Node::open(server, ros2, std::move(network));
   const std::unique_ptr<FoxgloveServer> foxglove =
       arguments.foxglove ? FoxgloveServer::open(server, arguments.foxglove_address) : nullptr;
   place.claim->describe(

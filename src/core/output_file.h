@@ -14,8 +14,9 @@ namespace ruedo {
 void check_output(const std::string& path);
 
 // A file that comes into being beside the one that it replaces, and takes its name at the end: when
-// the disk is full, or the work fails or is killed, what was there before stays, alone. Devices and
-// FIFOs are written to as they are. What throws EnvironmentError names the file and the reason.
+// the disk is full, or the work fails or is killed, what was there before stays, alone. Devices,
+// FIFOs and open descriptors (/dev/stdout) are written to as they are. What throws EnvironmentError
+// names the file and the reason.
 class OutputFile {
  public:
   explicit OutputFile(const std::string& path);  // throws as check_output(), or EnvironmentError
@@ -33,8 +34,10 @@ class OutputFile {
     void operator()(std::FILE* file) const { std::fclose(file); }
   };
 
-  void open();
+  void open(int descriptor);
+  int open_part();  // < 0: errno says why
   void name();
+  void take_over_rights() const;
   bool copy() const;
   [[noreturn]] void fail(int reason) const;
 

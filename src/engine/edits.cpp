@@ -151,7 +151,7 @@ Outcome check_spawn(const spawn_request_t& request) {
 }
 
 Outcome spawn(const spawn_request_t& request, const model::LoadedModel& loaded, int64_t step,
-              Simulation& simulation, Channels& channels, std::string& name) {
+              Simulation& simulation, Channels& channels, std::string& name, Findings& findings) {
   const model::WorldModel& world = simulation.world();
   if (world.models.size() >= kMostModels) {
     return refused("the world has " + std::to_string(kMostModels) +
@@ -183,7 +183,6 @@ Outcome spawn(const spawn_request_t& request, const model::LoadedModel& loaded, 
                    ": it would stand in '" + other + "'");
   }
   try {
-    Findings findings;
     model::check_channel_names({name, X_WM, loaded.model}, loaded.model->source);
     simulation.add_model(name, X_WM, loaded.model, step, channels, findings);
   } catch (const InputError& error) {

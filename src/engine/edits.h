@@ -50,9 +50,9 @@ std::string unused_name(const model::WorldModel& world, const std::string& name)
 
 // What can be checked before the model is read; OK: nothing is wrong.
 Outcome check_spawn(const spawn_request_t& request);
-// step: the first state that shows it. name: is set to the model's name.
+// step: the first state that shows it. name: is set to the model's name. findings: of its devices.
 Outcome spawn(const spawn_request_t& request, const model::LoadedModel& loaded, int64_t step,
-              Simulation& simulation, Channels& channels, std::string& name);
+              Simulation& simulation, Channels& channels, std::string& name, Findings& findings);
 Outcome remove(const std::string& name, Simulation& simulation, Channels& channels);
 // A fixed model, static or with a joint to the world, is removed and inserted again. step: the
 // first state that shows it.

@@ -18,9 +18,12 @@ std::string path_of_text(const std::string& world_file) {
 
 // What such a number belongs to was left out, which a client would never hear of.
 void refuse_what_is_not_finite(const std::vector<Finding>& findings) {
+  const auto says = [](const Finding& finding, const char* words) {  // as_number()'s
+    return finding.text.find(words) != std::string::npos;
+  };
   for (const Finding& each : findings) {
     if (each.kind == Finding::Kind::error &&
-        each.text.find("' is not finite; ") != std::string::npos)  // the words of as_number()
+        (says(each, "' is not finite; ") || says(each, "' is too large for a number; ")))
       throw InputError(each.source, each.text.substr(0, each.text.rfind("; ")));
   }
 }

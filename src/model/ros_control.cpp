@@ -271,7 +271,12 @@ std::unique_ptr<Element> drive_of(const Controller& controller, const Model& mod
   type->read(translation);
   for (const Element* joint : translation.missing)
     report.error(joint->source, unknown_joint(controller, joint->text));
-  if (!drive->has("ruedo:left_joint") || !translation.missing.empty()) return nullptr;
+  if (!translation.missing.empty()) return nullptr;
+  if (!drive->has("ruedo:left_joint")) {
+    report.error(controller.source, "controller '" + controller.name + "' of type '" +
+                                        controller.type + "' names no wheels: it drives nothing");
+    return nullptr;
+  }
   name_zeros(translation, report);
   translation.limits();
   return drive;

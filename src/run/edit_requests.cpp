@@ -186,17 +186,18 @@ void Run::spawn_ready() {
 Run::Outcome Run::put_in(const request_t& request, const spawn_request_t& body,
                          const model::LoadedModel& loaded) {
   std::string name;
+  Findings made;  // of its devices, which are made with it
   const Outcome outcome = change(request, Changes::models, [&] {
-    return engine::spawn(body, loaded, publisher_.step() + 1, *simulation_, channels_, name);
+    return engine::spawn(body, loaded, publisher_.step() + 1, *simulation_, channels_, name, made);
   });
   if (outcome.code == reply_t::OK) note_files(loaded.files_read);
   if (outcome.code == reply_t::OK && edited_) edited_->spawned(name, body);
   if (outcome.code != reply_t::OK || repeating_) return outcome;
   spdlog::info("{} was spawned at step {}", name, publisher_.step());
-  for (size_t i = 0; i < std::min(loaded.findings.size(), kFindingsTold); ++i) {
-    const Finding& finding = loaded.findings[i];
-    spdlog::warn("{}: {}: {}", finding.source.str(), finding.element, finding.text);
-  }
+  std::vector<Finding> findings = loaded.findings;
+  findings.insert(findings.end(), made.list().begin(), made.list().end());
+  for (size_t i = 0; i < std::min(findings.size(), kFindingsTold); ++i)
+    spdlog::warn("{}: {}: {}", findings[i].source.str(), findings[i].element, findings[i].text);
   name_request_t which;  // the answer gives its name and its pose
   which.name = name;
   return publisher_.latest() ? get_state(request, which) : outcome;

@@ -408,6 +408,13 @@ def test_a_find_gets_a_folder_of_its_own(tmp_path, there):
     assert (folder / there).read_text() == "mine"
 
 
+def test_a_find_is_not_kept_where_no_folder_can_be(tmp_path):
+    folder = blind(tmp_path, "once")
+    (folder / "kept").symlink_to("nowhere")
+    done = ruedo("hunt", "hunt.yaml", "--cases", "1", "--keep", "kept", folder=folder, code=2)
+    assert "kept is there already" in done.stderr
+
+
 def test_the_plot_of_why_is_checked_before_any_work(tmp_path):
     log = tmp_path / "log.svg"
     with Engine("arena") as engine:

@@ -197,6 +197,7 @@ def test_a_thousand_robots_load_at_once(tmp_path):
         ("--view", "1.2.3.4:8080"),
         ("--foxglove", "banana"),
         ("--foxglove", "1.2.3.4:8765"),
+        ("--ros2", "nosuch"),
     ],
 )
 @pytest.mark.parametrize("ring", [(), ("--record-limit", "16MB")])

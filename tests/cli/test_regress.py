@@ -34,6 +34,18 @@ def test_a_run_equals_its_golden_log(folder):
 
 
 @pytest.mark.parametrize(
+    ("option", "file"),
+    [("--golden", "run.lcm.kept"), ("--html", "run.lcm.html"), ("--junit", "./run.lcm.kept")],
+)
+def test_what_a_run_leaves_beside_its_log_is_nobody_elses(folder, option, file):
+    """Before, a golden log of this name was written over, and the run held to itself."""
+    (folder / file).write_text("kept")
+    done = regress(option, file) if option != "--golden" else regress(golden=file)
+    assert done.returncode == 2 and f"{option} {file}: this run writes" in done.stderr, done
+    assert (folder / file).read_text() == "kept"
+
+
+@pytest.mark.parametrize(
     "options", [["--keep", "nosuch"], ["--client", "true", "--lockstep", "1"]], ids=" ".join
 )
 def test_a_run_with_nothing_to_keep_costs_no_golden_log(folder, options):

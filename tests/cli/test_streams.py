@@ -156,9 +156,27 @@ def test_nothing_is_written_over_what_is_read(world, log, tmp_path):
         result = program(*command)
         assert result.returncode == 2 and "which would be lost" in result.stderr, result
         assert path.read_bytes() == before
-    for other in (tmp_path / "new", f"{tmp_path}/./new"):
-        two = ["--junit", tmp_path / "new", "--html", other]
+    for one, other in (
+        (tmp_path / "new", tmp_path / "new"),
+        (tmp_path / "new", f"{tmp_path}/./new"),
+        ("new", "./new"),
+        ("new", f"{os.getcwd()}/new"),
+    ):
+        two = ["--junit", one, "--html", other]
         assert "is the same file as" in program("diff", log, log, *two).stderr
+
+
+def test_what_is_printed_into_a_file_leaves_the_rest_of_it(log):
+    line = "--junit /dev/stdout"
+    together = f'(echo before; "$0" "$@" {line}; echo after) > all; cat all'
+    done = subprocess.run(
+        ["sh", "-c", together, RUEDO, "diff", log, log],
+        capture_output=True,
+        text=True,
+        cwd=log.parent,
+    )
+    assert done.stdout.startswith("before\n") and done.stdout.endswith("after\n"), done
+    assert "<testsuite" in done.stdout
 
 
 @pytest.fixture

@@ -1,7 +1,7 @@
 """Models that come and go, over the wire, in each language: the probes see known numbers."""
 
 import pytest
-from conftest import HERE, probe, ruedo_run
+from conftest import HERE, PATIENCE, probe, ruedo_run
 
 HALL = str(HERE / "hall.sdf")
 BALL = (
@@ -44,3 +44,20 @@ def test_snapshots_and_the_names_of_spawned_models(language, tmp_path):
     assert said.words("same") == ["True", "True", "True"]
     first, last = (int(word) for word in said.words("steps"))
     assert last - first == 60
+
+
+def test_what_is_wrong_with_a_sensor_of_a_spawned_robot_is_told():
+    """By the server: it is made when the robot enters."""
+    import ruedo
+
+    text = (
+        "<sdf version='1.9'><model name='m'><link name='l'><sensor name='s' type='imu'>"
+        "<update_rate>nan</update_rate></sensor></link></model></sdf>"
+    )
+    with (
+        ruedo_run("--disable", "p3at/camera", world=HALL) as server,
+        ruedo.connect(server.url, timeout=PATIENCE) as sim,
+    ):
+        sim.spawn(text=text, x=3, y=3)
+        said = server.end()
+    assert "'nan' is not a rate" in said and "the sensor is left out" in said

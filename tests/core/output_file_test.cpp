@@ -104,6 +104,33 @@ TEST_F(OutputFileTest, KeepsTheRightsAndTheLinkOfWhatWasThere) {
   EXPECT_EQ(fs::status(path()).permissions(), fs::perms::owner_read | fs::perms::owner_write);
 }
 
+TEST_F(OutputFileTest, IsWhereALinkPointsThatHasNoFileYet) {
+  fs::create_symlink("file", folder_ / "link");
+  write_file((folder_ / "link").string(), "new");
+  EXPECT_TRUE(fs::is_symlink(folder_ / "link"));
+  EXPECT_EQ(text(), "new");
+  fs::create_symlink("loop", folder_ / "loop");
+  EXPECT_THROW(write_file((folder_ / "loop").string(), "new"), EnvironmentError);
+}
+
+// Killed in a container, where the next process has its number.
+TEST_F(OutputFileTest, HasNothingToDoWithAPartThatWasLeft) {
+  const std::string left = path() + ".part" + std::to_string(::getpid());
+  std::ofstream(left) << "left";
+  write_file(path(), "new");
+  EXPECT_EQ(text(), "new");
+  EXPECT_TRUE(fs::exists(left));
+}
+
+TEST_F(OutputFileTest, GoesOnWhereADescriptorIs) {
+  const FileHandle file(::open(path().c_str(), O_WRONLY | O_CREAT | O_CLOEXEC, 0666));
+  ASSERT_EQ(write_all(file.get(), "before ", 7), 7U);
+  write_file("/dev/fd/" + std::to_string(file.get()), "it ");
+  ASSERT_EQ(write_all(file.get(), "after", 5), 5U);
+  EXPECT_EQ(text(), "before it after");
+  EXPECT_EQ(names(), std::vector<std::string>{"file"});
+}
+
 TEST_F(OutputFileTest, NamesTheFileThatCannotBe) {
   try {
     const OutputFile file((folder_ / "none" / "file").string());

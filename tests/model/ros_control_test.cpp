@@ -387,6 +387,11 @@ TEST(RosControl, ControllersWithoutATypeAreNamed) {
   EXPECT_THAT(texts(*named_world(kManager + kBase)), IsEmpty());
 }
 
+TEST(RosControl, ADriveThatNamesNoWheelsIsNamed) {
+  const auto world = named_world(kManager + with(kBase, "left_wheel_names", "left_wheels_names"));
+  EXPECT_THAT(texts(*world), testing::Contains(HasSubstr("names no wheels: it drives nothing")));
+}
+
 // NaN and infinity in all spellings that ROS 2 reads, and its wildcard for the names of nodes,
 // which counts where a node of the name says nothing.
 TEST(RosControl, LimitsThatAreNoneAndWildcards) {

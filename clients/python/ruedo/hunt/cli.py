@@ -80,11 +80,12 @@ def _hunt(arguments: argparse.Namespace) -> int:
             else f"{hunt.name}: nothing was found in {arguments.cases} cases"
         )
         return 0
-    kept, wrong = arguments.keep, None
+    kept: str | None = arguments.keep
+    wrong: Exception | None = None
     if kept:
         try:
             found.keep(kept)
-        except CampaignError as error:  # the find itself is not lost
+        except (CampaignError, OSError) as error:  # the find itself is not lost
             kept, wrong = None, error
     say(_as_json(found, kept) if arguments.json else _as_text(found, hunt.name, kept))
     if wrong:

@@ -13,6 +13,7 @@ from typing import Any
 
 from ..campaign import Campaign
 from ..campaign.errors import CampaignError, UsageError
+from ..campaign.outputs import check_writable
 from ..campaign.plan import words_of
 from ..campaign.worlds import beside, copy_beside, model_of
 from ..errors import for_terminal
@@ -80,9 +81,15 @@ def keep(found: Any, folder: Path) -> Path:
 
 
 def check_keep(folder: Path) -> None:
-    """Raises UsageError for a folder that holds anything, which would be mixed with the find."""
-    if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
+    """Raises UsageError for a folder that holds anything, which would be mixed with the find, and
+    OSError where none can be made.
+    """
+    if os.path.lexists(folder) and (not folder.is_dir() or any(folder.iterdir())):
         raise UsageError(f"{folder} is there already: keep what is found in a new folder")
+    there = folder
+    while not there.exists():
+        there = there.parent
+    check_writable(there)
 
 
 def _new_name(name: str, taken: set[str], home: Path) -> str:
