@@ -29,11 +29,13 @@ void MotionCore::update(const MotionStatus& status, const std::string& blocker) 
     remaining = status.remaining;
     state = status.state;
     reason = status.reason;
+    shown = status.utime;
     blocked_by = reason == MotionReason::blocked ? blocker : "";
   } else if (status.state == MotionState::refused) {
     // another command, which changed nothing
   } else if (state != MotionState::sent) {
-    state = MotionState::ended;  // its own end fell between two statuses
+    if (status.utime == shown) return;  // what it ended itself: the network may exchange the two
+    state = MotionState::ended;         // its own end fell between two statuses
     reason = MotionReason::replaced;
   } else if (++unseen >= kUnseenStatuses && Clock::now() - sent >= kUnseenTime) {
     state = MotionState::ended;
@@ -122,7 +124,7 @@ void Driver::begin_epoch() {
   const std::lock_guard lock(mutex_);
   for (const auto& motion : motions_) {
     const std::lock_guard motion_lock(motion->mutex);
-    motion->utime = -1;
+    motion->utime = motion->shown = -1;
   }
 }
 

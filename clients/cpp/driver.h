@@ -35,6 +35,7 @@ struct MotionCore {
   int unseen = 0;  // statuses that did not show it
   int64_t utime =
       -1;  // of the newest status; before it is another run's, or of a reset that info will tell of
+  int64_t shown = -1;  // of the newest status that shows it
 
   // With the mutex held.
   bool done() const {

@@ -181,6 +181,26 @@ def test_a_primitive_that_no_status_shows_is_lost(language, stream_url):
     assert said.startswith("failed MotionError: p3at: stop ended: lost, "), said
 
 
+def test_what_a_primitive_ended_may_be_told_late(language, stream_url):
+    """Of one step come the end of what ran, and what runs now: datagrams may change places."""
+    known = driven_info(motion="motion_status_t", move="move_command_t")
+
+    def moved(move):
+        status = lcmtypes.motion_status_t()
+        for utime, id, state in (
+            (5000, move.id, status.STATE_RUNNING),
+            (5000, 1, status.STATE_ENDED),
+            (10000, move.id, status.STATE_DONE),
+        ):
+            status.utime, status.id, status.state = utime, id, state
+            yield frame("p3at/motion", status.encode())
+
+    sent = HELLO + frame("ruedo/info", known.encode())
+    with LyingStream(stream_url, sent, lambda request: [], moved):
+        said = probe(language, stream_url, "primitives", "p3at")
+    assert "stop" not in said.one("failed"), said.text  # but that it has no pose
+
+
 @pytest.mark.parametrize("lie", [lambda _: grants_and_huge_ticks, grants_and_ever_new_infos])
 def test_what_a_server_sends_in_lockstep_takes_no_memory(lie, language, stream_url):
     driven = driven_info(pose="pose_t", velocity="velocity_command_t", tick="tick_t")

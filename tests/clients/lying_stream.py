@@ -74,8 +74,8 @@ def grants_and_ever_new_infos(info: lcmtypes.world_info_t) -> Callable[..., Iter
 
 
 class LyingStream:
-    """Sends `sent` to everybody who connects, and what `answer` makes of each request; reads
-    nothing where that is None, and never closes.
+    """Sends `sent` to everybody who connects, and what `answer` makes of each request, `moved` of
+    each primitive; reads nothing where `answer` is None, and never closes.
     """
 
     def __init__(
@@ -83,8 +83,9 @@ class LyingStream:
         url: str,
         sent: bytes,
         answer: Callable[[lcmtypes.request_t], Iterable[bytes]] | None = None,
+        moved: Callable[[lcmtypes.move_command_t], Iterable[bytes]] = lambda move: [],
     ):
-        self.url, self._sent, self._answer = url, sent, answer
+        self.url, self._sent, self._answer, self._moved = url, sent, answer, moved
         scheme, _, where = url.partition("://")
         if scheme == "unix":
             self._listening = socket.socket(socket.AF_UNIX)
@@ -149,5 +150,8 @@ class LyingStream:
                     client.sendall(part)
                 if request.kind == request.GRANT:
                     self.granted.set()
+            elif kind == 1 and data[8 : 8 + length].endswith(b"/move"):
+                for part in self._moved(lcmtypes.move_command_t.decode(data[12 + length : end])):
+                    client.sendall(part)
             data = data[end:]
         return data

@@ -44,6 +44,7 @@ class Motion:
         self._utime = (
             -1
         )  # of the newest status; before it is another run's, or of a reset that info will tell of
+        self._shown = -1  # of the newest status that shows it
         self._sent = time.monotonic()
         self._news = threading.Condition()
 
@@ -86,10 +87,13 @@ class Motion:
             if status.id == self.id:
                 self.progress, self.remaining = status.progress, status.remaining
                 self.state, self.reason = status.state, status.reason
+                self._shown = status.utime
                 self.blocked_by = blocked_by if status.reason == "blocked" else ""
             elif status.state == "refused":
                 pass  # another command, which changed nothing
             elif self.state != "sent":
+                if status.utime == self._shown:
+                    return  # what it ended itself: the network may exchange the two
                 self.state, self.reason = (
                     "ended",
                     "replaced",
@@ -176,7 +180,7 @@ class Driver:
         """Sim time was reset."""
         with self._lock:
             for motion in self._motions:
-                motion._utime = -1
+                motion._utime = motion._shown = -1
 
     def _watchdog(self) -> float:
         robot = self._connection.info.robots.get(self._robot.name)  # None: removed meanwhile

@@ -23,6 +23,7 @@ public final class Motion {
     private int unseen;
     // Of the newest status; an earlier one is another run's, or of a reset that info will tell of.
     private long utime = -1;
+    private long shown = -1; // of the newest status that shows it
 
     Motion(Simulation sim, String robot, long id, String kind, double amount) {
         this.sim = sim;
@@ -120,7 +121,7 @@ public final class Motion {
     /** Sim time was reset. */
     void beginEpoch() {
         synchronized (lock) {
-            utime = -1;
+            utime = shown = -1;
         }
     }
 
@@ -142,10 +143,13 @@ public final class Motion {
                 remaining = status.remaining;
                 state = status.state;
                 reason = status.reason;
+                shown = status.utime;
                 blockedBy = reason.equals("blocked") ? blocker : "";
             } else if (status.state.equals("refused")) {
                 return; // another command, which changed nothing
             } else if (!state.equals("sent")) {
+                // What it ended itself: the network may exchange the two.
+                if (status.utime == shown) return;
                 state = "ended"; // its own end fell between two statuses
                 reason = "replaced";
             } else if (++unseen >= UNSEEN_STATUSES && unseenUntil.passed()) {
