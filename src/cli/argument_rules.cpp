@@ -55,7 +55,7 @@ bool same_file(const std::string& a, const std::string& b) {
   if (fs::is_regular_file(a, error)) return fs::equivalent(a, b, error);
   if (fs::exists(a, error)) return false;            // a device
   const auto to_be = [&](const std::string& file) {  // however it is written
-    return fs::weakly_canonical(fs::absolute(file), error);
+    return fs::weakly_canonical(fs::absolute(file, error), error);
   };
   const fs::path one = to_be(a), other = to_be(b);
   return !error && one == other;

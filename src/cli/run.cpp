@@ -230,13 +230,12 @@ int run_world(const RunArguments& arguments) {
   for (std::string& plugin : plugin_options()) options.result_options.push_back(std::move(plugin));
   const bus::ServerBus place = bus::open_server_bus(
       arguments.lcm, world->name, [](const std::string& line) { spdlog::warn(line); });
-  Bus& bus = *place.bus;
   RunView viewed(arguments.viewed, arguments.view);
   viewed.follow(options);
   const Ros2Arguments ros2 = ros2_arguments(arguments, options);
   options.wait_for = with_channels(std::move(options.wait_for), *world, ros2);
   std::unique_ptr<Ros2Network> network = Ros2Network::open(ros2);
-  run::Run server(world, std::move(options), bus);
+  run::Run server(world, std::move(options), *place.bus);
   const std::unique_ptr<Ros2Node> node = Ros2Node::open(server, ros2, std::move(network));
   const std::unique_ptr<FoxgloveServer> foxglove =
       arguments.foxglove ? FoxgloveServer::open(server, arguments.foxglove_address) : nullptr;
