@@ -33,9 +33,10 @@ void MotionCore::update(const MotionStatus& status, const std::string& blocker) 
     blocked_by = reason == MotionReason::blocked ? blocker : "";
   } else if (status.state == MotionState::refused) {
     // another command, which changed nothing
+  } else if (status.state == MotionState::ended && status.utime == shown) {
+    // what it ended itself: the network may exchange the two
   } else if (state != MotionState::sent) {
-    if (status.utime == shown) return;  // what it ended itself: the network may exchange the two
-    state = MotionState::ended;         // its own end fell between two statuses
+    state = MotionState::ended;  // its own end fell between two statuses
     reason = MotionReason::replaced;
   } else if (++unseen >= kUnseenStatuses && Clock::now() - sent >= kUnseenTime) {
     state = MotionState::ended;

@@ -91,9 +91,9 @@ class Motion:
                 self.blocked_by = blocked_by if status.reason == "blocked" else ""
             elif status.state == "refused":
                 pass  # another command, which changed nothing
+            elif status.state == "ended" and status.utime == self._shown:
+                pass  # what it ended itself: the network may exchange the two
             elif self.state != "sent":
-                if status.utime == self._shown:
-                    return  # what it ended itself: the network may exchange the two
                 self.state, self.reason = (
                     "ended",
                     "replaced",

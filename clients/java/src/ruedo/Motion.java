@@ -147,9 +147,9 @@ public final class Motion {
                 blockedBy = reason.equals("blocked") ? blocker : "";
             } else if (status.state.equals("refused")) {
                 return; // another command, which changed nothing
+            } else if (status.state.equals("ended") && status.utime == shown) {
+                return; // what it ended itself: the network may exchange the two
             } else if (!state.equals("sent")) {
-                // What it ended itself: the network may exchange the two.
-                if (status.utime == shown) return;
                 state = "ended"; // its own end fell between two statuses
                 reason = "replaced";
             } else if (++unseen >= UNSEEN_STATUSES && unseenUntil.passed()) {
