@@ -35,6 +35,12 @@ class InputError : public std::runtime_error {
   std::string message_;
 };
 
+/// A number that is infinite, none, or too large for one.
+class NotFinite : public InputError {
+ public:
+  using InputError::InputError;
+};
+
 /// The machine lacks something (a route, a renderer, room on a disk). The text holds the cure. Exit
 /// code 4.
 class EnvironmentError : public std::runtime_error {
@@ -76,12 +82,21 @@ class Findings {
   void error(const Source& source, const std::string& element, const std::string& text) {
     add({Finding::Kind::error, source, element, text});
   }
+  /// Adds something wrong that was thrown and caught.
+  /// @param caught where; thrown again if it is a number that is refused
+  /// @param element its path
+  /// @param text what was found, and what Ruedo does instead
+  void error(const InputError& caught, const std::string& element, const std::string& text);
+  /// From now on a number that is not finite is no finding, but ends the reading with its
+  /// NotFinite: for those who would not hear of a finding.
+  void refuse_what_is_not_finite() { refuses_not_finite_ = true; }
   /// @return all of them, in the order of adding
   const std::vector<Finding>& list() const { return list_; }
 
  private:
   void add(Finding finding);
   std::vector<Finding> list_;
+  bool refuses_not_finite_ = false;
   std::unordered_set<std::string> seen_;  // looked up only, never walked through
 };
 

@@ -201,7 +201,7 @@ int strict_check(const WorldArguments& world) {
   return refusal == kGood ? kCheckFailed : refusal;
 }
 
-// And what can be refused then, before the log is begun, which empties that of an earlier run.
+// And refuses what can be refused by then.
 std::shared_ptr<const model::WorldModel> load_to_serve(const RunArguments& arguments) {
   std::shared_ptr<const model::WorldModel> world = load(arguments.world);
   check_output(arguments.record);
@@ -312,22 +312,25 @@ void add_pace(CLI::App& command, RunArguments& arguments) {
 }
 
 void add_lockstep(CLI::App& command, RunArguments& arguments) {
-  command
-      .add_option("--lockstep", arguments.lockstep,
-                  "wait for this many clients, then advance as far as all of them allow")
-      ->type_name("N")
-      ->check(CLI::Range(1, 64));
+  CLI::Option* lockstep =
+      command
+          .add_option("--lockstep", arguments.lockstep,
+                      "wait for this many clients, then advance as far as all of them allow")
+          ->type_name("N")
+          ->check(CLI::Range(1, 64));
   command
       .add_option("--lease", arguments.lease,
                   "seconds of real time after which a silent client of lockstep loses its lease")
       ->type_name("S")
       ->capture_default_str()
-      ->check(within(0.01, 1e6));
+      ->check(within(0.01, 1e6))
+      ->needs(lockstep);
   command
       .add_option("--lease-policy", arguments.lease_policy,
                   "then: pause the run, drop the client, or fail the run with exit code 1")
       ->capture_default_str()
-      ->check(CLI::IsMember({"pause", "drop", "fail"}));
+      ->check(CLI::IsMember({"pause", "drop", "fail"}))
+      ->needs(lockstep);
 }
 
 void add_bus(CLI::App& command, RunArguments& arguments) {
@@ -390,13 +393,15 @@ Viewers add_viewers(CLI::App& command, RunArguments& arguments) {
                   "maximum rate of /clock, per second of sim time")
       ->type_name("HZ")
       ->capture_default_str()
-      ->check(within(0.1, 10000.0));
+      ->check(within(0.1, 10000.0))
+      ->needs(viewers.ros2);
   command
       .add_option("--ros2-services", arguments.ros2.services,
                   "how services are mapped: as each call came, or as one middleware does")
       ->type_name("RMW")
       ->capture_default_str()
-      ->check(CLI::IsMember({"auto", "cyclonedds", "fastrtps"}));
+      ->check(CLI::IsMember({"auto", "cyclonedds", "fastrtps"}))
+      ->needs(viewers.ros2);
   return viewers;
 }
 

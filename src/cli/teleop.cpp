@@ -9,6 +9,7 @@
 #include <cmath>
 #include <csignal>
 #include <memory>
+#include <mutex>
 #include <string>
 #include <utility>
 
@@ -149,11 +150,11 @@ class Keys {
   Place place_ = Place::between;
 };
 
-// Whether the robot is there, as ruedo/info tells; until that has come, it is. Hears in the bus's
-// thread.
+// Whether the robot is there and where it takes velocities, as ruedo/info tells; until that has
+// come, it is, on the channel of every robot. Hears in the bus's thread.
 class Presence {
  public:
-  explicit Presence(std::string robot) : robot_(std::move(robot)) {}
+  explicit Presence(const std::string& robot) : robot_(robot), channel_(robot + "/velocity") {}
 
   void hear(const uint8_t* data, size_t size) {
     world_info_t info;
@@ -161,11 +162,20 @@ class Presence {
     if (info.part == 0) next_part_ = 0, found_ = false;
     if (info.part != next_part_++) return;  // one was lost
     for (const robot_info_t& robot : info.robots) found_ |= robot.name == robot_;
+    for (const channel_info_t& each : info.channels) {
+      if (!each.input || each.robot != robot_ || each.type != "velocity_command_t") continue;
+      const std::lock_guard lock(mutex_);
+      channel_ = each.name;  // another one with --remap
+    }
     if (next_part_ != info.nparts) return;
     is_there_ = found_;
     if (!found_) has_left_ = true;
   }
   bool is_there() const { return is_there_; }
+  std::string channel() const {
+    const std::lock_guard lock(mutex_);
+    return channel_;
+  }
   // Whether it was not there at some time since the last call: what is there now is another one.
   bool has_left() { return has_left_.exchange(false); }
 
@@ -174,13 +184,15 @@ class Presence {
   int next_part_ = 0;
   bool found_ = false;  // in the parts so far
   std::atomic<bool> is_there_{true}, has_left_{false};
+  mutable std::mutex mutex_;
+  std::string channel_;
 };
 
 // One robot's speed; at the end, whatever the reason, it stands.
 class Driver {
  public:
   Driver(const std::string& robot, bus::LcmBus& bus, Presence& presence)
-      : robot_(robot), channel_(robot + "/velocity"), bus_(bus), presence_(presence) {}
+      : robot_(robot), bus_(bus), presence_(presence) {}
   ~Driver() { stop(); }
 
   void stop() {
@@ -221,10 +233,10 @@ class Driver {
   void send() {
     uint8_t bytes[64];
     const int size = command_.encode(bytes, 0, sizeof bytes);
-    bus_.publish(channel_, bytes, static_cast<size_t>(size));
+    bus_.publish(presence_.channel(), bytes, static_cast<size_t>(size));
   }
 
-  std::string robot_, channel_;
+  std::string robot_;
   bus::LcmBus& bus_;
   Presence& presence_;
   velocity_command_t command_{};

@@ -70,8 +70,9 @@ struct Value {
 
   std::string_view text() const { return trimmed(element.text); }
 
+  template <class Error = InputError>
   [[noreturn]] void refuse(const std::string& why, std::string_view value) const {
-    throw InputError(element.source, "<" + path() + ">: " + quoted(value) + " " + why);
+    throw Error(element.source, "<" + path() + ">: " + quoted(value) + " " + why);
   }
   [[noreturn]] void refuse(const std::string& why) const { refuse(why, text()); }
 };
@@ -98,12 +99,12 @@ double number_of(const Value& where, std::string_view text, const Allowed& allow
   double value = 0.0;
   switch (read_number(text, value)) {
     case Reading::good: break;
-    case Reading::too_large: where.refuse("is too large for a number", text);
+    case Reading::too_large: where.refuse<NotFinite>("is too large for a number", text);
     case Reading::not_a_number:
       where.refuse("is not a number; allowed is " + described(allowed, "a number"), text);
   }
   if (std::isnan(value) || (std::isinf(value) && !allowed.infinite)) {
-    where.refuse("is not finite; allowed is " + described(allowed, "a number"), text);
+    where.refuse<NotFinite>("is not finite; allowed is " + described(allowed, "a number"), text);
   }
   if (value < allowed.min || value > allowed.max ||
       (allowed.min_excluded && value <= allowed.min)) {

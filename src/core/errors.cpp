@@ -19,4 +19,11 @@ void Findings::add(Finding finding) {
   if (seen_.insert(std::move(key)).second) list_.push_back(std::move(finding));
 }
 
+void Findings::error(const InputError& caught, const std::string& element,
+                     const std::string& text) {
+  const auto* not_finite = dynamic_cast<const NotFinite*>(&caught);
+  if (refuses_not_finite_ && not_finite) throw NotFinite(*not_finite);
+  error(caught.source(), element, text);
+}
+
 }  // namespace ruedo

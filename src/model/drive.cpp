@@ -610,7 +610,7 @@ void find_drive(const Element& model_element, const std::vector<const Element*>&
       return;
     } catch (const InputError& error) {
       context.findings.error(
-          error.source(), where,
+          error, where,
           "the controller " + controllers.controller + " cannot be used: " + error.message());
     }
   }
@@ -647,7 +647,7 @@ void take_drive(const Element& plugin, const std::shared_ptr<const Element>& odo
         read_drive(std::move(translated), odometry ? odometry : std::move(of_plugin), model);
     model.drive->belts = belts_from_plugin(plugin, model);
   } catch (const InputError& error) {
-    findings.error(error.source(), where, "the drive plugin cannot be used: " + error.message());
+    findings.error(error, where, "the drive plugin cannot be used: " + error.message());
   }
 }
 

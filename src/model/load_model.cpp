@@ -16,21 +16,10 @@ std::string path_of_text(const std::string& world_file) {
   return (fs::path(world_file).parent_path() / "the text").string();
 }
 
-// What such a number belongs to was left out, which a client would never hear of.
-void refuse_what_is_not_finite(const std::vector<Finding>& findings) {
-  const auto says = [](const Finding& finding, const char* words) {  // as_number()'s
-    return finding.text.find(words) != std::string::npos;
-  };
-  for (const Finding& each : findings) {
-    if (each.kind == Finding::Kind::error &&
-        (says(each, "' is not finite; ") || says(each, "' is too large for a number; ")))
-      throw InputError(each.source, each.text.substr(0, each.text.rfind("; ")));
-  }
-}
-
 LoadedModel read(const std::string& path, const std::string& world_file,
                  std::shared_ptr<const Element> document, LoadBudget* budget) {
   Findings findings;
+  if (document) findings.refuse_what_is_not_finite();  // a client would not hear of a finding
   const ResourceFinder resources = ResourceFinder::for_strangers(world_file);
   DocumentStore documents;
   MeshImport import;
@@ -87,7 +76,6 @@ LoadedModel load_model_text(const std::string& text, const std::string& world_fi
   try {
     std::shared_ptr<const Element> document = parse_document(text, path);
     LoadedModel loaded = read(path, world_file, std::move(document), budget);
-    refuse_what_is_not_finite(loaded.findings);
     std::erase(loaded.files_read, path);
     for (Finding& each : loaded.findings) {
       if (each.source.file == path) each.source.file = "the text";

@@ -58,7 +58,7 @@ bool read_or_leave_out(const std::string& where, const std::string& what, Findin
   } catch (const InputError& error) {
     const std::string element = error.message().substr(0, error.message().find('>'));
     if (element.find("ruedo:") != std::string::npos || is_option(error.source())) throw;
-    findings.error(error.source(), where, error.message() + "; " + what);
+    findings.error(error, where, error.message() + "; " + what);
     return false;
   }
 }

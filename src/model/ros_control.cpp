@@ -248,6 +248,9 @@ struct Report {
   void error(const Source& source, const std::string& text) const {
     if (is_named) findings.error(source, where, text);
   }
+  void error(const InputError& caught, const std::string& text) const {
+    if (is_named) findings.error(caught, where, text);
+  }
 };
 
 void name_zeros(const Translation& translation, const Report& report) {
@@ -298,7 +301,7 @@ std::optional<double> rate_of(const Element& written, const std::string& where,
               shown(near));
     return near;
   } catch (const InputError& error) {
-    findings.error(error.source(), where, error.message() + "; odometry has its usual rate");
+    findings.error(error, where, error.message() + "; odometry has its usual rate");
     return std::nullopt;
   }
 }
@@ -448,7 +451,7 @@ ControllersDrive drive_from_controllers(const Element& model_element,
         result.drive = drive_of(each, model, report);
         if (result.drive) name_what_has_no_effect(each, where, context.findings);
       } catch (const InputError& error) {
-        report.error(error.source(), "controller '" + each.name + "': " + error.message());
+        report.error(error, "controller '" + each.name + "': " + error.message());
         result.drive.reset();
       }
       if (!result.drive) continue;

@@ -288,7 +288,7 @@ std::vector<std::shared_ptr<const Element>> read_controllers(const std::vector<s
     try {
       if (auto file = context.controllers.read(path, named)) files.push_back(std::move(file));
     } catch (const InputError& error) {  // a neighbouring file may be anything
-      if (named) context.findings.error(error.source(), where, error.message());
+      if (named) context.findings.error(error, where, error.message());
     }
   }
   if (!named) return files;

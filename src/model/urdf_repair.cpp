@@ -29,6 +29,19 @@ int count_of_numbers(const std::string& text) {
   return values ? static_cast<int>(values->size()) : -1;
 }
 
+// "nan", "1e999" and their like, which count as no numbers above.
+bool holds_what_is_not_finite(const std::string& text) {
+  Element written;
+  written.text = text;
+  try {
+    written.as_numbers({});
+  } catch (const NotFinite&) {
+    return true;
+  } catch (const InputError&) {  // words
+  }
+  return false;
+}
+
 std::string name_of(const Element& element) {
   const std::string* name = element.attribute("name");
   return name ? *name : "";
@@ -60,6 +73,15 @@ class Repair {
   }
 
  private:
+  // value: what is wrong, as written.
+  void error(const Source& source, const std::string& where, const std::string& value,
+             const std::string& text) {
+    if (holds_what_is_not_finite(value))
+      findings_.error(NotFinite(source, text), where, text);
+    else
+      findings_.error(source, where, text);
+  }
+
   // Removes the elements for which `odd` returns a reason, and reports them.
   template <typename Odd>
   void leave_out(const Odd& odd) {
@@ -100,8 +122,9 @@ class Repair {
         findings_.repaired(element.source, where, written + "; its commas are taken for blanks");
         value = blanks;
       } else {
-        value = element.name == "axis" ? "1 0 0" : "0 0 0";
-        findings_.error(element.source, where, written + "; " + value + " is taken");
+        const std::string instead = element.name == "axis" ? "1 0 0" : "0 0 0";
+        error(element.source, where, value, written + "; " + instead + " is taken");
+        value = instead;
       }
     }
   }
@@ -113,15 +136,16 @@ class Repair {
                                                      "safety_controller", "calibration"};
     std::erase_if(joint.children, [&](const auto& child) {
       if (kOfNumbers.count(child->name) == 0) return false;
-      std::string reason;
+      std::string reason, wrong;
       for (const auto& [attribute, value] : child->attributes) {
-        if (attribute != "joint" && count_of_numbers(value) != 1)
-          reason = attribute + "=\"" + value + "\" is not a number";
+        if (attribute == "joint" || count_of_numbers(value) == 1) continue;
+        reason = attribute + "=\"" + value + "\" is not a number";
+        wrong = value;
       }
       if (child->name == "mimic" && !child->attribute("joint")) reason = "it names no joint";
       if (reason.empty()) return false;
-      findings_.error(child->source, "joint " + name_of(joint),
-                      "<" + child->name + ">: " + reason + "; it is left out");
+      error(child->source, "joint " + name_of(joint), wrong,
+            "<" + child->name + ">: " + reason + "; it is left out");
       return true;
     });
   }
@@ -166,7 +190,7 @@ class Repair {
         findings_.repaired(element.source, where, written + "; it is opaque");
         v.push_back(1.0);
       } else if (v.size() != 4) {
-        findings_.error(element.source, where, written + "; it is grey instead");
+        error(element.source, where, value, written + "; it is grey instead");
         v = {0.7, 0.7, 0.7, 1.0};
       }
       value.clear();

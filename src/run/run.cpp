@@ -71,7 +71,6 @@ Run::Run(std::shared_ptr<const model::WorldModel> world, RunOptions options, Bus
   }
   make_world();
   channels_.check_remaps();
-  // Last: what is refused leaves the log of an earlier run as it is.
   if (!options_.record.empty())
     log_ = std::make_unique<LogSink>(options_.record, options_.record_limit);
   add_sinks();
@@ -80,14 +79,20 @@ Run::Run(std::shared_ptr<const model::WorldModel> world, RunOptions options, Bus
         log::make_log_header(*world_, options_.simulation.fleet.seed, options_.result_options);
     header_made_ = true;
     header_.epoch = epoch_;
-    publisher_.record(kHeaderChannel, header_);
-    if (journal_) journal_->begin(header_, 0);
   }
   if (repeating_ && !options_.end_with_repeat)
     log::check_same_run(repeating_->header(), header_, options_.repeat);
 }
 
 Run::~Run() { bus_.stop(); }
+
+// Not before run(): who refuses the run until then leaves the log of an earlier one as it is.
+void Run::begin_log() {
+  if (!header_made_) return;
+  if (log_) log_->begin();
+  publisher_.record(kHeaderChannel, header_);
+  if (journal_) journal_->begin(header_, 0);
+}
 
 // The mode keeps messages for clients before the tick says that they were sent.
 void Run::add_sinks() {
@@ -136,6 +141,7 @@ void Run::run() {
   bus_sink_.listen([this](const std::string& channel, const uint8_t* data, size_t size) {
     receive(channel, data, size);
   });
+  begin_log();
   tell_readers();
   begin_with_state();
   simulation_->start(*pacer_);

@@ -106,6 +106,8 @@ class Run {
   const engine::Channels& channels() const { return channels_; }
   // What clients are told of the world; valid until models come or go.
   const std::vector<world_info_t>& info() const { return publisher_.announcement().info; }
+  // What a log of this run begins with; empty where nothing records, watches or repeats it.
+  const log_header_t& log_header() const { return header_; }
   const Findings& findings() const { return findings_; }
   // The world as it is now: another object when models have come or gone. Any thread.
   std::shared_ptr<const model::WorldModel> world() {
@@ -134,6 +136,7 @@ class Run {
 
   // The loop; in run.cpp.
   void add_sinks();
+  void begin_log();
   Control::Host control_host();
   void publish_what_is_ready();
   void publish(const engine::Batch& batch);

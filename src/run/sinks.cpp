@@ -35,11 +35,11 @@ LogSink::LogSink(const std::string& path, int64_t limit)
       queue_(file_,
              {.thread = "log", .when_full = QueuedSink::WhenFull::wait, .latency = kLogLatency}) {}
 
-LogSink::File::File(const std::string& path, int64_t limit) : path_(path) {
-  if (limit > 0)
-    ring_ = std::make_unique<log::Ring>(path, limit);
+void LogSink::File::begin() {
+  if (limit_ > 0)
+    ring_ = std::make_unique<log::Ring>(path_, limit_);
   else
-    writer_ = std::make_unique<log::Writer>(path);
+    writer_ = std::make_unique<log::Writer>(path_);
 }
 
 void LogSink::File::message(const Published& message) {

@@ -43,9 +43,11 @@ class BusSink : public Sink {
 // it: a log is whole.
 class LogSink : public Sink {
  public:
-  // Throws EnvironmentError when the file cannot be created.
   // limit: bytes of all files of a ring (log/ring.h); 0: one file without a limit.
   LogSink(const std::string& path, int64_t limit);
+  // Makes the file, or empties that of an earlier run; before any message. Throws EnvironmentError
+  // when that fails.
+  void begin() { file_.begin(); }
 
   Hears hears() const override { return queue_.hears(); }
   void begin_step(const Step& step) override { queue_.begin_step(step); }
@@ -63,7 +65,8 @@ class LogSink : public Sink {
  private:
   class File : public Sink {
    public:
-    File(const std::string& path, int64_t limit);
+    File(const std::string& path, int64_t limit) : path_(path), limit_(limit) {}
+    void begin();
     Hears hears() const override { return {.samples = true, .records = true, .repeated = true}; }
     void begin_step(const Step&) override { step_begins_ = true; }
     void message(const Published& message) override;
@@ -72,10 +75,11 @@ class LogSink : public Sink {
     const std::string& path() const { return path_; }
 
    private:
-    std::unique_ptr<log::Writer> writer_;  // one of the two
+    std::unique_ptr<log::Writer> writer_;  // one of the two, from begin() on
     std::unique_ptr<log::Ring> ring_;
     bool step_begins_ = false, told_ = false, told_unfollowed_ = false;
     const std::string path_;
+    const int64_t limit_;
     mutable std::mutex mutex_;
     std::string error_;
   };

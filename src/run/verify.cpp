@@ -88,7 +88,9 @@ class Verifier::Impl {
     return verdict_;
   }
 
-  log_header_t log_header, header;
+  const log_header_t& header() const { return server_->log_header(); }
+
+  log_header_t log_header;
   std::vector<std::string> differences;
 
  private:
@@ -121,10 +123,6 @@ class Verifier::Impl {
   }
 
   void see(SimTime stamp, const std::string& channel, const uint8_t* data, size_t size) {
-    if (channel == kHeaderChannel) {
-      decode_checked(data, size, header);
-      return;
-    }
     if (stamp < last_stamp_ || verdict_.difference || !is_compared(channel)) return;
     if (progress_) progress_->to(log_.offset());
     if (channel == kStateHashChannel) note_epoch(stamp, data, size);
@@ -194,14 +192,14 @@ Verifier::Verifier(const std::string& log, std::shared_ptr<const model::WorldMod
                    RunOptions options)
     : impl_(std::make_unique<Impl>(log, std::move(world), std::move(options))), log_(log) {
   impl_->log_header = read_header(log);
-  impl_->differences = log::machine_differences(impl_->log_header, impl_->header);
+  impl_->differences = log::machine_differences(impl_->log_header, impl_->header());
 }
 
 Verifier::~Verifier() = default;
 
 const std::vector<std::string>& Verifier::machine_differences() const { return impl_->differences; }
 void Verifier::check_same_run() const {
-  log::check_same_run(impl_->log_header, impl_->header, log_);
+  log::check_same_run(impl_->log_header, impl_->header(), log_);
 }
 Verification Verifier::run() { return impl_->run(); }
 

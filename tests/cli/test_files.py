@@ -198,6 +198,9 @@ def test_a_thousand_robots_load_at_once(tmp_path):
         ("--foxglove", "banana"),
         ("--foxglove", "1.2.3.4:8765"),
         ("--ros2", "nosuch"),
+        ("--ros2", "--remap", "/nosuch=/b"),
+        ("--ros2", "--wait-for", "/nosuch@10"),
+        ("--view", "127.0.0.1:18765", "--foxglove", "127.0.0.1:18765"),
     ],
 )
 @pytest.mark.parametrize("ring", [(), ("--record-limit", "16MB")])

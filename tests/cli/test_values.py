@@ -266,3 +266,25 @@ def test_regress_takes_nothing_that_does_nothing(options, text, tmp_path):
     )
     assert done.returncode == 2 and text in done.stderr, done.stderr
     assert not (tmp_path / "a.lcm").exists()  # told before the run, which may take hours
+
+
+@pytest.mark.parametrize(
+    "option, other",
+    [
+        ("--lease 3", "--lockstep"),
+        ("--lease-policy drop", "--lockstep"),
+        ("--ros2-clock 10", "--ros2"),
+        ("--ros2-services fastrtps", "--ros2"),
+    ],
+)
+def test_run_takes_nothing_that_does_nothing(option, other, tmp_path):
+    (tmp_path / "w.sdf").write_text(in_link("<sensor name='s' type='imu'/>"))
+    done = subprocess.run(
+        [RUEDO, "run", "w.sdf", "--lcm", "memq://", "--duration", "0", *option.split()],
+        capture_output=True,
+        text=True,
+        cwd=tmp_path,
+        timeout=60,
+    )
+    assert done.returncode == 2, done
+    assert f"{option.split()[0]} requires {other}" in done.stderr, done

@@ -287,14 +287,14 @@ class Teleop:
 
 
 class Commands:
-    """What is published on p3at/velocity."""
+    """What is published on p3at/velocity, or another channel."""
 
-    def __init__(self):
+    def __init__(self, channel="p3at/velocity"):
         from ruedo.lcmtypes import velocity_command_t
 
         self.bus, self.found = lcm.LCM(URL), []
         self.bus.subscribe(
-            "p3at/velocity",
+            channel,
             lambda channel, data: self.found.append(
                 (c := velocity_command_t.decode(data), round(c.vx, 6), round(c.omega, 6))[1:]
             ),
@@ -332,9 +332,10 @@ def test_teleop_drives_as_keys_are_pressed():
         assert teleop.process.wait(PATIENCE) == 0 and teleop.is_as_before()
 
 
-def publish_info(*parts):
-    """ruedo/info, each part of it with the robots of these names."""
-    from ruedo.lcmtypes import robot_info_t, world_info_t
+def publish_info(*parts, channels=()):
+    """ruedo/info, each part of it with the robots of these names; in the last one these channels
+    for velocities, as (robot, name)."""
+    from ruedo.lcmtypes import channel_info_t, robot_info_t, world_info_t
 
     bus = lcm.LCM(URL)
     for number, names in enumerate(parts):
@@ -343,6 +344,12 @@ def publish_info(*parts):
         for name in names:
             info.robots.append(robot_info_t())
             info.robots[-1].name = name
+        for robot, name in channels if number == len(parts) - 1 else ():
+            channel = channel_info_t()
+            channel.robot, channel.name, channel.input = robot, name, True
+            channel.type = "velocity_command_t"
+            info.channels.append(channel)
+        info.nchannels = len(info.channels)
         bus.publish("ruedo/info", info.encode())
 
 
@@ -364,6 +371,21 @@ def test_teleop_drives_no_other_robot_of_the_name_before_a_key():
         commands.until(teleop, (0.1, 0))
         late = commands.found[before:]
         assert set(late[late.index((0, 0)) :]) == {(0, 0), (0.1, 0)}
+
+
+def test_teleop_drives_on_the_channel_that_the_robot_listens_to():
+    """Another one with --remap."""
+    usual, commands = Commands(), Commands("cart/cmd_vel")
+    with Teleop() as teleop:
+        usual.until(teleop, (0, 0))
+        publish_info(
+            ["alice"],
+            ["p3at"],
+            channels=[("alice", "alice/velocity"), ("p3at", "cart/cmd_vel"), ("bob", "bob/v")],
+        )
+        commands.until(teleop, (0, 0))
+        teleop.press(b"w")
+        commands.until(teleop, (0.1, 0))
 
 
 def test_teleop_takes_keys_in_whatever_pieces_they_come():

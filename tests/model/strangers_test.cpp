@@ -125,6 +125,24 @@ TEST(Strangers, GiveFiniteNumbers) {
   EXPECT_NO_THROW(spawned("much"));  // left out, and told in the server's log
 }
 
+TEST(Strangers, GiveFiniteNumbersInUrdf) {
+  const std::string fine =
+      "<robot name='r'><link name='a'/><link name='b'/><joint name='j' type='prismatic'>"
+      "<parent link='a'/><child link='b'/><origin xyz='0 0 1' rpy='0 0 0'/><axis xyz='1 0 0'/>"
+      "<limit lower='-2' upper='3' effort='4' velocity='5'/></joint></robot>";
+  EXPECT_NO_THROW(load_model_text(fine, "/nowhere/w.sdf"));
+  for (const char* where : {"0 0 1", "0 0 0", "1 0 0", "-2", "3", "4", "5"}) {
+    for (const char* number : {"nan", "-inf", "1e999"}) {
+      std::string wrong = fine;
+      const std::string value = "'" + std::string(where) + "'";
+      std::string instead = value;
+      instead.replace(1, instead.find_first_of(" '", 1) - 1, number);
+      wrong.replace(wrong.find(value), value.size(), instead);
+      EXPECT_THROW(load_model_text(wrong, "/nowhere/w.sdf"), InputError) << wrong;
+    }
+  }
+}
+
 TEST(Names, ThatTwoModelsShareAreFound) {
   const auto model = [](std::vector<std::string> links) {
     auto made = std::make_shared<Model>();
