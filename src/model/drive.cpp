@@ -642,9 +642,8 @@ void take_drive(const Element& plugin, const std::shared_ptr<const Element>& odo
     if (!translated) return;
     if (model.drive)
       return findings.unsupported(plugin.source, where, "a second drive; the first one is used");
-    std::shared_ptr<const Element> of_plugin = odometry_from_plugin(plugin, where, findings);
-    model.drive =
-        read_drive(std::move(translated), odometry ? odometry : std::move(of_plugin), model);
+    const std::shared_ptr<const Element> of_plugin = odometry_from_plugin(plugin, where, findings);
+    model.drive = read_drive(std::move(translated), odometry ? odometry : of_plugin, model);
     model.drive->belts = belts_from_plugin(plugin, model);
   } catch (const InputError& error) {
     findings.error(error, where, "the drive plugin cannot be used: " + error.message());

@@ -8,6 +8,8 @@
 #include <sstream>
 #include <vector>
 
+#include <fmt/format.h>
+
 #include "model/read_context.h"
 
 namespace ruedo::model {
@@ -37,7 +39,8 @@ bool holds_what_is_not_finite(const std::string& text) {
     written.as_numbers({});
   } catch (const NotFinite&) {
     return true;
-  } catch (const InputError&) {  // words
+  } catch (const InputError&) {
+    return false;  // words
   }
   return false;
 }
@@ -115,7 +118,7 @@ class Repair {
     for (auto& [attribute, value] : element.attributes) {
       if ((attribute != "xyz" && attribute != "rpy") || count_of_numbers(value) == 3) continue;
       const std::string written =
-          attribute + "=\"" + value + "\" of <" + element.name + "> is not three numbers";
+          fmt::format("{}=\"{}\" of <{}> is not three numbers", attribute, value, element.name);
       std::string blanks = value;
       std::replace(blanks.begin(), blanks.end(), ',', ' ');
       if (count_of_numbers(blanks) == 3) {
@@ -123,7 +126,7 @@ class Repair {
         value = blanks;
       } else {
         const std::string instead = element.name == "axis" ? "1 0 0" : "0 0 0";
-        error(element.source, where, value, written + "; " + instead + " is taken");
+        error(element.source, where, value, fmt::format("{}; {} is taken", written, instead));
         value = instead;
       }
     }
@@ -139,7 +142,7 @@ class Repair {
       std::string reason, wrong;
       for (const auto& [attribute, value] : child->attributes) {
         if (attribute == "joint" || count_of_numbers(value) == 1) continue;
-        reason = attribute + "=\"" + value + "\" is not a number";
+        reason = fmt::format("{}=\"{}\" is not a number", attribute, value);
         wrong = value;
       }
       if (child->name == "mimic" && !child->attribute("joint")) reason = "it names no joint";
@@ -166,8 +169,9 @@ class Repair {
         const auto number = attribute == each.attribute ? numbers_in(value) : std::nullopt;
         if (!number || number->size() != 1 || !(number->front() < 0.0)) continue;
         findings_.error(of->source, "joint " + name_of(joint),
-                        attribute + "=\"" + value + "\" of <" + of->name +
-                            "> is not allowed; allowed is a number of at least 0; " + each.text);
+                        fmt::format("{}=\"{}\" of <{}> is not allowed; allowed is a number of at "
+                                    "least 0; {}",
+                                    attribute, value, of->name, each.text));
         value = each.instead;
       }
     }
