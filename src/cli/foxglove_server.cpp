@@ -338,6 +338,7 @@ class LiveFoxglove : public FoxgloveServer, public run::Sink, private FoxgloveOu
                           .most_sockets = kMostViewers},
         std::move(handler));
     rest_ = fmt::format(":{}/{}", web_->port(), token.empty() ? "" : "?token=" + token);
+    find_inputs(server.channels());  // a viewer may come before the first announcement
     thread_ = std::thread([this] {
       pthread_setname_np(pthread_self(), "foxglove web");
       try {

@@ -107,6 +107,23 @@ def test_channels_have_foxgloves_schemas(run: tuple[list[dict], dict]) -> None:
     assert info["supportedEncodings"] == ["json"]
 
 
+def test_who_comes_at_once_may_drive() -> None:
+    """Before the run's first messages have come this way; what was advertised is told by what is
+    complained of first."""
+    wish = {"id": 1, "topic": "/cmd_vel", "encoding": "json"}
+    for _ in range(10):
+        with serving("--disable", "p3at/camera") as (_, url):
+            port = int(url.removesuffix("/").split(":")[-1])
+            viewer = Socket(port, path="/", **{"Sec-WebSocket-Protocol": "foxglove.sdk.v1"})
+            viewer.send(json.dumps({"op": "advertise", "channels": [wish]}).encode(), 1)
+            viewer.send(struct.pack("<BI", 1, 7))
+            told: dict = {}
+            while told.get("op") != "status":
+                opcode, data = viewer.receive()
+                told = json.loads(data) if opcode == 1 else {}
+            assert told["message"] == "no channel 7 was advertised"
+
+
 def test_a_twist_drives_the_only_robot(run: tuple[list[dict], dict]) -> None:
     lines, _ = run
     poses = [
