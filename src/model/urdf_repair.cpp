@@ -78,9 +78,10 @@ class Repair {
  private:
   // value: what is wrong, as written.
   void error(const Source& source, const std::string& where, const std::string& value,
-             const std::string& text) {
+             const std::string& fault, const std::string& instead) {
+    const std::string text = fault + "; " + instead;
     if (holds_what_is_not_finite(value))
-      findings_.error(NotFinite(source, text), where, text);
+      findings_.error(NotFinite(source, fault), where, text);
     else
       findings_.error(source, where, text);
   }
@@ -126,7 +127,7 @@ class Repair {
         value = blanks;
       } else {
         const std::string instead = element.name == "axis" ? "1 0 0" : "0 0 0";
-        error(element.source, where, value, fmt::format("{}; {} is taken", written, instead));
+        error(element.source, where, value, written, instead + " is taken");
         value = instead;
       }
     }
@@ -148,7 +149,7 @@ class Repair {
       if (child->name == "mimic" && !child->attribute("joint")) reason = "it names no joint";
       if (reason.empty()) return false;
       error(child->source, "joint " + name_of(joint), wrong,
-            "<" + child->name + ">: " + reason + "; it is left out");
+            fmt::format("<{}>: {}", child->name, reason), "it is left out");
       return true;
     });
   }
@@ -194,7 +195,7 @@ class Repair {
         findings_.repaired(element.source, where, written + "; it is opaque");
         v.push_back(1.0);
       } else if (v.size() != 4) {
-        error(element.source, where, value, written + "; it is grey instead");
+        error(element.source, where, value, written, "it is grey instead");
         v = {0.7, 0.7, 0.7, 1.0};
       }
       value.clear();

@@ -237,6 +237,14 @@ def test_what_is_no_number_is_named(words, value, tmp_path):
     assert option in done.stderr and value in done.stderr, done
 
 
+def of_a_sensor(words, folder):
+    """A command with a world of one sensor, w.sdf."""
+    (folder / "w.sdf").write_text(in_link("<sensor name='s' type='imu'/>"))
+    return subprocess.run(
+        [RUEDO, *words.split()], capture_output=True, text=True, cwd=folder, timeout=60
+    )
+
+
 @pytest.mark.parametrize(
     "options, text",
     [
@@ -256,14 +264,7 @@ def test_what_is_no_number_is_named(words, value, tmp_path):
     ],
 )
 def test_regress_takes_nothing_that_does_nothing(options, text, tmp_path):
-    (tmp_path / "w.sdf").write_text(in_link("<sensor name='s' type='imu'/>"))
-    done = subprocess.run(
-        [RUEDO, "regress", "w.sdf", "--record", "a.lcm", "--duration", "0.1", *options.split()],
-        capture_output=True,
-        text=True,
-        cwd=tmp_path,
-        timeout=60,
-    )
+    done = of_a_sensor(f"regress w.sdf --record a.lcm --duration 0.1 {options}", tmp_path)
     assert done.returncode == 2 and text in done.stderr, done.stderr
     assert not (tmp_path / "a.lcm").exists()  # told before the run, which may take hours
 
@@ -278,13 +279,6 @@ def test_regress_takes_nothing_that_does_nothing(options, text, tmp_path):
     ],
 )
 def test_run_takes_nothing_that_does_nothing(option, other, tmp_path):
-    (tmp_path / "w.sdf").write_text(in_link("<sensor name='s' type='imu'/>"))
-    done = subprocess.run(
-        [RUEDO, "run", "w.sdf", "--lcm", "memq://", "--duration", "0", *option.split()],
-        capture_output=True,
-        text=True,
-        cwd=tmp_path,
-        timeout=60,
-    )
+    done = of_a_sensor(f"run w.sdf --lcm memq:// --duration 0 {option}", tmp_path)
     assert done.returncode == 2, done
     assert f"{option.split()[0]} requires {other}" in done.stderr, done
