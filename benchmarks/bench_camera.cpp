@@ -7,10 +7,10 @@
 
 #include <benchmark/benchmark.h>
 
-#include "model/codecs.h"
-#include "model/load.h"
 #include "scene/render_scene.h"
 #include "sensors/pixel_noise.h"
+#include "world/load.h"
+#include "world/mesh/codecs.h"
 
 namespace {
 

@@ -11,8 +11,8 @@
 #include <thread>
 #include <vector>
 
-#include "model/load.h"
 #include "scene/render_scene.h"
+#include "world/load.h"
 
 namespace {
 

@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "engine/engine.h"
-#include "model/load.h"
+#include "world/load.h"
 
 namespace {
 

@@ -14,7 +14,7 @@
 
 #include <btBulletCollisionCommon.h>
 
-#include "cli/bare_embree.h"
+#include "bench/bare_embree.h"
 #include "ruedo/random.h"
 #include "scene/ray_scene.h"
 

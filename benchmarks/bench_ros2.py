@@ -169,7 +169,12 @@ def driven(seconds: int, camera: str) -> tuple[float, float]:
         stderr=subprocess.DEVNULL,
     )
     controller = subprocess.Popen(
-        [sys.executable, SOURCE / "tests/ros2/controller.py", str(DOMAIN), str(seconds * 10)],
+        [
+            sys.executable,
+            SOURCE / "tests/bridges/ros2/controller.py",
+            str(DOMAIN),
+            str(seconds * 10),
+        ],
         stdout=subprocess.PIPE,
         text=True,
     )

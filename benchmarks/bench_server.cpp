@@ -6,8 +6,8 @@
 #include <benchmark/benchmark.h>
 
 #include "bus/lcm_bus.h"
-#include "model/load.h"
 #include "run/run.h"
+#include "world/load.h"
 
 namespace {
 

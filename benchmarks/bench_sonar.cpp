@@ -11,10 +11,10 @@
 #include <vector>
 
 #include "engine/fleet.h"
-#include "model/body_layout.h"
-#include "model/load.h"
 #include "ruedo/sensor.h"
 #include "scene/ray_scene.h"
+#include "world/load.h"
+#include "world/model/body_layout.h"
 
 namespace {
 

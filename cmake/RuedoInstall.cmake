@@ -6,7 +6,7 @@ set(package ${CMAKE_INSTALL_LIBDIR}/cmake/ruedo)
 set_target_properties(ruedo ruedo-measure ruedo-import-mesh PROPERTIES INSTALL_RPATH "\$ORIGIN/../${CMAKE_INSTALL_LIBDIR}/ruedo")
 install(TARGETS ruedo ruedo-measure ruedo-import-mesh RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR})
 install(DIRECTORY ${PROJECT_SOURCE_DIR}/worlds DESTINATION ${CMAKE_INSTALL_DATADIR}/ruedo)
-install(FILES ${PROJECT_SOURCE_DIR}/src/model/xacro/expand.py DESTINATION ${CMAKE_INSTALL_DATADIR}/ruedo/xacro)
+install(FILES ${PROJECT_SOURCE_DIR}/src/world/urdf/xacro/expand.py DESTINATION ${CMAKE_INSTALL_DATADIR}/ruedo/xacro)
 install(DIRECTORY ${PROJECT_SOURCE_DIR}/proto DESTINATION ${CMAKE_INSTALL_DATADIR}/ruedo FILES_MATCHING PATTERN "*.lcm")
 
 # LCM, which comes from a wheel and may be missing where the tree is moved to; libraries that call our elementary functions.

@@ -1,4 +1,4 @@
-# One layer of Ruedo: the static library ruedo_<name> of all sources in src/<name>.
+# One layer of Ruedo: the static library ruedo_<name> of all sources below src/<path>/<name>.
 
 add_library(ruedo_flags INTERFACE)
 # The same bytes everywhere: no contraction to FMA, no fast math, no -march=native.
@@ -18,21 +18,23 @@ if(RUEDO_SANITIZE)
   add_link_options(-fsanitize=${RUEDO_SANITIZE})
 endif()
 
-function(ruedo_layer name)
+# ruedo_layer([PATH/]NAME LINK ...): a layer inside another one's folder is declared before it, and is not part of it.
+function(ruedo_layer path)
   cmake_parse_arguments(ARG "" "" "LINK" ${ARGN})
-  file(GLOB sources CONFIGURE_DEPENDS ${CMAKE_CURRENT_SOURCE_DIR}/src/${name}/*.cpp)
+  get_filename_component(name ${path} NAME)
+  file(GLOB_RECURSE sources CONFIGURE_DEPENDS ${CMAKE_CURRENT_SOURCE_DIR}/src/${path}/*.cpp)
   list(FILTER sources EXCLUDE REGEX "_(main|module)\\.cpp$")
-  if(NOT sources)
-    add_library(ruedo_${name} INTERFACE)
-    target_link_libraries(ruedo_${name} INTERFACE ${ARG_LINK})
-    return()
-  endif()
+  get_property(layers GLOBAL PROPERTY RUEDO_LAYERS)
+  foreach(layer ${layers})
+    list(FILTER sources EXCLUDE REGEX "/src/${layer}/")
+  endforeach()
+  set_property(GLOBAL APPEND PROPERTY RUEDO_LAYERS ${path})
   add_library(ruedo_${name} STATIC ${sources})
   target_include_directories(ruedo_${name} PUBLIC ${CMAKE_CURRENT_SOURCE_DIR}/src ${CMAKE_CURRENT_SOURCE_DIR}/include)
   target_link_libraries(ruedo_${name} PUBLIC ${ARG_LINK} PRIVATE ruedo_flags)
 endfunction()
 
-# libruedo_<name>.so of one source file, which the program loads when it needs it (src/core/late_library.h). It lies beside our
+# libruedo_<name>.so of one source file, which the program loads when it needs it (src/system/late_library.h). It lies beside our
 # copies of libraries, where the program looks.
 function(ruedo_late_library name source)
   add_library(ruedo_${name} MODULE ${source})

@@ -25,7 +25,7 @@ foreach(name ${RUEDO_MATH_FUNCTIONS})
   string(APPEND names "${name} ruedo_${name}\n")
 endforeach()
 file(CONFIGURE OUTPUT ${ruedo_math_folder}/names.txt CONTENT "${names}")
-string(REPLACE "atan2 ruedo_atan2\n" "atan2 ruedo_musl_atan2\n" names "${names}")    # ours is better: src/core/math/atan2.cpp
+string(REPLACE "atan2 ruedo_atan2\n" "atan2 ruedo_musl_atan2\n" names "${names}")    # ours is better: src/base/math/atan2.cpp
 file(CONFIGURE OUTPUT ${ruedo_math_folder}/musl_names.txt CONTENT "${names}")
 add_custom_command(OUTPUT ${RUEDO_MATH_OBJECT}
   COMMAND ${CMAKE_LINKER} -r ${wanted} ${RUEDO_MUSL} -o all.o

@@ -6,7 +6,7 @@ set(RUEDO_PLUGIN_HEADERS include/ruedo/decode.h include/ruedo/drive.h include/ru
   include/ruedo/math.h include/ruedo/plugin.h include/ruedo/pose.h include/ruedo/quantity.h include/ruedo/random.h include/ruedo/schema.h include/ruedo/sensor.h
   include/ruedo/sim_time.h include/ruedo/snapshot.h include/ruedo/state_archive.h)
 # Headers of the lower layers, under the names by which sources in this tree include them.
-set(RUEDO_PLUGIN_LAYER_HEADERS model/body_layout.h model/fault.h model/mesh.h model/world_model.h scene/ray_scene.h scene/render_scene.h sensors/noise.h)
+set(RUEDO_PLUGIN_LAYER_HEADERS world/model/body_layout.h world/model/fault.h world/mesh/mesh.h world/model/world_model.h scene/ray_scene.h scene/render_scene.h sensors/noise.h)
 
 set(headers ${RUEDO_PLUGIN_HEADERS})
 foreach(header ${RUEDO_PLUGIN_LAYER_HEADERS})
@@ -18,12 +18,12 @@ add_custom_command(OUTPUT ${RUEDO_PLUGIN_ABI}
   COMMAND ${CMAKE_COMMAND} -DVERSION=${PROJECT_VERSION} "-DHEADERS=${headers}" -DIN=${CMAKE_CURRENT_SOURCE_DIR}/cmake/plugin_abi.h.in -DOUT=${RUEDO_PLUGIN_ABI}
           -P ${CMAKE_CURRENT_SOURCE_DIR}/cmake/PluginAbi.cmake
   DEPENDS ${headers} cmake/plugin_abi.h.in cmake/PluginAbi.cmake VERBATIM)
-target_sources(ruedo_core PRIVATE ${RUEDO_PLUGIN_ABI})
-set_source_files_properties(src/core/plugins.cpp PROPERTIES INCLUDE_DIRECTORIES ${CMAKE_CURRENT_BINARY_DIR}/plugin)
-target_link_libraries(ruedo_core PUBLIC ${CMAKE_DL_LIBS})
+target_sources(ruedo_system PRIVATE ${RUEDO_PLUGIN_ABI})
+set_source_files_properties(src/system/plugins.cpp PROPERTIES INCLUDE_DIRECTORIES ${CMAKE_CURRENT_BINARY_DIR}/plugin)
+target_link_libraries(ruedo_system PUBLIC ${CMAKE_DL_LIBS})
 
-add_library(ruedo_plugin STATIC src/core/element.cpp src/core/errors.cpp src/core/kinds.cpp src/core/math/atan2.cpp src/core/math/c_names.cpp
-  src/core/nearest_word.cpp src/core/quantity.cpp src/core/random.cpp src/core/sim_time.cpp src/core/utf8.cpp src/model/link_in_body.cpp src/sensors/noise.cpp
+add_library(ruedo_plugin STATIC src/base/element.cpp src/base/errors.cpp src/base/kinds.cpp src/base/math/atan2.cpp src/base/math/c_names.cpp
+  src/base/nearest_word.cpp src/base/quantity.cpp src/base/random.cpp src/base/sim_time.cpp src/base/utf8.cpp src/world/model/link_in_body.cpp src/sensors/noise.cpp
   ${RUEDO_MATH_OBJECT} ${RUEDO_PLUGIN_ABI})
 add_library(ruedo::plugin ALIAS ruedo_plugin)
 set_target_properties(ruedo_plugin PROPERTIES EXPORT_NAME plugin CXX_VISIBILITY_PRESET hidden)

@@ -1,6 +1,6 @@
 # The console's page: packages by npm from the lock file, types checked by tsc, bundled by esbuild, and put into the
 # program as a C++ file. npm runs when the lock file has changed and at no other time.
-set(web ${PROJECT_SOURCE_DIR}/clients/web)
+set(web ${PROJECT_SOURCE_DIR}/web)
 set(page ${PROJECT_BINARY_DIR}/web)
 file(MAKE_DIRECTORY ${page}/generated)
 file(CREATE_LINK ${web}/src ${page}/src SYMBOLIC)

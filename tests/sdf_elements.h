@@ -13,8 +13,8 @@
 #include <utility>
 #include <vector>
 
-#include "core/element_watch.h"
-#include "model/load.h"
+#include "base/element_watch.h"
+#include "world/load.h"
 
 namespace ruedo::test {
 

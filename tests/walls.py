@@ -6,9 +6,11 @@ run on small trees that break them.
 """
 
 import ast
+import html
 import os
 import re
 import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -19,26 +21,35 @@ ROOT = Path(__file__).resolve().parents[1]
 LIBRARIES = {
     ("btBullet", "bullet/", "LinearMath/", "BulletCollision/", "BulletDynamics/"): {"physics"},
     ("embree3/", "embree4/", "GL/", "EGL/"): {"scene"},
-    ("tinyxml2", "urdf_", "urdf/", "yaml-cpp/", "assimp/", "sdf/"): {"model"},
+    ("tinyxml2", "urdf_", "urdf/", "yaml-cpp/", "assimp/", "sdf/"): {"world"},
     ("lcm/lcm.h", "lcm/lcm-cpp", "lcm/eventlog"): {"bus"},
-    ("CLI/",): {"cli"},
-    ("libwebsockets",): {"console"},
-    ("dds/dds.h", "dds/ddsi"): {"dds"},
+    ("CLI/",): {"cli", "bench"},
+    ("libwebsockets",): {"http"},
+    ("seccomp",): {"system"},
+    ("dds/dds.h", "dds/ddsi"): {"bridges/dds"},
     ("tbb/", "oneapi/tbb"): {"scene", "sensors", "engine"},
 }
 
 
 def layers(root):
-    """{layer: the layers it may include, itself among them}, from CMakeLists.txt; the command line
-    may include all.
+    """{layer: the layers it may include, itself among them}, from CMakeLists.txt. A layer is a
+    folder below src/, such as "bridges/ros2". The command line may include all of them, and the
+    benchmarks the command line, too, since they are commands.
     """
     text = (root / "CMakeLists.txt").read_text(encoding="utf-8")
     found = {}
-    for name, links in re.findall(r"^\s*ruedo_layer\((\w+)([^)]*)\)", text, re.MULTILINE):
-        below = set(re.findall(r"\bruedo_(\w+)", links)) & set(found)
-        found[name] = {name}.union(*(found[b] for b in below))
+    for path, links in re.findall(r"^\s*ruedo_layer\(([\w/]+)([^)]*)\)", text, re.MULTILINE):
+        linked = set(re.findall(r"\bruedo_(\w+)", links))
+        below = [layer for layer in found if layer.split("/")[-1] in linked]
+        found[path] = {path}.union(*(found[layer] for layer in below))
     found["cli"] = {"cli", *found}
+    found["bench"] = {"bench", *found}
     return found
+
+
+def layer_of(path, known):
+    """The layer of a file below src/: the innermost, where one lies in another; "" for none."""
+    return max((layer for layer in known if path.startswith(layer + "/")), key=len, default="")
 
 
 def includes(path):
@@ -51,6 +62,7 @@ def includes(path):
 
 def broken_walls(root):
     known = layers(root)
+    folders = {layer.split("/")[0] for layer in known}
     problems = []
     for path in sorted(
         p
@@ -59,16 +71,17 @@ def broken_walls(root):
         if p.suffix in (".cpp", ".h")
     ):
         relative = path.relative_to(root)
-        layer = relative.parts[1] if relative.parts[0] == "src" else "include/ruedo"
-        allowed = known.get(layer, set())
-        if layer != "include/ruedo" and not allowed:
+        layer = "include/ruedo"
+        if relative.parts[0] == "src":
+            layer = layer_of(Path(*relative.parts[1:]).as_posix(), known)
+        if not layer:
             problems.append(
-                f"{relative}: layer {layer} has no ruedo_layer() line in CMakeLists.txt"
+                f"{relative}: no layer: its folder has no ruedo_layer() in CMakeLists.txt"
             )
             continue
         for number, name in includes(path):
-            target = name.split("/")[0]
-            if "/" in name and target in known and target not in allowed:
+            ours = "/" in name and name.split("/")[0] in folders
+            if ours and layer_of(name, known) not in known.get(layer, set()):
                 problems.append(f"{relative}:{number}: {layer} may not include {name}")
             for prefixes, homes in LIBRARIES.items():
                 if name.startswith(prefixes) and layer not in homes:
@@ -78,7 +91,7 @@ def broken_walls(root):
     return problems
 
 
-WHOLE = "src/core/whole.h"  # the one way from a floating-point number to a whole one
+WHOLE = "src/base/whole.h"  # the one way from a floating-point number to a whole one
 INTEGER = r"(?:std::)?(?:u?int(?:8|16|32|64)?(?:_t)?|size_t|ptrdiff_t|unsigned(?: int| char)?|(?:unsigned )?long(?: long)?|SimTime|char)"
 FLOATING = re.compile(
     r"\b(?:floor|ceil|round|trunc|sqrt|hypot|a?sin|a?cos|a?tan2?|exp2?|log2?|pow|fmod|norm|M_PI|double|float)\b(?!>)|"
@@ -108,7 +121,7 @@ def without_calls(text):
 
 def bare_conversions(root):
     """Casts of floating-point numbers to whole ones: undefined for what does not fit, which
-    core/whole.h refuses.
+    base/whole.h refuses.
     """
     problems = []
     for path in sorted(
@@ -135,7 +148,7 @@ def bare_conversions(root):
     return problems
 
 
-INPUT = "src/core/input_file.cpp"
+INPUT = "src/base/input_file.cpp"
 OPENED = re.compile(
     r"\bstd::ifstream\b(?!\s+\w+\(\"/proc/)|\bf(?:re)?open\([^;]*\"r|::open\((?:[^;](?!O_DIRECTORY))*O_RDONLY\b(?![^;]*O_DIRECTORY)"
 )
@@ -143,7 +156,7 @@ OF_THE_KERNEL = {"src/bus/datagram_loss.cpp", "src/bus/lcm_url.cpp"}  # what the
 
 
 def bare_reads(root):
-    """Files that are opened to be read elsewhere than in core/input_file.h: a FIFO would stall
+    """Files that are opened to be read elsewhere than in base/input_file.h: a FIFO would stall
     them, a device feed them for ever.
     """
     return [
@@ -155,15 +168,15 @@ def bare_reads(root):
     ]
 
 
-OUTPUT = "src/core/output_file.h"
+OUTPUT = "src/system/output_file.h"
 WRITTEN = re.compile(r"\bstd::ofstream\b|\bfopen\([^;]*\"[wa]")
 # Files that grow piece by piece.
-STREAMED = {"src/cli/bag_log.cpp", "src/cli/mcap_writer.cpp", "src/console/log_page.cpp"}
+STREAMED = {"src/bridges/ros2/bag_log.cpp", "src/log/mcap_writer.cpp", "src/console/log_page.cpp"}
 
 
 def bare_writes(root):
-    """Files that are written elsewhere than in core/output_file.h: a full disk would leave half of
-    one in place of the old one.
+    """Files that are written elsewhere than in system/output_file.h: a full disk would leave half
+    of one in place of the old one.
     """
     return [
         f"{path.relative_to(root)}:{text.count(chr(10), 0, match.start()) + 1}: use {OUTPUT}"
@@ -174,12 +187,12 @@ def bare_writes(root):
     ]
 
 
-ERRORS = "src/cli/to_stderr.h"
+ERRORS = "src/system/to_stderr.h"
 
 
 def bare_errors(root):
-    """Messages that are printed elsewhere than in cli/to_stderr.h: fmt throws where standard error
-    is a file on a full disk, and a command that had its result ends otherwise.
+    """Messages that are printed elsewhere than in system/to_stderr.h: fmt throws where standard
+    error is a file on a full disk, and a command that had its result ends otherwise.
     """
     return [
         f"{path.relative_to(root)}:{text.count(chr(10), 0, match.start()) + 1}: use {ERRORS}"
@@ -313,7 +326,7 @@ def states_left_behind(root):
     return problems
 
 
-WEB = "clients/web/src"
+WEB = "web/src"
 # The layers of the console's page, folders or single files, and what each may import beside itself.
 WEB_LAYERS = {
     "wire": set(),
@@ -410,37 +423,53 @@ def test_tree_keeps(rule):
 
 def test_layers_are_those_of_the_design():
     known = layers(ROOT)
-    assert set(known) == {
-        "core",
-        "model",
+    assert list(known) == [
+        "base",
+        "system",
+        "http",
+        "world",
         "scene",
         "physics",
         "robot",
         "sensors",
+        "engine/judge",
         "engine",
         "log",
-        "judge",
-        "run",
         "bus",
-        "ros2",
-        "dds",
+        "run",
+        "bridges/ros2",
+        "bridges/dds",
+        "bridges/foxglove",
         "console",
+        "report",
         "cli",
-    }
+        "bench",
+    ]
+    assert known["base"] == {"base"} and known["system"] == {"base", "system"}
+    assert known["http"] == {"base", "system", "http"}
     for outsider in ("physics", "engine", "run", "bus", "robot"):
         assert outsider not in known["sensors"]
-    for outsider in (
-        "log",
-        "run",
-        "bus",
-        "console",
-    ):  # one world knows no file, no network and no clock
-        assert outsider not in known["engine"]
+    # One world knows no file, no network and no clock.
+    assert not known["engine"] & {"log", "run", "bus", "http", "console"}
     assert not known["log"] & {"engine", "run", "bus"}
-    assert not known["judge"] & {"engine", "run", "bus", "log"}
-    assert (
-        "run" not in known["bus"] and "scene" not in known["physics"] and known["core"] == {"core"}
-    )
+    assert not known["engine/judge"] & {"engine", "run", "bus", "log", "physics"}
+    assert "run" not in known["bus"] and "scene" not in known["physics"]
+    assert not known["report"] & {"cli", "console", "bus"}
+
+
+def test_the_map_is_that_of_the_layers():
+    sys.path.insert(0, str(ROOT / "scripts"))
+    import draw_layers
+
+    known, texts = layers(ROOT), draw_layers.words(ROOT)
+    assert set(texts) == set(known), f"the table of {draw_layers.PAGE}"
+    picture = (ROOT / draw_layers.PICTURE).read_text(encoding="utf-8")
+    drawn = [html.unescape(one) for one in re.findall(r"<title>(.*?)</title>", picture)]
+    arrows = {f"{layer}->{other}" for layer, other in draw_layers.arrows(known)}
+    assert set(drawn) == {"layers", *known, *arrows}, "run scripts/draw_layers.py"
+    lines = [html.unescape(one) for one in re.findall(r"<text .*?>(.*?)</text>", picture)]
+    for layer, text in texts.items():
+        assert text in " ".join(lines[lines.index(layer) :]), "run scripts/draw_layers.py"
 
 
 # Elementary functions: ours alone, since the C library's depend on the CPU (include/ruedo/math.h).
@@ -482,7 +511,7 @@ def foreign_math(root):
     ):
         if path.relative_to(root).as_posix() in (
             "include/ruedo/math.h",
-            "src/core/math/c_names.cpp",
+            "src/base/math/c_names.cpp",
         ):
             continue
         for number, line in enumerate(path.read_text(encoding="utf-8").splitlines(), 1):
@@ -541,8 +570,10 @@ def test_what_is_built_takes_no_elementary_function_from_outside():
 
 def tree(folder, files):
     (folder / "CMakeLists.txt").write_text(
-        "ruedo_layer(core LINK Eigen3::Eigen)\nruedo_layer(scene LINK ruedo_core)\n"
-        "ruedo_layer(physics LINK ruedo_core)\nruedo_layer(sensors OBJECT LINK ruedo_scene)\n"
+        "ruedo_layer(base LINK Eigen3::Eigen)\nruedo_layer(scene LINK ruedo_base)\n"
+        "ruedo_layer(physics LINK ruedo_base)\nruedo_layer(sensors LINK ruedo_scene)\n"
+        "ruedo_layer(engine/judge LINK ruedo_scene)\nruedo_layer(engine LINK ruedo_physics)\n"
+        "ruedo_layer(bridges/ros2 LINK ruedo_engine)\n"
     )
     for name, text in files.items():
         (folder / name).parent.mkdir(parents=True, exist_ok=True)
@@ -554,7 +585,7 @@ def tree(folder, files):
     "name, include, good",
     [
         ("src/sensors/lrf.cpp", '"scene/ray_scene.h"', True),
-        ("src/sensors/lrf.cpp", '"core/x.h"', True),
+        ("src/sensors/lrf.cpp", '"base/x.h"', True),
         ("src/sensors/lrf.cpp", '"physics/physics_world.h"', False),
         ("src/scene/ray.cpp", '"sensors/lrf.h"', False),
         ("src/scene/ray.cpp", "<embree4/rtcore.h>", True),
@@ -562,9 +593,24 @@ def tree(folder, files):
         ("src/physics/world.cpp", "<btBulletDynamicsCommon.h>", True),
         ("src/scene/ray.cpp", "<btBulletDynamicsCommon.h>", False),
         ("src/cli/main.cpp", '"sensors/lrf.h"', True),
+        ("src/cli/commands/run.cpp", '"bridges/ros2/node.h"', True),
+        ("src/cli/main.cpp", '"bench/bench.h"', False),
+        ("src/bench/bench.cpp", '"cli/support/range.h"', True),
+        ("src/physics/joints/block.cpp", '"physics/base/rows.h"', True),
+        ("src/physics/joints/block.cpp", '"scene/ray_scene.h"', False),
+        ("src/engine/judge/judge.cpp", '"scene/ray_scene.h"', True),
+        ("src/engine/judge/judge.cpp", '"physics/world.h"', False),
+        ("src/engine/judge/judge.cpp", '"engine/world.h"', False),
+        ("src/engine/world.cpp", '"engine/judge/judge.h"', False),
+        ("src/engine/edits/edits.cpp", '"engine/world.h"', True),
+        ("src/bridges/ros2/node.cpp", '"engine/edits/edits.h"', True),
+        ("src/engine/world.cpp", '"bridges/ros2/node.h"', False),
+        ("src/bridges/lost.cpp", '"base/x.h"', False),
+        ("src/bridges/ros2/node.cpp", '"bridges/lost.h"', False),
+        ("src/lost.cpp", '"base/x.h"', False),
         ("include/ruedo/pose.h", "<Eigen/Geometry>", True),
-        ("include/ruedo/pose.h", '"core/x.h"', False),
-        ("src/newlayer/x.cpp", '"core/x.h"', False),
+        ("include/ruedo/pose.h", '"base/x.h"', False),
+        ("src/newlayer/x.cpp", '"base/x.h"', False),
     ],
 )
 def test_walls_are_seen(tmp_path, name, include, good):
@@ -592,7 +638,7 @@ def test_bare_conversions_are_seen(tmp_path, text, good):
         bare_conversions(
             tree(
                 tmp_path,
-                {"src/core/a.cpp": text + "\n", WHOLE: "static_cast<int>(std::floor(x))\n"},
+                {"src/base/a.cpp": text + "\n", WHOLE: "static_cast<int>(std::floor(x))\n"},
             )
         )
         == []
@@ -612,7 +658,7 @@ def test_bare_conversions_are_seen(tmp_path, text, good):
     ],
 )
 def test_bare_reads_are_seen(tmp_path, text, good):
-    assert (bare_reads(tree(tmp_path, {"src/core/a.cpp": text + "\n"})) == []) == good
+    assert (bare_reads(tree(tmp_path, {"src/base/a.cpp": text + "\n"})) == []) == good
 
 
 @pytest.mark.parametrize(
@@ -654,7 +700,7 @@ def test_raw_errors_are_seen(tmp_path, text, good):
     ],
 )
 def test_dangling_ranges_are_seen(tmp_path, text, good):
-    assert (dangling_ranges(tree(tmp_path, {"src/core/a.cpp": text + "\n"})) == []) == good
+    assert (dangling_ranges(tree(tmp_path, {"src/base/a.cpp": text + "\n"})) == []) == good
 
 
 @pytest.mark.parametrize(

@@ -4,7 +4,7 @@
 
 #include <pthread.h>
 
-#include "core/file_handle.h"
+#include "system/file_handle.h"
 
 namespace ruedo::client {
 

@@ -1,4 +1,4 @@
-// Reading logs (core/lcm_log.h): where each message lies is found once, and the messages are read
+// Reading logs (base/lcm_log.h): where each message lies is found once, and the messages are read
 // when asked for.
 #include <array>
 #include <cerrno>
@@ -8,9 +8,9 @@
 #include <map>
 #include <mutex>
 
-#include "core/big_endian.h"
-#include "core/lcm_log.h"
-#include "core/message_size.h"
+#include "base/big_endian.h"
+#include "base/lcm_log.h"
+#include "base/message_size.h"
 #include "sample_types.h"
 
 namespace ruedo::client {

@@ -13,9 +13,9 @@
 #include <string>
 #include <vector>
 
-#include "core/file_handle.h"
 #include "forked.h"
 #include "ruedo/client.h"
+#include "system/file_handle.h"
 
 namespace ruedo::client {
 

@@ -4,8 +4,8 @@
 #include <random>
 #include <stdexcept>
 
+#include "base/utf8.h"
 #include "core.h"
-#include "core/utf8.h"
 #include "ruedo/join_t.hpp"
 #include "ruedo/reply_t.hpp"
 #include "ruedo/request_t.hpp"

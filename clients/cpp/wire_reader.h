@@ -10,8 +10,8 @@
 #include <string>
 #include <vector>
 
-#include "core/big_endian.h"
-#include "core/utf8.h"
+#include "base/big_endian.h"
+#include "base/utf8.h"
 
 namespace ruedo::client {
 

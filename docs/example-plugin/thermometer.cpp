@@ -5,9 +5,9 @@
 #include <ruedo/sensor.h>
 
 #include "example/thermometer_t.hpp"
-#include "model/body_layout.h"
 #include "scene/ray_scene.h"
 #include "sensors/noise.h"
+#include "world/model/body_layout.h"
 
 namespace {
 

@@ -2,7 +2,7 @@
 //
 // The C library's pick other code where a CPU has fused multiply-adds, and change with its
 // versions. These are musl's, linked in, and an arc tangent of two arguments of our own; each is
-// within 1 ulp (tests/core/test_math.cpp holds them to MPFR). What computes a result calls these
+// within 1 ulp (tests/base/test_math.cpp holds them to MPFR). What computes a result calls these
 // and never <cmath>'s; sqrt, fmod, remainder, floor and the like are exact in every library and
 // stay.
 #pragma once

@@ -24,8 +24,8 @@
 #include "bus/lcm_url.h"
 #include "bus/multicast_receiver.h"
 #include "bus/stream_connection.h"
-#include "core/file_handle.h"
 #include "ruedo/bus.h"
+#include "system/file_handle.h"
 
 namespace ruedo::bus {
 

@@ -17,8 +17,8 @@
 #include <sys/socket.h>
 
 #include "bus/unix_socket.h"
-#include "core/file_handle.h"
 #include "ruedo/errors.h"
+#include "system/file_handle.h"
 
 namespace ruedo::bus {
 namespace {

@@ -16,7 +16,7 @@
 #include <netinet/in.h>
 #include <sys/socket.h>
 
-#include "core/big_endian.h"
+#include "base/big_endian.h"
 
 namespace ruedo::bus {
 namespace {

@@ -14,7 +14,7 @@
 #include <string_view>
 #include <vector>
 
-#include "core/file_handle.h"
+#include "system/file_handle.h"
 
 namespace ruedo::bus {
 

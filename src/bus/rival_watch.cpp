@@ -4,9 +4,9 @@
 #include <algorithm>
 #include <optional>
 
-#include "core/big_endian.h"
-#include "core/channel_names.h"
-#include "core/utf8.h"
+#include "base/big_endian.h"
+#include "base/channel_names.h"
+#include "base/utf8.h"
 #include "ruedo/decode.h"
 #include "ruedo/world_info_t.hpp"
 

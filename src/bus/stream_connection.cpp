@@ -7,8 +7,8 @@
 #include <poll.h>
 #include <sys/socket.h>
 
+#include "base/big_endian.h"
 #include "bus/tcpq_wire.h"
-#include "core/big_endian.h"
 
 namespace ruedo::bus {
 namespace {

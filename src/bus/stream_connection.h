@@ -10,7 +10,7 @@
 #include <string_view>
 #include <vector>
 
-#include "core/file_handle.h"
+#include "system/file_handle.h"
 
 namespace ruedo::bus {
 

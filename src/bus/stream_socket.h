@@ -3,7 +3,7 @@
 
 #include <string>
 
-#include "core/file_handle.h"
+#include "system/file_handle.h"
 
 namespace ruedo::bus {
 

@@ -17,8 +17,8 @@
 
 #include <spdlog/spdlog.h>
 
-#include "core/peer_owners.h"
 #include "ruedo/errors.h"
+#include "system/peer_owners.h"
 
 namespace ruedo::bus {
 namespace {

@@ -23,8 +23,8 @@
 #include "bus/lcm_url.h"
 #include "bus/message_ring.h"
 #include "bus/tcpq_wire.h"
-#include "core/file_handle.h"
 #include "ruedo/bus.h"
+#include "system/file_handle.h"
 
 namespace ruedo::bus {
 

@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cctype>
 
-#include "core/big_endian.h"
+#include "base/big_endian.h"
 
 namespace ruedo::bus::tcpq {
 namespace {

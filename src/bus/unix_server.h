@@ -19,9 +19,9 @@
 
 #include "bus/lcm_url.h"
 #include "bus/tcpq_wire.h"
-#include "core/file_handle.h"
-#include "core/leftovers.h"
 #include "ruedo/bus.h"
+#include "system/file_handle.h"
+#include "system/leftovers.h"
 
 namespace ruedo::bus {
 

@@ -9,7 +9,7 @@
 #include <thread>
 
 #include "bus/lcm_url.h"
-#include "core/file_handle.h"
+#include "system/file_handle.h"
 
 namespace ruedo::bus {
 

@@ -22,19 +22,19 @@
 #include <spdlog/sinks/stdout_color_sinks.h>
 #include <spdlog/spdlog.h>
 
-#include "cli/argument_rules.h"
-#include "cli/commands.h"
-#include "cli/progress_line.h"
-#include "cli/to_stderr.h"
-#include "core/installation.h"
-#include "core/leftovers.h"
-#include "core/option_text.h"
-#include "core/utf8.h"
-#include "core/version.h"
+#include "base/option_text.h"
+#include "base/utf8.h"
+#include "base/version.h"
+#include "cli/support/argument_rules.h"
+#include "cli/support/commands.h"
+#include "cli/support/progress_line.h"
 #include "physics/state_check.h"
 #include "ruedo/element.h"
 #include "ruedo/errors.h"
 #include "scene/gl_context.h"
+#include "system/installation.h"
+#include "system/leftovers.h"
+#include "system/to_stderr.h"
 
 namespace {
 
@@ -45,7 +45,7 @@ class LoggedText : public spdlog::custom_flag_formatter {
  public:
   void format(const spdlog::details::log_msg& message, const std::tm&,
               spdlog::memory_buf_t& line) override {
-    const std::string text = one_line(
+    const std::string text = ruedo::one_line(
         ruedo::shortened({message.payload.data(), message.payload.size()}, ruedo::kLongestSaid));
     line.append(text.data(), text.data() + text.size());
   }
@@ -63,7 +63,7 @@ void set_up_logging() {
 
 void say(const std::string& text) {
   const Style style = style_of(stderr);
-  to_stderr("{}{}ruedo: {}{}{}\n", style.bold, style.red, style.off, text, style.off);
+  ruedo::to_stderr("{}{}ruedo: {}{}{}\n", style.bold, style.red, style.off, text, style.off);
 }
 
 // A hint for an unknown argument: the nearest command or option.
@@ -187,7 +187,7 @@ int run(int argc, char** argv) {
       return kGood;
     }
     say(std::string(error.what()) + suggestion(app, argc, argv));
-    to_stderr("Run `ruedo --help`, or `ruedo COMMAND --help`.\n");
+    ruedo::to_stderr("Run `ruedo --help`, or `ruedo COMMAND --help`.\n");
     return kWrongUsage;
   }
   check_limits();

@@ -2,9 +2,9 @@
 // field `part` comes in parts.
 #include "console/board.h"
 
+#include "base/utf8.h"
+#include "base/wire_size.h"
 #include "console/drawn.h"
-#include "core/utf8.h"
-#include "core/wire_size.h"
 #include "ruedo/schema.h"
 
 namespace ruedo::console {

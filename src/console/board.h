@@ -5,20 +5,14 @@
 #pragma once
 
 #include <cstdint>
-#include <memory>
 #include <optional>
 #include <span>
 #include <string>
-#include <string_view>
 #include <vector>
 
+#include "http/bytes.h"
+
 namespace ruedo::console {
-
-using Bytes = std::shared_ptr<const std::vector<uint8_t>>;
-
-inline Bytes bytes_of(std::string_view text) {
-  return std::make_shared<const std::vector<uint8_t>>(text.begin(), text.end());
-}
 
 class Board {
  public:
@@ -27,7 +21,7 @@ class Board {
 
   struct Message {
     uint64_t number;  // counts all messages that reached this board
-    Bytes bytes;
+    http::Bytes bytes;
   };
   struct Channel {
     std::string name;

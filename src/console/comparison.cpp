@@ -8,8 +8,8 @@
 
 #include <pthread.h>
 
-#include "core/json.h"
-#include "core/utf8.h"
+#include "base/json.h"
+#include "base/utf8.h"
 #include "log/diff.h"
 #include "ruedo/decode.h"
 #include "ruedo/math.h"
@@ -244,7 +244,7 @@ std::vector<Comparison::Sample> Comparison::samples(const Robot& robot, size_t m
   return found;
 }
 
-Bytes Comparison::apart(const std::string& name, const std::string& field) {
+http::Bytes Comparison::apart(const std::string& name, const std::string& field) {
   const auto robot = std::find_if(robots_.begin(), robots_.end(),
                                   [&](const Robot& each) { return printable(each.name) == name; });
   if (robot == robots_.end() || (field != "distance" && field != "angle")) return nullptr;

@@ -14,7 +14,7 @@
 
 #include "console/board.h"
 #include "log/index.h"
-#include "run/log_worlds.h"
+#include "run/repeat/log_worlds.h"
 
 namespace ruedo::console {
 
@@ -64,7 +64,7 @@ class Comparison {
 
   // For a robot: time in s and distance in m, or angle in rad, between its poses in the log and in
   // the other run; null unless both have the robot.
-  Bytes apart(const std::string& robot, const std::string& field);
+  http::Bytes apart(const std::string& robot, const std::string& field);
 
   // {"comparison": ...}; "" until it is known.
   std::string report() const;

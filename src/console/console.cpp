@@ -12,25 +12,25 @@
 #include <pthread.h>
 #include <spdlog/spdlog.h>
 
+#include "base/json.h"
+#include "base/utf8.h"
+#include "base/version.h"
 #include "console/assets.h"
 #include "console/library.h"
 #include "console/scene_data.h"
 #include "console/types.h"
 #include "console/viewer.h"
-#include "console/web_server.h"
-#include "core/json.h"
-#include "core/utf8.h"
-#include "core/version.h"
+#include "http/web_server.h"
 
 namespace ruedo::console {
 namespace {
 
 constexpr size_t kKeptScenes = 4;  // of a log: those requested last
 
-HttpResponse not_found() {
-  HttpResponse response;
+http::HttpResponse not_found() {
+  http::HttpResponse response;
   response.status = 404;
-  response.body = bytes_of("There is no such page.\n");
+  response.body = http::bytes_of("There is no such page.\n");
   return response;
 }
 
@@ -60,27 +60,27 @@ struct Console::Impl {
   std::shared_ptr<const model::WorldModel> world;  // the running one, or the log's first
   std::deque<Scene> scenes;                        // newest first
   std::unique_ptr<Library> library;                // null: not requested yet
-  std::map<size_t, Bytes> assets;                  // those that were requested
-  Bytes types;                                     // null: not requested yet
-  std::unique_ptr<WebServer> web;
+  std::map<size_t, http::Bytes> assets;            // those that were requested
+  http::Bytes types;                               // null: not requested yet
+  std::unique_ptr<http::WebServer> web;
   std::thread thread;
   std::mutex words_mutex;
   std::string words = "The server has ended.";
 
-  HttpResponse get(std::string_view path);
-  HttpResponse scene_file(std::string_view path, bool shapes);
-  static HttpResponse file_of(const SceneData& data, std::string_view path);
-  HttpResponse library_file(std::string_view path);
-  HttpResponse history(std::string_view path);
-  HttpResponse model_text(size_t index);
-  static HttpResponse blob(Bytes body, const std::string& type);
+  http::HttpResponse get(std::string_view path);
+  http::HttpResponse scene_file(std::string_view path, bool shapes);
+  static http::HttpResponse file_of(const SceneData& data, std::string_view path);
+  http::HttpResponse library_file(std::string_view path);
+  http::HttpResponse history(std::string_view path);
+  http::HttpResponse model_text(size_t index);
+  static http::HttpResponse blob(http::Bytes body, const std::string& type);
   bool tick();
   Scene* scene(size_t number);
 };
 
-HttpResponse Console::Impl::blob(Bytes body, const std::string& type) {
+http::HttpResponse Console::Impl::blob(http::Bytes body, const std::string& type) {
   if (!body) return not_found();
-  HttpResponse response;
+  http::HttpResponse response;
   response.type = type;
   response.body = std::move(body);
   return response;
@@ -98,21 +98,21 @@ Scene* Console::Impl::scene(size_t number) {
   return &scenes.front();
 }
 
-HttpResponse Console::Impl::get(std::string_view path) {
+http::HttpResponse Console::Impl::get(std::string_view path) {
   for (size_t i = 0; i < kAssetCount; ++i) {
     const Asset& asset = kAssets[i];
     if (path != asset.path) continue;
-    Bytes& body = assets[i];
+    http::Bytes& body = assets[i];
     if (!body)
       body = std::make_shared<const std::vector<uint8_t>>(asset.data, asset.data + asset.size);
-    HttpResponse response = blob(body, asset.type);
+    http::HttpResponse response = blob(body, asset.type);
     response.gzip = true;
     return response;
   }
   constexpr std::string_view kHistory = "/history/";
   if (path.starts_with(kHistory)) return history(path.substr(kHistory.size()));
   if (path == "/types.json") {
-    if (!types) types = bytes_of(types_json());
+    if (!types) types = http::bytes_of(types_json());
     return blob(types, "application/json");
   }
   if (path.starts_with("/library"))
@@ -125,7 +125,7 @@ HttpResponse Console::Impl::get(std::string_view path) {
 }
 
 // "FIELD/CHANNEL": channel names contain slashes.
-HttpResponse Console::Impl::history(std::string_view path) {
+http::HttpResponse Console::Impl::history(std::string_view path) {
   const size_t slash = path.find('/');
   if (slash == std::string_view::npos) return not_found();
   return blob(stage.source->history(std::string(path.substr(slash + 1)),
@@ -134,7 +134,7 @@ HttpResponse Console::Impl::history(std::string_view path) {
 }
 
 // A file of a scene; for a log, its number comes first, as in "/3.json".
-HttpResponse Console::Impl::scene_file(std::string_view path, bool shapes) {
+http::HttpResponse Console::Impl::scene_file(std::string_view path, bool shapes) {
   size_t number = 0;
   if (path.size() > 1 && path[0] == '/' && path[1] >= '0' && path[1] <= '9') {
     const auto [end, error] = std::from_chars(path.data() + 1, path.data() + path.size(), number);
@@ -153,7 +153,7 @@ HttpResponse Console::Impl::scene_file(std::string_view path, bool shapes) {
 }
 
 // ".json", "/meshes", "/links", "/textures/NUMBER".
-HttpResponse Console::Impl::file_of(const SceneData& data, std::string_view path) {
+http::HttpResponse Console::Impl::file_of(const SceneData& data, std::string_view path) {
   if (path == ".json") return blob(data.json, "application/json");
   if (path == "/meshes") return blob(data.meshes, "application/octet-stream");
   if (path == "/links") return blob(data.links, "application/octet-stream");
@@ -163,17 +163,17 @@ HttpResponse Console::Impl::file_of(const SceneData& data, std::string_view path
 }
 
 // The text that SPAWN would take to create that model.
-HttpResponse Console::Impl::model_text(size_t index) {
+http::HttpResponse Console::Impl::model_text(size_t index) {
   if (!world || index >= world->models.size() || world->models[index].removed) return not_found();
   const std::string text = stage.source->model_text(world->models[index].name);
-  return text.empty() ? not_found() : blob(bytes_of(text), "text/plain; charset=utf-8");
+  return text.empty() ? not_found() : blob(http::bytes_of(text), "text/plain; charset=utf-8");
 }
 
 // "/library.json", and for each of its models "/library/NUMBER/scene" with the files of a scene.
-HttpResponse Console::Impl::library_file(std::string_view path) {
+http::HttpResponse Console::Impl::library_file(std::string_view path) {
   if (!world || stage.is_log) return not_found();
   if (!library) library = std::make_unique<Library>(world->file);
-  if (path == ".json") return blob(bytes_of(library->list()), "application/json");
+  if (path == ".json") return blob(http::bytes_of(library->list()), "application/json");
   const size_t end = path.find("/scene");
   const auto index = number_after("/", path.substr(0, end));
   const SceneData* data = index ? library->scene(*index) : nullptr;
@@ -193,8 +193,8 @@ bool Console::Impl::tick() {
   return !stage.viewers.empty() || before != stage.board.newest();
 }
 
-Console::Console(const Address& address, std::unique_ptr<Source> source, const std::string& mode,
-                 const std::string& title)
+Console::Console(const http::Address& address, std::unique_ptr<Source> source,
+                 const std::string& mode, const std::string& title)
     : impl_(std::make_unique<Impl>()) {
   Impl& impl = *impl_;
   impl.stage.source = std::move(source);
@@ -214,8 +214,8 @@ Console::Console(const Address& address, std::unique_ptr<Source> source, const s
       .close('}')
       .close('}');
   impl.stage.greeting = json.text();
-  const std::string token = address.loopback() ? "" : make_token();
-  WebHandler handler;
+  const std::string token = address.loopback() ? "" : http::make_token();
+  http::WebHandler handler;
   handler.get = [&impl](std::string_view path) { return impl.get(path); };
   handler.tick = [&impl] { return impl.tick(); };
   handler.end = [&impl] {
@@ -225,10 +225,11 @@ Console::Console(const Address& address, std::unique_ptr<Source> source, const s
     impl.stage.farewell = ended.text();
   };
   handler.open = [&impl] { return std::make_unique<Viewer>(impl.stage); };
-  impl.web = std::make_unique<WebServer>(
-      WebPlace{.address = address, .token = token, .origins = {}, .most_sockets = kMostViewers},
+  impl.web = std::make_unique<http::WebServer>(
+      http::WebPlace{
+          .address = address, .token = token, .origins = {}, .most_sockets = kMostViewers},
       std::move(handler));
-  for (const std::string& host : reachable_hosts(address)) {
+  for (const std::string& host : http::reachable_hosts(address)) {
     urls_.push_back("http://" + host + ":" + std::to_string(impl.web->port()) + "/" +
                     (token.empty() ? "" : "?token=" + token));
   }

@@ -6,8 +6,8 @@
 #include <string>
 #include <vector>
 
-#include "console/guard.h"
 #include "console/source.h"
+#include "http/guard.h"
 
 namespace ruedo::console {
 
@@ -17,7 +17,7 @@ class Console {
 
   // Starts serving. mode: "live" or "log"; title: what is shown. Throws EnvironmentError if the
   // address is not available.
-  Console(const Address& address, std::unique_ptr<Source> source, const std::string& mode,
+  Console(const http::Address& address, std::unique_ptr<Source> source, const std::string& mode,
           const std::string& title);
   // Tells the viewers that the run has ended, and stops.
   ~Console();

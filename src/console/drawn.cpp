@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "core/big_endian.h"
+#include "base/big_endian.h"
 #include "engine/markers.h"
 #include "ruedo/applied_t.hpp"
 #include "ruedo/decode.h"

@@ -8,8 +8,8 @@
 
 #include <fmt/format.h>
 
-#include "core/big_endian.h"
-#include "core/utf8.h"
+#include "base/big_endian.h"
+#include "base/utf8.h"
 #include "log/header.h"
 #include "ruedo/applied_t.hpp"
 #include "ruedo/decode.h"

@@ -12,12 +12,12 @@
 #include <utility>
 #include <vector>
 
+#include "base/json.h"
 #include "console/drawn.h"
-#include "core/json.h"
 #include "log/index.h"
-#include "model/world_model.h"
 #include "ruedo/motion_status_t.hpp"
 #include "ruedo/request_t.hpp"
+#include "world/model/world_model.h"
 
 namespace ruedo::console {
 

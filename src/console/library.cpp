@@ -5,11 +5,11 @@
 #include <filesystem>
 #include <set>
 
-#include "core/json.h"
-#include "core/utf8.h"
-#include "model/load_model.h"
-#include "model/resources.h"
+#include "base/json.h"
+#include "base/utf8.h"
 #include "ruedo/errors.h"
+#include "world/load_model.h"
+#include "world/read/resources.h"
 
 namespace fs = std::filesystem;
 

@@ -13,21 +13,21 @@
 
 #include <fmt/format.h>
 
+#include "base/channel_names.h"
+#include "base/json.h"
+#include "base/utf8.h"
 #include "console/assets.h"
 #include "console/board.h"
 #include "console/events.h"
 #include "console/scene_data.h"
 #include "console/types.h"
-#include "core/channel_names.h"
-#include "core/json.h"
-#include "core/output_file.h"
-#include "core/utf8.h"
 #include "log/index.h"
 #include "log/reader.h"
 #include "ruedo/errors.h"
 #include "ruedo/image_t.hpp"
 #include "ruedo/markers_t.hpp"
 #include "ruedo/world_info_t.hpp"
+#include "system/output_file.h"
 
 namespace ruedo::console {
 namespace {

@@ -5,7 +5,7 @@
 #include <cstddef>
 #include <string>
 
-#include "run/log_worlds.h"
+#include "run/repeat/log_worlds.h"
 
 namespace ruedo::console {
 

@@ -6,9 +6,9 @@
 #include <cmath>
 #include <optional>
 
-#include "core/channel_names.h"
-#include "core/utf8.h"
-#include "core/whole.h"
+#include "base/channel_names.h"
+#include "base/utf8.h"
+#include "base/whole.h"
 #include "ruedo/markers_t.hpp"
 #include "ruedo/schema.h"
 #include "ruedo/world_info_t.hpp"
@@ -84,7 +84,7 @@ void LogSource::pump(Board&, bool viewers) {
 }
 
 // The first and the last message are always among those read.
-Bytes LogSource::history(const std::string& name, const std::string& field) {
+http::Bytes LogSource::history(const std::string& name, const std::string& field) {
   const std::string_view apart = Comparison::kApart;
   if (comparison_ && name.starts_with(apart))
     return comparison_->apart(name.substr(apart.size()), field);

@@ -10,7 +10,7 @@
 #include "console/comparison.h"
 #include "console/source.h"
 #include "log/index.h"
-#include "run/log_worlds.h"
+#include "run/repeat/log_worlds.h"
 
 namespace ruedo::console {
 
@@ -35,7 +35,7 @@ class LogSource : public Source {
   std::shared_ptr<const model::WorldModel> world(size_t scene) override;
   std::string fault() const override;
   std::string info_channel() const override { return info_channel_; }
-  Bytes history(const std::string& channel, const std::string& field) override;
+  http::Bytes history(const std::string& channel, const std::string& field) override;
   const Events* events() const override { return scanned_ ? &scan_.events() : nullptr; }
   std::string compared() const override { return comparison_ ? comparison_->name() : ""; }
   std::string comparison() const override { return comparison_ ? comparison_->report() : ""; }

@@ -9,13 +9,13 @@
 
 #include <opencv2/imgproc.hpp>
 
-#include "core/input_file.h"
-#include "core/json.h"
-#include "model/body_layout.h"
-#include "model/codecs.h"
+#include "base/input_file.h"
+#include "base/json.h"
 #include "scene/cut_away.h"
 #include "scene/render_content.h"
 #include "scene/render_texture.h"
+#include "world/mesh/codecs.h"
+#include "world/model/body_layout.h"
 
 namespace ruedo::console {
 namespace {
@@ -47,7 +47,7 @@ class Blob {
     const auto* bytes = reinterpret_cast<const uint8_t*>(values.data());
     bytes_.insert(bytes_.end(), bytes, bytes + values.size() * sizeof(Value));
   }
-  Bytes take() { return std::make_shared<const std::vector<uint8_t>>(std::move(bytes_)); }
+  http::Bytes take() { return std::make_shared<const std::vector<uint8_t>>(std::move(bytes_)); }
 
  private:
   std::vector<uint8_t> bytes_;
@@ -148,7 +148,7 @@ model::WorldModel collision_shapes(const model::WorldModel& world) {
 
 namespace {
 
-Bytes write_meshes(JsonWriter& out, const std::vector<scene::RenderMesh>& meshes) {
+http::Bytes write_meshes(JsonWriter& out, const std::vector<scene::RenderMesh>& meshes) {
   Blob blob;
   out.name("meshes").open('[');
   for (const scene::RenderMesh& mesh : meshes) {
@@ -231,8 +231,8 @@ void write_bases(JsonWriter& out, const model::WorldModel& world, const model::B
   out.close(']');
 }
 
-Bytes link_bytes(const model::WorldModel& world, const model::BodyLayout& layout,
-                 const scene::RenderContent& content) {
+http::Bytes link_bytes(const model::WorldModel& world, const model::BodyLayout& layout,
+                       const scene::RenderContent& content) {
   Blob blob;
   for (const LinkIndex i : layout.links.indices()) {
     const model::LinkPlacement& link = layout.links[i];
@@ -278,7 +278,7 @@ SceneData::SceneData(const model::WorldModel& world, int version) {
   write_wheels(out, layout);
   write_bases(out, world, layout);
   out.close('}');
-  json = bytes_of(out.text());
+  json = http::bytes_of(out.text());
   links = link_bytes(world, layout, content);
 }
 

@@ -10,26 +10,26 @@
 #include <vector>
 
 #include "console/board.h"
-#include "model/world_model.h"
+#include "world/model/world_model.h"
 
 namespace ruedo::console {
 
 struct Picture {
   std::string type;  // "image/png", ...
-  Bytes bytes;
+  http::Bytes bytes;
 };
 
 // The collision shapes known to physics and range finders, in place of visuals.
 model::WorldModel collision_shapes(const model::WorldModel& world);
 
 struct SceneData {
-  Bytes json;
+  http::Bytes json;
   // for each mesh its vertices (float32 x, y, z, nx, ny, nz, u, v), then its indices (uint32);
   // little endian
-  Bytes meshes;
+  http::Bytes meshes;
   // for each link: int32 kind, int32 body (-1: static), float32 x, y, z, qw, qx, qy, qz of the link
   // in its body, or in the world; little endian
-  Bytes links;
+  http::Bytes links;
   std::vector<Picture> pictures;  // in the order of the JSON's textures; empty if there is none
 
   explicit SceneData(const model::WorldModel& world, int version);

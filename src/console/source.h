@@ -8,7 +8,7 @@
 
 #include "console/board.h"
 #include "console/events.h"
-#include "model/world_model.h"
+#include "world/model/world_model.h"
 
 namespace ruedo::console {
 
@@ -81,7 +81,7 @@ class Source {
 
   // A field ("vel[0]") over the whole log, as float64, little endian: how many messages were read
   // per value, then time in s and value for each; null if there is no such channel.
-  virtual Bytes history(const std::string& channel, const std::string& field) {
+  virtual http::Bytes history(const std::string& channel, const std::string& field) {
     static_cast<void>(channel), static_cast<void>(field);
     return nullptr;
   }

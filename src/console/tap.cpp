@@ -4,9 +4,9 @@
 #include <algorithm>
 #include <utility>
 
+#include "base/channel_names.h"
 #include "console/board.h"
 #include "console/drawn.h"
-#include "core/channel_names.h"
 
 namespace ruedo::console {
 

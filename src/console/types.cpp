@@ -1,7 +1,7 @@
 #include "console/types.h"
 
-#include "core/json.h"
-#include "core/type_files.h"
+#include "base/json.h"
+#include "base/type_files.h"
 
 namespace ruedo::console {
 namespace {

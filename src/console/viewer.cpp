@@ -5,7 +5,7 @@
 #include <cmath>
 #include <cstring>
 
-#include "core/json.h"
+#include "base/json.h"
 
 namespace ruedo::console {
 namespace {

@@ -13,7 +13,7 @@
 
 #include "console/board.h"
 #include "console/source.h"
-#include "console/web_server.h"
+#include "http/web_server.h"
 
 namespace ruedo::console {
 
@@ -43,7 +43,7 @@ enum class Operation : uint8_t {
 // Binary messages to the browser; text messages are JSON.
 enum class Frame : uint8_t { messages = 1, traffic = 2 };
 
-class Viewer : public Connection {
+class Viewer : public http::Connection {
  public:
   static constexpr int kMostUnseen = 2;                  // frames
   static constexpr size_t kMostFrame = size_t{8} << 20;  // bytes; may be exceeded by one message

@@ -3,7 +3,7 @@
 
 #include <algorithm>
 
-#include "core/channel_names.h"
+#include "base/channel_names.h"
 #include "ruedo/element.h"
 #include "ruedo/errors.h"
 #include "ruedo/reply_t.hpp"

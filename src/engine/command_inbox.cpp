@@ -10,7 +10,7 @@
 
 #include <spdlog/spdlog.h>
 
-#include "engine/faults.h"
+#include "engine/faults/faults.h"
 #include "engine/markers.h"
 #include "ruedo/decode.h"
 #include "ruedo/fault_t.hpp"

@@ -15,13 +15,13 @@
 #include <tbb/info.h>
 #include <tbb/task_arena.h>
 
-#include "core/enough_threads.h"
 #include "engine/markers.h"
 #include "engine/outcome.h"
 #include "engine/parallel.h"
 #include "engine/world_state.h"
 #include "ruedo/errors.h"
 #include "ruedo/velocity_command_t.hpp"
+#include "system/enough_threads.h"
 
 namespace ruedo::engine {
 namespace {

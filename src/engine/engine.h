@@ -18,7 +18,7 @@
 
 #include "engine/field_reader.h"
 #include "engine/world.h"
-#include "model/randomization.h"
+#include "world/edit/randomization.h"
 
 namespace ruedo::engine {
 

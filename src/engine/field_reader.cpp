@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cstring>
 
-#include "core/wire_size.h"
+#include "base/wire_size.h"
 #include "ruedo/errors.h"
 
 namespace ruedo::engine {

@@ -8,16 +8,16 @@
 #include <span>
 #include <thread>
 
-#include "core/channel_names.h"
-#include "core/whole.h"
+#include "base/channel_names.h"
+#include "base/whole.h"
 #include "engine/world_state.h"
-#include "model/read_context.h"
 #include "ruedo/fault_t.hpp"
 #include "ruedo/joint_command_t.hpp"
 #include "ruedo/markers_t.hpp"
 #include "ruedo/move_command_t.hpp"
 #include "ruedo/velocity_command_t.hpp"
 #include "ruedo/wheel_command_t.hpp"
+#include "world/read/read_context.h"
 
 namespace ruedo::engine {
 namespace {

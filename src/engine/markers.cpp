@@ -5,7 +5,7 @@
 
 #include <fmt/format.h>
 
-#include "core/utf8.h"
+#include "base/utf8.h"
 #include "ruedo/applied_t.hpp"
 #include "ruedo/decode.h"
 #include "ruedo/schema.h"

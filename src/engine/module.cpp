@@ -3,8 +3,8 @@
 
 #include <algorithm>
 
+#include "engine/faults/sensor_faults.h"
 #include "engine/parallel.h"
-#include "engine/sensor_faults.h"
 
 namespace ruedo::engine {
 namespace {

@@ -14,7 +14,7 @@
 #include <vector>
 
 #include "engine/batch.h"
-#include "engine/sensor_faults.h"
+#include "engine/faults/sensor_faults.h"
 #include "ruedo/sensor.h"
 #include "scene/ray_scene.h"
 #include "scene/render_scene.h"

@@ -10,8 +10,8 @@
 #include <pthread.h>
 #include <sys/prctl.h>
 
-#include "core/enough_threads.h"
 #include "physics/state_check.h"
+#include "system/enough_threads.h"
 
 namespace ruedo::engine {
 namespace {

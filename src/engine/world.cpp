@@ -1,7 +1,7 @@
 // Creates a world, and steps it.
 #include "engine/world.h"
 
-#include "core/channel_names.h"
+#include "base/channel_names.h"
 #include "physics/state_check.h"
 #include "ruedo/errors.h"
 

@@ -13,13 +13,13 @@
 #include "engine/batch.h"
 #include "engine/channels.h"
 #include "engine/command_inbox.h"
-#include "engine/faults.h"
+#include "engine/faults/faults.h"
 #include "engine/fleet.h"
 #include "engine/module.h"
-#include "model/body_layout.h"
 #include "physics/physics_world.h"
 #include "robot/robots.h"
 #include "scene/ray_scene.h"
+#include "world/model/body_layout.h"
 
 namespace ruedo::engine {
 

@@ -4,9 +4,9 @@
 #include <vector>
 
 #include "engine/channels.h"
-#include "model/body_layout.h"
 #include "ruedo/device_info_t.hpp"
 #include "ruedo/world_info_t.hpp"
+#include "world/model/body_layout.h"
 
 namespace ruedo::engine {
 

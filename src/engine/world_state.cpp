@@ -5,7 +5,7 @@
 #include <bit>
 #include <limits>
 
-#include "core/channel_names.h"
+#include "base/channel_names.h"
 
 namespace ruedo::engine {
 namespace {

@@ -3,9 +3,9 @@
 
 #include "engine/channels.h"
 #include "engine/module.h"
-#include "model/body_layout.h"
 #include "ruedo/snapshot.h"
 #include "ruedo/world_state_t.hpp"
+#include "world/model/body_layout.h"
 
 namespace ruedo::engine {
 

@@ -7,7 +7,7 @@
 
 #include <fmt/format.h>
 
-#include "core/utf8.h"
+#include "base/utf8.h"
 #include "log/diff.h"
 
 namespace ruedo::log {

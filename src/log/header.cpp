@@ -13,13 +13,13 @@
 #include <gnu/libc-version.h>
 #include <link.h>
 
-#include "core/late_library.h"
-#include "core/sha256.h"
-#include "core/version.h"
+#include "base/sha256.h"
+#include "base/version.h"
 #include "log/reader.h"
-#include "model/resources.h"
 #include "ruedo/decode.h"
 #include "ruedo/errors.h"
+#include "system/late_library.h"
+#include "world/read/resources.h"
 
 namespace ruedo::log {
 namespace {

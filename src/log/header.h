@@ -5,8 +5,8 @@
 #include <string>
 #include <vector>
 
-#include "model/world_model.h"
 #include "ruedo/log_header_t.hpp"
+#include "world/model/world_model.h"
 
 namespace ruedo::log {
 

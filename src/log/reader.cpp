@@ -1,4 +1,4 @@
-// Events by the format in core/lcm_log.h. A file is not trusted: every size is checked first.
+// Events by the format in base/lcm_log.h. A file is not trusted: every size is checked first.
 #include "log/reader.h"
 
 #include <sys/stat.h>
@@ -6,9 +6,9 @@
 #include <array>
 #include <utility>
 
-#include "core/big_endian.h"
-#include "core/lcm_log.h"
-#include "core/message_size.h"
+#include "base/big_endian.h"
+#include "base/lcm_log.h"
+#include "base/message_size.h"
 #include "ruedo/errors.h"
 
 namespace ruedo::log {

@@ -9,8 +9,8 @@
 #include <string>
 #include <vector>
 
-#include "core/input_file.h"
-#include "core/progress.h"
+#include "base/input_file.h"
+#include "base/progress.h"
 #include "ruedo/sim_time.h"
 
 namespace ruedo::log {

@@ -7,9 +7,9 @@
 
 #include <fmt/format.h>
 
-#include "core/big_endian.h"
-#include "core/input_file.h"
-#include "core/lcm_log.h"
+#include "base/big_endian.h"
+#include "base/input_file.h"
+#include "base/lcm_log.h"
 #include "log/header.h"
 #include "log/index.h"
 #include "ruedo/applied_t.hpp"

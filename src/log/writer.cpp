@@ -1,4 +1,4 @@
-// Events by the format in core/lcm_log.h, handed to the system in large pieces.
+// Events by the format in base/lcm_log.h, handed to the system in large pieces.
 #include "log/writer.h"
 
 #include <algorithm>
@@ -10,10 +10,10 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-#include "core/big_endian.h"
-#include "core/input_file.h"
-#include "core/lcm_log.h"
-#include "core/message_size.h"
+#include "base/big_endian.h"
+#include "base/input_file.h"
+#include "base/lcm_log.h"
+#include "base/message_size.h"
 #include "ruedo/errors.h"
 
 namespace ruedo::log {

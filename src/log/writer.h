@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "core/file_handle.h"
+#include "system/file_handle.h"
 
 namespace ruedo::log {
 

@@ -10,9 +10,9 @@
 #include <span>
 #include <vector>
 
-#include "model/body_layout.h"
 #include "ruedo/snapshot.h"
 #include "ruedo/state_archive.h"
+#include "world/model/body_layout.h"
 
 namespace ruedo::physics {
 

@@ -6,14 +6,14 @@
 #include <memory>
 #include <vector>
 
-#include "physics/broadphase.h"
-#include "physics/contact_book.h"
-#include "physics/detection.h"
-#include "physics/dynamics.h"
-#include "physics/joints.h"
+#include "physics/base/rigid_bodies.h"
+#include "physics/collision/broadphase.h"
+#include "physics/collision/contact_book.h"
+#include "physics/collision/detection.h"
+#include "physics/dynamics/dynamics.h"
+#include "physics/dynamics/surfaces.h"
+#include "physics/joints/joints.h"
 #include "physics/physics_world.h"
-#include "physics/rigid_bodies.h"
-#include "physics/surfaces.h"
 
 namespace ruedo::physics {
 

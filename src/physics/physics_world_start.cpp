@@ -3,8 +3,8 @@
 // not include what keeps a link on its arc.
 #include <algorithm>
 
+#include "physics/dynamics/solver.h"
 #include "physics/physics_world_impl.h"
-#include "physics/solver.h"
 
 namespace ruedo::physics {
 

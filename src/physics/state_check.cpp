@@ -4,7 +4,7 @@
 
 #include <cmath>
 
-#include "model/read_context.h"
+#include "world/read/read_context.h"
 
 namespace ruedo::physics {
 

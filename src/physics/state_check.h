@@ -5,8 +5,8 @@
 
 #include <stdexcept>
 
-#include "model/body_layout.h"
 #include "ruedo/snapshot.h"
+#include "world/model/body_layout.h"
 
 namespace ruedo::physics {
 

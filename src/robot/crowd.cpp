@@ -6,10 +6,10 @@
 #include <map>
 #include <mutex>
 
-#include "core/whole.h"
-#include "model/geometry.h"
-#include "model/placement.h"
+#include "base/whole.h"
 #include "ruedo/math.h"
+#include "world/model/placement.h"
+#include "world/read/geometry.h"
 
 namespace ruedo::robot {
 

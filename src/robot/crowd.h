@@ -16,11 +16,11 @@
 #include <memory>
 #include <vector>
 
-#include "model/crowd.h"
 #include "physics/physics_world.h"
 #include "ruedo/bound.h"
 #include "ruedo/random.h"
 #include "ruedo/state_archive.h"
+#include "world/sdf/crowd.h"
 
 namespace ruedo::robot {
 

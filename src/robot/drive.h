@@ -4,13 +4,13 @@
 
 #include <cstdint>
 
-#include "model/body_layout.h"
 #include "physics/physics_world.h"
 #include "robot/motion_planner.h"
 #include "robot/wheel_kinematics.h"
 #include "ruedo/bound.h"
 #include "ruedo/snapshot.h"
 #include "ruedo/state_archive.h"
+#include "world/model/body_layout.h"
 
 namespace ruedo::robot {
 

@@ -4,7 +4,7 @@
 #include <optional>
 #include <vector>
 
-#include "model/body_layout.h"
+#include "world/model/body_layout.h"
 
 namespace ruedo::robot {
 

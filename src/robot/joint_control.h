@@ -10,13 +10,13 @@
 #include <string>
 #include <vector>
 
-#include "model/body_layout.h"
 #include "physics/physics_world.h"
 #include "robot/holds.h"
 #include "robot/lifts.h"
 #include "robot/robots.h"
 #include "ruedo/bound.h"
 #include "ruedo/state_archive.h"
+#include "world/model/body_layout.h"
 
 namespace ruedo::robot {
 

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <limits>
 
-#include "core/sincos.h"
+#include "base/sincos.h"
 #include "physics/state_check.h"
 #include "robot/base_motion.h"
 #include "robot/ground.h"

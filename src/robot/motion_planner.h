@@ -10,7 +10,6 @@
 #include <utility>
 #include <vector>
 
-#include "model/world_model.h"
 #include "robot/base_motion.h"
 #include "robot/motion_log.h"
 #include "robot/robots.h"
@@ -18,6 +17,7 @@
 #include "ruedo/bound.h"
 #include "ruedo/math.h"
 #include "ruedo/state_archive.h"
+#include "world/model/world_model.h"
 
 namespace ruedo::robot {
 

@@ -6,7 +6,7 @@
 
 #include <fmt/format.h>
 
-#include "core/whole.h"
+#include "base/whole.h"
 #include "robot/surroundings.h"
 
 namespace ruedo::robot {

@@ -4,10 +4,10 @@
 
 #include <vector>
 
-#include "model/body_layout.h"
 #include "physics/physics_world.h"
 #include "ruedo/bound.h"
 #include "ruedo/state_archive.h"
+#include "world/model/body_layout.h"
 
 namespace ruedo::robot {
 

@@ -5,8 +5,8 @@
 #include <array>
 #include <cmath>
 
-#include "core/sincos.h"
-#include "core/whole.h"
+#include "base/sincos.h"
+#include "base/whole.h"
 
 namespace ruedo::robot {
 

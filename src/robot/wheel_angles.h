@@ -4,10 +4,10 @@
 
 #include <vector>
 
-#include "model/body_layout.h"
 #include "robot/unicycle.h"
 #include "ruedo/snapshot.h"
 #include "ruedo/state_archive.h"
+#include "world/model/body_layout.h"
 
 namespace ruedo::robot {
 

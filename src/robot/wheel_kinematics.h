@@ -2,7 +2,7 @@
 // + r_r w_r) / 2 and omega = (r_r w_r - r_l w_l) / track. The same holds for distances and angles.
 #pragma once
 
-#include "model/world_model.h"
+#include "world/model/world_model.h"
 
 namespace ruedo::robot {
 

@@ -15,8 +15,8 @@
 #include <optional>
 #include <vector>
 
-#include "model/base_odometry.h"
 #include "robot/drive.h"
+#include "world/model/base_odometry.h"
 
 namespace ruedo::robot {
 

@@ -10,8 +10,8 @@
 // nothing.
 #pragma once
 
-#include "model/world_model.h"
 #include "ruedo/random.h"
+#include "world/model/world_model.h"
 
 namespace ruedo::robot {
 

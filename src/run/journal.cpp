@@ -9,11 +9,11 @@
 #include <fcntl.h>
 #include <unistd.h>
 
-#include "core/file_handle.h"
 #include "log/reader.h"
 #include "ruedo/applied_t.hpp"
 #include "ruedo/decode.h"
 #include "ruedo/errors.h"
+#include "system/file_handle.h"
 
 namespace ruedo::run {
 namespace {

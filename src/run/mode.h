@@ -18,7 +18,7 @@
 #include "engine/outcome.h"
 #include "ruedo/request_t.hpp"
 #include "run/gate.h"
-#include "run/sessions.h"
+#include "run/requests/sessions.h"
 #include "run/sink.h"
 #include "run/tick.h"
 

@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "core/whole.h"
+#include "base/whole.h"
 
 namespace ruedo::run {
 namespace {

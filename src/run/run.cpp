@@ -5,13 +5,13 @@
 
 #include <spdlog/spdlog.h>
 
-#include "core/channel_names.h"
+#include "base/channel_names.h"
 #include "log/header.h"
 #include "physics/state_check.h"
 #include "ruedo/applied_t.hpp"
 #include "ruedo/request_t.hpp"
 #include "run/live.h"
-#include "run/request_table.h"
+#include "run/requests/request_table.h"
 
 namespace ruedo::run {
 namespace {

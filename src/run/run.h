@@ -16,7 +16,7 @@
 #include <utility>
 #include <vector>
 
-#include "engine/edits.h"
+#include "engine/edits/edits.h"
 #include "engine/simulation.h"
 #include "engine/world_info.h"
 #include "ruedo/bus.h"
@@ -27,16 +27,16 @@
 #include "ruedo/state_reply_t.hpp"
 #include "ruedo/step_request_t.hpp"
 #include "run/beats.h"
-#include "run/control.h"
-#include "run/edited_world.h"
 #include "run/journal.h"
-#include "run/lockstep.h"
-#include "run/model_worker.h"
+#include "run/lockstep/lockstep.h"
 #include "run/pacer.h"
 #include "run/publisher.h"
-#include "run/repeating.h"
-#include "run/request_table.h"
-#include "run/saved_states.h"
+#include "run/repeat/repeating.h"
+#include "run/requests/control.h"
+#include "run/requests/edited_world.h"
+#include "run/requests/model_worker.h"
+#include "run/requests/request_table.h"
+#include "run/requests/saved_states.h"
 #include "run/sinks.h"
 #include "run/stall_watch.h"
 #include "run/wait_for.h"
@@ -73,7 +73,7 @@ struct Status {
   SimTime time_us = 0;
   uint64_t messages = 0;
   bool paused = false;
-  bool repeating = false;  // on the way to a snapshot: core/progress.h says how far
+  bool repeating = false;  // on the way to a snapshot: base/progress.h says how far
 };
 
 class Run {

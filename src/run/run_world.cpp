@@ -3,7 +3,7 @@
 
 #include <spdlog/spdlog.h>
 
-#include "core/version.h"
+#include "base/version.h"
 #include "engine/world_state.h"
 #include "ruedo/errors.h"
 #include "run/run.h"

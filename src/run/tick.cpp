@@ -3,15 +3,10 @@
 
 #include <algorithm>
 
-#include <zlib.h>
-
+#include "base/crc32.h"
 #include "engine/world_state.h"
 
 namespace ruedo::run {
-
-uint32_t crc32(const uint8_t* data, size_t size, uint32_t before) {
-  return static_cast<uint32_t>(::crc32_z(before, data, size));
-}
 
 void TickWriter::begin(int64_t utime, int64_t run_id, int32_t epoch, int64_t step) {
   head_.utime = utime;

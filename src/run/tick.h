@@ -10,9 +10,6 @@
 
 namespace ruedo::run {
 
-// CRC-32 (IEEE 802.3), by zlib; before: that of the bytes before these.
-uint32_t crc32(const uint8_t* data, size_t size, uint32_t before = 0);
-
 // Collects a step's messages and cuts the tick into parts.
 class TickWriter {
  public:

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <limits>
 
-#include "model/geometry.h"
+#include "world/read/geometry.h"
 
 namespace ruedo::scene {
 namespace {

@@ -4,7 +4,7 @@
 #include <memory>
 #include <optional>
 
-#include "model/world_model.h"
+#include "world/model/world_model.h"
 
 namespace ruedo::scene {
 

@@ -7,9 +7,9 @@
 #include <cstdlib>
 #include <utility>
 
-#include "core/enough_threads.h"
-#include "core/late_library.h"
 #include "ruedo/errors.h"
+#include "system/enough_threads.h"
+#include "system/late_library.h"
 
 namespace ruedo::scene {
 namespace {

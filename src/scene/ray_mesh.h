@@ -11,9 +11,9 @@
 #include <cstdint>
 #include <vector>
 
-#include "model/mesh.h"
 #include "scene/ray_embree.h"
 #include "scene/ray_shapes.h"
+#include "world/mesh/mesh.h"
 
 namespace ruedo::scene {
 

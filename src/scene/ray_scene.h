@@ -9,8 +9,8 @@
 #include <memory>
 #include <span>
 
-#include "model/body_layout.h"
 #include "ruedo/snapshot.h"
+#include "world/model/body_layout.h"
 
 namespace ruedo::scene {
 

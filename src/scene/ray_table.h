@@ -10,8 +10,8 @@
 #include <tuple>
 #include <vector>
 
-#include "model/body_layout.h"
 #include "scene/ray_mesh.h"
+#include "world/model/body_layout.h"
 
 namespace ruedo::scene {
 

@@ -7,10 +7,10 @@
 #include <memory>
 #include <vector>
 
-#include "model/body_layout.h"
 #include "ruedo/snapshot.h"
 #include "scene/render_mesh.h"
 #include "scene/render_scene.h"
+#include "world/model/body_layout.h"
 
 namespace ruedo::scene {
 

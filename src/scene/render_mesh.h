@@ -5,8 +5,8 @@
 #include <cstdint>
 #include <vector>
 
-#include "model/mesh.h"
 #include "ruedo/pose.h"
+#include "world/mesh/mesh.h"
 
 namespace ruedo::scene {
 

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "core/whole.h"
+#include "base/whole.h"
 #include "ruedo/math.h"
 #include "scene/render_device.h"
 #include "scene/render_lights.h"

@@ -13,8 +13,8 @@
 #include <string>
 #include <vector>
 
-#include "model/body_layout.h"
 #include "ruedo/snapshot.h"
+#include "world/model/body_layout.h"
 
 namespace ruedo::scene {
 

@@ -6,11 +6,11 @@
 
 #include <opencv2/imgproc.hpp>
 
-#include "core/input_file.h"
-#include "model/codecs.h"
-#include "model/picture.h"
-#include "model/texture_store.h"
+#include "base/input_file.h"
 #include "ruedo/errors.h"
+#include "world/mesh/codecs.h"
+#include "world/mesh/picture.h"
+#include "world/mesh/texture_store.h"
 
 namespace ruedo::scene {
 namespace {

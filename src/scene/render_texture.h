@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "model/mesh.h"
+#include "world/mesh/mesh.h"
 
 namespace ruedo::scene {
 

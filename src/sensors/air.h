@@ -3,7 +3,7 @@
 // world's <atmosphere>.
 #pragma once
 
-#include "model/world_model.h"
+#include "world/model/world_model.h"
 
 namespace ruedo {
 

@@ -9,12 +9,12 @@
 #include <algorithm>
 #include <map>
 
-#include "model/geometry.h"
 #include "ruedo/boxes_2d_t.hpp"
 #include "ruedo/boxes_3d_t.hpp"
 #include "sensors/camera_view.h"
 #include "sensors/placed_models.h"
 #include "sensors/seen_things.h"
+#include "world/read/geometry.h"
 
 namespace ruedo {
 namespace {

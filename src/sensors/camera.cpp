@@ -15,12 +15,12 @@
 
 #include <opencv2/imgproc.hpp>
 
-#include "model/body_layout.h"
 #include "scene/render_scene.h"
 #include "sensors/camera_lens.h"
 #include "sensors/camera_view.h"
 #include "sensors/jpeg.h"
 #include "sensors/pixel_noise.h"
+#include "world/model/body_layout.h"
 
 namespace ruedo {
 namespace {

@@ -12,8 +12,8 @@
 
 #include <fmt/format.h>
 
-#include "core/message_size.h"
-#include "core/whole.h"
+#include "base/message_size.h"
+#include "base/whole.h"
 #include "ruedo/math.h"
 
 namespace ruedo {

@@ -4,11 +4,11 @@
 #include <algorithm>
 #include <vector>
 
-#include "model/body_layout.h"
 #include "ruedo/bound.h"
 #include "ruedo/collisions_t.hpp"
 #include "ruedo/sensor.h"
 #include "sensors/contact_points.h"
+#include "world/model/body_layout.h"
 
 namespace ruedo {
 namespace {

@@ -3,11 +3,11 @@
 // since the last sample.
 #include <algorithm>
 
-#include "model/body_layout.h"
 #include "ruedo/bound.h"
 #include "ruedo/contact_t.hpp"
 #include "ruedo/sensor.h"
 #include "sensors/contact_points.h"
+#include "world/model/body_layout.h"
 
 namespace ruedo {
 namespace {

@@ -1,9 +1,9 @@
 // Contacts as in messages: from the side of the sensor.
 #pragma once
 
-#include "model/body_layout.h"
 #include "ruedo/contact_point_t.hpp"
 #include "ruedo/snapshot.h"
+#include "world/model/body_layout.h"
 
 namespace ruedo {
 

@@ -10,9 +10,9 @@
 #include <algorithm>
 #include "ruedo/bound.h"
 
-#include "model/body_layout.h"
 #include "ruedo/force_torque_t.hpp"
 #include "sensors/mount.h"
+#include "world/model/body_layout.h"
 
 namespace ruedo {
 namespace {

@@ -6,7 +6,7 @@
 // 323), to rounding precision.
 #pragma once
 
-#include "model/world_model.h"
+#include "world/model/world_model.h"
 
 namespace ruedo {
 

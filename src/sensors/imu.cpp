@@ -6,11 +6,11 @@
 // a_B comes from the snapshot; alpha is the change of omega over the last step. At rest it measures
 // gravity upwards, on a ramp along the ramp's axes. A wheel that is part of B rotates the device
 // about its hub H: the same formula from B to H, then from H to S with the wheel's own omega.
-#include "model/body_layout.h"
 #include "ruedo/bound.h"
 #include "ruedo/imu_t.hpp"
 #include "ruedo/sensor.h"
 #include "sensors/noise.h"
+#include "world/model/body_layout.h"
 
 namespace ruedo {
 namespace {

@@ -1,8 +1,8 @@
 // A robot's joints other than fixed ones and wheels of its drive, on ROBOT/joints: positions,
 // velocities and motor efforts, without noise.
-#include "model/body_layout.h"
 #include "ruedo/joint_state_t.hpp"
 #include "ruedo/sensor.h"
+#include "world/model/body_layout.h"
 
 namespace ruedo {
 namespace {

@@ -3,7 +3,7 @@
 
 #include <algorithm>
 
-#include "model/codecs.h"
+#include "world/mesh/codecs.h"
 
 namespace ruedo {
 namespace {

@@ -1,13 +1,13 @@
 // A logical camera: the models whose origins lie in its frustum, on ROBOT/CAMERA, without occlusion
 // and without its own model. The frustum is given by <horizontal_fov> and by <near> and <far> along
 // x; its height is its width divided by <aspect_ratio>.
-#include "model/body_layout.h"
 #include "ruedo/bound.h"
 #include "ruedo/device_info_t.hpp"
 #include "ruedo/logical_camera_t.hpp"
 #include "ruedo/math.h"
 #include "sensors/mount.h"
 #include "sensors/placed_models.h"
+#include "world/model/body_layout.h"
 
 namespace ruedo {
 namespace {

@@ -16,8 +16,8 @@
 
 #include <fmt/format.h>
 
-#include "core/sincos.h"
-#include "core/whole.h"
+#include "base/sincos.h"
+#include "base/whole.h"
 #include "ruedo/device_info_t.hpp"
 #include "ruedo/lidar_t.hpp"
 #include "ruedo/math.h"

@@ -3,9 +3,9 @@
 // state; ends and refusals precede it.
 #include <algorithm>
 
-#include "model/body_layout.h"
 #include "ruedo/motion_status_t.hpp"
 #include "ruedo/sensor.h"
+#include "world/model/body_layout.h"
 
 namespace ruedo {
 namespace {

@@ -3,7 +3,7 @@
 
 #include <algorithm>
 
-#include "model/body_layout.h"
+#include "world/model/body_layout.h"
 
 namespace ruedo {
 

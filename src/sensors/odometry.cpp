@@ -18,13 +18,13 @@
 #include <cmath>
 #include <optional>
 
-#include "core/sincos.h"
-#include "core/whole.h"
-#include "model/base_odometry.h"
-#include "model/body_layout.h"
+#include "base/sincos.h"
+#include "base/whole.h"
 #include "ruedo/math.h"
 #include "ruedo/odometry_t.hpp"
 #include "ruedo/sensor.h"
+#include "world/model/base_odometry.h"
+#include "world/model/body_layout.h"
 
 namespace ruedo {
 namespace {

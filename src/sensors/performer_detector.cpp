@@ -5,11 +5,11 @@
 // the model. A performer is inside if its own axis-aligned box touches it.
 #include <algorithm>
 
-#include "model/body_layout.h"
 #include "ruedo/bound.h"
 #include "ruedo/logical_camera_t.hpp"
 #include "ruedo/sensor.h"
 #include "sensors/placed_models.h"
+#include "world/model/body_layout.h"
 
 namespace ruedo {
 namespace {

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "core/whole.h"
+#include "base/whole.h"
 
 namespace ruedo {
 namespace {

@@ -4,9 +4,9 @@
 #include <algorithm>
 #include <string>
 
-#include "model/body_layout.h"
 #include "ruedo/logical_object_t.hpp"
 #include "ruedo/snapshot.h"
+#include "world/model/body_layout.h"
 
 namespace ruedo {
 

@@ -1,8 +1,8 @@
 // The true pose of a robot's base_link, on ROBOT/pose: ground truth to measure errors against. No
 // noise.
-#include "model/body_layout.h"
 #include "ruedo/pose_t.hpp"
 #include "ruedo/sensor.h"
+#include "world/model/body_layout.h"
 
 namespace ruedo {
 namespace {

@@ -1,10 +1,10 @@
 // Common to sensors that cast rays: the device's pose, and the properties of surfaces that it hits.
 #pragma once
 
-#include "model/body_layout.h"
 #include "ruedo/bound.h"
 #include "ruedo/sensor.h"
 #include "scene/ray_scene.h"
+#include "world/model/body_layout.h"
 
 namespace ruedo {
 

@@ -6,7 +6,7 @@
 
 #include <vector>
 
-#include "model/body_layout.h"
+#include "world/model/body_layout.h"
 
 namespace ruedo {
 

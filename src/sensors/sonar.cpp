@@ -15,7 +15,7 @@
 
 #include <fmt/format.h>
 
-#include "core/whole.h"
+#include "base/whole.h"
 #include "ruedo/device_info_t.hpp"
 #include "ruedo/math.h"
 #include "ruedo/sonar_t.hpp"

@@ -9,11 +9,11 @@
 
 #include <fmt/format.h>
 
-#include "core/whole.h"
-#include "model/plugins.h"
+#include "base/whole.h"
 #include "ruedo/image_t.hpp"
 #include "sensors/camera_view.h"
 #include "sensors/seen_things.h"
+#include "world/compat/plugins.h"
 
 namespace ruedo {
 namespace {

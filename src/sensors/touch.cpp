@@ -7,12 +7,12 @@
 #include <algorithm>
 #include <optional>
 
-#include "core/whole.h"
-#include "model/body_layout.h"
+#include "base/whole.h"
 #include "ruedo/bound.h"
 #include "ruedo/contact_t.hpp"
 #include "ruedo/sensor.h"
 #include "sensors/contact_points.h"
+#include "world/model/body_layout.h"
 
 namespace ruedo {
 namespace {

@@ -14,7 +14,7 @@
 
 #include <fmt/format.h>
 
-#include "core/message_size.h"
+#include "base/message_size.h"
 #include "ruedo/image_t.hpp"
 #include "ruedo/math.h"
 #include "sensors/camera_view.h"

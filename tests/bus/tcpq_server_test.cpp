@@ -14,9 +14,9 @@
 #include <unistd.h>
 #include <lcm/lcm-cpp.hpp>
 
-#include "core/file_handle.h"
 #include "no_files.h"
 #include "ruedo/errors.h"
+#include "system/file_handle.h"
 
 namespace ruedo::bus {
 namespace {

@@ -17,8 +17,8 @@
 #include <gtest/gtest.h>
 
 #include "bus/tcpq_wire.h"
-#include "core/file_handle.h"
 #include "ruedo/errors.h"
+#include "system/file_handle.h"
 
 namespace ruedo::bus {
 namespace {

@@ -17,7 +17,7 @@ ET.register_namespace("ruedo", "urn:ruedo")
 WORLDS = [
     *(f"worlds/{name}.sdf" for name in ("arena", "crossing", "rooms", "warehouse")),
     *(f"tests/golden/{name}.sdf" for name in ("arms", "camera", "wheels")),
-    *(f"tests/ros2/{name}.sdf" for name in ("instruments", "links", "sensors")),
+    *(f"tests/bridges/ros2/{name}.sdf" for name in ("instruments", "links", "sensors")),
     "tests/console/senses.sdf",
     *(
         f"worlds/robots/{name}/model.sdf"

@@ -8,8 +8,8 @@
 #include <gtest/gtest.h>
 #include <unistd.h>
 
-#include "core/big_endian.h"
-#include "core/lcm_log.h"
+#include "base/big_endian.h"
+#include "base/lcm_log.h"
 
 namespace ruedo::console {
 namespace {
@@ -131,7 +131,7 @@ TEST(LogLook, ShowsWhereItWasPutLast) {
 TEST(LogSource, ThinsAPlotOfLargeMessages) {
   const SparseLog log(1, 12, kLarge);
   LogSource source(log.path(), {}, 1.0);
-  const Bytes plot = source.history("a", "utime");
+  const http::Bytes plot = source.history("a", "utime");
   double every = 0.0;
   ASSERT_GE(plot->size(), sizeof every);
   std::copy_n(plot->data(), sizeof every, reinterpret_cast<uint8_t*>(&every));

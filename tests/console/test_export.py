@@ -362,8 +362,12 @@ def test_it_is_listed():
 
 
 def test_a_fix_is_a_place_on_the_map(tmp_path):
-    """By hand: tests/ros2/instruments.sdf lies at 45 degrees north, 8 east, 110 m high."""
-    world, log, out = SOURCE / "tests/ros2/instruments.sdf", tmp_path / "i.lcm", tmp_path / "i.mcap"
+    """By hand: tests/bridges/ros2/instruments.sdf lies at 45 degrees north, 8 east, 110 m high."""
+    world, log, out = (
+        SOURCE / "tests/bridges/ros2/instruments.sdf",
+        tmp_path / "i.lcm",
+        tmp_path / "i.mcap",
+    )
     quiet = ["--lcm", "memq://", "--quiet", "--rate", "max", "--duration", "1", "--no-noise"]
     subprocess.run([RUEDO, "run", world, *quiet, "--record", log], check=True, timeout=120)
     subprocess.run([RUEDO, "export", log, out], check=True, timeout=120, capture_output=True)

@@ -141,8 +141,8 @@ def test_time_is_the_simulations(run: tuple[list[dict], dict]) -> None:
 
 
 def test_a_fix_is_a_place_on_the_map() -> None:
-    """By hand: tests/ros2/instruments.sdf lies at 45 degrees north, 8 east, 110 m high."""
-    world = SOURCE / "tests/ros2/instruments.sdf"
+    """By hand: tests/bridges/ros2/instruments.sdf lies at 45 degrees north, 8 east, 110 m high."""
+    world = SOURCE / "tests/bridges/ros2/instruments.sdf"
     with serving("--no-noise", world=world) as (_, url):
         lines = seen(url, 6, "mast/gps")
     channel = next(

@@ -10,7 +10,7 @@
 #include <spdlog/spdlog.h>
 
 #include "budget.h"
-#include "engine/faults.h"
+#include "engine/faults/faults.h"
 #include "ruedo/decode.h"
 #include "ruedo/grant_reply_t.hpp"
 #include "ruedo/grant_request_t.hpp"
@@ -18,9 +18,9 @@
 #include "ruedo/resend_reply_t.hpp"
 #include "ruedo/resend_request_t.hpp"
 #include "ruedo/velocity_command_t.hpp"
-#include "run/control.h"
-#include "run/lockstep.h"
-#include "run/request_table.h"
+#include "run/lockstep/lockstep.h"
+#include "run/requests/control.h"
+#include "run/requests/request_table.h"
 
 // There is no world here: what would act on one is never called.
 namespace ruedo::engine {

@@ -4,8 +4,8 @@
 #include <string>
 #include <vector>
 
+#include "base/lcm_log.h"
 #include "budget.h"
-#include "core/lcm_log.h"
 #include "log/header.h"
 #include "log/index.h"
 #include "log/reader.h"

@@ -2,9 +2,9 @@
 #include <stdexcept>
 
 #include "budget.h"
-#include "model/geometry.h"
-#include "model/occupancy.h"
 #include "scratch_file.h"
+#include "world/maps/occupancy.h"
+#include "world/read/geometry.h"
 
 extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   using namespace ruedo::model;

@@ -2,10 +2,10 @@
 // importer in its child process; otherwise it is an entry of the cache, as the server unpacks it.
 #include <stdexcept>
 
-#include "model/mesh_format.h"
-#include "model/mesh_loader.h"
 #include "ruedo/errors.h"
 #include "scratch_file.h"
+#include "world/mesh/mesh_format.h"
+#include "world/mesh/mesh_loader.h"
 
 extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   static const ScratchFolder folder;

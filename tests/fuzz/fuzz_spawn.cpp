@@ -2,7 +2,7 @@
 #include <string>
 
 #include "budget.h"
-#include "model/load_model.h"
+#include "world/load_model.h"
 
 extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   const Budget budget;

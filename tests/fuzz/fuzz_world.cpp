@@ -2,8 +2,8 @@
 #include <string>
 
 #include "budget.h"
-#include "model/body_layout.h"
-#include "model/load.h"
+#include "world/load.h"
+#include "world/model/body_layout.h"
 
 extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   const Budget budget;

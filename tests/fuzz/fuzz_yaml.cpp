@@ -3,8 +3,8 @@
 #include <stdexcept>
 
 #include "budget.h"
-#include "model/occupancy.h"
 #include "scratch_file.h"
+#include "world/maps/occupancy.h"
 
 extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   using namespace ruedo::model;

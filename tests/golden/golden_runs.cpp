@@ -12,10 +12,10 @@
 #include <openssl/evp.h>
 
 #include "engine/engine.h"
-#include "model/load.h"
 #include "ruedo/joint_command_t.hpp"
 #include "ruedo/math.h"
 #include "scene/gl_context.h"
+#include "world/load.h"
 
 namespace ruedo {
 namespace {

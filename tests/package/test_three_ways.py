@@ -147,7 +147,7 @@ def test_nothing_is_forced_and_nothing_depends_on_the_top():
         assert file.name == "RuedoRegression.cmake" or "CMAKE_BINARY_DIR" not in text, file
 
 
-@pytest.mark.parametrize("folder", ["clients/web", "scripts/lint_tools"])
+@pytest.mark.parametrize("folder", ["web", "scripts/lint_tools"])
 def test_the_npm_of_debian_reads_what_is_asked_of_it(folder):
     """npm 9.2, of Debian 12 and 13, takes no lock file beside an alias in "overrides"; its `npm ci`
     then says that there is none. Newer ones do not mind.

@@ -59,7 +59,7 @@ def test_it_stands_nowhere_else():
         "CMakeLists.txt": r"project\(ruedo VERSION \d",
         "clients/python/pyproject.toml": r'^version = "',
         "clients/python/ruedo/__init__.py": r'__version__ = "',
-        "clients/web/package.json": r'^  "version"',
+        "web/package.json": r'^  "version"',
         "README.md": r"ruedo[-_]\d",
     }
     for name, words in places.items():

@@ -6,7 +6,7 @@
 #include <memory>
 #include <random>
 
-#include "physics/joint_tree.h"
+#include "physics/joints/joint_tree.h"
 
 namespace ruedo::physics {
 namespace {

@@ -4,9 +4,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "model/load.h"
 #include "physics/physics_world.h"
 #include "ruedo/quantity.h"
+#include "world/load.h"
 
 namespace ruedo::physics {
 namespace {

@@ -5,8 +5,8 @@
 #include <memory>
 #include <string>
 
-#include "model/load.h"
 #include "physics/physics_world.h"
+#include "world/load.h"
 
 namespace ruedo::physics::testing {
 

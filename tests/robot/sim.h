@@ -10,9 +10,9 @@
 #include <ruedo/motion_status_t.hpp>
 #include <ruedo/move_command_t.hpp>
 
-#include "model/load.h"
 #include "physics/physics_world.h"
 #include "robot/robots.h"
+#include "world/load.h"
 
 namespace ruedo::robot::testing {
 

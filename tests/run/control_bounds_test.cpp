@@ -2,8 +2,8 @@
 // requests before the first state.
 #include <gtest/gtest.h>
 
+#include "base/utf8.h"
 #include "control_client.h"
-#include "core/utf8.h"
 #include "ruedo/grant_reply_t.hpp"
 #include "ruedo/grant_request_t.hpp"
 #include "ruedo/join_t.hpp"

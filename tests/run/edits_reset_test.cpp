@@ -12,7 +12,7 @@
 #include "ruedo/odometry_t.hpp"
 #include "ruedo/pose_t.hpp"
 #include "ruedo/velocity_command_t.hpp"
-#include "run/verify.h"
+#include "run/repeat/verify.h"
 
 namespace ruedo::run {
 namespace {

@@ -1,6 +1,6 @@
 // What faults cost: what they keep is bounded, and forgotten with them, and those that have ended
 // make room for others.
-#include "engine/faults.h"
+#include "engine/faults/faults.h"
 
 #include <algorithm>
 #include <cmath>

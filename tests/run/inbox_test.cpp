@@ -8,7 +8,7 @@
 #include "engine/command_inbox.h"
 #include "ruedo/velocity_command_t.hpp"
 #include "ruedo/wheel_command_t.hpp"
-#include "run/control.h"
+#include "run/requests/control.h"
 #include "running.h"
 
 namespace ruedo::run {

@@ -9,6 +9,7 @@
 #include <stdexcept>
 #include <utility>
 
+#include "base/crc32.h"
 #include "lossy_bus.h"
 #include "ruedo/decode.h"
 #include "ruedo/grant_reply_t.hpp"
@@ -19,7 +20,6 @@
 #include "ruedo/resend_reply_t.hpp"
 #include "ruedo/resend_request_t.hpp"
 #include "ruedo/tick_t.hpp"
-#include "run/tick.h"
 
 namespace ruedo::run {
 

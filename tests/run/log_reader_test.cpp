@@ -11,9 +11,9 @@
 
 #include <gtest/gtest.h>
 
-#include "core/big_endian.h"
-#include "core/lcm_log.h"
-#include "core/message_size.h"
+#include "base/big_endian.h"
+#include "base/lcm_log.h"
+#include "base/message_size.h"
 #include "log/writer.h"
 
 namespace ruedo::log {

@@ -14,8 +14,8 @@
 #include "ruedo/velocity_command_t.hpp"
 #include "run/journal.h"
 #include "run/live.h"
-#include "run/lockstep.h"
-#include "run/repeating.h"
+#include "run/lockstep/lockstep.h"
+#include "run/repeat/repeating.h"
 #include "running.h"
 
 namespace ruedo::run {

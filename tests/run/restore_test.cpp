@@ -9,8 +9,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "base/input_file.h"
 #include "control_client.h"
-#include "core/input_file.h"
 #include "log/reader.h"
 #include "log/writer.h"
 #include "ruedo/rate_request_t.hpp"
@@ -18,8 +18,8 @@
 #include "ruedo/tick_t.hpp"
 #include "ruedo/velocity_command_t.hpp"
 #include "ruedo/world_state_t.hpp"
-#include "run/replay.h"
-#include "run/saved_states.h"
+#include "run/repeat/replay.h"
+#include "run/requests/saved_states.h"
 
 namespace ruedo::run {
 namespace {

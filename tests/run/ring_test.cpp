@@ -11,7 +11,7 @@
 #include "log/reader.h"
 #include "log/ring.h"
 #include "ruedo/request_t.hpp"
-#include "run/verify.h"
+#include "run/repeat/verify.h"
 #include "running.h"
 
 namespace ruedo::log {

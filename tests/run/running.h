@@ -16,9 +16,9 @@
 #include <unistd.h>
 
 #include "engine/thread_limit.h"
-#include "model/load.h"
 #include "ruedo/bus.h"
 #include "run/run.h"
+#include "world/load.h"
 
 namespace ruedo::run {
 

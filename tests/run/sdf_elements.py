@@ -166,7 +166,7 @@ def main():
             lines.append(f' "{text[:end]}"')
             text = text[end:]
         lines[-1] += "},"
-    (source / "src/model/sdf_children.inc").write_text("\n".join(lines) + "\n")
+    (source / "src/world/read/sdf_children.inc").write_text("\n".join(lines) + "\n")
 
 
 if __name__ == "__main__":

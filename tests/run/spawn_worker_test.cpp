@@ -8,7 +8,7 @@
 #include "log/reader.h"
 #include "ruedo/applied_t.hpp"
 #include "ruedo/grant_request_t.hpp"
-#include "run/verify.h"
+#include "run/repeat/verify.h"
 
 namespace ruedo::run {
 namespace {

@@ -9,10 +9,10 @@
 #include <gtest/gtest.h>
 #include <sys/stat.h>
 
-#include "../model/temporary_folder.h"
 #include "control_client.h"
-#include "core/file_handle.h"
 #include "run/stall_watch.h"
+#include "system/file_handle.h"
+#include "temporary_folder.h"
 
 namespace ruedo::run {
 namespace {

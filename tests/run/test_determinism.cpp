@@ -5,7 +5,7 @@
 
 #include "ruedo/pose_t.hpp"
 #include "ruedo/velocity_command_t.hpp"
-#include "run/control.h"
+#include "run/requests/control.h"
 #include "running.h"
 
 namespace ruedo::run {

@@ -4,8 +4,7 @@
 #include <gtest/gtest.h>
 #include <lcm/lcm-cpp.hpp>
 
-#include "core/late_library.h"
-#include "core/sha256.h"
+#include "base/sha256.h"
 #include "full_disk.h"
 #include "log/header.h"
 #include "log/reader.h"
@@ -16,6 +15,7 @@
 #include "ruedo/log_header_t.hpp"
 #include "ruedo/velocity_command_t.hpp"
 #include "running.h"
+#include "system/late_library.h"
 
 namespace ruedo::run {
 namespace {

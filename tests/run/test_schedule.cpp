@@ -4,6 +4,7 @@
 
 #include <gtest/gtest.h>
 
+#include "base/crc32.h"
 #include "counting_new.h"
 #include "ruedo/decode.h"
 #include "ruedo/odometry_t.hpp"

@@ -1,9 +1,9 @@
 // Names and places of models that come and go.
-#include "engine/world_editor.h"
+#include "engine/edits/world_editor.h"
 
 #include <gtest/gtest.h>
 
-#include "engine/edits.h"
+#include "engine/edits/edits.h"
 
 namespace ruedo::engine {
 namespace {

@@ -6,9 +6,9 @@
 #include <utility>
 #include <vector>
 
-#include "model/body_layout.h"
 #include "ruedo/random.h"
 #include "scene/ray_scene.h"
+#include "world/model/body_layout.h"
 
 namespace ruedo::scene {
 

@@ -7,9 +7,9 @@
 #include <gtest/gtest.h>
 #include <opencv2/imgcodecs.hpp>
 
-#include "model/body_layout.h"
 #include "ruedo/errors.h"
 #include "scene/render_scene.h"
+#include "world/model/body_layout.h"
 
 namespace ruedo::scene {
 namespace {

@@ -16,7 +16,6 @@
 #endif
 #endif
 
-#include "model/document.h"
 #include "ruedo/camera_info_t.hpp"
 #include "ruedo/device_info_t.hpp"
 #include "ruedo/image_t.hpp"
@@ -24,6 +23,7 @@
 #include "sensor_bench.h"
 #include "sensors/camera_lens.h"
 #include "sensors/pixel_noise.h"
+#include "world/read/document.h"
 
 namespace ruedo {
 namespace {

@@ -9,9 +9,9 @@
 
 #include <gtest/gtest.h>
 
-#include "model/body_layout.h"
-#include "model/load.h"
 #include "ruedo/sensor.h"
+#include "world/load.h"
+#include "world/model/body_layout.h"
 
 namespace ruedo::test {
 

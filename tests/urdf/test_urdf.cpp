@@ -9,8 +9,8 @@
 #include <gtest/gtest.h>
 #include <sdf/sdf.hh>
 
-#include "model/load.h"
-#include "ros2/robot_frames.h"
+#include "bridges/ros2/robot_frames.h"
+#include "world/load.h"
 
 namespace ruedo::ros2 {
 namespace {
@@ -45,7 +45,7 @@ TEST_P(Urdf, IsReadCleanly) {
 }
 
 std::vector<std::string> robots() {
-  std::vector<std::string> files{std::string(RUEDO_SOURCE_DIR) + "/tests/ros2/links.sdf"};
+  std::vector<std::string> files{std::string(RUEDO_SOURCE_DIR) + "/tests/bridges/ros2/links.sdf"};
   for (const auto& each : std::filesystem::directory_iterator(kRobots)) {
     if (std::filesystem::exists(each.path() / "model.sdf"))
       files.push_back((each.path() / "model.sdf").string());

@@ -6,9 +6,9 @@
 #include <fstream>
 #include <iterator>
 
-#include "model/load.h"
-#include "model/world_text.h"
 #include "ruedo/errors.h"
+#include "world/edit/world_text.h"
+#include "world/load.h"
 
 namespace ruedo::model {
 namespace {

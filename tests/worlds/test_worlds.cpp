@@ -7,7 +7,7 @@
 #include <set>
 #include <string>
 
-#include "model/load.h"
+#include "world/load.h"
 
 namespace ruedo::model {
 namespace {

@@ -8,8 +8,8 @@
 #include <string>
 #include <vector>
 
-#include "model/load.h"
-#include "model/world_text.h"
+#include "world/edit/world_text.h"
+#include "world/load.h"
 
 namespace {
 

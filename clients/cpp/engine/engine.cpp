@@ -5,10 +5,10 @@
 #include <numeric>
 #include <utility>
 
-#include "core/plugins.h"
 #include "engine/engine.h"
-#include "model/load.h"
 #include "scene/gl_context.h"
+#include "system/plugins.h"
+#include "world/load.h"
 
 namespace ruedo {
 namespace {

@@ -18,17 +18,17 @@
 #include <nanobind/stl/vector.h>
 
 #include "arrivals.h"
-#include "core/plugins.h"
-#include "core/version.h"
+#include "base/version.h"
 #include "engine/engine.h"
 #include "log/header.h"
-#include "model/load.h"
-#include "model/randomization.h"
 #include "program_end.h"
 #include "ruedo/errors.h"
 #include "ruedo/math.h"
 #include "scene/gl_context.h"
+#include "system/plugins.h"
 #include "watched_run.h"
+#include "world/edit/randomization.h"
+#include "world/load.h"
 
 namespace nb = nanobind;
 using ruedo::Primitive;

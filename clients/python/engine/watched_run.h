@@ -9,15 +9,15 @@
 
 #include "engine/batch.h"
 #include "engine/command_inbox.h"
+#include "engine/judge/judge.h"
 #include "engine/world_state.h"
-#include "judge/judge.h"
 #include "log/header.h"
 #include "log/writer.h"
-#include "model/world_model.h"
 #include "ruedo/applied_t.hpp"
 #include "ruedo/errors.h"
 #include "ruedo/log_header_t.hpp"
 #include "ruedo/state_hash_t.hpp"
+#include "world/model/world_model.h"
 
 class WatchedRun {
  public:

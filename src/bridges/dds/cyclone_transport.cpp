@@ -1,0 +1,551 @@
+// One participant with a thread that waits for samples of all readers.
+#include "bridges/dds/cyclone_transport.h"
+
+#include <algorithm>
+#include <atomic>
+#include <charconv>
+#include <chrono>
+#include <condition_variable>
+#include <cstdlib>
+#include <cstring>
+#include <map>
+#include <mutex>
+#include <optional>
+#include <set>
+#include <string_view>
+#include <thread>
+#include <utility>
+#include <vector>
+
+#include <dds/dds.h>
+#include <fmt/format.h>
+#include <ifaddrs.h>
+#include <net/if.h>
+#include <spdlog/spdlog.h>
+#include <sys/socket.h>
+
+#include "bridges/dds/identity.h"
+#include "bridges/dds/incoming.h"
+#include "bridges/dds/raw_type.h"
+#include "bridges/dds/reply_ends.h"
+#include "bridges/ros2/fair_queue.h"
+#include "bridges/ros2/interfaces.h"
+#include "ruedo/errors.h"
+#include "system/enough_threads.h"
+
+namespace ruedo::dds {
+namespace {
+
+using ros2::Endpoint;
+using ros2::Gid;
+using ros2::Role;
+
+constexpr uint32_t kLastDomain = 232;  // higher domains have no valid ports
+constexpr int kCyclonesThreads = 12;
+constexpr auto kLinger = "250ms";     // for readers that have not acknowledged all, at the end
+constexpr int kMostTaken = 64;        // samples taken at once
+constexpr auto kLook = DDS_MSECS(2);  // interval for requests that have to wait
+
+struct QosDeleter {
+  void operator()(dds_qos_t* qos) const { dds_delete_qos(qos); }
+};
+using QosPointer = std::unique_ptr<dds_qos_t, QosDeleter>;
+struct ListenerDeleter {
+  void operator()(dds_listener_t* listener) const { dds_delete_listener(listener); }
+};
+using ListenerPointer = std::unique_ptr<dds_listener_t, ListenerDeleter>;
+
+dds_entity_t checked(dds_entity_t result, const std::string& what) {
+  if (result < 0)
+    throw EnvironmentError(fmt::format("ROS 2: {}: {}", what, dds_strretcode(-result)));
+  return result;
+}
+
+Gid gid_of(dds_entity_t entity) {
+  dds_guid_t guid{};
+  Gid gid{};
+  if (dds_get_guid(entity, &guid) == DDS_RETCODE_OK)
+    std::copy(std::begin(guid.v), std::end(guid.v), gid.begin());
+  return gid;
+}
+
+std::string dds_topic(const Endpoint& endpoint) {
+  switch (endpoint.role) {
+    case Role::topic: return "rt" + endpoint.topic.name;
+    case Role::request: return "rq" + endpoint.topic.name + "Request";
+    case Role::reply: return "rr" + endpoint.topic.name + "Reply";
+    case Role::graph: break;
+  }
+  return endpoint.topic.name;
+}
+
+QosPointer qos_of(const Endpoint& endpoint) {
+  const ros2::Qos& wanted = endpoint.topic.qos;
+  QosPointer qos(dds_create_qos());
+  dds_qset_history(qos.get(), DDS_HISTORY_KEEP_LAST, wanted.depth);
+  // Never waits for a slow reader: samples beyond its queue are dropped.
+  dds_qset_reliability(qos.get(),
+                       wanted.reliable ? DDS_RELIABILITY_RELIABLE : DDS_RELIABILITY_BEST_EFFORT, 0);
+  dds_qset_durability(
+      qos.get(), wanted.transient_local ? DDS_DURABILITY_TRANSIENT_LOCAL : DDS_DURABILITY_VOLATILE);
+  if (wanted.transient_local) {
+    dds_qset_durability_service(qos.get(), 0, DDS_HISTORY_KEEP_LAST, 1, DDS_LENGTH_UNLIMITED,
+                                DDS_LENGTH_UNLIMITED, DDS_LENGTH_UNLIMITED);
+  }
+  dds_qset_writer_data_lifecycle(qos.get(), false);
+  dds_qset_ignorelocal(qos.get(), DDS_IGNORELOCAL_PARTICIPANT);
+  const std::string user_data =
+      (endpoint.service.empty() ? "" : "serviceid=" + endpoint.service + ";") +
+      (endpoint.hash.empty() ? "" : "typehash=" + endpoint.hash + ";");
+  if (!user_data.empty()) dds_qset_userdata(qos.get(), user_data.data(), user_data.size());
+  return qos;
+}
+
+// A configuration element of Cyclone with text from the environment.
+std::string peer_element(std::string_view address) {
+  std::string text;
+  for (const char c : address) {
+    if (c == '&')
+      text += "&amp;";
+    else if (c == '<')
+      text += "&lt;";
+    else if (c == '"')
+      text += "&quot;";
+    else
+      text += c;
+  }
+  return "<Peer Address=\"" + text + "\"/>";
+}
+
+// Nodes of this machine only: multicast goes over the loopback interface, which reaches those that
+// listen to multicast on any interface; nodes without multicast, as with ROS's LOCALHOST, are
+// contacted individually. The other interfaces are listed because Cyclone considers a node
+// unreachable if its address is on none of its own.
+std::string local_interfaces() {
+  constexpr size_t kMost = 3;  // Cyclone has room for four
+  std::string text = "<NetworkInterface address=\"127.0.0.1\" multicast=\"true\"/>";
+  ifaddrs* list = nullptr;
+  if (getifaddrs(&list) != 0) return text;
+  size_t count = 0;
+  std::set<std::string> names;
+  for (const ifaddrs* each = list; each && count < kMost; each = each->ifa_next) {
+    const bool usable = each->ifa_addr && each->ifa_addr->sa_family == AF_INET &&
+                        (each->ifa_flags & IFF_UP) && !(each->ifa_flags & IFF_LOOPBACK);
+    if (!usable || !names.insert(each->ifa_name).second) continue;
+    text += fmt::format("<NetworkInterface name=\"{}\" multicast=\"false\"/>", each->ifa_name);
+    ++count;
+  }
+  freeifaddrs(list);
+  return text;
+}
+
+std::string configuration(const CycloneOptions& options) {
+  std::string general, peers;
+  switch (options.range) {
+    case Range::off:
+      general =
+          "<Interfaces><NetworkInterface address=\"127.0.0.1\" "
+          "multicast=\"false\"/></Interfaces><AllowMulticast>false</AllowMulticast>";
+      break;
+    case Range::localhost:
+      general = "<Interfaces>" + local_interfaces() +
+                "</Interfaces><AllowMulticast>spdp</AllowMulticast><MulticastTimeToLive>0</"
+                "MulticastTimeToLive>";
+      peers = peer_element("127.0.0.1");
+      break;
+    case Range::subnet:
+    case Range::system_default: break;
+  }
+  for (size_t begin = 0; begin < options.static_peers.size();) {
+    const size_t end = std::min(options.static_peers.find(';', begin), options.static_peers.size());
+    if (end > begin)
+      peers += peer_element(std::string_view(options.static_peers).substr(begin, end - begin));
+    begin = end + 1;
+  }
+  // Pictures need few datagrams; a writer's cache is limited by its depth only. Data that arrives
+  // while others have the CPU waits in the socket buffer, as far as the system allows
+  // (net.core.rmem_max). Of each writer few samples are kept that are not whole, or whose turn has
+  // not come; how large they may be says bridges/dds/incoming.h.
+  return "<CycloneDDS><Domain Id=\"any\"><General>" + general +
+         "<MaxMessageSize>65500B</MaxMessageSize><FragmentSize>60000B</FragmentSize></General>"
+         "<Discovery>" +
+         (peers.empty() ? ""
+                        : "<ParticipantIndex>auto</ParticipantIndex><MaxAutoParticipantIndex>119</"
+                          "MaxAutoParticipantIndex><Peers>" +
+                              peers + "</Peers>") +
+         "</Discovery><Internal><SocketReceiveBufferSize "
+         "max=\"8MiB\"/><MaxSampleSize>1GiB</MaxSampleSize>"
+         "<DefragUnreliableMaxSamples>4</DefragUnreliableMaxSamples>"
+         "<DefragReliableMaxSamples>4</DefragReliableMaxSamples>"
+         "<PrimaryReorderMaxSamples>32</PrimaryReorderMaxSamples>"
+         "<SecondaryReorderMaxSamples>32</SecondaryReorderMaxSamples><WriterLingerDuration>" +
+         std::string(kLinger) +
+         "</WriterLingerDuration><Watermarks><WhcHigh>1GB</"
+         "WhcHigh></Watermarks></Internal>"
+         "<Tracing><Verbosity>none</Verbosity></Tracing></Domain></CycloneDDS>";
+}
+
+// Cyclone's own warnings, of which strangers can cause any number: at most one a second. Refused
+// samples are counted elsewhere.
+void tell(void*, const dds_log_data_t* data) {
+  constexpr int64_t kPeriod_ns = 1'000'000'000;
+  static std::atomic<int64_t> next_ns{0};
+  const std::string_view text(data->message, data->size);
+  if (text.find("deserialization") != text.npos) return;
+  const int64_t now = std::chrono::steady_clock::now().time_since_epoch().count();
+  int64_t next = next_ns;
+  if (now < next || !next_ns.compare_exchange_strong(next, now + kPeriod_ns)) return;
+  const std::string_view line = text.substr(0, text.find_last_not_of('\n') + 1);
+  if (const size_t sample = line.find("sample"); line.starts_with("dropping oversize"))
+    spdlog::warn(
+        "ROS 2: left out, for it has more than {} MB or fragments of less than {} bytes: {}",
+        kLargestIncoming >> 20, kSmallestFragment, line.substr(std::min(sample, line.size())));
+  else
+    spdlog::warn("ROS 2: Cyclone DDS: {}", line);
+}
+
+// What ROS calls the policy for which a reader and a writer do not meet.
+const char* policy_name(uint32_t id) {
+  switch (id) {
+    case DDS_DURABILITY_QOS_POLICY_ID: return "durability";
+    case DDS_DEADLINE_QOS_POLICY_ID: return "deadline";
+    case DDS_LIVELINESS_QOS_POLICY_ID: return "liveliness";
+    case DDS_RELIABILITY_QOS_POLICY_ID: return "reliability";
+    default: return "another policy";
+  }
+}
+
+class CycloneWriter : public ros2::Writer {
+ public:
+  CycloneWriter(dds_entity_t participant, const Endpoint& endpoint) : name_(endpoint.topic.name) {
+    const std::string name = dds_topic(endpoint);
+    topic_ = checked(create_raw_topic(participant, name.c_str(),
+                                      ros2::dds_type(endpoint.topic.type).c_str(), &type_),
+                     "topic " + name);
+    const ListenerPointer listener(dds_create_listener(this));
+    dds_lset_offered_incompatible_qos(listener.get(), tell_incompatible);
+    writer_ =
+        checked(dds_create_writer(participant, topic_, qos_of(endpoint).get(), listener.get()),
+                "writer of " + name);
+    if (endpoint.role == Role::reply) tell_identities(*type_);
+  }
+  ~CycloneWriter() override {
+    dds_delete(writer_);
+    dds_delete(topic_);
+  }
+
+  bool write(std::span<const uint8_t> cdr) override {
+    ddsi_serdata* sample = make_sample(type_, cdr);
+    return dds_writecdr(writer_, sample) == DDS_RETCODE_OK;
+  }
+  bool reply(std::span<const uint8_t> cdr, const ros2::SampleIdentity& request) override {
+    const std::vector<uint8_t> marked = with_identity(cdr, request);
+    return !marked.empty() && write(marked);
+  }
+  size_t readers() const override {
+    dds_publication_matched_status_t status{};
+    return dds_get_publication_matched_status(writer_, &status) == DDS_RETCODE_OK
+               ? status.current_count
+               : 0;
+  }
+  Gid gid() const override { return gid_of(writer_); }
+  dds_entity_t entity() const { return writer_; }
+
+ private:
+  static void tell_incompatible(dds_entity_t, const dds_offered_incompatible_qos_status_t status,
+                                void* writer) noexcept {
+    CycloneWriter& self = *static_cast<CycloneWriter*>(writer);
+    if (std::exchange(self.told_, true)) return;
+    spdlog::warn("ROS 2: somebody reads {} with a QoS that is not offered ({}): it gets nothing",
+                 self.name_, policy_name(status.last_policy_id));
+  }
+
+  std::string name_;
+  bool told_ = false;
+  dds_entity_t topic_ = 0, writer_ = 0;
+  const ddsi_sertype* type_ = nullptr;
+};
+
+class CycloneReader;
+
+// The transport's thread, which takes what comes. Readers may come and go meanwhile.
+class Receiver {
+ public:
+  explicit Receiver(dds_entity_t participant)
+      : waitset_(dds_create_waitset(participant)), wake_(dds_create_guardcondition(participant)) {
+    dds_waitset_attach(waitset_, wake_, 0);
+  }
+  ~Receiver() { stop(); }
+
+  void start();
+  void stop();
+
+  void attach(dds_entity_t entity, CycloneReader* reader, const std::string& name) {
+    checked(dds_waitset_attach(waitset_, entity, reinterpret_cast<dds_attach_t>(reader)),
+            "reader of " + name);
+  }
+  // Returns when the thread is done with it. Not to be called from a handler.
+  void detach(dds_entity_t entity, CycloneReader* reader);
+
+ private:
+  void receive();
+  void let_go();
+
+  dds_entity_t waitset_, wake_;
+  std::set<CycloneReader*> readers_;  // the thread's: those with deferred work
+  std::atomic<bool> stopping_{false};
+  std::thread thread_;
+  std::condition_variable gone_;
+  std::mutex mutex_;  // of what follows
+  std::set<CycloneReader*> leaving_;
+  bool running_ = false;
+};
+
+class CycloneReader : public ros2::Reader {
+ public:
+  CycloneReader(dds_entity_t participant, Receiver& receiver, const Endpoint& endpoint,
+                ros2::Transport::Handler handler)
+      : receiver_(receiver), name_(endpoint.topic.name), handler_(std::move(handler)) {
+    const std::string name = dds_topic(endpoint);
+    const ddsi_sertype* type = nullptr;
+    topic_ = checked(create_raw_topic(participant, name.c_str(),
+                                      ros2::dds_type(endpoint.topic.type).c_str(), &type),
+                     "topic " + name);
+    reader_ = checked(dds_create_reader(participant, topic_, qos_of(endpoint).get(), nullptr),
+                      "reader of " + name);
+    bound_incoming(*type, gid_of(participant));
+    checked(dds_set_status_mask(reader_,
+                                DDS_DATA_AVAILABLE_STATUS | DDS_REQUESTED_INCOMPATIBLE_QOS_STATUS),
+            "reader of " + name);
+    if (const auto* replies = static_cast<const CycloneWriter*>(endpoint.replies))
+      requests_ = std::make_unique<WaitingRequests>(reader_, replies->entity());
+    receiver_.attach(reader_, this, name);
+  }
+  ~CycloneReader() override {
+    receiver_.detach(reader_, this);
+    requests_.reset();
+    dds_delete(reader_);
+    dds_delete(topic_);
+  }
+
+  Gid gid() const override { return gid_of(reader_); }
+  size_t writers() const override {
+    dds_subscription_matched_status_t status{};
+    return dds_get_subscription_matched_status(reader_, &status) == DDS_RETCODE_OK
+               ? status.current_count
+               : 0;
+  }
+
+  // Deferred work, in the transport's thread. One batch at a time, so that a writer that sends
+  // without end leaves time for others.
+  enum class Left { nothing, waiting, more };
+  Left take() {
+    uint32_t status = 0;
+    dds_take_status(reader_, &status,
+                    DDS_DATA_AVAILABLE_STATUS | DDS_REQUESTED_INCOMPATIBLE_QOS_STATUS);
+    if (status & DDS_REQUESTED_INCOMPATIBLE_QOS_STATUS) tell_incompatible();
+    ddsi_serdata* samples[kMostTaken];
+    dds_sample_info_t infos[kMostTaken];
+    const int count = dds_takecdr(reader_, samples, kMostTaken, infos, DDS_ANY_STATE);
+    for (int i = 0; i < count; ++i) {
+      SamplePointer sample(samples[i]);
+      if (!infos[i].valid_data) continue;
+      const dds_instance_handle_t writer = infos[i].publication_handle;
+      if (requests_)
+        requests_->queue.push(writer, std::move(sample));
+      else
+        hand_over(*sample, writer);
+    }
+    if (requests_) answer();
+    if (count == kMostTaken) return Left::more;
+    return requests_ && !requests_->queue.empty() ? Left::waiting : Left::nothing;
+  }
+
+ private:
+  struct Unref {
+    void operator()(ddsi_serdata* sample) const { ddsi_serdata_unref(sample); }
+  };
+  using SamplePointer = std::unique_ptr<ddsi_serdata, Unref>;
+  // While waiting they count towards their writer's share of the topic's memory.
+  struct WaitingRequests {
+    WaitingRequests(dds_entity_t requests, dds_entity_t replies) : ends(requests, replies) {}
+    ReplyEnds ends;
+    ros2::FairQueue<SamplePointer> queue;
+  };
+
+  void hand_over(const ddsi_serdata& data, dds_instance_handle_t writer) {
+    ros2::Sample sample = as_sample(&data);
+    sample.sender = writer;
+    handler_(sample);
+  }
+  void answer() {
+    for (int i = 0; i < kMostTaken; ++i) {
+      const auto now = ReplyEnds::Clock::now();
+      const auto request = requests_->queue.next(
+          now, [&](uint64_t writer) { return requests_->ends.may_answer(writer, now); });
+      if (!request) return;
+      hand_over(*request->second, request->first);
+    }
+  }
+  void tell_incompatible() {
+    if (std::exchange(told_, true)) return;
+    dds_requested_incompatible_qos_status_t status{};
+    dds_get_requested_incompatible_qos_status(reader_, &status);
+    spdlog::warn(
+        "ROS 2: somebody publishes on {} with a QoS that a reliable reader does not get ({}): it "
+        "is not heard",
+        name_, policy_name(status.last_policy_id));
+  }
+
+  Receiver& receiver_;
+  dds_entity_t topic_ = 0, reader_ = 0;
+  std::string name_;
+  ros2::Transport::Handler handler_;
+  std::unique_ptr<WaitingRequests> requests_;  // null: a topic
+  bool told_ = false;
+};
+
+void Receiver::start() {
+  const std::lock_guard lock(mutex_);
+  thread_ = std::thread([this] { receive(); });
+  running_ = true;
+}
+
+void Receiver::stop() {
+  if (!thread_.joinable()) return;
+  stopping_ = true;
+  dds_set_guardcondition(wake_, true);
+  thread_.join();
+}
+
+void Receiver::detach(dds_entity_t entity, CycloneReader* reader) {
+  dds_waitset_detach(waitset_, entity);
+  std::unique_lock lock(mutex_);
+  leaving_.insert(reader);
+  dds_set_guardcondition(wake_, true);
+  gone_.wait(lock, [&] { return !running_ || !leaving_.contains(reader); });
+  leaving_.erase(reader);
+}
+
+void Receiver::let_go() {
+  bool woken = false;
+  dds_take_guardcondition(wake_, &woken);
+  const std::lock_guard lock(mutex_);
+  for (CycloneReader* reader : leaving_) readers_.erase(reader);
+  leaving_.clear();
+  gone_.notify_all();
+}
+
+void Receiver::receive() {
+  using Left = CycloneReader::Left;
+  dds_attach_t woken[kMostTaken];
+  dds_duration_t patience = DDS_INFINITY;
+  while (!stopping_) {
+    const dds_return_t count = dds_waitset_wait(waitset_, woken, kMostTaken, patience);
+    for (dds_return_t i = 0; i < std::min(count, kMostTaken); ++i) {
+      if (woken[i] != 0) readers_.insert(reinterpret_cast<CycloneReader*>(woken[i]));
+    }
+    let_go();
+    patience = DDS_INFINITY;
+    for (auto reader = readers_.begin(); reader != readers_.end() && !stopping_;) {
+      const Left left = (*reader)->take();
+      if (left != Left::nothing) patience = left == Left::more ? 0 : std::min(patience, kLook);
+      reader = left == Left::nothing ? readers_.erase(reader) : std::next(reader);
+    }
+  }
+  const std::lock_guard lock(mutex_);
+  running_ = false;
+  gone_.notify_all();
+}
+
+class CycloneTransport : public ros2::Transport {
+ public:
+  explicit CycloneTransport(const CycloneOptions& options) : options_(options) {
+    require_threads(kCyclonesThreads);  // without one of them it aborts
+    dds_set_log_sink(tell, nullptr);
+    domain_ =
+        checked(dds_create_domain(options.domain, (configuration(options) + options.more).c_str()),
+                fmt::format("domain {}", options.domain));
+    QosPointer qos(dds_create_qos());
+    constexpr char kEnclave[] = "enclave=/;";
+    dds_qset_userdata(qos.get(), kEnclave, sizeof kEnclave - 1);
+    participant_ = dds_create_participant(options.domain, qos.get(), nullptr);
+    if (participant_ < 0) {
+      dds_delete(domain_);
+      throw EnvironmentError(fmt::format("ROS 2: no participant in domain {}: {}", options.domain,
+                                         dds_strretcode(-participant_)));
+    }
+    receiver_.emplace(participant_);
+  }
+  ~CycloneTransport() override {
+    stop();
+    dds_delete(domain_);
+  }
+
+  std::unique_ptr<ros2::Writer> add_writer(const Endpoint& endpoint) override {
+    return std::make_unique<CycloneWriter>(participant_, endpoint);
+  }
+  std::unique_ptr<ros2::Reader> add_reader(const Endpoint& endpoint, Handler handler) override {
+    return std::make_unique<CycloneReader>(participant_, *receiver_, endpoint, std::move(handler));
+  }
+
+  void start() override { receiver_->start(); }
+  void stop() override { receiver_->stop(); }
+
+  Gid gid() const override { return gid_of(participant_); }
+  std::string where() const override {
+    constexpr const char* kRanges[] = {"discovery off", "this machine only", "the subnet",
+                                       "as Cyclone DDS is configured"};
+    return fmt::format("domain {}, {}", options_.domain,
+                       kRanges[static_cast<size_t>(options_.range)]);
+  }
+  uint64_t refused() const override { return refused_samples(); }
+
+ private:
+  CycloneOptions options_;
+  dds_entity_t domain_ = 0, participant_ = 0;
+  std::optional<Receiver> receiver_;  // of the participant
+};
+
+std::string environment(const char* name) {
+  const char* value = std::getenv(name);
+  return value ? value : "";
+}
+
+}  // namespace
+
+CycloneOptions options_from_environment() {
+  CycloneOptions options;
+  if (const std::string text = environment("ROS_DOMAIN_ID"); !text.empty()) {
+    const auto [end, error] =
+        std::from_chars(text.data(), text.data() + text.size(), options.domain);
+    if (error != std::errc() || end != text.data() + text.size() || options.domain > kLastDomain) {
+      throw InputError({},
+                       fmt::format("ROS_DOMAIN_ID is '{}'; 0 to {} is allowed", text, kLastDomain));
+    }
+  }
+  const std::string range = environment("ROS_AUTOMATIC_DISCOVERY_RANGE");
+  const std::map<std::string, Range> ranges{{"", Range::localhost},
+                                            {"OFF", Range::off},
+                                            {"LOCALHOST", Range::localhost},
+                                            {"SUBNET", Range::subnet},
+                                            {"SYSTEM_DEFAULT", Range::system_default}};
+  const auto known = ranges.find(range);
+  if (known == ranges.end()) {
+    throw InputError({}, "ROS_AUTOMATIC_DISCOVERY_RANGE is '" + range +
+                             "'; OFF, LOCALHOST, SUBNET and SYSTEM_DEFAULT are allowed");
+  }
+  options.range = known->second;
+  // As with any program over Cyclone DDS: what it says goes before what Ruedo says.
+  if (const std::string more = environment("CYCLONEDDS_URI"); !more.empty())
+    options.more = "," + more;
+  if (options.range != Range::system_default && options.range != Range::off)
+    options.static_peers = environment("ROS_STATIC_PEERS");
+  return options;
+}
+
+std::unique_ptr<ros2::Transport> open_cyclone(const CycloneOptions& options) {
+  return std::make_unique<CycloneTransport>(options);
+}
+
+}  // namespace ruedo::dds

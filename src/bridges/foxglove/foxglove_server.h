@@ -1,0 +1,26 @@
+// --foxglove: a run in Foxglove, by its WebSocket protocol, with the messages that `ruedo export`
+// writes. Without the web console's server in this build it says what is missing.
+#pragma once
+
+#include <memory>
+#include <string>
+
+namespace ruedo::run {
+class Run;
+}
+
+namespace ruedo::foxglove {
+
+class FoxgloveServer {
+ public:
+  // Before any work. Throws as open().
+  static void check(const std::string& address);
+  // From now on it may be connected to; the run's messages come to it as it goes on. address: as
+  // of --view. Throws InputError, and EnvironmentError when the port cannot be had.
+  static std::unique_ptr<FoxgloveServer> open(run::Run& server, const std::string& address);
+
+  virtual ~FoxgloveServer() = default;  // after the run, before the server
+  virtual void print() const = 0;       // where it is reached
+};
+
+}  // namespace ruedo::foxglove

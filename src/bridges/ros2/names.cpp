@@ -1,0 +1,69 @@
+#include "bridges/ros2/names.h"
+
+#include <algorithm>
+#include <cctype>
+
+#include "ruedo/element.h"
+#include "ruedo/errors.h"
+
+namespace ruedo::ros2 {
+
+std::string ros_name(const std::string& name) {
+  std::string text;
+  for (const char c : name) {
+    const bool allowed =
+        std::isalnum(static_cast<unsigned char>(c)) && static_cast<unsigned char>(c) < 128;
+    if (allowed)
+      text += c;
+    else if (!text.ends_with('_'))
+      text += '_';  // two in a row are not allowed
+  }
+  if (text.empty() || std::isdigit(static_cast<unsigned char>(text[0]))) text = "r" + text;
+  return text;
+}
+
+// Robots whose own name ROS allows come first.
+void Names::update(const std::set<std::string>& robots) {
+  std::erase_if(given_, [&](const auto& each) { return !robots.contains(each.first); });
+  std::set<std::string> taken;
+  for (const auto& [robot, name] : given_) taken.insert(name);
+  for (const bool changes : {false, true}) {
+    for (const std::string& robot : robots) {
+      std::string name = ros_name(robot);
+      if (is_plain(robot) || given_.contains(robot) || (name != robot) != changes) continue;
+      for (int i = 2; !taken.insert(name).second; ++i)
+        name = ros_name(robot + "_" + std::to_string(i));
+      given_[robot] = name;
+    }
+  }
+}
+
+std::string Names::name_of(const std::string& robot) const {
+  const auto given = given_.find(robot);
+  return given == given_.end() ? ros_name(robot) : given->second;
+}
+
+std::string Names::topic(const std::string& robot, const std::string& name) {
+  const std::string own = (is_plain(robot) ? "" : "/" + name_of(robot)) + "/" + name;
+  if (asked_) asked_->insert(own);
+  const auto remap = std::find_if(remaps_.begin(), remaps_.end(),
+                                  [&](const auto& each) { return each.first == own; });
+  return remap == remaps_.end() ? own : remap->second;
+}
+
+std::string Names::frame(const std::string& robot, const std::string& name) const {
+  return (is_plain(robot) ? "" : name_of(robot) + "/") + name;
+}
+
+void Names::check_remaps() {
+  const std::set<std::string> asked =
+      std::exchange(asked_, std::nullopt).value_or(std::set<std::string>());
+  for (const auto& [from, to] : remaps_) {
+    if (asked.contains(from)) continue;
+    const std::string near = nearest_word(from, {asked.begin(), asked.end()});
+    throw InputError({}, "--remap: there is no ROS topic or service '" + from + "'" +
+                             (near.empty() ? "" : "; did you mean '" + near + "'?"));
+  }
+}
+
+}  // namespace ruedo::ros2

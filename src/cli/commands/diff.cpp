@@ -1,0 +1,58 @@
+// ruedo diff: compares a log with a golden one, field by field.
+#include <memory>
+
+#include <fmt/format.h>
+#include <spdlog/spdlog.h>
+
+#include "base/utf8.h"
+#include "cli/support/commands.h"
+#include "cli/support/extensions.h"
+#include "log/diff.h"
+#include "ruedo/errors.h"
+#include "system/output_file.h"
+
+namespace ruedo::cli {
+namespace {
+
+struct DiffArguments {
+  std::string golden, other, junit, html;
+  std::vector<std::string> tolerances, ignored;
+};
+
+int diff(const DiffArguments& arguments) {
+  read_given_types();
+  const auto rules = log::DiffRule::all(arguments.tolerances, arguments.ignored);
+  const log::Diff result = log::diff_logs(arguments.golden, arguments.other, rules);
+  for (const std::string& line : result.idle_rules) spdlog::warn(line);
+  fmt::print("{}", for_terminal(log::diff_text(result)));
+  if (!arguments.junit.empty()) write_file(arguments.junit, log::diff_junit(result));
+  if (!arguments.html.empty())
+    write_file(arguments.html, log::diff_html(result, arguments.golden, arguments.other));
+  return result.same() ? kGood : kCheckFailed;
+}
+
+void add_diff(CLI::App& app, Action& chosen) {
+  CLI::App* command = app.add_subcommand("diff", "compare a log with a golden one, field by field");
+  const auto arguments = std::make_shared<DiffArguments>();
+  command->add_option("GOLDEN", arguments->golden, "the log to compare with")->required();
+  command->add_option("NEW", arguments->other, "the log to judge")->required();
+  command
+      ->add_option(
+          "--tolerance", arguments->tolerances,
+          "CHANNEL:FIELD=abs:1e-3,rel:0.01,angle:0.02; shell patterns; the last that fits counts")
+      ->type_name("RULE")
+      ->allow_extra_args(false);
+  command->add_option("--ignore", arguments->ignored, "CHANNEL or CHANNEL:FIELD")
+      ->type_name("PATTERN")
+      ->allow_extra_args(false);
+  command->add_option("--junit", arguments->junit, "write JUnit XML")->type_name("FILE");
+  command->add_option("--html", arguments->html, "write a page with plots of what differs")
+      ->type_name("FILE");
+  add_types_argument(*command);
+  command->callback([arguments, &chosen] { chosen = [arguments] { return diff(*arguments); }; });
+}
+
+const RegisterCommand kRegister{50, add_diff};
+
+}  // namespace
+}  // namespace ruedo::cli

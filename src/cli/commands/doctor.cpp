@@ -1,0 +1,169 @@
+// ruedo doctor: what this machine lacks, each fault in one line with its cure, in less than a
+// second.
+#include <cstdlib>
+
+#include <fmt/format.h>
+
+#include <lcm/lcm_version.h>
+
+#include "base/version.h"
+#include "bus/datagram_loss.h"
+#include "bus/lcm_url.h"
+#include "bus/url_claim.h"
+#include "cli/support/commands.h"
+#include "log/header.h"
+#include "ruedo/errors.h"
+#include "scene/render_scene.h"
+#include "system/sandbox.h"
+#include "world/model/body_layout.h"
+
+namespace ruedo::cli {
+namespace {
+
+constexpr int64_t kGoodBuffer = 2'097'152;  // bytes: a raw VGA picture passes
+constexpr int kSelfTestMs = 300;
+
+class Report {
+ public:
+  void good(const std::string& what, const std::string& text) {
+    line(style_.green, "ok", what, text);
+  }
+  void hint(const std::string& what, const std::string& text) {
+    line(style_.yellow, "hint", what, text);
+  }
+  void fault(const std::string& what, const std::string& text) {
+    line(style_.red, "FAULT", what, text);
+    faulty_ = true;
+  }
+  bool faulty() const { return faulty_; }
+
+ private:
+  void line(const char* colour, const char* verdict, const std::string& what,
+            const std::string& text) {
+    fmt::print("{}{:<5}{}  {:<16} {}\n", colour, verdict, style_.off, what, text);
+  }
+  Style style_ = style_of(stdout);
+  bool faulty_ = false;
+};
+
+void check_multicast(Report& report, const bus::LcmUrl& url) {
+  try {
+    bus::check_route(url);
+  } catch (const EnvironmentError& error) {
+    return report.fault(
+        "multicast",
+        std::string(error.what()) + "; or do without: ruedo run WORLD --lcm tcpq://127.0.0.1:7700");
+  }
+  if (bus::hears_itself(url, kSelfTestMs)) {
+    report.good("multicast", url.str() + ": a datagram to the group comes back");
+  } else {
+    report.fault("multicast", url.str() +
+                                  ": a datagram to the group does not come back: run: sudo ip link "
+                                  "set lo multicast on; sudo ip route add " +
+                                  url.host + "/32 dev lo; or let the firewall pass UDP port " +
+                                  std::to_string(url.port));
+  }
+}
+
+// Datagrams that listeners on this machine have lost, as counted by the kernel.
+void check_loss(Report& report, const bus::LcmUrl& url) {
+  const auto loss = bus::datagram_loss(static_cast<uint16_t>(url.port));
+  if (!loss) return report.hint("datagrams", "whether any were lost is not known on this system");
+  if (loss->of_machine == 0)
+    return report.good("datagrams", "none was lost at a full receive buffer so far");
+  const std::string all =
+      fmt::format("{} were lost at full receive buffers, of all ports, since this machine began",
+                  loss->of_machine);
+  if (loss->at_port == 0)
+    return report.good("datagrams",
+                       all + fmt::format("; none by who listens on port {} now", url.port));
+  report.hint("datagrams", all +
+                               fmt::format("; who listens on port {} now may have lost some "
+                                           "({} were dropped or filtered there): ",
+                                           url.port, loss->at_port) +
+                               bus::cure_of_datagram_loss());
+}
+
+// The address that is served, or would be. Without multicast, and without an address in the
+// environment, it is TCP.
+void check_server(Report& report, const bus::LcmUrl& url) {
+  if (url.scheme == "memq")
+    return report.good("server", url.str() + " stays inside of one process");
+  const std::string owner = bus::claimed_by(url);
+  if (!owner.empty()) return report.good("server", url.str() + ": " + owner);
+  if (url.scheme == "tcpq" && bus::is_served(url, kSelfTestMs))
+    return report.good(
+        "server", url.str() + ": something listens there, not a server of this machine's Ruedo");
+  report.hint("server", "none on " + url.str() +
+                            " from this machine: `ruedo run WORLD` starts one; where it is on "
+                            "another address, its LCM_DEFAULT_URL is wanted here");
+}
+
+void check_bus(Report& report, const std::string& text) {
+  const bus::LcmUrl url = bus::parse_url(text);
+  if (url.scheme == "udpm") {
+    check_multicast(report, url);
+    check_loss(report, url);
+  }
+  const char* environment = std::getenv("LCM_DEFAULT_URL");
+  const bool asked = !text.empty() || (environment && *environment);
+  check_server(report, asked || bus::has_route(url) ? url : bus::parse_url("tcpq://"));
+}
+
+void check_buffers(Report& report) {
+  const int64_t limit = bus::receive_buffer_limit();
+  if (limit < 0) return report.hint("receive buffers", "not known on this system");
+  if (limit >= kGoodBuffer)
+    return report.good("receive buffers", fmt::format("up to {} bytes", limit));
+  report.hint("receive buffers",
+              fmt::format("at most {} bytes: raw pictures get lost (JPEG passes). For raw ones "
+                          "run: sudo sysctl -w net.core.rmem_max={}",
+                          limit, kGoodBuffer));
+}
+
+void check_renderer(Report& report) {
+  try {
+    const model::WorldModel world;
+    const model::BodyLayout layout(world);
+    report.good("renderer", scene::make_renderer(world, layout)->description());
+  } catch (const EnvironmentError& error) {
+    report.fault("renderer", error.what());
+  }
+}
+
+void check_sandbox(Report& report) {
+  const std::string missing = missing_for_sandbox();
+  if (missing.empty())
+    return report.good(
+        "sandbox", "Landlock and seccomp: --sandbox works, meshes and xacro files are read in one");
+  report.hint("sandbox",
+              missing +
+                  ": no --sandbox; meshes and xacro files are read with limits of time and memory "
+                  "only, and a xacro file may run any program");
+}
+
+int doctor(const std::string& url) {
+  Report report;
+  report.good("version", fmt::format("ruedo {}, LCM {}.{}.{}, {}, CPU with {}", version(),
+                                     LCM_VERSION_MAJOR, LCM_VERSION_MINOR, LCM_VERSION_PATCH,
+                                     log::libc_version(), log::cpu_features()));
+  check_bus(report, url);
+  check_buffers(report);
+  check_renderer(report);
+  check_sandbox(report);
+  return report.faulty() ? kEnvironment : kGood;
+}
+
+void add_doctor(CLI::App& app, Action& chosen) {
+  CLI::App* command = app.add_subcommand(
+      "doctor",
+      "check this machine: multicast route, buffers, renderer, versions; each fault with its cure");
+  const auto url = std::make_shared<std::string>();
+  command->add_option("--lcm", *url, "LCM address to check")->type_name("URL");
+  command->callback([url, &chosen] { chosen = [url] { return doctor(*url); }; });
+}
+
+const RegisterCommand kRegister{70, add_doctor};
+
+}  // namespace
+}  // namespace ruedo::cli

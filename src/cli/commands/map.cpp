@@ -1,0 +1,55 @@
+// ruedo map: the occupancy map of a world, as navigation stacks read it.
+#include <cmath>
+
+#include <fmt/format.h>
+
+#include "cli/support/commands.h"
+#include "cli/support/find_all.h"
+#include "cli/support/range.h"
+#include "ruedo/errors.h"
+#include "world/maps/occupancy.h"
+
+namespace ruedo::cli {
+namespace {
+
+struct MapArguments {
+  WorldArguments world;
+  std::string out;
+  double resolution = 0.05, height = 0.2;
+};
+
+int map(const MapArguments& arguments) {
+  if (!arguments.out.ends_with(".yaml") && !arguments.out.ends_with(".yml"))
+    throw InputError({}, "-o '" + arguments.out + "': the name ends in .yaml");
+  const auto world = load(arguments.world);
+  check_options(arguments.world, *world);
+  const model::OccupancyGrid grid =
+      model::occupancy_of(*world, arguments.resolution, arguments.height);
+  model::write_map(grid, arguments.out);
+  size_t occupied = 0;
+  for (const model::Cell cell : grid.cells) occupied += cell == model::Cell::occupied;
+  fmt::print("{}: {} x {} cells of {:g} m, {} occupied, cut at z = {:g} m\n", arguments.out,
+             grid.width, grid.height, grid.resolution, occupied, arguments.height);
+  return kGood;
+}
+
+void add_map(CLI::App& app, Action& chosen) {
+  CLI::App* command =
+      app.add_subcommand("map", "write the occupancy map of a world, as ROS's map_server reads it");
+  const auto arguments = std::make_shared<MapArguments>();
+  add_world_arguments(*command, arguments->world);
+  command->add_option("-o,--out", arguments->out, "the map's .yaml; the picture goes beside it")
+      ->required();
+  command->add_option("--resolution", arguments->resolution, "side of a cell, m")
+      ->capture_default_str()
+      ->check(within(0.001, 100.0));
+  command->add_option("--height", arguments->height, "where the world is cut: z, m")
+      ->capture_default_str()
+      ->check(within(-1e5, 1e5));
+  command->callback([arguments, &chosen] { chosen = [arguments] { return map(*arguments); }; });
+}
+
+const RegisterCommand kRegister{46, add_map};
+
+}  // namespace
+}  // namespace ruedo::cli

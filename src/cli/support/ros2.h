@@ -1,0 +1,59 @@
+// --ros2: a run as a ROS 2 node. Without Cyclone DDS in this build it says what is missing.
+#pragma once
+
+#include <memory>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "run/wait_for.h"
+#include "world/model/world_model.h"
+
+namespace ruedo::run {
+class Run;
+}
+
+namespace ruedo::cli {
+
+struct Ros2Arguments {
+  bool on = false;
+  std::string distro;  // "": $ROS_DISTRO, or jazzy
+  double clock_hz = 100.0;
+  std::string services = "auto";                              // how they are mapped
+  std::vector<std::pair<std::string, std::string>> topics;    // --remap of ROS names
+  std::vector<std::pair<std::string, std::string>> channels;  // of the bus's
+  std::vector<std::string> wait_for;                          // ROS topics on which the run waits
+};
+
+// Where a node takes part.
+class Ros2Network {
+ public:
+  // Null without --ros2. Before a run is made, whose log empties an earlier one. Throws as
+  // Ros2Node::open().
+  static std::unique_ptr<Ros2Network> open(const Ros2Arguments& arguments);
+  virtual ~Ros2Network() = default;
+};
+
+// A node, from its making on; the run's messages come to it once it is attached.
+class Ros2Node {
+ public:
+  // Null without a network. Throws InputError, and EnvironmentError when this build has no Cyclone
+  // DDS or there is no network for it.
+  static std::unique_ptr<Ros2Node> open(run::Run& server, const Ros2Arguments& arguments,
+                                        std::unique_ptr<Ros2Network> network);
+
+  virtual ~Ros2Node() = default;   // after the run, before the server
+  virtual void print() const = 0;  // the topics
+
+  // Returns when each topic that the run waits for has a publisher, and a reader of this
+  // run; or the run is to end.
+  virtual void wait_for_peers() = 0;
+};
+
+// The input channel of each ROS topic among --wait-for. Throws InputError for what is no topic that
+// takes commands.
+std::vector<run::WaitForOption> with_channels(std::vector<run::WaitForOption> options,
+                                              const model::WorldModel& world,
+                                              const Ros2Arguments& arguments);
+
+}  // namespace ruedo::cli

@@ -1,8 +1,0 @@
-// The one file that is compiled again when the version changes.
-#include "core/version.h"
-
-namespace ruedo {
-
-const char* version() { return RUEDO_VERSION; }
-
-}  // namespace ruedo

@@ -1,0 +1,149 @@
+// Converts manifolds to contacts. Their order is by links and then by position, independent of
+// Bullet's.
+#include "physics/collision/contact_book.h"
+
+#include <algorithm>
+#include <tuple>
+
+#include "physics/base/rigid_bodies.h"
+
+namespace ruedo::physics {
+
+namespace {
+
+// Contacts of several substeps within this distance are merged.
+constexpr double kSamePlace_m = 5e-3;
+// Reserved capacity: a face has four points, and most bodies touch at most two others.
+constexpr size_t kRoom = 64, kRoomPerBody = 8;
+
+// The entry of a child shape in one of ObjectInfo's lists; Bullet gives no child index for a single
+// shape.
+bool earlier(const Contact& a, const Contact& b) {
+  const auto key = [](const Contact& c) {
+    return std::tuple(c.body_a, c.link_a, c.body_b, c.link_b, c.position.x(), c.position.y(),
+                      c.position.z(), c.depth);
+  };
+  return key(a) < key(b);
+}
+
+Contact swapped(const Contact& contact) {
+  Contact other = contact;
+  std::swap(other.link_a, other.link_b);
+  std::swap(other.shape_a, other.shape_b);
+  std::swap(other.body_a, other.body_b);
+  other.normal = -contact.normal;
+  other.friction = -contact.friction;
+  return other;
+}
+
+}  // namespace
+
+void ContactBook::ByBody::clear() {
+  for (const Contact& contact : entries_) ranges_[contact.body_a] = {0, 0};
+  entries_.clear();
+}
+
+void ContactBook::ByBody::fill(const std::vector<Contact>& contacts) {
+  for (const Contact& contact : contacts) {
+    if (contact.body_a.valid()) entries_.push_back(contact);
+    if (contact.body_b.valid()) entries_.push_back(swapped(contact));
+  }
+  std::sort(entries_.begin(), entries_.end(), earlier);
+  for (size_t i = 0; i < entries_.size(); ++i) {
+    auto& range = ranges_[entries_[i].body_a];
+    if (range.second++ == 0) range.first = i;
+  }
+}
+
+void ContactBook::make_room(size_t bodies) {
+  const size_t contacts = kRoom + kRoomPerBody * bodies;
+  for (auto* list : {&contacts_, &near_only_, &merged_}) list->reserve(contacts);
+  touching_.reserve(2 * contacts);
+  near_.reserve(2 * contacts);
+}
+
+void ContactBook::clear(double step_s) {
+  step_s_ = step_s;
+  several_ = false;
+  contacts_.clear();
+  near_only_.clear();
+  touching_.clear();
+  near_.clear();
+}
+
+void ContactBook::add(const std::vector<btPersistentManifold*>& manifolds, int substeps,
+                      bool last) {
+  several_ |= !last;
+  for (const btPersistentManifold* each : manifolds) {
+    const btPersistentManifold& manifold = *each;
+    const ObjectInfo& a = info_of(*manifold.getBody0());
+    const ObjectInfo& b = info_of(*manifold.getBody1());
+    for (int p = 0; p < manifold.getNumContacts(); ++p) {
+      const btManifoldPoint& point = manifold.getContactPoint(p);
+      Contact contact;
+      contact.body_a = a.body;
+      contact.body_b = b.body;
+      const ObjectInfo::Shape &shape_a = shape_of(a, point.m_index0),
+                              &shape_b = shape_of(b, point.m_index1);
+      contact.link_a = shape_a.link;
+      contact.link_b = shape_b.link;
+      contact.shape_a = shape_a.collision;
+      contact.shape_b = shape_b.collision;
+      contact.position = from_bt(point.getPositionWorldOnB());
+      contact.normal = from_bt(point.m_normalWorldOnB);
+      contact.depth = -point.getDistance();
+      const bool touches = point.getAppliedImpulse() > 0.0 || contact.depth >= 0.0;
+      if (touches) {
+        const double per_s = substeps / step_s_;
+        contact.force = point.getAppliedImpulse() * per_s;
+        contact.friction =
+            per_s * from_bt(point.m_appliedImpulseLateral1 * point.m_lateralFrictionDir1 +
+                            point.m_appliedImpulseLateral2 * point.m_lateralFrictionDir2);
+      }
+      // Static things come second; of two bodies the one with the lower number comes first.
+      if (!contact.body_a.valid() || (contact.body_b.valid() && contact.body_b < contact.body_a))
+        contact = swapped(contact);
+      if (touches) {
+        contacts_.push_back(contact);
+      } else if (last) {
+        near_only_.push_back(contact);
+      }
+    }
+  }
+}
+
+// The same place in several substeps: their impulses are added.
+void ContactBook::merge() {
+  merged_.clear();
+  size_t first = 0;  // of contacts between the same two links
+  for (const Contact& contact : contacts_) {
+    if (!merged_.empty() &&
+        (merged_.back().link_a != contact.link_a || merged_.back().link_b != contact.link_b)) {
+      first = merged_.size();
+    }
+    const auto same =
+        std::find_if(merged_.begin() + static_cast<std::ptrdiff_t>(first), merged_.end(),
+                     [&](const Contact& other) {
+                       return (other.position - contact.position).norm() < kSamePlace_m;
+                     });
+    if (same == merged_.end()) {
+      merged_.push_back(contact);
+    } else {
+      same->force += contact.force;
+      same->friction += contact.friction;
+      same->depth = std::max(same->depth, contact.depth);
+    }
+  }
+  contacts_.swap(merged_);
+}
+
+void ContactBook::finish() {
+  if (contacts_.empty() && near_only_.empty()) return;
+  std::sort(contacts_.begin(), contacts_.end(), earlier);
+  if (several_) merge();
+  touching_.fill(contacts_);
+  near_only_.insert(near_only_.end(), contacts_.begin(), contacts_.end());
+  near_.fill(near_only_);
+}
+
+}  // namespace ruedo::physics

@@ -1,0 +1,295 @@
+// From pairs to manifolds to islands, which are solved and put to sleep.
+#include "physics/dynamics/dynamics.h"
+
+#include <algorithm>
+#include <numeric>
+#include <tuple>
+
+#include "physics/collision/contact_copies.h"
+#include "physics/collision/mesh_edges.h"
+
+namespace ruedo::physics {
+
+namespace {
+
+constexpr size_t kTouchingABody = 8;  // expected maximum
+
+// Bullet's island tag is a body's index in bodies_; negative for bodies that do not take part.
+bool takes_part(const btCollisionObject& object) { return object.getIslandTag() >= 0; }
+size_t number(const btCollisionObject& object) {
+  return static_cast<size_t>(object.getIslandTag());
+}
+// Whether the solver may move it: movers and walls do not connect islands.
+bool can_be_moved(const btCollisionObject& object) {
+  return takes_part(object) && !object.isStaticOrKinematicObject();
+}
+
+const btCollisionObject& object_of(const btBroadphaseProxy& proxy) {
+  return *static_cast<const btCollisionObject*>(proxy.m_clientObject);
+}
+
+bool asleep(const btRigidBody& body) { return body.getActivationState() == ISLAND_SLEEPING; }
+
+bool moves(const btCollisionObject& object) {
+  const auto* body = btRigidBody::upcast(&object);
+  return body && body->isKinematicObject() &&
+         !(body->getLinearVelocity().isZero() && body->getAngularVelocity().isZero());
+}
+
+int id_of(const btCollisionObject& object) { return object.getBroadphaseHandle()->m_uniqueId; }
+
+std::tuple<int, int, int, int> place_of(const btPersistentManifold& manifold) {
+  const btManifoldPoint& first = manifold.getContactPoint(0);
+  return {id_of(*manifold.getBody0()), id_of(*manifold.getBody1()), first.m_index0, first.m_index1};
+}
+
+// Bullet finds one contact of a lying cylinder per substep, at one of its ends, and keeps the
+// contact found earlier at the other end. That point rolls with the cylinder to behind its axle and
+// lifts it there, so that it would roll faster and faster. It is moved back to below the axle.
+// `outward` is the contact's normal away from `body`; p and q are the contact points on the body
+// and on the other one.
+void keep_below_its_axle(const btCollisionObject& body, const btCollisionObject& other,
+                         btManifoldPoint& point, int child, const btVector3& outward,
+                         btVector3& p_W, btVector3& p_Body, btVector3& q_W, btVector3& q_Other) {
+  const btCollisionShape* shape = body.getCollisionShape();
+  btTransform X_WS = body.getWorldTransform();
+  if (shape->isCompound()) {
+    const auto& compound = static_cast<const btCompoundShape&>(*shape);
+    if (child < 0 || child >= compound.getNumChildShapes()) return;
+    shape = compound.getChildShape(child);
+    X_WS = X_WS * compound.getChildTransform(child);
+  }
+  if (shape->getShapeType() != CYLINDER_SHAPE_PROXYTYPE) return;
+  const btVector3 axis = X_WS.getBasis().getColumn(2);
+  const btVector3 down = outward - outward.dot(axis) * axis;
+  constexpr btScalar kLying = 0.7;  // component of a unit normal across the axis
+  if (down.length2() < kLying * kLying) return;
+  const btScalar radius = static_cast<const btCylinderShapeZ*>(shape)->getRadius();
+  const btVector3 moved =
+      X_WS.getOrigin() + (p_W - X_WS.getOrigin()).dot(axis) * axis + radius * down.normalized();
+  btVector3 along = moved - p_W;
+  if (along.length2() > gContactBreakingThreshold * gContactBreakingThreshold) return;
+  along -= along.dot(outward) * outward;
+  p_W = moved;
+  q_W += along;
+  p_Body = body.getWorldTransform().invXform(p_W);
+  q_Other = other.getWorldTransform().invXform(q_W);
+  point.m_distance1 = (q_W - p_W).dot(outward);
+}
+
+}  // namespace
+
+void Dynamics::keep_below_the_axle(btPersistentManifold& manifold) {
+  for (int k = 0; k < manifold.getNumContacts(); ++k) {
+    btManifoldPoint& point = manifold.getContactPoint(k);
+    keep_below_its_axle(*manifold.getBody0(), *manifold.getBody1(), point, point.m_index0,
+                        -point.m_normalWorldOnB, point.m_positionWorldOnA, point.m_localPointA,
+                        point.m_positionWorldOnB, point.m_localPointB);
+    keep_below_its_axle(*manifold.getBody1(), *manifold.getBody0(), point, point.m_index1,
+                        point.m_normalWorldOnB, point.m_positionWorldOnB, point.m_localPointB,
+                        point.m_positionWorldOnA, point.m_localPointA);
+  }
+}
+
+Dynamics::Dynamics(btDispatcher& dispatcher, btBroadphaseInterface& broadphase,
+                   btCollisionConfiguration& configuration, const ContactSurfaces& surfaces,
+                   const SolverSettings& settings)
+    : btDiscreteDynamicsWorld(&dispatcher, &broadphase, nullptr, &configuration),
+      solver_(surfaces, settings) {}
+
+void Dynamics::reserve(size_t bodies) {
+  bodies_.reserve(bodies);
+  parents_.reserve(bodies);
+  island_of_root_.reserve(bodies);
+  pairs_.reserve(kTouchingABody * bodies);
+  manifolds_.reserve(kTouchingABody * bodies);
+  islands_.resize(std::max(islands_.size(), bodies));
+  for (Island& island : islands_) {
+    island.bodies.reserve(kTouchingABody);
+    island.manifolds.reserve(kTouchingABody);
+  }
+}
+
+void Dynamics::take(const std::vector<btRigidBody*>& bodies) {
+  m_collisionObjects.resizeNoInitialize(0);  // Bullet's own lists are not used
+  m_nonStaticRigidBodies.resizeNoInitialize(0);
+  for (btRigidBody* body : bodies_) body->setIslandTag(-1);
+  bodies_ = bodies;
+  for (size_t i = 0; i < bodies_.size(); ++i) bodies_[i]->setIslandTag(static_cast<int>(i));
+  pairs_.clear();
+  manifolds_.clear();
+  joints_.clear();
+  if (bodies_.empty()) return;
+  btBroadphasePairArray& pairs = getPairCache()->getOverlappingPairArray();
+  for (int i = 0; i < pairs.size(); ++i) {
+    if (takes_part(object_of(*pairs[i].m_pProxy0)) || takes_part(object_of(*pairs[i].m_pProxy1)))
+      pairs_.push_back(&pairs[i]);
+  }
+  std::sort(pairs_.begin(), pairs_.end(), [](const btBroadphasePair* a, const btBroadphasePair* b) {
+    return std::pair(a->m_pProxy0->m_uniqueId, a->m_pProxy1->m_uniqueId) <
+           std::pair(b->m_pProxy0->m_uniqueId, b->m_pProxy1->m_uniqueId);
+  });
+  for (int i = 0; i < m_constraints.size(); ++i) {
+    btTypedConstraint& joint = *m_constraints[i];
+    if (joint.isEnabled() &&
+        (takes_part(joint.getRigidBodyA()) || takes_part(joint.getRigidBodyB())))
+      joints_.push_back(&joint);
+  }
+}
+
+void Dynamics::take(const Dynamics& other,
+                    const std::function<btTypedConstraint*(btTypedConstraint*)>& joint_here) {
+  const auto& from =
+      // as Bullet's interface has it
+      const_cast<Dynamics&>(other).getPairCache()->getOverlappingPairArray();
+  auto& to = getPairCache()->getOverlappingPairArray();
+  for (int i = 0; i < to.size(); ++i)
+    copy_contacts(from[i], to[i], *getDispatcher(), getDispatchInfo());
+  for (int i = 0; i < m_constraints.size(); ++i)  // in solving order
+    m_constraints[i] = joint_here(other.m_constraints[i]);
+}
+
+void Dynamics::exchange(StateArchive& archive, const std::vector<btTypedConstraint*>& joints) {
+  auto& pairs = getPairCache()->getOverlappingPairArray();
+  for (int i = 0; i < pairs.size(); ++i)
+    exchange_contacts(archive, pairs[i], *getDispatcher(), getDispatchInfo());
+  std::vector<size_t> order;
+  for (int i = 0; i < m_constraints.size(); ++i) {
+    const auto found = std::find(joints.begin(), joints.end(), m_constraints[i]);
+    order.push_back(static_cast<size_t>(found - joints.begin()));
+  }
+  archive.each(order);
+  for (int i = 0; i < m_constraints.size(); ++i) {
+    const size_t number = order[static_cast<size_t>(i)];
+    if (number >= joints.size()) archive.refuse("there is no such joint");
+    m_constraints[i] = joints[number];
+  }
+}
+
+bool Dynamics::awake() const {
+  return std::any_of(bodies_.begin(), bodies_.end(),
+                     [](const btRigidBody* body) { return body->isActive(); });
+}
+
+void Dynamics::find_manifolds() {
+  manifolds_.clear();
+  for (int i = 0; i < getDispatcher()->getNumManifolds(); ++i) {
+    btPersistentManifold* manifold = getDispatcher()->getManifoldByIndexInternal(i);
+    if (manifold->getNumContacts() == 0) continue;
+    if (takes_part(*manifold->getBody0()) || takes_part(*manifold->getBody1()))
+      manifolds_.push_back(manifold);
+  }
+  std::sort(manifolds_.begin(), manifolds_.end(),
+            [](const btPersistentManifold* a, const btPersistentManifold* b) {
+              return place_of(*a) < place_of(*b);
+            });
+}
+
+void Dynamics::substep(double substep_s) {
+  for (btRigidBody* body : bodies_)
+    if (body->isActive()) body->applyGravity();
+  auto& dispatcher = static_cast<btCollisionDispatcher&>(*getDispatcher());
+  getDispatchInfo().m_timeStep = substep_s;
+  for (btBroadphasePair* pair : pairs_) {
+    const bool mesh = is_mesh(object_of(*pair->m_pProxy0)) || is_mesh(object_of(*pair->m_pProxy1));
+    mesh ? collide_with_mesh(*pair, dispatcher, getDispatchInfo())
+         : btCollisionDispatcher::defaultNearCallback(*pair, dispatcher, getDispatchInfo());
+  }
+  find_manifolds();
+  for (btPersistentManifold* manifold : manifolds_) keep_below_the_axle(*manifold);
+  find_islands();
+  for (size_t i = 0; i < island_count_; ++i) solve(islands_[i], substep_s);
+  for (btRigidBody* body : bodies_) body->clearForces();
+}
+
+size_t Dynamics::root(size_t body) {
+  while (parents_[body] != body) body = parents_[body] = parents_[parents_[body]];
+  return body;
+}
+
+void Dynamics::join(const btCollisionObject& a, const btCollisionObject& b) {
+  if (!can_be_moved(a) || !can_be_moved(b)) return;
+  const size_t of_a = root(number(a)), of_b = root(number(b));
+  parents_[std::max(of_a, of_b)] = std::min(of_a, of_b);
+}
+
+Dynamics::Island& Dynamics::island_of(const btCollisionObject& a, const btCollisionObject& b) {
+  return islands_[island_of_root_[root(number(can_be_moved(a) ? a : b))]];
+}
+
+void Dynamics::find_islands() {
+  parents_.resize(bodies_.size());
+  std::iota(parents_.begin(), parents_.end(), size_t{0});
+  for (const btPersistentManifold* manifold : manifolds_)
+    join(*manifold->getBody0(), *manifold->getBody1());
+  for (btTypedConstraint* joint : joints_) {
+    join(joint->getRigidBodyA(), joint->getRigidBodyB());
+    const auto* motors = static_cast<const JointMotors*>(joint->getUserConstraintPtr());
+    if (!motors || !motors->first.reference) continue;
+    join(*motors->first.reference, joint->getRigidBodyA());
+    join(*motors->first.reference, joint->getRigidBodyB());
+  }
+  island_count_ = 0;
+  island_of_root_.resize(bodies_.size());
+  for (size_t i = 0; i < bodies_.size(); ++i) {
+    if (!can_be_moved(*bodies_[i])) continue;
+    const size_t of = root(i);  // the smallest number of the set
+    if (of == i) {
+      island_of_root_[i] = island_count_++;
+      if (islands_.size() < island_count_) islands_.emplace_back();
+      Island& island = islands_[island_of_root_[i]];
+      island.bodies.clear();
+      island.manifolds.clear();
+      island.joints.clear();
+    }
+    islands_[island_of_root_[of]].bodies.push_back(bodies_[i]);
+  }
+  for (btPersistentManifold* manifold : manifolds_) {
+    const btCollisionObject &a = *manifold->getBody0(), &b = *manifold->getBody1();
+    if (can_be_moved(a) || can_be_moved(b)) island_of(a, b).manifolds.push_back(manifold);
+  }
+  for (btTypedConstraint* joint : joints_) {
+    if (can_be_moved(joint->getRigidBodyA()) || can_be_moved(joint->getRigidBodyB())) {
+      island_of(joint->getRigidBodyA(), joint->getRigidBodyB()).joints.push_back(joint);
+    }
+  }
+}
+
+void Dynamics::solve(Island& island, double substep_s) {
+  // Movers take part with their velocity, and wake what they touch.
+  bool awake = std::any_of(island.bodies.begin(), island.bodies.end(),
+                           [](const btRigidBody* body) { return body->isActive(); });
+  const size_t own = island.bodies.size();
+  for (const btPersistentManifold* manifold : island.manifolds) {
+    for (const btCollisionObject* object : {manifold->getBody0(), manifold->getBody1()}) {
+      if (!moves(*object)) continue;
+      awake = true;
+      auto* mover = const_cast<btRigidBody*>(btRigidBody::upcast(object));
+      if (std::find(island.bodies.begin() + static_cast<std::ptrdiff_t>(own), island.bodies.end(),
+                    mover) == island.bodies.end())
+        island.bodies.push_back(mover);
+    }
+  }
+  if (!awake) return;
+  for (size_t i = 0; i < own; ++i) {
+    btRigidBody& body = *island.bodies[i];
+    if (!asleep(body)) continue;
+    body.setActivationState(ACTIVE_TAG);
+    body.setDeactivationTime(0.0);
+    body.applyGravity();
+  }
+  solver_.solve(island.bodies, island.manifolds, island.joints, substep_s);
+  bool tired = true;
+  for (size_t i = 0; i < own; ++i) {
+    island.bodies[i]->updateDeactivation(substep_s);
+    tired = tired && island.bodies[i]->wantsSleeping();
+  }
+  for (size_t i = 0; tired && i < own; ++i) {
+    btRigidBody& body = *island.bodies[i];
+    body.setActivationState(ISLAND_SLEEPING);
+    body.setLinearVelocity({0, 0, 0});
+    body.setAngularVelocity({0, 0, 0});
+  }
+}
+
+}  // namespace ruedo::physics

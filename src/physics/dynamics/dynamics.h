@@ -1,0 +1,73 @@
+// Bullet's dynamics world with a step of our own: only bodies that need it take part, island by
+// island.
+//
+// Bullet's stepSimulation visits every object of the world several times; with a thousand robots
+// that touch nothing, that is most of its cost. It also solves islands together, in an order that
+// depends on other bodies; here an island's bits depend on its own bodies alone.
+#pragma once
+
+#include <functional>
+#include <vector>
+
+#include "physics/base/bullet.h"
+#include "physics/dynamics/solver.h"
+#include "ruedo/state_archive.h"
+
+namespace ruedo::physics {
+
+class Dynamics final : public btDiscreteDynamicsWorld {
+ public:
+  Dynamics(btDispatcher& dispatcher, btBroadphaseInterface& broadphase,
+           btCollisionConfiguration& configuration, const ContactSurfaces& surfaces,
+           const SolverSettings& settings);
+
+  // Reserves capacity for that many bodies and their usual contacts: up to there substeps do not
+  // allocate.
+  void reserve(size_t bodies);
+
+  // Selects the bodies that are simulated from now on. All bodies of all pairs and joints must be
+  // among them.
+  void take(const std::vector<btRigidBody*>& bodies);
+  bool awake() const;  // whether one of them is awake
+
+  // Takes the state of another copy of the world that has the same pairs in the same order, as far
+  // as Bullet keeps any. All objects must be awake. joint_here maps the other world's joints to
+  // those of this one.
+  void take(const Dynamics& other,
+            const std::function<btTypedConstraint*(btTypedConstraint*)>& joint_here);
+  // Writes that state, or reads it, likewise. joints: all of the world's, in an order that copies
+  // share.
+  void exchange(StateArchive& archive, const std::vector<btTypedConstraint*>& joints);
+
+  // One substep: forces and gravity, contacts, velocities, poses.
+  void substep(double substep_s);
+
+  // Of the simulated bodies, those that touch something or are near it, in a fixed order.
+  const std::vector<btPersistentManifold*>& manifolds() const { return manifolds_; }
+  void find_manifolds();
+
+ private:
+  struct Island {
+    std::vector<btRigidBody*> bodies;
+    std::vector<btPersistentManifold*> manifolds;
+    std::vector<btTypedConstraint*> joints;
+  };
+
+  size_t root(size_t body);
+  void join(const btCollisionObject& a, const btCollisionObject& b);
+  void find_islands();
+  Island& island_of(const btCollisionObject& a, const btCollisionObject& b);
+  void solve(Island& island, double substep_s);
+  void keep_below_the_axle(btPersistentManifold& manifold);
+
+  Solver solver_;
+  std::vector<btRigidBody*> bodies_;
+  std::vector<btBroadphasePair*> pairs_;  // of bodies_, ordered by their numbers
+  std::vector<btPersistentManifold*> manifolds_;
+  std::vector<btTypedConstraint*> joints_;
+  std::vector<size_t> parents_, island_of_root_;  // union-find over bodies_
+  std::vector<Island> islands_;
+  size_t island_count_ = 0;
+};
+
+}  // namespace ruedo::physics

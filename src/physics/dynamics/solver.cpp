@@ -1,0 +1,558 @@
+// A substep of an island.
+#include "physics/dynamics/solver.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "ruedo/math.h"
+#include "ruedo/quantity.h"
+
+namespace ruedo::physics {
+
+namespace {
+
+constexpr double kSlowestBounce_m_s = 1e-3;
+// Penetration up to this depth is not corrected: otherwise bodies at rest would be lifted a little,
+// fall a little, and rock.
+constexpr double kRestingDepth_m = 5e-5;
+// A loaded contact keeps its load up to this gap, and nothing stands higher than the rest by more.
+// Real surfaces yield by more.
+constexpr double kTouching_m = 1e-5;
+constexpr double kStanding_m_s = 1e-3;
+constexpr int kPushSweeps = 30;
+constexpr double kPushTolerance_m_s = 1e-5;
+// Sweeps before the first check, and between checks; a factorization may cost as much as that many
+// sweeps.
+constexpr int kSweepsBeforeNewton = 1, kSweepsBetweenNewton = 40, kNewtonSteps = 15;
+// With friction, sweeps do not converge while few contacts bear the whole load.
+constexpr int kSweepsBeforeSharing = 10;
+constexpr int kSweepsOfMechanisms = 20;  // before Newton: their joints are solved directly anyway
+constexpr size_t kFewBodies = 2;         // something immovable and one body: sweeps are faster
+constexpr double kSweepsForAFactor = 30.0, kProductsOfARow = 40.0, kSmall = 20'000.0;
+// Beyond this a joint did not come apart by its own motion: it was pushed, or placed so.
+constexpr double kFastestClosing_m_s = 0.5;
+
+Eigen::Matrix3d matrix(const btMatrix3x3& m) {
+  Eigen::Matrix3d result;
+  for (int i = 0; i < 3; ++i) result.row(i) = from_bt(m.getRow(i));
+  return result;
+}
+
+// Two tangential directions for n; the same as long as n does not change.
+void across(const Vec3& n, Vec3& first, Vec3& second) {
+  const Vec3 off = std::abs(n.z()) < 0.7 ? Vec3::UnitZ() : Vec3::UnitX();
+  first = (off - n * n.dot(off)).normalized();
+  second = n.cross(first);
+}
+
+Row linear_row(int a, int b, const Vec3& direction, const Vec3& arm_a, const Vec3& arm_b) {
+  Row row;
+  row.a = a;
+  row.b = b;
+  row.linear_a = direction;
+  row.angular_a = arm_a.cross(direction);
+  row.linear_b = -direction;
+  row.angular_b = -arm_b.cross(direction);
+  return row;
+}
+
+Row angular_row(int a, int b, const Vec3& direction) {
+  Row row;
+  row.a = a;
+  row.b = b;
+  row.angular_a = direction;
+  row.angular_b = -direction;
+  return row;
+}
+
+Quat turned_by(const Quat& rotation, const Vec3& turn) {
+  const double angle = turn.norm();
+  return angle > 0.0 ? (Quat(Eigen::AngleAxisd(angle, turn / angle)) * rotation).normalized()
+                     : rotation;
+}
+
+// Free rotation over h: conserves angular momentum. Fourth-order Runge-Kutta.
+void turn_freely(const btRigidBody& body, Quat& rotation, Vec3& w, double h) {
+  const Vec3 inverse = from_bt(body.getInvInertiaDiagLocal());
+  const Vec3 momentum = rotation * (rotation.conjugate() * w).cwiseQuotient(inverse);
+  const auto rate = [&](const Quat& q) {
+    return Vec3(q * inverse.cwiseProduct(q.conjugate() * momentum));
+  };
+  const auto turned = [&](const Vec3& k, double t) {
+    const Quat dq(0.0, k.x(), k.y(), k.z());
+    Quat q = rotation;
+    q.coeffs() += 0.5 * t * (dq * rotation).coeffs();
+    return q.normalized();
+  };
+  const Vec3 k1 = rate(rotation), k2 = rate(turned(k1, 0.5 * h)), k3 = rate(turned(k2, 0.5 * h)),
+             k4 = rate(turned(k3, h));
+  const Vec3 mean = (k1 + 2.0 * k2 + 2.0 * k3 + k4) / 6.0;
+  rotation = turned_by(rotation, h * mean);
+  w = rate(rotation);
+}
+
+// For bodies that differ by many orders of magnitude, each correction may increase a joint's error.
+Vec3 bounded(const Vec3& velocity) {
+  const double norm = velocity.norm();
+  return norm > quantity::kSpeed.most ? Vec3(velocity * (quantity::kSpeed.most / norm)) : velocity;
+}
+
+}  // namespace
+
+int Solver::body_of(const btCollisionObject& object) {
+  const int index = object.getCompanionId();
+  return index > 0 && static_cast<size_t>(index) < bodies_.size() &&
+                 bodies_[index].bullet == &object
+             ? index
+             : 0;
+}
+
+void Solver::add_body(btRigidBody& body, double substep_s) {
+  body.setCompanionId(static_cast<int>(bodies_.size()));
+  SolverBody& s = bodies_.emplace_back();
+  s.bullet = &body;
+  s.v = s.v0 = from_bt(body.getLinearVelocity());
+  s.w = s.w0 = from_bt(body.getAngularVelocity());
+  if (body.isStaticOrKinematicObject()) return;
+  s.inverse_mass = body.getInvMass() * from_bt(body.getLinearFactor());
+  const Eigen::DiagonalMatrix<double, 3> factor(from_bt(body.getAngularFactor()));
+  s.inverse_inertia = factor * matrix(body.getInvInertiaTensorWorld()) * factor;
+  s.v += substep_s * s.inverse_mass.cwiseProduct(from_bt(body.getTotalForce()));
+  s.w += substep_s * (s.inverse_inertia * from_bt(body.getTotalTorque()));
+}
+
+void Solver::set_normal(ContactRows& contact, const ContactSurface& surface, double substep_s) {
+  Row& row = contact.normal;
+  const double gap = contact.gap;
+  double reduction = settings_.error_reduction;
+  contact.soft = surface.stiffness > 0.0;
+  if (contact.soft) {  // implicit spring and damper
+    const double hard = substep_s * surface.stiffness + surface.damping;
+    row.softness = 1.0 / (substep_s * hard);
+    reduction = substep_s * surface.stiffness / hard;
+  }
+  row.prepare(bodies_);
+  row.lower = 0.0;
+  row.upper = BT_LARGE_FLOAT;
+  const bool bore = contact.point->m_appliedImpulse > 0.0 && gap <= kTouching_m && !contact.soft;
+  row.target = bore           ? 0.0
+               : gap > 0.0    ? -gap / substep_s
+               : contact.soft ? -reduction * gap / substep_s
+                              : 0.0;
+  row.push_target = gap < -kRestingDepth_m && !contact.soft
+                        ? -reduction * (gap + kRestingDepth_m) / substep_s
+                        : 0.0;
+  if (surface.restitution <= 0.0) return;
+  // The velocity at the time of impact, somewhere within the substep: forces act until then only.
+  const SolverBody& A = bodies_[row.a];
+  const SolverBody& B = bodies_[row.b];
+  const double before = -(row.linear_a.dot(A.v0) + row.angular_a.dot(A.w0) +
+                          row.linear_b.dot(B.v0) + row.angular_b.dot(B.w0));
+  const double acceleration = (-row.velocity(bodies_) - before) / substep_s;
+  const double square = before * std::abs(before) + 2.0 * acceleration * std::max(gap, 0.0);
+  const double rebound = square > 0.0 ? surface.restitution * std::sqrt(square) : 0.0;
+  contact.rebound = rebound > kSlowestBounce_m_s ? rebound : 0.0;
+}
+
+void Solver::set_friction(ContactRows& contact, const ContactSurface& surface) {
+  contact.along.softness = surface.slip;
+  contact.across.softness = surface.slip2;
+  contact.along.prepare(bodies_);
+  contact.across.prepare(bodies_);
+  contact.friction = surface.friction;
+  contact.friction2 = surface.friction2;
+  const double m1 = surface.friction, m2 = surface.friction2;
+  const double k11 = m1 * m1 * (contact.along.response + surface.slip),
+               k22 = m2 * m2 * (contact.across.response + surface.slip2);
+  const double k12 = m1 * m2 * contact.along.coupling(contact.across);
+  const double largest = 0.5 * (k11 + k22) + math::hypot(0.5 * (k11 - k22), k12);
+  contact.step = largest > 1e-12 ? 1.0 / largest : 0.0;
+}
+
+void Solver::add_contact(btManifoldPoint& point, const ContactSurface& surface, int a, int b,
+                         double substep_s) {
+  if (contacts_.size() == contact_count_) contacts_.emplace_back();
+  ContactRows& contact = contacts_[contact_count_++];
+  contact = {};
+  contact.point = &point;
+  contact.gap = point.getDistance();
+  const Vec3 normal = from_bt(point.m_normalWorldOnB);
+  const auto arm = [&](int body, const btVector3& at) {
+    const btRigidBody* bullet = bodies_[body].bullet;
+    return bullet ? from_bt(at - bullet->getCenterOfMassPosition()) : Vec3(Vec3::Zero());
+  };
+  const Vec3 arm_a = arm(a, point.getPositionWorldOnA()),
+             arm_b = arm(b, point.getPositionWorldOnB());
+  contact.normal = linear_row(a, b, normal, arm_a, arm_b);
+  set_normal(contact, surface, substep_s);
+
+  Vec3 first, second;
+  across(normal, first, second);
+  if (surface.along != Vec3::Zero()) {
+    const Vec3 along = surface.along - normal * normal.dot(surface.along);
+    if (along.norm() > 1e-6 * surface.along.norm()) {
+      first = along.normalized();
+      second = normal.cross(first);
+    }
+  }
+  contact.along = linear_row(a, b, first, arm_a, arm_b);
+  contact.across = linear_row(a, b, second, arm_a, arm_b);
+  ContactSurface of_rows = surface;
+  of_rows.slip /= substep_s;
+  of_rows.slip2 /= substep_s;
+  set_friction(contact, of_rows);
+
+  contact.spinning = surface.spinning;
+  contact.rolling = surface.rolling;
+  if (surface.spinning > 0.0) {
+    contact.spin = angular_row(a, b, normal);
+    contact.spin.prepare(bodies_);
+  }
+  if (surface.rolling > 0.0) {
+    contact.roll[0] = angular_row(a, b, first);
+    contact.roll[1] = angular_row(a, b, second);
+    for (Row& row : contact.roll) row.prepare(bodies_);
+  }
+  start_from_last(contact, substep_s);
+}
+
+// Impulses of the previous substep. m_prevRHS, which Bullet does not use, stores its length.
+void Solver::start_from_last(ContactRows& contact, double substep_s) {
+  const btManifoldPoint& point = *contact.point;
+  if (!(point.m_prevRHS > 0.0) || !(point.m_appliedImpulse > 0.0)) return;
+  const double scale = substep_s / point.m_prevRHS;
+  contact.normal.give(bodies_, scale * point.m_appliedImpulse);
+  const Vec3 rubbed = scale * from_bt(point.m_appliedImpulseLateral1 * point.m_lateralFrictionDir1 +
+                                      point.m_appliedImpulseLateral2 * point.m_lateralFrictionDir2);
+  contact.along.give(bodies_, rubbed.dot(contact.along.linear_a));
+  contact.across.give(bodies_, rubbed.dot(contact.across.linear_a));
+}
+
+void Solver::add_contacts(btPersistentManifold& manifold, double substep_s) {
+  const btCollisionObject& a = *manifold.getBody0();
+  const btCollisionObject& b = *manifold.getBody1();
+  const int of_a = body_of(a), of_b = body_of(b);
+  for (int i = 0; i < manifold.getNumContacts(); ++i) {
+    btManifoldPoint& point = manifold.getContactPoint(i);
+    add_contact(point, surfaces_.at(a, b, point), of_a, of_b, substep_s);
+    contacts_[contact_count_ - 1].manifold = &manifold;
+  }
+}
+
+// Both friction directions at once: sticking friction if it lies within the ellipse of Coulomb's
+// law; otherwise the projection of a step against the slip onto it, in coordinates in which the
+// ellipse is a circle.
+double Solver::rub(ContactRows& contact) {
+  Row& first = contact.along;
+  Row& second = contact.across;
+  const double load = std::max(contact.normal.impulse, 0.0);  // a conjugate step may have overshot
+  if (load == 0.0 && first.impulse == 0.0 && second.impulse == 0.0) return 0.0;
+  const double v1 = first.velocity(bodies_) + first.softness * first.impulse,
+               v2 = second.velocity(bodies_) + second.softness * second.impulse;
+  const double m1 = contact.friction, m2 = contact.friction2;
+  double p1 = first.impulse - v1 * first.inverse, p2 = second.impulse - v2 * second.inverse;
+  const double u1 = m1 > 0.0 ? p1 / m1 : 0.0, u2 = m2 > 0.0 ? p2 / m2 : 0.0;
+  const bool inside =
+      (m1 > 0.0 || p1 == 0.0) && (m2 > 0.0 || p2 == 0.0) && u1 * u1 + u2 * u2 <= load * load;
+  if (!inside) {
+    double s1 = (m1 > 0.0 ? first.impulse / m1 : 0.0) - contact.step * m1 * v1,
+           s2 = (m2 > 0.0 ? second.impulse / m2 : 0.0) - contact.step * m2 * v2;
+    const double size = math::hypot(s1, s2);
+    if (size > load) {
+      s1 *= load / size;
+      s2 *= load / size;
+    }
+    p1 = m1 * s1;
+    p2 = m2 * s2;
+  }
+  const double more1 = p1 - first.impulse, more2 = p2 - second.impulse;
+  first.give(bodies_, more1);
+  second.give(bodies_, more2);
+  return std::max(std::abs(more1) * first.response, std::abs(more2) * second.response);
+}
+
+double Solver::sweep(int number) {
+  double worst = blocks_.sweep(bodies_);
+  // Alternating directions: a load passes through a whole stack in one sweep, however it is
+  // numbered.
+  const auto nth = [&](size_t c) -> ContactRows& {
+    return contacts_[number % 2 == 0 ? c : contact_count_ - 1 - c];
+  };
+  for (size_t c = 0; c < contact_count_; ++c) {
+    ContactRows& contact = nth(c);
+    worst = std::max(worst, rub(contact));
+    if (contact.spinning > 0.0) {
+      contact.spin.upper = contact.spinning * std::max(contact.normal.impulse, 0.0);
+      contact.spin.lower = -contact.spin.upper;
+      worst = std::max(worst, contact.spin.relax(bodies_));
+    }
+    for (int k = 0; contact.rolling > 0.0 && k < 2; ++k) {
+      contact.roll[k].upper = contact.rolling * std::max(contact.normal.impulse, 0.0);
+      contact.roll[k].lower = -contact.roll[k].upper;
+      worst = std::max(worst, contact.roll[k].relax(bodies_));
+    }
+  }
+  for (size_t c = 0; c < contact_count_; ++c) worst = std::max(worst, nth(c).normal.relax(bodies_));
+  return worst;
+}
+
+// If that does not converge soon, all rows are solved at once; a solution that did not improve
+// matters is discarded. Between sweeps, impulses continue along conjugate directions (M.
+// Silcowitz-Hansen, S. Niebel, K. Erleben, "A nonsmooth nonlinear conjugate gradient method for
+// interactive contact force problems", 2010): stacks and large mass ratios then take a fraction of
+// the sweeps. The next sweep restores the bounds; the last one makes no such step.
+void Solver::sweep_until_still() {
+  const int first = blocks_.empty() ? kSweepsBeforeNewton : kSweepsOfMechanisms;
+  const auto start_conjugates = [](Row& row) { row.before = row.impulse, row.heading = 0.0; };
+  for_each_main_row(start_conjugates);
+  double last_square = 0.0, before_newton = 0.0;
+  bool after_newton = false, shared = false;
+  for (int i = 0; i < settings_.iterations; ++i) {
+    const double worst = sweep(i);
+    if (i + 1 == settings_.iterations || (contact_count_ == 0 && blocks_.exact())) break;
+    const bool still = worst <= settings_.tolerance_m_s;
+    if (still && shared) break;
+    if (still || i == kSweepsBeforeSharing) {
+      shared = still;
+      if (share_loads()) {
+        after_newton = false;
+        last_square = 0.0;
+        for_each_main_row(start_conjugates);
+        continue;
+      }
+      if (still) break;
+    }
+    if (after_newton && worst > before_newton) {
+      for_each_main_row([this](Row& row) { row.give(bodies_, row.before - row.impulse); });
+    }
+    if (after_newton) for_each_main_row(start_conjugates);
+    after_newton = i % kSweepsBetweenNewton == first && newton_pays();
+    if (after_newton) {
+      for_each_main_row(start_conjugates);
+      solve_at_once();
+      before_newton = worst;
+      last_square = 0.0;
+    } else {
+      go_on_along_conjugates(last_square, i);
+    }
+  }
+}
+
+// Returns whether any load changed.
+bool Solver::share_loads() {
+  if (contact_count_ < 3) return false;
+  shares_.begin();
+  for (size_t c = 0; c < contact_count_; ++c) {
+    ContactRows& contact = contacts_[c];
+    Row& row = contact.normal;
+    if (row.inverse == 0.0 || contact.soft || contact.gap > kTouching_m) continue;
+    if (row.impulse <= 0.0 && row.velocity(bodies_) > kStanding_m_s) continue;
+    Bearing bearing;
+    bearing.normal = &row;
+    bearing.manifold = contact.manifold;
+    bearing.shape = contact.point->m_index0;
+    bearing.other_shape = contact.point->m_index1;
+    bearing.place = from_bt(contact.point->getPositionWorldOnB());
+    bearing.on = blocks_.mechanism(row.a, bodies_);
+    bearing.against = blocks_.mechanism(row.b, bodies_);
+    if (bearing.on == bearing.against) continue;
+    bearing.direction = row.linear_a;
+    if (bearing.on < bearing.against) {
+      std::swap(bearing.on, bearing.against);
+      bearing.direction = row.linear_b;
+    }
+    shares_.add(bearing);
+  }
+  return shares_.spread(bodies_, blocks_, settings_.tolerance_m_s);
+}
+
+void Solver::go_on_along_conjugates(double& last_square, int sweep) {
+  double square = 0.0;
+  for_each_main_row([&](const Row& row) {
+    square += (row.impulse - row.before) * (row.impulse - row.before) * row.response;
+  });
+  const double further = sweep > 0 && last_square > 0.0 ? square / last_square : 0.0;
+  const bool on = further < 1.0 && sweep + 2 < settings_.iterations;
+  for_each_main_row([&](Row& row) {
+    const double step = row.impulse - row.before;
+    if (on && row.heading != 0.0) row.give(bodies_, further * row.heading);
+    row.heading = (on ? further * row.heading : 0.0) + step;
+    row.before = row.impulse;
+  });
+  last_square = square;
+}
+
+// Whether to use Newton's method for an island whose sweeps do not converge soon.
+bool Solver::newton_pays() {
+  if (newton_known_) return newton_pays_;
+  newton_known_ = true;
+  pairs_.clear();
+  blocks_.tell_pairs(pairs_);
+  for (size_t c = 0; c < contact_count_; ++c) {
+    const std::pair pair(contacts_[c].normal.a, contacts_[c].normal.b);
+    if (pairs_.empty() || pairs_.back() != pair) pairs_.push_back(pair);
+  }
+  const double rows = 3.0 * static_cast<double>(contact_count_);
+  newton_pays_ =
+      contact_count_ > 0 && !blocks_.has_gears() && bodies_.size() > kFewBodies &&
+      newton_.prepare(bodies_, pairs_) < kSweepsForAFactor * kProductsOfARow * rows + kSmall;
+  return newton_pays_;
+}
+
+void Solver::solve_at_once() {
+  newton_.begin();
+  blocks_.tell_rows(newton_, bodies_);
+  for (size_t c = 0; c < contact_count_; ++c) {
+    ContactRows& contact = contacts_[c];
+    if (contact.normal.inverse == 0.0) continue;
+    const size_t load = newton_.add(contact.normal);
+    if (contact.friction > 0.0 && contact.friction2 > 0.0)
+      newton_.add(contact.along, contact.across, contact.friction, contact.friction2, load);
+    if (contact.spinning > 0.0) newton_.add(contact.spin, load, contact.spinning);
+    for (int k = 0; contact.rolling > 0.0 && k < 2; ++k)
+      newton_.add(contact.roll[k], load, contact.rolling);
+  }
+  newton_.solve(bodies_, settings_.tolerance_m_s, kNewtonSteps);
+}
+
+// Corrects penetration by velocities that move the bodies in this substep and are not kept.
+void Solver::undo_penetration() {
+  bool any = false;
+  for (size_t c = 0; c < contact_count_; ++c) any |= contacts_[c].normal.push_target > 0.0;
+  if (!any) return;
+  for (int i = 0; i < kPushSweeps; ++i) {
+    double worst = blocks_.sweep_push(bodies_);
+    for (size_t c = 0; c < contact_count_; ++c) {
+      Row& row = contacts_[c].normal;
+      if (contacts_[c].gap > 0.0 || contacts_[c].soft) continue;
+      const double wanted =
+          std::max(0.0, row.push + (row.push_target - row.push_velocity(bodies_)) * row.inverse);
+      if (wanted == row.push) continue;
+      worst = std::max(worst, std::abs(wanted - row.push) * row.response);
+      row.give_push(bodies_, wanted - row.push);
+    }
+    if (worst <= kPushTolerance_m_s) return;
+  }
+}
+
+// The bodies of a mechanism moved along straight lines where its joints prescribe arcs. The
+// correction is part of their motion, and so is its velocity (J.-P. Ryckaert et al., "Numerical
+// integration of the cartesian equations of motion of a system with constraints", 1977: SHAKE): a
+// pendulum keeps its energy. Errors that motion did not cause are corrected without changing
+// velocities.
+void Solver::close_joints(double substep_s) {
+  if (blocks_.empty()) return;
+  for (SolverBody& s : bodies_) s.push_v = s.push_w = Vec3::Zero();
+  const double largest = blocks_.look_again(substep_s);
+  if (largest <= 0.0) return;
+  blocks_.sweep_push(bodies_);
+  const bool kept = largest < kFastestClosing_m_s;
+  for (size_t i = 1; i < bodies_.size(); ++i) {
+    SolverBody& s = bodies_[i];
+    if (s.push_v == Vec3::Zero() && s.push_w == Vec3::Zero()) continue;
+    s.push_v = bounded(s.push_v);
+    s.push_w = bounded(s.push_w);
+    btTransform X = s.bullet->getWorldTransform();
+    X.setOrigin(X.getOrigin() + to_bt(Vec3(substep_s * s.push_v)));
+    X.setRotation(to_bt(turned_by(from_bt(X.getRotation()), substep_s * s.push_w)));
+    s.bullet->setWorldTransform(X);
+    s.bullet->updateInertiaTensor();
+    if (!kept) continue;
+    s.v += s.push_v;
+    s.w += s.push_w;
+  }
+}
+
+void Solver::advance(double substep_s) {
+  for (size_t i = 1; i < bodies_.size(); ++i) {
+    SolverBody& s = bodies_[i];
+    if (s.inverse_mass == Vec3::Zero() && s.bullet->isStaticOrKinematicObject()) continue;
+    const btTransform& X = s.bullet->getWorldTransform();
+    Vec3 position = from_bt(X.getOrigin()) + substep_s * (s.v + s.push_v);
+    // In free flight the mean velocity of the substep is exact.
+    if (!s.held) position -= 0.5 * substep_s * (s.v - s.v0);
+    Quat rotation = from_bt(X.getRotation());
+    const Vec3 turn = s.w + s.push_w;
+    const bool free_axes = s.bullet->getAngularFactor() == btVector3(1, 1, 1);
+    if (free_axes && s.push_w == Vec3::Zero()) {
+      turn_freely(*s.bullet, rotation, s.w, substep_s);
+    } else {
+      rotation = turned_by(rotation, substep_s * turn);
+    }
+    s.bullet->setWorldTransform(btTransform(to_bt(rotation), to_bt(position)));
+    s.bullet->updateInertiaTensor();
+  }
+}
+
+// Bodies have reached what they hit; now they rebound.
+void Solver::bounce() {
+  bool any = false;
+  for (size_t c = 0; c < contact_count_; ++c) {
+    ContactRows& contact = contacts_[c];
+    if (contact.rebound <= 0.0 || contact.normal.impulse <= 0.0) continue;
+    contact.normal.target = contact.rebound;
+    any = true;
+  }
+  if (any) sweep_until_still();
+}
+
+void Solver::write_back(double substep_s) {
+  for (size_t c = 0; c < contact_count_; ++c) {
+    const ContactRows& contact = contacts_[c];
+    btManifoldPoint& point = *contact.point;
+    point.m_appliedImpulse = contact.normal.impulse;
+    point.m_appliedImpulseLateral1 = contact.along.impulse;
+    point.m_appliedImpulseLateral2 = contact.across.impulse;
+    point.m_lateralFrictionDir1 = to_bt(contact.along.linear_a);
+    point.m_lateralFrictionDir2 = to_bt(contact.across.linear_a);
+    point.m_prevRHS = substep_s;
+  }
+  blocks_.write_back();
+  for (size_t i = 1; i < bodies_.size(); ++i) {
+    SolverBody& s = bodies_[i];
+    if (!s.bullet->isStaticOrKinematicObject()) {
+      s.bullet->setLinearVelocity(to_bt(s.v));
+      s.bullet->setAngularVelocity(to_bt(s.w));
+    }
+    s.bullet->setCompanionId(-1);
+  }
+}
+
+void Solver::solve(const std::vector<btRigidBody*>& bodies,
+                   const std::vector<btPersistentManifold*>& manifolds,
+                   const std::vector<btTypedConstraint*>& joints, double substep_s) {
+  newton_known_ = false;
+  contact_count_ = 0;
+  bodies_.clear();
+  bodies_.emplace_back();
+  blocks_.clear();
+  for (btRigidBody* body : bodies) add_body(*body, substep_s);
+  const auto tie = [this](btRigidBody& body) {
+    const int index = body_of(body);
+    if (index > 0) bodies_[index].held = true;
+    return index;
+  };
+  for (btTypedConstraint* joint : joints) {
+    const int a = tie(joint->getRigidBodyA()), b = tie(joint->getRigidBodyB());
+    const auto* motors = static_cast<const JointMotors*>(joint->getUserConstraintPtr());
+    btRigidBody* reference = motors ? motors->first.reference : nullptr;
+    blocks_.add(*joint, a, b, reference ? tie(*reference) : 0);
+  }
+  blocks_.prepare(bodies_, substep_s);
+  for (btPersistentManifold* manifold : manifolds) add_contacts(*manifold, substep_s);
+  if (contact_count_ > 0 || !blocks_.empty()) {
+    sweep_until_still();
+    undo_penetration();
+  }
+  for (size_t c = 0; c < contact_count_; ++c) {
+    const ContactRows& contact = contacts_[c];
+    if (contact.normal.impulse == 0.0 && contact.normal.push == 0.0) continue;
+    bodies_[contact.normal.a].held = bodies_[contact.normal.b].held = true;
+  }
+  advance(substep_s);
+  close_joints(substep_s);
+  bounce();
+  write_back(substep_s);
+}
+
+}  // namespace ruedo::physics

@@ -1,0 +1,176 @@
+// A file is written beside the old one and renamed once it is on the disk.
+#include "run/requests/edited_world.h"
+
+#include <fcntl.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <cstring>
+#include <filesystem>
+
+#include "base/input_file.h"
+#include "ruedo/errors.h"
+#include "system/file_handle.h"
+#include "world/read/document.h"
+
+namespace fs = std::filesystem;
+
+namespace ruedo::run {
+namespace {
+
+constexpr size_t kLargest = 64u << 20;  // bytes; that is all that is ever loaded
+
+// The bytes of a file; none where it cannot be read.
+std::optional<std::string> bytes_of(const std::string& path) {
+  try {
+    return read_input(path, kLargest);
+  } catch (const InputError&) {
+    return std::nullopt;
+  }
+}
+
+// Whatever it is, a link that leads nowhere too.
+bool is_there(const std::string& path) {
+  struct stat info{};
+  return ::lstat(path.c_str(), &info) == 0 || errno != ENOENT;
+}
+
+// What went wrong, or "". The old file stays intact until the new one is complete.
+std::string write_file(const std::string& path, const std::string& bytes) {
+  const fs::path folder = fs::path(path).parent_path();
+  const std::string part =
+      (folder / ("." + fs::path(path).filename().string() + "." + std::to_string(::getpid())))
+          .string();
+  ::unlink(part.c_str());  // of a process of that number that was killed
+  const FileHandle file(::open(part.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666));
+  if (!file) return std::strerror(errno);
+  struct stat old{};
+  bool good = write_all(file.get(), bytes.data(), bytes.size()) == bytes.size() &&
+              (::stat(path.c_str(), &old) != 0 || ::fchmod(file.get(), old.st_mode & 07777) == 0) &&
+              ::fsync(file.get()) == 0;
+  std::string fault = good ? "" : std::strerror(errno);
+  if (good && ::rename(part.c_str(), path.c_str()) != 0) {
+    fault = std::strerror(errno);
+    good = false;
+  }
+  if (!good) {
+    ::unlink(part.c_str());
+    return fault;
+  }
+  if (const FileHandle opened(::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC)); opened)
+    ::fsync(opened.get());
+  return "";
+}
+
+// Follows symbolic links: writes the file that they lead to.
+std::string full(const std::string& file) {
+  if (file.empty()) return "";
+  std::error_code error;
+  const fs::path path = fs::weakly_canonical(fs::absolute(file), error);
+  return error ? fs::absolute(file).string() : path.string();
+}
+
+}  // namespace
+
+EditedWorld::EditedWorld(const model::WorldModel& first, std::string file)
+    : first_(first), file_(full(file)) {
+  try {
+    source_ = model::world_text_of(first);
+  } catch (const InputError& error) {
+    fault_ = error.what();
+  }
+  if (saves()) known_ = bytes_of(file_);
+}
+
+void EditedWorld::begin(std::set<std::string> put) {
+  const std::lock_guard lock(mutex_);
+  spawned_.clear();
+  put_ = std::move(put);
+}
+
+std::set<std::string> EditedWorld::put() const {
+  const std::lock_guard lock(mutex_);
+  return put_;
+}
+
+void EditedWorld::spawned(const std::string& name, const spawn_request_t& body) {
+  const bool named = !body.model.empty();
+  const bool path = body.model.find("://") != std::string::npos ||
+                    fs::path(body.model).has_extension() || fs::path(body.model).is_absolute();
+  const std::lock_guard lock(mutex_);
+  put_.insert(name);
+  spawned_[name] = named
+                       ? "<?xml version=\"1.0\"?>\n<sdf version=\"1.9\">\n<include>\n      <uri>" +
+                             model::escaped((path ? "" : "model://") + body.model) +
+                             "</uri>\n    </include>\n</sdf>\n"
+                       : body.text;
+}
+
+void EditedWorld::put(const std::string& name) {
+  const std::lock_guard lock(mutex_);
+  put_.insert(name);
+}
+
+void EditedWorld::removed(const std::string& name) {
+  const std::lock_guard lock(mutex_);
+  spawned_.erase(name);
+  put_.erase(name);
+}
+
+const model::WorldText& EditedWorld::text() const {
+  if (!fault_.empty()) throw InputError({}, fault_);
+  if (!text_) text_ = std::make_unique<model::WorldText>(source_, first_);
+  return *text_;
+}
+
+std::string EditedWorld::model_text(const std::string& name) const {
+  const std::lock_guard lock(mutex_);
+  if (const auto at = spawned_.find(name); at != spawned_.end()) return at->second;
+  try {
+    return text().model_text(name);
+  } catch (const InputError&) {
+    return "";
+  }
+}
+
+// "" or why what is on the disk must not be lost.
+std::string EditedWorld::overwritten() const {
+  if (known_ ? bytes_of(file_) == known_ : !is_there(file_)) return "";
+  return known_ ? file_ +
+                      " was changed, or removed, by another program since: keep that, and save "
+                      "this world by another name (ruedo edit --save-as FILE)"
+                : file_ + " exists by now: another program made it";
+}
+
+EditedWorld::Saved EditedWorld::save(const model::WorldModel& now,
+                                     const std::function<Pose(size_t)>& X_WM) {
+  const std::lock_guard lock(mutex_);
+  if (const std::string fault = overwritten(); !fault.empty()) return {fault, ""};
+  std::vector<model::ModelNow> models;
+  for (size_t i = 0; i < now.models.size(); ++i) {
+    if (now.models[i].removed) continue;
+    const std::string& name = now.models[i].name;
+    const auto spawned = spawned_.find(name);
+    const Pose X = now.models[i].model->path ? now.models[i].X_WM : X_WM(i);  // it goes from there
+    models.push_back(
+        {name, X, spawned == spawned_.end() ? "" : spawned->second, put_.contains(name)});
+  }
+  try {
+    model::WorldText::Written written = text().with(models);
+    written.text = model::moved_to(written.text, fs::path(first_.file).parent_path().string(),
+                                   fs::path(file_).parent_path().string());
+    model::parse_document(written.text, file_);
+    if (std::string fault = write_file(file_, written.text); !fault.empty())
+      return {file_ + " cannot be written: " + fault, ""};
+    known_ = std::move(written.text);
+    std::string note;
+    for (const std::string& sentence : written.left_out)
+      note += (note.empty() ? "" : "; ") + sentence;
+    return {"", note};
+  } catch (const InputError& error) {
+    return {error.what(), ""};
+  }
+}
+
+}  // namespace ruedo::run

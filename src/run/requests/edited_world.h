@@ -1,0 +1,57 @@
+// The current world of a run as text: single models for SPAWN, and the whole for the file that SAVE
+// writes.
+#pragma once
+
+#include <functional>
+#include <map>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <set>
+#include <string>
+
+#include "ruedo/spawn_request_t.hpp"
+#include "world/edit/world_text.h"
+#include "world/model/world_model.h"
+
+namespace ruedo::run {
+
+class EditedWorld {
+ public:
+  // file: what save() writes; "": nothing. The world as it was loaded must outlive it.
+  EditedWorld(const model::WorldModel& first, std::string file);
+
+  // The run tells what requests have done.
+  void begin(std::set<std::string> put = {});  // the world is rebuilt; what put() was then
+  void spawned(const std::string& name, const spawn_request_t& body);
+  void put(const std::string& name);
+  void removed(const std::string& name);
+
+  std::set<std::string> put() const;  // that were put somewhere
+  bool saves() const { return !file_.empty(); }
+  // SDF or URDF of a model, as SPAWN takes it; "" where there is none. Any thread.
+  std::string model_text(const std::string& name) const;
+
+  struct Saved {
+    std::string fault;  // "": it is on the disk
+    std::string note;   // what the file cannot say
+  };
+  // X_WM: of a model now, by its place in the list.
+  Saved save(const model::WorldModel& now, const std::function<Pose(size_t)>& X_WM);
+
+ private:
+  const model::WorldText& text() const;
+  std::string overwritten() const;
+
+  const model::WorldModel& first_;
+  const std::string file_;
+  std::string source_;                              // the text that the world was loaded from
+  std::string fault_;                               // why there is none
+  std::optional<std::string> known_;                // what the file holds; none: there is none
+  mutable std::unique_ptr<model::WorldText> text_;  // made when it is asked for
+  mutable std::mutex mutex_;                        // of that, and of what follows
+  std::map<std::string, std::string> spawned_;      // texts, by name
+  std::set<std::string> put_;
+};
+
+}  // namespace ruedo::run

@@ -1,0 +1,26 @@
+// Guesses a robot's drive where no file describes it: from the names, axes and positions of its
+// joints.
+#pragma once
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "world/model/world_model.h"
+
+namespace ruedo::model {
+
+struct GuessedDrive {
+  std::unique_ptr<Element> drive;  // null: its joints do not look like a drive
+  std::string in_words;            // "differential, left a+b, right c+d"
+  std::vector<std::string>
+      wheels;  // joints that look like wheels, whether or not they make a drive
+};
+
+// controlled: joints that a controller may turn; empty: not known.
+GuessedDrive guess_drive(const Model& model, const std::vector<std::string>& controlled);
+
+// Whether a part of the joint's subtree reaches down to height z in the model.
+double lowest_point_below(const Model& model, ModelJointIndex joint);
+
+}  // namespace ruedo::model

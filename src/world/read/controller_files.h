@@ -1,0 +1,54 @@
+// The YAML files that may hold a robot's controllers, for one load: folders are listed and files
+// read once, however many robots ask for them, within bounds for all of them together.
+#pragma once
+
+#include <cstddef>
+#include <map>
+#include <memory>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "ruedo/element.h"
+#include "world/read/resources.h"
+
+namespace ruedo::model {
+
+class ControllerFiles {
+ public:
+  static constexpr size_t kLargestFile = 1 << 18;  // bytes
+  static constexpr size_t kMostBytes = 4 << 20;    // of YAML of all files
+  static constexpr size_t kMostEntries =
+      1'000'000;  // of files, counted each time they are asked for
+
+  explicit ControllerFiles(const ResourceFinder& resources) : resources_(resources) {}
+  // For another load: files may have changed.
+  void begin() {
+    beside_.clear();
+    files_.clear();
+    bytes_ = entries_ = 0;
+  }
+
+  // The files in the parameter folders of the package that contains `from`, then of neighbouring
+  // packages, sorted by name.
+  const std::vector<std::string>& beside(const std::string& from);
+  // Null: it names no controller, and no plugin names it. Throws InputError if it is no YAML, or
+  // beyond the bounds.
+  std::shared_ptr<const Element> read(const std::string& path, bool named = false);
+
+ private:
+  struct File {
+    std::shared_ptr<const Element> root;
+    size_t entries = 0;
+    std::optional<InputError> error;
+  };
+  void load(const std::string& path, bool named, File& file);
+
+  const ResourceFinder& resources_;
+  std::map<std::string, std::vector<std::string>> beside_;  // by folder
+  std::map<std::pair<std::string, bool>, File> files_;      // by path, and whether it is named
+  size_t bytes_ = 0, entries_ = 0;
+};
+
+}  // namespace ruedo::model

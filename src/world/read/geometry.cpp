@@ -1,0 +1,323 @@
+// Reads <geometry> into Geometry.
+#include "world/read/geometry.h"
+
+#include <stdexcept>
+
+namespace ruedo::model {
+namespace {
+
+std::optional<Geometry> read_mesh(const Element& mesh, const std::string& where,
+                                  ReadContext& context) {
+  report_other_children(mesh, {"uri", "scale", "submesh"}, {"convex_decomposition"}, where,
+                        context.findings);
+  Geometry geometry;
+  geometry.shape = Shape::mesh;
+  geometry.scale = mesh.vector3("scale", Vec3::Ones(), Allowed::any(quantity::kFactor));
+  for (int i = 0; i < 3; ++i) {
+    if (geometry.scale[i] == 0)
+      mesh.child("scale")->fail("'" + mesh.child("scale")->text +
+                                "' has a zero; a mesh cannot be flat");
+  }
+  const std::string uri = mesh.string("uri", "");
+  if (uri.empty()) mesh.fail("has no <uri>");
+  const auto path = context.resources.find(uri, mesh.source.file);
+  if (!path) {
+    context.findings.error(mesh.source, where,
+                           "the mesh '" + uri + "' " +
+                               context.resources.why_not(uri, mesh.source.file) +
+                               "; the shape is left out");
+    return std::nullopt;
+  }
+  try {
+    if (const Element* submesh = mesh.child("submesh")) {
+      geometry.mesh = context.meshes.load_submesh(*path, submesh->string("name", ""),
+                                                  submesh->boolean("center", false));
+    } else {
+      geometry.mesh = context.meshes.load(*path);
+    }
+  } catch (const EnvironmentError&) {
+    throw;
+  } catch (const std::runtime_error& error) {
+    context.findings.error(
+        mesh.source, where,
+        "the mesh '" + uri + "' cannot be used: " + error.what() + "; the shape is left out");
+    return std::nullopt;
+  }
+  return geometry;
+}
+
+std::optional<Geometry> read_polyline(const Element& geometry_element, const Element& first,
+                                      const std::string& where, ReadContext& context) {
+  std::vector<std::vector<Eigen::Vector2d>> polygons;
+  for (const Element* polyline : geometry_element.all("polyline")) {
+    std::vector<Eigen::Vector2d> polygon;
+    for (const Element* point : polyline->all("point")) {
+      const std::vector<double> v = point->as_numbers(Allowed::any(quantity::kLength));
+      if (v.size() != 2)
+        point->fail("'" + point->text + "' has " + std::to_string(v.size()) +
+                    " numbers; allowed are x y");
+      polygon.emplace_back(v[0], v[1]);
+    }
+    polygons.push_back(std::move(polygon));
+  }
+  const double height = first.number("height", 1.0, Allowed::positive(quantity::kLength));
+  try {
+    auto mesh = std::make_shared<Mesh>(extruded(polygons, height));
+    mesh->name = first.source.str();
+    Geometry geometry;
+    geometry.shape = Shape::mesh;
+    geometry.mesh = std::move(mesh);
+    return geometry;
+  } catch (const std::runtime_error& error) {
+    context.findings.error(
+        first.source, where,
+        std::string("the polyline cannot be used: ") + error.what() + "; the shape is left out");
+    return std::nullopt;
+  }
+}
+
+// The first <texture>'s diffuse picture, tiled over the ground. Gazebo blends in further ones by
+// height; these are reported.
+void cover_with_texture(const Element& element, const Vec3& size, Mesh& mesh,
+                        const std::string& where, ReadContext& context) {
+  const Element* texture = element.child("texture");
+  const Element* picture = texture ? texture->child("diffuse") : nullptr;
+  if (!picture) return;
+  for (const auto& child : element.children) {
+    if (child->name != "texture" || child.get() == texture) continue;
+    context.findings.unsupported(child->source, where,
+                                 "a heightmap has one <texture>; this one is not blended in");
+  }
+  const double tile_m = texture->number("size", 10.0, Allowed::positive(quantity::kLength));
+  const auto path = context.resources.find_texture(picture->text, picture->source.file);
+  if (!path) {
+    context.findings.unsupported(
+        picture->source, where,
+        "the texture '" + picture->text + "' is not found; the ground is plain");
+    return;
+  }
+  context.documents.note(*path);
+  Material ground;
+  ground.ambient = ground.diffuse = {1.0f, 1.0f, 1.0f, 1.0f};
+  ground.texture = context.textures.take(*path);
+  if (!ground.texture) return;
+  mesh.materials.push_back(std::move(ground));
+  for (Mesh::Part& part : mesh.parts) part.material = MaterialIndex(0);
+  const Eigen::Vector2f tiles = (size.head<2>() / tile_m).cast<float>();
+  for (Eigen::Vector2f& uv : mesh.uvs) uv = uv.cwiseProduct(tiles);
+}
+
+std::optional<Geometry> read_heightmap(const Element& element, const std::string& where,
+                                       ReadContext& context) {
+  report_other_children(element, {"uri", "size", "pos", "texture"},
+                        {"use_terrain_paging", "sampling", "blend"}, where, context.findings);
+  const std::string uri = element.string("uri", "");
+  if (uri.empty()) element.fail("has no <uri>");
+  const Vec3 size = element.vector3("size", Vec3::Ones(), Allowed::any(quantity::kLength));
+  if (size.minCoeff() <= 0)
+    element.child("size")->fail("'" + element.child("size")->text +
+                                "' is not allowed; sizes are above 0");
+  const auto path = context.resources.find(uri, element.source.file);
+  if (!path) {
+    context.findings.error(element.source, where,
+                           "the heightmap '" + uri + "' " +
+                               context.resources.why_not(uri, element.source.file) +
+                               "; the shape is left out");
+    return std::nullopt;
+  }
+  context.documents.note(*path);
+  auto mesh = std::make_shared<Mesh>();
+  try {
+    *mesh = heightmap(*path, size);
+  } catch (const std::runtime_error& error) {
+    context.findings.error(
+        element.source, where,
+        "the heightmap '" + uri + "' cannot be used: " + error.what() + "; the shape is left out");
+    return std::nullopt;
+  }
+  cover_with_texture(element, size, *mesh, where, context);
+  const Vec3 at = element.vector3("pos", Vec3::Zero(), Allowed::any(quantity::kLength));
+  for (auto& p : mesh->positions) p += at.cast<float>();
+  mesh->name = *path;
+  Geometry geometry;
+  geometry.shape = Shape::mesh;
+  geometry.mesh = std::move(mesh);
+  return geometry;
+}
+
+// Checks the corners of a mesh times its scale: no number reader has checked these lengths.
+bool is_too_large(const Geometry& g, const Element& element, const std::string& where,
+                  ReadContext& context) {
+  const Eigen::AlignedBox3d box = bounds(g);
+  const double reach =
+      box.isEmpty() ? 0.0
+                    : std::max(box.min().cwiseAbs().maxCoeff(), box.max().cwiseAbs().maxCoeff());
+  if (reach <= quantity::kLength.most) return false;
+  context.findings.error(element.source, where,
+                         "the mesh reaches to " + shown(reach) + " m; allowed is up to " +
+                             shown(quantity::kLength.most) + " m; the shape is left out");
+  return true;
+}
+
+// Reads the shapes given by a few numbers. Converters write sizes of zero for "no shape": there is
+// none then. Negative sizes are errors.
+class SizedShape {
+ public:
+  SizedShape(const Element& shape, const std::string& where, Findings& findings)
+      : shape_(shape), where_(where), findings_(findings) {}
+
+  std::optional<Geometry> box() { return of_vector(Shape::box, "size", "sizes"); }
+  std::optional<Geometry> ellipsoid() { return of_vector(Shape::ellipsoid, "radii", "radii"); }
+  std::optional<Geometry> sphere();
+  std::optional<Geometry> round(Shape kind);  // cylinder, capsule or cone
+  Geometry plane();
+
+ private:
+  std::optional<Geometry> of_vector(Shape kind, const char* name, const std::string& plural);
+  std::nullopt_t nothing(const char* name);
+  double required(const char* name) const;
+  void tell_default(const char* name, const std::string& value);
+
+  const Element& shape_;
+  const std::string& where_;
+  Findings& findings_;
+};
+
+std::nullopt_t SizedShape::nothing(const char* name) {
+  findings_.repaired(shape_.source, where_,
+                     "a <" + shape_.name + "> whose <" + name + "> is 0; the shape is left out");
+  return std::nullopt;
+}
+
+double SizedShape::required(const char* name) const {
+  if (!shape_.has(name)) shape_.fail(std::string("has no <") + name + ">");
+  return shape_.number(name, 0, Allowed::not_negative(quantity::kLength));
+}
+
+// Where SDF has a default, a file may omit the value.
+void SizedShape::tell_default(const char* name, const std::string& value) {
+  if (shape_.has(name)) return;
+  findings_.repaired(shape_.source, where_,
+                     "a <" + shape_.name + "> without <" + name + ">; it is " + value +
+                         " as in SDF's description");
+}
+
+std::optional<Geometry> SizedShape::of_vector(Shape kind, const char* name,
+                                              const std::string& plural) {
+  Geometry g;
+  g.shape = kind;
+  tell_default(name, "1 1 1");
+  g.size = shape_.vector3(name, Vec3::Ones(), Allowed::any(quantity::kLength));
+  if (g.size.minCoeff() < 0)
+    shape_.child(name)->fail("'" + shape_.child(name)->text + "' is not allowed; " + plural +
+                             " are above 0");
+  if (g.size.minCoeff() == 0) return nothing(name);
+  return g;
+}
+
+std::optional<Geometry> SizedShape::sphere() {
+  Geometry g;
+  g.shape = Shape::sphere;
+  tell_default("radius", "1");
+  g.size = Vec3::Constant(shape_.number("radius", 1, Allowed::not_negative(quantity::kLength)));
+  if (g.size.x() == 0) return nothing("radius");
+  return g;
+}
+
+std::optional<Geometry> SizedShape::round(Shape kind) {
+  Geometry g;
+  g.shape = kind;
+  const double radius = required("radius");
+  g.size = {radius, required("length"), 0};
+  if (g.size.x() == 0) return nothing("radius");
+  if (g.size.y() == 0 && kind != Shape::capsule) return nothing("length");
+  return g;
+}
+
+Geometry SizedShape::plane() {
+  Geometry g;
+  g.shape = Shape::plane;
+  const Vec3 normal = shape_.vector3("normal", Vec3::UnitZ(), Allowed::any(quantity::kFactor));
+  if (!(normal.norm() > 1e-9))
+    shape_.child("normal")->fail("'" + shape_.child("normal")->text +
+                                 "' is not allowed; a normal is not zero");
+  g.normal = normal.normalized();
+  const Element* size = shape_.child("size");
+  if (!size) return g;
+  std::vector<double> v = size->as_numbers(Allowed::any(quantity::kLength));
+  if (v.size() == 3) {  // <size> of a box, which some files write here
+    findings_.repaired(size->source, where_,
+                       "<size> of a plane has two numbers; the third is left out");
+    v.pop_back();
+  }
+  if (v.size() != 2 || v[0] <= 0 || v[1] <= 0)
+    size->fail("'" + size->text + "' is not allowed; allowed are two numbers above 0");
+  g.extent = {v[0], v[1]};
+  return g;
+}
+
+// The one shape of a <geometry>; nullptr: there is none, or it is <empty/>.
+const Element* shape_of(const Element& element) {
+  const Element* shape = nullptr;
+  for (const auto& child : element.children) {
+    if (child->name == "empty") return nullptr;
+    if (child->name.find(':') != std::string::npos)
+      child->fail("is not allowed here; <geometry> has no elements of ruedo:");
+    if (shape && child->name != "polyline") child->fail("is a second shape; <geometry> holds one");
+    if (!shape) shape = child.get();
+  }
+  return shape;
+}
+
+}  // namespace
+
+std::optional<Geometry> read_geometry(const Element& element, const std::string& where,
+                                      ReadContext& context) {
+  const Element* shape = shape_of(element);
+  if (!shape) return std::nullopt;
+  const auto unless_too_large = [&](std::optional<Geometry> g) -> std::optional<Geometry> {
+    if (!g || is_too_large(*g, *shape, where, context)) return std::nullopt;
+    context.triangles.add(g->mesh, g->scale, *shape);
+    return g;
+  };
+  const std::string& kind = shape->name;
+  SizedShape sized(*shape, where, context.findings);
+  if (kind == "box") return sized.box();
+  if (kind == "sphere") return sized.sphere();
+  if (kind == "cylinder") return sized.round(Shape::cylinder);
+  if (kind == "capsule") return sized.round(Shape::capsule);
+  if (kind == "cone") return sized.round(Shape::cone);
+  if (kind == "ellipsoid") return sized.ellipsoid();
+  if (kind == "plane") return sized.plane();
+  if (kind == "mesh") return unless_too_large(read_mesh(*shape, where, context));
+  if (kind == "polyline") return unless_too_large(read_polyline(element, *shape, where, context));
+  if (kind == "heightmap") return unless_too_large(read_heightmap(*shape, where, context));
+  const std::string near =
+      nearest_word(kind, {"box", "sphere", "cylinder", "capsule", "cone", "ellipsoid", "plane",
+                          "mesh", "polyline", "heightmap"});
+  context.findings.unsupported(shape->source, where,
+                               "the shape <" + kind + "> is not supported and left out" +
+                                   (near.empty() ? "" : "; did you mean <" + near + ">?"));
+  return std::nullopt;
+}
+
+Eigen::AlignedBox3d bounds(const Geometry& g) {
+  Vec3 half = Vec3::Zero();
+  switch (g.shape) {
+    case Shape::box: half = g.size / 2; break;
+    case Shape::sphere: half = Vec3::Constant(g.size.x()); break;
+    case Shape::ellipsoid: half = g.size; break;
+    case Shape::cylinder:
+    case Shape::cone: half = {g.size.x(), g.size.x(), g.size.y() / 2}; break;
+    case Shape::capsule: half = {g.size.x(), g.size.x(), g.size.y() / 2 + g.size.x()}; break;
+    case Shape::plane: return {};
+    case Shape::mesh: {
+      Eigen::AlignedBox3d box;
+      for (const auto& p : g.mesh->positions) box.extend(g.scale.cwiseProduct(p.cast<double>()));
+      return box;
+    }
+  }
+  return {-half, half};
+}
+
+}  // namespace ruedo::model

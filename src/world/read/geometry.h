@@ -1,0 +1,28 @@
+// Shapes: SDF's <geometry>, and the meshes made from polylines and heightmaps.
+#pragma once
+
+#include <optional>
+#include <string>
+
+#include "world/model/world_model.h"
+#include "world/read/read_context.h"
+
+namespace ruedo::model {
+
+// Reads <geometry>. nullopt: there is no shape, or its mesh is missing or broken; the findings say
+// which.
+std::optional<Geometry> read_geometry(const Element& geometry, const std::string& where,
+                                      ReadContext& context);
+
+// Prisms over the polygons (even-odd: a polygon inside another is a hole) from z = 0 to `height`.
+// Throws std::runtime_error for polygons without area or with crossing edges.
+Mesh extruded(const std::vector<std::vector<Eigen::Vector2d>>& polygons, double height);
+
+// A heightmap from a picture file, one height per pixel; size in metres, centred at the origin.
+// Throws std::runtime_error for a picture that cannot be read.
+Mesh heightmap(const std::string& picture, const Vec3& size);
+
+// The corners of a shape's bounding box, in the shape's frame. Planes have none.
+Eigen::AlignedBox3d bounds(const Geometry& geometry);
+
+}  // namespace ruedo::model

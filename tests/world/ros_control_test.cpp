@@ -1,0 +1,574 @@
+// Drives that the YAML files of ros_control and ros2_control define, and drives that no file
+// defines.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "temporary_folder.h"
+#include "text_world.h"
+#include "world/load.h"
+#include "world/read/controller_files.h"
+#include "world/read/yaml.h"
+
+namespace ruedo::model {
+namespace {
+
+using testing::ElementsAre;
+using testing::HasSubstr;
+using testing::IsEmpty;
+using Steering = DriveDescription::Steering;
+
+// A box on four wheels of radius 0.1 m, 0.6 m apart to the side and 0.5 m along. Wheels' names
+// begin with `prefix`.
+std::string four_wheels(const std::string& more, const std::string& prefix = "") {
+  std::string text =
+      "<robot name='bot'><link name='base'><inertial><mass value='9'/><inertia ixx='0.3' iyy='0.3' "
+      "izz='0.3' ixy='0' ixz='0' iyz='0'/></inertial></link>";
+  const std::pair<const char*, const char*> places[] = {{"front_left", "0.25 0.3 0.1"},
+                                                        {"rear_left", "-0.25 0.3 0.1"},
+                                                        {"front_right", "0.25 -0.3 0.1"},
+                                                        {"rear_right", "-0.25 -0.3 0.1"}};
+  for (const auto& [place, xyz] : places) {
+    const std::string name = prefix + place;
+    text += "<link name='" + name +
+            "_link'><inertial><mass value='1'/><inertia ixx='0.01' iyy='0.01' izz='0.01' ixy='0' "
+            "ixz='0' iyz='0'/></inertial>"
+            "<collision><origin rpy='1.5707963 0 0'/><geometry><cylinder radius='0.1' "
+            "length='0.05'/></geometry></collision></link>"
+            "<joint name='" +
+            name + "' type='continuous'><parent link='base'/><child link='" + name +
+            "_link'/><origin xyz='" + xyz + "'/><axis xyz='0 1 0'/></joint>";
+  }
+  return text + more + "</robot>";
+}
+
+std::string transmission(const std::string& joint) {
+  return "<transmission name='t_" + joint +
+         "'><type>transmission_interface/SimpleTransmission</type><joint name='" + joint +
+         "'><hardwareInterface>hardware_interface/VelocityJointInterface</hardwareInterface></"
+         "joint></transmission>";
+}
+
+const char* const kPackage = "<package><name>%</name></package>";
+std::string package(const std::string& name) {
+  return std::string(kPackage).replace(std::string(kPackage).find('%'), 1, name);
+}
+
+const DriveDescription& drive_of(const WorldModel& world) {
+  const auto& drive = world.models.back().model->drive;
+  if (!drive) throw std::runtime_error("no drive");
+  return *drive;
+}
+
+std::vector<std::string> names(const WorldModel& world,
+                               const std::vector<ModelJointIndex>& joints) {
+  std::vector<std::string> list;
+  for (const ModelJointIndex joint : joints)
+    list.push_back(world.models.back().model->joints[joint].name);
+  return list;
+}
+
+// ROS 1: the file is in a neighbouring package and nothing names it; radius and separation are the
+// robot's own, times the multipliers.
+TEST(RosControl, DiffDriveOfRos1) {
+  TemporaryFolder folder;
+  folder.write("bot_description/package.xml", package("bot_description"));
+  folder.write("bot_control/package.xml", package("bot_control"));
+  folder.write("bot_control/config/other.yaml", "not: [what, is, looked, for]\n");
+  folder.write("bot_control/config/control.yaml", R"(bot_joints:
+  type: "joint_state_controller/JointStateController"
+bot_velocity_controller:
+  type: "diff_drive_controller/DiffDriveController"
+  left_wheel: ['front_left', 'rear_left']
+  right_wheel: ['front_right', 'rear_right']
+  publish_rate: 40
+  cmd_vel_timeout: 0.25
+  wheel_separation_multiplier: 1.5
+  wheel_radius_multiplier: 0.9
+  linear:
+    x:
+      has_velocity_limits: true
+      max_velocity: 1.0
+      has_acceleration_limits: true
+      max_acceleration: 3.0
+  angular:
+    z:
+      has_velocity_limits: true
+      max_velocity: 2.0
+      has_acceleration_limits: false
+      max_acceleration: 6.0
+)");
+  const auto world = load_world(folder.write(
+      "bot_description/urdf/bot.urdf",
+      four_wheels(transmission("front_left") +
+                  "<gazebo><plugin name='c' filename='libgazebo_ros_control.so'/></gazebo>")));
+  EXPECT_THAT(texts(*world),
+              ElementsAre("it drives as the controller 'bot_velocity_controller' of control.yaml "
+                          "says, which has its joints; no plugin names the file"));
+  EXPECT_EQ(world->findings[0].source.line, 4);  // yaml-cpp marks a map by its first entry
+  const DriveDescription& drive = drive_of(*world);
+  EXPECT_THAT(names(*world, drive.left_joints), ElementsAre("front_left", "rear_left"));
+  EXPECT_THAT(names(*world, drive.right_joints), ElementsAre("front_right", "rear_right"));
+  EXPECT_FALSE(drive.guessed);
+  EXPECT_NEAR(drive.track, 0.6 * 1.5, 1e-12);
+  EXPECT_EQ(drive.max_speed, 1.0);
+  EXPECT_EQ(drive.acceleration, 3.0);
+  EXPECT_EQ(drive.max_turn_rate, 2.0);
+  EXPECT_TRUE(std::isinf(drive.turn_acceleration));  // its switch is off
+  EXPECT_EQ(drive.watchdog_us, 250'000);
+  EXPECT_DOUBLE_EQ(drive.odometry_rate.hz(), 40.0);
+}
+
+// ROS 2: the plugin names the file by its path on the author's machine; names and types are
+// separate; keys contain dots.
+TEST(RosControl, DiffDriveOfRos2) {
+  TemporaryFolder folder;
+  folder.write("bot/package.xml", package("bot"));
+  folder.write("bot/config/controllers.yaml", R"(controller_manager:
+  ros__parameters:
+    update_rate: 100
+    joint_state_broadcaster:
+      type: joint_state_broadcaster/JointStateBroadcaster
+    strange:
+      type: maker/StrangeController
+    base:
+      type: diff_drive_controller/DiffDriveController
+base:
+  ros__parameters:
+    left_wheel_names: ["front_left", "rear_left"]
+    right_wheel_names: ["front_right", "rear_right"]
+    wheel_separation: 0.61
+    wheel_radius: 0.11
+    linear.x.max_velocity: 0.8
+    linear.x.min_velocity: -0.4
+    linear.x.max_acceleration: .NaN
+    angular.z.max_velocity: 1.5
+)");
+  const std::string control =
+      "<ros2_control name='s' type='system'><joint name='front_left'><command_interface "
+      "name='velocity'/></joint></ros2_control>";
+  const auto world = load_world(folder.write(
+      "bot/urdf/bot.urdf",
+      four_wheels(control + "<gazebo><plugin name='gz_ros2_control::GazeboSimROS2ControlPlugin' "
+                            "filename='libgz_ros2_control-system.so'>"
+                            "<parameters>/opt/ros/jazzy/share/bot/config/controllers.yaml</"
+                            "parameters></plugin></gazebo>")));
+  EXPECT_THAT(
+      texts(*world),
+      ElementsAre(
+          "controllers of type 'maker/StrangeController' are not known; 'strange' does nothing",
+          "controller 'base': min_velocity is not kept: it is as fast both ways as max_velocity "
+          "says"));
+  const DriveDescription& drive = drive_of(*world);
+  EXPECT_EQ(drive.wheel_radius, 0.11);
+  EXPECT_EQ(drive.track, 0.61);
+  EXPECT_EQ(drive.max_speed, 0.8);
+  EXPECT_TRUE(std::isinf(drive.acceleration));
+  EXPECT_EQ(drive.max_turn_rate, 1.5);
+  EXPECT_EQ(drive.watchdog_us, 500'000);  // diff_drive_controller's own
+}
+
+TEST(RosControl, MecanumAndSteeringControllers) {
+  TemporaryFolder folder;
+  folder.write("package.xml", package("bot"));
+  folder.write("config/c.yaml", R"(/**:
+  mecanum:
+    ros__parameters:
+      type: mecanum_drive_controller/MecanumDriveController
+      front_left_wheel_command_joint_name: front_left
+      front_right_wheel_command_joint_name: front_right
+      rear_left_wheel_command_joint_name: rear_left
+      rear_right_wheel_command_joint_name: rear_right
+      kinematics:
+        wheels_radius: 0.1
+        sum_of_robot_center_projection_on_X_Y_axis: 0.55
+)");
+  const auto world = load_world(folder.write("bot.urdf", four_wheels(transmission("front_left"))));
+  EXPECT_EQ(drive_of(*world).steering, Steering::mecanum);
+  EXPECT_NEAR(drive_of(*world).track, 0.6, 1e-12);
+  EXPECT_NEAR(drive_of(*world).wheelbase, 0.5, 1e-12);
+}
+
+// As PAL's robots have it: one file names the types, another holds the rest; and the type may stand
+// among the parameters.
+TEST(RosControl, SeveralFilesAreReadAsOne) {
+  TemporaryFolder folder;
+  const std::string plugin =
+      "<gazebo><plugin name='c' filename='libgz_ros2_control-system.so'>"
+      "<parameters>base.yaml</parameters><parameters>manager.yaml</parameters></plugin></gazebo>";
+  const std::string base =
+      "base_controller:\n  ros__parameters:\n    left_wheel_names: [front_left, rear_left]\n"
+      "    right_wheel_names: [front_right, rear_right]\n    wheel_radius: 0.11\n"
+      "    wheel_separation: 0.7\n";
+  const std::string type = "type: diff_drive_controller/DiffDriveController\n";
+  folder.write("base.yaml", base);
+  folder.write("manager.yaml",
+               "controller_manager:\n  ros__parameters:\n    base_controller:\n      " + type);
+  const auto apart = load_world(folder.write("bot.urdf", four_wheels(plugin)));
+  folder.write("base.yaml", base + "    " + type);
+  folder.write("manager.yaml", "controller_manager:\n  ros__parameters:\n    update_rate: 100\n");
+  const auto among = load_world(folder.write("bot.urdf", four_wheels(plugin)));
+  for (const auto& world : {apart, among}) {
+    EXPECT_THAT(texts(*world), IsEmpty());
+    EXPECT_EQ(drive_of(*world).track, 0.7);
+    EXPECT_EQ(drive_of(*world).wheel_radius, 0.11);
+  }
+}
+
+// A controller of other joints is another robot's.
+TEST(RosControl, JointsThatAreNotThereAreAnotherRobots) {
+  TemporaryFolder folder;
+  folder.write("package.xml", package("bot"));
+  folder.write("config/c.yaml",
+               "c:\n  type: diff_drive_controller/DiffDriveController\n  left_wheel: port\n  "
+               "right_wheel: starboard\n");
+  const auto world = load_world(folder.write("bot.urdf", four_wheels(transmission("front_left"))));
+  EXPECT_TRUE(drive_of(*world).guessed);
+}
+
+TEST(RosControl, AFileThatIsNotThereIsNamed) {
+  TemporaryFolder folder;
+  const auto world = load_world(folder.write(
+      "bot.urdf",
+      four_wheels(
+          "<gazebo><plugin name='c' filename='libgazebo_ros2_control.so'><parameters>$(find "
+          "x)/y.yaml</parameters></plugin></gazebo>")));
+  EXPECT_THAT(texts(*world),
+              testing::Contains("the controllers' file '$(find x)/y.yaml' is not found"));
+}
+
+TEST(RosControl, ParametersWithoutEffectAreOneFinding) {
+  TemporaryFolder folder;
+  folder.write("bot/package.xml", package("bot"));
+  folder.write("bot/config/control.yaml", R"(drive:
+  type: diff_drive_controller/DiffDriveController
+  left_wheel: [front_left, rear_left]
+  right_wheel: [front_right, rear_right]
+  publish_rate: 50
+  pose_covariance_diagonal: [0.001, 0.001, 0.001, 0.001, 0.001, 0.03]
+  open_loop: true
+  position_feedback: false
+  linear: {x: {max_velocity: 1.0, startup_boost: 2.0}}
+)");
+  const auto world =
+      load_world(folder.write("bot/urdf/bot.urdf", four_wheels(transmission("front_left"))));
+  EXPECT_THAT(texts(*world),
+              testing::Contains("controller 'drive': without effect here: "
+                                "pose_covariance_diagonal, open_loop, linear.x.startup_boost"));
+}
+
+// A robot whose plugin names a file of that text.
+std::shared_ptr<const WorldModel> named_world(const std::string& yaml) {
+  TemporaryFolder folder;
+  folder.write("c.yaml", yaml);
+  return load_world(
+      folder.write("bot.urdf", four_wheels("<gazebo><plugin name='c' "
+                                           "filename='libgazebo_ros2_control.so'><parameters>"
+                                           "c.yaml</parameters></plugin></gazebo>")));
+}
+
+const std::string kManager =
+    "controller_manager:\n  ros__parameters:\n"
+    "    base: {type: diff_drive_controller/DiffDriveController}\n"
+    "    hold: {type: effort_controllers/JointTrajectoryController}\n";
+const std::string kBase =
+    "base:\n  ros__parameters:\n    left_wheel_names: [front_left, rear_left]\n"
+    "    right_wheel_names: [front_right, rear_right]\n    wheel_separation: 0.61\n"
+    "    wheel_radius: 0.11\n    linear.x.max_velocity: 1.0\n    publish_rate: 50.0\n";
+const std::string kHold =
+    "hold:\n  ros__parameters:\n    joints: [front_left]\n"
+    "    gains: {front_left: {p: 10.0, i: 1.0, d: 0.5, i_clamp: 1.0}}\n";
+
+std::string with(std::string text, const std::string& old, const std::string& by) {
+  return text.replace(text.find(old), old.size(), by);
+}
+
+struct Wrong {
+  std::string old, by, text;
+  bool drives = false;  // as the file says
+};
+
+TEST(RosControl, WhatIsWrongInANamedFileIsNamed) {
+  const std::string good = kManager + kBase + kHold;
+  ASSERT_THAT(texts(*named_world(good)), IsEmpty());
+  const Wrong table[] = {
+      {"wheel_radius: 0.11", "wheel_radius: 0.11\n    wheel_radius: 0.3",
+       "a second 'wheel_radius'; the first is in line 10"},
+      {"radius: 0.11", "radius: -0.11", "<wheel_radius>: '-0.11' is not allowed"},
+      {"separation: 0.61", "separation: -0.61", "<wheel_separation>: '-0.61' is not allowed"},
+      {"radius: 0.11", "radius: .inf", "<wheel_radius>: '.inf'"},
+      {"max_velocity: 1.0", "max_velocity: -1.0", "<max_velocity>: '-1.0'"},
+      {"right_wheel_names: [front_right", "right_wheel_names: [xx",
+       "controller 'base' names the joint 'xx', which the model does not have"},
+      {"left_wheel_names: [front_left, rear_left]", "left_wheel_names: [rear_left, rear_left]",
+       "the joint 'rear_left' is named twice"},
+      {"publish_rate: 50.0", "publish_rate: -50.0", "<publish_rate>: '-50.0' is not allowed", true},
+      {"publish_rate: 50.0", "publish_rate: fast", "<publish_rate>: 'fast' is not a number", true},
+      {"publish_rate: 50.0", "publish_rate: 33.33333333333333", "it is 33.333333333", true},
+      {"publish_rate: 50.0", "publish_rate: 1e9", "it is 1e+06", true},
+      {"joints: [front_left]", "joints: [nope]",
+       "controller 'hold' names the joint 'nope', which the model does not have", true},
+      {"gains: {front_left", "gains: {other",
+       "controller 'hold': gains of the joint 'other', which is none of its joints", true},
+      {"{p: 10", "{pp: 10", "gains of the joint 'front_left': without effect here: pp", true},
+      {"i_clamp: 1.0", "i_clamp_min: 5, i_clamp_max: -5",
+       "gains of the joint 'front_left': i_clamp_min '5' is above 0; it counts as 0", true},
+      {"i_clamp: 1.0", "i_clamp_min: -5, i_clamp_max: -5",
+       "gains of the joint 'front_left': i_clamp_max '-5' is below 0; it counts as 0", true},
+  };
+  for (const Wrong& each : table) {
+    const auto world = named_world(with(good, each.old, each.by));
+    EXPECT_THAT(texts(*world), testing::Contains(HasSubstr(each.text))) << each.by;
+    EXPECT_EQ(drive_of(*world).guessed, !each.drives) << each.by;
+  }
+}
+
+TEST(RosControl, SizesOfNothingAreNamed) {
+  const auto world = named_world(kManager + with(kBase, "separation: 0.61", "separation: 0.0"));
+  EXPECT_THAT(texts(*world),
+              ElementsAre("controller 'base': wheel_separation '0.0' is not allowed; allowed is a "
+                          "number above 0; it counts as if it was not there"));
+  EXPECT_FALSE(drive_of(*world).guessed);
+  EXPECT_NEAR(drive_of(*world).track, 0.6, 1e-12);
+}
+
+TEST(RosControl, MistypedTypesAreNamed) {
+  const std::string good = kManager + kBase + kHold, type = "diff_drive_controller/DiffDrive";
+  EXPECT_THAT(texts(*named_world(with(good, type + "Controller", type + "Contoller"))),
+              ElementsAre("controllers of type 'diff_drive_controller/DiffDriveContoller' are not "
+                          "known; 'base' drives as its name says; did you mean "
+                          "'diff_drive_controller/DiffDriveController'?"));
+  EXPECT_THAT(texts(*named_world(
+                  with(good, type + "Controller", "diff_drive_controler/DiffDriveControler"))),
+              testing::Contains("controllers of type 'diff_drive_controler/DiffDriveControler' are "
+                                "not known; 'base' does nothing; did you mean "
+                                "'diff_drive_controller/DiffDriveController'?"));
+  EXPECT_THAT(texts(*named_world(with(good, "effort_controllers", "my_efforts_controllers"))),
+              IsEmpty());  // a maker's own
+}
+
+// ROS would run one of them at a time.
+TEST(RosControl, ASecondOfADriveAndOfGainsIsNamed) {
+  const std::string more =
+      "    base2: {type: diff_drive_controller/DiffDriveController}\n"
+      "    hold2: {type: effort_controllers/JointPositionController}\n";
+  const auto world = named_world(
+      kManager + more + kBase + kHold + with(kBase, "base", "base2") +
+      "hold2:\n  ros__parameters: {joint: front_left, pid: {p: 3.0, i: 0.0, d: 0.0}}\n");
+  EXPECT_THAT(
+      texts(*world),
+      ElementsAre("controller 'base2' drives, too, and is left out: 'base' of c.yaml drives "
+                  "the robot",
+                  "gains of the joint 'front_left' are left out: it has those of another "
+                  "controller already"));
+}
+
+TEST(RosControl, NamedFilesWithoutControllersAreNamed) {
+  for (const std::string& text : {std::string(), std::string("hello"), std::string("- a\n- b\n"),
+                                  std::string("\1\2"), std::string("a: {b: 1}\n"), kBase})
+    EXPECT_THAT(texts(*named_world(text)),
+                testing::Contains(testing::AnyOf(HasSubstr("holds no controller with a type"),
+                                                 HasSubstr("is no YAML"))))
+        << text;
+  const std::string broadcaster =
+      "m:\n  ros__parameters:\n    b: {type: joint_state_broadcaster/JointStateBroadcaster}\n";
+  EXPECT_THAT(texts(*named_world(broadcaster)),
+              testing::Not(testing::Contains(HasSubstr("holds no controller"))));
+}
+
+// Also beside others that have one, and where ROS 2's manager says nothing of a node.
+TEST(RosControl, ControllersWithoutATypeAreNamed) {
+  const std::string broadcaster = "    b: {type: joint_state_broadcaster/JointStateBroadcaster}\n";
+  const auto ros2 = named_world("controller_manager:\n  ros__parameters:\n" + broadcaster + kBase);
+  EXPECT_THAT(texts(*ros2),
+              testing::Contains("'base' names wheels or joints as a controller does, but no type "
+                                "says which: it does nothing"));
+  const auto ros1 = named_world("bot:\n" + broadcaster + "    arm: {joints: [front_left]}\n");
+  EXPECT_THAT(texts(*ros1), testing::Contains(HasSubstr("'arm' names wheels or joints")));
+  EXPECT_THAT(texts(*named_world(kManager + kBase)), IsEmpty());
+}
+
+TEST(RosControl, ADriveThatNamesNoWheelsIsNamed) {
+  const auto world = named_world(kManager + with(kBase, "left_wheel_names", "left_wheels_names"));
+  EXPECT_THAT(texts(*world), testing::Contains(HasSubstr("names no wheels: it drives nothing")));
+}
+
+// NaN and infinity in all spellings that ROS 2 reads, and its wildcard for the names of nodes,
+// which counts where a node of the name says nothing.
+TEST(RosControl, LimitsThatAreNoneAndWildcards) {
+  for (const char* none : {".nan", ".NaN", ".NAN", ".inf", ".Inf", "+.INF"}) {
+    const auto world = named_world(
+        kManager + with(kBase, "max_velocity: 1.0", "max_velocity: " + std::string(none)));
+    EXPECT_THAT(texts(*world), IsEmpty()) << none;
+    EXPECT_FALSE(drive_of(*world).guessed) << none;
+    EXPECT_TRUE(std::isinf(drive_of(*world).max_speed)) << none;
+  }
+  const auto braked = named_world(
+      kManager + with(kBase, "publish_rate", "linear.x.max_deceleration: -2.0\n    publish_rate"));
+  EXPECT_THAT(texts(*braked), IsEmpty());
+  EXPECT_EQ(drive_of(*braked).deceleration, 2.0);
+  const auto wild = named_world(
+      "/**:\n  ros__parameters:\n    wheel_radius: 0.3\n    max_torque: 7\n    "
+      "cmd_vel_timeout: 0.25\n" +
+      kManager + kBase);
+  EXPECT_THAT(texts(*wild), IsEmpty());
+  EXPECT_EQ(drive_of(*wild).wheel_radius, 0.11);
+  EXPECT_EQ(drive_of(*wild).watchdog_us, 250'000);
+  const auto all_wild = named_world(kManager + with(kBase, "base:", "/**:"));
+  EXPECT_THAT(texts(*all_wild), IsEmpty());
+  EXPECT_EQ(drive_of(*all_wild).track, 0.61);
+}
+
+TEST(Yaml, NamesASecondKey) {
+  EXPECT_THROW(parse_yaml("a: 1\nb: {c: 1, d: 2, c: 3}\n", "f"), InputError);
+  EXPECT_NO_THROW(parse_yaml("a: {c: 1}\nb: {c: 1}\n", "f"));
+}
+
+TEST(Yaml, IsBounded) {
+  EXPECT_THROW(parse_yaml("a: [", "f"), InputError);
+  EXPECT_THROW(parse_yaml(std::string(2000, '['), "f"), InputError);
+  std::string bomb = "a0: &a0 [x, x, x, x, x, x, x, x, x, x]\n";
+  for (int i = 1; i < 9; ++i) {
+    const std::string last = "*a" + std::to_string(i - 1) + ", ";
+    bomb += "a" + std::to_string(i) + ": &a" + std::to_string(i) + " [";
+    for (int k = 0; k < 9; ++k) bomb += last;
+    bomb += "x]\n";
+  }
+  EXPECT_THROW(parse_yaml(bomb, "f"), InputError);
+  const std::string text = "a: &a " + std::string(200'000, 'x') + "\nb: ";
+  EXPECT_NO_THROW(parse_yaml(text + "[*a, *a]", "f"));
+  EXPECT_THROW(parse_yaml(text + "[*a, *a, *a, *a, *a]", "f"), InputError);
+  EXPECT_THROW(parse_yaml(text + "{*a : {*a : {*a : {*a : {*a : 1}}}}}", "f"), InputError);
+  EXPECT_EQ(parse_yaml("a:\n  b: [1, 2]\n", "f")->child("a/b/item")->source.line, 2);
+}
+
+TEST(Yaml, DotsOfRos2AreLevels) {
+  const auto root = parse_yaml("ros__parameters:\n  a.b: 1\n  a.c.d: [2, 3]\nv1.2: 4\n", "f");
+  EXPECT_EQ(root->child("ros__parameters/a/b")->text, "1");
+  EXPECT_EQ(root->child("ros__parameters/a/c/d/item")->source.line, 3);
+  EXPECT_EQ(root->child("ros__parameters")->children.size(), 1u);
+  EXPECT_EQ(root->child("v1.2")->text, "4");
+  EXPECT_THROW(parse_yaml("ros__parameters: {" + std::string(40, '.') + ": 1}", "f"), InputError);
+  std::string many = "ros__parameters:\n";
+  for (int i = 0; i < 11'000; ++i) many += "  a" + std::to_string(i) + ".b: 1\n";
+  EXPECT_THROW(parse_yaml(many, "f"), InputError);
+}
+
+// A file costs once, however many robots ask for it, and all files together are bounded.
+TEST(ControllerFiles, AreReadOnceAndAreBounded) {
+  TemporaryFolder folder;
+  const ResourceFinder resources(folder / "w.sdf", false);
+  const std::string remark = "\n#" + std::string(250'000, 'x');
+  const auto text = [&](const std::string& entries) { return "a_controller: [" + entries + "]"; };
+  ControllerFiles files(resources);
+  const std::string one = folder.write("one.yaml", text("1") + remark);
+  const auto read = files.read(one);
+  std::filesystem::remove(one);
+  EXPECT_EQ(files.read(one), read);
+  for (int i = 1; i < 16; ++i)
+    EXPECT_NO_THROW(files.read(folder.write(std::to_string(i) + ".yaml", text("1") + remark))) << i;
+  const std::string last = folder.write("last.yaml", text("1") + remark + remark.substr(0, 10'000));
+  for (int i = 0; i < 2; ++i) {
+    try {
+      files.read(last);
+      FAIL();
+    } catch (const InputError& error) {
+      EXPECT_EQ(error.message(), "the controllers' files of a world hold no more than 4 MiB");
+    }
+  }
+
+  ControllerFiles many(resources);
+  std::string entries = "1";  // with the list and the map that hold them 10 002
+  for (int i = 1; i < 10'000; ++i) entries += ",1";
+  const std::string large = folder.write("large.yaml", text(entries));
+  for (int i = 0; i < 99; ++i) EXPECT_NO_THROW(many.read(large)) << i;
+  EXPECT_THROW(many.read(large), InputError);
+}
+
+TEST(ControllerFiles, ThatARobotNamesOftenAreOne) {
+  TemporaryFolder folder;
+  folder.write("bot/package.xml", package("bot"));
+  std::string entries = "1";
+  for (int i = 1; i < 2000; ++i) entries += ",1";
+  folder.write("bot/config/c.yaml", "a_controller: [" + entries + "]");
+  std::string named;
+  for (int i = 0; i < 1000; ++i) named += "<parameters>package://bot/config/c.yaml</parameters>";
+  const auto world = load_world(
+      folder.write("bot/urdf/bot.urdf",
+                   four_wheels("<gazebo><plugin name='c' filename='libgazebo_ros2_control.so'>" +
+                               named + "</plugin></gazebo>")));
+  EXPECT_THAT(texts(*world), testing::Not(testing::Contains(HasSubstr("look at no more than"))));
+}
+
+// Of a robot only so many are looked at: each looks in the parameters of all with its name.
+TEST(ControllerFiles, HoldManyControllersInVain) {
+  TemporaryFolder folder;
+  folder.write("bot/package.xml", package("bot"));
+  std::string text = "all:\n";
+  for (int i = 0; i < 100; ++i) text += "  c" + std::to_string(i) + ": {type: some/Controller}\n";
+  folder.write("bot/config/c.yaml", text +
+                                        "  last: {type: diff_drive_controller/DiffDriveController, "
+                                        "left_wheel: front_left, right_wheel: front_right}\n");
+  const auto world =
+      load_world(folder.write("bot/urdf/bot.urdf", four_wheels(transmission("front_left"))));
+  EXPECT_THAT(texts(*world), testing::Not(testing::Contains(HasSubstr("'last'"))));
+}
+
+// ---- Guesses.
+
+TEST(Guess, FourWheelsByNameAndPlace) {
+  TemporaryFolder folder;
+  const auto world = load_world(folder.write("bot.urdf", four_wheels("", "wheel_")));
+  EXPECT_THAT(
+      texts(*world),
+      ElementsAre(
+          "no file says how it drives; guessed from its wheels: differential, left "
+          "wheel_front_left+wheel_rear_left, right "
+          "wheel_front_right+wheel_rear_right (--drive bot=LEFT+...,RIGHT+... says it otherwise)"));
+  EXPECT_TRUE(drive_of(*world).guessed);
+  EXPECT_EQ(drive_of(*world).steering, Steering::differential);
+  EXPECT_NEAR(drive_of(*world).track, 0.6, 1e-12);
+  EXPECT_NEAR(drive_of(*world).wheel_radius, 0.1, 1e-12);
+}
+
+TEST(Guess, MecanumByName) {
+  TemporaryFolder folder;
+  const auto world = load_world(folder.write("bot.urdf", four_wheels("", "mecanum_wheel_")));
+  EXPECT_EQ(drive_of(*world).steering, Steering::mecanum);
+}
+
+TEST(Guess, TheFlagSaysItOtherwise) {
+  TemporaryFolder folder;
+  LoadOptions options;
+  options.drives.push_back({"bot", {"wheel_front_left"}, {"wheel_front_right"}});
+  const auto world = load_world(folder.write("bot.urdf", four_wheels("", "wheel_")), options);
+  EXPECT_FALSE(drive_of(*world).guessed);
+  EXPECT_EQ(drive_of(*world).left_joints.size(), 1u);
+}
+
+// An arm has no wheels, and a cart that is furniture has no drive.
+TEST(Guess, WhatIsNoRobotIsNoneAfterwards) {
+  TemporaryFolder folder;
+  const auto arm = load_world(folder.write(
+      "arm.urdf",
+      "<robot name='arm'><link name='a'/><link name='b'/><joint name='shoulder' "
+      "type='continuous'><parent link='a'/><child link='b'/><axis xyz='0 0 1'/></joint></robot>"));
+  EXPECT_FALSE(arm->models.back().model->drive);
+  EXPECT_THAT(texts(*arm), IsEmpty());
+  std::string cart = "<model name='cart'><link name='base'/>";
+  for (const char* side : {"left", "right"}) {
+    const std::string name = std::string(side) + "_wheel";
+    cart += "<link name='" + name + "'><pose>0 " + (side[0] == 'l' ? "0.2" : "-0.2") +
+            " 0.1 0 0 0</pose><collision "
+            "name='c'><geometry><sphere><radius>0.1</radius></sphere></geometry></collision></link>"
+            "<joint name='" +
+            name + "_joint' type='revolute'><parent>base</parent><child>" + name +
+            "</child><axis><xyz>0 1 0</xyz></axis></joint>";
+  }
+  EXPECT_FALSE(world_of(cart + "</model>")->models[0].model->drive);
+  EXPECT_TRUE(world_of(cart + "<plugin name='c' filename='libgazebo_ros_control.so'/></model>")
+                  ->models[0]
+                  .model->drive);
+}
+
+}  // namespace
+}  // namespace ruedo::model
