@@ -17,8 +17,8 @@ namespace {
 using namespace ruedo;
 
 // A sphere as a mesh file would have it, of 2 n^2 triangles.
-std::shared_ptr<const model::Mesh> sphere(int n) {
-  auto mesh = std::make_shared<model::Mesh>();
+std::shared_ptr<const world::Mesh> sphere(int n) {
+  auto mesh = std::make_shared<world::Mesh>();
   for (int i = 0; i <= n; ++i) {
     for (int k = 0; k <= n; ++k) {
       const double polar = M_PI * i / n, around = 2.0 * M_PI * k / n;
@@ -39,35 +39,35 @@ std::shared_ptr<const model::Mesh> sphere(int n) {
   return mesh;
 }
 
-std::shared_ptr<const model::WorldModel> room(int triangles) {
+std::shared_ptr<const world::WorldModel> room(int triangles) {
   constexpr int kSpheres = 20;
-  auto world = std::make_shared<model::WorldModel>();
-  auto model = std::make_shared<model::Model>();
+  auto world = std::make_shared<world::WorldModel>();
+  auto model = std::make_shared<world::Model>();
   model->is_static = true;
-  model::Link& link = model->links.emplace_back();
-  const auto add = [&](const Vec3& at, const model::Geometry& geometry, const model::Rgba& colour) {
-    model::Visual& visual = link.visuals.emplace_back();
+  world::Link& link = model->links.emplace_back();
+  const auto add = [&](const Vec3& at, const world::Geometry& geometry, const world::Rgba& colour) {
+    world::Visual& visual = link.visuals.emplace_back();
     visual.X_LV.translation = at;
     visual.geometry = geometry;
-    visual.material = model::Material{};
+    visual.material = world::Material{};
     visual.material->diffuse = colour;
   };
   for (int i = 0; i < 6; ++i) {
-    model::Geometry wall;
+    world::Geometry wall;
     wall.size = Vec3::Constant(10.0);
     wall.size[i / 2] = 0.2;
     add(Vec3(0, 0, 5) + (i % 2 == 0 ? 5.0 : -5.0) * Vec3::Unit(i / 2), wall,
         {0.7f, 0.65f, 0.6f, 1});
   }
-  model::Geometry ball;
-  ball.shape = model::Shape::mesh;
+  world::Geometry ball;
+  ball.shape = world::Shape::mesh;
   ball.mesh = sphere(static_cast<int>(std::sqrt(triangles / (2.0 * kSpheres))));
   ball.scale = Vec3::Constant(0.4);
   for (int i = 0; i < kSpheres; ++i)
     add({(i % 5) - 1.0, (i / 5) * 1.5 - 2.2, 1.2 + 0.1 * i}, ball, {0.3f, 0.5f, 0.7f, 1});
   world->models.push_back({"room", {}, model});
-  model::Light sun;
-  sun.type = model::Light::Type::directional;
+  world::Light sun;
+  sun.type = world::Light::Type::directional;
   sun.direction = Vec3(0.3, 0.2, -0.9).normalized();
   sun.diffuse = {0.8f, 0.8f, 0.8f, 1};
   sun.cast_shadows = true;
@@ -75,12 +75,12 @@ std::shared_ptr<const model::WorldModel> room(int triangles) {
   return world;
 }
 
-void draw(benchmark::State& state, const model::WorldModel& world, const Pose& X_WCamera,
+void draw(benchmark::State& state, const world::WorldModel& world, const Pose& X_WCamera,
           bool depth, int samples) {
-  const model::BodyLayout layout(world);
+  const world::BodyLayout layout(world);
   const auto renderer = scene::make_renderer(world, layout);
   Snapshot snapshot;
-  for (const model::BodyPlacement& body : layout.bodies) snapshot.bodies.push_back(body.X_WB);
+  for (const world::BodyPlacement& body : layout.bodies) snapshot.bodies.push_back(body.X_WB);
   snapshot.wheel_angles.resize(layout.wheels.size());
   scene::View view = scene::View::pinhole(X_WCamera, 640, 480, 1.047);
   view.samples = samples;
@@ -93,12 +93,12 @@ void draw(benchmark::State& state, const model::WorldModel& world, const Pose& X
 }
 
 void BM_Arena(benchmark::State& state) {
-  static const auto world = model::load_world(RUEDO_SOURCE_DIR "/worlds/arena.sdf");
+  static const auto world = world::load_world(RUEDO_SOURCE_DIR "/worlds/arena.sdf");
   draw(state, *world, Pose::from_xyz_rpy({0.2, 0, 0.4}, Vec3::Zero()), state.range(0) != 0,
        static_cast<int>(state.range(1)));
 }
 void BM_Room(benchmark::State& state) {
-  auto world = std::make_shared<model::WorldModel>(*room(static_cast<int>(state.range(0))));
+  auto world = std::make_shared<world::WorldModel>(*room(static_cast<int>(state.range(0))));
   world->sky.shadows = state.range(1) != 0;
   draw(state, *world, Pose::from_xyz_rpy({-4.5, 0, 2.5}, Vec3::Zero()), state.range(2) != 0, 1);
 }
@@ -111,7 +111,7 @@ void BM_Noise(benchmark::State& state) {
 }
 void BM_Jpeg(benchmark::State& state) {
   const auto world = room(20000);
-  const model::BodyLayout layout(*world);
+  const world::BodyLayout layout(*world);
   scene::Picture picture;
   scene::make_renderer(*world, layout)
       ->draw(
@@ -121,7 +121,7 @@ void BM_Jpeg(benchmark::State& state) {
   const cv::Mat pixels(480, 640, CV_8UC3, picture.rgb.data());
   std::vector<uint8_t> bytes;
   for (auto _ : state)
-    ruedo::model::encode_picture(".jpg", pixels, bytes, {cv::IMWRITE_JPEG_QUALITY, 85});
+    ruedo::world::encode_picture(".jpg", pixels, bytes, {cv::IMWRITE_JPEG_QUALITY, 85});
   state.SetLabel(std::to_string(bytes.size()) + " bytes");
 }
 

@@ -19,13 +19,13 @@ namespace {
 using namespace ruedo;
 
 // The walls alone: the peers draw no robots.
-model::WorldModel walls_of(const model::WorldModel& all) {
-  model::WorldModel world = all;
-  std::erase_if(world.models, [](const model::ModelInstance& instance) {
+world::WorldModel walls_of(const world::WorldModel& all) {
+  world::WorldModel world = all;
+  std::erase_if(world.models, [](const world::ModelInstance& instance) {
     return instance.model->drive.has_value();
   });
-  model::Light sun;
-  sun.type = model::Light::Type::directional;
+  world::Light sun;
+  sun.type = world::Light::Type::directional;
   sun.direction = Vec3(0.3, 0.2, -0.9).normalized();
   world.lights = {sun};
   world.sky.shadows = false;
@@ -47,11 +47,11 @@ int main(int argc, char** argv) {
   }
   const int frames = argc > 2 ? std::atoi(argv[2]) : 100;
   const int threads = argc > 3 ? std::atoi(argv[3]) : 1;
-  const auto all = model::load_world(argv[1]);
-  const model::WorldModel world = walls_of(*all);
-  const model::BodyLayout layout(world);
+  const auto all = world::load_world(argv[1]);
+  const world::WorldModel world = walls_of(*all);
+  const world::BodyLayout layout(world);
   Vec3 eye(0.0, 0.0, 0.4);
-  for (const model::ModelInstance& instance : all->models) {
+  for (const world::ModelInstance& instance : all->models) {
     if (!instance.model->drive) continue;
     eye.head<2>() = instance.X_WM.translation.head<2>();
     break;

@@ -60,16 +60,16 @@ int main(int argc, char** argv) {
   const auto copies = static_cast<int>(argument(2, 64));
   const auto beams = static_cast<int>(argument(3, 181));
   const double seconds = argument(5, 3.0);
-  ruedo::model::LoadOptions load;
-  const auto plain = ruedo::model::load_world(argv[1], load);
+  ruedo::world::LoadOptions load;
+  const auto plain = ruedo::world::load_world(argv[1], load);
   std::string robot;
   for (const auto& instance : plain->models)
     if (instance.is_robot()) robot = instance.name;
-  load.settings.push_back(ruedo::model::parse_setting(
+  load.settings.push_back(ruedo::world::parse_setting(
       robot + "/lrf.lidar.scan.horizontal.samples=" + std::to_string(beams)));
   for (const char* device : {"/camera", "/sonar_front", "/sonar_rear"})
     load.disabled.push_back(robot + device);
-  const auto world = ruedo::model::load_world(argv[1], load);
+  const auto world = ruedo::world::load_world(argv[1], load);
   ruedo::engine::EngineOptions options;
   options.worlds = copies;
   options.threads = static_cast<int>(argument(4, 0));

@@ -16,26 +16,26 @@ namespace {
 
 using namespace ruedo;
 
-model::Geometry shape(model::Shape kind, const Vec3& size) {
-  model::Geometry geometry;
+world::Geometry shape(world::Shape kind, const Vec3& size) {
+  world::Geometry geometry;
   geometry.shape = kind;
   geometry.size = size;
   return geometry;
 }
 
-std::shared_ptr<model::Model> robot_model() {
-  auto robot = std::make_shared<model::Model>();
+std::shared_ptr<world::Model> robot_model() {
+  auto robot = std::make_shared<world::Model>();
   robot->name = "robot";
-  model::Link base;
+  world::Link base;
   base.name = "base";
   base.inertial = {14.0, Pose{Quat::Identity(), {0, 0, 0.15}}, Vec3(0.3, 0.4, 0.5).asDiagonal()};
   base.collisions.push_back({"c",
                              Pose{Quat::Identity(), {0, 0, 0.18}},
-                             shape(model::Shape::box, {0.5, 0.3, 0.15}),
+                             shape(world::Shape::box, {0.5, 0.3, 0.15}),
                              {},
                              {}});
   robot->links.push_back(base);
-  model::DriveDescription drive;
+  world::DriveDescription drive;
   drive.wheel_radius = 0.111;
   drive.track = 0.394;
   drive.watchdog_us = 0;
@@ -43,15 +43,15 @@ std::shared_ptr<model::Model> robot_model() {
   drive.turn_acceleration = 1.0;
   for (const double y : {0.197, -0.197}) {
     for (const double x : {0.135, -0.134}) {
-      model::Link wheel;
+      world::Link wheel;
       wheel.name = "wheel" + std::to_string(robot->links.size());
       wheel.X_ML = {Quat(Eigen::AngleAxisd(-M_PI / 2, Vec3::UnitX())), {x, y, 0.111}};
       wheel.inertial = {1.5, Pose(), Vec3(0.005, 0.005, 0.009).asDiagonal()};
       wheel.collisions.push_back(
-          {"c", {}, shape(model::Shape::cylinder, {0.111, 0.075, 0}), {}, {}});
-      model::Joint joint;
+          {"c", {}, shape(world::Shape::cylinder, {0.111, 0.075, 0}), {}, {}});
+      world::Joint joint;
       joint.name = wheel.name + "_joint";
-      joint.type = model::JointType::continuous;
+      joint.type = world::JointType::continuous;
       joint.parent = 0;
       joint.child = static_cast<int>(robot->links.size());
       joint.X_MJ = wheel.X_ML;
@@ -65,25 +65,25 @@ std::shared_ptr<model::Model> robot_model() {
   return robot;
 }
 
-model::ModelInstance fixed(const std::string& name, const Pose& pose,
-                           const model::Geometry& geometry) {
-  auto thing = std::make_shared<model::Model>();
+world::ModelInstance fixed(const std::string& name, const Pose& pose,
+                           const world::Geometry& geometry) {
+  auto thing = std::make_shared<world::Model>();
   thing->is_static = true;
-  model::Link link;
+  world::Link link;
   link.name = "link";
   link.collisions.push_back({"c", {}, geometry, {}, {}});
   thing->links.push_back(link);
   return {name, pose, thing};
 }
 
-model::WorldModel world_of(int robots, double spacing_m) {
-  model::WorldModel world;
-  world.models.push_back(fixed("ground", {}, shape(model::Shape::plane, {1, 1, 1})));
+world::WorldModel world_of(int robots, double spacing_m) {
+  world::WorldModel world;
+  world.models.push_back(fixed("ground", {}, shape(world::Shape::plane, {1, 1, 1})));
   const int side = static_cast<int>(std::ceil(std::sqrt(robots)));
   for (int i = 0; i < 300; ++i) {
     const double x = (i % 20 - 0.5) * spacing_m, y = (i / 20 - 0.5) * spacing_m;
     world.models.push_back(fixed("box" + std::to_string(i), {Quat::Identity(), {x, y, 0.25}},
-                                 shape(model::Shape::box, {0.3, 0.3, 0.5})));
+                                 shape(world::Shape::box, {0.3, 0.3, 0.5})));
   }
   const auto robot = robot_model();
   for (int i = 0; i < robots; ++i) {
@@ -96,8 +96,8 @@ model::WorldModel world_of(int robots, double spacing_m) {
 
 void run(benchmark::State& state, double spacing_m, double v, double omega) {
   const int n = static_cast<int>(state.range(0));
-  const model::WorldModel world = world_of(n, spacing_m);
-  const model::BodyLayout layout(world);
+  const world::WorldModel world = world_of(n, spacing_m);
+  const world::BodyLayout layout(world);
   physics::PhysicsWorld physics(world, layout);
   robot::Robots robots(world, layout, physics);
   Snapshot snapshot;

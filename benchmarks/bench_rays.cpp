@@ -64,8 +64,8 @@ std::vector<BoxAt> office() {
 }
 
 // All boxes as one mesh, every face cut into cells x cells squares.
-std::shared_ptr<model::Mesh> as_mesh(const std::vector<BoxAt>& boxes, int cells) {
-  auto mesh = std::make_shared<model::Mesh>();
+std::shared_ptr<world::Mesh> as_mesh(const std::vector<BoxAt>& boxes, int cells) {
+  auto mesh = std::make_shared<world::Mesh>();
   mesh->name = "office";
   for (const BoxAt& box : boxes)
     for (int axis = 0; axis < 3; ++axis)
@@ -90,31 +90,31 @@ std::shared_ptr<model::Mesh> as_mesh(const std::vector<BoxAt>& boxes, int cells)
   return mesh;
 }
 
-model::WorldModel world_of(const std::vector<BoxAt>& boxes,
-                           const std::shared_ptr<model::Mesh>& mesh) {
-  auto model = std::make_shared<model::Model>();
+world::WorldModel world_of(const std::vector<BoxAt>& boxes,
+                           const std::shared_ptr<world::Mesh>& mesh) {
+  auto model = std::make_shared<world::Model>();
   model->name = "office";
   model->is_static = true;
   model->links.resize(1);
-  const auto add = [&](const Vec3& at, model::Geometry geometry) {
-    model::Collision collision;
+  const auto add = [&](const Vec3& at, world::Geometry geometry) {
+    world::Collision collision;
     collision.X_LC.translation = at;
     collision.geometry = std::move(geometry);
     model->links[0].collisions.push_back(collision);
   };
   if (mesh) {
-    model::Geometry geometry;
-    geometry.shape = model::Shape::mesh;
+    world::Geometry geometry;
+    geometry.shape = world::Shape::mesh;
     geometry.mesh = mesh;
     add(Vec3::Zero(), geometry);
   } else {
     for (const BoxAt& box : boxes) {
-      model::Geometry geometry;
+      world::Geometry geometry;
       geometry.size = 2.0 * box.half;
       add(box.center, geometry);
     }
   }
-  model::WorldModel world;
+  world::WorldModel world;
   world.models.push_back({"office", {}, model});
   return world;
 }
@@ -167,7 +167,7 @@ struct BulletOffice {
   std::vector<std::unique_ptr<btCollisionObject>> objects;
   btTriangleMesh triangles;
 
-  BulletOffice(const std::vector<BoxAt>& boxes, const model::Mesh* mesh) {
+  BulletOffice(const std::vector<BoxAt>& boxes, const world::Mesh* mesh) {
     const auto add = [&](std::unique_ptr<btCollisionShape> shape, const btVector3& at) {
       auto object = std::make_unique<btCollisionObject>();
       object->setCollisionShape(shape.get());
@@ -203,13 +203,13 @@ struct BulletOffice {
 };
 
 void compare(const std::string& name, const std::vector<BoxAt>& boxes,
-             const std::shared_ptr<model::Mesh>& mesh, int repeats) {
+             const std::shared_ptr<world::Mesh>& mesh, int repeats) {
   const std::vector<scene::Ray> rays = scans(boxes, 200);
-  const model::WorldModel world = world_of(boxes, mesh);
-  const model::BodyLayout layout(world);
+  const world::WorldModel world = world_of(boxes, mesh);
+  const world::BodyLayout layout(world);
   const auto ours = scene::make_ray_scene(scene::make_static_ray_scene(world, layout));
   const BulletOffice bullet(boxes, mesh.get());
-  const cli::BareEmbree bare(mesh ? *mesh : *as_mesh(boxes, 1));
+  const bench::BareEmbree bare(mesh ? *mesh : *as_mesh(boxes, 1));
   std::vector<scene::Hit> hits(rays.size());
   std::vector<double> ranges(rays.size());
 
@@ -239,22 +239,22 @@ void compare(const std::string& name, const std::vector<BoxAt>& boxes,
 // Robots of seven shapes among the walls: the cost of updating them, and scans from the first 100
 // of them.
 void fleet(int robots, const std::vector<BoxAt>& boxes, int repeats) {
-  model::WorldModel world = world_of(boxes, nullptr);
-  auto robot = std::make_shared<model::Model>();
+  world::WorldModel world = world_of(boxes, nullptr);
+  auto robot = std::make_shared<world::Model>();
   robot->links.resize(1);
-  const auto add = [&](const Vec3& at, const Vec3& rpy, model::Shape shape, const Vec3& size) {
-    model::Collision collision;
+  const auto add = [&](const Vec3& at, const Vec3& rpy, world::Shape shape, const Vec3& size) {
+    world::Collision collision;
     collision.X_LC = Pose::from_xyz_rpy(at, rpy);
     collision.geometry.shape = shape;
     collision.geometry.size = size;
     robot->links[0].collisions.push_back(collision);
   };
-  add({0, 0, 0.18}, Vec3::Zero(), model::Shape::box, {0.5, 0.28, 0.19});
-  add({0, 0, 0.275}, Vec3::Zero(), model::Shape::box, {0.5, 0.38, 0.01});
-  add({0.16, 0, 0.36}, Vec3::Zero(), model::Shape::box, {0.15, 0.15, 0.18});
+  add({0, 0, 0.18}, Vec3::Zero(), world::Shape::box, {0.5, 0.28, 0.19});
+  add({0, 0, 0.275}, Vec3::Zero(), world::Shape::box, {0.5, 0.38, 0.01});
+  add({0.16, 0, 0.36}, Vec3::Zero(), world::Shape::box, {0.15, 0.15, 0.18});
   for (const double x : {0.135, -0.134})
     for (const double y : {0.197, -0.197})
-      add({x, y, 0.111}, {M_PI / 2, 0, 0}, model::Shape::cylinder, {0.111, 0.075, 0});
+      add({x, y, 0.111}, {M_PI / 2, 0, 0}, world::Shape::cylinder, {0.111, 0.075, 0});
   RandomStream random = RandomSource(1, "office", "fleet").stream(0);
   const double size = 2.0 * std::sqrt(static_cast<double>(robots));
   for (int i = 0; i < robots; ++i) {
@@ -262,7 +262,7 @@ void fleet(int robots, const std::vector<BoxAt>& boxes, int repeats) {
     world.models.push_back({"robot" + std::to_string(i),
                             Pose::from_xyz_rpy(at, {0, 0, 6.28 * random.uniform()}), robot});
   }
-  const model::BodyLayout layout(world);
+  const world::BodyLayout layout(world);
   const auto scene = scene::make_ray_scene(scene::make_static_ray_scene(world, layout));
   Snapshot snapshot;
   for (const auto& body : layout.bodies) snapshot.bodies.push_back(body.X_WB);

@@ -23,11 +23,11 @@ class CountingBus : public Bus {
   size_t bytes_ = 0;
 };
 
-std::shared_ptr<const model::WorldModel> arena() {
+std::shared_ptr<const world::WorldModel> arena() {
   static const auto world = [] {
-    model::LoadOptions options;
+    world::LoadOptions options;
     options.disabled = {"p3at/camera"};
-    return model::load_world(std::string(RUEDO_SOURCE_DIR) + "/worlds/arena.sdf", options);
+    return world::load_world(std::string(RUEDO_SOURCE_DIR) + "/worlds/arena.sdf", options);
   }();
   return world;
 }

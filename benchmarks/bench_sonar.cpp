@@ -28,11 +28,11 @@ double cpu_time_us() {
 
 // us a firing: the median of some runs of 400 samples, one transducer each.
 double measure(const std::string& file, int rays, int repeats) {
-  model::LoadOptions options;
+  world::LoadOptions options;
   options.settings.push_back(
       {"p3at", "sonar_front", "ruedo:sonar.ruedo:rays", std::to_string(rays)});
-  const auto world = model::load_world(file, options);
-  const model::BodyLayout layout(*world);
+  const auto world = world::load_world(file, options);
+  const world::BodyLayout layout(*world);
   engine::Channels channels;
   Findings findings;
   engine::Fleet fleet = engine::make_fleet(*world, layout, {}, channels, findings);

@@ -2,7 +2,7 @@
 #
 # A plugin has copies of what it calls (typed reads, random numbers, noise, elementary functions), so that it needs no symbol of the
 # program, or Python module, that loads it. What both must agree on is the layout of the types in these headers.
-set(RUEDO_PLUGIN_HEADERS include/ruedo/decode.h include/ruedo/drive.h include/ruedo/element.h include/ruedo/errors.h include/ruedo/index.h
+set(RUEDO_PLUGIN_HEADERS include/ruedo/bound.h include/ruedo/decode.h include/ruedo/drive.h include/ruedo/element.h include/ruedo/errors.h include/ruedo/index.h
   include/ruedo/math.h include/ruedo/plugin.h include/ruedo/pose.h include/ruedo/quantity.h include/ruedo/random.h include/ruedo/schema.h include/ruedo/sensor.h
   include/ruedo/sim_time.h include/ruedo/snapshot.h include/ruedo/state_archive.h)
 # Headers of the lower layers, under the names by which sources in this tree include them.

@@ -25,7 +25,7 @@ class Thermometer : public SensorOf<Thermometer> {
         heater_(setup.element.vector3("thermometer/heater", Vec3::Zero(),
                                       Allowed::any(quantity::kLength))),
         noise_(setup.noise ? Noise(setup.element.child("thermometer/noise")) : Noise()) {
-    const model::LinkPlacement& link = setup.layout.links[setup.link];
+    const world::LinkPlacement& link = setup.layout.links[setup.link];
     body_ = link.body;
     X_BS_ = link.X_BL * setup.X_LS;
     RandomStream constants = random_.stream(kConstantDraws);

@@ -24,11 +24,11 @@
 /// The engine in the process, and what sensors and drives of one's own are written against.
 namespace ruedo {
 
-namespace model {
+namespace world {
 struct WorldModel;
 struct BodyLayout;
 struct DriveDescription;
-}  // namespace model
+}  // namespace world
 namespace scene {
 class RayScene;
 class Renderer;
@@ -88,8 +88,8 @@ class Outbox {
 
 /// What a sensor is told when it is made.
 struct SensorSetup {
-  const model::WorldModel& world;   ///< as the files say it
-  const model::BodyLayout& layout;  ///< what lies at which index of a Snapshot
+  const world::WorldModel& world;   ///< as the files say it
+  const world::BodyLayout& layout;  ///< what lies at which index of a Snapshot
   /// Its `<sensor>`, or `<ruedo:odometry>`, ...; an empty element when there is none.
   const Element& element;
   std::string robot;       ///< name
@@ -202,7 +202,7 @@ struct SensorKind {
   std::string kind = {};  ///< as ruedo/info names it; empty: the module's name
   /// Attached kinds only: the rate that the robot's drive asks for; where it is null, or the robot
   /// has no drive, default_rate holds.
-  std::function<Rate(const model::DriveDescription&)> drive_rate = {};
+  std::function<Rate(const world::DriveDescription&)> drive_rate = {};
   /// For --set: what a `<sensor>` of that type may have below it besides what the file has written,
   /// as paths: "lidar.range.max".
   std::function<std::vector<std::string>(const std::string& type)> settings = {};

@@ -1,7 +1,7 @@
 // The state of the world at one step: written once by the kinematics module, then read by all
 // others.
 //
-// Index spaces are those of model::BodyLayout. Everything is in the world frame and in SI units
+// Index spaces are those of world::BodyLayout. Everything is in the world frame and in SI units
 // unless a comment says otherwise. Plain arrays: copying one allocates nothing once its vectors
 // have their size.
 #pragma once

@@ -6,7 +6,7 @@
 //   void exchange(StateArchive& archive) { archive(time_, velocity_, noises_); }
 //
 // What the constructor makes is not in it. The bytes are for the build that wrote them alone, and
-// trusted: who reads them has made sure whose they are (run/state_file.h). Lengths are checked all
+// trusted: who reads them has made sure whose they are (system/seal.h). Lengths are checked all
 // the same.
 #pragma once
 

@@ -14,7 +14,7 @@ namespace ruedo::bench {
 
 class BareEmbree {
  public:
-  explicit BareEmbree(const model::Mesh& mesh) {
+  explicit BareEmbree(const world::Mesh& mesh) {
     RTCGeometry geometry = rtcNewGeometry(device_.get(), RTC_GEOMETRY_TYPE_TRIANGLE);
     auto* p = static_cast<float*>(rtcSetNewGeometryBuffer(
         geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, 12, mesh.positions.size()));

@@ -166,13 +166,13 @@ int run_client(const std::string& url, int commands, int pipe) {
   }
 }
 
-std::shared_ptr<const model::WorldModel> world_with_reports_at_every_step(
-    const model::LoadOptions& options) {
+std::shared_ptr<const world::WorldModel> world_with_reports_at_every_step(
+    const world::LoadOptions& options) {
   const auto world =
-      std::make_shared<model::WorldModel>(*model::load_world_text(kWorld, "latency.sdf", options));
-  for (model::ModelInstance& instance : world->models) {
+      std::make_shared<world::WorldModel>(*world::load_world_text(kWorld, "latency.sdf", options));
+  for (world::ModelInstance& instance : world->models) {
     if (!instance.model->drive) continue;
-    auto changed = std::make_shared<model::Model>(*instance.model);
+    auto changed = std::make_shared<world::Model>(*instance.model);
     changed->drive->status_rate = Rate{0, 1};
     instance.model = changed;
   }
@@ -194,7 +194,7 @@ std::vector<std::string> measure_latency(const BenchTask& task) {
   close(ends[1]);
   if (client < 0) throw EnvironmentError("the benchmark's client could not be started");
 
-  model::LoadOptions load;
+  world::LoadOptions load;
   load.disabled = {"r/camera"};
   run::RunOptions options;
   options.control = false;

@@ -22,12 +22,12 @@ constexpr double kMaxRange_m = 8.0, kHeight_m = 0.3;
 constexpr int kFewestScans = 200, kRounds = 15;
 
 // The walls as triangles: every box of the world's collisions.
-model::Mesh triangles_of(const model::WorldModel& world, const model::BodyLayout& layout) {
-  model::Mesh mesh;
-  for (const model::LinkPlacement& placement : layout.links) {
-    const model::ModelInstance& instance = world.models[placement.instance];
-    for (const model::Collision& collision : instance.model->links[placement.link].collisions) {
-      if (collision.geometry.shape != model::Shape::box) continue;
+world::Mesh triangles_of(const world::WorldModel& world, const world::BodyLayout& layout) {
+  world::Mesh mesh;
+  for (const world::LinkPlacement& placement : layout.links) {
+    const world::ModelInstance& instance = world.models[placement.instance];
+    for (const world::Collision& collision : instance.model->links[placement.link].collisions) {
+      if (collision.geometry.shape != world::Shape::box) continue;
       const auto first = static_cast<uint32_t>(mesh.positions.size());
       for (int corner = 0; corner < 8; ++corner) {
         const Vec3 sign((corner & 1) != 0 ? 0.5 : -0.5, (corner & 2) != 0 ? 0.5 : -0.5,
@@ -85,10 +85,10 @@ double median(std::vector<double> values) {
 }  // namespace
 
 std::vector<std::string> measure_rays(const BenchTask& task) {
-  model::WorldModel rooms = *model::load_world_text(bench_world(task.robots), "rooms.sdf", {});
+  world::WorldModel rooms = *world::load_world_text(bench_world(task.robots), "rooms.sdf", {});
   std::erase_if(rooms.models,
-                [](const model::ModelInstance& instance) { return !instance.model->is_static; });
-  const model::BodyLayout layout(rooms);
+                [](const world::ModelInstance& instance) { return !instance.model->is_static; });
+  const world::BodyLayout layout(rooms);
   const auto ours = scene::make_ray_scene(scene::make_static_ray_scene(rooms, layout));
   const BareEmbree bare(triangles_of(rooms, layout));
   const std::vector<scene::Ray> rays = scans(task.robots);

@@ -97,7 +97,7 @@ std::vector<std::string> measure(const BenchTask& task) {
   const double sim_s = task.duration_s > 0.0 ? task.duration_s : default_duration_s(task);
 
   const auto load_begin = std::chrono::steady_clock::now();
-  model::LoadOptions load_options;
+  world::LoadOptions load_options;
   run::RunOptions options;
   if (task.table != Table::camera) {
     for (int robot = 0; robot < task.robots; ++robot)
@@ -107,7 +107,7 @@ std::vector<std::string> measure(const BenchTask& task) {
   options.rate = std::numeric_limits<double>::infinity();
   options.duration_us = microseconds(sim_s);
   options.control = false;
-  const auto world = model::load_world_text(bench_world(task.robots), "rooms.sdf", load_options);
+  const auto world = world::load_world_text(bench_world(task.robots), "rooms.sdf", load_options);
   std::unique_ptr<bus::LcmBus> lcm;
   if (task.table == Table::lcm) lcm = std::make_unique<bus::LcmBus>(task.lcm);
   CountingBus sink(lcm.get());

@@ -16,17 +16,17 @@ namespace {
 constexpr SimTime kMostTime = 300'000'000;  // us, of one primitive
 
 // The P3-AT's world with the drive and odometry that the options ask for.
-std::shared_ptr<const model::WorldModel> make_world(const RigOptions& options) {
+std::shared_ptr<const world::WorldModel> make_world(const RigOptions& options) {
   const std::string text =
       "<sdf version='1.9'><world name='plane'><include><uri>model://ground_plane</uri></include>"
       "<include><uri>model://p3at</uri><name>p3at</name></include></world></sdf>";
-  auto world = std::make_shared<model::WorldModel>(*model::load_world_text(text, "experiments"));
+  auto world = std::make_shared<world::WorldModel>(*world::load_world_text(text, "experiments"));
   world->step_us = options.step_us;
-  for (model::ModelInstance& instance : world->models) {
+  for (world::ModelInstance& instance : world->models) {
     if (instance.name != "p3at") continue;
-    auto robot = std::make_shared<model::Model>(*instance.model);
+    auto robot = std::make_shared<world::Model>(*instance.model);
     robot->sensors.clear();  // odometry alone is looked at
-    model::DriveDescription& drive = *robot->drive;
+    world::DriveDescription& drive = *robot->drive;
     drive.kind = options.drive;
     drive.watchdog_us = 0;
     drive.odometry_rate = {0, 1};
@@ -52,7 +52,7 @@ std::shared_ptr<const model::WorldModel> make_world(const RigOptions& options) {
 }  // namespace
 
 ExperimentRig::ExperimentRig(const RigOptions& options) : world_(make_world(options)) {
-  layout_ = std::make_unique<model::BodyLayout>(*world_);
+  layout_ = std::make_unique<world::BodyLayout>(*world_);
   physics_ = std::make_unique<physics::PhysicsWorld>(*world_, *layout_);
   robots_ = std::make_unique<robot::Robots>(*world_, *layout_, *physics_);
   engine::Fleet fleet = engine::make_fleet(*world_, *layout_, {}, channels_, findings_);

@@ -17,7 +17,7 @@ namespace ruedo::bench {
 
 struct RigOptions {
   int64_t step_us = 5000;
-  model::DriveDescription::Kind drive = model::DriveDescription::Kind::kinematic;
+  world::DriveDescription::Kind drive = world::DriveDescription::Kind::kinematic;
   bool limits = true;  // the P3-AT's own on speed and acceleration; false: none
   // Children of <ruedo:odometry>: ("ruedo:integrator", "arc"). It is read out at every step.
   std::vector<std::pair<std::string, std::string>> odometry;
@@ -52,8 +52,8 @@ class ExperimentRig {
   bool moved(int64_t id) const;
   void look();
 
-  std::shared_ptr<const model::WorldModel> world_;
-  std::unique_ptr<model::BodyLayout> layout_;
+  std::shared_ptr<const world::WorldModel> world_;
+  std::unique_ptr<world::BodyLayout> layout_;
   std::unique_ptr<physics::PhysicsWorld> physics_;
   std::unique_ptr<robot::Robots> robots_;
   engine::Channels channels_;

@@ -20,7 +20,7 @@
 namespace ruedo::bench {
 namespace {
 
-using Kind = model::DriveDescription::Kind;
+using Kind = world::DriveDescription::Kind;
 
 constexpr int64_t kPaperStep_us = 20'000;
 constexpr double kHigh = 4.2, kLow = 0.27;  // m/s^2

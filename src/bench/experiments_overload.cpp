@@ -21,10 +21,10 @@ namespace {
 constexpr double kDuration_s = 20;
 
 // The fleet of one P3-AT in the arena, noise on, driving a wide arc.
-std::shared_ptr<const model::WorldModel> make_world() {
-  model::LoadOptions options;
+std::shared_ptr<const world::WorldModel> make_world() {
+  world::LoadOptions options;
   options.disabled = {"p3at/camera"};
-  return model::load_world_text(
+  return world::load_world_text(
       "<sdf version='1.9'><world name='walls'><include><uri>model://ground_plane</uri></include>"
       "<include><uri>model://p3at</uri><name>p3at</name></include>"
       "<model name='wall'><static>true</static><pose>4 0 0.5 0 0 0.3</pose><link "

@@ -101,13 +101,13 @@ void set(Element& element, std::string_view path, const std::string& text) {
 struct LaserBench {
   LaserBench() {
     auto changed =
-        std::make_shared<model::WorldModel>(*model::load_world_text(world_text(), "experiments"));
-    for (model::ModelInstance& instance : changed->models) {
+        std::make_shared<world::WorldModel>(*world::load_world_text(world_text(), "experiments"));
+    for (world::ModelInstance& instance : changed->models) {
       if (instance.name != "p3at") continue;
-      auto robot = std::make_shared<model::Model>(*instance.model);
+      auto robot = std::make_shared<world::Model>(*instance.model);
       std::erase_if(robot->sensors,
-                    [](const model::SensorDescription& sensor) { return sensor.name != "lrf"; });
-      for (model::SensorDescription& sensor : robot->sensors) {
+                    [](const world::SensorDescription& sensor) { return sensor.name != "lrf"; });
+      for (world::SensorDescription& sensor : robot->sensors) {
         const std::shared_ptr<Element> element = sensor.element->clone();
         set(*element, "lidar/range/max", "32");
         set(*element, "lidar/range/resolution", "0");
@@ -143,8 +143,8 @@ struct LaserBench {
     return message;
   }
 
-  std::shared_ptr<const model::WorldModel> world;
-  std::optional<model::BodyLayout> layout;
+  std::shared_ptr<const world::WorldModel> world;
+  std::optional<world::BodyLayout> layout;
   Snapshot start;
   std::unique_ptr<scene::RayScene> rays;
 };
@@ -191,7 +191,7 @@ void draw_picture(const Experiments& all, const LaserBench& bench,
     std::swap(picture.rgb[i], picture.rgb[i + 2]);  // OpenCV's order
   const cv::Mat image(view.height, view.width, CV_8UC3, picture.rgb.data());
   std::vector<uint8_t> png;
-  model::encode_picture(".png", image, png);
+  world::encode_picture(".png", image, png);
   all.write("e3_picture.png", std::string(png.begin(), png.end()));
 }
 

@@ -1,5 +1,5 @@
-// The bus that a server serves on: finds the address, claims it, and opens it as multicast or as a
-// tcpq server.
+// The bus that a server serves on: finds the address, claims it, and opens it as multicast, or as
+// a server of tcpq or of a Unix-domain socket.
 #pragma once
 
 #include <functional>

@@ -50,14 +50,14 @@ std::optional<size_t> number_after(std::string_view begin, std::string_view path
 struct Scene {
   size_t number = 0;  // a log's scenes are numbered
   uint64_t version = 0;
-  std::shared_ptr<const model::WorldModel> world;
+  std::shared_ptr<const world::WorldModel> world;
   std::unique_ptr<SceneData> looks;
   std::unique_ptr<SceneData> shapes;  // of its collisions
 };
 
 struct Console::Impl {
   Stage stage;
-  std::shared_ptr<const model::WorldModel> world;  // the running one, or the log's first
+  std::shared_ptr<const world::WorldModel> world;  // the running one, or the log's first
   std::deque<Scene> scenes;                        // newest first
   std::unique_ptr<Library> library;                // null: not requested yet
   std::map<size_t, http::Bytes> assets;            // those that were requested
@@ -91,7 +91,7 @@ Scene* Console::Impl::scene(size_t number) {
   const auto known = std::find_if(scenes.begin(), scenes.end(),
                                   [&](const Scene& each) { return each.number == number; });
   if (known != scenes.end()) return &*known;
-  std::shared_ptr<const model::WorldModel> shown = stage.source->world(number);
+  std::shared_ptr<const world::WorldModel> shown = stage.source->world(number);
   if (!shown) return nullptr;
   if (scenes.size() >= kKeptScenes) scenes.pop_back();
   scenes.push_front({number, stage.world_version + number, std::move(shown), nullptr, nullptr});

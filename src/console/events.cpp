@@ -155,7 +155,7 @@ void Events::reset() {
   ++generation_;
 }
 
-void Events::plan(const std::vector<model::Fault>& faults) {
+void Events::plan(const std::vector<world::Fault>& faults) {
   planned_ = faults;
   std::stable_sort(planned_.begin(), planned_.end(),
                    [](const auto& a, const auto& b) { return a.at_s < b.at_s; });
@@ -165,7 +165,7 @@ void Events::plan(const std::vector<model::Fault>& faults) {
 void Events::come_due() {
   const double now_s = now_s_;
   for (; due_ < planned_.size() && planned_[due_].at_s <= now_s; ++due_) {
-    const model::Fault& fault = planned_[due_];
+    const world::Fault& fault = planned_[due_];
     now_s_ = fault.at_s;
     add("fault", fault.robot, words_of(fault.kind, fault.target, fault.duration_s));
   }
@@ -301,7 +301,7 @@ void Events::replied(std::span<const uint8_t> message) {
   if (reply->code == reply_t::OK && reply->kind == asked.kind) done(asked.kind, asked.name);
 }
 
-EventScan::EventScan(const log::Index& index, const model::WorldModel* world) {
+EventScan::EventScan(const log::Index& index, const world::WorldModel* world) {
   if (world) events_.plan(world->faults);
   const auto& channels = index.channels();
   // If the log records everything that acted, the messages that asked for it add nothing.

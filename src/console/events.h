@@ -41,7 +41,7 @@ class Events {
   static bool tells(int64_t fingerprint);
 
   // The faults that the run will have on its own.
-  void plan(const std::vector<model::Fault>& faults);
+  void plan(const std::vector<world::Fault>& faults);
   // Messages in order of arrival. An incomplete message gives no event.
   void hear(double time_s, const std::string& channel, std::span<const uint8_t> message);
   // The number of messages that could not be sent so far.
@@ -78,7 +78,7 @@ class Events {
     std::string name;  // of what it is about
   };
   std::map<std::pair<int64_t, int64_t>, Asked> asked_;  // by session and sequence; unanswered
-  std::vector<model::Fault> planned_;                   // sorted by time
+  std::vector<world::Fault> planned_;                   // sorted by time
   size_t due_ = 0;                                      // number of those that have started
   uint64_t lost_ = 0;
 };
@@ -87,7 +87,7 @@ class Events {
 class EventScan {
  public:
   // world: of the log's start; null: not known.
-  EventScan(const log::Index& index, const model::WorldModel* world);
+  EventScan(const log::Index& index, const world::WorldModel* world);
 
   // Reads up to that many messages; true once all have been read.
   bool advance(log::Reader& reader, size_t messages);

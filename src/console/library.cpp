@@ -39,7 +39,7 @@ std::set<std::string> models_in(const fs::path& folder) {
 
 const std::vector<Library::Entry>& Library::entries() {
   if (std::exchange(listed_, true)) return entries_;
-  const fs::path shipped = model::shipped_worlds(), beside = fs::path(world_file_).parent_path();
+  const fs::path shipped = world::shipped_worlds(), beside = fs::path(world_file_).parent_path();
   std::set<std::string> known{"sun", "ground_plane"};  // part of every world
   const auto add = [&](const fs::path& folder, bool robots) {
     for (const std::string& name : models_in(folder)) {
@@ -71,11 +71,11 @@ const SceneData* Library::scene(size_t index) {
     return scenes_.front().second.get();
   }
   try {
-    const model::LoadedModel loaded = model::load_model(entries_[index].name, world_file_);
-    model::WorldModel world;
+    const world::LoadedModel loaded = world::load_model(entries_[index].name, world_file_);
+    world::WorldModel world;
     world.name = loaded.name;
     world.file = world_file_;
-    auto still = std::make_shared<model::Model>(*loaded.model);  // its links at their start poses
+    auto still = std::make_shared<world::Model>(*loaded.model);  // its links at their start poses
     still->is_static = true;
     still->drive.reset();
     world.models.push_back({loaded.name, {}, std::move(still)});

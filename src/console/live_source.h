@@ -13,7 +13,7 @@ namespace ruedo::console {
 
 // Requests to the run; from any thread.
 struct LiveHost {
-  std::function<std::shared_ptr<const model::WorldModel>()> world;
+  std::function<std::shared_ptr<const world::WorldModel>()> world;
   std::function<std::string(const std::string& name)> model_text;
   std::function<void(const std::string& channel, std::span<const uint8_t> message)> receive;
   std::function<uint64_t()> lost;  // messages that the bus could not send
@@ -63,7 +63,7 @@ class LiveSource : public Source {
     host_.receive(channel, message);
     return true;
   }
-  std::shared_ptr<const model::WorldModel> world(size_t scene) override {
+  std::shared_ptr<const world::WorldModel> world(size_t scene) override {
     return scene == 0 ? host_.world() : nullptr;
   }
   std::string model_text(const std::string& name) override { return host_.model_text(name); }

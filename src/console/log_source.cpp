@@ -73,7 +73,7 @@ std::string LogSource::fault() const {
   return all;
 }
 
-std::shared_ptr<const model::WorldModel> LogSource::world(size_t scene) {
+std::shared_ptr<const world::WorldModel> LogSource::world(size_t scene) {
   return scene < worlds_.scenes().size() ? worlds_.scenes()[scene].world : nullptr;
 }
 

@@ -32,7 +32,7 @@ class LogSource : public Source {
 
   void pump(Board& board, bool viewers) override;
   bool command(const std::string&, std::span<const uint8_t>) override { return false; }
-  std::shared_ptr<const model::WorldModel> world(size_t scene) override;
+  std::shared_ptr<const world::WorldModel> world(size_t scene) override;
   std::string fault() const override;
   std::string info_channel() const override { return info_channel_; }
   http::Bytes history(const std::string& channel, const std::string& field) override;

@@ -55,7 +55,7 @@ class Blob {
 
 // PNG and JPEG are served as they are; formats that browsers do not know, and pictures larger than
 // any screen, are converted to PNG.
-Picture picture(const model::Texture& texture) {
+Picture picture(const world::Texture& texture) {
   std::vector<uint8_t> bytes = texture.embedded;
   if (!texture.path.empty()) {
     try {
@@ -80,13 +80,13 @@ Picture picture(const model::Texture& texture) {
   cv::cvtColor(rgba, bgra, cv::COLOR_RGBA2BGRA);
   cv::flip(bgra, bgra, 0);
   std::vector<uint8_t> png;
-  model::encode_picture(".png", bgra, png);
+  world::encode_picture(".png", bgra, png);
   return {"image/png", std::make_shared<const std::vector<uint8_t>>(std::move(png))};
 }
 
 void write_light(JsonWriter& json, const scene::RenderLight& light) {
   constexpr const char* kTypes[] = {"directional", "point", "spot"};
-  const model::Light& l = light.light;
+  const world::Light& l = light.light;
   const Vec3 direction = l.pose.rotation * l.direction;  // in the world, or in the link
   json.open('{').member("type", kTypes[static_cast<int>(l.type)]).member("link", light.link);
   list(json.name("position"), l.pose.translation.data(), 3);
@@ -103,9 +103,9 @@ void write_light(JsonWriter& json, const scene::RenderLight& light) {
 }
 
 // fast: it is fixed. body: the one that carries the model; -1: none, and the pose is in the world.
-void write_model(JsonWriter& json, const model::ModelInstance& instance,
-                 const model::BodyLayout& layout, size_t index) {
-  const model::LinkPlacement& first = layout.links[layout.first_link[index]];
+void write_model(JsonWriter& json, const world::ModelInstance& instance,
+                 const world::BodyLayout& layout, size_t index) {
+  const world::LinkPlacement& first = layout.links[layout.first_link[index]];
   json.open('{')
       .member("name", instance.name)
       .member("first_link", layout.first_link[index])
@@ -120,19 +120,19 @@ void write_model(JsonWriter& json, const model::ModelInstance& instance,
 
 }  // namespace
 
-model::WorldModel collision_shapes(const model::WorldModel& world) {
-  constexpr model::Rgba kStanding{0.55f, 0.6f, 0.66f, 1}, kMoving{0.56f, 0.82f, 0.31f, 1};
-  model::WorldModel shown = world;
+world::WorldModel collision_shapes(const world::WorldModel& world) {
+  constexpr world::Rgba kStanding{0.55f, 0.6f, 0.66f, 1}, kMoving{0.56f, 0.82f, 0.31f, 1};
+  world::WorldModel shown = world;
   // only looked up, never iterated
-  std::map<const model::Model*, std::shared_ptr<const model::Model>> made;
-  for (model::ModelInstance& instance : shown.models) {
+  std::map<const world::Model*, std::shared_ptr<const world::Model>> made;
+  for (world::ModelInstance& instance : shown.models) {
     auto& replaced = made[instance.model.get()];
     if (!replaced) {
-      auto model = std::make_shared<model::Model>(*instance.model);
-      for (model::Link& link : model->links) {
+      auto model = std::make_shared<world::Model>(*instance.model);
+      for (world::Link& link : model->links) {
         link.visuals.clear();
-        for (const model::Collision& collision : link.collisions) {
-          model::Visual& visual = link.visuals.emplace_back();
+        for (const world::Collision& collision : link.collisions) {
+          world::Visual& visual = link.visuals.emplace_back();
           visual.name = collision.name;
           visual.X_LV = collision.X_LC;
           visual.geometry = collision.geometry;
@@ -201,12 +201,12 @@ void write_kinds(JsonWriter& out, const std::vector<scene::RenderLinkKind>& kind
 }
 
 // Wheels that are not bodies: link, robot, index among its wheels, a point on the axis, the axis.
-void write_wheels(JsonWriter& out, const model::BodyLayout& layout) {
+void write_wheels(JsonWriter& out, const world::BodyLayout& layout) {
   out.name("wheels").open('[');
   for (const RobotIndex r : layout.robots.indices()) {
     const auto& wheels = layout.robots[r].wheels;
     for (size_t w = 0; w < wheels.size(); ++w) {
-      const model::WheelPlacement& wheel = layout.wheels[wheels[w]];
+      const world::WheelPlacement& wheel = layout.wheels[wheels[w]];
       if (!layout.links[wheel.link].wheel.valid()) continue;
       out.open('[').value(wheel.link).value(r).value(static_cast<int>(w));
       for (int k = 0; k < 3; ++k) out.value(wheel.center_in_L[k]);
@@ -218,9 +218,9 @@ void write_wheels(JsonWriter& out, const model::BodyLayout& layout) {
 }
 
 // base_link in its body, or in the world, and its start pose in the world: x, y, z, qw, qx, qy, qz.
-void write_bases(JsonWriter& out, const model::WorldModel& world, const model::BodyLayout& layout) {
+void write_bases(JsonWriter& out, const world::WorldModel& world, const world::BodyLayout& layout) {
   out.name("bases").open('[');
-  for (const model::RobotPlacement& robot : layout.robots) {
+  for (const world::RobotPlacement& robot : layout.robots) {
     out.open('{').member("robot", world.models[robot.instance].name).member("body", robot.body);
     const Pose start =
         robot.body.valid() ? layout.bodies[robot.body].X_WB * robot.X_BBase : robot.X_BBase;
@@ -231,11 +231,11 @@ void write_bases(JsonWriter& out, const model::WorldModel& world, const model::B
   out.close(']');
 }
 
-http::Bytes link_bytes(const model::WorldModel& world, const model::BodyLayout& layout,
+http::Bytes link_bytes(const world::WorldModel& world, const world::BodyLayout& layout,
                        const scene::RenderContent& content) {
   Blob blob;
   for (const LinkIndex i : layout.links.indices()) {
-    const model::LinkPlacement& link = layout.links[i];
+    const world::LinkPlacement& link = layout.links[i];
     const bool removed = world.models[link.instance].removed;
     blob.add(int32_t{removed ? -1 : content.kind_of_link[i]});  // -1: nothing to draw
     blob.add(int32_t{link.body});
@@ -246,8 +246,8 @@ http::Bytes link_bytes(const model::WorldModel& world, const model::BodyLayout& 
 
 }  // namespace
 
-SceneData::SceneData(const model::WorldModel& world, int version) {
-  const model::BodyLayout layout(world);
+SceneData::SceneData(const world::WorldModel& world, int version) {
+  const world::BodyLayout layout(world);
   const scene::RenderContent content(world, layout);
   JsonWriter out;
   out.open('{')

@@ -20,7 +20,7 @@ struct Picture {
 };
 
 // The collision shapes known to physics and range finders, in place of visuals.
-model::WorldModel collision_shapes(const model::WorldModel& world);
+world::WorldModel collision_shapes(const world::WorldModel& world);
 
 struct SceneData {
   http::Bytes json;
@@ -32,7 +32,7 @@ struct SceneData {
   http::Bytes links;
   std::vector<Picture> pictures;  // in the order of the JSON's textures; empty if there is none
 
-  explicit SceneData(const model::WorldModel& world, int version);
+  explicit SceneData(const world::WorldModel& world, int version);
 };
 
 }  // namespace ruedo::console

@@ -65,7 +65,7 @@ class Source {
 
   // The world to show; the pointer changes when the world does; null if there is none. scene: which
   // scene of a log.
-  virtual std::shared_ptr<const model::WorldModel> world(size_t scene) = 0;
+  virtual std::shared_ptr<const world::WorldModel> world(size_t scene) = 0;
   // "" or why there is no world.
   virtual std::string fault() const { return {}; }
   // The channel of world_info_t.

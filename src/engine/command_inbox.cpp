@@ -32,18 +32,18 @@ DecodeFault try_decoding(const uint8_t* data, size_t size) {
 }
 
 // A fault's values are checked on arrival; whether its robot has that device, when it acts.
-std::string check_fault_message(const uint8_t* data, size_t size, model::Fault& fault) {
+std::string check_fault_message(const uint8_t* data, size_t size, world::Fault& fault) {
   fault_t message;
   if (decode_checked(data, size, message) != DecodeFault::none) return "it is none";
   fault = fault_of(message);
-  return model::check_fault(fault);
+  return world::check_fault(fault);
 }
 
 }  // namespace
 
 std::string check_values(Input::Kind kind, const uint8_t* data, size_t size) {
   if (kind == Input::Kind::fault) {
-    model::Fault asked;
+    world::Fault asked;
     return check_fault_message(data, size, asked);
   }
   markers_t markers;
@@ -299,7 +299,7 @@ void CommandInbox::apply(robot::Robots& robots, Faults& faults, int64_t step, Ba
   for (size_t i = 0; i < count; ++i) {
     const Input::Kind kind = inputs_[taken_[i].input].kind;
     if (kind == Input::Kind::fault) {
-      model::Fault fault;
+      world::Fault fault;
       if (check_fault_message(taken_[i].bytes.data(), taken_[i].bytes.size(), fault).empty())
         faults.begin(fault, taken_[i].command.robot, step);
     } else if (kind != Input::Kind::markers) {

@@ -84,9 +84,9 @@ class Engine::Borrowed {
 };
 
 struct Engine::Copy {
-  std::shared_ptr<const model::WorldModel> model;  // before any draws
+  std::shared_ptr<const world::WorldModel> model;  // before any draws
   uint64_t seed = 1;                               // with which it was created
-  model::Drawn drawn;
+  world::Drawn drawn;
   std::shared_ptr<Plan> plan;
   Channels channels;
   std::unique_ptr<World> world;
@@ -122,7 +122,7 @@ struct Engine::Observer {
   size_t count = 0;  // values per robot
 };
 
-Engine::Engine(std::shared_ptr<const model::WorldModel> world, EngineOptions options)
+Engine::Engine(std::shared_ptr<const world::WorldModel> world, EngineOptions options)
     : world_(std::move(world)), options_(std::move(options)), arena_(std::make_unique<Arena>()) {
   if (options_.worlds < 1)
     throw InputError({}, "an engine has 1 world or more, not " + std::to_string(options_.worlds));
@@ -157,7 +157,7 @@ Engine::Engine(std::shared_ptr<const model::WorldModel> world, EngineOptions opt
 
 Engine::~Engine() = default;
 
-std::unique_ptr<Engine::Copy> Engine::make_copy(std::shared_ptr<const model::WorldModel> model,
+std::unique_ptr<Engine::Copy> Engine::make_copy(std::shared_ptr<const world::WorldModel> model,
                                                 uint64_t seed, World* ended) {
   auto copy = std::make_unique<Copy>();
   FleetOptions fleet = options_.fleet;
@@ -187,7 +187,7 @@ std::unique_ptr<Engine::Copy> Engine::make_another(const Copy& copy) const {
   return other;
 }
 
-std::shared_ptr<Plan> Engine::plan_of(const std::shared_ptr<const model::WorldModel>& model) {
+std::shared_ptr<Plan> Engine::plan_of(const std::shared_ptr<const world::WorldModel>& model) {
   const std::lock_guard lock(shared_mutex_);
   std::erase_if(shared_, [](const auto& each) { return each.second.plan.expired(); });
   Shared& shared = shared_[model.get()];
@@ -323,7 +323,7 @@ std::vector<std::vector<std::string>> Engine::collisions(int world) const {
   for (const std::vector<LinkIndex>& links : copy.met) {
     std::vector<std::string>& of_robot = names.emplace_back();
     for (const LinkIndex link : links)
-      of_robot.push_back(model::body_name(copy.world->model(), copy.world->layout(), link));
+      of_robot.push_back(world::body_name(copy.world->model(), copy.world->layout(), link));
     std::sort(of_robot.begin(), of_robot.end());
     of_robot.erase(std::unique(of_robot.begin(), of_robot.end()), of_robot.end());
   }
@@ -427,7 +427,7 @@ void Engine::command(int world, const std::string& channel, std::span<const uint
       if (fault_t fault;
           input->kind == Input::Kind::fault &&
           decode_checked(message.data(), message.size(), fault) == DecodeFault::none) {
-        throw InputError({}, channel + ": " + model::check_fault(fault_of(fault)));
+        throw InputError({}, channel + ": " + world::check_fault(fault_of(fault)));
       }
       if (markers_t markers;
           input->kind == Input::Kind::markers &&
@@ -523,7 +523,7 @@ void Engine::restore_one(const SavedWorld& saved, size_t world) {
   for (auto& observer : observers_) update(*observer, world);
 }
 
-const model::Drawn& Engine::drawn(int world) const {
+const world::Drawn& Engine::drawn(int world) const {
   return copies_.at(static_cast<size_t>(world))->drawn;
 }
 

@@ -26,7 +26,7 @@ struct EngineOptions {
   int worlds = 1;
   FleetOptions fleet;              // its seed is for copy 0
   int threads = 0;                 // 0: one per core
-  std::vector<model::Draw> draws;  // for each copy and reset, from the seed
+  std::vector<world::Draw> draws;  // for each copy and reset, from the seed
 };
 
 // A field of one device on all robots that have it, in all copies. It is kept up to date: after
@@ -50,13 +50,13 @@ class Engine {
   using StateHandler = std::function<void(int world, const Snapshot& snapshot, const Batch& batch)>;
 
   // Computes state 0 of each copy. Throws InputError and EnvironmentError.
-  Engine(std::shared_ptr<const model::WorldModel> world, EngineOptions options);
+  Engine(std::shared_ptr<const world::WorldModel> world, EngineOptions options);
   ~Engine();
 
   int worlds() const { return static_cast<int>(copies_.size()); }
   int64_t step_us() const { return world_->step_us; }
   int64_t current_step(int world) const;
-  const model::WorldModel& model() const { return *world_; }
+  const world::WorldModel& model() const { return *world_; }
   const std::vector<device_info_t>& devices() const;
   const std::vector<Channel>& channels() const;
   // Robots with a drive, in world-file order: the second axis of drive().
@@ -84,12 +84,12 @@ class Engine {
     uint64_t seed = 1;
     // Another world for that copy from now on; null: the current one. It must have the channels of
     // the first world: the same robots with the same devices, in the same order.
-    std::shared_ptr<const model::WorldModel> model = nullptr;
+    std::shared_ptr<const world::WorldModel> model = nullptr;
   };
   // Restarts copies, each with its seed: what follows equals a fresh run. Throws InputError; some
   // copies may then be unchanged.
   void reset(std::span<const Reset> resets);
-  void reset(int world, uint64_t seed, std::shared_ptr<const model::WorldModel> model = nullptr) {
+  void reset(int world, uint64_t seed, std::shared_ptr<const world::WorldModel> model = nullptr) {
     const Reset one{world, seed, std::move(model)};
     reset(std::span(&one, 1));
   }
@@ -104,7 +104,7 @@ class Engine {
   void restore(const SavedWorld& saved, std::span<const int> worlds);
 
   // The values drawn for a copy.
-  const model::Drawn& drawn(int world) const;
+  const world::Drawn& drawn(int world) const;
 
   // The array of a field, kept up to date for the engine's lifetime. device: a name ("LRF"), or a
   // kind ("lrf") if each robot has at most one of it. Throws InputError, and EnvironmentError if
@@ -133,12 +133,12 @@ class Engine {
   struct Observer;
   class Borrowed;
 
-  std::unique_ptr<Copy> make_copy(std::shared_ptr<const model::WorldModel> model, uint64_t seed,
+  std::unique_ptr<Copy> make_copy(std::shared_ptr<const world::WorldModel> model, uint64_t seed,
                                   World* ended = nullptr);
   std::unique_ptr<Copy> make_another(const Copy& copy) const;
   void restore_one(const SavedWorld& saved, size_t world);
   void reset_one(const Reset& reset);
-  std::shared_ptr<Plan> plan_of(const std::shared_ptr<const model::WorldModel>& model);
+  std::shared_ptr<Plan> plan_of(const std::shared_ptr<const world::WorldModel>& model);
   void count_touching(Copy& copy, const Batch& batch, int32_t* counts) const;
   void take_velocities(size_t world);
   void compute(size_t world, int64_t steps);
@@ -150,16 +150,16 @@ class Engine {
   void for_each(size_t count, const std::function<void(size_t)>& body);
   std::vector<int> channels_of(const std::string& device) const;
 
-  std::shared_ptr<const model::WorldModel> world_;
+  std::shared_ptr<const world::WorldModel> world_;
   EngineOptions options_;
   std::shared_ptr<const char> identity_ = std::make_shared<char>();  // identifies its saved worlds
   // For worlds that several copies use: kept while one of them does.
   struct Shared {
-    std::weak_ptr<const model::WorldModel> model;
+    std::weak_ptr<const world::WorldModel> model;
     std::weak_ptr<Plan> plan;
   };
   std::mutex shared_mutex_;
-  std::map<const model::WorldModel*, Shared> shared_;  // only looked up, never iterated
+  std::map<const world::WorldModel*, Shared> shared_;  // only looked up, never iterated
   Findings findings_;
   std::vector<std::unique_ptr<Copy>> copies_;
   bool first_made_ = false;  // the first copy reports what is wrong with the world

@@ -40,7 +40,7 @@ struct Wanted {
 
 class FleetMaker {
  public:
-  FleetMaker(const model::WorldModel& world, const model::BodyLayout& layout,
+  FleetMaker(const world::WorldModel& world, const world::BodyLayout& layout,
              const FleetOptions& options, Channels& channels, Findings& findings)
       : world_(world),
         layout_(layout),
@@ -81,7 +81,7 @@ class FleetMaker {
     return all;
   }
 
-  const model::ModelInstance& instance(RobotIndex robot) const {
+  const world::ModelInstance& instance(RobotIndex robot) const {
     return world_.models[layout_.robots[robot].instance];
   }
 
@@ -91,9 +91,9 @@ class FleetMaker {
 
   // The devices of a kind on a robot, in file order.
   void collect(const SensorKind& kind, RobotIndex robot, std::vector<Wanted>& wanted) const {
-    const model::Model& model = *instance(robot).model;
+    const world::Model& model = *instance(robot).model;
     if (kind.attach_to.empty()) {
-      for (const model::SensorDescription& sensor : model.sensors) {
+      for (const world::SensorDescription& sensor : model.sensors) {
         if (std::find(kind.types.begin(), kind.types.end(), sensor.type) == kind.types.end() ||
             disabled(robot, sensor.name))
           continue;
@@ -114,12 +114,12 @@ class FleetMaker {
     const Element* element = &no_element();
     Rate rate = kind.default_rate;
     if (model.drive) {
-      const model::DriveDescription& drive = *model.drive;
+      const world::DriveDescription& drive = *model.drive;
       if (drive.odometry && drive.odometry->name == "ruedo:" + kind.device_name)
         element = drive.odometry.get();
       if (kind.drive_rate) rate = kind.drive_rate(drive);
     }
-    const model::RobotPlacement& placement = layout_.robots[robot];
+    const world::RobotPlacement& placement = layout_.robots[robot];
     const LinkIndex link = placement.body.valid()  // it is at base_link
                                ? layout_.bodies[placement.body].links.front()
                                : layout_.first_link[placement.instance];
@@ -128,7 +128,7 @@ class FleetMaker {
   }
 
   Pose X_WBase(RobotIndex robot) const {
-    const model::RobotPlacement& placement = layout_.robots[robot];
+    const world::RobotPlacement& placement = layout_.robots[robot];
     return placement.body.valid() ? layout_.bodies[placement.body].X_WB * placement.X_BBase
                                   : placement.X_BBase;
   }
@@ -172,7 +172,7 @@ class FleetMaker {
     channel_refused_ = nullptr;
     device_channels_.clear();
     try {
-      if (model::read_or_leave_out(where, "the sensor is left out", findings_,
+      if (world::read_or_leave_out(where, "the sensor is left out", findings_,
                                    [&] { module.devices.push_back(make_device(wanted)); }))
         return;
       if (channel_refused_) std::rethrow_exception(channel_refused_);
@@ -253,11 +253,11 @@ class FleetMaker {
   }
 
   void name_unserved(const std::vector<SensorKind>& kinds) {
-    std::set<const model::Model*> seen;
+    std::set<const world::Model*> seen;
     for (const RobotIndex robot : robots()) {
-      const model::Model* model = instance(robot).model.get();
+      const world::Model* model = instance(robot).model.get();
       if (!seen.insert(model).second) continue;
-      for (const model::SensorDescription& sensor : model->sensors) {
+      for (const world::SensorDescription& sensor : model->sensors) {
         const bool served = std::any_of(kinds.begin(), kinds.end(), [&](const SensorKind& kind) {
           return std::find(kind.types.begin(), kind.types.end(), sensor.type) != kind.types.end();
         });
@@ -298,8 +298,8 @@ class FleetMaker {
     }
   }
 
-  const model::WorldModel& world_;
-  const model::BodyLayout& layout_;
+  const world::WorldModel& world_;
+  const world::BodyLayout& layout_;
   const FleetOptions& options_;
   Channels& channels_;
   Findings& findings_;
@@ -312,13 +312,13 @@ class FleetMaker {
 
 }  // namespace
 
-Pose initial_pose(const model::BodyLayout& layout, LinkIndex link) {
-  const model::LinkPlacement& placement = layout.links[link];
+Pose initial_pose(const world::BodyLayout& layout, LinkIndex link) {
+  const world::LinkPlacement& placement = layout.links[link];
   return placement.body.valid() ? layout.bodies[placement.body].X_WB * placement.X_BL
                                 : placement.X_BL;
 }
 
-Fleet make_fleet(const model::WorldModel& world, const model::BodyLayout& layout,
+Fleet make_fleet(const world::WorldModel& world, const world::BodyLayout& layout,
                  const FleetOptions& options, Channels& channels, Findings& findings) {
   return FleetMaker(world, layout, options, channels, findings).make();
 }

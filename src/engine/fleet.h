@@ -34,10 +34,10 @@ struct Fleet {
 // Creates all devices and announces all channels. world and layout must outlive the fleet.
 // Unsupported parts and faulty <sensor>s, which are left out, go to `findings`; a faulty element of
 // Ruedo's own throws InputError.
-Fleet make_fleet(const model::WorldModel& world, const model::BodyLayout& layout,
+Fleet make_fleet(const world::WorldModel& world, const world::BodyLayout& layout,
                  const FleetOptions& options, Channels& channels, Findings& findings);
 
 // The start pose of a link's frame L in the world.
-Pose initial_pose(const model::BodyLayout& layout, LinkIndex link);
+Pose initial_pose(const world::BodyLayout& layout, LinkIndex link);
 
 }  // namespace ruedo::engine

@@ -23,7 +23,7 @@ constexpr int64_t kQuickNs =
     1'000'000;  // for which the publisher may wait for a step: it also sends the signs of life
 
 // Large worlds gain nothing from many steps in flight, and have large snapshots.
-int batch_steps(const model::BodyLayout& layout) {
+int batch_steps(const world::BodyLayout& layout) {
   const size_t snapshot = sizeof(Snapshot) +
                           layout.bodies.size() * (sizeof(Pose) + sizeof(Twist) + sizeof(Vec3)) +
                           layout.wheels.size() * 16 + layout.joints.size() * 24 +
@@ -34,14 +34,14 @@ int batch_steps(const model::BodyLayout& layout) {
 
 // TBB, with which Embree works too, waits for ever for a thread that could not be started. So those
 // of TBB and of the modules have to be possible before the first of them is needed.
-std::shared_ptr<Plan> plan_of(const model::WorldModel& world) {
+std::shared_ptr<Plan> plan_of(const world::WorldModel& world) {
   require_threads_for_cores(kModuleThreads);
   return std::make_shared<Plan>(world);
 }
 
 }  // namespace
 
-Simulation::Simulation(std::shared_ptr<const model::WorldModel> world,
+Simulation::Simulation(std::shared_ptr<const world::WorldModel> world,
                        const SimulationOptions& options, Channels& channels, Findings& findings,
                        Wakeup& finished)
     : world_(plan_of(*world), options.fleet, channels, findings),
@@ -96,7 +96,7 @@ void Simulation::fit_threads() {
 }
 
 InstanceIndex Simulation::add_model(const std::string& name, const Pose& X_WM,
-                                    std::shared_ptr<const model::Model> model, int64_t step,
+                                    std::shared_ptr<const world::Model> model, int64_t step,
                                     Channels& channels, Findings& findings) {
   const InstanceIndex instance =
       world_.add_model(name, X_WM, std::move(model), step, channels, findings);

@@ -41,7 +41,7 @@ class Simulation {
 
   // Creates everything but threads, and announces channels. finished: set whenever take() may have
   // something. Throws InputError.
-  Simulation(std::shared_ptr<const model::WorldModel> world, const SimulationOptions& options,
+  Simulation(std::shared_ptr<const world::WorldModel> world, const SimulationOptions& options,
              Channels& channels, Findings& findings, Wakeup& finished);
   ~Simulation();  // stops, and waits for all threads
 
@@ -77,8 +77,8 @@ class Simulation {
   template <class Handler>
   void messages(const Batch& batch, int64_t step, Handler&& handler);
 
-  const model::WorldModel& world() const { return world_.model(); }
-  const model::BodyLayout& layout() const { return world_.layout(); }
+  const world::WorldModel& world() const { return world_.model(); }
+  const world::BodyLayout& layout() const { return world_.layout(); }
   const std::vector<device_info_t>& devices() const { return world_.devices(); }
   CommandInbox& inbox() { return world_.inbox(); }
   const physics::PhysicsWorld& physics() const { return world_.physics(); }
@@ -91,7 +91,7 @@ class Simulation {
   // As in World. They also throw EnvironmentError if a module cannot run here; the world is then
   // unchanged. Both throw SceneLost.
   InstanceIndex add_model(const std::string& name, const Pose& X_WM,
-                          std::shared_ptr<const model::Model> model, int64_t step,
+                          std::shared_ptr<const world::Model> model, int64_t step,
                           Channels& channels, Findings& findings);
   void remove_model(InstanceIndex instance, Channels& channels);
   SimTime reset_time(int epoch) { return world_.reset_time(epoch); }

@@ -7,8 +7,8 @@
 
 namespace ruedo::engine {
 
-std::shared_ptr<const scene::StaticRayScene> StaticScenes::get(const model::WorldModel& world,
-                                                               const model::BodyLayout& layout,
+std::shared_ptr<const scene::StaticRayScene> StaticScenes::get(const world::WorldModel& world,
+                                                               const world::BodyLayout& layout,
                                                                bool visuals) {
   const std::lock_guard lock(mutex_);
   auto& scene = visuals ? visuals_ : collisions_;

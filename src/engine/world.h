@@ -26,8 +26,8 @@ namespace ruedo::engine {
 // The static geometry, built on first use: shared by all modules, and by copies of a world.
 class StaticScenes {
  public:
-  std::shared_ptr<const scene::StaticRayScene> get(const model::WorldModel& world,
-                                                   const model::BodyLayout& layout, bool visuals);
+  std::shared_ptr<const scene::StaticRayScene> get(const world::WorldModel& world,
+                                                   const world::BodyLayout& layout, bool visuals);
 
  private:
   std::mutex mutex_;
@@ -37,9 +37,9 @@ class StaticScenes {
 // What is made once from a world's model: copies of a world share it, and none of them may then be
 // changed.
 struct Plan {
-  explicit Plan(const model::WorldModel& world) : model(world), layout(model) {}
-  model::WorldModel model;
-  model::BodyLayout layout;
+  explicit Plan(const world::WorldModel& world) : model(world), layout(model) {}
+  world::WorldModel model;
+  world::BodyLayout layout;
   std::shared_ptr<StaticScenes> statics = std::make_shared<StaticScenes>();
 
   // A world's physics as it begins; made when it is first asked for, and never stepped.
@@ -77,8 +77,8 @@ class World {
   // From now on ruedo/world carries that epoch.
   void set_epoch(int epoch);
 
-  const model::WorldModel& model() const { return model_; }
-  const model::BodyLayout& layout() const { return layout_; }
+  const world::WorldModel& model() const { return model_; }
+  const world::BodyLayout& layout() const { return layout_; }
   const std::vector<device_info_t>& devices() const { return devices_; }
   bool refused() const { return fleet_.refused; }  // Fleet::refused
   CommandInbox& inbox() { return inbox_; }
@@ -91,13 +91,13 @@ class World {
   SceneMakers scene_makers() const;  // valid until a model joins or leaves
 
   // ---- Changes between two steps, while no module is working, for a world with its own plan; in
-  // world_edits.cpp. When models have joined or left, modules may have changed, and those with
-  // scenes need new ones.
+  // edits/world_edits.cpp. When models have joined or left, modules may have changed, and those
+  // with scenes need new ones.
 
   // Inserts a model, visible from the next state on; `step` is that state's number. Returns its
   // index in model().models. Throws InputError; the world is then unchanged.
   InstanceIndex add_model(const std::string& name, const Pose& X_WM,
-                          std::shared_ptr<const model::Model> model, int64_t step,
+                          std::shared_ptr<const world::Model> model, int64_t step,
                           Channels& channels, Findings& findings);
   // Removes one. Its numbers stay free until the same model is inserted again.
   void remove_model(InstanceIndex instance, Channels& channels);
@@ -107,7 +107,7 @@ class World {
  private:
   std::shared_ptr<physics::PhysicsWorld> physics_of(World* ended) const;
   InstanceIndex place(const std::string& name, const Pose& X_WM,
-                      std::shared_ptr<const model::Model> model);
+                      std::shared_ptr<const world::Model> model);
   void reseed(int64_t step);
   void show_beginning(Fleet& fleet, int64_t step) const;
   void join(Fleet fleet);
@@ -115,8 +115,8 @@ class World {
   void renew_world_state();
 
   std::shared_ptr<Plan> plan_;
-  model::WorldModel& model_;
-  model::BodyLayout& layout_;
+  world::WorldModel& model_;
+  world::BodyLayout& layout_;
   FleetOptions options_;
   Fleet fleet_;  // its parts are moved into the following members
   std::vector<device_info_t> devices_;

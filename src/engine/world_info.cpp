@@ -44,10 +44,10 @@ class Parts {
   size_t size_ = 0;
 };
 
-robot_info_t robot_info(const model::WorldModel& world, const model::BodyLayout& layout,
-                        const model::RobotPlacement& placement) {
-  const model::ModelInstance& instance = world.models[placement.instance];
-  const model::Model& model = *instance.model;
+robot_info_t robot_info(const world::WorldModel& world, const world::BodyLayout& layout,
+                        const world::RobotPlacement& placement) {
+  const world::ModelInstance& instance = world.models[placement.instance];
+  const world::Model& model = *instance.model;
   robot_info_t info;
   info.name = instance.name;
   info.model = model.name;
@@ -56,10 +56,10 @@ robot_info_t robot_info(const model::WorldModel& world, const model::BodyLayout&
   info.acceleration = info.deceleration = info.turn_acceleration = 0.0;
   info.watchdog_us = 0;
   if (model.drive) {
-    const model::DriveDescription& drive = *model.drive;
-    info.drive = drive.kind == model::DriveDescription::Kind::kinematic ? "kinematic" : "wheels";
-    if (drive.steering != model::DriveDescription::Steering::differential)
-      info.drive += " " + model::name_of(drive.steering);
+    const world::DriveDescription& drive = *model.drive;
+    info.drive = drive.kind == world::DriveDescription::Kind::kinematic ? "kinematic" : "wheels";
+    if (drive.steering != world::DriveDescription::Steering::differential)
+      info.drive += " " + world::name_of(drive.steering);
     info.wheel_radius = drive.wheel_radius;
     info.track = drive.track;
     info.max_speed = drive.max_speed;
@@ -70,7 +70,7 @@ robot_info_t robot_info(const model::WorldModel& world, const model::BodyLayout&
     info.watchdog_us = drive.watchdog_us;
   }
   for (WheelIndex wheel : placement.wheels) {
-    const model::WheelPlacement& description = layout.wheels[wheel];
+    const world::WheelPlacement& description = layout.wheels[wheel];
     info.wheels.push_back(model.joints[description.joint].name);
     info.left.push_back(description.left);
   }
@@ -78,19 +78,19 @@ robot_info_t robot_info(const model::WorldModel& world, const model::BodyLayout&
   return info;
 }
 
-const model::Link& link_of(const model::WorldModel& world, const model::LinkPlacement& placement) {
+const world::Link& link_of(const world::WorldModel& world, const world::LinkPlacement& placement) {
   return world.models[placement.instance].model->links[placement.link];
 }
 
 }  // namespace
 
-std::vector<world_info_t> make_world_info(const world_info_t& head, const model::WorldModel& world,
-                                          const model::BodyLayout& layout,
+std::vector<world_info_t> make_world_info(const world_info_t& head, const world::WorldModel& world,
+                                          const world::BodyLayout& layout,
                                           const std::vector<device_info_t>& devices,
                                           const Channels& channels) {
   Parts parts(head);
   const auto removed = [&](InstanceIndex instance) { return world.models[instance].removed; };
-  for (const model::RobotPlacement& robot : layout.robots) {
+  for (const world::RobotPlacement& robot : layout.robots) {
     if (removed(robot.instance)) continue;
     parts.add(&world_info_t::robots, &world_info_t::nrobots, robot_info(world, layout, robot));
   }
@@ -111,9 +111,9 @@ std::vector<world_info_t> make_world_info(const world_info_t& head, const model:
     info.input = channel.input;
     parts.add(&world_info_t::channels, &world_info_t::nchannels, info);
   }
-  for (const model::ListedBody& listed :
+  for (const world::ListedBody& listed :
        layout.listed) {  // their places count: pictures label by them
-    const model::LinkPlacement& link = layout.links[listed.link];
+    const world::LinkPlacement& link = layout.links[listed.link];
     body_info_t info{};
     info.index = -1;
     info.is_static = !listed.body.valid();
@@ -122,7 +122,7 @@ std::vector<world_info_t> make_world_info(const world_info_t& head, const model:
     } else if (!listed.body.valid()) {
       info.name = world.models[link.instance].name + "/" + link_of(world, link).name;
     } else {
-      const model::BodyPlacement& body = layout.bodies[listed.body];
+      const world::BodyPlacement& body = layout.bodies[listed.body];
       info.index = listed.body;
       info.name = body.name;
       for (int each : body.links) info.mass += link_of(world, layout.links[each]).inertial.mass;

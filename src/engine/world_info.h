@@ -11,8 +11,8 @@
 namespace ruedo::engine {
 
 // The head is copied into each part; the lists are cut where a part would exceed kMaxPartSize.
-std::vector<world_info_t> make_world_info(const world_info_t& head, const model::WorldModel& world,
-                                          const model::BodyLayout& layout,
+std::vector<world_info_t> make_world_info(const world_info_t& head, const world::WorldModel& world,
+                                          const world::BodyLayout& layout,
                                           const std::vector<device_info_t>& devices,
                                           const Channels& channels);
 

@@ -85,7 +85,7 @@ class Hash {
 namespace {
 
 // The bodies of models that are there.
-std::vector<int32_t> bodies_of(const model::WorldModel& world, const model::BodyLayout& layout) {
+std::vector<int32_t> bodies_of(const world::WorldModel& world, const world::BodyLayout& layout) {
   std::vector<int32_t> there;
   for (size_t i = 0; i < layout.bodies.size(); ++i) {
     if (!world.models[layout.bodies[i].instance].removed) there.push_back(static_cast<int32_t>(i));
@@ -95,19 +95,19 @@ std::vector<int32_t> bodies_of(const model::WorldModel& world, const model::Body
 
 }  // namespace
 
-std::unique_ptr<Sensor> world_state_sensor(const model::WorldModel& world,
-                                           const model::BodyLayout& layout, int epoch,
+std::unique_ptr<Sensor> world_state_sensor(const world::WorldModel& world,
+                                           const world::BodyLayout& layout, int epoch,
                                            ChannelIndex channel) {
   return std::make_unique<WorldState>(bodies_of(world, layout), epoch, channel);
 }
 
-std::vector<world_state_t> world_states(const model::WorldModel& world,
-                                        const model::BodyLayout& layout, int epoch,
+std::vector<world_state_t> world_states(const world::WorldModel& world,
+                                        const world::BodyLayout& layout, int epoch,
                                         const Snapshot& state) {
   return WorldState(bodies_of(world, layout), epoch, ChannelIndex()).shown(state);
 }
 
-ModuleSetup world_state_module(const model::WorldModel& world, const model::BodyLayout& layout,
+ModuleSetup world_state_module(const world::WorldModel& world, const world::BodyLayout& layout,
                                int epoch, Channels& channels) {
   const ChannelIndex channel = channels.add<world_state_t>(kWorldChannel, "", "", kWorldRate);
   ModuleSetup module;

@@ -12,17 +12,17 @@ namespace ruedo::engine {
 inline constexpr size_t kMaxPartSize = 60'000;  // bytes of one part of a long message
 
 // A module like any other, with one device: the simulation.
-ModuleSetup world_state_module(const model::WorldModel& world, const model::BodyLayout& layout,
+ModuleSetup world_state_module(const world::WorldModel& world, const world::BodyLayout& layout,
                                int epoch, Channels& channels);
 
 // Its device, for bodies or an epoch that are others now. channel: as the module announced it.
-std::unique_ptr<Sensor> world_state_sensor(const model::WorldModel& world,
-                                           const model::BodyLayout& layout, int epoch,
+std::unique_ptr<Sensor> world_state_sensor(const world::WorldModel& world,
+                                           const world::BodyLayout& layout, int epoch,
                                            ChannelIndex channel);
 
 // The same of one state.
-std::vector<world_state_t> world_states(const model::WorldModel& world,
-                                        const model::BodyLayout& layout, int epoch,
+std::vector<world_state_t> world_states(const world::WorldModel& world,
+                                        const world::BodyLayout& layout, int epoch,
                                         const Snapshot& state);
 
 // A hash of what a step's state is, for ruedo/tick: of every body's and robot's pose and motion,

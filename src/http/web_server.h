@@ -1,4 +1,5 @@
-// HTTP and WebSocket for the console, over libwebsockets: one thread, one port, everything bounded.
+// HTTP and WebSocket for browsers and viewers, over libwebsockets: one thread, one port, everything
+// bounded.
 //
 // Why libwebsockets: a small C library, available in every distribution, with one event loop for
 // HTTP and WebSocket.

@@ -1,4 +1,4 @@
-// The comparison itself; the reports are in log_diff_report.cpp.
+// The comparison itself; the reports are in diff_report.cpp.
 #include "log/diff.h"
 
 #include <fnmatch.h>

@@ -137,7 +137,7 @@ std::vector<std::string> libraries_that_matter() {
   return {names.begin(), names.end()};
 }
 
-log_header_t make_log_header(const model::WorldModel& world, uint64_t seed,
+log_header_t make_log_header(const world::WorldModel& world, uint64_t seed,
                              const std::vector<std::string>& options) {
   log_header_t header;
   header.utime = 0;
@@ -188,7 +188,7 @@ std::vector<std::string> ends_of(const std::string& path) {
 // A file of that content in those folders whose path ends as the given one's does; "" where there
 // is none. A link may lead out of a folder: the finder says how far a log reaches.
 std::string found_again(const log_file_t& file, const std::vector<fs::path>& folders,
-                        const model::ResourceFinder& finder, Digests& digests) {
+                        const world::ResourceFinder& finder, Digests& digests) {
   std::error_code error;
   for (const std::string& end : ends_of(file.path)) {
     for (const fs::path& folder : folders) {
@@ -229,8 +229,8 @@ namespace {
 void find_files_again(log_header_t& header, const std::string& log, Digests& digests) {
   if (!fault_of_names(header).empty()) return;
   std::error_code error;
-  const fs::path beside = fs::absolute(log, error).parent_path(), shipped = model::shipped_worlds();
-  const model::ResourceFinder near(log, false);
+  const fs::path beside = fs::absolute(log, error).parent_path(), shipped = world::shipped_worlds();
+  const world::ResourceFinder near(log, false);
   const auto move = [&](log_file_t& file, const std::vector<fs::path>& folders) {
     const std::string found = found_again(file, folders, near, digests);
     if (found.empty()) return;
@@ -241,7 +241,7 @@ void find_files_again(log_header_t& header, const std::string& log, Digests& dig
     if (!fs::is_regular_file(file.path, error)) move(file, {beside, shipped});
   }
   // What is there may be another installation's: ours is as good, and may be looked at.
-  const model::ResourceFinder finder(header.world_file, false);
+  const world::ResourceFinder finder(header.world_file, false);
   for (log_file_t& file : header.files) {
     if (!finder.reaches(file.path)) move(file, {shipped});
   }
@@ -252,7 +252,7 @@ void find_files_again(log_header_t& header, const std::string& log, Digests& dig
 void check_files(const log_header_t& header, const std::string& log, Digests& digests) {
   if (const std::string fault = fault_of_names(header); !fault.empty())
     throw InputError({log}, fault);
-  const model::ResourceFinder finder(header.world_file, false);
+  const world::ResourceFinder finder(header.world_file, false);
   for (const log_file_t& file : header.files) {
     if (!finder.reaches(file.path)) {
       throw InputError({log}, "was made from " + file.path +

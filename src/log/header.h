@@ -25,7 +25,7 @@ std::string libc_version();
 std::vector<std::string> libraries_that_matter();
 
 // options: those that change the result, as on the command line.
-log_header_t make_log_header(const model::WorldModel& world, uint64_t seed,
+log_header_t make_log_header(const world::WorldModel& world, uint64_t seed,
                              const std::vector<std::string>& options);
 
 // With their SHA-256.

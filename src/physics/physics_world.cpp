@@ -7,7 +7,7 @@
 
 namespace ruedo::physics {
 
-PhysicsWorld::PhysicsWorld(const model::WorldModel& world, const model::BodyLayout& layout)
+PhysicsWorld::PhysicsWorld(const world::WorldModel& world, const world::BodyLayout& layout)
     : impl_(std::make_unique<Impl>(world, layout)) {}
 PhysicsWorld::~PhysicsWorld() = default;
 

@@ -1,5 +1,5 @@
 // The rigid-body world: Bullet in double precision behind an interface in our own types. Only this
-// folder uses Bullet. Bodies are numbered as in model::BodyLayout. Not thread-safe: owned by the
+// folder uses Bullet. Bodies are numbered as in world::BodyLayout. Not thread-safe: owned by the
 // kinematics module.
 //
 // A kinematic robot on a horizontal ground plane has no contact pair with it: its support is
@@ -42,7 +42,7 @@ using TieIndex = Index<struct TieKind>;  // pairs of bodies that may be held tog
 class PhysicsWorld {
  public:
   // world and layout must outlive it.
-  PhysicsWorld(const model::WorldModel& world, const model::BodyLayout& layout);
+  PhysicsWorld(const world::WorldModel& world, const world::BodyLayout& layout);
   ~PhysicsWorld();
 
   // Advances by one step of the world's length.
@@ -65,7 +65,7 @@ class PhysicsWorld {
   void set_gravity(BodyIndex body, const Vec3& gravity);
 
   // Wind during the coming steps, m/s, world. Links with <enable_wind> are pushed at their centre
-  // of mass with gain * mass * (wind - velocity), if the world has the plugin (model::Wind).
+  // of mass with gain * mass * (wind - velocity), if the world has the plugin (world::Wind).
   void set_wind(const Vec3& wind);
 
   double mass(BodyIndex body) const;              // kg

@@ -81,7 +81,7 @@ bool MayTouch::may_touch(const btCollisionObject& object_a,
   return a.instance != b.instance || a.self_collide;
 }
 
-PhysicsWorld::Impl::Impl(const model::WorldModel& world, const model::BodyLayout& layout)
+PhysicsWorld::Impl::Impl(const world::WorldModel& world, const world::BodyLayout& layout)
     : rigid_(world, layout),
       contacts_(layout.bodies.size()),
       world_(world),
@@ -170,7 +170,7 @@ PhysicsWorld::Impl::~Impl() {
 JointConstraint PhysicsWorld::Impl::make_joint(InstanceIndex instance,
                                                ModelJointIndex joint_index) {
   const auto& placed = world_.models[instance];
-  const model::Joint& joint = placed.model->joints[joint_index];
+  const world::Joint& joint = placed.model->joints[joint_index];
   const auto body_of = [&](ModelLinkIndex link) {
     return link.valid() ? layout_.links[layout_.link_of(instance, link)].body : BodyIndex();
   };
@@ -185,7 +185,7 @@ JointConstraint PhysicsWorld::Impl::make_joint(InstanceIndex instance,
     tie(parent, child);  // what the joint carries is fixed to the world
   }
   const BodyIndex reference = body_of(joint.gear_reference);
-  const bool gears = joint.type == model::JointType::gearbox;
+  const bool gears = joint.type == world::JointType::gearbox;
   if (gears && reference.valid()) {
     for (const BodyIndex body : {parent, child})
       if (body.valid()) tie(body, reference);
@@ -231,7 +231,7 @@ void PhysicsWorld::Impl::add_wheel(WheelIndex i) {
   rolling_.push_back(link.body);
   wheels_.push_back(make_joint(robot.instance, wheel.joint));
   const auto& model = *world_.models[robot.instance].model;
-  const model::Joint& joint = model.joints[wheel.joint];
+  const world::Joint& joint = model.joints[wheel.joint];
   const Vec3 axis_in_M = joint.X_MJ.rotation * joint.axis.axis_in_J;
   const Vec3 ahead_in_M = model.links[link.link].X_ML.rotation * wheel.axis_in_L;
   wheel_sign_[i] = axis_in_M.dot(ahead_in_M) < 0.0 ? -1.0 : 1.0;

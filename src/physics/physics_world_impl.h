@@ -56,7 +56,7 @@ using WheelJointIndex = Index<struct WheelJointKind>;  // into Impl::wheels_
 
 class PhysicsWorld::Impl {
  public:
-  Impl(const model::WorldModel& world, const model::BodyLayout& layout);
+  Impl(const world::WorldModel& world, const world::BodyLayout& layout);
   ~Impl();
 
   void step();
@@ -149,8 +149,8 @@ class PhysicsWorld::Impl {
   void bound_speeds(const std::vector<btRigidBody*>&
                         bodies);  // after a substep; throws StateError if anything is not finite
 
-  const model::WorldModel& world_;
-  const model::BodyLayout& layout_;
+  const world::WorldModel& world_;
+  const world::BodyLayout& layout_;
   int64_t step_us_;
   int substeps_[2] = {1, 1};  // for each substep length
   MayTouch filter_;

@@ -16,23 +16,23 @@ bool finite(const Pose& X) {
 bool finite(const Twist& twist) { return std::isfinite(twist.linear.sum() + twist.angular.sum()); }
 
 [[noreturn]] void fail(const Snapshot& snapshot, const std::string& what) {
-  throw StateError("at " + model::shown(static_cast<double>(snapshot.time) * 1e-6) +
+  throw StateError("at " + world::shown(static_cast<double>(snapshot.time) * 1e-6) +
                    " s the state of " + what +
                    " is not finite: the run ends with the step before. Masses, inertias and "
                    "efforts that do not fit each other do this");
 }
 
-std::string joint_name(size_t joint, const model::WorldModel& world,
-                       const model::BodyLayout& layout) {
+std::string joint_name(size_t joint, const world::WorldModel& world,
+                       const world::BodyLayout& layout) {
   const auto& placed = layout.joints[joint];
-  const model::ModelInstance& instance = world.models[placed.instance];
+  const world::ModelInstance& instance = world.models[placed.instance];
   return "the joint '" + instance.name + "/" + instance.model->joints[placed.joint].name + "'";
 }
 
 }  // namespace
 
-void check_finite(const Snapshot& snapshot, const model::WorldModel& world,
-                  const model::BodyLayout& layout) {
+void check_finite(const Snapshot& snapshot, const world::WorldModel& world,
+                  const world::BodyLayout& layout) {
   for (size_t i = 0; i < snapshot.bodies.size(); ++i) {
     const Vec3& acceleration = snapshot.body_accelerations[i];
     if (!finite(snapshot.bodies[i]) || !finite(snapshot.body_twists[i]) ||

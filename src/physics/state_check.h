@@ -17,7 +17,7 @@ class StateError : public std::runtime_error {
 };
 
 // Throws StateError for the first value that is not finite.
-void check_finite(const Snapshot& snapshot, const model::WorldModel& world,
-                  const model::BodyLayout& layout);
+void check_finite(const Snapshot& snapshot, const world::WorldModel& world,
+                  const world::BodyLayout& layout);
 
 }  // namespace ruedo::physics

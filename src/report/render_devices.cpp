@@ -89,9 +89,9 @@ bool decode(const Outbox& out, const Outbox::Entry& entry, Message& message) {
 
 }  // namespace
 
-Snapshot initial_snapshot(const model::BodyLayout& layout) {
+Snapshot initial_snapshot(const world::BodyLayout& layout) {
   Snapshot s;
-  for (const model::BodyPlacement& body : layout.bodies) s.bodies.push_back(body.X_WB);
+  for (const world::BodyPlacement& body : layout.bodies) s.bodies.push_back(body.X_WB);
   s.body_twists.resize(layout.bodies.size());
   s.body_accelerations.resize(layout.bodies.size(), Vec3::Zero());
   s.wheel_angles.resize(layout.wheels.size());
@@ -101,38 +101,38 @@ Snapshot initial_snapshot(const model::BodyLayout& layout) {
   s.joint_efforts.resize(layout.joints.size());
   s.robots.resize(layout.robots.size());
   for (size_t i = 0; i < layout.robots.size(); ++i) {
-    const model::RobotPlacement& robot = layout.robots[i];
+    const world::RobotPlacement& robot = layout.robots[i];
     s.robots[i].X_WBase = robot.body.valid() ? s.bodies[robot.body] * robot.X_BBase : robot.X_BBase;
   }
   return s;
 }
 
-std::vector<std::string> device_names(const model::WorldModel& world,
-                                      const model::BodyLayout& layout) {
+std::vector<std::string> device_names(const world::WorldModel& world,
+                                      const world::BodyLayout& layout) {
   std::vector<std::string> names;
-  for (const model::RobotPlacement& robot : layout.robots) {
-    const model::ModelInstance& instance = world.models[robot.instance];
-    for (const model::SensorDescription& sensor : instance.model->sensors) {
+  for (const world::RobotPlacement& robot : layout.robots) {
+    const world::ModelInstance& instance = world.models[robot.instance];
+    for (const world::SensorDescription& sensor : instance.model->sensors) {
       if (kind_of(sensor.type)) names.push_back(instance.name + "/" + sensor.name);
     }
   }
   return names;
 }
 
-std::unique_ptr<LoneDevice> make_lone_device(const model::WorldModel& world,
-                                             const model::BodyLayout& layout,
+std::unique_ptr<LoneDevice> make_lone_device(const world::WorldModel& world,
+                                             const world::BodyLayout& layout,
                                              const std::string& name, bool noise) {
   static const Element kNothing;
   for (const RobotIndex robot : layout.robots.indices()) {
     const InstanceIndex instance_index = layout.robots[robot].instance;
-    const model::ModelInstance& instance = world.models[instance_index];
-    for (const model::SensorDescription& sensor : instance.model->sensors) {
+    const world::ModelInstance& instance = world.models[instance_index];
+    for (const world::SensorDescription& sensor : instance.model->sensors) {
       const SensorKind* kind = kind_of(sensor.type);
       if (!kind || instance.name + "/" + sensor.name != name) continue;
       auto device = std::make_unique<LoneDevice>();
       device->kind = kind;
       const LinkIndex link = layout.link_of(instance_index, sensor.link);
-      const model::LinkPlacement& placement = layout.links[link];
+      const world::LinkPlacement& placement = layout.links[link];
       const Pose X_WL = placement.body.valid() ? layout.bodies[placement.body].X_WB * placement.X_BL
                                                : placement.X_BL;
       device->X_WS = X_WL * sensor.X_LS;
@@ -164,8 +164,8 @@ std::unique_ptr<LoneDevice> make_lone_device(const model::WorldModel& world,
   return nullptr;
 }
 
-std::vector<scene::Line> device_rays(const model::WorldModel& world,
-                                     const model::BodyLayout& layout) {
+std::vector<scene::Line> device_rays(const world::WorldModel& world,
+                                     const world::BodyLayout& layout) {
   const Snapshot snapshot = initial_snapshot(layout);
   std::unique_ptr<scene::RayScene> scenes[2];  // collisions, visuals
   const auto scene = [&](bool visuals) {

@@ -22,19 +22,19 @@ struct LoneDevice {
 };
 
 // The state of the world before the first step.
-Snapshot initial_snapshot(const model::BodyLayout& layout);
+Snapshot initial_snapshot(const world::BodyLayout& layout);
 
 // Robots' names and their devices of <sensor> elements that some kind serves: "ROBOT/DEVICE".
-std::vector<std::string> device_names(const model::WorldModel& world,
-                                      const model::BodyLayout& layout);
+std::vector<std::string> device_names(const world::WorldModel& world,
+                                      const world::BodyLayout& layout);
 
 // Makes ROBOT/DEVICE; null when there is none.
-std::unique_ptr<LoneDevice> make_lone_device(const model::WorldModel& world,
-                                             const model::BodyLayout& layout,
+std::unique_ptr<LoneDevice> make_lone_device(const world::WorldModel& world,
+                                             const world::BodyLayout& layout,
                                              const std::string& name, bool noise);
 
 // The rays and cones of all devices, up to what they hit.
-std::vector<scene::Line> device_rays(const model::WorldModel& world,
-                                     const model::BodyLayout& layout);
+std::vector<scene::Line> device_rays(const world::WorldModel& world,
+                                     const world::BodyLayout& layout);
 
 }  // namespace ruedo::report

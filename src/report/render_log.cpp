@@ -118,15 +118,15 @@ class States {
 // A world of the log, and what draws it.
 class Scene {
  public:
-  Scene(const std::shared_ptr<const model::WorldModel>& world, const VideoArguments& arguments,
+  Scene(const std::shared_ptr<const world::WorldModel>& world, const VideoArguments& arguments,
         Size size)
       : world_(without_roof(world, arguments.view)),
         layout_(*world_),
         renderer_(scene::make_renderer(*world_, layout_)),
         snapshot_(initial_snapshot(layout_)) {
     Vec3 sunlight(1, 1, -1);
-    for (const model::Light& light : world_->lights) {
-      if (light.type != model::Light::Type::directional) continue;
+    for (const world::Light& light : world_->lights) {
+      if (light.type != world::Light::Type::directional) continue;
       sunlight = light.pose.rotation * light.direction;
       break;
     }
@@ -158,8 +158,8 @@ class Scene {
 
  private:
   // From outside a roof would hide what is in the rooms.
-  static std::shared_ptr<const model::WorldModel> without_roof(
-      const std::shared_ptr<const model::WorldModel>& world, const std::string& view) {
+  static std::shared_ptr<const world::WorldModel> without_roof(
+      const std::shared_ptr<const world::WorldModel>& world, const std::string& view) {
     const bool from_outside = view == "top" || view == "iso";
     const auto height = from_outside ? scene::height_of_ceiling(*world) : std::nullopt;
     return height ? scene::without_what_is_above(*world, *height) : world;
@@ -186,7 +186,7 @@ class Scene {
   }
 
   Pose base_of(RobotIndex index) const {
-    const model::RobotPlacement& robot = layout_.robots[index];
+    const world::RobotPlacement& robot = layout_.robots[index];
     return robot.body.valid() ? snapshot_.bodies[robot.body] * robot.X_BBase : robot.X_BBase;
   }
 
@@ -197,8 +197,8 @@ class Scene {
     return Pose::from_xyz_rpy(base.translation, {0, 0, yaw});
   }
 
-  std::shared_ptr<const model::WorldModel> world_;
-  model::BodyLayout layout_;
+  std::shared_ptr<const world::WorldModel> world_;
+  world::BodyLayout layout_;
   std::unique_ptr<scene::Renderer> renderer_;
   Snapshot snapshot_;
   scene::View view_;

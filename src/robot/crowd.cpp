@@ -15,7 +15,7 @@ namespace ruedo::robot {
 
 namespace {
 
-using model::Vec2;
+using world::Vec2;
 
 constexpr SimTime kTick_us = 10'000;
 constexpr double kTick_s = 1e-6 * kTick_us;
@@ -42,7 +42,7 @@ constexpr double kSeesThings_m = 4.0, kStands_m_s = 0.2;
 constexpr double kBesideThings_m = 0.2;
 constexpr double kAboveFloor_m = 0.1;  // lower things are stepped over
 
-bool is_person(const model::Model& model) {
+bool is_person(const world::Model& model) {
   return model.path && model.path->name == "ruedo:crowd";
 }
 
@@ -88,21 +88,21 @@ namespace {
 
 // The walls, and the paths to the goals in the file.
 struct Plan {
-  model::FloorPlan walls;
-  std::vector<model::Route> routes;
+  world::FloorPlan walls;
+  std::vector<world::Route> routes;
 
-  Plan(const model::WorldModel& world, const model::CrowdDescription& crowd, double floor)
-      : walls(model::walls_for(world, crowd, floor)) {
-    for (const model::Rect& goal : crowd.goals)
+  Plan(const world::WorldModel& world, const world::CrowdDescription& crowd, double floor)
+      : walls(world::walls_for(world, crowd, floor)) {
+    for (const world::Rect& goal : crowd.goals)
       routes.push_back(walls.route_to(goal, crowd.radius, crowd.radius + kBesideWalls_m));
   }
 };
 
 // Shared by all copies of a world: it depends on the file alone, and takes a few tenths of a
 // second.
-std::shared_ptr<const Plan> plan_for(const model::WorldModel& world,
-                                     const model::ModelInstance& first,
-                                     const model::CrowdDescription& crowd) {
+std::shared_ptr<const Plan> plan_for(const world::WorldModel& world,
+                                     const world::ModelInstance& first,
+                                     const world::CrowdDescription& crowd) {
   using Known = std::map<std::weak_ptr<const Element>, std::weak_ptr<const Plan>,
                          std::owner_less<std::weak_ptr<const Element>>>;
   static std::mutex mutex;
@@ -118,19 +118,19 @@ std::shared_ptr<const Plan> plan_for(const model::WorldModel& world,
 }  // namespace
 
 struct Crowd::Group {
-  model::CrowdDescription description;
+  world::CrowdDescription description;
   double floor = 0.0;
   std::shared_ptr<const Plan> plan;
-  Bound<const model::FloorPlan> walls;
-  std::vector<model::Rect> goals;
-  std::shared_ptr<const std::vector<model::Route>> routes;  // by goal
+  Bound<const world::FloorPlan> walls;
+  std::vector<world::Rect> goals;
+  std::shared_ptr<const std::vector<world::Route>> routes;  // by goal
   RandomSource random;
 
   uint64_t people = 0;
   const Element* element;
 
-  Group(const model::WorldModel& world, const model::ModelInstance& first, uint64_t seed)
-      : description(model::read_crowd(*first.model->path)),
+  Group(const world::WorldModel& world, const world::ModelInstance& first, uint64_t seed)
+      : description(world::read_crowd(*first.model->path)),
         floor(first.X_WM.translation.z()),
         plan(plan_for(world, first, description)),
         walls(plan->walls),
@@ -139,11 +139,11 @@ struct Crowd::Group {
         random(seed, description.name, "people"),
         element(first.model->path.get()) {
     if (!goals.empty()) return;
-    model::CrowdDescription places = description;
+    world::CrowdDescription places = description;
     places.count = kPlaces;
     places.name += "/goals";
-    auto ways = std::make_shared<std::vector<model::Route>>();
-    for (const Vec2& at : model::places_of(places, walls, {}, seed)) {
+    auto ways = std::make_shared<std::vector<world::Route>>();
+    for (const Vec2& at : world::places_of(places, walls, {}, seed)) {
       goals.push_back({at, at});
       ways->push_back(walls->route_to(goals.back(), description.radius, clearance()));
     }
@@ -181,7 +181,7 @@ struct Crowd::Other {
   Vec2 at = Vec2::Zero(), v = Vec2::Zero();
   double c = 1.0, s = 0.0, low = 0.0, high = 0.0;
 
-  bool is_in_way_of(const model::CrowdDescription& crowd, double floor) const {
+  bool is_in_way_of(const world::CrowdDescription& crowd, double floor) const {
     return high > floor + kAboveFloor_m && low < floor + crowd.height &&
            (!is_robot || crowd.avoids_robots);
   }
@@ -193,21 +193,21 @@ struct Crowd::Other {
   }
 };
 
-Crowd::Crowd(const model::WorldModel& world, const model::BodyLayout& layout,
+Crowd::Crowd(const world::WorldModel& world, const world::BodyLayout& layout,
              physics::PhysicsWorld& physics, uint64_t seed)
     : world_(world), physics_(physics), seed_(seed), step_us_(world.step_us) {
   gather(layout);
   if (people_.empty()) return;
-  std::vector<model::Circle> taken;
-  for (const model::ModelInstance& instance : world.models) {
+  std::vector<world::Circle> taken;
+  for (const world::ModelInstance& instance : world.models) {
     if (!instance.model->is_static && !is_person(*instance.model))
       taken.push_back(
-          {instance.X_WM.translation.head<2>(), model::footprint_radius(*instance.model)});
+          {instance.X_WM.translation.head<2>(), world::footprint_radius(*instance.model)});
   }
   size_t first = 0;
   for (const auto& group : groups_) {
     const std::vector<Vec2> places =
-        model::places_of(group->description, group->walls, taken, seed_);
+        world::places_of(group->description, group->walls, taken, seed_);
     for (size_t i = 0; first + i < people_.size() && &*people_[first + i].group == group.get();
          ++i) {
       people_[first + i].start = places[i];
@@ -242,7 +242,7 @@ void Crowd::reseed(uint64_t seed) {
   for (const auto& group : groups_) group->random.reseed(seed);
 }
 
-void Crowd::gather(const model::BodyLayout& layout) {
+void Crowd::gather(const world::BodyLayout& layout) {
   if (std::none_of(world_->models.begin(), world_->models.end(),
                    [](const auto& instance) { return is_person(*instance.model); }))
     return;
@@ -252,21 +252,21 @@ void Crowd::gather(const model::BodyLayout& layout) {
   }
 }
 
-void Crowd::add(InstanceIndex instance, const model::BodyLayout& layout) {
+void Crowd::add(InstanceIndex instance, const world::BodyLayout& layout) {
   if (people_.empty()) return;
   for (const BodyIndex body : layout.bodies.indices()) {
     if (layout.bodies[body].instance == instance) add_other(layout, body);
   }
 }
 
-void Crowd::add_other(const model::BodyLayout& layout, BodyIndex body) {
-  const model::BodyPlacement& placed = layout.bodies[body];
-  const model::ModelInstance& instance = world_->models[placed.instance];
+void Crowd::add_other(const world::BodyLayout& layout, BodyIndex body) {
+  const world::BodyPlacement& placed = layout.bodies[body];
+  const world::ModelInstance& instance = world_->models[placed.instance];
   Other other{placed.instance, body, instance.is_robot(), {}};
   for (const LinkIndex l : placed.links) {
-    const model::LinkPlacement& link = layout.links[l];
-    for (const model::Collision& collision : instance.model->links[link.link].collisions) {
-      const Eigen::AlignedBox3d box = model::bounds(collision.geometry);
+    const world::LinkPlacement& link = layout.links[l];
+    for (const world::Collision& collision : instance.model->links[link.link].collisions) {
+      const Eigen::AlignedBox3d box = world::bounds(collision.geometry);
       if (box.isEmpty()) continue;
       for (int corner = 0; corner < 8; ++corner)
         other.box.extend(
@@ -277,9 +277,9 @@ void Crowd::add_other(const model::BodyLayout& layout, BodyIndex body) {
   if (!other.box.isEmpty()) others_.push_back(other);
 }
 
-void Crowd::add_person(const model::BodyLayout& layout, BodyIndex body) {
+void Crowd::add_person(const world::BodyLayout& layout, BodyIndex body) {
   const InstanceIndex index = layout.bodies[body].instance;
-  const model::ModelInstance& instance = world_->models[index];
+  const world::ModelInstance& instance = world_->models[index];
   const auto known = std::find_if(groups_.begin(), groups_.end(), [&](const auto& group) {
     return group->element == instance.model->path.get();
   });
@@ -294,7 +294,7 @@ void Crowd::add_person(const model::BodyLayout& layout, BodyIndex body) {
 
 void Crowd::begin(Person& person) {
   person.ticks = 0;
-  const model::CrowdDescription& crowd = person.group->description;
+  const world::CrowdDescription& crowd = person.group->description;
   RandomStream stream = person.draw(0);
   constexpr double kSlowest = 0.3;  // relative to the mean
   person.speed =
@@ -459,7 +459,7 @@ Crowd::Vec2 Crowd::of_people(const Person& person, size_t index) const {
 
 // A thing repels like a person at its nearest point, whose centre is one radius behind it.
 Crowd::Vec2 Crowd::of_others(const Person& person, const Vec2& ahead) const {
-  const model::CrowdDescription& crowd = person.group->description;
+  const world::CrowdDescription& crowd = person.group->description;
   Vec2 sum = Vec2::Zero();
   for (size_t i = 0; i < others_.size();) {
     const InstanceIndex instance = others_[i].instance;
@@ -487,7 +487,7 @@ Crowd::Vec2 Crowd::of_others(const Person& person, const Vec2& ahead) const {
 
 Crowd::Vec2 Crowd::of_walls(const Person& person) const {
   const double radius = person.group->description.radius;
-  model::FloorPlan::Near near[2];
+  world::FloorPlan::Near near[2];
   const int count = person.group->walls->nearest(person.p, kSeesWalls_m, near);
   Vec2 sum = Vec2::Zero();
   for (int i = 0; i < count; ++i) {
@@ -503,13 +503,13 @@ Crowd::Vec2 Crowd::of_walls(const Person& person) const {
 // The next goal, once one is reached.
 void Crowd::choose_goal(Person& person) {
   const Group& group = *person.group;
-  const model::CrowdDescription& crowd = group.description;
+  const world::CrowdDescription& crowd = group.description;
   const bool wanders = crowd.goals.empty();
   if (person.arrived) {
-    if (crowd.at_end == model::CrowdDescription::AtEnd::again) come_again(person);
+    if (crowd.at_end == world::CrowdDescription::AtEnd::again) come_again(person);
     return;
   }
-  const model::Rect& goal = group.goals[person.goal];
+  const world::Rect& goal = group.goals[person.goal];
   const bool there =
       goal.low == goal.high ? (goal.low - person.p).norm() < kAtGoal_m : goal.has(person.p);
   if (!there && !(wanders && person.ticks == 0)) return;
@@ -518,11 +518,11 @@ void Crowd::choose_goal(Person& person) {
     person.goal = (person.goal + 1 + other) % kPlaces;
   } else if (person.goal + 1 < group.goals.size()) {
     ++person.goal;
-  } else if (crowd.at_end == model::CrowdDescription::AtEnd::loop && group.goals.size() > 1) {
+  } else if (crowd.at_end == world::CrowdDescription::AtEnd::loop && group.goals.size() > 1) {
     person.goal = 0;
   } else {
     person.arrived = true;
-    if (crowd.at_end == model::CrowdDescription::AtEnd::again) come_again(person);
+    if (crowd.at_end == world::CrowdDescription::AtEnd::again) come_again(person);
     return;
   }
   look_for_way(person);
@@ -538,7 +538,7 @@ void Crowd::look_for_way(Person& person) {
 // A waypoint beside the first obstacle on the path, on the nearer side: with forces alone the
 // person would stop in front of it.
 void Crowd::go_around_what_stands(Person& person) const {
-  const model::CrowdDescription& crowd = person.group->description;
+  const world::CrowdDescription& crowd = person.group->description;
   const Vec2 way = person.next - person.p;
   const double far = way.norm();
   if (far < 1e-6) return;
@@ -560,9 +560,9 @@ void Crowd::go_around_what_stands(Person& person) const {
 // A free place in the area where they started.
 bool Crowd::come_again(Person& person) {
   const Group& group = *person.group;
-  const model::CrowdDescription& crowd = group.description;
+  const world::CrowdDescription& crowd = group.description;
   const auto is_free = [&](const Vec2& at) {
-    model::FloorPlan::Near near[2];
+    world::FloorPlan::Near near[2];
     if (group.walls->nearest(at, crowd.radius, near) > 0) return false;
     for (const Person& other : people_) {
       if (&other != &person && !other.gone &&

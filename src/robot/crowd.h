@@ -27,7 +27,7 @@ namespace ruedo::robot {
 class Crowd {
  public:
   // All people of the world. Their start places depend on the seed.
-  Crowd(const model::WorldModel& world, const model::BodyLayout& layout,
+  Crowd(const world::WorldModel& world, const world::BodyLayout& layout,
         physics::PhysicsWorld& physics, uint64_t seed);
   ~Crowd();
 
@@ -35,7 +35,7 @@ class Crowd {
   void before_step(SimTime now);
 
   // what they react to from now on
-  void add(InstanceIndex instance, const model::BodyLayout& layout);
+  void add(InstanceIndex instance, const world::BodyLayout& layout);
   void remove(InstanceIndex instance);
   void take(const Crowd& other);  // takes the state of another copy of the world
   void exchange(StateArchive& archive);
@@ -44,14 +44,14 @@ class Crowd {
   void shift_time(SimTime us) { thought_ -= us; }  // sim time was set back by that much
 
  private:
-  using Vec2 = model::Vec2;
+  using Vec2 = world::Vec2;
   struct Group;  // a <ruedo:crowd>
   struct Person;
   struct Other;  // a moving body other than a crowd's person
 
-  void gather(const model::BodyLayout& layout);
-  void add_other(const model::BodyLayout& layout, BodyIndex body);
-  void add_person(const model::BodyLayout& layout, BodyIndex body);
+  void gather(const world::BodyLayout& layout);
+  void add_other(const world::BodyLayout& layout, BodyIndex body);
+  void add_person(const world::BodyLayout& layout, BodyIndex body);
   void begin(Person& person);
   void put(Person& person, const Vec2& at);
   void think();
@@ -66,7 +66,7 @@ class Crowd {
   void go_around_what_stands(Person& person) const;
   bool come_again(Person& person);
 
-  Bound<const model::WorldModel> world_;
+  Bound<const world::WorldModel> world_;
   Bound<physics::PhysicsWorld> physics_;
   uint64_t seed_;
   int64_t step_us_;

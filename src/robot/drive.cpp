@@ -8,16 +8,16 @@ namespace ruedo::robot {
 
 namespace {
 
-const model::DriveDescription& description_of(const model::WorldModel& world,
-                                              const model::BodyLayout& layout, RobotIndex robot) {
+const world::DriveDescription& description_of(const world::WorldModel& world,
+                                              const world::BodyLayout& layout, RobotIndex robot) {
   const InstanceIndex instance = layout.robots[robot].instance;
   return *world.models[instance].model->drive;
 }
 
-std::vector<Vec3> rims_of(const model::BodyLayout& layout, RobotIndex robot) {
+std::vector<Vec3> rims_of(const world::BodyLayout& layout, RobotIndex robot) {
   std::vector<Vec3> rims;
   for (const WheelIndex wheel : layout.robots[robot].wheels) {
-    const model::WheelPlacement& placement = layout.wheels[wheel];
+    const world::WheelPlacement& placement = layout.wheels[wheel];
     if (!placement.steers) rims.push_back(placement.rim);
   }
   return rims;
@@ -25,7 +25,7 @@ std::vector<Vec3> rims_of(const model::BodyLayout& layout, RobotIndex robot) {
 
 }  // namespace
 
-Drive::Drive(const model::WorldModel& world, const model::BodyLayout& layout,
+Drive::Drive(const world::WorldModel& world, const world::BodyLayout& layout,
              physics::PhysicsWorld& physics, RobotIndex robot)
     : physics_(physics),
       robot_(robot),

@@ -23,7 +23,7 @@ void read_motion(const MotionLog& log, RobotIndex robot, Snapshot& snapshot);
 
 class Drive {
  public:
-  Drive(const model::WorldModel& world, const model::BodyLayout& layout,
+  Drive(const world::WorldModel& world, const world::BodyLayout& layout,
         physics::PhysicsWorld& physics, RobotIndex robot);
   virtual ~Drive() = default;
   Drive(const Drive&) = delete;
@@ -79,7 +79,7 @@ class Drive {
   double step_s_;
   Pose X_BBase_, X_BaseB_;
   std::vector<WheelIndex> wheels_;
-  Bound<const model::DriveDescription> description_;
+  Bound<const world::DriveDescription> description_;
   MotionPlanner planner_;
   Pose X_WBase_;
   Twist twist_;                       // of base_link in base_link

@@ -9,15 +9,15 @@
 
 namespace ruedo::robot {
 
-std::vector<LevelPlane> level_planes(const model::WorldModel& world,
-                                     const model::BodyLayout& layout) {
+std::vector<LevelPlane> level_planes(const world::WorldModel& world,
+                                     const world::BodyLayout& layout) {
   std::vector<LevelPlane> planes;
   for (const auto& placement : layout.links) {
     const auto& instance = world.models[placement.instance];
     if (placement.body.valid() || instance.removed) continue;
     const auto& model = *instance.model;
     for (const auto& collision : model.links[placement.link].collisions) {
-      if (collision.geometry.shape != model::Shape::plane) continue;
+      if (collision.geometry.shape != world::Shape::plane) continue;
       const Pose X_WC = placement.X_BL * collision.X_LC;
       const Vec3 normal = X_WC.rotation * collision.geometry.normal;
       if (normal.z() > 1.0 - 1e-12)
@@ -36,24 +36,24 @@ std::optional<LevelPlane> nearest_plane(const std::vector<LevelPlane>& planes, d
   return nearest;
 }
 
-double lowest_point(const model::Geometry& geometry, const Pose& X_FC) {
+double lowest_point(const world::Geometry& geometry, const Pose& X_FC) {
   const Vec3 down = X_FC.rotation.conjugate() * -Vec3::UnitZ();  // in C
   const Vec3& size = geometry.size;
   const double across = math::hypot(down.x(), down.y());
   double reach = 0.0;
   switch (geometry.shape) {
-    case model::Shape::box: reach = 0.5 * down.cwiseAbs().dot(size); break;
-    case model::Shape::sphere: reach = size.x(); break;
-    case model::Shape::cylinder:
+    case world::Shape::box: reach = 0.5 * down.cwiseAbs().dot(size); break;
+    case world::Shape::sphere: reach = size.x(); break;
+    case world::Shape::cylinder:
       reach = size.x() * across + 0.5 * size.y() * std::abs(down.z());
       break;
-    case model::Shape::capsule: reach = size.x() + 0.5 * size.y() * std::abs(down.z()); break;
-    case model::Shape::ellipsoid: reach = down.cwiseProduct(size).norm(); break;
-    case model::Shape::cone:
+    case world::Shape::capsule: reach = size.x() + 0.5 * size.y() * std::abs(down.z()); break;
+    case world::Shape::ellipsoid: reach = down.cwiseProduct(size).norm(); break;
+    case world::Shape::cone:
       reach = std::max(0.5 * size.y() * down.z(), size.x() * across - 0.5 * size.y() * down.z());
       break;
-    case model::Shape::plane: break;
-    case model::Shape::mesh:
+    case world::Shape::plane: break;
+    case world::Shape::mesh:
       reach = -std::numeric_limits<double>::infinity();
       if (!geometry.mesh) break;
       for (const auto& position : geometry.mesh->positions) {
@@ -64,7 +64,7 @@ double lowest_point(const model::Geometry& geometry, const Pose& X_FC) {
   return X_FC.translation.z() - reach;
 }
 
-double friction_of_wheels(const model::WorldModel& world, const model::BodyLayout& layout,
+double friction_of_wheels(const world::WorldModel& world, const world::BodyLayout& layout,
                           RobotIndex robot) {
   const auto& placement = layout.robots[robot];
   const auto& model = *world.models[placement.instance].model;
@@ -77,7 +77,7 @@ double friction_of_wheels(const model::WorldModel& world, const model::BodyLayou
   return std::isfinite(least) ? least : 1.0;
 }
 
-double lowest_of_wheels(const model::WorldModel& world, const model::BodyLayout& layout,
+double lowest_of_wheels(const world::WorldModel& world, const world::BodyLayout& layout,
                         RobotIndex robot) {
   const auto& placement = layout.robots[robot];
   const auto& model = *world.models[placement.instance].model;

@@ -5,7 +5,7 @@
 
 namespace ruedo::robot {
 
-Holds::Holds(const model::WorldModel& world, const model::BodyLayout& layout,
+Holds::Holds(const world::WorldModel& world, const world::BodyLayout& layout,
              physics::PhysicsWorld& physics)
     : world_(world), layout_(layout), physics_(physics) {
   for (const InstanceIndex instance : world.models.indices()) start(instance);
@@ -24,8 +24,8 @@ void Holds::set(InstanceIndex instance, const std::string& name, bool attached) 
 }
 
 void Holds::start(InstanceIndex instance) {
-  const model::ModelInstance& placed = world_->models[instance];
-  for (const model::Hold& description : placed.model->holds) {
+  const world::ModelInstance& placed = world_->models[instance];
+  for (const world::Hold& description : placed.model->holds) {
     const auto known = std::find_if(held_.begin(), held_.end(), [&](const Held& each) {
       return each.instance == instance && each.description == &description;
     });
@@ -91,7 +91,7 @@ bool Holds::is_closed(const Held& held) const {
 
 void Holds::close(Held& held) {
   if (world_->models[held.instance].removed) return;
-  const model::Hold& description = *held.description;
+  const world::Hold& description = *held.description;
   const InstanceIndex other =
       description.other_model.empty() ? held.instance : find(description.other_model);
   if (!other.valid()) return;

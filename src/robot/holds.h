@@ -17,7 +17,7 @@ namespace ruedo::robot {
 class Holds {
  public:
   // The arguments must outlive it.
-  Holds(const model::WorldModel& world, const model::BodyLayout& layout,
+  Holds(const world::WorldModel& world, const world::BodyLayout& layout,
         physics::PhysicsWorld& physics);
 
   bool has(InstanceIndex instance, const std::string& name) const;
@@ -38,7 +38,7 @@ class Holds {
  private:
   struct Held {
     InstanceIndex instance;
-    const model::Hold* description;
+    const world::Hold* description;
     bool wanted = true;
     InstanceIndex other = {};    // the one held
     physics::TieIndex tie = {};  // none until first closed
@@ -50,8 +50,8 @@ class Holds {
   void open(Held& held);
   bool is_closed(const Held& held) const;
 
-  Bound<const model::WorldModel> world_;
-  Bound<const model::BodyLayout> layout_;
+  Bound<const world::WorldModel> world_;
+  Bound<const world::BodyLayout> layout_;
   Bound<physics::PhysicsWorld> physics_;
   std::vector<Held> held_;
 };

@@ -46,7 +46,7 @@ const Limits* limits_of(int8_t mode) {
 
 }  // namespace
 
-JointControl::JointControl(const model::WorldModel& world, const model::BodyLayout& layout,
+JointControl::JointControl(const world::WorldModel& world, const world::BodyLayout& layout,
                            physics::PhysicsWorld& physics)
     : world_(world),
       layout_(layout),
@@ -59,7 +59,7 @@ JointControl::JointControl(const model::WorldModel& world, const model::BodyLayo
   for (const JointIndex joint : layout.joints.indices()) begin(joint);
 }
 
-const model::Joint& JointControl::description(JointIndex joint) const {
+const world::Joint& JointControl::description(JointIndex joint) const {
   const auto& placed = layout_->joints[joint];
   return world_->models[placed.instance].model->joints[placed.joint];
 }
@@ -89,7 +89,7 @@ int8_t JointControl::check(RobotIndex robot, const std::string& name, int8_t mod
   const JointIndex joint = find(robot, name);
   // Mimic joints and gearboxes take no commands.
   const bool takes = joint.valid() && !description(joint).leader.valid() &&
-                     description(joint).type != model::JointType::gearbox;
+                     description(joint).type != world::JointType::gearbox;
   return if_so(takes);
 }
 
@@ -148,7 +148,7 @@ void JointControl::tell(JointIndex joint, int8_t mode, double value) {
 void JointControl::hold(JointIndex joint, int8_t mode, double value) {
   using Mode = joint_command_t;
   std::erase_if(targets_, [joint](const Target& each) { return each.joint == joint; });
-  const model::JointAxis& axis = description(joint).axis;
+  const world::JointAxis& axis = description(joint).axis;
   if (mode == Mode::EFFORT) return physics_->apply_joint_effort(joint, value);
   if (mode == Mode::VELOCITY) {
     if (!axis.rate_pid || is_set(joint))
@@ -161,10 +161,10 @@ void JointControl::hold(JointIndex joint, int8_t mode, double value) {
 
 void JointControl::begin(JointIndex joint) {
   using Mode = joint_command_t;
-  const model::Joint& axis_of = description(joint);
-  const model::JointStart& start = axis_of.axis.start;
-  if (start.mode == model::JointStart::Mode::free || axis_of.leader.valid()) return;
-  const bool rate = start.mode == model::JointStart::Mode::velocity;
+  const world::Joint& axis_of = description(joint);
+  const world::JointStart& start = axis_of.axis.start;
+  if (start.mode == world::JointStart::Mode::free || axis_of.leader.valid()) return;
+  const bool rate = start.mode == world::JointStart::Mode::velocity;
   hold(joint, rate ? Mode::VELOCITY : Mode::POSITION, start.value);
 }
 
@@ -198,7 +198,7 @@ void JointControl::forget(InstanceIndex instance) {
   std::erase_if(gains_, of_instance);
 }
 
-void JointControl::serve(Target& target, const model::Pid& pid) const {
+void JointControl::serve(Target& target, const world::Pid& pid) const {
   const double now = target.is_rate ? physics_->joint_velocity(target.joint)
                                     : physics_->joint_position(target.joint);
   const double error = target.value - now;
@@ -218,8 +218,8 @@ void JointControl::before_step() {
   for (const Lifts::Order& order : lifts_.before_step())
     hold(order.joint, joint_command_t::POSITION, order.position);
   for (Target& target : targets_) {
-    const model::JointAxis& axis = description(target.joint).axis;
-    const std::optional<model::Pid>& pid = target.is_rate ? axis.rate_pid : axis.position_pid;
+    const world::JointAxis& axis = description(target.joint).axis;
+    const std::optional<world::Pid>& pid = target.is_rate ? axis.rate_pid : axis.position_pid;
     if (pid && !is_set(target.joint)) {
       serve(target, *pid);
     } else if (target.is_rate) {

@@ -22,7 +22,7 @@ namespace ruedo::robot {
 
 class JointControl {
  public:
-  JointControl(const model::WorldModel& world, const model::BodyLayout& layout,
+  JointControl(const world::WorldModel& world, const world::BodyLayout& layout,
                physics::PhysicsWorld& physics);
 
   // Returns a reason of motion_status_t: 0 if accepted. A refused command changes no joint: unknown
@@ -47,7 +47,7 @@ class JointControl {
     double value;  // 1/s
   };
 
-  const model::Joint& description(JointIndex joint) const;
+  const world::Joint& description(JointIndex joint) const;
   // invalid: no joint has that name
   JointIndex find(RobotIndex robot, const std::string& name) const;
   int8_t check(RobotIndex robot, const std::string& name, int8_t mode, double value) const;
@@ -57,10 +57,10 @@ class JointControl {
   bool is_set(JointIndex joint) const;  // by a message: the gains are those of docs/world-files.md
   void hold(JointIndex joint, int8_t mode, double value);
   void begin(JointIndex joint);
-  void serve(Target& target, const model::Pid& pid) const;
+  void serve(Target& target, const world::Pid& pid) const;
 
-  Bound<const model::WorldModel> world_;
-  Bound<const model::BodyLayout> layout_;
+  Bound<const world::WorldModel> world_;
+  Bound<const world::BodyLayout> layout_;
   Bound<physics::PhysicsWorld> physics_;
   double step_s_;
   double largest_gain_;          // 1/s, of the position controller

@@ -29,7 +29,7 @@ constexpr double kStill_m_s = 2e-3, kStill_rad_s = 1e-2;  // thresholds of rest 
 // A load below this fraction of its weight is a first touch, not a support.
 constexpr double kFirstTouch = 0.05;
 
-bool have_shapes(const model::WorldModel& world, const model::BodyLayout& layout,
+bool have_shapes(const world::WorldModel& world, const world::BodyLayout& layout,
                  const std::vector<WheelIndex>& wheels) {
   return std::any_of(wheels.begin(), wheels.end(), [&](WheelIndex wheel) {
     const auto& link = layout.links[layout.wheels[wheel].link];
@@ -37,13 +37,13 @@ bool have_shapes(const model::WorldModel& world, const model::BodyLayout& layout
   });
 }
 
-bool have_shapes(const model::Model& model) {
+bool have_shapes(const world::Model& model) {
   return std::any_of(model.drive->belts.begin(), model.drive->belts.end(),
                      [&](auto belt) { return !model.links[belt].collisions.empty(); });
 }
 
 // The belts that are carried by joints.
-std::vector<BodyIndex> flippers_of(const model::WorldModel& world, const model::BodyLayout& layout,
+std::vector<BodyIndex> flippers_of(const world::WorldModel& world, const world::BodyLayout& layout,
                                    InstanceIndex instance, BodyIndex base) {
   std::vector<BodyIndex> flippers;
   for (const auto belt : world.models[instance].model->drive->belts) {
@@ -62,7 +62,7 @@ Quat about_z(double angle) {
 
 }  // namespace
 
-KinematicDrive::KinematicDrive(const model::WorldModel& world, const model::BodyLayout& layout,
+KinematicDrive::KinematicDrive(const world::WorldModel& world, const world::BodyLayout& layout,
                                physics::PhysicsWorld& physics, RobotIndex robot,
                                const std::vector<LevelPlane>& planes)
     : Drive(world, layout, physics, robot),

@@ -26,7 +26,7 @@ namespace ruedo::robot {
 class KinematicDrive final : public Drive {
  public:
   // planes: heights of the world's level planes; must outlive the drive.
-  KinematicDrive(const model::WorldModel& world, const model::BodyLayout& layout,
+  KinematicDrive(const world::WorldModel& world, const world::BodyLayout& layout,
                  physics::PhysicsWorld& physics, RobotIndex robot,
                  const std::vector<LevelPlane>& planes);
 
@@ -102,8 +102,8 @@ class KinematicDrive final : public Drive {
   SimTime still_us_ = 0;
   Pose next_;  // base_link after this step, on a plane
   Bound<const std::vector<LevelPlane>> planes_;
-  Bound<const model::WorldModel> world_;
-  Bound<const model::BodyLayout> layout_;
+  Bound<const world::WorldModel> world_;
+  Bound<const world::BodyLayout> layout_;
   double lowest_;  // of the wheels, below base_link
   double wheel_friction_;
   bool wheels_touch_;                // whether they have shapes

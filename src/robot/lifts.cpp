@@ -17,7 +17,7 @@ constexpr int64_t kTryAgain_us = 2'000'000;  // time until a blocked door tries 
 
 }  // namespace
 
-Lifts::Lifts(const model::WorldModel& world, const model::BodyLayout& layout,
+Lifts::Lifts(const world::WorldModel& world, const world::BodyLayout& layout,
              physics::PhysicsWorld& physics)
     : world_(world),
       layout_(layout),
@@ -34,25 +34,25 @@ JointIndex Lifts::joint_of(InstanceIndex instance, ModelJointIndex joint) const 
   return {};  // both ends are static
 }
 
-void Lifts::add_door(InstanceIndex instance, const model::Door& description) {
-  const model::Model& model = *world_->models[instance].model;
+void Lifts::add_door(InstanceIndex instance, const world::Door& description) {
+  const world::Model& model = *world_->models[instance].model;
   Door door{instance, &description, {}, {}};
-  for (const model::Door::Leaf& leaf : description.leaves) {
+  for (const world::Door::Leaf& leaf : description.leaves) {
     if (!leaf.joint.valid()) continue;
     const JointIndex index = joint_of(instance, leaf.joint);
     if (!index.valid()) continue;
-    const model::Joint& joint = model.joints[leaf.joint];
-    const model::LinkPlacement& link = layout_->links[layout_->link_of(instance, joint.child)];
+    const world::Joint& joint = model.joints[leaf.joint];
+    const world::LinkPlacement& link = layout_->links[layout_->link_of(instance, joint.child)];
     if (!link.body.valid()) continue;  // it is static, and what it hangs on moves
     const Pose X_BJ = link.X_BL * model.links[joint.child].X_ML.inverse() * joint.X_MJ;
     door.leaves.push_back({index, link.body, X_BJ.rotation * joint.axis.axis_in_J, X_BJ.translation,
-                           joint.type == model::JointType::prismatic, leaf.closed, leaf.open});
+                           joint.type == world::JointType::prismatic, leaf.closed, leaf.open});
     door.ways.push_back({index, leaf.closed});
   }
   doors_.push_back(std::move(door));
 }
 
-void Lifts::add_lift(InstanceIndex instance, const model::Lift& description) {
+void Lifts::add_lift(InstanceIndex instance, const world::Lift& description) {
   const JointIndex joint = joint_of(instance, description.cabin);
   if (!joint.valid()) return;
   Lift lift;
@@ -69,10 +69,10 @@ void Lifts::add_lift(InstanceIndex instance, const model::Lift& description) {
 
 void Lifts::start(InstanceIndex instance) {
   forget(instance);
-  const model::ModelInstance& placed = world_->models[instance];
+  const world::ModelInstance& placed = world_->models[instance];
   if (placed.removed || placed.model->is_static) return;
-  for (const model::Door& door : placed.model->doors) add_door(instance, door);
-  for (const model::Lift& lift : placed.model->lifts) add_lift(instance, lift);
+  for (const world::Door& door : placed.model->doors) add_door(instance, door);
+  for (const world::Lift& lift : placed.model->lifts) add_lift(instance, lift);
 }
 
 void Lifts::forget(InstanceIndex instance) {
@@ -166,9 +166,9 @@ void Lifts::set_target(Way& way, double target) {
 }
 
 // The highest speed from which it can still brake in the remaining distance.
-void Lifts::move(Way& way, const std::optional<model::Trapezoid>& motion) {
+void Lifts::move(Way& way, const std::optional<world::Trapezoid>& motion) {
   const auto wake = [&] {
-    const model::JointPlacement& joint = layout_->joints[way.joint];
+    const world::JointPlacement& joint = layout_->joints[way.joint];
     for (const BodyIndex body : {joint.parent_body, joint.child_body})
       if (body.valid()) physics_->wake(body);
   };
@@ -208,7 +208,7 @@ void Lifts::move_door(Door& door) {
 void Lifts::next(Lift& lift) {
   using enum Doing;
   bool ready = true;
-  const model::Lift& description = *lift.description;
+  const world::Lift& description = *lift.description;
   switch (lift.doing) {
     case nothing:
       if (!lift.calls.empty()) lift.doing = closing;

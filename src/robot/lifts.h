@@ -18,7 +18,7 @@ namespace ruedo::robot {
 class Lifts {
  public:
   // The arguments must outlive it.
-  Lifts(const model::WorldModel& world, const model::BodyLayout& layout,
+  Lifts(const world::WorldModel& world, const world::BodyLayout& layout,
         physics::PhysicsWorld& physics);
 
   // Whether the instance has a lift of that name with that floor, counted from 0; or a door.
@@ -61,7 +61,7 @@ class Lifts {
   };
   struct Door {
     InstanceIndex instance;
-    const model::Door* description;
+    const world::Door* description;
     std::vector<Leaf> leaves;
     std::vector<Way> ways;  // leaves
     bool wanted_open = false;
@@ -70,7 +70,7 @@ class Lifts {
   enum class Doing { nothing, closing, going, opening, waiting };
   struct Lift {
     InstanceIndex instance;
-    const model::Lift* description = nullptr;
+    const world::Lift* description = nullptr;
     Way way;
     Doing doing = Doing::nothing;
     std::vector<int> calls;  // floors; the first is the current target
@@ -80,8 +80,8 @@ class Lifts {
   };
 
   JointIndex joint_of(InstanceIndex instance, ModelJointIndex joint) const;
-  void add_door(InstanceIndex instance, const model::Door& description);
-  void add_lift(InstanceIndex instance, const model::Lift& description);
+  void add_door(InstanceIndex instance, const world::Door& description);
+  void add_lift(InstanceIndex instance, const world::Lift& description);
   Door* find_door(InstanceIndex instance, const std::string& name);
   template <class Visit>
   void for_each_door(const Lift& lift, Visit visit);
@@ -91,10 +91,10 @@ class Lifts {
   void move_door(Door& door);
   void next(Lift& lift);
   void set_target(Way& way, double target);
-  void move(Way& way, const std::optional<model::Trapezoid>& motion);
+  void move(Way& way, const std::optional<world::Trapezoid>& motion);
 
-  Bound<const model::WorldModel> world_;
-  Bound<const model::BodyLayout> layout_;
+  Bound<const world::WorldModel> world_;
+  Bound<const world::BodyLayout> layout_;
   Bound<physics::PhysicsWorld> physics_;
   int64_t step_us_;
   double step_s_;

@@ -53,7 +53,7 @@ bool all_finite(std::initializer_list<double> values) {
 
 }  // namespace
 
-MotionPlanner::MotionPlanner(const model::DriveDescription& drive, const std::vector<Vec3>& rims)
+MotionPlanner::MotionPlanner(const world::DriveDescription& drive, const std::vector<Vec3>& rims)
     : deadline_(kNever),
       drive_(drive),
       kinematics_(drive.on_odometry ? WheelKinematics::believed(drive)
@@ -70,7 +70,7 @@ MotionPlanner::MotionPlanner(const model::DriveDescription& drive, const std::ve
   if (turning < angle_limits_.speed) angle_limits_.speed = turning;
 }
 
-using Steering = model::DriveDescription::Steering;
+using Steering = world::DriveDescription::Steering;
 
 bool MotionPlanner::is_steered() const {
   return drive_->steering == Steering::ackermann || drive_->steering == Steering::tricycle;

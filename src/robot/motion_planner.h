@@ -29,9 +29,9 @@ struct Lag {
 
 class MotionPlanner {
  public:
-  // rims: of its rolling wheels, in order (model::WheelPlacement::rim); needed if they can roll
+  // rims: of its rolling wheels, in order (world::WheelPlacement::rim); needed if they can roll
   // sideways.
-  explicit MotionPlanner(const model::DriveDescription& drive, const std::vector<Vec3>& rims = {});
+  explicit MotionPlanner(const world::DriveDescription& drive, const std::vector<Vec3>& rims = {});
 
   // Commands, at sim time `now`. Invalid values are refused, and only the log changes.
   void command(const VelocityCommand& command, SimTime now);
@@ -110,7 +110,7 @@ class MotionPlanner {
   double v_ = 0.0, omega_ = 0.0, side_ = 0.0, steering_ = 0.0;
   bool steady_ = true, resting_ = true;
   SimTime deadline_;  // of the watchdog; far in the future if it is off
-  Bound<const model::DriveDescription> drive_;
+  Bound<const world::DriveDescription> drive_;
   WheelKinematics kinematics_;  // converts speeds to wheel rates, as in the drive
   Limits way_limits_, angle_limits_, side_limits_;
   std::vector<Vec3> rims_;  // of mecanum and omni wheels

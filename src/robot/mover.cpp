@@ -15,7 +15,7 @@ namespace {
 constexpr double kJump_m_s = 1000.0;  // faster than anything moves
 }  // namespace
 
-Mover::Mover(const model::WorldModel& world, const model::BodyLayout& layout,
+Mover::Mover(const world::WorldModel& world, const world::BodyLayout& layout,
              physics::PhysicsWorld& physics, InstanceIndex instance)
     : physics_(physics), instance_(instance), step_us_(world.step_us) {
   const auto& placed = world.models[instance];

@@ -13,11 +13,11 @@ namespace ruedo::robot {
 class Mover {
  public:
   // Whether a model has one.
-  static bool moves(const model::Model& model) {
+  static bool moves(const world::Model& model) {
     return model.path && model.path->name == "ruedo:path";
   }
   // Throws InputError for waypoints that are not numbers, or with times that do not increase.
-  Mover(const model::WorldModel& world, const model::BodyLayout& layout,
+  Mover(const world::WorldModel& world, const world::BodyLayout& layout,
         physics::PhysicsWorld& physics, InstanceIndex instance);
 
   // The model's pose in the world at a time: linear between waypoints, with slerp for rotations.

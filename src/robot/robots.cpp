@@ -18,7 +18,7 @@ namespace ruedo::robot {
 
 class Robots::Impl {
  public:
-  Impl(const model::WorldModel& world, const model::BodyLayout& layout,
+  Impl(const world::WorldModel& world, const world::BodyLayout& layout,
        physics::PhysicsWorld& physics, uint64_t seed);
 
   void apply(const Command& command);
@@ -57,8 +57,8 @@ class Robots::Impl {
   void number_robots();
   SimTime now() const { return step_ * world_.step_us; }
 
-  const model::WorldModel& world_;
-  const model::BodyLayout& layout_;
+  const world::WorldModel& world_;
+  const world::BodyLayout& layout_;
   physics::PhysicsWorld& physics_;
   std::vector<LevelPlane> planes_;
   // null: the robot has none, or cannot move
@@ -72,7 +72,7 @@ class Robots::Impl {
   Wind wind_;
 };
 
-Robots::Impl::Impl(const model::WorldModel& world, const model::BodyLayout& layout,
+Robots::Impl::Impl(const world::WorldModel& world, const world::BodyLayout& layout,
                    physics::PhysicsWorld& physics, uint64_t seed)
     : world_(world),
       layout_(layout),
@@ -92,10 +92,10 @@ Robots::Impl::Impl(const model::WorldModel& world, const model::BodyLayout& layo
 }
 
 std::unique_ptr<Drive> Robots::Impl::make_drive(RobotIndex robot) {
-  const model::RobotPlacement& placement = layout_.robots[robot];
+  const world::RobotPlacement& placement = layout_.robots[robot];
   const auto& drive = world_.models[placement.instance].model->drive;
   if (!drive || !placement.body.valid()) return nullptr;
-  if (drive->kind == model::DriveDescription::Kind::wheels)
+  if (drive->kind == world::DriveDescription::Kind::wheels)
     return std::make_unique<WheelsDrive>(world_, layout_, physics_, robot);
   return std::make_unique<KinematicDrive>(world_, layout_, physics_, robot, planes_);
 }
@@ -201,7 +201,7 @@ void Robots::Impl::number_robots() {
   IndexedVector<InstanceIndex, RobotIndex> of_instance(world_.models.size());
   for (const RobotIndex i : layout_.robots.indices()) of_instance[layout_.robots[i].instance] = i;
   robot_of_link_.clear();
-  for (const model::LinkPlacement& link : layout_.links)
+  for (const world::LinkPlacement& link : layout_.links)
     robot_of_link_.push_back(of_instance[link.instance]);
 }
 
@@ -365,7 +365,7 @@ SimTime Robots::Impl::set_time_to_zero() {
   return was;
 }
 
-Robots::Robots(const model::WorldModel& world, const model::BodyLayout& layout,
+Robots::Robots(const world::WorldModel& world, const world::BodyLayout& layout,
                physics::PhysicsWorld& physics, uint64_t seed)
     : impl_(std::make_unique<Impl>(world, layout, physics, seed)) {}
 Robots::~Robots() = default;

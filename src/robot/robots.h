@@ -48,7 +48,7 @@ void check_path(const Element& path);
 class Robots {
  public:
   // The arguments must outlive it. seed: for the people of crowds.
-  Robots(const model::WorldModel& world, const model::BodyLayout& layout,
+  Robots(const world::WorldModel& world, const world::BodyLayout& layout,
          physics::PhysicsWorld& physics, uint64_t seed = 1);
   ~Robots();
 

@@ -31,7 +31,7 @@ Vec3 velocity_of(const Element& belt) {
   return belt.vector3("ruedo:velocity", Vec3::Zero(), Allowed::between(-100, 100));
 }
 
-bool is(const model::Model& model, const char* name) {
+bool is(const world::Model& model, const char* name) {
   return model.path && model.path->name == name;
 }
 
@@ -40,7 +40,7 @@ bool is(const model::Model& model, const char* name) {
 void check_belt(const Element& belt) { velocity_of(belt); }
 void check_door(const Element& door) { DoorDescription{door}; }
 
-Surroundings::Surroundings(const model::WorldModel& world, const model::BodyLayout& layout,
+Surroundings::Surroundings(const world::WorldModel& world, const world::BodyLayout& layout,
                            physics::PhysicsWorld& physics)
     : world_(world),
       layout_(layout),
@@ -50,7 +50,7 @@ Surroundings::Surroundings(const model::WorldModel& world, const model::BodyLayo
 }
 
 void Surroundings::add(InstanceIndex instance) {
-  const model::ModelInstance& placed = world_->models[instance];
+  const world::ModelInstance& placed = world_->models[instance];
   if (is(*placed.model, "ruedo:belt"))
     belts_.push_back({instance, parts_of(instance), placed.X_WM,
                       placed.X_WM.rotation * velocity_of(*placed.model->path)});
@@ -98,7 +98,7 @@ Pose Surroundings::Door::pose() const {
 // The centre of a robot or person, seen from above.
 bool Surroundings::is_near(const Door& door) const {
   for (const BodyIndex b : layout_->bodies.indices()) {
-    const model::ModelInstance& instance = world_->models[layout_->bodies[b].instance];
+    const world::ModelInstance& instance = world_->models[layout_->bodies[b].instance];
     const bool walks = is(*instance.model, "ruedo:path") || is(*instance.model, "ruedo:crowd");
     if (instance.removed || !(walks || instance.is_robot())) continue;
     const Vec3 way = physics_->pose(b).translation - door.X_WM.translation;

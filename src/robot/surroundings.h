@@ -17,7 +17,7 @@ void check_door(const Element& door);
 
 class Surroundings {
  public:
-  Surroundings(const model::WorldModel& world, const model::BodyLayout& layout,
+  Surroundings(const world::WorldModel& world, const world::BodyLayout& layout,
                physics::PhysicsWorld& physics);
 
   void before_step(SimTime now);
@@ -57,8 +57,8 @@ class Surroundings {
   bool is_near(const Door& door) const;
   void guide(const std::vector<Part>& parts, const Pose& X_WM);
 
-  Bound<const model::WorldModel> world_;
-  Bound<const model::BodyLayout> layout_;
+  Bound<const world::WorldModel> world_;
+  Bound<const world::BodyLayout> layout_;
   Bound<physics::PhysicsWorld> physics_;
   double step_s_;
   std::vector<Belt> belts_;

@@ -8,14 +8,14 @@
 
 namespace ruedo::robot {
 
-WheelAngles::WheelAngles(const model::BodyLayout& layout, RobotIndex robot,
-                         const model::DriveDescription& drive)
+WheelAngles::WheelAngles(const world::BodyLayout& layout, RobotIndex robot,
+                         const world::DriveDescription& drive)
     : radius_(drive.wheel_radius) {
-  const model::RobotPlacement& placement = layout.robots[robot];
+  const world::RobotPlacement& placement = layout.robots[robot];
   const Pose X_BaseB = placement.X_BBase.inverse();
   for (const WheelIndex index : placement.wheels) {
-    const model::WheelPlacement& wheel = layout.wheels[index];
-    const model::WheelPlacement& place = wheel.on.valid() ? layout.wheels[wheel.on] : wheel;
+    const world::WheelPlacement& wheel = layout.wheels[index];
+    const world::WheelPlacement& place = wheel.on.valid() ? layout.wheels[wheel.on] : wheel;
     const Vec3 p_Base = X_BaseB * (layout.links[place.link].X_BL * place.center_in_L);
     wheels_.push_back({index, wheel.steers, wheel.on.valid(), wheel.rim, p_Base.x(), p_Base.y()});
   }

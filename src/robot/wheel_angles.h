@@ -13,8 +13,8 @@ namespace ruedo::robot {
 
 class WheelAngles {
  public:
-  WheelAngles(const model::BodyLayout& layout, RobotIndex robot,
-              const model::DriveDescription& drive);
+  WheelAngles(const world::BodyLayout& layout, RobotIndex robot,
+              const world::DriveDescription& drive);
 
   void advance(const Displacement& way);
   void exchange(StateArchive& archive) {

@@ -17,10 +17,10 @@ class WheelKinematics {
  public:
   // With the robot's true geometry, or with what it believes: including the errors of
   // <ruedo:odometry>.
-  static WheelKinematics real(const model::DriveDescription& drive) {
+  static WheelKinematics real(const world::DriveDescription& drive) {
     return {drive.wheel_radius, drive.wheel_radius, drive.track};
   }
-  static WheelKinematics believed(const model::DriveDescription& drive) {
+  static WheelKinematics believed(const world::DriveDescription& drive) {
     return {drive.wheel_radius * (1.0 + drive.radius_error[0]),
             drive.wheel_radius * (1.0 + drive.radius_error[1]),
             drive.track * (1.0 + drive.track_error)};

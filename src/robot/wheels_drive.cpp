@@ -26,7 +26,7 @@ constexpr double kStill_m_s = 5e-3, kStill_rad_s = 2e-2;
 
 }  // namespace
 
-WheelsDrive::WheelsDrive(const model::WorldModel& world, const model::BodyLayout& layout,
+WheelsDrive::WheelsDrive(const world::WorldModel& world, const world::BodyLayout& layout,
                          physics::PhysicsWorld& physics, RobotIndex robot)
     : Drive(world, layout, physics, robot),
       servos_(wheels_.size()),
@@ -46,14 +46,14 @@ WheelsDrive::WheelsDrive(const model::WorldModel& world, const model::BodyLayout
   begin_at_rest();
 }
 
-void WheelsDrive::place_wheels(const model::BodyLayout& layout) {
-  if (model::BaseOdometry::is_for(description_))
+void WheelsDrive::place_wheels(const world::BodyLayout& layout) {
+  if (world::BaseOdometry::is_for(description_))
     base_.emplace(layout, robot_, description_, description_->track_error, 0.0);
   const Pose X_BaseW = (layout.bodies[body_].X_WB * X_BBase_).inverse();
   for (const WheelIndex index : wheels_) {
-    const model::WheelPlacement& wheel = layout.wheels[index];
-    const model::WheelPlacement& place = wheel.on.valid() ? layout.wheels[wheel.on] : wheel;
-    const model::LinkPlacement& link = layout.links[place.link];
+    const world::WheelPlacement& wheel = layout.wheels[index];
+    const world::WheelPlacement& place = wheel.on.valid() ? layout.wheels[wheel.on] : wheel;
+    const world::LinkPlacement& link = layout.links[place.link];
     const Vec3 p_Base = X_BaseW * (layout.bodies[link.body].X_WB * (link.X_BL * place.center_in_L));
     places_.push_back(
         {wheel.left, wheel.steers, wheel.on.valid(), wheel.rim, p_Base.x(), p_Base.y()});

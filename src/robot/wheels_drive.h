@@ -22,7 +22,7 @@ namespace ruedo::robot {
 
 class WheelsDrive final : public Drive {
  public:
-  WheelsDrive(const model::WorldModel& world, const model::BodyLayout& layout,
+  WheelsDrive(const world::WorldModel& world, const world::BodyLayout& layout,
               physics::PhysicsWorld& physics, RobotIndex robot);
 
   void before_step(SimTime now) override;
@@ -42,7 +42,7 @@ class WheelsDrive final : public Drive {
   double rate_of(size_t wheel, const Vec3& twist, double curvature) const;
   double steering_of(size_t wheel, double curvature) const;
   Vec3 believed_way();
-  void place_wheels(const model::BodyLayout& layout);
+  void place_wheels(const world::BodyLayout& layout);
   void set_gains(double mass);
   void drive_wheel(size_t wheel, double rate);
   Lag lag() const;
@@ -64,7 +64,7 @@ class WheelsDrive final : public Drive {
   std::vector<BodyIndex> bodies_;  // its own: chassis and wheels
   double max_torque_;              // N m, each wheel
   WheelKinematics believed_;
-  std::optional<model::BaseOdometry> base_;         // for drives other than differential ones
+  std::optional<world::BaseOdometry> base_;         // for drives other than differential ones
   std::vector<double> last_angles_;                 // of the encoders, as in wheels_
   Vec3 believed_rate_ = Vec3::Zero();               // of the base, by the encoders
   Displacement way_;                                // planned for this step

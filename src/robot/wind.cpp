@@ -12,13 +12,13 @@ double risen(double t_s, double rise_s) {
 
 double wave(double t_s, double period_s) { return math::sin(2 * M_PI * t_s / period_s); }
 
-double drawn(const model::Wind::Noise& noise, RandomStream& stream) {
+double drawn(const world::Wind::Noise& noise, RandomStream& stream) {
   return noise.mean + noise.stddev * stream.gaussian();
 }
 
 }  // namespace
 
-Wind::Wind(const model::Wind& description, uint64_t seed)
+Wind::Wind(const world::Wind& description, uint64_t seed)
     : wind_(description),
       speed_(description.velocity.head<2>().norm()),
       direction_(math::atan2(description.velocity.y(), description.velocity.x())),

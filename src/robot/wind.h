@@ -17,14 +17,14 @@ namespace ruedo::robot {
 
 class Wind {
  public:
-  Wind(const model::Wind& description, uint64_t seed);
+  Wind(const world::Wind& description, uint64_t seed);
 
   // m/s, world, at the end of that step; 0 is the start of the run.
   Vec3 at(int64_t step, SimTime step_us) const;
   void reseed(uint64_t seed) { random_.reseed(seed); }
 
  private:
-  model::Wind wind_;
+  world::Wind wind_;
   double speed_, direction_;
   RandomSource random_;
 };

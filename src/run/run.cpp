@@ -30,7 +30,7 @@ std::unique_ptr<Mode> make_mode(const RunOptions& options, int64_t step_us,
 
 }  // namespace
 
-Run::Run(std::shared_ptr<const model::WorldModel> world, RunOptions options, Bus& bus)
+Run::Run(std::shared_ptr<const world::WorldModel> world, RunOptions options, Bus& bus)
     : first_world_(std::move(world)),
       world_(first_world_),
       options_(std::move(options)),
@@ -279,7 +279,7 @@ std::string Run::takes_no_messages() const {
 }
 
 void Run::tell_watchdog(size_t index) {
-  const model::ModelInstance& robot = world_->models[simulation_->layout().robots[index].instance];
+  const world::ModelInstance& robot = world_->models[simulation_->layout().robots[index].instance];
   spdlog::warn(
       "{} was stopped by its watchdog: no command came for {:g} s of sim time. A velocity or wheel "
       "command "

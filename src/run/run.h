@@ -3,7 +3,7 @@
 // run() is the publisher: it takes finished batches in order, hands their messages to the sinks,
 // executes requests between batches, and ends when the run does. Everything goes out from its
 // thread, in one order. The mode (mode.h) decides when it goes on, the sinks (sink.h) take the
-// messages, and the table in requests.cpp says what each request does.
+// messages, and the table in requests/requests.cpp says what each request does.
 #pragma once
 
 #include <atomic>
@@ -79,7 +79,7 @@ struct Status {
 class Run {
  public:
   // The bus must outlive it. Throws InputError and EnvironmentError.
-  Run(std::shared_ptr<const model::WorldModel> world, RunOptions options, Bus& bus);
+  Run(std::shared_ptr<const world::WorldModel> world, RunOptions options, Bus& bus);
   ~Run();
 
   // Runs until the duration is over, stop(), or QUIT. Throws EnvironmentError when the log cannot
@@ -110,7 +110,7 @@ class Run {
   const log_header_t& log_header() const { return header_; }
   const Findings& findings() const { return findings_; }
   // The world as it is now: another object when models have come or gone. Any thread.
-  std::shared_ptr<const model::WorldModel> world() {
+  std::shared_ptr<const world::WorldModel> world() {
     const std::lock_guard lock(simulation_mutex_);
     return world_;
   }
@@ -170,8 +170,8 @@ class Run {
   void end_repeat(bool paused);
   void break_repeat_off();  // the world stays where it is, paused
 
-  // Requests; in requests.cpp, and those of snapshots in snapshot_requests.cpp. Those of clients go
-  // through ask(), those of a log are executed.
+  // Requests; in requests/requests.cpp, and those of snapshots in snapshot_requests.cpp. Those of
+  // clients go through ask(), those of a log are executed.
   Outcome ask(const request_t& request, const Session& session);
   Outcome execute(const request_t& request, const Session& session);
   bool serves(const RequestKind& kind) const;
@@ -197,14 +197,14 @@ class Run {
   bool stands_here();  // at the state that was published last
   Outcome restore_kept(const SavedState& saved, const std::string& path);
 
-  // The state in a snapshot's file; in written_states.cpp.
+  // The state in a snapshot's file; in repeat/written_states.cpp.
   std::unique_ptr<engine::World> copy_of_world(uint64_t seed);
   std::vector<uint8_t>
   written_state();  // while the world stands still; empty: it cannot be written
   std::optional<SavedState> read_state(const std::string& path);  // none: run there again
   void begin_with_state();  // --restore, where the file has one
 
-  // Requests that change the world between two steps; in edit_requests.cpp.
+  // Requests that change the world between two steps; in requests/edit_requests.cpp.
   bool stand_still();  // false: the run is over
   void let_go();
   enum class Changes { states, models };  // models: some come or go
@@ -220,7 +220,7 @@ class Run {
       const spawn_request_t& body);  // makes the model ready; of a log, puts it in at once
   void spawn_ready();                // puts in what is ready
   Outcome put_in(const request_t& request, const spawn_request_t& body,
-                 const model::LoadedModel& loaded);
+                 const world::LoadedModel& loaded);
   Outcome remove(const request_t& request, const name_request_t& body);
   Outcome set_pose(const request_t& request, const set_pose_request_t& body);
   Outcome set_twist(const request_t& request, const set_twist_request_t& body);
@@ -235,8 +235,8 @@ class Run {
   };
 
   // The world that runs, and what clients know of it.
-  const std::shared_ptr<const model::WorldModel> first_world_;  // as it was loaded
-  std::shared_ptr<const model::WorldModel> world_;
+  const std::shared_ptr<const world::WorldModel> first_world_;  // as it was loaded
+  std::shared_ptr<const world::WorldModel> world_;
   RunOptions options_;
   Bus& bus_;
   const int64_t run_id_;

@@ -16,9 +16,9 @@ constexpr double kShown_m = 2.0;  // how much of the walls stays visible above t
 
 using Box = Eigen::AlignedBox3d;
 
-Box placed(const model::Geometry& geometry, const Pose& X_WG) {
+Box placed(const world::Geometry& geometry, const Pose& X_WG) {
   Box result;
-  const Box box = model::bounds(geometry);
+  const Box box = world::bounds(geometry);
   if (box.isEmpty()) return result;
   for (int corner = 0; corner < 8; ++corner)
     result.extend(X_WG * box.corner(static_cast<Box::CornerType>(corner)));
@@ -26,19 +26,19 @@ Box placed(const model::Geometry& geometry, const Pose& X_WG) {
 }
 
 template <class Visit>
-void for_each_visual(const model::WorldModel& world, Visit visit) {
-  for (const model::ModelInstance& instance : world.models) {
+void for_each_visual(const world::WorldModel& world, Visit visit) {
+  for (const world::ModelInstance& instance : world.models) {
     if (instance.removed) continue;
-    for (const model::Link& link : instance.model->links) {
-      for (const model::Visual& visual : link.visuals) {
-        if (visual.geometry.shape != model::Shape::plane)
+    for (const world::Link& link : instance.model->links) {
+      for (const world::Visual& visual : link.visuals) {
+        if (visual.geometry.shape != world::Shape::plane)
           visit(visual, instance.X_WM * link.X_ML * visual.X_LV);
       }
     }
   }
 }
 
-Vec3 corner_of(const model::Geometry& g, const Pose& X_WG, uint32_t index) {
+Vec3 corner_of(const world::Geometry& g, const Pose& X_WG, uint32_t index) {
   return X_WG * g.scale.cwiseProduct(g.mesh->positions[index].cast<double>());
 }
 
@@ -47,12 +47,12 @@ struct Area {
   double above = 0.0, below = 0.0;
 };
 
-Area area_of(const model::Visual& visual, const Pose& X_WV, double height) {
+Area area_of(const world::Visual& visual, const Pose& X_WV, double height) {
   Area area;
   const Box box = placed(visual.geometry, X_WV);
   if (box.isEmpty()) return area;
-  const model::Geometry& g = visual.geometry;
-  if (g.shape != model::Shape::mesh) {
+  const world::Geometry& g = visual.geometry;
+  if (g.shape != world::Shape::mesh) {
     (box.min().z() > height ? area.above : area.below) = box.sizes().x() * box.sizes().y();
     return area;
   }
@@ -66,11 +66,11 @@ Area area_of(const model::Visual& visual, const Pose& X_WV, double height) {
   return area;
 }
 
-std::shared_ptr<const model::Mesh> cut(const model::Geometry& g, const Pose& X_WG, double height) {
-  auto mesh = std::make_shared<model::Mesh>(*g.mesh);
+std::shared_ptr<const world::Mesh> cut(const world::Geometry& g, const Pose& X_WG, double height) {
+  auto mesh = std::make_shared<world::Mesh>(*g.mesh);
   mesh->triangles.clear();
   mesh->closed = false;
-  for (model::Mesh::Part& part : mesh->parts) {
+  for (world::Mesh::Part& part : mesh->parts) {
     const uint32_t first = part.first_triangle, count = part.triangle_count;
     part.first_triangle = static_cast<uint32_t>(mesh->triangles.size());
     for (uint32_t i = first; i < first + count; ++i) {
@@ -85,13 +85,13 @@ std::shared_ptr<const model::Mesh> cut(const model::Geometry& g, const Pose& X_W
   return mesh;
 }
 
-void cut(model::Link& link, const Pose& X_WL, double height) {
-  std::vector<model::Visual> kept;
-  for (model::Visual& visual : link.visuals) {
+void cut(world::Link& link, const Pose& X_WL, double height) {
+  std::vector<world::Visual> kept;
+  for (world::Visual& visual : link.visuals) {
     const Pose X_WV = X_WL * visual.X_LV;
     const Box box = placed(visual.geometry, X_WV);
     if (!box.isEmpty() && box.min().z() > height) continue;
-    if (!box.isEmpty() && box.max().z() > height && visual.geometry.shape == model::Shape::mesh)
+    if (!box.isEmpty() && box.max().z() > height && visual.geometry.shape == world::Shape::mesh)
       visual.geometry.mesh = cut(visual.geometry, X_WV, height);
     kept.push_back(std::move(visual));
   }
@@ -102,12 +102,12 @@ void cut(model::Link& link, const Pose& X_WL, double height) {
 
 namespace {
 
-bool has_ground_plane(const model::WorldModel& world) {
+bool has_ground_plane(const world::WorldModel& world) {
   return std::any_of(world.models.begin(), world.models.end(), [](const auto& instance) {
-    const std::vector<model::Link>& links = instance.model->links;
-    return std::any_of(links.begin(), links.end(), [](const model::Link& link) {
-      return std::any_of(link.visuals.begin(), link.visuals.end(), [](const model::Visual& visual) {
-        return visual.geometry.shape == model::Shape::plane;
+    const std::vector<world::Link>& links = instance.model->links;
+    return std::any_of(links.begin(), links.end(), [](const world::Link& link) {
+      return std::any_of(link.visuals.begin(), link.visuals.end(), [](const world::Visual& visual) {
+        return visual.geometry.shape == world::Shape::plane;
       });
     });
   });
@@ -115,15 +115,15 @@ bool has_ground_plane(const model::WorldModel& world) {
 
 }  // namespace
 
-std::optional<double> height_of_ceiling(const model::WorldModel& world) {
+std::optional<double> height_of_ceiling(const world::WorldModel& world) {
   Box bounds;
-  for_each_visual(world, [&](const model::Visual& visual, const Pose& X_WV) {
+  for_each_visual(world, [&](const world::Visual& visual, const Pose& X_WV) {
     bounds.extend(placed(visual.geometry, X_WV));
   });
   if (bounds.isEmpty()) return std::nullopt;
   const double floor = bounds.min().z(), whole = bounds.sizes().x() * bounds.sizes().y();
   Area area;
-  for_each_visual(world, [&](const model::Visual& visual, const Pose& X_WV) {
+  for_each_visual(world, [&](const world::Visual& visual, const Pose& X_WV) {
     const Area own = area_of(visual, X_WV, floor + kPerson_m);
     area.above += own.above;
     area.below += own.below;
@@ -134,12 +134,12 @@ std::optional<double> height_of_ceiling(const model::WorldModel& world) {
   return floor + kShown_m;
 }
 
-std::shared_ptr<const model::WorldModel> without_what_is_above(const model::WorldModel& world,
+std::shared_ptr<const world::WorldModel> without_what_is_above(const world::WorldModel& world,
                                                                double height_m) {
-  auto open = std::make_shared<model::WorldModel>(world);
-  for (model::ModelInstance& instance : open->models) {
-    auto own = std::make_shared<model::Model>(*instance.model);
-    for (model::Link& link : own->links) cut(link, instance.X_WM * link.X_ML, height_m);
+  auto open = std::make_shared<world::WorldModel>(world);
+  for (world::ModelInstance& instance : open->models) {
+    auto own = std::make_shared<world::Model>(*instance.model);
+    for (world::Link& link : own->links) cut(link, instance.X_WM * link.X_ML, height_m);
     instance.model = std::move(own);
   }
   return open;

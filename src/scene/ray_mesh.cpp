@@ -21,7 +21,7 @@ struct RayMesh::Query : EmbreeContext {
   }
 };
 
-RayMesh::RayMesh(const model::Mesh& mesh, const Vec3& scale, const Pose& X_FMesh)
+RayMesh::RayMesh(const world::Mesh& mesh, const Vec3& scale, const Pose& X_FMesh)
     : triangles_(mesh.triangles), closed_(mesh.closed) {
   const Eigen::Matrix3d rotation = X_FMesh.rotation.toRotationMatrix();
   positions_.reserve(mesh.positions.size());

@@ -43,7 +43,7 @@ struct FrameRays {
 class RayMesh {
  public:
   // The mesh, scaled, in frame F.
-  RayMesh(const model::Mesh& mesh, const Vec3& scale, const Pose& X_FMesh);
+  RayMesh(const world::Mesh& mesh, const Vec3& scale, const Pose& X_FMesh);
 
   // Builds a tree, for intersect() and inside(); without it they loop over the triangles.
   void build_tree(RTCDevice device);

@@ -10,7 +10,7 @@ class ReferenceRayScene : public RayScene {
  public:
   explicit ReferenceRayScene(std::shared_ptr<const StaticRayScene> statics)
       : statics_(std::move(statics)) {
-    for (const model::BodyPlacement& body : statics_->layout.bodies)
+    for (const world::BodyPlacement& body : statics_->layout.bodies)
       bodies_.emplace_back(body.X_WB);
     for (const TurningShape& shape : statics_->table.turning) turning_.push_back(shape.at(0.0));
   }

@@ -66,7 +66,7 @@ EmbreeRayScene::EmbreeRayScene(std::shared_ptr<const StaticRayScene> statics)
   for (const TurningShape& shape : table.turning) turning_.push_back(shape.at(0.0));
   tree_.build(std::move(boxes));
   Snapshot start;
-  for (const model::BodyPlacement& body : statics_->layout.bodies)
+  for (const world::BodyPlacement& body : statics_->layout.bodies)
     start.bodies.push_back(body.X_WB);
   start.wheel_angles.resize(statics_->layout.wheels.size());
   update(start);
@@ -108,7 +108,7 @@ void EmbreeRayScene::test_near(int index, unsigned lanes, const FrameRays& body,
                                RayBatch& batch) const {
   const RayShape& shape = statics_->table.shapes[index];
   unsigned near = lanes;
-  if (shape.kind != model::Shape::plane) {
+  if (shape.kind != world::Shape::plane) {
     near = 0;
     for (unsigned rest = lanes; rest != 0; rest &= rest - 1) {
       const int lane = std::countr_zero(rest);
@@ -196,7 +196,7 @@ void EmbreeRayScene::write(const RayBatch& batch, int lane, Hit& hit) const {
     hit.normal = -d;
     return;
   }
-  if (shape.kind == model::Shape::mesh && !shape.body.valid()) {  // in the world's frame
+  if (shape.kind == world::Shape::mesh && !shape.body.valid()) {  // in the world's frame
     const Vec3 normal = shape.mesh->normal(batch.feature[lane]);
     hit.normal = normal.dot(d) <= 0.0 ? normal : Vec3(-normal);
     return;

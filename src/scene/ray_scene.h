@@ -36,8 +36,8 @@ enum class Backend { embree, reference };
 class StaticRayScene;
 
 // world and layout must outlive the scene. visuals: rays hit visuals instead of collisions.
-std::shared_ptr<const StaticRayScene> make_static_ray_scene(const model::WorldModel& world,
-                                                            const model::BodyLayout& layout,
+std::shared_ptr<const StaticRayScene> make_static_ray_scene(const world::WorldModel& world,
+                                                            const world::BodyLayout& layout,
                                                             bool visuals = false,
                                                             Backend backend = Backend::embree);
 

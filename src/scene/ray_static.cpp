@@ -2,9 +2,9 @@
 
 namespace ruedo::scene {
 
-using model::Shape;
+using world::Shape;
 
-StaticRayScene::StaticRayScene(const model::WorldModel& world, const model::BodyLayout& body_layout,
+StaticRayScene::StaticRayScene(const world::WorldModel& world, const world::BodyLayout& body_layout,
                                bool visuals, Backend kind)
     : layout(body_layout),
       backend(kind),
@@ -82,8 +82,8 @@ void StaticRayScene::test_primitive(const RTCIntersectFunctionNArguments* argume
           [&](unsigned lane) { return query.batch.t[lane] - query.packet.start[lane]; });
 }
 
-std::shared_ptr<const StaticRayScene> make_static_ray_scene(const model::WorldModel& world,
-                                                            const model::BodyLayout& layout,
+std::shared_ptr<const StaticRayScene> make_static_ray_scene(const world::WorldModel& world,
+                                                            const world::BodyLayout& layout,
                                                             bool visuals, Backend backend) {
   return std::make_shared<const StaticRayScene>(world, layout, visuals, backend);
 }

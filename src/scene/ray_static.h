@@ -59,10 +59,10 @@ class RayTree {
 
 class StaticRayScene {
  public:
-  StaticRayScene(const model::WorldModel& world, const model::BodyLayout& layout, bool visuals,
+  StaticRayScene(const world::WorldModel& world, const world::BodyLayout& layout, bool visuals,
                  Backend backend);
 
-  const model::BodyLayout layout;  // a copy: the worlds that share it come and go
+  const world::BodyLayout layout;  // a copy: the worlds that share it come and go
   const Backend backend;
 
  private:

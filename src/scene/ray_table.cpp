@@ -4,7 +4,7 @@
 
 namespace ruedo::scene {
 
-using model::Shape;
+using world::Shape;
 
 namespace {
 
@@ -45,7 +45,7 @@ bool round_about(const RayShape& shape, const Pose& X_LS, const Vec3& center_in_
 }
 
 // As RayShape::size defines it; 0 for a plane or mesh.
-Vec3 size_of(const model::Geometry& geometry) {
+Vec3 size_of(const world::Geometry& geometry) {
   const Vec3& s = geometry.size;
   switch (geometry.shape) {
     case Shape::box: return 0.5 * s;
@@ -76,14 +76,14 @@ void enclose(RayShape& shape, const Pose& X_FS) {
 
 }  // namespace
 
-RayTable::RayTable(const model::WorldModel& world, const model::BodyLayout& layout, bool visuals,
+RayTable::RayTable(const world::WorldModel& world, const world::BodyLayout& layout, bool visuals,
                    RTCDevice device)
     : bodies(layout.bodies.size()) {
   for (size_t i = 0; i < layout.links.size(); ++i) {
-    const model::LinkPlacement& placement = layout.links[i];
-    const model::ModelInstance& instance = world.models[placement.instance];
+    const world::LinkPlacement& placement = layout.links[i];
+    const world::ModelInstance& instance = world.models[placement.instance];
     if (instance.removed) continue;
-    const model::Link& link = instance.model->links[placement.link];
+    const world::Link& link = instance.model->links[placement.link];
     const LinkIndex link_index(i);
     if (visuals) {
       for (size_t v = 0; v < link.visuals.size(); ++v)
@@ -98,7 +98,7 @@ RayTable::RayTable(const model::WorldModel& world, const model::BodyLayout& layo
   }
 }
 
-std::shared_ptr<const RayMesh> RayTable::mesh_of(const model::Geometry& geometry, const Pose* X_FS,
+std::shared_ptr<const RayMesh> RayTable::mesh_of(const world::Geometry& geometry, const Pose* X_FS,
                                                  RTCDevice device) {
   if (X_FS) return std::make_shared<RayMesh>(*geometry.mesh, geometry.scale, *X_FS);
   const Vec3& scale = geometry.scale;
@@ -111,11 +111,11 @@ std::shared_ptr<const RayMesh> RayTable::mesh_of(const model::Geometry& geometry
   return shared;
 }
 
-void RayTable::add_turning(RayShape& shape, const Pose& X_LS, const model::LinkPlacement& link,
-                           const model::BodyLayout& layout) {
+void RayTable::add_turning(RayShape& shape, const Pose& X_LS, const world::LinkPlacement& link,
+                           const world::BodyLayout& layout) {
   // Parts fixed to the wheel's own link rotate about the same axis, expressed in their frame.
   const Pose& X_FL = link.X_BL;
-  const model::WheelPlacement& wheel = layout.wheels[link.wheel];
+  const world::WheelPlacement& wheel = layout.wheels[link.wheel];
   const Pose X_LWheel = X_FL.inverse() * layout.links[wheel.link].X_BL;
   const Vec3 axis_in_L = (X_LWheel.rotation * wheel.axis_in_L).normalized(),
              center_in_L = X_LWheel * wheel.center_in_L;
@@ -132,9 +132,9 @@ void RayTable::add_turning(RayShape& shape, const Pose& X_LS, const model::LinkP
   shape.box_F.add(on_axis + Vec3::Constant(shape.radius));
 }
 
-void RayTable::add(const model::LinkPlacement& link, LinkIndex link_index, ShapeIndex shape_index,
-                   const Pose& X_LShape, const model::Geometry& geometry,
-                   const model::BodyLayout& layout, bool visuals, RTCDevice device) {
+void RayTable::add(const world::LinkPlacement& link, LinkIndex link_index, ShapeIndex shape_index,
+                   const Pose& X_LShape, const world::Geometry& geometry,
+                   const world::BodyLayout& layout, bool visuals, RTCDevice device) {
   const bool is_mesh = geometry.shape == Shape::mesh;
   if (is_mesh && (!geometry.mesh || geometry.mesh->triangles.empty())) return;
   RayShape shape;

@@ -32,7 +32,7 @@ struct IntoShape {
 using TurningIndex = Index<struct TurningKind>;  // into RayTable::turning
 
 struct RayShape {
-  model::Shape kind = model::Shape::box;
+  world::Shape kind = world::Shape::box;
   LinkIndex link;               // as in Hit
   ShapeIndex shape;             // likewise
   BodyIndex body;               // none: static
@@ -68,21 +68,21 @@ struct RayTable {
 
   // Meshes of static links are given in the world's frame, without a tree. Those of movers are
   // shared and have one; device null: no tree.
-  RayTable(const model::WorldModel& world, const model::BodyLayout& layout, bool visuals,
+  RayTable(const world::WorldModel& world, const world::BodyLayout& layout, bool visuals,
            RTCDevice device);
 
  private:
-  void add(const model::LinkPlacement& link, LinkIndex link_index, ShapeIndex shape_index,
-           const Pose& X_LS, const model::Geometry& geometry, const model::BodyLayout& layout,
+  void add(const world::LinkPlacement& link, LinkIndex link_index, ShapeIndex shape_index,
+           const Pose& X_LS, const world::Geometry& geometry, const world::BodyLayout& layout,
            bool visuals, RTCDevice device);
   // With X_FS: its own mesh in frame F, without a tree; otherwise a shared one.
-  std::shared_ptr<const RayMesh> mesh_of(const model::Geometry& geometry, const Pose* X_FS,
+  std::shared_ptr<const RayMesh> mesh_of(const world::Geometry& geometry, const Pose* X_FS,
                                          RTCDevice device);
   // Marks shapes moved by a wheel: they get an entry in `turning`, and bounds for all that they
   // sweep.
-  void add_turning(RayShape& shape, const Pose& X_LS, const model::LinkPlacement& link,
-                   const model::BodyLayout& layout);
-  std::map<std::tuple<const model::Mesh*, double, double, double>, std::shared_ptr<const RayMesh>>
+  void add_turning(RayShape& shape, const Pose& X_LS, const world::LinkPlacement& link,
+                   const world::BodyLayout& layout);
+  std::map<std::tuple<const world::Mesh*, double, double, double>, std::shared_ptr<const RayMesh>>
       meshes_;
 };
 

@@ -8,7 +8,7 @@
 namespace ruedo::scene {
 namespace {
 
-using model::Rgba;
+using world::Rgba;
 
 // Segments of round shapes, close up and at a distance.
 constexpr int kSegments = 32, kFewSegments = 10;
@@ -21,9 +21,9 @@ class Builder {
  public:
   explicit Builder(RenderContent& content) : content_(content) {}
 
-  RenderLinkKind link_kind(const model::Link& link) {
+  RenderLinkKind link_kind(const world::Link& link) {
     RenderLinkKind kind;
-    for (const model::Visual& visual : link.visuals) add(visual, kind.parts);
+    for (const world::Visual& visual : link.visuals) add(visual, kind.parts);
     if (kind.parts.empty()) return kind;
     Vec3 low = kind.parts[0].centre_L, high = low;
     for (const RenderPart& part : kind.parts) {
@@ -51,7 +51,7 @@ class Builder {
     return at->second;
   }
   template <class Make>
-  MeshPair round_mesh(model::Shape shape, const Vec3& scale, const Make& make, double a = 0,
+  MeshPair round_mesh(world::Shape shape, const Vec3& scale, const Make& make, double a = 0,
                       double b = 0) {
     const auto one = [&](int segments) {
       return mesh({nullptr, static_cast<int>(shape), a, b, segments},
@@ -61,8 +61,8 @@ class Builder {
   }
   MeshPair only_mesh(int index, const Vec3& scale) { return {index, index, scale}; }
 
-  MeshPair meshes_of(const model::Geometry& g) {
-    using model::Shape;
+  MeshPair meshes_of(const world::Geometry& g) {
+    using world::Shape;
     const double r = g.size.x(), length = g.size.y();
     switch (g.shape) {
       case Shape::box:
@@ -86,11 +86,11 @@ class Builder {
     return only_mesh(mesh({g.mesh.get(), 0, 0, 0, 0}, [&] { return file_mesh(*g.mesh); }), g.scale);
   }
 
-  TextureIndex texture(const std::shared_ptr<const model::Texture>& texture) {
+  TextureIndex texture(const std::shared_ptr<const world::Texture>& texture) {
     if (!texture) return {};
     // Many materials may name the same file: it is uploaded once.
     for (const TextureIndex i : content_.textures.indices()) {
-      const model::Texture& other = *content_.textures[i];
+      const world::Texture& other = *content_.textures[i];
       if (&other == texture.get() || (!texture->path.empty() && other.path == texture->path))
         return i;
     }
@@ -106,9 +106,9 @@ class Builder {
     return at->second;
   }
 
-  void add(const model::Visual& visual, std::vector<RenderPart>& parts) {
-    const model::Geometry& g = visual.geometry;
-    if (g.shape == model::Shape::mesh && !g.mesh) return;
+  void add(const world::Visual& visual, std::vector<RenderPart>& parts) {
+    const world::Geometry& g = visual.geometry;
+    if (g.shape == world::Shape::mesh && !g.mesh) return;
     const MeshPair pair = meshes_of(g);
     const Affine M_LP =
         compose(to_affine(visual.X_LV * Pose{pair.rotation, Vec3::Zero()}),
@@ -117,7 +117,7 @@ class Builder {
     for (size_t i = 0; i < pieces.size(); ++i) {
       const RenderMesh::Piece& piece = pieces[i];
       if (piece.index_count == 0) continue;
-      const model::Material material =
+      const world::Material material =
           visual.material ? *visual.material : own_material(g, piece.material);
       RenderPart part;
       part.M_LP = M_LP;
@@ -133,11 +133,11 @@ class Builder {
         b.flags |= kSpecular;
       if (material.double_sided) b.flags |= kDoubleSided;
       if (M_LP.leftCols<3>().determinant() < 0.0) b.flags |= kMirrored;
-      if (g.shape == model::Shape::plane && !b.texture.valid() && g.normal.z() > 0.999 &&
+      if (g.shape == world::Shape::plane && !b.texture.valid() && g.normal.z() > 0.999 &&
           g.extent.minCoeff() >= kGroundExtent) {
         b.flags |= kGround;
       }
-      if (g.shape == model::Shape::plane) part.casts_shadow = false;
+      if (g.shape == world::Shape::plane) part.casts_shadow = false;
       part.batch = batch(b);
       if (pair.small_mesh != pair.mesh) {
         const RenderMesh::Piece& small = content_.meshes[pair.small_mesh].pieces[i];
@@ -152,11 +152,11 @@ class Builder {
     }
   }
 
-  static model::Material own_material(const model::Geometry& g, model::MaterialIndex index) {
-    return g.mesh && g.mesh->materials.has(index) ? g.mesh->materials[index] : model::Material();
+  static world::Material own_material(const world::Geometry& g, world::MaterialIndex index) {
+    return g.mesh && g.mesh->materials.has(index) ? g.mesh->materials[index] : world::Material();
   }
 
-  static void shade(const model::Material& material, const model::Visual& visual,
+  static void shade(const world::Material& material, const world::Visual& visual,
                     RenderPart& part) {
     part.diffuse = material.diffuse;
     // Old worlds often give only the ambient colour.
@@ -196,8 +196,8 @@ Affine compose(const Affine& a, const Affine& b) {
   return m;
 }
 
-Pose link_pose(const model::BodyLayout& layout, const Snapshot& snapshot, LinkIndex link) {
-  const model::LinkPlacement& placement = layout.links[link];
+Pose link_pose(const world::BodyLayout& layout, const Snapshot& snapshot, LinkIndex link) {
+  const world::LinkPlacement& placement = layout.links[link];
   if (!placement.body.valid()) return placement.X_BL;
   return snapshot.bodies[placement.body] * layout.link_in_body(link, snapshot.wheel_angles);
 }
@@ -205,11 +205,11 @@ Pose link_pose(const model::BodyLayout& layout, const Snapshot& snapshot, LinkIn
 namespace {
 
 // The labels of a picture: from 1 on for what the world lists, 0 for everything else.
-IndexedVector<LinkIndex, uint16_t> labels_of(const model::BodyLayout& layout) {
+IndexedVector<LinkIndex, uint16_t> labels_of(const world::BodyLayout& layout) {
   IndexedVector<BodyIndex, size_t> label_of_body(layout.bodies.size());
   IndexedVector<LinkIndex, size_t> label_of_static(layout.links.size());
   for (size_t i = 0; i < layout.listed.size(); ++i) {
-    const model::ListedBody& listed = layout.listed[i];
+    const world::ListedBody& listed = layout.listed[i];
     (listed.body.valid() ? label_of_body[listed.body] : label_of_static[listed.link]) = i + 1;
   }
   IndexedVector<LinkIndex, uint16_t> labels;
@@ -237,10 +237,10 @@ Bounds bounds_of(const RenderPart& part, const Pose& X_WL) {
 }
 
 // A world without a light gets a high afternoon sun, so that something is visible.
-model::Light afternoon_sun() {
-  model::Light sun;
+world::Light afternoon_sun() {
+  world::Light sun;
   sun.name = "default";
-  sun.type = model::Light::Type::directional;
+  sun.type = world::Light::Type::directional;
   sun.direction = Vec3(-0.5, 0.35, -0.9).normalized();
   sun.diffuse = {0.8f, 0.8f, 0.8f, 1.0f};
   sun.cast_shadows = true;
@@ -249,18 +249,18 @@ model::Light afternoon_sun() {
 
 }  // namespace
 
-RenderContent::RenderContent(const model::WorldModel& world, const model::BodyLayout& layout)
+RenderContent::RenderContent(const world::WorldModel& world, const world::BodyLayout& layout)
     : label_of_link(labels_of(layout)) {
   Builder builder(*this);
-  std::map<const model::Link*, RenderKindIndex> kinds;  // only looked up, never iterated
+  std::map<const world::Link*, RenderKindIndex> kinds;  // only looked up, never iterated
   for (const LinkIndex i : layout.links.indices()) {
-    const model::LinkPlacement& placement = layout.links[i];
+    const world::LinkPlacement& placement = layout.links[i];
     kind_of_link.emplace_back();
     if (world.models[placement.instance].removed) {
       label_of_link[i] = 0;
       continue;
     }
-    const model::Link& link = world.models[placement.instance].model->links[placement.link];
+    const world::Link& link = world.models[placement.instance].model->links[placement.link];
     const auto [kind, inserted] = kinds.try_emplace(&link);
     if (inserted) {
       RenderLinkKind built = builder.link_kind(link);
@@ -270,18 +270,18 @@ RenderContent::RenderContent(const model::WorldModel& world, const model::BodyLa
       }
     }
     kind_of_link[i] = kind->second;
-    for (const model::Light& light : link.lights) lights.push_back({light, i});
+    for (const world::Light& light : link.lights) lights.push_back({light, i});
   }
-  for (const model::Light& light : world.lights) lights.push_back({light, {}});
+  for (const world::Light& light : world.lights) lights.push_back({light, {}});
   if (lights.empty()) lights.push_back({afternoon_sun(), {}});
   find_bounds(layout);
 }
 
-void RenderContent::find_bounds(const model::BodyLayout& layout) {
+void RenderContent::find_bounds(const world::BodyLayout& layout) {
   Bounds all{Vec3::Constant(kInfinity), Vec3::Constant(-kInfinity)};
   for (const LinkIndex i : layout.links.indices()) {
     if (!kind_of_link[i].valid()) continue;
-    const model::LinkPlacement& placement = layout.links[i];
+    const world::LinkPlacement& placement = layout.links[i];
     const Pose X_WL = placement.body.valid() ? layout.bodies[placement.body].X_WB * placement.X_BL
                                              : placement.X_BL;
     for (const RenderPart& part : link_kinds[kind_of_link[i]].parts) {

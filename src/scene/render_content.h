@@ -46,7 +46,7 @@ struct RenderPart {
   double radius = 0.0;
   Vec3 low = Vec3::Zero(), high = Vec3::Zero();  // bounding box, in mesh coordinates
   int batch = 0, small_batch = 0;  // indices into RenderContent::batches; small: for distant views
-  model::Rgba diffuse{}, specular{},
+  world::Rgba diffuse{}, specular{},
       emissive{};  // specular[3] is the shininess; diffuse[3] the opacity
   bool transparent = false;
   bool casts_shadow = true;
@@ -60,7 +60,7 @@ struct RenderLinkKind {
 
 // A light and the link that carries it.
 struct RenderLight {
-  model::Light light;
+  world::Light light;
   LinkIndex link;  // none: the world
 };
 
@@ -68,7 +68,7 @@ using RenderKindIndex = Index<RenderLinkKind>;  // into RenderContent::link_kind
 
 struct RenderContent {
   std::vector<RenderMesh> meshes;
-  IndexedVector<TextureIndex, std::shared_ptr<const model::Texture>> textures;
+  IndexedVector<TextureIndex, std::shared_ptr<const world::Texture>> textures;
   std::vector<Batch> batches;
   IndexedVector<RenderKindIndex, RenderLinkKind> link_kinds;
   IndexedVector<LinkIndex, RenderKindIndex> kind_of_link;  // not valid: nothing to draw
@@ -78,13 +78,13 @@ struct RenderContent {
                 // bounds of all that is drawn at the start, except the ground
                 Vec3::Constant(3.0)};
 
-  RenderContent(const model::WorldModel& world, const model::BodyLayout& layout);
+  RenderContent(const world::WorldModel& world, const world::BodyLayout& layout);
 
  private:
-  void find_bounds(const model::BodyLayout& layout);
+  void find_bounds(const world::BodyLayout& layout);
 };
 
 // The pose of a link in a snapshot, including its wheel's rotation.
-Pose link_pose(const model::BodyLayout& layout, const Snapshot& snapshot, LinkIndex link);
+Pose link_pose(const world::BodyLayout& layout, const Snapshot& snapshot, LinkIndex link);
 
 }  // namespace ruedo::scene

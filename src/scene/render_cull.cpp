@@ -41,7 +41,7 @@ Region view_region(const View& view) {
   return region;
 }
 
-Culler::Culler(const model::BodyLayout& layout, const RenderContent& content)
+Culler::Culler(const world::BodyLayout& layout, const RenderContent& content)
     : layout_(layout),
       content_(content),
       rank_(content.batches.size()),

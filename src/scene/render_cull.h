@@ -15,7 +15,7 @@ namespace ruedo::scene {
 // One part to draw: the vertex attributes 3 to 9 of the shaders.
 struct Instance {
   float rows[3][4];  // from mesh coordinates to the world's axes, relative to the eye
-  model::Rgba diffuse, specular, emissive;
+  world::Rgba diffuse, specular, emissive;
   uint32_t label;
   uint32_t padding[3];
 };
@@ -56,7 +56,7 @@ enum class Movers { only_static, only_moving };
 class Culler {
  public:
   // The arguments must outlive it.
-  Culler(const model::BodyLayout& layout, const RenderContent& content);
+  Culler(const world::BodyLayout& layout, const RenderContent& content);
 
   void update(const Snapshot& snapshot);
   const Affine& link_pose(LinkIndex link) const { return M_WL_[link]; }
@@ -78,7 +78,7 @@ class Culler {
   void append(std::vector<Item>& items, const Vec3& origin, std::vector<Run>& runs,
               std::vector<Instance>& instances) const;
 
-  const model::BodyLayout& layout_;
+  const world::BodyLayout& layout_;
   const RenderContent& content_;
   std::vector<int> rank_;  // drawing order of each batch
   IndexedVector<LinkIndex, Affine> M_WL_;

@@ -16,14 +16,14 @@ Vec4 vec4(const Vec3& v, double w) {
 }
 
 // Converts a displayed colour to light: its square (see the shaders' curve).
-Vec4 as_light(const model::Rgba& c, float factor) {
+Vec4 as_light(const world::Rgba& c, float factor) {
   return {factor * c[0] * c[0], factor * c[1] * c[1], factor * c[2] * c[2], 0.0f};
 }
 
-Vec4 light_colour(const model::Light& light) {
+Vec4 light_colour(const world::Light& light) {
   const auto factor = static_cast<float>(light.intensity);
   return {factor * light.diffuse[0], factor * light.diffuse[1], factor * light.diffuse[2],
-          light.type == model::Light::Type::spot ? 1.0f : 0.0f};
+          light.type == world::Light::Type::spot ? 1.0f : 0.0f};
 }
 
 // Range of shadows around a camera among the things, m.
@@ -40,10 +40,10 @@ Eigen::Matrix4d ShadowRegion::map_from_world(const Vec3& origin) const {
   return M;
 }
 
-RenderLights::RenderLights(const model::WorldModel& world, const RenderContent& content)
+RenderLights::RenderLights(const world::WorldModel& world, const RenderContent& content)
     : world_(world), content_(content) {
   for (const RenderLight& light : content.lights) {
-    auto& list = light.light.type == model::Light::Type::directional ? suns_ : lamps_;
+    auto& list = light.light.type == world::Light::Type::directional ? suns_ : lamps_;
     const size_t limit = &list == &suns_ ? kMaxDirectionalLights : kMaxLocalLights;
     if (list.size() < limit) list.push_back(&light);
   }
@@ -57,7 +57,7 @@ RenderLights::RenderLights(const model::WorldModel& world, const RenderContent& 
 
 void RenderLights::fill(const Culler& culler, const View& view, FrameBlock& frame) {
   const Vec3 eye = view.X_WCamera.translation;
-  const model::Sky& sky = world_.sky;
+  const world::Sky& sky = world_.sky;
   // Light from the sky is stronger than light reflected by the ground.
   frame.ambient_up = as_light(sky.ambient, 1.9f);
   frame.ambient_down = as_light(sky.ambient, 0.9f);
@@ -86,7 +86,7 @@ void RenderLights::fill(const Culler& culler, const View& view, FrameBlock& fram
     }
   }
   for (size_t i = 0; i < lamps_.size(); ++i) {
-    const model::Light& light = lamps_[i]->light;
+    const world::Light& light = lamps_[i]->light;
     const Affine M = pose_of(*lamps_[i]);
     frame.lamp_position[i] = vec4(M.col(3) - eye, std::max(light.range, 1e-3));
     frame.lamp_colour[i] = light_colour(light);

@@ -30,7 +30,7 @@ struct ShadowRegion {
 class RenderLights {
  public:
   // Both must outlive it.
-  RenderLights(const model::WorldModel& world, const RenderContent& content);
+  RenderLights(const world::WorldModel& world, const RenderContent& content);
 
   const LightCounts& counts() const { return counts_; }
 
@@ -41,7 +41,7 @@ class RenderLights {
  private:
   void place_shadow(const Vec3& to_sun, const View& view);
 
-  const model::WorldModel& world_;
+  const world::WorldModel& world_;
   const RenderContent& content_;
   std::vector<const RenderLight*> suns_, lamps_;
   LightCounts counts_;

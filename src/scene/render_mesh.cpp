@@ -167,13 +167,13 @@ namespace {
 
 using Triangle = std::array<uint32_t, 3>;
 
-Vector3f centroid3(const model::Mesh& mesh, const Triangle& t) {
+Vector3f centroid3(const world::Mesh& mesh, const Triangle& t) {
   return mesh.positions[t[0]] + mesh.positions[t[1]] + mesh.positions[t[2]];
 }
 
 // Splits the triangles along their longest axis until each part is small enough; [begin, end) is
 // reordered.
-void cut(const model::Mesh& mesh, std::vector<Triangle>& triangles, size_t begin, size_t end,
+void cut(const world::Mesh& mesh, std::vector<Triangle>& triangles, size_t begin, size_t end,
          std::vector<std::pair<size_t, size_t>>& parts) {
   if (end - begin <= kPieceTriangles) {
     if (end > begin) parts.emplace_back(begin, end);
@@ -202,7 +202,7 @@ void cut(const model::Mesh& mesh, std::vector<Triangle>& triangles, size_t begin
 
 }  // namespace
 
-RenderMesh file_mesh(const model::Mesh& mesh) {
+RenderMesh file_mesh(const world::Mesh& mesh) {
   const size_t count = mesh.positions.size();
   const bool smooth = mesh.normals.size() == count;
   const bool mapped = mesh.uvs.size() == count;
@@ -213,9 +213,9 @@ RenderMesh file_mesh(const model::Mesh& mesh) {
       out.vertices[i] = {mesh.positions[i], mesh.normals[i], mapped ? mesh.uvs[i] : Vector2f(0, 0)};
     }
   }
-  std::vector<model::Mesh::Part> parts = mesh.parts;
+  std::vector<world::Mesh::Part> parts = mesh.parts;
   if (parts.empty()) parts.push_back({"", 0, static_cast<uint32_t>(mesh.triangles.size()), {}});
-  for (const model::Mesh::Part& part : parts) {
+  for (const world::Mesh::Part& part : parts) {
     std::vector<Triangle> triangles;
     const size_t end =
         std::min<size_t>(size_t{part.first_triangle} + part.triangle_count, mesh.triangles.size());

@@ -20,7 +20,7 @@ struct RenderMesh {
   // A run of triangles of one material, small enough to be culled by its bounding sphere.
   struct Piece {
     uint32_t first_index = 0, index_count = 0;
-    model::MaterialIndex material;  // of the model::Mesh
+    world::MaterialIndex material;  // of the world::Mesh
     Vec3 centre = Vec3::Zero();     // of the bounding sphere
     double radius = 0.0;
     Vec3 low = Vec3::Zero(), high = Vec3::Zero();  // bounding box
@@ -42,6 +42,6 @@ RenderMesh capsule_mesh(double radius, double length,
 
 // The triangles of a mesh file; flat normals if it has none. Triangles with invalid vertex indices
 // are dropped.
-RenderMesh file_mesh(const model::Mesh& mesh);
+RenderMesh file_mesh(const world::Mesh& mesh);
 
 }  // namespace ruedo::scene

@@ -57,7 +57,7 @@ Matrix4 clip_from_world(const View& v) {
 
 class GlRenderer : public Renderer {
  public:
-  GlRenderer(const model::WorldModel& world, const model::BodyLayout& layout)
+  GlRenderer(const world::WorldModel& world, const world::BodyLayout& layout)
       : content_(world, layout),
         culler_(layout, content_),
         lights_(world, content_),
@@ -267,8 +267,8 @@ View View::pinhole(const Pose& X_WCamera, int width, int height, double hfov_rad
   return view;
 }
 
-std::unique_ptr<Renderer> make_renderer(const model::WorldModel& world,
-                                        const model::BodyLayout& layout) {
+std::unique_ptr<Renderer> make_renderer(const world::WorldModel& world,
+                                        const world::BodyLayout& layout) {
   return std::make_unique<GlRenderer>(world, layout);
 }
 

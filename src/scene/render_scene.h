@@ -77,7 +77,7 @@ class Renderer {
 
 // world and layout must outlive the renderer. Throws EnvironmentError with the remedy if there is
 // no backend.
-std::unique_ptr<Renderer> make_renderer(const model::WorldModel& world,
-                                        const model::BodyLayout& layout);
+std::unique_ptr<Renderer> make_renderer(const world::WorldModel& world,
+                                        const world::BodyLayout& layout);
 
 }  // namespace ruedo::scene

@@ -34,7 +34,7 @@ cv::Mat to_rgba(cv::Mat image) {
 }
 
 std::vector<uint8_t> read_bytes(const std::string& path) {
-  const std::string bytes = read_input(path, model::kMostTextureBytes);
+  const std::string bytes = read_input(path, world::kMostTextureBytes);
   return {bytes.begin(), bytes.end()};
 }
 
@@ -64,13 +64,13 @@ void remove_png_profile(std::vector<uint8_t>& bytes) {
 
 }  // namespace
 
-TexturePixels decode_texture(const model::Texture& texture) {
+TexturePixels decode_texture(const world::Texture& texture) {
   TexturePixels out;
   try {
     std::vector<uint8_t> bytes = texture.path.empty() ? texture.embedded : read_bytes(texture.path);
     remove_png_profile(bytes);
-    if (bytes.empty() || !model::picture_fault(bytes, kMostPixels).empty()) return out;
-    cv::Mat image = model::decode_picture(bytes.data(), bytes.size(), cv::IMREAD_UNCHANGED);
+    if (bytes.empty() || !world::picture_fault(bytes, kMostPixels).empty()) return out;
+    cv::Mat image = world::decode_picture(bytes.data(), bytes.size(), cv::IMREAD_UNCHANGED);
     if (image.empty()) return out;
     const int side = std::max(image.cols, image.rows);
     if (side > kMaxSide) {

@@ -15,6 +15,6 @@ struct TexturePixels {
 };
 
 // Never throws: a texture that cannot be loaded is empty, and its surface keeps its plain colour.
-TexturePixels decode_texture(const model::Texture& texture);
+TexturePixels decode_texture(const world::Texture& texture);
 
 }  // namespace ruedo::scene

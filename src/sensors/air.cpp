@@ -16,7 +16,7 @@ constexpr double kLowest = -5000.0, kHighest = 20'000.0;  // m, geopotential
 
 }  // namespace
 
-Air air_at(const model::Environment& environment, double altitude) {
+Air air_at(const world::Environment& environment, double altitude) {
   const double h =
       std::clamp(kEarthRadius * altitude / (kEarthRadius + altitude), kLowest, kHighest);
   const double troposphere = std::min(h, kTropopause), gradient = environment.temperature_gradient;

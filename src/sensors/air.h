@@ -14,6 +14,6 @@ struct Air {
 };
 
 // altitude: m above sea level, geometric. Clamped to -5 km and 20 km.
-Air air_at(const model::Environment& environment, double altitude);
+Air air_at(const world::Environment& environment, double altitude);
 
 }  // namespace ruedo

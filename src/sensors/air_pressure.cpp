@@ -37,7 +37,7 @@ class AirPressure : public SensorOf<AirPressure> {
   void exchange(StateArchive& archive) { archive(noises_); }
 
  private:
-  Bound<const model::Environment> environment_;
+  Bound<const world::Environment> environment_;
   Mount mount_;
   Noises<1> noises_;
   double origin_m_ = 0.0;  // of the world's z = 0, above sea level

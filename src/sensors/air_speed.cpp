@@ -47,7 +47,7 @@ class AirSpeed : public SensorOf<AirSpeed> {
   void exchange(StateArchive& archive) { archive(noises_); }
 
  private:
-  Bound<const model::Environment> environment_;
+  Bound<const world::Environment> environment_;
   Mount mount_;
   Noises<1> noises_;
   int channel_;

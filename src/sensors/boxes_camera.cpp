@@ -126,11 +126,11 @@ class BoxesCamera : public Sensor {
   template <class Visit>
   void each_corner(InstanceIndex instance, const Snapshot& now, const Pose& X_FW,
                    const Visit& visit) const {
-    const model::Model& model = *world_.models[instance].model;
+    const world::Model& model = *world_.models[instance].model;
     for (const ModelLinkIndex i : model.links.indices()) {
       const Pose X_FL = X_FW * link_pose(layout_, layout_.link_of(instance, i), now);
-      for (const model::Visual& visual : model.links[i].visuals) {
-        const Eigen::AlignedBox3d box = model::bounds(visual.geometry);
+      for (const world::Visual& visual : model.links[i].visuals) {
+        const Eigen::AlignedBox3d box = world::bounds(visual.geometry);
         if (visual.label == 0 || box.isEmpty()) continue;
         for (int corner = 0; corner < 8; ++corner)
           visit(X_FL * visual.X_LV *
@@ -150,8 +150,8 @@ class BoxesCamera : public Sensor {
     return around.intersection(picture);
   }
 
-  const model::WorldModel& world_;
-  const model::BodyLayout& layout_;
+  const world::WorldModel& world_;
+  const world::BodyLayout& layout_;
   Kind kind_;
   int channel_;
   CameraView view_;

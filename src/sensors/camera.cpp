@@ -44,7 +44,7 @@ class Camera : public Sensor {
     const Element& camera = camera_of(setup);
     element.refuse_unknown({"ruedo:encoding", "ruedo:quality", "ruedo:depth", "ruedo:labels",
                             "ruedo:exposure", "ruedo:vignetting", "ruedo:phase"});
-    const model::LinkPlacement& link = setup.layout.links[setup.link];
+    const world::LinkPlacement& link = setup.layout.links[setup.link];
     body_ = link.body;
     X_LC_ = setup.X_LS * camera.pose("pose");
     X_BC_ = link.X_BL * X_LC_;
@@ -208,7 +208,7 @@ class Camera : public Sensor {
   std::optional<int> depth_channel_, labels_channel_;
   BodyIndex body_;  // none: static
   Pose X_BC_;       // X_WC if static
-  const model::BodyLayout* layout_ = nullptr;
+  const world::BodyLayout* layout_ = nullptr;
   LinkIndex link_;
   Pose X_LC_;
   Encoding encoding_ = Encoding::jpeg;

@@ -101,12 +101,12 @@ bool Lens::undistort(const Eigen::Vector2d& distorted, Eigen::Vector2d& p) const
 }
 
 std::shared_ptr<const LensMap> LensMap::of(const Lens& lens, const Element& camera,
-                                           const model::WorldModel& world) {
+                                           const world::WorldModel& world) {
   using Key = std::tuple<int, int, std::array<double, 6>, std::array<double, 5>>;
   struct Shared {
     std::weak_ptr<const LensMap> map;
     int64_t pixels = 0;
-    std::set<const model::WorldModel*> worlds;  // whose cameras have had it; only compared
+    std::set<const world::WorldModel*> worlds;  // whose cameras have had it; only compared
   };
   static std::mutex mutex;
   static std::map<Key, Shared> all;

@@ -16,7 +16,7 @@
 
 namespace ruedo {
 
-namespace model {
+namespace world {
 struct WorldModel;
 }
 
@@ -45,7 +45,7 @@ class LensMap {
   // lens's. Throws InputError, which names the <distortion>, if all of the world have too many
   // pixels with this one.
   static std::shared_ptr<const LensMap> of(const Lens& lens, const Element& camera,
-                                           const model::WorldModel& world);
+                                           const world::WorldModel& world);
 
   explicit LensMap(const Lens& lens);
 

@@ -87,7 +87,7 @@ class Collisions : public SensorOf<Collisions> {
   void show(const Snapshot& now, Outbox& out) {
     shown_step_ = now.step;
     message_.utime = now.time;
-    message_.blocked_by = model::body_name(world_, layout_, blocked_by_);
+    message_.blocked_by = world::body_name(world_, layout_, blocked_by_);
     message_.n = static_cast<int32_t>(points_.size());
     if (message_.points.size() < points_.size()) message_.points.resize(points_.size());
     told_.clear();
@@ -103,8 +103,8 @@ class Collisions : public SensorOf<Collisions> {
     out.publish(channel_, message_);
   }
 
-  Bound<const model::WorldModel> world_;
-  Bound<const model::BodyLayout> layout_;
+  Bound<const world::WorldModel> world_;
+  Bound<const world::BodyLayout> layout_;
   RobotIndex robot_;
   int channel_;
   LinkIndex blocked_by_;

@@ -28,14 +28,14 @@ class ContactSensor : public SensorOf<ContactSensor> {
     setup.element.refuse_unknown({"ruedo:phase"});  // read by the server
     const Element* contact = setup.element.child("contact");
     if (!contact) return;
-    const model::LinkPlacement& placement = layout_->links[link_];
-    const std::vector<model::Collision>& shapes =
+    const world::LinkPlacement& placement = layout_->links[link_];
+    const std::vector<world::Collision>& shapes =
         world_->models[placement.instance].model->links[placement.link].collisions;
     for (const Element* named : contact->all("collision")) {
       const std::string name = without_scope(named->text);
       const auto found =
           std::find_if(shapes.begin(), shapes.end(),
-                       [&](const model::Collision& shape) { return shape.name == name; });
+                       [&](const world::Collision& shape) { return shape.name == name; });
       if (found != shapes.end()) {
         shapes_.push_back(ShapeIndex(found - shapes.begin()));
       } else if (name != "__default__" && setup.findings) {
@@ -84,8 +84,8 @@ class ContactSensor : public SensorOf<ContactSensor> {
     return contact.link_b == link_ && counts(contact.shape_b);
   }
 
-  Bound<const model::WorldModel> world_;
-  Bound<const model::BodyLayout> layout_;
+  Bound<const world::WorldModel> world_;
+  Bound<const world::BodyLayout> layout_;
   LinkIndex link_;
   int channel_;
   std::vector<ShapeIndex> shapes_;  // collisions of the link; empty: all

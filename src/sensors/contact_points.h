@@ -8,9 +8,9 @@
 namespace ruedo {
 
 // as_a: the sensor is on link_a.
-inline void put(const Contact& contact, bool as_a, const model::WorldModel& world,
-                const model::BodyLayout& layout, contact_point_t& point) {
-  point.body = model::body_name(world, layout, as_a ? contact.link_b : contact.link_a);
+inline void put(const Contact& contact, bool as_a, const world::WorldModel& world,
+                const world::BodyLayout& layout, contact_point_t& point) {
+  point.body = world::body_name(world, layout, as_a ? contact.link_b : contact.link_a);
   for (int i = 0; i < 3; ++i) {
     point.position[i] = contact.position[i];
     point.normal[i] = as_a ? contact.normal[i] : -contact.normal[i];

@@ -17,8 +17,8 @@
 namespace ruedo {
 namespace {
 
-using model::DriveDescription;
-using model::Joint;
+using world::DriveDescription;
+using world::Joint;
 
 std::array<std::string, 6> noise_paths() {
   std::array<std::string, 6> paths;
@@ -32,7 +32,7 @@ std::array<std::string, 6> noise_paths() {
 // The links of a model that remain connected when one joint is cut.
 using Side = IndexedVector<ModelLinkIndex, bool>;
 
-Side side(const model::Model& model, ModelLinkIndex link, ModelJointIndex cut) {
+Side side(const world::Model& model, ModelLinkIndex link, ModelJointIndex cut) {
   Side in(model.links.size());
   in[link] = true;
   for (bool grown = true; grown;) {
@@ -115,7 +115,7 @@ class ForceTorque : public SensorOf<ForceTorque> {
 
  private:
   void find_joint(const SensorSetup& setup) {
-    for (const model::SensorDescription& sensor : model_->sensors) {
+    for (const world::SensorDescription& sensor : model_->sensors) {
       if (sensor.name == setup.device) joint_ = sensor.joint;
     }
     if (!joint_.valid()) {  // on a link: in the joint that carries the link
@@ -139,7 +139,7 @@ class ForceTorque : public SensorOf<ForceTorque> {
     const DriveDescription* drive = driven ? &*model_->drive : nullptr;
     const bool wheelless = drive && drive->left_joints.empty() && drive->right_joints.empty();
     for (const ModelLinkIndex i : in.indices()) {
-      const model::LinkPlacement& link = layout_->links[layout_->link_of(instance_, i)];
+      const world::LinkPlacement& link = layout_->links[layout_->link_of(instance_, i)];
       if (!in[i]) continue;
       if (model_->is_static || model_->links[i].kinematic) return true;
       if (driven && (link.wheel.valid() || (wheelless && i == 0))) return true;
@@ -182,7 +182,7 @@ class ForceTorque : public SensorOf<ForceTorque> {
   }
 
   Pose link_pose(const Snapshot& now, LinkIndex link) const {
-    const model::LinkPlacement& placement = layout_->links[link];
+    const world::LinkPlacement& placement = layout_->links[link];
     if (!placement.body.valid()) return placement.X_BL;
     return now.bodies[placement.body] * layout_->link_in_body(link, now.wheel_angles);
   }
@@ -196,8 +196,8 @@ class ForceTorque : public SensorOf<ForceTorque> {
   // Adds the force that a link's motion requires, against gravity.
   void weigh(const Snapshot& now, LinkIndex link, const Vec3& p_WJ, Vec3& force,
              Vec3& torque) const {
-    const model::LinkPlacement& placement = layout_->links[link];
-    const model::Link& described = model_->links[placement.link];
+    const world::LinkPlacement& placement = layout_->links[link];
+    const world::Link& described = model_->links[placement.link];
     const Pose X_WI = link_pose(now, link) * described.inertial.X_LI;
     Vec3 a = Vec3::Zero(), omega = Vec3::Zero(), alpha = Vec3::Zero();
     if (placement.body.valid()) {  // otherwise it is fixed to the world
@@ -226,8 +226,8 @@ class ForceTorque : public SensorOf<ForceTorque> {
     }
   }
 
-  Bound<const model::BodyLayout> layout_;
-  const model::Model* model_ = nullptr;
+  Bound<const world::BodyLayout> layout_;
+  const world::Model* model_ = nullptr;
   Vec3 gravity_;
   Noises<6> noises_;
   int channel_;

@@ -17,7 +17,7 @@ Eigen::Matrix3d east_north_up(double latitude, double longitude) {
   return R;
 }
 
-Globe::Globe(const model::Environment& environment)
+Globe::Globe(const world::Environment& environment)
     : a_(environment.equatorial_radius),
       b_(environment.polar_radius),
       e2_(1.0 - (b_ / a_) * (b_ / a_)),

@@ -20,7 +20,7 @@ Eigen::Matrix3d east_north_up(double latitude, double longitude);
 
 class Globe {
  public:
-  explicit Globe(const model::Environment& environment);
+  explicit Globe(const world::Environment& environment);
 
   Vec3 to_ecef(const Geodetic& place) const;
   Geodetic from_ecef(const Vec3& p) const;

@@ -22,7 +22,7 @@ class Imu : public SensorOf<Imu> {
         gravity_(setup.world.gravity),
         channel_(setup.channel<imu_t>()),
         layout_(setup.layout) {
-    const model::LinkPlacement& link = setup.layout.links[setup.link];
+    const world::LinkPlacement& link = setup.layout.links[setup.link];
     body_ = link.body;
     X_LS_ = setup.X_LS;
     X_BS_ = link.X_BL * X_LS_;
@@ -30,7 +30,7 @@ class Imu : public SensorOf<Imu> {
       on_wheel_ = true;
       link_ = setup.link;
       wheel_ = link.wheel;
-      const model::WheelPlacement& wheel = layout_->wheels[wheel_];
+      const world::WheelPlacement& wheel = layout_->wheels[wheel_];
       const Pose& X_BWheel = layout_->links[wheel.link].X_BL;
       hub_B_ = X_BWheel * wheel.center_in_L;
       axis_B_ = X_BWheel.rotation * wheel.axis_in_L;
@@ -148,7 +148,7 @@ class Imu : public SensorOf<Imu> {
   int channel_;
   BodyIndex body_;    // none: does not move
   Pose X_LS_, X_BS_;  // X_BS_: X_WS when it does not move
-  Bound<const model::BodyLayout> layout_;
+  Bound<const world::BodyLayout> layout_;
   bool on_wheel_ = false;  // a wheel of that body turns the device
   LinkIndex link_;
   WheelIndex wheel_;

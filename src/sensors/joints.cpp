@@ -10,8 +10,8 @@ namespace {
 class Joints : public SensorOf<Joints> {
  public:
   explicit Joints(const SensorSetup& setup) : channel_(setup.channel<joint_state_t>()) {
-    const model::RobotPlacement& robot = setup.layout.robots[setup.robot_index];
-    const model::Model& model = *setup.world.models[robot.instance].model;
+    const world::RobotPlacement& robot = setup.layout.robots[setup.robot_index];
+    const world::Model& model = *setup.world.models[robot.instance].model;
     joints_ = robot.joints;
     for (const JointIndex joint : joints_) {
       message_.joint_name.push_back(model.joints[setup.layout.joints[joint].joint].name);

@@ -17,7 +17,7 @@ void encode_jpeg(const cv::Mat& picture, int quality, std::vector<uint8_t>& byte
   int tried = 0;  // steps below the requested quality
   const auto fits = [&](int steps) {
     tried = steps;
-    model::encode_picture(
+    world::encode_picture(
         ".jpg", picture, bytes,
         {cv::IMWRITE_JPEG_QUALITY, std::max(quality - steps * kStep, kLeastJpegQuality)});
     return bytes.size() <= kMaxMessage;

@@ -41,7 +41,7 @@ class LogicalCamera : public SensorOf<LogicalCamera> {
     message_.utime = now.time;
     message_.objects.clear();
     for (const InstanceIndex i : world_->models.indices()) {
-      const model::ModelInstance& instance = world_->models[i];
+      const world::ModelInstance& instance = world_->models[i];
       if (instance.removed || i == own_) continue;
       const Pose X_SM = X_SW * model_pose(world_, layout_, i, now);
       if (!sees(X_SM.translation)) continue;
@@ -66,8 +66,8 @@ class LogicalCamera : public SensorOf<LogicalCamera> {
            std::abs(p.z()) <= half_height_ * p.x();
   }
 
-  Bound<const model::WorldModel> world_;
-  Bound<const model::BodyLayout> layout_;
+  Bound<const world::WorldModel> world_;
+  Bound<const world::BodyLayout> layout_;
   InstanceIndex own_;
   Mount mount_;
   int channel_;

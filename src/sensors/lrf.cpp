@@ -305,7 +305,7 @@ class Lrf : public SensorOf<Lrf> {
     double way = 0.0, mirrored = 1.0;
     for (int mirrors = 0; hit.hit(); ++mirrors) {
       way += hit.range;
-      const model::Surface& surface = mount_.surface(hit, visuals_);
+      const world::Surface& surface = mount_.surface(hit, visuals_);
       const double part = mirrored * surface.laser_reflectance * (1.0 - surface.laser_mirror);
       if (part >= kFaintest) return {way, part * std::abs(hit.normal.dot(ray.direction))};
       mirrored *= surface.laser_mirror * surface.laser_mirror;

@@ -61,7 +61,7 @@ class Magnetometer : public SensorOf<Magnetometer> {
     return globe_.in_world(ratio * ratio * ratio * (3.0 * kDipole.dot(up) * up - kDipole));
   }
 
-  model::Environment environment_;
+  world::Environment environment_;
   Mount mount_;
   Globe globe_;
   Noises<3> noises_;

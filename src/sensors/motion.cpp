@@ -72,7 +72,7 @@ const RegisterSensor kRegister{
      .default_rate = {10, 1},
      .make = [](const SensorSetup& setup) { return std::make_unique<MotionStatus>(setup); },
      .kind = "motion",
-     .drive_rate = [](const model::DriveDescription& drive) { return drive.status_rate; }}};
+     .drive_rate = [](const world::DriveDescription& drive) { return drive.status_rate; }}};
 
 }  // namespace
 }  // namespace ruedo

@@ -20,7 +20,7 @@ Pose Mount::start() const {
 
 Pose Mount::pose(const Snapshot& now) const {
   if (!body_.valid()) return start();
-  const model::LinkPlacement& link = layout_->links[link_];
+  const world::LinkPlacement& link = layout_->links[link_];
   const Pose X_BL = link.wheel.valid() ? layout_->link_in_body(link_, now.wheel_angles) : link.X_BL;
   return now.bodies[body_] * X_BL * X_LS_;
 }
@@ -31,9 +31,9 @@ Twist Mount::twist(const Snapshot& now) const {
   const Vec3 p_WS = pose(now).translation;
   Twist twist = now.body_twists[body_];
   twist.linear += twist.angular.cross(p_WS - X_WB.translation);
-  const model::LinkPlacement& link = layout_->links[link_];
+  const world::LinkPlacement& link = layout_->links[link_];
   if (link.wheel.valid()) {
-    const model::WheelPlacement& wheel = layout_->wheels[link.wheel];
+    const world::WheelPlacement& wheel = layout_->wheels[link.wheel];
     const Pose X_WWheel = X_WB * layout_->link_in_body(wheel.link, now.wheel_angles);
     const Vec3 omega = now.wheel_rates[link.wheel] * (X_WWheel.rotation * wheel.axis_in_L);
     twist.linear += omega.cross(p_WS - X_WWheel * wheel.center_in_L);

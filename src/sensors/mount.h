@@ -22,7 +22,7 @@ class Mount {
   Twist twist(const Snapshot& now) const;   // of S's origin, expressed in the world
 
  private:
-  Bound<const model::BodyLayout> layout_;
+  Bound<const world::BodyLayout> layout_;
   LinkIndex link_;
   BodyIndex body_;
   Pose X_LS_;

@@ -26,9 +26,9 @@ std::array<std::string, 6> noise_paths(const std::string& element) {
 
 // The world's location: <spherical_coordinates>, or else what the receiver gives (hector's GPS
 // plugin).
-model::Environment place_of(const SensorSetup& setup) {
+world::Environment place_of(const SensorSetup& setup) {
   constexpr double kDegree = M_PI / 180.0;
-  model::Environment place = setup.world.environment;
+  world::Environment place = setup.world.environment;
   const Element* own = setup.element.child("ruedo:place");
   if (!own) return place;
   own->refuse_unknown(
@@ -100,7 +100,7 @@ class NavSat : public SensorOf<NavSat> {
 
  private:
   Mount mount_;
-  model::Environment place_;
+  world::Environment place_;
   Globe globe_;
   Noises<6> noises_;  // east, north, up; of position, then velocity
   int channel_;

@@ -14,7 +14,7 @@
 // difference of the wheel
 //   rates (the printed eq. 4 has their sum): speeds at both ends of the step, averaged. It leaves
 //   v omega^2 dt^3 / 12 a step, 5e-10 m at 0.2 m/s, 0.5 rad/s and 5 ms.
-// Other drives take the arc, with what base_odometry.h makes of their wheels.
+// Other drives take the arc, with what world/model/base_odometry.h makes of their wheels.
 #include <cmath>
 #include <optional>
 
@@ -80,18 +80,18 @@ class Odometry : public SensorOf<Odometry> {
         random_(setup.random),
         robot_(setup.robot_index),
         channel_(setup.channel<odometry_t>()) {
-    const model::RobotPlacement& robot = setup.layout.robots[robot_];
-    const model::DriveDescription& drive = *setup.world.models[robot.instance].model->drive;
+    const world::RobotPlacement& robot = setup.layout.robots[robot_];
+    const world::DriveDescription& drive = *setup.world.models[robot.instance].model->drive;
     if (!setup.noise) configuration_.slip_noise = 0.0;
     radius_ = drive.wheel_radius;
     track_ = drive.track * (1.0 + configuration_.track_error);
     for (const WheelIndex wheel : robot.wheels) {
-      const model::WheelPlacement& placement = setup.layout.wheels[wheel];
+      const world::WheelPlacement& placement = setup.layout.wheels[wheel];
       const int side = placement.left ? 0 : 1;
       wheels_.push_back({wheel, side, placement.steers});
       if (!placement.steers) ++wheels_of_side_[side];
     }
-    if (model::BaseOdometry::is_for(drive))
+    if (world::BaseOdometry::is_for(drive))
       base_.emplace(setup.layout, robot_, drive, configuration_.track_error,
                     configuration_.steering_error);
     message_.n = static_cast<int32_t>(wheels_.size());
@@ -324,7 +324,7 @@ class Odometry : public SensorOf<Odometry> {
   double radius_ = 0.0, track_ = 0.0;  // m; the track that the robot believes
   std::vector<Wheel> wheels_;
   int wheels_of_side_[2] = {0, 0};
-  std::optional<model::BaseOdometry> base_;  // for other than differential drives
+  std::optional<world::BaseOdometry> base_;  // for other than differential drives
   Pose X_WBase_;                             // at the previous step
   Vec3 rate_ = Vec3::Zero();  // m/s forward and to the left, rad/s, in the last step; with base_
   std::vector<double> ways_, angles_;
@@ -344,7 +344,7 @@ const RegisterSensor kRegister{
      .device_name = "odometry",
      .default_rate = {50, 1},
      .make = [](const SensorSetup& setup) { return std::make_unique<Odometry>(setup); },
-     .drive_rate = [](const model::DriveDescription& drive) { return drive.odometry_rate; }}};
+     .drive_rate = [](const world::DriveDescription& drive) { return drive.odometry_rate; }}};
 
 }  // namespace
 }  // namespace ruedo

@@ -107,8 +107,8 @@ class PerformerDetector : public SensorOf<PerformerDetector> {
     out.publish(channel_, message_);
   }
 
-  Bound<const model::WorldModel> world_;
-  Bound<const model::BodyLayout> layout_;
+  Bound<const world::WorldModel> world_;
+  Bound<const world::BodyLayout> layout_;
   InstanceIndex own_;
   int channel_;
   Vec3 half_, offset_M_ = Vec3::Zero();

@@ -44,7 +44,7 @@ const RegisterSensor kRegister{
      .default_rate = {50, 1},
      .make = [](const SensorSetup& setup) { return std::make_unique<TruePose>(setup); },
      .kind = "pose",
-     .drive_rate = [](const model::DriveDescription& drive) { return drive.pose_rate; }}};
+     .drive_rate = [](const world::DriveDescription& drive) { return drive.pose_rate; }}};
 
 }  // namespace
 }  // namespace ruedo

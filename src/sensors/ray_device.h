@@ -13,7 +13,7 @@ class RayMount {
  public:
   explicit RayMount(const SensorSetup& setup)
       : world_(setup.world), layout_(setup.layout), link_(setup.link) {
-    const model::LinkPlacement& link = setup.layout.links[setup.link];
+    const world::LinkPlacement& link = setup.layout.links[setup.link];
     body_ = link.body;
     X_LS_ = setup.X_LS;
     X_BS_ = link.X_BL * setup.X_LS;
@@ -28,17 +28,17 @@ class RayMount {
   }
 
   // The surface that a ray hit; visuals have the default surface.
-  const model::Surface& surface(const scene::Hit& hit, bool visuals = false) const {
-    static const model::Surface kDefault;
+  const world::Surface& surface(const scene::Hit& hit, bool visuals = false) const {
+    static const world::Surface kDefault;
     if (visuals) return kDefault;
-    const model::LinkPlacement& link = layout_->links[hit.link];
-    const model::Model& model = *world_->models[link.instance].model;
+    const world::LinkPlacement& link = layout_->links[hit.link];
+    const world::Model& model = *world_->models[link.instance].model;
     return model.links[link.link].collisions[hit.shape].surface;
   }
 
  private:
-  Bound<const model::WorldModel> world_;
-  Bound<const model::BodyLayout> layout_;
+  Bound<const world::WorldModel> world_;
+  Bound<const world::BodyLayout> layout_;
   LinkIndex link_;
   BodyIndex body_;      // none: static, X_BS_ is then X_WS
   bool turns_ = false;  // with a wheel that is part of that body

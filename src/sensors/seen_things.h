@@ -12,7 +12,7 @@ namespace ruedo {
 
 class SeenThings {
  public:
-  SeenThings(const model::WorldModel& world, const model::BodyLayout& layout)
+  SeenThings(const world::WorldModel& world, const world::BodyLayout& layout)
       : world_(world), layout_(layout) {}
 
   struct Thing {
@@ -30,10 +30,10 @@ class SeenThings {
   void update();
 
  private:
-  Thing thing_of(const model::ListedBody& listed);
+  Thing thing_of(const world::ListedBody& listed);
 
-  const model::WorldModel& world_;
-  const model::BodyLayout& layout_;
+  const world::WorldModel& world_;
+  const world::BodyLayout& layout_;
   std::vector<Thing> things_{Thing{}};
 };
 

@@ -81,7 +81,7 @@ class ThermalCamera : public Sensor {
     static const Element kNothing;
     const Element* plugin = &kNothing;
     for (const Element* each : sensor.all("plugin")) {
-      if (model::kind_of(*each).name == "ThermalSensor") plugin = each;
+      if (world::kind_of(*each).name == "ThermalSensor") plugin = each;
     }
     resolution_ = plugin->number("resolution", bytes_ == 1 ? 3.0 : 0.01,
                                  Allowed::positive(quantity::kFactor));

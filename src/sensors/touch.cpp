@@ -63,7 +63,7 @@ class Touch : public SensorOf<Touch> {
   void exchange(StateArchive& archive) { archive(since_, pressed_, shown_step_); }
 
  private:
-  const model::Model& model() const { return *world_->models[own_].model; }
+  const world::Model& model() const { return *world_->models[own_].model; }
 
   void find_shapes(const SensorSetup& setup) {
     const std::vector<const Element*> named = setup.element.all("ruedo:collision");
@@ -88,7 +88,7 @@ class Touch : public SensorOf<Touch> {
   // From a contact sensor.
   bool is_felt(ModelLinkIndex link, const std::string& shape) const {
     return std::any_of(model().sensors.begin(), model().sensors.end(),
-                       [&](const model::SensorDescription& each) {
+                       [&](const world::SensorDescription& each) {
                          if (each.type != "contact" || each.link != link) return false;
                          const Element* contact = each.element->child("contact");
                          if (!contact || !contact->has("collision")) return true;
@@ -108,9 +108,9 @@ class Touch : public SensorOf<Touch> {
 
   // In both notations used by Gazebo: model/M/link/L/collision/C, and M::L::C.
   bool is_target(LinkIndex index, ShapeIndex shape) const {
-    const model::LinkPlacement& placed = layout_->links[index];
-    const model::ModelInstance& instance = world_->models[placed.instance];
-    const model::Link& link = instance.model->links[placed.link];
+    const world::LinkPlacement& placed = layout_->links[index];
+    const world::ModelInstance& instance = world_->models[placed.instance];
+    const world::Link& link = instance.model->links[placed.link];
     std::string path, classic;
     for (std::string rest = instance.name + "." + link.name; !rest.empty();) {
       const size_t dot = rest.find('.');
@@ -125,7 +125,7 @@ class Touch : public SensorOf<Touch> {
     };
     if (shape.valid()) return is_it(link.collisions[shape].name);
     return std::any_of(link.collisions.begin(), link.collisions.end(),
-                       [&](const model::Collision& each) { return is_it(each.name); });
+                       [&](const world::Collision& each) { return is_it(each.name); });
   }
 
   // Which side of the contact is the model's: 1 for a, -1 for b; 0: not a contact with the target.
@@ -150,8 +150,8 @@ class Touch : public SensorOf<Touch> {
     out.publish(channel_, message_);
   }
 
-  Bound<const model::WorldModel> world_;
-  Bound<const model::BodyLayout> layout_;
+  Bound<const world::WorldModel> world_;
+  Bound<const world::BodyLayout> layout_;
   InstanceIndex own_;
   int channel_;
   std::string target_;

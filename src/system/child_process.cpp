@@ -17,7 +17,7 @@
 #include "system/end_with_parent.h"
 #include "system/file_handle.h"
 
-namespace ruedo::model {
+namespace ruedo {
 namespace {
 
 constexpr size_t kMessages_bytes = size_t{64} << 10;
@@ -138,4 +138,4 @@ ProcessResult run_limited(std::vector<std::string> words, const ProcessLimits& l
   return result;
 }
 
-}  // namespace ruedo::model
+}  // namespace ruedo

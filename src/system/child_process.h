@@ -10,7 +10,7 @@
 
 #include "system/sandbox.h"
 
-namespace ruedo::model {
+namespace ruedo {
 
 struct ProcessLimits {
   rlim_t cpu_s = 0;
@@ -35,4 +35,4 @@ struct ProcessResult {
 ProcessResult run_limited(std::vector<std::string> words, const ProcessLimits& limits,
                           const std::function<bool()>& give_up = nullptr);
 
-}  // namespace ruedo::model
+}  // namespace ruedo

@@ -257,7 +257,7 @@ SensorKind guarded(SensorKind kind, const std::string& plugin) {
   const std::string who = "the plugin " + plugin;
   SensorKind made = kind;
   if (kind.drive_rate) {
-    made.drive_rate = [who, rate = kind.drive_rate](const model::DriveDescription& drive) {
+    made.drive_rate = [who, rate = kind.drive_rate](const world::DriveDescription& drive) {
       return call(who, [&] { return rate(drive); });
     };
   }

@@ -25,7 +25,7 @@
 
 namespace fs = std::filesystem;
 
-namespace ruedo::model {
+namespace ruedo::world {
 namespace {
 
 class Loader {
@@ -315,4 +315,4 @@ std::shared_ptr<const WorldModel> load_world_text(const std::string& text, const
   return TextLoader(path, options).load(text);
 }
 
-}  // namespace ruedo::model
+}  // namespace ruedo::world

@@ -7,7 +7,7 @@
 
 #include "world/model/world_model.h"
 
-namespace ruedo::model {
+namespace ruedo::world {
 
 // --spawn MODEL[:NAME]@X,Y[,YAW]
 struct Spawn {
@@ -71,4 +71,4 @@ class TextLoader {
   std::unique_ptr<Impl> impl_;
 };
 
-}  // namespace ruedo::model
+}  // namespace ruedo::world

@@ -8,7 +8,7 @@
 
 namespace fs = std::filesystem;
 
-namespace ruedo::model {
+namespace ruedo::world {
 namespace {
 
 // A missing file of the world's folder.
@@ -87,4 +87,4 @@ LoadedModel load_model_text(const std::string& text, const std::string& world_fi
   }
 }
 
-}  // namespace ruedo::model
+}  // namespace ruedo::world

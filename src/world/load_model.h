@@ -8,7 +8,7 @@
 #include "world/model/world_model.h"
 #include "world/read/load_budget.h"
 
-namespace ruedo::model {
+namespace ruedo::world {
 
 inline constexpr size_t kMostLinksOfSpawned = 1000;
 
@@ -44,4 +44,4 @@ void name_shared_paths(const WorldModel& world, Findings& findings);
 // The file that load_model() would read. Throws InputError if there is none.
 std::string model_file(const std::string& name, const std::string& world_file);
 
-}  // namespace ruedo::model
+}  // namespace ruedo::world

@@ -7,7 +7,7 @@
 #include "ruedo/errors.h"
 #include "world/load.h"
 
-namespace ruedo::model {
+namespace ruedo::world {
 Spawn parse_spawn(const std::string& text) {
   const std::string allowed =
       "it looks like MODEL[:NAME]@X,Y[,YAW], for example p3at:rover@1,2.5,1.57";
@@ -73,4 +73,4 @@ Setting parse_setting(const std::string& text) {
           text.substr(dot + 1, equals - dot - 1), text.substr(equals + 1)};
 }
 
-}  // namespace ruedo::model
+}  // namespace ruedo::world

@@ -12,7 +12,7 @@
 #include "world/model/odd_drive.h"
 #include "world/sdf/sdf_reader.h"
 
-namespace ruedo::model {
+namespace ruedo::world {
 namespace {
 
 // Elements of sensors that nothing here reads.
@@ -307,4 +307,4 @@ void apply_disabled(const std::vector<std::string>& disabled, WorldModel& world)
   }
 }
 
-}  // namespace ruedo::model
+}  // namespace ruedo::world

@@ -6,7 +6,7 @@
 
 #include "world/load.h"
 
-namespace ruedo::model {
+namespace ruedo::world {
 
 // Each changed robot gets a model of its own; the others keep sharing theirs. Throws InputError for
 // a robot, device or key that does not exist, listing those that do.
@@ -20,4 +20,4 @@ void apply_drives(const std::vector<DriveOption>& drives, WorldModel& world);
 // recorded in the world.
 void apply_disabled(const std::vector<std::string>& disabled, WorldModel& world);
 
-}  // namespace ruedo::model
+}  // namespace ruedo::world

@@ -12,7 +12,7 @@
 
 namespace fs = std::filesystem;
 
-namespace ruedo::model {
+namespace ruedo::world {
 namespace {
 
 constexpr const char* kEndings[] = {".sdf", ".world"};
@@ -62,4 +62,4 @@ std::string world_file(const std::string& name) {
                                   joined(searched) + ")");
 }
 
-}  // namespace ruedo::model
+}  // namespace ruedo::world

@@ -3,11 +3,11 @@
 
 #include <string>
 
-namespace ruedo::model {
+namespace ruedo::world {
 
 // The file that a user means: an existing file, or NAME.sdf or NAME.world among Ruedo's own worlds
 // or in a folder of RUEDO_PATH. Throws InputError, listing the existing names and the folders
 // searched.
 std::string world_file(const std::string& name);
 
-}  // namespace ruedo::model
+}  // namespace ruedo::world

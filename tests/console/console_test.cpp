@@ -305,7 +305,7 @@ TEST_F(EventsTest, NamesOfAnyLengthAreShortened) {
 }
 
 TEST_F(EventsTest, FaultsOfTheRunItselfComeWhenTheirTimeDoes) {
-  model::Fault late, early;
+  world::Fault late, early;
   early.robot = late.robot = "r";
   early.kind = "dropout";
   early.target = "lrf";
@@ -446,7 +446,7 @@ TEST_F(TapTest, NothingIsMissedWhenTwoThreadsOfferInTheSameMoment) {
 
 // A viewer that has just come, or just said what it wants, gets the reply to its next request.
 TEST_F(TapTest, AViewerMissesNothingFromItsFirstWordOn) {
-  const auto world = std::make_shared<const model::WorldModel>();
+  const auto world = std::make_shared<const world::WorldModel>();
   Stage stage;
   stage.source = std::make_unique<LiveSource>(tap,
                                               LiveHost{.world = [=] { return world; },

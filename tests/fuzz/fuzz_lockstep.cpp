@@ -24,8 +24,8 @@
 
 // There is no world here: what would act on one is never called.
 namespace ruedo::engine {
-model::Fault fault_of(const fault_t&) { return {}; }
-void Faults::begin(const model::Fault&, RobotIndex, int64_t) { std::abort(); }
+world::Fault fault_of(const fault_t&) { return {}; }
+void Faults::begin(const world::Fault&, RobotIndex, int64_t) { std::abort(); }
 void Faults::command(const robot::Command&, size_t, int64_t, robot::Robots&) { std::abort(); }
 }  // namespace ruedo::engine
 

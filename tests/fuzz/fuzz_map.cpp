@@ -7,7 +7,7 @@
 #include "world/read/geometry.h"
 
 extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
-  using namespace ruedo::model;
+  using namespace ruedo::world;
   static const ScratchFolder folder;
   static const std::string picture = [] {
     const uint8_t pgm[] = "P5\n2 2\n255\nabcd";

@@ -15,16 +15,16 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
     if (data[0] < 8) {
       const std::string path =
           folder.write(std::string("mesh.") + kKinds[data[0]], data + 1, size - 1);
-      const ruedo::model::ResourceFinder finder(path, false);
-      ruedo::model::MeshImport import;
+      const ruedo::world::ResourceFinder finder(path, false);
+      ruedo::world::MeshImport import;
       import.cache = false;
       import.wall_limit_s = 5;
       import.cpu_limit_s = 2;
       ruedo::Findings findings;
-      ruedo::model::TextureStore textures(findings);
-      ruedo::model::MeshLoader(finder, textures, import).load(path);
+      ruedo::world::TextureStore textures(findings);
+      ruedo::world::MeshLoader(finder, textures, import).load(path);
     } else {
-      ruedo::model::unpack_mesh({reinterpret_cast<const char*>(data + 1), size - 1});
+      ruedo::world::unpack_mesh({reinterpret_cast<const char*>(data + 1), size - 1});
     }
   } catch (const ruedo::EnvironmentError&) {
     throw;  // without an importer nothing is tried

@@ -7,7 +7,7 @@
 extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   const Budget budget;
   try {
-    ruedo::model::load_model_text({reinterpret_cast<const char*>(data), size},
+    ruedo::world::load_model_text({reinterpret_cast<const char*>(data), size},
                                   "/nowhere/in/a/world.sdf");
   } catch (const ruedo::InputError&) {
   }

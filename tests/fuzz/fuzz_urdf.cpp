@@ -12,8 +12,8 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   if (text.find("<robot") == std::string::npos)
     text = "<robot name='r'><link name='base'/>" + text + "</robot>";
   try {
-    const auto world = ruedo::model::load_world_text(text, "/nowhere/in/a/robot.urdf");
-    const ruedo::model::BodyLayout layout(*world);
+    const auto world = ruedo::world::load_world_text(text, "/nowhere/in/a/robot.urdf");
+    const ruedo::world::BodyLayout layout(*world);
   } catch (const ruedo::InputError&) {
   }
   return 0;

@@ -8,9 +8,9 @@
 extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   const Budget budget;
   try {
-    const auto world = ruedo::model::load_world_text({reinterpret_cast<const char*>(data), size},
+    const auto world = ruedo::world::load_world_text({reinterpret_cast<const char*>(data), size},
                                                      "/nowhere/in/a/world.sdf");
-    const ruedo::model::BodyLayout layout(*world);
+    const ruedo::world::BodyLayout layout(*world);
   } catch (const ruedo::InputError&) {
   }
   return 0;

@@ -92,8 +92,8 @@ void move_arm(engine::Engine& engine, const std::string& robot, int turn) {
 }
 
 std::string run(const Run& run, int threads) {
-  model::LoadOptions load;
-  for (const std::string& spawn : run.spawns) load.spawns.push_back(model::parse_spawn(spawn));
+  world::LoadOptions load;
+  for (const std::string& spawn : run.spawns) load.spawns.push_back(world::parse_spawn(spawn));
   load.disabled = run.disabled;
   const std::string name = run.world,
                     world = name.ends_with(".sdf") ? RUEDO_GOLDEN_DIR "/" + name : name;
@@ -101,7 +101,7 @@ std::string run(const Run& run, int threads) {
   options.threads = threads;
   options.fleet.seed = 7;
   options.fleet.disabled = run.disabled;
-  engine::Engine engine(model::load_world(world, load), options);
+  engine::Engine engine(world::load_world(world, load), options);
   Hash hash;
   engine.on_message(
       [&](int, int64_t step, const engine::Channel& channel, std::span<const uint8_t> bytes) {

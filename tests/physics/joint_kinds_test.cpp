@@ -194,7 +194,7 @@ TEST(JointKinds, AMotorHoldsAnArmThroughItsGearbox) {
 
 TEST(JointKinds, AGearboxNeedsItsReference) {
   const auto loaded = [](const std::string& more) {
-    return model::load_world_text("<sdf version='1.9'><world name='w'><model name='m'>" +
+    return world::load_world_text("<sdf version='1.9'><world name='w'><model name='m'>" +
                                       link("p", "0 0 0 0 0 0") + link("c", "0 0 0 0 0 0") +
                                       joint("g", "gearbox", "p", "c", "0 0 1", "", more) +
                                       "</model></world></sdf>",

@@ -15,12 +15,12 @@ constexpr double kNaN = std::numeric_limits<double>::quiet_NaN(),
                  kInfinity = std::numeric_limits<double>::infinity();
 
 // A wheel of the given mass and moment on a hinge, beside a heavy and a light box.
-std::shared_ptr<const model::WorldModel> hinged(const std::string& mass,
+std::shared_ptr<const world::WorldModel> hinged(const std::string& mass,
                                                 const std::string& moment) {
   const std::string inertial = "<inertial><mass>" + mass + "</mass><inertia><ixx>" + moment +
                                "</ixx><iyy>" + moment + "</iyy><izz>" + moment +
                                "</izz></inertia></inertial>";
-  return model::load_world_text(
+  return world::load_world_text(
       "<sdf version='1.9'><world name='w'><model name='m'><link name='a'><pose>0 0 1 0 0 "
       "0</pose></link><link name='b'><pose>1 0 1 0 0 0</pose>" +
           inertial +
@@ -33,7 +33,7 @@ std::shared_ptr<const model::WorldModel> hinged(const std::string& mass,
 
 TEST(StateCheck, NamesWhatIsNotFinite) {
   const auto world = hinged("1", "1");
-  const model::BodyLayout layout(*world);
+  const world::BodyLayout layout(*world);
   PhysicsWorld physics(*world, layout);
   const auto error_with = [&](const auto& spoil) -> std::string {
     Snapshot snapshot;
@@ -74,7 +74,7 @@ TEST(StateCheck, EffortsThatAreAllowedStayFinite) {
                                      {"1e9", "1e15"},
                                      {"1", "1"}}) {
     const auto world = hinged(mass, moment);
-    const model::BodyLayout layout(*world);
+    const world::BodyLayout layout(*world);
     PhysicsWorld physics(*world, layout);
     Snapshot snapshot;
     for (int step = 0; step < 500; ++step) {
@@ -92,7 +92,7 @@ TEST(StateCheck, EffortsThatAreAllowedStayFinite) {
 
 TEST(StateCheck, StepsThrowForWhatIsNotFinite) {
   const auto world = hinged("1", "1");
-  const model::BodyLayout layout(*world);
+  const world::BodyLayout layout(*world);
   PhysicsWorld physics(*world, layout);
   physics.set_twist(BodyIndex(1), {Vec3(0, 0, kNaN), Vec3::Zero()});
   EXPECT_THROW(physics.step(), StateError);

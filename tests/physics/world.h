@@ -14,7 +14,7 @@ class World {
  public:
   // solver: the content of <bullet>.
   explicit World(const std::string& models, int64_t step_us = 2000, const std::string& solver = "")
-      : world(model::load_world_text("<sdf version='1.9' xmlns:ruedo='https://ruedo.org'><world "
+      : world(world::load_world_text("<sdf version='1.9' xmlns:ruedo='https://ruedo.org'><world "
                                      "name='w'><gravity>0 0 -10</gravity>"
                                      "<physics type='x'><max_step_size>" +
                                          std::to_string(static_cast<double>(step_us) * 1e-6) +
@@ -34,13 +34,13 @@ class World {
     return {};
   }
   Vec3 position(const std::string& name) const { return physics.pose(body(name)).translation; }
-  std::shared_ptr<const model::WorldModel> world;
-  model::BodyLayout layout;
+  std::shared_ptr<const world::WorldModel> world;
+  world::BodyLayout layout;
   PhysicsWorld physics;
 
  private:
-  static model::LoadOptions anywhere() {
-    model::LoadOptions options;
+  static world::LoadOptions anywhere() {
+    world::LoadOptions options;
     options.allow_absolute = true;  // meshes that a test wrote
     return options;
   }

@@ -129,7 +129,7 @@ TEST(KinematicContact, AVelocityBlockedByAWallSaysSo) {
 }
 
 std::string blocked_by(const Sim& sim, int robot = 0) {
-  return model::body_name(*sim.world, sim.layout, sim.robot(robot).motion.blocked_by);
+  return world::body_name(*sim.world, sim.layout, sim.robot(robot).motion.blocked_by);
 }
 
 // The robot rubs along a wall at its side all the way, and stops at a crate in the end.
@@ -226,7 +226,7 @@ std::vector<std::string> collides_with(const Sim& sim, int robot = 0) {
     const Contact& contact = sim.state.contacts[each.contact];
     if (each.robot != robot) continue;
     names.push_back(
-        model::body_name(*sim.world, sim.layout, each.as_a ? contact.link_b : contact.link_a));
+        world::body_name(*sim.world, sim.layout, each.as_a ? contact.link_b : contact.link_a));
   }
   std::sort(names.begin(), names.end());
   names.erase(std::unique(names.begin(), names.end()), names.end());

@@ -125,7 +125,7 @@ inline std::string box_sdf(const std::string& name, const std::string& pose,
 class Sim {
  public:
   explicit Sim(const std::string& models, int64_t step_us = 5000)
-      : world(model::load_world_text(
+      : world(world::load_world_text(
             "<sdf version='1.9' xmlns:ruedo='https://ruedo.org'><world name='w'><gravity>0 0 "
             "-9.8</gravity><physics type='x'><max_step_size>" +
                 std::to_string(static_cast<double>(step_us) * 1e-6) + "</max_step_size></physics>" +
@@ -161,8 +161,8 @@ class Sim {
     return -1;
   }
 
-  std::shared_ptr<const model::WorldModel> world;
-  model::BodyLayout layout;
+  std::shared_ptr<const world::WorldModel> world;
+  world::BodyLayout layout;
   physics::PhysicsWorld physics;
   Robots robots;
   Snapshot state;

@@ -72,7 +72,7 @@ std::vector<Command> random_commands(std::mt19937& random, int robots, int64_t s
   return commands;
 }
 
-std::map<int64_t, Told> by_server(const std::shared_ptr<const model::WorldModel>& world,
+std::map<int64_t, Told> by_server(const std::shared_ptr<const world::WorldModel>& world,
                                   uint64_t seed, const std::vector<Command>& commands,
                                   int64_t steps) {
   LossyBus bus({}, 1);

@@ -176,19 +176,19 @@ class FaultsTest : public testing::Test {
     device.kind = "odometry";
     return {device};
   }
-  static model::Fault made(const char* kind, const char* target, double duration_s, double value) {
-    model::Fault fault;
+  static world::Fault made(const char* kind, const char* target, double duration_s, double value) {
+    world::Fault fault;
     fault.kind = kind;
     fault.target = target;
     fault.duration_s = duration_s;
     fault.value = value;
     return fault;
   }
-  bool takes(const model::Fault& fault) const { return faults_.check(fault, RobotIndex(0)) == ""; }
-  void begin(const model::Fault& fault, int64_t step) { faults_.begin(fault, RobotIndex(0), step); }
+  bool takes(const world::Fault& fault) const { return faults_.check(fault, RobotIndex(0)) == ""; }
+  void begin(const world::Fault& fault, int64_t step) { faults_.begin(fault, RobotIndex(0), step); }
 
-  std::shared_ptr<const model::WorldModel> world_ = load_text(robot_sdf("r", 0, 0));
-  model::BodyLayout layout_{*world_};
+  std::shared_ptr<const world::WorldModel> world_ = load_text(robot_sdf("r", 0, 0));
+  world::BodyLayout layout_{*world_};
   physics::PhysicsWorld physics_{*world_, layout_};
   robot::Robots robots_{*world_, layout_, physics_};
   std::vector<device_info_t> devices_ = one_device();
@@ -199,7 +199,7 @@ constexpr double kStep_s = 0.005;
 
 // Of sensors: the list that a batch gets has those that act on any of its steps.
 TEST_F(FaultsTest, OfSensorsMakeRoomWhenTheyHaveEnded) {
-  const model::Fault short_one = made("dropout", "odometry", kStep_s, 0.0);
+  const world::Fault short_one = made("dropout", "odometry", kStep_s, 0.0);
   for (int64_t step = 0; step < 3000; ++step) {
     ASSERT_TRUE(takes(short_one)) << step;
     begin(short_one, step);  // of the state step + 1
@@ -211,10 +211,10 @@ TEST_F(FaultsTest, OfSensorsMakeRoomWhenTheyHaveEnded) {
 }
 
 TEST_F(FaultsTest, OfRobotsMakeRoomWhenTheyHaveEnded) {
-  const model::Fault weak = made("weak_motor", "", kStep_s, 0.5),
+  const world::Fault weak = made("weak_motor", "", kStep_s, 0.5),
                      kidnapped = made("kidnapped", "", 0.0, 0.0);
   for (int64_t step = 0; step < 3000; ++step) {
-    const model::Fault& fault = step % 2 == 0 ? weak : kidnapped;
+    const world::Fault& fault = step % 2 == 0 ? weak : kidnapped;
     ASSERT_TRUE(takes(fault)) << step;
     begin(fault, step);
     faults_.before_commands(step, robots_);
@@ -225,7 +225,7 @@ TEST_F(FaultsTest, OfRobotsMakeRoomWhenTheyHaveEnded) {
 TEST_F(FaultsTest, OtherSeedsMakeRoomWhenTheyHaveActed) {
   for (int64_t step = 0; step < 3000; ++step) {
     ASSERT_EQ(faults_.new_seed(step), step == 0 ? std::nullopt : std::optional<uint64_t>(step + 9));
-    const model::Fault fault = made("reseeded", "", 0.0, static_cast<double>(step + 10));
+    const world::Fault fault = made("reseeded", "", 0.0, static_cast<double>(step + 10));
     ASSERT_TRUE(takes(fault)) << step;
     begin(fault, step);
     // A batch of this step may have begun so early.
@@ -235,7 +235,7 @@ TEST_F(FaultsTest, OtherSeedsMakeRoomWhenTheyHaveActed) {
 }
 
 TEST_F(FaultsTest, ThoseThatActAtOnceAreBounded) {
-  const model::Fault weak = made("weak_motor", "", 0.0, 0.5),
+  const world::Fault weak = made("weak_motor", "", 0.0, 0.5),
                      dropout = made("dropout", "odometry", 1e6, 0.0);
   for (int i = 0; i < 500; ++i) {
     begin(weak, 0);
@@ -249,14 +249,14 @@ TEST_F(FaultsTest, ThoseThatActAtOnceAreBounded) {
 // Whatever number a message of the bus has where: it is taken or ignored, and the run goes on.
 TEST_F(FaultsTest, NoNumberOfAMessageEndsTheRun) {
   const double odd[] = {1e300, -1e300, 1e15, -1.0, std::nan(""), HUGE_VAL, -HUGE_VAL, 5e-324};
-  double model::Fault::* const fields[] = {
-      &model::Fault::duration_s, &model::Fault::value, &model::Fault::from,   &model::Fault::to,
-      &model::Fault::x,          &model::Fault::y,     &model::Fault::heading};
-  for (const model::FaultKind& kind : model::fault_kinds()) {
-    const bool of_device = kind.of == model::FaultKind::Of::device;
-    for (double model::Fault::* const field : fields) {
+  double world::Fault::* const fields[] = {
+      &world::Fault::duration_s, &world::Fault::value, &world::Fault::from,   &world::Fault::to,
+      &world::Fault::x,          &world::Fault::y,     &world::Fault::heading};
+  for (const world::FaultKind& kind : world::fault_kinds()) {
+    const bool of_device = kind.of == world::FaultKind::Of::device;
+    for (double world::Fault::* const field : fields) {
       for (const double number : odd) {
-        model::Fault fault = made(kind.name.c_str(), of_device ? "odometry" : "", 0.0, kind.most);
+        world::Fault fault = made(kind.name.c_str(), of_device ? "odometry" : "", 0.0, kind.most);
         fault.*field = number;
         EXPECT_NO_THROW(begin(fault, 0)) << kind.name << " " << number;
       }

@@ -48,8 +48,8 @@ class InboxTest : public testing::Test {
     return speeds;
   }
 
-  std::shared_ptr<const model::WorldModel> world_ = load_text(robot_sdf("r", 0, 0));
-  model::BodyLayout layout_{*world_};
+  std::shared_ptr<const world::WorldModel> world_ = load_text(robot_sdf("r", 0, 0));
+  world::BodyLayout layout_{*world_};
   physics::PhysicsWorld physics_{*world_, layout_};
   robot::Robots robots_{*world_, layout_, physics_};
   std::vector<device_info_t> devices_;

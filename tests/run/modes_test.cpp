@@ -66,8 +66,8 @@ struct FakeWorld {
   engine::CommandInbox inbox{{{"ruedo/markers", {}, engine::Input::Kind::markers}}, 1};
 
  private:
-  std::shared_ptr<const model::WorldModel> world_ = load_text(robot_sdf("r", 0, 0));
-  model::BodyLayout layout_{*world_};
+  std::shared_ptr<const world::WorldModel> world_ = load_text(robot_sdf("r", 0, 0));
+  world::BodyLayout layout_{*world_};
   physics::PhysicsWorld physics_{*world_, layout_};
   std::vector<device_info_t> devices_;
   robot::Robots robots_{*world_, layout_, physics_};

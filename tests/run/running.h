@@ -156,8 +156,8 @@ inline std::string world_sdf(const std::string& models) {
          models + "</world></sdf>";
 }
 
-inline std::shared_ptr<const model::WorldModel> load_text(const std::string& models) {
-  return model::load_world_text(world_sdf(models), "test.sdf");
+inline std::shared_ptr<const world::WorldModel> load_text(const std::string& models) {
+  return world::load_world_text(world_sdf(models), "test.sdf");
 }
 
 // At full speed, for `seconds` of sim time.

@@ -12,7 +12,7 @@ TEST(SdfElements, NoneOfASensorIsSilent) {
     return path.find("/sensor") != std::string::npos;
   };
   const auto load = [](const std::string& text, std::multiset<std::string>& found) {
-    const auto world = model::load_world_text(text, "/nowhere/w.sdf");
+    const auto world = world::load_world_text(text, "/nowhere/w.sdf");
     for (const Finding& finding : world->findings) found.insert(finding.text);
     engine::Channels channels;
     Findings of_devices;
@@ -27,7 +27,7 @@ TEST(SdfElements, NoneOfASensorIsSilent) {
 // Reported when the file is read, or when the device is created, but not twice.
 TEST(SdfElements, AnUnknownOneInASensorIsNamedOnce) {
   const auto count = [](const std::string& text, const std::string& word) {
-    const auto world = model::load_world_text(text, "/nowhere/w.sdf");
+    const auto world = world::load_world_text(text, "/nowhere/w.sdf");
     engine::Channels channels;
     Findings of_devices;
     engine::FleetOptions options;

@@ -199,14 +199,14 @@ TEST(SpawnWorker, InLockstepTheStepIsThatOfTheGrants) {
 }
 
 TEST(LoadBudget, IsSpent) {
-  model::LoadBudget memory(std::chrono::seconds(1000), size_t{3} << 20);
+  world::LoadBudget memory(std::chrono::seconds(1000), size_t{3} << 20);
   memory.take_time();
   memory.take_mesh(size_t{2} << 20);
   EXPECT_THROW(memory.take_mesh(size_t{2} << 20), std::runtime_error);
   EXPECT_EQ(memory.fault(), "its meshes take more than 3 MiB of memory");
-  model::LoadBudget time(std::chrono::seconds(-1), 1);
+  world::LoadBudget time(std::chrono::seconds(-1), 1);
   EXPECT_THROW(time.take_time(), std::runtime_error);
-  model::LoadBudget left(std::chrono::seconds(1000), 1);
+  world::LoadBudget left(std::chrono::seconds(1000), 1);
   left.leave_off();
   EXPECT_TRUE(left.is_over());
 }

@@ -86,7 +86,7 @@ struct Variation {
 };
 
 // The log of two seconds of driving robots. The commands are queued before the first step.
-std::string log_of(const std::shared_ptr<const model::WorldModel>& world,
+std::string log_of(const std::shared_ptr<const world::WorldModel>& world,
                    const Variation& variation) {
   const TemporaryFile file("determinism.lcmlog");
   const engine::ThreadLimit limit(variation.threads);

@@ -12,8 +12,8 @@ namespace ruedo::run {
 namespace {
 
 struct Fleet {
-  std::shared_ptr<const model::WorldModel> world;
-  model::LoadOptions load;
+  std::shared_ptr<const world::WorldModel> world;
+  world::LoadOptions load;
 };
 
 // Two columns of walls among robots on a grid of 3 m, so that rays meet walls, robots and nothing;
@@ -38,7 +38,7 @@ Fleet fleet(int robots) {
         " 0.5 0 0 0</pose><link name='l'><collision name='c'><geometry><box><size>0.4 1.5 1</size>"
         "</box></geometry></collision></link></model>";
   }
-  fleet.world = model::load_world_text(sdf + "</world></sdf>", "hundred.sdf", fleet.load);
+  fleet.world = world::load_world_text(sdf + "</world></sdf>", "hundred.sdf", fleet.load);
   return fleet;
 }
 

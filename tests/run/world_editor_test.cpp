@@ -8,10 +8,10 @@
 namespace ruedo::engine {
 namespace {
 
-std::shared_ptr<const model::Model> made() { return std::make_shared<model::Model>(); }
+std::shared_ptr<const world::Model> made() { return std::make_shared<world::Model>(); }
 
-model::WorldModel with(const std::vector<std::string>& names) {
-  model::WorldModel world;
+world::WorldModel with(const std::vector<std::string>& names) {
+  world::WorldModel world;
   for (const std::string& name : names) world.models.push_back({name, Pose{}, made()});
   return world;
 }
@@ -30,7 +30,7 @@ TEST(WorldEditor, FindsTheFirstUnusedName) {
 }
 
 TEST(WorldEditor, NamesOfTheRemovedAreFree) {
-  model::WorldModel world = with({"cart", "cart_2"});
+  world::WorldModel world = with({"cart", "cart_2"});
   WorldEditor(world).remove(InstanceIndex(0));
   EXPECT_EQ(find_model(world, "cart"), -1);
   EXPECT_EQ(find_model(world, "cart_2"), 1);
@@ -38,7 +38,7 @@ TEST(WorldEditor, NamesOfTheRemovedAreFree) {
 }
 
 TEST(WorldEditor, PlacesAModelWhereOneOfItsKindWas) {
-  model::WorldModel world = with({"a", "b", "c"});
+  world::WorldModel world = with({"a", "b", "c"});
   WorldEditor editor(world);
   const auto model = world.models[1].model;
   editor.remove(InstanceIndex(1));
@@ -60,7 +60,7 @@ TEST(WorldEditor, SpawnsWhereTheRequestSays) {
   request.position[0] = 1.0;
   request.position[2] = 0.5;
   request.orientation[0] = 1.0005;  // as good as a unit quaternion
-  const Pose X_WM = spawn_pose(model::WorldModel{}, model::Model{}, request);
+  const Pose X_WM = spawn_pose(world::WorldModel{}, world::Model{}, request);
   EXPECT_EQ(X_WM.translation, Vec3(1.0, 0.0, 0.5));
   EXPECT_EQ(X_WM.rotation.w(), 1.0);
 }

@@ -10,13 +10,13 @@ namespace {
 // The mesh alone, static (one flat tree) or moving (a tree of its own).
 struct Alone {
   World world;
-  std::unique_ptr<model::BodyLayout> layout;
+  std::unique_ptr<world::BodyLayout> layout;
   std::unique_ptr<RayScene> scene;
 
-  Alone(std::shared_ptr<const model::Mesh> mesh, const Pose& pose, bool is_static,
+  Alone(std::shared_ptr<const world::Mesh> mesh, const Pose& pose, bool is_static,
         Backend backend = Backend::embree) {
     world.add(pose, mesh_geometry(std::move(mesh)), is_static);
-    layout = std::make_unique<model::BodyLayout>(world.model);
+    layout = std::make_unique<world::BodyLayout>(world.model);
     scene = make_ray_scene(make_static_ray_scene(world.model, *layout, false, backend));
   }
 };
@@ -110,8 +110,8 @@ TEST(RayMesh, BoxOfTrianglesIsABox) {
   RandomStream random = RandomSource(5, "rays", "box").stream(0);
   const Pose pose = random_pose(random, 2.0);
   World boxes;
-  boxes.add(pose, geometry(model::Shape::box, {2, 2, 2}));
-  const model::BodyLayout layout(boxes.model);
+  boxes.add(pose, geometry(world::Shape::box, {2, 2, 2}));
+  const world::BodyLayout layout(boxes.model);
   const auto exact = make_ray_scene(make_static_ray_scene(boxes.model, layout));
   for (const bool is_static : {true, false}) {
     const Alone alone(cube_mesh(), pose, is_static);
@@ -145,7 +145,7 @@ TEST(RayMesh, DegenerateTrianglesAreNoTrouble) {
 }
 
 TEST(RayMesh, EmptyMeshIsNothing) {
-  const Alone alone(std::make_shared<model::Mesh>(), {}, true);
+  const Alone alone(std::make_shared<world::Mesh>(), {}, true);
   EXPECT_FALSE(alone.scene->cast({{-4, 0, 0}, {1, 0, 0}}).hit());
 }
 

@@ -15,7 +15,7 @@
 namespace ruedo::scene {
 namespace {
 
-using model::Shape;
+using world::Shape;
 
 bool same_bits(const Hit& a, const Hit& b) {
   return std::memcmp(&a.range, &b.range, sizeof a.range) == 0 && a.link == b.link &&
@@ -23,7 +23,7 @@ bool same_bits(const Hit& a, const Hit& b) {
          std::memcmp(a.normal.data(), b.normal.data(), 3 * sizeof(double)) == 0;
 }
 
-model::Geometry random_geometry(RandomStream& random) {
+world::Geometry random_geometry(RandomStream& random) {
   const Vec3 size(0.2 + 2 * random.uniform(), 0.2 + 2 * random.uniform(),
                   0.2 + 2 * random.uniform());
   switch (random.bits() % 9) {
@@ -40,12 +40,12 @@ model::Geometry random_geometry(RandomStream& random) {
 
 struct Scenes {
   World world;
-  std::unique_ptr<model::BodyLayout> layout;
+  std::unique_ptr<world::BodyLayout> layout;
   std::unique_ptr<RayScene> fast, slow;
   Snapshot snapshot;
 
   void make(bool visuals = false) {
-    layout = std::make_unique<model::BodyLayout>(world.model);
+    layout = std::make_unique<world::BodyLayout>(world.model);
     fast = make_ray_scene(make_static_ray_scene(world.model, *layout, visuals, Backend::embree));
     slow = make_ray_scene(make_static_ray_scene(world.model, *layout, visuals, Backend::reference));
     for (const auto& body : layout->bodies) snapshot.bodies.push_back(body.X_WB);
@@ -78,7 +78,7 @@ TEST(RayScene, RandomWorldsEqualTheReference) {
     Scenes scenes;
     if (seed % 2) scenes.world.add(at({0, 0, -size / 2}), plane({0, 0, 1}));
     for (int i = 0; i < 25; ++i) {
-      std::vector<std::pair<Pose, model::Geometry>> shapes;
+      std::vector<std::pair<Pose, world::Geometry>> shapes;
       for (uint32_t k = random.bits() % 4; k < 4; ++k)
         shapes.emplace_back(random_pose(random, 1.5), random_geometry(random));
       scenes.world.add(random_pose(random, size), std::move(shapes), i % 2 == 0);
@@ -211,9 +211,9 @@ TEST(RayScene, MoversWithoutAPlaceAreNotThere) {
 TEST(RayScene, WheelsTurn) {
   Scenes scenes;
   scenes.world.add({}, geometry(Shape::box, {0.1, 0.1, 1.0}), false);
-  scenes.layout = std::make_unique<model::BodyLayout>(scenes.world.model);
+  scenes.layout = std::make_unique<world::BodyLayout>(scenes.world.model);
   scenes.layout->links[0].wheel = WheelIndex(0);
-  model::WheelPlacement wheel;
+  world::WheelPlacement wheel;
   wheel.link = LinkIndex(0);
   wheel.axis_in_L = Vec3::UnitY();
   scenes.layout->wheels.push_back(wheel);
@@ -239,24 +239,24 @@ TEST(RayScene, WheelsTurn) {
 TEST(RayScene, WheelsTurnAboutTheirAxisWhereverTheirLinksAre) {
   World world;
   world.add({}, {{at({1, 0, 0}), geometry(Shape::box, {0.1, 0.1, 1.0})}}, false);
-  auto model = std::make_shared<model::Model>(*world.model.models[0].model);
-  model::Link cap;
+  auto model = std::make_shared<world::Model>(*world.model.models[0].model);
+  world::Link cap;
   cap.name = "cap";
   cap.X_ML = {Quat(Eigen::AngleAxisd(M_PI / 2, Vec3::UnitZ())), Vec3(1, 0, 0)};
   cap.collisions.emplace_back();
   cap.collisions[0].X_LC = at({2, 0, 0.5});  // in the model: (1, 2, 0.5)
   cap.collisions[0].geometry = geometry(Shape::box, {0.2, 0.2, 0.2});
   model->links.push_back(cap);
-  model::Joint joint;
-  joint.type = model::JointType::fixed;
+  world::Joint joint;
+  joint.type = world::JointType::fixed;
   joint.parent = ModelLinkIndex(0);
   joint.child = ModelLinkIndex(1);
   model->joints.push_back(joint);
   world.model.models[0].model = model;
-  model::BodyLayout layout(world.model);
+  world::BodyLayout layout(world.model);
   ASSERT_EQ(layout.bodies.size(), 1u);
   layout.links[0].wheel = layout.links[1].wheel = WheelIndex(0);
-  model::WheelPlacement wheel;
+  world::WheelPlacement wheel;
   wheel.link = LinkIndex(0);
   wheel.center_in_L = Vec3(1, 0, 0);
   layout.wheels.push_back(wheel);
@@ -278,8 +278,8 @@ TEST(RayScene, WheelsTurnAboutTheirAxisWhereverTheirLinksAre) {
 TEST(RayScene, VisualsWhenAsked) {
   World world;
   world.add({}, geometry(Shape::box, {2, 2, 2}));
-  auto model = std::make_shared<model::Model>(*world.model.models[0].model);
-  model::Visual visual;
+  auto model = std::make_shared<world::Model>(*world.model.models[0].model);
+  world::Visual visual;
   visual.geometry = geometry(Shape::sphere, {0.5, 0, 0});
   model->links[0].visuals.push_back(visual);
   visual.X_LV.translation.x() = -1.0;
@@ -291,7 +291,7 @@ TEST(RayScene, VisualsWhenAsked) {
   visual.geometry.extent = {1.0, 2.0};  // a wall of 1 m (along z: x of the plane) by 2 m
   model->links[0].visuals.push_back(visual);
   world.model.models[0].model = model;
-  const model::BodyLayout layout(world.model);
+  const world::BodyLayout layout(world.model);
   const auto scene = make_ray_scene(make_static_ray_scene(world.model, layout, true));
   EXPECT_EQ(scene->cast({{-5, 0, 0}, Vec3::UnitX()}).range, 4.5);
   EXPECT_NEAR(scene->cast({{-5, 0.9, 0.4}, Vec3::UnitX()}).range, 8.0, 1e-12);
@@ -328,7 +328,7 @@ TEST(RayScene, LeavesTbbItsThreads) {
   constexpr auto kThreads = tbb::global_control::max_allowed_parallelism;
   const tbb::global_control four(kThreads, 4);  // on one core, too
   Scenes scenes;
-  scenes.world.add(at({1, 0, 0}), geometry(model::Shape::box, {1, 1, 1}));
+  scenes.world.add(at({1, 0, 0}), geometry(world::Shape::box, {1, 1, 1}));
   scenes.make();
   EXPECT_EQ(tbb::global_control::active_value(kThreads), 4u);
 }

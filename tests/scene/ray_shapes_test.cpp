@@ -9,25 +9,25 @@
 namespace ruedo::scene {
 namespace {
 
-using model::Shape;
+using world::Shape;
 constexpr double kNothing = std::numeric_limits<double>::infinity();
 const double kHalf = std::sqrt(0.5);
 
 struct Case {
   const char* what;
-  model::Geometry shape;
+  world::Geometry shape;
   Pose pose;
   Vec3 origin, direction;
   double range;
   Vec3 normal;
 };
 
-const model::Geometry kBox = geometry(Shape::box, {2, 4, 6});
-const model::Geometry kBall = geometry(Shape::sphere, {2, 0, 0});
-const model::Geometry kCylinder = geometry(Shape::cylinder, {1, 4, 0});  // z from -2 to 2
-const model::Geometry kCapsule = geometry(Shape::capsule, {1, 4, 0});    // z from -3 to 3
-const model::Geometry kEllipsoid = geometry(Shape::ellipsoid, {1, 2, 3});
-const model::Geometry kCone =
+const world::Geometry kBox = geometry(Shape::box, {2, 4, 6});
+const world::Geometry kBall = geometry(Shape::sphere, {2, 0, 0});
+const world::Geometry kCylinder = geometry(Shape::cylinder, {1, 4, 0});  // z from -2 to 2
+const world::Geometry kCapsule = geometry(Shape::capsule, {1, 4, 0});    // z from -3 to 3
+const world::Geometry kEllipsoid = geometry(Shape::ellipsoid, {1, 2, 3});
+const world::Geometry kCone =
     geometry(Shape::cone, {1, 2, 0});  // apex at z 1, base at z -1; half as wide at z 0
 const Pose kTurned = Pose::from_xyz_rpy({10, 0, 0}, {0, 0, M_PI / 4});
 const double kSlope = std::sqrt(5.0);
@@ -218,7 +218,7 @@ TEST(RayShapes, HandComputed) {
       for (const Backend backend : {Backend::embree, Backend::reference}) {
         World world;
         world.add(c.pose, c.shape, is_static);
-        const model::BodyLayout layout(world.model);
+        const world::BodyLayout layout(world.model);
         const auto scene =
             make_ray_scene(make_static_ray_scene(world.model, layout, false, backend));
         expect_case(c, *scene, is_static ? ", static " : ", mover ");
@@ -251,7 +251,7 @@ TEST(RayShapes, MatchImplicitEquations) {
       const Pose pose = random_pose(random, 3.0);
       World world;
       world.add(pose, geometry(shape, size));
-      const model::BodyLayout layout(world.model);
+      const world::BodyLayout layout(world.model);
       const auto scene = make_ray_scene(make_static_ray_scene(world.model, layout));
       const Vec3 origin = random_vector(random, 4.0);
       const Vec3 direction = (pose * random_vector(random, 0.7) - origin).normalized();

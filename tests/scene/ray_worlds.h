@@ -12,24 +12,24 @@
 
 namespace ruedo::scene {
 
-inline model::Geometry geometry(model::Shape shape, const Vec3& size) {
-  model::Geometry g;
+inline world::Geometry geometry(world::Shape shape, const Vec3& size) {
+  world::Geometry g;
   g.shape = shape;
   g.size = size;
   return g;
 }
 
-inline model::Geometry plane(const Vec3& normal) {
-  model::Geometry g;
-  g.shape = model::Shape::plane;
+inline world::Geometry plane(const Vec3& normal) {
+  world::Geometry g;
+  g.shape = world::Shape::plane;
   g.normal = normal;
   return g;
 }
 
-inline model::Geometry mesh_geometry(std::shared_ptr<const model::Mesh> mesh,
+inline world::Geometry mesh_geometry(std::shared_ptr<const world::Mesh> mesh,
                                      const Vec3& scale = Vec3::Ones()) {
-  model::Geometry g;
-  g.shape = model::Shape::mesh;
+  world::Geometry g;
+  g.shape = world::Shape::mesh;
   g.mesh = std::move(mesh);
   g.scale = scale;
   return g;
@@ -38,19 +38,19 @@ inline model::Geometry mesh_geometry(std::shared_ptr<const model::Mesh> mesh,
 inline Pose at(const Vec3& position) { return {Quat::Identity(), position}; }
 
 struct World {
-  model::WorldModel model;
+  world::WorldModel model;
 
   // A model of one link with these collisions, each at its pose in the link. Returns the link's
   // index.
-  int add(const Pose& X_WM, std::vector<std::pair<Pose, model::Geometry>> shapes,
+  int add(const Pose& X_WM, std::vector<std::pair<Pose, world::Geometry>> shapes,
           bool is_static = true) {
-    auto m = std::make_shared<model::Model>();
+    auto m = std::make_shared<world::Model>();
     m->name = "m" + std::to_string(model.models.size());
     m->is_static = is_static;
     m->links.resize(1);
     m->links[0].name = "link";
     for (auto& [pose, g] : shapes) {
-      model::Collision collision;
+      world::Collision collision;
       collision.X_LC = pose;
       collision.geometry = std::move(g);
       m->links[0].collisions.push_back(std::move(collision));
@@ -58,7 +58,7 @@ struct World {
     model.models.push_back({m->name, X_WM, m});
     return static_cast<int>(model.models.size()) - 1;
   }
-  int add(const Pose& X_WM, model::Geometry g, bool is_static = true) {
+  int add(const Pose& X_WM, world::Geometry g, bool is_static = true) {
     return add(X_WM, {{Pose(), std::move(g)}}, is_static);
   }
 };
@@ -78,8 +78,8 @@ inline Pose random_pose(RandomStream& random, double size) {
 }
 
 // A closed ball of triangles: rings of `n` around z, wound counter-clockwise seen from outside.
-inline std::shared_ptr<model::Mesh> ball_mesh(int n, float radius) {
-  auto mesh = std::make_shared<model::Mesh>();
+inline std::shared_ptr<world::Mesh> ball_mesh(int n, float radius) {
+  auto mesh = std::make_shared<world::Mesh>();
   mesh->closed = true;
   const int rings = n / 2;
   mesh->positions.push_back({0, 0, radius});
@@ -105,8 +105,8 @@ inline std::shared_ptr<model::Mesh> ball_mesh(int n, float radius) {
 }
 
 // The closed cube [-1, 1]^3 of twelve triangles.
-inline std::shared_ptr<model::Mesh> cube_mesh() {
-  auto mesh = std::make_shared<model::Mesh>();
+inline std::shared_ptr<world::Mesh> cube_mesh() {
+  auto mesh = std::make_shared<world::Mesh>();
   mesh->closed = true;
   for (int i = 0; i < 8; ++i)
     mesh->positions.push_back({i & 1 ? 1.f : -1.f, i & 2 ? 1.f : -1.f, i & 4 ? 1.f : -1.f});
@@ -119,8 +119,8 @@ inline std::shared_ptr<model::Mesh> cube_mesh() {
   return mesh;
 }
 
-inline std::shared_ptr<model::Mesh> opened(const model::Mesh& mesh) {
-  auto open = std::make_shared<model::Mesh>(mesh);
+inline std::shared_ptr<world::Mesh> opened(const world::Mesh& mesh) {
+  auto open = std::make_shared<world::Mesh>(mesh);
   open->closed = false;
   return open;
 }

@@ -14,46 +14,46 @@
 namespace ruedo::scene {
 namespace {
 
-using model::Shape;
+using world::Shape;
 
 // A world defined in code. Each thing is a model of one link.
 struct World {
-  model::WorldModel world;
+  world::WorldModel world;
 
-  model::Link& add(const std::string& name, bool is_static, const Pose& X_WM) {
-    auto model = std::make_shared<model::Model>();
+  world::Link& add(const std::string& name, bool is_static, const Pose& X_WM) {
+    auto model = std::make_shared<world::Model>();
     model->name = name;
     model->is_static = is_static;
     model->links.resize(1);
     model->links[0].name = "link";
-    model::Link& link = model->links[0];
+    world::Link& link = model->links[0];
     world.models.push_back({name, X_WM, std::move(model)});
     return link;
   }
-  static model::Visual& show(model::Link& link, Shape shape, const Vec3& size,
-                             const model::Rgba& colour) {
-    model::Visual visual;
+  static world::Visual& show(world::Link& link, Shape shape, const Vec3& size,
+                             const world::Rgba& colour) {
+    world::Visual visual;
     visual.geometry.shape = shape;
     visual.geometry.size = size;
-    visual.material = model::Material{};
+    visual.material = world::Material{};
     visual.material->diffuse = colour;
     link.visuals.push_back(visual);
     return link.visuals.back();
   }
-  model::Visual& box(const std::string& name, const Vec3& at, const Vec3& size,
-                     const model::Rgba& colour, bool is_static = true) {
+  world::Visual& box(const std::string& name, const Vec3& at, const Vec3& size,
+                     const world::Rgba& colour, bool is_static = true) {
     return show(add(name, is_static, {Quat::Identity(), at}), Shape::box, size, colour);
   }
 };
 
-Snapshot start(const model::BodyLayout& layout) {
+Snapshot start(const world::BodyLayout& layout) {
   Snapshot snapshot;
-  for (const model::BodyPlacement& body : layout.bodies) snapshot.bodies.push_back(body.X_WB);
+  for (const world::BodyPlacement& body : layout.bodies) snapshot.bodies.push_back(body.X_WB);
   snapshot.wheel_angles.resize(layout.wheels.size());
   return snapshot;
 }
 
-constexpr model::Rgba kRed{0.9f, 0.1f, 0.1f, 1.0f}, kGreen{0.1f, 0.9f, 0.1f, 1.0f},
+constexpr world::Rgba kRed{0.9f, 0.1f, 0.1f, 1.0f}, kGreen{0.1f, 0.9f, 0.1f, 1.0f},
     kGrey{0.5f, 0.5f, 0.5f, 1.0f};
 
 View ahead(double z = 1.0) {
@@ -61,7 +61,7 @@ View ahead(double z = 1.0) {
 }
 
 Picture draw(const World& w, const View& view, bool depth = true, bool labels = true) {
-  const model::BodyLayout layout(w.world);
+  const world::BodyLayout layout(w.world);
   Picture picture;
   picture.want_depth = depth;
   picture.want_labels = labels;
@@ -142,22 +142,22 @@ TEST(RenderScene, PlacesInThePicture) {
 TEST(RenderScene, WheelsTurnAboutTheirAxisWhereverTheirLinksAre) {
   World w;
   w.box("wheel", {0, 0, 0}, {0.1, 0.1, 1.6}, kRed, false).X_LV.translation = Vec3(3, 0, 1);
-  auto model = std::make_shared<model::Model>(*w.world.models[0].model);
+  auto model = std::make_shared<world::Model>(*w.world.models[0].model);
   model->links.emplace_back();
-  model::Link& cap = model->links.back();
+  world::Link& cap = model->links.back();
   cap.name = "cap";
   cap.X_ML = {Quat(Eigen::AngleAxisd(M_PI / 2, Vec3::UnitZ())), Vec3(3, 0, 1)};
   World::show(cap, Shape::box, {0.2, 0.2, 0.2}, kGreen).X_LV.translation =
       Vec3(1, 0, 0.5);  // in the model: (3, 1, 1.5)
-  model::Joint joint;
-  joint.type = model::JointType::fixed;
+  world::Joint joint;
+  joint.type = world::JointType::fixed;
   joint.parent = ModelLinkIndex(0);
   joint.child = ModelLinkIndex(1);
   model->joints.push_back(joint);
   w.world.models[0].model = model;
-  model::BodyLayout layout(w.world);
+  world::BodyLayout layout(w.world);
   layout.links[0].wheel = layout.links[1].wheel = WheelIndex(0);
-  model::WheelPlacement wheel;
+  world::WheelPlacement wheel;
   wheel.link = LinkIndex(0);
   wheel.center_in_L = Vec3(3, 0, 1);
   layout.wheels.push_back(wheel);
@@ -261,12 +261,12 @@ TEST(RenderScene, ShapesHaveTheirSizes) {
 TEST(RenderScene, OutsideFacesOfMeshesAreSeen) {
   // A tetrahedron, counter-clockwise from outside; mirrored by a negative scale it is seen from
   // outside all the same.
-  auto mesh = std::make_shared<model::Mesh>();
+  auto mesh = std::make_shared<world::Mesh>();
   mesh->positions = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
   mesh->triangles = {{0, 2, 1}, {0, 1, 3}, {0, 3, 2}, {1, 2, 3}};
   for (const double sign : {1.0, -1.0}) {
     World w;
-    model::Visual visual;
+    world::Visual visual;
     visual.geometry.shape = Shape::mesh;
     visual.geometry.mesh = mesh;
     visual.geometry.scale = {1, sign, 1};
@@ -281,11 +281,11 @@ TEST(RenderScene, OutsideFacesOfMeshesAreSeen) {
 }
 
 TEST(RenderScene, TriangleWithoutItsVerticesIsLeftOut) {
-  auto mesh = std::make_shared<model::Mesh>();
+  auto mesh = std::make_shared<world::Mesh>();
   mesh->positions = {{0, -1, -1}, {0, 1, -1}, {0, 0, 1}};
   mesh->triangles = {{0, 2, 1}, {0, 1, 77}};
   World w;
-  model::Visual visual;
+  world::Visual visual;
   visual.geometry.shape = Shape::mesh;
   visual.geometry.mesh = mesh;
   w.add("mesh", true, {Quat::Identity(), Vec3(4, 0, 1)}).visuals.push_back(visual);
@@ -306,7 +306,7 @@ TEST(RenderScene, ColoursOfLitSurfaces) {
 TEST(RenderScene, EmissionNeedsNoLight) {
   World w;
   w.world.sky.ambient = {0, 0, 0, 1};
-  model::Visual& lamp = w.box("lamp", {3.5, 0, 1}, {1, 40, 20}, {0, 0, 0, 1});
+  world::Visual& lamp = w.box("lamp", {3.5, 0, 1}, {1, 40, 20}, {0, 0, 0, 1});
   lamp.material->ambient = {0, 0, 0, 1};
   lamp.material->emissive = {0.4f, 0.8f, 1.0f, 1.0f};
   const View view = ahead();
@@ -320,7 +320,7 @@ TEST(RenderScene, EmissionNeedsNoLight) {
 TEST(RenderScene, ExposureIsAFactorOnLight) {
   World w;
   w.world.sky.ambient = {0, 0, 0, 1};
-  model::Visual& lamp = w.box("lamp", {3.5, 0, 1}, {1, 40, 20}, {0, 0, 0, 1});
+  world::Visual& lamp = w.box("lamp", {3.5, 0, 1}, {1, 40, 20}, {0, 0, 0, 1});
   lamp.material->ambient = {0, 0, 0, 1};
   lamp.material->emissive = {0.4f, 0.4f, 0.4f, 1.0f};
   View view = ahead();
@@ -330,8 +330,8 @@ TEST(RenderScene, ExposureIsAFactorOnLight) {
 
 TEST(RenderScene, ShadowsLieWhereTheSunIsHidden) {
   World w;
-  model::Light sun;
-  sun.type = model::Light::Type::directional;
+  world::Light sun;
+  sun.type = world::Light::Type::directional;
   sun.direction = Vec3(0, -1, -1).normalized();
   sun.cast_shadows = true;
   w.world.lights.push_back(sun);
@@ -376,7 +376,7 @@ TEST(RenderScene, TexturesWithHolesAndWithout) {
   std::ofstream(folder + "/broken.png") << "not a picture";
   const auto make = [&](const std::string& file) {
     World w;
-    auto named = std::make_shared<model::Texture>();
+    auto named = std::make_shared<world::Texture>();
     named->path = folder + "/" + file;
     w.box("poster", {3, 0, 1}, {0.02, 2, 2}, {1, 1, 1, 1}).material->texture = named;
     return draw(w, ahead());
@@ -409,7 +409,7 @@ struct Sequence {
     w.box("mover", {4, 1, 0.5}, {0.5, 0.5, 1}, kGreen, false);
   }
   static constexpr int kStates = 3;
-  Snapshot state(const model::BodyLayout& layout, int i) const {
+  Snapshot state(const world::BodyLayout& layout, int i) const {
     Snapshot snapshot = start(layout);
     snapshot.bodies[0].translation += Vec3(0.7 * i, -0.9 * i, 0.3 * i);
     return snapshot;
@@ -422,7 +422,7 @@ struct Sequence {
 
 TEST(RenderScene, WhatWasDrawnBeforeDoesNotShow) {
   const Sequence s;
-  const model::BodyLayout layout(s.w.world);
+  const world::BodyLayout layout(s.w.world);
   const auto used = make_renderer(s.w.world, layout);
   for (int i : {0, 1, 2, 1, 0, 2}) {
     Picture a, b;
@@ -437,7 +437,7 @@ TEST(RenderScene, WhatWasDrawnBeforeDoesNotShow) {
 
 TEST(RenderScene, ThreadsDrawTheSame) {
   const Sequence s;
-  const model::BodyLayout layout(s.w.world);
+  const world::BodyLayout layout(s.w.world);
   const auto run = [&](std::vector<Picture>& pictures) {
     const auto renderer = make_renderer(s.w.world, layout);
     for (int i = 0; i < Sequence::kStates; ++i)
@@ -456,7 +456,7 @@ TEST(RenderScene, ThreadsDrawTheSame) {
 
 TEST(RenderScene, ARendererMayMoveToAnotherThread) {
   const Sequence s;
-  const model::BodyLayout layout(s.w.world);
+  const world::BodyLayout layout(s.w.world);
   const auto renderer = make_renderer(s.w.world, layout);
   Picture here, there;
   renderer->draw(s.state(layout, 0), s.view(0), here);
@@ -466,7 +466,7 @@ TEST(RenderScene, ARendererMayMoveToAnotherThread) {
 
 TEST(RenderScene, BothBackendsDrawTheSame) {
   const Sequence s;
-  const model::BodyLayout layout(s.w.world);
+  const world::BodyLayout layout(s.w.world);
   std::vector<Picture> pictures;
   for (const char* backend : {"osmesa", "egl"}) {
     setenv("RUEDO_RENDERER", backend, 1);
@@ -489,7 +489,7 @@ TEST(RenderScene, BothBackendsDrawTheSame) {
 TEST(RenderScene, AnUnknownBackendIsNamed) {
   setenv("RUEDO_RENDERER", "vulkan", 1);
   const World w;
-  const model::BodyLayout layout(w.world);
+  const world::BodyLayout layout(w.world);
   try {
     make_renderer(w.world, layout);
     ADD_FAILURE() << "no error";
@@ -513,7 +513,7 @@ TEST(RenderScene, SmoothEdgesChangeColoursOnly) {
 TEST(RenderScene, LinesAreDrawnOverThePicture) {
   World w;
   w.box("wall", {3.5, 0, 1}, {1, 40, 20}, kGrey);
-  const model::BodyLayout layout(w.world);
+  const world::BodyLayout layout(w.world);
   const View view = ahead();
   const Line lines[] = {{{2, -1, 1}, {2, 1, 1}, {1, 0, 0, 1}},
                         {{4, -1, 1.2}, {4, 1, 1.2}, {1, 0, 0, 1}},
@@ -534,7 +534,7 @@ TEST(RenderScene, LinesAreDrawnOverThePicture) {
 TEST(RenderScene, FacetsStandInTheWorld) {
   World w;
   w.box("wall", {3.5, 0, 1}, {1, 40, 20}, kGrey);
-  const model::BodyLayout layout(w.world);
+  const world::BodyLayout layout(w.world);
   const View view = ahead();
   const auto across = [](double x, double y, std::array<float, 4> rgba) {
     return Facet{{Vec3(x, y, 0.5), Vec3(x, y + 0.6, 0.5), Vec3(x, y, 1.6)}, rgba};

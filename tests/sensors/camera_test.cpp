@@ -436,18 +436,18 @@ TEST(CameraLens, NothingIsSeenBeyondAFold) {
 
 // A <camera> with a lens that folds at once, so that its map is made quickly.
 std::shared_ptr<const Element> folding_camera(int width, const std::string& k1) {
-  return model::parse_document("<camera><horizontal_fov>2.9</horizontal_fov><image><width>" +
+  return world::parse_document("<camera><horizontal_fov>2.9</horizontal_fov><image><width>" +
                                    std::to_string(width) +
                                    "</width><height>3000</height></image><distortion><k1>" + k1 +
                                    "</k1></distortion></camera>",
                                "camera.sdf");
 }
-std::shared_ptr<const LensMap> map_of(const Element& camera, const model::WorldModel& world) {
+std::shared_ptr<const LensMap> map_of(const Element& camera, const world::WorldModel& world) {
   return LensMap::of(Lens(camera), camera, world);
 }
 
 TEST(CameraLens, EqualOnesShareTheirMap) {
-  const model::WorldModel world, other;
+  const world::WorldModel world, other;
   const auto map = map_of(*folding_camera(100, "-10"), world);
   EXPECT_EQ(map_of(*folding_camera(100, "-10"), world), map);
   EXPECT_EQ(map_of(*folding_camera(100, "-10"), other), map);
@@ -455,7 +455,7 @@ TEST(CameraLens, EqualOnesShareTheirMap) {
 }
 
 TEST(CameraLens, PixelsOfAllThatDifferAreBounded) {
-  const model::WorldModel world, other;
+  const world::WorldModel world, other;
   const auto first = map_of(*folding_camera(4000, "-10"), world);
   const auto third = folding_camera(100, "-8");
   {

@@ -67,7 +67,7 @@ struct Bench {
 
 // The examples of GeographicLib's manual page CartConvert(1).
 TEST(Geodesy, AgreesWithGeographicLib) {
-  model::Environment origin;
+  world::Environment origin;
   origin.latitude = 33 * kDegree;
   origin.longitude = 44 * kDegree;
   origin.elevation = 20;
@@ -83,7 +83,7 @@ TEST(Geodesy, AgreesWithGeographicLib) {
 
 // There and back over all latitudes, from the deepest sea to a satellite's height.
 TEST(Geodesy, BackFromEcefToRounding) {
-  const Globe globe{model::Environment{}};
+  const Globe globe{world::Environment{}};
   for (int degree = -90; degree <= 90; degree += 5) {
     for (const double altitude : {-11e3, 0.0, 9e3, 1e6}) {
       const Geodetic place{degree * kDegree, 2.0, altitude};

@@ -49,12 +49,12 @@ class SensorBench {
 
   // `sdf` is a complete SDF file, as if it were in the folder for temporary files.
   explicit SensorBench(const std::string& sdf)
-      : world(model::load_world_text(sdf, testing::TempDir() + "/bench.sdf")), layout(*world) {}
+      : world(world::load_world_text(sdf, testing::TempDir() + "/bench.sdf")), layout(*world) {}
 
   // The state at the start: everything where the file has it, at rest.
   Snapshot snapshot() const {
     Snapshot s;
-    for (const model::BodyPlacement& body : layout.bodies) s.bodies.push_back(body.X_WB);
+    for (const world::BodyPlacement& body : layout.bodies) s.bodies.push_back(body.X_WB);
     s.body_twists.resize(layout.bodies.size());
     s.body_accelerations.resize(layout.bodies.size(), Vec3::Zero());
     s.wheel_angles.resize(layout.wheels.size());
@@ -64,7 +64,7 @@ class SensorBench {
     s.joint_efforts.resize(layout.joints.size());
     s.robots.resize(layout.robots.size());
     for (size_t i = 0; i < layout.robots.size(); ++i) {
-      const model::RobotPlacement& robot = layout.robots[i];
+      const world::RobotPlacement& robot = layout.robots[i];
       s.robots[i].X_WBase = robot.body < 0 ? robot.X_BBase : s.bodies[robot.body] * robot.X_BBase;
     }
     return s;
@@ -82,12 +82,12 @@ class SensorBench {
   Device make(const std::string& robot_name, const std::string& device, const Options& options) {
     Device made;
     const RobotIndex index(robot(robot_name));
-    const model::RobotPlacement& placement = layout.robots[index];
-    const model::Model& model = *world->models[placement.instance].model;
+    const world::RobotPlacement& placement = layout.robots[index];
+    const world::Model& model = *world->models[placement.instance].model;
     std::shared_ptr<const Element> element;
     LinkIndex link = layout.first_link[placement.instance];
     Pose X_LS;
-    for (const model::SensorDescription& sensor : model.sensors) {
+    for (const world::SensorDescription& sensor : model.sensors) {
       if (sensor.name != device) continue;
       for (const SensorKind& kind : sensor_kinds()) {
         for (const std::string& type : kind.types) {
@@ -133,8 +133,8 @@ class SensorBench {
     return make(robot_name, device, Options{});
   }
 
-  std::shared_ptr<const model::WorldModel> world;
-  model::BodyLayout layout;
+  std::shared_ptr<const world::WorldModel> world;
+  world::BodyLayout layout;
   Findings findings;
 };
 

@@ -152,7 +152,7 @@ class CollisionsOf : public ::testing::Test {
   CollisionsOf() { test::step(device_, now_, out_, 0); }  // the initial state
   LinkIndex link(const std::string& name) const {
     for (const LinkIndex i : bench_.layout.links.indices()) {
-      if (model::body_name(*bench_.world, bench_.layout, i) == name) return i;
+      if (world::body_name(*bench_.world, bench_.layout, i) == name) return i;
     }
     throw std::logic_error(name);
   }

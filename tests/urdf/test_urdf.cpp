@@ -20,7 +20,7 @@ const std::string kRobots = std::string(RUEDO_SOURCE_DIR) + "/worlds/robots/";
 class Urdf : public testing::TestWithParam<std::string> {};
 
 TEST_P(Urdf, IsReadCleanly) {
-  const auto world = model::load_world(GetParam());
+  const auto world = world::load_world(GetParam());
   for (const auto& [name, robot] : robot_frames(*world)) {
     std::ostringstream console;
     sdf::Console::Instance()->GetMsgStream().SetStream(&console);

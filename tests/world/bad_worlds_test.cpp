@@ -4,7 +4,7 @@
 #include "temporary_folder.h"
 #include "world/load.h"
 
-namespace ruedo::model {
+namespace ruedo::world {
 namespace {
 
 struct BadWorld {
@@ -399,4 +399,4 @@ TEST(BadFiles, NothingIsReadOutsideTheSearchPath) {
 }
 
 }  // namespace
-}  // namespace ruedo::model
+}  // namespace ruedo::world

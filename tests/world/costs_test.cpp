@@ -5,7 +5,7 @@
 #include "world/load.h"
 #include "world/read/triangle_count.h"
 
-namespace ruedo::model {
+namespace ruedo::world {
 namespace {
 
 std::string world_around(const std::string& models) {
@@ -113,4 +113,4 @@ TEST(Costs, PixelsOfAllTexturesAreBounded) {
 }
 
 }  // namespace
-}  // namespace ruedo::model
+}  // namespace ruedo::world

@@ -4,7 +4,7 @@
 
 #include "text_world.h"
 
-namespace ruedo::model {
+namespace ruedo::world {
 namespace {
 
 using testing::ElementsAre;
@@ -84,4 +84,4 @@ TEST(Degrees, OfAUrdfAreNamed) {
 }
 
 }  // namespace
-}  // namespace ruedo::model
+}  // namespace ruedo::world

@@ -9,7 +9,7 @@
 #include "world/compat/plugins.h"
 #include "world/model/body_layout.h"
 
-namespace ruedo::model {
+namespace ruedo::world {
 namespace {
 
 using testing::ElementsAre;
@@ -329,4 +329,4 @@ TEST(SensorPlugins, AnImuWithoutASensor) {
 }
 
 }  // namespace
-}  // namespace ruedo::model
+}  // namespace ruedo::world

@@ -4,7 +4,7 @@
 
 #include "text_world.h"
 
-namespace ruedo::model {
+namespace ruedo::world {
 namespace {
 
 using testing::ElementsAre;
@@ -102,4 +102,4 @@ TEST(Environment, WhatIsWrongIsNamed) {
 }
 
 }  // namespace
-}  // namespace ruedo::model
+}  // namespace ruedo::world

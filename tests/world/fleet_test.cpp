@@ -9,7 +9,7 @@
 #include "world/load.h"
 #include "world/model/placement.h"
 
-namespace ruedo::model {
+namespace ruedo::world {
 namespace {
 
 // A box of 0.6 x 0.8 m (circle of radius 0.5 m) that reaches from z = 0 to 0.4 m.
@@ -180,7 +180,7 @@ TEST(DriveOption, GivesARobotItsWheels) {
 TEST(DriveOption, SaysWhatThereIs) {
   TemporaryFolder folder;
   const std::string urdf = folder.write("bot.urdf", kUrdf);
-  const auto error = [&](const model::DriveOption& drive) {
+  const auto error = [&](const world::DriveOption& drive) {
     LoadOptions options;
     options.drives = {drive};
     try {
@@ -201,4 +201,4 @@ TEST(DriveOption, SaysWhatThereIs) {
 }
 
 }  // namespace
-}  // namespace ruedo::model
+}  // namespace ruedo::world

@@ -4,7 +4,7 @@
 
 #include "text_world.h"
 
-namespace ruedo::model {
+namespace ruedo::world {
 namespace {
 
 using testing::ElementsAre;
@@ -66,4 +66,4 @@ TEST(Holds, OfWhatCannotBeHeldIsNamed) {
 }
 
 }  // namespace
-}  // namespace ruedo::model
+}  // namespace ruedo::world

@@ -6,7 +6,7 @@
 #include "text_world.h"
 #include "world/load.h"
 
-namespace ruedo::model {
+namespace ruedo::world {
 namespace {
 
 using testing::ElementsAre;
@@ -111,4 +111,4 @@ TEST(IncludeParams, WhatCannotBeDoneIsNamedAndTheRestIsDone) {
 }
 
 }  // namespace
-}  // namespace ruedo::model
+}  // namespace ruedo::world

@@ -6,7 +6,7 @@
 #include "text_world.h"
 #include "world/load.h"
 
-namespace ruedo::model {
+namespace ruedo::world {
 namespace {
 
 using testing::Contains;
@@ -354,4 +354,4 @@ TEST(RosGains, JointsByPositionOrVelocityStayWhereTheyBegin) {
 }
 
 }  // namespace
-}  // namespace ruedo::model
+}  // namespace ruedo::world

@@ -11,7 +11,7 @@
 #include "world/load.h"
 #include "world/maps/occupancy.h"
 
-namespace ruedo::model {
+namespace ruedo::world {
 namespace {
 
 std::string world_of(const std::string& models) {
@@ -313,4 +313,4 @@ TEST(Map, WhatYamlAllows) {
 }
 
 }  // namespace
-}  // namespace ruedo::model
+}  // namespace ruedo::world

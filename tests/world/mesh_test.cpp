@@ -13,7 +13,7 @@
 #include "world/mesh/picture.h"
 #include "world/read/geometry.h"
 
-namespace ruedo::model {
+namespace ruedo::world {
 namespace {
 
 // A box of 1 x 2 x 3 m with a corner at the origin, in +x, +y, +z: no two axes can be mistaken.
@@ -418,7 +418,7 @@ TEST(MeshFormat, RefusesWhatDoesNotFit) {
   EXPECT_EQ(fault([](Mesh& m) { m.normals.resize(2); }), "it has not one normal per vertex");
   EXPECT_EQ(fault([](Mesh& m) { m.parts[0].triangle_count = 2; }),
             "a part names triangles that are not there");
-  EXPECT_EQ(fault([](Mesh& m) { m.parts[0].material = model::MaterialIndex(0); }),
+  EXPECT_EQ(fault([](Mesh& m) { m.parts[0].material = world::MaterialIndex(0); }),
             "a part names a material that is not there");
   EXPECT_EQ(fault([](Mesh& m) {
               m.triangles.clear();
@@ -516,4 +516,4 @@ TEST(Pictures, OfAnotherWhiteAreRefused) {
 }
 
 }  // namespace
-}  // namespace ruedo::model
+}  // namespace ruedo::world

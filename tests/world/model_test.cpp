@@ -13,7 +13,7 @@
 #include "world/load.h"
 #include "world/model/body_layout.h"
 
-namespace ruedo::model {
+namespace ruedo::world {
 namespace {
 
 // A cart: base 0.4 m up; wheels of radius 0.1 at x 0.2, y +-0.25, on joints that are not at their
@@ -536,4 +536,4 @@ TEST(Corpus, TheTwoWorldsLoadWithTheirMeshes) {
 }
 
 }  // namespace
-}  // namespace ruedo::model
+}  // namespace ruedo::world

@@ -5,7 +5,7 @@
 #include "temporary_folder.h"
 #include "text_world.h"
 
-namespace ruedo::model {
+namespace ruedo::world {
 namespace {
 
 using testing::ElementsAre;
@@ -259,4 +259,4 @@ TEST(OddElements, ColladaWithABlankBeforeItsColours) {
 }
 
 }  // namespace
-}  // namespace ruedo::model
+}  // namespace ruedo::world

@@ -4,7 +4,7 @@
 
 #include "text_world.h"
 
-namespace ruedo::model {
+namespace ruedo::world {
 namespace {
 
 using testing::ElementsAre;
@@ -343,4 +343,4 @@ TEST(OddValuesOfUrdf, InterfacesOfJoints) {
 }
 
 }  // namespace
-}  // namespace ruedo::model
+}  // namespace ruedo::world

@@ -9,7 +9,7 @@
 #include "world/model/convex.h"
 #include "world/model/placement.h"
 
-namespace ruedo::model {
+namespace ruedo::world {
 namespace {
 
 const char* kRobot = R"(<sdf version='1.9'><model name='bot'>
@@ -334,4 +334,4 @@ TEST(Urdf, RobotInAnEmptyWorld) {
 }
 
 }  // namespace
-}  // namespace ruedo::model
+}  // namespace ruedo::world

@@ -5,7 +5,7 @@
 #include "world/load.h"
 #include "world/model/placement.h"
 
-namespace ruedo::model {
+namespace ruedo::world {
 namespace {
 
 std::string box(const std::string& name, const std::string& pose, const std::string& size,
@@ -60,4 +60,4 @@ TEST_F(Rooms, AmongTrianglesThatCoverTheWholeMesh) {
 }
 
 }  // namespace
-}  // namespace ruedo::model
+}  // namespace ruedo::world

@@ -9,7 +9,7 @@
 #include "world/read/controller_files.h"
 #include "world/read/yaml.h"
 
-namespace ruedo::model {
+namespace ruedo::world {
 namespace {
 
 using testing::ElementsAre;
@@ -571,4 +571,4 @@ TEST(Guess, WhatIsNoRobotIsNoneAfterwards) {
 }
 
 }  // namespace
-}  // namespace ruedo::model
+}  // namespace ruedo::world

@@ -5,7 +5,7 @@
 #include "temporary_folder.h"
 #include "text_world.h"
 
-namespace ruedo::model {
+namespace ruedo::world {
 namespace {
 
 using testing::ElementsAre;
@@ -159,4 +159,4 @@ TEST(SavedState, PutsLightsBack) {
 }
 
 }  // namespace
-}  // namespace ruedo::model
+}  // namespace ruedo::world

@@ -8,7 +8,7 @@
 #include "temporary_folder.h"
 #include "text_world.h"
 
-namespace ruedo::model {
+namespace ruedo::world {
 namespace {
 
 TEST(Scene, LightsMaterialsAndSurfaces) {
@@ -265,4 +265,4 @@ TEST(Scene, ACrowdStandsWhereThereIsRoom) {
 }
 
 }  // namespace
-}  // namespace ruedo::model
+}  // namespace ruedo::world

@@ -3,7 +3,7 @@
 
 #include <gtest/gtest.h>
 
-namespace ruedo::model {
+namespace ruedo::world {
 namespace {
 
 TEST(SdfElements, NoneOfAWorldIsSilent) {
@@ -19,4 +19,4 @@ TEST(SdfElements, NoneOfAWorldIsSilent) {
 }
 
 }  // namespace
-}  // namespace ruedo::model
+}  // namespace ruedo::world

@@ -5,7 +5,7 @@
 
 #include "text_world.h"
 
-namespace ruedo::model {
+namespace ruedo::world {
 namespace {
 
 using testing::ElementsAre;
@@ -184,4 +184,4 @@ TEST(SensorPlugins, PerformersThatAreNowhereAndLevelsAreNamed) {
 }
 
 }  // namespace
-}  // namespace ruedo::model
+}  // namespace ruedo::world

@@ -8,7 +8,7 @@
 #include "temporary_folder.h"
 #include "world/load_model.h"
 
-namespace ruedo::model {
+namespace ruedo::world {
 namespace {
 
 namespace fs = std::filesystem;
@@ -211,4 +211,4 @@ TEST(Strangers, HaveNoControllersFromElsewhere) {
 }
 
 }  // namespace
-}  // namespace ruedo::model
+}  // namespace ruedo::world

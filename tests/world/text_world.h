@@ -9,7 +9,7 @@
 
 #include "world/load.h"
 
-namespace ruedo::model {
+namespace ruedo::world {
 
 inline std::shared_ptr<const WorldModel> world_of(const std::string& inside) {
   return load_world_text("<sdf version='1.9'><world name='w'>" + inside + "</world></sdf>",
@@ -29,4 +29,4 @@ inline std::vector<std::string> texts(const WorldModel& world) {
   return list;
 }
 
-}  // namespace ruedo::model
+}  // namespace ruedo::world

@@ -5,7 +5,7 @@
 
 #include "world/load.h"
 
-namespace ruedo::model {
+namespace ruedo::world {
 namespace {
 
 struct Part {
@@ -218,4 +218,4 @@ TEST(JointAxes, AreWrittenInSeveralFrames) {
 }
 
 }  // namespace
-}  // namespace ruedo::model
+}  // namespace ruedo::world

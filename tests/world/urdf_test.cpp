@@ -10,7 +10,7 @@
 #include "world/load_model.h"
 #include "world/model/body_layout.h"
 
-namespace ruedo::model {
+namespace ruedo::world {
 namespace {
 
 std::vector<std::string> texts(const WorldModel& world) {
@@ -449,4 +449,4 @@ TEST(Urdf, TheHomeFolderIsNoPackage) {
 }
 
 }  // namespace
-}  // namespace ruedo::model
+}  // namespace ruedo::world

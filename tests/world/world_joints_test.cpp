@@ -4,7 +4,7 @@
 
 #include "text_world.h"
 
-namespace ruedo::model {
+namespace ruedo::world {
 namespace {
 
 using testing::ElementsAre;
@@ -65,4 +65,4 @@ TEST(WorldJoints, ToTheWorldAndToNothing) {
 }
 
 }  // namespace
-}  // namespace ruedo::model
+}  // namespace ruedo::world

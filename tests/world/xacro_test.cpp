@@ -9,7 +9,7 @@
 #include "world/load.h"
 #include "world/load_model.h"
 
-namespace ruedo::model {
+namespace ruedo::world {
 namespace {
 
 using testing::ElementsAre;
@@ -185,4 +185,4 @@ TEST(Xacro, OfATextIsRefused) {
 }
 
 }  // namespace
-}  // namespace ruedo::model
+}  // namespace ruedo::world

@@ -8,7 +8,7 @@
 #include "world/read/document.h"
 #include "world/read/xml_text.h"
 
-namespace ruedo::model {
+namespace ruedo::world {
 namespace {
 
 std::string fault_of(const std::string& text) {
@@ -89,4 +89,4 @@ TEST(XmlPieces, PlacesAreThoseOfTheParsersElements) {
 }
 
 }  // namespace
-}  // namespace ruedo::model
+}  // namespace ruedo::world

@@ -10,7 +10,7 @@
 #include "world/edit/world_text.h"
 #include "world/load.h"
 
-namespace ruedo::model {
+namespace ruedo::world {
 namespace {
 
 using testing::HasSubstr;
@@ -312,4 +312,4 @@ TEST(WorldTextTest, ARobotStandsOnAFloorThatReadsBack) {
 }
 
 }  // namespace
-}  // namespace ruedo::model
+}  // namespace ruedo::world

@@ -9,7 +9,7 @@
 
 #include "world/load.h"
 
-namespace ruedo::model {
+namespace ruedo::world {
 namespace {
 
 const std::string kWorlds = std::string(RUEDO_SOURCE_DIR) + "/worlds/";
@@ -112,4 +112,4 @@ TEST(Fleet, HasRobotsWithDifferentModules) {
 }
 
 }  // namespace
-}  // namespace ruedo::model
+}  // namespace ruedo::world

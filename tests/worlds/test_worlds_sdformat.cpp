@@ -44,8 +44,8 @@ TEST_P(Libsdformat, LoadsOurFileCleanly) {
 // A world as `ruedo edit` saves it: with moved, added and removed models.
 TEST(LibsdformatText, ReadsWhatTheEditorSaves) {
   using ruedo::Pose;
-  const auto world = ruedo::model::load_world(kWorlds + "arena.sdf");
-  std::vector<ruedo::model::ModelNow> models;
+  const auto world = ruedo::world::load_world(kWorlds + "arena.sdf");
+  std::vector<ruedo::world::ModelNow> models;
   for (const auto& model : world->models) {
     if (model.name != "box_2") models.push_back({model.name, model.X_WM, "", false});
     if (model.name == "box_1")
@@ -55,7 +55,7 @@ TEST(LibsdformatText, ReadsWhatTheEditorSaves) {
       "<sdf version='1.9'>\n<include>\n      <uri>model://p3dx</uri>\n    </include>\n</sdf>";
   models.push_back({"guest", Pose::from_xyz_rpy({3, 3, 0}, {0, 0, -1}), include, true});
   const std::string text =
-      ruedo::model::WorldText(ruedo::model::world_text_of(*world), *world).with(models).text;
+      ruedo::world::WorldText(ruedo::world::world_text_of(*world), *world).with(models).text;
   sdf::ParserConfig config;
   config.SetFindCallback(find_model);
   sdf::Root root;

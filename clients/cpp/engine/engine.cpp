@@ -26,21 +26,21 @@ Observation::Type type_of(Primitive type) {
   }
 }
 
-model::LoadOptions load_options(const EngineOptions& options) {
-  model::LoadOptions load;
-  for (const std::string& text : options.spawn) load.spawns.push_back(model::parse_spawn(text));
-  for (const std::string& text : options.drive) load.drives.push_back(model::parse_drive(text));
-  for (const std::string& text : options.set) load.settings.push_back(model::parse_setting(text));
-  for (const std::string& text : options.fault) load.faults.push_back(model::parse_fault(text));
+world::LoadOptions load_options(const EngineOptions& options) {
+  world::LoadOptions load;
+  for (const std::string& text : options.spawn) load.spawns.push_back(world::parse_spawn(text));
+  for (const std::string& text : options.drive) load.drives.push_back(world::parse_drive(text));
+  for (const std::string& text : options.set) load.settings.push_back(world::parse_setting(text));
+  for (const std::string& text : options.fault) load.faults.push_back(world::parse_fault(text));
   load.disabled = options.disable;
   return load;
 }
 
-std::shared_ptr<const model::WorldModel> load(const std::string& world,
+std::shared_ptr<const world::WorldModel> load(const std::string& world,
                                               const EngineOptions& options) {
   for (const std::string& file : options.plugins) load_plugin(file);
-  return options.text.empty() ? model::load_world(world, load_options(options))
-                              : model::load_world_text(options.text, world, load_options(options));
+  return options.text.empty() ? world::load_world(world, load_options(options))
+                              : world::load_world_text(options.text, world, load_options(options));
 }
 
 engine::EngineOptions engine_options(const EngineOptions& options) {
@@ -83,7 +83,7 @@ struct Engine::Impl {
                               std::to_string(copies.worlds()));
   }
 
-  std::shared_ptr<const model::WorldModel> model;
+  std::shared_ptr<const world::WorldModel> model;
   engine::Engine copies;
   std::vector<std::string> findings;
   std::vector<uint64_t> seeds;

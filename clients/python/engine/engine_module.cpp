@@ -107,24 +107,24 @@ class PyEngine {
            const std::vector<std::string>& draws, const std::vector<std::string>& plugins,
            bool record) {
     for (const std::string& one : plugins) ruedo::load_plugin(one);
-    ruedo::model::LoadOptions options;
-    for (const std::string& one : spawns) options.spawns.push_back(ruedo::model::parse_spawn(one));
-    for (const std::string& one : drives) options.drives.push_back(ruedo::model::parse_drive(one));
+    ruedo::world::LoadOptions options;
+    for (const std::string& one : spawns) options.spawns.push_back(ruedo::world::parse_spawn(one));
+    for (const std::string& one : drives) options.drives.push_back(ruedo::world::parse_drive(one));
     for (const std::string& one : settings)
-      options.settings.push_back(ruedo::model::parse_setting(one));
+      options.settings.push_back(ruedo::world::parse_setting(one));
     options.disabled = disabled;
-    for (const std::string& one : faults) options.faults.push_back(ruedo::model::parse_fault(one));
+    for (const std::string& one : faults) options.faults.push_back(ruedo::world::parse_fault(one));
     ruedo::engine::EngineOptions engine;
     engine.worlds = worlds;
     engine.threads = threads;
     engine.fleet.seed = seed;
     engine.fleet.noise = noise;
     engine.fleet.disabled = disabled;
-    for (const std::string& one : draws) engine.draws.push_back(ruedo::model::parse_draw(one));
+    for (const std::string& one : draws) engine.draws.push_back(ruedo::world::parse_draw(one));
     randomized_ = !draws.empty();
     const Unlocked unlocked;
-    texts_ = std::make_unique<ruedo::model::TextLoader>(world, options);
-    const auto model = text ? read(*text) : ruedo::model::load_world(world, options);
+    texts_ = std::make_unique<ruedo::world::TextLoader>(world, options);
+    const auto model = text ? read(*text) : ruedo::world::load_world(world, options);
     engine_ = std::make_unique<Engine>(model, engine);
     for (const ruedo::Finding& finding : model->findings)
       findings_.push_back(finding.source.str() + ": " + finding.element + ": " + finding.text);
@@ -338,7 +338,7 @@ class PyEngine {
   }
 
   // Texts that come again are read once.
-  std::shared_ptr<const ruedo::model::WorldModel> read(const std::string& text) {
+  std::shared_ptr<const ruedo::world::WorldModel> read(const std::string& text) {
     constexpr size_t kMostKept = 256;
     if (const auto known = read_.find(text); known != read_.end()) return known->second;
     auto model = texts_->load(text);
@@ -346,11 +346,11 @@ class PyEngine {
     return read_[text] = std::move(model);
   }
 
-  std::unique_ptr<ruedo::model::TextLoader> texts_;
-  std::unordered_map<std::string, std::shared_ptr<const ruedo::model::WorldModel>> read_;
+  std::unique_ptr<ruedo::world::TextLoader> texts_;
+  std::unordered_map<std::string, std::shared_ptr<const ruedo::world::WorldModel>> read_;
   std::unique_ptr<Engine> engine_;
   bool randomized_ = false, records_ = false, at_work_ = false;
-  std::shared_ptr<const ruedo::model::WorldModel> world_;
+  std::shared_ptr<const ruedo::world::WorldModel> world_;
   std::vector<std::string> findings_, result_options_;
   std::optional<ruedo::log_header_t> header_;
   std::unique_ptr<WatchedRun> run_;

@@ -22,7 +22,7 @@
 class WatchedRun {
  public:
   // log: a file; "": none. The world must outlive it.
-  WatchedRun(const ruedo::model::WorldModel& world, ruedo::judge::Expectations expected,
+  WatchedRun(const ruedo::world::WorldModel& world, ruedo::judge::Expectations expected,
              const ruedo::log_header_t& header, const std::string& log)
       : step_us_(world.step_us),
         hash_clock_(ruedo::Rate{1, 1}, world.step_us),

@@ -173,7 +173,7 @@ uint16_t FoxgloveExport::channel(const std::string& topic, const std::string& na
   return at->second;
 }
 
-void FoxgloveExport::send(const std::string& topic, const foxglove::Type& type, uint64_t time_ns,
+void FoxgloveExport::send(const std::string& topic, const Type& type, uint64_t time_ns,
                           const std::string& json) {
   out_.add_message(channel(topic, type.name, type.schema), time_ns, json, "");
 }
@@ -207,13 +207,13 @@ std::string FoxgloveExport::device_frame(const std::string& channel) const {
 }
 
 void FoxgloveExport::send_frames(const run::LogWorlds::Scene& scene, uint64_t time_ns) {
-  const model::BodyLayout layout(*scene.world);
+  const world::BodyLayout layout(*scene.world);
   JsonWriter json;
   json.open('{').name("transforms").open('[');
-  for (const model::RobotPlacement& robot : layout.robots) {
-    const model::ModelInstance& instance = scene.world->models[robot.instance];
+  for (const world::RobotPlacement& robot : layout.robots) {
+    const world::ModelInstance& instance = scene.world->models[robot.instance];
     if (instance.removed) continue;
-    const model::BodyPlacement* body = robot.body.valid() ? &layout.bodies[robot.body] : nullptr;
+    const world::BodyPlacement* body = robot.body.valid() ? &layout.bodies[robot.body] : nullptr;
     write_frame(json, time_ns, body ? body->name : "world", instance.name, robot.X_BBase);
     write_frame(json, time_ns, "world", instance.name + "/odom",
                 body ? body->X_WB * robot.X_BBase : robot.X_BBase);
@@ -230,12 +230,12 @@ void FoxgloveExport::send_frames(const run::LogWorlds::Scene& scene, uint64_t ti
     }
   }
   json.close(']').close('}');
-  send(kFrames, foxglove::frame_transforms(), time_ns, json.text());
+  send(kFrames, frame_transforms(), time_ns, json.text());
 }
 
 // A message for each model, so that none grows without bound.
-void FoxgloveExport::send_scene(const model::WorldModel& world, uint64_t time_ns) {
-  const model::BodyLayout layout(world);
+void FoxgloveExport::send_scene(const world::WorldModel& world, uint64_t time_ns) {
+  const world::BodyLayout layout(world);
   const scene::RenderContent content(world, layout);
   IndexedVector<scene::RenderKindIndex, int> links_of_kind(content.link_kinds.size());
   for (const scene::RenderKindIndex kind : content.kind_of_link) {
@@ -253,17 +253,17 @@ void FoxgloveExport::send_scene(const model::WorldModel& world, uint64_t time_ns
         .open('[')
         .close(']')
         .close('}');
-    send(kScene, foxglove::scene_update(), time_ns, all.text());
+    send(kScene, scene_update(), time_ns, all.text());
   }
   scene_sent_ = true;
   for (size_t m = 0; m < world.models.size(); ++m) {
-    const model::ModelInstance& instance = world.models[m];
+    const world::ModelInstance& instance = world.models[m];
     if (instance.removed) continue;
     JsonWriter json;
     json.open('{').name("deletions").open('[').close(']').name("entities").open('[');
     for (size_t k = 0; k < instance.model->links.size(); ++k) {
       const size_t link = static_cast<size_t>(layout.first_link[m]) + k;
-      const model::LinkPlacement& placement = layout.links[link];
+      const world::LinkPlacement& placement = layout.links[link];
       const scene::RenderKindIndex kind = content.kind_of_link[link];
       if (!kind.valid()) continue;
       json.open('{');
@@ -278,12 +278,12 @@ void FoxgloveExport::send_scene(const model::WorldModel& world, uint64_t time_ns
       json.close(']').close('}');
     }
     json.close(']').close('}');
-    send(kScene, foxglove::scene_update(), time_ns, json.text());
+    send(kScene, scene_update(), time_ns, json.text());
   }
 }
 
 FoxgloveExport::Shown FoxgloveExport::show(const planar_lidar_t& scan, const Place& place) {
-  send(place.channel, foxglove::laser_scan(), place.time_ns,
+  send(place.channel, laser_scan(), place.time_ns,
        scan_json(scan, device_frame(place.channel), place.time_ns));
   return Shown::wholly;
 }
@@ -292,25 +292,25 @@ FoxgloveExport::Shown FoxgloveExport::show(const image_t& image, const Place& pl
   const char* encoding = encoding_of(image.pixelformat);
   if (!encoding && image.pixelformat != image_t::PIXEL_FORMAT_MJPEG) return Shown::no;
   const std::string frame = device_frame(place.channel) + "/optical";
-  send(place.channel, encoding ? foxglove::raw_image() : foxglove::compressed_image(),
-       place.time_ns, image_json(image, encoding, frame, place.time_ns));
+  send(place.channel, encoding ? raw_image() : compressed_image(), place.time_ns,
+       image_json(image, encoding, frame, place.time_ns));
   return Shown::wholly;
 }
 
 FoxgloveExport::Shown FoxgloveExport::show(const camera_info_t& camera, const Place& place) {
-  send(place.channel, foxglove::camera_calibration(), place.time_ns,
+  send(place.channel, camera_calibration(), place.time_ns,
        camera_json(camera, device_frame(place.channel) + "/optical", place.time_ns));
   return Shown::wholly;
 }
 
 FoxgloveExport::Shown FoxgloveExport::show(const pose_t& pose, const Place& place) {
-  send(place.channel, foxglove::pose_in_frame(), place.time_ns,
+  send(place.channel, pose_in_frame(), place.time_ns,
        pose_json(pose_of(pose.pos, pose.orientation), "world", place.time_ns));
   return Shown::partly;
 }
 
 FoxgloveExport::Shown FoxgloveExport::show(const navsat_t& navsat, const Place& place) {
-  send(place.channel, foxglove::location_fix(), place.time_ns,
+  send(place.channel, location_fix(), place.time_ns,
        location_json(navsat, device_frame(place.channel), place.time_ns));
   return Shown::partly;  // without the velocities
 }
@@ -319,8 +319,7 @@ FoxgloveExport::Shown FoxgloveExport::show(const odometry_t& odometry, const Pla
   const std::string robot = place.channel.substr(0, place.channel.find('/'));
   const Pose X{Quat(math::cos(odometry.theta / 2), 0, 0, math::sin(odometry.theta / 2)),
                Vec3(odometry.x, odometry.y, 0)};
-  send(place.channel, foxglove::pose_in_frame(), place.time_ns,
-       pose_json(X, robot + "/odom", place.time_ns));
+  send(place.channel, pose_in_frame(), place.time_ns, pose_json(X, robot + "/odom", place.time_ns));
   return Shown::partly;
 }
 
@@ -335,7 +334,7 @@ FoxgloveExport::Shown FoxgloveExport::show(const world_state_t& state, const Pla
                 pose_of(state.position[i].data(), state.orientation[i].data()));
   }
   json.close(']').close('}');
-  send(place.channel, foxglove::frame_transforms(), place.time_ns, json.text());
+  send(place.channel, frame_transforms(), place.time_ns, json.text());
   return Shown::wholly;
 }
 
@@ -357,7 +356,7 @@ FoxgloveExport::Shown FoxgloveExport::convert(const Place& place,
 bool FoxgloveExport::add_drawn(uint64_t time_ns, std::span<const uint8_t> message) {
   const auto markers = engine::markers_in(message);
   if (!markers) return false;
-  const foxglove::Type& type = foxglove::scene_update();
+  const Type& type = scene_update();
   out_.add_message(channel(kMarkersChannel, type.name, type.schema), time_ns,
                    markers_json(*markers, time_ns), markers->layer);
   return true;

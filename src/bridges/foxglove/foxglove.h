@@ -78,10 +78,9 @@ class FoxgloveExport {
 
  private:
   uint16_t channel(const std::string& topic, const std::string& name, const std::string& schema);
-  void send(const std::string& topic, const foxglove::Type& type, uint64_t time_ns,
-            const std::string& json);
+  void send(const std::string& topic, const Type& type, uint64_t time_ns, const std::string& json);
   void send_frames(const run::LogWorlds::Scene& scene, uint64_t time_ns);
-  void send_scene(const model::WorldModel& world, uint64_t time_ns);
+  void send_scene(const world::WorldModel& world, uint64_t time_ns);
   std::string device_frame(const std::string& channel) const;
   struct Place {
     const std::string& channel;

@@ -6,7 +6,7 @@
 
 #include "base/json.h"
 
-namespace ruedo::foxglove::foxglove {
+namespace ruedo::foxglove {
 namespace {
 
 using Fields = std::vector<std::pair<const char*, std::string>>;
@@ -175,4 +175,4 @@ const Type& scene_update() {
   return made;
 }
 
-}  // namespace ruedo::foxglove::foxglove
+}  // namespace ruedo::foxglove

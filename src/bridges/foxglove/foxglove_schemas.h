@@ -4,7 +4,7 @@
 
 #include <string>
 
-namespace ruedo::foxglove::foxglove {
+namespace ruedo::foxglove {
 
 struct Type {
   std::string name;    // "foxglove.LaserScan"
@@ -20,4 +20,4 @@ const Type& location_fix();
 const Type& frame_transforms();
 const Type& scene_update();
 
-}  // namespace ruedo::foxglove::foxglove
+}  // namespace ruedo::foxglove

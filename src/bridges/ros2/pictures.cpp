@@ -34,7 +34,7 @@ RawPicture raw_picture(const image_t& image) {
   }
   cv::Mat picture;
   if (!image.data.empty())
-    picture = model::decode_picture(image.data.data(), image.data.size(), cv::IMREAD_UNCHANGED);
+    picture = world::decode_picture(image.data.data(), image.data.size(), cv::IMREAD_UNCHANGED);
   if (picture.empty() || picture.depth() != CV_8U) return raw;
   if (picture.channels() == 3) cv::cvtColor(picture, picture, cv::COLOR_BGR2RGB);
   raw.width = static_cast<uint32_t>(picture.cols);
@@ -58,7 +58,7 @@ std::vector<uint8_t> jpeg_of(const image_t& image) {
     return packed;
   cv::Mat picture(image.height, image.width, type, const_cast<uint8_t*>(image.data.data()), stride);
   if (rgb) cv::cvtColor(picture, picture, cv::COLOR_RGB2BGR);
-  model::encode_picture(".jpg", picture, packed, {cv::IMWRITE_JPEG_QUALITY, 90});
+  world::encode_picture(".jpg", picture, packed, {cv::IMWRITE_JPEG_QUALITY, 90});
   return packed;
 }
 

@@ -9,8 +9,8 @@
 namespace ruedo::ros2 {
 namespace {
 
-using model::Joint;
-using model::JointType;
+using world::Joint;
+using world::JointType;
 using Motion = LinkFrame::Motion;
 
 Motion motion_of(JointType type) {
@@ -26,8 +26,8 @@ Motion motion_of(JointType type) {
 // From the links that base_link sits on, along the joints, in whichever direction.
 class Tree {
  public:
-  Tree(const model::WorldModel& world, const model::BodyLayout& layout,
-       const model::RobotPlacement& robot)
+  Tree(const world::WorldModel& world, const world::BodyLayout& layout,
+       const world::RobotPlacement& robot)
       : instance_(world.models[robot.instance]),
         model_(*instance_.model),
         layout_(layout),
@@ -51,7 +51,7 @@ class Tree {
   }
 
  private:
-  const model::LinkPlacement& placement(ModelLinkIndex link) const {
+  const world::LinkPlacement& placement(ModelLinkIndex link) const {
     return layout_.links[layout_.link_of(robot_.instance, link)];
   }
   // Moves as base_link does, though no joint ties it to that.
@@ -65,7 +65,7 @@ class Tree {
 
   void reserve_names() {
     names_ = {"base_link", "odom", "map", "world"};
-    for (const model::SensorDescription& sensor : model_.sensors) {
+    for (const world::SensorDescription& sensor : model_.sensors) {
       const std::string name = ros_name(sensor.name);
       names_.insert({name, name + "_optical"});
     }
@@ -145,7 +145,7 @@ class Tree {
 
   void list_moved() {
     for (const WheelIndex w : robot_.wheels) {
-      const model::WheelPlacement& wheel = layout_.wheels[w];
+      const world::WheelPlacement& wheel = layout_.wheels[w];
       const Joint& joint = model_.joints[wheel.joint];
       const Pose X_LM = model_.links[joint.child].X_ML.inverse();
       const Vec3 axis_in_L = X_LM.rotation * (joint.X_MJ.rotation * joint.axis.axis_in_J);
@@ -154,7 +154,7 @@ class Tree {
     }
     for (const JointIndex j : robot_.joints)
       result_.joints.push_back({frame_of_joint(layout_.joints[j].joint)});
-    for (const model::SensorDescription& sensor : model_.sensors) {
+    for (const world::SensorDescription& sensor : model_.sensors) {
       const size_t frame = frame_of_link_[sensor.link];
       for (size_t each = frame; each != 0; each = result_.frames[each].parent) {
         if (result_.frames[each].motion != Motion::none) result_.carriers[sensor.name] = frame;
@@ -162,10 +162,10 @@ class Tree {
     }
   }
 
-  const model::ModelInstance& instance_;
-  const model::Model& model_;
-  const model::BodyLayout& layout_;
-  const model::RobotPlacement& robot_;
+  const world::ModelInstance& instance_;
+  const world::Model& model_;
+  const world::BodyLayout& layout_;
+  const world::RobotPlacement& robot_;
   RobotFrames result_;
   IndexedVector<ModelLinkIndex, size_t> frame_of_link_;
   IndexedVector<ModelLinkIndex, bool> seen_;
@@ -184,11 +184,11 @@ Pose LinkFrame::at(double position) const {
   return X_PF * moved;
 }
 
-std::map<std::string, RobotFrames> robot_frames(const model::WorldModel& world) {
-  const model::BodyLayout layout(world);
+std::map<std::string, RobotFrames> robot_frames(const world::WorldModel& world) {
+  const world::BodyLayout layout(world);
   std::map<std::string, RobotFrames> robots;
-  for (const model::RobotPlacement& robot : layout.robots) {
-    const model::ModelInstance& instance = world.models[robot.instance];
+  for (const world::RobotPlacement& robot : layout.robots) {
+    const world::ModelInstance& instance = world.models[robot.instance];
     if (!instance.removed) robots[instance.name] = Tree(world, layout, robot).result();
   }
   return robots;

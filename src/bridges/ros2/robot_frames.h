@@ -44,9 +44,9 @@ struct RobotFrames {
 };
 
 // By robot.
-std::map<std::string, RobotFrames> robot_frames(const model::WorldModel& world);
+std::map<std::string, RobotFrames> robot_frames(const world::WorldModel& world);
 
 // URDF of these frames.
-std::string urdf_of(const model::Model& model, const RobotFrames& robot);
+std::string urdf_of(const world::Model& model, const RobotFrames& robot);
 
 }  // namespace ruedo::ros2

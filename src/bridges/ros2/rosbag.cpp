@@ -166,7 +166,7 @@ void Rosbag::attach_files(log_header_t header, const std::string& log) {
   std::vector<std::string> names;
   for (const log_file_t& file : header.files) names.push_back(file.path);
   log::find_files_again(header, log);
-  const model::ResourceFinder finder(header.world_file, false);
+  const world::ResourceFinder finder(header.world_file, false);
   log::Digests digests;
   std::set<std::string> attached;
   auto bytes = static_cast<uint64_t>(rest_->size());

@@ -12,8 +12,8 @@
 namespace ruedo::ros2 {
 namespace {
 
-using model::Geometry;
-using model::Shape;
+using world::Geometry;
+using world::Shape;
 using Motion = LinkFrame::Motion;
 
 constexpr double kNoLimit = 1e6;
@@ -76,28 +76,28 @@ std::vector<Piece> pieces_of(const Geometry& geometry) {
   }
   std::error_code error;
   if (!geometry.mesh || !std::filesystem::is_regular_file(geometry.mesh->name, error)) return {};
-  return {{Pose{}, "<mesh filename=\"" + model::escaped(file_uri(geometry.mesh->name)) +
+  return {{Pose{}, "<mesh filename=\"" + world::escaped(file_uri(geometry.mesh->name)) +
                        "\" scale=\"" + numbers(geometry.scale) + "\"/>"}};
 }
 
 // XML comments cannot contain two consecutive hyphens.
 std::string left_out(const char* element, const std::string& name) {
   std::string safe;
-  for (const char c : model::escaped(name)) safe += c == '-' ? '_' : c;
+  for (const char c : world::escaped(name)) safe += c == '-' ? '_' : c;
   return fmt::format("    <!-- {} {}: URDF has no such shape -->\n", element, safe);
 }
 
-std::string colour(const model::Visual& visual, const std::string& name) {
+std::string colour(const world::Visual& visual, const std::string& name) {
   const bool own = visual.geometry.shape == Shape::mesh;
   if (!visual.material && own) return {};  // the mesh's own
-  const model::Rgba rgba =
-      visual.material ? visual.material->diffuse : model::Rgba{0.7f, 0.7f, 0.7f, 1.0f};
+  const world::Rgba rgba =
+      visual.material ? visual.material->diffuse : world::Rgba{0.7f, 0.7f, 0.7f, 1.0f};
   return fmt::format(
       "<material name=\"{}\"><color rgba=\"{:.4g} {:.4g} {:.4g} {:.4g}\"/></material>",
-      model::escaped(name), rgba[0], rgba[1], rgba[2], rgba[3] * (1.0 - visual.transparency));
+      world::escaped(name), rgba[0], rgba[1], rgba[2], rgba[3] * (1.0 - visual.transparency));
 }
 
-std::string inertial(const model::Inertial& inertial, const Pose& X_FL) {
+std::string inertial(const world::Inertial& inertial, const Pose& X_FL) {
   const auto& I = inertial.inertia;
   return fmt::format(
       "    <inertial>{}<mass value=\"{:.9g}\"/><inertia ixx=\"{:.9g}\" ixy=\"{:.9g}\" "
@@ -106,14 +106,14 @@ std::string inertial(const model::Inertial& inertial, const Pose& X_FL) {
       I(2, 2));
 }
 
-std::string link_text(const LinkFrame& frame, const model::Model& model) {
-  std::string text = "  <link name=\"" + model::escaped(frame.name) + "\">\n";
-  if (!frame.link.valid()) return "  <link name=\"" + model::escaped(frame.name) + "\"/>\n";
-  const model::Link& link = model.links[frame.link];
+std::string link_text(const LinkFrame& frame, const world::Model& model) {
+  std::string text = "  <link name=\"" + world::escaped(frame.name) + "\">\n";
+  if (!frame.link.valid()) return "  <link name=\"" + world::escaped(frame.name) + "\"/>\n";
+  const world::Link& link = model.links[frame.link];
   const Pose X_FL = frame.X_MF.inverse() * link.X_ML;
   text += inertial(link.inertial, X_FL);
   for (size_t i = 0; i < link.visuals.size(); ++i) {
-    const model::Visual& visual = link.visuals[i];
+    const world::Visual& visual = link.visuals[i];
     const std::string material = colour(visual, fmt::format("{}_{}", frame.name, i));
     const std::vector<Piece> pieces = pieces_of(visual.geometry);
     if (pieces.empty()) text += left_out("visual", visual.name);
@@ -122,7 +122,7 @@ std::string link_text(const LinkFrame& frame, const model::Model& model) {
                           origin(X_FL * visual.X_LV * piece.X_GP), piece.text, material);
     }
   }
-  for (const model::Collision& collision : link.collisions) {
+  for (const world::Collision& collision : link.collisions) {
     const std::vector<Piece> pieces = pieces_of(collision.geometry);
     if (pieces.empty()) text += left_out("collision", collision.name);
     for (const Piece& piece : pieces) {
@@ -135,51 +135,51 @@ std::string link_text(const LinkFrame& frame, const model::Model& model) {
 
 double bounded(double value) { return std::min(std::max(value, -kNoLimit), kNoLimit); }
 
-std::string limits(const model::JointAxis& axis, bool bounds) {
+std::string limits(const world::JointAxis& axis, bool bounds) {
   const double lower = bounded(axis.lower), upper = bounded(axis.upper);
   return fmt::format("<limit {}effort=\"{:.9g}\" velocity=\"{:.9g}\"/>",
                      bounds ? fmt::format("lower=\"{:.9g}\" upper=\"{:.9g}\" ", lower, upper) : "",
                      bounded(axis.effort), bounded(axis.velocity));
 }
 
-std::string moving_joint(const LinkFrame& frame, const model::Model& model) {
-  const model::Joint& joint = model.joints[frame.joint];
+std::string moving_joint(const LinkFrame& frame, const world::Model& model) {
+  const world::Joint& joint = model.joints[frame.joint];
   const bool endless = std::isinf(joint.axis.lower) && std::isinf(joint.axis.upper);
   const char* type = frame.motion == Motion::slide   ? "prismatic"
                      : frame.motion == Motion::screw ? "floating"
                      : endless                       ? "continuous"
                                                      : "revolute";
   std::string text = fmt::format("  <joint name=\"{}\" type=\"{}\">\n    {}",
-                                 model::escaped(joint.name), type, origin(frame.X_PF));
+                                 world::escaped(joint.name), type, origin(frame.X_PF));
   if (frame.motion == Motion::screw) return text;
   text += "<axis xyz=\"" + numbers(frame.axis) + "\"/>" +
           limits(joint.axis, frame.motion == Motion::slide || !endless);
   if (joint.leader.valid()) {
     text += fmt::format("<mimic joint=\"{}\" multiplier=\"{:.9g}\" offset=\"{:.9g}\"/>",
-                        model::escaped(model.joints[joint.leader].name), joint.mimic_multiplier,
+                        world::escaped(model.joints[joint.leader].name), joint.mimic_multiplier,
                         joint.mimic_offset - joint.mimic_multiplier * joint.mimic_reference);
   }
   return text;
 }
 
 std::string joint_text(const LinkFrame& frame, const RobotFrames& robot,
-                       const model::Model& model) {
+                       const world::Model& model) {
   const std::string tied =
       frame.joint.valid() ? model.joints[frame.joint].name : frame.name + "_to_base_link";
   std::string text = frame.motion == Motion::none
                          ? fmt::format("  <joint name=\"{}\" type=\"fixed\">\n    {}",
-                                       model::escaped(tied), origin(frame.X_PF))
+                                       world::escaped(tied), origin(frame.X_PF))
                          : moving_joint(frame, model);
   return text + fmt::format("\n    <parent link=\"{}\"/><child link=\"{}\"/>\n  </joint>\n",
-                            model::escaped(robot.frames[frame.parent].name),
-                            model::escaped(frame.name));
+                            world::escaped(robot.frames[frame.parent].name),
+                            world::escaped(frame.name));
 }
 
 }  // namespace
 
-std::string urdf_of(const model::Model& model, const RobotFrames& robot) {
+std::string urdf_of(const world::Model& model, const RobotFrames& robot) {
   std::string text =
-      "<?xml version=\"1.0\"?>\n<robot name=\"" + model::escaped(model.name) + "\">\n";
+      "<?xml version=\"1.0\"?>\n<robot name=\"" + world::escaped(model.name) + "\">\n";
   for (const LinkFrame& frame : robot.frames) text += link_text(frame, model);
   for (size_t i = 1; i < robot.frames.size(); ++i)
     text += joint_text(robot.frames[i], robot, model);

@@ -53,7 +53,7 @@ void print_text(const std::vector<Finding>& findings) {
 
 int check(const CheckArguments& arguments) {
   load_given_plugins();
-  if (arguments.sandboxed) enter_sandbox(model::world_file(arguments.world.world), {});
+  if (arguments.sandboxed) enter_sandbox(world::world_file(arguments.world.world), {});
   ExitCode refusal{};
   const std::vector<Finding> findings = find_all(arguments.world, refusal);
   int counts[3] = {0, 0, 0};

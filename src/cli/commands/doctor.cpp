@@ -123,8 +123,8 @@ void check_buffers(Report& report) {
 
 void check_renderer(Report& report) {
   try {
-    const model::WorldModel world;
-    const model::BodyLayout layout(world);
+    const world::WorldModel world;
+    const world::BodyLayout layout(world);
     report.good("renderer", scene::make_renderer(world, layout)->description());
   } catch (const EnvironmentError& error) {
     report.fault("renderer", error.what());

@@ -40,7 +40,7 @@ bool is_new(const EditArguments& arguments) {
 // Whether what is loaded has a <world> of its own that can be written back.
 bool has_world(const std::string& path) {
   constexpr size_t kMost = 64u << 20;
-  return model::parse_document(read_input(path, kMost), path)->has("world");
+  return world::parse_document(read_input(path, kMost), path)->has("world");
 }
 
 std::string target(const EditArguments& arguments) {
@@ -48,7 +48,7 @@ std::string target(const EditArguments& arguments) {
   if (arguments.world.empty()) return kNewWorld;
   if (is_new(arguments)) return arguments.world;
   if (!is_there(arguments.world)) {
-    model::world_file(arguments.world);  // throws when there is none
+    world::world_file(arguments.world);  // throws when there is none
     throw InputError({}, "'" + arguments.world +
                              "' is the name of a world that comes with Ruedo or lies in "
                              "RUEDO_PATH: say where to save it by --save-as FILE");

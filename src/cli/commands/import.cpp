@@ -37,11 +37,11 @@ int import_map(const ImportArguments& arguments) {
   std::string kind = path.extension().string();
   std::transform(kind.begin(), kind.end(), kind.begin(),
                  [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  std::vector<model::WallPiece> walls;
+  std::vector<world::WallPiece> walls;
   std::string left_out;
-  const auto walls_of = [&](const model::OccupancyGrid& grid) {
+  const auto walls_of = [&](const world::OccupancyGrid& grid) {
     try {
-      return model::walls_of(grid);
+      return world::walls_of(grid);
     } catch (const std::runtime_error& error) {
       throw InputError({arguments.map, 0}, error.what());
     }
@@ -49,11 +49,11 @@ int import_map(const ImportArguments& arguments) {
   if (kind == ".yaml" || kind == ".yml") {
     check_sizes(arguments, "a map's .yaml, which says how large it is", {});
     Findings findings;
-    walls = walls_of(model::read_map(arguments.map, findings, arguments.allow_absolute));
+    walls = walls_of(world::read_map(arguments.map, findings, arguments.allow_absolute));
     print_findings(findings.list());
   } else if (kind == ".map") {
     check_sizes(arguments, "a .map, which says how large it is", {"--thickness"});
-    walls = model::read_armap(arguments.map, arguments.thickness, left_out);
+    walls = world::read_armap(arguments.map, arguments.thickness, left_out);
   } else if (kind == ".world" || kind == ".inc") {
     throw InputError(
         {arguments.map, 0},
@@ -63,10 +63,10 @@ int import_map(const ImportArguments& arguments) {
     if (arguments.sizes.empty())
       throw InputError({}, "a bitmap needs --resolution or --width, to know how large it is");
     walls =
-        walls_of(arguments.width > 0 ? model::read_bitmap_of_width(arguments.map, arguments.width)
-                                     : model::read_bitmap(arguments.map, arguments.resolution));
+        walls_of(arguments.width > 0 ? world::read_bitmap_of_width(arguments.map, arguments.width)
+                                     : world::read_bitmap(arguments.map, arguments.resolution));
   }
-  const std::string sdf = model::world_of_walls(path.stem().string(), walls, arguments.height);
+  const std::string sdf = world::world_of_walls(path.stem().string(), walls, arguments.height);
   if (arguments.out.empty()) {
     fmt::print("{}", sdf);
     return kGood;
@@ -86,7 +86,7 @@ void add_import(CLI::App& app, Action& chosen) {
   command->add_option("-o,--out", arguments->out, "the world (default: standard output)");
   CLI::Option* resolution =
       command->add_option("--resolution", arguments->resolution, "of a picture: side of a pixel, m")
-          ->check(within(model::kSmallestCell_m, model::kLargestCell_m));
+          ->check(within(world::kSmallestCell_m, world::kLargestCell_m));
   CLI::Option* width = command
                            ->add_option("--width", arguments->width,
                                         "of a picture: how wide it is, m (Stage's size)")

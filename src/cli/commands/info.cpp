@@ -19,7 +19,7 @@ struct InfoArguments {
   bool json = false;
 };
 
-void print_json(const model::WorldModel& world, const std::vector<world_info_t>& parts) {
+void print_json(const world::WorldModel& world, const std::vector<world_info_t>& parts) {
   JsonWriter json;
   json.open('{')
       .member("world", world.name)
@@ -77,9 +77,9 @@ void print_json(const model::WorldModel& world, const std::vector<world_info_t>&
 }
 
 int info(const InfoArguments& arguments) {
-  const std::shared_ptr<const model::WorldModel> world = load(arguments.world);
+  const std::shared_ptr<const world::WorldModel> world = load(arguments.world);
   check_options(arguments.world, *world);
-  const model::BodyLayout layout(*world);
+  const world::BodyLayout layout(*world);
   engine::Channels channels;
   Findings findings;
   engine::FleetOptions options;

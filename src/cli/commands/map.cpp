@@ -23,11 +23,11 @@ int map(const MapArguments& arguments) {
     throw InputError({}, "-o '" + arguments.out + "': the name ends in .yaml");
   const auto world = load(arguments.world);
   check_options(arguments.world, *world);
-  const model::OccupancyGrid grid =
-      model::occupancy_of(*world, arguments.resolution, arguments.height);
-  model::write_map(grid, arguments.out);
+  const world::OccupancyGrid grid =
+      world::occupancy_of(*world, arguments.resolution, arguments.height);
+  world::write_map(grid, arguments.out);
   size_t occupied = 0;
-  for (const model::Cell cell : grid.cells) occupied += cell == model::Cell::occupied;
+  for (const world::Cell cell : grid.cells) occupied += cell == world::Cell::occupied;
   fmt::print("{}: {} x {} cells of {:g} m, {} occupied, cut at z = {:g} m\n", arguments.out,
              grid.width, grid.height, grid.resolution, occupied, arguments.height);
   return kGood;

@@ -74,7 +74,7 @@ run::RunOptions server_options(const RegressArguments& arguments) {
 
 // The run. What went wrong besides expectations, or "".
 std::string run(const RegressArguments& arguments,
-                const std::shared_ptr<const model::WorldModel>& world, bool isolated,
+                const std::shared_ptr<const world::WorldModel>& world, bool isolated,
                 judge::Judge& judge, SignalThread& signals) {
   const bus::ServerBus place =
       bus::open_server_bus(isolated ? "auto" : "auto-tcp", world->name,
@@ -256,7 +256,7 @@ int regress(RegressArguments arguments) {
   const char* environment = std::getenv("RUEDO_RENEW");
   const bool renew =
       arguments.renew || (environment && *environment && std::string(environment) != "0");
-  const std::shared_ptr<const model::WorldModel> world = load(arguments.world);
+  const std::shared_ptr<const world::WorldModel> world = load(arguments.world);
   check_output(arguments.record);
   check_files_beside(arguments);
   print_findings(world->findings);

@@ -36,14 +36,14 @@ struct RenderArguments {
 // Drawn at twice the size with smooth edges, then reduced, where memory allows.
 constexpr int kMaxSupersampledSide = 4096;
 
-cv::Mat picture_of_world(const RenderArguments& arguments, const model::WorldModel& world,
-                         const model::BodyLayout& layout) {
+cv::Mat picture_of_world(const RenderArguments& arguments, const world::WorldModel& world,
+                         const world::BodyLayout& layout) {
   const auto renderer = scene::make_renderer(world, layout);
   const report::Size size =
       arguments.size.empty() ? report::Size{} : report::parse_size(arguments.size);
   Vec3 sunlight(1, 1, -1);
-  for (const model::Light& light : world.lights) {
-    if (light.type != model::Light::Type::directional) continue;
+  for (const world::Light& light : world.lights) {
+    if (light.type != world::Light::Type::directional) continue;
     sunlight = light.pose.rotation * light.direction;
     break;
   }
@@ -67,8 +67,8 @@ cv::Mat picture_of_world(const RenderArguments& arguments, const model::WorldMod
   return bgr;
 }
 
-void require_camera(const std::string& camera, const model::WorldModel& world) {
-  const model::BodyLayout layout(world);
+void require_camera(const std::string& camera, const world::WorldModel& world) {
+  const world::BodyLayout layout(world);
   std::vector<std::string> cameras;
   for (const std::string& name : report::device_names(world, layout)) {
     const auto device = report::make_lone_device(world, layout, name, false);
@@ -84,8 +84,8 @@ void require_camera(const std::string& camera, const model::WorldModel& world) {
 }
 
 // The camera's own picture: with its lens, noise and exposure, but not compressed.
-cv::Mat picture_of_camera(const RenderArguments& arguments, const model::WorldModel& world,
-                          const model::BodyLayout& layout) {
+cv::Mat picture_of_camera(const RenderArguments& arguments, const world::WorldModel& world,
+                          const world::BodyLayout& layout) {
   const auto device =
       report::make_lone_device(world, layout, arguments.camera, !arguments.world.no_noise);
   const auto renderer = scene::make_renderer(world, layout);
@@ -96,7 +96,7 @@ cv::Mat picture_of_camera(const RenderArguments& arguments, const model::WorldMo
     image_t image;
     if (image.decode(out.data(entry), 0, static_cast<int>(entry.size)) < 0) break;
     if (image.pixelformat == image_t::PIXEL_FORMAT_MJPEG)
-      return model::decode_picture(image.data.data(), image.data.size(), cv::IMREAD_COLOR);
+      return world::decode_picture(image.data.data(), image.data.size(), cv::IMREAD_COLOR);
     const bool grey = image.pixelformat == image_t::PIXEL_FORMAT_GRAY;
     cv::Mat bgr, pixels(image.height, image.width, grey ? CV_8UC1 : CV_8UC3, image.data.data(),
                         static_cast<size_t>(image.row_stride));
@@ -108,9 +108,9 @@ cv::Mat picture_of_camera(const RenderArguments& arguments, const model::WorldMo
 }
 
 // Colour pictures of the camera that is asked for come raw, in the size that is asked for.
-std::shared_ptr<const model::WorldModel> load(const RenderArguments& arguments) {
-  model::LoadOptions options = load_options(arguments.world);
-  if (arguments.camera.empty()) return model::load_world(arguments.world.world, options);
+std::shared_ptr<const world::WorldModel> load(const RenderArguments& arguments) {
+  world::LoadOptions options = load_options(arguments.world);
+  if (arguments.camera.empty()) return world::load_world(arguments.world.world, options);
   const size_t slash = arguments.camera.find('/');
   if (slash == std::string::npos)
     throw InputError({}, "--camera " + arguments.camera + ": allowed is ROBOT/DEVICE");
@@ -118,7 +118,7 @@ std::shared_ptr<const model::WorldModel> load(const RenderArguments& arguments) 
                     device = arguments.camera.substr(slash + 1);
   const report::Size size =
       arguments.size.empty() ? report::Size{} : report::parse_size(arguments.size);
-  std::vector<model::Setting> settings{{robot, device, "ruedo:encoding", "rgb"}};
+  std::vector<world::Setting> settings{{robot, device, "ruedo:encoding", "rgb"}};
   settings.insert(settings.end(), options.settings.begin(),
                   options.settings.end());  // the user's settings come later and win
   if (size.width != 0) {
@@ -127,15 +127,15 @@ std::shared_ptr<const model::WorldModel> load(const RenderArguments& arguments) 
   }
   options.settings.clear();
   const auto world =
-      std::make_shared<model::WorldModel>(*model::load_world(arguments.world.world, options));
+      std::make_shared<world::WorldModel>(*world::load_world(arguments.world.world, options));
   require_camera(arguments.camera, *world);
-  model::apply_settings(settings, *world);
+  world::apply_settings(settings, *world);
   return world;
 }
 
 // nullopt: nothing is taken off.
 std::optional<double> height_to_cut_at(const RenderArguments& arguments,
-                                       const model::WorldModel& world) {
+                                       const world::WorldModel& world) {
   const bool from_outside = arguments.view == "top" || arguments.view == "iso";
   if (arguments.cut == "none") return std::nullopt;
   if (arguments.cut == "auto")
@@ -195,12 +195,12 @@ int render(const RenderArguments& arguments) {
           "what is above {:.3g} m is left out, since it hides the rest; --cut none shows it\n",
           *height);
   }
-  const model::BodyLayout layout(*world);
+  const world::BodyLayout layout(*world);
   const Progress progress("drawing " + world->name);
   const cv::Mat bgr = arguments.camera.empty() ? picture_of_world(arguments, *world, layout)
                                                : picture_of_camera(arguments, *world, layout);
   std::vector<uint8_t> bytes;
-  model::encode_picture(extension, bgr, bytes);
+  world::encode_picture(extension, bgr, bytes);
   write_file(arguments.output, {reinterpret_cast<const char*>(bytes.data()), bytes.size()});
   fmt::print("{}: {} x {} pixels\n", arguments.output, bgr.cols, bgr.rows);
   return kGood;

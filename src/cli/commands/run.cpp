@@ -178,7 +178,7 @@ void announce(const bus::ServerBus& place) {
   std::fflush(stdout);
 }
 
-void print_world(const run::Run& server, const model::WorldModel& world, const bus::LcmUrl& url) {
+void print_world(const run::Run& server, const world::WorldModel& world, const bus::LcmUrl& url) {
   const Style style = style_of(stdout);
   fmt::print("{}{}{}: steps of {:g} ms, seed {}, on {}\n", style.bold, for_terminal(world.name),
              style.off, static_cast<double>(world.step_us) * 1e-3,
@@ -204,8 +204,8 @@ int strict_check(const WorldArguments& world) {
 }
 
 // And refuses what can be refused by then.
-std::shared_ptr<const model::WorldModel> load_to_serve(const RunArguments& arguments) {
-  std::shared_ptr<const model::WorldModel> world = load(arguments.world);
+std::shared_ptr<const world::WorldModel> load_to_serve(const RunArguments& arguments) {
+  std::shared_ptr<const world::WorldModel> world = load(arguments.world);
   check_output(arguments.record);
   if (arguments.foxglove) FoxgloveServer::check(arguments.foxglove_address);
   return world;
@@ -219,7 +219,7 @@ int run_world(const RunArguments& arguments) {
   load_given_plugins();
   read_given_types();
   if (arguments.sandboxed)
-    enter_sandbox(model::world_file(arguments.world.world),
+    enter_sandbox(world::world_file(arguments.world.world),
                   {arguments.record, arguments.snapshots, socket_of(arguments.lcm)});
   SignalThread signals;
   std::signal(SIGPIPE, SIG_IGN);  // a closed pipe is reported by write()
@@ -228,7 +228,7 @@ int run_world(const RunArguments& arguments) {
   if (arguments.strict) {
     if (const int code = strict_check(arguments.world); code != kGood) return code;
   }
-  const std::shared_ptr<const model::WorldModel> world = load_to_serve(arguments);
+  const std::shared_ptr<const world::WorldModel> world = load_to_serve(arguments);
   for (std::string& plugin : plugin_options()) options.result_options.push_back(std::move(plugin));
   const bus::ServerBus place = bus::open_server_bus(
       arguments.lcm, world->name, [](const std::string& line) { spdlog::warn(line); });

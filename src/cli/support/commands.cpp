@@ -134,12 +134,12 @@ int64_t parse_duration_us(const std::string& text) {
   return microseconds(seconds);
 }
 
-model::LoadOptions load_options(const WorldArguments& arguments) {
-  model::LoadOptions options;
+world::LoadOptions load_options(const WorldArguments& arguments) {
+  world::LoadOptions options;
   for (const std::string& text : arguments.spawns)
-    options.spawns.push_back(model::parse_spawn(text));
+    options.spawns.push_back(world::parse_spawn(text));
   for (const std::string& text : arguments.drives)
-    options.drives.push_back(model::parse_drive(text));
+    options.drives.push_back(world::parse_drive(text));
   for (const std::string& text : arguments.xacro_arguments) {
     const size_t sign = text.find(":=");
     if (sign == std::string::npos || sign == 0)
@@ -149,8 +149,8 @@ model::LoadOptions load_options(const WorldArguments& arguments) {
   options.xacro_arguments = arguments.xacro_arguments;
   options.allow_absolute = arguments.allow_absolute;
   for (const std::string& text : arguments.settings) {
-    model::Setting setting = model::parse_setting(text);
-    for (const model::Setting& other : options.settings) {
+    world::Setting setting = world::parse_setting(text);
+    for (const world::Setting& other : options.settings) {
       if (std::tie(other.robot, other.device, other.key) ==
           std::tie(setting.robot, setting.device, setting.key))
         refuse_option("--set", text, "it is set already, to " + other.value);
@@ -163,14 +163,14 @@ model::LoadOptions load_options(const WorldArguments& arguments) {
   }
   options.disabled = arguments.disabled;
   for (const std::string& text : arguments.faults)
-    options.faults.push_back(model::parse_fault(text));
+    options.faults.push_back(world::parse_fault(text));
   return options;
 }
 
-std::shared_ptr<const model::WorldModel> load(const WorldArguments& arguments) {
+std::shared_ptr<const world::WorldModel> load(const WorldArguments& arguments) {
   if (arguments.fast_pixels) scene::draw_as_fast_as_it_goes();
   load_given_plugins();
-  return model::load_world(arguments.world, load_options(arguments));
+  return world::load_world(arguments.world, load_options(arguments));
 }
 
 std::vector<std::string> result_options(const WorldArguments& arguments) {

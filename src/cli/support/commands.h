@@ -48,8 +48,8 @@ struct WorldArguments {
 // --fast-pixels.
 void add_world_arguments(CLI::App& command, WorldArguments& arguments);
 // Throws InputError; for wrong usage it names no file.
-model::LoadOptions load_options(const WorldArguments& arguments);
-std::shared_ptr<const model::WorldModel> load(const WorldArguments& arguments);
+world::LoadOptions load_options(const WorldArguments& arguments);
+std::shared_ptr<const world::WorldModel> load(const WorldArguments& arguments);
 // Those of them that change a result, as on the command line: for a log's header.
 std::vector<std::string> result_options(const WorldArguments& arguments);
 

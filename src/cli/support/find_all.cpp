@@ -13,10 +13,10 @@ namespace ruedo::cli {
 namespace {
 
 // Pictures that are there and cannot be decoded. Readers leave that to who draws: it takes long.
-void check_textures(const model::WorldModel& world, std::vector<Finding>& findings) {
+void check_textures(const world::WorldModel& world, std::vector<Finding>& findings) {
   std::set<std::string> seen;
-  const auto look = [&](const model::Material& material, const std::string& owner) {
-    const model::Texture* texture = material.texture.get();
+  const auto look = [&](const world::Material& material, const std::string& owner) {
+    const world::Texture* texture = material.texture.get();
     if (!texture || !seen.insert(texture->path.empty() ? owner : texture->path).second) return;
     if (scene::decode_texture(*texture).width > 0) return;
     findings.push_back(
@@ -25,20 +25,20 @@ void check_textures(const model::WorldModel& world, std::vector<Finding>& findin
          "",
          "the texture is no picture that can be read; the plain colour is shown instead"});
   };
-  for (const model::ModelInstance& instance : world.models) {
-    for (const model::Link& link : instance.model->links) {
-      for (const model::Visual& visual : link.visuals) {
+  for (const world::ModelInstance& instance : world.models) {
+    for (const world::Link& link : instance.model->links) {
+      for (const world::Visual& visual : link.visuals) {
         if (visual.material) look(*visual.material, "");
-        const model::Mesh* mesh = visual.geometry.mesh.get();
+        const world::Mesh* mesh = visual.geometry.mesh.get();
         if (!mesh || visual.material) continue;
-        for (const model::Material& material : mesh->materials) look(material, mesh->name);
+        for (const world::Material& material : mesh->materials) look(material, mesh->name);
       }
     }
   }
 }
 
 // All that `ruedo run` makes before it starts; but it stops at the first device that it refuses.
-bool is_refused(const WorldArguments& arguments, const model::WorldModel& world,
+bool is_refused(const WorldArguments& arguments, const world::WorldModel& world,
                 Findings& findings) {
   engine::Channels channels;
   engine::FleetOptions options;
@@ -59,7 +59,7 @@ std::vector<Finding> find_all(const WorldArguments& arguments, ExitCode& refusal
   refusal = kBadInput;
   std::vector<Finding> findings;
   try {
-    const std::shared_ptr<const model::WorldModel> world = load(arguments);
+    const std::shared_ptr<const world::WorldModel> world = load(arguments);
     findings = world->findings;
     {
       const Progress progress("reading textures");
@@ -77,7 +77,7 @@ std::vector<Finding> find_all(const WorldArguments& arguments, ExitCode& refusal
   return findings;
 }
 
-void check_options(const WorldArguments& arguments, const model::WorldModel& world) {
+void check_options(const WorldArguments& arguments, const world::WorldModel& world) {
   if (arguments.settings.empty() && arguments.disabled.empty() && arguments.faults.empty()) return;
   Findings findings;
   try {

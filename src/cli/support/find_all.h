@@ -14,6 +14,6 @@ std::vector<Finding> find_all(const WorldArguments& arguments, ExitCode& refusal
 
 // For commands that make no devices: refuses the options that `ruedo run` would refuse. world: as
 // they were loaded with. Throws InputError.
-void check_options(const WorldArguments& arguments, const model::WorldModel& world);
+void check_options(const WorldArguments& arguments, const world::WorldModel& world);
 
 }  // namespace ruedo::cli

@@ -24,10 +24,10 @@
 namespace ruedo::cli {
 
 std::vector<run::WaitForOption> with_channels(std::vector<run::WaitForOption> options,
-                                              const model::WorldModel& world,
+                                              const world::WorldModel& world,
                                               const Ros2Arguments& arguments) {
   std::vector<std::string> robots;
-  for (const model::ModelInstance& model : world.models) {
+  for (const world::ModelInstance& model : world.models) {
     if (model.is_robot() && !model.removed) robots.push_back(model.name);
   }
   ros2::Names names(robots.size() == 1 ? robots.front() : "", arguments.topics);
@@ -66,11 +66,11 @@ ros2::Distro distro_of(const Ros2Arguments& arguments) {
   return named && *named ? ros2::parse_distro(named) : ros2::Distro::jazzy;
 }
 
-std::vector<std::string> joints_of(const model::WorldModel& world, const std::string& robot) {
-  const model::BodyLayout layout(world);
+std::vector<std::string> joints_of(const world::WorldModel& world, const std::string& robot) {
+  const world::BodyLayout layout(world);
   std::vector<std::string> names;
-  for (const model::RobotPlacement& placement : layout.robots) {
-    const model::ModelInstance& instance = world.models[placement.instance];
+  for (const world::RobotPlacement& placement : layout.robots) {
+    const world::ModelInstance& instance = world.models[placement.instance];
     if (instance.name != robot || instance.removed) continue;
     for (const JointIndex joint : placement.joints)
       names.push_back(instance.model->joints[layout.joints[joint].joint].name);

@@ -53,7 +53,7 @@ class Ros2Node {
 // The input channel of each ROS topic among --wait-for. Throws InputError for what is no topic that
 // takes commands.
 std::vector<run::WaitForOption> with_channels(std::vector<run::WaitForOption> options,
-                                              const model::WorldModel& world,
+                                              const world::WorldModel& world,
                                               const Ros2Arguments& arguments);
 
 }  // namespace ruedo::cli

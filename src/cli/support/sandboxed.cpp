@@ -29,7 +29,7 @@ namespace {
 // The cache of meshes, and in it what would go to /tmp, where files of others are. Without a cache,
 // /tmp.
 std::string own_folder() {
-  const std::string cache = model::mesh_cache_folder();
+  const std::string cache = world::mesh_cache_folder();
   const fs::path temporary = fs::path(cache) / "tmp";
   std::error_code error;
   if (cache.empty() || (fs::create_directories(temporary, error), error))
@@ -46,15 +46,15 @@ void enter_sandbox(const std::string& file, const std::vector<std::string>& writ
     throw EnvironmentError("--sandbox: " + missing);
   load_late_libraries();  // they may lie where files cannot be reached any more
   Sandbox sandbox;
-  sandbox.readable = model::ResourceFinder::for_strangers(file).folders();
+  sandbox.readable = world::ResourceFinder::for_strangers(file).folders();
   sandbox.readable.push_back(fs::absolute(file).parent_path().string());
   if (!other.empty()) {
-    for (std::string& folder : model::ResourceFinder::for_strangers(other).folders())
+    for (std::string& folder : world::ResourceFinder::for_strangers(other).folders())
       sandbox.readable.push_back(std::move(folder));
     sandbox.readable.push_back(fs::absolute(other).parent_path().string());
   }
   for (std::string& folder : plugin_folders()) sandbox.readable.push_back(std::move(folder));
-  sandbox.runnable = model::xacro_parts();
+  sandbox.runnable = world::xacro_parts();
   sandbox.writable.push_back(own_folder());
   std::error_code error;
   for (const std::string& path : written) {

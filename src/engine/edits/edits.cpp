@@ -26,7 +26,7 @@ Outcome refused(const std::string& text) { return Outcome::refuse(reply_t::REFUS
 
 std::string list_of(std::span<const double> values) {
   std::string text;
-  for (const double value : values) text += (text.empty() ? "" : ", ") + model::shown(value);
+  for (const double value : values) text += (text.empty() ? "" : ", ") + world::shown(value);
   return "(" + text + ")";
 }
 
@@ -38,7 +38,7 @@ std::string fault_of(const char* what, std::span<const double> values, double mo
       return std::string(what) + " is " + list_of(values) + ": only finite numbers are allowed";
     if (std::abs(value) > most) {
       return std::string(what) + " is " + list_of(values) + ": allowed is up to " +
-             model::shown(most) + " " + unit;
+             world::shown(most) + " " + unit;
     }
   }
   return "";
@@ -65,7 +65,7 @@ std::string fault_of_name(const std::string& name) {
   if (name.empty() || name.size() > kLongestName)
     return fmt::format("has {} bytes; allowed are 1 to {}", name.size(), kLongestName);
   if (!is_one_line(name)) return "is no UTF-8 text without control characters";
-  if (name == "ruedo" || model::is_reserved_name(name))
+  if (name == "ruedo" || world::is_reserved_name(name))
     return "is kept for Ruedo itself; choose another";
   if (name.starts_with(' ') || name.ends_with(' ')) return "begins or ends with a blank";
   if (name.find("::") != std::string::npos)
@@ -79,21 +79,21 @@ Outcome unknown(const std::string& name) {
 
 // Why a model cannot be pushed; "": it can.
 std::string why_immovable(const Simulation& simulation, InstanceIndex instance) {
-  const model::Model& model = *simulation.world().models[instance].model;
+  const world::Model& model = *simulation.world().models[instance].model;
   if (model.path) return "moves along its path";
-  const model::BodyLayout& layout = simulation.layout();
+  const world::BodyLayout& layout = simulation.layout();
   const size_t first = static_cast<size_t>(layout.first_link[instance]);
   bool moves = false, stands = false;
   for (size_t link = first; link < first + model.links.size(); ++link)
     (layout.links[link].body.valid() ? moves : stands) = true;
-  for (const model::Joint& joint : model.joints) stands |= !joint.parent.valid();
+  for (const world::Joint& joint : model.joints) stands |= !joint.parent.valid();
   if (!moves) return "is static";
   return stands ? "is fixed to the world by a joint" : "";
 }
 
 Pose link_now(const Simulation& simulation, InstanceIndex instance, ModelLinkIndex link) {
-  const model::BodyLayout& layout = simulation.layout();
-  const model::LinkPlacement& placement = layout.links[layout.link_of(instance, link)];
+  const world::BodyLayout& layout = simulation.layout();
+  const world::LinkPlacement& placement = layout.links[layout.link_of(instance, link)];
   return placement.body.valid() ? simulation.physics().pose(placement.body) * placement.X_BL
                                 : placement.X_BL;
 }
@@ -108,13 +108,13 @@ std::string told(const InputError& error) {
 
 }  // namespace
 
-model::LoadedModel ModelStore::load(const spawn_request_t& request, model::LoadBudget* budget) {
+world::LoadedModel ModelStore::load(const spawn_request_t& request, world::LoadBudget* budget) {
   std::string key;
   if (request.model.empty()) {
     key = "text " +
           sha256(reinterpret_cast<const uint8_t*>(request.text.data()), request.text.size());
   } else {
-    const std::string path = model::model_file(request.model, world_file_);
+    const std::string path = world::model_file(request.model, world_file_);
     std::error_code error;
     const auto written = std::filesystem::last_write_time(path, error).time_since_epoch().count();
     key = "file " + std::to_string(written) + " " + path;
@@ -123,14 +123,14 @@ model::LoadedModel ModelStore::load(const spawn_request_t& request, model::LoadB
     const std::lock_guard lock(mutex_);
     std::erase_if(known_, [](const auto& entry) { return entry.second.model.expired(); });
     if (const auto known = known_.find(key); known != known_.end()) {
-      model::LoadedModel loaded = known->second.rest;
+      world::LoadedModel loaded = known->second.rest;
       loaded.model = known->second.model.lock();
       if (loaded.model) return loaded;
     }
   }
-  model::LoadedModel loaded = request.model.empty()
-                                  ? model::load_model_text(request.text, world_file_, budget)
-                                  : model::load_model(request.model, world_file_, budget);
+  world::LoadedModel loaded = request.model.empty()
+                                  ? world::load_model_text(request.text, world_file_, budget)
+                                  : world::load_model(request.model, world_file_, budget);
   const std::lock_guard lock(mutex_);
   Known& known = known_[key];
   known.model = loaded.model;
@@ -150,23 +150,23 @@ Outcome check_spawn(const spawn_request_t& request) {
   return fault.empty() ? Outcome{} : bad("the name '" + shortened(request.name, 80) + "' " + fault);
 }
 
-Outcome spawn(const spawn_request_t& request, const model::LoadedModel& loaded, int64_t step,
+Outcome spawn(const spawn_request_t& request, const world::LoadedModel& loaded, int64_t step,
               Simulation& simulation, Channels& channels, std::string& name, Findings& findings) {
-  const model::WorldModel& world = simulation.world();
+  const world::WorldModel& world = simulation.world();
   if (world.models.size() >= kMostModels) {
     return refused("the world has " + std::to_string(kMostModels) +
                    " models, those that were removed included; a reset makes room");
   }
   if (!request.name.empty() && find_model(world, request.name).valid())
     return refused("the name '" + request.name + "' is taken");
-  if (const std::string fault = model::placed_triangles_fault(world, loaded.model.get());
+  if (const std::string fault = world::placed_triangles_fault(world, loaded.model.get());
       !fault.empty())
     return refused("with this model, " + fault);
   name = request.name.empty() ? unused_name(world, loaded.name) : request.name;
   if (const std::string fault = fault_of_name(name); !fault.empty())
     return bad("the model's name '" + name + "' " + fault);
-  const model::ModelInstance asked{name, {}, loaded.model};
-  for (const model::ModelInstance& other : world.models) {
+  const world::ModelInstance asked{name, {}, loaded.model};
+  for (const world::ModelInstance& other : world.models) {
     const std::string path = other.removed ? "" : shared_path(other, asked);
     if (!path.empty())
       return refused("the name '" + name + "' is taken: with it, '" + path +
@@ -176,14 +176,14 @@ Outcome spawn(const spawn_request_t& request, const model::LoadedModel& loaded, 
   const auto now = [&](InstanceIndex instance, ModelLinkIndex link) {
     return link_now(simulation, instance, link);
   };
-  if (const std::string other = model::overlapped(world, *loaded.model, X_WM, now);
+  if (const std::string other = world::overlapped(world, *loaded.model, X_WM, now);
       !other.empty()) {
     return refused("there is no room for '" + name + "' at " +
                    list_of({{X_WM.translation.x(), X_WM.translation.y(), X_WM.translation.z()}}) +
                    ": it would stand in '" + other + "'");
   }
   try {
-    model::check_channel_names({name, X_WM, loaded.model}, loaded.model->source);
+    world::check_channel_names({name, X_WM, loaded.model}, loaded.model->source);
     simulation.add_model(name, X_WM, loaded.model, step, channels, findings);
   } catch (const InputError& error) {
     return bad(told(error));
@@ -204,12 +204,12 @@ Pose pose_of(const set_pose_request_t& request) {
   return pose_of(request.position, request.orientation);
 }
 
-bool is_fixed(const model::WorldModel& world, const std::string& name) {
+bool is_fixed(const world::WorldModel& world, const std::string& name) {
   const InstanceIndex instance = find_model(world, name);
   if (!instance.valid()) return false;
-  const model::Model& model = *world.models[instance].model;
+  const world::Model& model = *world.models[instance].model;
   return !model.path && (model.is_static || std::any_of(model.joints.begin(), model.joints.end(),
-                                                        [](const model::Joint& joint) {
+                                                        [](const world::Joint& joint) {
                                                           return !joint.parent.valid();
                                                         }));
 }
@@ -245,9 +245,9 @@ Outcome set_twist(const set_twist_request_t& request, Simulation& simulation) {
   const InstanceIndex instance = find_model(simulation.world(), request.name);
   if (!instance.valid()) return unknown(request.name);
   std::string why = why_immovable(simulation, instance);
-  const model::Model& model = *simulation.world().models[instance].model;
+  const world::Model& model = *simulation.world().models[instance].model;
   const bool kinematic = std::any_of(model.links.begin(), model.links.end(),
-                                     [](const model::Link& link) { return link.kinematic; });
+                                     [](const world::Link& link) { return link.kinematic; });
   if (why.empty() && model.drive) why = "has a drive: send it a velocity command";
   if (why.empty() && kinematic) why = "is kinematic: it stays where it is put";
   if (!why.empty()) return refused("'" + request.name + "' " + why);

@@ -32,12 +32,12 @@ class ModelStore {
  public:
   explicit ModelStore(std::string world_file) : world_file_(std::move(world_file)) {}
   // Throws InputError. budget: may be null.
-  model::LoadedModel load(const spawn_request_t& request, model::LoadBudget* budget = nullptr);
+  world::LoadedModel load(const spawn_request_t& request, world::LoadBudget* budget = nullptr);
 
  private:
   struct Known {
-    std::weak_ptr<const model::Model> model;
-    model::LoadedModel rest;  // everything but the model
+    std::weak_ptr<const world::Model> model;
+    world::LoadedModel rest;  // everything but the model
   };
   std::string world_file_;
   std::mutex mutex_;
@@ -46,12 +46,12 @@ class ModelStore {
 
 // The name, or with _2, _3, ... appended if it is taken: for a spawned model without a requested
 // name.
-std::string unused_name(const model::WorldModel& world, const std::string& name);
+std::string unused_name(const world::WorldModel& world, const std::string& name);
 
 // What can be checked before the model is read; OK: nothing is wrong.
 Outcome check_spawn(const spawn_request_t& request);
 // step: the first state that shows it. name: is set to the model's name. findings: of its devices.
-Outcome spawn(const spawn_request_t& request, const model::LoadedModel& loaded, int64_t step,
+Outcome spawn(const spawn_request_t& request, const world::LoadedModel& loaded, int64_t step,
               Simulation& simulation, Channels& channels, std::string& name, Findings& findings);
 Outcome remove(const std::string& name, Simulation& simulation, Channels& channels);
 // A fixed model, static or with a joint to the world, is removed and inserted again. step: the
@@ -60,7 +60,7 @@ Outcome set_pose(const set_pose_request_t& request, int64_t step, Simulation& si
                  Channels& channels);
 Pose pose_of(const set_pose_request_t& request);
 // Whether the model of that name is fixed; false if there is none.
-bool is_fixed(const model::WorldModel& world, const std::string& name);
+bool is_fixed(const world::WorldModel& world, const std::string& name);
 Outcome set_twist(const set_twist_request_t& request, Simulation& simulation);
 // Returns all models to where they started or were spawned, at rest.
 void reset_poses(Simulation& simulation);

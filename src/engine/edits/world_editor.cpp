@@ -13,10 +13,10 @@
 namespace ruedo::engine {
 
 WorldEditor::Placed WorldEditor::place(const std::string& name, const Pose& X_WM,
-                                       std::shared_ptr<const model::Model> model) {
-  IndexedVector<InstanceIndex, model::ModelInstance>& models = world_.models;
+                                       std::shared_ptr<const world::Model> model) {
+  IndexedVector<InstanceIndex, world::ModelInstance>& models = world_.models;
   const auto free =
-      std::find_if(models.begin(), models.end(), [&](const model::ModelInstance& instance) {
+      std::find_if(models.begin(), models.end(), [&](const world::ModelInstance& instance) {
         return instance.removed && instance.model == model;
       });
   if (free == models.end()) {
@@ -31,25 +31,25 @@ WorldEditor::Placed WorldEditor::place(const std::string& name, const Pose& X_WM
 }
 
 void WorldEditor::remove(InstanceIndex instance) {
-  model::ModelInstance& removed = world_.models[instance];
+  world::ModelInstance& removed = world_.models[instance];
   removed.removed = true;
   removed.name.clear();
 }
 
-InstanceIndex find_model(const model::WorldModel& world, const std::string& name) {
+InstanceIndex find_model(const world::WorldModel& world, const std::string& name) {
   const auto found = std::find_if(world.models.begin(), world.models.end(),
-                                  [&](const model::ModelInstance& instance) {
+                                  [&](const world::ModelInstance& instance) {
                                     return !instance.removed && instance.name == name;
                                   });
   return found == world.models.end() ? InstanceIndex()
                                      : InstanceIndex(found - world.models.begin());
 }
 
-std::string unused_name(const model::WorldModel& world, const std::string& name) {
+std::string unused_name(const world::WorldModel& world, const std::string& name) {
   if (!find_model(world, name).valid()) return name;
   const std::string stem = name + "_";
   std::set<int> taken;
-  for (const model::ModelInstance& instance : world.models) {
+  for (const world::ModelInstance& instance : world.models) {
     if (instance.removed || !instance.name.starts_with(stem)) continue;
     const char* const begin = instance.name.data() + stem.size();
     const char* const end = instance.name.data() + instance.name.size();
@@ -63,14 +63,14 @@ std::string unused_name(const model::WorldModel& world, const std::string& name)
   return stem + std::to_string(number);
 }
 
-Pose spawn_pose(const model::WorldModel& world, const model::Model& model,
+Pose spawn_pose(const world::WorldModel& world, const world::Model& model,
                 const spawn_request_t& request) {
   const double* q = request.orientation;
   const Pose X_WM{Quat(q[0], q[1], q[2], q[3]).normalized(),
                   Vec3(request.position[0], request.position[1], request.position[2])};
   if (!request.on_ground) return X_WM;
   const Vec3 ahead = X_WM.rotation * Vec3::UnitX();
-  return model::standing_on(world, model, request.position[0], request.position[1],
+  return world::standing_on(world, model, request.position[0], request.position[1],
                             math::atan2(ahead.y(), ahead.x()));
 }
 

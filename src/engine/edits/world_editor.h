@@ -16,25 +16,25 @@ namespace ruedo::engine {
 class WorldEditor {
  public:
   // The world must outlive it.
-  explicit WorldEditor(model::WorldModel& world) : world_(world) {}
+  explicit WorldEditor(world::WorldModel& world) : world_(world) {}
 
   struct Placed {
     InstanceIndex instance;  // index into the world's models
     bool reused;             // in the place of a removed one
   };
   Placed place(const std::string& name, const Pose& X_WM,
-               std::shared_ptr<const model::Model> model);
+               std::shared_ptr<const world::Model> model);
   void remove(InstanceIndex instance);
 
  private:
-  model::WorldModel& world_;
+  world::WorldModel& world_;
 };
 
 // Index of the model with that name; -1: there is none.
-InstanceIndex find_model(const model::WorldModel& world, const std::string& name);
+InstanceIndex find_model(const world::WorldModel& world, const std::string& name);
 
 // The pose for a SPAWN: as requested, or standing on the ground below.
-Pose spawn_pose(const model::WorldModel& world, const model::Model& model,
+Pose spawn_pose(const world::WorldModel& world, const world::Model& model,
                 const spawn_request_t& request);
 
 }  // namespace ruedo::engine

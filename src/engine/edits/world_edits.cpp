@@ -9,7 +9,7 @@
 namespace ruedo::engine {
 namespace {
 
-RobotIndex robot_of(const model::BodyLayout& layout, InstanceIndex instance) {
+RobotIndex robot_of(const world::BodyLayout& layout, InstanceIndex instance) {
   for (const RobotIndex robot : layout.robots.indices()) {
     if (layout.robots[robot].instance == instance) return robot;
   }
@@ -21,16 +21,16 @@ constexpr unsigned kMostDrawers = 8;  // threads that draw
 }  // namespace
 
 InstanceIndex World::place(const std::string& name, const Pose& X_WM,
-                           std::shared_ptr<const model::Model> model) {
+                           std::shared_ptr<const world::Model> model) {
   const WorldEditor::Placed placed = WorldEditor(model_).place(name, X_WM, std::move(model));
   placed.reused ? layout_.place_again(model_, placed.instance) : layout_.append(model_);
   return placed.instance;
 }
 
 InstanceIndex World::add_model(const std::string& name, const Pose& X_WM,
-                               std::shared_ptr<const model::Model> model, int64_t step,
+                               std::shared_ptr<const world::Model> model, int64_t step,
                                Channels& channels, Findings& findings) {
-  const model::BodyLayout layout_before = layout_;
+  const world::BodyLayout layout_before = layout_;
   const auto models_before = model_.models;
   const Channels channels_before = channels;
   if (model->path) robot::check_path(*model->path);

@@ -38,8 +38,8 @@ SensorFault::Kind sensor_kind(const std::string& name) {
 
 }  // namespace
 
-model::Fault fault_of(const fault_t& message) {
-  model::Fault fault;
+world::Fault fault_of(const fault_t& message) {
+  world::Fault fault;
   fault.kind = message.kind;
   fault.target = message.target;
   fault.duration_s = message.duration;
@@ -52,10 +52,10 @@ model::Fault fault_of(const fault_t& message) {
   return fault;
 }
 
-Faults::Faults(const model::WorldModel& world, const model::BodyLayout& layout,
+Faults::Faults(const world::WorldModel& world, const world::BodyLayout& layout,
                const std::vector<device_info_t>& devices, uint64_t seed)
     : world_(world), layout_(layout), devices_(devices), seed_(seed) {
-  for (const model::Fault& fault : world.faults) {
+  for (const world::Fault& fault : world.faults) {
     for (const RobotIndex robot : layout.robots.indices()) {
       if (name_of(robot) != fault.robot) continue;
       if (const std::string why = check(fault, robot); !why.empty())
@@ -84,14 +84,14 @@ const device_info_t* Faults::find_device(RobotIndex robot, const std::string& na
   return nullptr;
 }
 
-std::string Faults::check(const model::Fault& fault, RobotIndex robot) const {
-  if (std::string why = model::check_fault(fault); !why.empty()) return why;
+std::string Faults::check(const world::Fault& fault, RobotIndex robot) const {
+  if (std::string why = world::check_fault(fault); !why.empty()) return why;
   if (of_robots_.size() + (of_sensors_ ? of_sensors_->size() : 0) +
           (reseedings_ ? reseedings_->size() : 0) >=
       kMostFaults)
     return fmt::format("there are {} faults already", kMostFaults);
-  const model::FaultKind& kind = *model::find_fault_kind(fault.kind);
-  if (kind.of == model::FaultKind::Of::device) {
+  const world::FaultKind& kind = *world::find_fault_kind(fault.kind);
+  if (kind.of == world::FaultKind::Of::device) {
     const device_info_t* device = find_device(robot, fault.target);
     const std::vector<std::string>& disabled = world_->disabled;
     if (!device && std::find(disabled.begin(), disabled.end(),
@@ -107,14 +107,14 @@ std::string Faults::check(const model::Fault& fault, RobotIndex robot) const {
     if (!applies_to(sensor_kind(fault.kind), device->kind))
       return fmt::format("{} is no fault of {} {}", fault.kind,
                          device->kind.find_first_of("aeio") == 0 ? "an" : "a", device->kind);
-  } else if (kind.of != model::FaultKind::Of::world &&
+  } else if (kind.of != world::FaultKind::Of::world &&
              !world_->models[layout_->robots[robot].instance].model->drive) {
     return fmt::format("{} is a fault of robots that drive", fault.kind);
   }
   return "";
 }
 
-void Faults::begin(const model::Fault& fault, RobotIndex robot, int64_t step) {
+void Faults::begin(const world::Fault& fault, RobotIndex robot, int64_t step) {
   forget_ended(step);
   if (const std::string why = check(fault, robot); !why.empty()) {
     spdlog::warn("{}/fault was ignored: {}", name_of(robot), why);
@@ -141,15 +141,15 @@ void Faults::forget_ended(int64_t step) {
   }
 }
 
-void Faults::begin_at(const model::Fault& fault, RobotIndex robot, int64_t begin, bool message) {
+void Faults::begin_at(const world::Fault& fault, RobotIndex robot, int64_t begin, bool message) {
   ever_ = true;
   const int64_t end = fault.duration_s > 0.0 ? begin + steps(fault.duration_s) : INT64_MAX;
-  const model::FaultKind& kind = *model::find_fault_kind(fault.kind);
-  if (kind.of == model::FaultKind::Of::device) {
+  const world::FaultKind& kind = *world::find_fault_kind(fault.kind);
+  if (kind.of == world::FaultKind::Of::device) {
     return begin_of_device(fault, robot, message ? begin + 1 : begin,
                            message && end != INT64_MAX ? end + 1 : end);
   }
-  if (kind.of == model::FaultKind::Of::world)
+  if (kind.of == world::FaultKind::Of::world)
     return begin_reseeding(static_cast<uint64_t>(fault.value), message ? begin + 1 : begin);
   const std::pair<const char*, Kind> kinds[] = {
       {"encoder_stuck", Kind::encoder_stuck}, {"wheel_slip", Kind::wheel_slip},
@@ -181,7 +181,7 @@ std::optional<uint64_t> Faults::new_seed(int64_t step) {
   return seed_ = now->seed;
 }
 
-void Faults::begin_of_device(const model::Fault& fault, RobotIndex robot, int64_t begin,
+void Faults::begin_of_device(const world::Fault& fault, RobotIndex robot, int64_t begin,
                              int64_t end) {
   const device_info_t* device = find_device(robot, fault.target);
   if (!device) return;  // it is switched off
@@ -270,7 +270,7 @@ robot::Command Faults::weakened(robot::Command command, int64_t step) const {
   const double left = left_of(command.robot, true, step),
                right = left_of(command.robot, false, step), least = std::min(left, right);
   if (left == 1.0 && right == 1.0) return command;
-  const model::DriveDescription& drive =
+  const world::DriveDescription& drive =
       *world_->models[layout_->robots[command.robot].instance].model->drive;
   if (auto* velocity = std::get_if<robot::VelocityCommand>(&command.what)) {
     const double half = 0.5 * drive.track;
@@ -301,7 +301,7 @@ void Faults::show_wheels(Snapshot& snapshot) {
                    snapshot.wheel_angles.end());
   }
   for (size_t i = 0; i < snapshot.wheel_angles.size(); ++i) {
-    const model::WheelPlacement& wheel = layout_->wheels[i];
+    const world::WheelPlacement& wheel = layout_->wheels[i];
     double factor = 1.0;
     for (const RobotFault& fault : of_robots_) {
       if (!fault.acts(wheel.robot, snapshot.step) || !(wheel.left ? fault.left : fault.right) ||

@@ -29,19 +29,19 @@
 namespace ruedo::engine {
 
 // A message's fault, as from a file; the robot is the channel's.
-model::Fault fault_of(const fault_t& message);
+world::Fault fault_of(const fault_t& message);
 
 class Faults {
  public:
   // Takes the world's own faults. The arguments must outlive it. Throws InputError for a fault that
   // names no device of its robot.
-  Faults(const model::WorldModel& world, const model::BodyLayout& layout,
+  Faults(const world::WorldModel& world, const world::BodyLayout& layout,
          const std::vector<device_info_t>& devices, uint64_t seed);
 
   // What is wrong with a fault of that robot, or "".
-  std::string check(const model::Fault& fault, RobotIndex robot) const;
+  std::string check(const world::Fault& fault, RobotIndex robot) const;
   // Acts on the state `step`: samples of later states show it. An invalid one changes nothing.
-  void begin(const model::Fault& fault, RobotIndex robot, int64_t step);
+  void begin(const world::Fault& fault, RobotIndex robot, int64_t step);
 
   // Before the commands on the state `step`: delayed commands act, kidnapped robots are moved.
   void before_commands(int64_t step, robot::Robots& robots);
@@ -80,7 +80,7 @@ class Faults {
     int64_t begin, end;  // in steps
     int64_t delay_steps;
     double value;
-    model::Fault asked;
+    world::Fault asked;
     bool done = false;  // a kidnapped robot has been moved
     bool acts(int of_robot, int64_t step) const {
       return robot == of_robot && step >= begin && step < end;
@@ -94,10 +94,10 @@ class Faults {
   };
 
   int64_t steps(double seconds) const;
-  void begin_at(const model::Fault& fault, RobotIndex robot, int64_t begin, bool message);
+  void begin_at(const world::Fault& fault, RobotIndex robot, int64_t begin, bool message);
   void forget_ended(int64_t step);  // they make room for others
   void begin_reseeding(uint64_t seed, int64_t begin);
-  void begin_of_device(const model::Fault& fault, RobotIndex robot, int64_t begin, int64_t end);
+  void begin_of_device(const world::Fault& fault, RobotIndex robot, int64_t begin, int64_t end);
   const device_info_t* find_device(RobotIndex robot, const std::string& name) const;
   const std::string& name_of(RobotIndex robot) const;
   double left_of(RobotIndex robot, bool left,
@@ -105,8 +105,8 @@ class Faults {
   robot::Command weakened(robot::Command command, int64_t step) const;
   bool is_lost(RobotIndex robot, int64_t step);
 
-  Bound<const model::WorldModel> world_;
-  Bound<const model::BodyLayout> layout_;
+  Bound<const world::WorldModel> world_;
+  Bound<const world::BodyLayout> layout_;
   Bound<const std::vector<device_info_t>> devices_;
   uint64_t seed_;  // currently in use
   std::shared_ptr<const std::vector<Reseeding>> reseedings_;

@@ -45,7 +45,7 @@ Goal parse_goal(const std::string& text) {
   return {numbers[0], numbers[1], numbers[2], numbers[3]};
 }
 
-Judge::Judge(const model::WorldModel& world, Expectations expected)
+Judge::Judge(const world::WorldModel& world, Expectations expected)
     : world_(world), expected_(std::move(expected)), layout_(world) {
   IndexedVector<RobotIndex, std::string> names;
   for (const RobotIndex i : layout_.robots.indices()) {
@@ -62,7 +62,7 @@ Judge::Judge(const model::WorldModel& world, Expectations expected)
   own_.resize(layout_.links.size());
   wheel_.resize(layout_.links.size());
   for (const LinkIndex i : layout_.links.indices()) own_[i] = layout_.links[i].instance == instance;
-  for (const model::WheelPlacement& wheel : layout_.wheels)
+  for (const world::WheelPlacement& wheel : layout_.wheels)
     wheel_[wheel.link] = wheel.robot == robot_;
   reached_.resize(expected_.goals.size());
   expected_.clearance_reach =
@@ -79,8 +79,8 @@ void Judge::fail(const std::string& what, SimTime time, const std::string& text)
 }
 
 std::string Judge::name_of(LinkIndex link) const {
-  const model::LinkPlacement& placement = layout_.links[link];
-  const model::ModelInstance& instance = world_.models[placement.instance];
+  const world::LinkPlacement& placement = layout_.links[link];
+  const world::ModelInstance& instance = world_.models[placement.instance];
   return instance.name + "/" + instance.model->links[placement.link].name;
 }
 

@@ -53,7 +53,7 @@ struct Metric {
 class Judge {
  public:
   // Throws InputError when the world has no such robot. The world must outlive it.
-  Judge(const model::WorldModel& world, Expectations expected);
+  Judge(const world::WorldModel& world, Expectations expected);
   ~Judge();
 
   void see(const Snapshot& snapshot);
@@ -79,9 +79,9 @@ class Judge {
   void compare_odometry();
   std::string name_of(LinkIndex link) const;
 
-  const model::WorldModel& world_;
+  const world::WorldModel& world_;
   Expectations expected_;
-  model::BodyLayout layout_;
+  world::BodyLayout layout_;
   RobotIndex robot_;
   IndexedVector<LinkIndex, bool> own_, wheel_;
   std::unique_ptr<JudgeHull> hull_;

@@ -25,7 +25,7 @@ Vec3 direction_of(int i) {
 
 }  // namespace
 
-JudgeHull::JudgeHull(const model::WorldModel& world, const model::BodyLayout& layout,
+JudgeHull::JudgeHull(const world::WorldModel& world, const world::BodyLayout& layout,
                      RobotIndex robot)
     : layout_(layout), robot_(robot) {
   find_hull(world);
@@ -33,13 +33,13 @@ JudgeHull::JudgeHull(const model::WorldModel& world, const model::BodyLayout& la
 }
 
 // The robot alone, with base_link at the origin.
-void JudgeHull::find_hull(const model::WorldModel& world) {
-  model::WorldModel alone;
+void JudgeHull::find_hull(const world::WorldModel& world) {
+  world::WorldModel alone;
   alone.models.push_back(world.models[layout_.robots[robot_].instance]);
-  const model::BodyLayout layout(alone);
-  const model::RobotPlacement& placement = layout.robots.at(0);
+  const world::BodyLayout layout(alone);
+  const world::RobotPlacement& placement = layout.robots.at(0);
   Snapshot still;
-  for (const model::BodyPlacement& body : layout.bodies) still.bodies.push_back(body.X_WB);
+  for (const world::BodyPlacement& body : layout.bodies) still.bodies.push_back(body.X_WB);
   still.wheel_angles.resize(layout.wheels.size());
   const Pose X_BaseW = (placement.body.valid() ? still.bodies[placement.body] * placement.X_BBase
                                                : placement.X_BBase)

@@ -15,7 +15,7 @@ namespace ruedo::judge {
 
 class JudgeHull {
  public:
-  JudgeHull(const model::WorldModel& world, const model::BodyLayout& layout, RobotIndex robot);
+  JudgeHull(const world::WorldModel& world, const world::BodyLayout& layout, RobotIndex robot);
 
   struct Nearest {
     double range = std::numeric_limits<double>::infinity();  // m
@@ -25,9 +25,9 @@ class JudgeHull {
   Nearest nearest(const Snapshot& snapshot, double reach);
 
  private:
-  void find_hull(const model::WorldModel& world);
+  void find_hull(const world::WorldModel& world);
 
-  const model::BodyLayout& layout_;
+  const world::BodyLayout& layout_;
   RobotIndex robot_;
   std::vector<scene::Ray> hull_;  // in base_link: points on the hull, directions outwards
   std::unique_ptr<scene::RayScene> scene_;

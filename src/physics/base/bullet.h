@@ -1,5 +1,5 @@
 // Bullet's headers in double precision, and conversions between its types and ours. Only for the
-// sources of this folder.
+// sources of src/physics.
 #pragma once
 
 // gcc sees an uninitialised vector in btBoxShape::getPlane that is assigned before it is read.

@@ -26,8 +26,8 @@ struct MassProperties {
   Eigen::Matrix3d inertia = Eigen::Matrix3d::Zero();  // about the centre, axes of B
 };
 
-MassProperties mass_of(const model::Model& model, const model::BodyLayout& layout,
-                       const model::BodyPlacement& body) {
+MassProperties mass_of(const world::Model& model, const world::BodyLayout& layout,
+                       const world::BodyPlacement& body) {
   MassProperties sum;
   for (const LinkIndex index : body.links) {
     const auto& placement = layout.links[index];
@@ -63,25 +63,25 @@ Quat principal_axes(const Eigen::Matrix3d& inertia, Vec3& moments) {
   return Quat(axes).normalized();
 }
 
-const model::RobotPlacement* robot_of(const model::BodyLayout& layout, InstanceIndex instance) {
+const world::RobotPlacement* robot_of(const world::BodyLayout& layout, InstanceIndex instance) {
   const auto robot = std::lower_bound(
       layout.robots.begin(), layout.robots.end(), instance,
-      [](const model::RobotPlacement& a, InstanceIndex b) { return a.instance < b; });
+      [](const world::RobotPlacement& a, InstanceIndex b) { return a.instance < b; });
   return robot != layout.robots.end() && robot->instance == instance ? &*robot : nullptr;
 }
 
 // The wheel that this body is, with a wheels drive.
-WheelIndex driven_wheel(const model::BodyLayout& layout, BodyIndex index) {
-  const model::RobotPlacement* robot = robot_of(layout, layout.bodies[index].instance);
+WheelIndex driven_wheel(const world::BodyLayout& layout, BodyIndex index) {
+  const world::RobotPlacement* robot = robot_of(layout, layout.bodies[index].instance);
   if (!robot || robot->body == index) return {};
   for (const WheelIndex wheel : robot->wheels) {
-    const model::WheelPlacement& placement = layout.wheels[wheel];
+    const world::WheelPlacement& placement = layout.wheels[wheel];
     if (!placement.steers && layout.links[placement.link].body == index) return wheel;
   }
   return {};
 }
 
-double mass_on_each_wheel(const model::Model& model, const model::RobotPlacement& robot) {
+double mass_on_each_wheel(const world::Model& model, const world::RobotPlacement& robot) {
   double mass = 0.0;
   for (const auto& link : model.links) mass += link.inertial.mass;
   return mass / static_cast<double>(std::max<size_t>(robot.wheels.size(), 1));
@@ -92,18 +92,18 @@ void make_it_give(double share, const Vec3& gravity, ShapeSurface& surface) {
   surface.damping = kTyreDamping * 2.0 * std::sqrt(surface.stiffness * share);
 }
 
-bool carries_kinematic_drive(const model::WorldModel& world, const model::BodyLayout& layout,
+bool carries_kinematic_drive(const world::WorldModel& world, const world::BodyLayout& layout,
                              BodyIndex index) {
   for (const auto& robot : layout.robots) {
     if (robot.body != index) continue;
     const auto& drive = world.models[robot.instance].model->drive;
-    return drive && drive->kind == model::DriveDescription::Kind::kinematic;
+    return drive && drive->kind == world::DriveDescription::Kind::kinematic;
   }
   return false;
 }
 
 // Bullet's frame of a wheel: y is its axle, to which lateral friction refers.
-Pose wheel_frame(const model::BodyLayout& layout, WheelIndex wheel, const MassProperties& mass,
+Pose wheel_frame(const world::BodyLayout& layout, WheelIndex wheel, const MassProperties& mass,
                  Vec3& moments) {
   const auto& placement = layout.wheels[wheel];
   const Vec3 axis = layout.links[placement.link].X_BL.rotation * placement.axis_in_L;
@@ -114,7 +114,7 @@ Pose wheel_frame(const model::BodyLayout& layout, WheelIndex wheel, const MassPr
 }
 
 // Adds a link's mass to the mass exposed to the wind.
-void feel_wind(const model::Inertial& inertial, const Pose& X_IB, const Pose& X_BL,
+void feel_wind(const world::Inertial& inertial, const Pose& X_IB, const Pose& X_BL,
                RigidBody& body) {
   const Vec3 at = X_IB * (X_BL * inertial.X_LI.translation);
   body.wind_mass += inertial.mass;
@@ -141,8 +141,8 @@ void make_bullet(double mass, const Vec3& moments, const Pose& X_WB, RigidBody& 
 }
 
 // Of a kinematic drive, which also represents its friction.
-bool is_belt(const model::Model& model, ModelLinkIndex link) {
-  if (!model.drive || model.drive->kind != model::DriveDescription::Kind::kinematic) return false;
+bool is_belt(const world::Model& model, ModelLinkIndex link) {
+  if (!model.drive || model.drive->kind != world::DriveDescription::Kind::kinematic) return false;
   const auto& belts = model.drive->belts;
   return std::find(belts.begin(), belts.end(), link) != belts.end();
 }
@@ -157,14 +157,14 @@ const ObjectInfo::Shape& shape_of(const ObjectInfo& info, int child) {
   return known ? info.shapes[child] : info.shapes.front();
 }
 
-RigidBodies::RigidBodies(const model::WorldModel& world, const model::BodyLayout& layout)
+RigidBodies::RigidBodies(const world::WorldModel& world, const world::BodyLayout& layout)
     : findings(simplifications(world, layout)) {
   for (const LinkIndex link : layout.links.indices()) make_statics(world, layout, link);
   bodies.resize(layout.bodies.size());
   for (const BodyIndex i : bodies.indices()) make_body(world, layout, i);
 }
 
-void RigidBodies::append(const model::WorldModel& world, const model::BodyLayout& layout,
+void RigidBodies::append(const world::WorldModel& world, const world::BodyLayout& layout,
                          InstanceIndex instance) {
   const BodyIndex first = bodies.next();
   for (const LinkIndex link : layout.links.indices()) {
@@ -176,7 +176,7 @@ void RigidBodies::append(const model::WorldModel& world, const model::BodyLayout
   for (BodyIndex i = first; bodies.has(i); ++i) make_body(world, layout, i);
 }
 
-void RigidBodies::make_statics(const model::WorldModel& world, const model::BodyLayout& layout,
+void RigidBodies::make_statics(const world::WorldModel& world, const world::BodyLayout& layout,
                                LinkIndex index) {
   const auto& placement = layout.links[index];
   if (placement.body.valid()) return;
@@ -192,7 +192,7 @@ void RigidBodies::make_statics(const model::WorldModel& world, const model::Body
     bullet.setWorldTransform(to_bt((placement.X_BL * collision.X_LC).normalized()));
     bullet.setCollisionFlags(btCollisionObject::CF_STATIC_OBJECT);
     object->info.instance = placement.instance;
-    object->info.plane = collision.geometry.shape == model::Shape::plane;
+    object->info.plane = collision.geometry.shape == world::Shape::plane;
     object->info.shapes.push_back(  // Bullet's frame is the collision's
         {index, ShapeIndex(c), surface_of(collision.surface, Quat::Identity())});
     bullet.setUserPointer(&object->info);
@@ -201,12 +201,12 @@ void RigidBodies::make_statics(const model::WorldModel& world, const model::Body
 }
 
 // A wheel of a wheels drive: y of its frame is its axle.
-ShapeSurface RigidBodies::tyre_of(const model::WorldModel& world, const model::BodyLayout& layout,
+ShapeSurface RigidBodies::tyre_of(const world::WorldModel& world, const world::BodyLayout& layout,
                                   WheelIndex wheel, const ShapeSurface& surface) const {
   const auto& robot = layout.robots[layout.wheels[wheel].robot];
-  const model::Model& model = *world.models[robot.instance].model;
+  const world::Model& model = *world.models[robot.instance].model;
   ShapeSurface tyre = surface;
-  using Steering = model::DriveDescription::Steering;
+  using Steering = world::DriveDescription::Steering;
   const bool rolls_sideways = model.drive && (model.drive->steering == Steering::mecanum ||
                                               model.drive->steering == Steering::omni);
   if (rolls_sideways) {  // it grips along the roller's axis only; the roller rotates freely
@@ -223,11 +223,11 @@ ShapeSurface RigidBodies::tyre_of(const model::WorldModel& world, const model::B
 
 // Other supports of a robot, above all casters, are as compliant as its tyres: rigid ones would
 // bear all the weight and leave none for the wheels. Against what it runs into, it stays rigid.
-ShapeSurface RigidBodies::foot_of(const model::WorldModel& world, const model::BodyLayout& layout,
+ShapeSurface RigidBodies::foot_of(const world::WorldModel& world, const world::BodyLayout& layout,
                                   InstanceIndex instance, const ShapeSurface& surface) const {
-  const model::Model& model = *world.models[instance].model;
-  const model::RobotPlacement* robot = robot_of(layout, instance);
-  using Kind = model::DriveDescription::Kind;
+  const world::Model& model = *world.models[instance].model;
+  const world::RobotPlacement* robot = robot_of(layout, instance);
+  using Kind = world::DriveDescription::Kind;
   if (surface.stiffness > 0.0 || !robot || !model.drive || model.drive->kind != Kind::wheels)
     return surface;
   ShapeSurface foot = surface;
@@ -237,7 +237,7 @@ ShapeSurface RigidBodies::foot_of(const model::WorldModel& world, const model::B
 }
 
 // All collisions of a body as one shape, in Bullet's frame I, with the surface of each.
-void RigidBodies::make_compound(const model::WorldModel& world, const model::BodyLayout& layout,
+void RigidBodies::make_compound(const world::WorldModel& world, const world::BodyLayout& layout,
                                 WheelIndex wheel, RigidBody& body) {
   const auto& placement = layout.bodies[body.info.body];
   const auto& instance = world.models[placement.instance];
@@ -248,11 +248,11 @@ void RigidBodies::make_compound(const model::WorldModel& world, const model::Bod
   std::vector<btCollisionShape*> shapes;
   for (const LinkIndex link_index : placement.links) {
     const auto& link_placement = layout.links[link_index];
-    const model::Link& link = instance.model->links[link_placement.link];
+    const world::Link& link = instance.model->links[link_placement.link];
     for (size_t c = 0; c < link.collisions.size(); ++c) {
       const auto& collision = link.collisions[c];
       shapes.clear();
-      if (wheel.valid() && collision.geometry.shape == model::Shape::cylinder) {
+      if (wheel.valid() && collision.geometry.shape == world::Shape::cylinder) {
         shapes.push_back(shapes_.tyre(collision.geometry.size.x(), collision.geometry.size.y()));
       } else if (!shapes_.moving(collision.geometry, shapes)) {
         findings.push_back(
@@ -277,10 +277,10 @@ void RigidBodies::make_compound(const model::WorldModel& world, const model::Bod
   }
 }
 
-void RigidBodies::make_body(const model::WorldModel& world, const model::BodyLayout& layout,
+void RigidBodies::make_body(const world::WorldModel& world, const world::BodyLayout& layout,
                             BodyIndex index) {
   const auto& placement = layout.bodies[index];
-  const model::Model& model = *world.models[placement.instance].model;
+  const world::Model& model = *world.models[placement.instance].model;
   RigidBody& body = bodies[index];
   const MassProperties mass = mass_of(model, layout, placement);
   const WheelIndex wheel = driven_wheel(layout, index);
@@ -291,7 +291,7 @@ void RigidBodies::make_body(const model::WorldModel& world, const model::BodyLay
   bool gravity = false, kinematic = model.path != nullptr;
   for (const LinkIndex link_index : placement.links) {
     const auto& link_placement = layout.links[link_index];
-    const model::Link& link = model.links[link_placement.link];
+    const world::Link& link = model.links[link_placement.link];
     gravity |= link.gravity;
     kinematic |= link.kinematic;
     if (link.wind) feel_wind(link.inertial, X_IB, link_placement.X_BL, body);

@@ -58,10 +58,10 @@ struct StaticObject {
 
 class RigidBodies {
  public:
-  RigidBodies(const model::WorldModel& world, const model::BodyLayout& layout);
+  RigidBodies(const world::WorldModel& world, const world::BodyLayout& layout);
 
   // Creates what the layout has for a new instance, at the end of the lists.
-  void append(const model::WorldModel& world, const model::BodyLayout& layout,
+  void append(const world::WorldModel& world, const world::BodyLayout& layout,
               InstanceIndex instance);
 
   IndexedVector<BodyIndex, RigidBody> bodies;          // numbered as in the layout
@@ -69,14 +69,14 @@ class RigidBodies {
   std::vector<Finding> findings;
 
  private:
-  void make_statics(const model::WorldModel& world, const model::BodyLayout& layout,
+  void make_statics(const world::WorldModel& world, const world::BodyLayout& layout,
                     LinkIndex link);
-  ShapeSurface tyre_of(const model::WorldModel& world, const model::BodyLayout& layout,
+  ShapeSurface tyre_of(const world::WorldModel& world, const world::BodyLayout& layout,
                        WheelIndex wheel, const ShapeSurface& surface) const;
-  ShapeSurface foot_of(const model::WorldModel& world, const model::BodyLayout& layout,
+  ShapeSurface foot_of(const world::WorldModel& world, const world::BodyLayout& layout,
                        InstanceIndex instance, const ShapeSurface& surface) const;
-  void make_body(const model::WorldModel& world, const model::BodyLayout& layout, BodyIndex index);
-  void make_compound(const model::WorldModel& world, const model::BodyLayout& layout,
+  void make_body(const world::WorldModel& world, const world::BodyLayout& layout, BodyIndex index);
+  void make_compound(const world::WorldModel& world, const world::BodyLayout& layout,
                      WheelIndex wheel, RigidBody& body);
   ShapeFactory shapes_;
 };

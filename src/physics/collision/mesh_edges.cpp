@@ -42,13 +42,13 @@ class MeshContacts final : public btManifoldResult {
 
 }  // namespace
 
-MeshEdges::MeshEdges(const model::Mesh& mesh, const Vec3& scale) {
+MeshEdges::MeshEdges(const world::Mesh& mesh, const Vec3& scale) {
   join_vertices(mesh, scale);
   find_neighbours();
   find_rings();
 }
 
-void MeshEdges::join_vertices(const model::Mesh& mesh, const Vec3& scale) {
+void MeshEdges::join_vertices(const world::Mesh& mesh, const Vec3& scale) {
   const auto key = [&](uint32_t i) {
     return std::tuple(mesh.positions[i].x(), mesh.positions[i].y(), mesh.positions[i].z());
   };

@@ -16,7 +16,7 @@ namespace ruedo::physics {
 
 class MeshEdges {
  public:
-  MeshEdges(const model::Mesh& mesh, const Vec3& scale);
+  MeshEdges(const world::Mesh& mesh, const Vec3& scale);
 
   // Whether another part of the mesh is nearer to something in the direction of `normal` (unit)
   // from `point` on that triangle. Both in the mesh's frame, scaled.
@@ -25,7 +25,7 @@ class MeshEdges {
  private:
   static constexpr int kNone = -1;  // no other triangle has that edge, or several do
 
-  void join_vertices(const model::Mesh& mesh, const Vec3& scale);
+  void join_vertices(const world::Mesh& mesh, const Vec3& scale);
   void find_neighbours();
   void find_rings();
 

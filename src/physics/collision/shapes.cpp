@@ -35,7 +35,7 @@ btVector3 scaled(const Eigen::Vector3f& p, const Vec3& scale) {
 }
 
 // Labels every vertex with its connected part; vertices in the same place are one.
-std::vector<int> connected_parts(const model::Mesh& mesh, int& count) {
+std::vector<int> connected_parts(const world::Mesh& mesh, int& count) {
   const size_t n = mesh.positions.size();
   std::vector<uint32_t> order(n), parent(n);
   std::iota(order.begin(), order.end(), 0u);
@@ -122,7 +122,7 @@ struct ShapeFactory::Triangles {
   btTriangleIndexVertexArray array;
   MeshEdges edges;
 
-  Triangles(const model::Mesh& mesh, const Vec3& scale) : edges(mesh, scale) {
+  Triangles(const world::Mesh& mesh, const Vec3& scale) : edges(mesh, scale) {
     for (const auto& p : mesh.positions) {
       for (int i = 0; i < 3; ++i) positions.push_back(p[i] * scale[i]);
     }
@@ -143,39 +143,39 @@ struct ShapeFactory::Triangles {
 ShapeFactory::ShapeFactory() = default;
 ShapeFactory::~ShapeFactory() = default;
 
-btCollisionShape* ShapeFactory::primitive(const model::Geometry& geometry) {
+btCollisionShape* ShapeFactory::primitive(const world::Geometry& geometry) {
   const Vec3& size = geometry.size;
   switch (geometry.shape) {
-    case model::Shape::box: {
+    case world::Shape::box: {
       auto box = std::make_unique<SeenAhead<btBoxShape>>(to_bt(Vec3(size / 2)));
       box->setMargin(margin_for(size.minCoeff() / 2));
       return own(std::move(box));
     }
-    case model::Shape::sphere: return own(std::make_unique<SeenAhead<btSphereShape>>(size.x()));
-    case model::Shape::cylinder: {
+    case world::Shape::sphere: return own(std::make_unique<SeenAhead<btSphereShape>>(size.x()));
+    case world::Shape::cylinder: {
       auto cylinder = std::make_unique<SeenAhead<btCylinderShapeZ>>(
           btVector3(size.x(), size.x(), size.y() / 2));
       cylinder->setMargin(margin_for(std::min(size.x(), size.y() / 2)));
       return own(std::move(cylinder));
     }
-    case model::Shape::capsule:
+    case world::Shape::capsule:
       return own(std::make_unique<SeenAhead<btCapsuleShapeZ>>(size.x(), size.y()));
-    case model::Shape::ellipsoid:
+    case world::Shape::ellipsoid:
       return own(std::make_unique<SeenAhead<EllipsoidShape>>(to_bt(size)));
-    case model::Shape::cone: {
+    case world::Shape::cone: {
       auto cone = std::make_unique<SeenAhead<btConeShapeZ>>(size.x(), size.y());
       cone->setMargin(0.0);  // a cone's margin would be added outside
       return own(std::move(cone));
     }
-    case model::Shape::plane:
+    case world::Shape::plane:
       return own(std::make_unique<btStaticPlaneShape>(to_bt(geometry.normal), 0.0));
-    case model::Shape::mesh: break;
+    case world::Shape::mesh: break;
   }
   return nullptr;
 }
 
-btCollisionShape* ShapeFactory::fixed(const model::Geometry& geometry) {
-  if (geometry.shape != model::Shape::mesh) return primitive(geometry);
+btCollisionShape* ShapeFactory::fixed(const world::Geometry& geometry) {
+  if (geometry.shape != world::Shape::mesh) return primitive(geometry);
   if (!geometry.mesh || geometry.mesh->triangles.empty()) return nullptr;
   const Vec3& scale = geometry.scale;
   btCollisionShape*& shape = fixed_meshes_[{geometry.mesh.get(), scale.x(), scale.y(), scale.z()}];
@@ -190,14 +190,14 @@ btCollisionShape* ShapeFactory::fixed(const model::Geometry& geometry) {
   return shape;
 }
 
-bool ShapeFactory::moving(const model::Geometry& geometry, std::vector<btCollisionShape*>& shapes) {
-  if (geometry.shape == model::Shape::plane) return true;
-  if (geometry.shape != model::Shape::mesh) {
+bool ShapeFactory::moving(const world::Geometry& geometry, std::vector<btCollisionShape*>& shapes) {
+  if (geometry.shape == world::Shape::plane) return true;
+  if (geometry.shape != world::Shape::mesh) {
     shapes.push_back(primitive(geometry));
     return true;
   }
   if (!geometry.mesh || geometry.mesh->triangles.empty()) return true;
-  const model::Mesh& mesh = *geometry.mesh;
+  const world::Mesh& mesh = *geometry.mesh;
   const Vec3& scale = geometry.scale;
   const auto [entry, is_new] = moving_meshes_.try_emplace({&mesh, scale.x(), scale.y(), scale.z()});
   Pieces& pieces = entry->second;

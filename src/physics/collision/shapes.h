@@ -20,12 +20,12 @@ class ShapeFactory {
   ~ShapeFactory();
 
   // For a static body. Null for a mesh without triangles. Planes pass through the origin.
-  btCollisionShape* fixed(const model::Geometry& geometry);
+  btCollisionShape* fixed(const world::Geometry& geometry);
 
   // For a moving body: one shape, or for a mesh the convex hull of each connected part. Appends to
   // `shapes`; nothing for a plane, which cannot move. Returns false if the shape differs from the
   // geometry: for a concave mesh.
-  bool moving(const model::Geometry& geometry, std::vector<btCollisionShape*>& shapes);
+  bool moving(const world::Geometry& geometry, std::vector<btCollisionShape*>& shapes);
 
   // A wheel with that radius and width about its z axis (m).
   btCollisionShape* tyre(double radius, double width);
@@ -37,9 +37,9 @@ class ShapeFactory {
     bool exact = true;
   };
   using MeshKey =
-      std::tuple<const model::Mesh*, double, double, double>;  // only looked up, never iterated
+      std::tuple<const world::Mesh*, double, double, double>;  // only looked up, never iterated
 
-  btCollisionShape* primitive(const model::Geometry& geometry);
+  btCollisionShape* primitive(const world::Geometry& geometry);
   template <class Shape>
   Shape* own(std::unique_ptr<Shape> shape) {
     Shape* raw = shape.get();

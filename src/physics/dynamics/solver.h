@@ -8,8 +8,8 @@
 // more than a tolerance, up to a limit: a lone robot takes a few, a stack or a large mass ratio
 // more.
 // - The joints of a mechanism are one block, solved directly in each sweep: a tree of joints in
-// reduced coordinates (joint_tree.h), others by Cholesky factorization, so that long chains of
-// joints hold.
+// reduced coordinates (joints/joint_tree.h), others by Cholesky factorization, so that long chains
+// of joints hold.
 // - Friction is Coulomb's cone, not a pyramid; an ellipse where a file gives two coefficients. Its
 // force opposes the slip by maximum dissipation, whatever the heading.
 // - Penetration and joint errors are corrected by pseudo-velocities, which are discarded: they add

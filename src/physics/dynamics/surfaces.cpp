@@ -57,7 +57,7 @@ double felt(double coefficient) {
 
 }  // namespace
 
-ShapeSurface surface_of(const model::Surface& surface, const Quat& R_IC) {
+ShapeSurface surface_of(const world::Surface& surface, const Quat& R_IC) {
   ShapeSurface s;
   s.friction = felt(surface.friction);
   s.along_I = surface.friction_direction == Vec3::Zero() ? Vec3(Vec3::Zero())

@@ -30,7 +30,7 @@ struct ShapeSurface {
 };
 
 // R_IC: the collision's axes in the body's frame.
-ShapeSurface surface_of(const model::Surface& surface, const Quat& R_IC);
+ShapeSurface surface_of(const world::Surface& surface, const Quat& R_IC);
 
 // Found through ObjectInfo.
 class Surfaces final : public ContactSurfaces {

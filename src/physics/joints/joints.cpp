@@ -14,7 +14,7 @@ namespace {
 // SDF limits beyond this mean "no limit".
 constexpr double kNoLimit = 1e9;
 
-bool limited(const model::JointAxis& axis) {
+bool limited(const world::JointAxis& axis) {
   return (axis.lower > -kNoLimit || axis.upper < kNoLimit) && axis.lower <= axis.upper;
 }
 
@@ -23,7 +23,7 @@ bool limited(const model::JointAxis& axis) {
 // limits.
 constexpr double kWindow = 1.5;
 
-bool within_a_turn(const model::JointAxis& axis) { return axis.lower > -M_PI && axis.upper < M_PI; }
+bool within_a_turn(const world::JointAxis& axis) { return axis.lower > -M_PI && axis.upper < M_PI; }
 
 // A frame at J with its x or z axis along the joint's axis.
 Pose along(const Pose& X, const Vec3& axis_in_J, const Vec3& unit) {
@@ -69,7 +69,7 @@ double angle_about(const Vec3& axis, const Quat& turn) {
 
 }  // namespace
 
-JointConstraint::JointConstraint(const model::Joint& joint, btRigidBody& parent, btRigidBody& child,
+JointConstraint::JointConstraint(const world::Joint& joint, btRigidBody& parent, btRigidBody& child,
                                  const Pose& X_PJ, const Pose& X_CJ, btRigidBody* reference)
     : JointState(joint),
       type_(joint.type),
@@ -89,16 +89,16 @@ JointConstraint::JointConstraint(const model::Joint& joint, btRigidBody& parent,
 
 JointConstraint::Constraint JointConstraint::make_constraint() {
   switch (type_) {
-    case model::JointType::revolute:
-    case model::JointType::continuous: return make_hinge();
-    case model::JointType::prismatic: return make_slider();
-    case model::JointType::screw: return make_screw();
-    case model::JointType::universal: return make_universal();
-    case model::JointType::gearbox: return make_gearbox();
-    case model::JointType::ball:
+    case world::JointType::revolute:
+    case world::JointType::continuous: return make_hinge();
+    case world::JointType::prismatic: return make_slider();
+    case world::JointType::screw: return make_screw();
+    case world::JointType::universal: return make_universal();
+    case world::JointType::gearbox: return make_gearbox();
+    case world::JointType::ball:
       return std::make_unique<btPoint2PointConstraint>(parent_, child_, to_bt(X_PJ_.translation),
                                                        to_bt(X_CJ_.translation));
-    case model::JointType::fixed: break;
+    case world::JointType::fixed: break;
   }
   return std::make_unique<btFixedConstraint>(parent_, child_, to_bt(X_PJ_), to_bt(X_CJ_));
 }
@@ -107,7 +107,7 @@ JointConstraint::Constraint JointConstraint::make_hinge() const {
   auto hinge = std::make_unique<btHingeConstraint>(
       parent_, child_, to_bt(along(X_PJ_, limits_.axis_in_J, Vec3::UnitZ())),
       to_bt(along(X_CJ_, limits_.axis_in_J, Vec3::UnitZ())), true);
-  if (type_ == model::JointType::revolute && limited(limits_) && within_a_turn(limits_)) {
+  if (type_ == world::JointType::revolute && limited(limits_) && within_a_turn(limits_)) {
     hinge->setLimit(limits_.lower, limits_.upper, 1.0, 0.3, 0.0);
   } else {
     hinge->setLimit(1.0, -1.0);  // no limit, or a window in each substep
@@ -200,17 +200,17 @@ double JointConstraint::velocity() const {
   const Vec3 axis = axis_in_world();
   const Vec3 turn = from_bt(child_.getAngularVelocity() - parent_.getAngularVelocity());
   switch (type_) {
-    case model::JointType::revolute:
-    case model::JointType::continuous:
-    case model::JointType::universal:
-    case model::JointType::screw: return axis.dot(turn);
-    case model::JointType::prismatic: {
+    case world::JointType::revolute:
+    case world::JointType::continuous:
+    case world::JointType::universal:
+    case world::JointType::screw: return axis.dot(turn);
+    case world::JointType::prismatic: {
       const btVector3 arm = child_.getWorldTransform() * to_bt(X_CJ_.translation);
       return axis.dot(
           from_bt(child_.getVelocityInLocalPoint(arm - child_.getCenterOfMassPosition()) -
                   parent_.getVelocityInLocalPoint(arm - parent_.getCenterOfMassPosition())));
     }
-    case model::JointType::gearbox:
+    case world::JointType::gearbox:
       return gear_axis(limits2_).dot(
           from_bt(child_.getAngularVelocity() - reference_->getAngularVelocity()));
     default: return 0.0;
@@ -253,10 +253,10 @@ void JointConstraint::set_effort(double effort) {
 
 bool JointConstraint::leads() const {
   constexpr double kOfItsEffort = 0.99;  // beyond this it is at its limit, and may lag
-  if (!constraint_ || !constraint_->isEnabled() || type_ == model::JointType::fixed) return true;
+  if (!constraint_ || !constraint_->isEnabled() || type_ == world::JointType::fixed) return true;
   if (mode_ != Mode::motor || follows_ || std::isfinite(gain_)) return false;
   const JointMotor& motor = motors_->first;
-  return type_ != model::JointType::universal && type_ != model::JointType::screw &&
+  return type_ != world::JointType::universal && type_ != world::JointType::screw &&
          motor.impulse >= kOfItsEffort * motor.lower && motor.impulse <= kOfItsEffort * motor.upper;
 }
 
@@ -280,7 +280,7 @@ void JointConstraint::turn_on(JointMotor& motor, const Vec3& axis, double rate, 
                               double highest, double substep_s) const {
   constexpr double kMost = 1e9;  // stands for infinity, which an impulse cannot be
   motor.on = highest > 0.0 || lowest < 0.0;
-  motor.linear = type_ == model::JointType::prismatic;
+  motor.linear = type_ == world::JointType::prismatic;
   motor.axis = axis;
   motor.anchor = from_bt(child_.getWorldTransform() * to_bt(X_CJ_.translation));
   motor.rate = rate;
@@ -301,18 +301,18 @@ void JointConstraint::serve(const Vec3& axis, double substep_s) {
           std::max(servo_.lowest_torque, -limits_.effort) + braked,
           std::min(servo_.highest_torque, limits_.effort) + braked, substep_s);
   motors_->first.softness = 1.0 / (gain * substep_s);
-  if (limits_.friction > 0.0 && type_ != model::JointType::universal &&
-      type_ != model::JointType::screw)
+  if (limits_.friction > 0.0 && type_ != world::JointType::universal &&
+      type_ != world::JointType::screw)
     turn_on(motors_->second, axis, 0.0, -limits_.friction, limits_.friction, substep_s);
 }
 
 void JointConstraint::push(double effort) {
   const btVector3 along_axis = to_bt(Vec3(axis_in_world() * effort));
-  if (type_ == model::JointType::prismatic) {
+  if (type_ == world::JointType::prismatic) {
     const btVector3 at = child_.getWorldTransform() * to_bt(X_CJ_.translation);
     child_.applyForce(along_axis, at - child_.getCenterOfMassPosition());
     parent_.applyForce(-along_axis, at - parent_.getCenterOfMassPosition());
-  } else if (type_ != model::JointType::ball && type_ != model::JointType::fixed) {
+  } else if (type_ != world::JointType::ball && type_ != world::JointType::fixed) {
     child_.applyTorque(along_axis);
     parent_.applyTorque(-along_axis);
   }
@@ -350,12 +350,12 @@ void JointConstraint::hold_thread(double substep_s) {
   motors_->second.advance = advance_;
 }
 
-Vec3 JointConstraint::gear_axis(const model::JointAxis& axis) const {
+Vec3 JointConstraint::gear_axis(const world::JointAxis& axis) const {
   return rotation_of(*reference_) * (R_RJ_ * axis.axis_in_J);
 }
 
 double JointConstraint::turned(const btRigidBody& body, const Quat& start_in_R,
-                               const model::JointAxis& axis, double before) const {
+                               const world::JointAxis& axis, double before) const {
   const Quat turn =
       rotation_of(*reference_).conjugate() * rotation_of(body) * start_in_R.conjugate();
   return before + wrap_angle(angle_about(R_RJ_ * axis.axis_in_J, turn) - before);
@@ -383,18 +383,18 @@ void JointConstraint::follow(double leader_position, double leader_rate, double 
 void JointConstraint::before_substep(double substep_s) {
   if (!constraint_ || !constraint_->isEnabled()) return;
   motors_->second.on = false;
-  if (type_ == model::JointType::gearbox) return mesh_gears(substep_s);
-  if (type_ == model::JointType::screw) hold_thread(substep_s);
-  if (type_ == model::JointType::revolute && limited(limits_) && !within_a_turn(limits_)) {
+  if (type_ == world::JointType::gearbox) return mesh_gears(substep_s);
+  if (type_ == world::JointType::screw) hold_thread(substep_s);
+  if (type_ == world::JointType::revolute && limited(limits_) && !within_a_turn(limits_)) {
     static_cast<btHingeConstraint&>(*constraint_)
         .setLimit(std::max(limits_.lower, position_ - kWindow),
                   std::min(limits_.upper, position_ + kWindow), 1.0, 0.3, 0.0);
   }
-  if (type_ == model::JointType::universal) {
+  if (type_ == world::JointType::universal) {
     brake_second_axis(substep_s);
     if (limited(limits_)) limit_first_axis();
   }
-  if (type_ == model::JointType::ball || type_ == model::JointType::fixed) return;
+  if (type_ == world::JointType::ball || type_ == world::JointType::fixed) return;
   if (limits_.spring_stiffness > 0.0)
     push(limits_.spring_stiffness * (limits_.spring_reference - position_));
   const Vec3 axis = axis_in_world();
@@ -414,30 +414,30 @@ void JointConstraint::before_substep(double substep_s) {
 void JointConstraint::after_substep(double substep_s) {
   if (!constraint_ || !constraint_->isEnabled()) return;
   const bool driven = follows_ || mode_ == Mode::motor || mode_ == Mode::servo ||
-                      type_ == model::JointType::gearbox;
+                      type_ == world::JointType::gearbox;
   effort_ = driven ? motors_->first.impulse / substep_s : mode_ == Mode::effort ? command_ : 0.0;
   if (mode_ == Mode::servo && !follows_) effort_ += limits_.damping * velocity();
   switch (type_) {
-    case model::JointType::revolute:
-    case model::JointType::continuous: {
+    case world::JointType::revolute:
+    case world::JointType::continuous: {
       const double angle =
           static_cast<btHingeConstraint&>(*constraint_)
               .getHingeAngle(parent_.getWorldTransform(), child_.getWorldTransform());
       position_ += wrap_angle(angle - position_);
       break;
     }
-    case model::JointType::prismatic: position_ = advanced(); break;
-    case model::JointType::screw: {
+    case world::JointType::prismatic: position_ = advanced(); break;
+    case world::JointType::screw: {
       const Quat turn = rotation_of(parent_).conjugate() * rotation_of(child_) * X_CJ_.rotation *
                         X_PJ_.rotation.conjugate();
       position_ += wrap_angle(angle_about(X_PJ_.rotation * limits_.axis_in_J, turn) - position_);
       break;
     }
-    case model::JointType::gearbox:
+    case world::JointType::gearbox:
       position_ = turned(child_, R_RC_, limits2_, position_);
       parent_position_ = turned(parent_, R_RP_, limits_, parent_position_);
       break;
-    case model::JointType::universal: {
+    case world::JointType::universal: {
       // A rotation about the parent's axis, then one about the child's: where the child's second
       // axis points, seen along the first.
       const Quat R_PC = from_bt(parent_.getWorldTransform().getRotation()).conjugate() *

@@ -18,13 +18,13 @@ namespace ruedo::physics {
 
 // The joint's command and response: all state that changes between substeps.
 struct JointState {
-  explicit JointState(const model::Joint& joint) : limits_(joint.axis), limits2_(joint.axis2) {}
+  explicit JointState(const world::Joint& joint) : limits_(joint.axis), limits2_(joint.axis2) {}
 
   enum class Mode { passive, motor, effort, servo };
   bool follows_ = false;  // in the coming substep, with follow_rate_
   double follow_rate_ = 0.0;
   double parent_position_ = 0.0;       // rad about the first axis
-  model::JointAxis limits_, limits2_;  // limits2_: second axis of universal joints and gearboxes
+  world::JointAxis limits_, limits2_;  // limits2_: second axis of universal joints and gearboxes
   struct {
     double rate = 0.0, lowest = 0.0, highest = 0.0, gain = 0.0, effort = 0.0;
   } told_;  // before limits are applied
@@ -45,7 +45,7 @@ class JointConstraint : private JointState {
  public:
   // X_PJ, X_CJ: the joint's frame in Bullet's frames I of parent and child. reference: for a
   // gearbox.
-  JointConstraint(const model::Joint& joint, btRigidBody& parent, btRigidBody& child,
+  JointConstraint(const world::Joint& joint, btRigidBody& parent, btRigidBody& child,
                   const Pose& X_PJ, const Pose& X_CJ, btRigidBody* reference = nullptr);
 
   btTypedConstraint* constraint() {
@@ -120,13 +120,13 @@ class JointConstraint : private JointState {
   void brake_second_axis(double substep_s);
   double advanced() const;  // m along the axis since the start
   void hold_thread(double substep_s);
-  Vec3 gear_axis(const model::JointAxis& axis) const;  // world
+  Vec3 gear_axis(const world::JointAxis& axis) const;  // world
   void mesh_gears(double substep_s);
   // rad about an axis of the reference since the start, unwrapped using the previous value
-  double turned(const btRigidBody& body, const Quat& start_in_R, const model::JointAxis& axis,
+  double turned(const btRigidBody& body, const Quat& start_in_R, const world::JointAxis& axis,
                 double before) const;
 
-  model::JointType type_;
+  world::JointType type_;
   double advance_;              // m/rad: screw only
   double multiplier_, offset_;  // applied to the leader's position
   double ratio_;                // gearbox only, like the following

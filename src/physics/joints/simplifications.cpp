@@ -13,14 +13,14 @@ namespace ruedo::physics {
 
 namespace {
 
-const model::Model& model_of(const model::WorldModel& world, InstanceIndex instance) {
+const world::Model& model_of(const world::WorldModel& world, InstanceIndex instance) {
   return *world.models[instance].model;
 }
 
-void look_at_joints(const model::WorldModel& world, const model::BodyLayout& layout,
+void look_at_joints(const world::WorldModel& world, const world::BodyLayout& layout,
                     std::vector<Finding>& findings) {
   for (const auto& placement : layout.joints) {
-    const model::Joint& joint = model_of(world, placement.instance).joints[placement.joint];
+    const world::Joint& joint = model_of(world, placement.instance).joints[placement.joint];
     const bool led =
         std::any_of(layout.joints.begin(), layout.joints.end(), [&](const auto& other) {
           return other.instance == placement.instance && other.joint == joint.leader;
@@ -30,8 +30,8 @@ void look_at_joints(const model::WorldModel& world, const model::BodyLayout& lay
                           "model " + world.models[placement.instance].name + "/joint " + joint.name,
                           "<mimic> of a driven wheel is not supported; the joint moves freely"});
     }
-    const bool ball = joint.type == model::JointType::ball;
-    if (!ball && joint.type != model::JointType::universal) continue;
+    const bool ball = joint.type == world::JointType::ball;
+    if (!ball && joint.type != world::JointType::universal) continue;
     findings.push_back({Finding::Kind::unsupported, joint.source,
                         "model " + world.models[placement.instance].name + "/joint " + joint.name,
                         ball ? "a ball joint holds its links together; it takes no commands, and "
@@ -43,14 +43,14 @@ void look_at_joints(const model::WorldModel& world, const model::BodyLayout& lay
 
 // Without a direction only one coefficient is used; torsional friction without a patch has no lever
 // arm.
-void look_at_friction(const model::WorldModel& world, const model::BodyLayout& layout,
+void look_at_friction(const world::WorldModel& world, const world::BodyLayout& layout,
                       std::vector<Finding>& findings) {
   for (const auto& placement : layout.links) {
-    const model::ModelInstance& instance = world.models[placement.instance];
-    const model::Link& link = instance.model->links[placement.link];
+    const world::ModelInstance& instance = world.models[placement.instance];
+    const world::Link& link = instance.model->links[placement.link];
     const bool rolls = placement.wheel.valid();  // its axle gives the direction
     for (const auto& collision : link.collisions) {
-      const model::Surface& surface = collision.surface;
+      const world::Surface& surface = collision.surface;
       const auto find = [&](const char* what) {
         findings.push_back(
             {Finding::Kind::unsupported, collision.source,
@@ -72,12 +72,12 @@ void look_at_friction(const model::WorldModel& world, const model::BodyLayout& l
 }
 
 // What a joint takes away of the freedom of its bodies.
-size_t rows_of(const model::Joint& joint) {
+size_t rows_of(const world::Joint& joint) {
   switch (joint.type) {
-    case model::JointType::fixed: return 6;
-    case model::JointType::ball: return 3;
-    case model::JointType::universal: return 4;
-    case model::JointType::gearbox: return 1;
+    case world::JointType::fixed: return 6;
+    case world::JointType::ball: return 3;
+    case world::JointType::universal: return 4;
+    case world::JointType::gearbox: return 1;
     default: return 5;
   }
 }
@@ -85,18 +85,18 @@ size_t rows_of(const model::Joint& joint) {
 // Bodies that joints connect.
 struct Mechanism {
   size_t bodies = 0, joints = 0, hung = 0, rows = 0;  // hung: joints to the world
-  const model::JointPlacement* first = nullptr;
+  const world::JointPlacement* first = nullptr;
 
   bool has_loops() const { return hung > 1 || joints + (hung == 0 ? 1 : 0) > bodies; }
 };
 
 class Mechanisms {
  public:
-  Mechanisms(const model::WorldModel& world, const model::BodyLayout& layout)
+  Mechanisms(const world::WorldModel& world, const world::BodyLayout& layout)
       : parents_(layout.bodies.size()) {
     std::iota(parents_.begin(), parents_.end(), size_t{0});
     for (const auto& placement : layout.joints) {
-      const model::Joint& joint = model_of(world, placement.instance).joints[placement.joint];
+      const world::Joint& joint = model_of(world, placement.instance).joints[placement.joint];
       unite(placement.parent_body, placement.child_body);
       if (joint.gear_reference.valid()) {
         const BodyIndex carrier =
@@ -137,14 +137,14 @@ class Mechanisms {
 };
 
 // Trees are solved at once, however long they are.
-void look_at_loops(const model::WorldModel& world, const model::BodyLayout& layout,
+void look_at_loops(const world::WorldModel& world, const world::BodyLayout& layout,
                    std::vector<Finding>& findings) {
   if (layout.joints.size() <= kMostRowsAtOnce / 6) return;
   const Mechanisms mechanisms(world, layout);
   for (const auto& [body, mechanism] : mechanisms.all()) {
     if (mechanism.rows <= kMostRowsAtOnce || !mechanism.has_loops()) continue;
     const InstanceIndex instance = mechanism.first->instance;
-    const model::Model& model = model_of(world, instance);
+    const world::Model& model = model_of(world, instance);
     findings.push_back(
         {Finding::Kind::unsupported, model.joints[mechanism.first->joint].source,
          "model " + world.models[instance].name,
@@ -157,8 +157,8 @@ void look_at_loops(const model::WorldModel& world, const model::BodyLayout& layo
 
 }  // namespace
 
-std::vector<Finding> simplifications(const model::WorldModel& world,
-                                     const model::BodyLayout& layout) {
+std::vector<Finding> simplifications(const world::WorldModel& world,
+                                     const world::BodyLayout& layout) {
   std::vector<Finding> findings;
   look_at_joints(world, layout, findings);
   look_at_friction(world, layout, findings);

@@ -9,7 +9,7 @@ namespace ruedo::physics {
 
 // Ball and universal joints (they hold, but their state and motors are partial), bodies whose
 // shapes have different friction, and mechanisms too large to be solved at once.
-std::vector<Finding> simplifications(const model::WorldModel& world,
-                                     const model::BodyLayout& layout);
+std::vector<Finding> simplifications(const world::WorldModel& world,
+                                     const world::BodyLayout& layout);
 
 }  // namespace ruedo::physics

@@ -23,7 +23,7 @@ namespace {
 
 constexpr size_t kMostPlaced = 50'000;  // models of all scenes together: each scene lists its own
 
-using model::WorldModel;
+using world::WorldModel;
 
 template <class Body>
 bool read_body(const applied_t& applied, Body& body) {
@@ -66,7 +66,7 @@ std::shared_ptr<const WorldModel> edited(const applied_t& applied,
       if (!read_body(applied, body) || engine::check_spawn(body).code != reply_t::OK)
         return nullptr;
       auto world = std::make_shared<WorldModel>(*before);
-      const model::LoadedModel loaded = models.load(body);
+      const world::LoadedModel loaded = models.load(body);
       const std::string name =
           body.name.empty() ? engine::unused_name(*world, loaded.name) : body.name;
       const Pose X_WM = engine::spawn_pose(*world, *loaded.model, body);
@@ -88,7 +88,7 @@ std::vector<std::vector<uint8_t>> make_info(const log::Index& index, const Logge
     head.step_us = index.header()->step_us;
   }
   if (world) {
-    const model::BodyLayout layout(*world);
+    const world::BodyLayout layout(*world);
     engine::Channels channels(run.remaps);
     std::vector<device_info_t> devices;
     Findings findings;

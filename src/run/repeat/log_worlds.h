@@ -16,7 +16,7 @@ namespace ruedo::run {
 
 // The run of a log as its header has it.
 struct LoggedRun {
-  std::shared_ptr<const model::WorldModel> world;
+  std::shared_ptr<const world::WorldModel> world;
   std::vector<std::string> disabled;  // devices
   std::vector<std::pair<std::string, std::string>> remaps;
   std::string warning;  // "" or in what it may not be that run's world
@@ -28,7 +28,7 @@ class LogWorlds {
  public:
   struct Scene {
     SimTime from_us = 0;
-    std::shared_ptr<const model::WorldModel> world;  // null: none is known
+    std::shared_ptr<const world::WorldModel> world;  // null: none is known
     std::vector<std::vector<uint8_t>> info;          // encoded world_info_t, in parts
   };
 

@@ -63,7 +63,7 @@ void name_field(const std::vector<uint8_t>& logged, const std::vector<uint8_t>& 
 
 class Verifier::Impl {
  public:
-  Impl(const std::string& log, std::shared_ptr<const model::WorldModel> world, RunOptions options)
+  Impl(const std::string& log, std::shared_ptr<const world::WorldModel> world, RunOptions options)
       : log_(log) {
     step_us_ = world->step_us;
     find_kept_channels(log);
@@ -188,7 +188,7 @@ class Verifier::Impl {
   std::unique_ptr<Run> server_;
 };
 
-Verifier::Verifier(const std::string& log, std::shared_ptr<const model::WorldModel> world,
+Verifier::Verifier(const std::string& log, std::shared_ptr<const world::WorldModel> world,
                    RunOptions options)
     : impl_(std::make_unique<Impl>(log, std::move(world), std::move(options))), log_(log) {
   impl_->log_header = read_header(log);

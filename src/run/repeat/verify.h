@@ -33,7 +33,7 @@ struct Verification {
 class Verifier {
  public:
   // world and options as the log's header has them. Throws InputError and EnvironmentError.
-  Verifier(const std::string& log, std::shared_ptr<const model::WorldModel> world,
+  Verifier(const std::string& log, std::shared_ptr<const world::WorldModel> world,
            RunOptions options);
   ~Verifier();
 

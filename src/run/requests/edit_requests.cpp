@@ -48,7 +48,7 @@ Run::Outcome Run::change(const request_t& request, Changes what,
     outcome = apply();
     if (models) {
       as_made_ = false;
-      world_ = std::make_shared<const model::WorldModel>(simulation_->world());
+      world_ = std::make_shared<const world::WorldModel>(simulation_->world());
       mode().models_changed(stage(), publisher_.step());
     }
   }
@@ -184,7 +184,7 @@ void Run::spawn_ready() {
 }
 
 Run::Outcome Run::put_in(const request_t& request, const spawn_request_t& body,
-                         const model::LoadedModel& loaded) {
+                         const world::LoadedModel& loaded) {
   std::string name;
   Findings made;  // of its devices, which are made with it
   const Outcome outcome = change(request, Changes::models, [&] {
@@ -222,10 +222,10 @@ Run::Outcome Run::set_pose(const request_t& request, const set_pose_request_t& b
 
 // The file gets the poses of the last published state.
 Run::Outcome Run::save(const request_t&) {
-  const model::BodyLayout& layout = simulation_->layout();
+  const world::BodyLayout& layout = simulation_->layout();
   const EditedWorld::Saved saved = edited_->save(*world_, [&](size_t instance) {
-    const model::ModelInstance& model = world_->models[instance];
-    const model::LinkPlacement& link = layout.links[layout.first_link[instance]];
+    const world::ModelInstance& model = world_->models[instance];
+    const world::LinkPlacement& link = layout.links[layout.first_link[instance]];
     if (!link.body.valid()) return link.X_BL * model.model->links[0].X_ML.inverse();
     return publisher_.latest()->bodies[link.body] * link.X_BL *
            model.model->links[0].X_ML.inverse();

@@ -73,10 +73,10 @@ std::string full(const std::string& file) {
 
 }  // namespace
 
-EditedWorld::EditedWorld(const model::WorldModel& first, std::string file)
+EditedWorld::EditedWorld(const world::WorldModel& first, std::string file)
     : first_(first), file_(full(file)) {
   try {
-    source_ = model::world_text_of(first);
+    source_ = world::world_text_of(first);
   } catch (const InputError& error) {
     fault_ = error.what();
   }
@@ -102,7 +102,7 @@ void EditedWorld::spawned(const std::string& name, const spawn_request_t& body) 
   put_.insert(name);
   spawned_[name] = named
                        ? "<?xml version=\"1.0\"?>\n<sdf version=\"1.9\">\n<include>\n      <uri>" +
-                             model::escaped((path ? "" : "model://") + body.model) +
+                             world::escaped((path ? "" : "model://") + body.model) +
                              "</uri>\n    </include>\n</sdf>\n"
                        : body.text;
 }
@@ -118,9 +118,9 @@ void EditedWorld::removed(const std::string& name) {
   put_.erase(name);
 }
 
-const model::WorldText& EditedWorld::text() const {
+const world::WorldText& EditedWorld::text() const {
   if (!fault_.empty()) throw InputError({}, fault_);
-  if (!text_) text_ = std::make_unique<model::WorldText>(source_, first_);
+  if (!text_) text_ = std::make_unique<world::WorldText>(source_, first_);
   return *text_;
 }
 
@@ -143,11 +143,11 @@ std::string EditedWorld::overwritten() const {
                 : file_ + " exists by now: another program made it";
 }
 
-EditedWorld::Saved EditedWorld::save(const model::WorldModel& now,
+EditedWorld::Saved EditedWorld::save(const world::WorldModel& now,
                                      const std::function<Pose(size_t)>& X_WM) {
   const std::lock_guard lock(mutex_);
   if (const std::string fault = overwritten(); !fault.empty()) return {fault, ""};
-  std::vector<model::ModelNow> models;
+  std::vector<world::ModelNow> models;
   for (size_t i = 0; i < now.models.size(); ++i) {
     if (now.models[i].removed) continue;
     const std::string& name = now.models[i].name;
@@ -157,10 +157,10 @@ EditedWorld::Saved EditedWorld::save(const model::WorldModel& now,
         {name, X, spawned == spawned_.end() ? "" : spawned->second, put_.contains(name)});
   }
   try {
-    model::WorldText::Written written = text().with(models);
-    written.text = model::moved_to(written.text, fs::path(first_.file).parent_path().string(),
+    world::WorldText::Written written = text().with(models);
+    written.text = world::moved_to(written.text, fs::path(first_.file).parent_path().string(),
                                    fs::path(file_).parent_path().string());
-    model::parse_document(written.text, file_);
+    world::parse_document(written.text, file_);
     if (std::string fault = write_file(file_, written.text); !fault.empty())
       return {file_ + " cannot be written: " + fault, ""};
     known_ = std::move(written.text);

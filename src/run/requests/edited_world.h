@@ -19,7 +19,7 @@ namespace ruedo::run {
 class EditedWorld {
  public:
   // file: what save() writes; "": nothing. The world as it was loaded must outlive it.
-  EditedWorld(const model::WorldModel& first, std::string file);
+  EditedWorld(const world::WorldModel& first, std::string file);
 
   // The run tells what requests have done.
   void begin(std::set<std::string> put = {});  // the world is rebuilt; what put() was then
@@ -37,18 +37,18 @@ class EditedWorld {
     std::string note;   // what the file cannot say
   };
   // X_WM: of a model now, by its place in the list.
-  Saved save(const model::WorldModel& now, const std::function<Pose(size_t)>& X_WM);
+  Saved save(const world::WorldModel& now, const std::function<Pose(size_t)>& X_WM);
 
  private:
-  const model::WorldText& text() const;
+  const world::WorldText& text() const;
   std::string overwritten() const;
 
-  const model::WorldModel& first_;
+  const world::WorldModel& first_;
   const std::string file_;
   std::string source_;                              // the text that the world was loaded from
   std::string fault_;                               // why there is none
   std::optional<std::string> known_;                // what the file holds; none: there is none
-  mutable std::unique_ptr<model::WorldText> text_;  // made when it is asked for
+  mutable std::unique_ptr<world::WorldText> text_;  // made when it is asked for
   mutable std::mutex mutex_;                        // of that, and of what follows
   std::map<std::string, std::string> spawned_;      // texts, by name
   std::set<std::string> put_;

@@ -66,7 +66,7 @@ void ModelWorker::work() {
       changed_.wait(lock, [this] { return over_ || (!waiting_.empty() && !made_); });
       if (over_) return;
       order = waiting_.front();
-      budget_ = std::make_shared<model::LoadBudget>(kTime, kMeshBytes);
+      budget_ = std::make_shared<world::LoadBudget>(kTime, kMeshBytes);
     }
     Made made = make(std::move(order));
     {

@@ -33,7 +33,7 @@ class ModelWorker {
     spawn_request_t body;
   };
   struct Made : Order {
-    model::LoadedModel loaded;
+    world::LoadedModel loaded;
     std::string fault;  // "": there is a model
   };
 
@@ -58,7 +58,7 @@ class ModelWorker {
   std::mutex mutex_;  // of all that follows
   std::condition_variable changed_;
   std::deque<Order> waiting_;
-  std::shared_ptr<model::LoadBudget> budget_;  // while the first is being made
+  std::shared_ptr<world::LoadBudget> budget_;  // while the first is being made
   std::optional<Made> made_;
   bool over_ = false;
   std::thread thread_;  // started with the first order

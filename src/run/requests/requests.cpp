@@ -231,12 +231,12 @@ Outcome Run::get_state(const request_t&, const name_request_t& body) {
   state_reply_t reply = state();
   reply.name = body.name;
   if (body.name.empty()) return Outcome::with(engine::encoded(reply));
-  const model::BodyLayout& layout = simulation_->layout();
+  const world::BodyLayout& layout = simulation_->layout();
   for (size_t i = 0; i < layout.links.size(); ++i) {
-    const model::LinkPlacement& placement = layout.links[i];
-    const model::ModelInstance& instance = world_->models[placement.instance];
+    const world::LinkPlacement& placement = layout.links[i];
+    const world::ModelInstance& instance = world_->models[placement.instance];
     if (instance.removed) continue;
-    const model::Link& link = instance.model->links[placement.link];
+    const world::Link& link = instance.model->links[placement.link];
     const bool whole_model = body.name == instance.name && placement.link == 0;
     if (!whole_model && body.name != instance.name + "/" + link.name) continue;
     Pose X_WL = placement.X_BL;
@@ -258,7 +258,7 @@ Outcome Run::get_state(const request_t&, const name_request_t& body) {
 }
 
 Outcome Run::reset_odometry(const request_t& request, const name_request_t& body) {
-  const model::BodyLayout& layout = simulation_->layout();
+  const world::BodyLayout& layout = simulation_->layout();
   for (const RobotIndex robot : layout.robots.indices()) {
     if (world_->models[layout.robots[robot].instance].name != body.name) continue;
     simulation_->inbox().reset_odometry(robot, request.body);

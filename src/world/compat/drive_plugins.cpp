@@ -9,7 +9,7 @@
 #include "world/compat/plugins.h"
 #include "world/model/drive.h"
 
-namespace ruedo::model {
+namespace ruedo::world {
 namespace {
 
 enum class Unit { as_is, half, magnitude };
@@ -292,4 +292,4 @@ std::unique_ptr<Element> drive_from_plugin(const Element& plugin, const Model& m
   return drive;
 }
 
-}  // namespace ruedo::model
+}  // namespace ruedo::world

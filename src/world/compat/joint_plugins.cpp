@@ -7,7 +7,7 @@
 
 #include "world/compat/plugins.h"
 
-namespace ruedo::model {
+namespace ruedo::world {
 namespace {
 
 const Allowed kGain = Allowed::any(quantity::kDamping);
@@ -262,4 +262,4 @@ void read_joint_interfaces(const Element& model_element, const std::string& wher
   }
 }
 
-}  // namespace ruedo::model
+}  // namespace ruedo::world

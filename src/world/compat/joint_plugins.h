@@ -7,7 +7,7 @@
 #include "world/model/world_model.h"
 #include "world/read/read_context.h"
 
-namespace ruedo::model {
+namespace ruedo::world {
 
 // Sets the joints' PIDs from the model's plugins, and what the joints do before the first command;
 // reports what is not supported. The model's joints must be complete.
@@ -19,4 +19,4 @@ void read_joint_plugins(const std::vector<const Element*>& plugins, const std::s
 void read_joint_interfaces(const Element& model_element, const std::string& where,
                            Findings& findings, Model& model);
 
-}  // namespace ruedo::model
+}  // namespace ruedo::world

@@ -9,7 +9,7 @@
 #include "world/compat/ros_controllers.h"
 #include "world/read/read_context.h"
 
-namespace ruedo::model {
+namespace ruedo::world {
 namespace {
 
 // Parameters that are supported, or have no effect on results, separated by blanks. A plugin that
@@ -295,4 +295,4 @@ void name_parameters(const Element& plugin, const std::string& where, Findings& 
                       [&] { name_backwards(plugin, kind.name, where, findings); });
 }
 
-}  // namespace ruedo::model
+}  // namespace ruedo::world

@@ -5,7 +5,7 @@
 #include <cctype>
 #include <string_view>
 
-namespace ruedo::model {
+namespace ruedo::world {
 namespace {
 
 using Does = PluginKind::Does;
@@ -256,7 +256,7 @@ std::string system_of(const std::string& library) {
 PluginKind kind_of(const Element& plugin) {
   const std::string* name = plugin.attribute("name");
   const std::string* filename = plugin.attribute("filename");
-  // a user's own: own_plugins.h
+  // a user's own: model/own_plugins.h
   if (name && (*name == "ruedo" || begins_with(*name, "ruedo::")))
     return {filename ? *filename : "", Does::served, ""};
   const std::string library = filename ? library_of(*filename) : "";
@@ -285,4 +285,4 @@ PluginKind kind_of(const Element& plugin) {
   return {filename && !filename->empty() ? *filename : "(without a filename)", Does::unknown, ""};
 }
 
-}  // namespace ruedo::model
+}  // namespace ruedo::world

@@ -9,7 +9,7 @@
 
 #include "ruedo/element.h"
 
-namespace ruedo::model {
+namespace ruedo::world {
 
 struct PluginKind {
   enum class Does {
@@ -30,4 +30,4 @@ struct PluginKind {
 
 PluginKind kind_of(const Element& plugin);
 
-}  // namespace ruedo::model
+}  // namespace ruedo::world

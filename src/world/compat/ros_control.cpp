@@ -13,7 +13,7 @@
 
 namespace fs = std::filesystem;
 
-namespace ruedo::model {
+namespace ruedo::world {
 namespace {
 
 bool contains(std::string_view text, std::string_view part) {
@@ -495,4 +495,4 @@ std::vector<std::string> controlled_joints(const Element& model_element) {
   return by_velocity.empty() ? all : by_velocity;
 }
 
-}  // namespace ruedo::model
+}  // namespace ruedo::world

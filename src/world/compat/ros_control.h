@@ -10,7 +10,7 @@
 #include "world/model/world_model.h"
 #include "world/read/read_context.h"
 
-namespace ruedo::model {
+namespace ruedo::world {
 
 struct ControllersDrive {
   std::unique_ptr<Element> drive;  // null: no controller drives this robot
@@ -31,4 +31,4 @@ ControllersDrive drive_from_controllers(const Element& model_element,
 // interface, or all if there is none.
 std::vector<std::string> controlled_joints(const Element& model_element);
 
-}  // namespace ruedo::model
+}  // namespace ruedo::world

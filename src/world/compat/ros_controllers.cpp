@@ -14,7 +14,7 @@
 
 namespace fs = std::filesystem;
 
-namespace ruedo::model {
+namespace ruedo::world {
 namespace {
 
 // Of a robot, of a controller's name, and of a list; the others have no effect.
@@ -302,4 +302,4 @@ std::vector<std::shared_ptr<const Element>> read_controllers(const std::vector<s
   return files;
 }
 
-}  // namespace ruedo::model
+}  // namespace ruedo::world

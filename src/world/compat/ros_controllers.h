@@ -10,7 +10,7 @@
 
 #include "world/read/read_context.h"
 
-namespace ruedo::model {
+namespace ruedo::world {
 
 struct Controller {
   std::string name, type;                  // "diff_drive_controller/DiffDriveController"
@@ -58,4 +58,4 @@ std::vector<std::shared_ptr<const Element>> read_controllers(const std::vector<s
                                                              bool named, const std::string& where,
                                                              ReadContext& context);
 
-}  // namespace ruedo::model
+}  // namespace ruedo::world

@@ -9,7 +9,7 @@
 
 #include "world/compat/ros_controllers.h"
 
-namespace ruedo::model {
+namespace ruedo::world {
 namespace {
 
 const Allowed kGain = Allowed::not_negative(quantity::kDamping);
@@ -302,4 +302,4 @@ void read_ros_gains(const Element& model_element, const std::vector<const Elemen
   }
 }
 
-}  // namespace ruedo::model
+}  // namespace ruedo::world

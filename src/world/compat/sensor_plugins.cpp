@@ -10,7 +10,7 @@
 #include "world/compat/plugins.h"
 #include "world/read/read_context.h"
 
-namespace ruedo::model {
+namespace ruedo::world {
 namespace {
 
 using Words = std::vector<std::string>;
@@ -317,4 +317,4 @@ PluginSensor sensor_from_plugin(const Element& plugin, const std::string& where,
   return {std::move(sensor), body ? body->text : "", joint ? joint->text : ""};
 }
 
-}  // namespace ruedo::model
+}  // namespace ruedo::world

@@ -7,7 +7,7 @@
 
 #include "ruedo/element.h"
 
-namespace ruedo::model {
+namespace ruedo::world {
 
 struct PluginSensor {
   std::unique_ptr<Element> sensor;  // null: the plugin provides no sensor supported here
@@ -19,4 +19,4 @@ struct PluginSensor {
 PluginSensor sensor_from_plugin(const Element& plugin, const std::string& where,
                                 const std::vector<const Element*>& performers, Findings& findings);
 
-}  // namespace ruedo::model
+}  // namespace ruedo::world

@@ -9,7 +9,7 @@
 #include "world/compat/plugins.h"
 #include "world/read/read_context.h"
 
-namespace ruedo::model {
+namespace ruedo::world {
 namespace {
 
 struct Seen {
@@ -76,4 +76,4 @@ void read_labels_and_temperatures(const Element& model_element, const std::strin
   }
 }
 
-}  // namespace ruedo::model
+}  // namespace ruedo::world

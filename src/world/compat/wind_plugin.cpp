@@ -4,7 +4,7 @@
 #include "world/model/environment.h"
 #include "world/read/read_context.h"
 
-namespace ruedo::model {
+namespace ruedo::world {
 namespace {
 
 const Allowed kSeconds = Allowed::not_negative(quantity::kTime);
@@ -75,4 +75,4 @@ void read_wind_plugin(const Element& plugin, Wind& wind, Findings& findings) {
   wind = read;
 }
 
-}  // namespace ruedo::model
+}  // namespace ruedo::world

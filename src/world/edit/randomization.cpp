@@ -17,7 +17,7 @@
 #include "world/model/placement.h"
 #include "world/settings.h"
 
-namespace ruedo::model {
+namespace ruedo::world {
 namespace {
 
 constexpr const char* kOption = "--randomize";
@@ -272,4 +272,4 @@ std::shared_ptr<const WorldModel> randomized(const WorldModel& world,
   return Randomizer(world, seed, drawn).run(draws);
 }
 
-}  // namespace ruedo::model
+}  // namespace ruedo::world

@@ -11,7 +11,7 @@
 
 #include "world/model/world_model.h"
 
-namespace ruedo::model {
+namespace ruedo::world {
 
 struct Distribution {
   enum class Kind { uniform, log_uniform, normal, choice };
@@ -46,4 +46,4 @@ std::shared_ptr<const WorldModel> randomized(const WorldModel& world,
                                              const std::vector<Draw>& draws, uint64_t seed,
                                              Drawn* drawn = nullptr);
 
-}  // namespace ruedo::model
+}  // namespace ruedo::world

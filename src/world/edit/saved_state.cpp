@@ -5,7 +5,7 @@
 #include "world/model/joint_start.h"
 #include "world/read/read_context.h"
 
-namespace ruedo::model {
+namespace ruedo::world {
 namespace {
 
 constexpr double kAside_m = 0.01;  // difference to the pose that the joints imply
@@ -263,4 +263,4 @@ void SavedState::name_strangers(const std::set<std::string>& models,
   name_others("light", lights_, lights);
 }
 
-}  // namespace ruedo::model
+}  // namespace ruedo::world

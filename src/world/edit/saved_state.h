@@ -10,7 +10,7 @@
 #include "ruedo/element.h"
 #include "world/model/world_model.h"
 
-namespace ruedo::model {
+namespace ruedo::world {
 
 // In the syntax of SDF 1.12 (<model_state>, ...) and of earlier versions (<model>, ...).
 class SavedState {
@@ -44,4 +44,4 @@ class SavedState {
   std::map<std::string, SavedLight> lights_;
 };
 
-}  // namespace ruedo::model
+}  // namespace ruedo::world

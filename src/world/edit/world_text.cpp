@@ -19,7 +19,7 @@
 
 namespace fs = std::filesystem;
 
-namespace ruedo::model {
+namespace ruedo::world {
 
 const char* const kEmptyWorld = R"(<?xml version="1.0"?>
 <sdf version="1.9">
@@ -431,4 +431,4 @@ std::string moved_to(const std::string& text, const std::string& from_folder,
   return patch.applied_to(text);
 }
 
-}  // namespace ruedo::model
+}  // namespace ruedo::world

@@ -10,7 +10,7 @@
 #include "world/model/world_model.h"
 #include "world/read/xml_text.h"
 
-namespace ruedo::model {
+namespace ruedo::world {
 
 // A model's current state.
 struct ModelNow {
@@ -70,4 +70,4 @@ extern const char* const kEmptyWorld;
 std::string moved_to(const std::string& text, const std::string& from_folder,
                      const std::string& to_folder);
 
-}  // namespace ruedo::model
+}  // namespace ruedo::world

@@ -9,7 +9,7 @@
 
 #include "base/whole.h"
 
-namespace ruedo::model {
+namespace ruedo::world {
 namespace {
 
 constexpr double kBlock_m = 2.0;
@@ -203,4 +203,4 @@ Vec2 FloorPlan::next(const Route& route, const Rect& goal, const Vec2& p, double
   return seen;
 }
 
-}  // namespace ruedo::model
+}  // namespace ruedo::world

@@ -9,7 +9,7 @@
 
 #include "world/maps/occupancy.h"
 
-namespace ruedo::model {
+namespace ruedo::world {
 
 using Vec2 = Eigen::Vector2d;
 
@@ -56,4 +56,4 @@ class FloorPlan {
   int blocks_x_ = 0, blocks_y_ = 0;
 };
 
-}  // namespace ruedo::model
+}  // namespace ruedo::world

@@ -20,7 +20,7 @@
 
 namespace fs = std::filesystem;
 
-namespace ruedo::model {
+namespace ruedo::world {
 namespace {
 
 constexpr int kMostPixels = 20'000;  // width and height
@@ -400,4 +400,4 @@ std::vector<WallPiece> read_armap(const std::string& path, double thickness,
   return map.walls();
 }
 
-}  // namespace ruedo::model
+}  // namespace ruedo::world

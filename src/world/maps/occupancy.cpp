@@ -12,7 +12,7 @@
 #include "world/read/geometry.h"
 #include "world/read/read_context.h"
 
-namespace ruedo::model {
+namespace ruedo::world {
 namespace {
 
 constexpr double kMargin_m = 1;
@@ -77,7 +77,7 @@ class Cut {
       planes_.emplace_back(X_WG.rotation * g.normal, X_WG.translation);
       return;
     }
-    const Box box = placed(model::bounds(g), X_WG);
+    const Box box = placed(world::bounds(g), X_WG);
     if (box.isEmpty() || height_ < box.min().z() || height_ > box.max().z()) return;
     bounds_.extend(box);
     if (g.shape != Shape::mesh) {
@@ -232,4 +232,4 @@ std::string world_of_walls(const std::string& name, const std::vector<WallPiece>
   return sdf + "      </link>\n    </model>\n  </world>\n</sdf>\n";
 }
 
-}  // namespace ruedo::model
+}  // namespace ruedo::world

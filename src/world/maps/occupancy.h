@@ -8,7 +8,7 @@
 
 #include "world/model/world_model.h"
 
-namespace ruedo::model {
+namespace ruedo::world {
 
 enum class Cell : uint8_t { free, occupied, unknown };
 
@@ -78,4 +78,4 @@ std::vector<WallPiece> read_armap(const std::string& path, double thickness, std
 std::string world_of_walls(const std::string& name, const std::vector<WallPiece>& walls,
                            double height);
 
-}  // namespace ruedo::model
+}  // namespace ruedo::world

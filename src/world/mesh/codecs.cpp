@@ -4,7 +4,7 @@
 #include "system/late_library.h"
 #include "world/mesh/codecs_module.h"
 
-namespace ruedo::model {
+namespace ruedo::world {
 namespace {
 
 template <class Function>
@@ -30,4 +30,4 @@ void encode_picture(const std::string& kind, const cv::Mat& picture, std::vector
   encode(kind, picture, bytes, parameters);
 }
 
-}  // namespace ruedo::model
+}  // namespace ruedo::world

@@ -9,7 +9,7 @@
 #include <opencv2/core.hpp>
 #include <opencv2/imgcodecs.hpp>  // for its constants; its functions are not linked
 
-namespace ruedo::model {
+namespace ruedo::world {
 
 // As cv::imdecode: an empty picture, or cv::Exception, for bytes that are not a picture. `how` is
 // cv::IMREAD_...
@@ -19,4 +19,4 @@ cv::Mat decode_picture(const void* bytes, size_t size, int how);
 void encode_picture(const std::string& kind, const cv::Mat& picture, std::vector<uint8_t>& bytes,
                     const std::vector<int>& parameters = {});
 
-}  // namespace ruedo::model
+}  // namespace ruedo::world

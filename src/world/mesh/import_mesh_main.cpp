@@ -29,7 +29,7 @@
 #include "world/read/document.h"
 
 namespace fs = std::filesystem;
-using namespace ruedo::model;
+using namespace ruedo::world;
 
 #ifdef __SANITIZE_ADDRESS__
 // The search for leaks reads /proc, which the sandbox denies.

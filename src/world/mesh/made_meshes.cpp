@@ -9,7 +9,7 @@
 #include "world/mesh/picture.h"
 #include "world/read/geometry.h"
 
-namespace ruedo::model {
+namespace ruedo::world {
 namespace {
 
 using Point = Eigen::Vector2d;
@@ -220,4 +220,4 @@ Mesh heightmap(const std::string& picture, const Vec3& size) {
   return mesh;
 }
 
-}  // namespace ruedo::model
+}  // namespace ruedo::world

@@ -10,7 +10,7 @@
 
 namespace fs = std::filesystem;
 
-namespace ruedo::model {
+namespace ruedo::world {
 namespace {
 
 struct NamedColour {
@@ -295,4 +295,4 @@ std::optional<Material> read_material(const Element& element, const std::string&
   return material;
 }
 
-}  // namespace ruedo::model
+}  // namespace ruedo::world

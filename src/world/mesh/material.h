@@ -8,7 +8,7 @@
 #include "world/mesh/mesh.h"
 #include "world/read/read_context.h"
 
-namespace ruedo::model {
+namespace ruedo::world {
 
 // Reads <material>. nullopt: it holds nothing that Ruedo supports; the findings say so.
 std::optional<Material> read_material(const Element& material, const std::string& where,
@@ -20,4 +20,4 @@ std::optional<Material> gazebo_material(const std::string& name);
 // "r g b" or "r g b a"; values are clamped to [0, 1].
 Rgba read_colour(const Element& element, const std::string& where, Findings& findings);
 
-}  // namespace ruedo::model
+}  // namespace ruedo::world

@@ -11,7 +11,7 @@
 
 #include "ruedo/index.h"
 
-namespace ruedo::model {
+namespace ruedo::world {
 
 using Rgba = std::array<float, 4>;
 
@@ -54,4 +54,4 @@ struct Mesh {
   bool closed = false;  // every edge belongs to two triangles, so that the mesh has an inside
 };
 
-}  // namespace ruedo::model
+}  // namespace ruedo::world

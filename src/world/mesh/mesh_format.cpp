@@ -8,7 +8,7 @@
 #include <numeric>
 #include <stdexcept>
 
-namespace ruedo::model {
+namespace ruedo::world {
 namespace {
 
 static_assert(std::endian::native == std::endian::little,
@@ -283,4 +283,4 @@ bool is_closed(const Mesh& mesh) {
   return true;
 }
 
-}  // namespace ruedo::model
+}  // namespace ruedo::world

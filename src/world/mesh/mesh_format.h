@@ -11,7 +11,7 @@
 
 #include "world/mesh/mesh.h"
 
-namespace ruedo::model {
+namespace ruedo::world {
 
 // Increment it when the importer's results or this format change: old cache entries are then
 // ignored.
@@ -53,4 +53,4 @@ std::string mesh_fault(const Mesh& mesh);
 // positions count as one.
 bool is_closed(const Mesh& mesh);
 
-}  // namespace ruedo::model
+}  // namespace ruedo::world

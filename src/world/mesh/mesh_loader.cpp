@@ -23,7 +23,7 @@
 
 namespace fs = std::filesystem;
 
-namespace ruedo::model {
+namespace ruedo::world {
 namespace {
 
 constexpr size_t kMostBytes = size_t{1} << 30;  // of a mesh, packed
@@ -286,4 +286,4 @@ std::shared_ptr<const Mesh> MeshLoader::load_submesh(const std::string& path,
   return mesh;
 }
 
-}  // namespace ruedo::model
+}  // namespace ruedo::world

@@ -15,7 +15,7 @@
 #include "world/read/load_budget.h"
 #include "world/read/resources.h"
 
-namespace ruedo::model {
+namespace ruedo::world {
 
 struct MeshPackage;
 
@@ -66,4 +66,4 @@ class MeshLoader {
   std::vector<std::string> files_;
 };
 
-}  // namespace ruedo::model
+}  // namespace ruedo::world

@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <cstring>
 
-namespace ruedo::model {
+namespace ruedo::world {
 namespace {
 
 // width times height: a few bytes may decode to any number
@@ -133,4 +133,4 @@ std::string picture_fault(std::span<const uint8_t> span, int64_t most) {
          " pixels; allowed are " + std::to_string(most) + " each way";
 }
 
-}  // namespace ruedo::model
+}  // namespace ruedo::world

@@ -6,7 +6,7 @@
 #include <span>
 #include <string>
 
-namespace ruedo::model {
+namespace ruedo::world {
 
 // What is wrong with the size; "" for a picture of at most `most` pixels in width and height and
 // kMostPixelsInAll. Supports PNG, JPEG, BMP, TIFF, PBM, PGM and PPM; everything else is not a
@@ -24,4 +24,4 @@ inline std::string picture_fault(const std::string& bytes, int64_t most) {
   return picture_fault({reinterpret_cast<const uint8_t*>(bytes.data()), bytes.size()}, most);
 }
 
-}  // namespace ruedo::model
+}  // namespace ruedo::world

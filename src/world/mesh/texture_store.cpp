@@ -3,7 +3,7 @@
 #include "base/input_file.h"
 #include "world/mesh/picture.h"
 
-namespace ruedo::model {
+namespace ruedo::world {
 namespace {
 
 int64_t pixels_in(const std::string& path) {
@@ -39,4 +39,4 @@ bool TextureStore::has_room(int64_t pixels, const std::string& file) {
   return true;
 }
 
-}  // namespace ruedo::model
+}  // namespace ruedo::world

@@ -11,7 +11,7 @@
 #include "ruedo/errors.h"
 #include "world/mesh/mesh.h"
 
-namespace ruedo::model {
+namespace ruedo::world {
 
 inline constexpr int64_t kMostTexturePixels = 500'000'000;
 inline constexpr size_t kMostTextureBytes = 256u << 20;  // of a larger file nothing is read
@@ -35,4 +35,4 @@ class TextureStore {
   int64_t pixels_ = 0;
 };
 
-}  // namespace ruedo::model
+}  // namespace ruedo::world

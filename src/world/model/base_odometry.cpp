@@ -5,7 +5,7 @@
 
 #include "ruedo/math.h"
 
-namespace ruedo::model {
+namespace ruedo::world {
 
 using Steering = DriveDescription::Steering;
 
@@ -96,4 +96,4 @@ Vec3 BaseOdometry::moved(const Pose& before, const Pose& after) const {
           angle / lever_};
 }
 
-}  // namespace ruedo::model
+}  // namespace ruedo::world

@@ -8,7 +8,7 @@
 #include "ruedo/state_archive.h"
 #include "world/model/body_layout.h"
 
-namespace ruedo::model {
+namespace ruedo::world {
 
 class BaseOdometry {
  public:
@@ -44,4 +44,4 @@ class BaseOdometry {
   bool started_ = false;
 };
 
-}  // namespace ruedo::model
+}  // namespace ruedo::world

@@ -8,7 +8,7 @@
 
 #include "world/read/geometry.h"
 
-namespace ruedo::model {
+namespace ruedo::world {
 namespace {
 
 constexpr double kGroundReach_m = 0.01;
@@ -335,4 +335,4 @@ std::string body_name(const WorldModel& world, const BodyLayout& layout, LinkInd
   return instance.name + "/" + instance.model->links[placement.link].name;
 }
 
-}  // namespace ruedo::model
+}  // namespace ruedo::world

@@ -11,7 +11,7 @@
 
 #include "world/model/world_model.h"
 
-namespace ruedo::model {
+namespace ruedo::world {
 
 struct LinkPlacement {
   InstanceIndex instance;
@@ -99,4 +99,4 @@ struct BodyLayout {
 // The name under which ruedo/info lists a link: its body's MODEL/LINK, or its own if it is static.
 std::string body_name(const WorldModel& world, const BodyLayout& layout, LinkIndex link);
 
-}  // namespace ruedo::model
+}  // namespace ruedo::world

@@ -5,7 +5,7 @@
 
 #include "ruedo/math.h"
 
-namespace ruedo::model {
+namespace ruedo::world {
 namespace {
 
 Vec3 support_in_shape(const Geometry& g, const Vec3& d) {
@@ -134,4 +134,4 @@ bool overlap(const Convex& a, const Convex& b) {
   return true;  // no progress: the origin is on the boundary
 }
 
-}  // namespace ruedo::model
+}  // namespace ruedo::world

@@ -7,7 +7,7 @@
 
 #include "world/model/world_model.h"
 
-namespace ruedo::model {
+namespace ruedo::world {
 
 // A convex set: a shape of a model at a pose, or the hull of points.
 struct Convex {
@@ -21,4 +21,4 @@ struct Convex {
 
 bool overlap(const Convex& a, const Convex& b);
 
-}  // namespace ruedo::model
+}  // namespace ruedo::world

@@ -22,7 +22,7 @@
 #include "world/read/geometry.h"
 #include "world/sdf/sdf_link.h"
 
-namespace ruedo::model {
+namespace ruedo::world {
 namespace {
 
 constexpr double kStandardGravity = 9.80665;  // m/s^2
@@ -693,4 +693,4 @@ void read_drive_of(const Element& model_element, const std::string& where, ReadC
   }
 }
 
-}  // namespace ruedo::model
+}  // namespace ruedo::world

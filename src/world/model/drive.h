@@ -8,7 +8,7 @@
 #include "world/model/world_model.h"
 #include "world/read/read_context.h"
 
-namespace ruedo::model {
+namespace ruedo::world {
 
 // Sets the model's drive and odometry from its <ruedo:drive> or a known plugin; other plugins are
 // reported once. The model's links and joints must be complete.
@@ -45,4 +45,4 @@ inline constexpr const char* kNoDriveIsWritten = "no file says how it drives";
 const std::vector<std::string>& drive_elements();
 const std::vector<std::string>& odometry_elements();
 
-}  // namespace ruedo::model
+}  // namespace ruedo::world

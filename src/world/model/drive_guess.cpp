@@ -8,7 +8,7 @@
 
 #include "world/read/geometry.h"
 
-namespace ruedo::model {
+namespace ruedo::world {
 namespace {
 
 constexpr double kLevel = 0.35;     // z component of the axis' unit vector
@@ -255,4 +255,4 @@ GuessedDrive guess_drive(const Model& model, const std::vector<std::string>& con
   return result;
 }
 
-}  // namespace ruedo::model
+}  // namespace ruedo::world

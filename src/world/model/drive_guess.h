@@ -8,7 +8,7 @@
 
 #include "world/model/world_model.h"
 
-namespace ruedo::model {
+namespace ruedo::world {
 
 struct GuessedDrive {
   std::unique_ptr<Element> drive;  // null: its joints do not look like a drive
@@ -23,4 +23,4 @@ GuessedDrive guess_drive(const Model& model, const std::vector<std::string>& con
 // Whether a part of the joint's subtree reaches down to height z in the model.
 double lowest_point_below(const Model& model, ModelJointIndex joint);
 
-}  // namespace ruedo::model
+}  // namespace ruedo::world

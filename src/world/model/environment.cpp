@@ -6,7 +6,7 @@
 #include "world/compat/plugins.h"
 #include "world/read/read_context.h"
 
-namespace ruedo::model {
+namespace ruedo::world {
 namespace {
 
 constexpr double kDegree = M_PI / 180.0;
@@ -95,4 +95,4 @@ void read_environment(const Element& world, Environment& environment, Findings& 
   }
 }
 
-}  // namespace ruedo::model
+}  // namespace ruedo::world

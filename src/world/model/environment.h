@@ -3,7 +3,7 @@
 
 #include "world/model/world_model.h"
 
-namespace ruedo::model {
+namespace ruedo::world {
 
 // <spherical_coordinates>, <atmosphere>, <wind>, <magnetic_field> (SDF before 1.6: in <physics>).
 // An element with an error is reported and left out.
@@ -12,4 +12,4 @@ void read_environment(const Element& world, Environment& environment, Findings& 
 // The plugins WindEffects and WindPlugin: wind that pushes links and varies.
 void read_wind_plugin(const Element& plugin, Wind& wind, Findings& findings);
 
-}  // namespace ruedo::model
+}  // namespace ruedo::world

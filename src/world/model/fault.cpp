@@ -10,7 +10,7 @@
 
 #include "ruedo/element.h"
 
-namespace ruedo::model {
+namespace ruedo::world {
 namespace {
 
 constexpr double kLongest_s = 1e6, kLongestDelay_s = 60.0, kFarthest_m = 1e6;
@@ -193,4 +193,4 @@ Fault parse_fault(const std::string& text) {
   return fault;
 }
 
-}  // namespace ruedo::model
+}  // namespace ruedo::world

@@ -8,7 +8,7 @@
 
 #include "ruedo/errors.h"
 
-namespace ruedo::model {
+namespace ruedo::world {
 
 struct Fault {
   std::string robot;        // "": the world's first robot
@@ -40,4 +40,4 @@ std::string check_fault(const Fault& fault);
 // Throws InputError.
 Fault parse_fault(const std::string& text);
 
-}  // namespace ruedo::model
+}  // namespace ruedo::world

@@ -6,7 +6,7 @@
 #include "world/compat/plugins.h"
 #include "world/model/body_layout.h"
 
-namespace ruedo::model {
+namespace ruedo::world {
 namespace {
 
 const std::string& required(const Element& plugin, const char* name) {
@@ -108,4 +108,4 @@ void check_holds(const WorldModel& world, Findings& findings) {
   }
 }
 
-}  // namespace ruedo::model
+}  // namespace ruedo::world

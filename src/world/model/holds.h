@@ -7,7 +7,7 @@
 #include "world/model/world_model.h"
 #include "world/read/read_context.h"
 
-namespace ruedo::model {
+namespace ruedo::world {
 
 // Adds what the model's plugins hold, and makes the model take commands. Its links must be
 // complete.
@@ -17,4 +17,4 @@ void read_holds(const std::vector<const Element*>& plugins, const std::string& w
 // Reports models and links to be held that do not exist.
 void check_holds(const WorldModel& world, Findings& findings);
 
-}  // namespace ruedo::model
+}  // namespace ruedo::world

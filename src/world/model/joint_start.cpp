@@ -7,7 +7,7 @@
 #include "ruedo/math.h"
 #include "world/read/read_context.h"
 
-namespace ruedo::model {
+namespace ruedo::world {
 namespace {
 
 bool turns(const Joint& joint) {
@@ -128,4 +128,4 @@ void begin_at(const JointPositions& positions, const std::string& where, Model& 
   }
 }
 
-}  // namespace ruedo::model
+}  // namespace ruedo::world

@@ -5,7 +5,7 @@
 
 #include "world/model/world_model.h"
 
-namespace ruedo::model {
+namespace ruedo::world {
 
 // Joints with one axis: those that may start elsewhere than at 0.
 bool has_position(const Joint& joint);
@@ -23,4 +23,4 @@ using JointPositions = IndexedVector<ModelJointIndex, double>;  // rad or m
 void begin_at(const JointPositions& positions, const std::string& where, Model& model,
               Findings& findings);
 
-}  // namespace ruedo::model
+}  // namespace ruedo::world

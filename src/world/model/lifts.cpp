@@ -7,7 +7,7 @@
 #include "base/whole.h"
 #include "world/compat/plugins.h"
 
-namespace ruedo::model {
+namespace ruedo::world {
 namespace {
 
 constexpr double kMostWait_s = 1e6;
@@ -253,4 +253,4 @@ void check_lifts(const WorldModel& world, Findings& findings) {
   }
 }
 
-}  // namespace ruedo::model
+}  // namespace ruedo::world

@@ -7,7 +7,7 @@
 #include "world/model/world_model.h"
 #include "world/read/read_context.h"
 
-namespace ruedo::model {
+namespace ruedo::world {
 
 // Adds the doors and lifts of the model's plugins, and makes the model take commands. Links and
 // joints must be complete; a door may use joints of a model that contains this one.
@@ -17,4 +17,4 @@ void read_lifts(const std::vector<const Element*>& plugins, const std::string& w
 // Reports joints and doors that do not exist.
 void check_lifts(const WorldModel& world, Findings& findings);
 
-}  // namespace ruedo::model
+}  // namespace ruedo::world

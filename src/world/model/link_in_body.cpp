@@ -2,7 +2,7 @@
 #include "ruedo/math.h"
 #include "world/model/body_layout.h"
 
-namespace ruedo::model {
+namespace ruedo::world {
 namespace {
 
 // The displacement of the link when its wheel turns by an angle, in the link's frame.
@@ -28,4 +28,4 @@ Pose BodyLayout::link_in_body(LinkIndex link,
   return X_BSteer * turned(steer, wheel_angles[wheel.on]) * X_BSteer.inverse() * X_BL;
 }
 
-}  // namespace ruedo::model
+}  // namespace ruedo::world

@@ -6,7 +6,7 @@
 
 #include "world/model/drive.h"
 
-namespace ruedo::model {
+namespace ruedo::world {
 namespace {
 
 using Steering = DriveDescription::Steering;
@@ -139,4 +139,4 @@ void name_odd_drive(const Element& model_element, const Model& model, const std:
   Look(model, where, findings).all();
 }
 
-}  // namespace ruedo::model
+}  // namespace ruedo::world

@@ -6,7 +6,7 @@
 #include "world/model/world_model.h"
 #include "world/read/read_context.h"
 
-namespace ruedo::model {
+namespace ruedo::world {
 
 // Whether a drive of that steering has the element: "ruedo:wheelbase".
 bool steering_has(DriveDescription::Steering steering, const std::string& element);
@@ -16,4 +16,4 @@ bool steering_has(DriveDescription::Steering steering, const std::string& elemen
 void name_odd_drive(const Element& model_element, const Model& model, const std::string& where,
                     Findings& findings);
 
-}  // namespace ruedo::model
+}  // namespace ruedo::world

@@ -4,7 +4,7 @@
 
 #include "system/plugins.h"
 
-namespace ruedo::model {
+namespace ruedo::world {
 namespace {
 
 thread_local int loading = 0;
@@ -47,4 +47,4 @@ void load_own_plugins(const std::vector<const Element*>& plugins) {
   }
 }
 
-}  // namespace ruedo::model
+}  // namespace ruedo::world

@@ -6,7 +6,7 @@
 
 #include "ruedo/element.h"
 
-namespace ruedo::model {
+namespace ruedo::world {
 
 // While one of these lives, this thread's readers load the plugins that a file names, because the
 // user chose the file. Models from the network may only name plugins that are already loaded.
@@ -22,4 +22,4 @@ class LoadsPlugins {
 // InputError.
 void load_own_plugins(const std::vector<const Element*>& plugins);
 
-}  // namespace ruedo::model
+}  // namespace ruedo::world

@@ -16,7 +16,7 @@
 #include "world/read/geometry.h"
 #include "world/read/read_context.h"
 
-namespace ruedo::model {
+namespace ruedo::world {
 namespace {
 
 // up to this height above the lowest surface, a surface counts as ground
@@ -454,4 +454,4 @@ double footprint_radius(const Model& model) {
   return radius;
 }
 
-}  // namespace ruedo::model
+}  // namespace ruedo::world

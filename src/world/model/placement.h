@@ -9,7 +9,7 @@
 
 #include "world/model/world_model.h"
 
-namespace ruedo::model {
+namespace ruedo::world {
 
 // The current pose of a link of an instance, by their indices; empty: as in the world file.
 using LinkPose = std::function<Pose(InstanceIndex instance, ModelLinkIndex link)>;
@@ -65,4 +65,4 @@ void name_stuck_robots(const WorldModel& world, Findings& findings);
 // no drive) that contains its collisions.
 double footprint_radius(const Model& model);
 
-}  // namespace ruedo::model
+}  // namespace ruedo::world

@@ -19,7 +19,7 @@
 #include "world/mesh/mesh.h"
 #include "world/model/fault.h"
 
-namespace ruedo::model {
+namespace ruedo::world {
 
 enum class Shape { box, sphere, cylinder, capsule, ellipsoid, cone, plane, mesh };
 
@@ -364,4 +364,4 @@ struct WorldModel {
   std::vector<Fault> faults;  // each names a robot of the world
 };
 
-}  // namespace ruedo::model
+}  // namespace ruedo::world

@@ -9,7 +9,7 @@
 
 namespace fs = std::filesystem;
 
-namespace ruedo::model {
+namespace ruedo::world {
 namespace {
 
 constexpr size_t kMostFiles = 300,
@@ -117,4 +117,4 @@ void ControllerFiles::load(const std::string& path, bool named, File& file) {
   file.entries = count(*file.root);
 }
 
-}  // namespace ruedo::model
+}  // namespace ruedo::world

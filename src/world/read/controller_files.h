@@ -13,7 +13,7 @@
 #include "ruedo/element.h"
 #include "world/read/resources.h"
 
-namespace ruedo::model {
+namespace ruedo::world {
 
 class ControllerFiles {
  public:
@@ -51,4 +51,4 @@ class ControllerFiles {
   size_t bytes_ = 0, entries_ = 0;
 };
 
-}  // namespace ruedo::model
+}  // namespace ruedo::world

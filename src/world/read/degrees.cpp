@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-namespace ruedo::model {
+namespace ruedo::world {
 namespace {
 
 constexpr double kTurn = 2.0 * M_PI;
@@ -110,4 +110,4 @@ void name_degrees(const Element& root, Findings& findings) {
   Walk(findings).below(root, "", nullptr);
 }
 
-}  // namespace ruedo::model
+}  // namespace ruedo::world

@@ -3,11 +3,11 @@
 
 #include "ruedo/element.h"
 
-namespace ruedo::model {
+namespace ruedo::world {
 
 // Reports rotations and joint limits below the root of an SDF or URDF document whose numbers look
 // like degrees: whole multiples of 5 beyond a full turn in radians. Their values are used as
 // written.
 void name_degrees(const Element& root, Findings& findings);
 
-}  // namespace ruedo::model
+}  // namespace ruedo::world

@@ -10,7 +10,7 @@
 #include "base/input_file.h"
 #include "world/read/xml_pieces.h"
 
-namespace ruedo::model {
+namespace ruedo::world {
 namespace {
 
 constexpr size_t kMaxFileBytes = 64u << 20;
@@ -199,4 +199,4 @@ void DocumentStore::add(const std::string& path, std::shared_ptr<const Element> 
   note(path);
 }
 
-}  // namespace ruedo::model
+}  // namespace ruedo::world

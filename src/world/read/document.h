@@ -11,7 +11,7 @@
 
 #include "ruedo/element.h"
 
-namespace ruedo::model {
+namespace ruedo::world {
 
 // Entities other than XML's own five are not expanded: a file cannot grow while it is read.
 std::unique_ptr<Element> parse_document(const std::string& text, const std::string& file);
@@ -31,4 +31,4 @@ class DocumentStore {
   std::vector<std::string> files_;
 };
 
-}  // namespace ruedo::model
+}  // namespace ruedo::world

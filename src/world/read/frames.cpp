@@ -3,7 +3,7 @@
 
 #include <algorithm>
 
-namespace ruedo::model {
+namespace ruedo::world {
 namespace {
 
 // The names of the scope's own frame.
@@ -187,4 +187,4 @@ ModelLinkIndex FrameGraph::link(const std::string& name, const Element& asker) {
              : node_link(found.node);
 }
 
-}  // namespace ruedo::model
+}  // namespace ruedo::world

@@ -13,7 +13,7 @@
 
 #include "world/model/world_model.h"
 
-namespace ruedo::model {
+namespace ruedo::world {
 
 // A frame of a model that has been read: X_MF, and the link it moves with (none: it belongs to a
 // static scope or to the world).
@@ -86,4 +86,4 @@ class FrameGraph {
   std::vector<size_t> merged_;
 };
 
-}  // namespace ruedo::model
+}  // namespace ruedo::world

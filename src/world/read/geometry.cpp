@@ -3,7 +3,7 @@
 
 #include <stdexcept>
 
-namespace ruedo::model {
+namespace ruedo::world {
 namespace {
 
 std::optional<Geometry> read_mesh(const Element& mesh, const std::string& where,
@@ -320,4 +320,4 @@ Eigen::AlignedBox3d bounds(const Geometry& g) {
   return {-half, half};
 }
 
-}  // namespace ruedo::model
+}  // namespace ruedo::world

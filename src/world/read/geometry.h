@@ -7,7 +7,7 @@
 #include "world/model/world_model.h"
 #include "world/read/read_context.h"
 
-namespace ruedo::model {
+namespace ruedo::world {
 
 // Reads <geometry>. nullopt: there is no shape, or its mesh is missing or broken; the findings say
 // which.
@@ -25,4 +25,4 @@ Mesh heightmap(const std::string& picture, const Vec3& size);
 // The corners of a shape's bounding box, in the shape's frame. Planes have none.
 Eigen::AlignedBox3d bounds(const Geometry& geometry);
 
-}  // namespace ruedo::model
+}  // namespace ruedo::world

@@ -10,7 +10,7 @@
 #include <stdexcept>
 #include <string>
 
-namespace ruedo::model {
+namespace ruedo::world {
 
 class LoadBudget {
  public:
@@ -53,4 +53,4 @@ class LoadBudget {
   std::string fault_;
 };
 
-}  // namespace ruedo::model
+}  // namespace ruedo::world

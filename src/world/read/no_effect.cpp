@@ -9,7 +9,7 @@
 #include <string_view>
 #include <vector>
 
-namespace ruedo::model {
+namespace ruedo::world {
 namespace {
 
 struct NoEffect {
@@ -393,4 +393,4 @@ void name_what_has_no_effect(const Element& sdf, Findings& findings) {
   Walk(findings).below(sdf, "sdf", "");
 }
 
-}  // namespace ruedo::model
+}  // namespace ruedo::world

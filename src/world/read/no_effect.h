@@ -3,10 +3,10 @@
 
 #include "ruedo/element.h"
 
-namespace ruedo::model {
+namespace ruedo::world {
 
 // Reports them below an <sdf> element where they differ from the format's default. Excludes what
 // the readers report themselves, and what no result depends on (docs/world-files.md lists both).
 void name_what_has_no_effect(const Element& sdf, Findings& findings);
 
-}  // namespace ruedo::model
+}  // namespace ruedo::world

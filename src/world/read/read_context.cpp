@@ -6,7 +6,7 @@
 
 #include "world/read/reserved_names.h"
 
-namespace ruedo::model {
+namespace ruedo::world {
 
 std::string required_name(const Element& element) {
   const std::string* name = element.attribute("name");
@@ -49,4 +49,4 @@ std::string shown(double value) {
   return {buffer, end};
 }
 
-}  // namespace ruedo::model
+}  // namespace ruedo::world

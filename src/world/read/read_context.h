@@ -13,7 +13,7 @@
 #include "world/read/resources.h"
 #include "world/read/triangle_count.h"
 
-namespace ruedo::model {
+namespace ruedo::world {
 
 struct ReadContext {
   Findings& findings;
@@ -69,4 +69,4 @@ std::string dotted(const std::string& scoped);
 // A number for messages: 0.5, not 0.500000.
 std::string shown(double value);
 
-}  // namespace ruedo::model
+}  // namespace ruedo::world

@@ -14,7 +14,7 @@
 
 namespace fs = std::filesystem;
 
-namespace ruedo::model {
+namespace ruedo::world {
 namespace {
 
 constexpr int kFoldersAbove = 2;  // of a description that was copied without its package.xml
@@ -477,4 +477,4 @@ std::optional<std::string> ResourceFinder::find_texture(const std::string& name,
   return std::nullopt;
 }
 
-}  // namespace ruedo::model
+}  // namespace ruedo::world

@@ -10,7 +10,7 @@
 
 #include "ruedo/errors.h"
 
-namespace ruedo::model {
+namespace ruedo::world {
 
 // Not thread-safe.
 class ResourceFinder {
@@ -79,4 +79,4 @@ class ResourceFinder {
 // The folder of the worlds and robots that come with Ruedo; "" when there is none.
 std::string shipped_worlds();
 
-}  // namespace ruedo::model
+}  // namespace ruedo::world

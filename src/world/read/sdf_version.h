@@ -5,7 +5,7 @@
 #include <optional>
 #include <string>
 
-namespace ruedo::model {
+namespace ruedo::world {
 
 struct SdfVersion {
   int major = 1;
@@ -28,4 +28,4 @@ struct SdfVersion {
   }
 };
 
-}  // namespace ruedo::model
+}  // namespace ruedo::world

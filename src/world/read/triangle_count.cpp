@@ -5,7 +5,7 @@
 #include "world/model/world_model.h"
 #include "world/read/read_context.h"
 
-namespace ruedo::model {
+namespace ruedo::world {
 
 void TriangleCount::add(const std::shared_ptr<const Mesh>& mesh, const Vec3& scale,
                         const Element& shape) {
@@ -47,4 +47,4 @@ std::string placed_triangles_fault(const WorldModel& world, const Model* more) {
          std::to_string(kMostPlacedTriangles) + " triangles in all";
 }
 
-}  // namespace ruedo::model
+}  // namespace ruedo::world

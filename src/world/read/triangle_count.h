@@ -12,7 +12,7 @@
 #include "ruedo/pose.h"
 #include "world/mesh/mesh.h"
 
-namespace ruedo::model {
+namespace ruedo::world {
 
 struct Model;
 struct WorldModel;
@@ -36,4 +36,4 @@ class TriangleCount {
 // `more`, too.
 std::string placed_triangles_fault(const WorldModel& world, const Model* more = nullptr);
 
-}  // namespace ruedo::model
+}  // namespace ruedo::world

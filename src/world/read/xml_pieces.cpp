@@ -3,7 +3,7 @@
 
 #include <algorithm>
 
-namespace ruedo::model {
+namespace ruedo::world {
 namespace {
 
 constexpr std::string_view kSpace = " \t\r\n\f\v";
@@ -101,4 +101,4 @@ bool XmlPieces::read_attribute(XmlPiece& piece, size_t before, size_t begin) {
   return true;
 }
 
-}  // namespace ruedo::model
+}  // namespace ruedo::world

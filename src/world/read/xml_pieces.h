@@ -6,7 +6,7 @@
 #include <string_view>
 #include <vector>
 
-namespace ruedo::model {
+namespace ruedo::world {
 
 struct XmlPiece {
   enum class Kind { text, cdata, aside, open, closed, closing };  // aside: comments and the like
@@ -46,4 +46,4 @@ class XmlPieces {
   size_t at_ = 0;
 };
 
-}  // namespace ruedo::model
+}  // namespace ruedo::world

@@ -6,7 +6,7 @@
 #include "ruedo/errors.h"
 #include "world/read/xml_pieces.h"
 
-namespace ruedo::model {
+namespace ruedo::world {
 namespace {
 
 class Builder {
@@ -96,4 +96,4 @@ std::string escaped(std::string_view text) {
   return result;
 }
 
-}  // namespace ruedo::model
+}  // namespace ruedo::world

@@ -7,7 +7,7 @@
 #include <string_view>
 #include <vector>
 
-namespace ruedo::model {
+namespace ruedo::world {
 
 struct TextElement {
   struct Attribute {
@@ -50,4 +50,4 @@ class TextPatch {
 // Escapes text for use between tags and in quotes.
 std::string escaped(std::string_view text);
 
-}  // namespace ruedo::model
+}  // namespace ruedo::world

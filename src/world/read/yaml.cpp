@@ -6,7 +6,7 @@
 
 #include <yaml-cpp/yaml.h>
 
-namespace ruedo::model {
+namespace ruedo::world {
 namespace {
 
 constexpr int kDeepest = 32;
@@ -102,4 +102,4 @@ std::unique_ptr<Element> parse_yaml(const std::string& text, const std::string& 
   return root;
 }
 
-}  // namespace ruedo::model
+}  // namespace ruedo::world

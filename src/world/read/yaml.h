@@ -7,11 +7,11 @@
 
 #include "ruedo/element.h"
 
-namespace ruedo::model {
+namespace ruedo::world {
 
 // Keys become names of children, list entries become children named "item", and scalars become
 // texts. Dots in the names of ROS 2's parameters are levels. Throws InputError for text that is not
 // YAML, nests too deep, or grows too large by aliases.
 std::unique_ptr<Element> parse_yaml(const std::string& text, const std::string& file);
 
-}  // namespace ruedo::model
+}  // namespace ruedo::world

@@ -12,7 +12,7 @@
 #include "world/read/read_context.h"
 #include "world/sdf/sdf_reader.h"
 
-namespace ruedo::model {
+namespace ruedo::world {
 namespace {
 
 constexpr int kMostTries = 1000;  // places drawn for one person before there is no room
@@ -237,4 +237,4 @@ void add_crowd(const Element& element, WorldModel& world, size_t most_models) {
   }
 }
 
-}  // namespace ruedo::model
+}  // namespace ruedo::world

@@ -8,7 +8,7 @@
 #include "world/maps/floor_plan.h"
 #include "world/model/world_model.h"
 
-namespace ruedo::model {
+namespace ruedo::world {
 
 struct CrowdDescription {
   enum class AtEnd { loop, stop, again };
@@ -47,4 +47,4 @@ struct Circle {
 std::vector<Eigen::Vector2d> places_of(const CrowdDescription& crowd, const FloorPlan& walls,
                                        const std::vector<Circle>& taken, uint64_t seed);
 
-}  // namespace ruedo::model
+}  // namespace ruedo::world

@@ -6,7 +6,7 @@
 #include "base/utf8.h"
 #include "world/sdf/sdf_reader.h"
 
-namespace ruedo::model {
+namespace ruedo::world {
 namespace {
 
 constexpr size_t kMaxChannel = 63;  // bytes; LCM's limit
@@ -136,4 +136,4 @@ void check_channel_names(const ModelInstance& instance, const Source& source) {
   }
 }
 
-}  // namespace ruedo::model
+}  // namespace ruedo::world

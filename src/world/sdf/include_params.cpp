@@ -3,7 +3,7 @@
 
 #include <algorithm>
 
-namespace ruedo::model {
+namespace ruedo::world {
 namespace {
 
 std::string name_of(const Element& element) {
@@ -158,4 +158,4 @@ void apply_params(const Element& params, Element& model, const std::string& wher
   for (const auto& change : params.children) changes.apply(*change);
 }
 
-}  // namespace ruedo::model
+}  // namespace ruedo::world

@@ -5,7 +5,7 @@
 
 #include "ruedo/element.h"
 
-namespace ruedo::model {
+namespace ruedo::world {
 
 // Adds, modifies, removes and replaces elements of `model`. Each child of `params` names one by its
 // element_id ("LINK::SENSOR"), as in SDF's proposal for parameter passing. A change that cannot be
@@ -13,4 +13,4 @@ namespace ruedo::model {
 void apply_params(const Element& params, Element& model, const std::string& where,
                   Findings& findings);
 
-}  // namespace ruedo::model
+}  // namespace ruedo::world

@@ -11,7 +11,7 @@
 #include "world/model/placement.h"
 #include "world/sdf/sdf_reader.h"
 
-namespace ruedo::model {
+namespace ruedo::world {
 namespace {
 
 // positions drawn for one robot before it counts as having no room
@@ -197,4 +197,4 @@ void SdfReader::read_fleet(const Element& element, WorldModel& world, size_t mos
   }
 }
 
-}  // namespace ruedo::model
+}  // namespace ruedo::world

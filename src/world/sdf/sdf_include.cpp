@@ -9,7 +9,7 @@
 #include "world/urdf/urdf.h"
 #include "world/urdf/xacro.h"
 
-namespace ruedo::model {
+namespace ruedo::world {
 namespace {
 
 constexpr const char* kParams = "experimental:params";
@@ -252,4 +252,4 @@ std::optional<SdfReader::Included> SdfReader::include(const Element& element,
   return result;
 }
 
-}  // namespace ruedo::model
+}  // namespace ruedo::world

@@ -4,7 +4,7 @@
 
 #include "world/sdf/sdf_reader.h"
 
-namespace ruedo::model {
+namespace ruedo::world {
 namespace {
 
 // "post" for "post::link"; "" for "world" and for names that are not a model's link.
@@ -129,4 +129,4 @@ std::unique_ptr<Element> SdfReader::join(
   return model;
 }
 
-}  // namespace ruedo::model
+}  // namespace ruedo::world

@@ -4,7 +4,7 @@
 
 #include "world/sdf/sdf_reader.h"
 
-namespace ruedo::model {
+namespace ruedo::world {
 namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
@@ -265,4 +265,4 @@ Joint read_joint(const Element& element, SdfVersion version, FrameGraph& frames,
   return joint;
 }
 
-}  // namespace ruedo::model
+}  // namespace ruedo::world

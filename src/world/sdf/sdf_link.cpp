@@ -10,7 +10,7 @@
 #include "world/mesh/material.h"
 #include "world/read/geometry.h"
 
-namespace ruedo::model {
+namespace ruedo::world {
 namespace {
 
 // Surface parameters that change motion in Gazebo, but have no effect here.
@@ -413,4 +413,4 @@ Link read_link(const Element& element, const PoseInLink& pose_in_link, const std
   return link;
 }
 
-}  // namespace ruedo::model
+}  // namespace ruedo::world

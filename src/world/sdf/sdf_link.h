@@ -9,7 +9,7 @@
 #include "world/model/world_model.h"
 #include "world/read/read_context.h"
 
-namespace ruedo::model {
+namespace ruedo::world {
 
 // The pose of a link's child (<pose>, with relative_to) in the link's frame.
 using PoseInLink = std::function<Pose(const Element&)>;
@@ -28,4 +28,4 @@ SensorDescription read_sensor(const Element& element, ModelLinkIndex link, const
 // The plugins of a sensor in a file whose layout differs from SDF.
 void collect_plugins(const Element& element, std::vector<const Element*>& plugins);
 
-}  // namespace ruedo::model
+}  // namespace ruedo::world

@@ -10,7 +10,7 @@
 #include "world/sdf/sdf_link.h"
 #include "world/sdf/sdf_reader.h"
 
-namespace ruedo::model {
+namespace ruedo::world {
 namespace {
 
 constexpr size_t kMaxLinks = 20'000;  // per model: includes of includes cannot grow without end
@@ -636,4 +636,4 @@ bool SdfReader::ModelReader::lacks_an_end(const Element& joint) {
   return (parent != "world" && !frames_.has(parent)) || !frames_.has(joint_end(joint, "child"));
 }
 
-}  // namespace ruedo::model
+}  // namespace ruedo::world

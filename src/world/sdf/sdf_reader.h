@@ -16,7 +16,7 @@
 #include "world/read/read_context.h"
 #include "world/read/sdf_version.h"
 
-namespace ruedo::model {
+namespace ruedo::world {
 
 class SdfReader {
  public:
@@ -108,4 +108,4 @@ Joint read_joint(const Element& element, SdfVersion version, FrameGraph& frames,
 void read_mimic(const Element& element, const IndexedVector<ModelJointIndex, Joint>& joints,
                 Joint& joint);
 
-}  // namespace ruedo::model
+}  // namespace ruedo::world

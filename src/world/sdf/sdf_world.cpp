@@ -16,7 +16,7 @@
 #include "world/sdf/sdf_link.h"
 #include "world/sdf/sdf_reader.h"
 
-namespace ruedo::model {
+namespace ruedo::world {
 namespace {
 
 constexpr size_t kMaxModels = 100'000;
@@ -593,4 +593,4 @@ void SdfReader::read_world(const Element& element, SdfVersion version, WorldMode
   WorldReader(*this, element, version, world).read();
 }
 
-}  // namespace ruedo::model
+}  // namespace ruedo::world

@@ -17,7 +17,7 @@
 #include "world/urdf/urdf_format.h"
 #include "world/urdf/urdf_repair.h"
 
-namespace ruedo::model {
+namespace ruedo::world {
 namespace {
 
 // Collects what urdfdom logs instead of throwing.
@@ -591,4 +591,4 @@ std::unique_ptr<Element> urdf_as_sdf(const Element& written, Findings& findings)
   return std::move(sdf.children.front());
 }
 
-}  // namespace ruedo::model
+}  // namespace ruedo::world

@@ -7,7 +7,7 @@
 #include <string_view>
 #include <vector>
 
-namespace ruedo::model {
+namespace ruedo::world {
 namespace {
 
 using Words = std::vector<std::string>;
@@ -111,4 +111,4 @@ void name_what_urdf_lacks(const Element& robot, Findings& findings) {
   look(robot, "robot " + (name ? *name : ""), findings);
 }
 
-}  // namespace ruedo::model
+}  // namespace ruedo::world

@@ -12,7 +12,7 @@
 
 #include "world/read/read_context.h"
 
-namespace ruedo::model {
+namespace ruedo::world {
 namespace {
 
 // The numbers separated by blanks, as urdfdom parses them; nullopt: the text holds something else.
@@ -327,4 +327,4 @@ class Repair {
 
 void repair_urdf(Element& robot, Findings& findings) { Repair(robot, findings).run(); }
 
-}  // namespace ruedo::model
+}  // namespace ruedo::world

@@ -16,7 +16,7 @@
 
 namespace fs = std::filesystem;
 
-namespace ruedo::model {
+namespace ruedo::world {
 namespace {
 
 constexpr int kCpu_s = 10;
@@ -163,4 +163,4 @@ std::shared_ptr<const Element> expand_xacro(const std::string& path, ReadContext
   return root;
 }
 
-}  // namespace ruedo::model
+}  // namespace ruedo::world

@@ -9,7 +9,7 @@
 
 #include "world/read/read_context.h"
 
-namespace ruedo::model {
+namespace ruedo::world {
 
 // Whether a file is xacro: by its name, or because its <robot> contains xacro elements.
 bool is_xacro(const std::string& path, const Element* root);
@@ -24,4 +24,4 @@ std::vector<std::string> xacro_parts();
 // by their package.xml. Missing includes are reported. Throws InputError.
 std::shared_ptr<const Element> expand_xacro(const std::string& path, ReadContext& context);
 
-}  // namespace ruedo::model
+}  // namespace ruedo::world

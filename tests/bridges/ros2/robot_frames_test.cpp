@@ -36,7 +36,7 @@ constexpr const char* kRobot = R"(
   </model></world></sdf>)";
 
 RobotFrames frames_of(const char* text) {
-  return robot_frames(*model::load_world_text(text, "/nowhere/world.sdf")).at("bot");
+  return robot_frames(*world::load_world_text(text, "/nowhere/world.sdf")).at("bot");
 }
 
 const LinkFrame& frame(const RobotFrames& robot, const std::string& name) {

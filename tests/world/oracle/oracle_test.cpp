@@ -16,7 +16,7 @@ namespace fs = std::filesystem;
 using ruedo::Element;
 using ruedo::Pose;
 using ruedo::Vec3;
-namespace model = ruedo::model;
+namespace world = ruedo::world;
 
 namespace {
 
@@ -88,34 +88,34 @@ void collect(const sdf::Model& model, const std::string& prefix, const Pose& X_W
   }
 }
 
-void compare_geometry(const model::Geometry& ours, const sdf::Geometry& theirs,
+void compare_geometry(const world::Geometry& ours, const sdf::Geometry& theirs,
                       const std::string& what) {
   const auto near = [&](const Vec3& a, const Vec3& b) {
     EXPECT_LT((a - b).norm(), kTolerance) << what;
   };
   switch (theirs.Type()) {
     case sdf::GeometryType::BOX:
-      ASSERT_EQ(ours.shape, model::Shape::box) << what;
+      ASSERT_EQ(ours.shape, world::Shape::box) << what;
       near(ours.size, vec(theirs.BoxShape()->Size()));
       break;
     case sdf::GeometryType::SPHERE:
-      ASSERT_EQ(ours.shape, model::Shape::sphere) << what;
+      ASSERT_EQ(ours.shape, world::Shape::sphere) << what;
       EXPECT_NEAR(ours.size.x(), theirs.SphereShape()->Radius(), kTolerance) << what;
       break;
     case sdf::GeometryType::CYLINDER:
-      ASSERT_EQ(ours.shape, model::Shape::cylinder) << what;
+      ASSERT_EQ(ours.shape, world::Shape::cylinder) << what;
       near(ours.size, {theirs.CylinderShape()->Radius(), theirs.CylinderShape()->Length(), 0});
       break;
     case sdf::GeometryType::PLANE:
-      ASSERT_EQ(ours.shape, model::Shape::plane) << what;
+      ASSERT_EQ(ours.shape, world::Shape::plane) << what;
       near(ours.normal, vec(theirs.PlaneShape()->Normal()));
       EXPECT_NEAR(ours.extent.x(), theirs.PlaneShape()->Size().X(), kTolerance) << what;
       break;
     case sdf::GeometryType::MESH:
-      ASSERT_EQ(ours.shape, model::Shape::mesh) << what;
+      ASSERT_EQ(ours.shape, world::Shape::mesh) << what;
       near(ours.scale, vec(theirs.MeshShape()->Scale()));
       break;
-    case sdf::GeometryType::HEIGHTMAP: ASSERT_EQ(ours.shape, model::Shape::mesh) << what; break;
+    case sdf::GeometryType::HEIGHTMAP: ASSERT_EQ(ours.shape, world::Shape::mesh) << what; break;
     default: ADD_FAILURE() << what << ": a kind of shape that this test does not know";
   }
 }
@@ -131,7 +131,7 @@ void compare_noise(const Element* ours, const sdf::Noise& theirs, const std::str
       << what;
 }
 
-void compare_sensor(const model::SensorDescription& ours, const sdf::Sensor& theirs,
+void compare_sensor(const world::SensorDescription& ours, const sdf::Sensor& theirs,
                     const std::string& what) {
   expect_near(ours.X_LS, resolved(theirs.SemanticPose()), what);
   const Element& e = *ours.element;
@@ -186,11 +186,11 @@ struct Counts {
   int files = 0, links = 0, shapes = 0, joints = 0, sensors = 0;
 };
 
-void compare_instance(const model::ModelInstance& ours, const Their& their,
+void compare_instance(const world::ModelInstance& ours, const Their& their,
                       const std::string& findings, const std::string& file, Counts& counts) {
-  const model::Model& m = *ours.model;
+  const world::Model& m = *ours.model;
   EXPECT_EQ(m.links.size(), their.links.size()) << file << " " << ours.name;
-  for (const model::Link& link : m.links) {
+  for (const world::Link& link : m.links) {
     const std::string what = file + " " + ours.name + "/" + link.name;
     const auto at = their.links.find(link.name);
     if (at == their.links.end()) {
@@ -209,14 +209,14 @@ void compare_instance(const model::ModelInstance& ours, const Their& their,
       EXPECT_NEAR(link.inertial.inertia(2, 2), inertial.MassMatrix().Izz(), kTolerance) << what;
       expect_near(link.inertial.X_LI, pose_of(inertial.Pose()), what + " inertial");
     }
-    for (const model::Collision& c : link.collisions) {
+    for (const world::Collision& c : link.collisions) {
       const sdf::Collision* other = theirs.CollisionByName(c.name);
       ASSERT_NE(other, nullptr) << what << " collision " << c.name;
       expect_near(c.X_LC, resolved(other->SemanticPose()), what + " collision " + c.name);
       compare_geometry(c.geometry, *other->Geom(), what + " collision " + c.name);
       ++counts.shapes;
     }
-    for (const model::Visual& v : link.visuals) {
+    for (const world::Visual& v : link.visuals) {
       const sdf::Visual* other = theirs.VisualByName(v.name);
       ASSERT_NE(other, nullptr) << what << " visual " << v.name;
       expect_near(v.X_LV, resolved(other->SemanticPose()), what + " visual " + v.name);
@@ -240,7 +240,7 @@ void compare_instance(const model::ModelInstance& ours, const Their& their,
           << what << " visual " << name;
     }
     const int index = static_cast<int>(&link - m.links.data());
-    for (const model::SensorDescription& sensor : m.sensors) {
+    for (const world::SensorDescription& sensor : m.sensors) {
       if (sensor.link != index) continue;
       const sdf::Sensor* other = theirs.SensorByName(*sensor.element->attribute("name"));
       ASSERT_NE(other, nullptr) << what << " sensor " << sensor.name;
@@ -248,7 +248,7 @@ void compare_instance(const model::ModelInstance& ours, const Their& their,
       ++counts.sensors;
     }
   }
-  for (const model::Joint& joint : m.joints) {
+  for (const world::Joint& joint : m.joints) {
     const std::string what = file + " " + ours.name + " joint " + joint.name;
     const auto at = their.joints.find(joint.name);
     if (at == their.joints.end()) {
@@ -257,7 +257,7 @@ void compare_instance(const model::ModelInstance& ours, const Their& their,
       continue;
     }
     expect_near(ours.X_WM * joint.X_MJ, at->second.X_WJ, what);
-    if (joint.type == model::JointType::revolute || joint.type == model::JointType::prismatic) {
+    if (joint.type == world::JointType::revolute || joint.type == world::JointType::prismatic) {
       const Vec3 axis_W = ours.X_WM.rotation * (joint.X_MJ.rotation * joint.axis.axis_in_J);
       EXPECT_LT((axis_W - at->second.axis_W).norm(), kTolerance) << what;
       const double lower = at->second.joint->Axis()->Lower();
@@ -302,9 +302,9 @@ bool compare_file(const fs::path& path, Counts& counts) {
     return false;
   }
   SCOPED_TRACE(path.string());
-  std::shared_ptr<const model::WorldModel> ours;
+  std::shared_ptr<const world::WorldModel> ours;
   try {
-    ours = model::load_world(path.string());
+    ours = world::load_world(path.string());
   } catch (const std::exception& error) {
     ADD_FAILURE() << path << ": libsdformat loads it, we do not: " << error.what();
     return true;
