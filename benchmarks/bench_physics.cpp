@@ -52,11 +52,10 @@ std::shared_ptr<world::Model> robot_model() {
       world::Joint joint;
       joint.name = wheel.name + "_joint";
       joint.type = world::JointType::continuous;
-      joint.parent = 0;
-      joint.child = static_cast<int>(robot->links.size());
+      joint.parent = ModelLinkIndex(0);
+      joint.child = robot->links.next();
       joint.X_MJ = wheel.X_ML;
-      (y > 0 ? drive.left_joints : drive.right_joints)
-          .push_back(static_cast<int>(robot->joints.size()));
+      (y > 0 ? drive.left_joints : drive.right_joints).push_back(robot->joints.next());
       robot->links.push_back(wheel);
       robot->joints.push_back(joint);
     }
@@ -102,7 +101,7 @@ void run(benchmark::State& state, double spacing_m, double v, double omega) {
   robot::Robots robots(world, layout, physics);
   Snapshot snapshot;
   for (int i = 0; i < n && (v != 0.0 || omega != 0.0); ++i)
-    robots.apply({i, robot::VelocityCommand{v, 0.0, omega}});
+    robots.apply({RobotIndex(i), robot::VelocityCommand{v, 0.0, omega}});
   for (int i = 0; i < 400; ++i) robots.step();  // up to speed
   for (auto _ : state) {
     robots.step();
