@@ -37,6 +37,15 @@ class Bus {
     static_cast<void>(channels), static_cast<void>(own);
   }
 
+  // On these channels each message replaces the one before it: a listener that falls behind gets
+  // the newest of each. On all others it gets every message, as long as the bus has room for them.
+  // Any thread.
+  virtual void conflate(const std::vector<std::string>& channels) { static_cast<void>(channels); }
+
+  // The process that started this one gets every message from now on: the run waits for it. Any
+  // thread.
+  virtual void keep_all_for_launcher() {}
+
   // Ends listening: once it returns, the handler is not called any more.
   virtual void stop() {}
 
@@ -51,6 +60,8 @@ class Bus {
 
   // Messages that could not be sent so far.
   virtual uint64_t failed() const { return 0; }
+  // Messages that listeners did not get, since newer ones replaced them.
+  virtual uint64_t replaced() const { return 0; }
 };
 
 }  // namespace ruedo

@@ -26,10 +26,13 @@ class RivalWatch : public Bus {
   void listen_to(const std::vector<std::string>& channels,
                  const std::vector<std::string>& own = {}) override;
   void flush() override { bus_->flush(); }
+  void conflate(const std::vector<std::string>& channels) override { bus_->conflate(channels); }
+  void keep_all_for_launcher() override { bus_->keep_all_for_launcher(); }
   void stop() override { bus_->stop(); }
   bool is_heard(const std::string& channel) const override { return bus_->is_heard(channel); }
   uint64_t audience() const override { return bus_->audience(); }
   uint64_t failed() const override { return bus_->failed(); }
+  uint64_t replaced() const override { return bus_->replaced(); }
 
  private:
   void heard(const uint8_t* data, size_t size);

@@ -29,9 +29,10 @@ constexpr auto kFarewellTime = std::chrono::seconds(2);
 constexpr auto kStuckTime =
     std::chrono::seconds(30);  // after which a client that takes nothing is disconnected
 constexpr int kKeepAlive_s = 30, kKeepAliveAgain_s = 10,
-              kKeepAlives = 3;        // before a vanished machine is noticed
-constexpr size_t kChunk = 64 * 1024;  // bytes received from one client at a time
-constexpr int kMostChunks = 4;        // then it is the others' turn
+              kKeepAlives = 3;                      // before a vanished machine is noticed
+constexpr size_t kChunk = 64 * 1024;                // bytes received from one client at a time
+constexpr int kMostChunks = 4;                      // then it is the others' turn
+constexpr uint32_t kConflated = uint32_t{1} << 31;  // in the size of a frame that waits
 constexpr size_t kMostNumbers = 32768;
 constexpr int kMostPieces = 64;  // messages in one call of the system
 
@@ -112,7 +113,8 @@ void TcpqServer::publish(const std::string& channel, const uint8_t* data, size_t
     const size_t begin = waiting_.size();
     waiting_.resize(begin + sizeof(uint32_t));
     tcpq::append_publish(waiting_, channel, {data, size});
-    const auto frame = static_cast<uint32_t>(waiting_.size() - begin - sizeof(uint32_t));
+    auto frame = static_cast<uint32_t>(waiting_.size() - begin - sizeof(uint32_t));
+    if (conflated_.contains(channel)) frame |= kConflated;
     std::memcpy(&waiting_[begin], &frame, sizeof frame);
     wake = !std::exchange(woken_, true);
   }
@@ -289,6 +291,11 @@ bool TcpqServer::is_listened_to(const std::string& channel) {
   return channels_.contains(channel);
 }
 
+void TcpqServer::conflate(const std::vector<std::string>& channels) {
+  const std::lock_guard lock(mutex_);
+  conflated_ = {channels.begin(), channels.end()};
+}
+
 bool TcpqServer::is_heard(const std::string& channel) const {
   std::lock_guard lock(mutex_);
   return std::any_of(clients_.begin(), clients_.end(),
@@ -326,9 +333,14 @@ void TcpqServer::collect() {
     uint32_t size = 0;
     std::memcpy(&size, &collected_[at], sizeof size);
     at += sizeof size;
+    const bool conflated = size & kConflated;
+    size &= ~kConflated;
     const std::span<const uint8_t> frame(&collected_[at], size);
     const uint32_t name_size = frame[7];  // at most 63
-    ring_.append(number_of({reinterpret_cast<const char*>(&frame[8]), name_size}), frame);
+    const uint32_t number = number_of({reinterpret_cast<const char*>(&frame[8]), name_size});
+    ring_.append(number, frame);
+    if (newest_.size() <= number) newest_.resize(number + 64);
+    newest_[number] = conflated && number > 0 ? ring_.end() : 0;
     at += size;
   }
   collected_.clear();
@@ -353,6 +365,19 @@ bool TcpqServer::wants(Client& client, const MessageRing::Message& message) {
   int8_t& known = client.wants[message.channel];
   if (known == 0) known = passes() ? 1 : -1;
   return known > 0;
+}
+
+bool TcpqServer::is_replaced(Client& client, const MessageRing::Message& message) {
+  if (ring_.end() - client.place <= most_old_ || message.next >= newest_[message.channel])
+    return false;
+  ++replaced_;
+  if (!std::exchange(client.told_replaced, true)) {
+    spdlog::warn(
+        "{}: a client takes its messages more slowly than they come, and gets the newest of each "
+        "sensor alone (this is said once)",
+        url_.str());
+  }
+  return true;
 }
 
 void TcpqServer::send_all() {
@@ -395,7 +420,7 @@ void TcpqServer::send(Client& client) {
     size_t total = 0;
     while (client.place < ring_.end() && count < kMostPieces) {
       const MessageRing::Message message = ring_.at(client.place);
-      if (wants(client, message)) {
+      if (wants(client, message) && !is_replaced(client, message)) {
         places[count] = client.place;
         pieces[count++] = {const_cast<uint8_t*>(message.bytes.data()), message.bytes.size()};
         total += message.bytes.size();

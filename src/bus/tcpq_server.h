@@ -1,8 +1,9 @@
 // The bus as a tcpq server: LCM programs connect to it over TCP, and need no multicast.
 //
 // One thread does all the network. publish() copies a message into a bounded queue and returns; the
-// thread moves it to a ring from which each client is served at its own pace. A client that falls a
-// ring behind loses messages. What clients publish goes to the simulation and to all clients that
+// thread moves it to a ring from which each client is served at its own pace. Of conflated channels
+// a client that is kMostOld behind gets the newest message; one that falls a ring behind loses
+// messages. What clients publish goes to the simulation and to all clients that
 // subscribed to it, as on any LCM bus.
 //
 // When all places are taken, a newcomer replaces a connection that has said nothing. If there is
@@ -31,8 +32,10 @@ namespace ruedo::bus {
 class TcpqServer : public Bus {
  public:
   static constexpr size_t kMostClients = 512;
-  static constexpr size_t kMostWaiting = 16 << 20;  // bytes between publish() and the thread
-  static constexpr size_t kRing = 16 << 20;         // bytes
+  static constexpr size_t kMostWaiting = 16 << 20;       // bytes between publish() and the thread
+  static constexpr size_t kRing = 16 << 20;              // bytes
+  static constexpr size_t kMostOld = size_t{256} << 10;  // bytes,
+  static constexpr size_t kMostOldForLauncher = kRing / 2;  // which is more than a run goes ahead
   static constexpr size_t kMostReceived =
       64 << 20;  // bytes of incomplete frames, all clients together
 
@@ -49,9 +52,13 @@ class TcpqServer : public Bus {
               const std::vector<std::string>& own = {}) override;
   void listen_to(const std::vector<std::string>& channels,
                  const std::vector<std::string>& own = {}) override;
+  void conflate(const std::vector<std::string>& channels) override;
+  // Which of the clients that is cannot be told: all may be further behind.
+  void keep_all_for_launcher() override { most_old_ = kMostOldForLauncher; }
   // Sends what was published so far, for at most half a second, and closes all connections.
   void stop() override;
   uint64_t failed() const override { return failed_; }
+  uint64_t replaced() const override { return replaced_; }
   bool is_heard(const std::string& channel) const override;
   uint64_t audience() const override { return audience_; }
 
@@ -72,6 +79,7 @@ class TcpqServer : public Bus {
     uint64_t place = 0;         // in the ring
     std::vector<uint8_t> rest;  // of a message that was sent in part
     size_t rest_sent = 0;
+    bool told_replaced = false;
     bool blocked = false;     // waits for room in the socket
     Clock::time_point moved;  // when the socket last accepted bytes, or had none left to send
     bool spoke = false;       // published or subscribed
@@ -92,6 +100,7 @@ class TcpqServer : public Bus {
   void send(Client& client);
   bool send_rest(Client& client);
   bool wants(Client& client, const MessageRing::Message& message);
+  bool is_replaced(Client& client, const MessageRing::Message& message);
   uint32_t number_of(std::string_view channel);
   void sweep();
   void watch(Client& client, bool for_room);
@@ -102,19 +111,24 @@ class TcpqServer : public Bus {
   FileHandle listener_, poll_, wake_;
   Handler handler_;
 
-  mutable std::mutex mutex_;                  // of the next three
+  mutable std::mutex mutex_;                  // of what follows, up to woken_
   std::unordered_set<std::string> channels_;  // listened to
-  std::vector<uint8_t> waiting_;              // frames, each behind its size
+  std::unordered_set<std::string> conflated_;
+  std::vector<uint8_t> waiting_;  // frames, each behind its size
   bool woken_ = false;
   std::atomic<int> listeners_{0};  // clients with a subscription
   std::atomic<bool> stop_{false};
-  std::atomic<uint64_t> failed_{0}, connections_{0}, dropped_clients_{0}, skipped_{0}, audience_{0};
+  std::atomic<uint64_t> failed_{0}, connections_{0}, dropped_clients_{0}, skipped_{0}, audience_{0},
+      replaced_{0};
+  std::atomic<size_t> most_old_{kMostOld};
 
   // The thread's own; but clients_ and their filters change with the mutex held, for is_heard().
   std::vector<uint8_t> collected_;
   MessageRing ring_{kRing};
   std::unordered_map<std::string, uint32_t>
       numbers_;  // of channels; beyond a bound all others share number 0
+  // By channel number: where its newest message begins in the ring, where it is conflated.
+  std::vector<uint64_t> newest_;
   std::list<Client> clients_;
   size_t received_ = 0;               // bytes that the readers hold
   Clock::time_point accept_again_{};  // when there was no room for one more

@@ -60,6 +60,11 @@ void append_publish(std::vector<uint8_t>& out, std::string_view channel,
   out.insert(out.end(), data.begin(), data.end());
 }
 
+size_t size_of_publish(const uint8_t* frame) {
+  const size_t name = read_big_endian<uint32_t>(frame + 4);
+  return 8 + name + 4 + read_big_endian<uint32_t>(frame + 8 + name);
+}
+
 uint32_t Reader::number(size_t at) const { return read_big_endian<uint32_t>(&buffer_[read_ + at]); }
 
 Reader::Result Reader::next(Frame& frame) {

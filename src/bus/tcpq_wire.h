@@ -29,6 +29,8 @@ void append_subscribe(std::vector<uint8_t>& out, std::string_view name);
 void append_unsubscribe(std::vector<uint8_t>& out, std::string_view name);
 void append_publish(std::vector<uint8_t>& out, std::string_view channel,
                     std::span<const uint8_t> data);
+// Of a whole PUBLISH that begins there.
+size_t size_of_publish(const uint8_t* frame);
 
 struct Frame {
   enum class Kind { publish, subscribe, unsubscribe };

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cerrno>
 #include <cstring>
+#include <unordered_map>
 
 #include <pthread.h>
 #include <sys/epoll.h>
@@ -39,6 +40,12 @@ uint64_t inode_of(const std::string& path) {
   return ::lstat(path.c_str(), &status) == 0 ? status.st_ino : 0;
 }
 
+// Where the first frame begins at or after a place; one begins at `begin`.
+size_t first_frame(const std::vector<uint8_t>& frames, size_t begin, size_t place) {
+  while (begin < place) begin += tcpq::size_of_publish(&frames[begin]);
+  return begin;
+}
+
 }  // namespace
 
 std::string_view UnixServer::Frame::channel(const std::vector<uint8_t>& frames) const {
@@ -69,6 +76,16 @@ void UnixServer::listen_to(const std::vector<std::string>& channels,
                            const std::vector<std::string>&) {
   const std::lock_guard lock(mutex_);
   channels_ = {channels.begin(), channels.end()};
+}
+
+void UnixServer::conflate(const std::vector<std::string>& channels) {
+  const std::lock_guard lock(mutex_);
+  conflated_ = {channels.begin(), channels.end()};
+}
+
+void UnixServer::keep_all_for_launcher() {
+  const std::lock_guard lock(mutex_);
+  launcher_gets_all_ = true;
 }
 
 void UnixServer::stop() {
@@ -118,64 +135,118 @@ void UnixServer::send_frames() {
   index_.clear();
 }
 
-// What lies together in memory is one piece.
 void UnixServer::send(Client& client) {
-  iovec pieces[kMostPieces];
-  int count = 0;
-  const auto flush = [&] {
+  for (size_t i = client.behind() > 0 ? 0 : send_at_once(client); i < index_.size(); ++i) {
+    if (client.filter.passes(index_[i].channel(frames_))) keep(client, index_[i]);
+  }
+}
+
+// Returns the index of the first frame that was not sent or kept. What lies together in memory is
+// one piece.
+size_t UnixServer::send_at_once(Client& client) {
+  for (size_t begin = 0, end = 0; begin < index_.size(); begin = end) {
+    iovec pieces[kMostPieces];
+    int count = 0;
+    for (; end < index_.size(); ++end) {
+      const Frame& frame = index_[end];
+      if (!client.filter.passes(frame.channel(frames_))) continue;
+      uint8_t* const bytes = &frames_[frame.begin];
+      iovec* const last = count > 0 ? &pieces[count - 1] : nullptr;
+      if (last && static_cast<uint8_t*>(last->iov_base) + last->iov_len == bytes) {
+        last->iov_len += frame.size;
+        continue;
+      }
+      if (count == kMostPieces) break;
+      pieces[count++] = {bytes, frame.size};
+    }
+    if (count == 0) return end;
     msghdr header{};
     header.msg_iov = pieces;
     header.msg_iovlen = static_cast<size_t>(count);
-    const ssize_t result =
-        client.behind() > 0 ? 0
-                            : ::sendmsg(client.socket.get(), &header, MSG_NOSIGNAL | MSG_DONTWAIT);
-    if (result < 0 && errno != EAGAIN && errno != EINTR) client.gone = true;
-    size_t sent = result < 0 ? 0 : static_cast<size_t>(result);
-    for (int i = 0; i < count && !client.gone; ++i) {
-      const size_t done = std::min(sent, pieces[i].iov_len);
-      sent -= done;
-      if (done < pieces[i].iov_len)
-        keep(client,
-             {static_cast<const uint8_t*>(pieces[i].iov_base) + done, pieces[i].iov_len - done});
+    const ssize_t result = ::sendmsg(client.socket.get(), &header, MSG_NOSIGNAL | MSG_DONTWAIT);
+    if (result < 0 && errno != EAGAIN && errno != EINTR) {
+      client.gone = true;
+      return index_.size();
     }
-    count = 0;
-  };
-  size_t waiting = client.behind();
-  for (const Frame& frame : index_) {
-    if (!client.filter.passes(frame.channel(frames_))) continue;
-    if (waiting + frame.size > kMostBehind ||
-        held_ + waiting + frame.size > kMostHeld + client.behind()) {
-      ++failed_;
-      if (!std::exchange(client.told, true)) {
-        spdlog::warn(
-            "{}: a client takes nothing, and loses messages: {} MiB wait for it (this is said "
-            "once)",
-            url_.str(), waiting >> 20);
+    auto sent = static_cast<size_t>(std::max<ssize_t>(result, 0));
+    for (size_t i = begin; i < end; ++i) {
+      const Frame& frame = index_[i];
+      if (!client.filter.passes(frame.channel(frames_))) continue;
+      if (sent >= frame.size) {
+        sent -= frame.size;
+        continue;
       }
-      continue;
+      if (sent == 0) return i;
+      keep(client, {&frames_[frame.begin + sent], frame.size - sent});
+      client.frames_begin = client.rest.size();
+      return i + 1;
     }
-    waiting += frame.size;
-    uint8_t* begin = &frames_[frame.begin];
-    if (count > 0 &&
-        static_cast<uint8_t*>(pieces[count - 1].iov_base) + pieces[count - 1].iov_len == begin) {
-      pieces[count - 1].iov_len += frame.size;
-      continue;
-    }
-    if (count == kMostPieces) flush();
-    pieces[count++] = {begin, frame.size};
   }
-  if (count > 0) flush();
+  return index_.size();
+}
+
+void UnixServer::keep(Client& client, const Frame& frame) {
+  const bool gets_all = conflated_.empty() || (client.is_launcher && launcher_gets_all_);
+  if (client.behind() + frame.size > client.most_old && !gets_all) take_out_replaced(client);
+  if (client.behind() + frame.size > kMostBehind || held_ + frame.size > kMostHeld) {
+    ++failed_;
+    if (!std::exchange(client.told, true)) {
+      spdlog::warn(
+          "{}: a client takes nothing, and loses messages: {} MiB wait for it (this is said once)",
+          url_.str(), client.behind() >> 20);
+    }
+    return;
+  }
+  keep(client, {&frames_[frame.begin], frame.size});
 }
 
 void UnixServer::keep(Client& client, std::span<const uint8_t> bytes) {
   if (client.rest_sent > 0 && client.rest_sent >= client.rest.size() / 2) {
+    const size_t begin = first_frame(client.rest, client.frames_begin, client.rest_sent);
     client.rest.erase(client.rest.begin(),
                       client.rest.begin() + static_cast<std::ptrdiff_t>(client.rest_sent));
+    client.frames_begin = begin - client.rest_sent;
     client.rest_sent = 0;
   }
   client.rest.insert(client.rest.end(), bytes.begin(), bytes.end());
   held_ += bytes.size();
   watch(client);
+}
+
+// What is not replaced goes first, so that replies do not wait for samples.
+void UnixServer::take_out_replaced(Client& client) {
+  const size_t begin = first_frame(client.rest, client.frames_begin, client.rest_sent);
+  std::unordered_map<std::string, size_t> newest;  // of each conflated channel, where it begins
+  std::vector<uint8_t> kept(client.rest.begin() + static_cast<std::ptrdiff_t>(client.rest_sent),
+                            client.rest.begin() + static_cast<std::ptrdiff_t>(begin));
+  const auto keep_frame = [&](size_t at) {
+    const auto frame = client.rest.begin() + static_cast<std::ptrdiff_t>(at);
+    kept.insert(kept.end(), frame,
+                frame + static_cast<std::ptrdiff_t>(tcpq::size_of_publish(&client.rest[at])));
+  };
+  for (size_t at = begin; at < client.rest.size(); at += tcpq::size_of_publish(&client.rest[at])) {
+    const std::string channel(Frame{at, 0}.channel(client.rest));
+    if (!conflated_.contains(channel)) {
+      keep_frame(at);
+    } else if (!newest.insert_or_assign(channel, at).second) {
+      ++replaced_;
+    }
+  }
+  std::vector<size_t> in_order;
+  for (const auto& [channel, at] : newest) in_order.push_back(at);
+  std::sort(in_order.begin(), in_order.end());
+  for (const size_t at : in_order) keep_frame(at);
+  held_ -= client.behind() - kept.size();
+  client.frames_begin = begin - client.rest_sent;
+  client.rest = std::move(kept);
+  client.rest_sent = 0;
+  client.most_old = std::max(kMostOld, 2 * client.rest.size());
+  if (!std::exchange(client.told_replaced, true)) {
+    spdlog::warn(
+        "{}: a client takes its messages more slowly than they come, and gets the newest of each "
+        "sensor alone (this is said once)",
+        url_.str());
+  }
 }
 
 void UnixServer::send_rest(Client& client) {
@@ -186,7 +257,11 @@ void UnixServer::send_rest(Client& client) {
     if (sent < 0 && errno != EINTR) client.gone = true;
     if (sent > 0) client.rest_sent += static_cast<size_t>(sent), held_ -= static_cast<size_t>(sent);
   }
-  if (client.behind() == 0) std::vector<uint8_t>().swap(client.rest), client.rest_sent = 0;
+  if (client.behind() == 0) {
+    std::vector<uint8_t>().swap(client.rest);
+    client.rest_sent = client.frames_begin = 0;
+    client.most_old = kMostOld;
+  }
   watch(client);
 }
 
@@ -252,13 +327,15 @@ void UnixServer::accept_all() {
       return;
     }
     ++connections_;
-    if (!is_own_peer(socket.get()) || clients_.size() >= kMostClients) {
+    const pid_t peer = own_peer(socket.get());
+    if (peer < 0 || clients_.size() >= kMostClients) {
       ++refused_;
       continue;  // closes it
     }
     Client& client = clients_.emplace_back();
     client.socket = std::move(socket);
     client.since = Clock::now();
+    client.is_launcher = peer == ::getppid();
     add_to(poll_.get(), client.socket.get(), &client);
   }
 }
@@ -291,6 +368,7 @@ void UnixServer::receive(Client& client) {
     client.gone = true;
   } else if (!greeted && client.reader.greeted()) {
     keep(client, tcpq::server_hello());
+    client.frames_begin = client.rest.size();
     send_rest(client);
   }
 }

@@ -3,8 +3,9 @@
 // The socket has mode 0600, and the kernel names its peer: no other user reads or sends.
 // The frames are tcpq's (tcpq_wire.h). What is published waits for flush(), and then goes to each
 // client in one call of the system; what a client does not take at once is kept for it, in order.
-// Nothing is lost, except by a client that falls kMostBehind behind: it loses whole messages, and
-// the loss is logged.
+// Once more than kMostOld bytes wait for a client, messages on conflated channels that newer ones
+// replace are taken out; the process that started this one keeps all of them, since a run does not
+// leave it behind. A client that falls kMostBehind behind loses whole messages. Both are logged.
 #pragma once
 
 #include <atomic>
@@ -28,6 +29,7 @@ namespace ruedo::bus {
 class UnixServer : public Bus {
  public:
   static constexpr size_t kMostClients = 256;
+  static constexpr size_t kMostOld = size_t{256} << 10;    // bytes
   static constexpr size_t kMostBehind = size_t{64} << 20;  // bytes that one client has not taken
   static constexpr size_t kMostHeld =
       size_t{256} << 20;  // bytes that wait for clients, or belong to messages that are incomplete
@@ -43,9 +45,12 @@ class UnixServer : public Bus {
               const std::vector<std::string>& own = {}) override;
   void listen_to(const std::vector<std::string>& channels,
                  const std::vector<std::string>& own = {}) override;
+  void conflate(const std::vector<std::string>& channels) override;
+  void keep_all_for_launcher() override;
   // Sends what was published, for at most two seconds, and closes all connections.
   void stop() override;
   uint64_t failed() const override { return failed_; }
+  uint64_t replaced() const override { return replaced_; }
   bool is_heard(const std::string& channel) const override;
   uint64_t audience() const override { return audience_; }
 
@@ -63,6 +68,10 @@ class UnixServer : public Bus {
     tcpq::Filter filter;
     std::vector<uint8_t> rest;  // what it has not taken yet
     size_t rest_sent = 0;
+    size_t frames_begin = 0;  // in rest; before it is what remains of a frame that was sent in part
+    size_t most_old = kMostOld;  // then those that are replaced are taken out
+    bool is_launcher = false;
+    bool told_replaced = false;
     bool watched = false;  // for room
     bool told = false;     // that it lost messages
     bool gone = false;
@@ -81,7 +90,10 @@ class UnixServer : public Bus {
   void add(std::string_view channel, std::span<const uint8_t> data);
   void send_frames();
   void send(Client& client);
+  size_t send_at_once(Client& client);
+  void keep(Client& client, const Frame& frame);
   void keep(Client& client, std::span<const uint8_t> bytes);
+  void take_out_replaced(Client& client);
   void send_rest(Client& client);
   void watch(Client& client);
   void sweep();
@@ -93,11 +105,13 @@ class UnixServer : public Bus {
   uint64_t inode_ = 0;
   Handler handler_;
   std::atomic<bool> stop_{false};
-  std::atomic<uint64_t> failed_{0}, connections_{0}, refused_{0}, audience_{0};
+  std::atomic<uint64_t> failed_{0}, replaced_{0}, connections_{0}, refused_{0}, audience_{0};
 
   mutable std::mutex mutex_;  // of all that follows; not held while the handler runs
   std::unordered_set<std::string> channels_;  // listened to
-  std::vector<uint8_t> frames_;               // published since flush()
+  std::unordered_set<std::string> conflated_;
+  bool launcher_gets_all_ = false;
+  std::vector<uint8_t> frames_;  // published since flush()
   std::vector<Frame> index_;
   std::list<Client> clients_;
   bool newcomers_watched_ = true;

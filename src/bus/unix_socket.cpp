@@ -71,7 +71,7 @@ FileHandle connect_unix(const std::string& path) {
     throw EnvironmentError("nothing listens at unix://" + path + " (" + std::strerror(errno) +
                            "): start `ruedo run` with that --lcm first");
   }
-  if (!is_own_peer(socket.get()))
+  if (own_peer(socket.get()) < 0)
     throw EnvironmentError("unix://" + path + " is served by another user");
   return socket;
 }
@@ -100,11 +100,11 @@ FileHandle listen_unix(const std::string& path) {
   return socket;
 }
 
-bool is_own_peer(int socket) {
+pid_t own_peer(int socket) {
   ucred peer{};
   socklen_t size = sizeof peer;
-  return ::getsockopt(socket, SOL_SOCKET, SO_PEERCRED, &peer, &size) == 0 &&
-         (peer.uid == ::geteuid() || peer.uid == 0);
+  const bool is_known = ::getsockopt(socket, SOL_SOCKET, SO_PEERCRED, &peer, &size) == 0;
+  return is_known && (peer.uid == ::geteuid() || peer.uid == 0) ? peer.pid : -1;
 }
 
 }  // namespace ruedo::bus

@@ -3,6 +3,8 @@
 
 #include <string>
 
+#include <sys/types.h>
+
 #include "system/file_handle.h"
 
 namespace ruedo::bus {
@@ -18,7 +20,7 @@ bool is_unix_served(const std::string& path);
 // behind is replaced. Throws EnvironmentError.
 FileHandle listen_unix(const std::string& path);
 
-// Whether the other end is a process of this user, or of root.
-bool is_own_peer(int socket);
+// The process at the other end, where it is one of this user or of root; else -1.
+pid_t own_peer(int socket);
 
 }  // namespace ruedo::bus

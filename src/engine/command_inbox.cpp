@@ -196,7 +196,19 @@ void CommandInbox::receive(const std::string& channel, const uint8_t* data, size
   if (fault != DecodeFault::none) return refuse(channel, describe(fault));
   if (const std::string why = check_values(input.kind, data, size); !why.empty())
     return refuse(channel, why.c_str());
-  keep(found->second, command, data, size);
+  if (!is_repeated(input, data, size)) keep(found->second, command, data, size);
+}
+
+// Clients send a primitive until a status shows it, since messages may be lost.
+bool CommandInbox::is_repeated(const Input& input, const uint8_t* data, size_t size) {
+  const bool moves = input.kind == Input::Kind::move;
+  if (!moves && input.kind != Input::Kind::velocity && input.kind != Input::Kind::wheels)
+    return false;
+  const std::lock_guard lock(mutex_);
+  std::vector<uint8_t>& last = slots_of(input.robot).primitive;
+  if (moves && std::equal(data, data + size, last.begin(), last.end())) return true;
+  last.assign(data, moves ? data + size : data);
+  return false;
 }
 
 void CommandInbox::reset_odometry(RobotIndex robot, const std::vector<uint8_t>& body) {

@@ -41,8 +41,8 @@ class CommandInbox {
   // inputs: at most one for each channel, except that reset_odometry has no channel.
   CommandInbox(std::vector<Input> inputs, int robots);
 
-  // Checks a message and stores it; a faulty one is counted, and logged at most once a second. Any
-  // thread.
+  // Checks a message and stores it; a faulty one is counted, and logged at most once a second. Of a
+  // motion primitive that is sent again, each byte the same, the first is taken. Any thread.
   void receive(const std::string& channel, const uint8_t* data, size_t size);
 
   // Requests a reset of a robot's odometry, with the request's body for the log. Any thread.
@@ -91,7 +91,8 @@ class CommandInbox {
   struct Slots {  // a ring of the newest
     explicit Slots(size_t most = kKeptPerRobot) : most(most) {}
     size_t most;
-    std::vector<Entry> entries;  // none before the first that is kept
+    std::vector<Entry> entries;      // none before the first that is kept
+    std::vector<uint8_t> primitive;  // the last one, until another command replaces it
     size_t first = 0, size = 0;
   };
 
@@ -100,6 +101,7 @@ class CommandInbox {
     return robot.valid() ? waits_.slots[robot] : waits_.world_slots;
   }
   Entry& next_entry(RobotIndex robot);  // the mutex must be held
+  bool is_repeated(const Input& input, const uint8_t* data, size_t size);
   void keep(InputIndex input, robot::Command& command, const uint8_t* data, size_t size);
   void refuse(const std::string& channel, const char* why);
   Entry& next_taken(size_t& count);

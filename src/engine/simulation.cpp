@@ -17,8 +17,7 @@ namespace ruedo::engine {
 namespace {
 
 constexpr size_t kMaxSnapshotMemory = 64u << 20;  // bytes of all batches together
-constexpr int kFewSteps = 4;
-constexpr int kModuleThreads = 12;  // and those of the run
+constexpr int kModuleThreads = 12;                // and those of the run
 constexpr int64_t kQuickNs =
     1'000'000;  // for which the publisher may wait for a step: it also sends the signs of life
 
@@ -157,10 +156,10 @@ void Simulation::simulate() {
   }
 }
 
-bool Simulation::go() {
+bool Simulation::go(int most) {
   int64_t first_step = 0;
   const int limit =
-      step_ns_ > kQuickNs ? 0 : std::min(kFewSteps, static_cast<int>(batches_[0].snapshots.size()));
+      step_ns_ > kQuickNs ? 0 : std::min(most, static_cast<int>(batches_[0].snapshots.size()));
   const int count = pace_->borrow(first_step, limit);
   if (count == 0) return false;
   Batch& batch = batches_[round_ % batches_.size()];

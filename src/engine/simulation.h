@@ -52,10 +52,10 @@ class Simulation {
   // From the next batch on, only these channels are read (Batch::read). Any thread.
   void set_read_channels(ReadChannels read);
 
-  // Computes the next steps in the caller's thread, the publisher's, if they are few, may be
-  // computed now, and the simulation thread is waiting for them: waking it and waiting for it takes
-  // longer than a step of a small world. Otherwise wakes it, and returns false.
-  bool go();
+  // Computes the next steps in the caller's thread, the publisher's, if they are at most `most`,
+  // may be computed now, and the simulation thread is waiting for them: waking it and waiting for
+  // it takes longer than a step of a small world. Otherwise wakes it, and returns false.
+  bool go(int most);
 
   // For the publisher: the next finished batch in order, or null if there is none yet. The batch
   // stays valid until the next call that returns one. Throws std::runtime_error if a module failed.

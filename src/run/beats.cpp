@@ -22,13 +22,29 @@ void Ticks::message(const Published& message) {
   if (due_) tick_.add_message(message.index, message.sequence, message.data, message.size);
 }
 
-void Ticks::end_step(const Step& step) {
-  if (!due_) return;
-  add_applied_(tick_, step.step);
+void Ticks::set_rate(Rate rate) {
+  if (rate == rate_) return;
+  rate_ = rate;
+  beat_ = Beat(rate, step_us_);
+}
+
+void Ticks::say() {
+  if (!publisher_.latest()) return;
+  tick_.begin(publisher_.time_us(), run_id_, publisher_.epoch(), publisher_.step());
+  finish();
+}
+
+void Ticks::end_step(const Step&) {
+  if (due_) finish();
+}
+
+void Ticks::finish() {
+  add_applied_(tick_, publisher_.step());
   tick_.finish(engine::state_hash(*publisher_.latest()), [this](const tick_t& part) {
     publisher_.service(publisher_.announcement().own.tick, part, part.part);
   });
   last_ = std::chrono::steady_clock::now();
+  told_us_ = publisher_.time_us();
 }
 
 void InfoBeat::say() {

@@ -37,6 +37,8 @@ class Ticks : public Sink {
   Ticks(Publisher& publisher, int64_t run_id, Rate rate, int64_t step_us, AddApplied add_applied)
       : publisher_(publisher),
         run_id_(run_id),
+        step_us_(step_us),
+        rate_(rate),
         beat_(rate, step_us),
         add_applied_(std::move(add_applied)) {}
 
@@ -46,16 +48,25 @@ class Ticks : public Sink {
   void message(const Published& message) override;
   void end_step(const Step& step) override;
 
-  Time last() const { return last_; }  // in real time
+  void set_rate(Rate rate);
+  // Of the last state, without the list of its messages.
+  void say();
+
+  Time last() const { return last_; }           // in real time
+  SimTime told_us() const { return told_us_; }  // the time of the last tick
 
  private:
+  void finish();
+
   Publisher& publisher_;
-  const int64_t run_id_;
+  const int64_t run_id_, step_us_;
+  Rate rate_;
   Beat beat_;
   const AddApplied add_applied_;
   TickWriter tick_;
   bool due_ = false;
   Time last_ = std::chrono::steady_clock::now();
+  SimTime told_us_ = -1;
 };
 
 // ruedo/info, once a second of sim time and whenever asked.

@@ -31,6 +31,12 @@ Pacer::Clock::time_point Pacer::due(int64_t step) const {
   return origin_time_ + std::chrono::nanoseconds(whole(std::min(real_us * 1e3, 9e18)));
 }
 
+// The last state that may be computed.
+int64_t Pacer::until() const {
+  const int64_t limit = std::min({until_, limit_, limits_.at_any_rate});
+  return std::isfinite(rate_) ? limit : std::min(limit, limits_.at_highest_rate);
+}
+
 void Pacer::reset() {
   origin_step_ = granted_ + 1;
   origin_time_ = Clock::now();
@@ -63,14 +69,14 @@ int Pacer::wait(int64_t& step, int limit) {
       changed_.notify_all();
       return 0;
     }
-    const int64_t until = std::min(until_, limit_);
+    const int64_t until = this->until();
     if (step > until) {
       sleep(lock);
       continue;
     }
     int64_t count =
         std::min<int64_t>(limit - 1, until - step) + 1;  // until may be the largest number there is
-    if (limit_ < INT64_MAX) count = std::min(count, some_of(until - step + 1));
+    if (limit_ < INT64_MAX || until < until_) count = std::min(count, some_of(until - step + 1));
     if (std::isfinite(rate_) && !paused_) {  // single steps are taken at once
       const Clock::time_point now = Clock::now();
       const Clock::time_point due_now = due(step);
@@ -93,7 +99,7 @@ int Pacer::wait(int64_t& step, int limit) {
 
 int Pacer::borrow(int64_t& step, int limit) {
   std::lock_guard lock(mutex_);
-  const int64_t until = std::min(until_, limit_);
+  const int64_t until = this->until();
   if (lent_ || granted_ >= until) return 0;
   const bool paced = std::isfinite(rate_) && !paused_;  // real time decides
   if (!asleep_ || hold_ || stopped_ || paced || until - granted_ > limit) {
@@ -112,7 +118,7 @@ void Pacer::give_back(int unused) {
     std::lock_guard lock(mutex_);
     granted_ -= unused;
     lent_ = false;
-    told = hold_ || stopped_ || granted_ >= last_step_ || std::min(until_, limit_) > granted_;
+    told = hold_ || stopped_ || granted_ >= last_step_ || until() > granted_;
   }
   if (told) changed_.notify_all();
 }
@@ -212,6 +218,11 @@ void Pacer::set_limit(int64_t step) {
   changed_.notify_all();
 }
 
+void Pacer::set_limits(const Backpressure::Limits& limits) {
+  const std::lock_guard lock(mutex_);
+  limits_ = limits;
+}
+
 bool Pacer::paused() const {
   std::lock_guard lock(mutex_);
   return paused_;
@@ -222,6 +233,11 @@ bool Pacer::rests() const {
   if (granted_ >= until_) return true;
   const bool paced = std::isfinite(rate_) && !paused_;
   return paced && granted_ < limit_ && Clock::now() < due(granted_ + 1);
+}
+
+bool Pacer::is_limited() const {
+  const std::lock_guard lock(mutex_);
+  return granted_ >= until() && until() < std::min(until_, limit_);
 }
 
 double Pacer::rate() const {

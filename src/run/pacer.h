@@ -13,6 +13,7 @@
 #include <mutex>
 
 #include "engine/pace.h"
+#include "run/backpressure.h"
 #include "run/gate.h"
 
 namespace ruedo::run {
@@ -43,7 +44,8 @@ class Pacer : public engine::Pace, public Gate {
   int64_t allow(int64_t steps);  // while paused: that many more; returns the last one of them
   void set_rate(double rate);
   void set_limit(int64_t step) override;
-  void set_limit_quietly(int64_t step) override;  // for who calls borrow() next
+  void set_limit_quietly(int64_t step) override;        // for who calls borrow() next
+  void set_limits(const Backpressure::Limits& limits);  // beside that of set_limit(), and quietly
 
   // Standing still for a change of the world. hold(): wait() lets nothing more go; returns the last
   // state that it let go. wait_until_held(), when that state is done: until the simulation thread
@@ -58,10 +60,12 @@ class Pacer : public engine::Pace, public Gate {
   // Whether nothing is to be computed now: a pause, the end of the run, or real time.
   bool rests() const;
   double rate() const;
+  bool is_limited() const;  // by set_limits(), now
   int64_t last_step() const { return last_step_; }
 
  private:
   Clock::time_point due(int64_t step) const;
+  int64_t until() const;
   void reset();
   void sleep(std::unique_lock<std::mutex>& lock);
 
@@ -78,9 +82,10 @@ class Pacer : public engine::Pace, public Gate {
   bool asleep_ = false,
        lent_ = false;  // wait() waits for a higher limit; its steps are another thread's
   int64_t until_;  // last state that may be computed: by the end of the run, pause() and allow(),
-  int64_t limit_ = INT64_MAX;  // and by set_limit()
-  int64_t granted_ = -1;       // last state that wait() let go
-  int64_t origin_step_ = 0;    // was due at origin_time_
+  int64_t limit_ = INT64_MAX;    // by set_limit(),
+  Backpressure::Limits limits_;  // and by set_limits()
+  int64_t granted_ = -1;         // last state that wait() let go
+  int64_t origin_step_ = 0;      // was due at origin_time_
   Clock::time_point origin_time_;
 };
 

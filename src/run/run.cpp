@@ -18,6 +18,11 @@ namespace {
 
 constexpr auto kStatusPeriod = std::chrono::milliseconds(500);
 constexpr auto kPausedInfoPeriod = std::chrono::seconds(1);
+constexpr auto kTickAgainPeriod = std::chrono::milliseconds(100);
+constexpr Rate kFollowedTickRate{40, 1};  // two within Backpressure::kMostAhead
+// Steps that the publisher computes itself rather than wake another thread for them: it is waited
+// for meanwhile.
+constexpr int kFewGranted = 4, kFewAhead = 16;
 constexpr auto kDrainPeriod = std::chrono::milliseconds(50);
 
 // record: writes joins and ended leases into the log.
@@ -37,6 +42,7 @@ Run::Run(std::shared_ptr<const world::WorldModel> world, RunOptions options, Bus
       bus_(bus),
       run_id_(random_id()),
       channels_(options_.remaps),
+      backpressure_(world_->step_us),
       mode_(make_mode(options_, world_->step_us,
                       [this](applied_t applied) {
                         applied.utime = publisher_.time_us();
@@ -44,7 +50,7 @@ Run::Run(std::shared_ptr<const world::WorldModel> world, RunOptions options, Bus
                         publisher_.record(kAppliedChannel, applied);
                       })),
       wanted_{options_.rate, options_.paused},
-      bus_sink_(bus),
+      bus_sink_(bus, !mode_->takes_grants()),
       beats_{.hashes = {publisher_, world_->step_us},
              .watchdogs = {publisher_, world_->step_us,
                            [this](size_t robot) { tell_watchdog(robot); }},
@@ -166,7 +172,7 @@ void Run::publish_what_is_ready() {
   for (;;) {
     stall_watch_.beat(StallWatch::At::messages);
     if (stop_) simulation_->leave_off();
-    const engine::Batch* batch = mode().has_room() || stop_ ? simulation_->take() : nullptr;
+    const engine::Batch* batch = has_room() || stop_ ? simulation_->take() : nullptr;
     if (!batch) return;
     publish(*batch);
     tell_status();
@@ -180,6 +186,14 @@ void Run::publish_what_is_ready() {
   }
 }
 
+// A tick says what has been published: whoever has it has the samples before it.
+bool Run::has_room() {
+  if (!mode().has_room()) return false;
+  if (backpressure_.has_room()) return true;
+  if (beats_.ticks.told_us() != publisher_.time_us()) beats_.ticks.say();
+  return false;
+}
+
 void Run::publish(const engine::Batch& batch) {
   for (int i = 0; i < batch.count; ++i) {
     const Snapshot& state = batch.snapshots[i];
@@ -190,6 +204,7 @@ void Run::publish(const engine::Batch& batch) {
   tell_readers();
   if (batch.count == 0) return;
   mode().published(publisher_.step());
+  backpressure_.published(publisher_.time_us(), bus_sink_.bytes());
   stall_watch_.moved(Clock::now());
 }
 
@@ -221,9 +236,10 @@ void Run::tell_readers() {
 }
 
 bool Run::compute_here() {
-  if (!mode().takes_grants() || !mode().has_room()) return false;
+  const bool is_paced_by_clients = mode().takes_grants() || backpressure_.acts();
+  if (!is_paced_by_clients || !mode().has_room() || !backpressure_.has_room()) return false;
   stall_watch_.beat(StallWatch::At::steps);
-  return simulation_->go();
+  return simulation_->go(mode().takes_grants() ? kFewGranted : kFewAhead);
 }
 
 void Run::serve() {
@@ -238,6 +254,7 @@ Run::Clock::time_point Run::attend() {
   // is restored.
   const auto last_sign = [this] { return std::max(beats_.info.last(), beats_.ticks.last()); };
   if (now >= last_sign() + kPausedInfoPeriod) beats_.info.say();
+  const Clock::time_point next_tick = attend_follower(now);
   Mode::Attended attended;
   {
     const std::lock_guard lock(simulation_mutex_);
@@ -247,7 +264,16 @@ Run::Clock::time_point Run::attend() {
   for (const int64_t session : attended.dropped) control_.drop(session);
   if (pacer_->rests()) stall_watch_.moved(now);
   stall_watch_.idle(now, [this] { return why_idle(); });
-  return std::min({next_status_, last_sign() + kPausedInfoPeriod, attended.next});
+  return std::min({next_status_, last_sign() + kPausedInfoPeriod, next_tick, attended.next});
+}
+
+// Ticks may be lost on the way to the program that the run waits for.
+Run::Clock::time_point Run::attend_follower(Clock::time_point now) {
+  if (!backpressure_.acts() || repeating_) return Clock::time_point::max();
+  beats_.ticks.set_rate(kFollowedTickRate);
+  if (!waits_for_launcher() && backpressure_.has_room()) return Clock::time_point::max();
+  if (now >= beats_.ticks.last() + kTickAgainPeriod) beats_.ticks.say();
+  return beats_.ticks.last() + kTickAgainPeriod;
 }
 
 Status Run::status() const {
@@ -268,9 +294,17 @@ std::string Run::why_idle() {
     const std::lock_guard lock(simulation_mutex_);
     who = mode().waits_for(publisher_.step());
   }
+  if (who.empty() && waits_for_launcher())
+    who =
+        "the program that launched it, which has not come this far: is it stopped, or is a "
+        "callback slow?";
   std::string why = who.empty() ? simulation_->at_work() : "it waits for " + who;
   if (why.empty()) return "";
   return fmt::format("{} (the last state was that of step {})", why, publisher_.step());
+}
+
+bool Run::waits_for_launcher() const {
+  return backpressure_.acts() && !repeating_ && pacer_->is_limited();
 }
 
 std::string Run::takes_no_messages() const {

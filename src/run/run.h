@@ -26,6 +26,7 @@
 #include "ruedo/snapshot_request_t.hpp"
 #include "ruedo/state_reply_t.hpp"
 #include "ruedo/step_request_t.hpp"
+#include "run/backpressure.h"
 #include "run/beats.h"
 #include "run/journal.h"
 #include "run/lockstep/lockstep.h"
@@ -100,8 +101,12 @@ class Run {
     receive(channel, bytes.data(), bytes.size());
   }
 
-  // Messages that the bus could not send. Any thread.
-  uint64_t lost() const { return bus_.failed(); }
+  // From the program that launched this run: it is not left behind from now on. Any thread.
+  void take(const LauncherProgress& progress);
+
+  // Messages that the bus could not send, or that newer ones replaced on the way to a slow client.
+  // Any thread.
+  uint64_t lost() const { return bus_.failed() + bus_.replaced(); }
 
   const engine::Channels& channels() const { return channels_; }
   // What clients are told of the world; valid until models come or go.
@@ -139,14 +144,17 @@ class Run {
   void begin_log();
   Control::Host control_host();
   void publish_what_is_ready();
+  bool has_room();
   void publish(const engine::Batch& batch);
   void record_applied(const engine::Batch& batch, int64_t step);
-  void tell_readers();         // what is read by now
-  bool compute_here();         // a few steps that were granted; false: there are none
-  void serve();                // requests, and models that are ready
+  void tell_readers();  // what is read by now
+  bool compute_here();  // a few steps that were granted; false: there are none
+  void serve();         // requests, and models that are ready
+  Clock::time_point attend_follower(Clock::time_point now);
   Clock::time_point attend();  // does what is due by real time; returns when it is due next
   void tell_status();
   std::string why_idle();
+  bool waits_for_launcher() const;
   std::string takes_no_messages() const;
   void finish();  // the run is over
   Status status() const;
@@ -159,6 +167,10 @@ class Run {
     bool paused;
   };
   void make_simulation(const Pace& pace);
+  // The run goes on with that mode from the state `step`; -1: from its beginning. With the
+  // simulation's mutex held, as the next.
+  void begin_mode(Mode& mode, int64_t step);
+  void limit_pace();
   void begin_epoch();  // with a rebuilt world
   void announce();
   Mode::Stage stage();
@@ -253,6 +265,7 @@ class Run {
   std::mutex
       simulation_mutex_;  // of the world and the mode: commands reach them from other threads
   std::unique_ptr<Pacer> pacer_;
+  Backpressure backpressure_;
   std::unique_ptr<engine::Simulation> simulation_;
   const std::unique_ptr<Mode> mode_;
   std::unique_ptr<Repeating> repeating_;  // before that mode goes on; null: nothing is repeated

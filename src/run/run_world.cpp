@@ -1,4 +1,5 @@
 // The world of each epoch, and the change from repeating a log to going on.
+#include <algorithm>
 #include <limits>
 
 #include <spdlog/spdlog.h>
@@ -40,7 +41,27 @@ void Run::make_simulation(const Pace& pace) {
   pacer_ = std::make_unique<Pacer>(world_->step_us, pace.rate, last_step);
   if (pace.paused) pacer_->pause();
   publisher_.begin_epoch(epoch_);
-  mode().begin(stage(), -1);
+  begin_mode(mode(), -1);
+}
+
+void Run::begin_mode(Mode& mode, int64_t step) {
+  mode.begin(stage(), step);
+  backpressure_.begin(epoch_, std::max<int64_t>(step, 0) * world_->step_us);
+  limit_pace();
+}
+
+void Run::take(const LauncherProgress& progress) {
+  if (mode_->takes_grants()) return;  // they say how far the run goes
+  const std::lock_guard lock(simulation_mutex_);
+  if (!backpressure_.acts()) bus_.keep_all_for_launcher();
+  backpressure_.take(progress);
+  limit_pace();
+  wakeup_.set();  // the publisher goes on, or wakes who does
+}
+
+// What is repeated is not published, and nobody has to follow it.
+void Run::limit_pace() {
+  pacer_->set_limits(repeating_ ? Backpressure::Limits{} : backpressure_.limits());
 }
 
 void Run::begin_epoch() {
@@ -125,7 +146,7 @@ void Run::end_repeat(bool paused) {
     const std::lock_guard lock(simulation_mutex_);
     repeating_.reset();
     publisher_.mute(false);
-    mode_->begin(stage(), publisher_.step());
+    begin_mode(*mode_, publisher_.step());
   }
   beats_.info.say();
 }

@@ -5,6 +5,7 @@
 
 #include <spdlog/spdlog.h>
 
+#include "base/channel_names.h"
 #include "ruedo/errors.h"
 
 namespace ruedo::run {
@@ -19,11 +20,21 @@ void BusSink::listen(Bus::Handler handler) {
   bus_.listen(inputs_, std::move(handler), outputs_);
 }
 
+// Answers are asked for once, and of what goes in parts the last part replaces nothing.
+bool is_conflated(const engine::Channel& channel, const engine::SimulationChannels& own,
+                  engine::ChannelIndex index) {
+  return !channel.input && index != own.reply && index != own.info && channel.name != kWorldChannel;
+}
+
 void BusSink::announce(const std::shared_ptr<const Announcement>& announcement) {
-  std::vector<std::string> inputs, outputs;
-  for (const engine::Channel& channel : announcement->channels.list()) {
-    if (!channel.gone) (channel.input ? inputs : outputs).push_back(channel.bus_name);
+  std::vector<std::string> inputs, outputs, conflated;
+  for (const engine::ChannelIndex index : announcement->channels.list().indices()) {
+    const engine::Channel& channel = announcement->channels[index];
+    if (channel.gone) continue;
+    (channel.input ? inputs : outputs).push_back(channel.bus_name);
+    if (is_conflated(channel, announcement->own, index)) conflated.push_back(channel.bus_name);
   }
+  if (conflates_) bus_.conflate(conflated);
   const bool same = inputs == inputs_ && outputs == outputs_;
   inputs_ = std::move(inputs);
   outputs_ = std::move(outputs);

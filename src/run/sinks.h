@@ -18,7 +18,8 @@ namespace ruedo::run {
 // What clients hear, and the channels on which they are heard.
 class BusSink : public Sink {
  public:
-  explicit BusSink(Bus& bus) : bus_(bus) {}
+  // conflates: a client that falls behind gets the newest sample of each channel; else every one.
+  BusSink(Bus& bus, bool conflates) : bus_(bus), conflates_(conflates) {}
 
   // From now on commands and requests come to the handler, in the bus's thread. Once, after the
   // first announcement.
@@ -30,12 +31,17 @@ class BusSink : public Sink {
   void announce(const std::shared_ptr<const Announcement>& announcement) override;
   void message(const Published& message) override {
     bus_.publish(message.channel, message.data, message.size);
+    if (message.kind == Kind::sample) bytes_ += message.size;
   }
   void flush() override { bus_.flush(); }
 
+  uint64_t bytes() const { return bytes_; }  // of all samples
+
  private:
   Bus& bus_;
+  const bool conflates_;
   bool listening_ = false;
+  uint64_t bytes_ = 0;
   std::vector<std::string> inputs_, outputs_;
 };
 

@@ -223,6 +223,35 @@ TEST(TcpqServer, ASlowClientLosesMessagesAndHoldsNobodyUp) {
   EXPECT_FALSE(slow.closed(1));
 }
 
+TEST(TcpqServer, OfConflatedChannelsASlowClientGetsTheNewest) {
+  Served served;
+  served.server.conflate({"state"});
+  lcm::LCM slow(served.url);
+  struct Came {
+    int states = 0, events = 0, newest = -1;
+    void on(const lcm::ReceiveBuffer* buffer, const std::string& channel) {
+      if (channel == "state") newest = *static_cast<const uint8_t*>(buffer->data), ++states;
+      if (channel == "event") ++events;
+    }
+  } came;
+  slow.subscribe(".*", &Came::on, &came)->setQueueCapacity(0);
+  ASSERT_TRUE(soon([&] { return served.server.is_heard("state"); }));
+  std::vector<uint8_t> block(20'000);
+  constexpr int kStates = 600;  // 12 MB: less than the ring holds
+  for (int i = 0; i < kStates; ++i) {
+    block[0] = static_cast<uint8_t>(i % 100);
+    served.publish("state", block);
+    if (i % 20 == 0) served.publish("event", {1});
+  }
+  block[0] = 200;
+  served.publish("state", block);
+  ASSERT_TRUE(soon([&] { return slow.handleTimeout(100), came.newest == 200; }));
+  EXPECT_EQ(came.events, kStates / 20);
+  EXPECT_LT(came.states, kStates);
+  EXPECT_GT(served.server.replaced(), 0u);
+  EXPECT_EQ(served.server.failed(), 0u);
+}
+
 TEST(TcpqServer, WithoutFileDescriptorsNewcomersWaitAndCostNothing) {
   Served served;
   const FileHandle newcomer(::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0));

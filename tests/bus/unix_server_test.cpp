@@ -1,6 +1,7 @@
 // The Unix domain socket: its owner, that nothing is lost, and malicious clients.
 #include "bus/unix_server.h"
 
+#include <algorithm>
 #include <atomic>
 #include <cerrno>
 #include <condition_variable>
@@ -187,6 +188,105 @@ TEST(UnixServer, NothingIsLostThatASlowClientTakesLater) {
   slow.take_until(500);
   ASSERT_EQ(slow.came.size(), 500u);
   for (int i = 0; i < 500; ++i) ASSERT_EQ(slow.came[i].second, std::to_string(i) + block) << i;
+}
+
+// 3 000 rounds of "state", "event" and "bulk" for a client that takes nothing meanwhile.
+Messages flooded(Served& served, Client& slow) {
+  const std::string block(2'000, 'x');
+  for (int i = 0; i < 3'000; ++i) {  // 6 MB
+    served.publish("state", std::to_string(i));
+    if (i % 100 == 0) served.publish("event", std::to_string(i));
+    served.publish("bulk", std::to_string(i) + block);
+    served.server.flush();
+  }
+  served.publish("end", "");
+  served.server.flush();
+  while ((slow.came.empty() || slow.came.back().first != "end") && !slow.connection.is_over())
+    slow.take();
+  return slow.came;
+}
+
+std::vector<int> numbers_on(const std::string& channel, const Messages& messages) {
+  std::vector<int> numbers;
+  for (const auto& [name, text] : messages)
+    if (name == channel) numbers.push_back(std::stoi(text));
+  return numbers;
+}
+
+TEST(UnixServer, OfConflatedChannelsASlowClientGetsTheNewest) {
+  Served served;
+  served.server.conflate({"state", "bulk"});
+  Client slow(served, {"state", "event", "bulk", "end"});
+  const Messages came = flooded(served, slow);
+  for (const char* channel : {"state", "bulk"}) {
+    const std::vector<int> numbers = numbers_on(channel, came);
+    EXPECT_LT(numbers.size(), 1'500u) << channel;
+    EXPECT_EQ(numbers.back(), 2'999) << channel;
+    EXPECT_TRUE(std::is_sorted(numbers.begin(), numbers.end())) << channel;
+  }
+  EXPECT_EQ(numbers_on("event", came).size(), 30u);
+  EXPECT_EQ(
+      numbers_on("state", came).size() + numbers_on("bulk", came).size() + served.server.replaced(),
+      6'000u);
+  EXPECT_EQ(served.server.failed(), 0u);
+}
+
+TEST(UnixServer, WhatIsNotConflatedDoesNotWaitForWhatIs) {
+  Served served;
+  served.server.conflate({"state"});
+  Client slow(served, {"state", "reply"});
+  const std::string block(60'000, 'x');
+  for (int i = 0; i < 100; ++i) served.publish("state", block), served.server.flush();
+  served.publish("reply", "1");
+  served.publish("state", "newest");
+  for (int i = 0; i < 5; ++i) served.publish("state", block);
+  served.server.flush();
+  const auto place_of_reply = [&] {
+    return std::find(slow.came.begin(), slow.came.end(),
+                     std::pair<std::string, std::string>{"reply", "1"});
+  };
+  while (place_of_reply() == slow.came.end() && !slow.connection.is_over()) slow.take();
+  EXPECT_LT(place_of_reply() - slow.came.begin(), 12);  // what the kernel had taken already
+}
+
+// The test's process is the parent of none, so another one launches.
+TEST(UnixServer, TheLauncherGetsAll) {
+  Folder folder;
+  const pid_t launched = ::fork();
+  ASSERT_GE(launched, 0);
+  if (launched == 0) {
+    UnixServer server(folder.url());
+    std::atomic<bool> go{false};
+    server.listen({"in"}, [&](const std::string&, const uint8_t*, size_t) { go = true; });
+    server.conflate({"state"});
+    server.keep_all_for_launcher();
+    while (!go) std::this_thread::yield();
+    const std::vector<uint8_t> block(2'000);
+    for (int i = 0; i < 3'000; ++i)
+      server.publish("state", block.data(), block.size()), server.flush();
+    server.publish("end", block.data(), 1);
+    server.stop();
+    ::_exit(server.replaced() == 0 ? 0 : 1);
+  }
+  while (!is_unix_served(folder.url().host)) std::this_thread::yield();
+  StreamConnection connection(connect_unix(folder.url().host));
+  connection.subscribe("state");
+  connection.subscribe("end");
+  const uint8_t byte = 1;
+  ASSERT_TRUE(connection.publish("in", &byte, 1));
+  std::this_thread::sleep_for(std::chrono::milliseconds(200));  // it is behind
+  int count = 0;
+  bool ended = false;
+  while (!ended && !connection.is_over()) {
+    connection.take(100, [&](std::string_view channel, const uint8_t*, size_t) {
+      ended = channel == "end";
+      count += channel == "state";
+    });
+  }
+  EXPECT_EQ(count, 3'000);
+  int status = 0;
+  ASSERT_EQ(::waitpid(launched, &status, 0), launched);
+  EXPECT_EQ(status, 0);
 }
 
 TEST(UnixServer, WhoTakesNothingHasABound) {

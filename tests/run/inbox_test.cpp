@@ -6,6 +6,7 @@
 #include <thread>
 
 #include "engine/command_inbox.h"
+#include "ruedo/move_command_t.hpp"
 #include "ruedo/velocity_command_t.hpp"
 #include "ruedo/wheel_command_t.hpp"
 #include "run/requests/control.h"
@@ -122,6 +123,38 @@ TEST_F(InboxTest, WhatWaitsForARobotGoesWithIt) {
 }
 
 // However threads are scheduled, each kept command acts once, on its step.
+TEST_F(InboxTest, APrimitiveThatIsSentAgainIsTakenOnce) {
+  engine::CommandInbox inbox({{"r/move", RobotIndex(0), engine::Input::Kind::move},
+                              {"r/velocity", RobotIndex(0), engine::Input::Kind::velocity}},
+                             1);
+  const auto moved = [&](int64_t id, double value) {
+    move_command_t command{};
+    command.id = id;
+    command.kind = move_command_t::ADVANCE;
+    command.value = value;
+    const auto bytes = engine::encoded(command);
+    inbox.receive("r/move", bytes.data(), bytes.size());
+  };
+  const auto applied = [&](int64_t step) {
+    batch_.applied_count = 0;
+    inbox.apply(robots_, faults_, step, batch_);
+    return batch_.applied_count;
+  };
+  moved(7, 1.0);
+  moved(7, 1.0);
+  EXPECT_EQ(applied(0), 1);
+  moved(7, 1.0);  // late
+  EXPECT_EQ(applied(1), 0);
+  moved(8, 1.0);
+  moved(8, 2.0);  // another one, though its number is not
+  EXPECT_EQ(applied(2), 2);
+  const auto stop = velocity(0.0);
+  inbox.receive("r/velocity", stop.data(), stop.size());
+  moved(8, 2.0);  // after another command it is meant
+  EXPECT_EQ(applied(3), 2);
+  EXPECT_EQ(inbox.refused(), 0u);
+}
+
 TEST_F(InboxTest, ManyThreads) {
   std::atomic<int> kept{0};
   std::vector<std::thread> threads;

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import logging
 import math
 import threading
 import time
@@ -13,19 +12,22 @@ from functools import partial
 from . import arrivals
 from .callbacks import Callbacks, Subscription
 from .errors import RuedoError
-from .stack import place_in_callback
 from .transport import Transport
 
 Handler = Callable[[bytes], None]
 _LEND_SECONDS = 0.02
-_LONG_SECONDS = 5.0  # for a handler that is waited for
+_CATCH_UP_SECONDS, _LOOK_SECONDS = 0.05, 0.0002
+_TURN_SECONDS = 0.1
 _LARGEST = 4 << 20  # bytes of a message: what a server takes from a client
 _receives_for = threading.local()  # .bus: the one that this thread receives for, or None
-log = logging.getLogger("ruedo")
 
 
 def _nothing(arrived: arrivals.Arrived) -> None:
     pass
+
+
+def _as_usual() -> float:
+    return _TURN_SECONDS
 
 
 class Bus:
@@ -39,6 +41,8 @@ class Bus:
         self._collectors: dict[str, Callable[[tuple[str, bytes]], object]] = {}
         # Told first of what came at once; for a client that collects.
         self.on_arrived: Callable[[arrivals.Arrived], object] = _nothing
+        # What the receiving thread does each time before it waits; returns for how long, s.
+        self.before_turn: Callable[[], float] = _as_usual
         self._lock = threading.Lock()
         self._turn = threading.Lock()  # to receive
         self._lent_until = (
@@ -77,7 +81,7 @@ class Bus:
 
     @property
     def handling(self) -> bool:
-        """Whether this thread is in a handler of it: while that lasts, nothing is received."""
+        """Whether this thread is in a handler of it."""
         return getattr(_receives_for, "bus", None) is self
 
     @property
@@ -98,24 +102,23 @@ class Bus:
         if not self._closed.is_set():
             self._transport.publish(channel, data)
 
-    def close(self, patience: float | None = None) -> None:
-        """patience: s of real time for the handler that runs to return; None for ever. One that
-        takes long is named."""
+    def close(self, patient: bool = True) -> None:
+        """patient: it returns when nothing is received any more."""
         self._closed.set()
         self._transport.close()
-        if patience == 0.0 or not self._thread.is_alive():
-            return
-        self._thread.join(_LONG_SECONDS if patience is None else patience)
-        place = place_in_callback(self._thread) if self._thread.is_alive() else ""
-        if place:
-            log.warning(
-                "a callback has not returned for %g s, at %s: %s",
-                _LONG_SECONDS if patience is None else patience,
-                place,
-                "close() waits for it" if patience is None else "the program ends without it",
-            )
-        if patience is None:
+        if patient and not self.handling and self._thread.is_alive():
             self._thread.join()
+
+    def catch_up(self) -> None:
+        """Returns when what waits now was handled, or after a moment: more may come all the
+        time."""
+        if self.handling:
+            return
+        deadline = time.monotonic() + _CATCH_UP_SECONDS
+        while (self._transport.busy or self._transport.has_news()) and not self._closed.is_set():
+            if time.monotonic() >= deadline:
+                break
+            time.sleep(_LOOK_SECONDS)
 
     def _left(self, channel: str) -> None:
         """A handler of the channel was taken back."""
@@ -154,7 +157,7 @@ class Bus:
         while not self._closed.is_set():
             with self._turn:
                 if time.monotonic() >= self._lent_until:
-                    self._handle(0.1)
+                    self._handle(self.before_turn())
             lent = self._lent_until - time.monotonic()
             if lent > 0.0:
                 self._closed.wait(min(lent, _LEND_SECONDS))

@@ -12,20 +12,28 @@ _MOST_AHEAD = 1_000_000  # us: ticks come ten times a second
 class Clock:
     """Sim time, and how long the server has been silent. Safe to use from any thread."""
 
-    def __init__(self) -> None:
+    def __init__(self, woken: Callable[[int, tuple[int, ...]], object]):
+        """woken: called with the sim time at which threads are woken, and with those."""
+        self._woken = woken
         self.utime = 0  # us, of the newest message
         self._last_sign = time.monotonic()
         self._news = threading.Condition()
-        self._sleepers = 0
+        self._sleepers: list[_Sleeper] = []
 
     def note(self, utime: int) -> None:
         """A message of that time came."""
-        if utime > self.utime:
+        before = self.utime
+        if utime > before:
             self.utime = utime
         self._last_sign = time.monotonic()
         if self._sleepers:  # else a lock for each tick, of which a step() may bring hundreds
             with self._news:
-                self._news.notify_all()
+                for sleeper in self._sleepers:
+                    sleeper.left -= max(0, utime - before)
+                woken = tuple(one.thread for one in self._sleepers if one.left <= 0)
+                if woken:
+                    self._woken(utime, woken)
+                    self._news.notify_all()
 
     def is_far_ahead(self, utime: int) -> bool:
         """Of a time that no message of this run has yet: it was false."""
@@ -51,15 +59,17 @@ class Clock:
     def sleep(self, duration: int, check: Callable[[], None]) -> None:
         """duration: us. check: called meanwhile, every 0.5 s at least; what it raises ends the
         waiting."""
+        sleeper = _Sleeper(threading.get_ident(), duration)
         with self._news:
-            self._sleepers += 1
-            before = self.utime
+            self._sleepers.append(sleeper)
             try:
-                while duration > 0:
+                while sleeper.left > 0:
                     self._news.wait(0.5)
                     check()
-                    now = self.utime
-                    duration -= max(0, now - before)  # time may be set back
-                    before = now
             finally:
-                self._sleepers -= 1
+                self._sleepers.remove(sleeper)
+
+
+class _Sleeper:
+    def __init__(self, thread: int, left: int):
+        self.thread, self.left = thread, left  # us of sim time, which may be set back

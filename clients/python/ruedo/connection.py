@@ -18,12 +18,14 @@ from typing import Any, Protocol
 from . import lcmtypes
 from .arguments import shown
 from .bus import Bus
+from .callback_queue import CallbackQueue
 from .callbacks import Callbacks, Subscription
 from .clock import Clock
 from .control import REQUEST_CHANNEL, Session
 from .errors import NoServer, RuedoError, UnknownName
 from .lockstep import Stepper
 from .motion import Drivers
+from .progress import Progress
 from .run_watch import RunWatch
 from .stack import is_in_another_call
 from .stream import Streams
@@ -36,9 +38,10 @@ _LOOK_SECONDS = 1.0  # a stopped server keeps the connection of each look
 _END_SECONDS = 10.0  # for another thread that closes
 _CALLBACK_SECONDS = 5.0  # for a callback, at the program's end
 _FAULT_SECONDS = 1.0
+_LISTEN_SECONDS = 0.2
 _CLOSED = "this simulation was closed"
 _FORKED = "this simulation is the parent process's: connect() again after a fork"
-_TICK = struct.Struct(">8sqq")  # fingerprint, utime, run_id
+_TICK = struct.Struct(">8sqqi")  # fingerprint, utime, run_id, epoch
 _TICK_FINGERPRINT = lcmtypes.tick_t._get_packed_fingerprint()
 log = logging.getLogger("ruedo")
 
@@ -50,6 +53,12 @@ class PrivateServer(Protocol):
         """Why it is gone; None while it runs."""
 
     def end(self) -> None: ...
+
+    def tell(self, line: str) -> None:
+        """How far this client has come, which may be lost."""
+
+    def warnings(self) -> list[str]:
+        """What it has said since the last call."""
 
     def forked(self) -> None:
         """In a fork's child: the server is the parent's."""
@@ -72,7 +81,9 @@ class Connection:
     ):
         self.url = url
         self.closed = ""  # why: what every call says
-        self.clock = Clock()
+        self.progress = Progress()
+        self.clock = Clock(self.progress.use)
+        self.callbacks = CallbackQueue()
         self.session = Session(self, name)
         self.stepper = Stepper(self)
         self.streams = Streams()
@@ -93,6 +104,9 @@ class Connection:
         self._closing = threading.Lock()  # whoever has it closes
         self._ended = threading.Event()  # all that close() ends
         self.bus = Bus(transport or open_transport(url))
+        self.bus.before_turn = self._before_turn
+        self._ends = threading.local()  # .utime: of the last motion that the thread awaited
+        self._listen_at = 0.0  # to the server's warnings, s of time.monotonic()
         atexit.register(self._close_at_end)
         _all.add(self)
 
@@ -103,6 +117,9 @@ class Connection:
         self.bus.subscribe("ruedo/reply", self.session.receive)
         self.bus.start()
         self._await_info(timeout)
+        self.callbacks.may_drop = not (self._server or self.in_lockstep)
+        if self._server and not self.in_lockstep:
+            self.progress.begin(self._server.tell)
         self._ids = _ids_from(self.session.name, self.info)
 
     def close(self) -> None:
@@ -122,7 +139,7 @@ class Connection:
         """patience: s of real time for the callback that runs; None for ever."""
         if self.closed == _FORKED:
             return
-        may_wait = not (self.bus.handling or is_in_another_call())
+        may_wait = not (self.is_called_back or is_in_another_call())
         if not self._closing.acquire(blocking=False):
             if may_wait:
                 self._ended.wait(_END_SECONDS)
@@ -154,7 +171,8 @@ class Connection:
             ends.callback(atexit.unregister, self._close_at_end)
             if self._server:
                 ends.callback(self._server.end)
-            ends.callback(self.bus.close, patience)
+            ends.callback(self.callbacks.close, patience)
+            ends.callback(self.bus.close, patience != 0.0)
             self.drivers.wake()
             if self._known:
                 self.session.leave()
@@ -164,15 +182,20 @@ class Connection:
             raise NoServer(self.closed)
 
     def check_may_wait(self) -> None:
-        """Before waiting for what the server sends. Raises NoServer; RuedoError in a callback,
-        which is what would receive it.
+        """Before waiting for what the server sends. Raises NoServer; RuedoError in a callback:
+        the server may wait for that.
         """
         self.check_open()
-        if self.bus.handling:
+        if self.is_called_back:
             raise RuedoError(
-                "a callback cannot wait for the server, since nothing is received until it returns: "
-                "make this call in another thread"
+                "a callback cannot wait for the server, which may wait for it to return: make this "
+                "call in another thread"
             )
+
+    @property
+    def is_called_back(self) -> bool:
+        """Whether this thread is in a callback."""
+        return self.callbacks.runs_here or self.bus.handling
 
     def check_server(self) -> None:
         """Raises NoServer when the private server ended, or nothing was heard for long; a server
@@ -200,7 +223,7 @@ class Connection:
             return f"nothing at all was heard from the server for {silence:.1f} s"
         if self.info.paused:
             return "the simulation is paused"
-        if self.info.features >> lcmtypes.request_t.GRANT & 1:
+        if self.in_lockstep:
             return (
                 "in lockstep it stands still between calls of step(), whose observations have the "
                 f"samples, as in sim.step(20).latest(robot.lrf); it is at {self.clock.utime * 1e-6:.2f} s"
@@ -232,6 +255,11 @@ class Connection:
     def version(self) -> str:
         """Of the server."""
         return self.info.version
+
+    @property
+    def in_lockstep(self) -> bool:
+        """Whether the clients say how far the run goes."""
+        return bool(self.info.features >> lcmtypes.request_t.GRANT & 1)
 
     def robot_info(self, name: str) -> Any:
         """Raises UnknownName."""
@@ -359,12 +387,12 @@ class Connection:
         self.streams.forget()
         log.warning("another run has begun at %s: commands are not repeated into it", self.url)
         if not self.closed:
-            self._new_run.call()
+            self.callbacks.put(self._new_run.call)
 
     def _on_tick(self, data: bytes) -> None:
         if len(data) < _TICK.size:
             return
-        fingerprint, utime, run_id = _TICK.unpack_from(data)
+        fingerprint, utime, run_id, epoch = _TICK.unpack_from(data)
         known = self._known
         if fingerprint != _TICK_FINGERPRINT or known is None:
             return
@@ -375,7 +403,41 @@ class Connection:
         # Sim time may run a hundred times faster than real time: the watchdog is fed by its beat,
         # too.
         if self.drivers.repeating:  # else a call for each tick
-            self.drivers.repeat()
+            self.drivers.repeat_at(utime)
+        if self.progress.is_told:
+            self._note_progress(epoch, utime)
+
+    def note_use(self) -> None:
+        """This thread works with what is known now. A callback is waited for anyway."""
+        if not self.is_called_back:
+            self.progress.use(self.clock.utime)
+
+    def begin_after(self, utime: int) -> None:
+        """A motion ended then, and this thread knows: next() of any stream gives nothing older."""
+        self._ends.utime = utime
+
+    def not_before(self) -> int | None:
+        """us of sim time, which may have been reset since."""
+        utime: int | None = getattr(self._ends, "utime", None)
+        return None if utime is None else min(utime, self.clock.utime)
+
+    def _note_progress(self, epoch: int, utime: int) -> None:
+        """What was sent up to that time has come."""
+        if self.callbacks.is_idle:
+            self.progress.received(epoch, utime)
+        else:
+            self.callbacks.put(lambda: self.progress.received(epoch, utime))
+
+    def _before_turn(self) -> float:
+        """Returns for how long the receiving thread may wait, s."""
+        if self._server and time.monotonic() >= self._listen_at:
+            self._listen_at = time.monotonic() + _LISTEN_SECONDS
+            for warning in self._server.warnings():
+                log.warning("the server: %s", warning)
+        if not self.progress.in_use:
+            return 0.1
+        self.progress.say()
+        return 0.01
 
     def _forked(self) -> None:
         self.closed = _FORKED

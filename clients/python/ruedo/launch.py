@@ -7,6 +7,7 @@ PR_SET_PDEATHSIG does not.
 
 from __future__ import annotations
 
+import contextlib
 import math
 import os
 import shutil
@@ -22,10 +23,13 @@ from typing import IO, Any, Literal
 
 from . import arguments
 from .address import has_multicast_route, read_address
-from .errors import LaunchError, NoServer
+from .errors import LaunchError, NoServer, for_terminal
 from .simulation import Simulation
 from .stream_transport import is_served
 from .world import World
+
+_MOST_HEARD = 1 << 16  # bytes of warnings that are read at once
+_MOST_WARNED = 1000  # warnings, each of which is said once
 
 
 def find_ruedo() -> str:
@@ -273,20 +277,54 @@ class _Server:
         self._token = token
         self._said = ""  # by the end, its last lines
         self._output: IO[bytes] | None = None if verbose else tempfile.TemporaryFile()
+        self._heard = 0  # bytes of it that warnings() has read
+        self._warned: set[str] = set()
         try:
             # A session of its own: Ctrl-C in a terminal reaches the client alone, which may still
             # use the server.
             self._process = subprocess.Popen(
                 command,
                 stdin=subprocess.PIPE,
-                stdout=self._output,
-                stderr=subprocess.STDOUT if self._output else None,
+                stdout=subprocess.DEVNULL if self._output else None,
+                stderr=self._output,
                 start_new_session=True,
             )
         except OSError as error:
             if token:
                 token.close()
             raise LaunchError(f"{command[0]} cannot be started: {error.strerror}") from None
+        assert self._process.stdin
+        os.set_blocking(self._process.stdin.fileno(), False)
+        self.tell(f"0 0 {2**63 - 1}\n")  # the run waits at its beginning until this client joins
+
+    def tell(self, line: str) -> None:
+        """How far this client has come (progress.py). Where the pipe is full, a later line says it
+        all."""
+        pipe = self._process.stdin
+        if pipe and not pipe.closed:
+            with contextlib.suppress(OSError, ValueError):
+                os.write(pipe.fileno(), line.encode())
+
+    def warnings(self) -> list[str]:
+        """What the server has warned of since the last call, each once."""
+        output = self._output
+        if output is None:
+            return []
+        try:
+            said = os.pread(output.fileno(), _MOST_HEARD, self._heard)
+        except (OSError, ValueError):  # end() has closed it
+            return []
+        lines, newline, _ = said.rpartition(b"\n")
+        self._heard += len(lines) + len(newline)
+        news = [
+            for_terminal(line)
+            for line in lines.decode(errors="replace").splitlines()
+            if line and not line.startswith("ruedo: info:")
+        ]
+        new = [line for line in dict.fromkeys(news) if line not in self._warned]
+        if len(self._warned) < _MOST_WARNED:
+            self._warned.update(new)
+        return new
 
     def ended(self) -> str | None:
         """How the server ended, with the last lines it printed; None while it runs."""
@@ -337,6 +375,6 @@ class _Server:
     def _last_lines(self) -> str:
         if self._output is None:
             return self._said
-        end = self._output.seek(0, os.SEEK_END)
-        self._output.seek(max(0, end - 4000))
-        return "\n".join(self._output.read().decode(errors="replace").strip().splitlines()[-12:])
+        end = os.fstat(self._output.fileno()).st_size
+        last = os.pread(self._output.fileno(), 4000, max(0, end - 4000))
+        return "\n".join(last.decode(errors="replace").strip().splitlines()[-12:])

@@ -370,7 +370,10 @@ class Stepper:
             return
         first = _LAST_REPEAT if self._connection.bus.loses_nothing else _FIRST_REPEAT
         repeat, deadline, silences = first, time.monotonic() + timeout, 0
-        with self._connection.bus.receiving() as receive:
+        with (
+            self._connection.callbacks.in_this_thread(),
+            self._connection.bus.receiving() as receive,
+        ):
             while True:
                 had, quiet_at = self._have, time.monotonic() + repeat
                 heard = True

@@ -21,10 +21,12 @@ if TYPE_CHECKING:
 
 log = logging.getLogger("ruedo")
 
-# A primitive that no status has shown after so many statuses and seconds was lost, or replaced at
-# once.
+# A primitive goes out again until a status shows it: messages may be lost, and the server takes
+# each once. One that no status has shown after so many statuses and seconds reaches nobody, or was
+# replaced at once.
+_FIRST_AGAIN, _LAST_AGAIN = 0.1, 1.0  # s of real time
 _UNSEEN_STATUSES = 20
-_UNSEEN_SECONDS = 1.0
+_UNSEEN_SECONDS = 5.0
 
 
 class Motion:
@@ -41,12 +43,16 @@ class Motion:
         self.blocked_by = ""  # the body that blocked it
         self._connection, self._robot = connection, robot
         self._unseen = 0
+        self._message = ("", b"")  # its channel and command
+        self._again = _FIRST_AGAIN
+        self._again_at = 0.0  # s of time.monotonic()
         self._utime = (
             -1
         )  # of the newest status; before it is another run's, or of a reset that info will tell of
         self._shown = -1  # of the newest status that shows it
         self._sent = time.monotonic()
         self._news = threading.Condition()
+        self._waiting: list[int] = []  # threads
 
     @property
     def done(self) -> bool:
@@ -57,17 +63,13 @@ class Motion:
         """Waits until it is done, at most timeout seconds of real time. Raises MotionError when it
         ended early or was refused, Timeout when it still runs; the robot goes on then."""
         deadline = None if timeout is None else time.monotonic() + timeout
+        me = threading.get_ident()
         with self._news:
-            while not self.done:
-                if deadline is not None and time.monotonic() >= deadline:
-                    raise Timeout(
-                        f"{self._robot}: {self.kind} was not done within {timeout:g} s "
-                        f"({self.remaining:.3f} remain)"
-                    )
-                self._connection.check_may_wait()
-                left = 0.5 if deadline is None else max(0.0, min(0.5, deadline - time.monotonic()))
-                self._news.wait(left)
-                self._connection.check_server()
+            self._waiting.append(me)
+            try:
+                self._await_end(deadline, timeout)
+            finally:
+                self._waiting.remove(me)
         if self.state != "done":
             raise MotionError(
                 f"{self._robot}: {self.kind} {'was refused' if self.state == 'refused' else 'ended'}: "
@@ -75,6 +77,22 @@ class Motion:
                 self.reason,
             )
         return self
+
+    def _await_end(self, deadline: float | None, timeout: float | None) -> None:
+        """With the lock held."""
+        if not self.done:
+            self._connection.progress.wait()
+        while not self.done:
+            if deadline is not None and time.monotonic() >= deadline:
+                raise Timeout(
+                    f"{self._robot}: {self.kind} was not done within {timeout:g} s "
+                    f"({self.remaining:.3f} remain)"
+                )
+            self._connection.check_may_wait()
+            left = 0.5 if deadline is None else max(0.0, min(0.5, deadline - time.monotonic()))
+            self._news.wait(left)
+            self._connection.check_server()
+        self._connection.begin_after(self._utime)
 
     def _why(self) -> str:
         return f"{self.reason} by {self.blocked_by}" if self.blocked_by else self.reason
@@ -105,7 +123,17 @@ class Motion:
                     and time.monotonic() - self._sent >= _UNSEEN_SECONDS
                 ):
                     self.state, self.reason = "ended", "lost"
+            if self.done and self._waiting:
+                self._connection.progress.use(status.utime, tuple(self._waiting))
             self._news.notify_all()
+
+    def _due_again(self, now: float) -> bool:
+        """Whether it is to be sent now."""
+        if self.state != "sent" or now < self._again_at:
+            return False
+        self._again_at = now + self._again
+        self._again = min(2.0 * self._again, _LAST_AGAIN)
+        return True
 
     def _end(self, reason: str) -> None:
         with self._news:
@@ -127,6 +155,7 @@ class Driver:
         self._connection, self._robot = connection, robot
         self._lock = threading.Lock()
         self._held: tuple[str, bytes] | None = None
+        self._held_at = 0  # us, when it last went out by sim time
         self._motions: list[Motion] = []
         self._statuses: Subscription | None = None
         self._collisions: Subscription | None = None
@@ -145,7 +174,20 @@ class Driver:
         self._connection.drivers.keep_repeating(self)
 
     def repeat(self) -> None:
+        """What is held, and the newest primitive where no status has shown it: by real time."""
         with self._lock:
+            newest = self._motions[-1] if self._motions else None
+            if self._held:
+                self._connection.bus.publish(*self._held)
+            elif newest and newest._due_again(time.monotonic()):
+                self._connection.bus.publish(*newest._message)
+
+    def repeat_at(self, utime: int) -> None:
+        """What is held, by sim time."""
+        if self._held is None or 0 <= utime - self._held_at < 1e6 * self.period():
+            return
+        with self._lock:
+            self._held_at = utime
             if self._held:
                 self._connection.bus.publish(*self._held)
 
@@ -160,7 +202,10 @@ class Driver:
         with self._lock:
             self._held = None  # a repetition after this would replace the primitive
             self._motions = [m for m in self._motions if not m.done] + [motion]
-            self._connection.bus.publish(channel, command.encode())
+            motion._message = (channel, command.encode())
+            motion._due_again(time.monotonic())
+            self._connection.bus.publish(*motion._message)
+        self._connection.drivers.keep_repeating(self)
         return motion
 
     def end(self, reason: str) -> None:
@@ -192,10 +237,10 @@ class Driver:
                 raise UnknownName(f"{self._robot.name} is gone: {self._ended}")
             if self._statuses is None:
                 try:  # of a step they come before the status
-                    self._collisions = self._robot.collisions.on_sample(self._on_collisions)
+                    self._collisions = self._robot.collisions.on_arrival(self._on_collisions)
                 except UnknownName:
                     pass  # switched off: a motion that is blocked does not know by what
-                self._statuses = self._robot.motion.on_sample(self._on_status)
+                self._statuses = self._robot.motion.on_arrival(self._on_status)
 
     def _on_collisions(self, collisions: Collisions) -> None:
         with self._lock:
@@ -234,7 +279,7 @@ class Drivers:
         self._connection = connection
         self._lock = threading.Lock()
         self._all: dict[str, Driver] = {}
-        self.repeating: set[Driver] = set()  # those that were told to hold a command
+        self.repeating: set[Driver] = set()  # those that were told something
         self._wake = threading.Condition()
         self._thread: threading.Thread | None = None
 
@@ -256,6 +301,11 @@ class Drivers:
     def repeat(self) -> None:
         for driver in tuple(self.repeating):
             driver.repeat()
+
+    def repeat_at(self, utime: int) -> None:
+        """In the time of a simulation that runs faster than real time."""
+        for driver in tuple(self.repeating):
+            driver.repeat_at(utime)
 
     def wake(self) -> None:
         """The thread sees whether the connection was closed."""

@@ -22,7 +22,7 @@ import lcm
 from . import arrivals
 from .address import Address
 from .errors import NoServer
-from .stream_transport import Receiver
+from .stream_transport import Receiver, is_readable
 
 _SHORT, _FRAGMENT = b"LC02", b"LC03"
 _SHORT_HEAD = 8
@@ -67,6 +67,7 @@ class MulticastTransport:
 
     loses_nothing = False
     is_connected = True
+    busy = False
 
     def __init__(self, address: Address):
         try:
@@ -104,13 +105,20 @@ class MulticastTransport:
             if not self._poll.poll(math.ceil(left * 1e3)):
                 break
             with contextlib.suppress(OSError):  # there is no more, or it was closed
+                self.busy = True
                 for _ in range(_MOST_AT_ONCE):
                     self._take(*self._socket.recvfrom_into(self._buffer), arrived)
             if left == 0.0:
                 break
-        if arrived:
-            receiver(arrived)
+        try:
+            if arrived:
+                receiver(arrived)
+        finally:
+            self.busy = False
         return bool(arrived)
+
+    def has_news(self) -> bool:
+        return is_readable(self._socket)
 
     def close(self) -> None:
         self._lcm = None

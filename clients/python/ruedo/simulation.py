@@ -118,7 +118,7 @@ class Simulation:
             return self._robots.setdefault(name, Robot(self._connection, name))
 
     def on_new_run(self, callback: Callable[[Simulation], None]) -> Subscription:
-        """Calls callback(simulation) in the receiving thread when another server, or the same one
+        """Calls callback(simulation), in the thread of the callbacks, when another server, or the same one
         restarted, answers at this address. Commands are not repeated into the new run, and
         primitives under way have ended."""
         return self._connection.on_new_run(lambda: callback(self))
@@ -170,7 +170,7 @@ class Simulation:
     @property
     def lockstep(self) -> bool:
         """Whether the server runs in lockstep."""
-        return bool(self._info.features >> lcmtypes.request_t.GRANT & 1)
+        return self._connection.in_lockstep
 
     def set_rate(self, rate: float) -> None:
         """Sim time per real time, > 0; math.inf: as fast as it goes."""

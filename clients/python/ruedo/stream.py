@@ -1,7 +1,12 @@
-"""A stream of samples from one channel: the latest, the next, or each as it comes."""
+"""A stream of samples from one channel: the latest, the next, or each as it comes.
+
+The receiving thread keeps the newest message as it came. It is decoded by who asks for it, and in
+the thread of the callbacks.
+"""
 
 from __future__ import annotations
 
+import struct
 import threading
 import time
 from collections.abc import Callable
@@ -18,6 +23,10 @@ if TYPE_CHECKING:
     from .world_info import WorldInfo
 
 T = TypeVar("T")
+
+_UTIME = struct.Struct(">q")
+_UTIME_AT = 8  # behind the fingerprint, in all of the server's own types
+_MOST_UNEVEN = 0.25  # periods: gaps of samples that are taken at whole steps tell no more than that
 
 
 class Form(NamedTuple):
@@ -47,7 +56,14 @@ class Reader(Generic[T]):
 
     def __init__(self, stream: Stream[T]):
         self._stream = stream
-        self._seen = 0  # of the samples received, the newest that a call has returned
+        self._seen = 0  # of the samples of the stream, the newest that a call has returned
+        self._skipped = 0
+
+    @property
+    def dropped(self) -> int:
+        """How many samples there were between those that this reader got: newer ones had come, or
+        they were lost on the way."""
+        return self._skipped
 
     def latest(self, timeout: float = 5.0) -> T:
         """The newest sample. Before the first one it waits, at most timeout seconds of real
@@ -57,9 +73,35 @@ class Reader(Generic[T]):
 
     def next(self, timeout: float = 5.0) -> T:
         """The newest sample that neither latest() nor next() has returned yet; waits for one, at
-        most timeout seconds of real time. A reader slower than the rate skips samples; on_sample()
-        skips none."""
+        most timeout seconds of real time. After wait() of a motion it is one from its end or later.
+        A reader slower than the rate skips samples, which `dropped` counts; on_sample() skips
+        none."""
         return self._stream._sample_for(self, True, timeout)
+
+
+class _Arrival:
+    """A message of a stream."""
+
+    __slots__ = ("_sample", "_stream", "data", "utime")
+
+    def __init__(self, stream: Stream[Any], data: bytes, utime: int | None):
+        self._stream, self.data = stream, data
+        self.utime = utime  # us; None: its type does not say
+        self._sample: Any = None
+
+    def sample(self) -> Any:
+        """Decoded once; by two threads at most twice. Raises TypeMismatch."""
+        if self._sample is None:
+            self._sample = self._stream._sample_of(self.data)
+        return self._sample
+
+    def call_back(self) -> None:
+        try:
+            sample = self.sample()
+        except RuedoError as error:
+            self._stream._fail(error)
+        else:
+            self._stream._callbacks.call(sample)
 
 
 class Stream(Reader[T]):
@@ -86,21 +128,43 @@ class Stream(Reader[T]):
         self._fingerprint = fingerprint  # as ruedo/info said first
         self._news = threading.Condition()
         self._source: Subscription | None = None
-        self._sample: T | None = None
-        self._count = 0  # samples received
+        self._newest: _Arrival | None = None
+        self._count = 0  # samples that came or were lost
+        self._last_utime: int | None = None  # us
+        self._waiting: list[int] = []  # threads that wait for a sample
         self._fault: RuedoError | None = None
+        self._arrivals = Callbacks(channel)  # this package's own
         self._callbacks = Callbacks(channel)
+        self._missed = 0  # by the callbacks
+        self._has_utime = type in samples.CONVERSIONS
+        # s; 0: what is missing cannot be told.
+        even = rate > 0.0 and connection.info.step_us * 1e-6 * rate <= _MOST_UNEVEN
+        self._period = 1.0 / rate if even else 0.0
+
+    @property
+    def dropped(self) -> int:
+        """How many samples latest() and next() have skipped, since newer ones had come, or were
+        lost on the way; and how many a callback did not get, which was slower than they came."""
+        return self._skipped + self._missed
 
     def reader(self) -> Reader[T]:
         """A reader that has seen nothing yet."""
         return Reader(self)
 
     def on_sample(self, callback: Callable[[T], None]) -> Subscription:
-        """Calls callback(sample) in the receiving thread for every sample from now on, until
-        close() of what it returns (or of the simulation). It must be quick, and cannot wait for
-        other samples or replies: such a call raises RuedoError."""
+        """Calls callback(sample) for every sample from now on, until close() of what it returns (or
+        of the simulation). All callbacks run in one thread of their own, one at a time, in the
+        order in which the samples came. A server that launch() started waits for them; with
+        another one, and more than a megabyte of samples behind, they get the newest of each channel
+        (`dropped`). A callback cannot wait for other samples or replies: such a call raises
+        RuedoError."""
         self._subscribe()
         return self._callbacks.add(callback)
+
+    def on_arrival(self, callback: Callable[[T], None]) -> Subscription:
+        """The same in the receiving thread, for what is this package's own."""
+        self._subscribe()
+        return self._arrivals.add(callback)
 
     def _subscribe(self) -> None:
         self._connection.check_open()
@@ -155,7 +219,13 @@ class Stream(Reader[T]):
     def _forget(self) -> None:
         """What came is of a run that has ended."""
         with self._news:
-            self._sample = self._fault = None
+            self._newest = self._fault = self._last_utime = None
+
+    def _fail(self, error: RuedoError) -> None:
+        """Whatever came, the receiving thread lives."""
+        with self._news:
+            self._fault = error
+            self._news.notify_all()
 
     def _mismatch(self, fingerprint: int, expected: bytes) -> TypeMismatch:
         ours = int.from_bytes(expected, "big")
@@ -172,23 +242,40 @@ class Stream(Reader[T]):
         )
 
     def _receive(self, data: bytes) -> None:
-        if self._connection.closed or self._connection.in_doubt:
+        connection = self._connection
+        if connection.closed or connection.in_doubt:
             return
+        form = self._form()
+        if form.fingerprint and data[:8] != form.fingerprint:
+            self._fail(self._mismatch(int.from_bytes(data[:8], "big"), form.fingerprint))
+            return
+        timed = self._has_utime and len(data) >= _UTIME_AT + 8
+        utime = _UTIME.unpack_from(data, _UTIME_AT)[0] if timed else None
+        arrival = _Arrival(self, data, utime)
         try:
-            sample = self._sample_of(data)
-        except RuedoError as error:  # whatever came, the receiving thread lives
-            with self._news:
-                self._fault = error
-                self._news.notify_all()
+            sample = arrival.sample() if self._arrivals else None
+        except RuedoError as error:
+            self._fail(error)
             return
+        if utime is not None:
+            connection.clock.note(utime)
         with self._news:
-            self._sample, self._fault = sample, None
-            self._count += 1
+            self._newest, self._fault = arrival, None
+            self._count += 1 + self._lost_before(utime)
+            if self._waiting:
+                connection.progress.use(connection.clock.utime, tuple(self._waiting))
             self._news.notify_all()
-        utime = getattr(sample, "utime", None)  # a type of a user's own may have none
-        if isinstance(utime, int):
-            self._connection.clock.note(utime)
-        self._callbacks.call(sample)
+        self._arrivals.call(sample)
+        if self._callbacks:
+            for stream in connection.callbacks.put(arrival.call_back, self, len(data)):
+                stream._missed += 1
+
+    def _lost_before(self, utime: int | None) -> int:
+        """How many samples are missing since the last one."""
+        last, self._last_utime = self._last_utime, utime
+        if last is None or utime is None or not self._period or utime <= last:
+            return 0
+        return max(0, round((utime - last) * 1e-6 / self._period) - 1)
 
     def _sample_for(self, reader: Reader[T], a_new_one: bool, timeout: float) -> T:
         if isinstance(timeout, bool) or not isinstance(timeout, (int, float)):
@@ -197,9 +284,46 @@ class Stream(Reader[T]):
                 "latest(device) and all(device) are the samples"
             )
         self._subscribe()
-        deadline = time.monotonic() + timeout
+        connection = self._connection
+        connection.note_use()
+        connection.bus.catch_up()
+        not_before = connection.not_before() if a_new_one else None
         with self._news:
-            while self._sample is None or (a_new_one and reader._seen == self._count):
+            arrival = self._newest
+            if not self._serves(reader, a_new_one, not_before):
+                arrival = self._await(reader, a_new_one, not_before, timeout)
+            assert arrival is not None
+            if reader._seen:
+                reader._skipped += max(0, self._count - reader._seen - 1)
+            reader._seen = self._count
+        connection.note_use()
+        try:
+            sample: T = arrival.sample()
+            return sample
+        except RuedoError:
+            with self._news:
+                if self._newest is arrival:
+                    self._newest = None
+            raise
+
+    def _serves(self, reader: Reader[T], a_new_one: bool, not_before: int | None) -> bool:
+        """Whether the newest sample is what the reader wants. With the lock held."""
+        newest = self._newest
+        if newest is None or not a_new_one:
+            return newest is not None
+        if reader._seen == self._count:
+            return False
+        return not_before is None or newest.utime is None or newest.utime >= not_before
+
+    def _await(
+        self, reader: Reader[T], a_new_one: bool, not_before: int | None, timeout: float
+    ) -> _Arrival | None:
+        """With the lock held."""
+        deadline, me = time.monotonic() + timeout, threading.get_ident()
+        self._connection.progress.wait()
+        self._waiting.append(me)
+        try:
+            while not self._serves(reader, a_new_one, not_before):
                 if self._fault:
                     fault, self._fault = self._fault, None
                     raise fault
@@ -211,8 +335,9 @@ class Stream(Reader[T]):
                     )
                 self._news.wait(min(left, 0.5))
                 self._connection.check_server()
-            reader._seen = self._count
-            return self._sample
+            return self._newest
+        finally:
+            self._waiting.remove(me)
 
     def __repr__(self) -> str:
         return f"<{type(self).__name__} {self.channel} ({self.type})>"

@@ -82,12 +82,23 @@ def is_served(address: Address) -> bool:
     return True
 
 
+def is_readable(end: socket.socket) -> bool:
+    """Any thread: a poll object is one thread's."""
+    poll = select.poll()
+    try:
+        poll.register(end, select.POLLIN)
+        return bool(poll.poll(0))
+    except (OSError, ValueError):  # it was closed
+        return False
+
+
 class StreamTransport:
     """Connects again when the server comes back."""
 
     def __init__(self, address: Address):
         """Raises OSError when nobody serves there."""
         self.loses_nothing = address.scheme == "unix"
+        self.busy = False
         self._address = address
         self._lock = threading.Lock()  # of what is sent, and of the connection
         self._channels: set[str] = set()
@@ -116,6 +127,10 @@ class StreamTransport:
             if not self._closed:
                 self._send(_named(_PUBLISH, channel) + _SIZE.pack(len(data)) + data)
 
+    def has_news(self) -> bool:
+        connection = self._socket
+        return connection is not None and is_readable(connection)
+
     def receive(self, seconds: float, receiver: Receiver) -> bool:
         connection = self._socket
         if connection is None:  # those who wait find out by their timeouts
@@ -127,17 +142,20 @@ class StreamTransport:
         try:
             if not self._poll.poll(math.ceil(seconds * 1e3)):
                 return False
+            self.busy = True
             came = connection.recv(_CHUNK)
             arrived = self._taken_apart(came) if came else None
         except OSError:
             arrived = None
+        try:
+            if arrived:
+                receiver(arrived)
+        finally:
+            self.busy = False
         if arrived is None:
             with self._lock:
                 connection.close()
                 self._socket = None
-            return False
-        if arrived:
-            receiver(arrived)
         return bool(arrived)
 
     def close(self) -> None:

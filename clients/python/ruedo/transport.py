@@ -16,6 +16,7 @@ class Transport(Protocol):
     """
 
     loses_nothing: bool
+    busy: bool  # receive() has taken something, and its receiver has not seen all of it
 
     @property
     def is_connected(self) -> bool:
@@ -27,6 +28,9 @@ class Transport(Protocol):
     def unsubscribe(self, channel: str) -> None: ...
 
     def publish(self, channel: str, data: bytes) -> None: ...
+
+    def has_news(self) -> bool:
+        """Whether something waits for receive()."""
 
     def receive(self, seconds: float, receiver: Receiver) -> bool:
         """Hands over what has come, or waits for it at most so long and returns False."""

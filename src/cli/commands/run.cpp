@@ -8,6 +8,7 @@
 #include <filesystem>
 #include <functional>
 #include <list>
+#include <optional>
 #include <system_error>
 #include <thread>
 
@@ -23,6 +24,7 @@
 #include "cli/support/commands.h"
 #include "cli/support/extensions.h"
 #include "cli/support/find_all.h"
+#include "cli/support/launcher_pipe.h"
 #include "cli/support/listing.h"
 #include "cli/support/progress_line.h"
 #include "cli/support/range.h"
@@ -43,20 +45,6 @@ namespace ruedo::cli {
 namespace {
 
 using foxglove::FoxgloveServer;
-
-// Ends the run, as SIGTERM would, when standard input ends: the client that started this server
-// holds the other end of the pipe, and the kernel closes it however that client ends. The thread
-// waits in read() for as long as the process lives.
-void watch_stdin() {
-  std::thread([] {
-    char bytes[256];
-    ssize_t count = 0;
-    do {
-      count = read(STDIN_FILENO, bytes, sizeof bytes);
-    } while (count > 0 || (count < 0 && errno == EINTR));
-    kill(getpid(), SIGTERM);
-  }).detach();
-}
 
 // What was made for this run alone: who made it may have been killed by then.
 class Temporary {
@@ -211,6 +199,12 @@ std::shared_ptr<const world::WorldModel> load_to_serve(const RunArguments& argum
   return world;
 }
 
+// As after SIGTERM: the log is closed properly.
+void stop_soon(run::Run& server, bool no_state_comes_by_itself) {
+  server.on_state([&server](const Snapshot&) { server.stop(); });
+  if (no_state_comes_by_itself) server.stop();
+}
+
 }  // namespace
 
 int run_world(const RunArguments& arguments) {
@@ -223,7 +217,8 @@ int run_world(const RunArguments& arguments) {
                   {arguments.record, arguments.snapshots, socket_of(arguments.lcm)});
   SignalThread signals;
   std::signal(SIGPIPE, SIG_IGN);  // a closed pipe is reported by write()
-  if (arguments.watch_stdin) watch_stdin();
+  std::optional<LauncherPipe> launcher;
+  if (arguments.watch_stdin) launcher.emplace();
   const engine::ThreadLimit limit(arguments.threads);
   if (arguments.strict) {
     if (const int code = strict_check(arguments.world); code != kGood) return code;
@@ -255,15 +250,12 @@ int run_world(const RunArguments& arguments) {
     if (node && !arguments.quiet) node->print();
     if (foxglove) foxglove->print();
   });
-  if (!is_read)
-    server.on_state([&server](const Snapshot&) {
-      server.stop();
-    });  // as after SIGTERM: the log is closed properly
-  if (!is_read && arguments.lockstep > 0) server.stop();  // no state comes by itself
+  if (!is_read) stop_soon(server, arguments.lockstep > 0);
   end_progress_line();
   StatusLine status(arguments.quiet);
   server.on_status([&](const run::Status& now) { status.draw(now); });
   const SignalThread::Serving serving(signals, server);
+  const LauncherPipe::Pacing pacing(launcher, server);
   if (node) node->wait_for_peers();
   try {
     server.run();

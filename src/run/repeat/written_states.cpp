@@ -143,7 +143,7 @@ void Run::begin_with_state() {
     if (edited_) edited_->begin(saved->put);
     repeating_.reset();
     publisher_.mute(false);
-    mode_->begin(stage(), changed_.step);
+    begin_mode(*mode_, changed_.step);
   }
   options_.repeat.clear();
   if (journal_) journal_->begin_with(header_, publisher_.base_us(), path, saved->journal);

@@ -145,7 +145,7 @@ Run::Outcome Run::reset_time(const request_t& request) {
     const std::lock_guard lock(simulation_mutex_);
     simulation_->reset_time(epoch_);
     as_made_ = false;
-    mode().begin(stage(), -1);
+    begin_mode(mode(), -1);
   }
   announce();
   let_go();

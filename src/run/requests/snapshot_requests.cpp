@@ -123,7 +123,7 @@ Outcome Run::restore_kept(const SavedState& saved, const std::string& path) {
     pacer_->go_on_from(changed_.step);
     publisher_.go_on_from(changed_, saved.sequences);
     if (edited_) edited_->begin(saved.put);
-    mode_->begin(stage(), changed_.step);
+    begin_mode(*mode_, changed_.step);
   }
   announce();
   journal_->begin_with(header_, publisher_.base_us(), path, saved.journal);

@@ -1,0 +1,92 @@
+"""How far a program has come in a run that it launched: the server waits for it there.
+
+A run at the highest rate takes a second of sim time in less than a millisecond. A program that
+looks at a sensor and then commands would act on a world that has gone on without it. So it tells
+its server what it has received, and from which moment on it works with what it knew then.
+"""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Callable
+
+_NEVER = 2**63 - 1
+# A program that was given a sample and then does something else for so long is not waited for.
+_PATIENCE_SECONDS = 0.5
+
+Tell = Callable[[str], object]
+
+
+class Progress:
+    """Safe to use from any thread. Until begin() no server waits for this program."""
+
+    def __init__(self) -> None:
+        self._tell: Tell | None = None
+        self._lock = threading.Lock()
+        self._epoch = 0
+        self._received = 0  # us of sim time
+        self._uses: dict[int, tuple[int, float]] = {}  # by thread: since when, us and s of time.monotonic()
+        self._told = ""
+
+    def begin(self, tell: Tell) -> None:
+        """tell: writes a line to the server, which may be lost; the next one says all that it
+        did."""
+        self._tell = tell
+
+    @property
+    def is_told(self) -> bool:
+        return self._tell is not None
+
+    @property
+    def in_use(self) -> bool:
+        """Whether it is to be told again soon: a thread works with what it was given."""
+        return bool(self._uses)
+
+    def received(self, epoch: int, utime: int) -> None:
+        """All that the server sent up to that sim time has come, and callbacks have seen it."""
+        if self._tell is None:
+            return
+        with self._lock:
+            if epoch != self._epoch:
+                self._epoch = epoch
+                self._uses.clear()
+            self._received = utime
+            self._say()
+
+    def use(self, utime: int, threads: tuple[int, ...] = ()) -> None:
+        """The threads, by default the caller's, work with what is known at that sim time."""
+        if self._tell is None:
+            return
+        since = utime, time.monotonic()
+        with self._lock:
+            for thread in threads or (threading.get_ident(),):
+                self._uses[thread] = since
+            self._say()
+
+    def wait(self) -> None:
+        """The caller's thread waits for what the server sends."""
+        if self._tell is None:
+            return
+        with self._lock:
+            if self._uses.pop(threading.get_ident(), None):
+                self._say()
+
+    def say(self) -> None:
+        """While a thread works the run goes on as in real time."""
+        with self._lock:
+            self._say()
+
+    def _say(self) -> None:
+        used = _NEVER
+        if self._uses:
+            now = time.monotonic()
+            for thread, (utime, since) in list(self._uses.items()):
+                if now - since > _PATIENCE_SECONDS:
+                    del self._uses[thread]
+                else:
+                    used = min(used, utime + int((now - since) * 1e6))
+        line = f"{self._epoch} {self._received} {used}\n"
+        if line != self._told and self._tell:
+            self._told = line
+            self._tell(line)
