@@ -196,18 +196,20 @@ void CommandInbox::receive(const std::string& channel, const uint8_t* data, size
   if (fault != DecodeFault::none) return refuse(channel, describe(fault));
   if (const std::string why = check_values(input.kind, data, size); !why.empty())
     return refuse(channel, why.c_str());
-  if (!is_repeated(input, data, size)) keep(found->second, command, data, size);
+  if (!is_repeated(command, data, size)) keep(found->second, command, data, size);
 }
 
-// Clients send a primitive until a status shows it, since messages may be lost.
-bool CommandInbox::is_repeated(const Input& input, const uint8_t* data, size_t size) {
-  const bool moves = input.kind == Input::Kind::move;
-  if (!moves && input.kind != Input::Kind::velocity && input.kind != Input::Kind::wheels)
-    return false;
+// Clients send a primitive until a status shows it, since messages may be lost; and a network may
+// double them, and exchange two.
+bool CommandInbox::is_repeated(const robot::Command& command, const uint8_t* data, size_t size) {
+  const auto* move = std::get_if<robot::MoveCommand>(&command.what);
+  if (!move || move->id == 0) return false;
   const std::lock_guard lock(mutex_);
-  std::vector<uint8_t>& last = slots_of(input.robot).primitive;
-  if (moves && std::equal(data, data + size, last.begin(), last.end())) return true;
-  last.assign(data, moves ? data + size : data);
+  auto& known = slots_of(command.robot).primitives;
+  const std::vector<uint8_t> bytes(data, data + size);
+  if (std::find(known.begin(), known.end(), bytes) != known.end()) return true;
+  known.push_back(bytes);
+  if (known.size() > kKnownPrimitives) known.pop_front();
   return false;
 }
 

@@ -7,6 +7,7 @@
 
 #include <atomic>
 #include <cstdint>
+#include <deque>
 #include <mutex>
 #include <string>
 #include <unordered_map>
@@ -31,6 +32,7 @@ struct Input {
 class CommandInbox {
  public:
   static constexpr size_t kKeptPerRobot = 4;
+  static constexpr size_t kKnownPrimitives = 32;    // of each robot
   static constexpr size_t kKeptOfWorld = 64;        // marker messages
   static constexpr size_t kMaxMessageSize = 65536;  // bytes
   static constexpr size_t kMostScheduled = 65536;   // commands
@@ -41,8 +43,8 @@ class CommandInbox {
   // inputs: at most one for each channel, except that reset_odometry has no channel.
   CommandInbox(std::vector<Input> inputs, int robots);
 
-  // Checks a message and stores it; a faulty one is counted, and logged at most once a second. Of a
-  // motion primitive that is sent again, each byte the same, the first is taken. Any thread.
+  // Checks a message and stores it; a faulty one is counted, and logged at most once a second. A
+  // motion primitive with a number is taken once, however often it is sent. Any thread.
   void receive(const std::string& channel, const uint8_t* data, size_t size);
 
   // Requests a reset of a robot's odometry, with the request's body for the log. Any thread.
@@ -91,8 +93,8 @@ class CommandInbox {
   struct Slots {  // a ring of the newest
     explicit Slots(size_t most = kKeptPerRobot) : most(most) {}
     size_t most;
-    std::vector<Entry> entries;      // none before the first that is kept
-    std::vector<uint8_t> primitive;  // the last one, until another command replaces it
+    std::vector<Entry> entries;                   // none before the first that is kept
+    std::deque<std::vector<uint8_t>> primitives;  // the newest that have a number
     size_t first = 0, size = 0;
   };
 
@@ -101,7 +103,7 @@ class CommandInbox {
     return robot.valid() ? waits_.slots[robot] : waits_.world_slots;
   }
   Entry& next_entry(RobotIndex robot);  // the mutex must be held
-  bool is_repeated(const Input& input, const uint8_t* data, size_t size);
+  bool is_repeated(const robot::Command& command, const uint8_t* data, size_t size);
   void keep(InputIndex input, robot::Command& command, const uint8_t* data, size_t size);
   void refuse(const std::string& channel, const char* why);
   Entry& next_taken(size_t& count);

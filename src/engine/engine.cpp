@@ -7,6 +7,7 @@
 #include <cfenv>
 #include <cmath>
 #include <cstring>
+#include <exception>
 #include <limits>
 #include <stdexcept>
 #include <utility>
@@ -91,6 +92,7 @@ struct Engine::Copy {
   Channels channels;
   std::unique_ptr<World> world;
   int64_t step = -1;                         // of the current state
+  bool sound = true;                         // no call failed since it was made
   bool driven = false;                       // velocities_ has rows that are not in its inbox yet
   std::vector<bool> scenes_made;             // for each module
   std::vector<std::vector<uint8_t>> newest;  // the newest message of each channel; empty: none yet
@@ -201,8 +203,9 @@ std::shared_ptr<Plan> Engine::plan_of(const std::shared_ptr<const world::WorldMo
 
 void Engine::for_each(size_t count, const std::function<void(size_t)>& body) {
   if (handler_ || state_handler_ || count == 1) {
-    for (size_t i = 0; i < count; ++i) body(i);
-    return;
+    FirstFailure failure;
+    for (size_t i = 0; i < count; ++i) failure.call(body, static_cast<int>(i));
+    return failure.rethrow();
   }
   arena_->tasks.execute([&] {
     parallel_pieces(static_cast<int>(count), [&](int i) {
@@ -221,7 +224,25 @@ void Engine::forget_touching(size_t index) {
 }
 
 void Engine::compute(size_t index, int64_t steps) {
-  Copy& copy = *copies_[index];
+  Copy& copy = sound_copy(index);
+  copy.sound = false;
+  const std::exception_ptr handlers = compute(index, copy, steps);
+  copy.sound = true;
+  if (handlers) std::rethrow_exception(handlers);
+}
+
+Engine::Copy& Engine::sound_copy(size_t index) const {
+  Copy& copy = *copies_.at(index);
+  if (!copy.sound)
+    throw std::runtime_error("world " + std::to_string(index) +
+                             " failed in an earlier call: reset or restore it");
+  return copy;
+}
+
+// Returns what a handler threw; then it is told nothing more, and the steps are computed all the
+// same.
+std::exception_ptr Engine::compute(size_t index, Copy& copy, int64_t steps) {
+  std::exception_ptr handlers;
   World& world = *copy.world;
   Borrowed borrowed(*arena_, world);
   Batch& batch = *borrowed;
@@ -233,9 +254,8 @@ void Engine::compute(size_t index, int64_t steps) {
     batch.first_step = copy.step + 1;
     batch.count = static_cast<int>(std::min<int64_t>(left, kMaxBatchSteps));
     batch.applied_count = 0;
-    for (int i = 0; i < batch.count; ++i)
+    for (int i = 0; i < batch.count; ++i, ++copy.step)
       world.advance(batch.first_step + i, batch.snapshots[i], batch);
-    copy.step += batch.count;
     copy.make_scenes(batch.read.get(), batch.sensor_faults.get());
     for (size_t m = 0; m < world.modules().size(); ++m) {
       Module& module = *world.modules()[m];
@@ -246,9 +266,15 @@ void Engine::compute(size_t index, int64_t steps) {
     }
     copy.keep_newest(batch);
     count_touching(copy, batch, touching);
-    if (handler_ || state_handler_) tell(index, batch);
+    if (handlers || (!handler_ && !state_handler_)) continue;
+    try {
+      tell(index, batch);
+    } catch (...) {
+      handlers = std::current_exception();
+    }
   }
   for (auto& observer : observers_) update(*observer, index);
+  return handlers;
 }
 
 // Creates a renderer when the first picture is read: most copies never need one.
@@ -448,27 +474,42 @@ void Engine::reset(std::span<const Reset> resets) {
                        "world " + std::to_string(reset.world) + " is to be reset twice at once");
     named[reset.world] = true;
   }
-  for_each(resets.size(), [&](size_t i) { reset_one(resets[i]); });
+  // What may be refused is made before anything is changed.
+  std::vector<std::unique_ptr<Copy>> made(resets.size());
+  for_each(resets.size(), [&](size_t i) { made[i] = make_other(resets[i]); });
+  for_each(resets.size(), [&](size_t i) { reset_one(resets[i], std::move(made[i])); });
 }
 
-void Engine::reset_one(const Reset& reset) {
+// Null where the reset needs no other plan.
+std::unique_ptr<Engine::Copy> Engine::make_other(const Reset& reset) {
+  const Copy& before = *copies_[static_cast<size_t>(reset.world)];
+  const bool other = reset.model && reset.model != before.model;
+  if (!other && options_.draws.empty()) return nullptr;
+  if (other && reset.model->step_us != world_->step_us)
+    throw InputError({reset.model->file}, "its steps have " + std::to_string(reset.model->step_us) +
+                                              " us, those of " + world_->file + " have " +
+                                              std::to_string(world_->step_us) +
+                                              ": an engine's worlds have the same");
+  auto copy = make_copy(other ? reset.model : before.model, reset.seed);
+  const auto same = [](const Channel& a, const Channel& b) {
+    return a.name == b.name && a.fingerprint == b.fingerprint;
+  };
+  const std::vector<Channel>&here = before.channels.list(), &there = copy->channels.list();
+  if (!std::equal(here.begin(), here.end(), there.begin(), there.end(), same))
+    throw InputError({copy->model->file},
+                     "its robots and devices are not those of " + world_->file +
+                         ": an engine's worlds have the same, in the same order");
+  return copy;
+}
+
+void Engine::reset_one(const Reset& reset, std::unique_ptr<Copy> made) {
   const auto index = static_cast<size_t>(reset.world);
-  const auto& before = copies_[index]->model;
-  const bool other = reset.model && reset.model != before;
-  auto copy = make_copy(other ? reset.model : before, reset.seed, copies_[index]->world.get());
-  if (other) {
-    const auto same = [](const Channel& a, const Channel& b) {
-      return a.name == b.name && a.fingerprint == b.fingerprint;
-    };
-    const std::vector<Channel>&here = copies_[index]->channels.list(),
-          &there = copy->channels.list();
-    if (!std::equal(here.begin(), here.end(), there.begin(), there.end(), same)) {
-      throw InputError({copy->model->file},
-                       "its robots and devices are not those of " + world_->file +
-                           ": an engine's worlds have the same, in the same order");
-    }
+  if (!made) {
+    Copy& ended = *copies_[index];
+    const bool reusable = std::exchange(ended.sound, false);  // from here on it is no more
+    made = make_copy(ended.model, reset.seed, reusable ? ended.world.get() : nullptr);
   }
-  copies_[index] = std::move(copy);
+  copies_[index] = std::move(made);
   forget_touching(index);
   compute(index, 1);
 }
@@ -483,7 +524,7 @@ void Engine::Copy::take(const Copy& other) {
 
 std::shared_ptr<const SavedWorld> Engine::save(int world) {
   const auto index = static_cast<size_t>(world);
-  const Copy& copy = *copies_.at(index);
+  const Copy& copy = sound_copy(index);
   const DefaultFloatingPoint floating_point;
   take_velocities(index);
   auto saved = std::make_shared<SavedWorld>();
@@ -511,9 +552,11 @@ void Engine::restore(const SavedWorld& saved, std::span<const int> worlds) {
 // A copy with another plan or seed is created again: what it drew on creation would remain.
 void Engine::restore_one(const SavedWorld& saved, size_t world) {
   const Copy& from = *saved.copy;
-  if (copies_[world]->plan != from.plan || copies_[world]->seed != from.seed)
+  if (!copies_[world]->sound || copies_[world]->plan != from.plan ||
+      copies_[world]->seed != from.seed)
     copies_[world] = make_another(from);
   Copy& copy = *copies_[world];
+  copy.sound = false;
   copy.take(from);
   std::copy(saved.touching.begin(), saved.touching.end(),
             reinterpret_cast<int32_t*>(touching_->values.data()) + world * driven_.size());
@@ -521,6 +564,7 @@ void Engine::restore_one(const SavedWorld& saved, size_t world) {
   for (size_t channel = 0; channel < read_->size(); ++channel)
     if ((*read_)[channel]) catch_up(copy, static_cast<int>(channel));
   for (auto& observer : observers_) update(*observer, world);
+  copy.sound = true;
 }
 
 const world::Drawn& Engine::drawn(int world) const {

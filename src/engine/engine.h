@@ -8,6 +8,7 @@
 
 #include <atomic>
 #include <cstdint>
+#include <exception>
 #include <functional>
 #include <map>
 #include <memory>
@@ -65,7 +66,8 @@ class Engine {
 
   // Computes that many states, at least 1: of every copy, or of those with a 1 in `which`. Between
   // some of them, in which all copies have computed as many, `go_on` may say that it is enough.
-  // Throws std::runtime_error if a module failed.
+  // Throws what the first copy threw that failed: that one has to be reset or restored; the others
+  // have gone on. Or what the handler of its messages threw: all have gone on then.
   void step(int64_t steps, std::span<const uint8_t> which = {},
             const std::function<bool()>& go_on = {});
 
@@ -86,8 +88,8 @@ class Engine {
     // the first world: the same robots with the same devices, in the same order.
     std::shared_ptr<const world::WorldModel> model = nullptr;
   };
-  // Restarts copies, each with its seed: what follows equals a fresh run. Throws InputError; some
-  // copies may then be unchanged.
+  // Restarts copies, each with its seed: what follows equals a fresh run. Throws InputError; then
+  // nothing has changed.
   void reset(std::span<const Reset> resets);
   void reset(int world, uint64_t seed, std::shared_ptr<const world::WorldModel> model = nullptr) {
     const Reset one{world, seed, std::move(model)};
@@ -137,11 +139,14 @@ class Engine {
                                   World* ended = nullptr);
   std::unique_ptr<Copy> make_another(const Copy& copy) const;
   void restore_one(const SavedWorld& saved, size_t world);
-  void reset_one(const Reset& reset);
+  std::unique_ptr<Copy> make_other(const Reset& reset);
+  void reset_one(const Reset& reset, std::unique_ptr<Copy> made);
   std::shared_ptr<Plan> plan_of(const std::shared_ptr<const world::WorldModel>& model);
   void count_touching(Copy& copy, const Batch& batch, int32_t* counts) const;
   void take_velocities(size_t world);
   void compute(size_t world, int64_t steps);
+  std::exception_ptr compute(size_t world, Copy& copy, int64_t steps);
+  Copy& sound_copy(size_t world) const;
   void forget_touching(size_t world);
   void tell(size_t world, const Batch& batch);
   void update(Observer& observer, size_t world);

@@ -33,7 +33,7 @@ std::optional<LauncherProgress> read_launcher_progress(std::string_view line);
 
 class Backpressure {
  public:
-  static constexpr SimTime kMostAhead = 50'000;
+  static constexpr SimTime kMostAhead = 30'000;
   static constexpr uint64_t kMostBytes = uint64_t{1} << 20;
 
   // The last steps that may be computed.

@@ -19,7 +19,7 @@ namespace {
 constexpr auto kStatusPeriod = std::chrono::milliseconds(500);
 constexpr auto kPausedInfoPeriod = std::chrono::seconds(1);
 constexpr auto kTickAgainPeriod = std::chrono::milliseconds(100);
-constexpr Rate kFollowedTickRate{40, 1};  // two within Backpressure::kMostAhead
+constexpr Rate kFollowedTickRate{80, 1};  // two within Backpressure::kMostAhead
 // Steps that the publisher computes itself rather than wake another thread for them: it is waited
 // for meanwhile.
 constexpr int kFewGranted = 4, kFewAhead = 16;

@@ -25,6 +25,7 @@ BUILD = Path(os.environ.get("RUEDO_BUILD_DIR", SOURCE / "build/release"))
 RUEDO = os.environ.setdefault("RUEDO", str(BUILD / "bin/ruedo"))
 os.environ["PYTHONPATH"] = f"{BUILD / 'python'}{os.pathsep}{os.environ.get('PYTHONPATH', '')}"
 sys.path.insert(0, str(BUILD / "python"))
+sys.path.insert(0, str(HERE.parent))  # witness.py
 ARENA = str(SOURCE / "worlds/arena.sdf")
 HALL = str(HERE / "hall.sdf")
 
@@ -144,15 +145,6 @@ class Said:
 
 
 def probe(language: str, url: str, *command: str, timeout: float = PATIENCE) -> Said:
-    """Begins anew where a server that gets no processor lost a motion, which is commanded once."""
-    for _ in range(5):
-        said = _probed(language, url, *command, timeout=timeout)
-        if not any("ended: lost" in line for line in said.all("failed")):
-            break
-    return said
-
-
-def _probed(language: str, url: str, *command: str, timeout: float) -> Said:
     done = subprocess.run(
         [*PROBES[language], url, *command], capture_output=True, text=True, timeout=timeout
     )

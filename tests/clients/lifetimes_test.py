@@ -264,3 +264,37 @@ def test_a_server_whose_queue_is_full_is_there(tmp_path):
             client.close()
     assert internals("served", f"unix://{tmp_path}/bus") == ["served false"]
     assert internals("served", f"unix://{tmp_path}/nobody") == ["served false"]
+
+
+NEVER = 2**63 - 1
+
+
+def test_callbacks_get_the_newest_where_nobody_waits_for_them():
+    done = run([*JAVA, "ruedo.Internals", "callbacks"])
+    assert done.stdout.splitlines() == [
+        "newest 100000",
+        "newest 400000, skipped 2",
+        "newest 800000, lost 5",
+        "heard [1, 2, 3, 4, 8]",
+        "all true",
+    ]
+    assert done.returncode == 0 and done.stderr.count("\n") == 1
+
+
+def test_a_primitive_is_sent_until_a_status_shows_it():
+    assert internals("resends") == ["again true"] * 4 + ["shown true"]
+
+
+def test_a_server_is_told_how_far_its_client_has_come():
+    assert internals("progress") == [
+        f"first 0 0 {NEVER}",
+        f"received 0 25000 {NEVER}",
+        "used true",
+        "goes on true true",
+        f"waits 0 25000 {NEVER}",
+        "said again false",
+        f"forgotten 0 25000 {NEVER}",
+        f"reset 1 0 {NEVER}",
+        "stopped true",
+        f"heard 1 999 {NEVER}",
+    ]

@@ -9,11 +9,11 @@ import struct
 import subprocess
 import sys
 import threading
-import time
 import zlib
 
 import pytest
 from conftest import BUILD, HERE, PATIENCE
+from witness import attempts
 
 RUNNERS = {"python": [sys.executable, str(HERE / "vectors/runner.py")]}
 if "RUEDO_VECTORS_CPP" in os.environ:
@@ -242,46 +242,41 @@ class Script:
 
 
 def converse(runner, one, patience):
-    """The script, what the client said, and whether one of them was held up, or the client did not
-    come to its end in that time.
-    """
+    """The script, what the client said, and what went wrong."""
     command = [*RUNNERS[runner], "converse", *map(str, one["steps"])]
     with subprocess.Popen(
         command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE
     ) as client:
-        late = threading.Event()
-        killer = threading.Timer(patience, lambda: (late.set(), client.kill()))
+        killer = threading.Timer(patience, client.kill)
         killer.start()
-        script, said = Script(client), []
+        script, said, wrong = Script(client), [], None
         try:
             while script.request() is not None:  # until it takes part
                 pass
-            begun = time.monotonic()
             for line in one["say"]:
                 script.say(line)
             said = client.stderr.read().decode().splitlines()
-            if time.monotonic() > begun + 1.5:
-                late.set()
-        except (AssertionError, BrokenPipeError):
-            if not late.is_set():
-                raise
+        except (AssertionError, BrokenPipeError) as error:
+            wrong = error
         finally:
             killer.cancel()
             client.kill()
-        return script, said, late.is_set()
+        return script, said, wrong
 
 
 @pytest.mark.parametrize("name", list(CONVERSATIONS))
 @pytest.mark.parametrize("runner", list(RUNNERS))
 def test_conversations(runner, name):
     """A client that has heard nothing for 1.7 s doubts all that it has of the steps to come, and
-    asks for more than a script knows of: where this program was held up, there is another try.
+    asks for more than a script knows of.
     """
     one = CONVERSATIONS[name]
-    for patience in (10.0, 30.0, 90.0, PATIENCE):
-        script, said, late = converse(runner, one, patience)
-        if not late:
+    for witness in attempts():
+        script, said, wrong = converse(runner, one, PATIENCE)
+        if not wrong or not witness.excuses():
             break
+    if wrong:
+        raise wrong
     expected = []
     for states in one["sees"]:
         last = states[-1]

@@ -9,6 +9,7 @@ import sys
 import lcm
 import pytest
 from conftest import ARENA, BUILD, PATIENCE, SOURCE, heed_ctrl_c, ruedo_run
+from witness import attempts
 
 EXAMPLES = {
     "python": [sys.executable, str(SOURCE / "clients/python/examples/wander.py")],
@@ -62,11 +63,11 @@ def test_wander(language, tmp_path):
 
     status = lcmtypes.motion_status_t
     log, picture = tmp_path / "run.log", tmp_path / "seen.jpg"
-    for _ in range(4):
+    for witness in attempts():  # one that is held up for 0.6 s is stopped by the watchdog
         done = wander(language, log, picture)
         reasons = reasons_in(log)
-        # Else it was held up, for 0.6 s or the 2 s of connect(), or a command was lost: once more.
-        if done.returncode == 0 and status.REASON_WATCHDOG not in reasons:
+        is_good = done.returncode == 0 and status.REASON_WATCHDOG not in reasons
+        if is_good or not witness.excuses():
             break
     assert done.returncode == 0, done.stdout + done.stderr
     assert picture.read_bytes()[:3] == b"\xff\xd8\xff"  # a JPEG
@@ -97,7 +98,7 @@ def test_wander(language, tmp_path):
 def test_ctrl_c_ends_the_example_in_order(language, tmp_path):
     picture = tmp_path / "seen.jpg"
     with ruedo_run(world=ARENA) as server:
-        for _ in range(4):
+        for witness in attempts():
             example = subprocess.Popen(
                 [*EXAMPLES[language], "--url", server.url, "--picture", str(picture)],
                 stdout=subprocess.PIPE,
@@ -109,8 +110,8 @@ def test_ctrl_c_ends_the_example_in_order(language, tmp_path):
             if first:
                 example.send_signal(signal.SIGINT)
             said, errors = example.communicate(timeout=PATIENCE)
-            if not errors:
-                break  # else it was held up, or a command was lost
+            if not errors or not witness.excuses():
+                break
         assert "Ctrl-C ends it" in first
     assert [line.split()[0] for line in said.splitlines()] == ["camera", "true", "odometry"], (
         said + errors

@@ -7,4 +7,14 @@ namespace ruedo::run {
 
 uint64_t allocations();  // calls of operator new so far, in all threads
 
+// While one lives, the call of operator new with that number from here on, in any thread, throws.
+class FailingAllocation {
+ public:
+  explicit FailingAllocation(uint64_t number);
+  ~FailingAllocation();
+  FailingAllocation(const FailingAllocation&) = delete;
+  FailingAllocation& operator=(const FailingAllocation&) = delete;
+  static bool has_failed();
+};
+
 }  // namespace ruedo::run

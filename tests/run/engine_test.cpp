@@ -8,6 +8,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "counting_new.h"
 #include "lockstep_client.h"
 #include "ruedo/velocity_command_t.hpp"
 
@@ -263,6 +264,105 @@ TEST(Engine, GoesOnWithoutASensorThatIsWrittenWrongly) {
                  "a", 0, 0, "<sensor name='i' type='imu'><ruedo:phase>x</ruedo:phase></sensor>")),
              {}),
       InputError);
+}
+
+std::vector<uint64_t> hashes(const Engine& engine) {
+  std::vector<uint64_t> all;
+  for (int copy = 0; copy < engine.worlds(); ++copy) all.push_back(engine.state_hash(copy));
+  return all;
+}
+
+// Sixteen copies, one of which is to be reset to a world with another robot.
+TEST(Engine, ARefusedResetChangesNothing) {
+  std::mt19937 random(4);
+  const std::string models = random_models(random, 2);
+  const auto world = load_text(models), other = load_text(models + robot_sdf("more", 9, 9));
+  engine::EngineOptions options;
+  options.worlds = 16;
+  Engine engine(world, options), fresh(world, options);
+  engine.observe("scan", "ranges");
+  engine.step(10);
+  const std::vector<uint64_t> before = hashes(engine);
+  for (int round = 0; round < 20; ++round) {
+    std::vector<Engine::Reset> resets;
+    for (int copy = 0; copy < 16; ++copy)
+      resets.push_back({copy, 100, copy == round % 16 ? other : load_text(models)});
+    EXPECT_THROW(engine.reset(resets), InputError);
+    EXPECT_EQ(hashes(engine), before);
+    EXPECT_EQ(engine.current_step(round % 16), 10);
+  }
+  std::vector<Engine::Reset> resets;
+  for (int copy = 0; copy < 16; ++copy) resets.push_back({copy, 1 + static_cast<uint64_t>(copy)});
+  engine.reset(resets);
+  const std::vector<Command> commands = random_commands(random, 2, 100);
+  EXPECT_TRUE(by_engine(engine, commands, 100) == by_engine(fresh, commands, 100));
+}
+
+TEST(Engine, AWorldOfAnotherStepSizeIsRefused) {
+  const std::string models = robot_sdf("a", 0, 0);
+  std::string text = world_sdf(models);
+  text.replace(text.find("0.005"), 5, "0.004");
+  Engine engine(load_text(models), {});
+  EXPECT_THROW(engine.reset(0, 1, world::load_world_text(text, "other.sdf")), InputError);
+}
+
+TEST(Engine, AHandlerThatThrowsLeavesWorldsSound) {
+  engine::EngineOptions options;
+  options.worlds = 3;
+  const auto world = load_text(robot_sdf("a", 0, 0));
+  Engine engine(world, options), fresh(world, options);
+  engine.on_message([](int copy, int64_t, const engine::Channel&, std::span<const uint8_t>) {
+    if (copy > 0) throw std::runtime_error("from copy " + std::to_string(copy));
+  });
+  try {
+    engine.step(50);
+    FAIL();
+  } catch (const std::runtime_error& error) {
+    EXPECT_STREQ(error.what(), "from copy 1");
+  }
+  fresh.step(50);
+  for (int copy = 0; copy < 3; ++copy) EXPECT_EQ(engine.current_step(copy), 50);
+  EXPECT_EQ(hashes(engine), hashes(fresh));
+}
+
+// Wherever memory runs out, a copy is as it was, has done what was asked, or says that it failed;
+// and after a reset it is a fresh one.
+TEST(Engine, SurvivesEveryFailingAllocation) {
+  std::mt19937 random(5);
+  engine::EngineOptions options;
+  options.worlds = 2;
+  options.threads = 2;
+  const auto world = load_text(random_models(random, 1));
+  Engine engine(world, options), fresh(world, options);
+  engine.observe("scan", "ranges");
+  const auto goes_on = [&](int copy) {
+    const std::vector<uint8_t> which{static_cast<uint8_t>(copy == 0), static_cast<uint8_t>(copy)};
+    try {
+      engine.step(1, which);
+    } catch (const std::runtime_error& error) {
+      EXPECT_THAT(error.what(), testing::HasSubstr("failed in an earlier call"));
+    }
+  };
+  const std::vector<uint64_t> begin = hashes(fresh);
+  for (const bool resets : {true, false}) {
+    bool failed = true;
+    for (uint64_t number = 1; failed; ++number) {
+      {
+        const FailingAllocation failing(number);
+        try {
+          if (resets)
+            engine.reset(std::vector<Engine::Reset>{{0, 1}, {1, 2}});
+          else
+            engine.step(12);
+        } catch (const std::bad_alloc&) {
+        }
+        failed = FailingAllocation::has_failed();
+      }
+      goes_on(0), goes_on(1);
+      engine.reset(std::vector<Engine::Reset>{{0, 1}, {1, 2}});
+      ASSERT_EQ(hashes(engine), begin) << "allocation " << number;
+    }
+  }
 }
 
 TEST(Engine, SaysWhatCannotBe) {

@@ -124,9 +124,7 @@ TEST_F(InboxTest, WhatWaitsForARobotGoesWithIt) {
 
 // However threads are scheduled, each kept command acts once, on its step.
 TEST_F(InboxTest, APrimitiveThatIsSentAgainIsTakenOnce) {
-  engine::CommandInbox inbox({{"r/move", RobotIndex(0), engine::Input::Kind::move},
-                              {"r/velocity", RobotIndex(0), engine::Input::Kind::velocity}},
-                             1);
+  engine::CommandInbox inbox({{"r/move", RobotIndex(0), engine::Input::Kind::move}}, 1);
   const auto moved = [&](int64_t id, double value) {
     move_command_t command{};
     command.id = id;
@@ -148,10 +146,11 @@ TEST_F(InboxTest, APrimitiveThatIsSentAgainIsTakenOnce) {
   moved(8, 1.0);
   moved(8, 2.0);  // another one, though its number is not
   EXPECT_EQ(applied(2), 2);
-  const auto stop = velocity(0.0);
-  inbox.receive("r/velocity", stop.data(), stop.size());
-  moved(8, 2.0);  // after another command it is meant
-  EXPECT_EQ(applied(3), 2);
+  moved(7, 1.0);  // the network has exchanged the two
+  EXPECT_EQ(applied(3), 0);
+  moved(0, 1.0);
+  moved(0, 1.0);  // without a number each is meant
+  EXPECT_EQ(applied(4), 2);
   EXPECT_EQ(inbox.refused(), 0u);
 }
 

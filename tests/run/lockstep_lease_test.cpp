@@ -17,6 +17,7 @@
 #include "ruedo/applied_t.hpp"
 #include "ruedo/velocity_command_t.hpp"
 #include "ruedo/wheel_command_t.hpp"
+#include "witness.h"
 
 namespace ruedo::run {
 namespace {
@@ -68,15 +69,17 @@ class LockstepTest : public testing::Test {
   }
 
   // A client's thread that is held up for longer than its lease loses it before the test means it
-  // to, and throws: then all begins anew, with a longer one.
+  // to, and throws. Where all of the machine was, all begins anew, with a longer one.
   void with_leases(int clients, Policy policy, double lease_s,
                    const std::function<void(double)>& test) {
     for (;; lease_s *= 4.0) {
+      const Witness witness;
       begin(clients, policy, lease_s);
       try {
         return test(lease_s);
-      } catch (const std::runtime_error& held_up) {
-        ASSERT_LT(lease_s, 60.0) << held_up.what();
+      } catch (const std::runtime_error& error) {
+        if (!witness.excuses("lockstep_lease_test")) throw;
+        ASSERT_LT(lease_s, 60.0) << error.what();
       }
       end();
     }

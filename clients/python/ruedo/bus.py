@@ -115,7 +115,8 @@ class Bus:
         if self.handling:
             return
         deadline = time.monotonic() + _CATCH_UP_SECONDS
-        while (self._transport.busy or self._transport.has_news()) and not self._closed.is_set():
+        # In this order: what is no news any more is being handled.
+        while (self._transport.has_news() or self._transport.busy) and not self._closed.is_set():
             if time.monotonic() >= deadline:
                 break
             time.sleep(_LOOK_SECONDS)

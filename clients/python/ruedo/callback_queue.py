@@ -83,13 +83,15 @@ class CallbackQueue:
                     self._borrowed -= 1
                     self._news.notify()
 
-    def close(self, patience: float | None) -> None:
-        """Nothing runs any more, but for what has begun. patience: s of real time for that to
-        return; None for ever. One that takes long is named."""
+    def stop(self) -> None:
+        """Nothing begins to run any more."""
+        self._closed = True
         with self._news:
-            self._closed = True
-            self._waiting.clear()
             self._news.notify_all()
+
+    def close(self, patience: float | None) -> None:
+        """After stop(): returns when what has begun has returned. patience: s of real time for
+        that; None for ever. One that takes long is named."""
         thread = self._thread
         if thread is None or patience == 0.0 or self.runs_here:
             return
@@ -131,7 +133,7 @@ class CallbackQueue:
         """False: nothing waits."""
         with self._turn:
             with self._news:
-                if not self._waiting:
+                if self._closed or not self._waiting:
                     return False
                 _, cost, call = self._waiting.popleft()
                 self._bytes -= cost

@@ -30,9 +30,10 @@ class Clock:
             with self._news:
                 for sleeper in self._sleepers:
                     sleeper.left -= max(0, utime - before)
-                woken = tuple(one.thread for one in self._sleepers if one.left <= 0)
+                woken = [one for one in self._sleepers if one.left <= 0]
                 if woken:
-                    self._woken(utime, woken)
+                    self._sleepers = [one for one in self._sleepers if one.left > 0]
+                    self._woken(utime, tuple(one.thread for one in woken))
                     self._news.notify_all()
 
     def is_far_ahead(self, utime: int) -> bool:
@@ -67,7 +68,7 @@ class Clock:
                     self._news.wait(0.5)
                     check()
             finally:
-                self._sleepers.remove(sleeper)
+                self._sleepers = [one for one in self._sleepers if one is not sleeper]
 
 
 class _Sleeper:

@@ -145,6 +145,7 @@ class Connection:
                 self._ended.wait(_END_SECONDS)
             return
         self.closed = _CLOSED
+        self.callbacks.stop()
         if may_wait:
             self._end_all(patience)
             return

@@ -69,7 +69,8 @@ class Motion:
             try:
                 self._await_end(deadline, timeout)
             finally:
-                self._waiting.remove(me)
+                if me in self._waiting:
+                    self._waiting.remove(me)
         if self.state != "done":
             raise MotionError(
                 f"{self._robot}: {self.kind} {'was refused' if self.state == 'refused' else 'ended'}: "
@@ -125,6 +126,7 @@ class Motion:
                     self.state, self.reason = "ended", "lost"
             if self.done and self._waiting:
                 self._connection.progress.use(status.utime, tuple(self._waiting))
+                self._waiting.clear()
             self._news.notify_all()
 
     def _due_again(self, now: float) -> bool:

@@ -118,8 +118,8 @@ class Simulation:
             return self._robots.setdefault(name, Robot(self._connection, name))
 
     def on_new_run(self, callback: Callable[[Simulation], None]) -> Subscription:
-        """Calls callback(simulation), in the thread of the callbacks, when another server, or the same one
-        restarted, answers at this address. Commands are not repeated into the new run, and
+        """Calls callback(simulation), in the thread of the callbacks, when another server, or the
+        same one restarted, answers at this address. Commands are not repeated into the new run, and
         primitives under way have ended."""
         return self._connection.on_new_run(lambda: callback(self))
 
@@ -127,6 +127,8 @@ class Simulation:
         """Waits until so much sim time has passed."""
         self._connection.check_may_wait()
         microseconds = round(arguments.finite("seconds", seconds) * 1e6)
+        if microseconds > 0:
+            self._connection.progress.wait()
         self._connection.clock.sleep(microseconds, self._connection.check_server)
 
     # Control. Every call raises NotSupported where the server has no such request, RequestError
@@ -163,6 +165,7 @@ class Simulation:
             )
         body = lcmtypes.step_request_t()
         body.steps = int(n)
+        self._connection.progress.wait()
         return observed(
             control.state_of(self._session.request(lcmtypes.request_t.STEP, body, timeout)), []
         )

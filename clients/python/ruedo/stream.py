@@ -264,6 +264,7 @@ class Stream(Reader[T]):
             self._count += 1 + self._lost_before(utime)
             if self._waiting:
                 connection.progress.use(connection.clock.utime, tuple(self._waiting))
+                self._waiting.clear()
             self._news.notify_all()
         self._arrivals.call(sample)
         if self._callbacks:
@@ -320,10 +321,11 @@ class Stream(Reader[T]):
     ) -> _Arrival | None:
         """With the lock held."""
         deadline, me = time.monotonic() + timeout, threading.get_ident()
-        self._connection.progress.wait()
-        self._waiting.append(me)
         try:
             while not self._serves(reader, a_new_one, not_before):
+                if me not in self._waiting:  # what came meanwhile was not what is wanted
+                    self._connection.progress.wait()
+                    self._waiting.append(me)
                 if self._fault:
                     fault, self._fault = self._fault, None
                     raise fault
@@ -337,7 +339,8 @@ class Stream(Reader[T]):
                 self._connection.check_server()
             return self._newest
         finally:
-            self._waiting.remove(me)
+            if me in self._waiting:
+                self._waiting.remove(me)
 
     def __repr__(self) -> str:
         return f"<{type(self).__name__} {self.channel} ({self.type})>"

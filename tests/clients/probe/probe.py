@@ -2,6 +2,7 @@
 Probe.java are its twins, with the same commands and output.
 """
 
+import itertools
 import math
 import sys
 import time
@@ -384,6 +385,48 @@ def launched_with(world, text=None):
         say("scans", len(seen.all(robot.lrf)), seen.latest(robot.lrf).ranges[90])
 
 
+def keeps_up(rate):
+    """What a program does in a run that it launched: looks now and then, works in a callback, and
+    acts on what it sees.
+    """
+    with ruedo.launch("arena", rate=rate, noise=False, disable=["p3at/camera"]) as sim:
+        robot = sim.robot("p3at")
+        for _ in range(5):
+            time.sleep(0.2)
+            newest = robot.pose.latest(PATIENCE).time
+            say("age", sim.state().time - newest)
+        seen = []
+
+        def work(scan):
+            seen.append(scan.time)
+            time.sleep(0.15)
+
+        with robot.lrf.on_sample(work):
+            sim.sleep(2.0)
+            newest = robot.odometry.latest(PATIENCE).time
+            say("age", sim.state().time - newest)
+        say("seen", len(seen), max(b - a for a, b in itertools.pairwise(seen)), robot.lrf.dropped)
+        for _ in range(10):
+            robot.rotate(0.1).wait(PATIENCE)
+            pose = robot.pose.next(PATIENCE)
+            sim.sleep(0.2)
+            say("after", abs(robot.pose.latest(PATIENCE).heading - pose.heading))
+        robot.turn_to(0.0).wait(PATIENCE)
+        while min(robot.lrf.next(PATIENCE).ranges[60:120]) > 0.8:
+            robot.set_velocity(0.4, 0.0)
+        robot.set_velocity(0.0, 0.0)
+        sim.sleep(2.0)
+        say("stands", min(robot.lrf.next(PATIENCE).ranges[60:120]))
+
+
+def many_primitives(sim, name, count):
+    robot = sim.robot(name)
+    done = 0
+    for i in range(int(count)):
+        done += robot.rotate(0.02 if i % 2 else -0.02).wait(PATIENCE).done
+    say("done", done)
+
+
 def read_log(path):
     """As pandas has it; what C++ and Java say beside that is not Python's."""
     log = ruedo.read_log(path)
@@ -415,8 +458,8 @@ def main():
         if command == "apart":
             apart(url, *rest)
             return
-        if command in ("launch_with", "log"):
-            {"launch_with": launched_with, "log": read_log}[command](*rest)
+        if command in ("launch_with", "keeps_up", "log"):
+            {"launch_with": launched_with, "keeps_up": keeps_up, "log": read_log}[command](*rest)
             return
         if command == "launch":
             launched(ruedo.launch(rest[0], seed=3, args=rest[1:]))
@@ -437,6 +480,7 @@ def main():
                 "velocity": lambda: drive(sim, *rest, False),
                 "wheels": lambda: drive(sim, *rest, True),
                 "primitives": lambda: primitives(sim, *rest),
+                "many_primitives": lambda: many_primitives(sim, *rest),
                 "collisions": lambda: collisions(sim, *rest),
                 "errors": lambda: errors(sim, *rest),
                 "markers": lambda: markers(sim, *rest),

@@ -14,7 +14,12 @@ import ruedo.lcmtypes.world_info_t;
 
 import java.io.IOException;
 import java.nio.ByteBuffer;
+import java.util.ArrayList;
+import java.util.Arrays;
+import java.util.List;
+import java.util.concurrent.BlockingQueue;
 import java.util.concurrent.CountDownLatch;
+import java.util.concurrent.LinkedBlockingQueue;
 import java.util.concurrent.Semaphore;
 import java.util.concurrent.TimeUnit;
 import java.util.function.Supplier;
@@ -31,6 +36,7 @@ public final class Internals {
     /** Calls the client in the thread that calls it, and answers requests for ruedo/info. */
     private static class Server implements Transport {
         final world_info_t info = new world_info_t();
+        Simulation sim;
         private Receiver client;
 
         Server() {
@@ -89,7 +95,8 @@ public final class Internals {
         }
 
         Simulation connect(String url) {
-            return new Simulation(new Address(url), "client", PATIENCE, null, this);
+            sim = new Simulation(new Address(url), "client", PATIENCE, null, this);
+            return sim;
         }
 
         void send(String channel, ruedo.lcmtypes.Message message) {
@@ -193,6 +200,7 @@ public final class Internals {
                             server.send("p3at/motion", status);
                         });
         receiving.setDaemon(true);
+        boolean called;
         synchronized (sim) {
             synchronized (robot) {
                 synchronized (odometry) {
@@ -200,18 +208,122 @@ public final class Internals {
                         synchronized (subscription) {
                             receiving.start();
                             receiving.join((long) (PATIENCE * 1e3));
+                            called = heard.tryAcquire((long) PATIENCE, TimeUnit.SECONDS);
                         }
                     }
                 }
             }
         }
+        System.out.println("received " + !receiving.isAlive() + " " + called + " " + motion.done());
+    }
+
+    private static odometry_t odometryAt(long utime) {
+        odometry_t sample = new odometry_t();
+        sample.utime = utime;
+        return sample;
+    }
+
+    /**
+     * Receiving goes on beside a callback that does not return; what waits for it is dropped from a
+     * megabyte on, and counted, as is what was lost on the way.
+     */
+    private static void callbacks() throws InterruptedException {
+        Server server = new Server();
+        Stream<Odometry> odometry = server.connect().robot("p3at").odometry();
+        Semaphore begun = new Semaphore(0);
+        Semaphore goOn = new Semaphore(0);
+        List<Long> heard = new ArrayList<>();
+        odometry.onSample(
+                sample -> {
+                    begun.release();
+                    goOn.acquireUninterruptibly();
+                    heard.add(sample.utime / 100_000);
+                });
+        server.send("p3at/odometry", odometryAt(100_000));
+        System.out.println("newest " + odometry.next().utime);
+        begun.acquire();
+        for (int i = 2; i < 5; i++) server.send("p3at/odometry", odometryAt(i * 100_000));
+        System.out.println("newest " + odometry.next().utime + ", skipped " + odometry.dropped());
+        server.send("p3at/odometry", odometryAt(800_000));
+        System.out.println("newest " + odometry.next().utime + ", lost " + odometry.dropped());
+        goOn.release(5);
+        begun.acquire(4);
+        int many = 20_000;
+        for (int i = 0; i < many; i++) server.send("p3at/odometry", odometryAt(900_000 + i));
+        begun.acquire();
+        goOn.release(many);
+        while (!server.sim.callbacks.isIdle()) Thread.sleep(10);
+        System.out.println("heard " + heard.subList(0, 5));
+        System.out.println("all " + (heard.size() - 5 + odometry.core.missed() == many));
+    }
+
+    /** A primitive is sent again until a status shows it, or another command has replaced it. */
+    private static void resends() throws InterruptedException {
+        BlockingQueue<byte[]> sent = new LinkedBlockingQueue<>();
+        Server server =
+                new Server() {
+                    @Override
+                    public void publish(String channel, byte[] message) {
+                        if (channel.equals("p3at/move")) sent.add(message);
+                        super.publish(channel, message);
+                    }
+                };
+        Robot robot = server.connect().robot("p3at");
+        robot.advance(1.0);
+        byte[] first = sent.take();
+        System.out.println("again " + Arrays.equals(first, sent.take()));
+        Motion motion = robot.advance(2.0);
+        byte[] second = sent.take();
+        while (Arrays.equals(first, second)) second = sent.take(); // it was on its way
+        for (int i = 0; i < 3; i++)
+            System.out.println("again " + Arrays.equals(second, sent.take()));
+        motion_status_t status = new motion_status_t();
+        status.id = motion.id;
+        status.state = motion_status_t.STATE_RUNNING;
+        server.send("p3at/motion", status);
+        Thread.sleep(100); // for one on its way
+        sent.clear();
+        System.out.println("shown " + (sent.poll(1200, TimeUnit.MILLISECONDS) == null));
+    }
+
+    /** What a server that the client launched is told of it. */
+    private static void progress() throws InterruptedException {
+        BlockingQueue<String> lines = new LinkedBlockingQueue<>();
+        Progress progress = new Progress();
+        progress.use(1); // nobody is told yet
+        progress.begin(lines::add);
+        System.out.print("first " + Progress.first());
+        progress.received(0, 25_000);
+        System.out.print("received " + lines.take());
+        progress.use(25_000);
+        long begun = System.nanoTime();
+        System.out.println("used " + usedAfter(lines.take(), 25_000, begun));
+        Thread.sleep(50);
         System.out.println(
-                "received "
-                        + !receiving.isAlive()
-                        + " "
-                        + heard.tryAcquire()
-                        + " "
-                        + motion.done());
+                "goes on " + progress.goOn() + " " + usedAfter(lines.take(), 75_000, begun));
+        progress.waits();
+        System.out.print("waits " + lines.take());
+        System.out.println("said again " + progress.goOn());
+        progress.use(30_000);
+        lines.take();
+        Thread.sleep(600); // it does something else
+        progress.goOn();
+        System.out.print("forgotten " + lines.take());
+        progress.use(30_000);
+        lines.take();
+        progress.received(1, 0);
+        System.out.print("reset " + lines.take());
+        for (int i = 0; i < 1000; i++) progress.received(1, i); // nothing is heard of the server
+        System.out.println("stopped " + (lines.size() < 300));
+        lines.clear();
+        progress.heard();
+        System.out.print("heard " + lines.take());
+    }
+
+    /** Whether it is at least that, and at most as much as real time has gone on. */
+    private static boolean usedAfter(String line, long least, long since) {
+        long used = Long.parseLong(line.trim().split(" ")[2]);
+        return used >= least && used <= 25_000 + (System.nanoTime() - since) / 1000 + 1000;
     }
 
     private static byte[] part(int number, int count, int size) {
@@ -354,7 +466,7 @@ public final class Internals {
     }
 
     /** The program's end waits for that of the simulation, which its callback has begun. */
-    private static void exits() {
+    private static void exits() throws InterruptedException {
         LosingServer server = new LosingServer();
         Simulation sim = server.connect();
         sim.pause();
@@ -368,6 +480,7 @@ public final class Internals {
         odometry_t odometry = new odometry_t();
         odometry.utime = 1000;
         server.send("p3at/odometry", odometry);
+        new CountDownLatch(1).await();
     }
 
     public static void main(String[] args) throws InterruptedException {
@@ -377,6 +490,15 @@ public final class Internals {
                 break;
             case "monitors":
                 monitors();
+                break;
+            case "callbacks":
+                callbacks();
+                break;
+            case "resends":
+                resends();
+                break;
+            case "progress":
+                progress();
                 break;
             case "parts":
                 parts();

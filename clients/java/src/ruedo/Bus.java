@@ -1,7 +1,5 @@
 package ruedo;
 
-import static java.util.concurrent.TimeUnit.SECONDS;
-
 import ruedo.lcmtypes.Message;
 
 import java.io.ByteArrayOutputStream;
@@ -11,8 +9,10 @@ import java.util.ArrayList;
 import java.util.List;
 import java.util.Map;
 import java.util.concurrent.ConcurrentHashMap;
+import java.util.concurrent.locks.LockSupport;
 import java.util.concurrent.locks.ReentrantLock;
 import java.util.function.Consumer;
+import java.util.function.LongSupplier;
 
 /**
  * The messages of a client: raw bytes to handlers. Thread safe; the transport's thread calls the
@@ -23,11 +23,13 @@ final class Bus implements Transport.Receiver {
     private final Map<String, List<Subscription>> handlers =
             new ConcurrentHashMap<>(); // lists are never changed
     private static final int LARGEST = 4 << 20; // bytes: what a server takes from a client
-    private static final long LONG_SECONDS = 5; // for a callback
-    private final ReentrantLock delivering = new ReentrantLock(); // while handlers are called
-    private volatile Thread receiving; // the one that calls them; null: nothing came yet
-    private boolean told; // of a handler that is waited for; under this object's monitor
+    private static final double CATCH_UP_SECONDS = 0.05;
+    private static final long LOOK_NANOS = 50_000;
+    private final ReentrantLock delivering = new ReentrantLock(true); // while handlers are called
     private volatile boolean closed;
+
+    /** What the receiving thread does each time before it waits; returns for how long, ms. */
+    volatile LongSupplier beforeTurn = () -> 1000;
 
     /** The one that this thread is in a handler of. */
     private static final ThreadLocal<Bus> HANDLING = new ThreadLocal<>();
@@ -66,8 +68,12 @@ final class Bus implements Transport.Receiver {
     }
 
     @Override
+    public long beforeTurn() {
+        return beforeTurn.getAsLong();
+    }
+
+    @Override
     public void receive(String channel, byte[] message) {
-        receiving = Thread.currentThread();
         HANDLING.set(this);
         delivering.lock();
         try {
@@ -77,7 +83,22 @@ final class Bus implements Transport.Receiver {
         } finally {
             delivering.unlock();
             HANDLING.remove();
+            Thread.interrupted(); // it was for a handler, not for the thread that receives
         }
+    }
+
+    /** Returns when all handlers of what came have been called. */
+    void awaitHandlers() {
+        delivering.lock();
+        delivering.unlock();
+    }
+
+    /** Returns when what waits now was handled, or after a moment: more may come all the time. */
+    void catchUp() {
+        if (handling()) return;
+        Deadline deadline = new Deadline(CATCH_UP_SECONDS);
+        while (!closed && transport.hasNews() && !deadline.passed())
+            LockSupport.parkNanos(LOOK_NANOS);
     }
 
     /** False: what is published now reaches nobody. */
@@ -85,13 +106,9 @@ final class Bus implements Transport.Receiver {
         return transport.isConnected();
     }
 
-    /** Whether this thread is in a handler: while that lasts, nothing is received. */
+    /** Whether this thread is in a handler. */
     boolean handling() {
         return HANDLING.get() == this;
-    }
-
-    static boolean inAnyHandler() {
-        return HANDLING.get() != null;
     }
 
     /** Throws RuedoException for a message that no server would take. */
@@ -130,48 +147,5 @@ final class Bus implements Transport.Receiver {
     void close() {
         closed = true;
         transport.close();
-    }
-
-    /**
-     * Waits for a handler that is running, which is named when it takes long. At the program's end
-     * it is not waited for any longer: it may be what ended the program.
-     */
-    void awaitHandler() {
-        if (returned()) return;
-        tellOfHandler();
-        while (!ProgramEnd.hasBegun() && !returned()) {} // which waits
-    }
-
-    /** Once; who waits with others goes on after it was said. */
-    private synchronized void tellOfHandler() {
-        if (told) return;
-        told = true;
-        System.err.println(
-                "ruedo: a callback has not returned for "
-                        + LONG_SECONDS
-                        + " s, at "
-                        + placeInCallback()
-                        + (ProgramEnd.hasBegun()
-                                ? ": the program ends without it"
-                                : ": close() waits for it"));
-    }
-
-    /** Whether no handler runs; waits for that. */
-    private boolean returned() {
-        if (!Uninterrupted.get(() -> delivering.tryLock(LONG_SECONDS, SECONDS))) return false;
-        delivering.unlock();
-        return true;
-    }
-
-    /** The innermost line of the user's, in the thread that calls the handlers. */
-    private String placeInCallback() {
-        for (StackTraceElement frame : receiving.getStackTrace()) {
-            String module = frame.getModuleName();
-            boolean ofJava =
-                    module != null && (module.startsWith("java.") || module.startsWith("jdk."));
-            if (!ofJava && !frame.getClassName().startsWith("ruedo."))
-                return frame.getFileName() + ":" + frame.getLineNumber();
-        }
-        return "a place that is not known";
     }
 }

@@ -39,14 +39,21 @@ final class Deadline {
 
     /** Until something may be done with a channel, at most until here; an interrupt is put off. */
     void select(Selector selector) throws IOException {
+        while (!selects(selector, 1000)) {
+            if (passed()) throw new InterruptedIOException("it takes too long");
+        }
+    }
+
+    /** Whether something may be done with a channel, now or within so many milliseconds. */
+    static boolean selects(Selector selector, long millis) throws IOException {
         boolean interrupted = Thread.interrupted();
         try {
-            do {
-                if (passed()) throw new InterruptedIOException("it takes too long");
-                selector.select(1000);
-                interrupted |= Thread.interrupted();
-            } while (selector.selectedKeys().isEmpty());
+            if (millis > 0) selector.select(millis);
+            else selector.selectNow();
+            interrupted |= Thread.interrupted();
+            boolean found = !selector.selectedKeys().isEmpty();
             selector.selectedKeys().clear();
+            return found;
         } catch (ClosedSelectorException error) {
             throw new IOException("it was closed", error);
         } finally {

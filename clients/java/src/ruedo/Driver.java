@@ -15,7 +15,9 @@ final class Driver {
     private final String robot;
     private String heldChannel;
     private byte[] held;
-    private List<Motion> motions = new ArrayList<>();
+    private long heldAt; // us, when it last went out by sim time
+    private List<Motion> motions = new ArrayList<>(); // the newest last
+    private String moveChannel;
     private Subscription statuses;
     private Subscription collisions;
     private String blockedBy = "";
@@ -41,8 +43,21 @@ final class Driver {
         sim.keepRepeating(this);
     }
 
+    /** What is held, and the newest primitive where no status has shown it: by real time. */
     synchronized void repeat() {
         if (held != null) sim.bus.publish(heldChannel, held);
+        else if (!motions.isEmpty()) sendIfDue(motions.get(motions.size() - 1));
+    }
+
+    /** What is held, by sim time. */
+    synchronized void repeatAt(long utime) {
+        if (held == null || (utime >= heldAt && utime - heldAt < 1000 * periodMillis())) return;
+        heldAt = utime;
+        sim.bus.publish(heldChannel, held);
+    }
+
+    private void sendIfDue(Motion motion) {
+        if (motion.isDue()) sim.bus.publish(moveChannel, motion.message);
     }
 
     /** ms of real time between repetitions: a quarter of the watchdog's time, at most 100. */
@@ -61,7 +76,8 @@ final class Driver {
 
     Motion move(String channel, move_command_t command, String kind) {
         listen();
-        Motion motion = new Motion(sim, robot, command.id, kind, Math.abs(command.value));
+        double amount = Math.abs(command.value);
+        Motion motion = new Motion(sim, robot, command.id, kind, amount, Bus.encode(command));
         synchronized (this) {
             held = null; // a repetition after this would replace the primitive
             List<Motion> underWay = new ArrayList<>();
@@ -70,9 +86,11 @@ final class Driver {
             }
             underWay.add(motion);
             motions = underWay;
+            moveChannel = channel;
             if (!ended.isEmpty()) motion.end(ended);
-            sim.bus.publish(channel, command);
+            sendIfDue(motion);
         }
+        sim.keepRepeating(this);
         return motion;
     }
 
@@ -105,11 +123,11 @@ final class Driver {
                     robot + " is gone: " + ended); // while the command was made
         if (statuses != null) return;
         try { // of a step they come before the status
-            collisions = sim.robot(robot).collisions().onSample(this::onCollisions);
+            collisions = sim.robot(robot).collisions().onArrival(this::onCollisions);
         } catch (RuedoException.UnknownName switchedOff) {
             blockedBy = ""; // a motion that is blocked does not know by what
         }
-        statuses = sim.robot(robot).motion().onSample(this::onStatus);
+        statuses = sim.robot(robot).motion().onArrival(this::onStatus);
     }
 
     private synchronized void onCollisions(Collisions sample) {

@@ -94,7 +94,7 @@ public final class LaunchOptions {
         return this;
     }
 
-    /** True: show what the server prints; else it is shown in errors alone. */
+    /** True: show all that the server prints; else its warnings alone. */
     public LaunchOptions verbose(boolean verbose) {
         this.verbose = verbose;
         return this;

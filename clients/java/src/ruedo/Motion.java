@@ -1,11 +1,17 @@
 package ruedo;
 
+import java.util.ArrayList;
+import java.util.List;
+
 /** A motion primitive under way. Thread safe. */
 public final class Motion {
-    // A primitive that no status has shown after this many statuses and seconds was lost or
-    // replaced at once.
+    // A primitive goes out again until a status shows it: messages may be lost, and the server
+    // takes each once. One that no status has shown after so many statuses and seconds reaches
+    // nobody, or was replaced at once.
+    private static final double FIRST_AGAIN = 0.1; // s of real time
+    private static final double LAST_AGAIN = 1.0;
     private static final int UNSEEN_STATUSES = 20;
-    private static final double UNSEEN_SECONDS = 1.0;
+    private static final double UNSEEN_SECONDS = 5.0;
 
     /** As {@link MotionStatus#id} shows it. */
     public final long id;
@@ -13,6 +19,7 @@ public final class Motion {
     private final Simulation sim;
     private final String robot;
     private final String kind;
+    final byte[] message; // the command
     private final Deadline unseenUntil = new Deadline(UNSEEN_SECONDS);
     private final Object lock = new Object(); // a user may hold the monitor of this object itself
     private String state = "sent"; // these under lock
@@ -21,15 +28,19 @@ public final class Motion {
     private double progress;
     private double remaining;
     private int unseen;
+    private double again = FIRST_AGAIN;
+    private Deadline untilAgain = new Deadline(0.0);
+    private final List<Thread> waiting = new ArrayList<>();
     // Of the newest status; an earlier one is another run's, or of a reset that info will tell of.
     private long utime = -1;
     private long shown = -1; // of the newest status that shows it
 
-    Motion(Simulation sim, String robot, long id, String kind, double amount) {
+    Motion(Simulation sim, String robot, long id, String kind, double amount, byte[] message) {
         this.sim = sim;
         this.robot = robot;
         this.id = id;
         this.kind = kind;
+        this.message = message;
         remaining = amount;
     }
 
@@ -91,18 +102,13 @@ public final class Motion {
      */
     public Motion await(double timeout) {
         synchronized (lock) {
-            Deadline deadline = new Deadline(timeout);
-            while (!done()) {
-                sim.checkMayWait();
-                if (deadline.passed()) {
-                    throw new RuedoException.Timeout(
-                            String.format(
-                                    "%s: %s was not done within %s s (%.3f remain)",
-                                    robot, kind, Deadline.text(timeout), remaining));
-                }
-                deadline.waitOn(lock, 500);
-                sim.checkServer();
+            waiting.add(Thread.currentThread());
+            try {
+                awaitEnd(timeout);
+            } finally {
+                waiting.remove(Thread.currentThread());
             }
+            sim.beginAfter(utime);
             if (!state.equals("done")) {
                 throw new RuedoException.MotionError(
                         String.format(
@@ -115,6 +121,32 @@ public final class Motion {
                         reason);
             }
             return this;
+        }
+    }
+
+    private void awaitEnd(double timeout) {
+        Deadline deadline = new Deadline(timeout);
+        if (!done()) sim.progress.waits();
+        while (!done()) {
+            sim.checkMayWait();
+            if (deadline.passed()) {
+                throw new RuedoException.Timeout(
+                        String.format(
+                                "%s: %s was not done within %s s (%.3f remain)",
+                                robot, kind, Deadline.text(timeout), remaining));
+            }
+            deadline.waitOn(lock, 500);
+            sim.checkServer();
+        }
+    }
+
+    /** Whether it is to be sent now: at first, and again until a status shows it. */
+    boolean isDue() {
+        synchronized (lock) {
+            if (!state.equals("sent") || !untilAgain.passed()) return false;
+            untilAgain = new Deadline(again);
+            again = Math.min(2.0 * again, LAST_AGAIN);
+            return true;
         }
     }
 
@@ -136,7 +168,7 @@ public final class Motion {
 
     void update(MotionStatus status, String blocker) {
         synchronized (lock) {
-            if (done() || status.utime < utime && !sim.isFarAhead(utime)) return;
+            if (done() || status.utime < utime && !sim.clock.isFarAhead(utime)) return;
             utime = status.utime;
             if (status.id == id) {
                 progress = status.progress;
@@ -156,6 +188,7 @@ public final class Motion {
                 state = "ended";
                 reason = "lost";
             }
+            if (done()) sim.progress.use(status.utime, waiting);
             lock.notifyAll();
         }
     }

@@ -34,10 +34,18 @@ public class Reader<T extends Sample> {
 
     /**
      * The newest sample that neither latest() nor next() has returned yet; waits for one, at most
-     * timeout seconds of real time. A reader slower than the rate skips samples; onSample() skips
-     * none.
+     * timeout seconds of real time. After await() of a motion it is one from its end or later. A
+     * reader slower than the rate skips samples, which dropped() counts; onSample() skips none.
      */
     public T next(double timeout) {
         return samples.read(place, true, timeout);
+    }
+
+    /**
+     * How many samples there were between those that this reader got: newer ones had come, or they
+     * were lost on the way.
+     */
+    public long dropped() {
+        return samples.skipped(place);
     }
 }

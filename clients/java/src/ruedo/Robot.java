@@ -213,7 +213,7 @@ public final class Robot {
     /** The same with vy, m/s to the left. */
     public Command velocityCommand(double v, double omega, double vy) {
         velocity_command_t command = new velocity_command_t();
-        command.utime = sim.utime();
+        command.utime = sim.clock.utime();
         command.vx = finite("v", v);
         command.vy = finite("vy", vy);
         command.omega = finite("omega", omega);
@@ -223,7 +223,7 @@ public final class Robot {
     /** What {@link #setWheels} sends, once, for {@link Simulation#step(long, List)}. */
     public Command wheelCommand(double left, double right) {
         wheel_command_t command = new wheel_command_t();
-        command.utime = sim.utime();
+        command.utime = sim.clock.utime();
         command.n = 2;
         command.rate = new double[] {finite("left", left), finite("right", right)};
         return new Command(input("wheel_command_t"), Bus.encode(command));
@@ -314,7 +314,7 @@ public final class Robot {
 
     private move_command_t moveMessage(byte kind, double value, double radius, Limits limits) {
         move_command_t command = new move_command_t();
-        command.utime = sim.utime();
+        command.utime = sim.clock.utime();
         command.kind = kind;
         command.value = finite("value", value);
         command.radius = finite("radius", radius);

@@ -17,7 +17,9 @@ import java.nio.file.Files;
 import java.nio.file.Path;
 import java.util.ArrayList;
 import java.util.Arrays;
+import java.util.HashSet;
 import java.util.List;
+import java.util.Set;
 import java.util.concurrent.TimeUnit;
 import java.util.concurrent.atomic.AtomicBoolean;
 
@@ -31,11 +33,15 @@ final class ServerProcess {
     private static final File SETSID = new File("/usr/bin/setsid");
 
     private static final int MOST_SAID = 1 << 16; // bytes of its last lines
+    private static final int MOST_HEARD = 1 << 16; // bytes of warnings that are read at once
+    private static final int MOST_WARNED = 1000; // warnings, each of which is said once
 
     final String url;
     private final List<String> command;
     private final Process process;
-    private RandomAccessFile output; // what it prints; null when verbose
+    private RandomAccessFile output; // its warnings and errors; null when verbose
+    private long heard; // bytes of it that warnings() has read
+    private final Set<String> warned = new HashSet<>();
     private ServerSocket token; // see freeUrl()
     private Path folder; // of the socket; null: not made
     private Path file; // of a world's text; null: the world is somebody's own
@@ -55,6 +61,7 @@ final class ServerProcess {
             addTemporary(folder);
             addTemporary(file);
             process = started(options.verbose);
+            tell(Progress.first()); // the run waits at its beginning until this client joins
             started = true;
         } finally {
             if (!started) cleanUp();
@@ -76,7 +83,7 @@ final class ServerProcess {
             Path log = Files.createTempFile("ruedo-", ".log");
             try {
                 output = new RandomAccessFile(log.toFile(), "r");
-                return builder.redirectErrorStream(true).redirectOutput(log.toFile()).start();
+                return builder.redirectOutput(Redirect.DISCARD).redirectError(log.toFile()).start();
             } finally { // it lives on without a name, for as long as it is open
                 Files.delete(log);
             }
@@ -139,6 +146,40 @@ final class ServerProcess {
 
     private static void sayOnce(String line) {
         if (said.compareAndSet(false, true)) System.err.println(line);
+    }
+
+    /** How far this client has come. Not from two threads at once. */
+    void tell(String line) {
+        try {
+            process.getOutputStream().write(line.getBytes(StandardCharsets.US_ASCII));
+            process.getOutputStream().flush();
+        } catch (IOException error) {
+            // it has ended
+        }
+    }
+
+    /** What the server has warned of since the last call, each once. */
+    synchronized List<String> warnings() {
+        List<String> news = new ArrayList<>();
+        if (output == null) return news;
+        try {
+            byte[] said = new byte[(int) Math.min(output.length() - heard, MOST_HEARD)];
+            output.seek(heard);
+            output.readFully(said);
+            int end = said.length; // of its last whole line
+            while (end > 0 && said[end - 1] != '\n') end--;
+            heard += end;
+            for (String line : new String(said, 0, end, StandardCharsets.UTF_8).split("\n")) {
+                String warning = WireReader.printed(line);
+                if (line.isEmpty() || line.startsWith("ruedo: info:") || warned.contains(warning))
+                    continue;
+                if (warned.size() < MOST_WARNED) warned.add(warning);
+                news.add(warning);
+            }
+        } catch (IOException error) {
+            // end() has closed it
+        }
+        return news;
     }
 
     /** How the server ended, with the last lines it printed; null while it runs. */

@@ -252,7 +252,7 @@ final class Session {
 
     private void send(int kind, long toSession, long number, byte[] body, int epoch) {
         request_t request = new request_t();
-        request.utime = sim.utime();
+        request.utime = sim.clock.utime();
         request.run_id = runId;
         request.epoch = epoch;
         request.session = toSession;

@@ -36,8 +36,10 @@ public final class Simulation implements AutoCloseable {
     private static final long SEEK_NANOS = 1_000_000_000;
     private static final double REPLY_SECONDS = 5.0;
     private static final long ASK_AGAIN_NANOS = 500_000_000;
-    private static final long MOST_AHEAD_MICROS = 1_000_000; // ticks come ten times a second
     private static final long FAULT_NANOS = 1_000_000_000;
+    private static final long LISTEN_NANOS = 200_000_000; // to the server's warnings
+    private static final long TURN_MILLIS = 100; // of the receiving thread
+    private static final long TURN_IN_USE_MILLIS = 10;
     private static final double SLOW_REPLY_SECONDS = 60.0;
     private static final double RESTORE_SECONDS = 3600.0;
 
@@ -45,6 +47,9 @@ public final class Simulation implements AutoCloseable {
     public final String url;
 
     final Bus bus;
+    final Progress progress = new Progress();
+    final Clock clock = new Clock(progress);
+    final CallbackQueue callbacks = new CallbackQueue();
     private final Address address;
     private final ServerProcess server; // null: not ours
     private final Session session;
@@ -58,13 +63,13 @@ public final class Simulation implements AutoCloseable {
     private static final Map<Long, Integer> joined =
             new ConcurrentHashMap<>(); // by run: how many clients of this process have joined it
     private final AtomicLong ids; // the newest primitive's
+    private final ThreadLocal<Long> ends = new ThreadLocal<>(); // us, of the last motion awaited
     private final Object news = new Object(); // a user may hold the monitor of this object itself
     private WorldInfo known; // these under news
     private RuedoException fault; // of an info that cannot be read
     private long faultAt; // the first
     private Thread repeater;
-    private volatile long utime;
-    private volatile long lastSign = System.nanoTime();
+    private long listenedAt = System.nanoTime(); // the receiving thread's
     private volatile long asked = System.nanoTime(); // for info
     private volatile long soughtAt = System.nanoTime() - SEEK_NANOS; // the server, in its silence
     private volatile boolean there;
@@ -90,6 +95,7 @@ public final class Simulation implements AutoCloseable {
         session = new Session(this, name);
         stepper = new Stepper(this, session);
         bus = new Bus(transport == null ? Transport.open(address) : transport);
+        if (server != null) bus.beforeTurn = this::beforeTurn;
         bus.subscribe("ruedo/info", this::onInfo);
         bus.subscribe("ruedo/tick", this::onTick);
         bus.subscribe("ruedo/reply", session::receive);
@@ -100,6 +106,8 @@ public final class Simulation implements AutoCloseable {
             bus.close();
             throw error;
         }
+        if (server != null || lockstep()) callbacks.keepAll();
+        if (server != null && !lockstep()) progress.begin(server::tell);
         ids = new AtomicLong(idsFrom(name, info()));
     }
 
@@ -139,7 +147,7 @@ public final class Simulation implements AutoCloseable {
 
     /** Sim time of the newest message that came, s. */
     public double time() {
-        return utime * 1e-6;
+        return clock.utime() * 1e-6;
     }
 
     /** As ruedo/info last said it. */
@@ -168,9 +176,9 @@ public final class Simulation implements AutoCloseable {
     }
 
     /**
-     * Calls back in the receiving thread when another server, or the same one restarted, answers at
-     * this address. Commands are not repeated into the new run, and primitives under way have
-     * ended.
+     * Calls back, in the thread of the callbacks, when another server, or the same one restarted,
+     * answers at this address. Commands are not repeated into the new run, and primitives under way
+     * have ended.
      */
     public Subscription onNewRun(Runnable callback) {
         checkOpen();
@@ -182,17 +190,7 @@ public final class Simulation implements AutoCloseable {
     /** Waits until so many seconds of sim time have passed. */
     public void sleep(double seconds) {
         checkMayWait();
-        Deadline never = new Deadline(Double.POSITIVE_INFINITY);
-        long left = Math.round(seconds * 1e6);
-        synchronized (news) {
-            for (long before = utime; left > 0; ) {
-                never.waitOn(news, 500);
-                checkServer();
-                long now = utime;
-                left -= Math.max(0, now - before); // time may be set back
-                before = now;
-            }
-        }
+        clock.sleep(Math.round(seconds * 1e6), this::checkServer);
     }
 
     // Control.
@@ -227,7 +225,7 @@ public final class Simulation implements AutoCloseable {
     public Observations step(long n, List<Command> commands, double timeout) {
         if (lockstep()) {
             Observations observations = stepper.step(n, commands, timeout);
-            noteTime(observations.utime);
+            clock.note(observations.utime);
             return observations;
         }
         if (!commands.isEmpty()) {
@@ -235,6 +233,7 @@ public final class Simulation implements AutoCloseable {
                     "commands go with steps where the server runs in lockstep: start it with "
                             + "`ruedo run --lockstep N`");
         }
+        progress.waits();
         step_request_t body = new step_request_t();
         body.steps = n;
         return new Observations(
@@ -278,7 +277,7 @@ public final class Simulation implements AutoCloseable {
         body.seed = seed;
         session.request(request_t.RESET, body, SLOW_REPLY_SECONDS);
         if (what == Reset.POSES) return;
-        utime = 0;
+        clock.reset(0);
         stepper.forget();
     }
 
@@ -400,7 +399,7 @@ public final class Simulation implements AutoCloseable {
      */
     public State restore(String name) {
         State state = State.of(session.request(request_t.RESTORE, nameBody(name), RESTORE_SECONDS));
-        utime = state.utime;
+        clock.reset(state.utime);
         stepper.forget();
         return state;
     }
@@ -419,7 +418,7 @@ public final class Simulation implements AutoCloseable {
     @Override
     public void close() {
         if (closing.compareAndSet(false, true)) {
-            // A callback's thread is what receives the answer to a LEAVE, and any other may be
+            // A callback is not to wait for the answer to a LEAVE, and any other thread may be
             // interrupted: one of its own waits, and the program's end for that. It starts before
             // anyone sees that this is closed.
             Thread ending = new Thread(this::end, "ruedo-close");
@@ -427,9 +426,9 @@ public final class Simulation implements AutoCloseable {
             ending.start();
             sayClosed();
         }
-        if (Bus.inAnyHandler()) return;
+        if (CallbackQueue.inAnyCallback()) return;
         Uninterrupted.get(this::awaitEnd);
-        bus.awaitHandler();
+        callbacks.awaitCallback();
     }
 
     private void sayClosed() {
@@ -437,6 +436,8 @@ public final class Simulation implements AutoCloseable {
             closed = true;
             news.notifyAll();
         }
+        clock.wake();
+        callbacks.close();
     }
 
     private void end() {
@@ -484,10 +485,6 @@ public final class Simulation implements AutoCloseable {
                         + (all.isEmpty() ? "none" : String.join(", ", all.keySet())));
     }
 
-    long utime() {
-        return utime;
-    }
-
     Stepper stepper() {
         return stepper;
     }
@@ -496,25 +493,24 @@ public final class Simulation implements AutoCloseable {
         return ids.incrementAndGet();
     }
 
-    void noteTime(long now) {
-        synchronized (news) {
-            utime = Math.max(utime, now);
-            lastSign = System.nanoTime();
-            news.notifyAll();
-        }
+    /** This thread works with what is known now. A callback is waited for anyway. */
+    void noteUse() {
+        if (!isCalledBack()) progress.use(clock.utime());
     }
 
-    /** No message of this run is so far yet: it was false. */
-    boolean isFarAhead(long time) {
-        return time - MOST_AHEAD_MICROS > utime;
+    /** A motion ended then, and this thread knows: next() of any stream gives nothing older. */
+    void beginAfter(long utime) {
+        ends.set(utime);
     }
 
-    /** What another message said of a time long after a tick's was false. */
-    private void noteTick(long now) {
-        synchronized (news) {
-            if (now < utime - MOST_AHEAD_MICROS) utime = Math.max(now, 0);
-            noteTime(now);
-        }
+    /** us of sim time, which may have been reset since. */
+    long notBefore() {
+        Long utime = ends.get();
+        return utime == null ? Long.MIN_VALUE : Math.min(utime, clock.utime());
+    }
+
+    private boolean isCalledBack() {
+        return callbacks.runsHere() || bus.handling();
     }
 
     boolean isClosed() {
@@ -526,15 +522,15 @@ public final class Simulation implements AutoCloseable {
     }
 
     /**
-     * Before waiting for what the server sends. Throws NoServer; RuedoException in a callback,
-     * which is what would receive it.
+     * Before waiting for what the server sends. Throws NoServer; RuedoException in a callback: the
+     * server may wait for that.
      */
     void checkMayWait() {
         checkOpen();
-        if (bus.handling()) {
+        if (isCalledBack()) {
             throw new RuedoException(
-                    "a callback cannot wait for the server, since nothing is received until it"
-                            + " returns: make this call in another thread");
+                    "a callback cannot wait for the server, which may wait for it to return: make"
+                            + " this call in another thread");
         }
     }
 
@@ -542,7 +538,7 @@ public final class Simulation implements AutoCloseable {
         checkOpen();
         String ended = server == null ? null : server.ended();
         if (ended != null) throw new RuedoException.NoServer(ended);
-        if (silence() > SILENCE_SECONDS && !isThere()) {
+        if (clock.silence() > SILENCE_SECONDS && !isThere()) {
             throw new RuedoException.NoServer(
                     "nothing was heard from the server at " + url + " for 5 s");
         }
@@ -562,8 +558,9 @@ public final class Simulation implements AutoCloseable {
     }
 
     String whatIsKnown(double rate) {
-        if (silence() > 3.0)
-            return String.format("nothing at all was heard from the server for %.1f s", silence());
+        double silence = clock.silence();
+        if (silence > 3.0)
+            return String.format("nothing at all was heard from the server for %.1f s", silence);
         if (paused()) return "the simulation is paused";
         return rate > 0.0
                 ? String.format(
@@ -579,10 +576,6 @@ public final class Simulation implements AutoCloseable {
             repeater = new LastingThread("ruedo-repeat", () -> closed, this::repeat);
             repeater.start();
         }
-    }
-
-    private double silence() {
-        return (System.nanoTime() - lastSign) * 1e-9;
     }
 
     /** Feeds the watchdogs in real time. */
@@ -643,7 +636,7 @@ public final class Simulation implements AutoCloseable {
         List<Driver> all;
         List<StreamCore<?>> known;
         watch.begin();
-        utime = info().head.utime;
+        clock.reset(info().head.utime);
         synchronized (robots) {
             all = new ArrayList<>(drivers.values());
             known = new ArrayList<>(streams.values());
@@ -653,8 +646,10 @@ public final class Simulation implements AutoCloseable {
         for (StreamCore<?> stream : known) stream.forget();
         System.err.println(
                 "ruedo: another run has begun at " + url + ": commands are not repeated into it");
-        if (closed) return;
-        for (Subscription callback : newRun) callback.call(null);
+        callbacks.put(
+                () -> {
+                    for (Subscription callback : newRun) callback.call(null);
+                });
     }
 
     private void onInfo(byte[] message) {
@@ -672,13 +667,14 @@ public final class Simulation implements AutoCloseable {
             before = known;
             if (wrong != null && fault == null) faultAt = System.nanoTime();
             if (wrong != null) fault = wrong;
-            if (wrong == null) lastSign = System.nanoTime();
             if (info != null) {
-                if (before == null || before.head.epoch != info.head.epoch) utime = info.head.utime;
+                if (before == null || before.head.epoch != info.head.epoch)
+                    clock.reset(info.head.utime);
                 known = info;
             }
             news.notifyAll();
         }
+        if (wrong == null) clock.noteSign();
         if (info == null) return;
         stepper.onInfo(info);
         if (before != null && before.head.epoch != info.head.epoch) {
@@ -698,14 +694,34 @@ public final class Simulation implements AutoCloseable {
             if (in.int64() != tick_t.LCM_FINGERPRINT) return;
             long now = in.int64();
             if (!isOfOurRun(in.int64(), false)) return;
-            noteTick(now);
+            int epoch = in.int32();
+            clock.noteTick(now);
             stepper.onTick(message);
+            // Sim time may run a hundred times faster than real time: the watchdog is fed by its
+            // beat, too.
+            for (Driver driver : repeating) driver.repeatAt(now);
+            if (progress.isTold()) noteProgress(epoch, now);
         } catch (IOException error) {
-            return;
+            // broken
         }
-        // Sim time may run a hundred times faster than real time: the watchdog is fed by its beat,
-        // too.
-        for (Driver driver : repeating) driver.repeat();
+    }
+
+    /** What was sent up to that time has come. */
+    private void noteProgress(int epoch, long utime) {
+        if (callbacks.isIdle()) progress.received(epoch, utime);
+        else callbacks.put(() -> progress.received(epoch, utime));
+    }
+
+    /**
+     * Prints what the launched server has warned of, and tells it again how far this program is.
+     */
+    private long beforeTurn() {
+        if (System.nanoTime() - listenedAt >= LISTEN_NANOS) {
+            listenedAt = System.nanoTime();
+            for (String warning : server.warnings())
+                System.err.println("ruedo: the server: " + warning);
+        }
+        return progress.goOn() ? TURN_IN_USE_MILLIS : TURN_MILLIS;
     }
 
     /**

@@ -110,6 +110,7 @@ final class Stepper {
         this.session = session;
     }
 
+    /** Its caller runs the callbacks of what came, before it returns. */
     Observations step(long n, List<Command> commands, double timeout) {
         if (n < 0) throw new IllegalArgumentException("n is " + n + ": it must be at least 0");
         for (Command command : commands) {
@@ -124,6 +125,16 @@ final class Stepper {
                             + " is allowed");
         }
         sim.checkMayWait();
+        sim.callbacks.borrow();
+        try {
+            return stepInTurn(n, commands, timeout);
+        } finally {
+            sim.bus.awaitHandlers(); // which put them into the queue
+            sim.callbacks.drain();
+        }
+    }
+
+    private Observations stepInTurn(long n, List<Command> commands, double timeout) {
         synchronized (session) { // its turn: other requests wait
             sim.checkOpen();
             if (!takesPart()) {

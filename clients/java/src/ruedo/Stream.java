@@ -37,12 +37,29 @@ public class Stream<T extends Sample> extends Reader<T> {
     }
 
     /**
-     * Calls back in the receiving thread for every sample from now on, until what it returns is
-     * closed (or the simulation). The callback must be quick, and cannot wait for other samples or
-     * replies: such a call throws RuedoException.
+     * How many samples latest() and next() have skipped, since newer ones had come, or were lost on
+     * the way; and how many a callback did not get, which was slower than they came.
+     */
+    @Override
+    public long dropped() {
+        return super.dropped() + core.missed();
+    }
+
+    /**
+     * Calls back for every sample from now on, until what it returns is closed (or the simulation).
+     * All callbacks run in one thread of their own, one at a time, in the order in which the
+     * samples came. A server that launch() started waits for them; with another one, and more than
+     * a megabyte of samples behind, they get the newest of each channel ({@link #dropped()}). In
+     * lockstep they run in the thread that calls step(), before it returns. A callback cannot wait
+     * for other samples or replies: such a call throws RuedoException.
      */
     public Subscription onSample(Consumer<? super T> callback) {
         return core.onSample(callback);
+    }
+
+    /** The same in the receiving thread, for what is this package's own. */
+    Subscription onArrival(Consumer<? super T> callback) {
+        return core.onArrival(callback);
     }
 
     @Override

@@ -3,20 +3,61 @@ package ruedo;
 import ruedo.lcmtypes.channel_info_t;
 
 import java.io.IOException;
+import java.nio.ByteBuffer;
+import java.util.ArrayList;
 import java.util.List;
 import java.util.concurrent.CopyOnWriteArrayList;
+import java.util.concurrent.atomic.AtomicLong;
 import java.util.function.Consumer;
 
 /**
  * The samples of a channel, decoded in one way: all streams of it share them, whatever ruedo/info
- * said of the channel when each was made. Thread safe.
+ * said of the channel when each was made. The receiving thread keeps the newest message as it came;
+ * it is decoded by who asks for it, and in the thread of the callbacks. Thread safe.
  *
  * @param <T> kind of sample
  */
 final class StreamCore<T extends Sample> {
+    private static final long NO_TIME = Long.MAX_VALUE; // its type does not say
+    private static final int UTIME_AT = 8; // in all of the server's own types
+
+    /** Periods: gaps of samples that are taken at whole steps tell no more than that. */
+    private static final double MOST_UNEVEN = 0.25;
+
     /** How far a reader has come. */
     static final class Place {
-        private long seen; // of the samples received, the newest that a call has returned
+        private long seen; // of the samples of the stream, the newest that a call has returned
+        private long skipped;
+    }
+
+    /** A message as it came. */
+    private final class Arrival {
+        final byte[] message;
+        final long utime; // us
+        private volatile T sample;
+
+        Arrival(byte[] message) {
+            this.message = message;
+            boolean timed = hasTime && message.length >= UTIME_AT + 8;
+            utime = timed ? ByteBuffer.wrap(message).getLong(UTIME_AT) : NO_TIME;
+        }
+
+        /** Decoded once; by two threads at most twice. */
+        T sample() {
+            if (sample == null) sample = decoded(message);
+            return sample;
+        }
+
+        void callBack() {
+            T decoded;
+            try {
+                decoded = sample();
+            } catch (RuedoException error) {
+                fail(error);
+                return;
+            }
+            for (Subscription callback : callbacks) callback.call(decoded);
+        }
     }
 
     final Simulation sim;
@@ -24,10 +65,16 @@ final class StreamCore<T extends Sample> {
     final String type;
     final Conversions.Conversion conversion; // null: there is none for the type
     final Place place = new Place(); // of the streams, where they are readers themselves
+    private final boolean hasTime;
+    private final double period; // us; 0: what is missing cannot be told
+    private final List<Subscription> arrivals = new CopyOnWriteArrayList<>(); // the package's own
     private final List<Subscription> callbacks = new CopyOnWriteArrayList<>();
-    private Subscription source; // these under this object's monitor
-    private T sample;
-    private long count; // samples received
+    private final AtomicLong missed = new AtomicLong(); // by the callbacks
+    private final List<Thread> waiting = new ArrayList<>(); // these under this object's monitor
+    private Subscription source;
+    private Arrival newest;
+    private long count; // samples that came or were lost
+    private long lastUtime = NO_TIME;
     private RuedoException fault;
 
     StreamCore(Simulation sim, channel_info_t info, Conversions.Conversion conversion) {
@@ -35,12 +82,24 @@ final class StreamCore<T extends Sample> {
         channel = info.name;
         type = info.type;
         this.conversion = conversion;
+        hasTime = Conversions.of(type) != null;
+        double steps = sim.info().head.step_us * 1e-6 * info.rate; // in a period
+        period = info.rate > 0.0 && steps <= MOST_UNEVEN ? 1e6 / info.rate : 0.0;
     }
 
     Subscription onSample(Consumer<? super T> callback) {
-        Subscription subscription = Subscription.of(channel, callback, callbacks::remove);
+        return add(callbacks, callback);
+    }
+
+    /** In the receiving thread, for what is this package's own. */
+    Subscription onArrival(Consumer<? super T> callback) {
+        return add(arrivals, callback);
+    }
+
+    private Subscription add(List<Subscription> all, Consumer<? super T> callback) {
+        Subscription subscription = Subscription.of(channel, callback, all::remove);
         subscribe();
-        callbacks.add(subscription);
+        all.add(subscription);
         return subscription;
     }
 
@@ -77,8 +136,9 @@ final class StreamCore<T extends Sample> {
 
     /** What came is of a run that has ended. */
     synchronized void forget() {
-        sample = null;
+        newest = null;
         fault = null;
+        lastUtime = NO_TIME;
     }
 
     private RuedoException.TypeMismatch mismatch(long found) {
@@ -97,47 +157,119 @@ final class StreamCore<T extends Sample> {
                         channel, type, found, conversion.fingerprint, sim.version()));
     }
 
+    private RuedoException.TypeMismatch invalid(byte[] message, IOException error) {
+        return new RuedoException.TypeMismatch(
+                channel
+                        + ": a message of "
+                        + message.length
+                        + " bytes is no valid "
+                        + type
+                        + ": "
+                        + error.getMessage());
+    }
+
     @SuppressWarnings("unchecked")
-    private void receive(byte[] message) {
-        if (sim.isClosed() || sim.inDoubt()) return;
-        T received = null;
-        RuedoException wrong = null;
+    private T decoded(byte[] message) {
         try {
             WireReader in = new WireReader(message);
-            long found = in.int64();
-            if (!conversion.reads(found)) throw mismatch(found);
-            received = (T) conversion.decoder.decode(in);
-        } catch (RuedoException error) {
-            wrong = error;
+            in.int64(); // fingerprint
+            return (T) conversion.decoder.decode(in);
         } catch (IOException error) {
-            wrong =
-                    new RuedoException.TypeMismatch(
-                            channel
-                                    + ": a message of "
-                                    + message.length
-                                    + " bytes is no valid "
-                                    + type
-                                    + ": "
-                                    + error.getMessage());
+            throw invalid(message, error);
         }
-        synchronized (this) {
-            fault = wrong;
-            if (received != null) {
-                sample = received;
-                count++;
-            }
-            notifyAll();
+    }
+
+    private void receive(byte[] message) {
+        if (sim.isClosed() || sim.inDoubt()) return;
+        Arrival arrival = new Arrival(message);
+        T sample = null;
+        try {
+            long found = new WireReader(message).int64();
+            if (!conversion.reads(found)) throw mismatch(found);
+            if (!arrivals.isEmpty()) sample = arrival.sample();
+        } catch (RuedoException error) {
+            fail(error);
+            return;
+        } catch (IOException error) {
+            fail(invalid(message, error));
+            return;
         }
-        if (received == null) return;
-        if (received.utime != 0) sim.noteTime(received.utime);
-        for (Subscription callback : callbacks) callback.call(received);
+        if (arrival.utime != NO_TIME) sim.clock.note(arrival.utime);
+        take(arrival);
+        if (sample != null) for (Subscription own : arrivals) own.call(sample);
+        if (!callbacks.isEmpty()) sim.callbacks.put(arrival::callBack, this, message.length);
+    }
+
+    private synchronized void take(Arrival arrival) {
+        newest = arrival;
+        fault = null;
+        count += 1 + lostBefore(arrival.utime);
+        if (!waiting.isEmpty()) sim.progress.use(sim.clock.utime(), waiting);
+        waiting.clear(); // who waits on says so
+        notifyAll();
+    }
+
+    /** Whatever came, the receiving thread lives. */
+    private synchronized void fail(RuedoException error) {
+        fault = error;
+        notifyAll();
+    }
+
+    /** How many samples are missing since the last one. */
+    private long lostBefore(long utime) {
+        long last = lastUtime;
+        lastUtime = utime;
+        if (period == 0.0 || last == NO_TIME || utime == NO_TIME || utime <= last) return 0;
+        return Math.max(0, Math.round((utime - last) / period) - 1);
+    }
+
+    /** A callback does not get a sample. */
+    void miss() {
+        missed.incrementAndGet();
+    }
+
+    long missed() {
+        return missed.get();
+    }
+
+    synchronized long skipped(Place reader) {
+        return reader.skipped;
     }
 
     T read(Place reader, boolean newOne, double timeout) {
         subscribe();
-        Deadline deadline = new Deadline(timeout);
+        sim.noteUse();
+        sim.bus.catchUp();
+        long notBefore = newOne ? sim.notBefore() : Long.MIN_VALUE;
+        Arrival arrival;
         synchronized (this) {
-            while (sample == null || (newOne && count == reader.seen)) {
+            if (!serves(reader, newOne, notBefore)) await(reader, newOne, notBefore, timeout);
+            arrival = newest;
+            if (reader.seen > 0) reader.skipped += Math.max(0, count - reader.seen - 1);
+            reader.seen = count;
+        }
+        sim.noteUse();
+        try {
+            return arrival.sample();
+        } catch (RuedoException error) {
+            synchronized (this) {
+                if (newest == arrival) newest = null;
+            }
+            throw error;
+        }
+    }
+
+    /** Whether the newest sample is what the reader wants. */
+    private boolean serves(Place reader, boolean newOne, long notBefore) {
+        if (newest == null || !newOne) return newest != null;
+        return reader.seen != count && newest.utime >= notBefore;
+    }
+
+    private void await(Place reader, boolean newOne, long notBefore, double timeout) {
+        Deadline deadline = new Deadline(timeout);
+        Thread me = Thread.currentThread();
+        try {
+            while (!serves(reader, newOne, notBefore)) {
                 if (fault != null) {
                     RuedoException thrown = fault;
                     fault = null;
@@ -150,11 +282,15 @@ final class StreamCore<T extends Sample> {
                                     "no sample on %s within %s s (%s)",
                                     channel, Deadline.text(timeout), whatIsKnown()));
                 }
+                if (!waiting.contains(me)) {
+                    sim.progress.waits();
+                    waiting.add(me);
+                }
                 deadline.waitOn(this, 500);
                 sim.checkServer();
             }
-            reader.seen = count;
-            return sample;
+        } finally {
+            waiting.remove(me);
         }
     }
 

@@ -31,6 +31,7 @@ final class StreamSocket implements Closeable {
     private final SocketChannel channel;
     private final Selector reads = Selector.open();
     private final Selector writes = Selector.open();
+    private final Selector looks = Selector.open(); // of hasInput(), for any thread
     private volatile long readMillis; // 0: without end
 
     /** Throws IOException when nobody serves there. */
@@ -39,6 +40,7 @@ final class StreamSocket implements Closeable {
         try {
             channel.configureBlocking(false);
             channel.register(reads, SelectionKey.OP_READ);
+            channel.register(looks, SelectionKey.OP_READ);
             if (address.path == null) channel.setOption(StandardSocketOptions.TCP_NODELAY, true);
             connect(address);
             if (address.path != null) checkPeer(channel, address.path);
@@ -58,6 +60,22 @@ final class StreamSocket implements Closeable {
             key.interestOps(SelectionKey.OP_WRITE);
         } else {
             channel.register(writes, SelectionKey.OP_WRITE);
+        }
+    }
+
+    /** Waits for input, at most so long; the thread that reads. */
+    boolean awaitInput(long millis) throws IOException {
+        return Deadline.selects(reads, millis);
+    }
+
+    /** Whether there is something to read; any thread. */
+    boolean hasInput() {
+        synchronized (looks) {
+            try {
+                return Deadline.selects(looks, 0);
+            } catch (IOException error) { // it was closed
+                return false;
+            }
         }
     }
 
@@ -104,6 +122,7 @@ final class StreamSocket implements Closeable {
         channel.close();
         reads.close();
         writes.close();
+        looks.close();
     }
 
     /** Java 16 has these sockets; this library is for 11. */

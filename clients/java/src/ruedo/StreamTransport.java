@@ -27,7 +27,8 @@ final class StreamTransport implements Transport {
     private final Address address;
     private final Set<String> subscriptions =
             new LinkedHashSet<>(); // these under this object's monitor
-    private StreamSocket socket; // null: not connected
+    private volatile StreamSocket socket; // null: not connected
+    private volatile boolean busy; // something was read that the receiver has not seen
     private volatile boolean closed;
 
     StreamTransport(Address address) {
@@ -64,7 +65,13 @@ final class StreamTransport implements Transport {
     }
 
     @Override
-    public synchronized boolean isConnected() {
+    public boolean hasNews() { // in this order: it is busy before it reads
+        StreamSocket open = socket;
+        return (open != null && open.hasInput()) || busy;
+    }
+
+    @Override
+    public boolean isConnected() {
         return socket != null;
     }
 
@@ -124,7 +131,7 @@ final class StreamTransport implements Transport {
     }
 
     /** The connection, reopened if necessary; null if none is possible now, or after close(). */
-    private synchronized DataInputStream input() throws InterruptedException {
+    private synchronized StreamSocket connected() throws InterruptedException {
         if (socket == null && !closed) {
             try {
                 connect();
@@ -132,17 +139,25 @@ final class StreamTransport implements Transport {
                 wait(AGAIN_MILLIS);
             }
         }
-        return socket == null
-                ? null
-                : new DataInputStream(new BufferedInputStream(socket.input(), 1 << 16));
+        return socket;
     }
 
     private void receive(Receiver receiver) throws InterruptedException {
-        DataInputStream in = input();
+        StreamSocket open = connected();
+        if (open == null) return;
+        DataInputStream in = new DataInputStream(new BufferedInputStream(open.input(), 1 << 16));
         try {
-            while (in != null && !closed) takeOne(in, receiver);
-        } catch (IOException | OutOfMemoryError error) { // it may have ended within a message
+            while (!closed) {
+                long millis = receiver.beforeTurn();
+                if (in.available() == 0 && !open.awaitInput(millis)) continue;
+                busy = true;
+                takeOne(in, receiver);
+                busy = in.available() > 0;
+            }
+        } catch (IOException | RuntimeException | Error error) { // maybe within a message
             drop();
+        } finally {
+            busy = false;
         }
     }
 

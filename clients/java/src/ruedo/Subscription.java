@@ -52,15 +52,13 @@ public final class Subscription implements AutoCloseable {
         try {
             if (taker != null) taker.accept(argument);
             else callback.run();
-        } catch (Throwable error) { // an Error, too, leaves the receiving thread alive
+        } catch (Throwable error) { // an Error, too, leaves the thread alive that calls
             if (failed) return;
             failed = true;
             Faults.tell(
                     "a callback on " + what + " failed: ",
                     error,
                     "; it is called on, and this is said once");
-        } finally {
-            Thread.interrupted(); // it was for the callback, not for the thread that receives
         }
     }
 

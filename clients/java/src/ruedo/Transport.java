@@ -10,6 +10,9 @@ interface Transport {
         /** Whether anybody listens to that channel; otherwise its messages are skipped. */
         boolean wants(String channel);
 
+        /** Before the thread waits; for how long it may, ms. */
+        long beforeTurn();
+
         /** message: all of its bytes, the receiver's from now on. */
         void receive(String channel, byte[] message);
     }
@@ -30,6 +33,11 @@ interface Transport {
 
     /** What cannot be sent is lost, as any datagram may be; unanswered requests are repeated. */
     void publish(String channel, byte[] message);
+
+    /** Whether a message waits for the receiver, or it has not seen all of one yet. */
+    default boolean hasNews() {
+        return false;
+    }
 
     /** False: nothing can be sent, since there is no server. */
     default boolean isConnected() {

@@ -81,7 +81,9 @@ final class UdpmTransport implements Transport {
     private final DatagramChannel socket;
     private final Selector reads;
     private final Selector writes;
+    private final Selector looks; // of hasNews(), for any thread
     private int sequence; // under this object's monitor
+    private volatile boolean busy; // something was read that the receiver has not seen
     private volatile boolean closed;
     // The newest last; the receiving thread's.
     private final Map<SocketAddress, Partial> partials = new LinkedHashMap<>();
@@ -104,7 +106,9 @@ final class UdpmTransport implements Transport {
             socket.configureBlocking(false);
             reads = Selector.open();
             writes = Selector.open();
+            looks = Selector.open();
             socket.register(reads, SelectionKey.OP_READ);
+            socket.register(looks, SelectionKey.OP_READ);
             socket.register(writes, SelectionKey.OP_WRITE);
         } catch (IOException | RuntimeException error) {
             throw new RuedoException.NoServer(
@@ -142,12 +146,25 @@ final class UdpmTransport implements Transport {
     public void unsubscribe(String channel) {}
 
     @Override
+    public boolean hasNews() { // in this order: it is busy before it reads
+        synchronized (looks) {
+            try {
+                if (Deadline.selects(looks, 0)) return true;
+            } catch (IOException error) {
+                return false; // it was closed
+            }
+        }
+        return busy;
+    }
+
+    @Override
     public void close() {
         closed = true;
         try {
             socket.close();
             reads.close();
             writes.close();
+            looks.close();
         } catch (IOException error) {
             // it is of no use any more
         }
@@ -202,13 +219,19 @@ final class UdpmTransport implements Transport {
 
     private void receive(ByteBuffer packet, Receiver receiver) throws IOException {
         packet.clear();
-        SocketAddress sender = socket.receive(packet);
-        if (sender == null) {
-            new Deadline(Double.POSITIVE_INFINITY).select(reads);
-            return;
+        long millis = receiver.beforeTurn();
+        busy = true;
+        try {
+            SocketAddress sender = socket.receive(packet);
+            if (sender != null) {
+                packet.flip();
+                take(packet, sender, receiver);
+                return;
+            }
+        } finally {
+            busy = false;
         }
-        packet.flip();
-        take(packet, sender, receiver);
+        Deadline.selects(reads, millis);
     }
 
     private void take(ByteBuffer in, SocketAddress sender, Receiver receiver) {

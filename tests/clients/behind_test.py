@@ -1,0 +1,93 @@
+"""Clients that are slower than the run, and networks that lose what they send."""
+
+import logging
+import re
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+import pytest
+import ruedo
+from conftest import ARENA, PATIENCE, RUEDO, probe, ruedo_run
+from lockstep_test import bad_network
+
+
+@pytest.mark.parametrize("load", [0, 4])
+@pytest.mark.parametrize("rate", ["1", "max"])
+def test_a_run_does_not_leave_its_launcher_behind(language, rate, load):
+    busy = [subprocess.Popen([sys.executable, "-c", "while True: pass"]) for _ in range(load)]
+    try:
+        said = probe(language, "-", "keeps_up", rate)
+    finally:
+        for program in busy:
+            program.kill()
+            program.wait()
+    # In real time the question itself takes some; it was 7 s before the run waited.
+    assert max(float(age) for age in said.all("age")) < (0.0501 if rate == "max" else 0.5)
+    count, gap, dropped = said.numbers("seen")
+    assert count >= 19 and gap < 0.1051 and dropped == 0
+    assert all(float(turned) < 1e-9 for turned in said.all("after"))
+    assert 0.6 < said.numbers("stands")[0] < 0.72  # 0.13 m to brake
+
+
+def test_no_primitive_is_lost_on_a_bad_network(language):
+    with (
+        ruedo_run("--rate", "20", "--disable", "p3at/camera") as server,
+        bad_network(server.url, 1, 0.2) as [url],
+    ):
+        assert probe(language, url, "many_primitives", "p3at", "200").numbers("done") == [200]
+
+
+@pytest.fixture
+def unwaited():
+    """The address of a server at the highest rate that this process did not launch."""
+    with tempfile.TemporaryDirectory() as folder:
+        url = f"unix://{folder}/bus"
+        command = [RUEDO, "run", ARENA, "--lcm", url, "--rate", "max", "--disable", "p3at/camera"]
+        with subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE) as server:
+            while not Path(folder, "bus").exists():
+                time.sleep(0.01)
+            yield url, server
+            server.terminate()
+
+
+def test_who_is_not_waited_for_gets_the_newest(unwaited, caplog):
+    url, server = unwaited
+    with ruedo.connect(url, timeout=PATIENCE) as sim:
+        robot, seen = sim.robot("p3at"), []
+
+        def work(pose):
+            seen.append(pose.time)
+            time.sleep(0.001)
+
+        with robot.pose.on_sample(work):
+            time.sleep(3.0)
+            begin = time.monotonic()
+            sim.pause()  # its reply does not wait for samples
+            assert time.monotonic() - begin < 3.0
+            stands = sim.state().time
+            deadline = time.monotonic() + PATIENCE
+            while seen[-1] < stands - 0.021 and time.monotonic() < deadline:
+                time.sleep(0.01)
+        assert seen[-1] >= stands - 0.021
+        assert robot.pose.dropped > 0
+    warnings = [record.message for record in caplog.records if "slower" in record.message]
+    assert len(warnings) <= 1
+    server.terminate()
+    told = server.stderr.read().decode()
+    assert told.count("takes its messages more slowly") + len(warnings) >= 1
+
+
+def test_a_servers_warnings_reach_the_program_once(caplog):
+    text = Path(ARENA).read_text().replace("<model name", "<model nonsense='1' name", 1)
+    with ruedo.launch(text=text, disable=["p3at/camera"]) as sim:
+        robot = sim.robot("p3at")
+        for _ in range(3):
+            sim._connection.bus.publish("p3at/velocity", b"nonsense")
+            time.sleep(1.2)
+        assert robot.pose.latest(PATIENCE)
+    told = [record.message for record in caplog.records if record.levelno == logging.WARNING]
+    ignored = [line for line in told if re.search("p3at/velocity: a message was ignored", line)]
+    assert ignored and len(ignored) == len(set(ignored))
