@@ -2,7 +2,6 @@
 #include "bus.h"
 
 #include <algorithm>
-#include <future>
 #include <limits>
 #include <map>
 #include <mutex>
@@ -14,17 +13,10 @@
 namespace ruedo::client {
 namespace {
 
-constexpr std::chrono::milliseconds kLendTime(20);
+constexpr std::chrono::milliseconds kLendTime(20), kCatchUpTime(50);
+constexpr std::chrono::microseconds kLookTime(100);
 
 thread_local const void* received_from = nullptr;  // the bus's state that this thread receives for
-
-struct Receiving {
-  explicit Receiving(const void* state) : before(std::exchange(received_from, state)) {}
-  ~Receiving() { received_from = before; }
-  Receiving(const Receiving&) = delete;
-  Receiving& operator=(const Receiving&) = delete;
-  const void* const before;
-};
 
 }  // namespace
 
@@ -35,13 +27,14 @@ struct Bus::State : std::enable_shared_from_this<Bus::State> {
 
   void receive();
   void handle(std::chrono::milliseconds timeout);
+  std::chrono::steady_clock::duration lent_for() const;
+  bool handle_in_turn(const std::function<std::chrono::milliseconds()>& timeout);
   void leave(const std::string& channel);
 
   const std::unique_ptr<Transport> transport;
   std::mutex mutex;
   std::map<std::string, std::shared_ptr<Handlers>, std::less<>> handlers;
-  std::string handled;  // the channel of the handler that runs; "": none
-  std::promise<void> ended;
+  std::function<std::chrono::milliseconds()> turn;
   std::atomic<bool> closed{false};
   std::mutex receiving;
   std::atomic<std::chrono::steady_clock::rep> lent_until{0};
@@ -52,7 +45,8 @@ Bus::Bus(std::unique_ptr<Transport> transport)
 
 Bus::~Bus() { close(); }
 
-void Bus::start() {
+void Bus::start(std::function<std::chrono::milliseconds()> turn) {
+  state_->turn = std::move(turn);
   thread_ = std::thread([state = state_] { state->receive(); });
 }
 
@@ -104,14 +98,17 @@ void Bus::stop() { state_->closed = true; }
 void Bus::close() {
   stop();
   if (!thread_.joinable()) return;
-  if (in_any_handler()) {
-    thread_.detach();
-  } else {
-    if (state_->ended.get_future().wait_for(kLongTime) == std::future_status::timeout) {
-      const std::lock_guard lock(state_->mutex);
-      if (!state_->handled.empty()) say_awaited(state_->handled);
-    }
-    thread_.join();
+  in_any_handler() ? thread_.detach() : thread_.join();
+}
+
+void Bus::catch_up() {
+  if (handling()) return;
+  const auto deadline = std::chrono::steady_clock::now() + kCatchUpTime;
+  while (!state_->closed && state_->transport->has_news() &&
+         std::chrono::steady_clock::now() < deadline) {
+    // After a step() the receiving thread sleeps for a moment.
+    if (!state_->handle_in_turn([] { return std::chrono::milliseconds(0); }))
+      std::this_thread::sleep_for(kLookTime);
   }
 }
 
@@ -120,37 +117,44 @@ bool Bus::handling() const { return received_from == state_.get(); }
 bool Bus::in_any_handler() { return received_from != nullptr; }
 
 void Bus::State::handle(std::chrono::milliseconds timeout) {
-  const Receiving receiving(this);
   transport->receive(timeout, [this](std::string_view channel, const uint8_t* bytes, size_t size) {
     std::shared_ptr<Handlers> called;
     {
       const std::lock_guard lock(mutex);
       if (const auto found = handlers.find(channel); found != handlers.end())
         called = found->second;
-      handled = channel;
     }
     if (called && !closed) called->call(bytes, size);
   });
-  const std::lock_guard lock(mutex);
-  handled.clear();
+}
+
+std::chrono::steady_clock::duration Bus::State::lent_for() const {
+  return std::chrono::steady_clock::duration(lent_until) -
+         std::chrono::steady_clock::now().time_since_epoch();
+}
+
+// Without waiting for the lock: a callback in another's turn may take for ever. False: another has
+// it.
+bool Bus::State::handle_in_turn(const std::function<std::chrono::milliseconds()>& timeout) {
+  const std::unique_lock lock(receiving, std::try_to_lock);
+  if (!lock) return false;
+  const void* const before = std::exchange(received_from, this);
+  handle(timeout());
+  received_from = before;
+  return true;
 }
 
 void Bus::State::receive() {
   while (!closed) {
-    const auto now = std::chrono::steady_clock::now().time_since_epoch();
-    const std::chrono::steady_clock::duration lent(lent_until);
-    if (now < lent) {
-      std::this_thread::sleep_for(
-          std::min<std::chrono::steady_clock::duration>(lent - now, kLendTime));
-    } else {
-      const std::lock_guard turn(receiving);
-      handle(std::chrono::milliseconds(100));
-    }
+    const auto lent = lent_for();
+    if (lent.count() <= 0 && handle_in_turn(turn)) continue;
+    std::this_thread::sleep_for(
+        std::clamp<std::chrono::steady_clock::duration>(lent, kLookTime, kLendTime));
   }
-  ended.set_value();
 }
 
-Bus::Turn::Turn(Bus& bus) : state_(bus.state_) {
+Bus::Turn::Turn(Bus& bus)
+    : state_(bus.state_), before_(std::exchange(received_from, state_.get())) {
   state_->lent_until = std::numeric_limits<std::chrono::steady_clock::rep>::max();
   state_->receiving.lock();
 }
@@ -158,6 +162,7 @@ Bus::Turn::Turn(Bus& bus) : state_(bus.state_) {
 Bus::Turn::~Turn() {
   state_->lent_until = (std::chrono::steady_clock::now() + kLendTime).time_since_epoch().count();
   state_->receiving.unlock();
+  received_from = before_;
 }
 
 void Bus::Turn::handle(std::chrono::steady_clock::duration timeout) {

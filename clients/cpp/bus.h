@@ -23,10 +23,14 @@ class Bus {
  public:
   using Handler = std::function<void(const uint8_t* bytes, size_t size)>;
 
+  static constexpr std::chrono::milliseconds kTurnTime{100};
+
   explicit Bus(std::unique_ptr<Transport> transport);
   ~Bus();
 
-  void start();  // begins to receive
+  // turn: what the receiving thread does each time before it waits; returns for how long it may.
+  // Begins to receive.
+  void start(std::function<std::chrono::milliseconds()> turn = [] { return kTurnTime; });
   [[nodiscard]] Subscription subscribe(const std::string& channel, Handler handler);
   // Throws Error for a message that is larger than what a server takes from a client.
   void publish(const std::string& channel, const uint8_t* bytes, size_t size);
@@ -34,12 +38,12 @@ class Bus {
   bool is_connected() const;  // false: what is published now reaches nobody
   void receive_eagerly();     // as Transport's
   void stop();  // nothing is received or published any more, but for the handler that runs
-  // Waits for that handler, too. In a handler, of this bus or another, its thread ends by itself:
-  // two handlers that close each other's bus do not wait for each other.
+  // Stops, and waits for that handler; one that calls this does not wait for itself or another.
   void close();
-  // This thread is in a handler of it: while that lasts, nothing is received.
-  bool handling() const;
-  static bool in_any_handler();
+  // Returns when what waits now was handled, or after a moment: more may come all the time.
+  void catch_up();
+  bool handling() const;         // this thread is what receives: meanwhile no other does
+  static bool in_any_handler();  // or it receives for another bus
 
   // Lets the caller receive in its own thread: handing each message from thread to thread takes as
   // long as receiving it. While one of these lives, and a moment longer, the receiving thread
@@ -53,6 +57,7 @@ class Bus {
 
    private:
     const std::shared_ptr<State> state_;
+    const void* const before_;  // that this thread received for
   };
 
   template <class Message>

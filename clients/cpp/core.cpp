@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cstdio>
+#include <limits>
 #include <optional>
 #include <system_error>
 #include <utility>
@@ -20,7 +21,7 @@ namespace {
 constexpr auto kAskAgain = std::chrono::milliseconds(500),
                kFaultTime = std::chrono::milliseconds(1000);
 constexpr std::chrono::seconds kLookTime(1);  // a stopped server keeps the connection of each look
-constexpr int64_t kMostAhead = 1'000'000;     // us: ticks come ten times a second
+constexpr std::chrono::milliseconds kTurnInUse(10), kListenTime(200);
 constexpr double kSilence =
     5.0;  // s of real time without any message: a server gives a sign of life each second
 
@@ -43,6 +44,9 @@ int64_t ids_from(const std::string& name, int64_t utime, uint32_t before) {
   return static_cast<int64_t>(hash & 0x7fffffffu) << 20;
 }
 
+// Two callbacks that close each other's simulation do not wait for each other.
+bool may_wait_for_callbacks() { return !CallbackQueue::any_runs_here() && !Bus::in_any_handler(); }
+
 }  // namespace
 
 Clock::time_point deadline_after(Duration time) {
@@ -62,8 +66,9 @@ Core::Core(const std::string& url, const std::string& name, std::unique_ptr<Serv
            std::unique_ptr<Transport> transport)
     : url_(url),
       server_(std::move(server)),
+      clock_(
+          [this](int64_t utime, const Progress::Threads& woken) { progress_.use(utime, woken); }),
       watch_([this](int64_t run_id) { tell_another_server(run_id); }),
-      last_sign_(Clock::now().time_since_epoch().count()),
       session_(*this, name),
       stepper_(*this),
       bus_(transport ? std::move(transport) : open_transport(url)) {}
@@ -86,7 +91,10 @@ void Core::join(Duration timeout) {
       bus_.subscribe("ruedo/reply", handler([](Core& core, const uint8_t* bytes, size_t size) {
                        core.session_.receive(bytes, size);
                      }));
-  bus_.start();
+  bus_.start([self = weak_from_this()] {
+    const auto core = self.lock();
+    return core ? core->before_turn() : Bus::kTurnTime;
+  });
   const Clock::time_point deadline = deadline_after(timeout);
   std::unique_lock lock(mutex_);
   while (!known_) {
@@ -105,6 +113,10 @@ void Core::join(Duration timeout) {
     news_.wait_for(lock, std::chrono::milliseconds(100));
   }
   ids_ = ids_from(session_.name(), known_->utime, joined_before(known_->run_id));
+  lock.unlock();
+  if (server_ || in_lockstep()) callbacks_.keep_all();
+  if (server_ && !in_lockstep())
+    progress_.begin([this](const std::string& line) { server_->tell(line); });
 }
 
 void Core::close() {
@@ -117,11 +129,13 @@ void Core::close() {
     news_.notify_all();
   }
   if (!first) {
-    if (!Bus::in_any_handler()) ended_.wait();
+    if (may_wait_for_callbacks()) ended_.wait();
     return;
   }
-  // In a callback, this thread is what receives the answer to a LEAVE: another one waits for it.
-  if (const auto self = weak_from_this().lock(); self && bus_.handling() && ends_apart(self))
+  clock_.wake();
+  callbacks_.stop();
+  // In a callback, which is what the end waits for, another thread ends it.
+  if (const auto self = weak_from_this().lock(); self && is_called_back() && ends_apart(self))
     return;
   end();
   await_callback();
@@ -146,10 +160,11 @@ void Core::end() {
   if (info()) session_.leave();
   bus_.stop();
   if (server_) server_->end();
+  bus_.close();
 }
 
 void Core::await_callback() {
-  bus_.close();
+  if (may_wait_for_callbacks()) callbacks_.await_call();
   end_.set_value();
 }
 
@@ -160,16 +175,22 @@ void Core::check_open() const {
 
 void Core::check_may_wait() const {
   check_open();
-  if (bus_.handling())
+  if (is_called_back())
     throw Error(
-        "a callback cannot wait for the server, since nothing is received until it returns: make "
-        "this call in another thread");
+        "a callback cannot wait for the server, which may wait for it to return: make this call in "
+        "another thread");
 }
+
+bool Core::is_called_back() const { return callbacks_.runs_here() || bus_.handling(); }
 
 std::shared_ptr<const WorldInfo> Core::info() const {
   if (forked_) throw NoServer(kForked);
   std::lock_guard lock(mutex_);
   return known_;
+}
+
+bool Core::in_lockstep() const {
+  return static_cast<uint64_t>(info()->features) >> request_t::GRANT & 1;
 }
 
 RobotInfo Core::robot_info(const std::string& name) const {
@@ -186,7 +207,8 @@ std::shared_ptr<StreamCore> Core::stream(const ChannelInfo& channel, bool raw) {
   auto& stream = streams_[{channel.name, raw}];
   if (!stream || stream->type() != channel.type) {  // in the next run it may be another type
     stream = std::make_shared<StreamCore>(weak_from_this(), channel,
-                                          raw ? raw_decoder() : find_decoder(channel.type));
+                                          raw ? raw_decoder() : find_decoder(channel.type),
+                                          known_->step_us);
   }
   return stream;
 }
@@ -226,6 +248,7 @@ void Core::repeat() {  // feeds the watchdogs in real time
 
 Subscription Core::on_new_run(std::function<void()> callback) {
   check_open();
+  callbacks_.start();
   return Subscription(new_run_->add("a new run", std::move(callback)));
 }
 
@@ -268,7 +291,7 @@ void Core::begin_run() {
   std::vector<std::shared_ptr<StreamCore>> streams;
   {
     const std::lock_guard lock(mutex_);
-    utime_ = known_->utime;
+    clock_.reset(known_->utime);
     for (const auto& [name, driver] : std::exchange(drivers_, {})) drivers.push_back(driver);
     for (const auto& [name, stream] : streams_) streams.push_back(stream);
   }
@@ -276,41 +299,29 @@ void Core::begin_run() {
   for (const auto& stream : streams) stream->forget();
   std::fprintf(stderr, "ruedo: another run has begun at %s: commands are not repeated into it\n",
                url_.c_str());
-  if (!closed_) new_run_->call();
+  callbacks_.put([list = new_run_] { list->call(); }, "a new run");
 }
 
-void Core::note_time(int64_t utime) {
-  last_sign_ = Clock::now().time_since_epoch().count();
-  {
-    std::lock_guard lock(mutex_);
-    if (utime > utime_) utime_ = utime;
-  }
-  news_.notify_all();
+void Core::note_use() {
+  if (!is_called_back()) progress_.use(utime());
 }
 
-bool Core::is_far_ahead(int64_t utime) const { return utime - kMostAhead > utime_; }
+void Core::begin_after(int64_t utime) {
+  const std::lock_guard lock(mutex_);
+  ends_[std::this_thread::get_id()] = utime;
+}
 
-// What another message said of a time long after a tick's was false.
-void Core::note_tick(int64_t utime) {
-  {
-    const std::lock_guard lock(mutex_);
-    if (utime < utime_ - kMostAhead) utime_ = std::max<int64_t>(utime, 0);
-  }
-  note_time(utime);
+int64_t Core::not_before() const {
+  const std::lock_guard lock(mutex_);
+  const auto found = ends_.find(std::this_thread::get_id());
+  return found == ends_.end() ? std::numeric_limits<int64_t>::min()
+                              : std::min(found->second, utime());
 }
 
 void Core::sleep(int64_t duration) {
   check_may_wait();
-  std::unique_lock lock(mutex_);
-  for (int64_t before = utime_; duration > 0;) {
-    news_.wait_for(lock, std::chrono::milliseconds(500));
-    lock.unlock();
-    check_server();
-    lock.lock();
-    const int64_t now = utime_;
-    duration -= std::max<int64_t>(now - before, 0);  // time may be set back
-    before = now;
-  }
+  progress_.wait();
+  clock_.sleep(duration, [this] { check_server(); });
 }
 
 void Core::refresh_info(std::shared_ptr<const WorldInfo> before) {
@@ -333,7 +344,7 @@ void Core::check_server() {
     if (const auto ended = server_->ended()) throw NoServer(*ended);
   }
   // A server on this machine that is stopped, or in a debugger, is waited for.
-  if (silence() > kSilence && !is_there())
+  if (clock_.silence() > kSilence && !is_there())
     throw NoServer("nothing was heard from the server at " + url_ + " for 5 s");
 }
 
@@ -348,24 +359,30 @@ bool Core::is_there() {
 
 std::string Core::what_is_known(double rate) const {
   char text[96];
-  if (silence() > 3.0) {
+  if (clock_.silence() > 3.0) {
     std::snprintf(text, sizeof text, "nothing at all was heard from the server for %.1f s",
-                  silence());
+                  clock_.silence());
   } else if (info()->paused) {
     return "the simulation is paused";
   } else if (rate > 0.0) {
     std::snprintf(text, sizeof text, "its rate is %g Hz of sim time, which is now %.2f s", rate,
-                  static_cast<double>(utime_) * 1e-6);
+                  static_cast<double>(utime()) * 1e-6);
   } else {
     return "it sends when something happens";
   }
   return text;
 }
 
-double Core::silence() const {
-  const Clock::duration since =
-      Clock::now().time_since_epoch() - Clock::duration(last_sign_.load());
-  return std::chrono::duration<double>(since).count();
+// What the receiving thread does each time before it waits; returns for how long it may.
+std::chrono::milliseconds Core::before_turn() {
+  if (const auto now = Clock::now(); server_ && now >= listen_at_) {
+    listen_at_ = now + kListenTime;
+    for (const std::string& line : server_->warnings())
+      std::fprintf(stderr, "ruedo: the server: %s\n", line.c_str());
+  }
+  if (!progress_.in_use()) return Bus::kTurnTime;
+  progress_.say();
+  return kTurnInUse;
 }
 
 void Core::on_info(const uint8_t* bytes, size_t size) {
@@ -384,9 +401,9 @@ void Core::on_info(const uint8_t* bytes, size_t size) {
     before = known_;
     if (fault && !fault_) fault_at_ = Clock::now();
     if (fault) fault_ = fault;
-    if (!fault) last_sign_ = Clock::now().time_since_epoch().count();
+    if (!fault) clock_.note_sign();
     if (info) {
-      if (!before || info->epoch != before->epoch) utime_ = info->utime;
+      if (!before || info->epoch != before->epoch) clock_.reset(info->utime);
       known_ = info;
     }
   }
@@ -406,12 +423,12 @@ void Core::on_info(const uint8_t* bytes, size_t size) {
 }
 
 void Core::on_tick(const uint8_t* bytes, size_t size) {
-  if (size < 24) return;
+  if (size < 28) return;
   WireReader in(bytes, size);
   if (in.int64() != tick_t::getHash()) return;
   const int64_t utime = in.int64();
   if (!is_of_our_run(in.int64())) return;
-  note_tick(utime);
+  clock_.note_tick(utime);
   stepper_.on_tick(bytes, size);
   // Sim time may run a hundred times faster than real time: the watchdog is fed by its beat, too.
   std::vector<std::shared_ptr<Driver>> drivers;
@@ -419,7 +436,18 @@ void Core::on_tick(const uint8_t* bytes, size_t size) {
     const std::lock_guard lock(mutex_);
     drivers.assign(repeating_.begin(), repeating_.end());
   }
-  for (const auto& driver : drivers) driver->repeat(bus_);
+  for (const auto& driver : drivers) driver->repeat_at(utime, bus_);
+  if (progress_.is_told()) note_progress(in.int32(), utime);
+}
+
+// What was sent up to that time has come.
+void Core::note_progress(int32_t epoch, int64_t utime) {
+  if (callbacks_.is_idle()) return progress_.received(epoch, utime);
+  callbacks_.put(
+      [self = weak_from_this(), epoch, utime] {
+        if (const auto core = self.lock()) core->progress_.received(epoch, utime);
+      },
+      "ticks");
 }
 
 bool Core::is_of_our_run(int64_t run_id, bool may_take_over) {

@@ -16,12 +16,15 @@
 #include <vector>
 
 #include "bus.h"
+#include "callback_queue.h"
 #include "callbacks.h"
 #include "driver.h"
 #include "forked.h"
+#include "progress.h"
 #include "ruedo/client.h"
 #include "run_watch.h"
 #include "session.h"
+#include "sim_clock.h"
 #include "stepper.h"
 #include "stream_core.h"
 #include "world_info.h"
@@ -47,26 +50,30 @@ class Core : public std::enable_shared_from_this<Core> {
 
   void join(Duration timeout);  // begins to receive, and waits for ruedo/info; throws NoServer
   void close();                 // in a callback, too: the end follows by itself there
+  bool is_called_back() const;  // this thread is in a callback
   bool closed() const { return closed_; }
   void check_open() const;  // throws NoServer
-  // Before waiting for what the server sends. Throws NoServer; Error in a callback, which is what
-  // would receive it.
+  // Before waiting for what the server sends. Throws NoServer; Error in a callback: the server may
+  // wait for that.
   void check_may_wait() const;
   bool forked() const { return static_cast<bool>(forked_); }
 
   Bus& bus() { return bus_; }
+  CallbackQueue& callbacks() { return callbacks_; }
+  Progress& progress() { return progress_; }
+  SimClock& clock() { return clock_; }
   Session& session() { return session_; }
   Stepper& stepper() { return stepper_; }
   const std::string& url() const { return url_; }
   std::shared_ptr<const WorldInfo> info() const;
+  bool in_lockstep() const;  // the clients say how far the run goes
   // Whether a message is of this client's run, or, where it may take over, of the one that has
   // taken its place. The receiving thread's.
   bool is_of_our_run(int64_t run_id, bool may_take_over = false);
   // What comes may be of the next run, of which there is no info yet. The receiving thread's.
   bool in_doubt() const { return watch_.in_doubt(); }
   RobotInfo robot_info(const std::string& name) const;  // throws UnknownName
-  int64_t utime() const { return utime_; }
-  bool is_far_ahead(int64_t utime) const;  // no message of this run is so far yet: it was false
+  int64_t utime() const { return clock_.utime(); }
   int64_t next_id() { return ++ids_; }
 
   // The stream of a channel, made on first use. raw: of its messages as they come.
@@ -74,9 +81,11 @@ class Core : public std::enable_shared_from_this<Core> {
   std::shared_ptr<Driver> driver(const std::string& robot);
 
   void keep_repeating(const std::shared_ptr<Driver>& driver);
-  void note_time(int64_t utime);
-  void reset_time(int64_t utime) { utime_ = utime; }
-  void note_tick(int64_t utime);
+  // This thread works with what is known now. A callback is waited for anyway.
+  void note_use();
+  // A motion ended then, and this thread knows: next() of any stream gives nothing older.
+  void begin_after(int64_t utime);
+  int64_t not_before() const;    // us of sim time, which may have been reset since
   void sleep(int64_t duration);  // us
   // After the set of models changed; before: the info from before that, null: the one that is known
   // now.
@@ -91,8 +100,10 @@ class Core : public std::enable_shared_from_this<Core> {
   static bool ends_apart(const std::shared_ptr<Core>& self);
   void end();  // all but a callback that has not returned
   void await_callback();
+  std::chrono::milliseconds before_turn();
   void on_info(const uint8_t* bytes, size_t size);
   void on_tick(const uint8_t* bytes, size_t size);
+  void note_progress(int32_t epoch, int64_t utime);
   void forget_removed(const WorldInfo& info);
   void begin_run();
   void tell_another_server(int64_t run_id) const;
@@ -100,11 +111,13 @@ class Core : public std::enable_shared_from_this<Core> {
   void ask_info();
   bool is_there();  // a server on this machine, as of about a second ago
   void repeat();
-  double silence() const;  // s
 
   const Forked forked_;
   const std::string url_;
   std::unique_ptr<ServerProcess> server_;
+  Clock::time_point listen_at_;  // to the server's warnings; the receiving thread's
+  Progress progress_;
+  SimClock clock_;
   mutable std::mutex mutex_;
   std::condition_variable news_;
   WorldInfoAssembler assembler_;  // the receiving thread's
@@ -115,8 +128,8 @@ class Core : public std::enable_shared_from_this<Core> {
   std::map<std::pair<std::string, bool>, std::shared_ptr<StreamCore>> streams_;  // channel, raw
   std::map<std::string, std::shared_ptr<Driver>> drivers_;
   std::set<std::shared_ptr<Driver>> repeating_;
-  std::atomic<int64_t> utime_{0}, ids_{0};
-  std::atomic<Clock::time_point::rep> last_sign_;
+  std::map<std::thread::id, int64_t> ends_;  // of the motions that threads awaited, the last
+  std::atomic<int64_t> ids_{0};
   std::atomic<Clock::time_point::rep> asked_{0};  // for info
   std::mutex looking_;
   Clock::time_point look_at_;  // for the server, again
@@ -129,6 +142,7 @@ class Core : public std::enable_shared_from_this<Core> {
   std::condition_variable wake_;
   Session session_;
   Stepper stepper_;
+  CallbackQueue callbacks_;
   Bus bus_;
   Subscription info_source_, tick_source_, reply_source_;
 };

@@ -12,17 +12,19 @@
 namespace ruedo::client {
 namespace {
 
-// A primitive that no status has shown after this many statuses and this time was lost or replaced
-// at once.
+// A primitive goes out again until a status shows it: messages may be lost, and the server takes
+// each once. One that no status has shown after so many statuses and this time reaches nobody, or
+// was replaced at once.
+constexpr std::chrono::milliseconds kFirstAgain(100), kLastAgain(1000);
 constexpr int kUnseenStatuses = 20;
-constexpr auto kUnseenTime = std::chrono::seconds(1);
+constexpr auto kUnseenTime = std::chrono::seconds(5);
 
 }  // namespace
 
 void MotionCore::update(const MotionStatus& status, const std::string& blocker) {
   const std::lock_guard lock(mutex);
   const auto core = connection.lock();
-  if (done() || !core || (status.utime < utime && !core->is_far_ahead(utime))) return;
+  if (done() || !core || (status.utime < utime && !core->clock().is_far_ahead(utime))) return;
   utime = status.utime;
   if (status.id == id) {
     progress = status.progress;
@@ -42,7 +44,16 @@ void MotionCore::update(const MotionStatus& status, const std::string& blocker) 
     state = MotionState::ended;
     reason = MotionReason::lost;
   }
+  if (done() && !waiting.empty()) core->progress().use(status.utime, waiting);
   news.notify_all();
+}
+
+bool MotionCore::due_again(Clock::time_point now) {
+  const std::lock_guard lock(mutex);
+  if (state != MotionState::sent || now < again_at) return false;
+  again_at = now + again;
+  again = std::min<Clock::duration>(2 * again, kLastAgain);
+  return true;
 }
 
 void MotionCore::end(MotionReason why) {
@@ -67,14 +78,14 @@ void Driver::listen(const std::shared_ptr<StreamCore>& motion,
   const std::lock_guard lock(listening_);
   if (statuses_.open()) return;
   if (collisions) {  // of a step they come before the status
-    collisions_ = collisions->on_sample([self = weak_from_this()](const Sample& sample) {
+    collisions_ = collisions->on_arrival([self = weak_from_this()](const Sample& sample) {
       const auto driver = self.lock();
       if (!driver) return;
       const std::lock_guard driver_lock(driver->mutex_);
       driver->blocked_by_ = static_cast<const Collisions&>(sample).blocked_by;
     });
   }
-  statuses_ = motion->on_sample([self = weak_from_this()](const Sample& sample) {
+  statuses_ = motion->on_arrival([self = weak_from_this()](const Sample& sample) {
     if (const auto driver = self.lock())
       driver->on_status(static_cast<const MotionStatus&>(sample));
   });
@@ -91,7 +102,21 @@ void Driver::hold(Bus& bus, const std::string& channel, std::vector<uint8_t> byt
 
 void Driver::repeat(Bus& bus) {
   const std::lock_guard lock(mutex_);
-  if (!held_.empty()) bus.publish(held_channel_, held_.data(), held_.size());
+  if (!held_.empty()) {
+    bus.publish(held_channel_, held_.data(), held_.size());
+  } else if (!motions_.empty() && motions_.back()->due_again(Clock::now())) {
+    const MotionCore& newest = *motions_.back();
+    bus.publish(newest.channel, newest.message.data(), newest.message.size());
+  }
+}
+
+void Driver::repeat_at(int64_t utime, Bus& bus) {
+  const std::lock_guard lock(mutex_);
+  if (held_.empty()) return;
+  const double since = static_cast<double>(utime) - static_cast<double>(held_at_);
+  if (since >= 0.0 && since < 1e6 * period()) return;
+  held_at_ = utime;
+  bus.publish(held_channel_, held_.data(), held_.size());
 }
 
 double Driver::period() const {
@@ -106,7 +131,11 @@ std::shared_ptr<MotionCore> Driver::move(Bus& bus, const std::string& channel,
   motion->kind = kind;
   motion->id = command.id;
   motion->remaining = std::abs(command.value);
+  motion->channel = channel;
+  motion->message = encoded(command);
   motion->sent = Clock::now();
+  motion->again_at = motion->sent + kFirstAgain;
+  motion->again = 2 * kFirstAgain;
   const std::lock_guard lock(mutex_);
   held_.clear();  // a repetition after this would replace the primitive
   motions_.erase(std::remove_if(motions_.begin(), motions_.end(),
@@ -117,7 +146,7 @@ std::shared_ptr<MotionCore> Driver::move(Bus& bus, const std::string& channel,
                  motions_.end());
   motions_.push_back(motion);
   if (ended_ != MotionReason::none) motion->end(ended_);
-  bus.publish(channel, command);
+  bus.publish(channel, motion->message.data(), motion->message.size());
   return motion;
 }
 
@@ -195,32 +224,47 @@ double Motion::remaining() const {
   return core_->remaining;
 }
 
-const Motion& Motion::wait(Duration timeout) const {
+std::string MotionCore::remaining_text() const {
+  char text[32];
+  std::snprintf(text, sizeof text, "%.3f remain", remaining);
+  return text;
+}
+
+void MotionCore::await_end(std::unique_lock<std::mutex>& lock, Duration timeout) {
   const Clock::time_point deadline = deadline_after(timeout);
-  MotionCore& motion = *core_;
-  char remain[32];
-  const auto remaining_text = [&] {
-    std::snprintf(remain, sizeof remain, "%.3f remain", motion.remaining);
-    return std::string(remain);
+  const auto me = std::this_thread::get_id();
+  waiting.push_back(me);
+  struct Leave {
+    MotionCore& motion;
+    const std::thread::id me;
+    ~Leave() { motion.waiting.erase(std::find(motion.waiting.begin(), motion.waiting.end(), me)); }
   };
-  std::unique_lock lock(motion.mutex);
-  while (!motion.done()) {
+  const Leave leave{*this, me};
+  while (!done()) {
     if (Clock::now() >= deadline) {
-      throw Timeout(motion.robot + ": " + motion.kind + " was not done within " + text_of(timeout) +
-                    " s (" + remaining_text() + ")");
+      throw Timeout(robot + ": " + kind + " was not done within " + text_of(timeout) + " s (" +
+                    remaining_text() + ")");
     }
-    const auto connection = motion.connection.lock();
-    if (!connection) throw NoServer(kClosed);
-    connection->check_may_wait();
-    motion.news.wait_until(lock, std::min(deadline, Clock::now() + std::chrono::milliseconds(500)));
-    connection->check_server();
+    const auto core = connection.lock();
+    if (!core) throw NoServer(kClosed);
+    core->check_may_wait();
+    core->progress().wait();
+    news.wait_until(lock, std::min(deadline, Clock::now() + std::chrono::milliseconds(500)));
+    core->check_server();
   }
+  if (const auto core = connection.lock()) core->begin_after(utime);
+}
+
+const Motion& Motion::wait(Duration timeout) const {
+  MotionCore& motion = *core_;
+  std::unique_lock lock(motion.mutex);
+  motion.await_end(lock, timeout);
   if (motion.state != MotionState::done) {
     throw MotionError(motion.robot + ": " + motion.kind +
                           (motion.state == MotionState::refused ? " was refused: " : " ended: ") +
                           to_string(motion.reason) +
                           (motion.blocked_by.empty() ? "" : " by " + motion.blocked_by) + ", " +
-                          remaining_text(),
+                          motion.remaining_text(),
                       motion.reason);
   }
   return *this;

@@ -7,6 +7,7 @@
 #include <memory>
 #include <mutex>
 #include <string>
+#include <thread>
 #include <vector>
 
 #include "ruedo/client.h"
@@ -25,6 +26,8 @@ struct MotionCore {
   std::string robot, kind;
   int64_t id = 0;
   std::chrono::steady_clock::time_point sent;
+  std::string channel;
+  std::vector<uint8_t> message;
 
   std::mutex mutex;
   std::condition_variable news;
@@ -35,15 +38,23 @@ struct MotionCore {
   int unseen = 0;  // statuses that did not show it
   int64_t utime =
       -1;  // of the newest status; before it is another run's, or of a reset that info will tell of
-  int64_t shown = -1;  // of the newest status that shows it
+  int64_t shown = -1;                              // of the newest status that shows it
+  std::chrono::steady_clock::time_point again_at;  // it is sent then, where no status has shown it
+  std::chrono::steady_clock::duration again{};
+  std::vector<std::thread::id> waiting;
 
   // With the mutex held.
   bool done() const {
     return state == MotionState::done || state == MotionState::ended ||
            state == MotionState::refused;
   }
+  void await_end(std::unique_lock<std::mutex>& lock, Duration timeout);
+  std::string remaining_text() const;
+
+  // Without it.
   void update(const MotionStatus& status, const std::string& blocker);
   void end(MotionReason why);
+  bool due_again(std::chrono::steady_clock::time_point now);  // it is to be sent now
 };
 
 // The connection has one for each robot that was driven.
@@ -53,8 +64,10 @@ class Driver : public std::enable_shared_from_this<Driver> {
 
   // Publishes the command now, and again until the next one.
   void hold(Bus& bus, const std::string& channel, std::vector<uint8_t> bytes);
+  // What is held, and the newest primitive where no status has shown it: by real time.
   void repeat(Bus& bus);
-  double period() const;  // s of real time between repetitions
+  void repeat_at(int64_t utime, Bus& bus);  // what is held, by sim time
+  double period() const;                    // s of real time between repetitions
 
   std::shared_ptr<MotionCore> move(Bus& bus, const std::string& channel,
                                    const move_command_t& command, const std::string& kind);
@@ -77,6 +90,7 @@ class Driver : public std::enable_shared_from_this<Driver> {
   std::mutex mutex_;
   std::string held_channel_;
   std::vector<uint8_t> held_;  // empty: nothing
+  int64_t held_at_ = 0;        // us, when it last went out by sim time
   std::vector<std::shared_ptr<MotionCore>> motions_;
   std::string blocked_by_;
   MotionReason ended_ = MotionReason::none;

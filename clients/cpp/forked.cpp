@@ -1,8 +1,7 @@
 // The count of forks, and what is closed in their children.
 #include "forked.h"
 
-#include <fcntl.h>
-#include <unistd.h>
+#include <sys/socket.h>
 
 #include <atomic>
 #include <mutex>
@@ -44,10 +43,15 @@ FileHandle ParentsPipe::open() {
   fork_count();  // its handlers are needed from now on
   const std::lock_guard lock(pipes().mutex);
   int ends[2];
-  if (pipe2(ends, O_CLOEXEC) != 0) return FileHandle();
+  if (socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, ends) != 0) return FileHandle();
   end_ = FileHandle(ends[1]);
   pipes().open.insert(&end_);
   return FileHandle(ends[0]);
+}
+
+void ParentsPipe::write(std::string_view text) {
+  const std::lock_guard lock(pipes().mutex);
+  if (end_) ::send(end_.get(), text.data(), text.size(), MSG_DONTWAIT | MSG_NOSIGNAL);
 }
 
 void ParentsPipe::close() {

@@ -4,6 +4,8 @@
 
 #include <pthread.h>
 
+#include <string_view>
+
 #include "system/file_handle.h"
 
 namespace ruedo::client {
@@ -29,8 +31,8 @@ State& of_this_process() {
   return static_cast<void>(registered), *state;
 }
 
-// A pipe's end for writing, which no child of a fork keeps open: who reads is to know when this
-// process closes it, or ends.
+// An end for writing, which no child of a fork keeps open: who reads is to know when this process
+// closes it, or ends. It is a socket's, to which writing raises no SIGPIPE.
 class ParentsPipe {
  public:
   ParentsPipe() = default;
@@ -39,6 +41,9 @@ class ParentsPipe {
   ParentsPipe& operator=(const ParentsPipe&) = delete;
 
   FileHandle open();  // the end for reading; none: errno says why
+  // Without waiting: nothing is written where there is no room, or no reader. Thread safe, as
+  // close().
+  void write(std::string_view text);
   void close();
 
  private:

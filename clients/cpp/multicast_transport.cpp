@@ -35,12 +35,21 @@ void MulticastTransport::publish(const std::string& channel, const uint8_t* byte
   lcm_publish(lcm_.get(), channel.c_str(), bytes, static_cast<unsigned int>(size));
 }
 
+bool MulticastTransport::has_news() {
+  pollfd waiting{receiver_->file(), POLLIN, 0};
+  // In that order: what has left the socket is in hand.
+  return ::poll(&waiting, 1, 0) > 0 || busy_;
+}
+
 bool MulticastTransport::receive(std::chrono::milliseconds timeout, const Receiver& receiver) {
   // Waking a thread takes as long as a step of a small world: poll before sleeping.
   static const bool may_look_again = std::thread::hardware_concurrency() > 1;
   const auto sleep_at = std::chrono::steady_clock::now() + kLookTime;
   do {
-    if (receiver_->take(receiver)) return true;
+    busy_ = true;
+    const bool any = receiver_->take(receiver);
+    busy_ = false;
+    if (any) return true;
   } while (looks_again_ && may_look_again && timeout.count() > 0 &&
            std::chrono::steady_clock::now() < sleep_at);
   pollfd waiting{receiver_->file(), POLLIN, 0};

@@ -6,6 +6,7 @@
 
 #include <lcm/lcm.h>
 
+#include <atomic>
 #include <memory>
 #include <string>
 
@@ -23,6 +24,7 @@ class MulticastTransport : public Transport {
   void unsubscribe(const std::string&) override {}
   void publish(const std::string& channel, const uint8_t* bytes, size_t size) override;
   bool receive(std::chrono::milliseconds timeout, const Receiver& receiver) override;
+  bool has_news() override;
   void receive_eagerly() override { looks_again_ = true; }
 
  private:
@@ -32,6 +34,7 @@ class MulticastTransport : public Transport {
   std::unique_ptr<lcm_t, Destroy> lcm_;  // sends; from any thread
   std::unique_ptr<bus::MulticastReceiver> receiver_;
   bool looks_again_ = false;
+  std::atomic<bool> busy_{false};  // receive() takes something
 };
 
 }  // namespace ruedo::client

@@ -143,7 +143,9 @@ Motion move(Core& core, const std::string& robot, const char* name, int8_t kind,
   const auto driver = core.driver(robot);
   listen(core, robot, *driver);
   command.id = core.next_id();
-  return Motion(driver->move(core.bus(), channel, command, name));
+  Motion motion(driver->move(core.bus(), channel, command, name));
+  core.keep_repeating(driver);
+  return motion;
 }
 
 velocity_command_t velocity_message(Core& core, double v, double omega, double vy) {

@@ -22,6 +22,7 @@
 #include <thread>
 
 #include "address.h"
+#include "base/utf8.h"
 #include "core.h"
 
 extern char** environ;
@@ -30,6 +31,9 @@ namespace ruedo::client {
 namespace {
 
 namespace fs = std::filesystem;
+
+constexpr size_t kMostHeard = size_t{1} << 16;  // bytes of warnings that are read at once
+constexpr size_t kMostWarned = 1000;            // warnings, each of which is said once
 
 bool is_program(const fs::path& path) {
   std::error_code error;
@@ -218,7 +222,7 @@ void ServerProcess::start(const std::vector<std::string>& command, bool verbose)
   posix_spawn_file_actions_init(&actions);
   posix_spawn_file_actions_adddup2(&actions, its_end.get(), 0);
   if (output_) {
-    posix_spawn_file_actions_adddup2(&actions, output_.get(), 1);
+    posix_spawn_file_actions_addopen(&actions, 1, "/dev/null", O_WRONLY, 0);
     posix_spawn_file_actions_adddup2(&actions, output_.get(), 2);
   }
   // A session of its own: Ctrl-C in a terminal reaches this process alone, which may still use the
@@ -241,6 +245,26 @@ void ServerProcess::start(const std::vector<std::string>& command, bool verbose)
     pid_ = -1;
     throw LaunchError(command[0] + " cannot be started: " + std::strerror(error));
   }
+  tell("0 0 9223372036854775807\n");  // the run waits at its beginning until this client joins
+}
+
+std::vector<std::string> ServerProcess::warnings() {
+  std::vector<std::string> news;
+  const std::unique_lock lock(mutex_, std::try_to_lock);  // end() may take a while
+  if (!lock || !output_) return news;
+  std::string said(kMostHeard, '\0');
+  const ssize_t count = pread(output_.get(), said.data(), said.size(), heard_);
+  said.resize(count > 0 ? static_cast<size_t>(count) : 0);
+  said.resize(said.rfind('\n') + 1);  // whole lines
+  heard_ += static_cast<off_t>(said.size());
+  std::istringstream lines(said);
+  for (std::string line; std::getline(lines, line);) {
+    line = for_terminal(line);
+    if (line.empty() || line.rfind("ruedo: info:", 0) == 0 || warned_.count(line)) continue;
+    if (warned_.size() < kMostWarned) warned_.insert(line);
+    news.push_back(line);
+  }
+  return news;
 }
 
 // A server listens on its socket or by tcpq once its world is loaded. If it ends before, connecting

@@ -10,6 +10,7 @@
 #include <filesystem>
 #include <mutex>
 #include <optional>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -28,6 +29,9 @@ class ServerProcess {
   // How the server ended, with the last lines it printed; nothing while it runs. Thread safe, as is
   // end().
   std::optional<std::string> ended();
+  // How far this client has come (progress.h). Where the pipe is full, a later line says it all.
+  void tell(const std::string& line) { stdin_.write(line); }
+  std::vector<std::string> warnings();  // of the server since the last call, each once
   // Closes the pipe, which ends the server; kills it when it has not ended after 5 s.
   void end();
 
@@ -47,6 +51,8 @@ class ServerProcess {
   bool ended_ = false;
   ParentsPipe stdin_;
   FileHandle output_, token_;  // token_: keeps the port (free_url)
+  off_t heard_ = 0;            // bytes of the output that warnings() has read
+  std::set<std::string> warned_;
 };
 
 }  // namespace ruedo::client

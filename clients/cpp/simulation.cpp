@@ -138,9 +138,7 @@ Observations Simulation::step(int64_t n, const std::vector<Command>& commands,
   return {state_of(core()->session().request(request_t::STEP, encoded(body), timeout)), {}};
 }
 
-bool Simulation::lockstep() const {
-  return static_cast<uint64_t>(core()->info()->features) >> request_t::GRANT & 1;
-}
+bool Simulation::lockstep() const { return core()->in_lockstep(); }
 
 void Simulation::set_rate(double rate) const {
   rate_request_t body;
@@ -156,7 +154,7 @@ void Simulation::reset(Reset what, int64_t seed) const {
   body.seed = seed;
   core()->session().request(request_t::RESET, encoded(body), kSlowReplyTime);
   if (what == Reset::poses) return;
-  core()->reset_time(0);
+  core()->clock().reset(0);
   core()->stepper().forget();
 }
 
@@ -222,7 +220,7 @@ State Simulation::snapshot(const std::string& name) const {
 State Simulation::restore(const std::string& name) const {
   const State state =
       state_of(core()->session().request(request_t::RESTORE, name_body(name), kRestoreTime));
-  core()->reset_time(state.utime);
+  core()->clock().reset(state.utime);
   core()->stepper().forget();
   return state;
 }

@@ -36,6 +36,7 @@ Observations Stepper::step(int64_t n, const std::vector<Command>& commands, Dura
   std::lock_guard one_at_a_time(one_at_a_time_);
   const auto turn = core_.session().turn();
   core_.check_open();
+  const CallbackQueue::Borrowed callbacks(core_.callbacks());  // they return before this does
   std::unique_lock lock(mutex_);
   if (part_) {
     check_run();
@@ -66,7 +67,7 @@ Observations Stepper::step(int64_t n, const std::vector<Command>& commands, Dura
   Observations observations;
   collect(observations);
   lock.unlock();
-  core_.note_time(observations.utime);
+  core_.clock().note(observations.utime);
   return observations;
 }
 
@@ -195,6 +196,7 @@ void Stepper::wait(std::unique_lock<std::mutex>& lock, int64_t until, Duration t
       lock.unlock();
       core_.check_open();
       turn.handle(quiet_at - now);
+      core_.callbacks().run_waiting();
       lock.lock();
     }
     const bool news = news_here();

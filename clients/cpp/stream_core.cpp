@@ -1,6 +1,8 @@
 // Streams: subscription, waiting, and the typed faces of both.
 #include "stream_core.h"
 
+#include <algorithm>
+#include <cmath>
 #include <cstdio>
 #include <utility>
 
@@ -9,22 +11,54 @@
 namespace ruedo::client {
 namespace {
 
+constexpr double kMostUneven = 0.25;  // periods: gaps of samples that are taken at whole steps tell
+                                      // no more than that
+constexpr size_t kHead = 16;  // bytes of a message: fingerprint, and in all of the server's types
+                              // the time
+
 std::string hex(int64_t fingerprint) {
   char text[17];
   std::snprintf(text, sizeof text, "%016llx", static_cast<unsigned long long>(fingerprint));
   return text;
 }
 
+double period_us(double rate, int64_t step_us) {
+  const bool even = rate > 0.0 && static_cast<double>(step_us) * 1e-6 * rate <= kMostUneven;
+  return even ? 1e6 / rate : 0.0;
+}
+
 }  // namespace
 
+// A message that came.
+class StreamCore::Arrival {
+ public:
+  Arrival(const uint8_t* bytes, size_t size, std::optional<int64_t> utime)
+      : utime_(utime), bytes_(bytes, bytes + size) {}
+
+  // Decoded once. Throws TypeMismatch.
+  std::shared_ptr<const Sample> sample(const StreamCore& stream) {
+    const std::lock_guard lock(mutex_);
+    if (!sample_) sample_ = stream.decoded(bytes_);
+    return sample_;
+  }
+  std::optional<int64_t> utime() const { return utime_; }  // us; nothing: its type does not say
+
+ private:
+  const std::optional<int64_t> utime_;
+  const std::vector<uint8_t> bytes_;
+  std::mutex mutex_;
+  std::shared_ptr<const Sample> sample_;
+};
+
 StreamCore::StreamCore(std::weak_ptr<Core> core, const ChannelInfo& channel,
-                       const SampleDecoder* decoder)
+                       const SampleDecoder* decoder, int64_t step_us)
     : core_(std::move(core)),
       channel_(channel.name),
       robot_(channel.robot),
       type_(channel.type),
       fingerprint_(channel.fingerprint),
       rate_(channel.rate),
+      period_us_(period_us(channel.rate, step_us)),
       decoder_(decoder) {}
 
 std::shared_ptr<Core> StreamCore::connection() const {
@@ -35,8 +69,15 @@ std::shared_ptr<Core> StreamCore::connection() const {
 }
 
 Subscription StreamCore::on_sample(std::function<void(const Sample&)> callback) {
-  subscribe(*connection());
+  const auto core = connection();
+  subscribe(*core);
+  core->callbacks().start();
   return Subscription(callbacks_->add(channel_, std::move(callback)));
+}
+
+Subscription StreamCore::on_arrival(std::function<void(const Sample&)> callback) {
+  subscribe(*connection());
+  return Subscription(arrivals_->add(channel_, std::move(callback)));
 }
 
 TypeMismatch StreamCore::mismatch(int64_t fingerprint) const {
@@ -77,8 +118,9 @@ int64_t StreamCore::announced(const Core& core) const {
 
 void StreamCore::forget() {
   const std::lock_guard lock(mutex_);
-  sample_ = nullptr;
+  newest_ = nullptr;
   fault_ = nullptr;
+  last_utime_.reset();
 }
 
 void StreamCore::end() {
@@ -90,58 +132,135 @@ void StreamCore::end() {
 }
 
 void StreamCore::receive(const uint8_t* bytes, size_t size) {
-  if (const auto core = core_.lock(); core && (core->closed() || core->in_doubt())) return;
+  const auto core = core_.lock();
+  if (!core || core->closed() || core->in_doubt()) return;
+  const int64_t fingerprint = size < kHead ? 0 : read_big_endian<int64_t>(bytes);
+  if (size >= kHead && !is_raw() && fingerprint != decoder_->fingerprint)
+    return fail(std::make_exception_ptr(mismatch(fingerprint)));
+  std::optional<int64_t> utime;
+  if (const SampleDecoder* own = find_decoder(type_); own && fingerprint == own->fingerprint)
+    utime = read_big_endian<int64_t>(bytes + 8);
+  const auto arrival = std::make_shared<Arrival>(bytes, size, utime);
   std::shared_ptr<const Sample> sample;
-  std::exception_ptr fault;
   try {
-    WireReader in(bytes, size);
-    const int64_t fingerprint = in.int64();
-    if (!is_raw() && fingerprint != decoder_->fingerprint) throw mismatch(fingerprint);
-    sample = decoder_->decode(in);
-  } catch (const WireError& error) {
-    fault =
-        std::make_exception_ptr(TypeMismatch(channel_ + ": a message of " + std::to_string(size) +
-                                             " bytes is no valid " + type_ + ": " + error.what()));
+    if (!arrivals_->empty()) sample = arrival->sample(*this);
   } catch (const TypeMismatch&) {
-    fault = std::current_exception();
+    return fail(std::current_exception());
   }
+  if (utime) core->clock().note(*utime);
   {
     const std::lock_guard lock(mutex_);
-    fault_ = fault;
-    if (sample) {
-      sample_ = sample;
-      ++count_;
-    }
+    newest_ = arrival;
+    fault_ = nullptr;
+    count_ += 1 + lost_before(utime);
+    if (!waiting_.empty()) core->progress().use(core->utime(), waiting_);
   }
   news_.notify_all();
-  if (!sample) return;
-  if (const auto core = core_.lock(); core && !is_raw()) core->note_time(sample->utime);
+  if (sample) arrivals_->call(*sample);
+  if (callbacks_->empty()) return;
+  core->callbacks().put_sample(
+      [self = weak_from_this(), arrival] {
+        if (const auto stream = self.lock()) stream->call_back(*arrival);
+      },
+      channel_, missed_, size);
+}
+
+void StreamCore::call_back(Arrival& arrival) {
+  std::shared_ptr<const Sample> sample;
+  try {
+    sample = arrival.sample(*this);
+  } catch (const TypeMismatch&) {
+    return fail(std::current_exception());
+  }
   callbacks_->call(*sample);
 }
 
-std::shared_ptr<const Sample> StreamCore::read(std::atomic<int64_t>& seen, bool new_one,
+void StreamCore::fail(std::exception_ptr fault) {
+  const std::lock_guard lock(mutex_);
+  fault_ = std::move(fault);
+  news_.notify_all();
+}
+
+std::shared_ptr<const Sample> StreamCore::decoded(const std::vector<uint8_t>& bytes) const {
+  try {
+    WireReader in(bytes.data(), bytes.size());
+    in.int64();  // fingerprint
+    return decoder_->decode(in);
+  } catch (const WireError& error) {
+    throw TypeMismatch(channel_ + ": a message of " + std::to_string(bytes.size()) +
+                       " bytes is no valid " + type_ + ": " + error.what());
+  }
+}
+
+// How many samples are missing since the last one. With the mutex held, as the next two.
+int64_t StreamCore::lost_before(std::optional<int64_t> utime) {
+  const auto last = std::exchange(last_utime_, utime);
+  if (!last || !utime || *utime <= *last || period_us_ == 0.0) return 0;
+  const double gap = static_cast<double>(*utime) - static_cast<double>(*last);
+  constexpr double kMost = 1e9;  // a time may be false
+  return std::max<int64_t>(0, std::llround(std::min(gap / period_us_, kMost)) - 1);
+}
+
+// Whether the newest sample is what the reader wants.
+bool StreamCore::serves(int64_t seen, bool new_one, int64_t not_before) const {
+  if (!newest_ || !new_one) return newest_ != nullptr;
+  return seen != count_ && newest_->utime().value_or(not_before) >= not_before;
+}
+
+void StreamCore::await(Core& core, std::unique_lock<std::mutex>& lock, Duration timeout,
+                       const std::function<bool()>& ready) {
+  const Clock::time_point deadline = deadline_after(timeout);
+  const auto me = std::this_thread::get_id();
+  waiting_.push_back(me);
+  struct Leave {
+    std::vector<std::thread::id>& waiting;
+    const std::thread::id me;
+    ~Leave() { waiting.erase(std::find(waiting.begin(), waiting.end(), me)); }
+  };
+  const Leave leave{waiting_, me};
+  while (!ready()) {
+    if (fault_) std::rethrow_exception(std::exchange(fault_, nullptr));
+    core.check_may_wait();
+    if (Clock::now() >= deadline) {
+      throw Timeout("no sample on " + channel_ + " within " + text_of(timeout) + " s (" +
+                    core.what_is_known(rate_) + ")");
+    }
+    core.progress().wait();
+    news_.wait_until(lock, std::min(deadline, Clock::now() + std::chrono::milliseconds(500)));
+    core.check_server();
+  }
+}
+
+std::shared_ptr<const Sample> StreamCore::read(std::atomic<int64_t>& seen,
+                                               std::atomic<int64_t>& skipped, bool new_one,
                                                Duration timeout) {
   const auto core = connection();
   subscribe(*core);
-  const Clock::time_point deadline = deadline_after(timeout);
-  std::unique_lock lock(mutex_);
-  while (!sample_ || (new_one && count_ == seen)) {
-    if (fault_) std::rethrow_exception(std::exchange(fault_, nullptr));
-    core->check_may_wait();
-    if (Clock::now() >= deadline) {
-      throw Timeout("no sample on " + channel_ + " within " + text_of(timeout) + " s (" +
-                    core->what_is_known(rate_) + ")");
-    }
-    news_.wait_until(lock, std::min(deadline, Clock::now() + std::chrono::milliseconds(500)));
-    core->check_server();
+  core->note_use();
+  core->bus().catch_up();
+  const int64_t not_before = core->not_before();
+  std::shared_ptr<Arrival> arrival;
+  {
+    std::unique_lock lock(mutex_);
+    await(*core, lock, timeout, [&] { return serves(seen, new_one, not_before); });
+    arrival = newest_;
+    if (seen > 0) skipped += std::max<int64_t>(count_ - seen - 1, 0);
+    last_read_ = seen = count_;
+    last_skipped_ = skipped.load();
   }
-  last_read_ = seen = count_;
-  return sample_;
+  core->note_use();
+  try {
+    return arrival->sample(*this);
+  } catch (const TypeMismatch&) {
+    const std::lock_guard lock(mutex_);
+    if (newest_ == arrival) newest_ = nullptr;
+    throw;
+  }
 }
 
 template <class SampleType>
 Stream<SampleType>::Stream(std::shared_ptr<StreamCore> core)
-    : core_(std::move(core)), seen_(core_->last_read()) {}
+    : core_(std::move(core)), seen_(core_->last_read()), skipped_(core_->last_skipped()) {}
 
 template <class SampleType>
 const std::string& Stream<SampleType>::channel() const {
@@ -150,12 +269,17 @@ const std::string& Stream<SampleType>::channel() const {
 
 template <class SampleType>
 SampleType Stream<SampleType>::latest(Duration timeout) const {
-  return static_cast<const SampleType&>(*core_->read(seen_, false, timeout));
+  return static_cast<const SampleType&>(*core_->read(seen_, skipped_, false, timeout));
 }
 
 template <class SampleType>
 SampleType Stream<SampleType>::next(Duration timeout) const {
-  return static_cast<const SampleType&>(*core_->read(seen_, true, timeout));
+  return static_cast<const SampleType&>(*core_->read(seen_, skipped_, true, timeout));
+}
+
+template <class SampleType>
+int64_t Stream<SampleType>::dropped() const {
+  return skipped_ + core_->missed();
 }
 
 template <class SampleType>

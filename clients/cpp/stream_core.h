@@ -1,4 +1,7 @@
 // A subscription to one channel: the newest sample, its readers, and what went wrong.
+//
+// The receiving thread keeps the newest message as it came. It is decoded by who asks for it, and
+// in the thread of the callbacks.
 #pragma once
 
 #include <atomic>
@@ -7,9 +10,12 @@
 #include <functional>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <string>
+#include <thread>
 #include <vector>
 
+#include "callback_queue.h"
 #include "callbacks.h"
 #include "ruedo/client.h"
 #include "sample_types.h"
@@ -21,43 +27,62 @@ struct ChannelInfo;
 // Thread safe. The connection has one for each channel that was asked for; handles may outlive it.
 class StreamCore : public std::enable_shared_from_this<StreamCore> {
  public:
-  // decoder: null where there is none for the channel's type.
-  StreamCore(std::weak_ptr<Core> core, const ChannelInfo& channel, const SampleDecoder* decoder);
+  // decoder: null where there is none for the channel's type. step_us: the simulation's.
+  StreamCore(std::weak_ptr<Core> core, const ChannelInfo& channel, const SampleDecoder* decoder,
+             int64_t step_us);
 
   const std::string& channel() const { return channel_; }
   const std::string& type() const { return type_; }
-  int64_t last_read() const { return last_read_; }  // where a new reader begins
-  // seen: the reader's. new_one: waits for a sample that it has not seen. Throws Timeout,
+  // Where a new reader begins.
+  int64_t last_read() const { return last_read_; }
+  int64_t last_skipped() const { return last_skipped_; }
+  // seen, skipped: the reader's. new_one: waits for a sample that it has not seen. Throws Timeout,
   // TypeMismatch, NoServer.
-  std::shared_ptr<const Sample> read(std::atomic<int64_t>& seen, bool new_one, Duration timeout);
+  std::shared_ptr<const Sample> read(std::atomic<int64_t>& seen, std::atomic<int64_t>& skipped,
+                                     bool new_one, Duration timeout);
+  int64_t missed() const { return *missed_; }  // by the callbacks
   Subscription on_sample(std::function<void(const Sample&)> callback);
+  // The same in the receiving thread, for what is this library's own.
+  Subscription on_arrival(std::function<void(const Sample&)> callback);
   void forget();  // what came is of a run that has ended
   void end();     // its robot is gone
 
  private:
   using Callbacks = CallbackList<const Sample&>;
+  class Arrival;
 
   std::shared_ptr<Core> connection() const;  // throws NoServer once it was closed
   bool is_raw() const { return decoder_ == raw_decoder(); }
   void subscribe(Core& core);
   void receive(const uint8_t* bytes, size_t size);
+  void fail(std::exception_ptr fault);
+  void call_back(Arrival& arrival);
+  std::shared_ptr<const Sample> decoded(const std::vector<uint8_t>& bytes) const;
+  int64_t lost_before(std::optional<int64_t> utime);
+  bool serves(int64_t seen, bool new_one, int64_t not_before) const;
+  void await(Core& core, std::unique_lock<std::mutex>& lock, Duration timeout,
+             const std::function<bool()>& ready);
   TypeMismatch mismatch(int64_t fingerprint) const;
   int64_t announced(const Core& core) const;
 
   const std::weak_ptr<Core> core_;
   const std::string channel_, robot_, type_;
-  const int64_t fingerprint_;  // as ruedo/info said first
-  const double rate_;
+  const int64_t fingerprint_;      // as ruedo/info said first
+  const double rate_, period_us_;  // 0: what is missing cannot be told
   const SampleDecoder* decoder_;
   const std::shared_ptr<Callbacks> callbacks_ = std::make_shared<Callbacks>();
+  const std::shared_ptr<Callbacks> arrivals_ = std::make_shared<Callbacks>();
+  const CallbackQueue::Count missed_ = std::make_shared<std::atomic<int64_t>>(0);
 
   std::mutex opening_;  // source_
   Subscription source_;
   std::mutex mutex_;  // what follows
   std::condition_variable news_;
-  std::shared_ptr<const Sample> sample_;
-  int64_t count_ = 0;  // samples received
-  std::atomic<int64_t> last_read_{0};
+  std::shared_ptr<Arrival> newest_;
+  int64_t count_ = 0;  // samples that came or were lost
+  std::optional<int64_t> last_utime_;
+  std::vector<std::thread::id> waiting_;  // for a sample
+  std::atomic<int64_t> last_read_{0}, last_skipped_{0};
   std::exception_ptr fault_;
 };
 

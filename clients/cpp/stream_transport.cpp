@@ -1,5 +1,7 @@
 #include "stream_transport.h"
 
+#include <poll.h>
+
 #include <algorithm>
 #include <thread>
 
@@ -20,6 +22,11 @@ FileHandle socket_to(const bus::LcmUrl& address) {
   FileHandle socket = bus::connect_tcp(address.host, std::to_string(address.port), why);
   if (!socket) throw EnvironmentError("nothing listens at " + address.str() + " (" + why + ")");
   return socket;
+}
+
+bool is_readable(int file, int timeout_ms) {
+  pollfd waiting{file, POLLIN, 0};
+  return ::poll(&waiting, 1, timeout_ms) > 0;
 }
 
 }  // namespace
@@ -60,6 +67,19 @@ void StreamTransport::publish(const std::string& channel, const uint8_t* bytes, 
   if (const auto open = connection()) open->publish(channel, bytes, size);
 }
 
+bool StreamTransport::has_news() {
+  const auto open = connection();
+  // In that order: what has left the socket is in hand.
+  return open && (is_readable(open->file(), 0) || busy_);
+}
+
+bool StreamTransport::take(bus::StreamConnection& from, const Receiver& receiver) {
+  busy_ = true;
+  const bool any = from.take(0, receiver);
+  busy_ = false;
+  return any;
+}
+
 bool StreamTransport::receive(std::chrono::milliseconds timeout, const Receiver& receiver) {
   const auto open = connection();
   if (!open) {  // those who wait find out by their timeouts
@@ -75,10 +95,12 @@ bool StreamTransport::receive(std::chrono::milliseconds timeout, const Receiver&
   static const bool may_look_again = std::thread::hardware_concurrency() > 1;
   const auto sleep_at = std::chrono::steady_clock::now() + kLookTime;
   do {
-    if (open->take(0, receiver)) return true;
+    if (take(*open, receiver)) return true;
   } while (may_look_again && timeout.count() > 0 && !open->is_over() &&
            std::chrono::steady_clock::now() < sleep_at);
-  if (open->take(static_cast<int>(timeout.count()), receiver)) return true;
+  if (!open->is_over() && is_readable(open->file(), static_cast<int>(timeout.count())) &&
+      take(*open, receiver))
+    return true;
   if (open->is_over()) {
     const std::lock_guard lock(mutex_);
     connection_.reset();

@@ -5,6 +5,7 @@
 // whatever length a server names.
 #pragma once
 
+#include <atomic>
 #include <memory>
 #include <mutex>
 #include <set>
@@ -25,16 +26,19 @@ class StreamTransport : public Transport {
   void unsubscribe(const std::string& channel) override;
   void publish(const std::string& channel, const uint8_t* bytes, size_t size) override;
   bool receive(std::chrono::milliseconds timeout, const Receiver& receiver) override;
+  bool has_news() override;
   bool is_connected() override { return connection() != nullptr; }
 
  private:
   std::shared_ptr<bus::StreamConnection> connection();
   void connect();  // throws EnvironmentError
+  bool take(bus::StreamConnection& from, const Receiver& receiver);
 
   const bus::LcmUrl address_;
   std::mutex mutex_;
   std::shared_ptr<bus::StreamConnection> connection_;  // null: there is no server
   std::set<std::string> channels_;
+  std::atomic<bool> busy_{false};  // receive() takes something
 };
 
 }  // namespace ruedo::client

@@ -24,6 +24,8 @@ class Transport {
   virtual void publish(const std::string& channel, const uint8_t* bytes, size_t size) = 0;
   // Hands over what has come, or waits for it at most so long and returns false.
   virtual bool receive(std::chrono::milliseconds timeout, const Receiver& receiver) = 0;
+  // Something waits for receive(), or its receiver has not seen all of what it took.
+  virtual bool has_news() { return false; }
   // False: nothing can be sent, since there is no server.
   virtual bool is_connected() { return true; }
   // From now on without sleeping between messages that follow each other closely, as in lockstep.

@@ -142,39 +142,52 @@ class Stream {
  public:
   /// @cond
   explicit Stream(std::shared_ptr<StreamCore> core);
-  Stream(const Stream& other) : core_(other.core_), seen_(other.seen_.load()) {}
+  Stream(const Stream& other)
+      : core_(other.core_), seen_(other.seen_.load()), skipped_(other.skipped_.load()) {}
   Stream& operator=(const Stream& other) {
     if (this == &other) return *this;
     core_ = other.core_;
     seen_ = other.seen_.load();
+    skipped_ = other.skipped_.load();
     return *this;
   }
   /// @endcond
   /// @return its name on the bus
   [[nodiscard]] const std::string& channel() const;
 
-  /// The newest sample; before the first one it waits.
+  /// The newest sample; before the first one it waits. What has come by the time of the call is
+  /// taken into account.
   /// @param timeout of real time
   /// @return a copy
   /// @throws Timeout, TypeMismatch, NoServer
   [[nodiscard]] SampleType latest(Duration timeout = 5.0) const;
   /// The newest sample that neither latest() nor next() of this object has returned yet; waits for
-  /// one. A reader slower than the rate skips samples; on_sample() skips none.
+  /// one. After Motion::wait() in the same thread it is one from the end of that motion or later. A
+  /// reader slower than the rate skips samples, which dropped() counts; on_sample() skips none.
   /// @param timeout of real time
   /// @return a copy
   /// @throws Timeout, TypeMismatch, NoServer
   SampleType next(Duration timeout = 5.0) const;
-  /// Calls back in the receiving thread for every sample from now on. The callback must be quick,
-  /// and cannot wait for other samples or replies: such a call throws Error.
+  /// Calls back for every sample from now on. All callbacks of a simulation run in one thread of
+  /// their own, one at a time, in the order in which the samples came; in lockstep those of the
+  /// steps of step() return before it does. A server that launch() started waits for them. With
+  /// another one, and more than a megabyte of samples behind, they get the newest of each channel
+  /// (dropped()). A callback cannot wait for other samples or replies: such a call throws Error.
   /// @param callback what it throws is reported once on the terminal
   /// @return ends the calls when it goes
   /// @throws TypeMismatch, NoServer; std::invalid_argument for an empty function
   Subscription on_sample(std::function<void(const SampleType&)> callback) const;
+  /// How many samples latest() and next() have skipped, since newer ones had come or they were lost
+  /// on the way; and how many the channel's callbacks did not get, which were slower than the
+  /// samples came. A new Stream goes on from where the channel was last read, with its count.
+  /// @return samples
+  int64_t dropped() const;
 
  private:
   std::shared_ptr<StreamCore> core_;
   mutable std::atomic<int64_t>
-      seen_;  ///< of the samples received, the newest that a call has returned
+      seen_;  ///< of the samples of the channel, the newest that a call has returned
+  mutable std::atomic<int64_t> skipped_;
 };
 
 /// A stream of messages of a type of one's own: `robot.stream<thermometer_t>("temp")`.
@@ -213,6 +226,9 @@ class MessageStream {
       callback(decoded(name, raw.bytes));
     });
   }
+  /// As Stream::dropped().
+  /// @return messages
+  int64_t dropped() const { return raw_.dropped(); }
 
   /// @param channel names it in the error
   /// @param bytes LCM's encoding
@@ -544,9 +560,9 @@ class [[nodiscard]] Simulation {
   /// @param time of sim time
   /// @throws NoServer
   void sleep(Duration time) const;
-  /// Calls back in the receiving thread when another server, or the same one restarted, answers
-  /// at this address. Commands are not repeated into the new run, and primitives under way have
-  /// ended.
+  /// Calls back, in the thread of the callbacks, when another server, or the same one restarted,
+  /// answers at this address. Commands are not repeated into the new run, and primitives under way
+  /// have ended.
   /// @param callback what it throws is reported once on the terminal
   /// @return ends the calls when it goes
   /// @throws NoServer
@@ -675,7 +691,8 @@ struct LaunchOptions {
                                   ///< port for LCM
   std::string name = "client";    ///< of this client
   Duration timeout = 30.0;        ///< of real time until the world is loaded
-  bool verbose = false;           ///< show what the server prints; else it is shown in errors alone
+  bool verbose = false;           ///< show what the server prints; else its warnings alone, and in
+                                  ///< errors its last lines
 };
 
 /// Starts `ruedo run WORLD` and joins it. The server ends with the Simulation, and with this

@@ -120,14 +120,15 @@ void MulticastReceiver::take_fragment(const uint8_t* bytes, size_t size, const H
 // end(): a fragment contradicts those before it.
 MulticastReceiver::Partials::iterator MulticastReceiver::partial_of(uint32_t sequence, size_t size,
                                                                     size_t count) {
-  const auto known = std::find_if(partials_.begin(), partials_.end(),
-                                  [&](const Partial& one) { return one.sender == sender_; });
-  if (known != partials_.end()) {
-    if (known->sequence == sequence)
-      return known->size == size && known->count == count ? known : partials_.end();
-    forget(known);
-  }
-  if (partials_.size() >= kMostSenders) forget(partials_.begin());
+  const auto is_senders = [this](const Partial& one) { return one.sender == sender_; };
+  const auto known = std::find_if(partials_.begin(), partials_.end(), [&](const Partial& one) {
+    return is_senders(one) && one.sequence == sequence;
+  });
+  if (known != partials_.end())
+    return known->size == size && known->count == count ? known : partials_.end();
+  if (std::count_if(partials_.begin(), partials_.end(), is_senders) >= std::ptrdiff_t{kMostOfSender})
+    forget(std::find_if(partials_.begin(), partials_.end(), is_senders));
+  if (partials_.size() >= kMostMessages) forget(partials_.begin());
   Partial& made = partials_.emplace_back();
   made.sender = sender_;
   made.sequence = sequence;

@@ -26,7 +26,8 @@ class MulticastReceiver {
   static constexpr size_t kLongestChannel = 63;  // LCM's
   static constexpr size_t kLongestMessage = 64u << 20;
   static constexpr size_t kMostPartial = 80u << 20;  // memory of messages that are not whole yet
-  static constexpr size_t kMostSenders = 32;         // of such messages
+  static constexpr size_t kMostMessages = 64;        // of these, and of each sender
+  static constexpr size_t kMostOfSender = 4;
 
   // Joins the group. buffer: bytes of the socket's buffer, 0: the system's. Throws
   // std::system_error.
@@ -55,8 +56,8 @@ class MulticastReceiver {
     size_t offset = 0;
     std::vector<uint8_t> data;
   };
-  // Of each sender the newest message. It takes the memory of what has come, not of what its sender
-  // says is to come.
+  // A message that is not whole yet: several threads of a sender's may send at once. It takes the
+  // memory of what has come, not of what its sender says is to come.
   struct Partial {
     Sender sender;
     uint32_t sequence = 0;

@@ -101,17 +101,36 @@ TEST_F(Multicast, LongMessagesInAnyOrderAndTwice) {
   }
 }
 
-TEST_F(Multicast, SendersApartAndTheNewestMessageOfEach) {
+TEST_F(Multicast, SendersApartAndMessagesThatAreSentAtOnce) {
   const Bytes data(100, 1), other(100, 2);
   const std::vector<Bytes> a = fragments("a", data, 1, 60), b = fragments("b", other, 1, 60),
-                           later = fragments("a", other, 2, 60);
+                           beside = fragments("a", other, 2, 60);
   read(a[0], {1, 1});
   read(b[1], {1, 2});
-  read(later[0], {1, 1});  // a's second part was lost
-  read(a[1], {1, 1});      // and now it is too late: this begins it anew, without its first part
+  read(beside[0], {1, 1});
+  read(a[1], {1, 1});
+  read(beside[1], {1, 1});
   read(b[0], {1, 2});
-  ASSERT_EQ(heard_.size(), 1u);
-  EXPECT_EQ(heard_[0], (std::pair<std::string, Bytes>("b", other)));
+  ASSERT_EQ(heard_.size(), 3u);
+  EXPECT_EQ(heard_[0], (std::pair<std::string, Bytes>("a", data)));
+  EXPECT_EQ(heard_[1], (std::pair<std::string, Bytes>("a", other)));
+  EXPECT_EQ(heard_[2], (std::pair<std::string, Bytes>("b", other)));
+}
+
+TEST_F(Multicast, AFewMessagesOfEachSenderAreOnTheWay) {
+  const Bytes data(100, 1);
+  const auto begin = [&](uint32_t sequence, uint16_t port) {
+    read(fragments("a", data, sequence, 60)[0], {1, port});
+  };
+  begin(100, 2);
+  for (uint32_t sequence = 1; sequence <= 5; ++sequence) begin(sequence, 1);
+  for (uint32_t sequence = 2; sequence <= 5; ++sequence)
+    read(fragments("a", data, sequence, 60)[1], {1, 1});
+  EXPECT_EQ(heard_.size(), 4u);
+  read(fragments("a", data, 1, 60)[1], {1, 1});  // it was forgotten
+  EXPECT_EQ(heard_.size(), 4u);
+  read(fragments("a", data, 100, 60)[1], {1, 2});  // not for another sender's sake
+  EXPECT_EQ(heard_.size(), 5u);
 }
 
 // Of which each sender says that 30 MB are to come: they cost what came, and none of the time and

@@ -13,14 +13,16 @@ import time
 from pathlib import Path
 
 import pytest
-from conftest import BUILD, HALL, PATIENCE, free_url, ruedo_run, tcp_server
+from conftest import BUILD, CLIENT, HALL, PATIENCE, free_url, ruedo_run, tcp_server
 
 CLASSES = os.environ.get("RUEDO_PROBE_JAVA")
 JAVA = ["java", "-cp", f"{BUILD}/java/ruedo.jar:{CLASSES}"]
 COMMAND = [*JAVA, "Lifetimes"]
 CLOSED = "this simulation was closed"
 ANOTHER_RUN = "ruedo: another run has begun at URL: commands are not repeated into it\n"
-pytestmark = pytest.mark.skipif(not CLASSES, reason="there is no JDK")
+pytestmark = pytest.mark.skipif(
+    not CLASSES or CLIENT not in ("", "java"), reason="the Java client is not there, or not chosen"
+)
 
 
 def run(command, **options):

@@ -8,7 +8,7 @@ import sys
 
 import lcm
 import pytest
-from conftest import ARENA, BUILD, PATIENCE, SOURCE, heed_ctrl_c, ruedo_run
+from conftest import ARENA, BUILD, PATIENCE, SOURCE, chosen, heed_ctrl_c, ruedo_run
 from witness import attempts
 
 EXAMPLES = {
@@ -57,7 +57,7 @@ def reasons_in(log):
     return {lcmtypes.motion_status_t.decode(status).reason for status in statuses}
 
 
-@pytest.mark.parametrize("language", list(EXAMPLES))
+@pytest.mark.parametrize("language", list(chosen(EXAMPLES)))
 def test_wander(language, tmp_path):
     from ruedo import lcmtypes
 
@@ -94,7 +94,7 @@ def test_wander(language, tmp_path):
     )
 
 
-@pytest.mark.parametrize("language", list(EXAMPLES))
+@pytest.mark.parametrize("language", list(chosen(EXAMPLES)))
 def test_ctrl_c_ends_the_example_in_order(language, tmp_path):
     picture = tmp_path / "seen.jpg"
     with ruedo_run(world=ARENA) as server:
@@ -123,7 +123,7 @@ def test_ctrl_c_ends_the_example_in_order(language, tmp_path):
     )  # a JVM that a signal ends says so
 
 
-@pytest.mark.parametrize("language", list(EXAMPLES))
+@pytest.mark.parametrize("language", list(chosen(EXAMPLES)))
 def test_options_are_explained(language):
     asked = subprocess.run(
         [*EXAMPLES[language], "--help"], capture_output=True, text=True, timeout=PATIENCE

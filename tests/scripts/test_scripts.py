@@ -3,6 +3,7 @@ and when nothing is done.
 """
 
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -140,6 +141,19 @@ def test_without_rights_the_line_to_ask_for_is_printed(machine):
 def test_help_installs_nothing():
     result = subprocess.run([ROOT / "scripts/test", "--help"], capture_output=True, text=True)
     assert result.returncode == 0 and "--sanitizers" in result.stdout
+
+
+def test_the_tiers_name_tests_that_there_are():
+    """A test that is renamed would else move into the gate."""
+    known = subprocess.run(
+        ["ctest", "--test-dir", os.environ["RUEDO_BINARY_DIR"], "-N", "-C", "Nightly"], capture_output=True, text=True
+    ).stdout
+    names = re.findall(r"Test +#\d+: (\S+)", known)
+    for line in (ROOT / "tests/tiers.txt").read_text().splitlines():
+        if line and not line.startswith("#"):
+            tier, pattern = line.split()
+            assert tier in ("all", "nightly")
+            assert any(re.fullmatch(pattern, name) for name in names), line
 
 
 def test_failed_tests_are_told_again_at_the_end(tmp_path):

@@ -31,7 +31,7 @@ _LONGEST_CHANNEL, _LONGEST_DATAGRAM = 63, 65536
 _LONGEST_MESSAGE = 64 << 20  # bytes
 _MOST_PARTIAL = 80 << 20  # bytes: memory of messages that are not whole yet
 _FRAGMENT_MEMORY = 256  # bytes, beside its data
-_MOST_SENDERS = 32  # of such messages
+_MOST_MESSAGES, _MOST_OF_SENDER = 64, 4  # of these
 _RECEIVE_BUFFER = 2 << 20  # bytes; the system gives at most its own limit
 _MOST_AT_ONCE = 100  # datagrams
 
@@ -40,10 +40,9 @@ _Sender = tuple[str, int]
 
 @dataclass
 class _Partial:
-    """Of each sender the newest message that is not whole yet. It takes the memory of what has
-    come, not of what its sender says is to come."""
+    """A message that is not whole yet: several threads of a sender's may send at once. It takes the
+    memory of what has come, not of what its sender says is to come."""
 
-    sequence: int
     size: int
     count: int
     fragments: dict[int, tuple[int, bytes]] = field(default_factory=dict)  # offset and data
@@ -83,7 +82,8 @@ class MulticastTransport:
         self._buffer = bytearray(_LONGEST_DATAGRAM)
         self._view = memoryview(self._buffer)
         self._channels: dict[bytes, str] = {}  # that are listened to
-        self._partials: dict[_Sender, _Partial] = {}  # the newest last
+        # Of a sender, and with its number; the newest last.
+        self._partials: dict[tuple[_Sender, int], _Partial] = {}
         self._partial_memory = 0
 
     def subscribe(self, channel: str) -> None:
@@ -145,12 +145,15 @@ class MulticastTransport:
                 return
         if number >= count or size > _LONGEST_MESSAGE or offset + len(data) > size:
             return
-        partial = self._partials.get(sender)
-        if partial is None or partial.sequence != sequence:
-            self._drop_partial(sender)
-            if len(self._partials) >= _MOST_SENDERS:
+        key = sender, sequence
+        partial = self._partials.get(key)
+        if partial is None:
+            of_sender = [other for other in self._partials if other[0] == sender]
+            if len(of_sender) >= _MOST_OF_SENDER:
+                self._drop_partial(of_sender[0])
+            if len(self._partials) >= _MOST_MESSAGES:
                 self._drop_partial(next(iter(self._partials)))
-            partial = self._partials[sender] = _Partial(sequence, size, count)
+            partial = self._partials[key] = _Partial(size, count)
         if (size, count) != (partial.size, partial.count) or number in partial.fragments:
             return
         partial.fragments[number] = (offset, data)
@@ -159,15 +162,15 @@ class MulticastTransport:
         if number == 0:
             partial.channel = self._channels.get(name)
         if len(partial.fragments) == count:
-            self._drop_partial(sender)
+            self._drop_partial(key)
             message = partial.joined() if partial.channel is not None else None
             if partial.channel is not None and message is not None:
                 arrived.append((partial.channel, message))
         while self._partial_memory > _MOST_PARTIAL:
             self._drop_partial(next(iter(self._partials)))
 
-    def _drop_partial(self, sender: _Sender) -> None:
-        partial = self._partials.pop(sender, None)
+    def _drop_partial(self, key: tuple[_Sender, int]) -> None:
+        partial = self._partials.pop(key, None)
         if partial is not None:
             self._partial_memory -= partial.memory
 

@@ -26,7 +26,9 @@ class Progress:
         self._lock = threading.Lock()
         self._epoch = 0
         self._received = 0  # us of sim time
-        self._uses: dict[int, tuple[int, float]] = {}  # by thread: since when, us and s of time.monotonic()
+        self._uses: dict[
+            int, tuple[int, float]
+        ] = {}  # by thread: since when, us and s of time.monotonic()
         self._told = ""
 
     def begin(self, tell: Tell) -> None:

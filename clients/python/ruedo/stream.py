@@ -26,6 +26,7 @@ T = TypeVar("T")
 
 _UTIME = struct.Struct(">q")
 _UTIME_AT = 8  # behind the fingerprint, in all of the server's own types
+_MOST_LOST = 1_000_000_000  # in one gap: a false time may make it any
 _MOST_UNEVEN = 0.25  # periods: gaps of samples that are taken at whole steps tell no more than that
 
 
@@ -276,7 +277,7 @@ class Stream(Reader[T]):
         last, self._last_utime = self._last_utime, utime
         if last is None or utime is None or not self._period or utime <= last:
             return 0
-        return max(0, round((utime - last) * 1e-6 / self._period) - 1)
+        return min(max(0, round((utime - last) * 1e-6 / self._period) - 1), _MOST_LOST)
 
     def _sample_for(self, reader: Reader[T], a_new_one: bool, timeout: float) -> T:
         if isinstance(timeout, bool) or not isinstance(timeout, (int, float)):

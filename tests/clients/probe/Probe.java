@@ -172,12 +172,7 @@ public final class Probe {
         boolean early = motion.done();
         sim.resume();
         motion.await(PATIENCE);
-        double stood = sim.time();
         Pose end = robot.pose().next(PATIENCE);
-        while (end.time() < stood)
-            end =
-                    robot.pose()
-                            .next(PATIENCE); // poses come at 50 Hz, the end of a motion at its step
         say(
                 what,
                 early,
@@ -462,6 +457,79 @@ public final class Probe {
     }
 
     /** The second: the text of a world, instead of the world. */
+    private static double ahead(Scan scan) {
+        double least = Double.POSITIVE_INFINITY;
+        for (int i = 60; i < 120; i++) least = Math.min(least, scan.ranges[i]);
+        return least;
+    }
+
+    /**
+     * What a program does in a run that it launched: looks now and then, works in a callback, and
+     * acts on what it sees.
+     */
+    private static void keepsUp(String rate) throws InterruptedException {
+        LaunchOptions options =
+                new LaunchOptions()
+                        .rate(
+                                rate.equals("max")
+                                        ? Double.POSITIVE_INFINITY
+                                        : Double.parseDouble(rate))
+                        .noise(false)
+                        .disable("p3at/camera");
+        try (Simulation sim = Ruedo.launch("arena", options)) {
+            Robot robot = sim.robot("p3at");
+            for (int i = 0; i < 5; i++) {
+                Thread.sleep(200);
+                double newest = robot.pose().latest(PATIENCE).time();
+                say("age", sim.state().time() - newest);
+            }
+            List<Double> seen = Collections.synchronizedList(new ArrayList<>());
+            Subscription open =
+                    robot.lrf()
+                            .onSample(
+                                    scan -> {
+                                        seen.add(scan.time());
+                                        pause(150);
+                                    });
+            try (open) {
+                sim.sleep(2.0);
+                double newest = robot.odometry().latest(PATIENCE).time();
+                say("age", sim.state().time() - newest);
+            }
+            double gap = 0.0;
+            for (int i = 1; i < seen.size(); i++)
+                gap = Math.max(gap, seen.get(i) - seen.get(i - 1));
+            say("seen", seen.size(), gap, robot.lrf().dropped());
+            for (int i = 0; i < 10; i++) {
+                robot.rotate(0.1).await(PATIENCE);
+                double heading = robot.pose().next(PATIENCE).heading();
+                sim.sleep(0.2);
+                say("after", Math.abs(robot.pose().latest(PATIENCE).heading() - heading));
+            }
+            robot.turnTo(0.0).await(PATIENCE);
+            while (ahead(robot.lrf().next(PATIENCE)) > 0.8) robot.setVelocity(0.4, 0.0);
+            robot.setVelocity(0.0, 0.0);
+            sim.sleep(2.0);
+            say("stands", ahead(robot.lrf().next(PATIENCE)));
+        }
+    }
+
+    private static void pause(long ms) {
+        try {
+            Thread.sleep(ms);
+        } catch (InterruptedException end) {
+            Thread.currentThread().interrupt();
+        }
+    }
+
+    private static void manyPrimitives(Simulation sim, String name, int count) {
+        Robot robot = sim.robot(name);
+        int done = 0;
+        for (int i = 0; i < count; i++)
+            if (robot.rotate(i % 2 == 1 ? 0.02 : -0.02).await(PATIENCE).done()) done++;
+        say("done", done);
+    }
+
     private static void launchedWith(String[] a) {
         LaunchOptions options =
                 new LaunchOptions()
@@ -531,6 +599,10 @@ public final class Probe {
             launchedWith(a);
             return;
         }
+        if (command.equals("keeps_up")) {
+            keepsUp(a[0]);
+            return;
+        }
         if (command.equals("log")) {
             readLog(a);
             return;
@@ -577,6 +649,9 @@ public final class Probe {
                     break;
                 case "primitives":
                     primitives(sim, a[0]);
+                    break;
+                case "many_primitives":
+                    manyPrimitives(sim, a[0], Integer.parseInt(a[1]));
                     break;
                 case "collisions":
                     collisions(sim, a[0]);

@@ -162,10 +162,7 @@ void primitives(const rc::Simulation& sim, const std::string& name) {
     const bool early = motion.done();
     sim.resume();
     motion.wait(kPatience);
-    const double stood = sim.time();
-    auto end = robot.pose().next(kPatience);
-    while (end.time() < stood)
-      end = robot.pose().next(kPatience);  // poses come at 50 Hz, the end of a motion at its step
+    const auto end = robot.pose().next(kPatience);
     say(what, early, motion.done(), motion.state(), motion.reason(),
         std::hypot(end.x() - begin.x(), end.y() - begin.y()),
         std::remainder(end.heading() - begin.heading(), 2 * kPi));
@@ -455,6 +452,60 @@ void launched_with(const std::string& world, const std::string& text) {
   say("scans", seen.all(robot.lrf()).size(), seen.latest(robot.lrf())->ranges[90]);
 }
 
+double ahead(const rc::Scan& scan) {
+  return *std::min_element(scan.ranges.begin() + 60, scan.ranges.begin() + 120);
+}
+
+// What a program does in a run that it launched: looks now and then, works in a callback, and acts
+// on what it sees.
+void keeps_up(const std::string& rate) {
+  const auto nap = [](double s) { std::this_thread::sleep_for(std::chrono::duration<double>(s)); };
+  rc::LaunchOptions options;
+  options.rate = rate == "max" ? rc::kFast : std::stod(rate);
+  options.noise = false;
+  options.disable = {"p3at/camera"};
+  const rc::Simulation sim = rc::launch("arena", options);
+  const rc::Robot robot = sim.robot("p3at");
+  const auto lrf = robot.lrf();
+  for (int i = 0; i < 5; ++i) {
+    nap(0.2);
+    const double newest = robot.pose().latest(kPatience).time();
+    say("age", sim.state().time() - newest);
+  }
+  std::vector<double> seen;
+  {
+    const rc::Subscription subscription = lrf.on_sample([&](const rc::Scan& scan) {
+      seen.push_back(scan.time());
+      nap(0.15);
+    });
+    sim.sleep(2.0);
+    const double newest = robot.odometry().latest(kPatience).time();
+    say("age", sim.state().time() - newest);
+  }
+  double gap = 0.0;
+  for (size_t i = 1; i < seen.size(); ++i) gap = std::max(gap, seen[i] - seen[i - 1]);
+  say("seen", seen.size(), gap, lrf.dropped());
+  for (int i = 0; i < 10; ++i) {
+    robot.rotate(0.1).wait(kPatience);
+    const double heading = robot.pose().next(kPatience).heading();
+    sim.sleep(0.2);
+    say("after", std::abs(robot.pose().latest(kPatience).heading() - heading));
+  }
+  robot.turn_to(0.0).wait(kPatience);
+  while (ahead(lrf.next(kPatience)) > 0.8) robot.set_velocity(0.4, 0.0);
+  robot.set_velocity(0.0, 0.0);
+  sim.sleep(2.0);
+  say("stands", ahead(lrf.next(kPatience)));
+}
+
+void many_primitives(const rc::Simulation& sim, const std::string& name, int count) {
+  const rc::Robot robot = sim.robot(name);
+  int done = 0;
+  for (int i = 0; i < count; ++i)
+    done += robot.rotate(i % 2 ? 0.02 : -0.02).wait(kPatience).done() ? 1 : 0;
+  say("done", done);
+}
+
 void read_log(const std::vector<std::string>& a) {
   const rc::Log log = rc::read_log(a[0]);
   std::string names;
@@ -498,6 +549,7 @@ void apart(const std::string& url, const std::string& name) {
 void act(const std::string& url, const std::string& command, const std::vector<std::string>& a) {
   if (command == "launch") launched(a);
   if (command == "launch_with") return launched_with(a[0], a.size() > 1 ? a[1] : "");
+  if (command == "keeps_up") return keeps_up(a[0]);
   if (command == "log") return read_log(a);
   if (command == "apart") return apart(url, a[0]);
   const bool named =
@@ -515,6 +567,7 @@ void act(const std::string& url, const std::string& command, const std::vector<s
   if (command == "velocity") drive(sim, a, false);
   if (command == "wheels") drive(sim, a, true);
   if (command == "primitives") primitives(sim, a[0]);
+  if (command == "many_primitives") many_primitives(sim, a[0], std::stoi(a[1]));
   if (command == "collisions") collisions(sim, a[0]);
   if (command == "errors") errors(sim, a[0]);
   if (command == "markers") markers(sim, a[0]);

@@ -122,9 +122,7 @@ def primitives(sim, name):
         early = motion.done
         sim.resume()
         motion.wait(PATIENCE)
-        stood, end = sim.time, robot.pose.next(PATIENCE)
-        while end.time < stood:  # poses come at 50 Hz, the end of a motion at its step
-            end = robot.pose.next(PATIENCE)
+        end = robot.pose.next(PATIENCE)
         say(
             what,
             early,

@@ -20,6 +20,7 @@
 #include "ruedo/channel_info_t.hpp"
 #include "ruedo/grant_reply_t.hpp"
 #include "ruedo/motion_status_t.hpp"
+#include "ruedo/move_command_t.hpp"
 #include "ruedo/odometry_t.hpp"
 #include "ruedo/reply_t.hpp"
 #include "ruedo/request_t.hpp"
@@ -41,7 +42,9 @@ class FakeServer {
   std::atomic<int> lost_leaves{0}, leaves{0};
   std::atomic<bool> exits_on_pause{false};  // the program, as if a signal's handler did it
   std::atomic<int64_t> falsehood{0};        // what it says of odometry_t
+  std::atomic<int64_t> features{-1};        // all
   std::vector<std::string> robots{"p3at"};
+  std::weak_ptr<Core> client;  // the last
 
   template <class Message>
   void send(const std::string& channel, const Message& message) {
@@ -62,7 +65,7 @@ class FakeServer {
     info.version = "1";
     info.world = "memory";
     info.step_us = 5000;
-    info.features = -1;
+    info.features = features;
     for (const std::string& name : robots) {
       robot_info_t robot{};
       robot.name = name;
@@ -108,13 +111,18 @@ class FakeServer {
     const std::lock_guard lock(mutex_);
     return heard_[channel];
   }
+  std::atomic<int64_t> id_of_last_move{0};
   void await(const std::function<bool()>& ready) {
     while (!ready()) std::this_thread::sleep_for(std::chrono::milliseconds(1));
   }
-  // Returns when the client's handlers have received everything sent so far.
+  // Returns when the client's handlers have received everything sent so far, and its callbacks have
+  // seen it.
   void await_delivery() {
-    std::unique_lock lock(mutex_);
-    news_.wait(lock, [&] { return to_client_.empty() && !delivering_; });
+    {
+      std::unique_lock lock(mutex_);
+      news_.wait(lock, [&] { return to_client_.empty() && !delivering_; });
+    }
+    if (const auto core = client.lock()) await([&] { return core->callbacks().is_idle(); });
   }
 
  private:
@@ -144,6 +152,9 @@ class FakeServer {
       ++heard_[channel];
       news_.notify_all();
     }
+    if (move_command_t move;
+        channel.ends_with("/move") && move.decode(bytes, 0, static_cast<int>(size)) > 0)
+      id_of_last_move = move.id;
     if (channel != "ruedo/request") return;
     request_t request;
     if (request.decode(bytes, 0, static_cast<int>(size)) < 0) return;
@@ -187,6 +198,10 @@ class FakeTransport : public Transport {
     server_->hear(channel, bytes, size);
   }
   bool is_connected() override { return !server_->gone; }
+  bool has_news() override {
+    const std::lock_guard lock(server_->mutex_);
+    return !server_->to_client_.empty() || server_->delivering_;
+  }
   bool receive(std::chrono::milliseconds timeout, const Receiver& receiver) override {
     std::unique_lock lock(server_->mutex_);
     if (!server_->news_.wait_for(lock, timeout, [&] { return !server_->to_client_.empty(); }))
@@ -217,6 +232,7 @@ class FakeTransport : public Transport {
 inline Simulation simulation(const std::shared_ptr<FakeServer>& server) {
   auto core =
       std::make_shared<Core>("memq://", "test", nullptr, std::make_unique<FakeTransport>(server));
+  server->client = core;
   core->join(300.0);
   return Simulation(std::move(core));
 }

@@ -557,7 +557,7 @@ TEST_F(Lifetimes, ANewRobotOfTheSameNameDoesNotGetTheOldCommands) {
   server->send_info();
   server->await_delivery();
   const int64_t before = server->heard("p3at/velocity");
-  for (int i = 1; i <= 20; ++i) server->send_tick(1000 * i);  // each was a repetition
+  for (int i = 1; i <= 20; ++i) server->send_tick(20'000 * i);  // each was a repetition
   for (int i = 1; i <= 20; ++i)
     server->send_motion("p3at", 1000 * i, 0, ruedo::motion_status_t::STATE_RUNNING);
   server->await_delivery();
@@ -594,7 +594,7 @@ TEST_F(Lifetimes, ANewRunIsNoticedAndNotDriven) {
   EXPECT_EQ(testing::internal::GetCapturedStderr(),
             "ruedo: another run has begun at memq://: commands are not repeated into it\n");
   const int64_t before = server->heard("p3at/velocity");
-  for (int i = 2; i <= 20; ++i) server->send_tick(1000 * i);
+  for (int i = 2; i <= 20; ++i) server->send_tick(20'000 * i);
   server->await_delivery();
   EXPECT_EQ(server->heard("p3at/velocity"), before);
   EXPECT_EQ(motion.reason(), MotionReason::new_run);

@@ -12,8 +12,9 @@ import java.nio.channels.DatagramChannel;
 import java.nio.channels.SelectionKey;
 import java.nio.channels.Selector;
 import java.nio.charset.StandardCharsets;
+import java.util.ArrayList;
 import java.util.Arrays;
-import java.util.LinkedHashMap;
+import java.util.List;
 import java.util.Map;
 import java.util.TreeMap;
 
@@ -31,20 +32,23 @@ final class UdpmTransport implements Transport {
     private static final long MOST_PARTIAL = // bytes: memory of those not whole yet
             Math.min(80 << 20, Runtime.getRuntime().maxMemory() / 4);
     private static final double SENDING_SECONDS = 5.0; // what is not taken until then is lost
-    private static final int MOST_SENDERS = 32; // of messages that are not whole yet
+    private static final int MOST_MESSAGES = 64; // that are not whole yet, and of each sender
+    private static final int MOST_OF_SENDER = 4;
 
     /**
-     * Of each sender the newest message that is not whole yet. It takes the memory of what has
-     * come, not of what its sender says is to come.
+     * A message that is not whole yet: several threads of a sender's may send at once. It takes the
+     * memory of what has come, not of what its sender says is to come.
      */
     private static final class Partial {
+        final SocketAddress sender;
         final int sequence;
         final int size;
         final int count;
         final Map<Integer, Fragment> fragments = new TreeMap<>(); // by number
         String channel;
 
-        Partial(int sequence, int size, int count) {
+        Partial(SocketAddress sender, int sequence, int size, int count) {
+            this.sender = sender;
             this.sequence = sequence;
             this.size = size;
             this.count = count;
@@ -86,7 +90,7 @@ final class UdpmTransport implements Transport {
     private volatile boolean busy; // something was read that the receiver has not seen
     private volatile boolean closed;
     // The newest last; the receiving thread's.
-    private final Map<SocketAddress, Partial> partials = new LinkedHashMap<>();
+    private final List<Partial> partials = new ArrayList<>();
     private final FragmentPool pool = new FragmentPool();
 
     UdpmTransport(Address address) {
@@ -269,34 +273,33 @@ final class UdpmTransport implements Transport {
         byte[] message = null;
         if (partial.fragments.size() == fragments) {
             if (partial.channel != null) message = partial.joined();
-            forget(sender);
+            forget(partial);
         }
         while (pool.held() > MOST_PARTIAL) {
-            if (!pool.shrink()) forgetOldest();
+            if (!pool.shrink()) forget(partials.get(0));
         }
         if (message != null) receiver.receive(partial.channel, message);
     }
 
     /** Null when a fragment contradicts those before it. */
     private Partial partialOf(SocketAddress sender, int sequence, int size, int count) {
-        Partial known = partials.get(sender);
-        if (known != null && known.sequence == sequence)
-            return known.size == size && known.count == count ? known : null;
-        forget(sender);
-        if (partials.size() >= MOST_SENDERS) forgetOldest();
-        Partial made = new Partial(sequence, size, count);
-        partials.put(sender, made);
+        List<Partial> ofSender = new ArrayList<>();
+        for (Partial known : partials) {
+            if (!known.sender.equals(sender)) continue;
+            if (known.sequence == sequence)
+                return known.size == size && known.count == count ? known : null;
+            ofSender.add(known);
+        }
+        if (ofSender.size() >= MOST_OF_SENDER) forget(ofSender.get(0));
+        if (partials.size() >= MOST_MESSAGES) forget(partials.get(0));
+        Partial made = new Partial(sender, sequence, size, count);
+        partials.add(made);
         return made;
     }
 
-    private void forget(SocketAddress sender) {
-        Partial partial = partials.remove(sender);
-        if (partial == null) return;
+    private void forget(Partial partial) {
+        if (!partials.remove(partial)) return;
         for (Fragment fragment : partial.fragments.values()) pool.giveBack(fragment.data);
-    }
-
-    private void forgetOldest() {
-        forget(partials.keySet().iterator().next());
     }
 
     /** The name in front of a message; null where it has no end. */

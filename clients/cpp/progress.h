@@ -1,0 +1,55 @@
+// How far a program has come in a run that it launched: the server waits for it there.
+//
+// A run at the highest rate takes a second of sim time in less than a millisecond. A program that
+// looks at a sensor and then commands would act on a world that has gone on without it. So it tells
+// its server what it has received, and from which moment on it works with what it knew then.
+#pragma once
+
+#include <atomic>
+#include <chrono>
+#include <cstdint>
+#include <functional>
+#include <map>
+#include <mutex>
+#include <string>
+#include <thread>
+#include <vector>
+
+namespace ruedo::client {
+
+// Thread safe. Until begin() no server waits for this program.
+class Progress {
+ public:
+  using Threads = std::vector<std::thread::id>;
+
+  // tell: writes a line to the server, which may be lost; the next one says all that it did.
+  void begin(std::function<void(const std::string& line)> tell);
+  bool is_told() const { return told_; }
+  // It is to be told again soon: a thread works with what it was given.
+  bool in_use() const;
+  // All that the server sent up to that sim time has come, and callbacks have seen it.
+  void received(int32_t epoch, int64_t utime);
+  // These threads work with what is known at that sim time.
+  void use(int64_t utime, const Threads& threads = {std::this_thread::get_id()});
+  // The caller's thread waits for what the server sends.
+  void wait();
+  // While a thread works the run goes on as in real time.
+  void say();
+
+ private:
+  struct Use {
+    int64_t utime;
+    std::chrono::steady_clock::time_point since;
+  };
+  void say_locked();
+
+  std::atomic<bool> told_{false};
+  mutable std::mutex mutex_;  // what follows
+  std::function<void(const std::string& line)> tell_;
+  int32_t epoch_ = 0;
+  int64_t received_ = 0;  // us of sim time
+  std::map<std::thread::id, Use> uses_;
+  std::string last_;  // that was said
+};
+
+}  // namespace ruedo::client
