@@ -126,7 +126,8 @@ MulticastReceiver::Partials::iterator MulticastReceiver::partial_of(uint32_t seq
   });
   if (known != partials_.end())
     return known->size == size && known->count == count ? known : partials_.end();
-  if (std::count_if(partials_.begin(), partials_.end(), is_senders) >= std::ptrdiff_t{kMostOfSender})
+  if (std::count_if(partials_.begin(), partials_.end(), is_senders) >=
+      std::ptrdiff_t{kMostOfSender})
     forget(std::find_if(partials_.begin(), partials_.end(), is_senders));
   if (partials_.size() >= kMostMessages) forget(partials_.begin());
   Partial& made = partials_.emplace_back();

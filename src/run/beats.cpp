@@ -14,18 +14,12 @@ bool Beat::due(int64_t step) {
 }
 
 void Ticks::begin_step(const Step& step) {
-  due_ = beat_.due(step.step);
+  due_ = beat_.due(step.step) || wanted_(step.step);
   if (due_) tick_.begin(step.time_us, run_id_, step.epoch, step.step);
 }
 
 void Ticks::message(const Published& message) {
   if (due_) tick_.add_message(message.index, message.sequence, message.data, message.size);
-}
-
-void Ticks::set_rate(Rate rate) {
-  if (rate == rate_) return;
-  rate_ = rate;
-  beat_ = Beat(rate, step_us_);
 }
 
 void Ticks::say() {

@@ -34,13 +34,16 @@ class Ticks : public Sink {
   // Adds the last request or grant of each client that acted before that step.
   using AddApplied = std::function<void(TickWriter& tick, int64_t step)>;
 
-  Ticks(Publisher& publisher, int64_t run_id, Rate rate, int64_t step_us, AddApplied add_applied)
+  // Whether a step has a tick for another reason than the rate.
+  using Wanted = std::function<bool(int64_t step)>;
+
+  Ticks(Publisher& publisher, int64_t run_id, Rate rate, int64_t step_us, AddApplied add_applied,
+        Wanted wanted)
       : publisher_(publisher),
         run_id_(run_id),
-        step_us_(step_us),
-        rate_(rate),
         beat_(rate, step_us),
-        add_applied_(std::move(add_applied)) {}
+        add_applied_(std::move(add_applied)),
+        wanted_(std::move(wanted)) {}
 
   // It lists what there is.
   bool wants(const std::string&) const override { return false; }
@@ -48,7 +51,6 @@ class Ticks : public Sink {
   void message(const Published& message) override;
   void end_step(const Step& step) override;
 
-  void set_rate(Rate rate);
   // Of the last state, without the list of its messages.
   void say();
 
@@ -59,10 +61,10 @@ class Ticks : public Sink {
   void finish();
 
   Publisher& publisher_;
-  const int64_t run_id_, step_us_;
-  Rate rate_;
+  const int64_t run_id_;
   Beat beat_;
   const AddApplied add_applied_;
+  const Wanted wanted_;
   TickWriter tick_;
   bool due_ = false;
   Time last_ = std::chrono::steady_clock::now();

@@ -1,7 +1,9 @@
 // The publisher's loop.
 #include "run/run.h"
 
+#include <algorithm>
 #include <cfenv>
+#include <cmath>
 
 #include <spdlog/spdlog.h>
 
@@ -19,7 +21,6 @@ namespace {
 constexpr auto kStatusPeriod = std::chrono::milliseconds(500);
 constexpr auto kPausedInfoPeriod = std::chrono::seconds(1);
 constexpr auto kTickAgainPeriod = std::chrono::milliseconds(100);
-constexpr Rate kFollowedTickRate{80, 1};  // two within Backpressure::kMostAhead
 // Steps that the publisher computes itself rather than wake another thread for them: it is waited
 // for meanwhile.
 constexpr int kFewGranted = 4, kFewAhead = 16;
@@ -58,7 +59,8 @@ Run::Run(std::shared_ptr<const world::WorldModel> world, RunOptions options, Bus
                        world_->step_us,
                        [this](TickWriter& tick, int64_t step) {
                          mode().add_applied(tick, step, control_.sessions().list());
-                       }},
+                       },
+                       [this](int64_t step) { return launcher_wants_tick(step); }},
              .info = {publisher_, world_->step_us, [this] { return pacer_->paused(); }}},
       on_stall_(
           [](const std::string& reason) { spdlog::warn("the run does not go on: {}", reason); }),
@@ -267,10 +269,18 @@ Run::Clock::time_point Run::attend() {
   return std::min({next_status_, last_sign() + kPausedInfoPeriod, next_tick, attended.next});
 }
 
+// The run can go no further without an answer; in real time the answer is asked for earlier.
+bool Run::launcher_wants_tick(int64_t step) const {
+  if (!backpressure_.acts() || repeating_) return false;
+  const auto [at_any_rate, at_highest_rate] = backpressure_.limits();
+  if (std::isinf(pacer_->rate())) return step >= std::min(at_any_rate, at_highest_rate);
+  const SimTime since = step * world_->step_us - beats_.ticks.told_us();
+  return step >= at_any_rate || since < 0 || since >= Backpressure::kMostAhead / 2;
+}
+
 // Ticks may be lost on the way to the program that the run waits for.
 Run::Clock::time_point Run::attend_follower(Clock::time_point now) {
   if (!backpressure_.acts() || repeating_) return Clock::time_point::max();
-  beats_.ticks.set_rate(kFollowedTickRate);
   if (!waits_for_launcher() && backpressure_.has_room()) return Clock::time_point::max();
   if (now >= beats_.ticks.last() + kTickAgainPeriod) beats_.ticks.say();
   return beats_.ticks.last() + kTickAgainPeriod;

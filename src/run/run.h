@@ -145,6 +145,7 @@ class Run {
   Control::Host control_host();
   void publish_what_is_ready();
   bool has_room();
+  bool launcher_wants_tick(int64_t step) const;
   void publish(const engine::Batch& batch);
   void record_applied(const engine::Batch& batch, int64_t step);
   void tell_readers();  // what is read by now

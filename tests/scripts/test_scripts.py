@@ -146,7 +146,9 @@ def test_help_installs_nothing():
 def test_the_tiers_name_tests_that_there_are():
     """A test that is renamed would else move into the gate."""
     known = subprocess.run(
-        ["ctest", "--test-dir", os.environ["RUEDO_BINARY_DIR"], "-N", "-C", "Nightly"], capture_output=True, text=True
+        ["ctest", "--test-dir", os.environ["RUEDO_BINARY_DIR"], "-N", "-C", "Nightly"],
+        capture_output=True,
+        text=True,
     ).stdout
     names = re.findall(r"Test +#\d+: (\S+)", known)
     for line in (ROOT / "tests/tiers.txt").read_text().splitlines():
