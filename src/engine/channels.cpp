@@ -60,6 +60,10 @@ void Channels::check_remaps() const {
   std::vector<std::string> names;
   for (const Channel& channel : channels_) names.push_back(channel.name);
   for (const auto& [name, bus_name] : remaps_) {
+    for (const char* own : {kInfoChannel, kTickChannel, kRequestChannel, kReplyChannel}) {
+      if (name == own)
+        throw InputError({}, "--remap: '" + name + "' keeps its name: clients find the run by it");
+    }
     if (std::find(names.begin(), names.end(), name) != names.end()) continue;
     const std::string near = nearest_word(name, names);
     throw InputError({}, "--remap: there is no channel '" + name + "'" +

@@ -183,6 +183,7 @@ void CommandInbox::reset_time() {
   std::lock_guard lock(mutex_);
   waits_.scheduled_count = waits_.scheduled_bytes = 0;
   waits_.next_step = 0;
+  for (Slots& slots : waits_.slots) slots.primitives.clear();
 }
 
 void CommandInbox::receive(const std::string& channel, const uint8_t* data, size_t size) {

@@ -50,6 +50,14 @@ bool same_name(const std::string& a, const std::string& b) {
   });
 }
 
+// What is read in another way than it is written is another world.
+void refuse_errors(const world::WorldModel& model) {
+  for (const Finding& finding : model.findings) {
+    if (finding.kind == Finding::Kind::error)
+      throw InputError(finding.source, finding.element + ": " + finding.text);
+  }
+}
+
 }  // namespace
 
 struct Engine::Arena {
@@ -485,6 +493,7 @@ std::unique_ptr<Engine::Copy> Engine::make_other(const Reset& reset) {
   const Copy& before = *copies_[static_cast<size_t>(reset.world)];
   const bool other = reset.model && reset.model != before.model;
   if (!other && options_.draws.empty()) return nullptr;
+  if (other) refuse_errors(*reset.model);
   if (other && reset.model->step_us != world_->step_us)
     throw InputError({reset.model->file}, "its steps have " + std::to_string(reset.model->step_us) +
                                               " us, those of " + world_->file + " have " +

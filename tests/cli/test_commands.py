@@ -55,6 +55,7 @@ def one_line(text):
         (["run", ARENA, "--disable", "camera"], 2, "ROBOT/DEVICE"),
         (["run", ARENA, "--remap", "p3at/lrff=LASER"], 2, "did you mean 'p3at/lrf'"),
         (["run", ARENA, "--remap", "p3at/lrf=" + "x" * 64], 2, "63"),
+        (["run", ARENA, "--remap", "ruedo/info=X"], 2, "'ruedo/info' keeps its name"),
         (["run", ARENA, "--remap", "p3at/lrf=p3at/pose"], 2, "p3at/pose"),
         (["run", ARENA, "--control", "maybe"], 2, "control"),
         (["run", "/nowhere.sdf"], 3, "/nowhere.sdf"),

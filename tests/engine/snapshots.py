@@ -240,7 +240,8 @@ class Commands:
                 velocities[i] = rng.uniform(-0.8, 1.2), rng.uniform(-0.3, 0.3), rng.uniform(-2, 2)
             elif chance < 0.75:
                 move = lcmtypes.move_command_t()
-                move.id, move.kind, move.value = decision, rng.choice([1, 2]), rng.uniform(-1, 1)
+                # Without a number: the same decision may be made again in one run.
+                move.id, move.kind, move.value = 0, rng.choice([1, 2]), rng.uniform(-1, 1)
                 others.append((name + "/move", move))
         for robot, names in self.joints.items():
             if not names or rng.random() < 0.5:

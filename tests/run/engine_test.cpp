@@ -304,6 +304,8 @@ TEST(Engine, AWorldOfAnotherStepSizeIsRefused) {
   text.replace(text.find("0.005"), 5, "0.004");
   Engine engine(load_text(models), {});
   EXPECT_THROW(engine.reset(0, 1, world::load_world_text(text, "other.sdf")), InputError);
+  text.replace(text.find("0.004"), 5, "nan");  // a finding; what is usual would be taken
+  EXPECT_THROW(engine.reset(0, 1, world::load_world_text(text, "other.sdf")), InputError);
 }
 
 TEST(Engine, AHandlerThatThrowsLeavesWorldsSound) {

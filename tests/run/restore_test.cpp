@@ -307,6 +307,20 @@ TEST_F(RestoreTest, OneWhoseWorldWasEditedRunsThePastAgain) {
   EXPECT_EQ(go_on(), followed);
 }
 
+TEST_F(RestoreTest, ARefusedRequestCostsNoState) {
+  start_paused();
+  step(100);
+  save("before");
+  EXPECT_NE(remove("nobody").code, reply_t::OK);
+  EXPECT_NE(spawn("no text", 5.0, 5.0).code, reply_t::OK);
+  EXPECT_NE(spawn(robot_sdf("r", 0, 0), 0.0, 0.0).code, reply_t::OK);  // there is something
+  saved_ = save("after");
+  EXPECT_GE(fs::file_size(file("after")), fs::file_size(file("before")));
+  const auto followed = go_on();
+  EXPECT_FALSE(restore("after"));
+  EXPECT_EQ(go_on(), followed);
+}
+
 TEST_F(RestoreTest, AndSoDoesOneWhoseRunIsLogged) {
   TemporaryFile log("restored.lcm");
   RunOptions options = paused_server();

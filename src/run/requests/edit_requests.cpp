@@ -46,7 +46,7 @@ Run::Outcome Run::change(const request_t& request, Changes what,
   {
     const std::lock_guard lock(simulation_mutex_);
     outcome = apply();
-    if (models) {
+    if (models && outcome.code == reply_t::OK) {
       as_made_ = false;
       world_ = std::make_shared<const world::WorldModel>(simulation_->world());
       mode().models_changed(stage(), publisher_.step());

@@ -464,6 +464,15 @@ public final class Probe {
     }
 
     /**
+     * Of the newest sample, s of sim time; without the real time that the question takes, in which
+     * sim time goes on.
+     */
+    private static void sayAge(Simulation sim, double newest, long begin) {
+        double now = sim.state().time();
+        say("age", now - newest - (System.nanoTime() - begin) * 1e-9);
+    }
+
+    /**
      * What a program does in a run that it launched: looks now and then, works in a callback, and
      * acts on what it sees.
      */
@@ -480,8 +489,9 @@ public final class Probe {
             Robot robot = sim.robot("p3at");
             for (int i = 0; i < 5; i++) {
                 Thread.sleep(200);
+                long begin = System.nanoTime();
                 double newest = robot.pose().latest(PATIENCE).time();
-                say("age", sim.state().time() - newest);
+                sayAge(sim, newest, begin);
             }
             List<Double> seen = Collections.synchronizedList(new ArrayList<>());
             Subscription open =
@@ -493,8 +503,9 @@ public final class Probe {
                                     });
             try (open) {
                 sim.sleep(2.0);
+                long begin = System.nanoTime();
                 double newest = robot.odometry().latest(PATIENCE).time();
-                say("age", sim.state().time() - newest);
+                sayAge(sim, newest, begin);
             }
             double gap = 0.0;
             for (int i = 1; i < seen.size(); i++)

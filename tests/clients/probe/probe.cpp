@@ -456,6 +456,17 @@ double ahead(const rc::Scan& scan) {
   return *std::min_element(scan.ranges.begin() + 60, scan.ranges.begin() + 120);
 }
 
+// Of the newest sample, s of sim time; without the real time that the question takes, in which sim
+// time goes on.
+template <class Stream>
+void say_age(const rc::Simulation& sim, const Stream& stream) {
+  const auto begin = std::chrono::steady_clock::now();
+  const double newest = stream.latest(kPatience).time();
+  const double now = sim.state().time();
+  const std::chrono::duration<double> asked = std::chrono::steady_clock::now() - begin;
+  say("age", now - newest - asked.count());
+}
+
 // What a program does in a run that it launched: looks now and then, works in a callback, and acts
 // on what it sees.
 void keeps_up(const std::string& rate) {
@@ -469,8 +480,7 @@ void keeps_up(const std::string& rate) {
   const auto lrf = robot.lrf();
   for (int i = 0; i < 5; ++i) {
     nap(0.2);
-    const double newest = robot.pose().latest(kPatience).time();
-    say("age", sim.state().time() - newest);
+    say_age(sim, robot.pose());
   }
   std::vector<double> seen;
   {
@@ -479,8 +489,7 @@ void keeps_up(const std::string& rate) {
       nap(0.15);
     });
     sim.sleep(2.0);
-    const double newest = robot.odometry().latest(kPatience).time();
-    say("age", sim.state().time() - newest);
+    say_age(sim, robot.odometry());
   }
   double gap = 0.0;
   for (size_t i = 1; i < seen.size(); ++i) gap = std::max(gap, seen[i] - seen[i - 1]);

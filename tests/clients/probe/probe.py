@@ -383,6 +383,16 @@ def launched_with(world, text=None):
         say("scans", len(seen.all(robot.lrf)), seen.latest(robot.lrf).ranges[90])
 
 
+def say_age(sim, stream):
+    """Of the newest sample, s of sim time; without the real time that the question takes, in which
+    sim time goes on.
+    """
+    begin = time.monotonic()
+    newest = stream.latest(PATIENCE).time
+    now = sim.state().time
+    say("age", now - newest - (time.monotonic() - begin))
+
+
 def keeps_up(rate):
     """What a program does in a run that it launched: looks now and then, works in a callback, and
     acts on what it sees.
@@ -391,8 +401,7 @@ def keeps_up(rate):
         robot = sim.robot("p3at")
         for _ in range(5):
             time.sleep(0.2)
-            newest = robot.pose.latest(PATIENCE).time
-            say("age", sim.state().time - newest)
+            say_age(sim, robot.pose)
         seen = []
 
         def work(scan):
@@ -401,8 +410,7 @@ def keeps_up(rate):
 
         with robot.lrf.on_sample(work):
             sim.sleep(2.0)
-            newest = robot.odometry.latest(PATIENCE).time
-            say("age", sim.state().time - newest)
+            say_age(sim, robot.odometry)
         say("seen", len(seen), max(b - a for a, b in itertools.pairwise(seen)), robot.lrf.dropped)
         for _ in range(10):
             robot.rotate(0.1).wait(PATIENCE)
