@@ -28,7 +28,7 @@ def test_a_run_does_not_leave_its_launcher_behind(language, rate, load):
     count, gap, dropped = said.numbers("seen")
     assert count >= 19 and gap < 0.1051 and dropped == 0
     assert all(float(turned) < 1e-9 for turned in said.all("after"))
-    # 0.13 m to brake, and 0.4 m for each second of real time in which the program gets no processor.
+    # 0.13 m to brake, and 0.4 m for each second in which the program gets no processor.
     assert 0.55 < said.numbers("stands")[0] < 0.72
 
 
