@@ -30,7 +30,7 @@ struct CallbackQueue::State {
   struct Waiting {
     Call call;
     std::string on;
-    Count missed;  // null: it is no sample, and always runs
+    Count missed;  // null: the call gets no sample, and is never dropped
     size_t cost = 0;
   };
 

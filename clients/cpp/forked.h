@@ -41,7 +41,7 @@ class ParentsPipe {
   ParentsPipe& operator=(const ParentsPipe&) = delete;
 
   FileHandle open();  // the end for reading; none: errno says why
-  // Without waiting: nothing is written where there is no room, or no reader. Thread safe, as
+  // Does not wait: it drops the text where the pipe is full or nobody reads it. Thread safe, as
   // close().
   void write(std::string_view text);
   void close();

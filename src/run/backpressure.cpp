@@ -49,11 +49,6 @@ Backpressure::Limits Backpressure::limits() const {
   return {after(progress_.received_us, kMostAhead), after(progress_.used_us, kMostAhead / 2)};
 }
 
-bool Backpressure::acts() const {
-  const std::lock_guard lock(mutex_);
-  return acts_;
-}
-
 void Backpressure::published(SimTime time_us, uint64_t bytes) {
   const std::lock_guard lock(mutex_);
   published_ = bytes;

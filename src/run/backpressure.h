@@ -7,6 +7,7 @@
 // nobody.
 #pragma once
 
+#include <atomic>
 #include <cstdint>
 #include <deque>
 #include <limits>
@@ -49,7 +50,7 @@ class Backpressure {
   // The run goes on from there.
   void begin(int32_t epoch, SimTime time_us);
   Limits limits() const;
-  bool acts() const;  // the program has said something
+  bool acts() const { return acts_; }  // the program has said something; asked at each step
 
   // The samples up to that time have this many bytes, since the run began.
   void published(SimTime time_us, uint64_t bytes);
@@ -62,8 +63,8 @@ class Backpressure {
   };
 
   const int64_t step_us_;
+  std::atomic<bool> acts_{false};
   mutable std::mutex mutex_;
-  bool acts_ = false;
   LauncherProgress progress_;
   std::deque<Mark> on_the_way_;  // what was published after progress_.received_us
   uint64_t published_ = 0, received_ = 0;

@@ -115,7 +115,7 @@ class Bus:
         if self.handling:
             return
         deadline = time.monotonic() + _CATCH_UP_SECONDS
-        # In this order: what is no news any more is being handled.
+        # News first: once the receiving thread has taken it, that thread is busy.
         while (self._transport.has_news() or self._transport.busy) and not self._closed.is_set():
             if time.monotonic() >= deadline:
                 break

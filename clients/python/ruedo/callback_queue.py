@@ -49,8 +49,8 @@ class CallbackQueue:
         return not self._waiting and not self._running
 
     def put(self, call: Call, of: Any = None, size: int = 0) -> list[Any]:
-        """of: the stream whose sample it gets; None: it is no sample, and always runs. Returns of
-        what samples were dropped, each as often as it lost one."""
+        """of: the stream whose sample the call gets; None: it gets no sample, and is never dropped.
+        Returns the streams that lost a sample, each as often as it lost one."""
         with self._news:
             if self._closed:
                 return []

@@ -22,7 +22,7 @@ final class CallbackQueue {
 
     private static final class Call {
         final Runnable run;
-        final StreamCore<?> of; // null: it is no sample, and always runs
+        final StreamCore<?> of; // null: the call gets no sample, and is never dropped
         final int cost; // bytes
 
         Call(Runnable run, StreamCore<?> of, int cost) {

@@ -108,7 +108,7 @@ final class Progress {
         }
     }
 
-    /** Something came from the server, which takes what it is told, then. */
+    /** A message came: the server runs, and so it reads what this program tells it. */
     void heard() {
         boolean wasFull = unheard > MOST_UNHEARD;
         unheard = 0;
