@@ -13,6 +13,8 @@ import ruedo
 from conftest import ARENA, PATIENCE, RUEDO, probe, ruedo_run
 from lockstep_test import bad_network
 
+CATCH_UP_SECONDS = 0.25  # Pacer::kMostCatchUp
+
 
 @pytest.mark.parametrize("load", [0, 4])
 @pytest.mark.parametrize("rate", ["1", "max"])
@@ -24,7 +26,10 @@ def test_a_run_does_not_leave_its_launcher_behind(language, rate, load):
         for program in busy:
             program.kill()
             program.wait()
-    assert max(float(age) for age in said.all("age")) < 0.0501
+    most = 0.0501
+    if load and rate == "1":  # a run that was held up goes faster than real time, until it is due
+        most += CATCH_UP_SECONDS
+    assert max(float(age) for age in said.all("age")) < most
     count, gap, dropped = said.numbers("seen")
     assert count >= 19 and gap < 0.1051 and dropped == 0
     assert all(float(turned) < 1e-9 for turned in said.all("after"))
