@@ -66,6 +66,7 @@ Core::Core(const std::string& url, const std::string& name, std::unique_ptr<Serv
            std::unique_ptr<Transport> transport)
     : url_(url),
       server_(std::move(server)),
+      regression_(server_ ? nullptr : ToRegression::at(url)),
       clock_(
           [this](int64_t utime, const Progress::Threads& woken) { progress_.use(utime, woken); }),
       watch_([this](int64_t run_id) { tell_another_server(run_id); }),
@@ -114,9 +115,13 @@ void Core::join(Duration timeout) {
   }
   ids_ = ids_from(session_.name(), known_->utime, joined_before(known_->run_id));
   lock.unlock();
-  if (server_ || in_lockstep()) callbacks_.keep_all();
-  if (server_ && !in_lockstep())
-    progress_.begin([this](const std::string& line) { server_->tell(line); });
+  const bool is_waited_for = server_ || regression_;
+  if (is_waited_for || in_lockstep()) callbacks_.keep_all();
+  if (is_waited_for && !in_lockstep()) {
+    progress_.begin([this](const std::string& line) {
+      server_ ? server_->tell(line) : regression_->tell(line);
+    });
+  }
 }
 
 void Core::close() {
@@ -159,6 +164,7 @@ void Core::end() {
   if (repeater_.joinable()) repeater_.join();
   if (info()) session_.leave();
   bus_.stop();
+  regression_.reset();
   if (server_) server_->end();
   bus_.close();
 }

@@ -117,6 +117,7 @@ class Core : public std::enable_shared_from_this<Core> {
   std::unique_ptr<ServerProcess> server_;
   Clock::time_point listen_at_;  // to the server's warnings; the receiving thread's
   Progress progress_;
+  std::unique_ptr<ToRegression> regression_;  // null: none launched this program
   SimClock clock_;
   mutable std::mutex mutex_;
   std::condition_variable news_;

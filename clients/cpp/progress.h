@@ -10,6 +10,7 @@
 #include <cstdint>
 #include <functional>
 #include <map>
+#include <memory>
 #include <mutex>
 #include <string>
 #include <thread>
@@ -50,6 +51,24 @@ class Progress {
   int64_t received_ = 0;  // us of sim time
   std::map<std::thread::id, Use> uses_;
   std::string last_;  // that was said
+};
+
+// The pipe by which `ruedo regress` is told how far the client that it launched is
+// (docs/protocol.md).
+class ToRegression {
+ public:
+  // The regression that launched this program, if that is its address; null: there is none.
+  static std::unique_ptr<ToRegression> at(const std::string& url);
+
+  explicit ToRegression(int descriptor);
+  ~ToRegression();
+  ToRegression(const ToRegression&) = delete;
+  // Where the pipe is full, a later line says it all.
+  void tell(const std::string& line) const;
+
+ private:
+  const int descriptor_;
+  const std::string sender_;
 };
 
 }  // namespace ruedo::client

@@ -145,6 +145,7 @@ Engine::Engine(std::shared_ptr<const world::WorldModel> world, EngineOptions opt
       world_, options_.fleet.seed);  // the first one reports errors, and builds what all share
   first_made_ = true;
   read_ = std::make_shared<const ReadChannels>(copies_[0]->channels.list().size(), false);
+  choose_read();
   for_each(copies_.size(), [this](size_t i) {
     if (i > 0) copies_[i] = make_copy(world_, options_.fleet.seed + i);
   });
@@ -255,7 +256,7 @@ std::exception_ptr Engine::compute(size_t index, Copy& copy, int64_t steps) {
   Borrowed borrowed(*arena_, world);
   Batch& batch = *borrowed;
   take_velocities(index);
-  batch.read = handler_ ? nullptr : read_;
+  batch.read = read_by_any_;
   auto* const touching =
       reinterpret_cast<int32_t*>(touching_->values.data()) + index * driven_.size();
   for (int64_t left = steps; left > 0; left -= batch.count) {
@@ -650,6 +651,23 @@ void Engine::read(const std::vector<int>& channels) {
     for (const int channel : channels) catch_up(*copies_[i], channel);
   });
   read_ = std::move(read);
+  choose_read();
+}
+
+void Engine::on_message(MessageHandler handler, std::function<bool(const Channel&)> wants) {
+  handler_ = std::move(handler);
+  handler_wants_ = std::move(wants);
+  choose_read();
+}
+
+void Engine::choose_read() {
+  read_by_any_ = handler_ && !handler_wants_ ? nullptr : read_;
+  if (!handler_ || !handler_wants_) return;
+  auto read = std::make_shared<ReadChannels>(*read_);
+  for (const ChannelIndex channel : copies_[0]->channels.list().indices()) {
+    if (handler_wants_(copies_[0]->channels[channel])) (*read)[static_cast<size_t>(channel)] = true;
+  }
+  read_by_any_ = std::move(read);
 }
 
 void Engine::catch_up(Copy& copy, int channel) {

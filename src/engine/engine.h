@@ -122,8 +122,9 @@ class Engine {
   uint64_t state_hash(int world) const;
 
   // Called in step() and reset() with each message, in the order of copies and messages (of a long
-  // step(), for each of its pieces); nothing is computed in parallel then.
-  void on_message(MessageHandler handler) { handler_ = std::move(handler); }
+  // step(), for each of its pieces); nothing is computed in parallel then. wants: the channels that
+  // it reads; without it, all.
+  void on_message(MessageHandler handler, std::function<bool(const Channel&)> wants = {});
   // The same for each state, before its messages.
   void on_state(StateHandler handler) { state_handler_ = std::move(handler); }
 
@@ -143,6 +144,7 @@ class Engine {
   void reset_one(const Reset& reset, std::unique_ptr<Copy> made);
   std::shared_ptr<Plan> plan_of(const std::shared_ptr<const world::WorldModel>& model);
   void count_touching(Copy& copy, const Batch& batch, int32_t* counts) const;
+  void choose_read();
   void take_velocities(size_t world);
   void compute(size_t world, int64_t steps);
   std::exception_ptr compute(size_t world, Copy& copy, int64_t steps);
@@ -174,8 +176,10 @@ class Engine {
   std::vector<double> velocities_;  // from the last drive(): see Copy::driven
   std::shared_ptr<FieldArray> touching_ = std::make_shared<FieldArray>();
   std::vector<std::unique_ptr<Observer>> observers_;
-  std::shared_ptr<const ReadChannels> read_;  // set by observers; the same for each copy
+  std::shared_ptr<const ReadChannels> read_;         // set by observers; the same for each copy
+  std::shared_ptr<const ReadChannels> read_by_any_;  // also by the handler; null: all are
   MessageHandler handler_;
+  std::function<bool(const Channel&)> handler_wants_;
   StateHandler state_handler_;
   struct Arena;
   std::unique_ptr<Arena> arena_;

@@ -7,7 +7,7 @@
 
 #include <fmt/format.h>
 
-#include "base/utf8.h"
+#include "base/xml.h"
 #include "log/diff.h"
 
 namespace ruedo::log {
@@ -15,21 +15,6 @@ namespace {
 
 std::string seconds(SimTime time) {
   return fmt::format("{}.{:06d} s", time / 1'000'000, time % 1'000'000);
-}
-
-// Names and values come from files: nothing of them may become markup.
-std::string escaped(std::string_view text) {
-  std::string out;
-  for (const char c : printable(text)) {
-    switch (c) {
-      case '&': out += "&amp;"; break;
-      case '<': out += "&lt;"; break;
-      case '>': out += "&gt;"; break;
-      case '"': out += "&quot;"; break;
-      default: out += static_cast<unsigned char>(c) < 0x20 ? ' ' : c;
-    }
-  }
-  return out;
 }
 
 std::string describe(const std::string& name, const FieldDifference& field) {
@@ -142,14 +127,14 @@ std::string diff_junit(const Diff& diff) {
       "failures=\"{}\">\n",
       diff.channels.size(), differing(diff).size());
   for (const auto& [name, channel] : diff.channels) {
-    xml += fmt::format("  <testcase classname=\"ruedo.diff\" name=\"{}\"", escaped(name));
+    xml += fmt::format("  <testcase classname=\"ruedo.diff\" name=\"{}\"", xml_escaped(name));
     if (channel.same()) {
       xml += "/>\n";
       continue;
     }
     const auto lines = lines_of(name, channel);
-    xml += fmt::format(">\n    <failure message=\"{}\">", escaped(lines.front()));
-    for (const std::string& line : lines) xml += escaped(line) + "\n";
+    xml += fmt::format(">\n    <failure message=\"{}\">", xml_escaped(lines.front()));
+    for (const std::string& line : lines) xml += xml_escaped(line) + "\n";
     xml += "</failure>\n  </testcase>\n";
   }
   return xml + "</testsuite>\n";
@@ -167,22 +152,23 @@ std::string diff_html(const Diff& diff, const std::string& golden, const std::st
       "td{{padding-right:1.5em}}\n"
       "</style></head><body>\n<h1>{}</h1>\n<p><b class=\"golden\">golden</b> {}<br><b "
       "class=\"new\">new</b> {}</p>\n",
-      diff.same() ? "The logs are the same" : "The logs differ", escaped(golden), escaped(other));
-  for (const std::string& note : diff.notes) page += "<p>Note: " + escaped(note) + "</p>\n";
+      diff.same() ? "The logs are the same" : "The logs differ", xml_escaped(golden),
+      xml_escaped(other));
+  for (const std::string& note : diff.notes) page += "<p>Note: " + xml_escaped(note) + "</p>\n";
   for (const auto* entry : differing(diff)) {
     const auto& [name, channel] = *entry;
-    page += fmt::format("<h2>{}</h2>\n<ul>\n", escaped(name));
+    page += fmt::format("<h2>{}</h2>\n<ul>\n", xml_escaped(name));
     for (const std::string& line : lines_of(name, channel))
-      page += "<li>" + escaped(line) + "</li>\n";
+      page += "<li>" + xml_escaped(line) + "</li>\n";
     page += "</ul>\n";
     for (const auto& [pattern, field] : channel.fields) {
       if (const std::string svg = plot(field); !svg.empty())
-        page += "<h3>" + escaped(field.first_path) + "</h3>\n" + svg;
+        page += "<h3>" + xml_escaped(field.first_path) + "</h3>\n" + svg;
     }
   }
   page += "<h2>All channels</h2>\n<table>\n";
   for (const auto& [name, channel] : diff.channels) {
-    page += fmt::format("<tr><td>{}</td><td>{} messages</td><td>{}</td></tr>\n", escaped(name),
+    page += fmt::format("<tr><td>{}</td><td>{} messages</td><td>{}</td></tr>\n", xml_escaped(name),
                         channel.compared, channel.same() ? "same" : "different");
   }
   return page + "</table>\n</body></html>\n";

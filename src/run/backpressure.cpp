@@ -31,6 +31,12 @@ void Backpressure::take(const LauncherProgress& progress) {
   }
 }
 
+void Backpressure::end() {
+  const std::lock_guard lock(mutex_);
+  acts_ = false;
+  on_the_way_.clear();
+}
+
 void Backpressure::begin(int32_t epoch, SimTime time_us) {
   const std::lock_guard lock(mutex_);
   progress_ = {epoch, time_us};

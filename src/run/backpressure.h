@@ -47,6 +47,7 @@ class Backpressure {
 
   // Any thread, as all that follows. What is of another epoch is ignored.
   void take(const LauncherProgress& progress);
+  void end();  // nobody is waited for any more
   // The run goes on from there.
   void begin(int32_t epoch, SimTime time_us);
   Limits limits() const;

@@ -223,6 +223,8 @@ void Pacer::set_limits(const Backpressure::Limits& limits) {
   limits_ = limits;
 }
 
+void Pacer::look_again() { changed_.notify_all(); }
+
 bool Pacer::paused() const {
   std::lock_guard lock(mutex_);
   return paused_;

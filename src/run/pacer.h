@@ -46,6 +46,7 @@ class Pacer : public engine::Pace, public Gate {
   void set_limit(int64_t step) override;
   void set_limit_quietly(int64_t step) override;        // for who calls borrow() next
   void set_limits(const Backpressure::Limits& limits);  // beside that of set_limit(), and quietly
+  void look_again();  // for who waits at a limit that was set quietly
 
   // Standing still for a change of the world. hold(): wait() lets nothing more go; returns the last
   // state that it let go. wait_until_held(), when that state is done: until the simulation thread

@@ -305,9 +305,7 @@ std::string Run::why_idle() {
     who = mode().waits_for(publisher_.step());
   }
   if (who.empty() && waits_for_launcher())
-    who =
-        "the program that launched it, which has not come this far: is it stopped, or is a "
-        "callback slow?";
+    who = "its program, which has not come this far: is it stopped, or is a callback slow?";
   std::string why = who.empty() ? simulation_->at_work() : "it waits for " + who;
   if (why.empty()) return "";
   return fmt::format("{} (the last state was that of step {})", why, publisher_.step());

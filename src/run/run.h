@@ -103,6 +103,8 @@ class Run {
 
   // From the program that launched this run: it is not left behind from now on. Any thread.
   void take(const LauncherProgress& progress);
+  // There is no such program, or none that says how far it is. Any thread.
+  void follow_nobody();
 
   // Messages that the bus could not send, or that newer ones replaced on the way to a slow client.
   // Any thread.
@@ -114,6 +116,7 @@ class Run {
   // What a log of this run begins with; empty where nothing records, watches or repeats it.
   const log_header_t& log_header() const { return header_; }
   const Findings& findings() const { return findings_; }
+  const world::BodyLayout& layout() const { return simulation_->layout(); }  // sinks may ask
   // The world as it is now: another object when models have come or gone. Any thread.
   std::shared_ptr<const world::WorldModel> world() {
     const std::lock_guard lock(simulation_mutex_);

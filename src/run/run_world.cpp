@@ -59,6 +59,14 @@ void Run::take(const LauncherProgress& progress) {
   wakeup_.set();  // the publisher goes on, or wakes who does
 }
 
+void Run::follow_nobody() {
+  const std::lock_guard lock(simulation_mutex_);
+  backpressure_.end();
+  limit_pace();
+  pacer_->look_again();
+  wakeup_.set();
+}
+
 // What is repeated is not published, and nobody has to follow it.
 void Run::limit_pace() {
   pacer_->set_limits(repeating_ ? Backpressure::Limits{} : backpressure_.limits());

@@ -105,7 +105,7 @@ class PyEngine {
            const std::vector<std::string>& drives, const std::vector<std::string>& settings,
            const std::vector<std::string>& disabled, const std::vector<std::string>& faults,
            const std::vector<std::string>& draws, const std::vector<std::string>& plugins,
-           bool record) {
+           bool record, bool allow_errors) {
     for (const std::string& one : plugins) ruedo::load_plugin(one);
     ruedo::world::LoadOptions options;
     for (const std::string& one : spawns) options.spawns.push_back(ruedo::world::parse_spawn(one));
@@ -125,6 +125,11 @@ class PyEngine {
     const Unlocked unlocked;
     texts_ = std::make_unique<ruedo::world::TextLoader>(world, options);
     const auto model = text ? read(*text) : ruedo::world::load_world(world, options);
+    for (const ruedo::Finding& finding : model->findings) {
+      if (finding.kind == ruedo::Finding::Kind::error && !allow_errors)
+        throw ruedo::InputError(finding.source, finding.element + ": " + finding.text +
+                                                    "; allow_errors=True takes the world as it is");
+    }
     engine_ = std::make_unique<Engine>(model, engine);
     for (const ruedo::Finding& finding : model->findings)
       findings_.push_back(finding.source.str() + ": " + finding.element + ": " + finding.text);
@@ -229,7 +234,7 @@ class PyEngine {
       header_ = ruedo::log::make_log_header(*world_, seed,
                                             result_options_);  // it hashes the world's files: once
     header_->seed = static_cast<int64_t>(seed);
-    run_ = std::make_unique<WatchedRun>(*world_, std::move(expected), *header_, log);
+    run_ = std::make_unique<WatchedRun>(world_, std::move(expected), *header_, log);
     engine.on_state(
         [this](int copy, const ruedo::Snapshot& snapshot, const ruedo::engine::Batch& batch) {
           if (copy == 0 && run_) run_->see(snapshot, batch, engine_->inputs(0));
@@ -239,27 +244,12 @@ class PyEngine {
     engine.reset(0, seed);
   }
 
-  // What came of it; the log is whole then.
-  nb::dict end_run() {
+  // What came of it, as the JSON of a verdict; the log is whole then.
+  std::string end_run() {
     Engine& engine = this->engine();
     if (!run_) throw std::runtime_error("no run was begun");
     run_->end();
-    nb::dict verdict, metrics;
-    nb::list failures, track;
-    for (const ruedo::judge::Failure& failure : run_->judge().failures()) {
-      nb::dict one;
-      one["what"] = failure.what;
-      one["time_s"] = static_cast<double>(failure.time) * 1e-6;
-      one["text"] = failure.text;
-      failures.append(one);
-    }
-    for (const ruedo::judge::Metric& metric : run_->judge().metrics())
-      metrics[metric.name.c_str()] = metric.value;
-    for (const ruedo::judge::Judge::Place& place : run_->judge().track())
-      track.append(nb::make_tuple(place.time_s, place.x, place.y));
-    verdict["failures"] = failures;
-    verdict["metrics"] = metrics;
-    verdict["track"] = track;
+    const std::string verdict = ruedo::judge::to_json(run_->judge().verdict());
     run_.reset();
     engine.on_state({});
     watch(false);
@@ -318,18 +308,22 @@ class PyEngine {
   // Messages are kept, judged and logged as they are wanted. everything: the log has all of them.
   void watch(bool everything) {
     if (!records_ && !run_) return engine_->on_message({});
-    engine_->on_message([this, everything](int copy, int64_t step,
-                                           const ruedo::engine::Channel& channel,
-                                           std::span<const uint8_t> bytes) {
-      if (records_)
-        recorded_.push_back({copy,
-                             step,
-                             channel.bus_name,
-                             {reinterpret_cast<const char*>(bytes.data()), bytes.size()}});
-      if (copy != 0 || !run_) return;
-      run_->judge().see(channel.name, bytes);
-      if (everything) run_->record_message(channel.bus_name, bytes);
-    });
+    std::function<bool(const ruedo::engine::Channel&)> wants;
+    if (!records_ && !everything)
+      wants = [](const ruedo::engine::Channel& one) { return one.name.ends_with("/odometry"); };
+    engine_->on_message(
+        [this, everything](int copy, int64_t step, const ruedo::engine::Channel& channel,
+                           std::span<const uint8_t> bytes) {
+          if (records_)
+            recorded_.push_back({copy,
+                                 step,
+                                 channel.bus_name,
+                                 {reinterpret_cast<const char*>(bytes.data()), bytes.size()}});
+          if (copy != 0 || !run_) return;
+          run_->judge().see(channel.name, bytes);
+          if (everything) run_->record_message(channel.bus_name, bytes);
+        },
+        std::move(wants));
   }
 
   void refuse_in_a_run(const std::vector<int>& worlds) const {
@@ -376,13 +370,14 @@ NB_MODULE(_engine, module) {
                     const std::vector<std::string>&, const std::vector<std::string>&,
                     const std::vector<std::string>&, const std::vector<std::string>&,
                     const std::vector<std::string>&, const std::vector<std::string>&,
-                    const std::vector<std::string>&, bool>(),
+                    const std::vector<std::string>&, bool, bool>(),
            nb::arg("world"), nb::kw_only(), nb::arg("text") = nb::none(), nb::arg("worlds") = 1,
            nb::arg("seed") = 1, nb::arg("noise") = true, nb::arg("threads") = 0,
            nb::arg("spawn") = nb::list(), nb::arg("drive") = nb::list(),
            nb::arg("set") = nb::list(), nb::arg("disable") = nb::list(),
            nb::arg("fault") = nb::list(), nb::arg("randomize") = nb::list(),
-           nb::arg("plugin") = nb::list(), nb::arg("record") = false)
+           nb::arg("plugin") = nb::list(), nb::arg("record") = false,
+           nb::arg("allow_errors") = false)
       .def("close", &PyEngine::close)
       .def("step", &PyEngine::step, nb::arg("steps"), nb::arg("which") = nb::none())
       .def("drive", &PyEngine::drive)

@@ -21,12 +21,13 @@
 
 class WatchedRun {
  public:
-  // log: a file; "": none. The world must outlive it.
-  WatchedRun(const ruedo::world::WorldModel& world, ruedo::judge::Expectations expected,
-             const ruedo::log_header_t& header, const std::string& log)
-      : step_us_(world.step_us),
-        hash_clock_(ruedo::Rate{1, 1}, world.step_us),
-        judge_(world, std::move(expected)) {
+  // log: a file; "": none.
+  WatchedRun(std::shared_ptr<const ruedo::world::WorldModel> world,
+             ruedo::judge::Expectations expected, const ruedo::log_header_t& header,
+             const std::string& log)
+      : step_us_(world->step_us),
+        hash_clock_(ruedo::Rate{1, 1}, world->step_us),
+        judge_(std::move(world), std::move(expected)) {
     if (log.empty()) return;
     log_ = std::make_unique<ruedo::log::Writer>(log);
     record(ruedo::log::kHeaderChannel, header);

@@ -25,7 +25,7 @@ from .control import REQUEST_CHANNEL, Session
 from .errors import NoServer, RuedoError, UnknownName
 from .lockstep import Stepper
 from .motion import Drivers
-from .progress import Progress
+from .progress import Progress, regression_at
 from .run_watch import RunWatch
 from .stack import is_in_another_call
 from .stream import Streams
@@ -89,6 +89,7 @@ class Connection:
         self.streams = Streams()
         self.drivers = Drivers(self)
         self._server = server
+        self._regression = None if server else regression_at(url)
         self._news = threading.Condition()
         self._assembler = WorldInfoAssembler()
         self._known: WorldInfo | None = None
@@ -117,9 +118,10 @@ class Connection:
         self.bus.subscribe("ruedo/reply", self.session.receive)
         self.bus.start()
         self._await_info(timeout)
-        self.callbacks.may_drop = not (self._server or self.in_lockstep)
-        if self._server and not self.in_lockstep:
-            self.progress.begin(self._server.tell)
+        is_waited_for = self._server or self._regression
+        self.callbacks.may_drop = not (is_waited_for or self.in_lockstep)
+        if is_waited_for and not self.in_lockstep:
+            self.progress.begin(is_waited_for.tell)
         self._ids = _ids_from(self.session.name, self.info)
 
     def close(self) -> None:
@@ -172,6 +174,8 @@ class Connection:
             ends.callback(atexit.unregister, self._close_at_end)
             if self._server:
                 ends.callback(self._server.end)
+            if self._regression:
+                ends.callback(self._regression.close)
             ends.callback(self.callbacks.close, patience)
             ends.callback(self.bus.close, patience != 0.0)
             self.drivers.wake()

@@ -12,6 +12,7 @@ the same steps. There is no network and no clock.
 
 from __future__ import annotations
 
+import json
 import os
 import struct
 from collections.abc import Iterable, Mapping, Sequence
@@ -90,7 +91,8 @@ class Engine:
     randomize: what is drawn anew for each seed, see :meth:`drawn`: {"p3at.x": "uniform(-2, 2)",
     "p3at/lrf.lidar.noise.stddev": "log_uniform(0.003, 0.03)"}. plugin: shared libraries with
     sensors or drives of your own, which stay for the life of the process. record: keep the messages
-    of the last call, for :meth:`messages`.
+    of the last call, for :meth:`messages`. allow_errors: take a world in which something is missing
+    or wrong as it is.
 
     Raises ValueError for what is wrong in the file or an argument, with file, line, value and what
     is allowed; OSError for what the machine lacks. Not for several threads at once; ``step`` lets
@@ -115,6 +117,7 @@ class Engine:
         randomize: Mapping[str, str] | None = None,
         plugin: Iterable[str | os.PathLike[str]] = (),
         record: bool = False,
+        allow_errors: bool = False,
     ) -> None:
         if not isinstance(world, (str, os.PathLike)):
             raise TypeError(f"world is a file or the name of a world, not {shown(world)}")
@@ -145,6 +148,7 @@ class Engine:
             randomize=texts("randomize", [f"{one}={drawn}" for one, drawn in draws.items()]),
             plugin=texts("plugin", plugin),
             record=switch("record", record),
+            allow_errors=switch("allow_errors", allow_errors),
         )
         self._worlds = self._core.worlds()
         self._seeds = [seed + i for i in range(self._worlds)]
@@ -219,10 +223,11 @@ class Engine:
         self._seeds[0] = seed
 
     def end_run(self) -> dict[str, Any]:
-        """What came of it: {"failures": [{"what", "time_s", "text"}], "metrics": {name: number},
-        "track": [(s, m, m)]}.
+        """The verdict, as `ruedo regress --json` writes it: {"outcome": "passed", "failed" or "not
+        judged", "evidence": [{"what", "text"}], "failures": [{"what", "judged", "time_s", "text"}],
+        "metrics": {name: number}, "track": [[s, m, m]]}. time_s is None where there is no moment.
         """
-        verdict: dict[str, Any] = self._core.end_run()
+        verdict: dict[str, Any] = json.loads(self._core.end_run())
         return verdict
 
     def steps(self, world: int = 0) -> int:

@@ -24,6 +24,7 @@ from typing import IO, Any, Literal
 from . import arguments
 from .address import has_multicast_route, read_address
 from .errors import LaunchError, NoServer, for_terminal
+from .progress import FIRST
 from .simulation import Simulation
 from .stream_transport import is_served
 from .world import World
@@ -295,7 +296,7 @@ class _Server:
             raise LaunchError(f"{command[0]} cannot be started: {error.strerror}") from None
         assert self._process.stdin
         os.set_blocking(self._process.stdin.fileno(), False)
-        self.tell(f"0 0 {2**63 - 1}\n")  # the run waits at its beginning until this client joins
+        self.tell(FIRST)  # the run waits at its beginning until this client joins
 
     def tell(self, line: str) -> None:
         """How far this client has come (progress.py). Where the pipe is full, a later line says it

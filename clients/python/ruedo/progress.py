@@ -7,6 +7,10 @@ its server what it has received, and from which moment on it works with what it 
 
 from __future__ import annotations
 
+import contextlib
+import itertools
+import os
+import stat
 import threading
 import time
 from collections.abc import Callable
@@ -16,6 +20,43 @@ _NEVER = 2**63 - 1
 _PATIENCE_SECONDS = 0.5
 
 Tell = Callable[[str], object]
+
+FIRST = f"0 0 {_NEVER}\n"
+"""The line of a program that has received nothing yet."""
+
+_LEFT = "-1 0 0\n"
+_connections = itertools.count()  # of this process, to regressions
+
+
+class ToRegression:
+    """The pipe by which `ruedo regress` is told how far the client that it launched is
+    (docs/protocol.md).
+    """
+
+    def __init__(self, descriptor: int) -> None:
+        self._descriptor = descriptor
+        self._sender = f"{os.getpid()} {next(_connections)}"
+        self.tell(FIRST)
+
+    def tell(self, line: str) -> None:
+        """Where the pipe is full, a later line says it all."""
+        with contextlib.suppress(OSError):
+            os.write(self._descriptor, f"{line[:-1]} {self._sender}\n".encode())
+
+    def close(self) -> None:
+        self.tell(_LEFT)
+
+
+def regression_at(url: str) -> ToRegression | None:
+    """The regression that launched this program, if that is its address."""
+    try:
+        descriptor = int(os.environ["RUEDO_PROGRESS"])
+        is_pipe = stat.S_ISFIFO(os.fstat(descriptor).st_mode)
+    except (KeyError, ValueError, OSError):
+        return None
+    return (
+        ToRegression(descriptor) if is_pipe and url == os.environ.get("LCM_DEFAULT_URL") else None
+    )
 
 
 class Progress:

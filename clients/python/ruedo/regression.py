@@ -30,7 +30,7 @@ from .launch import find_ruedo
 
 _PARTING_S = 10.0  # that a run has to end its client
 _LONGEST_S = 1e6  # the system cannot wait for ever at once
-_PASSED = "passed; the run is in "  # what `ruedo regress` prints in the end
+_PASSED = "\nThe run is in "  # what `ruedo regress` prints in the end
 _PathLike = str | os.PathLike[str]
 
 
@@ -110,7 +110,7 @@ def _output_of(command: list[str], folder: _PathLike | None, timeout: float) -> 
         raise RegressionFailed(
             f"{output}\n(exit code {process.returncode} of {shlex.join(command)})"
         )
-    if _PASSED not in output:  # as after an option that prints something in place of a run
+    if _PASSED not in f"\n{output}":  # as after an option that prints something in place of a run
         raise RegressionFailed(f"{output}\n(there was no run by {shlex.join(command)})")
     return output
 

@@ -1,21 +1,27 @@
 // ruedo regress: a user's regression test: a world, a client, and what is expected of the run.
 // ctest and pytest run it.
+#include <algorithm>
+#include <atomic>
 #include <charconv>
+#include <chrono>
 #include <cmath>
+#include <condition_variable>
 #include <cstdlib>
 #include <filesystem>
 #include <limits>
+#include <mutex>
+#include <thread>
 
 #include <fmt/format.h>
 #include <fnmatch.h>
 #include <spdlog/spdlog.h>
 
 #include "base/input_file.h"
-#include "base/json.h"
 #include "base/progress.h"
 #include "base/utf8.h"
 #include "bus/server_bus.h"
 #include "cli/support/argument_rules.h"
+#include "cli/support/client_pace.h"
 #include "cli/support/client_process.h"
 #include "cli/support/commands.h"
 #include "cli/support/extensions.h"
@@ -24,8 +30,11 @@
 #include "cli/support/view.h"
 #include "engine/judge/judge.h"
 #include "log/diff.h"
+#include "log/header.h"
 #include "log/reader.h"
 #include "log/writer.h"
+#include "ruedo/applied_t.hpp"
+#include "ruedo/decode.h"
 #include "ruedo/errors.h"
 #include "run/run.h"
 #include "system/isolation.h"
@@ -49,8 +58,10 @@ struct RegressArguments {
   std::vector<std::string> remaps, wait_for, goals, tolerances, ignored, keep;
   judge::Expectations expected;
   double clearance = -1.0, odometry_error = -1.0;
+  double grace = 5.0, timeout = 600.0;  // s of real time
   int lockstep = 0;
-  bool renew = false, shared_network = false, no_page = false;
+  bool renew = false, shared_network = false, no_page = false, no_client_wait = false,
+       allow_errors = false;
 };
 
 run::RunOptions server_options(const RegressArguments& arguments) {
@@ -72,35 +83,168 @@ run::RunOptions server_options(const RegressArguments& arguments) {
   return options;
 }
 
-// The run. What went wrong besides expectations, or "".
-std::string run(const RegressArguments& arguments,
-                const std::shared_ptr<const world::WorldModel>& world, bool isolated,
-                judge::Judge& judge, SignalThread& signals) {
+// What the judge hears of a run.
+class JudgeSink : public run::Sink {
+ public:
+  JudgeSink(judge::Judge& judge, run::Run& run) : judge_(judge), run_(run) {}
+
+  Hears hears() const override { return {.samples = true, .records = true}; }
+  bool wants(const std::string&) const override { return false; }  // no pictures
+  void announce(const std::shared_ptr<const run::Announcement>& announcement) override {
+    announcement_ = announcement;
+    judge_.see_world(run_.world(), run_.layout());
+  }
+  void message(const run::Published& message) override {
+    const std::span<const uint8_t> bytes(message.data, message.size);
+    if (message.kind == run::Kind::sample) {
+      judge_.see(announcement_->channels[message.index].name, bytes);
+    } else if (message.channel == log::kAppliedChannel) {
+      applied_t applied;
+      if (decode_checked(bytes.data(), bytes.size(), applied) == DecodeFault::none)
+        judge_.see(applied);
+    }
+  }
+
+ private:
+  judge::Judge& judge_;
+  run::Run& run_;
+  std::shared_ptr<const run::Announcement> announcement_;
+};
+
+// Ends a run that has not gone on for too long.
+class Watchdog {
+ public:
+  Watchdog(double timeout_s, run::Run& run) : timeout_s_(timeout_s), run_(run) {
+    run.on_stall([this](const std::string& reason) {
+      const std::lock_guard lock(mutex_);
+      reason_ = reason;
+    });
+    thread_ = std::thread([this] { watch(); });
+  }
+  ~Watchdog() {
+    {
+      const std::lock_guard lock(mutex_);
+      over_ = true;
+    }
+    changed_.notify_all();
+    thread_.join();
+  }
+  void moved() { ++moves_; }  // any thread
+
+  // Why it has ended the run; "": it has not.
+  std::string fault() {
+    const std::lock_guard lock(mutex_);
+    return fault_;
+  }
+
+ private:
+  void watch() {
+    std::unique_lock lock(mutex_);
+    while (!over_) {
+      const int64_t before = moves_;
+      if (changed_.wait_for(lock, std::chrono::duration<double>(timeout_s_), [&] { return over_; }))
+        return;
+      if (moves_ != before) continue;
+      fault_ = fmt::format("the run did not go on for {:g} s of real time{} (--timeout)",
+                           timeout_s_, reason_.empty() ? "" : ": " + reason_);
+      run_.stop();
+      return;
+    }
+  }
+
+  const double timeout_s_;
+  run::Run& run_;
+  std::atomic<int64_t> moves_{0};
+  std::mutex mutex_;
+  std::condition_variable changed_;
+  std::string reason_, fault_;
+  bool over_ = false;
+  std::thread thread_;
+};
+
+// How the client has ended. until: sim time at its end, of a client that ended before the run.
+judge::Check client_check(const RegressArguments& arguments, const ClientProcess& client,
+                          bool was_heard, std::optional<SimTime> until) {
+  judge::Check check{"client", judge::Outcome::passed, "", {}};
+  if (client.was_killed()) {
+    check.outcome = judge::Outcome::failed;
+    check.text = fmt::format(
+        "the client was still running {:g} s after the end of the run (--grace), and was killed",
+        arguments.grace);
+  } else if (!client.fault().empty()) {
+    check.outcome = judge::Outcome::failed;
+    check.text = "the client ended with " + client.fault();
+    if (!until) check.text += " after the end of the run";
+  } else if (!was_heard && !arguments.no_client_wait) {
+    check.outcome = judge::Outcome::not_judged;
+    check.text = fmt::format(
+        "the client{} was never heard on the bus (a program that only listens wants "
+        "--no-client-wait)",
+        client.was_told_to_end() ? "" : " ended with 0 and");
+  } else if (client.was_told_to_end()) {
+    check.text = "the client ran to the end, and ended when it was told to";
+  } else {
+    check.text =
+        until ? fmt::format("the client ended with 0 at {:g} s", static_cast<double>(*until) * 1e-6)
+              : "the client ended with 0 after the end of the run";
+  }
+  return check;
+}
+
+// The run: the checks of its client, and of what ended it.
+std::vector<judge::Check> run(const RegressArguments& arguments,
+                              const std::shared_ptr<const world::WorldModel>& world, bool isolated,
+                              judge::Judge& judge, SignalThread& signals) {
   const bus::ServerBus place =
       bus::open_server_bus(isolated ? "auto" : "auto-tcp", world->name,
                            [](const std::string& line) { spdlog::warn(line); });
-  run::Run server(world, server_options(arguments), *place.bus);
+  const bool has_client = !arguments.client.empty();
+  ClientPace pace(has_client && !arguments.no_client_wait);
+  run::RunOptions options = server_options(arguments);
+  options.hearer = [&pace](const std::string&, const uint8_t*, size_t) { pace.heard(); };
+  run::Run server(world, std::move(options), *place.bus);
+  JudgeSink sink(judge, server);
+  server.add(sink);
+  Watchdog watchdog(arguments.timeout, server);
+  std::atomic<SimTime> now{0};
   Progress progress("running " + world->name, parse_duration_us(arguments.duration));
   server.on_state([&](const Snapshot& snapshot) {
     judge.see(snapshot);
+    now = snapshot.time;
+    watchdog.moved();
     progress.to(snapshot.time);
   });
+  if (has_client) pace.pace(&server);
   std::unique_ptr<ClientProcess> client;
-  if (!arguments.client.empty()) {
+  std::atomic<SimTime> ended_at{-1};
+  if (has_client) {
     client = std::make_unique<ClientProcess>(
-        arguments.client, std::vector<std::string>{"LCM_DEFAULT_URL=" + place.url.str()},
-        [&server] { server.stop(); });
+        arguments.client,
+        std::vector<std::string>{"LCM_DEFAULT_URL=" + place.url.str(), "RUEDO_REGRESS=1",
+                                 pace.variable()},
+        [&] {
+          ended_at = now.load();
+          server.stop();
+        },
+        std::vector<int>{pace.inherited()});
   }
-  std::string fault;
+  std::vector<judge::Check> checks;
   const SignalThread::Serving serving(signals, server);
   try {
     server.run();
   } catch (const run::LeaseEnded& ended) {
-    fault = ended.what();
+    checks.push_back({"run", judge::Outcome::failed, ended.what(), {}});
   }
-  if (client && client->end() && !client->fault().empty())
-    return "the client ended with " + client->fault();
-  return fault;
+  if (std::string fault = watchdog.fault(); !fault.empty())
+    checks.push_back({"run", judge::Outcome::failed, std::move(fault), {}});
+  pace.pace(nullptr);
+  if (client) {
+    const bool by_itself = client->is_over();
+    client->end(std::chrono::duration<double>(signals.told() ? 0.0 : arguments.grace));
+    checks.push_back(client_check(arguments, *client, pace.was_heard(),
+                                  by_itself ? std::optional(ended_at.load()) : std::nullopt));
+  }
+  return checks;
 }
 
 bool fits_any(const std::string& channel, const std::vector<std::string>& patterns) {
@@ -137,7 +281,6 @@ std::string compare(const RegressArguments& arguments, const std::string& kept,
                     const std::vector<log::DiffRule>& rules) {
   const log::Diff result = log::diff_logs(arguments.golden, kept, rules);
   for (const std::string& line : result.idle_rules) spdlog::warn(line);
-  if (!arguments.junit.empty()) write_file(arguments.junit, log::diff_junit(result));
   if (!arguments.html.empty())
     write_file(arguments.html, log::diff_html(result, arguments.golden, kept));
   return result.same()
@@ -192,41 +335,6 @@ void attach_page(const std::string& log) {
 #endif
 }
 
-// The expectations that were not met, judged by the log's messages.
-std::vector<judge::Failure> judged(judge::Judge& judge, const std::string& record) {
-  log::Reader log(record);
-  log::Event event;
-  const auto wanted = [](const std::string& channel) {
-    return channel.ends_with("/pose") || channel.ends_with("/odometry");
-  };
-  while (log.next(event, wanted)) judge.see(event.channel, event.data);
-  return judge.failures();
-}
-
-// For programs that run many: {"faults": [...], "failures": [{"what", "time_s", "text"}],
-// "metrics": {...}, "track": [[s, m, m]]}.
-void write_verdict(const std::string& path, const std::vector<std::string>& faults,
-                   judge::Judge& judge) {
-  JsonWriter json;
-  json.open('{').name("faults").open('[');
-  for (const std::string& fault : faults) json.value(fault);
-  json.close(']').name("failures").open('[');
-  for (const judge::Failure& failure : judge.failures()) {
-    json.open('{')
-        .member("what", failure.what)
-        .member("time_s", static_cast<double>(failure.time) * 1e-6)
-        .member("text", failure.text)
-        .close('}');
-  }
-  json.close(']').name("metrics").open('{');
-  for (const judge::Metric& metric : judge.metrics()) json.member(metric.name, metric.value);
-  json.close('}').name("track").open('[');
-  for (const judge::Judge::Place& place : judge.track())
-    json.open('[').value(place.time_s).value(place.x).value(place.y).close(']');
-  json.close(']').close('}');
-  write_file(path, json.text() + "\n");
-}
-
 // A run leaves two more files beside its log.
 void check_files_beside(const RegressArguments& arguments) {
   const std::pair<const char*, const std::string&> given[] = {{"--golden", arguments.golden},
@@ -243,15 +351,68 @@ void check_files_beside(const RegressArguments& arguments) {
   }
 }
 
-int regress(RegressArguments arguments) {
-  const bool isolated = !arguments.shared_network && isolate();
-  SignalThread signals;  // after isolate(), which wants to be alone
-  judge::Expectations& expected = arguments.expected;
+judge::Expectations expectations(const RegressArguments& arguments) {
+  judge::Expectations expected = arguments.expected;
   for (const std::string& text : arguments.goals) expected.goals.push_back(judge::parse_goal(text));
   if (arguments.clearance >= 0.0) expected.clearance = arguments.clearance;
   if (arguments.odometry_error >= 0.0) expected.odometry_error = arguments.odometry_error;
   expected.clearance_reach = arguments.clearance_reach;
-  if (arguments.keep.empty()) arguments.keep = {"*/pose"};
+  return expected;
+}
+
+// A world of which parts are missing is not the one that was meant.
+std::optional<judge::Check> world_check(const RegressArguments& arguments,
+                                        const world::WorldModel& world) {
+  const auto error = std::find_if(world.findings.begin(), world.findings.end(),
+                                  [](const Finding& f) { return f.kind == Finding::Kind::error; });
+  if (arguments.allow_errors || error == world.findings.end()) return {};
+  return judge::Check{
+      "world",
+      judge::Outcome::failed,
+      fmt::format("the world has an error, {}: {}: {} (--allow-errors runs it as it is)",
+                  error->source.str(), error->element, error->text),
+      {}};
+}
+
+// The checks of a run that has ended, beside the judge's.
+void add_files(const RegressArguments& arguments, const std::vector<log::DiffRule>& rules,
+               bool renew, judge::Verdict& verdict) {
+  const auto add = [&](const char* what, const std::string& fault, std::string evidence) {
+    const bool failed = !fault.empty();
+    verdict.checks.push_back({what,
+                              failed ? judge::Outcome::failed : judge::Outcome::passed,
+                              failed ? fault : std::move(evidence),
+                              {}});
+  };
+  if (!arguments.script.empty()) add("script", run_script(arguments), "the script ended with 0");
+  if (arguments.golden.empty()) return;
+  std::string fault;
+  const bool good = verdict.passed();
+  try {
+    fault = hold_to_golden(arguments, rules, renew && good);
+  } catch (const std::exception& error) {  // must not hide what has failed before
+    if (good) throw;
+    fault = error.what();
+  }
+  add("golden", fault, renew ? "golden log renewed" : "equal to " + arguments.golden);
+}
+
+void tell(const RegressArguments& arguments, const judge::Verdict& verdict) {
+  for (const judge::Check& check : verdict.failures()) {
+    const std::string text = judge::to_line(check);  // a difference has lines of ours
+    to_stderr("FAILED: {}\n", for_terminal(text).c_str());
+  }
+  if (!arguments.json.empty()) write_file(arguments.json, judge::to_json(verdict));
+  if (!arguments.junit.empty())
+    write_file(arguments.junit, judge::to_junit(verdict, arguments.world.world));
+  if (verdict.passed())
+    fmt::print("passed: {}\nThe run is in {}\n", for_terminal(verdict.evidence()),
+               arguments.record);
+}
+
+int regress(const RegressArguments& arguments) {
+  const bool isolated = !arguments.shared_network && isolate();
+  SignalThread signals;  // after isolate(), which wants to be alone
   const auto rules = log::DiffRule::all(arguments.tolerances, arguments.ignored);
   const char* environment = std::getenv("RUEDO_RENEW");
   const bool renew =
@@ -260,43 +421,26 @@ int regress(RegressArguments arguments) {
   check_output(arguments.record);
   check_files_beside(arguments);
   print_findings(world->findings);
-  judge::Judge judge(*world, expected);
-  std::vector<std::string> failures;
-  if (std::string fault = run(arguments, world, isolated, judge, signals); !fault.empty())
-    failures.push_back(fault);
+  judge::Judge judge(world, expectations(arguments));
+  judge::Verdict verdict;
+  if (auto check = world_check(arguments, *world)) {
+    verdict.checks.push_back(std::move(*check));
+    tell(arguments, verdict);
+    return kCheckFailed;
+  }
+  std::vector<judge::Check> checks = run(arguments, world, isolated, judge, signals);
   if (const int signal = signals.told()) {
     to_stderr("ruedo: the run was ended by a signal; its log up to there is {}\n",
               arguments.record);
     return 128 + signal;
   }
-  const size_t begin_of_judged = failures.size();
-  for (const judge::Failure& failure : judged(judge, arguments.record))
-    failures.push_back(judge::to_line(failure));
-  const size_t end_of_judged = failures.size();
-  if (!arguments.golden.empty()) {
-    std::string fault;
-    try {
-      fault = hold_to_golden(arguments, rules, renew && failures.empty());
-    } catch (const std::exception& error) {  // must not hide what has failed before
-      if (failures.empty()) throw;
-      fault = error.what();
-    }
-    if (!fault.empty()) failures.push_back(fault);
-  }
-  if (!arguments.script.empty()) {
-    if (std::string fault = run_script(arguments); !fault.empty()) failures.push_back(fault);
-  }
-  for (const std::string& line : failures)
-    to_stderr("FAILED: {}\n", for_terminal(line).c_str());  // a difference has lines of ours
-  if (!arguments.json.empty()) {
-    std::vector<std::string> faults = failures;
-    faults.erase(faults.begin() + static_cast<std::ptrdiff_t>(begin_of_judged),
-                 faults.begin() + static_cast<std::ptrdiff_t>(end_of_judged));
-    write_verdict(arguments.json, faults, judge);
-  }
-  if (!failures.empty() && !arguments.no_page) attach_page(arguments.record);
-  if (failures.empty()) fmt::print("passed; the run is in {}\n", arguments.record);
-  return failures.empty() ? kGood : kCheckFailed;
+  verdict = judge.verdict();
+  if (arguments.client.empty()) verdict.checks.front().text += " without a client";
+  verdict.checks.insert(verdict.checks.begin() + 1, checks.begin(), checks.end());
+  add_files(arguments, rules, renew, verdict);
+  if (!verdict.passed() && !arguments.no_page) attach_page(arguments.record);
+  tell(arguments, verdict);
+  return verdict.passed() ? kGood : kCheckFailed;
 }
 
 void add_list(CLI::App& command, const char* name, std::vector<std::string>& to, const char* text,
@@ -327,6 +471,22 @@ void add_course(CLI::App& command, RegressArguments& a) {
                   "wait for this many clients, then advance as far as all of them allow")
       ->type_name("N")
       ->check(CLI::Range(1, 64));
+  command.add_flag("--no-client-wait", a.no_client_wait,
+                   "do not wait until the client is heard on the bus: for one that only listens");
+  command
+      .add_option(
+          "--grace", a.grace,
+          "the client has so long to end after the run (s of real time); SIGTERM comes after "
+          "half of it")
+      ->type_name("S")
+      ->capture_default_str()
+      ->check(within(0.0, 3600.0));
+  command
+      .add_option("--timeout", a.timeout,
+                  "a run that does not go on for so long has failed (s of real time)")
+      ->type_name("S")
+      ->capture_default_str()
+      ->check(within(0.1, 1e6));
   add_list(command, "--wait-for", a.wait_for,
            "do not pass a step at which a message on that channel is due: CHANNEL@HZ", "WAIT");
   add_list(command, "--remap", a.remaps, "give a channel another name: CHANNEL=NAME", "REMAP");
@@ -356,6 +516,9 @@ void add_expectations(CLI::App& command, RegressArguments& a) {
                   "measure the smallest clearance below this (m), for --json")
       ->type_name("M")
       ->check(within(0.0, 100.0));
+  command.add_flag("--allow-requests", a.expected.allow_requests,
+                   "the client may move the robot by requests (SET_POSE, RESET, REMOVE, ...)");
+  command.add_flag("--allow-errors", a.allow_errors, "run a world that has errors");
   command
       .add_option("--script", a.script,
                   "command line that judges too, by its exit code; RUEDO_LOG is the run's log")
@@ -377,12 +540,13 @@ void add_reports(CLI::App& command, RegressArguments& a) {
       .add_option("--json", a.json,
                   "write what failed, and how well the run went in numbers, as JSON")
       ->type_name("FILE");
-  command.add_option("--junit", a.junit, "write how the golden log compares as JUnit XML")
+  command
+      .add_option("--junit", a.junit, "write the verdict as JUnit XML, a test case for each check")
       ->type_name("FILE");
   command.add_option("--html", a.html, "write it as a page with plots")->type_name("FILE");
   command.add_flag("--no-page", a.no_page, "no page beside the log of a failed run");
   // Without it they would do nothing.
-  for (const char* each : {"--keep", "--tolerance", "--ignore", "--renew", "--junit", "--html"})
+  for (const char* each : {"--keep", "--tolerance", "--ignore", "--renew", "--html"})
     command.get_option(each)->needs(command.get_option("--golden"));
 }
 
@@ -396,7 +560,12 @@ void add_regress(CLI::App& app, Action& chosen) {
   add_expectations(*command, *arguments);
   add_golden(*command, *arguments);
   add_reports(*command, *arguments);
-  command->callback([arguments, &chosen] { chosen = [arguments] { return regress(*arguments); }; });
+  command->callback([arguments, &chosen] {
+    chosen = [arguments] {
+      if (arguments->keep.empty()) arguments->keep = {"*/pose"};
+      return regress(*arguments);
+    };
+  });
 }
 
 const RegisterCommand kRegister{55, add_regress};

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <atomic>
+#include <chrono>
 #include <functional>
 #include <optional>
 #include <string>
@@ -17,27 +18,36 @@ namespace ruedo::cli {
 
 class ClientProcess {
  public:
-  // Runs `command` by the shell, with the variables ("NAME=VALUE") added to the environment.
-  // `ended` is called, from a thread of its own, when it ends. Throws EnvironmentError when there
-  // are no processes.
+  // Runs `command` by bash, with the variables ("NAME=VALUE") added to the environment, and with
+  // the descriptors of `inherited` open. The exit code of each part counts: of a pipeline's
+  // programs, and of what runs in the background, which is waited for. `ended` is called, from a
+  // thread of its own, when it ends. Throws EnvironmentError when there are no processes.
   ClientProcess(const std::string& command, const std::vector<std::string>& variables,
-                std::function<void()> ended);
+                std::function<void()> ended, const std::vector<int>& inherited = {});
   ~ClientProcess();
 
-  // Asks it to end, and kills it when it has not ended after some seconds. True when it had already
-  // ended by itself.
-  bool end();
+  bool is_over() const { return over_; }
+
+  // Ends it: it may end by itself for half of that time, then it is asked to by SIGTERM, and killed
+  // when the time is over.
+  void end(std::chrono::duration<double> grace);
 
   // Waits until it has ended by itself.
   void wait();
 
-  // What is wrong with how it ended: "exit code 3", "signal 11"; "" for exit code 0. After end() or
-  // wait().
+  // What is wrong with how it ended: "exit code 3", "signal 11"; "" for exit code 0, and where it
+  // obeyed SIGTERM. After end() or wait().
   std::string fault() const;
+  bool was_told_to_end() const { return told_; }
+  bool was_killed() const { return killed_; }
 
  private:
+  void wait_until(std::chrono::steady_clock::time_point time) const;
+  void reap();
+
   pid_t pid_ = -1;
   std::atomic<bool> over_{false};
+  bool told_ = false, killed_ = false;
   int status_ = 0;
   std::optional<LeftoverGroup> leftover_;
   std::thread waiter_;

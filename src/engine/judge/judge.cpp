@@ -1,18 +1,24 @@
-// Goals, contacts and odometry; clearance is in judge_hull.cpp.
+// Goals, contacts and requests; clearance is in judge_hull.cpp, odometry in odometry_check.cpp.
 #include "engine/judge/judge.h"
 
 #include <algorithm>
 #include <charconv>
 #include <cmath>
-#include <cstring>
 
 #include <fmt/format.h>
 
+#include "base/channel_names.h"
 #include "base/whole.h"
 #include "engine/judge/judge_hull.h"
 #include "ruedo/decode.h"
 #include "ruedo/errors.h"
 #include "ruedo/math.h"
+#include "ruedo/name_request_t.hpp"
+#include "ruedo/request_t.hpp"
+#include "ruedo/reset_request_t.hpp"
+#include "ruedo/set_pose_request_t.hpp"
+#include "ruedo/set_twist_request_t.hpp"
+#include "ruedo/spawn_request_t.hpp"
 
 namespace ruedo::judge {
 namespace {
@@ -21,9 +27,12 @@ constexpr SimTime kTrackPeriod = 250'000;  // us
 
 double seconds(SimTime time) { return static_cast<double>(time) * 1e-6; }
 
-// Of a quaternion w, x, y, z.
-double heading_of(const double* q) {
-  return math::atan2(2.0 * (q[0] * q[3] + q[1] * q[2]), 1.0 - 2.0 * (q[2] * q[2] + q[3] * q[3]));
+// The body of a request that acted, which was checked before.
+template <class Body>
+Body body_of(const applied_t& applied) {
+  Body body{};
+  decode_checked(applied.data.data(), applied.data.size(), body);
+  return body;
 }
 
 }  // namespace
@@ -45,64 +54,82 @@ Goal parse_goal(const std::string& text) {
   return {numbers[0], numbers[1], numbers[2], numbers[3]};
 }
 
-Judge::Judge(const world::WorldModel& world, Expectations expected)
-    : world_(world), expected_(std::move(expected)), layout_(world) {
-  IndexedVector<RobotIndex, std::string> names;
-  for (const RobotIndex i : layout_.robots.indices()) {
-    const std::string& name = world.models[layout_.robots[i].instance].name;
-    names.push_back(name);
-    if (!robot_.valid() && (expected_.robot.empty() || expected_.robot == name)) robot_ = i;
-  }
-  if (!robot_.valid())
+Judge::Judge(std::shared_ptr<const world::WorldModel> world, Expectations expected)
+    : expected_(std::move(expected)), reached_(expected_.goals.size()) {
+  expected_.clearance_reach =
+      std::max(expected_.clearance_reach, expected_.clearance.value_or(0.0));
+  const world::BodyLayout layout(*world);
+  std::vector<std::string> names;
+  for (const world::RobotPlacement& robot : layout.robots)
+    names.push_back(world->models[robot.instance].name);
+  if (expected_.robot.empty() && !names.empty()) expected_.robot = names.front();
+  see_world(std::move(world), layout);
+  if (!robot_.valid() && (!expected_.robot.empty() || expected_.any())) {
     throw InputError(
         {}, fmt::format("--robot '{}': the world has {}", expected_.robot,
                         names.empty() ? "no robot" : fmt::format("{}", fmt::join(names, ", "))));
-  expected_.robot = names[robot_];
-  const InstanceIndex instance = layout_.robots[robot_].instance;
-  own_.resize(layout_.links.size());
-  wheel_.resize(layout_.links.size());
-  for (const LinkIndex i : layout_.links.indices()) own_[i] = layout_.links[i].instance == instance;
-  for (const world::WheelPlacement& wheel : layout_.wheels)
-    wheel_[wheel.link] = wheel.robot == robot_;
-  reached_.resize(expected_.goals.size());
-  expected_.clearance_reach =
-      std::max(expected_.clearance_reach, expected_.clearance.value_or(0.0));
-  if (expected_.clearance_reach > 0.0) hull_ = std::make_unique<JudgeHull>(world_, layout_, robot_);
+  }
 }
 
 Judge::~Judge() = default;
 
+void Judge::see_world(std::shared_ptr<const world::WorldModel> world,
+                      const world::BodyLayout& layout) {
+  world_ = std::move(world);
+  layout_.emplace(layout);
+  robot_ = {};
+  hull_.reset();
+  for (const RobotIndex i : layout_->robots.indices()) {
+    const world::ModelInstance& instance = world_->models[layout_->robots[i].instance];
+    if (!instance.removed && instance.name == expected_.robot) robot_ = i;
+  }
+  if (!robot_.valid()) return;
+  const InstanceIndex instance = layout_->robots[robot_].instance;
+  own_.resize(layout_->links.size());
+  for (const LinkIndex i : layout_->links.indices())
+    own_[i] = layout_->links[i].instance == instance;
+  if (expected_.clearance_reach > 0.0)
+    hull_ = std::make_unique<JudgeHull>(*world_, *layout_, robot_);
+}
+
 void Judge::fail(const std::string& what, SimTime time, const std::string& text) {
   const bool known = std::any_of(failures_.begin(), failures_.end(),
-                                 [&](const Failure& f) { return f.what == what; });
-  if (!known) failures_.push_back({what, time, text});
+                                 [&](const Check& check) { return check.what == what; });
+  if (!known) failures_.push_back({what, Outcome::failed, text, time});
 }
 
 std::string Judge::name_of(LinkIndex link) const {
-  const world::LinkPlacement& placement = layout_.links[link];
-  const world::ModelInstance& instance = world_.models[placement.instance];
+  const world::LinkPlacement& placement = layout_->links[link];
+  const world::ModelInstance& instance = world_->models[placement.instance];
   return instance.name + "/" + instance.model->links[placement.link].name;
 }
 
 void Judge::see(const Snapshot& snapshot) {
-  if (!snapshot.robots.has(robot_)) return;
-  const Vec3 position = snapshot.robots[robot_].X_WBase.translation;
-  if (seen_ >= 0) path_m_ += (position - position_).head<2>().norm();
+  const bool goes_on = snapshot.time > seen_;  // else sim time was reset
+  if (goes_on && snapshot.step > 0) ++steps_;
   seen_ = snapshot.time;
+  if (!robot_.valid() || !snapshot.robots.has(robot_)) return;
+  const RobotState& robot = snapshot.robots[robot_];
+  const Vec3 position = robot.X_WBase.translation;
+  if (!track_.empty()) path_m_ += (position - position_).head<2>().norm();
   position_ = position;
-  if (snapshot.time >= static_cast<SimTime>(track_.size()) * kTrackPeriod)
+  if (track_.empty() || snapshot.time >= static_cast<SimTime>(track_.size()) * kTrackPeriod)
     track_.push_back({seconds(snapshot.time), position.x(), position.y()});
+  if (goes_on && snapshot.step > 0) ++judged_;
+  odometry_.see_truth(snapshot.time, robot.X_WBase, robot.odometry_resets);
+  see_goals(snapshot.time, position);
+  see_contacts(snapshot);
+  if (hull_) see_clearance(snapshot);
+}
+
+void Judge::see_goals(SimTime time, const Vec3& position) {
   for (size_t i = 0; i < expected_.goals.size(); ++i) {
     const Goal& goal = expected_.goals[i];
     const double distance = math::hypot(position.x() - goal.x, position.y() - goal.y);
     if (i + 1 == expected_.goals.size())
       last_goal_distance_m_ = std::min(last_goal_distance_m_, distance);
-    if (reached_[i] || seconds(snapshot.time) > goal.by_s || distance > goal.radius) continue;
-    reached_[i] = true;
-    last_goal_ = std::max(last_goal_, snapshot.time);
+    if (!reached_[i] && seconds(time) <= goal.by_s && distance <= goal.radius) reached_[i] = time;
   }
-  see_contacts(snapshot);
-  if (hull_) see_clearance(snapshot);
 }
 
 void Judge::see_clearance(const Snapshot& snapshot) {
@@ -116,9 +143,7 @@ void Judge::see_clearance(const Snapshot& snapshot) {
 
 void Judge::see_contacts(const Snapshot& snapshot) {
   for (const Contact& contact : snapshot.contacts) {
-    if (!contact.link_a.valid() || !contact.link_b.valid() ||
-        static_cast<size_t>(std::max(contact.link_a, contact.link_b)) >= own_.size())
-      continue;
+    if (!own_.has(contact.link_a) || !own_.has(contact.link_b)) continue;
     const bool a = own_[contact.link_a], b = own_[contact.link_b];
     if (a == b) continue;
     // What carries it presses upwards on a wheel, or from below anywhere (castors).
@@ -136,57 +161,138 @@ void Judge::see_contacts(const Snapshot& snapshot) {
 }
 
 void Judge::see(const std::string& channel, std::span<const uint8_t> message) {
-  const auto is = [&](const char* device) {
-    return channel.size() == expected_.robot.size() + std::strlen(device) &&
-           channel.starts_with(expected_.robot) && channel.ends_with(device);
-  };
-  if (is("/pose")) {
-    pose_t pose;
-    if (decode_checked(message.data(), message.size(), pose) != DecodeFault::none) return;
-    if (!first_pose_) first_pose_ = pose;
-    pose_ = pose;
-  } else if (is("/odometry")) {
-    odometry_t odometry;
-    if (decode_checked(message.data(), message.size(), odometry) != DecodeFault::none) return;
-    odometry_ = odometry;
-  } else {
+  if (channel != expected_.robot + "/odometry") return;
+  odometry_t odometry;
+  if (decode_checked(message.data(), message.size(), odometry) == DecodeFault::none)
+    odometry_.see(odometry);
+}
+
+// What the robot did not do by itself is no evidence of what it can do.
+void Judge::see(const applied_t& applied) {
+  if (applied.channel != kRequestChannel) return;
+  std::string said, moved;  // the model that it moved
+  switch (applied.kind) {
+    case request_t::SPAWN: said = "SPAWN " + body_of<spawn_request_t>(applied).name; break;
+    case request_t::REMOVE:
+      moved = body_of<name_request_t>(applied).name;
+      said = "REMOVE " + moved;
+      break;
+    case request_t::SET_POSE:
+      moved = body_of<set_pose_request_t>(applied).name;
+      said = "SET_POSE " + moved;
+      break;
+    case request_t::SET_TWIST:
+      moved = body_of<set_twist_request_t>(applied).name;
+      said = "SET_TWIST " + moved;
+      break;
+    case request_t::RESET:
+      moved = expected_.robot;
+      said = "RESET";
+      break;
+    case request_t::RESET_ODOMETRY:
+      said = "RESET_ODOMETRY " + body_of<name_request_t>(applied).name;
+      break;
+    default: return;
+  }
+  changes_.push_back(said);
+  const bool is_robots = moved == expected_.robot || moved.starts_with(expected_.robot + "/");
+  if (!expected_.allow_requests && !moved.empty() && is_robots) {
+    fail("requests", applied.utime,
+         fmt::format("{} was moved by a request ({}); --allow-requests allows that",
+                     expected_.robot, said));
+  }
+}
+
+Verdict Judge::verdict() const {
+  Verdict verdict;
+  add_run(verdict);
+  add_goals(verdict);
+  if (expected_.no_contact)
+    add_kept(verdict, "contact", fmt::format("{} touched nothing", expected_.robot));
+  if (expected_.clearance) {
+    const bool none = !(smallest_clearance_m_ < expected_.clearance_reach);
+    add_kept(verdict, "clearance",
+             fmt::format("clearance {}{:.2f} m", none ? "of at least " : "",
+                         std::min(smallest_clearance_m_, expected_.clearance_reach)));
+  }
+  if (expected_.odometry_error) add_odometry(verdict);
+  for (const Check& check : failures_) {
+    if (check.what == "requests") verdict.checks.push_back(check);
+  }
+  verdict.metrics = metrics();
+  verdict.track = track_;
+  return verdict;
+}
+
+void Judge::add_run(Verdict& verdict) const {
+  if (steps_ == 0) {
+    verdict.checks.push_back({"run", Outcome::not_judged, "no step was run", {}});
     return;
   }
-  if (pose_ && odometry_ && pose_->utime == odometry_->utime) compare_odometry();
+  std::string text = fmt::format("{} steps", steps_);
+  if (!changes_.empty()) {
+    constexpr size_t kMostTold = 5;
+    const auto end =
+        changes_.begin() + static_cast<std::ptrdiff_t>(std::min(changes_.size(), kMostTold));
+    text += fmt::format(" ({} requests changed the run: {}{})", changes_.size(),
+                        fmt::join(changes_.begin(), end, ", "),
+                        changes_.size() > kMostTold ? ", ..." : "");
+  }
+  verdict.checks.push_back({"run", Outcome::passed, text, {}});
 }
 
-// Odometry starts at zero where the robot starts: the truth is looked at from its first pose.
-void Judge::compare_odometry() {
-  const double dx = pose_->pos[0] - first_pose_->pos[0], dy = pose_->pos[1] - first_pose_->pos[1],
-               turn = heading_of(first_pose_->orientation);
-  const double x = math::cos(turn) * dx + math::sin(turn) * dy,
-               y = -math::sin(turn) * dx + math::cos(turn) * dy;
-  const double error = math::hypot(odometry_->x - x, odometry_->y - y);
-  odometry_error_m_ = std::max(odometry_error_m_, error);
-  if (!expected_.odometry_error || error <= *expected_.odometry_error) return;
-  fail("odometry", pose_->utime,
-       fmt::format("{}'s odometry was {:.3f} m off, at most {:g} m are asked for", expected_.robot,
-                   error, *expected_.odometry_error));
-}
-
-std::vector<Failure> Judge::failures() {
+void Judge::add_goals(Verdict& verdict) const {
   for (size_t i = 0; i < expected_.goals.size(); ++i) {
     const Goal& goal = expected_.goals[i];
-    if (reached_[i]) continue;
-    fail(fmt::format("goal {}", i), microseconds(goal.by_s),
+    const std::string what = fmt::format("goal {}", i);
+    if (reached_[i]) {
+      verdict.checks.push_back({what,
+                                Outcome::passed,
+                                fmt::format("{} reached at {:.3g} s", what, seconds(*reached_[i])),
+                                {}});
+      continue;
+    }
+    const std::string ended =
+        seconds(seen_) < goal.by_s ? fmt::format("; the run ended at {:g} s", seconds(seen_)) : "";
+    verdict.checks.push_back(
+        {what, Outcome::failed,
          fmt::format("{} was not within {:g} m of ({:g}, {:g}) by {:g} s{}", expected_.robot,
-                     goal.radius, goal.x, goal.y, goal.by_s,
-                     seconds(seen_) < goal.by_s
-                         ? fmt::format("; the run ended at {:g} s", seconds(seen_))
-                         : ""));
+                     goal.radius, goal.x, goal.y, goal.by_s, ended),
+         microseconds(goal.by_s)});
   }
-  if (expected_.odometry_error && odometry_error_m_ < 0.0) {
-    fail("odometry", 0,
-         fmt::format("there is no {0}/odometry beside {0}/pose to judge by", expected_.robot));
+}
+
+// What has to hold at each step.
+void Judge::add_kept(Verdict& verdict, const std::string& what, const std::string& evidence) const {
+  const auto failed = std::find_if(failures_.begin(), failures_.end(),
+                                   [&](const Check& check) { return check.what == what; });
+  if (failed != failures_.end()) {
+    verdict.checks.push_back(*failed);
+  } else if (judged_ == 0) {
+    verdict.checks.push_back({what, Outcome::not_judged, what + ": no step was run", {}});
+  } else {
+    verdict.checks.push_back(
+        {what, Outcome::passed, fmt::format("{} over {} steps", evidence, judged_), {}});
   }
-  std::stable_sort(failures_.begin(), failures_.end(),
-                   [](const Failure& a, const Failure& b) { return a.time < b.time; });
-  return failures_;
+}
+
+void Judge::add_odometry(Verdict& verdict) const {
+  const OdometryCheck::Result result = odometry_.compare(*expected_.odometry_error);
+  Check check{
+      "odometry",
+      Outcome::passed,
+      fmt::format("odometry at most {:.3f} m off in {} samples", result.largest_m, result.samples),
+      {}};
+  if (result.samples == 0) {
+    check.outcome = Outcome::not_judged;
+    check.text = fmt::format("odometry: {}/odometry has no sample", expected_.robot);
+  } else if (result.beyond) {
+    check.outcome = Outcome::failed;
+    check.time = result.beyond;
+    check.text = fmt::format("{}'s odometry was {:.3f} m off, at most {:g} m are asked for",
+                             expected_.robot, result.beyond_m, *expected_.odometry_error);
+  }
+  verdict.checks.push_back(std::move(check));
 }
 
 std::vector<Metric> Judge::metrics() const {
@@ -195,17 +301,17 @@ std::vector<Metric> Judge::metrics() const {
                               {"y_m", position_.y()},
                               {"path_m", path_m_}};
   if (!expected_.goals.empty()) metrics.push_back({"goal_distance_m", last_goal_distance_m_});
-  if (!reached_.empty() && std::find(reached_.begin(), reached_.end(), false) == reached_.end())
-    metrics.push_back({"goal_time_s", seconds(last_goal_)});
+  if (!reached_.empty() && std::all_of(reached_.begin(), reached_.end(),
+                                       [](const auto& at) { return at.has_value(); })) {
+    metrics.push_back(
+        {"goal_time_s", seconds(**std::max_element(reached_.begin(), reached_.end()))});
+  }
   if (first_contact_ >= 0) metrics.push_back({"contact_time_s", seconds(first_contact_)});
-  if (hull_)
+  if (expected_.clearance_reach > 0.0)
     metrics.push_back({"clearance_m", std::min(smallest_clearance_m_, expected_.clearance_reach)});
-  if (odometry_error_m_ >= 0.0) metrics.push_back({"odometry_error_m", odometry_error_m_});
+  const OdometryCheck::Result odometry = odometry_.compare(0.0);
+  if (odometry.samples > 0) metrics.push_back({"odometry_error_m", odometry.largest_m});
   return metrics;
-}
-
-std::string to_line(const Failure& failure) {
-  return fmt::format("{:.3f} s: {}", seconds(failure.time), failure.text);
 }
 
 }  // namespace ruedo::judge

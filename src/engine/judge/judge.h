@@ -1,5 +1,7 @@
-// What a regression or a case of a campaign expects of a run, held against the true state of every
-// step; and how well the run went, in numbers.
+// Holds a run against what is expected of it: by the true state of every step, what the robot says
+// of itself, and what acted on the run.
+//
+// The world may change meanwhile: the judge follows what comes and goes.
 #pragma once
 
 #include <cstdint>
@@ -10,9 +12,10 @@
 #include <string>
 #include <vector>
 
-#include "ruedo/odometry_t.hpp"
+#include "engine/judge/odometry_check.h"
+#include "engine/judge/verdict.h"
+#include "ruedo/applied_t.hpp"
 #include "ruedo/pose.h"
-#include "ruedo/pose_t.hpp"
 #include "ruedo/snapshot.h"
 #include "world/model/body_layout.h"
 
@@ -34,69 +37,64 @@ struct Expectations {
   std::optional<double> odometry_error;  // m, at most, between odometry and truth
   double clearance_reach =
       0.0;  // m: clearances below this are measured, whether or not one is asked for
-};
+  bool allow_requests = false;  // the robot may be moved by a request of the program's
 
-struct Failure {
-  std::string what;  // "goal 0", "contact", "clearance", "odometry"
-  SimTime time = 0;
-  std::string text;
-};
-
-std::string to_line(const Failure& failure);  // "12.500 s: p3at touched wall/link at ..."
-
-// A number that says how well a run went: SI units, in the name's end.
-struct Metric {
-  std::string name;
-  double value = 0.0;
+  bool any() const { return !goals.empty() || no_contact || clearance || odometry_error; }
 };
 
 class Judge {
  public:
-  // Throws InputError when the world has no such robot. The world must outlive it.
-  Judge(const world::WorldModel& world, Expectations expected);
+  // Throws InputError when the world has no such robot.
+  Judge(std::shared_ptr<const world::WorldModel> world, Expectations expected);
   ~Judge();
 
-  void see(const Snapshot& snapshot);
-  // A message of the run, in its order: pose and odometry are compared.
-  void see(const std::string& channel, std::span<const uint8_t> message);
+  // Models have come or gone, or the world begins anew. The layout is that of the states to come.
+  void see_world(std::shared_ptr<const world::WorldModel> world, const world::BodyLayout& layout);
 
-  // After the run: what did not hold, the first of each kind, the earliest first.
-  std::vector<Failure> failures();
-  // After the run: time_s, x_m, y_m and path_m of the end; goal_distance_m, the smallest to the
-  // last goal, and goal_time_s, when all were reached; contact_time_s of the first contact;
-  // clearance_m and odometry_error_m where they were measured.
-  std::vector<Metric> metrics() const;
-  // Where base_link was every quarter of a second: s, m, m.
-  struct Place {
-    double time_s, x, y;
-  };
-  const std::vector<Place>& track() const { return track_; }
+  void see(const Snapshot& snapshot);
+  // A message of the run, on a channel by its own name. Only the odometry of the robot matters.
+  void see(const std::string& channel, std::span<const uint8_t> message);
+  // A command or a request that acted on the run.
+  void see(const applied_t& applied);
+
+  // After the run: the checks "run", "requests", and what was expected. Metrics: time_s, x_m, y_m
+  // and path_m of the end; goal_distance_m, the smallest to the last goal, and goal_time_s, when
+  // all were reached; contact_time_s of the first contact; clearance_m and odometry_error_m where
+  // they were measured. The track has base_link every quarter of a second.
+  Verdict verdict() const;
 
  private:
   void fail(const std::string& what, SimTime time, const std::string& text);
+  void see_goals(SimTime time, const Vec3& position);
   void see_contacts(const Snapshot& snapshot);
   void see_clearance(const Snapshot& snapshot);
-  void compare_odometry();
+  void see_request(const applied_t& applied);
   std::string name_of(LinkIndex link) const;
 
-  const world::WorldModel& world_;
+  void add_run(Verdict& verdict) const;
+  void add_goals(Verdict& verdict) const;
+  void add_kept(Verdict& verdict, const std::string& what, const std::string& evidence) const;
+  void add_odometry(Verdict& verdict) const;
+  std::vector<Metric> metrics() const;
+
+  std::shared_ptr<const world::WorldModel> world_;
   Expectations expected_;
-  world::BodyLayout layout_;
-  RobotIndex robot_;
-  IndexedVector<LinkIndex, bool> own_, wheel_;
+  std::optional<world::BodyLayout> layout_;
+  RobotIndex robot_;  // none: it is not in the world now
+  IndexedVector<LinkIndex, bool> own_;
   std::unique_ptr<JudgeHull> hull_;
-  std::vector<bool> reached_;
+  int64_t steps_ = 0, judged_ = 0;  // of the run, and those with the robot in the world
+  std::vector<std::optional<SimTime>> reached_;
   double last_goal_distance_m_ = std::numeric_limits<double>::infinity();
-  SimTime last_goal_ = -1, first_contact_ = -1;
+  SimTime first_contact_ = -1;
   double smallest_clearance_m_ = std::numeric_limits<double>::infinity();
   SimTime seen_ = -1;
   Vec3 position_ = Vec3::Zero();
   double path_m_ = 0.0;
   std::vector<Place> track_;
-  std::optional<pose_t> first_pose_, pose_;
-  std::optional<odometry_t> odometry_;
-  double odometry_error_m_ = -1.0;  // the largest so far; below 0: nothing was compared
-  std::vector<Failure> failures_;   // the first of each kind
+  OdometryCheck odometry_;
+  std::vector<std::string> changes_;  // requests that changed the world
+  std::vector<Check> failures_;       // the first of each kind
 };
 
 }  // namespace ruedo::judge

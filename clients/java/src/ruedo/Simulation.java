@@ -47,6 +47,7 @@ public final class Simulation implements AutoCloseable {
     public final String url;
 
     final Bus bus;
+    private final ToRegression regression; // null: none launched this program
     final Progress progress = new Progress();
     final Clock clock = new Clock(progress);
     final CallbackQueue callbacks = new CallbackQueue();
@@ -95,7 +96,9 @@ public final class Simulation implements AutoCloseable {
         session = new Session(this, name);
         stepper = new Stepper(this, session);
         bus = new Bus(transport == null ? Transport.open(address) : transport);
-        if (server != null) bus.beforeTurn = this::beforeTurn;
+        regression = server == null ? ToRegression.at(url) : null;
+        boolean isWaitedFor = server != null || regression != null;
+        if (isWaitedFor) bus.beforeTurn = this::beforeTurn;
         bus.subscribe("ruedo/info", this::onInfo);
         bus.subscribe("ruedo/tick", this::onTick);
         bus.subscribe("ruedo/reply", session::receive);
@@ -106,8 +109,9 @@ public final class Simulation implements AutoCloseable {
             bus.close();
             throw error;
         }
-        if (server != null || lockstep()) callbacks.keepAll();
-        if (server != null && !lockstep()) progress.begin(server::tell);
+        if (isWaitedFor || lockstep()) callbacks.keepAll();
+        if (isWaitedFor && !lockstep())
+            progress.begin(server != null ? server::tell : regression::tell);
         ids = new AtomicLong(idsFrom(name, info()));
     }
 
@@ -446,6 +450,7 @@ public final class Simulation implements AutoCloseable {
             session.leave();
             bus.close();
         } finally {
+            if (regression != null) regression.close();
             if (server != null) server.end();
             ended.countDown();
         }
@@ -716,7 +721,7 @@ public final class Simulation implements AutoCloseable {
      * Prints what the launched server has warned of, and tells it again how far this program is.
      */
     private long beforeTurn() {
-        if (System.nanoTime() - listenedAt >= LISTEN_NANOS) {
+        if (server != null && System.nanoTime() - listenedAt >= LISTEN_NANOS) {
             listenedAt = System.nanoTime();
             for (String warning : server.warnings())
                 System.err.println("ruedo: the server: " + warning);

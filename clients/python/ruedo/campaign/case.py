@@ -32,15 +32,17 @@ from .processes import die_with_parent, end_descendants, ends_within, forks_end,
 
 _ROOM = 64 << 10  # bytes that a disk must have left
 _ENGINES = 4  # that a worker keeps
+_STARVED = ("MemoryError", "bad_alloc", "OutOfMemoryError", "Cannot allocate memory")
 
 
 @dataclass
 class Outcome:
     """What came of a case.
 
-    status: passed, failed (an expectation), crashed, timeout or memory (the controller), or invalid
-    (the case cannot be run). what: which expectation, or what went wrong. reason: in a line. log:
-    its content.
+    status: passed, failed (an expectation), not judged (what was asked for could not be), crashed,
+    timeout or memory (the controller), or invalid (the case cannot be run). what: which
+    expectation, or what went wrong. reason: in a line; of what has passed, the evidence. log: its
+    content.
     """
 
     status: str = "passed"
@@ -56,7 +58,7 @@ class Outcome:
     def fail(self, status: str, what: str, reason: str) -> None:
         """The first thing that went wrong is what stays."""
         if self.status == "passed":
-            self.status, self.what, self.reason = status, what, " ".join(reason.split())[:500]
+            self.status, self.what, self.reason = status, what, _in_a_line(reason)
 
     def as_dict(self) -> dict[str, Any]:
         return asdict(self)
@@ -161,7 +163,7 @@ class Runner:
             traceback.print_exc()
         finally:
             verdict = engine.end_run()
-        self._take(verdict, outcome)
+        self._take(verdict, limits["memory_mb"], outcome)
 
     def _drive(self, engine: Engine, robot: str, what: dict[str, Any]) -> None:
         made = what["controller"]
@@ -196,6 +198,7 @@ class Runner:
             "set": what["settings"],
             "disable": what["disable"],
             "noise": what["noise"],
+            "allow_errors": what["expect"].get("allow_errors", False),
         }
         if what["faults"]:
             options["fault"] = [fault_text(one) for one in what["faults"]]
@@ -241,9 +244,7 @@ class Runner:
         outcome.output = output.text()
         if os.path.exists(verdict_file):
             verdict = json.loads(Path(verdict_file).read_text())
-            for fault in verdict["faults"]:
-                self._take_fault(fault, limits["memory_mb"], outcome)
-            self._take(verdict, outcome)
+            self._take(verdict, limits["memory_mb"], outcome)
         elif code is None:
             outcome.fail("timeout", "controller", too_slow(limits["wall"]))
         else:
@@ -254,27 +255,29 @@ class Runner:
                 said[-1][7:] if said else f"ruedo regress ended with exit code {code}",
             )
 
-    def _take_fault(self, fault: str, memory_mb: int, outcome: Outcome) -> None:
-        starved = ("MemoryError", "bad_alloc", "OutOfMemoryError", "Cannot allocate memory")
-        if fault.startswith("the client ended with"):
-            if any(word in outcome.output for word in starved):
-                outcome.fail("memory", "controller", too_large(memory_mb))
-            else:
-                outcome.fail("crashed", "controller", fault.replace("the client", "the controller"))
-        elif fault.startswith("the run differs from"):
-            outcome.fail("failed", "golden", fault.splitlines()[0])
-        else:
-            outcome.fail("crashed", "controller", fault.splitlines()[0])
-
     # ---- Of both.
 
-    def _take(self, verdict: dict[str, Any], outcome: Outcome) -> None:
+    def _take(self, verdict: dict[str, Any], memory_mb: int, outcome: Outcome) -> None:
         for failure in verdict["failures"]:
-            outcome.fail(
-                "failed",
-                failure["what"].split(" ")[0],
-                f"{failure['time_s']:.3f} s: {failure['text']}",
-            )
+            what, at = failure["what"].split(" ")[0], failure["time_s"]
+            reason = failure["text"] if at is None else f"{at:.3f} s: {failure['text']}"
+            if not failure["judged"]:
+                outcome.fail("not judged", what, reason)
+            elif what == "client" and any(word in outcome.output for word in _STARVED):
+                outcome.fail("memory", "controller", too_large(memory_mb))
+            elif what in ("client", "run"):
+                outcome.fail(
+                    "crashed", "controller", reason.replace("the client", "the controller")
+                )
+            elif what == "world":
+                outcome.fail("invalid", "world", reason)
+            else:
+                outcome.fail("failed", what, reason.splitlines()[0])
+        if outcome.status == "passed":
+            texts = [
+                one["text"].replace("the client", "the controller") for one in verdict["evidence"]
+            ]
+            outcome.reason = _in_a_line("; ".join(texts))
         outcome.metrics.update(
             {name: value for name, value in verdict["metrics"].items() if value is not None}
         )
@@ -324,6 +327,10 @@ class Runner:
             outcome.fail("failed", "golden", reason)
         elif done.returncode != 0:
             outcome.fail("invalid", "golden", first.removeprefix("ruedo: "))
+
+
+def _in_a_line(text: str) -> str:
+    return " ".join(text.split())[:500]
 
 
 def diff_command(expect: dict[str, Any], golden: str, log: str) -> list[str]:
@@ -382,6 +389,9 @@ def regress_command(what: dict[str, Any], log: str, verdict: str = "") -> list[s
     return (
         command
         + (["--no-contact"] if expect.get("no_contact") else [])
+        + (["--no-client-wait"] if made.get("no_client_wait") else [])
+        + (["--allow-requests"] if expect.get("allow_requests") else [])
+        + (["--allow-errors"] if expect.get("allow_errors") else [])
         + ([] if what["noise"] else ["--no-noise"])
     )
 

@@ -40,7 +40,9 @@ METRICS = (
 )
 _FARTHEST_M = 1e6  # of an obstacle
 _MOST_INTEGER = 2**63 - 1
-_TEXTS_OF_EXPECT = ("robot", "no_contact", "golden", "tolerances", "ignore")
+_TEXTS_OF_EXPECT = (
+    *("robot", "no_contact", "allow_requests", "allow_errors", "golden", "tolerances", "ignore"),
+)
 _TEXTS_OF_FAULT = ("robot", "kind", "target")
 _HOLE = re.compile(r"(?<![${])\{([A-Za-z_]\w*)\}")
 

@@ -40,7 +40,7 @@ _COLUMNS = (
 _TEXTS = ("what", "reason", "state_hash", "output")
 _FORMAT = "1"
 _ALL = f"SELECT {', '.join(_COLUMNS)} FROM results"
-_STATUSES = ("passed", "failed", "crashed", "timeout", "memory", "invalid")
+_STATUSES = ("passed", "failed", "not judged", "crashed", "timeout", "memory", "invalid")
 _MOST_LOG_BYTES = 1 << 30
 
 

@@ -257,7 +257,10 @@ def _as_it_was(recorded: Recorded, case: tuple[Campaign, Case] | None) -> Answer
         raise SpecError(
             f"{recorded.path}: this run did not fail: {'its controller did' if case else 'nothing was touched'}"
         )
-    return Answer(failures[0]["time_s"], f"{failures[0]['time_s']:.3f} s: {failures[0]['text']}")
+    judged = [one for one in failures if one["time_s"] is not None]
+    if not judged:
+        raise SpecError(f"{recorded.path}: {failures[0]['text']}")
+    return Answer(judged[0]["time_s"], f"{judged[0]['time_s']:.3f} s: {judged[0]['text']}")
 
 
 def _moments(failed_s: float) -> list[float]:
