@@ -15,6 +15,7 @@ import subprocess
 import sys
 import threading
 import time
+import types
 import warnings
 import zlib
 
@@ -23,7 +24,8 @@ import numpy as np
 import pytest
 import ruedo
 from conftest import HALL, PATIENCE, free_url, ruedo_run, tcp_server
-from ruedo import samples
+from ruedo import lcmtypes, samples
+from ruedo.control import Session
 from ruedo.decoding import decode
 from ruedo.launch import _options
 
@@ -970,3 +972,30 @@ def test_a_program_may_end_beside_a_callback_in_a_daemon_thread():
                 timeout=PATIENCE,
             )
         assert done.returncode == 0, done.stderr
+
+
+def test_a_send_that_takes_long_holds_up_nobody_who_receives():
+    """Of a large request, to a server that has much else to do."""
+    ends = []
+
+    def publish(channel, data):
+        asked = lcmtypes.request_t.decode(data)
+        reply = lcmtypes.reply_t()
+        reply.run_id, reply.session, reply.sequence, reply.kind = 7, 3, asked.sequence, asked.kind
+        receiving = threading.Thread(target=session.receive, args=(reply.encode(),))
+        receiving.start()
+        receiving.join(10.0)
+        ends.append(not receiving.is_alive())
+
+    connection = types.SimpleNamespace(
+        info=types.SimpleNamespace(features=-1, run_id=7),
+        clock=types.SimpleNamespace(utime=0),
+        bus=types.SimpleNamespace(publish=publish),
+        is_of_our_run=lambda run_id: True,
+        check_may_wait=lambda: None,
+        check_open=lambda: None,
+        check_server=lambda: None,
+    )
+    session = Session(connection, "sender")
+    assert session.request(lcmtypes.request_t.GET_STATE).session == 3
+    assert ends == [True, True]  # JOIN, GET_STATE

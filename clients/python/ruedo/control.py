@@ -173,20 +173,24 @@ class Session:
         encoded = body.encode() if body is not None else b""
         with self._news:
             self._awaited, self._reply = (kind, sequence), None
-            while self._reply is None:
+        try:
+            while True:
                 if self._connection.info.run_id != self._run_id:
-                    self._awaited = None
                     raise RequestError(
                         f"{_KINDS[kind]}: another run has begun meanwhile", "WRONG_RUN"
                     )
                 if time.monotonic() >= deadline:
-                    self._awaited = None
                     raise Timeout(f"no reply to {_KINDS[kind]} on ruedo/reply within {timeout:g} s")
+                # Not under the lock: it may take long, and the receiving thread goes on meanwhile.
                 self.publish(kind, session, sequence, encoded)
-                self._news.wait(_REPEAT_SECONDS)
+                with self._news:
+                    if self._news.wait_for(lambda: self._reply is not None, _REPEAT_SECONDS):
+                        return self._reply
                 self._connection.check_server()
-            reply, self._awaited = self._reply, None
-        return reply
+        finally:
+            with self._news:
+                if self._awaited == (kind, sequence):
+                    self._awaited = None
 
     def publish(self, kind: int, session: int, sequence: int, body: bytes, epoch: int = -1) -> None:
         head = _REQUEST.pack(
