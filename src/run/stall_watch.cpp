@@ -15,7 +15,7 @@ StallWatch::~StallWatch() {
     const std::lock_guard lock(mutex_);
     is_over_ = true;
   }
-  over_.notify_all();
+  changed_.notify_all();
   thread_.join();
 }
 
@@ -37,15 +37,18 @@ void StallWatch::idle(Clock::time_point now, const std::function<std::string()>&
   const std::string reason = why();
   if (reason.empty()) return;
   told_ = true;
-  const std::lock_guard lock(mutex_);
-  say(reason, now);
+  {
+    const std::lock_guard lock(mutex_);
+    say(reason, now);
+  }
+  changed_.notify_all();
 }
 
 void StallWatch::say(const std::string& reason, Clock::time_point now) {
   if (reason == last_reason_ && now < last_told_ + kQuiet) return;
   last_reason_ = reason;
   last_told_ = now;
-  host_.tell(reason);
+  to_tell_.push_back(reason);
 }
 
 std::string StallWatch::reason(At at) {
@@ -61,27 +64,33 @@ std::string StallWatch::reason(At at) {
 void StallWatch::watch() {
   pthread_setname_np(pthread_self(), "stall watch");
   std::unique_lock lock(mutex_);
-  uint64_t beats = 0;
-  Clock::time_point last_look = Clock::now(), last_beat = last_look;
-  bool told = false;
-  while (!over_.wait_for(lock, kPatience / 6, [this] { return is_over_; })) {
-    const Clock::time_point now = Clock::now();
-    const Clock::duration blind = now - std::exchange(last_look, now);
-    const uint64_t beats_now = beats_.load(std::memory_order_acquire);
-    if (blind > kPatience) {
-      host_.tell(fmt::format(
-          "this process was held up for {:.1f} s: stopped by a signal, or without a processor. "
-          "Sim time goes on from where it was",
-          std::chrono::duration<double>(blind).count()));
-      last_beat = now;  // no client is to blame
-    } else if (beats_now != std::exchange(beats, beats_now)) {
-      last_beat = now;
-      told = false;
-    } else if (!told && now >= last_beat + kPatience) {
-      const std::string why = reason(at_.load(std::memory_order_relaxed));
-      told = true;
-      if (!why.empty()) say(why, now);
-    }
+  while (!is_over_ || !to_tell_.empty()) {
+    changed_.wait_for(lock, kPatience / 6, [this] { return is_over_ || !to_tell_.empty(); });
+    if (!is_over_) look(Clock::now());
+    const std::vector<std::string> reasons = std::exchange(to_tell_, {});
+    lock.unlock();
+    for (const std::string& reason : reasons) host_.tell(reason);
+    lock.lock();
+    last_look_ = Clock::now();
+  }
+}
+
+void StallWatch::look(Clock::time_point now) {
+  const Clock::duration blind = now - std::exchange(last_look_, now);
+  const uint64_t beats = beats_.load(std::memory_order_acquire);
+  if (blind > kPatience) {
+    to_tell_.push_back(fmt::format(
+        "this process was held up for {:.1f} s: stopped by a signal, or without a processor. "
+        "Sim time goes on from where it was",
+        std::chrono::duration<double>(blind).count()));
+    last_beat_ = now;  // no client is to blame
+  } else if (beats != std::exchange(seen_beats_, beats)) {
+    last_beat_ = now;
+    beat_missed_ = false;
+  } else if (!beat_missed_ && now >= last_beat_ + kPatience) {
+    const std::string why = reason(at_.load(std::memory_order_relaxed));
+    beat_missed_ = true;
+    if (!why.empty()) say(why, now);
   }
 }
 

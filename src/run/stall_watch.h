@@ -2,7 +2,9 @@
 //
 // While the publisher has nothing to do it asks for the reason itself: a client, a sensor, a step.
 // When the publisher itself is held up, by a request or a disk, a thread of the watch notices that
-// its beats have stopped, and reports it; likewise when the whole process was stopped.
+// its beats have stopped, and reports it; likewise when the whole process was stopped. That thread
+// does all the telling, and holds nothing up meanwhile: standard error may be a pipe that nobody
+// reads.
 #pragma once
 
 #include <atomic>
@@ -13,6 +15,7 @@
 #include <mutex>
 #include <string>
 #include <thread>
+#include <vector>
 
 namespace ruedo::run {
 
@@ -26,7 +29,7 @@ class StallWatch {
   enum class At { rest, steps, messages, request };  // what the publisher is at
 
   struct Host {
-    // Called with the reason. Any thread, one call at a time.
+    // Called with the reason, in the watch's thread.
     std::function<void(const std::string& reason)> tell;
     // Describes what takes no messages. Called in the watch's thread.
     std::function<std::string()> takes_none;
@@ -51,6 +54,7 @@ class StallWatch {
 
  private:
   void watch();
+  void look(Clock::time_point now);
   std::string reason(At at);
   void say(const std::string& reason, Clock::time_point now);
 
@@ -58,12 +62,17 @@ class StallWatch {
   std::atomic<At> at_{At::rest};
   std::atomic<uint64_t> beats_{0};
 
-  Clock::time_point moved_ = Clock::now();  // this and the next: the publisher's thread
+  Clock::time_point moved_ = Clock::now();  // with the next: the publisher's thread
   bool told_ = false;
 
+  Clock::time_point last_look_ = moved_, last_beat_ = moved_;  // to beat_missed_: the watch's
+  uint64_t seen_beats_ = 0;
+  bool beat_missed_ = false;
+
   std::mutex mutex_;  // of what follows
-  std::condition_variable over_;
+  std::condition_variable changed_;
   bool is_over_ = false;
+  std::vector<std::string> to_tell_;
   std::string request_;
   std::string last_reason_;
   Clock::time_point last_told_;
