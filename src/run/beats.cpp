@@ -1,6 +1,8 @@
 // All beats come from the last state that was published.
 #include "run/beats.h"
 
+#include <spdlog/spdlog.h>
+
 #include "engine/world_state.h"
 #include "ruedo/motion_status_t.hpp"
 #include "run/journal.h"
@@ -75,12 +77,17 @@ void HashBeat::end_step(const Step& step) {
 
 void WatchdogWarnings::end_step(const Step& step) {
   if (!beat_.due(step.step)) return;
-  const std::vector<RobotState>& robots = publisher_.latest()->robots;
-  told_.resize(robots.size(), false);
+  const IndexedVector<RobotIndex, RobotState>& robots = publisher_.latest()->robots;
   for (size_t i = 0; i < robots.size(); ++i) {
-    if (robots[i].motion.reason != motion_status_t::REASON_WATCHDOG || told_[i]) continue;
-    told_[i] = true;
-    tell_(i);
+    const RobotIndex index(i);
+    if (robots[index].motion.reason != motion_status_t::REASON_WATCHDOG) continue;
+    const world::ModelInstance& robot = robot_(index);
+    if (!told_.insert(robot.name).second) continue;
+    const double watchdog_s = static_cast<double>(robot.model->drive->watchdog_us) * 1e-6;
+    spdlog::warn(
+        "{0} was stopped by its watchdog: no command came for {1:g} s of sim time. Send velocity "
+        "and wheel commands at least every {1:g} s (shown once per robot)",
+        robot.name, watchdog_s);
   }
 }
 

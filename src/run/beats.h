@@ -7,6 +7,8 @@
 #include <chrono>
 #include <functional>
 #include <memory>
+#include <set>
+#include <string>
 #include <vector>
 
 #include "ruedo/state_hash_t.hpp"
@@ -118,13 +120,15 @@ class HashBeat : public Sink {
   Beat beat_;
 };
 
-// Says on the terminal, once a robot, that its watchdog stopped it.
+// Says on the terminal, once for each robot's name, that its watchdog stopped it. A robot that is
+// spawned may have the number of one that was removed.
 class WatchdogWarnings : public Sink {
  public:
-  // tell: about a robot, by its index in the layout.
-  WatchdogWarnings(const Publisher& publisher, int64_t step_us,
-                   std::function<void(size_t robot)> tell)
-      : publisher_(publisher), beat_(engine::kTickRate, step_us), tell_(std::move(tell)) {}
+  // By its number in the layout.
+  using Robot = std::function<const world::ModelInstance&(RobotIndex robot)>;
+
+  WatchdogWarnings(const Publisher& publisher, int64_t step_us, Robot robot)
+      : publisher_(publisher), beat_(engine::kTickRate, step_us), robot_(std::move(robot)) {}
 
   Hears hears() const override { return {.samples = false}; }
   void message(const Published&) override {}
@@ -133,8 +137,8 @@ class WatchdogWarnings : public Sink {
  private:
   const Publisher& publisher_;
   Beat beat_;
-  const std::function<void(size_t)> tell_;
-  std::vector<bool> told_;
+  const Robot robot_;
+  std::set<std::string> told_;
 };
 
 }  // namespace ruedo::run

@@ -54,7 +54,7 @@ Run::Run(std::shared_ptr<const world::WorldModel> world, RunOptions options, Bus
       bus_sink_(bus, !mode_->takes_grants()),
       beats_{.hashes = {publisher_, world_->step_us},
              .watchdogs = {publisher_, world_->step_us,
-                           [this](size_t robot) { tell_watchdog(robot); }},
+                           [this](RobotIndex robot) -> const auto& { return instance_of(robot); }},
              .ticks = {publisher_, run_id_, mode_->takes_grants() ? Rate{} : engine::kTickRate,
                        world_->step_us,
                        [this](TickWriter& tick, int64_t step) {
@@ -320,13 +320,8 @@ std::string Run::takes_no_messages() const {
                                : "the bus takes no messages";
 }
 
-void Run::tell_watchdog(size_t index) {
-  const world::ModelInstance& robot = world_->models[simulation_->layout().robots[index].instance];
-  spdlog::warn(
-      "{} was stopped by its watchdog: no command came for {:g} s of sim time. A velocity or wheel "
-      "command "
-      "wants repeating (this is said once)",
-      robot.name, static_cast<double>(robot.model->drive->watchdog_us) * 1e-6);
+const world::ModelInstance& Run::instance_of(RobotIndex robot) const {
+  return world_->models[simulation_->layout().robots[robot].instance];
 }
 
 // Clients may still fetch what they have lost.

@@ -162,7 +162,7 @@ class Run {
   std::string takes_no_messages() const;
   void finish();  // the run is over
   Status status() const;
-  void tell_watchdog(size_t robot);  // on the terminal
+  const world::ModelInstance& instance_of(RobotIndex robot) const;
 
   // The world and the mode in which it runs; in run_world.cpp.
   void make_world();  // again: what follows equals a fresh run

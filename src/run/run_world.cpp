@@ -99,9 +99,7 @@ void Run::announce() {
 
 Mode::Stage Run::stage() {
   return {&simulation_->inbox(), pacer_.get(), &channels_, publisher_.base_us(),
-          [this](RobotIndex robot) {
-            return world_->models[simulation_->layout().robots[robot].instance].name;
-          }};
+          [this](RobotIndex robot) { return instance_of(robot).name; }};
 }
 
 void Run::begin_repeat(std::unique_ptr<Repeating> repeating) {

@@ -1,5 +1,9 @@
 // Models that come and go while a world runs: spawn, remove, set pose and twist, over the bus.
 #include <cmath>
+#include <sstream>
+
+#include <spdlog/sinks/ostream_sink.h>
+#include <spdlog/spdlog.h>
 
 #include "control_client.h"
 #include "ruedo/fault_t.hpp"
@@ -96,6 +100,34 @@ TEST_F(EditsTest, ASpawnedRobotIsThereAndDrives) {
   EXPECT_EQ(scans[1].utime, 155'000);
   EXPECT_NEAR(on<odometry_t>("guest/odometry", from).back().x,
               on<pose_t>("guest/pose", from).back().pos[0] - 2.0, 1e-9);
+}
+
+// The next robot of the same model takes the removed one's place in all lists.
+TEST_F(EditsTest, EachSpawnedRobotIsToldOfItsWatchdog) {
+  std::ostringstream log;
+  const auto former = spdlog::default_logger();
+  spdlog::set_default_logger(std::make_shared<spdlog::logger>(
+      "test", std::make_shared<spdlog::sinks::ostream_sink_mt>(log)));
+  std::string sdf = robot_sdf("guest", 0, 0);
+  sdf.replace(sdf.find("<ruedo:watchdog>0"), 17, "<ruedo:watchdog>0.1");
+  begin(paused_server(), robot_sdf("r", 0, 0));
+  step(1);
+  for (const std::string name : {"first", "second", "second"}) {
+    ASSERT_EQ(spawn(as_file(sdf), 2, 1, name).code, reply_t::OK);
+    drive(name, 0.5);
+    step(100);
+    ASSERT_EQ(remove(name).code, reply_t::OK);
+  }
+  end();
+  spdlog::set_default_logger(former);
+  const auto told = [&](const std::string& name) {
+    const std::string text = log.str(), words = name + " was stopped by its watchdog";
+    size_t count = 0;
+    for (size_t at = text.find(words); at != text.npos; at = text.find(words, at + 1)) ++count;
+    return count;
+  };
+  EXPECT_EQ(told("first"), 1u) << log.str();
+  EXPECT_EQ(told("second"), 1u) << log.str();
 }
 
 TEST_F(EditsTest, RaysMeetWhatCameAndNotWhatWent) {
