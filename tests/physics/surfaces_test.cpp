@@ -181,5 +181,26 @@ TEST(Surfaces, ABounceHasTheFilesRestitution) {
   }
 }
 
+// Rows that can move nothing: bodies that a drive moves along the ground do not roll.
+TEST(Surfaces, BodiesThatOnlyTurnUprightMayResistRolling) {
+  const std::string surface =
+      "<friction><ode><mu>0.5</mu></ode><bullet><rolling_friction>0.01</rolling_friction></bullet>"
+      "<torsional><coefficient>0.5</coefficient><patch_radius>0.1</patch_radius></torsional>"
+      "</friction>";
+  std::string models = kPlane + thing("wall", "-0.2 0 0.1 0 0 0", kBox, 0);
+  for (int i = 0; i < 4; ++i) {
+    models += body("b" + std::to_string(i), std::to_string(0.2 * i) + " 0.02 0.1 0 0 0",
+                   shape("c", "0 0 0 0 0 0", kBox, surface));
+  }
+  World w(models, 5000);
+  for (const char* name : {"b0/l", "b1/l", "b2/l", "b3/l"})
+    w.physics.set_support(w.body(name), Support::plane);
+  for (int i = 0; i < 100; ++i) {
+    w.physics.apply_impulse(w.body("b3/l"), {-0.5, 0, 0}, Vec3::Zero());
+    w.physics.step();
+  }
+  EXPECT_NEAR(w.position("b3/l").x(), 0.6, 0.01);
+}
+
 }  // namespace
 }  // namespace ruedo::physics::testing

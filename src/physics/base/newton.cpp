@@ -173,10 +173,12 @@ size_t Newton::add(Row& row) {
 }
 
 void Newton::add(Row& row, size_t load, double lever) {
+  if (row.inverse == 0.0) return;
   enter(row, Kind::on_load, lever, row.response).load = load;
 }
 
 void Newton::add(Row& along, Row& across, double friction, double friction2, size_t load) {
+  if (along.inverse == 0.0 && across.inverse == 0.0) return;
   const double weight =
       std::max(friction * friction * along.response, friction2 * friction2 * across.response);
   enter(along, Kind::along, friction, weight / (friction * friction)).load = load;

@@ -28,7 +28,8 @@ class Newton {
   void begin() { entries_.clear(); }
   // Adds a row with fixed bounds. Returns its number.
   size_t add(Row& row);
-  // Adds a row bounded by multiples of the impulse of the row `load`.
+  // Adds a row bounded by multiples of the impulse of the row `load`. Here and below, rows that can
+  // move nothing are left out: their springs would be infinitely stiff.
   void add(Row& row, size_t load, double lever);
   // Adds friction along two rows: within an ellipse with these coefficients, not 0, times that
   // impulse.
