@@ -307,13 +307,14 @@ TEST_F(ControlTest, ControlOff) {
 // What comes faster than it is served.
 TEST(Control, FewRequestsWait) {
   size_t executed = 0;
+  std::vector<reply_t> replies;
   Control control(7, {.execute =
                           [&](const request_t&, const Session&) {
                             ++executed;
                             return engine::Outcome{};
                           },
                       .state = [] { return std::vector<uint8_t>(); },
-                      .publish = [](const reply_t&) {},
+                      .publish = [&](const reply_t& reply) { replies.push_back(reply); },
                       .utime = [] { return int64_t{0}; },
                       .epoch = [] { return 1; },
                       .state_comes = [] { return false; }});
@@ -331,10 +332,11 @@ TEST(Control, FewRequestsWait) {
   const size_t large = Control::kMaxRequestSize - 1000;
   EXPECT_EQ(served(large, 20), Control::kMostWaitingBytes / (large + 1000));
   EXPECT_EQ(served(0, 1), 1U);  // there is room again
-  asked.body.assign(Control::kMaxRequestSize, 0);
-  asked.size = static_cast<int32_t>(asked.body.size());
-  const std::vector<uint8_t> larger = engine::encoded(asked);
-  EXPECT_FALSE(control.receive(larger.data(), larger.size()));
+  EXPECT_TRUE(replies.empty());
+  EXPECT_EQ(served(Control::kMaxRequestSize, 1), 0U);
+  ASSERT_EQ(replies.size(), 1U);
+  EXPECT_EQ(replies[0].code, reply_t::BAD_REQUEST);
+  EXPECT_EQ(replies[0].text, "its body has 1048576 bytes: a request has 1048576 at most");
 }
 
 // Without a server: the world's first state is late, and requests wait for it in order.

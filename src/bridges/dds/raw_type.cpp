@@ -15,6 +15,7 @@
 #include <dds/ddsi/q_radmin.h>
 
 #include "bridges/dds/identity.h"
+#include "bridges/dds/incoming.h"
 
 namespace ruedo::dds {
 namespace {
@@ -82,7 +83,7 @@ uint32_t size_of(const ddsi_serdata* sample) {
 void free_sample(ddsi_serdata* sample) { delete static_cast<RawSample*>(sample); }
 
 bool is_too_large(ddsi_serdata_kind kind, size_t size) {
-  const bool too_large = size > kMostReceived || (kind == SDK_DATA && size < 4);
+  const bool too_large = size > kLargestIncoming || (kind == SDK_DATA && size < 4);
   if (too_large) ++refused;
   return too_large;
 }

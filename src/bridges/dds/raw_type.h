@@ -15,9 +15,8 @@
 
 namespace ruedo::dds {
 
-// Larger incoming samples are dropped and counted.
-inline constexpr size_t kMostReceived = size_t{1} << 20;
-// Likewise samples for which there is no room beside the waiting ones of their topic.
+// Incoming samples for which there is no room beside the waiting ones of their topic are dropped
+// and counted, as those that are too large (bridges/dds/incoming.h).
 inline constexpr size_t kMostWaiting = size_t{16} << 20;  // bytes
 inline constexpr size_t kMostOfWriter = 100;              // samples
 

@@ -21,9 +21,13 @@ std::string fit_text(const std::string& text) {
 
 bool Control::receive(const uint8_t* data, size_t size) {
   request_t request;
-  if (size > kMaxRequestSize || decode_checked(data, size, request) != DecodeFault::none) {
+  if (decode_checked(data, size, request) != DecodeFault::none) {
     ++refused_;
     return false;
+  }
+  if (size > kMaxRequestSize) {  // refused for its size, which stays to be told
+    request.body = {};
+    size = 0;
   }
   std::lock_guard lock(mutex_);
   if (inbox_.size() >= kMostWaiting || inbox_bytes_ + size > kMostWaitingBytes) return true;
@@ -63,6 +67,10 @@ void Control::serve(const request_t& request) {
   };
   if (request.run_id != 0 && request.run_id != run_id_)
     return answer_with(reply_t::WRONG_RUN, "this is another run of the server");
+  if (request.body.size() != static_cast<size_t>(request.size))
+    return answer_with(reply_t::BAD_REQUEST, "its body has " + std::to_string(request.size) +
+                                                 " bytes: a request has " +
+                                                 std::to_string(kMaxRequestSize) + " at most");
   if (request.kind == request_t::JOIN) return join(request, reply);
   if (request.kind == request_t::LEAVE) {  // may be repeated at will
     if (host_.left) host_.left(request.session);

@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 import math
 import random
+import re
 import time
 
 import pytest
@@ -239,6 +240,17 @@ def test_models_that_are_no_robots_come_and_go(client):
     assert spawn(True, 1.0) == (OK, "crate_2") and entities() == ["crate", "crate_2"]
     assert client.call("delete_entity", "crate").result.result == OK and entities() == ["crate_2"]
     assert spawn(False, 0.0) == (OK, "crate")
+
+
+def test_a_text_that_is_too_large_is_refused_by_its_size(client):
+    text = CRATE.replace("<link", f"<!--{'x' * 3_000_000}--><link")
+    reply = client.call("spawn_entity", "crate", False, "", text, "", at(0.0, 3.0, 1.0))
+    assert reply.result.result == FAILED
+    assert re.fullmatch(
+        "its body has 30[0-9]{5} bytes: a request has 1048576 at most", reply.result.error_message
+    )
+    spawned = client.call("spawn_entity", "crate", False, "", CRATE, "", at(0.0, 3.0, 1.0))
+    assert spawned.result.result == OK
 
 
 def test_models_that_are_spawned_at_once_have_names_of_their_own(client):
