@@ -216,9 +216,9 @@ def test_a_flood_of_calls_keeps_nobody_waiting(arguments):
             for client in (known, Client(run.domain)):
                 flood.goes_on()
                 for _ in range(5):
-                    reply = client.call("get_entity_state", "p3at", again=True)
+                    reply = client.call("get_entity_state", "p3at", again=30.0)
                     assert reply.result.result == 1
-                assert client.call("get_simulation_state", again=True).state == 1
+                assert client.call("get_simulation_state", again=30.0).state == 1
                 flood.goes_on()
         output = run.end()
     assert run.process.returncode == 0

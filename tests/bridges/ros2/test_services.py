@@ -59,36 +59,40 @@ class Client:
         self.sequence = itertools.count(1)
         self.ends = {}
 
-    def call(self, service: str, *arguments, again: bool = False):
-        """The reply. again: calls again every 30 s, for beside a flood more is not promised while
-        the run gets no processor. So does the first call of a service, which may come before the
-        run knows that client (docs/ros2.md, too).
+    def call(self, service: str, *arguments, again: float = math.inf):
+        """The reply. again: calls again after so many seconds, for beside a flood more is not
+        promised while the run gets no processor.
         """
-        question, answer = self.services[service]
+        question, _ = self.services[service]
         if service not in self.ends:
-            again = True
-            writer = self.peer.writer(f"/{service}Request", question, prefix="rq")
-            # Others' replies come here, too: 2000 a second, while this process waits for its turn.
-            reader = self.peer.reader(f"/{service}Reply", answer, prefix="rr", depth=100_000)
-            wait_for(
-                lambda: writer.get_matched_subscriptions() and reader.get_matched_publications(),
-                service,
-            )
-            self.ends[service] = writer, reader
+            self.open(service)
+            await_discovery(self.peer)
         writer, reader = self.ends[service]
         sequence = next(self.sequence)
         asked = -math.inf
 
         def mine():
             nonlocal asked
-            if asked == -math.inf or (again and time.monotonic() > asked + 30.0):
+            if time.monotonic() > asked + again or asked == -math.inf:
                 asked = time.monotonic()
                 writer.write(question(self.mark, sequence, *arguments))
             replies = [r for r in reader.take(N=1000) if hasattr(r, "__idl__")]
             return [r for r in replies if (r.client, r.sequence_number) == (self.mark, sequence)]
 
-        (reply,) = wait_for(mine, f"the reply of {service}")
+        reply, *more = wait_for(mine, f"the reply of {service}")
+        assert not more or again < math.inf
         return reply
+
+    def open(self, service: str) -> None:
+        question, answer = self.services[service]
+        writer = self.peer.writer(f"/{service}Request", question, prefix="rq")
+        # Others' replies come here, too: 2000 a second, while this process waits for its turn.
+        reader = self.peer.reader(f"/{service}Reply", answer, prefix="rr", depth=100_000)
+        wait_for(
+            lambda: writer.get_matched_subscriptions() and reader.get_matched_publications(),
+            service,
+        )
+        self.ends[service] = writer, reader
 
     def state(self) -> int:
         return self.call("get_simulation_state").state
@@ -96,9 +100,12 @@ class Client:
 
 def await_discovery(peer: Peer) -> None:
     """Until the run knows all readers and writers that the peer has so far; what these write before
-    that is lost. A participant tells of them in order, and here of those of a new client last.
+    that is lost (docs/ros2.md, too). A participant tells of them in order, and here of those of a
+    new client last, which asks until it is answered.
     """
-    Client(peer.domain, peer).state()
+    last = Client(peer.domain, peer)
+    last.open("get_simulation_state")
+    last.call("get_simulation_state", again=1.0)
 
 
 def at(x=0.0, y=0.0, z=0.0, frame="") -> PoseStamped:
