@@ -2,6 +2,7 @@
 #include "system/plugins.h"
 
 #include <algorithm>
+#include <array>
 #include <cfenv>
 #include <cstdio>
 #include <cstdlib>
@@ -16,6 +17,7 @@
 #include <dlfcn.h>
 #include <elf.h>
 #include <link.h>
+#include <sys/stat.h>
 
 #include "base/input_file.h"
 #include "base/sha256.h"
@@ -67,6 +69,14 @@ void check_whole(const std::string& bytes, const std::string& path) {
   }
   if (!whole)
     throw InputError({path}, "is a shared library whose end is missing, as in a broken off copy");
+}
+
+// Changes when another file comes to that path, and when other bytes come into the file.
+std::array<int64_t, 4> state_of(const std::string& path) {
+  struct stat file{};
+  ::stat(path.c_str(), &file);
+  return {static_cast<int64_t>(file.st_dev), static_cast<int64_t>(file.st_ino),
+          int64_t{file.st_ctim.tv_sec}, int64_t{file.st_ctim.tv_nsec}};
 }
 
 // What the plugin was built for, by its bytes.
@@ -206,11 +216,14 @@ Plugin load_plugin(const std::string& given) {
   for (const Plugin& plugin : plugins()) {
     if (plugin.path == path) return plugin;
   }
+  const auto as_read = state_of(path);
   const std::string bytes = read_input(path, kLargest);
   check_abi(built_for(bytes, path), path);
   Plugin plugin{fs::path(given).filename().string(), path,
                 sha256(reinterpret_cast<const uint8_t*>(bytes.data()), bytes.size())};
   const PluginEntry& entry = open(path);
+  if (state_of(path) != as_read)
+    throw InputError({path}, "was written anew while it was loaded: start again");
   check_new(entry, path);
   watch_plugin_calls();
   for (const SensorKind& kind : entry.sensors()) RegisterSensor{guarded(kind, plugin.name)};

@@ -18,8 +18,8 @@ struct Plugin {
 
 // Loads a plugin, and adds its kinds to sensor_kinds() and drive_kinds(); a file that is loaded
 // already changes nothing. Throws InputError that names the file: it cannot be read, is no shared
-// library, is no plugin, is one for another version, throws while it is loaded, or has a kind that
-// there is already.
+// library, is no plugin, is one for another version, throws or is written anew while it is loaded,
+// or has a kind that there is already.
 Plugin load_plugin(const std::string& path);
 
 // The plugin that a world names: one that is loaded, else the file of that name in a folder of

@@ -298,6 +298,12 @@ BAD = {
         ' [](const ruedo::DriveSetup&) -> std::unique_ptr<ruedo::DriveModel> { throw std::runtime_error("no wheels"); }}};\n',
         "no wheels",
     ),
+    "rebuilt.cpp": (
+        "#include <chrono>\n#include <filesystem>\n#include <dlfcn.h>\nstatic const bool kRebuilt = [] { Dl_info own{}; "
+        "dladdr(&kRebuilt, &own); std::filesystem::last_write_time(own.dli_fname, "
+        "std::filesystem::file_time_type::clock::now()); return true; }();\n",
+        "was written anew while it was loaded",
+    ),
     "step.cpp": (
         '#include <ruedo/drive.h>\nstruct Bad : ruedo::DriveModel { ruedo::BaseVelocity step(const ruedo::DriveInput&) override '
         '{ return {0.0 / 0.0, 0, 0}; } };\nstatic const ruedo::RegisterDrive kOne{{"lagging", [](const ruedo::DriveSetup&) '

@@ -43,10 +43,10 @@ void load_logged_plugin(const std::string& wanted, const std::string& log) {
                      "its run had the plugin " + name +
                          ", which is in no folder of RUEDO_PLUGIN_PATH; --plugin FILE gives it");
   }
-  if (sha256_of_file(file) != hash)
+  // What is loaded may have been so since before the file was written anew.
+  if (sha256_of_file(file) != hash || load_plugin(file).sha256 != hash)
     throw InputError(
         {log}, "its run had another " + name + " than " + file + " (its sha256 was " + hash + ")");
-  load_plugin(file);
 }
 
 void add_types_argument(CLI::App& command) {
