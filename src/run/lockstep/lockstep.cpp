@@ -16,7 +16,6 @@ namespace {
 constexpr auto kLastWords =
     std::chrono::seconds(1);  // for clients to ask again for lost messages after the end
 
-// Reads what decides whether a grant is early, without decoding all of it.
 bool read_grant(const request_t& request, grant_request_t& grant) {
   return decode_checked(request.body.data(), request.body.size(), grant) == DecodeFault::none;
 }
