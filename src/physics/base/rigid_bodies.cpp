@@ -70,17 +70,6 @@ const world::RobotPlacement* robot_of(const world::BodyLayout& layout, InstanceI
   return robot != layout.robots.end() && robot->instance == instance ? &*robot : nullptr;
 }
 
-// The wheel that this body is, with a wheels drive.
-WheelIndex driven_wheel(const world::BodyLayout& layout, BodyIndex index) {
-  const world::RobotPlacement* robot = robot_of(layout, layout.bodies[index].instance);
-  if (!robot || robot->body == index) return {};
-  for (const WheelIndex wheel : robot->wheels) {
-    const world::WheelPlacement& placement = layout.wheels[wheel];
-    if (!placement.steers && layout.links[placement.link].body == index) return wheel;
-  }
-  return {};
-}
-
 double mass_on_each_wheel(const world::Model& model, const world::RobotPlacement& robot) {
   double mass = 0.0;
   for (const auto& link : model.links) mass += link.inertial.mass;
@@ -148,6 +137,16 @@ bool is_belt(const world::Model& model, ModelLinkIndex link) {
 }
 
 }  // namespace
+
+WheelIndex driven_wheel(const world::BodyLayout& layout, BodyIndex index) {
+  const world::RobotPlacement* robot = robot_of(layout, layout.bodies[index].instance);
+  if (!robot || robot->body == index) return {};
+  for (const WheelIndex wheel : robot->wheels) {
+    const world::WheelPlacement& placement = layout.wheels[wheel];
+    if (!placement.steers && layout.links[placement.link].body == index) return wheel;
+  }
+  return {};
+}
 
 const ObjectInfo::Shape& shape_of(const ObjectInfo& info, int child) {
   static const ObjectInfo::Shape kNone;

@@ -38,6 +38,9 @@ inline const ObjectInfo& info_of(const btCollisionObject& object) {
 // none.
 const ObjectInfo::Shape& shape_of(const ObjectInfo& info, int child);
 
+// The wheel that this body is, with a wheels drive: it rolls on a tyre. None for other bodies.
+WheelIndex driven_wheel(const world::BodyLayout& layout, BodyIndex body);
+
 // A moving body. Bullet's frame I has its origin at the centre of mass, along the principal axes of
 // inertia.
 struct RigidBody {

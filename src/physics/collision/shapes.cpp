@@ -82,18 +82,19 @@ double volume_of(const btConvexHullComputer& hull) {
   return std::abs(six_volumes) / 6.0;
 }
 
-// The vertices of the convex hull of `points`; if there are too many, only the extreme ones in
-// evenly distributed directions.
-std::unique_ptr<btConvexHullShape> hull_of(const std::vector<btVector3>& points, double& volume) {
+// The vertices of the convex hull of `points`; if there are too many and it need not be exact, only
+// the extreme ones in evenly distributed directions.
+std::unique_ptr<btConvexHullShape> hull_of(const std::vector<btVector3>& points, bool exact,
+                                           double& volume) {
   btConvexHullComputer computer;
   computer.compute(&points[0].m_floats[0], sizeof(btVector3), static_cast<int>(points.size()), 0,
                    0);
   volume += volume_of(computer);
   auto shape = std::make_unique<SeenAhead<btConvexHullShape>>();
   const int corners = computer.vertices.size();
-  std::vector<bool> keep(static_cast<size_t>(corners),
-                         corners <= static_cast<int>(kMaxHullVertices));
-  if (corners > static_cast<int>(kMaxHullVertices)) {
+  const bool all = exact || corners <= static_cast<int>(kMaxHullVertices);
+  std::vector<bool> keep(static_cast<size_t>(corners), all);
+  if (!all) {
     for (size_t i = 0; i < kMaxHullVertices; ++i) {  // a Fibonacci sphere
       const double z = 1.0 - (2.0 * static_cast<double>(i) + 1.0) / kMaxHullVertices;
       const double angle = 2.399963229728653 * static_cast<double>(i), r = std::sqrt(1.0 - z * z);
@@ -106,7 +107,9 @@ std::unique_ptr<btConvexHullShape> hull_of(const std::vector<btVector3>& points,
     }
   }
   for (int v = 0; v < corners; ++v) {
-    if (keep[v]) shape->addPoint(computer.vertices[v], false);
+    if (keep[v])
+      shape->addPoint(exact ? points[computer.original_vertex_index[v]] : computer.vertices[v],
+                      false);
   }
   shape->setMargin(0.0);
   shape->recalcLocalAabb();
@@ -140,7 +143,7 @@ struct ShapeFactory::Triangles {
   }
 };
 
-ShapeFactory::ShapeFactory() = default;
+ShapeFactory::ShapeFactory(Hulls hulls) : hulls_(hulls) {}
 ShapeFactory::~ShapeFactory() = default;
 
 btCollisionShape* ShapeFactory::primitive(const world::Geometry& geometry) {
@@ -219,7 +222,8 @@ bool ShapeFactory::moving(const world::Geometry& geometry, std::vector<btCollisi
       of_part.insert(of_part.end(), {a, b, c});
     }
     for (const auto& of_part : points) {
-      if (!of_part.empty()) pieces.hulls.push_back(own(hull_of(of_part, hull_volume)));
+      if (!of_part.empty())
+        pieces.hulls.push_back(own(hull_of(of_part, hulls_ == Hulls::exact, hull_volume)));
     }
     pieces.exact = mesh.closed && hull_volume - std::abs(mesh_volume) <= kConcavity * hull_volume;
   }

@@ -16,7 +16,10 @@ namespace ruedo::physics {
 // its shapes.
 class ShapeFactory {
  public:
-  ShapeFactory();
+  // colliding: hulls have a bounded number of vertices, which are moved by up to 1e-4 of their
+  // size. exact: they are the mesh's own.
+  enum class Hulls { colliding, exact };
+  explicit ShapeFactory(Hulls hulls = Hulls::colliding);
   ~ShapeFactory();
 
   // For a static body. Null for a mesh without triangles. Planes pass through the origin.
@@ -47,6 +50,7 @@ class ShapeFactory {
     return raw;
   }
 
+  const Hulls hulls_;
   std::vector<std::unique_ptr<Triangles>> triangles_;
   std::vector<std::unique_ptr<btCollisionShape>> shapes_;
   std::map<MeshKey, btCollisionShape*> fixed_meshes_;
