@@ -115,3 +115,36 @@ def test_a_rule_for_no_channel_is_pointed_out(folder):
 def test_nothing_left_to_compare_is_no_pass(folder, pattern):
     done = regress("--ignore", pattern)
     assert done.returncode == 2 and "--ignore leaves nothing to compare" in done.stderr, done
+
+
+TABLE = """<model name='table'><static>true</static><pose>{x} 0 0.24 0 0 0</pose><link name='top'>
+<collision name='c'><geometry><box><size>1 1 0.08</size></box></geometry></collision></link></model>"""
+FRONT = 0.257  # m: the deck of the robot; it is 0.221 to 0.278 m high
+
+
+@pytest.mark.parametrize(
+    ("gap", "asked", "told"),
+    [
+        (0.017, "0.1", "p3at/base_link was 0.017 m from table/top at (0.274, "),
+        (0.017, "0.016", None),
+        (0.017, "0", None),
+        (-0.001, "0", "p3at/base_link was 0.000 m from table/top at (0.25"),
+    ],
+)
+def test_clearance_is_exact(tmp_path, monkeypatch, gap, asked, told):
+    """Regression: horizontal rays at five heights passed above and below a table top, and a
+    clearance of 0 was not measured.
+    """
+    monkeypatch.chdir(tmp_path)
+    table = TABLE.format(x=FRONT + gap + 0.5)
+    (tmp_path / "w.sdf").write_text(WORLD.replace("</world>", table + "</world>"))
+    options = [*RUN, "run.lcm", "--clearance", asked, "--json", "verdict.json"]
+    done = program("regress", "w.sdf", *options)
+    if told is None:
+        assert done.returncode == 0, done
+    else:
+        assert done.returncode == 1 and told in done.stderr, done
+        assert f"at least {asked} m are asked for" in done.stderr
+    metrics = json.loads((tmp_path / "verdict.json").read_text())["metrics"]
+    if asked == "0.1":
+        assert metrics["clearance_m"] == pytest.approx(gap, abs=1e-5)

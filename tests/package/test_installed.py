@@ -179,7 +179,7 @@ def test_another_way_is_the_first_difference(prefix, tmp_path):
         (
             ["--clearance", "0.6"],
             1,
-            r"s: p3at was 0\.5\d\d m from (left|right)_post/link, at least 0\.6 m",
+            r"s: p3at/\w+ was 0\.5\d\d m from (left|right)_post/link at \(.+\), at least 0\.6 m",
         ),
         (["--odometry-error", "0.0000001"], 1, r"s: p3at's odometry was 0\.0\d\d m off"),
         (["--script", "test -s $RUEDO_LOG && exit 7"], 1, r"the script ended with exit code 7"),

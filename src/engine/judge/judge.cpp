@@ -1,4 +1,4 @@
-// Goals, contacts and requests; clearance is in judge_hull.cpp, odometry in odometry_check.cpp.
+// Goals, contacts, clearance and requests; odometry is in odometry_check.cpp.
 #include "engine/judge/judge.h"
 
 #include <algorithm>
@@ -9,7 +9,7 @@
 
 #include "base/channel_names.h"
 #include "base/whole.h"
-#include "engine/judge/judge_hull.h"
+#include "physics/collision/distances.h"
 #include "ruedo/decode.h"
 #include "ruedo/errors.h"
 #include "ruedo/math.h"
@@ -75,10 +75,10 @@ Judge::~Judge() = default;
 
 void Judge::see_world(std::shared_ptr<const world::WorldModel> world,
                       const world::BodyLayout& layout) {
+  distances_.reset();
   world_ = std::move(world);
   layout_.emplace(layout);
   robot_ = {};
-  hull_.reset();
   for (const RobotIndex i : layout_->robots.indices()) {
     const world::ModelInstance& instance = world_->models[layout_->robots[i].instance];
     if (!instance.removed && instance.name == expected_.robot) robot_ = i;
@@ -88,8 +88,8 @@ void Judge::see_world(std::shared_ptr<const world::WorldModel> world,
   own_.resize(layout_->links.size());
   for (const LinkIndex i : layout_->links.indices())
     own_[i] = layout_->links[i].instance == instance;
-  if (expected_.clearance_reach > 0.0)
-    hull_ = std::make_unique<JudgeHull>(*world_, *layout_, robot_);
+  if (expected_.clearance || expected_.clearance_reach > 0.0)
+    distances_ = std::make_unique<physics::Distances>(*world_, *layout_, instance);
 }
 
 void Judge::fail(const std::string& what, SimTime time, const std::string& text) {
@@ -119,7 +119,7 @@ void Judge::see(const Snapshot& snapshot) {
   odometry_.see_truth(snapshot.time, robot.X_WBase, robot.odometry_resets);
   see_goals(snapshot.time, position);
   see_contacts(snapshot);
-  if (hull_) see_clearance(snapshot);
+  if (distances_) see_clearance(snapshot);
 }
 
 void Judge::see_goals(SimTime time, const Vec3& position) {
@@ -133,12 +133,17 @@ void Judge::see_goals(SimTime time, const Vec3& position) {
 }
 
 void Judge::see_clearance(const Snapshot& snapshot) {
-  const JudgeHull::Nearest nearest = hull_->nearest(snapshot, expected_.clearance_reach);
-  smallest_clearance_m_ = std::min(smallest_clearance_m_, nearest.range);
-  if (!expected_.clearance || nearest.range >= *expected_.clearance) return;
+  const physics::Distances::Nearest nearest =
+      distances_->nearest(snapshot, expected_.clearance_reach);
+  smallest_clearance_m_ = std::min(smallest_clearance_m_, nearest.distance);
+  if (!expected_.clearance || (nearest.distance >= *expected_.clearance && nearest.distance > 0.0))
+    return;
+  const Vec3& at = nearest.other_point;
   fail("clearance", snapshot.time,
-       fmt::format("{} was {:.3f} m from {}, at least {:g} m are asked for", expected_.robot,
-                   nearest.range, name_of(nearest.link), *expected_.clearance));
+       fmt::format(
+           "{} was {:.3f} m from {} at ({:.3f}, {:.3f}, {:.3f}), at least {:g} m are asked for",
+           name_of(nearest.own), nearest.distance, name_of(nearest.other), at.x(), at.y(), at.z(),
+           *expected_.clearance));
 }
 
 void Judge::see_contacts(const Snapshot& snapshot) {

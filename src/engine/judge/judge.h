@@ -19,9 +19,11 @@
 #include "ruedo/snapshot.h"
 #include "world/model/body_layout.h"
 
-namespace ruedo::judge {
+namespace ruedo::physics {
+class Distances;
+}
 
-class JudgeHull;
+namespace ruedo::judge {
 
 struct Goal {
   double x = 0.0, y = 0.0, radius = 0.0;  // m, world: base_link within this circle
@@ -32,8 +34,9 @@ Goal parse_goal(const std::string& text);  // X,Y,RADIUS,BY; throws InputError
 struct Expectations {
   std::string robot;  // its name; "": the first of the world
   std::vector<Goal> goals;
-  bool no_contact = false;               // with anything but what its wheels stand on
-  std::optional<double> clearance;       // m, at least, from the robot's hull to everything else
+  bool no_contact = false;  // with anything but what its wheels stand on
+  // m, at least, from the robot's collision shapes to all that does not carry it; a touch fails
+  std::optional<double> clearance;
   std::optional<double> odometry_error;  // m, at most, between odometry and truth
   double clearance_reach =
       0.0;  // m: clearances below this are measured, whether or not one is asked for
@@ -82,7 +85,7 @@ class Judge {
   std::optional<world::BodyLayout> layout_;
   RobotIndex robot_;  // none: it is not in the world now
   IndexedVector<LinkIndex, bool> own_;
-  std::unique_ptr<JudgeHull> hull_;
+  std::unique_ptr<physics::Distances> distances_;  // none: clearance is not measured
   int64_t steps_ = 0, judged_ = 0;  // of the run, and those with the robot in the world
   std::vector<std::optional<SimTime>> reached_;
   double last_goal_distance_m_ = std::numeric_limits<double>::infinity();
