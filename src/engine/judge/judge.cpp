@@ -217,7 +217,7 @@ Verdict Judge::verdict() const {
   if (expected_.clearance) {
     const bool none = !(smallest_clearance_m_ < expected_.clearance_reach);
     add_kept(verdict, "clearance",
-             fmt::format("clearance {}{:.2f} m", none ? "of at least " : "",
+             fmt::format("clearance {}{:.3f} m", none ? "of at least " : "",
                          std::min(smallest_clearance_m_, expected_.clearance_reach)));
   }
   if (expected_.odometry_error) add_odometry(verdict);
