@@ -3,6 +3,7 @@ anywhere: program, server, engine, picture, what C++ and Java need. In bare Debi
 packaging/try_in_debian.sh."""
 
 import os
+import re
 import sys
 import sysconfig
 import zipfile
@@ -146,3 +147,23 @@ def test_it_brings_the_cpp_package_and_the_jar(venv):
     assert (prefix / "include/ruedo/client.h").is_file()
     with zipfile.ZipFile(run(venv / "bin/ruedo", "--jar").strip()) as jar:
         assert "Automatic-Module-Name: ruedo" in jar.read("META-INF/MANIFEST.MF").decode()
+
+
+def test_pytest_and_cmake_find_what_regressions_need(venv, tmp_path):
+    """The fixture by the wheel's metadata; RUEDO_PYTHON_DIR was a folder that is not there."""
+    (tmp_path / "test_it.py").write_text(
+        "def test_it(ruedo_regression):\n"
+        "    assert ruedo_regression('arena', duration=0.1).log.exists()\n"
+    )
+    pytest_of_the_wheel = [venv / "bin/python", "-m", "pytest", "-q", "-p", "no:cacheprovider"]
+    assert "1 passed" in run(*pytest_of_the_wheel, tmp_path)
+    (tmp_path / "CMakeLists.txt").write_text(
+        "cmake_minimum_required(VERSION 3.22)\nproject(x NONE)\n"
+        "find_package(ruedo REQUIRED COMPONENTS regression)\nenable_testing()\n"
+        'ruedo_add_regression(NAME python WORLD arena DURATION 1 CLIENT python3 -c "import ruedo")\n'
+    )
+    prefix = run(venv / "bin/ruedo", "--prefix").strip()
+    run("cmake", "-S", tmp_path, "-B", tmp_path / "b", f"-DCMAKE_PREFIX_PATH={prefix}")
+    properties = (tmp_path / "b/CTestTestfile.cmake").read_text()
+    folder = re.search(r"PYTHONPATH=path_list_prepend:([^\"]+)", properties).group(1)
+    assert (Path(folder) / "ruedo/regression.py").is_file()
