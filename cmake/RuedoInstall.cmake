@@ -47,9 +47,10 @@ string(REGEX REPLACE "[^/]+" ".." up ${CMAKE_INSTALL_LIBDIR}/pkgconfig)
 configure_file(cmake/ruedo.pc.in ${PROJECT_BINARY_DIR}/cmake/ruedo.pc @ONLY)
 install(FILES ${PROJECT_BINARY_DIR}/cmake/ruedo.pc DESTINATION ${CMAKE_INSTALL_LIBDIR}/pkgconfig)
 
-# The Python client with its pytest fixture, to put on PYTHONPATH; the metadata let pytest find the fixture there.
+# The Python client with its pytest fixture, to put on PYTHONPATH.
 set(python lib/ruedo/python)
-install(DIRECTORY ${PROJECT_BINARY_DIR}/python/ruedo DESTINATION ${python} PATTERN __pycache__ EXCLUDE PATTERN "_engine*" EXCLUDE)
+install(DIRECTORY ${PROJECT_BINARY_DIR}/python/ruedo ${PROJECT_BINARY_DIR}/python/ruedo-${PROJECT_VERSION}.dist-info DESTINATION ${python}
+  PATTERN __pycache__ EXCLUDE PATTERN "_engine*" EXCLUDE)
 if(TARGET ruedo_python_engine)
   set_target_properties(ruedo_python_engine PROPERTIES INSTALL_RPATH "\$ORIGIN/../../../../${CMAKE_INSTALL_LIBDIR}/ruedo")
   install(TARGETS ruedo_python_engine LIBRARY DESTINATION ${python}/ruedo)
@@ -58,10 +59,6 @@ if(TARGET ruedo_python_engine_stable)
   set_target_properties(ruedo_python_engine_stable PROPERTIES INSTALL_RPATH "\$ORIGIN/../../../../${CMAKE_INSTALL_LIBDIR}/ruedo")
   install(TARGETS ruedo_python_engine_stable LIBRARY DESTINATION ${python}/ruedo)
 endif()
-set(metadata ${PROJECT_BINARY_DIR}/cmake/ruedo-${PROJECT_VERSION}.dist-info)
-file(WRITE ${metadata}/METADATA "Metadata-Version: 2.1\nName: ruedo\nVersion: ${PROJECT_VERSION}\nRequires-Dist: lcm==1.5.3\nRequires-Dist: numpy\n")
-file(WRITE ${metadata}/entry_points.txt "[pytest11]\nruedo = ruedo.regression\n")
-install(DIRECTORY ${metadata} DESTINATION ${python})
 
 # The licences of everything that is installed.
 set(copyright ${PROJECT_BINARY_DIR}/licences/copyright)
