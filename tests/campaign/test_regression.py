@@ -5,11 +5,17 @@ import math
 import os
 import re
 import signal
+import subprocess
+import sys
 
 import pytest
 from ruedo.regression import RegressionFailed, ruedo_regression, run_regression
 
 __all__ = ["ruedo_regression"]  # a fixture, for pytest to find
+
+WORLD = (
+    "<sdf version='1.9'><world name='w'><include><uri>model://p3at</uri></include></world></sdf>"
+)
 
 WRONG = [  # what is given, what the error says
     ({"ignore": "*/camera"}, r"ignore is a list of texts, not one: ignore=\['\*/camera'\]"),
@@ -18,6 +24,7 @@ WRONG = [  # what is given, what the error says
     ({"options": "--no-contact"}, "options is a list of texts, not one"),
     ({"wait_for": "a@1"}, "wait_for is a list of texts, not one"),
     ({"goal": (0.0, 0.0, 9.0), "radius": 1, "by": 1}, "goal is 2 numbers, not 3"),
+    ({"goal": 5, "radius": 1, "by": 1}, "goal is 2 numbers, not 5"),
     ({"goal": (0.0,), "radius": 1, "by": 1}, "goal is 2 numbers, not 1"),
     ({"goal": (0.0, float("nan")), "radius": 1, "by": 1}, "goal is nan: it must be a finite"),
     ({"goal": (0.0, 0.0), "radius": "1,1", "by": 1}, "radius is a number, not '1,1'"),
@@ -27,7 +34,7 @@ WRONG = [  # what is given, what the error says
     ({"by": 3.0}, "radius and by belong to a goal"),
     ({"no_contact": "no"}, "no_contact is True or False, not 'no'"),
     ({"robot": ""}, "an empty text is no robot"),
-    ({"keep": [""]}, "an empty text is no keep"),
+    ({"keep": [""], "golden": "g"}, "an empty text is no keep"),
     ({"keep": ["\0"]}, "keep is .*, which holds the character 0"),
     ({"client": []}, r"client is \[\], which names no program"),
     ({"client": ""}, "client is '', which names no program"),
@@ -47,9 +54,57 @@ WRONG = [  # what is given, what the error says
     ({"record": 5}, "record is a text or a path, not 5"),
     ({"folder": 5}, "folder is a text or a path, not 5"),
     ({"options": ["\0"]}, "options is .*, which holds the character 0"),
+    ({"client": ["", "x"]}, r"client is \['', 'x'\], which names no program"),
+    ({"client": [" "]}, r"client is \[' '\], which names no program"),
+    ({"client": ["sh", "-c", "a\nb"]}, "client is .*, which holds the control character 0x0a"),
+    ({"keep": ["a\tb"], "golden": "g"}, "keep is .*, which holds the control character 0x09"),
+    ({"goal": (True, 0.0), "radius": 1, "by": 1}, "goal is a number, not True"),
+    ({"goal": (0.0, 0.0), "radius": True, "by": 1}, "radius is a number, not True"),
+    ({"goal": (0.0, 0.0), "radius": 0, "by": 1}, "radius is 0.0: it must be above 0"),
+    ({"goal": (0.0, 0.0), "radius": 1, "by": -1}, "by is -1.0: it must be above 0"),
+    ({"duration": True}, "duration is a number, not True"),
+    ({"duration": "5"}, "duration is a number, not '5'"),
+    ({"duration": float("inf")}, "duration is inf: it must be a finite number"),
+    ({"duration": 0}, "duration is 0.0: it must be above 0"),
+    ({"seed": True}, "seed is a whole number, not True"),
+    ({"seed": 1.5}, "seed is a whole number, not 1.5"),
+    ({"seed": -1}, "seed is -1; allowed are 0 to 18446744073709551615"),
+    ({"lockstep": True}, "lockstep is a whole number, not True"),
+    ({"lockstep": 65}, "lockstep is 65; allowed are 0 to 64"),
+    ({"clearance": True}, "clearance is a number, not True"),
+    ({"clearance": -0.1}, "clearance is -0.1: it must be a finite number, 0 or more"),
+    ({"odometry_error": "1"}, "odometry_error is a number, not '1'"),
+    ({"timeout": True}, "timeout is a number, not True"),
+    ({"robot": 5}, "robot is a text, not 5"),
+    ({"keep": ["a"]}, "keep needs a golden log"),
+    ({"tolerances": ["a:b=abs:1"]}, "tolerances needs a golden log"),
+    ({"ignore": ["a"]}, "ignore needs a golden log"),
+    ({"options": [""]}, "an empty text is no option"),
+    ({"options": ["--help"]}, "options has --help, which prints something in place of a run"),
+    ({"options": ["--no-noise", "-h"]}, "options has -h, which prints something"),
+    ({"options": ["--version"]}, "options has --version, which prints something"),
+    ({"options": ["--record", "x.lcm"]}, "options has --record, which the argument record sets"),
+    ({"options": ["--odometry-error=1"]}, "--odometry-error, which the argument odometry_error"),
+    ({"options": ["--no-contact"]}, "options has --no-contact, which the argument no_contact sets"),
+    ({"options": ["--renew"]}, "options has --renew, with which every run passes"),
     ({"world": 5}, "world is a text or a path, not 5"),
     ({"world": "\0"}, "world is .*, which holds the character 0"),
 ]
+
+
+@pytest.fixture
+def pytest_on():
+    """Runs a test file by a pytest of its own, from another folder; what it says."""
+
+    def run(file, text):
+        file.write_text(text)
+        command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", file]
+        environment = {**os.environ, "RUEDO_RENEW": "1"}
+        return subprocess.run(
+            command, cwd="/", env=environment, capture_output=True, text=True, timeout=100
+        ).stdout
+
+    return run
 
 
 def plain(given):
@@ -61,9 +116,9 @@ def test_a_wrong_argument_is_told(tmp_path, given, text):
     """Regression: a text counted as its letters, of which `*` ignored everything, and what was
     expected without a goal was left out.
     """
-    rest = {"world": "arena", "record": tmp_path / "run.lcm", "folder": tmp_path, **given}
+    rest = {"world": "arena", "duration": 1, "record": tmp_path / "run.lcm", "folder": tmp_path}
     with pytest.raises((TypeError, ValueError), match=text) as caught:
-        run_regression(duration=1, **rest)
+        run_regression(**{**rest, **given})
     assert "\n" not in str(caught.value) and not os.listdir(tmp_path)
 
 
@@ -77,16 +132,55 @@ def test_a_worlds_name_may_begin_as_an_option_does(tmp_path):
     """Regression: `--help` was an option, and the help a run that had passed."""
     with pytest.raises(RegressionFailed, match="--help: no such file"):
         run_regression("--help", duration=1, record=tmp_path / "run.lcm")
-    world = "<sdf version='1.9'><world name='w'><include><uri>model://p3at</uri></include>"
-    (tmp_path / "-w.sdf").write_text(f"{world}</world></sdf>")
+    (tmp_path / "-w.sdf").write_text(WORLD)
     run = run_regression("-w.sdf", duration=0.1, record=tmp_path / "run.lcm", folder=tmp_path)
     assert run.log.exists() and "passed" in run.output
 
 
-@pytest.mark.parametrize("options", [["--help"], ["-h"]], ids=" ".join)
-def test_where_nothing_ran_nothing_passed(tmp_path, options):
+def test_a_misspelt_argument_is_told_with_those_that_there_are(ruedo_regression):
+    with pytest.raises(TypeError, match="no argument 'tolerance': there are client, duration, "):
+        ruedo_regression("arena", duration=1, golden="g.lcm", tolerance=["a:b=abs:1"])
+
+
+@pytest.mark.parametrize("renew", ["false", "no", "yes", " "])
+def test_a_golden_log_is_written_anew_for_1_alone(tmp_path, monkeypatch, renew):
+    """Regression: RUEDO_RENEW=false wrote it."""
+    golden = tmp_path / "g.lcm"
+    monkeypatch.setenv("RUEDO_RENEW", renew)
+    with pytest.raises(ValueError, match=f"RUEDO_RENEW is '{renew}' in the environment: 1 writes"):
+        run_regression("arena", duration=1, golden=golden, record=tmp_path / "run.lcm")
+    assert not os.listdir(tmp_path)
+
+
+def test_where_nothing_ran_nothing_passed(tmp_path, monkeypatch):
+    """As by another program than ruedo."""
+    monkeypatch.setenv("RUEDO", "/bin/true")
     with pytest.raises(RegressionFailed, match="there was no run"):
-        run_regression("arena", duration=1, record=tmp_path / "run.lcm", options=options)
+        run_regression("arena", duration=1, record=tmp_path / "run.lcm")
+
+
+def test_each_run_of_a_test_has_a_log_of_its_own(ruedo_regression, tmp_path):
+    """Regression: the second wrote over the first, which its result still named."""
+    (tmp_path / "w.sdf").write_text(WORLD)
+    runs = [ruedo_regression(tmp_path / "w.sdf", duration=0.1, seed=n) for n in (1, 2)]
+    assert runs[0].log != runs[1].log and runs[0].log.read_bytes() != runs[1].log.read_bytes()
+    with pytest.raises(ValueError, match="record is .*, the log of an earlier run of this test"):
+        ruedo_regression(tmp_path / "w.sdf", duration=0.1, record=runs[0].log)
+
+
+def test_paths_are_relative_to_the_tests_file(pytest_on, tmp_path):
+    """All of them, wherever pytest is started."""
+    (tmp_path / "sub/logs").mkdir(parents=True)
+    (tmp_path / "sub/w.sdf").write_text(WORLD)
+    said = pytest_on(
+        tmp_path / "sub/test_it.py",
+        "def test_it(ruedo_regression):\n"
+        "    ruedo_regression('w.sdf', duration=0.1, record='logs/a.lcm', folder='logs',\n"
+        "                     golden='g.lcm', script='touch here')\n",
+    )
+    assert "1 passed" in said, said
+    for name in ("logs/a.lcm", "logs/here", "g.lcm"):
+        assert (tmp_path / "sub" / name).exists()
 
 
 def test_an_option_without_its_value_is_named(tmp_path):
@@ -97,9 +191,7 @@ def test_an_option_without_its_value_is_named(tmp_path):
 def test_words_are_no_shells(tmp_path):
     """Also empty ones, and names of files that are no UTF-8."""
     (tmp_path / "caf\udce9").write_text("no UTF-8")
-    (tmp_path / "w.sdf").write_text(
-        "<sdf version='1.9'><world name='w'><include><uri>model://p3at</uri></include></world></sdf>"
-    )
+    (tmp_path / "w.sdf").write_text(WORLD)
     words = ["sh", "-c", 'test -z "$1" && test -f "$2"', "sh", "", tmp_path / "caf\udce9"]
     record = tmp_path / "run.lcm"
     run_regression(tmp_path / "w.sdf", duration=0.1, script=words, record=record, timeout=math.inf)

@@ -12,7 +12,9 @@ RUEDO_RENEW=1 in the environment writes the golden logs anew.
 
 from __future__ import annotations
 
+import inspect
 import os
+import re
 import shlex
 import subprocess
 import sys
@@ -22,16 +24,36 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
-from .arguments import finite, number, numbers, path, shown, switch, texts, word
+from .arguments import (
+    MOST_SEED,
+    finite,
+    number,
+    numbers,
+    path,
+    shown,
+    switch,
+    text,
+    texts,
+    whole,
+    word,
+)
 from .errors import RuedoError
 from .launch import find_ruedo
 
 _PARTING_S = 10.0  # that a run has to end its client
 _LONGEST_S = 1e6  # the system cannot wait for ever at once
+# What `ruedo regress` takes once, and arguments set.
+_SINGLE = {
+    *("client", "duration", "seed", "record", "robot", "no_contact", "clearance"),
+    *("odometry_error", "golden", "lockstep", "script"),
+}
 _PASSED = "\nThe run is in "  # what `ruedo regress` prints in the end
 _PathLike = str | os.PathLike[str]
+_MOST_CLIENTS = 64  # in lockstep
+_CONTROL = re.compile(r"[\x01-\x1f\x7f-\x9f]")  # what no option of `ruedo` may hold
 
 
 class RegressionFailed(RuedoError, AssertionError):
@@ -47,10 +69,40 @@ class Regression:
 
 
 def _option(name: str, *values: object) -> list[str]:
-    given = [word(name, str(value)) for value in values if value is not None]
-    if "" in given:  # the next option would count as its value
+    return [f"--{name}={_held(name, value)}" for value in values if value is not None]
+
+
+def _held(name: str, value: object) -> str:
+    given = word(name, str(value))
+    if not given:  # the next option would count as its value
         raise ValueError(f"an empty text is no {name}")
-    return [f"--{name}={value}" for value in given]
+    if odd := _CONTROL.search(given):
+        raise ValueError(
+            f"{name} is {shown(given)}, which holds the control character {ord(odd[0]):#04x}"
+        )
+    return given
+
+
+def _countable(what: str, value: Any, kind: str = "number") -> Any:
+    """No truth value, which Python takes for 0 or 1."""
+    if isinstance(value, (bool, np.bool_)):
+        raise TypeError(f"{what} is a {kind}, not {value}")
+    return value
+
+
+def _whole(what: str, value: Any, high: int) -> int:
+    return whole(what, _countable(what, value, "whole number"), 0, high)
+
+
+def _above_0(what: str, value: Any) -> float:
+    given = finite(what, _countable(what, value))
+    if not given > 0.0:
+        raise ValueError(f"{what} is {given}: it must be above 0")
+    return given
+
+
+def _distance(what: str, value: Any) -> float | None:
+    return None if value is None else finite(what, _countable(what, value), 0.0)
 
 
 def _line(what: str, words: Sequence[_PathLike] | str | None) -> str | None:
@@ -58,12 +110,14 @@ def _line(what: str, words: Sequence[_PathLike] | str | None) -> str | None:
     if words is None:
         return None
     if isinstance(words, str):
+        given = [words]
         line = words
     elif isinstance(words, Iterable) and not isinstance(words, (bytes, Mapping)):
-        line = shlex.join(word(f"a word of {what}", one) for one in words)
+        given = [word(f"a word of {what}", one) for one in words]
+        line = shlex.join(given)
     else:
         raise TypeError(f"{what} is a list of words or a line for a shell, not {shown(words)}")
-    if not line.strip():
+    if not given or not given[0].strip():
         raise ValueError(f"{what} is {shown(words)}, which names no program")
     return line
 
@@ -75,12 +129,50 @@ def _goal(goal: tuple[float, float] | None, radius: float | None, by: float | No
         return []
     if radius is None or by is None:
         raise ValueError("a goal needs its radius (m) and by (s)")
+    for one in goal if isinstance(goal, (tuple, list)) else ():
+        _countable("goal", one)
     x, y = (finite("goal", one) for one in numbers("goal", goal, 2))
-    return [f"--goal={x!r},{y!r},{finite('radius', radius)!r},{finite('by', by)!r}"]
+    return [f"--goal={x!r},{y!r},{_above_0('radius', radius)!r},{_above_0('by', by)!r}"]
+
+
+def _golden(golden: _PathLike | None, **rules: Sequence[str]) -> list[str]:
+    """The golden log, and how it is compared: {option of `ruedo regress`: values}."""
+    given = {name: texts(name, values) for name, values in rules.items()}
+    if golden is None:
+        for name in (name for name, values in given.items() if values):
+            raise ValueError(f"{name} needs a golden log")
+        return []
+    renew = os.environ.get("RUEDO_RENEW", "")
+    if renew not in ("", "0", "1"):
+        raise ValueError(
+            f"RUEDO_RENEW is {renew!r} in the environment: 1 writes golden logs anew, 0 does not"
+        )
+    return [
+        *_option("golden", os.path.abspath(path("golden", golden))),
+        *(
+            option
+            for name, values in given.items()
+            for option in _option("tolerance" if name == "tolerances" else name, *values)
+        ),
+    ]
+
+
+def _options(options: Sequence[str]) -> list[str]:
+    """Others than those that arguments set, and than those with which nothing is judged."""
+    given = [_held("option", one) for one in texts("options", options)]
+    for name in (one.partition("=")[0] for one in given):
+        if name in ("--help", "-h", "--version"):
+            raise ValueError(f"options has {name}, which prints something in place of a run")
+        if name == "--renew":
+            raise ValueError("options has --renew, with which every run passes: set RUEDO_RENEW=1")
+        argument = name.removeprefix("--").replace("-", "_")
+        if name.startswith("--") and argument in _SINGLE:
+            raise ValueError(f"options has {name}, which the argument {argument} sets")
+    return given
 
 
 def _patience(timeout: float) -> float:
-    seconds = number("timeout", timeout)
+    seconds = number("timeout", _countable("timeout", timeout))
     if not seconds > 0.0:
         raise ValueError(f"timeout is {seconds}: it must be above 0 s")
     return min(seconds, _LONGEST_S)
@@ -162,23 +254,21 @@ def run_regression(
     command = [
         find_ruedo(),
         "regress",
-        *_option("seed", seed),
+        *_option("seed", _whole("seed", seed, MOST_SEED)),
         *_option("record", record),
         *_goal(goal, radius, by),
         *_option("client", _line("client", client)),
         *_option("script", _line("script", script)),
-        *_option("robot", robot),
-        *_option("clearance", clearance),
-        *_option("odometry-error", odometry_error),
-        *_option("lockstep", lockstep or None),
-        *_option("golden", None if golden is None else os.path.abspath(path("golden", golden))),
-        *_option("keep", *texts("keep", keep)),
-        *_option("tolerance", *texts("tolerances", tolerances)),
-        *_option("ignore", *texts("ignore", ignore)),
+        *_option("robot", None if robot is None else text("robot", robot)),
+        *_option("clearance", _distance("clearance", clearance)),
+        *_option("odometry-error", _distance("odometry_error", odometry_error)),
+        *_option("lockstep", _whole("lockstep", lockstep, _MOST_CLIENTS) or None),
+        *_golden(golden, keep=keep, tolerances=tolerances, ignore=ignore),
         *_option("wait-for", *texts("wait_for", wait_for)),
         *(["--no-contact"] if switch("no_contact", no_contact) else ()),
-        *(word("options", one) for one in texts("options", options)),
-        *_option("duration", duration),  # no value of the last of the options, as "--" would be
+        *_options(options),
+        # After the options: else "--" would be the value of the last one.
+        *_option("duration", _above_0("duration", duration)),
         "--",  # a world's name may begin as an option does
         path("world", world),
     ]
@@ -186,20 +276,31 @@ def run_regression(
     return Regression(Path(record), _output_of(command, folder, timeout))
 
 
+_ARGUMENTS = [name for name in inspect.signature(run_regression).parameters if name != "world"]
+
+
 @pytest.fixture
 def ruedo_regression(request: pytest.FixtureRequest, tmp_path: Path) -> Callable[..., Regression]:
-    """run_regression() with the log in the test's temporary folder; world and golden are relative
+    """run_regression() with a log for each run in the test's temporary folder. Paths are relative
     to the test's file, and client and script run beside it."""
     here = request.path.parent
+    logs: list[Path] = []
 
     def run(world: _PathLike, **options: Any) -> Regression:
         __tracebackhide__ = True  # a failure shows the test's own line
-        options.setdefault("record", tmp_path / "run.lcm")
-        options.setdefault("folder", here)
-        if options.get("golden") is not None:
-            options["golden"] = here / path("golden", options["golden"])
+        for name in options:
+            if name not in _ARGUMENTS:
+                raise TypeError(f"no argument {name!r}: there are {', '.join(_ARGUMENTS)}")
+        name = f"run-{len(logs) + 1}.lcm" if logs else "run.lcm"
+        given = {"record": tmp_path / name, "folder": here, **options}
+        for name in ("record", "folder", "golden"):
+            if given.get(name) is not None:
+                given[name] = here / path(name, given[name])
+        if given["record"] in logs:
+            raise ValueError(f"record is {given['record']}, the log of an earlier run of this test")
+        logs.append(given["record"])
         beside = here / path("world", world)
-        result = run_regression(beside if beside.exists() else world, **options)
+        result = run_regression(beside if beside.exists() else world, **given)
         print(result.output, file=sys.stderr)
         return result
 
