@@ -15,9 +15,9 @@ endforeach()
 list(TRANSFORM headers PREPEND ${CMAKE_CURRENT_SOURCE_DIR}/)
 set(RUEDO_PLUGIN_ABI ${CMAKE_CURRENT_BINARY_DIR}/plugin/ruedo/plugin_abi.h)
 add_custom_command(OUTPUT ${RUEDO_PLUGIN_ABI}
-  COMMAND ${CMAKE_COMMAND} -DVERSION=${PROJECT_VERSION} "-DHEADERS=${headers}" -DIN=${CMAKE_CURRENT_SOURCE_DIR}/cmake/plugin_abi.h.in -DOUT=${RUEDO_PLUGIN_ABI}
-          -P ${CMAKE_CURRENT_SOURCE_DIR}/cmake/PluginAbi.cmake
-  DEPENDS ${headers} cmake/plugin_abi.h.in cmake/PluginAbi.cmake VERBATIM)
+  COMMAND ${CMAKE_COMMAND} -DVERSION=${PROJECT_VERSION} "-DFILES=${headers}" -DIN=${CMAKE_CURRENT_SOURCE_DIR}/cmake/plugin_abi.h.in -DOUT=${RUEDO_PLUGIN_ABI}
+          -P ${CMAKE_CURRENT_SOURCE_DIR}/cmake/HashOfFiles.cmake
+  DEPENDS ${headers} cmake/plugin_abi.h.in cmake/HashOfFiles.cmake VERBATIM)
 target_sources(ruedo_system PRIVATE ${RUEDO_PLUGIN_ABI})
 set_source_files_properties(src/system/plugins.cpp PROPERTIES INCLUDE_DIRECTORIES ${CMAKE_CURRENT_BINARY_DIR}/plugin)
 target_link_libraries(ruedo_system PUBLIC ${CMAKE_DL_LIBS})

@@ -87,6 +87,14 @@ std::string build_id() {
   return id;
 }
 
+constexpr const char* kBuild = ", build ";
+
+// Programs of one build have different ones. An older log names nothing but a build.
+std::string without_build(const std::string& version) {
+  const size_t at = version.find(kBuild);
+  return at == std::string::npos ? version : version.substr(0, at) + ")";
+}
+
 }  // namespace
 
 std::string cpu_features() {
@@ -112,7 +120,8 @@ std::string cpu_features() {
 
 std::string own_version() {
   const std::string id = build_id();
-  return version() + (id.empty() ? "" : " (build " + id + ")");
+  return std::string(version()) + " (source " + own_sources() + (id.empty() ? "" : kBuild + id) +
+         ")";
 }
 
 std::string libc_version() { return std::string("glibc ") + gnu_get_libc_version(); }
@@ -302,7 +311,7 @@ std::vector<std::string> machine_differences(const log_header_t& log, const log_
     if (then != now)
       lines.push_back(std::string(what) + ": the log has " + then + ", here it is " + now);
   };
-  compare("Ruedo", log.version, here.version);
+  compare("Ruedo", without_build(log.version), without_build(here.version));
   const auto architecture = [](const std::string& cpu) { return cpu.substr(0, cpu.find(' ')); };
   compare("processor", architecture(log.cpu), architecture(here.cpu));
   // What is computed is the same on all of them, and with every C library; pictures are, unless

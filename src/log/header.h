@@ -17,7 +17,11 @@ inline const std::string kHeaderChannel = "ruedo/header", kAppliedChannel = "rue
 // The processor's family, then the vector extensions of this CPU that libraries choose code by:
 // "x86-64 sse4.2 avx".
 std::string cpu_features();
-// Ruedo's version, and the build of this program where the linker noted one: as a header has it.
+// A hash of the sources that a run's bytes come from, and the compiler: the same in all programs
+// of a build.
+std::string own_sources();
+// Ruedo's version with its sources, and the build of this program where the linker noted one: as a
+// header has it.
 std::string own_version();
 std::string libc_version();
 // Those shared libraries of this process that compute what goes into messages, by file name with
@@ -55,8 +59,8 @@ void check_files(const log_header_t& header, const std::string& log);
 // The same for the models that came later in the log.
 void check_files_of_spawned(const std::string& log);
 
-// What else determines a run's bytes and differs here, a line each: Ruedo's version and build, the
-// CPU, the C library, other libraries.
+// What else determines a run's bytes and differs here, a line each: Ruedo's version and sources,
+// the CPU, the C library, other libraries.
 std::vector<std::string> machine_differences(const log_header_t& log, const log_header_t& here);
 
 // Throws InputError when a run with the header `here` is another one than the log's: other files,

@@ -263,7 +263,9 @@ def test_a_kept_log_repeats_byte_for_byte(whole):
     assert len(logs) == 2  # of what failed
     for log in logs:
         assert log.stat().st_size < 20000
-        assert "repeated byte for byte" in ruedo("verify", log, folder=folder).stdout
+        said = ruedo("verify", log, folder=folder).stdout
+        assert "repeated byte for byte" in said
+        assert "not as in the log" not in said, "one release, though another program"
 
 
 def test_show_and_repeat(whole):

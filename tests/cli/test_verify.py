@@ -4,6 +4,7 @@ damaged, cut off or no logs.
 
 import os
 import random
+import re
 import shutil
 import signal
 import struct
@@ -262,6 +263,30 @@ def test_a_full_disk(tmp_path):
     assert result.returncode == 0 and "verified up to there" in result.stdout, (
         result.stdout + result.stderr
     )
+
+
+def test_another_build_of_the_same_sources_is_no_excuse(tmp_path):
+    """The linker gives each program of a build another id."""
+    found = record(tmp_path / "a.lcm", seconds=1)
+    header = log_header_t.decode(found[0][2])
+    release, source, build = re.fullmatch(
+        r"(\S+) \(source (\w+), .*, build (\w+)\)", header.version
+    ).groups()
+
+    def verified(version):
+        header.version = version
+        found[0] = (*found[0][:2], header.encode())
+        write(tmp_path / "other.lcm", found)
+        return program("verify", tmp_path / "other.lcm")
+
+    own = header.version
+    assert "not as in the log" not in verified(own.replace(build, "beef")).stdout
+    for other in own.replace(source, "beef"), f"{release} (build {build})":
+        result = verified(other)
+        assert result.returncode == 0, result
+        assert result.stdout.startswith(f"not as in the log: Ruedo: the log has {release} ("), (
+            result
+        )
 
 
 def test_what_is_no_recording(tmp_path):

@@ -23,7 +23,7 @@ namespace {
 // What the bytes of a state hold for, beside the seed: this build on such a machine, with this
 // world and these options. "" for a program without a build's id.
 std::string made_for(const log_header_t& header) {
-  if (header.version.find("(build ") == std::string::npos) return "";
+  if (header.version.find(", build ") == std::string::npos) return "";
   std::string all = header.version + '\n' + header.cpu + '\n' + header.libc + '\n' +
                     std::to_string(header.step_us);
   for (const std::string& library : header.libraries) all += '\n' + library;
