@@ -6,6 +6,8 @@
 #include <filesystem>
 #include <map>
 
+#include <fmt/format.h>
+#include <fmt/ranges.h>
 #include <pthread.h>
 
 #include "base/json.h"
@@ -270,8 +272,9 @@ void Comparison::write_report() {
   json.open('{').name("comparison").open('{').member("other", printable(name_));
   std::string fault;
   try {
-    const log::Diff diff = log::diff_logs(path_, log_, {}, [this] { return !ending_; });
+    const log::Diff diff = log::diff_logs(path_, log_, {}, true, [this] { return !ending_; });
     if (ending_) return;
+    fault = fmt::format("{}", fmt::join(diff.faults, "; "));
     json.member("same", diff.same());
     if (const auto first = first_of(diff)) {
       json.name("first")

@@ -1,10 +1,9 @@
-// The comparison itself; the reports are in diff_report.cpp.
+// The comparison itself; the rules are in diff_rule.cpp, the reports in diff_report.cpp.
 #include "log/diff.h"
 
 #include <fnmatch.h>
 
 #include <algorithm>
-#include <charconv>
 #include <cmath>
 #include <set>
 
@@ -13,25 +12,14 @@
 
 #include "log/header.h"
 #include "log/reader.h"
+#include "ruedo/decode.h"
 #include "ruedo/errors.h"
-#include "ruedo/pose.h"
-#include "ruedo/schema.h"
+#include "ruedo/state_hash_t.hpp"
 
 namespace ruedo::log {
 namespace {
 
 constexpr size_t kMaxSamples = 1000;  // for a plot
-
-double parse_tolerance(std::string_view text, std::string_view whole) {
-  double value = 0.0;
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-  if (error != std::errc() || end != text.data() + text.size() || !(value >= 0.0) ||
-      !std::isfinite(value)) {
-    throw InputError({}, "tolerance \"" + std::string(whole) + "\": \"" + std::string(text) +
-                             "\" is not a number of at least 0");
-  }
-  return value;
-}
 
 bool fits(const std::string& pattern, const std::string& name) {
   return fnmatch(pattern.c_str(), name.c_str(), 0) == 0;
@@ -48,35 +36,85 @@ void collect_patterns(const Schema& schema, const std::string& prefix,
   }
 }
 
-// A scalar of a message, taken out of it.
+std::vector<std::string> patterns_of(const std::set<std::string>& types) {
+  std::vector<std::string> patterns;
+  for (const std::string& type : types) {
+    if (const Schema* schema = find_schema(type))
+      collect_patterns(*schema, "", patterns);
+    else
+      patterns.emplace_back("(bytes)");
+  }
+  return patterns;
+}
+
+// A scalar of a message. It points into that.
 struct Value {
-  std::string path, pattern, text;
-  double number = 0.0;
-  bool is_number = false;
+  std::string path, pattern;
+  std::optional<FieldValue> value;  // none: absent
+
+  std::string text() const { return value ? to_string(*value) : "(absent)"; }
 };
 
 std::vector<Value> values_of(const Schema& schema, const std::vector<uint8_t>& message) {
   std::vector<Value> values;
   visit_message(schema, message, [&](const FieldPath& path, const FieldValue& value) {
-    Value v{path.str(), path.pattern(), to_string(value), 0.0, true};
-    if (const auto* integer = std::get_if<int64_t>(&value))
-      v.number = static_cast<double>(*integer);
-    else if (const auto* number = std::get_if<double>(&value))
-      v.number = *number;
-    else
-      v.is_number = false;
-    values.push_back(std::move(v));
+    values.push_back({path.str(), path.pattern(), value});
     return true;
   });
   return values;
 }
 
+using Events = std::map<std::string, std::vector<Event>>;  // of one time, by channel
+
 class Comparison {
  public:
   Comparison(Diff& diff, const std::vector<DiffRule>& rules) : diff_(diff), rules_(rules) {}
 
-  // Every channel of the logs, also one that is ignored, with its messages of one time.
-  void meet(const std::string& channel, const std::vector<Event>& events) {
+  // What two logs have at one time. may_lack, may_add: what only the golden log, or only the other
+  // has is passed over.
+  void meet(const Events& golden, const Events& other, bool may_lack, bool may_add) {
+    for (const auto& [channel, events] : golden) {
+      note_types(channel, events);
+      const auto found = other.find(channel);
+      const size_t in_both =
+          found == other.end() ? 0 : std::min(events.size(), found->second.size());
+      for (size_t i = 0; i < events.size() && !ignored(channel); ++i) {
+        if (i < in_both)
+          both(events[i], found->second[i]);
+        else if (!may_lack)
+          only(events[i], true);
+      }
+    }
+    for (const auto& [channel, events] : other) {
+      note_types(channel, events);
+      const auto found = golden.find(channel);
+      for (size_t i = found == golden.end() ? 0 : found->second.size();
+           i < events.size() && !may_add && !ignored(channel); ++i)
+        only(events[i], false);
+    }
+  }
+
+  // Throws InputError when nothing was left to compare.
+  void end() {
+    if (!met_.empty() && std::none_of(met_.begin(), met_.end(), [this](const auto& met) {
+          return is_judged(met.first, met.second);
+        }))
+      throw InputError({},
+                       "--ignore leaves nothing to compare: it fits every channel of both logs, or "
+                       "all that they hold");
+    if (diff_.channels.empty())
+      diff_.faults.emplace_back("nothing was compared: there is no message to compare");
+    for (const DiffRule& rule : rules_) {
+      const std::string idle = idleness(rule);
+      if (!idle.empty())
+        diff_.idle_rules.push_back((rule.ignore ? "--ignore " : "--tolerance ") + rule.channel +
+                                   idle);
+    }
+  }
+
+ private:
+  // Every channel of the logs, also one that is ignored.
+  void note_types(const std::string& channel, const std::vector<Event>& events) {
     std::set<std::string>& types = met_[channel];
     for (const Event& event : events) {
       const Schema* schema = find_schema(fingerprint_of(event.data));
@@ -92,16 +130,15 @@ class Comparison {
     if (schema != nullptr) channel.type = schema->name;
     if (schema == nullptr || !well_formed(*schema, golden.data) ||
         !well_formed(*schema, other.data)) {
-      differ(channel, golden.timestamp_us,
-             {"(bytes)", "(bytes)", std::to_string(golden.data.size()) + " bytes", 0, false},
-             {"", "", std::to_string(other.data.size()) + " bytes", 0, false});
+      note(channel, golden.timestamp_us, {"(bytes)", "(bytes)", {}},
+           std::to_string(golden.data.size()) + " bytes",
+           std::to_string(other.data.size()) + " bytes");
       return;
     }
     fields(channel, golden, values_of(*schema, golden.data), values_of(*schema, other.data));
   }
 
   void only(const Event& event, bool in_golden) {
-    if (const DiffRule* rule = rule_of(event.channel, ""); rule != nullptr && rule->ignore) return;
     ChannelDifference& channel = diff_.channels[event.channel];
     int64_t& count = in_golden ? channel.missing : channel.extra;
     if (count++ == 0)
@@ -113,20 +150,17 @@ class Comparison {
     return rule != nullptr && rule->ignore;
   }
 
-  // Throws InputError when nothing was left to compare.
-  void end() {
-    if (diff_.channels.empty() && !met_.empty())
-      throw InputError({},
-                       "--ignore leaves nothing to compare: it fits every channel of both logs");
-    for (const DiffRule& rule : rules_) {
-      const std::string idle = idleness(rule);
-      if (!idle.empty())
-        diff_.idle_rules.push_back((rule.ignore ? "--ignore " : "--tolerance ") + rule.channel +
-                                   idle);
-    }
+  // Whether the rules leave anything of a channel's messages.
+  bool is_judged(const std::string& channel, const std::set<std::string>& types) const {
+    const std::vector<std::string> patterns = patterns_of(types);
+    return !ignored(channel) &&
+           (patterns.empty() ||  // of types without a field: there are messages, or there are none
+            std::any_of(patterns.begin(), patterns.end(), [&](const std::string& pattern) {
+              const DiffRule* rule = rule_of(channel, pattern);
+              return rule == nullptr || !rule->ignore;
+            }));
   }
 
- private:
   // Why a rule fits nothing in either log; "" when it does.
   std::string idleness(const DiffRule& rule) const {
     if (fits(rule.channel, std::string(kHeaderChannel))) return "";
@@ -135,13 +169,7 @@ class Comparison {
       if (fits(rule.channel, channel)) types.insert(each.begin(), each.end());
     }
     if (types.empty()) return ": neither log has such a channel";
-    std::vector<std::string> patterns;
-    for (const std::string& type : types) {
-      if (const Schema* schema = find_schema(type))
-        collect_patterns(*schema, "", patterns);
-      else
-        patterns.emplace_back("(bytes)");
-    }
+    const std::vector<std::string> patterns = patterns_of(types);
     if (std::any_of(patterns.begin(), patterns.end(),
                     [&](const std::string& pattern) { return fits(rule.field, pattern); }))
       return "";
@@ -160,17 +188,10 @@ class Comparison {
   }
 
   bool good(const std::string& channel, const Value& golden, const Value& other) const {
-    if (golden.text == other.text) return true;
+    const bool both = golden.value && other.value;
+    if (both && passes(*golden.value, *other.value, nullptr)) return true;
     const DiffRule* rule = rule_of(channel, golden.pattern);
-    if (rule == nullptr) return false;
-    if (rule->ignore) return true;
-    if (!golden.is_number || !other.is_number) return false;
-    const double difference = other.number - golden.number;
-    if (rule->angle >= 0.0 && std::isfinite(difference) &&
-        std::abs(wrap_angle(difference)) <= rule->angle)
-      return true;
-    return std::abs(difference) <=
-           std::max(rule->absolute, rule->relative * std::abs(golden.number));
+    return rule && (rule->ignore || (both && passes(*golden.value, *other.value, rule)));
   }
 
   // Arrays of other lengths shift what follows, so values are matched by their paths, which come in
@@ -181,7 +202,7 @@ class Comparison {
     for (const Value& value : other) by_path.emplace(value.path, &value);
     for (const Value& value : golden) {
       const auto match = by_path.find(value.path);
-      const Value absent{value.path, value.pattern, "(absent)", 0.0, false};
+      const Value absent{value.path, value.pattern, {}};
       const Value& counterpart = match == by_path.end() ? absent : *match->second;
       if (match != by_path.end()) by_path.erase(match);
       if (!good(event.channel, value, counterpart))
@@ -189,25 +210,32 @@ class Comparison {
     }
     for (const Value& value : other) {
       if (!by_path.contains(value.path)) continue;
-      const Value absent{value.path, value.pattern, "(absent)", 0.0, false};
+      const Value absent{value.path, value.pattern, {}};
       if (!good(event.channel, absent, value)) differ(channel, event.timestamp_us, absent, value);
     }
   }
 
-  static void differ(ChannelDifference& channel, SimTime time, const Value& golden,
-                     const Value& other) {
-    FieldDifference& field = channel.fields[golden.pattern];
+  static FieldDifference& note(ChannelDifference& channel, SimTime time, const Value& place,
+                               const std::string& golden, const std::string& other) {
+    FieldDifference& field = channel.fields[place.pattern];
     if (field.count++ == 0) {
       field.first_time = time;
-      field.first_path = golden.path;
-      field.first_golden = golden.text;
-      field.first_other = other.text;
+      field.first_path = place.path;
+      field.first_golden = golden;
+      field.first_other = other;
     }
-    if (!golden.is_number || !other.is_number) return;
-    field.worst = std::max(field.worst, std::abs(other.number - golden.number));
-    if (golden.path == field.first_path && field.samples.size() < kMaxSamples) {
-      field.samples.push_back({time, golden.number, other.number});
-    }
+    return field;
+  }
+
+  static void differ(ChannelDifference& channel, SimTime time, const Value& golden,
+                     const Value& other) {
+    FieldDifference& field = note(channel, time, golden, golden.text(), other.text());
+    const auto then = golden.value ? number_of(*golden.value) : std::nullopt;
+    const auto now = other.value ? number_of(*other.value) : std::nullopt;
+    if (!then || !now) return;
+    field.worst = std::max(field.worst, static_cast<double>(std::abs(*now - *then)));
+    if (golden.path == field.first_path && field.samples.size() < kMaxSamples)
+      field.samples.push_back({time, static_cast<double>(*then), static_cast<double>(*now)});
   }
 
   Diff& diff_;
@@ -215,137 +243,79 @@ class Comparison {
   std::map<std::string, std::set<std::string>> met_;  // with the types of its messages; "": unknown
 };
 
-// Hands out the events of one timestamp after the other.
+// Hands out the events of one timestamp after the other, without the header.
 class Stamps {
  public:
-  explicit Stamps(const std::string& path) : reader_(path) { more_ = reader_.next(event_); }
+  explicit Stamps(const std::string& path) : reader_(path) { advance(); }
 
   bool more() const { return more_; }
   SimTime time() const { return event_.timestamp_us; }
-  const std::string& fault() const { return reader_.fault(); }
+  const std::vector<uint8_t>& header() const { return header_; }
 
-  // The events of time(), by channel, each channel's in their order.
-  std::map<std::string, std::vector<Event>> take() {
-    std::map<std::string, std::vector<Event>> events;
-    for (const SimTime now = time(); more_ && time() == now; more_ = reader_.next(event_))
-      events[event_.channel].push_back(event_);
+  // Why the log breaks off, once there is no more; "" when it is whole. A run's log has the run's
+  // end in it.
+  std::string fault() const {
+    if (more_ || !reader_.fault().empty()) return reader_.fault();
+    return open_ ? "cut off: the end of the run is not in it" : "";
+  }
+
+  Events take() {
+    Events events;
+    for (const SimTime now = time(); more_ && time() == now; advance()) {
+      if (event_.channel == kHeaderChannel)
+        header_ = event_.data;
+      else
+        events[event_.channel].push_back(event_);
+    }
     return events;
   }
 
  private:
+  void advance() {
+    state_hash_t hash;
+    more_ = reader_.next(event_);
+    if (more_ && event_.channel == kStateHashChannel &&
+        decode_checked(event_.data.data(), event_.data.size(), hash) == DecodeFault::none)
+      open_ = !hash.last;
+  }
+
   Reader reader_;
   Event event_;
-  bool more_;
+  bool more_ = false, open_ = false;
+  std::vector<uint8_t> header_;
 };
-
-// Of the fields that "CHANNEL" or "CHANNEL:FIELD" names.
-DiffRule rule_for(std::string_view place) {
-  DiffRule rule;
-  const size_t colon = place.find(':');
-  rule.channel = place.substr(0, colon);
-  if (colon != std::string_view::npos) rule.field = place.substr(colon + 1);
-  if (rule.channel.empty() || rule.field.empty())
-    throw InputError({}, "\"" + std::string(place) + "\" does not name CHANNEL or CHANNEL:FIELD");
-  return rule;
-}
 
 }  // namespace
 
-DiffRule DiffRule::ignoring(std::string_view text) {
-  DiffRule rule = rule_for(text);
-  rule.ignore = true;
-  return rule;
-}
-
-DiffRule DiffRule::tolerance(std::string_view text) {
-  const size_t equals = text.find('=');
-  DiffRule rule = rule_for(text.substr(0, equals));
-  if (equals == std::string_view::npos) {
-    throw InputError({}, "tolerance \"" + std::string(text) +
-                             "\" is not of the form CHANNEL:FIELD=abs:1e-3,rel:0.01,angle:0.02");
-  }
-  std::string_view rest = text.substr(equals + 1);
-  while (!rest.empty()) {
-    const std::string_view part = rest.substr(0, rest.find(','));
-    rest.remove_prefix(std::min(rest.size(), part.size() + 1));
-    const size_t separator = part.find(':');
-    const std::string_view kind =
-        separator == std::string_view::npos ? "abs" : part.substr(0, separator);
-    const double value = parse_tolerance(
-        separator == std::string_view::npos ? part : part.substr(separator + 1), text);
-    if (kind == "abs")
-      rule.absolute = value;
-    else if (kind == "rel")
-      rule.relative = value;
-    else if (kind == "angle")
-      rule.angle = value;
-    else
-      throw InputError({}, "tolerance \"" + std::string(text) + "\": \"" + std::string(kind) +
-                               "\" is none of abs, rel, angle");
-  }
-  return rule;
-}
-
-std::vector<DiffRule> DiffRule::all(const std::vector<std::string>& tolerances,
-                                    const std::vector<std::string>& ignored) {
-  std::vector<DiffRule> rules;
-  for (const std::string& text : tolerances) rules.push_back(tolerance(text));
-  for (const std::string& text : ignored) rules.push_back(ignoring(text));
-  return rules;
-}
-
 bool Diff::same() const {
-  return std::all_of(channels.begin(), channels.end(),
-                     [](const auto& channel) { return channel.second.same(); });
+  return faults.empty() && std::all_of(channels.begin(), channels.end(),
+                                       [](const auto& channel) { return channel.second.same(); });
 }
 
 Diff diff_logs(const std::string& golden_path, const std::string& other_path,
-               const std::vector<DiffRule>& rules, const std::function<bool()>& goes_on) {
+               const std::vector<DiffRule>& rules, bool partial,
+               const std::function<bool()>& goes_on) {
   Diff diff;
   Comparison comparison(diff, rules);
   Stamps golden(golden_path), other(other_path);
-  std::vector<uint8_t> golden_header, other_header;
+  bool at_cut = false;
 
-  while ((golden.more() || other.more()) && (!goes_on || goes_on())) {
+  while ((golden.more() || other.more()) && !at_cut && (!goes_on || goes_on())) {
     const bool take_golden = golden.more() && (!other.more() || golden.time() <= other.time());
     const bool take_other = other.more() && (!golden.more() || other.time() <= golden.time());
-    auto golden_events = take_golden ? golden.take() : decltype(golden.take()){};
-    auto other_events = take_other ? other.take() : decltype(other.take()){};
-    if (const auto at = golden_events.find(std::string(kHeaderChannel));
-        at != golden_events.end()) {
-      golden_header = at->second.front().data;
-      golden_events.erase(at);
-    }
-    if (const auto at = other_events.find(std::string(kHeaderChannel)); at != other_events.end()) {
-      other_header = at->second.front().data;
-      other_events.erase(at);
-    }
-    for (const auto& [channel, events] : golden_events) {
-      comparison.meet(channel, events);
-      if (comparison.ignored(channel)) continue;
-      const std::vector<Event>& counterparts = other_events[channel];
-      for (size_t i = 0; i < events.size(); ++i) {
-        if (i < counterparts.size())
-          comparison.both(events[i], counterparts[i]);
-        else
-          comparison.only(events[i], true);
-      }
-    }
-    for (const auto& [channel, events] : other_events) {
-      comparison.meet(channel, events);
-      const auto counterparts = golden_events.find(channel);
-      for (size_t i = counterparts == golden_events.end() ? 0 : counterparts->second.size();
-           i < events.size(); ++i) {
-        comparison.only(events[i], false);
-      }
-    }
+    const Events golden_events = take_golden ? golden.take() : Events{};
+    const Events other_events = take_other ? other.take() : Events{};
+    const bool golden_ends = partial && !golden.fault().empty();
+    const bool other_ends = partial && !other.fault().empty();
+    comparison.meet(golden_events, other_events, other_ends, golden_ends);
+    at_cut = golden_ends || other_ends;
   }
   comparison.end();
-  if (diff.channels.empty() && golden_header.empty() && other_header.empty())
-    diff.notes.push_back("both logs are without any message: nothing was compared");
-  if (!golden.fault().empty()) diff.notes.push_back(golden_path + ": " + golden.fault());
-  if (!other.fault().empty()) diff.notes.push_back(other_path + ": " + other.fault());
-  if (golden_header != other_header) {
+  std::vector<std::string>& cuts = partial ? diff.notes : diff.faults;
+  if (!golden.fault().empty()) cuts.push_back(golden_path + ": " + golden.fault());
+  if (!other.fault().empty() && golden_path != other_path)
+    cuts.push_back(other_path + ": " + other.fault());
+  if (golden.header() != other.header()) {
     diff.notes.push_back(
         "the headers differ: another machine, version, world file or option (ruedo/header is not "
         "compared)");

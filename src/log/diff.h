@@ -6,10 +6,12 @@
 
 #include <functional>
 #include <map>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
 
+#include "ruedo/schema.h"
 #include "ruedo/sim_time.h"
 
 namespace ruedo::log {
@@ -32,6 +34,12 @@ struct DiffRule {
   static std::vector<DiffRule> all(const std::vector<std::string>& tolerances,
                                    const std::vector<std::string>& ignored);
 };
+
+// Whether a value may stand where the golden log has its own. rule: null where none fits.
+bool passes(const FieldValue& golden, const FieldValue& other, const DiffRule* rule);
+
+// A number, integers exactly; none of text, bytes and booleans.
+std::optional<long double> number_of(const FieldValue& value);
 
 struct FieldDifference {
   struct Sample {
@@ -58,17 +66,22 @@ struct ChannelDifference {
 
 struct Diff {
   std::map<std::string, ChannelDifference> channels;
-  std::vector<std::string> notes;  // cut-off logs, other machines
+  // Why the logs are not the same even if no channel differs, a line each: a log that is cut or
+  // damaged, nothing that was compared.
+  std::vector<std::string> faults;
+  std::vector<std::string> notes;  // other machines; logs that are known to be cut
   // A line for each rule that fits no channel of either log, or no field there: a name that is
   // spelt wrongly, or a rule that is for other logs as well.
   std::vector<std::string> idle_rules;
   bool same() const;
 };
 
-// Throws InputError when one of them is not a log, and when the rules ignore every channel of both.
-// goes_on: asked now and then; when it returns false, the result so far is returned.
+// Throws InputError when one of them is not a log, and when the rules ignore all of both. partial:
+// a log that is cut or damaged is compared up to there. goes_on: asked now and then; when it
+// returns false, the result so far is returned.
 Diff diff_logs(const std::string& golden, const std::string& other,
-               const std::vector<DiffRule>& rules, const std::function<bool()>& goes_on = {});
+               const std::vector<DiffRule>& rules, bool partial = false,
+               const std::function<bool()>& goes_on = {});
 
 std::string diff_text(const Diff& diff);   // for a terminal
 std::string diff_junit(const Diff& diff);  // JUnit XML: one test case a channel

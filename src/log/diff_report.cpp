@@ -6,6 +6,7 @@
 #include <tuple>
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include "base/xml.h"
 #include "log/diff.h"
@@ -107,8 +108,10 @@ std::string diff_text(const Diff& diff) {
   int64_t messages = 0;
   for (const auto& [name, channel] : diff.channels) messages += channel.compared;
   const auto channels = differing(diff);
-  if (channels.empty()) {
+  if (diff.same()) {
     text = fmt::format("same: {} messages on {} channels\n", messages, diff.channels.size());
+  } else if (channels.empty()) {
+    text = fmt::format("not the same: {}\n", fmt::join(diff.faults, "; "));
   } else {
     text = fmt::format("different: {} of {} channels; the earliest difference first\n",
                        channels.size(), diff.channels.size());
@@ -116,6 +119,7 @@ std::string diff_text(const Diff& diff) {
       for (const std::string& line : lines_of(channel->first, channel->second))
         text += "  " + line + "\n";
     }
+    for (const std::string& fault : diff.faults) text += "  " + fault + "\n";
   }
   for (const std::string& note : diff.notes) text += "note: " + note + "\n";
   return text;
@@ -125,7 +129,13 @@ std::string diff_junit(const Diff& diff) {
   std::string xml = fmt::format(
       "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<testsuite name=\"ruedo diff\" tests=\"{}\" "
       "failures=\"{}\">\n",
-      diff.channels.size(), differing(diff).size());
+      diff.channels.size() + diff.faults.size(), differing(diff).size() + diff.faults.size());
+  for (const std::string& fault : diff.faults) {
+    xml += fmt::format(
+        "  <testcase classname=\"ruedo.diff\" name=\"logs\">\n    <failure message=\"{0}\">{0}"
+        "</failure>\n  </testcase>\n",
+        xml_escaped(fault));
+  }
   for (const auto& [name, channel] : diff.channels) {
     xml += fmt::format("  <testcase classname=\"ruedo.diff\" name=\"{}\"", xml_escaped(name));
     if (channel.same()) {
@@ -152,8 +162,8 @@ std::string diff_html(const Diff& diff, const std::string& golden, const std::st
       "td{{padding-right:1.5em}}\n"
       "</style></head><body>\n<h1>{}</h1>\n<p><b class=\"golden\">golden</b> {}<br><b "
       "class=\"new\">new</b> {}</p>\n",
-      diff.same() ? "The logs are the same" : "The logs differ", xml_escaped(golden),
-      xml_escaped(other));
+      diff.same() ? "The logs are the same" : "The logs differ", xml_escaped(golden), xml_escaped(other));
+  for (const std::string& fault : diff.faults) page += "<p>" + xml_escaped(fault) + "</p>\n";
   for (const std::string& note : diff.notes) page += "<p>Note: " + xml_escaped(note) + "</p>\n";
   for (const auto* entry : differing(diff)) {
     const auto& [name, channel] = *entry;

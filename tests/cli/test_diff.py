@@ -86,13 +86,45 @@ def test_nothing_left_to_compare_is_no_pass(logs, pattern):
     assert "same" not in done.stdout
 
 
-def test_two_logs_without_messages_are_called_so(logs, tmp_path):
-    empty = tmp_path / "empty.lcm"
-    empty.touch()
-    done = diff(empty, empty, "--html", tmp_path / "page.html")
-    assert done.returncode == 0 and "both logs are without any message" in done.stdout, done
-    assert "both logs are without any message" in (tmp_path / "page.html").read_text()
-    assert "without any message" not in diff(logs[0], logs[0]).stdout
+@pytest.mark.parametrize("content", ["", "header"])
+def test_logs_without_a_message_are_not_the_same(logs, tmp_path, content):
+    """Nothing that was compared is no proof."""
+    empty, said = tmp_path / "empty.lcm", "nothing was compared: there is no message to compare"
+    log = lcm.EventLog(str(empty), "w", overwrite=True)
+    if content:
+        log.write_event(0, "ruedo/header", b"of a run")
+    log.close()
+    for options in [], ["--partial"]:
+        done = diff(empty, empty, "--html", tmp_path / "page.html", *options)
+        assert done.returncode == 1 and f"not the same: {said}" in done.stdout, done
+    page = (tmp_path / "page.html").read_text()
+    assert said in page and "The logs differ" in page
+    done = diff(logs[0], empty)
+    assert done.returncode == 1 and "10 messages of r/pose are missing" in done.stdout, done
+    assert said not in diff(logs[0], logs[0]).stdout
+
+
+def test_a_log_that_is_cut_is_the_same_as_none(logs, tmp_path):
+    """A log that was cut in half equalled itself."""
+    cut = tmp_path / "cut.lcm"
+    content = logs[0].read_bytes()
+    cut.write_bytes(content[: len(content) // 2 + 5])  # in the midst of an event
+    for pair in ((cut, cut), (logs[0], cut), (cut, logs[0])):
+        done = diff(*pair, "--junit", tmp_path / "junit.xml")
+        assert done.returncode == 1, done
+        assert f"{cut}: cut off in the event that begins at byte " in done.stdout
+        suite = ElementTree.parse(tmp_path / "junit.xml").getroot()
+        failures = suite.findall(".//failure")
+        assert suite.get("failures") == str(len(failures))
+        assert any("cut off" in each.get("message") for each in failures)
+
+        done = diff(*pair, "--partial")
+        assert done.returncode == 0 and done.stdout.startswith("same: 5 messages"), done
+        assert f"note: {cut}: cut off" in done.stdout
+    assert diff(logs[1], cut, "--partial").returncode == 0, "they differ after the cut alone"
+    other = logs[1].read_bytes()
+    cut.write_bytes(other[: len(other) - 5])
+    assert diff(logs[0], cut, "--partial").returncode == 1
 
 
 def test_what_cannot_be_read_is_said(logs, tmp_path):

@@ -233,6 +233,9 @@ def test_killed_in_the_middle(tmp_path):
     begin = log.read_bytes().index(b"\xed\xa1\xda\x01", 2_000_000)  # of an event
     os.truncate(log, begin + 40)  # and cut within it, wherever the kill was
     result = program("verify", log)
+    assert result.returncode == 1 and "not verified to the end: cut off" in result.stdout, result
+    assert "repeated byte for byte" not in result.stdout and "--partial" in result.stdout
+    result = program("verify", log, "--partial")
     assert result.returncode == 0, result.stdout + result.stderr
     assert "cut off" in result.stdout and "verified up to there" in result.stdout
 
@@ -240,7 +243,8 @@ def test_killed_in_the_middle(tmp_path):
         log
     )  # a kill between two events leaves no damage; that the end is missing is seen all the same
     write(tmp_path / "whole.lcm", whole)
-    result = program("verify", tmp_path / "whole.lcm")
+    assert program("verify", tmp_path / "whole.lcm").returncode == 1
+    result = program("verify", tmp_path / "whole.lcm", "--partial")
     assert (
         result.returncode == 0
         and "the end of the run is not in it; verified up to there" in result.stdout
@@ -259,10 +263,32 @@ def test_a_full_disk(tmp_path):
         restore_signals=False,
     )
     assert result.returncode == 4 and "readable up to" in result.stderr
-    result = program("verify", log)
+    assert program("verify", log).returncode == 1
+    result = program("verify", log, "--partial")
     assert result.returncode == 0 and "verified up to there" in result.stdout, (
         result.stdout + result.stderr
     )
+
+
+def test_a_header_alone_is_no_run_that_was_repeated(tmp_path):
+    found = record(tmp_path / "a.lcm", seconds=1)
+    log = tmp_path / "header.lcm"
+    write(log, found[:1])
+    for options in [], ["--partial"]:
+        result = program("verify", log, *options)
+        assert result.returncode == 1 and "nothing was compared" in result.stdout, result
+        assert "repeated byte for byte" not in result.stdout
+    log.write_bytes(log.read_bytes()[:-5])
+    result = program("verify", log)
+    assert result.returncode == 3 and "cut off in the event that begins at byte 0" in result.stderr
+
+
+def test_a_log_that_is_damaged_after_the_runs_end_is_not_whole(tmp_path):
+    record(tmp_path / "a.lcm", seconds=1)
+    with (tmp_path / "a.lcm").open("ab") as log:
+        log.write(b"more")
+    result = program("verify", tmp_path / "a.lcm")
+    assert result.returncode == 1 and "not verified to the end: cut off" in result.stdout, result
 
 
 def test_another_build_of_the_same_sources_is_no_excuse(tmp_path):

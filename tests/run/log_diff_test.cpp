@@ -5,12 +5,14 @@
 
 #include <filesystem>
 #include <fstream>
+#include <limits>
 
 #include "log/reader.h"
 #include "log/writer.h"
 #include "ruedo/errors.h"
 #include "ruedo/odometry_t.hpp"
 #include "ruedo/planar_lidar_t.hpp"
+#include "ruedo/state_hash_t.hpp"
 
 namespace ruedo::run {
 namespace {
@@ -165,15 +167,112 @@ TEST_F(LogDiffTest, ArraysOfDifferentLengths) {
   EXPECT_TRUE(fields.contains("nranges"));
 }
 
-TEST_F(LogDiffTest, ACutOffLogIsComparedUpToThereAndSaid) {
+// A range finder says inf where it has no echo: that is no distance which a tolerance could widen.
+TEST_F(LogDiffTest, NoToleranceReachesFromAnEchoToNone) {
+  constexpr float kInf = std::numeric_limits<float>::infinity();
+  constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
+  const auto write_scan = [](const std::string& path, std::vector<float> ranges) {
+    planar_lidar_t scan{};
+    scan.nranges = static_cast<int32_t>(ranges.size());
+    scan.ranges = std::move(ranges);
+    log::Writer log(path);
+    write(log, "p3at/lrf", scan);
+  };
+  write_scan(golden_, {kInf, kInf, -kInf, kNan, -kNan, kInf, 1});
+  write_scan(other_, {1, -kInf, 0, 1, kNan, kInf, kNan});
+  for (const char* tolerance : {"*:ranges=abs:1e300", "*:ranges=rel:0.5", "*:ranges=angle:4"}) {
+    EXPECT_EQ(diff({tolerance}).channels.at("p3at/lrf").fields.at("ranges").count, 5) << tolerance;
+  }
+  EXPECT_EQ(diff().channels.at("p3at/lrf").fields.at("ranges").count, 5) << "without a rule, too";
+}
+
+// Beyond 2^53 a double holds no odd number.
+TEST_F(LogDiffTest, LargeIntegersAreComparedExactly) {
+  constexpr int64_t kLarge = (int64_t{1} << 53) + 1;
+  for (const std::string& path : {golden_, other_}) {
+    odometry_t message = odometry(path == golden_ ? kLarge : kLarge - 1, 0, 0);
+    std::vector<uint8_t> bytes(static_cast<size_t>(message.getEncodedSize()));
+    message.encode(bytes.data(), 0, static_cast<int>(bytes.size()));
+    log::Writer(path).write(0, "p3at/odometry", bytes.data(), bytes.size());
+  }
+  EXPECT_FALSE(diff({"*:utime=abs:0.5"}).same());
+  EXPECT_TRUE(diff({"*:utime=abs:1"}).same());
+  EXPECT_EQ(diff().channels.at("p3at/odometry").fields.at("utime").worst, 1.0);
+}
+
+TEST_F(LogDiffTest, ALogThatIsCutIsNotTheSame) {
   write_log(golden_, 0);
   write_log(other_, 0);
   std::filesystem::resize_file(other_, std::filesystem::file_size(other_) - 5);
   const log::Diff result = diff();
   EXPECT_EQ(result.channels.at("p3at/odometry").compared, 9);
   EXPECT_EQ(result.channels.at("p3at/odometry").missing, 1);
-  ASSERT_EQ(result.notes.size(), 1u);
-  EXPECT_THAT(result.notes[0], HasSubstr("new.lcm: cut off in the event that begins at byte"));
+  ASSERT_EQ(result.faults.size(), 1u);
+  EXPECT_THAT(result.faults[0], HasSubstr("new.lcm: cut off in the event that begins at byte"));
+
+  golden_ = other_;  // cut in one place: nothing that is there differs
+  EXPECT_TRUE(diff().channels.at("p3at/odometry").same());
+  EXPECT_FALSE(diff().same());
+  EXPECT_THAT(log::diff_text(diff()), HasSubstr("not the same: "));
+  EXPECT_THAT(log::diff_junit(diff()), HasSubstr("cut off in the event"));
+}
+
+TEST_F(LogDiffTest, OfALogThatIsKnownToBeCutWhatIsThereIsCompared) {
+  write_log(golden_, 0);
+  write_log(other_, 0);
+  std::filesystem::resize_file(other_, std::filesystem::file_size(other_) - 5);
+  for (int i = 0; i < 2; ++i, std::swap(golden_, other_)) {  // either of them is cut
+    const log::Diff result = log::diff_logs(golden_, other_, {}, true);
+    EXPECT_TRUE(result.same());
+    EXPECT_EQ(result.channels.at("p3at/odometry").compared, 9);
+    ASSERT_EQ(result.notes.size(), 1u);
+    EXPECT_THAT(result.notes[0], HasSubstr("new.lcm: cut off in the event that begins at byte"));
+  }
+  write_log(golden_, 0, 0, 4);
+  EXPECT_FALSE(log::diff_logs(golden_, other_, {}, true).same()) << "before the cut";
+}
+
+// The end of a run is in its log.
+TEST_F(LogDiffTest, ARunsLogThatEndsBetweenTwoEventsIsCut) {
+  for (const bool whole : {true, false}) {
+    log::Writer log(golden_);
+    state_hash_t hash{};
+    hash.last = whole;
+    write(log, "p3at/odometry", odometry(0, 1, 0));
+    write(log, "ruedo/state_hash", hash);
+    log.flush();
+    other_ = golden_;
+    EXPECT_EQ(diff().same(), whole);
+    EXPECT_TRUE(log::diff_logs(golden_, other_, {}, true).same());
+  }
+}
+
+TEST_F(LogDiffTest, NothingComparedIsNotTheSame) {
+  const auto expect_nothing = [&](bool partial) {
+    const log::Diff result = log::diff_logs(golden_, other_, {}, partial);
+    EXPECT_FALSE(result.same());
+    EXPECT_THAT(log::diff_text(result), HasSubstr("not the same: nothing was compared"));
+  };
+  log::Writer{golden_}.flush();
+  log::Writer{other_}.flush();
+  expect_nothing(false);
+  expect_nothing(true);
+  for (const std::string& path : {golden_, other_}) {
+    log::Writer log(path);
+    write(log, "ruedo/header", odometry(0, 1, 0));
+  }
+  expect_nothing(false);
+  write_log(golden_, 0);
+  EXPECT_EQ(diff().channels.at("p3at/odometry").missing, 10) << "one log without a message";
+  std::filesystem::resize_file(golden_, 20);  // in its first event
+  expect_nothing(true);
+}
+
+TEST_F(LogDiffTest, IgnoringEveryFieldLeavesNothingToCompare) {
+  write_log(golden_, 0);
+  write_log(other_, 0.5);
+  EXPECT_THROW(diff({}, {"p3at/*:?*"}), InputError);
+  EXPECT_FALSE(diff({}, {"p3at/*:th*"}).same());
 }
 
 TEST_F(LogDiffTest, WhatIsNoLogIsRefused) {

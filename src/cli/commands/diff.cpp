@@ -17,12 +17,14 @@ namespace {
 struct DiffArguments {
   std::string golden, other, junit, html;
   std::vector<std::string> tolerances, ignored;
+  bool partial = false;
 };
 
 int diff(const DiffArguments& arguments) {
   read_given_types();
   const auto rules = log::DiffRule::all(arguments.tolerances, arguments.ignored);
-  const log::Diff result = log::diff_logs(arguments.golden, arguments.other, rules);
+  const log::Diff result =
+      log::diff_logs(arguments.golden, arguments.other, rules, arguments.partial);
   for (const std::string& line : result.idle_rules) spdlog::warn(line);
   fmt::print("{}", for_terminal(log::diff_text(result)));
   if (!arguments.junit.empty()) write_file(arguments.junit, log::diff_junit(result));
@@ -45,6 +47,8 @@ void add_diff(CLI::App& app, Action& chosen) {
   command->add_option("--ignore", arguments->ignored, "CHANNEL or CHANNEL:FIELD")
       ->type_name("PATTERN")
       ->allow_extra_args(false);
+  command->add_flag("--partial", arguments->partial,
+                    "for a log that is known to be cut: what is there is compared");
   command->add_option("--junit", arguments->junit, "write JUnit XML")->type_name("FILE");
   command->add_option("--html", arguments->html, "write a page with plots of what differs")
       ->type_name("FILE");

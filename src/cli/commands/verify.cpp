@@ -17,7 +17,7 @@ namespace ruedo::cli {
 namespace {
 
 struct VerifyArguments {
-  bool sandboxed = false;
+  bool sandboxed = false, partial = false;
   std::string log;
   int threads = 0;
 };
@@ -64,6 +64,18 @@ int repeat(const VerifyArguments& arguments, const log_header_t& header) {
         one_line(header.version.substr(0, header.version.find(' '))));
     return kEnvironment;
   }
+  if (result.messages == 0) {
+    fmt::print("{}: nothing was compared: there is no message to compare\n",
+               one_line(arguments.log));
+    return kCheckFailed;
+  }
+  if (!result.fault.empty() && !arguments.partial) {
+    fmt::print(
+        "{}: not verified to the end: {}; what is there repeats: {} (--partial is for logs that "
+        "are known to be cut)\n",
+        one_line(arguments.log), one_line(result.fault), one_line(so_far));
+    return kCheckFailed;
+  }
   fmt::print("{}: repeated byte for byte: {}\n", one_line(arguments.log), one_line(so_far));
   if (!result.fault.empty())
     fmt::print("{}: {}; verified up to there\n", one_line(arguments.log), one_line(result.fault));
@@ -88,6 +100,8 @@ void add_verify(CLI::App& app, Action& chosen) {
                    "maximum number of threads in a module (default: one per core)")
       ->type_name("N")
       ->check(CLI::Range(1, 1024));
+  command->add_flag("--partial", arguments->partial,
+                    "for a log that is known to be cut: what is there is compared");
   add_plugin_argument(*command);
   add_sandbox_argument(*command, arguments->sandboxed);
   command->callback([arguments, &chosen] { chosen = [arguments] { return verify(*arguments); }; });

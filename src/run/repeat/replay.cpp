@@ -17,7 +17,9 @@ namespace {
 log_header_t first_event(log::Reader& reader, log::Event& event) {
   log_header_t header;
   if (reader.size() == 0) throw InputError({reader.path()}, "is empty: nothing was recorded");
-  if (!reader.next(event) || event.channel != kHeaderChannel) {
+  const bool found = reader.next(event);
+  if (!found && !reader.fault().empty()) throw InputError({reader.path()}, reader.fault());
+  if (!found || event.channel != kHeaderChannel) {
     throw InputError({reader.path()},
                      "does not begin with ruedo/header: it was not recorded by ruedo run --record");
   }

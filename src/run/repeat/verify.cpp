@@ -82,8 +82,9 @@ class Verifier::Impl {
     if (!verdict_.difference && more_ && next_logged()) {
       differ(logged_.timestamp_us, logged_.channel, "a message", "the end of the run");
     }
-    if (!verdict_.difference && !ended_)
-      verdict_.fault = log_.fault().empty() ? "the end of the run is not in it" : log_.fault();
+    if (!verdict_.difference) verdict_.fault = log_.fault();
+    if (!verdict_.difference && !ended_ && verdict_.fault.empty())
+      verdict_.fault = "the end of the run is not in it";
     verdict_.time_us = last_stamp_;
     return verdict_;
   }
