@@ -25,6 +25,59 @@ def regress(*options, golden="g.lcm"):
     return program("regress", "w.sdf", *RUN, "run.lcm", "--golden", golden, *options)
 
 
+def test_a_golden_log_that_is_cut_is_no_pass(folder):
+    """In its last event, which left all others to be the same."""
+    golden = folder / "g.lcm"
+    for size in golden.stat().st_size - 5, golden.stat().st_size // 2 - 5:
+        golden.write_bytes(golden.read_bytes()[:size])
+        done = regress()
+        assert done.returncode == 1 and "passed" not in done.stdout, done
+        assert "the run differs from g.lcm (g.lcm: cut off in the event that begins" in done.stderr
+
+
+@pytest.mark.parametrize("value", ["1", "true", "YES", "on", "0", "False", "no", "OFF", ""])
+def test_the_environment_renews_when_it_says_so(folder, monkeypatch, value):
+    before = (folder / "g.lcm").read_bytes()
+    monkeypatch.setenv("RUEDO_RENEW", value)
+    done = regress("--spawn", "p3at:other@3,0")
+    renewed = value.lower() in ("1", "true", "yes", "on")
+    assert done.returncode == (0 if renewed else 1), done
+    assert ("renewed g.lcm" in done.stdout) == renewed
+    assert ((folder / "g.lcm").read_bytes() != before) == renewed
+
+
+def test_another_word_in_the_environment_is_refused(folder, monkeypatch):
+    monkeypatch.setenv("RUEDO_RENEW", "nope")
+    done = regress()
+    assert done.returncode == 2, done
+    assert (
+        'RUEDO_RENEW is "nope"; allowed are 1, true, yes, on and 0, false, no, off' in done.stderr
+    )
+
+
+@pytest.mark.parametrize(
+    "failing",
+    [["--script", "false"], ["--client", "exit 3"], ["--goal", "40,0,0.1,0.2"]],
+    ids=lambda words: words[0],
+)
+def test_a_run_that_failed_renews_no_golden_log(folder, failing):
+    """The script judged when the golden log had been written already."""
+    before = (folder / "g.lcm").read_bytes()
+    done = regress("--spawn", "p3at:other@3,0", "--renew", *failing)
+    assert done.returncode == 1 and "renewed" not in done.stdout, done
+    assert (folder / "g.lcm").read_bytes() == before
+
+
+@pytest.mark.parametrize("renew", [[], ["--renew"]], ids=str)
+def test_each_kept_pattern_has_to_fit(folder, renew):
+    """One that was misspelt beside a right one left its channel out without a word."""
+    before = (folder / "g.lcm").read_bytes()
+    done = regress("--keep", "*/pose", "--keep", "*/odometri", *renew)
+    assert done.returncode == 2 and "--keep */odometri: " in done.stderr, done
+    assert "p3at/odometry" in done.stderr and "*/pose:" not in done.stderr
+    assert (folder / "g.lcm").read_bytes() == before
+
+
 def test_a_run_equals_its_golden_log(folder):
     assert {channel for _, channel, _ in events("g.lcm")} == {"p3at/pose"}
     done = regress()

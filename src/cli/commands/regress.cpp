@@ -10,6 +10,7 @@
 #include <filesystem>
 #include <limits>
 #include <mutex>
+#include <set>
 #include <thread>
 
 #include <fmt/format.h>
@@ -253,13 +254,24 @@ bool fits_any(const std::string& channel, const std::vector<std::string>& patter
   });
 }
 
-bool holds_any(const std::string& path, const std::vector<std::string>& patterns) {
+void note_channels(const std::string& path, std::set<std::string>& channels) {
   log::Reader log(path);
   log::Event event;
-  while (log.next(event)) {
-    if (fits_any(event.channel, patterns)) return true;
+  while (log.next(event, [](const std::string&) { return false; })) channels.insert(event.channel);
+}
+
+// A run that lacks what the golden log holds differs; --keep is wrong where neither has it.
+void check_kept(const RegressArguments& arguments, bool renew) {
+  std::set<std::string> channels;
+  note_channels(arguments.record, channels);
+  if (!renew) note_channels(arguments.golden, channels);
+  for (const std::string& pattern : arguments.keep) {
+    if (std::none_of(channels.begin(), channels.end(),
+                     [&](const std::string& channel) { return fits_any(channel, {pattern}); }))
+      throw InputError(
+          {}, fmt::format("--keep {}: no message of the run is on such a channel; there are {}",
+                          pattern, fmt::join(channels, ", ")));
   }
-  return false;
 }
 
 // A log's events on the channels that are kept.
@@ -283,9 +295,10 @@ std::string compare(const RegressArguments& arguments, const std::string& kept,
   for (const std::string& line : result.idle_rules) spdlog::warn(line);
   if (!arguments.html.empty())
     write_file(arguments.html, log::diff_html(result, arguments.golden, kept));
-  return result.same()
-             ? ""
-             : "the run differs from " + arguments.golden + ":\n" + log::diff_text(result);
+  if (result.same()) return "";
+  std::string text = "the run differs from " + arguments.golden;
+  for (const std::string& fault : result.faults) text += " (" + fault + ")";
+  return text + ":\n" + log::diff_text(result);
 }
 
 // Holds the run against its golden log, or writes that one anew. What is wrong, or "".
@@ -294,12 +307,7 @@ std::string hold_to_golden(const RegressArguments& arguments,
   const std::string &golden = arguments.golden, kept = arguments.record + kKept;
   if (std::error_code unreadable; !renew && !fs::exists(golden, unreadable))
     return "there is no golden log " + golden + " yet: run this once with RUEDO_RENEW=1";
-  // A run that lacks what the golden log holds differs; --keep is wrong where neither has it.
-  if (!holds_any(arguments.record, arguments.keep) &&
-      (renew || !holds_any(golden, arguments.keep))) {
-    throw InputError({}, fmt::format("--keep {}: no message of the run is on such a channel",
-                                     fmt::join(arguments.keep, " ")));
-  }
+  check_kept(arguments, renew);
   keep_channels(arguments.record, kept, arguments.keep);
   if (!renew) return compare(arguments, kept, rules);
   if (const fs::path folder = fs::path(golden).parent_path(); !folder.empty()) {
@@ -349,6 +357,20 @@ void check_files_beside(const RegressArguments& arguments) {
                                          option, file, arguments.record));
     }
   }
+}
+
+// By RUEDO_RENEW. Throws InputError for what is neither yes nor no.
+bool is_told_to_renew() {
+  const char* environment = std::getenv("RUEDO_RENEW");
+  const std::string told = CLI::detail::to_lower(environment ? environment : "");
+  const auto is_any_of = [&](std::initializer_list<const char*> words) {
+    return std::find(words.begin(), words.end(), told) != words.end();
+  };
+  if (is_any_of({"1", "true", "yes", "on"})) return true;
+  if (is_any_of({"", "0", "false", "no", "off"})) return false;
+  throw InputError({}, fmt::format("RUEDO_RENEW is \"{}\"; allowed are 1, true, yes, on and 0, "
+                                   "false, no, off",
+                                   environment));
 }
 
 judge::Expectations expectations(const RegressArguments& arguments) {
@@ -414,9 +436,7 @@ int regress(const RegressArguments& arguments) {
   const bool isolated = !arguments.shared_network && isolate();
   SignalThread signals;  // after isolate(), which wants to be alone
   const auto rules = log::DiffRule::all(arguments.tolerances, arguments.ignored);
-  const char* environment = std::getenv("RUEDO_RENEW");
-  const bool renew =
-      arguments.renew || (environment && *environment && std::string(environment) != "0");
+  const bool renew = is_told_to_renew() || arguments.renew;
   const std::shared_ptr<const world::WorldModel> world = load(arguments.world);
   check_output(arguments.record);
   check_files_beside(arguments);
