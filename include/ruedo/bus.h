@@ -58,6 +58,9 @@ class Bus {
   // Grows whenever is_heard() may say something else than before.
   virtual uint64_t audience() const { return 0; }
 
+  // Whether a message may get lost on its way to a listener that takes its messages.
+  virtual bool loses_messages() const { return false; }
+
   // Messages that could not be sent so far.
   virtual uint64_t failed() const { return 0; }
   // Messages that listeners did not get, since newer ones replaced them.

@@ -48,6 +48,8 @@ class LcmBus : public Bus {
   void stop() override;
   // With memq there is only this process.
   bool is_heard(const std::string&) const override { return url_.scheme != "memq"; }
+  // Datagrams; a stream only where its reader does not read.
+  bool loses_messages() const override { return url_.scheme == "udpm"; }
   uint64_t failed() const override { return failed_; }
 
   const LcmUrl& url() const { return url_; }

@@ -31,6 +31,7 @@ class RivalWatch : public Bus {
   void stop() override { bus_->stop(); }
   bool is_heard(const std::string& channel) const override { return bus_->is_heard(channel); }
   uint64_t audience() const override { return bus_->audience(); }
+  bool loses_messages() const override { return bus_->loses_messages(); }
   uint64_t failed() const override { return bus_->failed(); }
   uint64_t replaced() const override { return bus_->replaced(); }
 

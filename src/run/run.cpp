@@ -4,7 +4,9 @@
 #include <algorithm>
 #include <cfenv>
 #include <cmath>
+#include <thread>
 
+#include <fmt/format.h>
 #include <spdlog/spdlog.h>
 
 #include "base/channel_names.h"
@@ -25,6 +27,9 @@ constexpr auto kTickAgainPeriod = std::chrono::milliseconds(100);
 // for meanwhile.
 constexpr int kFewGranted = 4, kFewAhead = 16;
 constexpr auto kDrainPeriod = std::chrono::milliseconds(50);
+// The last word goes out so often where it may be lost.
+constexpr int kLastWords = 3;
+constexpr auto kLastWordPeriod = std::chrono::milliseconds(20);
 
 // record: writes joins and ended leases into the log.
 std::unique_ptr<Mode> make_mode(const RunOptions& options, int64_t step_us,
@@ -332,7 +337,7 @@ void Run::finish() {
     wakeup_.wait_until(Clock::now() + kDrainPeriod);
     control_.serve();
   }
-  control_.cancel("the run has ended");
+  control_.cancel("the run has ended", reply_t::ENDED);
   publisher_.record(kStateHashChannel, beats_.hashes.at_end());
   publisher_.flush();
   if (log_) {
@@ -340,6 +345,26 @@ void Run::finish() {
     log_->check(publisher_.time_us());
   }
   if (!simulation_->end().empty()) throw physics::StateError(simulation_->end());
+  say_ended();
+}
+
+// To the clients alone: of a run that was interrupted, or ended by itself, the log is the same.
+void Run::say_ended() {
+  reply_t last;
+  last.utime = publisher_.time_us();
+  last.run_id = run_id_;
+  last.epoch = epoch_;
+  last.session = last.sequence = 0;
+  last.kind = 0;
+  last.code = reply_t::ENDED;
+  last.text = fmt::format("the run has ended at step {}", publisher_.step());
+  last.size = 0;
+  const std::vector<uint8_t> bytes = engine::encoded(last);
+  for (int i = 0; i < (bus_.loses_messages() ? kLastWords : 1); ++i) {
+    if (i > 0) std::this_thread::sleep_for(kLastWordPeriod);
+    bus_.publish(kReplyChannel, bytes.data(), bytes.size());
+    bus_.flush();
+  }
 }
 
 }  // namespace ruedo::run

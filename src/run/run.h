@@ -161,6 +161,7 @@ class Run {
   bool waits_for_launcher() const;
   std::string takes_no_messages() const;
   void finish();  // the run is over
+  void say_ended();
   Status status() const;
   const world::ModelInstance& instance_of(RobotIndex robot) const;
 

@@ -31,6 +31,7 @@ struct Message {
 class MemoryBus : public Bus {
  public:
   bool keep = true;  // false: only counts
+  bool loses = false;
   std::function<void(const std::string&)> on_publish;
 
   void publish(const std::string& channel, const uint8_t* data, size_t size) override {
@@ -60,6 +61,8 @@ class MemoryBus : public Bus {
     lock.unlock();
     handler(channel, bytes.data(), bytes.size());
   }
+
+  bool loses_messages() const override { return loses; }
 
   // A server that ends: the next one will listen.
   void stop() override {

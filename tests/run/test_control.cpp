@@ -3,6 +3,7 @@
 #include <atomic>
 #include <cmath>
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include "control_client.h"
@@ -40,6 +41,15 @@ class ControlTest : public testing::Test, protected Controlled {
     EXPECT_EQ(Controlled::join().session, reply.session);  // a repeated JOIN: the same session
   }
   reply_t step(int64_t steps) { return ask(stepping(steps)); }
+  std::vector<reply_t> last_words() {
+    std::vector<reply_t> found;
+    for (const Message& message : bus_.messages()) {
+      if (message.channel != "ruedo/reply") continue;
+      const reply_t reply = decoded<reply_t>(message.bytes);
+      if (reply.code == reply_t::ENDED) found.push_back(reply);
+    }
+    return found;
+  }
 
   MemoryBus& bus_ = bus;
 };
@@ -293,6 +303,7 @@ TEST_F(ControlTest, QuitEndsTheRun) {
   join();
   EXPECT_EQ(ask(request_t::QUIT).code, reply_t::OK);
   wait();
+  EXPECT_EQ(last_words().size(), 1u);
 }
 
 TEST_F(ControlTest, ControlOff) {
@@ -301,7 +312,31 @@ TEST_F(ControlTest, ControlOff) {
   begin(options);
   bus_.send("ruedo/request", engine::encoded(request(request_t::PAUSE)));
   wait();
-  for (const Message& message : bus_.messages()) EXPECT_NE(message.channel, "ruedo/reply");
+  EXPECT_EQ(last_words().size(), 1u);
+  for (const Message& message : bus_.messages()) {
+    if (message.channel == "ruedo/reply")
+      EXPECT_EQ(decoded<reply_t>(message.bytes).code, reply_t::ENDED);
+  }
+}
+
+TEST_F(ControlTest, TheLastWordOfARunSaysThatItHasEnded) {
+  begin(fast(0.1));
+  wait();
+  EXPECT_EQ(bus_.messages().back().channel, "ruedo/reply");
+  ASSERT_EQ(last_words().size(), 1u);
+  const reply_t last = last_words().front();
+  EXPECT_EQ(last.run_id, server_->run_id());
+  EXPECT_EQ(last.session, 0);
+  EXPECT_EQ(last.sequence, 0);
+  EXPECT_EQ(last.kind, 0);
+  EXPECT_THAT(last.text, testing::StartsWith("the run has ended at step "));
+}
+
+TEST_F(ControlTest, WhereItMayBeLostTheLastWordIsRepeated) {
+  bus_.loses = true;
+  begin(fast(0.1));
+  wait();
+  EXPECT_EQ(last_words().size(), 3u);
 }
 
 // What comes faster than it is served.

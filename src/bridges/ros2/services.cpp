@@ -50,6 +50,7 @@ uint8_t result_of(int32_t kind, int32_t code) {
     case reply_t::OK: return kOk;
     case reply_t::UNKNOWN_NAME: return kNotFound;
     case reply_t::NOT_SUPPORTED: return kUnsupported;
+    case reply_t::ENDED:
     case reply_t::REFUSED: return kind == request_t::STEP ? kIncorrectState : kFailed;
     default: return kFailed;
   }

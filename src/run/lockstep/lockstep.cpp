@@ -202,7 +202,7 @@ engine::Outcome Lockstep::grant(const request_t& request, const Session& session
     return engine::Outcome::refuse(
         reply_t::BAD_REQUEST, "this client does not take part: a grant of granted -1 comes first");
   if (over_)
-    return engine::Outcome::refuse(reply_t::REFUSED,
+    return engine::Outcome::refuse(reply_t::ENDED,
                                    fmt::format("the run has ended at step {}", published_));
   if (std::string wrong = fault_of(grant, *member); !wrong.empty())
     return engine::Outcome::refuse(reply_t::BAD_REQUEST, std::move(wrong));

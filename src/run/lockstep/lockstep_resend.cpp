@@ -33,7 +33,7 @@ engine::Outcome Lockstep::resend(const request_t& request, const Session& sessio
   member->received = std::max(member->received, body.received);
   forget();
   if (over_ && member->received >= published_) {
-    return engine::Outcome::refuse(reply_t::REFUSED,
+    return engine::Outcome::refuse(reply_t::ENDED,
                                    fmt::format("the run has ended at step {}", published_));
   }
   resend_reply_t reply;

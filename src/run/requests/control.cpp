@@ -237,12 +237,12 @@ void Control::published(int64_t step) {
 }
 
 template <class Condition>
-void Control::refuse_waiting(const std::string& why, Condition condition) {
+void Control::refuse_waiting(const std::string& why, int32_t code, Condition condition) {
   const auto refused =
       std::stable_partition(waiting_.begin(), waiting_.end(),
                             [&](const Waiting& waiting) { return !condition(waiting); });
   for (auto waiting = refused; waiting != waiting_.end(); ++waiting) {
-    waiting->reply.code = reply_t::REFUSED;
+    waiting->reply.code = code;
     waiting->reply.text = why;
     waiting->reply.body.clear();
     answer(waiting->reply);
@@ -250,12 +250,12 @@ void Control::refuse_waiting(const std::string& why, Condition condition) {
   waiting_.erase(refused, waiting_.end());
 }
 
-void Control::cancel(const std::string& why) {
-  refuse_waiting(why, [](const Waiting&) { return true; });
+void Control::cancel(const std::string& why, int32_t code) {
+  refuse_waiting(why, code, [](const Waiting&) { return true; });
 }
 
 void Control::cancel_after(int64_t step, const std::string& why) {
-  refuse_waiting(why, [step](const Waiting& waiting) {
+  refuse_waiting(why, reply_t::REFUSED, [step](const Waiting& waiting) {
     return waiting.after_step > step && waiting.after_step != kPending;
   });
 }

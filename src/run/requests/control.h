@@ -63,7 +63,7 @@ class Control {
   // Answers those that waited for a state up to `step`.
   void published(int64_t step);
   // Refuses all that wait, for a state that will not come or for what is made ready.
-  void cancel(const std::string& why);
+  void cancel(const std::string& why, int32_t code = reply_t::REFUSED);
   // Refuses those that wait for a state after `step`.
   void cancel_after(int64_t step, const std::string& why);
   // Of a request whose outcome was pending: false when it was refused meanwhile.
@@ -89,7 +89,7 @@ class Control {
   void hold(const request_t& request);
   bool has_too_many(const request_t& request) const;
   template <class Condition>
-  void refuse_waiting(const std::string& why, Condition condition);
+  void refuse_waiting(const std::string& why, int32_t code, Condition condition);
   void forget_left();
   void join(const request_t& request, reply_t& reply);
   void answer(reply_t& reply, bool quiet = false);
