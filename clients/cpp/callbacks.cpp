@@ -75,11 +75,11 @@ void say_awaited(const std::string& what) {
                what.c_str(), static_cast<long long>(kLongTime.count()));
 }
 
-void CallbackCore::say_failed(const char* why) {
-  if (std::exchange(failed_, true)) return;
+void CallbackCore::fail(const std::exception_ptr& fault) {
+  if ((faults_ && faults_->keep(fault, what_)) || std::exchange(failed_, true)) return;
   std::fprintf(stderr,
                "ruedo: a callback on %s failed: %s; it is called on, and this is said once\n",
-               what_.c_str(), why);
+               what_.c_str(), text_of(fault).c_str());
 }
 
 Subscription::~Subscription() { close(); }

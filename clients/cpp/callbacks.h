@@ -15,6 +15,7 @@
 #include <utility>
 #include <vector>
 
+#include "callback_faults.h"
 #include "forked.h"
 #include "ruedo/client.h"
 
@@ -27,7 +28,9 @@ void say_awaited(const std::string& what);
 // What a Subscription holds.
 class CallbackCore {
  public:
-  explicit CallbackCore(std::string what) : what_(std::move(what)) {}
+  // faults: keeps what it throws; null: that is printed once.
+  CallbackCore(std::string what, std::shared_ptr<CallbackFaults> faults)
+      : what_(std::move(what)), faults_(std::move(faults)) {}
   virtual ~CallbackCore() = default;
 
   // After it returns, the callback is not called any more: it waits for a call in another thread.
@@ -51,9 +54,10 @@ class CallbackCore {
     CallbackCore& core_;
   };
 
-  void say_failed(const char* why);
+  void fail(const std::exception_ptr& fault);
 
   const std::string what_;  // it is called on, for the log
+  const std::shared_ptr<CallbackFaults> faults_;
   const Forked forked_;
   std::atomic<bool> closed_{false};
 
@@ -73,19 +77,17 @@ template <class... Arguments>
 class Callback : public CallbackCore {
  public:
   using Function = std::function<void(Arguments...)>;
-  Callback(std::string what, Function function)
-      : CallbackCore(std::move(what)), function_(std::move(function)) {}
+  Callback(std::string what, std::shared_ptr<CallbackFaults> faults, Function function)
+      : CallbackCore(std::move(what), std::move(faults)), function_(std::move(function)) {}
 
-  // What the callback throws is reported once, and harms no other callback.
+  // What the callback throws harms no other callback.
   void call(Arguments... arguments) {
     const Call call(*this);
     if (closed_) return;
     try {
       function_(arguments...);
-    } catch (const std::exception& error) {
-      say_failed(error.what());
     } catch (...) {
-      say_failed("what it threw is no std::exception");
+      fail(std::current_exception());
     }
   }
 
@@ -100,10 +102,14 @@ class CallbackList : public std::enable_shared_from_this<CallbackList<Arguments.
  public:
   using One = Callback<Arguments...>;
 
+  // faults: of the user's callbacks; null for this library's own.
+  explicit CallbackList(std::shared_ptr<CallbackFaults> faults = nullptr)
+      : faults_(std::move(faults)) {}
+
   // Throws std::invalid_argument for an empty function.
   std::shared_ptr<One> add(std::string what, typename One::Function function) {
     if (!function) throw std::invalid_argument(what + ": the callback is an empty function");
-    auto one = std::make_shared<One>(std::move(what), std::move(function));
+    auto one = std::make_shared<One>(std::move(what), faults_, std::move(function));
     one->at_close([list = this->weak_from_this(), raw = one.get()] {
       if (const auto here = list.lock()) here->remove(raw);
     });
@@ -133,6 +139,7 @@ class CallbackList : public std::enable_shared_from_this<CallbackList<Arguments.
     const std::lock_guard lock(mutex_);
     return all_;
   }
+  const std::shared_ptr<CallbackFaults> faults_;
   mutable std::mutex mutex_;
   All all_ = std::make_shared<const std::vector<std::shared_ptr<One>>>();
 };

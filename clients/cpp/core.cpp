@@ -176,7 +176,12 @@ void Core::await_callback() {
 
 void Core::check_open() const {
   if (forked_) throw NoServer(kForked);
+  check_callbacks();
   if (closed_) throw NoServer(kClosed);
+}
+
+void Core::check_callbacks() const {
+  if (!is_called_back()) faults_->rethrow();
 }
 
 void Core::check_may_wait() const {
@@ -214,7 +219,7 @@ std::shared_ptr<StreamCore> Core::stream(const ChannelInfo& channel, bool raw) {
   if (!stream || stream->type() != channel.type) {  // in the next run it may be another type
     stream = std::make_shared<StreamCore>(weak_from_this(), channel,
                                           raw ? raw_decoder() : find_decoder(channel.type),
-                                          known_->step_us);
+                                          known_->step_us, faults_);
   }
   return stream;
 }
@@ -303,6 +308,7 @@ void Core::begin_run() {
   }
   end_drivers(drivers, MotionReason::new_run);
   for (const auto& stream : streams) stream->forget();
+  is_over_ = false;
   std::fprintf(stderr, "ruedo: another run has begun at %s: commands are not repeated into it\n",
                url_.c_str());
   callbacks_.put([list = new_run_] { list->call(); }, "a new run");
@@ -327,7 +333,27 @@ int64_t Core::not_before() const {
 void Core::sleep(int64_t duration) {
   check_may_wait();
   progress_.wait();
-  clock_.sleep(duration, [this] { check_server(); });
+  Standstill standstill = this->standstill("sleep()");
+  clock_.sleep(duration, [&] {
+    check_server();
+    standstill.look();
+  });
+}
+
+Standstill Core::standstill(std::string call) {
+  return {clock_, std::move(call),
+          [this] { return why_it_stands([this] { return stepper_.whose_turn(); }); }};
+}
+
+std::string Core::why_it_stands(const std::function<std::string()>& in_lockstep) const {
+  if (const double silence = clock_.silence(); silence > 3.0) {
+    char text[96];
+    std::snprintf(text, sizeof text, "nothing at all was heard from the server for %.1f s",
+                  silence);
+    return text;
+  }
+  if (info()->paused) return "the simulation is paused";
+  return this->in_lockstep() ? in_lockstep() : "";
 }
 
 void Core::refresh_info(std::shared_ptr<const WorldInfo> before) {
@@ -346,12 +372,25 @@ bool Core::server_has_ended() { return (server_ && server_->ended()) || !bus_.is
 
 void Core::check_server() {
   check_open();
+  if (is_over_) {
+    const std::lock_guard lock(mutex_);
+    throw RunEnded(over_);
+  }
   if (server_) {
-    if (const auto ended = server_->ended()) throw NoServer(*ended);
+    if (const auto ended = server_->ended()) {
+      if (server_->is_done()) throw RunEnded(*ended);
+      throw NoServer(*ended);
+    }
   }
   // A server on this machine that is stopped, or in a debugger, is waited for.
   if (clock_.silence() > kSilence && !is_there())
     throw NoServer("nothing was heard from the server at " + url_ + " for 5 s");
+}
+
+void Core::note_end(const std::string& text) {
+  const std::lock_guard lock(mutex_);
+  over_ = text + ", at " + url_;
+  is_over_ = true;
 }
 
 bool Core::is_there() {
@@ -364,18 +403,16 @@ bool Core::is_there() {
 }
 
 std::string Core::what_is_known(double rate) const {
-  char text[96];
-  if (clock_.silence() > 3.0) {
-    std::snprintf(text, sizeof text, "nothing at all was heard from the server for %.1f s",
-                  clock_.silence());
-  } else if (info()->paused) {
-    return "the simulation is paused";
-  } else if (rate > 0.0) {
-    std::snprintf(text, sizeof text, "its rate is %g Hz of sim time, which is now %.2f s", rate,
-                  static_cast<double>(utime()) * 1e-6);
-  } else {
-    return "it sends when something happens";
-  }
+  const double now = static_cast<double>(utime()) * 1e-6;
+  char text[192];
+  std::snprintf(text, sizeof text,
+                "in lockstep it stands still between calls of step(), whose observations have the "
+                "samples, as in sim.step(20).latest(robot.lrf()); it is at %.2f s",
+                now);
+  const std::string why = why_it_stands([&] { return std::string(text); });
+  if (!why.empty()) return why;
+  if (rate == 0.0) return "it sends when something happens";
+  std::snprintf(text, sizeof text, "its rate is %g Hz of sim time, which is now %.2f s", rate, now);
   return text;
 }
 
@@ -463,7 +500,7 @@ bool Core::is_of_our_run(int64_t run_id, bool may_take_over) {
     watch_.hear_own();
     return true;
   }
-  const bool is_over = watch_.hear_another(run_id);
+  const bool is_over = watch_.hear_another(run_id) || is_over_;
   // Which of the two is there?
   if (Clock::now().time_since_epoch() - Clock::duration(asked_.load()) > kAskAgain) ask_info();
   return is_over && may_take_over;

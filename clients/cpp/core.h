@@ -16,6 +16,7 @@
 #include <vector>
 
 #include "bus.h"
+#include "callback_faults.h"
 #include "callback_queue.h"
 #include "callbacks.h"
 #include "driver.h"
@@ -25,6 +26,7 @@
 #include "run_watch.h"
 #include "session.h"
 #include "sim_clock.h"
+#include "standstill.h"
 #include "stepper.h"
 #include "stream_core.h"
 #include "world_info.h"
@@ -52,7 +54,9 @@ class Core : public std::enable_shared_from_this<Core> {
   void close();                 // in a callback, too: the end follows by itself there
   bool is_called_back() const;  // this thread is in a callback
   bool closed() const { return closed_; }
-  void check_open() const;  // throws NoServer
+  // At the beginning of a call, and while it waits. Throws NoServer, and what a callback threw.
+  void check_open() const;
+  void check_callbacks() const;  // throws what one of them threw
   // Before waiting for what the server sends. Throws NoServer; Error in a callback: the server may
   // wait for that.
   void check_may_wait() const;
@@ -60,6 +64,7 @@ class Core : public std::enable_shared_from_this<Core> {
 
   Bus& bus() { return bus_; }
   CallbackQueue& callbacks() { return callbacks_; }
+  CallbackFaults& faults() { return *faults_; }
   Progress& progress() { return progress_; }
   SimClock& clock() { return clock_; }
   Session& session() { return session_; }
@@ -91,13 +96,17 @@ class Core : public std::enable_shared_from_this<Core> {
   // now.
   void refresh_info(std::shared_ptr<const WorldInfo> before = nullptr);
   bool server_has_ended();  // for certain; one that is looked for in vain just now has, too
-  void check_server();      // throws NoServer when it is gone, or this was closed
+  // Throws RunEnded when the run has, and NoServer when the server is gone or this was closed.
+  void check_server();
+  void note_end(const std::string& text);   // the server's last word
+  Standstill standstill(std::string call);  // for a call that waits for sim time
   Subscription on_new_run(std::function<void()> callback);
   std::string what_is_known(double rate) const;  // for timeouts
 
  private:
   // In a thread of its own. False: there are too many threads.
   static bool ends_apart(const std::shared_ptr<Core>& self);
+  std::string why_it_stands(const std::function<std::string()>& in_lockstep) const;
   void end();  // all but a callback that has not returned
   void await_callback();
   std::chrono::milliseconds before_turn();
@@ -126,6 +135,8 @@ class Core : public std::enable_shared_from_this<Core> {
   std::exception_ptr fault_;    // of an info that cannot be read
   Clock::time_point fault_at_;  // the first
   RunWatch watch_;
+  std::string over_;  // the server's last word on the run
+  std::atomic<bool> is_over_{false};
   std::map<std::pair<std::string, bool>, std::shared_ptr<StreamCore>> streams_;  // channel, raw
   std::map<std::string, std::shared_ptr<Driver>> drivers_;
   std::set<std::shared_ptr<Driver>> repeating_;
@@ -138,7 +149,8 @@ class Core : public std::enable_shared_from_this<Core> {
   std::atomic<bool> closed_{false};
   std::promise<void> end_;  // of all that close() ends
   const std::shared_future<void> ended_ = end_.get_future().share();
-  const std::shared_ptr<CallbackList<>> new_run_ = std::make_shared<CallbackList<>>();
+  const std::shared_ptr<CallbackFaults> faults_ = std::make_shared<CallbackFaults>();
+  const std::shared_ptr<CallbackList<>> new_run_ = std::make_shared<CallbackList<>>(faults_);
   std::thread repeater_;
   std::condition_variable wake_;
   Session session_;

@@ -240,19 +240,25 @@ void MotionCore::await_end(std::unique_lock<std::mutex>& lock, Duration timeout)
     ~Leave() { motion.waiting.erase(std::find(motion.waiting.begin(), motion.waiting.end(), me)); }
   };
   const Leave leave{*this, me};
+  const auto core = connection.lock();
+  if (!core && !done()) throw NoServer(kClosed);
+  if (!core) return;
+  core->check_callbacks();
+  Standstill standstill = core->standstill(robot + ": wait() for " + kind);
   while (!done()) {
     if (Clock::now() >= deadline) {
+      const std::string why = standstill.reason();
       throw Timeout(robot + ": " + kind + " was not done within " + text_of(timeout) + " s (" +
-                    remaining_text() + ")");
+                    remaining_text() + (why.empty() ? "" : "; " + why) + ")");
     }
-    const auto core = connection.lock();
-    if (!core) throw NoServer(kClosed);
     core->check_may_wait();
     core->progress().wait();
     news.wait_until(lock, std::min(deadline, Clock::now() + std::chrono::milliseconds(500)));
+    if (done()) break;
     core->check_server();
+    if (deadline == Clock::time_point::max()) standstill.look();
   }
-  if (const auto core = connection.lock()) core->begin_after(utime);
+  core->begin_after(utime);
 }
 
 const Motion& Motion::wait(Duration timeout) const {

@@ -4,6 +4,7 @@
 #include <atomic>
 #include <chrono>
 #include <condition_variable>
+#include <cstdio>
 #include <cstdlib>
 #include <future>
 #include <mutex>
@@ -11,6 +12,7 @@
 #include <system_error>
 #include <thread>
 
+#include "callback_faults.h"
 #include "forked.h"
 
 namespace ruedo::client {
@@ -65,6 +67,9 @@ void call_for_a_moment() {
 [[gnu::destructor]] void end_of_program() {
   if (of_this_process<Called>().count > 0) call_for_a_moment();
   await_ends();
+  if (!print_unthrown_faults()) return;
+  std::fflush(nullptr);
+  std::_Exit(EXIT_FAILURE);  // no other way gives an exit code here
 }
 
 }  // namespace

@@ -301,6 +301,11 @@ std::optional<std::string> ServerProcess::ended() {
          command_ + "`)";
 }
 
+bool ServerProcess::is_done() {
+  const std::lock_guard lock(mutex_);
+  return poll() && status_ && WIFEXITED(*status_) && WEXITSTATUS(*status_) == 0;
+}
+
 void ServerProcess::end() {
   std::lock_guard lock(mutex_);
   stdin_.close();

@@ -29,6 +29,7 @@ class ServerProcess {
   // How the server ended, with the last lines it printed; nothing while it runs. Thread safe, as is
   // end().
   std::optional<std::string> ended();
+  bool is_done();  // it has ended with exit code 0
   // How far this client has come (progress.h). Where the pipe is full, a later line says it all.
   void tell(const std::string& line) { stdin_.write(line); }
   std::vector<std::string> warnings();  // of the server since the last call, each once

@@ -32,6 +32,7 @@ Reply checked(Reply reply) {
   const std::string text =
       kind_name(reply.kind) + ": " +
       (reply.text.empty() ? "refused with code " + std::to_string(reply.code) : reply.text);
+  if (reply.code == reply_t::ENDED) throw RunEnded(text);
   if (reply.code == reply_t::NOT_SUPPORTED) throw NotSupported(text);
   throw RequestError(text, static_cast<ReplyCode>(reply.code));
 }
@@ -127,7 +128,8 @@ Reply Session::exchange(int32_t kind, int64_t session, int64_t sequence,
     }
     publish(kind, session, sequence, body);
     news_.wait_for(lock, kRepeatTime, [this] { return reply_.has_value(); });
-    core_.check_server();
+    core_.check_open();
+    if (!reply_) core_.check_server();  // else the run may have ended since
   }
   awaited_kind_ = 0;
   return std::move(*reply_);
@@ -169,6 +171,8 @@ void Session::receive(const uint8_t* bytes, size_t size) {
   } catch (const WireError&) {
     return;
   }
+  if (reply.code == reply_t::ENDED && reply.session == 0)  // nobody asked
+    return core_.note_end(reply.text);
   if (reply.kind != request_t::JOIN && reply.session != session_) return;
   std::unique_lock lock(mutex_);
   if (reply.kind == request_t::LEAVE) {

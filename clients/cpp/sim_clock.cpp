@@ -66,6 +66,7 @@ void SimClock::sleep(int64_t duration, const std::function<void()>& check) {
   const Leave leave{*this, lock, me};
   while (me->left > 0) {
     news_.wait_for(lock, std::chrono::milliseconds(500));
+    if (me->left <= 0) break;
     lock.unlock();
     check();
     lock.lock();

@@ -61,6 +61,7 @@ namespace {
 void end(std::shared_ptr<Core> core) {
   if (!core) return;
   core->close();
+  if (!core->forked()) core->faults().print();
   static auto* const parents = new std::vector<std::shared_ptr<Core>>;
   if (core->forked()) parents->push_back(std::move(core));
 }
@@ -85,7 +86,14 @@ std::shared_ptr<Core> Simulation::core() const {
 }
 
 void Simulation::close() {
-  if (const auto core = core_) core->close();
+  const auto core = core_;
+  if (!core) return;
+  core->close();
+  if (core->forked() || core->is_called_back()) return;
+  if (std::uncaught_exceptions() > 0)
+    core->faults().print();
+  else
+    core->faults().rethrow();
 }
 
 std::string Simulation::url() const { return core()->url(); }
@@ -225,6 +233,11 @@ State Simulation::restore(const std::string& name) const {
   return state;
 }
 
-void Simulation::quit() const { core()->session().request(request_t::QUIT, {}, kReplyTime); }
+void Simulation::quit() const {
+  try {
+    core()->session().request(request_t::QUIT, {}, kReplyTime);
+  } catch (const RunEnded&) {  // its last word may come before the reply, or without
+  }
+}
 
 }  // namespace ruedo::client

@@ -71,6 +71,18 @@ Observations Stepper::step(int64_t n, const std::vector<Command>& commands, Dura
   return observations;
 }
 
+std::string Stepper::whose_turn() {
+  const std::unique_lock no_step(one_at_a_time_, std::try_to_lock);
+  const std::lock_guard lock(mutex_);
+  const std::string& name = core_.session().name();
+  if (!part_) {
+    return "in lockstep the clients that take part grant each step, and this one, '" + name +
+           "', does not: step() takes part";
+  }
+  if (!no_step && !waits_for_.empty()) return "in lockstep it waits for " + waits_for_;
+  return "in lockstep it waits for the next step() of this client, '" + name + "'";
+}
+
 void Stepper::forget() {
   std::lock_guard lock(mutex_);
   part_ = false;

@@ -33,6 +33,8 @@ class Stepper {
   Observations step(int64_t n, const std::vector<Command>& commands, Duration timeout);
   void forget();  // the client has reset the world, or left: the next step takes part again
 
+  std::string whose_turn();  // for whose grant the run waits, as far as this client knows
+
   // The receiving thread's.
   void on_info(const std::shared_ptr<const WorldInfo>& info);
   void on_tick(const uint8_t* bytes, size_t size);

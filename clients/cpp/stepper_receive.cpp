@@ -213,6 +213,7 @@ std::exception_ptr Stepper::fault_of(const Reply& reply) const {
   const std::string text = (reply.kind == request_t::GRANT ? "GRANT: " : "RESEND: ") + reply.text;
   if (reply.code == reply_t::UNKNOWN_SESSION)
     return std::make_exception_ptr(LeaseLost(text, ReplyCode::unknown_session));
+  if (reply.code == reply_t::ENDED) return std::make_exception_ptr(RunEnded(text));
   if (reply.code == reply_t::WRONG_RUN || reply.code == reply_t::REFUSED)
     return std::make_exception_ptr(NoServer(text));
   return std::make_exception_ptr(RequestError(text, static_cast<ReplyCode>(reply.code)));

@@ -51,7 +51,8 @@ class StreamCore::Arrival {
 };
 
 StreamCore::StreamCore(std::weak_ptr<Core> core, const ChannelInfo& channel,
-                       const SampleDecoder* decoder, int64_t step_us)
+                       const SampleDecoder* decoder, int64_t step_us,
+                       const std::shared_ptr<CallbackFaults>& faults)
     : core_(std::move(core)),
       channel_(channel.name),
       robot_(channel.robot),
@@ -59,7 +60,8 @@ StreamCore::StreamCore(std::weak_ptr<Core> core, const ChannelInfo& channel,
       fingerprint_(channel.fingerprint),
       rate_(channel.rate),
       period_us_(period_us(channel.rate, step_us)),
-      decoder_(decoder) {}
+      decoder_(decoder),
+      callbacks_(std::make_shared<Callbacks>(faults)) {}
 
 std::shared_ptr<Core> StreamCore::connection() const {
   auto core = core_.lock();
@@ -227,7 +229,8 @@ void StreamCore::await(Core& core, std::unique_lock<std::mutex>& lock, Duration 
     }
     core.progress().wait();
     news_.wait_until(lock, std::min(deadline, Clock::now() + std::chrono::milliseconds(500)));
-    core.check_server();
+    core.check_open();
+    if (!ready()) core.check_server();  // else the run may have ended since
   }
 }
 

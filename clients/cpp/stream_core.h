@@ -27,9 +27,10 @@ struct ChannelInfo;
 // Thread safe. The connection has one for each channel that was asked for; handles may outlive it.
 class StreamCore : public std::enable_shared_from_this<StreamCore> {
  public:
-  // decoder: null where there is none for the channel's type. step_us: the simulation's.
+  // decoder: null where there is none for the channel's type. step_us: the simulation's. faults: of
+  // callbacks.
   StreamCore(std::weak_ptr<Core> core, const ChannelInfo& channel, const SampleDecoder* decoder,
-             int64_t step_us);
+             int64_t step_us, const std::shared_ptr<CallbackFaults>& faults);
 
   const std::string& channel() const { return channel_; }
   const std::string& type() const { return type_; }
@@ -70,7 +71,7 @@ class StreamCore : public std::enable_shared_from_this<StreamCore> {
   const int64_t fingerprint_;      // as ruedo/info said first
   const double rate_, period_us_;  // 0: what is missing cannot be told
   const SampleDecoder* decoder_;
-  const std::shared_ptr<Callbacks> callbacks_ = std::make_shared<Callbacks>();
+  const std::shared_ptr<Callbacks> callbacks_;
   const std::shared_ptr<Callbacks> arrivals_ = std::make_shared<Callbacks>();
   const CallbackQueue::Count missed_ = std::make_shared<std::atomic<int64_t>>(0);
 

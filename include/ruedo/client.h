@@ -112,7 +112,8 @@ struct MotionCore;
 /// Once close() has returned, or the destructor, the callback is not called any more, and no call
 /// of it is under way (but for the one that closes it itself): what it refers to may go. Where
 /// callbacks in several threads close each other, the last of them does not wait for the others.
-/// What a callback throws is reported once on the terminal, and harms no other callback.
+/// What a callback throws is thrown by the next call of its simulation, and harms no other
+/// callback.
 class [[nodiscard]] Subscription {
  public:
   Subscription() = default;  ///< Of nothing.
@@ -173,7 +174,8 @@ class Stream {
   /// steps of step() return before it does. A server that launch() started waits for them. With
   /// another one, and more than a megabyte of samples behind, they get the newest of each channel
   /// (dropped()). A callback cannot wait for other samples or replies: such a call throws Error.
-  /// @param callback what it throws is reported once on the terminal
+  /// @param callback what it throws is thrown by the next call of the simulation, at the latest by
+  /// Simulation::close(); its destructor prints it, and the program's exit code is not 0
   /// @return ends the calls when it goes
   /// @throws TypeMismatch, NoServer; std::invalid_argument for an empty function
   Subscription on_sample(std::function<void(const SampleType&)> callback) const;
@@ -358,7 +360,7 @@ class Motion {
   /// @param timeout of real time
   /// @return itself
   /// @throws MotionError when it ended early or was refused; Timeout when it still runs: the robot
-  /// goes on then; NoServer
+  /// goes on then; RunEnded; NoServer
   const Motion& wait(Duration timeout = kForever) const;
 
  private:
@@ -649,6 +651,8 @@ class [[nodiscard]] Simulation {
   /// Ends repeated commands, and a server that launch() started; a second time nothing. In a
   /// callback it returns at once, and the end follows by itself; a second call, or the destructor,
   /// waits for it.
+  /// @throws what a callback threw and no call has thrown since; while another exception is on its
+  /// way it prints that
   void close();
 
  private:

@@ -88,7 +88,8 @@ enum class ReplyCode : int32_t {
   wrong_epoch = 5,
   old_sequence = 6,
   unknown_session = 7,
-  not_supported = 8
+  not_supported = 8,
+  ended = 9
 };
 
 /// @param kind of a motion
@@ -122,6 +123,10 @@ struct Error : std::runtime_error {
 /// None answered, it fell silent or ended, or the Simulation was closed.
 struct NoServer : Error {
   using Error::Error;
+};
+/// The run is over: its server has said so, or ended with exit code 0.
+struct RunEnded : NoServer {
+  using NoServer::NoServer;
 };
 /// A private server could not be started.
 struct LaunchError : Error {

@@ -9,15 +9,26 @@ from typing import Any
 
 log = logging.getLogger("ruedo")
 
+Keep = Callable[[BaseException, str], bool]
+
+
+def _keep_none(error: BaseException, what: str) -> bool:
+    return False
+
 
 class Subscription:
     """A callback that is called until close(), or the end of a with block. What it raises is
-    logged once, and does not affect others."""
+    raised by the next call of its simulation, and does not affect other callbacks."""
 
     def __init__(
-        self, callback: Callable[..., Any], what: str, leave: Callable[[Subscription], None]
+        self,
+        callback: Callable[..., Any],
+        what: str,
+        leave: Callable[[Subscription], None],
+        keep: Keep,
     ):
         self._callback, self._what, self._leave = callback, what, leave
+        self._keep = keep
         self._failed = False
         self.closed = False
 
@@ -47,7 +58,7 @@ class Subscription:
                 and threading.current_thread() is threading.main_thread()
             ):
                 raise  # Ctrl-C, while step() receives for itself
-            if not self._failed:
+            if not self._keep(error, self._what) and not self._failed:
                 self._failed = True
                 log.exception(
                     "a callback on %s failed; it is called on, and this is said once", self._what
@@ -57,11 +68,12 @@ class Subscription:
 class Callbacks:
     """All callbacks on one thing. Safe to use from any thread.
 
-    what: they are called on, for the log. left: called after one was taken back.
+    what: they are called on, for the log. left: called after one was taken back. keep: takes what
+    one raised, with `what`; where it returns False, that is logged, once of each.
     """
 
-    def __init__(self, what: str, left: Callable[[], None] = lambda: None):
-        self._what, self._left = what, left
+    def __init__(self, what: str, left: Callable[[], None] = lambda: None, keep: Keep = _keep_none):
+        self._what, self._left, self._keep = what, left, keep
         self._lock = threading.Lock()
         self._all: tuple[Subscription, ...] = ()  # replaced, never changed: call() takes no lock
 
@@ -71,7 +83,7 @@ class Callbacks:
     def add(self, callback: Callable[..., Any]) -> Subscription:
         if not callable(callback):
             raise TypeError(f"a callback is a function of one sample, not {callback!r}")
-        subscription = Subscription(callback, self._what, self._remove)
+        subscription = Subscription(callback, self._what, self._remove, self._keep)
         with self._lock:
             self._all += (subscription,)
         return subscription

@@ -66,7 +66,8 @@ class Clock:
             try:
                 while sleeper.left > 0:
                     self._news.wait(0.5)
-                    check()
+                    if sleeper.left > 0:
+                        check()
             finally:
                 self._sleepers = [one for one in self._sleepers if one is not sleeper]
 

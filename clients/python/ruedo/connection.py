@@ -22,12 +22,14 @@ from .callback_queue import CallbackQueue
 from .callbacks import Callbacks, Subscription
 from .clock import Clock
 from .control import REQUEST_CHANNEL, Session
-from .errors import NoServer, RuedoError, UnknownName
+from .errors import NoServer, RuedoError, RunEnded, UnknownName
 from .lockstep import Stepper
 from .motion import Drivers
+from .program_end import CallbackFaults
 from .progress import Progress, regression_at
 from .run_watch import RunWatch
 from .stack import is_in_another_call
+from .standstill import Standstill
 from .stream import Streams
 from .transport import Transport, is_claimed, open_transport
 from .world_info import WorldInfo, WorldInfoAssembler, run_id_of
@@ -51,6 +53,9 @@ class PrivateServer(Protocol):
 
     def ended(self) -> str | None:
         """Why it is gone; None while it runs."""
+
+    def is_done(self) -> bool:
+        """Whether it has ended in good order."""
 
     def end(self) -> None: ...
 
@@ -84,6 +89,7 @@ class Connection:
         self.progress = Progress()
         self.clock = Clock(self.progress.use)
         self.callbacks = CallbackQueue()
+        self.faults = CallbackFaults()
         self.session = Session(self, name)
         self.stepper = Stepper(self)
         self.streams = Streams()
@@ -101,7 +107,8 @@ class Connection:
         self._look_at = 0.0  # for the server, again, s of time.monotonic()
         self._there = False  # as it was then
         self._ids = 0  # of the newest primitive
-        self._new_run = Callbacks("a new run")
+        self._over = ""  # the server's last word on the run
+        self._new_run = Callbacks("a new run", keep=self.faults.note)
         self._closing = threading.Lock()  # whoever has it closes
         self._ended = threading.Event()  # all that close() ends
         self.bus = Bus(transport or open_transport(url))
@@ -124,39 +131,46 @@ class Connection:
             self.progress.begin(is_waited_for.tell)
         self._ids = _ids_from(self.session.name, self.info)
 
-    def close(self) -> None:
+    def close(self, during: BaseException | None = None) -> None:
         """Repeated commands end, and so does a private server. A second call waits for that, and so
-        does the program's end.
+        does the program's end. Raises what a callback raised, unless that was raised before.
 
         In a callback, a signal handler or a finalizer, what waits is left to a thread: this one may
-        hold what the receiving thread waits for.
+        hold what the receiving thread waits for. during: an exception that is on its way.
         """
-        self._close(None)
+        if not self._close(None):
+            return
+        if during is None:
+            self.faults.raise_kept()
+        else:
+            self.faults.print_kept()
 
     def _close_at_end(self) -> None:
         """Of the program, which ends beside a callback that does not return."""
         self._close(_CALLBACK_SECONDS)
 
-    def _close(self, patience: float | None) -> None:
-        """patience: s of real time for the callback that runs; None for ever."""
+    def _close(self, patience: float | None) -> bool:
+        """Whether it has waited for the end. patience: s of real time for the callback that runs;
+        None for ever."""
         if self.closed == _FORKED:
-            return
+            return False
         may_wait = not (self.is_called_back or is_in_another_call())
         if not self._closing.acquire(blocking=False):
             if may_wait:
                 self._ended.wait(_END_SECONDS)
-            return
+            return may_wait
         self.closed = _CLOSED
         self.callbacks.stop()
         if may_wait:
             self._end_all(patience)
-            return
+            return True
         closing = threading.Thread(target=self._end_all, name="ruedo-close", args=(0.0,))
         closing.daemon = False  # whatever this one is: the program's end waits for it
         try:
             closing.start()
         except RuntimeError:  # there are too many threads, or the program is at its end
             self._end_all(0.0)
+        return False
 
     def __reduce__(self) -> Any:
         raise TypeError(
@@ -183,8 +197,16 @@ class Connection:
                 self.session.leave()
 
     def check_open(self) -> None:
+        """At the beginning of a call, and while it waits. Raises NoServer, and what a callback
+        raised."""
+        self.check_callbacks()
         if self.closed:
             raise NoServer(self.closed)
+
+    def check_callbacks(self) -> None:
+        """Raises what one of them raised."""
+        if not self.is_called_back:
+            self.faults.raise_kept()
 
     def check_may_wait(self) -> None:
         """Before waiting for what the server sends. Raises NoServer; RuedoError in a callback:
@@ -203,10 +225,12 @@ class Connection:
         return self.callbacks.runs_here or self.bus.handling
 
     def check_server(self) -> None:
-        """Raises NoServer when the private server ended, or nothing was heard for long; a server
-        gives a sign of life each second. One of this machine that is stopped, or in a debugger, is
-        waited for."""
+        """Raises RunEnded when the run has, NoServer when the private server broke off, or nothing
+        was heard for long; a server gives a sign of life each second. One of this machine that is
+        stopped, or in a debugger, is waited for."""
         self.check_open()
+        if self._over:
+            raise RunEnded(self._over)
         self._check_private_server()
         if self.clock.silence() > _SILENCE_SECONDS and not self._is_there():
             raise NoServer(
@@ -221,13 +245,36 @@ class Connection:
                 self._look_at = time.monotonic() + _LOOK_SECONDS
             return self._there
 
-    def what_is_known(self, rate: float) -> str:
-        """Why a stream of that rate (Hz) may be silent."""
+    def sleep(self, duration: int) -> None:
+        """duration: us of sim time."""
+        self.check_may_wait()
+        if duration > 0:
+            self.progress.wait()
+        standstill = self.standstill("sleep()")
+
+        def check() -> None:
+            self.check_server()
+            standstill.look()
+
+        self.clock.sleep(duration, check)
+
+    def standstill(self, call: str) -> Standstill:
+        """For a call that waits for sim time."""
+        return Standstill(self.clock, call, lambda: self._why_it_stands(self.stepper.whose_turn()))
+
+    def _why_it_stands(self, in_lockstep: str) -> str:
         silence = self.clock.silence()
         if silence > 3.0:
             return f"nothing at all was heard from the server for {silence:.1f} s"
         if self.info.paused:
             return "the simulation is paused"
+        return in_lockstep if self.in_lockstep else ""
+
+    def what_is_known(self, rate: float) -> str:
+        """Why a stream of that rate (Hz) may be silent."""
+        why = self._why_it_stands("")
+        if why:
+            return why
         if self.in_lockstep:
             return (
                 "in lockstep it stands still between calls of step(), whose observations have the "
@@ -296,9 +343,8 @@ class Connection:
             return self._ids
 
     def _check_private_server(self) -> None:
-        ended = self._server and self._server.ended()
-        if ended:
-            raise NoServer(ended)
+        if self._server and (ended := self._server.ended()):
+            raise (RunEnded if self._server.is_done() else NoServer)(ended)
 
     def _await_info(self, timeout: float) -> None:
         deadline = time.monotonic() + timeout
@@ -361,6 +407,10 @@ class Connection:
         if before and info.run_id != before.run_id:
             self._begin_run()
 
+    def note_end(self, text: str) -> None:
+        """The server's last word."""
+        self._over = f"{text}, at {self.url}"
+
     def is_of_our_run(self, run_id: int, may_take_over: bool = False) -> bool:
         """Of a message that came. may_take_over: or of the run that has taken its place."""
         known = self._known
@@ -369,7 +419,7 @@ class Connection:
         if run_id == known.run_id:
             self._watch.hear_own()
             return True
-        is_over = self._watch.hear_another(run_id)
+        is_over = self._watch.hear_another(run_id) or bool(self._over)
         if time.monotonic() - self._asked > _ASK_AGAIN_SECONDS:  # which of the two is there
             self._ask_info()
         return is_over and may_take_over
@@ -386,6 +436,7 @@ class Connection:
 
     def _begin_run(self) -> None:
         """The server was restarted, or another has taken its place."""
+        self._over = ""
         self._watch.begin()
         self.clock.reset(self.info.utime)
         self.drivers.end_all("new run")
@@ -446,6 +497,7 @@ class Connection:
 
     def _forked(self) -> None:
         self.closed = _FORKED
+        self.faults = CallbackFaults()
         if self._server:
             self._server.forked()
 

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from . import lcmtypes
 from .decoding import decode
-from .errors import NotSupported, RequestError, Timeout, TypeMismatch, for_terminal
+from .errors import NotSupported, RequestError, RunEnded, Timeout, TypeMismatch, for_terminal
 from .geometry import Floats
 from .samples import Value, floats
 
@@ -151,6 +151,9 @@ class Session:
         if not self._connection.is_of_our_run(reply.run_id):
             return  # another server's, which was not asked
         reply.text = for_terminal(reply.text)
+        if reply.code == lcmtypes.reply_t.ENDED and not reply.session:  # nobody asked
+            self._connection.note_end(reply.text)
+            return
         with self._news:
             ours = reply.session == self._session or reply.kind == lcmtypes.request_t.JOIN
             if self._awaited == (reply.kind, reply.sequence) and ours:
@@ -184,8 +187,11 @@ class Session:
                 # Not under the lock: it may take long, and the receiving thread goes on meanwhile.
                 self.publish(kind, session, sequence, encoded)
                 with self._news:
-                    if self._news.wait_for(lambda: self._reply is not None, _REPEAT_SECONDS):
-                        return self._reply
+                    self._news.wait_for(lambda: self._reply is not None, _REPEAT_SECONDS)
+                    reply = self._reply
+                self._connection.check_open()
+                if reply is not None:  # else the run may have ended since
+                    return reply
                 self._connection.check_server()
         finally:
             with self._news:
@@ -213,6 +219,8 @@ class Session:
             _CODES.get(reply.code, str(reply.code)),
             _KINDS.get(reply.kind, str(reply.kind)),
         )
+        if reply.code == lcmtypes.reply_t.ENDED:
+            raise RunEnded(f"{kind}: {reply.text}")
         if reply.code == lcmtypes.reply_t.NOT_SUPPORTED:
             raise NotSupported(f"{kind}: {reply.text or 'this server does not have it'}")
         raise RequestError(f"{kind}: {reply.text or code}", code)

@@ -31,6 +31,10 @@ class NoServer(RuedoError, ConnectionError):
     """No server answered, or it fell silent or ended."""
 
 
+class RunEnded(NoServer):
+    """The run is over: its server has said so, or ended with exit code 0."""
+
+
 class LaunchError(RuedoError):
     """A private server could not be started."""
 

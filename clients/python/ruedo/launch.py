@@ -335,6 +335,9 @@ class _Server:
         how = f"exit code {code}" if code >= 0 else f"signal {signal.Signals(-code).name}"
         return f"the server ended ({how}): {self._last_lines() or 'it said nothing'}\n(`{' '.join(self._command)}`)"
 
+    def is_done(self) -> bool:
+        return self._process.poll() == 0
+
     def await_port(self, url: str, until: float) -> None:
         """Waits for a tcpq or unix server to listen. If it does not in time, connecting reports
         that.

@@ -29,6 +29,7 @@ from .errors import (
     NoServer,
     RequestError,
     RuedoError,
+    RunEnded,
     Timeout,
     TypeMismatch,
     for_terminal,
@@ -280,6 +281,19 @@ class Stepper:
                     self._connection.refresh_info()
                 self._subscribe()
             return self._collect()
+
+    def whose_turn(self) -> str:
+        """For whose grant the run waits, as far as this client knows."""
+        session = self._connection.session
+        name = session.name.decode()
+        if not self._part:
+            return (
+                "in lockstep the clients that take part grant each step, and this one, "
+                f"'{name}', does not: step() takes part"
+            )
+        if session.turn().locked() and self._waits_for:
+            return f"in lockstep it waits for {self._waits_for}"
+        return f"in lockstep it waits for the next step() of this client, '{name}'"
 
     def forget(self) -> None:
         """The client has reset the world: the next step takes part anew."""
@@ -722,6 +736,8 @@ def _fault_of(reply: Any) -> RuedoError:
     text = f"{'GRANT' if reply.kind == lcmtypes.request_t.GRANT else 'RESEND'}: {reply.text}"
     if reply.code == codes.UNKNOWN_SESSION:
         return LeaseLost(text, "UNKNOWN_SESSION")
+    if reply.code == codes.ENDED:
+        return RunEnded(text)
     if reply.code in (codes.WRONG_RUN, codes.REFUSED):
         return NoServer(text)
     return RequestError(

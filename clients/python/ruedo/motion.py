@@ -61,7 +61,9 @@ class Motion:
 
     def wait(self, timeout: float | None = None) -> Motion:
         """Waits until it is done, at most timeout seconds of real time. Raises MotionError when it
-        ended early or was refused, Timeout when it still runs; the robot goes on then."""
+        ended early or was refused, Timeout when it still runs; the robot goes on then. Warns where
+        sim time stands still for 5 s of real time, and says why. Raises RunEnded."""
+        self._connection.check_callbacks()
         deadline = None if timeout is None else time.monotonic() + timeout
         me = threading.get_ident()
         with self._news:
@@ -83,16 +85,21 @@ class Motion:
         """With the lock held."""
         if not self.done:
             self._connection.progress.wait()
+        standstill = self._connection.standstill(f"{self._robot}: wait() for {self.kind}")
         while not self.done:
             if deadline is not None and time.monotonic() >= deadline:
+                why = standstill.reason()
                 raise Timeout(
                     f"{self._robot}: {self.kind} was not done within {timeout:g} s "
-                    f"({self.remaining:.3f} remain)"
+                    f"({self.remaining:.3f} remain{why and '; ' + why})"
                 )
             self._connection.check_may_wait()
             left = 0.5 if deadline is None else max(0.0, min(0.5, deadline - time.monotonic()))
             self._news.wait(left)
-            self._connection.check_server()
+            if not self.done:
+                self._connection.check_server()
+                if deadline is None:
+                    standstill.look()
         self._connection.begin_after(self._utime)
 
     def _why(self) -> str:

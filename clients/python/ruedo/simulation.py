@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import math
 import os
 import sys
@@ -17,7 +18,7 @@ from .address import resolve_url
 from .callbacks import Subscription
 from .connection import Connection, PrivateServer
 from .control import State
-from .errors import NotSupported
+from .errors import NotSupported, RunEnded
 from .lockstep import Command, Observations, observed
 from .markers import message as made_markers
 from .robot import Robot
@@ -124,12 +125,10 @@ class Simulation:
         return self._connection.on_new_run(lambda: callback(self))
 
     def sleep(self, seconds: float) -> None:
-        """Waits until so much sim time has passed."""
-        self._connection.check_may_wait()
-        microseconds = round(arguments.finite("seconds", seconds) * 1e6)
-        if microseconds > 0:
-            self._connection.progress.wait()
-        self._connection.clock.sleep(microseconds, self._connection.check_server)
+        """Waits until so much sim time has passed. Warns where that stands still for 5 s of real
+        time, and says why. Raises RunEnded."""
+        self._connection.check_open()
+        self._connection.sleep(round(arguments.finite("seconds", seconds) * 1e6))
 
     # Control. Every call raises NotSupported where the server has no such request, RequestError
     # when it refuses.
@@ -324,14 +323,16 @@ class Simulation:
 
     def quit(self) -> None:
         """Ends the server."""
-        self._session.request(lcmtypes.request_t.QUIT)
+        with contextlib.suppress(RunEnded):  # its last word may come before the reply, or without
+            self._session.request(lcmtypes.request_t.QUIT)
 
     def close(self) -> None:
         """Leaves the simulation: repeated commands end, and so does a server that launch()
         started. Returns when no callback runs any more; at once in a callback, a signal handler or
-        a finalizer (__del__), where the end follows by itself.
+        a finalizer (__del__), where the end follows by itself. Raises what a callback raised and no
+        call has raised since; while another exception is handled, it is printed instead.
         """
-        self._connection.close()
+        self._connection.close(sys.exc_info()[1])
 
     def __enter__(self) -> Simulation:
         return self
@@ -342,7 +343,7 @@ class Simulation:
         error: BaseException | None,
         trace: TracebackType | None,
     ) -> None:
-        self.close()
+        self._connection.close(error)
 
     def __repr__(self) -> str:
         return f"<Simulation {self.world} at {self.url}: {self._connection.closed or ', '.join(self._info.robots) or 'no robots'}>"

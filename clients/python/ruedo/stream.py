@@ -135,7 +135,7 @@ class Stream(Reader[T]):
         self._waiting: list[int] = []  # threads that wait for a sample
         self._fault: RuedoError | None = None
         self._arrivals = Callbacks(channel)  # this package's own
-        self._callbacks = Callbacks(channel)
+        self._callbacks = Callbacks(channel, keep=connection.faults.note)
         self._missed = 0  # by the callbacks
         self._has_utime = type in samples.CONVERSIONS
         # s; 0: what is missing cannot be told.
@@ -158,7 +158,8 @@ class Stream(Reader[T]):
         order in which the samples came. A server that launch() started waits for them; with
         another one, and more than a megabyte of samples behind, they get the newest of each channel
         (`dropped`). A callback cannot wait for other samples or replies: such a call raises
-        RuedoError."""
+        RuedoError. What a callback raises is raised by the simulation's next call, at the latest by
+        close()."""
         self._subscribe()
         return self._callbacks.add(callback)
 
@@ -337,7 +338,9 @@ class Stream(Reader[T]):
                         f"no sample on {self.channel} within {timeout:g} s ({self._connection.what_is_known(self.rate)})"
                     )
                 self._news.wait(min(left, 0.5))
-                self._connection.check_server()
+                self._connection.check_open()
+                if not self._serves(reader, a_new_one, not_before):  # else the run may have ended
+                    self._connection.check_server()
             return self._newest
         finally:
             if me in self._waiting:

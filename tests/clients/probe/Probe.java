@@ -20,6 +20,7 @@ import ruedo.Scan;
 import ruedo.Simulation;
 import ruedo.SonarReading;
 import ruedo.State;
+import ruedo.Stream;
 import ruedo.Subscription;
 
 import java.nio.charset.StandardCharsets;
@@ -30,6 +31,9 @@ import java.util.List;
 import java.util.Locale;
 import java.util.Set;
 import java.util.TreeSet;
+import java.util.concurrent.CountDownLatch;
+import java.util.concurrent.atomic.AtomicBoolean;
+import java.util.concurrent.atomic.AtomicInteger;
 import java.util.function.Supplier;
 import java.util.zip.CRC32;
 
@@ -604,6 +608,105 @@ public final class Probe {
                 : Ruedo.connect(url, what, 60.0);
     }
 
+    /** A callback does. how: what the program does then. */
+    private static void fails(String url, String how) throws InterruptedException {
+        AtomicBoolean failed = new AtomicBoolean();
+        AtomicInteger others = new AtomicInteger();
+        Simulation sim = Ruedo.connect(url, "probe", 60.0);
+        Stream<Odometry> odometry = sim.robot("p3at").odometry();
+        odometry.onSample(
+                sample -> {
+                    if (!failed.getAndSet(true)) throw new AssertionError("a fault of the user's");
+                });
+        odometry.onSample(sample -> others.incrementAndGet());
+        while (!failed.get() && !how.equals("sleep")) Thread.sleep(10);
+        if (!how.equals("sleep")) Thread.sleep(300); // that it is kept
+        if (how.equals("forget")) return;
+        if (how.equals("close")) {
+            attempt("raised", sim::close);
+            attempt("once", sim::close);
+            return;
+        }
+        try (Simulation there = sim) {
+            if (how.equals("leave")) return;
+            if (how.equals("other")) throw new IllegalStateException("another fault");
+            attempt("raised", () -> call(there, how));
+            attempt("once", odometry::latest);
+            say("others", others.get() > 1);
+        } catch (IllegalStateException error) {
+            say("won", error.getMessage());
+            Throwable suppressed = error.getSuppressed()[0];
+            say("suppressed", suppressed.getClass().getSimpleName() + ":", suppressed.getMessage());
+        }
+    }
+
+    private static void call(Simulation sim, String how) {
+        if (how.equals("latest")) sim.robot("p3at").odometry().latest();
+        if (how.equals("sleep")) sim.sleep(PATIENCE);
+        if (how.equals("command")) sim.robot("p3at").setVelocity(0.0, 0.0);
+        if (how.equals("request")) sim.state();
+    }
+
+    /** The run does, while a call waits for it. */
+    private static void ends(String url, String call) throws InterruptedException {
+        CountDownLatch ended = new CountDownLatch(1);
+        try (Simulation sim = Ruedo.connect(url, "probe", 60.0)) {
+            Robot robot = sim.robot("p3at");
+            if (call.equals("uncaught_failed"))
+                robot.odometry()
+                        .onSample(
+                                sample -> {
+                                    while (ended.getCount() > 0) Thread.onSpinWait();
+                                    throw new AssertionError("a fault of the user's");
+                                });
+            if (!sim.lockstep()) sim.resume();
+            say("joined");
+            if (call.startsWith("uncaught")) {
+                try {
+                    sim.sleep(PATIENCE);
+                } finally {
+                    ended.countDown();
+                    Thread.sleep(300);
+                }
+            }
+            attempt("ended", () -> awaitEnd(sim, robot, call));
+            attempt("request", sim::state);
+        }
+    }
+
+    private static void awaitEnd(Simulation sim, Robot robot, String call) {
+        while (call.equals("next")) robot.odometry().next(PATIENCE);
+        if (call.equals("sleep")) sim.sleep(PATIENCE);
+        if (call.equals("wait")) robot.advance(5.0, new Limits(0.01, 0.0, 0.0)).await();
+        while (call.equals("step")) sim.step(20);
+    }
+
+    /** Sim time does. */
+    private static void stands(String url, String call) throws InterruptedException {
+        Simulation sim = Ruedo.connect(url, "waits", 60.0);
+        Motion motion = sim.robot("p3at").advance(1.0);
+        if (call.equals("stepped")) sim.step(1);
+        attempt("timeout", () -> motion.await(1.2));
+        Thread closing =
+                new Thread(
+                        () -> {
+                            try {
+                                Thread.sleep(8000);
+                            } catch (InterruptedException error) {
+                                return;
+                            }
+                            sim.close();
+                        });
+        closing.start();
+        attempt(
+                "ended",
+                () -> {
+                    if (call.equals("wait")) motion.await();
+                    else sim.sleep(1.0);
+                });
+        closing.join();
+    }
+
     private static void act(String url, String command, String[] a) throws InterruptedException {
         if (command.equals("launch")) launched(a);
         if (command.equals("launch_with")) {
@@ -699,6 +802,18 @@ public final class Probe {
     }
 
     public static void main(String[] args) throws InterruptedException {
+        switch (args[1]) {
+            case "fails":
+                fails(args[0], args[2]);
+                return;
+            case "ends":
+                ends(args[0], args[2]);
+                return;
+            case "stands":
+                stands(args[0], args[2]);
+                return;
+            default:
+        }
         try {
             act(args[0], args[1], Arrays.copyOfRange(args, 2, args.length));
             System.exit(0);

@@ -1,12 +1,15 @@
 // The C++ probe: does what a test asks of a client and prints the results. probe.py and Probe.java
 // are its twins, with the same commands and output.
 #include <algorithm>
+#include <atomic>
 #include <chrono>
 #include <cmath>
 #include <cstdio>
 #include <functional>
+#include <memory>
 #include <mutex>
 #include <set>
+#include <stdexcept>
 #include <string>
 #include <thread>
 #include <vector>
@@ -51,6 +54,8 @@ void report(const std::string& what, const std::function<void()>& call) {
   try {
     call();
     say(what, "none");
+  } catch (const rc::RunEnded& e) {
+    say(what, "RunEnded:", e.what());
   } catch (const rc::NoServer& e) {
     say(what, "NoServer:", e.what());
   } catch (const rc::LaunchError& e) {
@@ -73,6 +78,8 @@ void report(const std::string& what, const std::function<void()>& call) {
     say(what, "RuedoError:", e.what());
   } catch (const std::invalid_argument& e) {
     say(what, "ValueError:", e.what());
+  } catch (const std::logic_error& e) {  // what a callback threw
+    say(what, e.what());
   }
 }
 
@@ -555,6 +562,98 @@ void apart(const std::string& url, const std::string& name) {
   }
 }
 
+void pause_for(double seconds) {
+  std::this_thread::sleep_for(std::chrono::duration<double>(seconds));
+}
+
+// A callback does. how: what the program does then.
+void fails(const std::string& url, const std::string& how) {
+  std::atomic<bool> failed{false};
+  std::atomic<int> others{0};
+  auto sim = std::make_unique<rc::Simulation>(rc::connect(url, {.name = "", .timeout = 60.0}));
+  const rc::Robot robot = sim->robot("p3at");
+  const auto odometry = robot.odometry();
+  odometry
+      .on_sample([&](const rc::Odometry&) {
+        if (!failed.exchange(true)) throw std::logic_error("a fault of the user's");
+      })
+      .keep();
+  odometry.on_sample([&](const rc::Odometry&) { ++others; }).keep();
+  while (!failed && how != "sleep") pause_for(0.01);
+  if (how != "sleep") pause_for(0.3);  // that it is kept
+  if (how == "forget") {
+    static_cast<void>(sim.release());
+    std::exit(0);  // what the callbacks refer to stays
+  }
+  if (how == "close") {
+    report("raised", [&] { sim->close(); });
+    report("once", [&] { sim->close(); });
+  } else if (how == "other") {
+    try {
+      const auto there = std::move(sim);
+      throw std::out_of_range("another fault");
+    } catch (const std::out_of_range& error) {
+      say("won", error.what());
+    }
+  } else if (how != "leave") {
+    report("raised", [&] {
+      if (how == "latest") static_cast<void>(odometry.latest());
+      if (how == "sleep") sim->sleep(kPatience);
+      if (how == "command") robot.set_velocity(0.0, 0.0);
+      if (how == "request") static_cast<void>(sim->state());
+    });
+    report("once", [&] { static_cast<void>(odometry.latest()); });
+    say("others", others > 1);
+  }
+}
+
+// The run does, while a call waits for it.
+void ends(const std::string& url, const std::string& call) {
+  std::atomic<bool> ended{false};
+  rc::Simulation sim = rc::connect(url, {.name = "", .timeout = 60.0});
+  const rc::Robot robot = sim.robot("p3at");
+  if (call == "uncaught_failed") {
+    robot.odometry()
+        .on_sample([&](const rc::Odometry&) {
+          while (!ended) pause_for(0.01);
+          throw std::logic_error("a fault of the user's");
+        })
+        .keep();
+  }
+  if (!sim.lockstep()) sim.resume();
+  say("joined");
+  if (call.rfind("uncaught", 0) == 0) {
+    try {
+      sim.sleep(kPatience);
+    } catch (...) {
+      ended = true;
+      pause_for(0.3);
+      throw;
+    }
+  }
+  report("ended", [&] {
+    while (call == "next") static_cast<void>(robot.odometry().next(kPatience));
+    if (call == "sleep") sim.sleep(kPatience);
+    if (call == "wait") robot.advance(5.0, {.speed = 0.01}).wait();
+    while (call == "step") static_cast<void>(sim.step(20));
+  });
+  report("request", [&] { static_cast<void>(sim.state()); });
+}
+
+// Sim time does.
+void stands(const std::string& url, const std::string& call) {
+  rc::Simulation sim = rc::connect(url, {.name = "waits", .timeout = 60.0});
+  const rc::Motion motion = sim.robot("p3at").advance(1.0);
+  if (call == "stepped") static_cast<void>(sim.step(1));
+  report("timeout", [&] { motion.wait(1.2); });
+  std::thread closing([&] {
+    pause_for(8.0);
+    sim.close();
+  });
+  report("ended", [&] { call == "wait" ? static_cast<void>(motion.wait()) : sim.sleep(1.0); });
+  closing.join();
+}
+
 void act(const std::string& url, const std::string& command, const std::vector<std::string>& a) {
   if (command == "launch") launched(a);
   if (command == "launch_with") return launched_with(a[0], a.size() > 1 ? a[1] : "");
@@ -595,6 +694,13 @@ void act(const std::string& url, const std::string& command, const std::vector<s
 
 int main(int argc, char** argv) {
   if (argc < 3) return 2;
+  const std::string command = argv[2];
+  void (*const of_endings)(const std::string&, const std::string&) = command == "fails"  ? fails
+                                                                     : command == "ends" ? ends
+                                                                     : command == "stands"
+                                                                         ? stands
+                                                                         : nullptr;
+  if (of_endings) return of_endings(argv[1], argv[3]), 0;
   bool failed = true;
   report("failed", [&] {
     act(argv[1], argv[2], {argv + 3, argv + argc});

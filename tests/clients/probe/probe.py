@@ -5,6 +5,7 @@ Probe.java are its twins, with the same commands and output.
 import itertools
 import math
 import sys
+import threading
 import time
 import zlib
 
@@ -458,8 +459,106 @@ def apart(url, name):
             advance(own, first.robot(name))
 
 
+def fails(url, how):
+    """In a callback. how: what the program does then."""
+    failed, others = threading.Event(), []
+
+    def callback(_):
+        if not failed.is_set():
+            failed.set()
+            raise ValueError("a fault of the user's")
+
+    def see(sim):
+        sim.robot("p3at").odometry.on_sample(callback)
+        sim.robot("p3at").odometry.on_sample(others.append)
+        if how != "sleep":  # while that waits
+            failed.wait(PATIENCE)
+            time.sleep(0.3)  # that it is kept
+
+    sim = ruedo.connect(url, timeout=60.0)
+    if how == "forget":
+        see(sim)
+        return
+    if how == "close":
+        see(sim)
+        attempt("raised", sim.close)
+        attempt("once", sim.close)
+        return
+    try:
+        with sim:
+            see(sim)
+            if how == "other":
+                raise LookupError("another fault")
+            if how == "leave":
+                return
+            odometry = sim.robot("p3at").odometry
+            calls = {
+                "latest": odometry.latest,
+                "sleep": lambda: sim.sleep(PATIENCE),
+                "command": lambda: sim.robot("p3at").set_velocity(0.0, 0.0),
+                "request": sim.state,
+            }
+            attempt("raised", calls[how])
+            attempt("once", odometry.latest)
+            say("others", len(others) > 1)
+    except LookupError as error:
+        say("won", error)
+
+
+def ends(url, call):
+    """The run, while a call waits for it."""
+    with ruedo.connect(url, timeout=60.0) as sim:
+        robot, ended = sim.robot("p3at"), threading.Event()
+
+        def fail(_):
+            ended.wait(PATIENCE)
+            raise ValueError("a fault of the user's")
+
+        def read():
+            while True:
+                robot.odometry.next(PATIENCE)
+
+        def step():
+            while True:
+                sim.step(20)
+
+        if call == "uncaught_failed":
+            robot.odometry.on_sample(fail)
+        if not sim.lockstep:
+            sim.resume()
+        say("joined")
+        if call.startswith("uncaught"):
+            try:
+                sim.sleep(PATIENCE)
+            finally:
+                ended.set()
+                time.sleep(0.3)
+        calls = {
+            "next": read,
+            "sleep": lambda: sim.sleep(PATIENCE),
+            "wait": lambda: robot.advance(5.0, speed=0.01).wait(),
+            "step": step,
+        }
+        attempt("ended", calls[call])
+        attempt("request", sim.state)
+
+
+def stands(url, call):
+    """Sim time."""
+    with ruedo.connect(url, name="waits", timeout=60.0) as sim:
+        motion = sim.robot("p3at").advance(1.0)
+        if call == "stepped":
+            sim.step(1)
+        attempt("timeout", lambda: motion.wait(1.2))
+        threading.Timer(8.0, sim.close).start()
+        attempt("ended", motion.wait if call == "wait" else lambda: sim.sleep(1.0))
+
+
 def main():
     url, command, *rest = sys.argv[1:]
+    if command in ("fails", "ends", "stands"):
+        {"fails": fails, "ends": ends, "stands": stands}[command](url, *rest)
+        return
     try:
         if command == "apart":
             apart(url, *rest)

@@ -27,6 +27,14 @@ public final class Lifetimes {
 
     private Lifetimes() {}
 
+    private static void readUntilThrown(Stream<Odometry> odometry) {
+        try {
+            while (true) odometry.next(PATIENCE);
+        } catch (RuedoException.CallbackException error) {
+            System.out.println("thrown " + error.getMessage());
+        }
+    }
+
     private static void callbacks(Simulation sim) {
         Stream<Odometry> odometry = sim.robot("p3at").odometry();
         AtomicInteger heard = new AtomicInteger();
@@ -34,10 +42,11 @@ public final class Lifetimes {
         try (Subscription first =
                         odometry.onSample(
                                 sample -> {
-                                    failed.incrementAndGet();
-                                    throw new AssertionError("a fault of the user's");
+                                    if (failed.incrementAndGet() == 1)
+                                        throw new AssertionError("a fault of the user's");
                                 });
                 Subscription second = odometry.onSample(sample -> heard.incrementAndGet())) {
+            readUntilThrown(odometry);
             while (heard.get() < 3) odometry.next(PATIENCE);
             System.out.println("open " + !first.closed() + " " + !second.closed());
         }
@@ -210,9 +219,9 @@ public final class Lifetimes {
         AtomicInteger failed = new AtomicInteger();
         odometry.onSample(
                 sample -> {
-                    failed.incrementAndGet();
-                    throw new Unspeakable();
+                    if (failed.incrementAndGet() == 1) throw new Unspeakable();
                 });
+        readUntilThrown(odometry);
         while (failed.get() < 3) odometry.next(PATIENCE);
         System.out.println("goes on");
     }

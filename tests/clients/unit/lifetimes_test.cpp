@@ -504,7 +504,7 @@ TEST_F(Lifetimes, ACallbackOfANewRunMayDestroyTheSimulation) {
   EXPECT_FALSE(sim);
 }
 
-TEST_F(Lifetimes, WhatACallbackThrowsIsSaidOnceAndHurtsNobody) {
+TEST_F(Lifetimes, WhatACallbackThrowsTheNextCallThrowsAndItHurtsNobody) {
   const Simulation sim = simulation(server);
   const auto odometry = sim.robot("p3at").odometry();
   int heard = 0;
@@ -516,11 +516,13 @@ TEST_F(Lifetimes, WhatACallbackThrowsIsSaidOnceAndHurtsNobody) {
   for (int i = 1; i <= 3; ++i) server->send_odometry("p3at", 1000 * i, 0.0);
   server->await_delivery();
   EXPECT_EQ(testing::internal::GetCapturedStderr(),
-            "ruedo: a callback on p3at/odometry failed: a fault of the user's; it is called on, "
-            "and this is said once\n"
             "ruedo: a callback on p3at/odometry failed: what it threw is no std::exception; it is "
-            "called on, and this is said once\n");
+            "called on, and this is said once\n"
+            "ruedo: a callback on p3at/odometry failed: a fault of the user's; it is called on, "
+            "and this is said once\n");
   EXPECT_EQ(heard, 3);
+  EXPECT_THROW((void)odometry.latest(), std::runtime_error);
+  EXPECT_EQ(odometry.latest().utime, 3000);
 }
 
 TEST_F(Lifetimes, EachReaderHasACursorOfItsOwn) {

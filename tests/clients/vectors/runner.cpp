@@ -206,6 +206,8 @@ void converse(int argc, char** argv) {
     }
   } catch (const LeaseLost& error) {
     std::fprintf(stderr, "LeaseLost: %s\n", error.what());
+  } catch (const RunEnded& error) {
+    std::fprintf(stderr, "RunEnded: %s\n", error.what());
   } catch (const NoServer& error) {
     std::fprintf(stderr, "NoServer: %s\n", error.what());
   } catch (const RequestError& error) {

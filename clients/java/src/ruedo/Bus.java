@@ -44,7 +44,8 @@ final class Bus implements Transport.Receiver {
 
     /** Calls handler with all bytes of every message from now on. */
     synchronized Subscription subscribe(String channel, Consumer<byte[]> handler) {
-        Subscription subscription = Subscription.of(channel, handler, one -> leave(channel, one));
+        Subscription subscription =
+                Subscription.of(channel, handler, null, one -> leave(channel, one));
         List<Subscription> all = new ArrayList<>(handlers.getOrDefault(channel, List.of()));
         all.add(subscription);
         if (handlers.put(channel, all) == null) transport.subscribe(channel);

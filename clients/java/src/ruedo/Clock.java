@@ -88,7 +88,7 @@ final class Clock {
             try {
                 while (sleeper.left > 0) {
                     never.waitOn(this, 500);
-                    check.run();
+                    if (sleeper.left > 0) check.run();
                 }
             } finally {
                 sleepers.remove(sleeper);

@@ -16,7 +16,16 @@ final class Faults {
         }
     }
 
-    private static String described(Throwable error) {
+    /** Where it was thrown. */
+    static void trace(Throwable error) {
+        try {
+            error.printStackTrace();
+        } catch (Throwable again) {
+            // its description throws in its turn
+        }
+    }
+
+    static String described(Throwable error) {
         try {
             return error.toString();
         } catch (Throwable again) {

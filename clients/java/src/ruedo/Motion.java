@@ -99,6 +99,7 @@ public final class Motion {
      *
      * @throws RuedoException.MotionError when it ended early or was refused
      * @throws RuedoException.Timeout when it still runs; the robot goes on then
+     * @throws RuedoException.RunEnded when the run has
      */
     public Motion await(double timeout) {
         synchronized (lock) {
@@ -126,17 +127,26 @@ public final class Motion {
 
     private void awaitEnd(double timeout) {
         Deadline deadline = new Deadline(timeout);
+        sim.checkCallbacks();
         if (!done()) sim.progress.waits();
+        Standstill standstill = sim.standstill(robot + ": await() for " + kind);
         while (!done()) {
             sim.checkMayWait();
             if (deadline.passed()) {
+                String why = standstill.reason();
                 throw new RuedoException.Timeout(
                         String.format(
-                                "%s: %s was not done within %s s (%.3f remain)",
-                                robot, kind, Deadline.text(timeout), remaining));
+                                "%s: %s was not done within %s s (%.3f remain%s)",
+                                robot,
+                                kind,
+                                Deadline.text(timeout),
+                                remaining,
+                                why.isEmpty() ? "" : "; " + why));
             }
             deadline.waitOn(lock, 500);
+            if (done()) return;
             sim.checkServer();
+            if (timeout == Double.POSITIVE_INFINITY) standstill.look();
         }
     }
 

@@ -1,13 +1,19 @@
 package ruedo;
 
+import java.util.Set;
+import java.util.concurrent.ConcurrentHashMap;
+
 /** The end of the program: what it waits for, and whether it has begun. */
 final class ProgramEnd {
+    private static final Set<Thread> HOOKS = ConcurrentHashMap.newKeySet();
+
     private ProgramEnd() {}
 
     /** From now on it runs the thread, and waits for it. False: it has begun. */
     static boolean waitsFor(Thread thread) {
         try {
             Runtime.getRuntime().addShutdownHook(thread);
+            HOOKS.add(thread);
             return true;
         } catch (IllegalStateException error) {
             return false;
@@ -16,7 +22,7 @@ final class ProgramEnd {
 
     static void waitsNoMoreFor(Thread thread) {
         try {
-            Runtime.getRuntime().removeShutdownHook(thread);
+            if (Runtime.getRuntime().removeShutdownHook(thread)) HOOKS.remove(thread);
         } catch (IllegalStateException error) {
             // it has begun
         }
@@ -27,5 +33,41 @@ final class ProgramEnd {
         if (!waitsFor(thread)) return true;
         waitsNoMoreFor(thread);
         return false;
+    }
+
+    /** In one of these threads, until the others have ended. */
+    static void awaitOthers(long mostMillis) {
+        Deadline deadline = new Deadline(mostMillis * 1e-3);
+        for (Thread hook : HOOKS) {
+            if (hook != Thread.currentThread())
+                Uninterrupted.get(
+                        () -> {
+                            while (hook.getState() != Thread.State.TERMINATED && !deadline.passed())
+                                hook.join(10); // at once for one that has not begun
+                            return true;
+                        });
+        }
+    }
+
+    /**
+     * From now on an uncaught RunEnded ends the program, or its thread, as if it were done. What a
+     * callback threw, which close() has added to it, counts.
+     */
+    static void comesWithTheRun() {
+        Thread.UncaughtExceptionHandler otherwise = Thread.getDefaultUncaughtExceptionHandler();
+        Thread.setDefaultUncaughtExceptionHandler(
+                (thread, error) -> {
+                    boolean isDone =
+                            error instanceof RuedoException.RunEnded
+                                    && error.getSuppressed().length == 0;
+                    if (isDone && thread.getName().equals("main")) System.exit(0);
+                    if (isDone) return;
+                    if (otherwise != null) {
+                        otherwise.uncaughtException(thread, error);
+                    } else {
+                        System.err.print("Exception in thread \"" + thread.getName() + "\" ");
+                        error.printStackTrace();
+                    }
+                });
     }
 }

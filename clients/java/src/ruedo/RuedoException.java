@@ -11,11 +11,33 @@ public class RuedoException extends RuntimeException {
         super(text);
     }
 
+    RuedoException(String text, Throwable cause) {
+        super(text, cause);
+    }
+
+    /** What a callback threw, which is the cause; thrown by the next call of its simulation. */
+    public static final class CallbackException extends RuedoException {
+        private static final long serialVersionUID = 1L;
+
+        CallbackException(String text, Throwable cause) {
+            super(text, cause);
+        }
+    }
+
     /** No server answered, or it fell silent or ended. */
-    public static final class NoServer extends RuedoException {
+    public static class NoServer extends RuedoException {
         private static final long serialVersionUID = 1L;
 
         NoServer(String text) {
+            super(text);
+        }
+    }
+
+    /** The run is over: its server has said so, or ended with exit code 0. */
+    public static final class RunEnded extends NoServer {
+        private static final long serialVersionUID = 1L;
+
+        RunEnded(String text) {
             super(text);
         }
     }

@@ -195,6 +195,11 @@ final class ServerProcess {
                 + "`)";
     }
 
+    /** Whether it has ended with exit code 0. */
+    synchronized boolean isDone() {
+        return !process.isAlive() && process.exitValue() == 0;
+    }
+
     /** Closes the pipe, which ends the server; kills it when it has not ended after 5 s. */
     synchronized void end() {
         try {

@@ -167,6 +167,10 @@ final class Session {
         } catch (IOException error) {
             return;
         }
+        if (received.code == reply_t.ENDED && received.session == 0) { // nobody asked
+            sim.noteEnd(received.text);
+            return;
+        }
         synchronized (news) {
             boolean ours = received.kind == request_t.JOIN || received.session == session;
             if (!ours) return;
@@ -221,7 +225,8 @@ final class Session {
                 }
                 publish(kind, toSession, number, body);
                 deadline.waitOn(news, REPEAT_MILLIS);
-                sim.checkServer();
+                sim.checkOpen();
+                if (reply == null) sim.checkServer(); // else the run may have ended since
             }
             awaitedKind = 0;
             return reply;
@@ -287,6 +292,7 @@ final class Session {
                 kind
                         + ": "
                         + (reply.text.isEmpty() ? "refused with code " + reply.code : reply.text);
+        if (reply.code == reply_t.ENDED) throw new RuedoException.RunEnded(text);
         if (reply.code == reply_t.NOT_SUPPORTED) throw new RuedoException.NotSupported(text);
         throw new RuedoException.RequestError(text, reply.code);
     }

@@ -24,6 +24,7 @@ import java.util.concurrent.ConcurrentHashMap;
 import java.util.concurrent.CountDownLatch;
 import java.util.concurrent.atomic.AtomicBoolean;
 import java.util.concurrent.atomic.AtomicLong;
+import java.util.function.Supplier;
 
 /**
  * A running simulation. Made by {@link Ruedo#connect} or {@link Ruedo#launch}; thread safe. close()
@@ -43,6 +44,10 @@ public final class Simulation implements AutoCloseable {
     private static final double SLOW_REPLY_SECONDS = 60.0;
     private static final double RESTORE_SECONDS = 3600.0;
 
+    static {
+        if ("1".equals(System.getenv("RUEDO_REGRESS"))) ProgramEnd.comesWithTheRun();
+    }
+
     /** Where it is. */
     public final String url;
 
@@ -51,6 +56,7 @@ public final class Simulation implements AutoCloseable {
     final Progress progress = new Progress();
     final Clock clock = new Clock(progress);
     final CallbackQueue callbacks = new CallbackQueue();
+    final CallbackFaults faults = new CallbackFaults();
     private final Address address;
     private final ServerProcess server; // null: not ours
     private final Session session;
@@ -77,6 +83,7 @@ public final class Simulation implements AutoCloseable {
     private final RunWatch watch = new RunWatch(this::tellAnotherServer);
     private final AtomicBoolean closing = new AtomicBoolean();
     private volatile boolean closed;
+    private volatile String over; // the server's last word on the run; null: it has not said it
     private final CountDownLatch ended = new CountDownLatch(1); // all that close() ends
 
     Simulation(String url, String name, double timeout, ServerProcess server) {
@@ -186,15 +193,26 @@ public final class Simulation implements AutoCloseable {
      */
     public Subscription onNewRun(Runnable callback) {
         checkOpen();
-        Subscription subscription = Subscription.of("a new run", callback, newRun::remove);
+        Subscription subscription = Subscription.of("a new run", callback, faults, newRun::remove);
         newRun.add(subscription);
         return subscription;
     }
 
-    /** Waits until so many seconds of sim time have passed. */
+    /**
+     * Waits until so many seconds of sim time have passed. Prints a warning where that stands still
+     * for 5 s of real time, with the reason.
+     *
+     * @throws RuedoException.RunEnded when the run has
+     */
     public void sleep(double seconds) {
         checkMayWait();
-        clock.sleep(Math.round(seconds * 1e6), this::checkServer);
+        Standstill standstill = standstill("sleep()");
+        clock.sleep(
+                Math.round(seconds * 1e6),
+                () -> {
+                    checkServer();
+                    standstill.look();
+                });
     }
 
     // Control.
@@ -410,7 +428,11 @@ public final class Simulation implements AutoCloseable {
 
     /** Ends the server. */
     public void quit() {
-        session.request(request_t.QUIT, null, REPLY_SECONDS);
+        try {
+            session.request(request_t.QUIT, null, REPLY_SECONDS);
+        } catch (RuedoException.RunEnded ended) {
+            // its last word may come before the reply, or without
+        }
     }
 
     /**
@@ -418,6 +440,9 @@ public final class Simulation implements AutoCloseable {
      * leaves nothing behind either: the watchdog stops its robots, and its server ends with the
      * pipe to it. Waits for a callback that is running. In a callback it returns at once, and the
      * end follows by itself; a second call waits for it.
+     *
+     * @throws RuedoException.CallbackException for what a callback threw, and no call has thrown
+     *     since
      */
     @Override
     public void close() {
@@ -433,6 +458,7 @@ public final class Simulation implements AutoCloseable {
         if (CallbackQueue.inAnyCallback()) return;
         Uninterrupted.get(this::awaitEnd);
         callbacks.awaitCallback();
+        checkCallbacks();
     }
 
     private void sayClosed() {
@@ -522,8 +548,17 @@ public final class Simulation implements AutoCloseable {
         return closed;
     }
 
+    /**
+     * At the beginning of a call, and while it waits. Throws NoServer, and what a callback threw.
+     */
     void checkOpen() {
+        checkCallbacks();
         if (closed) throw new RuedoException.NoServer("this simulation was closed");
+    }
+
+    /** Throws what one of them threw. */
+    void checkCallbacks() {
+        if (!isCalledBack()) faults.rethrow();
     }
 
     /**
@@ -541,7 +576,9 @@ public final class Simulation implements AutoCloseable {
 
     void checkServer() {
         checkOpen();
+        if (over != null) throw new RuedoException.RunEnded(over);
         String ended = server == null ? null : server.ended();
+        if (ended != null && server.isDone()) throw new RuedoException.RunEnded(ended);
         if (ended != null) throw new RuedoException.NoServer(ended);
         if (clock.silence() > SILENCE_SECONDS && !isThere()) {
             throw new RuedoException.NoServer(
@@ -562,11 +599,34 @@ public final class Simulation implements AutoCloseable {
         return there;
     }
 
-    String whatIsKnown(double rate) {
+    /** The server's last word. */
+    void noteEnd(String text) {
+        over = text + ", at " + url;
+    }
+
+    /** For a call that waits for sim time. */
+    Standstill standstill(String call) {
+        return new Standstill(clock, call, () -> whyItStands(stepper::whoseTurn));
+    }
+
+    private String whyItStands(Supplier<String> inLockstep) {
         double silence = clock.silence();
         if (silence > 3.0)
             return String.format("nothing at all was heard from the server for %.1f s", silence);
         if (paused()) return "the simulation is paused";
+        return lockstep() ? inLockstep.get() : "";
+    }
+
+    String whatIsKnown(double rate) {
+        String why =
+                whyItStands(
+                        () ->
+                                String.format(
+                                        "in lockstep it stands still between calls of step(), whose"
+                                            + " observations have the samples, as in"
+                                            + " sim.step(20).latest(robot.lrf()); it is at %.2f s",
+                                        time()));
+        if (!why.isEmpty()) return why;
         return rate > 0.0
                 ? String.format(
                         "its rate is %s Hz of sim time, which is now %.2f s",
@@ -641,6 +701,7 @@ public final class Simulation implements AutoCloseable {
         List<Driver> all;
         List<StreamCore<?>> known;
         watch.begin();
+        over = null;
         clock.reset(info().head.utime);
         synchronized (robots) {
             all = new ArrayList<>(drivers.values());
@@ -740,7 +801,7 @@ public final class Simulation implements AutoCloseable {
             watch.hearOwn();
             return true;
         }
-        boolean isOver = watch.hearAnother(runId);
+        boolean isOver = watch.hearAnother(runId) || over != null;
         if (System.nanoTime() - asked > ASK_AGAIN_NANOS) askInfo(); // which of the two is there
         return isOver && mayTakeOver;
     }

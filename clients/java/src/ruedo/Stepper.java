@@ -166,6 +166,19 @@ final class Stepper {
         }
     }
 
+    /** For whose grant the run waits, as far as this client knows. */
+    synchronized String whoseTurn() {
+        String name = session.name();
+        if (!part) {
+            return "in lockstep the clients that take part grant each step, and this one, '"
+                    + name
+                    + "', does not: step() takes part";
+        }
+        return have < wantedUntil && !waitsFor.isEmpty()
+                ? "in lockstep it waits for " + waitsFor
+                : "in lockstep it waits for the next step() of this client, '" + name + "'";
+    }
+
     /** The client has reset the world: the next step joins again. */
     synchronized void forget() {
         part = false;
@@ -650,6 +663,7 @@ final class Stepper {
         String text = (reply.kind == request_t.GRANT ? "GRANT: " : "RESEND: ") + reply.text;
         if (reply.code == reply_t.UNKNOWN_SESSION)
             return new RuedoException.LeaseLost(text, reply.code);
+        if (reply.code == reply_t.ENDED) return new RuedoException.RunEnded(text);
         if (reply.code == reply_t.WRONG_RUN || reply.code == reply_t.REFUSED)
             return new RuedoException.NoServer(text);
         return new RuedoException.RequestError(text, reply.code);

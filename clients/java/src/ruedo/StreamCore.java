@@ -88,16 +88,17 @@ final class StreamCore<T extends Sample> {
     }
 
     Subscription onSample(Consumer<? super T> callback) {
-        return add(callbacks, callback);
+        return add(callbacks, callback, sim.faults);
     }
 
     /** In the receiving thread, for what is this package's own. */
     Subscription onArrival(Consumer<? super T> callback) {
-        return add(arrivals, callback);
+        return add(arrivals, callback, null);
     }
 
-    private Subscription add(List<Subscription> all, Consumer<? super T> callback) {
-        Subscription subscription = Subscription.of(channel, callback, all::remove);
+    private Subscription add(
+            List<Subscription> all, Consumer<? super T> callback, CallbackFaults faults) {
+        Subscription subscription = Subscription.of(channel, callback, faults, all::remove);
         subscribe();
         all.add(subscription);
         return subscription;
@@ -287,7 +288,8 @@ final class StreamCore<T extends Sample> {
                     waiting.add(me);
                 }
                 deadline.waitOn(this, 500);
-                sim.checkServer();
+                sim.checkOpen();
+                if (!serves(reader, newOne, notBefore)) sim.checkServer(); // or the run has ended
             }
         } finally {
             waiting.remove(me);
