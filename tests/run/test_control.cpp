@@ -314,18 +314,20 @@ TEST_F(ControlTest, ControlOff) {
   wait();
   EXPECT_EQ(last_words().size(), 1u);
   for (const Message& message : bus_.messages()) {
-    if (message.channel == "ruedo/reply")
-      EXPECT_EQ(decoded<reply_t>(message.bytes).code, reply_t::ENDED);
+    if (message.channel != "ruedo/reply") continue;
+    EXPECT_EQ(decoded<reply_t>(message.bytes).code, reply_t::ENDED);
   }
 }
 
 TEST_F(ControlTest, TheLastWordOfARunSaysThatItHasEnded) {
-  begin(fast(0.1));
-  wait();
+  begin(paused());
+  join();
+  const int64_t run_id = info().run_id;
+  end();
   EXPECT_EQ(bus_.messages().back().channel, "ruedo/reply");
   ASSERT_EQ(last_words().size(), 1u);
   const reply_t last = last_words().front();
-  EXPECT_EQ(last.run_id, server_->run_id());
+  EXPECT_EQ(last.run_id, run_id);
   EXPECT_EQ(last.session, 0);
   EXPECT_EQ(last.sequence, 0);
   EXPECT_EQ(last.kind, 0);
