@@ -6,14 +6,18 @@ The first takes the place of {} and gives that exit code and that text; the seco
 gate a tenth of the rows is tried (RUEDO_EXAM=PART/OF, chosen by the commit).
 """
 
+import atexit
+import functools
 import os
 import shlex
 import shutil
 import subprocess
 import sys
+import tempfile
 from dataclasses import dataclass
 from pathlib import Path
 
+import lcm
 import pytest
 
 RUEDO = os.environ["RUEDO"]
@@ -85,16 +89,81 @@ def ruedo(line, folder):
     return run([RUEDO, *words(line)], folder)
 
 
-def shell(line, folder):
-    """As it is; $RUEDO is the program."""
-    return run(["bash", "-c", line], folder)
+def logs(line, folder):
+    """In a folder with logs: a.lcm and its equal b.lcm, other.lcm of another seed, and what is cut, has
+    its header alone, no message, or no byte."""
+    for log in recorded().iterdir():
+        shutil.copy(log, folder)
+    return run([RUEDO, *words(line)], folder)
 
 
-FRONTS = {"regress": regress, "ruedo": ruedo, "shell": shell}
+def cmake(line, folder):
+    """The arguments of ruedo_add_regression() in a project, which is configured and tested."""
+    (folder / "CMakeLists.txt").write_text(
+        "cmake_minimum_required(VERSION 3.22)\nproject(exam NONE)\nfind_package(ruedo REQUIRED)\n"
+        "enable_testing()\nruedo_add_regression(NAME exam WORLD box.sdf DURATION 5 "
+        f"OPTIONS --disable p3at/camera {line})\n"
+    )
+    code, said = run(["cmake", "-B", "build", f"-DCMAKE_PREFIX_PATH={installed()}"], folder)
+    said = " ".join(said.split())
+    if code == 0:
+        code, more = run(["ctest", "--test-dir", "build", "--output-on-failure"], folder)
+        said += more
+    return min(code, 1), said
+
+
+def pytest_(line, folder):
+    """The arguments of the fixture ruedo_regression in a test."""
+    (folder / "test_it.py").write_text(
+        f"PYTHON = {sys.executable!r}\n\n\ndef test_it(ruedo_regression):\n"
+        f'    ruedo_regression("box.sdf", options=["--disable", "p3at/camera"], {line})\n'
+    )
+    return run([sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", "test_it.py"], folder)
+
+
+FRONTS = {"regress": regress, "logs": logs, "cmake": cmake, "pytest": pytest_}
 
 
 def words(line):
     return shlex.split(line)
+
+
+@functools.cache
+def installed():
+    """The folder of an installation."""
+    folder = Path(tempfile.mkdtemp(prefix="ruedo-exam-"))
+    atexit.register(shutil.rmtree, folder)
+    build = os.environ["RUEDO_BINARY_DIR"]
+    subprocess.run(["cmake", "--install", build, "--prefix", folder], check=True, capture_output=True)
+    return folder
+
+
+@functools.cache
+def recorded():
+    """A folder of logs."""
+    folder = Path(tempfile.mkdtemp(prefix="ruedo-exam-"))
+    atexit.register(shutil.rmtree, folder)
+    for name, seed in (("a", 1), ("other", 2)):
+        command = [RUEDO, "run", HERE / "files/box.sdf", "--rate", "max", "--duration", "1", "--quiet"]
+        command += ["--disable", "p3at/camera", "--seed", str(seed), "--record", f"{name}.lcm"]
+        subprocess.run(command, check=True, cwd=folder, capture_output=True)
+    whole = (folder / "a.lcm").read_bytes()
+    (folder / "b.lcm").write_bytes(whole)
+    (folder / "cut.lcm").write_bytes(whole[: len(whole) // 2])
+    (folder / "no_byte.lcm").write_bytes(b"")
+    write(folder / "header.lcm", lambda event: event.channel == "ruedo/header", folder / "a.lcm")
+    write(folder / "no_message.lcm", lambda event: False, folder / "a.lcm")
+    write(folder / "poses.lcm", lambda event: event.channel == "p3at/pose", folder / "a.lcm")
+    return folder
+
+
+def write(path, keeps, log):
+    """The events of a log that are kept."""
+    new = lcm.EventLog(str(path), "w", overwrite=True)
+    for event in lcm.EventLog(str(log), "r"):
+        if keeps(event):
+            new.write_event(event.timestamp, event.channel, event.data)
+    new.close()
 
 
 @pytest.mark.parametrize("row", chosen(), ids=lambda row: f"{row.front}-{row.name}")

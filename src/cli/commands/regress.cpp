@@ -40,6 +40,7 @@
 #include "run/run.h"
 #include "system/isolation.h"
 #include "system/output_file.h"
+#include "system/temporary_folder.h"
 #include "system/to_stderr.h"
 
 namespace ruedo::cli {
@@ -428,18 +429,23 @@ void tell(const RegressArguments& arguments, const judge::Verdict& verdict) {
   if (!arguments.junit.empty())
     write_file(arguments.junit, judge::to_junit(verdict, arguments.world.world));
   if (verdict.passed())
-    fmt::print("passed: {}\nThe run is in {}\n", for_terminal(verdict.evidence()),
-               arguments.record);
+    fmt::print("passed: {}\n", for_terminal(verdict.evidence()));
 }
 
-int regress(const RegressArguments& arguments) {
+int regress(RegressArguments arguments) {
+  const bool keeps_log = !arguments.record.empty();
+  std::optional<TemporaryFolder> scratch;  // for who reads the log after the run
+  if (!keeps_log && !(arguments.golden.empty() && arguments.script.empty())) {
+    scratch.emplace("regress");
+    arguments.record = *scratch / "run.lcm";
+  }
   const bool isolated = !arguments.shared_network && isolate();
   SignalThread signals;  // after isolate(), which wants to be alone
   const auto rules = log::DiffRule::all(arguments.tolerances, arguments.ignored);
   const bool renew = is_told_to_renew() || arguments.renew;
   const std::shared_ptr<const world::WorldModel> world = load(arguments.world);
-  check_output(arguments.record);
-  check_files_beside(arguments);
+  if (!arguments.record.empty()) check_output(arguments.record);
+  if (keeps_log) check_files_beside(arguments);
   print_findings(world->findings);
   judge::Judge judge(world, expectations(arguments));
   judge::Verdict verdict;
@@ -450,16 +456,17 @@ int regress(const RegressArguments& arguments) {
   }
   std::vector<judge::Check> checks = run(arguments, world, isolated, judge, signals);
   if (const int signal = signals.told()) {
-    to_stderr("ruedo: the run was ended by a signal; its log up to there is {}\n",
-              arguments.record);
+    to_stderr("ruedo: the run was ended by a signal{}\n",
+              keeps_log ? "; its log up to there is " + arguments.record : "");
     return 128 + signal;
   }
   verdict = judge.verdict();
   if (arguments.client.empty()) verdict.checks.front().text += " without a client";
   verdict.checks.insert(verdict.checks.begin() + 1, checks.begin(), checks.end());
   add_files(arguments, rules, renew, verdict);
-  if (!verdict.passed() && !arguments.no_page) attach_page(arguments.record);
+  if (!verdict.passed() && keeps_log && !arguments.no_page) attach_page(arguments.record);
   tell(arguments, verdict);
+  if (verdict.passed() && keeps_log) fmt::print("The run is in {}\n", arguments.record);
   return verdict.passed() ? kGood : kCheckFailed;
 }
 
@@ -485,7 +492,7 @@ void add_course(CLI::App& command, RegressArguments& a) {
   command.add_option("--rate", a.rate, "sim time per real time, or max")
       ->type_name("R|max")
       ->capture_default_str();
-  command.add_option("--record", a.record, "the log of the run")->type_name("FILE")->required();
+  command.add_option("--record", a.record, "the log of the run (default: none)")->type_name("FILE");
   command
       .add_option("--lockstep", a.lockstep,
                   "wait for this many clients, then advance as far as all of them allow")

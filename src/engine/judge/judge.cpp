@@ -147,13 +147,15 @@ void Judge::see_clearance(const Snapshot& snapshot) {
 }
 
 void Judge::see_contacts(const Snapshot& snapshot) {
+  const Pose& X_WBase = snapshot.robots[robot_].X_WBase;
+  const Vec3 up = X_WBase.rotation * Vec3::UnitZ();
   for (const Contact& contact : snapshot.contacts) {
     if (!own_.has(contact.link_a) || !own_.has(contact.link_b)) continue;
     const bool a = own_[contact.link_a], b = own_[contact.link_b];
     if (a == b) continue;
-    // What carries it presses upwards on a wheel, or from below anywhere (castors).
-    if (std::abs(contact.normal.z()) > 0.7 &&
-        contact.position.z() < snapshot.robots[robot_].X_WBase.translation.z() + 0.02)
+    // What carries it presses upwards, low on the robot: as physics::Distances has it.
+    if (std::abs(contact.normal.dot(up)) > 0.7 &&
+        (contact.position - X_WBase.translation).dot(up) < 0.02)
       continue;
     if (first_contact_ < 0) first_contact_ = snapshot.time;
     if (!expected_.no_contact) return;

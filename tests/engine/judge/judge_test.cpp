@@ -1,0 +1,433 @@
+// The judge: what it counts as kept, failed and not judged, at the edges of each.
+#include "engine/judge/judge.h"
+
+#include <cmath>
+#include <limits>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "base/channel_names.h"
+#include "ruedo/errors.h"
+#include "ruedo/name_request_t.hpp"
+#include "ruedo/request_t.hpp"
+#include "ruedo/reset_request_t.hpp"
+#include "ruedo/set_pose_request_t.hpp"
+#include "ruedo/set_twist_request_t.hpp"
+#include "ruedo/spawn_request_t.hpp"
+#include "world/load.h"
+
+namespace ruedo::judge {
+namespace {
+
+using testing::HasSubstr;
+
+// A box that stands.
+std::string box(const std::string& name, const std::string& pose, bool moves = true) {
+  return "<model name='" + name + "'><static>" + (moves ? "false" : "true") + "</static><pose>" +
+         pose +
+         "</pose><link name='link'><inertial><mass>1</mass></inertial><collision name='c'>"
+         "<geometry><box><size>1 1 1</size></box></geometry></collision></link></model>";
+}
+
+// A robot whose base_link is its model's frame: a box of 1 m about the point 0.6 m above it.
+std::string robot(const std::string& name, const std::string& pose) {
+  return "<model name='" + name + "'><pose>" + pose +
+         "</pose><link name='base_link'><inertial><pose>0 0 0.6 0 0 0</pose><mass>1</mass></inertial>"
+         "<collision name='c'><pose>0 0 0.6 0 0 0</pose><geometry><box><size>1 1 1</size></box>"
+         "</geometry></collision></link><ruedo:joints/>"
+         "<ruedo:drive type='holonomic'><ruedo:max_speed>1</ruedo:max_speed></ruedo:drive></model>";
+}
+
+std::shared_ptr<const world::WorldModel> world_of(const std::string& models) {
+  return world::load_world_text(
+      "<sdf version='1.9'><world name='w'>" + models + "</world></sdf>", "/tmp/w.sdf");
+}
+
+constexpr SimTime kStep = 5000;  // us
+
+class JudgeTest : public testing::Test {
+ protected:
+  void judge(Expectations expected, const std::string& models = robot("r", "0 0 0 0 0 0") +
+                                                                box("box", "5 0 0.5 0 0 0", false)) {
+    world_ = world_of(models);
+    judge_ = std::make_unique<Judge>(world_, std::move(expected));
+    begin();
+  }
+  // States of the world as it was loaded.
+  void begin() {
+    const world::BodyLayout layout(*world_);
+    state_ = {};
+    state_.step = -1;
+    for (const world::BodyPlacement& body : layout.bodies) state_.bodies.push_back(body.X_WB);
+    state_.wheel_angles.resize(layout.wheels.size());
+    for (const world::RobotPlacement& robot : layout.robots) {
+      RobotState state;
+      state.X_WBase = robot.body.valid() ? state_.bodies[robot.body] * robot.X_BBase : robot.X_BBase;
+      state_.robots.push_back(state);
+    }
+    body_ = layout.robots.at(0).body;
+  }
+  // The next state, with the robot there.
+  void see(double x, double y = 0.0) {
+    ++state_.step;
+    state_.time = state_.step * kStep;
+    state_.robots[RobotIndex(0)].X_WBase.translation = {x, y, 0.0};
+    state_.bodies[body_].translation = {x, y, 0.0};
+    judge_->see(state_);
+    state_.contacts.clear();
+  }
+  void touch(LinkIndex a, LinkIndex b, const Vec3& position, const Vec3& normal) {
+    Contact contact;
+    contact.link_a = a;
+    contact.link_b = b;
+    contact.position = position;
+    contact.normal = normal;
+    state_.contacts.push_back(contact);
+  }
+  template <class Body>
+  void ask(int32_t kind, const Body& body) {
+    applied_t applied{};
+    applied.utime = state_.time;
+    applied.channel = kRequestChannel;
+    applied.kind = kind;
+    applied.data.resize(static_cast<size_t>(body.getEncodedSize()));
+    applied.size = static_cast<int32_t>(applied.data.size());
+    body.encode(applied.data.data(), 0, applied.size);
+    judge_->see(applied);
+  }
+  void say_odometry(SimTime time, double x, double y, int32_t resets = 0,
+                    const std::string& channel = "r/odometry") {
+    odometry_t sample{};
+    sample.utime = time;
+    sample.x = x;
+    sample.y = y;
+    sample.resets = resets;
+    std::vector<uint8_t> bytes(static_cast<size_t>(sample.getEncodedSize()));
+    sample.encode(bytes.data(), 0, static_cast<int>(bytes.size()));
+    judge_->see(channel, bytes);
+  }
+  Check check(const std::string& what) const {
+    for (const Check& each : judge_->verdict().checks)
+      if (each.what == what) return each;
+    return {"", Outcome::not_judged, "there is no such check", {}};
+  }
+  Outcome outcome(const std::string& what) const { return check(what).outcome; }
+
+  std::shared_ptr<const world::WorldModel> world_;
+  std::unique_ptr<Judge> judge_;
+  Snapshot state_;
+  BodyIndex body_;
+};
+
+Expectations goal(double x, double y, double radius, double by_s) {
+  Expectations expected;
+  expected.goals = {{x, y, radius, by_s}};
+  return expected;
+}
+
+TEST_F(JudgeTest, NoStepIsNoPass) {
+  Expectations expected;
+  expected.no_contact = true;
+  expected.clearance = 0.1;
+  expected.odometry_error = 0.1;
+  judge(expected);
+  for (const char* what : {"run", "contact", "clearance", "odometry"})
+    EXPECT_EQ(outcome(what), Outcome::not_judged) << what;
+  see(0.0);  // the initial state is no step
+  for (const char* what : {"run", "contact", "clearance", "odometry"})
+    EXPECT_EQ(outcome(what), Outcome::not_judged) << what;
+  EXPECT_FALSE(judge_->verdict().passed());
+  see(0.0);
+  for (const char* what : {"run", "contact", "clearance"})
+    EXPECT_EQ(outcome(what), Outcome::passed) << what;
+  EXPECT_EQ(check("run").text, "1 steps");
+}
+
+TEST_F(JudgeTest, AGoalIsReachedOnItsCircleAndAtItsTime) {
+  judge(goal(1.0, 0.0, 0.25, 0.01));
+  see(0.0);
+  see(0.749);
+  EXPECT_EQ(outcome("goal 0"), Outcome::failed);
+  see(0.75);  // at 0.01 s
+  EXPECT_EQ(outcome("goal 0"), Outcome::passed);
+
+  judge(goal(1.0, 0.0, 0.25, 0.01));
+  for (const double x : {0.0, 0.0, 0.0, 1.0}) see(x);  // too late
+  const Check late = check("goal 0");
+  EXPECT_EQ(late.outcome, Outcome::failed);
+  EXPECT_EQ(late.time, 10'000);
+  EXPECT_THAT(late.text, testing::Not(HasSubstr("the run ended")));
+
+  judge(goal(1.0, 0.0, 0.25, 9.0));
+  see(0.0);
+  see(0.0);
+  EXPECT_THAT(check("goal 0").text, HasSubstr("the run ended at 0.005 s"));
+}
+
+TEST_F(JudgeTest, EachGoalCounts) {
+  Expectations expected = goal(1.0, 0.0, 0.25, 1.0);
+  expected.goals.push_back({2.0, 1.0, 0.25, 1.0});
+  judge(expected);
+  see(0.0);
+  see(1.0);
+  EXPECT_EQ(outcome("goal 0"), Outcome::passed);
+  EXPECT_EQ(outcome("goal 1"), Outcome::failed);
+  const auto names = [&] {
+    std::vector<std::string> all;
+    for (const Metric& metric : judge_->verdict().metrics) all.push_back(metric.name);
+    return all;
+  };
+  EXPECT_THAT(names(), testing::Not(testing::Contains("goal_time_s")));
+  see(2.0, 1.0);
+  EXPECT_TRUE(judge_->verdict().passed());
+  EXPECT_THAT(names(), testing::Contains("goal_time_s"));
+  for (const Metric& metric : judge_->verdict().metrics) {
+    if (metric.name == "goal_time_s") EXPECT_DOUBLE_EQ(metric.value, 0.01);
+    if (metric.name == "goal_distance_m") EXPECT_DOUBLE_EQ(metric.value, 0.0);
+    if (metric.name == "path_m") EXPECT_DOUBLE_EQ(metric.value, 1.0 + std::sqrt(2.0));
+  }
+}
+
+TEST_F(JudgeTest, WhatCarriesTheRobotIsNoContact) {
+  Expectations expected;
+  expected.no_contact = true;
+  const LinkIndex own(0), other(1);
+  judge(expected);
+  see(0.0);
+  touch(own, other, {0, 0, 0.019}, {0, 0, 1});     // from below
+  touch(other, own, {0, 0, 0.0}, {0, 0, -1});      // the same, told the other way round
+  touch(own, other, {0, 0, 0.0}, {0.7, 0, 0.714});  // of a slope
+  touch(own, own, {0.5, 0, 0.5}, {1, 0, 0});
+  touch(other, other, {5, 0, 0.5}, {1, 0, 0});
+  touch(own, LinkIndex(), {0.5, 0, 0.5}, {1, 0, 0});
+  see(0.0);
+  EXPECT_EQ(outcome("contact"), Outcome::passed);
+  touch(other, own, {0.5, 0, 0.5}, {1, 0, 0});
+  see(0.0);
+  const Check touched = check("contact");
+  EXPECT_EQ(touched.outcome, Outcome::failed);
+  EXPECT_EQ(touched.time, 2 * kStep);
+  EXPECT_EQ(touched.text, "r/base_link touched box/link at (0.500, 0.000, 0.500)");
+  see(0.0);  // once is enough
+  EXPECT_EQ(outcome("contact"), Outcome::failed);
+}
+
+TEST_F(JudgeTest, WhatPressesFromAboveOrFromTheSideIsAContact) {
+  Expectations expected;
+  expected.no_contact = true;
+  for (const auto& [position, normal] : {std::pair(Vec3(0, 0, 0.03), Vec3(0, 0, 1)),
+                                         std::pair(Vec3(0, 0, 1.1), Vec3(0, 0, -1)),
+                                         std::pair(Vec3(0, 0, 0.0), Vec3(0.72, 0, 0.694))}) {
+    judge(expected);
+    see(0.0);
+    touch(LinkIndex(0), LinkIndex(1), position, normal);
+    see(0.0);
+    EXPECT_EQ(outcome("contact"), Outcome::failed) << position.transpose();
+  }
+}
+
+TEST_F(JudgeTest, ClearanceIsTheSmallestDistance) {
+  Expectations expected;
+  expected.clearance = 0.5;
+  judge(expected);
+  see(0.0);
+  see(3.49);  // 0.51 m from the box
+  EXPECT_EQ(outcome("clearance"), Outcome::passed);
+  see(3.6);
+  see(3.0);
+  const Check check = this->check("clearance");
+  EXPECT_EQ(check.outcome, Outcome::failed);
+  EXPECT_EQ(check.time, 2 * kStep);
+  EXPECT_THAT(check.text, HasSubstr("0.400 m from box/link"));
+}
+
+TEST_F(JudgeTest, ModelsThatComeAndGoAreSeen) {
+  Expectations expected;
+  expected.clearance = 0.5;
+  judge(expected);
+  see(0.0);
+  see(0.0);
+  world_ = world_of(robot("r", "0 0 0 0 0 0") + box("box", "5 0 0.5 0 0 0", false) +
+                    box("new", "0 1.2 0.5 0 0 0", false));
+  judge_->see_world(world_, world::BodyLayout(*world_));
+  EXPECT_EQ(outcome("clearance"), Outcome::passed);
+  see(0.0);
+  EXPECT_THAT(check("clearance").text, HasSubstr("0.200 m from new/link"));
+}
+
+TEST_F(JudgeTest, StepsWithoutTheRobotAreNotJudged) {
+  Expectations expected;
+  expected.no_contact = true;
+  judge(expected);
+  see(0.0);
+  world_ = world_of(box("box", "5 0 0.5 0 0 0", false));
+  judge_->see_world(world_, world::BodyLayout(*world_));
+  for (int step = 1; step < 4; ++step) {
+    Snapshot state;
+    state.step = step;
+    state.time = step * kStep;
+    judge_->see(state);
+  }
+  EXPECT_EQ(check("run").text, "3 steps");
+  EXPECT_EQ(outcome("contact"), Outcome::not_judged);
+}
+
+TEST_F(JudgeTest, ARobotThatARequestMovesHasFailed) {
+  const auto asks = [](auto ask) {
+    set_pose_request_t pose{};
+    set_twist_request_t twist{};
+    name_request_t name{};
+    reset_request_t reset{};
+    pose.orientation[0] = 1.0;
+    pose.name = twist.name = name.name = "r";
+    ask(request_t::SET_POSE, pose);
+    ask(request_t::SET_TWIST, twist);
+    ask(request_t::REMOVE, name);
+    ask(request_t::RESET, reset);
+  };
+  asks([&](int32_t kind, const auto& body) {
+    for (const bool allowed : {false, true}) {
+      Expectations expected;
+      expected.allow_requests = allowed;
+      judge(expected);
+      see(0.0);
+      see(0.0);
+      ask(kind, body);
+      EXPECT_EQ(judge_->verdict().passed(), allowed) << kind;
+      EXPECT_THAT(check("run").text, HasSubstr("1 requests changed the run")) << kind;
+      if (!allowed) EXPECT_THAT(check("requests").text, HasSubstr("r was moved by a request"));
+    }
+  });
+}
+
+TEST_F(JudgeTest, WhatARequestDoesElsewhereIsNamed) {
+  judge({});
+  see(0.0);
+  see(0.0);
+  name_request_t name{};
+  name.name = "box";
+  ask(request_t::REMOVE, name);
+  name.name = "r";
+  ask(request_t::RESET_ODOMETRY, name);
+  spawn_request_t spawn{};
+  spawn.name = "new";
+  for (int i = 0; i < 4; ++i) ask(request_t::SPAWN, spawn);
+  ask(request_t::PAUSE, name);  // changes nothing
+  EXPECT_TRUE(judge_->verdict().passed());
+  EXPECT_EQ(check("run").text,
+            "1 steps (6 requests changed the run: REMOVE box, RESET_ODOMETRY r, SPAWN new, SPAWN "
+            "new, SPAWN new, ...)");
+}
+
+TEST_F(JudgeTest, OdometryIsComparedAtItsStamp) {
+  Expectations expected;
+  expected.odometry_error = 0.1;
+  judge(expected);
+  for (int i = 0; i <= 100; ++i) see(0.01 * i);  // 2 m/s
+  say_odometry(2500, 0.005, 0.0);                // between two states
+  say_odometry(0, 0.1, 0.0);                     // just good enough
+  say_odometry(500'000, 1.0, 0.0);
+  say_odometry(600'000, 1.0, 0.0);  // after the last state
+  say_odometry(-100, 0.0, 0.0);
+  EXPECT_EQ(check("odometry").text, "odometry at most 0.100 m off in 5 samples");
+  EXPECT_TRUE(judge_->verdict().passed());
+  say_odometry(252'500, 0.6061, 0.0);  // 0.1011 m
+  const Check check = this->check("odometry");
+  EXPECT_EQ(check.outcome, Outcome::failed);
+  EXPECT_EQ(check.time, 252'500);
+  EXPECT_THAT(check.text, HasSubstr("r's odometry was 0.101 m off"));
+}
+
+TEST_F(JudgeTest, OdometryBeginsWhereTheRobotDoesAndAtItsResets) {
+  Expectations expected;
+  expected.odometry_error = 1e-9;
+  judge(expected, robot("r", "3 1 0 0 0 1.5707963267948966"));
+  const auto at = [&](double y, int32_t resets) {
+    state_.robots[RobotIndex(0)].odometry_resets = resets;
+    see(3.0, y);
+  };
+  at(1.0, 0);
+  at(1.5, 0);
+  say_odometry(5000, 0.5, 0.0);
+  at(2.0, 0);
+  at(2.5, 1);  // it was reset on the state before
+  say_odometry(15'000, 0.5, 0.0, 1);
+  at(3.5, 1);
+  say_odometry(20'000, 1.5, 0.0, 1);
+  EXPECT_EQ(outcome("odometry"), Outcome::passed) << check("odometry").text;
+  say_odometry(20'000, 2.5, 0.0, 1);
+  EXPECT_EQ(outcome("odometry"), Outcome::failed);
+}
+
+TEST_F(JudgeTest, OdometryThatIsNoNumberOrOfNoFrameIsOff) {
+  for (const auto& [x, resets] :
+       {std::pair(std::nan(""), 0), std::pair(std::numeric_limits<double>::infinity(), 0),
+        std::pair(0.0, 7)}) {
+    Expectations expected;
+    expected.odometry_error = 1e6;
+    judge(expected);
+    see(0.0);
+    see(0.0);
+    say_odometry(0, x, 0.0, resets);
+    EXPECT_EQ(outcome("odometry"), Outcome::failed) << x << " " << resets;
+  }
+}
+
+TEST_F(JudgeTest, OdometryOfOthersIsNotTheRobots) {
+  Expectations expected;
+  expected.odometry_error = 0.1;
+  judge(expected);
+  see(0.0);
+  see(0.0);
+  say_odometry(0, 0.0, 0.0, 0, "rr/odometry");
+  say_odometry(0, 0.0, 0.0, 0, "r/odometry/twist");
+  EXPECT_EQ(outcome("odometry"), Outcome::not_judged);
+}
+
+TEST_F(JudgeTest, OdometryAfterSimTimeWasReset) {
+  Expectations expected;
+  expected.odometry_error = 1e-9;
+  expected.allow_requests = true;
+  judge(expected);
+  see(0.0);
+  see(0.5);
+  say_odometry(5000, 0.5, 0.0);
+  begin();
+  see(2.0);
+  see(2.25);
+  say_odometry(5000, 0.25, 0.0);
+  EXPECT_EQ(outcome("odometry"), Outcome::passed) << check("odometry").text;
+}
+
+TEST_F(JudgeTest, TheRobotIsTheOneThatIsNamed) {
+  const std::string two = robot("a", "0 0 0 0 0 0") + robot("b", "3 0 0 0 0 0");
+  Expectations expected = goal(3.0, 0.0, 0.1, 1.0);
+  judge(expected, two);
+  see(0.0);
+  see(0.0);
+  EXPECT_EQ(outcome("goal 0"), Outcome::failed);
+  expected.robot = "b";
+  judge(expected, two);
+  see(0.0);
+  see(0.0);
+  EXPECT_EQ(outcome("goal 0"), Outcome::passed);
+  expected.robot = "c";
+  EXPECT_THROW(judge(expected, two), InputError);
+  expected.robot = "";
+  EXPECT_THROW(judge(expected, box("box", "0 0 0.5 0 0 0")), InputError);
+}
+
+TEST(Goal, IsFourNumbers) {
+  const Goal good = parse_goal("1,-2.5,0.2,60");
+  EXPECT_EQ(good.x, 1.0);
+  EXPECT_EQ(good.y, -2.5);
+  EXPECT_EQ(good.radius, 0.2);
+  EXPECT_EQ(good.by_s, 60.0);
+  for (const char* bad : {"", "1", "1,2,3", "1,2,3,4,5", "1,2,3,4 ", "1,2,0,4", "1,2,-1,4",
+                          "1,2,3,0", "1,2,3,-1", "a,2,3,4", "1,2,inf,4", "nan,2,3,4", "1,,3,4"})
+    EXPECT_THROW(parse_goal(bad), InputError) << bad;
+}
+
+}  // namespace
+}  // namespace ruedo::judge
