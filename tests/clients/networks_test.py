@@ -312,4 +312,42 @@ def test_doctor_names_who_serves():
     done = subprocess.run(
         [RUEDO, "doctor", "--lcm", server.url], capture_output=True, text=True, timeout=PATIENCE
     )
-    assert re.search(r"^hint +server +none on udpm://.*ruedo run", done.stdout, re.MULTILINE)
+    assert re.search(
+        r"^hint +server +none answers on udpm://.*ruedo run", done.stdout, re.MULTILINE
+    )
+
+
+@pytest.mark.parametrize("other", ["udpm://239.255.76.67:7667?ttl=1", "tcpq://10.0.0.2:7700"])
+def test_doctor_finds_the_server_of_another_host(tmp_path, other):
+    """It asks on the bus; the claims of servers are seen on their own host alone."""
+    script = """
+        ip link set lo up
+        unshare -n sh -c 'ip link set lo up; echo ready; read go; exec "$@"' sh "$@" < pipe > second & other=$!
+        exec 3> pipe
+        until grep -q ready second; do sleep 0.02; done
+        ip link add va type veth peer name vb netns $other
+        ip link set va up; ip addr add 10.0.0.1/24 dev va; ip route add 224.0.0.0/4 dev va
+        nsenter -t $other -n sh -ec 'ip link set vb up; ip addr add 10.0.0.2/24 dev vb; ip route add 224.0.0.0/4 dev vb'
+        echo go >&3
+        until "$1" echo ruedo/info -n 1 --timeout 60 --lcm "$LCM_DEFAULT_URL" > /dev/null; do kill -0 $other; sleep 0.1; done
+        "$1" doctor || true
+        kill $other
+        wait $other || true
+    """
+    os.mkfifo(tmp_path / "pipe")
+    flags = "-n" if os.geteuid() == 0 else "-rn"
+    done = subprocess.run(
+        ["unshare", flags, "sh", "-ec", script, "sh", RUEDO, "run", HALL, "--quiet", *QUICK]
+        + ["--lcm", other],
+        cwd=tmp_path,
+        env={**PLAIN, "LCM_DEFAULT_URL": other},
+        capture_output=True,
+        text=True,
+        timeout=PATIENCE,
+    )
+    if "Operation not" in done.stderr or "unshare" in done.stderr:
+        pytest.skip("no network namespaces with a cable here: " + done.stderr)
+    assert done.returncode == 0, done.stderr
+    answers = rf"^ok +server +{re.escape(other)}: run -?\d+, world hall, ruedo [^ ]+ answers"
+    assert len(re.findall(answers, done.stdout, re.MULTILINE)) == 1, done.stdout
+    assert "hint   server" not in done.stdout

@@ -1,18 +1,29 @@
 // ruedo doctor: what this machine lacks, each fault in one line with its cure, in less than a
 // second.
+#include <chrono>
 #include <cstdlib>
+#include <map>
+#include <mutex>
+#include <thread>
 
 #include <fmt/format.h>
 
 #include <lcm/lcm_version.h>
 
+#include "base/channel_names.h"
+#include "base/utf8.h"
 #include "base/version.h"
 #include "bus/datagram_loss.h"
+#include "bus/lcm_bus.h"
 #include "bus/lcm_url.h"
 #include "bus/url_claim.h"
 #include "cli/support/commands.h"
+#include "engine/outcome.h"
 #include "log/header.h"
+#include "ruedo/decode.h"
 #include "ruedo/errors.h"
+#include "ruedo/request_t.hpp"
+#include "ruedo/world_info_t.hpp"
 #include "scene/render_scene.h"
 #include "system/sandbox.h"
 #include "world/model/body_layout.h"
@@ -22,6 +33,10 @@ namespace {
 
 constexpr int64_t kGoodBuffer = 2'097'152;  // bytes: a raw VGA picture passes
 constexpr int kSelfTestMs = 300;
+constexpr std::chrono::milliseconds kBetweenQuestions{100};
+constexpr int kQuestions = 4;  // a datagram may be lost
+constexpr size_t kMostServers = 8;
+constexpr size_t kLongestName = 100;  // bytes
 
 class Report {
  public:
@@ -84,19 +99,66 @@ void check_loss(Report& report, const bus::LcmUrl& url) {
                                bus::cure_of_datagram_loss());
 }
 
-// The address that is served, or would be. Without multicast, and without an address in the
-// environment, it is TCP.
+std::string line_about(const world_info_t& info) {
+  const auto name = [](const std::string& text) {
+    return in_one_line(for_terminal(shortened(text, kLongestName)));
+  };
+  return fmt::format("run {}, world {}, ruedo {}", info.run_id, name(info.world),
+                     name(info.version));
+}
+
+// The servers that answer on the bus, wherever they run: a line about each, by the ids of their
+// runs.
+std::map<int64_t, std::string> servers_on(const bus::LcmUrl& url) {
+  std::mutex mutex;
+  std::map<int64_t, std::string> servers;
+  try {
+    bus::LcmBus bus(url.str());
+    bus.listen({kInfoChannel}, [&](const std::string&, const uint8_t* data, size_t size) {
+      world_info_t info;
+      if (decode_checked(data, size, info) != DecodeFault::none) return;
+      const std::lock_guard lock(mutex);
+      if (servers.size() < kMostServers) servers.emplace(info.run_id, line_about(info));
+    });
+    request_t question{};
+    question.epoch = -1;
+    question.kind = request_t::INFO;
+    const std::vector<uint8_t> bytes = engine::encoded(question);
+    for (int i = 0; i < kQuestions; ++i) {
+      bus.publish(kRequestChannel, bytes.data(), bytes.size());
+      std::this_thread::sleep_for(kBetweenQuestions);
+    }
+    bus.stop();
+  } catch (const EnvironmentError&) {
+    // Nothing listens, or there is no route.
+  }
+  return servers;
+}
+
+std::string advice_on_no_server(const bus::LcmUrl& url) {
+  const bool local = url.scheme == "udpm" && url.option("ttl", "0") == "0";
+  return "none answers on " + url.str() +
+         (local ? ", which stays on this machine (another one's is asked with ?ttl=1)" : "") +
+         ": `ruedo run WORLD` starts one; where it is on another address, its LCM_DEFAULT_URL or "
+         "--lcm is wanted here";
+}
+
+// The address that is served, or would be: by this machine's claims, and by who answers there.
 void check_server(Report& report, const bus::LcmUrl& url) {
   if (url.scheme == "memq")
     return report.good("server", url.str() + " stays inside of one process");
-  const std::string owner = bus::claimed_by(url);
-  if (!owner.empty()) return report.good("server", url.str() + ": " + owner);
-  if (url.scheme == "tcpq" && bus::is_served(url, kSelfTestMs))
-    return report.good(
-        "server", url.str() + ": something listens there, not a server of this machine's Ruedo");
-  report.hint("server", "none on " + url.str() +
-                            " from this machine: `ruedo run WORLD` starts one; where it is on "
-                            "another address, its LCM_DEFAULT_URL is wanted here");
+  const std::string owner = url.scheme == "unix" ? "" : bus::claimed_by(url);
+  if (!owner.empty()) report.good("server", url.str() + ": " + owner);
+  const bool open = url.scheme == "udpm" || bus::is_served(url, kSelfTestMs);
+  const auto servers = open ? servers_on(url) : std::map<int64_t, std::string>();
+  for (const auto& [run, line] : servers) {
+    if (owner.ends_with(fmt::format("run {}", run))) continue;
+    report.good("server", fmt::format("{}: {} answers{}", url.str(), line,
+                                      url.scheme == "udpm" ? " from another machine" : ""));
+  }
+  if (!owner.empty() || !servers.empty()) return;
+  if (url.scheme == "udpm" || !open) return report.hint("server", advice_on_no_server(url));
+  report.good("server", url.str() + ": something listens there; no server of Ruedo answers");
 }
 
 void check_bus(Report& report, const std::string& text) {
