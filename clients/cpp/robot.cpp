@@ -76,13 +76,14 @@ Stream<SampleType> camera_part(Core& core, const DeviceInfo& camera, const std::
 }
 
 std::string input_channel(Core& core, const std::string& robot, const std::string& type) {
-  if (core.robot_info(robot).drive.empty())
-    throw NotSupported(robot + " cannot be driven: its model has no drive; --drive " + robot +
-                       "=LEFT+...,RIGHT+... gives it one, by its wheel joints");
+  const bool drives = !core.robot_info(robot).drive.empty();
   const auto info = core.info();
   for (const ChannelInfo& channel : channels_of(*info, robot)) {
     if (channel.input && channel.type == type) return channel.name;
   }
+  if (!drives)
+    throw NotSupported(robot + " cannot be driven: its model has no drive; --drive " + robot +
+                       "=LEFT+...,RIGHT+... gives it one, by its wheel joints");
   throw NotSupported(robot + " takes no " + type);
 }
 
@@ -115,11 +116,22 @@ void listen(Core& core, const std::string& robot, Driver& driver) {
   driver.listen(motion, collisions);
 }
 
-void hold(Core& core, const std::string& robot, const std::string& channel,
-          std::vector<uint8_t> bytes) {
+// in_steps: the call to make in lockstep, where what is sent beside the steps would act at whatever
+// step the run has reached.
+std::shared_ptr<Driver> driver_of(Core& core, const std::string& robot,
+                                  const std::string& in_steps) {
   const auto driver = core.driver(robot);
+  if (core.in_lockstep())
+    throw NotSupported(
+        "in lockstep a command acts at a step that its client chooses: sim.step(n, {robot." +
+        in_steps + "})");
+  return driver;
+}
+
+void hold(Core& core, const std::string& robot, Command command, const std::string& in_steps) {
+  const auto driver = driver_of(core, robot, in_steps);
   listen(core, robot, *driver);
-  driver->hold(core.bus(), channel, std::move(bytes));
+  driver->hold(core.bus(), command.channel, std::move(command.bytes));
   core.keep_repeating(driver);
 }
 
@@ -140,7 +152,8 @@ Motion move(Core& core, const std::string& robot, const char* name, int8_t kind,
             double radius, const Limits& limits) {
   move_command_t command = move_message(core, kind, value, radius, limits);
   const std::string channel = input_channel(core, robot, "move_command_t");
-  const auto driver = core.driver(robot);
+  const std::string primitive = to_string(static_cast<MotionKind>(kind));
+  const auto driver = driver_of(core, robot, "move_command(MotionKind::" + primitive + ", ...)");
   listen(core, robot, *driver);
   command.id = core.next_id();
   Motion motion(driver->move(core.bus(), channel, command, name));
@@ -255,18 +268,23 @@ Camera Robot::camera() const {
 }
 
 void Robot::set_velocity(double v, double omega, double vy) const {
-  hold(*core_, name_, input_channel(*core_, name_, "velocity_command_t"),
-       encoded(velocity_message(*core_, v, omega, vy)));
+  hold(*core_, name_, velocity_command(v, omega, vy), "velocity_command(v, omega)");
 }
 
 void Robot::set_wheels(double left, double right) const {
-  hold(*core_, name_, input_channel(*core_, name_, "wheel_command_t"),
-       encoded(wheel_message(*core_, left, right)));
+  hold(*core_, name_, wheel_command(left, right), "wheel_command(left, right)");
 }
 
 Command Robot::velocity_command(double v, double omega, double vy) const {
-  return {input_channel(*core_, name_, "velocity_command_t"),
-          encoded(velocity_message(*core_, v, omega, vy))};
+  Command command{input_channel(*core_, name_, "velocity_command_t"),
+                  encoded(velocity_message(*core_, v, omega, vy))};
+  const std::string drive = info().drive;
+  const bool sideways =
+      drive.ends_with(" mecanum") || drive.ends_with(" omni") || drive.ends_with(" holonomic");
+  if (vy != 0.0 && !sideways)
+    throw NotSupported("vy is " + text_of(vy) + " m/s, but " + name_ +
+                       " cannot move sideways: its drive is '" + drive + "'");
+  return command;
 }
 
 Command Robot::wheel_command(double left, double right) const {

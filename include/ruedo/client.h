@@ -449,7 +449,7 @@ class Robot {
   /// @param omega rad/s, positive to the left
   /// @param vy m/s to the left, of a robot that moves sideways
   /// @throws std::invalid_argument for what is not finite; NotSupported for a robot without a
-  /// drive; NoServer
+  /// drive, for vy of one that does not move sideways, and in lockstep; NoServer
   void set_velocity(double v, double omega, double vy = 0.0) const;
   /// The same with the rates of the wheels.
   /// @param left rad/s, positive ahead
@@ -459,7 +459,8 @@ class Robot {
 
   /// @name Primitives
   /// Each returns at once; Motion::wait() waits for the end. They throw std::invalid_argument for
-  /// what is not finite or out of range, NotSupported for a robot without a drive, and NoServer.
+  /// what is not finite or out of range, NotSupported for a robot without a drive and in lockstep,
+  /// and NoServer.
   /// @{
 
   /// @param deceleration m/s^2; 0: the robot's own
@@ -487,7 +488,8 @@ class Robot {
   /// @}
 
   /// @name Commands for Simulation::step()
-  /// It sends them; nothing repeats these. They throw what the functions above do.
+  /// It sends them; nothing repeats these. They throw what the functions above do, but for
+  /// lockstep.
   /// @{
 
   /// @param v m/s ahead

@@ -3,6 +3,7 @@ saw, and the expected numbers are known.
 """
 
 import math
+import re
 
 import lcm
 import pytest
@@ -152,6 +153,23 @@ def test_errors_name_what_exists(language, server):
     assert said.one("radius").startswith("ValueError: radius is 0")
     assert said.one("limit").startswith("ValueError: speed is -1")
     assert said.one("spawn").split(":")[0] in ("NotSupported", "RequestError")
+
+
+def test_what_cannot_move_sideways_is_not_told_to(language, server):
+    """The part ahead would be lost with it."""
+    said = probe(language, server.url, "sideways", "p3at")
+    for what in ("command", "velocity"):
+        assert re.fullmatch(
+            r"NotSupported: vy is 0\.30* m/s, but p3at cannot move sideways: its drive is 'kinematic'",
+            said.one(what),
+        )
+    assert said.one("none") == "none"
+
+
+def test_what_moves_sideways_is_told_to(language):
+    with ruedo_run("--spawn", "mecanum:m@0,0", world="empty") as server:
+        said = probe(language, server.url, "sideways", "m")
+    assert [said.one(what) for what in ("command", "velocity", "none")] == 3 * ["none"]
 
 
 def test_markers_are_drawn_and_logged(language, tmp_path):

@@ -220,6 +220,26 @@ def test_who_leaves_is_not_waited_for_whatever_is_lost(visit, language, tmp_path
     assert sorted(joined) == 2 * [request_t.JOIN] + 2 * [request_t.LEAVE]
 
 
+def in_one_step(language, *command):
+    with ruedo_run("--lockstep", "1", "--disable", "p3at/camera", world=HALL) as server:
+        return probe(language, server.url, *command)
+
+
+def test_commands_of_no_step_are_refused_and_do_nothing(language):
+    """They would act at whatever step the run has reached when they come."""
+    runs = [in_one_step(language, "beside", "one", "p3at") for _ in range(3)]
+    for said in runs:
+        for what in ("before", "velocity", "wheels", "advance", "rotate", "turn_to", "arc", "stop"):
+            error = said.one(what).replace("C", "_c").lower()  # Java's velocityCommand
+            call = {"before": "velocity", "velocity": "velocity", "wheels": "wheel"}.get(what, "move")
+            assert error.startswith("notsupported: in lockstep "), error
+            assert "sim.step(n, " in error and f"robot.{call}_command(" in error, error
+        for name in ("advance", "rotate", "heading", "arc", "stop"):
+            assert name in said.one("turn_to" if name == "heading" else name)
+    step, state_hash, _messages, _digest = in_one_step(language, "watches", "one", "200").words("end")
+    assert all(said.words("end")[:2] == [step, state_hash] for said in runs)
+
+
 def test_commands_beside_the_steps_are_refused(language):
     with ruedo_run("--lockstep", "1", "--disable", "p3at/camera", world=HALL) as server:
         said = probe(language, server.url, "lockstep", "one", "p3at", "4", "2", "0.3")

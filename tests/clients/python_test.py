@@ -205,6 +205,31 @@ def test_wrong_types_in_calls_say_what_is_right(call, says):
         call(sim)
 
 
+POST = """<sdf version="1.9"><world name="w"><model name="post"><static>true</static><link name="base">
+<sensor name="lrf" type="gpu_lidar"><pose>0 0 1 0 0 0</pose><update_rate>10</update_rate><lidar><scan>
+<horizontal><samples>31</samples><min_angle>-1</min_angle><max_angle>1</max_angle></horizontal></scan>
+<range><min>0.1</min><max>8</max></range></lidar></sensor></link></model></world></sdf>"""
+
+
+def test_a_robot_without_a_drive_has_faults():
+    with ruedo.launch(text=POST) as sim:
+        robot = sim.robot("post")
+        assert robot.drive == "" and robot.lrf.latest(PATIENCE).ranges.max() == math.inf
+        robot.inject("blocked", "lrf", value=0.5)
+        while robot.lrf.next(PATIENCE).ranges.max() == math.inf:
+            pass
+        with pytest.raises(ruedo.NotSupported, match="^post cannot be driven: its model has no"):
+            robot.set_velocity(0.1, 0.0)
+    with ruedo.launch(text=POST, lockstep=1) as sim:
+        robot = sim.robot("post")
+        with pytest.raises(
+            ruedo.NotSupported, match=r"sim.step\(n, \[robot.fault_command\('blocked', ...\)\]\)$"
+        ):
+            robot.inject("blocked", "lrf", value=0.5)
+        seen = sim.step(100, [robot.fault_command("blocked", "lrf", value=0.5)])
+        assert [scan.ranges.max() for scan in seen.all(robot.lrf)] == [math.inf] + 5 * [0.5]
+
+
 def test_who_waits_in_lockstep_is_told_that_steps_are_wanted():
     with ruedo.launch(HALL, lockstep=1, **QUICK) as sim:
         robot = sim.robot("p3at")
@@ -222,7 +247,10 @@ def test_equal_runs_in_lockstep_number_their_primitives_alike():
                 ruedo.connect(sim.url, name="guest", timeout=PATIENCE) as guest,
                 ruedo.connect(sim.url, name="guest", timeout=PATIENCE) as its_like,
             ):
-                ids.append([each.robot("p3at").stop().id for each in (sim, guest, its_like)])
+                stops = [
+                    each.robot("p3at").move_command("stop", 0.0) for each in (sim, guest, its_like)
+                ]
+                ids.append([lcmtypes.move_command_t.decode(stop.data).id for stop in stops])
     assert ids[0] == ids[1] and len(set(ids[0])) == 3
 
 

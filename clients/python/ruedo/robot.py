@@ -16,7 +16,7 @@ from .arguments import finite, number, numbers, shown, text
 from .errors import NotSupported, UnknownName
 from .geometry import Floats
 from .lockstep import Command
-from .motion import Motion
+from .motion import Driver, Motion
 from .samples import (
     CameraInfo,
     Collisions,
@@ -40,6 +40,7 @@ if TYPE_CHECKING:
 T = TypeVar("T")
 
 _VELOCITY = struct.Struct(">8sqddd")  # fingerprint, utime, vx, vy, omega
+_MOVE_SIDEWAYS = (" mecanum", " omni", " holonomic")  # ends of a drive's name
 _VELOCITY_FINGERPRINT = lcmtypes.velocity_command_t._get_packed_fingerprint()
 
 
@@ -247,17 +248,17 @@ class Robot:
     def set_velocity(self, v: float, omega: float, vy: float = 0.0) -> None:
         """Drives with v (m/s ahead) and omega (rad/s), within the robot's limits, until the next
         command of any kind: the command is repeated in the background, so that the watchdog does
-        not stop the robot. vy: m/s to the left, of a robot that moves sideways; others refuse
-        it."""
+        not stop the robot. vy: m/s to the left, of a robot that moves sideways. Raises NotSupported
+        for another robot, and in lockstep, as all that drives at once."""
         command = self.velocity_command(v, omega, vy)
-        self._connection.drivers.get(self).hold(command.channel, command.data)
+        self._driver("velocity_command(v, omega)").hold(command.channel, command.data)
 
     def set_wheels(self, left: float, right: float) -> None:
         """Turns the wheels of the left and right side (rad/s, positive ahead), until the next
         command.
         """
         command = self.wheel_command(left, right)
-        self._connection.drivers.get(self).hold(command.channel, command.data)
+        self._driver("wheel_command(left, right)").hold(command.channel, command.data)
 
     def velocity_command(self, v: float, omega: float, vy: float = 0.0) -> Command:
         """What set_velocity() sends, once, for Simulation.step()."""
@@ -268,7 +269,12 @@ class Robot:
             finite("vy", vy),
             finite("omega", omega),
         )
-        return Command(self._input("velocity_command_t"), data)
+        channel = self._input("velocity_command_t")
+        if vy and not self.drive.endswith(_MOVE_SIDEWAYS):
+            raise NotSupported(
+                f"vy is {vy} m/s, but {self.name} cannot move sideways: its drive is {self.drive!r}"
+            )
+        return Command(channel, data)
 
     def wheel_command(self, left: float, right: float) -> Command:
         """What set_wheels() sends, once, for Simulation.step()."""
@@ -327,9 +333,10 @@ class Robot:
 
     def inject(self, kind: str, target: str = "", **how: Any) -> None:
         """Something goes wrong from now on; what it takes is fault_command()'s. The server's log
-        says what acted; a wrong one is ignored.
+        says what acted; a wrong one is ignored. Raises NotSupported in lockstep.
         """
         self._connection.check_open()
+        self._check_acts_at_once(f"fault_command({shown(kind)}, ...)")
         command = self.fault_command(kind, target, **how)
         self._connection.bus.publish(command.channel, command.data)
 
@@ -418,7 +425,8 @@ class Robot:
         deceleration: float = 0.0,
     ) -> Motion:
         command = self._move_message(kind, value, radius, speed, acceleration, deceleration)
-        return self._connection.drivers.get(self).move(self._input("move_command_t"), command, name)
+        driver = self._driver(f'move_command("{"heading" if name == "turn_to" else name}", ...)')
+        return driver.move(self._input("move_command_t"), command, name)
 
     def _move_message(
         self,
@@ -478,14 +486,29 @@ class Robot:
             channel = self._inputs_now[type] = self._find_input(type)
         return channel
 
+    def _driver(self, in_steps: str) -> Driver:
+        driver = self._connection.drivers.get(self)
+        self._check_acts_at_once(in_steps)
+        return driver
+
+    def _check_acts_at_once(self, in_steps: str) -> None:
+        """in_steps: the call to make in lockstep, where what is sent beside the steps would act at
+        whatever step the run has reached.
+        """
+        if self._connection.in_lockstep:
+            raise NotSupported(
+                "in lockstep a command acts at a step that its client chooses: "
+                f"sim.step(n, [robot.{in_steps}])"
+            )
+
     def _find_input(self, type: str) -> str:
+        for channel in self._channels:
+            if channel.input and channel.type == type:
+                return str(channel.name)
         if not self.drive:
             raise NotSupported(
                 f"{self.name} cannot be driven: its model has no drive; --drive {self.name}=LEFT+...,RIGHT+... gives it one, by its wheel joints"
             )
-        for channel in self._channels:
-            if channel.input and channel.type == type:
-                return str(channel.name)
         raise NotSupported(f"{self.name} takes no {type}")
 
     def _device(self, info: Any) -> Device[Any] | None:

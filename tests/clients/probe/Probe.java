@@ -22,7 +22,11 @@ import ruedo.SonarReading;
 import ruedo.State;
 import ruedo.Stream;
 import ruedo.Subscription;
+import ruedo.lcmtypes.joint_command_t;
 
+import java.io.ByteArrayOutputStream;
+import java.io.DataOutputStream;
+import java.io.IOException;
 import java.nio.charset.StandardCharsets;
 import java.util.ArrayList;
 import java.util.Arrays;
@@ -428,6 +432,49 @@ public final class Probe {
         say("end", last.step, last.stateHash, messages, ofGuest, digest.getValue());
     }
 
+    /** Commands that go with no step. */
+    private static void beside(Simulation sim, String[] a) {
+        Robot robot = sim.robot(a[1]);
+        attempt("before", () -> robot.setVelocity(0.3, 0.0));
+        sim.step(0);
+        attempt("velocity", () -> robot.setVelocity(0.3, 0.0));
+        attempt("wheels", () -> robot.setWheels(1.0, 1.0));
+        attempt("advance", () -> robot.advance(1.0));
+        attempt("rotate", () -> robot.rotate(1.0));
+        attempt("turn_to", () -> robot.turnTo(1.0));
+        attempt("arc", () -> robot.arc(1.0, 0.5));
+        attempt("stop", () -> robot.stop());
+        Observations last = sim.step(200);
+        say("end", last.step, last.stateHash, last.messages.size());
+    }
+
+    /** Sends them all to 0.2, in lockstep. */
+    private static void joints(Simulation sim, String[] a) {
+        joint_command_t order = new joint_command_t();
+        order.name = Arrays.copyOfRange(a, 2, a.length);
+        order.n = order.name.length;
+        order.mode = new byte[order.n];
+        order.value = new double[order.n];
+        Arrays.fill(order.value, 0.2);
+        ByteArrayOutputStream bytes = new ByteArrayOutputStream();
+        try {
+            order.encode(new DataOutputStream(bytes));
+        } catch (IOException error) {
+            throw new IllegalStateException(error);
+        }
+        sim.step(0);
+        Command command = new Command(a[1] + "/joint_command", bytes.toByteArray());
+        attempt("joints", () -> sim.step(1, List.of(command)));
+        say("then", sim.step(1).step);
+    }
+
+    private static void sideways(Simulation sim, String name) {
+        Robot robot = sim.robot(name);
+        attempt("command", () -> robot.velocityCommand(0.2, 0.1, 0.3));
+        attempt("velocity", () -> robot.setVelocity(0.2, 0.1, 0.3));
+        attempt("none", () -> robot.setVelocity(0.0, 0.0, 0.0));
+    }
+
     /** Lockstep in which others act. */
     private static void watches(Simulation sim, String[] a) {
         Observations seen = sim.step(0);
@@ -725,7 +772,9 @@ public final class Probe {
             apart(url, a[0]);
             return;
         }
-        boolean named = List.of("lockstep", "visited", "watches", "leaves").contains(command);
+        boolean named =
+                List.of("lockstep", "visited", "watches", "leaves", "beside", "joints")
+                        .contains(command);
         try (Simulation sim =
                 command.equals("connect")
                         ? Ruedo.connect(url)
@@ -745,6 +794,15 @@ public final class Probe {
                     break;
                 case "leaves":
                     leaves(sim, a);
+                    break;
+                case "beside":
+                    beside(sim, a);
+                    break;
+                case "joints":
+                    joints(sim, a);
+                    break;
+                case "sideways":
+                    sideways(sim, a[0]);
                     break;
                 case "connect":
                     say("connected", sim.world());

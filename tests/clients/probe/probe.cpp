@@ -15,6 +15,7 @@
 #include <vector>
 
 #include "ruedo/client.h"
+#include "ruedo/joint_command_t.hpp"
 
 namespace rc = ruedo::client;
 
@@ -410,6 +411,43 @@ void visited(const rc::Simulation& sim, const std::vector<std::string>& a) {
   say("end", last.step, last.state_hash, messages, of_guest, digest);
 }
 
+// Commands that go with no step.
+void beside(const rc::Simulation& sim, const std::vector<std::string>& a) {
+  const rc::Robot robot = sim.robot(a[1]);
+  report("before", [&] { robot.set_velocity(0.3, 0.0); });
+  sim.step(0);
+  report("velocity", [&] { robot.set_velocity(0.3, 0.0); });
+  report("wheels", [&] { robot.set_wheels(1.0, 1.0); });
+  report("advance", [&] { robot.advance(1.0); });
+  report("rotate", [&] { robot.rotate(1.0); });
+  report("turn_to", [&] { robot.turn_to(1.0); });
+  report("arc", [&] { robot.arc(1.0, 0.5); });
+  report("stop", [&] { robot.stop(); });
+  const rc::Observations last = sim.step(200);
+  say("end", last.step, last.state_hash, last.messages.size());
+}
+
+// Sends them all to 0.2, in lockstep.
+void joints(const rc::Simulation& sim, const std::vector<std::string>& a) {
+  ruedo::joint_command_t order{};
+  order.name.assign(a.begin() + 2, a.end());
+  order.n = static_cast<int32_t>(order.name.size());
+  order.mode.assign(order.name.size(), ruedo::joint_command_t::POSITION);
+  order.value.assign(order.name.size(), 0.2);
+  std::vector<uint8_t> bytes(static_cast<size_t>(order.getEncodedSize()));
+  order.encode(bytes.data(), 0, order.getEncodedSize());
+  sim.step(0);
+  report("joints", [&] { sim.step(1, {{a[1] + "/joint_command", bytes}}); });
+  say("then", sim.step(1).step);
+}
+
+void sideways(const rc::Simulation& sim, const std::string& name) {
+  const rc::Robot robot = sim.robot(name);
+  report("command", [&] { static_cast<void>(robot.velocity_command(0.2, 0.1, 0.3)); });
+  report("velocity", [&] { robot.set_velocity(0.2, 0.1, 0.3); });
+  report("none", [&] { robot.set_velocity(0.0, 0.0, 0.0); });
+}
+
 // Lockstep in which others act.
 void watches(const rc::Simulation& sim, const std::vector<std::string>& a) {
   const rc::Observations seen = sim.step(0);
@@ -661,13 +699,17 @@ void act(const std::string& url, const std::string& command, const std::vector<s
   if (command == "log") return read_log(a);
   if (command == "apart") return apart(url, a[0]);
   const bool named =
-      command == "lockstep" || command == "visited" || command == "watches" || command == "leaves";
+      std::set<std::string>{"lockstep", "visited", "watches", "leaves", "beside", "joints"}
+          .contains(command);
   rc::Simulation sim =
       rc::connect(url, {.name = named ? a[0] : "", .timeout = command == "connect" ? 2.0 : 60.0});
   if (command == "leaves") leaves(sim, a);
   if (command == "lockstep") lockstep(sim, a);
   if (command == "visited") visited(sim, a);
   if (command == "watches") watches(sim, a);
+  if (command == "beside") beside(sim, a);
+  if (command == "joints") joints(sim, a);
+  if (command == "sideways") sideways(sim, a[0]);
   if (command == "given_up") given_up(sim);
   if (command == "connect") say("connected", sim.world());
   if (command == "list") list_all(sim);

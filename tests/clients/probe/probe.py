@@ -337,6 +337,39 @@ def visited(sim, name):
     say("end", last.step, last.state_hash, messages, of_guest, digest)
 
 
+def beside(sim, name):
+    """Commands that go with no step."""
+    robot = sim.robot(name)
+    attempt("before", lambda: robot.set_velocity(0.3, 0.0))
+    sim.step(0)
+    attempt("velocity", lambda: robot.set_velocity(0.3, 0.0))
+    attempt("wheels", lambda: robot.set_wheels(1.0, 1.0))
+    attempt("advance", lambda: robot.advance(1.0))
+    attempt("rotate", lambda: robot.rotate(1.0))
+    attempt("turn_to", lambda: robot.turn_to(1.0))
+    attempt("arc", lambda: robot.arc(1.0, 0.5))
+    attempt("stop", robot.stop)
+    last = sim.step(200)
+    say("end", last.step, last.state_hash, len(last.messages))
+
+
+def joints(sim, name, *joints):
+    """Sends them all to 0.2, in lockstep."""
+    order = ruedo.lcmtypes.joint_command_t()
+    order.n, order.name = len(joints), list(joints)
+    order.mode, order.value = bytes(len(joints)), [0.2] * len(joints)
+    sim.step(0)
+    attempt("joints", lambda: sim.step(1, [ruedo.Command(f"{name}/joint_command", order.encode())]))
+    say("then", sim.step(1).step)
+
+
+def sideways(sim, name):
+    robot = sim.robot(name)
+    attempt("command", lambda: robot.velocity_command(0.2, 0.1, 0.3))
+    attempt("velocity", lambda: robot.set_velocity(0.2, 0.1, 0.3))
+    attempt("none", lambda: robot.set_velocity(0.0, 0.0, 0.0))
+
+
 def watches(sim, steps):
     """Lockstep in which others act."""
     seen, digest = sim.step(0), 0
@@ -570,7 +603,7 @@ def main():
             launched(ruedo.launch(rest[0], seed=3, args=rest[1:]))
         with ruedo.connect(
             url,
-            name=rest[0] if command in ("lockstep", "visited", "watches", "leaves") else None,
+            name=rest[0] if command in ("lockstep", "visited", "watches", "leaves", "beside", "joints") else None,
             timeout=2.0 if command == "connect" else 60.0,
         ) as sim:
             actions = {
@@ -579,6 +612,9 @@ def main():
                 "visited": lambda: visited(sim, *rest[1:]),
                 "watches": lambda: watches(sim, *rest[1:]),
                 "leaves": lambda: leaves(sim, *rest[1:]),
+                "beside": lambda: beside(sim, *rest[1:]),
+                "joints": lambda: joints(sim, *rest[1:]),
+                "sideways": lambda: sideways(sim, *rest),
                 "connect": lambda: say("connected", sim.world),
                 "list": lambda: list_all(sim),
                 "read": lambda: read(sim, *rest),

@@ -35,8 +35,7 @@ std::string robot(const std::string& name, const std::string& pose) {
   return "<model name='" + name + "'><pose>" + pose +
          "</pose><link name='base_link'><inertial><pose>0 0 0.6 0 0 0</pose><mass>1</mass></inertial>"
          "<collision name='c'><pose>0 0 0.6 0 0 0</pose><geometry><box><size>1 1 1</size></box>"
-         "</geometry></collision></link><ruedo:joints/>"
-         "<ruedo:drive type='holonomic'><ruedo:max_speed>1</ruedo:max_speed></ruedo:drive></model>";
+         "</geometry></collision><sensor name='imu' type='imu'/></link></model>";
 }
 
 std::shared_ptr<const world::WorldModel> world_of(const std::string& models) {

@@ -187,22 +187,26 @@ public final class Robot {
     /**
      * Drives with v (m/s ahead) and omega (rad/s), within the robot's limits, until the next
      * command of any kind: the command is repeated in the background, so that the watchdog does not
-     * stop the robot.
+     * stop the robot. Throws NotSupported for a robot without a drive, and in lockstep, as all that
+     * drives at once.
      */
     public void setVelocity(double v, double omega) {
         setVelocity(v, omega, 0.0);
     }
 
-    /** The same with vy, m/s to the left, of a robot that moves sideways; others refuse it. */
+    /**
+     * The same with vy, m/s to the left, of a robot that moves sideways. Throws NotSupported for
+     * another.
+     */
     public void setVelocity(double v, double omega, double vy) {
         Command command = velocityCommand(v, omega, vy);
-        sim.driver(name).hold(command.channel, command.data);
+        driver("velocityCommand(v, omega)").hold(command.channel, command.data);
     }
 
     /** The same with the rates of the left and the right wheels, rad/s, positive ahead. */
     public void setWheels(double left, double right) {
         Command command = wheelCommand(left, right);
-        sim.driver(name).hold(command.channel, command.data);
+        driver("wheelCommand(left, right)").hold(command.channel, command.data);
     }
 
     /** What {@link #setVelocity} sends, once, for {@link Simulation#step(long, List)}. */
@@ -217,7 +221,18 @@ public final class Robot {
         command.vx = finite("v", v);
         command.vy = finite("vy", vy);
         command.omega = finite("omega", omega);
-        return new Command(input("velocity_command_t"), Bus.encode(command));
+        String channel = input("velocity_command_t");
+        if (vy != 0.0 && !drive().matches(".* (mecanum|omni|holonomic)")) {
+            throw new RuedoException.NotSupported(
+                    "vy is "
+                            + vy
+                            + " m/s, but "
+                            + name
+                            + " cannot move sideways: its drive is '"
+                            + drive()
+                            + "'");
+        }
+        return new Command(channel, Bus.encode(command));
     }
 
     /** What {@link #setWheels} sends, once, for {@link Simulation#step(long, List)}. */
@@ -309,7 +324,9 @@ public final class Robot {
 
     private Motion move(String kindName, byte kind, double value, double radius, Limits limits) {
         move_command_t command = moveMessage(kind, value, radius, limits);
-        return sim.driver(name).move(input("move_command_t"), command, kindName);
+        String kindOfCommand = kindName.equals("turn_to") ? "heading" : kindName;
+        return driver("moveCommand(\"" + kindOfCommand + "\", ...)")
+                .move(input("move_command_t"), command, kindName);
     }
 
     private move_command_t moveMessage(byte kind, double value, double radius, Limits limits) {
@@ -325,18 +342,35 @@ public final class Robot {
         return command;
     }
 
+    /**
+     * inSteps: the call to make in lockstep, where what is sent beside the steps would act at
+     * whatever step the run has reached.
+     */
+    private Driver driver(String inSteps) {
+        Driver driver = sim.driver(name);
+        if (sim.lockstep()) {
+            throw new RuedoException.NotSupported(
+                    "in lockstep a command acts at a step that its client chooses:"
+                            + " sim.step(n, List.of(robot."
+                            + inSteps
+                            + "))");
+        }
+        return driver;
+    }
+
     // Channels, by what info says of them: names on the bus may be remapped.
 
     private String input(String type) {
-        if (drive().isEmpty()) {
+        String drive = drive();
+        for (channel_info_t channel : sim.info().channels(name)) {
+            if (channel.input && channel.type.equals(type)) return channel.name;
+        }
+        if (drive.isEmpty()) {
             throw new RuedoException.NotSupported(
                     name
                             + " cannot be driven: its model has no drive; --drive "
                             + name
                             + "=LEFT+...,RIGHT+... gives it one, by its wheel joints");
-        }
-        for (channel_info_t channel : sim.info().channels(name)) {
-            if (channel.input && channel.type.equals(type)) return channel.name;
         }
         throw new RuedoException.NotSupported(name + " takes no " + type);
     }
