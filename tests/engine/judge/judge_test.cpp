@@ -3,6 +3,7 @@
 
 #include <cmath>
 #include <limits>
+#include <map>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -415,6 +416,97 @@ TEST_F(JudgeTest, TheRobotIsTheOneThatIsNamed) {
   EXPECT_THROW(judge(expected, two), InputError);
   expected.robot = "";
   EXPECT_THROW(judge(expected, box("box", "0 0 0.5 0 0 0")), InputError);
+}
+
+TEST_F(JudgeTest, MetricsSayHowWellItWent) {
+  Expectations expected = goal(9.0, 0.0, 0.25, 1.0);
+  expected.goals.push_back({1.0, 0.0, 0.25, 1.0});
+  judge(expected);
+  const auto metrics = [&] {
+    std::map<std::string, double> all;
+    for (const Metric& metric : judge_->verdict().metrics) all[metric.name] = metric.value;
+    return all;
+  };
+  see(0.0);
+  see(2.0);
+  EXPECT_THAT(metrics(), testing::UnorderedElementsAre(
+                             testing::Pair("time_s", 0.005), testing::Pair("x_m", 2.0),
+                             testing::Pair("y_m", 0.0), testing::Pair("path_m", 2.0),
+                             testing::Pair("goal_distance_m", 1.0)));  // of the last goal
+  touch(LinkIndex(0), LinkIndex(1), {0.5, 0, 0.5}, {1, 0, 0});
+  see(2.0);
+  touch(LinkIndex(0), LinkIndex(1), {0.5, 0, 0.5}, {1, 0, 0});
+  see(2.0);
+  say_odometry(5000, 1.0, 0.0);
+  EXPECT_DOUBLE_EQ(metrics().at("contact_time_s"), 0.01);  // of the first one
+  EXPECT_DOUBLE_EQ(metrics().at("odometry_error_m"), 1.0);
+  EXPECT_FALSE(metrics().contains("clearance_m"));
+  EXPECT_EQ(check("contact").text, "there is no such check");  // nobody asked for it
+
+  Expectations reach;
+  reach.clearance_reach = 1.0;
+  judge(reach);
+  see(0.0);
+  see(0.0);
+  EXPECT_DOUBLE_EQ(metrics().at("clearance_m"), 1.0);  // nothing is as near
+  see(3.5);
+  EXPECT_NEAR(metrics().at("clearance_m"), 0.5, 1e-6);
+}
+
+TEST_F(JudgeTest, TheEvidenceOfClearanceIsWhatWasMeasured) {
+  Expectations expected;
+  expected.clearance = 0.25;
+  judge(expected);
+  see(0.0);
+  see(0.0);
+  EXPECT_EQ(check("clearance").text, "clearance of at least 0.250 m over 1 steps");
+  expected.clearance_reach = 1.0;
+  judge(expected);
+  see(0.0);
+  see(3.5);
+  EXPECT_EQ(check("clearance").text, "clearance 0.500 m over 1 steps");
+}
+
+TEST_F(JudgeTest, TheTrackIsEveryQuarterOfASecond) {
+  judge({});
+  for (int i = 0; i <= 101; ++i) see(0.01 * i);
+  const std::vector<Place> track = judge_->verdict().track;
+  ASSERT_EQ(track.size(), 3);
+  for (size_t i = 0; i < 3; ++i) {
+    EXPECT_DOUBLE_EQ(track[i].time_s, 0.25 * static_cast<double>(i));
+    EXPECT_DOUBLE_EQ(track[i].x, 0.5 * static_cast<double>(i));
+  }
+}
+
+TEST_F(JudgeTest, EachKindOfFailureIsTold) {
+  Expectations expected;
+  expected.no_contact = true;
+  expected.clearance = 0.5;
+  judge(expected);
+  see(0.0);
+  touch(LinkIndex(0), LinkIndex(1), {0.5, 0, 0.5}, {1, 0, 0});
+  see(3.6);
+  EXPECT_EQ(outcome("contact"), Outcome::failed);
+  EXPECT_EQ(outcome("clearance"), Outcome::failed);
+}
+
+TEST_F(JudgeTest, ACommandIsNoRequest) {
+  judge({});
+  see(0.0);
+  see(0.0);
+  applied_t applied{};
+  applied.channel = "r/velocity";
+  applied.kind = request_t::RESET;
+  judge_->see(applied);
+  EXPECT_EQ(check("run").text, "1 steps");
+}
+
+TEST_F(JudgeTest, OdometryBeforeTheFirstStateIsOff) {
+  Expectations expected;
+  expected.odometry_error = 1e6;
+  judge(expected);
+  say_odometry(0, 0.0, 0.0);
+  EXPECT_EQ(outcome("odometry"), Outcome::failed);
 }
 
 TEST(Goal, IsFourNumbers) {

@@ -44,6 +44,7 @@ TEST(Verdict, IsJson) {
                                 "\"text\": \"there is no sample\"}"));
   EXPECT_THAT(failed, HasSubstr("{\"what\": \"clearance\", \"judged\": true, \"time_s\": 1, "
                                 "\"text\": \"too near\"}"));
+  EXPECT_THAT(failed, HasSubstr("\"evidence\": [{\"what\": \"run\", \"text\": \"12 steps\"}], "));
   EXPECT_THAT(failed, HasSubstr("\"faults\": [\"there is no sample\"]"));
   EXPECT_THAT(to_json({{kSteps, kNot}, {}, {}}), HasSubstr("\"outcome\": \"not judged\""));
   EXPECT_THAT(to_json({{}, {}, {}}), HasSubstr("\"outcome\": \"not judged\""));
