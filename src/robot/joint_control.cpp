@@ -46,6 +46,10 @@ const Limits* limits_of(int8_t mode) {
 
 }  // namespace
 
+bool takes_commands(const world::Joint& joint) {
+  return !joint.leader.valid() && joint.type != world::JointType::gearbox;
+}
+
 JointControl::JointControl(const world::WorldModel& world, const world::BodyLayout& layout,
                            physics::PhysicsWorld& physics)
     : world_(world),
@@ -87,10 +91,7 @@ int8_t JointControl::check(RobotIndex robot, const std::string& name, int8_t mod
   if (mode == joint_command_t::OPEN) return if_so(yes_or_no && lifts_.has_door(instance, name));
   if (mode == joint_command_t::FLOOR) return if_so(lifts_.has_floor(instance, name, value));
   const JointIndex joint = find(robot, name);
-  // Mimic joints and gearboxes take no commands.
-  const bool takes = joint.valid() && !description(joint).leader.valid() &&
-                     description(joint).type != world::JointType::gearbox;
-  return if_so(takes);
+  return if_so(joint.valid() && takes_commands(description(joint)));
 }
 
 // Commands to a hold, lift or door rather than a joint. True: it was one.

@@ -20,6 +20,9 @@
 
 namespace ruedo::robot {
 
+// Mimic joints and gearboxes take no commands.
+bool takes_commands(const world::Joint& joint);
+
 class JointControl {
  public:
   JointControl(const world::WorldModel& world, const world::BodyLayout& layout,

@@ -11,6 +11,7 @@
 
 #include "ruedo/math.h"
 #include "ruedo/quantity.h"
+#include "world/model/drive.h"
 
 namespace ruedo::robot {
 
@@ -76,10 +77,7 @@ bool MotionPlanner::is_steered() const {
   return drive_->steering == Steering::ackermann || drive_->steering == Steering::tricycle;
 }
 
-bool MotionPlanner::moves_sideways() const {
-  return drive_->steering == Steering::mecanum || drive_->steering == Steering::omni ||
-         drive_->steering == Steering::holonomic;
-}
+bool MotionPlanner::moves_sideways() const { return world::moves_sideways(drive_->steering); }
 
 void MotionPlanner::show(int64_t id, int8_t kind, int8_t state, int8_t reason,
                          LinkIndex blocked_by) {

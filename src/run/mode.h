@@ -35,6 +35,10 @@ class Mode {
     const engine::Channels* channels = nullptr;
     SimTime base_us = 0;  // the stamp of sim time 0
     std::function<std::string(RobotIndex robot)> robot_name;
+    // Why that command can never act; "": it can.
+    std::function<std::string(const robot::Command&)> check_possible = [](const robot::Command&) {
+      return std::string();
+    };
   };
   // What the run has to do before it goes on.
   struct Turn {

@@ -5,6 +5,7 @@
 #include <spdlog/spdlog.h>
 
 #include "base/version.h"
+#include "engine/command_check.h"
 #include "engine/world_state.h"
 #include "ruedo/errors.h"
 #include "run/run.h"
@@ -98,8 +99,14 @@ void Run::announce() {
 }
 
 Mode::Stage Run::stage() {
-  return {&simulation_->inbox(), pacer_.get(), &channels_, publisher_.base_us(),
-          [this](RobotIndex robot) { return instance_of(robot).name; }};
+  return {&simulation_->inbox(),
+          pacer_.get(),
+          &channels_,
+          publisher_.base_us(),
+          [this](RobotIndex robot) { return instance_of(robot).name; },
+          [this](const robot::Command& command) {
+            return engine::check_possible(*world_, simulation_->layout(), command);
+          }};
 }
 
 void Run::begin_repeat(std::unique_ptr<Repeating> repeating) {

@@ -172,6 +172,34 @@ def test_what_moves_sideways_is_told_to(language):
     assert [said.one(what) for what in ("command", "velocity", "none")] == 3 * ["none"]
 
 
+def test_what_a_robot_cannot_execute_is_refused_as_a_whole_and_told_once():
+    """The server's part, for any LCM program: a misspelt joint beside a good one, and a speed to
+    the side beside one ahead.
+    """
+    joints, velocity = lcmtypes.joint_command_t(), lcmtypes.velocity_command_t()
+    joints.n, joints.name = 2, ["turret_joint", "hand_jiont"]
+    joints.mode, joints.value = bytes(2), [0.5, 0.5]
+    velocity.vx, velocity.vy = 0.2, 0.1
+    with ruedo_run("--spawn", "carrier:c@0,0", world="empty") as server:
+        with ruedo.connect(server.url, timeout=PATIENCE) as sim:
+            robot, refused = sim.robot("c"), []
+            robot.motion.on_sample(
+                lambda status: status.state == "refused" and refused.append(status.kind)
+            )
+            bus = lcm.LCM(server.url)
+            while not (refused.count("none") >= 2 and refused.count("velocity") >= 2):
+                bus.publish("c/joint_command", joints.encode())
+                bus.publish("c/velocity", velocity.encode())
+                sim.sleep(0.1)
+            seen = robot.joints.latest(PATIENCE)
+            turret = seen.positions[list(seen.names).index("turret_joint")]
+            assert abs(turret) < 1e-3 and abs(robot.pose.latest(PATIENCE).x) < 1e-3
+        said = [line for line in server.end().splitlines() if "a command was refused" in line]
+    assert len(said) == 2 and all(line.endswith("(shown once)") for line in said), said
+    assert any("c has no joint 'hand_jiont' that takes commands; it has turr" in s for s in said)
+    assert any("vy is 0.1 m/s, but c cannot move sideways" in line for line in said)
+
+
 def test_markers_are_drawn_and_logged(language, tmp_path):
     """Each library sends the same; what the server would refuse is said at once."""
     log = tmp_path / "run.lcm"

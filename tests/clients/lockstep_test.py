@@ -240,6 +240,22 @@ def test_commands_of_no_step_are_refused_and_do_nothing(language):
     assert all(said.words("end")[:2] == [step, state_hash] for said in runs)
 
 
+@pytest.mark.parametrize(
+    "joints, wrong", [(["turret_joint", "hand_jiont"], "hand_jiont"), (["turret_joint", "hand_joint"], None)]
+)
+def test_a_misspelt_joint_refuses_its_step(language, joints, wrong):
+    with ruedo_run("--lockstep", "1", "--spawn", "carrier:c@0,0", world="empty") as server:
+        said = probe(language, server.url, "joints", "one", "c", *joints)
+    if wrong:
+        assert said.one("joints") == (
+            "RequestError: GRANT: command 0 (c/joint_command): c has no joint 'hand_jiont' "
+            "that takes commands; it has turret_joint, upper_arm_joint, forearm_joint, hand_joint"
+        )
+    else:
+        assert said.one("joints") == "none"
+    assert said.words("then") == ["1" if wrong else "2"]
+
+
 def test_commands_beside_the_steps_are_refused(language):
     with ruedo_run("--lockstep", "1", "--disable", "p3at/camera", world=HALL) as server:
         said = probe(language, server.url, "lockstep", "one", "p3at", "4", "2", "0.3")

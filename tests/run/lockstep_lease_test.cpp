@@ -24,11 +24,12 @@ namespace {
 
 using Policy = LockstepOptions::Policy;
 
-std::vector<uint8_t> velocity(double vx) {
+std::vector<uint8_t> velocity(double vx, double vy = 0.0) {
   velocity_command_t command;
   command.utime = 0;
   command.vx = vx;
-  command.vy = command.omega = 0.0;
+  command.vy = vy;
+  command.omega = 0.0;
   return engine::encoded(command);
 }
 
@@ -315,6 +316,8 @@ TEST_F(HostileGrants, AreRefusedWithWhatIsWrong) {
       {"no number in the last",
        with(with(grant(4, 6), 4, "r/velocity", good), 5, "r/wheels", wheels(std::nan(""))),
        reply_t::BAD_REQUEST, "command 1 (r/wheels): a value is not finite"},
+      {"sideways", with(grant(4, 6), 4, "r/velocity", velocity(0.1, 0.2)), reply_t::BAD_REQUEST,
+       "command 0 (r/velocity): vy is 0.2 m/s, but r cannot move sideways"},
       {"received", grant(4, 5, 5), reply_t::BAD_REQUEST, "the newest state is 4"},
       {"most received", grant(4, 5, INT64_MAX), reply_t::BAD_REQUEST, "the newest state is 4"},
   };

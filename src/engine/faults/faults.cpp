@@ -10,6 +10,7 @@
 #include <spdlog/spdlog.h>
 
 #include "base/whole.h"
+#include "engine/command_check.h"
 #include "ruedo/math.h"
 
 namespace ruedo::engine {
@@ -232,8 +233,15 @@ bool Faults::is_lost(RobotIndex robot, int64_t step) {
   return lost;
 }
 
+void Faults::warn_of_impossible(const robot::Command& command) {
+  const std::string why = check_possible(*world_, *layout_, command);
+  if (why.empty() || !warned_.emplace(command.robot, command.what.index()).second) return;
+  spdlog::warn("{}: a command was refused: {} (shown once)", name_of(command.robot), why);
+}
+
 void Faults::command(const robot::Command& command, size_t bytes, int64_t step,
                      robot::Robots& robots) {
+  warn_of_impossible(command);
   if (of_robots_.empty() || std::holds_alternative<robot::ResetOdometry>(command.what))
     return robots.apply(command);
   if (is_lost(command.robot, step)) return;
@@ -328,6 +336,7 @@ void Faults::remove(RobotIndex robot) {
   // Another robot in its place begins anew, with wheels that have not turned.
   draws_.resize(layout_->robots.size());
   draws_[robot] = 0;
+  std::erase_if(warned_, [&](const auto& one) { return one.first == robot; });
   for (size_t i = 0; i < shown_angles_.size(); ++i)
     if (layout_->wheels[i].robot == robot) true_angles_[i] = shown_angles_[i] = 0.0;
   if (!of_sensors_) return;

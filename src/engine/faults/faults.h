@@ -11,6 +11,7 @@
 #include <deque>
 #include <memory>
 #include <optional>
+#include <set>
 #include <string>
 #include <utility>
 #include <vector>
@@ -45,7 +46,8 @@ class Faults {
 
   // Before the commands on the state `step`: delayed commands act, kidnapped robots are moved.
   void before_commands(int64_t step, robot::Robots& robots);
-  // A command on the state `step`, as changed by faults. bytes: the size of its message.
+  // A command on the state `step`, as changed by faults. bytes: the size of its message. Warns,
+  // once per robot and kind of command, of one that its robot can never execute.
   void command(const robot::Command& command, size_t bytes, int64_t step, robot::Robots& robots);
   // The wheel angles of a new state as encoders see them.
   void show_wheels(Snapshot& snapshot);
@@ -104,6 +106,7 @@ class Faults {
                  int64_t step) const;  // applied to the commanded speed of a side
   robot::Command weakened(robot::Command command, int64_t step) const;
   bool is_lost(RobotIndex robot, int64_t step);
+  void warn_of_impossible(const robot::Command& command);
 
   Bound<const world::WorldModel> world_;
   Bound<const world::BodyLayout> layout_;
@@ -116,6 +119,7 @@ class Faults {
   std::deque<Late> late_;  // by step
   size_t late_bytes_ = 0;
   std::vector<uint64_t> draws_;                     // for each robot
+  std::set<std::pair<int, size_t>> warned_;         // robots, and kinds of commands
   bool ever_ = false, wheels_ever_ = false;         // whether anything was faulty, and any wheel
   std::vector<double> true_angles_, shown_angles_;  // for each wheel, while encoders may be wrong
 };

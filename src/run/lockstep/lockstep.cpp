@@ -34,6 +34,7 @@ Lockstep::Lockstep(const LockstepOptions& options, std::function<void(const appl
 void Lockstep::begin(const Stage& stage, int64_t step) {
   inbox_ = stage.inbox;
   gate_ = stage.gate;
+  check_possible_ = stage.check_possible;
   kept_.clear();
   limit_ = step < 0 && started_ ? 0 : step;
   published_ = step;
@@ -166,6 +167,10 @@ std::string Lockstep::take_commands(const grant_request_t& grant, std::vector<He
     if (!engine::is_finite(decoded)) return which() + ": a value is not finite";
     if (const std::string wrong =
             engine::check_values(input->kind, command.data.data(), command.data.size());
+        !wrong.empty())
+      return which() + ": " + wrong;
+    decoded.robot = input->robot;
+    if (const std::string wrong = input->robot.valid() ? check_possible_(decoded) : "";
         !wrong.empty())
       return which() + ": " + wrong;
     held.push_back({command.step, engine::InputIndex(input - inputs.begin()), command.data});

@@ -122,6 +122,7 @@ class Lockstep : public Mode {
   const std::function<void(const applied_t&)> record_;
   engine::CommandInbox* inbox_ = nullptr;
   Gate* gate_ = nullptr;
+  std::function<std::string(const robot::Command&)> check_possible_;
   std::vector<Member> members_;  // by name
   bool started_ = false;         // all were there once
   bool over_ = false;

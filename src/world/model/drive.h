@@ -38,6 +38,13 @@ bool names_wheels(const Element& plugin, const Model& model);
 // The value for <ruedo:drive steering="">: "differential", "mecanum", ...
 std::string name_of(DriveDescription::Steering steering);
 
+// Whether such a drive goes to the side as it goes ahead.
+inline bool moves_sideways(DriveDescription::Steering steering) {
+  using Steering = DriveDescription::Steering;
+  return steering == Steering::mecanum || steering == Steering::omni ||
+         steering == Steering::holonomic;
+}
+
 // The prefix of findings about a drive that no file describes.
 inline constexpr const char* kNoDriveIsWritten = "no file says how it drives";
 
