@@ -13,6 +13,7 @@ import re
 import shlex
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 import tree_sitter_cpp
@@ -33,7 +34,7 @@ namespace {
 }
 }  // namespace
 """
-PATIENCE = 600  # s, for a mutant that does not end
+MOST_TIMES = 10  # as long as without a mutant: then it does not end
 
 
 def mutated(source):
@@ -122,17 +123,21 @@ def main():
     program = build(folder, target, source, text)
     command = [word.replace("{}", str(program)) for word in sys.argv[split + 1 :]]
 
+    patience = None
+
     def passes(number):
         environment = {**os.environ, "RUEDO_MUTANT": str(number)}
         try:
             return not subprocess.run(
-                command, env=environment, capture_output=True, timeout=PATIENCE
+                command, env=environment, capture_output=True, timeout=patience
             ).returncode
         except subprocess.TimeoutExpired:
             return False
 
+    begin = time.monotonic()
     if not passes(0):
         sys.exit(f"{source}: the tests fail without a mutant")
+    patience = MOST_TIMES * (time.monotonic() - begin) + 1.0
     left = [(number + 1, *one) for number, one in enumerate(mutants) if passes(number + 1)]
     for number, line, what in left:
         print(f"{source.name}:{line}: mutant {number} lives: {what}")

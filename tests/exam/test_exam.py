@@ -9,6 +9,7 @@ gate a tenth of the rows is tried (RUEDO_EXAM=PART/OF, chosen by the commit).
 import atexit
 import functools
 import os
+import re
 import shlex
 import shutil
 import subprocess
@@ -98,7 +99,10 @@ def logs(line, folder):
 
 
 def cmake(line, folder):
-    """The arguments of ruedo_add_regression() in a project, which is configured and tested."""
+    """The arguments of ruedo_add_regression() in a project, which is configured and tested; programs
+    are in its folder.
+    """
+    line = re.sub(r"\b(\w+\.py)\b", r"${CMAKE_CURRENT_SOURCE_DIR}/\1", line)
     (folder / "CMakeLists.txt").write_text(
         "cmake_minimum_required(VERSION 3.22)\nproject(exam NONE)\nfind_package(ruedo REQUIRED)\n"
         "enable_testing()\nruedo_add_regression(NAME exam WORLD box.sdf DURATION 5 "

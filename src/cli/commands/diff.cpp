@@ -27,6 +27,8 @@ int diff(const DiffArguments& arguments) {
       log::diff_logs(arguments.golden, arguments.other, rules, arguments.partial);
   for (const std::string& line : result.idle_rules) spdlog::warn(line);
   fmt::print("{}", for_terminal(log::diff_text(result)));
+  if (!result.faults.empty() && !arguments.partial)
+    fmt::print("(--partial is for a log that is known to be cut)\n");
   if (!arguments.junit.empty()) write_file(arguments.junit, log::diff_junit(result));
   if (!arguments.html.empty())
     write_file(arguments.html, log::diff_html(result, arguments.golden, arguments.other));
