@@ -10,6 +10,7 @@
 
 #include <fmt/format.h>
 #include <openssl/evp.h>
+#include <spdlog/spdlog.h>
 
 #include "engine/engine.h"
 #include "ruedo/joint_command_t.hpp"
@@ -126,6 +127,7 @@ std::string run(const Run& run, int threads) {
 
 int main(int argc, char** argv) {
   ruedo::scene::set_up_mesa();
+  spdlog::set_level(spdlog::level::off);  // of commands that a robot refuses
   int threads = 1;
   std::vector<std::string> wanted;
   for (int i = 1; i < argc; ++i) {

@@ -356,6 +356,8 @@ class PyEngine {
 NB_MODULE(_engine, module) {
   nb::set_leak_warnings(false);  // a daemon thread may hold an engine when the program ends
   ruedo::scene::set_up_mesa();   // an import has the interpreter to itself
+  spdlog::set_default_logger(spdlog::stderr_color_mt("ruedo"));  // not on standard output
+  spdlog::set_pattern("ruedo: %l: %v");
   module.attr("version") = ruedo::version();
   module.attr("build") = ruedo::log::own_version();
   nb::exception<ruedo::InputError>(module, "InputError", PyExc_ValueError);

@@ -144,6 +144,10 @@ class Motion:
         self._again = min(2.0 * self._again, _LAST_AGAIN)
         return True
 
+    def _begin_epoch(self) -> None:
+        """Sim time was reset."""
+        self._utime = self._shown = -1
+
     def _end(self, reason: str) -> None:
         with self._news:
             if not self.done:
@@ -234,7 +238,7 @@ class Driver:
         """Sim time was reset."""
         with self._lock:
             for motion in self._motions:
-                motion._utime = motion._shown = -1
+                motion._begin_epoch()
 
     def _watchdog(self) -> float:
         robot = self._connection.info.robots.get(self._robot.name)  # None: removed meanwhile
