@@ -56,9 +56,9 @@ std::string check_possible(const world::WorldModel& world, const world::BodyLayo
   for (size_t i = 0; i < std::min(joints->names.size(), joints->modes.size()); ++i) {
     const std::string& name = joints->names[i];
     bool known = false;
-    const char* const kind = for_each_target(
-        model, layout, robot, joints->modes[i],
-        [&](const std::string& target) { known = known || target == name; });
+    const char* const kind =
+        for_each_target(model, layout, robot, joints->modes[i],
+                        [&](const std::string& target) { known = known || target == name; });
     if (known) continue;
     std::vector<std::string> names;
     for_each_target(model, layout, robot, joints->modes[i],

@@ -162,7 +162,8 @@ std::string diff_html(const Diff& diff, const std::string& golden, const std::st
       "td{{padding-right:1.5em}}\n"
       "</style></head><body>\n<h1>{}</h1>\n<p><b class=\"golden\">golden</b> {}<br><b "
       "class=\"new\">new</b> {}</p>\n",
-      diff.same() ? "The logs are the same" : "The logs differ", xml_escaped(golden), xml_escaped(other));
+      diff.same() ? "The logs are the same" : "The logs differ", xml_escaped(golden),
+      xml_escaped(other));
   for (const std::string& fault : diff.faults) page += "<p>" + xml_escaped(fault) + "</p>\n";
   for (const std::string& note : diff.notes) page += "<p>Note: " + xml_escaped(note) + "</p>\n";
   for (const auto* entry : differing(diff)) {

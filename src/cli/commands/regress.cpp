@@ -1,43 +1,23 @@
 // ruedo regress: a user's regression test: a world, a client, and what is expected of the run.
 // ctest and pytest run it.
 #include <algorithm>
-#include <atomic>
-#include <charconv>
-#include <chrono>
-#include <cmath>
-#include <condition_variable>
-#include <cstdlib>
 #include <filesystem>
-#include <limits>
-#include <mutex>
-#include <set>
-#include <thread>
+#include <optional>
 
 #include <fmt/format.h>
-#include <fnmatch.h>
-#include <spdlog/spdlog.h>
 
-#include "base/input_file.h"
-#include "base/progress.h"
 #include "base/utf8.h"
-#include "bus/server_bus.h"
 #include "cli/support/argument_rules.h"
-#include "cli/support/client_pace.h"
 #include "cli/support/client_process.h"
 #include "cli/support/commands.h"
 #include "cli/support/extensions.h"
+#include "cli/support/golden.h"
+#include "cli/support/judged_run.h"
 #include "cli/support/range.h"
 #include "cli/support/signal_thread.h"
 #include "cli/support/view.h"
 #include "engine/judge/judge.h"
-#include "log/diff.h"
-#include "log/header.h"
-#include "log/reader.h"
-#include "log/writer.h"
-#include "ruedo/applied_t.hpp"
-#include "ruedo/decode.h"
 #include "ruedo/errors.h"
-#include "run/run.h"
 #include "system/isolation.h"
 #include "system/output_file.h"
 #include "system/temporary_folder.h"
@@ -48,9 +28,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// What is compared with the golden log, and the page of a run that failed: by the log's name.
-constexpr const char *kKept = ".kept", *kPage = ".html";
-constexpr double kPageSize_MB = 20.0;  // of the page that shows a failed run
+constexpr const char* kPage = ".html";  // of a run that failed, after the log's name
+constexpr double kPageSize_MB = 20.0;   // of the page that shows a failed run
 
 struct RegressArguments {
   WorldArguments world;
@@ -83,241 +62,6 @@ run::RunOptions server_options(const RegressArguments& arguments) {
   options.simulation.fleet.noise = !arguments.world.no_noise;
   options.simulation.fleet.disabled = arguments.world.disabled;
   return options;
-}
-
-// What the judge hears of a run.
-class JudgeSink : public run::Sink {
- public:
-  JudgeSink(judge::Judge& judge, run::Run& run) : judge_(judge), run_(run) {}
-
-  Hears hears() const override { return {.samples = true, .records = true}; }
-  bool wants(const std::string&) const override { return false; }  // no pictures
-  void announce(const std::shared_ptr<const run::Announcement>& announcement) override {
-    announcement_ = announcement;
-    judge_.see_world(run_.world(), run_.layout());
-  }
-  void message(const run::Published& message) override {
-    const std::span<const uint8_t> bytes(message.data, message.size);
-    if (message.kind == run::Kind::sample) {
-      judge_.see(announcement_->channels[message.index].name, bytes);
-    } else if (message.channel == log::kAppliedChannel) {
-      applied_t applied;
-      if (decode_checked(bytes.data(), bytes.size(), applied) == DecodeFault::none)
-        judge_.see(applied);
-    }
-  }
-
- private:
-  judge::Judge& judge_;
-  run::Run& run_;
-  std::shared_ptr<const run::Announcement> announcement_;
-};
-
-// Ends a run that has not gone on for too long.
-class Watchdog {
- public:
-  Watchdog(double timeout_s, run::Run& run) : timeout_s_(timeout_s), run_(run) {
-    run.on_stall([this](const std::string& reason) {
-      const std::lock_guard lock(mutex_);
-      reason_ = reason;
-    });
-    thread_ = std::thread([this] { watch(); });
-  }
-  ~Watchdog() {
-    {
-      const std::lock_guard lock(mutex_);
-      over_ = true;
-    }
-    changed_.notify_all();
-    thread_.join();
-  }
-  void moved() { ++moves_; }  // any thread
-
-  // Why it has ended the run; "": it has not.
-  std::string fault() {
-    const std::lock_guard lock(mutex_);
-    return fault_;
-  }
-
- private:
-  void watch() {
-    std::unique_lock lock(mutex_);
-    while (!over_) {
-      const int64_t before = moves_;
-      if (changed_.wait_for(lock, std::chrono::duration<double>(timeout_s_), [&] { return over_; }))
-        return;
-      if (moves_ != before) continue;
-      fault_ = fmt::format("the run did not go on for {:g} s of real time{} (--timeout)",
-                           timeout_s_, reason_.empty() ? "" : ": " + reason_);
-      run_.stop();
-      return;
-    }
-  }
-
-  const double timeout_s_;
-  run::Run& run_;
-  std::atomic<int64_t> moves_{0};
-  std::mutex mutex_;
-  std::condition_variable changed_;
-  std::string reason_, fault_;
-  bool over_ = false;
-  std::thread thread_;
-};
-
-// How the client has ended. until: sim time at its end, of a client that ended before the run.
-judge::Check client_check(const RegressArguments& arguments, const ClientProcess& client,
-                          bool was_heard, std::optional<SimTime> until) {
-  judge::Check check{"client", judge::Outcome::passed, "", {}};
-  if (client.was_killed()) {
-    check.outcome = judge::Outcome::failed;
-    check.text = fmt::format(
-        "the client was still running {:g} s after the end of the run (--grace), and was killed",
-        arguments.grace);
-  } else if (!client.fault().empty()) {
-    check.outcome = judge::Outcome::failed;
-    check.text = "the client ended with " + client.fault();
-    if (!until) check.text += " after the end of the run";
-  } else if (!was_heard && !arguments.no_client_wait) {
-    check.outcome = judge::Outcome::not_judged;
-    check.text = fmt::format(
-        "the client{} was never heard on the bus (a program that only listens wants "
-        "--no-client-wait)",
-        client.was_told_to_end() ? "" : " ended with 0 and");
-  } else if (client.was_told_to_end()) {
-    check.text = "the client ran to the end, and ended when it was told to";
-  } else {
-    check.text =
-        until ? fmt::format("the client ended with 0 at {:g} s", static_cast<double>(*until) * 1e-6)
-              : "the client ended with 0 after the end of the run";
-  }
-  return check;
-}
-
-// The run: the checks of its client, and of what ended it.
-std::vector<judge::Check> run(const RegressArguments& arguments,
-                              const std::shared_ptr<const world::WorldModel>& world, bool isolated,
-                              judge::Judge& judge, SignalThread& signals) {
-  const bus::ServerBus place =
-      bus::open_server_bus(isolated ? "auto" : "auto-tcp", world->name,
-                           [](const std::string& line) { spdlog::warn(line); });
-  const bool has_client = !arguments.client.empty();
-  ClientPace pace(has_client && !arguments.no_client_wait);
-  run::RunOptions options = server_options(arguments);
-  options.hearer = [&pace](const std::string&, const uint8_t*, size_t) { pace.heard(); };
-  run::Run server(world, std::move(options), *place.bus);
-  JudgeSink sink(judge, server);
-  server.add(sink);
-  Watchdog watchdog(arguments.timeout, server);
-  std::atomic<SimTime> now{0};
-  Progress progress("running " + world->name, parse_duration_us(arguments.duration));
-  server.on_state([&](const Snapshot& snapshot) {
-    judge.see(snapshot);
-    now = snapshot.time;
-    watchdog.moved();
-    progress.to(snapshot.time);
-  });
-  if (has_client) pace.pace(&server);
-  std::unique_ptr<ClientProcess> client;
-  std::atomic<SimTime> ended_at{-1};
-  if (has_client) {
-    client = std::make_unique<ClientProcess>(
-        arguments.client,
-        std::vector<std::string>{"LCM_DEFAULT_URL=" + place.url.str(), "RUEDO_REGRESS=1",
-                                 pace.variable()},
-        [&] {
-          ended_at = now.load();
-          server.stop();
-        },
-        std::vector<int>{pace.inherited()});
-  }
-  std::vector<judge::Check> checks;
-  const SignalThread::Serving serving(signals, server);
-  try {
-    server.run();
-  } catch (const run::LeaseEnded& ended) {
-    checks.push_back({"run", judge::Outcome::failed, ended.what(), {}});
-  }
-  if (std::string fault = watchdog.fault(); !fault.empty())
-    checks.push_back({"run", judge::Outcome::failed, std::move(fault), {}});
-  pace.pace(nullptr);
-  if (client) {
-    const bool by_itself = client->is_over();
-    client->end(std::chrono::duration<double>(signals.told() ? 0.0 : arguments.grace));
-    checks.push_back(client_check(arguments, *client, pace.was_heard(),
-                                  by_itself ? std::optional(ended_at.load()) : std::nullopt));
-  }
-  return checks;
-}
-
-bool fits_any(const std::string& channel, const std::vector<std::string>& patterns) {
-  return std::any_of(patterns.begin(), patterns.end(), [&](const std::string& pattern) {
-    return fnmatch(pattern.c_str(), channel.c_str(), 0) == 0;
-  });
-}
-
-void note_channels(const std::string& path, std::set<std::string>& channels) {
-  log::Reader log(path);
-  log::Event event;
-  while (log.next(event, [](const std::string&) { return false; })) channels.insert(event.channel);
-}
-
-// A run that lacks what the golden log holds differs; --keep is wrong where neither has it.
-void check_kept(const RegressArguments& arguments, bool renew) {
-  std::set<std::string> channels;
-  note_channels(arguments.record, channels);
-  if (!renew) note_channels(arguments.golden, channels);
-  for (const std::string& pattern : arguments.keep) {
-    if (std::none_of(channels.begin(), channels.end(),
-                     [&](const std::string& channel) { return fits_any(channel, {pattern}); }))
-      throw InputError(
-          {}, fmt::format("--keep {}: no message of the run is on such a channel; there are {}",
-                          pattern, fmt::join(channels, ", ")));
-  }
-}
-
-// A log's events on the channels that are kept.
-void keep_channels(const std::string& from, const std::string& to,
-                   const std::vector<std::string>& patterns) {
-  log::Reader log(from);
-  log::Writer writer(to);
-  log::Event event;
-  while (log.next(event)) {
-    if (fits_any(event.channel, patterns))
-      writer.write(event.timestamp_us, event.channel, event.data.data(), event.data.size());
-  }
-  writer.flush();
-  if (!writer.error().empty()) throw EnvironmentError(to + ": " + writer.error());
-}
-
-// What differs from the golden log, or "".
-std::string compare(const RegressArguments& arguments, const std::string& kept,
-                    const std::vector<log::DiffRule>& rules) {
-  const log::Diff result = log::diff_logs(arguments.golden, kept, rules);
-  for (const std::string& line : result.idle_rules) spdlog::warn(line);
-  if (!arguments.html.empty())
-    write_file(arguments.html, log::diff_html(result, arguments.golden, kept));
-  if (result.same()) return "";
-  std::string text = "the run differs from " + arguments.golden;
-  for (const std::string& fault : result.faults) text += " (" + fault + ")";
-  return text + ":\n" + log::diff_text(result);
-}
-
-// Holds the run against its golden log, or writes that one anew. What is wrong, or "".
-std::string hold_to_golden(const RegressArguments& arguments,
-                           const std::vector<log::DiffRule>& rules, bool renew) {
-  const std::string &golden = arguments.golden, kept = arguments.record + kKept;
-  if (std::error_code unreadable; !renew && !fs::exists(golden, unreadable))
-    return "there is no golden log " + golden + " yet: run this once with RUEDO_RENEW=1";
-  check_kept(arguments, renew);
-  keep_channels(arguments.record, kept, arguments.keep);
-  if (!renew) return compare(arguments, kept, rules);
-  if (const fs::path folder = fs::path(golden).parent_path(); !folder.empty()) {
-    std::error_code error;  // writing the log reports what is wrong
-    fs::create_directories(folder, error);
-  }
-  write_file(golden, read_input(kept, std::numeric_limits<size_t>::max()));
-  fmt::print("renewed {}\n", golden);
-  return "";
 }
 
 std::string run_script(const RegressArguments& arguments) {
@@ -360,20 +104,6 @@ void check_files_beside(const RegressArguments& arguments) {
   }
 }
 
-// By RUEDO_RENEW. Throws InputError for what is neither yes nor no.
-bool is_told_to_renew() {
-  const char* environment = std::getenv("RUEDO_RENEW");
-  const std::string told = CLI::detail::to_lower(environment ? environment : "");
-  const auto is_any_of = [&](std::initializer_list<const char*> words) {
-    return std::find(words.begin(), words.end(), told) != words.end();
-  };
-  if (is_any_of({"1", "true", "yes", "on"})) return true;
-  if (is_any_of({"", "0", "false", "no", "off"})) return false;
-  throw InputError({}, fmt::format("RUEDO_RENEW is \"{}\"; allowed are 1, true, yes, on and 0, "
-                                   "false, no, off",
-                                   environment));
-}
-
 judge::Expectations expectations(const RegressArguments& arguments) {
   judge::Expectations expected = arguments.expected;
   for (const std::string& text : arguments.goals) expected.goals.push_back(judge::parse_goal(text));
@@ -412,7 +142,8 @@ void add_files(const RegressArguments& arguments, const std::vector<log::DiffRul
   std::string fault;
   const bool good = verdict.passed();
   try {
-    fault = hold_to_golden(arguments, rules, renew && good);
+    fault = hold_to_golden({arguments.golden, arguments.keep, rules, arguments.html},
+                           arguments.record, renew && good);
   } catch (const std::exception& error) {  // must not hide what has failed before
     if (good) throw;
     fault = error.what();
@@ -428,8 +159,7 @@ void tell(const RegressArguments& arguments, const judge::Verdict& verdict) {
   if (!arguments.json.empty()) write_file(arguments.json, judge::to_json(verdict));
   if (!arguments.junit.empty())
     write_file(arguments.junit, judge::to_junit(verdict, arguments.world.world));
-  if (verdict.passed())
-    fmt::print("passed: {}\n", for_terminal(verdict.evidence()));
+  if (verdict.passed()) fmt::print("passed: {}\n", for_terminal(verdict.evidence()));
 }
 
 int regress(RegressArguments arguments) {
@@ -454,7 +184,11 @@ int regress(RegressArguments arguments) {
     tell(arguments, verdict);
     return kCheckFailed;
   }
-  std::vector<judge::Check> checks = run(arguments, world, isolated, judge, signals);
+  std::vector<judge::Check> checks =
+      run_judged(world,
+                 {server_options(arguments), isolated, arguments.client, !arguments.no_client_wait,
+                  arguments.grace, arguments.timeout},
+                 judge, signals);
   if (const int signal = signals.told()) {
     to_stderr("ruedo: the run was ended by a signal{}\n",
               keeps_log ? "; its log up to there is " + arguments.record : "");

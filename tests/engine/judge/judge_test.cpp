@@ -34,22 +34,24 @@ std::string box(const std::string& name, const std::string& pose, bool moves = t
 // A robot whose base_link is its model's frame: a box of 1 m about the point 0.6 m above it.
 std::string robot(const std::string& name, const std::string& pose) {
   return "<model name='" + name + "'><pose>" + pose +
-         "</pose><link name='base_link'><inertial><pose>0 0 0.6 0 0 0</pose><mass>1</mass></inertial>"
+         "</pose><link name='base_link'><inertial><pose>0 0 0.6 0 0 "
+         "0</pose><mass>1</mass></inertial>"
          "<collision name='c'><pose>0 0 0.6 0 0 0</pose><geometry><box><size>1 1 1</size></box>"
          "</geometry></collision><sensor name='imu' type='imu'/></link></model>";
 }
 
 std::shared_ptr<const world::WorldModel> world_of(const std::string& models) {
-  return world::load_world_text(
-      "<sdf version='1.9'><world name='w'>" + models + "</world></sdf>", "/tmp/w.sdf");
+  return world::load_world_text("<sdf version='1.9'><world name='w'>" + models + "</world></sdf>",
+                                "/tmp/w.sdf");
 }
 
 constexpr SimTime kStep = 5000;  // us
 
 class JudgeTest : public testing::Test {
  protected:
-  void judge(Expectations expected, const std::string& models = robot("r", "0 0 0 0 0 0") +
-                                                                box("box", "5 0 0.5 0 0 0", false)) {
+  void judge(Expectations expected,
+             const std::string& models = robot("r", "0 0 0 0 0 0") +
+                                         box("box", "5 0 0.5 0 0 0", false)) {
     world_ = world_of(models);
     judge_ = std::make_unique<Judge>(world_, std::move(expected));
     begin();
@@ -63,7 +65,8 @@ class JudgeTest : public testing::Test {
     state_.wheel_angles.resize(layout.wheels.size());
     for (const world::RobotPlacement& robot : layout.robots) {
       RobotState state;
-      state.X_WBase = robot.body.valid() ? state_.bodies[robot.body] * robot.X_BBase : robot.X_BBase;
+      state.X_WBase =
+          robot.body.valid() ? state_.bodies[robot.body] * robot.X_BBase : robot.X_BBase;
       state_.robots.push_back(state);
     }
     body_ = layout.robots.at(0).body;
@@ -195,8 +198,8 @@ TEST_F(JudgeTest, WhatCarriesTheRobotIsNoContact) {
   const LinkIndex own(0), other(1);
   judge(expected);
   see(0.0);
-  touch(own, other, {0, 0, 0.019}, {0, 0, 1});     // from below
-  touch(other, own, {0, 0, 0.0}, {0, 0, -1});      // the same, told the other way round
+  touch(own, other, {0, 0, 0.019}, {0, 0, 1});      // from below
+  touch(other, own, {0, 0, 0.0}, {0, 0, -1});       // the same, told the other way round
   touch(own, other, {0, 0, 0.0}, {0.7, 0, 0.714});  // of a slope
   touch(own, own, {0.5, 0, 0.5}, {1, 0, 0});
   touch(other, other, {5, 0, 0.5}, {1, 0, 0});
@@ -216,9 +219,9 @@ TEST_F(JudgeTest, WhatCarriesTheRobotIsNoContact) {
 TEST_F(JudgeTest, WhatPressesFromAboveOrFromTheSideIsAContact) {
   Expectations expected;
   expected.no_contact = true;
-  for (const auto& [position, normal] : {std::pair(Vec3(0, 0, 0.03), Vec3(0, 0, 1)),
-                                         std::pair(Vec3(0, 0, 1.1), Vec3(0, 0, -1)),
-                                         std::pair(Vec3(0, 0, 0.0), Vec3(0.72, 0, 0.694))}) {
+  for (const auto& [position, normal] :
+       {std::pair(Vec3(0, 0, 0.03), Vec3(0, 0, 1)), std::pair(Vec3(0, 0, 1.1), Vec3(0, 0, -1)),
+        std::pair(Vec3(0, 0, 0.0), Vec3(0.72, 0, 0.694))}) {
     judge(expected);
     see(0.0);
     touch(LinkIndex(0), LinkIndex(1), position, normal);

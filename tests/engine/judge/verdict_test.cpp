@@ -27,17 +27,17 @@ TEST(Verdict, TellsFailuresInTheirOrder) {
   const Verdict verdict{{kLate, kNot, kSteps, kEarly, kClient}, {}, {}};
   std::vector<std::string> lines;
   for (const Check& check : verdict.failures()) lines.push_back(to_line(check));
-  EXPECT_THAT(lines,
-              testing::ElementsAre("the client ended with exit code 1",
-                                   "not judged: there is no sample", "1.000 s: too near",
-                                   "2.500 s: touched <b>\nand more"));
+  EXPECT_THAT(lines, testing::ElementsAre("the client ended with exit code 1",
+                                          "not judged: there is no sample", "1.000 s: too near",
+                                          "2.500 s: touched <b>\nand more"));
 }
 
 TEST(Verdict, IsJson) {
-  EXPECT_EQ(to_json({{kSteps}, {{"time_s", 0.5}}, {{0.25, 1.0, -1.0}}}),
-            "{\"outcome\": \"passed\", \"evidence\": [{\"what\": \"run\", \"text\": \"12 steps\"}], "
-            "\"failures\": [], \"faults\": [], \"metrics\": {\"time_s\": 0.5}, \"track\": "
-            "[[0.25, 1, -1]]}\n");
+  EXPECT_EQ(
+      to_json({{kSteps}, {{"time_s", 0.5}}, {{0.25, 1.0, -1.0}}}),
+      "{\"outcome\": \"passed\", \"evidence\": [{\"what\": \"run\", \"text\": \"12 steps\"}], "
+      "\"failures\": [], \"faults\": [], \"metrics\": {\"time_s\": 0.5}, \"track\": "
+      "[[0.25, 1, -1]]}\n");
   const std::string failed = to_json({{kSteps, kNot, kEarly}, {}, {}});
   EXPECT_THAT(failed, HasSubstr("\"outcome\": \"failed\""));
   EXPECT_THAT(failed, HasSubstr("{\"what\": \"odometry\", \"judged\": false, \"time_s\": null, "
@@ -51,21 +51,22 @@ TEST(Verdict, IsJson) {
 }
 
 TEST(Verdict, IsJunit) {
-  EXPECT_EQ(to_junit({{kSteps, kLate, kNot}, {}, {}}, "a<b"),
-            "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n"
-            "<testsuite name=\"a&lt;b\" tests=\"3\" failures=\"2\">\n"
-            "  <testcase classname=\"ruedo.regress\" name=\"run\">\n"
-            "    <system-out>12 steps</system-out>\n"
-            "  </testcase>\n"
-            "  <testcase classname=\"ruedo.regress\" name=\"contact\">\n"
-            "    <failure type=\"failed\" message=\"2.500 s: touched &lt;b&gt;\">2.500 s: touched "
-            "&lt;b&gt;\nand more</failure>\n"
-            "  </testcase>\n"
-            "  <testcase classname=\"ruedo.regress\" name=\"odometry\">\n"
-            "    <failure type=\"not judged\" message=\"not judged: there is no sample\">not judged: "
-            "there is no sample</failure>\n"
-            "  </testcase>\n"
-            "</testsuite>\n");
+  EXPECT_EQ(
+      to_junit({{kSteps, kLate, kNot}, {}, {}}, "a<b"),
+      "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n"
+      "<testsuite name=\"a&lt;b\" tests=\"3\" failures=\"2\">\n"
+      "  <testcase classname=\"ruedo.regress\" name=\"run\">\n"
+      "    <system-out>12 steps</system-out>\n"
+      "  </testcase>\n"
+      "  <testcase classname=\"ruedo.regress\" name=\"contact\">\n"
+      "    <failure type=\"failed\" message=\"2.500 s: touched &lt;b&gt;\">2.500 s: touched "
+      "&lt;b&gt;\nand more</failure>\n"
+      "  </testcase>\n"
+      "  <testcase classname=\"ruedo.regress\" name=\"odometry\">\n"
+      "    <failure type=\"not judged\" message=\"not judged: there is no sample\">not judged: "
+      "there is no sample</failure>\n"
+      "  </testcase>\n"
+      "</testsuite>\n");
 }
 
 }  // namespace

@@ -1,0 +1,28 @@
+// A golden log: what a run is held against, or what is written anew.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "log/diff.h"
+
+namespace ruedo::cli {
+
+struct Golden {
+  std::string log;
+  std::vector<std::string> keep;     // shell patterns of the channels that it holds
+  std::vector<log::DiffRule> rules;  // what may differ
+  std::string html;                  // a page that shows what does; "": none
+};
+
+// What is compared lies beside the log of the run, under its name and this.
+inline constexpr const char* kKept = ".kept";
+
+// Holds a run's log against it, or writes it anew. What is wrong, or "". Throws InputError where a
+// pattern of `keep` fits no channel, and EnvironmentError.
+std::string hold_to_golden(const Golden& golden, const std::string& record, bool renew);
+
+// By RUEDO_RENEW. Throws InputError for what is neither yes nor no.
+bool is_told_to_renew();
+
+}  // namespace ruedo::cli

@@ -1,0 +1,190 @@
+// The judge hears the run as a sink; the client, its pace and its end are seen to beside it.
+#include "cli/support/judged_run.h"
+
+#include <atomic>
+#include <chrono>
+#include <condition_variable>
+#include <mutex>
+#include <optional>
+#include <span>
+#include <thread>
+
+#include <fmt/format.h>
+#include <spdlog/spdlog.h>
+
+#include "base/progress.h"
+#include "bus/server_bus.h"
+#include "cli/support/client_pace.h"
+#include "cli/support/client_process.h"
+#include "log/header.h"
+#include "ruedo/applied_t.hpp"
+#include "ruedo/decode.h"
+
+namespace ruedo::cli {
+namespace {
+
+// What the judge hears of a run.
+class JudgeSink : public run::Sink {
+ public:
+  JudgeSink(judge::Judge& judge, run::Run& run) : judge_(judge), run_(run) {}
+
+  Hears hears() const override { return {.samples = true, .records = true}; }
+  bool wants(const std::string&) const override { return false; }  // no pictures
+  void announce(const std::shared_ptr<const run::Announcement>& announcement) override {
+    announcement_ = announcement;
+    judge_.see_world(run_.world(), run_.layout());
+  }
+  void message(const run::Published& message) override {
+    const std::span<const uint8_t> bytes(message.data, message.size);
+    if (message.kind == run::Kind::sample) {
+      judge_.see(announcement_->channels[message.index].name, bytes);
+    } else if (message.channel == log::kAppliedChannel) {
+      applied_t applied;
+      if (decode_checked(bytes.data(), bytes.size(), applied) == DecodeFault::none)
+        judge_.see(applied);
+    }
+  }
+
+ private:
+  judge::Judge& judge_;
+  run::Run& run_;
+  std::shared_ptr<const run::Announcement> announcement_;
+};
+
+// Ends a run that has not gone on for too long.
+class Watchdog {
+ public:
+  Watchdog(double timeout_s, run::Run& run) : timeout_s_(timeout_s), run_(run) {
+    run.on_stall([this](const std::string& reason) {
+      const std::lock_guard lock(mutex_);
+      reason_ = reason;
+    });
+    thread_ = std::thread([this] { watch(); });
+  }
+  ~Watchdog() {
+    {
+      const std::lock_guard lock(mutex_);
+      over_ = true;
+    }
+    changed_.notify_all();
+    thread_.join();
+  }
+  void moved() { ++moves_; }  // any thread
+
+  // Why it has ended the run; "": it has not.
+  std::string fault() {
+    const std::lock_guard lock(mutex_);
+    return fault_;
+  }
+
+ private:
+  void watch() {
+    std::unique_lock lock(mutex_);
+    while (!over_) {
+      const int64_t before = moves_;
+      if (changed_.wait_for(lock, std::chrono::duration<double>(timeout_s_), [&] { return over_; }))
+        return;
+      if (moves_ != before) continue;
+      fault_ = fmt::format("the run did not go on for {:g} s of real time{} (--timeout)",
+                           timeout_s_, reason_.empty() ? "" : ": " + reason_);
+      run_.stop();
+      return;
+    }
+  }
+
+  const double timeout_s_;
+  run::Run& run_;
+  std::atomic<int64_t> moves_{0};
+  std::mutex mutex_;
+  std::condition_variable changed_;
+  std::string reason_, fault_;
+  bool over_ = false;
+  std::thread thread_;
+};
+
+// How the client has ended. until: sim time at its end, of a client that ended before the run.
+judge::Check client_check(const JudgedRunOptions& options, const ClientProcess& client,
+                          bool was_heard, std::optional<SimTime> until) {
+  judge::Check check{"client", judge::Outcome::passed, "", {}};
+  if (client.was_killed()) {
+    check.outcome = judge::Outcome::failed;
+    check.text = fmt::format(
+        "the client was still running {:g} s after the end of the run (--grace), and was killed",
+        options.grace_s);
+  } else if (!client.fault().empty()) {
+    check.outcome = judge::Outcome::failed;
+    check.text = "the client ended with " + client.fault();
+    if (!until) check.text += " after the end of the run";
+  } else if (!was_heard && options.waits) {
+    check.outcome = judge::Outcome::not_judged;
+    check.text = fmt::format(
+        "the client{} was never heard on the bus (a program that only listens wants "
+        "--no-client-wait)",
+        client.was_told_to_end() ? "" : " ended with 0 and");
+  } else if (client.was_told_to_end()) {
+    check.text = "the client ran to the end, and ended when it was told to";
+  } else {
+    check.text =
+        until ? fmt::format("the client ended with 0 at {:g} s", static_cast<double>(*until) * 1e-6)
+              : "the client ended with 0 after the end of the run";
+  }
+  return check;
+}
+
+}  // namespace
+
+std::vector<judge::Check> run_judged(const std::shared_ptr<const world::WorldModel>& world,
+                                     JudgedRunOptions options, judge::Judge& judge,
+                                     SignalThread& signals) {
+  const bus::ServerBus place =
+      bus::open_server_bus(options.isolated ? "auto" : "auto-tcp", world->name,
+                           [](const std::string& line) { spdlog::warn(line); });
+  const bool has_client = !options.client.empty();
+  ClientPace pace(has_client && options.waits);
+  options.run.hearer = [&pace](const std::string&, const uint8_t*, size_t) { pace.heard(); };
+  Progress progress("running " + world->name, options.run.duration_us);
+  run::Run server(world, std::move(options.run), *place.bus);
+  JudgeSink sink(judge, server);
+  server.add(sink);
+  Watchdog watchdog(options.timeout_s, server);
+  std::atomic<SimTime> now{0};
+  server.on_state([&](const Snapshot& snapshot) {
+    judge.see(snapshot);
+    now = snapshot.time;
+    watchdog.moved();
+    progress.to(snapshot.time);
+  });
+  if (has_client) pace.pace(&server);
+  std::unique_ptr<ClientProcess> client;
+  std::atomic<SimTime> ended_at{-1};
+  if (has_client) {
+    client = std::make_unique<ClientProcess>(
+        options.client,
+        std::vector<std::string>{"LCM_DEFAULT_URL=" + place.url.str(), "RUEDO_REGRESS=1",
+                                 pace.variable()},
+        [&] {
+          ended_at = now.load();
+          server.stop();
+        },
+        std::vector<int>{pace.inherited()});
+  }
+  std::vector<judge::Check> checks;
+  const SignalThread::Serving serving(signals, server);
+  try {
+    server.run();
+  } catch (const run::LeaseEnded& ended) {
+    checks.push_back({"run", judge::Outcome::failed, ended.what(), {}});
+  }
+  if (std::string fault = watchdog.fault(); !fault.empty())
+    checks.push_back({"run", judge::Outcome::failed, std::move(fault), {}});
+  pace.pace(nullptr);
+  if (client) {
+    const bool by_itself = client->is_over();
+    client->end(std::chrono::duration<double>(signals.told() ? 0.0 : options.grace_s));
+    checks.push_back(client_check(options, *client, pace.was_heard(),
+                                  by_itself ? std::optional(ended_at.load()) : std::nullopt));
+  }
+  return checks;
+}
+
+}  // namespace ruedo::cli
