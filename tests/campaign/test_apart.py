@@ -74,10 +74,10 @@ def leaves(view):
             time.sleep(0.001)
     threading.Thread(target=beat).start()
     has_begun.wait()
-    return "done"
+    return "done" if view.time else (0.0, 0.0)
 def waits(view):
     time.sleep(0.5)
-    return "done"
+    return "done" if view.time else (0.0, 0.0)
 """
 
 
@@ -127,13 +127,13 @@ def forks(view):
     if os.fork() == 0:
         raise RuntimeError("a child of another case's")
     os.wait()
-    return "done"
+    return "done" if view.time else (0.0, 0.0)
 def stays(view):
     if os.fork() == 0:
         open(__file__ + ".child", "w").write(str(os.getpid()))
         while True:
             time.sleep(1)
-    return "done"
+    return "done" if view.time else (0.0, 0.0)
 def stand(view):
     return 0.0, 0.0
 """
@@ -158,7 +158,7 @@ def leave(name):
     Path(__file__).with_name(name).write_text(str(child.pid))
 def ends(view):
     leave("ends")
-    return "done"
+    return "done" if view.time else (0.0, 0.0)
 def dies(view):
     leave("dies")
     os._exit(0)
@@ -186,7 +186,8 @@ def test_what_a_repeated_program_leaves_behind_is_ended(tmp_path):
     command = "echo $$ > child; exec sleep 1000"
     (tmp_path / "leave.sh").write_text(command)
     command = "setsid sh leave.sh & while ! test -s child; do :; done"
-    campaign(tmp_path, {"c": f'command: "{command}", lockstep: 1'})
+    limits = "{duration: 1, wall: 10}"  # who is in the background is waited for
+    campaign(tmp_path, {"c": f'command: "{command}", lockstep: 1'}, limits=limits)
     ruedo("campaign", "repeat", "c.yaml", "0", folder=tmp_path)
     assert not os.path.exists(f"/proc/{(tmp_path / 'child').read_text().strip()}")
 
@@ -196,7 +197,7 @@ import os
 def drive(view):
     with open(FILE, "a") as file:
         file.write("\\n")
-    return "done"
+    return "done" if view.time else (0.0, 0.0)
 """
 
 
@@ -215,7 +216,7 @@ def test_what_runs_while_its_file_is_edited_is_no_result(folder, which):
     said = ruedo("campaign", "run", "c.yaml", "--workers", "1", folder=folder, code=4).stderr
     assert f"{which} was changed while its cases ran" in said and said.count("\n") == 1
     assert results_in(folder / "c.campaign") == 0
-    (folder / "controller.py").write_text("def drive(view):\n    return 'done'\n")
+    (folder / "controller.py").write_text("def drive(view):\n    return 0.0, 0.0\n")
     ruedo("campaign", "resume", "c.yaml", folder=folder)
 
 
@@ -223,14 +224,16 @@ STREAMS = """
 import os, sys
 def closes(view):
     sys.stdout.close()
-    return "done"
+    return "done" if view.time else (0.0, 0.0)
 def none(view):
     sys.stdout = sys.stderr = None
-    return "done"
+    return "done" if view.time else (0.0, 0.0)
 def closes_both(view):
+    if view.time:
+        return "done"
     os.close(1)
     os.close(2)
-    return "done"
+    return 0.0, 0.0
 def speaks(view):
     print("here I am")
     raise RuntimeError("and that was it")
@@ -353,7 +356,7 @@ def test_a_package_is_found_without_being_imported(tmp_path, line):
     """Regression: `status` ended with it, silently and well."""
     (tmp_path / "package").mkdir()
     (tmp_path / "package/__init__.py").write_text(line + "\n")
-    (tmp_path / "package/sub.py").write_text("def drive(view):\n    return 'done'\n")
+    (tmp_path / "package/sub.py").write_text("def drive(view):\n    return 0.0, 0.0\n")
     campaign(tmp_path, {"c": 'python: "package.sub:drive"'})
     assert "0 of 1 cases" in ruedo("campaign", "status", "c.yaml", folder=tmp_path).stdout
     assert "1 passed" in ruedo("campaign", "run", "c.yaml", folder=tmp_path).stdout

@@ -125,7 +125,7 @@ def drive(view):
 
 
 def looks(view):
-    assert ("lrf.ranges" in view) == (view.time >= 1.0)
+    assert ("lrf.ranges" in view) == (view.time >= 1.0 and view.parameters["last"] == 1)
     return (0.2, 0.0) if "lrf.ranges" in view else (0.0, 0.0)
 
 
@@ -152,10 +152,12 @@ def test_a_controller_stands_until_what_it_reads_has_come(tmp_path):
     results = Campaign(tmp_path / "c.yaml").run(workers=1)
     found = {(case.controller, case.parameters["last"]): row for case, row in results.done}
     # For a second, after 0.3 m/s^2 from rest: 0.2 - 0.2^2 / (2 * 0.3) m. What never comes: no way.
-    for name, last, way in (("drive", 1, 0.1333), ("looks", 1, 0.1333), ("drive", 0, 0.0)):
+    for name, last, way in (("drive", 1, 0.1333), ("looks", 1, 0.1333), ("looks", 0, 0.0)):
         assert found[name, last]["status"] == "passed", found[name, last]
         assert found[name, last]["metrics"]["path_m"] == pytest.approx(way, abs=0.002)
     assert found["misspelt", 1]["status"] == "crashed"
+    waits = found["drive", 0]  # all the time, so that nothing it may do wrong was seen
+    assert waits["status"] == "not judged" and "commanded nothing" in waits["reason"]
 
 
 PROGRAM = '''

@@ -124,6 +124,66 @@ def test_nothing_is_run_twice_and_a_changed_controller_is_run_anew(folder):
     assert len(ran) == 16
 
 
+def ids(folder, file="c.yaml"):
+    return [case.id for case in Campaign(folder / file).cases]
+
+
+def test_what_lies_beside_a_controller_counts(folder):
+    """Regression: what it imports did not. What Ruedo itself writes there does not."""
+    before = ids(folder)
+    ruedo("campaign", "export", "c.yaml", "-o", "table.csv", folder=folder)
+    for name in ("report.html", "case0.lcm", "results.xml"):
+        (folder / name).touch()
+    (folder / "other.yaml").write_text(CAMPAIGN.replace("seeds: 2", "seeds: 3"))
+    (folder / ".hidden").mkdir()
+    for name in (".hidden/a.py", ".a.py", "notes.txt", "other.campaign/worlds/a.json"):
+        (folder / name).parent.mkdir(parents=True, exist_ok=True)
+        (folder / name).write_text("")
+    shutil.copytree(folder / "c.campaign", folder / "taken")
+    assert ids(folder) == before
+    for name in ("lib.py", "deep/er/lib.py", "gains.json", "way.csv", "weights.npz"):
+        (folder / name).parent.mkdir(parents=True, exist_ok=True)
+        (folder / name).write_text("1")
+        one = ids(folder)
+        (folder / name).write_text("2")
+        assert not set(before) & set(one) and not set(one) & set(ids(folder)), name
+        (folder / name).unlink()
+    assert ids(folder) == before
+
+
+@pytest.mark.parametrize(
+    "count, size, says", [(2001, 0, "2000 files"), (1, (256 << 20) + 1, "256 MB")]
+)
+def test_a_folder_that_is_too_large_is_told(folder, count, size, says):
+    (folder / "data").mkdir()
+    for i in range(count):
+        with (folder / f"data/{i}.npy").open("wb") as file:
+            file.truncate(size)
+    said = ruedo("campaign", "run", "c.yaml", folder=folder, code=3).stderr
+    assert said.count("\n") == 1 and "c.yaml:6: " in said and "in `files`" in said and says in said
+    text = CAMPAIGN.replace("name: ahead,", "name: ahead, files: [world.py],")
+    (folder / "c.yaml").write_text(text)
+    assert len(ids(folder)) == 8
+
+
+def test_of_students_the_one_that_changed_is_run_again(tmp_path):
+    (tmp_path / "students").mkdir()
+    for name in ("a", "b"):
+        (tmp_path / f"students/{name}.py").write_text("def drive(view):\n    return 0.0, 0.0\n")
+    (tmp_path / "c.yaml").write_text(
+        "worlds: [empty]\nrobots: ['p3at@0,0']\nlimits: {duration: 1}\n"
+        "controllers: [{name: s, each: 'students/*.py', python: '{file}:drive'}]\n"
+        "metrics: [{name: m, python: 'metrics.py:measure'}]\n"
+    )
+    (tmp_path / "metrics.py").write_text("def measure(log):\n    return 1.0\n")
+    a, b = ids(tmp_path)
+    (tmp_path / "students/b.py").write_text("def drive(view):\n    return 0.1, 0.0\n")
+    assert ids(tmp_path)[0] == a and ids(tmp_path)[1] != b
+    made = Campaign(tmp_path / "c.yaml")
+    again = Campaign(made.content, folder=tmp_path)
+    assert [case.id for case in again.cases] == [case.id for case in made.cases]
+
+
 ROBOT = """<sdf version='1.9'><model name='cart'><link name='base_link'><pose>0 0 0.1 0 0 0</pose>
 <collision name='c'><geometry><box><size>0.4 0.4 0.2</size></box></geometry></collision>
 <sensor name='imu' type='imu'><update_rate>10</update_rate></sensor></link>
@@ -137,7 +197,7 @@ def test_a_robot_of_the_users_own_is_looked_for_beside_the_file(tmp_path):
     (tmp_path / "stand.py").write_text("def stand(view):\n    return None\n")
     (tmp_path / "c.yaml").write_text(
         "worlds: [empty]\nrobots: ['robots/cart.sdf:guest@1,2']\n"
-        "controllers: [{name: stand, python: 'stand.py:stand'}]\n"
+        "controllers: [{name: stand, python: 'stand.py:stand', no_client_wait: true}]\n"
         "expect: {robot: guest}\nlimits: {duration: 1}\n"
     )
     ruedo("campaign", "run", tmp_path / "c.yaml", folder="/")
@@ -397,6 +457,82 @@ def test_two_campaigns_compared(whole):
         (folder / "controller.py").write_text(CONTROLLER)
     assert [case.number for case, _, _ in found.better] == [2, 3] and not found.worse
     assert found.p == 0.5 and found.change[0] == pytest.approx(0.25)
+
+
+def test_what_became_worse_has_an_exit_code(whole):
+    """Regressions: "1 worse" was 0, where p was large; and a shard that was started in the folder
+    of a whole campaign made everybody forget its other cases."""
+    folder, _ = whole
+    shutil.copytree(folder / "c.campaign", folder / "before")
+    ruedo("campaign", "run", "c.yaml", "--shard", "8/8", "--out", "before", folder=folder)
+    compare = ("campaign", "compare", "c.yaml", "before")
+    assert "8 cases in both" in ruedo(*compare, folder=folder).stdout
+    with contextlib.closing(sqlite3.connect(folder / "c.campaign/results.sqlite")) as db:
+        first = Campaign(folder / "c.yaml").cases[0].id
+        kept = db.execute("SELECT * FROM results WHERE id = ?", (first,)).fetchone()
+        db.execute("UPDATE results SET status = 'not judged' WHERE id = ?", (first,))
+        db.commit()
+        try:
+            said = ruedo(*compare, folder=folder, code=1).stdout
+            assert "1 worse" in said and f"worse: 0 {first} not judged: " in said
+        finally:
+            db.execute("UPDATE results SET status = 'passed' WHERE id = ?", (first,))
+            db.commit()
+            assert db.execute("SELECT * FROM results WHERE id = ?", (first,)).fetchone() == kept
+    (folder / "other.yaml").write_text(CAMPAIGN.replace("seeds: 2", "seeds: [7]"))
+    said = ruedo("campaign", "compare", "other.yaml", "before", folder=folder, code=1).stderr
+    assert "have no case in common" in said
+    assert "have passed" not in said
+    help_ = " ".join(ruedo("campaign", "compare", "--help", folder=folder).stdout.split())
+    assert "A case is worse when it had passed and now has not" in help_
+
+
+CAUSES = """
+def first(view):
+    return (0.5, 0.0) if view.time < 3 else (0.0, 0.0)
+def second(view):
+    if view.time > 0.5 + 0.1 * view.seed:
+        raise RuntimeError(f"no plan for {view.seed} cells")
+    return 0.1, 0.0
+def third(view):
+    return None
+def fourth(view):
+    return 0.0, 0.0
+"""
+
+
+def test_a_report_tells_causes_apart(tmp_path):
+    from ruedo import World
+
+    (tmp_path / "c.py").write_text(CAUSES)
+    for name, x in (("near", 1.2), ("far", 9.0)):
+        (tmp_path / f"{name}.sdf").write_text(str(World(name).wall(x, -2, x, 2).robot("p3at")))
+    controllers = ", ".join(
+        f"{{name: {one}, python: 'c.py:{one}'}}" for one in ("first", "second", "third", "fourth")
+    )
+    (tmp_path / "c.yaml").write_text(
+        f"worlds: [near.sdf, far.sdf]\ncontrollers: [{controllers}]\nseeds: 10\n"
+        "disable: [p3at/camera, p3at/sonar_front, p3at/sonar_rear]\n"
+        "expect: {no_contact: true}\nlimits: {duration: 3}\n"
+    )
+    ruedo("campaign", "run", "c.yaml", "--quiet", folder=tmp_path, code=1)
+    ruedo("campaign", "report", "c.yaml", "--pages", "0", folder=tmp_path)
+    page = html.unescape((tmp_path / "c.campaign/report.html").read_text())
+    why = page.partition("<h2>Why they failed</h2>")[2].partition("</table>")[0]
+    groups = re.findall(r"<tr><td>([a-z ]+)</td><td>(\w+)</td><td class='n'>(\d+)</td>", why)
+    assert groups == [
+        ("crashed", "controller", "20"),
+        ("not judged", "controller", "20"),
+        ("failed", "contact", "10"),
+    ], groups
+    assert "20 crashed" in page and "20 not judged" in page and "30 passed" in page
+    assert "<tr><td>near</td><td class='n'>0 of 10</td><td class='n'>0 of 10</td>" in page
+    assert "<tr><td>far</td><td class='n'>10 of 10</td><td class='n'>0 of 10</td>" in page
+    assert "; walls as in case 0" in page
+    assert re.search(r"<td>passed</td><td>[^<]*p3at touched nothing over \d+ steps", page)
+    worst = page.partition("<h2>The worst runs</h2>")[2].partition("<h2>")[0]
+    captions = re.findall(r"<figcaption><b>\d+</b> (\w+),", worst)[:3]
+    assert set(captions) == {"first", "second", "third"}, captions
 
 
 def test_thirty_students_are_marked_in_one_command(tmp_path):

@@ -420,6 +420,14 @@ def test_intervals_and_tests_of_counts():
     assert (other, low2, high2) == pytest.approx((-change, -high, -low))
 
 
+def test_a_shard_without_a_case_is_told(folder):
+    """Regression: nothing was run, and all was well."""
+    said = ruedo("campaign", "run", "c.yaml", "--shard", "9/9", folder=folder, code=3).stderr
+    assert said == "ruedo: --shard 9/9: there are 8 cases, and none is in it\n"
+    script = ruedo("campaign", "slurm", "c.yaml", "--tasks", "20", folder=folder).stdout
+    assert "--array=1-8\n" in script and '"$SLURM_ARRAY_TASK_ID/8"' in script
+
+
 @pytest.mark.parametrize("shard", ["9" * 5000 + "/" + "9" * 5000, "0/2", "3/2", "1/2/3"], ids=len)
 def test_a_wrong_shard_is_told(folder, shard):
     said = ruedo("campaign", "run", "c.yaml", "--shard", shard, folder=folder, code=3).stderr
@@ -478,7 +486,7 @@ def test_a_command_that_names_no_file_is_told(folder):
     (folder / "c.yaml").write_text(text)
     said = ruedo("campaign", "run", "c.yaml", folder=folder, code=1).stderr
     [told] = [line for line in said.splitlines() if "controller ahead: no file of" in line]
-    assert "`files`" in told
+    assert "`inputs`" in told
 
 
 def test_a_parameter_may_be_a_name_though_it_is_a_number(folder):

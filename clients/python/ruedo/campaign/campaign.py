@@ -15,6 +15,7 @@ from .. import _engine
 from ..files import MOST_YAML_BYTES, open_lock, read_bytes, sha256_of
 from .cluster import run_on_ray
 from .errors import CampaignError, SpecError
+from .inputs import Folders
 from .local import Crew, Done, cores
 from .names import check_names
 from .plan import Case, Planner, check_values, files_called, shard_of
@@ -71,6 +72,7 @@ class Campaign:
         self.version = str(_engine.build)
         self._cases: list[Case] | None = None
         self.worlds = WorldFiles(self.folder, self.out / "worlds")
+        self.folders = Folders(self.out)
         self._files: dict[str, str] = {}  # that the cases are made from, with their hashes
 
     @property
@@ -91,6 +93,7 @@ class Campaign:
                 self.out / "worlds",
                 self.version,
                 self.worlds,
+                self.folders,
             )
             self._cases = planner.cases()
             self._files = planner.files
@@ -134,7 +137,9 @@ class Campaign:
             )
             store.set_about(
                 "cases",
-                json.dumps([{key: getattr(case, key) for key in _REMEMBERED} for case in cases]),
+                json.dumps(
+                    [{key: getattr(case, key) for key in _REMEMBERED} for case in self.cases]
+                ),  # also those of other shards, which may be here
             )
             known = store.known()
             missing = [case for case in cases if case.id not in known]
@@ -215,7 +220,8 @@ class Campaign:
                     if key != "each"
                 }
                 if "command" in made:  # however the command names it
-                    made["files"] = [*made.get("files", []), glob.escape(path)]
+                    made["inputs"] = [*made.get("inputs", []), glob.escape(path)]
+                made["others"] = [*made.get("others", []), one["each"]]
                 yield {**made, "name": file.stem}
 
     def _sampled(self) -> set[str]:
@@ -262,7 +268,8 @@ class Unchanged:
             if changed:
                 raise CampaignError(
                     f"{file} was changed while its cases ran; what was run before is kept, "
-                    "`ruedo campaign resume` does the rest with what it is now"
+                    "`ruedo campaign resume` does the rest with what it is now; where a controller "
+                    "writes it, say in `files` which files it is made of"
                 )
             self._touched[file] = touched
 

@@ -6,6 +6,7 @@ The same on every machine and in every order: nothing here reads a clock but to 
 from __future__ import annotations
 
 import json
+import math
 import os
 import shutil
 import signal
@@ -32,6 +33,10 @@ from .processes import die_with_parent, end_descendants, ends_within, forks_end,
 
 _ROOM = 64 << 10  # bytes that a disk must have left
 _ENGINES = 4  # that a worker keeps
+_IDLE = (
+    "the controller commanded nothing all the time; one that stands answers (0, 0), and one that "
+    "only looks has no_client_wait: true"
+)
 _STARVED = ("MemoryError", "bad_alloc", "OutOfMemoryError", "Cannot allocate memory")
 
 
@@ -142,9 +147,10 @@ class Runner:
             log=log,
             everything=everything,
         )
+        acted = True
         try:
             with _time_limit(limits["wall"]), limit_memory(limits["memory_mb"]):
-                self._drive(engine, robot, what)
+                acted = self._drive(engine, robot, what)
         except TimeIsUp:
             outcome.fail("timeout", "controller", too_slow(limits["wall"]))
         except BrokenRun as error:
@@ -164,8 +170,11 @@ class Runner:
         finally:
             verdict = engine.end_run()
         self._take(verdict, limits["memory_mb"], outcome)
+        if not acted and not what["controller"].get("no_client_wait", False):
+            outcome.fail("not judged", "controller", _IDLE)
 
-    def _drive(self, engine: Engine, robot: str, what: dict[str, Any]) -> None:
+    def _drive(self, engine: Engine, robot: str, what: dict[str, Any]) -> bool:
+        """Whether the controller has commanded anything, or said that it is done."""
         made = what["controller"]
         steps = max(1, round(1.0 / (made.get("hz", 10.0) * engine.dt)))
         last = max(1, round(what["limits"]["duration"] / engine.dt))
@@ -175,6 +184,7 @@ class Runner:
         view = View(engine, robot, what["parameters"], what["seed"])
         index = engine.robots.index(robot) if robot in engine.robots else -1
         commands = _no_commands(len(engine.robots))
+        acted = False
         while engine.steps() < last:
             try:
                 with forks_end():
@@ -182,14 +192,18 @@ class Runner:
             except NothingYet:
                 answer = None
             if isinstance(answer, str) and answer == DONE:
-                return
+                return True
             commands[:] = float("nan")
             if answer is not None:
+                if index < 0:
+                    raise ValueError(f"{robot or 'the world'} has no drive to take a velocity")
                 commands[0, index] = velocity_of(answer)
+                acted = True
             try:
                 engine.step(commands if index >= 0 else None, min(steps, last - engine.steps()))
             except RuntimeError as error:
                 raise BrokenRun(_line(error)) from None
+        return acted or view.has_sent
 
     def _engine(self, what: dict[str, Any]) -> Engine:
         world = what["world"]
@@ -304,7 +318,10 @@ class Runner:
             left = max(until - time.monotonic(), 1e-3)
             with _time_limit(left), limit_memory(limits["memory_mb"]), forks_end():
                 value = float(Function(metric["python"], self._folder).load()(log))
-            outcome.metrics[metric["name"]] = value
+            if math.isfinite(value):
+                outcome.metrics[metric["name"]] = value
+            else:
+                said = f"{metric['python']} returned {value}, which measures nothing"
         except KeyboardInterrupt:
             raise
         except TimeIsUp:

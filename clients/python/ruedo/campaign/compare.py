@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from .errors import CampaignError, ResultsError
+from .errors import CampaignError, NothingCompared, ResultsError
 from .plan import Case
 from .stats import mcnemar, paired_difference
 from .store import Results, Store
@@ -27,6 +27,7 @@ class Comparison:
     neither: int = 0
     worse: list[Pair] = field(default_factory=list)
     better: list[Pair] = field(default_factory=list)
+    missing: int = 0  # that had a result before, and have none now
 
     @property
     def count(self) -> int:
@@ -52,6 +53,7 @@ class Comparison:
             "neither": self.neither,
             "worse": [case.number for case, _, _ in self.worse],
             "better": [case.number for case, _, _ in self.better],
+            "missing": self.missing,
             "p": self.p,
             "change": change,
             "interval": [low, high],
@@ -64,11 +66,14 @@ class Comparison:
             f"success {change:+.1%} (95 % interval {low:+.1%} to {high:+.1%}), {len(self.worse)} worse, "
             f"{len(self.better)} better, exact p = {self.p:.3g} (McNemar)",
         ]
+        if self.missing:
+            lines.append(f"{self.missing} more of {self.before} have no result in {self.now}")
         lines += [
-            f"  worse: {case.number} {case.id}: {now['reason']}" for case, _, now in self.worse[:20]
+            f"  worse: {case.number} {case.id} {now['status']}: {now['reason']}"
+            for case, _, now in self.worse[:20]
         ]
         lines += [
-            f"  better: {case.number} {case.id}: it was {before['reason']}"
+            f"  better: {case.number} {case.id}: it was {before['status']}: {before['reason']}"
             for case, before, _ in self.better[:20]
         ]
         return "\n".join(lines)
@@ -96,8 +101,9 @@ def compare(before: Results, now: Results, names: tuple[str, str]) -> Comparison
             result.better.append((case, was, row))
         else:
             result.neither += 1
+    result.missing = len(old) - result.count
     if result.count == 0:
-        raise CampaignError(
+        raise NothingCompared(
             f"{names[0]} and {names[1]} have no case in common: the same world, robot, parameters and seed"
         )
     return result

@@ -37,6 +37,7 @@ class View:
         self.robot = robot
         self.parameters = parameters
         self.seed = seed
+        self.has_sent = False
 
     @property
     def time(self) -> float:
@@ -63,6 +64,7 @@ class View:
         """A message on one of the robot's channels: "move" or "p3at/move"."""
         full = channel if "/" in channel else f"{self.robot}/{channel}"
         self._engine.command(0, full, message)
+        self.has_sent = True
 
 
 def _rows(engine: Engine, robot: str) -> dict[str, int]:

@@ -11,6 +11,12 @@ class CampaignError(RuedoError):
     exit_code = 4
 
 
+class NothingCompared(CampaignError):
+    """Two campaigns have no case in common: that says nothing of either."""
+
+    exit_code = 1
+
+
 class UsageError(CampaignError, ValueError):
     """What was asked for cannot be, whatever is in the files."""
 

@@ -24,7 +24,7 @@ _INSTALLED = (sysconfig.get_path("stdlib"), str(Path(__file__).resolve().parents
 class Function:
     """A function or class, its name, and the hash of the file that it stands in.
 
-    Modules that the file imports are not in the hash: name them in the controller's `files`.
+    Modules that the file imports are not in the hash, but in that of its folder (inputs.py).
     """
 
     def __init__(self, name: str, folder: Path) -> None:
@@ -43,6 +43,11 @@ class Function:
         except OSError as error:
             raise ValueError(f"is {name!r}, which cannot be read: {error}") from None
         self.sha256 = hashlib.sha256(self._source).hexdigest()
+
+    @property
+    def is_installed(self) -> bool:
+        """In a package: what lies beside it is not the campaign's."""
+        return _is_packaged(str(self.file))
 
     def load(self) -> Any:
         """The object, of the text that was hashed. Raises what its module raises, ValueError when
@@ -107,6 +112,10 @@ def _is_installed(module: Any) -> bool:
     file = getattr(module, "__file__", None) or next(iter(getattr(module, "__path__", ())), None)
     if not isinstance(file, str):
         return True  # built in
+    return _is_packaged(file)
+
+
+def _is_packaged(file: str) -> bool:
     return bool(_PACKAGES & set(Path(file).parts)) or file.startswith(
         tuple(one + os.sep for one in _INSTALLED)
     )

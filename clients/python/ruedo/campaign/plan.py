@@ -23,6 +23,7 @@ from ..arguments import MOST_SEED
 from ..files import sha256_of
 from .errors import SpecError
 from .functions import Function
+from .inputs import Folders, hash_of
 from .schema import Source
 from .worlds import WorldFiles
 
@@ -344,7 +345,7 @@ class Planner:
     """Makes the cases of a checked campaign. folder: where its paths begin; store: where made
     worlds go.
 
-    worlds: of an earlier plan of the same folder, which has read them already.
+    worlds, folders: of an earlier plan of the same folder, which has read them already.
     """
 
     def __init__(
@@ -355,10 +356,14 @@ class Planner:
         store: Path,
         version: str,
         worlds: WorldFiles | None = None,
+        folders: Folders | None = None,
     ) -> None:
         self._content, self._source, self._folder, self._version = content, source, folder, version
         self._worlds = worlds or WorldFiles(folder, store)
+        self._folders = folders or Folders(store.parent)
         self._hashes: dict[str, str] = {}
+        self._beside_files: dict[str, str] = {}
+        self._beside_hashes: dict[tuple[Any, ...], list[str]] = {}
         self._functions: dict[str, Function] = {}
 
     def cases(self) -> list[Case]:
@@ -390,6 +395,7 @@ class Planner:
         """All that the cases are made from, with their hashes."""
         return (
             self._worlds.files
+            | self._beside_files
             | {str(self._folder / name): sha256 for name, sha256 in self._hashes.items()}
             | {str(function.file): function.sha256 for function in self._functions.values()}
         )
@@ -426,7 +432,7 @@ class Planner:
             "expect": expect,
             "faults": [_with_texts(one, _TEXTS_OF_FAULT) for one in faults],
             "metrics": [
-                {**one, "sha256": self._function(("metrics", i, "python"), one["python"]).sha256}
+                self._metric(("metrics", i), one)
                 for i, one in enumerate(content.get("metrics", []))
             ],
             "limits": {
@@ -492,24 +498,78 @@ class Planner:
         made = {
             key: fill((*path, key), value)
             for key, value in asked.items()
-            if key not in ("name", "files")
+            if key not in ("name", "files", "inputs", "others")
         }
         made = _with_texts(made, ("command", "python"))
-        files: dict[str, str] = {}
-        for i, pattern in enumerate(asked.get("files", [])):
-            found = files_called(pattern, self._folder, (*path, "files", i), self._source)
-            files |= {
-                str(one.relative_to(self._folder)): self._sha256((*path, "files", i), str(one))
-                for one in found
-            }
+        files = self._named((*path, "files"), asked.get("files", []))
+        for at, patterns in (
+            (path, asked.get("inputs", [])),
+            ((), self._content.get("inputs", [])),
+        ):
+            files |= self._named((*at, "inputs"), patterns)
+        homes = [self._folder]
         if "command" in made:
-            for word in words_of(made["command"]):
+            for word in sorted(words_of(made["command"])):
                 if word and os.path.isfile(self._folder / word):  # or too long for a name
                     files[word] = self._sha256((*path, "command"), word)
+                    homes += [] if os.path.isabs(word) else [(self._folder / word).parent]
         else:
             function = self._function((*path, "python"), made["python"])
             files["python"] = function.sha256
+            homes += [] if function.is_installed else [function.file.parent]
+        if "files" not in asked:  # which says exactly what counts
+            made["beside"] = self._beside(path, homes, asked.get("others", []))
         return {**made, "files": files}
+
+    def _metric(self, path: tuple[Any, ...], asked: dict[str, Any]) -> dict[str, Any]:
+        function = self._function((*path, "python"), asked["python"])
+        made = {**asked, "sha256": function.sha256}
+        made["files"] = self._named((*path, "files"), asked.get("files", []))
+        if "files" not in asked and not function.is_installed:
+            others = [
+                one for made_by in self._content["controllers"] for one in made_by.get("others", [])
+            ]
+            made["beside"] = self._beside(path, [function.file.parent], others)
+        return made
+
+    def _named(self, path: tuple[Any, ...], patterns: list[str]) -> dict[str, str]:
+        """Of a folder, what may matter in it."""
+        named: dict[str, str] = {}
+        for i, pattern in enumerate(patterns):
+            for one in files_called(pattern, self._folder, (*path, i), self._source, path[-1]):
+                name = str(one.relative_to(self._folder))
+                if one.is_dir():
+                    named[name] = hash_of(self._below((*path, i), one))
+                else:
+                    named[name] = self._sha256((*path, i), str(one))
+        return named
+
+    def _beside(self, path: tuple[Any, ...], homes: list[Path], others: list[str]) -> list[str]:
+        """Hashes of what lies in the controller's folders. others: files that are other
+        controllers'.
+        """
+        key = (tuple(homes), tuple(others))
+        if key not in self._beside_hashes:
+            but = {
+                os.path.realpath(one) for pattern in others for one in self._folder.glob(pattern)
+            }
+            roots = dict.fromkeys(os.path.realpath(home) for home in homes)
+            outer = [one for one in roots if not any(one.startswith(up + os.sep) for up in roots)]
+            hashes = []
+            for root in outer:
+                found = self._below(path, Path(root)).items()
+                kept = {name: one for name, one in found if os.path.join(root, name) not in but}
+                hashes.append(hash_of(kept))
+            self._beside_hashes[key] = hashes
+        return self._beside_hashes[key]
+
+    def _below(self, path: tuple[Any, ...], folder: Path) -> dict[str, str]:
+        try:
+            found = self._folders.below(folder)
+        except (ValueError, OSError) as error:
+            raise self._source.error(path, str(error)) from None
+        self._beside_files |= {os.path.join(folder, name): one for name, one in found.items()}
+        return found
 
     def _function(self, path: tuple[Any, ...], name: str) -> Function:
         if name not in self._functions:
@@ -530,6 +590,13 @@ class Planner:
         return self._hashes[name]
 
 
+def is_expected(what: dict[str, Any]) -> bool:
+    """Whether more is asked of a case than that it runs."""
+    expect = what["expect"]
+    names = ("goal", "clearance", "odometry_error", "golden")
+    return expect.get("no_contact", False) or any(name in expect for name in names)
+
+
 def words_of(command: str) -> set[str]:
     """Of a shell's line, as it stands there and with its quotes read."""
     words = set(re.split(r"[\s'\"=]+", command))
@@ -540,10 +607,18 @@ def words_of(command: str) -> set[str]:
     return words
 
 
-def files_called(pattern: str, folder: Path, path: tuple[Any, ...], source: Source) -> list[Path]:
-    """Those in the folder that a member of the campaign means, at least one."""
+def files_called(
+    pattern: str, folder: Path, path: tuple[Any, ...], source: Source, member: str = ""
+) -> list[Path]:
+    """Those in the folder that a member of the campaign means, at least one; of `inputs` folders,
+    too.
+    """
     try:
-        found = sorted(file for file in folder.glob(pattern) if file.is_file())
+        found = sorted(
+            one
+            for one in folder.glob(pattern)
+            if one.is_file() or (member == "inputs" and one.is_dir())
+        )
     except (ValueError, NotImplementedError, IndexError, OSError):  # "", "/etc/*", ".", "aaa..."
         found = []
     if not found:
@@ -568,4 +643,7 @@ def shard_of(cases: list[Case], shard: str) -> list[Case]:
     match = re.fullmatch(r"([0-9]{1,9})/([0-9]{1,9})", shard)
     if not match or not 1 <= int(match.group(1)) <= int(match.group(2)):
         raise SpecError(f"--shard {shard}: it looks like I/N with I from 1 to N, for example 2/4")
-    return cases[int(match.group(1)) - 1 :: int(match.group(2))]
+    found = cases[int(match.group(1)) - 1 :: int(match.group(2))]
+    if not found:
+        raise SpecError(f"--shard {shard}: there are {len(cases)} cases, and none is in it")
+    return found

@@ -7,7 +7,12 @@ from __future__ import annotations
 import html
 import io
 import math
+import os
+import re
 import shlex
+import subprocess
+import tempfile
+from collections import Counter
 from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 from typing import Any
@@ -15,17 +20,32 @@ from urllib.parse import quote
 
 import numpy as np
 
+from ..errors import NotSupported
+from ..launch import find_ruedo
+from ..maps import OCCUPIED, load_map
 from .compare import compare_with
 from .errors import missing
 from .outputs import write_text
 from .pages import make_pages
-from .plan import Case
+from .plan import Case, is_expected
 from .stats import wilson
 from .store import Results
 
 _BINS = 8  # of a parameter with more values than that
 _WORST = 12  # runs that are drawn
+_NUMBER = re.compile(r"[-+]?\d+(?:\.\d+)?(?:[eE][-+]?\d+)?")
 _FARTHEST_M = 1e9  # from the origin, of what is drawn
+_MOST_ROWS = 1000  # of the table of all cases
+_MAP_MARGIN_M = 5.0  # of a world's walls around what was driven
+_COLOURS = {
+    "passed": "#8fb7e8",
+    "failed": "#d96b5b",
+    "not judged": "#9a9fab",
+    "crashed": "#7d3c98",
+    "timeout": "#c98a1b",
+    "memory": "#8a6d3b",
+    "invalid": "#4a5266",
+}
 _STYLE = """
 body { font: 15px/1.45 system-ui, sans-serif; color: #1d2330; background: #fff; max-width: 1080px; margin: 2em auto; padding: 0 1em }
 h1 { font-size: 1.5em } h2 { font-size: 1.15em; margin-top: 2.2em; border-bottom: 1px solid #d6dae3; padding-bottom: .2em }
@@ -49,6 +69,7 @@ def write_report(campaign: Any, file: Path, baseline: str | None = None, pages: 
     parts = [
         _head(campaign, results),
         *_by_parameter(results),
+        *_by_world_and_controller(results),
         *_reasons(results),
         *_distributions(results),
         *_heat_map(results),
@@ -56,6 +77,7 @@ def write_report(campaign: Any, file: Path, baseline: str | None = None, pages: 
     ]
     if baseline:
         parts += _comparison(campaign, baseline)
+    parts += _all_cases(results)
     title = html.escape(campaign.name)
     page = (
         f"<!DOCTYPE html><html lang='en'><head><meta charset='utf-8'><title>{title}</title><style>{_STYLE}</style></head><body>"
@@ -72,9 +94,17 @@ def _head(campaign: Any, results: Results) -> str:
         if done
         else "nothing was run yet"
     )
+    counts = Counter(row["status"] for _, row in results.done)
+    kinds = ", ".join(
+        f"<span style='color:{colour}'>&#9632;</span> {counts[status]} {status}"
+        for status, colour in _COLOURS.items()
+        if counts[status]
+    )
+    asked = any(is_expected(case.what) for case in results.cases)
     return (
         f"<h1>{html.escape(campaign.name)}</h1><p>{done} of {len(results.cases)} cases, {failed} failed: {rate}. "
-        f"Ruedo {html.escape(campaign.version)}.</p>"
+        f"{kinds}. Ruedo {html.escape(campaign.version)}.</p>"
+        + ("" if asked else "<p>Nothing was expected but that controllers run to their end.</p>")
     )
 
 
@@ -142,21 +172,59 @@ def _success_table(name: str, groups: list[tuple[Any, list[bool]]]) -> str:
     return f"<table><tr><th>{html.escape(name)}</th><th>passed</th><th></th><th></th><th>interval</th></tr>{''.join(rows)}</table>"
 
 
+def _by_world_and_controller(results: Results) -> Iterable[str]:
+    """The tables of one member alone hide that all failures of one world are one controller's."""
+    cells: dict[tuple[str, str], list[bool]] = {}
+    for case, row in results.done:
+        cells.setdefault((case.world, case.controller), []).append(row["status"] == "passed")
+    worlds, controllers = (list(dict.fromkeys(one[i] for one in cells)) for i in (0, 1))
+    if min(len(worlds), len(controllers)) < 2:
+        return
+    yield "<table><tr><th>passed</th>"
+    yield "".join(f"<th>{html.escape(one)}</th>" for one in controllers)
+    for world in worlds:
+        yield f"</tr><tr><td>{html.escape(world)}</td>"
+        for controller in controllers:
+            good = cells.get((world, controller), [])
+            yield f"<td class='n'>{f'{sum(good)} of {len(good)}' if good else ''}</td>"
+    yield "</tr></table>"
+
+
+def cause_of(row: dict[str, Any]) -> tuple[str, str, str]:
+    """Failures that differ in their numbers alone have one cause."""
+    return row["status"], row["what"], _NUMBER.sub("#", row["reason"])
+
+
 def _reasons(results: Results) -> Iterable[str]:
-    counts: dict[tuple[str, str], list[Case]] = {}
+    groups: dict[tuple[str, str, str], list[tuple[Case, dict[str, Any]]]] = {}
     for case, row in results.failed:
-        counts.setdefault((row["status"], row["what"]), []).append(case)
-    if not counts:
+        groups.setdefault(cause_of(row), []).append((case, row))
+    if not groups:
         return
     yield "<h2>Why they failed</h2><table><tr><th>status</th><th>what</th><th>cases</th><th>first</th></tr>"
-    for (status, what), cases in sorted(counts.items(), key=lambda one: -len(one[1])):
-        first = results.row(cases[0])
-        assert first is not None
+    for (status, what, _), members in sorted(groups.items(), key=lambda one: -len(one[1])):
+        case, row = members[0]
         yield (
-            f"<tr><td>{status}</td><td>{html.escape(what)}</td><td class='n'>{len(cases)}</td><td>{cases[0].number}: "
-            f"{html.escape(first['reason'])}</td></tr>"
+            f"<tr><td>{status}</td><td>{html.escape(what)}</td><td class='n'>{len(members)}</td><td>{case.number}: "
+            f"{html.escape(row['reason'])}</td></tr>"
         )
     yield "</table>"
+
+
+def _all_cases(results: Results) -> Iterable[str]:
+    """Of what has passed, with the evidence."""
+    yield "<h2>All cases</h2><details><summary>what came of each</summary><table>"
+    yield "<tr><th></th><th>world</th><th>controller</th><th>seed</th><th></th><th></th></tr>"
+    for case, row in results.done[:_MOST_ROWS]:
+        yield (
+            f"<tr><td class='n'>{case.number}</td><td>{html.escape(case.world)}</td>"
+            f"<td>{html.escape(case.controller)}</td><td class='n'>{case.seed}</td>"
+            f"<td>{row['status']}</td><td>{html.escape(row['reason'])}</td></tr>"
+        )
+    yield "</table>"
+    if len(results.done) > _MOST_ROWS:
+        yield f"<p>... and {len(results.done) - _MOST_ROWS} more: <code>ruedo campaign export</code></p>"
+    yield "</details>"
 
 
 # ---- Plots.
@@ -192,18 +260,20 @@ def _distributions(results: Results) -> Iterable[str]:
     names = sorted({name for _, row in results.done for name in row["metrics"]})
     plots = []
     for name in names:
-        good = [value for value, row in _finite(name, results) if row["status"] == "passed"]
-        bad = [value for value, row in _finite(name, results) if row["status"] != "passed"]
-        if not _differ(good + bad):
+        values: dict[str, list[float]] = {}
+        for value, row in _finite(name, results):
+            values.setdefault(row["status"], []).append(value)
+        if not _differ([value for some in values.values() for value in some]):
             continue
+        shown = [status for status in _COLOURS if status in values]
         figure = new_figure()
         axes = figure.add_subplot()
         axes.hist(
-            [good, bad],
+            [values[status] for status in shown],
             bins=20,
             stacked=True,
-            color=["#8fb7e8", "#d96b5b"],
-            label=["passed", "failed"],
+            color=[_COLOURS[status] for status in shown],
+            label=shown,
         )
         axes.set_xlabel(name)
         axes.locator_params(axis="x", nbins=6)
@@ -229,15 +299,18 @@ def _finite(name: str, results: Results) -> Iterator[tuple[float, dict[str, Any]
 def _heat_map(results: Results) -> Iterable[str]:
     plots = []
     for world in dict.fromkeys(case.world for case in results.cases):
-        places = [place_of_failure(row) for case, row in results.failed if case.world == world]
+        failed = [(case, row) for case, row in results.failed if case.world == world]
+        places = [place_of_failure(row) for _, row in failed]
         known = [one for one in places if one and max(map(abs, one)) < _FARTHEST_M]
         if not known:
             continue
         figure = new_figure(5.2, 3.6)
         axes = figure.add_subplot()
+        extent = _extent(results, world)
+        walls = _draw_walls(axes, failed[0][0], extent)
         drawn = axes.hexbin(
             *zip(*known),
-            extent=_extent(results, world),
+            extent=extent,
             gridsize=24,
             mincnt=1,
             cmap="OrRd",
@@ -248,10 +321,36 @@ def _heat_map(results: Results) -> Iterable[str]:
         axes.set_xlabel("x (m)")
         axes.set_ylabel("y (m)")
         plots.append(
-            f"<figure>{_svg(figure)}<figcaption>{html.escape(world)}: {len(known)} failures, where the robot was then</figcaption></figure>"
+            f"<figure>{_svg(figure)}<figcaption>{html.escape(world)}: {len(known)} failures, where the robot was then{walls}</figcaption></figure>"
         )
     if plots:
         yield f"<h2>Where they failed</h2><div class='plots'>{''.join(plots)}</div>"
+
+
+def _draw_walls(axes: Any, case: Case, extent: tuple[float, float, float, float]) -> str:
+    """Whose walls they are, for the caption, since a parameter may change them; "" where there is
+    no map of the world.
+    """
+    world = case.what.get("world")
+    if not world:
+        return ""
+    with tempfile.TemporaryDirectory(prefix="ruedo-map-") as folder:
+        file = os.path.join(folder, "walls.yaml")
+        command = [find_ruedo(), "map", world["file"], "-o", file, "--quiet"]
+        done = subprocess.run(command, capture_output=True, check=False)
+        try:
+            walls = load_map(file) if done.returncode == 0 else None
+        except (ValueError, OSError, NotSupported):
+            walls = None
+    if walls is None:
+        return ""
+    rows, columns = (walls.cells == OCCUPIED).nonzero()
+    x = walls.origin[0] + walls.resolution * (columns + 0.5)
+    y = walls.origin[1] + walls.resolution * (rows + 0.5)
+    near = (x > extent[0] - _MAP_MARGIN_M) & (x < extent[1] + _MAP_MARGIN_M)
+    near &= (y > extent[2] - _MAP_MARGIN_M) & (y < extent[3] + _MAP_MARGIN_M)
+    axes.plot(x[near], y[near], "s", color="#1d2330", markersize=0.8, markeredgewidth=0)
+    return f"; walls as in case {case.number}"
 
 
 def _extent(results: Results, world: str) -> tuple[float, float, float, float]:
@@ -285,9 +384,9 @@ def place_of_failure(row: dict[str, Any]) -> tuple[float, float] | None:
 def badness(row: dict[str, Any]) -> tuple[float, ...]:
     """The worst first: crashes, then contacts, then what missed its goal by most."""
     metrics = row["metrics"]
-    order = {"crashed": 0, "memory": 0, "timeout": 0, "invalid": 1}.get(row["status"], 2)
+    order = {"crashed": 0, "memory": 0, "timeout": 0, "invalid": 1, "not judged": 1}
     return (
-        order,
+        order.get(row["status"], 2),
         0 if "contact_time_s" in metrics else 1,
         -metrics.get("goal_distance_m", 0.0),
         metrics.get("clearance_m", 0.0),
@@ -295,7 +394,13 @@ def badness(row: dict[str, Any]) -> tuple[float, ...]:
 
 
 def _worst_of(results: Results) -> list[tuple[Case, dict[str, Any]]]:
-    return sorted(results.failed, key=lambda one: (badness(one[1]), one[0].number))
+    """The worst of each cause first, then the second of each, ..."""
+    turns: Counter[tuple[str, str, str]] = Counter()
+    ordered: list[tuple[int, int, Case, dict[str, Any]]] = []
+    for case, row in sorted(results.failed, key=lambda one: (badness(one[1]), one[0].number)):
+        ordered.append((turns[cause_of(row)], len(ordered), case, row))
+        turns[cause_of(row)] += 1
+    return [(case, row) for _, _, case, row in sorted(ordered, key=lambda one: one[:2])]
 
 
 def _worst(
@@ -358,8 +463,8 @@ def _comparison(campaign: Any, baseline: str) -> Iterable[str]:
     )
     for kind, pairs in (("worse", found.worse), ("better", found.better)):
         for case, before, now in pairs[:50]:
-            yield (
-                f"<tr><td>{kind}</td><td>{case.number}</td><td>{html.escape(before['reason'] or 'passed')}</td>"
-                f"<td>{html.escape(now['reason'] or 'passed')}</td></tr>"
+            then, today = (
+                html.escape(f"{one['status']}: {one['reason']}") for one in (before, now)
             )
+            yield f"<tr><td>{kind}</td><td>{case.number}</td><td>{then}</td><td>{today}</td></tr>"
     yield "</table>"

@@ -77,6 +77,8 @@ _CONTROLLER = _object(
         "command": {"type": "string"},
         "python": {"type": "string"},
         "files": _TEXTS,
+        "inputs": _TEXTS,
+        "others": _TEXTS,
         "lockstep": {"type": "integer", "minimum": 1, "maximum": 64},
         "no_client_wait": {"type": "boolean"},
         "wait_for": _TEXTS,
@@ -157,11 +159,14 @@ SCHEMA: dict[str, Any] = _object(
         "set": {"type": "object", "additionalProperties": _VALUE},
         "disable": _TEXTS,
         "noise": {"type": "boolean"},
+        "inputs": _TEXTS,
         "faults": {"type": "array", "items": _FAULT},
         "expect": _EXPECT,
         "metrics": {
             "type": "array",
-            "items": _object({"name": _NAME, "python": {"type": "string"}}, ("name", "python")),
+            "items": _object(
+                {"name": _NAME, "python": {"type": "string"}, "files": _TEXTS}, ("name", "python")
+            ),
         },
         "limits": _object(
             {
@@ -257,7 +262,10 @@ def check(content: Any, source: Source) -> None:
     validator = validators.extend(jsonschema.Draft202012Validator, type_checker=types)
     errors = sorted(
         validator(SCHEMA).iter_errors(content),
-        key=lambda error: [str(one) for one in error.absolute_path],
+        key=lambda error: (  # a name that is misspelt says more than that the right one is missing
+            [str(one) for one in error.absolute_path],
+            error.validator != "additionalProperties",
+        ),
     )
     if errors:
         _raise(errors[0], source)

@@ -17,7 +17,7 @@ from typing import Any
 
 from ..files import open_regular, read_bytes
 from .errors import CampaignError, ResultsError, missing
-from .plan import Case
+from .plan import COLUMNS, Case
 
 _TABLES = {
     "about": "(key TEXT PRIMARY KEY, value TEXT NOT NULL)",
@@ -277,7 +277,9 @@ class Results:
     def csv(self) -> str:
         table = self.table()
         text = io.StringIO()
-        writer = csv.DictWriter(text, list(table[0]) if table else ["number"], lineterminator="\n")
+        writer = csv.DictWriter(
+            text, list(table[0]) if table else list(COLUMNS), lineterminator="\n"
+        )
         writer.writeheader()
         writer.writerows(table)
         return text.getvalue()
@@ -321,6 +323,8 @@ class Results:
                     message=_printable(row["reason"]),
                 )
                 failure.text = _printable(row["output"])
+            else:
+                ElementTree.SubElement(test, "system-out").text = _printable(row["reason"])
         return (
             "<?xml version='1.0' encoding='UTF-8'?>\n"
             + ElementTree.tostring(suite, encoding="unicode")

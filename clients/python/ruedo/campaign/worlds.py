@@ -8,11 +8,13 @@ import hashlib
 import os
 import re
 import shutil
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 from ..engine import Engine
 from ..files import read_bytes, sha256_of
+from .errors import SpecError
 from .functions import Function, own_state
 from .processes import forks_end
 
@@ -138,6 +140,27 @@ def copy_beside(places: dict[str, Path], folder: Path) -> None:
             part = to.with_name(f".{to.name}.{os.getpid()}")
             shutil.copyfile(file, part)
             part.rename(to)
+
+
+def changed(
+    world: dict[str, Any],
+    files: list[str],
+    folder: Path,
+    store: Path,
+    change: Callable[[bytes], bytes],
+) -> Path:
+    """A case's world with another text, beside copies of the files that it refers to. Raises
+    SpecError for a text that cannot be changed so.
+    """
+    file = world["file"] if os.path.isfile(world["file"]) else files[0]
+    home, places = beside(world["file"], files, folder)
+    store = store / world["sha256"][:16] if places else store
+    copy_beside(places, store)
+    try:
+        text = change(read_bytes(file, MOST_WORLD_BYTES))
+    except (ValueError, OSError) as error:
+        raise SpecError(f"{file}: {error}") from None
+    return keep_text(text, store / home)
 
 
 def keep_text(text: str | bytes, store: Path) -> Path:

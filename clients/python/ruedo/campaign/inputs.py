@@ -1,0 +1,102 @@
+"""What a controller may read beside the file that a campaign names: the modules, settings and data
+in its folder, which all count when it is asked whether a result is still one of it.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import re
+from collections.abc import Iterator
+from pathlib import Path
+
+from ..files import parse_yaml, read_bytes, sha256_of
+
+# Programs, settings and data. Not what worlds are made of, which has hashes of its own, nor what
+# programs write: logs, pictures, pages.
+_ENDINGS = re.compile(
+    r".*\.(pyx?|so|sh|bash|m?js|lua|rb|pl|m|jl|c|cc|cpp|cxx|h|hh|hpp|java|class|jar"
+    r"|json|ya?ml|toml|ini|cfg|conf|csv|npy|npz|mat|pkl|pickle|h5|hdf5|pth?|onnx|tflite|safetensors|pgm)",
+    re.IGNORECASE,
+)
+_MOST_FILES, _MOST_LOOKED_AT, _MOST_BYTES = 2000, 50_000, 256 << 20
+_TABLE = b"number,id,world,robot,controller,seed,"  # as `ruedo campaign export` begins
+_MOST_SPEC_BYTES = 1 << 20
+
+
+class Folders:
+    """Files and their hashes, each read once. out: the campaign's results, which never count."""
+
+    def __init__(self, out: Path) -> None:
+        self._out = os.path.realpath(out)
+        self._known: dict[str, dict[str, str]] = {}
+
+    def below(self, folder: Path) -> dict[str, str]:
+        """The files below a folder that may matter, by their path in it, with their hashes. Raises
+        ValueError for more of them than anybody's controller has, OSError.
+        """
+        place = os.path.realpath(folder)
+        if place not in self._known:
+            found: dict[str, str] = {}
+            size = 0
+            for file in self._files(place):
+                size += os.path.getsize(file)
+                if len(found) == _MOST_FILES or size > _MOST_BYTES:
+                    raise _too_many(folder)
+                found[os.path.relpath(file, place)] = sha256_of(file)
+            self._known[place] = found
+        return self._known[place]
+
+    def _files(self, folder: str) -> Iterator[str]:
+        seen: set[str] = set()
+        looked_at = 0
+        for place, folders, files in os.walk(folder, followlinks=True):
+            looked_at += len(folders) + len(files)
+            if looked_at > _MOST_LOOKED_AT:
+                raise _too_many(Path(folder))
+            real = os.path.realpath(place)
+            if real in seen or real == self._out or "results.sqlite" in files:
+                folders.clear()
+                continue
+            seen.add(real)
+            folders[:] = sorted(one for one in folders if not _is_passed_over(one))
+            for name in sorted(files):
+                file = os.path.join(place, name)
+                if not name.startswith(".") and os.path.isfile(file) and _may_matter(file):
+                    yield file
+
+
+def hash_of(files: dict[str, str]) -> str:
+    """One for all of them, and for their names."""
+    return hashlib.sha256(repr(sorted(files.items())).encode(errors="backslashreplace")).hexdigest()
+
+
+def _is_passed_over(folder: str) -> bool:
+    return folder.startswith(".") or folder == "__pycache__" or ".campaign" in folder
+
+
+def _may_matter(file: str) -> bool:
+    if not _ENDINGS.fullmatch(os.path.basename(file)):
+        return False
+    if file.endswith(".csv"):
+        with open(file, "rb") as table:
+            return table.read(len(_TABLE)) != _TABLE
+    return not file.endswith((".yaml", ".yml")) or not _is_campaign(file)
+
+
+def _is_campaign(file: str) -> bool:
+    """What it asks for is in the ids of its own cases, and nothing to another one's."""
+    import yaml
+
+    try:
+        _, content = parse_yaml(read_bytes(file, _MOST_SPEC_BYTES).decode())
+    except (OSError, UnicodeDecodeError, yaml.YAMLError):
+        return False
+    return isinstance(content, dict) and {"worlds", "controllers", "limits"} <= set(content)
+
+
+def _too_many(folder: Path) -> ValueError:
+    return ValueError(
+        f"has more in its folder {folder} than can be looked through ({_MOST_FILES} files, "
+        f"{_MOST_BYTES >> 20} MB): name the files that belong to it in `files`"
+    )
