@@ -209,6 +209,71 @@ def test_why_branches_a_log_of_no_campaign_with_the_same_commands(tmp_path):
     assert "0 of 5 other seeds from 2.25 s on avoid it\n" in text
 
 
+LOCKSTEP = """
+import ruedo
+with ruedo.connect(timeout=60.0) as sim:
+    robot = sim.robot("p3at")
+    while True:
+        sim.step(20, [robot.velocity_command(0.5, 0.0)])
+"""
+
+
+def test_why_of_a_program_in_lockstep(tmp_path):
+    """Regression: that it had joined was a request that acted, and no such log was answered. What
+    is not tried is said."""
+    (tmp_path / "wall.sdf").write_text(str(World("wall").wall(1.5, -2, 1.5, 2).robot("p3at")))
+    (tmp_path / "drive.py").write_text(LOCKSTEP)
+    campaign = {
+        "worlds": [{"name": "wall", "file": "wall.sdf"}],
+        "controllers": [
+            {
+                "name": "c",
+                "command": f"{sys.executable} drive.py",
+                "lockstep": 1,
+                "no_client_wait": False,
+            }
+        ],
+        "disable": DISABLED,
+        "expect": {"no_contact": True},
+        "limits": {"duration": 5},
+    }
+    (tmp_path / "c.yaml").write_text(yaml.safe_dump(campaign))
+    ruedo("campaign", "run", "c.yaml", "--quiet", folder=tmp_path, code=1)
+    log = next((tmp_path / "c.campaign/logs").iterdir())
+    said = ruedo("why", log, "--seeds", "0", folder=tmp_path).stdout
+    assert re.search(r"it could be avoided up to [\d.]+ s", said), said
+    assert "not tried: several changes at once" in said
+
+
+def test_why_leaves_models_out_and_knows_of_other_parameters(tmp_path):
+    world = World("hall").wall(1.5, -2, 1.5, 2).wall(-3, -2, -3, 2).robot("p3at")
+    (tmp_path / "hall.sdf").write_text(str(world))
+    (tmp_path / "drive.py").write_text(
+        "def drive(view):\n    return view.parameters['speed'], 0.0\n"
+    )
+    (tmp_path / "c.yaml").write_text(
+        "worlds: [hall.sdf]\ncontrollers: [{name: c, python: 'drive.py:drive'}]\n"
+        f"parameters: {{speed: [0.5, 0.1]}}\ndisable: {json.dumps(DISABLED)}\n"
+        "expect: {no_contact: true}\nlimits: {duration: 4}\n"
+    )
+    ruedo("campaign", "run", "c.yaml", "--quiet", folder=tmp_path, code=1)
+    log = next((tmp_path / "c.campaign/logs").iterdir())
+    found = json.loads(ruedo("why", log, "--seeds", "0", "--json", folder=tmp_path).stdout)
+    changes = {what: good for what, good, _ in found["changes"]}
+    assert changes.pop("speed = 0.1 (case 1)") and not changes.pop("without noise")
+    walls = {what: good for what, good in changes.items() if "wall" in what}
+    assert list(walls.values()) == [True, False], changes  # what was touched is tried first
+    assert "p3at" not in str(changes)
+
+
+def test_a_robot_that_is_put_into_an_obstacle_is_no_find(tmp_path):
+    """Regression: what was kept stayed red, whatever became of the controller."""
+    obstacles = {"most": 1, "area": [-0.01, -0.01, 0.01, 0.01], "size": [0.4, 0.5]}
+    folder = blind(tmp_path, "stand", obstacles=obstacles)
+    found = Hunt(folder / "hunt.yaml").run(cases=10, seed=1, by="random", workers=1)
+    assert found is None
+
+
 BROKEN = {  # and what is said of it
     "no message": "at 1 s",
     "a far step": "at 1 s",
@@ -259,10 +324,11 @@ def test_a_kept_program_runs_in_its_folder_and_is_run_anew_when_it_changes(tmp_p
     command = "python3 drive.py --gain 0.5"
     kept = moved({"name": "mine", "command": command, "files": ["*.toml"]}, home, home / "kept/a b")
     assert shlex.split(kept["command"]) == ["cd", "../..", "&&", *command.split()]
-    assert kept["files"] == ["../../*.toml", "../../drive.py"]
+    assert (kept["files"], kept["inputs"]) == (["../../*.toml"], ["../../drive.py"])
     aside = moved({"name": "mine", "command": command}, home, tmp_path / "kept")
     assert shlex.split(aside["command"]) == ["cd", "../lab's 1", "&&", *command.split()]
-    assert aside["files"] == ["../lab's 1/drive.py"]
+    assert "files" not in aside
+    assert aside["inputs"] == ["../lab's 1", "../lab's 1/drive.py"]  # the folder, too
     for python in ("drive.py:run", "drive:run"):
         made = moved({"name": "mine", "python": python}, home, tmp_path / "kept")
         assert made["python"] == "../lab's 1/drive.py:run"
@@ -313,6 +379,8 @@ def test_obstacles_are_few_in_the_end(example):
 BLIND = """
 def ahead(view):
     return 0.5, 0.0
+def stand(view):
+    return 0.0, 0.0
 def always(view):
     raise RuntimeError("always")
 def careless(view):

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,18 +15,18 @@ from ..campaign.errors import CampaignError, SpecError
 from ..campaign.local import Crew, cores
 from ..campaign.names import check_names
 from ..campaign.plan import Case
-from ..campaign.worlds import MOST_WORLD_BYTES, beside, copy_beside, keep_text
+from ..campaign.worlds import changed
 from ..engine import Engine
-from ..files import read_bytes
 from .obstacles import Box, with_boxes
 from .regression import keep
 from .search import SEARCHES, breaks
-from .shrink import shrink
+from .shrink import Way, shrink
 from .space import Choices, Space
 
 Outcome = dict[str, Any]
 Progress = Callable[[int, Outcome, float], None]  # how many cases, the outcome, its score
 _REACH_M = 3.0  # clearances below it steer
+_AT_ONCE_S = 0.1  # in which no robot gets away from anything
 
 
 @dataclass
@@ -100,6 +99,7 @@ class Hunt:
             def evaluate(several: list[Choices]) -> list[tuple[Outcome, float]]:
                 nonlocal count, invalid, found_after, first_invalid
                 outcomes = _run(crew, [self._case_or_why_not(one) for one in several])
+                outcomes = [_without_impossible(one) for one in outcomes]
                 for outcome in outcomes:
                     count += 1
                     if breaks(outcome):
@@ -120,7 +120,8 @@ class Hunt:
                 return None
             choices, outcome = hit
             searched = count
-            choices, outcome = shrink(self.space, choices, outcome, evaluate, shrink_cases)
+            way = Way(self.content)
+            choices, outcome = shrink(self.space, choices, outcome, evaluate, shrink_cases, way)
             case = self.case(choices)
             world = case.what["world"]
             return Found(
@@ -208,6 +209,7 @@ class Hunt:
     def _campaign_of(self, content: dict[str, Any]) -> Campaign:
         made = Campaign(content, folder=self.folder, out=self._campaign.out)
         made.worlds = self._campaign.worlds  # what was read once is known
+        made.folders = self._campaign.folders
         made.source = self._campaign.source
         return made
 
@@ -215,15 +217,18 @@ class Hunt:
         """The world with them, beside copies of what it refers to."""
         world = case.what["world"]
         files = self._campaign.worlds.read_with(world["file"], world["spawn"])
-        file = world["file"] if os.path.isfile(world["file"]) else files[0]
-        home, places = beside(world["file"], files, self.folder)
-        store = self._store / world["sha256"][:16] if places else self._store
-        copy_beside(places, store)
-        try:
-            text = with_boxes(read_bytes(file, MOST_WORLD_BYTES), boxes)
-        except (ValueError, OSError) as error:
-            raise SpecError(f"{file}: {error}") from None
-        return keep_text(text, store / home)
+        return changed(world, files, self.folder, self._store, lambda text: with_boxes(text, boxes))
+
+
+def _without_impossible(outcome: Outcome) -> Outcome:
+    """A robot that is put into an obstacle breaks no controller: none could pass."""
+    at, is_timed, _ = outcome["reason"].partition(" s: ")
+    touches = outcome["status"] == "failed" and outcome["what"] in ("contact", "clearance")
+    if not (touches and is_timed and float(at) <= _AT_ONCE_S):
+        return outcome
+    made = OutcomeOfCase()
+    made.fail("invalid", "case", f"no controller could pass: {outcome['reason']}")
+    return made.as_dict()
 
 
 def _run(crew: Crew, cases: list[Case | Outcome]) -> list[Outcome]:

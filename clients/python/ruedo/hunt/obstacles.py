@@ -1,4 +1,4 @@
-"""Obstacles of a hunt, as boxes in the text of its world."""
+"""Obstacles, in the text of a world: boxes that a hunt puts there, and models that are left out."""
 
 from __future__ import annotations
 
@@ -36,3 +36,49 @@ def _end_of_world(text: bytes) -> int:
     if not found:
         raise ValueError("obstacles need a world with models, and it has none")
     return found[0]
+
+
+def models_of(text: bytes) -> list[tuple[str, int, int]]:
+    """The models that stand in a world, and what it includes: name, begin and end in the text.
+    Raises ValueError for no XML.
+    """
+    found: list[tuple[str, int, int]] = []
+    path: list[str] = []
+    begin, name, said = 0, "", ""
+    parser = expat.ParserCreate()
+
+    def begins(tag: str, attributes: dict[str, str]) -> None:
+        nonlocal begin, name, said
+        path.append(tag)
+        said = ""
+        if path[1:] in (["world", "model"], ["world", "include"]):
+            begin, name = parser.CurrentByteIndex, attributes.get("name", "")
+
+    def says(more: str) -> None:
+        nonlocal said
+        said += more
+
+    def ends(tag: str) -> None:
+        nonlocal name, said
+        if path[1:] == ["world", "include", "name"]:
+            name = said.strip()
+        elif path[1:] == ["world", "include", "uri"]:
+            name = name or said.strip().rpartition("/")[2]
+        elif path[1:] in (["world", "model"], ["world", "include"]):
+            found.append((name, begin, text.index(b">", parser.CurrentByteIndex) + 1))
+        path.pop()
+
+    parser.StartElementHandler, parser.EndElementHandler = begins, ends
+    parser.CharacterDataHandler = says
+    try:
+        parser.Parse(text, True)
+    except expat.ExpatError as error:
+        raise ValueError(f"its models cannot be found: {error}") from None
+    return found
+
+
+def without_model(text: bytes, name: str) -> bytes:
+    for one, begin, end in models_of(text):
+        if one == name:
+            return text[:begin] + text[end:]
+    raise ValueError(f"it has no model {name!r}")

@@ -61,6 +61,9 @@ def keep(found: Any, folder: Path) -> Path:
     content["controllers"] = [moved(one, found.folder, folder) for one in content["controllers"]]
     if "metrics" in content:
         content["metrics"] = [moved(one, found.folder, folder) for one in content["metrics"]]
+    if "inputs" in content:
+        way = glob.escape(os.path.relpath(found.folder, folder))
+        content["inputs"] = [os.path.join(way, one) for one in content["inputs"]]
     if "golden" in content["expect"]:
         golden = os.path.join(os.path.relpath(found.folder, folder), content["expect"]["golden"])
         content["expect"] = {**content["expect"], "golden": golden}
@@ -116,7 +119,7 @@ def moved(controller: dict[str, Any], home: Path, folder: Path) -> dict[str, Any
     """
     made = dict(controller)
     way = os.path.relpath(home, folder)
-    files = list(made.pop("files", []))
+    files, inputs, others = (list(made.pop(key, [])) for key in ("files", "inputs", "others"))
     module, _, name = made.get("python", "").partition(":")
     if module and os.path.isfile(home / f"{module}.py"):
         module += ".py"
@@ -124,8 +127,11 @@ def moved(controller: dict[str, Any], home: Path, folder: Path) -> dict[str, Any
         made["python"] = os.path.join(way, f"{module}:{name}")
     if "command" in made:
         words = sorted(words_of(made["command"]) - {""})
-        files += [glob.escape(word) for word in words if os.path.isfile(home / word)]
+        named = [glob.escape(word) for word in words if os.path.isfile(home / word)]
+        inputs += named if files else ["", *named]  # the whole folder counts there, too
         made["command"] = f"cd {shlex.quote(way)} && {made['command']}"
-    if files:
-        made["files"] = [os.path.join(glob.escape(way), one) for one in dict.fromkeys(files)]
+    for key, patterns in (("files", files), ("inputs", inputs), ("others", others)):
+        if patterns:
+            there = [os.path.join(glob.escape(way), one) for one in dict.fromkeys(patterns)]
+            made[key] = [one.rstrip("/") for one in there]
     return made

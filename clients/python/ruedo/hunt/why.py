@@ -8,9 +8,11 @@ from __future__ import annotations
 
 import json
 import os
+import tempfile
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass, field
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -22,9 +24,12 @@ from ..campaign.errors import CampaignError, SpecError, UsageError
 from ..campaign.local import Crew
 from ..campaign.outputs import replacing
 from ..campaign.store import Store
+from ..campaign.worlds import MOST_WORLD_BYTES, changed
 from ..decoding import decode
 from ..engine import Engine
+from ..files import read_bytes
 from ..logs import APPLIED_CHANNEL, HEADER_CHANNEL, STATE_HASH_CHANNEL, Event, events
+from .obstacles import models_of, without_model
 
 # What somebody could have done from a moment on: m/s, rad/s.
 MANOEUVRES = {
@@ -36,6 +41,8 @@ MANOEUVRES = {
 _PERIOD_S = 0.25  # between moments that are tried
 _AFTER_S = 3.0  # how long a branch goes on after the run failed
 _MOST = 80  # moments
+_NO_OBSTACLES = ("ground_plane", "sun")  # without the ground a robot falls, and touches nothing
+_MOST_CHANGES = 12  # of the world's models, and of other cases' parameters
 _PLOTS = (".svg", ".png", ".pdf")
 _HASHES_US = 1_000_000  # sim time between the states whose hash is in a log
 _Again = tuple[Crew, dict[str, Any]]  # what runs a campaign's case again, and its `what`
@@ -54,7 +61,9 @@ class Recorded:
 
     @staticmethod
     def read(path: str) -> Recorded:
-        from ..lcmtypes import applied_t, log_header_t, state_hash_t
+        from ..lcmtypes import applied_t, log_header_t, request_t, state_hash_t
+
+        of_lockstep = (request_t.JOIN, request_t.LEAVE)  # which change nothing in the world
 
         def decoded(message_type: Any, event: Event) -> Any:
             try:
@@ -74,6 +83,8 @@ class Recorded:
                 header = decoded(log_header_t, event)
             elif event.channel == APPLIED_CHANNEL:
                 applied = decoded(applied_t, event)
+                if applied.channel.startswith("ruedo/") and applied.kind in of_lockstep:
+                    continue
                 if applied.channel.startswith("ruedo/"):
                     raise SpecError(
                         f"{path}: a request acted on the run (at {applied.utime * 1e-6:g} s); runs with commands alone can be branched"
@@ -97,7 +108,8 @@ class Recorded:
 
     def engine(self, worlds: int = 1, **changed: Any) -> Engine:
         with self._blamed():
-            return Engine(self.world, worlds=worlds, seed=self.seed, **{**self.options, **changed})
+            given = {**self.options, **changed}  # the run was run, whatever its world lacks
+            return Engine(self.world, worlds=worlds, seed=self.seed, allow_errors=True, **given)
 
     def replay(self, engine: Engine, until: int, from_step: int = 0) -> None:
         """The commands act again, on every copy, up to the state of that step."""
@@ -161,7 +173,8 @@ class Branches:
 @dataclass
 class Answer:
     """failed_s: when. rescues: of each manoeuvre and moment, whether it saved the run. seeds: the
-    latest moment first. changes: what was changed, and what came of it.
+    latest moment first. changes: what was changed, and what came of it. not_tried: what else might
+    be the cause.
     """
 
     failed_s: float
@@ -169,6 +182,7 @@ class Answer:
     rescues: dict[str, list[tuple[float, bool]]] = field(default_factory=dict)
     seeds: list[Branches] = field(default_factory=list)
     changes: list[tuple[str, bool, str]] = field(default_factory=list)
+    not_tried: list[str] = field(default_factory=list)
 
     @property
     def too_late_s(self) -> float | None:
@@ -193,7 +207,7 @@ class Answer:
             lines.append(
                 f"{'avoids it' if good else 'does not'}: {what}" + ("" if good else f" ({reason})")
             )
-        return "\n".join(lines)
+        return "\n".join([*lines, f"not tried: {', '.join(self.not_tried)}"])
 
     def as_dict(self) -> dict[str, Any]:
         return {**asdict(self), "too_late_s": self.too_late_s}
@@ -214,7 +228,61 @@ def why(path: str, seeds: int = 5) -> Answer:
         if others:
             answer.seeds = _branches(recorded, again, answer.failed_s, others)
         answer.changes = list(_changes(recorded, again, answer.failed_s, others))
+        answer.not_tried = ["several changes at once"]
+        if case:
+            answer.changes += _other_parameters(*case)
+            answer.changes += _without_models(crew, *case, answer)
+        else:
+            answer.not_tried += ["other parameters", "the world without one of its models"]
     return answer
+
+
+def _other_parameters(campaign: Campaign, case: Case) -> list[tuple[str, bool, str]]:
+    """What the campaign knows of cases that differ from it in one parameter alone."""
+    results = campaign.results()
+    found = []
+    for other, row in results.done:
+        differs = [name for name, at in case.parameters.items() if other.parameters[name] != at]
+        same = all(
+            getattr(other, one) == getattr(case, one)
+            for one in ("world", "robot", "controller", "seed")
+        )
+        if same and len(differs) == 1:
+            (name,) = differs
+            text = f"{name} = {other.parameters[name]} (case {other.number})"
+            found.append((text, row["status"] == "passed", row["reason"]))
+    return found[:_MOST_CHANGES]
+
+
+def _without_models(
+    crew: Crew, campaign: Campaign, case: Case, answer: Answer
+) -> Iterator[tuple[str, bool, str]]:
+    """One left out at a time, first what was touched."""
+    world = case.what["world"]
+    files = campaign.worlds.read_with(world["file"], world["spawn"])
+    text = read_bytes(
+        world["file"] if os.path.isfile(world["file"]) else files[0], MOST_WORLD_BYTES
+    )
+    spawn = [world["spawn"]] if world["spawn"] else []
+    with Engine(world["file"], spawn=spawn, allow_errors=True) as engine:
+        robots = {*engine.robots, *(owner for owner, _, _ in engine.devices)}
+    try:
+        names = [
+            name
+            for name, begin, end in models_of(text)
+            if name not in {*robots, *_NO_OBSTACLES} and b"<plane" not in text[begin:end]
+        ]
+    except ValueError:
+        names = []
+    names.sort(key=lambda name: f"touched {name}/" not in answer.reason)
+    if names[_MOST_CHANGES:]:
+        answer.not_tried.append(f"the world without {', '.join(names[_MOST_CHANGES:])}")
+    with tempfile.TemporaryDirectory(prefix="ruedo-why-") as store:
+        for name in names[:_MOST_CHANGES]:
+            without = partial(without_model, name=name)
+            file = changed(world, files, campaign.folder, Path(store), without)
+            outcome = crew.run_one({**case.what, "world": {**world, "file": str(file)}})
+            yield f"without the model {name}", outcome.status == "passed", outcome.reason
 
 
 def files_read(path: str) -> list[Path]:
@@ -249,6 +317,7 @@ def _as_it_was(recorded: Recorded, case: tuple[Campaign, Case] | None) -> Answer
             goals=goals(case[1].what) if case else (),
             no_contact=expect.get("no_contact", False),
             clearance=expect.get("clearance"),
+            odometry_error=expect.get("odometry_error"),
             robot=expect.get("robot", ""),
         )
         recorded.replay(engine, recorded.steps)

@@ -16,7 +16,8 @@ def add_why(commands: Any) -> None:
         "why",
         help="until when a failed run could have been saved, and what would have saved it",
         description="Since when a failed run could not be saved, and which single change would have saved it. LOG is one that "
-        "a campaign kept, or another one of a run with commands alone in which the robot touched something.",
+        "a campaign kept, or another one of a run without requests that acted in which the robot touched something. "
+        "The last line says what was not tried.",
     )
     one.set_defaults(action=_why)
     one.add_argument("LOG")
