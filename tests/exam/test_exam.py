@@ -20,6 +20,7 @@ from pathlib import Path
 
 import lcm
 import pytest
+from campaigns import campaign, hunt
 
 RUEDO = os.environ["RUEDO"]
 HERE = Path(__file__).parent
@@ -86,10 +87,6 @@ def regress(line, folder):
     )
 
 
-def ruedo(line, folder):
-    return run([RUEDO, *words(line)], folder)
-
-
 def logs(line, folder):
     """In a folder with logs: a.lcm and its equal b.lcm, other.lcm of another seed, and what is cut, has
     its header alone, no message, or no byte."""
@@ -125,7 +122,14 @@ def pytest_(line, folder):
     return run([sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", "test_it.py"], folder)
 
 
-FRONTS = {"regress": regress, "logs": logs, "cmake": cmake, "pytest": pytest_}
+FRONTS = {
+    "regress": regress,
+    "logs": logs,
+    "cmake": cmake,
+    "pytest": pytest_,
+    "campaign": campaign,
+    "hunt": hunt,
+}
 
 
 def words(line):

@@ -1,0 +1,2 @@
+. ./how.sh
+exec "$RUEDO_PYTHON" drive.py "$HOW"
