@@ -5,6 +5,7 @@
 
 #include <gtest/gtest.h>
 
+#include "base/channel_names.h"
 #include "control_client.h"
 #include "ruedo/pose_t.hpp"
 #include "ruedo/velocity_command_t.hpp"
@@ -127,6 +128,7 @@ TEST(Run, HandsTheSameMessagesToEverySink) {
   server.run();
   std::map<std::string, int> by_bus, by_samples, by_all;
   for (const Message& message : bus.messages()) ++by_bus[message.channel];
+  by_bus.erase(kReplyChannel);  // the run's last word, for clients alone
   const auto count = [](Notes& notes, std::map<std::string, int>& counts) {
     for (const std::string& line : notes.lines()) ++counts[line.substr(0, line.find(' '))];
   };

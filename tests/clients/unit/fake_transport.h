@@ -42,7 +42,7 @@ class FakeServer {
   std::atomic<int> lost_leaves{0}, leaves{0};
   std::atomic<bool> exits_on_pause{false};  // the program, as if a signal's handler did it
   std::atomic<int64_t> falsehood{0};        // what it says of odometry_t
-  std::atomic<int64_t> features{-1};        // all
+  std::atomic<int64_t> features{~(int64_t{1} << request_t::GRANT)};  // all but lockstep
   std::vector<std::string> robots{"p3at"};
   std::weak_ptr<Core> client;  // the last
 

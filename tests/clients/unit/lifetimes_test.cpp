@@ -214,6 +214,7 @@ enum class Meanwhile { waits, sleeps, steps };
   static std::optional<Simulation> sim;
   auto& done = *new std::promise<void>;  // which outlives the end that a callback begins
   alarm(static_cast<unsigned>(kPatience.count()));
+  if (meanwhile == Meanwhile::steps) server->features = -1;  // in lockstep
   sim.emplace(simulation(server));
   sim->pause();
   sim->robot("p3at")
@@ -257,6 +258,7 @@ TEST_F(Lifetimes, AProgramThatExitsLeaves) {
   GTEST_FLAG_SET(death_test_style, "threadsafe");
   server->lost_leaves = 2;
   const auto exits = [this](bool beside_a_step) {
+    if (beside_a_step) server->features = -1;  // in lockstep
     Simulation sim = simulation(server);
     sim.pause();
     std::promise<void> steps;

@@ -27,8 +27,6 @@ constexpr int64_t kNever = std::numeric_limits<int64_t>::max();
 
 class Receiving : public testing::Test {
  protected:
-  Receiving() { server->features = ~(int64_t{1} << ruedo::request_t::GRANT); }
-
   // A callback that waits for go_on.
   Subscription block(const Stream<Odometry>& odometry) {
     return odometry.on_sample([this, first = true](const Odometry&) mutable {
