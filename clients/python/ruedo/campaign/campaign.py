@@ -7,6 +7,7 @@ import glob
 import json
 import os
 import re
+import shlex
 from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 from typing import Any
@@ -193,7 +194,7 @@ class Campaign:
 
     def _each_controller(self) -> Iterator[dict[str, Any]]:
         """A controller with `each` is one for each file: {file} is its path, and its name, without
-        ending, the controller's.
+        ending, the controller's. A student may call a file whatever they like.
         """
         for i, one in enumerate(self._content["controllers"]):
             if "each" not in one:
@@ -214,8 +215,12 @@ class Campaign:
                         f"is {one['each']!r}, and {path!r} cannot name a controller, which has "
                         f"{NAME_RULES[CONTROLLER_NAME]}: rename it",
                     )
+                text = path.replace("{", "{{").replace("}", "}}")  # of braces no parameters
+                in_a_shell = shlex.quote(text)
                 made = {
-                    key: value.replace("{file}", path) if isinstance(value, str) else value
+                    key: value.replace("{file}", in_a_shell if key == "command" else text)
+                    if isinstance(value, str)
+                    else value
                     for key, value in one.items()
                     if key != "each"
                 }
