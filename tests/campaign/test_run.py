@@ -15,6 +15,7 @@ import subprocess
 import sys
 import termios
 import xml.etree.ElementTree as ElementTree
+from pathlib import Path
 
 import pytest
 from conftest import (
@@ -559,34 +560,41 @@ limits: {duration: 3}
 
 
 def test_the_labs_of_a_class_are_marked_in_one_command(tmp_path):
-    """The labs' own answers pass; each of the wrong ones fails where it should."""
+    """The labs' own answers pass; each of the wrong ones fails where it should. tests/exam has more
+    of those.
+    """
     shutil.copytree(SOURCE / "clients/python/examples/labs", tmp_path / "labs")
     folder = tmp_path / "labs/marking"
-    first = "import sys\nfrom pathlib import Path\n\nsys.path.append(str(Path(__file__).parents[1]))\nimport labs\n"
     students = {
-        "runs_into_it": "class SonarAvoidance(labs.SonarAvoidance):\n    def program(self):\n        while True:\n            yield (0.4 if self.view.time < 20.0 else -0.4), 0.0\n",
-        "stands": "class WallFollowing(labs.WallFollowing):\n    def program(self):\n        while True:\n            yield 0.0, 0.0\n",
-        "guesses": "class ParticleFilter(labs.ParticleFilter):\n    def program(self):\n        self.estimate = self.true_pose() + 0.3\n        yield 0.0, 0.0\n",
-        "crashes": "class Square(labs.Square):\n    def program(self):\n        yield 1 / 0, 0.0\n",
-        "typo": "class UmbMark(labs.UmbMark):\n    def program(self)\n",
+        "done": "class square:\n    def __init__(self, robot): pass\n    def __call__(self, view): return 'done'\nwall_following = sonar_avoidance = umbmark = mapping = particle_filter = square\n",
+        "bad": "def square(robot):\n    robot.drive(1 / 0, 0.0)\ndef wall_following(robot):\n    for _ in range(9):\n        robot.drive(0.0, 0.0)\ndef sonar_avoidance(robot):\n    while True:\n        robot.drive(0.4, 0.0)\n",
+        "$(touch here); 'a name' {lab}": "def umbmark(robot)\n",
     }
     for name, text in students.items():
-        (folder / f"students/{name}.py").write_text(first + "\n\n" + text)
-    ruedo("campaign", "run", "labs.yaml", "--quiet", "--workers", "2", folder=folder, code=1)
+        (folder / f"students/{name}.py").write_text(text)
+    path = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
+    ruedo(
+        *("campaign", "run", "labs.yaml", "--quiet", "--workers", "2"),
+        folder=folder,
+        code=1,
+        env={**os.environ, "PATH": path},
+    )
     frame = Campaign(folder / "labs.yaml").results().frame()
     passed = frame[frame.passed].groupby("controller").size()
     assert dict(passed) == {"solution": 6}
     reasons = {(row.controller, row.lab): row.reason for row in frame.itertuples()}
-    assert len(reasons) == 6 * 6
+    assert len(reasons) == 4 * 6
     for student, lab, text in (
-        ("runs_into_it", "SonarAvoidance", "touched"),
-        ("stands", "WallFollowing", "went 0.0 m, and 6 are asked for"),
-        ("guesses", "ParticleFilter", "believes to be 0.42 m from where it is"),
-        ("crashes", "Square", "ZeroDivisionError"),
-        ("typo", "UmbMark", "SyntaxError"),
-        ("stands", "Mapping", "has no Mapping"),
+        ("done", "square", "was not at the corner 2, 0 in its turn"),
+        ("done", "wall_following", "went 0.0 m, and 6 are asked for"),
+        ("bad", "square", "ZeroDivisionError"),
+        ("bad", "wall_following", "went 0.0 m, and 6 are asked for"),
+        ("bad", "sonar_avoidance", "touched"),
+        ("bad", "mapping", "nothing was handed in"),
+        ("$(touch here); 'a name' {lab}", "umbmark", "SyntaxError"),
     ):
         assert text in reasons[student, lab], reasons[student, lab]
+    assert not (folder / "here").exists()
 
 
 @pytest.fixture

@@ -23,7 +23,8 @@ import pytest
 from campaigns import campaign, hunt
 
 RUEDO = os.environ["RUEDO"]
-HERE = Path(__file__).parent
+HERE = Path(__file__).resolve().parent
+SOURCE = Path(os.environ.get("RUEDO_SOURCE_DIR", HERE.parents[1]))
 PATIENCE = 400  # s
 
 
@@ -50,7 +51,9 @@ def rows():
 
 
 def chosen():
-    all_rows = list(rows())
+    """Of one front, where RUEDO_EXAM_FRONT names it."""
+    front = os.environ.get("RUEDO_EXAM_FRONT")
+    all_rows = [row for row in rows() if front in (None, row.front)]
     part, _, of = os.environ.get("RUEDO_EXAM", "0/1").partition("/")
     return [row for i, row in enumerate(all_rows) if i % int(of) == int(part)]
 
@@ -122,6 +125,41 @@ def pytest_(line, folder):
     return run([sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", "test_it.py"], folder)
 
 
+def labs(line, folder):
+    """A student's program and a lab of clients/python/examples/labs, marked as those of a class."""
+    program, lab = words(line)
+    return solved(lab) if program == "solution" else marked(program, lab, folder)
+
+
+@functools.cache
+def solved(lab):
+    """One run for all rows that have this twin."""
+    with tempfile.TemporaryDirectory() as folder:
+        return marked("solution", lab, Path(folder))
+
+
+def marked(program, lab, folder):
+    shutil.copytree(SOURCE / "clients/python/examples/labs", folder / "marked")
+    marking = folder / "marked/marking"
+    if program != "solution":
+        shutil.copy(HERE / f"files/labs/{program}.py", marking / "students")
+    file = (marking / "labs.yaml").read_text()
+    for before, after in (
+        ("students/*.py", f"students/{program}.py"),
+        ("lab: [square,", f"lab: [{lab}] #"),
+    ):
+        assert before in file
+        file = file.replace(before, after)
+    (marking / "labs.yaml").write_text(file)
+    python = Path(sys.executable)
+    return run(
+        [RUEDO, "campaign", "run", "labs.yaml", "--quiet", "--workers", "1"],
+        marking,
+        RUEDO_PYTHON=str(python),
+        PATH=f"{python.parent}{os.pathsep}{os.environ['PATH']}",
+    )
+
+
 FRONTS = {
     "regress": regress,
     "logs": logs,
@@ -129,6 +167,7 @@ FRONTS = {
     "pytest": pytest_,
     "campaign": campaign,
     "hunt": hunt,
+    "labs": labs,
 }
 
 

@@ -8,6 +8,7 @@ import math
 
 import numpy as np
 import ruedo
+from numpy.typing import ArrayLike
 
 WALLS = [
     ((-4.0, -3.0), (4.0, -3.0)),
@@ -25,13 +26,15 @@ START = (-2.5, 1.0, 0.4)
 THICKNESS = 0.1  # m
 
 
-def ranges_from(poses: np.ndarray, angles: np.ndarray, most: float = 8.0) -> np.ndarray:
+def ranges_from(
+    poses: np.ndarray, angles: np.ndarray, walls: ArrayLike = WALLS, most: float = 8.0
+) -> np.ndarray:
     """What a range finder would measure at (n, 3) poses of its own (m, m, rad): (n, beams) m."""
     heading = poses[:, 2, None] + angles
     direction = np.stack([np.cos(heading), np.sin(heading)], axis=-1)
     nearest = np.full(heading.shape, most)
-    for a, b in WALLS:
-        begin, along = np.array(a), np.subtract(b, a)
+    for a, b in np.asarray(walls):
+        begin, along = a, b - a
         # origin + r direction = begin + s along
         cross = direction[..., 0] * along[1] - direction[..., 1] * along[0]
         to = begin - poses[:, None, :2]
@@ -44,8 +47,10 @@ def ranges_from(poses: np.ndarray, angles: np.ndarray, most: float = 8.0) -> np.
 
 
 class Filter:
-    def __init__(self, particles: int, generator: np.random.Generator):
-        self._draw = generator
+    def __init__(
+        self, particles: int, generator: np.random.Generator, walls: ArrayLike = WALLS
+    ) -> None:
+        self._draw, self._walls = generator, walls
         self.poses = np.column_stack(
             [
                 generator.uniform(-3.9, 3.9, particles),
@@ -73,7 +78,7 @@ class Filter:
         device = self.poses.copy()
         device[:, 0] += ahead * np.cos(self.poses[:, 2])
         device[:, 1] += ahead * np.sin(self.poses[:, 2])
-        off = ranges_from(device, angles) - measured
+        off = ranges_from(device, angles, self._walls) - measured
         likelihood = -0.5 * np.minimum(off / SIGMA, 3.0) ** 2
         weights = np.exp(likelihood.sum(axis=1) - likelihood.sum(axis=1).max())
         weights /= weights.sum()

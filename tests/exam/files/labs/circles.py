@@ -1,0 +1,3 @@
+def wall_following(robot):
+    while True:
+        robot.drive(0.2, 0.6)

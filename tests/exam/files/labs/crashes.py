@@ -1,0 +1,2 @@
+def square(robot):
+    robot.drive(1 / 0, 0.0)

@@ -1,0 +1,3 @@
+def square(robot):
+    robot._says.write("[" * 100000 + "\n")
+    robot._says.flush()

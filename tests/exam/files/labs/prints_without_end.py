@@ -1,0 +1,3 @@
+def square(robot):
+    while True:
+        print("x" * 100000)

@@ -1,0 +1,4 @@
+import os
+import tempfile
+
+print(os.listdir("/tmp"), tempfile.gettempdir())

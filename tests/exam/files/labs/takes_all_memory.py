@@ -1,0 +1,3 @@
+taken = []
+while True:
+    taken.append(bytearray(100_000_000))
