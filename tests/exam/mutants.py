@@ -3,8 +3,8 @@ returns or goes on left out, one at a time. A mutant that no test kills is print
 
     mutants.py BUILD TARGET SOURCE -- COMMAND...
 
-SOURCE is mutated as a whole, with a switch for each mutant, compiled once, and linked into a copy of
-TARGET beside it, which is {} in COMMAND. Needs tree-sitter and tree-sitter-cpp.
+SOURCE is mutated as a whole, with a switch for each mutant, compiled once, and linked into a copy
+of TARGET beside it, which is {} in COMMAND. Needs tree-sitter and tree-sitter-cpp.
 """
 
 import json

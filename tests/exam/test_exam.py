@@ -91,16 +91,17 @@ def regress(line, folder):
 
 
 def logs(line, folder):
-    """In a folder with logs: a.lcm and its equal b.lcm, other.lcm of another seed, and what is cut, has
-    its header alone, no message, or no byte."""
+    """In a folder with logs: a.lcm and its equal b.lcm, other.lcm of another seed, and what is cut,
+    has its header alone, no message, or no byte.
+    """
     for log in recorded().iterdir():
         shutil.copy(log, folder)
     return run([RUEDO, *words(line)], folder)
 
 
 def cmake(line, folder):
-    """The arguments of ruedo_add_regression() in a project, which is configured and tested; programs
-    are in its folder.
+    """The arguments of ruedo_add_regression() in a project, which is configured and tested;
+    programs are in its folder.
     """
     line = re.sub(r"\b(\w+\.py)\b", r"${CMAKE_CURRENT_SOURCE_DIR}/\1", line)
     (folder / "CMakeLists.txt").write_text(

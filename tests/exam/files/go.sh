@@ -1,2 +1,4 @@
+#!/bin/sh
+# shellcheck source=/dev/null
 . ./how.sh
 exec "$RUEDO_PYTHON" drive.py "$HOW"
