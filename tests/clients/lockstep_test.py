@@ -231,17 +231,22 @@ def test_commands_of_no_step_are_refused_and_do_nothing(language):
     for said in runs:
         for what in ("before", "velocity", "wheels", "advance", "rotate", "turn_to", "arc", "stop"):
             error = said.one(what).replace("C", "_c").lower()  # Java's velocityCommand
-            call = {"before": "velocity", "velocity": "velocity", "wheels": "wheel"}.get(what, "move")
+            call = {"before": "velocity", "velocity": "velocity", "wheels": "wheel"}.get(
+                what, "move"
+            )
             assert error.startswith("notsupported: in lockstep "), error
             assert "sim.step(n, " in error and f"robot.{call}_command(" in error, error
         for name in ("advance", "rotate", "heading", "arc", "stop"):
             assert name in said.one("turn_to" if name == "heading" else name)
-    step, state_hash, _messages, _digest = in_one_step(language, "watches", "one", "200").words("end")
+    step, state_hash, _messages, _digest = in_one_step(language, "watches", "one", "200").words(
+        "end"
+    )
     assert all(said.words("end")[:2] == [step, state_hash] for said in runs)
 
 
 @pytest.mark.parametrize(
-    "joints, wrong", [(["turret_joint", "hand_jiont"], "hand_jiont"), (["turret_joint", "hand_joint"], None)]
+    "joints, wrong",
+    [(["turret_joint", "hand_jiont"], "hand_jiont"), (["turret_joint", "hand_joint"], None)],
 )
 def test_a_misspelt_joint_refuses_its_step(language, joints, wrong):
     with ruedo_run("--lockstep", "1", "--spawn", "carrier:c@0,0", world="empty") as server:

@@ -62,10 +62,15 @@ def mutated(source):
         if node.type == "if_statement":
             then = node.child_by_field_name("consequence")
             condition = node.child_by_field_name("condition").child_by_field_name("value")
-            plain = condition is not None and condition.type not in ("declaration", "init_statement")
+            plain = condition is not None and condition.type not in (
+                "declaration",
+                "init_statement",
+            )
             head = node.child_by_field_name("condition")
-            if plain and head.named_child_count == 1 and LEAVES.match(
-                text[then.start_byte : then.end_byte]
+            if (
+                plain
+                and head.named_child_count == 1
+                and LEAVES.match(text[then.start_byte : then.end_byte])
             ):
                 add(condition, "left out: if", b"!mutant(N) && (", b")")
         for child in node.children:
@@ -142,7 +147,9 @@ def main():
     for number, line, what in left:
         print(f"{source.name}:{line}: mutant {number} lives: {what}")
     killed = len(mutants) - len(left)
-    print(f"{source.name}: {killed} of {len(mutants)} mutants killed ({killed / max(len(mutants), 1):.0%})")
+    print(
+        f"{source.name}: {killed} of {len(mutants)} mutants killed ({killed / max(len(mutants), 1):.0%})"
+    )
     sys.exit(killed < 0.9 * len(mutants))
 
 

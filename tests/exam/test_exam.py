@@ -123,7 +123,9 @@ def pytest_(line, folder):
         f"PYTHON = {sys.executable!r}\n\n\ndef test_it(ruedo_regression):\n"
         f'    ruedo_regression("box.sdf", options=["--disable", "p3at/camera"], {line})\n'
     )
-    return run([sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", "test_it.py"], folder)
+    return run(
+        [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", "test_it.py"], folder
+    )
 
 
 def labs(line, folder):
@@ -182,7 +184,9 @@ def installed():
     folder = Path(tempfile.mkdtemp(prefix="ruedo-exam-"))
     atexit.register(shutil.rmtree, folder)
     build = os.environ["RUEDO_BINARY_DIR"]
-    subprocess.run(["cmake", "--install", build, "--prefix", folder], check=True, capture_output=True)
+    subprocess.run(
+        ["cmake", "--install", build, "--prefix", folder], check=True, capture_output=True
+    )
     return folder
 
 
@@ -192,7 +196,16 @@ def recorded():
     folder = Path(tempfile.mkdtemp(prefix="ruedo-exam-"))
     atexit.register(shutil.rmtree, folder)
     for name, seed in (("a", 1), ("other", 2)):
-        command = [RUEDO, "run", HERE / "files/box.sdf", "--rate", "max", "--duration", "1", "--quiet"]
+        command = [
+            RUEDO,
+            "run",
+            HERE / "files/box.sdf",
+            "--rate",
+            "max",
+            "--duration",
+            "1",
+            "--quiet",
+        ]
         command += ["--disable", "p3at/camera", "--seed", str(seed), "--record", f"{name}.lcm"]
         subprocess.run(command, check=True, cwd=folder, capture_output=True)
     whole = (folder / "a.lcm").read_bytes()

@@ -603,7 +603,9 @@ def main():
             launched(ruedo.launch(rest[0], seed=3, args=rest[1:]))
         with ruedo.connect(
             url,
-            name=rest[0] if command in ("lockstep", "visited", "watches", "leaves", "beside", "joints") else None,
+            name=rest[0]
+            if command in ("lockstep", "visited", "watches", "leaves", "beside", "joints")
+            else None,
             timeout=2.0 if command == "connect" else 60.0,
         ) as sim:
             actions = {
