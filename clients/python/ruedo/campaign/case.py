@@ -17,7 +17,6 @@ import traceback
 from collections import OrderedDict
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
-from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -28,6 +27,7 @@ from ..logs import APPLIED_CHANNEL, HEADER_CHANNEL, STATE_HASH_CHANNEL
 from .controller import DONE, NothingYet, View, make_controller, velocity_of
 from .errors import CampaignError
 from .functions import Function, own_state
+from .outcome import Outcome, too_large, too_slow
 from .output import Output, captured
 from .processes import die_with_parent, end_descendants, ends_within, forks_end, limit_memory
 
@@ -37,36 +37,6 @@ _IDLE = (
     "the controller commanded nothing all the time; one that stands answers (0, 0), and one that "
     "only looks has no_client_wait: true"
 )
-_STARVED = ("MemoryError", "bad_alloc", "OutOfMemoryError", "Cannot allocate memory")
-
-
-@dataclass
-class Outcome:
-    """What came of a case.
-
-    status: passed, failed (an expectation), not judged (what was asked for could not be), crashed,
-    timeout or memory (the controller), or invalid (the case cannot be run). what: which
-    expectation, or what went wrong. reason: in a line; of what has passed, the evidence. log: its
-    content.
-    """
-
-    status: str = "passed"
-    what: str = ""
-    reason: str = ""
-    time_s: float = 0.0
-    metrics: dict[str, float] = field(default_factory=dict)
-    track: list[list[float]] = field(default_factory=list)
-    state_hash: str = ""
-    output: str = ""
-    log: bytes = b""
-
-    def fail(self, status: str, what: str, reason: str) -> None:
-        """The first thing that went wrong is what stays."""
-        if self.status == "passed":
-            self.status, self.what, self.reason = status, what, _in_a_line(reason)
-
-    def as_dict(self) -> dict[str, Any]:
-        return asdict(self)
 
 
 class TimeIsUp(BaseException):
@@ -169,7 +139,7 @@ class Runner:
             traceback.print_exc()
         finally:
             verdict = engine.end_run()
-        self._take(verdict, limits["memory_mb"], outcome)
+        outcome.take(verdict, limits["memory_mb"])
         if not acted and not what["controller"].get("no_client_wait", False):
             outcome.fail("not judged", "controller", _IDLE)
 
@@ -258,7 +228,7 @@ class Runner:
         outcome.output = output.text()
         if os.path.exists(verdict_file):
             verdict = json.loads(Path(verdict_file).read_text())
-            self._take(verdict, limits["memory_mb"], outcome)
+            outcome.take(verdict, limits["memory_mb"])
         elif code is None:
             outcome.fail("timeout", "controller", too_slow(limits["wall"]))
         else:
@@ -270,32 +240,6 @@ class Runner:
             )
 
     # ---- Of both.
-
-    def _take(self, verdict: dict[str, Any], memory_mb: int, outcome: Outcome) -> None:
-        for failure in verdict["failures"]:
-            what, at = failure["what"].split(" ")[0], failure["time_s"]
-            reason = failure["text"] if at is None else f"{at:.3f} s: {failure['text']}"
-            if not failure["judged"]:
-                outcome.fail("not judged", what, reason)
-            elif what == "client" and any(word in outcome.output for word in _STARVED):
-                outcome.fail("memory", "controller", too_large(memory_mb))
-            elif what in ("client", "run"):
-                outcome.fail(
-                    "crashed", "controller", reason.replace("the client", "the controller")
-                )
-            elif what == "world":
-                outcome.fail("invalid", "world", reason)
-            else:
-                outcome.fail("failed", what, reason.splitlines()[0])
-        if outcome.status == "passed":
-            texts = [
-                one["text"].replace("the client", "the controller") for one in verdict["evidence"]
-            ]
-            outcome.reason = _in_a_line("; ".join(texts))
-        outcome.metrics.update(
-            {name: value for name, value in verdict["metrics"].items() if value is not None}
-        )
-        outcome.track = [[round(value, 4) for value in place] for place in verdict["track"]]
 
     def _measure(self, what: dict[str, Any], log: str, outcome: Outcome) -> None:
         if "golden" in what["expect"] and "python" in what["controller"]:
@@ -344,10 +288,6 @@ class Runner:
             outcome.fail("failed", "golden", reason)
         elif done.returncode != 0:
             outcome.fail("invalid", "golden", first.removeprefix("ruedo: "))
-
-
-def _in_a_line(text: str) -> str:
-    return " ".join(text.split())[:500]
 
 
 def diff_command(expect: dict[str, Any], golden: str, log: str) -> list[str]:
@@ -486,14 +426,6 @@ def remove_scratch(process: int) -> None:
     for place in {"/dev/shm", tempfile.gettempdir()}:
         for folder in Path(place).glob(_scratch_name(process) + "*"):
             shutil.rmtree(folder, ignore_errors=True)
-
-
-def too_slow(wall: float) -> str:
-    return f"the run took more than {wall:g} s of real time"
-
-
-def too_large(memory_mb: int) -> str:
-    return f"the controller wanted more than {memory_mb} MB of memory"
 
 
 def _no_commands(robots: int) -> Any:

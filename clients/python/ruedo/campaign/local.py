@@ -16,7 +16,8 @@ from pathlib import Path
 from pickle import UnpicklingError
 from typing import Any, Literal
 
-from .case import Outcome, remove_scratch, too_slow
+from .case import remove_scratch
+from .outcome import Outcome, too_slow
 from .errors import CampaignError
 from .plan import Case
 from .processes import ends_within, kill_with_descendants

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from ..campaign import Campaign
-from ..campaign.case import Outcome as OutcomeOfCase
+from ..campaign.outcome import Outcome as OutcomeOfCase
 from ..campaign.case import fault_text
 from ..campaign.errors import CampaignError, SpecError
 from ..campaign.local import Crew, cores
