@@ -54,7 +54,9 @@ def _check_world(what: dict[str, Any], source: Source) -> None:
 def _load(what: dict[str, Any], robot: str = "", **options: Any) -> None:
     """Raises ValueError."""
     spawn = what["world"]["spawn"]
-    with Engine(what["world"]["file"], spawn=[spawn] if spawn else [], **options) as engine:
+    options |= {"spawn": [spawn] if spawn else []}
+    options |= {"allow_errors": what["expect"].get("allow_errors", False)}
+    with Engine(what["world"]["file"], **options) as engine:
         if robot:
             engine.begin_run(what["seed"], robot=robot)
 

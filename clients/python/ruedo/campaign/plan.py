@@ -360,6 +360,7 @@ class Planner:
     ) -> None:
         self._content, self._source, self._folder, self._version = content, source, folder, version
         self._worlds = worlds or WorldFiles(folder, store)
+        self._worlds.allow_errors = content.get("expect", {}).get("allow_errors", False)
         self._folders = folders or Folders(store.parent)
         self._hashes: dict[str, str] = {}
         self._beside_files: dict[str, str] = {}

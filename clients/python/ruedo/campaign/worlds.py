@@ -28,6 +28,7 @@ class WorldFiles:
 
     def __init__(self, folder: Path, store: Path) -> None:
         self._folder, self._store = folder, store
+        self.allow_errors = False  # of worlds, as the campaign expects
         self._made: dict[str, str] = {}
         self._hashed: dict[tuple[str, str], str] = {}
         self._read: dict[tuple[Any, ...], str] = {}
@@ -85,7 +86,8 @@ class WorldFiles:
         else:
             key = (world, model)
         if key not in self._read:
-            with Engine(world, spawn=[spawn] if spawn else [], disable=()) as engine:
+            spawned = [spawn] if spawn else []
+            with Engine(world, spawn=spawned, allow_errors=self.allow_errors) as engine:
                 read = engine.files_read
             rest = [file for file in read if not _same(file, world)]
             digest = hashlib.sha256()

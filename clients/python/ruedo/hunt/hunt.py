@@ -148,7 +148,9 @@ class Hunt:
                 what = self.case({**self.space.neutral(), "fault": str(i)}).what
                 world, spawn = what["world"]["file"], what["world"]["spawn"]
                 faults = [fault_text(one) for one in what["faults"]]
-                Engine(world, spawn=[spawn] if spawn else [], fault=faults).close()
+                allowed = what["expect"].get("allow_errors", False)
+                spawned = [spawn] if spawn else []
+                Engine(world, spawn=spawned, fault=faults, allow_errors=allowed).close()
             except (SpecError, ValueError) as error:
                 raise self._campaign.source.error(("hunt", "faults", i), str(error)) from None
 
