@@ -229,7 +229,8 @@ def test_without_namespaces_it_is_tcp(prefix, tmp_path):
         prefix,
         "--shared-network",
         "--client",
-        "echo url $LCM_DEFAULT_URL",
+        "echo url $LCM_DEFAULT_URL; sleep 1",
+        "--no-client-wait",
         folder=tmp_path,
         client=False,
     )

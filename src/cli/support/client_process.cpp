@@ -116,7 +116,8 @@ void ClientProcess::wait() {
 std::string ClientProcess::fault() const {
   const int signal = WIFSIGNALED(status_) ? WTERMSIG(status_) : 0;
   const int code = signal != 0 ? 128 + signal : WEXITSTATUS(status_);
-  if (told_ && code == 128 + SIGTERM) return "";
+  // 255: of bash, where what it waits for was ended while it waited.
+  if (told_ && (code == 128 + SIGTERM || code == 255)) return "";
   if (signal != 0) return "signal " + std::to_string(signal);
   return code == 0 ? "" : "exit code " + std::to_string(code);
 }
