@@ -1,6 +1,6 @@
 """Mutation testing, by cosmic-ray, of what makes a case's status of a verdict.
 
-    python_mutants.py BUILD
+python_mutants.py BUILD
 """
 
 import json
