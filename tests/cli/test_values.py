@@ -257,7 +257,6 @@ def of_a_sensor(words, folder):
                 "--ignore x",
                 "--keep x",
                 "--renew",
-                "--junit a.xml",
                 "--html a.html",
             )
         ),

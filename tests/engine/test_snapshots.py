@@ -55,6 +55,7 @@ def test_random_worlds_go_on_as_they_went_on(seed):
         worlds=3,
         seed=seed,
         record=True,
+        allow_errors=True,  # robots may stand in something
     ) as engine:
         check(engine, seed)
 

@@ -93,13 +93,14 @@ def meaning(type, s):
 def decode():
     for line in sys.stdin:
         type, *data = line.split()
+        connection = types.SimpleNamespace(
+            version="", faults=types.SimpleNamespace(note=lambda *_: None)
+        )
         try:
             lines = list(
                 meaning(
                     type,
-                    Stream(types.SimpleNamespace(version=""), "c", type, 0, 0.0)._sample_of(
-                        bytes.fromhex("".join(data))
-                    ),
+                    Stream(connection, "c", type, 0, 0.0)._sample_of(bytes.fromhex("".join(data))),
                 )
             )
         except ruedo.TypeMismatch:

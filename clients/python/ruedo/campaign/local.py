@@ -17,8 +17,8 @@ from pickle import UnpicklingError
 from typing import Any, Literal
 
 from .case import remove_scratch
-from .outcome import Outcome, too_slow
 from .errors import CampaignError
+from .outcome import Outcome, too_slow
 from .plan import Case
 from .processes import ends_within, kill_with_descendants
 

@@ -9,11 +9,11 @@ from pathlib import Path
 from typing import Any
 
 from ..campaign import Campaign
-from ..campaign.outcome import Outcome as OutcomeOfCase
 from ..campaign.case import fault_text
 from ..campaign.errors import CampaignError, SpecError
 from ..campaign.local import Crew, cores
 from ..campaign.names import check_names
+from ..campaign.outcome import Outcome as OutcomeOfCase
 from ..campaign.plan import Case
 from ..campaign.worlds import changed
 from ..engine import Engine
