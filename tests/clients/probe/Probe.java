@@ -731,9 +731,10 @@ public final class Probe {
     /** Sim time does. */
     private static void stands(String url, String call) throws InterruptedException {
         Simulation sim = Ruedo.connect(url, "waits", 60.0);
-        Motion motion = sim.robot("p3at").advance(1.0);
         if (call.equals("stepped")) sim.step(1);
-        attempt("timeout", () -> motion.await(1.2));
+        boolean drives = call.equals("wait") || call.equals("sleep");
+        Motion motion = drives ? sim.robot("p3at").advance(1.0) : null;
+        if (drives) attempt("timeout", () -> motion.await(1.2));
         Thread closing =
                 new Thread(
                         () -> {

@@ -681,14 +681,17 @@ void ends(const std::string& url, const std::string& call) {
 // Sim time does.
 void stands(const std::string& url, const std::string& call) {
   rc::Simulation sim = rc::connect(url, {.name = "waits", .timeout = 60.0});
-  const rc::Motion motion = sim.robot("p3at").advance(1.0);
   if (call == "stepped") static_cast<void>(sim.step(1));
-  report("timeout", [&] { motion.wait(1.2); });
+  std::optional<rc::Motion> motion;
+  if (call == "wait" || call == "sleep") {
+    motion = sim.robot("p3at").advance(1.0);
+    report("timeout", [&] { motion->wait(1.2); });
+  }
   std::thread closing([&] {
     pause_for(8.0);
     sim.close();
   });
-  report("ended", [&] { call == "wait" ? static_cast<void>(motion.wait()) : sim.sleep(1.0); });
+  report("ended", [&] { call == "wait" ? static_cast<void>(motion->wait()) : sim.sleep(1.0); });
   closing.join();
 }
 

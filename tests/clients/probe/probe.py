@@ -577,12 +577,15 @@ def ends(url, call):
 
 
 def stands(url, call):
-    """Sim time."""
+    """Sim time, while this waits for a motion ("wait", "sleep"), or in lockstep ("idle",
+    "stepped").
+    """
     with ruedo.connect(url, name="waits", timeout=60.0) as sim:
-        motion = sim.robot("p3at").advance(1.0)
         if call == "stepped":
             sim.step(1)
-        attempt("timeout", lambda: motion.wait(1.2))
+        if call in ("wait", "sleep"):
+            motion = sim.robot("p3at").advance(1.0)
+            attempt("timeout", lambda: motion.wait(1.2))
         threading.Timer(8.0, sim.close).start()
         attempt("ended", motion.wait if call == "wait" else lambda: sim.sleep(1.0))
 
