@@ -447,6 +447,22 @@ def test_the_report_has_pages_of_the_worst_runs(whole):
     assert "'some': allowed is a whole number" in wrong.stderr
 
 
+def test_results_opened_twice_stay_locked(whole):
+    """Regression: the second to open them ended SQLite's locks of the first, and what another
+    process's last connection then removed held what was written."""
+    folder, _ = whole
+    opened = [Campaign(folder / "c.yaml").results() for _ in range(2)]
+    alone = (
+        "import sqlite3, sys\n"
+        "db = sqlite3.connect(sys.argv[1], timeout=0)\n"
+        "db.execute('PRAGMA journal_mode=DELETE')\n"
+    )
+    file = folder / "c.campaign/results.sqlite"
+    done = subprocess.run([sys.executable, "-c", alone, file], capture_output=True, text=True)
+    assert "database is locked" in done.stderr
+    del opened
+
+
 def test_two_campaigns_compared(whole):
     folder, _ = whole
     (folder / "controller.py").write_text(CONTROLLER.replace('not view.parameters["bold"]', "True"))

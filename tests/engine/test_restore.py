@@ -92,7 +92,12 @@ def test_random_worlds_go_on_as_they_went_on(seed, tmp_path):
     world = RandomWorld(seed, pictures=seed % 4 == 1)
     (tmp_path / "w.sdf").write_text(world.text)
     with ruedo.Engine(
-        "w.sdf", text=world.text, spawn=world.spawn, fault=world.fault, record=True
+        "w.sdf",
+        text=world.text,
+        spawn=world.spawn,
+        fault=world.fault,
+        record=True,
+        allow_errors=True,
     ) as engine:
         joints = joint_names(engine)
         before, then = (Commands(10 * seed + i, engine, joints) for i in range(2))

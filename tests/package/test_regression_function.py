@@ -214,7 +214,9 @@ def test_words_arrive_as_they_were_written(prefix, tmp_path):
 def test_words_arrive_in_a_run(prefix, tmp_path, minimum):
     """As ctest starts it; with all policies of old, too."""
     (tmp_path / "same.py").write_text(
-        "import json, sys\nsys.exit(json.load(open(sys.argv[1])) != sys.argv[2:])\n"
+        "import json, sys, time\n"
+        "time.sleep(1)  # the client's end is the run's, which takes less\n"
+        "sys.exit(json.load(open(sys.argv[1])) != sys.argv[2:])\n"
     )
     (tmp_path / "words.json").write_text(json.dumps(WORDS))
     program = [sys.executable, tmp_path / "same.py", tmp_path / "words.json"]
@@ -222,7 +224,8 @@ def test_words_arrive_in_a_run(prefix, tmp_path, minimum):
     configure(
         prefix,
         tmp_path,
-        f"ruedo_add_regression(NAME words WORLD w.sdf DURATION 1 CLIENT {words} SCRIPT {words})\n"
+        f"ruedo_add_regression(NAME words WORLD w.sdf DURATION 1 CLIENT {words} SCRIPT {words}\n"
+        "OPTIONS --no-client-wait)\n"
         'ruedo_add_regression(NAME three WORLD w.sdf DURATION 1 '
         'CLIENT sh -c "true; exit 3")',
         minimum=minimum,

@@ -58,8 +58,9 @@ class Store:
             raise ResultsError(f"{folder} holds no results of a campaign (no results.sqlite)")
         try:
             folder.mkdir(parents=True, exist_ok=True)
-            if self._file.exists():
-                open_regular(self._file).close()
+            # Not opened here: to close it would end SQLite's locks of this whole process.
+            if self._file.exists() and not self._file.is_file():
+                raise OSError("it is not a regular file")
             self._copy = None if write or os.access(folder, os.W_OK) else _copy_of(self._file)
             file = Path(self._copy.name) / self._file.name if self._copy else self._file
             self._db = sqlite3.connect(file, timeout=10, isolation_level=None)
