@@ -123,8 +123,7 @@ class Campaign:
         campaign early.
         """
         cases = shard_of(self.cases, shard) if shard else self.cases
-        store = Store(self.out)
-        with _lock(self.out):
+        with Store(self.out) as store, _lock(self.out):
             store.set_about(
                 "campaign",
                 json.dumps(
@@ -159,26 +158,29 @@ class Campaign:
                     progress(case, outcome)
                 if stop():
                     break
-        return Results(cases, store.rows(case.id for case in cases), store)
+            return Results(cases, store.rows(case.id for case in cases), self.out)
 
     def results(self, shard: str | None = None) -> Results:
         """What there is."""
         cases = shard_of(self.cases, shard) if shard else self.cases
         anything = (self.out / "results.sqlite").is_file()
-        store = Store(self.out, write=not anything)
-        return Results(cases, store.rows(case.id for case in cases), store)
+        with Store(self.out, write=not anything) as store:
+            return Results(cases, store.rows(case.id for case in cases), self.out)
 
     def join(self, folders: Iterable[str | os.PathLike[str]]) -> int:
         """Takes over the results of shards; how many."""
-        store = Store(self.out)
-        with _lock(self.out):
+        with Store(self.out) as store, _lock(self.out):
             store.set_about(
                 "cases",
                 json.dumps(
                     [{key: getattr(case, key) for key in _REMEMBERED} for case in self.cases]
                 ),
             )
-            return sum(store.take(Store(Path(one), write=False)) for one in folders)
+            taken = 0
+            for one in folders:
+                with Store(Path(one), write=False) as other:
+                    taken += store.take(other)
+            return taken
 
     def case(self, text: str) -> Case:
         """By its number, or by the beginning of its id."""

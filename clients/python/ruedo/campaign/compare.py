@@ -126,22 +126,22 @@ def compare_with(campaign: Any, baseline: str) -> Comparison:
 
     def only(controller: str) -> Results:
         cases = [case for case in now.cases if case.controller == controller]
-        return Results(cases, {case.id: row for case in cases if (row := now.row(case))}, now.store)
+        return Results(cases, {case.id: row for case in cases if (row := now.row(case))}, now.folder)
 
     return compare(only(name), only(other), (name, other))
 
 
 def results_of(folder: Path) -> Results:
     """A folder's results, with the cases that they were made from as the folder remembers them."""
-    store = Store(folder, write=False)
-    text = store.about("cases")
-    if text is None:
-        raise ResultsError(f"{folder} holds no results of a campaign")
-    try:
-        cases = [_remembered(one) for one in json.loads(text)]
-    except (TypeError, ValueError, KeyError, RecursionError):
-        raise ResultsError(f"{folder}: the list of its cases is damaged") from None
-    return Results(cases, store.rows(case.id for case in cases), store)
+    with Store(folder, write=False) as store:
+        text = store.about("cases")
+        if text is None:
+            raise ResultsError(f"{folder} holds no results of a campaign")
+        try:
+            cases = [_remembered(one) for one in json.loads(text)]
+        except (TypeError, ValueError, KeyError, RecursionError):
+            raise ResultsError(f"{folder}: the list of its cases is damaged") from None
+        return Results(cases, store.rows(case.id for case in cases), folder)
 
 
 def _remembered(one: dict[str, Any]) -> Case:

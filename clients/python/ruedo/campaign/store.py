@@ -78,7 +78,10 @@ class Store:
         elif found != _FORMAT:
             raise ResultsError(f"{self._file} is of format {found!r}; this Ruedo reads {_FORMAT}")
 
-    def close(self) -> None:
+    def __enter__(self) -> Store:
+        return self
+
+    def __exit__(self, *_: object) -> None:
         self._db.close()
         if self._copy:
             self._copy.cleanup()
@@ -199,7 +202,7 @@ class Store:
 
     def log(self, id: str) -> Path:
         """Where the log of a case is, if it was kept."""
-        return self.folder / "logs" / f"{id}.lcm"
+        return _log_of(self.folder, id)
 
     def _keep_log(self, id: str, content: bytes) -> None:
         try:
@@ -225,8 +228,8 @@ class Store:
 class Results:
     """The results of a campaign's cases, in the order of its file."""
 
-    def __init__(self, cases: list[Case], rows: dict[str, dict[str, Any]], store: Store) -> None:
-        self.cases, self._rows, self.store = cases, rows, store
+    def __init__(self, cases: list[Case], rows: dict[str, dict[str, Any]], folder: Path) -> None:
+        self.cases, self._rows, self.folder = cases, rows, folder
 
     def __len__(self) -> int:
         return len(self._rows)
@@ -246,7 +249,8 @@ class Results:
 
     def log(self, case: Case) -> Path | None:
         """The log of a case that was kept: what acted on it, for `ruedo verify`."""
-        return self.store.log(case.id) if self.store.log(case.id).exists() else None
+        log = _log_of(self.folder, case.id)
+        return log if log.exists() else None
 
     def table(self) -> list[dict[str, Any]]:
         """A row a case. Wall-clock times are not in it: the table is the same from every
@@ -331,6 +335,10 @@ class Results:
             + ElementTree.tostring(suite, encoding="unicode")
             + "\n"
         )
+
+
+def _log_of(folder: Path, id: str) -> Path:
+    return folder / "logs" / f"{id}.lcm"
 
 
 def _copy_of(file: Path) -> tempfile.TemporaryDirectory[str]:

@@ -296,7 +296,8 @@ def _case_of(path: str) -> tuple[Campaign, Case] | None:
     folder = Path(path).resolve().parent.parent
     if not (folder / "results.sqlite").is_file():
         return None
-    text = Store(folder, write=False).about("campaign")
+    with Store(folder, write=False) as store:
+        text = store.about("campaign")
     if text is None:
         return None
     about = json.loads(text)
