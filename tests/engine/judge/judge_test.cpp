@@ -186,9 +186,15 @@ TEST_F(JudgeTest, EachGoalCounts) {
   EXPECT_TRUE(judge_->verdict().passed());
   EXPECT_THAT(names(), testing::Contains("goal_time_s"));
   for (const Metric& metric : judge_->verdict().metrics) {
-    if (metric.name == "goal_time_s") EXPECT_DOUBLE_EQ(metric.value, 0.01);
-    if (metric.name == "goal_distance_m") EXPECT_DOUBLE_EQ(metric.value, 0.0);
-    if (metric.name == "path_m") EXPECT_DOUBLE_EQ(metric.value, 1.0 + std::sqrt(2.0));
+    if (metric.name == "goal_time_s") {
+      EXPECT_DOUBLE_EQ(metric.value, 0.01);
+    }
+    if (metric.name == "goal_distance_m") {
+      EXPECT_DOUBLE_EQ(metric.value, 0.0);
+    }
+    if (metric.name == "path_m") {
+      EXPECT_DOUBLE_EQ(metric.value, 1.0 + std::sqrt(2.0));
+    }
   }
 }
 
@@ -299,7 +305,9 @@ TEST_F(JudgeTest, ARobotThatARequestMovesHasFailed) {
       ask(kind, body);
       EXPECT_EQ(judge_->verdict().passed(), allowed) << kind;
       EXPECT_THAT(check("run").text, HasSubstr("1 requests changed the run")) << kind;
-      if (!allowed) EXPECT_THAT(check("requests").text, HasSubstr("r was moved by a request"));
+      if (!allowed) {
+        EXPECT_THAT(check("requests").text, HasSubstr("r was moved by a request"));
+      }
     }
   });
 }

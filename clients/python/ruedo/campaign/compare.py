@@ -126,7 +126,9 @@ def compare_with(campaign: Any, baseline: str) -> Comparison:
 
     def only(controller: str) -> Results:
         cases = [case for case in now.cases if case.controller == controller]
-        return Results(cases, {case.id: row for case in cases if (row := now.row(case))}, now.folder)
+        return Results(
+            cases, {case.id: row for case in cases if (row := now.row(case))}, now.folder
+        )
 
     return compare(only(name), only(other), (name, other))
 
