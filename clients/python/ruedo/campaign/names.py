@@ -68,7 +68,9 @@ def _check_golden(expect: dict[str, Any], source: Source, folder: Path) -> None:
     golden = str(folder / expect["golden"])
     done = subprocess.run(diff_command(expect, golden, golden), capture_output=True, text=True)
     if done.returncode != 0:
-        said = (done.stderr or done.stdout).strip().splitlines() or ["it is no log"]
-        at = "ignore" if "--ignore" in said[0] else "tolerances"
-        at = "golden" if expect["golden"] in said[0] else at
-        raise source.error(("expect", at), said[0].removeprefix("ruedo: "))
+        lines = (done.stderr + done.stdout).splitlines()
+        said = next((line for line in lines if line and "warning: " not in line), "it is no log")
+        at = "golden"
+        if golden not in said and done.returncode != 1:  # it is a rule that is wrong
+            at = "ignore" if "--ignore" in said else "tolerances"
+        raise source.error(("expect", at), said.removeprefix("ruedo: ").removeprefix("not the same: "))
