@@ -73,4 +73,6 @@ def _check_golden(expect: dict[str, Any], source: Source, folder: Path) -> None:
         at = "golden"
         if golden not in said and done.returncode != 1:  # it is a rule that is wrong
             at = "ignore" if "--ignore" in said else "tolerances"
-        raise source.error(("expect", at), said.removeprefix("ruedo: ").removeprefix("not the same: "))
+        raise source.error(
+            ("expect", at), said.removeprefix("ruedo: ").removeprefix("not the same: ")
+        )
