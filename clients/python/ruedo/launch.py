@@ -17,7 +17,7 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import IO, Any, Literal
 
@@ -139,7 +139,8 @@ def _world_file(
             )
         return os.fspath(world), None
     text = arguments.text("text", text)
-    folder = tempfile.TemporaryDirectory(prefix="ruedo-")
+    with _room_for_files():
+        folder = tempfile.TemporaryDirectory(prefix="ruedo-")
     kind = "urdf" if "<robot" in text and "<sdf" not in text else "sdf"
     file = Path(folder.name, f"world.{kind}")
     file.write_text(text, encoding="utf-8")
@@ -153,8 +154,19 @@ def _address(url: str | None) -> tuple[str, socket.socket | _Folder | None]:
         return url, token
     if url is not None:
         return url, None
-    folder = _Folder()
+    with _room_for_files():
+        folder = _Folder()
     return f"unix://{folder.path}/bus", folder
+
+
+@contextlib.contextmanager
+def _room_for_files() -> Iterator[None]:
+    try:
+        yield
+    except OSError as error:
+        raise LaunchError(
+            f"no temporary file can be made: {error.strerror}; let TMPDIR name a folder that is writable"
+        ) from None
 
 
 def _temporary(
@@ -221,10 +233,11 @@ class _Folder:
 
     def __init__(self) -> None:
         runtime = os.environ.get("XDG_RUNTIME_DIR", "")
-        usable = 0 < len(runtime) < 60 and os.access(
-            runtime, os.W_OK | os.X_OK
-        )  # a socket's path has 99 bytes at most
-        self.path = tempfile.mkdtemp(prefix="ruedo-", dir=runtime if usable else "/tmp")
+        for folder in (runtime, "/tmp", tempfile.gettempdir()):
+            # A socket's path has 99 bytes at most.
+            if 0 < len(folder) < 60 and os.access(folder, os.W_OK | os.X_OK):
+                break
+        self.path = tempfile.mkdtemp(prefix="ruedo-", dir=folder)
 
     def close(self) -> None:
         shutil.rmtree(self.path, ignore_errors=True)
@@ -277,7 +290,13 @@ class _Server:
         self._folder = folder  # of the world's file, when it is ours
         self._token = token
         self._said = ""  # by the end, its last lines
-        self._output: IO[bytes] | None = None if verbose else tempfile.TemporaryFile()
+        try:
+            with _room_for_files():
+                self._output: IO[bytes] | None = None if verbose else tempfile.TemporaryFile()
+        except LaunchError:
+            if token:
+                token.close()
+            raise
         self._heard = 0  # bytes of it that warnings() has read
         self._warned: set[str] = set()
         try:

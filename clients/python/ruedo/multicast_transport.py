@@ -24,6 +24,12 @@ from .address import Address
 from .errors import NoServer
 from .stream_transport import Receiver, is_readable
 
+if not hasattr(lcm, "EventLog"):
+    raise ImportError(
+        f"the module lcm, {lcm.__file__}, is not LCM's: install lcm (pip), and keep modules of that "
+        "name out of PYTHONPATH and of the script's folder"
+    )
+
 _SHORT, _FRAGMENT = b"LC02", b"LC03"
 _SHORT_HEAD = 8
 _HEAD = struct.Struct(">4sIIIHH")
