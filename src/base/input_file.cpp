@@ -22,11 +22,13 @@ std::set<std::string>& files_read() {
   return *paths;
 }
 
-[[noreturn]] void fail(const std::string& path) {
-  throw InputError({path, 0}, errno == ENOENT
-                                  ? "no such file"
-                                  : std::string("cannot be read: ") + std::strerror(errno));
+std::string why_not(int error) {
+  if (error == ENOENT) return "no such file";
+  if (error == ELOOP) return "cannot be read: its symbolic links lead in a circle";
+  return std::string("cannot be read: ") + std::strerror(error);
 }
+
+[[noreturn]] void fail(const std::string& path) { throw InputError({path, 0}, why_not(errno)); }
 
 }  // namespace
 

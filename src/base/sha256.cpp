@@ -1,11 +1,11 @@
-// OpenSSL's EVP digests.
+// OpenSSL's digests, in a context of our own: they do not depend on the host's configuration.
 #include "base/sha256.h"
 
-#include <array>
 #include <cstdio>
 #include <memory>
 #include <vector>
 
+#include <openssl/crypto.h>
 #include <openssl/evp.h>
 
 #include "base/input_file.h"
@@ -16,29 +16,48 @@ namespace {
 
 constexpr int64_t kMostBytes = int64_t{4} << 30;  // of a file that a world was made from
 
+// Not the library's usual context, in which a host's openssl.cnf may have switched SHA-256 off.
+// The default provider is part of the library.
+OSSL_LIB_CTX* context() {
+  static OSSL_LIB_CTX* const own = ::OSSL_LIB_CTX_new();
+  return own;
+}
+
+void require(bool done) {
+  if (!done)
+    throw EnvironmentError(
+        "this machine's OpenSSL (libcrypto) computes no SHA-256; without it no "
+        "file can be told from a changed one");
+}
+
 class Digest {
  public:
-  Digest() { EVP_DigestInit_ex(context_.get(), EVP_sha256(), nullptr); }
+  Digest() {
+    static EVP_MD* const method = ::EVP_MD_fetch(context(), "SHA256", nullptr);
+    require(method != nullptr && ::EVP_DigestInit_ex(state_.get(), method, nullptr) == 1);
+  }
 
-  void add(const uint8_t* data, size_t size) { EVP_DigestUpdate(context_.get(), data, size); }
+  void add(const uint8_t* data, size_t size) {
+    require(::EVP_DigestUpdate(state_.get(), data, size) == 1);
+  }
 
   std::string hex() {
-    std::array<unsigned char, EVP_MAX_MD_SIZE> bytes{};
+    Sha256 bytes{};
     unsigned size = 0;
-    EVP_DigestFinal_ex(context_.get(), bytes.data(), &size);
+    require(::EVP_DigestFinal_ex(state_.get(), bytes.data(), &size) == 1 && size == bytes.size());
     std::string text;
-    for (unsigned i = 0; i < size; ++i) {
-      text += "0123456789abcdef"[bytes[i] >> 4];
-      text += "0123456789abcdef"[bytes[i] & 15];
+    for (const uint8_t byte : bytes) {
+      text += "0123456789abcdef"[byte >> 4];
+      text += "0123456789abcdef"[byte & 15];
     }
     return text;
   }
 
  private:
   struct Free {
-    void operator()(EVP_MD_CTX* context) const { EVP_MD_CTX_free(context); }
+    void operator()(EVP_MD_CTX* state) const { ::EVP_MD_CTX_free(state); }
   };
-  std::unique_ptr<EVP_MD_CTX, Free> context_{EVP_MD_CTX_new()};
+  std::unique_ptr<EVP_MD_CTX, Free> state_{::EVP_MD_CTX_new()};
 };
 
 }  // namespace
@@ -62,6 +81,15 @@ std::string sha256_of_file(const std::string& path) {
   while (const size_t got = std::fread(piece.data(), 1, piece.size(), input.file.get()))
     digest.add(piece.data(), got);
   return std::ferror(input.file.get()) ? "" : digest.hex();
+}
+
+Sha256 hmac_sha256(std::span<const uint8_t> key, std::span<const uint8_t> bytes) {
+  Sha256 code{};
+  size_t size = 0;
+  require(::EVP_Q_mac(context(), "HMAC", nullptr, "SHA256", nullptr, key.data(), key.size(),
+                      bytes.data(), bytes.size(), code.data(), code.size(), &size) != nullptr &&
+          size == code.size());
+  return code;
 }
 
 }  // namespace ruedo

@@ -4,6 +4,7 @@
 #include <sys/resource.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cerrno>
 #include <csignal>
 #include <cstdio>
@@ -16,6 +17,7 @@
 #include <new>
 #include <string_view>
 #include <system_error>
+#include <vector>
 
 #include <fmt/format.h>
 #include <spdlog/pattern_formatter.h>
@@ -31,7 +33,6 @@
 #include "physics/state_check.h"
 #include "ruedo/element.h"
 #include "ruedo/errors.h"
-#include "scene/gl_context.h"
 #include "system/installation.h"
 #include "system/leftovers.h"
 #include "system/to_stderr.h"
@@ -102,12 +103,30 @@ void open_standard_streams() {
   }
 }
 
+[[noreturn]] void fail_of_output() {
+  throw ruedo::EnvironmentError(std::string("standard output cannot be written: ") +
+                                std::strerror(errno));
+}
+
 // What is still to be printed may meet a full disk. A reader that has gone, as `| head` does, has
 // what it wanted.
 void flush_output() {
-  if (std::fflush(stdout) != 0 && errno != EPIPE)
-    throw ruedo::EnvironmentError(std::string("standard output cannot be written: ") +
-                                  std::strerror(errno));
+  if (std::fflush(stdout) != 0 && errno != EPIPE) fail_of_output();
+}
+
+// An empty variable counts as one that is not set, here and in the libraries: TMPDIR= is no folder.
+void forget_empty_variables() {
+  constexpr std::string_view kOurs[] = {"RUEDO_",   "LCM_",       "ROS_",     "TMP",        "TEMP",
+                                        "NO_COLOR", "PYTHONHOME", "OPENSSL_", "CYCLONEDDS_"};
+  std::vector<std::string> empty;
+  for (char** at = environ; at != nullptr && *at != nullptr; ++at) {
+    const std::string_view variable = *at;
+    const bool ours = std::any_of(std::begin(kOurs), std::end(kOurs),
+                                  [&](auto beginning) { return variable.starts_with(beginning); });
+    if (ours && variable.find('=') + 1 == variable.size())
+      empty.emplace_back(variable.substr(0, variable.size() - 1));
+  }
+  for (const std::string& name : empty) ::unsetenv(name.c_str());
 }
 
 // Checks what threads and libraries cannot do without, and would hang or crash for want of, where
@@ -182,7 +201,7 @@ int run(int argc, char** argv) {
   } catch (const CLI::ParseError& error) {
     if (error.get_exit_code() == 0) {  // --help, --version
       app.exit(error);
-      std::cout.flush();
+      if (!std::cout.flush() && errno != EPIPE) fail_of_output();
       flush_output();
       return kGood;
     }
@@ -213,10 +232,17 @@ int tell_error() {
     return kBrokenState;
   } catch (const std::bad_alloc&) {
     say("there is not enough memory");
+  } catch (const std::filesystem::filesystem_error& error) {
+    say(error.what());
   } catch (const std::system_error& error) {
-    say(error.code() == std::errc::resource_unavailable_try_again
-            ? "no thread can be started: raise ulimit -u, ulimit -v or a container's pids.max"
-            : error.what());
+    if (error.code() == std::errc::resource_unavailable_try_again)
+      say("no thread can be started: raise ulimit -u, ulimit -v or a container's pids.max");
+    else if (error.code() == std::errc::operation_not_permitted)
+      say("no thread can be started: the system refuses the call clone3 (EPERM), as the seccomp "
+          "profiles of older Docker versions do: update Docker and libseccomp, or start the "
+          "container with --security-opt seccomp=unconfined");
+    else
+      say(error.what());
   } catch (const std::exception& error) {
     say(error.what());
   }
@@ -241,9 +267,9 @@ int tell_error() {
 
 int main(int argc, char** argv) {
   open_standard_streams();
+  forget_empty_variables();
   // A write beyond `ulimit -f` then fails as on a full disk. Not SIG_IGN, which children inherit.
   std::signal(SIGXFSZ, [](int) {});
-  ruedo::scene::set_up_mesa();
   set_up_logging();
   std::set_terminate(end_with_error);
   try {

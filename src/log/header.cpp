@@ -95,6 +95,16 @@ std::string without_build(const std::string& version) {
   return at == std::string::npos ? version : version.substr(0, at) + ")";
 }
 
+// Those that acted on pictures.
+std::string mesas_variables(const log_header_t& header) {
+  constexpr std::string_view kOption = "--mesa-environment=";
+  std::vector<std::string> variables;
+  for (const std::string& option : header.options) {
+    if (option.starts_with(kOption)) variables.push_back(option.substr(kOption.size()));
+  }
+  return joined(variables);
+}
+
 }  // namespace
 
 std::string cpu_features() {
@@ -318,6 +328,7 @@ std::vector<std::string> machine_differences(const log_header_t& log, const log_
   // they were to be fast.
   if (std::find(log.options.begin(), log.options.end(), "--fast-pixels") != log.options.end())
     compare("CPU features", log.cpu, here.cpu);
+  compare("Mesa's environment", mesas_variables(log), mesas_variables(here));
   std::vector<std::string> only_log, only_here;
   std::set_difference(log.libraries.begin(), log.libraries.end(), here.libraries.begin(),
                       here.libraries.end(), std::back_inserter(only_log));

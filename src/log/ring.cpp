@@ -64,7 +64,8 @@ void remove_numbered(const fs::path& path) {
 
 }  // namespace
 
-Ring::Ring(const std::string& path, int64_t limit) : path_(path), limit_(limit), acted_(path) {
+Ring::Ring(const std::string& path, int64_t limit, const std::function<void()>& wait)
+    : path_(path), limit_(limit), acted_(path, wait) {
   remove_numbered(path);
 }
 
@@ -136,9 +137,19 @@ void Ring::keep_for_later(const std::string& channel, const uint8_t* data, size_
   if (follows_) preamble_.push_back({channel, {data, data + size}});
 }
 
+void Ring::look_for_files() {
+  acted_.look_for_file();
+  if (file_) file_->look_for_file();
+  take_errors();
+}
+
 void Ring::flush() {
   acted_.flush();
   if (file_) file_->flush();
+  take_errors();
+}
+
+void Ring::take_errors() {
   if (error_.empty()) error_ = acted_.error();
   if (error_.empty() && file_) error_ = file_->error();
 }

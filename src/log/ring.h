@@ -9,6 +9,7 @@
 
 #include <cstdint>
 #include <deque>
+#include <functional>
 #include <memory>
 #include <string>
 #include <vector>
@@ -25,8 +26,8 @@ class Ring {
   static constexpr int64_t kPreambleShare = 2 * kFiles;
 
   // Removes the numbered files of an earlier run, and nobody else's. Throws EnvironmentError when a
-  // file cannot be created.
-  Ring(const std::string& path, int64_t limit);
+  // file cannot be created. wait: as Writer's.
+  Ring(const std::string& path, int64_t limit, const std::function<void()>& wait = {});
 
   void begin_step(int64_t timestamp_us);
   // record: it acted on the run, or is a hash of its state.
@@ -34,8 +35,10 @@ class Ring {
              bool record);
   void flush();
 
-  // What went wrong, or "".
+  // As Writer's, of the files that are being written; and what went wrong, or "".
+  void look_for_files();
   const std::string& error() const { return error_; }
+  bool is_lost() const { return acted_.is_lost() || (file_ && file_->is_lost()); }
   // False: the record of what acted fills half of the limit, and is no longer kept.
   bool repeats() const { return repeats_; }
   // False: so much has changed the world that numbered files no longer begin with all of it.
@@ -54,6 +57,7 @@ class Ring {
   std::string name_of(int64_t number) const;
   void begin_file(int64_t timestamp_us);
   void remove_old();
+  void take_errors();
   void keep_for_later(const std::string& channel, const uint8_t* data, size_t size);
 
   const std::string path_;

@@ -21,9 +21,28 @@ namespace {
 
 constexpr size_t kFlushSize = 1 << 20;  // bytes
 
+bool is_fifo(const std::string& path) {
+  struct stat status{};
+  const bool is = ::stat(path.c_str(), &status) == 0 && S_ISFIFO(status.st_mode);
+  errno = ENXIO;
+  return is;
+}
+
+// Here a FIFO without a reader would stall the run, deaf to signals.
+int open_to_write(const std::string& path, const std::function<void()>& wait) {
+  constexpr useconds_t kPause_us = 50'000;
+  for (;;) {
+    const int file = ::open(path.c_str(), O_WRONLY | O_CREAT | O_NONBLOCK | O_CLOEXEC, 0666);
+    if (file >= 0) ::fcntl(file, F_SETFL, O_WRONLY);
+    if (file >= 0 || errno != ENXIO || !is_fifo(path)) return file;
+    if (wait) wait();
+    ::usleep(kPause_us);
+  }
+}
+
 // An empty file that no other process writes: two would write over each other.
-int open_empty(const std::string& path) {
-  const int file = ::open(path.c_str(), O_WRONLY | O_CREAT | O_CLOEXEC, 0666);
+int open_empty(const std::string& path, const std::function<void()>& wait) {
+  const int file = open_to_write(path, wait);
   const auto fail = [&](const std::string& why) {
     if (file >= 0) ::close(file);
     throw EnvironmentError("--record: cannot write '" + path + "': " + why);
@@ -33,13 +52,15 @@ int open_empty(const std::string& path) {
   if (!S_ISREG(status.st_mode)) return file;
   if (::flock(file, LOCK_EX | LOCK_NB) != 0 && errno == EWOULDBLOCK)  // else: it knows no locks
     fail("another run records into it; end that one, or record elsewhere");
-  if (::ftruncate(file, 0) != 0) fail(std::strerror(errno));
+  // Some file systems (FUSE) cannot do that, which does not matter for an empty one.
+  if (status.st_size > 0 && ::ftruncate(file, 0) != 0) fail(std::strerror(errno));
   return file;
 }
 
 }  // namespace
 
-Writer::Writer(const std::string& path) : Writer(open_empty(path), path) {}
+Writer::Writer(const std::string& path, const std::function<void()>& wait)
+    : Writer(open_empty(path, wait), path) {}
 
 Writer::Writer(int file, std::string name) : path_(std::move(name)), file_(file) {
   buffer_.reserve(2 * kFlushSize);
@@ -74,7 +95,7 @@ void Writer::write(int64_t timestamp_us, const std::string& channel, const uint8
 }
 
 void Writer::flush() {
-  if (error_.empty()) {
+  if (is_whole()) {
     const size_t done = write_all(file_.get(), buffer_.data(), buffer_.size());
     const int error_number = errno;
     size_t whole = 0;  // bytes of whole events
@@ -84,6 +105,25 @@ void Writer::flush() {
   }
   buffer_.clear();
   ends_.clear();
+}
+
+// The next write would fill what is missing with zeros.
+bool Writer::is_whole() {
+  struct stat status{};
+  if (error_.empty() && ::fstat(file_.get(), &status) == 0 && S_ISREG(status.st_mode) &&
+      status.st_size < written_)
+    lose("truncated (" + std::to_string(status.st_size) + " bytes are left of " +
+         std::to_string(written_) + ")");
+  return error_.empty();
+}
+
+void Writer::look_for_file() {
+  struct stat open{}, named{};
+  if (!is_whole() || ::fstat(file_.get(), &open) != 0 || !S_ISREG(open.st_mode)) return;
+  if (::stat(path_.c_str(), &named) != 0)
+    lose("removed");
+  else if (named.st_ino != open.st_ino || named.st_dev != open.st_dev)
+    lose("replaced by another");
 }
 
 void Writer::truncate() {
@@ -127,6 +167,11 @@ std::string Writer::copy(int file, const std::string& path, int64_t begin, int64
   }
   written_ += end - begin;
   return "";
+}
+
+void Writer::lose(const std::string& how) {
+  error_ = "the file was " + how + " while the run wrote it, and the log is lost";
+  lost_ = true;
 }
 
 void Writer::fail(int error_number) {

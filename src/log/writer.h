@@ -5,6 +5,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -14,8 +15,9 @@ namespace ruedo::log {
 
 class Writer {
  public:
-  // Creates or empties the file. Throws EnvironmentError when that fails.
-  explicit Writer(const std::string& path);
+  // Creates or empties the file. Throws EnvironmentError when that fails. wait: called again and
+  // again while a FIFO has no reader; what it throws ends that. Without one, the wait has no end.
+  explicit Writer(const std::string& path, const std::function<void()>& wait = {});
   // Takes over an open, empty file. name: for messages.
   Writer(int file, std::string name);
   ~Writer();
@@ -31,6 +33,9 @@ class Writer {
   // Writes everything so far to the operating system.
   void flush();
 
+  // Whether its name still leads to the file, and the file holds all that was written: see error().
+  void look_for_file();
+
   // Begins with an empty file again, whatever went wrong before.
   void truncate();
 
@@ -43,6 +48,8 @@ class Writer {
   // What went wrong ("no space left on device"), or "". The file then ends with the last whole
   // event that had room.
   const std::string& error() const { return error_; }
+  // After an error: others have removed, replaced or truncated the file.
+  bool is_lost() const { return lost_; }
   const std::string& path() const { return path_; }
   // Bytes so far, with what is not handed over yet.
   int64_t size() const { return written_ + static_cast<int64_t>(buffer_.size()); }
@@ -51,6 +58,8 @@ class Writer {
  private:
   std::string copy(int file, const std::string& path, int64_t begin, int64_t end);
   void fail(int error_number);
+  void lose(const std::string& how);
+  bool is_whole();
 
   std::string path_;
   FileHandle file_;
@@ -60,6 +69,7 @@ class Writer {
   int64_t events_ = 0;
   int64_t first_number_ = 0;
   std::string error_;
+  bool lost_ = false;
 };
 
 }  // namespace ruedo::log

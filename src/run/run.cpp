@@ -13,6 +13,7 @@
 #include "log/header.h"
 #include "physics/state_check.h"
 #include "ruedo/applied_t.hpp"
+#include "ruedo/errors.h"
 #include "ruedo/request_t.hpp"
 #include "run/live.h"
 #include "run/requests/request_table.h"
@@ -102,7 +103,10 @@ Run::~Run() { bus_.stop(); }
 // Not before run(): who refuses the run until then leaves the log of an earlier one as it is.
 void Run::begin_log() {
   if (!header_made_) return;
-  if (log_) log_->begin();
+  if (log_)
+    log_->begin([this] {
+      if (stop_) throw EnvironmentError("--record: nobody reads " + options_.record);
+    });
   publisher_.record(kHeaderChannel, header_);
   if (journal_) journal_->begin(header_, 0);
 }
@@ -342,6 +346,7 @@ void Run::finish() {
   publisher_.flush();
   if (log_) {
     log_->drain();
+    log_->look_for_file();
     log_->check(publisher_.time_us());
   }
   if (!simulation_->end().empty()) throw physics::StateError(simulation_->end());

@@ -12,6 +12,7 @@ namespace ruedo::run {
 namespace {
 
 constexpr std::chrono::milliseconds kLogLatency{200};
+constexpr std::chrono::seconds kBetweenLooks{1};  // for the log's file
 
 }  // namespace
 
@@ -46,11 +47,11 @@ LogSink::LogSink(const std::string& path, int64_t limit)
       queue_(file_,
              {.thread = "log", .when_full = QueuedSink::WhenFull::wait, .latency = kLogLatency}) {}
 
-void LogSink::File::begin() {
+void LogSink::File::begin(const std::function<void()>& wait) {
   if (limit_ > 0)
-    ring_ = std::make_unique<log::Ring>(path_, limit_);
+    ring_ = std::make_unique<log::Ring>(path_, limit_, wait);
   else
-    writer_ = std::make_unique<log::Writer>(path_);
+    writer_ = std::make_unique<log::Writer>(path_, wait);
 }
 
 void LogSink::File::message(const Published& message) {
@@ -62,7 +63,13 @@ void LogSink::File::message(const Published& message) {
 
 void LogSink::File::flush() {
   ring_ ? ring_->flush() : writer_->flush();
-  const std::string& error = ring_ ? ring_->error() : writer_->error();
+  const auto now = std::chrono::steady_clock::now();
+  if (now >= looked_ + kBetweenLooks) {
+    looked_ = now;
+    look_for_file();
+  } else {
+    take_error();
+  }
   if (ring_ && !ring_->repeats() && !std::exchange(told_, true))
     spdlog::warn(
         "what acted on the run takes half of --record-limit: {} repeats it up to here, and no "
@@ -73,9 +80,24 @@ void LogSink::File::flush() {
         "what changed the world takes more than a sixteenth of --record-limit: the numbered files "
         "beside {} begin without what came after it",
         path_);
+}
+
+void LogSink::File::look_for_file() {
+  ring_ ? ring_->look_for_files() : writer_->look_for_file();
+  take_error();
+}
+
+void LogSink::File::take_error() {
+  const std::string& error = ring_ ? ring_->error() : writer_->error();
   if (error.empty()) return;
   const std::lock_guard lock(mutex_);
   error_ = error;
+  lost_ = ring_ ? ring_->is_lost() : writer_->is_lost();
+}
+
+bool LogSink::File::is_lost() const {
+  const std::lock_guard lock(mutex_);
+  return lost_;
 }
 
 std::string LogSink::File::error() const {
@@ -86,6 +108,7 @@ std::string LogSink::File::error() const {
 void LogSink::check(SimTime now) const {
   const std::string error = file_.error();
   if (error.empty()) return;
+  if (file_.is_lost()) throw EnvironmentError("--record: " + file_.path() + ": " + error);
   throw EnvironmentError("--record: " + file_.path() + ": " + error +
                          ". The log is readable up to " + std::to_string(now / 1000000) +
                          " s of sim time: make room, or record elsewhere");

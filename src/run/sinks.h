@@ -1,6 +1,7 @@
 // The sinks of a server: the bus, the log, and watchers in the same process.
 #pragma once
 
+#include <chrono>
 #include <functional>
 #include <memory>
 #include <mutex>
@@ -52,8 +53,8 @@ class LogSink : public Sink {
   // limit: bytes of all files of a ring (log/ring.h); 0: one file without a limit.
   LogSink(const std::string& path, int64_t limit);
   // Makes the file, or empties that of an earlier run; before any message. Throws EnvironmentError
-  // when that fails.
-  void begin() { file_.begin(); }
+  // when that fails. wait: as log::Writer's.
+  void begin(const std::function<void()>& wait) { file_.begin(wait); }
 
   Hears hears() const override { return queue_.hears(); }
   void begin_step(const Step& step) override { queue_.begin_step(step); }
@@ -65,6 +66,8 @@ class LogSink : public Sink {
   bool waits() const { return queue_.is_waited_for(); }
   // Returns when all that came so far was handed to the operating system.
   void drain() { queue_.drain(); }
+  // After drain(), at the end of the run: check() then knows of a file that has gone.
+  void look_for_file() { file_.look_for_file(); }
   // Throws EnvironmentError when the log cannot be written any more. now: sim time.
   void check(SimTime now) const;
 
@@ -72,22 +75,28 @@ class LogSink : public Sink {
   class File : public Sink {
    public:
     File(const std::string& path, int64_t limit) : path_(path), limit_(limit) {}
-    void begin();
+    void begin(const std::function<void()>& wait);
     Hears hears() const override { return {.samples = true, .records = true, .repeated = true}; }
     void begin_step(const Step&) override { step_begins_ = true; }
     void message(const Published& message) override;
     void flush() override;
+    void look_for_file();
     std::string error() const;
+    bool is_lost() const;
     const std::string& path() const { return path_; }
 
    private:
+    void take_error();
+
     std::unique_ptr<log::Writer> writer_;  // one of the two, from begin() on
     std::unique_ptr<log::Ring> ring_;
     bool step_begins_ = false, told_ = false, told_unfollowed_ = false;
     const std::string path_;
     const int64_t limit_;
+    std::chrono::steady_clock::time_point looked_{};
     mutable std::mutex mutex_;
     std::string error_;
+    bool lost_ = false;
   };
 
   File file_;

@@ -8,15 +8,14 @@
 #include <utility>
 
 #include "ruedo/errors.h"
+#include "scene/mesas_environment.h"
 #include "system/enough_threads.h"
 #include "system/late_library.h"
 
 namespace ruedo::scene {
 namespace {
 
-constexpr const char* kMesasCpu = "GALLIUM_OVERRIDE_CPU_CAPS";
 constexpr int kMesasOwnThreads = 4;  // for its caches
-bool set_by_us = false;
 
 std::atomic<pid_t> process_of_mesa{0};  // that of the first context
 
@@ -69,19 +68,6 @@ class ContextOfProcess : public GlContext {
 
 }  // namespace
 
-void set_up_mesa() {
-  ::setenv("MESA_DISK_CACHE_DATABASE", "true", 0);
-#ifdef __x86_64__
-  if (std::getenv(kMesasCpu) != nullptr || !__builtin_cpu_supports("sse4.1")) return;
-  set_by_us = ::setenv(kMesasCpu, "sse4.1", 0) == 0;
-#endif
-}
-
-void draw_as_fast_as_it_goes() {
-  if (set_by_us) ::unsetenv(kMesasCpu);
-  set_by_us = false;
-}
-
 std::unique_ptr<GlContext> make_osmesa_context(std::string& why) {
 #ifdef RUEDO_OSMESA
   auto* make = late_function<GlContext*(std::string&)>(LateLibrary::osmesa,
@@ -102,6 +88,7 @@ std::unique_ptr<GlContext> make_gl_context() {
   require_mesas_threads();
   // Mesa has one for each core, and waits for ever for those that could not be started.
   require_threads_for_cores(kMesasOwnThreads);
+  const MesasEnvironment environment;
   std::string why_not_osmesa = "not tried", why_not_egl = "not tried";
   if (choice != "egl") {
     if (auto context = make_osmesa_context(why_not_osmesa))
@@ -111,8 +98,13 @@ std::unique_ptr<GlContext> make_gl_context() {
     if (auto context = make_egl_context(why_not_egl))
       return std::make_unique<ContextOfProcess>(std::move(context));
   }
-  throw EnvironmentError("no renderer for cameras. OSMesa: " + why_not_osmesa + "; EGL: " +
-                         why_not_egl + ". Install libosmesa6, or libegl1 with libgl1-mesa-dri");
+  std::string heeded;
+  for (const std::string& variable : mesas_variables()) heeded += " " + variable;
+  throw EnvironmentError("no renderer for cameras. OSMesa: " + why_not_osmesa +
+                         "; EGL: " + why_not_egl +
+                         (heeds_mesas_variables() && !heeded.empty()
+                              ? ". --mesa-environment heeds" + heeded
+                              : ". Install libosmesa6, or libegl1 with libgl1-mesa-dri"));
 }
 
 }  // namespace ruedo::scene

@@ -3,7 +3,7 @@
 // A Renderer owns one context. It may move between threads, but serves one at a time: several
 // cameras use several cores with a pool of renderers. Pixels depend on nothing but the world, the
 // snapshot and the view; they are the same from every renderer, in every run (see
-// set_up_mesa()), with both backends.
+// mesas_environment.h), with both backends.
 #pragma once
 
 #include <array>

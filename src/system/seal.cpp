@@ -8,13 +8,12 @@
 #include <string>
 
 #include <openssl/crypto.h>
-#include <openssl/evp.h>
-#include <openssl/hmac.h>
 #include <sys/random.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
 #include "base/input_file.h"
+#include "base/sha256.h"
 #include "ruedo/errors.h"
 #include "system/file_handle.h"
 
@@ -62,14 +61,6 @@ void make_key(const fs::path& path) {
   ::unlink(part.c_str());
 }
 
-std::optional<Seal> sealed_with(const Key& key, std::span<const uint8_t> bytes) {
-  Seal seal{};
-  unsigned size = 0;
-  const bool made = HMAC(EVP_sha256(), key.data(), static_cast<int>(key.size()), bytes.data(),
-                         bytes.size(), seal.data(), &size);
-  return made && size == seal.size() ? std::optional(seal) : std::nullopt;
-}
-
 }  // namespace
 
 std::optional<Seal> seal_of(std::span<const uint8_t> bytes) {
@@ -80,15 +71,15 @@ std::optional<Seal> seal_of(std::span<const uint8_t> bytes) {
     make_key(folder / "key");
     key = read_key(folder / "key");
   }
-  return key ? sealed_with(*key, bytes) : std::nullopt;
+  return key ? std::optional(hmac_sha256(*key, bytes)) : std::nullopt;
 }
 
 bool is_sealed(std::span<const uint8_t> bytes, std::span<const uint8_t> seal) {
   const fs::path folder = folder_of_key();
   const std::optional<Key> key = folder.empty() ? std::nullopt : read_key(folder / "key");
-  const std::optional<Seal> right = key ? sealed_with(*key, bytes) : std::nullopt;
-  return right && seal.size() == right->size() &&
-         CRYPTO_memcmp(right->data(), seal.data(), seal.size()) == 0;
+  if (!key || seal.size() != std::tuple_size_v<Seal>) return false;
+  const Seal right = hmac_sha256(*key, bytes);
+  return CRYPTO_memcmp(right.data(), seal.data(), seal.size()) == 0;
 }
 
 }  // namespace ruedo

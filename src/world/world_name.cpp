@@ -40,7 +40,7 @@ std::string joined(const std::vector<std::string>& words) {
 
 std::string world_file(const std::string& name) {
   std::error_code error;
-  if (fs::exists(name, error)) return name;
+  if (fs::exists(name, error) || error) return name;  // an error is for who opens it to say
   if (name.empty() || name.find('/') != std::string::npos || fs::path(name).has_extension())
     throw InputError({name, 0}, "no such file");
   std::set<std::string> known;

@@ -15,7 +15,6 @@
 #include "engine/engine.h"
 #include "ruedo/joint_command_t.hpp"
 #include "ruedo/math.h"
-#include "scene/gl_context.h"
 #include "world/load.h"
 
 namespace ruedo {
@@ -126,7 +125,6 @@ std::string run(const Run& run, int threads) {
 }  // namespace ruedo
 
 int main(int argc, char** argv) {
-  ruedo::scene::set_up_mesa();
   spdlog::set_level(spdlog::level::off);  // of commands that a robot refuses
   int threads = 1;
   std::vector<std::string> wanted;

@@ -6,7 +6,6 @@
 #include <utility>
 
 #include "engine/engine.h"
-#include "scene/gl_context.h"
 #include "system/plugins.h"
 #include "world/load.h"
 
@@ -89,10 +88,8 @@ struct Engine::Impl {
   std::vector<uint64_t> seeds;
 };
 
-Engine::Engine(const std::string& world, const EngineOptions& options) {
-  scene::set_up_mesa();
-  impl_ = std::make_unique<Impl>(world, options);
-}
+Engine::Engine(const std::string& world, const EngineOptions& options)
+    : impl_(std::make_unique<Impl>(world, options)) {}
 
 Engine::Engine(Engine&&) noexcept = default;
 Engine& Engine::operator=(Engine&&) noexcept = default;

@@ -26,7 +26,6 @@
 #include "program_end.h"
 #include "ruedo/errors.h"
 #include "ruedo/math.h"
-#include "scene/gl_context.h"
 #include "system/plugins.h"
 #include "watched_run.h"
 #include "world/edit/randomization.h"
@@ -357,7 +356,6 @@ class PyEngine {
 
 NB_MODULE(_engine, module) {
   nb::set_leak_warnings(false);  // a daemon thread may hold an engine when the program ends
-  ruedo::scene::set_up_mesa();   // an import has the interpreter to itself
   spdlog::set_default_logger(spdlog::stderr_color_mt("ruedo"));  // not on standard output
   spdlog::set_pattern("ruedo: %l: %v");
   module.attr("version") = ruedo::version();

@@ -2,15 +2,18 @@
 // second.
 #include <chrono>
 #include <cstdlib>
+#include <filesystem>
 #include <map>
 #include <mutex>
 #include <thread>
+#include <vector>
 
 #include <fmt/format.h>
 
 #include <lcm/lcm_version.h>
 
 #include "base/channel_names.h"
+#include "base/sha256.h"
 #include "base/utf8.h"
 #include "base/version.h"
 #include "bus/datagram_loss.h"
@@ -24,8 +27,10 @@
 #include "ruedo/errors.h"
 #include "ruedo/request_t.hpp"
 #include "ruedo/world_info_t.hpp"
+#include "scene/mesas_environment.h"
 #include "scene/render_scene.h"
 #include "system/sandbox.h"
+#include "system/temporary_folder.h"
 #include "world/model/body_layout.h"
 
 namespace ruedo::cli {
@@ -193,6 +198,37 @@ void check_renderer(Report& report) {
   }
 }
 
+// What the host says to libraries, and Ruedo does not let them hear.
+void check_environment(Report& report) {
+  std::vector<std::string> variables;
+  for (const std::string& variable : scene::mesas_variables())
+    variables.push_back(for_terminal(shortened(variable, kLongestName)));
+  if (!variables.empty())
+    report.hint("environment",
+                fmt::format("has no effect on pictures: {} (--mesa-environment lets it act)",
+                            fmt::join(variables, ", ")));
+}
+
+// Where logs of campaigns, meshes and xacro files lie for a while.
+void check_temporary_folder(Report& report) {
+  try {
+    const TemporaryFolder folder("doctor");
+    report.good("temporary files",
+                std::filesystem::path(folder / "").parent_path().parent_path().string());
+  } catch (const EnvironmentError& error) {
+    report.fault("temporary files",
+                 std::string(error.what()) + "; set TMPDIR to one that is writable");
+  }
+}
+
+void check_digests(Report& report) {
+  try {
+    sha256(nullptr, 0);
+  } catch (const EnvironmentError& error) {
+    report.fault("digests", error.what());
+  }
+}
+
 void check_sandbox(Report& report) {
   const std::string missing = missing_for_sandbox();
   if (missing.empty())
@@ -212,6 +248,9 @@ int doctor(const std::string& url) {
   check_bus(report, url);
   check_buffers(report);
   check_renderer(report);
+  check_environment(report);
+  check_temporary_folder(report);
+  check_digests(report);
   check_sandbox(report);
   return report.faulty() ? kEnvironment : kGood;
 }

@@ -168,9 +168,10 @@ void announce(const bus::ServerBus& place) {
 
 void print_world(const run::Run& server, const world::WorldModel& world, const bus::LcmUrl& url) {
   const Style style = style_of(stdout);
-  fmt::print("{}{}{}: steps of {:g} ms, seed {}, on {}\n", style.bold, for_terminal(world.name),
+  const char* hint = url.scheme == "memq" ? ", which no other program hears" : "";
+  fmt::print("{}{}{}: steps of {:g} ms, seed {}, on {}{}\n", style.bold, for_terminal(world.name),
              style.off, static_cast<double>(world.step_us) * 1e-3,
-             static_cast<uint64_t>(server.info().front().seed), url.str());
+             static_cast<uint64_t>(server.info().front().seed), url.str(), hint);
   print_channels(stdout, server.info());
   std::fflush(stdout);
 }

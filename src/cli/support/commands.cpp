@@ -18,7 +18,7 @@
 #include "ruedo/errors.h"
 #include "ruedo/sim_time.h"
 #include "run/pacer.h"
-#include "scene/gl_context.h"
+#include "scene/mesas_environment.h"
 #include "system/to_stderr.h"
 
 namespace ruedo::cli {
@@ -78,6 +78,8 @@ void add_world_arguments(CLI::App& command, WorldArguments& arguments) {
   command.add_flag(
       "--fast-pixels", arguments.fast_pixels,
       "draw with this CPU's widest vectors: faster, but pixels may differ between CPUs");
+  command.add_flag("--mesa-environment", arguments.mesa_environment,
+                   "let Mesa's environment variables act on pictures, such as GALLIUM_DRIVER");
   command.add_flag("--allow-absolute", arguments.allow_absolute,
                    "absolute paths in files may lead out of the search folders");
 }
@@ -169,6 +171,7 @@ world::LoadOptions load_options(const WorldArguments& arguments) {
 
 std::shared_ptr<const world::WorldModel> load(const WorldArguments& arguments) {
   if (arguments.fast_pixels) scene::draw_as_fast_as_it_goes();
+  if (arguments.mesa_environment) scene::heed_mesas_variables();
   load_given_plugins();
   return world::load_world(arguments.world, load_options(arguments));
 }
@@ -185,6 +188,11 @@ std::vector<std::string> result_options(const WorldArguments& arguments) {
   for (const std::string& text : arguments.faults) options.push_back("--fault=" + text);
   if (arguments.no_noise) options.push_back("--no-noise");
   if (arguments.fast_pixels) options.push_back("--fast-pixels");
+  if (arguments.mesa_environment) {
+    options.push_back("--mesa-environment");
+    for (const std::string& variable : scene::mesas_variables())
+      options.push_back("--mesa-environment=" + variable);
+  }
   return options;
 }
 
@@ -224,7 +232,9 @@ void print_findings(const std::vector<Finding>& findings) {
 }
 
 Style style_of(FILE* stream) {
-  if (!isatty(fileno(stream)) || std::getenv("NO_COLOR")) return {};
+  const char* terminal = std::getenv("TERM");
+  const bool dumb = terminal && std::string_view(terminal) == "dumb";
+  if (!isatty(fileno(stream)) || std::getenv("NO_COLOR") || dumb) return {};
   return {"\033[1m", "\033[2m", "\033[31m", "\033[33m", "\033[32m", "\033[36m", "\033[0m"};
 }
 

@@ -42,10 +42,10 @@ std::vector<RegisterCommand::Add> registered_commands();
 struct WorldArguments {
   std::string world;
   std::vector<std::string> spawns, drives, settings, disabled, xacro_arguments, faults;
-  bool no_noise = false, allow_absolute = false, fast_pixels = false;
+  bool no_noise = false, allow_absolute = false, fast_pixels = false, mesa_environment = false;
 };
 // WORLD, --spawn, --drive, --set, --disable, --fault, --xacro-arg, --no-noise, --allow-absolute,
-// --fast-pixels.
+// --fast-pixels, --mesa-environment.
 void add_world_arguments(CLI::App& command, WorldArguments& arguments);
 // Throws InputError; for wrong usage it names no file.
 world::LoadOptions load_options(const WorldArguments& arguments);

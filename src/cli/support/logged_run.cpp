@@ -38,6 +38,8 @@ LoggedOptions read_options(const log_header_t& header, const std::string& log) {
       world.no_noise = true;
     else if (name == "--fast-pixels")
       world.fast_pixels = true;
+    else if (name == "--mesa-environment")
+      world.mesa_environment = true;  // with the variables that are set here
     else if (name == "--remap")
       options.remaps.push_back(with_options_of(log, [&] { return parse_remap(value); }));
     else

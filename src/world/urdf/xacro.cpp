@@ -86,6 +86,9 @@ std::string output_of(const std::string& path, std::vector<std::string> words,
   if (code == 126) fail(path, "its sandbox cannot be entered");
   if (code == 127) fail(path, "Python is missing (" + python + "); xacro needs it");
   if (!ended) fail(path, "it needs more than " + std::to_string(kCpu_s) + " s, or more than 1 GB");
+  const char* home = std::getenv("PYTHONHOME");
+  if (home && result.messages.find("<no Python frame>") != std::string::npos)
+    fail(path, "Python (" + python + ") does not start with PYTHONHOME=" + home + ": unset it");
   fail(path, last_line(result.messages));  // xacro's warnings come before
 }
 

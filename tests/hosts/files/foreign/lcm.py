@@ -1,0 +1,5 @@
+"""Another module of that name."""
+
+
+def lcm(a, b):
+    return a * b
