@@ -454,11 +454,11 @@ PlaneMotion KinematicDrive::of_wheels() const {
 }
 
 // On odometry the wheels do as planned, and the robot believes them.
-void KinematicDrive::finish(SimTime now, double way, double angle, bool touched) {
+void KinematicDrive::finish(SimTime now, double way, double angle, bool touched, double side) {
   if (description_->on_odometry && planner_.has_primitive())
     return planner_.finish(now, planned_.way, planned_.angle, false);
   if (touched) for_each_contact([&](const Contact& contact) { resist(contact); });
-  planner_.finish(now, way, angle, touched, lag_);
+  planner_.finish(now, way, angle, touched, lag_, side);
   if (touched || !planner_.has_primitive())
     lag_ = {0.0, 0.0, lag_.moving};  // a velocity is not made up for
 }
@@ -470,7 +470,7 @@ void KinematicDrive::after_on_plane(SimTime now) {
   if (!touched_ && !behind_) {
     heading_ += way_.angle;
     if (std::abs(heading_) > M_PI) heading_ = wrap_angle(heading_);
-    finish(now, way_.way, way_.angle, false);
+    finish(now, way_.way, way_.angle, false, way_.side);
     const PlaneMotion wheels = of_wheels();
     const Twist twist{{wheels.v, side(), 0.0}, {0.0, 0.0, wheels.omega}};
     set_state(next_, twist);
@@ -489,7 +489,9 @@ void KinematicDrive::after_on_plane(SimTime now) {
   Twist twist = base_twist(X_WBase);
   twist.linear.z() = twist.angular.x() = twist.angular.y() = 0.0;
   set_state(X_WBase, twist);
-  finish(now, moved.x() * math::cos(middle) + moved.y() * math::sin(middle), angle, true);
+  const double sine = math::sin(middle), cosine = math::cos(middle);
+  finish(now, moved.x() * cosine + moved.y() * sine, angle, true,
+         moved.y() * cosine - moved.x() * sine);
   fall_asleep_when_still(false);
 }
 
@@ -504,7 +506,7 @@ void KinematicDrive::after_on_contacts(SimTime now) {
   const Vec3 moved = X_WBase_.rotation.conjugate() * (X_WBase.translation - X_WBase_.translation);
   if (!supported_ || touched_ || behind_) {
     set_state(X_WBase, base_twist(X_WBase));
-    finish(now, moved.x(), wrap_angle(bullet_angle), true);
+    finish(now, moved.x(), wrap_angle(bullet_angle), true, moved.y());
     fall_asleep_when_still(false);
     return;
   }
@@ -515,7 +517,7 @@ void KinematicDrive::after_on_contacts(SimTime now) {
                       about_z(way_.angle + step_s_ * carrier_.angular.z()))
                          .normalized();
   Twist twist = base_twist(X_WBase);
-  finish(now, way_.way, way_.angle, false);
+  finish(now, way_.way, way_.angle, false, way_.side);
   const PlaneMotion wheels = of_wheels();
   twist.linear.x() = wheels.v + carrier_.linear.x();
   twist.linear.y() = side() + carrier_.linear.y();

@@ -55,7 +55,7 @@ class KinematicDrive final : public Drive {
   void after_on_plane(SimTime now);
   void after_on_contacts(SimTime now);
   PlaneMotion of_wheels() const;
-  void finish(SimTime now, double way, double angle, bool touched);
+  void finish(SimTime now, double way, double angle, bool touched, double side);
   void fall_asleep_when_still(bool still);
   // Changes `twist` (of base_link, expressed in it) towards the plan's mean velocities in the
   // plane, relative to the supporting body, as far as `force` (N) allows after compensating

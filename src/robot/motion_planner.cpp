@@ -113,7 +113,7 @@ void MotionPlanner::exchange(StateArchive& archive) {
   archive(v_, omega_, side_, steering_, steady_, resting_, deadline_, start_, plan_v_, plan_omega_,
           plan_side_, plan_steering_, target_v_, target_omega_, target_side_, target_steering_,
           by_wheels_, holding_, primitive_, window_start_, window_done_, window_fastest_,
-          window_turned_, window_fastest_turn_, window_touched_, window_work_, log_);
+          window_made_, window_planned_, window_touched_, window_work_, log_);
 }
 
 void MotionPlanner::command(const VelocityCommand& command, SimTime now) {
@@ -196,20 +196,33 @@ void MotionPlanner::hold(double v, double side, double omega, SimTime now, int8_
   replace_running();
   by_wheels_ = kind == Status::KIND_WHEELS;
   const bool same = holding_ && v == target_v_ && omega == target_omega_ && side == target_side_;
+  // Any other command goes on with what it is known of the last one's progress.
+  const bool anew = !holding_ || (!same && turns_round(v, side, omega));
   holding_ = true;
   deadline_ = drive_->watchdog_us > 0 ? now + drive_->watchdog_us : kNever;
-  const bool blocked =
-      same && log_.current().kind == kind && log_.current().reason == Status::REASON_BLOCKED;
+  const bool blocked = !anew && log_.current().reason == Status::REASON_BLOCKED;
   show(0, kind, Status::STATE_RUNNING, blocked ? Status::REASON_BLOCKED : Status::REASON_NONE,
        blocked ? log_.current().blocked_by : LinkIndex());
   if (same) return;  // a repeated command only resets the watchdog
-  begin_window(now);
+  if (anew) begin_window(now);
   target_v_ = v;
   target_omega_ = omega;
   target_side_ = side;
   if (is_steered()) steer_for(v, omega);
   set_plan(Profile::to_velocity(v_, v, way_limits_),
            Profile::to_velocity(omega_, omega, angle_limits_), now, side);
+}
+
+// From the last target to these: it stood, or shall stand, or goes the other way. The turn rate
+// only counts on the spot: who follows a wall corrects it all the time.
+bool MotionPlanner::turns_round(double v, double side, double omega) const {
+  const auto stands = [](double x, double y, double turn) {
+    return x == 0.0 && y == 0.0 && turn == 0.0;
+  };
+  if (stands(v, side, omega) || stands(target_v_, target_side_, target_omega_)) return true;
+  const bool on_the_spot = v == 0.0 && side == 0.0 && target_v_ == 0.0 && target_side_ == 0.0;
+  return v * target_v_ < 0.0 || side * target_side_ < 0.0 ||
+         (on_the_spot && omega * target_omega_ < 0.0);
 }
 
 Limits MotionPlanner::stricter(const Limits& own, const MoveCommand& command,
@@ -441,7 +454,8 @@ bool MotionPlanner::settled(SimTime now, const Lag& lag) const {
              std::max({plan_v_.end(), plan_omega_.end(), plan_side_.end()}) + kSettling_s;
 }
 
-void MotionPlanner::finish(SimTime now, double way, double angle, bool touched, const Lag& lag) {
+void MotionPlanner::finish(SimTime now, double way, double angle, bool touched, const Lag& lag,
+                           double side) {
   if (resting_) return;
   Primitive& p = primitive_;
   if (p.axis == Axis::none) {
@@ -451,7 +465,7 @@ void MotionPlanner::finish(SimTime now, double way, double angle, bool touched, 
       show(log_.current().id, Move::STOP, Status::STATE_DONE);
       take_speeds(now);
     }
-    if (holding_) watch_held(now, way, angle, touched);
+    if (holding_) watch_held(now, {way, side, angle}, touched);
     return;
   }
   const double t = seconds(now);
@@ -481,7 +495,9 @@ void MotionPlanner::finish(SimTime now, double way, double angle, bool touched, 
 
 void MotionPlanner::begin_window(SimTime now) {
   window_start_ = now;
-  window_done_ = window_turned_ = window_fastest_ = window_fastest_turn_ = 0.0;
+  window_done_ = window_fastest_ = 0.0;
+  window_made_.setZero();
+  window_planned_.setZero();
   window_touched_ = false;
   window_work_.clear();
 }
@@ -505,24 +521,25 @@ LinkIndex MotionPlanner::strongest() const {
   return most == window_work_.end() ? LinkIndex() : most->first;
 }
 
-// A velocity command keeps running; its status says while it makes no progress.
-void MotionPlanner::watch_held(SimTime now, double way, double angle, bool touched) {
+// A velocity command keeps running; its status says while it makes no progress. Commands may
+// change all the time: progress is what was made in the direction of the plan, whatever it was.
+void MotionPlanner::watch_held(SimTime now, const Vec3& made, bool touched) {
   window_touched_ |= touched;
-  window_done_ += way;
-  window_turned_ += angle;
-  window_fastest_ = std::max(window_fastest_, std::abs(v_));
-  window_fastest_turn_ = std::max(window_fastest_turn_, std::abs(omega_));
+  const Vec3 planned(v_, side_, omega_);
+  for (int i = 0; i < 3; ++i) window_made_[i] += std::copysign(1.0, planned[i]) * made[i];
+  window_planned_ = window_planned_.cwiseMax(planned.cwiseAbs());
   // It is still braking from the opposite direction: no progress yet, but not blocked.
-  if (v_ * target_v_ < 0.0 || omega_ * target_omega_ < 0.0) return begin_window(now);
+  const bool on_the_spot = target_v_ == 0.0 && target_side_ == 0.0;
+  if (v_ * target_v_ < 0.0 || side_ * target_side_ < 0.0 ||
+      (on_the_spot && omega_ * target_omega_ < 0.0))
+    return begin_window(now);
   if (now - window_start_ < kBlockWindow_us) return;
   const double seconds = static_cast<double>(now - window_start_) * 1e-6;
-  const bool wanted = window_fastest_ > 0.0 || window_fastest_turn_ > 0.0;
-  const auto short_of = [&](double done, double fastest) {
-    return std::abs(done) <= kJitter + kBlockedPart * fastest * seconds;
+  const auto is_short = [&](int i) {
+    return std::abs(window_made_[i]) <= kJitter + kBlockedPart * window_planned_[i] * seconds;
   };
-  const bool stuck =
-      short_of(window_done_, window_fastest_) && short_of(window_turned_, window_fastest_turn_);
-  const bool blocked = wanted && window_touched_ && stuck;
+  const bool stuck = is_short(0) && (!moves_sideways() || is_short(1)) && is_short(2);
+  const bool blocked = !window_planned_.isZero(0.0) && window_touched_ && stuck;
   const int8_t reason = blocked ? Status::REASON_BLOCKED : Status::REASON_NONE;
   if (log_.current().state == Status::STATE_RUNNING)
     show(0, log_.current().kind, Status::STATE_RUNNING, reason,

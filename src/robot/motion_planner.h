@@ -49,10 +49,11 @@ class MotionPlanner {
   // Before finish(): a foreign link that the robot touched in this step, and the work (J) that it
   // absorbed from the commanded motion.
   void resist(LinkIndex link, double work);
-  // After step(): the actual result, with base_link's travelled distance (m) and angle (rad).
-  // `touched`: by something that may have changed them. Ends primitives, also those whose plan is
-  // over once the robot has settled.
-  void finish(SimTime now, double way, double angle, bool touched, const Lag& lag = {});
+  // After step(): the actual result, with base_link's travelled distance (m), angle (rad) and
+  // distance to the left (m). `touched`: by something that may have changed them. Ends primitives,
+  // also those whose plan is over once the robot has settled.
+  void finish(SimTime now, double way, double angle, bool touched, const Lag& lag = {},
+              double side = 0.0);
 
   double v() const { return v_; }  // m/s and rad/s at the end of the last step, as planned
   double omega() const { return omega_; }
@@ -99,7 +100,8 @@ class MotionPlanner {
   void publish_progress();
   void begin_window(SimTime now);
   void watch_for_block(SimTime now, bool touched);
-  void watch_held(SimTime now, double way, double angle, bool touched);
+  bool turns_round(double v, double side, double omega) const;
+  void watch_held(SimTime now, const Vec3& made, bool touched);
   bool settled(SimTime now, const Lag& lag) const;
   // The plan for a command, or the reason why it is not possible.
   int8_t aim(const MoveCommand& command, double heading, Primitive& next) const;
@@ -122,12 +124,12 @@ class MotionPlanner {
   bool by_wheels_ = false;
   bool holding_ = false;  // a velocity or wheel command is active
   Primitive primitive_;
-  // Detection of blocks: start of the window, progress at that time, the highest planned speed
-  // since, and whether anything touched.
+  // Detection of blocks: start of the window, a primitive's progress at that time and its highest
+  // planned speed since, or what a velocity made of its highest speeds (ahead, to the left, turn),
+  // and whether anything touched.
   SimTime window_start_ = 0;
   double window_done_ = 0.0, window_fastest_ = 0.0;
-  // rotation, monitored separately for a velocity command
-  double window_turned_ = 0.0, window_fastest_turn_ = 0.0;
+  Vec3 window_made_ = Vec3::Zero(), window_planned_ = Vec3::Zero();
   bool window_touched_ = false;
   std::vector<std::pair<LinkIndex, double>> window_work_;  // by resisting link, J
   MotionLog log_;

@@ -24,6 +24,33 @@ constexpr SimTime kFallAsleep_us = 500'000;
 constexpr double kSettled_m_s = 2e-3, kSettled_rad_s = 1e-2;
 constexpr double kStill_m_s = 5e-3, kStill_rad_s = 2e-2;
 
+// The base, the wheels, and the suspension between them.
+std::vector<BodyIndex> bodies_of(const world::WorldModel& world, const world::BodyLayout& layout,
+                                 RobotIndex robot) {
+  const world::RobotPlacement& placement = layout.robots[robot];
+  std::vector<BodyIndex> bodies{placement.body};
+  const auto add = [&](BodyIndex body) {
+    if (!body.valid() || std::find(bodies.begin(), bodies.end(), body) != bodies.end())
+      return false;
+    bodies.push_back(body);
+    return true;
+  };
+  for (const WheelIndex index : placement.wheels) add(layout.links[layout.wheels[index].link].body);
+  for (const WheelIndex index : placement.wheels) {
+    const auto& model = *world.models[placement.instance].model;
+    const ModelLinkIndex holder = model.joints[layout.wheels[index].joint].parent;
+    if (!holder.valid()) continue;
+    BodyIndex body = layout.links[layout.link_of(placement.instance, holder)].body;
+    while (add(body)) {
+      const auto above =
+          std::find_if(placement.joints.begin(), placement.joints.end(),
+                       [&](JointIndex joint) { return layout.joints[joint].child_body == body; });
+      if (above != placement.joints.end()) body = layout.joints[*above].parent_body;
+    }
+  }
+  return bodies;
+}
+
 }  // namespace
 
 WheelsDrive::WheelsDrive(const world::WorldModel& world, const world::BodyLayout& layout,
@@ -33,15 +60,9 @@ WheelsDrive::WheelsDrive(const world::WorldModel& world, const world::BodyLayout
       max_torque_(description_->max_wheel_torque),
       believed_(WheelKinematics::believed(description_)) {
   place_wheels(layout);
-  bodies_.push_back(body_);
-  double mass = physics.mass(body_);
-  for (size_t i = 0; i < wheels_.size(); ++i) {
-    const auto& wheel = layout.wheels[wheels_[i]];
-    const BodyIndex body = layout.links[wheel.link].body;
-    if (std::find(bodies_.begin(), bodies_.end(), body) != bodies_.end()) continue;
-    bodies_.push_back(body);
-    mass += physics.mass(body);
-  }
+  bodies_ = bodies_of(world, layout, robot);
+  double mass = 0.0;
+  for (const BodyIndex body : bodies_) mass += physics.mass(body);
   set_gains(mass);
   begin_at_rest();
 }
@@ -227,8 +248,7 @@ void WheelsDrive::after_step(SimTime now) {
   const Pose X_WBase = base_pose().normalized();
   const Quat turn = X_WBase_.rotation.conjugate() * X_WBase.rotation;
   const double turned = wrap_angle(2.0 * math::atan2(turn.z(), turn.w()));
-  const double ahead =
-      (X_WBase_.rotation.conjugate() * (X_WBase.translation - X_WBase_.translation)).x();
+  const Vec3 moved = X_WBase_.rotation.conjugate() * (X_WBase.translation - X_WBase_.translation);
   set_state(X_WBase, base_twist(X_WBase));
 
   const Vec3 way = believed_way();
@@ -245,7 +265,8 @@ void WheelsDrive::after_step(SimTime now) {
   // A primitive ends by the robot's own estimate; whether a velocity makes progress is judged by
   // its true motion.
   const bool believes = planner_.has_primitive();
-  planner_.finish(now, believes ? made.v : ahead, believes ? made.omega : turned, touched, lag());
+  planner_.finish(now, believes ? made.v : moved.x(), believes ? made.omega : turned, touched,
+                  lag(), moved.y());
   if (touched && planner_.has_primitive())
     way_missing_ = angle_missing_ = 0.0;  // it was replanned from its estimated position
   if (!planner_.has_primitive()) {        // for a velocity command the lag is not made up

@@ -61,7 +61,7 @@ class WheelsDrive final : public Drive {
   };
   std::vector<Servo> servos_;      // as wheels_
   std::vector<Place> places_;      // as wheels_
-  std::vector<BodyIndex> bodies_;  // its own: chassis and wheels
+  std::vector<BodyIndex> bodies_;  // its own: chassis, suspension and wheels
   double max_torque_;              // N m, each wheel
   WheelKinematics believed_;
   std::optional<world::BaseOdometry> base_;         // for drives other than differential ones

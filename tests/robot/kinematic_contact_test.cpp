@@ -132,6 +132,48 @@ std::string blocked_by(const Sim& sim, int robot = 0) {
   return world::body_name(*sim.world, sim.layout, sim.robot(robot).motion.blocked_by);
 }
 
+// A controller corrects its command all the time.
+TEST(KinematicContact, AVelocityThatKeepsChangingIsBlocked) {
+  for (const char* drive : {"kinematic", "wheels"}) {
+    for (const std::string& limited : {std::string(), limits(0.6, 1.0, 0.5, 0.5, 1.0)}) {
+      Sim sim(plane_sdf() + robot_sdf("r", "0 0 0 0 0 0", limited + kNoWatchdog, drive) +
+              box_sdf("wall", "1.1 0 0.5 0 0 0", "0.2 4 1"));
+      int blocked = 0;
+      for (int i = 0; i < 100; ++i) {
+        sim.velocity(i % 3 == 0 ? 0.4 : 0.39, i % 2 == 0 ? 0.01 : -0.01);
+        sim.run(0.1);
+        if (i < 20) {
+          EXPECT_EQ(blocked_by(sim), "") << drive << i;  // on its way
+        }
+        if (i >= 40) blocked += blocked_by(sim) == "wall/l" ? 1 : 0;
+      }
+      EXPECT_EQ(blocked, 60) << drive;
+      sim.velocity(-0.3, 0.01);  // the other way: not blocked
+      EXPECT_EQ(blocked_by(sim), "wall/l");
+      sim.run(0.05);
+      EXPECT_EQ(blocked_by(sim), "") << drive;
+    }
+  }
+}
+
+// A mecanum base that rubs along a wall moves as it is driven, and one that is driven against it
+// does not.
+TEST(KinematicContact, SidewaysIsAWayAsWell) {
+  Sim sim(plane_sdf() +
+          "<model name='m'><link name='l'><pose>0 0 0.1 0 0 0</pose><collision name='c'><geometry>"
+          "<box><size>0.4 0.4 0.2</size></box></geometry></collision></link>"
+          "<ruedo:drive steering='holonomic'>" +
+          kNoWatchdog + "</ruedo:drive></model>" +
+          box_sdf("wall", "0.3001 0 0.5 0 0 0", "0.2 9 1"));
+  const auto drive = [&](double vx, double vy) {
+    sim.robots.apply({RobotIndex(0), VelocityCommand{vx, vy, 0.0}});
+    sim.run(1.2);
+    return blocked_by(sim);
+  };
+  EXPECT_EQ(drive(0.3, 0.3), "");
+  EXPECT_EQ(drive(0.3, 0.0), "wall/l");
+}
+
 // The robot rubs along a wall at its side all the way, and stops at a crate in the end.
 TEST(KinematicContact, WhatBlocksIsNamed) {
   for (const char* drive : {"kinematic", "wheels"}) {
