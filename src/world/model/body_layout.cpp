@@ -1,5 +1,6 @@
 // Which links move as one body. Links are merged by fixed joints, by the wheels of a kinematic
-// drive, and by its passive wheels (casters): links on a free joint that reach down to the ground.
+// drive and their suspension, and by its passive wheels (casters): links on a free joint that reach
+// down to the ground.
 #include "world/model/body_layout.h"
 
 #include <algorithm>
@@ -79,23 +80,65 @@ bool is_drive_wheel(const Model& model, ModelJointIndex joint) {
          in(model.drive->steer_joints);
 }
 
-// The link that a drive moves: the parent of its wheels, or of the joints that steer them.
-ModelLinkIndex carrier_of(const Model& model) {
-  const DriveDescription& drive = *model.drive;
-  const std::vector<ModelJointIndex>& first = !drive.steer_joints.empty()  ? drive.steer_joints
-                                              : !drive.left_joints.empty() ? drive.left_joints
-                                                                           : drive.right_joints;
-  const ModelLinkIndex carrier = first.empty() ? ModelLinkIndex() : model.joints[first[0]].parent;
-  return carrier.valid() ? carrier : ModelLinkIndex(0);
-}
-
 // What of a model moves as one body, and which links turn with which of its joints. The same for
 // all instances of the model.
 struct Grouping {
   Groups links;
   IndexedVector<ModelJointIndex, bool> joined;  // its links are one
   std::vector<bool> is_static;                  // of each group's representative
+  ModelLinkIndex carrier{0};                    // the link that its drive moves
 };
+
+ModelJointIndex joint_above(const Model& model, ModelLinkIndex link) {
+  for (const ModelJointIndex j : model.joints.indices()) {
+    if (model.joints[j].child == link && model.joints[j].parent.valid()) return j;
+  }
+  return {};
+}
+
+// The joints from a link up to what moves as one with the carrier; none if that is not above it.
+std::vector<ModelJointIndex> way_up(const Model& model, const Groups& links, ModelLinkIndex from,
+                                    ModelLinkIndex carrier) {
+  std::vector<ModelJointIndex> way;
+  while (links.find(from) != links.find(carrier)) {
+    const ModelJointIndex above = joint_above(model, from);
+    if (!above.valid() || way.size() > model.joints.size()) return {};
+    way.push_back(above);
+    from = model.joints[above].parent;
+  }
+  return way;
+}
+
+// What carries the wheels and the joints that steer them, each perhaps on a suspension.
+std::vector<ModelLinkIndex> holders_of(const Model& model) {
+  std::vector<ModelLinkIndex> holders;
+  for (const auto* joints :
+       {&model.drive->steer_joints, &model.drive->left_joints, &model.drive->right_joints}) {
+    for (const ModelJointIndex joint : *joints) {
+      if (model.joints[joint].parent.valid()) holders.push_back(model.joints[joint].parent);
+    }
+  }
+  return holders;
+}
+
+// The link that a drive moves: the parent of its first wheel, or of the first joint that steers,
+// or what is further up and carries them all.
+ModelLinkIndex carrier_of(const Model& model, const Groups& links) {
+  const std::vector<ModelLinkIndex> holders = holders_of(model);
+  if (holders.empty()) return ModelLinkIndex(0);
+  const auto carries_all = [&](ModelLinkIndex link) {
+    return std::all_of(holders.begin(), holders.end(), [&](ModelLinkIndex each) {
+      return links.find(each) == links.find(link) || !way_up(model, links, each, link).empty();
+    });
+  };
+  ModelLinkIndex carrier = holders[0];
+  for (size_t steps = 0; steps <= model.joints.size() && !carries_all(carrier); ++steps) {
+    const ModelJointIndex above = joint_above(model, carrier);
+    if (!above.valid()) return holders[0];
+    carrier = model.joints[above].parent;
+  }
+  return carrier;
+}
 
 Grouping group(const Model& model) {
   Grouping result{Groups(model.links.size()),
@@ -120,6 +163,14 @@ Grouping group(const Model& model) {
       if (lowest_point(model, below, X_BaseM) > kGroundReach_m) continue;
       for (const ModelJointIndex k : model.joints.indices()) {
         if (std::find(below.begin(), below.end(), model.joints[k].child) != below.end()) join(k);
+      }
+    }
+  }
+  if (model.drive) {
+    result.carrier = carrier_of(model, result.links);
+    if (kinematic) {  // it moves as a whole: its suspension does not give way
+      for (const ModelLinkIndex each : holders_of(model)) {
+        for (const ModelJointIndex j : way_up(model, result.links, each, result.carrier)) join(j);
       }
     }
   }
@@ -307,7 +358,7 @@ void BodyLayout::add(const WorldModel& world, InstanceIndex i, Known& known) {
   RobotPlacement robot;
   robot.instance = i;
   if (instance.is_robot()) {
-    const ModelLinkIndex carrier = model.drive ? carrier_of(model) : ModelLinkIndex(0);
+    const ModelLinkIndex carrier = grouping.carrier;
     const Pose X_MBase = model.drive ? model.drive->X_MBase : Pose();
     const LinkPlacement& link = links[link_of(i, carrier)];
     robot.body = link.body;
