@@ -2,6 +2,9 @@
 // whole link, on ROBOT/CONTACT. Contacts between samples are not lost: `pressed` covers every step
 // since the last sample.
 #include <algorithm>
+#include <charconv>
+#include <optional>
+#include <string_view>
 
 #include "ruedo/bound.h"
 #include "ruedo/contact_t.hpp"
@@ -28,16 +31,12 @@ class ContactSensor : public SensorOf<ContactSensor> {
     setup.element.refuse_unknown({"ruedo:phase"});  // read by the server
     const Element* contact = setup.element.child("contact");
     if (!contact) return;
-    const world::LinkPlacement& placement = layout_->links[link_];
-    const std::vector<world::Collision>& shapes =
-        world_->models[placement.instance].model->links[placement.link].collisions;
     for (const Element* named : contact->all("collision")) {
       const std::string name = without_scope(named->text);
-      const auto found =
-          std::find_if(shapes.begin(), shapes.end(),
-                       [&](const world::Collision& shape) { return shape.name == name; });
-      if (found != shapes.end()) {
-        shapes_.push_back(ShapeIndex(found - shapes.begin()));
+      auto shape = shape_of(link_, [&](const world::Collision& each) { return each.name == name; });
+      if (!shape) shape = shape_of_converter(name);
+      if (shape) {
+        shapes_.push_back(*shape);
       } else if (name != "__default__" && setup.findings) {
         setup.findings->unsupported(
             named->source, "sensor " + setup.device + "/contact/collision",
@@ -73,22 +72,66 @@ class ContactSensor : public SensorOf<ContactSensor> {
   void exchange(StateArchive& archive) { archive(pressed_); }
 
  private:
-  bool counts(ShapeIndex shape) const {
-    return shapes_.empty() || !shape.valid() ||
-           std::find(shapes_.begin(), shapes_.end(), shape) != shapes_.end();
+  struct Shape {
+    LinkIndex link;
+    ShapeIndex shape;
+  };
+
+  const world::Link& model_link(LinkIndex link) const {
+    const world::LinkPlacement& placement = layout_->links[link];
+    return world_->models[placement.instance].model->links[placement.link];
   }
-  bool is_a(const Contact& contact) const {
-    return contact.link_a == link_ && counts(contact.shape_a);
+
+  template <class Is>
+  std::optional<Shape> shape_of(LinkIndex link, Is is) const {
+    const auto& shapes = model_link(link).collisions;
+    const auto found = std::find_if(shapes.begin(), shapes.end(), is);
+    if (found == shapes.end()) return std::nullopt;
+    return Shape{link, ShapeIndex(found - shapes.begin())};
   }
-  bool is_b(const Contact& contact) const {
-    return contact.link_b == link_ && counts(contact.shape_b);
+
+  // The names that sdformat's converter of URDF makes: LINK_collision, LINK_collision_1, ..., or
+  // PARENT_fixed_joint_lump__LINK_collision of a link that it joined to its parent. Here such a
+  // link is still one of its own, whose shapes are in the file's order.
+  std::optional<Shape> shape_of_converter(const std::string& name) const {
+    constexpr std::string_view kJoined = "_fixed_joint_lump__", kShape = "_collision";
+    const size_t joined = name.rfind(kJoined);
+    const std::string own =
+        joined == std::string::npos ? name : name.substr(joined + kJoined.size());
+    const size_t end = own.rfind(kShape);
+    if (end == std::string::npos) return std::nullopt;
+    const std::string number = own.substr(end + kShape.size());
+    size_t index = 0;
+    if (!number.empty()) {
+      const char* const past = number.data() + number.size();
+      const auto read = std::from_chars(number.data() + 1, past, index);
+      if (number[0] != '_' || read.ec != std::errc() || read.ptr != past) return std::nullopt;
+    }
+    const world::LinkPlacement& sensor = layout_->links[link_];
+    for (const LinkIndex link : layout_->links.indices()) {
+      const world::LinkPlacement& other = layout_->links[link];
+      if (other.instance != sensor.instance || other.body != sensor.body ||
+          model_link(link).name != own.substr(0, end))
+        continue;
+      if (index < model_link(link).collisions.size()) return Shape{link, ShapeIndex(index)};
+    }
+    return std::nullopt;
   }
+
+  bool counts(LinkIndex link, ShapeIndex shape) const {
+    if (shapes_.empty()) return link == link_;
+    return std::any_of(shapes_.begin(), shapes_.end(), [&](const Shape& each) {
+      return each.link == link && (!shape.valid() || each.shape == shape);
+    });
+  }
+  bool is_a(const Contact& contact) const { return counts(contact.link_a, contact.shape_a); }
+  bool is_b(const Contact& contact) const { return counts(contact.link_b, contact.shape_b); }
 
   Bound<const world::WorldModel> world_;
   Bound<const world::BodyLayout> layout_;
   LinkIndex link_;
   int channel_;
-  std::vector<ShapeIndex> shapes_;  // collisions of the link; empty: all
+  std::vector<Shape> shapes_;  // empty: all of the link
   bool pressed_ = false;
   contact_t message_;
 };

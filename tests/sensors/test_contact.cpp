@@ -125,6 +125,27 @@ TEST(ContactSensor, NamedShapesOnly) {
   EXPECT_TRUE(both.with({touch(kBumper, kBox, 1)}).pressed);
 }
 
+// Of an SDF file that was written for what sdformat makes of a URDF.
+TEST(ContactSensor, NamesOfTheConverterOfUrdf) {
+  const auto contact = [](const std::string& name) {
+    return "<contact><collision>" + name + "</collision></contact>";
+  };
+  for (const char* name : {"bumper_collision_1", "body_fixed_joint_lump__bumper_collision_1"}) {
+    Bench bench(contact(name));
+    EXPECT_TRUE(bench.bench.findings.list().empty()) << name;
+    EXPECT_FALSE(bench.with({touch(kBumper, kBox, 0)}).pressed) << name;
+    EXPECT_TRUE(bench.with({touch(kBumper, kBox, 1)}).pressed) << name;
+    EXPECT_FALSE(bench.with({touch(kHull, kBox, 0)}).pressed) << name;
+  }
+  // Of another link that moves as one with the sensor's: the converter makes one link of them.
+  Bench other(contact("base_fixed_joint_lump__body_collision"));
+  EXPECT_TRUE(other.bench.findings.list().empty());
+  EXPECT_FALSE(other.with({touch(kBumper, kBox, 0)}).pressed);
+  EXPECT_EQ(other.with({touch(kBox, kHull, 0, 0)}).n, 1);
+  for (const char* name : {"bumper_collision_2", "bumper_collision_x", "box_collision"})
+    EXPECT_EQ(Bench(contact(name)).bench.findings.list().size(), 1u) << name;
+}
+
 TEST(ContactSensor, AShapeThatIsNotThereIsToldAndTheLinkCounts) {
   Bench bench("<contact><collision>middle</collision></contact>");
   ASSERT_EQ(bench.bench.findings.list().size(), 1u);
