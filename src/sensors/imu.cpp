@@ -92,7 +92,7 @@ class Imu : public SensorOf<Imu> {
       message.angular_velocity[i] = gyroscope_[i].apply(rate[i], dt_s, stream);
     for (int i = 0; i < 3; ++i)
       message.linear_acceleration[i] = accelerometer_[i].apply(force[i], dt_s, stream);
-    const Quat& q = X_WS.rotation;
+    const Quat q = turned_ ? R_EnuW_ * X_WS.rotation : X_WS.rotation;
     const double orientation[4] = {q.w(), q.x(), q.y(), q.z()};
     for (int i = 0; i < 4; ++i) message.orientation[i] = has_orientation_ ? orientation[i] : 0.0;
     out.publish(channel_, message);
@@ -113,7 +113,11 @@ class Imu : public SensorOf<Imu> {
   void configure(const Element& imu, const SensorSetup& setup) {
     has_orientation_ = imu.boolean("enable_orientation", true);
     if (const Element* frame = imu.child("orientation_reference_frame")) {
-      if (setup.findings && frame->string("localization", "CUSTOM") != "ENU") {
+      const bool by_compass = frame->string("localization", "CUSTOM") == "ENU";
+      const double heading = setup.world.environment.heading;
+      turned_ = by_compass && heading != 0.0;
+      if (turned_) R_EnuW_ = Quat(Eigen::AngleAxisd(heading, Vec3::UnitZ()));
+      if (setup.findings && !by_compass) {
         setup.findings->unsupported(
             frame->source, "sensor " + setup.device + "/imu/orientation_reference_frame",
             "the orientation is that of the device in the world (east, north, up)");
@@ -154,6 +158,8 @@ class Imu : public SensorOf<Imu> {
   WheelIndex wheel_;
   Vec3 hub_B_ = Vec3::Zero(), axis_B_ = Vec3::Zero();  // p_BH; unit
   bool has_orientation_ = true;
+  bool turned_ = false;  // the orientation is that in R_EnuW_'s frame: x is east, not the world's x
+  Quat R_EnuW_ = Quat::Identity();
   Noise gyroscope_[3], accelerometer_[3];
 
   SimTime time_ = -1, sample_time_ = 0;

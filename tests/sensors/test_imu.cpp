@@ -68,6 +68,26 @@ TEST(Imu, AtRestItShowsGravityUpwards) {
   EXPECT_EQ(bench.device.channels, (std::vector<std::string>{"box/IMU"}));
 }
 
+// East is not along the world's x axis: an orientation by compass is that from east.
+TEST(Imu, LocalizationFromEastTurnsByTheHeading) {
+  for (const char* localization : {"ENU", "CUSTOM"}) {
+    std::string sdf = world(std::string("<imu><orientation_reference_frame><localization>") +
+                            localization + "</localization></orientation_reference_frame></imu>");
+    const std::string at = "<world name='w'>";
+    ASSERT_NE(sdf.find(at), std::string::npos);
+    sdf.insert(sdf.find(at) + at.size(),
+               "<spherical_coordinates><latitude_deg>10</latitude_deg><longitude_deg>20"
+               "</longitude_deg><elevation>0</elevation><heading_deg>30</heading_deg>"
+               "</spherical_coordinates>");
+    Bench bench(sdf);
+    const imu_t m = bench.sample();
+    const double yaw = localization == std::string("ENU") ? M_PI / 6 : 0.0;
+    EXPECT_NEAR(m.orientation[0], std::cos(yaw / 2), 1e-12) << localization;
+    EXPECT_NEAR(m.orientation[3], std::sin(yaw / 2), 1e-12) << localization;
+    expect_vector(m.linear_acceleration, {0, 0, kG}, 1e-12);
+  }
+}
+
 // Nose up by 0.3 rad (pitch -0.3): gravity acts along x and z.
 TEST(Imu, OnARampGravityIsAlongTheRampsAxes) {
   Bench bench(world("", "0 0 0 0 0 0", "0 0 0.5 0 -0.3 1.1"));
