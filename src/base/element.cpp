@@ -190,7 +190,7 @@ Pose pose_of(const Value& where) {
     }
     quaternion = *written == "quat_xyzw";
   }
-  const std::vector<double> v =
+  std::vector<double> v =
       numbers_of(where, Allowed::any(quantity::kLength),
                  Allowed::any(quaternion ? quantity::kFactor : quantity::kAngle));
   if (v.empty()) return {};
@@ -202,6 +202,7 @@ Pose pose_of(const Value& where) {
     if (!(q.norm() > 1e-9)) where.refuse("has no rotation: its quaternion is zero");
     return {q.normalized(), {v[0], v[1], v[2]}};
   }
+  if (v.size() == 5) v.push_back(0.0);  // as in Gazebo; the reader of poses warns
   if (v.size() != 6)
     where.refuse("has " + std::to_string(v.size()) + " numbers; allowed are x y z roll pitch yaw");
   const double unit = degrees ? M_PI / 180.0 : 1.0;

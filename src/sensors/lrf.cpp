@@ -42,20 +42,35 @@ struct Sweep {
 
   Sweep() = default;
   // limit_rad: for the angles; whole_rad: for their span.
-  Sweep(const Element& e, int64_t samples_if_absent, double limit_rad, double whole_rad) {
-    const int64_t samples =
-        e.integer("samples", samples_if_absent, Allowed::between(1, static_cast<double>(kMaxRays)));
+  Sweep(const Element& e, int64_t samples_if_absent, double limit_rad, double whole_rad,
+        const SensorSetup& setup) {
+    const double written = e.number("samples", static_cast<double>(samples_if_absent),
+                                    Allowed::between(1, static_cast<double>(kMaxRays)));
+    const double samples = std::floor(written);
+    const auto repaired = [&](const Element& at, const std::string& text) {
+      if (setup.findings)
+        setup.findings->repaired(at.source, "sensor " + setup.device + "/" + e.name, text);
+    };
+    if (samples != written)
+      repaired(*e.child("samples"),
+               fmt::format("<samples>: {} is not whole; as in Gazebo, it is {}", written, samples));
     const double resolution = e.number("resolution", 1.0, Allowed::positive(quantity::kFactor));
     // Many planar lidars have one layer with a resolution of 0.01: at least one ray, as in Gazebo.
-    const double rays = std::max(1.0, std::round(static_cast<double>(samples) * resolution));
+    const double rays = std::max(1.0, std::round(samples * resolution));
     if (rays > static_cast<double>(kMaxRays)) {
       e.fail(
           fmt::format("<samples> times <resolution> is {} rays; allowed: 1 to {}", rays, kMaxRays));
     }
     count = whole(rays);
-    const double low = e.number("min_angle", 0.0, Allowed::between(-limit_rad, limit_rad));
-    const double high = e.number("max_angle", 0.0, Allowed::between(-limit_rad, limit_rad));
-    if (high < low) e.fail(fmt::format("<max_angle> {} is below <min_angle> {}", high, low));
+    double low = e.number("min_angle", 0.0, Allowed::between(-limit_rad, limit_rad));
+    double high = e.number("max_angle", 0.0, Allowed::between(-limit_rad, limit_rad));
+    if (high < low && e.name != "vertical")
+      e.fail(fmt::format("<max_angle> {} is below <min_angle> {}", high, low));
+    if (high < low) {  // layers have no direction
+      repaired(e,
+               fmt::format("<max_angle> {} is below <min_angle> {}; they are swapped", high, low));
+      std::swap(low, high);
+    }
     constexpr double kOverlap_rad = 0.1;  // -3.15 to 3.15 still counts as a full turn
     if (high - low > whole_rad + kOverlap_rad)
       e.fail("from <min_angle> to <max_angle> is more than a full turn");
@@ -79,9 +94,9 @@ class Lrf : public SensorOf<Lrf> {
     if (!laser) e.fail("a laser range finder needs a <lidar> (or <ray>) with <scan> and <range>");
     const Element* horizontal = laser->child("scan/horizontal");
     if (!horizontal) laser->fail("needs <scan><horizontal>");
-    columns_ = Sweep(*horizontal, 640, 2.0 * M_PI + 1e-3, 2.0 * M_PI);
+    columns_ = Sweep(*horizontal, 640, 2.0 * M_PI + 1e-3, 2.0 * M_PI, setup);
     if (const Element* vertical = laser->child("scan/vertical"))
-      layers_ = Sweep(*vertical, 1, M_PI / 2 + 1e-3, M_PI);
+      layers_ = Sweep(*vertical, 1, M_PI / 2 + 1e-3, M_PI, setup);
     if (columns_.count * layers_.count > kMaxRays) {
       laser->fail(std::to_string(layers_.count) + " layers of " + std::to_string(columns_.count) +
                   " rays; allowed: " + std::to_string(kMaxRays) + " rays in all");

@@ -233,6 +233,20 @@ TEST(Lrf, OneRayAtLeast) {
   EXPECT_EQ(bench.sample<planar_lidar_t>().nranges, 90);
 }
 
+// As Gazebo reads them: whole samples, and layers from whichever side.
+TEST(Lrf, OddNumbersAreRepaired) {
+  RayBench bench(
+      robot_world("", lrf("<horizontal><samples>66.7</samples><min_angle>-1</min_angle><max_angle>1"
+                          "</max_angle></horizontal><vertical><samples>3</samples><min_angle>0.2"
+                          "</min_angle><max_angle>-0.3</max_angle></vertical>")),
+      "LRF");
+  const auto scan = bench.sample<lidar_t>();
+  EXPECT_EQ(scan.ncolumns, 66);
+  EXPECT_EQ(scan.nlayers, 3);
+  EXPECT_FLOAT_EQ(scan.elevation0, -0.3);
+  EXPECT_FLOAT_EQ(scan.elevation_step, 0.25);
+}
+
 TEST(Lrf, FullCircle) {
   RayBench bench(
       robot_world(solid("ring", "0 0 0 0 0 0", "<sphere><radius>0.2</radius></sphere>") +

@@ -103,8 +103,8 @@ const std::vector<BadWorld>& table() {
        ":5: the channel 'm/a23456789012345678901234567890123456789012345678901234567890xy' has 64 "
        "characters; allowed are 63"},
       // Numbers.
-      {"PoseOfFive", in_link("<pose>0 0 0 0 0</pose>"),
-       ":5: <link/pose>: '0 0 0 0 0' has 5 numbers; allowed are x y z roll pitch yaw",
+      {"PoseOfFour", in_link("<pose>0 0 0 0</pose>"),
+       ":5: <link/pose>: '0 0 0 0' has 4 numbers; allowed are x y z roll pitch yaw",
        "the link is left out"},
       {"CommaInPose", in_link("<pose>0 0 1,5 0 0 0</pose>"),
        ":5: <link/pose>: '1,5' is not a number; allowed is a number", "the link is left out"},

@@ -8,6 +8,7 @@
 
 #include "temporary_folder.h"
 #include "world/load.h"
+#include "world/mesh/codecs.h"
 #include "world/mesh/mesh_format.h"
 #include "world/mesh/mesh_loader.h"
 #include "world/mesh/picture.h"
@@ -472,6 +473,22 @@ TEST(MadeMeshes, HeightmapOfTwoByTwo) {
               0);
   }
   EXPECT_THROW(heightmap(folder.write("x.png", "no picture"), {1, 1, 1}), std::runtime_error);
+}
+
+// A digital elevation model: metres above the sea, from its lowest to its highest point.
+TEST(MadeMeshes, HeightmapOfElevations) {
+  TemporaryFolder folder;
+  cv::Mat elevation(2, 2, CV_32F);
+  elevation.at<float>(0, 0) = 100.0f;
+  elevation.at<float>(0, 1) = 140.0f;
+  elevation.at<float>(1, 0) = -9999.0f;  // not measured
+  elevation.at<float>(1, 1) = 110.0f;
+  std::vector<uint8_t> bytes;
+  encode_picture(".tiff", elevation, bytes, {});
+  const Mesh mesh =
+      heightmap(folder.write("dem.tif", std::string(bytes.begin(), bytes.end())), {4, 6, 8});
+  const double heights[] = {0.0, 8.0, 0.0, 2.0};
+  for (int i = 0; i < 4; ++i) EXPECT_NEAR(mesh.positions[i].z(), heights[i], 1e-5) << i;
 }
 
 // A few bytes that announce gigabytes: the header is checked before anything is decoded.

@@ -108,7 +108,8 @@ std::shared_ptr<const Element> ControllerFiles::read(const std::string& path, bo
 
 void ControllerFiles::load(const std::string& path, bool named, File& file) {
   const std::string text = read_input(path, kLargestFile);
-  if (!named && text.find("ontroller") == std::string::npos) return;
+  const auto has = [&](const char* word) { return text.find(word) != std::string::npos; };
+  if (!named && !has("ontroller") && !has("steer_bot")) return;
   bytes_ += text.size();
   if (bytes_ > kMostBytes)
     throw InputError({path, 0}, "the controllers' files of a world hold no more than " +

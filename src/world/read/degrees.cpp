@@ -67,6 +67,10 @@ class Walk {
     const std::string* format = pose.attribute("rotation_format");
     if (is_true(pose.attribute("degrees")) || (format && *format == "quat_xyzw")) return;
     const std::vector<double> numbers = numbers_of(pose.text);
+    if (numbers.size() == 5)
+      findings_.repaired(pose.source, where,
+                         "<pose>" + pose.text +
+                             "</pose> has 5 numbers; x y z roll pitch yaw are six: the yaw is 0");
     if (numbers.size() == 6 && std::any_of(numbers.begin() + 3, numbers.end(), reads_as_degrees))
       name(pose, where, "the rotation of <pose>" + pose.text + "</pose>", " or degrees=\"true\"");
   }

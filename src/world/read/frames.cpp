@@ -115,7 +115,9 @@ Pose FrameGraph::placed(const Node& node, Pose X) {
     const auto inner = frames.find(node.placement_frame);
     if (inner != frames.end()) {
       X = X * inner->second.X_MF.inverse();
-    } else if (node.placement_frame != "__model__") {
+    } else if (node.placement_frame != "__model__" &&
+               node.placement_frame != node.scope->model->name &&
+               node.placement_frame != node.name) {
       node.element->fail("placement_frame '" + node.placement_frame +
                          "' is no frame of the model '" + node.scope->model->name + "'");
     }

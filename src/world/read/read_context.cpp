@@ -16,6 +16,11 @@ std::string required_name(const Element& element) {
   return *name;
 }
 
+std::string name_of_model(const Element& element) {
+  const std::string* name = element.attribute("name");
+  return name && *name == "world" ? kModelNamedWorld : required_name(element);
+}
+
 void report_other_children(const Element& element, const std::vector<std::string>& known,
                            const std::vector<std::string>& silent, const std::string& where,
                            Findings& findings) {

@@ -4,6 +4,7 @@
 
 #include "world/read/degrees.h"
 #include "world/read/no_effect.h"
+#include "world/read/reserved_names.h"
 #include "world/sdf/include_params.h"
 #include "world/sdf/sdf_reader.h"
 #include "world/urdf/urdf.h"
@@ -106,7 +107,7 @@ SdfReader::Included SdfReader::read_file(const std::string& path, const Element&
   for (const auto& child : result.document->children) {
     if (child->name == "model") {
       result.model = read_model(*child, result.version);
-      result.name = required_name(*child);
+      result.name = name_of_model(*child);
       break;
     }
     if (child->name == "light" || child->name == "actor") {
@@ -247,6 +248,12 @@ std::optional<SdfReader::Included> SdfReader::include(const Element& element,
   if (const Element* name = element.child("name")) {
     if (name->text.empty()) name->fail("is empty");
     result.name = name->text;
+    if (result.name == "world") {
+      result.name = kModelNamedWorld;
+      context_.findings.repaired(
+          name->source, where,
+          "'world' is a reserved name; the model is called '" + result.name + "'");
+    }
   }
   if (result.model) result.model = placed_by(element, std::move(result.model));
   return result;

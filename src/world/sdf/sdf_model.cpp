@@ -7,6 +7,7 @@
 #include "world/compat/visual_plugins.h"
 #include "world/model/drive.h"
 #include "world/model/joint_start.h"
+#include "world/read/reserved_names.h"
 #include "world/sdf/sdf_link.h"
 #include "world/sdf/sdf_reader.h"
 
@@ -154,7 +155,7 @@ class SdfReader::ModelReader {
         findings_(reader.context_.findings),
         element_(element),
         version_(version),
-        where_("model " + required_name(element)),
+        where_("model " + name_of_model(element)),
         frames_(where_) {}
 
   // nullptr: it has no link, which is reported.
@@ -242,7 +243,10 @@ std::shared_ptr<const ScopedModel> SdfReader::ModelReader::read() {
 }
 
 void SdfReader::ModelReader::read_attributes() {
-  model_->name = required_name(element_);
+  model_->name = name_of_model(element_);
+  if (*element_.attribute("name") == "world")
+    findings_.repaired(element_.source, where_,
+                       "'world' is a reserved name; the model is called '" + model_->name + "'");
   report_other_children(
       element_,
       {"link", "joint", "frame", "model", "include", "pose", "static", "self_collide", "plugin",
