@@ -143,12 +143,16 @@ class Loader {
       if (child->name == "model") {
         if (const auto scope = reader_.read_model(*child, version)) {
           const std::string name =
-              name_in_world(required_name(*child), scope->model, child->source);
+              name_in_world(name_of_model(*child), scope->model, child->source);
           for (const ModelInstance& other : world_.models) {
             if (other.name == name && any) child->fail("a second model of the name '" + name + "'");
           }
           // The user's own ground plane replaces ours.
           std::erase_if(world_.models, [&](const auto& other) { return other.name == name; });
+          if (!scope->relative_to.empty() && scope->relative_to != "world")
+            findings_.error(child->source, "model " + name,
+                            "<pose> is relative to '" + scope->relative_to +
+                                "', which is no frame beside the model; it is that in the world");
           add(name, scope->pose, scope->model, child->source);
         }
         any = true;

@@ -30,6 +30,75 @@ TEST(OddElements, AWorldMayBeNamedWorld) {
   EXPECT_EQ(load_world_text("<sdf version='1.6'><world/></sdf>", "/nowhere/w.sdf")->name, "world");
 }
 
+// As in Gazebo Classic. For everything else, "world" is the world.
+TEST(OddElements, AModelNamedWorldHasAnotherName) {
+  std::string model = kBox;
+  model.replace(model.find("'box'"), 5, "'world'");
+  const auto world = world_of(model +
+                              "<model name='m'><pose relative_to='world'>1 0 0 0 0 0</pose>"
+                              "<link name='l'/></model>");
+  ASSERT_EQ(world->models.size(), 2u);
+  EXPECT_EQ(world->models[0].name, "world_model");
+  EXPECT_EQ(world->models[1].X_WM.translation.x(), 1.0);
+  EXPECT_THAT(texts(*world),
+              ElementsAre("'world' is a reserved name; the model is called 'world_model'"));
+}
+
+TEST(OddElements, APoseOfFiveNumbersHasNoYaw) {
+  const auto world = world_of("<model name='m'><pose>1 2 3 0 0.5</pose><link name='l'/></model>");
+  ASSERT_EQ(world->models.size(), 1u);
+  EXPECT_EQ(world->models[0].X_WM.translation, Vec3(1, 2, 3));
+  EXPECT_NEAR(world->models[0].X_WM.rotation.y(), std::sin(0.25), 1e-12);
+  EXPECT_THAT(texts(*world), ElementsAre(HasSubstr("has 5 numbers")));
+}
+
+TEST(OddElements, APlacementFrameMayBeTheModelItself) {
+  TemporaryFolder folder;
+  folder.write("part.sdf",
+               "<sdf version='1.9'><model name='part'><link name='l'><pose>1 0 0 0 0 0</pose>"
+               "</link></model></sdf>");
+  for (const std::string& own : {std::string("part"), std::string("other")}) {
+    const auto world = load_world(folder.write(
+        "w.sdf", "<sdf version='1.9'><world name='w'><include><uri>part.sdf</uri>" +
+                     (own == "other" ? "<name>other</name>" : std::string()) + "<placement_frame>" +
+                     own + "</placement_frame><pose>5 5 1 0 0 0</pose></include></world></sdf>"));
+    ASSERT_EQ(world->models.size(), 1u) << own;
+    EXPECT_EQ(world->models[0].X_WM.translation, Vec3(5, 5, 1)) << own;
+    EXPECT_THAT(texts(*world), IsEmpty()) << own;
+  }
+}
+
+// Beside a model at the root of a file there is only the world.
+TEST(OddElements, AModelAtTheRootIsRelativeToNothing) {
+  for (const char* frame : {"world", "nowhere"}) {
+    const auto world = load_world_text("<sdf version='1.9'><model name='m'><pose relative_to='" +
+                                           std::string(frame) +
+                                           "'>1 0 0 0 0 0</pose><link name='l'/></model></sdf>",
+                                       "/nowhere/m.sdf");
+    EXPECT_EQ(world->models.back().X_WM.translation.x(), 1.0);
+    if (frame == std::string("world"))
+      EXPECT_THAT(texts(*world), IsEmpty());
+    else
+      EXPECT_THAT(texts(*world), ElementsAre(HasSubstr("is relative to 'nowhere'")));
+  }
+}
+
+TEST(OddElements, AnActorsOwnShapesMove) {
+  const auto world = world_of(
+      "<actor name='cart'><link name='body'><pose>0 0 0.5 0 0 0</pose><collision name='c'><pose>1 "
+      "0 "
+      "0 0 0 0</pose><geometry><box><size>2 1 1</size></box></geometry></collision></link><script>"
+      "<trajectory id='0'><waypoint><time>0</time><pose>0 0 0.2 0 0 0</pose></waypoint><waypoint>"
+      "<time>4</time><pose>4 0 0.2 0 0 0</pose></waypoint></trajectory></script></actor>");
+  ASSERT_EQ(world->models.size(), 1u);
+  const Link& link = world->models[0].model->links[0];
+  ASSERT_EQ(link.collisions.size(), 1u);
+  EXPECT_EQ(link.collisions[0].geometry.shape, Shape::box);
+  EXPECT_EQ(link.collisions[0].X_LC.translation, Vec3(1, 0, 0.5));
+  EXPECT_EQ(world->models[0].X_WM.translation.z(), 0.2);
+  EXPECT_THAT(texts(*world), IsEmpty());
+}
+
 TEST(OddElements, TheRestOfTheWorldStands) {
   const auto world =
       world_of(with_shape("<mesh><uri>x.dae</uri><scale>1 0 0</scale></mesh>") +

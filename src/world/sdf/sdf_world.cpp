@@ -12,6 +12,7 @@
 #include "world/model/environment.h"
 #include "world/model/own_plugins.h"
 #include "world/model/placement.h"
+#include "world/read/reserved_names.h"
 #include "world/sdf/crowd.h"
 #include "world/sdf/sdf_link.h"
 #include "world/sdf/sdf_reader.h"
@@ -261,8 +262,44 @@ void name_plugins_of_actor(const Element& actor, const std::string& where, Findi
 
 }  // namespace
 
+namespace {
+
+bool has_own_shape(const Element& actor) {
+  const auto links = actor.all("link");
+  return !actor.has("skin") && std::any_of(links.begin(), links.end(), [](const Element* link) {
+    return link->has("collision") || link->has("visual");
+  });
+}
+
+// The shapes of an actor's links, as one link.
+Link own_shape(const Element& actor, const std::string& where, ReadContext& context) {
+  Link all;
+  all.name = required_name(*actor.child("link"));
+  all.source = actor.source;
+  all.kinematic = true;
+  all.inertial.mass = 75;
+  for (const Element* written : actor.all("link")) {
+    const Pose X = written->pose("pose");
+    std::vector<SensorDescription> sensors;
+    Link link = read_link(
+        *written, [](const Element& owner) { return owner.pose("pose"); }, where, context,
+        ModelLinkIndex(0), sensors);
+    for (Collision& each : link.collisions) {
+      each.X_LC = X * each.X_LC;
+      all.collisions.push_back(std::move(each));
+    }
+    for (Visual& each : link.visuals) {
+      each.X_LV = X * each.X_LV;
+      all.visuals.push_back(std::move(each));
+    }
+  }
+  return all;
+}
+
+}  // namespace
+
 // An actor becomes a person: a cylinder on the floor that moves along its trajectories, without a
-// skin.
+// skin. One that has no skin, but shapes, is moved as these.
 std::shared_ptr<const Model> SdfReader::actor_model(const Element& actor, Pose& X_WM,
                                                     ReadContext& context) {
   constexpr double kHeight = 1.7, kRadius = 0.25;  // m
@@ -270,8 +307,10 @@ std::shared_ptr<const Model> SdfReader::actor_model(const Element& actor, Pose& 
   model->name = required_name(actor);
   model->source = actor.source;
   const std::string where = "actor " + model->name;
-  context.findings.unsupported(
-      actor.source, where, "actors move as cylinders of 1.7 m; skins and animations are not shown");
+  if (!has_own_shape(actor))
+    context.findings.unsupported(
+        actor.source, where,
+        "actors move as cylinders of 1.7 m; skins and animations are not shown");
   name_plugins_of_actor(actor, where, context.findings);
   X_WM = actor.pose("pose");
   auto path = std::make_shared<Element>();
@@ -290,7 +329,8 @@ std::shared_ptr<const Model> SdfReader::actor_model(const Element& actor, Pose& 
   }
   X_WM.rotation = Quat(Eigen::AngleAxisd(heading(X_WM.rotation), Vec3::UnitZ()));
   if (path->children.size() > 1) model->path = path;
-  model->links.push_back(person_link(kRadius, kHeight, actor.source));
+  model->links.push_back(has_own_shape(actor) ? own_shape(actor, where, context)
+                                              : person_link(kRadius, kHeight, actor.source));
   model->is_static = !model->path;
   return model;
 }
@@ -466,7 +506,7 @@ class SdfReader::WorldReader {
   void read_child(const Element& child) {
     if (child.name == "model") {
       auto model = reader_.read_model(child, version_);
-      place(std::move(model), required_name(child), child);
+      place(std::move(model), name_of_model(child), child);
     } else if (child.name == "include") {
       read_include(child);
     } else if (child.name == "frame") {
@@ -538,7 +578,7 @@ class SdfReader::WorldReader {
     node.scope = scope;
     frames_.add(node);
     placed_.push_back({name, &by, scope});
-    actors_.insert(dotted(name));
+    if (!has_own_shape(actor)) actors_.insert(dotted(name));
   }
 
   void add_model(const Placed& each, const SavedState& saved) {
