@@ -190,6 +190,39 @@ TEST(DrivePlugins, OfEveryKindAreTranslated) {
             Steering::mecanum);
 }
 
+// AgileX's plugin names what it steers by "hinges".
+TEST(DrivePlugins, HingesSteer) {
+  const auto world = world_of(car(
+      "<plugin name='d' filename='libgazebo_ros_ackerman.so'><leftFrontJoint>j_fl</leftFrontJoint>"
+      "<rightFrontJoint>j_fr</rightFrontJoint><leftRearJoint>j_rl</leftRearJoint><rightRearJoint>"
+      "j_rr</rightRearJoint><leftHingeJoint>sl</leftHingeJoint><rightHingeJoint>sr"
+      "</rightHingeJoint><wheelSeparation>0.4</wheelSeparation></plugin>"));
+  const auto& drive = world->models[0].model->drive;
+  ASSERT_TRUE(drive);
+  EXPECT_EQ(drive->steering, Steering::ackermann);
+  EXPECT_EQ(drive->steer_joints.size(), 2u);
+}
+
+// A planar move sets the model's velocity, whatever the wheels that it names do.
+TEST(DrivePlugins, APlanarMoveNeedsNoWheels) {
+  for (const char* z : {"0.1", "0.13"}) {
+    const std::string at = z;
+    const auto world = world_of(
+        "<model name='m'><link name='base'><collision name='c'><pose>0 0 0.1 0 0 0</pose>"
+        "<geometry><box><size>0.4 0.3 0.2</size></box></geometry></collision></link>" +
+        wheel("l", "0 0.2 " + at + " 0 0 0") + wheel("r", "0 -0.2 " + at + " 0 0 0") +
+        "<plugin name='p' filename='libgazebo_ros_planar_move.so'><leftFrontJoint>j_l"
+        "</leftFrontJoint><rightFrontJoint>j_r</rightFrontJoint></plugin></model>");
+    const auto& drive = world->models[0].model->drive;
+    ASSERT_TRUE(drive);
+    EXPECT_EQ(drive->steering, Steering::holonomic);
+    EXPECT_EQ(drive->left_joints.size(), at == "0.1" ? 1u : 0u);
+    EXPECT_THAT(texts(*world), at == "0.1" ? testing::Matcher<std::vector<std::string>>(IsEmpty())
+                                           : testing::SizeIs(2));
+    EXPECT_NEAR(drive->X_MBase.translation.z(), 0.0, 1e-9);
+  }
+}
+
 // A value that is not a number leaves out the drive, not the model.
 TEST(DrivePlugins, WithAnOddNumberLeaveTheModel) {
   for (const char* odd : {"wide", "-0.4"}) {

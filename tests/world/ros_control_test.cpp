@@ -15,6 +15,7 @@ namespace {
 using testing::ElementsAre;
 using testing::HasSubstr;
 using testing::IsEmpty;
+using testing::Not;
 using Steering = DriveDescription::Steering;
 
 // A box on four wheels of radius 0.1 m, 0.6 m apart to the side and 0.5 m along. Wheels' names
@@ -190,6 +191,118 @@ TEST(RosControl, MecanumAndSteeringControllers) {
 
 // As PAL's robots have it: one file names the types, another holds the rest; and the type may stand
 // among the parameters.
+// Rear wheels, and front wheels on knuckles: 0.8 m apart along, 0.6 m across. `more`: of the model.
+std::string car(const std::string& more) {
+  const std::string inertial =
+      "<inertial><mass value='1'/><inertia ixx='0.01' iyy='0.01' izz='0.01' ixy='0' ixz='0' "
+      "iyz='0'/></inertial>";
+  const auto wheel = [&](const std::string& name, const std::string& parent,
+                         const std::string& xyz) {
+    return "<link name='" + name + "_link'>" + inertial +
+           "<collision><origin rpy='1.5707963 0 0'/><geometry><cylinder radius='0.15' "
+           "length='0.06'/></geometry></collision></link><joint name='" +
+           name + "' type='continuous'><parent link='" + parent + "'/><child link='" + name +
+           "_link'/><origin xyz='" + xyz + "'/><axis xyz='0 1 0'/></joint>";
+  };
+  std::string text = "<robot name='car'><link name='base'>" + inertial + "</link>";
+  for (const auto& [side, y] : {std::pair("left", "0.3"), std::pair("right", "-0.3")}) {
+    const std::string name = side, knuckle = name + "_steer";
+    text += wheel("rear_" + name, "base", "0 " + std::string(y) + " 0.15") + "<link name='" +
+            knuckle + "_link'>" + inertial + "</link><joint name='" + knuckle +
+            "' type='revolute'><parent link='base'/><child link='" + knuckle +
+            "_link'/><origin xyz='0.8 " + y +
+            " 0.15'/><axis xyz='0 0 1'/><limit lower='-0.7' upper='0.7' effort='9' "
+            "velocity='9'/></joint>" +
+            wheel("front_" + name, knuckle + "_link", "0 0 0");
+  }
+  return text + more + "</robot>";
+}
+
+// In Humble, the steered joints are the front "wheels"; Jazzy has names of its own.
+TEST(RosControl, TheWheelsOfACarAreLeftAndRight) {
+  for (const char* joints :
+       {"front_steering: true\n    rear_wheels_names: [rear_right, rear_left]\n"
+        "    front_wheels_names: [right_steer, left_steer]\n"
+        "    rear_wheel_track: 0.6\n    rear_wheels_radius: 0.15",
+        "traction_joints_names: [rear_right, rear_left]\n"
+        "    steering_joints_names: [right_steer, left_steer]\n"
+        "    traction_track_width: 0.6\n    traction_wheels_radius: 0.15"}) {
+    TemporaryFolder folder;
+    folder.write("car.yaml",
+                 "controller_manager:\n  ros__parameters:\n    drive:\n      type: "
+                 "ackermann_steering_controller/AckermannSteeringController\ndrive:\n  "
+                 "ros__parameters:\n    wheelbase: 0.8\n    " +
+                     std::string(joints) + "\n");
+    const auto world = load_world(folder.write(
+        "car.urdf", car("<gazebo><plugin filename='gz_ros2_control-system' "
+                        "name='gz_ros2_control::GazeboSimROS2ControlPlugin'><parameters>car.yaml"
+                        "</parameters></plugin></gazebo>")));
+    const DriveDescription& drive = drive_of(*world);
+    EXPECT_EQ(drive.steering, Steering::ackermann);
+    EXPECT_THAT(names(*world, drive.left_joints), ElementsAre("rear_left"));
+    EXPECT_THAT(names(*world, drive.right_joints), ElementsAre("rear_right"));
+    EXPECT_THAT(names(*world, drive.steer_joints), ElementsAre("right_steer", "left_steer"));
+    EXPECT_NEAR(drive.track, 0.6, 1e-9);
+    for (const std::string& text : texts(*world)) EXPECT_THAT(text, Not(HasSubstr("way round")));
+  }
+}
+
+// steer_bot_hardware_gazebo: the controller turns two joints in the middle that carry nothing; a
+// second file names the wheels.
+TEST(RosControl, WheelsBehindTheJointsOfACarsController) {
+  const auto dummy = [](const std::string& name, const std::string& type, const std::string& x,
+                        const std::string& axis) {
+    return "<link name='" + name + "_link'/><joint name='" + name + "' type='" + type +
+           "'><parent link='base'/><child link='" + name + "_link'/><origin xyz='" + x +
+           " 0 0.3'/><axis xyz='" + axis +
+           "'/><limit lower='-0.7' upper='0.7' effort='9' velocity='9'/></joint>";
+  };
+  TemporaryFolder folder;
+  folder.write("bot/package.xml", package("bot"));
+  folder.write("bot/config/controller.yaml",
+               "drive:\n  type: 'ackermann_steering_controller/AckermannSteeringController'\n  "
+               "rear_wheel: 'rear_wheel'\n  front_steer: 'front_steer'\n  wheel_radius: 0.15\n  "
+               "linear: {x: {has_velocity_limits: true, max_velocity: 4.0}}\n");
+  folder.write("bot/config/hardware.yaml",
+               "steer_bot_hardware_gazebo:\n  rear_wheel: 'rear_wheel'\n  front_steer: "
+               "'front_steer'\n  virtual_rear_wheels: ['rear_left', 'rear_right']\n  "
+               "virtual_front_wheels: ['front_left', 'front_right']\n  virtual_front_steers: "
+               "['left_steer', 'right_steer']\n");
+  const auto world = load_world(folder.write(
+      "bot/urdf/car.urdf",
+      car(dummy("rear_wheel", "continuous", "0", "0 1 0") +
+          dummy("front_steer", "revolute", "0.8", "0 0 1") +
+          "<gazebo><plugin name='c' filename='libgazebo_ros_control.so'><robotSimType>"
+          "steer_bot_hardware_gazebo/SteerBotHardwareGazebo</robotSimType></plugin></gazebo>")));
+  const DriveDescription& drive = drive_of(*world);
+  EXPECT_EQ(drive.steering, Steering::ackermann);
+  EXPECT_THAT(names(*world, drive.left_joints), ElementsAre("front_left", "rear_left"));
+  EXPECT_THAT(names(*world, drive.right_joints), ElementsAre("front_right", "rear_right"));
+  EXPECT_THAT(names(*world, drive.steer_joints), ElementsAre("left_steer", "right_steer"));
+  EXPECT_NEAR(drive.wheelbase, 0.8, 1e-9);
+  EXPECT_EQ(drive.max_speed, 4.0);
+}
+
+// Launch files load such files below a name, and put arguments into them.
+TEST(RosControl, AControllerAtTheRootOfItsFileAndArguments) {
+  for (const char* prefix : {"", "robot_"}) {
+    TemporaryFolder folder;
+    folder.write("bot/package.xml", package("bot"));
+    folder.write("bot/config/drive.yaml",
+                 "type: diff_drive_controller/DiffDriveController\n"
+                 "left_wheel: ['$(arg prefix)front_left', '$(arg prefix)rear_left']\n"
+                 "right_wheel: [$(arg prefix)front_right, $(arg prefix)rear_right]\n"
+                 "wheel_separation: 0.6\nwheel_radius: 0.1\n"
+                 "linear: {x: {has_velocity_limits: true, max_velocity: 1.5}}\n");
+    const auto world = load_world(folder.write(
+        "bot/urdf/bot.urdf", four_wheels(transmission(prefix + std::string("front_left")) +
+                                             transmission(prefix + std::string("front_right")),
+                                         prefix)));
+    EXPECT_EQ(drive_of(*world).max_speed, 1.5) << prefix;
+    EXPECT_EQ(drive_of(*world).left_joints.size(), 2u) << prefix;
+  }
+}
+
 TEST(RosControl, SeveralFilesAreReadAsOne) {
   TemporaryFolder folder;
   const std::string plugin =
@@ -528,6 +641,43 @@ TEST(Guess, FourWheelsByNameAndPlace) {
   EXPECT_EQ(drive_of(*world).steering, Steering::differential);
   EXPECT_NEAR(drive_of(*world).track, 0.6, 1e-12);
   EXPECT_NEAR(drive_of(*world).wheel_radius, 0.1, 1e-12);
+}
+
+// A wheel whose mesh is smaller than the one on the other end of its axle stands as well.
+TEST(Guess, AnAxleHasTwoWheels) {
+  std::string text = four_wheels(transmission("a_wheel_front_left"), "a_wheel_");
+  const std::string small =
+      "length='0.05'/></geometry></collision></link><joint "
+      "name='a_wheel_front_left'";
+  const size_t at = text.rfind("radius='0.1'", text.find(small));
+  text.replace(at, 12, "radius='0.06'");
+  const auto world = load_world_text(text, "bot.urdf");
+  EXPECT_EQ(drive_of(*world).left_joints.size(), 2u);
+  EXPECT_EQ(drive_of(*world).right_joints.size(), 2u);
+}
+
+// Powered casters drive in all directions. A round link that hangs in the air is no wheel.
+TEST(Guess, PoweredCastersAndArms) {
+  const std::string arm =
+      "<link name='upper'><inertial><mass value='1'/><inertia ixx='0.01' iyy='0.01' izz='0.01' "
+      "ixy='0' ixz='0' iyz='0'/></inertial><collision><geometry><cylinder radius='0.1' "
+      "length='0.3'/></geometry></collision></link><joint name='roll' type='continuous'><parent "
+      "link='base'/><child link='upper'/><origin xyz='0.3 0.2 0.9'/><axis xyz='1 0 0'/></joint>"
+      "<link name='fore'><inertial><mass value='1'/><inertia ixx='0.01' iyy='0.01' izz='0.01' "
+      "ixy='0' ixz='0' iyz='0'/></inertial><collision><geometry><cylinder radius='0.1' "
+      "length='0.3'/></geometry></collision></link><joint name='fore' type='continuous'><parent "
+      "link='base'/><child link='fore'/><origin xyz='0.3 -0.2 0.9'/><axis xyz='1 0 0'/></joint>";
+  const auto idle = load_world_text(
+      four_wheels(arm + transmission("roll") + transmission("fore"), "caster_wheel_"), "bot.urdf");
+  EXPECT_FALSE(idle->models.back().model->drive);
+  for (const std::string& text : texts(*idle)) EXPECT_THAT(text, Not(HasSubstr("roll")));
+  const auto driven = load_world_text(
+      four_wheels(arm + transmission("caster_wheel_front_left") +
+                      transmission("caster_wheel_front_right") + transmission("roll"),
+                  "caster_wheel_"),
+      "bot.urdf");
+  EXPECT_THAT(names(*driven, drive_of(*driven).left_joints),
+              ElementsAre("caster_wheel_front_left"));
 }
 
 TEST(Guess, MecanumByName) {

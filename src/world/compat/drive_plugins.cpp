@@ -8,6 +8,7 @@
 
 #include "world/compat/plugins.h"
 #include "world/model/drive.h"
+#include "world/model/drive_guess.h"
 
 namespace ruedo::world {
 namespace {
@@ -83,7 +84,8 @@ const Joints kJoints[] = {
       "frontRightJoint", "rightMiddleJoint", "frontRightWheelJoint", "rearRightWheelJoint",
       "right_wheel_joint", "right_wheel_joint_name", "rightWheelJoint", "right_joint_name"}},
     {"ruedo:steer_joint",
-     {"left_steering_joint", "right_steering_joint", "steeringJoint", "steering_joint"}},
+     {"left_steering_joint", "right_steering_joint", "steeringJoint", "steering_joint",
+      "leftHingeJoint", "rightHingeJoint"}},
 };
 
 struct Steered {
@@ -256,6 +258,28 @@ void add_parameters(const Element& plugin, const std::string& where, Findings& f
   }
 }
 
+// A plugin that sets the model's velocity needs no wheels, and may name some that do not carry it.
+bool carries(const Element& named, const Model& model) {
+  constexpr double kStands_m = 5e-3;
+  const auto joint = std::find_if(model.joints.begin(), model.joints.end(), [&](const Joint& each) {
+    return each.name == dotted(named.text);
+  });
+  return joint == model.joints.end() ||
+         lowest_point_below(model, ModelJointIndex(joint - model.joints.begin())) <
+             lowest_point(model) + kStands_m;
+}
+
+void leave_out_lifted_wheels(const Model& model, const std::string& where, Findings& findings,
+                             Element& drive) {
+  std::erase_if(drive.children, [&](const auto& child) {
+    if (!child->name.ends_with("_joint") || carries(*child, model)) return false;
+    findings.repaired(child->source, where,
+                      "the wheel of the joint '" + child->text +
+                          "' does not reach the ground: the drive moves the model without it");
+    return true;
+  });
+}
+
 }  // namespace
 
 std::unique_ptr<Element> drive_from_plugin(const Element& plugin, const Model& model,
@@ -283,6 +307,8 @@ std::unique_ptr<Element> drive_from_plugin(const Element& plugin, const Model& m
         add(*drive, each.ours, joint->text, joint->source);
     }
   }
+  if (steered != std::end(kSteering) && steered->steering == std::string_view("holonomic"))
+    leave_out_lifted_wheels(model, where, findings, *drive);
   if (alike) {
     const bool mecanum = kind.name.find("mecanum") != std::string::npos;
     if (mecanum || drive->has("ruedo:steer_joint"))

@@ -35,10 +35,25 @@ struct Translation {
     child.source = source;
   }
 
+  // "$(arg prefix)wheel" is the joint of that name, or the only one with something before it.
+  std::string named(const std::string& written) const {
+    const std::string joint = without_arguments(written);
+    if (joint.empty() || joint == written) return joint;
+    std::string found;
+    for (const Joint& each : model.joints) {
+      if (each.name == joint) return joint;
+      if (!each.name.ends_with(joint)) continue;
+      if (!found.empty()) return joint;
+      found = each.name;
+    }
+    return found.empty() ? joint : found;
+  }
+
   void joints(const char* ours, std::initializer_list<const char*> theirs) {
     for (const char* name : theirs) {
       const Element* list = parameter(from, {name});
-      for (const std::string& joint : names_in(list)) {
+      for (const std::string& written : names_in(list)) {
+        const std::string joint = named(written);
         const bool known =
             std::any_of(model.joints.begin(), model.joints.end(),
                         [&](const Joint& each) { return each.name == dotted(joint); });
@@ -123,6 +138,9 @@ struct Translation {
 
 using Read = void (*)(Translation&);
 
+// Of steer_bot_hardware_gazebo, which moves a car's wheels with the two joints of its controller.
+constexpr const char* kWheelsOfSteerBot = "virtual_rear_wheels";
+
 void differential(Translation& t) {
   t.joints("ruedo:left_joint", {"left_wheel", "left_wheel_names"});
   t.joints("ruedo:right_joint", {"right_wheel", "right_wheel_names"});
@@ -162,10 +180,15 @@ void omni(Translation& t) {
 }
 
 void car(Translation& t) {
-  t.joints("ruedo:left_joint",
-           {"rear_wheel", "rear_wheels_names", "traction_joints_names", "traction_joint_name"});
-  t.joints("ruedo:steer_joint",
-           {"front_steer", "front_wheels_names", "steering_joints_names", "steering_joint_name"});
+  if (parameter(t.from, {kWheelsOfSteerBot})) {  // the controller's own joints carry nothing
+    t.joints("ruedo:left_joint", {kWheelsOfSteerBot, "virtual_front_wheels"});
+    t.joints("ruedo:steer_joint", {"virtual_front_steers"});
+  } else {
+    t.joints("ruedo:left_joint",
+             {"rear_wheel", "rear_wheels_names", "traction_joints_names", "traction_joint_name"});
+    t.joints("ruedo:steer_joint",
+             {"front_steer", "front_wheels_names", "steering_joints_names", "steering_joint_name"});
+  }
   if (const Element* front = parameter(t.from, {"front_steering"}); front && !is_true(front)) {
     std::erase_if(t.drive.children, [](const auto& child) {
       return child->name == "ruedo:left_joint" || child->name == "ruedo:steer_joint";
@@ -426,6 +449,24 @@ void name_untyped(const std::vector<Controller>& controllers, const std::string&
                                    each.name + "' does nothing" + suggested(each.type));
 }
 
+bool is_steer_bot(const std::vector<const Element*>& plugins) {
+  return std::any_of(plugins.begin(), plugins.end(), [](const Element* each) {
+    return contains(each->string("robotSimType", ""), "steer_bot");
+  });
+}
+
+// Its parameters, which lie in a file of their own.
+void add_steer_bot(const std::vector<std::string>& beside, const std::string& where,
+                   ReadContext& context, std::vector<Controller>& controllers) {
+  for (const auto& file : read_controllers(beside, false, where, context)) {
+    for (const auto& map : file->children) {
+      if (!map->has(kWheelsOfSteerBot)) continue;
+      for (Controller& each : controllers) each.parameters.push_back(map.get());
+      return;
+    }
+  }
+}
+
 }  // namespace
 
 ControllersDrive drive_from_controllers(const Element& model_element,
@@ -439,7 +480,9 @@ ControllersDrive drive_from_controllers(const Element& model_element,
     ControllersDrive result;
     const auto files = read_controllers(paths, is_named, where, context);
     const Report report{where, context.findings, is_named};
-    const std::vector<Controller> controllers = controllers_in(files);
+    std::vector<Controller> controllers = controllers_in(files);
+    if (!controllers.empty() && is_steer_bot(plugins))
+      add_steer_bot(beside, where, context, controllers);
     if (is_named) name_untyped(untyped_in(files, controllers), where, context.findings);
     for (const Controller& each : controllers) {
       if (is_named) name_type(each, where, context.findings);

@@ -81,6 +81,14 @@ bool is_controllers_type(const std::string& type) {
   return type.find("ontroller") != std::string::npos || !mistyped(type).empty();
 }
 
+// A file whose root is the controller: a launch file says under which name.
+void collect_root(const Element& file, std::vector<Controller>& into) {
+  const Element* type = file.child("type");
+  if (type && is_controllers_type(type->text))
+    into.push_back(
+        {fs::path(file.source.file).stem().string(), type->text, {&file}, 1, file.source});
+}
+
 void collect_types(const Element& map, std::vector<Controller>& into) {
   for (const auto& child : map.children) {
     if (into.size() >= kMostControllers) return;
@@ -109,6 +117,8 @@ void collect_parameters(const Element& map, const std::string& name, Controller&
 
 // Whether anything below is a controller, or gains of gazebo_ros_control.
 bool holds_controllers(const Element& map) {
+  const Element* root = map.child("type");
+  if (root && is_controllers_type(root->text)) return true;
   return std::any_of(map.children.begin(), map.children.end(), [](const auto& child) {
     const Element* type = child->child("type");
     return child->name.ends_with("pid_gains") ||
@@ -175,6 +185,15 @@ const Element* parameter(const Controller& controller, std::initializer_list<con
   return nullptr;
 }
 
+std::string without_arguments(std::string text) {
+  for (size_t at; (at = text.find("$(arg ")) != std::string::npos;) {
+    const size_t end = text.find(')', at);
+    if (end == std::string::npos) break;
+    text.erase(at, end + 1 - at);
+  }
+  return text;
+}
+
 std::vector<std::string> names_in(const Element* list) {
   std::vector<std::string> names;
   if (!list) return names;
@@ -226,7 +245,10 @@ std::string unknown_joint(const Controller& controller, const std::string& joint
 
 std::vector<Controller> controllers_in(const std::vector<std::shared_ptr<const Element>>& files) {
   std::vector<Controller> all;
-  for (const auto& file : files) collect_types(*file, all);
+  for (const auto& file : files) {
+    collect_root(*file, all);
+    collect_types(*file, all);
+  }
   for (Controller& each : all) {
     for (const auto& file : files) collect_parameters(*file, each.name, each);
     each.own = each.parameters.size();

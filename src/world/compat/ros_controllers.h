@@ -22,6 +22,9 @@ struct Controller {
 // The type that one is mistyped for, by some letters; "": none. ROS would not load it.
 std::string mistyped(const std::string& type);
 
+// Without "$(arg NAME)": what a launch file would put there is not known, and mostly nothing.
+std::string without_arguments(std::string text);
+
 // The first of these parameters that the controller has; "a.b" may also be nested.
 const Element* parameter(const Controller& controller, std::initializer_list<const char*> names);
 // the texts of a list, or of a single value

@@ -313,9 +313,34 @@ double mecanum_wheelbase(const Element& e, const Model& model, const DriveDescri
   return apart;
 }
 
+// The wheels of a car that is described without sides are left or right by where they are, along
+// the axis of those that are not steered.
+void split_sides(const Model& model, DriveDescription& drive) {
+  if (drive.left_joints.empty() == drive.right_joints.empty()) return;
+  std::vector<ModelJointIndex> wheels = drive.left_joints;
+  wheels.insert(wheels.end(), drive.right_joints.begin(), drive.right_joints.end());
+  const std::vector<ModelJointIndex> fixed = not_steered(model, drive, wheels);
+  if (fixed.size() < 2) return;
+  const Joint& first = model.joints[fixed[0]];
+  Vec3 left = first.X_MJ.rotation * first.axis.axis_in_J;
+  if (left.y() < 0) left = -left;
+  const Vec3 center = middle(model, fixed);
+  const auto aside = [&](ModelJointIndex joint) {
+    return left.dot(model.joints[joint].X_MJ.translation - center);
+  };
+  constexpr double kInTheMiddle_m = 1e-3;
+  const auto is_right = [&](ModelJointIndex joint) { return aside(joint) < -kInTheMiddle_m; };
+  if (std::none_of(fixed.begin(), fixed.end(), is_right)) return;
+  drive.left_joints.clear();
+  drive.right_joints.clear();
+  for (const ModelJointIndex joint : wheels)
+    (is_right(joint) ? drive.right_joints : drive.left_joints).push_back(joint);
+}
+
 // base_link and what follows from it: track, wheelbase, the order of the wheels.
 void place_base(const Element& e, const Model& model, DriveDescription& drive) {
   const Allowed positive = Allowed::positive(quantity::kLength);
+  if (steers(drive)) split_sides(model, drive);
   std::vector<ModelJointIndex> wheels = drive.left_joints;
   wheels.insert(wheels.end(), drive.right_joints.begin(), drive.right_joints.end());
   Stance stance = stance_of(e, model, wheels, drive);

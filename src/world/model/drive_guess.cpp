@@ -21,6 +21,8 @@ std::string lower(std::string text) {
   return text;
 }
 
+constexpr std::initializer_list<const char*> kCasters = {"caster", "castor", "swivel"};
+
 bool has_any(const std::string& name, std::initializer_list<const char*> words) {
   return std::any_of(words.begin(), words.end(),
                      [&](const char* word) { return name.find(word) != std::string::npos; });
@@ -66,7 +68,39 @@ bool is_round(const Model& model, ModelLinkIndex link) {
   return false;
 }
 
-std::vector<Wheel> wheels_of(const Model& model, bool by_name) {
+// Of a link's shapes, in the model.
+double lowest_of(const Link& link) {
+  double lowest = std::numeric_limits<double>::infinity();
+  for (const Collision& each : link.collisions) {
+    const Eigen::AlignedBox3d box = bounds(each.geometry);
+    if (box.isEmpty()) continue;
+    for (int corner = 0; corner < 8; ++corner)
+      lowest = std::min(lowest, (link.X_ML * each.X_LC *
+                                 box.corner(static_cast<Eigen::AlignedBox3d::CornerType>(corner)))
+                                    .z());
+  }
+  return lowest;
+}
+
+// One on the axle of a wheel that stands is a wheel as well, however roughly its mesh is made.
+void keep_standing(std::vector<Wheel>& wheels, double ground) {
+  const auto stands = [&](const Wheel& wheel) { return wheel.lowest <= ground + kGround_m; };
+  const auto on_axle = [](const Wheel& one, const Wheel& other) {
+    return std::abs((one.at - other.at).normalized().dot(one.axis)) > 1.0 - 1e-3;
+  };
+  std::vector<Wheel> kept;
+  for (const Wheel& wheel : wheels) {
+    if (stands(wheel) || std::any_of(wheels.begin(), wheels.end(), [&](const Wheel& other) {
+          return stands(other) && on_axle(wheel, other);
+        }))
+      kept.push_back(wheel);
+  }
+  wheels = std::move(kept);
+}
+
+// by_name: or else those that are round. controlled: joints that are driven whatever their names.
+std::vector<Wheel> wheels_of(const Model& model, bool by_name,
+                             const std::vector<std::string>& controlled = {}) {
   std::vector<Wheel> wheels;
   for (const ModelJointIndex j : model.joints.indices()) {
     const Joint& joint = model.joints[j];
@@ -76,15 +110,18 @@ std::vector<Wheel> wheels_of(const Model& model, bool by_name) {
     wheel.axis = axis_in_model(joint);
     if (std::abs(wheel.axis.z()) > kLevel) continue;
     wheel.name = lower(joint.name + " " + model.links[joint.child].name);
-    if (has_any(wheel.name, {"caster", "castor", "idler", "swivel", "roller", "passive", "laser",
-                             "lidar", "scan", "sonar", "camera", "rotor", "prop"}))
+    const bool is_driven =
+        std::find(controlled.begin(), controlled.end(), joint.name) != controlled.end();
+    if (has_any(wheel.name, {"idler", "roller", "passive", "laser", "lidar", "scan", "sonar",
+                             "camera", "rotor", "prop"}) ||
+        (!is_driven && has_any(wheel.name, kCasters)))
       continue;
     if (by_name ? !has_any(wheel.name, {"wheel", "whl", "tire", "tyre"})
                 : !is_round(model, joint.child))
       continue;
     wheel.steer = steering_above(model, wheel.joint);
-    if (wheel.steer.valid() && unlimited(model.joints[wheel.steer]) &&
-        has_any(lower(model.joints[wheel.steer].name), {"caster", "castor", "swivel"}))
+    if (!is_driven && wheel.steer.valid() && unlimited(model.joints[wheel.steer]) &&
+        has_any(lower(model.joints[wheel.steer].name), kCasters))
       continue;
     wheel.at = joint.X_MJ.translation;
     wheel.lowest = lowest_point_below(model, wheel.joint);
@@ -92,7 +129,8 @@ std::vector<Wheel> wheels_of(const Model& model, bool by_name) {
   }
   double ground = std::numeric_limits<double>::infinity();
   for (const Wheel& wheel : wheels) ground = std::min(ground, wheel.lowest);
-  std::erase_if(wheels, [&](const Wheel& wheel) { return wheel.lowest > ground + kGround_m; });
+  if (!by_name) ground = std::min(ground, lowest_point(model));
+  keep_standing(wheels, ground);
   return wheels;
 }
 
@@ -117,17 +155,13 @@ double lowest_point_below(const Model& model, ModelJointIndex joint) {
     }
   }
   double lowest = top.X_MJ.translation.z();
-  const auto reach = [&](const Pose& X, const Geometry& geometry) {
-    const Eigen::AlignedBox3d box = bounds(geometry);
-    if (box.isEmpty()) return;
-    for (int corner = 0; corner < 8; ++corner)
-      lowest = std::min(lowest,
-                        (X * box.corner(static_cast<Eigen::AlignedBox3d::CornerType>(corner))).z());
-  };
-  for (const ModelLinkIndex index : links) {
-    const Link& link = model.links[index];
-    for (const Collision& each : link.collisions) reach(link.X_ML * each.X_LC, each.geometry);
-  }
+  for (const ModelLinkIndex index : links) lowest = std::min(lowest, lowest_of(model.links[index]));
+  return lowest;
+}
+
+double lowest_point(const Model& model) {
+  double lowest = std::numeric_limits<double>::infinity();
+  for (const Link& link : model.links) lowest = std::min(lowest, lowest_of(link));
   return lowest;
 }
 
@@ -136,6 +170,7 @@ namespace {
 // The candidate wheels; if a controller names some of them, only those.
 std::vector<Wheel> driven_wheels(const Model& model, const std::vector<std::string>& controlled) {
   std::vector<Wheel> wheels = wheels_of(model, true);
+  if (wheels.size() < 2) wheels = wheels_of(model, true, controlled);
   if (wheels.size() < 2) wheels = wheels_of(model, false);
   const auto is_controlled = [&](const Wheel& wheel) {
     return std::any_of(controlled.begin(), controlled.end(), [&](const std::string& name) {

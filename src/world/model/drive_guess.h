@@ -20,7 +20,9 @@ struct GuessedDrive {
 // controlled: joints that a controller may turn; empty: not known.
 GuessedDrive guess_drive(const Model& model, const std::vector<std::string>& controlled);
 
-// Whether a part of the joint's subtree reaches down to height z in the model.
+// The lowest z in the model that a joint and the shapes of its subtree reach, and that of all
+// shapes; infinity: there are none.
 double lowest_point_below(const Model& model, ModelJointIndex joint);
+double lowest_point(const Model& model);
 
 }  // namespace ruedo::world

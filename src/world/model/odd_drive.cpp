@@ -82,7 +82,8 @@ class Look {
   // With them, x would point backwards.
   void swapped() {
     const Element* left = drive_.element->child("ruedo:left_joint");
-    if (!left || !has_side_wheels(drive_.steering)) return;
+    if (!left || !drive_.element->has("ruedo:right_joint") || !has_side_wheels(drive_.steering))
+      return;
     const auto is_it = [&](ModelJointIndex joint) {
       const std::string& name = model_.joints[joint].name;
       return dotted(left->text) == name || dotted(left->text) == model_.name + "." + name;
