@@ -202,7 +202,8 @@ Pose pose_of(const Value& where) {
     if (!(q.norm() > 1e-9)) where.refuse("has no rotation: its quaternion is zero");
     return {q.normalized(), {v[0], v[1], v[2]}};
   }
-  if (v.size() == 5) v.push_back(0.0);  // as in Gazebo; the reader of poses warns
+  if (v.size() == 5 && where.element.name == "pose")
+    v.push_back(0.0);  // as in Gazebo; the reader of poses warns
   if (v.size() != 6)
     where.refuse("has " + std::to_string(v.size()) + " numbers; allowed are x y z roll pitch yaw");
   const double unit = degrees ? M_PI / 180.0 : 1.0;

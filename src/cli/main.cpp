@@ -270,6 +270,7 @@ int main(int argc, char** argv) {
   forget_empty_variables();
   // A write beyond `ulimit -f` then fails as on a full disk. Not SIG_IGN, which children inherit.
   std::signal(SIGXFSZ, [](int) {});
+  std::signal(SIGCHLD, SIG_DFL);  // a parent that ignores it would have our children lost
   set_up_logging();
   std::set_terminate(end_with_error);
   try {

@@ -3,6 +3,7 @@
 
 #include <map>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "ruedo/log_header_t.hpp"
@@ -58,6 +59,9 @@ class Digests {
 void check_files(const log_header_t& header, const std::string& log);
 // The same for the models that came later in the log.
 void check_files_of_spawned(const std::string& log);
+
+// Of a log whose pictures Mesa's environment variables act on: an option for each, NAME=VALUE.
+constexpr std::string_view kMesaOption = "--mesa-environment=";
 
 // What else determines a run's bytes and differs here, a line each: Ruedo's version and sources,
 // the CPU, the C library, other libraries.

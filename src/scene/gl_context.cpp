@@ -88,6 +88,8 @@ std::unique_ptr<GlContext> make_gl_context() {
   require_mesas_threads();
   // Mesa has one for each core, and waits for ever for those that could not be started.
   require_threads_for_cores(kMesasOwnThreads);
+  std::string heeded;
+  for (const std::string& variable : mesas_variables()) heeded += " " + variable;
   const MesasEnvironment environment;
   std::string why_not_osmesa = "not tried", why_not_egl = "not tried";
   if (choice != "egl") {
@@ -98,8 +100,6 @@ std::unique_ptr<GlContext> make_gl_context() {
     if (auto context = make_egl_context(why_not_egl))
       return std::make_unique<ContextOfProcess>(std::move(context));
   }
-  std::string heeded;
-  for (const std::string& variable : mesas_variables()) heeded += " " + variable;
   throw EnvironmentError("no renderer for cameras. OSMesa: " + why_not_osmesa +
                          "; EGL: " + why_not_egl +
                          (heeds_mesas_variables() && !heeded.empty()

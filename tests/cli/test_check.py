@@ -85,7 +85,7 @@ FILES = {
             "error",
             4,
             "m/s",
-            "<horizontal/samples>: '0' is not allowed; allowed is a whole number from 1",
+            "<horizontal/samples>: '0' is not allowed; allowed is a number from 1 to 1000000",
         ),
     ),
     "a sensor whose own element is wrong": (

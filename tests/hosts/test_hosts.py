@@ -10,6 +10,7 @@ import os
 import shutil
 import subprocess
 import sys
+import tempfile
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -61,10 +62,16 @@ def environment(folder):
     }
 
 
-@pytest.mark.parametrize("row", every_row())
-def test_row(row, tmp_path):
-    folder = tmp_path / "host"
-    shutil.copytree(HERE / "files", folder)
+@pytest.fixture
+def folder():
+    """One that other users may enter, too."""
+    with tempfile.TemporaryDirectory(prefix="hosts-") as place:
+        Path(place).chmod(0o755)
+        yield shutil.copytree(HERE / "files", Path(place, "host"))
+
+
+@pytest.mark.parametrize("row", list(every_row()))
+def test_row(row, folder):
     done = subprocess.run(
         ["bash", "-c", f"{BEGIN}\n{row.host or ':'}\n{row.command}"],
         cwd=folder,

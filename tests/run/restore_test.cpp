@@ -322,9 +322,8 @@ TEST_F(RestoreTest, ARefusedRequestCostsNoState) {
 }
 
 TEST_F(RestoreTest, AndSoDoesOneWhoseRunIsLogged) {
-  TemporaryFile log("restored.lcm");
   RunOptions options = paused_server();
-  options.record = log.path();
+  options.record = folder_ + "/restored.lcm";
   start_paused(options);
   step(400);
   saved_ = save("here");

@@ -109,6 +109,7 @@ cv::Mat picture_of_camera(const RenderArguments& arguments, const world::WorldMo
 
 // Colour pictures of the camera that is asked for come raw, in the size that is asked for.
 std::shared_ptr<const world::WorldModel> load(const RenderArguments& arguments) {
+  draw_as_told(arguments.world);
   world::LoadOptions options = load_options(arguments.world);
   if (arguments.camera.empty()) return world::load_world(arguments.world.world, options);
   const size_t slash = arguments.camera.find('/');

@@ -41,7 +41,11 @@ int repeat(const VerifyArguments& arguments, const log_header_t& header) {
   options.simulation.fleet.seed = static_cast<uint64_t>(header.seed);
   options.simulation.fleet.noise = !logged.world.no_noise;
   options.simulation.fleet.disabled = logged.world.disabled;
-  options.result_options = header.options;
+  for (const std::string& option : header.options) {
+    if (!option.starts_with(log::kMesaOption)) options.result_options.push_back(option);
+    if (option != "--mesa-environment") continue;
+    for (std::string& here : mesa_options()) options.result_options.push_back(std::move(here));
+  }
   const engine::ThreadLimit limit(arguments.threads);
   run::Verifier verifier(arguments.log, load(logged.world), std::move(options));
   const bool same_machine = verifier.machine_differences().empty();

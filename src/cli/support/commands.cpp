@@ -15,6 +15,7 @@
 #include "base/option_text.h"
 #include "base/whole.h"
 #include "cli/support/extensions.h"
+#include "log/header.h"
 #include "ruedo/errors.h"
 #include "ruedo/sim_time.h"
 #include "run/pacer.h"
@@ -169,11 +170,21 @@ world::LoadOptions load_options(const WorldArguments& arguments) {
   return options;
 }
 
-std::shared_ptr<const world::WorldModel> load(const WorldArguments& arguments) {
+void draw_as_told(const WorldArguments& arguments) {
   if (arguments.fast_pixels) scene::draw_as_fast_as_it_goes();
   if (arguments.mesa_environment) scene::heed_mesas_variables();
+}
+
+std::shared_ptr<const world::WorldModel> load(const WorldArguments& arguments) {
+  draw_as_told(arguments);
   load_given_plugins();
   return world::load_world(arguments.world, load_options(arguments));
+}
+
+std::vector<std::string> mesa_options() {
+  std::vector<std::string> options = scene::mesas_variables();
+  for (std::string& variable : options) variable.insert(0, log::kMesaOption);
+  return options;
 }
 
 std::vector<std::string> result_options(const WorldArguments& arguments) {
@@ -190,8 +201,7 @@ std::vector<std::string> result_options(const WorldArguments& arguments) {
   if (arguments.fast_pixels) options.push_back("--fast-pixels");
   if (arguments.mesa_environment) {
     options.push_back("--mesa-environment");
-    for (const std::string& variable : scene::mesas_variables())
-      options.push_back("--mesa-environment=" + variable);
+    for (std::string& one : mesa_options()) options.push_back(std::move(one));
   }
   return options;
 }

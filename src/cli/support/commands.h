@@ -50,8 +50,12 @@ void add_world_arguments(CLI::App& command, WorldArguments& arguments);
 // Throws InputError; for wrong usage it names no file.
 world::LoadOptions load_options(const WorldArguments& arguments);
 std::shared_ptr<const world::WorldModel> load(const WorldArguments& arguments);
+// --fast-pixels and --mesa-environment, before any context is made; load() does it, too.
+void draw_as_told(const WorldArguments& arguments);
 // Those of them that change a result, as on the command line: for a log's header.
 std::vector<std::string> result_options(const WorldArguments& arguments);
+// Of a log whose pictures Mesa's variables act on: those that are set here.
+std::vector<std::string> mesa_options();
 
 std::pair<std::string, std::string> parse_remap(const std::string& text);  // CHANNEL=NAME
 // Of one command line: none may be renamed twice.
