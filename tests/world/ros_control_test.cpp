@@ -6,6 +6,7 @@
 #include "temporary_folder.h"
 #include "text_world.h"
 #include "world/load.h"
+#include "world/model/body_layout.h"
 #include "world/read/controller_files.h"
 #include "world/read/yaml.h"
 
@@ -189,8 +190,6 @@ TEST(RosControl, MecanumAndSteeringControllers) {
   EXPECT_NEAR(drive_of(*world).wheelbase, 0.5, 1e-12);
 }
 
-// As PAL's robots have it: one file names the types, another holds the rest; and the type may stand
-// among the parameters.
 // Rear wheels, and front wheels on knuckles: 0.8 m apart along, 0.6 m across. `more`: of the model.
 std::string car(const std::string& more) {
   const std::string inertial =
@@ -244,6 +243,10 @@ TEST(RosControl, TheWheelsOfACarAreLeftAndRight) {
     EXPECT_THAT(names(*world, drive.steer_joints), ElementsAre("right_steer", "left_steer"));
     EXPECT_NEAR(drive.track, 0.6, 1e-9);
     for (const std::string& text : texts(*world)) EXPECT_THAT(text, Not(HasSubstr("way round")));
+    for (const WheelPlacement& wheel : BodyLayout(*world).wheels) {
+      const std::string& name = world->models.back().model->joints[wheel.joint].name;
+      EXPECT_EQ(wheel.left, name.find("left") != std::string::npos) << name;
+    }
   }
 }
 
@@ -303,6 +306,8 @@ TEST(RosControl, AControllerAtTheRootOfItsFileAndArguments) {
   }
 }
 
+// As PAL's robots have it: one file names the types, another holds the rest; and the type may stand
+// among the parameters.
 TEST(RosControl, SeveralFilesAreReadAsOne) {
   TemporaryFolder folder;
   const std::string plugin =

@@ -305,8 +305,8 @@ void add_wheel(BodyLayout& layout, const Model& model, RobotIndex robot, RobotPl
   wheel.robot = robot;
   wheel.joint = j;
   wheel.link = layout.link_of(i, joint.child);
-  wheel.left = side == Side::left;
   wheel.steers = side == Side::steers;
+  wheel.left = wheel.steers ? (X_BaseM * joint.X_MJ.translation).y() > 0.0 : side == Side::left;
   Vec3 axis_M = joint.X_MJ.rotation * joint.axis.axis_in_J;
   const Vec3 left_M = drive.X_MBase.rotation * Vec3::UnitY();
   if (wheel.steers ? axis_M.z() < 0
