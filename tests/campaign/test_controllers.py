@@ -254,6 +254,14 @@ def fastest(log):
 
 def broken(log):
     raise KeyError("x")
+
+
+def wanted(log):
+    assert fastest(log) > 1, "was slow"
+
+
+def asserts(log):
+    assert fastest(log) > 1
 '''
 
 
@@ -277,6 +285,12 @@ def test_own_metrics_and_golden_logs(tmp_path):
     (tmp_path / "c.yaml").write_text(text + "metrics: [{name: b, python: 'metric.py:broken'}]\n")
     row = Campaign(tmp_path / "c.yaml").run(workers=1).done[0][1]
     assert (row["status"], row["what"]) == ("invalid", "metric") and "KeyError" in row["reason"]
+    for name, reason in ("wanted", "was slow"), ("asserts", "metric.py:asserts does not hold"):
+        (tmp_path / "c.yaml").write_text(
+            text + f"metrics: [{{name: b, python: 'metric.py:{name}'}}]\n"
+        )
+        row = Campaign(tmp_path / "c.yaml").run(workers=1).done[0][1]
+        assert (row["status"], row["what"], row["reason"]) == ("failed", "metric", reason)
     ruedo("campaign", "repeat", "c.yaml", "0", "-o", "golden.lcm", folder=tmp_path, code=0)
     (tmp_path / "c.yaml").write_text(
         text + "expect: {golden: golden.lcm, ignore: ['[!p]*', 'p3at/[!p]*', 'ruedo/*']}\n"

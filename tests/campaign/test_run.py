@@ -595,6 +595,7 @@ def test_the_labs_of_a_class_are_marked_in_one_command(tmp_path):
     frame = Campaign(folder / "labs.yaml").results().frame()
     passed = frame[frame.passed].groupby("controller").size()
     assert dict(passed) == {"solution": 6}
+    assert set(frame[~frame.passed].status) <= {"failed", "crashed"}
     reasons = {(row.controller, row.lab): row.reason for row in frame.itertuples()}
     assert len(reasons) == 4 * 6
     for student, lab, text in (

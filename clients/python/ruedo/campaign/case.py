@@ -257,7 +257,7 @@ class Runner:
         outcome: Outcome,
     ) -> None:
         """All metrics of a case together have as long as its run."""
-        said = ""
+        status, said = "invalid", ""
         try:
             left = max(until - time.monotonic(), 1e-3)
             with _time_limit(left), limit_memory(limits["memory_mb"]), forks_end():
@@ -272,10 +272,12 @@ class Runner:
             said = f"{metric['python']}: the metrics took more than {limits['wall']:g} s"
         except MemoryError:
             said = f"{metric['python']} wanted more than {limits['memory_mb']} MB of memory"
+        except AssertionError as error:
+            status, said = "failed", str(error)[:300] or f"{metric['python']} does not hold"
         except BaseException as error:
             said = f"{metric['python']} raised {named(error)}"[:300]
         if said:
-            outcome.fail("invalid", "metric", said)
+            outcome.fail(status, "metric", said)
 
     def _compare_with_golden(self, expect: dict[str, Any], log: str, outcome: Outcome) -> None:
         kept = log + ".kept"
