@@ -43,6 +43,9 @@ if "RUEDO_PROBE_JAVA" in os.environ:
     ]
 
 CLIENT = os.environ.get("RUEDO_CLIENT", "")  # the language that is tested; "": each
+# In these the one alone that this says, where it says one.
+LONG = ("endings_test", "hostile_test", "rivals_test")
+CLIENT_OF_LONG = os.environ.get("RUEDO_CLIENT_OF_LONG_TESTS", "")
 
 
 def chosen(programs: dict[str, list[str]]) -> dict[str, list[str]]:
@@ -168,6 +171,8 @@ def probe(language: str, url: str, *command: str, timeout: float = PATIENCE) -> 
 
 @pytest.fixture(params=list(chosen(PROBES)))
 def language(request: pytest.FixtureRequest) -> str:
+    if request.module.__name__ in LONG and CLIENT_OF_LONG not in ("", request.param):
+        pytest.skip(f"of {CLIENT_OF_LONG} alone; of each language in nightly runs")
     return request.param
 
 
