@@ -24,6 +24,8 @@ needs() {{ "$@" >/dev/null 2>&1 || exit {SKIPPED}; }}
 run="ruedo run box.sdf --lcm memq:// --rate max --duration 0.2 --quiet"
 live="ruedo run box.sdf --lcm memq:// --rate 1 --duration 30 --quiet"
 written() {{ until test -s "$1"; do sleep 0.05; done; }}
+ros2() {{ unshare -n bash -c 'ip link set lo up; ip link add eth9 type dummy; ip addr add 10.9.0.1/24 dev eth9;
+  ip link set eth9 up multicast on; exec "$@"' -- timeout 30 ruedo run box.sdf --lcm memq:// --rate max --duration 0.2 --ros2; }}
 picture() {{ ruedo render box.sdf --camera eye/camera -o "$1"; }}
 """
 

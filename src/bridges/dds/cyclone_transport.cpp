@@ -19,6 +19,7 @@
 
 #include <dds/dds.h>
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 #include <ifaddrs.h>
 #include <net/if.h>
 #include <spdlog/spdlog.h>
@@ -117,6 +118,12 @@ std::string peer_element(std::string_view address) {
   return "<Peer Address=\"" + text + "\"/>";
 }
 
+// Iceoryx, through which Cyclone would share memory, waits a minute for a daemon and then ends the
+// process; and Ruedo's samples have no fixed size, so that nothing would be shared.
+constexpr char kWithoutSharedMemory[] =
+    ",<CycloneDDS><Domain Id=\"any\"><SharedMemory><Enable>false</Enable></SharedMemory></Domain>"
+    "</CycloneDDS>";
+
 // Nodes of this machine only: multicast goes over the loopback interface, which reaches those that
 // listen to multicast on any interface; nodes without multicast, as with ROS's LOCALHOST, are
 // contacted individually. The other interfaces are listed because Cyclone considers a node
@@ -137,6 +144,12 @@ std::string local_interfaces() {
   }
   freeifaddrs(list);
   return text;
+}
+
+// Ports are 16 bits wide: high domains have fewer of them.
+uint32_t last_participant(uint32_t domain) {
+  constexpr uint32_t kLastPort = 65535, kFirst = 7411, kOfDomain = 250, kMost = 119;
+  return std::min(kMost, (kLastPort - kFirst - kOfDomain * domain) / 2);
 }
 
 std::string configuration(const CycloneOptions& options) {
@@ -169,10 +182,11 @@ std::string configuration(const CycloneOptions& options) {
   return "<CycloneDDS><Domain Id=\"any\"><General>" + general +
          "<MaxMessageSize>65500B</MaxMessageSize><FragmentSize>60000B</FragmentSize></General>"
          "<Discovery>" +
-         (peers.empty() ? ""
-                        : "<ParticipantIndex>auto</ParticipantIndex><MaxAutoParticipantIndex>119</"
-                          "MaxAutoParticipantIndex><Peers>" +
-                              peers + "</Peers>") +
+         (peers.empty()
+              ? ""
+              : fmt::format("<ParticipantIndex>auto</ParticipantIndex><MaxAutoParticipantIndex>{}"
+                            "</MaxAutoParticipantIndex><Peers>{}</Peers>",
+                            last_participant(options.domain), peers)) +
          "</Discovery><Internal><SocketReceiveBufferSize "
          "max=\"8MiB\"/><MaxSampleSize>1GiB</MaxSampleSize>"
          "<DefragUnreliableMaxSamples>4</DefragUnreliableMaxSamples>"
@@ -182,8 +196,59 @@ std::string configuration(const CycloneOptions& options) {
          std::string(kLinger) +
          "</WriterLingerDuration><Watermarks><WhcHigh>1GB</"
          "WhcHigh></Watermarks></Internal>"
-         "<Tracing><Verbosity>none</Verbosity></Tracing></Domain></CycloneDDS>";
+         "<Tracing><Verbosity>none</Verbosity></Tracing></Domain></CycloneDDS>" +
+         options.more + kWithoutSharedMemory;
 }
+
+void tell(void*, const dds_log_data_t* data);
+
+// What Cyclone says while it starts: why it does not, or else warnings.
+class StartLog {
+ public:
+  // own_interfaces: Ruedo lists them, most of them without multicast, of which Cyclone warns.
+  explicit StartLog(bool own_interfaces) : own_interfaces_(own_interfaces) {
+    const std::lock_guard lock(mutex_);
+    current_ = this;
+    dds_set_log_sink(tell, nullptr);
+  }
+  ~StartLog() {
+    const std::lock_guard lock(mutex_);
+    current_ = nullptr;
+  }
+  // Whether Cyclone is starting, and the line is kept.
+  static bool takes(std::string_view line) {
+    const std::lock_guard lock(mutex_);
+    if (!current_) return false;
+    if (current_->own_interfaces_ && line.find("is not multicast-capable") != line.npos)
+      return true;
+    std::vector<std::string>& lines = current_->lines_;
+    if (lines.size() < kMost && std::find(lines.begin(), lines.end(), line) == lines.end())
+      lines.emplace_back(line);
+    return true;
+  }
+  // Not while Cyclone's threads still tell.
+  std::vector<std::string> lines() const {
+    const std::lock_guard lock(mutex_);
+    return lines_;
+  }
+  dds_entity_t checked(dds_entity_t result, const std::string& what) const {
+    if (result >= 0) return result;
+    const std::vector<std::string> why = lines();
+    throw EnvironmentError(fmt::format(
+        "ROS 2: {}: {}{}", what,
+        why.empty() ? std::string(dds_strretcode(-result)) : fmt::format("{}", fmt::join(why, "; ")),
+        std::getenv("CYCLONEDDS_URI") ? " (CYCLONEDDS_URI is set)" : ""));
+  }
+
+ private:
+  static constexpr size_t kMost = 10;
+  static inline std::mutex mutex_;
+  static inline StartLog* current_ = nullptr;
+  const bool own_interfaces_;
+  std::vector<std::string> lines_;
+};
+
+void warn(std::string_view line) { spdlog::warn("ROS 2: Cyclone DDS: {}", line); }
 
 // Cyclone's own warnings, of which strangers can cause any number: at most one a second. Refused
 // samples are counted elsewhere.
@@ -192,6 +257,7 @@ void tell(void*, const dds_log_data_t* data) {
   static std::atomic<int64_t> next_ns{0};
   const std::string_view text(data->message, data->size);
   if (text.find("deserialization") != text.npos) return;
+  if (StartLog::takes(text.substr(0, text.find_last_not_of('\n') + 1))) return;
   const int64_t now = std::chrono::steady_clock::now().time_since_epoch().count();
   int64_t next = next_ns;
   if (now < next || !next_ns.compare_exchange_strong(next, now + kPeriod_ns)) return;
@@ -201,7 +267,7 @@ void tell(void*, const dds_log_data_t* data) {
         "ROS 2: left out, for it has more than {} MB or fragments of less than {} bytes: {}",
         kLargestIncoming >> 20, kSmallestFragment, line.substr(std::min(sample, line.size())));
   else
-    spdlog::warn("ROS 2: Cyclone DDS: {}", line);
+    warn(line);
 }
 
 // What ROS calls the policy for which a reader and a writer do not meet.
@@ -462,19 +528,19 @@ class CycloneTransport : public ros2::Transport {
  public:
   explicit CycloneTransport(const CycloneOptions& options) : options_(options) {
     require_threads(kCyclonesThreads);  // without one of them it aborts
-    dds_set_log_sink(tell, nullptr);
-    domain_ =
-        checked(dds_create_domain(options.domain, (configuration(options) + options.more).c_str()),
-                fmt::format("domain {}", options.domain));
+    std::optional<StartLog> log(
+        std::in_place, options.range == Range::localhost || options.range == Range::off);
+    domain_ = log->checked(dds_create_domain(options.domain, configuration(options).c_str()),
+                           fmt::format("domain {} cannot be joined", options.domain));
     QosPointer qos(dds_create_qos());
     constexpr char kEnclave[] = "enclave=/;";
     dds_qset_userdata(qos.get(), kEnclave, sizeof kEnclave - 1);
     participant_ = dds_create_participant(options.domain, qos.get(), nullptr);
-    if (participant_ < 0) {
-      dds_delete(domain_);
-      throw EnvironmentError(fmt::format("ROS 2: no participant in domain {}: {}", options.domain,
-                                         dds_strretcode(-participant_)));
-    }
+    if (participant_ < 0) dds_delete(domain_);
+    log->checked(participant_, fmt::format("no participant in domain {}", options.domain));
+    const std::vector<std::string> warnings = log->lines();
+    log.reset();
+    for (const std::string& line : warnings) warn(line);
     receiver_.emplace(participant_);
   }
   ~CycloneTransport() override {
@@ -536,10 +602,12 @@ CycloneOptions options_from_environment() {
                              "'; OFF, LOCALHOST, SUBNET and SYSTEM_DEFAULT are allowed");
   }
   options.range = known->second;
+  const bool on_this_host_alone = environment("ROS_LOCALHOST_ONLY") == "1";  // wins in each release
+  if (on_this_host_alone) options.range = Range::localhost;
   // As with any program over Cyclone DDS: what it says goes before what Ruedo says.
   if (const std::string more = environment("CYCLONEDDS_URI"); !more.empty())
     options.more = "," + more;
-  if (options.range != Range::system_default && options.range != Range::off)
+  if (options.range != Range::system_default && options.range != Range::off && !on_this_host_alone)
     options.static_peers = environment("ROS_STATIC_PEERS");
   return options;
 }

@@ -19,7 +19,8 @@ struct CycloneOptions {
   std::string more;          // additional Cyclone configuration: "" or "," and a URI or XML
 };
 
-// From ROS_DOMAIN_ID, ROS_AUTOMATIC_DISCOVERY_RANGE, ROS_STATIC_PEERS and CYCLONEDDS_URI. Throws
+// From ROS_DOMAIN_ID, ROS_AUTOMATIC_DISCOVERY_RANGE, ROS_LOCALHOST_ONLY, ROS_STATIC_PEERS and
+// CYCLONEDDS_URI. Throws
 // InputError.
 CycloneOptions options_from_environment();
 

@@ -63,7 +63,13 @@ constexpr auto kPatience = std::chrono::seconds(1);
 ros2::Distro distro_of(const Ros2Arguments& arguments) {
   if (!arguments.distro.empty()) return ros2::parse_distro(arguments.distro);
   const char* named = std::getenv("ROS_DISTRO");
-  return named && *named ? ros2::parse_distro(named) : ros2::Distro::jazzy;
+  if (!named || !*named) return ros2::Distro::jazzy;
+  try {
+    return ros2::parse_distro(named);
+  } catch (const InputError& error) {
+    throw InputError({}, std::string("ROS_DISTRO: ") + error.what() +
+                             "; name a release whose messages are the same, as in --ros2 jazzy");
+  }
 }
 
 std::vector<std::string> joints_of(const world::WorldModel& world, const std::string& robot) {
@@ -171,6 +177,11 @@ class CycloneNode : public Ros2Node {
 std::unique_ptr<Ros2Network> Ros2Network::open(const Ros2Arguments& arguments) {
   if (!arguments.on) return nullptr;
   distro_of(arguments);  // before a network is asked
+  const char* middleware = std::getenv("RMW_IMPLEMENTATION");
+  if (middleware && std::string_view(middleware) == "rmw_zenoh_cpp")
+    spdlog::warn(
+        "ROS 2: RMW_IMPLEMENTATION is rmw_zenoh_cpp; nodes with it do not hear this run, which "
+        "speaks DDS: start them with RMW_IMPLEMENTATION=rmw_cyclonedds_cpp or rmw_fastrtps_cpp");
   return std::make_unique<CycloneNetwork>();
 }
 
