@@ -234,10 +234,11 @@ class StartLog {
   dds_entity_t checked(dds_entity_t result, const std::string& what) const {
     if (result >= 0) return result;
     const std::vector<std::string> why = lines();
-    throw EnvironmentError(fmt::format(
-        "ROS 2: {}: {}{}", what,
-        why.empty() ? std::string(dds_strretcode(-result)) : fmt::format("{}", fmt::join(why, "; ")),
-        std::getenv("CYCLONEDDS_URI") ? " (CYCLONEDDS_URI is set)" : ""));
+    throw EnvironmentError(
+        fmt::format("ROS 2: {}: {}{}", what,
+                    why.empty() ? std::string(dds_strretcode(-result))
+                                : fmt::format("{}", fmt::join(why, "; ")),
+                    std::getenv("CYCLONEDDS_URI") ? " (CYCLONEDDS_URI is set)" : ""));
   }
 
  private:
@@ -528,8 +529,8 @@ class CycloneTransport : public ros2::Transport {
  public:
   explicit CycloneTransport(const CycloneOptions& options) : options_(options) {
     require_threads(kCyclonesThreads);  // without one of them it aborts
-    std::optional<StartLog> log(
-        std::in_place, options.range == Range::localhost || options.range == Range::off);
+    std::optional<StartLog> log(std::in_place,
+                                options.range == Range::localhost || options.range == Range::off);
     domain_ = log->checked(dds_create_domain(options.domain, configuration(options).c_str()),
                            fmt::format("domain {} cannot be joined", options.domain));
     QosPointer qos(dds_create_qos());
