@@ -7,6 +7,8 @@
 
 #include <fmt/format.h>
 
+#include "base/utf8.h"
+
 namespace ruedo {
 
 // Values and names in the order of the calls; commas and quotes are seen to here.
@@ -58,7 +60,7 @@ class JsonWriter {
   }
   void quote(std::string_view text) {
     text_ += '"';
-    for (const char c : text) {
+    for (const char c : printable(text)) {
       if (c == '"' || c == '\\') {
         text_ += '\\';
         text_ += c;

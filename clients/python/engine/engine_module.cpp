@@ -20,6 +20,7 @@
 #include <spdlog/spdlog.h>
 
 #include "arrivals.h"
+#include "base/utf8.h"
 #include "base/version.h"
 #include "engine/engine.h"
 #include "log/header.h"
@@ -101,12 +102,13 @@ struct Saved {
 
 class PyEngine {
  public:
-  PyEngine(const std::string& world, const std::optional<std::string>& text, int worlds,
-           uint64_t seed, bool noise, int threads, const std::vector<std::string>& spawns,
+  PyEngine(const nb::bytes& path, const std::optional<std::string>& text, int worlds, uint64_t seed,
+           bool noise, int threads, const std::vector<std::string>& spawns,
            const std::vector<std::string>& drives, const std::vector<std::string>& settings,
            const std::vector<std::string>& disabled, const std::vector<std::string>& faults,
            const std::vector<std::string>& draws, const std::vector<std::string>& plugins,
            bool record, bool allow_errors) {
+    const std::string world(path.c_str(), path.size());
     for (const std::string& one : plugins) ruedo::load_plugin(one);
     ruedo::world::LoadOptions options;
     for (const std::string& one : spawns) options.spawns.push_back(ruedo::world::parse_spawn(one));
@@ -257,7 +259,11 @@ class PyEngine {
     return verdict;
   }
 
-  std::vector<std::string> files_read() const { return world_->files_read; }
+  std::vector<nb::bytes> files_read() const {
+    std::vector<nb::bytes> paths;
+    for (const std::string& path : world_->files_read) paths.emplace_back(path.data(), path.size());
+    return paths;
+  }
 
   nb::object touching() const { return view_of(engine().touching()); }
 
@@ -283,7 +289,11 @@ class PyEngine {
     return list;
   }
 
-  const std::vector<std::string>& findings() const { return findings_; }
+  std::vector<std::string> findings() const {
+    std::vector<std::string> texts;
+    for (const std::string& text : findings_) texts.push_back(ruedo::printable(text));
+    return texts;
+  }
 
  private:
   // Other Python threads run, and may not use this engine meanwhile.
@@ -352,6 +362,21 @@ class PyEngine {
   std::vector<Recorded> recorded_;
 };
 
+// Raised in Python with its text; paths in it need not be UTF-8.
+template <class Error>
+void add_exception(nb::module_& module, const char* name, PyObject* base) {
+  const nb::exception<Error> type(module, name, base);
+  nb::register_exception_translator(
+      [](const std::exception_ptr& error, void* raised) {
+        try {
+          std::rethrow_exception(error);
+        } catch (const Error& told) {
+          PyErr_SetString(static_cast<PyObject*>(raised), ruedo::printable(told.what()).c_str());
+        }
+      },
+      type.ptr());
+}
+
 }  // namespace
 
 NB_MODULE(_engine, module) {
@@ -360,15 +385,15 @@ NB_MODULE(_engine, module) {
   spdlog::set_pattern("ruedo: %l: %v");
   module.attr("version") = ruedo::version();
   module.attr("build") = ruedo::log::own_version();
-  nb::exception<ruedo::InputError>(module, "InputError", PyExc_ValueError);
-  nb::exception<ruedo::EnvironmentError>(module, "EnvironmentError", PyExc_OSError);
+  add_exception<ruedo::InputError>(module, "InputError", PyExc_ValueError);
+  add_exception<ruedo::EnvironmentError>(module, "EnvironmentError", PyExc_OSError);
   // Python's own are the C library's, whose last bit differs from one system to the next.
   module.def("sin", &ruedo::math::sin);
   module.def("cos", &ruedo::math::cos);
   add_arrivals(module);
   nb::class_<Saved>(module, "Saved");
   nb::class_<PyEngine>(module, "Engine")
-      .def(nb::init<const std::string&, const std::optional<std::string>&, int, uint64_t, bool, int,
+      .def(nb::init<const nb::bytes&, const std::optional<std::string>&, int, uint64_t, bool, int,
                     const std::vector<std::string>&, const std::vector<std::string>&,
                     const std::vector<std::string>&, const std::vector<std::string>&,
                     const std::vector<std::string>&, const std::vector<std::string>&,

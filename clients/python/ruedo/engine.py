@@ -32,6 +32,7 @@ from .arguments import (
     switch,
     texts,
     whole,
+    word,
 )
 from .arguments import text as checked_text
 
@@ -121,7 +122,7 @@ class Engine:
     ) -> None:
         if not isinstance(world, (str, os.PathLike)):
             raise TypeError(f"world is a file or the name of a world, not {shown(world)}")
-        if not checked_text("world", os.fspath(world)):
+        if not word("world", world):
             raise ValueError("world is '': it is a file or the name of a world")
         if not isinstance(text, (str, type(None))):
             raise TypeError(f"text is a world's SDF as text, not {shown(text)}")
@@ -134,7 +135,7 @@ class Engine:
         settings = named("set", set, '{"p3at/lrf.update_rate": 10}')
         draws = named("randomize", randomize, '{"p3at.x": "uniform(-2, 2)"}')
         self._core = _engine.Engine(
-            os.fspath(world),
+            os.fsencode(world),
             text=text,
             worlds=worlds,
             seed=seed,
@@ -185,7 +186,7 @@ class Engine:
     @property
     def files_read(self) -> list[str]:
         """The files that the world was read from, in the order of reading."""
-        return list(self._core.files_read())
+        return [os.fsdecode(path) for path in self._core.files_read()]
 
     def begin_run(
         self,

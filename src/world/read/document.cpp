@@ -108,8 +108,11 @@ struct Converter {
     element->name = checked(xml.Name(), xml.GetLineNum());
     element->source = {file, xml.GetLineNum()};
     for (auto* a = xml.FirstAttribute(); a; a = a->Next()) {
-      element->attributes.emplace_back(checked(a->Name(), a->GetLineNum()),
-                                       checked(a->Value(), a->GetLineNum()));
+      std::string name = checked(a->Name(), a->GetLineNum());
+      // Paths, which xacro makes from that of its file, need not be UTF-8.
+      const bool is_path = name == "filename" || name == "ruedo_at";
+      element->attributes.emplace_back(std::move(name),
+                                       is_path ? a->Value() : checked(a->Value(), a->GetLineNum()));
     }
     std::string text;
     for (auto* node = xml.FirstChild(); node; node = node->NextSibling()) {
