@@ -1,15 +1,22 @@
-"""CPU time of a stack, an arm and a floor of triangles, in the process, at a step of 5 ms."""
+"""CPU time of piles, an arm and a floor of triangles, in the process, at a step of 5 ms.
+
+As a program: of piles drawn from seeds, beside MuJoCo and PyBullet, and their distribution
+(in build/physics-venv, with PYTHONPATH=build/release/python).
+"""
 
 from __future__ import annotations
 
+import argparse
+import statistics
 import tempfile
 import time
 from pathlib import Path
 
+import piles
 import rows
 import ruedo
 from scenes import PLANE, Body, Scene, Shape
-from simulators import Simulator, sdf, with_friction
+from simulators import Simulator, available, sdf, with_friction
 
 STEP_S, SECONDS, REPEATS = (
     0.005,
@@ -70,17 +77,17 @@ def falling() -> Scene:
     )
 
 
-def cost(make, scene: Scene, rate: float | None) -> float:
+def cost(make, scene: Scene, rate: float | None = None, step_s: float = STEP_S) -> float:
     """ms of CPU time for a second of sim time: the least of several runs from the same
     start. rate: of all joints, rad/s.
     """
     best = float("inf")
     for _ in range(REPEATS):
-        with make(scene, STEP_S) as sim:
+        with make(scene, step_s) as sim:
             if rate is not None:
                 sim.hold(rows.JOINTS, "velocity", rate)
             began = time.process_time()
-            sim.step(round(SECONDS / STEP_S))
+            sim.step(round(SECONDS / step_s))
             best = min(best, time.process_time() - began)
     return 1e3 * best / SECONDS
 
@@ -97,6 +104,7 @@ def table(peers: list[type[Simulator]]) -> str:
         ("arm of six joints that holds 5 kg", Scene(urdf=rows.arm(), commands=True), 0.0),
         ("the same arm, each joint at 0.1 rad/s", Scene(urdf=rows.arm(), commands=True), 0.1),
         ("20 things that fall on triangles of 8 cm", falling(), None),
+        *((title, make(), None) for title, make in piles.SCENES.items()),
     )
     makers = [InProcess, *peers]
     lines = [
@@ -110,3 +118,20 @@ def table(peers: list[type[Simulator]]) -> str:
         ratio = f" {costs[0] / min(costs[1:]):.2f} |" if peers else ""
         lines.append(f"| {title} | " + " | ".join(f"{c:.1f}" for c in costs) + " |" + ratio)
     return "\n".join(lines) + "\n"
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--seeds", nargs=2, type=int, default=(0, 100), metavar=("FIRST", "END"))
+    peers = available(True)[1:]
+    ratios = []
+    for seed in range(*parser.parse_args().seeds):
+        scene, step_s = piles.drawn(seed)
+        costs = [cost(make, scene, None, step_s) for make in (InProcess, *peers)]
+        ratios.append(costs[0] / min(costs[1:], default=costs[0]))
+        print(seed, len(scene.free), f"{1e3 * step_s:g} ms", *(f"{c:.1f}" for c in costs))
+    print(f"of the faster peer: median {statistics.median(ratios):.2f}, most {max(ratios):.2f}")
+
+
+if __name__ == "__main__":
+    main()
