@@ -57,6 +57,10 @@ std::string world_file(const std::string& name) {
         known.insert(entry.path().stem().string());
     }
   }
+  if (searched.empty())
+    throw InputError({name, 0},
+                     "no such file, and no world of that name: Ruedo's own worlds lie neither "
+                     "beside this program nor where it was built");
   throw InputError({name, 0}, "no such file, and no world of that name; there are " +
                                   joined({known.begin(), known.end()}) + " (searched in " +
                                   joined(searched) + ")");

@@ -147,6 +147,9 @@ std::string workspace_of(const std::string& file) {
 std::string shipped_worlds() {
   const std::string installed = find_installed("share/ruedo/worlds");
   if (is_folder(installed)) return full_path(installed);
+  // A build within its source tree, which may be a copy, and one elsewhere.
+  if (const std::string beside = find_installed("worlds/arena.sdf"); !beside.empty())
+    return full_path(fs::path(beside).parent_path().string());
   return is_folder(RUEDO_WORLDS_DIR) ? full_path(RUEDO_WORLDS_DIR) : "";
 }
 

@@ -26,8 +26,10 @@ ProcessLimits limits() {
 }
 
 std::string script() {
-  const std::string installed = find_installed("share/ruedo/xacro/expand.py");
-  return installed.empty() ? RUEDO_XACRO_DIR "/expand.py" : installed;
+  for (const char* path : {"share/ruedo/xacro/expand.py", "src/world/urdf/xacro/expand.py"}) {
+    if (std::string found = find_installed(path); !found.empty()) return found;
+  }
+  return RUEDO_XACRO_DIR "/expand.py";  // of a build outside of its source tree
 }
 
 // "FILE:LINE", added to each element by expand.py.
@@ -49,6 +51,7 @@ void take_lines(Element& element, const Source& above) {
 // Ruedo's own if it exists, since it has the package.
 std::string xacro_python() {
   if (const char* chosen = std::getenv("RUEDO_PYTHON")) return chosen;
+  if (std::string own = find_installed(".venv/bin/python"); !own.empty()) return own;
   std::error_code error;
   return fs::exists(RUEDO_PYTHON, error) ? RUEDO_PYTHON : "python3";
 }
