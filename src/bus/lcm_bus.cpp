@@ -98,7 +98,21 @@ void LcmBus::publish(const std::string& channel, const uint8_t* data, size_t siz
   const auto stream = this->stream();
   const bool sent = stream ? stream->publish(channel, data, size)
                            : out_->publish(channel, data, static_cast<unsigned>(size)) == 0;
+  if (!stream) tell_of_network(sent ? 0 : errno);
   if (!sent) ++failed_;
+}
+
+// Once when it goes, and once when it is back.
+void LcmBus::tell_of_network(int error) {
+  if (error == 0 && cut_off_ && cut_off_.exchange(false))
+    spdlog::warn("the network is back: messages are sent on {} again", url_.str());
+  const bool is_networks = error == ENETUNREACH || error == ENETDOWN || error == EHOSTUNREACH ||
+                           error == ENODEV || error == EADDRNOTAVAIL;
+  if (is_networks && !cut_off_.exchange(true))
+    spdlog::warn(
+        "{}: {}: nobody gets a message until its network is back (the interface up, with a route "
+        "for multicast)",
+        url_.str(), std::strerror(error));
 }
 
 void LcmBus::listen(const std::vector<std::string>& channels, Handler handler,

@@ -55,6 +55,7 @@ class LcmBus : public Bus {
   const LcmUrl& url() const { return url_; }
 
  private:
+  void tell_of_network(int error);
   void know(const std::vector<std::string>& channels);
   void open();
   void ignore_own();
@@ -90,6 +91,7 @@ class LcmBus : public Bus {
   std::vector<std::string> wanted_;  // channels
   std::thread thread_;
   std::atomic<uint64_t> failed_{0};
+  std::atomic<bool> cut_off_{false};  // there is no network to send on
 };
 
 // Regular expressions that match the names: digits become runs of digits, so that a thousand robots

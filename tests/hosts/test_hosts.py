@@ -26,6 +26,10 @@ live="ruedo run box.sdf --lcm memq:// --rate 1 --duration 30 --quiet"
 written() {{ until test -s "$1"; do sleep 0.05; done; }}
 ros2() {{ unshare -n bash -c 'ip link set lo up; ip link add eth9 type dummy; ip addr add 10.9.0.1/24 dev eth9;
   ip link set eth9 up multicast on; exec "$@"' -- timeout 30 ruedo run box.sdf --lcm memq:// --rate max --duration 0.2 --ros2; }}
+cut_off() {{ unshare -n bash -c 'ip link set lo up; ip link add v0 type veth peer name v1; ip addr add 10.9.0.1/24 dev v0
+  ip link set v0 up; ip link set v1 up; ip route add 224.0.0.0/4 dev v0
+  (sleep 1; eval "$1"; sleep 1; eval "$2") &
+  exec ruedo run box.sdf --lcm "udpm://239.255.76.67:7667?ttl=1" --rate 1 --duration 4 --quiet' -- "$@" 2>&1; }}
 picture() {{ ruedo render box.sdf --camera eye/camera -o "$1"; }}
 """
 
