@@ -126,7 +126,9 @@ Reply Session::exchange(int32_t kind, int64_t session, int64_t sequence,
       throw Timeout("no reply to " + kind_name(kind) + " on ruedo/reply within " +
                     text_of(timeout) + " s");
     }
+    lock.unlock();  // it may take long, and the receiving thread goes on meanwhile
     publish(kind, session, sequence, body);
+    lock.lock();
     news_.wait_for(lock, kRepeatTime, [this] { return reply_.has_value(); });
     core_.check_open();
     if (!reply_) core_.check_server();  // else the run may have ended since

@@ -208,14 +208,14 @@ final class Session {
             awaitedKind = kind;
             awaitedSequence = number;
             reply = null;
-            while (reply == null) {
+        }
+        try {
+            while (true) {
                 if (sim.info().head.run_id != runId) {
-                    awaitedKind = 0;
                     throw new RuedoException.RequestError(
                             name(kind) + ": another run has begun meanwhile", reply_t.WRONG_RUN);
                 }
                 if (deadline.passed()) {
-                    awaitedKind = 0;
                     throw new RuedoException.Timeout(
                             "no reply to "
                                     + name(kind)
@@ -223,13 +223,21 @@ final class Session {
                                     + Deadline.text(timeout)
                                     + " s");
                 }
+                // Not under the lock: it may take long, and the receiving thread goes on meanwhile.
                 publish(kind, toSession, number, body);
-                deadline.waitOn(news, REPEAT_MILLIS);
+                reply_t answer;
+                synchronized (news) {
+                    if (reply == null) deadline.waitOn(news, REPEAT_MILLIS);
+                    answer = reply;
+                }
                 sim.checkOpen();
-                if (reply == null) sim.checkServer(); // else the run may have ended since
+                if (answer != null) return answer;
+                sim.checkServer(); // the run may have ended since
             }
-            awaitedKind = 0;
-            return reply;
+        } finally {
+            synchronized (news) {
+                awaitedKind = 0;
+            }
         }
     }
 
