@@ -44,7 +44,7 @@ if "RUEDO_PROBE_JAVA" in os.environ:
 
 CLIENT = os.environ.get("RUEDO_CLIENT", "")  # the language that is tested; "": each
 # In these the one alone that this says, where it says one.
-LONG = ("endings_test", "hostile_test", "rivals_test")
+LONG = ("behind_test", "endings_test", "hostile_test", "rivals_test")
 CLIENT_OF_LONG = os.environ.get("RUEDO_CLIENT_OF_LONG_TESTS", "")
 
 
