@@ -33,8 +33,8 @@ def test_a_run_does_not_leave_its_launcher_behind(language, rate, load):
     count, gap, dropped = said.numbers("seen")
     assert count >= 19 and gap < 0.1051 and dropped == 0
     assert all(float(turned) < 1e-9 for turned in said.all("after"))
-    # 0.17 m until the next scan and to brake, and 0.4 m for each second in which the program gets no
-    # processor: beside a load, at most the half second for which a run at the highest rate goes on.
+    # 0.17 m until the next scan and to brake, and 0.4 m for each second without a processor: beside
+    # a load, at most the half second for which a run at the highest rate goes on.
     assert (0.42 if load else 0.55) < said.numbers("stands")[0] < 0.72
 
 
