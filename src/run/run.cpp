@@ -313,7 +313,8 @@ std::string Run::why_idle() {
     const std::lock_guard lock(simulation_mutex_);
     who = mode().waits_for(publisher_.step());
   }
-  if (who.empty() && waits_for_launcher())
+  const bool starts = publisher_.step() < 0;  // as its program does, which may take seconds
+  if (who.empty() && !starts && waits_for_launcher())
     who = "its program, which has not come this far: is it stopped, or is a callback slow?";
   std::string why = who.empty() ? simulation_->at_work() : "it waits for " + who;
   if (why.empty()) return "";

@@ -529,18 +529,18 @@ class CycloneTransport : public ros2::Transport {
  public:
   explicit CycloneTransport(const CycloneOptions& options) : options_(options) {
     require_threads(kCyclonesThreads);  // without one of them it aborts
-    std::optional<StartLog> log(std::in_place,
-                                options.range == Range::localhost || options.range == Range::off);
-    domain_ = log->checked(dds_create_domain(options.domain, configuration(options).c_str()),
-                           fmt::format("domain {} cannot be joined", options.domain));
+    std::optional<StartLog> start(std::in_place,
+                                  options.range == Range::localhost || options.range == Range::off);
+    domain_ = start->checked(dds_create_domain(options.domain, configuration(options).c_str()),
+                             fmt::format("domain {} cannot be joined", options.domain));
     QosPointer qos(dds_create_qos());
     constexpr char kEnclave[] = "enclave=/;";
     dds_qset_userdata(qos.get(), kEnclave, sizeof kEnclave - 1);
     participant_ = dds_create_participant(options.domain, qos.get(), nullptr);
     if (participant_ < 0) dds_delete(domain_);
-    log->checked(participant_, fmt::format("no participant in domain {}", options.domain));
-    const std::vector<std::string> warnings = log->lines();
-    log.reset();
+    start->checked(participant_, fmt::format("no participant in domain {}", options.domain));
+    const std::vector<std::string> warnings = start->lines();
+    start.reset();
     for (const std::string& line : warnings) warn(line);
     receiver_.emplace(participant_);
   }
