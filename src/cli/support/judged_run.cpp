@@ -148,9 +148,11 @@ std::vector<judge::Check> run_judged(const std::shared_ptr<const world::WorldMod
   server.add(sink);
   Watchdog watchdog(options.timeout_s, server);
   std::atomic<SimTime> now{0};
+  std::atomic<bool> client_is_over{false};
   server.on_state([&](const Snapshot& snapshot) {
     judge.see(snapshot);
     now = snapshot.time;
+    if (client_is_over && snapshot.time > 0) server.stop();
     watchdog.moved();
     progress.to(snapshot.time);
   });
@@ -164,7 +166,9 @@ std::vector<judge::Check> run_judged(const std::shared_ptr<const world::WorldMod
                                  pace.variable()},
         [&] {
           ended_at = now.load();
-          server.stop();
+          // A run that does not wait for it may not have begun: it has a step at least.
+          client_is_over = true;
+          if (options.waits || now > 0) server.stop();
         },
         std::vector<int>{pace.inherited()});
   }
