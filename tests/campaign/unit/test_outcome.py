@@ -36,6 +36,7 @@ def test_it_has_passed_on_evidence():
         (failure("golden", "the run differs:\n  a"), ("failed", "golden", "the run differs:")),
         (failure("requests"), ("failed", "requests", "why")),
         (failure("script"), ("failed", "script", "why")),
+        (failure("yaw"), ("failed", "yaw", "why")),
         (failure("world", "no mesh"), ("invalid", "world", "no mesh")),
         (
             failure("client", "the client ended with exit code 1"),
@@ -52,6 +53,10 @@ def test_it_has_passed_on_evidence():
 )
 def test_a_failure_is_a_status(one, expected):
     assert taken(one, evidence=["12 steps"]) == expected
+
+
+def test_what_the_client_says_of_memory_is_its_own_fault_alone():
+    assert taken(failure("clearance"), output="MemoryError") == ("failed", "clearance", "why")
 
 
 @pytest.mark.parametrize(
