@@ -130,19 +130,28 @@ def ids(folder, file="c.yaml"):
 
 
 def test_what_lies_beside_a_controller_counts(folder):
-    """Regression: what it imports did not. What Ruedo itself writes there does not."""
+    """Every file, but for what Ruedo itself writes there."""
     before = ids(folder)
     ruedo("campaign", "export", "c.yaml", "-o", "table.csv", folder=folder)
-    for name in ("report.html", "case0.lcm", "results.xml"):
+    ruedo("campaign", "export", "c.yaml", "-o", "results.xml", folder=folder)
+    for name in ("report.html", "case0.lcm", "lib.pyc"):
         (folder / name).touch()
     (folder / "other.yaml").write_text(CAMPAIGN.replace("seeds: 2", "seeds: 3"))
     (folder / ".hidden").mkdir()
-    for name in (".hidden/a.py", ".a.py", "notes.txt", "other.campaign/worlds/a.json"):
+    for name in (".hidden/a.py", ".a.py", "other.campaign/worlds/a.json"):
         (folder / name).parent.mkdir(parents=True, exist_ok=True)
         (folder / name).write_text("")
     shutil.copytree(folder / "c.campaign", folder / "taken")
     assert ids(folder) == before
-    for name in ("lib.py", "deep/er/lib.py", "gains.json", "way.csv", "weights.npz"):
+    for name in (
+        "lib.py",
+        "deep/er/way.txt",
+        "way.csv",
+        "tree.xml",
+        "weights.bin",
+        "map.png",
+        "gains",
+    ):
         (folder / name).parent.mkdir(parents=True, exist_ok=True)
         (folder / name).write_text("1")
         one = ids(folder)
@@ -150,6 +159,26 @@ def test_what_lies_beside_a_controller_counts(folder):
         assert not set(before) & set(one) and not set(one) & set(ids(folder)), name
         (folder / name).unlink()
     assert ids(folder) == before
+
+
+def test_why_results_no_longer_stand_is_told(folder):
+    """A picture that lies beside the controller may be read by it."""
+    campaign = Campaign(folder / "c.yaml", out=folder / "other.campaign")
+    assert campaign.changes() == []
+    campaign.run(workers=1, stop=lambda: True)
+    (folder / "map.png").touch()
+    (folder / "deep").mkdir()
+    (folder / "deep/a.txt").touch()
+    assert Campaign(folder / "c.yaml", out=folder / "other.campaign").changes() == [
+        "deep/a.txt",
+        "map.png",
+    ]
+    for words in (["run", "c.yaml", "--shard", "1/8"], ["status", "c.yaml"]):
+        said = ruedo("campaign", *words, "--out", "other.campaign", folder=folder).stderr
+        assert ("last run: deep/a.txt, map.png; the cases" in said) == (words[0] == "run")
+    (folder / "map.png").unlink()
+    said = ruedo("campaign", "report", "c.yaml", "--out", "other.campaign", folder=folder).stderr
+    assert "last run: map.png; the cases" in said
 
 
 @pytest.mark.parametrize(

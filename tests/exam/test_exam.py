@@ -1,5 +1,5 @@
 """The exam of what judges: broken things that must be red, each with an innocent twin that must be
-green.
+green. What is examined is the installed package, or the program that RUEDO names.
 
 A row, in rows/FRONT.txt: NAME ~ COMMAND with {} ~ what is broken ~ its innocent twin ~ CODE TEXT
 The first takes the place of {} and gives that exit code and that text; the second gives 0. In the
@@ -22,10 +22,27 @@ import lcm
 import pytest
 from campaigns import campaign, hunt
 
-RUEDO = os.environ["RUEDO"]
 HERE = Path(__file__).resolve().parent
 SOURCE = Path(os.environ.get("RUEDO_SOURCE_DIR", HERE.parents[1]))
 PATIENCE = 400  # s
+
+
+@functools.cache
+def installed():
+    """The folder of an installation."""
+    folder = Path(tempfile.mkdtemp(prefix="ruedo-exam-"))
+    atexit.register(shutil.rmtree, folder)
+    build = os.environ["RUEDO_BINARY_DIR"]
+    subprocess.run(
+        ["cmake", "--install", build, "--prefix", folder], check=True, capture_output=True
+    )
+    return folder
+
+
+if "RUEDO" not in os.environ:  # programs, too, take it from there
+    os.environ["RUEDO"] = str(installed() / "bin/ruedo")
+    os.environ["PYTHONPATH"] = str(installed() / "lib/ruedo/python")
+RUEDO = os.environ["RUEDO"]
 
 
 @dataclass
@@ -176,18 +193,6 @@ FRONTS = {
 
 def words(line):
     return shlex.split(line)
-
-
-@functools.cache
-def installed():
-    """The folder of an installation."""
-    folder = Path(tempfile.mkdtemp(prefix="ruedo-exam-"))
-    atexit.register(shutil.rmtree, folder)
-    build = os.environ["RUEDO_BINARY_DIR"]
-    subprocess.run(
-        ["cmake", "--install", build, "--prefix", folder], check=True, capture_output=True
-    )
-    return folder
 
 
 @functools.cache

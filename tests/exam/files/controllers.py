@@ -130,6 +130,8 @@ class Planted:
         if self.planted == "blind":
             return 0.5, 0.0
         ahead = view["lrf.ranges"][60:121].min()
+        if self.planted == "squeezes" and self.turn > 0.5:
+            return (0.4 if ahead > 0.3 else 0.0), 0.0
         if ahead < 0.5 or x > 0.9:
             return 0.0, 0.0
         return 0.25, 0.0

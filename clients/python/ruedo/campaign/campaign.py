@@ -141,6 +141,7 @@ class Campaign:
                     [{key: getattr(case, key) for key in _REMEMBERED} for case in self.cases]
                 ),  # also those of other shards, which may be here
             )
+            store.set_about("files", json.dumps(self._by_name()))
             known = store.known()
             missing = [case for case in cases if case.id not in known]
             check_names(missing, self.source, self.folder)
@@ -166,6 +167,20 @@ class Campaign:
         anything = (self.out / "results.sqlite").is_file()
         with Store(self.out, write=not anything) as store:
             return Results(cases, store.rows(case.id for case in cases), self.out)
+
+    def changes(self) -> list[str]:
+        """The files that its cases are made from and that have changed, come or gone since its
+        cases were last run: each result of before stands for them no more.
+        """
+        now = self._by_name() if self.cases else {}
+        with Store(self.out, write=not (self.out / "results.sqlite").is_file()) as store:
+            before = json.loads(store.about("files") or "null")
+        if not isinstance(before, dict):
+            return []
+        return sorted(name for name in before.keys() | now if before.get(name) != now.get(name))
+
+    def _by_name(self) -> dict[str, str]:
+        return {os.path.relpath(file, self.folder): sha256 for file, sha256 in self._files.items()}
 
     def join(self, folders: Iterable[str | os.PathLike[str]]) -> int:
         """Takes over the results of shards; how many."""

@@ -232,6 +232,7 @@ def _run(arguments: argparse.Namespace) -> int:
         junit = _output(campaign, "--junit", arguments.junit)
     if not arguments.quiet:
         _name_unknown_programs(campaign)
+        _name_changes(campaign)
     with shown(campaign, arguments.shard, arguments.quiet or arguments.json) as progress:
         results = campaign.run(
             workers=arguments.workers, ray=arguments.ray, shard=arguments.shard, progress=progress
@@ -254,6 +255,25 @@ def _name_unknown_programs(campaign: Any) -> None:
                 f"ruedo: controller {name}: no file of {campaign.folder} is found in its command, so "
                 "that it is not run again when its program changes: name that in `inputs`"
             )
+
+
+def _name_changes(campaign: Any) -> None:
+    """Or a picture that somebody put there is why 600 cases run again, and nobody knows."""
+    changed = campaign.changes()
+    if changed:
+        more = f" and {len(changed) - 3} more" if len(changed) > 3 else ""
+        tell(
+            f"ruedo: changed since the last run: {', '.join(changed[:3])}{more}; the cases that this "
+            "belongs to need new results (what does not belong to a controller: see `files`)"
+        )
+
+
+def _results(campaign: Any) -> Any:
+    """Those that there are."""
+    results = campaign.results()
+    if len(results.done) < len(results.cases):
+        _name_changes(campaign)
+    return results
 
 
 def _summary(campaign: Any, results: Any) -> dict[str, Any]:
@@ -289,7 +309,7 @@ def _print_summary(campaign: Any, results: Any) -> None:
 
 def _status(arguments: argparse.Namespace) -> int:
     campaign = _campaign(arguments)
-    results = campaign.results()
+    results = _results(campaign)
     if arguments.json:
         say(json.dumps(_summary(campaign, results)))
     else:
@@ -305,6 +325,7 @@ def _report(arguments: argparse.Namespace) -> int:
     if arguments.output:
         compared = [Path(arguments.baseline) / "results.sqlite"] if arguments.baseline else []
         _output(campaign, "-o", arguments.output, *compared)
+    _results(campaign)
     write_report(campaign, file, arguments.baseline, arguments.pages)
     say(str(file))
     return GOOD
@@ -313,7 +334,7 @@ def _report(arguments: argparse.Namespace) -> int:
 def _show(arguments: argparse.Namespace) -> int:
     campaign = _campaign(arguments)
     case = campaign.case(arguments.CASE)
-    results = campaign.results()
+    results = _results(campaign)
     row = results.row(case)
     say(
         f"case {case.number}, id {case.id}: world {case.world}, {case.robot or 'its robot'}, controller {case.controller}, seed {case.seed}"
@@ -345,7 +366,7 @@ def _repeat(arguments: argparse.Namespace) -> int:
     log = _output(campaign, "-o", arguments.output or f"{case.id}.lcm").resolve()
     with Crew(str(campaign.folder)) as crew:
         outcome = crew.run_one(case.what, full_log=str(log))
-    row = campaign.results().row(case)
+    row = _results(campaign).row(case)
     say(f"{outcome.status}{': ' + outcome.reason if outcome.reason else ''}")
     say(f"{log}: ruedo play {log} --view, ruedo verify {log}")
     if row is None:
@@ -388,7 +409,7 @@ def _join(arguments: argparse.Namespace) -> int:
     campaign = _campaign(arguments)
     taken = campaign.join(arguments.FOLDERS)
     say(f"took over {taken} results")
-    _print_summary(campaign, campaign.results())
+    _print_summary(campaign, _results(campaign))
     return GOOD
 
 
@@ -401,7 +422,7 @@ def _export(arguments: argparse.Namespace) -> int:
         raise UsageError(f"-o {arguments.output}: its name ends with .csv, .parquet or .xml")
     campaign = _campaign(arguments)
     file = _output(campaign, "-o", arguments.output)
-    results = campaign.results()
+    results = _results(campaign)
     if kind == ".parquet":
         with replacing(file) as part:
             results.parquet(str(part))
@@ -414,6 +435,8 @@ def _export(arguments: argparse.Namespace) -> int:
 def _compare(arguments: argparse.Namespace) -> int:
     from .compare import compare_with
 
-    comparison = compare_with(_campaign(arguments), arguments.BASELINE)
+    campaign = _campaign(arguments)
+    _results(campaign)
+    comparison = compare_with(campaign, arguments.BASELINE)
     say(json.dumps(comparison.as_dict()) if arguments.json else comparison.text())
     return FAILED if comparison.worse else GOOD

@@ -1,5 +1,5 @@
-"""What a controller may read beside the file that a campaign names: the modules, settings and data
-in its folder, which all count when it is asked whether a result is still one of it.
+"""What a controller may read beside the file that a campaign names: every file in its folder counts
+when it is asked whether a result still stands for it, but for what Ruedo itself writes there.
 """
 
 from __future__ import annotations
@@ -12,15 +12,11 @@ from pathlib import Path
 
 from ..files import parse_yaml, read_bytes, sha256_of
 
-# Programs, settings and data. Not what worlds are made of, which has hashes of its own, nor what
-# programs write: logs, pictures, pages.
-_ENDINGS = re.compile(
-    r".*\.(pyx?|so|sh|bash|m?js|lua|rb|pl|m|jl|c|cc|cpp|cxx|h|hh|hpp|java|class|jar"
-    r"|json|ya?ml|toml|ini|cfg|conf|csv|npy|npz|mat|pkl|pickle|h5|hdf5|pth?|onnx|tflite|safetensors|pgm)",
-    re.IGNORECASE,
-)
+_WRITTEN = (".lcm", ".html", ".svg", ".pdf", ".pyc")  # logs, pages, figures; Python's own
+_JUNIT = re.compile(rb"(<\?xml[^>]*>)?\s*<testsuite")
 _MOST_FILES, _MOST_LOOKED_AT, _MOST_BYTES = 2000, 50_000, 256 << 20
 _TABLE = b"number,id,world,robot,controller,seed,"  # as `ruedo campaign export` begins
+_MOST_FOOTER_BYTES = 1 << 16  # of Parquet, with the names of columns
 _MOST_SPEC_BYTES = 1 << 20
 
 
@@ -32,7 +28,7 @@ class Folders:
         self._known: dict[str, dict[str, str]] = {}
 
     def below(self, folder: Path) -> dict[str, str]:
-        """The files below a folder that may matter, by their path in it, with their hashes. Raises
+        """The files below a folder that count, by their path in it, with their hashes. Raises
         ValueError for more of them than anybody's controller has, OSError.
         """
         place = os.path.realpath(folder)
@@ -62,7 +58,7 @@ class Folders:
             folders[:] = sorted(one for one in folders if not _is_passed_over(one))
             for name in sorted(files):
                 file = os.path.join(place, name)
-                if not name.startswith(".") and os.path.isfile(file) and _may_matter(file):
+                if not name.startswith(".") and os.path.isfile(file) and not _is_written(file):
                     yield file
 
 
@@ -75,13 +71,21 @@ def _is_passed_over(folder: str) -> bool:
     return folder.startswith(".") or folder == "__pycache__" or ".campaign" in folder
 
 
-def _may_matter(file: str) -> bool:
-    if not _ENDINGS.fullmatch(os.path.basename(file)):
-        return False
-    if file.endswith(".csv"):
-        with open(file, "rb") as table:
-            return table.read(len(_TABLE)) != _TABLE
-    return not file.endswith((".yaml", ".yml")) or not _is_campaign(file)
+def _is_written(file: str) -> bool:
+    """Whether it is what Ruedo writes, or a campaign, which is no other one's."""
+    _, kind = os.path.splitext(file)
+    if kind in (".yaml", ".yml"):
+        return _is_campaign(file)
+    if kind not in (".csv", ".parquet", ".xml"):
+        return kind in _WRITTEN
+    with open(file, "rb") as one:
+        if kind == ".xml":
+            return _JUNIT.match(one.read(200)) is not None
+        if kind == ".csv":
+            return one.read(len(_TABLE)) == _TABLE
+        one.seek(max(0, os.path.getsize(file) - _MOST_FOOTER_BYTES))
+        footer = one.read()
+    return all(name in footer for name in _TABLE.strip(b",").split(b","))
 
 
 def _is_campaign(file: str) -> bool:

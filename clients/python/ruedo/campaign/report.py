@@ -103,7 +103,7 @@ def _head(campaign: Any, results: Results) -> str:
     asked = any(is_expected(case.what) for case in results.cases)
     return (
         f"<h1>{html.escape(campaign.name)}</h1><p>{done} of {len(results.cases)} cases, {failed} failed: {rate}. "
-        f"{kinds}. Ruedo {html.escape(campaign.version)}.</p>"
+        f"{f'{kinds}. ' if kinds else ''}Ruedo {html.escape(campaign.version)}.</p>"
         + ("" if asked else "<p>Nothing was expected but that controllers run to their end.</p>")
     )
 
@@ -297,6 +297,8 @@ def _finite(name: str, results: Results) -> Iterator[tuple[float, dict[str, Any]
 
 
 def _heat_map(results: Results) -> Iterable[str]:
+    from matplotlib.ticker import MaxNLocator
+
     plots = []
     for world in dict.fromkeys(case.world for case in results.cases):
         failed = [(case, row) for case, row in results.failed if case.world == world]
@@ -313,10 +315,12 @@ def _heat_map(results: Results) -> Iterable[str]:
             extent=extent,
             gridsize=24,
             mincnt=1,
+            vmin=0,
             cmap="OrRd",
             linewidths=0.2,
         )
-        figure.colorbar(drawn, label="failures")
+        bar = figure.colorbar(drawn, label="failures")
+        bar.locator = MaxNLocator(integer=True)
         axes.set_aspect("equal", adjustable="datalim")
         axes.set_xlabel("x (m)")
         axes.set_ylabel("y (m)")
