@@ -25,8 +25,9 @@ needs() {{ "$@" >/dev/null 2>&1 || exit {SKIPPED}; }}
 run="ruedo run box.sdf --lcm memq:// --rate max --duration 0.2 --quiet"
 live="ruedo run box.sdf --lcm memq:// --rate 1 --duration 30 --quiet"
 written() {{ until test -s "$1"; do sleep 0.05; done; }}
-ros2() {{ unshare -n bash -c 'ip link set lo up; ip link add eth9 type dummy; ip addr add 10.9.0.1/24 dev eth9;
-  ip link set eth9 up multicast on; exec "$@"' -- timeout 30 ruedo run box.sdf --lcm memq:// --rate max --duration 0.2 --ros2; }}
+in_network() {{ unshare -n bash -c 'ip link set lo up; ip link add eth9 type veth peer name far; ip addr add 10.9.0.1/24 dev eth9;
+  ip link set far up; ip link set eth9 up multicast on; exec "$@"' -- timeout 30 "$@"; }}
+ros2() {{ in_network ruedo run box.sdf --lcm memq:// --rate max --duration 0.2 --ros2; }}
 cut_off() {{ unshare -n bash -c 'ip link set lo up; ip link add v0 type veth peer name v1; ip addr add 10.9.0.1/24 dev v0
   ip link set v0 up; ip link set v1 up; ip route add 224.0.0.0/4 dev v0
   (sleep 1; eval "$1"; sleep 1; eval "$2") &

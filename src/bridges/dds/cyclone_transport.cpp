@@ -178,7 +178,9 @@ std::string configuration(const CycloneOptions& options) {
   // Pictures need few datagrams; a writer's cache is limited by its depth only. Data that arrives
   // while others have the CPU waits in the socket buffer, as far as the system allows
   // (net.core.rmem_max). Of each writer few samples are kept that are not whole, or whose turn has
-  // not come; how large they may be says bridges/dds/incoming.h.
+  // not come; how large they may be says bridges/dds/incoming.h. One thread receives from all sockets:
+  // one that waits on the multicast socket alone ends when a datagram comes, and none comes where
+  // the interface is down.
   return "<CycloneDDS><Domain Id=\"any\"><General>" + general +
          "<MaxMessageSize>65500B</MaxMessageSize><FragmentSize>60000B</FragmentSize></General>"
          "<Discovery>" +
@@ -187,7 +189,8 @@ std::string configuration(const CycloneOptions& options) {
               : fmt::format("<ParticipantIndex>auto</ParticipantIndex><MaxAutoParticipantIndex>{}"
                             "</MaxAutoParticipantIndex><Peers>{}</Peers>",
                             last_participant(options.domain), peers)) +
-         "</Discovery><Internal><SocketReceiveBufferSize "
+         "</Discovery><Internal><MultipleReceiveThreads>false</MultipleReceiveThreads>"
+         "<SocketReceiveBufferSize "
          "max=\"8MiB\"/><MaxSampleSize>1GiB</MaxSampleSize>"
          "<DefragUnreliableMaxSamples>4</DefragUnreliableMaxSamples>"
          "<DefragReliableMaxSamples>4</DefragReliableMaxSamples>"
@@ -251,18 +254,32 @@ class StartLog {
 
 void warn(std::string_view line) { spdlog::warn("ROS 2: Cyclone DDS: {}", line); }
 
-// Cyclone's own warnings, of which strangers can cause any number: at most one a second. Refused
-// samples are counted elsewhere.
+// Cyclone's own warnings, of which strangers can cause any number: at most one a second, and each
+// text once a minute, for it repeats what lasts (no network) with each message. Refused samples are
+// counted elsewhere.
+bool is_due(std::string_view line) {
+  using Clock = std::chrono::steady_clock;
+  constexpr auto kPeriod = std::chrono::seconds(1), kPeriodOfEach = std::chrono::seconds(60);
+  constexpr size_t kMostKnown = 64;
+  static std::mutex mutex;
+  static std::map<std::string, Clock::time_point, std::less<>> told;
+  static Clock::time_point last;
+  const Clock::time_point now = Clock::now();
+  const std::lock_guard lock(mutex);
+  if (last != Clock::time_point() && now < last + kPeriod) return false;
+  const auto known = told.find(line);
+  if (known != told.end() && now < known->second + kPeriodOfEach) return false;
+  if (told.size() == kMostKnown) told.clear();
+  told.insert_or_assign(std::string(line), now);
+  last = now;
+  return true;
+}
+
 void tell(void*, const dds_log_data_t* data) {
-  constexpr int64_t kPeriod_ns = 1'000'000'000;
-  static std::atomic<int64_t> next_ns{0};
   const std::string_view text(data->message, data->size);
   if (text.find("deserialization") != text.npos) return;
-  if (StartLog::takes(text.substr(0, text.find_last_not_of('\n') + 1))) return;
-  const int64_t now = std::chrono::steady_clock::now().time_since_epoch().count();
-  int64_t next = next_ns;
-  if (now < next || !next_ns.compare_exchange_strong(next, now + kPeriod_ns)) return;
   const std::string_view line = text.substr(0, text.find_last_not_of('\n') + 1);
+  if (StartLog::takes(line) || !is_due(line)) return;
   if (const size_t sample = line.find("sample"); line.starts_with("dropping oversize"))
     spdlog::warn(
         "ROS 2: left out, for it has more than {} MB or fragments of less than {} bytes: {}",

@@ -3,6 +3,7 @@
 #include <chrono>
 #include <cstdlib>
 #include <filesystem>
+#include <fstream>
 #include <map>
 #include <mutex>
 #include <thread>
@@ -21,6 +22,7 @@
 #include "bus/lcm_url.h"
 #include "bus/url_claim.h"
 #include "cli/support/commands.h"
+#include "cli/support/ros2.h"
 #include "engine/outcome.h"
 #include "log/header.h"
 #include "ruedo/decode.h"
@@ -31,6 +33,7 @@
 #include "scene/render_scene.h"
 #include "system/sandbox.h"
 #include "system/temporary_folder.h"
+#include "world/load.h"
 #include "world/model/body_layout.h"
 
 namespace ruedo::cli {
@@ -209,6 +212,44 @@ void check_environment(Report& report) {
                             fmt::join(variables, ", ")));
 }
 
+// Whether --ros2 would work. Where nothing speaks of ROS, that it would not is no fault.
+void check_ros2(Report& report) {
+  constexpr const char* kVariables[] = {
+      "ROS_DISTRO",         "ROS_DOMAIN_ID",    "ROS_AUTOMATIC_DISCOVERY_RANGE",
+      "ROS_LOCALHOST_ONLY", "ROS_STATIC_PEERS", "RMW_IMPLEMENTATION",
+      "CYCLONEDDS_URI"};
+  const bool asked = std::any_of(std::begin(kVariables), std::end(kVariables), [](const char* one) {
+    const char* value = std::getenv(one);
+    return value && *value;
+  });
+  const auto tell = [&](const std::string& text) {
+    const std::string line = in_one_line(for_terminal(text));
+    asked ? report.fault("ROS 2", line) : report.hint("ROS 2", line);
+  };
+  try {
+    report.good("ROS 2", ros2_network());
+    if (const std::string deaf = nodes_that_do_not_hear(); !deaf.empty()) tell(deaf);
+  } catch (const InputError& error) {
+    tell(error.what());
+  } catch (const EnvironmentError& error) {
+    tell(error.what());
+  }
+}
+
+// Python and what the environment says to it.
+void check_xacro(Report& report) {
+  try {
+    const TemporaryFolder folder("doctor");
+    const std::string file = folder / "robot.urdf.xacro";
+    std::ofstream(file) << R"(<robot name="robot"><link name="base_link"/></robot>)";
+    world::load_world(file);
+    report.good("xacro files", "a file was expanded");
+  } catch (const InputError& error) {
+    report.hint("xacro files", in_one_line(for_terminal(error.message())));
+  } catch (const EnvironmentError&) {  // told by check_temporary_folder()
+  }
+}
+
 // Where logs of campaigns, meshes and xacro files lie for a while.
 void check_temporary_folder(Report& report) {
   try {
@@ -250,6 +291,8 @@ int doctor(const std::string& url) {
   check_renderer(report);
   check_environment(report);
   check_temporary_folder(report);
+  check_xacro(report);
+  check_ros2(report);
   check_digests(report);
   check_sandbox(report);
   return report.faulty() ? kEnvironment : kGood;

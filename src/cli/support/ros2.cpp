@@ -51,6 +51,13 @@ std::vector<run::WaitForOption> with_channels(std::vector<run::WaitForOption> op
   return options;
 }
 
+std::string nodes_that_do_not_hear() {
+  const char* middleware = std::getenv("RMW_IMPLEMENTATION");
+  if (!middleware || std::string_view(middleware) != "rmw_zenoh_cpp") return "";
+  return "RMW_IMPLEMENTATION is rmw_zenoh_cpp; nodes with it do not hear this run, which speaks "
+         "DDS: start them with RMW_IMPLEMENTATION=rmw_cyclonedds_cpp or rmw_fastrtps_cpp";
+}
+
 #ifdef RUEDO_ROS2
 
 namespace {
@@ -177,12 +184,14 @@ class CycloneNode : public Ros2Node {
 std::unique_ptr<Ros2Network> Ros2Network::open(const Ros2Arguments& arguments) {
   if (!arguments.on) return nullptr;
   distro_of(arguments);  // before a network is asked
-  const char* middleware = std::getenv("RMW_IMPLEMENTATION");
-  if (middleware && std::string_view(middleware) == "rmw_zenoh_cpp")
-    spdlog::warn(
-        "ROS 2: RMW_IMPLEMENTATION is rmw_zenoh_cpp; nodes with it do not hear this run, which "
-        "speaks DDS: start them with RMW_IMPLEMENTATION=rmw_cyclonedds_cpp or rmw_fastrtps_cpp");
+  if (const std::string deaf = nodes_that_do_not_hear(); !deaf.empty())
+    spdlog::warn("ROS 2: {}", deaf);
   return std::make_unique<CycloneNetwork>();
+}
+
+std::string ros2_network() {
+  const ros2::Distro distro = distro_of({});
+  return fmt::format("{}, {}", ros2::name_of(distro), CycloneNetwork().transport->where());
 }
 
 std::unique_ptr<Ros2Node> Ros2Node::open(run::Run& server, const Ros2Arguments& arguments,
@@ -194,17 +203,23 @@ std::unique_ptr<Ros2Node> Ros2Node::open(run::Run& server, const Ros2Arguments& 
 
 #else
 
+namespace {
+constexpr const char* kWithout =
+    "this ruedo was built without ROS 2. Install cyclonedds-dev, then configure with "
+    "-DRUEDO_ROS2=ON and build again";
+}  // namespace
+
 std::unique_ptr<Ros2Network> Ros2Network::open(const Ros2Arguments& arguments) {
   if (!arguments.on) return nullptr;
-  throw EnvironmentError(
-      "this ruedo was built without ROS 2. Install cyclonedds-dev, then configure with "
-      "-DRUEDO_ROS2=ON and build again");
+  throw EnvironmentError(kWithout);
 }
 
 std::unique_ptr<Ros2Node> Ros2Node::open(run::Run&, const Ros2Arguments&,
                                          std::unique_ptr<Ros2Network>) {
   return nullptr;
 }
+
+std::string ros2_network() { throw EnvironmentError(kWithout); }
 
 #endif
 

@@ -50,6 +50,13 @@ class Ros2Node {
   virtual void wait_for_peers() = 0;
 };
 
+// Where a node would take part by the environment: "jazzy, domain 0, this machine only". Throws as
+// Ros2Node::open().
+std::string ros2_network();
+
+// Why nodes of this environment would not hear a run; "": they would.
+std::string nodes_that_do_not_hear();
+
 // The input channel of each ROS topic among --wait-for. Throws InputError for what is no topic that
 // takes commands.
 std::vector<run::WaitForOption> with_channels(std::vector<run::WaitForOption> options,
