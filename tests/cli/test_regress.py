@@ -202,3 +202,17 @@ def test_clearance_is_exact(tmp_path, monkeypatch, gap, asked, told):
     metrics = json.loads((tmp_path / "verdict.json").read_text())["metrics"]
     if asked == "0.1":
         assert metrics["clearance_m"] == pytest.approx(gap, abs=1e-5)
+
+
+def test_a_run_that_goes_on_may_last_longer_than_the_timeout(folder):
+    done = regress("--rate", "1", "--duration", "1.5", "--timeout", "0.4", golden="none.lcm")
+    assert "did not go on" not in done.stderr + done.stdout, done
+
+
+def test_a_client_that_ends_before_the_first_step_ends_the_run_after_it(folder):
+    """The run would last a thousand seconds, and one without a step is not judged."""
+    done = program(
+        *("regress", "w.sdf", "--no-page", "--rate", "1", "--duration", "1000"),
+        *("--client", "true", "--no-client-wait", "--no-contact"),
+    )
+    assert done.returncode == 0 and "passed" in done.stdout, done
