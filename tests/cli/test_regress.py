@@ -88,7 +88,7 @@ def test_a_run_equals_its_golden_log(folder):
 
 @pytest.mark.parametrize(
     ("option", "file"),
-    [("--golden", "run.lcm.kept"), ("--html", "run.lcm.html"), ("--junit", "./run.lcm.kept")],
+    [("--golden", "run.lcm"), ("--html", "run.lcm.html"), ("--junit", "./run.lcm.kept")],
 )
 def test_what_a_run_leaves_beside_its_log_is_nobody_elses(folder, option, file):
     """Before, a golden log of this name was written over, and the run held to itself."""
@@ -216,3 +216,10 @@ def test_a_client_that_ends_before_the_first_step_ends_the_run_after_it(folder):
         *("--client", "true", "--no-client-wait", "--no-contact"),
     )
     assert done.returncode == 0 and "passed" in done.stdout, done
+
+
+def test_a_disk_that_is_full_is_no_pass(folder):
+    (folder / "run.lcm.kept").unlink(missing_ok=True)
+    (folder / "run.lcm.kept").symlink_to("/dev/full")
+    done = regress("--keep", "p3at/*")
+    assert done.returncode == 4 and "No space left on device" in done.stderr, done

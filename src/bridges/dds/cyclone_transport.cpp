@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <atomic>
-#include <charconv>
 #include <chrono>
 #include <condition_variable>
 #include <cstdlib>
@@ -11,7 +10,6 @@
 #include <map>
 #include <mutex>
 #include <optional>
-#include <set>
 #include <string_view>
 #include <thread>
 #include <utility>
@@ -20,11 +18,9 @@
 #include <dds/dds.h>
 #include <fmt/format.h>
 #include <fmt/ranges.h>
-#include <ifaddrs.h>
-#include <net/if.h>
 #include <spdlog/spdlog.h>
-#include <sys/socket.h>
 
+#include "bridges/dds/configuration.h"
 #include "bridges/dds/identity.h"
 #include "bridges/dds/incoming.h"
 #include "bridges/dds/raw_type.h"
@@ -41,9 +37,7 @@ using ros2::Endpoint;
 using ros2::Gid;
 using ros2::Role;
 
-constexpr uint32_t kLastDomain = 232;  // higher domains have no valid ports
 constexpr int kCyclonesThreads = 12;
-constexpr auto kLinger = "250ms";     // for readers that have not acknowledged all, at the end
 constexpr int kMostTaken = 64;        // samples taken at once
 constexpr auto kLook = DDS_MSECS(2);  // interval for requests that have to wait
 
@@ -102,107 +96,6 @@ QosPointer qos_of(const Endpoint& endpoint) {
   return qos;
 }
 
-// A configuration element of Cyclone with text from the environment.
-std::string peer_element(std::string_view address) {
-  std::string text;
-  for (const char c : address) {
-    if (c == '&')
-      text += "&amp;";
-    else if (c == '<')
-      text += "&lt;";
-    else if (c == '"')
-      text += "&quot;";
-    else
-      text += c;
-  }
-  return "<Peer Address=\"" + text + "\"/>";
-}
-
-// Iceoryx, through which Cyclone would share memory, waits a minute for a daemon and then ends the
-// process; and Ruedo's samples have no fixed size, so that nothing would be shared.
-constexpr char kWithoutSharedMemory[] =
-    ",<CycloneDDS><Domain Id=\"any\"><SharedMemory><Enable>false</Enable></SharedMemory></Domain>"
-    "</CycloneDDS>";
-
-// Nodes of this machine only: multicast goes over the loopback interface, which reaches those that
-// listen to multicast on any interface; nodes without multicast, as with ROS's LOCALHOST, are
-// contacted individually. The other interfaces are listed because Cyclone considers a node
-// unreachable if its address is on none of its own.
-std::string local_interfaces() {
-  constexpr size_t kMost = 3;  // Cyclone has room for four
-  std::string text = "<NetworkInterface address=\"127.0.0.1\" multicast=\"true\"/>";
-  ifaddrs* list = nullptr;
-  if (getifaddrs(&list) != 0) return text;
-  size_t count = 0;
-  std::set<std::string> names;
-  for (const ifaddrs* each = list; each && count < kMost; each = each->ifa_next) {
-    const bool usable = each->ifa_addr && each->ifa_addr->sa_family == AF_INET &&
-                        (each->ifa_flags & IFF_UP) && !(each->ifa_flags & IFF_LOOPBACK);
-    if (!usable || !names.insert(each->ifa_name).second) continue;
-    text += fmt::format("<NetworkInterface name=\"{}\" multicast=\"false\"/>", each->ifa_name);
-    ++count;
-  }
-  freeifaddrs(list);
-  return text;
-}
-
-// Ports are 16 bits wide: high domains have fewer of them.
-uint32_t last_participant(uint32_t domain) {
-  constexpr uint32_t kLastPort = 65535, kFirst = 7411, kOfDomain = 250, kMost = 119;
-  return std::min(kMost, (kLastPort - kFirst - kOfDomain * domain) / 2);
-}
-
-std::string configuration(const CycloneOptions& options) {
-  std::string general, peers;
-  switch (options.range) {
-    case Range::off:
-      general =
-          "<Interfaces><NetworkInterface address=\"127.0.0.1\" "
-          "multicast=\"false\"/></Interfaces><AllowMulticast>false</AllowMulticast>";
-      break;
-    case Range::localhost:
-      general = "<Interfaces>" + local_interfaces() +
-                "</Interfaces><AllowMulticast>spdp</AllowMulticast><MulticastTimeToLive>0</"
-                "MulticastTimeToLive>";
-      peers = peer_element("127.0.0.1");
-      break;
-    case Range::subnet:
-    case Range::system_default: break;
-  }
-  for (size_t begin = 0; begin < options.static_peers.size();) {
-    const size_t end = std::min(options.static_peers.find(';', begin), options.static_peers.size());
-    if (end > begin)
-      peers += peer_element(std::string_view(options.static_peers).substr(begin, end - begin));
-    begin = end + 1;
-  }
-  // Pictures need few datagrams; a writer's cache is limited by its depth only. Data that arrives
-  // while others have the CPU waits in the socket buffer, as far as the system allows
-  // (net.core.rmem_max). Of each writer few samples are kept that are not whole, or whose turn has
-  // not come; how large they may be says bridges/dds/incoming.h. One thread receives from all sockets:
-  // one that waits on the multicast socket alone ends when a datagram comes, and none comes where
-  // the interface is down.
-  return "<CycloneDDS><Domain Id=\"any\"><General>" + general +
-         "<MaxMessageSize>65500B</MaxMessageSize><FragmentSize>60000B</FragmentSize></General>"
-         "<Discovery>" +
-         (peers.empty()
-              ? ""
-              : fmt::format("<ParticipantIndex>auto</ParticipantIndex><MaxAutoParticipantIndex>{}"
-                            "</MaxAutoParticipantIndex><Peers>{}</Peers>",
-                            last_participant(options.domain), peers)) +
-         "</Discovery><Internal><MultipleReceiveThreads>false</MultipleReceiveThreads>"
-         "<SocketReceiveBufferSize "
-         "max=\"8MiB\"/><MaxSampleSize>1GiB</MaxSampleSize>"
-         "<DefragUnreliableMaxSamples>4</DefragUnreliableMaxSamples>"
-         "<DefragReliableMaxSamples>4</DefragReliableMaxSamples>"
-         "<PrimaryReorderMaxSamples>32</PrimaryReorderMaxSamples>"
-         "<SecondaryReorderMaxSamples>32</SecondaryReorderMaxSamples><WriterLingerDuration>" +
-         std::string(kLinger) +
-         "</WriterLingerDuration><Watermarks><WhcHigh>1GB</"
-         "WhcHigh></Watermarks></Internal>"
-         "<Tracing><Verbosity>none</Verbosity></Tracing></Domain></CycloneDDS>" +
-         options.more + kWithoutSharedMemory;
-}
-
 void tell(void*, const dds_log_data_t* data);
 
 // What Cyclone says while it starts: why it does not, or else warnings.
@@ -238,13 +131,27 @@ class StartLog {
     if (result >= 0) return result;
     const std::vector<std::string> why = lines();
     throw EnvironmentError(
-        fmt::format("ROS 2: {}: {}{}", what,
+        fmt::format("ROS 2: {}: {}{}{}", what,
                     why.empty() ? std::string(dds_strretcode(-result))
                                 : fmt::format("{}", fmt::join(why, "; ")),
-                    std::getenv("CYCLONEDDS_URI") ? " (CYCLONEDDS_URI is set)" : ""));
+                    std::getenv("CYCLONEDDS_URI") ? " (CYCLONEDDS_URI is set)" : "", cure(why)));
   }
 
  private:
+  // "failed to increase socket receive buffer size to at least 10485760 bytes, current is ..."
+  static std::string cure(const std::vector<std::string>& why) {
+    for (const std::string& line : why) {
+      constexpr std::string_view kWanted = "socket receive buffer size to at least ";
+      const size_t at = line.find(kWanted);
+      if (at == line.npos) continue;
+      const size_t begin = at + kWanted.size();
+      const std::string bytes = line.substr(begin, line.find(' ', begin) - begin);
+      return "; the system allows less than SocketReceiveBufferSize asks for: run: sudo sysctl -w "
+             "net.core.rmem_max=" +
+             bytes;
+    }
+    return "";
+  }
   static constexpr size_t kMost = 10;
   static inline std::mutex mutex_;
   static inline StartLog* current_ = nullptr;
@@ -591,44 +498,7 @@ class CycloneTransport : public ros2::Transport {
   std::optional<Receiver> receiver_;  // of the participant
 };
 
-std::string environment(const char* name) {
-  const char* value = std::getenv(name);
-  return value ? value : "";
-}
-
 }  // namespace
-
-CycloneOptions options_from_environment() {
-  CycloneOptions options;
-  if (const std::string text = environment("ROS_DOMAIN_ID"); !text.empty()) {
-    const auto [end, error] =
-        std::from_chars(text.data(), text.data() + text.size(), options.domain);
-    if (error != std::errc() || end != text.data() + text.size() || options.domain > kLastDomain) {
-      throw InputError({},
-                       fmt::format("ROS_DOMAIN_ID is '{}'; 0 to {} is allowed", text, kLastDomain));
-    }
-  }
-  const std::string range = environment("ROS_AUTOMATIC_DISCOVERY_RANGE");
-  const std::map<std::string, Range> ranges{{"", Range::localhost},
-                                            {"OFF", Range::off},
-                                            {"LOCALHOST", Range::localhost},
-                                            {"SUBNET", Range::subnet},
-                                            {"SYSTEM_DEFAULT", Range::system_default}};
-  const auto known = ranges.find(range);
-  if (known == ranges.end()) {
-    throw InputError({}, "ROS_AUTOMATIC_DISCOVERY_RANGE is '" + range +
-                             "'; OFF, LOCALHOST, SUBNET and SYSTEM_DEFAULT are allowed");
-  }
-  options.range = known->second;
-  const bool on_this_host_alone = environment("ROS_LOCALHOST_ONLY") == "1";  // wins in each release
-  if (on_this_host_alone) options.range = Range::localhost;
-  // As with any program over Cyclone DDS: what it says goes before what Ruedo says.
-  if (const std::string more = environment("CYCLONEDDS_URI"); !more.empty())
-    options.more = "," + more;
-  if (options.range != Range::system_default && options.range != Range::off && !on_this_host_alone)
-    options.static_peers = environment("ROS_STATIC_PEERS");
-  return options;
-}
 
 std::unique_ptr<ros2::Transport> open_cyclone(const CycloneOptions& options) {
   return std::make_unique<CycloneTransport>(options);

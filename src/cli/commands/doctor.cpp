@@ -3,7 +3,6 @@
 #include <chrono>
 #include <cstdlib>
 #include <filesystem>
-#include <fstream>
 #include <map>
 #include <mutex>
 #include <thread>
@@ -31,6 +30,7 @@
 #include "ruedo/world_info_t.hpp"
 #include "scene/mesas_environment.h"
 #include "scene/render_scene.h"
+#include "system/output_file.h"
 #include "system/sandbox.h"
 #include "system/temporary_folder.h"
 #include "world/load.h"
@@ -241,7 +241,7 @@ void check_xacro(Report& report) {
   try {
     const TemporaryFolder folder("doctor");
     const std::string file = folder / "robot.urdf.xacro";
-    std::ofstream(file) << R"(<robot name="robot"><link name="base_link"/></robot>)";
+    write_file(file, R"(<robot name="robot"><link name="base_link"/></robot>)");
     world::load_world(file);
     report.good("xacro files", "a file was expanded");
   } catch (const InputError& error) {
