@@ -23,6 +23,7 @@
 #include "bridges/dds/configuration.h"
 #include "bridges/dds/identity.h"
 #include "bridges/dds/incoming.h"
+#include "bridges/dds/publications.h"
 #include "bridges/dds/raw_type.h"
 #include "bridges/dds/reply_ends.h"
 #include "bridges/ros2/fair_queue.h"
@@ -36,6 +37,7 @@ namespace {
 using ros2::Endpoint;
 using ros2::Gid;
 using ros2::Role;
+using ros2::Topic;
 
 constexpr int kCyclonesThreads = 12;
 constexpr int kMostTaken = 64;        // samples taken at once
@@ -467,9 +469,11 @@ class CycloneTransport : public ros2::Transport {
     start.reset();
     for (const std::string& line : warnings) warn(line);
     receiver_.emplace(participant_);
+    publications_.emplace(participant_);
   }
   ~CycloneTransport() override {
     stop();
+    publications_.reset();
     dds_delete(domain_);
   }
 
@@ -478,6 +482,10 @@ class CycloneTransport : public ros2::Transport {
   }
   std::unique_ptr<ros2::Reader> add_reader(const Endpoint& endpoint, Handler handler) override {
     return std::make_unique<CycloneReader>(participant_, *receiver_, endpoint, std::move(handler));
+  }
+
+  bool is_published(const Topic& topic) override {
+    return publications_->has("rt" + topic.name, ros2::dds_type(topic.type));
   }
 
   void start() override { receiver_->start(); }
@@ -496,6 +504,7 @@ class CycloneTransport : public ros2::Transport {
   CycloneOptions options_;
   dds_entity_t domain_ = 0, participant_ = 0;
   std::optional<Receiver> receiver_;  // of the participant
+  std::optional<Publications> publications_;
 };
 
 }  // namespace

@@ -1,5 +1,5 @@
-// cmd_vel is accepted with either type, since releases differ in it. A command's utime is 0: what
-// is recorded of a run must not depend on when a node sent it.
+// cmd_vel has the type of the release, and the other one where somebody publishes it. A command's
+// utime is 0: what is recorded of a run must not depend on when a node sent it.
 #include "bridges/ros2/commands.h"
 
 #include "bridges/ros2/cdr.h"
@@ -89,18 +89,22 @@ Bytes from_array(std::span<const uint8_t> cdr, const std::vector<std::string>& j
   return joint_command(joints, mode, values);
 }
 
+enum class Form { any, plain, stamped };
+
 struct Row {
   const char* channel_type;
   const char* channel;
   const char* topic;
   const char* type;
   Bytes (*convert)(std::span<const uint8_t>, const std::vector<std::string>& joints);
+  Form form = Form::any;  // of the two that releases differ in
 };
 
 constexpr Row kRows[] = {
-    {"velocity_command_t", "velocity", "cmd_vel", "geometry_msgs/msg/Twist", from_twist},
+    {"velocity_command_t", "velocity", "cmd_vel", "geometry_msgs/msg/Twist", from_twist,
+     Form::plain},
     {"velocity_command_t", "velocity", "cmd_vel", "geometry_msgs/msg/TwistStamped",
-     from_twist_stamped},
+     from_twist_stamped, Form::stamped},
     {"joint_command_t", "joint_command", "joint_trajectory_controller/joint_trajectory",
      "trajectory_msgs/msg/JointTrajectory", from_trajectory},
     {"joint_command_t", "joint_command", "forward_position_controller/commands",
@@ -113,8 +117,8 @@ constexpr Row kRows[] = {
 
 }  // namespace
 
-std::vector<Command> commands_of(const std::vector<world_info_t>& info, const JointNames& joints,
-                                 Names& names) {
+std::vector<Command> commands_of(const std::vector<world_info_t>& info, bool stamped,
+                                 const JointNames& joints, Names& names) {
   std::vector<Command> commands;
   for (const world_info_t& part : info) {
     for (const channel_info_t& channel : part.channels) {
@@ -122,6 +126,7 @@ std::vector<Command> commands_of(const std::vector<world_info_t>& info, const Jo
         if (!channel.input || channel.robot.empty() || channel.type != row.channel_type) continue;
         const std::vector<std::string> list = joints(channel.robot);
         commands.push_back({{names.topic(channel.robot, row.topic), row.type, kCommandQos},
+                            row.form == (stamped ? Form::plain : Form::stamped),
                             channel.name,
                             list,
                             [convert = row.convert, list](std::span<const uint8_t> cdr) {

@@ -83,6 +83,7 @@ void Node::flush() {
   if (now < next_look_) return;
   next_look_ = now + kLook;
   look_for_readers();
+  look_for_writers();
   drawn_->look(time_us_);
 }
 
@@ -94,6 +95,20 @@ void Node::look_for_readers() {
                                  [&](size_t topic) { return writer_of_topic_[topic]->is_read(); });
     if (std::exchange(is_read, now) != now) ++audience_;
   }
+}
+
+void Node::look_for_writers() {
+  bool changed = false;
+  for (const Command& command : others_) {
+    const bool published = transport_->is_published(command.topic);
+    if (published == inputs_.contains(key(command.topic))) continue;
+    changed = true;
+    if (published)
+      add_command(inputs_, command);
+    else
+      inputs_.erase(key(command.topic));
+  }
+  if (changed) tell_graph();
 }
 
 // The first pictures of a channel are drawn, until the first check.
@@ -186,9 +201,11 @@ void Node::tell_standing() {
 // To commands and initial poses.
 void Node::listen(const std::vector<world_info_t>& info) {
   std::map<std::string, Input> inputs;
-  for (const Command& command : commands_of(info, options_.joints, names_)) {
-    add_input(inputs, {command.topic, command.channel, command.joints, nullptr},
-              [this, command](const Sample& sample) { receive(command, sample.cdr); });
+  others_.clear();
+  for (const Command& command : commands_of(info, options_.stamped, options_.joints, names_)) {
+    if (command.when_published) others_.push_back(command);
+    if (!command.when_published || transport_->is_published(command.topic))
+      add_command(inputs, command);
   }
   for (const world_info_t& part : info) {
     for (const robot_info_t& robot : part.robots) {
@@ -201,6 +218,11 @@ void Node::listen(const std::vector<world_info_t>& info) {
     }
   }
   inputs_ = std::move(inputs);
+}
+
+void Node::add_command(std::map<std::string, Input>& inputs, const Command& command) {
+  add_input(inputs, {command.topic, command.channel, command.joints, nullptr},
+            [this, command](const Sample& sample) { receive(command, sample.cdr); });
 }
 
 // The reader that there is goes on where it does the same. Else it ends first: no message is to be
@@ -288,7 +310,8 @@ bool Node::is_read() const {
                      [](const auto& each) { return each.second->is_read(); });
 }
 
-bool Node::is_written(const std::string& topic) const {
+bool Node::is_written(const std::string& topic) {
+  look_for_writers();
   return std::any_of(inputs_.begin(), inputs_.end(), [&](const auto& each) {
     return each.second.topic.name == topic && each.second.reader->writers() > 0;
   });

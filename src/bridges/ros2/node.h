@@ -27,6 +27,7 @@ namespace ruedo::ros2 {
 struct NodeOptions {
   ConversionOptions conversion;
   double clock_hz = 100.0;  // maximum rate of /clock, in sim time
+  bool stamped = false;     // cmd_vel is a TwistStamped
   ServiceMapping mapping = ServiceMapping::automatic;
   JointNames joints = [](const std::string&) { return std::vector<std::string>(); };
 };
@@ -64,7 +65,7 @@ class Node : public run::Sink {
   // Before the run begins: whether anybody subscribes to a sensor's topic or publishes on a
   // command's, and how many of each.
   bool is_read() const;
-  bool is_written(const std::string& topic) const;
+  bool is_written(const std::string& topic);
   size_t peers() const;
 
   std::vector<Topic> outputs() const;
@@ -75,8 +76,10 @@ class Node : public run::Sink {
   void take_over(const std::vector<world_info_t>& info);  // what there is from now on
   void add_pictures(const std::vector<world_info_t>& info);
   void look_for_readers();  // of pictures
+  void look_for_writers();  // of commands of the other type
   struct Input;
   void listen(const std::vector<world_info_t>& info);
+  void add_command(std::map<std::string, Input>& inputs, const Command& command);
   void add_input(std::map<std::string, Input>& inputs, Input input, Transport::Handler handler);
   void tell_standing();
   void tell_graph();  // ros_discovery_info
@@ -113,6 +116,7 @@ class Node : public run::Sink {
     std::unique_ptr<Reader> reader;
   };
   std::map<std::string, Input> inputs_;  // by name and type
+  std::vector<Command> others_;          // those that are read while somebody publishes them
   Requests requests_;
   std::unique_ptr<Services> services_;
   std::string reply_channel_;

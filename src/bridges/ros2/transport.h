@@ -74,6 +74,9 @@ class Transport {
   virtual std::unique_ptr<Writer> add_writer(const Endpoint& endpoint) = 0;
   virtual std::unique_ptr<Reader> add_reader(const Endpoint& endpoint, Handler handler) = 0;
 
+  // Whether another participant publishes on that topic, with its type. From one thread at a time.
+  virtual bool is_published(const Topic& topic) = 0;
+
   // Handlers are called between start() and the return of stop().
   virtual void start() = 0;
   virtual void stop() = 0;

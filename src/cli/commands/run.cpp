@@ -397,6 +397,13 @@ Viewers add_viewers(CLI::App& command, RunArguments& arguments) {
       ->capture_default_str()
       ->check(CLI::IsMember({"auto", "cyclonedds", "fastrtps"}))
       ->needs(viewers.ros2);
+  command
+      .add_option("--ros2-stamped", arguments.ros2.stamped,
+                  "cmd_vel is a TwistStamped (default: from kilted on); the other type is read "
+                  "where somebody publishes it")
+      ->type_name("on|off")
+      ->check(CLI::IsMember({"on", "off"}))
+      ->needs(viewers.ros2);
   return viewers;
 }
 

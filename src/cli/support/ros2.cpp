@@ -101,6 +101,8 @@ ros2::NodeOptions node_options(run::Run& server, const Ros2Arguments& arguments)
                         arguments.topics, arguments.channels,
                         [&server] { return ros2::robot_frames(*server.world()); }};
   options.clock_hz = arguments.clock_hz;
+  options.stamped = arguments.stamped.empty() ? options.conversion.distro >= ros2::Distro::kilted
+                                              : arguments.stamped == "on";
   options.mapping = ros2::parse_mapping(arguments.services);
   options.joints = [&server](const std::string& robot) {
     return joints_of(*server.world(), robot);

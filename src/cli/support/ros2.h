@@ -19,6 +19,7 @@ struct Ros2Arguments {
   bool on = false;
   std::string distro;  // "": $ROS_DISTRO, or jazzy
   double clock_hz = 100.0;
+  std::string stamped;                                        // "on", "off"; "": by the release
   std::string services = "auto";                              // how they are mapped
   std::vector<std::pair<std::string, std::string>> topics;    // --remap of ROS names
   std::vector<std::pair<std::string, std::string>> channels;  // of the bus's

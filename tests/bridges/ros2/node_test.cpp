@@ -13,6 +13,7 @@
 #include "ruedo/image_t.hpp"
 #include "ruedo/joint_command_t.hpp"
 #include "ruedo/planar_lidar_t.hpp"
+#include "ruedo/velocity_command_t.hpp"
 
 namespace ruedo::ros2 {
 namespace {
@@ -22,6 +23,7 @@ struct Middleware {
   std::map<std::string, size_t> readers;                    // of a topic, elsewhere
   std::map<std::string, std::vector<std::string>> written;  // by topic
   std::multimap<std::string, Transport::Handler> read;      // by topic
+  std::set<std::string> published;                          // "TOPIC TYPE", by others
   std::multiset<std::string> ends;                          // the topics of the node's own
 };
 
@@ -67,6 +69,9 @@ class FakeTransport : public Transport {
   }
   std::unique_ptr<Reader> add_reader(const Endpoint& endpoint, Handler handler) override {
     return std::make_unique<FakeReader>(endpoint.topic.name, std::move(handler), shared_);
+  }
+  bool is_published(const Topic& topic) override {
+    return shared_->published.contains(topic.name + " " + topic.type);
   }
   void start() override {}
   void stop() override {}
@@ -164,6 +169,41 @@ TEST(Node, TellsWhatAnotherRobotOfTheNameIsLike) {
   node.announce(announcement({arm("arm")}));
   ASSERT_EQ(told.size(), 2u);
   EXPECT_NE(told.back().find(frames.description), std::string::npos);
+}
+
+world_info_t base(const std::string& name) {
+  world_info_t info = arm(name);
+  info.channels = {channel<velocity_command_t>(name + "/velocity", "")};
+  info.channels[0].robot = name;
+  info.channels[0].input = true;
+  return info;
+}
+
+TEST(Node, ReadsOneTypeOfCmdVelAndTheOtherOnceItIsPublished) {
+  constexpr const char* kTypes[] = {"geometry_msgs/msg/Twist", "geometry_msgs/msg/TwistStamped"};
+  for (const bool stamped : {false, true}) {
+    const auto shared = std::make_shared<Middleware>();
+    NodeOptions options;
+    options.stamped = stamped;
+    Node node(options, std::make_unique<FakeTransport>(shared), {base("p3at")},
+              [](const std::string&, std::span<const uint8_t>) {});
+    const auto types = [&] {
+      std::set<std::string> found;
+      for (const Topic& topic : node.inputs())
+        if (topic.name == "/p3at/cmd_vel") found.insert(topic.type);
+      return found;
+    };
+    EXPECT_EQ(types(), std::set<std::string>{kTypes[stamped]});
+    shared->published.insert(std::string("/p3at/cmd_vel ") + kTypes[!stamped]);
+    EXPECT_FALSE(node.is_written("/p3at/cmd_vel"));  // reads the other type from now on
+    EXPECT_EQ(types().size(), 2u);
+    node.announce(announcement({base("p3at")}));
+    EXPECT_EQ(types().size(), 2u);
+    EXPECT_EQ(shared->read.count("/p3at/cmd_vel"), 2u);
+    shared->published.clear();
+    EXPECT_FALSE(node.is_written("/p3at/cmd_vel"));
+    EXPECT_EQ(types(), std::set<std::string>{kTypes[stamped]});
+  }
 }
 
 TEST(Node, CommandsTheJointsOfTheRobotThatIsThere) {

@@ -139,6 +139,40 @@ def test_wheels_are_joints(standing):
     assert len(joints.position) == len(joints.velocity) == 4
 
 
+@pytest.mark.parametrize(
+    "distro, options, types",
+    [
+        ("humble", [], ["Twist_"]),
+        ("kilted", [], ["TwistStamped_"]),
+        ("humble", ["--ros2-stamped", "on"], ["TwistStamped_"]),
+        ("lyrical", ["--ros2-stamped", "off"], ["Twist_"]),
+    ],
+)
+def test_cmd_vel_has_the_type_of_the_release(distro, options, types):
+    """ROS's tools refuse a topic that has two."""
+    with Run("--no-noise", *options, environment={"ROS_DISTRO": distro}) as run:
+        peer = Peer(run.domain)
+        take(peer.reader("/odom", Odometry))
+        assert types_read(peer, "rt/cmd_vel") == types
+
+
+def types_read(peer, topic):
+    """The types of the topic's readers, without their package."""
+    found = BuiltinDataReader(peer.participant, BuiltinTopicDcpsSubscription).read(N=10_000)
+    return sorted(one.type_name.rpartition("::")[2] for one in found if one.topic_name == topic)
+
+
+def test_the_other_type_of_cmd_vel_is_read_while_it_is_published():
+    with Run("--no-noise") as run:
+        peer, nav2 = Peer(run.domain), Peer(run.domain)
+        take(peer.reader("/odom", Odometry))
+        assert types_read(peer, "rt/cmd_vel") == ["Twist_"]
+        nav2.writer("/cmd_vel", TwistStamped)
+        wait_for(lambda: types_read(peer, "rt/cmd_vel") == ["TwistStamped_", "Twist_"], "both")
+        del nav2
+        wait_for(lambda: types_read(peer, "rt/cmd_vel") == ["Twist_"], "one again")
+
+
 @pytest.mark.parametrize("stamped", [False, True])
 def test_cmd_vel_of_either_type_drives(stamped):
     with Run("--no-noise") as run:
@@ -217,7 +251,7 @@ def test_the_node_is_in_the_graph(standing):
     guids = {bytes(s.key.bytes): s.topic_name for s in found.take(N=1000)}
     listed = {guids[bytes(g.data)] for g in node.writer_gid_seq if bytes(g.data) in guids}
     assert {"rt/scan", "rt/odom", "rt/clock", "rt/tf", "rt/tf_static"} <= listed
-    assert len(node.reader_gid_seq) == 3 + 10 + 3  # commands, services, and the action's
+    assert len(node.reader_gid_seq) == 2 + 10 + 3  # commands, services, and the action's
 
 
 def test_many_robots_have_namespaces_and_frames_of_their_own():
