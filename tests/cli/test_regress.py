@@ -88,7 +88,7 @@ def test_a_run_equals_its_golden_log(folder):
 
 @pytest.mark.parametrize(
     ("option", "file"),
-    [("--golden", "run.lcm"), ("--html", "run.lcm.html"), ("--junit", "./run.lcm.kept")],
+    [("--golden", "run.lcm.kept"), ("--html", "run.lcm.html"), ("--junit", "./run.lcm.kept")],
 )
 def test_what_a_run_leaves_beside_its_log_is_nobody_elses(folder, option, file):
     """Before, a golden log of this name was written over, and the run held to itself."""
