@@ -12,6 +12,7 @@
 
 #include <dds/ddsi/ddsi_tran.h>
 
+#include "bridges/dds/early_messages.h"
 #include "bridges/dds/held_samples.h"
 #include "bridges/dds/known_participants.h"
 #include "bridges/dds/rtps_message.h"
@@ -28,12 +29,16 @@ class Incoming {
     const std::lock_guard lock(mutex_);
     held_.add(bytes, samples);
   }
-  // A message that nobody sent: what has to give way. 0: nothing has.
-  size_t write_notice(std::span<uint8_t> out) {
+  // A message that nobody sent now: what has to give way, or what came too early. 0: nothing.
+  size_t write_notice(std::span<uint8_t> out, ddsi_locator_t& from) {
     const std::lock_guard lock(mutex_);
     if (const auto samples = held_.overdue()) return write_dropped(*samples, out);
     if (const auto participant = known_.left()) return write_left(*participant, out);
-    return 0;
+    const auto early = early_.due(EarlyMessages::Clock::now());
+    if (!early || early->bytes.size() > out.size()) return 0;
+    std::copy(early->bytes.begin(), early->bytes.end(), out.begin());
+    from = early->from;
+    return early->bytes.size();
   }
   void serve(const ros2::Gid& participant) {
     const std::lock_guard lock(mutex_);
@@ -44,8 +49,18 @@ class Incoming {
   // The samples in the message that are left.
   std::vector<Samples> bound(std::span<uint8_t> message, const ddsi_locator_t& from) {
     const std::lock_guard lock(mutex_);
-    known_.bound(message, address_of(from), KnownParticipants::Clock::now());
+    const auto now = KnownParticipants::Clock::now();
+    known_.bound(message, address_of(from), now);
     bound_fragments(message);
+    using Told = KnownParticipants::Told;
+    if (const auto writer = writer_in(message);
+        writer && known_.told(writer->first, writer->second, now) != Told::before)
+      early_.hold({writer->first, writer->second, from, {message.begin(), message.end()}}, now);
+    early_.look(
+        [&](const EarlyMessages::Message& early) {
+          return known_.told(early.participant, early.writer, now) != Told::never;
+        },
+        now);
     return samples_in(message);
   }
 
@@ -60,6 +75,7 @@ class Incoming {
   std::mutex mutex_;
   HeldSamples held_;
   KnownParticipants known_;
+  EarlyMessages early_;
 };
 
 Incoming incoming;
@@ -91,7 +107,7 @@ ssize_t read_bounded(ddsi_tran_conn_t conn, unsigned char* into, size_t size, bo
   last.settle(into);
   last.place = into;
   // In place of the datagram, which waits in the socket.
-  if (const size_t notice = incoming.write_notice({into, size})) {
+  if (const size_t notice = incoming.write_notice({into, size}, last.from)) {
     if (from) *from = last.from;
     return static_cast<ssize_t>(notice);
   }

@@ -47,6 +47,16 @@ void KnownParticipants::bound(std::span<uint8_t> message, const Address& from,
   });
 }
 
+KnownParticipants::Told KnownParticipants::told(const Prefix& who,
+                                                const std::array<uint8_t, 4>& endpoint,
+                                                Clock::time_point now) const {
+  const auto known = known_.find(who);
+  if (known == known_.end()) return Told::before;
+  const auto found = known->second.endpoints.find({endpoint, 0});
+  if (found == known->second.endpoints.end()) return Told::never;
+  return now < found->second.told + kLately ? Told::lately : Told::before;
+}
+
 // Whether what follows is for this program, or for all.
 bool KnownParticipants::is_addressed(const Submessage& part) const {
   Prefix to{};
@@ -112,7 +122,7 @@ void KnownParticipants::tell_endpoint(const Submessage& part, const Entity& writ
     if (is_new) remove(known, key);
     return;
   }
-  if (!add(known, key, {told->topic, kEndpoint + part.bytes.size()})) return part.erase();
+  if (!add(known, key, {told->topic, kEndpoint + part.bytes.size(), {}})) return part.erase();
   bound_locators(*told, known->second.from);
   make_room_for_endpoints();
 }
@@ -120,7 +130,7 @@ void KnownParticipants::tell_endpoint(const Submessage& part, const Entity& writ
 void KnownParticipants::tell_fragment(const Submessage& part, const Entity& writer, Place known) {
   const size_t size = part.number(Submessage::kSampleSize, 4);
   const EndpointKey key{writer, part.sequence(Submessage::kSequence)};
-  if (size > kMostTold || !add(known, key, {kFragmentsTopic, kEndpoint + size}))
+  if (size > kMostTold || !add(known, key, {kFragmentsTopic, kEndpoint + size, {}}))
     return part.leave_out();
   make_room_for_endpoints();
 }
@@ -136,7 +146,9 @@ bool KnownParticipants::add(Place known, const EndpointKey& key, const Endpoint&
       return false;
     }
     ++count;
-    before = known->second.endpoints.try_emplace(key, Endpoint{endpoint.topic, 0}).first;
+    before =
+        known->second.endpoints.try_emplace(key, Endpoint{endpoint.topic, 0, known->second.heard})
+            .first;
   }
   if (const size_t more = std::max(before->second.bytes, endpoint.bytes) - before->second.bytes) {
     before->second.bytes += more;

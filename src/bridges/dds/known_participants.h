@@ -39,6 +39,8 @@ class KnownParticipants {
   static constexpr std::chrono::milliseconds kRepeat{100};
   // One of those known, and one of a socket's, gives way so often at most.
   static constexpr std::chrono::milliseconds kTurn{20};
+  // Cyclone has taken notice of an endpoint by then, on a machine that is busy.
+  static constexpr std::chrono::milliseconds kLately{100};
 
   // This program's own, to whom messages may be addressed.
   void serve(const Prefix& participant) { own_.insert(participant); }
@@ -51,6 +53,10 @@ class KnownParticipants {
 
   size_t size() const { return known_.size(); }
 
+  // Whether a participant that is known has told of that endpoint, and that time ago.
+  enum class Told { never, lately, before };
+  Told told(const Prefix& who, const std::array<uint8_t, 4>& endpoint, Clock::time_point now) const;
+
  private:
   // Who announced participants by it, and what they told.
   struct Socket {
@@ -61,6 +67,7 @@ class KnownParticipants {
   };
   struct Endpoint {
     size_t topic, bytes;
+    Clock::time_point told;
   };
   // What is told in fragments cannot be read: it is an endpoint of its own for each number.
   using EndpointKey = std::pair<Entity, int64_t>;

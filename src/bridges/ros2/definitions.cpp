@@ -161,6 +161,33 @@ constexpr Definition kDefinitions[] = {
      "string entity\n---\nResult result\nEntityState state\n"},
     {"simulation_interfaces/srv/SetEntityState",
      "string entity\nEntityState state\n---\nResult result\n"},
+    {"rcl_interfaces/msg/ParameterValue",
+     "uint8 type\nbool bool_value\nint64 integer_value\nfloat64 double_value\nstring "
+     "string_value\nbyte[] byte_array_value\nbool[] bool_array_value\nint64[] "
+     "integer_array_value\nfloat64[] double_array_value\nstring[] string_array_value\n"},
+    {"rcl_interfaces/msg/Parameter", "string name\nParameterValue value\n"},
+    {"rcl_interfaces/msg/FloatingPointRange",
+     "float64 from_value\nfloat64 to_value\nfloat64 step\n"},
+    {"rcl_interfaces/msg/IntegerRange", "int64 from_value\nint64 to_value\nuint64 step\n"},
+    {"rcl_interfaces/msg/ParameterDescriptor",
+     "string name\nuint8 type\nstring description\nstring additional_constraints\nbool read_only "
+     "false\nbool dynamic_typing false\nFloatingPointRange[<=1] "
+     "floating_point_range\nIntegerRange[<=1] integer_range\n"},
+    {"rcl_interfaces/msg/ListParametersResult", "string[] names\nstring[] prefixes\n"},
+    {"rcl_interfaces/msg/SetParametersResult", "bool successful\nstring reason\n"},
+    {"rcl_interfaces/msg/ParameterEvent",
+     "builtin_interfaces/Time stamp\nstring node\nParameter[] new_parameters\nParameter[] "
+     "changed_parameters\nParameter[] deleted_parameters\n"},
+    {"rcl_interfaces/srv/GetParameters", "string[] names\n---\nParameterValue[] values\n"},
+    {"rcl_interfaces/srv/GetParameterTypes", "string[] names\n---\nuint8[] types\n"},
+    {"rcl_interfaces/srv/ListParameters",
+     "string[] prefixes\nuint64 depth\n---\nListParametersResult result\n"},
+    {"rcl_interfaces/srv/DescribeParameters",
+     "string[] names\n---\nParameterDescriptor[] descriptors\n"},
+    {"rcl_interfaces/srv/SetParameters",
+     "Parameter[] parameters\n---\nSetParametersResult[] results\n"},
+    {"rcl_interfaces/srv/SetParametersAtomically",
+     "Parameter[] parameters\n---\nSetParametersResult result\n"},
     {"unique_identifier_msgs/msg/UUID", "uint8[16] uuid\n"},
     {"action_msgs/msg/GoalInfo",
      "unique_identifier_msgs/UUID goal_id\nbuiltin_interfaces/Time stamp\n"},

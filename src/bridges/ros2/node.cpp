@@ -46,7 +46,10 @@ Node::Node(NodeOptions options, std::unique_ptr<Transport> transport,
   drawn_topic_ = {names_.topic("", "markers"), MarkerArrays::kType, kMarkersQos};
   drawn_ = std::make_unique<DrawnTopic>(transport_->add_writer(endpoint(drawn_topic_)), names_);
   services_ = std::make_unique<Services>(
-      ServiceContext{*transport_, options_.conversion.distro, options_.mapping, names_}, requests_);
+      ServiceContext{*transport_, options_.conversion.distro, options_.mapping, names_}, requests_,
+      [this](const std::string& channel, std::span<const uint8_t> message) {
+        inject_(channel, message);
+      });
   graph_ = transport_->add_writer(
       endpoint({"ros_discovery_info", "rmw_dds_common/msg/ParticipantEntitiesInfo", kLatchedQos},
                Role::graph));

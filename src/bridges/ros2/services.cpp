@@ -147,8 +147,11 @@ class Filter {
 
 }  // namespace
 
-Services::Services(const ServiceContext& context, Requests& requests)
-    : requests_(requests), step_action_(context, requests, faulty_) {
+Services::Services(const ServiceContext& context, Requests& requests,
+                   const Requests::Inject& inject)
+    : requests_(requests),
+      step_action_(context, requests, faulty_),
+      parameters_(context, requests, inject, faulty_) {
   struct Row {
     const char* name;
     const char* type;
@@ -178,23 +181,27 @@ std::vector<Topic> Services::list() const {
   std::vector<Topic> topics;
   for (const auto& service : services_) topics.push_back(service->topic());
   topics.push_back(step_action_.topic());
+  for (const Topic& topic : parameters_.list()) topics.push_back(topic);
   return topics;
 }
 
 std::vector<const Reader*> Services::readers() const {
   std::vector<const Reader*> all = step_action_.readers();
+  for (const Reader* reader : parameters_.readers()) all.push_back(reader);
   for (const auto& service : services_) all.push_back(&service->requests());
   return all;
 }
 
 std::vector<const Writer*> Services::writers() const {
   std::vector<const Writer*> all = step_action_.writers();
+  for (const Writer* writer : parameters_.writers()) all.push_back(writer);
   for (const auto& service : services_) all.push_back(&service->replies());
   return all;
 }
 
 // Models are the entities; a body is called MODEL/LINK.
 void Services::update(const std::vector<world_info_t>& info) {
+  parameters_.update(info);
   std::set<std::string> robots;
   std::map<std::string, uint8_t> categories;
   for (const world_info_t& part : info) {

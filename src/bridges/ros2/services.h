@@ -1,4 +1,4 @@
-// The services of simulation_interfaces, and its action.
+// The services of simulation_interfaces, its action, and the node's parameters.
 #pragma once
 
 #include <atomic>
@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "bridges/ros2/parameters.h"
 #include "bridges/ros2/requests.h"
 #include "bridges/ros2/service_server.h"
 #include "bridges/ros2/step_action.h"
@@ -19,7 +20,7 @@ namespace ruedo::ros2 {
 class Services {
  public:
   // Throws EnvironmentError.
-  Services(const ServiceContext& context, Requests& requests);
+  Services(const ServiceContext& context, Requests& requests, const Requests::Inject& inject);
 
   // What there is in the run from now on. Any thread.
   void update(const std::vector<world_info_t>& info);
@@ -57,6 +58,7 @@ class Services {
   std::atomic<uint64_t> faulty_{0};
   std::vector<std::unique_ptr<ServiceServer>> services_;
   StepAction step_action_;
+  Parameters parameters_;
 
   struct Entity {
     std::string name;

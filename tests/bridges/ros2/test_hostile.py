@@ -112,8 +112,9 @@ def test_noise_on_all_that_is_read_is_harmless():
     with Run("--no-noise", world=RIG) as run:
         peer = Peer(run.domain)
         read = inputs(peer)
-        # Each kind of joint command, cmd_vel's absence aside; the pose; ten services; the action.
-        assert len(read) == 4 + 1 + 10 + 3
+        # Each kind of joint command, cmd_vel's absence aside; the pose; ten services; the action;
+        # parameters.
+        assert len(read) == 4 + 1 + 10 + 3 + 6
         liars = [
             peer.writer(topic, make_idl_struct("Noise", kind, {"data": sequence[uint8]}), "")
             for topic, kind in sorted(read)
@@ -216,9 +217,9 @@ def test_a_flood_of_calls_keeps_nobody_waiting(arguments):
             for client in (known, Client(run.domain)):
                 flood.goes_on()
                 for _ in range(5):
-                    reply = client.call("get_entity_state", "p3at", again=30.0)
+                    reply = client.call("get_entity_state", "p3at")
                     assert reply.result.result == 1
-                assert client.call("get_simulation_state", again=30.0).state == 1
+                assert client.call("get_simulation_state").state == 1
                 flood.goes_on()
         output = run.end()
     assert run.process.returncode == 0

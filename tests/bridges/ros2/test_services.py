@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import itertools
-import math
 import random
 import re
-import time
 
 import pytest
 from conftest import Peer, Run, take, wait_for
@@ -59,28 +57,21 @@ class Client:
         self.sequence = itertools.count(1)
         self.ends = {}
 
-    def call(self, service: str, *arguments, again: float = math.inf):
-        """The reply. again: calls again after so many seconds, for beside a flood more is not
-        promised while the run gets no processor.
-        """
+    def call(self, service: str, *arguments):
+        """The reply."""
         question, _ = self.services[service]
         if service not in self.ends:
             self.open(service)
             await_discovery(self.peer)
         writer, reader = self.ends[service]
         sequence = next(self.sequence)
-        asked = -math.inf
+        writer.write(question(self.mark, sequence, *arguments))
 
         def mine():
-            nonlocal asked
-            if time.monotonic() > asked + again or asked == -math.inf:
-                asked = time.monotonic()
-                writer.write(question(self.mark, sequence, *arguments))
             replies = [r for r in reader.take(N=1000) if hasattr(r, "__idl__")]
             return [r for r in replies if (r.client, r.sequence_number) == (self.mark, sequence)]
 
-        reply, *more = wait_for(mine, f"the reply of {service}")
-        assert not more or again < math.inf
+        [reply] = wait_for(mine, f"the reply of {service}")
         return reply
 
     def open(self, service: str) -> None:
@@ -101,11 +92,11 @@ class Client:
 def await_discovery(peer: Peer) -> None:
     """Until the run knows all readers and writers that the peer has so far; what these write before
     that is lost (docs/ros2.md, too). A participant tells of them in order, and here of those of a
-    new client last, which asks until it is answered.
+    new client last, which asks and is answered.
     """
     last = Client(peer.domain, peer)
     last.open("get_simulation_state")
-    last.call("get_simulation_state", again=1.0)
+    last.call("get_simulation_state")
 
 
 def at(x=0.0, y=0.0, z=0.0, frame="") -> PoseStamped:
