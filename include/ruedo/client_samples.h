@@ -244,7 +244,8 @@ struct Image : Sample {
   int width = 0;   ///< pixels
   int height = 0;  ///< pixels
   Format format =
-      Format::unknown;        ///< gray16: labels (body index + 1); float32: depth, m, +inf: nothing
+      Format::unknown;        ///< gray16: labels (body index + 1); float32: depth, m, +inf: nothing,
+                              ///< -inf: nearer than the camera sees
   int row_stride = 0;         ///< bytes in a row, 0 for jpeg
   std::vector<uint8_t> data;  ///< as they came: rows from the top, or a JPEG file
   /// Writes a JPEG's bytes as they are, rgb, bgr and gray as PPM or PGM.

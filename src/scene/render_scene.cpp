@@ -104,8 +104,11 @@ class GlRenderer : public Renderer {
         device_.read_labels(picture.labels.data());
       }
     }
+    if (picture.want_depth) {
+      to_metres(view, picture.depth);
+      mark_too_near(view, picture.depth);
+    }
     device_.context().release();
-    if (picture.want_depth) to_metres(view, picture.depth);
   }
 
   Bounds bounds() const override { return content_.bounds; }
@@ -240,6 +243,28 @@ class GlRenderer : public Renderer {
     }
   }
 
+  // What is nearer than the near plane hides what is behind it, as in Gazebo's depth cameras: -inf
+  // (REP 117).
+  void mark_too_near(const View& view, std::vector<float>& depth) {
+    if (view.orthographic) return;
+    View close = view;
+    close.near_m = 1e-3 * view.near_m;
+    close.far_m = (1.0 + 1e-6) * view.near_m;  // no gap between the two
+    culler_.collect(view_region(close), view.X_WCamera.translation, std::max(view.fx, view.fy),
+                    false, close_);
+    if (close_.opaque.empty()) return;
+    FrameBlock frame{};
+    fill(close, frame);
+    device_.set_frame(frame);
+    device_.begin_geometry(view.width, view.height);
+    device_.draw(Pass::geometry, close_.instances, close_.opaque);
+    close_depth_.resize(depth.size());
+    device_.read_depth(close_depth_.data());
+    for (size_t i = 0; i < depth.size(); ++i) {
+      if (close_depth_[i] > 0.0f) depth[i] = -std::numeric_limits<float>::infinity();
+    }
+  }
+
   static constexpr double kLinePixels = 2.5;
 
   RenderContent content_;
@@ -247,7 +272,8 @@ class GlRenderer : public Renderer {
   RenderLights lights_;
   RenderDevice device_;
   std::string description_;
-  DrawList visible_, casters_;
+  DrawList visible_, casters_, close_;
+  std::vector<float> close_depth_;  // as stored by OpenGL
   std::vector<float> overlay_;
   ShadowRegion shadow_place_;  // region of the kept shadow map
   bool shadow_drawn_ = false;

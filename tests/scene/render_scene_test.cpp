@@ -101,16 +101,37 @@ TEST(RenderScene, FarDepthKeepsItsPrecision) {
   }
 }
 
-TEST(RenderScene, NothingNearerOrFartherThanTheClip) {
+TEST(RenderScene, NearerThanTheClipHidesAndFartherIsNotSeen) {
+  constexpr float kInfinity = std::numeric_limits<float>::infinity();
   World w;
   w.box("near", {0.5, 0, 1}, {0.2, 0.1, 0.1}, kRed);
   w.box("far", {20, 0, 1}, {0.2, 30, 30}, kGreen);
   View view = ahead();
   EXPECT_NEAR(draw(w, view).depth[at(view, 160, 120)], 0.4, 1e-6);
+  const auto near_pixels = [&](bool labels) {
+    const Picture picture = draw(w, view, true, labels);
+    EXPECT_EQ(picture.depth[at(view, 160, 120)], -kInfinity);
+    EXPECT_NEAR(picture.depth[at(view, 10, 120)], 19.9, 1e-4);  // beside it
+    return std::count(picture.depth.begin(), picture.depth.end(), -kInfinity);
+  };
   view.near_m = 0.7;
-  EXPECT_NEAR(draw(w, view).depth[at(view, 160, 120)], 19.9, 1e-4);
+  for (const bool labels : {false, true}) {
+    const double width = 2.0 * std::ceil(view.fx * 0.05 / 0.4);
+    EXPECT_NEAR(near_pixels(labels), width * width, 2.0 * width);
+  }
+  view.near_m = 0.45;  // inside the box
+  EXPECT_GT(near_pixels(true), 0);
+  view.near_m = 0.7;
   view.far_m = 19.0;
-  EXPECT_EQ(draw(w, view).depth[at(view, 160, 120)], std::numeric_limits<float>::infinity());
+  EXPECT_EQ(draw(w, view).depth[at(view, 10, 120)], kInfinity);
+}
+
+// A camera in its housing looks out: inner faces are not drawn.
+TEST(RenderScene, AClosedShapeAroundTheCameraHidesNothing) {
+  World w;
+  w.box("housing", {0, 0, 1}, {0.06, 0.06, 0.06}, kRed);
+  w.box("far", {20, 0, 1}, {0.2, 30, 30}, kGreen);
+  EXPECT_NEAR(draw(w, ahead()).depth[at(ahead(), 160, 120)], 19.9, 1e-4);
 }
 
 TEST(RenderScene, PlacesInThePicture) {

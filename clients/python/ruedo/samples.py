@@ -231,7 +231,8 @@ class Pose(Sample):
 @dataclass(frozen=True, eq=False, repr=False)
 class Image(Sample):
     """A picture. format: "jpeg", "rgb", "bgr", "gray", "gray16" (labels: body index + 1) or
-    "float32" (depth, m along the optical axis, +inf: nothing)."""
+    "float32" (depth, m along the optical axis, +inf: nothing, -inf: nearer than the camera
+    sees)."""
 
     width: int  # pixels
     height: int  # pixels

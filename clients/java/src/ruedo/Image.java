@@ -18,7 +18,7 @@ public final class Image extends Sample {
 
     /**
      * "jpeg", "rgb", "bgr", "gray", "gray16" (labels: body index + 1), "float32" (depth, m; +inf:
-     * nothing).
+     * nothing, -inf: nearer than the camera sees).
      */
     public final String format;
 
