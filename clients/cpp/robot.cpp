@@ -238,6 +238,9 @@ Device<SonarReading> Robot::sonar() const {
 Device<Odometry> Robot::odometry() const {
   return first_device<Odometry>(*core_, name_, "odometry");
 }
+Stream<OdometryTwist> Robot::odometry_twist() const {
+  return first_stream<OdometryTwist>(*core_, name_, "velocity of odometry");
+}
 Device<Imu> Robot::imu() const { return first_device<Imu>(*core_, name_, "IMU"); }
 Device<Contact> Robot::contact() const {
   return first_device<Contact>(*core_, name_, "contact sensor");

@@ -17,6 +17,7 @@ namespace ruedo::client {
   X(LidarScan, lidar_t)              \
   X(SonarReading, sonar_t)           \
   X(Odometry, odometry_t)            \
+  X(OdometryTwist, odometry_twist_t) \
   X(Pose, pose_t)                    \
   X(Image, image_t)                  \
   X(CameraInfo, camera_info_t)       \

@@ -21,6 +21,7 @@
 #include "ruedo/motion_status_t.hpp"
 #include "ruedo/navsat_t.hpp"
 #include "ruedo/odometry_t.hpp"
+#include "ruedo/odometry_twist_t.hpp"
 #include "ruedo/planar_lidar_t.hpp"
 #include "ruedo/pose_t.hpp"
 #include "ruedo/sonar_t.hpp"
@@ -171,6 +172,14 @@ std::shared_ptr<const Sample> decode_odometry(WireReader& in) {
   s->wheel_rates = in.doubles(n);
   s->ticks = in.int64s(n);
   s->resets = in.int32();
+  return s;
+}
+
+std::shared_ptr<const Sample> decode_odometry_twist(WireReader& in) {
+  auto s = std::make_shared<OdometryTwist>();
+  s->utime = in.int64();
+  for (double* value : {&s->vx, &s->vy, &s->omega}) *value = in.float64();
+  s->covariance = in.array<9>();
   return s;
 }
 
@@ -373,6 +382,7 @@ const SampleDecoder kDecoders[] = {
     {"lidar_t", lidar_t::getHash(), decode_lidar},
     {"sonar_t", sonar_t::getHash(), decode_sonar},
     {"odometry_t", odometry_t::getHash(), decode_odometry},
+    {"odometry_twist_t", odometry_twist_t::getHash(), decode_odometry_twist},
     {"pose_t", pose_t::getHash(), decode_pose},
     {"image_t", image_t::getHash(), decode_image},
     {"camera_info_t", camera_info_t::getHash(), decode_camera_info},

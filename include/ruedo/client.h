@@ -420,9 +420,11 @@ class Robot {
   Device<LidarScan> lidar() const;     ///< @return the laser scanner of several layers
   Device<SonarReading> sonar() const;  ///< @return the array of sonars
   Device<Odometry> odometry() const;   ///< @return the odometry
-  Camera camera() const;               ///< @return the camera
-  Device<Imu> imu() const;             ///< @return the inertial unit
-  Device<Contact> contact() const;     ///< @return the bumper
+  /// @return what the odometry makes of the wheels' speeds, also sideways
+  Stream<OdometryTwist> odometry_twist() const;
+  Camera camera() const;            ///< @return the camera
+  Device<Imu> imu() const;          ///< @return the inertial unit
+  Device<Contact> contact() const;  ///< @return the bumper
   /// @}
   /// @return what it runs into, and what blocks it; it needs no bumper
   /// @throws UnknownName, NoServer

@@ -225,6 +225,14 @@ struct Odometry : Sample {
   int32_t resets = 0;               ///< how often the pose was reset
 };
 
+/// What the robot believes of its velocity from its wheels, in base_link; comes with each Odometry.
+struct OdometryTwist : Sample {
+  double vx = 0.0;                     ///< m/s, ahead
+  double vy = 0.0;                     ///< m/s, to the left
+  double omega = 0.0;                  ///< rad/s
+  std::array<double, 9> covariance{};  ///< of (vx, vy, omega), by rows; 0: ideal encoders
+};
+
 /// The true pose of base_link in the world; velocities are expressed in base_link.
 struct Pose : Sample {
   Vector3 position{};                       ///< m
@@ -241,13 +249,12 @@ struct Pose : Sample {
 struct Image : Sample {
   /// How `data` has it.
   enum class Format { unknown, jpeg, rgb, bgr, gray, gray16, float32 };
-  int width = 0;   ///< pixels
-  int height = 0;  ///< pixels
-  Format format =
-      Format::unknown;        ///< gray16: labels (body index + 1); float32: depth, m, +inf: nothing,
-                              ///< -inf: nearer than the camera sees
-  int row_stride = 0;         ///< bytes in a row, 0 for jpeg
-  std::vector<uint8_t> data;  ///< as they came: rows from the top, or a JPEG file
+  int width = 0;                    ///< pixels
+  int height = 0;                   ///< pixels
+  Format format = Format::unknown;  ///< gray16: labels (body index + 1); float32: depth, m, +inf:
+                                    ///< nothing, -inf: nearer than the camera sees
+  int row_stride = 0;               ///< bytes in a row, 0 for jpeg
+  std::vector<uint8_t> data;        ///< as they came: rows from the top, or a JPEG file
   /// Writes a JPEG's bytes as they are, rgb, bgr and gray as PPM or PGM.
   /// @param path of the file
   /// @throws Error for another format, and for what cannot be written

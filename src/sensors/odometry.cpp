@@ -1,6 +1,6 @@
-// Odometry: the pose that a robot computes from its wheel encoders, on ROBOT/odometry. Models the
-// encoders and the robot's estimate with their errors: ticks, wrap-around, slip, wrong radius,
-// wrong track.
+// Odometry: the pose that a robot computes from its wheel encoders, on ROBOT/odometry, and its
+// velocity with covariances on ROBOT/odometry/twist. Models the encoders and the robot's estimate
+// with their errors: ticks, wrap-around, slip, wrong radius, wrong track.
 //
 // The wheels are read at every step. With s_l and s_r the way of the left and right wheels in a
 // step (the mean of a side's wheels, times the radius that the robot believes in), d = (s_l + s_r)
@@ -15,13 +15,20 @@
 //   rates (the printed eq. 4 has their sum): speeds at both ends of the step, averaged. It leaves
 //   v omega^2 dt^3 / 12 a step, 5e-10 m at 0.2 m/s, 0.5 rad/s and 5 ms.
 // Other drives take the arc, with what world/model/base_odometry.h makes of their wheels.
+//
+// The velocity's covariance holds what is drawn at random: slip, and the ticks between which a
+// wheel stood at both ends of the interval (variance of a difference of two uniform errors, tick^2
+// / 6).
+#include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <optional>
 
 #include "base/sincos.h"
 #include "base/whole.h"
 #include "ruedo/math.h"
 #include "ruedo/odometry_t.hpp"
+#include "ruedo/odometry_twist_t.hpp"
 #include "ruedo/sensor.h"
 #include "world/model/base_odometry.h"
 #include "world/model/body_layout.h"
@@ -67,6 +74,8 @@ struct Configuration {
   }
 };
 
+double square(double x) { return x * x; }
+
 // sin(x) / x
 double sinc(double x) {
   const double x2 = x * x;
@@ -79,7 +88,8 @@ class Odometry : public SensorOf<Odometry> {
       : configuration_(setup.element),
         random_(setup.random),
         robot_(setup.robot_index),
-        channel_(setup.channel<odometry_t>()) {
+        channel_(setup.channel<odometry_t>()),
+        twist_channel_(setup.channel<odometry_twist_t>("twist")) {
     const world::RobotPlacement& robot = setup.layout.robots[robot_];
     const world::DriveDescription& drive = *setup.world.models[robot.instance].model->drive;
     if (!setup.noise) configuration_.slip_noise = 0.0;
@@ -110,6 +120,7 @@ class Odometry : public SensorOf<Odometry> {
       side_rates(speed_before_);
     } else if (now.time > time_) {
       const double dt_s = 1e-6 * static_cast<double>(now.time - time_);
+      if (base_) slip_variance_ = Vec3::Zero();  // its velocity is that of the last step
       turn_wheels(now, dt_s);
       if (base_)
         integrate_base(now, dt_s);
@@ -145,13 +156,16 @@ class Odometry : public SensorOf<Odometry> {
       if (!wheel.steers) speed[wheel.side] += rate * believed_radius(wheel.side);
     }
     for (int side : {0, 1}) speed[side] /= std::max(1, wheels_of_side_[side]);
+    const Vec3 twist =
+        base_ ? rate_ : Vec3(0.5 * (speed[0] + speed[1]), 0.0, (speed[1] - speed[0]) / track_);
+    publish_twist(input.snapshot.time, twist, base_ ? step_s_ : period_s, out);
     sample_time_ = input.snapshot.time;
     message_.utime = input.snapshot.time;
     message_.x = x_;
     message_.y = y_;
     message_.theta = theta_;
-    message_.v = base_ ? rate_.x() : 0.5 * (speed[0] + speed[1]);
-    message_.omega = base_ ? rate_.z() : (speed[1] - speed[0]) / track_;
+    message_.v = twist.x();
+    message_.omega = twist.z();
     message_.resets = resets_;
     out.publish(channel_, message_);
   }
@@ -160,7 +174,7 @@ class Odometry : public SensorOf<Odometry> {
     archive.each(wheels_);
     if (base_) archive(*base_);
     archive(X_WBase_, rate_, ways_, angles_, time_, sample_time_, x_, y_, theta_, speed_before_,
-            resets_);
+            resets_, slip_variance_, step_s_);
   }
 
  private:
@@ -227,9 +241,11 @@ class Odometry : public SensorOf<Odometry> {
     if (configuration_.slip_noise > 0.0 && (way[0] != 0.0 || way[1] != 0.0)) {
       RandomStream stream = random_.stream(static_cast<uint64_t>(now.step));
       double slip[2];
-      for (const int side : {0, 1})
+      for (const int side : {0, 1}) {
         slip[side] = configuration_.slip_noise * std::sqrt(std::abs(way[side])) *
                      stream.gaussian() / radius_;
+        slip_variance_[side] += square(configuration_.slip_noise) * std::abs(way[side]);
+      }
       for (Wheel& wheel : wheels_) {
         if (wheel.steers) continue;
         wheel.slipped += slip[wheel.side];
@@ -281,16 +297,57 @@ class Odometry : public SensorOf<Odometry> {
       moved = base_->moved(X_WBase_, X_WBase);
       if (configuration_.slip_noise > 0.0 && moved != Vec3::Zero()) {
         RandomStream stream = random_.stream(static_cast<uint64_t>(now.step));
-        for (int i = 0; i < 3; ++i)
+        for (int i = 0; i < 3; ++i) {
+          slip_variance_[i] = square(configuration_.slip_noise) * std::abs(moved[i]);
           moved[i] += configuration_.slip_noise * std::sqrt(std::abs(moved[i])) * stream.gaussian();
+        }
       }
     }
     X_WBase_ = X_WBase;
     rate_ = moved / dt_s;
+    step_s_ = dt_s;
     const double along = theta_ + 0.5 * moved.z(), chord = sinc(0.5 * moved.z());
     x_ += chord * (moved.x() * math::cos(along) - moved.y() * math::sin(along));
     y_ += chord * (moved.x() * math::sin(along) + moved.y() * math::cos(along));
     theta_ += moved.z();
+  }
+
+  // Motion of base_link for each metre that a wheel travels: m ahead, m to the left, rad.
+  Vec3 moved_by(size_t wheel) const {
+    if (base_) return base_->moved_by(wheel);
+    const int side = wheels_[wheel].side;
+    const double share = 1.0 / wheels_of_side_[side];
+    return {0.5 * share, 0.0, (side == 0 ? -share : share) / track_};
+  }
+
+  // Of the motion in the interval that the velocity is the mean of: m^2, m rad, rad^2.
+  Eigen::Matrix3d covariance() const {
+    if (wheels_.empty()) return slip_variance_.asDiagonal();
+    Eigen::Matrix3d sum = Eigen::Matrix3d::Zero();
+    Vec3 by_side[2] = {Vec3::Zero(), Vec3::Zero()};  // the wheels of a side slip together
+    for (size_t i = 0; i < wheels_.size(); ++i) {
+      if (wheels_[i].steers) continue;
+      const Vec3 by = believed_radius(wheels_[i].side) * moved_by(i);
+      by_side[wheels_[i].side] += by;
+      if (configuration_.ticks_per_turn > 0) sum += square(angle_of(1)) / 6.0 * by * by.transpose();
+    }
+    for (const int side : {0, 1})
+      sum += slip_variance_[side] / square(radius_) * by_side[side] * by_side[side].transpose();
+    return sum;
+  }
+
+  // interval_s: 0 before the first step, when nothing has been measured.
+  void publish_twist(SimTime time, const Vec3& twist, double interval_s, Outbox& out) {
+    twist_.utime = time;
+    twist_.vx = twist.x();
+    twist_.vy = twist.y();
+    twist_.omega = twist.z();
+    std::fill(std::begin(twist_.covariance), std::end(twist_.covariance), 0.0);
+    const bool random = configuration_.ticks_per_turn > 0 || configuration_.slip_noise > 0.0;
+    if (random && interval_s > 0.0)
+      Eigen::Map<Eigen::Matrix3d>(twist_.covariance) = covariance() / square(interval_s);
+    slip_variance_ = Vec3::Zero();
+    out.publish(twist_channel_, twist_);
   }
 
   void side_rates(double (&speed)[2]) const {
@@ -320,20 +377,25 @@ class Odometry : public SensorOf<Odometry> {
   Configuration configuration_;
   RandomSource random_;
   RobotIndex robot_;
-  int channel_;
+  int channel_, twist_channel_;
   double radius_ = 0.0, track_ = 0.0;  // m; the track that the robot believes
   std::vector<Wheel> wheels_;
   int wheels_of_side_[2] = {0, 0};
   std::optional<world::BaseOdometry> base_;  // for other than differential drives
   Pose X_WBase_;                             // at the previous step
   Vec3 rate_ = Vec3::Zero();  // m/s forward and to the left, rad/s, in the last step; with base_
+  double step_s_ = 0.0;       // s, the last step; with base_
   std::vector<double> ways_, angles_;
+  // m^2, of the slip since the last sample, with base_ in the last step: of left and right wheels;
+  // without wheels m^2, m^2, rad^2 ahead, to the left, turning
+  Vec3 slip_variance_ = Vec3::Zero();
 
   SimTime time_ = -1, sample_time_ = 0;
   double x_ = 0.0, y_ = 0.0, theta_ = 0.0;  // m, m, rad: base_link in odom
   double speed_before_[2] = {0.0, 0.0};     // m/s, left and right, at the previous step
   int32_t resets_ = 0;
   odometry_t message_;
+  odometry_twist_t twist_;
 };
 
 const RegisterSensor kRegister{

@@ -49,10 +49,12 @@ TEST(Schedule, StepThenModuleThenRobot) {
     }
     return names;
   };
-  EXPECT_EQ(names_at(20'000), (Names{"b/odometry", "b/pose", "a/odometry", "a/pose"}));
+  EXPECT_EQ(names_at(20'000), (Names{"b/odometry/twist", "b/odometry", "b/pose", "a/odometry/twist",
+                                     "a/odometry", "a/pose"}));
   EXPECT_EQ(names_at(35'000), (Names{"ruedo/world"}));  // the first step at or after 33.3 ms
-  EXPECT_EQ(names_at(100'000), (Names{"b/collisions", "b/odometry", "b/pose", "a/collisions",
-                                      "a/odometry", "a/pose", "ruedo/world"}));
+  EXPECT_EQ(names_at(100'000),
+            (Names{"b/collisions", "b/odometry/twist", "b/odometry", "b/pose", "a/collisions",
+                   "a/odometry/twist", "a/odometry", "a/pose", "ruedo/world"}));
 }
 
 // An hour of sim time: sample k is at the first step at or after k / rate, and none is missing.

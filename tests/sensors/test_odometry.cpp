@@ -6,6 +6,7 @@
 #include <gtest/gtest.h>
 
 #include "ruedo/odometry_t.hpp"
+#include "ruedo/odometry_twist_t.hpp"
 #include "sensors/sensor_bench.h"
 
 namespace ruedo {
@@ -69,7 +70,8 @@ class Drive {
     test::step(device, now, out, due ? ++samples : -1);
   }
 
-  odometry_t last() const { return Device::decode<odometry_t>(out).back(); }
+  odometry_t last() const { return Device::decode<odometry_t>(out, 0).back(); }
+  odometry_twist_t twist() const { return Device::decode<odometry_twist_t>(out, 1).back(); }
 
   SensorBench bench;
   Device device;
@@ -90,7 +92,8 @@ TEST(Odometry, StartsAtZeroWhereverTheRobotStands) {
 
 TEST(Odometry, ChannelTypeAndRate) {
   Drive drive("<ruedo:rate>20</ruedo:rate>");
-  EXPECT_EQ(drive.device.channels, (std::vector<std::string>{"rover/odometry"}));
+  EXPECT_EQ(drive.device.channels,
+            (std::vector<std::string>{"rover/odometry", "rover/odometry/twist"}));
   EXPECT_EQ(drive.device.rate, (Rate{20, 1}));
   EXPECT_TRUE(drive.device.sensor->observes());
 }
@@ -317,6 +320,65 @@ TEST(Odometry, SlipHasItsSigmaAndIsIndependent) {
   EXPECT_NEAR(squares / kSteps, 1.0, 3.29 * std::sqrt(2.0 / kSteps));
   for (const double product : {across, along, robots})
     EXPECT_LT(std::abs(product), 3.29 * std::sqrt(kSteps));
+}
+
+TEST(Odometry, TwistIsOdometrysAndExactWithIdealEncoders) {
+  Drive drive("");
+  drive.to(0.02, 0.04, 5000, 4.0, 8.0);
+  const odometry_twist_t twist = drive.twist();
+  EXPECT_EQ(twist.utime, 5000);
+  EXPECT_EQ(twist.vx, drive.last().v);
+  EXPECT_EQ(twist.vy, 0.0);
+  EXPECT_EQ(twist.omega, drive.last().omega);
+  EXPECT_THAT(twist.covariance, testing::Each(0.0));
+}
+
+TEST(Odometry, CovarianceOfTheTwistIsThatOfTheSlip) {
+  Drive drive("<ruedo:slip_noise>0.02</ruedo:slip_noise>");
+  drive.to(0.0, 0.0, 5000, 0.0, 0.0);
+  constexpr int kSamples = 4000;
+  Eigen::Matrix3d sum = Eigen::Matrix3d::Zero();
+  for (int i = 1; i <= kSamples; ++i) {  // 50 Hz; 0.1 m/s left, 0.4 m/s right
+    const double turned = 0.02 * (i - 1);
+    for (int k = 1; k <= 4; ++k)
+      drive.to(turned + 0.005 * k, 4.0 * (turned + 0.005 * k), 5000, 1.0, 4.0, k == 4);
+    const odometry_twist_t twist = drive.twist();
+    const Vec3 error(twist.vx - 0.25, twist.vy, twist.omega - 0.75);
+    sum += error * error.transpose();
+    drive.out.clear();
+  }
+  drive.to(0.02 * kSamples + 0.02, 4.0 * (0.02 * kSamples + 0.02), 20000, 1.0, 4.0);
+  // sides: 0.02^2 (0.002 m, 0.008 m) / (0.02 s)^2
+  const double left = 0.002, right = 0.008;
+  const odometry_twist_t twist = drive.twist();
+  const double expected[3][3] = {{(left + right) / 4, 0, (right - left) / (2 * kTrack)},
+                                 {0, 0, 0},
+                                 {(right - left) / (2 * kTrack), 0, (left + right) / 0.16}};
+  for (int i = 0; i < 3; ++i) {
+    for (int k = 0; k < 3; ++k) {
+      EXPECT_NEAR(twist.covariance[3 * i + k], expected[i][k], 1e-12);
+      EXPECT_NEAR(sum(i, k) / kSamples, expected[i][k],
+                  3.29 * std::sqrt(2.0 * expected[i][i] * expected[k][k] / kSamples));
+    }
+  }
+}
+
+TEST(Odometry, CovarianceOfTheTwistIsThatOfTheTicks) {
+  Drive drive("<ruedo:ticks_per_turn>500</ruedo:ticks_per_turn>");
+  double turned = 0.0, squares = 0.0;
+  constexpr int kSamples = 4000;
+  for (int i = 0; i < kSamples; ++i) {
+    turned += 0.03 + 0.01 * std::sin(1.7 * i);  // no multiple of a tick
+    const double before = i == 0 ? 0.0 : turned - 0.03 - 0.01 * std::sin(1.7 * i);
+    drive.to(turned, 1.3 * turned, 20000);
+    const double v = kRadius * 1.15 * (turned - before) / 0.02;
+    squares += std::pow(drive.twist().vx - v, 2);
+    drive.out.clear();
+  }
+  drive.to(turned + 0.03, 1.3 * (turned + 0.03), 20000);
+  const double tick = kRadius * 2.0 * M_PI / 500.0 / 0.02;  // m/s
+  EXPECT_NEAR(drive.twist().covariance[0], tick * tick / 12.0, 1e-12);
+  EXPECT_NEAR(squares / kSamples, tick * tick / 12.0, 0.1 * tick * tick / 12.0);
 }
 
 TEST(Odometry, SlipCanBeSwitchedOffAndAStandingRobotHasNone) {

@@ -27,6 +27,7 @@ from .samples import (
     LidarScan,
     MotionStatus,
     Odometry,
+    OdometryTwist,
     Pose,
     Scan,
     SonarReading,
@@ -191,6 +192,11 @@ class Robot:
     @property
     def odometry(self) -> Device[Odometry]:
         return self._first("odometry_t", "odometry")
+
+    @property
+    def odometry_twist(self) -> Stream[OdometryTwist]:
+        """What the odometry makes of the wheels' speeds, also sideways."""
+        return self._stream("odometry_twist_t", "velocity of odometry")
 
     @property
     def camera(self) -> Camera:

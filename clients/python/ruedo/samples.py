@@ -204,6 +204,18 @@ class Odometry(Sample):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
+class OdometryTwist(Sample):
+    """What the robot believes of its velocity from its wheels, in base_link; comes with each
+    Odometry.
+    """
+
+    vx: float  # m/s, ahead
+    vy: float  # m/s, to the left
+    omega: float  # rad/s
+    covariance: Floats  # (3, 3) of (vx, vy, omega); 0: ideal encoders
+
+
+@dataclass(frozen=True, eq=False, repr=False)
 class Pose(Sample):
     """The true pose of base_link in the world; velocities are expressed in base_link."""
 
@@ -524,6 +536,10 @@ def _odometry(m: Any) -> Odometry:
     )
 
 
+def _odometry_twist(m: Any) -> OdometryTwist:
+    return OdometryTwist(m.utime, m.vx, m.vy, m.omega, floats(np.reshape(m.covariance, (3, 3))))
+
+
 def _pose(m: Any) -> Pose:
     return Pose(
         m.utime,
@@ -656,6 +672,7 @@ CONVERSIONS: dict[str, tuple[Any, Callable[[Any], Any]]] = {
     "lidar_t": (lcmtypes.lidar_t, _lidar),
     "sonar_t": (lcmtypes.sonar_t, _sonar),
     "odometry_t": (lcmtypes.odometry_t, _odometry),
+    "odometry_twist_t": (lcmtypes.odometry_twist_t, _odometry_twist),
     "pose_t": (lcmtypes.pose_t, _pose),
     "image_t": (lcmtypes.image_t, _image),
     "camera_info_t": (lcmtypes.camera_info_t, _camera_info),

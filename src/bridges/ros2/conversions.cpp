@@ -30,6 +30,7 @@
 #include "ruedo/math.h"
 #include "ruedo/navsat_t.hpp"
 #include "ruedo/odometry_t.hpp"
+#include "ruedo/odometry_twist_t.hpp"
 #include "ruedo/planar_lidar_t.hpp"
 #include "ruedo/pose.h"
 #include "ruedo/pose_t.hpp"
@@ -56,6 +57,8 @@ struct Source {
   std::string base, odom, frame, optical, world;
   int element = -1;  // of a sonar
   Distro distro = Distro::jazzy;
+  // The robot's last one; a log of an earlier version has none.
+  std::shared_ptr<const odometry_twist_t> twist;
 };
 
 void put_vector(CdrWriter& out, double x, double y, double z) { out.put(x).put(y).put(z); }
@@ -168,15 +171,33 @@ void put_yaw(CdrWriter& out, double yaw) {
   out.put(0.0).put(0.0).put(math::sin(yaw / 2)).put(math::cos(yaw / 2));
 }
 
+// odometry_t has no sideways speed: the twist that was sent with it has.
+odometry_twist_t twist_of(const odometry_t& odometry, const Source& from) {
+  if (from.twist && from.twist->utime == odometry.utime) return *from.twist;
+  odometry_twist_t twist{};
+  twist.vx = odometry.v;
+  twist.omega = odometry.omega;
+  return twist;
+}
+
+// That of (vx, vy, omega) in that of (x, y, z, and turns about them).
+void put_covariance(CdrWriter& out, std::span<const double, 9> of_plane) {
+  constexpr size_t kAxes[] = {0, 1, 5};
+  double all[36] = {};
+  for (size_t i = 0; i < 9; ++i) all[6 * kAxes[i / 3] + kAxes[i % 3]] = of_plane[i];
+  out.put_array(std::span<const double>(all));
+}
+
 void write_odometry(const odometry_t& odometry, const Source& from, CdrWriter& out) {
+  const odometry_twist_t twist = twist_of(odometry, from);
   put_header(out, odometry.utime, from.odom);
   out.put(from.base);
   put_vector(out, odometry.x, odometry.y, 0.0);
   put_yaw(out, odometry.theta);
   put_zeros<36>(out);
-  put_vector(out, odometry.v, 0.0, 0.0);
-  put_vector(out, 0.0, 0.0, odometry.omega);
-  put_zeros<36>(out);
+  put_vector(out, twist.vx, twist.vy, 0.0);
+  put_vector(out, 0.0, 0.0, twist.omega);
+  put_covariance(out, twist.covariance);
 }
 
 size_t count_frames(const std::vector<MovedLink>& links, size_t count) {
@@ -560,6 +581,7 @@ struct Conversions::Plan {
   // number of uses of a robot's topic by its devices
   std::map<std::pair<std::string, std::string>, int> uses;
   std::map<std::string, RobotFrames> links;
+  std::map<std::string, std::shared_ptr<odometry_twist_t>> twists = {};  // by robot
 
   std::vector<MovedLink> moved(const std::string& robot,
                                const std::vector<RobotFrames::Moved>& all) const {
@@ -584,6 +606,8 @@ struct Conversions::Plan {
       from.wheels = robot->second->wheels;
     if (const auto device = devices.find(name); device != devices.end())
       from.device = *device->second;
+    if (const auto twist = twists.find(channel.robot); twist != twists.end())
+      from.twist = twist->second;
     const std::string original = original_name(channel.name);
     if (original.starts_with(name + "/")) from.part = original.substr(name.size() + 1);
     if (const auto robot = links.find(channel.robot); robot != links.end()) {
@@ -660,6 +684,22 @@ class TypedRoute : public Conversions::Route {
   CdrWriter out_;
 };
 
+// Publishes nothing of its own: ROS has the velocity in odometry's message.
+class TwistRoute : public Conversions::Route {
+ public:
+  explicit TwistRoute(std::shared_ptr<odometry_twist_t> twist) : twist_(std::move(twist)) {
+    twist_->utime = -1;
+  }
+
+  bool run(std::span<const uint8_t> message, const Conversions::Wanted&,
+           const Conversions::Emit&) override {
+    return decode_checked(message.data(), message.size(), *twist_) == DecodeFault::none;
+  }
+
+ private:
+  std::shared_ptr<odometry_twist_t> twist_;
+};
+
 // Calls visit.operator()<Message>() with the type of that name; this is the list of all types that
 // are converted.
 template <class Visit>
@@ -697,6 +737,11 @@ Conversions::Conversions(const std::vector<world_info_t>& info, const Conversion
       plan.devices[device.robot + "/" + device.name] = &device;
   }
   names.update(robots);
+  each_channel([&](const channel_info_t& channel) {
+    if (channel.type != odometry_twist_t::getTypeName()) return;
+    auto& twist = plan.twists[channel.robot] = std::make_shared<odometry_twist_t>();
+    routes_[channel.name] = std::make_unique<TwistRoute>(twist);
+  });
   each_channel([&](const channel_info_t& channel) {
     with_type(channel.type, [&]<class Message>() { plan.count<Message>(channel); });
   });

@@ -14,6 +14,7 @@
 #include "ruedo/imu_t.hpp"
 #include "ruedo/lidar_t.hpp"
 #include "ruedo/odometry_t.hpp"
+#include "ruedo/odometry_twist_t.hpp"
 #include "ruedo/planar_lidar_t.hpp"
 #include "ruedo/sonar_t.hpp"
 
@@ -87,6 +88,10 @@ void change(const SensorFault& fault, odometry_t& message) {  // a bias applies 
   for (double* value : {&message.x, &message.y, &message.v, &message.omega})
     *value = wrong(fault, *value);
 }
+void change(const SensorFault& fault, odometry_twist_t& message) {
+  if (fault.kind == SensorFault::Kind::bias) return;
+  for (double* value : {&message.vx, &message.vy, &message.omega}) *value = wrong(fault, *value);
+}
 // a bias applies to the rate about its z axis
 void change(const SensorFault& fault, imu_t& message) {
   message.angular_velocity[2] = wrong(fault, message.angular_velocity[2]);
@@ -110,7 +115,7 @@ bool change_as(const SensorFault& fault, std::vector<uint8_t>& bytes) {
 void change_values(const SensorFault& fault, std::vector<uint8_t>& bytes) {
   static_cast<void>(change_as<planar_lidar_t>(fault, bytes) || change_as<sonar_t>(fault, bytes) ||
                     change_as<lidar_t>(fault, bytes) || change_as<odometry_t>(fault, bytes) ||
-                    change_as<imu_t>(fault, bytes));
+                    change_as<odometry_twist_t>(fault, bytes) || change_as<imu_t>(fault, bytes));
 }
 
 bool keeps(const SensorFault& fault) {

@@ -57,15 +57,26 @@ double BaseOdometry::curvature(const std::vector<double>& angles) const {
 }
 
 Vec3 BaseOdometry::moved(const std::vector<double>& ways, const std::vector<double>& angles) {
+  if (!rims_.empty()) return moved_along(0.0, ways);
+  const double now = curvature(angles);
+  const double middle = started_ ? 0.5 * (curvature_before_ + now) : now;
+  curvature_before_ = now;
+  started_ = true;
+  return moved_along(middle, ways);
+}
+
+Vec3 BaseOdometry::moved_by(size_t wheel) const {
+  std::vector<double> ways(rims_.empty() ? wheels_.size() : rims_.size(), 0.0);
+  ways[wheel] = 1.0;
+  return moved_along(curvature_before_, ways);
+}
+
+Vec3 BaseOdometry::moved_along(double curvature, const std::vector<double>& ways) const {
   if (!rims_.empty()) {
     Vec3 sum = Vec3::Zero();
     for (size_t i = 0; i < rims_.size(); ++i) sum += rims_[i] * ways[i];
     return normal_.ldlt().solve(sum);
   }
-  const double now = curvature(angles);
-  const double middle = started_ ? 0.5 * (curvature_before_ + now) : now;
-  curvature_before_ = now;
-  started_ = true;
   const bool any_fixed = std::any_of(wheels_.begin(), wheels_.end(), [](const Wheel& wheel) {
     return !wheel.steers && !wheel.steered;
   });
@@ -75,13 +86,13 @@ Vec3 BaseOdometry::moved(const std::vector<double>& ways, const std::vector<doub
     const Wheel& wheel = wheels_[i];
     if (wheel.steers || (any_fixed && wheel.steered)) continue;
     // A wheel runs on a circle about the same centre as base_link; their paths are in proportion.
-    const double part = wheel.steered ? math::hypot(1.0 - middle * wheel.y, middle * wheel.x)
-                                      : 1.0 - middle * wheel.y;
+    const double part = wheel.steered ? math::hypot(1.0 - curvature * wheel.y, curvature * wheel.x)
+                                      : 1.0 - curvature * wheel.y;
     way += ways[i] / part;
     ++count;
   }
   if (count > 0) way /= count;
-  return {way, 0.0, way * middle};
+  return {way, 0.0, way * curvature};
 }
 
 Vec3 BaseOdometry::moved(const Pose& before, const Pose& after) const {

@@ -25,6 +25,8 @@ class BaseOdometry {
   // order: the distance each travelled (m), and its angle after the step (rad).
   Vec3 moved(const std::vector<double>& ways, const std::vector<double>& angles);
   Vec3 moved(const Pose& before, const Pose& after) const;
+  // Motion of base_link for each metre that one wheel travels, steered as after the last step.
+  Vec3 moved_by(size_t wheel) const;
 
   void exchange(StateArchive& archive) { archive(curvature_before_, started_); }
 
@@ -35,6 +37,7 @@ class BaseOdometry {
     double x, y;  // m, in base_link
   };
   double curvature(const std::vector<double>& angles) const;
+  Vec3 moved_along(double curvature, const std::vector<double>& ways) const;
 
   std::vector<Wheel> wheels_;  // steered bases only
   std::vector<Vec3> rims_;     // mecanum and omni wheels only

@@ -16,6 +16,7 @@ from pathlib import Path
 import lcm
 import mcap.writer
 import pytest
+import ruedo as ruedo_client
 from mcap.reader import make_reader
 from mcap_ros2.decoder import DecoderFactory
 from rosbags.rosbag2 import Reader, StoragePlugin, Writer
@@ -288,6 +289,27 @@ def test_raw_pictures_and_several_robots(tmp_path):
     ruedo("export", log, "--ros2", bag)
     found = shown(bag, tmp_path / "temporary")
     assert found == events(log) and {"p3at/camera", "other/camera"} < found.keys()
+
+
+def test_odometry_has_the_sideways_speed_and_its_covariance(tmp_path):
+    (tmp_path / "w.sdf").write_text(
+        "<sdf version='1.9'><world name='w'><model name='ground'><static>1</static><link name='l'>"
+        "<collision name='c'><geometry><plane/></geometry></collision></link></model>"
+        "<model name='h'><pose>0 0 0.1 0 0 0</pose><link name='base'><collision name='c'><geometry>"
+        "<box><size>.3 .3 .2</size></box></geometry></collision></link>"
+        "<ruedo:odometry><ruedo:slip_noise>0.01</ruedo:slip_noise></ruedo:odometry>"
+        "<plugin name='p' filename='libgazebo_ros_planar_move.so'/></model></world></sdf>"
+    )
+    run = tmp_path / "run.lcm"
+    with ruedo_client.launch(tmp_path / "w.sdf", args=["--lockstep", "1", "--record", run]) as sim:
+        sim.step(50, [sim.robot("h").velocity_command(0.0, 0.0, 0.3)])
+    ruedo("export", run, "--ros2", tmp_path / "bag")
+    messages = bag_messages(tmp_path / "bag", store_of("jazzy"))["/odom"]
+    last = [m.twist for _, m in messages if m.twist.twist.linear.y != 0.0][-1]
+    assert last.twist.linear.y == pytest.approx(0.3, abs=0.2)  # the slip of a step is 0.08 m/s
+    # 0.01^2 (0.3 m/s 0.005 s) / (0.005 s)^2
+    assert last.covariance[7] == pytest.approx(0.006, rel=1e-6)
+    assert sum(last.covariance) == last.covariance[7]
 
 
 def test_a_bag_has_its_world_with_it(tmp_path):

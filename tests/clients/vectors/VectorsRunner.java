@@ -64,6 +64,10 @@ public final class VectorsRunner {
             row("rates", (Object) s.wheelRates);
             row("ticks", (Object) s.ticks);
             row("resets", s.resets);
+        } else if (sample instanceof OdometryTwist) {
+            OdometryTwist s = (OdometryTwist) sample;
+            row("twist", s.vx, s.vy, s.omega);
+            row("covariance", (Object) s.covariance);
         } else if (sample instanceof Pose) {
             Pose s = (Pose) sample;
             row("position", (Object) s.position);

@@ -58,6 +58,9 @@ void mean(const std::string& type, const Sample& sample) {
     row("rates", odometry->wheel_rates);
     row("ticks", odometry->ticks);
     row("resets", std::vector{odometry->resets});
+  } else if (const auto* twist = as<OdometryTwist>(type, sample)) {
+    row("twist", std::vector{twist->vx, twist->vy, twist->omega});
+    row("covariance", twist->covariance);
   } else if (const auto* pose = as<Pose>(type, sample)) {
     row("position", pose->position);
     row("orientation", pose->orientation);

@@ -41,6 +41,9 @@ def meaning(type, s):
         yield row("rates", floats(s.wheel_rates))
         yield row("ticks", s.ticks)
         yield row("resets", [s.resets])
+    elif type == "odometry_twist_t":
+        yield row("twist", [s.vx, s.vy, s.omega])
+        yield row("covariance", floats(s.covariance.ravel()))
     elif type == "pose_t":
         for name in ("position", "orientation", "velocity", "rotation_rate", "acceleration"):
             yield row(name, floats(getattr(s, name)))

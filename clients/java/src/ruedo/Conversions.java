@@ -18,6 +18,7 @@ import ruedo.lcmtypes.magnetometer_t;
 import ruedo.lcmtypes.motion_status_t;
 import ruedo.lcmtypes.navsat_t;
 import ruedo.lcmtypes.odometry_t;
+import ruedo.lcmtypes.odometry_twist_t;
 import ruedo.lcmtypes.planar_lidar_t;
 import ruedo.lcmtypes.pose_t;
 import ruedo.lcmtypes.sonar_t;
@@ -71,6 +72,10 @@ final class Conversions {
                     Map.entry(
                             "odometry_t",
                             new Conversion(odometry_t.LCM_FINGERPRINT, Conversions::odometry)),
+                    Map.entry(
+                            "odometry_twist_t",
+                            new Conversion(
+                                    odometry_twist_t.LCM_FINGERPRINT, Conversions::odometryTwist)),
                     Map.entry("pose_t", new Conversion(pose_t.LCM_FINGERPRINT, Conversions::pose)),
                     Map.entry(
                             "image_t", new Conversion(image_t.LCM_FINGERPRINT, Conversions::image)),
@@ -201,6 +206,12 @@ final class Conversions {
                 in.doubles(n),
                 in.int64s(n),
                 in.int32());
+    }
+
+    private static Sample odometryTwist(WireReader in) throws IOException {
+        long utime = in.int64();
+        double[] twist = in.doubles(3);
+        return new OdometryTwist(utime, twist[0], twist[1], twist[2], in.doubles(9));
     }
 
     private static Sample pose(WireReader in) throws IOException {

@@ -122,6 +122,12 @@ public final class Robot {
         return (Device<Odometry>) first("odometry_t", "odometry");
     }
 
+    /** What the odometry makes of the wheels' speeds, also sideways. */
+    @SuppressWarnings("unchecked")
+    public Stream<OdometryTwist> odometryTwist() {
+        return (Stream<OdometryTwist>) firstStream("odometry_twist_t", "velocity of odometry");
+    }
+
     /** The first camera. */
     public Camera camera() {
         return (Camera) first("image_t", "camera");
