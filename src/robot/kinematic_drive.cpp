@@ -8,7 +8,6 @@
 #include "base/sincos.h"
 #include "physics/state_check.h"
 #include "robot/base_motion.h"
-#include "robot/ground.h"
 #include "ruedo/math.h"
 
 namespace ruedo::robot {
@@ -64,7 +63,7 @@ Quat about_z(double angle) {
 
 KinematicDrive::KinematicDrive(const world::WorldModel& world, const world::BodyLayout& layout,
                                physics::PhysicsWorld& physics, RobotIndex robot,
-                               const std::vector<LevelPlane>& planes)
+                               const std::vector<world::LevelPlane>& planes)
     : Drive(world, layout, physics, robot),
       wheel_angles_(layout, robot, description_),
       planes_(planes),
@@ -125,7 +124,7 @@ void KinematicDrive::stand_on_near_plane() {
     stand_on_plane(*plane);
 }
 
-void KinematicDrive::stand_on_plane(const LevelPlane& plane) {
+void KinematicDrive::stand_on_plane(const world::LevelPlane& plane) {
   on_plane_ = true;
   plane_friction_ = plane.friction;
   carrier_ = Twist{Vec3::Zero(), Vec3::Zero()};

@@ -16,10 +16,10 @@
 #include <vector>
 
 #include "robot/drive.h"
-#include "robot/ground.h"
 #include "robot/wheel_angles.h"
 #include "ruedo/bound.h"
 #include "ruedo/drive.h"
+#include "world/model/ground.h"
 
 namespace ruedo::robot {
 
@@ -28,7 +28,7 @@ class KinematicDrive final : public Drive {
   // planes: heights of the world's level planes; must outlive the drive.
   KinematicDrive(const world::WorldModel& world, const world::BodyLayout& layout,
                  physics::PhysicsWorld& physics, RobotIndex robot,
-                 const std::vector<LevelPlane>& planes);
+                 const std::vector<world::LevelPlane>& planes);
 
   void before_step(SimTime now) override;
   void after_step(SimTime now) override;
@@ -48,7 +48,7 @@ class KinematicDrive final : public Drive {
   bool is_still() const;
   void stand_on_near_plane();
   void choose_support();
-  void stand_on_plane(const LevelPlane& plane);
+  void stand_on_plane(const world::LevelPlane& plane);
   void leave_plane();
   void before_on_plane();
   void before_on_contacts();
@@ -101,7 +101,7 @@ class KinematicDrive final : public Drive {
   WheelAngles wheel_angles_;
   SimTime still_us_ = 0;
   Pose next_;  // base_link after this step, on a plane
-  Bound<const std::vector<LevelPlane>> planes_;
+  Bound<const std::vector<world::LevelPlane>> planes_;
   Bound<const world::WorldModel> world_;
   Bound<const world::BodyLayout> layout_;
   double lowest_;  // of the wheels, below base_link

@@ -5,7 +5,6 @@
 #include <ruedo/motion_status_t.hpp>
 
 #include "robot/crowd.h"
-#include "robot/ground.h"
 #include "robot/joint_control.h"
 #include "robot/kinematic_drive.h"
 #include "robot/mover.h"
@@ -13,6 +12,7 @@
 #include "robot/surroundings.h"
 #include "robot/wheels_drive.h"
 #include "robot/wind.h"
+#include "world/model/ground.h"
 
 namespace ruedo::robot {
 
@@ -60,7 +60,7 @@ class Robots::Impl {
   const world::WorldModel& world_;
   const world::BodyLayout& layout_;
   physics::PhysicsWorld& physics_;
-  std::vector<LevelPlane> planes_;
+  std::vector<world::LevelPlane> planes_;
   // null: the robot has none, or cannot move
   IndexedVector<RobotIndex, std::unique_ptr<Drive>> drives_;
   IndexedVector<RobotIndex, MotionLog> driveless_;  // refusals of robots without a drive

@@ -1,8 +1,12 @@
 // A contact sensor (bumper): contacts of the collision shapes named by SDF's <contact>, or of the
 // whole link, on ROBOT/CONTACT. Contacts between samples are not lost: `pressed` covers every step
 // since the last sample.
+//
+// A kinematic robot on a level plane has no contact pair with it (robot/kinematic_drive.h), so what
+// of it reaches down to the plane is computed here; the force of such a point is not known, 0 N.
 #include <algorithm>
 #include <charconv>
+#include <cmath>
 #include <optional>
 #include <string_view>
 
@@ -11,6 +15,7 @@
 #include "ruedo/sensor.h"
 #include "sensors/contact_points.h"
 #include "world/model/body_layout.h"
+#include "world/model/ground.h"
 
 namespace ruedo {
 namespace {
@@ -21,6 +26,8 @@ std::string without_scope(const std::string& name) {
   return colons == std::string::npos ? name : name.substr(colons + 2);
 }
 
+constexpr double kOnPlane_m = 1e-6;  // a robot that a plane carries is exactly on it
+
 class ContactSensor : public SensorOf<ContactSensor> {
  public:
   explicit ContactSensor(const SensorSetup& setup)
@@ -29,9 +36,12 @@ class ContactSensor : public SensorOf<ContactSensor> {
         link_(setup.link),
         channel_(setup.channel<contact_t>()) {
     setup.element.refuse_unknown({"ruedo:phase"});  // read by the server
-    const Element* contact = setup.element.child("contact");
-    if (!contact) return;
-    for (const Element* named : contact->all("collision")) {
+    if (const Element* contact = setup.element.child("contact")) read_shapes(*contact, setup);
+    find_soles(setup.robot_index);
+  }
+
+  void read_shapes(const Element& contact, const SensorSetup& setup) {
+    for (const Element* named : contact.all("collision")) {
       const std::string name = without_scope(named->text);
       auto shape = shape_of(link_, [&](const world::Collision& each) { return each.name == name; });
       if (!shape) shape = shape_of_converter(name);
@@ -63,8 +73,9 @@ class ContactSensor : public SensorOf<ContactSensor> {
       if (!as_a && !is_b(contact)) continue;
       put(contact, as_a, world_, layout_, message_.points.emplace_back());
     }
+    add_plane(input.snapshot);
     message_.n = static_cast<int32_t>(message_.points.size());
-    message_.pressed = pressed_ ? 1 : 0;
+    message_.pressed = pressed_ || message_.n > 0 ? 1 : 0;
     pressed_ = false;
     out.publish(channel_, message_);
   }
@@ -118,6 +129,53 @@ class ContactSensor : public SensorOf<ContactSensor> {
     return std::nullopt;
   }
 
+  // Those of its shapes on which a kinematic robot stands.
+  void find_soles(RobotIndex robot) {
+    constexpr double kStands_m = 2e-3;  // as in robot/kinematic_drive.cpp
+    if (!robot.valid()) return;
+    const world::RobotPlacement& placement = layout_->robots[robot];
+    const auto& drive = world_->models[placement.instance].model->drive;
+    if (!drive || drive->kind != world::DriveDescription::Kind::kinematic) return;
+    robot_ = robot;
+    lowest_ = world::lowest_of_wheels(world_, layout_, robot);
+    const Pose X_BaseB = placement.X_BBase.inverse();
+    for (const LinkIndex link : layout_->links.indices()) {
+      if (layout_->links[link].body != placement.body) continue;
+      const auto& shapes = model_link(link).collisions;
+      for (size_t i = 0; i < shapes.size(); ++i) {
+        if (!counts(link, ShapeIndex(i))) continue;
+        const Pose X_BaseC = X_BaseB * layout_->links[link].X_BL * shapes[i].X_LC;
+        if (world::lowest_point(shapes[i].geometry, X_BaseC) < lowest_ + kStands_m)
+          soles_.push_back({{link, ShapeIndex(i)}, X_BaseC.translation});
+      }
+    }
+  }
+
+  void add_plane(const Snapshot& now) {
+    if (soles_.empty()) return;
+    const Pose& X_WBase = now.robots[robot_].X_WBase;
+    const double sole = X_WBase.translation.z() + lowest_;
+    const auto plane = world::nearest_plane(world_, layout_, sole);
+    const bool upright = (X_WBase.rotation * Vec3::UnitZ()).z() > 1.0 - 1e-9;
+    if (!plane || !upright || std::abs(sole - plane->height) > kOnPlane_m) return;
+    for (const auto& [shape, p_BaseC] : soles_) {
+      if (touches(now, shape, plane->link)) continue;
+      Contact contact;
+      contact.link_a = shape.link;
+      contact.link_b = plane->link;
+      contact.position = X_WBase * p_BaseC;
+      contact.position.z() = plane->height;
+      put(contact, true, world_, layout_, message_.points.emplace_back());
+    }
+  }
+
+  static bool touches(const Snapshot& now, const Shape& shape, LinkIndex other) {
+    return std::any_of(now.contacts.begin(), now.contacts.end(), [&](const Contact& c) {
+      return (c.link_a == shape.link && c.shape_a == shape.shape && c.link_b == other) ||
+             (c.link_b == shape.link && c.shape_b == shape.shape && c.link_a == other);
+    });
+  }
+
   bool counts(LinkIndex link, ShapeIndex shape) const {
     if (shapes_.empty()) return link == link_;
     return std::any_of(shapes_.begin(), shapes_.end(), [&](const Shape& each) {
@@ -132,6 +190,13 @@ class ContactSensor : public SensorOf<ContactSensor> {
   LinkIndex link_;
   int channel_;
   std::vector<Shape> shapes_;  // empty: all of the link
+  struct Sole {
+    Shape shape;
+    Vec3 p_BaseC;
+  };
+  std::vector<Sole> soles_;  // of a kinematic robot
+  RobotIndex robot_;
+  double lowest_ = 0.0;  // of its wheels, m above base_link
   bool pressed_ = false;
   contact_t message_;
 };

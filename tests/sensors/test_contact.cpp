@@ -1,5 +1,7 @@
 // The contact sensor: which contacts are its own, from which side they are shown, and that no touch
 // is lost.
+#include <cmath>
+
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -163,6 +165,65 @@ TEST(ContactSensor, ATouchBetweenTwoSamplesIsNotLost) {
   EXPECT_TRUE(m.pressed);
   EXPECT_EQ(m.n, 0);  // but it is over
   EXPECT_FALSE(bench.with({}).pressed);
+}
+
+// A kinematic robot on a plane has no contact pair with it.
+std::string rover(const std::string& drive) {
+  const auto wheel = [](const std::string& side, const std::string& y) {
+    return "<link name='" + side + "'><pose>0 " + y +
+           " 0.1 -1.5707963 0 0</pose><collision name='c'><geometry>"
+           "<cylinder><radius>0.1</radius><length>0.02</length></cylinder></geometry></collision>"
+           "<sensor name='" +
+           side + "_foot' type='contact'/></link><joint name='" + side +
+           "_joint' type='revolute'><parent>base</parent><child>" + side +
+           "</child><axis><xyz>0 0 1</xyz></axis></joint>";
+  };
+  return "<sdf version='1.9'><world name='w'><model name='floor'><static>1</static><pose>0 0 -0.5 "
+         "0 0 0"
+         "</pose><link name='link'><collision "
+         "name='c'><geometry><plane/></geometry></collision></link></model>"
+         "<model name='robot'><pose>1 2 -0.5 0 0 0.5</pose><link name='base'><pose>0 0 0.15 0 0 "
+         "0</pose>"
+         "<collision name='hull'><geometry><box><size>0.3 0.2 "
+         "0.1</size></box></geometry></collision>"
+         "<collision name='caster'><pose>-0.12 0 -0.12 0 0 "
+         "0</pose><geometry><sphere><radius>0.03</radius>"
+         "</sphere></geometry></collision>"
+         "<sensor name='hull' "
+         "type='contact'><contact><collision>hull</collision></contact></sensor>"
+         "<sensor name='caster' "
+         "type='contact'><contact><collision>caster</collision></contact></sensor>"
+         "</link>" +
+         wheel("left", "0.15") + wheel("right", "-0.15") + "<ruedo:drive type='" + drive +
+         "'><ruedo:left_joint>left_joint</ruedo:left_joint>"
+         "<ruedo:right_joint>right_joint</ruedo:right_joint></ruedo:drive></model></world></sdf>";
+}
+
+contact_t of_rover(const std::string& sensor, const std::string& drive, double above) {
+  SensorBench bench(rover(drive));
+  Device device = bench.make("robot", sensor);
+  Snapshot now = bench.snapshot();
+  now.robots[RobotIndex(0)].X_WBase.translation.z() += above;
+  Outbox out;
+  test::step(device, now, out, 0);
+  return Device::decode<contact_t>(out).at(0);
+}
+
+TEST(ContactSensor, WhatAKinematicRobotStandsOnTouchesThePlane) {
+  for (const char* sensor : {"left_foot", "right_foot", "caster"}) {
+    const contact_t m = of_rover(sensor, "kinematic", 0.0);
+    EXPECT_TRUE(m.pressed) << sensor;
+    ASSERT_EQ(m.n, 1);
+    EXPECT_EQ(m.points[0].body, "floor/link");
+    EXPECT_DOUBLE_EQ(m.points[0].normal[2], 1.0);
+    EXPECT_DOUBLE_EQ(m.points[0].position[2], -0.5);
+    EXPECT_FALSE(of_rover(sensor, "kinematic", 0.01).pressed) << sensor << " in the air";
+    EXPECT_FALSE(of_rover(sensor, "wheels", 0.0).pressed) << sensor << " has contacts of its own";
+  }
+  const contact_t left = of_rover("left_foot", "kinematic", 0.0);
+  EXPECT_NEAR(left.points[0].position[0], 1.0 - 0.15 * std::sin(0.5), 1e-9);
+  EXPECT_NEAR(left.points[0].position[1], 2.0 + 0.15 * std::cos(0.5), 1e-9);
+  EXPECT_FALSE(of_rover("hull", "kinematic", 0.0).pressed);
 }
 
 TEST(ContactSensor, RefusedConfigurations) {

@@ -1,5 +1,5 @@
 // Support heights of shapes, in closed form.
-#include "robot/ground.h"
+#include "world/model/ground.h"
 
 #include <algorithm>
 #include <cmath>
@@ -7,53 +7,70 @@
 
 #include "ruedo/math.h"
 
-namespace ruedo::robot {
+namespace ruedo::world {
 
-std::vector<LevelPlane> level_planes(const world::WorldModel& world,
-                                     const world::BodyLayout& layout) {
-  std::vector<LevelPlane> planes;
-  for (const auto& placement : layout.links) {
+namespace {
+
+template <class Visit>
+void for_each_level_plane(const WorldModel& world, const BodyLayout& layout, Visit visit) {
+  for (const LinkIndex link : layout.links.indices()) {
+    const auto& placement = layout.links[link];
     const auto& instance = world.models[placement.instance];
     if (placement.body.valid() || instance.removed) continue;
-    const auto& model = *instance.model;
-    for (const auto& collision : model.links[placement.link].collisions) {
-      if (collision.geometry.shape != world::Shape::plane) continue;
+    for (const auto& collision : instance.model->links[placement.link].collisions) {
+      if (collision.geometry.shape != Shape::plane) continue;
       const Pose X_WC = placement.X_BL * collision.X_LC;
       const Vec3 normal = X_WC.rotation * collision.geometry.normal;
       if (normal.z() > 1.0 - 1e-12)
-        planes.push_back({X_WC.translation.z(), collision.surface.friction});
+        visit(LevelPlane{X_WC.translation.z(), collision.surface.friction, link});
     }
   }
+}
+
+// Keeps the plane that is nearer to that height.
+void keep_nearer(double height, const LevelPlane& plane, std::optional<LevelPlane>& nearest) {
+  if (!nearest || std::abs(plane.height - height) < std::abs(nearest->height - height))
+    nearest = plane;
+}
+
+}  // namespace
+
+std::vector<LevelPlane> level_planes(const WorldModel& world, const BodyLayout& layout) {
+  std::vector<LevelPlane> planes;
+  for_each_level_plane(world, layout, [&](const LevelPlane& plane) { planes.push_back(plane); });
   return planes;
 }
 
 std::optional<LevelPlane> nearest_plane(const std::vector<LevelPlane>& planes, double height) {
   std::optional<LevelPlane> nearest;
-  for (const LevelPlane& plane : planes) {
-    if (!nearest || std::abs(plane.height - height) < std::abs(nearest->height - height))
-      nearest = plane;
-  }
+  for (const LevelPlane& plane : planes) keep_nearer(height, plane, nearest);
   return nearest;
 }
 
-double lowest_point(const world::Geometry& geometry, const Pose& X_FC) {
+std::optional<LevelPlane> nearest_plane(const WorldModel& world, const BodyLayout& layout,
+                                        double height) {
+  std::optional<LevelPlane> nearest;
+  for_each_level_plane(world, layout,
+                       [&](const LevelPlane& plane) { keep_nearer(height, plane, nearest); });
+  return nearest;
+}
+
+double lowest_point(const Geometry& geometry, const Pose& X_FC) {
   const Vec3 down = X_FC.rotation.conjugate() * -Vec3::UnitZ();  // in C
   const Vec3& size = geometry.size;
   const double across = math::hypot(down.x(), down.y());
   double reach = 0.0;
   switch (geometry.shape) {
-    case world::Shape::box: reach = 0.5 * down.cwiseAbs().dot(size); break;
-    case world::Shape::sphere: reach = size.x(); break;
-    case world::Shape::cylinder:
-      reach = size.x() * across + 0.5 * size.y() * std::abs(down.z());
-      break;
-    case world::Shape::capsule: reach = size.x() + 0.5 * size.y() * std::abs(down.z()); break;
-    case world::Shape::ellipsoid: reach = down.cwiseProduct(size).norm(); break;
-    case world::Shape::cone:
+    case Shape::box: reach = 0.5 * down.cwiseAbs().dot(size); break;
+    case Shape::sphere: reach = size.x(); break;
+    case Shape::cylinder: reach = size.x() * across + 0.5 * size.y() * std::abs(down.z()); break;
+    case Shape::capsule: reach = size.x() + 0.5 * size.y() * std::abs(down.z()); break;
+    case Shape::ellipsoid: reach = down.cwiseProduct(size).norm(); break;
+    case Shape::cone:
       reach = std::max(0.5 * size.y() * down.z(), size.x() * across - 0.5 * size.y() * down.z());
       break;
-    case world::Shape::plane: break;
-    case world::Shape::mesh:
+    case Shape::plane: break;
+    case Shape::mesh:
       reach = -std::numeric_limits<double>::infinity();
       if (!geometry.mesh) break;
       for (const auto& position : geometry.mesh->positions) {
@@ -64,8 +81,7 @@ double lowest_point(const world::Geometry& geometry, const Pose& X_FC) {
   return X_FC.translation.z() - reach;
 }
 
-double friction_of_wheels(const world::WorldModel& world, const world::BodyLayout& layout,
-                          RobotIndex robot) {
+double friction_of_wheels(const WorldModel& world, const BodyLayout& layout, RobotIndex robot) {
   const auto& placement = layout.robots[robot];
   const auto& model = *world.models[placement.instance].model;
   double least = std::numeric_limits<double>::infinity();
@@ -77,8 +93,7 @@ double friction_of_wheels(const world::WorldModel& world, const world::BodyLayou
   return std::isfinite(least) ? least : 1.0;
 }
 
-double lowest_of_wheels(const world::WorldModel& world, const world::BodyLayout& layout,
-                        RobotIndex robot) {
+double lowest_of_wheels(const WorldModel& world, const BodyLayout& layout, RobotIndex robot) {
   const auto& placement = layout.robots[robot];
   const auto& model = *world.models[placement.instance].model;
   const Pose X_BaseB = placement.X_BBase.inverse();
@@ -98,4 +113,4 @@ double lowest_of_wheels(const world::WorldModel& world, const world::BodyLayout&
   return std::isfinite(lowest) ? lowest : 0.0;
 }
 
-}  // namespace ruedo::robot
+}  // namespace ruedo::world
