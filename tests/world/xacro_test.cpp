@@ -77,6 +77,23 @@ TEST(Xacro, IsKnownByItsElementsToo) {
   EXPECT_EQ(world->models.at(0).model->links.size(), 2u);
 }
 
+// What an installed ROS has in its packages does not hide those of the next folder.
+TEST(Xacro, FindsPackagesBehindManyOthers) {
+  const TemporaryFolder folder;
+  for (int i = 0; i < 300; ++i) {
+    const std::string name = "p" + std::to_string(i), package = "share/" + name;
+    folder.write(package + "/package.xml", "<package><name>" + name + "</name></package>");
+    for (const char* inside : {"a", "b", "c", "d", "e", "f"})
+      std::filesystem::create_directory(folder / (package + "/" + inside));
+  }
+  folder.write("src/parts/package.xml", "<package><name>parts</name></package>");
+  folder.write("src/parts/urdf/box.xacro", kPart);
+  setenv("ROS_PACKAGE_PATH", ((folder / "share") + ":" + (folder / "src")).c_str(), 1);
+  const auto world = load_world(folder.write("a/b/c/bot.xacro", kBase));
+  unsetenv("ROS_PACKAGE_PATH");
+  EXPECT_EQ(world->models.back().model->links.size(), 2u);
+}
+
 TEST(Xacro, AnIncludeThatIsNotThereIsPassedOver) {
   const Packages packages;
   const auto world = load_world(

@@ -62,6 +62,7 @@ def packages(roots):
                 name = package_name(folder)
                 if name:
                     known.setdefault(name, folder)
+                    continue  # packages do not lie in one another
                 with contextlib.suppress(OSError):
                     below += sorted(
                         entry.path
