@@ -26,12 +26,12 @@ std::string robot_of(const std::filesystem::path& file) {
   return all.substr(begin, all.rfind("</model>") + 8 - begin);
 }
 
-std::string hung(const std::string& side, const std::string& y) {
-  return "<link name='drop_" + side + "'><pose>0 " + y +
-         " 0.036 0 0 0</pose><inertial><mass>0.05</mass><inertia><ixx>2e-5</ixx><iyy>2e-5</iyy>"
+std::string hung(const std::string& side, const std::string& y, const std::string& z) {
+  return "<link name='drop_" + side + "'><pose>0 " + y + " " + z +
+         " 0 0 0</pose><inertial><mass>0.05</mass><inertia><ixx>2e-5</ixx><iyy>2e-5</iyy>"
          "<izz>2e-5</izz></inertia></inertial></link><link name='wheel_" +
-         side + "'><pose>0 " + y +
-         " 0.036 -1.5707963267948966 0 0</pose><inertial><mass>0.2</mass><inertia><ixx>1e-4</ixx>"
+         side + "'><pose>0 " + y + " " + z +
+         " -1.5707963267948966 0 0</pose><inertial><mass>0.2</mass><inertia><ixx>1e-4</ixx>"
          "<iyy>1e-4</iyy><izz>1.3e-4</izz></inertia></inertial><collision name='c'><geometry>"
          "<cylinder><radius>0.036</radius><length>0.02</length></cylinder></geometry></collision>"
          "</link><joint name='spring_" +
@@ -45,7 +45,7 @@ std::string hung(const std::string& side, const std::string& y) {
 }
 
 // A round robot of 3 kg whose wheels are pressed down by springs, and that slides on two balls.
-std::string hung_robot() {
+std::string hung_robot(const std::string& z = "0.036") {
   const auto slider = [](const std::string& name, const std::string& x) {
     return "<collision name='" + name + "'><pose>" + x +
            " 0 -0.04 0 0 0</pose><geometry><sphere><radius>0.02</radius></sphere></geometry>"
@@ -55,8 +55,8 @@ std::string hung_robot() {
          "<mass>2.5</mass><inertia><ixx>0.02</ixx><iyy>0.02</iyy><izz>0.03</izz></inertia>"
          "</inertial><collision name='c'><pose>0 0 0.02 0 0 0</pose><geometry><cylinder><radius>"
          "0.16</radius><length>0.06</length></cylinder></geometry></collision>" +
-         slider("ahead", "0.12") + slider("behind", "-0.12") + "</link>" + hung("left", "0.117") +
-         hung("right", "-0.117") +
+         slider("ahead", "0.12") + slider("behind", "-0.12") + "</link>" +
+         hung("left", "0.117", z) + hung("right", "-0.117", z) +
          "<ruedo:drive><ruedo:left_joint>left</ruedo:left_joint><ruedo:right_joint>right"
          "</ruedo:right_joint><ruedo:watchdog>0</ruedo:watchdog></ruedo:drive></model>";
 }
@@ -96,6 +96,14 @@ TEST(BaseLink, IsWhereTheRobotSaysThatItIs) {
       watch(with_drive(model, "wheels"), name + " on wheels");
   }
   EXPECT_GE(robots, 10);
+}
+
+// Springs press down wheels that are drawn above the ground (RMF's DeliveryRobot).
+TEST(BaseLink, MovesOnSlidersBelowTheWheelsOnSprings) {
+  Sim sim(plane_sdf() + with_drive(hung_robot("0.056"), "kinematic"));
+  sim.velocity(0.3, 0.0);
+  sim.run(2.0);
+  EXPECT_NEAR(sim.position().x(), 0.6, 0.005);
 }
 
 TEST(BaseLink, IsCarriedByWheelsOnSprings) {

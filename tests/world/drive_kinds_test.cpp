@@ -223,6 +223,19 @@ TEST(DrivePlugins, APlanarMoveNeedsNoWheels) {
   }
 }
 
+// It moves along the model's x, also where a wheel is a little ahead of the others.
+TEST(DrivePlugins, APlanarMoveHeadsAsTheModel) {
+  const auto world =
+      world_of("<model name='m'><link name='base'/>" + wheel("l", "0.03 0.2 0.1 0 0 0") +
+               wheel("r", "0 -0.2 0.1 0 0 0") +
+               "<plugin name='p' filename='libgazebo_ros_planar_move.so'><leftFrontJoint>j_l"
+               "</leftFrontJoint><rightFrontJoint>j_r</rightFrontJoint></plugin></model>");
+  const auto& drive = world->models[0].model->drive;
+  ASSERT_TRUE(drive);
+  EXPECT_EQ(drive->left_joints.size(), 1u);
+  EXPECT_DOUBLE_EQ(heading(drive->X_MBase.rotation), 0.0);
+}
+
 // A value that is not a number leaves out the drive, not the model.
 TEST(DrivePlugins, WithAnOddNumberLeaveTheModel) {
   for (const char* odd : {"wide", "-0.4"}) {

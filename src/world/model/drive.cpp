@@ -95,6 +95,10 @@ Quat heading_of(const Vec3& left, const Vec3& right, DriveDescription& drive,
     std::swap(drive.left_joints, drive.right_joints);
     ahead = -ahead;
   }
+  if (drive.steering == DriveDescription::Steering::holonomic) {  // not led by its wheels
+    const int along = std::abs(ahead.x()) > std::abs(ahead.y()) ? 0 : 1;
+    ahead = Vec3::Unit(along) * (ahead[along] > 0 ? 1.0 : -1.0);
+  }
   return Quat(Eigen::AngleAxisd(math::atan2(ahead.y(), ahead.x()), Vec3::UnitZ()));
 }
 

@@ -93,22 +93,46 @@ double friction_of_wheels(const WorldModel& world, const BodyLayout& layout, Rob
   return std::isfinite(least) ? least : 1.0;
 }
 
+namespace {
+
+// Whether a sliding joint carries the wheel, whose spring presses it down.
+bool is_suspended(const Model& model, ModelJointIndex wheel) {
+  ModelLinkIndex at = model.joints[wheel].parent;
+  for (size_t steps = 0; at.valid() && steps <= model.joints.size(); ++steps) {
+    const auto above = std::find_if(model.joints.begin(), model.joints.end(),
+                                    [&](const Joint& each) { return each.child == at; });
+    if (above == model.joints.end()) return false;
+    if (above->type == JointType::prismatic) return true;
+    at = above->parent;
+  }
+  return false;
+}
+
+}  // namespace
+
 double lowest_of_wheels(const WorldModel& world, const BodyLayout& layout, RobotIndex robot) {
   const auto& placement = layout.robots[robot];
   const auto& model = *world.models[placement.instance].model;
   const Pose X_BaseB = placement.X_BBase.inverse();
   const Pose X_BaseW = X_BaseB * layout.bodies[placement.body].X_WB.inverse();
   double lowest = std::numeric_limits<double>::infinity();
+  const auto include = [&](const LinkPlacement& link) {
+    const Pose X_BaseL = X_BaseW * layout.bodies[link.body].X_WB * link.X_BL;
+    for (const auto& collision : model.links[link.link].collisions)
+      lowest = std::min(lowest, lowest_point(collision.geometry, X_BaseL * collision.X_LC));
+    return X_BaseL;
+  };
+  bool suspended = !placement.wheels.empty();
   for (const WheelIndex wheel : placement.wheels) {
     if (layout.wheels[wheel].steers) continue;
     const auto& link = layout.links[layout.wheels[wheel].link];
-    const Pose X_BaseL = X_BaseW * layout.bodies[link.body].X_WB * link.X_BL;
-    const auto& collisions = model.links[link.link].collisions;
-    for (const auto& collision : collisions) {
-      lowest = std::min(lowest, lowest_point(collision.geometry, X_BaseL * collision.X_LC));
-    }
-    if (collisions.empty())
+    const Pose X_BaseL = include(link);
+    if (model.links[link.link].collisions.empty())
       lowest = std::min(lowest, X_BaseL.translation.z() - model.drive->wheel_radius);
+    suspended = suspended && is_suspended(model, layout.wheels[wheel].joint);
+  }
+  if (suspended) {  // the casters carry the robot, and the wheels reach down beside them
+    for (const LinkIndex link : layout.bodies[placement.body].links) include(layout.links[link]);
   }
   return std::isfinite(lowest) ? lowest : 0.0;
 }

@@ -28,7 +28,8 @@ double friction_of_wheels(const WorldModel& world, const BodyLayout& layout, Rob
 double lowest_point(const Geometry& geometry, const Pose& X_FC);
 
 // Height of the lowest point of a robot's wheels, along z of base_link, from its origin. Wheels
-// without collision shapes reach down by the drive's wheel radius.
+// without collision shapes reach down by the drive's wheel radius; where all are suspended, the
+// robot's lowest shape counts.
 double lowest_of_wheels(const WorldModel& world, const BodyLayout& layout, RobotIndex robot);
 
 }  // namespace ruedo::world
