@@ -223,6 +223,15 @@ TEST(DrivePlugins, APlanarMoveNeedsNoWheels) {
   }
 }
 
+TEST(DrivePlugins, APlanarMoveNeedsNoneOfTheJointsThatItNames) {
+  const auto world = world_of(
+      "<model name='m'><link name='base'/><plugin name='p' filename='libgazebo_ros_planar_move.so'>"
+      "<leftFrontJoint>j_l</leftFrontJoint></plugin></model>");
+  ASSERT_TRUE(world->models[0].model->drive);
+  EXPECT_THAT(texts(*world), testing::ElementsAre("there is no joint 'j_l': the drive moves the "
+                                                  "model without it"));
+}
+
 // It moves along the model's x, also where a wheel is a little ahead of the others.
 TEST(DrivePlugins, APlanarMoveHeadsAsTheModel) {
   const auto world =

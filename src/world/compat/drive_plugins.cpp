@@ -258,24 +258,26 @@ void add_parameters(const Element& plugin, const std::string& where, Findings& f
   }
 }
 
-// A plugin that sets the model's velocity needs no wheels, and may name some that do not carry it.
-bool carries(const Element& named, const Model& model) {
+// Why the wheel of a named joint does not carry the model; "" if it does.
+std::string lifts(const Element& named, const Model& model) {
   constexpr double kStands_m = 5e-3;
   const auto joint = std::find_if(model.joints.begin(), model.joints.end(), [&](const Joint& each) {
     return each.name == dotted(named.text);
   });
-  return joint == model.joints.end() ||
-         lowest_point_below(model, ModelJointIndex(joint - model.joints.begin())) <
-             lowest_point(model) + kStands_m;
+  if (joint == model.joints.end()) return "there is no joint '" + named.text + "'";
+  if (lowest_point_below(model, ModelJointIndex(joint - model.joints.begin())) <
+      lowest_point(model) + kStands_m)
+    return "";
+  return "the wheel of the joint '" + named.text + "' does not reach the ground";
 }
 
+// A plugin that sets the model's velocity needs no wheels, and may name some that do not carry it.
 void leave_out_lifted_wheels(const Model& model, const std::string& where, Findings& findings,
                              Element& drive) {
   std::erase_if(drive.children, [&](const auto& child) {
-    if (!child->name.ends_with("_joint") || carries(*child, model)) return false;
-    findings.repaired(child->source, where,
-                      "the wheel of the joint '" + child->text +
-                          "' does not reach the ground: the drive moves the model without it");
+    const std::string why = child->name.ends_with("_joint") ? lifts(*child, model) : "";
+    if (why.empty()) return false;
+    findings.repaired(child->source, where, why + ": the drive moves the model without it");
     return true;
   });
 }
