@@ -16,6 +16,7 @@ import re
 import subprocess
 import sys
 from pathlib import Path
+from typing import NamedTuple
 
 import ruedo
 from sections import put
@@ -41,10 +42,10 @@ STAND_THERE_TOO = {
 }
 
 
-def check(program, path):
+def check(program, path, args=()):
     """What is named, in words, each once."""
     done = subprocess.run(
-        [program, "check", path, "--json"], capture_output=True, text=True, timeout=120
+        [program, "check", path, "--json", *args], capture_output=True, text=True, timeout=120
     )
     if not done.stdout.startswith("["):
         return [done.stderr.strip().splitlines()[-1]]
@@ -57,11 +58,11 @@ def check(program, path):
     return [text + (f" ({count} places)" if count > 1 else "") for text, count in texts.items()]
 
 
-def state_of_base(sim, robot):
-    """Of base_link, where the model has it; else of its first link that moves."""
+def base_of(sim, robot):
+    """base_link, where the model has it; else its first link that moves."""
     links = [body.name for body in sim.bodies if body.name.startswith(f"{robot.name}/")]
     base = f"{robot.name}/base_link"
-    return sim.state(base if base in links else links[0])
+    return base if base in links else links[0]
 
 
 def yaw_of(state):
@@ -69,57 +70,95 @@ def yaw_of(state):
     return math.atan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z))
 
 
-def drive(path):
-    """Steering, way, turn, sensors that publish, all sensors. Raises what the server says."""
-    with ruedo.launch(path, args=["--lockstep", "1", "--no-noise"], timeout=120) as sim:
-        if not sim.robots:
-            return "stands still", math.nan, math.nan, 0, 0
+class Driven(NamedTuple):
+    """What came of the commands: 0.3 m/s ahead for 2 s, 0.5 rad/s for 2 s, and 0.3 m/s to the left
+    for 2 s where the robot can. By base_link; NaN where it was not commanded."""
+
+    steering: str
+    way: float = math.nan  # m, in the plane
+    aside: float = math.nan  # m, of the way ahead, to the left
+    turn: float = math.nan  # rad
+    strafe: float = math.nan  # m, to the left
+    alive: int = 0  # sensors that published
+    sensors: int = 0
+
+
+def drive(path, args=()):
+    """Raises what the server says."""
+    with launched(path, args) as sim:
+        if not sim.robots or not sim.robots[0].drive:
+            return Driven("stands still")
         robot = sim.robots[0]
-        seen = sim.step(0)
-        published = collections.Counter(message.channel for message in seen.messages)
-        if not robot.drive:
-            return "stands still", math.nan, math.nan, 0, 0
-        steered = robot.drive.endswith(("ackermann", "tricycle"))
-        second = round(1.0 / sim.step_size)
+        seen = [sim.step(0), sim.step(round(1.2 / sim.step_size))]
+        published = {message.channel for part in seen for message in part.messages}
+        sensors = [f"{robot.name}/{device.name}" for device in sensors_of(robot)]
+    alive = sum(publishes(sensor, published) for sensor in sensors)
+    # Pictures take longer than the drive, which no sensor concerns.
+    without = [word for sensor in sensors for word in ("--disable", sensor)]
+    with launched(path, [*args, *without]) as sim:
+        steering = sim.robots[0].drive.partition(" ")[2] or "differential"
+        return Driven(steering, *ways(sim, sim.robots[0]), alive, len(sensors))
 
-        def go(seconds, v, omega):
-            for _ in range(round(seconds * 4)):
-                part = sim.step(second // 4, [robot.velocity_command(v, omega)])
-                published.update(message.channel for message in part.messages)
-            return state_of_base(sim, robot)
 
-        go(0.5, 0.0, 0.0)
-        before = go(0.25, 0.0, 0.0)
-        go(2.0, 0.3, 0.0)
-        straight = go(2.0, 0.0, 0.0)
-        way = math.dist(straight.position[:2], before.position[:2])
-        go(2.0, 0.5 if steered else 0.0, 0.5)
-        turned = go(2.0, 0.0, 0.0)
-        turn = math.remainder(yaw_of(turned) - yaw_of(straight), 2 * math.pi)
-        sensors = [
-            device
-            for device in robot.devices
-            if device.kind not in ("odometry", "pose", "motion", "collisions", "joints")
-        ]
-        alive = sum(
-            any(
-                channel == f"{robot.name}/{each.name}"
-                or channel.startswith(f"{robot.name}/{each.name}/")
-                for channel in published
-            )
-            for each in sensors
-        )
-        return robot.drive.partition(" ")[2] or "differential", way, turn, alive, len(sensors)
+def launched(path, args):
+    return ruedo.launch(path, args=["--lockstep", "1", "--no-noise", *args], timeout=120)
+
+
+def ways(sim, robot):
+    """Way, aside, turn, strafe."""
+    steered = robot.drive.endswith(("ackermann", "tricycle"))
+    second = round(1.0 / sim.step_size)
+    base = base_of(sim, robot)
+
+    def go(seconds, *velocity):
+        for _ in range(round(seconds * 10)):  # watchdogs of controllers are as short as 0.2 s
+            sim.step(second // 10, [robot.velocity_command(*velocity)])
+        return sim.state(base)
+
+    def measured(*velocity):
+        before = sim.state(base)
+        go(2.0, *velocity)
+        return before, go(2.0, 0.0, 0.0)
+
+    go(0.75, 0.0, 0.0)
+    ahead, aside = moved(*measured(0.3, 0.0))
+    for v in (0.5, 3.0) if steered else (0.0,):  # a car may not drive so narrow a curve
+        before, after = measured(v, 0.5)
+        turn = math.remainder(yaw_of(after) - yaw_of(before), 2 * math.pi)
+        if turn > 0.99:
+            break
+    strafe = math.nan
+    if robot.drive.endswith(("mecanum", "omni", "holonomic")):
+        strafe = moved(*measured(0.0, 0.0, 0.3))[1]
+    return math.hypot(ahead, aside), aside, turn, strafe
+
+
+def moved(before, after):
+    """m ahead and m to the left, as seen before."""
+    x, y = (float(b - a) for a, b in zip(before.position[:2], after.position[:2]))
+    yaw = yaw_of(before)
+    return x * math.cos(yaw) + y * math.sin(yaw), y * math.cos(yaw) - x * math.sin(yaw)
+
+
+def sensors_of(robot):
+    others = ("odometry", "pose", "motion", "collisions", "joints")
+    return [device for device in robot.devices if device.kind not in others]
+
+
+def publishes(device, channels):
+    return any(each == device or each.startswith(f"{device}/") for each in channels)
 
 
 def row(program, name, path):
     named = check(program, path)
     try:
-        steering, way, turn, alive, sensors = drive(path)
+        driven = drive(path)
     except ruedo.RuedoError as error:
         return f"| {name} | does not load | | | | {str(error).splitlines()[0]} |"
-    driven = f"{way:.3f} m | {turn:.3f} rad" if not math.isnan(way) else "- | -"
-    return f"| {name} | {steering} | {driven} | {alive} of {sensors} | {'<br>'.join(named) or 'nothing'} |"
+    stands = math.isnan(driven.way)
+    way = "- | -" if stands else f"{driven.way:.3f} m | {driven.turn:.3f} rad"
+    sensors = f"{driven.alive} of {driven.sensors}"
+    return f"| {name} | {driven.steering} | {way} | {sensors} | {'<br>'.join(named) or 'nothing'} |"
 
 
 def table(program, folder, names=None):
