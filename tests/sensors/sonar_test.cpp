@@ -149,6 +149,16 @@ TEST(Sonar, MinimumAndOwnLink) {
   EXPECT_EQ(own.sample<sonar_t>().range[0], 2.0f);
 }
 
+// The last millimetre of the range counts, and the first one beyond it does not.
+TEST(Sonar, EchoesUpToTheMaximum) {
+  for (const char* reading : {"average", "nearest"}) {
+    for (const double x : {4.95, 4.999, 5.001, 5.05}) {
+      RayBench bench(robot_world(wall_at(x), array(cone(0.001, 0.001, 1, reading))), "SONAR");
+      EXPECT_NEAR(bench.sample<sonar_t>().range[0], std::min(x, 5.0), 1e-6) << reading << " " << x;
+    }
+  }
+}
+
 // Three transducers: ahead, left at y 0.2 and behind; walls 2 m ahead, 3 m left of the middle, 4 m
 // behind.
 const std::string kRoom = wall_at(2) + solid("left", "0 3.5 0 0 0 0", box(100, 1, 100)) +
