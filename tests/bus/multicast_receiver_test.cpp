@@ -101,6 +101,20 @@ TEST_F(Multicast, LongMessagesInAnyOrderAndTwice) {
   }
 }
 
+// LCM's fragments hold 65 487 bytes: of a message whose last one is full, or one byte short of it,
+// or holds a single byte.
+TEST_F(Multicast, TheLastFragmentMayBeFull) {
+  constexpr size_t kFull = 65'487;
+  for (const size_t size : {2 * kFull - 1, 2 * kFull, 2 * kFull + 1}) {
+    const Bytes data(size, 7);
+    for (const Bytes& part : fragments("r/camera", data, static_cast<uint32_t>(size), kFull))
+      read(part);
+    ASSERT_FALSE(heard_.empty()) << size;
+    EXPECT_TRUE(heard_.back().second == data) << size;
+    heard_.clear();
+  }
+}
+
 TEST_F(Multicast, SendersApartAndMessagesThatAreSentAtOnce) {
   const Bytes data(100, 1), other(100, 2);
   const std::vector<Bytes> a = fragments("a", data, 1, 60), b = fragments("b", other, 1, 60),
