@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <fstream>
 #include <limits>
+#include <map>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -30,6 +31,34 @@ const char* const kRobot =
     "<include><uri>model://p3at</uri><name>r</name></include><model name='box'><pose>1 0.1 0.2 0 0 "
     "0</pose><link name='l'><inertial><mass>1</mass></inertial><collision name='c'><geometry><box>"
     "<size>0.4 0.4 0.4</size></box></geometry></collision></link></model>";
+
+// A robot with a sensor of each kind whose noise wanders: how far it has come is state, too.
+std::string wandering_robot() {
+  const auto noisy = [](const std::string& path) {
+    std::string open, close;
+    for (size_t at = 0, end = 0; at < path.size(); at = end + 1) {
+      end = std::min(path.find('/', at), path.size());
+      const std::string name = path.substr(at, end - at);
+      open += "<" + name + ">";
+      close.insert(0, "</" + name + ">");
+    }
+    return open +
+           "<noise type='gaussian'><stddev>0.01</stddev><dynamic_bias_stddev>0.05"
+           "</dynamic_bias_stddev></noise>" +
+           close;
+  };
+  std::string sensors;
+  for (const auto& [type, what] :
+       std::map<std::string, std::string>{{"imu", noisy("imu/angular_velocity/x")},
+                                          {"navsat", noisy("navsat/position_sensing/horizontal")},
+                                          {"magnetometer", noisy("magnetometer/x")},
+                                          {"altimeter", noisy("altimeter/vertical_position")},
+                                          {"air_pressure", noisy("air_pressure/pressure")},
+                                          {"air_speed", noisy("air_speed/pressure")}})
+    sensors += "<sensor name='" + type + "' type='" + type + "'><update_rate>20</update_rate>" +
+               what + "</sensor>";
+  return robot_sdf("wandering", 5.0, 5.0, sensors);
+}
 
 class RestoreTest : public testing::Test, protected Controlled {
  protected:
@@ -61,7 +90,7 @@ class RestoreTest : public testing::Test, protected Controlled {
     RunOptions options = with_snapshots(paused_server());
     options.repeat = file(name);
     options.record = record;
-    begin(std::move(options), kRobot);
+    begin(std::move(options), kRobot + wandering_robot());
     state_reply_t back = state();
     for (int i = 0; i < 10'000 && back.step < saved_.step; ++i) back = state();  // on its way
     EXPECT_EQ(back.step, saved_.step);
@@ -69,7 +98,7 @@ class RestoreTest : public testing::Test, protected Controlled {
     return batches_ > 5;
   }
   void start_paused(RunOptions options = paused_server()) {
-    begin(with_snapshots(std::move(options)), kRobot);
+    begin(with_snapshots(std::move(options)), kRobot + wandering_robot());
     velocity_command_t command{};
     command.vx = 0.6;
     command.omega = 0.1;
