@@ -94,6 +94,7 @@ class LockstepClient {
     const int64_t sequence = ++sequence_;
     const int64_t from = std::exchange(granted_, grant.step_until);
     bool taken = false;
+    give_up_at_ = Clock::now() + kPatience;
     send(request_t::GRANT, sequence, body);
     for (Clock::time_point again = Clock::now() + kAgain; have_ < granted_;) {
       if (const std::optional<Message> message = listener_->receive(kAgain)) {
@@ -129,6 +130,7 @@ class LockstepClient {
   }
 
   reply_t ask(int32_t kind, int64_t sequence, const std::vector<uint8_t>& body) {
+    give_up_at_ = Clock::now() + kPatience;
     for (;;) {
       check_run();
       send(kind, sequence, body);
@@ -153,6 +155,7 @@ class LockstepClient {
   using Clock = std::chrono::steady_clock;
   static constexpr std::chrono::milliseconds kAgain{
       4};  // until what was not answered is said again
+  static constexpr std::chrono::seconds kPatience{120};  // with a call
 
   struct Step {
     std::map<int, tick_t> parts;
@@ -161,6 +164,7 @@ class LockstepClient {
 
   void check_run() const {
     if (over_ && *over_) throw std::runtime_error(name_ + ": the run is over");
+    if (Clock::now() >= give_up_at_) throw std::runtime_error(name_ + ": the run stands still");
   }
 
   // Whether the message says that the grant was executed.
@@ -280,6 +284,7 @@ class LockstepClient {
   std::shared_ptr<LossyBus::Listener> listener_;
   std::string name_;
   const std::atomic<bool>* over_;
+  Clock::time_point give_up_at_;
   int32_t tick_channel_ = -1;
   std::map<std::string, int32_t> by_name_;
   int64_t session_ = 0, sequence_ = 0, resends_ = 0, granted_ = 0, have_ = -1, acknowledged_ = -1,

@@ -9,6 +9,7 @@
 #include <functional>
 #include <map>
 #include <mutex>
+#include <stdexcept>
 #include <string>
 #include <thread>
 #include <vector>
@@ -70,17 +71,19 @@ class MemoryBus : public Bus {
     handler_ = nullptr;
   }
 
-  // The first message at or after index `from` on a channel that `good` accepts; waits for it. The
-  // test fails by its own time limit when there is none.
+  // The first message at or after index `from` on a channel that `good` accepts; waits for it.
+  // Throws where none comes, rather than to hold up all tests by this one's time limit.
   Message wait_for(const std::string& channel, size_t& from,
                    const std::function<bool(const Message&)>& good = {}) {
+    const auto deadline = std::chrono::steady_clock::now() + std::chrono::seconds(60);
     std::unique_lock lock(mutex_);
     for (;;) {
       for (; from < messages_.size(); ++from) {
         if (messages_[from].channel == channel && (!good || good(messages_[from])))
           return messages_[from++];
       }
-      changed_.wait(lock);
+      if (changed_.wait_until(lock, deadline) == std::cv_status::timeout)
+        throw std::runtime_error("nothing that is waited for came on " + channel + " for 60 s");
     }
   }
 
