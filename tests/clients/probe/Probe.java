@@ -36,6 +36,7 @@ import java.util.Locale;
 import java.util.Set;
 import java.util.TreeSet;
 import java.util.concurrent.CountDownLatch;
+import java.util.concurrent.TimeUnit;
 import java.util.concurrent.atomic.AtomicBoolean;
 import java.util.concurrent.atomic.AtomicInteger;
 import java.util.function.Supplier;
@@ -47,6 +48,7 @@ import java.util.zip.CRC32;
  */
 public final class Probe {
     private static final double PATIENCE = 300.0; // s, for what comes sooner or later
+    private static final int AGAIN = 60; // s, for what follows soon, or never
 
     private Probe() {}
 
@@ -592,6 +594,17 @@ public final class Probe {
         say("done", done);
     }
 
+    /** Of the server that takes the place of this one. */
+    private static void heardAgain(Simulation sim, String name) throws InterruptedException {
+        CountDownLatch begun = new CountDownLatch(1);
+        sim.onNewRun(begun::countDown);
+        sim.robot(name).pose().next(PATIENCE);
+        say("heard", "first");
+        if (!begun.await(AGAIN, TimeUnit.SECONDS)) return;
+        sim.robot(name).pose().next(PATIENCE);
+        say("heard", "again");
+    }
+
     private static void launchedWith(String[] a) {
         LaunchOptions options =
                 new LaunchOptions()
@@ -825,6 +838,9 @@ public final class Probe {
                     break;
                 case "many_primitives":
                     manyPrimitives(sim, a[0], Integer.parseInt(a[1]));
+                    break;
+                case "heard_again":
+                    heardAgain(sim, a[0]);
                     break;
                 case "collisions":
                     collisions(sim, a[0]);

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstdio>
 #include <functional>
+#include <future>
 #include <memory>
 #include <mutex>
 #include <set>
@@ -22,7 +23,8 @@ namespace rc = ruedo::client;
 namespace {
 
 constexpr double kPi = 3.14159265358979323846;
-constexpr double kPatience = 300.0;  // s, for what comes sooner or later
+constexpr double kPatience = 300.0;         // s, for what comes sooner or later
+constexpr std::chrono::seconds kAgain{60};  // for what follows soon, or never
 
 std::string word(const std::string& text) { return text; }
 std::string word(const char* text) { return text; }
@@ -560,6 +562,17 @@ void many_primitives(const rc::Simulation& sim, const std::string& name, int cou
   say("done", done);
 }
 
+// Of the server that takes the place of this one.
+void heard_again(const rc::Simulation& sim, const std::string& name) {
+  std::promise<void> begun;
+  const rc::Subscription news = sim.on_new_run([&] { begun.set_value(); });
+  sim.robot(name).pose().next(kPatience);
+  say("heard", "first");
+  if (begun.get_future().wait_for(kAgain) == std::future_status::timeout) return;
+  sim.robot(name).pose().next(kPatience);
+  say("heard", "again");
+}
+
 void read_log(const std::vector<std::string>& a) {
   const rc::Log log = rc::read_log(a[0]);
   std::string names;
@@ -721,6 +734,7 @@ void act(const std::string& url, const std::string& command, const std::vector<s
   if (command == "wheels") drive(sim, a, true);
   if (command == "primitives") primitives(sim, a[0]);
   if (command == "many_primitives") many_primitives(sim, a[0], std::stoi(a[1]));
+  if (command == "heard_again") heard_again(sim, a[0]);
   if (command == "collisions") collisions(sim, a[0]);
   if (command == "errors") errors(sim, a[0]);
   if (command == "markers") markers(sim, a[0]);

@@ -12,6 +12,7 @@ import zlib
 import ruedo
 
 PATIENCE = 300.0  # s, for what comes sooner or later
+AGAIN = 60.0  # s, for what follows soon, or never
 
 
 def say(*words):
@@ -467,6 +468,17 @@ def many_primitives(sim, name, count):
     say("done", done)
 
 
+def heard_again(sim, name):
+    """Of the server that takes the place of this one."""
+    begun = threading.Event()
+    sim.on_new_run(lambda _: begun.set())
+    sim.robot(name).pose.next(PATIENCE)
+    say("heard", "first")
+    if begun.wait(AGAIN):
+        sim.robot(name).pose.next(AGAIN)
+        say("heard", "again")
+
+
 def read_log(path):
     """As pandas has it; what C++ and Java say beside that is not Python's."""
     log = ruedo.read_log(path)
@@ -627,6 +639,7 @@ def main():
                 "wheels": lambda: drive(sim, *rest, True),
                 "primitives": lambda: primitives(sim, *rest),
                 "many_primitives": lambda: many_primitives(sim, *rest),
+                "heard_again": lambda: heard_again(sim, *rest),
                 "collisions": lambda: collisions(sim, *rest),
                 "errors": lambda: errors(sim, *rest),
                 "markers": lambda: markers(sim, *rest),
