@@ -237,6 +237,17 @@ def test_who_waits_in_lockstep_is_told_that_steps_are_wanted():
             robot.lrf.next(timeout=0.2)
 
 
+def test_clients_that_start_number_their_primitives_apart():
+    """Whether they have a name of their own, the same one, or none."""
+    with ruedo_run("--paused", world=HALL) as server, contextlib.ExitStack() as all_of_them:
+        ids = []
+        for name in 8 * [None, "driver", "guest"]:
+            sim = all_of_them.enter_context(ruedo.connect(server.url, name=name, timeout=PATIENCE))
+            stop = sim.robot("p3at").move_command("stop", 0.0)
+            ids.append(lcmtypes.move_command_t.decode(stop.data).id)
+        assert len(set(ids)) == 24
+
+
 def test_equal_runs_in_lockstep_number_their_primitives_alike():
     """Their logs have these numbers."""
     ids = []
