@@ -1,6 +1,6 @@
 """A virtual environment with real ROS 2, made once.
 
-    install.py FOLDER
+    install.py RELEASE FOLDER
 
 Ends with 77 where there is none for this Python.
 """
@@ -15,7 +15,8 @@ NONE_FOR_THIS_PYTHON = 77
 
 
 def main():
-    folder, wanted = Path(sys.argv[1]), Path(__file__).with_name("requirements.txt")
+    release, folder = sys.argv[1], Path(sys.argv[2])
+    wanted = Path(__file__).with_name(f"{release}.txt")
     if sys.version_info[:2] != (3, 11):
         sys.exit(NONE_FOR_THIS_PYTHON)
     stamp = folder / "requirements.txt"

@@ -5,10 +5,13 @@ node.py WHAT [NUMBER]
 
 import itertools
 import json
+import os
+import signal
 import sys
 import time
 
 import rclpy
+from geometry_msgs.msg import Twist, TwistStamped
 from nav_msgs.msg import Odometry
 from rcl_interfaces.msg import ParameterEvent
 from rcl_interfaces.srv import (
@@ -23,7 +26,9 @@ from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.parameter import Parameter, parameter_value_to_python
+from rclpy.qos import DurabilityPolicy, QoSProfile, qos_profile_sensor_data
 from sensor_msgs.msg import LaserScan
+from std_msgs.msg import String
 
 PATIENCE = 30  # s
 
@@ -31,10 +36,10 @@ PATIENCE = 30  # s
 class Peer:
     """A node in a context of its own, as a process of its own has it."""
 
-    def __init__(self, name="peer"):
+    def __init__(self, name="peer", parameters=()):
         self.context = Context()
         rclpy.init(context=self.context)
-        self.node = Node(name, context=self.context)
+        self.node = Node(name, context=self.context, parameter_overrides=list(parameters))
         self.executor = SingleThreadedExecutor(context=self.context)
         self.executor.add_node(self.node)
 
@@ -70,6 +75,99 @@ def topics():
         "periods": [b - a for a, b in itertools.pairwise(stamps)],
         "types": dict(peer.node.get_topic_names_and_types()),
     }
+
+
+def names():
+    """Of all topics."""
+    peer, found = Peer(), []
+    peer.spin_until(
+        lambda: any(name.endswith("/scan") for name in found) or found.extend(topics_of(peer))
+    )
+    time.sleep(1)
+    return topics_of(peer)
+
+
+def topics_of(peer):
+    return [name for name, _ in peer.node.get_topic_names_and_types()]
+
+
+def qos():
+    """Messages for a reader of each kind, and the description for one that comes late."""
+    peer, got = Peer(), {"best_effort": 0, "reliable": 0, "depth": 0, "late": 0}
+
+    def count(name):
+        def heard(_):
+            got[name] += 1
+
+        return heard
+
+    node = peer.node
+    node.create_subscription(LaserScan, "/scan", count("best_effort"), qos_profile_sensor_data)
+    node.create_subscription(LaserScan, "/scan", count("reliable"), 10)
+    node.create_subscription(LaserScan, "/scan", count("depth"), QoSProfile(depth=1))
+    latched = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+    node.create_subscription(String, "/robot_description", count("late"), latched)
+    peer.spin_until(lambda: got["late"] and min(got.values()) >= 1 and got["best_effort"] >= 10)
+    return got
+
+
+def sim_time():
+    """How far a node's own clock is from the newest odometry, at most, in s of sim time."""
+    peer = Peer(parameters=[Parameter("use_sim_time", value=True)])
+    apart = []
+
+    def heard(odometry):
+        now = peer.node.get_clock().now().nanoseconds * 1e-9
+        stamp = odometry.header.stamp
+        if now > 0:
+            apart.append(now - (stamp.sec + stamp.nanosec * 1e-9))
+
+    peer.node.create_subscription(Odometry, "/odom", heard, 10)
+    peer.spin_until(lambda: len(apart) >= 100)
+    return max(map(abs, apart[50:]))
+
+
+def drives():
+    """How far the robot came within a second of sim time under a velocity of the release's type."""
+    peer, poses = Peer(), []
+    peer.node.create_subscription(Odometry, "/ground_truth", poses.append, 10)
+    types = []
+    peer.spin_until(lambda: poses and types.extend(command_types(peer)) is None and types)
+    stamped = types[0].endswith("Stamped")
+    publisher = peer.node.create_publisher(TwistStamped if stamped else Twist, "/cmd_vel", 10)
+    message = publisher.msg_type()
+    (message.twist if stamped else message).linear.x = 0.5
+
+    def has_driven():
+        publisher.publish(message)
+        return poses[-1].pose.pose.position.x > 0.3
+
+    peer.spin_until(has_driven)
+    return types[0]
+
+
+def command_types(peer):
+    return dict(peer.node.get_topic_names_and_types()).get("/cmd_vel", [])
+
+
+def many_nodes(count):
+    """Scans that each of so many nodes heard."""
+    peers = [Peer(f"node{i}") for i in range(int(count))]
+    got = [[] for _ in peers]
+    for peer, messages in zip(peers, got, strict=True):
+        peer.node.create_subscription(LaserScan, "/scan", messages.append, 10)
+    for peer, messages in zip(peers, got, strict=True):
+        peer.spin_until(lambda messages=messages: len(messages) >= 5)
+    return [len(messages) for messages in got]
+
+
+def killed(process):
+    """Whether a node sees a run go that was killed."""
+    peer = Peer()
+    peer.spin_until(lambda: peer.node.count_publishers("/scan") == 1)
+    os.kill(int(process), signal.SIGKILL)
+    peer.spin_until(lambda: peer.node.count_publishers("/scan") == 0)
+    return True
 
 
 def parameters():
