@@ -161,6 +161,18 @@ def test_what_lies_beside_a_controller_counts(folder):
     assert ids(folder) == before
 
 
+def test_what_a_controller_writes_beside_itself_is_no_input(folder):
+    (folder / "controller.py").write_text(
+        CONTROLLER + "\n\nwith open(__file__ + '.log', 'a') as log:\n    log.write('loaded')\n"
+    )
+    done = ruedo("campaign", "run", "c.yaml", folder=folder, code=1)
+    assert "8 of 8 cases" in done.stdout, done
+    assert "written while the cases ran: controller.py.log; that counts as no input" in done.stderr
+    for code, word in enumerate(("status", "run")):
+        done = ruedo("campaign", word, "c.yaml", folder=folder, code=code)
+        assert "8 of 8 cases" in done.stdout and not done.stderr, done
+
+
 def test_why_results_no_longer_stand_is_told(folder):
     """A picture that lies beside the controller may be read by it."""
     campaign = Campaign(folder / "c.yaml", out=folder / "other.campaign")
@@ -820,8 +832,10 @@ def test_what_is_there_outlives_a_full_disk(whole, words):
     folder, _ = whole
     (folder / "full").mkdir(exist_ok=True)
     kept = "number,id,world,robot,controller,seed,kept"  # as what it replaces begins
+    if words[-1].endswith(".xml"):
+        kept = "<testsuite/>"
     script = (
-        "mount -t tmpfs -o size=64k none full && echo $KEPT > $0 && ! cat /dev/zero > full/fill && "
+        "mount -t tmpfs -o size=64k none full && echo \"$KEPT\" > $0 && ! cat /dev/zero > full/fill && "
         '! cat /dev/zero >> full/fill && "$@"; echo $?; cat $0; ls full'
     )
     full = ["unshare", "-m" if os.getuid() == 0 else "-rm", "sh", "-c", script, words[-1]]

@@ -54,10 +54,10 @@ def test_all_tables_run_by_themselves():
 
 def test_the_workload_is_the_one_described():
     (row,) = rows_of("--robots", "7", "--duration", "4")
-    # A second of a robot: 10 scans, 25 of each of two sonar arrays, 50 odometry, 50 poses, 10
-    # motions, 10 collisions. Beside them the world's: 30 states, 10 ticks, 1 info. Each starts at
-    # 0, so there may be one more of each, and of motions at once two.
-    assert 180 * 7 + 40 <= row["messages_per_sim_s"] <= 180 * 7 + 45 + 7 * 10 / 4
+    # A second of a robot: 10 scans, 25 of each of two sonar arrays, 50 odometry and as many
+    # twists of it, 50 poses, 10 motions, 10 collisions. Beside them the world's: 30 states, 10
+    # ticks, 1 info. Each starts at 0, so there may be one more of each, and of motions at once two.
+    assert 230 * 7 + 40 <= row["messages_per_sim_s"] <= 230 * 7 + 45 + 7 * 10 / 4
     # Each scan has two lists of 181 floats, so that is its least.
     assert row["bytes_per_sim_s"] > 7 * 10 * 2 * 181 * 4
     (with_cameras,) = rows_of("--only", "camera", "--robots", "2", "--duration", "2")

@@ -71,9 +71,9 @@ def test_256_robots_over_every_transport(fleet, tmp_path):
             ends[name] = decisions(server.url)
     with servers["udpm"]() as server, bad_network(server.url, 1, 0.1) as [url]:
         ends["lossy"] = decisions(url)
-    # From 0 to 0.3 s pose and odometry at 50 Hz; lrf, motion and collisions at 10 Hz; motion once
-    # more, when the first command comes; ruedo/world at 30 Hz.
-    assert ends["unix"][0] == ROBOTS * (2 * 16 + 3 * 4 + 1) + 10
+    # From 0 to 0.3 s pose, odometry and its twist at 50 Hz; lrf, motion and collisions at 10 Hz;
+    # motion once more, when the first command comes; ruedo/world at 30 Hz.
+    assert ends["unix"][0] == ROBOTS * (3 * 16 + 3 * 4 + 1) + 10
     assert all(end == ends["unix"] for end in ends.values()), ends
 
 

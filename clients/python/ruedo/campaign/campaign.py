@@ -16,7 +16,7 @@ from .. import _engine
 from ..files import MOST_YAML_BYTES, open_lock, read_bytes, sha256_of
 from .cluster import run_on_ray
 from .errors import CampaignError, SpecError
-from .inputs import Folders
+from .inputs import Folders, is_read
 from .local import Crew, Done, cores
 from .names import check_names
 from .plan import Case, Planner, check_values, files_called, shard_of
@@ -74,6 +74,8 @@ class Campaign:
         self._cases: list[Case] | None = None
         self.worlds = WorldFiles(self.folder, self.out / "worlds")
         self.folders = Folders(self.out)
+        self._named: set[str] = set()
+        self.outputs: set[str] = set()  # that the last run() has seen written in those folders
         self._files: dict[str, str] = {}  # that the cases are made from, with their hashes
 
     @property
@@ -87,6 +89,7 @@ class Campaign:
         for.
         """
         if self._cases is None:
+            self.folders.leave_out(self._outputs())
             planner = Planner(
                 self._content,
                 self.source,
@@ -97,7 +100,7 @@ class Campaign:
                 self.folders,
             )
             self._cases = planner.cases()
-            self._files = planner.files
+            self._files, self._named = planner.files, planner.named_files
         return self._cases
 
     @property
@@ -124,41 +127,29 @@ class Campaign:
         """
         cases = shard_of(self.cases, shard) if shard else self.cases
         with Store(self.out) as store, _lock(self.out):
-            store.set_about(
-                "campaign",
-                json.dumps(
-                    {
-                        "name": self.name,
-                        "content": self._content,
-                        "folder": str(self.folder),
-                        "version": self.version,
-                    }
-                ),
-            )
-            store.set_about(
-                "cases",
-                json.dumps(
-                    [{key: getattr(case, key) for key in _REMEMBERED} for case in self.cases]
-                ),  # also those of other shards, which may be here
-            )
-            store.set_about("files", json.dumps(self._by_name()))
+            self._tell_about(store)
             known = store.known()
             missing = [case for case in cases if case.id not in known]
             check_names(missing, self.source, self.folder)
             sample = self._sampled()
-            files = Unchanged(self._files)
-            for case, outcome, wall_s in self._outcomes(missing, workers, ray):
-                files.check()
-                keep = (
-                    outcome["status"] != "passed"
-                    if self._content.get("keep", {}).get("failures", True)
-                    else False
-                )
-                store.add(case.id, outcome, wall_s, keep or case.id in sample)
-                if progress:
-                    progress(case, outcome)
-                if stop():
-                    break
+            files = Unchanged(self._inputs())
+            try:
+                for case, outcome, wall_s in self._outcomes(missing, workers, ray):
+                    files.check()
+                    keep = (
+                        outcome["status"] != "passed"
+                        if self._content.get("keep", {}).get("failures", True)
+                        else False
+                    )
+                    store.add(case.id, outcome, wall_s, keep or case.id in sample)
+                    if progress:
+                        progress(case, outcome)
+                    if stop():
+                        break
+            finally:
+                self.outputs = self.folders.written_since() if missing else set()
+                known_outputs = _set_of(store.about("outputs"))
+                store.set_about("outputs", json.dumps(sorted(known_outputs | self.outputs)))
             return Results(cases, store.rows(case.id for case in cases), self.out)
 
     def results(self, shard: str | None = None) -> Results:
@@ -173,11 +164,40 @@ class Campaign:
         cases were last run: each result of before stands for them no more.
         """
         now = self._by_name() if self.cases else {}
-        with Store(self.out, write=not (self.out / "results.sqlite").is_file()) as store:
+        if not (self.out / "results.sqlite").is_file():
+            return []
+        with Store(self.out, write=False) as store:
             before = json.loads(store.about("files") or "null")
         if not isinstance(before, dict):
             return []
         return sorted(name for name in before.keys() | now if before.get(name) != now.get(name))
+
+    def _tell_about(self, store: Store) -> None:
+        about = {
+            "name": self.name,
+            "content": self._content,
+            "folder": str(self.folder),
+            "version": self.version,
+        }
+        store.set_about("campaign", json.dumps(about))
+        remembered = [{key: getattr(case, key) for key in _REMEMBERED} for case in self.cases]
+        store.set_about("cases", json.dumps(remembered))  # also other shards', which may be here
+        store.set_about("files", json.dumps(self._by_name()))
+
+    def _inputs(self) -> dict[str, str]:
+        """Those that nothing writes while its cases run, with their hashes."""
+        return {
+            file: sha256
+            for file, sha256 in self._files.items()
+            if file in self._named or is_read(file)
+        }
+
+    def _outputs(self) -> set[str]:
+        """The files in the controllers' folders that its cases have written: no inputs."""
+        if not (self.out / "results.sqlite").is_file():
+            return set()
+        with Store(self.out, write=False) as store:
+            return _set_of(store.about("outputs"))
 
     def _by_name(self) -> dict[str, str]:
         return {os.path.relpath(file, self.folder): sha256 for file, sha256 in self._files.items()}
@@ -260,6 +280,11 @@ class Campaign:
         if count < 1:
             raise CampaignError(f"{count} workers: 1 or more are needed")
         return _on_this_machine(cases, str(self.folder), count)
+
+
+def _set_of(text: str | None) -> set[str]:
+    known = json.loads(text or "[]")
+    return {one for one in known if isinstance(one, str)} if isinstance(known, list) else set()
 
 
 def _on_this_machine(cases: list[Case], folder: str, workers: int) -> Iterator[Done]:

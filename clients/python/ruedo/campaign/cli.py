@@ -8,6 +8,7 @@ import argparse
 import importlib
 import io
 import json
+import os
 import re
 import shlex
 import signal
@@ -236,6 +237,13 @@ def _run(arguments: argparse.Namespace) -> int:
     with shown(campaign, arguments.shard, arguments.quiet or arguments.json) as progress:
         results = campaign.run(
             workers=arguments.workers, ray=arguments.ray, shard=arguments.shard, progress=progress
+        )
+    if campaign.outputs and not arguments.quiet:
+        written = sorted(os.path.relpath(one, campaign.folder) for one in campaign.outputs)
+        more = f" and {len(written) - 3} more" if len(written) > 3 else ""
+        tell(
+            f"ruedo: written while the cases ran: {', '.join(written[:3])}{more}; that counts as no "
+            "input from now on (name an input in `inputs`)"
         )
     if junit:
         write_text(junit, results.junit(campaign.name))

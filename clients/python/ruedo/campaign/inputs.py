@@ -4,6 +4,7 @@ when it is asked whether a result still stands for it, but for what Ruedo itself
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
 import os
 import re
@@ -12,6 +13,12 @@ from pathlib import Path
 
 from ..files import parse_yaml, read_bytes, sha256_of
 
+# Programs and settings. Of other files it is not known whether cases read or write them.
+_READ = re.compile(
+    r".*\.(pyx?|so|sh|bash|m?js|lua|rb|pl|m|jl|c|cc|cpp|cxx|h|hh|hpp|java|class|jar"
+    r"|json|ya?ml|toml|ini|cfg|conf|csv|npy|npz|mat|pkl|pickle|h5|hdf5|pth?|onnx|tflite|safetensors|pgm)",
+    re.IGNORECASE,
+)
 _WRITTEN = (".lcm", ".html", ".svg", ".pdf", ".pyc")  # logs, pages, figures; Python's own
 _JUNIT = re.compile(rb"(<\?xml[^>]*>)?\s*<testsuite")
 _MOST_FILES, _MOST_LOOKED_AT, _MOST_BYTES = 2000, 50_000, 256 << 20
@@ -26,6 +33,30 @@ class Folders:
     def __init__(self, out: Path) -> None:
         self._out = os.path.realpath(out)
         self._known: dict[str, dict[str, str]] = {}
+        self._outputs: set[str] = set()
+
+    def leave_out(self, outputs: set[str]) -> None:
+        """Files that cases have written, by their real paths."""
+        self._outputs = outputs
+
+    def written_since(self) -> set[str]:
+        """Of the folders that were looked at, the files that have come or changed since, and that
+        cases may have written: no programs and settings.
+        """
+        again = Folders(Path(self._out))
+        again.leave_out(self._outputs)
+        written = set()
+        for place, before in self._known.items():
+            with contextlib.suppress(
+                ValueError, OSError
+            ):  # it was to be looked at, and is told then
+                now = again.below(Path(place))
+                written |= {
+                    os.path.join(place, name)
+                    for name in now
+                    if now[name] != before.get(name) and not is_read(name)
+                }
+        return written
 
     def below(self, folder: Path) -> dict[str, str]:
         """The files below a folder that count, by their path in it, with their hashes. Raises
@@ -58,13 +89,20 @@ class Folders:
             folders[:] = sorted(one for one in folders if not _is_passed_over(one))
             for name in sorted(files):
                 file = os.path.join(place, name)
-                if not name.startswith(".") and os.path.isfile(file) and not _is_written(file):
+                if name.startswith(".") or file in self._outputs or not os.path.isfile(file):
+                    continue
+                if not _is_written(file):
                     yield file
 
 
 def hash_of(files: dict[str, str]) -> str:
     """One for all of them, and for their names."""
     return hashlib.sha256(repr(sorted(files.items())).encode(errors="backslashreplace")).hexdigest()
+
+
+def is_read(file: str) -> bool:
+    """Whether it is a program or settings by its name, which no case writes."""
+    return _READ.fullmatch(os.path.basename(file)) is not None
 
 
 def _is_passed_over(folder: str) -> bool:

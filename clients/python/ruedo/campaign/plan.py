@@ -401,6 +401,11 @@ class Planner:
             | {str(function.file): function.sha256 for function in self._functions.values()}
         )
 
+    @property
+    def named_files(self) -> set[str]:
+        """Those that the campaign names, and its worlds."""
+        return self.files.keys() - self._beside_files.keys()
+
     def _case(
         self,
         number: int,
