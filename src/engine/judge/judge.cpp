@@ -12,6 +12,7 @@
 #include "physics/collision/distances.h"
 #include "ruedo/decode.h"
 #include "ruedo/errors.h"
+#include "ruedo/fault_t.hpp"
 #include "ruedo/math.h"
 #include "ruedo/name_request_t.hpp"
 #include "ruedo/request_t.hpp"
@@ -176,6 +177,9 @@ void Judge::see(const std::string& channel, std::span<const uint8_t> message) {
 
 // What the robot did not do by itself is no evidence of what it can do.
 void Judge::see(const applied_t& applied) {
+  constexpr std::string_view kFault = "/fault";
+  if (applied.channel.ends_with(kFault))
+    return see_fault(applied.channel.substr(0, applied.channel.size() - kFault.size()), applied);
   if (applied.channel != kRequestChannel) return;
   std::string said, moved;  // the model that it moved
   switch (applied.kind) {
@@ -208,6 +212,15 @@ void Judge::see(const applied_t& applied) {
          fmt::format("{} was moved by a request ({}); --allow-requests allows that",
                      expected_.robot, said));
   }
+}
+
+void Judge::see_fault(const std::string& robot, const applied_t& applied) {
+  const auto fault = body_of<fault_t>(applied);
+  changes_.push_back("fault " + fault.kind + " of " + robot);
+  if (!expected_.allow_requests && robot == expected_.robot && fault.kind == "kidnapped")
+    fail(
+        "requests", applied.utime,
+        robot + " was moved by a fault of the program's (kidnapped); --allow-requests allows that");
 }
 
 Verdict Judge::verdict() const {

@@ -71,7 +71,8 @@ class Judge {
   void see_goals(SimTime time, const Vec3& position);
   void see_contacts(const Snapshot& snapshot);
   void see_clearance(const Snapshot& snapshot);
-  void see_request(const applied_t& applied);
+  // A fault that a program has injected.
+  void see_fault(const std::string& robot, const applied_t& applied);
   std::string name_of(LinkIndex link) const;
 
   void add_run(Verdict& verdict) const;

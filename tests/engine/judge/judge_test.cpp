@@ -10,6 +10,7 @@
 
 #include "base/channel_names.h"
 #include "ruedo/errors.h"
+#include "ruedo/fault_t.hpp"
 #include "ruedo/name_request_t.hpp"
 #include "ruedo/request_t.hpp"
 #include "ruedo/reset_request_t.hpp"
@@ -89,10 +90,10 @@ class JudgeTest : public testing::Test {
     state_.contacts.push_back(contact);
   }
   template <class Body>
-  void ask(int32_t kind, const Body& body) {
+  void ask(int32_t kind, const Body& body, const std::string& channel = kRequestChannel) {
     applied_t applied{};
     applied.utime = state_.time;
-    applied.channel = kRequestChannel;
+    applied.channel = channel;
     applied.kind = kind;
     applied.data.resize(static_cast<size_t>(body.getEncodedSize()));
     applied.size = static_cast<int32_t>(applied.data.size());
@@ -310,6 +311,26 @@ TEST_F(JudgeTest, ARobotThatARequestMovesHasFailed) {
       }
     }
   });
+}
+
+TEST_F(JudgeTest, ARobotThatAFaultCarriesAwayHasFailed) {
+  for (const bool allowed : {false, true}) {
+    for (const std::string kind : {"kidnapped", "freeze"}) {
+      for (const std::string robot : {"r", "other"}) {
+        Expectations expected;
+        expected.allow_requests = allowed;
+        judge(expected);
+        see(0.0);
+        see(0.0);
+        fault_t fault{};
+        fault.kind = kind;
+        ask(0, fault, robot + "/fault");
+        const bool moved = kind == "kidnapped" && robot == "r";
+        EXPECT_EQ(judge_->verdict().passed(), allowed || !moved) << kind << robot;
+        EXPECT_THAT(check("run").text, HasSubstr("fault " + kind + " of " + robot));
+      }
+    }
+  }
 }
 
 TEST_F(JudgeTest, WhatARequestDoesElsewhereIsNamed) {

@@ -28,6 +28,10 @@ def put_ahead(sim):
     sim.set_pose("p3at", x=0.5, y=0.0)
 
 
+def kidnap(sim):
+    sim.robot("p3at").inject("kidnapped", place=(0.5, 0.0, 0.0))
+
+
 def reset(sim):
     sim.reset()
 
