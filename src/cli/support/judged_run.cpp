@@ -131,6 +131,18 @@ judge::Check client_check(const JudgedRunOptions& options, const ClientProcess& 
   return check;
 }
 
+// A run that a client's pace holds, until it goes, however it ends.
+class Paced {
+ public:
+  Paced(ClientPace& pace, run::Run* run) : pace_(pace) { pace_.pace(run); }
+  ~Paced() { pace_.pace(nullptr); }
+  Paced(const Paced&) = delete;
+  Paced& operator=(const Paced&) = delete;
+
+ private:
+  ClientPace& pace_;
+};
+
 }  // namespace
 
 std::vector<judge::Check> run_judged(const std::shared_ptr<const world::WorldModel>& world,
@@ -156,7 +168,7 @@ std::vector<judge::Check> run_judged(const std::shared_ptr<const world::WorldMod
     watchdog.moved();
     progress.to(snapshot.time);
   });
-  if (has_client) pace.pace(&server);
+  const Paced paced(pace, has_client ? &server : nullptr);
   std::unique_ptr<ClientProcess> client;
   std::atomic<SimTime> ended_at{-1};
   if (has_client) {
