@@ -40,16 +40,15 @@ class Folders:
         self._outputs = outputs
 
     def written_since(self) -> set[str]:
-        """Of the folders that were looked at, the files that have come or changed since, and that
-        cases may have written: no programs and settings.
+        """The files that have come or changed since below() read their folders, without programs
+        and settings: cases may have written them.
         """
         again = Folders(Path(self._out))
         again.leave_out(self._outputs)
         written = set()
         for place, before in self._known.items():
-            with contextlib.suppress(
-                ValueError, OSError
-            ):  # it was to be looked at, and is told then
+            # The next plan reads this folder again, and reports what it cannot read.
+            with contextlib.suppress(ValueError, OSError):
                 now = again.below(Path(place))
                 written |= {
                     os.path.join(place, name)
@@ -110,7 +109,7 @@ def _is_passed_over(folder: str) -> bool:
 
 
 def _is_written(file: str) -> bool:
-    """Whether it is what Ruedo writes, or a campaign, which is no other one's."""
+    """Whether Ruedo wrote it, or it is a campaign: neither is an input of another campaign."""
     _, kind = os.path.splitext(file)
     if kind in (".yaml", ".yml"):
         return _is_campaign(file)

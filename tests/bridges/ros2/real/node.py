@@ -77,13 +77,10 @@ def topics():
     }
 
 
-def names():
-    """Of all topics."""
-    peer, found = Peer(), []
-    peer.spin_until(
-        lambda: any(name.endswith("/scan") for name in found) or found.extend(topics_of(peer))
-    )
-    time.sleep(1)
+def names(*wanted):
+    """Of all topics, once those that are wanted are there."""
+    peer = Peer()
+    peer.spin_until(lambda: set(wanted) <= set(topics_of(peer)))
     return topics_of(peer)
 
 
