@@ -136,8 +136,9 @@ def tcp_server(*args: str, world: str = HALL) -> Server:
 class Said:
     """What a probe printed: the words behind each first word."""
 
-    def __init__(self, text: str):
+    def __init__(self, text: str, errors: str = ""):
         self.text = text
+        self.errors = errors
         self.lines = [line.split(" ", 1) for line in text.splitlines() if line]
 
     def all(self, key: str) -> list[str]:
@@ -145,7 +146,9 @@ class Said:
 
     def one(self, key: str) -> str:
         found = self.all(key)
-        assert len(found) == 1, f"{len(found)} lines begin with {key!r} in:\n{self.text}"
+        assert len(found) == 1, (
+            f"{len(found)} lines begin with {key!r} in:\n{self.text}\n{self.errors}"
+        )
         return found[0]
 
     def words(self, key: str) -> list[str]:
@@ -159,7 +162,7 @@ def probe(language: str, url: str, *command: str, timeout: float = PATIENCE) -> 
     done = subprocess.run(
         [*PROBES[language], url, *command], capture_output=True, text=True, timeout=timeout
     )
-    said = Said(done.stdout)
+    said = Said(done.stdout, done.stderr)
     if (
         "Traceback" in done.stderr
         or "Exception in thread" in done.stderr

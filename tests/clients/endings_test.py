@@ -28,7 +28,7 @@ def ended(language, url, *command, regress=False):
         timeout=PATIENCE,
         env=environment,
     )
-    return done.returncode, Said(done.stdout), done.stderr
+    return done.returncode, Said(done.stdout, done.stderr), done.stderr
 
 
 @pytest.fixture(scope="module")

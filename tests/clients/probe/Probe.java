@@ -674,11 +674,11 @@ public final class Probe {
         AtomicInteger others = new AtomicInteger();
         Simulation sim = Ruedo.connect(url, "probe", 60.0);
         Stream<Odometry> odometry = sim.robot("p3at").odometry();
-        odometry.onSample(
+        odometry.onSample(sample -> others.incrementAndGet());
+        odometry.onSample( // the last call before the one that throws
                 sample -> {
                     if (!failed.getAndSet(true)) throw new AssertionError("a fault of the user's");
                 });
-        odometry.onSample(sample -> others.incrementAndGet());
         while (!failed.get() && !how.equals("sleep")) Thread.sleep(10);
         if (!how.equals("sleep")) Thread.sleep(300); // that it is kept
         if (how.equals("forget")) return;

@@ -624,12 +624,12 @@ void fails(const std::string& url, const std::string& how) {
   auto sim = std::make_unique<rc::Simulation>(rc::connect(url, {.name = "", .timeout = 60.0}));
   const rc::Robot robot = sim->robot("p3at");
   const auto odometry = robot.odometry();
-  odometry
+  odometry.on_sample([&](const rc::Odometry&) { ++others; }).keep();
+  odometry  // the last call before the one that throws
       .on_sample([&](const rc::Odometry&) {
         if (!failed.exchange(true)) throw std::logic_error("a fault of the user's");
       })
       .keep();
-  odometry.on_sample([&](const rc::Odometry&) { ++others; }).keep();
   while (!failed && how != "sleep") pause_for(0.01);
   if (how != "sleep") pause_for(0.3);  // that it is kept
   if (how == "forget") {

@@ -514,8 +514,8 @@ def fails(url, how):
             raise ValueError("a fault of the user's")
 
     def see(sim):
-        sim.robot("p3at").odometry.on_sample(callback)
         sim.robot("p3at").odometry.on_sample(others.append)
+        sim.robot("p3at").odometry.on_sample(callback)  # the last call before the one that throws
         if how != "sleep":  # while that waits
             failed.wait(PATIENCE)
             time.sleep(0.3)  # that it is kept
