@@ -38,6 +38,7 @@ std::string nearest_word(std::string_view word, const std::vector<std::string>& 
   constexpr size_t kLongest = 64;  // longer words are not mistyped ones
   if (word.size() > kLongest) return "";
   const size_t written = word.size() - (word.starts_with(kPrefix) ? kPrefix.size() : 0);
+  if (written < 2) return "";  // every other letter is one step away
   size_t best_distance = std::max<size_t>(1, written / 3) + 1;
   std::string best;
   for (const std::string& each : known) {

@@ -116,6 +116,8 @@ class Run {
   // What a log of this run begins with; empty where nothing records, watches or repeats it.
   const log_header_t& log_header() const { return header_; }
   const Findings& findings() const { return findings_; }
+  // The first error in what it is made of: in its devices, or in a model that came later.
+  const std::optional<Finding>& first_error() const { return first_error_; }
   const world::BodyLayout& layout() const { return simulation_->layout(); }  // sinks may ask
   // The world as it is now: another object when models have come or gone. Any thread.
   std::shared_ptr<const world::WorldModel> world() {
@@ -195,6 +197,7 @@ class Run {
   bool ends_restore(const RequestKind& kind) const;
   int64_t features() const;
   void note(const request_t& request);  // in the log: it changed the state
+  void note_error(const std::vector<Finding>& findings);
   void note_files(const std::vector<std::string>&
                       files);  // that a model was read from which came since the start
   state_reply_t state() const;
@@ -263,6 +266,7 @@ class Run {
   engine::SimulationChannels own_;
   std::string request_channel_;  // as it is called on the bus; "": none
   Findings findings_;
+  std::optional<Finding> first_error_;
   engine::Wakeup wakeup_;  // a batch is finished, a request has come, or the end
   std::atomic<bool> stop_{false};
 

@@ -37,12 +37,20 @@ void Run::make_simulation(const Pace& pace) {
   findings_ = Findings();
   simulation_ = std::make_unique<engine::Simulation>(world_, options_.simulation, channels_,
                                                      findings_, wakeup_);
+  note_error(findings_.list());
   const int64_t last_step = options_.duration_us < 0 ? std::numeric_limits<int64_t>::max()
                                                      : options_.duration_us / world_->step_us;
   pacer_ = std::make_unique<Pacer>(world_->step_us, pace.rate, last_step);
   if (pace.paused) pacer_->pause();
   publisher_.begin_epoch(epoch_);
   begin_mode(mode(), -1);
+}
+
+void Run::note_error(const std::vector<Finding>& findings) {
+  const auto error = std::find_if(findings.begin(), findings.end(), [](const Finding& finding) {
+    return finding.kind == Finding::Kind::error;
+  });
+  if (!first_error_ && error != findings.end()) first_error_ = *error;
 }
 
 void Run::begin_mode(Mode& mode, int64_t step) {

@@ -4,6 +4,7 @@
 #include <algorithm>
 
 #include "world/model/body_layout.h"
+#include "world/read/read_context.h"
 
 namespace ruedo {
 
@@ -47,10 +48,8 @@ void name_what_does_not_act(const SensorSetup& setup, const Element* element,
   if (!element || !setup.findings) return;
   for (const auto& child : element->children) {
     if (std::find(read.begin(), read.end(), child->name) != read.end()) continue;
-    const std::string near = nearest_word(child->name, read);
-    setup.findings->unsupported(child->source, "sensor " + setup.device + "/" + element->name,
-                                "<" + child->name + "> is not supported and left out" +
-                                    (near.empty() ? "" : "; did you mean <" + near + ">?"));
+    world::report_unknown(*child, "<" + child->name + ">", nearest_word(child->name, read),
+                          "sensor " + setup.device + "/" + element->name, *setup.findings);
   }
 }
 

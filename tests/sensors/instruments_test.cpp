@@ -350,7 +350,7 @@ TEST(Instruments, RefusedConfigurations) {
 TEST(Instruments, WhatDoesNotActIsNamed) {
   for (const auto& [type, inside, named] :
        {std::tuple{"altimeter", "<altimeter><vertical_postion/></altimeter>",
-                   "<vertical_postion> is not supported and left out; did you mean "
+                   "<vertical_postion> is not known and left out; did you mean "
                    "<vertical_position>?"},
         std::tuple{"magnetometer", "<magnetometer><w/></magnetometer>", "<w> is not supported"},
         std::tuple{"gps", "<gps><satellites>5</satellites></gps>", "<satellites> is not supported"},

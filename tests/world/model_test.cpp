@@ -340,7 +340,7 @@ TEST(Findings, WhatIsNotSupportedIsNamedOnce) {
       (std::vector<std::string>{
           "<road> is not supported and left out",
           "the step 0.0033333333 s is not a whole number of microseconds; it is 3333 us instead",
-          "<colision> is not supported and left out; did you mean <collision>?",
+          "<colision> is not known and left out; did you mean <collision>?",
           "the mesh 'model://x/y.dae' is not found; the shape is left out",
           "one moment of inertia is larger than the sum of the two others; the inertia of a box of "
           "1 x 2 x 3 m is taken instead"}));

@@ -189,7 +189,7 @@ TEST(OddElements, TwoRobotsOfOneName) {
 
 TEST(OddElements, AMissingPrefixIsGuessed) {
   EXPECT_THAT(texts(*world_of("<model name='m'><link name='l'/><drive/></model>")),
-              ElementsAre("<drive> is not supported and left out; did you mean <ruedo:drive>?"));
+              ElementsAre("<drive> is not known and left out; did you mean <ruedo:drive>?"));
 }
 
 TEST(OddElements, WhatWasSilentIsNamed) {
@@ -224,7 +224,7 @@ TEST(OddElements, WhatSdfDoesNotHaveIsNamed) {
             "1</size></box></geometry><surface><friction><ode><mu3>1</mu3></ode></friction>"
             "<contact><ode><tension>1</tension></ode></contact></surface></collision></link>"
             "</model>"),
-      ElementsAre("<mu3> in <ode> is not supported and left out; did you mean <mu>?",
+      ElementsAre("<mu3> in <ode> is not known and left out; did you mean <mu>?",
                   HasSubstr("<tension> in <ode> is not supported and left out")));
   EXPECT_THAT(named("<model name='m'><link name='l'><sensor name='s' type='imu'><imu><angular_"
                     "velocity><x><noise type='gaussian'><sigma>1</sigma></noise></x></angular_"
@@ -283,7 +283,7 @@ TEST(OddElements, WhatUrdfDoesNotHaveIsNamed) {
       "<safety_controller k_velocity='1'/></joint></robot>",
       "/nowhere/r.urdf");
   EXPECT_THAT(texts(*world),
-              ElementsAre("<collisoin> in <link> is not supported and left out; did you mean "
+              ElementsAre("<collisoin> in <link> is not known and left out; did you mean "
                           "<collision>?",
                           "efort=\"1\" of <limit> is not supported and left out; did you mean "
                           "effort?"));

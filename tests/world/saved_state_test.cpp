@@ -118,8 +118,8 @@ TEST(SavedState, NamesWhatItDoesNotRead) {
       texts(*world_of(kArm +
                       "<state world_name='w'><modle name='arm'/><model name='arm'><pose>5 0 0 0 0 0"
                       "</pose><joint name='wrist'><angel>1</angel></joint></model></state>")),
-      ElementsAre("<modle> is not supported and left out; did you mean <model>?",
-                  "<angel> is not supported and left out; did you mean <angle>?"));
+      ElementsAre("<modle> is not known and left out; did you mean <model>?",
+                  "<angel> is not known and left out; did you mean <angle>?"));
   EXPECT_THAT(texts(*world_of(kArm + "<state><model><pose>5 0 0 0 0 0</pose></model></state>")),
               ElementsAre("<model> has no name; it is left out"));
 }

@@ -64,15 +64,20 @@ run::RunOptions server_options(const RegressArguments& arguments) {
   return options;
 }
 
+// "", or why it failed. The log that it looks at stays the one that is judged and kept.
 std::string run_script(const RegressArguments& arguments) {
+  const auto written = [&] {
+    return std::pair(fs::file_size(arguments.record), fs::last_write_time(arguments.record));
+  };
+  const auto before = written();
   ClientProcess script(arguments.script,
                        {"RUEDO_LOG=" + fs::absolute(arguments.record).string(),
                         "RUEDO_WORLD=" + fs::absolute(arguments.world.world).string()},
                        [] {});
   script.wait();
-  return script.fault().empty()
-             ? ""
-             : "the script ended with " + script.fault() + ": " + arguments.script;
+  if (!script.fault().empty())
+    return "the script ended with " + script.fault() + ": " + arguments.script;
+  return written() == before ? "" : "the script changed the log of the run: " + arguments.script;
 }
 
 // The failed run as a page beside its log, for machines without ruedo.
@@ -111,20 +116,6 @@ judge::Expectations expectations(const RegressArguments& arguments) {
   if (arguments.odometry_error >= 0.0) expected.odometry_error = arguments.odometry_error;
   expected.clearance_reach = arguments.clearance_reach;
   return expected;
-}
-
-// A world of which parts are missing is not the one that was meant.
-std::optional<judge::Check> world_check(const RegressArguments& arguments,
-                                        const world::WorldModel& world) {
-  const auto error = std::find_if(world.findings.begin(), world.findings.end(),
-                                  [](const Finding& f) { return f.kind == Finding::Kind::error; });
-  if (arguments.allow_errors || error == world.findings.end()) return {};
-  return judge::Check{
-      "world",
-      judge::Outcome::failed,
-      fmt::format("the world has an error, {}: {}: {} (--allow-errors runs it as it is)",
-                  error->source.str(), error->element, error->text),
-      {}};
 }
 
 // The checks of a run that has ended, beside the judge's.
@@ -179,15 +170,17 @@ int regress(RegressArguments arguments) {
   print_findings(world->findings);
   judge::Judge judge(world, expectations(arguments));
   judge::Verdict verdict;
-  if (auto check = world_check(arguments, *world)) {
-    verdict.checks.push_back(std::move(*check));
+  const auto error = std::find_if(world->findings.begin(), world->findings.end(),
+                                  [](const Finding& f) { return f.kind == Finding::Kind::error; });
+  if (!arguments.allow_errors && error != world->findings.end()) {
+    verdict.checks.push_back(world_check(*error));
     tell(arguments, verdict);
     return kCheckFailed;
   }
   std::vector<judge::Check> checks =
       run_judged(world,
                  {server_options(arguments), isolated, arguments.client, !arguments.no_client_wait,
-                  arguments.grace, arguments.timeout},
+                  arguments.allow_errors, arguments.grace, arguments.timeout},
                  judge, signals);
   if (const int signal = signals.told()) {
     to_stderr("ruedo: the run was ended by a signal{}\n",

@@ -48,6 +48,11 @@ std::string what_is_odd(const std::string& value) {
   return "";
 }
 
+// A flag is given or not; the parser would take --no-contact=false.
+std::string is_set(const std::string& value) {
+  return value == "true" ? "" : "takes no value, not '" + value + "'";
+}
+
 }  // namespace
 
 bool same_file(const std::string& a, const std::string& b) {
@@ -64,6 +69,7 @@ bool same_file(const std::string& a, const std::string& b) {
 void refuse_odd_values(CLI::App& app) {
   for (CLI::App* command : app.get_subcommands([](const CLI::App*) { return true; })) {
     for (CLI::Option* option : command->get_options()) {
+      if (option->get_items_expected_max() == 0) option->check(is_set);
       if (option->get_items_expected_min() == 0) continue;  // a flag, or a value may be left out
       option->check(what_is_odd);
     }

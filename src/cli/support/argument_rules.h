@@ -9,7 +9,8 @@ namespace ruedo::cli {
 
 // An argument that takes a value takes no empty one: `--record "$LOG"` without a LOG must not mean
 // that nothing is recorded. Nor one with control characters, since values are printed, and names of
-// files may come from a stranger's archive. Of all commands below app, before it parses.
+// files may come from a stranger's archive. A flag takes none. Of all commands below app, before it
+// parses.
 void refuse_odd_values(CLI::App& app);
 
 // Of `--seed`: what is wrong with it, or "".

@@ -21,11 +21,12 @@ namespace {
 constexpr auto kPatience = std::chrono::seconds(5);
 constexpr auto kLook = std::chrono::milliseconds(5);
 
-// Before the user's line. A shell forgets how a program in the background ended: so its number is
-// noted before the next command, and it is waited for at the end; and `wait` alone fails as a
-// program in the background did.
+// Before the user's line. The first command that fails ends it. A shell forgets how a program in
+// the background ended: so its number is noted before the next command, and it is waited for at the
+// end; and `wait` alone fails as a program in the background did.
 constexpr const char* kShell = "/bin/bash";
-constexpr const char* kPrologue = R"sh(set -o pipefail
+constexpr const char* kPrologue = R"sh(set -e -o pipefail
+shopt -s inherit_errexit
 wait() {
   if (($#)); then builtin wait "$@"; return; fi
   local code=0 job
@@ -33,7 +34,7 @@ wait() {
   return $code
 }
 trap 'ruedo_jobs[${!:-0}]=' DEBUG
-trap 'code=$?; wait; late=$?; exit $((code ? code : late))' EXIT
+trap 'code=$? late=0; wait || late=$?; exit $((code ? code : late))' EXIT
 )sh";
 
 }  // namespace

@@ -19,8 +19,9 @@ namespace ruedo::cli {
 class ClientProcess {
  public:
   // Runs `command` by bash, with the variables ("NAME=VALUE") added to the environment, and with
-  // the descriptors of `inherited` open. The exit code of each part counts: of a pipeline's
-  // programs, and of what runs in the background, which is waited for. `ended` is called, from a
+  // the descriptors of `inherited` open. The exit code of each part counts: the first command that
+  // fails ends it (`set -e`); a pipeline fails as one of its programs does; what runs in the
+  // background is waited for. `ended` is called, from a
   // thread of its own, when it ends. Throws EnvironmentError when there are no processes.
   ClientProcess(const std::string& command, const std::vector<std::string>& variables,
                 std::function<void()> ended, const std::vector<int>& inherited = {});

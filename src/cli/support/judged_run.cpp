@@ -145,6 +145,14 @@ class Paced {
 
 }  // namespace
 
+judge::Check world_check(const Finding& error) {
+  return {"world",
+          judge::Outcome::failed,
+          fmt::format("the world has an error, {}: {}: {} (--allow-errors runs it as it is)",
+                      error.source.str(), error.element, error.text),
+          {}};
+}
+
 std::vector<judge::Check> run_judged(const std::shared_ptr<const world::WorldModel>& world,
                                      JudgedRunOptions options, judge::Judge& judge,
                                      SignalThread& signals) {
@@ -194,6 +202,8 @@ std::vector<judge::Check> run_judged(const std::shared_ptr<const world::WorldMod
   if (std::string fault = watchdog.fault(); !fault.empty())
     checks.push_back({"run", judge::Outcome::failed, std::move(fault), {}});
   pace.pace(nullptr);
+  if (server.first_error() && !options.allow_errors)
+    checks.push_back(world_check(*server.first_error()));
   if (client) {
     const bool by_itself = client->is_over();
     client->end(std::chrono::duration<double>(signals.told() ? 0.0 : options.grace_s));

@@ -25,6 +25,14 @@ namespace ruedo::judge {
 namespace {
 
 constexpr SimTime kTrackPeriod = 250'000;  // us
+constexpr double kFall_m_s = 5.0;          // no wheel drops as far as gives that speed: 1.3 m
+
+// Three decimals, or six where three would show the limit itself.
+std::string beside(double value, double limit) {
+  std::string text = fmt::format("{:.3f}", value);
+  if (value == limit || text != fmt::format("{:.3f}", limit)) return text;
+  return fmt::format("{:.6f}", value);
+}
 
 double seconds(SimTime time) { return static_cast<double>(time) * 1e-6; }
 
@@ -118,9 +126,19 @@ void Judge::see(const Snapshot& snapshot) {
     track_.push_back({seconds(snapshot.time), position.x(), position.y()});
   if (goes_on && snapshot.step > 0) ++judged_;
   odometry_.see_truth(snapshot.time, robot.X_WBase, robot.odometry_resets);
+  see_fall(snapshot.time, robot);
   see_goals(snapshot.time, position);
   see_contacts(snapshot);
   if (distances_) see_clearance(snapshot);
+}
+
+// What falls touches nothing, and may pass over a goal.
+void Judge::see_fall(SimTime time, const RobotState& robot) {
+  const double up = (robot.X_WBase.rotation * robot.twist.linear).z();
+  if (up > -kFall_m_s) return;
+  fail("fall", time,
+       fmt::format("{} fell: at z = {:.2f} m it went down at {:.1f} m/s", expected_.robot,
+                   robot.X_WBase.translation.z(), -up));
 }
 
 void Judge::see_goals(SimTime time, const Vec3& position) {
@@ -141,10 +159,9 @@ void Judge::see_clearance(const Snapshot& snapshot) {
     return;
   const Vec3& at = nearest.other_point;
   fail("clearance", snapshot.time,
-       fmt::format(
-           "{} was {:.3f} m from {} at ({:.3f}, {:.3f}, {:.3f}), at least {:g} m are asked for",
-           name_of(nearest.own), nearest.distance, name_of(nearest.other), at.x(), at.y(), at.z(),
-           *expected_.clearance));
+       fmt::format("{} was {} m from {} at ({:.3f}, {:.3f}, {:.3f}), at least {:g} m are asked for",
+                   name_of(nearest.own), beside(nearest.distance, *expected_.clearance),
+                   name_of(nearest.other), at.x(), at.y(), at.z(), *expected_.clearance));
 }
 
 void Judge::see_contacts(const Snapshot& snapshot) {
@@ -237,7 +254,7 @@ Verdict Judge::verdict() const {
   }
   if (expected_.odometry_error) add_odometry(verdict);
   for (const Check& check : failures_) {
-    if (check.what == "requests") verdict.checks.push_back(check);
+    if (check.what == "requests" || check.what == "fall") verdict.checks.push_back(check);
   }
   verdict.metrics = metrics();
   verdict.track = track_;
@@ -309,8 +326,9 @@ void Judge::add_odometry(Verdict& verdict) const {
   } else if (result.beyond) {
     check.outcome = Outcome::failed;
     check.time = result.beyond;
-    check.text = fmt::format("{}'s odometry was {:.3f} m off, at most {:g} m are asked for",
-                             expected_.robot, result.beyond_m, *expected_.odometry_error);
+    check.text =
+        fmt::format("{}'s odometry was {} m off, at most {:g} m are asked for", expected_.robot,
+                    beside(result.beyond_m, *expected_.odometry_error), *expected_.odometry_error);
   }
   verdict.checks.push_back(std::move(check));
 }

@@ -60,14 +60,15 @@ class Judge {
   // A command or a request that acted on the run.
   void see(const applied_t& applied);
 
-  // After the run: the checks "run", "requests", and what was expected. Metrics: time_s, x_m, y_m
-  // and path_m of the end; goal_distance_m, the smallest to the last goal, and goal_time_s, when
-  // all were reached; contact_time_s of the first contact; clearance_m and odometry_error_m where
-  // they were measured. The track has base_link every quarter of a second.
+  // After the run: the checks "run", "requests", "fall", and what was expected. Metrics: time_s,
+  // x_m, y_m and path_m of the end; goal_distance_m, the smallest to the last goal, and
+  // goal_time_s, when all were reached; contact_time_s of the first contact; clearance_m and
+  // odometry_error_m where they were measured. The track has base_link every quarter of a second.
   Verdict verdict() const;
 
  private:
   void fail(const std::string& what, SimTime time, const std::string& text);
+  void see_fall(SimTime time, const RobotState& robot);
   void see_goals(SimTime time, const Vec3& position);
   void see_contacts(const Snapshot& snapshot);
   void see_clearance(const Snapshot& snapshot);

@@ -196,6 +196,7 @@ Run::Outcome Run::put_in(const request_t& request, const spawn_request_t& body,
   spdlog::info("{} was spawned at step {}", name, publisher_.step());
   std::vector<Finding> findings = loaded.findings;
   findings.insert(findings.end(), made.list().begin(), made.list().end());
+  note_error(findings);
   for (size_t i = 0; i < std::min(findings.size(), kFindingsTold); ++i)
     spdlog::warn("{}: {}: {}", findings[i].source.str(), findings[i].element, findings[i].text);
   name_request_t which;  // the answer gives its name and its pose

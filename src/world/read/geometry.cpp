@@ -295,9 +295,9 @@ std::optional<Geometry> read_geometry(const Element& element, const std::string&
   const std::string near =
       nearest_word(kind, {"box", "sphere", "cylinder", "capsule", "cone", "ellipsoid", "plane",
                           "mesh", "polyline", "heightmap"});
-  context.findings.unsupported(shape->source, where,
-                               "the shape <" + kind + "> is not supported and left out" +
-                                   (near.empty() ? "" : "; did you mean <" + near + ">?"));
+  context.findings.error(shape->source, where,
+                         "the shape <" + kind + "> is not supported and left out" +
+                             (near.empty() ? "" : "; did you mean <" + near + ">?"));
   return std::nullopt;
 }
 

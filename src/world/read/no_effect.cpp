@@ -9,6 +9,8 @@
 #include <string_view>
 #include <vector>
 
+#include "world/read/read_context.h"
+
 namespace ruedo::world {
 namespace {
 
@@ -318,11 +320,8 @@ class Walk {
       return false;
     }
     if (known) return true;
-    const std::string near = nearest_word(child.name, words_in(parent));
-    findings_.unsupported(child.source, where,
-                          "<" + child.name + "> in <" + parent.name +
-                              "> is not supported and left out" +
-                              (near.empty() ? "" : "; did you mean <" + near + ">?"));
+    report_unknown(child, "<" + child.name + "> in <" + parent.name + ">",
+                   nearest_word(child.name, words_in(parent)), where, findings_);
     return false;
   }
 

@@ -21,6 +21,15 @@ std::string name_of_model(const Element& element) {
   return name && *name == "world" ? kModelNamedWorld : required_name(element);
 }
 
+void report_unknown(const Element& element, const std::string& what, const std::string& near,
+                    const std::string& where, Findings& findings) {
+  if (near.empty())
+    findings.unsupported(element.source, where, what + " is not supported and left out");
+  else
+    findings.error(element.source, where,
+                   what + " is not known and left out; did you mean <" + near + ">?");
+}
+
 void report_other_children(const Element& element, const std::vector<std::string>& known,
                            const std::vector<std::string>& silent, const std::string& where,
                            Findings& findings) {
@@ -35,9 +44,7 @@ void report_other_children(const Element& element, const std::vector<std::string
     const std::string with_prefix = "ruedo:" + child->name;
     const std::string near =
         in(known, with_prefix) ? with_prefix : nearest_word(child->name, known);
-    findings.unsupported(child->source, where,
-                         "<" + child->name + "> is not supported and left out" +
-                             (near.empty() ? "" : "; did you mean <" + near + ">?"));
+    report_unknown(*child, "<" + child->name + ">", near, where, findings);
   }
 }
 

@@ -31,6 +31,11 @@ struct ReadContext {
 // "__model__").
 std::string required_name(const Element& element);
 
+// Names an element that is not known, `what`: an error where it is nearly the name of another,
+// for what was meant is missing; else it may be a plugin's own.
+void report_unknown(const Element& element, const std::string& what, const std::string& near,
+                    const std::string& where, Findings& findings);
+
 // Checks the children that a reader does not read: unknown ruedo: elements are errors with a
 // suggestion, unsupported or unknown elements are findings, and those in `silent` or of other
 // namespaces are ignored.

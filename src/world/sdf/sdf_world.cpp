@@ -139,8 +139,10 @@ void name_what_has_no_effect(const Element& world, const std::string& where, Fin
       findings.unsupported(element->source, where,
                            "<" + element->name + "> is not supported: " + text);
   };
-  name("population", "what it would place is left out");
   name("audio", "nothing sounds");
+  for (const Element* population : world.all("population"))
+    findings.error(population->source, where,
+                   "<population> is not supported: what it would place is missing");
 }
 
 void read_scene(const Element& scene, Sky& sky, Findings& findings) {

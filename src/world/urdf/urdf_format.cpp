@@ -7,6 +7,8 @@
 #include <string_view>
 #include <vector>
 
+#include "world/read/read_context.h"
+
 namespace ruedo::world {
 namespace {
 
@@ -63,31 +65,23 @@ bool holds(const Words& words, const std::string& word) {
          std::find(words.begin(), words.end(), word) != words.end();
 }
 
-std::string suggestion(const std::string& word, const Words& words, const char* open,
-                       const char* close) {
-  const std::string near = nearest_word(word, words);
-  return near.empty() ? "" : std::string("; did you mean ") + open + near + close + "?";
-}
-
 void look(const Element& element, const std::string& where, Findings& findings) {
   const auto format = formats().find(element.name);
   if (format == formats().end()) return;
   const auto& [children, attributes] = format->second;
   for (const auto& [name, value] : element.attributes) {
     // No simulator reads others, such as a <geometry>'s name or an <axis>'s rpy.
-    if (holds(attributes, name) || nearest_word(name, attributes).empty()) continue;
+    const std::string near = nearest_word(name, attributes);
+    if (holds(attributes, name) || near.empty()) continue;
     findings.unsupported(element.source, where,
                          name + "=\"" + value + "\" of <" + element.name +
-                             "> is not supported and left out" +
-                             suggestion(name, attributes, "", ""));
+                             "> is not supported and left out; did you mean " + near + "?");
   }
   std::set<std::string_view> seen;
   for (const auto& child : element.children) {
     if (!holds(children, child->name)) {
-      findings.unsupported(child->source, where,
-                           "<" + child->name + "> in <" + element.name +
-                               "> is not supported and left out" +
-                               suggestion(child->name, children, "<", ">"));
+      report_unknown(*child, "<" + child->name + "> in <" + element.name + ">",
+                     nearest_word(child->name, children), where, findings);
       continue;
     }
     const std::string_view kind =

@@ -16,8 +16,9 @@ def spawn_aside(sim):
     sim.spawn(text=BOX.format("wall", "true"), name="wall", x=-3.0, y=0.0)
 
 
-def remove_the_box(sim):
-    sim.remove("box")
+def spawn_misspelt(sim):
+    text = BOX.format("wall", "true").replace("collision", "collison")
+    sim.spawn(text=text, name="wall", x=-3.0, y=0.0)
 
 
 def keep_the_box(sim):
