@@ -8,6 +8,7 @@ import stat
 import subprocess
 import tempfile
 import threading
+import time
 from pathlib import Path
 from urllib.parse import urlsplit
 
@@ -79,12 +80,19 @@ def test_nobody_talks_to_another_users_server(language, anothers_socket):
     assert said.startswith("NoServer") and "served by another user" in said
 
 
-@pytest.fixture
-def stopped_server(tmp_path):
-    """Where: it greets one client, then stops, with room for one connection that waits."""
+@pytest.fixture(params=["then stops", "begins late"])
+def stopped_server(tmp_path, request):
+    """Where: it greets one client, then stops, with room for one connection that waits. One that
+    begins late has that place taken.
+    """
     greeted = []
 
     def greet(listener):
+        if request.param == "begins late":
+            waiting = socket.socket(socket.AF_UNIX)
+            waiting.connect(listener.getsockname())
+            time.sleep(2.0)
+            waiting.close()
         while not greeted:
             client = listener.accept()[0]
             if client.recv(1):  # who says nothing looked whether somebody is here

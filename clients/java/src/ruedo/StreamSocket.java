@@ -27,6 +27,7 @@ import java.security.Principal;
  */
 final class StreamSocket implements Closeable {
     private static final long SENDING_MILLIS = 5000;
+    private static final long AGAIN_MILLIS = 10;
 
     private final SocketChannel channel;
     private final Selector reads = Selector.open();
@@ -36,14 +37,18 @@ final class StreamSocket implements Closeable {
 
     /** Throws IOException when nobody serves there. */
     StreamSocket(Address address) throws IOException {
-        channel = address.path != null ? local() : SocketChannel.open();
+        channel = address.path != null ? local(address) : SocketChannel.open();
         try {
             channel.configureBlocking(false);
             channel.register(reads, SelectionKey.OP_READ);
             channel.register(looks, SelectionKey.OP_READ);
             if (address.path == null) channel.setOption(StandardSocketOptions.TCP_NODELAY, true);
-            connect(address);
-            if (address.path != null) checkPeer(channel, address.path);
+            if (address.path != null) {
+                checkPeer(channel, address.path);
+                channel.register(writes, SelectionKey.OP_WRITE);
+            } else {
+                connect(address);
+            }
         } catch (IOException error) {
             close();
             throw error;
@@ -52,8 +57,6 @@ final class StreamSocket implements Closeable {
 
     private void connect(Address address) throws IOException {
         if (!channel.connect(addressOf(address))) {
-            if (address.path != null) // such a socket connects at once
-            throw new SocketException("its queue of connections is full");
             SelectionKey key = channel.register(writes, SelectionKey.OP_CONNECT);
             new Deadline(SENDING_MILLIS * 1e-3).select(writes);
             if (!channel.finishConnect()) throw new IOException("nobody answers");
@@ -125,8 +128,28 @@ final class StreamSocket implements Closeable {
         looks.close();
     }
 
+    /** A connection; a server whose queue is full, as of one that is stopped, is waited for. */
+    private static SocketChannel local(Address address) throws IOException {
+        Deadline deadline = new Deadline(SENDING_MILLIS * 1e-3);
+        for (; ; ) {
+            SocketChannel made = unconnected();
+            try {
+                made.configureBlocking(false);
+                if (made.connect(addressOf(address))) return made;
+                throw new SocketException("its queue of connections is full");
+            } catch (IOException error) {
+                made.close();
+                boolean full = // there is no class of its own for it
+                        error.getClass() == SocketException.class
+                                && Files.exists(Paths.get(address.path));
+                if (!full || deadline.passed()) throw error;
+            }
+            Uninterrupted.sleep(AGAIN_MILLIS);
+        }
+    }
+
     /** Java 16 has these sockets; this library is for 11. */
-    private static SocketChannel local() throws IOException {
+    private static SocketChannel unconnected() throws IOException {
         try {
             Method open = SocketChannel.class.getMethod("open", ProtocolFamily.class);
             return (SocketChannel) open.invoke(null, StandardProtocolFamily.valueOf("UNIX"));

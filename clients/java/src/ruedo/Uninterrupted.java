@@ -8,6 +8,16 @@ final class Uninterrupted {
         T get() throws InterruptedException;
     }
 
+    /** At least so long. */
+    static void sleep(long millis) {
+        Deadline deadline = new Deadline(millis * 1e-3);
+        get(
+                () -> {
+                    while (!deadline.passed()) Thread.sleep(millis);
+                    return null;
+                });
+    }
+
     static <T> T get(Wait<T> wait) {
         boolean interrupted = false;
         try {
