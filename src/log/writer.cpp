@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cerrno>
 #include <cstring>
+#include <filesystem>
 
 #include <fcntl.h>
 #include <sys/file.h>
@@ -52,9 +53,11 @@ int open_empty(const std::string& path, const std::function<void()>& wait) {
   if (!S_ISREG(status.st_mode)) return file;
   if (::flock(file, LOCK_EX | LOCK_NB) != 0 && errno == EWOULDBLOCK)  // else: it knows no locks
     fail("another run records into it; end that one, or record elsewhere");
-  // Some file systems (FUSE) cannot do that, which does not matter for an empty one.
-  if (status.st_size > 0 && ::ftruncate(file, 0) != 0) fail(std::strerror(errno));
-  return file;
+  if (status.st_size == 0 || ::ftruncate(file, 0) == 0) return file;
+  // Some file systems (FUSE) cannot do that: another one takes its place.
+  if (::unlink(std::filesystem::weakly_canonical(path).c_str()) != 0) fail(std::strerror(errno));
+  ::close(file);
+  return open_empty(path, wait);
 }
 
 }  // namespace

@@ -1,15 +1,18 @@
-"""Runs a program for which the kernel answers clone3 by EPERM, as under an older Docker."""
+"""Runs a program for which the kernel answers a call by EPERM: without_call.py CALL PROGRAM...
+
+clone3: as under an older Docker; ftruncate: as on some file systems.
+"""
 
 import ctypes
 import os
 import struct
 import sys
 
-CLONE3 = 435
-# if the call is clone3: EPERM, else: allow
+CALLS = {"clone3": 435, "ftruncate": 77 if os.uname().machine == "x86_64" else 46}
+# if it is the call: EPERM, else: allow
 FILTER = [
     (0x20, 0, 0, 0),
-    (0x15, 0, 1, CLONE3),
+    (0x15, 0, 1, CALLS[sys.argv[1]]),
     (0x06, 0, 0, 0x00050001),
     (0x06, 0, 0, 0x7FFF0000),
 ]
@@ -22,4 +25,4 @@ if libc.prctl(PR_SET_NO_NEW_PRIVS, 1, 0, 0, 0) or libc.prctl(
     PR_SET_SECCOMP, SECCOMP_MODE_FILTER, program, 0, 0
 ):
     sys.exit("no seccomp here")
-os.execvp(sys.argv[1], sys.argv[1:])
+os.execvp(sys.argv[2], sys.argv[2:])
