@@ -11,7 +11,7 @@
 
 #include "base/input_file.h"
 #include "base/json.h"
-#include "scene/cut_away.h"
+#include "scene/overview.h"
 #include "scene/render_content.h"
 #include "scene/render_texture.h"
 #include "world/mesh/codecs.h"
@@ -257,10 +257,13 @@ SceneData::SceneData(const world::WorldModel& world, int version) {
       .member("shadows", world.sky.shadows);
   list(out.name("ambient"), world.sky.ambient.data(), 3);
   list(out.name("background"), world.sky.background.data(), 3);
-  list(out.name("low"), content.bounds.low.data(), 3);
-  list(out.name("high"), content.bounds.high.data(), 3);
+  const scene::Overview overview = scene::overview(world);
+  list(out.name("low"), overview.shown.low.data(), 3);
+  list(out.name("high"), overview.shown.high.data(), 3);
+  out.member("floor", overview.floor);
+  if (world.viewpoint) list(out.name("viewpoint"), numbers(*world.viewpoint).data(), 7);
   constexpr double kOpen = std::numeric_limits<double>::infinity();  // null in JSON
-  out.member("ceiling", scene::height_of_ceiling(world).value_or(kOpen));
+  out.member("ceiling", overview.ceiling.value_or(kOpen));
   meshes = write_meshes(out, content.meshes);
   out.name("textures").open('[');
   for (const auto& texture : content.textures) {

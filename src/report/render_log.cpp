@@ -19,7 +19,7 @@
 #include "ruedo/errors.h"
 #include "ruedo/world_state_t.hpp"
 #include "run/repeat/log_worlds.h"
-#include "scene/cut_away.h"
+#include "scene/overview.h"
 #include "scene/render_scene.h"
 #include "system/to_stderr.h"
 
@@ -130,7 +130,7 @@ class Scene {
       sunlight = light.pose.rotation * light.direction;
       break;
     }
-    scene::Bounds bounds = renderer_->bounds();
+    scene::Bounds bounds = scene::overview(*world_).shown;
     robot_ = robot_of(arguments.follow);
     if (robot_.valid())
       bounds = {Vec3::Constant(-0.5 * kFollowed_m), Vec3::Constant(0.5 * kFollowed_m)};
@@ -161,7 +161,7 @@ class Scene {
   static std::shared_ptr<const world::WorldModel> without_roof(
       const std::shared_ptr<const world::WorldModel>& world, const std::string& view) {
     const bool from_outside = view == "top" || view == "iso";
-    const auto height = from_outside ? scene::height_of_ceiling(*world) : std::nullopt;
+    const auto height = from_outside ? scene::overview(*world).ceiling : std::nullopt;
     return height ? scene::without_what_is_above(*world, *height) : world;
   }
 

@@ -111,7 +111,6 @@ class GlRenderer : public Renderer {
     device_.context().release();
   }
 
-  Bounds bounds() const override { return content_.bounds; }
   std::string description() const override { return description_; }
 
  private:

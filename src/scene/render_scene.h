@@ -70,8 +70,6 @@ class Renderer {
   // Draws the world in the state of `snapshot`; the picture's vectors keep their capacity.
   virtual void draw(const Snapshot& snapshot, const View& view, Picture& picture,
                     const Overlay& overlay = {}) = 0;
-  // Of all that is drawn at the start, except the ground; around the origin if there is nothing.
-  virtual Bounds bounds() const = 0;
   virtual std::string description() const = 0;  // for ruedo doctor: backend, renderer, version
 };
 

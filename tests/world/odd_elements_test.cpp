@@ -327,5 +327,23 @@ TEST(OddElements, ColladaWithABlankBeforeItsColours) {
   EXPECT_NEAR(visuals[0].geometry.mesh->materials.at(0).diffuse[1], 0.5, 1e-6);
 }
 
+// Of Gazebo Classic's window, and of the later Gazebo's; a faulty one costs nothing.
+TEST(Viewpoint, IsThatOfTheFilesWindow) {
+  const auto seen = [](const std::string& gui) {
+    return world_of("<gui>" + gui + "</gui>")->viewpoint;
+  };
+  const auto classic = seen("<camera name='c'><pose>1 2 3 0 0.5 0.1</pose></camera>");
+  ASSERT_TRUE(classic);
+  EXPECT_EQ(classic->translation, Vec3(1, 2, 3));
+  EXPECT_TRUE(
+      seen("<plugin filename='MinimalScene' name='v'><camera_pose>-6 0 6 0 0.5 0"
+           "</camera_pose></plugin>"));
+  EXPECT_FALSE(seen("<camera name='c'/>"));
+  const auto faulty = world_of("<gui><camera name='c'><pose>a b c 0 0 0</pose></camera></gui>");
+  EXPECT_FALSE(faulty->viewpoint);
+  ASSERT_EQ(faulty->findings.size(), 1u);
+  EXPECT_EQ(faulty->findings[0].kind, Finding::Kind::unsupported);
+}
+
 }  // namespace
 }  // namespace ruedo::world

@@ -5,7 +5,7 @@ import { Crowd } from "../src/scene/crowd";
 import type { Movers } from "../src/scene/build";
 import { metrePixels, shareOut } from "../src/scene/detail";
 import { Lights } from "../src/scene/lights";
-import { homeOf, shownOf } from "../src/scene/viewpoint";
+import { depthOf, homeOf, shownOf, viewOf } from "../src/scene/viewpoint";
 import type { Description } from "../src/wire/description";
 
 function box(): THREE.BufferGeometry {
@@ -21,7 +21,7 @@ describe("home", () => {
       [[-1, -40, 0], [4, 40, 8], 390 / 844],
       [[-50, -50, -1], [50, 50, 0.2], 2],
     ] as const) {
-      const world = shownOf({ low: [...low], high: [...high], ceiling: null });
+      const world = shownOf({ low: [...low], high: [...high], floor: low[2], ceiling: null });
       const camera = new THREE.PerspectiveCamera(50, aspect, 0.05, 400);
       const { eye, target } = homeOf(world, camera.fov, aspect);
       camera.up.set(0, 0, 1);
@@ -40,16 +40,33 @@ describe("home", () => {
     }
   });
 
-  it("is of what is under a roof, of a small world from 3 m around, of an endless one up to 60 m", () => {
-    expect(shownOf({ low: [0, 0, 0], high: [1, 1, 9], ceiling: 2 })).toEqual({
+  it("is of what is under a roof and above the floor, and of a small world from 3 m around", () => {
+    expect(shownOf({ low: [0, 0, -3], high: [1, 1, 9], floor: 0, ceiling: 2 })).toEqual({
       low: [-2.5, -2.5, 0],
       high: [3.5, 3.5, 2],
     });
-    expect(shownOf({ low: [-900, -20, 0], high: [1100, 20, 1], ceiling: null })).toEqual({
-      low: [40, -20, 0],
-      high: [160, 20, 1],
+    expect(shownOf({ low: [-900, -20, 0], high: [1100, 20, 1], floor: 0, ceiling: null })).toEqual({
+      low: [-900, -20, 0],
+      high: [1100, 20, 1],
     });
     expect(shownOf(null)).toEqual({ low: [-3, -3, 0], high: [3, 3, 1] });
+  });
+
+  it("is the file's own view, if it has one: of the floor, or of what is 5 m ahead", () => {
+    const down = Math.PI / 6, // pitch of 60 degrees, over a floor 4 m below
+      { eye, target } = viewOf([1, 2, 5, Math.cos(down), 0, Math.sin(down), 0], 1);
+    expect(eye.toArray()).toEqual([1, 2, 5]);
+    expect(target.z).toBeCloseTo(1, 9);
+    expect(target.x).toBeCloseTo(1 + 4 / Math.tan(2 * down), 9);
+    expect(viewOf([0, 0, 2, 1, 0, 0, 0], 0).target.toArray()).toEqual([5, 0, 2]);
+  });
+
+  it("keeps what lies 1 mm above a floor apart from it, as far as it is looked at", () => {
+    for (const reach of [0.5, 5, 30, 150, 1000]) {
+      const { near, far } = depthOf(reach),
+        step = (reach * reach * (1 / near - 1 / far)) / 2 ** 24; // of a depth buffer of 24 bits
+      expect(step).toBeLessThan(reach < 100 ? 0.001 : reach / 20_000);
+    }
   });
 });
 

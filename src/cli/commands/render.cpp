@@ -16,7 +16,7 @@
 #include "report/render_view.h"
 #include "ruedo/errors.h"
 #include "ruedo/image_t.hpp"
-#include "scene/cut_away.h"
+#include "scene/overview.h"
 #include "system/output_file.h"
 #include "world/mesh/codecs.h"
 #include "world/settings.h"
@@ -47,7 +47,8 @@ cv::Mat picture_of_world(const RenderArguments& arguments, const world::WorldMod
     sunlight = light.pose.rotation * light.direction;
     break;
   }
-  scene::View view = report::parse_view(arguments.view, size, renderer->bounds(), sunlight);
+  scene::View view =
+      report::parse_view(arguments.view, size, scene::overview(world).shown, sunlight);
   const int factor = std::max(view.width, view.height) <= kMaxSupersampledSide ? 2 : 1;
   const cv::Size wanted(view.width, view.height);
   view.width *= factor;
@@ -140,8 +141,7 @@ std::optional<double> height_to_cut_at(const RenderArguments& arguments,
   const bool from_outside = arguments.view == "top" || arguments.view == "iso";
   if (arguments.cut == "none") return std::nullopt;
   if (arguments.cut == "auto")
-    return arguments.camera.empty() && from_outside ? scene::height_of_ceiling(world)
-                                                    : std::nullopt;
+    return arguments.camera.empty() && from_outside ? scene::overview(world).ceiling : std::nullopt;
   const std::optional<double> height = report::parse_number(arguments.cut);
   if (!height)
     throw InputError({}, "--cut " + arguments.cut + ": allowed are a height in m, auto and none");

@@ -354,6 +354,7 @@ struct WorldModel {
   Environment environment;
   SolverDescription solver;
   Sky sky;
+  std::optional<Pose> viewpoint;  // from which the file wants to be looked at: x ahead, z up
   std::vector<Light> lights;
   // in file order, followed by those of --spawn
   IndexedVector<InstanceIndex, ModelInstance> models;

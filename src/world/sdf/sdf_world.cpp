@@ -105,6 +105,22 @@ std::vector<const Element*> read_performers(const Element& world, const std::str
   return performers;
 }
 
+// Of Gazebo Classic's window, or of the plugin that is the later Gazebo's.
+std::optional<Pose> read_viewpoint(const Element& world, const std::string& where,
+                                   Findings& findings) {
+  const Element* gui = world.child("gui");
+  if (!gui) return std::nullopt;
+  try {
+    if (gui->child("camera/pose")) return gui->pose("camera/pose");
+    for (const Element* plugin : gui->all("plugin")) {
+      if (plugin->child("camera_pose")) return plugin->pose("camera_pose");
+    }
+  } catch (const InputError& error) {
+    findings.unsupported(error.source(), where, "the window's camera: " + error.message());
+  }
+  return std::nullopt;
+}
+
 // Performers that are not models of the world are reported and ignored.
 void check_performers(const WorldModel& world, const std::vector<const Element*>& performers,
                       Findings& findings) {
@@ -463,6 +479,7 @@ class SdfReader::WorldReader {
     if (const Element* scene = element_.child("scene"))
       read_or_leave_out(in_world_, "what is usual is taken", findings_,
                         [&] { read_scene(*scene, world_.sky, findings_); });
+    world_.viewpoint = read_viewpoint(element_, in_world_, findings_);
     name_what_has_no_effect(element_, in_world_, findings_);
   }
 

@@ -1,7 +1,7 @@
 // The 3-D view: its contents, and when it is drawn, which is only when something has changed.
 import * as THREE from "three";
 import type { Poses } from "../state/poses";
-import type { ModelDescription, SceneFiles } from "../wire/description";
+import type { Description, ModelDescription, SceneFiles } from "../wire/description";
 import { Bodies } from "./bodies";
 import { disposeOf, SceneBuilder } from "./build";
 import { metrePixels } from "./detail";
@@ -10,7 +10,7 @@ import { FrameTimer } from "./frame_timer";
 import { Lights } from "./lights";
 import { Picker } from "./picker";
 import { drawnBySoftware, Quality } from "./quality";
-import { shownOf, Viewpoint } from "./viewpoint";
+import { shownOf, Viewpoint, viewOf } from "./viewpoint";
 
 export class Stage {
   readonly scene = new THREE.Scene();
@@ -23,6 +23,7 @@ export class Stage {
   frameCost_ms = 0; // of this thread, smoothed
   firstDrawn_ms = 0; // when the world was first drawn, since navigation
   private readonly lights = new Lights();
+  private readonly fog = new THREE.Fog(0); // begins behind what is looked at
   private readonly timer: FrameTimer | null = null;
   private shadows = true; // what the user wants
   private wireframe = false;
@@ -54,6 +55,7 @@ export class Stage {
     );
     this.picker = new Picker(canvas, this.view.camera, this.bodies);
     this.scene.add(this.lights.group);
+    this.scene.fog = this.fog;
     new ResizeObserver(() => this.resize()).observe(canvas.parentElement!);
     this.resize();
   }
@@ -77,7 +79,7 @@ export class Stage {
   setTheme(dark: boolean): void {
     const colour = new THREE.Color(dark ? 0x171b21 : 0xdde4ec);
     this.scene.background = colour;
-    this.scene.fog = new THREE.Fog(colour, 35, 130);
+    this.fog.color.copy(colour);
     this.touch();
   }
 
@@ -116,10 +118,15 @@ export class Stage {
     this.bodies.show(files?.description ?? null, next);
     this.lights.show(files?.description ?? null);
     this.refine();
-    if (files && first) this.home();
+    if (files && first) this.begin(files.description);
     if (this.wireframe) this.setWireframe(true);
     this.cut();
     this.touch();
+  }
+
+  private begin({ viewpoint, floor }: Description): void {
+    if (viewpoint) this.view.begin(viewOf(viewpoint, floor));
+    else this.home();
   }
 
   // Shows all of the world.
@@ -197,6 +204,8 @@ export class Stage {
       this.bodies.shareOut({ position: camera.position, metre_px }, this.quality.now.plain);
       this.regroup = false;
     }
+    this.fog.near = Math.max(35, 2 * this.view.reach);
+    this.fog.far = 4 * this.fog.near;
     if (this.lights.aim(controls.target)) renderer.shadowMap.needsUpdate = true;
     renderer.render(this.scene, camera);
   }

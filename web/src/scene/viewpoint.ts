@@ -3,13 +3,14 @@ import * as THREE from "three";
 import { OrbitControls } from "three/addons/controls/OrbitControls.js";
 import type { ViewMode } from "../state/page";
 
-// Home: bounds on how much of the world it shows, the height that it looks at, and the share of the
-// view that the world fills
+// Home: how much of the world it shows at least, the height above the floor that it looks at, and
+// the share of the view that the world fills
 const kLeastHome_m = 3,
-  kMostHome_m = 60,
   kLookedAt_m = 1,
   kHomeShare = 0.95;
 const kSeen_m2 = 1e-8; // shorter ways cannot be seen
+const kFarthestSeen_m = 200, // of what a file's view looks at
+  kBefore_m = 5;
 
 // The part of the world that home shows, as a box.
 export interface Shown {
@@ -19,17 +20,44 @@ export interface Shown {
 
 // What home shows of a world with those bounds. ceiling: nothing above it is drawn.
 export function shownOf(
-  world: { low: number[]; high: number[]; ceiling: number | null } | null,
+  world: { low: number[]; high: number[]; floor: number; ceiling: number | null } | null,
 ): Shown {
-  const { low, high, ceiling } = world ?? { low: [-3, -3, 0], high: [3, 3, 1], ceiling: null };
+  const { low, high, floor, ceiling } = world ?? {
+    low: [-3, -3, 0],
+    high: [3, 3, 1],
+    floor: 0,
+    ceiling: null,
+  };
   const centre = [0, 1].map((i) => (low[i]! + high[i]!) / 2),
-    half = [0, 1].map((i) =>
-      Math.max(kLeastHome_m, Math.min(kMostHome_m, (high[i]! - low[i]!) / 2)),
-    ),
-    top = Math.max(0, Math.min(kMostHome_m, high[2]!, ceiling ?? Infinity));
+    half = [0, 1].map((i) => Math.max(kLeastHome_m, (high[i]! - low[i]!) / 2));
   return {
-    low: [centre[0]! - half[0]!, centre[1]! - half[1]!, 0],
-    high: [centre[0]! + half[0]!, centre[1]! + half[1]!, top],
+    low: [centre[0]! - half[0]!, centre[1]! - half[1]!, floor],
+    high: [
+      centre[0]! + half[0]!,
+      centre[1]! + half[1]!,
+      Math.max(floor, Math.min(high[2]!, ceiling ?? Infinity)),
+    ],
+  };
+}
+
+// The eye of a file's own view, and what it looks at: the floor, or what is before it.
+export function viewOf(
+  [x, y, z, qw, qx, qy, qz]: number[],
+  floor: number,
+): { eye: THREE.Vector3; target: THREE.Vector3 } {
+  const eye = new THREE.Vector3(x, y, z),
+    ahead = new THREE.Vector3(1, 0, 0).applyQuaternion(new THREE.Quaternion(qx, qy, qz, qw)),
+    drop = (eye.z - floor) / -ahead.z,
+    reach = drop > 0 && drop < kFarthestSeen_m ? drop : kBefore_m;
+  return { eye, target: eye.clone().addScaledVector(ahead, reach) };
+}
+
+// How far the camera sees, from what it looks at in that distance: near enough for what stands
+// before it, and not so near that what lies on a floor flickers.
+export function depthOf(reach_m: number): { near: number; far: number } {
+  return {
+    near: Math.min(2, Math.max(0.02, reach_m / 60)),
+    far: Math.max(400, 20 * reach_m),
   };
 }
 
@@ -42,7 +70,7 @@ export function homeOf(
   const target = new THREE.Vector3(
     (low[0]! + high[0]!) / 2,
     (low[1]! + high[1]!) / 2,
-    Math.min(high[2]! / 2, kLookedAt_m),
+    Math.min((low[2]! + high[2]!) / 2, low[2]! + kLookedAt_m),
   );
   const back = new THREE.Vector3(-0.5, -0.62, 0.62).normalize(),
     right = new THREE.Vector3(0, 0, 1).cross(back).normalize(),
@@ -96,9 +124,13 @@ export class Viewpoint {
 
   // Shows all of that.
   home(shown: Shown): void {
-    const { eye, target } = homeOf(shown, this.camera.fov, this.camera.aspect);
+    this.begin(homeOf(shown, this.camera.fov, this.camera.aspect));
+  }
+
+  // As a file wants to be looked at.
+  begin({ eye, target }: { eye: THREE.Vector3; target: THREE.Vector3 }): void {
     this.controls.target.copy(target);
-    this.look(eye.sub(target));
+    this.look(eye.clone().sub(target));
   }
 
   setMode(mode: ViewMode): void {
@@ -174,6 +206,15 @@ export class Viewpoint {
   frame(): void {
     this.track();
     this.controls.update();
+    const { near, far } = depthOf(this.reach);
+    if (near === this.camera.near && far === this.camera.far) return;
+    Object.assign(this.camera, { near, far });
+    this.camera.updateProjectionMatrix();
+  }
+
+  // m, from what is looked at
+  get reach(): number {
+    return this.camera.position.distanceTo(this.controls.target);
   }
 
   private track(): void {

@@ -44,7 +44,9 @@ export interface Description {
   background: number[];
   low: number[];
   high: number[];
+  floor: number; // m: what robots stand on
   ceiling: number | null; // things above this height hide what is below; null for an open world
+  viewpoint?: number[]; // where the file looks from: x y z, quaternion w x y z; x ahead
   meshes: [vertices: number, indices: number][];
   textures: boolean[];
   batches: [mesh: number, first: number, count: number, texture: number, flags: number][];
