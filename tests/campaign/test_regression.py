@@ -9,9 +9,7 @@ import subprocess
 import sys
 
 import pytest
-from ruedo.regression import RegressionFailed, ruedo_regression, run_regression
-
-__all__ = ["ruedo_regression"]  # a fixture, for pytest to find
+from ruedo.regression import RegressionFailed, run_regression
 
 WORLD = (
     "<sdf version='1.9'><world name='w'><include><uri>model://p3at</uri></include></world></sdf>"
@@ -75,6 +73,7 @@ WRONG = [  # what is given, what the error says
     ({"clearance": -0.1}, "clearance is -0.1: it must be a finite number, 0 or more"),
     ({"odometry_error": "1"}, "odometry_error is a number, not '1'"),
     ({"timeout": True}, "timeout is a number, not True"),
+    ({"check": "no"}, "check is True or False, not 'no'"),
     ({"robot": 5}, "robot is a text, not 5"),
     ({"keep": ["a"]}, "keep needs a golden log"),
     ({"tolerances": ["a:b=abs:1"]}, "tolerances needs a golden log"),
@@ -96,9 +95,9 @@ WRONG = [  # what is given, what the error says
 def pytest_on():
     """Runs a test file by a pytest of its own, from another folder; what it says."""
 
-    def run(file, text):
+    def run(file, text, *options):
         file.write_text(text)
-        command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", file]
+        command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", *options, file]
         environment = {**os.environ, "RUEDO_RENEW": "1"}
         return subprocess.run(
             command, cwd="/", env=environment, capture_output=True, text=True, timeout=100
@@ -122,10 +121,20 @@ def test_a_wrong_argument_is_told(tmp_path, given, text):
     assert "\n" not in str(caught.value) and not os.listdir(tmp_path)
 
 
-@pytest.mark.parametrize("given", [{"world": 5}, {"golden": 5}], ids=str)
-def test_the_fixture_tells_it_too(ruedo_regression, given):
-    with pytest.raises(TypeError, match="is a text or a path, not 5"):
-        ruedo_regression(**{"world": "arena", "duration": 1, **given})
+@pytest.mark.parametrize(
+    "given, text",
+    [
+        ("5, duration=1", "world is a text or a path, not 5"),
+        ("'arena', duration=1, golden=5", "golden is a text or a path, not 5"),
+        ("'arena', duration=1, tolerance=[]", "no argument 'tolerance': there are client, durat"),
+    ],
+)
+def test_the_fixture_tells_it_too(pytest_on, tmp_path, given, text):
+    said = pytest_on(
+        tmp_path / "test_it.py",
+        f"def test_it(ruedo_regression):\n    ruedo_regression({given})\n",
+    )
+    assert "1 failed in" in said and f"TypeError: {text}" in said, said
 
 
 def test_a_worlds_name_may_begin_as_an_option_does(tmp_path):
@@ -137,19 +146,66 @@ def test_a_worlds_name_may_begin_as_an_option_does(tmp_path):
     assert run.log.exists() and "passed" in run.output
 
 
-def test_a_misspelt_argument_is_told_with_those_that_there_are(ruedo_regression):
-    with pytest.raises(TypeError, match="no argument 'tolerance': there are client, duration, "):
-        ruedo_regression("arena", duration=1, golden="g.lcm", tolerance=["a:b=abs:1"])
+def test_a_golden_log_is_renewed_by_the_words_of_the_command(tmp_path, monkeypatch):
+    """Regression: `yes` was refused here, and taken there."""
+    (tmp_path / "w.sdf").write_text(WORLD)
+    given = {"duration": 0.1, "golden": tmp_path / "g.lcm", "record": tmp_path / "run.lcm"}
+    monkeypatch.setenv("RUEDO_RENEW", "nope")
+    with pytest.raises(RegressionFailed, match="allowed are 1, true, yes, on and 0, false, no, o"):
+        run_regression(tmp_path / "w.sdf", **given)
+    assert os.listdir(tmp_path) == ["w.sdf"]
+    monkeypatch.setenv("RUEDO_RENEW", "yes")
+    assert "renewed" in run_regression(tmp_path / "w.sdf", **given).output
 
 
-@pytest.mark.parametrize("renew", ["false", "no", "yes", " "])
-def test_a_golden_log_is_written_anew_for_1_alone(tmp_path, monkeypatch, renew):
-    """Regression: RUEDO_RENEW=false wrote it."""
-    golden = tmp_path / "g.lcm"
-    monkeypatch.setenv("RUEDO_RENEW", renew)
-    with pytest.raises(ValueError, match=f"RUEDO_RENEW is '{renew}' in the environment: 1 writes"):
-        run_regression("arena", duration=1, golden=golden, record=tmp_path / "run.lcm")
-    assert not os.listdir(tmp_path)
+def test_a_run_that_fails_is_returned_where_that_is_expected(tmp_path):
+    given = {"duration": 0.1, "record": tmp_path / "run.lcm", "check": False}
+    (tmp_path / "w.sdf").write_text(WORLD)
+    run = run_regression(tmp_path / "w.sdf", script="false", **given)
+    assert not run.passed and run.evidence == "" and "the script ended with" in run.output
+    assert run_regression(tmp_path / "w.sdf", **given).passed
+
+
+@pytest.mark.parametrize(
+    "given, text",
+    [
+        ({"world": "nosuch"}, "nosuch"),
+        ({"options": ["--nosuch"]}, "--nosuch"),
+        ({"timeout": 0.001}, "took more than 0.001 s"),
+    ],
+    ids=plain,
+)
+def test_what_was_not_run_is_no_failure_that_was_expected(tmp_path, given, text):
+    rest = {"world": "arena", "duration": 1, "record": tmp_path / "run.lcm", "check": False}
+    with pytest.raises(RegressionFailed, match=text):
+        run_regression(**{**rest, **given})
+
+
+SETUP_FAILS = """
+@pytest.fixture
+def broken(ruedo_regression):
+    {}
+def test_it(ruedo_regression, broken):
+    pass
+"""
+
+
+@pytest.mark.parametrize(
+    "test, said",
+    [
+        ("def test_it(ruedo_regression):\n    assert False", "1 failed in"),
+        (SETUP_FAILS.format("assert False"), "1 error in"),
+        (SETUP_FAILS.format("pytest.skip()"), "1 skipped in"),
+        ("@pytest.mark.xfail\ndef test_it(ruedo_regression):\n    assert False", "1 xfailed in"),
+        ("@pytest.mark.skip\ndef test_it(ruedo_regression): pass", "1 skipped in"),
+    ],
+)
+@pytest.mark.parametrize("of", ["", "from ruedo.regression import ruedo_regression\n"])
+def test_who_has_not_come_to_its_run_is_not_blamed_for_it(pytest_on, tmp_path, of, test, said):
+    """Also where the fixture alone was imported, and no plugin is loaded."""
+    more = ["-p", "no:ruedo"] if of else []
+    told = pytest_on(tmp_path / "test_it.py", f"import pytest\n{of}{test}\n", *more)
+    assert said in told, told
 
 
 def test_where_nothing_ran_nothing_passed(tmp_path, monkeypatch):
@@ -159,13 +215,17 @@ def test_where_nothing_ran_nothing_passed(tmp_path, monkeypatch):
         run_regression("arena", duration=1, record=tmp_path / "run.lcm")
 
 
-def test_each_run_of_a_test_has_a_log_of_its_own(ruedo_regression, tmp_path):
+def test_each_run_of_a_test_has_a_log_of_its_own(pytest_on, tmp_path):
     """Regression: the second wrote over the first, which its result still named."""
     (tmp_path / "w.sdf").write_text(WORLD)
-    runs = [ruedo_regression(tmp_path / "w.sdf", duration=0.1, seed=n) for n in (1, 2)]
-    assert runs[0].log != runs[1].log and runs[0].log.read_bytes() != runs[1].log.read_bytes()
-    with pytest.raises(ValueError, match="record is .*, the log of an earlier run of this test"):
-        ruedo_regression(tmp_path / "w.sdf", duration=0.1, record=runs[0].log)
+    said = pytest_on(
+        tmp_path / "test_it.py",
+        "def test_it(ruedo_regression):\n"
+        "    one, two = (ruedo_regression('w.sdf', duration=0.1, seed=n).log for n in (1, 2))\n"
+        "    assert one.read_bytes() != two.read_bytes()\n"
+        "    ruedo_regression('w.sdf', duration=0.1, record=one)\n",
+    )
+    assert re.search("ValueError: record is .*, the log of an earlier run of this test", said), said
 
 
 def test_paths_are_relative_to_the_tests_file(pytest_on, tmp_path):

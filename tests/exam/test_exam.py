@@ -135,13 +135,22 @@ def cmake(line, folder):
 
 
 def pytest_(line, folder):
-    """The arguments of the fixture ruedo_regression in a test."""
+    """The arguments of the fixture ruedo_regression in a test, or the test, in which run() is it;
+    -- its environment.
+    """
+    line, _, environment = line.partition(" -- ")
+    test = line if "run(" in line else f"run({line})"
     (folder / "test_it.py").write_text(
-        f"PYTHON = {sys.executable!r}\n\n\ndef test_it(ruedo_regression):\n"
-        f'    ruedo_regression("box.sdf", options=["--disable", "p3at/camera"], {line})\n'
+        "from contextlib import suppress\nfrom functools import partial\n"
+        f"from threading import Thread\n\nimport pytest\n\nPYTHON = {sys.executable!r}\n\n\n"
+        "def test_it(ruedo_regression):\n"
+        '    run = partial(ruedo_regression, "box.sdf", options=["--disable", "p3at/camera"])\n'
+        f"    {test}\n"
     )
     return run(
-        [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", "test_it.py"], folder
+        [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", "test_it.py"],
+        folder,
+        **dict(one.split("=") for one in environment.split()),
     )
 
 

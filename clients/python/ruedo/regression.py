@@ -18,7 +18,7 @@ import re
 import shlex
 import subprocess
 import sys
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -51,6 +51,7 @@ _SINGLE = {
     *("odometry_error", "golden", "lockstep", "script"),
 }
 _VERDICT = "passed: "
+_FAILED = 1  # the exit code of `ruedo regress` for a verdict; others are for what was not judged
 _PASSED = "\nThe run is in "  # what `ruedo regress` prints in the end
 _PathLike = str | os.PathLike[str]
 _MOST_CLIENTS = 64  # in lockstep
@@ -63,16 +64,18 @@ class RegressionFailed(RuedoError, AssertionError):
 
 @dataclass(frozen=True)
 class Regression:
-    """A run that was as expected."""
+    """A run that was as expected, or with check=False any run that was judged."""
 
     log: Path  # of the whole run, a standard LCM log
     output: str  # what the client and `ruedo regress` printed
+    passed: bool = True
 
     @property
     def evidence(self) -> str:
-        """On what it has passed: "12000 steps; the client ended with 0 at 59.8 s; ..."."""
+        """On what it has passed: "12000 steps; the client ended with 0 at 59.8 s; ..."; "" where it
+        has not."""
         said = (line for line in reversed(self.output.splitlines()) if line.startswith(_VERDICT))
-        return next(said).removeprefix(_VERDICT)
+        return next(said).removeprefix(_VERDICT) if self.passed else ""
 
 
 def _option(name: str, *values: object) -> list[str]:
@@ -149,11 +152,6 @@ def _golden(golden: _PathLike | None, **rules: Sequence[str]) -> list[str]:
         for name in (name for name, values in given.items() if values):
             raise ValueError(f"{name} needs a golden log")
         return []
-    renew = os.environ.get("RUEDO_RENEW", "")
-    if renew not in ("", "0", "1"):
-        raise ValueError(
-            f"RUEDO_RENEW is {renew!r} in the environment: 1 writes golden logs anew, 0 does not"
-        )
     return [
         *_option("golden", os.path.abspath(path("golden", golden))),
         *(
@@ -185,7 +183,10 @@ def _patience(timeout: float) -> float:
     return min(seconds, _LONGEST_S)
 
 
-def _output_of(command: list[str], folder: _PathLike | None, timeout: float) -> str:
+def _output_of(
+    command: list[str], folder: _PathLike | None, timeout: float, check: bool
+) -> tuple[str, bool]:
+    """What was printed, and whether the run has passed."""
     __tracebackhide__ = True
     process = subprocess.Popen(
         command,
@@ -205,13 +206,15 @@ def _output_of(command: list[str], folder: _PathLike | None, timeout: float) -> 
     except BaseException:
         _stopped(process)
         raise
+    if process.returncode == _FAILED and not check:
+        return output, False
     if process.returncode != 0:
         raise RegressionFailed(
             f"{output}\n(exit code {process.returncode} of {shlex.join(command)})"
         )
     if _PASSED not in f"\n{output}":  # as after an option that prints something in place of a run
         raise RegressionFailed(f"{output}\n(there was no run by {shlex.join(command)})")
-    return output
+    return output, True
 
 
 def _stopped(process: subprocess.Popen[str]) -> str:
@@ -247,16 +250,18 @@ def run_regression(
     options: Sequence[str] = (),
     folder: _PathLike | None = None,
     timeout: float = 300.0,
+    check: bool = True,
 ) -> Regression:
     """`ruedo regress` with these options; raises RegressionFailed.
 
     client, script: words, or a line for a shell; the client finds the run by LCM_DEFAULT_URL, the
     script its log by RUEDO_LOG. duration, by: s of sim time; goal, radius, clearance,
     odometry_error: m. lockstep: clients to wait for. options: more of `ruedo regress`, such as
-    ["--spawn", "p3at@1,2"]. folder: where client and script run. timeout: s of real time.
+    ["--spawn", "p3at@1,2"]. folder: where client and script run. timeout: s of real time. check:
+    False returns a run that has failed, too; one that was not run is still raised.
     """
     __tracebackhide__ = True
-    timeout = _patience(timeout)
+    timeout, check = _patience(timeout), switch("check", check)
     record = os.path.abspath(path("record", record))
     command = [
         find_ruedo(),
@@ -280,35 +285,88 @@ def run_regression(
         path("world", world),
     ]
     folder = None if folder is None else path("folder", folder)
-    return Regression(Path(record), _output_of(command, folder, timeout))
+    return Regression(Path(record), *_output_of(command, folder, timeout, check))
 
 
 _ARGUMENTS = [name for name in inspect.signature(run_regression).parameters if name != "world"]
 
 
-@pytest.fixture
-def ruedo_regression(request: pytest.FixtureRequest, tmp_path: Path) -> Callable[..., Regression]:
-    """run_regression() with a log for each run in the test's temporary folder. Paths are relative
-    to the test's file, and client and script run beside it."""
-    here = request.path.parent
-    logs: list[Path] = []
+_phase = pytest.StashKey[pytest.CallInfo[None]]()  # of a test, the one that ended last
 
-    def run(world: _PathLike, **options: Any) -> Regression:
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_runtest_makereport(item: pytest.Item, call: pytest.CallInfo[None]) -> None:
+    item.stash[_phase] = call
+
+
+class _Runs:
+    """The calls of one test. None of their verdicts may be lost."""
+
+    def __init__(self, here: Path, logs: Path) -> None:
+        self._here, self._logs = here, logs
+        self._records: list[Path] = []
+        self.begun = self._ended = 0
+        self._failures: list[Exception] = []
+
+    def __call__(self, world: _PathLike, **options: Any) -> Regression:
         __tracebackhide__ = True  # a failure shows the test's own line
+        self.begun += 1
+        try:
+            return self._run(world, options)
+        except Exception as error:
+            self._failures.append(error)
+            raise
+        finally:
+            self._ended += 1
+
+    def _run(self, world: _PathLike, options: dict[str, Any]) -> Regression:
+        __tracebackhide__ = True
         for name in options:
             if name not in _ARGUMENTS:
                 raise TypeError(f"no argument {name!r}: there are {', '.join(_ARGUMENTS)}")
-        name = f"run-{len(logs) + 1}.lcm" if logs else "run.lcm"
-        given = {"record": tmp_path / name, "folder": here, **options}
+        name = f"run-{len(self._records) + 1}.lcm" if self._records else "run.lcm"
+        given = {"record": self._logs / name, "folder": self._here, **options}
         for name in ("record", "folder", "golden"):
             if given.get(name) is not None:
-                given[name] = here / path(name, given[name])
-        if given["record"] in logs:
+                given[name] = self._here / path(name, given[name])
+        if given["record"] in self._records:
             raise ValueError(f"record is {given['record']}, the log of an earlier run of this test")
-        logs.append(given["record"])
-        beside = here / path("world", world)
+        self._records.append(given["record"])
+        beside = self._here / path("world", world)
         result = run_regression(beside if beside.exists() else world, **given)
         print(result.output, file=sys.stderr)
         return result
 
-    return run
+    def lost(self) -> str:
+        """What a test that has not failed has not seen."""
+        if not self.begun:
+            return "the test takes ruedo_regression and has not called it: nothing was judged"
+        if self._ended < self.begun:
+            return "the test ended before a run that it began: that was not judged"
+        if self._failures:
+            return (
+                "the test went on after a regression that failed; where that is expected, "
+                f"ruedo_regression(..., check=False) returns the run: {self._failures[0]}"
+            )
+        return ""
+
+
+@pytest.fixture
+def ruedo_regression(
+    request: pytest.FixtureRequest, tmp_path: Path
+) -> Iterator[Callable[..., Regression]]:
+    """run_regression() with a log for each run in the test's temporary folder. Paths are relative
+    to the test's file, and client and script run beside it. A run that failed fails the test,
+    whatever becomes of the exception, and so does a test that never calls it."""
+    here = sys.modules[__name__]
+    if not request.config.pluginmanager.is_registered(here):  # the fixture alone was imported
+        request.config.pluginmanager.register(here)
+    runs = _Runs(request.path.parent, tmp_path)
+    yield runs
+    phase = request.node.stash[_phase]
+    if phase.when != "call":  # the setup of another fixture failed, or skipped the test
+        return
+    ended_by = phase.excinfo
+    is_green = ended_by is None or (runs.begun and ended_by.errisinstance(pytest.skip.Exception))
+    if is_green and (lost := runs.lost()):
+        pytest.fail(lost, pytrace=False)
