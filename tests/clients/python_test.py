@@ -18,6 +18,7 @@ import time
 import types
 import warnings
 import zlib
+from functools import partial
 
 import lcm
 import numpy as np
@@ -195,6 +196,7 @@ def test_what_is_no_world_is_said():
         (lambda sim: sim.reset(seed="x"), "seed is a whole number, not 'x'"),
         (lambda sim: sim.robot("p3at").on_collision(5), "a callback is a function.*not 5"),
         (lambda sim: sim.robot("p3at").lrf.on_sample(5), "a callback is a function.*not 5"),
+        (lambda sim: sim.on_new_run(5), "a callback is a function.*not 5"),
         (lambda sim: scan(1.0).points("world"), "a device or a pose is wanted.*not 'world'"),
         (lambda sim: scan(1.0).points(sim.robot("p3at").lrf, 5), "a pose is wanted.*not 5"),
         (lambda sim: sim.set_rate("fast"), "rate is a number, not 'fast'"),
@@ -346,6 +348,44 @@ def test_the_text_of_a_world():
         assert sim.world == "hall"
 
 
+async def coroutine(sample):
+    await NotImplemented
+
+
+async def coroutines(sample):
+    yield
+
+
+def generator(sample):
+    yield
+
+
+class Awaited:
+    async def __call__(self, sample):
+        await NotImplemented
+
+
+@pytest.mark.parametrize(
+    "callback", [coroutine, coroutines, generator, Awaited(), partial(coroutine)], ids=repr
+)
+def test_what_would_never_run_is_no_callback(callback):
+    with ruedo.launch(HALL, lockstep=1, **QUICK) as sim:
+        robot = sim.robot("p3at")
+        for register in robot.lrf.on_sample, robot.on_collision, sim.on_new_run:
+            with pytest.raises(TypeError, match="a callback is a plain function.*would never run"):
+                register(callback)
+
+
+@pytest.mark.parametrize("made", [coroutine, generator])
+def test_what_a_callback_made_and_nothing_ran_is_a_fault(made):
+    with (
+        pytest.raises(TypeError, match="a callback returned .* which nothing runs"),
+        ruedo.launch(HALL, lockstep=1, **QUICK) as sim,
+    ):
+        sim.robot("p3at").odometry.on_sample(lambda sample: (made(sample), None)[0])
+        sim.step(100)
+
+
 def test_callbacks_are_taken_back_and_readers_do_not_meet():
     with ruedo.launch(HALL, **QUICK) as sim:
         odometry = sim.robot("p3at").odometry
@@ -357,7 +397,10 @@ def test_callbacks_are_taken_back_and_readers_do_not_meet():
                 sys.exit("a callback wants to end the program")
 
         with odometry.on_sample(heard.append), odometry.on_sample(fail) as failed:
-            with pytest.raises(SystemExit, match="wants to end"):
+            with pytest.raises(
+                ruedo.RuedoError,
+                match=r"a callback on p3at/odometry raised SystemExit\('a callback",
+            ):
                 while True:
                     odometry.next(PATIENCE)
             while len(heard) < 3 or len(failing) < 2:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 import math
 import operator
 import os
@@ -135,6 +136,24 @@ def finite(what: str, value: Any, low: float = -math.inf) -> float:
         allowed = "" if low == -math.inf else f", {low:g} or more"
         raise ValueError(f"{what} is {value}: it must be a finite number{allowed}")
     return given
+
+
+def check_callback(value: Any) -> None:
+    """Raises TypeError for what is not called, and for what only makes something that would have to
+    be run then.
+    """
+    if not callable(value):
+        raise TypeError(f"a callback is a function of one sample, not {shown(value)}")
+    for one in (value, type(value).__call__):  # of a function, of an object
+        if (
+            inspect.iscoroutinefunction(one)
+            or inspect.isgeneratorfunction(one)
+            or inspect.isasyncgenfunction(one)
+        ):
+            raise TypeError(
+                "a callback is a plain function of one sample; an `async def` or a generator as "
+                f"{shown(value)} would never run"
+            )
 
 
 def array(what: str, value: Any) -> NDArray[np.float64]:

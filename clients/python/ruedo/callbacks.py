@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import inspect
 import logging
 import threading
 from collections.abc import Callable
 from typing import Any
+
+from .arguments import check_callback
 
 log = logging.getLogger("ruedo")
 
@@ -51,7 +54,10 @@ class Subscription:
         if self.closed:
             return
         try:
-            self._callback(*arguments)
+            made = self._callback(*arguments)
+            if inspect.iscoroutine(made) or inspect.isgenerator(made):
+                made.close()
+                raise TypeError(f"a callback returned {made!r}, which nothing runs")
         except BaseException as error:
             if (
                 isinstance(error, KeyboardInterrupt)
@@ -81,8 +87,7 @@ class Callbacks:
         return bool(self._all)
 
     def add(self, callback: Callable[..., Any]) -> Subscription:
-        if not callable(callback):
-            raise TypeError(f"a callback is a function of one sample, not {callback!r}")
+        check_callback(callback)
         subscription = Subscription(callback, self._what, self._remove, self._keep)
         with self._lock:
             self._all += (subscription,)

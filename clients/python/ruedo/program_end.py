@@ -15,7 +15,7 @@ import traceback
 from types import TracebackType
 from typing import Any
 
-from .errors import RunEnded
+from .errors import RuedoError, RunEnded
 
 
 class CallbackFaults:
@@ -28,6 +28,11 @@ class CallbackFaults:
 
     def note(self, error: BaseException, what: str) -> bool:
         """Whether it is kept: False while another one is."""
+        if isinstance(error, SystemExit):  # which would end the program as if all were well
+            fault = RuedoError(
+                f"a callback on {what} raised {error!r}, which ends a program in its main thread alone"
+            )
+            fault.__cause__, error = error, fault
         with self._lock:
             if self._kept is not None:
                 return False

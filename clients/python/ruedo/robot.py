@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, Literal, TypeVar
 import numpy as np
 
 from . import lcmtypes
-from .arguments import finite, number, numbers, shown, text
+from .arguments import check_callback, finite, number, numbers, shown, text
 from .errors import NotSupported, UnknownName
 from .geometry import Floats
 from .lockstep import Command
@@ -223,15 +223,13 @@ class Robot:
         """Calls callback(collisions) as on_sample() does, but only when the robot runs into a body
         that it did not touch a moment before.
         """
-        if not callable(callback):
-            raise TypeError(f"a callback is a function of one sample, not {shown(callback)}")
+        check_callback(callback)
         touched: list[str] = []
 
-        def see(sample: Collisions) -> None:
+        def see(sample: Collisions) -> Any:
             news = not set(sample.bodies) <= set(touched)
             touched[:] = sample.bodies
-            if news:
-                callback(sample)
+            return callback(sample) if news else None
 
         return self.collisions.on_sample(see)
 

@@ -122,6 +122,7 @@ class Simulation:
         """Calls callback(simulation), in the thread of the callbacks, when another server, or the
         same one restarted, answers at this address. Commands are not repeated into the new run, and
         primitives under way have ended."""
+        arguments.check_callback(callback)
         return self._connection.on_new_run(lambda: callback(self))
 
     def sleep(self, seconds: float) -> None:
