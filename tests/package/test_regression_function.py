@@ -63,6 +63,20 @@ def value(command, option):
 GOOD = "NAME gate WORLD w.sdf DURATION 1"
 REFUSED = [  # the arguments, what the error says besides the test's name
     *(
+        (f"{GOOD} {keys} {word}", rf"{key} has the word '.*', which is not the keyword NO_CONTACT")
+        for keys, key in (
+            ("CLIENT drive", "CLIENT"),
+            ("SCRIPT judge", "SCRIPT"),
+            ("GOLDEN g.lcm IGNORE */lrf", "IGNORE"),
+            ("OPTIONS --no-noise", "OPTIONS"),
+        )
+        for word in (
+            *("no_contact", '"NO_CONTACT;"', '" no_contact "', '"a;No_Contact;b"'),
+            *("$<0:NO_CONTACT>", '"$<0:NO_CONTACT;SEED;3>"', '"$<IF:1,NO_CONTACT,>"'),
+        )
+    ),
+    (f"{GOOD} CLIENT drive seed 3", "CLIENT program ...|meant for the program goes into a line"),
+    *(
         (f"{GOOD} {key} ${{typo}}", rf"\b{key} has no value: it is {key} ")
         for key in (
             *("SEED", "LOCKSTEP", "GOLDEN", "ROBOT", "CLEARANCE", "ODOMETRY_ERROR", "TIMEOUT"),
