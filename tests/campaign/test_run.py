@@ -31,6 +31,7 @@ from conftest import (
 )
 from ruedo.campaign import Campaign
 from ruedo.campaign.compare import compare_with
+from ruedo.hunt.why import Answer, plot
 
 
 @pytest.fixture(scope="module")
@@ -134,8 +135,10 @@ def test_what_lies_beside_a_controller_counts(folder):
     before = ids(folder)
     ruedo("campaign", "export", "c.yaml", "-o", "table.csv", folder=folder)
     ruedo("campaign", "export", "c.yaml", "-o", "results.xml", folder=folder)
-    for name in ("report.html", "case0.lcm", "lib.pyc"):
+    for name in ("report.html", "case0.lcm", "controller.pyc"):
         (folder / name).touch()
+    for name in ("why.svg", "why.png", "why.pdf"):
+        plot(Answer(1.0, "it failed", {"stop": [(0.5, True)]}), str(folder / name))
     (folder / "other.yaml").write_text(CAMPAIGN.replace("seeds: 2", "seeds: 3"))
     (folder / ".hidden").mkdir()
     for name in (".hidden/a.py", ".a.py", "other.campaign/worlds/a.json"):
@@ -150,6 +153,9 @@ def test_what_lies_beside_a_controller_counts(folder):
         "tree.xml",
         "weights.bin",
         "map.png",
+        "map.svg",
+        "map.pdf",
+        "bare.pyc",
         "gains",
     ):
         (folder / name).parent.mkdir(parents=True, exist_ok=True)

@@ -11,6 +11,7 @@ from conftest import CAMPAIGN, PATIENCE, ruedo
 from ruedo.campaign import Campaign, SpecError
 from ruedo.campaign.plan import points, substitute
 from ruedo.campaign.stats import mcnemar, paired_difference, wilson
+from ruedo.files import dump_yaml, parse_yaml
 
 WRONG = [  # what is replaced, by what, line, what the message says
     ("name: walls\nworlds", "nmae: walls\nworlds", 2, "nmae: is not known; .*did you mean 'name'"),
@@ -479,6 +480,22 @@ def test_a_controller_may_be_called_as_its_file(tmp_path, name):
     [case] = made.cases
     assert case.controller == name
     assert [one.id for one in Campaign(made.content, folder=tmp_path).cases] == [case.id]
+
+
+@pytest.mark.parametrize("text", ["1e9", "2.5e3", "-1E-3", "+.5e2", "1.e+1", "1.0e+9"])
+def test_a_number_with_an_exponent_is_one(text):
+    """Regression: without a point and a sign it was a text, as YAML 1.1 has it."""
+    assert parse_yaml(f"[{text}, '{text}']")[1] == [float(text), text]
+
+
+@pytest.mark.parametrize("text", ["1e", "e9", "1e9s", "1e9.5", "a1e9", "1 e9", "v1e9", "."])
+def test_what_is_no_number_stays_a_text(text):
+    assert parse_yaml(f"[{text}]")[1] == [text]
+
+
+def test_what_is_written_as_yaml_is_read_as_the_same():
+    content = {"1e9": ["1e9", 1e9, 1e22, 1e-9, 7, "7", True, "true", None, "caf\u00e9", 0.1]}
+    assert parse_yaml(dump_yaml(content))[1] == content
 
 
 def test_a_command_that_names_no_file_is_told(folder):

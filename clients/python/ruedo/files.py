@@ -8,6 +8,7 @@ by how it is written.
 from __future__ import annotations
 
 import errno
+import functools
 import hashlib
 import os
 import re
@@ -61,15 +62,35 @@ def parse_yaml(text: str) -> tuple[Any, Any]:
     """
     import yaml
 
+    loader = _with_exponents(yaml.SafeLoader)
     try:
-        node = yaml.compose(text, Loader=yaml.SafeLoader)
+        node = yaml.compose(text, Loader=loader)
         if node is not None and _values(node, {}) > MOST_YAML_VALUES:
             raise yaml.YAMLError(f"it stands for more than {MOST_YAML_VALUES} values")
-        return node, yaml.safe_load(text)
+        return node, yaml.load(text, Loader=loader)
     except RecursionError:
         raise yaml.YAMLError("it is nested too deep") from None
     except (ValueError, OverflowError) as error:  # a date or a number that there is not
         raise yaml.YAMLError(str(error)) from None
+
+
+def dump_yaml(content: Any) -> str:
+    """What parse_yaml() reads as the same."""
+    import yaml
+
+    dumper = _with_exponents(yaml.SafeDumper)
+    return str(yaml.dump(content, Dumper=dumper, sort_keys=False, allow_unicode=True))
+
+
+@functools.cache
+def _with_exponents(of: Any) -> Any:
+    """A loader or dumper to which 1e9 and 2.5e3 are numbers, as in YAML 1.2; YAML 1.1 knows 2.5e+3
+    alone.
+    """
+    made = type(of.__name__, (of,), {})
+    exponent = re.compile(r"[-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)[eE][-+]?[0-9]+\Z")
+    made.add_implicit_resolver("tag:yaml.org,2002:float", exponent, list("-+.0123456789"))
+    return made
 
 
 def _values(node: Any, known: dict[int, int]) -> int:

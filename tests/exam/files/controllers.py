@@ -145,3 +145,8 @@ def from_json(view):
 def from_text(view):
     with open(os.path.join(os.path.dirname(__file__), "gain.txt")) as file:
         return float(file.read()), 0.0
+
+
+def from_picture(view):
+    with open(os.path.join(os.path.dirname(__file__), "gain.svg")) as file:
+        return float(file.read()), 0.0

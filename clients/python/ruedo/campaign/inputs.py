@@ -15,15 +15,17 @@ from ..files import parse_yaml, read_bytes, sha256_of
 
 # Programs and settings. Of other files it is not known whether cases read or write them.
 _READ = re.compile(
-    r".*\.(pyx?|so|sh|bash|m?js|lua|rb|pl|m|jl|c|cc|cpp|cxx|h|hh|hpp|java|class|jar"
+    r".*\.(py[cx]?|so|sh|bash|m?js|lua|rb|pl|m|jl|c|cc|cpp|cxx|h|hh|hpp|java|class|jar"
     r"|json|ya?ml|toml|ini|cfg|conf|csv|npy|npz|mat|pkl|pickle|h5|hdf5|pth?|onnx|tflite|safetensors|pgm)",
     re.IGNORECASE,
 )
-_WRITTEN = (".lcm", ".html", ".svg", ".pdf", ".pyc")  # logs, pages, figures; Python's own
+_WRITTEN = (".lcm", ".html")  # logs, pages
+FIGURE_TITLE = "drawn by ruedo why"  # in its files
+_FIGURES = (".svg", ".png", ".pdf")
 _JUNIT = re.compile(rb"(<\?xml[^>]*>)?\s*<testsuite")
 _MOST_FILES, _MOST_LOOKED_AT, _MOST_BYTES = 2000, 50_000, 256 << 20
 _TABLE = b"number,id,world,robot,controller,seed,"  # as `ruedo campaign export` begins
-_MOST_FOOTER_BYTES = 1 << 16  # of Parquet, with the names of columns
+_MOST_MARK_BYTES = 1 << 16  # of a figure's head, and of Parquet's footer with the names of columns
 _MOST_SPEC_BYTES = 1 << 20
 
 
@@ -113,14 +115,20 @@ def _is_written(file: str) -> bool:
     _, kind = os.path.splitext(file)
     if kind in (".yaml", ".yml"):
         return _is_campaign(file)
-    if kind not in (".csv", ".parquet", ".xml"):
+    if kind == ".pyc":  # Python prefers the source
+        return os.path.isfile(file[:-1])
+    if kind not in (".csv", ".parquet", ".xml", *_FIGURES):
         return kind in _WRITTEN
     with open(file, "rb") as one:
+        if kind in _FIGURES:
+            head = one.read(_MOST_MARK_BYTES)
+            one.seek(max(0, os.path.getsize(file) - _MOST_MARK_BYTES))
+            return FIGURE_TITLE.encode() in head + one.read()
         if kind == ".xml":
             return _JUNIT.match(one.read(200)) is not None
         if kind == ".csv":
             return one.read(len(_TABLE)) == _TABLE
-        one.seek(max(0, os.path.getsize(file) - _MOST_FOOTER_BYTES))
+        one.seek(max(0, os.path.getsize(file) - _MOST_MARK_BYTES))
         footer = one.read()
     return all(name in footer for name in _TABLE.strip(b",").split(b","))
 

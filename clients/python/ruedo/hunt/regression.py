@@ -17,6 +17,7 @@ from ..campaign.outputs import check_writable
 from ..campaign.plan import words_of
 from ..campaign.worlds import beside, copy_beside, model_of
 from ..errors import for_terminal
+from ..files import dump_yaml
 
 _PYTEST = '''# Found by `ruedo hunt`: {reason}
 
@@ -40,8 +41,6 @@ def keep(found: Any, folder: Path) -> Path:
     """world.sdf, regression.yaml (a campaign of one case), test_NAME.py, CMakeLists.txt, and
     run.lcm, the log of the run that failed.
     """
-    import yaml
-
     check_keep(folder)
     folder.mkdir(parents=True, exist_ok=True)
     name = re.sub(r"\W", "_", folder.name)
@@ -67,9 +66,8 @@ def keep(found: Any, folder: Path) -> Path:
     if "golden" in content["expect"]:
         golden = os.path.join(os.path.relpath(found.folder, folder), content["expect"]["golden"])
         content["expect"] = {**content["expect"], "golden": golden}
-    text = yaml.safe_dump(content, sort_keys=False, allow_unicode=True)
     (folder / "regression.yaml").write_text(
-        f"# Found by `ruedo hunt`: {reason}\n{text}", encoding="utf-8"
+        f"# Found by `ruedo hunt`: {reason}\n{dump_yaml(content)}", encoding="utf-8"
     )
     (folder / f"test_{name}.py").write_text(
         _PYTEST.format(name=name, reason=reason),

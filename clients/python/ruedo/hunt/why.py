@@ -473,6 +473,7 @@ def check_plot(file: str) -> None:
 
 def plot(answer: Answer, file: str) -> None:
     """The moments that were tried, and what saved the run: SVG, PNG or PDF by the file's name."""
+    from ..campaign.inputs import FIGURE_TITLE
     from ..campaign.report import new_figure
 
     drawn = new_figure(6.4, 2.6)
@@ -502,4 +503,5 @@ def plot(answer: Answer, file: str) -> None:
     axes.legend(frameon=False, loc="lower left", ncols=2)
     kind = Path(file).suffix[1:]
     with replacing(file) as part:
-        drawn.savefig(part, format=kind, metadata={"Date": None} if kind == "svg" else None)
+        metadata = {"Title": FIGURE_TITLE, **({"Date": None} if kind == "svg" else {})}
+        drawn.savefig(part, format=kind, metadata=metadata)
