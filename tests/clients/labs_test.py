@@ -4,13 +4,15 @@ from planted values.
 
 import math
 import sys
+from itertools import pairwise
 
 import numpy as np
 import pytest
 from conftest import SOURCE
 
-sys.path.insert(0, str(SOURCE / "clients/python/examples/labs"))
+sys.path[:0] = [str(SOURCE / "clients/python/examples/labs" / one) for one in (".", "marking")]
 
+import labs
 import mapping
 import particle_filter
 import sonar_avoidance
@@ -63,3 +65,91 @@ def test_a_map_has_the_walls_where_they_are():
 def test_a_particle_filter_finds_the_robot():
     errors = particle_filter.localise(seconds=20)
     assert errors[0] > 1.0 and max(errors[100:]) < 0.3
+
+
+# The referee of a class, by ways that are given, ten places a second.
+def along(*corners):
+    """Straight from one to the next at 0.4 m/s."""
+    return np.concatenate(
+        [
+            np.linspace(a, b, max(2, round(math.dist(a, b) / 0.04)), endpoint=False)
+            for a, b in pairwise(corners)
+        ]
+        + [corners[-1:]]
+    )
+
+
+def around(x, y, radius, turns=1.0, begin=0.0):
+    angles = begin + np.linspace(
+        0.0, 2 * math.pi * turns, round(2 * math.pi * radius * turns / 0.04)
+    )
+    return np.stack([x + radius * np.cos(angles), y + radius * np.sin(angles)], axis=1)
+
+
+def why_not(lab, way):
+    run = labs.Run(lab, 1, 0.0, np.asarray(way, dtype=float), np.zeros((0, 3)), "")
+    try:
+        labs.LABS[lab].judge(run)
+    except labs.Failed as error:
+        return str(error)
+    return ""
+
+
+@pytest.mark.parametrize(
+    "way, text",
+    [
+        (along((0, 0), (2, 0), (2, 2), (0, 2), (0, 0)), ""),
+        (along((0, 0), (2.15, 0), (2.15, 2.15), (0, 2.15), (0, 0)), ""),  # too far
+        (along((0, 0), (1.9, 0.1), (1.8, 2.0), (-0.1, 1.9), (0.1, 0.1)), ""),  # at wrong angles
+        (along((0, 0), (1.7, 0), (2, 0.3), (2, 1.7), (1.7, 2), (0.3, 2), (0, 1.7), (0, 0)), ""),
+        (around(1, 1, math.sqrt(2), begin=-0.75 * math.pi), "0.41 m off the straight edge to the "),
+        (
+            around(1, 1, 1.2, 1.1, begin=-0.8 * math.pi),
+            "m off the straight edge to the corner 2, 0",
+        ),
+        (along((0, 0), (1, -0.3), (2, 0), (2, 2), (0, 2), (0, 0)), "0.30 m off the straight edge"),
+        (
+            along((0, 0), (0, 2), (2, 2), (2, 0), (0, 0)),
+            "m off the straight edge to the corner 2, 0",
+        ),
+        (along((0, 0), (2, 0), (2, 2), (0, 2)), "was not at the corner 0, 0 in its turn"),
+    ],
+)
+def test_a_square_has_four_straight_edges(way, text):
+    said = why_not("square", way)
+    assert text in said and bool(text) == bool(said)
+
+
+INNER = [(-3.15, -2.15), (3.15, -2.15), (3.15, 2.15), (-3.15, 2.15)]
+
+
+@pytest.mark.parametrize(
+    "way, text",
+    [
+        (along((-2, -1.4), *INNER[:3]), ""),
+        (along((2, -1.4), *INNER[1::-1], INNER[3]), ""),  # the other way around
+        (along(*INNER, *INNER), ""),
+        (along(*((-3 + 0.5 * i, -2.15 + 0.25 * (-1) ** i) for i in range(13)), *INNER[1:3]), ""),
+        (around(0, -2.15, 0.2, 12), "went on 0.0 m along the walls"),
+        (around(3.0, -2.0, 0.2, 12), "m along the walls"),  # in a corner
+        (along(*[(-2, -2.15), (1, -2.15)] * 4), "went on 3.0 m along the walls"),
+        (along((-3, -1), (3, -1), (3, 1), (-3, 1)), "m from the wall, not 0.8"),
+    ],
+)
+def test_who_follows_a_wall_goes_on(way, text):
+    said = why_not("wall_following", way)
+    assert text in said and bool(text) == bool(said)
+
+
+@pytest.mark.parametrize(
+    "way, text",
+    [
+        (along((-3, -2), (2, -1), (2.5, 1)), ""),
+        (around(0, 0, 0.6, 5), "its farthest places are 1.2 m from each other"),
+        (around(0, 0, 1.5, 2), "its farthest places are 3.0 m from each other"),
+        (along(*[(0, 0), (1, 0)] * 8), "its farthest places are 1.0 m from each other"),
+    ],
+)
+def test_who_avoids_what_is_near_gets_around(way, text):
+    said = why_not("sonar_avoidance", way)
+    assert text in said and bool(text) == bool(said)

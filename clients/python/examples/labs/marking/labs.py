@@ -39,6 +39,7 @@ ROOM: list[Wall] = [
 PATIENCE = 20.0  # s of real time from readings to the command; less than the lease of lockstep
 LONGEST, MOST_POINTS = 1 << 20, 4000  # bytes of a line, points of a map
 LAYER = "handed in"
+STRAIGHT = 0.2  # m, that an edge may deviate
 
 
 class Failed(AssertionError):
@@ -273,26 +274,59 @@ def read(log: str) -> Run:
 
 
 def square(run: Run) -> None:
-    after = 0
+    before = 0
     for x, y in ((SIDE, 0.0), (SIDE, SIDE), (0.0, SIDE), (0.0, 0.0)):
-        near = np.flatnonzero(np.hypot(*(run.way[after:] - (x, y)).T) < 0.3)
+        apart = np.hypot(*(run.way[before:] - (x, y)).T)
+        near = np.flatnonzero(apart < 0.3)
         if not len(near):
             raise Failed(f"was not at the corner {x:g}, {y:g} in its turn")
-        after += near[0] + 1
+        gone = near[0] + np.argmax(np.append(apart[near[0] :], math.inf) >= 0.3)
+        corner = before + near[0] + int(np.argmin(apart[near[0] : gone]))
+        off = deviation(run.way[before : corner + 1])
+        if off > STRAIGHT:
+            raise Failed(f"was {off:.2f} m off the straight edge to the corner {x:g}, {y:g}")
+        before = corner
     if np.hypot(*run.way[-1]) > 0.3:
         raise Failed(f"ends {np.hypot(*run.way[-1]):.2f} m from where it began")
 
 
+def deviation(way: np.ndarray) -> float:
+    """How far it goes from the line between its ends (m)."""
+    (x, y), from_begin = way[-1] - way[0], way - way[0]
+    across = x * from_begin[:, 1] - y * from_begin[:, 0]
+    return float(abs(across).max() / max(math.hypot(x, y), 1e-9))
+
+
 def wall_following(run: Run) -> None:
     needs_way(run, 6.0)
-    way = run.way[50:]
-    apart = np.minimum(4.0 - abs(way[:, 0]), 3.0 - abs(way[:, 1])) - THICKNESS / 2
-    if not abs(np.median(apart) - APART) < 0.2:
-        raise Failed(f"was {np.median(apart):.2f} m from the wall, not {APART}")
+    apart = np.minimum(4.0 - abs(run.way[:, 0]), 3.0 - abs(run.way[:, 1])) - THICKNESS / 2
+    if not abs(np.median(apart[50:]) - APART) < 0.2:
+        raise Failed(f"was {np.median(apart[50:]):.2f} m from the wall, not {APART}")
+    along = progress(run.way, abs(apart - APART) < 0.5)
+    if along < 6.0:
+        raise Failed(f"went on {along:.1f} m along the walls, and 6 are asked for")
+
+
+def progress(way: np.ndarray, counts: np.ndarray) -> float:
+    """Along the walls of the room, there and back counting as nothing (m). counts: which places are
+    near enough to a wall.
+    """
+    a, b = (
+        4.0 - THICKNESS / 2 - APART,
+        3.0 - THICKNESS / 2 - APART,
+    )  # half of the way that is asked for
+    x, y = np.clip(way, (-a, -b), (a, b)).T
+    nearest = np.argmin([y + b, a - x, b - y, x + a], axis=0)  # the lower side, and on to the left
+    at = np.choose(nearest, [x + a, 2 * a + b + y, 3 * a + 2 * b - x, 4 * a + 3 * b - y])
+    steps = (np.diff(at) + 2 * (a + b)) % (4 * (a + b)) - 2 * (a + b)
+    return float(abs(steps[counts[1:] & counts[:-1]].sum()))
 
 
 def sonar_avoidance(run: Run) -> None:
     needs_way(run, 5.0)
+    apart = np.linalg.norm(run.way[:, None] - run.way, axis=2).max()
+    if apart < 4.0:
+        raise Failed(f"its farthest places are {apart:.1f} m from each other, and 4 are asked for")
 
 
 def umbmark(run: Run) -> None:
