@@ -1,64 +1,25 @@
-// Folders are searched once; models are read when their pictures are requested.
+// Models are listed once, and read when their pictures are requested.
 #include "console/library.h"
 
 #include <algorithm>
-#include <filesystem>
-#include <set>
+#include <utility>
 
 #include "base/json.h"
-#include "base/utf8.h"
 #include "ruedo/errors.h"
 #include "world/load_model.h"
-#include "world/read/resources.h"
-
-namespace fs = std::filesystem;
 
 namespace ruedo::console {
-namespace {
 
-bool is_model(const fs::path& folder) {
-  std::error_code error;
-  return fs::is_regular_file(folder / "model.sdf", error) ||
-         fs::is_regular_file(folder / "model.config", error);
-}
-
-// The subfolders that are models, by name.
-std::set<std::string> models_in(const fs::path& folder) {
-  std::set<std::string> names;
-  std::error_code error;
-  for (const fs::directory_entry& entry : fs::directory_iterator(folder, error)) {
-    const std::string name = entry.path().filename().string();
-    if (!name.starts_with('.') && printable(name) == name && is_model(entry.path()) &&
-        names.size() < Library::kMostModels)
-      names.insert(name);
-  }
-  return names;
-}
-
-}  // namespace
-
-const std::vector<Library::Entry>& Library::entries() {
-  if (std::exchange(listed_, true)) return entries_;
-  const fs::path shipped = world::shipped_worlds(), beside = fs::path(world_file_).parent_path();
-  std::set<std::string> known{"sun", "ground_plane"};  // part of every world
-  const auto add = [&](const fs::path& folder, bool robots) {
-    for (const std::string& name : models_in(folder)) {
-      if (entries_.size() < kMostModels && known.insert(name).second)
-        entries_.push_back({name, robots});
-    }
-  };
-  add(shipped / "robots", true);
-  add(shipped / "models", false);
-  add(beside / "models", false);
-  add(beside / ".." / "models", false);
+const std::vector<world::ListedModel>& Library::entries() {
+  if (!std::exchange(listed_, true)) entries_ = world::listed_models(world_file_);
   return entries_;
 }
 
 std::string Library::list() {
   JsonWriter json;
   json.open('[');
-  for (const Entry& entry : entries())
-    json.open('{').member("name", entry.name).member("robot", entry.robot).close('}');
+  for (const world::ListedModel& entry : entries())
+    json.open('{').member("name", entry.name).member("robot", entry.is_robot).close('}');
   return json.close(']').text();
 }
 

@@ -9,12 +9,12 @@
 #include <vector>
 
 #include "console/scene_data.h"
+#include "world/model_library.h"
 
 namespace ruedo::console {
 
 class Library {
  public:
-  static constexpr size_t kMostModels = 1000;
   static constexpr size_t kKept = 8;  // scenes that are kept in memory
 
   explicit Library(std::string world_file) : world_file_(std::move(world_file)) {}
@@ -25,14 +25,10 @@ class Library {
   const SceneData* scene(size_t index);
 
  private:
-  struct Entry {
-    std::string name;
-    bool robot;
-  };
-  const std::vector<Entry>& entries();
+  const std::vector<world::ListedModel>& entries();
 
   std::string world_file_;
-  std::vector<Entry> entries_;
+  std::vector<world::ListedModel> entries_;
   bool listed_ = false;
   std::list<std::pair<size_t, std::unique_ptr<SceneData>>> scenes_;  // most recently used first
 };

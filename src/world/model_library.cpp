@@ -1,0 +1,52 @@
+#include "world/model_library.h"
+
+#include <filesystem>
+#include <set>
+
+#include "base/utf8.h"
+#include "world/read/resources.h"
+
+namespace fs = std::filesystem;
+
+namespace ruedo::world {
+namespace {
+
+bool is_model(const fs::path& folder) {
+  std::error_code error;
+  return fs::is_regular_file(folder / "model.sdf", error) ||
+         fs::is_regular_file(folder / "model.config", error);
+}
+
+// The subfolders that are models, by name.
+std::set<std::string> models_in(const fs::path& folder) {
+  std::set<std::string> names;
+  std::error_code error;
+  for (const fs::directory_entry& entry : fs::directory_iterator(folder, error)) {
+    const std::string name = entry.path().filename().string();
+    if (!name.starts_with('.') && printable(name) == name && is_model(entry.path()) &&
+        names.size() < kMostListedModels)
+      names.insert(name);
+  }
+  return names;
+}
+
+}  // namespace
+
+std::vector<ListedModel> listed_models(const std::string& world_file) {
+  const fs::path shipped = shipped_worlds(), beside = fs::path(world_file).parent_path();
+  std::vector<ListedModel> models;
+  std::set<std::string> known{"sun", "ground_plane"};  // part of every world
+  const auto add = [&](const fs::path& folder, bool robots) {
+    for (const std::string& name : models_in(folder)) {
+      if (models.size() < kMostListedModels && known.insert(name).second)
+        models.push_back({name, robots});
+    }
+  };
+  add(shipped / "robots", true);
+  add(shipped / "models", false);
+  add(beside / "models", false);
+  add(beside / ".." / "models", false);
+  return models;
+}
+
+}  // namespace ruedo::world
