@@ -77,6 +77,34 @@ TEST(Map, MeshesGiveTheirOutline) {
             "........\n........\n..####..\n..#..#..\n..#..#..\n..####..\n........\n........\n");
 }
 
+// A closed yard of 2 x 2 m with walls of 1 m.
+std::string yard(const std::string& robot_at) {
+  const auto wall = [](const char* name, const std::string& at, const std::string& size) {
+    return shape(name, at + " 0.5 0 0 0", "<box><size>" + size + " 1</size></box>");
+  };
+  return wall("north", "0 1.5", "4 1") + wall("south", "0 -1.5", "4 1") +
+         wall("east", "1.5 0", "1 2") + wall("west", "-1.5 0", "1 2") +
+         (robot_at.empty() ? ""
+                           : "<model name='robot'><pose>" + robot_at +
+                                 " 0 0 0 0</pose><link name='l'><sensor name='s' type='imu'/>"
+                                 "</link></model>");
+}
+
+TEST(Map, WhatLiesOutsideOfTheWallsIsUnknown) {
+  const auto map_of = [](const std::string& robot_at) {
+    const auto world = load(yard(robot_at));
+    OccupancyGrid grid = occupancy_of(*world, 1, 0.5);
+    mark_outside(*world, grid);
+    return drawn(grid);
+  };
+  EXPECT_EQ(map_of("0 0"), "??????\n?####?\n?#..#?\n?#..#?\n?####?\n??????\n");
+  // It goes where the robot can.
+  const std::string free = "......\n.####.\n.#..#.\n.#..#.\n.####.\n......\n";
+  EXPECT_EQ(map_of("2.5 0"), free);
+  EXPECT_EQ(map_of(""), free);
+  EXPECT_EQ(map_of("1.5 0"), free);  // in a wall
+}
+
 TEST(Map, TooManyCellsAreRefused) {
   const auto world = load(shape("wall", "0 0 0 0 0 0", "<box><size>1000 1000 1</size></box>"));
   EXPECT_THROW(occupancy_of(*world, 0.01, 0), InputError);

@@ -1,5 +1,5 @@
 // ruedo map: the occupancy map of a world, as navigation stacks read it.
-#include <cmath>
+#include <algorithm>
 
 #include <fmt/format.h>
 
@@ -23,13 +23,15 @@ int map(const MapArguments& arguments) {
     throw InputError({}, "-o '" + arguments.out + "': the name ends in .yaml");
   const auto world = load(arguments.world);
   check_options(arguments.world, *world);
-  const world::OccupancyGrid grid =
-      world::occupancy_of(*world, arguments.resolution, arguments.height);
+  world::OccupancyGrid grid = world::occupancy_of(*world, arguments.resolution, arguments.height);
+  world::mark_outside(*world, grid);
   world::write_map(grid, arguments.out);
-  size_t occupied = 0;
-  for (const world::Cell cell : grid.cells) occupied += cell == world::Cell::occupied;
-  fmt::print("{}: {} x {} cells of {:g} m, {} occupied, cut at z = {:g} m\n", arguments.out,
-             grid.width, grid.height, grid.resolution, occupied, arguments.height);
+  const auto count = [&](world::Cell kind) {
+    return std::count(grid.cells.begin(), grid.cells.end(), kind);
+  };
+  fmt::print("{}: {} x {} cells of {:g} m, {} occupied, {} unknown, cut at z = {:g} m\n",
+             arguments.out, grid.width, grid.height, grid.resolution, count(world::Cell::occupied),
+             count(world::Cell::unknown), arguments.height);
   return kGood;
 }
 

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <stdexcept>
+#include <utility>
 
 #include "base/progress.h"
 #include "base/whole.h"
@@ -163,6 +164,40 @@ OccupancyGrid occupancy_of(const WorldModel& world, double resolution, double he
   grid.cells.assign(static_cast<size_t>(grid.width) * static_cast<size_t>(grid.height), Cell::free);
   cut.draw(grid);
   return grid;
+}
+
+void mark_outside(const WorldModel& world, OccupancyGrid& grid) {
+  std::vector<std::pair<int, int>> next;
+  const auto mark = [&](int column, int row) {
+    if (column < 0 || row < 0 || column >= grid.width || row >= grid.height) return;
+    Cell& cell = grid.at(column, row);
+    if (std::exchange(cell, cell == Cell::free ? Cell::unknown : cell) == Cell::free)
+      next.emplace_back(column, row);
+  };
+  const std::vector<Cell> before = grid.cells;
+  for (int column = 0; column < grid.width; ++column)
+    for (const int row : {0, grid.height - 1}) mark(column, row);
+  for (int row = 0; row < grid.height; ++row)
+    for (const int column : {0, grid.width - 1}) mark(column, row);
+  while (!next.empty()) {
+    const auto [column, row] = next.back();
+    next.pop_back();
+    mark(column - 1, row);
+    mark(column + 1, row);
+    mark(column, row - 1);
+    mark(column, row + 1);
+  }
+  bool inside = false, outside = false;
+  for (const ModelInstance& robot : world.models) {
+    if (robot.removed || !robot.is_robot()) continue;
+    const double column = std::floor((robot.X_WM.translation.x() - grid.x) / grid.resolution),
+                 row = std::floor((robot.X_WM.translation.y() - grid.y) / grid.resolution);
+    if (!(column >= 0 && row >= 0 && column < grid.width && row < grid.height)) continue;
+    const Cell cell = grid.at(rounded_down<int>(column), rounded_down<int>(row));
+    inside |= cell == Cell::free;
+    outside |= cell == Cell::unknown;
+  }
+  if (outside || !inside) grid.cells = before;
 }
 
 std::vector<WallPiece> walls_of(const OccupancyGrid& grid) {

@@ -42,6 +42,10 @@ struct Rect {
 OccupancyGrid occupancy_of(const WorldModel& world, double resolution, double height,
                            const Rect* within = nullptr);
 
+// Marks as unknown what lies outside of the walls: the free cells from the map's edge on, unless a
+// robot stands among them, or none in the map at all.
+void mark_outside(const WorldModel& world, OccupancyGrid& grid);
+
 // Writes ROS map_server files: `path` (.yaml), and a PGM of the same name beside it. Throws
 // EnvironmentError if they cannot be written.
 void write_map(const OccupancyGrid& grid, const std::string& path);
