@@ -25,6 +25,8 @@ std::string ros_name(const std::string& name) {
 // Robots whose own name ROS allows come first.
 void Names::update(const std::set<std::string>& robots) {
   std::erase_if(given_, [&](const auto& each) { return !robots.contains(each.first); });
+  for (const auto& [robot, name] : wished_)
+    if (robots.contains(robot)) given_.try_emplace(robot, name);
   std::set<std::string> taken;
   for (const auto& [robot, name] : given_) taken.insert(name);
   for (const bool changes : {false, true}) {

@@ -21,6 +21,8 @@ class Names {
   // root: the robot without a namespace; "": none. remaps: full names of topics and services.
   Names(std::string root, Remaps remaps) : root_(std::move(root)), remaps_(std::move(remaps)) {}
 
+  // Robots that have another namespace than their name ("fleet/alice"), from the next update() on.
+  void wish(std::map<std::string, std::string> namespaces) { wished_ = std::move(namespaces); }
   // What robots there are. Each keeps its name in ROS for as long as it is there.
   void update(const std::set<std::string>& robots);
 
@@ -33,11 +35,14 @@ class Names {
   void check_remaps();
 
  private:
-  bool is_plain(const std::string& robot) const { return robot.empty() || robot == root_; }
+  bool is_plain(const std::string& robot) const {
+    return robot.empty() || (robot == root_ && !given_.contains(robot));
+  }
   std::string name_of(const std::string& robot) const;
 
   std::string root_;
   Remaps remaps_;
+  std::map<std::string, std::string> wished_;                             // namespaces, by robot
   std::map<std::string, std::string> given_;                              // names in ROS, by robot
   std::optional<std::set<std::string>> asked_ = std::set<std::string>();  // none: it was checked
 };

@@ -165,7 +165,8 @@ void Node::send(Writer& writer, std::span<const uint8_t> cdr) {
 void Node::take_over(const std::vector<world_info_t>& info) {
   requests_.listen(channel_of(info, request_t::getTypeName()));
   reply_channel_ = channel_of(info, reply_t::getTypeName());
-  services_->update(info);
+  services_->update(info, options_.world());
+  names_.wish(services_->namespaces());
   auto conversions = std::make_unique<Conversions>(info, options_.conversion, names_);
   std::map<std::string, std::unique_ptr<Writer>> writers;
   std::vector<Writer*> of_topic;

@@ -30,6 +30,10 @@ struct NodeOptions {
   bool stamped = false;     // cmd_vel is a TwistStamped
   ServiceMapping mapping = ServiceMapping::automatic;
   JointNames joints = [](const std::string&) { return std::vector<std::string>(); };
+  // As it is now; null: not known.
+  std::function<std::shared_ptr<const world::WorldModel>()> world = [] {
+    return std::shared_ptr<const world::WorldModel>();
+  };
 };
 
 class Node : public run::Sink {

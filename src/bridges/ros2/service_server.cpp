@@ -37,10 +37,11 @@ ServiceMapping parse_mapping(const std::string& name) {
                            "': auto, cyclonedds and fastrtps are known");
 }
 
-Call::Call(Writer& replies, const Sample& sample, ServiceMapping mapping)
+Call::Call(Writer& replies, const Sample& sample, ServiceMapping mapping, const std::string& type)
     : bytes_(sample.cdr.begin(), sample.cdr.end()),
       in(bytes_),
       replies_(replies),
+      type_(type),
       has_header_(mapping == ServiceMapping::cyclonedds ||
                   (mapping == ServiceMapping::automatic && !sample.is_related &&
                    sample.vendor == kCyclone)),
@@ -57,11 +58,8 @@ CdrWriter Call::answer() const {
   return out;
 }
 
-void Call::send(const CdrWriter& out) {
-  if (has_header_)
-    replies_.write(out.bytes());
-  else
-    replies_.reply(out.bytes(), identity_);
+bool Call::send(const CdrWriter& out) {
+  return has_header_ ? replies_.write(out.bytes()) : replies_.reply(out.bytes(), identity_);
 }
 
 ServiceServer::ServiceServer(const ServiceContext& context, const std::string& name,
@@ -81,7 +79,7 @@ ServiceServer::ServiceServer(const ServiceContext& context, const std::string& n
 }
 
 void ServiceServer::receive(const Sample& sample) {
-  const auto call = std::make_shared<Call>(*replies_, sample, mapping_);
+  const auto call = std::make_shared<Call>(*replies_, sample, mapping_, topic_.type);
   if (!call->in.good()) {
     ++faulty_;
     return;

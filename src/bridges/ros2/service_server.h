@@ -37,12 +37,14 @@ struct ServiceContext {
 // A call, whose answer may come later, from another thread.
 class Call {
  public:
-  Call(Writer& replies, const Sample& sample, ServiceMapping mapping);
+  // type: of the service, "pkg/srv/Name"; must outlive it.
+  Call(Writer& replies, const Sample& sample, ServiceMapping mapping, const std::string& type);
 
   // Begins the answer.
   CdrWriter answer() const;
   uint64_t client() const { return sender_; }
-  void send(const CdrWriter& out);
+  const std::string& type() const { return type_; }
+  bool send(const CdrWriter& out);  // false: it could not be sent
 
  private:
   std::vector<uint8_t> bytes_;
@@ -52,6 +54,7 @@ class Call {
 
  private:
   Writer& replies_;
+  const std::string& type_;
   bool has_header_;
   SampleIdentity identity_;
   uint64_t sender_;

@@ -1,14 +1,10 @@
-// Each service is a reading of its request, a request of the run's own, and a writing of the
-// answer.
+// Each service is a reading of its request, requests of the run's own, and a writing of the answer.
 #include "bridges/ros2/services.h"
 
 #include <algorithm>
-#include <array>
-#include <cstring>
-#include <map>
-#include <set>
-
-#include <regex.h>
+#include <filesystem>
+#include <limits>
+#include <utility>
 
 #include "base/version.h"
 #include "bridges/ros2/cdr.h"
@@ -18,10 +14,6 @@
 #include "ruedo/name_request_t.hpp"
 #include "ruedo/request_t.hpp"
 #include "ruedo/reset_request_t.hpp"
-#include "ruedo/set_pose_request_t.hpp"
-#include "ruedo/set_twist_request_t.hpp"
-#include "ruedo/spawn_request_t.hpp"
-#include "ruedo/state_reply_t.hpp"
 #include "ruedo/step_request_t.hpp"
 
 namespace ruedo::ros2 {
@@ -30,126 +22,77 @@ namespace {
 
 using engine::encoded;
 
-// simulation_interfaces/msg/Result, and what some services add.
-constexpr uint8_t kUnsupported = 0, kOk = 1, kNotFound = 2, kIncorrectState = 3, kFailed = 4;
-constexpr uint8_t kNameNotUnique = 101, kNameInvalid = 102, kNoResource = 104;
-constexpr uint8_t kAlreadyThere = 101;
-// EntityCategory
-constexpr uint8_t kRobot = 2, kDynamic = 4, kStatic = 5;
-constexpr size_t kLongestFilter = 200;
-constexpr size_t kLongestWrittenOut = 500;  // what is repeated so often
+const std::string kPackage = "simulation_interfaces/";
 
-std::vector<uint8_t> name_body(const std::string& name) {
-  name_request_t body;
-  body.name = name;
-  return encoded(body);
-}
-
-uint8_t result_of(int32_t kind, int32_t code) {
-  switch (code) {
-    case reply_t::OK: return kOk;
-    case reply_t::UNKNOWN_NAME: return kNotFound;
-    case reply_t::NOT_SUPPORTED: return kUnsupported;
-    case reply_t::ENDED:
-    case reply_t::REFUSED: return kind == request_t::STEP ? kIncorrectState : kFailed;
-    default: return kFailed;
-  }
-}
-
-void put_result(CdrWriter& out, uint8_t code, const std::string& text) { out.put(code).put(text); }
-void put_result(CdrWriter& out, int32_t kind, const reply_t& reply) {
-  put_result(out, result_of(kind, reply.code), reply.text);
-}
-
-void put_numbers(CdrWriter& out, std::initializer_list<double> numbers) {
-  for (const double number : numbers) out.put(number);
-}
-
-void put_state(CdrWriter& out, const state_reply_t& state) {
-  put_header(out, state.utime, "world");
-  const double* q = state.orientation;
-  for (const double x : state.position) out.put(x);
-  put_numbers(out, {q[1], q[2], q[3], q[0]});
-  for (const double x : state.linear) out.put(x);
-  for (const double x : state.angular) out.put(x);
-  put_numbers(out, {0, 0, 0, 0, 0, 0});  // acceleration
-}
-
-void put_no_state(CdrWriter& out) {
-  put_header(out, 0, "");
-  put_numbers(out, {0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0});
-}
-
-struct Placed {
-  std::string frame;
-  double position[3], orientation[4];  // w, x, y, z
+// SimulatorFeatures' numbers, and the request of the run that each needs; 0: none.
+struct Feature {
+  uint16_t number;
+  int32_t needs;
+};
+constexpr Feature kFeatures[] = {
+    {0, request_t::SPAWN},       // SPAWNING
+    {1, request_t::REMOVE},      // DELETING
+    {4, 0},                      // ENTITY_TAGS
+    {5, 0},                      // ENTITY_BOUNDS
+    {6, request_t::GET_STATE},   // ENTITY_BOUNDS_BOX
+    {8, 0},                      // ENTITY_CATEGORIES
+    {9, request_t::SPAWN},       // SPAWNING_RESOURCE_STRING
+    {10, request_t::GET_STATE},  // ENTITY_STATE_GETTING
+    {11, request_t::SET_TWIST},  // ENTITY_STATE_SETTING
+    {12, 0},                     // ENTITY_INFO_GETTING
+    {13, 0},                     // ENTITY_INFO_SETTING
+    {14, 0},                     // SPAWNABLES
+    {20, request_t::RESET},      // SIMULATION_RESET
+    {21, request_t::RESET},      // SIMULATION_RESET_TIME
+    {22, request_t::RESET},      // SIMULATION_RESET_STATE
+    {23, request_t::REMOVE},     // SIMULATION_RESET_SPAWNED
+    {24, request_t::GET_STATE},  // SIMULATION_STATE_GETTING
+    {25, request_t::PAUSE},      // SIMULATION_STATE_SETTING
+    {26, request_t::PAUSE},      // SIMULATION_STATE_PAUSE
+    {31, request_t::STEP},       // STEP_SIMULATION_SINGLE
+    {32, request_t::STEP},       // STEP_SIMULATION_MULTIPLE
+    {33, request_t::STEP},       // STEP_SIMULATION_ACTION
+    {44, 0},                     // WORLD_INFO_GETTING
+    {50, request_t::SPAWN},      // SPAWNING_ENTITIES
 };
 
-Placed read_pose_stamped(CdrReader& in) {
-  Placed placed;
-  in.skip<uint32_t>(2);
-  placed.frame = in.get_text();
-  for (double& x : placed.position) x = in.get<double>();
-  for (const size_t i : {1, 2, 3, 0}) placed.orientation[i] = in.get<double>();
-  // An empty message is no rotation.
-  if (std::all_of(placed.orientation, placed.orientation + 4, [](double x) { return x == 0.0; }))
-    placed.orientation[0] = 1.0;
-  return placed;
-}
+constexpr int64_t bit(int32_t kind) { return int64_t{1} << kind; }
 
-bool is_world(const std::string& frame) { return frame.empty() || frame == "world"; }
-
-// How many copies the C library makes of a part of an expression, at most: + after a group or a
-// repeat doubles what it repeats, and {9} makes nine of it.
-size_t copies(const std::string& expression) {
-  size_t times = 1;
-  for (size_t i = 1; i < expression.size() && times <= kLongestWrittenOut; ++i) {
-    if (expression[i] == '+' && std::strchr(")+*?}", expression[i - 1])) times *= 2;
-    if (expression[i] != '{') continue;
-    size_t number = 0, largest = 1;
-    for (size_t at = i + 1; at < expression.size() && largest <= kLongestWrittenOut; ++at) {
-      const char c = expression[at];
-      number = c >= '0' && c <= '9' ? 10 * number + static_cast<size_t>(c - '0') : 0;
-      largest = std::max(largest, number);
-      if (c == '}') break;
+// Zeros, and sequences and texts of no length.
+void put_nothing(CdrWriter& out, const Field& field, Distro distro) {
+  if (field.kind == Field::Kind::sequence || field.kind == Field::Kind::bounded)
+    return void(out.put_length(0));
+  const size_t count = field.kind == Field::Kind::array ? field.capacity : 1;
+  for (size_t i = 0; i < count; ++i) {
+    if (field.type.find('/') != std::string::npos) {
+      for (const Field& inner : fields_of(field.type, distro)) put_nothing(out, inner, distro);
+    } else if (field.type == "string") {
+      out.put("");
+    } else if (field.type.ends_with("64")) {
+      out.put(int64_t{0});
+    } else if (field.type.ends_with("32")) {
+      out.put(int32_t{0});
+    } else if (field.type.ends_with("16")) {
+      out.put(int16_t{0});
+    } else {
+      out.put(uint8_t{0});
     }
-    times *= largest;
   }
-  return times;
 }
 
-// Whether a name matches a POSIX extended regular expression as a whole or in part; null where the
-// expression cannot be taken.
-class Filter {
- public:
-  explicit Filter(const std::string& text) : empty_(text.empty()) {
-    // Repeats of repeats, and references backwards, take time and memory without end.
-    const bool dear = text.find('\\') != std::string::npos || text.size() > kLongestFilter ||
-                      text.size() * copies(text) > kLongestWrittenOut;
-    good_ = empty_ || (!dear && text.find('\0') == std::string::npos &&
-                       regcomp(&expression_, text.c_str(), REG_EXTENDED | REG_NOSUB) == 0);
-  }
-  ~Filter() {
-    if (good_ && !empty_) regfree(&expression_);
-  }
-  Filter(const Filter&) = delete;
-  Filter& operator=(const Filter&) = delete;
-
-  bool good() const { return good_; }
-  bool matches(const std::string& name) const {
-    return empty_ || regexec(&expression_, name.c_str(), 0, nullptr, 0) == 0;
-  }
-
- private:
-  bool empty_, good_ = false;
-  regex_t expression_{};
-};
+std::vector<uint8_t> reset_body(int8_t what) {
+  reset_request_t reset;
+  reset.what = what;
+  reset.seed = -1;
+  return encoded(reset);
+}
 
 }  // namespace
 
 Services::Services(const ServiceContext& context, Requests& requests,
                    const Requests::Inject& inject)
-    : requests_(requests),
+    : distro_(context.distro),
+      requests_(requests),
       step_action_(context, requests, faulty_),
       parameters_(context, requests, inject, faulty_) {
   struct Row {
@@ -158,20 +101,32 @@ Services::Services(const ServiceContext& context, Requests& requests,
     void (Services::*handler)(const CallPointer& call);
   };
   static constexpr Row kRows[] = {
-      {"get_simulator_features", "GetSimulatorFeatures", &Services::get_simulator_features},
-      {"reset_simulation", "ResetSimulation", &Services::reset_simulation},
-      {"step_simulation", "StepSimulation", &Services::step_simulation},
-      {"get_simulation_state", "GetSimulationState", &Services::get_simulation_state},
-      {"set_simulation_state", "SetSimulationState", &Services::set_simulation_state},
-      {"spawn_entity", "SpawnEntity", &Services::spawn_entity},
       {"delete_entity", "DeleteEntity", &Services::delete_entity},
+      {"get_available_worlds", "GetAvailableWorlds", &Services::refuse},
+      {"get_current_world", "GetCurrentWorld", &Services::get_current_world},
       {"get_entities", "GetEntities", &Services::get_entities},
+      {"get_entities_states", "GetEntitiesStates", &Services::get_entities_states},
+      {"get_entity_bounds", "GetEntityBounds", &Services::get_entity_bounds},
+      {"get_entity_info", "GetEntityInfo", &Services::get_entity_info},
       {"get_entity_state", "GetEntityState", &Services::get_entity_state},
+      {"get_named_pose_bounds", "GetNamedPoseBounds", &Services::refuse},
+      {"get_named_poses", "GetNamedPoses", &Services::refuse},
+      {"get_simulation_state", "GetSimulationState", &Services::get_simulation_state},
+      {"get_simulator_features", "GetSimulatorFeatures", &Services::get_simulator_features},
+      {"get_spawnables", "GetSpawnables", &Services::get_spawnables},
+      {"load_world", "LoadWorld", &Services::refuse},
+      {"reset_simulation", "ResetSimulation", &Services::reset_simulation},
+      {"set_entity_info", "SetEntityInfo", &Services::set_entity_info},
       {"set_entity_state", "SetEntityState", &Services::set_entity_state},
+      {"set_simulation_state", "SetSimulationState", &Services::set_simulation_state},
+      {"spawn_entities", "SpawnEntities", &Services::spawn_entities},
+      {"spawn_entity", "SpawnEntity", &Services::spawn_entity},
+      {"step_simulation", "StepSimulation", &Services::step_simulation},
+      {"unload_world", "UnloadWorld", &Services::refuse},
   };
   for (const Row& row : kRows) {
     services_.push_back(std::make_unique<ServiceServer>(
-        context, row.name, std::string("simulation_interfaces/srv/") + row.type,
+        context, row.name, kPackage + "srv/" + row.type,
         [this, handler = row.handler](const CallPointer& call) { (this->*handler)(call); },
         faulty_));
   }
@@ -199,301 +154,203 @@ std::vector<const Writer*> Services::writers() const {
   return all;
 }
 
-// Models are the entities; a body is called MODEL/LINK.
-void Services::update(const std::vector<world_info_t>& info) {
+void Services::update(const std::vector<world_info_t>& info,
+                      std::shared_ptr<const world::WorldModel> world) {
   parameters_.update(info);
-  std::set<std::string> robots;
-  std::map<std::string, uint8_t> categories;
-  for (const world_info_t& part : info) {
-    for (const robot_info_t& robot : part.robots) robots.insert(robot.name);
-  }
-  for (const world_info_t& part : info) {
-    for (const body_info_t& body : part.bodies) {
-      if (body.name.empty()) continue;
-      const std::string name = body.name.substr(0, body.name.find('/'));
-      const auto [at, fresh] =
-          categories.try_emplace(name, robots.contains(name) ? kRobot : kStatic);
-      if (at->second == kStatic && !body.is_static) at->second = kDynamic;
-    }
-  }
   const std::lock_guard lock(mutex_);
-  entities_.clear();
-  for (const auto& [name, category] : categories) entities_.push_back({name, category});
-}
-
-void Services::pass_on(const CallPointer& call, int32_t kind, std::vector<uint8_t> body) {
-  requests_.ask(call->client(), kind, std::move(body), [call, kind](const reply_t& reply) {
-    CdrWriter out = call->answer();
-    put_result(out, kind, reply);
-    call->send(out);
+  served_ = 0;
+  for (const world_info_t& part : info)
+    for (const channel_info_t& channel : part.channels)
+      if (channel.type == request_t::getTypeName() && channel.robot.empty())
+        served_ = part.features;
+  // In lockstep it is the clients' grants that step.
+  if ((served_ & bit(request_t::GRANT)) != 0) served_ &= ~bit(request_t::STEP);
+  entities_.update(std::move(world));
+  std::erase_if(namespaces_, [&](const auto& each) {
+    return !entities_.find(each.first) && !spawning_.contains(each.first);
   });
 }
 
-void Services::get_simulator_features(const CallPointer& call) {
-  // SimulatorFeatures' numbers: spawning, deleting, categories, from texts, states of entities,
-  // resets of time and state, state of the simulation with pausing, one step and many, these as an
-  // action.
-  constexpr std::array<uint16_t, 15> kFeatures{0,  1,  8,  9,  10, 11, 20, 21,
-                                               22, 24, 25, 26, 31, 32, 33};
+std::map<std::string, std::string> Services::namespaces() const {
+  const std::lock_guard lock(mutex_);
+  return namespaces_;
+}
+
+void Services::answer(const CallPointer& call, const Result& result) const {
   CdrWriter out = call->answer();
-  out.put_sequence(std::span<const uint16_t>(kFeatures));
+  for (const Field& field : fields_of(call->type() + "_Response", distro_)) {
+    if (field.type == kPackage + "msg/Result")
+      out.put(result.code).put(result.text);
+    else
+      put_nothing(out, field, distro_);
+  }
+  call->send(out);
+}
+
+void Services::send(const CallPointer& call, const CdrWriter& out) const {
+  if (!call->send(out))
+    answer(call, kFailed, "the answer is too large for one message: ask for less with a filter");
+}
+
+void Services::in_turn(uint64_t client, std::vector<Step> steps, Requests::Then then) {
+  Step first = std::move(steps.front());
+  steps.erase(steps.begin());
+  requests_.ask(client, first.kind, std::move(first.body),
+                [this, client, steps = std::move(steps), then](const reply_t& reply) {
+                  if (reply.code != reply_t::OK || steps.empty()) return then(reply);
+                  in_turn(client, steps, then);
+                });
+}
+
+void Services::in_turn(const CallPointer& call, std::vector<Step> steps) {
+  in_turn(call->client(), std::move(steps),
+          [this, call](const reply_t& reply) { answer(call, result_of(reply)); });
+}
+
+void Services::ask_state(uint64_t client, const std::string& name,
+                         std::function<void(const Result&, const state_reply_t&)> then) {
+  name_request_t body;
+  body.name = name;
+  requests_.ask(client, request_t::GET_STATE, encoded(body), [then](const reply_t& reply) {
+    state_reply_t state{};
+    Result result = result_of(reply);
+    if (reply.code == reply_t::OK &&
+        decode_checked(reply.body.data(), reply.body.size(), state) != DecodeFault::none)
+      result = {kFailed, "the run's answer is of another version"};
+    then(result, state);
+  });
+}
+
+void Services::to_world(uint64_t client, Motion motion,
+                        std::function<void(const Result&, const Motion&)> then) {
+  if (motion.frame.empty() || motion.frame == "world") return then({}, motion);
+  ask_state(client, motion.frame, [motion, then](const Result& result, const state_reply_t& state) {
+    if (result.code != kOk) {
+      const bool unknown = result.code == kNotFound;
+      return then({result.code, unknown ? "the frame '" + motion.frame +
+                                              "' is neither world nor an entity or a link of one"
+                                        : result.text},
+                  motion);
+    }
+    const auto vector = [](const double(&v)[3]) { return Vec3(v[0], v[1], v[2]); };
+    const double* q = state.orientation;
+    const Pose X_WF{Quat(q[0], q[1], q[2], q[3]), vector(state.position)};
+    Motion moved{"world", X_WF * motion.pose, {}};
+    moved.twist.angular = vector(state.angular) + X_WF.rotation * motion.twist.angular;
+    moved.twist.linear = vector(state.linear) + X_WF.rotation * motion.twist.linear +
+                         vector(state.angular).cross(moved.pose.translation - X_WF.translation);
+    then({}, moved);
+  });
+}
+
+void Services::refuse(const CallPointer& call) {
+  answer(call, kUnsupported, "not supported: get_simulator_features lists what is");
+}
+
+void Services::get_simulator_features(const CallPointer& call) {
+  std::vector<uint16_t> features;
+  {
+    const std::lock_guard lock(mutex_);
+    for (const Feature& feature : kFeatures)
+      if (feature.needs == 0 || (served_ & bit(feature.needs)) != 0)
+        features.push_back(feature.number);
+  }
+  CdrWriter out = call->answer();
+  out.put_sequence(std::span<const uint16_t>(features));
   out.put_length(2).put("sdf").put("urdf");
   out.put(std::string("Ruedo ") + version());
-  call->send(out);
+  send(call, out);
 }
 
 void Services::reset_simulation(const CallPointer& call) {
   constexpr uint8_t kTime = 1, kState = 2, kSpawned = 4, kEach = kTime | kState | kSpawned;
   const auto scope = call->in.get<uint8_t>();
   if (!call->in.good()) return void(++faulty_);
-  const auto body = [](int8_t what) {
-    reset_request_t reset;
-    reset.what = what;
-    reset.seed = -1;
-    return encoded(reset);
-  };
   if (scope == 0 || (scope & kEach) == kEach)
-    return pass_on(call, request_t::RESET, body(reset_request_t::ALL));
-  if (scope == kTime) return pass_on(call, request_t::RESET, body(reset_request_t::TIME));
-  if (scope == kState) return pass_on(call, request_t::RESET, body(reset_request_t::POSES));
-  if (scope == (kTime | kState)) {
-    requests_.ask(call->client(), request_t::RESET, body(reset_request_t::POSES),
-                  [this, call, body](const reply_t& reply) {
-                    if (reply.code == reply_t::OK)
-                      return pass_on(call, request_t::RESET, body(reset_request_t::TIME));
-                    CdrWriter out = call->answer();
-                    put_result(out, request_t::RESET, reply);
-                    call->send(out);
-                  });
-    return;
+    return in_turn(call, {{request_t::RESET, reset_body(reset_request_t::ALL)}});
+  if ((scope & kEach) == 0)
+    return answer(call, kUnsupported,
+                  "scopes are 1 (time), 2 (state) and 4 (spawned), each with each, and 255 (all)");
+  std::vector<Step> steps;
+  if ((scope & kSpawned) != 0) {
+    const std::lock_guard lock(mutex_);
+    for (const std::string& name : entities_.spawned()) {
+      name_request_t body;
+      body.name = name;
+      steps.push_back({request_t::REMOVE, encoded(body)});
+    }
   }
-  CdrWriter out = call->answer();
-  put_result(out, kUnsupported, "scopes are ALL, TIME, STATE, and TIME with STATE");
-  call->send(out);
+  if ((scope & kState) != 0)
+    steps.push_back({request_t::RESET, reset_body(reset_request_t::POSES)});
+  if ((scope & kTime) != 0) steps.push_back({request_t::RESET, reset_body(reset_request_t::TIME)});
+  if (steps.empty()) return answer(call, Result{});  // nothing was spawned
+  in_turn(call, std::move(steps));
 }
 
+// Steps while the simulation plays are RESULT_OPERATION_FAILED, as StepSimulation says.
 void Services::step_simulation(const CallPointer& call) {
-  constexpr uint64_t kMost = INT64_MAX;
   step_request_t body;
-  body.steps = static_cast<int64_t>(std::min(call->in.get<uint64_t>(), kMost));
+  body.steps = static_cast<int64_t>(
+      std::min<uint64_t>(call->in.get<uint64_t>(), std::numeric_limits<int64_t>::max()));
   if (!call->in.good()) return void(++faulty_);
-  pass_on(call, request_t::STEP, encoded(body));
+  in_turn(call, {{request_t::STEP, encoded(body)}});
 }
 
 void Services::get_simulation_state(const CallPointer& call) {
-  requests_.ask(
-      call->client(), request_t::GET_STATE, name_body(""), [this, call](const reply_t& reply) {
-        state_reply_t state{};
-        const bool good =
-            reply.code == reply_t::OK &&
-            decode_checked(reply.body.data(), reply.body.size(), state) == DecodeFault::none;
-        CdrWriter out = call->answer();
-        out.put(good ? state_of(state.paused) : kPlaying);
-        put_result(out, request_t::GET_STATE, reply);
-        call->send(out);
-      });
+  ask_state(call->client(), "", [this, call](const Result& result, const state_reply_t& state) {
+    CdrWriter out = call->answer();
+    out.put(result.code == kOk ? state_of(state) : kPlaying);
+    out.put(result.code).put(result.text);
+    send(call, out);
+  });
 }
 
 void Services::set_simulation_state(const CallPointer& call) {
   const auto wanted = call->in.get<uint8_t>();
   if (!call->in.good()) return void(++faulty_);
-  requests_.ask(
-      call->client(), request_t::GET_STATE, name_body(""),
-      [this, call, wanted](const reply_t& reply) {
-        state_reply_t state{};
-        if (reply.code == reply_t::OK &&
-            decode_checked(reply.body.data(), reply.body.size(), state) == DecodeFault::none) {
-          return change_state(call, state_of(state.paused), wanted);
-        }
-        CdrWriter out = call->answer();
-        put_result(out, request_t::GET_STATE, reply);
-        call->send(out);
-      });
+  ask_state(call->client(), "",
+            [this, call, wanted](const Result& result, const state_reply_t& state) {
+              if (result.code != kOk) return answer(call, result);
+              change_state(call, state_of(state), wanted);
+            });
 }
 
+// A world is always loaded, so that each change between the other states is allowed.
 void Services::change_state(const CallPointer& call, uint8_t now, uint8_t wanted) {
-  if (now == wanted || wanted > kQuitting) {
-    CdrWriter out = call->answer();
-    put_result(out, now == wanted ? kAlreadyThere : kFailed,
-               now == wanted ? "" : "there is no such state");
-    return call->send(out);
-  }
-  if (wanted == kPlaying) stopped_ = false;
-  if (wanted == kPlaying) return pass_on(call, request_t::RESUME, {});
-  if (wanted == kQuitting) return pass_on(call, request_t::QUIT, {});
+  if (now == wanted) return answer(call, kAlreadyThere, "it is in that state already");
+  if (wanted > kLoading) return answer(call, kFailed, "there is no such state");
+  if (wanted > kQuitting)
+    return answer(call, kIncorrectTransition, "a world is loaded, and stays: set 0 to 3");
   if (wanted == kPaused && now == kStopped) {  // it stands still already
     stopped_ = false;
-    CdrWriter out = call->answer();
-    put_result(out, kOk, "");
-    return call->send(out);
+    return answer(call, Result{});
   }
-  if (wanted == kPaused) return pass_on(call, request_t::PAUSE, {});
-  requests_.ask(call->client(), request_t::PAUSE, {}, [this, call](const reply_t& reply) {
-    if (reply.code != reply_t::OK) {
-      CdrWriter out = call->answer();
-      put_result(out, request_t::PAUSE, reply);
-      return call->send(out);
-    }
-    stopped_ = true;
-    reset_request_t body;
-    body.what = reset_request_t::ALL;
-    body.seed = -1;
-    pass_on(call, request_t::RESET, encoded(body));
+  constexpr int32_t kKinds[] = {request_t::PAUSE, request_t::RESUME, request_t::PAUSE,
+                                request_t::QUIT};
+  std::vector<Step> steps{{kKinds[wanted], {}}};
+  if (wanted == kStopped) steps.push_back({request_t::RESET, reset_body(reset_request_t::ALL)});
+  in_turn(call->client(), std::move(steps), [this, call, wanted](const reply_t& reply) {
+    Result result = result_of(reply);
+    if (result.code == kOk) stopped_ = wanted == kStopped;
+    if (result.code == kFailed) result.code = kTransitionError;
+    answer(call, result);
   });
 }
 
-void Services::spawn_entity(const CallPointer& call) {
-  spawn_request_t body;
-  body.name = call->in.get_text();
-  const bool renames = call->in.get<bool>();
-  std::string uri = call->in.get_text();
-  const std::string text = call->in.get_text();
-  call->in.get_text();  // a namespace: the robot's name is one
-  const Placed placed = read_pose_stamped(call->in);
-  if (!call->in.good()) return void(++faulty_);
-  const auto refuse = [&](uint8_t code, const std::string& why) {
-    CdrWriter out = call->answer();
-    put_result(out, code, why);
-    out.put("");
-    call->send(out);
-  };
-  if (uri.starts_with("file://")) uri = uri.substr(7);
-  if (uri.empty() && text.empty()) return refuse(kNoResource, "give uri or resource_string");
-  if (!is_world(placed.frame))
-    return refuse(kFailed, "poses are in the frame world, not in '" + placed.frame + "'");
-  if (body.name.empty() && !renames)
-    return refuse(kNameInvalid, "the name is empty, and allow_renaming is false");
+void Services::get_current_world(const CallPointer& call) {
+  std::string name, file;
   {
     const std::lock_guard lock(mutex_);
-    if (is_entity(body.name) && !renames)
-      return refuse(kNameNotUnique, "there is a '" + body.name + "' already");
-    if (renames && !body.name.empty()) body.name = free_name(body.name);
-    spawning_.insert(body.name);
-  }
-  body.model = uri;
-  body.text = uri.empty() ? text : "";
-  body.on_ground = false;
-  std::copy(std::begin(placed.position), std::end(placed.position), body.position);
-  std::copy(std::begin(placed.orientation), std::end(placed.orientation), body.orientation);
-  const auto answer = [this, call, asked = body.name](const reply_t& reply) {
-    {
-      const std::lock_guard lock(mutex_);
-      spawning_.erase(spawning_.find(asked));
+    if (const world::WorldModel* world = entities_.world()) {
+      name = world->name;
+      file = std::filesystem::absolute(world->file).lexically_normal().string();
     }
-    state_reply_t state{};
-    const bool named =
-        reply.code == reply_t::OK &&
-        decode_checked(reply.body.data(), reply.body.size(), state) == DecodeFault::none;
-    CdrWriter out = call->answer();
-    put_result(out, request_t::SPAWN, reply);
-    out.put(named ? state.name : std::string());
-    call->send(out);
-  };
-  requests_.ask(call->client(), request_t::SPAWN, encoded(body), answer);
-}
-
-bool Services::is_entity(const std::string& name) const {
-  return std::any_of(entities_.begin(), entities_.end(),
-                     [&](const Entity& entity) { return entity.name == name; });
-}
-
-std::string Services::free_name(const std::string& wanted) const {
-  std::string name = wanted;
-  for (int i = 2; is_entity(name) || spawning_.contains(name); ++i)
-    name = wanted + "_" + std::to_string(i);
-  return name;
-}
-
-void Services::delete_entity(const CallPointer& call) {
-  const std::string name = call->in.get_text();
-  if (!call->in.good()) return void(++faulty_);
-  pass_on(call, request_t::REMOVE, name_body(name));
-}
-
-void Services::get_entities(const CallPointer& call) {
-  CdrReader& in = call->in;
-  const std::string text = in.get_text();
-  const std::vector<uint8_t> categories = in.get_sequence<uint8_t>();
-  const std::vector<std::string> tags = in.get_texts();
-  in.skip<uint8_t>(2);  // how tags are joined; kind of the bounds
-  const size_t bounds = in.get_length(24);
-  if (!in.good()) return void(++faulty_);
-  const Filter filter(text);
+  }
+  if (file.empty()) return answer(call, kNoWorld, "no world is known");
   CdrWriter out = call->answer();
-  if (bounds > 0 || !filter.good()) {
-    put_result(out, kUnsupported,
-               bounds > 0
-                   ? "bounds are not supported"
-                   : "the filter is no POSIX extended regular expression, or too dear a one");
-    out.put_length(0);
-    return call->send(out);
-  }
-  std::vector<std::string> found;
-  {
-    const std::lock_guard lock(mutex_);
-    for (const Entity& entity : entities_) {
-      const bool wanted = categories.empty() || std::find(categories.begin(), categories.end(),
-                                                          entity.category) != categories.end();
-      if (wanted && tags.empty() && filter.matches(entity.name)) found.push_back(entity.name);
-    }
-  }
-  put_result(out, kOk, "");
-  out.put_length(found.size());
-  for (const std::string& name : found) out.put(name);
-  call->send(out);
-}
-
-void Services::get_entity_state(const CallPointer& call) {
-  const std::string name = call->in.get_text();
-  if (!call->in.good()) return void(++faulty_);
-  const auto answer = [call](const reply_t& reply) {
-    state_reply_t state{};
-    const bool good =
-        reply.code == reply_t::OK &&
-        decode_checked(reply.body.data(), reply.body.size(), state) == DecodeFault::none;
-    CdrWriter out = call->answer();
-    put_result(out, request_t::GET_STATE, reply);
-    if (good)
-      put_state(out, state);
-    else
-      put_no_state(out);
-    call->send(out);
-  };
-  if (!name.empty())
-    return requests_.ask(call->client(), request_t::GET_STATE, name_body(name), answer);
-  reply_t nobody{};  // without a name the run tells of itself
-  nobody.code = reply_t::UNKNOWN_NAME;
-  nobody.text = "the name is empty";
-  answer(nobody);
-}
-
-void Services::set_entity_state(const CallPointer& call) {
-  set_pose_request_t pose;
-  set_twist_request_t twist;
-  pose.name = twist.name = call->in.get_text();
-  const Placed placed = read_pose_stamped(call->in);
-  for (double& x : twist.linear) x = call->in.get<double>();
-  for (double& x : twist.angular) x = call->in.get<double>();
-  if (!call->in.good()) return void(++faulty_);
-  if (!is_world(placed.frame)) {
-    CdrWriter out = call->answer();
-    put_result(out, kFailed, "poses are in the frame world, not in '" + placed.frame + "'");
-    return call->send(out);
-  }
-  std::copy(std::begin(placed.position), std::end(placed.position), pose.position);
-  std::copy(std::begin(placed.orientation), std::end(placed.orientation), pose.orientation);
-  const bool rests =
-      std::all_of(twist.linear, twist.linear + 3, [](double x) { return x == 0.0; }) &&
-      std::all_of(twist.angular, twist.angular + 3, [](double x) { return x == 0.0; });
-  if (rests) return pass_on(call, request_t::SET_POSE, encoded(pose));  // which brings it to rest
-  requests_.ask(call->client(), request_t::SET_POSE, encoded(pose),
-                [this, call, twist](const reply_t& reply) {
-                  if (reply.code == reply_t::OK)
-                    return pass_on(call, request_t::SET_TWIST, encoded(twist));
-                  CdrWriter out = call->answer();
-                  put_result(out, request_t::SET_POSE, reply);
-                  call->send(out);
-                });
+  out.put(uint8_t{kOk}).put("");
+  out.put(name).put(file).put("").put("").put_length(0);
+  send(call, out);
 }
 
 }  // namespace ruedo::ros2

@@ -107,6 +107,7 @@ ros2::NodeOptions node_options(run::Run& server, const Ros2Arguments& arguments)
   options.joints = [&server](const std::string& robot) {
     return joints_of(*server.world(), robot);
   };
+  options.world = [&server] { return server.world(); };
   return options;
 }
 

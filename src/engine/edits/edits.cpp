@@ -44,33 +44,9 @@ std::string fault_of(const char* what, std::span<const double> values, double mo
   return "";
 }
 
-std::string fault_of_pose(const double (&position)[3], const double (&orientation)[4]) {
-  if (std::string fault = fault_of("position", position, kFarthest_m, "m"); !fault.empty())
-    return fault;
-  double squared = 0.0;
-  for (const double part : orientation) squared += part * part;
-  if (!(std::abs(squared - 1.0) <= 2e-3)) {  // also false for NaN
-    return "orientation is " + list_of(orientation) + ": a unit quaternion w, x, y, z is wanted";
-  }
-  return "";
-}
-
 Pose pose_of(const double (&position)[3], const double (&orientation)[4]) {
   return Pose{Quat(orientation[0], orientation[1], orientation[2], orientation[3]).normalized(),
               Vec3(position[0], position[1], position[2])};
-}
-
-// "": valid for a model, as in a world file; a robot's name must also be usable in channel names.
-std::string fault_of_name(const std::string& name) {
-  if (name.empty() || name.size() > kLongestName)
-    return fmt::format("has {} bytes; allowed are 1 to {}", name.size(), kLongestName);
-  if (!is_one_line(name)) return "is no UTF-8 text without control characters";
-  if (name == "ruedo" || world::is_reserved_name(name))
-    return "is kept for Ruedo itself; choose another";
-  if (name.starts_with(' ') || name.ends_with(' ')) return "begins or ends with a blank";
-  if (name.find("::") != std::string::npos)
-    return "has '::', which separates names from each other";
-  return "";
 }
 
 Outcome unknown(const std::string& name) {
@@ -107,6 +83,29 @@ std::string told(const InputError& error) {
 }
 
 }  // namespace
+
+std::string fault_of_pose(const double (&position)[3], const double (&orientation)[4]) {
+  if (std::string fault = fault_of("position", position, kFarthest_m, "m"); !fault.empty())
+    return fault;
+  double squared = 0.0;
+  for (const double part : orientation) squared += part * part;
+  if (!(std::abs(squared - 1.0) <= 2e-3)) {  // also false for NaN
+    return "orientation is " + list_of(orientation) + ": a unit quaternion w, x, y, z is wanted";
+  }
+  return "";
+}
+
+std::string fault_of_name(const std::string& name) {
+  if (name.empty() || name.size() > kLongestName)
+    return fmt::format("has {} bytes; allowed are 1 to {}", name.size(), kLongestName);
+  if (!is_one_line(name)) return "is no UTF-8 text without control characters";
+  if (name == "ruedo" || world::is_reserved_name(name))
+    return "is kept for Ruedo itself; choose another";
+  if (name.starts_with(' ') || name.ends_with(' ')) return "begins or ends with a blank";
+  if (name.find("::") != std::string::npos)
+    return "has '::', which separates names from each other";
+  return "";
+}
 
 world::LoadedModel ModelStore::load(const spawn_request_t& request, world::LoadBudget* budget) {
   std::string key;

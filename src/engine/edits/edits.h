@@ -48,6 +48,10 @@ class ModelStore {
 // name.
 std::string unused_name(const world::WorldModel& world, const std::string& name);
 
+// "": it is allowed.
+std::string fault_of_pose(const double (&position)[3], const double (&orientation)[4]);
+// "": valid for a model, as in a world file; a robot's name must also be usable in channel names.
+std::string fault_of_name(const std::string& name);
 // What can be checked before the model is read; OK: nothing is wrong.
 Outcome check_spawn(const spawn_request_t& request);
 // step: the first state that shows it. name: is set to the model's name. findings: of its devices.

@@ -44,6 +44,61 @@ TEST(Interfaces, HashesAreThoseOfGeneratedDescriptions) {
     EXPECT_EQ(type_hash(type, Distro::jazzy), std::string("RIHS01_") + hash) << type;
 }
 
+// From rosidl_generator_type_description of Jazzy, over the files of simulation_interfaces 1.5.1;
+// and that of its package.
+TEST(Interfaces, HashesAreThoseOfTheStandardOfSimulation) {
+  const std::pair<const char*, const char*> kHashes[] = {
+      {"simulation_interfaces/srv/DeleteEntity",
+       "ff7e96a5b83dc8e2bb34b8b034480028b3a24d9f8376b2c0590bac3704be3e28"},
+      {"simulation_interfaces/srv/GetAvailableWorlds",
+       "ce5589b5523f2732d1969a3c5a7e6b17a387091df8190c62f78d7fdd1109e3e3"},
+      {"simulation_interfaces/srv/GetCurrentWorld",
+       "79ed4e910e1b7a1c9f7950ff758bfba3535bf0dec669054e8af115a099724ddd"},
+      {"simulation_interfaces/srv/GetEntities",
+       "cb90004c48cd50f37732fb008e22c34c261dd680a723bf0f85d8437ea4498bf7"},
+      {"simulation_interfaces/srv/GetEntitiesStates",
+       "0a76170d0c1c90e1eaf805cfab78ea801d1f82df309a28c1f0fae4b570f19754"},
+      {"simulation_interfaces/srv/GetEntityBounds",
+       "17be8d36231178a5eed0de0344b55c19975581627a9aec30a4fee9926a35deed"},
+      {"simulation_interfaces/srv/GetEntityInfo",
+       "953b7ab6bfc35063f5c9a72463c6ce489baa10249a7fa510926d342a34b0d29e"},
+      {"simulation_interfaces/srv/GetEntityState",
+       "749c91f2a2353d98367b64f2995a0f5842ce92a08ec1ffb3e185540a91557fb5"},
+      {"simulation_interfaces/srv/GetNamedPoseBounds",
+       "59fa8dd2c68ba6771160cc66a628ac99fa95e2748fa0a43c2cc62a2e5f3f6fdc"},
+      {"simulation_interfaces/srv/GetNamedPoses",
+       "c3d12ab920115bfd4733f6d20516adc3968fb438538540997c37e200e02b04e3"},
+      {"simulation_interfaces/srv/GetSimulationState",
+       "3362dcebee4b1afebbf9c4beee5c79c1455385aded62092a892d61fde8644f30"},
+      {"simulation_interfaces/srv/GetSimulatorFeatures",
+       "abb9439c8cf196722a469fb6c68b44b484f198c2a1356ac38849a29c2a20a794"},
+      {"simulation_interfaces/srv/GetSpawnables",
+       "3bc0266bf8236058ff589c44512e013afe4f295427c39d44cff363d1c956bf36"},
+      {"simulation_interfaces/srv/LoadWorld",
+       "f210682338f195f6f06191b46b20ec4992bddf485d33e2cffab2dd15341b4e3e"},
+      {"simulation_interfaces/srv/ResetSimulation",
+       "4ce285d7ff9b8ac70dcc95161f32bf54c05a6f4b13427990e41ab40c36c39646"},
+      {"simulation_interfaces/srv/SetEntityInfo",
+       "867fe2b6812f3e021859171f9b788560d66bb7079d640030baf6c0bb2dd2631e"},
+      {"simulation_interfaces/srv/SetEntityState",
+       "ca210e7d2b66629ae133c8e1edf5246e618106d75c78ed0556c0e7a33c59ee5e"},
+      {"simulation_interfaces/srv/SetSimulationState",
+       "a868b916dce49974f637ba252141258c4b07b0c06858b88af560e3eb6bfbcb30"},
+      {"simulation_interfaces/srv/SpawnEntities",
+       "41703a359ee032bf4fc230f144f531705ba039a2e97edeae1f7997dd83b04857"},
+      {"simulation_interfaces/srv/SpawnEntity",
+       "d4c086345d4194a5fc4c9ae45095736ca4062b5cdac4d06a42dec93d683e03cf"},
+      {"simulation_interfaces/srv/StepSimulation",
+       "913fe0653690ce6bf8f09f316e6a626747012e9fca31e26719910d417aa8565c"},
+      {"simulation_interfaces/srv/UnloadWorld",
+       "ac7f9a73df1b5b15015d854c5ac552b7726506e22f886c6792804f0b7f88b30b"},
+      {"diagnostic_msgs/msg/DiagnosticArray",
+       "5a8a36efb05fb25070fa0fb3810290c0e6cd4862b54a8fb975a1ee8dc55a333e"},
+  };
+  for (const auto& [type, hash] : kHashes)
+    EXPECT_EQ(type_hash(type, Distro::jazzy), std::string("RIHS01_") + hash) << type;
+}
+
 TEST(Interfaces, HumbleHasItsOwn) {
   EXPECT_NE(type_hash("sensor_msgs/msg/Range", Distro::humble),
             type_hash("sensor_msgs/msg/Range", Distro::jazzy));

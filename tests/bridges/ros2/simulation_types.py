@@ -1,7 +1,8 @@
-"""simulation_interfaces 1.x as rmw_cyclonedds has services on the wire: 16 bytes of header, then
+"""simulation_interfaces 1.5 as rmw_cyclonedds has services on the wire: 16 bytes of header, then
 the request or the response.
 """
 
+import re
 from dataclasses import dataclass
 
 from cyclonedds.idl import IdlStruct, make_idl_struct
@@ -65,34 +66,54 @@ class EntityFilters(IdlStruct, typename="simulation_interfaces::msg::dds_::Entit
 
 
 @dataclass
-class Empty_(IdlStruct, typename=mark("GetSimulatorFeatures", "Request")):
-    client: uint64
-    sequence_number: int64
-    structure_needs_at_least_one_member: uint8 = 0
+class EntityInfo(IdlStruct, typename="simulation_interfaces::msg::dds_::EntityInfo_"):
+    category: EntityCategory
+    description: str
+    tags: sequence[str]
 
 
 @dataclass
-class Features(IdlStruct, typename=mark("GetSimulatorFeatures", "Response")):
-    client: uint64
-    sequence_number: int64
-    features: sequence[uint16]
-    spawn_formats: sequence[str]
-    custom_info: str
+class NamedPose(IdlStruct, typename="simulation_interfaces::msg::dds_::NamedPose_"):
+    name: str
+    description: str
+    tags: sequence[str]
+    pose: Pose
 
 
 @dataclass
-class GetState(IdlStruct, typename=mark("GetSimulationState", "Request")):
-    client: uint64
-    sequence_number: int64
-    structure_needs_at_least_one_member: uint8 = 0
+class Resource(IdlStruct, typename="simulation_interfaces::msg::dds_::Resource_"):
+    uri: str
+    resource_string: str
 
 
 @dataclass
-class GotState(IdlStruct, typename=mark("GetSimulationState", "Response")):
-    client: uint64
-    sequence_number: int64
-    state: uint8
+class Spawnable(IdlStruct, typename="simulation_interfaces::msg::dds_::Spawnable_"):
+    uri: str
+    description: str
+    spawn_bounds: Bounds
+
+
+@dataclass
+class SpawnEntity(IdlStruct, typename="simulation_interfaces::msg::dds_::SpawnEntity_"):
+    name: str
+    allow_renaming: bool
+    entity_resource: Resource
+    entity_namespace: str
+    initial_pose: PoseStamped
+
+
+@dataclass
+class SpawnResult(IdlStruct, typename="simulation_interfaces::msg::dds_::SpawnResult_"):
     result: Result
+    entity_name: str
+
+
+@dataclass
+class WorldResource(IdlStruct, typename="simulation_interfaces::msg::dds_::WorldResource_"):
+    name: str
+    world_resource: Resource
+    description: str
+    tags: sequence[str]
 
 
 def part(service: str, which: str, fields: dict[str, type]) -> type:
@@ -103,52 +124,72 @@ def part(service: str, which: str, fields: dict[str, type]) -> type:
     )
 
 
-def request(service: str, /, **fields: type) -> type:
-    return part(service, "Request", fields)
-
-
-def response(service: str, /, **fields: type) -> type:
-    return part(service, "Response", fields)
-
+NOTHING = {"structure_needs_at_least_one_member": uint8}
+RESULT = {"result": Result}
+TYPES = {
+    "DeleteEntity": ({"entity": str}, RESULT),
+    "GetAvailableWorlds": (
+        {
+            "additional_sources": sequence[str],
+            "filter": TagsFilter,
+            "offline_only": bool,
+            "continue_on_error": bool,
+        },
+        {**RESULT, "worlds": sequence[WorldResource]},
+    ),
+    "GetCurrentWorld": (NOTHING, {**RESULT, "world": WorldResource}),
+    "GetEntities": ({"filters": EntityFilters}, {**RESULT, "entities": sequence[str]}),
+    "GetEntitiesStates": (
+        {"filters": EntityFilters},
+        {**RESULT, "entities": sequence[str], "states": sequence[EntityState]},
+    ),
+    "GetEntityBounds": ({"entity": str}, {**RESULT, "bounds": Bounds}),
+    "GetEntityInfo": ({"entity": str}, {**RESULT, "info": EntityInfo}),
+    "GetEntityState": ({"entity": str}, {**RESULT, "state": EntityState}),
+    "GetNamedPoseBounds": ({"name": str}, {**RESULT, "bounds": Bounds}),
+    "GetNamedPoses": ({"tags": TagsFilter}, {**RESULT, "poses": sequence[NamedPose]}),
+    "GetSimulationState": (NOTHING, {"state": uint8, **RESULT}),
+    "GetSimulatorFeatures": (
+        NOTHING,
+        {"features": sequence[uint16], "spawn_formats": sequence[str], "custom_info": str},
+    ),
+    "GetSpawnables": ({"sources": sequence[str]}, {**RESULT, "spawnables": sequence[Spawnable]}),
+    "LoadWorld": (
+        {
+            "uri": str,
+            "resource_string": str,
+            "fail_on_unsupported_element": bool,
+            "ignore_missing_or_unsupported_assets": bool,
+        },
+        {**RESULT, "world": WorldResource},
+    ),
+    "ResetSimulation": ({"scope": uint8}, RESULT),
+    "SetEntityInfo": ({"entity": str, "info": EntityInfo}, RESULT),
+    "SetEntityState": ({"entity": str, "state": EntityState}, RESULT),
+    "SetSimulationState": ({"state": uint8}, RESULT),
+    "SpawnEntities": (
+        {"spawn_requests": sequence[SpawnEntity]},
+        {**RESULT, "results": sequence[SpawnResult]},
+    ),
+    "SpawnEntity": (
+        {
+            "name": str,
+            "allow_renaming": bool,
+            "uri": str,
+            "resource_string": str,
+            "entity_namespace": str,
+            "initial_pose": PoseStamped,
+        },
+        {**RESULT, "entity_name": str},
+    ),
+    "StepSimulation": ({"steps": uint64}, RESULT),
+    "UnloadWorld": (NOTHING, RESULT),
+}
 
 SERVICES = {
-    "get_simulator_features": (Empty_, Features),
-    "get_simulation_state": (GetState, GotState),
-    "set_simulation_state": (
-        request("SetSimulationState", state=uint8),
-        response("SetSimulationState", result=Result),
-    ),
-    "reset_simulation": (
-        request("ResetSimulation", scope=uint8),
-        response("ResetSimulation", result=Result),
-    ),
-    "step_simulation": (
-        request("StepSimulation", steps=uint64),
-        response("StepSimulation", result=Result),
-    ),
-    "spawn_entity": (
-        request(
-            "SpawnEntity",
-            name=str,
-            allow_renaming=bool,
-            uri=str,
-            resource_string=str,
-            entity_namespace=str,
-            initial_pose=PoseStamped,
-        ),
-        response("SpawnEntity", result=Result, entity_name=str),
-    ),
-    "delete_entity": (request("DeleteEntity", entity=str), response("DeleteEntity", result=Result)),
-    "get_entities": (
-        request("GetEntities", filters=EntityFilters),
-        response("GetEntities", result=Result, entities=sequence[str]),
-    ),
-    "get_entity_state": (
-        request("GetEntityState", entity=str),
-        response("GetEntityState", result=Result, state=EntityState),
-    ),
-    "set_entity_state": (
-        request("SetEntityState", entity=str, state=EntityState),
-        response("SetEntityState", result=Result),
-    ),
+    re.sub("(?<!^)(?=[A-Z])", "_", name).lower(): (
+        part(name, "Request", question),
+        part(name, "Response", answer),
+    )
+    for name, (question, answer) in TYPES.items()
 }
