@@ -43,6 +43,8 @@ Node::Node(NodeOptions options, std::unique_ptr<Transport> transport,
       clock_period_us_(std::max<int64_t>(1, rounded(1e6 / options_.clock_hz))) {
   clock_topic_ = {names_.topic("", "clock"), "rosgraph_msgs/msg/Clock", kStateQos};
   clock_ = transport_->add_writer(endpoint(clock_topic_));
+  diagnostics_topic_ = {names_.topic("", "diagnostics"), Diagnostics::kType, kStateQos};
+  diagnosed_ = transport_->add_writer(endpoint(diagnostics_topic_));
   drawn_topic_ = {names_.topic("", "markers"), MarkerArrays::kType, kMarkersQos};
   drawn_ = std::make_unique<DrawnTopic>(transport_->add_writer(endpoint(drawn_topic_)), names_);
   services_ = std::make_unique<Services>(
@@ -85,6 +87,11 @@ void Node::flush() {
   requests_.repeat(now);
   if (now < next_look_) return;
   next_look_ = now + kLook;
+  const auto [lost, missed] = options_.losses();
+  const Counts counted = counts();
+  if (const auto message = diagnostics_.look(
+          now, {lost, missed, counted.sent, counted.dropped, counted.received, counted.faulty}))
+    send(*diagnosed_, *message);
   look_for_readers();
   look_for_writers();
   drawn_->look(time_us_);
@@ -138,6 +145,7 @@ void Node::announce(const std::shared_ptr<const run::Announcement>& announcement
 // Before measurements of that time.
 void Node::begin_step(const run::Step& step) {
   time_us_ = step.time_us;
+  diagnostics_.step(step.time_us);
   if (step.time_us < next_clock_us_) return;
   next_clock_us_ = step.time_us / clock_period_us_ * clock_period_us_ + clock_period_us_;
   send(*clock_, clock_message(step.time_us));
@@ -256,10 +264,11 @@ void Node::tell_graph() {
   out.put_length(inputs_.size() + services_->readers().size());
   for (const auto& [name, input] : inputs_) put_gid(input.reader->gid());
   for (const Reader* reader : services_->readers()) put_gid(reader->gid());
-  out.put_length(writers_.size() + standing_.size() + services_->writers().size() + 2);
+  out.put_length(writers_.size() + standing_.size() + services_->writers().size() + 3);
   for (const auto& [name, writer] : writers_) put_gid(writer->gid());
   for (const Writer* writer : services_->writers()) put_gid(writer->gid());
   put_gid(clock_->gid());
+  put_gid(diagnosed_->gid());
   put_gid(drawn_->writer().gid());
   for (const auto& [name, standing] : standing_) put_gid(standing.writer->gid());
   graph_->write(out.bytes());
@@ -331,6 +340,7 @@ size_t Node::peers() const {
 std::vector<Topic> Node::outputs() const {
   std::vector<Topic> topics = conversions_->topics();
   topics.push_back(clock_topic_);
+  topics.push_back(diagnostics_topic_);
   topics.push_back(drawn_topic_);
   for (const Conversions::Standing& each : conversions_->standing()) topics.push_back(each.topic);
   return topics;

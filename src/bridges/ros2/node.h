@@ -12,10 +12,12 @@
 #include <mutex>
 #include <span>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "bridges/ros2/commands.h"
 #include "bridges/ros2/conversions.h"
+#include "bridges/ros2/diagnostics.h"
 #include "bridges/ros2/markers.h"
 #include "bridges/ros2/requests.h"
 #include "bridges/ros2/services.h"
@@ -33,6 +35,10 @@ struct NodeOptions {
   // As it is now; null: not known.
   std::function<std::shared_ptr<const world::WorldModel>()> world = [] {
     return std::shared_ptr<const world::WorldModel>();
+  };
+  // Messages that the bus lost, and that this node missed; the thread that calls the sink.
+  std::function<std::pair<uint64_t, uint64_t>()> losses = [] {
+    return std::pair<uint64_t, uint64_t>();
   };
 };
 
@@ -104,8 +110,9 @@ class Node : public run::Sink {
   std::unique_ptr<Conversions> conversions_;
   std::map<std::string, std::unique_ptr<Writer>> writers_;  // by name and type
   std::vector<Writer*> writer_of_topic_;
-  Topic clock_topic_, drawn_topic_;
-  std::unique_ptr<Writer> clock_, graph_;
+  Topic clock_topic_, drawn_topic_, diagnostics_topic_;
+  std::unique_ptr<Writer> clock_, diagnosed_, graph_;
+  Diagnostics diagnostics_;
   std::unique_ptr<DrawnTopic> drawn_;
   int64_t time_us_ = 0;  // sim time
   struct Standing {

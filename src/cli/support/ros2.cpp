@@ -122,7 +122,7 @@ class CycloneNode : public Ros2Node {
       : server_(server),
         wait_for_(arguments.wait_for),
         where_(fmt::format("{}, {}", ros2::name_of(distro_of(arguments)), transport->where())),
-        node_(node_options(server, arguments), std::move(transport), server.info(),
+        node_(options(arguments), std::move(transport), server.info(),
               [&server](const std::string& channel, std::span<const uint8_t> message) {
                 server.receive(channel, message.data(), message.size());
               }),
@@ -175,6 +175,12 @@ class CycloneNode : public Ros2Node {
   }
 
  private:
+  ros2::NodeOptions options(const Ros2Arguments& arguments) {
+    ros2::NodeOptions options = node_options(server_, arguments);
+    options.losses = [this] { return std::pair(server_.lost(), queue_.missed()); };
+    return options;
+  }
+
   run::Run& server_;
   std::vector<std::string> wait_for_;
   std::string where_;

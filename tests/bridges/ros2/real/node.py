@@ -11,6 +11,7 @@ import sys
 import time
 
 import rclpy
+from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import Twist, TwistStamped
 from nav_msgs.msg import Odometry
 from rcl_interfaces.msg import ParameterEvent
@@ -165,6 +166,20 @@ def killed(process):
     os.kill(int(process), signal.SIGKILL)
     peer.spin_until(lambda: peer.node.count_publishers("/scan") == 0)
     return True
+
+
+def diagnostics():
+    """The second of two messages: by status its level and values; and how far they are apart."""
+    peer, got = Peer(), []
+    peer.node.create_subscription(DiagnosticArray, "/diagnostics", got.append, 10)
+    peer.spin_until(lambda: len(got) >= 2)
+    stamps = [m.header.stamp.sec + m.header.stamp.nanosec * 1e-9 for m in got]
+    return {
+        "apart": stamps[1] - stamps[0],
+        "status": {
+            s.name: [ord(s.level), {v.key: v.value for v in s.values}] for s in got[1].status
+        },
+    }
 
 
 def parameters():
