@@ -10,6 +10,7 @@
 #include <optional>
 #include <set>
 
+#include "bridges/ros2/markers.h"
 #include "bridges/ros2/pictures.h"
 #include "ruedo/air_pressure_t.hpp"
 #include "ruedo/air_speed_t.hpp"
@@ -419,6 +420,19 @@ void write_collisions(const collisions_t& collisions, const Source& from, CdrWri
   put_contacts(collisions.utime, from.robot, collisions.points, from, out);
 }
 
+// Along the normal, towards the robot; the text is the other body.
+void write_collision_arrows(const collisions_t& collisions, const Source& from, CdrWriter& out) {
+  constexpr double kLength = 0.3;  // m
+  out.put_length(collisions.points.size());
+  int32_t id = 0;
+  for (const contact_point_t& point : collisions.points) {
+    double tip[3];
+    for (int i = 0; i < 3; ++i) tip[i] = point.position[i] + kLength * point.normal[i];
+    put_arrow(out, collisions.utime, from.world, from.robot, id++,
+              {point.position, tip, point.body});
+  }
+}
+
 void write_bumper(const contact_t& contact, const Source&, CdrWriter& out) {
   out.put(static_cast<bool>(contact.pressed));
 }
@@ -560,8 +574,11 @@ RUEDO_ROWS(camera_info_t,
            {"camera_info", "sensor_msgs/msg/CameraInfo", kSensorQos, write_camera_info})
 RUEDO_ROWS(contact_t, {"contacts", "ros_gz_interfaces/msg/Contacts", kSensorQos, write_contacts},
            {"bumper", "std_msgs/msg/Bool", kSensorQos, write_bumper})
-RUEDO_ROWS(collisions_t, {"collisions", "ros_gz_interfaces/msg/Contacts", kSensorQos,
-                          write_collisions, nullptr, nullptr, Scope::robot})
+RUEDO_ROWS(collisions_t,
+           {"collisions", "ros_gz_interfaces/msg/Contacts", kSensorQos, write_collisions, nullptr,
+            nullptr, Scope::robot},
+           {"collisions/markers", MarkerArrays::kType, kSensorQos, write_collision_arrows, nullptr,
+            nullptr, Scope::robot})
 
 #undef RUEDO_ROWS
 

@@ -12,7 +12,14 @@
 namespace ruedo::ros2 {
 namespace {
 
-enum Type : int32_t { kLineStrip = 4, kLineList = 5, kCubeList = 6, kSphereList = 7, kText = 9 };
+enum Type : int32_t {
+  kArrow = 0,
+  kLineStrip = 4,
+  kLineList = 5,
+  kCubeList = 6,
+  kSphereList = 7,
+  kText = 9
+};
 enum Action : int32_t { kAdd = 0, kDelete = 2 };
 constexpr float kFlat = 0.01f;  // a cell's height, as a share of its side
 
@@ -92,6 +99,24 @@ void put_rest(CdrWriter& out, const std::string& text) {
 }
 
 }  // namespace
+
+void put_arrow(CdrWriter& out, int64_t utime, const std::string& frame, const std::string& layer,
+               int32_t id, const Arrow& arrow) {
+  constexpr double kShaft = 0.02, kHead = 0.04;  // m, diameters
+  constexpr uint32_t kLifetime_ns = 300'000'000;
+  constexpr float kRed[] = {1, 0, 0, 1};
+  put_header(out, utime, frame);
+  out.put(layer).put(id).put(int32_t{kArrow}).put(int32_t{kAdd});
+  put_xyz(out, 0, 0, 0);
+  for (const double x : {0.0, 0.0, 0.0, 1.0}) out.put(x);
+  put_xyz(out, kShaft, kHead, 0);
+  out.put_array(std::span<const float>(kRed));
+  out.put(int32_t{0}).put(kLifetime_ns).put(false);
+  out.put_length(2);
+  for (const double* end : {arrow.from, arrow.to}) put_xyz(out, end[0], end[1], end[2]);
+  out.put_length(0);  // colours
+  put_rest(out, arrow.text);
+}
 
 std::vector<uint8_t> MarkerArrays::message(const markers_t& markers, int64_t utime,
                                            const std::string& frame) {

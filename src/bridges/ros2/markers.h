@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "bridges/ros2/cdr.h"
 #include "bridges/ros2/names.h"
 #include "bridges/ros2/transport.h"
 #include "ruedo/markers_t.hpp"
@@ -25,6 +26,14 @@ class MarkerArrays {
  private:
   std::map<std::string, size_t> shown_;  // how many, by layer that has any
 };
+
+// An arrow, which is gone a moment later; for a message of markers. Positions in the frame, m.
+struct Arrow {
+  const double *from, *to;
+  std::string text;
+};
+void put_arrow(CdrWriter& out, int64_t utime, const std::string& frame, const std::string& layer,
+               int32_t id, const Arrow& arrow);
 
 // What clients have drawn in a run so far, on a topic of its own. Who comes later is sent the
 // newest of each layer: a writer keeps one message for latecomers, of one layer.

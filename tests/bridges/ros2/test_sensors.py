@@ -18,6 +18,7 @@ from ros_types import (
     JointState,
     JointTrajectory,
     JointTrajectoryPoint,
+    MarkerArray,
     MultiArrayDimension,
     MultiArrayLayout,
     Time,
@@ -104,12 +105,17 @@ def test_what_a_robot_runs_into_is_told():
     with Run("--no-noise", "--rate", "4") as run:
         peer = Peer(run.domain)
         drive, told = peer.writer("/cmd_vel", Twist), peer.reader("/collisions", Contacts)
+        shown = peer.reader("/collisions/markers", MarkerArray)
 
         def touched():
             drive.write(Twist(Vector3(x=0.5), Vector3()))
             return [m for m in told.take(N=100) if hasattr(m, "__idl__") and m.contacts]
 
         first = wait_for(touched, "a collision")[0]
+        arrows = wait_for(
+            lambda: [a for m in shown.take(N=100) if hasattr(m, "__idl__") for a in m.markers],
+            "an arrow",
+        )
     assert first.header.frame_id == "world" and first.header.stamp.us > 0
     for contact in first.contacts:
         assert contact.collision1.name == "p3at"
@@ -121,6 +127,12 @@ def test_what_a_robot_runs_into_is_told():
         wrench = contact.wrenches[0]
         assert wrench.body_1_wrench.force.x == -wrench.body_2_wrench.force.x
         assert wrench.body_2_name.data == contact.collision2.name
+    for arrow in arrows:
+        assert (arrow.header.frame_id, arrow.ns, arrow.type) == ("world", "p3at", 0)
+        assert arrow.text.startswith("parcel")
+        touch, tip = arrow.points
+        assert math.dist((touch.x, touch.y, touch.z), (tip.x, tip.y, tip.z)) == pytest.approx(0.3)
+        assert tip.x < touch.x < 2.0
 
 
 def test_frames_of_devices_hang_on_the_robot(bag):
