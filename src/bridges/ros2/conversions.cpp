@@ -51,6 +51,7 @@ struct MovedLink {
 struct Source {
   std::string robot;
   std::vector<std::string> wheels;       // names of their joints
+  std::vector<std::string> still;        // of joints that stay at 0
   std::vector<MovedLink> turned, moved;  // by odometry_t and joint_state_t, in order
   device_info_t device{};
   std::string part;   // the channel's name after the device: "depth", "info", ...
@@ -230,17 +231,20 @@ void write_odometry_frame(const odometry_t& odometry, const Source& from, CdrWri
 void write_wheels(const odometry_t& odometry, const Source& from, CdrWriter& out) {
   put_header(out, odometry.utime, "");
   const size_t count = std::min({from.wheels.size(), odometry.angle.size(), odometry.rate.size()});
-  out.put_length(count);
+  const size_t all = count + from.still.size();
+  out.put_length(all);
   for (size_t i = 0; i < count; ++i) out.put(from.wheels[i]);
+  for (const std::string& joint : from.still) out.put(joint);
   for (const auto* values : {&odometry.angle, &odometry.rate}) {
-    out.put_length(count);
+    out.put_length(all);
     for (size_t i = 0; i < count; ++i)
       out.put((i < from.turned.size() ? from.turned[i].sign : 1.0) * (*values)[i]);
+    for (size_t i = count; i < all; ++i) out.put(0.0);
   }
   out.put_length(0);
 }
 
-bool has_wheels(const Source& from) { return !from.wheels.empty(); }
+bool has_wheels(const Source& from) { return !from.wheels.empty() || !from.still.empty(); }
 
 void write_joints(const joint_state_t& joints, const Source&, CdrWriter& out) {
   put_header(out, joints.utime, "");
@@ -628,6 +632,7 @@ struct Conversions::Plan {
     const std::string original = original_name(channel.name);
     if (original.starts_with(name + "/")) from.part = original.substr(name.size() + 1);
     if (const auto robot = links.find(channel.robot); robot != links.end()) {
+      from.still = robot->second.still;
       from.turned = moved(channel.robot, robot->second.wheels);
       from.moved = moved(channel.robot, robot->second.joints);
     }

@@ -154,6 +154,11 @@ class Tree {
     }
     for (const JointIndex j : robot_.joints)
       result_.joints.push_back({frame_of_joint(layout_.joints[j].joint)});
+    for (const ModelJointIndex j : model_.joints.indices()) {
+      const Joint& joint = model_.joints[j];
+      if (!moves_[j] && joint.parent.valid() && motion_of(joint.type) != Motion::none)
+        result_.still.push_back(joint.name);
+    }
     for (const world::SensorDescription& sensor : model_.sensors) {
       const size_t frame = frame_of_link_[sensor.link];
       for (size_t each = frame; each != 0; each = result_.frames[each].parent) {

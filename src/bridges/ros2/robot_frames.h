@@ -38,6 +38,8 @@ struct RobotFrames {
   };
   std::vector<Moved> wheels;               // in the order of odometry_t
   std::vector<Moved> joints;               // in the order of joint_state_t
+  std::vector<std::string> still;          // joints that a kinematic drive carries and nothing
+                                           // turns (casters): they stay at 0
   std::map<std::string, size_t> carriers;  // by sensor: the frame that moves with it; only where
                                            // that moves in base_link
   std::string description;                 // URDF

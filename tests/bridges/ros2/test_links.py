@@ -155,3 +155,21 @@ def test_meshes_are_files_that_are_there():
     assert meshes
     for mesh in meshes:
         assert Path(mesh.removeprefix("file://")).is_file()
+
+
+def test_joint_states_have_the_joints_that_only_go_along():
+    """A user's own URDF has them, too: robot_state_publisher waits for each that is not fixed."""
+    world = str(Path(__file__).resolve().parent / "casters.sdf")
+    with Run("--no-noise", world=world) as run:
+        peer = Peer(run.domain)
+        joints, drive = peer.reader("/joint_states", JointState), peer.writer("/cmd_vel", Twist)
+
+        def turned():
+            drive.write(Twist(Vector3(x=0.2), Vector3()))
+            return [m for m in joints.take(N=100) if hasattr(m, "__idl__") and m.velocity[0] > 1.9]
+
+        message = wait_for(turned, "wheels that turn")[-1]
+    assert message.name == ["left_joint", "right_joint", "fork_joint", "caster_joint"]
+    assert message.velocity == [pytest.approx(2.0, abs=0.1)] * 2 + [0.0, 0.0]
+    assert message.position[0] == pytest.approx(message.position[1]) and message.position[0] > 0
+    assert message.position[2:] == [0.0, 0.0]
