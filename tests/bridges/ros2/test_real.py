@@ -80,12 +80,11 @@ def test_diagnostics_tell_how_the_run_gets_on(run):
     assert list(seen["status"]) == ["ruedo: simulation", "ruedo: ROS 2", "ruedo: bus"]
     _, simulation = seen["status"]["ruedo: simulation"]
     factor = float(simulation["real-time factor"])
-    assert 0 < factor < 1.5
-    # A second of real time lies between two messages; a busy machine.
-    assert factor / 1.5 < seen["apart"] < 10 * factor
+    # At least a second of real time lies between two messages.
+    assert 0 < factor <= seen["apart"] * 1.01
     assert float(simulation["real time per step (ms)"]) == pytest.approx(5 / factor, rel=0.01)
-    level, values = seen["status"]["ruedo: ROS 2"]
-    assert level == 0 and int(values["messages sent"]) > 0
+    _, values = seen["status"]["ruedo: ROS 2"]
+    assert int(values["messages sent"]) > 0
 
 
 def test_parameters_are_those_of_a_node(run):
