@@ -304,6 +304,7 @@ void PhysicsWorld::Impl::update_box(BodyIndex body) {
 
 void PhysicsWorld::Impl::start(BodyIndex body) {
   BodyMotion& motion = motions_[body];
+  bullet(body).setHitFraction(motion.kind == BodyMotion::Kind::free ? 1.0 : 0.0);
   if (motion.kind == BodyMotion::Kind::free) {
     if (motion.dirty) push_to_bullet(body);
     return;
@@ -376,6 +377,7 @@ void PhysicsWorld::Impl::choose_pace() {
   for (BodyMotion& motion : motions_) motion.fine = false;
   find_led();
   find_hurried();
+  find_fast();
   for (const BodyIndex i : motions_.indices()) {
     if (!motions_[i].simulated) continue;
     if (rigid_.bodies[i].info.moved) continue;
@@ -425,6 +427,24 @@ void PhysicsWorld::Impl::find_hurried() {
   }
   for (const BodyIndex body : rolling_) {
     if (motions_[body].simulated) motions_[root(body)].fine = true;
+  }
+}
+
+// Nor do long substeps fit what turns far or moves far for its size in one, and what is so small
+// that its weight alone makes it.
+void PhysicsWorld::Impl::find_fast() {
+  constexpr double kFarthest = 0.5, kFarthest_rad = 0.2;  // of the half thickness
+  const double substep_s = static_cast<double>(std::min(step_us_, kLongestSubstep_us)) * 1e-6;
+  for (const BodyIndex i : motions_.indices()) {
+    const RigidBody& rigid = rigid_.bodies[i];
+    if (!motions_[i].simulated || motions_[i].kind != BodyMotion::Kind::free || rigid.info.moved ||
+        sleeping(i) || rigid.info.shapes.empty())
+      continue;
+    const double way =
+        twists_[i].linear.norm() + from_bt(rigid.bullet->getGravity()).norm() * substep_s;
+    if (way * substep_s > kFarthest * rigid.box_half.minCoeff() ||
+        twists_[i].angular.norm() * substep_s > kFarthest_rad)
+      motions_[root(i)].fine = true;
   }
 }
 

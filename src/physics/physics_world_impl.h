@@ -124,6 +124,7 @@ class PhysicsWorld::Impl {
   void choose_pace();
   void find_led();
   void find_hurried();
+  void find_fast();
   bool at_pace(JointIndex joint, int pace) const;
   BodyIndex body_of(JointIndex joint) const;  // the body that moves
   void step_at(int pace);

@@ -14,6 +14,9 @@ namespace ruedo::physics {
 namespace {
 
 constexpr double kSmallestMass_kg = 1e-6;
+// Radius of gyration about any axis: with a smaller one, a torque could produce any angular rate.
+// At most this part of the shapes' size.
+constexpr double kSmallestGyration_m = 1e-3, kSmallestGyration = 0.05;
 // Driven wheels: the tyre is compressed by about this much by the robot's weight, which distributes
 // the weight over all wheels (four rigid wheels on a rigid floor stand on any two or three).
 constexpr double kTyreGives_m = 5e-4, kTyreDamping = 1.0;
@@ -113,7 +116,9 @@ void feel_wind(const world::Inertial& inertial, const Pose& X_IB, const Pose& X_
 // moments: about the axes of I.
 void make_bullet(double mass, const Vec3& moments, const Pose& X_WB, RigidBody& body) {
   const bool kinematic = body.info.moved;
-  const double smallest = 1e-9 + 1e-6 * mass;  // with less, a torque could produce any angular rate
+  const double size = body.box_half.norm();
+  const double gyration = std::min(kSmallestGyration_m, kSmallestGyration * size);
+  const double smallest = size > 0.0 ? mass * gyration * gyration : 1e-9 + 1e-6 * mass;
   btRigidBody::btRigidBodyConstructionInfo settings(
       kinematic ? 0.0 : mass, nullptr, body.compound.get(),
       kinematic ? btVector3(0, 0, 0) : to_bt(Vec3(moments.cwiseMax(smallest))));
@@ -127,6 +132,8 @@ void make_bullet(double mass, const Vec3& moments, const Pose& X_WB, RigidBody& 
   bullet.setFlags(bullet.getFlags() | BT_DISABLE_WORLD_GRAVITY);  // gravity is set per body
   bullet.setGravity(to_bt(body.gravity));
   bullet.setUserPointer(&body.info);
+  // The farthest that any of it is from its centre of mass.
+  bullet.setCcdSweptSphereRadius(size + (body.box_center - body.X_BI.translation).norm());
 }
 
 // Of a kinematic drive, which also represents its friction.
@@ -243,7 +250,7 @@ void RigidBodies::make_compound(const world::WorldModel& world, const world::Bod
   const Pose X_IB = body.X_BI.inverse();
   // A kinematic drive represents its wheels' friction.
   const bool imposed = carries_kinematic_drive(world, layout, body.info.body);
-  body.compound = std::make_unique<btCompoundShape>();
+  body.compound = std::make_unique<BodyShape>();
   std::vector<btCollisionShape*> shapes;
   for (const LinkIndex link_index : placement.links) {
     const auto& link_placement = layout.links[link_index];
@@ -301,13 +308,13 @@ void RigidBodies::make_body(const world::WorldModel& world, const world::BodyLay
   body.info.self_collide = model.self_collide;
   body.info.moved = kinematic;
   make_compound(world, layout, wheel, body);
-  make_bullet(mass.mass, moments, placement.X_WB, body);
   if (body.compound->getNumChildShapes() > 0) {
     btVector3 low, high;
     body.compound->getAabb(to_bt(X_IB.inverse().normalized()), low, high);
     body.box_center = from_bt((low + high) / 2);
     body.box_half = from_bt((high - low) / 2);
   }
+  make_bullet(mass.mass, moments, placement.X_WB, body);
 }
 
 }  // namespace ruedo::physics

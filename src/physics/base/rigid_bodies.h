@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "physics/base/bullet.h"
+#include "physics/collision/convex_shapes.h"
 #include "physics/collision/shapes.h"
 #include "physics/dynamics/surfaces.h"
 #include "world/model/body_layout.h"
@@ -44,7 +45,7 @@ WheelIndex driven_wheel(const world::BodyLayout& layout, BodyIndex body);
 // A moving body. Bullet's frame I has its origin at the centre of mass, along the principal axes of
 // inertia.
 struct RigidBody {
-  std::unique_ptr<btCompoundShape> compound;
+  std::unique_ptr<BodyShape> compound;
   std::unique_ptr<btRigidBody> bullet;
   ObjectInfo info;
   Pose X_BI;

@@ -6,8 +6,13 @@
 #include <new>
 
 #include <BulletCollision/CollisionDispatch/btBoxBoxDetector.h>
+#include <BulletCollision/NarrowPhaseCollision/btGjkEpaPenetrationDepthSolver.h>
+#include <BulletCollision/NarrowPhaseCollision/btGjkPairDetector.h>
+#include <BulletCollision/NarrowPhaseCollision/btVoronoiSimplexSolver.h>
 
+#include "physics/collision/closest_points.h"
 #include "physics/collision/convex_shapes.h"
+#include "physics/collision/faces.h"
 
 namespace ruedo::physics {
 
@@ -128,6 +133,33 @@ class OnPlane final : public Pair {
   }
 };
 
+// The lowest point of any other convex shape, and of its lowest side or edge.
+template <bool swapped>
+class ConvexOnPlane final : public Pair {
+ public:
+  ConvexOnPlane(const btCollisionAlgorithmConstructionInfo& info, const btCollisionObjectWrapper& a,
+                const btCollisionObjectWrapper& b)
+      : Pair(info, swapped ? b : a, swapped ? a : b) {}
+
+ private:
+  void collide(const btCollisionObjectWrapper& a, const btCollisionObjectWrapper& b,
+               btManifoldResult& result) override {
+    const btCollisionObjectWrapper &body = swapped ? b : a, &other = swapped ? a : b;
+    const auto& plane = static_cast<const btStaticPlaneShape&>(*other.getCollisionShape());
+    const auto& shape = static_cast<const btConvexShape&>(*body.getCollisionShape());
+    const btTransform &X_WP = other.getWorldTransform(), &X_WS = body.getWorldTransform();
+    const btVector3 up = X_WP.getBasis() * plane.getPlaneNormal();
+    const btScalar ground = up.dot(X_WP.getOrigin()) + plane.getPlaneConstant();
+    const auto add = [&](const btVector3& at) {
+      const btScalar height = up.dot(at) - ground;
+      result.addContactPoint(up, at - height * up, height);
+    };
+    add(X_WS * shape.localGetSupportingVertex(-up * X_WS.getBasis()));
+    const Face face = face_towards(shape, X_WS, -up);
+    for (size_t i = 0; i < face.count; ++i) add(face.corners[i]);
+  }
+};
+
 // Bullet's contacts of two enlarged boxes, corrected to their real size.
 class OnRealBoxes final : public btDiscreteCollisionDetectorInterface::Result {
  public:
@@ -192,6 +224,18 @@ class BoxOnBox final : public Pair {
       return static_cast<const btBoxShape&>(*box.getCollisionShape()).getHalfExtentsWithMargin();
     };
     const btScalar ahead = moves_along_plane(a) || moves_along_plane(b) ? 0.0 : kAhead_m;
+    if (seen_ahead_m > kAhead_m) {
+      const auto placed = [](const btCollisionObjectWrapper& box) {
+        return PlacedShape{static_cast<const btConvexShape&>(*box.getCollisionShape()),
+                           box.getWorldTransform()};
+      };
+      const ClosestPoints closest = closest_points(placed(a), placed(b), seen_ahead_m);
+      if (closest.distance > kAhead_m) {
+        if (closest.distance <= seen_ahead_m)
+          result.addContactPoint(closest.normal, closest.on_b, closest.distance);
+        return;
+      }
+    }
     const btVector3 more(ahead, ahead, ahead), half_a = half_of(a), half_b = half_of(b);
     const btBoxShape larger_a(half_a + more), larger_b(half_b + more);
     btDiscreteCollisionDetectorInterface::ClosestPointInput input;
@@ -201,6 +245,78 @@ class BoxOnBox final : public Pair {
                         result);
     btBoxBoxDetector(&larger_a, &larger_b).getClosestPoints(input, on_real, nullptr);
   }
+};
+
+// The closest points of a convex shape and a triangle of a mesh: Bullet finds none for things of
+// millimetres. Overlapping shapes have none: then in the direction, of that which Bullet finds and
+// those of their sides, in which they overlap least.
+class ConvexOnTriangle final : public Pair {
+ public:
+  using Pair::Pair;
+
+ private:
+  void collide(const btCollisionObjectWrapper& a, const btCollisionObjectWrapper& b,
+               btManifoldResult& result) override {
+    const auto& of_a = static_cast<const btConvexShape&>(*a.getCollisionShape());
+    const auto& of_b = static_cast<const btConvexShape&>(*b.getCollisionShape());
+    const btTransform &X_WA = a.getWorldTransform(), &X_WB = b.getWorldTransform();
+    const ClosestPoints closest = closest_points({of_a, X_WA}, {of_b, X_WB}, seen_ahead_m);
+    if (closest.distance > seen_ahead_m) return;
+    if (!closest.normal.isZero()) {
+      const btScalar gap = closest.normal.dot(closest.on_a - closest.on_b);
+      return result.addContactPoint(closest.normal, closest.on_b, gap);
+    }
+    Deepest deepest{of_a, of_b, X_WA, X_WB};
+    deepest.ask_bullet();
+    const btVector3 apart = X_WA.getOrigin() - X_WB.getOrigin();
+    for_each_side(of_a, X_WA, -apart, [&](const btVector3& n) { deepest.look(-n); });
+    for_each_side(of_b, X_WB, apart, [&](const btVector3& n) { deepest.look(n); });
+    for_each_side(of_b, X_WB, apart, [&](const btVector3& n) {
+      if (n.dot(apart) > 0.0) deepest.prefer(n);
+    });
+    result.addContactPoint(deepest.normal, deepest.on_b, deepest.gap);
+  }
+
+  struct Deepest final : btDiscreteCollisionDetectorInterface::Result {
+    const btConvexShape &a, &b;
+    const btTransform &X_WA, &X_WB;
+    btVector3 normal{0, 0, 1}, on_b{0, 0, 0};
+    btScalar gap = -BT_LARGE_FLOAT;
+
+    Deepest(const btConvexShape& shape_a, const btConvexShape& shape_b, const btTransform& of_a,
+            const btTransform& of_b)
+        : a(shape_a), b(shape_b), X_WA(of_a), X_WB(of_b) {}
+    void look(const btVector3& n) {
+      const btVector3 on_a = X_WA * a.localGetSupportingVertex(-n * X_WA.getBasis());
+      const btScalar here = n.dot(on_a - X_WB * b.localGetSupportingVertex(n * X_WB.getBasis()));
+      if (here <= gap) return;
+      normal = n;
+      on_b = on_a - here * n;
+      gap = here;
+    }
+    // A triangle is part of a surface: what overlaps it rather left that than passed its edge.
+    void prefer(const btVector3& n) {
+      constexpr btScalar kRather = 2.0;
+      const btScalar least = gap;
+      gap *= kRather;
+      look(n);
+      if (normal != n) gap = least;
+    }
+    void ask_bullet() {
+      btVoronoiSimplexSolver simplex;
+      btGjkEpaPenetrationDepthSolver depth;
+      btDiscreteCollisionDetectorInterface::ClosestPointInput input;
+      input.m_transformA = X_WA;
+      input.m_transformB = X_WB;
+      btGjkPairDetector(&a, &b, &simplex, &depth).getClosestPoints(input, *this, nullptr);
+    }
+    void setShapeIdentifiersA(int, int) override {}
+    void setShapeIdentifiersB(int, int) override {}
+    void addContactPoint(const btVector3& n, const btVector3& point, btScalar) override {
+      look(n);
+      if (normal == n) on_b = point;
+    }
+  };
 };
 
 template <class Algorithm>
@@ -220,6 +336,9 @@ void register_collisions(btCollisionDispatcher& dispatcher) {
   static Create<OnPlane<true, true>> plane_box;
   static Create<OnPlane<false, false>> cylinder_plane;
   static Create<OnPlane<true, false>> plane_cylinder;
+  static Create<ConvexOnPlane<false>> convex_plane;
+  static Create<ConvexOnPlane<true>> plane_convex;
+  static Create<ConvexOnTriangle> convex_triangle;
   static Create<BoxOnBox> box_box;
   const auto set = [&](int a, int b, btCollisionAlgorithmCreateFunc& create) {
     dispatcher.registerCollisionCreateFunc(a, b, &create);
@@ -228,6 +347,17 @@ void register_collisions(btCollisionDispatcher& dispatcher) {
   set(STATIC_PLANE_PROXYTYPE, BOX_SHAPE_PROXYTYPE, plane_box);
   set(CYLINDER_SHAPE_PROXYTYPE, STATIC_PLANE_PROXYTYPE, cylinder_plane);
   set(STATIC_PLANE_PROXYTYPE, CYLINDER_SHAPE_PROXYTYPE, plane_cylinder);
+  for (const int convex : {CAPSULE_SHAPE_PROXYTYPE, CONE_SHAPE_PROXYTYPE,
+                           CONVEX_HULL_SHAPE_PROXYTYPE, CUSTOM_CONVEX_SHAPE_TYPE}) {
+    set(convex, STATIC_PLANE_PROXYTYPE, convex_plane);
+    set(STATIC_PLANE_PROXYTYPE, convex, plane_convex);
+  }
+  for (const int convex :
+       {BOX_SHAPE_PROXYTYPE, CYLINDER_SHAPE_PROXYTYPE, CAPSULE_SHAPE_PROXYTYPE,
+        CONE_SHAPE_PROXYTYPE, CONVEX_HULL_SHAPE_PROXYTYPE, CUSTOM_CONVEX_SHAPE_TYPE}) {
+    set(convex, TRIANGLE_SHAPE_PROXYTYPE, convex_triangle);
+    set(TRIANGLE_SHAPE_PROXYTYPE, convex, convex_triangle);
+  }
   set(BOX_SHAPE_PROXYTYPE, BOX_SHAPE_PROXYTYPE, box_box);
 }
 

@@ -5,6 +5,8 @@
 // Ellipsoid and tyre are given to Bullet's GJK by their support functions.
 #pragma once
 
+#include <vector>
+
 #include "physics/base/bullet.h"
 
 namespace ruedo::physics {
@@ -12,17 +14,40 @@ namespace ruedo::physics {
 // Bullet looks for contacts where the bounds of two shapes overlap. These bounds overlap before the
 // shapes touch: something put down exactly must not fall by a rounding error.
 constexpr btScalar kSeenAhead_m = 2e-4;
+// Of what moves, by as much as it moves in a substep: set for each pair before its contacts are
+// found. It must neither land inside of something nor pass through it.
+inline thread_local btScalar seen_ahead_m = kSeenAhead_m;
 
 template <class Shape>
 class SeenAhead final : public Shape {
  public:
   using Shape::Shape;
   void getAabb(const btTransform& X, btVector3& low, btVector3& high) const override {
-    constexpr btScalar k = kSeenAhead_m;
+    const btScalar k = seen_ahead_m;
     Shape::getAabb(X, low, high);
     low -= {k, k, k};
     high += {k, k, k};
   }
+};
+
+// The shapes of a body. Bullet first looks at the bounds in its tree, which are those of shapes
+// that do not move: of what does, they must overlap as early.
+class BodyShape final : public btCompoundShape {
+ public:
+  void see_ahead(btScalar by) {
+    if (by <= tree_seen_m_ && 16 * by >= tree_seen_m_) return;
+    widen(getDynamicAabbTree()->m_root, 2 * by - tree_seen_m_);
+    tree_seen_m_ = 2 * by;
+  }
+
+ private:
+  static void widen(btDbvtNode* node, btScalar by) {
+    if (!node) return;
+    node->volume.Expand({by, by, by});
+    if (!node->isinternal()) return;
+    for (btDbvtNode* child : node->childs) widen(child, by);
+  }
+  btScalar tree_seen_m_ = kSeenAhead_m;
 };
 
 class ConvexShape : public btConvexInternalShape {
@@ -70,9 +95,25 @@ class TyreShape : public ConvexShape {
     return {core_ * direction.x() / length, core_ * direction.y() / length, 0};
   }
   const char* getName() const override { return "Tyre"; }
+  btScalar core() const { return core_; }
 
  private:
   btScalar core_;
+};
+
+// A convex hull that knows its flat sides.
+class HullShape : public btConvexHullShape {
+ public:
+  struct Side {
+    btVector3 normal;
+    std::vector<btVector3> corners;  // in order
+  };
+  const std::vector<Side>& sides() const { return sides_; }
+  // To be called once all points are added.
+  void find_sides();
+
+ private:
+  std::vector<Side> sides_;
 };
 
 }  // namespace ruedo::physics

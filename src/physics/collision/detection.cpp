@@ -8,6 +8,7 @@
 #include <LinearMath/btPoolAllocator.h>
 
 #include "physics/collision/collisions.h"
+#include "physics/collision/convex_shapes.h"
 
 namespace ruedo::physics {
 namespace {
@@ -26,6 +27,13 @@ btDefaultCollisionConstructionInfo pools(int room) {
 }
 
 }  // namespace
+
+btPersistentManifold* Dispatcher::getNewManifold(const btCollisionObject* a,
+                                                 const btCollisionObject* b) {
+  btPersistentManifold* manifold = btCollisionDispatcher::getNewManifold(a, b);
+  manifold->setContactBreakingThreshold(std::max(gContactBreakingThreshold, seen_ahead_m));
+  return manifold;
+}
 
 class Detection::Spare {
  public:

@@ -12,6 +12,14 @@
 
 namespace ruedo::physics {
 
+// Contacts are sought as far away as shapes are seen ahead.
+class Dispatcher final : public btCollisionDispatcher {
+ public:
+  using btCollisionDispatcher::btCollisionDispatcher;
+  btPersistentManifold* getNewManifold(const btCollisionObject* a,
+                                       const btCollisionObject* b) override;
+};
+
 class Detection {
  public:
   // For a world with that many moving bodies. Constructor and destructor may run in any thread.
@@ -28,7 +36,7 @@ class Detection {
     bool empty();
     const int room;  // capacity for pairs
     btDefaultCollisionConfiguration configuration;
-    btCollisionDispatcher dispatcher;
+    Dispatcher dispatcher;
   };
   class Spare;
 

@@ -13,33 +13,6 @@ constexpr double kOnEdge = 1e-4;  // relative to the triangle's height above tha
 // Sine of the tolerance for normals that lean over an edge: meshes are read in single precision.
 constexpr double kLean = 2e-3;
 
-class MeshContacts final : public btManifoldResult {
- public:
-  MeshContacts(const btCollisionObjectWrapper& a, const btCollisionObjectWrapper& b,
-               const btCollisionObject& mesh)
-      : btManifoldResult(&a, &b),
-        mesh_(mesh),
-        edges_(*static_cast<const MeshEdges*>(mesh.getCollisionShape()->getUserPointer())) {}
-
-  // B is the manifold's second object, whichever of the two it is.
-  void addContactPoint(const btVector3& normal_on_b, const btVector3& point_on_b,
-                       btScalar depth) override {
-    const bool mesh_is_b = m_manifoldPtr->getBody1() == &mesh_;
-    const btVector3 normal = mesh_is_b ? normal_on_b : -normal_on_b;
-    const btVector3 point = mesh_is_b ? point_on_b : point_on_b + depth * normal_on_b;
-    const int triangle = getBody0Internal() == &mesh_ ? m_index0 : m_index1;
-    const btTransform& X_WM = mesh_.getWorldTransform();
-    if (edges_.belongs_elsewhere(triangle, from_bt(X_WM.invXform(point)),
-                                 from_bt(normal * X_WM.getBasis())))
-      return;
-    btManifoldResult::addContactPoint(normal_on_b, point_on_b, depth);
-  }
-
- private:
-  const btCollisionObject& mesh_;
-  const MeshEdges& edges_;
-};
-
 }  // namespace
 
 MeshEdges::MeshEdges(const world::Mesh& mesh, const Vec3& scale) {
@@ -151,20 +124,21 @@ bool is_mesh(const btCollisionObject& object) {
          object.getCollisionShape()->getUserPointer();
 }
 
-void collide_with_mesh(btBroadphasePair& pair, btDispatcher& dispatcher,
-                       const btDispatcherInfo& info) {
-  auto& a = *static_cast<btCollisionObject*>(pair.m_pProxy0->m_clientObject);
-  auto& b = *static_cast<btCollisionObject*>(pair.m_pProxy1->m_clientObject);
-  if (!dispatcher.needsCollision(&a, &b)) return;
-  const btCollisionObjectWrapper of_a(nullptr, a.getCollisionShape(), &a, a.getWorldTransform(), -1,
-                                      -1);
-  const btCollisionObjectWrapper of_b(nullptr, b.getCollisionShape(), &b, b.getWorldTransform(), -1,
-                                      -1);
-  if (!pair.m_algorithm)
-    pair.m_algorithm = dispatcher.findAlgorithm(&of_a, &of_b, nullptr, BT_CONTACT_POINT_ALGORITHMS);
-  if (!pair.m_algorithm) return;
-  MeshContacts contacts(of_a, of_b, is_mesh(a) ? a : b);
-  pair.m_algorithm->processCollision(&of_a, &of_b, info, &contacts);
+MeshContacts::MeshContacts(const btCollisionObjectWrapper& a, const btCollisionObjectWrapper& b,
+                           const btCollisionObject& mesh, Scratch& scratch)
+    : ContactPoints(a, b, scratch),
+      mesh_(mesh),
+      edges_(*static_cast<const MeshEdges*>(mesh.getCollisionShape()->getUserPointer())) {}
+
+bool MeshContacts::belongs(const btVector3& normal_on_b, const btVector3& point_on_b,
+                           btScalar gap) const {
+  const bool mesh_is_b = m_manifoldPtr->getBody1() == &mesh_;
+  const btVector3 normal = mesh_is_b ? normal_on_b : -normal_on_b;
+  const btVector3 point = mesh_is_b ? point_on_b : point_on_b + gap * normal_on_b;
+  const int triangle = getBody0Internal() == &mesh_ ? m_index0 : m_index1;
+  const btTransform& X_WM = mesh_.getWorldTransform();
+  return !edges_.belongs_elsewhere(triangle, from_bt(X_WM.invXform(point)),
+                                   from_bt(normal * X_WM.getBasis()));
 }
 
 }  // namespace ruedo::physics

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "physics/base/bullet.h"
+#include "physics/collision/contact_points.h"
 #include "world/model/world_model.h"
 
 namespace ruedo::physics {
@@ -36,9 +37,19 @@ class MeshEdges {
   std::vector<uint32_t> ring_;                  // vertices connected by an edge
 };
 
-// Replaces Bullet's near callback for pairs with a static mesh.
 bool is_mesh(const btCollisionObject& object);
-void collide_with_mesh(btBroadphasePair& pair, btDispatcher& dispatcher,
-                       const btDispatcherInfo& info);
+
+// Of a pair with a static mesh.
+class MeshContacts final : public ContactPoints {
+ public:
+  MeshContacts(const btCollisionObjectWrapper& a, const btCollisionObjectWrapper& b,
+               const btCollisionObject& mesh, Scratch& scratch);
+
+ private:
+  bool belongs(const btVector3& normal_on_b, const btVector3& point_on_b,
+               btScalar gap) const override;
+  const btCollisionObject& mesh_;
+  const MeshEdges& edges_;
+};
 
 }  // namespace ruedo::physics

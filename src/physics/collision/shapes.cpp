@@ -90,7 +90,7 @@ std::unique_ptr<btConvexHullShape> hull_of(const std::vector<btVector3>& points,
   computer.compute(&points[0].m_floats[0], sizeof(btVector3), static_cast<int>(points.size()), 0,
                    0);
   volume += volume_of(computer);
-  auto shape = std::make_unique<SeenAhead<btConvexHullShape>>();
+  auto shape = std::make_unique<SeenAhead<HullShape>>();
   const int corners = computer.vertices.size();
   const bool all = exact || corners <= static_cast<int>(kMaxHullVertices);
   std::vector<bool> keep(static_cast<size_t>(corners), all);
@@ -113,6 +113,7 @@ std::unique_ptr<btConvexHullShape> hull_of(const std::vector<btVector3>& points,
   }
   shape->setMargin(0.0);
   shape->recalcLocalAabb();
+  if (!exact) shape->find_sides();
   return shape;
 }
 
@@ -184,8 +185,8 @@ btCollisionShape* ShapeFactory::fixed(const world::Geometry& geometry) {
   btCollisionShape*& shape = fixed_meshes_[{geometry.mesh.get(), scale.x(), scale.y(), scale.z()}];
   if (!shape) {
     triangles_.push_back(std::make_unique<Triangles>(*geometry.mesh, scale));
-    auto mesh =
-        std::make_unique<btBvhTriangleMeshShape>(&triangles_.back()->array, /*quantised*/ false);
+    auto mesh = std::make_unique<SeenAhead<btBvhTriangleMeshShape>>(&triangles_.back()->array,
+                                                                    /*quantised*/ false);
     mesh->setMargin(0.0);
     mesh->setUserPointer(&triangles_.back()->edges);
     shape = own(std::move(mesh));

@@ -6,7 +6,6 @@
 #include <tuple>
 
 #include "physics/collision/contact_copies.h"
-#include "physics/collision/mesh_edges.h"
 
 namespace ruedo::physics {
 
@@ -43,53 +42,7 @@ std::tuple<int, int, int, int> place_of(const btPersistentManifold& manifold) {
   return {id_of(*manifold.getBody0()), id_of(*manifold.getBody1()), first.m_index0, first.m_index1};
 }
 
-// Bullet finds one contact of a lying cylinder per substep, at one of its ends, and keeps the
-// contact found earlier at the other end. That point rolls with the cylinder to behind its axle and
-// lifts it there, so that it would roll faster and faster. It is moved back to below the axle.
-// `outward` is the contact's normal away from `body`; p and q are the contact points on the body
-// and on the other one.
-void keep_below_its_axle(const btCollisionObject& body, const btCollisionObject& other,
-                         btManifoldPoint& point, int child, const btVector3& outward,
-                         btVector3& p_W, btVector3& p_Body, btVector3& q_W, btVector3& q_Other) {
-  const btCollisionShape* shape = body.getCollisionShape();
-  btTransform X_WS = body.getWorldTransform();
-  if (shape->isCompound()) {
-    const auto& compound = static_cast<const btCompoundShape&>(*shape);
-    if (child < 0 || child >= compound.getNumChildShapes()) return;
-    shape = compound.getChildShape(child);
-    X_WS = X_WS * compound.getChildTransform(child);
-  }
-  if (shape->getShapeType() != CYLINDER_SHAPE_PROXYTYPE) return;
-  const btVector3 axis = X_WS.getBasis().getColumn(2);
-  const btVector3 down = outward - outward.dot(axis) * axis;
-  constexpr btScalar kLying = 0.7;  // component of a unit normal across the axis
-  if (down.length2() < kLying * kLying) return;
-  const btScalar radius = static_cast<const btCylinderShapeZ*>(shape)->getRadius();
-  const btVector3 moved =
-      X_WS.getOrigin() + (p_W - X_WS.getOrigin()).dot(axis) * axis + radius * down.normalized();
-  btVector3 along = moved - p_W;
-  if (along.length2() > gContactBreakingThreshold * gContactBreakingThreshold) return;
-  along -= along.dot(outward) * outward;
-  p_W = moved;
-  q_W += along;
-  p_Body = body.getWorldTransform().invXform(p_W);
-  q_Other = other.getWorldTransform().invXform(q_W);
-  point.m_distance1 = (q_W - p_W).dot(outward);
-}
-
 }  // namespace
-
-void Dynamics::keep_below_the_axle(btPersistentManifold& manifold) {
-  for (int k = 0; k < manifold.getNumContacts(); ++k) {
-    btManifoldPoint& point = manifold.getContactPoint(k);
-    keep_below_its_axle(*manifold.getBody0(), *manifold.getBody1(), point, point.m_index0,
-                        -point.m_normalWorldOnB, point.m_positionWorldOnA, point.m_localPointA,
-                        point.m_positionWorldOnB, point.m_localPointB);
-    keep_below_its_axle(*manifold.getBody1(), *manifold.getBody0(), point, point.m_index1,
-                        point.m_normalWorldOnB, point.m_positionWorldOnB, point.m_localPointB,
-                        point.m_positionWorldOnA, point.m_localPointA);
-  }
-}
 
 Dynamics::Dynamics(btDispatcher& dispatcher, btBroadphaseInterface& broadphase,
                    btCollisionConfiguration& configuration, const ContactSurfaces& surfaces,
@@ -188,15 +141,10 @@ void Dynamics::find_manifolds() {
 void Dynamics::substep(double substep_s) {
   for (btRigidBody* body : bodies_)
     if (body->isActive()) body->applyGravity();
-  auto& dispatcher = static_cast<btCollisionDispatcher&>(*getDispatcher());
   getDispatchInfo().m_timeStep = substep_s;
-  for (btBroadphasePair* pair : pairs_) {
-    const bool mesh = is_mesh(object_of(*pair->m_pProxy0)) || is_mesh(object_of(*pair->m_pProxy1));
-    mesh ? collide_with_mesh(*pair, dispatcher, getDispatchInfo())
-         : btCollisionDispatcher::defaultNearCallback(*pair, dispatcher, getDispatchInfo());
-  }
+  for (btBroadphasePair* pair : pairs_)
+    collide(*pair, *getDispatcher(), getDispatchInfo(), scratch_);
   find_manifolds();
-  for (btPersistentManifold* manifold : manifolds_) keep_below_the_axle(*manifold);
   find_islands();
   for (size_t i = 0; i < island_count_; ++i) solve(islands_[i], substep_s);
   for (btRigidBody* body : bodies_) body->clearForces();

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "physics/base/bullet.h"
+#include "physics/collision/contact_points.h"
 #include "physics/dynamics/solver.h"
 #include "ruedo/state_archive.h"
 
@@ -58,13 +59,13 @@ class Dynamics final : public btDiscreteDynamicsWorld {
   void find_islands();
   Island& island_of(const btCollisionObject& a, const btCollisionObject& b);
   void solve(Island& island, double substep_s);
-  void keep_below_the_axle(btPersistentManifold& manifold);
 
   Solver solver_;
   std::vector<btRigidBody*> bodies_;
   std::vector<btBroadphasePair*> pairs_;  // of bodies_, ordered by their numbers
   std::vector<btPersistentManifold*> manifolds_;
   std::vector<btTypedConstraint*> joints_;
+  ContactPoints::Scratch scratch_;
   std::vector<size_t> parents_, island_of_root_;  // union-find over bodies_
   std::vector<Island> islands_;
   size_t island_count_ = 0;
