@@ -21,7 +21,7 @@ import rows
 import simulators
 
 HERE = Path(__file__).resolve().parent
-STEPS_MS = (1, 5, 10)
+STEPS_MS = (1, 5, 10, 20)
 PLOTS = {  # row: what its y axis shows
     "tumbling": "energy, of 1",
     "double_pendulum": "change of energy, %",

@@ -284,15 +284,57 @@ def spinning(make: Make, step_s: float, series: Series) -> float:
         return float(sim.velocity("ball")[1][2])
 
 
+# Small, thin, round and fast
+
+
+def resting(
+    shape: Shape, height: float, seconds: float, rpy: tuple[float, float, float] = (0, 0, 0)
+) -> Callable[[Make, float, Series], float]:
+    """How far it moves, of water's density, put down on a plane."""
+
+    def measure(make: Make, step_s: float, series: Series) -> float:
+        size = shape.size
+        volume = math.prod(size) if shape.kind == "box" else math.pi * size[0] ** 2 * size[1]
+        body = Body("thing", (shape,), mass=1e3 * volume, at=(0, 0, height), rpy=rpy)
+        with make(Scene((PLANE, body)), step_s) as sim:
+            sim.step(steps(seconds, step_s))
+            return 1e3 * float(np.linalg.norm(sim.position("thing") - np.array(body.at)))
+
+    return measure
+
+
+SPEEDS = (2, 4, 7, 10, 15, 18, 22, 28, 35, 45, 60, 80)  # m/s
+
+
 def tunnelling(make: Make, step_s: float, series: Series) -> float:
-    wall = Body("wall", (Shape("box", (0.002, 2, 2)),), mass=0.0)
-    with make(
-        Scene((wall, Body("ball", (Shape("sphere", (0.05,)),), at=(-0.503, 0, 0))), gravity=0.0),
-        step_s,
-    ) as sim:
-        sim.set_velocity("ball", (10, 0, 0))
-        sim.step(steps(0.5, step_s))
-        return float(max(sim.position("ball")[0], 0.0))
+    """How many of 72 balls of 5 cm pass walls of 2, 10 and 100 mm, from two distances."""
+    walls, balls = [], {}
+    for i, thickness in enumerate((0.002, 0.01, 0.1)):
+        at = (thickness / 2, 30.0 * i, 0)
+        walls.append(Body(f"w{i}", (Shape("box", (thickness, 28, 2)),), mass=0.0, at=at))
+        for k, speed in enumerate((*SPEEDS, *SPEEDS)):
+            start = (-0.31 if k < len(SPEEDS) else -0.503, 30.0 * i + k - 11.5, 0)
+            balls[f"b{i}_{k}"] = (
+                speed,
+                Body(f"b{i}_{k}", (Shape("sphere", (0.05,)),), mass=0.5, at=start),
+            )
+    bodies = (*walls, *(body for _, body in balls.values()))
+    with make(Scene(bodies, gravity=0.0), step_s) as sim:
+        for name, (speed, _) in balls.items():
+            sim.set_velocity(name, (speed, 0, 0))
+        sim.step(steps(0.3, step_s))
+        return float(sum(sim.position(name)[0] > 0.0 for name in balls))
+
+
+def through_mesh(make: Make, step_s: float, series: Series) -> float:
+    """How many of 24 balls of 2 to 10 mm pass a floor of triangles."""
+    balls = [
+        Body(f"b{i}", (Shape("sphere", (r,)),), mass=1e3 * 4.19 * r**3, at=(x, 0.013 * i, 0.1 + r))
+        for i, (r, x) in enumerate((1e-3 * r, 0.1 * k) for r in (1, 2, 3, 5) for k in range(6))
+    ]
+    with make(Scene((floor(), *balls)), step_s) as sim:
+        sim.step(steps(1.0, step_s))
+        return float(sum(sim.position(ball.name)[2] < -0.001 for ball in balls))
 
 
 # Stacks
@@ -385,10 +427,13 @@ def skidding(left: float, right: float) -> Callable[[Make, float, Series], float
 BALL = Body("ball", (Shape("sphere", (0.1,)),), at=(0, 0, 0.1))
 ROLLER = Body("roller", (Shape("cylinder", (0.1, 0.3)),), at=(0, 0, 0.1), rpy=(math.pi / 2, 0, 0))
 
-FREE, JOINTED, CONTACT, STACKS, MESHES = (
+WHEEL = Body("wheel", (Shape("cylinder", (0.1, 0.01)),), at=(0, 0, 0.1), rpy=(math.pi / 2, 0, 0))
+
+FREE, JOINTED, CONTACT, SIZES, STACKS, MESHES = (
     "Flight and rotation",
     "Mechanisms",
     "Contacts",
+    "Small, thin, round and fast",
     "Stacks",
     "Floors of triangles",
 )
@@ -537,13 +582,83 @@ ROWS = [
         spinning,
     ),
     Row(
+        "cube_5mm",
+        SIZES,
+        "cube of 5 mm at rest: moved in 5 s",
+        "mm",
+        0.0,
+        CLOSED,
+        resting(Shape("box", (0.005, 0.005, 0.005)), 0.0025, 5.0),
+        3,
+    ),
+    Row(
+        "cube_10mm",
+        SIZES,
+        "cube of 10 mm at rest: moved in 5 s",
+        "mm",
+        0.0,
+        CLOSED,
+        resting(Shape("box", (0.01, 0.01, 0.01)), 0.005, 5.0),
+        3,
+    ),
+    Row(
+        "slab",
+        SIZES,
+        "slab of 100 x 100 x 5 mm at rest: moved in 5 s",
+        "mm",
+        0.0,
+        CLOSED,
+        resting(Shape("box", (0.1, 0.1, 0.005)), 0.0025, 5.0),
+        3,
+    ),
+    Row(
+        "pen",
+        SIZES,
+        "upright cylinder of 8 mm, 140 mm high: moved in 5 s",
+        "mm",
+        0.0,
+        CLOSED,
+        resting(Shape("cylinder", (0.004, 0.14)), 0.07, 5.0),
+        3,
+    ),
+    Row(
+        "capsule",
+        SIZES,
+        "lying capsule, radius 50 mm, length 200 mm: moved in 20 s",
+        "mm",
+        0.0,
+        CLOSED,
+        resting(Shape("capsule", (0.05, 0.2)), 0.05, 20.0, (math.pi / 2, 0, 0)),
+        3,
+    ),
+    Row(
+        "thin_wheel",
+        SIZES,
+        "free wheel of 10 cm radius, 10 mm wide, at 1 m/s: aside in 5 s",
+        "mm",
+        0.0,
+        CLOSED,
+        rolling(WHEEL, lambda: PLANE, "aside", 0.0),
+        3,
+    ),
+    Row(
         "tunnelling",
-        CONTACT,
-        "ball of 5 cm at 10 m/s against a wall of 2 mm: how far behind it",
-        "m",
+        SIZES,
+        "balls of 5 cm, 2 to 80 m/s, against walls of 2 to 100 mm: passed, of 72",
+        "",
         0.0,
         CLOSED,
         tunnelling,
+        3,
+    ),
+    Row(
+        "through_mesh",
+        SIZES,
+        "balls of 2 to 10 mm from 10 cm onto triangles of 8 cm: passed, of 24",
+        "",
+        0.0,
+        CLOSED,
+        through_mesh,
         3,
     ),
     *(

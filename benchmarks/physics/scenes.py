@@ -16,8 +16,8 @@ GRAVITY = 9.81
 
 @dataclass(frozen=True)
 class Shape:
-    """kind and size: box (x, y, z), sphere (radius), cylinder (radius, length along z), plane (),
-    mesh ().
+    """kind and size: box (x, y, z), sphere (radius), cylinder (radius, length along z),
+    capsule (the same, length without its ends), plane (), mesh ().
     """
 
     kind: str

@@ -199,6 +199,7 @@ class MuJoCo(Simulator):
             "box": mj.mjtGeom.mjGEOM_BOX,
             "sphere": mj.mjtGeom.mjGEOM_SPHERE,
             "cylinder": mj.mjtGeom.mjGEOM_CYLINDER,
+            "capsule": mj.mjtGeom.mjGEOM_CAPSULE,
             "plane": mj.mjtGeom.mjGEOM_PLANE,
         }
         for shape in body.shapes:
@@ -214,7 +215,7 @@ class MuJoCo(Simulator):
                 geom.type, geom.hfieldname = mj.mjtGeom.mjGEOM_HFIELD, "floor"
             else:
                 size = [s / 2 for s in shape.size] if shape.kind == "box" else list(shape.size)
-                if shape.kind == "cylinder":
+                if shape.kind in ("cylinder", "capsule"):
                     size[1] /= 2
                 geom.type, geom.size = (
                     kinds[shape.kind],
@@ -356,10 +357,9 @@ class PyBullet(Simulator):
             return p.createCollisionShape(p.GEOM_BOX, halfExtents=[s / 2 for s in shape.size], **c)
         if shape.kind == "sphere":
             return p.createCollisionShape(p.GEOM_SPHERE, radius=shape.size[0], **c)
-        if shape.kind == "cylinder":
-            return p.createCollisionShape(
-                p.GEOM_CYLINDER, radius=shape.size[0], height=shape.size[1], **c
-            )
+        if shape.kind in ("cylinder", "capsule"):
+            kind = p.GEOM_CYLINDER if shape.kind == "cylinder" else p.GEOM_CAPSULE
+            return p.createCollisionShape(kind, radius=shape.size[0], height=shape.size[1], **c)
         if shape.kind == "plane":
             return p.createCollisionShape(p.GEOM_PLANE, **c)
         return p.createCollisionShape(
@@ -494,9 +494,12 @@ def _collision(name: str, shape: Shape) -> str:
     geometry = {
         "box": lambda: f"<box><size>{size[0]!r} {size[1]!r} {size[2]!r}</size></box>",
         "sphere": lambda: f"<sphere><radius>{size[0]!r}</radius></sphere>",
-        "cylinder": lambda: (
-            f"<cylinder><radius>{size[0]!r}</radius><length>{size[1]!r}</length></cylinder>"
-        ),
+        **{
+            kind: lambda kind=kind: (
+                f"<{kind}><radius>{size[0]!r}</radius><length>{size[1]!r}</length></{kind}>"
+            )
+            for kind in ("cylinder", "capsule")
+        },
         "plane": lambda: "<plane><normal>0 0 1</normal></plane>",
         "mesh": lambda: f"<mesh><uri>{shape.file}</uri></mesh>",
     }[shape.kind]()
