@@ -93,6 +93,49 @@ TEST(Physics, ThingsAtRestSleepAndStay) {
   EXPECT_GT(w.physics.pose(BodyIndex(1)).translation.x(), rest.x() + 0.005);
 }
 
+std::string door(const std::string& axis) {
+  return "<model name='d'><pose>0 0 1 0 0 0</pose><joint name='fixed' type='fixed'>"
+         "<parent>world</parent><child>frame</child></joint>"
+         "<link name='frame'/><link name='leaf'><inertial><pose>0.4 0 0 0 0 0</pose>"
+         "<mass>20</mass><inertia><ixx>1</ixx><iyy>1</iyy><izz>1.2</izz></inertia></inertial></"
+         "link>"
+         "<joint name='hinge' type='revolute'><parent>frame</parent><child>leaf</child><axis>"
+         "<xyz>0 0 1</xyz>" +
+         axis + "</axis></joint></model>";
+}
+
+double opened(const World& w) {
+  const Quat q = w.physics.pose(w.body("d/leaf")).rotation;
+  return 2 * std::atan2(q.z(), q.w());
+}
+
+// What is slow does not rest: it has somewhere to go.
+TEST(Physics, ASlowJointArrives) {
+  World w(door("<limit><effort>100</effort></limit>"), 5000);
+  w.physics.drive_joint_velocity(JointIndex(0), 0.005, 100.0);
+  w.run(120.0);
+  EXPECT_NEAR(opened(w), 0.6, 1e-3);
+}
+
+TEST(Physics, ADoorsSpringClosesIt) {
+  // 1 N m/rad and 20 N m s/rad: e^(-t / 20 s) of the way remains.
+  World w(door("<dynamics><spring_reference>0.95</spring_reference><spring_stiffness>1"
+               "</spring_stiffness><damping>20</damping></dynamics>"),
+          5000);
+  w.run(200.0);
+  EXPECT_NEAR(opened(w), 0.95, 2e-3);
+}
+
+TEST(Physics, ASlowBodyDriftsOn) {
+  for (const double v : {0.004, 1e-6}) {
+    World w(thing("a", "0 0 0 0 0 0", kBall, 1), 5000);
+    w.physics.set_gravity(BodyIndex(0), Vec3::Zero());
+    w.physics.set_twist(BodyIndex(0), {{v, 0, 0}, Vec3::Zero()});
+    w.run(100.0);
+    EXPECT_NEAR(w.position("a/l").x(), 100 * v, 1e-6 * v);
+  }
+}
+
 TEST(Physics, MassCentreAndInertiaOfJoinedLinks) {
   // 1 kg at the origin and 3 kg at x = 2: centre at 1.5; Izz = 0.1 + 0.3 + 1 * 1.5^2 + 3 * 0.5^2
   // = 3.4.

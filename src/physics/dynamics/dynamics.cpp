@@ -2,6 +2,7 @@
 #include "physics/dynamics/dynamics.h"
 
 #include <algorithm>
+#include <cmath>
 #include <numeric>
 #include <tuple>
 
@@ -12,6 +13,10 @@ namespace ruedo::physics {
 namespace {
 
 constexpr size_t kTouchingABody = 8;  // expected maximum
+// What falls asleep has been slow, and within this distance of one place, for 2 s.
+constexpr btScalar kStays_m = 5e-5, kStays_rad = 5e-5;
+// A motor that is told to move faster does not let its bodies sleep; m/s or rad/s.
+constexpr double kTold = 1e-6;
 
 // Bullet's island tag is a body's index in bodies_; negative for bodies that do not take part.
 bool takes_part(const btCollisionObject& object) { return object.getIslandTag() >= 0; }
@@ -33,6 +38,34 @@ bool moves(const btCollisionObject& object) {
   const auto* body = btRigidBody::upcast(&object);
   return body && body->isKinematicObject() &&
          !(body->getLinearVelocity().isZero() && body->getAngularVelocity().isZero());
+}
+
+// Bullet counts how long a body is slow. What is slow and moves on does not rest: then the count
+// begins anew, and so does the place, which Bullet's interpolated pose stores.
+bool rests(btRigidBody& body, double substep_s) {
+  body.updateDeactivation(substep_s);
+  const btTransform &X = body.getWorldTransform(), &before = body.getInterpolationWorldTransform();
+  btScalar turned2 = 0.0;  // twice the square of the angle
+  for (int axis = 0; axis < 3; ++axis)
+    turned2 += (X.getBasis().getColumn(axis) - before.getBasis().getColumn(axis)).length2();
+  if ((X.getOrigin() - before.getOrigin()).length2() > kStays_m * kStays_m ||
+      turned2 > 2 * kStays_rad * kStays_rad) {
+    body.setInterpolationWorldTransform(X);
+    body.setDeactivationTime(0.0);
+  }
+  return body.wantsSleeping();
+}
+
+bool is_told_to_move(btTypedConstraint& joint) {
+  const auto* motors = static_cast<const JointMotors*>(joint.getUserConstraintPtr());
+  const auto told = [](const JointMotor& motor) {
+    return motor.on && std::abs(motor.rate) > kTold && motor.upper > 0.0;
+  };
+  return motors && (told(motors->first) || told(motors->second));
+}
+
+bool moves_at_all(const btRigidBody& body) {
+  return !body.getLinearVelocity().isZero() || !body.getAngularVelocity().isZero();
 }
 
 int id_of(const btCollisionObject& object) { return object.getBroadphaseHandle()->m_uniqueId; }
@@ -227,11 +260,12 @@ void Dynamics::solve(Island& island, double substep_s) {
     body.applyGravity();
   }
   solver_.solve(island.bodies, island.manifolds, island.joints, substep_s);
-  bool tired = true;
-  for (size_t i = 0; i < own; ++i) {
-    island.bodies[i]->updateDeactivation(substep_s);
-    tired = tired && island.bodies[i]->wantsSleeping();
-  }
+  // What nothing holds is at rest only if it does not move at all.
+  const bool held = !island.manifolds.empty() || !island.joints.empty();
+  bool tired = std::none_of(island.joints.begin(), island.joints.end(),
+                            [](auto* joint) { return is_told_to_move(*joint); });
+  for (size_t i = 0; i < own; ++i)
+    tired &= rests(*island.bodies[i], substep_s) && (held || !moves_at_all(*island.bodies[i]));
   for (size_t i = 0; tired && i < own; ++i) {
     btRigidBody& body = *island.bodies[i];
     body.setActivationState(ISLAND_SLEEPING);
