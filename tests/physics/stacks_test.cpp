@@ -115,6 +115,18 @@ TEST(Stacks, WhatDoesNotTouchChangesNoBit) {
   EXPECT_GT((alone.back().translation - alone[4].translation).norm(), 0.01);  // something happened
 }
 
+// A single sweep per substep is enough for what is at rest on a slope: it begins with the last
+// friction, in the direction that this had.
+TEST(Stacks, FrictionGoesOnFromTheLastSubstep) {
+  World w(
+      "<model name='slope'><static>true</static><pose>0 0 0 0 0.4 0</pose><link name='l'>"
+      "<collision name='c'><geometry><plane/></geometry><surface><friction><ode><mu>0.8</mu>"
+      "<mu2>0.8</mu2></ode></friction></surface></collision></link></model>" +
+          thing("box", "0.0389 0 0.0921 0 0.4 0", kBox, 1, 0.8, 0.04 / 6),
+      5000, "<solver><iters>1</iters></solver>");
+  EXPECT_LT(drift(w, 2, "box/l"), 2e-3);
+}
+
 // The world's settings take effect: with two sweeps a stack falls that stands with the default.
 TEST(Stacks, TheWorldsSolverActs) {
   World w(kPlane + stack(10), 5000, "<solver><iters>2</iters></solver>");

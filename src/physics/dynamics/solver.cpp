@@ -216,16 +216,16 @@ void Solver::add_contact(btManifoldPoint& point, const ContactSurface& surface, 
   start_from_last(contact, substep_s);
 }
 
-// Impulses of the previous substep. m_prevRHS, which Bullet does not use, stores its length.
+// Impulses of the previous substep. m_prevRHS, which Bullet does not use, stores its length. The
+// directions of friction follow from the normal: those in the point are Bullet's own, once it has
+// found the point again.
 void Solver::start_from_last(ContactRows& contact, double substep_s) {
   const btManifoldPoint& point = *contact.point;
   if (!(point.m_prevRHS > 0.0) || !(point.m_appliedImpulse > 0.0)) return;
   const double scale = substep_s / point.m_prevRHS;
   contact.normal.give(bodies_, scale * point.m_appliedImpulse);
-  const Vec3 rubbed = scale * from_bt(point.m_appliedImpulseLateral1 * point.m_lateralFrictionDir1 +
-                                      point.m_appliedImpulseLateral2 * point.m_lateralFrictionDir2);
-  contact.along.give(bodies_, rubbed.dot(contact.along.linear_a));
-  contact.across.give(bodies_, rubbed.dot(contact.across.linear_a));
+  contact.along.give(bodies_, scale * point.m_appliedImpulseLateral1);
+  contact.across.give(bodies_, scale * point.m_appliedImpulseLateral2);
 }
 
 void Solver::add_contacts(btPersistentManifold& manifold, double substep_s) {
