@@ -17,8 +17,7 @@ namespace {
 constexpr double kStanding_m = 2e-3;  // a wheel this close to the ground stands on it
 // a bump this close takes the robot off the plane's analytic support
 constexpr double kSeesBump_m = 1e-2;
-// Tolerances for returning to the plane's support; at the start the height may be further off,
-// since the wheels of many models reach into the ground.
+// Tolerances for returning to the plane's support; at the start the height may be further off.
 constexpr double kLevel_rad = 5e-3, kNear_m = 2e-3, kCalm_m_s = 0.05, kNearAtStart_m = 5e-3;
 // lever arm of the turning force for a robot without wheels
 constexpr double kLeverWithoutWheels_m = 0.25;
@@ -116,11 +115,14 @@ void KinematicDrive::make_model() {
   lag_ = {};
 }
 
+// The wheels of many models reach into the ground, those of TurtleBot3 by 10 mm, and of others up
+// to the axles. Contacts would throw the robot out, to land however it may.
 void KinematicDrive::stand_on_near_plane() {
   const auto plane = nearest_plane(planes_, X_WBase_.translation.z() + lowest_);
   const Vec3 up = X_WBase_.rotation * Vec3::UnitZ();
-  if (plane && std::abs(plane_gap(plane->height)) < kNearAtStart_m &&
-      up.z() > math::cos(kLevel_rad))
+  if (!plane || up.z() <= math::cos(kLevel_rad)) return;
+  const double gap = plane_gap(plane->height);
+  if (gap < kNearAtStart_m && -gap < std::max(kNearAtStart_m, description_->wheel_radius))
     stand_on_plane(*plane);
 }
 
