@@ -251,9 +251,8 @@ def test_the_node_is_in_the_graph(standing):
     guids = {bytes(s.key.bytes): s.topic_name for s in found.take(N=1000)}
     listed = {guids[bytes(g.data)] for g in node.writer_gid_seq if bytes(g.data) in guids}
     assert {"rt/scan", "rt/odom", "rt/clock", "rt/tf", "rt/tf_static"} <= listed
-    assert (
-        len(node.reader_gid_seq) == 2 + 10 + 3 + 6
-    )  # commands, services, the action's, and of parameters
+    # commands, services, the action's, and of parameters
+    assert len(node.reader_gid_seq) == 2 + 22 + 3 + 6
 
 
 def test_many_robots_have_namespaces_and_frames_of_their_own():
