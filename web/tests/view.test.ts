@@ -5,8 +5,11 @@ import { Crowd } from "../src/scene/crowd";
 import type { Movers } from "../src/scene/build";
 import { metrePixels, shareOut } from "../src/scene/detail";
 import { Lights } from "../src/scene/lights";
+import { RobotOverlay } from "../src/scene/overlays";
 import { depthOf, homeOf, shownOf, viewOf } from "../src/scene/viewpoint";
+import { drawable } from "../src/widgets/plots";
 import type { Description } from "../src/wire/description";
+import type { device_info_t, planar_lidar_t } from "../generated/messages";
 
 function box(): THREE.BufferGeometry {
   const geometry = new THREE.BoxGeometry(1, 1, 1),
@@ -67,6 +70,35 @@ describe("home", () => {
         step = (reach * reach * (1 / near - 1 / far)) / 2 ** 24; // of a depth buffer of 24 bits
       expect(step).toBeLessThan(reach < 100 ? 0.001 : reach / 20_000);
     }
+  });
+});
+
+describe("rays and cones", () => {
+  it("of many robots are fainter, so that what lies below stays to be seen", () => {
+    const overlay = new RobotOverlay([], [0, 0, 0, 1, 0, 0, 0], "key"),
+      device = { name: "lrf", kind: "lrf", position: [0, 0, 0], orientation: [1, 0, 0, 0] },
+      scan = { ranges: [1, 2], rad0: 0, radstep: 0.1 };
+    overlay.scan(device as unknown as device_info_t, scan as unknown as planar_lidar_t);
+    const opacities = () => {
+      const found: number[] = [];
+      overlay.group.traverse((object) => {
+        if (object instanceof THREE.Mesh || object instanceof THREE.LineSegments) {
+          const { transparent, opacity } = object.material as THREE.Material;
+          if (transparent) found.push(opacity);
+        }
+      });
+      return found;
+    };
+    const alone = opacities();
+    overlay.fade(0.25);
+    expect(alone.length).toBe(2);
+    expect(opacities()).toEqual(alone.map((opacity) => opacity / 4));
+  });
+});
+
+describe("plots", () => {
+  it("leave a gap for what is not finite", () => {
+    expect([1, Infinity, -Infinity, NaN, 0].map(drawable)).toEqual([1, null, null, null, 0]);
   });
 });
 

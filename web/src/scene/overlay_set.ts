@@ -50,6 +50,7 @@ export class OverlaySet {
       else before.delete(name);
       this.of.set(name, overlay);
     }
+    for (const overlay of this.of.values()) overlay.fade(1 / Math.max(1, this.of.size));
     for (const overlay of before.values()) {
       this.stage.scene.remove(overlay.group);
       overlay.dispose();

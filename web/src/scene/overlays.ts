@@ -65,10 +65,15 @@ const glow = (colour: number, opacity: number) =>
     toneMapped: false,
   });
 
+// Opacities of one robot's
+const kFan = 0.1,
+  kRays = 0.35,
+  kCones = 0.16;
+
 class ScanView {
   readonly group = new THREE.Group();
   private readonly fan = new Strip(
-    new THREE.Mesh(new THREE.BufferGeometry(), glow(kColours.rays, 0.1)),
+    new THREE.Mesh(new THREE.BufferGeometry(), glow(kColours.rays, kFan)),
   );
   private readonly lines = new Strip(
     new THREE.LineSegments(
@@ -76,7 +81,7 @@ class ScanView {
       new THREE.LineBasicMaterial({
         color: kColours.rays,
         transparent: true,
-        opacity: 0.35,
+        opacity: kRays,
         toneMapped: false,
         fog: false,
       }),
@@ -100,6 +105,11 @@ class ScanView {
     devicePose(device, this.mount);
     this.group.add(this.fan.object, this.lines.object, this.points.object);
     this.group.matrixAutoUpdate = false;
+  }
+
+  fade(strength: number): void {
+    this.fan.object.material.opacity = kFan * strength;
+    this.lines.object.material.opacity = kRays * strength;
   }
 
   show(scan: planar_lidar_t): void {
@@ -160,7 +170,7 @@ class ScanView {
 class SonarView {
   readonly group = new THREE.Group();
   private readonly cones = new Strip(
-    new THREE.Mesh(new THREE.BufferGeometry(), glow(kColours.sonar, 0.16)),
+    new THREE.Mesh(new THREE.BufferGeometry(), glow(kColours.sonar, kCones)),
   );
   private readonly arcs = new Strip(
     new THREE.LineSegments(
@@ -180,6 +190,10 @@ class SonarView {
     devicePose(device, this.mount);
     this.group.add(this.cones.object, this.arcs.object);
     this.group.matrixAutoUpdate = false;
+  }
+
+  fade(strength: number): void {
+    this.cones.object.material.opacity = kCones * strength;
   }
 
   show(sonar: sonar_t): void {
@@ -274,6 +288,7 @@ export class RobotOverlay {
   private readonly odom = new THREE.Matrix4(); // odom in the world
   private readonly point = new THREE.Vector3();
   private changed = true;
+  private strength = 1;
 
   constructor(
     devices: device_info_t[],
@@ -327,6 +342,11 @@ export class RobotOverlay {
     this.odometry.add(this.point.x, this.point.y, this.point.z);
     this.changed = true;
   }
+  // How strongly rays and cones are painted: those of many robots lie over each other.
+  fade(strength: number): void {
+    for (const view of [...this.scans.values(), ...this.sonars.values()]) view.fade(strength);
+    this.strength = strength;
+  }
   contact(message: contact_t): void {
     this.contacts.write(message.n, (p) =>
       message.points.forEach(({ position }, i) => p.set(position, 3 * i)),
@@ -374,6 +394,7 @@ export class RobotOverlay {
     let view = views.get(device.name);
     if (!view) {
       view = new Make(device);
+      view.fade(this.strength);
       views.set(device.name, view);
       this.group.add(view.group);
     }

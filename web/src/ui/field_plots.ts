@@ -8,7 +8,7 @@ import { decode, typeOf } from "../wire/lcm";
 import type { History, RunLink } from "../wire/protocol";
 import { h, toast } from "../widgets/elements";
 import { recall, remember } from "../state/memory";
-import { padded } from "../widgets/plots";
+import { drawable, padded } from "../widgets/plots";
 import { download } from "../widgets/download";
 import { kDragType } from "../widgets/drag";
 
@@ -113,7 +113,10 @@ class Pane {
         uPlot.join(
           this.series.map(
             ({ times, values }) =>
-              [times.map((time_s) => time_s - this.origin), values] as uPlot.AlignedData,
+              [
+                times.map((time_s) => time_s - this.origin),
+                values.map(drawable),
+              ] as uPlot.AlignedData,
           ),
           this.series.map(() => [2]),
         ),

@@ -20,7 +20,7 @@ export interface SeriesDescription {
 export class TimePlot {
   readonly element = h("div", { class: "plot" });
   private plot: uPlot | undefined;
-  private data: number[][];
+  private data: (number | null)[][]; // null: nothing to draw there
   private dirty = false;
 
   constructor(
@@ -34,22 +34,27 @@ export class TimePlot {
 
   // Adds one value at that time; the other series keep their last one.
   add(series: number, time_s: number, value: number): void {
-    const times = this.data[0]!;
+    const times = this.times,
+      drawn = drawable(value);
     const last = times.length - 1;
     if (last >= 0 && time_s < times[last]!) this.clear();
     if (times.length > 0 && times[times.length - 1] === time_s) {
-      this.data[series + 1]![times.length - 1] = value;
+      this.data[series + 1]![times.length - 1] = drawn;
     } else {
       times.push(time_s);
       this.data
         .slice(1)
         .forEach((column, i) =>
-          column.push(i === series ? value : (column[column.length - 1] ?? NaN)),
+          column.push(i === series ? drawn : (column[column.length - 1] ?? null)),
         );
     }
     const first = times.findIndex((t) => t >= time_s - kWindow_s);
     if (first > 64) for (const column of this.data) column.splice(0, first);
     this.dirty = true;
+  }
+
+  private get times(): number[] {
+    return this.data[0] as number[];
   }
 
   clear(): void {
@@ -61,7 +66,7 @@ export class TimePlot {
     if (!this.dirty || this.element.clientWidth === 0) return;
     this.dirty = false;
     if (!this.plot) this.build();
-    const end = this.data[0]![this.data[0]!.length - 1] ?? 0;
+    const end = this.times[this.times.length - 1] ?? 0;
     this.plot?.setData(this.data as uPlot.AlignedData, false);
     this.plot?.setScale("x", { min: Math.max(0, end - kWindow_s), max: Math.max(5, end) });
   }
@@ -118,6 +123,11 @@ export class TimePlot {
     this.element.title = this.unit;
     this.dirty = true;
   }
+}
+
+// null, a gap, for what is not finite: one infinite value would hide all others.
+export function drawable(value: number): number | null {
+  return Number.isFinite(value) ? value : null;
 }
 
 // Some room below and above.
