@@ -25,9 +25,12 @@ namespace {
           "' is not allowed; an address is ADDRESS:PORT, such as 127.0.0.1:8080 or 0.0.0.0:8080");
 }
 
+// Empty where what follows it is no port.
 std::string_view host_name(std::string_view host) {
   const size_t colon = host.rfind(':');
-  return host.ends_with(']') ? host : host.substr(0, colon);
+  if (host.ends_with(']') || colon == std::string_view::npos) return host;
+  const std::string_view port = host.substr(colon + 1);
+  return port.find_first_not_of("0123456789") == std::string_view::npos ? host.substr(0, colon) : "";
 }
 
 bool equal(std::string_view a,
