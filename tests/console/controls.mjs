@@ -100,6 +100,13 @@ export default async function controls(tools) {
         .map(Number),
     );
   const before = await place();
+  for (const odd of ["1e9", ""]) {
+    await page.getByLabel("how far").fill(odd);
+    await page.locator("#move").click();
+    const said = await page.getByLabel("how far").evaluate((input) => input.validationMessage);
+    const motion = await page.locator('[data-fact="motion"]').innerText();
+    check(`what nobody means is not sent: "${odd}"`, said !== "" && /idle/.test(motion), motion);
+  }
   await page.getByLabel("how far").fill("0.4");
   await page.locator("#move").click();
   await until("a motion primitive is done", () =>

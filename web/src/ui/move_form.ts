@@ -3,8 +3,26 @@ import { move_command_t } from "../../generated/messages";
 import { h, say } from "../widgets/elements";
 import type { Move } from "../state/go_to";
 
+const kFarthest = { min: -1000, max: 1000 }, // m; what is asked for is hardly further
+  kMostTurned = { min: -36_000, max: 36_000 }; // degrees
+
 function numberInput(label: string, more: Record<string, string | number>): HTMLInputElement {
-  return h("input", { type: "number", step: 0.1, value: 1, "aria-label": label, ...more });
+  return h("input", {
+    type: "number",
+    step: 0.1,
+    value: 1,
+    required: "required",
+    "aria-label": label,
+    ...more,
+  });
+}
+
+// Says what is allowed where it is not. Between its steps a number is good.
+function isGood(input: HTMLInputElement): boolean {
+  const { valueMissing, badInput, rangeOverflow, rangeUnderflow } = input.validity;
+  const bad = valueMissing || badInput || rangeOverflow || rangeUnderflow;
+  if (bad) input.reportValidity();
+  return !bad;
 }
 
 // buttons: placed after the one that sends.
@@ -20,11 +38,11 @@ export function makeMoveForm(
     h("option", { value: move_command_t.HEADING }, "turn to heading"),
     h("option", { value: move_command_t.ARC }, "arc"),
   );
-  const value = numberInput("how far", {}),
+  const value = numberInput("how far", kFarthest),
     unit = h("span", { class: "dim" }, "m");
-  const radius = numberInput("radius", { min: 0.05 }),
+  const radius = numberInput("radius", { min: 0.05, max: 1000 }),
     radiusRow = h("label", { class: "row" }, "radius", radius, h("span", { class: "dim" }, "m"));
-  const speed = numberInput("speed", { value: 0, min: 0, title: "0: the robot's own" });
+  const speed = numberInput("speed", { value: 0, min: 0, max: 100, title: "0: the robot's own" });
   const turns = () => Number(kind.value) !== move_command_t.ADVANCE,
     isArc = () => Number(kind.value) === move_command_t.ARC;
   radiusRow.hidden = true;
@@ -32,9 +50,12 @@ export function makeMoveForm(
     say(unit, turns() ? "°" : "m");
     value.value = turns() ? "90" : "1";
     value.step = turns() ? "15" : "0.1";
+    const { min, max } = turns() ? kMostTurned : kFarthest;
+    Object.assign(value, { min, max });
     radiusRow.hidden = !isArc();
   });
-  const go = () =>
+  const go = () => {
+    if (![value, ...(isArc() ? [radius] : []), speed].every(isGood)) return;
     send({
       kind: Number(kind.value),
       value: Number(value.value) * (turns() ? Math.PI / 180 : 1),
@@ -43,6 +64,7 @@ export function makeMoveForm(
       acceleration: 0,
       deceleration: 0,
     });
+  };
   return h(
     "div",
     { class: "row" },
