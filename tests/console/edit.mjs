@@ -79,6 +79,16 @@ export default async function edit({ page, seen, until, check, picture, still, o
   // ---- selected, moved
   await page.mouse.click(...(await onScreen(1.7, 0.5, 0.4)));
   await until("a click selects", () => window.ruedo.page.now.selected === "box");
+  const shownX = await page.locator('[data-number="x"]').inputValue();
+  for (const odd of ["", "1e300"]) {
+    await page.locator('[data-number="x"]').fill(odd);
+    await page.locator('[data-number="x"]').press("Enter");
+    await until(
+      `what is no place is taken back: "${odd}"`,
+      (shown) => document.querySelector('[data-number="x"]').value === shown,
+      shownX,
+    );
+  }
   await page.locator('[data-number="x"]').fill("2.25");
   await page.locator('[data-number="x"]').press("Enter");
   await until("numbers move it", () => Math.abs(window.ruedo.editor.pose("box")[0] - 2.25) < 1e-6);

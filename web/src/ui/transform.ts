@@ -1,6 +1,6 @@
 // The selected model in numbers: its pose, its handles, duplicate and delete.
 import type { Editor } from "../edit/editor";
-import { numbersOf, poseFrom, samePose } from "../edit/pose";
+import { numbersOf, poseFrom, samePose, type Pose7 } from "../edit/pose";
 import type { Handle, Page } from "../state/page";
 import { h, say } from "../widgets/elements";
 import { remember } from "../state/memory";
@@ -46,7 +46,7 @@ export class Transform {
     private readonly page: Page,
     private readonly editor: Editor,
   ) {
-    for (const field of this.fields) field.addEventListener("change", () => this.put());
+    this.fields.forEach((field, i) => field.addEventListener("change", () => void this.put(i)));
     const numbers = this.fields.map((field, i) =>
       h("label", {}, h("span", { class: "dim" }, `${kFields[i]![0]}, ${kFields[i]![1]}`), field),
     );
@@ -114,33 +114,36 @@ export class Transform {
     ];
   }
 
-  // Updates the numbers as things move, except while they are being edited.
+  // Updates the numbers as things move, except the one that is being edited.
   show(): void {
     const { selected } = this.page.now,
       pose = this.editor.pose(selected);
     say(this.title, selected || "Nothing is selected: click a model");
     this.body.hidden = !pose;
-    if (!pose || this.fields.includes(document.activeElement as HTMLInputElement)) return;
-    numbersOf(pose).forEach((value, i) => {
-      const text = String(Number(value.toFixed(i < 3 ? 4 : 2)) || 0),
-        field = this.fields[i]!;
-      if (field.value !== text) field.value = text;
+    if (!pose) return;
+    this.fields.forEach((field, i) => {
+      if (field !== document.activeElement) this.fill(i, pose);
     });
   }
 
-  private put(): void {
+  private fill(i: number, pose: Pose7): void {
+    const text = String(Number(numbersOf(pose)[i]!.toFixed(i < 3 ? 4 : 2)) || 0),
+      field = this.fields[i]!;
+    if (field.value !== text) field.value = text;
+  }
+
+  // Only the number that was edited counts: the others keep all their digits, and where the model
+  // is now. What is no number, or is refused, is taken back.
+  private async put(i: number): Promise<void> {
     const { selected } = this.page.now,
-      numbers = this.fields.map((field) => Number(field.value)),
-      pose = this.editor.pose(selected);
-    if (!pose || numbers.some((value) => !Number.isFinite(value))) return;
-    // Values that were not edited keep all their digits.
-    const before = numbersOf(pose),
-      to = poseFrom(
-        numbers.map((value, i) =>
-          Math.abs(value - before[i]!) < (i < 3 ? 6e-5 : 6e-3) ? before[i]! : value,
-        ),
-      );
-    if (!samePose(pose, to)) void this.editor.move(selected, to);
+      pose = this.editor.pose(selected),
+      value = this.fields[i]!.valueAsNumber;
+    if (!pose) return;
+    const to = poseFrom(numbersOf(pose).map((number, k) => (k === i ? value : number)));
+    const isMoved =
+      Number.isFinite(value) && !samePose(pose, to) && (await this.editor.move(selected, to));
+    if (!isMoved && this.page.now.selected === selected)
+      this.fill(i, this.editor.pose(selected) ?? pose);
   }
 
   private scale(): void {
