@@ -27,11 +27,11 @@ namespace {
 constexpr SimTime kTrackPeriod = 250'000;  // us
 constexpr double kFall_m_s = 5.0;          // no wheel drops as far as gives that speed: 1.3 m
 
-// Three decimals, or six where three would show the limit itself.
+// Three decimals, or more where three would show the limit itself.
 std::string beside(double value, double limit) {
   std::string text = fmt::format("{:.3f}", value);
   if (value == limit || text != fmt::format("{:.3f}", limit)) return text;
-  return fmt::format("{:.6f}", value);
+  return fmt::format("{:.6g}", value);
 }
 
 double seconds(SimTime time) { return static_cast<double>(time) * 1e-6; }
