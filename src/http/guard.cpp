@@ -30,7 +30,8 @@ std::string_view host_name(std::string_view host) {
   const size_t colon = host.rfind(':');
   if (host.ends_with(']') || colon == std::string_view::npos) return host;
   const std::string_view port = host.substr(colon + 1);
-  return port.find_first_not_of("0123456789") == std::string_view::npos ? host.substr(0, colon) : "";
+  return port.find_first_not_of("0123456789") == std::string_view::npos ? host.substr(0, colon)
+                                                                        : "";
 }
 
 bool equal(std::string_view a,

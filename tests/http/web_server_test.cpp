@@ -40,9 +40,9 @@ TEST(Guard, OnLoopbackOnlyLoopbackNames) {
        {"localhost:8080", "127.0.0.1:8080", "localhost", "[::1]:8080", "127.0.0.2:1"}) {
     EXPECT_EQ(refuse({.host = good}, here, ""), "") << good;
   }
-  for (const char* bad : {"", "evil.example:8080", "127.evil.example:8080",
-                          "localhost.evil.example", "10.0.0.1:8080",
-                          "127.0.0.1:8080.evil.example", "localhost:evil.example"}) {
+  for (const char* bad :
+       {"", "evil.example:8080", "127.evil.example:8080", "localhost.evil.example", "10.0.0.1:8080",
+        "127.0.0.1:8080.evil.example", "localhost:evil.example"}) {
     EXPECT_NE(refuse({.host = bad}, here, ""), "") << bad;
   }
 }

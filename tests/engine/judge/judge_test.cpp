@@ -252,6 +252,28 @@ TEST_F(JudgeTest, ClearanceIsTheSmallestDistance) {
   EXPECT_THAT(check.text, HasSubstr("0.400 m from box/link"));
 }
 
+TEST_F(JudgeTest, ADistanceIsToldWithTheDigitsThatFailIt) {
+  Expectations expected;
+  expected.clearance = 0.5;
+  judge(expected);
+  see(3.5001);
+  EXPECT_THAT(check("clearance").text, HasSubstr("was 0.4999 m from box/link"));
+}
+
+// Also without any expectation: what falls touches nothing, and may pass over a goal.
+TEST_F(JudgeTest, WhatFallsHasFailed) {
+  judge({});
+  RobotState& robot = state_.robots[RobotIndex(0)];
+  robot.twist.linear = Vec3(0, 0, -4.9);
+  see(0.0);
+  EXPECT_EQ(check("fall").what, "") << "a step down";
+  robot.twist.linear = Vec3(0, 0, -5.1);
+  see(0.0);
+  const Check check = this->check("fall");
+  EXPECT_EQ(check.outcome, Outcome::failed);
+  EXPECT_THAT(check.text, HasSubstr("r fell: at z = 0.00 m it went down at 5.1 m/s"));
+}
+
 TEST_F(JudgeTest, ModelsThatComeAndGoAreSeen) {
   Expectations expected;
   expected.clearance = 0.5;
