@@ -59,6 +59,8 @@ void PhysicsWorld::Impl::take_ties(const Impl& other) {
 
 void PhysicsWorld::Impl::take_body(BodyIndex body, const Impl& other) {
   rigid_.bodies[body].info = other.rigid_.bodies[body].info;
+  if (BodyShape* shape = rigid_.bodies[body].compound.get())
+    shape->see_in_tree(other.rigid_.bodies[body].compound->seen_in_tree());
   btRigidBody& here = bullet(body);
   const btRigidBody& there = *other.rigid_.bodies[body].bullet;
   here.setWorldTransform(there.getWorldTransform());
@@ -136,6 +138,14 @@ void PhysicsWorld::Impl::exchange_ties(StateArchive& archive) {
 void PhysicsWorld::Impl::exchange_body(StateArchive& archive, BodyIndex body) {
   ObjectInfo& info = rigid_.bodies[body].info;
   archive(info.on_plane, info.moved, info.gone, info.joined);
+  if (BodyShape* shape = rigid_.bodies[body].compound.get()) {
+    btScalar seen = shape->seen_in_tree();
+    archive.raw(seen);
+    constexpr btScalar kFarthest_m = 1e6;
+    if (!(seen >= kSeenAhead_m && seen <= kFarthest_m))
+      StateArchive::refuse("a body sees too far ahead");
+    if (archive.reads()) shape->see_in_tree(seen);
+  }
   btRigidBody& here = bullet(body);
   btTransform places[2] = {here.getWorldTransform(), here.getInterpolationWorldTransform()};
   btVector3 values[] = {here.getInterpolationLinearVelocity(),

@@ -36,8 +36,13 @@ class BodyShape final : public btCompoundShape {
  public:
   void see_ahead(btScalar by) {
     if (by <= tree_seen_m_ && 16 * by >= tree_seen_m_) return;
-    widen(getDynamicAabbTree()->m_root, 2 * by - tree_seen_m_);
-    tree_seen_m_ = 2 * by;
+    see_in_tree(2 * by);
+  }
+  // How far the tree's bounds see: it depends on the past, so that a saved state has it.
+  btScalar seen_in_tree() const { return tree_seen_m_; }
+  void see_in_tree(btScalar by) {
+    widen(getDynamicAabbTree()->m_root, by - tree_seen_m_);
+    tree_seen_m_ = by;
   }
 
  private:
