@@ -310,9 +310,9 @@ def test_equal_findings_are_one_with_all_its_places(tmp_path):
     )
     (tmp_path / "w.sdf").write_text(in_link(boxes))
     lines = check(tmp_path / "w.sdf").stdout.decode().splitlines()
-    assert lines[0].startswith("unsupported: ") and "did you mean <box>?" in lines[0]
+    assert lines[0].startswith("error: ") and "did you mean <box>?" in lines[0]
     assert [line.split(":")[1].split()[0] for line in lines[1:4]] == ["4", "5", "6"]
-    assert lines[4].endswith("w.sdf: 0 errors, 3 not supported, 0 repaired") and len(lines) == 5
+    assert lines[4].endswith("w.sdf: 3 errors, 0 not supported, 0 repaired") and len(lines) == 5
 
 
 def test_names_cannot_speak_to_the_terminal(tmp_path):

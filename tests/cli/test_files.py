@@ -36,7 +36,9 @@ def test_round_trip_of_a_map(tmp_path):
         ).returncode
         == 0
     )
-    assert (tmp_path / "two.pgm").read_bytes() == (tmp_path / "one.pgm").read_bytes()
+    # Walls alone have no robot, and so no outside that is unknown.
+    known = (tmp_path / "one.pgm").read_bytes().replace(b"\xcd", b"\xfe")
+    assert (tmp_path / "two.pgm").read_bytes() == known
     assert ruedo("check", tmp_path / "walls.sdf", "--strict").returncode == 0
 
 

@@ -87,7 +87,7 @@ def _with_exponents(of: Any) -> Any:
     """A loader or dumper to which 1e9 and 2.5e3 are numbers, as in YAML 1.2; YAML 1.1 knows 2.5e+3
     alone.
     """
-    made = type(of.__name__, (of,), {})
+    made: Any = type(of.__name__, (of,), {})
     exponent = re.compile(r"[-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)[eE][-+]?[0-9]+\Z")
     made.add_implicit_resolver("tag:yaml.org,2002:float", exponent, list("-+.0123456789"))
     return made
