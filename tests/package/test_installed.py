@@ -181,7 +181,11 @@ def test_another_way_is_the_first_difference(prefix, tmp_path):
             1,
             r"s: p3at/\w+ was 0\.5\d\d m from (left|right)_post/link at \(.+\), at least 0\.6 m",
         ),
-        (["--odometry-error", "0.0000001"], 1, r"s: p3at's odometry was \S+ m off, at most 1e-07 m"),
+        (
+            ["--odometry-error", "0.0000001"],
+            1,
+            r"s: p3at's odometry was \S+ m off, at most 1e-07 m",
+        ),
         (["--script", "test -s $RUEDO_LOG && exit 7"], 1, r"the script ended with exit code 7"),
         (["--robot", "nobody"], 2, r"--robot 'nobody': the world has p3at"),
         (["--goal", "4,0,0.3"], 2, r"X,Y,RADIUS,BY"),
