@@ -1,6 +1,7 @@
-// Where a robot says it is: its state, ROBOT/pose, the pose of its base_link and odometry are one
-// thing, at each step and on both drives, for our own robots and for each public one that lies
-// beside the checkout. The frames of /tf are made of odometry_t (tests/bridges/ros2/test_links.py).
+// Where a robot says it is: its state, ROBOT/pose, the pose of its base_link, odometry and what the
+// console draws (world_state_t) are one thing, at each step and on both drives, for our own robots
+// and for each public one that lies beside the checkout. The frames of /tf are made of odometry_t
+// (tests/bridges/ros2/test_links.py).
 #include <cmath>
 #include <cstdlib>
 #include <filesystem>
@@ -17,6 +18,7 @@
 #include "ruedo/errors.h"
 #include "ruedo/odometry_t.hpp"
 #include "ruedo/pose_t.hpp"
+#include "ruedo/world_state_t.hpp"
 #include "world/load.h"
 
 namespace ruedo {
@@ -65,6 +67,7 @@ class Watch {
   void see(const engine::Channel& channel, std::span<const uint8_t> bytes) {
     if (channel.bus_name.ends_with("/pose") && channel.type == "pose_t") read(bytes, pose_);
     if (channel.bus_name.ends_with("/odometry")) read(bytes, odometry_);
+    if (channel.type == "world_state_t") read(bytes, drawn_);
   }
 
   void see(const Snapshot& now) {
@@ -86,10 +89,17 @@ class Watch {
     for (const pose_t& pose : pose_) {
       if (pose.utime == 0) continue;  // the handlers come later than that state
       ++compared_;
-      const double* q = pose.orientation;
-      expect_equal(states_.at(pose.utime),
-                   {Quat(q[0], q[1], q[2], q[3]), Vec3(pose.pos[0], pose.pos[1], pose.pos[2])},
-                   1e-9, "ROBOT/pose at " + std::to_string(pose.utime));
+      expect_equal(states_.at(pose.utime), pose_of(pose.pos, pose.orientation), 1e-9,
+                   "ROBOT/pose at " + std::to_string(pose.utime));
+    }
+    for (const world_state_t& drawn : drawn_) {
+      for (int32_t i = 0; i < drawn.n; ++i) {
+        if (drawn.index[i] != layout_.links[link_].body) continue;
+        ++drawn_compared_;
+        expect_equal(states_.at(drawn.utime) * apart_,
+                     pose_of(drawn.position[i], drawn.orientation[i]) * layout_.links[link_].X_BL,
+                     1e-6, "the console's picture at " + std::to_string(drawn.utime));
+      }
     }
     for (const odometry_t& odometry : odometry_) {
       if (!ideal_ || odometry.utime == 0) continue;
@@ -104,8 +114,13 @@ class Watch {
 
   double way() const { return way_; }
   int compared() const { return compared_; }
+  int drawn() const { return drawn_compared_; }
 
  private:
+  static Pose pose_of(const auto& p, const auto& q) {
+    return {Quat(q[0], q[1], q[2], q[3]), Vec3(p[0], p[1], p[2])};
+  }
+
   template <class Message>
   static void read(std::span<const uint8_t> bytes, std::vector<Message>& into) {
     ASSERT_EQ(decode_checked(bytes.data(), bytes.size(), into.emplace_back()), DecodeFault::none);
@@ -118,8 +133,9 @@ class Watch {
   std::map<SimTime, Pose> states_;
   std::vector<pose_t> pose_;
   std::vector<odometry_t> odometry_;
+  std::vector<world_state_t> drawn_;
   double way_ = 0.0;
-  int compared_ = 0;
+  int compared_ = 0, drawn_compared_ = 0;
 };
 
 // Straight on, then a curve. Returns how far it came, or nothing where it has no such drive.
@@ -145,6 +161,7 @@ std::optional<double> drive(const world::WorldModel& loaded, Kind kind) {
   }
   watch.compare();
   EXPECT_GT(watch.compared(), 90);
+  EXPECT_GT(watch.drawn(), 50);  // 30 a second for 2 s
   return watch.way();
 }
 

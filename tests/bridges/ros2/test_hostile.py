@@ -112,9 +112,8 @@ def test_noise_on_all_that_is_read_is_harmless():
     with Run("--no-noise", world=RIG) as run:
         peer = Peer(run.domain)
         read = inputs(peer)
-        # Each kind of joint command, cmd_vel's absence aside; the pose; ten services; the action;
-        # parameters.
-        assert len(read) == 4 + 1 + 10 + 3 + 6
+        # Joint commands of each kind, the pose, the services, the action, the parameters.
+        assert len(read) == 4 + 1 + len(SERVICES) + 3 + 6
         liars = [
             peer.writer(topic, make_idl_struct("Noise", kind, {"data": sequence[uint8]}), "")
             for topic, kind in sorted(read)
@@ -167,7 +166,7 @@ wait_for(calls.get_matched_subscriptions, "a reader")
 if sys.argv[3] == "hears":
     hostile.peer.reader(f"/{sys.argv[2]}Reply", answer, prefix="rr")
 for i in itertools.count(1):
-    calls.write(question(hostile.mark + 1, i, *sys.argv[4:]))
+    calls.write(question(hostile.mark + 1, i, *(sys.argv[4:] or [0])))
     if i % 1000 == 0:
         print(i, flush=True)
 """
