@@ -1,8 +1,8 @@
-// Newton's method, the banded matrix and its Cholesky factor.
 #include "physics/base/newton.h"
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "ruedo/math.h"
 
@@ -10,12 +10,20 @@ namespace ruedo::physics {
 
 namespace {
 
-// The softness of a row's spring relative to the row's response: the stiffer, the fewer multiplier
-// updates, and the more Newton steps for each.
-constexpr double kYields = 1e-3;
-constexpr int kMostHalvings = 6;
-// A line search may end at a slope of this fraction of the initial one.
-constexpr double kSlopeLeft = 0.3;
+// The softness of a row's spring relative to the row's response: soft springs take few Newton
+// steps, stiff ones few multiplier updates. They begin soft, and become stiff; beyond that only
+// where what they bear is so much heavier than what they act on that updates hardly help.
+constexpr double kYieldsFirst = 0.1, kYieldsStiff = 1e-3, kYieldsLeast = 1e-8, kStiffer = 0.1;
+// A line search ends at a slope of this fraction of the initial one.
+constexpr double kSlopeLeft = 0.05;
+constexpr int kMostTrials = 12;
+// Newton's method has done its part for these multipliers once its error is this part of theirs.
+constexpr double kErrorLeft = 0.1;
+// If the slips' error does not fall to this part, they change each other: then aims follow them by
+// smaller parts, down to the least.
+constexpr double kFalls = 0.7, kRelaxed = 0.5, kLeastRelaxation = 0.25;
+
+constexpr double kHuge = std::numeric_limits<double>::infinity();
 
 bool can_move(const SolverBody& body) {
   return body.inverse_mass != Vec3::Zero() || !body.inverse_inertia.isZero(0.0);
@@ -43,337 +51,376 @@ Eigen::Matrix3d root_of(const Eigen::Matrix3d& A) {
 
 // Capacity for usual islands is reserved: steady runs do not allocate.
 Newton::Newton() {
-  constexpr size_t kBodies = 8, kEntries = 64;
+  constexpr size_t kBodies = 8, kRows = 64;
   bodies_.reserve(kBodies);
   movable_.reserve(kBodies);
-  degree_.reserve(kBodies);
-  order_.reserve(kBodies);
-  first_neighbour_.reserve(kBodies + 1);
-  neighbours_.reserve(kEntries);
-  first_.reserve(kBodies);
-  start_.reserve(kBodies);
-  blocks_.reserve(kBodies * (kBodies + 1) / 2);
   y_.reserve(kBodies);
-  trial_.reserve(kBodies);
   gradient_.reserve(kBodies);
   step_.reserve(kBodies);
-  entries_.reserve(kEntries);
+  bounds_.reserve(kRows);
+  contacts_.reserve(kRows);
 }
 
 double Newton::prepare(const SolverBodies& bodies, const std::vector<std::pair<int, int>>& pairs) {
   bodies_.assign(bodies.size(), {});
-  movable_.clear();
+  movable_.assign(bodies.size(), 0);
   for (size_t i = 1; i < bodies.size(); ++i) {
     if (!can_move(bodies[i])) continue;
+    movable_[i] = 1;
     bodies_[i].root_mass = bodies[i].inverse_mass.cwiseSqrt();
     bodies_[i].root_inertia = root_of(bodies[i].inverse_inertia);
-    movable_.push_back(static_cast<int>(i));
   }
-  put_in_order(pairs);
-  lay_out(pairs);
-  double products = 0.0;
-  for (size_t i = 0; i < first_.size(); ++i) {
-    const double wide = static_cast<double>(static_cast<int>(i) - first_[i]) + 1.0;
-    products += 216.0 * wide * wide;
-  }
-  return products;
+  return matrix_.prepare(movable_, pairs);
 }
 
-// Breadth-first from a body with few neighbours; then reversed.
-void Newton::put_in_order(const std::vector<std::pair<int, int>>& pairs) {
-  const auto movable = [&](int body) {
-    return body > 0 &&
-           (bodies_[body].root_mass != Vec3::Zero() || !bodies_[body].root_inertia.isZero(0.0));
-  };
-  first_neighbour_.assign(bodies_.size() + 1, 0);
-  for (const auto& [a, b] : pairs) {
-    if (!movable(a) || !movable(b)) continue;
-    ++first_neighbour_[static_cast<size_t>(a) + 1];
-    ++first_neighbour_[static_cast<size_t>(b) + 1];
-  }
-  for (size_t i = 0; i < bodies_.size(); ++i) first_neighbour_[i + 1] += first_neighbour_[i];
-  neighbours_.resize(first_neighbour_.back());
-  degree_.assign(bodies_.size(), 0);
-  for (const auto& [a, b] : pairs) {
-    if (!movable(a) || !movable(b)) continue;
-    for (const auto& [from, to] : {std::pair(a, b), std::pair(b, a)}) {
-      const size_t i = static_cast<size_t>(from);
-      neighbours_[first_neighbour_[i] + static_cast<size_t>(degree_[i]++)] = to;
-    }
-  }
-  const auto fewer = [&](int a, int b) {
-    return std::pair(degree_[a], a) < std::pair(degree_[b], b);
-  };
-  std::sort(movable_.begin(), movable_.end(), fewer);
-  order_.clear();
-  const auto visit = [&](int body) {
-    PlaceIndex& place = bodies_[body].place;
-    if (place.valid()) return;
-    place = PlaceIndex(0);
-    order_.push_back(body);
-  };
-  for (const int body : movable_) {
-    size_t next = order_.size();
-    visit(body);
-    for (; next < order_.size(); ++next) {
-      const size_t i = static_cast<size_t>(order_[next]);
-      const auto begin = neighbours_.begin() + static_cast<std::ptrdiff_t>(first_neighbour_[i]),
-                 end = begin + degree_[i];
-      std::sort(begin, end, fewer);
-      for (auto each = begin; each != end; ++each) visit(*each);
-    }
-  }
-  std::reverse(order_.begin(), order_.end());
-  for (size_t i = 0; i < order_.size(); ++i) bodies_[order_[i]].place = PlaceIndex(i);
+void Newton::begin() {
+  bounds_.clear();
+  contacts_.clear();
 }
 
-void Newton::lay_out(const std::vector<std::pair<int, int>>& pairs) {
-  first_.resize(order_.size());
-  for (size_t i = 0; i < first_.size(); ++i) first_[i] = static_cast<int>(i);
-  for (const auto& [a, b] : pairs) {
-    const PlaceIndex p = bodies_[a].place, q = bodies_[b].place;
-    if (!p.valid() || !q.valid()) continue;
-    int& first = first_[std::max(p, q)];
-    first = std::min<int>(first, std::min(p, q));
-  }
-  start_.resize(first_.size());
-  size_t blocks = 0;
-  for (size_t i = 0; i < first_.size(); ++i) {
-    start_[i] = blocks;
-    blocks += i + 1 - static_cast<size_t>(first_[i]);
-  }
-  blocks_.resize(blocks);
+Newton::Six Newton::scaled(int body, const Vec3& linear, const Vec3& angular) const {
+  const Body& of = bodies_[body];
+  Six J;
+  J.head<3>() = linear.cwiseProduct(of.root_mass);
+  J.tail<3>() = of.root_inertia.transpose() * angular;
+  return J;
 }
 
-Newton::Entry& Newton::enter(Row& row, Kind kind, double scale, double response) {
-  Entry& entry = entries_.emplace_back();
-  entry.row = &row;
-  entry.kind = kind;
-  entry.scale = scale;
-  entry.weight = 1.0 / (scale * scale * (row.softness + kYields * response));
-  entry.begun = entry.held = row.impulse / scale;
-  const auto scaled = [&](int body, const Vec3& linear, const Vec3& angular, PlaceIndex& place,
-                          Six& J) {
-    const Body& of = bodies_[body];
-    place = of.place;
-    if (!place.valid()) return;
-    J.head<3>() = scale * linear.cwiseProduct(of.root_mass);
-    J.tail<3>() = scale * (of.root_inertia.transpose() * angular);
-  };
-  scaled(row.a, row.linear_a, row.angular_a, entry.a, entry.J_a);
-  scaled(row.b, row.linear_b, row.angular_b, entry.b, entry.J_b);
-  return entry;
+void Newton::add(Row& row) {
+  Bound& bound = bounds_.emplace_back();
+  bound.row = &row;
+  bound.a = matrix_.place(row.a);
+  bound.b = matrix_.place(row.b);
+  bound.lower = row.lower;
+  bound.upper = row.upper;
+  bound.J_a = scaled(row.a, row.linear_a, row.angular_a);
+  bound.J_b = scaled(row.b, row.linear_b, row.angular_b);
 }
 
-size_t Newton::add(Row& row) {
-  Entry& entry = enter(row, Kind::bounded, 1.0, row.response);
-  entry.lower = row.lower;
-  entry.upper = row.upper;
-  return entries_.size() - 1;
-}
-
-void Newton::add(Row& row, size_t load, double lever) {
+void Newton::add(Row& row, size_t contact, double lever) {
   if (row.inverse == 0.0) return;
-  enter(row, Kind::on_load, lever, row.response).load = load;
+  add(row);
+  bounds_.back().load = contact;
+  bounds_.back().lever = lever;
 }
 
-void Newton::add(Row& along, Row& across, double friction, double friction2, size_t load) {
-  if (along.inverse == 0.0 && across.inverse == 0.0) return;
-  const double weight =
-      std::max(friction * friction * along.response, friction2 * friction2 * across.response);
-  enter(along, Kind::along, friction, weight / (friction * friction)).load = load;
-  enter(across, Kind::across, friction2, weight / (friction2 * friction2)).load = load;
-  Entry &first = entries_[entries_.size() - 2], &second = entries_.back();
-  first.weight = second.weight = std::min(first.weight, second.weight);
+size_t Newton::add(Row& normal, Row& along, Row& across, double friction, double friction2) {
+  Contact& contact = contacts_.emplace_back();
+  contact.a = matrix_.place(normal.a);
+  contact.b = matrix_.place(normal.b);
+  const bool rubs =
+      friction > 0.0 && friction2 > 0.0 && along.inverse > 0.0 && across.inverse > 0.0;
+  contact.friction[0] = friction;
+  contact.friction[1] = friction2;
+  const double scales[3] = {1.0, friction, friction2};
+  Row* rows[3] = {&normal, &along, &across};
+  for (int k = 0; k < (rubs ? 3 : 1); ++k) {
+    Row& row = *rows[k];
+    contact.rows[k] = &row;
+    contact.softness[k] = scales[k] * scales[k] * row.softness;
+    contact.begun[k] = contact.held[k] = row.impulse / scales[k];
+    contact.J_a.row(k) = scales[k] * scaled(row.a, row.linear_a, row.angular_a);
+    contact.J_b.row(k) = scales[k] * scaled(row.b, row.linear_b, row.angular_b);
+  }
+  if (rubs) {
+    contact.response_t =
+        std::max(friction * friction * along.response, friction2 * friction2 * across.response);
+  }
+  return contacts_.size() - 1;
+}
+
+void Newton::start(const SolverBodies& bodies) {
+  const auto missing = [&](const Row& row) {
+    return row.target - row.velocity(bodies) - row.softness * row.impulse;
+  };
+  for (Bound& bound : bounds_) {
+    bound.missing = missing(*bound.row);
+    bound.begun = bound.held = bound.row->impulse;
+    bound.moves = 0.0;
+  }
+  for (Contact& contact : contacts_) {
+    contact.moves = Vec3::Zero();
+    contact.missing = Vec3::Zero();
+    for (int k = 0; k < 3 && contact.rows[k]; ++k)
+      contact.missing[k] = (k == 0 ? 1.0 : contact.friction[k - 1]) * missing(*contact.rows[k]);
+    contact.slip = math::hypot(contact.missing[1], contact.missing[2]);
+  }
+  y_.assign(matrix_.size(), Six::Zero());
+  step_ = y_;
+  set_weights(kYieldsFirst);
+  set_bounds();
+}
+
+void Newton::set_weights(double yields) {
+  yields_ = yields;
+  for (Bound& bound : bounds_)
+    bound.weight = 1.0 / (bound.row->softness + yields * bound.row->response);
+  for (Contact& contact : contacts_) {
+    contact.weight = 1.0 / (contact.softness[0] + yields * contact.rows[0]->response);
+    const double softness_t = std::max(contact.softness[1], contact.softness[2]);
+    if (contact.rows[1]) contact.weight_t = 1.0 / (softness_t + yields * contact.response_t);
+  }
 }
 
 void Newton::set_bounds() {
-  for (Entry& entry : entries_) {
-    if (entry.kind == Kind::bounded) continue;
-    entry.upper = std::max(entries_[entry.load].pulls, 0.0);
-    entry.lower = -entry.upper;
+  for (Bound& bound : bounds_) {
+    if (bound.load == kNone) continue;
+    bound.upper = bound.lever * std::max(contacts_[bound.load].held[0], 0.0);
+    bound.lower = -bound.upper;
   }
 }
 
-void Newton::pull(Entry& entry, double wanted) {
-  entry.pulls = std::clamp(wanted, entry.lower, entry.upper);
-  entry.active = entry.pulls == wanted;
-  entry.stiffness = entry.active ? entry.weight : 0.0;
+void Newton::pull(Bound& bound, double part) {
+  const double missing = bound.missing - bound.moves - part * bound.turns -
+                         bound.row->softness * (bound.held - bound.begun);
+  const double wanted = bound.held + bound.weight * missing;
+  bound.pulls = std::clamp(wanted, bound.lower, bound.upper);
+  bound.active = bound.pulls == wanted;
 }
 
-void Newton::rub(Entry& along, Entry& across, double first, double second) {
-  const double size = math::hypot(first, second), load = along.upper;
-  along.active = across.active = size <= load;
-  const double part = along.active ? 1.0 : load / size;
-  along.pulls = part * first;
-  across.pulls = part * second;
-  along.stiffness = across.stiffness = part * along.weight;
-  if (along.active) return;
-  along.turn = -second / size;
-  across.turn = first / size;
-}
-
-double Newton::slope(const std::vector<Six>& y) {
-  gradient_ = y;
-  double first_of_pair = 0.0;
-  for (size_t i = 0; i < entries_.size(); ++i) {
-    Entry& entry = entries_[i];
-    double missing = entry.missing;
-    if (entry.a.valid()) missing -= entry.J_a.dot(y[entry.a]);
-    if (entry.b.valid()) missing -= entry.J_b.dot(y[entry.b]);
-    missing -= entry.scale * entry.scale * entry.row->softness * (entry.held - entry.begun);
-    const double wanted = entry.held + entry.weight * missing;
-    if (entry.kind == Kind::along) {
-      first_of_pair = wanted;
-      continue;
-    }
-    if (entry.kind == Kind::across) {
-      rub(entries_[i - 1], entry, first_of_pair, wanted);
-    } else {
-      pull(entry, wanted);
-    }
-    for (size_t k = entry.kind == Kind::across ? i - 1 : i; k <= i; ++k) {
-      const Entry& each = entries_[k];
-      const double more = each.pulls - each.begun;
-      if (each.a.valid()) gradient_[each.a] -= more * each.J_a;
-      if (each.b.valid()) gradient_[each.b] -= more * each.J_b;
-    }
+// The point of the cone that is nearest to the wanted impulses, each measured by its softness.
+void Newton::pull(Contact& contact, double part) {
+  const Vec3 missing = contact.missing - contact.moves - part * contact.turns -
+                       contact.softness.cwiseProduct(contact.held - contact.begun);
+  const double load = contact.held[0] + contact.weight * (missing[0] - contact.slip);
+  if (!contact.rows[1]) {
+    contact.zone = load > 0.0 ? Zone::sticks : Zone::open;
+    contact.pulls = Vec3(std::max(load, 0.0), 0.0, 0.0);
+    return;
   }
-  double sum = 0.0;
-  for (size_t i = 0; i < step_.size(); ++i) sum += gradient_[i].dot(step_[i]);
+  const double first = contact.held[1] + contact.weight_t * missing[1],
+               second = contact.held[2] + contact.weight_t * missing[2];
+  const double size = math::hypot(first, second), ratio = contact.weight / contact.weight_t;
+  if (size <= load) {
+    contact.zone = Zone::sticks;
+    contact.pulls = Vec3(load, first, second);
+  } else if (load > -ratio * size) {
+    contact.zone = Zone::slips;
+    contact.cosine = first / size;
+    contact.sine = second / size;
+    const double held = (load + ratio * size) / (1.0 + ratio);
+    contact.pulls = held * Vec3(1.0, contact.cosine, contact.sine);
+    contact.stiffness = contact.weight / (1.0 + ratio);
+    contact.sideways = contact.weight_t * held / size;
+  } else {
+    contact.zone = Zone::open;
+    contact.pulls = Vec3::Zero();
+  }
+}
+
+Vec3 Newton::stiffness_times(const Contact& contact, const Vec3& u) const {
+  if (contact.zone == Zone::open) return Vec3::Zero();
+  if (contact.zone == Zone::sticks)
+    return Vec3(contact.weight * u[0], contact.weight_t * u[1], contact.weight_t * u[2]);
+  const double radial = contact.stiffness * (u[0] + contact.cosine * u[1] + contact.sine * u[2]),
+               across = contact.sideways * (contact.cosine * u[2] - contact.sine * u[1]);
+  return Vec3(radial, contact.cosine * radial - contact.sine * across,
+              contact.sine * radial + contact.cosine * across);
+}
+
+// The derivative of the convex function along the step, that part of it on; also the impulses and
+// the second derivative there.
+double Newton::slope(double part) {
+  double sum = slope_of_step_ + part * square_of_step_;
+  curvature_ = square_of_step_;
+  for (Bound& bound : bounds_) {
+    pull(bound, part);
+    sum -= (bound.pulls - bound.begun) * bound.turns;
+    if (bound.active) curvature_ += bound.weight * bound.turns * bound.turns;
+  }
+  for (Contact& contact : contacts_) {
+    pull(contact, part);
+    sum -= (contact.pulls - contact.begun).dot(contact.turns);
+    curvature_ += contact.turns.dot(stiffness_times(contact, contact.turns));
+  }
   return sum;
 }
 
-bool Newton::same_set() const {
-  return std::all_of(entries_.begin(), entries_.end(), [](const Entry& entry) {
-    const bool slips = !entry.active && entry.kind >= Kind::along && entry.upper > 0.0;
-    return !slips && entry.active == entry.was_active;
-  });
+// How far to go along the step: to where the function is least, found by Newton's method in a
+// bracket.
+double Newton::search() {
+  const double begin = slope(0.0);
+  double part = 1.0, low = 0.0, high = 1.0;
+  for (int k = 0; k < kMostTrials; ++k) {
+    const double here = slope(part);
+    if (std::abs(here) <= kSlopeLeft * std::abs(begin) || (here < 0.0 && part >= 1.0)) break;
+    (here > 0.0 ? high : low) = part;
+    part -= here / curvature_;
+    if (!(part > low && part < high)) part = 0.5 * (low + high);
+  }
+  return part;
 }
 
-void Newton::add_row(const Entry& entry, const Six& J_a, const Six& J_b, double weight) {
-  if (entry.a.valid()) block(entry.a, entry.a).noalias() += J_a * (weight * J_a).transpose();
-  if (entry.b.valid()) block(entry.b, entry.b).noalias() += J_b * (weight * J_b).transpose();
-  if (!entry.a.valid() || !entry.b.valid()) return;
-  if (entry.a > entry.b) {
-    block(entry.a, entry.b).noalias() += J_a * (weight * J_b).transpose();
+void Newton::find_gradient() {
+  gradient_ = y_;
+  for (const Bound& bound : bounds_) {
+    const double more = bound.pulls - bound.begun;
+    if (bound.a.valid()) gradient_[bound.a] -= more * bound.J_a;
+    if (bound.b.valid()) gradient_[bound.b] -= more * bound.J_b;
+  }
+  for (const Contact& contact : contacts_) {
+    const Vec3 more = contact.pulls - contact.begun;
+    if (contact.a.valid()) gradient_[contact.a].noalias() -= contact.J_a.transpose() * more;
+    if (contact.b.valid()) gradient_[contact.b].noalias() -= contact.J_b.transpose() * more;
+  }
+}
+
+bool Newton::same_zones() const {
+  return std::all_of(bounds_.begin(), bounds_.end(),
+                     [](const Bound& bound) { return bound.active == bound.was_active; }) &&
+         std::all_of(contacts_.begin(), contacts_.end(),
+                     [](const Contact& contact) { return contact.zone == contact.was; });
+}
+
+bool Newton::any_slips() const {
+  return std::any_of(contacts_.begin(), contacts_.end(),
+                     [](const Contact& contact) { return contact.zone == Zone::slips; });
+}
+
+void Newton::add_block(PlaceIndex a, PlaceIndex b, const auto& of_a, const auto& of_b) {
+  if (a.valid()) matrix_.block(a, a) += of_a.transpose().lazyProduct(of_a);
+  if (b.valid()) matrix_.block(b, b) += of_b.transpose().lazyProduct(of_b);
+  if (!a.valid() || !b.valid()) return;
+  if (a > b) {
+    matrix_.block(a, b) += of_a.transpose().lazyProduct(of_b);
   } else {
-    block(entry.b, entry.a).noalias() += J_b * (weight * J_a).transpose();
+    matrix_.block(b, a) += of_b.transpose().lazyProduct(of_a);
   }
 }
 
 void Newton::assemble() {
-  for (size_t i = 0; i < first_.size(); ++i) {
-    for (int j = first_[i]; j < static_cast<int>(i); ++j) block(static_cast<int>(i), j).setZero();
-    block(static_cast<int>(i), static_cast<int>(i)).setIdentity();
+  matrix_.set_identity();
+  for (Bound& bound : bounds_) {
+    bound.was_active = bound.active;
+    if (!bound.active) continue;
+    const double root = std::sqrt(bound.weight);
+    using Line = Eigen::Matrix<double, 1, 6>;
+    add_block(bound.a, bound.b, Line(root * bound.J_a.transpose()),
+              Line(root * bound.J_b.transpose()));
   }
-  for (size_t i = 0; i < entries_.size(); ++i) {
-    Entry& entry = entries_[i];
-    entry.was_active = entry.active;
-    if (entry.active) {
-      add_row(entry, entry.J_a, entry.J_b, entry.stiffness);
-    } else if (entry.kind == Kind::across && entry.stiffness > 0.0) {
-      const Entry& along = entries_[i - 1];
-      add_row(entry, along.turn * along.J_a + entry.turn * entry.J_a,
-              along.turn * along.J_b + entry.turn * entry.J_b, entry.stiffness);
+  for (Contact& contact : contacts_) {
+    contact.was = contact.zone;
+    if (contact.zone == Zone::open) continue;
+    Eigen::Matrix3d root = Eigen::Matrix3d::Zero();
+    if (contact.zone == Zone::sticks) {
+      root.diagonal() << std::sqrt(contact.weight), std::sqrt(contact.weight_t),
+          std::sqrt(contact.weight_t);
+    } else {
+      const double radial = std::sqrt(contact.stiffness), across = std::sqrt(contact.sideways);
+      root.row(0) << radial, radial * contact.cosine, radial * contact.sine;
+      root.row(1) << 0.0, -across * contact.sine, across * contact.cosine;
     }
+    add_block(contact.a, contact.b, Reach(root * contact.J_a), Reach(root * contact.J_b));
   }
 }
 
-void Newton::factor() {
-  for (int i = 0; i < static_cast<int>(first_.size()); ++i) {
-    const int first = first_[i];
-    Block& own = block(i, i);
-    for (int j = first; j < i; ++j) {
-      Block& of_j = block(i, j);
-      for (int k = std::max(first, first_[j]); k < j; ++k)
-        of_j.noalias() -= block(i, k) * block(j, k).transpose();
-      block(j, j).triangularView<Eigen::Lower>().transpose().solveInPlace<Eigen::OnTheRight>(of_j);
-      own.noalias() -= of_j * of_j.transpose();
-    }
-    Eigen::LLT<Eigen::Ref<Block>> in_place(own);
+void Newton::find_step() {
+  for (size_t i = 0; i < step_.size(); ++i) step_[i] = -gradient_[i];
+  matrix_.solve(step_);
+  slope_of_step_ = square_of_step_ = 0.0;
+  for (size_t i = 0; i < step_.size(); ++i) {
+    slope_of_step_ += y_[i].dot(step_[i]);
+    square_of_step_ += step_[i].squaredNorm();
+  }
+  for (Bound& bound : bounds_) {
+    bound.turns = 0.0;
+    if (bound.a.valid()) bound.turns += bound.J_a.dot(step_[bound.a]);
+    if (bound.b.valid()) bound.turns += bound.J_b.dot(step_[bound.b]);
+  }
+  for (Contact& contact : contacts_) {
+    contact.turns.setZero();
+    if (contact.a.valid()) contact.turns.noalias() += contact.J_a * step_[contact.a];
+    if (contact.b.valid()) contact.turns.noalias() += contact.J_b * step_[contact.b];
   }
 }
 
-void Newton::substitute() {
-  const int n = static_cast<int>(first_.size());
-  for (int i = 0; i < n; ++i) {
-    Six& x = step_[i];
-    for (int j = first_[i]; j < i; ++j) x.noalias() -= block(i, j) * step_[j];
-    block(i, i).triangularView<Eigen::Lower>().solveInPlace(x);
+// Updates the multipliers by the current impulses.
+Newton::Errors Newton::take_multipliers(double relaxation) {
+  Errors most;
+  const auto take = [&](double& held, double pulls, double response) {
+    most.yielded = std::max(most.yielded, yields_ * std::abs(pulls - held) * response);
+    held = pulls;
+  };
+  for (Bound& bound : bounds_) take(bound.held, bound.pulls, bound.row->response);
+  for (Contact& contact : contacts_) {
+    take(contact.held[0], contact.pulls[0], contact.rows[0]->response);
+    if (!contact.rows[1]) continue;
+    contact.held.tail<2>() = contact.pulls.tail<2>();
+    const double slip =
+        math::hypot(contact.missing[1] - contact.moves[1], contact.missing[2] - contact.moves[2]);
+    most.slipped = std::max(most.slipped, std::abs(slip - contact.slip));
+    contact.slip += relaxation * (slip - contact.slip);
   }
-  for (int i = n; i-- > 0;) {
-    Six& x = step_[i];
-    block(i, i).triangularView<Eigen::Lower>().transpose().solveInPlace(x);
-    for (int j = first_[i]; j < i; ++j) step_[j].noalias() -= block(i, j).transpose() * x;
-  }
-}
-
-// Updates the multipliers by the rows' current impulses. Returns the largest change, as a velocity.
-double Newton::take_multipliers() {
-  double change = 0.0;
-  for (Entry& entry : entries_) {
-    change =
-        std::max(change, std::abs(entry.pulls - entry.held) * entry.scale * entry.row->response);
-    entry.held = entry.pulls;
-  }
-  return change;
+  set_bounds();
+  return most;
 }
 
 // m/s
-double Newton::furthest(const std::vector<Six>& step) const {
+double Newton::furthest(const std::vector<Six>& change) const {
   double most = 0.0;
-  for (size_t i = 0; i < step.size(); ++i) {
-    const Body& body = bodies_[order_[i]];
-    most = std::max(most, step[i].norm() * body.root_mass.maxCoeff());
+  for (size_t i = 0; i < change.size(); ++i) {
+    const Body& body = bodies_[matrix_.body(i)];
+    most = std::max(most, change[i].norm() * body.root_mass.maxCoeff());
   }
   return most;
 }
 
-void Newton::solve(SolverBodies& bodies, double tolerance, int most_steps) {
-  for (Entry& entry : entries_) {
-    const Row& row = *entry.row;
-    entry.missing = entry.scale * (row.target - row.velocity(bodies) - row.softness * row.impulse);
+void Newton::give(SolverBodies& bodies) const {
+  for (const Bound& bound : bounds_) bound.row->give(bodies, bound.pulls - bound.begun);
+  for (const Contact& contact : contacts_) {
+    const Vec3 more = contact.pulls - contact.begun;
+    for (int k = 0; k < 3 && contact.rows[k]; ++k)
+      contact.rows[k]->give(bodies, (k == 0 ? 1.0 : contact.friction[k - 1]) * more[k]);
   }
-  y_.assign(first_.size(), Six::Zero());
-  step_ = y_;
-  for (Entry& entry : entries_) entry.pulls = entry.held;
-  set_bounds();
-  slope(y_);
-  bool factored = false;
+}
+
+void Newton::go_on(double part) {
+  for (size_t k = 0; k < y_.size(); ++k) y_[k] += part * step_[k];
+  for (Bound& bound : bounds_) {
+    bound.moves += part * bound.turns;
+    bound.turns = 0.0;
+  }
+  for (Contact& contact : contacts_) {
+    contact.moves += part * contact.turns;
+    contact.turns.setZero();
+  }
+  slope(0.0);
+  find_gradient();
+}
+
+bool Newton::solve(SolverBodies& bodies, double tolerance, int most_steps) {
+  start(bodies);
+  go_on(0.0);
+  double small = tolerance;  // error that ends Newton's method for these multipliers
+  double relaxation = 1.0;
+  Errors last = {kHuge, kHuge};
+  bool factored = false, done = false;
   for (int i = 0; i < most_steps; ++i) {
-    const bool same = factored && same_set();
-    if (!same) {
+    if (furthest(gradient_) <= small) {
+      const Errors errors = take_multipliers(relaxation);
+      done = std::max(errors.yielded, errors.slipped) <= tolerance;
+      if (done) break;
+      if (errors.slipped > kFalls * last.slipped)
+        relaxation = std::max(kRelaxed * relaxation, kLeastRelaxation);
+      const double least = errors.yielded > kFalls * last.yielded ? kYieldsLeast : kYieldsStiff;
+      small = std::max(tolerance, kErrorLeft * std::max(errors.yielded, errors.slipped));
+      if (errors.yielded > tolerance && yields_ > least) {
+        set_weights(std::max(least, kStiffer * yields_));
+        factored = false;
+      }
+      last = errors;
+      go_on(0.0);
+    }
+    if (!factored || any_slips() || !same_zones()) {
       assemble();
-      factor();
+      matrix_.factor();
       factored = true;
     }
-    for (size_t k = 0; k < step_.size(); ++k) step_[k] = -gradient_[k];
-    double begin = 0.0;
-    substitute();
-    for (size_t k = 0; k < step_.size(); ++k) begin += gradient_[k].dot(step_[k]);
-    double part = 1.0, low = 0.0, high = 1.0;
-    for (int k = 0;; ++k) {
-      trial_.resize(y_.size());
-      for (size_t j = 0; j < y_.size(); ++j) trial_[j] = y_[j] + part * step_[j];
-      const double end = slope(trial_);
-      if (k == kMostHalvings || std::abs(end) <= kSlopeLeft * std::abs(begin)) break;
-      if (end < 0.0 && part == 1.0) break;
-      (end > 0.0 ? high : low) = part;
-      part = 0.5 * (low + high);
-    }
-    y_.swap(trial_);
-    const bool settled = part == 1.0 && (same_set() || furthest(step_) <= tolerance);
-    if (!settled) {
-      set_bounds();
-      slope(y_);
-      continue;
-    }
-    if (take_multipliers() <= tolerance) break;
-    set_bounds();
-    slope(y_);
+    find_step();
+    go_on(search());
   }
-  for (Entry& entry : entries_) entry.row->give(bodies, entry.scale * (entry.pulls - entry.begun));
+  give(bodies);
+  return done;
 }
 
 }  // namespace ruedo::physics

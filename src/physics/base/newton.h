@@ -1,19 +1,21 @@
 // Solves all rows of an island at once, where sweeps would carry a load from box to box: the method
 // of multipliers, with Newton's method for its steps (as in X. Li, D. Sun, K.-C. Toh, "A highly
-// efficient semismooth Newton augmented Lagrangian method", 2018; here for contacts with friction).
+// efficient semismooth Newton augmented Lagrangian method", 2018).
 //
 // Each row acts like a stiff spring within its bounds, in addition to its previous impulse: a
-// convex problem in the bodies' velocities, six unknowns per body. Its solution gives the next
-// impulses and friction bounds, until nothing changes. Bodies are ordered by the Cuthill-McKee
-// algorithm, so that the matrix has a narrow band for stacks, walls and chains; its envelope is
-// factored by a Cholesky method in blocks of one body.
+// convex problem in the bodies' velocities, six unknowns per body. The springs of a contact pull to
+// the nearest point of Coulomb's cone (A. Castro, F. Permenter, X. Han, "An unconstrained convex
+// formulation of compliant contact", 2022). By that alone a contact that slips would also open, as
+// fast as it slips times the friction; so its normal velocity is aimed lower by that much (V.
+// Acary, F. Cadoux, "Applications of an existence result for the Coulomb friction problem", 2013).
+// The solution gives the next impulses and aims, and stiffer springs, until nothing changes.
 #pragma once
 
 #include <utility>
 #include <vector>
 
+#include "physics/base/envelope.h"
 #include "physics/base/rows.h"
-#include "ruedo/index.h"
 
 namespace ruedo::physics {
 
@@ -25,75 +27,92 @@ class Newton {
   // factorization, in multiplications.
   double prepare(const SolverBodies& bodies, const std::vector<std::pair<int, int>>& pairs);
 
-  void begin() { entries_.clear(); }
-  // Adds a row with fixed bounds. Returns its number.
-  size_t add(Row& row);
-  // Adds a row bounded by multiples of the impulse of the row `load`. Here and below, rows that can
-  // move nothing are left out: their springs would be infinitely stiff.
-  void add(Row& row, size_t load, double lever);
-  // Adds friction along two rows: within an ellipse with these coefficients, not 0, times that
-  // impulse.
-  void add(Row& along, Row& across, double friction, double friction2, size_t load);
+  void begin();
+  // Adds a row with fixed bounds. Here and below, rows that can move nothing are left out: their
+  // springs would be infinitely stiff.
+  void add(Row& row);
+  // Adds a contact, with friction within an ellipse with these coefficients. Returns its number.
+  size_t add(Row& normal, Row& along, Row& across, double friction, double friction2);
+  // Adds a row bounded by multiples of the normal impulse of a contact.
+  void add(Row& row, size_t contact, double lever);
 
   // Changes impulses and velocities until the next step would change no velocity by more than
-  // `tolerance`, or for at most that many steps.
-  void solve(SolverBodies& bodies, double tolerance, int most_steps);
+  // `tolerance`, or for at most that many steps. Returns whether it came to that.
+  bool solve(SolverBodies& bodies, double tolerance, int most_steps);
 
  private:
-  using Block = Eigen::Matrix<double, 6, 6>;
-  using Six = Eigen::Matrix<double, 6, 1>;
-  using PlaceIndex = Index<struct PlaceKind>;  // in the elimination order
+  using Six = Envelope::Six;
+  using Block = Envelope::Block;
+  using Reach = Eigen::Matrix<double, 3, 6>;
+  static constexpr size_t kNone = static_cast<size_t>(-1);
   struct Body {
-    PlaceIndex place;                                        // none: immovable
     Vec3 root_mass = Vec3::Zero();                           // M^-1 = L L^T
     Eigen::Matrix3d root_inertia = Eigen::Matrix3d::Zero();  // lower triangle
   };
-  enum class Kind : uint8_t { bounded, on_load, along, across };
-  struct Entry {
+  struct Bound {
     Row* row = nullptr;
-    Kind kind = Kind::bounded;
-    PlaceIndex a, b;                  // of the bodies
-    size_t load = 0;                  // the entry whose impulse bounds this one
-    double scale = 1.0;               // the entry's impulse is the row's divided by this
-    double weight = 0.0;              // of the spring
-    double lower = 0.0, upper = 0.0;  // of the impulse; friction: upper is the radius
-    double missing = 0.0;             // velocity error at the start of the solution
-    double begun = 0.0, held = 0.0;   // impulse at the start, and at the last multiplier update
+    PlaceIndex a, b;                 // of the bodies
+    size_t load = kNone;             // the contact that bounds it
+    double lever = 1.0;              // times this
+    double weight = 0.0;             // stiffness of the spring
+    double missing = 0.0;            // velocity error at the start of the solution
+    double begun = 0.0, held = 0.0;  // impulse at the start, and at the last multiplier update
+    double lower = 0.0, upper = 0.0;
+    double moves = 0.0, turns = 0.0;  // J y, J step
     double pulls = 0.0;               // current impulse
-    double stiffness = 0.0;           // its derivative; along `turn` for slipping friction
-    double turn = 0.0;                // angle of the combination of both friction rows
     bool active = false, was_active = false;
-    Six J_a = Six::Zero(), J_b = Six::Zero();  // scale J L
+    Six J_a = Six::Zero(), J_b = Six::Zero();  // J L
+  };
+  enum class Zone : uint8_t { open, sticks, slips };
+  // Normal, along, across; the last two in units in which the cone is round and of slope 1.
+  struct Contact {
+    Row* rows[3] = {};
+    PlaceIndex a, b;
+    double friction[2] = {};
+    double response_t = 0.0;              // of the tangential rows, the larger one
+    double weight = 0.0, weight_t = 0.0;  // stiffness of the springs
+    Vec3 softness = Vec3::Zero(), missing = Vec3::Zero(), begun = Vec3::Zero(), held = Vec3::Zero();
+    double slip = 0.0;  // speed that the aim assumes, times the friction
+    Vec3 moves = Vec3::Zero(), turns = Vec3::Zero(), pulls = Vec3::Zero();
+    Zone zone = Zone::open, was = Zone::open;
+    double sine = 0.0, cosine = 1.0;         // of the impulse's direction in the plane
+    double stiffness = 0.0, sideways = 0.0;  // that of slipping friction: radial, and across
+    Reach J_a = Reach::Zero(), J_b = Reach::Zero();
   };
 
-  void put_in_order(const std::vector<std::pair<int, int>>& pairs);
-  void lay_out(const std::vector<std::pair<int, int>>& pairs);
-  Block& block(int row, int column) {
-    return blocks_[start_[row] + static_cast<size_t>(column - first_[row])];
-  }
-  Entry& enter(Row& row, Kind kind, double scale, double response);
+  Six scaled(int body, const Vec3& linear, const Vec3& angular) const;
+  void start(const SolverBodies& bodies);
+  void set_weights(double yields);
   void set_bounds();
-  // Computes `pulls` and the gradient at y; returns its product with the step.
-  double slope(const std::vector<Six>& y);
-  void pull(Entry& entry, double wanted);
-  void rub(Entry& along, Entry& across, double first, double second);
-  bool same_set() const;
+  void pull(Bound& bound, double part);
+  void pull(Contact& contact, double part);
+  Vec3 stiffness_times(const Contact& contact, const Vec3& u) const;
+  double slope(double part);
+  double search();
+  void go_on(double part);
+  void find_gradient();
+  bool same_zones() const;
+  bool any_slips() const;
   void assemble();
-  void add_row(const Entry& entry, const Six& J_a, const Six& J_b, double weight);
-  void factor();
-  void substitute();
-  double take_multipliers();
-  double furthest(const std::vector<Six>& step) const;
+  void add_block(PlaceIndex a, PlaceIndex b, const auto& of_a, const auto& of_b);
+  void find_step();
+  // The most that springs yielded, and that slips differ from what was assumed: m/s.
+  struct Errors {
+    double yielded = 0.0, slipped = 0.0;
+  };
+  Errors take_multipliers(double relaxation);
+  double furthest(const std::vector<Six>& change) const;
+  void give(SolverBodies& bodies) const;
 
-  std::vector<Body> bodies_;                   // as the solver's
-  std::vector<int> movable_, degree_, order_;  // bodies; order_: by place
-  std::vector<size_t> first_neighbour_;
-  std::vector<int> neighbours_;
-  std::vector<int> first_;     // for each place, the first one that its blocks reach
-  std::vector<size_t> start_;  // for each place, its blocks in blocks_
-  std::vector<Block> blocks_;
-  std::vector<Six> y_, trial_, gradient_, step_;  // by place, as L^-1 v
-  std::vector<Entry> entries_;
+  std::vector<Body> bodies_;  // as the solver's
+  std::vector<char> movable_;
+  Envelope matrix_;
+  std::vector<Six> y_, gradient_, step_;  // by place, as L^-1 v
+  std::vector<Bound> bounds_;
+  std::vector<Contact> contacts_;
+  double yields_ = 0.0;  // softness of the springs, relative to the rows' responses
+  double slope_of_step_ = 0.0, square_of_step_ = 0.0;  // y step, step step
+  double curvature_ = 0.0;                             // at the last place of slope()
 };
 
 }  // namespace ruedo::physics

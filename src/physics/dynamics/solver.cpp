@@ -23,11 +23,15 @@ constexpr int kPushSweeps = 30;
 constexpr double kPushTolerance_m_s = 1e-5;
 // Sweeps before the first check, and between checks; a factorization may cost as much as that many
 // sweeps.
-constexpr int kSweepsBeforeNewton = 1, kSweepsBetweenNewton = 40, kNewtonSteps = 15;
+constexpr int kSweepsBeforeNewton = 1, kSweepsBetweenNewton = 40, kNewtonSteps = 30;
 // With friction, sweeps do not converge while few contacts bear the whole load.
 constexpr int kSweepsBeforeSharing = 10;
 constexpr int kSweepsOfMechanisms = 20;  // before Newton: their joints are solved directly anyway
 constexpr size_t kFewBodies = 2;         // something immovable and one body: sweeps are faster
+// Piles in motion are solved to this part of the speed at which they meet and slip.
+constexpr double kOfSpeed = 1e-3;
+// Of Newton's method, so that the sweep that follows finds nothing left to do.
+constexpr double kOfTolerance = 0.5;
 constexpr double kSweepsForAFactor = 30.0, kProductsOfARow = 40.0, kSmall = 20'000.0;
 // Beyond this a joint did not come apart by its own motion: it was pushed, or placed so.
 constexpr double kFastestClosing_m_s = 0.5;
@@ -296,6 +300,18 @@ double Solver::sweep(int number) {
   return worst;
 }
 
+// The accuracy at which sweeps end. To be called before the first one.
+double Solver::tolerance() const {
+  if (!blocks_.empty() || bodies_.size() <= kFewBodies + 1) return settings_.tolerance_m_s;
+  double fastest = 0.0;
+  for (size_t c = 0; c < contact_count_; ++c) {
+    const ContactRows& contact = contacts_[c];
+    for (const Row* row : {&contact.normal, &contact.along, &contact.across})
+      fastest = std::max(fastest, std::abs(row->velocity(bodies_)));
+  }
+  return std::max(settings_.tolerance_m_s, kOfSpeed * fastest);
+}
+
 // If that does not converge soon, all rows are solved at once; a solution that did not improve
 // matters is discarded. Between sweeps, impulses continue along conjugate directions (M.
 // Silcowitz-Hansen, S. Niebel, K. Erleben, "A nonsmooth nonlinear conjugate gradient method for
@@ -305,12 +321,13 @@ void Solver::sweep_until_still() {
   const int first = blocks_.empty() ? kSweepsBeforeNewton : kSweepsOfMechanisms;
   const auto start_conjugates = [](Row& row) { row.before = row.impulse, row.heading = 0.0; };
   for_each_main_row(start_conjugates);
+  tolerance_m_s_ = tolerance();
   double last_square = 0.0, before_newton = 0.0;
   bool after_newton = false, shared = false;
   for (int i = 0; i < settings_.iterations; ++i) {
     const double worst = sweep(i);
     if (i + 1 == settings_.iterations || (contact_count_ == 0 && blocks_.exact())) break;
-    const bool still = worst <= settings_.tolerance_m_s;
+    const bool still = worst <= tolerance_m_s_;
     if (still && shared) break;
     if (still || i == kSweepsBeforeSharing) {
       shared = still;
@@ -363,7 +380,7 @@ bool Solver::share_loads() {
     }
     shares_.add(bearing);
   }
-  return shares_.spread(bodies_, blocks_, settings_.tolerance_m_s);
+  return shares_.spread(bodies_, blocks_, tolerance_m_s_);
 }
 
 void Solver::go_on_along_conjugates(double& last_square, int sweep) {
@@ -405,14 +422,13 @@ void Solver::solve_at_once() {
   for (size_t c = 0; c < contact_count_; ++c) {
     ContactRows& contact = contacts_[c];
     if (contact.normal.inverse == 0.0) continue;
-    const size_t load = newton_.add(contact.normal);
-    if (contact.friction > 0.0 && contact.friction2 > 0.0)
-      newton_.add(contact.along, contact.across, contact.friction, contact.friction2, load);
+    const size_t load = newton_.add(contact.normal, contact.along, contact.across, contact.friction,
+                                    contact.friction2);
     if (contact.spinning > 0.0) newton_.add(contact.spin, load, contact.spinning);
     for (int k = 0; contact.rolling > 0.0 && k < 2; ++k)
       newton_.add(contact.roll[k], load, contact.rolling);
   }
-  newton_.solve(bodies_, settings_.tolerance_m_s, kNewtonSteps);
+  newton_.solve(bodies_, kOfTolerance * tolerance_m_s_, kNewtonSteps);
 }
 
 // Corrects penetration by velocities that move the bodies in this substep and are not kept.

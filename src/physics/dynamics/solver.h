@@ -93,6 +93,7 @@ class Solver {
   void start_from_last(ContactRows& contact, double substep_s);
   double rub(ContactRows& contact);
   double sweep(int number);
+  double tolerance() const;
   void sweep_until_still();
   bool share_loads();
   void go_on_along_conjugates(double& last_square, int sweep);
@@ -117,6 +118,7 @@ class Solver {
   size_t contact_count_ = 0;
   JointBlocks blocks_;
   LoadShares shares_;
+  double tolerance_m_s_ = 0.0;  // of this island
   Newton newton_;
   bool newton_known_ = false, newton_pays_ = false;  // for this island
   std::vector<std::pair<int, int>> pairs_;           // bodies coupled by rows

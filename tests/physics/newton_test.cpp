@@ -1,0 +1,141 @@
+// Newton's method over all rows of an island, beside closed forms and dense algebra.
+#include <cmath>
+#include <random>
+#include <utility>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "physics/base/envelope.h"
+#include "physics/base/newton.h"
+
+namespace ruedo::physics {
+namespace {
+
+TEST(Envelope, SolvesLikeADenseFactor) {
+  constexpr int kBodies = 7;
+  const std::vector<std::pair<int, int>> pairs = {{1, 2}, {2, 5}, {5, 3}, {3, 6}, {6, 1}, {0, 4}};
+  std::vector<char> takes_part(kBodies, 1);
+  takes_part[0] = 0;
+  Envelope envelope;
+  envelope.prepare(takes_part, pairs);
+  ASSERT_EQ(envelope.size(), 6u);
+  std::mt19937 random(1);
+  std::uniform_real_distribution<double> any(-1.0, 1.0);
+  Eigen::MatrixXd dense = Eigen::MatrixXd::Identity(36, 36);
+  envelope.set_identity();
+  for (const auto& [a, b] : pairs) {
+    const PlaceIndex p = envelope.place(a), q = envelope.place(b);
+    if (!p.valid() || !q.valid()) continue;
+    const Envelope::Block A = Envelope::Block::NullaryExpr([&] { return any(random); }),
+                          B = Envelope::Block::NullaryExpr([&] { return any(random); });
+    envelope.block(p, p) += A * A.transpose();
+    envelope.block(q, q) += B * B.transpose();
+    envelope.block(std::max(p, q), std::min(p, q)) +=
+        p > q ? Envelope::Block(A * B.transpose()) : Envelope::Block(B * A.transpose());
+    dense.block<6, 6>(6 * p, 6 * p) += A * A.transpose();
+    dense.block<6, 6>(6 * q, 6 * q) += B * B.transpose();
+    dense.block<6, 6>(6 * p, 6 * q) += A * B.transpose();
+    dense.block<6, 6>(6 * q, 6 * p) += B * A.transpose();
+  }
+  std::vector<Envelope::Six> x(6);
+  Eigen::VectorXd right(36);
+  for (int i = 0; i < 6; ++i) {
+    x[i] = Envelope::Six::NullaryExpr([&] { return any(random); });
+    right.segment<6>(6 * i) = x[i];
+  }
+  envelope.factor();
+  envelope.solve(x);
+  const Eigen::VectorXd expected = dense.llt().solve(right);
+  for (int i = 0; i < 6; ++i) EXPECT_LT((x[i] - expected.segment<6>(6 * i)).norm(), 1e-12);
+}
+
+// A tower of points: each stands on the one below, the first one on something immovable.
+class Tower {
+ public:
+  Tower(const std::vector<double>& masses, const Vec3& velocity) : bodies_(1) {
+    for (const double mass : masses) {
+      SolverBody& body = bodies_.emplace_back();
+      body.v = velocity;
+      body.inverse_mass = Vec3::Constant(1.0 / mass);
+      const int a = static_cast<int>(bodies_.size()) - 1;
+      pairs_.emplace_back(a, a - 1);
+      for (int k = 0; k < 3; ++k) {
+        Row row;
+        row.a = a;
+        row.b = a - 1;
+        row.linear_a = Vec3::Unit((k + 2) % 3);  // up, along, across
+        row.linear_b = -row.linear_a;
+        if (k == 0) row.upper = 1e30;
+        rows_.push_back(row);
+      }
+    }
+    for (Row& row : rows_) row.prepare(bodies_);
+  }
+
+  bool solve(double friction, double friction2, double tolerance = 1e-9) {
+    Newton newton;
+    newton.prepare(bodies_, pairs_);
+    newton.begin();
+    for (size_t i = 0; i < rows_.size(); i += 3)
+      newton.add(rows_[i], rows_[i + 1], rows_[i + 2], friction, friction2);
+    return newton.solve(bodies_, tolerance, 200);
+  }
+
+  const SolverBody& body(size_t i) const { return bodies_[i]; }
+  const Row& row(size_t i) const { return rows_[i]; }
+
+ private:
+  SolverBodies bodies_;
+  std::vector<std::pair<int, int>> pairs_;
+  std::vector<Row> rows_;
+};
+
+// It loses its fall, and of its slip the friction times that: m v = mu m 2 m/s. It does not rise.
+TEST(Newton, WhatSlipsKeepsTouching) {
+  Tower tower({3.0}, {5.0, 0.0, -2.0});
+  EXPECT_TRUE(tower.solve(0.4, 0.4));
+  EXPECT_LT((tower.body(1).v - Vec3(5.0 - 0.4 * 2.0, 0.0, 0.0)).norm(), 1e-7);
+  EXPECT_NEAR(tower.row(0).impulse, 3.0 * 2.0, 1e-6);
+}
+
+TEST(Newton, WhatSticksStops) {
+  Tower tower({3.0}, {0.6, -0.4, -2.0});
+  EXPECT_TRUE(tower.solve(0.4, 0.4));
+  EXPECT_LT(tower.body(1).v.norm(), 1e-7);
+}
+
+// Friction in the ellipse (x / mu)^2 + (y / mu2)^2 <= load^2 opposes the slip by maximum
+// dissipation: its direction is (mu^2 v_x, mu2^2 v_y), for the velocity after it.
+TEST(Newton, FrictionOfTwoCoefficientsDissipatesTheMost) {
+  const double mu = 0.6, mu2 = 0.2;
+  Tower tower({1.0}, {3.0, 4.0, -2.0});
+  EXPECT_TRUE(tower.solve(mu, mu2));
+  const Vec3 v = tower.body(1).v, p = v - Vec3(3.0, 4.0, -2.0);
+  EXPECT_NEAR(v.z(), 0.0, 1e-7);
+  EXPECT_NEAR(std::hypot(p.x() / mu, p.y() / mu2), 2.0, 1e-6);
+  EXPECT_NEAR(p.x() / p.y(), mu * mu * v.x() / (mu2 * mu2 * v.y()), 1e-6);
+}
+
+// A ton on a tower of light bodies: all stop, and each contact bears what is above it.
+TEST(Newton, ATowerStopsWhateverItsMasses) {
+  const std::vector<double> masses = {1.0, 0.01, 1.0, 0.5, 1000.0};
+  Tower tower(masses, {0.0, 0.1, -0.05});
+  EXPECT_TRUE(tower.solve(0.8, 0.8));
+  double above = 0.0;
+  for (size_t i = masses.size(); i-- > 0;) {
+    above += masses[i];
+    EXPECT_LT(std::abs(tower.body(i + 1).v.z()), 1e-6);
+    EXPECT_NEAR(tower.row(3 * i).impulse, 0.05 * above, 1e-6 * above);
+  }
+}
+
+TEST(Newton, WhatFliesApartIsLeftAlone) {
+  const Vec3 up(1.0, 0.0, 0.5);
+  Tower rising({1.0}, up);
+  EXPECT_TRUE(rising.solve(0.8, 0.8));
+  EXPECT_EQ(rising.body(1).v, up);
+}
+
+}  // namespace
+}  // namespace ruedo::physics
