@@ -219,6 +219,60 @@ TEST(Articulated, ACradlePassesTheSpeedOn) {
     EXPECT_LT(w.position("m" + std::to_string(i) + "/l").z() - 0.2, 1e-3) << i;
 }
 
+// Two weights below each other on vertical sliders, with dampers of any size: each sinks at (weight
+// that it bears - friction) / damping, relative to what it hangs on, and stays where the friction
+// bears all.
+TEST(Articulated, DampersSinkAtTheRateOfTheirLoad) {
+  struct Case {
+    double damping, friction;
+  };
+  for (const Case& c :
+       {Case{10, 0}, {2e4, 0}, {1e5, 0}, {1e8, 0}, {2e4, 30}, {1e5, 30}, {1e5, 60}}) {
+    for (const int64_t step_us : {1000, 2000, 5000, 10'000, 20'000}) {
+      const auto slider = [&](const std::string& name, const std::string& on) {
+        return "<link name='" + name + "'><pose>0 0 1 0 0 0</pose>" +
+               inertial("0.3 0.1 0 0 0 0", 5, 0.01, 0.1, 0.1) + "</link><joint name='j" + name +
+               "' type='prismatic'><parent>" + on + "</parent><child>" + name +
+               "</child><axis><xyz>0 0 1</xyz><dynamics><damping>" + std::to_string(c.damping) +
+               "</damping><friction>" + std::to_string(c.friction) +
+               "</friction></dynamics></axis></joint>";
+      };
+      World w("<model name='m'>" + slider("a", "world") + slider("b", "a") + "</model>", step_us);
+      w.run(c.damping < 100 ? 10.0 : 1.0);
+      const double of_a = std::max(0.0, 100 - c.friction) / c.damping,
+                   of_b = std::max(0.0, 50 - c.friction) / c.damping;
+      EXPECT_NEAR(w.physics.joint_velocity(JointIndex(0)), -of_a, 1e-3 * of_a) << c.damping;
+      EXPECT_NEAR(w.physics.joint_velocity(JointIndex(1)), -of_b, 1e-3 * of_b + 1e-9) << c.damping;
+      if (c.damping < 100) continue;
+      EXPECT_NEAR(w.physics.joint_position(JointIndex(0)), -of_a, 0.01 * of_a) << c.damping;
+    }
+  }
+}
+
+// The same in a loop, and with a servo at its limit beside the damper.
+TEST(Articulated, DampersAddUpAndBearWhatAServoCannot) {
+  for (const int64_t step_us : {1000, 5000, 20'000}) {
+    const auto slider = [](const std::string& name, double damping) {
+      return "<joint name='" + name +
+             "' type='prismatic'><parent>world</parent><child>a</child>"
+             "<axis><xyz>0 0 1</xyz><dynamics><damping>" +
+             std::to_string(damping) + "</damping></dynamics></axis></joint>";
+    };
+    const std::string weight =
+        "<link name='a'>" + inertial("0 0 0 0 0 0", 5, 0.01, 0.1, 0.1) + "</link>";
+    World loop(
+        "<model name='m'>" + weight + slider("left", 2e4) + slider("right", 3e4) + "</model>",
+        step_us);
+    loop.run(1.0);
+    EXPECT_NEAR(loop.physics.joint_velocity(JointIndex(0)), -50 / 5e4, 1e-3 * 50 / 5e4);
+    World served("<model name='m'>" + weight + slider("only", 2e4) + "</model>", step_us);
+    served.physics.servo_joint(JointIndex(0), {0.5, 1e5, -20.0, 20.0});
+    served.run(1.0);
+    EXPECT_NEAR(served.physics.joint_velocity(JointIndex(0)), -30 / 2e4, 1e-3 * 30 / 2e4);
+    EXPECT_NEAR(served.physics.joint_effort(JointIndex(0)), 20.0, 1e-6);
+  }
+}
+
 TEST(Articulated, AJointsSpringHolds) {
   World w("<model name='m'><link name='arm'><pose>0 0 1 0 0 0</pose>" +
               inertial("0.5 0 0 0 0 0", 2, 0.01, 0.1, 0.1) + "</link>" +

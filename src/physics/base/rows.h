@@ -34,7 +34,9 @@ struct JointMotor {
   double impulse = 0.0;             // the impulse that it gave
 };
 struct JointMotors {
-  JointMotor first, second;  // second: universal joints
+  JointMotor first, second;  // second: universal joints, screws, and the friction beside a servo
+  // For the damping about or along the axes of those two: rate 0, soft, without bounds.
+  JointMotor damper, second_damper;
 };
 
 using SolverBodies = std::vector<SolverBody>;  // the first one is immovable

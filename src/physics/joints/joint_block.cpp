@@ -172,6 +172,7 @@ struct JointBlocks::Values {
 void JointBlocks::clear() {
   rows_.clear();
   way_of_row_.clear();
+  damper_of_row_.clear();
   thirds_.clear();
   third_of_row_.clear();
   joints_.clear();
@@ -285,19 +286,33 @@ void JointBlocks::add_rows(Joint& joint, const SolverBodies& bodies, double subs
   joint.hinge = !block.is_tree && !joint.stop && add_hinge(*joint.constraint, joint, bodies);
   if (!joint.hinge) add_asked(*joint.constraint, joint, bodies, substep_s);
   const size_t first_motor = rows_.size();
-  if (motors && motors->first.on) add_motor(motors->first, joint, joint.reference, bodies);
-  if (motors && motors->second.on) add_motor(motors->second, joint, joint.reference, bodies);
+  size_t damper = 0;
+  if (motors) {
+    if (motors->first.on) add_motor(motors->first, joint, joint.reference, bodies);
+    if (motors->damper.on) {
+      damper = rows_.size();
+      add_motor(motors->damper, joint, joint.reference, bodies);
+    }
+    if (motors->second.on) add_motor(motors->second, joint, joint.reference, bodies);
+    if (motors->second_damper.on) add_motor(motors->second_damper, joint, joint.reference, bodies);
+  }
   joint.count = rows_.size() - joint.first;
   way_of_row_.resize(rows_.size(), JointTree::kNone);
+  bool led = false;  // a tree can prescribe one degree of freedom only once
   for (size_t i = joint.first; i < rows_.size(); ++i) {
     const Row& row = rows_[i];
     if (row.inverse == 0.0) continue;
-    // a tree can prescribe one degree of freedom only once
-    const bool second = block.is_tree && i > first_motor;
-    const bool direct = !is_stop(row) && row.upper > 0.0 && row.lower < 0.0 && !second &&
+    const bool of_tree = block.is_tree && i >= first_motor;
+    if (of_tree) way_of_row_[i] = joint.way;
+    if (of_tree && led && i == damper) {
+      damper_of_row_.resize(rows_.size());
+      damper_of_row_[first_motor] = damper;
+      continue;
+    }
+    const bool direct = !is_stop(row) && row.upper > 0.0 && row.lower < 0.0 && !(of_tree && led) &&
                         (block.is_tree || block.free.size() < kMostRowsAtOnce);
     (direct ? block.free : block.bounded).push_back(i);
-    if (block.is_tree && i >= first_motor) way_of_row_[i] = joint.way;
+    led |= of_tree && direct;
   }
 }
 
@@ -385,7 +400,7 @@ void JointBlocks::add_motor(JointMotor& motor, Joint& joint, int reference,
   row.lower = motor.lower;
   row.upper = motor.upper;
   row.prepare(bodies);
-  (joint.motors[0] ? joint.motors[1] : joint.motors[0]) = &motor;
+  joint.motors[joint.motor_count++] = &motor;
   rows_.push_back(row);
   if (motor.reference && reference > 0) add_third(motor, reference, bodies);
 }
@@ -556,7 +571,10 @@ void JointBlocks::factor(Block& block) {
   block.factored = true;
   if (!block.is_tree) return factor_matrix(block);
   block.tree.let_go();
-  for (const size_t i : block.free) block.tree.lead(way_of_row_[i], rows_[i].softness);
+  for (const size_t i : block.free) block.tree.lead(way_of_row_[i], softness_of(i));
+  for (const Spent& spent : block.spent)
+    if (const Row* damper = damper_of(spent.row))
+      block.tree.lead(way_of_row_[spent.row], damper->softness);
   block.tree.factor();
 }
 
@@ -629,20 +647,51 @@ double JointBlocks::aim(Block& block, const SolverBodies& bodies) {
   return worst;
 }
 
-// Motors that hold get their rate error; those at a bound get what they can give.
+// Of a motor in a tree and the damper beside it, which add up like springs side by side.
+double JointBlocks::softness_of(size_t motor) const {
+  const double alone = rows_[motor].softness;
+  const Row* damper = damper_of(motor);
+  return damper && alone > 0.0 ? 1.0 / (1.0 / alone + 1.0 / damper->softness) : alone;
+}
+
+// The rate error of a motor that holds, with the damper beside it.
+double JointBlocks::missing(const Block& block, size_t motor) const {
+  const Row& row = rows_[motor];
+  const double rate = block.tree.rate(way_of_row_[motor]);
+  const Row* damper = damper_of(motor);
+  if (!damper || row.softness == 0.0) return row.target - rate - row.softness * row.impulse;
+  return softness_of(motor) * (row.target / row.softness - row.impulse - damper->impulse) - rate;
+}
+
+// After a solution: how much more impulse the damper beside a motor gives.
+double JointBlocks::damper_gives(const Block& block, size_t motor) const {
+  const Row* damper = damper_of(motor);
+  if (!damper) return 0.0;
+  return -block.tree.rate_after(way_of_row_[motor]) / damper->softness - damper->impulse;
+}
+
+// Motors that hold get their rate error; those at a bound get what they can give, and their dampers
+// what the rate makes of them.
 double JointBlocks::aim_motors(Block& block) {
   double worst = 0.0;
   x_.resize(block.free.size());
   for (size_t i = 0; i < x_.size(); ++i) {
-    const Row& row = rows_[block.free[i]];
-    x_[i] = row.target - block.tree.rate(way_of_row_[block.free[i]]) - row.softness * row.impulse;
+    x_[i] = missing(block, block.free[i]);
     worst = std::max(worst, std::abs(x_[i]));
   }
-  for (const auto& [r, upper] : block.spent) {
-    const Row& row = rows_[r];
-    const double more = (upper ? row.upper : row.lower) - row.impulse;
-    block.tree.push(way_of_row_[r], more);
+  for (const Spent& spent : block.spent) {
+    const Row& row = rows_[spent.row];
+    const size_t way = way_of_row_[spent.row];
+    const double more = bound_of(spent) - row.impulse;
     worst = std::max(worst, std::abs(more) * row.response);
+    const Row* damper = damper_of(spent.row);
+    if (!damper) {
+      block.tree.push(way, more);
+      continue;
+    }
+    const double error = damper->softness * (more - damper->impulse) - block.tree.rate(way);
+    block.tree.aim(way, error);
+    worst = std::max(worst, std::abs(error));
   }
   return worst;
 }
@@ -656,7 +705,7 @@ bool JointBlocks::choose_spent(Block& block, bool one) {
   size_t kept = 0;
   for (size_t i = 0; i < block.free.size(); ++i) {
     const size_t r = block.free[i];
-    const double wanted = rows_[r].impulse + x_[i];
+    const double wanted = rows_[r].impulse + x_[i] - damper_gives(block, r);
     const bool holds = wanted >= rows_[r].lower && wanted <= rows_[r].upper;
     if (holds || (one && any)) {
       block.free[kept++] = r;
@@ -670,9 +719,9 @@ bool JointBlocks::choose_spent(Block& block, bool one) {
   for (size_t i = 0; i < block.spent.size(); ++i) {
     const Spent spent = block.spent[i];
     const Row& row = rows_[spent.row];
-    const double missing = row.target - block.tree.rate_after(way_of_row_[spent.row]) -
-                           row.softness * (spent.upper ? row.upper : row.lower);
-    const bool too_much = spent.upper ? missing < -kSame : missing > kSame;
+    const double error =
+        row.target - block.tree.rate_after(way_of_row_[spent.row]) - row.softness * bound_of(spent);
+    const bool too_much = spent.upper ? error < -kSame : error > kSame;
     if (i >= were_spent || !too_much || (one && any)) {
       block.spent[kept++] = spent;
     } else {
@@ -702,9 +751,17 @@ double JointBlocks::sweep_tree(Block& block, SolverBodies& bodies) {
     solve(block, x_);
     block.exact = false;
   }
-  for (size_t i = 0; i < x_.size(); ++i) rows_[block.free[i]].impulse += x_[i];
-  for (const auto& [r, upper] : block.spent)
-    rows_[r].impulse = upper ? rows_[r].upper : rows_[r].lower;
+  const auto damp = [&](size_t motor) {
+    const double more = damper_gives(block, motor);
+    if (damper_of(motor)) rows_[damper_of_row_[motor]].impulse += more;
+    return more;
+  };
+  for (size_t i = 0; i < x_.size(); ++i)
+    rows_[block.free[i]].impulse += x_[i] - damp(block.free[i]);
+  for (const Spent& spent : block.spent) {
+    damp(spent.row);
+    rows_[spent.row].impulse = bound_of(spent);
+  }
   block.tree.for_each_change([&](int body, const Vec3& v, const Vec3& w) {
     bodies[body].v += v;
     bodies[body].w += w;
@@ -713,13 +770,24 @@ double JointBlocks::sweep_tree(Block& block, SolverBodies& bodies) {
   return worst;
 }
 
+// A motor at a bound gives nothing against a push, its damper holds.
+void JointBlocks::hold_push(Block& block) const {
+  for (const Spent& spent : block.spent) {
+    const size_t way = way_of_row_[spent.row];
+    if (damper_of(spent.row))
+      block.tree.aim(way, -block.tree.rate(way));
+    else
+      block.tree.push(way, 0.0);
+  }
+}
+
 double JointBlocks::aim_push(Block& block, const SolverBodies& bodies) {
   double worst = 0.0;
   if (block.is_tree) {
     worst = block.tree.aim(
         [&](int body) { return std::pair(bodies[body].push_v, bodies[body].push_w); },
         closing_per_s_);
-    for (const Spent& spent : block.spent) block.tree.push(way_of_row_[spent.row], 0.0);
+    hold_push(block);
   }
   x_.resize(block.free.size());
   for (size_t i = 0; i < x_.size(); ++i) {
@@ -826,7 +894,7 @@ void JointBlocks::add_those_of_tree(Block& block, const std::vector<Row*>& conta
     block.tree.aim(moved, 0.0);
     for (const size_t k : block.free)
       block.tree.aim(way_of_row_[k], -block.tree.rate(way_of_row_[k]));
-    for (const Spent& spent : block.spent) block.tree.push(way_of_row_[spent.row], 0.0);
+    hold_push(block);
     block.tree.solve();
     for (size_t j = 0; j <= i; ++j) {
       const Row& other = *contacts[j];
@@ -874,8 +942,7 @@ double JointBlocks::look_again(double substep_s) {
     Values whole, none;
     const int n = ask(*joint.constraint, 1.0, substep_s, whole);
     if (!joint.errors_only) ask(*joint.constraint, 0.0, substep_s, none);
-    const size_t motors = joint.motors[1] ? 2 : joint.motors[0] ? 1 : 0;
-    for (size_t i = 0; i < joint.count - motors && i < static_cast<size_t>(n); ++i) {
+    for (size_t i = 0; i < joint.count - joint.motor_count && i < static_cast<size_t>(n); ++i) {
       Row& row = rows_[joint.first + i];
       row.push_target = whole.error[i * kSkip] - (joint.errors_only ? 0.0 : none.error[i * kSkip]);
       largest = std::max(largest, std::abs(row.push_target));
@@ -959,9 +1026,9 @@ void JointBlocks::add_locked_rows(const Joint& joint, const SolverBodies& bodies
 
 void JointBlocks::write_back() const {
   for (const Joint& joint : joints_) {
-    const size_t motors = joint.motors[1] ? 2 : joint.motors[0] ? 1 : 0;
-    for (size_t i = 0; i < motors; ++i)
-      joint.motors[i]->impulse = rows_[joint.first + joint.count - motors + i].impulse;
+    const size_t first = joint.first + joint.count - joint.motor_count;
+    for (size_t i = 0; i < joint.motor_count; ++i)
+      joint.motors[i]->impulse = rows_[first + i].impulse;
   }
 }
 

@@ -53,9 +53,10 @@ class JointBlocks {
   struct Joint {
     size_t first = 0, count = 0;  // rows
     btTypedConstraint* constraint = nullptr;
-    JointMotor* motors[2] = {};  // of the last rows, in that order
-    bool errors_only = true;     // without error reduction, no row has a target
-    bool hinge = false;          // not at a stop: we compute its five rows, not Bullet
+    JointMotor* motors[4] = {};  // of the last rows, in that order
+    size_t motor_count = 0;
+    bool errors_only = true;  // without error reduction, no row has a target
+    bool hinge = false;       // not at a stop: we compute its five rows, not Bullet
     int a = 0, b = 0, reference = 0;
     JointWays ways;
     std::optional<int> stop;  // Bullet's row for the stop that the joint is at
@@ -121,6 +122,18 @@ class JointBlocks {
   size_t root(size_t body);
   double sweep_tree(Block& block, SolverBodies& bodies);
   double aim_motors(Block& block);
+  double missing(const Block& block, size_t motor) const;
+  double damper_gives(const Block& block, size_t motor) const;
+  const Row* damper_of(size_t motor) const {
+    return motor < damper_of_row_.size() && damper_of_row_[motor] > 0
+               ? &rows_[damper_of_row_[motor]]
+               : nullptr;
+  }
+  double softness_of(size_t motor) const;
+  double bound_of(const Spent& spent) const {
+    return spent.upper ? rows_[spent.row].upper : rows_[spent.row].lower;
+  }
+  void hold_push(Block& block) const;
   bool choose_spent(Block& block, bool one);
   double aim(Block& block, const SolverBodies& bodies);
   double aim_push(Block& block, const SolverBodies& bodies);
@@ -137,7 +150,10 @@ class JointBlocks {
 
   std::vector<Row> rows_;
   std::vector<size_t> way_of_row_;  // in its block's tree; kNone: in none
-  std::vector<Row> locked_;         // of trees, for Newton's method
+  // In a tree, of a motor's row: that of the damper beside it, which is not 0; shorter where none
+  // follows. The two act on the same degree of freedom, and are solved as one.
+  std::vector<size_t> damper_of_row_;
+  std::vector<Row> locked_;  // of trees, for Newton's method
   std::vector<Third> thirds_;
   static constexpr size_t kNoThird = SIZE_MAX;
   std::vector<size_t> third_of_row_;  // asked for each pair of rows; shorter where none follows

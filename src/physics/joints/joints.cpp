@@ -1,5 +1,6 @@
-// Hinges, sliders, ball and universal joints. Damping and friction act like a motor with rate 0 and
-// a bounded impulse: however large they are, they never reverse a motion.
+// Hinges, sliders, ball and universal joints. Friction acts like a motor with rate 0 and a bounded
+// impulse, damping like one whose impulse is in proportion to the rate that results: however large
+// they are, they never reverse a motion.
 #include "physics/joints/joints.h"
 
 #include <algorithm>
@@ -289,18 +290,27 @@ void JointConstraint::turn_on(JointMotor& motor, const Vec3& axis, double rate, 
   motor.softness = 0.0;
 }
 
-// The servo and the joint's damping are one linear function of the rate; friction is a separate
-// row.
+// Takes the rate at the end of the substep, not that at its beginning: stable at any damping.
+void JointConstraint::damp(JointMotor& damper, const Vec3& axis, double damping,
+                           double substep_s) const {
+  if (damping <= 0.0) return;
+  constexpr double kAnything = 1e9;  // N m or N
+  turn_on(damper, axis, 0.0, -kAnything, kAnything, substep_s);
+  damper.softness = 1.0 / (damping * substep_s);
+}
+
 void JointConstraint::serve(const Vec3& axis, double substep_s) {
-  const double now = velocity(), damping = limits_.damping;
+  const double now = velocity();
   double rate = servo_.rate;
   if (rate * now > 0.0 && std::abs(now) >= limits_.velocity)
     rate = std::copysign(std::min(std::abs(rate), limits_.velocity), rate);
-  const double braked = -damping * now, gain = servo_.gain + damping;
-  turn_on(motors_->first, axis, servo_.gain * rate / gain,
-          std::max(servo_.lowest_torque, -limits_.effort) + braked,
-          std::min(servo_.highest_torque, limits_.effort) + braked, substep_s);
-  motors_->first.softness = 1.0 / (gain * substep_s);
+  motors_->first.impulse = 0.0;
+  if (servo_.gain > 0.0) {
+    turn_on(motors_->first, axis, rate, std::max(servo_.lowest_torque, -limits_.effort),
+            std::min(servo_.highest_torque, limits_.effort), substep_s);
+    motors_->first.softness = 1.0 / (servo_.gain * substep_s);
+  }
+  damp(motors_->damper, axis, limits_.damping, substep_s);
   if (limits_.friction > 0.0 && type_ != world::JointType::universal &&
       type_ != world::JointType::screw)
     turn_on(motors_->second, axis, 0.0, -limits_.friction, limits_.friction, substep_s);
@@ -329,9 +339,8 @@ void JointConstraint::limit_first_axis() {
 
 void JointConstraint::brake_second_axis(double substep_s) {
   const Vec3 axis = from_bt(child_.getWorldTransform().getRotation()) * axis2_in_C_;
-  const double rate = axis.dot(from_bt(child_.getAngularVelocity() - parent_.getAngularVelocity()));
-  const double brake = limits2_.friction + limits2_.damping * std::abs(rate);
-  turn_on(motors_->second, axis, 0.0, -brake, brake, substep_s);
+  turn_on(motors_->second, axis, 0.0, -limits2_.friction, limits2_.friction, substep_s);
+  damp(motors_->second_damper, axis, limits2_.damping, substep_s);
 }
 
 double JointConstraint::advanced() const {
@@ -382,7 +391,8 @@ void JointConstraint::follow(double leader_position, double leader_rate, double 
 
 void JointConstraint::before_substep(double substep_s) {
   if (!constraint_ || !constraint_->isEnabled()) return;
-  motors_->second.on = false;
+  motors_->first.on = motors_->second.on = false;
+  motors_->damper.on = motors_->second_damper.on = false;
   if (type_ == world::JointType::gearbox) return mesh_gears(substep_s);
   if (type_ == world::JointType::screw) hold_thread(substep_s);
   if (type_ == world::JointType::revolute && limited(limits_) && !within_a_turn(limits_)) {
@@ -407,8 +417,8 @@ void JointConstraint::before_substep(double substep_s) {
   }
   if (mode_ == Mode::servo) return serve(axis, substep_s);
   if (mode_ == Mode::effort) push(command_);
-  const double brake = limits_.friction + limits_.damping * std::abs(velocity());
-  turn_on(motors_->first, axis, 0.0, -brake, brake, substep_s);
+  turn_on(motors_->first, axis, 0.0, -limits_.friction, limits_.friction, substep_s);
+  damp(motors_->damper, axis, limits_.damping, substep_s);
 }
 
 void JointConstraint::after_substep(double substep_s) {
@@ -416,7 +426,6 @@ void JointConstraint::after_substep(double substep_s) {
   const bool driven = follows_ || mode_ == Mode::motor || mode_ == Mode::servo ||
                       type_ == world::JointType::gearbox;
   effort_ = driven ? motors_->first.impulse / substep_s : mode_ == Mode::effort ? command_ : 0.0;
-  if (mode_ == Mode::servo && !follows_) effort_ += limits_.damping * velocity();
   switch (type_) {
     case world::JointType::revolute:
     case world::JointType::continuous: {

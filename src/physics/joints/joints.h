@@ -114,6 +114,7 @@ class JointConstraint : private JointState {
   void wake();
   void turn_on(JointMotor& motor, const Vec3& axis, double rate, double lowest, double highest,
                double substep_s) const;
+  void damp(JointMotor& damper, const Vec3& axis, double damping, double substep_s) const;
   void serve(const Vec3& axis, double substep_s);
   void push(double effort);  // for one substep
   void limit_first_axis();   // of a universal joint, for one substep
