@@ -273,6 +273,78 @@ TEST(Articulated, DampersAddUpAndBearWhatAServoCannot) {
   }
 }
 
+// A heavy top in a gimbal of two rings (outer: Io about the vertical, inner: a), released at an
+// angle to the vertical: the conserved momenta about its axis and the vertical, and the energy,
+// make 2 m g l (Io + a + I1 sin^2) = (I3 s)^2 (cos(start) - cos) at the lowest point of its
+// nutation.
+class Top {
+ public:
+  static constexpr double kMass = 2.0, kLever = 0.065, kRing = 1e-4, kStart = 0.5, kI3 = 0.006,
+                          kI1 = 0.004;  // about its centre of mass
+  explicit Top(double spin, int64_t step_us) : w_(text(), step_us) {
+    const Vec3 axis = w_.physics.pose(rotor()).rotation * Vec3::UnitZ();
+    w_.physics.set_twist(rotor(), {Vec3::Zero(), spin * axis});
+  }
+  void step() { w_.physics.step(); }
+  double tilt() const { return std::acos((w_.physics.pose(rotor()).rotation * Vec3::UnitZ()).z()); }
+  // Of all parts, about the vertical through the pivot.
+  double momentum() const {
+    double sum = 0.0;
+    for (const BodyIndex i : w_.layout.bodies.indices()) {
+      const Twist& twist = w_.physics.twist(i);
+      const Vec3 arm = w_.physics.center_of_mass(i) - Vec3(0, 0, 1),
+                 v = twist.linear + twist.angular.cross(w_.physics.center_of_mass(i) -
+                                                        w_.physics.pose(i).translation);
+      sum += (w_.physics.inertia(i) * twist.angular + w_.physics.mass(i) * arm.cross(v)).z();
+    }
+    return sum;
+  }
+  static double lowest(double spin) {
+    const double I1 = kI1 + kMass * kLever * kLever;
+    const auto missing = [&](double tilt) {
+      const double s = std::sin(tilt);
+      return 2 * kMass * 10 * kLever * (2 * kRing + I1 * s * s) -
+             std::pow(kI3 * spin, 2) * (std::cos(kStart) - std::cos(tilt));
+    };
+    double low = kStart, high = M_PI / 2;
+    for (int i = 0; i < 60; ++i) (missing((low + high) / 2) > 0 ? low : high) = (low + high) / 2;
+    return low;
+  }
+
+ private:
+  BodyIndex rotor() const { return w_.body("m/rotor"); }
+  static std::string text() {
+    const std::string tilted = "<pose>0 0 1 " + std::to_string(kStart) + " 0 0</pose>";
+    return "<model name='m'><link name='outer'><pose>0 0 1 0 0 0</pose>" +
+           inertial("0 0 0 0 0 0", 0.1, kRing, kRing, kRing) + "</link><link name='inner'>" +
+           tilted + inertial("0 0 0 0 0 0", 0.1, kRing, kRing, kRing) +
+           "</link><link name='rotor'>" + tilted +
+           inertial("0 0 " + std::to_string(kLever) + " 0 0 0", kMass, kI1, kI1, kI3) + "</link>" +
+           hinge("z", "world", "outer", "0 0 1") + hinge("x", "outer", "inner", "1 0 0") +
+           hinge("spin", "inner", "rotor", "0 0 1") + "</model>";
+  }
+  World w_;
+};
+
+TEST(Articulated, ATopNutatesAsItsMomentaAllow) {
+  for (const double spin : {60.0, 150.0, 400.0}) {
+    for (const int64_t step_us : {1000, 5000, 20'000}) {
+      Top top(spin, step_us);
+      const double momentum = Top::kI3 * spin * std::cos(Top::kStart);
+      double lowest = 0.0, least = 0.0, most = 0.0;
+      for (int64_t t = 0; t < 4'000'000; t += step_us) {
+        top.step();
+        lowest = std::max(lowest, top.tilt());
+        least = std::min(least, top.momentum() - momentum);
+        most = std::max(most, top.momentum() - momentum);
+      }
+      const double nutation = Top::lowest(spin) - Top::kStart;
+      EXPECT_NEAR((lowest - Top::kStart) / nutation, 1.0, 0.03) << spin << " " << step_us;
+      EXPECT_LT(most - least, 5e-3 * momentum) << spin << " " << step_us;
+    }
+  }
+}
+
 TEST(Articulated, AJointsSpringHolds) {
   World w("<model name='m'><link name='arm'><pose>0 0 1 0 0 0</pose>" +
               inertial("0.5 0 0 0 0 0", 2, 0.01, 0.1, 0.1) + "</link>" +

@@ -18,6 +18,11 @@ struct SolverBody {
   Vec3 inverse_mass = Vec3::Zero();                           // 1/kg, along each axis of the world
   Eigen::Matrix3d inverse_inertia = Eigen::Matrix3d::Zero();  // world
   bool held = false;  // a row acted on it, or it has a joint
+  // Of a mechanism, where moments of inertia differ: its rotation before the substep, and by how
+  // much its angular momentum changes in the first half of it (N m s, world), as last found.
+  bool swings = false;
+  Quat before = Quat::Identity();
+  Vec3 swing = Vec3::Zero(), next_swing = Vec3::Zero();
 };
 // Drives or brakes a joint about or along one axis, in addition to Bullet's constraint.
 struct JointMotor {

@@ -95,6 +95,18 @@ void turn_freely(const btRigidBody& body, Quat& rotation, Vec3& w, double h) {
   w = rate(rotation);
 }
 
+// N m s about the centre of mass, world, of a body that has that rotation.
+Vec3 momentum_of(const btRigidBody& body, const Quat& rotation, const Vec3& w) {
+  return rotation *
+         (rotation.conjugate() * w).cwiseQuotient(from_bt(body.getInvInertiaDiagLocal()));
+}
+
+// By how much that changes while the body turns with w for a time.
+Vec3 swing_of(const btRigidBody& body, const Quat& rotation, const Vec3& w, double time) {
+  const Vec3 momentum = momentum_of(body, rotation, w);
+  return turned_by(Quat::Identity(), time * w) * momentum - momentum;
+}
+
 // For bodies that differ by many orders of magnitude, each correction may increase a joint's error.
 Vec3 bounded(const Vec3& velocity) {
   const double norm = velocity.norm();
@@ -123,6 +135,58 @@ void Solver::add_body(btRigidBody& body, double substep_s) {
   s.inverse_inertia = factor * matrix(body.getInvInertiaTensorWorld()) * factor;
   s.v += substep_s * s.inverse_mass.cwiseProduct(from_bt(body.getTotalForce()));
   s.w += substep_s * (s.inverse_inertia * from_bt(body.getTotalTorque()));
+}
+
+// The velocities of a mechanism's bodies are those in the middle between two poses. Half a substep
+// after a pose the angular momentum is I w + swing(w), and half a substep before it likewise; what
+// joints and forces give is the difference: a leapfrog, which is of second order, keeps angular
+// momentum, and lets no top's nutation grow. The swing depends on the result, and is found anew
+// until it fits (swing_again).
+void Solver::begin_to_swing(double substep_s) {
+  constexpr double kMost = 0.3;  // to which that shrinks the error each time
+  for (SolverBody& s : bodies_) {
+    if (!s.held || s.inverse_mass == Vec3::Zero() ||
+        s.bullet->getAngularFactor() != btVector3(1, 1, 1))
+      continue;
+    const Vec3 inverse = from_bt(s.bullet->getInvInertiaDiagLocal());
+    const double most = inverse.maxCoeff(), least = inverse.minCoeff();
+    if (!(least > 0.0) || most == least ||
+        0.5 * substep_s * s.w0.norm() * (most / least - 1.0) > kMost)
+      continue;
+    s.swings = true;
+    s.before = from_bt(s.bullet->getWorldTransform().getRotation());
+    s.swing = swing_of(*s.bullet, s.before, s.w0, 0.5 * substep_s);
+    s.w += s.inverse_inertia * (swing_of(*s.bullet, s.before, s.w0, -0.5 * substep_s) - s.swing);
+  }
+}
+
+// Returns whether that changed a velocity.
+bool Solver::swing_again(double substep_s) {
+  double worst = 0.0;
+  for (SolverBody& s : bodies_) {
+    if (!s.swings) continue;
+    s.next_swing = swing_of(*s.bullet, s.before, s.w, 0.5 * substep_s);
+    worst = std::max(worst, (s.inverse_inertia * (s.swing - s.next_swing)).cwiseAbs().maxCoeff());
+  }
+  if (worst <= settings_.tolerance_m_s) return false;
+  for (SolverBody& s : bodies_) {
+    if (!s.swings) continue;
+    s.w += s.inverse_inertia * (s.swing - s.next_swing);
+    s.swing = s.next_swing;
+  }
+  return true;
+}
+
+// The velocity that has the body's momentum in its new pose, half a substep after it.
+void Solver::end_swing(SolverBody& s, double substep_s) {
+  constexpr int kTimes = 3;
+  const Quat now = from_bt(s.bullet->getWorldTransform().getRotation());
+  const Vec3 momentum = momentum_of(*s.bullet, s.before, s.w) + s.swing;
+  const Vec3 inverse = from_bt(s.bullet->getInvInertiaDiagLocal());
+  for (int i = 0; i < kTimes; ++i) {
+    const Vec3 at_pose = momentum - swing_of(*s.bullet, now, s.w, -0.5 * substep_s);
+    s.w = now * inverse.cwiseProduct(now.conjugate() * at_pose);
+  }
 }
 
 void Solver::set_normal(ContactRows& contact, const ContactSurface& surface, double substep_s) {
@@ -490,7 +554,7 @@ void Solver::advance(double substep_s) {
     Quat rotation = from_bt(X.getRotation());
     const Vec3 turn = s.w + s.push_w;
     const bool free_axes = s.bullet->getAngularFactor() == btVector3(1, 1, 1);
-    if (free_axes && s.push_w == Vec3::Zero()) {
+    if (free_axes && !s.swings && s.push_w == Vec3::Zero()) {
       turn_freely(*s.bullet, rotation, s.w, substep_s);
     } else {
       rotation = turned_by(rotation, substep_s * turn);
@@ -526,6 +590,7 @@ void Solver::write_back(double substep_s) {
   blocks_.write_back();
   for (size_t i = 1; i < bodies_.size(); ++i) {
     SolverBody& s = bodies_[i];
+    if (s.swings) end_swing(s, substep_s);
     if (!s.bullet->isStaticOrKinematicObject()) {
       s.bullet->setLinearVelocity(to_bt(s.v));
       s.bullet->setAngularVelocity(to_bt(s.w));
@@ -555,9 +620,12 @@ void Solver::solve(const std::vector<btRigidBody*>& bodies,
     blocks_.add(*joint, a, b, reference ? tie(*reference) : 0);
   }
   blocks_.prepare(bodies_, substep_s);
+  if (!joints.empty()) begin_to_swing(substep_s);
   for (btPersistentManifold* manifold : manifolds) add_contacts(*manifold, substep_s);
   if (contact_count_ > 0 || !blocks_.empty()) {
+    constexpr int kMostSwings = 4;
     sweep_until_still();
+    for (int i = 0; i < kMostSwings && swing_again(substep_s); ++i) sweep_until_still();
     undo_penetration();
   }
   for (size_t c = 0; c < contact_count_; ++c) {

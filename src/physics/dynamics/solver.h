@@ -85,6 +85,9 @@ class Solver {
 
   int body_of(const btCollisionObject& object);
   void add_body(btRigidBody& body, double substep_s);
+  void begin_to_swing(double substep_s);
+  bool swing_again(double substep_s);
+  static void end_swing(SolverBody& s, double substep_s);
   void add_contacts(btPersistentManifold& manifold, double substep_s);
   void add_contact(btManifoldPoint& point, const ContactSurface& surface, int a, int b,
                    double substep_s);
