@@ -192,7 +192,11 @@ TEST(Wheels, AWallStopsIt) {
 }
 
 TEST(Wheels, AnotherRobotPushesIt) {
-  Sim sim(plane_sdf() + wheeled("0.8 0 0 0 0 0") + robot_sdf("k", "0 0 0 0 0 0", kNoWatchdog));
+  // Its motors yield before its tyres slip, which the other one's grip would just not make them.
+  Sim sim(plane_sdf() +
+          wheeled("0.8 0 0 0 0 0", limits(0.7, 1.0, 0.5, 0.5, 1.5) +
+                                       "<ruedo:max_wheel_torque>2</ruedo:max_wheel_torque>") +
+          robot_sdf("k", "0 0 0 0 0 0", kNoWatchdog));
   sim.run(1.0);
   sim.velocity(0.5, 0.0, RobotIndex(1));
   sim.run(3.0);
@@ -235,6 +239,57 @@ TEST(Wheels, SprungCastersLeaveTheLoadToTheWheels) {
   const auto caster = [](const std::string& name, const std::string& x) {
     return "<collision name='" + name + "'><pose>" + x +
            " 0 -0.15 0 0 0</pose><geometry><sphere><radius>0.05</radius></sphere></geometry>"
+// The file limits neither force nor torque, so that friction does: nose up, where the rear wheels
+// bear nearly all, it holds to a slope of atan(mu), and above it slides with g (sin - mu cos).
+TEST(Wheels, HoldsOnASlopeAsFarAsFrictionDoes) {
+  const double mu = 0.8;
+  for (const double more : {-0.01, 0.03}) {
+    for (const bool up : {true, false}) {
+      const double slope = std::atan(mu) + more;
+      Sim sim(box_sdf("slope", "0 0 0 0 " + std::to_string(-slope) + " 0", "40 40 0.2", 0.0, mu) +
+              wheeled(std::to_string(-0.1 * std::sin(slope)) + " 0 " +
+                      std::to_string(0.1 * std::cos(slope)) +
+                      (up ? " 0 " + std::to_string(-slope) + " 0"
+                          : " 0 " + std::to_string(slope) + " " + std::to_string(M_PI))));
+      sim.velocity(0.0, 0.0);
+      sim.run(1.0);
+      const Vec3 start = sim.position();
+      const double v = sim.robot().twist.linear.norm();
+      sim.run(2.0);
+      const double way = (sim.position() - start).norm();
+      if (more < 0.0) {
+        EXPECT_LT(way, 2e-3) << up;
+      } else {
+        const double a = 9.8 * (std::sin(slope) - mu * std::cos(slope));
+        EXPECT_NEAR(way, 2.0 * v + 0.5 * a * 4.0, 0.03 * way) << up;
+      }
+    }
+  }
+}
+
+TEST(Wheels, BrakesAsHardAsFrictionAllows) {
+  const double mu = 0.8, v = 2.0;
+  Sim sim(box_sdf("floor", "0 0 -0.1 0 0 0", "60 20 0.2", 0.0, mu) +
+          wheeled("0 0 0 0 0 0", limits(50, 50, 5, 1e3, 1e3)));
+  sim.velocity(v, 0.0);
+  sim.run(2.0);
+  ASSERT_NEAR(sim.robot().twist.linear.x(), v, 1e-3);
+  const Vec3 start = sim.position();
+  sim.velocity(0.0, 0.0);
+  sim.run(1.0);
+  EXPECT_NEAR((sim.position() - start).norm(), v * v / (2 * mu * 9.8), 0.01);
+}
+
+// A limit that the file gives, for the drive as a whole: each of the four wheels has a quarter.
+TEST(Wheels, TheForceOfItsFileLimitsTheAcceleration) {
+  Sim sim(plane_sdf() + wheeled("0 0 0 0 0 0", limits(50, 50, 1e3, 1e3, 1e3) +
+                                                   "<ruedo:max_force>80</ruedo:max_force>"));
+  sim.run(0.5);
+  sim.velocity(5.0, 0.0);
+  sim.run(0.5);
+  EXPECT_NEAR(sim.robot().twist.linear.x(), 0.5 * 80.0 / (20.0 + 4 * 0.005 / 0.01), 0.03);
+}
+
            "<surface><friction><ode><mu>0</mu><mu2>0</mu2></ode></friction><contact><ode>"
            "<kp>1e5</kp><kd>1e3</kd></ode></contact></surface></collision>";
   };

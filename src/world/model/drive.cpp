@@ -375,7 +375,9 @@ void read_limits(const Element& e, const Model& model, DriveDescription& drive) 
       e.number("ruedo:turn_acceleration", drive.turn_acceleration, acceleration);
   double mass = 0;
   for (const Link& link : model.links) mass += link.inertial.mass;
-  drive.max_force = e.number("ruedo:max_force", mass * kStandardGravity, effort);
+  const bool wheels = drive.kind == DriveDescription::Kind::wheels;  // friction limits them
+  drive.max_force =
+      e.number("ruedo:max_force", wheels ? drive.max_force : mass * kStandardGravity, effort);
   drive.max_wheel_torque = e.number("ruedo:max_wheel_torque", drive.max_wheel_torque, effort);
   drive.max_wheel_rate = e.number("ruedo:max_wheel_rate", drive.max_wheel_rate, speed);
 }
