@@ -297,7 +297,6 @@ inline bool is_of_no_effect(const std::string& path) {
                                             "physics/real_time_update_rate",
                                             "scene/grid",
                                             "scene/origin_visual",
-                                            "allow_auto_disable",
                                             "must_be_base_link",
                                             "collision/max_contacts",
                                             "visual/meta",

@@ -65,6 +65,7 @@ std::span<const Contact> PhysicsWorld::nearby(BodyIndex body) const {
 }
 bool PhysicsWorld::alone(BodyIndex body) const { return impl_->alone(body); }
 void PhysicsWorld::wake(BodyIndex body) { impl_->bullet(body).activate(true); }
+bool PhysicsWorld::may_sleep(BodyIndex body) const { return impl_->rigid_.bodies[body].sleeps; }
 void PhysicsWorld::sleep(BodyIndex body) { impl_->sleep(body); }
 bool PhysicsWorld::sleeping(BodyIndex body) const { return impl_->sleeping(body); }
 

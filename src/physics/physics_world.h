@@ -82,6 +82,7 @@ class PhysicsWorld {
   // Whether nothing is near that the body could touch.
   bool alone(BodyIndex body) const;
   void wake(BodyIndex body);
+  bool may_sleep(BodyIndex body) const;  // unless its file says otherwise
   void sleep(BodyIndex body);  // immediately, with velocity 0; a contact or wake() ends it
   bool sleeping(BodyIndex body) const;
 

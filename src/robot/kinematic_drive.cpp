@@ -533,7 +533,7 @@ void KinematicDrive::after_on_contacts(SimTime now) {
 }
 
 void KinematicDrive::fall_asleep_when_still(bool still) {
-  if (!still || !planner_.resting() || !is_still()) {
+  if (!still || !planner_.resting() || !is_still() || !physics_->may_sleep(body_)) {
     still_us_ = 0;
     return;
   }

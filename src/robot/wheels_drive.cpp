@@ -314,8 +314,9 @@ void WheelsDrive::read_wheel_rates() {
 }
 
 void WheelsDrive::fall_asleep_when_still() {
-  const bool still = planner_.resting() && twist_.linear.norm() < kStill_m_s &&
-                     twist_.angular.norm() < kStill_rad_s && std::abs(wheel_v_) < kStill_m_s;
+  const bool still = planner_.resting() && physics_->may_sleep(body_) &&
+                     twist_.linear.norm() < kStill_m_s && twist_.angular.norm() < kStill_rad_s &&
+                     std::abs(wheel_v_) < kStill_m_s;
   still_us_ = still ? still_us_ + step_us_ : 0;
   if (still_us_ < kFallAsleep_us) return;
   asleep_ = true;

@@ -93,6 +93,22 @@ TEST(Physics, ThingsAtRestSleepAndStay) {
   EXPECT_GT(w.physics.pose(BodyIndex(1)).translation.x(), rest.x() + 0.005);
 }
 
+// <allow_auto_disable>false</allow_auto_disable>, in a model and beside what includes one.
+TEST(Physics, WhatMayNotSleepStaysAwake) {
+  const std::string awake = "<allow_auto_disable>false</allow_auto_disable>";
+  std::string a = thing("a", "0 0 0.1 0 0 0", kBox, 1);
+  a.insert(a.find("<link"), awake);
+  World w(kPlane + a + thing("b", "1 0 0.1 0 0 0", kBox, 1), 5000);
+  w.run(10.0);
+  EXPECT_FALSE(w.physics.sleeping(w.body("a/l")));
+  EXPECT_TRUE(w.physics.sleeping(w.body("b/l")));
+  EXPECT_FALSE(w.physics.may_sleep(w.body("a/l")));
+  w.physics.sleep(w.body("a/l"));
+  w.run(5.0);
+  EXPECT_FALSE(w.physics.sleeping(w.body("a/l")));
+  EXPECT_NEAR(w.position("a/l").z(), 0.1, 1e-5);
+}
+
 std::string door(const std::string& axis) {
   return "<model name='d'><pose>0 0 1 0 0 0</pose><joint name='fixed' type='fixed'>"
          "<parent>world</parent><child>frame</child></joint>"

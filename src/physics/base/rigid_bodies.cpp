@@ -132,6 +132,7 @@ void make_bullet(double mass, const Vec3& moments, const Pose& X_WB, RigidBody& 
   bullet.setFlags(bullet.getFlags() | BT_DISABLE_WORLD_GRAVITY);  // gravity is set per body
   bullet.setGravity(to_bt(body.gravity));
   bullet.setUserPointer(&body.info);
+  if (!body.sleeps) bullet.forceActivationState(DISABLE_DEACTIVATION);
   // The farthest that any of it is from its centre of mass.
   bullet.setCcdSweptSphereRadius(size + (body.box_center - body.X_BI.translation).norm());
 }
@@ -300,6 +301,7 @@ void RigidBodies::make_body(const world::WorldModel& world, const world::BodyLay
     const world::Link& link = model.links[link_placement.link];
     gravity |= link.gravity;
     kinematic |= link.kinematic;
+    body.sleeps &= link.sleeps;
     if (link.wind) feel_wind(link.inertial, X_IB, link_placement.X_BL, body);
   }
   body.gravity = gravity && !kinematic ? world.gravity : Vec3(0, 0, 0);

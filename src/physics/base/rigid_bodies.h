@@ -50,6 +50,7 @@ struct RigidBody {
   ObjectInfo info;
   Pose X_BI;
   Vec3 gravity = Vec3::Zero();                              // at the start
+  bool sleeps = true;                                       // when it is at rest
   double wind_mass = 0.0;                                   // kg, of its links exposed to the wind
   Vec3 wind_center = Vec3::Zero();                          // centre of that mass, in I
   Vec3 box_center = Vec3::Zero(), box_half = Vec3::Zero();  // bounds of the shapes, in B

@@ -101,7 +101,8 @@ struct Link {
   Pose X_ML;
   Inertial inertial;
   bool gravity = true;
-  bool wind = false;  // whether the wind pushes it
+  bool wind = false;   // whether the wind pushes it
+  bool sleeps = true;  // may be put to sleep when it is at rest: <allow_auto_disable>
   bool kinematic = false;
   std::vector<Collision> collisions;
   std::vector<Visual> visuals;

@@ -34,6 +34,12 @@ void name_what_else_is_in(const Element& sdf, Findings& findings) {
   }
 }
 
+// What an <include> may say in place of its model.
+bool is_setting(const Element& child) {
+  return child.name == "static" || child.name == "enable_wind" ||
+         child.name == "allow_auto_disable" || child.name.rfind("ruedo:", 0) == 0;
+}
+
 }  // namespace
 
 std::string relative_to(const Element& owner) {
@@ -140,13 +146,10 @@ std::shared_ptr<const ScopedModel> SdfReader::read_overridden(const Element& mod
     std::erase_if(copy->children, [&](const auto& child) { return child->name == name; });
   };
   for (const auto& child : include.children) {
-    if (child->name == "static" || child->name == "enable_wind" ||
-        child->name.rfind("ruedo:", 0) == 0)
-      remove(child->name);
+    if (is_setting(*child)) remove(child->name);
   }
   for (const auto& child : include.children) {
-    if (child->name == "static" || child->name == "enable_wind" || child->name == "plugin" ||
-        child->name.rfind("ruedo:", 0) == 0) {
+    if (is_setting(*child) || child->name == "plugin") {
       copy->children.push_back(child->clone());
     } else if (child->name == "sensor") {
       Element* link = copy->child("link");
@@ -163,8 +166,8 @@ namespace {
 
 // What an <include> changes in the model itself, beyond its pose.
 bool is_override(const Element& child) {
-  return child.name == "static" || child.name == "enable_wind" || child.name == "plugin" ||
-         child.name == "sensor" || child.name == kParams || child.name.rfind("ruedo:", 0) == 0;
+  return is_setting(child) || child.name == "plugin" || child.name == "sensor" ||
+         child.name == kParams;
 }
 
 // Also false if <static> alone is given, with the value that the model has: nothing has to be read
@@ -221,11 +224,12 @@ std::shared_ptr<const ScopedModel> placed_by(const Element& include,
 
 std::optional<SdfReader::Included> SdfReader::include(const Element& element,
                                                       const std::string& where) {
-  report_other_children(element,
-                        {"uri", "name", "pose", "static", "enable_wind", "placement_frame",
-                         "plugin", "sensor", kParams, "ruedo:drive", "ruedo:joints",
-                         "ruedo:odometry", "ruedo:path", "ruedo:belt", "ruedo:door"},
-                        {"allow_auto_disable"}, where, context_.findings);
+  report_other_children(
+      element,
+      {"uri", "name", "pose", "static", "enable_wind", "allow_auto_disable", "placement_frame",
+       "plugin", "sensor", kParams, "ruedo:drive", "ruedo:joints", "ruedo:odometry", "ruedo:path",
+       "ruedo:belt", "ruedo:door"},
+      {}, where, context_.findings);
   const Element* uri = element.child("uri");
   if (!uri || uri->text.empty()) element.fail("has no <uri>");
   const auto path = context_.resources.find_model(uri->text, element.source.file);

@@ -251,8 +251,8 @@ void SdfReader::ModelReader::read_attributes() {
       element_,
       {"link", "joint", "frame", "model", "include", "pose", "static", "self_collide", "plugin",
        "ruedo:drive", "ruedo:joints", "ruedo:odometry", "ruedo:path", "ruedo:belt", "ruedo:door",
-       "transmission", "ros2_control", "enable_wind"},
-      {"allow_auto_disable"}, where_, findings_);
+       "transmission", "ros2_control", "enable_wind", "allow_auto_disable"},
+      {}, where_, findings_);
   model_->source = element_.source;
   model_->is_static = element_.boolean("static", false);
   model_->self_collide = element_.boolean("self_collide", false);
@@ -417,6 +417,7 @@ void SdfReader::ModelReader::append_link(const Element& child) {
   link.name = dotted(link.name);
   link.X_ML = X_ML;
   if (!child.has("enable_wind")) link.wind = element_.boolean("enable_wind", false);
+  link.sleeps = element_.boolean("allow_auto_disable", true);
   model_->links.push_back(std::move(link));
 }
 

@@ -216,7 +216,7 @@ struct Converter {
   void read_of_robot(const Element& child) {
     const std::string& name = child.name;
     if (name == "plugin" || name == "static" || name == "self_collide" || name == "enable_wind" ||
-        name.rfind("ruedo:", 0) == 0) {
+        name == "allow_auto_disable" || name.rfind("ruedo:", 0) == 0) {
       model->children.push_back(child.clone());
     } else if (name.find(':') == std::string::npos) {
       findings.unsupported(child.source, "robot " + urdf.getName(),
