@@ -96,7 +96,7 @@ std::unique_ptr<Drive> Robots::Impl::make_drive(RobotIndex robot) {
   const auto& drive = world_.models[placement.instance].model->drive;
   if (!drive || !placement.body.valid()) return nullptr;
   if (drive->kind == world::DriveDescription::Kind::wheels)
-    return std::make_unique<WheelsDrive>(world_, layout_, physics_, robot);
+    return std::make_unique<WheelsDrive>(world_, layout_, physics_, robot, planes_);
   return std::make_unique<KinematicDrive>(world_, layout_, physics_, robot, planes_);
 }
 

@@ -54,13 +54,18 @@ std::vector<BodyIndex> bodies_of(const world::WorldModel& world, const world::Bo
 }  // namespace
 
 WheelsDrive::WheelsDrive(const world::WorldModel& world, const world::BodyLayout& layout,
-                         physics::PhysicsWorld& physics, RobotIndex robot)
+                         physics::PhysicsWorld& physics, RobotIndex robot,
+                         const std::vector<world::LevelPlane>& planes)
     : Drive(world, layout, physics, robot),
       servos_(wheels_.size()),
+      planes_(planes),
+      lowest_(lowest_of_wheels(world, layout, robot)),
       max_torque_(description_->max_wheel_torque),
       believed_(WheelKinematics::believed(description_)) {
   place_wheels(layout);
   bodies_ = bodies_of(world, layout, robot);
+  for (const BodyIndex body : layout.bodies.indices())
+    if (layout.bodies[body].instance == layout.robots[robot].instance) all_bodies_.push_back(body);
   double mass = 0.0;
   for (const BodyIndex body : bodies_) mass += physics.mass(body);
   set_gains(mass);
@@ -113,6 +118,27 @@ SideRates WheelsDrive::mean_of_sides(const std::vector<double>& of_wheels) const
 }
 
 void WheelsDrive::begin_at_rest() {
+  leave_the_ground();
+  stand_still();
+}
+
+// The wheels of many models reach into the ground: contacts would throw the robot out.
+void WheelsDrive::leave_the_ground() {
+  constexpr double kGives_m = 5e-3, kLevel_rad = 5e-3;
+  const auto plane = nearest_plane(planes_, X_WBase_.translation.z() + lowest_);
+  const Vec3 up = X_WBase_.rotation * Vec3::UnitZ();
+  if (!plane || up.z() <= math::cos(kLevel_rad)) return;
+  const double deep = plane->height - (X_WBase_.translation.z() + lowest_);
+  if (deep < kGives_m || deep > description_->wheel_radius) return;
+  for (const BodyIndex body : all_bodies_) {
+    Pose X_WB = physics_->pose(body);
+    X_WB.translation.z() += deep;
+    physics_->set_pose(body, X_WB);
+  }
+  X_WBase_.translation.z() += deep;
+}
+
+void WheelsDrive::stand_still() {
   last_angles_.resize(wheels_.size());
   for (size_t i = 0; i < wheels_.size(); ++i)
     last_angles_[i] = servos_[i].angle = physics_->wheel_angle(wheels_[i]);
@@ -322,7 +348,7 @@ void WheelsDrive::fall_asleep_when_still() {
   asleep_ = true;
   twist_ = {};
   wheel_v_ = wheel_omega_ = 0.0;
-  begin_at_rest();
+  stand_still();
   for (const BodyIndex body : bodies_) physics_->sleep(body);
 }
 

@@ -17,13 +17,15 @@
 
 #include "robot/drive.h"
 #include "world/model/base_odometry.h"
+#include "world/model/ground.h"
 
 namespace ruedo::robot {
 
 class WheelsDrive final : public Drive {
  public:
   WheelsDrive(const world::WorldModel& world, const world::BodyLayout& layout,
-              physics::PhysicsWorld& physics, RobotIndex robot);
+              physics::PhysicsWorld& physics, RobotIndex robot,
+              const std::vector<world::LevelPlane>& planes);
 
   void before_step(SimTime now) override;
   void after_step(SimTime now) override;
@@ -35,6 +37,8 @@ class WheelsDrive final : public Drive {
  private:
   WheelsDrive& operator=(const WheelsDrive&) = default;
   void begin_at_rest() override;
+  void leave_the_ground();
+  void stand_still();
   SideRates mean_of_sides(const std::vector<double>& of_wheels) const;
   double yaw_correction();
   void turn_wheels(const Displacement& way);
@@ -62,7 +66,10 @@ class WheelsDrive final : public Drive {
   std::vector<Servo> servos_;      // as wheels_
   std::vector<Place> places_;      // as wheels_
   std::vector<BodyIndex> bodies_;  // its own: chassis, suspension and wheels
-  double max_torque_;              // N m, each wheel
+  Bound<const std::vector<world::LevelPlane>> planes_;
+  std::vector<BodyIndex> all_bodies_;  // of its model
+  double lowest_;                      // of the wheels, below base_link
+  double max_torque_;                  // N m, each wheel
   WheelKinematics believed_;
   std::optional<world::BaseOdometry> base_;         // for drives other than differential ones
   std::vector<double> last_angles_;                 // of the encoders, as in wheels_

@@ -180,6 +180,21 @@ TEST(Wheels, RestsWithoutDrift) {
   }
 }
 
+// Contacts would throw it into the air from a depth of centimetres.
+TEST(Wheels, LeavesTheGroundInWhichItStarts) {
+  for (const double height : {-0.09, -0.03, -0.01, 0.0}) {
+    Sim sim(plane_sdf() + wheeled("0 0 " + std::to_string(height) + " 0 0 0.3"));
+    double highest = 0.0;
+    for (int i = 0; i < 400; ++i) {
+      sim.step();
+      highest = std::max(highest, sim.position().z());
+    }
+    EXPECT_LT(highest, 1e-3) << height;
+    EXPECT_NEAR(sim.position().z(), 0.0, 1e-3) << height;
+    EXPECT_LT(sim.position().head<2>().norm(), 1e-3) << height;
+  }
+}
+
 TEST(Wheels, AWallStopsIt) {
   Sim sim(plane_sdf() +
           wheeled("0 0 0 0 0 0", limits(0.7, 1.0, 0.5, 0.5, 1.5) +
@@ -224,21 +239,6 @@ TEST(Wheels, StandsAcrossASlopeWithTheFrictionOfItsFile) {
   }
 }
 
-// Two wheels, and a caster ahead and behind: rigid casters may carry all of the load, since rigid
-// bodies do not determine how it is shared. Sprung ones leave it to the wheels.
-TEST(Wheels, SprungCastersLeaveTheLoadToTheWheels) {
-  const auto wheel = [](const std::string& name, const std::string& y) {
-    return "<link name='" + name + "'><pose>0 " + y +
-           " 0.1 -1.5707963267948966 0 0</pose><inertial><mass>1</mass><inertia><ixx>0.003</ixx>"
-           "<iyy>0.003</iyy><izz>0.005</izz></inertia></inertial><collision name='c'><geometry>"
-           "<cylinder><radius>0.1</radius><length>0.04</length></cylinder></geometry></collision>"
-           "</link><joint name='" +
-           name + "_joint' type='continuous'><parent>base</parent><child>" + name +
-           "</child><axis><xyz>0 0 1</xyz></axis></joint>";
-  };
-  const auto caster = [](const std::string& name, const std::string& x) {
-    return "<collision name='" + name + "'><pose>" + x +
-           " 0 -0.15 0 0 0</pose><geometry><sphere><radius>0.05</radius></sphere></geometry>"
 // The file limits neither force nor torque, so that friction does: nose up, where the rear wheels
 // bear nearly all, it holds to a slope of atan(mu), and above it slides with g (sin - mu cos).
 TEST(Wheels, HoldsOnASlopeAsFarAsFrictionDoes) {
@@ -290,6 +290,21 @@ TEST(Wheels, TheForceOfItsFileLimitsTheAcceleration) {
   EXPECT_NEAR(sim.robot().twist.linear.x(), 0.5 * 80.0 / (20.0 + 4 * 0.005 / 0.01), 0.03);
 }
 
+// Two wheels, and a caster ahead and behind: rigid casters may carry all of the load, since rigid
+// bodies do not determine how it is shared. Sprung ones leave it to the wheels.
+TEST(Wheels, SprungCastersLeaveTheLoadToTheWheels) {
+  const auto wheel = [](const std::string& name, const std::string& y) {
+    return "<link name='" + name + "'><pose>0 " + y +
+           " 0.1 -1.5707963267948966 0 0</pose><inertial><mass>1</mass><inertia><ixx>0.003</ixx>"
+           "<iyy>0.003</iyy><izz>0.005</izz></inertia></inertial><collision name='c'><geometry>"
+           "<cylinder><radius>0.1</radius><length>0.04</length></cylinder></geometry></collision>"
+           "</link><joint name='" +
+           name + "_joint' type='continuous'><parent>base</parent><child>" + name +
+           "</child><axis><xyz>0 0 1</xyz></axis></joint>";
+  };
+  const auto caster = [](const std::string& name, const std::string& x) {
+    return "<collision name='" + name + "'><pose>" + x +
+           " 0 -0.15 0 0 0</pose><geometry><sphere><radius>0.05</radius></sphere></geometry>"
            "<surface><friction><ode><mu>0</mu><mu2>0</mu2></ode></friction><contact><ode>"
            "<kp>1e5</kp><kd>1e3</kd></ode></contact></surface></collision>";
   };
