@@ -229,12 +229,13 @@ class Loader {
     room.add(world_.models.back());
   }
 
-  // A guessed drive, for a model that has got one from an <include> or --drive.
+  // A guessed drive, for a model that has got one from an <include> or --drive, or shall have none.
   bool is_settled(const Finding& finding) const {
     if (finding.text.rfind(kNoDriveIsWritten, 0) != 0) return false;
     return std::none_of(world_.models.begin(), world_.models.end(), [&](const ModelInstance& each) {
       const Model& model = *each.model;
-      return model.source.str() == finding.source.str() && (!model.drive || model.drive->guessed);
+      return model.source.str() == finding.source.str() && model.guess &&
+             (!model.drive || model.drive->guessed);
     });
   }
 

@@ -50,6 +50,30 @@ const char* const kCar =
     "<ruedo:right_joint>j_rr</ruedo:right_joint><ruedo:steer_joint>sl</"
     "ruedo:steer_joint><ruedo:steer_joint>sr</ruedo:steer_joint></ruedo:drive>";
 
+// A model with wheels that look driven: a sensor makes it a robot, whose drive is guessed, unless
+// the file says that its joints take commands, or that it does not drive.
+TEST(DriveKinds, AFileMaySayThatThereIsNone) {
+  const std::string robot =
+      "<model name='m'><link name='base'><sensor name='s' type='imu'/></link>" +
+      wheel("left_wheel", "0 0.2 0.1 0 0 0") + wheel("right_wheel", "0 -0.2 0.1 0 0 0");
+  const auto guessed = world_of(robot + "</model>");
+  ASSERT_TRUE(guessed->models[0].model->drive);
+  EXPECT_TRUE(guessed->models[0].model->drive->guessed);
+  const std::string plugin =
+      "<plugin filename='libgazebo_ros_diff_drive.so' name='d'><leftJoint>j_left_wheel</leftJoint>"
+      "<rightJoint>j_right_wheel</rightJoint></plugin>";
+  ASSERT_TRUE(world_of(robot + "<ruedo:joints/>" + plugin + "</model>")->models[0].model->drive);
+  for (const std::string& none :
+       {std::string("<ruedo:joints/>"), std::string("<ruedo:drive type='none'/>"),
+        "<ruedo:drive type='none'/><ruedo:joints/>" + plugin}) {
+    const auto world = world_of(robot + none + "</model>");
+    EXPECT_FALSE(world->models[0].model->drive) << none;
+    EXPECT_TRUE(world->models[0].is_robot()) << none;
+    EXPECT_EQ(world->models[0].model->commanded, none.find("joints") != std::string::npos);
+    EXPECT_THAT(world->findings, IsEmpty()) << none;
+  }
+}
+
 TEST(DriveKinds, ACarTurnsAboutItsRearAxle) {
   const auto world = world_of(car(kCar));
   const DriveDescription& drive = *world->models[0].model->drive;

@@ -475,7 +475,7 @@ bool is_own_drive(const std::string& type) {
 std::string drive_types() {
   std::string all = "kinematic";
   for (const DriveKind& kind : drive_kinds()) all += ", " + kind.type;
-  return all + " and wheels";
+  return all + ", wheels and none";
 }
 
 }  // namespace
@@ -645,6 +645,7 @@ void find_drive(const Element& model_element, const std::vector<const Element*>&
           "the controller " + controllers.controller + " cannot be used: " + error.message());
     }
   }
+  if (!model.guess) return;
   GuessedDrive guess = guess_drive(model, controlled_joints(model_element));
   if (std::any_of(guess.wheels.begin(), guess.wheels.end(),
                   [&](const std::string& wheel) { return is_turned_by_plugin(plugins, wheel); }))
@@ -683,6 +684,25 @@ void take_drive(const Element& plugin, const std::shared_ptr<const Element>& odo
 
 }  // namespace
 
+namespace {
+
+// type="none": the model does not drive, whatever wheels and plugins it has.
+bool is_none(const Element& drive) {
+  const std::string* type = drive.attribute("type");
+  if (!type || *type != "none") return false;
+  if (!drive.children.empty())
+    drive.children[0]->fail("is not allowed with type 'none', which has no elements");
+  return true;
+}
+
+// <ruedo:joints/> says that the joints take commands; any URDF file's do, without saying so.
+bool may_be_guessed(const Element& model_element) {
+  const Element* joints = model_element.child("ruedo:joints");
+  return !joints || joints->attribute(kImplied);
+}
+
+}  // namespace
+
 void read_drive_of(const Element& model_element, const std::string& where, ReadContext& context,
                    Model& model) {
   std::vector<const Element*> plugins;
@@ -692,7 +712,10 @@ void read_drive_of(const Element& model_element, const std::string& where, ReadC
   if (const Element* written = model_element.child("ruedo:odometry")) odometry = written->clone();
   if (const auto drives = model_element.all("ruedo:drive"); !drives.empty()) {
     if (drives.size() > 1) drives[1]->fail("a second drive; a model has one");
-    model.drive = read_drive(drives[0]->clone(), odometry, model);
+    model.guess = !is_none(*drives[0]);
+    if (model.guess) model.drive = read_drive(drives[0]->clone(), odometry, model);
+  } else {
+    model.guess = may_be_guessed(model_element);
   }
   std::set<std::string> named;
   for (const Element* plugin : plugins) {
@@ -705,7 +728,8 @@ void read_drive_of(const Element& model_element, const std::string& where, ReadC
       take_drive(*plugin, odometry, where, context.findings, model);
   }
   name_lone_tracks(plugins, model, where, context.findings);
-  if (!model.drive) find_drive(model_element, plugins, odometry, where, context, model);
+  if (!model.drive && !model_element.has("ruedo:drive"))
+    find_drive(model_element, plugins, odometry, where, context, model);
   name_odd_drive(model_element, model, where, context.findings);
   if (!model.is_static) {
     read_holds(plugins, where, context.findings, model);

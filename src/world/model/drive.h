@@ -46,6 +46,8 @@ inline bool moves_sideways(DriveDescription::Steering steering) {
 }
 
 // The prefix of findings about a drive that no file describes.
+// An attribute of a <ruedo:joints> that no file has.
+inline constexpr const char* kImplied = "implied";
 inline constexpr const char* kNoDriveIsWritten = "no file says how it drives";
 
 // The elements allowed in <ruedo:drive> and <ruedo:odometry>.

@@ -279,6 +279,7 @@ struct Model {
   IndexedVector<ModelJointIndex, Joint> joints;
   std::vector<SensorDescription> sensors;
   std::optional<DriveDescription> drive;
+  bool guess = true;  // a drive that no file describes, from the wheels
   bool commanded =
       false;  // its joints take commands, which makes even an arm without sensors a robot
   std::shared_ptr<const Element> path;  // <ruedo:path> or an actor's trajectory; null: none

@@ -11,6 +11,7 @@
 #include <urdf_model/model.h>
 #include <urdf_parser/urdf_parser.h>
 
+#include "world/model/drive.h"
 #include "world/read/degrees.h"
 #include "world/read/no_effect.h"
 #include "world/read/read_context.h"
@@ -583,7 +584,7 @@ std::unique_ptr<Element> urdf_as_sdf(const Element& written, Findings& findings)
   }
   if (!model.has("ruedo:joints"))
     // makes any <robot> a robot, even an arm without sensors
-    add(model, "ruedo:joints", robot.source);
+    add(model, "ruedo:joints", robot.source).attributes.emplace_back(kImplied, "");
   Element sdf;
   sdf.name = "sdf";
   sdf.children.push_back(std::move(converter.model));
