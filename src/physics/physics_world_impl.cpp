@@ -9,6 +9,7 @@
 #include <numeric>
 #include <span>
 
+#include "base/sincos.h"
 #include "physics/state_check.h"
 #include "ruedo/errors.h"
 #include "ruedo/quantity.h"
@@ -618,6 +619,16 @@ void PhysicsWorld::Impl::sleep(BodyIndex body) {
   bullet(body).setActivationState(ISLAND_SLEEPING);
 }
 
+// The mean over a step is that in its middle, half a step ago. A vehicle's turns with it.
+void PhysicsWorld::Impl::turn_accelerations(Snapshot& snapshot) const {
+  const double half_step_s = 0.5e-6 * static_cast<double>(step_us_);
+  for (const world::RobotPlacement& robot : layout_.robots) {
+    if (!robot.body.valid() || !world_.models[robot.instance].model->drive) continue;
+    Vec3& acceleration = snapshot.body_accelerations[robot.body];
+    acceleration = about_z(half_step_s * twists_[robot.body].angular.z()) * acceleration;
+  }
+}
+
 void PhysicsWorld::Impl::read(Snapshot& snapshot) {
   const double step_s = static_cast<double>(step_us_) * 1e-6;
   snapshot.bodies = poses_;
@@ -628,6 +639,7 @@ void PhysicsWorld::Impl::read(Snapshot& snapshot) {
     if (motions_[i].fresh && !motions_[i].tied && !mechanism_in_the_air(i).empty())
       snapshot.body_accelerations[i] = from_bt(rigid_.bodies[i].bullet->getGravity());
   }
+  turn_accelerations(snapshot);
   accelerate_at_start(snapshot);
   snapshot.joint_positions.resize(joints_.size());
   snapshot.joint_velocities.resize(joints_.size());

@@ -144,6 +144,7 @@ class PhysicsWorld::Impl {
   std::vector<BodyIndex> mechanism_in_the_air(BodyIndex body) const;
   Vec3 velocity_now(BodyIndex body) const;
   void fall_at_start(const std::vector<BodyIndex>& bodies, Snapshot& snapshot) const;
+  void turn_accelerations(Snapshot& snapshot) const;
   void accelerate_at_start(Snapshot& snapshot);
   void accelerate_at_start(const std::vector<BodyIndex>& bodies, Snapshot& snapshot);
   BodyIndex root(BodyIndex body);

@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "base/sincos.h"
+
 namespace ruedo::robot {
 
 namespace {
@@ -58,7 +60,10 @@ void Drive::set_state(const Pose& X_WBase, const Twist& twist) {
   X_WBase_ = X_WBase;
   twist_ = twist;
   const Vec3 velocity = X_WBase.rotation * twist.linear;
-  acceleration_ = X_WBase.rotation.conjugate() * Vec3((velocity - velocity_) / step_s_);
+  // The mean over the step is that in its middle; the robot has turned on since, and it with it.
+  acceleration_ = X_WBase.rotation.conjugate() *
+                  (about_z(0.5 * step_s_ * (X_WBase.rotation * twist.angular).z()) *
+                   Vec3((velocity - velocity_) / step_s_));
   velocity_ = velocity;
 }
 

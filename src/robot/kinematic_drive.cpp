@@ -53,11 +53,6 @@ std::vector<BodyIndex> flippers_of(const world::WorldModel& world, const world::
   return flippers;
 }
 
-Quat about_z(double angle) {
-  const auto [sine, cosine] = math::sincos(0.5 * angle);
-  return {cosine, 0.0, 0.0, sine};
-}
-
 }  // namespace
 
 KinematicDrive::KinematicDrive(const world::WorldModel& world, const world::BodyLayout& layout,

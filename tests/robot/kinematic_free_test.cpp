@@ -33,6 +33,27 @@ TEST_P(FreeAtAnyStep, AdvanceOneMetreByTriangles) {
   }
 }
 
+// v omega to the left on a circle, and beside it the change of the speed: what an accelerometer
+// shows, too.
+TEST_P(FreeAtAnyStep, AccelerationTurnsWithTheRobot) {
+  Sim sim(free_robot(limits(5.0, 5.0, 0.5, 1.0, 1e3) + "<ruedo:watchdog>0</ruedo:watchdog>"),
+          GetParam());
+  const auto expect = [&](double ahead, double left, double tolerance) {
+    EXPECT_NEAR((sim.robot().acceleration - Vec3(ahead, left, 0)).norm(), 0.0, tolerance);
+    const BodyIndex body = sim.layout.robots[RobotIndex(0)].body;
+    const Vec3 shown =
+        sim.robot().X_WBase.rotation.conjugate() * sim.state.body_accelerations[body];
+    EXPECT_NEAR((shown - Vec3(ahead, left, 0)).norm(), 0.0, tolerance);
+  };
+  sim.velocity(2.0, 1.3);
+  sim.run(2.0);
+  ASSERT_NEAR(sim.robot().twist.linear.x(), 1.0, 1e-6);
+  const double step_s = 1e-6 * static_cast<double>(GetParam());
+  expect(0.5, 1.3 * 1.0, 0.5 * 1.3 * step_s + 3e-4);  // the speed changes on in half a step
+  sim.run(2.5);
+  expect(0.0, 1.3 * 2.0, 2e-4 * 2.6);
+}
+
 // The same commands at the same times give the same path, up to rounding. Commands come at
 // multiples of 50 ms.
 TEST_P(FreeAtAnyStep, FreeMotionDoesNotDependOnTheStep) {
