@@ -3,6 +3,29 @@
 #include <algorithm>
 
 namespace ruedo::dds {
+namespace {
+
+constexpr size_t kWriterOfHeartbeat = 8;
+
+// Calls with each data submessage or heartbeat, the prefix of its sender and its writer.
+template <class Do>
+void for_each_said(std::span<uint8_t> message, Do what) {
+  if (message.size() < kMessageHeader) return;
+  Prefix sender = sender_at(message, kSenderInHead).prefix;
+  for_each_submessage(message, [&](const Submessage& each) {
+    if (each.is_source()) sender = sender_at(each.bytes, Submessage::kSender).prefix;
+    const bool beats = each.kind() == Submessage::kHeartbeat;
+    if (!beats && !each.is_data()) return;
+    const size_t place = beats ? kWriterOfHeartbeat : Submessage::kWriter;
+    EarlyMessages::Entity writer{};
+    if (each.bytes.size() < place + writer.size()) return;
+    std::copy_n(each.bytes.begin() + static_cast<std::ptrdiff_t>(place), writer.size(),
+                writer.begin());
+    what(each, sender, writer);
+  });
+}
+
+}  // namespace
 
 void EarlyMessages::hold(Message message, Clock::time_point now) {
   while (!held_.empty() && held_.front().came + kLongest < now) {
@@ -32,23 +55,23 @@ std::optional<EarlyMessages::Message> EarlyMessages::due(Clock::time_point now) 
   return last;
 }
 
-std::optional<std::pair<Prefix, EarlyMessages::Entity>> writer_in(std::span<uint8_t> message) {
-  constexpr size_t kWriterOfHeartbeat = 8;
-  constexpr uint8_t kBuiltin = 0xc0;  // in the last byte
-  if (message.size() < kMessageHeader) return std::nullopt;
-  Prefix sender = sender_at(message, kSenderInHead).prefix;
-  std::optional<std::pair<Prefix, EarlyMessages::Entity>> found;
-  for_each_submessage(message, [&](const Submessage& each) {
-    if (each.is_source()) sender = sender_at(each.bytes, Submessage::kSender).prefix;
-    const bool beats = each.kind() == Submessage::kHeartbeat;
-    if (found || !(beats || each.is_data())) return;
-    const size_t place = beats ? kWriterOfHeartbeat : Submessage::kWriter;
-    EarlyMessages::Entity writer{};
-    if (each.bytes.size() < place + writer.size()) return;
-    std::copy_n(each.bytes.begin() + static_cast<std::ptrdiff_t>(place), writer.size(),
-                writer.begin());
-    if (!(writer.back() & kBuiltin)) found.emplace(sender, writer);
+void EarlyMessages::keep_order(std::span<uint8_t> message) const {
+  if (held_.empty()) return;
+  for_each_said(message, [&](const Submessage& part, const Prefix& who, const Entity& writer) {
+    const bool waits = std::any_of(held_.begin(), held_.end(), [&](const Held& each) {
+      return each.told && each.message.writer == writer && each.message.participant == who;
+    });
+    if (waits && part.kind() == Submessage::kHeartbeat) part.erase();
   });
+}
+
+std::optional<std::pair<Prefix, EarlyMessages::Entity>> writer_in(std::span<uint8_t> message) {
+  constexpr uint8_t kBuiltin = 0xc0;  // in the last byte
+  std::optional<std::pair<Prefix, EarlyMessages::Entity>> found;
+  for_each_said(message,
+                [&](const Submessage&, const Prefix& who, const EarlyMessages::Entity& writer) {
+                  if (!found && !(writer.back() & kBuiltin)) found.emplace(who, writer);
+                });
   return found;
 }
 

@@ -3,7 +3,8 @@
 // Cyclone DDS passes over what an unknown writer says. A client of Fast DDS sends its first request
 // right behind the word that it has a writer: where the two change places on their way, the request
 // would be lost, for Cyclone takes the writer's next heartbeat for the beginning of all that
-// concerns it.
+// concerns it. So it is where Cyclone cannot take the word yet, since an earlier one is missing,
+// which it gets a second later: a client that was there before the run finds the service at once.
 #pragma once
 
 #include <array>
@@ -34,15 +35,18 @@ class EarlyMessages {
   };
 
   static constexpr size_t kMost = 256, kMostBytes = 1 << 20;
-  static constexpr auto kLongest = std::chrono::seconds(2);
-  // Cyclone's thread for discovery needs a fraction of the first, where it has a processor. What is
-  // heard twice is taken once.
+  static constexpr auto kLongest = std::chrono::seconds(4);
+  // Once Cyclone knows the writer, it matches it with readers at once, where it has a processor.
+  // What is heard twice is taken once.
   static constexpr std::array kDelays{std::chrono::milliseconds(5), std::chrono::milliseconds(100)};
 
   // The newest give way to the oldest: these end by themselves.
   void hold(Message message, Clock::time_point now);
-  // To be called with each datagram: is_known says whether a participant has told of a writer.
+  // To be called with each datagram: is_known says whether Cyclone knows a writer.
   void look(const std::function<bool(const Message&)>& is_known, Clock::time_point now);
+  // Takes the heartbeats of known writers that have messages here out of a message: the first that
+  // Cyclone hears of a writer is to be what it said first. Heartbeats come again.
+  void keep_order(std::span<uint8_t> message) const;
   // One whose turn has come; those of a writer in their order.
   std::optional<Message> due(Clock::time_point now);
 

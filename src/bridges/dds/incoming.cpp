@@ -46,21 +46,27 @@ class Incoming {
     std::copy_n(participant.begin(), prefix.size(), prefix.begin());
     known_.serve(prefix);
   }
-  // The samples in the message that are left.
-  std::vector<Samples> bound(std::span<uint8_t> message, const ddsi_locator_t& from) {
+  // The samples in the message that are left. socket: that it came by.
+  std::vector<Samples> bound(std::span<uint8_t> message, const ddsi_locator_t& from,
+                             const ddsi_tran_conn* socket) {
     const std::lock_guard lock(mutex_);
     const auto now = KnownParticipants::Clock::now();
     known_.bound(message, address_of(from), now);
     bound_fragments(message);
     using Told = KnownParticipants::Told;
+    const auto knows = [&](const Prefix& participant, const EarlyMessages::Entity& writer) {
+      ros2::Gid gid{};
+      std::copy(writer.begin(), writer.end(),
+                std::copy(participant.begin(), participant.end(), gid.begin()));
+      return ruedo_knows_writer(socket, gid.data());
+    };
     if (const auto writer = writer_in(message);
-        writer && known_.told(writer->first, writer->second, now) != Told::before)
+        writer && (known_.told(writer->first, writer->second, now) != Told::before ||
+                   !knows(writer->first, writer->second)))
       early_.hold({writer->first, writer->second, from, {message.begin(), message.end()}}, now);
-    early_.look(
-        [&](const EarlyMessages::Message& early) {
-          return known_.told(early.participant, early.writer, now) != Told::never;
-        },
-        now);
+    early_.look([&](const EarlyMessages::Message& m) { return knows(m.participant, m.writer); },
+                now);
+    early_.keep_order(message);
     return samples_in(message);
   }
 
@@ -117,7 +123,7 @@ ssize_t read_bounded(ddsi_tran_conn_t conn, unsigned char* into, size_t size, bo
   if (got <= 0) return got;
   last.size = static_cast<size_t>(got);
   last.from = sender;
-  last.samples = incoming.bound({into, last.size}, sender);
+  last.samples = incoming.bound({into, last.size}, sender, conn);
   return got;
 }
 

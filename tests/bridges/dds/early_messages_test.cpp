@@ -48,9 +48,38 @@ TEST(EarlyMessages, AreNotHeldForEver) {
   messages.hold(early(1), kBegin);
   messages.hold(early(2), kBegin + EarlyMessages::kLongest + 1s);
   messages.look(kKnown, kBegin + 10s);
-  ASSERT_TRUE(messages.due(kBegin + 11s));
-  ASSERT_TRUE(messages.due(kBegin + 11s));
-  EXPECT_FALSE(messages.due(kBegin + 11s));
+  size_t heard = 0;
+  while (const auto next = messages.due(kBegin + 20s)) {
+    EXPECT_EQ(next->bytes, std::vector<uint8_t>{2});
+    ++heard;
+  }
+  EXPECT_EQ(heard, EarlyMessages::kDelays.size());
+}
+
+TEST(EarlyMessages, AreHeardBeforeTheirWritersHeartbeats) {
+  Bytes beat{0, 0, 0, 0, 0, 0, 0x14, 3};
+  beat.resize(28);
+  const Bytes whole = message({header(7, 15), data(0x1403, 1, Bytes(4)), submessage(7, 2, beat)});
+  const auto left = [&](const EarlyMessages& messages) {
+    Bytes heard = whole;
+    messages.keep_order(heard);
+    std::vector<uint8_t> kinds;
+    for_each_submessage(heard, [&](const Submessage& each) { kinds.push_back(each.kind()); });
+    return kinds;
+  };
+  using Kinds = std::vector<uint8_t>;
+  EarlyMessages messages;
+  EXPECT_EQ(left(messages), (Kinds{Submessage::kData, Submessage::kHeartbeat}));
+  messages.hold(early(1, kOther), kBegin);
+  EXPECT_EQ(left(messages), (Kinds{Submessage::kData, Submessage::kHeartbeat}));
+  EarlyMessages::Message own = early(1);
+  own.participant.fill(7);
+  messages.hold(own, kBegin);
+  EXPECT_EQ(left(messages), (Kinds{Submessage::kData, Submessage::kHeartbeat}));  // nor to Cyclone
+  messages.look(kKnown, kBegin);
+  EXPECT_EQ(left(messages), (Kinds{Submessage::kData, Submessage::kNothing}));
+  while (messages.due(kBegin + 20s)) continue;
+  EXPECT_EQ(left(messages), (Kinds{Submessage::kData, Submessage::kHeartbeat}));
 }
 
 TEST(EarlyMessages, AreBoundedInNumberAndBytes) {
