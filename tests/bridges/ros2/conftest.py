@@ -4,12 +4,9 @@ the ROS interfaces.
 
 from __future__ import annotations
 
-import os
 import subprocess
-import time
 from pathlib import Path
 
-import pytest
 from cyclonedds.core import Policy, Qos
 from cyclonedds.domain import DomainParticipant
 from cyclonedds.pub import DataWriter
@@ -18,13 +15,7 @@ from cyclonedds.topic import Topic
 from cyclonedds.util import duration
 from rosbags.rosbag2 import Reader
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
-
-PATIENCE = float(os.environ.get("RUEDO_PATIENCE", "300"))  # s, for what comes sooner or later
-SOURCE = Path(os.environ.get("RUEDO_SOURCE_DIR", Path(__file__).resolve().parents[3]))
-RUEDO = os.environ.get("RUEDO", str(SOURCE / "build/release/bin/ruedo"))
-ARENA = str(SOURCE / "worlds/arena.sdf")
-
-_domains = iter(range(1, 200))
+from server import PATIENCE, RUEDO, wait_for
 
 
 class Peer:
@@ -65,56 +56,6 @@ class Peer:
         )
         self.entities.append(writer)
         return writer
-
-
-class Run:
-    """`ruedo run WORLD --ros2` in a domain of its own; ends with the with-block."""
-
-    def __init__(
-        self,
-        *arguments: str,
-        world: str = ARENA,
-        environment: dict[str, str] | None = None,
-        lcm: str = "auto",
-    ):
-        self.domain = next(_domains)
-        environment = {**os.environ, "ROS_DOMAIN_ID": str(self.domain), **(environment or {})}
-        self.process = subprocess.Popen(
-            [RUEDO, "run", world, "--ros2", "--lcm", lcm, *arguments],
-            env=environment,
-            stdin=subprocess.DEVNULL,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.STDOUT,
-            text=True,
-        )
-
-    def __enter__(self) -> Run:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.end()
-
-    def end(self) -> str:
-        """Its output."""
-        if self.process.poll() is None:
-            self.process.terminate()
-        try:
-            return self.process.communicate(timeout=PATIENCE)[0]
-        except subprocess.TimeoutExpired:
-            self.process.kill()
-            return self.process.communicate()[0]
-        except ValueError:  # read already
-            return ""
-
-
-def wait_for(condition, what: str = "the condition"):
-    """What `condition` returns, once that is true."""
-    deadline = time.monotonic() + PATIENCE
-    while time.monotonic() < deadline:
-        if result := condition():
-            return result
-        time.sleep(0.01)
-    pytest.fail(f"{what} did not come")
 
 
 def take(reader: DataReader, count: int = 1) -> list:

@@ -1,5 +1,5 @@
-"""simulation_interfaces 1.5 as rmw_cyclonedds has services on the wire: 16 bytes of header, then
-the request or the response.
+"""Some of simulation_interfaces as rmw_cyclonedds has services on the wire: 16 bytes of header,
+then the request or the response.
 """
 
 import re
@@ -65,57 +65,6 @@ class EntityFilters(IdlStruct, typename="simulation_interfaces::msg::dds_::Entit
     bounds: Bounds
 
 
-@dataclass
-class EntityInfo(IdlStruct, typename="simulation_interfaces::msg::dds_::EntityInfo_"):
-    category: EntityCategory
-    description: str
-    tags: sequence[str]
-
-
-@dataclass
-class NamedPose(IdlStruct, typename="simulation_interfaces::msg::dds_::NamedPose_"):
-    name: str
-    description: str
-    tags: sequence[str]
-    pose: Pose
-
-
-@dataclass
-class Resource(IdlStruct, typename="simulation_interfaces::msg::dds_::Resource_"):
-    uri: str
-    resource_string: str
-
-
-@dataclass
-class Spawnable(IdlStruct, typename="simulation_interfaces::msg::dds_::Spawnable_"):
-    uri: str
-    description: str
-    spawn_bounds: Bounds
-
-
-@dataclass
-class SpawnEntity(IdlStruct, typename="simulation_interfaces::msg::dds_::SpawnEntity_"):
-    name: str
-    allow_renaming: bool
-    entity_resource: Resource
-    entity_namespace: str
-    initial_pose: PoseStamped
-
-
-@dataclass
-class SpawnResult(IdlStruct, typename="simulation_interfaces::msg::dds_::SpawnResult_"):
-    result: Result
-    entity_name: str
-
-
-@dataclass
-class WorldResource(IdlStruct, typename="simulation_interfaces::msg::dds_::WorldResource_"):
-    name: str
-    world_resource: Resource
-    description: str
-    tags: sequence[str]
-
-
 def part(service: str, which: str, fields: dict[str, type]) -> type:
     return make_idl_struct(
         f"{service}{which}",
@@ -127,50 +76,14 @@ def part(service: str, which: str, fields: dict[str, type]) -> type:
 NOTHING = {"structure_needs_at_least_one_member": uint8}
 RESULT = {"result": Result}
 TYPES = {
-    "DeleteEntity": ({"entity": str}, RESULT),
-    "GetAvailableWorlds": (
-        {
-            "additional_sources": sequence[str],
-            "filter": TagsFilter,
-            "offline_only": bool,
-            "continue_on_error": bool,
-        },
-        {**RESULT, "worlds": sequence[WorldResource]},
-    ),
-    "GetCurrentWorld": (NOTHING, {**RESULT, "world": WorldResource}),
     "GetEntities": ({"filters": EntityFilters}, {**RESULT, "entities": sequence[str]}),
-    "GetEntitiesStates": (
-        {"filters": EntityFilters},
-        {**RESULT, "entities": sequence[str], "states": sequence[EntityState]},
-    ),
-    "GetEntityBounds": ({"entity": str}, {**RESULT, "bounds": Bounds}),
-    "GetEntityInfo": ({"entity": str}, {**RESULT, "info": EntityInfo}),
     "GetEntityState": ({"entity": str}, {**RESULT, "state": EntityState}),
-    "GetNamedPoseBounds": ({"name": str}, {**RESULT, "bounds": Bounds}),
-    "GetNamedPoses": ({"tags": TagsFilter}, {**RESULT, "poses": sequence[NamedPose]}),
     "GetSimulationState": (NOTHING, {"state": uint8, **RESULT}),
     "GetSimulatorFeatures": (
         NOTHING,
         {"features": sequence[uint16], "spawn_formats": sequence[str], "custom_info": str},
     ),
-    "GetSpawnables": ({"sources": sequence[str]}, {**RESULT, "spawnables": sequence[Spawnable]}),
-    "LoadWorld": (
-        {
-            "uri": str,
-            "resource_string": str,
-            "fail_on_unsupported_element": bool,
-            "ignore_missing_or_unsupported_assets": bool,
-        },
-        {**RESULT, "world": WorldResource},
-    ),
-    "ResetSimulation": ({"scope": uint8}, RESULT),
-    "SetEntityInfo": ({"entity": str, "info": EntityInfo}, RESULT),
-    "SetEntityState": ({"entity": str, "state": EntityState}, RESULT),
     "SetSimulationState": ({"state": uint8}, RESULT),
-    "SpawnEntities": (
-        {"spawn_requests": sequence[SpawnEntity]},
-        {**RESULT, "results": sequence[SpawnResult]},
-    ),
     "SpawnEntity": (
         {
             "name": str,
@@ -183,7 +96,6 @@ TYPES = {
         {**RESULT, "entity_name": str},
     ),
     "StepSimulation": ({"steps": uint64}, RESULT),
-    "UnloadWorld": (NOTHING, RESULT),
 }
 
 SERVICES = {

@@ -16,7 +16,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
-from conftest import PATIENCE, Peer, Run, take, wait_for
+from conftest import Peer, take
 from cyclonedds.builtin import BuiltinDataReader, BuiltinTopicDcpsSubscription
 from cyclonedds.core import Policy
 from cyclonedds.idl import IdlStruct, make_idl_struct
@@ -24,6 +24,7 @@ from cyclonedds.idl.types import float64, sequence, uint8
 from cyclonedds.util import duration
 from ros_types import Clock, LaserScan, Odometry, Twist, Vector3
 from rtps import participant, prefix, reader
+from server import PATIENCE, Run, wait_for
 from simulation_types import SERVICES
 from test_services import Client, await_discovery, filters
 
@@ -155,7 +156,7 @@ def test_who_asks_much_keeps_nobody_waiting(hears):
 
 FLOOD = """
 import itertools, sys
-from conftest import wait_for
+from server import wait_for
 from simulation_types import SERVICES
 from test_services import Client
 

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from conftest import Peer, Run, take, wait_for
+from conftest import Peer, take
 from ros_types import (
     Float64MultiArray,
     JointState,
@@ -20,6 +20,7 @@ from ros_types import (
     Twist,
     Vector3,
 )
+from server import Run, wait_for
 from urdf import about, child_frames, of_transform, pose
 
 WORLD = str(Path(__file__).resolve().parent / "links.sdf")

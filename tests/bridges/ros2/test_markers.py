@@ -6,9 +6,10 @@ from __future__ import annotations
 
 import pytest
 import ruedo
-from conftest import Peer, Run, wait_for
+from conftest import Peer
 from ros_types import MarkerArray
 from ruedo import markers
+from server import Run, wait_for
 
 LINE_STRIP, CUBE_LIST, SPHERE_LIST, TEXT = 4, 6, 7, 9  # Marker.msg
 ADD, DELETE = 0, 2

@@ -9,7 +9,7 @@ import sys
 from pathlib import Path
 
 import pytest
-from conftest import PATIENCE, RUEDO, Run
+from server import PATIENCE, RUEDO, Run
 
 HERE = Path(__file__).resolve().parent
 

@@ -9,7 +9,7 @@ import struct
 from pathlib import Path
 
 import pytest
-from conftest import Peer, Run, bag_of, wait_for
+from conftest import Peer, bag_of
 from ros_types import (
     Contacts,
     Duration,
@@ -25,6 +25,7 @@ from ros_types import (
     Twist,
     Vector3,
 )
+from server import Run, wait_for
 from test_services import await_discovery
 
 WORLD = str(Path(__file__).resolve().parent / "sensors.sdf")

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import itertools
 import math
-import re
 
 import pytest
-from conftest import Peer, Run, take, wait_for
+from conftest import Peer, take
 from cyclonedds.builtin import (
     BuiltinDataReader,
     BuiltinTopicDcpsPublication,
@@ -34,8 +33,7 @@ from ros_types import (
     TwistStamped,
     Vector3,
 )
-from rosbags.typesys import get_types_from_msg
-from stores import store_of
+from server import Run, wait_for
 
 
 @pytest.fixture(scope="module")
@@ -190,55 +188,6 @@ def test_cmd_vel_of_either_type_drives(stamped):
             )
 
         wait_for(has_driven, "a speed of 0.4 m/s")
-
-
-def endpoints(peer, kind):
-    """{(topic, type): user data} of what the run has."""
-    reader = BuiltinDataReader(peer.participant, kind)
-    found = {}
-
-    def all_there():
-        for sample in reader.take(N=1000):
-            data = sample.qos[Policy.Userdata].data if Policy.Userdata in sample.qos else b""
-            if data and sample.topic_name.startswith("rt/"):
-                found[sample.topic_name, sample.type_name] = data
-        return found
-
-    wait_for(
-        lambda: len(all_there()) >= (2 if kind is BuiltinTopicDcpsSubscription else 28),
-        "the run's endpoints",
-    )
-    return found
-
-
-def ros_name(dds_type: str) -> str:
-    return dds_type.replace("::dds_::", "::").replace("::", "/").removesuffix("_")
-
-
-# From SimulateSteps.action, as rosidl makes messages of an action.
-STEPS = "simulation_interfaces/action/SimulateSteps_"
-ACTION = {
-    STEPS + "Feedback": "uint64 completed_steps\nuint64 remaining_steps\n",
-    STEPS + "FeedbackMessage": "unique_identifier_msgs/msg/UUID goal_id\n"
-    f"{STEPS}Feedback feedback\n",
-}
-
-
-@pytest.mark.parametrize("kind", [BuiltinTopicDcpsPublication, BuiltinTopicDcpsSubscription])
-def test_type_hashes_are_those_of_rosbags(standing, kind):
-    store = store_of("jazzy")
-    for name, fields in ACTION.items():
-        store.register(get_types_from_msg(fields, name))
-    compared = 0
-    for (topic, dds_type), data in endpoints(standing, kind).items():
-        told = re.fullmatch(rb"typehash=(RIHS01_[0-9a-f]{64});", data)
-        assert told, (topic, data)
-        name = ros_name(dds_type)
-        if name.startswith("rmw_dds_common"):  # rosbags takes a char for another type than ROS does
-            continue
-        assert told.group(1).decode() == store.hash_rihs01(name), topic
-        compared += 1
-    assert compared >= 2
 
 
 def test_the_node_is_in_the_graph(standing):

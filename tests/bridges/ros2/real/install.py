@@ -1,10 +1,11 @@
-"""A virtual environment with real ROS 2, made once.
+"""A virtual environment with real ROS 2 and the interfaces that PyPI lacks, made once.
 
     install.py RELEASE FOLDER
 
 Ends with 77 where there is none for this Python.
 """
 
+import os
 import shutil
 import subprocess
 import sys
@@ -16,17 +17,23 @@ NONE_FOR_THIS_PYTHON = 77
 
 def main():
     release, folder = sys.argv[1], Path(sys.argv[2])
-    wanted = Path(__file__).with_name(f"{release}.txt")
+    here = Path(__file__).parent
+    wanted = "".join(
+        (here / name).read_text() for name in (f"{release}.txt", "interfaces.txt", "generate.py")
+    )
     if sys.version_info[:2] != (3, 11):
         sys.exit(NONE_FOR_THIS_PYTHON)
-    stamp = folder / "requirements.txt"
-    if stamp.exists() and stamp.read_text() == wanted.read_text():
+    stamp = folder / "made-from.txt"
+    if stamp.exists() and stamp.read_text() == wanted:
         return
     shutil.rmtree(folder, ignore_errors=True)
     venv.create(folder, with_pip=True)
-    pip = [folder / "bin/python", "-m", "pip", "install", "--quiet", "--no-deps", "-r", wanted]
+    python = folder / "bin/python"
+    pip = [python, "-m", "pip", "install", "--quiet", "--no-deps", "-r", here / f"{release}.txt"]
     subprocess.run(pip, check=True)
-    shutil.copy(wanted, stamp)
+    environment = {**os.environ, "LD_LIBRARY_PATH": str(folder / "lib")}
+    subprocess.run([python, here / "generate.py"], env=environment, check=True)
+    stamp.write_text(wanted)
 
 
 main()

@@ -6,36 +6,48 @@ leaves the other fields empty and the world as it was. The rows of a test follow
 
 from __future__ import annotations
 
-import dataclasses
+import importlib
 from pathlib import Path
 
 import pytest
-from conftest import Run, wait_for
-from ros_types import Header, LaserScan, Point, Pose, Quaternion, Time, Twist, Vector3
-from simulation_types import (
-    SERVICES,
-    TYPES,
+from conftest import Peer
+from geometry_msgs.msg import (
     Accel,
+    Point,
+    Pose,
+    PoseStamped,
+    PoseWithCovarianceStamped,
+    Quaternion,
+    Twist,
+    Vector3,
+)
+from nav_msgs.msg import Odometry
+from server import Run
+from simulation_interfaces.msg import (
     Bounds,
     EntityCategory,
     EntityFilters,
     EntityInfo,
     EntityState,
-    PoseStamped,
     Resource,
+    SimulationState,
     SpawnEntity,
     TagsFilter,
 )
-from test_services import CRATE, Client
+from std_msgs.msg import Header
 
 UNSUPPORTED, OK, NOT_FOUND, INCORRECT_STATE, FAILED = range(5)
 OBJECT, ROBOT, HUMAN, DYNAMIC, STATIC = 0, 1, 2, 4, 5
 EMPTY, BOX, CONVEX_HULL, SPHERE = range(4)
 STOPPED, PLAYING, PAUSED, QUITTING, NO_WORLD, LOADING_WORLD = range(6)
-WORLD = Path(__file__).parent / "conformance.sdf"
+WORLD = Path(__file__).resolve().parents[1] / "conformance.sdf"
 ALL = ["crate", "ground", "p3at", "walker", "wall"]
-TURNED = Quaternion(0.0, 0.0, 0.5**0.5, 0.5**0.5)
-ZERO = Quaternion(0.0, 0.0, 0.0, 0.0)
+TURNED = Quaternion(z=0.5**0.5, w=0.5**0.5)
+ZERO = Quaternion(w=0.0)
+CRATE = """<sdf version="1.9"><model name="crate"><link name="link">
+  <inertial><mass>2</mass></inertial>
+  <collision name="box"><geometry><box><size>0.3 0.3 0.3</size></box></geometry></collision>
+</link></model></sdf>"""
 NAN = float("nan")
 
 
@@ -46,21 +58,45 @@ class Something:
         self.rule = rule
 
 
+def fields_of(message) -> list[str]:
+    return list(message.get_fields_and_field_types())
+
+
+def kind_of(service: str) -> type:
+    name = "".join(map(str.capitalize, service.split("_")))
+    return getattr(importlib.import_module("simulation_interfaces.srv"), name)
+
+
+class Client:
+    """Calls the services; a request's fields in their order."""
+
+    def __init__(self, peer: Peer):
+        self.peer = peer
+
+    def call(self, service: str, *values):
+        kind = kind_of(service)
+        names = fields_of(kind.Request)
+        return self.peer.call(kind, f"/{service}", **dict(zip(names, values, strict=False)))
+
+    def state(self) -> int:
+        return self.call("get_simulation_state").state.state
+
+
 def same(got, wanted) -> bool:
     if isinstance(wanted, Something):
         return bool(wanted.rule(got))
     if isinstance(wanted, list):
         return len(got) == len(wanted) and all(map(same, got, wanted))
-    if dataclasses.is_dataclass(wanted):
-        names = [field.name for field in dataclasses.fields(wanted)]
+    if hasattr(wanted, "get_fields_and_field_types"):
+        names = fields_of(wanted)
         return all(same(getattr(got, name), getattr(wanted, name)) for name in names)
     return got == (pytest.approx(wanted, abs=1e-9) if isinstance(wanted, float) else wanted)
 
 
 def is_empty(value) -> bool:
-    if dataclasses.is_dataclass(value):
-        return all(is_empty(getattr(value, f.name)) for f in dataclasses.fields(value))
-    return value in (0, "", [], False)
+    if hasattr(value, "get_fields_and_field_types"):
+        return all(is_empty(getattr(value, name)) for name in fields_of(value))
+    return not (len(value) if hasattr(value, "__len__") else value)
 
 
 def world_of(client):
@@ -75,7 +111,7 @@ def check(client, rows):
         before = None if code == OK else world_of(client)
         reply = client.call(service, *arguments)
         where = f"{service}{arguments}: {reply}"
-        _, answer = TYPES[TYPE_OF[service]]
+        answer = fields_of(reply)
         if "result" in answer:
             assert reply.result.result == code, where
             assert (code == OK) or reply.result.error_message, where
@@ -92,51 +128,55 @@ def check(client, rows):
             assert same(list(world_of(client)), list(before)), where
 
 
-TYPE_OF = dict(zip(SERVICES, TYPES, strict=True))
-
-
 def filters(pattern="", categories=(), tags=(), mode=0, bounds=(EMPTY,)) -> EntityFilters:
-    kind, *points = bounds
     return EntityFilters(
-        pattern,
-        [EntityCategory(c) for c in categories],
-        TagsFilter(list(tags), mode),
-        Bounds(kind, [Vector3(*map(float, point)) for point in points]),
+        filter=pattern,
+        categories=[EntityCategory(category=c) for c in categories],
+        tags=TagsFilter(tags=list(tags), filter_mode=mode),
+        bounds=boundary(*bounds),
     )
 
 
+def boundary(kind=EMPTY, *points) -> Bounds:
+    return Bounds(type=kind, points=[vector(point) for point in points])
+
+
 def vector(v=(0, 0, 0)) -> Vector3:
-    return Vector3(*map(float, v))
+    x, y, z = map(float, v)
+    return Vector3(x=x, y=y, z=z)
 
 
-def state(x=0.0, y=0.0, z=0.0, turn=None, frame="", linear=(), angular=(), acceleration=(), us=0):
+def pose(x=0.0, y=0.0, z=0.0, turn=None) -> Pose:
+    place = Point(x=float(x), y=float(y), z=float(z))
+    return Pose(position=place, orientation=turn or Quaternion())
+
+
+def state(x=0.0, y=0.0, z=0.0, turn=None, frame="", linear=(), angular=(), acceleration=()):
     """An EntityState."""
+    nothing = (0, 0, 0)
     return EntityState(
-        Header(Time(us // 1_000_000, us % 1_000_000 * 1000), frame),
-        Pose(Point(float(x), float(y), float(z)), turn or Quaternion()),
-        Twist(vector(linear or (0, 0, 0)), vector(angular or (0, 0, 0))),
-        Accel(vector(acceleration or (0, 0, 0)), vector()),
+        header=Header(frame_id=frame),
+        pose=pose(x, y, z, turn),
+        twist=Twist(linear=vector(linear or nothing), angular=vector(angular or nothing)),
+        acceleration=Accel(linear=vector(acceleration or nothing)),
     )
 
 
 def at(x=0.0, y=0.0, z=0.0, turn=None, frame="") -> PoseStamped:
-    return PoseStamped(
-        Header(Time(), frame), Pose(Point(float(x), float(y), float(z)), turn or Quaternion())
-    )
+    return PoseStamped(header=Header(frame_id=frame), pose=pose(x, y, z, turn))
 
 
 def info(category, description="", tags=()) -> EntityInfo:
-    return EntityInfo(EntityCategory(category), description, list(tags))
-
-
-def bounds(kind=EMPTY, *points) -> Bounds:
-    return Bounds(kind, [vector(point) for point in points])
+    kind = EntityCategory(category=category)
+    return EntityInfo(category=kind, description=description, tags=list(tags))
 
 
 @pytest.fixture(scope="module")
 def session():
     with Run("--no-noise", "--disable", "p3at/camera", "--paused", world=str(WORLD)) as run:
-        yield Client(run.domain)
+        peer = Peer(run.domain)
+        yield Client(peer)
+        peer.close()
 
 
 @pytest.fixture
@@ -144,7 +184,9 @@ def client(session):
     """At the start, paused."""
     assert session.call("reset_simulation", 255).result.result == OK
     if session.state() != PAUSED:
-        assert session.call("set_simulation_state", PAUSED).result.result == OK
+        assert (
+            session.call("set_simulation_state", SimulationState(state=PAUSED)).result.result == OK
+        )
     return session
 
 
@@ -221,15 +263,15 @@ def test_what_is_known_of_an_entity(client):
                 "get_entity_bounds",
                 ("crate",),
                 OK,
-                {"bounds": bounds(BOX, (0.2, 0.1, 0.35), (-0.2, -0.1, -0.25))},
+                {"bounds": boundary(BOX, (0.2, 0.1, 0.35), (-0.2, -0.1, -0.25))},
             ),
             (
                 "get_entity_bounds",
                 ("wall",),
                 OK,
-                {"bounds": bounds(BOX, (0.1, 2, 0.5), (-0.1, -2, -0.5))},
+                {"bounds": boundary(BOX, (0.1, 2, 0.5), (-0.1, -2, -0.5))},
             ),
-            ("get_entity_bounds", ("ground",), OK, {"bounds": bounds()}),
+            ("get_entity_bounds", ("ground",), OK, {"bounds": boundary()}),
             ("get_entity_bounds", ("nobody",), NOT_FOUND),
             (about, ("p3at",), OK, {"info": info(ROBOT)}),
             (about, ("walker",), OK, {"info": info(HUMAN)}),
@@ -260,7 +302,7 @@ def test_states_that_are_set(client):
             (put, ("nobody", state()), NOT_FOUND),
             (put, ("", state()), NOT_FOUND),
             (put, ("crate", state(1, turn=ZERO)), invalid),
-            (put, ("crate", state(1, turn=Quaternion(0.0, 0.0, 0.0, 2.0))), invalid),
+            (put, ("crate", state(1, turn=Quaternion(w=2.0))), invalid),
             (put, ("crate", state(NAN)), invalid),
             (put, ("crate", state(1e9)), invalid),
             (put, ("crate", state(1, frame="mars")), invalid),
@@ -337,9 +379,8 @@ def test_spawning(client):
         rows.append(("spawn_entity", question, code, *({"entity_name": n} for n in name)))
     check(client, rows)
     check(client, [("get_entity_state", ("c",), OK, {"state": state(2, 3, 0.5, None, "world")})])
-    wait_for(
-        lambda: client.peer.reader("/fleet/one/scan", LaserScan).get_matched_publications(),
-        "the robot's topics under its namespace",
+    client.peer.spin_until(
+        lambda: client.peer.node.count_publishers("/fleet/one/scan"), "the robot's topics"
     )
     check(
         client,
@@ -356,8 +397,14 @@ def test_spawning(client):
 
 def test_spawning_several(client):
     def order(question):
-        name, renames, uri, text, space, pose = question
-        return SpawnEntity(name, renames, Resource(uri, text), space, pose)
+        name, renames, uri, text, space, place = question
+        return SpawnEntity(
+            name=name,
+            allow_renaming=renames,
+            entity_resource=Resource(uri=uri, resource_string=text),
+            entity_namespace=space,
+            initial_pose=place,
+        )
 
     check(client, [("spawn_entities", ([],), OK, {"results": []})])
     reply = client.call("spawn_entities", [order(question) for question, *_ in SPAWNS])
@@ -370,41 +417,46 @@ def test_spawning_several(client):
 
 
 def test_states_of_the_simulation(client):
-    put, step, ask = "set_simulation_state", "step_simulation", "get_simulation_state"
+    step, ask = "step_simulation", "get_simulation_state"
     already, incorrect = 101, 103
 
+    def put(number, code):
+        return ("set_simulation_state", (SimulationState(state=number),), code)
+
     def told(number):
-        return (ask, (), OK, {"state": number})
+        return (ask, (), OK, {"state": SimulationState(state=number)})
 
     check(
         client,
         [
             told(PAUSED),
-            (put, (PAUSED,), already),
-            (put, (NO_WORLD,), incorrect),
-            (put, (LOADING_WORLD,), incorrect),
-            (put, (9,), FAILED),
+            put(PAUSED, already),
+            put(NO_WORLD, incorrect),
+            put(LOADING_WORLD, incorrect),
+            put(9, FAILED),
             (step, (0,), FAILED),
             (step, (3,), OK),
             told(PAUSED),
-            (put, (STOPPED,), OK),
+            put(STOPPED, OK),
             told(STOPPED),
-            (put, (STOPPED,), already),
+            put(STOPPED, already),
             ("get_entity_state", ("wall",), OK, {"state": state(5, 0, 0.5, None, "world")}),
             # As SimulationState has it: a stopped simulation can be paused.
-            (put, (PAUSED,), OK),
+            put(PAUSED, OK),
             told(PAUSED),
-            (put, (STOPPED,), OK),
+            put(STOPPED, OK),
             (step, (1,), OK),
             told(PAUSED),
-            (put, (PLAYING,), OK),
+            put(PLAYING, OK),
             told(PLAYING),
         ],
     )
     # The world goes on, so that what is refused cannot be seen in it.
-    assert client.call(put, PLAYING).result.result == already
+    assert (
+        client.call("set_simulation_state", SimulationState(state=PLAYING)).result.result == already
+    )
     assert client.call(step, 1).result.result == FAILED
-    check(client, [(put, (PAUSED,), OK), told(PAUSED)])
+    check(client, [put(PAUSED, OK), told(PAUSED)])
 
 
 def test_resets(client):
@@ -419,7 +471,7 @@ def test_resets(client):
         assert ("b" in names) == (not (whole or scope & 4)), scope
         crate = states[names.index("crate")]
         time = 0 if whole or scope & 1 else 2 * 5000
-        start.header = Header(Time(0, time * 1000), "world")
+        start.header.stamp.nanosec = time * 1000
         assert same(crate, start) == bool(whole or scope & 2), scope
         assert crate.header.stamp == start.header.stamp, scope
         check(client, [("reset_simulation", (255,), OK)])
@@ -431,11 +483,11 @@ def test_resources(client):
     world = Something(
         lambda got: (
             got.name == "conformance"
-            and got.world_resource == Resource(str(WORLD.resolve()), "")
+            and got.world_resource == Resource(uri=str(WORLD))
             and (got.description, got.tags) == ("", [])
         )
     )
-    tags = TagsFilter([], 0)
+    tags = TagsFilter()
     check(
         client,
         [
@@ -462,14 +514,14 @@ EVERYTHING = [0, 1, 4, 5, 6, *range(8, 15), *range(20, 27), 31, 32, 33, 44, 50]
 WITHOUT_CONTROL = [4, 5, 8, 12, 13, 14, 44]
 
 
-def test_features_are_those_that_are_there(client):
-    told = client.call("get_simulator_features")
-    assert told.features == EVERYTHING
+def test_features_are_those_that_are_there(client, peers):
+    told = client.call("get_simulator_features").features
+    assert list(told.features) == EVERYTHING
     assert told.spawn_formats == ["sdf", "urdf"]
     assert told.custom_info.startswith("Ruedo ")
     with Run("--no-noise", "--disable", "p3at/camera", "--control", "off", world=str(WORLD)) as run:
-        deaf = Client(run.domain)
-        assert deaf.call("get_simulator_features").features == WITHOUT_CONTROL
+        deaf = Client(peers(run))
+        assert list(deaf.call("get_simulator_features").features.features) == WITHOUT_CONTROL
         assert deaf.call("get_entities", filters()).entities == ALL
         for service, *arguments in (
             ("step_simulation", 1),
@@ -479,14 +531,43 @@ def test_features_are_those_that_are_there(client):
             ("spawn_entity", "b", False, "", model(), "", at(0, 5, 1)),
             ("reset_simulation", 0),
             ("get_simulation_state",),
-            ("set_simulation_state", PAUSED),
+            ("set_simulation_state", SimulationState(state=PAUSED)),
             ("get_entities_states", filters()),
         ):
             assert deaf.call(service, *arguments).result.result == UNSUPPORTED, service
 
 
-def test_quitting_ends_the_run():
+def test_quitting_ends_the_run(peers):
     with Run("--no-noise", "--disable", "p3at/camera", world=str(WORLD)) as run:
-        client = Client(run.domain)
-        assert client.call("set_simulation_state", QUITTING).result.result == OK
+        client = Client(peers(run))
+        assert (
+            client.call("set_simulation_state", SimulationState(state=QUITTING)).result.result == OK
+        )
         run.process.wait(60)
+
+
+def test_robots_come_and_go_with_their_topics(run, peers):
+    client = Client(peers(run))
+    spawned = client.call("spawn_entity", "p3at", True, "p3at", "", "", at(0.0, 1.5))
+    assert (spawned.result.result, spawned.entity_name) == (OK, "p3at_2"), spawned
+    own = client.peer.hear(Odometry, "/p3at_2/ground_truth")
+    first = client.peer.hear(Odometry, "/ground_truth")
+    client.peer.spin_until(lambda: len(own) >= 5 and len(first) >= 5, "poses of both")
+    assert {(o.child_frame_id, o.pose.pose.position.y) for o in own} == {("p3at_2/base_link", 1.5)}
+    assert {(o.child_frame_id, o.pose.pose.position.y) for o in first} == {("base_link", 0.0)}
+    assert client.call("delete_entity", "p3at_2").result.result == OK
+    assert client.call("delete_entity", "p3at_2").result.result == NOT_FOUND
+
+
+def test_where_somebody_says_the_robot_is_there_it_is_put(run, peers):
+    peer = peers(run)
+    truth = peer.hear(Odometry, "/ground_truth")
+    initial = peer.node.create_publisher(PoseWithCovarianceStamped, "/initialpose", 10)
+    peer.spin_until(initial.get_subscription_count, "a reader")
+    place = PoseWithCovarianceStamped(header=Header(frame_id="map"))
+    place.pose.pose = pose(0.0, 1.5)
+    initial.publish(place)
+    peer.spin_until(
+        lambda: any(abs(o.pose.pose.position.y - 1.5) < 1e-6 for o in truth),
+        "the robot at its new place",
+    )
