@@ -36,6 +36,27 @@ TEST_F(Rooms, OfSomethingHugeIsFoundAtOnce) {
   EXPECT_DOUBLE_EQ(standing_on(*world, huge, 0, 0, 0).translation.z(), 0.5);
 }
 
+// A storey above the ground: which of both is meant, a height near it says.
+TEST_F(Rooms, StandOnTheStoreyThatIsMeant) {
+  const auto fixed = [](const std::string& name, double top) {
+    return "<model name='" + name + "'><static>true</static><pose>0 0 " +
+           std::to_string(top - 0.1) +
+           " 0 0 0</pose><link name='l'><collision name='c'><geometry><box><size>9 9 0.2</size>"
+           "</box></geometry></collision></link></model>";
+  };
+  const auto world = load(fixed("cellar", -2.5) + fixed("ground", 0) + fixed("upstairs", 3));
+  const auto guest = load(box("bot", "0 0 0 0 0 0", "0.6 0.8 0.4"));
+  const Model& bot = *guest->models[InstanceIndex(0)].model;
+  const auto height = [&](std::optional<double> near_z) {
+    return standing_on(*world, bot, 1, 1, 0, near_z).translation.z() - 0.2;
+  };
+  EXPECT_NEAR(height({}), -2.5, 1e-9) << "without one, the lowest";
+  EXPECT_NEAR(height(0.0), 0, 1e-9);
+  EXPECT_NEAR(height(3.02), 3, 1e-9);
+  EXPECT_NEAR(height(2.6), 3, 1e-9) << "half a metre off at most";
+  EXPECT_NEAR(height(1.5), -2.5, 1e-9) << "nothing is near that";
+}
+
 // Storing each of them in every cell that the mesh covers took gigabytes.
 TEST_F(Rooms, AmongTrianglesThatCoverTheWholeMesh) {
   constexpr int kTriangles = 100000;

@@ -71,7 +71,7 @@ Pose spawn_pose(const world::WorldModel& world, const world::Model& model,
   if (!request.on_ground) return X_WM;
   const Vec3 ahead = X_WM.rotation * Vec3::UnitX();
   return world::standing_on(world, model, request.position[0], request.position[1],
-                            math::atan2(ahead.y(), ahead.x()));
+                            math::atan2(ahead.y(), ahead.x()), request.position[2]);
 }
 
 }  // namespace ruedo::engine

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <iterator>
 #include <map>
 #include <optional>
 #include <unordered_map>
@@ -334,8 +335,12 @@ std::vector<double> Room::surfaces(double x, double y) const {
   return heights;
 }
 
-double Room::ground_height(double x, double y) const {
+double Room::ground_height(double x, double y, std::optional<double> near_z) const {
   const std::vector<double> heights = surfaces(x, y);
+  std::vector<double> storey;
+  std::copy_if(heights.begin(), heights.end(), std::back_inserter(storey),
+               [&](double z) { return near_z && std::abs(z - *near_z) <= kStep_m; });
+  if (!storey.empty()) return walkable(storey);
   return heights.empty() ? 0 : walkable(heights);
 }
 
@@ -350,7 +355,8 @@ double Room::floor_height(double x, double y, double z) const {
 
 // The ground under a model at its level pose, as a plane: z = c[0] + c[1] (x - x0) + c[2] (y - y0)
 // about (x0, y0). nullopt: it is level, too steep, or not a plane.
-std::optional<Pose> Room::on_slope(const Model& model, const Pose& X_WM, double lowest) const {
+std::optional<Pose> Room::on_slope(const Model& model, const Pose& X_WM, double lowest,
+                                   std::optional<double> near_z) const {
   Box foot;
   for (const Link& link : model.links) {
     for (const Collision& c : link.collisions)
@@ -366,7 +372,7 @@ std::optional<Pose> Room::on_slope(const Model& model, const Pose& X_WM, double 
     const Vec3 part(column / (kSamples - 1.0), row / (kSamples - 1.0), 0);
     const Vec3 at = X_WM.rotation * Vec3(foot.min() + part.cwiseProduct(foot.sizes()));
     A.row(i) << 1, at.x(), at.y();
-    heights[i] = ground_height(place.x() + at.x(), place.y() + at.y());
+    heights[i] = ground_height(place.x() + at.x(), place.y() + at.y(), near_z);
   }
   const Vec3 c = A.colPivHouseholderQr().solve(heights);
   const Eigen::Matrix<double, kSamples * kSamples, 1> bumps = heights - A * c;
@@ -381,7 +387,8 @@ std::optional<Pose> Room::on_slope(const Model& model, const Pose& X_WM, double 
   return Pose{Quat(axes), place + Vec3(0, 0, c[0]) + up * (bumps.maxCoeff() - lowest)};
 }
 
-Pose Room::standing_on(const Model& model, double x, double y, double yaw) const {
+Pose Room::standing_on(const Model& model, double x, double y, double yaw,
+                       std::optional<double> near_z) const {
   Pose X_WM{Quat(Eigen::AngleAxisd(yaw, Vec3::UnitZ())), {x, y, 0}};
   double lowest = std::numeric_limits<double>::infinity();
   for (const Link& link : model.links) {
@@ -395,9 +402,9 @@ Pose Room::standing_on(const Model& model, double x, double y, double yaw) const
   // large or too small.
   if (model.drive) lowest = std::min(lowest, model.drive->X_MBase.translation.z());
   if (!std::isfinite(lowest)) lowest = 0;
-  X_WM.translation.z() = ground_height(x, y) - lowest;
+  X_WM.translation.z() = ground_height(x, y, near_z) - lowest;
   if (index_->overlapped(model, X_WM, true).empty()) return X_WM;
-  return on_slope(model, X_WM, lowest).value_or(X_WM);
+  return on_slope(model, X_WM, lowest, near_z).value_or(X_WM);
 }
 
 std::string Room::overlapped(const Model& model, const Pose& X_WM) const {
@@ -408,8 +415,9 @@ double ground_height(const WorldModel& world, double x, double y) {
   return Room(world).ground_height(x, y);
 }
 
-Pose standing_on(const WorldModel& world, const Model& model, double x, double y, double yaw) {
-  return Room(world).standing_on(model, x, y, yaw);
+Pose standing_on(const WorldModel& world, const Model& model, double x, double y, double yaw,
+                 std::optional<double> near_z) {
+  return Room(world).standing_on(model, x, y, yaw, near_z);
 }
 
 std::string overlapped(const WorldModel& world, const Model& model, const Pose& X_WM,

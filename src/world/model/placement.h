@@ -26,8 +26,8 @@ class Room {
 
   // The height of the ground at (x, y), m: the highest static surface at most 0.5 m above the
   // lowest one there, so that ramps and steps count, but tables, walls and roofs do not. 0 if there
-  // is none.
-  double ground_height(double x, double y) const;
+  // is none. near_z: on that storey, where there is a surface at most 0.5 m from it.
+  double ground_height(double x, double y, std::optional<double> near_z = {}) const;
 
   // The same on the storey of a person whose origin is at z, somewhere between feet and hips. If
   // there is no ground below, the result is z, or 0 if z may be the height of the hips.
@@ -36,7 +36,8 @@ class Room {
   // The pose of a model at (x, y) with that yaw, its lowest collision point on the ground. It is
   // level, unless the model would then stick in ground that is close to a plane: it is then tilted
   // with the ground.
-  Pose standing_on(const Model& model, double x, double y, double yaw) const;
+  Pose standing_on(const Model& model, double x, double y, double yaw,
+                   std::optional<double> near_z = {}) const;
 
   // The name of a model that the model's collisions would overlap, ignoring the lowest 2 cm above
   // the ground; "" if there is room. Static models may overlap each other. Meshes of the placed
@@ -45,7 +46,8 @@ class Room {
 
  private:
   std::vector<double> surfaces(double x, double y) const;
-  std::optional<Pose> on_slope(const Model& model, const Pose& level, double lowest) const;
+  std::optional<Pose> on_slope(const Model& model, const Pose& level, double lowest,
+                               std::optional<double> near_z) const;
 
   struct Index;
   std::unique_ptr<Index> index_;
@@ -53,7 +55,8 @@ class Room {
 
 // The same, for a single query.
 double ground_height(const WorldModel& world, double x, double y);
-Pose standing_on(const WorldModel& world, const Model& model, double x, double y, double yaw);
+Pose standing_on(const WorldModel& world, const Model& model, double x, double y, double yaw,
+                 std::optional<double> near_z = {});
 std::string overlapped(const WorldModel& world, const Model& model, const Pose& X_WM,
                        const LinkPose& now = {});
 
