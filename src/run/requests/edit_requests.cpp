@@ -2,6 +2,8 @@
 //
 // The pacer holds, what is under way is published, and then nothing moves: the simulation's thread
 // waits in the pacer, the modules at their queues. So the change needs no lock against any of them.
+#include <map>
+
 #include <spdlog/spdlog.h>
 
 #include "base/channel_names.h"
@@ -222,19 +224,29 @@ Run::Outcome Run::set_pose(const request_t& request, const set_pose_request_t& b
 }
 
 // The file gets the poses of the last published state.
-Run::Outcome Run::save(const request_t&) {
+Run::Outcome Run::save(const request_t& request) {
+  name_request_t how;
+  if (!request.body.empty() && !read_body(request, how)) return bad_body<name_request_t>();
+  const std::map<std::string, EditedWorld::How> kHow{{"", EditedWorld::How::kept},
+                                                     {"overwrite", EditedWorld::How::overwritten},
+                                                     {"copy", EditedWorld::How::copied}};
+  const auto found = kHow.find(how.name);
+  if (found == kHow.end())
+    return Outcome::refuse(reply_t::BAD_REQUEST,
+                           "'" + how.name + "' is not allowed; '', 'overwrite' or 'copy' is");
   const world::BodyLayout& layout = simulation_->layout();
-  const EditedWorld::Saved saved = edited_->save(*world_, [&](size_t instance) {
+  const auto X_WM = [&](size_t instance) {
     const world::ModelInstance& model = world_->models[instance];
     const world::LinkPlacement& link = layout.links[layout.first_link[instance]];
     if (!link.body.valid()) return link.X_BL * model.model->links[0].X_ML.inverse();
     return publisher_.latest()->bodies[link.body] * link.X_BL *
            model.model->links[0].X_ML.inverse();
-  });
+  };
+  const EditedWorld::Saved saved = edited_->save(*world_, X_WM, found->second);
   if (!saved.fault.empty()) return Outcome::refuse(reply_t::REFUSED, saved.fault);
   spdlog::info("the world is saved");
   Outcome outcome;
-  outcome.text = saved.note;
+  outcome.text = saved.file + (saved.file.empty() || saved.note.empty() ? "" : "; ") + saved.note;
   return outcome;
 }
 

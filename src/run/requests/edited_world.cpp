@@ -63,6 +63,16 @@ std::string write_file(const std::string& path, const std::string& bytes) {
   return "";
 }
 
+// "lab_2.sdf" of "lab.sdf", or the next number that is free.
+std::string unused_copy(const std::string& file) {
+  const fs::path path(file);
+  for (int number = 2;; ++number) {
+    const fs::path copy = path.parent_path() / (path.stem().string() + "_" +
+                                                std::to_string(number) + path.extension().string());
+    if (!is_there(copy.string())) return copy.string();
+  }
+}
+
 // Follows symbolic links: writes the file that they lead to.
 std::string full(const std::string& file) {
   if (file.empty()) return "";
@@ -139,14 +149,16 @@ std::string EditedWorld::overwritten() const {
   if (known_ ? bytes_of(file_) == known_ : !is_there(file_)) return "";
   return known_ ? file_ +
                       " was changed, or removed, by another program since: keep that, and save "
-                      "this world by another name (ruedo edit --save-as FILE)"
+                      "a copy of this world, or overwrite it"
                 : file_ + " exists by now: another program made it";
 }
 
 EditedWorld::Saved EditedWorld::save(const world::WorldModel& now,
-                                     const std::function<Pose(size_t)>& X_WM) {
+                                     const std::function<Pose(size_t)>& X_WM, How how) {
   const std::lock_guard lock(mutex_);
-  if (const std::string fault = overwritten(); !fault.empty()) return {fault, ""};
+  if (const std::string fault = how == How::kept ? overwritten() : ""; !fault.empty())
+    return {fault, "", ""};
+  const std::string file = how == How::copied ? unused_copy(file_) : file_;
   std::vector<world::ModelNow> models;
   for (size_t i = 0; i < now.models.size(); ++i) {
     if (now.models[i].removed) continue;
@@ -160,16 +172,16 @@ EditedWorld::Saved EditedWorld::save(const world::WorldModel& now,
     world::WorldText::Written written = text().with(models);
     written.text = world::moved_to(written.text, fs::path(first_.file).parent_path().string(),
                                    fs::path(file_).parent_path().string());
-    world::parse_document(written.text, file_);
-    if (std::string fault = write_file(file_, written.text); !fault.empty())
-      return {file_ + " cannot be written: " + fault, ""};
-    known_ = std::move(written.text);
+    world::parse_document(written.text, file);
+    if (std::string fault = write_file(file, written.text); !fault.empty())
+      return {file + " cannot be written: " + fault, "", ""};
+    if (how != How::copied) known_ = std::move(written.text);
     std::string note;
     for (const std::string& sentence : written.left_out)
       note += (note.empty() ? "" : "; ") + sentence;
-    return {"", note};
+    return {"", note, how == How::copied ? fs::path(file).filename().string() : ""};
   } catch (const InputError& error) {
-    return {error.what(), ""};
+    return {error.what(), "", ""};
   }
 }
 

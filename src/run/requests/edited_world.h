@@ -35,9 +35,14 @@ class EditedWorld {
   struct Saved {
     std::string fault;  // "": it is on the disk
     std::string note;   // what the file cannot say
+    std::string file;   // the name of the copy; "" for none
   };
+  // To the file, unless another program has changed it since; in spite of that; or to a copy beside
+  // it whose name is not taken yet.
+  enum class How { kept, overwritten, copied };
   // X_WM: of a model now, by its place in the list.
-  Saved save(const world::WorldModel& now, const std::function<Pose(size_t)>& X_WM);
+  Saved save(const world::WorldModel& now, const std::function<Pose(size_t)>& X_WM,
+             How how = How::kept);
 
  private:
   const world::WorldText& text() const;
