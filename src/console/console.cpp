@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <charconv>
 #include <deque>
+#include <filesystem>
 #include <map>
 #include <mutex>
 #include <optional>
@@ -13,6 +14,7 @@
 #include <spdlog/spdlog.h>
 
 #include "base/json.h"
+#include "base/sha256.h"
 #include "base/utf8.h"
 #include "base/version.h"
 #include "console/assets.h"
@@ -42,6 +44,15 @@ std::optional<size_t> number_after(std::string_view begin, std::string_view path
   const auto [end, error] = std::from_chars(path.data(), path.data() + path.size(), number);
   if (error != std::errc() || end != path.data() + path.size()) return std::nullopt;
   return number;
+}
+
+// Tells world files apart, wherever they lie, without telling a viewer where that is.
+std::string key_of(const std::string& file) {
+  constexpr size_t kDigits = 16;
+  std::error_code error;
+  const std::string path = std::filesystem::weakly_canonical(file, error).string();
+  if (file.empty() || error) return "";
+  return sha256(reinterpret_cast<const uint8_t*>(path.data()), path.size()).substr(0, kDigits);
 }
 
 }  // namespace
@@ -124,7 +135,7 @@ http::HttpResponse Console::Impl::get(std::string_view path) {
   return not_found();
 }
 
-// "FIELD/CHANNEL": channel names contain slashes.
+// "FIELD,FIELD.../CHANNEL": channel names contain slashes.
 http::HttpResponse Console::Impl::history(std::string_view path) {
   const size_t slash = path.find('/');
   if (slash == std::string_view::npos) return not_found();
@@ -162,11 +173,12 @@ http::HttpResponse Console::Impl::file_of(const SceneData& data, std::string_vie
   return blob(data.pictures[*picture].bytes, data.pictures[*picture].type);
 }
 
-// The text that SPAWN would take to create that model.
+// The text that SPAWN would take to create that model; "" where there is none, or it is gone.
 http::HttpResponse Console::Impl::model_text(size_t index) {
-  if (!world || index >= world->models.size() || world->models[index].removed) return not_found();
-  const std::string text = stage.source->model_text(world->models[index].name);
-  return text.empty() ? not_found() : blob(http::bytes_of(text), "text/plain; charset=utf-8");
+  if (!world || index >= world->models.size()) return not_found();
+  const world::ModelInstance& model = world->models[index];
+  const std::string text = model.removed ? "" : stage.source->model_text(model.name);
+  return blob(http::bytes_of(text), "text/plain; charset=utf-8");
 }
 
 // "/library.json", and for each of its models "/library/NUMBER/scene" with the files of a scene.
@@ -207,7 +219,8 @@ Console::Console(const http::Address& address, std::unique_ptr<Source> source,
       .member("mode", mode)
       .member("title", printable(title))
       .member("version", version());
-  json.member("info", impl.stage.source->info_channel())
+  json.member("world", impl.world ? key_of(impl.world->file) : "")
+      .member("info", impl.stage.source->info_channel())
       .member("fault", printable(impl.stage.source->fault()))
       .member("save", printable(impl.stage.source->save_name()))
       .member("compared", printable(impl.stage.source->compared()))

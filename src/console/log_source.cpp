@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <optional>
 
 #include "base/channel_names.h"
@@ -22,19 +23,72 @@ constexpr double kLongestPause_s =
     0.5;
 constexpr double kSlowest = 0.01, kFastest = 1000.0;
 
-// The number at a field's path; none if the message has none there.
-std::optional<double> number_at(std::span<const uint8_t> message, const std::string& path) {
+constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
+
+std::optional<double> number_of(const FieldValue& value) {
+  if (const auto* real = std::get_if<double>(&value)) return *real;
+  if (const auto* whole = std::get_if<int64_t>(&value)) return static_cast<double>(*whole);
+  if (const auto* yes = std::get_if<bool>(&value)) return *yes ? 1.0 : 0.0;
+  return std::nullopt;
+}
+
+// What is plotted of a message: the number at a path ("vel[0]"), or the least, the largest, the
+// mean or the sum of an array's finite elements ("min(ranges)"). web/src/wire/fields.ts has the
+// same.
+class PlottedField {
+ public:
+  explicit PlottedField(std::string_view text) : path_(text) {
+    const size_t open = text.find('(');
+    if (open == text.npos || !text.ends_with(')')) return;
+    over_ = text.substr(0, open);
+    path_ = text.substr(open + 1, text.size() - open - 2);
+  }
+
+  void begin() { value_ = kNone, count_ = 0; }
+  void visit(const FieldPath& at, const FieldValue& value) {
+    if (!path_.starts_with(at.parts.front().field->name)) return;
+    const auto number = number_of(value);
+    if (!number || (over_.empty() ? at.str() : at.pattern()) != path_) return;
+    if (over_.empty()) {
+      value_ = *number;
+      count_ = 1;
+    } else if (std::isfinite(*number)) {
+      value_ = count_++ == 0    ? *number
+               : over_ == "min" ? std::min(value_, *number)
+               : over_ == "max" ? std::max(value_, *number)
+                                : value_ + *number;
+    }
+  }
+  bool found() const { return count_ > 0; }
+  double value() const { return over_ == "mean" ? value_ / static_cast<double>(count_) : value_; }
+
+ private:
+  std::string path_, over_;  // over_: "min", "max", "mean", "sum"; "" for a single number
+  double value_ = kNone;
+  size_t count_ = 0;
+};
+
+std::vector<PlottedField> plotted_fields(std::string_view list) {
+  std::vector<PlottedField> fields;
+  while (fields.size() < LogSource::kMostFields) {
+    const size_t end = std::min(list.find(','), list.size());
+    fields.emplace_back(list.substr(0, end));
+    if (end == list.size()) break;
+    list.remove_prefix(end + 1);
+  }
+  return fields;
+}
+
+// False if the message has none of them.
+bool read_fields(std::span<const uint8_t> message, std::vector<PlottedField>& fields) {
   const Schema* schema = find_schema(fingerprint_of(message));
-  std::optional<double> found;
-  if (!schema) return found;
+  for (PlottedField& field : fields) field.begin();
+  if (!schema) return false;
   visit_message(*schema, message, [&](const FieldPath& at, const FieldValue& value) {
-    if (!path.starts_with(at.parts.front().field->name) || at.str() != path) return true;
-    if (const auto* real = std::get_if<double>(&value)) found = *real;
-    if (const auto* whole = std::get_if<int64_t>(&value)) found = static_cast<double>(*whole);
-    if (const auto* yes = std::get_if<bool>(&value)) found = *yes ? 1.0 : 0.0;
-    return false;
+    for (PlottedField& field : fields) field.visit(at, value);
+    return true;
   });
-  return found;
+  return std::any_of(fields.begin(), fields.end(), [](const auto& field) { return field.found(); });
 }
 
 bool read(log::Reader& reader, const log::Index::Entry& wanted, log::Event& event) {
@@ -84,10 +138,10 @@ void LogSource::pump(Board&, bool viewers) {
 }
 
 // The first and the last message are always among those read.
-http::Bytes LogSource::history(const std::string& name, const std::string& field) {
+http::Bytes LogSource::history(const std::string& name, const std::string& list) {
   const std::string_view apart = Comparison::kApart;
   if (comparison_ && name.starts_with(apart))
-    return comparison_->apart(name.substr(apart.size()), field);
+    return comparison_->apart(name.substr(apart.size()), list);
   const auto& channels = index_.channels();
   const auto found = std::find_if(
       channels.begin(), channels.end(),
@@ -97,16 +151,18 @@ http::Bytes LogSource::history(const std::string& name, const std::string& field
   size_t all = 0;
   for (const log::Index::Entry& entry : entries) all += entry.size;
   const size_t every = 1 + std::max(entries.size() / kMostHistory, all / kMostForPlot);
+  std::vector<PlottedField> fields = plotted_fields(list);
   std::vector<double> numbers{static_cast<double>(every)};
+  double last_s = -std::numeric_limits<double>::infinity();
   log::Event event;
   for (size_t i = 0; i < entries.size();
        i = i + 1 < entries.size() ? std::min(i + every, entries.size() - 1) : entries.size()) {
     if (!read(reader_, entries[i], event)) continue;
-    const auto value = number_at(event.data, field);
     const double time_s = static_cast<double>(entries[i].time_us) * 1e-6;
-    if (!value || (numbers.size() > 1 && time_s <= numbers[numbers.size() - 2])) continue;
-    numbers.push_back(time_s);
-    numbers.push_back(*value);
+    if (time_s <= last_s || !read_fields(event.data, fields)) continue;
+    numbers.push_back(last_s = time_s);
+    for (const PlottedField& field : fields)
+      numbers.push_back(field.found() ? field.value() : kNone);
   }
   const auto* bytes = reinterpret_cast<const uint8_t*>(numbers.data());
   return std::make_shared<const std::vector<uint8_t>>(bytes,

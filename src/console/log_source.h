@@ -17,6 +17,7 @@ namespace ruedo::console {
 class LogSource : public Source {
  public:
   static constexpr size_t kMostHistory = 100'000;      // messages of a channel read for a plot
+  static constexpr size_t kMostFields = 16;            // of a channel in one plot
   static constexpr size_t kScanned = 2'000;            // messages scanned for events at a time
   static constexpr uint32_t kMostMessage = 64u << 20;  // bytes; larger ones are not shown
   // Bytes that are read for a plot, and for all viewers at a time: what one of them asks for holds
@@ -35,7 +36,7 @@ class LogSource : public Source {
   std::shared_ptr<const world::WorldModel> world(size_t scene) override;
   std::string fault() const override;
   std::string info_channel() const override { return info_channel_; }
-  http::Bytes history(const std::string& channel, const std::string& field) override;
+  http::Bytes history(const std::string& channel, const std::string& fields) override;
   const Events* events() const override { return scanned_ ? &scan_.events() : nullptr; }
   std::string compared() const override { return comparison_ ? comparison_->name() : ""; }
   std::string comparison() const override { return comparison_ ? comparison_->report() : ""; }

@@ -231,6 +231,25 @@ void write_bases(JsonWriter& out, const world::WorldModel& world, const world::B
   out.close(']');
 }
 
+// Of robots, as joint_state_t and joint_command_t call them: what it can be moved by, from where to
+// where, in rad or m; null: without a limit.
+void write_joints(JsonWriter& out, const world::WorldModel& world,
+                  const world::BodyLayout& layout) {
+  out.name("joints").open('[');
+  for (const world::RobotPlacement& robot : layout.robots) {
+    const world::ModelInstance& instance = world.models[robot.instance];
+    for (const JointIndex j : robot.joints) {
+      const world::Joint& joint = instance.model->joints[layout.joints[j].joint];
+      out.open('{').member("robot", instance.name).member("name", joint.name);
+      out.member("slides", joint.type == world::JointType::prismatic)
+          .member("lower", joint.axis.lower)
+          .member("upper", joint.axis.upper)
+          .close('}');
+    }
+  }
+  out.close(']');
+}
+
 http::Bytes link_bytes(const world::WorldModel& world, const world::BodyLayout& layout,
                        const scene::RenderContent& content) {
   Blob blob;
@@ -280,6 +299,7 @@ SceneData::SceneData(const world::WorldModel& world, int version) {
   out.close(']');
   write_wheels(out, layout);
   write_bases(out, world, layout);
+  write_joints(out, world, layout);
   out.close('}');
   json = http::bytes_of(out.text());
   links = link_bytes(world, layout, content);

@@ -79,10 +79,11 @@ class Source {
   // The file written by SAVE; "" for none.
   virtual std::string save_name() const { return {}; }
 
-  // A field ("vel[0]") over the whole log, as float64, little endian: how many messages were read
-  // per value, then time in s and value for each; null if there is no such channel.
-  virtual http::Bytes history(const std::string& channel, const std::string& field) {
-    static_cast<void>(channel), static_cast<void>(field);
+  // Fields over the whole log, as float64, little endian: how many messages were read per row, then
+  // for each row its time in s and the values, NaN for none; null if there is no such channel.
+  // fields: "vel[0]", or "min(ranges)", also max, mean and sum; several with commas between them.
+  virtual http::Bytes history(const std::string& channel, const std::string& fields) {
+    static_cast<void>(channel), static_cast<void>(fields);
     return nullptr;
   }
 

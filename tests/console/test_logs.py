@@ -3,10 +3,12 @@ logs.
 """
 
 import json
+import math
 import os
 import struct
 import subprocess
 import time
+from urllib.parse import quote
 
 import pytest
 from harness import (
@@ -252,6 +254,38 @@ def test_a_field_is_told_over_the_whole_log(tmp_path, count, every):
         )
         for none in ("x/p3at/lrf", "x", "", "%00/p3at/odometry"):
             assert get(process.port, f"/history/{none}")[0] in (200, 404)
+
+
+def test_fields_are_told_together_and_arrays_as_a_whole(tmp_path):
+    """Of the finite elements; where there are none, and of fields that there are not, nothing."""
+    from ruedo.lcmtypes import planar_lidar_t
+
+    path = tmp_path / "scans.lcm"
+    with open(path, "wb") as log:
+        for i, ranges in enumerate([[3, math.inf, 1, 2], [], [math.inf, -math.inf]]):
+            scan = planar_lidar_t()
+            scan.utime, scan.nranges, scan.ranges = 50 * i, len(ranges), ranges
+            log.write(event(i, 1000 * i, b"p3at/lrf", scan.encode()))
+    fields = [
+        "min(ranges)",
+        "max(ranges)",
+        "mean(ranges)",
+        "sum(ranges)",
+        "ranges[2]",
+        "none",
+        "utime",
+    ]
+    with playing(path) as process:
+        _, body, _ = get(process.port, f"/history/{quote(','.join(fields))}/p3at/lrf")
+        numbers = struct.unpack(f"<{len(body) // 8}d", body)
+        assert numbers[0] == 1
+        rows = [numbers[1 + 8 * i : 9 + 8 * i] for i in range(3)]
+        nan = math.nan
+        assert rows[0] == pytest.approx((0, 1, 3, 2, 6, 1, nan, 0), nan_ok=True)
+        assert rows[1] == pytest.approx((0.001, nan, nan, nan, nan, nan, nan, 50), nan_ok=True)
+        assert rows[2] == pytest.approx((0.002, nan, nan, nan, nan, nan, nan, 100), nan_ok=True)
+        many = ",".join(["utime"] * 200)  # of which it tells some
+        assert len(get(process.port, f"/history/{many}/p3at/lrf")[1]) < 8 * 200
 
 
 def test_strange_logs_do_not_hurt(log, tmp_path):
