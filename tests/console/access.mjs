@@ -33,8 +33,11 @@ export default async function access({ page, until, check, ready, picture, expec
       window.ruedo.page.set({ theme, panel: true });
     }, scheme);
     await page.evaluate(axe);
-    for (const name of ["Robot", "Plots", "Channels", "World"]) {
+    for (const name of ["Robot", "Plots", "Channels", "World", "Notes"]) {
       await tab(name);
+      await page.evaluate(() => {
+        for (const part of document.querySelectorAll("#panel details")) part.open = true;
+      });
       await note(`${scheme}, ${width} wide, ${name}`);
     }
     await page.locator("#canvas").focus();
@@ -181,7 +184,11 @@ export default async function access({ page, until, check, ready, picture, expec
   await page.keyboard.press(" ");
   await until("paused, all pixels are drawn", () => {
     const canvas = document.getElementById("canvas");
-    return canvas.width >= canvas.clientWidth && document.getElementById("reduced").hidden;
+    return (
+      document.getElementById("state").textContent === "paused" &&
+      canvas.width >= canvas.clientWidth &&
+      document.getElementById("reduced").hidden
+    );
   });
   await picture("still");
   await page.locator("#canvas").focus();

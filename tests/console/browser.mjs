@@ -51,7 +51,7 @@ const wrong = (text) => {
   if (!expected?.test(text)) errors.push(text);
 };
 page.on("console", (message) => {
-  if (message.type() === "error") wrong(message.text());
+  if (message.type() === "error" || /^THREE/.test(message.text())) wrong(message.text());
 });
 page.on("pageerror", (error) => wrong(String(error)));
 // No errors: a picture that is replaced while it is being read, and a server that does not answer

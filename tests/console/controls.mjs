@@ -222,8 +222,8 @@ export default async function controls(tools) {
   const click = async (at) => {
     const place = await onScreen(...at);
     const exact = await page.evaluate((pixel) => {
-      const { ground } = window.ruedo.stage.picker.pick(...pixel);
-      return [ground.x, ground.y];
+      const { point } = window.ruedo.stage.picker.pick(...pixel);
+      return [point.x, point.y];
     }, place);
     await page.mouse.click(...place);
     return exact;

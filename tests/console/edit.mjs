@@ -23,13 +23,14 @@ export default async function edit({ page, seen, until, check, picture, still, o
     until(`(${name} is there)`, (wanted) => window.ruedo.editor.find(wanted) !== undefined, name);
   const gone = (name) =>
     until(`(${name} is gone)`, (wanted) => window.ruedo.editor.find(wanted) === undefined, name);
-  const drag = async (from, to) => {
+  const drag = async (from, to, meanwhile = () => undefined) => {
     await page.mouse.move(...(await onScreen(...from)));
     await page.mouse.down();
     await page.mouse.move(...(await onScreen((from[0] + to[0]) / 2, (from[1] + to[1]) / 2)), {
       steps: 3,
     });
     await page.mouse.move(...(await onScreen(...to)), { steps: 3 });
+    await meanwhile();
     await page.mouse.up();
   };
   const pose = (name) => page.evaluate((wanted) => window.ruedo.editor.pose(wanted), name);
@@ -45,8 +46,29 @@ export default async function edit({ page, seen, until, check, picture, still, o
     near(await pose("wall"), [-0.5, 1, 0, 1, 0, 0, 0]),
     JSON.stringify(await pose("wall")),
   );
+  for (const odd of ["1e7", ""]) {
+    await page.getByLabel("wall height").fill(odd);
+    await page.getByLabel("wall height").press("Tab");
+    await until(
+      `a height that no wall has is refused: "${odd}"`,
+      () =>
+        document.querySelector('[aria-label="wall height"]').value === "1.2" &&
+        window.notes.some((note) => /^wall height: a number from/.test(note)),
+    );
+  }
   await tool("room");
-  await drag([-2, -2], [1, 0]);
+  await drag([-2, -2], [1, 0], async () => {
+    const differs = await page.evaluate(() => {
+      const { stage, draw } = window.ruedo,
+        picture = (visible) => {
+          draw.ghost.visible = visible;
+          stage.redraw();
+          return document.getElementById("canvas").toDataURL();
+        };
+      return picture(false) !== picture(true);
+    });
+    check("what is being drawn is seen", differs, "the same picture without it");
+  });
   await has("room");
   check(
     "a room stands where it was drawn",
@@ -129,8 +151,15 @@ export default async function edit({ page, seen, until, check, picture, still, o
   await page.locator('[data-number="y"]').fill("1.5");
   await page.locator('[data-number="y"]').press("Enter");
   await until("a wall is moved", () => Math.abs(window.ruedo.editor.pose("wall")[1] - 1.5) < 1e-6);
+  const moved_wall = await pose("wall");
   await page.locator("#duplicate").click();
   await has("wall_2");
+  const apart = (await pose("wall_2")).map((v, i) => v - moved_wall[i]);
+  check(
+    "a copy finds room: the nearest is behind it",
+    Math.abs(apart[0]) < 1e-6 && Math.abs(Math.abs(apart[1]) - 0.2) < 1e-3,
+    JSON.stringify(apart),
+  );
   seen("a copy stands beside it");
   await page.locator("#canvas").focus();
   await page.keyboard.press("Delete");
@@ -148,6 +177,45 @@ export default async function edit({ page, seen, until, check, picture, still, o
   await page.locator('[aria-label="factor along z"]').fill("2");
   await page.locator("#scale").click();
   await until("it is scaled", () => window.ruedo.page.now.edits.undo === "scale box");
+  await has("box");
+
+  // ---- its properties; the box is 0.4 m wide and 0.8 m high by now, of 100 kg/m^3
+  await page.locator('[data-model="box"]').click();
+  const property = (name) => page.locator(`[data-property="${name}"]`);
+  await until("properties are those of its text", () => {
+    const value = (name) => document.querySelector(`[data-property="${name}"]`).value;
+    return (
+      Number(value("mass")) === 12.8 &&
+      ["size-x", "size-y", "size-z"].map(value).join() === "0.4,0.4,0.8"
+    );
+  });
+  const text = () =>
+    page.evaluate(() => window.ruedo.editor.textOf(window.ruedo.page.now.selected));
+  const becomes = async (what, pattern) => {
+    for (let i = 0; i < 100 && !pattern.test((await text()) ?? ""); ++i)
+      await page.waitForTimeout(50);
+    check(what, pattern.test(await text()), await text());
+  };
+  await property("size-x").fill("0.5");
+  await property("size-x").press("Tab");
+  await becomes("a size in metres", /<size>0\.5 0\.4 0\.8<\/size>/);
+  await property("mass").fill("20");
+  await property("mass").press("Tab");
+  await becomes("a mass", /<mass>20<\/mass>/);
+  await property("colour").fill("#ff8000");
+  await becomes("a colour", /<diffuse>1 0\.502 0 1<\/diffuse>/);
+  await property("static").check();
+  await becomes("fixed", /<static>true<\/static>/);
+  await property("static").uncheck();
+  await becomes("and movable", /<static>false<\/static>/);
+  await property("name").fill("crate");
+  await property("name").press("Enter");
+  await has("crate");
+  await page.locator("#properties").scrollIntoViewIfNeeded();
+  await picture("properties");
+  await until("a name", () => window.ruedo.page.now.selected === "crate");
+  await property("name").fill("box");
+  await property("name").press("Enter");
   await has("box");
 
   // ---- settled: the box, now 0.8 m high, was put back where it stood before: its lower half in

@@ -56,6 +56,85 @@ export default async function fields({ page, until, check, ready, picture }) {
   );
   await page.locator(".pane").scrollIntoViewIfNeeded();
   await picture("fields");
+  // ---- formulas
+  await page.getByLabel("channel to plot").selectOption("p3at/lrf");
+  await until("every element of an array is offered", () => {
+    const offered = [...document.querySelectorAll("#offered-fields option")].map((o) => o.value);
+    return offered.includes("ranges[180]") && offered.includes("min(ranges)");
+  });
+  const plot = async (text, apart = false) => {
+    await page.getByLabel("field to plot").fill(text);
+    await page.locator(apart ? "#plot-apart" : "#plot").click();
+  };
+  const newest = (text) =>
+    page.evaluate((wanted) => {
+      const all = window.ruedo.plots.panes.flatMap(({ series }) => series);
+      return all.find(({ path }) => path === wanted)?.values.at(-1) ?? NaN;
+    }, text);
+  const grows = (text, what) =>
+    until(
+      what,
+      (wanted) =>
+        window.ruedo.plots.panes.flatMap(({ series }) => series).find(({ path }) => path === wanted)
+          ?.values.length > 5,
+      text,
+    );
+  await plot("min(ranges)", true);
+  await grows("min(ranges)", "(it grows)");
+  const nearest = await page.evaluate(() =>
+    Math.min(...window.ruedo.plots.newest.get("p3at/lrf").ranges.filter(Number.isFinite)),
+  );
+  check(
+    "a formula over an array is plotted",
+    Math.abs((await newest("min(ranges)")) - nearest) < 0.3,
+    `${await newest("min(ranges)")} and ${nearest}`,
+  );
+  const apart = "{p3at/pose pos[0]} - {p3at/odometry x}";
+  await plot(apart);
+  await grows(apart, "a formula over two channels is plotted");
+  check("(both are near each other)", Math.abs(await newest(apart)) < 0.2, await newest(apart));
+  await plot("min(ranges");
+  await until("what is no formula is refused in words", () =>
+    window.notes.some((note) => /"\)" is missing/.test(note)),
+  );
+  await open("p3at/odometry");
+  await page.evaluate(() => {
+    const data = new DataTransfer(),
+      event = (type) =>
+        new DragEvent(type, { dataTransfer: data, cancelable: true, bubbles: true });
+    document.querySelector('[data-field="v"]').dispatchEvent(event("dragstart"));
+    document.querySelector("#panel .page").dispatchEvent(event("drop"));
+  });
+  await until(
+    "a drop anywhere on the panel plots",
+    () =>
+      window.ruedo.page.now.tab === "Plots" &&
+      window.ruedo.plots.panes.at(-1).series.some(({ path }) => path === "v"),
+  );
+
+  // ---- zoomed, and over each other
+  const over = page.locator(".pane .u-over").first();
+  await over.scrollIntoViewIfNeeded();
+  const { x, y, width, height } = await over.boundingBox();
+  await page.mouse.move(x + 0.3 * width, y + height / 2);
+  await page.mouse.down();
+  await page.mouse.move(x + 0.6 * width, y + height / 2, { steps: 4 });
+  await page.mouse.up();
+  await until("panes zoom together", () => {
+    const [a, b] = window.ruedo.plots.panes.map(({ plot }) => plot.scales.x);
+    return Math.abs(a.min - b.min) < 1e-6 && Math.abs(a.max - b.max) < 1e-6 && a.max - a.min < 1e3;
+  });
+  await over.dblclick();
+  await page.locator(".pane").first().getByRole("button", { name: "x-y" }).click();
+  await until(
+    "one series is drawn over another",
+    () => window.ruedo.plots.panes[0].curves?.points[0].length > 10,
+  );
+  await picture("curves");
+  await page.locator(".pane").nth(1).getByTitle("close this pane").click();
   await page.reload();
-  await until("panes are kept", () => window.ruedo?.plots.panes[0]?.series.length === 2);
+  await until(
+    "panes are kept",
+    () => window.ruedo?.plots.panes[0]?.series.length === 2 && window.ruedo.plots.panes[0].xy,
+  );
 }

@@ -5,7 +5,7 @@ export default async function fieldsOfLog({ page, until, check, ready, given, pi
   await page.keyboard.press(" ");
   await page.getByRole("tab", { name: "Plots" }).click();
   await page.getByLabel("channel to plot").selectOption("p3at/odometry");
-  await page.getByLabel("field to plot").selectOption("x");
+  await page.getByLabel("field to plot").fill("x");
   await page.locator("#plot").click();
   await until(
     "the whole run is there",
@@ -34,6 +34,21 @@ export default async function fieldsOfLog({ page, until, check, ready, given, pi
       Math.abs(window.ruedo.page.now.playback.now - (begin + end) / 2) < 0.2 * (end - begin),
     given,
   );
+  // 30 s of them: at 20 Hz or more, of a robot that goes round.
+  await until(
+    "standard plots show what was before",
+    () =>
+      window.ruedo.pages.speed.data[0].length > 300 &&
+      window.ruedo.pages.error.data[0].length > 300,
+  );
+  const path = await page.evaluate(() => window.ruedo.pages.path.points[0]);
+  check(
+    "and the path, as y over x",
+    path.length > 300 && Math.max(...path.map(([, y]) => y)) > 0.05,
+    path.length,
+  );
   await picture("fields-log");
+  await page.locator(".xy").first().scrollIntoViewIfNeeded();
+  await picture("path-log");
   check("(it is seen)", true);
 }

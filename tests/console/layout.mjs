@@ -2,18 +2,20 @@
 // address when told to.
 export default async function layout({ page, seen, told, until, expect, ready, picture }) {
   expect(/WebSocket|net::ERR_|Failed to load|socket/); // its end cuts off what is under way
-  const world = () => page.evaluate(() => window.ruedo.page.now.world.name);
+  const world = () => page.evaluate(() => window.ruedo.page.now.world.robots[0].name);
   const open = () => {
     const { tab, layers } = window.ruedo.page.now;
-    return [tab, layers.has("sonar"), window.ruedo.plots.channels.join()].join(" ");
+    return [tab, layers.has("sonar"), document.querySelectorAll(".pane").length].join(" ");
   };
   const isOpen = (what, words) =>
     until(
       what,
       ([of, words]) => {
-        const { world, tab, layers } = window.ruedo.page.now;
-        const is = [tab, layers.has("sonar"), window.ruedo.plots.channels.join()].join(" ");
-        return world?.name === of && is === words;
+        const { world, tab, layers } = window.ruedo.page.now,
+          panes = document.querySelectorAll(".pane").length;
+        return (
+          world?.robots[0]?.name === of && [tab, layers.has("sonar"), panes].join(" ") === words
+        );
       },
       words,
     );
@@ -23,7 +25,7 @@ export default async function layout({ page, seen, told, until, expect, ready, p
     await told();
     await until(
       "(it is there)",
-      (name) => (window.ruedo.page.now.world?.name ?? name) !== name,
+      (name) => (window.ruedo.page.now.world?.robots[0]?.name ?? name) !== name,
       before,
     );
     return before;
@@ -35,12 +37,12 @@ export default async function layout({ page, seen, told, until, expect, ready, p
   const first = await page.evaluate(open);
   const one = await change();
   const two = await world();
-  await isOpen("plots are of their world", [two, "Plots false "]);
+  await isOpen("plots are of their world", [two, "Plots false 0"]);
   await page.getByRole("tab", { name: "World" }).click();
   await page.locator('[data-layer="sonar"]').click();
   await page.reload();
   await ready();
-  await isOpen("what was open is open again", [two, "World true "]);
+  await isOpen("what was open is open again", [two, "World true 0"]);
   await change();
   await isOpen("and in the other world what was open there", [one, first]);
   await picture("layout");

@@ -43,7 +43,8 @@ export default async function live({
     "plots grow",
     () =>
       document.querySelectorAll(".plot canvas").length === 3 &&
-      ["speed", "path", "error"].every((name) => window.ruedo.pages[name].data[0].length > 10),
+      ["speed", "error"].every((name) => window.ruedo.pages[name].data[0].length > 10) &&
+      window.ruedo.pages.path.points.every((points) => points.length > 10),
   );
   await picture("plots");
   await page.getByRole("tab", { name: "Channels" }).click();

@@ -26,6 +26,16 @@ export default async function looks({ page, until, check, ready, still, onScreen
       /level/.test(document.getElementById("coordinates").textContent),
   );
   check("(in words)", true, await page.evaluate(words));
+  const differs = await page.evaluate(() => {
+    const { stage, measure } = window.ruedo,
+      picture = (visible) => {
+        measure.line.visible = visible;
+        stage.redraw();
+        return document.getElementById("canvas").toDataURL();
+      };
+    return picture(true) !== picture(false);
+  });
+  check("and seen, over the floor that it lies on", differs, "the same picture without it");
   await page.locator("#measure").click();
   const lines = () =>
     page.evaluate(() =>
@@ -44,8 +54,10 @@ export default async function looks({ page, until, check, ready, still, onScreen
   const [name, png] = await saved(() => page.locator("#screenshot").click());
   check(
     "a screenshot is a picture",
-    name === "ruedo.png" && png.subarray(1, 4).toString() === "PNG" && png.length > 5000,
-    png.length,
+    /^arena_\d+\.\d\ds\.png$/.test(name) &&
+      png.subarray(1, 4).toString() === "PNG" &&
+      png.length > 5000,
+    `${name}, ${png.length}`,
   );
   await page.locator("#record").click();
   await page.locator("#canvas").focus();
@@ -55,13 +67,43 @@ export default async function looks({ page, until, check, ready, still, onScreen
   const [film, webm] = await saved(() => page.locator("#record").click());
   check(
     "a video is one",
-    (film === "ruedo.webm" && webm.readUInt32BE(0) === 0x1a45dfa3) || film === "ruedo.mp4",
+    (film.endsWith(".webm") && webm.readUInt32BE(0) === 0x1a45dfa3) || film.endsWith(".mp4"),
     film,
   );
+  const at = webm.indexOf(Buffer.from([0x44, 0x89, 0x88])); // its duration, a float64 in ms
+  check(
+    "(and it says how long it is)",
+    film.endsWith(".mp4") || (at > 0 && at < 1024 && webm.readDoubleBE(at + 3) > 100),
+    at,
+  );
   await page.locator('[data-model="box_1"]').click();
+  check(
+    "names are written as they are",
+    (await page.locator("#selected").innerText()) === "box_1",
+    await page.locator("#selected").innerText(),
+  );
+  await page.getByLabel("one step while paused (.)").click();
+  await page.keyboard.press(" ");
+  await until(
+    "after a click on step, space goes on",
+    () => document.getElementById("state").textContent === "running",
+  );
+  await page.keyboard.press("?");
+  check(
+    "the keys are shown from their beginning",
+    await page.evaluate(() => {
+      const help = document.getElementById("help");
+      return help.scrollHeight > help.clientHeight && help.scrollTop === 0;
+    }),
+    "further down",
+  );
+  await page.keyboard.press("Escape");
   const before = await page.evaluate(() => window.ruedo.stage.view.at);
+  await page.evaluate(() => window.ruedo.plots.plot("p3at/odometry", "v", false));
+  await page.locator('[data-layer="sonar"]').click();
   await page.locator("#link").click();
   await until("(the address has it)", () => location.hash.includes("selected=box_1"));
+  await page.evaluate(() => localStorage.clear()); // as in another browser
   await page.reload();
   await until(
     "a link leads back to camera and selection",
@@ -69,5 +111,12 @@ export default async function looks({ page, until, check, ready, still, onScreen
       window.ruedo?.page.now.selected === "box_1" &&
       window.ruedo.stage.view.at.every((v, i) => Math.abs(v - was[i]) < 0.01),
     before,
+  );
+  await until(
+    "and to what was open",
+    () =>
+      window.ruedo.plots.panes[0]?.series[0]?.path === "v" &&
+      window.ruedo.page.now.tab === "World" &&
+      !window.ruedo.page.now.layers.has("sonar"),
   );
 }

@@ -58,7 +58,7 @@ export default async function looks(tools) {
     [844, 390],
   ]) {
     await page.setViewportSize({ width, height });
-    for (const tab of ["Robot", "Plots", "Channels", "World"]) {
+    for (const tab of ["Robot", "Plots", "Channels", "World", "Notes"]) {
       if (await page.evaluate(() => document.getElementById("app").classList.contains("closed")))
         await page.keyboard.press("p");
       await page.getByRole("tab", { name: tab }).click();

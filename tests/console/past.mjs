@@ -66,14 +66,40 @@ export default async function past({
   check("values are of that moment", Math.abs(parseFloat(await fact("pose")) - begin.x) < 0.05);
   await picture("past");
   const first = await server();
+  // Meanwhile ruedo/info, which comes once a second, tells another time.
   await until(
     "the run goes on meanwhile",
-    (t) => window.ruedo.rewind.range.end > t + 0.5,
+    (t) => window.ruedo.rewind.range.end > t + 2.5,
     first.utime * 1e-6,
   );
+  const times = await page.evaluate(() => [
+    parseFloat(document.getElementById("clock").textContent),
+    window.ruedo.poses.utime * 1e-6,
+  ]);
+  check("the clock shows the time of the picture", Math.abs(times[0] - times[1]) < 0.006, times);
   check("(and the page stays)", Math.abs((await pose()) - begin.x) < 0.02);
   await page.locator("#timeline button").first().click();
   await until("the past plays on", (t) => window.ruedo.page.now.past.now > t + 0.3, begin.time);
+  const trail = () => {
+    const { points } = window.ruedo.overlays.of.get("p3at").truth;
+    return points.length / 3 > 15 ? Math.max(...points.filter((_, i) => i % 3 === 0)) : NaN;
+  };
+  await scrub(await page.evaluate(() => window.ruedo.page.now.kept.end));
+  await until("its trail is that of what was before", `(${trail})() > ${begin.x + 0.4}`);
+  await page.keyboard.press(",");
+  await until("(and after a step back)", `(${trail})() > ${begin.x + 0.4}`);
+  await scrub(begin.time);
+  await page.locator("#canvas").focus();
+  const isPlaying = () => window.ruedo.page.now.past.playing;
+  await page.keyboard.press(" ");
+  await until("(it plays)", isPlaying);
+  await page.keyboard.press(" ");
+  await until("(and stops)", () => !window.ruedo.page.now.past.playing);
+  check(
+    "space plays the past, as its button says",
+    !(await server()).paused && !/space/.test(await page.locator("#pause").getAttribute("title")),
+    "the run is paused",
+  );
   await page.locator("#live").click();
   await until("Live shows what runs now", (x) => window.ruedo.poses.to[0] > x + 0.5, begin.x);
   await until("with all that came", box);

@@ -42,6 +42,13 @@ export default async function senses({ page, until, check, seen, ready, picture 
     const canvas = document.querySelector(".inset canvas");
     return canvas?.width === 64 && canvas.height === 48;
   });
+  await page.locator(".inset canvas").hover();
+  await until("a depth is told under the pointer: the wall's, 2.9 m ahead of the camera", () => {
+    const [, metres] = /here ([\d.]+) m/.exec(
+      document.querySelector(".inset figcaption").textContent,
+    ) ?? [0, NaN];
+    return Math.abs(metres - 2.9) < 0.02;
+  });
   await page.getByRole("tab", { name: "Channels" }).click();
   const told = () => document.querySelector(".inset figcaption").textContent;
   const before = await page.evaluate(told);
@@ -54,7 +61,15 @@ export default async function senses({ page, until, check, seen, ready, picture 
   await until("joints are told", () =>
     /shoulder-?\d/.test(document.getElementById("joints").textContent),
   );
-  await page.getByLabel("move shoulder").evaluate((slider) => {
+  const slider = page.getByLabel("move shoulder");
+  check(
+    "a slider ends where its joint does",
+    (await slider.getAttribute("min")) === "-1" &&
+      (await slider.getAttribute("max")) === "1" &&
+      /-1 to 1 rad/.test(await page.locator("#joints").innerText()),
+    await page.locator("#joints").innerText(),
+  );
+  await slider.evaluate((slider) => {
     slider.value = "0.5";
     slider.dispatchEvent(new Event("input"));
   });
@@ -97,6 +112,41 @@ export default async function senses({ page, until, check, seen, ready, picture 
     (n) => window.ruedo.stage.renderer.info.render.triangles > n - 50,
     looks,
   );
+  // ---- as the user wants it drawn
+  const cloud = () => {
+    const { object } = window.ruedo.overlays.of.get("probe").clouds.get("LIDAR"),
+      { array } = object.geometry.getAttribute("color");
+    return [object.material.size, new Set(array).size];
+  };
+  await page.getByRole("tab", { name: "World" }).click();
+  const usual = await page.evaluate(cloud);
+  await page.getByLabel("size of points").fill("2");
+  await until(
+    "points are larger",
+    (size) =>
+      window.ruedo.overlays.of.get("probe").clouds.get("LIDAR").object.material.size === size,
+    4 * usual[0],
+  );
+  await page.getByLabel("colour of clouds").selectOption("height");
+  // Of two points that are equally far, and not equally high
+  await until("and coloured by height", () => {
+    const { object } = window.ruedo.overlays.of.get("probe").clouds.get("LIDAR"),
+      colours = object.geometry.getAttribute("color"),
+      { array } = object.geometry.getAttribute("position");
+    const points = Array.from({ length: colours.count }, (_, i) => ({
+      range: Math.hypot(...array.subarray(3 * i, 3 * i + 3)),
+      z: array[3 * i + 2],
+      colour: ["getX", "getY", "getZ"].map((get) => colours[get](i)),
+    }));
+    const pairs = points.flatMap((a) =>
+      points
+        .map((b) => [a, b])
+        .filter(([a, b]) => Math.abs(a.range - b.range) < 0.02 && a.z - b.z > 0.4),
+    );
+    const apart = ([a, b]) => Math.hypot(...a.colour.map((value, k) => value - b.colour[k]));
+    return pairs.length > 0 && pairs.every((pair) => apart(pair) > 0.05);
+  });
+  await picture("senses-display");
   seen("all was seen");
   check("(done)", true);
 }

@@ -6,6 +6,7 @@ import contextlib
 import itertools
 import json
 import math
+import re
 import shlex
 import signal
 import socket
@@ -107,6 +108,9 @@ def test_the_past_of_a_live_run_is_looked_at(tmp_path):
         "the past plays on",
         "Live shows what runs now",
         "with all that came",
+        "the clock shows the time of the picture",
+        "its trail is that of what was before",
+        "space plays the past, as its button says",
         "all was seen",
     } <= set(seen)
 
@@ -153,6 +157,13 @@ def test_any_field_is_plotted(tmp_path):
         "a drag onto Plots does, too",
         "the plot grows",
         "it is a table",
+        "every element of an array is offered",
+        "a formula over an array is plotted",
+        "a formula over two channels is plotted",
+        "what is no formula is refused in words",
+        "a drop anywhere on the panel plots",
+        "panes zoom together",
+        "one series is drawn over another",
         "panes are kept",
     } <= set(seen)
 
@@ -188,6 +199,8 @@ def test_a_log_is_plotted_whole(tmp_path):
         "it is the log's, from its first message to its last",
         "and its statistics are told",
         "a click in a plot seeks",
+        "standard plots show what was before",
+        "and the path, as y over x",
     } <= set(seen)
 
 
@@ -297,6 +310,10 @@ def test_the_view_tells_and_gives(tmp_path):
     assert {
         "coordinates are those under the pointer",
         "a way is measured",
+        "and seen, over the floor that it lies on",
+        "after a click on step, space goes on",
+        "the keys are shown from their beginning",
+        "names are written as they are",
         "edges alone are drawn",
         "a screenshot is a picture",
         "a video is one",
@@ -314,6 +331,7 @@ def test_what_robots_sense_in_space_is_shown(tmp_path):
         "a camera's picture is in the view",
         "whatever the panel shows",
         "joints are told",
+        "a slider ends where its joint does",
         "a slider moves a joint",
         "an IMU at rest shows gravity, and no turning",
         "frames are a tree",
@@ -346,6 +364,40 @@ HALL = "".join(
         ("right", "0 -4 1.5 0 0 0", "10 0.1 3"),
     )
 )
+
+
+UPSTAIRS = """<model name="upstairs"><static>1</static><pose>1 2 1.9 0 0 0</pose><link name="l">
+<collision name="c"><geometry><box><size>4 5 0.2</size></box></geometry></collision>
+<visual name="v"><geometry><box><size>4 5 0.2</size></box></geometry></visual></link></model>
+<include><uri>model://p3dx</uri><pose>-3 -2 0 0 0 0</pose></include>"""
+
+
+def test_clicks_meet_what_is_seen(tmp_path):
+    world = tmp_path / "world.sdf"
+    world.write_text(BARE % UPSTAIRS)
+    with running(world=world) as process:
+        browse(process.url, tmp_path, "ground", [0.5, 2.5, 2.0])
+
+
+SLAB = """<sdf version="1.9"><world name="slab"><include><uri>model://sun</uri></include>
+<model name="slab"><static>1</static><pose>0 0 -0.1 0 0 0</pose><link name="l">
+<collision name="c"><geometry><box><size>9 9 0.2</size></box></geometry></collision>
+<visual name="v"><geometry><box><size>9 9 0.2</size></box></geometry></visual></link></model>
+<include><uri>model://p3dx</uri><pose>-2 -1 0 0 0 0</pose></include>
+<include><uri>model://p3dx</uri><name>falling</name><pose>7 0 0 0 0 0</pose></include>
+</world></sdf>"""
+
+
+def test_what_goes_wrong_is_said(tmp_path):
+    world = tmp_path / "world.sdf"
+    world.write_text(SLAB)
+    with running(world=world) as process:
+        browse(process.url, tmp_path, "odd")
+
+
+def test_panels_do_more(tmp_path):
+    with running("--disable", "p3at/camera") as process:
+        browse(process.url, tmp_path, "panels")
 
 
 @pytest.mark.parametrize("what", ["bare", "log", "watched", "hall"])
@@ -428,7 +480,13 @@ def test_what_is_open_is_kept_for_each_world(tmp_path):
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
         port = probe.getsockname()[1]
-    worlds = itertools.cycle([SOURCE / "worlds/arena.sdf", SOURCE / "tests/console/aside.sdf"])
+    files = []  # worlds of the same name
+    for source in (SOURCE / "worlds/arena.sdf", SOURCE / "tests/console/aside.sdf"):
+        text, count = re.subn('<world name="[^"]*"', '<world name="default"', source.read_text())
+        assert count == 1
+        files.append(tmp_path / source.name)
+        files[-1].write_text(text)
+    worlds = itertools.cycle(files)
 
     def server():
         return running(world=next(worlds), view=f"127.0.0.1:{port}")

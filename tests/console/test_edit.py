@@ -20,7 +20,9 @@ from harness import (
     WANT,
     Socket,
     browse,
+    browser,
     get,
+    judged,
     needs_browser,
     running,
     serving,
@@ -71,12 +73,15 @@ class Client:
                 if reply.sequence == request.sequence and reply.kind == request.kind:
                     return reply
 
-    def remove(self, name):
+    def ask_of(self, kind, name):
         from ruedo.lcmtypes import name_request_t
 
         body = name_request_t()
         body.name = name
-        return self.ask("REMOVE", body)
+        return self.ask(kind, body)
+
+    def remove(self, name):
+        return self.ask_of("REMOVE", name)
 
 
 def libsdformat_reads(world):
@@ -223,6 +228,26 @@ def test_who_comes_late_to_a_run_that_stands_is_told_how_it_stands(tmp_path):
         comes_to_know(process, utime)
 
 
+@needs_browser
+def test_a_changed_file_is_asked_about(tmp_path):
+    world = tmp_path / "w.sdf"
+    world.write_bytes(ARENA.read_bytes())
+    said = []
+    with (
+        editing("w.sdf", folder=tmp_path) as process,
+        browser(process.url, tmp_path, "save") as page,
+    ):
+        for line in page.stdout:
+            said.append(line.rstrip())
+            if line.startswith("change the file"):
+                world.write_text("<mine/>")
+                page.stdin.write("done\n")
+                page.stdin.flush()
+        judged("save", tmp_path, said, page.wait(60))
+    saved = (tmp_path / "w_2.sdf").read_text()
+    assert world.read_text() == saved and "box_1" not in saved and "box_2" in saved
+
+
 def test_what_was_not_changed_is_saved_to_the_byte(tmp_path):
     with editing(ARENA, "--save-as", "mine.sdf", folder=tmp_path) as process:
         reply = Client(process.port).ask("SAVE")
@@ -249,6 +274,17 @@ def test_the_named_file_is_written_and_no_other(tmp_path):
         reply = client.ask("SAVE")
         assert reply.code == 3 and "changed" in reply.text
         assert world.read_text() == "<mine/>"
+        # Unless that is wished: beside it, or in its place.
+        assert client.ask_of("SAVE", "../other.sdf").code not in (0, 3)
+        (tmp_path / "w_2.sdf").symlink_to("nowhere")
+        reply = client.ask_of("SAVE", "copy")
+        assert (reply.code, reply.text) == (0, "w_3.sdf")
+        saved = text[:begin] + text[end:]
+        assert world.read_text() == "<mine/>" and (tmp_path / "w_3.sdf").read_text() == saved
+        assert client.ask("SAVE").code == 3
+        assert client.ask_of("SAVE", "overwrite").code == 0 and world.read_text() == saved
+        names = {path.name for path in tmp_path.iterdir()}
+        assert names == {"w.sdf", "w_2.sdf", "w_3.sdf"} and not (tmp_path / "nowhere").exists()
 
 
 def test_what_came_in_its_place_is_not_lost(tmp_path):

@@ -1,5 +1,11 @@
 // What the user does with the run: requests, driving, motion primitives, placing models.
-import { joint_command_t, move_command_t, request_t, type reply_t } from "../generated/messages";
+import {
+  joint_command_t,
+  move_command_t,
+  request_t,
+  type fault_t,
+  type reply_t,
+} from "../generated/messages";
 import type { Clock } from "./state/clock";
 import type { Page } from "./state/page";
 import { inputOf, sees } from "./state/world";
@@ -34,7 +40,7 @@ export class Control {
   constructor(
     private readonly page: Page,
     private readonly link: RunLink,
-    private readonly session: Session,
+    readonly session: Session,
     private readonly clock: Clock,
   ) {}
 
@@ -42,8 +48,8 @@ export class Control {
     return this.page.now.hello?.mode === "log";
   }
 
-  // The reply if the request succeeded; otherwise says why not.
-  async ask(kind: number, body?: Uint8Array): Promise<reply_t | null> {
+  // The reply if the request succeeded; otherwise says why not, unless quiet.
+  async ask(kind: number, body?: Uint8Array, quiet = false): Promise<reply_t | null> {
     try {
       const reply = await this.session.ask(kind, body);
       if (reply.body.length > 0) {
@@ -53,7 +59,7 @@ export class Control {
       }
       return reply;
     } catch (error) {
-      toast((error as Error).message, "error");
+      if (!quiet) toast((error as Error).message, "error");
       return null;
     }
   }
@@ -72,8 +78,8 @@ export class Control {
     if (reply) showCommand(`Saved at ${past.now.toFixed(2)} s`, reply.text);
   }
 
-  async request(kind: number, body?: Uint8Array): Promise<boolean> {
-    return (await this.ask(kind, body)) !== null;
+  async request(kind: number, body?: Uint8Array, quiet = false): Promise<boolean> {
+    return (await this.ask(kind, body, quiet)) !== null;
   }
 
   pauseOrResume(): void {
@@ -111,10 +117,16 @@ export class Control {
       robot = world?.robots[chosen];
     const channel = robot && inputOf(world!, robot.name, "velocity_command_t");
     if (!robot || !channel) return null;
+    if (ahead !== 0 || left !== 0) this.notePaused();
     const vx = ahead * Math.min(robot.max_speed, kFastest_m_s);
     const omega = left * Math.min(robot.max_turn_rate, kQuickestTurn_rad_s) * (ahead < 0 ? -1 : 1);
     this.link.command(channel, encode("velocity_command_t", { utime: 0n, vx, vy: 0, omega }));
     return { robot: robot.name, vx, omega };
+  }
+
+  private notePaused(): void {
+    if (this.page.now.paused && !this.isLog)
+      toast("The run is paused: nothing moves until it goes on (space).");
   }
 
   // Returns the primitive's id; null, with a note, if the robot takes none.
@@ -126,6 +138,7 @@ export class Control {
       toast(robot ? "This robot takes no motion primitives." : "There is no robot.", "error");
       return null;
     }
+    this.notePaused();
     const id = ++this.motionId;
     this.link.command(channel, encode("move_command_t", { ...command, utime: 0n, id }));
     return id;
@@ -143,6 +156,9 @@ export class Control {
   get canMove(): boolean {
     return this.input("move_command_t") !== undefined;
   }
+  get canFail(): boolean {
+    return this.input("fault_t") !== undefined;
+  }
   get canDrive(): boolean {
     return this.input("velocity_command_t") !== undefined;
   }
@@ -159,6 +175,12 @@ export class Control {
         value: new Float64Array([position]),
       }),
     );
+  }
+
+  // False if there is no robot that takes it, or no connection.
+  fault(fault: fault_t): boolean {
+    const channel = this.input("fault_t");
+    return channel !== undefined && this.link.command(channel, encode("fault_t", fault));
   }
 
   stop(): void {

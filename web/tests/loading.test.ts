@@ -8,6 +8,7 @@ const kHello: Hello = {
   mode: "live",
   title: "w",
   version: "1",
+  world: "",
   info: "ruedo/info",
   fault: "",
   save: "",

@@ -28,10 +28,13 @@ describe("a log in the page", () => {
       (message, i) => ({ time: 10 + i, messages: [message] }),
     );
     entries.push({ time: 99, messages: [] });
-    expect(historyOf(entries, "pos[0]")).toEqual({
+    expect(historyOf(entries, ["pos[0]", "max(pos)"])).toEqual({
       every: 1,
       times: [10, 13, 14],
-      values: [3, 4, 1],
+      columns: [
+        [3, 4, 1],
+        [3, 4, 1],
+      ],
     });
   });
 

@@ -18,7 +18,7 @@ class Hand implements RunLink {
     return true;
   }
   history() {
-    return Promise.resolve({ every: 1, times: [], values: [] });
+    return Promise.resolve({ every: 1, times: [], columns: [] });
   }
   step(ahead: boolean) {
     this.sent.push(ahead ? "ahead" : "back");

@@ -1,4 +1,5 @@
 // The store, the clock, which channels are wanted, and the text about the run.
+import { displayOf } from "../src/state/display";
 import { beforeEach, describe, expect, it, vi } from "vitest";
 import { Clock, clockText } from "../src/state/clock";
 import { shownRobots, stateWords, type PageState } from "../src/state/page";
@@ -41,6 +42,7 @@ function state(more: Partial<PageState> = {}): PageState {
       mode: "live",
       title: "",
       version: "",
+      world: "",
       info: "ruedo/info",
       fault: "",
       save: "",
@@ -57,6 +59,8 @@ function state(more: Partial<PageState> = {}): PageState {
     playback: null,
     past: null,
     kept: { begin: 0, end: 0 },
+    span: null,
+    display: displayOf(null),
     comparison: null,
     events: [],
     eventKind: "",
@@ -211,6 +215,7 @@ it("what is said of the run", () => {
       mode: "log",
       title: "",
       version: "",
+      world: "",
       info: "",
       fault: "",
       save: "",

@@ -35,6 +35,7 @@ describe("the time line", () => {
       mode: "live",
       title: "",
       version: "",
+      world: "",
       info: "",
       fault: "",
       save: "",

@@ -1,9 +1,12 @@
-// The place in the page's URL: moment, camera, robot, selected model.
+// The place in the page's URL: moment, camera, robot, selected model, what is open.
 import type { Stage } from "../scene/stage";
 import { chooseRobot } from "../state/choices";
-import { hashOf, placeOf } from "../state/place";
+import { kLayers } from "../state/layers";
+import { hashOf, placeOf, type Open } from "../state/place";
 import { toast } from "../widgets/elements";
 import type { Model } from "./model";
+
+type Pane = Open["panes"][number];
 
 export function goToAddress({ page, link }: Model, stage: Stage): void {
   const { time_s, camera, robot, selected } = placeOf(location.hash);
@@ -16,11 +19,12 @@ export function goToAddress({ page, link }: Model, stage: Stage): void {
   }
 }
 
-export async function copyLink({ page }: Model, stage: Stage): Promise<void> {
-  const { hello, playback, past, world, robot, selected } = page.now,
+export async function copyLink({ page }: Model, stage: Stage, panes: Pane[]): Promise<void> {
+  const { hello, playback, past, world, robot, selected, tab, layers } = page.now,
+    open = { page: tab, off: kLayers.filter((layer) => !layers.has(layer)), panes },
     time_s = hello?.mode === "log" ? (playback?.now ?? null) : (past?.now ?? null);
   const name = world?.robots[robot]?.name ?? "";
-  location.hash = hashOf({ time_s, camera: stage.view.at, robot: name, selected });
+  location.hash = hashOf({ time_s, camera: stage.view.at, robot: name, selected, open });
   try {
     await navigator.clipboard.writeText(location.href);
     toast("The link is copied.");

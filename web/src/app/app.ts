@@ -2,6 +2,7 @@
 // it.
 import { listenToClicks } from "../edit/clicks";
 import { togglePanel, toggleTheme } from "../state/choices";
+import { Aim } from "../ui/aim";
 import { Bar } from "../ui/bar";
 import { Drive } from "../ui/drive";
 import { fillHelp } from "../ui/help";
@@ -15,8 +16,10 @@ import { Arrivals } from "./arrivals";
 import { ChosenRobot } from "./chosen_robot";
 import { Connection } from "./connection";
 import { Editing } from "./editing";
+import { Fallen } from "./fallen";
 import { Model } from "./model";
 import { PanelView } from "./panel_view";
+import { Retrace } from "./retrace";
 import { Router } from "./router";
 import { SceneView } from "./scene_view";
 import { shortcutsOf } from "./shortcuts";
@@ -29,6 +32,7 @@ export class App {
   readonly panel: PanelView;
   readonly robot: ChosenRobot;
   readonly arrivals: Arrivals;
+  private readonly fallen = new Fallen(this.model.page, this.model.poses);
   private readonly help = byId("help") as HTMLDialogElement;
 
   constructor() {
@@ -40,9 +44,16 @@ export class App {
     this.editing = new Editing(model, this.scene);
     this.panel = new PanelView(model, this.scene, this.editing);
     this.robot = new ChosenRobot(model, this.scene, this.panel.pages);
+    new Retrace(model, this.scene, this.panel.pages);
     const world = new ShownWorld(model, this.scene),
       notice = new Notice(byId("notice"), page);
     this.arrivals = new Arrivals(model, world, notice);
+    this.scene.stage.onContext = (there) =>
+      notice.show(
+        there
+          ? ""
+          : "The browser has taken the 3-D graphics away. All else works; waiting for them …",
+      );
     this.makeControls();
     this.makePad();
     this.listen();
@@ -99,7 +110,7 @@ export class App {
 
   private listen(): void {
     const { model, scene, editing, panel, robot } = this;
-    listenToClicks(
+    const click = listenToClicks(
       scene.canvas,
       model.page,
       scene.stage,
@@ -109,12 +120,20 @@ export class App {
       (point) => scene.measure.click(point),
       (point, further) => robot.trip.go(point, further),
     );
+    new Aim(byId("view"), scene.canvas, model.page, {
+      click,
+      look: (x, y) => scene.measure.look(x, y),
+    });
+    model.onForget((reset) => {
+      if (reset) this.fallen.forget();
+    });
   }
 
   private frame(at_ms: number): void {
     this.editing.frame();
     this.scene.frame(at_ms);
     this.panel.frame(at_ms);
+    this.fallen.look(at_ms);
     requestAnimationFrame((next_ms) => this.frame(next_ms));
   }
 }

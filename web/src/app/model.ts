@@ -46,6 +46,13 @@ export class Model {
     else this.link.step(ahead);
   }
 
+  // What is played goes on or stands still: the shown past, else the log or the run itself.
+  playOrPause(): void {
+    const { past } = this.page.now;
+    if (past) this.link.play(!past.playing, past.speed);
+    else this.control.pauseOrResume();
+  }
+
   // Back to the present.
   live(): void {
     this.rewind?.live();

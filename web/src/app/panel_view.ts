@@ -4,12 +4,16 @@ import { Capture } from "../ui/capture";
 import { ChannelList } from "../ui/channels";
 import { Compared } from "../ui/compared";
 import { EditPage } from "../ui/edit_page";
+import { FaultForm } from "../ui/fault_form";
 import { FieldPlots } from "../ui/field_plots";
 import { FrameTree } from "../ui/frames";
 import { Inset } from "../ui/inset";
+import { Notes } from "../ui/notes";
 import { Panel } from "../ui/panel";
+import { Publisher } from "../ui/publish";
 import { RobotPages } from "../ui/robot";
 import { byId, h } from "../widgets/elements";
+import { Splitter } from "../ui/splitter";
 import { copyLink } from "./address";
 import type { Editing } from "./editing";
 import type { Model } from "./model";
@@ -35,8 +39,14 @@ export class PanelView {
       {
         move: (name, position) => control.joint(name, position),
         canMove: () => control.jointChannel !== undefined,
+        find: (name) => {
+          const { scene, world, robot } = page.now,
+            of = world?.robots[robot]?.name;
+          return scene?.joints?.find((joint) => joint.robot === of && joint.name === name);
+        },
       },
     );
+    const publish = (channel: string, message: Uint8Array) => model.link.command(channel, message);
     const want = () => wanted.update(),
       seek = (time_s: number) => model.seek(time_s);
     this.editPage = new EditPage(page, scene.stage, editing.editor, editing.draw);
@@ -48,13 +58,17 @@ export class PanelView {
       seek,
       plot: (channel, field) => this.plots.plot(channel, field, field === "distance"),
     });
-    this.pages.extras.append(this.inset.chooser, this.frames.element);
+    this.pages.extras.append(this.inset.chooser, this.frames.element, this.faults(model));
     this.editPage.extras.append(
-      new Capture(scene.stage, scene.canvas).element,
+      new Capture(page, scene.stage, scene.canvas).element,
       h(
         "div",
         { class: "row" },
-        h("button", { id: "link", click: () => void copyLink(model, scene.stage) }, "Copy link"),
+        h(
+          "button",
+          { id: "link", click: () => void copyLink(model, scene.stage, this.plots.kept) },
+          "Copy link",
+        ),
       ),
     );
     new Panel(
@@ -63,15 +77,31 @@ export class PanelView {
       {
         Robot: this.pages.statePage,
         Plots: h("div", {}, compared.element, this.pages.plotPage, this.plots.element),
-        Channels: this.channels.element,
+        Channels: h("div", {}, new Publisher(page, publish).element, this.channels.element),
         World: this.editPage.element,
+        Notes: new Notes(page).element,
       },
       (robot) => chooseRobot(page, robot),
     );
+    new Splitter(byId("panel"));
     this.connect();
   }
 
-  // Once a frame.
+  // Of the chosen robot, where it takes any.
+  private faults({ page, control }: Model): HTMLElement {
+    const form = new FaultForm((fault) => control.fault(fault));
+    page.watch(["world", "robot", "hello"], ({ world, robot }) => {
+      const name = world?.robots[robot]?.name;
+      form.element.hidden = !control.canFail;
+      form.show(
+        (world?.devices ?? [])
+          .filter((device) => device.robot === name)
+          .map((device) => device.name),
+      );
+    });
+    return form.element;
+  }
+
   private connect(): void {
     const { model, pages, plots, channels, inset } = this,
       { page, control } = model;
@@ -80,6 +110,7 @@ export class PanelView {
       ...plots.channels,
       ...(inset.channel ? [inset.channel] : []),
     ]);
+    plots.takeDrops(byId("panel"));
     channels.onPlot = (channel, path) => {
       plots.plot(channel, path, false);
       page.set({ tab: "Plots" });
@@ -103,8 +134,9 @@ export class PanelView {
     page.watch(["tool"], ({ tool }) => pages.goButton.classList.toggle("on", tool === "go"));
   }
 
+  // Once a frame.
   frame(at_ms: number): void {
-    this.plots.draw();
+    this.plots.draw(at_ms);
     this.editPage.transform.show();
     this.frames.follow(at_ms);
     this.pages.draw();

@@ -2,7 +2,7 @@
 import type { device_info_t, Messages } from "../../generated/messages";
 import { isCompared } from "../state/comparison";
 import type { Loading } from "../state/loading";
-import { pointsOfDepth, pointsOfLidar } from "../scene/clouds";
+import { intensitiesOf, pointsOfDepth, pointsOfLidar } from "../scene/clouds";
 import { isDepth } from "../state/wanted";
 import { channelOfType, type World } from "../state/world";
 import type { Clock } from "../state/clock";
@@ -14,6 +14,7 @@ import type { RobotOverlay } from "../scene/overlays";
 import type { OverlaySet } from "../scene/overlay_set";
 import type { Stage } from "../scene/stage";
 import type { ChannelList } from "../ui/channels";
+import type { FieldPlots } from "../ui/field_plots";
 import type { Inset } from "../ui/inset";
 import type { RobotPages } from "../ui/robot";
 import { decode, fingerprint, typeOf, type TypeName } from "../wire/lcm";
@@ -100,12 +101,14 @@ const kShow: { [Type in TypeName]?: Show<Type> } = {
     const image = read();
     const points =
       device && isDepth(channel, "image_t") ? pointsOfDepth(image, device.fov_horizontal) : null;
-    if (points) overlay?.cloud(device!, points);
+    if (points) overlay?.cloud(device!, points, null);
     inset.message(channel, image);
-    pages?.camera(channel.slice(channel.indexOf("/") + 1), image);
+    pages?.camera(channel.slice(channel.indexOf("/") + 1), image, device?.kind);
   },
   lidar_t({ device, overlay }, read) {
-    if (device) overlay?.cloud(device, pointsOfLidar(read()));
+    if (!device) return;
+    const scan = read();
+    overlay?.cloud(device, pointsOfLidar(scan), intensitiesOf(scan));
   },
   joint_state_t: ({ pages }, read) => pages?.joints(read()),
 };
@@ -121,6 +124,7 @@ export interface Views {
   ghosts: Ghosts;
   pages: RobotPages;
   channels: ChannelList;
+  plots: Pick<FieldPlots, "message">;
   inset: Inset;
 }
 
@@ -140,6 +144,7 @@ export class Router {
 
   onMessage(channel: string, bytes: Uint8Array): void {
     this.views.channels.message(channel, bytes);
+    if (this.page.now.hello?.mode === "log") this.views.plots.message(channel, bytes);
     if (isCompared(channel)) return this.ofOther(bytes);
     const route = this.routes.get(channel),
       type = route?.type ?? typeOf(bytes);

@@ -28,8 +28,12 @@ export function shortcutsOf(
   };
 }
 
-const ofRun = ({ page, control }: Model): Shortcuts => ({
-  " ": () => control.pauseOrResume(),
+const ofRun = (model: Model): Shortcuts => ({
+  ...ofRobot(model),
+  " ": () => model.playOrPause(),
+});
+
+const ofRobot = ({ page, control }: Model): Shortcuts => ({
   r: () => void control.reset(),
   x: () => control.stop(),
   g: () => toggleGoing(page),

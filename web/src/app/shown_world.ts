@@ -72,16 +72,16 @@ export class ShownWorld {
 
   // Another moment of a live run is shown, or the present again.
   private onPast(past: Past | null, kept: { begin: number; end: number }): void {
-    const { page, poses, clock } = this.model;
+    const { page, clock } = this.model;
     if (page.now.hello?.mode !== "live") return;
     const before = page.now.past;
     if (past === null && before === null && kept.end === page.now.kept.end) return;
     page.set({ past, kept });
     if (past?.now === before?.now) return;
-    clock.move();
-    // markers of that time will follow
-    if (!past || !before || past.now < before.now) this.scene.markers.clear();
-    if (!past || !before || Math.abs(past.now - before.now) > kJump_s) poses.jump();
+    const isBack = !past || !before || past.now < before.now;
+    if (isBack) this.scene.markers.clear(); // those of that time will follow
+    if (isBack || past.now - before.now > kJump_s) clock.jump();
+    else clock.move();
     const times = this.scenes.map(({ from }) => ({ time: from })),
       shown = this.scenes[Math.max(0, newestAt(times, past?.now ?? Infinity))];
     if (shown && shown.files?.description !== page.now.scene) this.show(shown.world, shown.files);

@@ -9,6 +9,7 @@ import type { Door } from "./sdf";
 
 const kClick_px = 5; // the pointer may move this far in a click
 
+// Returns what clicks at a point of the page; further: in addition to earlier points.
 export function listenToClicks(
   canvas: HTMLElement,
   page: Page,
@@ -18,7 +19,7 @@ export function listenToClicks(
   busy: () => boolean,
   measured: (point: THREE.Vector3) => void,
   sent: (point: THREE.Vector3, further: boolean) => void,
-): void {
+): (x: number, y: number, further: boolean) => void {
   let down = { x: 0, y: 0 },
     taken = false;
   canvas.addEventListener("pointerdown", (event) => {
@@ -32,27 +33,27 @@ export function listenToClicks(
       Math.hypot(event.clientX - down.x, event.clientY - down.y) > kClick_px
     )
       return;
+    click(event.clientX, event.clientY, event.shiftKey);
+  });
+  const click = (x: number, y: number, further: boolean) => {
     const { tool } = page.now,
-      picked = stage.picker.pick(event.clientX, event.clientY);
+      picked = stage.picker.pick(x, y);
     if (tool === "wall" || tool === "room") return;
     if (tool === "measure") {
-      const point = picked.point ?? picked.ground;
-      if (point) measured(point);
+      if (picked.point) measured(picked.point);
       return;
     }
     if (tool === "go") {
-      if (picked.ground) sent(picked.ground, event.shiftKey);
+      if (picked.point) sent(picked.point, further);
       return;
     }
     if (tool === "door") return makeDoor(picked.model, picked.point, editor, door);
     if (tool !== "select") {
-      if (!picked.ground) return;
+      if (!picked.point) return;
       page.set({ tool: "select" });
-      void editor
-        .add(tool, [picked.ground.x, picked.ground.y, 0, 1, 0, 0, 0], true)
-        .then((good) => {
-          if (good) toast("Placed.");
-        });
+      void editor.add(tool, [...picked.point.toArray(), 1, 0, 0, 0], true).then((good) => {
+        if (good) toast("Placed.");
+      });
       return;
     }
     if (page.now.tab === "World" && page.now.controlled && page.now.hello?.mode === "live")
@@ -62,7 +63,8 @@ export function listenToClicks(
         ({ name }) => name === page.now.scene?.bases[picked.robot]?.robot,
       ) ?? -1;
     if (robot >= 0) page.set({ robot });
-  });
+  };
+  return click;
 }
 
 // A door takes the full thickness of its wall; only the position along the wall matters.

@@ -1,26 +1,22 @@
-// Drawing walls and rooms on the floor by dragging.
+// Drawing walls and rooms by dragging, on the floor where the drag begins.
 import * as THREE from "three";
+import { kOnTop, putOnTop } from "../scene/on_top";
 import type { Stage } from "../scene/stage";
 import type { Page } from "../state/page";
 import type { Editor } from "./editor";
 import { roomModel, wallModel, type WallStyle } from "./sdf";
 
 const kShortest_m = 0.2;
-type Point = { x: number; y: number };
+type Point = { x: number; y: number; z: number };
 
 export class Draw {
   style: WallStyle = { height: 1.2, thickness: 0.1 };
   onLength: (words: string) => void = () => undefined; // the dimensions of what is being drawn
   private from: Point | null = null;
-  private to: Point = { x: 0, y: 0 };
+  private to: Point = { x: 0, y: 0, z: 0 };
   private readonly ghost = new THREE.LineSegments(
     new THREE.EdgesGeometry(new THREE.BoxGeometry(1, 1, 1)),
-    new THREE.LineBasicMaterial({
-      color: 0x35c2ad,
-      toneMapped: false,
-      fog: false,
-      depthTest: false,
-    }),
+    new THREE.LineBasicMaterial({ color: 0x35c2ad, ...kOnTop }),
   );
 
   constructor(
@@ -30,6 +26,7 @@ export class Draw {
     canvas: HTMLCanvasElement,
   ) {
     this.ghost.visible = false;
+    putOnTop(this.ghost);
     stage.scene.add(this.ghost);
     page.watch(["tool"], () => {
       this.cancel();
@@ -56,22 +53,26 @@ export class Draw {
     this.stage.touch();
   }
 
-  private ground(event: PointerEvent): Point | null {
-    const point = this.stage.picker.ground(event.clientX, event.clientY),
+  // A point at the height where the drag began; at its begin, one that is seen.
+  private point({ clientX, clientY }: PointerEvent): Point | null {
+    const { picker } = this.stage,
+      point = this.from
+        ? picker.level(clientX, clientY, this.from.z)
+        : picker.point(clientX, clientY),
       snap = this.page.now.snap_m;
     if (!point) return null;
     const near = (value: number) => (snap > 0 ? Math.round(value / snap) * snap : value);
-    return { x: near(point.x), y: near(point.y) };
+    return { x: near(point.x), y: near(point.y), z: Number(point.z.toFixed(3)) };
   }
 
   private begin(canvas: HTMLCanvasElement, event: PointerEvent): void {
-    this.from = this.ground(event);
+    this.from = this.point(event);
     if (this.from) this.to = this.from;
     canvas.setPointerCapture(event.pointerId);
   }
 
   private drag(event: PointerEvent): void {
-    const point = this.ground(event);
+    const point = this.point(event);
     if (!point || !this.from) return;
     this.to = point;
     const { from, to } = this,
@@ -86,7 +87,7 @@ export class Draw {
         : `${length.toFixed(2)} m, ${((Math.atan2(dy, dx) * 180) / Math.PI).toFixed(0)}°`,
     );
     this.ghost.visible = true;
-    this.ghost.position.set((from.x + to.x) / 2, (from.y + to.y) / 2, height / 2);
+    this.ghost.position.set((from.x + to.x) / 2, (from.y + to.y) / 2, from.z + height / 2);
     this.ghost.rotation.z = room ? 0 : Math.atan2(dy, dx);
     this.ghost.scale.set(
       Math.max(0.01, room ? Math.abs(dx) : length),
@@ -109,7 +110,7 @@ export class Draw {
       const half = Math.atan2(dy, dx) / 2;
       await this.editor.add(
         { name: "wall", model: "", text: wallModel("wall", Math.hypot(dx, dy), this.style) },
-        [x, y, 0, Math.cos(half), 0, 0, Math.sin(half)],
+        [x, y, from.z, Math.cos(half), 0, 0, Math.sin(half)],
         false,
       );
     } else if (tool === "room" && Math.min(Math.abs(dx), Math.abs(dy)) >= kShortest_m) {
@@ -119,7 +120,7 @@ export class Draw {
           model: "",
           text: roomModel("room", Math.abs(dx), Math.abs(dy), this.style),
         },
-        [x, y, 0, 1, 0, 0, 0],
+        [x, y, from.z, 1, 0, 0, 0],
         false,
       );
     }

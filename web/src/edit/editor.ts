@@ -5,13 +5,15 @@ import type { Control } from "../control";
 import type { ModelDescription } from "../wire/description";
 import type { Page, Thing } from "../state/page";
 import type { Poses } from "../state/poses";
+import { chosen } from "../widgets/confirm";
 import { toast } from "../widgets/elements";
 import { encode } from "../wire/lcm";
 import { History } from "./history";
 import { poseNow, samePose, type Pose7 } from "./pose";
 import { scaled, withDoor, type Door, type Size } from "./sdf";
 
-const kCopyAside_m = 0.1; // between a model and its copy
+const kCopyAside_m = 0.1, // between a model and its copy
+  kTouch_m = 1e-3; // things that touch leave room
 const kRest_m = 2e-4; // smaller motions between two looks count as rest
 const kLook_ms = 250; // between two looks while settling
 const kLongestSettling_s = 10; // of sim time
@@ -86,26 +88,92 @@ export class Editor {
     });
   }
 
+  // Beside it, where there is room, as near as possible.
   async duplicate(name: string): Promise<boolean> {
     const from = await this.knownPose(name),
       text = await this.text(name);
     if (!from || text === null) return false;
-    const copy = this.unusedName(name),
-      to = [from[0]! + this.width(name) + kCopyAside_m, ...from.slice(1)];
+    const copy = this.unusedName(name);
+    let to: Pose7 | null = null; // where it found room
     this.given.add(copy);
     const good = await this.history.do({
       name: `duplicate ${name}`,
-      apply: () => this.spawn(copy, { model: "", text }, to, false),
+      apply: async () => {
+        for (const [x, y] of to ? [] : this.roomBeside(name)) {
+          const there = [from[0]! + x, from[1]! + y, ...from.slice(2)];
+          if (!(await this.spawn(copy, { model: "", text }, there, false, true))) continue;
+          to = there;
+          return true;
+        }
+        if (to) return this.spawn(copy, { model: "", text }, to, false);
+        toast(`There is no room for a copy of ${name} beside it.`, "error");
+        return false;
+      },
       revert: () => this.take(copy),
     });
     if (good) this.page.set({ selected: copy });
+    else this.given.delete(copy);
     return good;
   }
 
-  private width(name: string): number {
+  // Ways from a model to places for a copy, the nearest first: those where the boxes around other
+  // models are not met, and then the others, which the server may refuse.
+  private roomBeside(name: string): [x: number, y: number][] {
     const model = this.find(name),
       box = model && this.box(model);
-    return box && !box.isEmpty() ? box.max.x - box.min.x : 0;
+    if (!box || box.isEmpty()) return [[kCopyAside_m, 0]];
+    const others = this.models
+      .filter((other) => other !== model)
+      .map((other) => this.box(other).expandByScalar(-kTouch_m));
+    const [w, d] = [box.max.x - box.min.x + kCopyAside_m, box.max.y - box.min.y + kCopyAside_m];
+    const ways = [1, 2, 3, 4].flatMap((n): [number, number][] => [
+      [n * w, 0],
+      [0, n * d],
+      [-n * w, 0],
+      [0, -n * d],
+    ]);
+    const isFree = ([x, y]: [number, number]) => {
+      const there = box.clone();
+      for (const corner of [there.min, there.max]) {
+        corner.x += x;
+        corner.y += y;
+      }
+      return !others.some((other) => !other.isEmpty() && other.intersectsBox(there));
+    };
+    const free = ways.filter(isFree),
+      near = (a: number[], b: number[]) => Math.hypot(a[0]!, a[1]!) - Math.hypot(b[0]!, b[1]!);
+    // a fixed model is not refused anywhere: rather far away than in a wall
+    return [...free.sort(near), ...(model.fast && free.length > 0 ? [] : ways.sort(near))];
+  }
+
+  async rename(name: string, to: string): Promise<boolean> {
+    const text = await this.text(name);
+    if (text === null || to === name) return false;
+    if (to === "" || this.find(to)) {
+      toast(to === "" ? "A model has a name." : `There is a model called ${to} already.`, "error");
+      return false;
+    }
+    const exchange = async (old: string, fresh: string) => {
+      const pose = await this.knownPose(old);
+      if (!pose) return false;
+      this.given.add(fresh);
+      if (!(await this.withdraw(old))) return false;
+      const good = await this.spawn(fresh, { model: "", text }, pose, false);
+      if (!good) await this.spawn(old, { model: "", text }, pose, false);
+      this.given.delete(good ? old : fresh);
+      if (good) this.page.set({ selected: fresh });
+      return good;
+    };
+    return this.history.do({
+      name: `rename ${name}`,
+      apply: () => exchange(name, to),
+      revert: () => exchange(to, name),
+    });
+  }
+
+  // Replaces a model by what a function makes of its text.
+  change(name: string, what: string, by: (xml: string) => string): Promise<boolean> {
+    return this.rewrite(name, `${what} ${name}`, by);
   }
 
   // What stands on the ground stays on the ground.
@@ -151,12 +219,47 @@ export class Editor {
   }
 
   async save(): Promise<boolean> {
-    const { changes } = this.page.now.edits,
-      reply = await this.control.ask(request_t.SAVE);
-    if (!reply) return false;
-    this.page.set({ saved: changes });
-    toast(reply.text ? `Saved; but ${reply.text}.` : `Saved to ${this.page.now.hello?.save}.`);
+    const answer = await this.write("");
+    if (typeof answer === "string") return this.tell(answer);
+    if (!/another program/.test(answer.message)) return this.refused(answer);
+    const file = this.page.now.hello?.save ?? "";
+    const how = await chosen(`Overwrite ${file}?`, `${answer.message}.`, [
+      ["copy", "Save a copy"],
+      ["overwrite", "Overwrite"],
+    ]);
+    if (how === "copy") return this.saveCopy();
+    const again = how === "overwrite" ? await this.write("overwrite") : null;
+    if (again instanceof Error) return this.refused(again);
+    return again !== null && this.tell(again);
+  }
+
+  // Beside the file, by a name that the server finds.
+  async saveCopy(): Promise<boolean> {
+    const answer = await this.write("copy");
+    if (answer instanceof Error) return this.refused(answer);
+    toast(`Saved a copy as ${answer}.`);
     return true;
+  }
+
+  // What the server says, or why it did not.
+  private async write(how: "" | "overwrite" | "copy"): Promise<string | Error> {
+    const { changes } = this.page.now.edits,
+      body = how ? encode("name_request_t", { name: how }) : undefined;
+    try {
+      const { text } = await this.control.session.ask(request_t.SAVE, body);
+      if (how !== "copy") this.page.set({ saved: changes });
+      return text;
+    } catch (error) {
+      return error as Error;
+    }
+  }
+  private tell(note: string): true {
+    toast(note ? `Saved; but ${note}.` : `Saved to ${this.page.now.hello?.save}.`);
+    return true;
+  }
+  private refused({ message }: Error): false {
+    toast(message, "error");
+    return false;
   }
 
   // ---- requests
@@ -173,10 +276,12 @@ export class Editor {
     { model, text }: { model: string; text: string },
     pose: Pose7,
     onGround: boolean,
+    quiet = false,
   ): Promise<boolean> {
     return this.control.request(
       request_t.SPAWN,
       encode("spawn_request_t", { name, model, text, on_ground: onGround, ...placeOf(pose) }),
+      quiet,
     );
   }
 
@@ -186,12 +291,12 @@ export class Editor {
   }
 
   private async withdraw(name: string): Promise<boolean> {
-    const body = this.find(name)?.body ?? -1,
-      good = await this.control.request(request_t.REMOVE, encode("name_request_t", { name }));
-    if (good) {
-      this.gone.add(name);
+    const body = this.find(name)?.body ?? -1;
+    this.gone.add(name);
+    const good = await this.control.request(request_t.REMOVE, encode("name_request_t", { name }));
+    if (good)
       this.poses.forget(body); // which the next model may have
-    }
+    else this.gone.delete(name);
     return good;
   }
 
@@ -245,11 +350,19 @@ export class Editor {
     });
   }
 
-  // The request that SPAWNs that model again; null, with a note, if there is none.
-  private async text(name: string): Promise<string | null> {
-    const index = this.page.now.scene?.models.findIndex((model) => model.name === name) ?? -1;
+  // What SPAWNs that model again; null if there is none.
+  async textOf(name: string): Promise<string | null> {
+    const index = this.gone.has(name)
+      ? -1
+      : (this.page.now.scene?.models.findIndex((model) => model.name === name) ?? -1);
     const answer = index >= 0 ? await fetch(`/scene/models/${index}`).catch(() => null) : null;
-    if (answer?.ok) return answer.text();
+    return answer?.ok ? (await answer.text()) || null : null;
+  }
+
+  // Likewise, with a note.
+  private async text(name: string): Promise<string | null> {
+    const text = await this.textOf(name);
+    if (text !== null) return text;
     toast(
       `${name} has no text of its own in the file, as robots of a fleet: it can be moved, and nothing else.`,
       "error",

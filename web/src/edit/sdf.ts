@@ -171,8 +171,8 @@ export function places(xml: string): Place[] {
   return root.children;
 }
 
-type Change = [begin: number, end: number, text: string];
-function changed(xml: string, changes: Change[]): string {
+export type Change = [begin: number, end: number, text: string];
+export function changed(xml: string, changes: Change[]): string {
   let result = "",
     at = 0;
   for (const [begin, end, text] of changes.sort((a, b) => a[0] - b[0])) {
@@ -182,20 +182,20 @@ function changed(xml: string, changes: Change[]): string {
   return result + xml.slice(at);
 }
 
-const child = (place: Place | undefined, name: string) =>
+export const child = (place: Place | undefined, name: string) =>
   place?.children.find((each) => each.name === name);
-const inner = (xml: string, place: Place) => xml.slice(place.inside, place.past).trim();
-const numbers = (xml: string, place: Place | undefined) =>
+export const inner = (xml: string, place: Place) => xml.slice(place.inside, place.past).trim();
+export const numbers = (xml: string, place: Place | undefined) =>
   place ? inner(xml, place).split(/\s+/).map(Number) : [];
 
-function topModel(xml: string): Place {
+export function topModel(xml: string): Place {
   const root = places(xml).find(({ name }) => name === "sdf");
   const found = child(root, "model");
   if (!found) throw new Error("it comes from a file of its own: change that, or place a box");
   return found;
 }
 
-function each(place: Place, name: string, found: (place: Place) => void): void {
+export function each(place: Place, name: string, found: (place: Place) => void): void {
   for (const inside of place.children) {
     if (inside.name === name) found(inside);
     each(inside, name, found);
@@ -227,7 +227,7 @@ export function scaled(xml: string, factor: Size): string {
 }
 
 // Numbers, each multiplied by its factor.
-function multiply(
+export function multiply(
   xml: string,
   place: Place | undefined,
   factors: number[],

@@ -83,7 +83,8 @@ export class Bodies {
     const at = new THREE.Matrix4();
     if (robot < 0 || !this.base(robot, at, this.poses.to)) return null;
     const [cosine, sine] = at.elements;
-    return { x: at.elements[12], y: at.elements[13], heading: Math.atan2(sine, cosine) };
+    const [x, y, z] = at.elements.slice(12) as [number, number, number];
+    return { x, y, z, heading: Math.atan2(sine, cosine) };
   }
 
   // The pose of a model.

@@ -1,8 +1,11 @@
 // Point clouds of 3-D range finders and depth cameras, in the device's frame.
 import * as THREE from "three";
 import { image_t, type device_info_t, type lidar_t } from "../../generated/messages";
+import type { Display } from "../state/display";
 import { matrixOf } from "./matrix";
 
+const kSize_px = 2.5,
+  kHighest_m = 3; // above the floor: the coldest colour
 const kMostPoints = 40_000; // of a picture; of larger ones every second or third row and column
 
 // x, y, z of each return in turn.
@@ -24,6 +27,12 @@ export function pointsOfLidar(scan: lidar_t): Float32Array {
     }
   }
   return points.subarray(0, at);
+}
+
+// How bright each return is, 0 to 1; null if the scanner does not tell.
+export function intensitiesOf({ ranges, intensities }: lidar_t): Float32Array | null {
+  if (intensities.length !== ranges.length) return null;
+  return intensities.filter((_, i) => Number.isFinite(ranges[i]));
 }
 
 // The points of a picture of depths along the optical axis: x forward, y left, z up, in the
@@ -54,7 +63,7 @@ export class Cloud {
   readonly object = new THREE.Points(
     new THREE.BufferGeometry(),
     new THREE.PointsMaterial({
-      size: 2.5,
+      size: kSize_px,
       sizeAttenuation: false,
       vertexColors: true,
       toneMapped: false,
@@ -62,6 +71,9 @@ export class Cloud {
     }),
   );
   private readonly mount = new THREE.Matrix4();
+  private points = new Float32Array();
+  private intensities: Float32Array | null = null;
+  private colouring: Display["colouring"] = "range";
 
   constructor(device: device_info_t) {
     matrixOf([...device.position, ...device.orientation], 0, this.mount);
@@ -69,19 +81,36 @@ export class Cloud {
     this.object.frustumCulled = false;
   }
 
-  // Near is warm, far is cold.
-  show(points: Float32Array): void {
-    const { geometry } = this.object,
-      colours = new Float32Array(points.length),
-      colour = new THREE.Color();
-    for (let i = 0; i < points.length; i += 3) {
-      const away = Math.hypot(points[i]!, points[i + 1]!, points[i + 2]!);
-      colour.setHSL(0.66 * (1 - Math.exp(-away / 6)), 1, 0.55).toArray(colours, i);
-    }
+  show(points: Float32Array, intensities: Float32Array | null): void {
+    const { geometry } = this.object;
+    Object.assign(this, { points, intensities });
     geometry.dispose();
     geometry.setAttribute("position", new THREE.BufferAttribute(points, 3));
-    geometry.setAttribute("color", new THREE.BufferAttribute(colours, 3));
     geometry.setDrawRange(0, points.length / 3);
+    this.paint();
+  }
+
+  style({ size, colouring }: Display): void {
+    this.object.material.size = kSize_px * size;
+    this.colouring = colouring;
+    this.paint();
+  }
+
+  // Warm is near, low, or bright; cold is far, high, or dim.
+  private paint(): void {
+    const { points, intensities, object } = this,
+      mount_z = this.mount.elements[14]!,
+      colours = new Float32Array(points.length),
+      colour = new THREE.Color();
+    const cold = (i: number) => {
+      const [x, y, z] = [points[i]!, points[i + 1]!, points[i + 2]!];
+      if (this.colouring === "height") return Math.max(0, Math.min(1, (z + mount_z) / kHighest_m));
+      if (this.colouring === "intensity" && intensities) return 1 - intensities[i / 3]!;
+      return 1 - Math.exp(-Math.hypot(x, y, z) / 6);
+    };
+    for (let i = 0; i < points.length; i += 3)
+      colour.setHSL(0.66 * cold(i), 1, 0.55).toArray(colours, i);
+    object.geometry.setAttribute("color", new THREE.BufferAttribute(colours, 3));
   }
 
   place(base: THREE.Matrix4, visible: boolean): void {

@@ -2,35 +2,37 @@
 import * as THREE from "three";
 import type { Page } from "../state/page";
 import { h, say } from "../widgets/elements";
+import { kOnTop, putOnTop } from "./on_top";
 import type { Stage } from "./stage";
 
-const kLook_ms = 60; // between two looks at what is under the pointer
+const kLook_ms = 60, // between two looks at what is under the pointer
+  kLookShare = 0.2; // of the time that looks may take at most
+const kLevel_m = 0.005; // of a height that is not shown
 const number = (value: number) => value.toFixed(2);
+const placeWords = ({ x, y, z }: THREE.Vector3) =>
+  [x, y, ...(Math.abs(z) < kLevel_m ? [] : [z])].map(number).join(", ") + " m";
 
 export class Measure {
   readonly readout = h("div", { class: "readout", id: "coordinates" });
   private from: THREE.Vector3 | null = null;
   private words = "";
-  private looked_ms = 0;
+  private nextLook_ms = 0;
   private readonly line = new THREE.Line(
     new THREE.BufferGeometry(),
-    new THREE.LineBasicMaterial({
-      color: 0xffd24a,
-      depthTest: false,
-      toneMapped: false,
-      fog: false,
-    }),
+    new THREE.LineBasicMaterial({ color: 0xffd24a, ...kOnTop }),
   );
 
   constructor(
-    private readonly page: Page,
+    page: Page,
     private readonly stage: Stage,
     canvas: HTMLElement,
   ) {
     this.line.visible = false;
-    this.line.frustumCulled = false;
+    putOnTop(this.line);
     stage.scene.add(this.line);
-    canvas.addEventListener("pointermove", (event) => this.look(event));
+    canvas.addEventListener("pointermove", ({ buttons, clientX, clientY }) => {
+      if (buttons === 0) this.look(clientX, clientY);
+    });
     canvas.addEventListener("pointerleave", () => say(this.readout, this.words));
     page.watch(["tool"], ({ tool }) => {
       this.from = null;
@@ -63,14 +65,14 @@ export class Measure {
     this.stage.touch();
   }
 
-  private look(event: PointerEvent): void {
-    if (event.buttons !== 0 || event.timeStamp - this.looked_ms < kLook_ms) return;
-    this.looked_ms = event.timeStamp;
-    const measuring = this.page.now.tool === "measure";
-    const point = measuring
-      ? this.stage.picker.point(event.clientX, event.clientY)
-      : this.stage.picker.ground(event.clientX, event.clientY);
+  // Tells what is under that point of the page.
+  look(x: number, y: number): void {
+    const begun_ms = performance.now();
+    if (begun_ms < this.nextLook_ms) return;
+    const point = this.stage.picker.point(x, y),
+      end_ms = performance.now();
+    this.nextLook_ms = end_ms + Math.max(kLook_ms, (end_ms - begun_ms) / kLookShare);
     if (point && this.from) this.draw(point);
-    else if (point && !this.words) say(this.readout, `${number(point.x)}, ${number(point.y)} m`);
+    else if (point && !this.words) say(this.readout, placeWords(point));
   }
 }

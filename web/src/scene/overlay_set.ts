@@ -27,6 +27,10 @@ export class OverlaySet {
     stage.scene.add(this.marker);
     page.watch(["world", "scene", "robot"], () => this.make());
     page.watch(["layers"], () => stage.touch());
+    page.watch(["display"], () => {
+      this.style();
+      stage.touch();
+    });
   }
 
   // An overlay and its trails last as long as their robot.
@@ -50,12 +54,16 @@ export class OverlaySet {
       else before.delete(name);
       this.of.set(name, overlay);
     }
-    for (const overlay of this.of.values()) overlay.fade(1 / Math.max(1, this.of.size));
+    this.style();
     for (const overlay of before.values()) {
       this.stage.scene.remove(overlay.group);
       overlay.dispose();
     }
     this.stage.touch();
+  }
+
+  private style(): void {
+    for (const overlay of this.of.values()) overlay.style(this.page.now.display, this.of.size);
   }
 
   // Moves them with the robots; true if there is something to draw.

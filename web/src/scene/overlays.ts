@@ -9,9 +9,11 @@ import type {
   pose_t,
   sonar_t,
 } from "../../generated/messages";
+import { displayOf, type Display } from "../state/display";
 import type { Layer } from "../state/layers";
 import { Cloud } from "./clouds";
 import { matrixOf } from "./matrix";
+import { kOnTop, putOnTop } from "./on_top";
 
 const kColours = {
   rays: 0xff5a4d,
@@ -22,7 +24,9 @@ const kColours = {
   contacts: 0xff2d8a,
 };
 const kMostTrail = 20000; // points
-const kTrailStep_m = 0.02;
+const kTrailStep_m = 0.02,
+  kTruthAbove_m = 0.02,
+  kOdometryAbove_m = 0.025;
 
 function devicePose(device: device_info_t, into: THREE.Matrix4): THREE.Matrix4 {
   return matrixOf([...device.position, ...device.orientation], 0, into);
@@ -69,6 +73,7 @@ const glow = (colour: number, opacity: number) =>
 const kFan = 0.1,
   kRays = 0.35,
   kCones = 0.16;
+const kPoint_px = 4;
 
 class ScanView {
   readonly group = new THREE.Group();
@@ -92,7 +97,7 @@ class ScanView {
       new THREE.BufferGeometry(),
       new THREE.PointsMaterial({
         color: kColours.points,
-        size: 4,
+        size: kPoint_px,
         sizeAttenuation: false,
         toneMapped: false,
         fog: false,
@@ -107,9 +112,10 @@ class ScanView {
     this.group.matrixAutoUpdate = false;
   }
 
-  fade(strength: number): void {
-    this.fan.object.material.opacity = kFan * strength;
-    this.lines.object.material.opacity = kRays * strength;
+  style({ size }: Display, strength: number): void {
+    this.fan.object.material.opacity = Math.min(1, kFan * strength);
+    this.lines.object.material.opacity = Math.min(1, kRays * strength);
+    this.points.object.material.size = kPoint_px * size;
   }
 
   show(scan: planar_lidar_t): void {
@@ -192,8 +198,8 @@ class SonarView {
     this.group.matrixAutoUpdate = false;
   }
 
-  fade(strength: number): void {
-    this.cones.object.material.opacity = kCones * strength;
+  style(_: Display, strength: number): void {
+    this.cones.object.material.opacity = Math.min(1, kCones * strength);
   }
 
   show(sonar: sonar_t): void {
@@ -258,8 +264,19 @@ class Trail {
     this.strip.write(this.points.length / 3, (p) => p.set(this.points));
   }
   clear(): void {
+    this.set([]);
+  }
+  set(points: [number, number, number][]): void {
     this.points = [];
-    this.strip.write(0, () => undefined);
+    const step2 = kTrailStep_m ** 2;
+    let [x0, y0] = [Infinity, Infinity];
+    for (const [x, y, z] of points) {
+      if ((x - x0) ** 2 + (y - y0) ** 2 < step2) continue;
+      this.points.push(x, y, z);
+      [x0, y0] = [x, y];
+    }
+    this.points.splice(0, this.points.length - 3 * kMostTrail);
+    this.strip.write(this.points.length / 3, (p) => p.set(this.points));
   }
 }
 
@@ -278,8 +295,7 @@ export class RobotOverlay {
         color: kColours.contacts,
         size: 9,
         sizeAttenuation: false,
-        depthTest: false,
-        toneMapped: false,
+        ...kOnTop,
       }),
     ),
   );
@@ -289,12 +305,14 @@ export class RobotOverlay {
   private readonly point = new THREE.Vector3();
   private changed = true;
   private strength = 1;
+  private display: Display = displayOf(null);
 
   constructor(
     devices: device_info_t[],
     start: number[],
     readonly key: string,
   ) {
+    putOnTop(this.contacts.object);
     matrixOf(start, 0, this.odom);
     const odomFrame = new THREE.AxesHelper(0.35);
     odomFrame.applyMatrix4(this.odom);
@@ -323,29 +341,42 @@ export class RobotOverlay {
     this.view(this.sonars, device, SonarView).show(message);
     this.changed = true;
   }
-  cloud(device: device_info_t, points: Float32Array): void {
+  cloud(device: device_info_t, points: Float32Array, intensities: Float32Array | null): void {
     let cloud = this.clouds.get(device.name);
     if (!cloud) {
       cloud = new Cloud(device);
+      cloud.style(this.display);
       this.clouds.set(device.name, cloud);
       this.group.add(cloud.object);
     }
-    cloud.show(points);
+    cloud.show(points, intensities);
     this.changed = true;
   }
   pose(message: pose_t): void {
-    this.truth.add(message.pos[0]!, message.pos[1]!, message.pos[2]! + 0.02);
+    this.truth.add(message.pos[0]!, message.pos[1]!, message.pos[2]! + kTruthAbove_m);
     this.changed = true;
   }
-  odometer(message: odometry_t): void {
-    this.point.set(message.x, message.y, 0.025).applyMatrix4(this.odom);
-    this.odometry.add(this.point.x, this.point.y, this.point.z);
+  odometer({ x, y }: odometry_t): void {
+    this.odometry.add(...this.reckoned(x, y));
     this.changed = true;
   }
-  // How strongly rays and cones are painted: those of many robots lie over each other.
-  fade(strength: number): void {
-    for (const view of [...this.scans.values(), ...this.sonars.values()]) view.fade(strength);
-    this.strength = strength;
+  private reckoned(x: number, y: number): [number, number, number] {
+    return this.point.set(x, y, kOdometryAbove_m).applyMatrix4(this.odom).toArray();
+  }
+  // The trails up to another moment: positions in the world, and in odom.
+  retrace(truth: [number, number, number][], odometry: [number, number][]): void {
+    this.truth.set(truth.map(([x, y, z]) => [x, y, z + kTruthAbove_m]));
+    this.odometry.set(odometry.map(([x, y]) => this.reckoned(x, y)));
+    this.changed = true;
+  }
+  // robots: how many there are; their rays and cones lie over each other, and are painted fainter.
+  style(display: Display, robots: number): void {
+    this.display = display;
+    this.strength = display.opacity / Math.max(1, robots);
+    for (const view of [...this.scans.values(), ...this.sonars.values()])
+      view.style(display, this.strength);
+    for (const cloud of this.clouds.values()) cloud.style(display);
+    this.changed = true;
   }
   contact(message: contact_t): void {
     this.contacts.write(message.n, (p) =>
@@ -394,7 +425,7 @@ export class RobotOverlay {
     let view = views.get(device.name);
     if (!view) {
       view = new Make(device);
-      view.fade(this.strength);
+      view.style(this.display, this.strength);
       views.set(device.name, view);
       this.group.add(view.group);
     }

@@ -11,27 +11,28 @@ export class Picker {
     private readonly bodies: Bodies,
   ) {}
 
-  // The point of the floor under a point of the canvas; null above the horizon.
-  ground(x: number, y: number): THREE.Vector3 | null {
+  // The point at that height under a point of the canvas; null above the horizon.
+  level(x: number, y: number, height_m: number): THREE.Vector3 | null {
     return this.caster(x, y).ray.intersectPlane(
-      new THREE.Plane(new THREE.Vector3(0, 0, 1), 0),
+      new THREE.Plane(new THREE.Vector3(0, 0, 1), -height_m),
       new THREE.Vector3(),
     );
   }
 
-  // The visible point under a point of the canvas, of the floor if nothing else is there.
+  // The visible point under a point of the canvas. Where nothing is drawn, the floor goes on; null
+  // above the horizon.
   point(x: number, y: number): THREE.Vector3 | null {
-    return this.seen(this.caster(x, y))?.point ?? this.ground(x, y);
+    return this.seen(this.caster(x, y))?.point ?? this.floor(x, y);
   }
 
-  // What is under a point of the canvas: a robot (-1 for none), the name of a model ("" for none),
-  // the point of it that is visible, and the point of the floor.
-  pick(
-    x: number,
-    y: number,
-  ): { robot: number; model: string; point: THREE.Vector3 | null; ground: THREE.Vector3 | null } {
+  private floor(x: number, y: number): THREE.Vector3 | null {
+    return this.level(x, y, this.bodies.description?.floor ?? 0);
+  }
+
+  // What is under a point of the canvas: a robot (-1 for none), the name of a model ("" for none,
+  // and for the ground), and the point as of point().
+  pick(x: number, y: number): { robot: number; model: string; point: THREE.Vector3 | null } {
     const caster = this.caster(x, y),
-      ground = this.ground(x, y),
       seen = this.seen(caster);
     const { bases = [], models = [] } = this.bodies.description ?? {};
     const model = models[seen?.model ?? -1]?.name ?? "";
@@ -50,8 +51,7 @@ export class Picker {
     return {
       robot,
       model: model || (bases[robot]?.robot ?? ""),
-      point: seen?.point ?? null,
-      ground,
+      point: seen?.point ?? this.floor(x, y),
     };
   }
 
@@ -61,7 +61,7 @@ export class Picker {
     return caster;
   }
 
-  // The nearest model other than the floor.
+  // The nearest model; -1 for the ground.
   private seen(caster: THREE.Raycaster): { model: number; point: THREE.Vector3 } | null {
     let nearest = Infinity,
       found: { model: number; point: THREE.Vector3 } | null = null;
@@ -70,14 +70,14 @@ export class Picker {
       const { indices, meshes, far, shown } = part,
         top = standing.includes(part) ? this.ceiling : Infinity;
       for (const mesh of far ? [...meshes, far.mesh] : meshes) {
-        if (mesh.userData.ground) continue;
         // the old one holds instances as they once were
         if (mesh instanceof THREE.InstancedMesh) mesh.boundingSphere = null;
         for (const { distance, instanceId, point } of caster.intersectObject(mesh, false)) {
           if (distance >= nearest || point.z > top) continue;
           nearest = distance;
           const place = (mesh === far?.mesh ? far.shown : shown)[instanceId!]!;
-          found = { model: this.bodies.modelOf(indices[place]!), point: point.clone() };
+          const model = mesh.userData.ground ? -1 : this.bodies.modelOf(indices[place]!);
+          found = { model, point: point.clone() };
         }
       }
     }

@@ -24,7 +24,7 @@ export class Stage {
   firstDrawn_ms = 0; // when the world was first drawn, since navigation
   private readonly lights = new Lights();
   private readonly fog = new THREE.Fog(0); // begins behind what is looked at
-  private readonly timer: FrameTimer | null = null;
+  private timer: FrameTimer | null = null;
   private shadows = true; // what the user wants
   private wireframe = false;
   private dirty = true;
@@ -32,6 +32,8 @@ export class Stage {
   private regroup = false; // distances from the camera have changed
   // Called with each frame: whether it has fewer pixels than the display
   onDetail: (reduced: boolean) => void = () => undefined;
+  // Called when the browser takes the graphics away, and when it gives them back
+  onContext: (there: boolean) => void = () => undefined;
 
   // full: full detail even with a software rasteriser.
   constructor(
@@ -42,8 +44,14 @@ export class Stage {
     const software = !full && drawnBySoftware();
     this.quality = new Quality(software);
     this.renderer = makeRenderer(canvas, !software);
-    if (this.renderer)
-      this.timer = new FrameTimer(this.renderer.getContext() as WebGL2RenderingContext);
+    this.makeTimer();
+    canvas.addEventListener("webglcontextlost", () => this.onContext(false));
+    canvas.addEventListener("webglcontextrestored", () => {
+      this.makeTimer();
+      this.lights.moved();
+      this.refine();
+      this.onContext(true);
+    });
     this.bodies = new Bodies(poses, () => {
       this.lights.moved();
       this.turned();
@@ -58,6 +66,11 @@ export class Stage {
     this.scene.fog = this.fog;
     new ResizeObserver(() => this.resize()).observe(canvas.parentElement!);
     this.resize();
+  }
+
+  private makeTimer(): void {
+    const context = this.renderer?.getContext() as WebGL2RenderingContext | undefined;
+    this.timer = context ? new FrameTimer(context) : null;
   }
 
   // Something has changed: draw with the next frame.

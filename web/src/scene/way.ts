@@ -1,6 +1,7 @@
 // The path that a robot has been sent along, on the floor.
 import * as THREE from "three";
 import type { Planar } from "../state/go_to";
+import { kOnTop, putOnTop } from "./on_top";
 import type { Stage } from "./stage";
 
 const kAbove_m = 0.03;
@@ -13,25 +14,21 @@ export class Way {
       color: kColour,
       size: 10,
       sizeAttenuation: false,
-      depthTest: false,
-      transparent: true,
-      toneMapped: false,
-      fog: false,
+      ...kOnTop,
     }),
   );
 
   constructor(private readonly stage: Stage) {
     for (const object of [this.line, this.ends]) {
       object.visible = false;
-      object.frustumCulled = false;
-      object.renderOrder = 1; // over sensor data
+      putOnTop(object);
       stage.scene.add(object);
     }
   }
 
   // from: the robot's position.
   show(from: Planar | null, points: readonly Planar[]): void {
-    const at = ({ x, y }: Planar) => new THREE.Vector3(x, y, kAbove_m);
+    const at = ({ x, y, z }: Planar) => new THREE.Vector3(x, y, (z ?? 0) + kAbove_m);
     this.line.visible = this.ends.visible = points.length > 0;
     if (points.length > 0) {
       draw(this.line, [...(from ? [from] : []), ...points].map(at));
@@ -42,13 +39,7 @@ export class Way {
 }
 
 const kColour = 0x35c2ad,
-  kPaint = new THREE.LineBasicMaterial({
-    color: kColour,
-    depthTest: false,
-    transparent: true,
-    toneMapped: false,
-    fog: false,
-  });
+  kPaint = new THREE.LineBasicMaterial({ color: kColour, ...kOnTop });
 
 // A geometry keeps the number of its first points.
 function draw(object: THREE.Line | THREE.Points, points: THREE.Vector3[]): void {

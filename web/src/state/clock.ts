@@ -17,7 +17,8 @@ export class Clock {
 
   // isState: only states announce a jump back; other messages may be older than the last state.
   tell(time_s: number, epoch: number, isState = false): void {
-    const before_s = this.page.now.time_s;
+    const { time_s: before_s, past } = this.page.now;
+    if (past && !isState) return; // what runs now has another time than what is shown
     if (isState && (epoch !== this.epoch || time_s < before_s - kBack_s)) {
       const reset = epoch !== this.epoch;
       this.epoch = epoch;

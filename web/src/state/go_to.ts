@@ -25,6 +25,7 @@ const kMostTries = 5; // for one point
 export interface Planar {
   x: number;
   y: number;
+  z?: number; // m, where it is drawn; the way is planned in x and y
 }
 export interface PlanarPose extends Planar {
   heading: number; // rad, from the world's x to its y

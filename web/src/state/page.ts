@@ -2,12 +2,13 @@
 import type { Hello, LinkState, Playback, RunEvent, Comparison } from "../wire/protocol";
 import type { Past } from "../wire/rewind";
 import type { Description } from "../wire/description";
+import { recallDisplay, type Display } from "./display";
 import { kLayers, kOffAtFirst, type Layer } from "./layers";
 import { recall } from "./memory";
 import { Store } from "./store";
 import type { World } from "./world";
 
-export const kTabs = ["Robot", "Plots", "Channels", "World"] as const;
+export const kTabs = ["Robot", "Plots", "Channels", "World", "Notes"] as const;
 export type Tab = (typeof kTabs)[number];
 
 export type ViewMode = "orbit" | "follow" | "top";
@@ -53,7 +54,9 @@ export interface PageState {
   loop: boolean; // playback starts over at the end
   // of the part that is looped; null: from the beginning, to the end
   marks: { begin: number | null; end: number | null };
+  span: Span | null; // the part of the time line that is shown; null: all of it
   layers: ReadonlySet<Layer>;
+  display: Display; // of what robots sense
   mode: ViewMode;
   drawn: boolean; // clients have drawn something
   reduced: boolean; // drawn with fewer pixels than the display has
@@ -66,6 +69,11 @@ export interface PageState {
   saved: number; // number of changes when the world was last saved
   tab: Tab;
   panel: boolean; // whether it is open
+}
+
+export interface Span {
+  begin: number; // s
+  end: number;
 }
 
 export type Page = Store<PageState>;
@@ -92,7 +100,9 @@ export function makePage(): Page {
     eventKind: "",
     loop: false,
     marks: { begin: null, end: null },
+    span: null,
     layers: new Set(kLayers.filter((layer) => !off.includes(layer))),
+    display: recallDisplay(),
     mode: "orbit",
     drawn: false,
     reduced: false,

@@ -1,7 +1,7 @@
 // The time line: which part of a run can be shown, the events around a moment, and when a loop
 // starts over.
 import type { RunEvent } from "../wire/protocol";
-import type { PageState } from "./page";
+import type { PageState, Span } from "./page";
 
 export interface Shown {
   begin: number;
@@ -25,6 +25,32 @@ export function shownOf({
   return kept.end - kept.begin > kFewest_s
     ? { ...kept, now: kept.end, speed: 1, playing: true }
     : null;
+}
+
+const kShortest_s = 0.05; // part of the time line that can be shown
+
+// The part of the time line that is shown, within what there is; it follows the shown moment.
+export function spanOf(span: Span | null, shown: Shown): Span {
+  if (!span) return { begin: shown.begin, end: shown.end };
+  const length = Math.min(span.end - span.begin, shown.end - shown.begin);
+  let { begin } = span;
+  if (shown.now < begin || shown.now > begin + length) begin = shown.now - length / 2;
+  begin = Math.max(shown.begin, Math.min(shown.end - length, begin));
+  return { begin, end: begin + length };
+}
+
+// So many times as long, with a moment in its place; null: everything.
+export function zoomed(
+  span: Span | null,
+  shown: Shown,
+  around_s: number,
+  times: number,
+): Span | null {
+  const { begin, end } = spanOf(span, shown),
+    length = Math.max(kShortest_s, times * (end - begin));
+  if (length >= shown.end - shown.begin) return null;
+  const share = (around_s - begin) / (end - begin);
+  return { begin: around_s - share * length, end: around_s + (1 - share) * length };
 }
 
 // The next event; of several at the same time, the first. Null if there is none.

@@ -11,6 +11,7 @@ const kOfTab: Record<Exclude<Tab, "Robot">, string[]> = {
   Plots: ["pose_t", "odometry_t"],
   Channels: [],
   World: [],
+  Notes: [],
 };
 const kNotOnRobotPage = ["lidar_t", "camera_info_t"]; // the page Robot shows all others
 const kOfLayer: Partial<Record<Layer, string>> = {

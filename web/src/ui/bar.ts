@@ -1,7 +1,7 @@
 // The bar at the top: what runs, the clock, and the controls of the simulation.
 import { clockText } from "../state/clock";
 import { stateWords, type Page, type ViewMode } from "../state/page";
-import { h, say } from "../widgets/elements";
+import { giveFocusBack, h, say } from "../widgets/elements";
 import { icon, iconButton } from "../widgets/icons";
 
 export interface BarActions {
@@ -32,6 +32,8 @@ export class Bar {
       h("option", { value }, value === "max" ? "max" : `× ${value}`),
     ),
   );
+  // Told by screen readers
+  private readonly told = h("span", { class: "unseen", role: "status", id: "told" });
   private readonly modes = new Map<string, HTMLButtonElement>();
 
   constructor(
@@ -59,6 +61,7 @@ export class Bar {
         this.name,
       ),
       this.state,
+      this.told,
       h("span", { class: "grow" }),
       this.clock,
       this.pause,
@@ -78,6 +81,7 @@ export class Bar {
       ),
       iconButton("panel", "panel (P)", () => actions.panel()),
     );
+    giveFocusBack(place);
     this.show();
   }
 
@@ -123,6 +127,13 @@ export class Bar {
       say(this.state, words);
       this.state.className = `pill ${good === null ? "" : good ? "good" : "bad"}`;
     });
+    page.watch(["paused", "hello", "world"], ({ paused, hello, world }) => {
+      if (world)
+        say(
+          this.told,
+          `${hello?.mode === "log" ? "log" : "run"} ${paused ? "paused" : "going on"}`,
+        );
+    });
     page.watch(["time_s", "world"], ({ time_s, world }) => {
       if (world) say(this.clock, clockText(time_s, world.step_us));
     });
@@ -138,9 +149,10 @@ export class Bar {
         button.setAttribute("aria-pressed", name === mode ? "true" : "false");
       }
     });
-    page.watch(["paused", "controlled"], ({ paused, controlled }) => {
+    page.watch(["paused", "controlled", "past"], ({ paused, controlled, past }) => {
       this.pause.replaceChildren(icon(paused ? "play" : "pause"));
-      this.pause.title = paused ? "go on (space)" : "pause (space)";
+      const what = paused ? "go on" : "pause";
+      this.pause.title = past ? `the run: ${what}` : `${what} (space)`;
       this.pause.setAttribute("aria-label", this.pause.title);
       for (const element of [this.pause, this.rate, this.resetButton])
         element.disabled = !controlled;

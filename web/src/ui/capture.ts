@@ -1,8 +1,11 @@
 // Screenshots and videos of the view, made by the browser.
 import type { Stage } from "../scene/stage";
+import type { Page } from "../state/page";
+import { downloadName } from "../state/world_key";
 import { download } from "../widgets/download";
 import { h, say, toast } from "../widgets/elements";
 import { Recording } from "./recording";
+import { withDuration } from "./webm";
 
 const kFrames_hz = 30;
 const kTypes = ["video/webm;codecs=vp9", "video/webm;codecs=vp8", "video/webm", "video/mp4"];
@@ -17,6 +20,7 @@ export class Capture {
   private recording: Recording | null = null;
 
   constructor(
+    private readonly page: Page,
     private readonly stage: Stage,
     private readonly canvas: HTMLCanvasElement,
   ) {
@@ -28,7 +32,7 @@ export class Capture {
   private picture(): void {
     this.stage.redraw(); // the last frame may no longer be in the buffer
     this.canvas.toBlob((blob) => {
-      if (blob) download(blob, "ruedo.png");
+      if (blob) download(blob, downloadName(this.page.now, "", "png"));
     }, "image/png");
   }
 
@@ -37,13 +41,20 @@ export class Capture {
     const mimeType = kTypes.find((type) => globalThis.MediaRecorder?.isTypeSupported(type));
     if (!mimeType) return toast("This browser records no videos.", "error");
     const recorder = new MediaRecorder(this.canvas.captureStream(kFrames_hz), { mimeType });
+    const begun_ms = performance.now();
     this.recording = new Recording(recorder, (video) => {
       this.recording = null;
       this.show();
-      if (video.size === 0) return toast("The browser has recorded no picture.", "error");
-      download(video, `ruedo.${mimeType.startsWith("video/mp4") ? "mp4" : "webm"}`);
+      void this.offer(video, (performance.now() - begun_ms) / 1000);
     });
     this.show();
+  }
+
+  private async offer(video: Blob, duration_s: number): Promise<void> {
+    if (video.size === 0) return toast("The browser has recorded no picture.", "error");
+    const isWebm = !video.type.startsWith("video/mp4"),
+      name = downloadName(this.page.now, "", isWebm ? "webm" : "mp4");
+    download(isWebm ? await withDuration(video, duration_s) : video, name);
   }
 
   private show(): void {

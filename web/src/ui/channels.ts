@@ -1,13 +1,14 @@
 // The list of all channels: type, rate, size, and the last values of those that are open.
 import { decode, typeOf } from "../wire/lcm";
 import type { World } from "../state/world";
-import { fieldsOf } from "../wire/fields";
+import { fieldsOf, nameOf } from "../wire/fields";
 import { h, say } from "../widgets/elements";
 import { kDragType } from "../widgets/drag";
 import { textOf } from "../widgets/text";
 
 const kMostRows = 300;
-const kMostFields = 60; // to plot
+const kMostFields = 400; // to plot by a click; a formula on the page Plots takes any
+const kMostShown = 2000; // elements of an array
 
 interface Row {
   element: HTMLElement;
@@ -126,9 +127,9 @@ export class ChannelList {
 
   // Fields that can be plotted by a click or a drag onto the page Plots; made once for each open
   // row.
-  private offerFields(channel: string, type: string, values: HTMLElement): void {
+  private offerFields(channel: string, type: string, message: unknown, values: HTMLElement): void {
     if (values.nextElementSibling) return;
-    const fields = fieldsOf(type).filter((path) => path !== "utime");
+    const fields = fieldsOf(type, message).filter((path) => path !== "utime");
     const chips = fields.slice(0, kMostFields).map((path) => {
       const chip = h(
         "button",
@@ -139,7 +140,7 @@ export class ChannelList {
           title: `plot ${channel} ${path}`,
           click: () => this.onPlot(channel, path),
         },
-        path,
+        nameOf(message, path) || path,
       );
       chip.addEventListener("dragstart", (event) =>
         event.dataTransfer?.setData(kDragType, `${channel}\n${path}`),
@@ -171,11 +172,12 @@ export class ChannelList {
     if (!values) return;
     const type = typeOf(bytes);
     try {
+      const message = type && decode(type, bytes);
       say(
         values,
-        type ? textOf(decode(type, bytes)) : `${bytes.length} bytes of a type that is not known`,
+        type ? textOf(message, 0, kMostShown) : `${bytes.length} bytes of a type that is not known`,
       );
-      if (type) this.offerFields(channel, type, values);
+      if (type) this.offerFields(channel, type, message, values);
     } catch (error) {
       say(values, (error as Error).message);
     }

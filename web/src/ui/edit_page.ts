@@ -4,6 +4,8 @@ import type { Editor } from "../edit/editor";
 import type { Page, Tool } from "../state/page";
 import type { Stage } from "../scene/stage";
 import { h, say } from "../widgets/elements";
+import { numberField } from "../widgets/number_field";
+import { kColourings, kLeast, kMost, rememberDisplay, type Display } from "../state/display";
 import { recall, remember } from "../state/memory";
 import { Library } from "./library";
 import { kThings } from "../edit/things";
@@ -16,6 +18,8 @@ const kTools: [Tool & string, string, string][] = [
   ["room", "Room", "drag from corner to corner"],
   ["door", "Door", "click on a wall"],
 ];
+
+const kSizes = { min: 0.01, max: 100, step: 0.1 }; // m, of walls and doors
 
 export interface DoorSize {
   width: number;
@@ -78,10 +82,16 @@ export class EditPage {
       button = (id: string, text: string, title: string, click: () => void) =>
         h("button", { id, title, click }, text);
     const save = button("save", "Save", "save the world (Ctrl S)", () => void editor.save());
+    const copy = button(
+      "save-copy",
+      "Save a copy",
+      "beside the file, with the next free number",
+      () => void editor.saveCopy(),
+    );
     const undo = button("undo", "Undo", "", () => void editor.history.undo()),
       redo = button("redo", "Redo", "", () => void editor.history.redo());
     page.watch(["hello", "edits", "saved"], ({ hello, edits, saved }) => {
-      save.hidden = !hello?.save;
+      save.hidden = copy.hidden = !hello?.save;
       say(save, edits.changes === saved ? `Save to ${hello?.save}` : `Save to ${hello?.save} •`);
       undo.disabled = edits.undo === null;
       redo.disabled = edits.redo === null;
@@ -92,6 +102,7 @@ export class EditPage {
       "div",
       { class: "row" },
       save,
+      copy,
       undo,
       redo,
       button(
@@ -109,30 +120,24 @@ export class EditPage {
     const buttons = kTools.map(([tool, text, title]) =>
       h("button", { "data-tool": tool, title, click: () => page.set({ tool }) }, text),
     );
-    const number = (label: string, of: Record<string, number>, key: string) => {
-      const field = h("input", {
-        type: "number",
-        step: 0.1,
-        min: 0.01,
-        value: of[key]!,
-        "aria-label": label,
-      });
-      field.addEventListener("change", () => {
-        if (Number(field.value) > 0) of[key] = Number(field.value);
-      });
-      return h("label", { class: "row" }, h("span", { class: "dim" }, label), field);
-    };
+    const number = <Key extends string>(label: string, of: Record<Key, number>, key: Key) =>
+      h(
+        "label",
+        { class: "row" },
+        h("span", { class: "dim" }, `${label}, m`),
+        numberField(label, of[key], kSizes, (value) => (of[key] = value)),
+      );
     const walls = h(
       "div",
       { class: "row" },
-      number("wall height", draw.style as unknown as Record<string, number>, "height"),
-      number("thickness", draw.style as unknown as Record<string, number>, "thickness"),
+      number("wall height", draw.style, "height"),
+      number("thickness", draw.style, "thickness"),
     );
     const doors = h(
       "div",
       { class: "row" },
-      number("door width", door as unknown as Record<string, number>, "width"),
-      number("door height", door as unknown as Record<string, number>, "height"),
+      number("door width", door, "width"),
+      number("door height", door, "height"),
     );
     draw.onLength = (length) => say(words, length);
     page.watch(["tool"], ({ tool }) => {
@@ -174,6 +179,44 @@ export class EditPage {
     );
   }
 
+  // How what robots sense is drawn.
+  private display(): HTMLElement {
+    const { page } = this,
+      change = (by: Partial<Display>) => {
+        const display = { ...page.now.display, ...by };
+        rememberDisplay(display);
+        page.set({ display });
+      };
+    const slider = (label: string, key: "size" | "opacity") => {
+      const field = h("input", {
+        type: "range",
+        min: Math.log2(kLeast),
+        max: Math.log2(kMost),
+        step: 0.25,
+        value: Math.log2(page.now.display[key]),
+        "aria-label": label,
+      });
+      field.addEventListener("input", () => change({ [key]: 2 ** Number(field.value) }));
+      return h("label", { class: "row" }, h("span", { class: "dim" }, label), field);
+    };
+    const colouring = h(
+      "select",
+      { "aria-label": "colour of clouds" },
+      ...kColourings.map((each) => h("option", {}, each)),
+    );
+    colouring.value = page.now.display.colouring;
+    colouring.addEventListener("change", () =>
+      change({ colouring: colouring.value as Display["colouring"] }),
+    );
+    return h(
+      "div",
+      {},
+      slider("size of points", "size"),
+      slider("strength of rays", "opacity"),
+      h("label", { class: "row" }, h("span", { class: "dim" }, "clouds coloured by"), colouring),
+    );
+  }
+
   private view(): HTMLElement {
     const { stage } = this,
       shadows = h("input", { type: "checkbox", checked: true });
@@ -203,6 +246,7 @@ export class EditPage {
       h("label", { class: "check" }, edges, "wireframe"),
       h("label", { class: "check" }, shadows, "shadows"),
       h("label", { class: "check" }, less, "less detail where drawing is slow"),
+      this.display(),
       h(
         "div",
         { class: "row" },

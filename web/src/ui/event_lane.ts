@@ -1,8 +1,8 @@
 // Events below the time line: a mark for each, buttons to jump between them, and the looped part of
 // the run.
 import { eventOf } from "../state/comparison";
-import type { Page, PageState } from "../state/page";
-import { eventAfter, eventBefore, shownOf } from "../state/time";
+import type { Page, PageState, Span } from "../state/page";
+import { eventAfter, eventBefore, shownOf, spanOf, zoomed } from "../state/time";
 import type { RunEvent } from "../wire/protocol";
 import { iconButton } from "../widgets/icons";
 import { h, say } from "../widgets/elements";
@@ -24,6 +24,7 @@ const kColours: Record<string, string> = {
 const kThumb_px = 8;
 const kNear_px = 6;
 const kHeight_px = 14;
+const kZoom = 1.25; // of one turn of the wheel
 
 export class EventLane {
   readonly canvas = h("canvas", { class: "lane", id: "events", role: "img" });
@@ -48,13 +49,15 @@ export class EventLane {
     });
     this.canvas.addEventListener("pointermove", (event) => {
       const near = this.near(event.offsetX);
-      this.canvas.title = near ? wordsOf(near) : "";
+      this.canvas.title = near ? wordsOf(near) : "wheel: zoom; double click: everything";
     });
     this.canvas.addEventListener("click", (event) => {
       const near = this.near(event.offsetX);
       if (near) this.goTo(near);
       else this.seek(this.timeAt(event.offsetX));
     });
+    this.canvas.addEventListener("wheel", (event) => this.zoom(event), { passive: false });
+    this.canvas.addEventListener("dblclick", () => page.set({ span: null }));
     new ResizeObserver(() => this.draw()).observe(this.canvas);
     page.watch(["events", "comparison"], () => this.list(this.all));
     page.watch(["loop"], ({ loop }) => {
@@ -64,11 +67,14 @@ export class EventLane {
     page.watch(["events", "comparison", "eventKind", "marks", "kept", "hello", "theme"], () =>
       this.draw(),
     );
-    page.watch(["playback"], ({ playback }) => {
-      if (playback?.begin !== this.drawn.begin || playback.end !== this.drawn.end) this.draw();
+    page.watch(["playback", "past", "span"], (state) => {
+      const shown = shownOf(state);
+      if (!shown) return;
+      const { begin, end } = spanOf(state.span, shown);
+      if (begin !== this.drawn.begin || end !== this.drawn.end) this.draw();
     });
   }
-  private drawn = { begin: 0, end: 0 };
+  private drawn: Span = { begin: 0, end: 0 };
 
   // Jumps to the next event of the shown kinds, or the previous one.
   jump(ahead: boolean): void {
@@ -128,13 +134,27 @@ export class EventLane {
     if (events.length === 0) say(this.text, "");
   }
 
+  private get span(): Span {
+    return spanOf(this.page.now.span, shownOf(this.page.now)!);
+  }
+
+  // Shows a part of the time line, around what is under the pointer; or all of it.
+  private zoom(event: WheelEvent): void {
+    const shown = shownOf(this.page.now);
+    if (!shown) return;
+    event.preventDefault();
+    const around_s = this.timeAt(event.offsetX),
+      times = kZoom ** Math.sign(event.deltaY);
+    this.page.set({ span: zoomed(this.page.now.span, shown, around_s, times) });
+  }
+
   private place(time_s: number): number {
-    const { begin, end } = shownOf(this.page.now)!,
+    const { begin, end } = this.span,
       share = end > begin ? (time_s - begin) / (end - begin) : 0;
     return kThumb_px + share * (this.canvas.clientWidth - 2 * kThumb_px);
   }
   private timeAt(x: number): number {
-    const { begin, end } = shownOf(this.page.now)!,
+    const { begin, end } = this.span,
       share = (x - kThumb_px) / Math.max(1, this.canvas.clientWidth - 2 * kThumb_px);
     return begin + Math.max(0, Math.min(1, share)) * (end - begin);
   }
@@ -155,14 +175,14 @@ export class EventLane {
       width = this.canvas.clientWidth,
       context = this.canvas.getContext("2d");
     if (!shown || width === 0 || !context) return;
-    this.drawn = { begin: shown.begin, end: shown.end };
+    const span = (this.drawn = this.span);
     const ratio = devicePixelRatio;
     this.canvas.width = Math.round(width * ratio);
     this.canvas.height = Math.round(kHeight_px * ratio);
     context.scale(ratio, ratio);
-    this.shade(context, this.page.now, shown);
+    this.shade(context, this.page.now, span);
     for (const { t, kind } of this.events) {
-      if (t < shown.begin || t > shown.end) continue;
+      if (t < span.begin || t > span.end) continue;
       context.fillStyle = kColours[kind] ?? kColours.lost!;
       context.fillRect(Math.round(this.place(t)) - 1, 1, 2, kHeight_px - 2);
     }

@@ -5,6 +5,7 @@ const kKeys: [string[], string][] = [
   [["W", "A", "S", "D"], "drive the chosen robot (arrow keys, a gamepad and the stick, too)"],
   [["X"], "stop it"],
   [["G"], "send it to where you click; with Shift, further points"],
+  [["Arrows", "Enter"], "with the focus on the view: where a tool acts, in place of a click"],
   [["Space"], "pause and go on"],
   [[".", ","], "one step, while paused; in a log or the past, a state on and back"],
   [[">", "<"], "next event, event before"],
@@ -30,7 +31,7 @@ const kKeys: [string[], string][] = [
 
 export function fillHelp(dialog: HTMLDialogElement): void {
   dialog.append(
-    h("h2", {}, "Keys"),
+    h("h2", { tabindex: -1, autofocus: true }, "Keys"), // else the last button has the focus, and is in view
     h(
       "div",
       { class: "keys" },

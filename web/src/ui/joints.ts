@@ -1,8 +1,11 @@
-// The joints of the chosen robot: their positions, and a slider for each that can be moved.
+// The joints of the chosen robot: their positions, and a slider for each that can be moved, between
+// the joint's limits.
 import type { joint_state_t } from "../../generated/messages";
 import { h, say } from "../widgets/elements";
+import type { JointDescription } from "../wire/description";
 
-const kReach = Math.PI; // range of a slider, rad or m to both sides
+const kReach = Math.PI, // to both sides, of a joint without limits: rad or m
+  kSteps = 500; // of a slider
 
 interface Row {
   values: HTMLElement[];
@@ -10,15 +13,17 @@ interface Row {
   moved: boolean; // moved by hand: the slider no longer follows the joint
 }
 
+export interface JointActions {
+  move(name: string, position: number): void; // requests a position of a joint
+  canMove(): boolean; // whether the robot accepts that
+  find(name: string): JointDescription | undefined;
+}
+
 export class JointTable {
   readonly element = h("table", { class: "statistics", id: "joints", hidden: true });
   private rows = new Map<string, Row>();
 
-  // move: requests a position of a joint. canMove: whether the robot accepts that.
-  constructor(
-    private readonly move: (joint: string, position: number) => void,
-    private readonly canMove: () => boolean,
-  ) {}
+  constructor(private readonly joints: JointActions) {}
 
   clear(): void {
     this.rows.clear();
@@ -42,19 +47,13 @@ export class JointTable {
 
   private make(names: string[]): void {
     this.clear();
-    const movable = this.canMove();
-    const heads = ["joint", "position", "speed", "effort", ...(movable ? ["move"] : [])];
+    const movable = this.joints.canMove();
+    const heads = ["joint", "position", "speed", "effort", "", ...(movable ? ["move"] : [])];
     this.element.append(h("tr", {}, ...heads.map((text) => h("th", {}, text))));
     for (const name of names) {
-      const slider = movable
-        ? h("input", {
-            type: "range",
-            min: -kReach,
-            max: kReach,
-            step: 0.01,
-            "aria-label": `move ${name}`,
-          })
-        : null;
+      const joint = this.joints.find(name),
+        unit = joint ? (joint.slides ? "m" : "rad") : "";
+      const slider = movable ? this.slider(name, unit, joint) : null;
       const row: Row = {
         values: [0, 1, 2].map(() => h("td", { class: "number" })),
         slider,
@@ -62,13 +61,35 @@ export class JointTable {
       };
       slider?.addEventListener("input", () => {
         row.moved = true;
-        this.move(name, Number(slider.value));
+        this.joints.move(name, Number(slider.value));
       });
       this.rows.set(name, row);
+      const range = slider && `${bound(slider.min)} to ${bound(slider.max)} ${unit}`;
       this.element.append(
-        h("tr", {}, h("th", {}, name), ...row.values, slider && h("td", {}, slider)),
+        h(
+          "tr",
+          {},
+          h("th", {}, name),
+          ...row.values,
+          h("td", { class: "dim" }, unit),
+          slider && h("td", {}, slider, h("div", { class: "dim range" }, range)),
+        ),
       );
     }
     this.element.hidden = names.length === 0;
   }
+
+  private slider(name: string, unit: string, joint?: JointDescription): HTMLInputElement {
+    const min = joint?.lower ?? Math.min(-kReach, (joint?.upper ?? kReach) - 2 * kReach),
+      max = joint?.upper ?? Math.max(kReach, min + 2 * kReach);
+    return h("input", {
+      type: "range",
+      min,
+      max,
+      step: max > min ? (max - min) / kSteps : "any",
+      "aria-label": `move ${name}${unit && `, ${unit}`}`,
+    });
+  }
 }
+
+const bound = (value: string) => String(Number(Number(value).toPrecision(3)));

@@ -1,17 +1,22 @@
-// Which parts of the page are open, kept for each world. A new world starts with the last layout.
+// Which parts of the page are open, kept for each world, or as the link says that led here. A new
+// world starts with the last layout.
 import { kLayers } from "../state/layers";
 import { kTabs, type Page } from "../state/page";
 import { recallFor, rememberFor } from "../state/memory";
+import { placeOf } from "../state/place";
+import { worldKey } from "../state/world_key";
 
 const kNarrow_px = 860; // below this the panel takes much of the page, and is closed at first
 
 export class Layout {
   private of = ""; // the world that the layout belongs to
+  private isFirst = true; // no world was shown so far
 
   constructor(private readonly page: Page) {
-    page.watch(["world"], ({ world }) => {
-      if (!world || world.name === this.of) return;
-      this.of = world.name;
+    page.watch(["world"], (state) => {
+      const key = worldKey(state);
+      if (!state.world || key === this.of) return;
+      this.of = key;
       this.restore();
     });
     page.watch(["tab", "panel", "layers"], ({ tab, panel, layers }) => {
@@ -25,8 +30,10 @@ export class Layout {
 
   private restore(): void {
     const { hello, tab, panel, layers } = this.page.now,
-      kept = recallFor(this.of, "page"),
-      off = recallFor(this.of, "layers-off")?.split(",");
+      linked = this.isFirst ? placeOf(location.hash).open : null,
+      kept = linked?.page ?? recallFor(this.of, "page"),
+      off = linked?.off ?? recallFor(this.of, "layers-off")?.split(",");
+    this.isFirst = false;
     const isOpen = recallFor(this.of, "panel") !== "closed";
     this.page.set({
       tab: hello?.save ? tab : (kTabs.find((name) => name === kept) ?? tab),

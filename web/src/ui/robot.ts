@@ -15,13 +15,27 @@ import {
 } from "../../generated/messages";
 import { textOf } from "../widgets/text";
 import { h, say } from "../widgets/elements";
-import { JointTable } from "./joints";
+import { JointTable, type JointActions } from "./joints";
 import { makeMoveForm } from "./move_form";
 import type { Move } from "../state/go_to";
 import { inWorld, type Heading } from "./odometry";
-import { PolarPlot, TimePlot } from "../widgets/plots";
+import { kWindow_s, PolarPlot, TimePlot } from "../widgets/plots";
+import { XYPlot } from "../widgets/xy_plot";
 import { kReasons } from "../state/go_to";
 import { Picture } from "../widgets/picture";
+
+// At earlier moments; time_s: sim time.
+export interface PastPose {
+  time_s: number;
+  x: number; // m
+  y: number;
+  heading: number; // rad
+  v: number; // m/s
+  omega: number; // rad/s
+}
+export type PastOdometry = Pick<odometry_t, "x" | "y" | "theta" | "v" | "omega"> & {
+  time_s: number;
+};
 
 const kStates = ["idle", "running", "done", "ended", "refused"];
 const kFacts = ["drive", "pose", "speed", "odometry", "odometry error", "motion", "runs into"];
@@ -65,12 +79,16 @@ export class RobotPages {
     { label: "ω true, rad/s", colour: "--sonar", scale: "w" },
     { label: "ω odometry", colour: "--rays", scale: "w", dash: [5, 3] },
   ]);
-  private readonly path = new TimePlot("Path", "m", [
-    { label: "x true, m", colour: "--true" },
-    { label: "x odometry", colour: "--odometry", dash: [5, 3] },
-    { label: "y true", colour: "--sonar" },
-    { label: "y odometry", colour: "--rays", dash: [5, 3] },
-  ]);
+  private readonly path = new XYPlot(
+    "Path",
+    ["x, m", "y, m"],
+    [
+      { label: "true", colour: "--true" },
+      { label: "odometry", colour: "--odometry", dash: [5, 3] },
+    ],
+    true,
+    kWindow_s,
+  );
   private readonly error = new TimePlot("Odometry error", "m, degrees", [
     { label: "distance, m", colour: "--rays" },
     { label: "heading, °", colour: "--sonar", scale: "w" },
@@ -85,15 +103,8 @@ export class RobotPages {
   private truth: pose_t | null = null;
   private reckoned: odometry_t | null = null;
 
-  constructor(
-    move: (command: Move) => unknown,
-    stop: () => void,
-    joint: { move(name: string, position: number): void; canMove(): boolean },
-  ) {
-    this.jointTable = new JointTable(
-      (name, position) => joint.move(name, position),
-      () => joint.canMove(),
-    );
+  constructor(move: (command: Move) => unknown, stop: () => void, joints: JointActions) {
+    this.jointTable = new JointTable(joints);
     this.motions = h(
       "section",
       { id: "motions" },
@@ -140,7 +151,7 @@ export class RobotPages {
     this.pictures.clear();
     this.truth = this.reckoned = null;
     this.polar.clear();
-    for (const plot of [this.speed, this.path, this.error]) plot.clear();
+    for (const plot of this.plots) plot.clear();
     this.ranges.hidden = true; // until ranges arrive
     this.order = [...kFacts, ...devices.map(({ name }) => name)];
     this.fact("drive", `${robot.model}, ${robot.drive || "no drive"}`);
@@ -153,7 +164,10 @@ export class RobotPages {
   // Clears the plots.
   forget(): void {
     this.truth = this.reckoned = null;
-    for (const plot of [this.speed, this.path, this.error]) plot.clear();
+    for (const plot of this.plots) plot.clear();
+  }
+  private get plots() {
+    return [this.speed, this.path, this.error];
   }
 
   private fact(name: string, text: string): void {
@@ -182,37 +196,72 @@ export class RobotPages {
         (Math.abs(z) > kLevel_m ? `, at a height of ${fixed(z)} m` : ""),
     );
     this.fact("speed", `${fixed(m.vel[0]!)} m/s, ${fixed(m.rotation_rate[2]!)} rad/s`);
-    this.speed.add(0, t, m.vel[0]!);
-    this.speed.add(2, t, m.rotation_rate[2]!);
-    this.path.add(0, t, m.pos[0]!);
-    this.path.add(2, t, m.pos[1]!);
+    this.plotPose(t, x, y, m.vel[0]!, m.rotation_rate[2]!);
     this.compare();
   }
 
   odometry(m: odometry_t): void {
     const t = Number(m.utime) * 1e-6;
     this.fact("odometry", `${m.x.toFixed(3)} m, ${m.y.toFixed(3)} m, ${heading(m.theta)}`);
-    this.speed.add(1, t, m.v);
-    this.speed.add(3, t, m.omega);
+    this.plotOdometry(t, m);
     this.reckoned = m;
+    this.compare();
+  }
+
+  private plotPose(time_s: number, x: number, y: number, v: number, omega: number): void {
+    this.speed.add(0, time_s, v);
+    this.speed.add(2, time_s, omega);
+    this.path.add(0, time_s, x, y);
+  }
+  private plotOdometry(
+    time_s: number,
+    m: Pick<odometry_t, "x" | "y" | "theta" | "v" | "omega">,
+  ): void {
+    this.speed.add(1, time_s, m.v);
+    this.speed.add(3, time_s, m.omega);
     if (!this.start) return;
     const [x, y] = inWorld(m, this.start);
-    this.path.add(1, t, x);
-    this.path.add(3, t, y);
-    this.compare();
+    this.path.add(1, time_s, x, y);
+  }
+
+  // Plots what was before the shown moment. Both in the order of their times.
+  retrace(poses: readonly PastPose[], odometry: readonly PastOdometry[]): void {
+    for (const plot of this.plots) plot.clear();
+    let next = 0;
+    for (const pose of poses) {
+      for (; next < odometry.length && odometry[next]!.time_s <= pose.time_s; ++next) {
+        const reckoned = odometry[next]!;
+        this.plotOdometry(reckoned.time_s, reckoned);
+        if (reckoned.time_s === pose.time_s) this.plotError(pose.time_s, reckoned, pose);
+      }
+      this.plotPose(pose.time_s, pose.x, pose.y, pose.v, pose.omega);
+    }
+    for (const reckoned of odometry.slice(next)) this.plotOdometry(reckoned.time_s, reckoned);
   }
 
   // Compares odometry with the pose of the same moment, whichever arrives last.
   private compare(): void {
     const { truth, reckoned } = this;
     if (!this.start || !truth || !reckoned || truth.utime !== reckoned.utime) return;
-    const t = Number(truth.utime) * 1e-6,
-      [x, y, heading] = inWorld(reckoned, this.start);
-    const away = Math.hypot(x - truth.pos[0]!, y - truth.pos[1]!),
-      turn = wrap(heading - yawOf(truth.orientation));
-    this.error.add(0, t, away);
-    this.error.add(1, t, (turn * 180) / Math.PI);
+    const [x, y] = truth.pos as unknown as [number, number],
+      pose = { x, y, heading: yawOf(truth.orientation) };
+    const [away, turn] = this.plotError(Number(truth.utime) * 1e-6, reckoned, pose)!;
     this.fact("odometry error", `${away.toFixed(3)} m, ${degrees(turn)}`);
+  }
+
+  // m, rad
+  private plotError(
+    time_s: number,
+    reckoned: Pick<odometry_t, "x" | "y" | "theta">,
+    truth: { x: number; y: number; heading: number },
+  ): [away: number, turn: number] | null {
+    if (!this.start) return null;
+    const [x, y, heading] = inWorld(reckoned, this.start),
+      away = Math.hypot(x - truth.x, y - truth.y),
+      turn = wrap(heading - truth.heading);
+    this.error.add(0, time_s, away);
+    this.error.add(1, time_s, (turn * 180) / Math.PI);
+    return [away, turn];
   }
 
   onMotion: (m: motion_status_t) => void = () => undefined;
@@ -283,10 +332,10 @@ export class RobotPages {
     this.ranges.hidden = false;
     this.polar.sonar(device, m);
   }
-  camera(name: string, m: image_t): void {
+  camera(name: string, m: image_t, deviceKind = ""): void {
     let picture = this.pictures.get(name);
     if (!picture) {
-      picture = new Picture(name);
+      picture = new Picture(name, deviceKind);
       this.pictures.set(name, picture);
       this.pictureList.append(picture.element);
     }
@@ -295,11 +344,10 @@ export class RobotPages {
 
   draw(): void {
     if (this.statePage.isConnected) this.polar.draw();
-    if (this.plotPage.isConnected)
-      for (const plot of [this.speed, this.path, this.error]) plot.draw();
+    if (this.plotPage.isConnected) for (const plot of this.plots) plot.draw();
   }
   restyle(): void {
     this.polar.restyle();
-    for (const plot of [this.speed, this.path, this.error]) plot.restyle();
+    for (const plot of this.plots) plot.restyle();
   }
 }

@@ -1,7 +1,7 @@
 // The time line of a recorded run, or of the last minutes of a live one: play, scrub, speed.
 import type { Page } from "../state/page";
-import { loopedTo, shownOf, type Shown } from "../state/time";
-import { h, say } from "../widgets/elements";
+import { loopedTo, shownOf, spanOf, type Shown } from "../state/time";
+import { giveFocusBack, h, say } from "../widgets/elements";
 import { icon, iconButton } from "../widgets/icons";
 import { EventLane } from "./event_lane";
 
@@ -41,7 +41,7 @@ export class Timeline {
     private readonly page: Page,
     private readonly actions: TimelineActions,
   ) {
-    this.button = iconButton("play", "play or pause (space)", () => this.toggle());
+    this.button = iconButton("play", "play (space)", () => this.toggle());
     this.live = h(
       "button",
       { id: "live", title: "what runs now (End)", click: () => actions.live() },
@@ -80,11 +80,8 @@ export class Timeline {
       this.branch(),
       this.live,
     );
-    // After a click the focus is given back, so that space plays; keyboard users keep it.
-    place.addEventListener("click", (event) => {
-      if (event.detail > 0) (event.target as Element).closest("button")?.blur();
-    });
-    page.watch(["playback", "past", "kept", "hello"], (state) => {
+    giveFocusBack(place);
+    page.watch(["playback", "past", "kept", "hello", "span"], (state) => {
       const shown = shownOf(state);
       this.show(shown);
       const to = shown && loopedTo(page.now, shown, this.played);
@@ -143,8 +140,9 @@ export class Timeline {
     this.speed.hidden = isLive && !past;
     this.live.classList.toggle("on", !past);
     if (!shown) return;
-    this.slider.min = String(shown.begin);
-    this.slider.max = String(shown.end);
+    const { begin, end } = spanOf(this.page.now.span, shown);
+    this.slider.min = String(begin);
+    this.slider.max = String(end);
     if (!this.held) this.slider.value = String(shown.now);
     say(
       this.time,
@@ -159,5 +157,13 @@ export class Timeline {
       this.speed.append(h("option", { value: speed }, `× ${speed}`));
     if (document.activeElement !== this.speed) this.speed.value = speed;
     this.button.replaceChildren(icon(shown.playing ? "pause" : "play"));
+    const title =
+      isLive && !past
+        ? "stop here; the run goes on"
+        : shown.playing
+          ? "pause (space)"
+          : "play (space)";
+    this.button.title = title;
+    this.button.setAttribute("aria-label", title);
   }
 }

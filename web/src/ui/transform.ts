@@ -3,7 +3,9 @@ import type { Editor } from "../edit/editor";
 import { numbersOf, poseFrom, samePose, type Pose7 } from "../edit/pose";
 import type { Handle, Page } from "../state/page";
 import { h, say } from "../widgets/elements";
+import { numberField } from "../widgets/number_field";
 import { remember } from "../state/memory";
+import { PropertyList } from "./properties";
 
 const kFields = [
   ["x", "m"],
@@ -32,13 +34,7 @@ export class Transform {
     }),
   );
   private readonly factors = ["x", "y", "z"].map((axis) =>
-    h("input", {
-      type: "number",
-      step: 0.1,
-      min: 0.01,
-      value: 1,
-      "aria-label": `factor along ${axis}`,
-    }),
+    numberField(`factor along ${axis}`, 1, { min: 0.01, max: 100, step: 0.1 }),
   );
   private readonly body: HTMLElement;
 
@@ -57,6 +53,7 @@ export class Transform {
       h("div", { class: "row" }, ...this.handles(), this.snap()),
       h("div", { class: "numbers" }, ...numbers),
       h("div", { class: "row" }, h("span", { class: "dim" }, "scale"), ...this.factors, scale),
+      new PropertyList(page, editor).element,
       h("div", { class: "row" }, ...this.ends()),
     );
     this.element = h("section", {}, this.title, this.body);

@@ -1,7 +1,16 @@
-// A question before something that cannot be undone. Enter confirms, Esc cancels.
+// A question before something that cannot be undone. Enter takes the first answer, Esc cancels.
 import { h } from "./elements";
 
-export function confirmed(question: string, words: string, yes: string): Promise<boolean> {
+export async function confirmed(question: string, words: string, yes: string): Promise<boolean> {
+  return (await chosen(question, words, [["yes", yes]])) === "yes";
+}
+
+// "" if it was cancelled.
+export function chosen<Answer extends string>(
+  question: string,
+  words: string,
+  answers: [Answer, text: string][],
+): Promise<Answer | ""> {
   const dialog = h(
     "dialog",
     { class: "confirm", "aria-labelledby": "question" },
@@ -10,7 +19,9 @@ export function confirmed(question: string, words: string, yes: string): Promise
     h(
       "form",
       { method: "dialog", class: "row" },
-      h("button", { value: "yes", class: "on", autofocus: true }, yes),
+      ...answers.map(([value, text], i) =>
+        h("button", { value, class: i === 0 ? "on" : "", autofocus: i === 0 }, text),
+      ),
       h("button", { value: "" }, "Cancel (Esc)"),
     ),
   );
@@ -19,7 +30,7 @@ export function confirmed(question: string, words: string, yes: string): Promise
   return new Promise((resolve) => {
     dialog.addEventListener("close", () => {
       dialog.remove();
-      resolve(dialog.returnValue === "yes");
+      resolve(dialog.returnValue as Answer | "");
     });
   });
 }

@@ -26,12 +26,28 @@ export function say(element: Element, text: string): void {
   if (element.textContent !== text) element.textContent = text;
 }
 
+// After a click on a button its focus is given back, so that space does not press it again;
+// keyboard users keep it.
+export function giveFocusBack(place: HTMLElement): void {
+  place.addEventListener("click", (event) => {
+    if (event.detail > 0) (event.target as Element).closest("button")?.blur();
+  });
+}
+
 const kToast_ms = 6000;
-export function toast(text: string, kind: "info" | "error" = "info"): void {
+type Kind = "info" | "error";
+const hearers: ((text: string, kind: Kind) => void)[] = [];
+// Calls with each toast.
+export function onToast(call: (text: string, kind: Kind) => void): void {
+  hearers.push(call);
+}
+
+export function toast(text: string, kind: Kind = "info"): void {
   const place = document.getElementById("toasts")!;
   for (const old of place.children) if (old.textContent === text) return;
   const note = h("div", { class: `toast ${kind}`, role: "status" }, text);
   place.append(note);
+  for (const call of hearers) call(text, kind);
   setTimeout(() => note.remove(), kToast_ms);
 }
 

@@ -4,6 +4,34 @@ import { image_t } from "../../generated/messages";
 import { h, say } from "./elements";
 
 const kMostPixels = 1 << 24;
+const kCount_K = 0.01; // of a thermal camera, unless its file says otherwise
+
+// What the pixels of a raw picture are.
+export type Quantity = "colour" | "depth" | "labels" | "temperature";
+export function quantityOf({ pixelformat }: image_t, deviceKind = ""): Quantity {
+  if (pixelformat === image_t.PIXEL_FORMAT_FLOAT_GRAY32) return "depth";
+  if (pixelformat !== image_t.PIXEL_FORMAT_LE_GRAY16) return "colour";
+  return deviceKind === "thermal_camera" ? "temperature" : "labels";
+}
+
+// The value of a pixel in m or K, or its label; NaN outside of the data.
+export function valueOf(picture: image_t, x: number, y: number, quantity: Quantity): number {
+  const { data, row_stride, height } = picture,
+    view = new DataView(data.buffer, data.byteOffset, data.byteLength),
+    row = y * (row_stride || data.length / height),
+    size = quantity === "depth" ? 4 : 2,
+    at = row + size * x;
+  if (at + size > view.byteLength) return NaN;
+  if (quantity === "depth") return view.getFloat32(at, true);
+  return view.getUint16(at, true) * (quantity === "temperature" ? kCount_K : 1);
+}
+
+const words = (value: number, quantity: Quantity): string => {
+  if (quantity === "labels") return value === 0 ? "nothing" : `label ${value}`;
+  if (value === Infinity) return "nothing";
+  if (value === -Infinity) return "too near";
+  return quantity === "depth" ? `${value.toFixed(3)} m` : `${value.toFixed(2)} K`;
+};
 
 export class Picture {
   private readonly canvas: HTMLCanvasElement;
@@ -11,8 +39,16 @@ export class Picture {
   readonly element: HTMLElement;
   private next: Blob | null = null; // the newest JPEG, while another one is being decoded
   private reading = false;
+  private raw: image_t | null = null; // the newest picture whose pixels are values
+  private quantity: Quantity = "colour";
+  private pointer: [x: number, y: number] | null = null; // shares of the picture
+  private range: [low: number, high: number] = [0, 1]; // of its finite values
 
-  constructor(readonly name: string) {
+  // deviceKind: of the sensor that it comes from; "" where that is not known.
+  constructor(
+    readonly name: string,
+    private readonly deviceKind = "",
+  ) {
     this.canvas = h("canvas", {
       class: "picture",
       role: "img",
@@ -21,14 +57,54 @@ export class Picture {
     });
     this.element = h("figure", { "data-camera": name }, this.canvas, this.caption);
     say(this.caption, `${name}: no picture yet`);
+    this.canvas.addEventListener("pointermove", ({ offsetX, offsetY }) => {
+      this.pointer = [offsetX / this.canvas.clientWidth, offsetY / this.canvas.clientHeight];
+      this.tell();
+    });
+    this.canvas.addEventListener("pointerleave", () => {
+      this.pointer = null;
+      this.tell();
+    });
+  }
+
+  // Its size and time, and of values the range and what is under the pointer.
+  private tell(): void {
+    const { raw, quantity, pointer } = this;
+    if (!raw) return;
+    const { width, height, utime } = raw,
+      parts = [this.name, `${width} × ${height}`, `${(Number(utime) * 1e-6).toFixed(2)} s`];
+    if (quantity === "depth" || quantity === "temperature")
+      parts.push(`dark to bright: ${this.darkToBright()}`);
+    if (pointer && quantity !== "colour") {
+      const [x, y] = [Math.floor(pointer[0] * width), Math.floor(pointer[1] * height)];
+      parts.push(`here ${words(valueOf(raw, x, y, quantity), quantity)}`);
+    }
+    say(this.caption, parts.join(" · "));
+  }
+  private darkToBright(): string {
+    const [low, high] = this.range,
+      [from, to] = this.quantity === "depth" ? [high, low] : [low, high];
+    return `${words(from, this.quantity)} to ${words(to, this.quantity)}`;
+  }
+
+  private measure(message: image_t): void {
+    let [low, high] = [Infinity, -Infinity];
+    for (let y = 0; y < message.height; ++y)
+      for (let x = 0; x < message.width; ++x) {
+        const value = valueOf(message, x, y, this.quantity);
+        if (!Number.isFinite(value)) continue;
+        low = Math.min(low, value);
+        high = Math.max(high, value);
+      }
+    this.range = low <= high ? [low, high] : [0, 1];
   }
 
   show(message: image_t): void {
     const { width, height, pixelformat, data } = message;
-    say(
-      this.caption,
-      `${this.name} · ${width} × ${height} · ${(Number(message.utime) * 1e-6).toFixed(2)} s`,
-    );
+    this.raw = message;
+    this.quantity = quantityOf(message, this.deviceKind);
+    if (this.quantity !== "colour" && width * height <= kMostPixels) this.measure(message);
+    this.tell();
     if (pixelformat === image_t.PIXEL_FORMAT_MJPEG) {
       this.next = new Blob([data as BlobPart], { type: "image/jpeg" });
       void this.read();
@@ -36,7 +112,9 @@ export class Picture {
     }
     this.next = null;
     if (width > 0 && height > 0 && width * height <= kMostPixels)
-      this.draw(width, height, (context) => context.putImageData(pixelsOf(message), 0, 0));
+      this.draw(width, height, (context) =>
+        context.putImageData(pixelsOf(message, this.quantity, this.range), 0, 0),
+      );
   }
 
   // One at a time; of those that arrive meanwhile, only the newest.
@@ -67,13 +145,17 @@ export class Picture {
   }
 }
 
-function pixelsOf({ width, height, pixelformat, data, row_stride }: image_t): ImageData {
-  const pixels = new ImageData(width, height),
+function pixelsOf(message: image_t, quantity: Quantity, [low, high]: [number, number]): ImageData {
+  const { width, height, pixelformat, data, row_stride } = message,
+    pixels = new ImageData(width, height),
     view = new DataView(data.buffer, data.byteOffset, data.byteLength);
   const stride = row_stride || data.length / height;
   for (let y = 0; y < height; ++y) {
     for (let x = 0; x < width; ++x) {
-      const [r, g, b] = pixel(pixelformat, view, y * stride, x);
+      let [r, g, b] = [0, 0, 0];
+      if (quantity === "temperature")
+        r = g = b = (255 * (valueOf(message, x, y, quantity) - low)) / Math.max(0.1, high - low);
+      else [r, g, b] = pixel(pixelformat, view, y * stride, x);
       pixels.data.set([r, g, b, 255], 4 * (y * width + x));
     }
   }

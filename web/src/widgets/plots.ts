@@ -1,11 +1,12 @@
-// Live plots of the chosen robot: velocity, path and odometry error over time, and ranges around
-// the robot.
+// Live plots of the chosen robot: velocity and odometry error over time, and ranges around the
+// robot.
 import uPlot from "uplot";
 import "uplot/dist/uPlot.min.css";
 import type { planar_lidar_t, sonar_t, device_info_t } from "../../generated/messages";
 import { h } from "./elements";
 
-const kWindow_s = 30;
+export const kWindow_s = 30;
+const kLate_s = 0.5; // a longer step back begins anew
 const css = (name: string) =>
   getComputedStyle(document.documentElement).getPropertyValue(name).trim();
 
@@ -32,15 +33,18 @@ export class TimePlot {
     new ResizeObserver(() => this.build()).observe(this.element);
   }
 
-  // Adds one value at that time; the other series keep their last one.
+  // Adds one value at that time; the other series keep their last one. What comes a little late
+  // counts only if something else is of its time.
   add(series: number, time_s: number, value: number): void {
     const times = this.times,
       drawn = drawable(value);
-    const last = times.length - 1;
-    if (last >= 0 && time_s < times[last]!) this.clear();
-    if (times.length > 0 && times[times.length - 1] === time_s) {
-      this.data[series + 1]![times.length - 1] = drawn;
-    } else {
+    const last_s = times.at(-1) ?? -Infinity;
+    if (time_s < last_s - kLate_s) this.clear();
+    else if (time_s <= last_s) {
+      const at = times.lastIndexOf(time_s);
+      if (at >= 0) this.data[series + 1]![at] = drawn;
+    }
+    if (times.length === 0 || time_s > last_s) {
       times.push(time_s);
       this.data
         .slice(1)

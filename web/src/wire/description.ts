@@ -35,6 +35,14 @@ export interface ModelDescription {
   body: number;
   pose: number[];
 }
+// Of a robot. lower, upper: rad, or m if it slides; null: no limit.
+export interface JointDescription {
+  robot: string;
+  name: string;
+  slides: boolean;
+  lower: number | null;
+  upper: number | null;
+}
 export interface Description {
   version: number;
   world: string;
@@ -55,6 +63,7 @@ export interface Description {
   models: ModelDescription[];
   wheels: number[][]; // link, robot, index among its wheels, a point on the axis, the axis
   bases: { robot: string; body: number; pose: number[]; start: number[] }[];
+  joints?: JointDescription[]; // pages of older logs have none
 }
 export const enum Flag {
   textured = 1,

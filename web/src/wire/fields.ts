@@ -1,7 +1,9 @@
-// Numbers in messages, by the path that leads to them: "vel[0]", "points[2].depth".
+// Numbers in messages, by the path that leads to them: "vel[0]", "points[2].depth"; or of all
+// elements of an array: "min(ranges)".
 import { kTypes, type Field } from "../../generated/messages";
 
-const kMostElements = 12; // listed of one array
+const kFewElements = 12, // listed of an array whose length is not known
+  kMostElements = 1000;
 const kNumbers = new Set([
   "double",
   "float",
@@ -13,29 +15,81 @@ const kNumbers = new Set([
   "boolean",
 ]);
 
-// The fields of a type that can be plotted; of arrays of variable length, the first few elements.
-export function fieldsOf(type: string, depth = 0): string[] {
+// The fields of a type that can be plotted: all elements that a message has; without one, of arrays
+// of variable length the first few.
+export function fieldsOf(type: string, message?: unknown, depth = 0): string[] {
   if (depth > 3) return [];
+  const members = message as Record<string, unknown> | undefined;
   return (kTypes[type] ?? []).flatMap((field) => {
+    const value = members?.[field.name],
+      first: unknown =
+        field.sizes.length > 0 ? (value as ArrayLike<unknown> | undefined)?.[0] : value;
     const inner = kNumbers.has(field.type)
       ? [""]
-      : fieldsOf(field.type, depth + 1).map((path) => `.${path}`);
+      : fieldsOf(field.type, first, depth + 1).map((path) => `.${path}`);
     if (inner.length === 0) return [];
-    return places(field).flatMap((place) => inner.map((path) => `${field.name}${place}${path}`));
+    return places(field, members).flatMap((place) =>
+      inner.map((path) => `${field.name}${place}${path}`),
+    );
   });
 }
 
-function places({ sizes }: Field): string[] {
+function places({ sizes }: Field, members: Record<string, unknown> | undefined): string[] {
   if (sizes.length === 0) return [""];
   const count = sizes.reduce<number>(
-    (product, size) => product * (typeof size === "number" ? size : kMostElements),
+    (product, size) =>
+      product * (typeof size === "number" ? size : Number(members?.[size] ?? kFewElements)),
     1,
   );
-  return Array.from({ length: Math.min(count, kMostElements) }, (_, i) => `[${i}]`);
+  const most = members ? kMostElements : kFewElements;
+  return Array.from({ length: Math.min(count, most) }, (_, i) => `[${i}]`);
+}
+
+// Paths that lead to all elements of an array at once.
+export function arraysOf(type: string): string[] {
+  return (kTypes[type] ?? [])
+    .filter(({ type: of, sizes }) => sizes.length > 0 && kNumbers.has(of))
+    .map(({ name }) => name);
+}
+
+// What an element of an array is called in its message: that of a joint, by the joints' names; ""
+// for nothing.
+export function nameOf(message: unknown, path: string): string {
+  const [, field, index] = /^(\w+)\[(\d+)\]$/.exec(path) ?? [],
+    [stem] = field?.split("_") ?? [];
+  const names = (message as Record<string, unknown> | undefined)?.[`${stem}_name`];
+  const name: unknown =
+    Array.isArray(names) && field !== `${stem}_name` ? names[Number(index)] : "";
+  return typeof name === "string" ? name : "";
+}
+
+export const kOverAll = ["min", "max", "mean", "sum"] as const;
+type Over = (typeof kOverAll)[number];
+
+// Of the finite numbers; NaN if there are none.
+function overAll(over: Over, values: number[]): number {
+  const finite = values.filter(Number.isFinite),
+    total = finite.reduce((sum, value) => sum + value, 0);
+  if (finite.length === 0) return NaN;
+  if (over === "sum") return total;
+  if (over === "mean") return total / finite.length;
+  return finite.reduce((a, b) => (over === "min" ? Math.min(a, b) : Math.max(a, b)));
+}
+
+function elementsAt(value: unknown, steps: string[]): number[] {
+  if (Array.isArray(value) || ArrayBuffer.isView(value))
+    return Array.from(value as ArrayLike<unknown>).flatMap((each) => elementsAt(each, steps));
+  const [step, ...rest] = steps;
+  if (step === undefined) return [Number(value)];
+  return value === null || typeof value !== "object"
+    ? []
+    : elementsAt((value as Record<string, unknown>)[step], rest);
 }
 
 // The number at a path; NaN if there is none.
 export function valueAt(message: unknown, path: string): number {
+  const [, over, array] = /^(\w+)\((.*)\)$/.exec(path) ?? [];
+  if (over && array) return overAll(over as Over, elementsAt(message, array.split(".")));
   let value: unknown = message;
   for (const step of path.split(/[.[\]]+/).filter(Boolean)) {
     if (value === null || typeof value !== "object") return NaN;

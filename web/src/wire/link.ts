@@ -17,21 +17,36 @@ import type {
 // From messages with their times.
 export function historyOf(
   entries: { time: number; messages: Uint8Array[] }[],
-  path: string,
+  paths: string[],
 ): History {
-  const found: History = { every: 1, times: [], values: [] };
+  const found: History = { every: 1, times: [], columns: paths.map(() => []) };
   for (const { time, messages } of entries) {
-    const bytes = messages[0],
-      type = bytes && typeOf(bytes);
-    if (!type) continue;
-    try {
-      found.values.push(valueAt(decode(type, bytes), path));
-      found.times.push(time);
-    } catch {
-      /* not whole: others say so */
-    }
+    const row = messages[0] && rowOf(messages[0], paths);
+    if (!row) continue;
+    found.times.push(time);
+    row.forEach((value, i) => found.columns[i]!.push(value));
   }
   return found;
+}
+
+// The last row of each message: the past is looked through again with each jump in it.
+const rows = new WeakMap<Uint8Array, { of: string; row: number[] }>();
+
+// Null for what is no whole message of a known type.
+function rowOf(bytes: Uint8Array, paths: string[]): number[] | null {
+  const of = paths.join(),
+    kept = rows.get(bytes),
+    type = typeOf(bytes);
+  if (kept?.of === of) return kept.row;
+  if (!type) return null;
+  try {
+    const message = decode(type, bytes),
+      row = paths.map((path) => valueAt(message, path));
+    rows.set(bytes, { of, row });
+    return row;
+  } catch {
+    return null; // others say so
+  }
 }
 
 const enum Operation {
@@ -140,15 +155,21 @@ export class Link implements RunLink {
     this.send([Operation.step, ahead ? 1 : 0]);
   }
 
-  async history(channel: string, path: string): Promise<History> {
-    const place = [path, ...channel.split("/")].map(encodeURIComponent).join("/");
+  async history(channel: string, paths: string[]): Promise<History> {
+    const place = [paths.join(), ...channel.split("/")].map(encodeURIComponent).join("/");
     const answer = await fetch(`/history/${place}`);
     if (!answer.ok) throw new Error(`${channel} is not in the log`);
-    const [every = 1, ...numbers] = new Float64Array(await answer.arrayBuffer());
+    const numbers = new Float64Array(await answer.arrayBuffer()),
+      width = paths.length + 1;
+    const column = (at: number) =>
+      Array.from(
+        { length: Math.floor((numbers.length - 1) / width) },
+        (_, row) => numbers[1 + row * width + at]!,
+      );
     return {
-      every,
-      times: numbers.filter((_, i) => i % 2 === 0),
-      values: numbers.filter((_, i) => i % 2 === 1),
+      every: numbers[0] ?? 1,
+      times: column(0),
+      columns: paths.map((_, i) => column(i + 1)),
     };
   }
 

@@ -128,6 +128,7 @@ export class LogFile implements RunLink {
       mode: "log",
       title: this.head.title,
       version: "",
+      world: "",
       info: this.head.info,
       fault: this.note,
       save: "",
@@ -192,9 +193,9 @@ export class LogFile implements RunLink {
     this.seek(entries[to]?.time ?? (ahead ? end : begin));
   }
 
-  history(channel: string, path: string): Promise<History> {
+  history(channel: string, paths: string[]): Promise<History> {
     const index = this.head.channels.indexOf(channel);
-    return Promise.resolve(historyOf(this.entries[index] ?? [], path));
+    return Promise.resolve(historyOf(this.entries[index] ?? [], paths));
   }
 
   private tell(): void {

@@ -1,10 +1,12 @@
 // What the server and a page tell each other, through a socket or from a log in the page itself.
 
-// save: the file that SAVE writes; compared: the other log; "" if there is none.
+// world: tells world files apart; save: the file that SAVE writes; compared: the other log; "" if
+// there is none.
 export interface Hello {
   mode: "live" | "log";
   title: string;
   version: string;
+  world: string;
   info: string;
   fault: string;
   save: string;
@@ -73,13 +75,13 @@ export interface RunLink {
   seek(time_s: number): void;
   // To the next state of the bodies, or the previous one.
   step(ahead: boolean): void;
-  // The values of a field so far.
-  history(channel: string, path: string): Promise<History>;
+  // The values of fields of a channel so far.
+  history(channel: string, paths: string[]): Promise<History>;
 }
 
-// A field over the time of the time line, ascending.
+// Fields of a channel over the time of the time line, ascending.
 export interface History {
   every: number; // every n-th message was taken; 1 for all
   times: number[];
-  values: number[];
+  columns: number[][]; // of each field its values; NaN: it had none then
 }

@@ -173,9 +173,9 @@ export class Rewind implements RunLink {
   }
 
   // For a live run: what is kept.
-  history(channel: string, path: string): Promise<History> {
-    if (!this.isLive) return this.inner.history(channel, path);
-    return Promise.resolve(historyOf(this.entries.get(channel) ?? [], path));
+  history(channel: string, paths: string[]): Promise<History> {
+    if (!this.isLive) return this.inner.history(channel, paths);
+    return Promise.resolve(historyOf(this.entries.get(channel) ?? [], paths));
   }
 
   private onMessage(channel: string, bytes: Uint8Array): void {

@@ -1,0 +1,48 @@
+// What lies high: clicks, coordinates and ways meet what is seen, not the plane of 0 m.
+export default async function ground({ page, until, check, ready, onScreen, given: [x, y, z] }) {
+  await page.setViewportSize({ width: 1000, height: 520 });
+  await ready();
+  await page.locator("#canvas").focus();
+  await page.keyboard.press(" ");
+  await until("(paused)", () => document.getElementById("state").textContent === "paused");
+  await page.mouse.move(...(await onScreen(x, y, z)));
+  await until(
+    "coordinates are those of what is under the pointer",
+    (at) => {
+      const shown = document.getElementById("coordinates").textContent.split(",").map(parseFloat);
+      return shown.length === 3 && shown.every((value, i) => Math.abs(value - at[i]) < 0.05);
+    },
+    [x, y, z],
+  );
+  await page.keyboard.press("b");
+  await page.mouse.click(...(await onScreen(x, y, z)));
+  await until(
+    "what is placed stands where the click was",
+    ([x, y, z]) => {
+      const {
+          page: { now },
+          poses,
+        } = window.ruedo,
+        body = now.world.bodies.find(({ name }) => name === "box/link")?.index ?? -1;
+      const at = body < 0 ? [] : [...poses.now.subarray(7 * body, 7 * body + 3)];
+      return Math.hypot(at[0] - x, at[1] - y) < 0.05 && Math.abs(at[2] - z - 0.2) < 0.01;
+    },
+    [x, y, z],
+  );
+  await page.keyboard.press("g");
+  await page.mouse.click(...(await onScreen(x, y - 1, z)));
+  const point = await page.evaluate(() => window.ruedo.trip.points()[0]);
+  check(
+    "a robot is sent to what was clicked",
+    Math.hypot(point.x - x, point.y - y + 1) < 0.05 && Math.abs(point.z - z) < 0.02,
+    JSON.stringify(point),
+  );
+  check(
+    "and the way is drawn there",
+    await page.evaluate((z) => {
+      const { position } = window.ruedo.way.ends.geometry.attributes;
+      return Math.abs(position.getZ(0) - z) < 0.05;
+    }, z),
+    "at another height",
+  );
+}

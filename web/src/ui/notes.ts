@@ -1,0 +1,32 @@
+// What the page has said: each note with its times, the newest first, as toasts disappear.
+import { clockText } from "../state/clock";
+import type { Page } from "../state/page";
+import { h, onToast } from "../widgets/elements";
+
+const kMost = 500;
+
+export class Notes {
+  readonly element: HTMLElement;
+  private readonly list = h("ol", { class: "notes", id: "notes" });
+  private readonly none = h("p", { class: "dim" }, "Nothing was said so far.");
+
+  constructor(page: Page) {
+    const clear = h("button", { id: "clear-notes", click: () => this.clear() }, "Clear");
+    this.element = h("section", {}, h("div", { class: "row" }, clear), this.none, this.list);
+    onToast((text, kind) => {
+      const { world, time_s } = page.now,
+        sim = world ? clockText(time_s, world.step_us) : "",
+        wall = new Date().toLocaleTimeString();
+      this.list.prepend(
+        h("li", { class: kind }, h("span", { class: "dim" }, `${wall}  ${sim} `), text),
+      );
+      if (this.list.childElementCount > kMost) this.list.lastElementChild!.remove();
+      this.none.hidden = true;
+    });
+  }
+
+  private clear(): void {
+    this.list.replaceChildren();
+    this.none.hidden = false;
+  }
+}

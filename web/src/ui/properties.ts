@@ -1,0 +1,152 @@
+// The selected model's properties: name, whether it is fixed, colour, size and mass.
+import type { Editor } from "../edit/editor";
+import {
+  propertiesOf,
+  withColour,
+  withMass,
+  withStatic,
+  type Properties,
+} from "../edit/properties";
+import type { Size } from "../edit/sdf";
+import type { Page } from "../state/page";
+import { h, say, toast } from "../widgets/elements";
+
+const kLargest_m = 1000,
+  kHeaviest_kg = 1e6;
+
+export class PropertyList {
+  readonly element: HTMLElement;
+  private readonly name = h("input", { "aria-label": "name", "data-property": "name" });
+  private readonly fixed = h("input", { type: "checkbox", "data-property": "static" });
+  private readonly colour = h("input", {
+    type: "color",
+    "aria-label": "colour",
+    "data-property": "colour",
+  });
+  private readonly mass = this.number("mass, kg", "mass", kHeaviest_kg);
+  private readonly sizes = ["x", "y", "z"].map((axis) =>
+    this.number(`size along ${axis}, m`, `size-${axis}`, kLargest_m),
+  );
+  private readonly words = h("p", { class: "dim" });
+  private readonly rows: Record<"name" | "colour" | "size" | "mass" | "static", HTMLElement>;
+  private shown: Properties | null = null;
+  private asked = 0;
+
+  constructor(
+    private readonly page: Page,
+    private readonly editor: Editor,
+  ) {
+    const row = (label: string, ...fields: HTMLElement[]) =>
+      h("div", { class: "row property" }, h("span", { class: "dim" }, label), ...fields);
+    this.rows = {
+      name: row("name", this.name),
+      colour: row("colour", this.colour),
+      size: row("size, m", ...this.sizes),
+      mass: row("mass, kg", this.mass),
+      static: h("label", { class: "check" }, this.fixed, "fixed: it never moves"),
+    };
+    this.element = h("div", { id: "properties" }, ...Object.values(this.rows), this.words);
+    this.listen();
+    page.watch(["selected", "scene", "tab"], () => void this.show());
+  }
+
+  private number(label: string, property: string, max: number): HTMLInputElement {
+    return h("input", {
+      type: "number",
+      step: "any",
+      min: 0,
+      max,
+      "aria-label": label,
+      "data-property": property,
+    });
+  }
+
+  private listen(): void {
+    const change = (what: string, by: (xml: string) => string) =>
+      void this.editor.change(this.page.now.selected, what, by).then((good) => good || this.fill());
+    this.name.addEventListener("change", () => void this.rename());
+    this.fixed.addEventListener("change", () => {
+      const on = this.fixed.checked;
+      change(on ? "fix" : "let move", (xml) => withStatic(xml, on));
+    });
+    this.colour.addEventListener("change", () => {
+      const hex = this.colour.value;
+      change("colour", (xml) => withColour(xml, hex));
+    });
+    this.mass.addEventListener("change", () => {
+      const mass = this.mass.valueAsNumber;
+      if (this.isGood(this.mass)) change("mass", (xml) => withMass(xml, mass));
+    });
+    this.sizes.forEach((field, i) =>
+      field.addEventListener("change", () => {
+        if (this.isGood(field)) this.resize(i, field.valueAsNumber);
+      }),
+    );
+  }
+
+  // Anything else is refused in words, and taken back.
+  private isGood(field: HTMLInputElement): boolean {
+    const value = field.valueAsNumber,
+      good = value > 0 && value <= Number(field.max);
+    if (!good) {
+      toast(
+        `${field.getAttribute("aria-label")}: a number above 0, ${field.max} at most.`,
+        "error",
+      );
+      this.fill();
+    }
+    return good;
+  }
+
+  // A ball keeps its shape, and a cylinder its circle.
+  private resize(axis: number, to: number): void {
+    const { shape, size } = this.shown ?? {},
+      { selected } = this.page.now;
+    if (!size) return;
+    const together =
+      shape === "sphere" ? [0, 1, 2] : shape === "cylinder" && axis < 2 ? [0, 1] : [axis];
+    const factors = [0, 1, 2].map((i) => (together.includes(i) ? to / size[axis]! : 1)) as Size;
+    void this.editor.scale(selected, factors).then((good) => good || this.fill());
+  }
+
+  private async rename(): Promise<void> {
+    const { selected } = this.page.now,
+      good = await this.editor.rename(selected, this.name.value.trim());
+    if (!good) this.fill();
+  }
+
+  private async show(): Promise<void> {
+    const { selected, tab, hello } = this.page.now,
+      asked = ++this.asked;
+    this.element.hidden = !selected || tab !== "World" || hello?.mode !== "live";
+    if (this.element.hidden) return;
+    const text = await this.editor.textOf(selected);
+    if (asked !== this.asked) return;
+    let words = text === null ? "It has no text of its own." : "";
+    this.shown = null;
+    try {
+      if (text !== null) this.shown = propertiesOf(text);
+    } catch (error) {
+      words = `${(error as Error).message}.`;
+    }
+    say(this.words, words);
+    this.fill();
+  }
+
+  private fill(): void {
+    const { shown } = this,
+      { size, mass, colour } = shown ?? {};
+    this.name.value = this.page.now.selected;
+    this.rows.name.hidden = shown === null;
+    this.rows.static.hidden = shown === null;
+    this.rows.colour.hidden = shown === null;
+    this.rows.size.hidden = !size;
+    this.rows.mass.hidden = mass === undefined || mass === null || (shown?.isStatic ?? true);
+    this.fixed.checked = shown?.isStatic ?? false;
+    this.colour.value = colour ?? "#808080";
+    this.mass.value = mass ? String(Number(mass.toPrecision(5))) : "";
+    this.sizes.forEach((field, i) => {
+      field.value = size ? String(Number(size[i]!.toPrecision(6))) : "";
+    });
+  }
+}
