@@ -133,6 +133,9 @@ class Builder {
         b.flags |= kSpecular;
       if (material.double_sided) b.flags |= kDoubleSided;
       if (M_LP.leftCols<3>().determinant() < 0.0) b.flags |= kMirrored;
+      const bool round = g.shape == world::Shape::sphere || g.shape == world::Shape::ellipsoid;
+      if (round && !material.double_sided) b.flags |= kRound;
+      content_.has_round |= round;
       if (g.shape == world::Shape::plane && !b.texture.valid() && g.normal.z() > 0.999 &&
           g.extent.minCoeff() >= kGroundExtent) {
         b.flags |= kGround;

@@ -26,6 +26,7 @@ enum BatchFlags : uint32_t {
   kGround = 4,       // an untextured ground plane: has a grid and fades out at its edge
   kDoubleSided = 8,  // back faces are drawn
   kMirrored = 16,    // the scale has an odd number of negative factors: clockwise is outside
+  kRound = 32,       // a sphere or an ellipsoid, which depth and labels show as such
 };
 
 using TextureIndex = Index<struct TextureKind>;  // into RenderContent::textures
@@ -70,6 +71,7 @@ struct RenderContent {
   std::vector<RenderMesh> meshes;
   IndexedVector<TextureIndex, std::shared_ptr<const world::Texture>> textures;
   std::vector<Batch> batches;
+  bool has_round = false;  // a batch is kRound
   IndexedVector<RenderKindIndex, RenderLinkKind> link_kinds;
   IndexedVector<LinkIndex, RenderKindIndex> kind_of_link;  // not valid: nothing to draw
   IndexedVector<LinkIndex, uint16_t> label_of_link;

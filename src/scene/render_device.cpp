@@ -11,6 +11,10 @@ namespace {
 constexpr GLuint kFrameBinding = 0;
 constexpr GLuint kFirstInstanceAttribute = 3;
 
+bool is_traced(Pass pass, uint32_t flags, bool cutout) {
+  return pass == Pass::geometry && (flags & kRound) != 0 && !cutout;
+}
+
 const void* offset(size_t bytes) { return reinterpret_cast<const void*>(bytes); }
 
 }  // namespace
@@ -103,6 +107,7 @@ GLuint RenderDevice::program(Pass pass, uint32_t flags, bool cutout) {
   // Batches that differ only in what a pass does not look at share an entry.
   uint32_t used = flags & (kTextured | kSpecular | kGround | kMirrored);
   if (pass != Pass::colour) used = cutout && pass == Pass::geometry ? uint32_t{kTextured} : 0u;
+  if (is_traced(pass, flags, cutout)) used |= kRound;
   const ProgramKey key{pass, used, cutout && (used & kTextured) != 0};
   const auto [at, inserted] = programs_.try_emplace(key, 0);
   if (inserted)
@@ -307,8 +312,11 @@ void RenderDevice::draw_run(Pass pass, const Run& run) {
     gl.Enable(GL_CULL_FACE);
   }
   // Rows run from the top, so that pictures need no flipping: outside faces are clockwise in
-  // OpenGL's window.
-  gl.FrontFace((flags & kMirrored) != 0 ? GL_CCW : GL_CW);
+  // OpenGL's window. Rays are traced through the back faces of what encloses a round shape: the eye
+  // may be close to it, and the planes that clip in between.
+  const bool traced = is_traced(pass, flags, cutout);
+  gl.FrontFace(((flags & kMirrored) != 0) != traced ? GL_CCW : GL_CW);
+  if (traced) gl.Enable(GL_DEPTH_CLAMP);
   gl.BindVertexArray(meshes_[batch.mesh].vertex_array);
   const size_t at = run.first * sizeof(Instance);
   const auto attribute = [&](GLuint index, size_t member) {
@@ -323,6 +331,7 @@ void RenderDevice::draw_run(Pass pass, const Run& run) {
   gl.DrawElementsInstanced(GL_TRIANGLES, static_cast<GLsizei>(batch.index_count), GL_UNSIGNED_INT,
                            offset(batch.first_index * sizeof(uint32_t)),
                            static_cast<GLsizei>(run.count));
+  if (traced) gl.Disable(GL_DEPTH_CLAMP);
 }
 
 void RenderDevice::draw(Pass pass, const std::vector<Instance>& instances,

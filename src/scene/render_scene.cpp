@@ -79,7 +79,8 @@ class GlRenderer : public Renderer {
 
     const size_t pixels = static_cast<size_t>(view.width) * static_cast<size_t>(view.height);
     const int samples = std::max(view.samples, 1);
-    const bool depth_from_colour = picture.want_rgb && samples == 1 && !picture.want_labels;
+    const bool depth_from_colour = picture.want_rgb && samples == 1 && !picture.want_labels &&
+                                   !content_.has_round;  // those are exact in the other pass only
     if (picture.want_depth) picture.depth.resize(pixels);
     if (picture.want_rgb) {
       picture.rgb.resize(3 * pixels);

@@ -85,11 +85,42 @@ constexpr const char* kLamp = R"(    vec3 way = lamp_position[i].xyz - v_positio
     light += strength * lamp_colour[i].rgb;
 )";
 
+// Encloses a unit sphere by the meshes that are drawn for it, also by the one of few segments:
+// those touch it from inside.
+constexpr const char* kEnclosing = "  p.xyz *= 1.12;\n";
+
+// The ray to a point of what encloses the unit sphere, in the mesh's coordinates and in the
+// world's.
+constexpr const char* kRayOfVertex = R"(
+  mat3 from_mesh = transpose(mat3(a_row0.xyz, a_row1.xyz, a_row2.xyz));
+  mat3 to_mesh = inverse(from_mesh);
+  v_position = position;
+  v_eye = to_mesh * (eye.w > 0.0 ? -vec3(a_row0.w, a_row1.w, a_row2.w) : eye.xyz);
+  v_point = p.xyz;
+)";
+constexpr const char* kRay = R"(
+  vec3 way = eye.w > 0.0 ? v_point - v_eye : -v_eye;
+  vec3 from = eye.w > 0.0 ? v_eye : v_point;
+  float length2 = dot(way, way);
+  float nearest = -dot(from, way) / length2;
+  vec3 aside = from + nearest * way;
+  float inside = 1.0 - dot(aside, aside);
+  if (inside < 0.0) discard;
+  float along = nearest - sqrt(inside / length2);
+  if (eye.w > 0.0 && along <= 0.0) discard;
+  vec3 hit = eye.w > 0.0 ? along * v_position : v_position - along * eye.xyz;
+  vec4 clip = clip_from_world * vec4(hit, 1.0);
+  gl_FragDepth = clip.z / clip.w;
+  if (gl_FragDepth < 0.0 || gl_FragDepth > 1.0) discard;
+)";
+
 // Draws the labels of things.
 std::string label_shader(uint32_t flags, bool cutout, const LightCounts& lights) {
   std::string s = head(lights);
   if ((flags & kTextured) != 0) s += kSurface;
+  if ((flags & kRound) != 0) s += "in vec3 v_position, v_point;\nflat in vec3 v_eye;\n";
   s += "flat in uint v_label;\nlayout(location = 0) out uint o_label;\nvoid main() {\n";
+  if ((flags & kRound) != 0) s += kRay;
   if (cutout) s += "  if (texture(surface, v_uv).a < 0.5) discard;\n";
   return s + "  o_label = v_label;\n}\n";
 }
@@ -144,6 +175,7 @@ layout(location = 9) in uint a_label;
 )";
   if (pass != Pass::shadow && (flags & kTextured) != 0) s += "out vec2 v_uv;\n";
   if (pass == Pass::geometry) s += "flat out uint v_label;\n";
+  if ((flags & kRound) != 0) s += "out vec3 v_position, v_point;\nflat out vec3 v_eye;\n";
   if (pass == Pass::colour) {
     s += "out vec3 v_position;\nout vec3 v_normal;\nflat out vec4 v_diffuse;\nflat out vec4 "
          "v_emissive;\n";
@@ -153,8 +185,10 @@ layout(location = 9) in uint a_label;
   s += R"(
 void main() {
   vec4 p = vec4(a_position, 1.0);
-  vec3 position = vec3(dot(a_row0, p), dot(a_row1, p), dot(a_row2, p));
 )";
+  if ((flags & kRound) != 0) s += kEnclosing;
+  s += "  vec3 position = vec3(dot(a_row0, p), dot(a_row1, p), dot(a_row2, p));\n";
+  if ((flags & kRound) != 0) s += kRayOfVertex;
   if (pass == Pass::shadow)
     return s + "  gl_Position = shadow_from_world * vec4(position, 1.0);\n}\n";
   s += "  gl_Position = clip_from_world * vec4(position, 1.0);\n";

@@ -279,6 +279,51 @@ TEST(RenderScene, ShapesHaveTheirSizes) {
   }
 }
 
+// Depth of each pixel against its ray's, to the silhouette: of spheres and turned ellipsoids, near
+// and far, close before the eye, and beside another.
+TEST(RenderScene, SpheresAreRound) {
+  struct Case {
+    Vec3 at, radii;
+    bool parallel;
+  };
+  for (const Case& c : {Case{{3, 0.3, 1}, {0.4, 0.4, 0.4}, false},
+                        {{8, 1, 1.5}, {0.1, 0.1, 0.1}, false},
+                        {{2.05, 0, 1}, {2, 2, 2}, false},
+                        {{4, -0.5, 1}, {0.3, 0.8, 0.5}, false},
+                        {{30, 2, 1}, {0.5, 0.5, 0.5}, false},
+                        {{4, 0.2, 1}, {0.4, 0.4, 0.4}, true},
+                        {{4, 0.2, 1}, {0.3, 0.8, 0.5}, true}}) {
+    World w;
+    const Pose X_WM{Quat(Eigen::AngleAxisd(0.7, Vec3(1, 2, 3).normalized())), c.at};
+    World::show(w.add("thing", true, X_WM), Shape::ellipsoid, c.radii, kGrey);
+    View view = ahead();
+    view.near_m = 0.02;
+    view.orthographic = c.parallel;
+    if (c.parallel) view.fx = view.fy = 100;
+    const Picture picture = draw(w, view);
+    int hits = 0;
+    for (int v = 0; v < view.height; ++v) {
+      for (int u = 0; u < view.width; ++u) {
+        const double left = (view.cx - u) / view.fx, up = (view.cy - v) / view.fy;
+        const Vec3 eye(0, c.parallel ? left : 0, 1 + (c.parallel ? up : 0)),
+            ray(1, c.parallel ? 0 : left, c.parallel ? 0 : up);
+        const Vec3 o = (X_WM.inverse() * eye).cwiseQuotient(c.radii),
+                   d = (X_WM.rotation.conjugate() * ray).cwiseQuotient(c.radii);
+        const double middle = -o.dot(d) / d.squaredNorm(),
+                     inside = 1 - (o + middle * d).squaredNorm();
+        const float depth = picture.depth[at(view, u, v)];
+        ASSERT_EQ(std::isfinite(depth), picture.labels[at(view, u, v)] == 1);
+        if (std::abs(inside) < 1e-4) continue;  // within a rounding of the silhouette
+        ASSERT_EQ(std::isfinite(depth), inside > 0) << u << " " << v;
+        if (inside < 0) continue;
+        ASSERT_NEAR(depth, middle - std::sqrt(inside / d.squaredNorm()), 1e-3) << u << " " << v;
+        ++hits;
+      }
+    }
+    EXPECT_GT(hits, 10);
+  }
+}
+
 TEST(RenderScene, OutsideFacesOfMeshesAreSeen) {
   // A tetrahedron, counter-clockwise from outside; mirrored by a negative scale it is seen from
   // outside all the same.
