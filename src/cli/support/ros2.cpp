@@ -16,6 +16,7 @@
 
 #ifdef RUEDO_ROS2
 #include "bridges/dds/cyclone_transport.h"
+#include "bridges/dds/self_test.h"
 #include "bridges/ros2/node.h"
 #include "run/queued_sink.h"
 #include "world/model/body_layout.h"
@@ -203,6 +204,11 @@ std::string ros2_network() {
   return fmt::format("{}, {}", ros2::name_of(distro), CycloneNetwork().transport->where());
 }
 
+Ros2Pictures ros2_pictures() {
+  const dds::PictureCount count = dds::send_pictures_to_self();
+  return {count.sent, count.arrived, count.buffer};
+}
+
 std::unique_ptr<Ros2Node> Ros2Node::open(run::Run& server, const Ros2Arguments& arguments,
                                          std::unique_ptr<Ros2Network> network) {
   if (!network) return nullptr;
@@ -229,6 +235,8 @@ std::unique_ptr<Ros2Node> Ros2Node::open(run::Run&, const Ros2Arguments&,
 }
 
 std::string ros2_network() { throw EnvironmentError(kWithout); }
+
+Ros2Pictures ros2_pictures() { throw EnvironmentError(kWithout); }
 
 #endif
 

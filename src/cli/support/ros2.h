@@ -55,6 +55,13 @@ class Ros2Node {
 // Ros2Node::open().
 std::string ros2_network();
 
+// Sends raw pictures to a best-effort reader of its own over DDS, for some seconds: how many
+// arrived, and with which buffer (bridges/dds/self_test.h). Throws EnvironmentError.
+struct Ros2Pictures {
+  int sent = 0, arrived = 0, buffer = 0;
+};
+Ros2Pictures ros2_pictures();
+
 // Why nodes of this environment would not hear a run; "": they would.
 std::string nodes_that_do_not_hear();
 
