@@ -14,6 +14,7 @@
 #include "cli/support/golden.h"
 #include "cli/support/judged_run.h"
 #include "cli/support/range.h"
+#include "cli/support/ros2.h"
 #include "cli/support/signal_thread.h"
 #include "cli/support/view.h"
 #include "engine/judge/judge.h"
@@ -34,9 +35,10 @@ constexpr double kPageSize_MB = 20.0;   // of the page that shows a failed run
 struct RegressArguments {
   WorldArguments world;
   uint64_t seed = 1;
-  std::string duration, rate = "max", client, golden, record, script, junit, html, json;
+  std::string duration, rate, client, golden, record, script, junit, html, json;
   double clearance_reach = 0.0;
   std::vector<std::string> remaps, wait_for, goals, tolerances, ignored, keep;
+  Ros2Arguments ros2;
   judge::Expectations expected;
   double clearance = -1.0, odometry_error = -1.0;
   double grace = 5.0, timeout = 600.0;  // s of real time
@@ -47,15 +49,19 @@ struct RegressArguments {
 
 run::RunOptions server_options(const RegressArguments& arguments) {
   run::RunOptions options;
-  options.rate = parse_rate(arguments.rate);
+  // Nodes that nothing waits for need their time.
+  const bool is_real_time = arguments.ros2.on && arguments.wait_for.empty();
+  options.rate = parse_rate(!arguments.rate.empty() ? arguments.rate : is_real_time ? "1" : "max");
   options.duration_us = parse_duration_us(arguments.duration);
   options.lockstep = {arguments.lockstep, 30.0, run::LockstepOptions::Policy::fail};
   options.record = arguments.record;
   options.result_options = result_options(arguments.world);
   for (std::string& plugin : plugin_options()) options.result_options.push_back(std::move(plugin));
-  options.remaps = parse_remaps(arguments.remaps);
-  for (const std::string& text : arguments.remaps)
-    options.result_options.push_back("--remap=" + text);
+  for (auto& [name, other] : parse_remaps(arguments.remaps)) {
+    if (name.starts_with('/')) continue;  // ROS's names, which do not affect the run
+    options.result_options.push_back(fmt::format("--remap={}={}", name, other));
+    options.remaps.emplace_back(std::move(name), std::move(other));
+  }
   for (const std::string& text : arguments.wait_for)
     options.wait_for.push_back(parse_wait_for(text));
   options.simulation.fleet.seed = arguments.seed;
@@ -177,11 +183,13 @@ int regress(RegressArguments arguments) {
     tell(arguments, verdict);
     return kCheckFailed;
   }
-  std::vector<judge::Check> checks =
-      run_judged(world,
-                 {server_options(arguments), isolated, arguments.client, !arguments.no_client_wait,
-                  arguments.allow_errors, arguments.grace, arguments.timeout},
-                 judge, signals);
+  run::RunOptions options = server_options(arguments);
+  const Ros2Arguments ros2 = with_names(arguments.ros2, arguments.remaps, options.wait_for);
+  std::vector<judge::Check> checks = run_judged(
+      world,
+      {std::move(options), ros2, isolated, arguments.client, !arguments.no_client_wait && !ros2.on,
+       arguments.allow_errors, arguments.grace, arguments.timeout},
+      judge, signals);
   if (const int signal = signals.told()) {
     to_stderr("ruedo: the run was ended by a signal{}\n",
               keeps_log ? "; its log up to there is " + arguments.record : "");
@@ -216,9 +224,10 @@ void add_course(CLI::App& command, RegressArguments& a) {
                   "end after this many seconds of sim time, or when the client ends")
       ->type_name("S")
       ->required();
-  command.add_option("--rate", a.rate, "sim time per real time, or max")
-      ->type_name("R|max")
-      ->capture_default_str();
+  command
+      .add_option("--rate", a.rate,
+                  "sim time per real time, or max (default: max; 1 with --ros2 without --wait-for)")
+      ->type_name("R|max");
   command.add_option("--record", a.record, "the log of the run (default: none)")->type_name("FILE");
   command
       .add_option("--lockstep", a.lockstep,
@@ -311,10 +320,12 @@ void add_regress(CLI::App& app, Action& chosen) {
   const auto arguments = std::make_shared<RegressArguments>();
   add_world_arguments(*command, arguments->world);
   add_course(*command, *arguments);
+  const CLI::Option* ros2 = add_ros2_options(*command, arguments->ros2);
   add_expectations(*command, *arguments);
   add_golden(*command, *arguments);
   add_reports(*command, *arguments);
-  command->callback([arguments, &chosen] {
+  command->callback([arguments, ros2, &chosen] {
+    arguments->ros2.on = ros2->count() > 0;
     chosen = [arguments] {
       if (arguments->keep.empty()) arguments->keep = {"*/pose"};
       return regress(*arguments);

@@ -144,21 +144,6 @@ run::RunOptions server_options(const RunArguments& arguments) {
   return options;
 }
 
-// The options for ROS: names that begin with a slash.
-Ros2Arguments ros2_arguments(const RunArguments& arguments, const run::RunOptions& options) {
-  Ros2Arguments ros2 = arguments.ros2;
-  for (const std::string& text : arguments.remaps) {
-    if (text.starts_with('/')) ros2.topics.push_back(parse_remap(text));
-  }
-  for (const run::WaitForOption& option : options.wait_for) {
-    if (option.channel.starts_with('/')) ros2.wait_for.push_back(option.channel);
-  }
-  if (!ros2.on && !(ros2.topics.empty() && ros2.wait_for.empty()))
-    throw InputError({}, "names of ROS topics (/...) in --remap and --wait-for go with --ros2");
-  ros2.channels = options.remaps;
-  return ros2;
-}
-
 // What clients need in order to find this server, when they would not by default.
 void announce(const bus::ServerBus& place) {
   if (!place.note.empty()) spdlog::warn(place.note);
@@ -230,7 +215,7 @@ int run_world(const RunArguments& arguments) {
       arguments.lcm, world->name, [](const std::string& line) { spdlog::warn(line); });
   RunView viewed(arguments.viewed, arguments.view);
   viewed.follow(options);
-  const Ros2Arguments ros2 = ros2_arguments(arguments, options);
+  const Ros2Arguments ros2 = with_names(arguments.ros2, arguments.remaps, options.wait_for);
   options.wait_for = with_channels(std::move(options.wait_for), *world, ros2);
   std::unique_ptr<Ros2Network> network = Ros2Network::open(ros2);
   run::Run server(world, std::move(options), *place.bus);
@@ -381,29 +366,7 @@ Viewers add_viewers(CLI::App& command, RunArguments& arguments) {
       optional("--foxglove", arguments.foxglove_address,
                "show the run in Foxglove, by its WebSocket protocol (default: 127.0.0.1:8765)",
                "[ADDRESS:PORT]"),
-      optional("--ros2", arguments.ros2.distro,
-               "be a ROS 2 node, of that release (default: $ROS_DISTRO, or jazzy)", "[DISTRO]")};
-  command
-      .add_option("--ros2-clock", arguments.ros2.clock_hz,
-                  "maximum rate of /clock, per second of sim time")
-      ->type_name("HZ")
-      ->capture_default_str()
-      ->check(within(0.1, 10000.0))
-      ->needs(viewers.ros2);
-  command
-      .add_option("--ros2-services", arguments.ros2.services,
-                  "how services are mapped: as each call came, or as one middleware does")
-      ->type_name("RMW")
-      ->capture_default_str()
-      ->check(CLI::IsMember({"auto", "cyclonedds", "fastrtps"}))
-      ->needs(viewers.ros2);
-  command
-      .add_option("--ros2-stamped", arguments.ros2.stamped,
-                  "cmd_vel is a TwistStamped (default: from kilted on); the other type is read "
-                  "where somebody publishes it")
-      ->type_name("on|off")
-      ->check(CLI::IsMember({"on", "off"}))
-      ->needs(viewers.ros2);
+      add_ros2_options(command, arguments.ros2)};
   return viewers;
 }
 

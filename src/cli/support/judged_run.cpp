@@ -4,6 +4,8 @@
 #include <atomic>
 #include <chrono>
 #include <condition_variable>
+#include <functional>
+#include <memory>
 #include <mutex>
 #include <optional>
 #include <span>
@@ -143,6 +145,16 @@ class Paced {
   ClientPace& pace_;
 };
 
+// Null: the run has none.
+std::unique_ptr<ClientProcess> start_client(const JudgedRunOptions& options, const bus::LcmUrl& url,
+                                            ClientPace& pace, std::function<void()> at_end) {
+  if (options.client.empty()) return nullptr;
+  return std::make_unique<ClientProcess>(
+      options.client,
+      std::vector<std::string>{"LCM_DEFAULT_URL=" + url.str(), "RUEDO_REGRESS=1", pace.variable()},
+      std::move(at_end), std::vector<int>{pace.inherited()});
+}
+
 }  // namespace
 
 judge::Check world_check(const Finding& error) {
@@ -163,12 +175,15 @@ std::vector<judge::Check> run_judged(const std::shared_ptr<const world::WorldMod
   ClientPace pace(has_client && options.waits);
   options.run.hearer = [&pace](const std::string&, const uint8_t*, size_t) { pace.heard(); };
   Progress progress("running " + world->name, options.run.duration_us);
+  options.run.wait_for = with_channels(std::move(options.run.wait_for), *world, options.ros2);
+  std::unique_ptr<Ros2Network> network = Ros2Network::open(options.ros2);
   run::Run server(world, std::move(options.run), *place.bus);
+  const std::unique_ptr<Ros2Node> node = Ros2Node::open(server, options.ros2, std::move(network));
   JudgeSink sink(judge, server);
   server.add(sink);
   Watchdog watchdog(options.timeout_s, server);
   std::atomic<SimTime> now{0};
-  std::atomic<bool> client_is_over{false};
+  std::atomic<bool> client_is_over{false}, awaits_peers{!options.ros2.wait_for.empty()};
   server.on_state([&](const Snapshot& snapshot) {
     judge.see(snapshot);
     now = snapshot.time;
@@ -177,24 +192,18 @@ std::vector<judge::Check> run_judged(const std::shared_ptr<const world::WorldMod
     progress.to(snapshot.time);
   });
   const Paced paced(pace, has_client ? &server : nullptr);
-  std::unique_ptr<ClientProcess> client;
   std::atomic<SimTime> ended_at{-1};
-  if (has_client) {
-    client = std::make_unique<ClientProcess>(
-        options.client,
-        std::vector<std::string>{"LCM_DEFAULT_URL=" + place.url.str(), "RUEDO_REGRESS=1",
-                                 pace.variable()},
-        [&] {
-          ended_at = now.load();
-          // A run that does not wait for it may not have begun: it has a step at least.
-          client_is_over = true;
-          if (options.waits || now > 0) server.stop();
-        },
-        std::vector<int>{pace.inherited()});
-  }
+  const std::unique_ptr<ClientProcess> client = start_client(options, place.url, pace, [&] {
+    ended_at = now.load();
+    // A run that waits for nobody may not have begun: it has a step at least.
+    client_is_over = true;
+    if (options.waits || awaits_peers || now > 0) server.stop();
+  });
   std::vector<judge::Check> checks;
   const SignalThread::Serving serving(signals, server);
   try {
+    if (node) node->wait_for_peers();
+    awaits_peers = false;
     server.run();
   } catch (const run::LeaseEnded& ended) {
     checks.push_back({"run", judge::Outcome::failed, ended.what(), {}});

@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "cli/support/ros2.h"
 #include "cli/support/signal_thread.h"
 #include "engine/judge/judge.h"
 #include "run/run.h"
@@ -14,6 +15,7 @@ namespace ruedo::cli {
 
 struct JudgedRunOptions {
   run::RunOptions run;
+  Ros2Arguments ros2;
   bool isolated = false;      // this process is in a network of its own
   std::string client;         // command line; "": none
   bool waits = true;          // for the client to be heard on the bus

@@ -9,7 +9,11 @@
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
 
+#include <CLI/CLI.hpp>
+
 #include "bridges/ros2/commands.h"
+#include "cli/support/commands.h"
+#include "cli/support/range.h"
 #include "ruedo/element.h"
 #include "ruedo/errors.h"
 #include "run/run.h"
@@ -23,6 +27,50 @@
 #endif
 
 namespace ruedo::cli {
+
+CLI::Option* add_ros2_options(CLI::App& command, Ros2Arguments& arguments) {
+  CLI::Option* ros2 =
+      command
+          .add_option("--ros2", arguments.distro,
+                      "be a ROS 2 node, of that release (default: $ROS_DISTRO, or jazzy)")
+          ->type_name("[DISTRO]")
+          ->expected(0, 1);
+  command
+      .add_option("--ros2-clock", arguments.clock_hz,
+                  "maximum rate of /clock, per second of sim time")
+      ->type_name("HZ")
+      ->capture_default_str()
+      ->check(within(0.1, 10000.0))
+      ->needs(ros2);
+  command
+      .add_option("--ros2-services", arguments.services,
+                  "how services are mapped: as each call came, or as one middleware does")
+      ->type_name("RMW")
+      ->capture_default_str()
+      ->check(CLI::IsMember({"auto", "cyclonedds", "fastrtps"}))
+      ->needs(ros2);
+  command
+      .add_option("--ros2-stamped", arguments.stamped,
+                  "cmd_vel is a TwistStamped (default: from kilted on); the other type is read "
+                  "where somebody publishes it")
+      ->type_name("on|off")
+      ->check(CLI::IsMember({"on", "off"}))
+      ->needs(ros2);
+  return ros2;
+}
+
+Ros2Arguments with_names(Ros2Arguments arguments, const std::vector<std::string>& remaps,
+                         const std::vector<run::WaitForOption>& wait_for) {
+  for (auto& [name, other] : parse_remaps(remaps))
+    (name.starts_with('/') ? arguments.topics : arguments.channels)
+        .emplace_back(std::move(name), std::move(other));
+  for (const run::WaitForOption& option : wait_for) {
+    if (option.channel.starts_with('/')) arguments.wait_for.push_back(option.channel);
+  }
+  if (!arguments.on && !(arguments.topics.empty() && arguments.wait_for.empty()))
+    throw InputError({}, "names of ROS topics (/...) in --remap and --wait-for go with --ros2");
+  return arguments;
+}
 
 std::vector<run::WaitForOption> with_channels(std::vector<run::WaitForOption> options,
                                               const world::WorldModel& world,

@@ -9,6 +9,11 @@
 #include "run/wait_for.h"
 #include "world/model/world_model.h"
 
+namespace CLI {
+class App;
+class Option;
+}  // namespace CLI
+
 namespace ruedo::run {
 class Run;
 }
@@ -25,6 +30,14 @@ struct Ros2Arguments {
   std::vector<std::pair<std::string, std::string>> channels;  // of the bus's
   std::vector<std::string> wait_for;                          // ROS topics on which the run waits
 };
+
+// --ros2, which it returns, and the options that go with it.
+CLI::Option* add_ros2_options(CLI::App& command, Ros2Arguments& arguments);
+
+// The arguments with ROS's names, which begin with a slash, of --remap and --wait-for; the others
+// of --remap are the bus's. Throws InputError for such names without --ros2.
+Ros2Arguments with_names(Ros2Arguments arguments, const std::vector<std::string>& remaps,
+                         const std::vector<run::WaitForOption>& wait_for);
 
 // Where a node takes part.
 class Ros2Network {
