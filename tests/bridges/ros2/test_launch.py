@@ -1,6 +1,7 @@
-"""The launch and parameter files of docs/ros2.md: they are there, parse, and fit the robots.
+"""The package ruedo_ros: its launch files, parameters and actions, and what colcon installs.
 
-ROS 2's launch packages cannot be had here: what stands for them takes any call.
+PyPI lacks ROS 2's launch packages: what stands for them takes any call. What the actions start is
+run. With the real ones, ros2.workspace runs the package's own tests.
 """
 
 from __future__ import annotations
@@ -8,8 +9,10 @@ from __future__ import annotations
 import importlib.util
 import os
 import re
+import runpy
 import subprocess
 import sys
+import xml.etree.ElementTree as ET
 from pathlib import Path
 from unittest.mock import MagicMock
 
@@ -18,12 +21,15 @@ import yaml
 
 SOURCE = Path(os.environ.get("RUEDO_SOURCE_DIR", Path(__file__).resolve().parents[3]))
 RUEDO = os.environ.get("RUEDO", str(SOURCE / "build/release/bin/ruedo"))
-CLIENTS = SOURCE / "clients/ros2"
+PACKAGE = SOURCE / "clients/ros2/ruedo_ros"
 PACKAGES = (
     "launch",
     "launch.actions",
+    "launch.conditions",
     "launch.launch_description_sources",
+    "launch.some_substitutions_type",
     "launch.substitutions",
+    "launch.utilities",
     "launch_ros",
     "launch_ros.actions",
     "launch_ros.substitutions",
@@ -32,22 +38,60 @@ PACKAGES = (
 )
 
 
+class Process:
+    """launch's ExecuteProcess, which is run by hand."""
+
+    def __init__(self, *, cmd, on_exit=None, **options):
+        self.words, self.on_exit, self.options = list(map(str, cmd)), on_exit, options
+
+
 @pytest.fixture
-def launch(monkeypatch):
+def stand_ins(monkeypatch):
     for package in PACKAGES:
         monkeypatch.setitem(sys.modules, package, MagicMock())
-    path = CLIENTS / "ruedo_nav2.launch.py"
-    spec = importlib.util.spec_from_file_location("ruedo_nav2", path)
+    sys.modules["launch.actions"].ExecuteProcess = Process
+    monkeypatch.syspath_prepend(PACKAGE)
+    monkeypatch.setenv("RUEDO", RUEDO)
+    yield
+    for name in [name for name in sys.modules if name.partition(".")[0] == "ruedo_ros"]:
+        monkeypatch.delitem(sys.modules, name)
+
+
+def launch_file(name):
+    spec = importlib.util.spec_from_file_location(name, PACKAGE / f"launch/{name}.launch.py")
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
     return module
 
 
-def test_the_page_names_files_that_are_there():
-    page = (SOURCE / "docs/ros2.md").read_text(encoding="utf-8")
-    named = set(re.findall(r"clients/ros2/[\w.]+", page))
-    assert {CLIENTS / Path(name).name for name in named} <= set(CLIENTS.iterdir())
-    assert len(named) >= 4
+@pytest.fixture
+def launch(stand_ins):
+    return launch_file("nav2")
+
+
+def test_pages_name_files_that_are_there():
+    for page in (SOURCE / "docs/ros2.md", PACKAGE / "README.md"):
+        for name in re.findall(r"clients/ros2/[\w./]+\w", page.read_text(encoding="utf-8")):
+            assert (SOURCE / name).exists(), name
+
+
+def test_colcon_installs_each_file(monkeypatch):
+    """What setup.py tells setuptools."""
+    monkeypatch.chdir(PACKAGE)
+    told = {}
+    monkeypatch.setattr("setuptools.setup", told.update)
+    runpy.run_path("setup.py")
+    description = ET.parse("package.xml").getroot()
+    version = (SOURCE / "VERSION").read_text(encoding="utf-8").strip()
+    for name in ("name", "version"):
+        assert (
+            description.findtext(name) == told[name] == {"version": version}.get(name, "ruedo_ros")
+        )
+    files = {file for _, names in told["data_files"] for file in names}
+    assert all(Path(file).is_file() for file in files)
+    folders = ("config", "launch", "resource", "rviz")
+    there = {str(f) for folder in folders for f in Path(folder).iterdir() if f.is_file()}
+    assert files == {*there, "package.xml"}
 
 
 def test_everything_is_launched(launch):
@@ -55,6 +99,68 @@ def test_everything_is_launched(launch):
     launch.LaunchConfiguration.return_value.perform.return_value = "p3at"
     assert len(launch.bring_up(MagicMock())) == 2
     assert launch.RewrittenYaml.call_args.kwargs["param_rewrites"]["robot_radius"] == "0.38"
+
+
+@pytest.mark.parametrize("world, spawned", [("arena", []), ("empty", ["--spawn", "turtle@0,0"])])
+def test_a_robot_is_spawned_where_the_world_has_none(stand_ins, world, spawned):
+    module = launch_file("sim")
+    module.generate_launch_description()
+    values = {"world": world, "robot": "turtle", "bag": "", "lcm": "memq://", "view": "false"}
+    values["options"] = "--seed 7"
+    module.LaunchConfiguration.side_effect = lambda name: MagicMock(
+        perform=lambda context: values[name]
+    )
+    module.perform_substitutions.return_value = RUEDO
+    [simulation] = module.simulation(MagicMock())
+    words = [RUEDO, "run", world, "--ros2", "--watch-stdin", "--quiet", "--lcm", "memq://"]
+    assert simulation.words == [*words, *spawned, "--seed", "7"]
+
+
+def test_a_simulation_leaves_a_bag(stand_ins, tmp_path):
+    from ruedo_ros import Simulation
+
+    bag = tmp_path / "bag"
+    simulation = Simulation("arena", bag=bag, arguments=["--duration", "1"])
+    running = {"stdin": subprocess.PIPE}
+    assert subprocess.Popen(simulation.words, **running).wait(120) == 0
+    assert sorted(path.suffix for path in bag.iterdir()) == [".mcap", ".yaml"]
+    assert subprocess.Popen(simulation.words, **running).wait(120) == 2  # it is there already
+
+
+def ended(regression):
+    """Runs it as launch does."""
+    code = subprocess.run(regression.words, capture_output=True, timeout=120).returncode
+    regression.on_exit(MagicMock(returncode=code), MagicMock())
+    return regression
+
+
+def test_the_referee_judges(stand_ins, tmp_path):
+    from ruedo_ros import Regression
+
+    stays = {"duration": 1.0, "arguments": ["--rate", "max", "--no-noise"]}
+    good = ended(Regression("arena", no_contact=True, record=tmp_path / "run.lcm", **stays))
+    good.assert_passed(0)
+    assert (tmp_path / "run.lcm").stat().st_size > 0
+    assert any("touched nothing" in one["text"] for one in good.verdict(0)["evidence"])
+    bad = ended(Regression("arena", goal=(3.0, 0.0), **stays))
+    with pytest.raises(AssertionError, match="failed: p3at was not within 0.3 m"):
+        bad.assert_passed(0)
+    with pytest.raises(RuntimeError, match="ended with 3"):
+        ended(Regression("no_such_world", **stays)).verdict(0)
+    with pytest.raises(RuntimeError, match="not ended within 0 s"):
+        Regression("arena", **stays).verdict(0)
+
+
+@pytest.mark.parametrize("robot", ["p3at", "turtle"])
+def test_rviz_shows_topics_of_the_robot(robot):
+    told = yaml.safe_load((PACKAGE / f"rviz/{robot}.rviz").read_text(encoding="utf-8"))
+    model = SOURCE / f"worlds/robots/{robot}/model.sdf"
+    command = [RUEDO, "run", model, "--ros2", "--lcm", "memq://", "--duration", "0.1"]
+    printed = subprocess.run(command, capture_output=True, text=True, timeout=120).stdout
+    topics = set(re.findall(r"-> (/\S+)", printed))
+    for display in told["Visualization Manager"]["Displays"]:
+        topic = display.get("Topic") or display.get("Description Topic")
+        assert topic is None or topic["Value"] in topics, display["Name"]
 
 
 @pytest.mark.parametrize("robot", ["p3at", "turtle"])
@@ -72,7 +178,7 @@ def test_parameters_are_the_robots(launch, robot):
 
 
 def test_slam_toolbox_reads_ruedos_frames():
-    told = yaml.safe_load((CLIENTS / "slam_toolbox.yaml").read_text(encoding="utf-8"))
+    told = yaml.safe_load((PACKAGE / "config/slam_toolbox.yaml").read_text(encoding="utf-8"))
     parameters = told["slam_toolbox"]["ros__parameters"]
     frames = [parameters[f"{each}_frame"] for each in ("map", "odom", "base")]
     assert frames == ["map", "odom", "base_link"]

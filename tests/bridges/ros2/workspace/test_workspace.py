@@ -1,0 +1,144 @@
+"""ROS 2's command line against a run, with each middleware that the workspace has."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import re
+import signal
+import subprocess
+
+import pytest
+from ament_index_python.packages import get_packages_with_prefixes
+from server import PATIENCE, RUEDO, Run
+
+PACKAGES = set(get_packages_with_prefixes())
+MIDDLEWARES = [m for m in ("rmw_fastrtps_cpp", "rmw_cyclonedds_cpp") if m in PACKAGES]
+
+
+def needs(*packages):
+    missing = sorted(set(packages) - PACKAGES)
+    return pytest.mark.skipif(bool(missing), reason=f"the workspace lacks {' '.join(missing)}")
+
+
+class Ros:
+    """`ros2`, beside a run."""
+
+    def __init__(self, run, middleware):
+        self.run = run
+        self.environment = {
+            **os.environ,
+            "RMW_IMPLEMENTATION": middleware,
+            "ROS_DOMAIN_ID": str(run.domain),
+            "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST",
+            "PYTHONUNBUFFERED": "1",
+            "RUEDO": RUEDO,
+        }
+
+    def __call__(self, *words):
+        """What it prints."""
+        done = subprocess.run(
+            ["ros2", *map(str, words)],
+            env=self.environment,
+            capture_output=True,
+            text=True,
+            timeout=PATIENCE,
+        )
+        assert done.returncode == 0, done.stdout + done.stderr
+        return done.stdout
+
+    def until(self, pattern, *words):
+        """The first match in the output of a command that goes on, which is then ended."""
+        with subprocess.Popen(
+            ["ros2", *words],
+            env=self.environment,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            text=True,
+        ) as process:
+            lines = []
+            for line in process.stdout:
+                lines.append(line)
+                if found := re.search(pattern, line):
+                    process.send_signal(signal.SIGINT)
+                    process.stdout.read()
+                    return found
+        pytest.fail("".join(lines))
+
+
+@pytest.fixture(params=MIDDLEWARES)
+def ros(request):
+    with Run("--no-noise", "--disable", "p3at/camera") as run:
+        ros = Ros(run, request.param)
+        yield ros
+        subprocess.run(["ros2", "daemon", "stop"], env=ros.environment, capture_output=True)
+
+
+@needs("ros2topic")
+def test_topics(ros):
+    listed = ros("topic", "list", "-t", "--no-daemon", "--spin-time", 3)
+    assert "/scan [sensor_msgs/msg/LaserScan]" in listed
+    assert "frame_id: lrf" in ros("topic", "echo", "--once", "/scan")
+    rate = ros.until(r"average rate: ([\d.]+)", "topic", "hz", "/scan", "--use-sim-time")
+    assert float(rate[1]) == pytest.approx(10, rel=0.2)
+
+
+@needs("ros2param")
+def test_parameters(ros):
+    assert "rate" in ros("param", "list", "/ruedo", "--no-daemon", "--spin-time", 3)
+    assert "1.0" in ros("param", "get", "/ruedo", "rate")
+    assert "successful" in ros("param", "set", "/ruedo", "rate", "2.0")
+    assert "rate: 2.0" in ros("param", "dump", "/ruedo")
+
+
+@needs("ros2service", "simulation_interfaces")
+def test_services(ros):
+    kind = "simulation_interfaces/srv/"
+    state = ros("service", "call", "/get_simulation_state", kind + "GetSimulationState")
+    assert "state=1" in state
+    ros(
+        "service",
+        "call",
+        "/set_simulation_state",
+        kind + "SetSimulationState",
+        "{state: {state: 2}}",
+    )
+    step = ros("service", "call", "/step_simulation", kind + "StepSimulation", "{steps: 3}")
+    assert "result=1" in step
+
+
+@needs("ros2action", "ros2service", "simulation_interfaces")
+def test_the_action(ros):
+    kind = "simulation_interfaces/srv/SetSimulationState"
+    ros("service", "call", "/set_simulation_state", kind, "{state: {state: 2}}")
+    kind = "simulation_interfaces/action/SimulateSteps"
+    done = ros("action", "send_goal", "--feedback", "/simulate_steps", kind, "{steps: 3}")
+    assert "completed_steps: 3" in done and "SUCCEEDED" in done
+
+
+@needs("ros2bag", "rosbag2_storage_mcap", "rosbag2_storage_default_plugins")
+@pytest.mark.parametrize("storage", ["mcap", "sqlite3"])
+def test_bags(ros, tmp_path, storage):
+    words = ["bag", "record", "-s", storage, "-o", str(tmp_path / "bag"), "/scan", "/odom", "/tf"]
+    with subprocess.Popen(["ros2", *words], env=ros.environment) as recording:
+        with contextlib.suppress(subprocess.TimeoutExpired):
+            recording.wait(10)
+        recording.send_signal(signal.SIGINT)
+    told = ros("bag", "info", tmp_path / "bag")
+    assert re.search(r"Topic: /scan \| Type: sensor_msgs/msg/LaserScan \| Count: [1-9]", told)
+
+
+@needs("ros2bag", "rosbag2_storage_mcap")
+def test_exported_bags(ros, tmp_path):
+    run = [RUEDO, "run", "arena", "--rate", "max", "--duration", "2", "--quiet", "--lcm", "auto"]
+    subprocess.run([*run, "--record", tmp_path / "run.lcm"], check=True, timeout=PATIENCE)
+    subprocess.run([RUEDO, "export", tmp_path / "run.lcm", "--ros2", tmp_path / "bag"], check=True)
+    assert "Topic: /scan" in ros("bag", "info", tmp_path / "bag")
+    ros("bag", "play", tmp_path / "bag", "--rate", 4)
+
+
+@needs("ros2launch", "ruedo_ros")
+def test_a_launch_file_starts_a_simulation(ros):
+    options = "options:=--duration 2 --rate max"
+    told = ros("launch", "ruedo_ros", "sim.launch.py", "world:=arena", "robot:=p3at", options)
+    assert "the simulation has ended" in told
