@@ -141,7 +141,8 @@ void Solver::add_body(btRigidBody& body, double substep_s) {
 // after a pose the angular momentum is I w + swing(w), and half a substep before it likewise; what
 // joints and forces give is the difference: a leapfrog, which is of second order, keeps angular
 // momentum, and lets no top's nutation grow. The swing depends on the result, and is found anew
-// until it fits (swing_again).
+// until it fits (swing_again). Rows at stops of Bullet's own joints assume the other velocities:
+// only for trees of joints.
 void Solver::begin_to_swing(double substep_s) {
   constexpr double kMost = 0.3;  // to which that shrinks the error each time
   for (SolverBody& s : bodies_) {
@@ -620,7 +621,7 @@ void Solver::solve(const std::vector<btRigidBody*>& bodies,
     blocks_.add(*joint, a, b, reference ? tie(*reference) : 0);
   }
   blocks_.prepare(bodies_, substep_s);
-  if (!joints.empty()) begin_to_swing(substep_s);
+  if (!blocks_.empty() && blocks_.only_trees()) begin_to_swing(substep_s);
   for (btPersistentManifold* manifold : manifolds) add_contacts(*manifold, substep_s);
   if (contact_count_ > 0 || !blocks_.empty()) {
     constexpr int kMostSwings = 4;

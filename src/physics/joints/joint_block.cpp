@@ -630,6 +630,11 @@ void JointBlocks::solve(Block& block, std::vector<double>& x) const {
   }
 }
 
+bool JointBlocks::only_trees() const {
+  return std::all_of(blocks_.begin(), blocks_.begin() + static_cast<std::ptrdiff_t>(block_count_),
+                     [](const Block& block) { return block.is_tree; });
+}
+
 bool JointBlocks::exact() const {
   return std::all_of(blocks_.begin(), blocks_.begin() + static_cast<std::ptrdiff_t>(block_count_),
                      [](const Block& block) { return block.exact && block.bounded.empty(); });

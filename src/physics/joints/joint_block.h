@@ -28,6 +28,9 @@ class JointBlocks {
   // Whether the last sweep brought all rows to their targets, so that another one would change
   // nothing.
   bool exact() const;
+  // Whether each mechanism is solved in reduced coordinates: all joints are of JointTree's kinds,
+  // and none closes a loop.
+  bool only_trees() const;
   bool has_gears() const { return !thirds_.empty(); }  // the rows of a gearbox couple three bodies
 
   // Brings all rows to their targets as far as their bounds allow. Returns the largest error
