@@ -3,7 +3,7 @@ green. What is examined is the installed package, or the program that RUEDO name
 
 A row, in rows/FRONT.txt: NAME ~ COMMAND with {} ~ what is broken ~ its innocent twin ~ CODE TEXT
 The first takes the place of {} and gives that exit code and that text; the second gives 0. In the
-gate a tenth of the rows is tried (RUEDO_EXAM=PART/OF, chosen by the commit).
+gate a tenth of the rows is tried, with --all a third (RUEDO_EXAM=PART/OF, chosen by the commit).
 """
 
 import atexit
