@@ -173,7 +173,7 @@ http::HttpResponse Console::Impl::file_of(const SceneData& data, std::string_vie
   return blob(data.pictures[*picture].bytes, data.pictures[*picture].type);
 }
 
-// The text that SPAWN would take to create that model; "" where there is none, or it is gone.
+// The text with which SPAWN would create that model; "" if it has no text or was removed.
 http::HttpResponse Console::Impl::model_text(size_t index) {
   if (!world || index >= world->models.size()) return not_found();
   const world::ModelInstance& model = world->models[index];

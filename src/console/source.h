@@ -80,7 +80,7 @@ class Source {
   virtual std::string save_name() const { return {}; }
 
   // Fields over the whole log, as float64, little endian: how many messages were read per row, then
-  // for each row its time in s and the values, NaN for none; null if there is no such channel.
+  // for each row its time in s and the values, NaN for missing ones; null for an unknown channel.
   // fields: "vel[0]", or "min(ranges)", also max, mean and sum; several with commas between them.
   virtual http::Bytes history(const std::string& channel, const std::string& fields) {
     static_cast<void>(channel), static_cast<void>(fields);

@@ -25,7 +25,7 @@ namespace {
           "' is not allowed; an address is ADDRESS:PORT, such as 127.0.0.1:8080 or 0.0.0.0:8080");
 }
 
-// Empty where what follows it is no port.
+// Empty if something other than a port follows it.
 std::string_view host_name(std::string_view host) {
   const size_t colon = host.rfind(':');
   if (host.ends_with(']') || colon == std::string_view::npos) return host;

@@ -177,7 +177,7 @@ export class Control {
     );
   }
 
-  // False if there is no robot that takes it, or no connection.
+  // False without a connection, or if no robot accepts the command.
   fault(fault: fault_t): boolean {
     const channel = this.input("fault_t");
     return channel !== undefined && this.link.command(channel, encode("fault_t", fault));

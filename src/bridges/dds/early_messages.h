@@ -37,7 +37,7 @@ class EarlyMessages {
   static constexpr size_t kMost = 256, kMostBytes = 1 << 20;
   static constexpr auto kLongest = std::chrono::seconds(4);
   // Once Cyclone knows the writer, it matches it with readers at once, where it has a processor.
-  // What is heard twice is taken once.
+  // Cyclone drops the duplicate.
   static constexpr std::array kDelays{std::chrono::milliseconds(5), std::chrono::milliseconds(100)};
 
   // The newest give way to the oldest: these end by themselves.

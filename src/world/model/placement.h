@@ -26,7 +26,7 @@ class Room {
 
   // The height of the ground at (x, y), m: the highest static surface at most 0.5 m above the
   // lowest one there, so that ramps and steps count, but tables, walls and roofs do not. 0 if there
-  // is none. near_z: on that storey, where there is a surface at most 0.5 m from it.
+  // is none. near_z: prefers a surface at most 0.5 m from it.
   double ground_height(double x, double y, std::optional<double> near_z = {}) const;
 
   // The same on the storey of a person whose origin is at z, somewhere between feet and hips. If

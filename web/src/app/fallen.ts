@@ -1,4 +1,5 @@
-// Robots that have left the world: below everything that is in it, or nowhere. Each is told once.
+// Reports robots that have left the world, each once: below everything in it, or with a pose that
+// is not finite.
 import type { Poses } from "../state/poses";
 import type { Page } from "../state/page";
 import { toast } from "../widgets/elements";

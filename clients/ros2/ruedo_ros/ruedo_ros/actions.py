@@ -42,9 +42,9 @@ class Simulation(ExecuteProcess):
         **options: object,
     ) -> None:
         """world: a file, or the name of one of Ruedo's. spawn: models, "turtle@3,0". bag: a new
-        folder, into which the run is written as a rosbag2 bag when it ends. lcm: where LCM's
-        clients find the run; on memq:// there are none, and pictures that no node reads are not
-        drawn. arguments: further options of `ruedo run`. options: of ExecuteProcess.
+        folder, into which the run is written as a rosbag2 bag when it ends. lcm: where LCM
+        clients find the run; memq:// admits none, and pictures that no node reads are not drawn.
+        arguments: further options of `ruedo run`. options: of ExecuteProcess.
         """
         words = [ruedo(), "run", world, "--ros2", "--watch-stdin", "--quiet", "--lcm", lcm]
         for model in spawn:
