@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <tuple>
+#include <utility>
 
 #include "physics/base/rigid_bodies.h"
 
@@ -39,19 +40,36 @@ Contact swapped(const Contact& contact) {
 }  // namespace
 
 void ContactBook::ByBody::clear() {
-  for (const Contact& contact : entries_) ranges_[contact.body_a] = {0, 0};
-  entries_.clear();
+  for (const BodyIndex body : bodies_) ranges_[body] = {0, 0};
+  bodies_.clear();
 }
 
-void ContactBook::ByBody::fill(const std::vector<Contact>& contacts) {
+void ContactBook::ByBody::group(const std::vector<Contact>& contacts) {
+  const auto count = [this](BodyIndex body) {
+    if (body.valid() && ranges_[body].second++ == 0) bodies_.push_back(body);
+  };
   for (const Contact& contact : contacts) {
-    if (contact.body_a.valid()) entries_.push_back(contact);
-    if (contact.body_b.valid()) entries_.push_back(swapped(contact));
+    count(contact.body_a);
+    count(contact.body_b);
   }
-  std::sort(entries_.begin(), entries_.end(), earlier);
-  for (size_t i = 0; i < entries_.size(); ++i) {
-    auto& range = ranges_[entries_[i].body_a];
-    if (range.second++ == 0) range.first = i;
+  size_t first = 0;
+  for (const BodyIndex body : bodies_) {
+    auto& range = ranges_[body];
+    range.first = std::exchange(first, first + range.second);
+    range.second = 0;
+  }
+  entries_.resize(first);
+  const auto place = [this](const Contact& contact) {
+    auto& range = ranges_[contact.body_a];
+    entries_[range.first + range.second++] = contact;
+  };
+  for (const Contact& contact : contacts) {
+    if (contact.body_a.valid()) place(contact);
+    if (contact.body_b.valid()) place(swapped(contact));
+  }
+  for (const BodyIndex body : bodies_) {
+    const auto begin = entries_.begin() + static_cast<std::ptrdiff_t>(ranges_[body].first);
+    std::sort(begin, begin + static_cast<std::ptrdiff_t>(ranges_[body].second), earlier);
   }
 }
 
@@ -141,9 +159,7 @@ void ContactBook::finish() {
   if (contacts_.empty() && near_only_.empty()) return;
   std::sort(contacts_.begin(), contacts_.end(), earlier);
   if (several_) merge();
-  touching_.fill(contacts_);
   near_only_.insert(near_only_.end(), contacts_.begin(), contacts_.end());
-  near_.fill(near_only_);
 }
 
 }  // namespace ruedo::physics

@@ -29,32 +29,34 @@ class ContactBook {
   void finish();
 
   void exchange(StateArchive& archive) {
-    archive(step_s_, several_, contacts_, near_only_, touching_, near_);
+    touching_.clear();
+    near_.clear();
+    archive(step_s_, several_, contacts_, near_only_);
   }
 
   const std::vector<Contact>& all() const { return contacts_; }  // contacts with a force
-  std::span<const Contact> touching(BodyIndex body) const { return touching_.of(body); }
-  std::span<const Contact> near(BodyIndex body) const { return near_.of(body); }
+  // Contacts are grouped by body only once somebody asks.
+  std::span<const Contact> touching(BodyIndex body) { return touching_.of(body, contacts_); }
+  std::span<const Contact> near(BodyIndex body) { return near_.of(body, near_only_); }
 
  private:
   // Contacts grouped by body, with that body as `a`.
   class ByBody {
    public:
-    explicit ByBody(size_t bodies) : ranges_(bodies, {0, 0}) {}
-    void resize(size_t bodies) { ranges_.resize(bodies, {0, 0}); }
+    explicit ByBody(size_t bodies) : ranges_(bodies, {0, 0}) { bodies_.reserve(bodies); }
+    void resize(size_t bodies) { ranges_.resize(bodies, {0, 0}), bodies_.reserve(bodies); }
     void reserve(size_t contacts) { entries_.reserve(contacts); }
     void clear();
-    void fill(const std::vector<Contact>& contacts);
-    void exchange(StateArchive& archive) {
-      archive(entries_);
-      archive.each(ranges_);
-    }
-    std::span<const Contact> of(BodyIndex body) const {
+    std::span<const Contact> of(BodyIndex body, const std::vector<Contact>& contacts) {
+      if (bodies_.empty() && !contacts.empty()) group(contacts);
       const auto& range = ranges_[body];
       return {entries_.data() + range.first, range.second};
     }
 
    private:
+    void group(const std::vector<Contact>& contacts);
+
+    std::vector<BodyIndex> bodies_;  // with an entry
     std::vector<Contact> entries_;
     IndexedVector<BodyIndex, std::pair<size_t, size_t>> ranges_;  // first, count
   };
