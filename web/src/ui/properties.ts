@@ -31,6 +31,7 @@ export class PropertyList {
   private readonly rows: Record<"name" | "colour" | "size" | "mass" | "static", HTMLElement>;
   private shown: Properties | null = null;
   private asked = 0;
+  private pending = 0; // edits that the server has not answered yet
 
   constructor(
     private readonly page: Page,
@@ -63,7 +64,7 @@ export class PropertyList {
 
   private listen(): void {
     const change = (what: string, by: (xml: string) => string) =>
-      void this.editor.change(this.page.now.selected, what, by).then((good) => good || this.fill());
+      void this.settle(this.editor.change(this.page.now.selected, what, by));
     this.name.addEventListener("change", () => void this.rename());
     this.fixed.addEventListener("change", () => {
       const on = this.fixed.checked;
@@ -106,13 +107,21 @@ export class PropertyList {
     const together =
       shape === "sphere" ? [0, 1, 2] : shape === "cylinder" && axis < 2 ? [0, 1] : [axis];
     const factors = [0, 1, 2].map((i) => (together.includes(i) ? to / size[axis]! : 1)) as Size;
-    void this.editor.scale(selected, factors).then((good) => good || this.fill());
+    void this.settle(this.editor.scale(selected, factors));
   }
 
   private async rename(): Promise<void> {
-    const { selected } = this.page.now,
-      good = await this.editor.rename(selected, this.name.value.trim());
+    await this.settle(this.editor.rename(this.page.now.selected, this.name.value.trim()));
+  }
+
+  // Until the server has answered, the fields keep what was entered: a text that was asked for
+  // earlier would take it back.
+  private async settle(edit: Promise<boolean>): Promise<void> {
+    ++this.pending;
+    const good = await edit;
+    --this.pending;
     if (!good) this.fill();
+    else if (!this.pending) await this.show();
   }
 
   private async show(): Promise<void> {
@@ -121,7 +130,7 @@ export class PropertyList {
     this.element.hidden = !selected || tab !== "World" || hello?.mode !== "live";
     if (this.element.hidden) return;
     const text = await this.editor.textOf(selected);
-    if (asked !== this.asked) return;
+    if (asked !== this.asked || this.pending) return;
     let words = text === null ? "It has no text of its own." : "";
     this.shown = null;
     try {
