@@ -173,7 +173,8 @@ std::string configuration(const CycloneOptions& options) {
   // (net.core.rmem_max). Of each writer few samples are kept that are not whole, or whose turn has
   // not come; how large they may be says bridges/dds/incoming.h. One thread receives from all
   // sockets: one that waits on the multicast socket alone ends when a datagram comes, and none
-  // comes where the interface is down.
+  // comes where the interface is down. Without key hashes Fast DDS does not see an endpoint go, and
+  // lists it for ever as _NODE_NAME_UNKNOWN_.
   return "<CycloneDDS><Domain Id=\"any\"><General>" + general +
          "<MaxMessageSize>65500B</MaxMessageSize><FragmentSize>60000B</FragmentSize></General>"
          "<Discovery>" +
@@ -183,6 +184,7 @@ std::string configuration(const CycloneOptions& options) {
                             "</MaxAutoParticipantIndex><Peers>{}</Peers>",
                             last_participant(options.domain), peers)) +
          "</Discovery><Internal><MultipleReceiveThreads>false</MultipleReceiveThreads>"
+         "<GenerateKeyhash>true</GenerateKeyhash>"
          "<SocketReceiveBufferSize "
          "max=\"8MiB\"/><MaxSampleSize>1GiB</MaxSampleSize>"
          "<DefragUnreliableMaxSamples>4</DefragUnreliableMaxSamples>"

@@ -21,7 +21,7 @@ from rclpy.duration import Duration
 from rclpy.qos import DurabilityPolicy, QoSProfile, qos_profile_sensor_data
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import Image, JointState, LaserScan, Range
-from server import ARENA, Run
+from server import ARENA, PATIENCE, Run
 from simulation_interfaces.srv import ResetSimulation
 from std_msgs.msg import String
 from tf2_msgs.msg import TFMessage
@@ -289,6 +289,26 @@ def test_a_robot_stops_when_its_driver_is_killed(run, peer):
         driver.send_signal(signal.SIGKILL)
     peer.spin_until(lambda: speed() == pytest.approx(0.0, abs=1e-9), "a robot that stands")
     drive(peer, lambda: speed() > 0.39)
+    assert run.process.poll() is None
+
+
+LISTENER = """
+import sys
+import rclpy
+from rosgraph_msgs.msg import Clock
+rclpy.init(domain_id=int(sys.argv[1]))
+node, heard = rclpy.create_node("listener"), []
+node.create_subscription(Clock, "/clock", heard.append, 10)
+while not heard:
+    rclpy.spin_once(node, timeout_sec=0.1)
+"""
+
+
+def test_processes_that_begin_at_once_all_hear(run):
+    """Regression: Cyclone DDS crashed on the types of which several of Kilted's told it."""
+    words = [sys.executable, "-c", LISTENER, str(run.domain)]
+    for listener in [subprocess.Popen(words) for _ in range(6)]:
+        assert listener.wait(PATIENCE) == 0
     assert run.process.poll() is None
 
 
