@@ -1,6 +1,6 @@
-"""The runs of golden_runs.cpp make the bytes that are kept in hashes.txt: on this processor with one
-thread and with two, or on the emulated one that RUEDO_PROCESSOR names (of `qemu-x86_64 -cpu help`)
-with two."""
+"""The runs of golden_runs.cpp make the bytes that are kept in hashes.txt: on this processor with
+one thread and with two, or on the emulated one that RUEDO_PROCESSOR names (of
+`qemu-x86_64 -cpu help`) with two."""
 
 import os
 import subprocess

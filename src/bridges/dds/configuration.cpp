@@ -115,7 +115,7 @@ void take_names_of(const std::string& uri, uint32_t domain, std::set<std::string
             : read_input(uri.substr(uri.starts_with(kScheme) ? kScheme.size() : 0), kLargest);
     take_names(*world::parse_document(text, "CYCLONEDDS_URI"), domain, names);
   } catch (const InputError&) {
-    // Cyclone says why.
+    return;  // Cyclone says why
   }
 }
 
