@@ -2,11 +2,31 @@
 
 #include <algorithm>
 #include <cctype>
+#include <string_view>
 
 #include "ruedo/element.h"
 #include "ruedo/errors.h"
 
 namespace ruedo::ros2 {
+
+namespace {
+
+constexpr std::string_view kOfAction = "/_action/";  // before the names of an action's parts
+
+// "/a/b_2": of tokens of letters, digits and single underscores that begin with none of the digits.
+bool is_absolute_name(std::string_view name) {
+  char before = 0;
+  for (const char c : name) {
+    const bool digit = c >= '0' && c <= '9',
+               letter = (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || c == '_';
+    const bool good = before == 0 ? c == '/' : before == '/' ? letter : letter || digit || c == '/';
+    if (!good || (c == '_' && before == '_')) return false;
+    before = c;
+  }
+  return before != 0 && before != '/';
+}
+
+}  // namespace
 
 std::string ros_name(const std::string& name) {
   std::string text;
@@ -48,9 +68,10 @@ std::string Names::name_of(const std::string& robot) const {
 std::string Names::topic(const std::string& robot, const std::string& name) {
   const std::string own = (is_plain(robot) ? "" : "/" + name_of(robot)) + "/" + name;
   if (asked_) asked_->insert(own);
-  const auto remap = std::find_if(remaps_.begin(), remaps_.end(),
-                                  [&](const auto& each) { return each.first == own; });
-  return remap == remaps_.end() ? own : remap->second;
+  for (const auto& [from, to] : remaps_)
+    if (own == from || own.starts_with(from + std::string(kOfAction)))
+      return to + own.substr(from.size());
+  return own;
 }
 
 std::string Names::frame(const std::string& robot, const std::string& name) const {
@@ -60,7 +81,15 @@ std::string Names::frame(const std::string& robot, const std::string& name) cons
 void Names::check_remaps() {
   const std::set<std::string> asked =
       std::exchange(asked_, std::nullopt).value_or(std::set<std::string>());
+  std::set<std::string> taken = asked;
+  for (const auto& [from, to] : remaps_) taken.erase(from);
   for (const auto& [from, to] : remaps_) {
+    if (!is_absolute_name(to))
+      throw InputError({}, "--remap " + from + "=" + to + ": '" + to +
+                               "' is not a ROS name; it looks like /scan or /front/scan_2");
+    if (!taken.insert(to).second)
+      throw InputError(
+          {}, "--remap " + from + "=" + to + ": another topic or service is named '" + to + "'");
     if (asked.contains(from)) continue;
     const std::string near = nearest_word(from, {asked.begin(), asked.end()});
     throw InputError({}, "--remap: there is no ROS topic or service '" + from + "'" +

@@ -158,6 +158,25 @@ TEST(Names, OfTwoRobotsAreNeverOne) {
   EXPECT_EQ(names.topic("a-b", "scan"), "/a_b/scan");
 }
 
+TEST(Names, ARemapOfAnActionMovesItsParts) {
+  Names names("p3at", {{"/simulate_steps", "/sim/steps"}});
+  EXPECT_EQ(names.topic("", "simulate_steps/_action/send_goal"), "/sim/steps/_action/send_goal");
+  EXPECT_EQ(names.topic("", "simulate_steps_2"), "/simulate_steps_2");
+}
+
+TEST(Names, NewNamesAreOfRosAndOfNothingElse) {
+  for (const char* name : {"scan2", "/1x//y", "/a b", "/", "", "/a/", "/a__b", "/odom", "/a/2"}) {
+    Names names("p3at", {{"/scan", name}});
+    names.topic("p3at", "scan");
+    names.topic("p3at", "odom");
+    EXPECT_THROW(names.check_remaps(), InputError) << name;
+  }
+  Names swapped("p3at", {{"/scan", "/odom"}, {"/odom", "/scan"}});
+  swapped.topic("p3at", "scan");
+  swapped.topic("p3at", "odom");
+  EXPECT_NO_THROW(swapped.check_remaps());
+}
+
 TEST(Names, ARemapOfNothingIsRefused) {
   Names names("p3at", {{"/scam", "/x"}});
   names.topic("p3at", "scan");
