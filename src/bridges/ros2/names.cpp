@@ -4,6 +4,8 @@
 #include <cctype>
 #include <string_view>
 
+#include <fmt/format.h>
+
 #include "ruedo/element.h"
 #include "ruedo/errors.h"
 
@@ -66,7 +68,7 @@ std::string Names::name_of(const std::string& robot) const {
 }
 
 std::string Names::topic(const std::string& robot, const std::string& name) {
-  const std::string own = (is_plain(robot) ? "" : "/" + name_of(robot)) + "/" + name;
+  std::string own = (is_plain(robot) ? "" : "/" + name_of(robot)) + "/" + name;
   if (asked_) asked_->insert(own);
   for (const auto& [from, to] : remaps_)
     if (own == from || own.starts_with(from + std::string(kOfAction)))
@@ -85,11 +87,13 @@ void Names::check_remaps() {
   for (const auto& [from, to] : remaps_) taken.erase(from);
   for (const auto& [from, to] : remaps_) {
     if (!is_absolute_name(to))
-      throw InputError({}, "--remap " + from + "=" + to + ": '" + to +
-                               "' is not a ROS name; it looks like /scan or /front/scan_2");
+      throw InputError({},
+                       fmt::format("--remap {}={}: '{}' is not a ROS name; it looks like /scan or "
+                                   "/front/scan_2",
+                                   from, to, to));
     if (!taken.insert(to).second)
       throw InputError(
-          {}, "--remap " + from + "=" + to + ": another topic or service is named '" + to + "'");
+          {}, fmt::format("--remap {}={}: another topic or service is named '{}'", from, to, to));
     if (asked.contains(from)) continue;
     const std::string near = nearest_word(from, {asked.begin(), asked.end()});
     throw InputError({}, "--remap: there is no ROS topic or service '" + from + "'" +
