@@ -350,7 +350,7 @@ WRONG = [
     ),
     ("p3at/lrf:lag@1", "value 0 of lag is not allowed; allowed are 1e-06 to 60"),
     ("p3at/lrf:freeze", "it looks like ROBOT/DEVICE:KIND@SECONDS"),
-    ("p3at/lrf:freeze@x", "'x' is no number"),
+    ("p3at/lrf:freeze@x", "'x' is not a number"),
     ("p3at/lrf:freeze@1,four=2", "'four' of freeze is not allowed; allowed are for"),
     ("p3at/laser:freeze@1", "there is no device 'laser' to be faulty; p3at has .*lrf"),
     ("r2d2/lrf:freeze@1", "a fault of robot 'r2d2'; the world has p3at"),

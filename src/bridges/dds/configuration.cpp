@@ -13,6 +13,7 @@
 #include <map>
 
 #include <fmt/format.h>
+#include <spdlog/spdlog.h>
 
 #include "base/input_file.h"
 #include "ruedo/element.h"
@@ -106,17 +107,29 @@ void take_names(const Element& element, uint32_t domain, std::set<std::string>& 
   }
 }
 
-void take_names_of(const std::string& uri, uint32_t domain, std::set<std::string>& names) {
+std::string xml_of(const std::string& uri) {
   constexpr std::string_view kScheme = "file://";
-  try {
-    const std::string text =
-        uri.starts_with('<')
-            ? uri
-            : read_input(uri.substr(uri.starts_with(kScheme) ? kScheme.size() : 0), kLargest);
-    take_names(*world::parse_document(text, "CYCLONEDDS_URI"), domain, names);
-  } catch (const InputError&) {
-    return;  // Cyclone says why
-  }
+  if (uri.starts_with('<')) return uri;
+  return read_input(uri.substr(uri.starts_with(kScheme) ? kScheme.size() : 0), kLargest);
+}
+
+// What has no effect, or other nodes would not do without.
+void check_environment(const CycloneOptions& options) {
+  if (!environment("ROS_STATIC_PEERS").empty() && options.static_peers.empty())
+    spdlog::warn("ROS 2: ignored ROS_STATIC_PEERS, as {} says to",
+                 environment("ROS_LOCALHOST_ONLY") == "1" ? "ROS_LOCALHOST_ONLY"
+                                                          : "ROS_AUTOMATIC_DISCOVERY_RANGE");
+  if (environment("ROS_SECURITY_ENABLE") != "true") return;
+  constexpr const char* kUnsupported =
+      "ROS_SECURITY_ENABLE is 'true', but Ruedo does not support DDS Security";
+  if (environment("ROS_SECURITY_STRATEGY") == "Enforce")
+    throw InputError({}, fmt::format("{}, and ROS_SECURITY_STRATEGY is 'Enforce'; unset one of "
+                                     "them to run without encryption",
+                                     kUnsupported));
+  spdlog::warn(
+      "ROS 2: {}: its topics are neither encrypted nor authenticated, and nodes that "
+      "enforce security do not see them",
+      kUnsupported);
 }
 
 }  // namespace
@@ -131,7 +144,12 @@ UserSettings::UserSettings(const std::string& uris, uint32_t domain) {
       if (end != lower.npos) end += kEnd.size();
     }
     end = std::min(end, uris.size());
-    take_names_of(uris.substr(at, end - at), domain, names_);
+    try {
+      take_names(*world::parse_document(xml_of(uris.substr(at, end - at)), "CYCLONEDDS_URI"),
+                 domain, names_);
+    } catch (const InputError& error) {
+      if (unreadable_.empty()) unreadable_ = error.what();
+    }
     at = end;
   }
 }
@@ -226,6 +244,7 @@ CycloneOptions options_from_environment() {
   options.own = environment("CYCLONEDDS_URI");
   if (options.range != Range::system_default && options.range != Range::off && !on_this_host_alone)
     options.static_peers = environment("ROS_STATIC_PEERS");
+  check_environment(options);
   return options;
 }
 

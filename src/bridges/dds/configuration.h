@@ -19,7 +19,8 @@ struct CycloneOptions {
 };
 
 // From ROS_DOMAIN_ID, ROS_AUTOMATIC_DISCOVERY_RANGE, ROS_LOCALHOST_ONLY, ROS_STATIC_PEERS and
-// CYCLONEDDS_URI. Throws InputError.
+// CYCLONEDDS_URI. Warns of static peers that have no effect, and of ROS_SECURITY_ENABLE. Throws
+// InputError.
 CycloneOptions options_from_environment();
 
 // For dds_create_domain().
@@ -28,15 +29,18 @@ std::string configuration(const CycloneOptions& options);
 // The elements of Cyclone's configuration that a user sets for a domain.
 class UserSettings {
  public:
-  // uris: XML, or files that have some, separated by commas, as in CYCLONEDDS_URI. What cannot be
-  // read is passed over: Cyclone says why.
+  // uris: XML, or files that have some, separated by commas, as in CYCLONEDDS_URI.
   UserSettings(const std::string& uris, uint32_t domain);
 
   // Names are compared as Cyclone does, without regard to case.
   bool has(std::string_view element) const;
 
+  // Why the first of them cannot be read; "": all can. Cyclone's own parser is less strict.
+  const std::string& unreadable() const { return unreadable_; }
+
  private:
   std::set<std::string> names_;  // in lower case
+  std::string unreadable_;
 };
 
 }  // namespace ruedo::dds

@@ -103,8 +103,9 @@ void tell(void*, const dds_log_data_t* data);
 // What Cyclone says while it starts: why it does not, or else warnings.
 class StartLog {
  public:
-  // own_interfaces: Ruedo lists them, most of them without multicast, of which Cyclone warns.
-  explicit StartLog(bool own_interfaces) : own_interfaces_(own_interfaces) {
+  explicit StartLog(const CycloneOptions& options)
+      : options_(options),
+        lists_interfaces_(options.range == Range::localhost || options.range == Range::off) {
     const std::lock_guard lock(mutex_);
     current_ = this;
     dds_set_log_sink(tell, nullptr);
@@ -117,7 +118,7 @@ class StartLog {
   static bool takes(std::string_view line) {
     const std::lock_guard lock(mutex_);
     if (!current_) return false;
-    if (current_->own_interfaces_ && line.find("is not multicast-capable") != line.npos)
+    if (current_->lists_interfaces_ && line.find("is not multicast-capable") != line.npos)
       return true;
     std::vector<std::string>& lines = current_->lines_;
     if (lines.size() < kMost && std::find(lines.begin(), lines.end(), line) == lines.end())
@@ -131,15 +132,24 @@ class StartLog {
   }
   dds_entity_t checked(dds_entity_t result, const std::string& what) const {
     if (result >= 0) return result;
-    const std::vector<std::string> why = lines();
-    throw EnvironmentError(
-        fmt::format("ROS 2: {}: {}{}{}", what,
-                    why.empty() ? std::string(dds_strretcode(-result))
-                                : fmt::format("{}", fmt::join(why, "; ")),
-                    std::getenv("CYCLONEDDS_URI") ? " (CYCLONEDDS_URI is set)" : "", cure(why)));
+    throw EnvironmentError(fmt::format("ROS 2: {}: {}", what, reason(result)));
   }
 
  private:
+  std::string reason(dds_entity_t result) const {
+    const UserSettings own(options_.own, options_.domain);
+    if (!own.unreadable().empty()) return own.unreadable();
+    std::vector<std::string> why = lines();
+    for (std::string& line : why) line = without_offset(line);
+    return fmt::format("{}{}{}",
+                       why.empty() ? std::string(dds_strretcode(-result))
+                                   : fmt::format("{}", fmt::join(why, "; ")),
+                       std::getenv("CYCLONEDDS_URI") ? " (CYCLONEDDS_URI is set)" : "", cure(why));
+  }
+  // "... (CYCLONEDDS_URI+1022 line 1)" counts what Ruedo puts before the user's text.
+  static std::string without_offset(const std::string& line) {
+    return line.substr(0, line.find(" (CYCLONEDDS_URI+"));
+  }
   // "failed to increase socket receive buffer size to at least 10485760 bytes, current is ..."
   static std::string cure(const std::vector<std::string>& why) {
     for (const std::string& line : why) {
@@ -157,7 +167,8 @@ class StartLog {
   static constexpr size_t kMost = 10;
   static inline std::mutex mutex_;
   static inline StartLog* current_ = nullptr;
-  const bool own_interfaces_;
+  const CycloneOptions& options_;
+  const bool lists_interfaces_;  // most of them without multicast, of which Cyclone warns
   std::vector<std::string> lines_;
 };
 
@@ -455,8 +466,7 @@ class CycloneTransport : public ros2::Transport {
  public:
   explicit CycloneTransport(const CycloneOptions& options) : options_(options) {
     require_threads(kCyclonesThreads);  // without one of them it aborts
-    std::optional<StartLog> start(std::in_place,
-                                  options.range == Range::localhost || options.range == Range::off);
+    std::optional<StartLog> start(std::in_place, options_);
     domain_ = start->checked(dds_create_domain(options.domain, configuration(options).c_str()),
                              fmt::format("domain {} cannot be joined", options.domain));
     QosPointer qos(dds_create_qos());

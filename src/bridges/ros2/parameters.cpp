@@ -327,12 +327,9 @@ void Parameters::apply(uint64_t client, const Parameter& parameter,
 std::string Parameters::inject_fault(const std::string& words) {
   world::Fault fault;
   try {
-    const size_t options = std::min(words.find(','), words.size());
-    fault = world::parse_fault(words.find('@') == words.npos
-                                   ? words.substr(0, options) + "@0" + words.substr(options)
-                                   : words);
+    fault = world::parse_fault_from_now(words);
   } catch (const InputError& error) {
-    return error.message();
+    return error.what();
   }
   std::string channel;
   {

@@ -216,9 +216,9 @@ void check_environment(Report& report) {
 // Whether --ros2 would work. Where nothing speaks of ROS, that it would not is no fault.
 void check_ros2(Report& report) {
   constexpr const char* kVariables[] = {
-      "ROS_DISTRO",         "ROS_DOMAIN_ID",    "ROS_AUTOMATIC_DISCOVERY_RANGE",
-      "ROS_LOCALHOST_ONLY", "ROS_STATIC_PEERS", "RMW_IMPLEMENTATION",
-      "CYCLONEDDS_URI"};
+      "ROS_DISTRO",          "ROS_DOMAIN_ID",    "ROS_AUTOMATIC_DISCOVERY_RANGE",
+      "ROS_LOCALHOST_ONLY",  "ROS_STATIC_PEERS", "RMW_IMPLEMENTATION",
+      "ROS_SECURITY_ENABLE", "CYCLONEDDS_URI"};
   const bool asked = std::any_of(std::begin(kVariables), std::end(kVariables), [](const char* one) {
     const char* value = std::getenv(one);
     return value && *value;

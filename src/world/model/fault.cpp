@@ -16,12 +16,24 @@ namespace {
 constexpr double kLongest_s = 1e6, kLongestDelay_s = 60.0, kFarthest_m = 1e6;
 constexpr double kLargestSeed = 1e15;  // every whole number up to it is a double
 
-[[noreturn]] void wrong(const std::string& text, const std::string& why) {
-  throw InputError(
-      {}, "--fault '" + text + "': " + why +
-              "it looks like ROBOT/DEVICE:KIND@SECONDS[,for=S][,value=V][,...], for example "
-              "p3at/lrf:freeze@3,for=2");
-}
+// The two ways of writing a fault: with the time at which it begins, or without.
+struct Form {
+  const char *name, *time, *example_time;
+};
+constexpr Form kOption{"--fault", "@SECONDS", "@3"}, kFromNow{"fault", "", ""};
+
+struct Written {
+  const std::string& text;
+  const Form& form;
+
+  std::string place() const { return fmt::format("{} '{}'", form.name, text); }
+  [[noreturn]] void refuse(const std::string& why) const {
+    throw InputError(
+        {}, fmt::format("{}: {}it looks like ROBOT/DEVICE:KIND{}[,for=S][,value=V][,...], for "
+                        "example p3at/lrf:freeze{},for=2",
+                        place(), why, form.time, form.example_time));
+  }
+};
 
 struct Detail {
   const char* name;
@@ -49,11 +61,11 @@ std::string details_of(const FaultKind* kind) {
   return fmt::format("{}", fmt::join(names, ", "));
 }
 
-double read_number(const std::string& text, const std::string& part) {
+double read_number(const Written& written, const std::string& part) {
   double value = 0.0;
   const auto [end, error] = std::from_chars(part.data(), part.data() + part.size(), value);
   if (error != std::errc() || end != part.data() + part.size() || !std::isfinite(value))
-    wrong(text, "'" + part + "' is no number; ");
+    written.refuse("'" + part + "' is not a number; ");
   return value;
 }
 
@@ -149,48 +161,62 @@ std::string check_fault(const Fault& fault) {
 namespace {
 
 // "NAME=VALUE,..."
-void read_details(const std::string& text, std::string details, Fault& fault) {
+void read_details(const Written& written, std::string details, Fault& fault) {
   const FaultKind* kind = find_fault_kind(fault.kind);
   std::vector<std::string> given;
   for (details += ','; !details.empty(); details.erase(0, details.find(',') + 1)) {
     const std::string part = details.substr(0, details.find(','));
     const size_t equals = part.find('=');
-    if (equals == std::string::npos) wrong(text, "'" + part + "' is no NAME=VALUE; ");
+    if (equals == std::string::npos) written.refuse("'" + part + "' is not NAME=VALUE; ");
     const std::string name = part.substr(0, equals);
     const auto detail = std::find_if(std::begin(kDetails), std::end(kDetails),
                                      [&](const Detail& each) { return each.name == name; });
     if (detail == std::end(kDetails) || (kind && !has_detail(*kind, name)))
-      wrong(text, "'" + name + "'" + (kind ? " of " + kind->name : "") +
-                      " is not allowed; allowed are " + details_of(kind) + "; ");
+      written.refuse("'" + name + "'" + (kind ? " of " + kind->name : "") +
+                     " is not allowed; allowed are " + details_of(kind) + "; ");
     if (std::find(given.begin(), given.end(), name) != given.end())
-      wrong(text, "'" + name + "' is given twice; ");
+      written.refuse("'" + name + "' is given twice; ");
     given.push_back(name);
-    fault.*detail->value = read_number(text, part.substr(equals + 1));
+    fault.*detail->value = read_number(written, part.substr(equals + 1));
   }
 }
 
-}  // namespace
-
-Fault parse_fault(const std::string& text) {
-  const size_t at = text.find('@'), colon = text.rfind(':', at);
-  if (at == std::string::npos || colon == std::string::npos || colon > at) wrong(text, "");
+// Of text up to "@SECONDS", or up to the details where the form has no time.
+Fault parse(const Written& written) {
+  const std::string& text = written.text;
+  const bool has_time = &written.form == &kOption;
+  const size_t end =
+      std::min(text.find(',', has_time ? std::min(text.find('@'), text.size()) : 0), text.size());
+  const size_t at = text.substr(0, end).find('@');
+  if (has_time && at == std::string::npos) written.refuse("");
+  if (!has_time && at != std::string::npos)
+    written.refuse("'" + text.substr(at, end - at) +
+                   "' is not allowed: the fault begins when it is set; ");
+  const size_t colon = text.rfind(':', std::min(at, end));
+  if (colon == std::string::npos) written.refuse("");
   Fault fault;
   fault.robot = text.substr(0, colon);
-  fault.kind = text.substr(colon + 1, at - colon - 1);
+  fault.kind = text.substr(colon + 1, std::min(at, end) - colon - 1);
   if (const size_t slash = fault.robot.find('/'); slash != std::string::npos) {
     fault.target = fault.robot.substr(slash + 1);
     fault.robot.resize(slash);
   }
-  const size_t end = std::min(text.find(',', at), text.size());
-  fault.at_s = read_number(text, text.substr(at + 1, end - at - 1));
-  if (end < text.size()) read_details(text, text.substr(end + 1), fault);
-  fault.source = {"--fault '" + text + "'", 0};
+  if (has_time) fault.at_s = read_number(written, text.substr(at + 1, end - at - 1));
+  if (end < text.size()) read_details(written, text.substr(end + 1), fault);
+  fault.source = {written.place(), 0};
   if (const std::string why = check_fault(fault); !why.empty()) throw InputError(fault.source, why);
   if (!fault.robot.empty() && find_fault_kind(fault.kind)->of == FaultKind::Of::world)
-    throw InputError(fault.source, fault.kind + " is of the world, not of the robot '" +
-                                       fault.robot + "'; it looks like :" + fault.kind +
-                                       "@SECONDS,value=SEED");
+    throw InputError(fault.source,
+                     fmt::format("{} is of the world, not of the robot '{}'; it looks like :{}{},"
+                                 "value=SEED",
+                                 fault.kind, fault.robot, fault.kind, written.form.time));
   return fault;
 }
+
+}  // namespace
+
+Fault parse_fault(const std::string& text) { return parse({text, kOption}); }
+
+Fault parse_fault_from_now(const std::string& text) { return parse({text, kFromNow}); }
 
 }  // namespace ruedo::world

@@ -40,4 +40,7 @@ std::string check_fault(const Fault& fault);
 // Throws InputError.
 Fault parse_fault(const std::string& text);
 
+// The same without @AT, for a fault that begins when it is set. Throws InputError.
+Fault parse_fault_from_now(const std::string& text);
+
 }  // namespace ruedo::world

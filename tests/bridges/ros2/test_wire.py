@@ -4,6 +4,9 @@ from __future__ import annotations
 
 import itertools
 import math
+import re
+import subprocess
+from pathlib import Path
 
 import pytest
 from conftest import Peer, take
@@ -33,7 +36,7 @@ from ros_types import (
     TwistStamped,
     Vector3,
 )
-from server import Run, wait_for
+from server import PATIENCE, RUEDO, Run, wait_for
 
 
 @pytest.fixture(scope="module")
@@ -236,6 +239,21 @@ def test_topics_are_remapped():
             {"ROS_AUTOMATIC_DISCOVERY_RANGE": "EVERYWHERE"},
             "ROS_AUTOMATIC_DISCOVERY_RANGE is 'EVERYWHERE'",
         ),
+        (
+            [],
+            {"ROS_SECURITY_ENABLE": "true", "ROS_SECURITY_STRATEGY": "Enforce"},
+            "Ruedo does not support DDS Security, and ROS_SECURITY_STRATEGY is 'Enforce'",
+        ),
+        (
+            [],
+            {"CYCLONEDDS_URI": "<CycloneDDS><Domain>"},
+            "cannot be joined: CYCLONEDDS_URI:1: not XML",
+        ),
+        (
+            [],
+            {"CYCLONEDDS_URI": "<CycloneDDS><Domain><Genral/></Domain></CycloneDDS>"},
+            "//CycloneDDS/Domain: Genral: unknown element (CYCLONEDDS_URI is set)\n",
+        ),
         ([], {"ROS_DISTRO": "noetic"}, "there is no ROS 2 release 'noetic'"),
         (["--ros2-clock", "0"], {}, "--ros2-clock"),
     ],
@@ -244,4 +262,38 @@ def test_wrong_usage_is_named(arguments, environment, words):
     with Run(*arguments, environment=environment) as run:
         output = run.process.communicate(timeout=60)[0]
         assert words in output
-        assert run.process.returncode in (2, 3)
+        assert run.process.returncode in (2, 3, 4)
+
+
+@pytest.mark.parametrize(
+    "environment, words",
+    [
+        (
+            {"ROS_STATIC_PEERS": "10.0.0.9", "ROS_AUTOMATIC_DISCOVERY_RANGE": "OFF"},
+            "ignored ROS_STATIC_PEERS, as ROS_AUTOMATIC_DISCOVERY_RANGE says to",
+        ),
+        (
+            {"ROS_STATIC_PEERS": "10.0.0.9", "ROS_LOCALHOST_ONLY": "1"},
+            "ignored ROS_STATIC_PEERS, as ROS_LOCALHOST_ONLY says to",
+        ),
+        ({"ROS_SECURITY_ENABLE": "true"}, "Ruedo does not support DDS Security"),
+        ({"ROS_STATIC_PEERS": "10.0.0.9"}, None),
+    ],
+)
+def test_variables_without_effect_warn(environment, words):
+    with Run("--duration", "0.1", environment=environment) as run:
+        output = run.process.communicate(timeout=60)[0]
+        assert words in output if words else "ignored" not in output
+
+
+def test_doctor_counts_the_pictures_that_arrive():
+    told = subprocess.run(
+        [RUEDO, "doctor", "--ros2"], capture_output=True, text=True, timeout=PATIENCE
+    ).stdout
+    line = next(line for line in told.splitlines() if "pictures on DDS" in line)
+    found = re.search(r"(\d+) of (\d+) raw ones of 640 x 480 .* buffer of (\d+) bytes", line)
+    arrived, sent, buffer = map(int, found.groups())
+    assert 20 <= sent <= 30 and 0 <= arrived <= sent  # 15 Hz for two seconds
+    # The kernel doubles what a program asks for; the default is given as it is.
+    assert buffer == int(Path("/proc/sys/net/core/rmem_default").read_text())
+    assert ("sysctl -w net.core.rmem_default=" in line) == (arrived < sent)

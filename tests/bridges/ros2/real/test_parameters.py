@@ -84,7 +84,14 @@ def test_what_cannot_be_set_is_refused(peer, parameters):
     ):
         assert words in reason
     assert "0.0001" in parameters.reasons(rate=-1.0)[0]
-    assert "dropout" in parameters.reasons(fault="lrf:nonsense")[0]
+    for fault, words in (
+        ("lrf:nonsense", "dropout"),
+        ("p3at/lrf:freeze@3", "fault 'p3at/lrf:freeze@3': '@3' is not allowed: the fault begins"),
+        ("lrf", "fault 'lrf': it looks like ROBOT/DEVICE:KIND[,for=S]"),
+        ("p3at/lrf:lag", "fault 'p3at/lrf:lag': value 0 of lag is not allowed"),
+    ):
+        reason = parameters.reasons(fault=fault)[0]
+        assert words in reason and "--fault" not in reason
     both = [Parameter(n, value=v).to_parameter_msg() for n, v in (("rate", 3.0), ("seed", 4))]
     atomically = peer.call(
         SetParametersAtomically, "/ruedo/set_parameters_atomically", parameters=both
