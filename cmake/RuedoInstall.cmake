@@ -65,7 +65,7 @@ set(copyright ${PROJECT_BINARY_DIR}/licences/copyright)
 file(MAKE_DIRECTORY ${PROJECT_BINARY_DIR}/licences)
 add_custom_command(OUTPUT ${copyright}
   COMMAND ${RUEDO_PYTHON} ${PROJECT_SOURCE_DIR}/packaging/copyright.py ${PROJECT_BINARY_DIR} ${copyright}
-  DEPENDS ${PROJECT_SOURCE_DIR}/packaging/copyright.py ${PROJECT_SOURCE_DIR}/LICENSE ruedo VERBATIM)
+  DEPENDS ${PROJECT_SOURCE_DIR}/packaging/copyright.py ${PROJECT_SOURCE_DIR}/packaging/parts.py ${PROJECT_SOURCE_DIR}/packaging/parts.toml ${PROJECT_SOURCE_DIR}/LICENSE ruedo VERBATIM)
 add_custom_target(licences ALL DEPENDS ${copyright})
 install(FILES ${copyright} DESTINATION ${CMAKE_INSTALL_DOCDIR})
 

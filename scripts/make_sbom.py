@@ -7,41 +7,44 @@ import importlib.metadata
 import json
 import os
 import re
-import subprocess
 import sys
 import time
 import zipfile
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
-# Compiled into the programs: what is linked to them as a shared library is found in the wheel.
-LINKED = ("musl-dev", "libcli11-dev", "libeigen3-dev")
+sys.path.insert(0, str(ROOT / "packaging"))
+
+import parts  # noqa: E402
+
+Part = tuple[str, str, str, str]  # name, version, licence, what registries call it
 
 
-def debian(name: str) -> tuple[str, str, str]:
-    """(name, version, what registries call it) of a package that is installed here."""
-    version = subprocess.run(
-        ["dpkg-query", "-W", "-f=${Version}\n", name], capture_output=True, text=True, check=True
-    ).stdout.splitlines()[0]
-    return name, version, f"pkg:deb/debian/{name}@{version}"
-
-
-def inside(build: Path, wheel: Path) -> list[tuple[str, str, str]]:
-    """Of the wheel's shared libraries, which are named by the licences there; of what is linked;
-    of what Python and npm gave.
-    """
+def shared(wheel: Path) -> list[Part]:
+    """Of the wheel's shared libraries, which are named by the licences there."""
     with zipfile.ZipFile(wheel) as archive:
         folders = (Path(name) for name in archive.namelist() if ".dist-info/licenses/" in name)
-        licences = {path.name for path in folders if path.parent.name == "debian"}
-    found = [debian(name) for name in sorted(licences | set(LINKED))]
-    for name in ("lcm", "nanobind"):
+        names = sorted({path.name for path in folders if path.parent.name == "debian"})
+    versions = [parts.installed()[name][1] for name in names]
+    return [
+        (name, version, parts.licence_of(name), f"pkg:deb/debian/{name}@{version}")
+        for name, version in zip(names, versions, strict=True)
+    ]
+
+
+def inside(build: Path, wheel: Path) -> list[Part]:
+    """Shared libraries; what is compiled in; of what Python and npm gave."""
+    found = shared(wheel)
+    for source, (_, _, licence) in parts.COMPILED.items():
+        if names := parts.packages_of(source):
+            version = parts.installed()[names[0]][1]
+            locator = f"pkg:deb/debian/{source}@{version}?arch=source"
+            found.append((f"{source} (source)", version, licence, locator))
+    for name, (_, _, licence) in parts.COMPILED_PYPI.items():
         version = importlib.metadata.version(name)
-        found.append((name, version, f"pkg:pypi/{name}@{version}"))
-    lock = json.loads((build / "web/package-lock.json").read_text(encoding="utf-8"))
-    for folder, about in lock["packages"].items():
-        if folder and not about.get("dev"):
-            name = folder.removeprefix("node_modules/")
-            found.append((name, about["version"], f"pkg:npm/{name}@{about['version']}"))
+        found.append((name, version, licence, f"pkg:pypi/{name}@{version}"))
+    for _, name, version, licence in parts.of_npm(build):
+        found.append((name, version, licence, f"pkg:npm/{name}@{version}"))
     return found
 
 
@@ -69,13 +72,13 @@ def package_of_file(file: Path, version: str) -> dict[str, object]:
     }
 
 
-def package_inside(name: str, version: str, locator: str) -> dict[str, object]:
+def package_inside(name: str, version: str, licence: str, locator: str) -> dict[str, object]:
     return {
         "SPDXID": identifier(name),
         "name": name,
         "versionInfo": version,
-        "licenseConcluded": "NOASSERTION",
-        "licenseDeclared": "NOASSERTION",
+        "licenseConcluded": licence,
+        "licenseDeclared": licence,
         "copyrightText": "NOASSERTION",
         "downloadLocation": "NOASSERTION",
         "filesAnalyzed": False,

@@ -21,12 +21,14 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
 PLATFORM = f"manylinux_2_36_{os.uname().machine}"  # Debian 12's C library
-# What Debian's libraries are linked to and nothing here calls, by the library that is: each some 10
-# MB.
+# What Debian's libraries are linked to and nothing here calls, by the library that is: most of them
+# some 10 MB.
 UNUSED = {
     "libLLVM": ["libz3", "libxml2", "libedit"],
     "libopencv_imgcodecs": ["libgdal", "libgdcm"],
-    "libopencv_core": ["libGLX"],
+    # OpenCV's linear algebra; the host's choice of a BLAS would be in the wheel.
+    "libopencv_core": ["libGLX", "liblapack", "libblas"],
+    "libtiff": ["libjbig"],  # GPL
 }
 # What the platform's tag takes for granted, and a bare Debian has not.
 NOT_THERE = ("libglib-2.0",)
