@@ -5,9 +5,10 @@ import json
 import re
 import subprocess
 import sys
-import tomllib
 from collections.abc import Iterable
 from pathlib import Path
+
+import tomllib
 
 TABLE = tomllib.loads(Path(__file__).with_name("parts.toml").read_text(encoding="utf-8"))
 COMPILED = TABLE["compiled"]["debian"]
@@ -86,7 +87,9 @@ def read_by(build: Path) -> tuple[set[str], set[str]]:
     rules = (build / "build.ninja").read_text(encoding="utf-8")
     for rule in re.findall(r"^build (?!tests/|benchmarks/).*(?:\n  .*)*", rules, re.MULTILINE):
         files |= {Path(name).resolve() for name in re.findall(r"(?<!\S)/\S+\.a(?!\S)", rule)}
-    sources = {installed()[name][0] for name in owners(f for f in files if f.is_relative_to("/usr"))}
+    sources = {
+        installed()[name][0] for name in owners(f for f in files if f.is_relative_to("/usr"))
+    }
     packages = {
         match.group(1)  # LCM's headers are in site-packages/include/lcm
         for file in files

@@ -19,20 +19,21 @@ constexpr int kReceiveBuffer = 2 << 20;  // bytes; the system gives at most its 
 }  // namespace
 
 MulticastTransport::MulticastTransport(const bus::LcmUrl& address) {
-  const std::string url = address.str();  // whole: without a port LCM would send to port 0
-  lcm_.reset(lcm_create(url.c_str()));
+  const auto number = [&](const char* option) {
+    return std::atoi(address.option(option, "0").c_str());
+  };
   try {
-    if (!lcm_) throw std::system_error(std::make_error_code(std::errc::invalid_argument));
+    sender_ = std::make_unique<bus::MulticastSender>(address.host, address.port, number("ttl"));
     receiver_ = std::make_unique<bus::MulticastReceiver>(
-        address.host, address.port,
-        std::max(std::atoi(address.option("recv_buf_size", "0").c_str()), kReceiveBuffer));
-  } catch (const std::system_error&) {
-    throw NoServer(url + ": LCM cannot use it; `ruedo doctor` looks for what is wrong");
+        address.host, address.port, std::max(number("recv_buf_size"), kReceiveBuffer));
+  } catch (const std::system_error& error) {
+    throw NoServer(address.str() + ": it cannot be used (" + error.what() +
+                   "); `ruedo doctor` looks for what is wrong");
   }
 }
 
 void MulticastTransport::publish(const std::string& channel, const uint8_t* bytes, size_t size) {
-  lcm_publish(lcm_.get(), channel.c_str(), bytes, static_cast<unsigned int>(size));
+  sender_->send(channel, bytes, size);
 }
 
 bool MulticastTransport::has_news() {

@@ -1,10 +1,7 @@
-// LCM's multicast as a transport. LCM only sends: its receiver reads outside of a datagram that is
-// shorter than its head says, and ends the program.
+// LCM's multicast as a transport.
 //
 // All channels come; what waits is in the socket's buffer alone, for all channels together.
 #pragma once
-
-#include <lcm/lcm.h>
 
 #include <atomic>
 #include <memory>
@@ -12,6 +9,7 @@
 
 #include "bus/lcm_url.h"
 #include "bus/multicast_receiver.h"
+#include "bus/multicast_sender.h"
 #include "transport.h"
 
 namespace ruedo::client {
@@ -28,10 +26,7 @@ class MulticastTransport : public Transport {
   void receive_eagerly() override { looks_again_ = true; }
 
  private:
-  struct Destroy {
-    void operator()(lcm_t* lcm) const { lcm_destroy(lcm); }
-  };
-  std::unique_ptr<lcm_t, Destroy> lcm_;  // sends; from any thread
+  std::unique_ptr<bus::MulticastSender> sender_;
   std::unique_ptr<bus::MulticastReceiver> receiver_;
   bool looks_again_ = false;
   std::atomic<bool> busy_{false};  // receive() takes something

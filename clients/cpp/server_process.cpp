@@ -3,7 +3,6 @@
 
 #include <arpa/inet.h>
 #include <fcntl.h>
-#include <link.h>
 #include <signal.h>
 #include <spawn.h>
 #include <sys/socket.h>
@@ -40,26 +39,6 @@ bool is_program(const fs::path& path) {
   return fs::is_regular_file(path, error) && access(path.c_str(), X_OK) == 0;
 }
 
-// The program of the installation that the LCM in use came with; "" where it is another LCM.
-std::string beside_lcm() {
-  std::string found;
-  dl_iterate_phdr(
-      [](dl_phdr_info* info, size_t, void* data) {
-        const fs::path library = info->dlpi_name;
-        if (library.filename() != "liblcm.so.1" || library.parent_path().filename() != "ruedo")
-          return 0;
-        fs::path folder = library.parent_path();
-        for (int above = 0; above < 3; ++above) {  // lib/ruedo, or lib/ARCHITECTURE/ruedo
-          folder = folder.parent_path();
-          if (is_program(folder / "bin/ruedo"))
-            *static_cast<std::string*>(data) = folder / "bin/ruedo";
-        }
-        return 0;
-      },
-      &found);
-  return found;
-}
-
 // RUEDO, else the one of the installation, else the PATH, else the bin/ or build/*/bin/ of a folder
 // above this program.
 std::string find_ruedo(const std::string& installed) {
@@ -70,7 +49,6 @@ std::string find_ruedo(const std::string& installed) {
     return named;
   }
   if (!installed.empty() && is_program(installed)) return installed;
-  if (const std::string program = beside_lcm(); !program.empty()) return program;
   std::istringstream path(std::getenv("PATH") ? std::getenv("PATH") : "");
   for (std::string folder; std::getline(path, folder, ':');) {
     if (is_program(fs::path(folder) / "ruedo")) return fs::path(folder) / "ruedo";
@@ -166,6 +144,14 @@ fs::path make_folder() {
 }
 
 }  // namespace
+
+std::string detail::program_beside(const std::string& header) {
+  // include/ruedo/client.h
+  const fs::path prefix = fs::path(header).parent_path().parent_path().parent_path();
+  std::error_code error;
+  const fs::path program = fs::canonical(prefix / "bin/ruedo", error);
+  return !error && is_program(program) ? program.string() : "";
+}
 
 ServerProcess::ServerProcess(const std::string& world, const LaunchOptions& options) {
   if (world.empty() == options.text.empty())

@@ -677,13 +677,21 @@ struct ConnectOptions {
 /// @throws NoServer when none answers
 Simulation connect(const std::string& url = "", const ConnectOptions& options = {});
 
+/// Not for programs.
+namespace detail {
+/// The program that is installed with a header of Ruedo.
+/// @param header its path
+/// @return its path; "" where none is
+std::string program_beside(const std::string& header);
+}  // namespace detail
+
 /// How launch() starts the server; the lists are as the options of `ruedo run`.
 struct LaunchOptions {
 #ifdef RUEDO_PROGRAM  // find_package(ruedo) defines it
   std::string program = RUEDO_PROGRAM;
 #else
-  std::string program;  ///< the server, unless the environment's RUEDO names one; "": of the same
-                        ///< installation, by the PATH, or above this program
+  /// the server, unless the environment's RUEDO names one; "": by the PATH, or above this program
+  std::string program = detail::program_beside(__FILE__);
 #endif
   int64_t seed = -1;                       ///< -1: the server's default
   double rate = 1.0;                       ///< sim time per real time; kFast: as fast as it goes

@@ -148,6 +148,50 @@ def test_pkg_config_leads_to_library_and_server(prefix, tmp_path):
     assert f"searched in {prefix.resolve()}/share/ruedo/worlds" in said, said
 
 
+def test_what_a_project_installs_starts(prefix, tmp_path):
+    """Each of the libraries; from and to folders with blanks in their names."""
+    ours = tmp_path / "with a blank/ruedo"
+    shutil.copytree(prefix, ours, symlinks=True)
+    uses = {
+        "client": "ruedo/client.h> \nint main() { ruedo::client::LaunchOptions options; }",
+        "engine": "ruedo/engine.h> \nint main() { try { ruedo::Engine engine(\"nowhere\"); }"
+        " catch (const std::exception& error) { std::puts(error.what()); } }",
+        "lcmtypes": "lcm/lcm-cpp.hpp>\nint main() { lcm::LCM bus(\"memq://\"); return !bus.good(); }",
+    }
+    lines = [
+        "cmake_minimum_required(VERSION 3.22)",
+        "project(x CXX)",
+        "find_package(ruedo REQUIRED)",
+    ]
+    for name, text in uses.items():
+        (tmp_path / f"{name}.cpp").write_text(f"#include <cstdio>\n#include <{text}\n")
+        lines += [f"add_executable({name} {name}.cpp)"]
+        lines += [f"target_link_libraries({name} PRIVATE ruedo::{name})"]
+        lines += [f"install(TARGETS {name})"]
+    (tmp_path / "CMakeLists.txt").write_text("\n".join(lines) + "\n")
+    build, installed = tmp_path / "b", tmp_path / "in stalled"
+    run(CMAKE, "-S", tmp_path, "-B", build, f"-DCMAKE_PREFIX_PATH={ours}")
+    run(CMAKE, "--build", build)
+    run(CMAKE, "--install", build, "--prefix", installed)
+    shutil.rmtree(build)
+    said = {name: run(installed / "bin" / name) for name in uses}
+    assert f"searched in {ours}/share/ruedo/worlds" in said["engine"]
+    assert "liblcm" not in run("ldd", installed / "bin/client")
+
+
+def test_pkg_config_survives_blanks(prefix, tmp_path):
+    ours = tmp_path / "with a blank"
+    shutil.copytree(prefix, ours, symlinks=True)
+    (tmp_path / "a.cpp").write_text(
+        "#include <ruedo/client.h>\n#include <ruedo/pose_t.hpp>\n"
+        "int main() { ruedo::client::LaunchOptions options; ruedo::pose_t pose; }\n"
+    )
+    build = 'eval g++ -std=c++17 a.cpp -o a "$(pkg-config --cflags --libs ruedo)"'
+    more = {"PKG_CONFIG_PATH": str(next(ours.glob("lib/**/pkgconfig")))}
+    run("sh", "-ec", build, cwd=tmp_path, more=more)
+    run(tmp_path / "a")
+
+
 def test_the_example_from_nothing_to_green(project):
     """Without goldens it says what to do; renewed, all is green, in parallel; twice gives the
     same.

@@ -16,13 +16,18 @@ SOURCE = Path(os.environ["RUEDO_SOURCE_DIR"])
 BUILD = Path(os.environ["RUEDO_BINARY_DIR"])
 sys.path.insert(0, str(SOURCE / "packaging"))
 
-import parts  # noqa: E402
+import parts
 
 # Of https://spdx.org/licenses: those that occur.
 SPDX = set(
-    "Apache-2.0 BSD-2-Clause BSD-3-Clause BSL-1.0 CC0-1.0 EPL-2.0 GPL-2.0-only IJG "
-    "LGPL-2.1-only LGPL-2.1-or-later LLVM-exception LicenseRef-public-domain MIT MPL-2.0 "
-    "X11-distribute-modifications-variant Zlib libpng-2.0 libtiff".split()
+    re.findall(
+        r"\S+",
+        """
+    Apache-2.0 BSD-2-Clause BSD-3-Clause BSL-1.0 CC0-1.0 EPL-2.0 GPL-2.0-only IJG LGPL-2.1-only
+    LGPL-2.1-or-later LLVM-exception LicenseRef-public-domain MIT MPL-2.0
+    X11-distribute-modifications-variant Zlib libpng-2.0 libtiff
+    """,
+    )
 )
 
 
