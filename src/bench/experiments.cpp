@@ -45,8 +45,9 @@ experiments again on a P3-AT: in the paper's setting, and in Ruedo's.
 The paper's setting is assumed to be a control loop at 50 Hz that starts to brake when the braking distance v^2 / (2 d) has reached the remaining distance.
 It notices this up to one frame late, and so drives up to v dt too far. The paper prints neither the loop nor its limits:
 4.2 and 0.27 m/s^2 are chosen so that such a loop nearly reproduces the paper's two numbers. The agreement in E1 therefore shows that late braking
-can explain them, not that it did. Ruedo plans a primitive in closed form and evaluates it exactly at every step, so that the distance
-does not depend on the step. The distance is measured at the step at which the primitive reports that it is done.
+can explain them, not that it did. Ruedo plans a primitive in closed form. The kinematic drive evaluates it exactly at every step, so that its distance
+does not depend on the step. That of the wheels drive does: its servos are told the plan once a step, and lag by a part of it. Rows that depend on the step
+say it; the target is for the usual 5 ms. The distance is measured at the step at which the primitive reports that it is done.
 
 ## E1: advance by one metre (the paper's Fig. 8)
 

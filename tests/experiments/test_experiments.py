@@ -10,6 +10,7 @@ import xml.etree.ElementTree
 
 import pytest
 
+ROOT = pathlib.Path(__file__).resolve().parents[2]
 RUEDO = pathlib.Path(os.environ["RUEDO_BINARY_DIR"]) / "bin" / "ruedo"
 HIGH, LOW = "acceleration 4.2, deceleration 0.27", "acceleration 0.27, deceleration 4.2"
 
@@ -56,18 +57,34 @@ def test_e1_the_papers_loop_gives_the_papers_numbers(numbers):
 def test_e1_ruedos_primitive_is_exact(numbers):
     for case in (HIGH, LOW):
         assert value(numbers, "E1", case, "kinematic drive: worst error") < 1e-3  # mm
-        assert value(numbers, "E1", case, "wheels drive") == pytest.approx(1000, abs=2)
+        assert value(numbers, "E1", case, "wheels drive, step 5 ms") == pytest.approx(1000, abs=2)
+        for step in ("20 ms", "50 ms"):  # said, and without a target
+            assert value(numbers, "E1", case, f"wheels drive, step {step}") > 900
+
+
+def test_the_committed_numbers_are_these(numbers):
+    """The page in docs/ is what its command gives now."""
+    committed = json.loads((ROOT / "docs/experiments/numbers.json").read_text())
+    for one, other in zip(numbers, committed, strict=True):
+        assert one["value"] == pytest.approx(other["value"], rel=1e-6, abs=1e-9), one["quantity"]
+        assert {**one, "value": 0} == {**other, "value": 0}
+
+
+def test_the_committed_page_is_this_one(run):
+    folder, _ = run
+    assert (folder / "experiments.md").read_text() == (ROOT / "docs/experiments.md").read_text()
 
 
 def test_e2_odometry(numbers):
     for component in ("in x", "in y"):
-        assert value(numbers, "E2", "drive, arc: mean", "kinematic", component) < 1e-3
+        assert value(numbers, "E2", "kinematic drive, arc, step", component) < 1e-3
         assert 0 < value(numbers, "E2", "34 000 ticks", component) < 0.5
         # Slip is there, and a calibrated track takes most of it away.
-        assert value(numbers, "E2", "wheels drive, arc, track", component) < 0.5 * value(
-            numbers, "E2", "wheels drive, arc: mean", component
-        )
-    assert value(numbers, "E2", "drive, arc: mean", "kinematic", "in heading") < 1e-9
+        for step in ("5 ms", "20 ms"):
+            assert value(numbers, "E2", "wheels drive, arc, track", step, component) < 0.5 * value(
+                numbers, "E2", f"wheels drive, arc, step {step}", component
+            )
+    assert value(numbers, "E2", "kinematic drive, arc, step", "in heading") < 1e-9
 
 
 def test_e2_in_the_papers_setting_is_reported_without_a_target(numbers):
