@@ -24,6 +24,7 @@ void PhysicsWorld::set_support(BodyIndex body, Support support) {
 
 void PhysicsWorld::guide(BodyIndex body, const Twist& mean, const Pose& X_WB) {
   BodyMotion& motion = impl_->motions_[body];
+  impl_->stir(body);
   motion.kind = BodyMotion::Kind::guided;
   motion.mean = mean;
   motion.end = X_WB;
@@ -31,6 +32,7 @@ void PhysicsWorld::guide(BodyIndex body, const Twist& mean, const Pose& X_WB) {
 
 void PhysicsWorld::drive(BodyIndex body, const Twist& twist) {
   BodyMotion& motion = impl_->motions_[body];
+  impl_->stir(body);
   motion.kind = BodyMotion::Kind::driven;
   motion.mean = twist;
 }
@@ -64,7 +66,7 @@ std::span<const Contact> PhysicsWorld::nearby(BodyIndex body) const {
   return impl_->contacts_.near(body);
 }
 bool PhysicsWorld::alone(BodyIndex body) const { return impl_->alone(body); }
-void PhysicsWorld::wake(BodyIndex body) { impl_->bullet(body).activate(true); }
+void PhysicsWorld::wake(BodyIndex body) { impl_->wake(body); }
 bool PhysicsWorld::may_sleep(BodyIndex body) const { return impl_->rigid_.bodies[body].sleeps; }
 void PhysicsWorld::sleep(BodyIndex body) { impl_->sleep(body); }
 bool PhysicsWorld::sleeping(BodyIndex body) const { return impl_->sleeping(body); }
@@ -77,18 +79,18 @@ double PhysicsWorld::joint_velocity(JointIndex joint) const {
 }
 double PhysicsWorld::joint_effort(JointIndex joint) const { return impl_->joints_[joint].effort(); }
 void PhysicsWorld::drive_joint_velocity(JointIndex joint, double rate, double max_effort) {
-  impl_->joints_[joint].set_motor(rate, -max_effort, max_effort,
+  impl_->stirred(joint).set_motor(rate, -max_effort, max_effort,
                                   std::numeric_limits<double>::infinity());
 }
 void PhysicsWorld::apply_joint_effort(JointIndex joint, double effort) {
-  impl_->joints_[joint].set_effort(effort);
+  impl_->stirred(joint).set_effort(effort);
 }
 void PhysicsWorld::servo_joint(JointIndex joint, const WheelServo& servo) {
-  impl_->joints_[joint].set_servo(servo);
+  impl_->stirred(joint).set_servo(servo);
 }
 
 void PhysicsWorld::set_joint(JointIndex joint, JointSetting setting, double value) {
-  impl_->joints_[joint].set(setting, value);
+  impl_->stirred(joint).set(setting, value);
 }
 
 TieIndex PhysicsWorld::make_tie(BodyIndex body, BodyIndex other) {
@@ -110,7 +112,7 @@ void PhysicsWorld::drive_wheel(WheelIndex wheel, const WheelServo& servo) {
   const WheelJointIndex joint = impl_->wheel_joint_[wheel];
   if (!joint.valid()) return;
   const bool ahead = impl_->wheel_sign_[wheel] > 0.0;
-  impl_->wheels_[joint].set_motor(ahead ? servo.rate : -servo.rate,
+  impl_->stirred(wheel).set_motor(ahead ? servo.rate : -servo.rate,
                                   ahead ? servo.lowest_torque : -servo.highest_torque,
                                   ahead ? servo.highest_torque : -servo.lowest_torque, servo.gain);
 }
@@ -118,7 +120,7 @@ void PhysicsWorld::drive_wheel(WheelIndex wheel, const WheelServo& servo) {
 void PhysicsWorld::add(InstanceIndex instance) { impl_->add(instance); }
 void PhysicsWorld::remove(InstanceIndex instance) { impl_->remove(instance); }
 void PhysicsWorld::disturb(BodyIndex body) { impl_->disturb(body); }
-void PhysicsWorld::reset(JointIndex joint) { impl_->joints_[joint].reset(); }
+void PhysicsWorld::reset(JointIndex joint) { impl_->stirred(joint).reset(); }
 
 const std::vector<Finding>& PhysicsWorld::findings() const { return impl_->rigid_.findings; }
 void PhysicsWorld::read(Snapshot& snapshot) const { impl_->read(snapshot); }

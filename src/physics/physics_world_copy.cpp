@@ -14,6 +14,9 @@ void PhysicsWorld::Impl::take(const Impl& other) {
   twists_ = other.twists_;
   last_twists_ = other.last_twists_;
   motions_ = other.motions_;
+  for (BodyMotion& motion : motions_) motion.listed = false;
+  busy_.clear();
+  stir_all();
   contacts_ = other.contacts_;
   tied_ = other.tied_;
   wind_ = other.wind_;
@@ -104,6 +107,7 @@ void PhysicsWorld::Impl::exchange(StateArchive& archive) {
     bullet(i).forceActivationState(rests[i].first);
     bullet(i).setDeactivationTime(rests[i].second);
   }
+  if (archive.reads()) stir_all();
 }
 
 std::vector<btTypedConstraint*> PhysicsWorld::Impl::numbered_constraints() {

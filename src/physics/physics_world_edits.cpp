@@ -9,9 +9,11 @@ namespace ruedo::physics {
 
 void PhysicsWorld::Impl::disturb(BodyIndex body) {
   btRigidBody& itself = bullet(body);
-  broadphase_.for_each_partner(itself.getBroadphaseHandle(),
-                               [](btCollisionObject& partner) { partner.activate(true); });
-  itself.activate(true);
+  broadphase_.for_each_partner(itself.getBroadphaseHandle(), [this](btCollisionObject& partner) {
+    const BodyIndex near = info_of(partner).body;
+    if (near.valid()) wake(near);
+  });
+  wake(body);
 }
 
 void PhysicsWorld::Impl::refilter_all() {
@@ -64,6 +66,7 @@ void PhysicsWorld::Impl::add(InstanceIndex instance) {
     broadphase_.refilter(bullet(i).getBroadphaseHandle(), &dispatcher_);
   }
   if (has_statics) refilter_all();
+  list_joints();
 }
 
 // Resets it to a new body at the layout's pose.
@@ -79,7 +82,7 @@ void PhysicsWorld::Impl::reset_body(BodyIndex body) {
   rigid.bullet->setGravity(to_bt(rigid.gravity));
   push_to_bullet(body);
   rigid.bullet->clearForces();
-  rigid.bullet->activate(true);
+  wake(body);
 }
 
 void PhysicsWorld::Impl::add_joints(InstanceIndex instance) {
@@ -113,7 +116,7 @@ void PhysicsWorld::Impl::remove(InstanceIndex instance) {
     broadphase_.for_each_partner(
         rigid.bullet->getBroadphaseHandle(),
         [&](btCollisionObject& partner) { neighbour |= is_of(info_of(partner)); });
-    if (neighbour && !rigid.info.gone) rigid.bullet->activate(true);
+    if (neighbour && !rigid.info.gone) wake(i);
   }
   const auto let_go = [&](JointConstraint& joint) {
     if (joint.constraint() && joint.constraint()->isEnabled())

@@ -123,6 +123,8 @@ PhysicsWorld::Impl::Impl(const world::WorldModel& world, const world::BodyLayout
   for (JointConstraint& joint : wheels_)
     if (joint.constraint()) dynamics_.addConstraint(joint.constraint(), true);
   last_twists_ = twists_;
+  list_joints();
+  stir_all();
 }
 
 void PhysicsWorld::Impl::refuse_crowded(BodyIndex body, int64_t most, const char* how) const {
@@ -229,13 +231,23 @@ void PhysicsWorld::Impl::add_wheel(WheelIndex i) {
   wheel_sign_.push_back(1.0);
   if (!link.body.valid() || link.body == robot.body) return;
   wheel_joint_[i] = wheels_.next();
-  rolling_.push_back(link.body);
   wheels_.push_back(make_joint(robot.instance, wheel.joint));
   const auto& model = *world_.models[robot.instance].model;
   const world::Joint& joint = model.joints[wheel.joint];
   const Vec3 axis_in_M = joint.X_MJ.rotation * joint.axis.axis_in_J;
   const Vec3 ahead_in_M = model.links[link.link].X_ML.rotation * wheel.axis_in_L;
   wheel_sign_[i] = axis_in_M.dot(ahead_in_M) < 0.0 ? -1.0 : 1.0;
+}
+
+void PhysicsWorld::Impl::list_joints() {
+  joints_of_.assign(motions_.size(), {});
+  wheels_of_.assign(motions_.size(), {});
+  for (const JointIndex i : joints_.indices())
+    if (const BodyIndex body = body_of(i); body.valid()) joints_of_[body].push_back(i);
+  for (const WheelIndex i : wheel_joint_.indices()) {
+    if (wheel_joint_[i].valid())
+      wheels_of_[layout_.links[layout_.wheels[i].link].body].push_back(wheel_joint_[i]);
+  }
 }
 
 void PhysicsWorld::Impl::tie(BodyIndex body, BodyIndex other) {
@@ -316,11 +328,46 @@ void PhysicsWorld::Impl::start(BodyIndex body) {
   twists_[body] = now;
 }
 
-void PhysicsWorld::Impl::choose_simulated() {
-  for (const BodyIndex i : motions_.indices()) {
+void PhysicsWorld::Impl::stir(BodyIndex body) {
+  if (!std::exchange(motions_[body].listed, true)) busy_.push_back(body);
+}
+
+void PhysicsWorld::Impl::stir_all() {
+  for (const BodyIndex i : motions_.indices()) stir(i);
+}
+
+JointConstraint& PhysicsWorld::Impl::stirred(JointIndex joint) {
+  const auto& placed = layout_.joints[joint];
+  for (const BodyIndex body : {placed.child_body, placed.parent_body})
+    if (body.valid()) stir(body);
+  return joints_[joint];
+}
+
+JointConstraint& PhysicsWorld::Impl::stirred(WheelIndex wheel) {
+  stir(layout_.links[layout_.wheels[wheel].link].body);
+  return wheels_[wheel_joint_[wheel]];
+}
+
+// Whether it moves by itself, or something outside moves it.
+bool PhysicsWorld::Impl::stirs(BodyIndex body) const {
+  const BodyMotion& motion = motions_[body];
+  const RigidBody& rigid = rigid_.bodies[body];
+  if (rigid.info.gone) return false;
+  const bool free = motion.kind == BodyMotion::Kind::free;
+  if (!rigid.info.moved) return !free || !sleeping(body);
+  const Twist& twist = free ? twists_[body] : motion.mean;
+  return !twist.linear.isZero(0.0) || !twist.angular.isZero(0.0);
+}
+
+// What stirs, and everything that it could reach in this step, through contacts and joints.
+void PhysicsWorld::Impl::find_busy() {
+  considered_.clear();
+  considered_.swap(busy_);
+  spreading_.clear();
+  for (const BodyIndex i : considered_) {
+    motions_[i].listed = motions_[i].simulated = false;
     if (rigid_.bodies[i].info.gone) continue;
     if (motions_[i].kind != BodyMotion::Kind::free) {
-      if (sleeping(i)) bullet(i).activate(true);
       bullet(i).setDeactivationTime(0.0);
       bullet(i).setActivationState(ACTIVE_TAG);
       update_box(i);
@@ -328,22 +375,41 @@ void PhysicsWorld::Impl::choose_simulated() {
       update_box(i);
     }
   }
+  const auto reach = [this](BodyIndex body) {
+    if (!body.valid() || motions_[body].listed || rigid_.bodies[body].info.gone) return;
+    stir(body);
+    if (!rigid_.bodies[body].info.moved) spreading_.push_back(body);
+  };
+  for (const BodyIndex i : considered_) {
+    if (rigid_.bodies[i].info.gone || (!stirs(i) && motions_[i].kind == BodyMotion::Kind::free))
+      continue;
+    reach(i);
+    if (rigid_.bodies[i].info.moved && stirs(i)) spreading_.push_back(i);
+  }
+  for (size_t next = 0; next < spreading_.size(); ++next) {
+    const BodyIndex body = spreading_[next];
+    broadphase_.for_each_partner(
+        bullet(body).getBroadphaseHandle(),
+        [&](const btCollisionObject& partner) { reach(info_of(partner).body); });
+    for (const BodyIndex other : rigid_.bodies[body].info.joined) reach(other);
+  }
+  std::sort(busy_.begin(), busy_.end());
+}
+
+void PhysicsWorld::Impl::choose_simulated() {
+  find_busy();
   bool any = false;
-  for (const BodyIndex i : motions_.indices()) {
+  for (const BodyIndex i : busy_) {
     BodyMotion& motion = motions_[i];
-    motion.simulated = false;
-    if (rigid_.bodies[i].info.gone) continue;
-    const bool alone_now = alone(i);
     motion.simulated =
-        motion.tied || !alone_now ||
+        motion.tied || !alone(i) ||
         (motion.kind != BodyMotion::Kind::guided && !sleeping(i) && !rigid_.bodies[i].info.moved);
     if (motion.simulated) start(i);
     any |= motion.simulated;
   }
-  if (any)
-    choose_pace();
-  else
-    for (auto& bodies : simulated_) bodies.clear();
+  for (auto& bodies : simulated_) bodies.clear();
+  if (any) choose_pace();
+  choose_joints();
 }
 
 BodyIndex PhysicsWorld::Impl::root(BodyIndex body) {
@@ -354,9 +420,8 @@ BodyIndex PhysicsWorld::Impl::root(BodyIndex body) {
 // Bodies connected by joints, and everything that may touch them in this step, use the shorter
 // substeps.
 void PhysicsWorld::Impl::choose_pace() {
-  for (auto& bodies : simulated_) bodies.clear();
   parents_.resize(motions_.size());
-  std::iota(parents_.begin(), parents_.end(), BodyIndex(0));
+  for (const BodyIndex i : busy_) parents_[i] = i;
   const auto movable = [&](BodyIndex body) {
     return body.valid() && motions_[body].simulated && !rigid_.bodies[body].info.moved;
   };
@@ -365,21 +430,17 @@ void PhysicsWorld::Impl::choose_pace() {
     const BodyIndex of_a = root(a), of_b = root(b);
     parents_[std::max(of_a, of_b)] = std::min(of_a, of_b);
   };
-  for (const auto& [a, b] : tied_) together(a, b);
-  const btBroadphasePairArray& pairs =
-      broadphase_.getOverlappingPairCache()->getOverlappingPairArray();
-  for (int i = 0; i < pairs.size(); ++i) {
-    const BodyIndex a =
-        info_of(*static_cast<btCollisionObject*>(pairs[i].m_pProxy0->m_clientObject)).body;
-    const BodyIndex b =
-        info_of(*static_cast<btCollisionObject*>(pairs[i].m_pProxy1->m_clientObject)).body;
-    together(a, b);
+  for (const BodyIndex i : busy_) {
+    for (const BodyIndex other : rigid_.bodies[i].info.joined) together(i, other);
+    broadphase_.for_each_partner(
+        bullet(i).getBroadphaseHandle(),
+        [&](const btCollisionObject& partner) { together(i, info_of(partner).body); });
+    motions_[i].fine = motions_[i].led = false;
   }
-  for (BodyMotion& motion : motions_) motion.fine = false;
   find_led();
   find_hurried();
   find_fast();
-  for (const BodyIndex i : motions_.indices()) {
+  for (const BodyIndex i : busy_) {
     if (!motions_[i].simulated) continue;
     if (rigid_.bodies[i].info.moved) continue;
     motions_[i].fine = motions_[root(i)].fine;
@@ -391,19 +452,20 @@ void PhysicsWorld::Impl::choose_pace() {
 // A mechanism fixed to the world whose motors prescribe every joint, and that touches nothing,
 // moves as prescribed: shorter substeps would give the same path.
 void PhysicsWorld::Impl::find_led() {
-  for (BodyMotion& motion : motions_) motion.led = false;
-  for (const BodyIndex i : motions_.indices()) {
+  for (const BodyIndex i : busy_) {
     if (motions_[i].simulated && motions_[i].hung) motions_[root(i)].led = true;
   }
-  for (const BodyIndex i : motions_.indices()) {
+  for (const BodyIndex i : busy_) {
     if (motions_[i].simulated && !alone(i)) motions_[root(i)].led = false;
   }
-  for (const JointIndex i : joints_.indices()) {
-    const auto stray = [this](BodyIndex body) {
-      if (body.valid() && motions_[body].simulated) motions_[root(body)].led = false;
-    };
-    if (!joints_[i].leads()) stray(body_of(i));
-    if (leaders_[i].valid()) stray(body_of(leaders_[i]));  // a mimic joint moves with its leader
+  const auto stray = [this](BodyIndex body) {
+    if (body.valid() && motions_[body].simulated) motions_[root(body)].led = false;
+  };
+  for (const BodyIndex body : busy_) {
+    for (const JointIndex i : joints_of_[body]) {
+      if (!joints_[i].leads()) stray(body);
+      if (leaders_[i].valid()) stray(body_of(leaders_[i]));  // a mimic joint moves with its leader
+    }
   }
 }
 
@@ -412,7 +474,7 @@ void PhysicsWorld::Impl::find_led() {
 void PhysicsWorld::Impl::find_hurried() {
   constexpr double kStill_m_s = 1e-3, kStill_rad_s = 1e-3;
   constexpr int kStillSteps = 20;
-  for (const BodyIndex i : motions_.indices()) {
+  for (const BodyIndex i : busy_) {
     BodyMotion& motion = motions_[i];
     if (!motion.simulated || !motion.tied) continue;
     const bool still = twists_[i].linear.squaredNorm() < kStill_m_s * kStill_m_s &&
@@ -420,14 +482,12 @@ void PhysicsWorld::Impl::find_hurried() {
     motion.still = still ? std::min(motion.still + 1, kStillSteps) : 0;
     if (motion.still < kStillSteps && !motions_[root(i)].led) motions_[root(i)].fine = true;
   }
-  for (const JointIndex i : joints_.indices()) {
-    const BodyIndex body = body_of(i);
-    if (!body.valid() || !motions_[body].simulated) continue;
+  for (const BodyIndex body : busy_) {
+    if (!motions_[body].simulated) continue;
     BodyMotion& first = motions_[root(body)];
-    if ((joints_[i].may_start() && !first.led) || leaders_[i].valid()) first.fine = true;
-  }
-  for (const BodyIndex body : rolling_) {
-    if (motions_[body].simulated) motions_[root(body)].fine = true;
+    for (const JointIndex i : joints_of_[body])
+      if ((joints_[i].may_start() && !first.led) || leaders_[i].valid()) first.fine = true;
+    if (!wheels_of_[body].empty()) first.fine = true;
   }
 }
 
@@ -436,7 +496,7 @@ void PhysicsWorld::Impl::find_hurried() {
 void PhysicsWorld::Impl::find_fast() {
   constexpr double kFarthest = 0.5, kFarthest_rad = 0.2;  // of the half thickness
   const double substep_s = static_cast<double>(std::min(step_us_, kLongestSubstep_us)) * 1e-6;
-  for (const BodyIndex i : motions_.indices()) {
+  for (const BodyIndex i : busy_) {
     const RigidBody& rigid = rigid_.bodies[i];
     if (!motions_[i].simulated || motions_[i].kind != BodyMotion::Kind::free || rigid.info.moved ||
         sleeping(i) || rigid.info.shapes.empty())
@@ -447,6 +507,20 @@ void PhysicsWorld::Impl::find_fast() {
         twists_[i].angular.norm() * substep_s > kFarthest_rad)
       motions_[root(i)].fine = true;
   }
+}
+
+// The joints of simulated bodies.
+void PhysicsWorld::Impl::choose_joints() {
+  for (auto& joints : busy_joints_) joints.clear();
+  busy_wheels_.clear();
+  for (const BodyIndex body : busy_) {
+    if (!motions_[body].simulated) continue;
+    auto& joints = busy_joints_[motions_[body].fine ? kFine : kCoarse];
+    joints.insert(joints.end(), joints_of_[body].begin(), joints_of_[body].end());
+    busy_wheels_.insert(busy_wheels_.end(), wheels_of_[body].begin(), wheels_of_[body].end());
+  }
+  for (auto& joints : busy_joints_) std::sort(joints.begin(), joints.end());
+  std::sort(busy_wheels_.begin(), busy_wheels_.end());
 }
 
 // A mover continues along its path; Bullet leaves its pose unchanged.
@@ -462,8 +536,7 @@ void PhysicsWorld::Impl::set_wind(const Vec3& wind) {
   wind_ = wind;
   if (!world_.environment.wind.pushes || wind_ == Vec3::Zero()) return;
   for (const RigidBody& rigid : rigid_.bodies) {
-    if (rigid.wind_mass > 0.0 && !rigid.info.moved && !rigid.info.gone)
-      rigid.bullet->activate(true);
+    if (rigid.wind_mass > 0.0 && !rigid.info.moved && !rigid.info.gone) wake(rigid.info.body);
   }
 }
 
@@ -472,7 +545,7 @@ void PhysicsWorld::Impl::set_wind(const Vec3& wind) {
 void PhysicsWorld::Impl::blow(int pace) {
   if (!world_.environment.wind.pushes) return;
   const double gain = world_.environment.wind.gain;
-  for (const BodyIndex i : motions_.indices()) {
+  for (const BodyIndex i : busy_) {
     const RigidBody& rigid = rigid_.bodies[i];
     if (rigid.wind_mass == 0.0 || rigid.info.moved || rigid.info.gone) continue;
     if (!motions_[i].simulated || motions_[i].fine != (pace == kFine)) continue;
@@ -484,33 +557,22 @@ void PhysicsWorld::Impl::blow(int pace) {
 
 void PhysicsWorld::Impl::before_substep(int pace, double substep_s) {
   blow(pace);
-  for (const JointIndex i : joints_.indices()) {
-    if (!leaders_[i].valid() || !at_pace(i, pace)) continue;
+  for (const JointIndex i : busy_joints_[pace]) {
+    if (!leaders_[i].valid()) continue;
     const JointConstraint& leader = joints_[leaders_[i]];
     joints_[i].follow(leader.position(), leader.velocity(), substep_s);
   }
-  for (const JointIndex i : joints_.indices()) {
-    if (at_pace(i, pace)) joints_[i].before_substep(substep_s);
-  }
+  for (const JointIndex i : busy_joints_[pace]) joints_[i].before_substep(substep_s);
   if (pace == kFine) {
-    for (JointConstraint& joint : wheels_) joint.before_substep(substep_s);
+    for (const WheelJointIndex i : busy_wheels_) wheels_[i].before_substep(substep_s);
   }
 }
 
 void PhysicsWorld::Impl::after_substep(int pace, double substep_s) {
-  for (const JointIndex i : joints_.indices()) {
-    if (at_pace(i, pace)) joints_[i].after_substep(substep_s);
-  }
+  for (const JointIndex i : busy_joints_[pace]) joints_[i].after_substep(substep_s);
   if (pace == kFine) {
-    for (JointConstraint& joint : wheels_) joint.after_substep(substep_s);
+    for (const WheelJointIndex i : busy_wheels_) wheels_[i].after_substep(substep_s);
   }
-}
-
-// A body that takes no part keeps its short substeps.
-bool PhysicsWorld::Impl::at_pace(JointIndex joint, int pace) const {
-  const BodyIndex body = body_of(joint);
-  const bool coarse = body.valid() && motions_[body].simulated && !motions_[body].fine;
-  return coarse == (pace == kCoarse);
 }
 
 BodyIndex PhysicsWorld::Impl::body_of(JointIndex joint) const {
@@ -524,41 +586,52 @@ void PhysicsWorld::Impl::step_at(int pace) {
   if (bodies.empty()) return;
   std::vector<std::pair<btRigidBody*, btTransform>>& movers = movers_;
   movers.clear();
-  bool moving = false;
-  for (const BodyIndex i : motions_.indices()) {
+  for (const BodyIndex i : busy_) {
     if (!motions_[i].simulated || !rigid_.bodies[i].info.moved) continue;
     btRigidBody& mover = *rigid_.bodies[i].bullet;
     bodies.push_back(&mover);
     movers.emplace_back(&mover, mover.getWorldTransform());
-    moving |= motions_[i].kind != BodyMotion::Kind::free;
   }
   dynamics_.take(bodies);
   const double substep_s = static_cast<double>(step_us_) * 1e-6 / substeps_[pace];
-  if (!moving && !dynamics_.awake()) {  // things at rest keep their contacts
-    dynamics_.find_manifolds();
-    contacts_.add(dynamics_.manifolds(), substeps_[pace], true);
-    return;
-  }
   for (int s = 0; s < substeps_[pace]; ++s) {
     before_substep(pace, substep_s);
     dynamics_.substep(substep_s);
     bound_speeds(bodies);
     after_substep(pace, substep_s);
-    contacts_.add(dynamics_.manifolds(), 1, s + 1 == substeps_[pace]);
+    contacts_.add(dynamics_.manifolds(), s + 1 == substeps_[pace]);
     for (auto& [mover, start] : movers) advance(*mover, substep_s);
   }
   for (auto& [mover, start] : movers)
     mover->setWorldTransform(start);  // the other substep length starts there, too
 }
 
+// Contacts between bodies at rest stay as they were when these came to rest.
+void PhysicsWorld::Impl::begin_contacts() {
+  const auto awake = [this](BodyIndex body) {
+    return body.valid() && motions_[body].listed && !rigid_.bodies[body].info.moved;
+  };
+  const auto gone = [this](BodyIndex body) {
+    return body.valid() && rigid_.bodies[body].info.gone;
+  };
+  const auto rests = [&](const Contact& contact) {
+    return !awake(contact.body_a) && !awake(contact.body_b) && !gone(contact.body_a) &&
+           !gone(contact.body_b);
+  };
+  bool any_woke = false;
+  for (const auto* bodies : {&busy_, &considered_})
+    for (const BodyIndex i : *bodies) any_woke |= contacts_.rests(i) && (awake(i) || gone(i));
+  contacts_.begin(static_cast<double>(step_us_) * 1e-6, any_woke, rests);
+}
+
 void PhysicsWorld::Impl::step() {
-  last_twists_ = twists_;
+  for (const BodyIndex i : busy_) last_twists_[i] = twists_[i];
   choose_simulated();
-  contacts_.clear(static_cast<double>(step_us_) * 1e-6);
+  begin_contacts();
   step_at(kCoarse);
   step_at(kFine);
   contacts_.finish();
-  for (const BodyIndex i : motions_.indices()) {
+  for (const BodyIndex i : busy_) {
     BodyMotion& motion = motions_[i];
     const bool moved = rigid_.bodies[i].info.moved;
     if (motion.simulated && !moved && (motion.awake || !sleeping(i))) pull_from_bullet(i);
@@ -597,6 +670,7 @@ void PhysicsWorld::Impl::set_support(BodyIndex body, Support support) {
   RigidBody& rigid = rigid_.bodies[body];
   const bool plane = support == Support::plane;
   if (rigid.info.on_plane == plane) return;
+  stir(body);
   rigid.info.on_plane = plane;
   rigid.bullet->setLinearFactor(plane ? btVector3(1, 1, 0) : btVector3(1, 1, 1));
   rigid.bullet->setAngularFactor(plane ? btVector3(0, 0, 1) : btVector3(1, 1, 1));
@@ -605,7 +679,7 @@ void PhysicsWorld::Impl::set_support(BodyIndex body, Support support) {
 
 void PhysicsWorld::Impl::apply_impulse(BodyIndex body, const Vec3& linear, const Vec3& angular) {
   if (motions_[body].dirty) push_to_bullet(body);
-  bullet(body).activate(true);
+  wake(body);
   bullet(body).applyCentralImpulse(to_bt(linear));
   bullet(body).applyTorqueImpulse(to_bt(angular));
   const Pose pose = poses_[body];
@@ -614,6 +688,7 @@ void PhysicsWorld::Impl::apply_impulse(BodyIndex body, const Vec3& linear, const
 }
 
 void PhysicsWorld::Impl::sleep(BodyIndex body) {
+  stir(body);
   twists_[body] = Twist{};
   push_to_bullet(body);
   bullet(body).setActivationState(ISLAND_SLEEPING);
@@ -651,6 +726,8 @@ void PhysicsWorld::Impl::read(Snapshot& snapshot) {
   }
   snapshot.contacts.reserve(contacts_.room());
   snapshot.contacts = contacts_.all();
+  snapshot.contacts.insert(snapshot.contacts.end(), contacts_.at_rest().begin(),
+                           contacts_.at_rest().end());
 }
 
 }  // namespace ruedo::physics

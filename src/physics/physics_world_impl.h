@@ -37,6 +37,7 @@ struct BodyMotion {
   bool led = false;        // for a mechanism's first body: motors prescribe its motion
   int still = 0;           // number of steps with hardly any motion, for bodies with joints
   bool fresh = true;       // placed since the last step, so that its acceleration is not known
+  bool listed = false;     // in Impl::busy_; not archived: listing more changes nothing
   Twist mean;
   Pose end;
   void exchange(StateArchive& archive) {
@@ -65,14 +66,25 @@ class PhysicsWorld::Impl {
   void exchange(StateArchive& archive);
 
   void set_pose(BodyIndex body, const Pose& pose) {
+    stir(body);
     poses_[body] = pose;
     motions_[body].dirty = true;
     update_box(body);
   }
   void set_twist(BodyIndex body, const Twist& twist) {
+    stir(body);
     twists_[body] = twist;
     motions_[body].dirty = true;
   }
+  // The next step considers the body. To be called by everything that moves or wakes it: a step
+  // looks at no other bodies, so that those at rest cost nothing.
+  void stir(BodyIndex body);
+  void wake(BodyIndex body) {
+    bullet(body).activate(true);
+    stir(body);
+  }
+  JointConstraint& stirred(JointIndex joint);  // for a command: likewise for its bodies
+  JointConstraint& stirred(WheelIndex wheel);
   void set_support(BodyIndex body, Support support);
   void apply_impulse(BodyIndex body, const Vec3& linear, const Vec3& angular);
   void add(InstanceIndex instance);
@@ -125,7 +137,6 @@ class PhysicsWorld::Impl {
   void find_led();
   void find_hurried();
   void find_fast();
-  bool at_pace(JointIndex joint, int pace) const;
   BodyIndex body_of(JointIndex joint) const;  // the body that moves
   void step_at(int pace);
   void advance(btRigidBody& mover, double substep_s);
@@ -140,7 +151,13 @@ class PhysicsWorld::Impl {
   void pull_from_bullet(BodyIndex body);
   void start(BodyIndex body);  // sets its velocity at the start of the step
   void update_box(BodyIndex body);
+  void list_joints();
+  void stir_all();
+  bool stirs(BodyIndex body) const;
+  void find_busy();
   void choose_simulated();
+  void choose_joints();
+  void begin_contacts();
   std::vector<BodyIndex> mechanism_in_the_air(BodyIndex body) const;
   Vec3 velocity_now(BodyIndex body) const;
   void fall_at_start(const std::vector<BodyIndex>& bodies, Snapshot& snapshot) const;
@@ -164,8 +181,15 @@ class PhysicsWorld::Impl {
   Dynamics dynamics_;
   Vec3 wind_ = Vec3::Zero();
   std::vector<btRigidBody*> simulated_[2];             // for each substep length
+  // Bodies that may move in this step, and what they could reach, in order; between two steps those
+  // that the next one considers, in any order. What sleeps together is not among them.
+  std::vector<BodyIndex> busy_;
+  std::vector<BodyIndex> considered_, spreading_;                // scratch
+  IndexedVector<BodyIndex, std::vector<JointIndex>> joints_of_;  // those that move it
+  IndexedVector<BodyIndex, std::vector<WheelJointIndex>> wheels_of_;
+  std::vector<JointIndex> busy_joints_[2];  // for each substep length, in order
+  std::vector<WheelJointIndex> busy_wheels_;
   IndexedVector<BodyIndex, BodyIndex> parents_;        // union-find over bodies
-  std::vector<BodyIndex> rolling_;                     // driven wheels
   std::vector<std::pair<BodyIndex, BodyIndex>> tied_;  // pairs connected by a joint
   IndexedVector<TieIndex, Tie> ties_;
   // with their poses at the start of the step

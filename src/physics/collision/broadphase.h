@@ -36,6 +36,14 @@ class Broadphase final : public btBroadphaseInterface {
     for (const Proxy* partner : static_cast<const Proxy*>(proxy)->partners)
       visit(*static_cast<btCollisionObject*>(partner->m_clientObject));
   }
+  // The same, with the pair: visit(pair, object). Pairs stay in their places until one is added or
+  // removed.
+  template <class Visit>
+  void for_each_pair(btBroadphaseProxy* proxy, Visit visit) {
+    for (Proxy* partner : static_cast<Proxy*>(proxy)->partners)
+      visit(*pairs_.findPair(proxy, partner),
+            *static_cast<const btCollisionObject*>(partner->m_clientObject));
+  }
   // Whether nothing is near that the body could touch.
   bool alone(const btBroadphaseProxy* proxy) const {
     return static_cast<const Proxy*>(proxy)->partners.empty();

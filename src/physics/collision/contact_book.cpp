@@ -80,17 +80,52 @@ void ContactBook::make_room(size_t bodies) {
   near_.reserve(2 * contacts);
 }
 
-void ContactBook::clear(double step_s) {
-  step_s_ = step_s;
-  several_ = false;
-  contacts_.clear();
-  near_only_.clear();
-  touching_.clear();
-  near_.clear();
+void ContactBook::resize(size_t bodies) {
+  for (ByBody* each : {&touching_, &near_, &resting_touching_, &resting_near_})
+    each->resize(bodies);
+  rests_.resize(bodies);
+  make_room(bodies);
 }
 
-void ContactBook::add(const std::vector<btPersistentManifold*>& manifolds, int substeps,
-                      bool last) {
+void ContactBook::sort(std::vector<Contact>& contacts) {
+  std::sort(contacts.begin(), contacts.end(), earlier);
+}
+
+// After the contacts at rest have changed. What touches is near, too.
+void ContactBook::note_resting() {
+  resting_touching_.clear();
+  resting_near_.clear();
+  std::fill(rests_.begin(), rests_.end(), 0);
+  for (const Contact& contact : *near_at_rest_) {
+    for (const BodyIndex body : {contact.body_a, contact.body_b})
+      if (body.valid()) rests_[body] = 1;
+  }
+}
+
+std::span<const Contact> ContactBook::of(BodyIndex body, ByBody& moving,
+                                         const std::vector<Contact>& contacts, ByBody& resting,
+                                         const std::vector<Contact>& at_rest) {
+  const std::span<const Contact> here = moving.of(body, contacts);
+  if (!rests_[body]) return here;
+  const std::span<const Contact> there = resting.of(body, at_rest);
+  if (here.empty()) return there;
+  both_.assign(here.begin(), here.end());  // something driven, which both touch
+  both_.insert(both_.end(), there.begin(), there.end());
+  return both_;
+}
+
+void ContactBook::exchange(StateArchive& archive) {
+  std::vector<Contact> resting = *resting_, near = *near_at_rest_;
+  archive(step_s_, several_, contacts_, near_only_, resting, near);
+  if (!archive.reads()) return;
+  touching_.clear();
+  near_.clear();
+  resting_ = std::make_shared<std::vector<Contact>>(std::move(resting));
+  near_at_rest_ = std::make_shared<std::vector<Contact>>(std::move(near));
+  note_resting();
+}
+
+void ContactBook::add(const std::vector<btPersistentManifold*>& manifolds, bool last) {
   several_ |= !last;
   for (const btPersistentManifold* each : manifolds) {
     const btPersistentManifold& manifold = *each;
@@ -112,7 +147,7 @@ void ContactBook::add(const std::vector<btPersistentManifold*>& manifolds, int s
       contact.depth = -point.getDistance();
       const bool touches = point.getAppliedImpulse() > 0.0 || contact.depth >= 0.0;
       if (touches) {
-        const double per_s = substeps / step_s_;
+        const double per_s = 1.0 / step_s_;
         contact.force = point.getAppliedImpulse() * per_s;
         contact.friction =
             per_s * from_bt(point.m_appliedImpulseLateral1 * point.m_lateralFrictionDir1 +
@@ -157,7 +192,7 @@ void ContactBook::merge() {
 
 void ContactBook::finish() {
   if (contacts_.empty() && near_only_.empty()) return;
-  std::sort(contacts_.begin(), contacts_.end(), earlier);
+  sort(contacts_);
   if (several_) merge();
   near_only_.insert(near_only_.end(), contacts_.begin(), contacts_.end());
 }

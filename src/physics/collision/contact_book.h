@@ -1,7 +1,10 @@
 // The contacts of a step: read from Bullet's manifolds after each substep, put into a fixed order,
-// and grouped by the bodies involved.
+// and grouped by the bodies involved. Those between bodies at rest are kept from step to step.
 #pragma once
 
+#include <algorithm>
+#include <iterator>
+#include <memory>
 #include <span>
 #include <vector>
 
@@ -13,37 +16,41 @@ namespace ruedo::physics {
 
 class ContactBook {
  public:
-  explicit ContactBook(size_t bodies) : touching_(bodies), near_(bodies) { make_room(bodies); }
+  explicit ContactBook(size_t bodies) { resize(bodies); }
 
-  void resize(size_t bodies) { touching_.resize(bodies), near_.resize(bodies), make_room(bodies); }
+  void resize(size_t bodies);
   // Capacity reserved in advance, so that new contacts do not allocate in the running loop. What is
   // not used costs address space only.
   size_t room() const { return contacts_.capacity(); }
 
-  // Starts a step of that length (s).
-  void clear(double step_s);
-  // Adds the manifolds' contacts after a substep; the last substep defines what is near. If
-  // everything sleeps, one call counts as `substeps`.
-  void add(const std::vector<btPersistentManifold*>& manifolds, int substeps, bool last);
+  // Whether the body has a contact at rest.
+  bool rests(BodyIndex body) const { return rests_[body]; }
+  // Starts a step of that length (s). rests(contact) tells for those of the last step whether their
+  // bodies rest from now on; with `any_woke` it is also asked for those that rested so far.
+  template <class Rests>
+  void begin(double step_s, bool any_woke, const Rests& rests);
+  // Adds the manifolds' contacts after a substep; the last substep defines what is near.
+  void add(const std::vector<btPersistentManifold*>& manifolds, bool last);
   // Ends the step.
   void finish();
 
-  void exchange(StateArchive& archive) {
-    touching_.clear();
-    near_.clear();
-    archive(step_s_, several_, contacts_, near_only_);
-  }
+  void exchange(StateArchive& archive);
 
-  const std::vector<Contact>& all() const { return contacts_; }  // contacts with a force
+  // Those with a force.
+  const std::vector<Contact>& all() const { return contacts_; }
+  const std::vector<Contact>& at_rest() const { return *resting_; }
   // Contacts are grouped by body only once somebody asks.
-  std::span<const Contact> touching(BodyIndex body) { return touching_.of(body, contacts_); }
-  std::span<const Contact> near(BodyIndex body) { return near_.of(body, near_only_); }
+  std::span<const Contact> touching(BodyIndex body) {
+    return of(body, touching_, contacts_, resting_touching_, *resting_);
+  }
+  std::span<const Contact> near(BodyIndex body) {
+    return of(body, near_, near_only_, resting_near_, *near_at_rest_);
+  }
 
  private:
   // Contacts grouped by body, with that body as `a`.
   class ByBody {
    public:
-    explicit ByBody(size_t bodies) : ranges_(bodies, {0, 0}) { bodies_.reserve(bodies); }
     void resize(size_t bodies) { ranges_.resize(bodies, {0, 0}), bodies_.reserve(bodies); }
     void reserve(size_t contacts) { entries_.reserve(contacts); }
     void clear();
@@ -61,8 +68,17 @@ class ContactBook {
     IndexedVector<BodyIndex, std::pair<size_t, size_t>> ranges_;  // first, count
   };
 
+  using List = std::shared_ptr<const std::vector<Contact>>;
+
+  std::span<const Contact> of(BodyIndex body, ByBody& moving, const std::vector<Contact>& contacts,
+                              ByBody& resting, const std::vector<Contact>& at_rest);
   void make_room(size_t bodies);
   void merge();
+  template <class Rests>
+  static void put_to_rest(const std::vector<Contact>& contacts, List& resting, bool any_woke,
+                          const Rests& rests);
+  static void sort(std::vector<Contact>& contacts);
+  void note_resting();
 
   double step_s_ = 0.0;
   bool several_ = false;  // several substeps share the manifolds
@@ -70,6 +86,35 @@ class ContactBook {
   std::vector<Contact> near_only_;  // of the last substep
   std::vector<Contact> merged_;     // scratch
   ByBody touching_, near_;
+  List resting_ = std::make_shared<std::vector<Contact>>(), near_at_rest_ = resting_;
+  ByBody resting_touching_, resting_near_;
+  IndexedVector<BodyIndex, char> rests_;
+  std::vector<Contact> both_;  // scratch: a body's contacts of both kinds
 };
+
+template <class Rests>
+void ContactBook::put_to_rest(const std::vector<Contact>& contacts, List& resting, bool any_woke,
+                              const Rests& rests) {
+  if (!any_woke && std::none_of(contacts.begin(), contacts.end(), rests)) return;
+  auto list = std::make_shared<std::vector<Contact>>();
+  for (const auto* from : {resting.get(), &contacts})
+    std::copy_if(from->begin(), from->end(), std::back_inserter(*list), rests);
+  sort(*list);
+  resting = std::move(list);
+}
+
+template <class Rests>
+void ContactBook::begin(double step_s, bool any_woke, const Rests& rests) {
+  const List before = near_at_rest_;
+  put_to_rest(contacts_, resting_, any_woke, rests);
+  put_to_rest(near_only_, near_at_rest_, any_woke, rests);
+  if (near_at_rest_ != before) note_resting();
+  step_s_ = step_s;
+  several_ = false;
+  contacts_.clear();
+  near_only_.clear();
+  touching_.clear();
+  near_.clear();
+}
 
 }  // namespace ruedo::physics

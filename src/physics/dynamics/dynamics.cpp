@@ -28,10 +28,6 @@ bool can_be_moved(const btCollisionObject& object) {
   return takes_part(object) && !object.isStaticOrKinematicObject();
 }
 
-const btCollisionObject& object_of(const btBroadphaseProxy& proxy) {
-  return *static_cast<const btCollisionObject*>(proxy.m_clientObject);
-}
-
 bool asleep(const btRigidBody& body) { return body.getActivationState() == ISLAND_SLEEPING; }
 
 bool moves(const btCollisionObject& object) {
@@ -77,10 +73,11 @@ std::tuple<int, int, int, int> place_of(const btPersistentManifold& manifold) {
 
 }  // namespace
 
-Dynamics::Dynamics(btDispatcher& dispatcher, btBroadphaseInterface& broadphase,
+Dynamics::Dynamics(btDispatcher& dispatcher, Broadphase& broadphase,
                    btCollisionConfiguration& configuration, const ContactSurfaces& surfaces,
                    const SolverSettings& settings)
     : btDiscreteDynamicsWorld(&dispatcher, &broadphase, nullptr, &configuration),
+      near_(broadphase),
       solver_(surfaces, settings) {}
 
 void Dynamics::reserve(size_t bodies) {
@@ -106,10 +103,12 @@ void Dynamics::take(const std::vector<btRigidBody*>& bodies) {
   manifolds_.clear();
   joints_.clear();
   if (bodies_.empty()) return;
-  btBroadphasePairArray& pairs = getPairCache()->getOverlappingPairArray();
-  for (int i = 0; i < pairs.size(); ++i) {
-    if (takes_part(object_of(*pairs[i].m_pProxy0)) || takes_part(object_of(*pairs[i].m_pProxy1)))
-      pairs_.push_back(&pairs[i]);
+  for (btRigidBody* body : bodies_) {
+    if (body->isStaticOrKinematicObject()) continue;  // the other one of a pair can be moved
+    near_.for_each_pair(body->getBroadphaseHandle(), [&](btBroadphasePair& pair,
+                                                         const btCollisionObject& partner) {
+      if (!can_be_moved(partner) || number(*body) < number(partner)) pairs_.push_back(&pair);
+    });
   }
   std::sort(pairs_.begin(), pairs_.end(), [](const btBroadphasePair* a, const btBroadphasePair* b) {
     return std::pair(a->m_pProxy0->m_uniqueId, a->m_pProxy1->m_uniqueId) <
@@ -152,18 +151,14 @@ void Dynamics::exchange(StateArchive& archive, const std::vector<btTypedConstrai
   }
 }
 
-bool Dynamics::awake() const {
-  return std::any_of(bodies_.begin(), bodies_.end(),
-                     [](const btRigidBody* body) { return body->isActive(); });
-}
-
 void Dynamics::find_manifolds() {
   manifolds_.clear();
-  for (int i = 0; i < getDispatcher()->getNumManifolds(); ++i) {
-    btPersistentManifold* manifold = getDispatcher()->getManifoldByIndexInternal(i);
-    if (manifold->getNumContacts() == 0) continue;
-    if (takes_part(*manifold->getBody0()) || takes_part(*manifold->getBody1()))
-      manifolds_.push_back(manifold);
+  for (const btBroadphasePair* pair : pairs_) {
+    if (!pair->m_algorithm) continue;
+    of_pair_.resizeNoInitialize(0);
+    pair->m_algorithm->getAllContactManifolds(of_pair_);
+    for (int i = 0; i < of_pair_.size(); ++i)
+      if (of_pair_[i]->getNumContacts() > 0) manifolds_.push_back(of_pair_[i]);
   }
   std::sort(manifolds_.begin(), manifolds_.end(),
             [](const btPersistentManifold* a, const btPersistentManifold* b) {

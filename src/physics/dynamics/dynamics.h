@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "physics/base/bullet.h"
+#include "physics/collision/broadphase.h"
 #include "physics/collision/contact_points.h"
 #include "physics/dynamics/solver.h"
 #include "ruedo/state_archive.h"
@@ -18,7 +19,7 @@ namespace ruedo::physics {
 
 class Dynamics final : public btDiscreteDynamicsWorld {
  public:
-  Dynamics(btDispatcher& dispatcher, btBroadphaseInterface& broadphase,
+  Dynamics(btDispatcher& dispatcher, Broadphase& broadphase,
            btCollisionConfiguration& configuration, const ContactSurfaces& surfaces,
            const SolverSettings& settings);
 
@@ -26,10 +27,9 @@ class Dynamics final : public btDiscreteDynamicsWorld {
   // allocate.
   void reserve(size_t bodies);
 
-  // Selects the bodies that are simulated from now on. All bodies of all pairs and joints must be
-  // among them.
+  // Selects the bodies that are simulated from now on. What contacts and joints could move with one
+  // of them must be among them.
   void take(const std::vector<btRigidBody*>& bodies);
-  bool awake() const;  // whether one of them is awake
 
   // Takes the state of another copy of the world that has the same pairs in the same order, as far
   // as Bullet keeps any. All objects must be awake. joint_here maps the other world's joints to
@@ -45,7 +45,6 @@ class Dynamics final : public btDiscreteDynamicsWorld {
 
   // Of the simulated bodies, those that touch something or are near it, in a fixed order.
   const std::vector<btPersistentManifold*>& manifolds() const { return manifolds_; }
-  void find_manifolds();
 
  private:
   struct Island {
@@ -54,17 +53,20 @@ class Dynamics final : public btDiscreteDynamicsWorld {
     std::vector<btTypedConstraint*> joints;
   };
 
+  void find_manifolds();
   size_t root(size_t body);
   void join(const btCollisionObject& a, const btCollisionObject& b);
   void find_islands();
   Island& island_of(const btCollisionObject& a, const btCollisionObject& b);
   void solve(Island& island, double substep_s);
 
+  Broadphase& near_;
   Solver solver_;
   std::vector<btRigidBody*> bodies_;
   std::vector<btBroadphasePair*> pairs_;  // of bodies_, ordered by their numbers
   std::vector<btPersistentManifold*> manifolds_;
   std::vector<btTypedConstraint*> joints_;
+  btManifoldArray of_pair_;  // scratch
   ContactPoints::Scratch scratch_;
   std::vector<size_t> parents_, island_of_root_;  // union-find over bodies_
   std::vector<Island> islands_;
